@@ -1,0 +1,17 @@
+//! The physical world: real ephemerides, a user's motion and a described environment become IF samples.
+//!
+//! A [`scenario`] as written becomes a [`scene`] as meant. For each satellite, [`sky`] finds where
+//! it was when it sent what arrives now, effects ([`ray`]) act on the rays that reach the antenna,
+//! and [`synth`] turns delays and phases into samples. The truth is written beside them.
+
+pub mod catalogue;
+pub mod clock;
+pub mod effect;
+pub mod ray;
+pub mod scenario;
+pub mod scene;
+pub mod sky;
+pub mod stage;
+pub mod synth;
+pub mod truth;
+pub mod vehicle;

@@ -1,0 +1,52 @@
+//! What reaches the antenna: rays, the sight line that they belong to, and the effects that act on them.
+
+use nalgebra::Vector3;
+
+use crate::gnss::broadcast::State;
+use crate::gnss::earth::{Geodetic, Look};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+use crate::gnss::time::Epoch;
+
+/// The geometry between one satellite and the antenna at one instant of reception.
+#[derive(Clone, Debug)]
+pub struct Sight {
+    pub sv: Sv,
+    /// True GPS time of reception.
+    pub received: Epoch,
+    /// Antenna, in the ECEF axes of `received`.
+    pub user: Geodetic,
+    pub user_m: Vector3<f64>,
+    pub user_mps: Vector3<f64>,
+    /// Satellite when it sent what is received now, in the ECEF axes of `received`.
+    pub satellite: State,
+    /// Geometric range between the two.
+    pub range_m: f64,
+    pub look: Look,
+    /// Angle at the satellite between the Earth's centre and the antenna.
+    pub off_nadir_rad: f64,
+}
+
+/// One path from the satellite to the antenna.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// What the path adds to the geometric delay of the code …
+    pub code_delay_s: f64,
+    /// … and to that of the carrier.
+    pub carrier_delay_s: f64,
+    /// Carrier phase that comes from no delay (wind-up, reflection), in cycles.
+    pub phase_cycles: f64,
+    /// Carrier power over noise density, linear (Hz).
+    pub cn0_hz: f64,
+}
+
+/// Something that nature or hardware does to the rays of a satellite.
+///
+/// Laws: an effect of zero strength gives the same bits as its absence; the result depends on the
+/// arguments alone; effects commute, or the scene fixes their order.
+pub trait Effect: Send + Sync {
+    /// Name as a scenario writes it.
+    fn name(&self) -> &'static str;
+    /// Acts on every ray of `signal` along `sight`, or adds rays.
+    fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>);
+}

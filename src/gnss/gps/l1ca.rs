@@ -1,0 +1,88 @@
+//! GPS L1 C/A: Gold codes of 1023 chips at 1.023 Mchip/s on 1575.42 MHz.
+//!
+//! Source: IS-GPS-200N, 3.3.2.3 and table 3-Ia. The codes of PRN 1 to 37 are made from the two
+//! printed registers and the G2 delays; PRN 34 and 37 share a code, as the table says.
+
+use crate::gnss::satellite::System;
+use crate::gnss::signal::{Component, Message, Shape, Signal};
+
+/// Chips in a C/A code period.
+pub const CODE_CHIPS: u32 = 1023;
+
+/// The signal.
+pub static L1_CA: Signal = Signal {
+    name: "GPS L1 C/A",
+    rinex: "1C",
+    system: System::Gps,
+    carrier_hz: 1_575.42e6, // IS-GPS-200N, 3.3.1.1
+    components: &[Component {
+        power_share: 1.0,
+        phase_cycles: 0.0,
+        chip_rate_hz: 1.023e6, // IS-GPS-200N, 3.3.2.3
+        code_chips: CODE_CHIPS,
+        code,
+        shape: Shape { pulse: &[1] },
+        message: Some(Message::GpsLnav),
+    }],
+};
+
+/// Delay of G2 in chips for PRN 1 to 37 (IS-GPS-200N, table 3-Ia, "G2 delay").
+const G2_DELAY_CHIPS: [usize; 37] = [
+    5, 6, 7, 8, 17, 18, 139, 140, 141, 251, 252, 254, 255, 256, 257, 258, 469, 470, 471, 472, 473, 474, 509, 512, 513,
+    514, 515, 516, 859, 860, 861, 862, 863, 950, 947, 948, 950,
+];
+
+/// The C/A code of a PRN from 1 to 37 (IS-GPS-200N, 3.3.2.3, figures 3-8 to 3-10).
+pub fn code(prn: u8) -> Option<Vec<bool>> {
+    let delay = *G2_DELAY_CHIPS.get(usize::from(prn).checked_sub(1)?)?;
+    let g1 = register(&[3, 10]);
+    let g2 = register(&[2, 3, 6, 8, 9, 10]);
+    let length = CODE_CHIPS as usize;
+    Some((0..length).map(|i| g1[i] ^ g2[(i + length - delay) % length]).collect())
+}
+
+/// One period of a ten-stage register that starts with all ones; `taps` are the stages fed back.
+fn register(taps: &[usize]) -> Vec<bool> {
+    let mut stages = [true; 10];
+    (0..CODE_CHIPS)
+        .map(|_| {
+            let output = stages[9];
+            let feedback = taps.iter().fold(false, |sum, &stage| sum ^ stages[stage - 1]);
+            stages.rotate_right(1);
+            stages[0] = feedback;
+            output
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_ten_chips_are_the_printed_octal_of_every_prn() {
+        // IS-GPS-200N, table 3-Ia, "first 10 chips octal".
+        const FIRST_TEN: [u32; 37] = [
+            0o1440, 0o1620, 0o1710, 0o1744, 0o1133, 0o1455, 0o1131, 0o1454, 0o1626, 0o1504, 0o1642, 0o1750, 0o1764,
+            0o1772, 0o1775, 0o1776, 0o1156, 0o1467, 0o1633, 0o1715, 0o1746, 0o1763, 0o1063, 0o1706, 0o1743, 0o1761,
+            0o1770, 0o1774, 0o1127, 0o1453, 0o1625, 0o1712, 0o1745, 0o1713, 0o1134, 0o1456, 0o1713,
+        ];
+        for (index, expected) in FIRST_TEN.iter().enumerate() {
+            let code = code(index as u8 + 1).unwrap();
+            let first = code[..10].iter().fold(0, |word, &chip| word << 1 | u32::from(chip));
+            assert_eq!(first, *expected, "PRN {}", index + 1);
+        }
+        assert!(code(0).is_none() && code(38).is_none());
+    }
+
+    #[test]
+    fn autocorrelation_takes_only_the_values_of_a_gold_code() {
+        for prn in 1..=37 {
+            let code = code(prn).unwrap();
+            for shift in 1..1023 {
+                let agreements = (0..1023).filter(|&i| code[i] == code[(i + shift) % 1023]).count() as i32;
+                assert!([-65, -1, 63].contains(&(2 * agreements - 1023)), "PRN {prn} shift {shift}");
+            }
+        }
+    }
+}

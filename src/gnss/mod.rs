@@ -1,0 +1,18 @@
+//! The printed world: what interface documents and standards define, and nothing else.
+//!
+//! No truth and no opinions live here. Both generator and receiver use these modules, so an
+//! error in them would cancel in a closed loop: everything here is tested against something
+//! that this project did not write (`tests/witness.rs`).
+
+pub mod broadcast;
+pub mod earth;
+pub mod gps;
+pub mod klobuchar;
+pub mod record;
+#[cfg(feature = "generator")]
+pub mod rinex;
+pub mod samples;
+pub mod satellite;
+pub mod sigmf;
+pub mod signal;
+pub mod time;

@@ -1,0 +1,220 @@
+//! The rows that generator and receiver write and the judge joins, one CSV file a kind.
+//!
+//! A row says *when* by sample number: the only clock that truth and estimate share without
+//! agreeing on anything. Columns end with their unit; angles are in degrees in files, in radians nowhere.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Signal, by_name};
+use crate::gnss::time::Epoch;
+
+/// One satellite's signal at one sample: `observations.csv`, on both sides.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Observation {
+    pub sample: u64,
+    pub sv: Sv,
+    #[serde(with = "by_name")]
+    pub signal: &'static Signal,
+    /// What the satellite's clock read when it sent what arrives at this sample, as its signal
+    /// says (IS-GPS-200N, 20.3.3.3.3): whole GPS seconds …
+    pub sent_s: i64,
+    /// … and the fraction.
+    pub sent_fraction_s: f64,
+    /// Speed of light times (reading of the receiver's clock − time sent).
+    pub pseudorange_m: f64,
+    /// Accumulated carrier, growing with range (RINEX sense); the receiver's has an unknown whole number.
+    pub carrier_cycles: f64,
+    /// Positive when approaching (RINEX sense).
+    pub doppler_hz: f64,
+    pub cn0_dbhz: f64,
+    /// Time since the carrier was locked without interruption; in the truth, since the satellite appeared.
+    pub locked_s: f64,
+}
+
+impl Observation {
+    /// When the signal was sent, by the satellite's clock.
+    pub fn sent(&self) -> Epoch {
+        Epoch::new(self.sent_s, self.sent_fraction_s)
+    }
+}
+
+/// Where a satellite truly was as seen by the antenna: `truth/sky.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SkyRow {
+    pub sample: u64,
+    pub sv: Sv,
+    pub azimuth_deg: f64,
+    pub elevation_deg: f64,
+    /// Geometric range with light time and Earth rotation.
+    pub range_m: f64,
+    /// Satellite clock as the signal carries it (relativity and group delay included), in metres.
+    pub satellite_clock_m: f64,
+    /// Group delay of the ionosphere on this signal.
+    pub ionosphere_m: f64,
+    pub troposphere_m: f64,
+}
+
+/// Where the antenna was and what the clocks read: `truth/trajectory.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct TrajectoryRow {
+    pub sample: u64,
+    /// True GPS time of the sample: whole seconds since 1980 …
+    pub gps_s: i64,
+    /// … and the fraction.
+    pub gps_fraction_s: f64,
+    pub x_m: f64,
+    pub y_m: f64,
+    pub z_m: f64,
+    pub vx_mps: f64,
+    pub vy_mps: f64,
+    pub vz_mps: f64,
+    /// Reading of the receiver's clock minus true time.
+    pub clock_bias_s: f64,
+    pub clock_drift: f64,
+}
+
+impl TrajectoryRow {
+    /// True GPS time of the sample.
+    pub fn time(&self) -> Epoch {
+        Epoch::new(self.gps_s, self.gps_fraction_s)
+    }
+
+    /// ECEF position.
+    pub fn position_m(&self) -> Vector3<f64> {
+        Vector3::new(self.x_m, self.y_m, self.z_m)
+    }
+
+    /// ECEF velocity.
+    pub fn velocity_mps(&self) -> Vector3<f64> {
+        Vector3::new(self.vx_mps, self.vy_mps, self.vz_mps)
+    }
+}
+
+/// One position solution: `rx/fixes.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Fix {
+    pub sample: u64,
+    /// GPS time of the sample as the receiver found it: whole seconds since 1980 …
+    pub gps_s: i64,
+    /// … and the fraction.
+    pub gps_fraction_s: f64,
+    pub x_m: f64,
+    pub y_m: f64,
+    pub z_m: f64,
+    pub vx_mps: f64,
+    pub vy_mps: f64,
+    pub vz_mps: f64,
+    /// Reading of the receiver's clock minus GPS time, and its rate.
+    pub clock_bias_s: f64,
+    pub clock_drift: f64,
+    /// Formal standard deviations in the local frame, and of the clock.
+    pub sigma_east_m: f64,
+    pub sigma_north_m: f64,
+    pub sigma_up_m: f64,
+    pub sigma_clock_m: f64,
+    pub gdop: f64,
+    pub pdop: f64,
+    pub hdop: f64,
+    pub vdop: f64,
+    pub tdop: f64,
+    /// Satellites in the solution.
+    pub satellites: u32,
+    /// Weighted sum of squared residuals; its degrees of freedom are `satellites` − 4.
+    pub chi_square: f64,
+    /// Satellites left out by the residual test, separated by blanks.
+    pub excluded: String,
+    /// Whether the ionosphere was corrected with decoded parameters.
+    pub ionosphere: bool,
+}
+
+impl Fix {
+    /// GPS time of the sample as the receiver found it.
+    pub fn time(&self) -> Epoch {
+        Epoch::new(self.gps_s, self.gps_fraction_s)
+    }
+
+    /// ECEF position.
+    pub fn position_m(&self) -> Vector3<f64> {
+        Vector3::new(self.x_m, self.y_m, self.z_m)
+    }
+
+    /// ECEF velocity.
+    pub fn velocity_mps(&self) -> Vector3<f64> {
+        Vector3::new(self.vx_mps, self.vy_mps, self.vz_mps)
+    }
+}
+
+/// The outcome of a search for one satellite: `rx/acquisition.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct AcquisitionRow {
+    /// First sample searched.
+    pub sample: u64,
+    pub sv: Sv,
+    #[serde(with = "by_name")]
+    pub signal: &'static Signal,
+    pub acquired: bool,
+    /// Largest detection statistic of the search, and the threshold that it had to pass.
+    pub statistic: f64,
+    pub threshold: f64,
+    pub doppler_hz: f64,
+    /// Code phase at `sample`.
+    pub code_phase_chips: f64,
+    pub cn0_dbhz: f64,
+}
+
+/// A tracking loop at work: `rx/tracking.csv`, thinned.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct TrackingRow {
+    pub sample: u64,
+    pub sv: Sv,
+    #[serde(with = "by_name")]
+    pub signal: &'static Signal,
+    /// Prompt correlator, in units of its noise's standard deviation per component.
+    pub prompt_i: f64,
+    pub prompt_q: f64,
+    /// Raw discriminators of this update.
+    pub dll_discriminator_chips: f64,
+    pub pll_discriminator_cycles: f64,
+    pub fll_discriminator_hz: f64,
+    pub cn0_dbhz: f64,
+    /// cos of twice the phase error, averaged: 1 is perfect lock.
+    pub phase_lock: f64,
+    pub integration_s: f64,
+}
+
+/// One parameter of a navigation message as its raw integer: `navigation.csv`, on both sides.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct NavigationRow {
+    pub sv: Sv,
+    /// What identifies the data set within the satellite: the issue of data for ephemerides, 0 otherwise.
+    pub issue: u32,
+    /// Name in the message's field table.
+    pub parameter: String,
+    pub raw: i64,
+}
+
+/// Something that happened to a channel: `rx/events.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct EventRow {
+    pub sample: u64,
+    pub sv: Sv,
+    #[serde(with = "by_name")]
+    pub signal: &'static Signal,
+    pub event: Event,
+}
+
+/// What can happen to a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Event {
+    Acquired,
+    PhaseLocked,
+    BitSynchronised,
+    FrameSynchronised,
+    EphemerisComplete,
+    LossOfLock,
+    /// The half-cycle or whole-cycle count of the carrier was broken and restarted.
+    CycleSlip,
+}

@@ -1,0 +1,221 @@
+//! IF samples as files hold them: formats, packing, and what a data sheet says of a recording.
+//!
+//! Formats carry SigMF's names (SigMF 1.2, "Dataset format"). Inside, samples are planar `f32`
+//! in units of the format's least significant bit. Integers saturate symmetrically and round half to even.
+
+use std::fmt;
+use std::str::FromStr;
+
+use thiserror::Error;
+
+use crate::gnss::signal::Signal;
+use crate::gnss::time::{Epoch, Rate};
+
+/// How one sample is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Complex, 8 bits a component, two's complement.
+    Ci8,
+    /// Complex, 8 bits a component, offset binary: zero lies between 127 and 128.
+    Cu8,
+    /// Complex, 16 bits a component, little endian.
+    Ci16Le,
+    /// Complex, IEEE 754 single precision, little endian.
+    Cf32Le,
+    /// Real, 8 bits, two's complement.
+    Ri8,
+    /// Real, 16 bits, little endian.
+    Ri16Le,
+}
+
+/// Why a text names no format.
+#[derive(Debug, Error, PartialEq)]
+#[error("unknown sample format '{0}': expected one of ci8, cu8, ci16_le, cf32_le, ri8, ri16_le")]
+pub struct FormatError(String);
+
+impl Format {
+    /// Every format with its SigMF name.
+    pub const NAMES: [(Self, &'static str); 6] = [
+        (Self::Ci8, "ci8"),
+        (Self::Cu8, "cu8"),
+        (Self::Ci16Le, "ci16_le"),
+        (Self::Cf32Le, "cf32_le"),
+        (Self::Ri8, "ri8"),
+        (Self::Ri16Le, "ri16_le"),
+    ];
+
+    /// SigMF's name.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(format, _)| *format == self).map_or("", |(_, name)| *name)
+    }
+
+    /// Bytes of one sample, both components if it is complex.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::Ri8 => 1,
+            Self::Ci8 | Self::Cu8 | Self::Ri16Le => 2,
+            Self::Ci16Le => 4,
+            Self::Cf32Le => 8,
+        }
+    }
+
+    /// Whether a sample has a quadrature component.
+    pub fn is_complex(self) -> bool {
+        !matches!(self, Self::Ri8 | Self::Ri16Le)
+    }
+
+    /// Largest magnitude a component can take, in LSB; `None` for floating point.
+    pub fn full_scale_lsb(self) -> Option<f32> {
+        match self {
+            Self::Ci8 | Self::Ri8 => Some(127.0),
+            Self::Cu8 => Some(127.5),
+            Self::Ci16Le | Self::Ri16Le => Some(32_767.0),
+            Self::Cf32Le => None,
+        }
+    }
+
+    /// Appends samples `i + jq`, in LSB, to `out`. Real formats ignore `q`.
+    pub fn pack(self, i: &[f32], q: &[f32], out: &mut Vec<u8>) {
+        out.reserve(i.len() * self.bytes());
+        let pairs = i.iter().zip(q);
+        match self {
+            Self::Ci8 => pairs.for_each(|(i, q)| out.extend([round_i8(*i) as u8, round_i8(*q) as u8])),
+            Self::Cu8 => pairs.for_each(|(i, q)| out.extend([round_u8(*i), round_u8(*q)])),
+            Self::Ci16Le => pairs.for_each(|(i, q)| {
+                let [a, b] = round_i16(*i).to_le_bytes();
+                let [c, d] = round_i16(*q).to_le_bytes();
+                out.extend([a, b, c, d]);
+            }),
+            Self::Cf32Le => pairs.for_each(|(i, q)| {
+                out.extend(i.to_le_bytes());
+                out.extend(q.to_le_bytes());
+            }),
+            Self::Ri8 => out.extend(i.iter().map(|i| round_i8(*i) as u8)),
+            Self::Ri16Le => i.iter().for_each(|i| out.extend(round_i16(*i).to_le_bytes())),
+        }
+    }
+
+    /// Reads the whole samples in `bytes` into planar LSB values, replacing what `i` and `q` held.
+    /// Real formats give `q` = 0; a cut sample at the end is left out. A non-finite float reads as 0.
+    pub fn unpack(self, bytes: &[u8], i: &mut Vec<f32>, q: &mut Vec<f32>) {
+        i.clear();
+        q.clear();
+        let samples = bytes.chunks_exact(self.bytes());
+        match self {
+            Self::Ci8 => samples.for_each(|s| {
+                i.push(f32::from(s[0] as i8));
+                q.push(f32::from(s[1] as i8));
+            }),
+            Self::Cu8 => samples.for_each(|s| {
+                i.push(f32::from(s[0]) - 127.5);
+                q.push(f32::from(s[1]) - 127.5);
+            }),
+            Self::Ci16Le => samples.for_each(|s| {
+                i.push(f32::from(i16::from_le_bytes([s[0], s[1]])));
+                q.push(f32::from(i16::from_le_bytes([s[2], s[3]])));
+            }),
+            Self::Cf32Le => samples.for_each(|s| {
+                i.push(finite(f32::from_le_bytes([s[0], s[1], s[2], s[3]])));
+                q.push(finite(f32::from_le_bytes([s[4], s[5], s[6], s[7]])));
+            }),
+            Self::Ri8 => i.extend(bytes.iter().map(|b| f32::from(*b as i8))),
+            Self::Ri16Le => samples.for_each(|s| i.push(f32::from(i16::from_le_bytes([s[0], s[1]])))),
+        }
+        q.resize(i.len(), 0.0);
+    }
+}
+
+/// Adding this to an `f32` of magnitude below 2^22 leaves its integer, rounded half to even, in the low bits.
+const ROUNDING_BIAS: f32 = 12_582_912.0;
+
+fn round_i8(x: f32) -> i8 {
+    (x.clamp(-127.0, 127.0) + ROUNDING_BIAS).to_bits() as i8
+}
+
+fn round_u8(x: f32) -> u8 {
+    ((x + 127.5).clamp(0.0, 255.0) + ROUNDING_BIAS).to_bits() as u8
+}
+
+fn round_i16(x: f32) -> i16 {
+    (x.clamp(-32_767.0, 32_767.0) + ROUNDING_BIAS).to_bits() as i16
+}
+
+fn finite(x: f32) -> f32 {
+    if x.is_finite() { x } else { 0.0 }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Format {
+    type Err = FormatError;
+
+    fn from_str(text: &str) -> Result<Self, FormatError> {
+        let short = text.trim().to_ascii_lowercase();
+        Self::NAMES
+            .iter()
+            .find(|(_, name)| *name == short || name.strip_suffix("_le") == Some(&short))
+            .map(|(format, _)| *format)
+            .ok_or_else(|| FormatError(text.to_owned()))
+    }
+}
+
+/// What a data sheet says of a stream of samples; no truth can be written here.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IfMetadata {
+    pub format: Format,
+    /// Samples a second by the recorder's clock.
+    pub rate: Rate,
+    /// The radio frequency that appears at 0 Hz in the samples.
+    pub center_hz: f64,
+    /// Whether the spectrum is mirrored about `center_hz` (local oscillator above the signal).
+    pub inverted: bool,
+    /// What the recorder's clock read at sample 0, if it was written down.
+    pub start: Option<Epoch>,
+}
+
+impl IfMetadata {
+    /// The frequency at which a carrier of that signal with no Doppler appears in the samples.
+    pub fn if_hz(&self, signal: &Signal) -> f64 {
+        let offset_hz = signal.carrier_hz - self.center_hz;
+        if self.inverted { -offset_hz } else { offset_hz }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integer_formats_round_half_to_even_and_saturate_symmetrically() {
+        let i = [0.5_f32, 1.5, -0.5, -2.5, 126.6, 127.4, 1e9, -1e9, f32::NAN];
+        let q = [0.0_f32; 9];
+        let (mut back_i, mut back_q) = (Vec::new(), Vec::new());
+        let mut bytes = Vec::new();
+        Format::Ci8.pack(&i, &q, &mut bytes);
+        Format::Ci8.unpack(&bytes, &mut back_i, &mut back_q);
+        assert_eq!(back_i[..8], [0.0, 2.0, 0.0, -2.0, 127.0, 127.0, 127.0, -127.0]);
+        assert_eq!(back_q, q);
+    }
+
+    #[test]
+    fn every_format_gives_back_what_it_can_hold() {
+        for (format, name) in Format::NAMES {
+            assert_eq!(name.parse::<Format>().unwrap(), format);
+            let offset = if format == Format::Cu8 { 0.5 } else { 0.0 };
+            let i: Vec<f32> = (-100..100).map(|x| x as f32 + offset).collect();
+            let q: Vec<f32> = if format.is_complex() { i.iter().rev().copied().collect() } else { vec![0.0; i.len()] };
+            let (mut bytes, mut back_i, mut back_q) = (Vec::new(), Vec::new(), Vec::new());
+            format.pack(&i, &q, &mut bytes);
+            assert_eq!(bytes.len(), i.len() * format.bytes());
+            bytes.extend(vec![1; format.bytes() - 1]);
+            format.unpack(&bytes, &mut back_i, &mut back_q);
+            assert_eq!((back_i, back_q), (i, q), "{name}");
+        }
+        assert_eq!("CI16".parse(), Ok(Format::Ci16Le));
+        assert!("ci12".parse::<Format>().is_err());
+    }
+}

@@ -1,0 +1,110 @@
+//! Which satellite: its system and its number there, written as RINEX does (`G05`).
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A satellite system (RINEX 4.02, table 2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum System {
+    Gps,
+    Glonass,
+    Galileo,
+    BeiDou,
+    Qzss,
+    Navic,
+    Sbas,
+}
+
+impl System {
+    /// Every system, with its RINEX letter.
+    pub const LETTERS: [(Self, char); 7] = [
+        (Self::Gps, 'G'),
+        (Self::Glonass, 'R'),
+        (Self::Galileo, 'E'),
+        (Self::BeiDou, 'C'),
+        (Self::Qzss, 'J'),
+        (Self::Navic, 'I'),
+        (Self::Sbas, 'S'),
+    ];
+
+    /// The RINEX letter.
+    pub fn letter(self) -> char {
+        Self::LETTERS.iter().find(|(system, _)| *system == self).map_or('?', |(_, letter)| *letter)
+    }
+}
+
+/// A satellite: system and number (for GPS, the PRN).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct Sv {
+    pub system: System,
+    pub number: u8,
+}
+
+/// Why a text is not a satellite.
+#[derive(Debug, Error, PartialEq)]
+#[error("'{0}' is not a satellite: expected a system letter and a number, like G05")]
+pub struct SvError(String);
+
+impl Sv {
+    /// A GPS satellite by its PRN.
+    pub const fn gps(number: u8) -> Self {
+        Self { system: System::Gps, number }
+    }
+}
+
+impl fmt::Display for Sv {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // Through `pad`, so that width and alignment work.
+        f.pad(&format!("{}{:02}", self.system.letter(), self.number))
+    }
+}
+
+impl FromStr for Sv {
+    type Err = SvError;
+
+    fn from_str(text: &str) -> Result<Self, SvError> {
+        let error = || SvError(text.to_owned());
+        let mut chars = text.chars();
+        let letter = chars.next().ok_or_else(error)?;
+        let &(system, _) = System::LETTERS.iter().find(|(_, l)| *l == letter).ok_or_else(error)?;
+        let digits = chars.as_str();
+        if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit()) {
+            return Err(error());
+        }
+        let number = digits.parse().map_err(|_| error())?;
+        if number == 0 { Err(error()) } else { Ok(Self { system, number }) }
+    }
+}
+
+impl From<Sv> for String {
+    fn from(sv: Sv) -> Self {
+        sv.to_string()
+    }
+}
+
+impl TryFrom<String> for Sv {
+    type Error = SvError;
+
+    fn try_from(text: String) -> Result<Self, SvError> {
+        text.parse()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_satellite_reads_back_as_written_and_nonsense_is_refused() {
+        for text in ["G05", "E36", "R24", "C63"] {
+            assert_eq!(text.parse::<Sv>().unwrap().to_string(), text);
+        }
+        for text in ["", "G", "5", "X05", "G00", "G-5", "G+5", "G999", "g05", "GÉ"] {
+            assert!(text.parse::<Sv>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! GPS time as whole seconds and a fraction, and the exact time of a sample.
+//!
+//! One `f64` of seconds since 1980 resolves only 0.2 µs (71 m), so an [`Epoch`] keeps the
+//! whole seconds as an integer: its resolution is 1e-16 s everywhere. Calendar dates and leap
+//! seconds come from the `hifitime` crate and are met only at the edges (files, labels).
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Seconds in a GPS week (IS-GPS-200N, 3.3.4).
+pub const WEEK_S: i64 = 604_800;
+
+/// An instant of GPS time: whole seconds since 1980-01-06T00:00:00 and a fraction in [0, 1).
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
+pub struct Epoch {
+    seconds: i64,
+    fraction: f64,
+}
+
+/// Why a text is not an instant.
+#[derive(Debug, Error, PartialEq)]
+#[error(
+    "'{text}' is not a time: expected GPS time like 2010-07-01T08:12:30, or UTC with a final Z, from 1980-01-06 to 2180"
+)]
+pub struct TimeError {
+    text: String,
+}
+
+impl Epoch {
+    /// The instant `seconds + fraction` after 1980-01-06T00:00:00 GPST; any finite fraction is carried.
+    pub fn new(seconds: i64, fraction: f64) -> Self {
+        let carry = fraction.floor();
+        let rest = fraction - carry;
+        // A tiny negative fraction rounds to exactly 1.0 here.
+        if rest >= 1.0 {
+            Self { seconds: seconds + carry as i64 + 1, fraction: 0.0 }
+        } else {
+            Self { seconds: seconds + carry as i64, fraction: rest }
+        }
+    }
+
+    /// The instant at `tow_s` seconds of the (continuous, not modulo 1024) GPS week.
+    pub fn from_week(week: u32, tow_s: f64) -> Self {
+        Self::new(i64::from(week) * WEEK_S, 0.0).plus_s(tow_s)
+    }
+
+    /// Reads `YYYY-MM-DDThh:mm:ss[.f]` as GPS time, or as UTC when it ends in `Z`.
+    pub fn parse(text: &str) -> Result<Self, TimeError> {
+        let error = || TimeError { text: text.to_owned() };
+        let (body, scale) = match text.trim().strip_suffix('Z') {
+            Some(body) => (body, hifitime::TimeScale::UTC),
+            None => (text.trim(), hifitime::TimeScale::GPST),
+        };
+        let (date, clock) = body.split_once(['T', ' ']).ok_or_else(error)?;
+        let mut date = date.splitn(3, '-');
+        let mut clock = clock.splitn(3, ':');
+        let mut next = |from_date: bool| if from_date { date.next() } else { clock.next() }.ok_or_else(error);
+        let year: i32 = next(true)?.parse().map_err(|_| error())?;
+        let month: u8 = next(true)?.parse().map_err(|_| error())?;
+        let day: u8 = next(true)?.parse().map_err(|_| error())?;
+        let hour: u8 = next(false)?.parse().map_err(|_| error())?;
+        let minute: u8 = next(false)?.parse().map_err(|_| error())?;
+        let second_text = next(false)?;
+        let (whole, fraction) = second_text.split_once('.').unwrap_or((second_text, ""));
+        let second: u8 = whole.parse().map_err(|_| error())?;
+        if !fraction.bytes().all(|b| b.is_ascii_digit()) {
+            return Err(error());
+        }
+        let fraction: f64 =
+            if fraction.is_empty() { 0.0 } else { format!("0.{fraction}").parse().map_err(|_| error())? };
+        if !(1980..=2180).contains(&year) {
+            return Err(error());
+        }
+        let epoch = hifitime::Epoch::maybe_from_gregorian(year, month, day, hour, minute, second, 0, scale)
+            .map_err(|_| error())?
+            .to_time_scale(hifitime::TimeScale::GPST);
+        let nanoseconds = epoch.duration.total_nanoseconds();
+        if nanoseconds < 0 {
+            return Err(error());
+        }
+        let seconds = i64::try_from(nanoseconds / 1_000_000_000).map_err(|_| error())?;
+        Ok(Self::new(seconds, fraction))
+    }
+
+    /// Whole seconds since 1980-01-06T00:00:00 GPST.
+    pub fn seconds(self) -> i64 {
+        self.seconds
+    }
+
+    /// Seconds after [`Self::seconds`], in [0, 1).
+    pub fn fraction(self) -> f64 {
+        self.fraction
+    }
+
+    /// Continuous GPS week number.
+    pub fn week(self) -> i64 {
+        self.seconds.div_euclid(WEEK_S)
+    }
+
+    /// Time of week; resolves 6e-11 s at the week's end, so never for code phase.
+    pub fn tow_s(self) -> f64 {
+        self.tow_whole_s() as f64 + self.fraction
+    }
+
+    /// Whole seconds of the week, 0..604 800.
+    pub fn tow_whole_s(self) -> i64 {
+        self.seconds.rem_euclid(WEEK_S)
+    }
+
+    /// The instant `dt_s` later (or earlier, if negative).
+    pub fn plus_s(self, dt_s: f64) -> Self {
+        let whole = dt_s.floor();
+        Self::new(self.seconds + whole as i64, self.fraction + (dt_s - whole))
+    }
+
+    /// Seconds from `earlier` to `self`; exact to 1e-16 s while they are within a second.
+    pub fn since(self, earlier: Self) -> f64 {
+        (self.seconds - earlier.seconds) as f64 + (self.fraction - earlier.fraction)
+    }
+
+    fn hifitime(self, scale: hifitime::TimeScale) -> hifitime::Epoch {
+        let nanoseconds = self.seconds as i128 * 1_000_000_000 + (self.fraction * 1e9) as i128;
+        hifitime::Epoch::from_duration(
+            hifitime::Duration::from_total_nanoseconds(nanoseconds),
+            hifitime::TimeScale::GPST,
+        )
+        .to_time_scale(scale)
+    }
+
+    /// `YYYY-MM-DDThh:mm:ss.ssssssZ`, in UTC.
+    pub fn to_utc_text(self) -> String {
+        let (y, m, d, hh, mm, ss, ns) = self.hifitime(hifitime::TimeScale::UTC).to_gregorian(hifitime::TimeScale::UTC);
+        format!("{y:04}-{m:02}-{d:02}T{hh:02}:{mm:02}:{ss:02}.{:06}Z", ns / 1000)
+    }
+
+    /// UTC calendar date of this instant and its day of the year counted from 1.0.
+    pub fn day_of_year(self) -> f64 {
+        self.hifitime(hifitime::TimeScale::UTC).day_of_year()
+    }
+
+    /// GPS time minus UTC, in whole seconds, at this instant.
+    pub fn leap_seconds(self) -> i64 {
+        // TAI - GPST is 19 s by definition.
+        self.hifitime(hifitime::TimeScale::UTC).leap_seconds(true).map_or(0, |tai_utc| tai_utc as i64 - 19)
+    }
+}
+
+impl fmt::Display for Epoch {
+    /// `YYYY-MM-DDThh:mm:ss.ssssss`, in GPS time.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (y, m, d, hh, mm, ss, ns) =
+            self.hifitime(hifitime::TimeScale::GPST).to_gregorian(hifitime::TimeScale::GPST);
+        write!(f, "{y:04}-{m:02}-{d:02}T{hh:02}:{mm:02}:{ss:02}.{:06}", ns / 1000)
+    }
+}
+
+/// A sample rate as an exact fraction of integers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rate {
+    samples: u64,
+    seconds: u64,
+}
+
+impl Rate {
+    /// A rate given in hertz, exact to the millihertz; `None` unless it is positive and below 1 THz.
+    pub fn from_hz(hz: f64) -> Option<Self> {
+        if !(hz.is_finite() && hz >= 1e-3 && hz < 1e12) {
+            return None;
+        }
+        let milli = (hz * 1000.0).round() as u64;
+        Some(if milli % 1000 == 0 {
+            Self { samples: milli / 1000, seconds: 1 }
+        } else {
+            Self { samples: milli, seconds: 1000 }
+        })
+    }
+
+    /// The rate in hertz.
+    pub fn hz(self) -> f64 {
+        self.samples as f64 / self.seconds as f64
+    }
+
+    /// Time from sample 0 to sample `n`: whole seconds and a fraction in [0, 1), exact.
+    pub fn elapsed(self, n: u64) -> (i64, f64) {
+        let ticks = u128::from(n) * u128::from(self.seconds);
+        let whole = ticks / u128::from(self.samples);
+        let rest = ticks % u128::from(self.samples);
+        (whole as i64, rest as f64 / self.samples as f64)
+    }
+
+    /// Time from sample 0 to sample `n` in one number; resolves 1e-16 of its size.
+    pub fn elapsed_s(self, n: u64) -> f64 {
+        let (whole, fraction) = self.elapsed(n);
+        whole as f64 + fraction
+    }
+
+    /// The number of the first sample at or after `numerator / denominator` seconds.
+    pub fn first_sample_at(self, numerator: u64, denominator: u64) -> u64 {
+        let ticks = u128::from(numerator) * u128::from(self.samples);
+        ticks.div_ceil(u128::from(denominator) * u128::from(self.seconds)) as u64
+    }
+}
+
+/// Turns of a tone of `hz` (to the millihertz) at sample `n`, modulo one, as a fraction of 2^64; exact in `n`.
+pub fn tone_turns(hz: f64, rate: Rate, n: u64) -> u64 {
+    let milli = (hz * 1000.0).round() as i128;
+    // Phase in turns = n * milli / 1000 * seconds / samples; keep the remainder only.
+    let modulus = 1000 * i128::from(rate.samples);
+    let step = (milli * i128::from(rate.seconds)).rem_euclid(modulus);
+    let phase = (step as u128 * u128::from(n)) % modulus as u128;
+    // modulus < 2^60, so the shifted value fits in 128 bits after one split.
+    let high = (phase << 64) / modulus as u128;
+    high as u64
+}
+
+/// The clock of a sampler: sample 0 is taken when it reads `start`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleClock {
+    /// Reading at sample 0.
+    pub start: Epoch,
+    /// Samples a second, as the sampler's own clock counts them.
+    pub rate: Rate,
+}
+
+impl SampleClock {
+    /// What the sampler's clock reads at sample `n`.
+    pub fn epoch(self, n: u64) -> Epoch {
+        let (whole, fraction) = self.rate.elapsed(n);
+        Epoch::new(self.start.seconds + whole, self.start.fraction + fraction)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gps_and_utc_labels_agree_with_the_leap_second_table() {
+        // IERS Bulletin C 37: 15 leap seconds between GPS time and UTC in July 2010.
+        let gps = Epoch::parse("2010-07-01T00:00:15").unwrap();
+        assert_eq!(gps, Epoch::parse("2010-07-01T00:00:00Z").unwrap());
+        assert_eq!(gps.leap_seconds(), 15);
+        assert_eq!((gps.week(), gps.tow_whole_s()), (1590, 4 * 86_400 + 15));
+        assert_eq!(gps.to_utc_text(), "2010-07-01T00:00:00.000000Z");
+        assert_eq!(Epoch::parse("2010-07-01T08:12:30.25").unwrap().to_string(), "2010-07-01T08:12:30.250000");
+    }
+
+    #[test]
+    fn what_is_not_a_time_is_refused() {
+        for text in [
+            "",
+            "2010-07-01",
+            "2010-13-01T00:00:00",
+            "2010-02-30T00:00:00",
+            "1979-01-01T00:00:00",
+            "2010-07-01T00:00:0x",
+        ] {
+            assert!(Epoch::parse(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn arithmetic_keeps_sixteen_digits_of_a_second() {
+        let epoch = Epoch::from_week(2400, 604_799.999_999);
+        let later = epoch.plus_s(1e-6 + 1e-12);
+        // Half an ulp of the fraction (5.5e-17) plus the rounding of the literal's 604 799.999 999 (6e-11).
+        assert!((later.since(epoch) - 1.000_001e-6).abs() < 2.3e-16);
+        assert_eq!(Epoch::new(5, -1e-20).fraction(), 0.0);
+    }
+
+    #[test]
+    fn sample_times_are_exact_after_thirty_days_at_fifty_megahertz() {
+        let rate = Rate::from_hz(50e6).unwrap();
+        let n = 30 * 86_400 * 50_000_000 + 1;
+        assert_eq!(rate.elapsed(n), (30 * 86_400, 1.0 / 50e6));
+        assert_eq!(rate.first_sample_at(30 * 864_000, 10), n - 1);
+        // 12.5 MHz at 50 Msps is a quarter turn a sample.
+        assert_eq!(tone_turns(12.5e6, rate, n), 1 << 62);
+        assert_eq!(tone_turns(-12.5e6, rate, n), 3 << 62);
+    }
+}

@@ -1,0 +1,15 @@
+//! The estimating world: one designer's receiver, from IF samples to position.
+//!
+//! It sees IF metadata, samples and settings; no argument can carry truth. [`acquire`] finds
+//! satellites, [`track`] follows them with [`correlate`], [`decode`] reads their messages,
+//! [`observe`] makes observables at common epochs and [`position`] solves for place and time.
+
+pub mod acquire;
+pub mod correlate;
+pub mod decode;
+pub mod observe;
+pub mod output;
+pub mod position;
+pub mod settings;
+pub mod source;
+pub mod track;
