@@ -166,11 +166,11 @@ pub struct Rate {
 impl Rate {
     /// A rate given in hertz, exact to the millihertz; `None` unless it is positive and below 1 THz.
     pub fn from_hz(hz: f64) -> Option<Self> {
-        if !(hz.is_finite() && hz >= 1e-3 && hz < 1e12) {
+        if !(hz.is_finite() && (1e-3..1e12).contains(&hz)) {
             return None;
         }
         let milli = (hz * 1000.0).round() as u64;
-        Some(if milli % 1000 == 0 {
+        Some(if milli.is_multiple_of(1000) {
             Self { samples: milli / 1000, seconds: 1 }
         } else {
             Self { samples: milli, seconds: 1000 }
