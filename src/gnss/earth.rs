@@ -12,6 +12,7 @@ pub const EARTH_ROTATION_RADPS: f64 = 7.292_115_146_7e-5;
 /// Earth's gravitational parameter for GPS users (IS-GPS-200N, table 20-IV).
 pub const GPS_MU_M3PS2: f64 = 3.986_005e14;
 /// π as the broadcast algorithm prints it (IS-GPS-200N, table 20-IV).
+#[expect(clippy::approx_constant, reason = "the document prints this many digits and both ends must use them")]
 pub const GPS_PI: f64 = 3.141_592_653_589_8;
 /// Semi-major axis of the WGS 84 ellipsoid.
 pub const SEMI_MAJOR_AXIS_M: f64 = 6_378_137.0;
