@@ -5,6 +5,9 @@
 //! before. One knot at rest is a static antenna. Where the acceleration's slope jumps, a break is reported, so
 //! that knots of the signal can be put there. Attitude is not modelled.
 
+pub mod ramp;
+pub mod route;
+
 use nalgebra::Vector3;
 
 /// Position, velocity and acceleration of the antenna in ECEF.
