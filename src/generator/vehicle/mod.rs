@@ -5,8 +5,11 @@
 //! before. One knot at rest is a static antenna. Where the acceleration's slope jumps, a break is reported, so
 //! that knots of the signal can be put there. Attitude is not modelled.
 
+pub mod file;
 pub mod ramp;
+pub mod rocket;
 pub mod route;
+pub mod spline;
 
 use nalgebra::Vector3;
 
