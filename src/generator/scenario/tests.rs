@@ -265,3 +265,51 @@ fn a_front_end_puts_l1_where_the_scenario_says() {
         assert_eq!((scene.samples, scene.noise_lsb), (40_000_000, 3.0));
     }
 }
+
+/// The scenarios that come with the program.
+const SHIPPED: [(&str, &str); 5] = [
+    ("static", include_str!("../../../scenarios/static.toml")),
+    ("moderate", include_str!("../../../scenarios/moderate.toml")),
+    ("high_dynamics", include_str!("../../../scenarios/high_dynamics.toml")),
+    ("noise_free", include_str!("../../../scenarios/noise_free.toml")),
+    ("trajectory_file", include_str!("../../../scenarios/trajectory_file.toml")),
+];
+
+fn shipped(name: &str) -> crate::generator::scene::Scene {
+    let (_, text) = SHIPPED.iter().find(|(n, _)| *n == name).unwrap();
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let (scene, warnings) = Scenario::parse(text, name).unwrap().compose(&directory, &Overrides::default()).unwrap();
+    println!("{name}: {warnings:?}");
+    scene
+}
+
+#[test]
+fn shipped_scenarios_begin_two_seconds_before_a_frame_with_the_ionosphere_s_page() {
+    for (name, text) in SHIPPED {
+        let scenario = Scenario::parse(text, name).unwrap();
+        assert_eq!(scenario.name, name);
+        let frame = scenario.start.tow_whole_s() + 2;
+        // IS-GPS-200N, 20.3.3.5.1.1 and table 20-V: page 18 of subframe 4, frames counted from the week's start.
+        assert_eq!((frame % 30, frame / 30 % 25 + 1), (0, 18), "{name}");
+    }
+}
+
+#[test]
+fn the_shipped_motions_do_what_their_comments_say() {
+    let g = 9.806_65;
+    let moderate = shipped("moderate").trajectory;
+    let extremes = moderate.extremes(90.0);
+    assert!(
+        (29.0..=30.1).contains(&extremes.speed_mps) && (3.9..4.1).contains(&extremes.acceleration_mps2),
+        "{extremes:?}"
+    );
+    assert!(moderate.at(5.0).velocity_mps.norm() > 8.0);
+    let rocket = shipped("high_dynamics").trajectory;
+    let extremes = rocket.extremes(110.0);
+    assert!(extremes.acceleration_mps2 > 20.0 * g && extremes.speed_mps > 700.0, "{extremes:?}");
+    let height_m = |t_s| crate::gnss::earth::Geodetic::from_ecef(&rocket.at(t_s).position_m).height_m;
+    println!("high_dynamics: {extremes:?} height at the end {}", height_m(110.0));
+    assert!(height_m(40.0) < 130.001 && height_m(110.0) > 10_000.0);
+    let ride = shipped("trajectory_file").trajectory.extremes(60.0);
+    assert!(ride.speed_mps < 4.0 && ride.acceleration_mps2 < 1.0, "{ride:?}");
+}
