@@ -394,3 +394,16 @@ fn power_by_satellite_reaches_the_rays() {
         assert_eq!(rays[0].code_delay_s, 0.0);
     }
 }
+
+proptest::proptest! {
+    #[test]
+    fn no_text_makes_the_parser_panic(text in "\\PC{0,200}", at in 0_usize..2_000, cut in 0_usize..40) {
+        let _ = parse(&text);
+        // The full scene with a piece replaced.
+        let whole = full();
+        let bytes = whole.as_bytes();
+        let (from, to) = (at.min(bytes.len()), (at + cut).min(bytes.len()));
+        let damaged = [&bytes[..from], text.as_bytes(), &bytes[to..]].concat();
+        let _ = parse(&String::from_utf8_lossy(&damaged));
+    }
+}

@@ -470,4 +470,15 @@ mod tests {
             assert!(error.contains(reason), "{text}: {error}");
         }
     }
+
+    proptest::proptest! {
+        #[test]
+        fn no_bytes_make_the_readers_panic(bytes: Vec<u8>, rows in "[-0-9.,e\\n]{0,80}", tail in "[0-9A-Z.,*]{0,60}") {
+            let _ = read_csv(bytes.as_slice(), "any", &options());
+            let _ = read_nmea(bytes.as_slice(), "any", &options());
+            let _ = csv(&format!("{HEADER}{rows}"));
+            let _ = read_nmea(format!("$GPGGA,{tail}").as_bytes(), "any", &options());
+            let _ = read_nmea(sentence(&format!("GPGGA,{tail}")).as_bytes(), "any", &options());
+        }
+    }
 }
