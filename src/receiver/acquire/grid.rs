@@ -15,6 +15,7 @@ use rustfft::{Fft, FftPlanner};
 
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
+use super::threshold::{of_one_cell, threshold};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Signal;
 use crate::receiver::source::Block;
@@ -38,6 +39,11 @@ pub(super) struct Grid {
     /// Lags in one code period, and the samples between them.
     pub lags: usize,
     pub lag_samples: f64,
+    /// What a satellite's statistic has to exceed.
+    pub threshold: f64,
+    /// What the statistic is multiplied by where a real recording's noise is not circular.
+    image_scale: f64,
+    is_real: bool,
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
 }
@@ -75,6 +81,11 @@ impl Grid {
         let lag_samples = length as f64 / band as f64;
         let step_hz = settings.doppler_step_cycles / (periods * component.period_s());
         let side = (settings.doppler_max_hz / step_hz).ceil() as i64;
+        let dopplers_hz: Vec<f64> = (-side..=side).map(|bin| bin as f64 * step_hz).collect();
+        let lags = (period_samples / lag_samples).ceil() as usize;
+        let per_cell = of_one_cell(settings.false_alarm_probability, (lags * dopplers_hz.len()) as f64);
+        let sums = settings.noncoherent_sums;
+        let circular = threshold(per_cell, 2 * sums);
         let mut planner = FftPlanner::new();
         Some(Self {
             period_samples,
@@ -84,11 +95,15 @@ impl Grid {
             doppler_sign: if metadata.inverted { -1.0 } else { 1.0 },
             carrier_hz: signal.carrier_hz,
             coherent_periods: periods,
-            sums: settings.noncoherent_sums,
+            sums,
             replica_samples,
-            dopplers_hz: (-side..=side).map(|bin| bin as f64 * step_hz).collect(),
-            lags: (period_samples / lag_samples).ceil() as usize,
+            dopplers_hz,
+            lags,
             lag_samples,
+            threshold: circular,
+            // One degree of freedom a sum, with the same mean.
+            image_scale: circular / (2.0 * threshold(per_cell, sums)),
+            is_real: !metadata.format.is_complex(),
             forward: planner.plan_fft_forward(length),
             inverse: planner.plan_fft_inverse(band),
         })
@@ -101,9 +116,12 @@ impl Grid {
         (periods * self.period_samples * (1.0 + slowest)).ceil() as u64 + 2
     }
 
-    /// Cells of one satellite's search.
-    pub fn cells(&self) -> f64 {
-        (self.lags * self.dopplers_hz.len()) as f64
+    /// Whether the carrier lies so near its own image (at a multiple of half the rate of a real
+    /// recording) that a coherent sum's noise has one degree of freedom instead of two.
+    fn meets_image(&self, doppler_hz: f64) -> bool {
+        let turns = 2.0 * self.frequency_hz(doppler_hz) / self.rate_hz;
+        let coherent_samples = self.coherent_periods * self.period_samples;
+        self.is_real && (turns - turns.round()).abs() * coherent_samples < 0.75
     }
 
     /// Conjugate spectrum of a satellite's code, over the band. Sample n covers the phases from n to n + 1 samples.
@@ -236,9 +254,11 @@ impl Grid {
     fn peak(&self, strips: &[Vec<Strip>], satellite: usize) -> Peak {
         let column = || strips.iter().filter_map(|strip| strip.get(satellite));
         let (mut best, mut bin) = (Strip { peak: 0.0, lag: 0, total: 0.0, near: 0.0, near_cells: 0 }, 0);
-        for (n, strip) in column().enumerate() {
-            if strip.peak > best.peak {
-                (best, bin) = (*strip, n);
+        let mut height = 0.0;
+        for (n, (strip, &doppler_hz)) in column().zip(&self.dopplers_hz).enumerate() {
+            let scale = if self.meets_image(doppler_hz) { self.image_scale } else { 1.0 };
+            if f64::from(strip.peak) * scale > height {
+                (best, bin, height) = (*strip, n, f64::from(strip.peak) * scale);
             }
         }
         let (mut total, mut cells) = (0.0, 0);
@@ -249,7 +269,7 @@ impl Grid {
             cells += self.lags - if same { strip.near_cells } else { 0 };
         }
         let floor = total / cells.max(1) as f64 / (2.0 * f64::from(self.sums));
-        let statistic = if floor > 0.0 { f64::from(best.peak) / floor } else { 0.0 };
+        let statistic = if floor > 0.0 { height / floor } else { 0.0 };
         Peak { statistic, doppler_hz: self.dopplers_hz.get(bin).copied().unwrap_or(0.0), lag: best.lag }
     }
 

@@ -5,7 +5,8 @@
 //! stated false-alarm probability and the noise floor of the satellite's own map. Found satellites
 //! are refined for tracking. Cross-correlation with strong satellites passes for weak ones, so these are searched for
 //! again after the strong ones are subtracted from the samples.
-//! Dopplers that change by more than the step within the search, and data symbols shorter than the
+//! Cross-correlation with satellites that are not candidates, and narrow-band interference, are not
+//! recognised: they look like weak satellites. Dopplers that change by more than the step within the search, and data symbols shorter than the
 //! coherent sum, are not searched for.
 //!
 //! **Threshold.** A cell's statistic is Σ|S|² in units of half its noise power: chi-square with 2K degrees
@@ -213,8 +214,7 @@ impl Searcher {
     ) -> Vec<(AcquisitionRow, Option<Acquired>)> {
         let Some(component) = signal.components.first() else { return Vec::new() };
         let code_chips = f64::from(component.code_chips);
-        let per_cell = threshold::of_one_cell(self.settings.false_alarm_probability, grid.cells());
-        let threshold = threshold::threshold(per_cell, 2 * self.settings.noncoherent_sums);
+        let threshold = grid.threshold;
         let mut findings = self.detect(grid, component, &window.block(), codes, threshold);
 
         let strongest_hz = findings.iter().filter_map(|f| f.hit.map(|hit| hit.cn0_hz)).fold(0.0, f64::max);
