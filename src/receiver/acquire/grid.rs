@@ -67,6 +67,13 @@ struct Strip {
     near_cells: usize,
 }
 
+/// Samples up to the last lag of the last dwell, at the code rate of the slowest code over the nominal one.
+pub(super) fn samples_needed(period_samples: f64, coherent_periods: f64, sums: u32, slowest: f64) -> u64 {
+    let coherent_samples = coherent_periods * period_samples;
+    let last_begins = f64::from(sums - 1) * coherent_samples / slowest;
+    last_begins.ceil() as u64 + coherent_samples.round() as u64 + period_samples.ceil() as u64
+}
+
 impl Grid {
     pub fn new(signal: &Signal, metadata: &IfMetadata, settings: &AcquisitionSettings) -> Option<Self> {
         let component = signal.components.first()?;
@@ -74,7 +81,7 @@ impl Grid {
         let period_samples = component.period_s() * rate_hz;
         let periods = f64::from(settings.coherent_periods);
         let replica_samples = (periods * period_samples).round() as usize;
-        let length = fast_length(replica_samples + period_samples.ceil() as usize + 1);
+        let length = fast_length(replica_samples + period_samples.ceil() as usize);
         // The narrower band must be worth its trouble.
         let narrow = settings.cells_per_chip * component.chip_rate_hz / rate_hz * length as f64;
         let band = if narrow < 0.8 * length as f64 { fast_length(narrow.ceil() as usize) } else { length };
@@ -111,9 +118,8 @@ impl Grid {
 
     /// Samples that a search looks at.
     pub fn samples_needed(&self) -> u64 {
-        let slowest = self.dopplers_hz.first().map_or(0.0, |doppler| -doppler / self.carrier_hz);
-        let periods = f64::from(self.sums) * self.coherent_periods + 1.0;
-        (periods * self.period_samples * (1.0 + slowest)).ceil() as u64 + 2
+        let slowest_hz = self.dopplers_hz.first().copied().unwrap_or(0.0);
+        samples_needed(self.period_samples, self.coherent_periods, self.sums, 1.0 + slowest_hz / self.carrier_hz)
     }
 
     /// Whether the carrier lies so near its own image (at a multiple of half the rate of a real
@@ -201,7 +207,7 @@ impl Grid {
             f64::from(dwell) * self.coherent_periods * self.period_samples / (1.0 + doppler_hz / self.carrier_hz);
         let first = begins.round();
         let fraction = begins - first;
-        let samples = self.replica_samples + self.period_samples.ceil() as usize + 1;
+        let samples = self.replica_samples + self.period_samples.ceil() as usize;
         let step = self.phasor(-self.frequency_hz(doppler_hz), 1);
         let mut rotation = Complex::new(scale, 0.0);
         long.fill(Complex::default());
