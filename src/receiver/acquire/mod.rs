@@ -6,8 +6,8 @@
 //! are refined for tracking. Cross-correlation with strong satellites passes for weak ones, so these are searched for
 //! again after the strong ones are subtracted from the samples.
 //! Cross-correlation with satellites that are not candidates, and narrow-band interference, are not
-//! recognised: they look like weak satellites. Dopplers that change by more than the step within the search, and data symbols shorter than the
-//! coherent sum, are not searched for.
+//! recognised: they look like weak satellites. Dopplers that change by more than the step within the search,
+//! and data symbols shorter than the coherent sum, are not searched for.
 //!
 //! **Threshold.** A cell's statistic is Σ|S|² in units of half its noise power: chi-square with 2K degrees
 //! of freedom for K sums. With N cells (lags in one code period times Dopplers), a cell is given
@@ -17,9 +17,9 @@
 //! multiple of half the rate of a real recording a carrier meets its own image and a sum has one degree of freedom
 //! only; there the statistic is scaled by the ratio of both thresholds.
 //!
-//! **Sensitivity.** By default 10 sums of 2 ms with half-cycle steps. At 38 dB-Hz and 2.6 Msps, with the worst losses of code
-//! (2.0 dB) and Doppler (0.9 dB) and one sum in ten lost to a data bit, 20 + λ = 138 ± 23 stands against a threshold of 78.
-//! 32 satellites take 0.24 s so on two cores.
+//! **Sensitivity.** By default 10 sums of 2 ms with half-cycle steps. At 38 dB-Hz and 2.6 Msps, with the worst
+//! losses of code (2.0 dB) and Doppler (0.9 dB) and one sum in ten lost to a data bit, 20 + λ = 138 ± 23 stands
+//! against a threshold of 78. 32 satellites take 0.24 s so on two cores.
 
 mod grid;
 mod refine;
