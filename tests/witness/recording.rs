@@ -1,1 +1,198 @@
-//! stub
+//! Acquisition on recordings that others made with real antennas.
+
+use gnss_twin::gnss::gps::l1ca::L1_CA;
+use gnss_twin::gnss::samples::{Format, IfMetadata};
+use gnss_twin::gnss::satellite::Sv;
+use gnss_twin::gnss::signal::Signal;
+use gnss_twin::gnss::time::Rate;
+use gnss_twin::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
+use gnss_twin::receiver::source::{Block, Source};
+
+use crate::data::external;
+
+fn metadata(format: Format, rate_hz: f64, if_hz: f64) -> IfMetadata {
+    let rate = Rate::from_hz(rate_hz).unwrap();
+    IfMetadata { format, rate, center_hz: L1_CA.carrier_hz - if_hz, inverted: false, start: None }
+}
+
+fn candidates() -> Vec<(&'static Signal, Sv)> {
+    (1..=32).map(|prn| (&L1_CA, Sv::gps(prn))).collect()
+}
+
+fn acquire(metadata: &IfMetadata, i: &[f32], q: &[f32], settings: &AcquisitionSettings) -> Vec<Acquired> {
+    let mut searcher = Searcher::new(metadata, settings).unwrap();
+    let rows = searcher.search(&Block { first: 0, i, q }, &candidates()).unwrap();
+    let found: Vec<Acquired> = rows.iter().filter_map(|(_, hit)| *hit).collect();
+    for (row, _) in rows.iter().filter(|(row, _)| row.statistic > row.threshold) {
+        println!(
+            "{} {} {:9.1} Hz {:7.2} chips {:5.1} dB-Hz  {:.1}/{:.1}",
+            row.sv, row.acquired, row.doppler_hz, row.code_phase_chips, row.cn0_dbhz, row.statistic, row.threshold
+        );
+    }
+    found
+}
+
+/// The whole recording as planar samples.
+fn read(name: &str, format: Format) -> Option<(Vec<f32>, Vec<f32>)> {
+    let file = std::fs::File::open(external(name)?).unwrap();
+    let mut source = Source::new(file, format, 1 << 16).unwrap();
+    let (mut i, mut q) = (Vec::new(), Vec::new());
+    while let Some(block) = source.next_block().unwrap() {
+        i.extend_from_slice(block.i);
+        q.extend_from_slice(block.q);
+    }
+    assert_eq!(source.cut_bytes(), 0);
+    Some((i, q))
+}
+
+/// Exactly these satellites, each within `tolerance_hz` of the Doppler that another program listed, if it listed one.
+fn assert_found(found: &[Acquired], listed: &[(u8, Option<f64>)], tolerance_hz: f64) {
+    let mut expected: Vec<u8> = listed.iter().map(|(prn, _)| *prn).collect();
+    expected.sort_unstable();
+    let prns: Vec<u8> = found.iter().map(|hit| hit.sv.number).collect();
+    assert_eq!(prns, expected);
+    for (prn, doppler_hz) in listed {
+        let hit = found.iter().find(|hit| hit.sv.number == *prn).unwrap();
+        if let Some(doppler_hz) = doppler_hz {
+            assert!((hit.doppler_hz - doppler_hz).abs() <= tolerance_hz, "{hit:?}, listed at {doppler_hz} Hz");
+        }
+    }
+}
+
+#[test]
+fn a_complex_recording_holds_the_satellites_that_others_found_in_it() {
+    let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
+    let metadata = metadata(Format::Ci8, 4e6, 0.0);
+    // The recording holds narrow-band interference (lines at -580 and +-511.5 kHz), of which each window brings up to
+    // six weak false hits and its first 20 ms more. They do not stay where they are; satellites do.
+    let windows = [400_000, 800_000, 1_200_000, 1_600_000]
+        .map(|start| acquire(&metadata, &i[start..], &q[start..], &AcquisitionSettings::default()));
+    let stays = |hit: &Acquired| {
+        let same = |other: &Acquired| other.sv == hit.sv && (other.doppler_hz - hit.doppler_hz).abs() < 30.0;
+        windows.iter().all(|window| window.iter().any(same))
+    };
+    let found: Vec<Acquired> = windows[0].iter().copied().filter(stays).collect();
+    let listed = [
+        (26, -750.0),
+        (31, 250.0),
+        (29, 2250.0),
+        (16, -2500.0),
+        (32, 3250.0),
+        (18, -2750.0),
+        (4, -3250.0),
+        (25, 2750.0),
+    ];
+    // The list is on a grid of 250 Hz.
+    assert_found(&found, &listed.map(|(prn, doppler_hz)| (prn, Some(doppler_hz))), 130.0);
+    assert_found(&windows[3], &listed.map(|(prn, doppler_hz)| (prn, Some(doppler_hz))), 130.0);
+}
+
+#[test]
+fn a_recording_with_a_mirrored_spectrum_shows_it_in_its_code_doppler() {
+    // From the list alone the sense of this recording's spectrum cannot be told. Code and carrier Doppler agree
+    // (f/1540 chips a second) in one sense only: in the other the code phases found 0.4 s apart contradict it by
+    // 2 f/1540 x 0.4 s = 1.7 chips at 3250 Hz.
+    let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
+    let settings = AcquisitionSettings::default();
+    let later = 1_600_000;
+    for (inverted, agrees) in [(true, true), (false, false)] {
+        let metadata = IfMetadata { inverted, ..metadata(Format::Ci8, 4e6, 0.0) };
+        let one = acquire(&metadata, &i, &q, &settings);
+        let two = acquire(&metadata, &i[later..], &q[later..], &settings);
+        for prn in [16, 32, 29] {
+            let of = |hits: &[Acquired]| *hits.iter().find(|hit| hit.sv.number == prn).unwrap();
+            let (one, two) = (of(&one), of(&two));
+            let passed = 1.023e6 * 0.4 * (1.0 + one.doppler_hz / 1_575.42e6);
+            let error = (two.code_phase_chips - one.code_phase_chips - passed + 511.5).rem_euclid(1023.0) - 511.5;
+            println!("{prn} inverted {inverted}: {error:.2} chips");
+            // Each code phase to about 0.05 chips.
+            assert_eq!(error.abs() < 0.25, agrees, "PRN {prn}, inverted {inverted}: {error} chips");
+        }
+    }
+}
+
+#[test]
+fn a_real_recording_at_an_if_holds_the_satellites_that_others_found_in_it() {
+    let Some((i, q)) = read("if/pocket_l1_2021-11-25_12msps_ri8_if3mhz.bin", Format::Ri8) else { return };
+    let metadata = metadata(Format::Ri8, 12e6, 3e6);
+    let settings = AcquisitionSettings::default();
+    let found = acquire(&metadata, &i, &q, &settings);
+    // 24 and 28 are not in the list, which stops at stronger ones. Both are found again below.
+    let prns = [13, 20, 5, 15, 11, 30, 29, 2, 18, 24, 28];
+    assert_found(&found, &prns.map(|prn| (prn, None)), 0.0);
+    let later = 600_000;
+    let longer = AcquisitionSettings { noncoherent_sums: 20, ..settings };
+    let again = acquire(&metadata, &i[later..], &q[later..], &longer);
+    for prn in [24, 28] {
+        let of = |hits: &[Acquired]| *hits.iter().find(|hit| hit.sv.number == prn).unwrap();
+        let (one, two) = (of(&found), of(&again));
+        assert!((one.doppler_hz - two.doppler_hz).abs() < 20.0, "{one:?} {two:?}");
+        // 50 code periods later, but for code Doppler.
+        let passed = 1023.0 * 50.0 * one.doppler_hz / 1_575.42e6;
+        let error = (two.code_phase_chips - one.code_phase_chips - passed + 511.5).rem_euclid(1023.0) - 511.5;
+        assert!(error.abs() < 0.5, "{one:?} {two:?}");
+    }
+}
+
+#[test]
+fn four_milliseconds_of_floats_with_a_local_oscillator_far_off() {
+    let Some((i, q)) = read("if/cttc_l1_2012-07-26_4msps_cf32.bin", Format::Cf32Le) else { return };
+    // 4 ms leave room for one sum of 3 ms, with every code phase.
+    let settings = AcquisitionSettings {
+        doppler_max_hz: 12_500.0,
+        coherent_periods: 3,
+        noncoherent_sums: 1,
+        ..Default::default()
+    };
+    let found = acquire(&metadata(Format::Cf32Le, 4e6, 0.0), &i, &q, &settings);
+    let listed = [(29, Some(9750.0)), (25, Some(9000.0)), (12, Some(7250.0)), (2, Some(8000.0)), (31, None)];
+    assert_found(&found, &listed, 150.0);
+}
+
+/// Standard base64 without padding checks.
+fn base64(text: &str) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let (mut bits, mut count) = (0_u32, 0);
+    for c in text.bytes() {
+        let value = match c {
+            b'A'..=b'Z' => c - b'A',
+            b'a'..=b'z' => c - b'a' + 26,
+            b'0'..=b'9' => c - b'0' + 52,
+            b'+' => 62,
+            b'/' => 63,
+            _ => continue,
+        };
+        bits = bits << 6 | u32::from(value);
+        count += 6;
+        if count >= 8 {
+            count -= 8;
+            bytes.push((bits >> count) as u8);
+        }
+    }
+    bytes
+}
+
+#[test]
+fn one_bit_snapshots_hold_only_satellites_that_were_up() {
+    let Some(path) = external("if/snappergps_w00.json") else { return };
+    let json: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let metadata = metadata(Format::Ri8, 4.092e6, 4.092e6);
+    let settings = AcquisitionSettings { coherent_periods: 1, ..Default::default() };
+    let mut times_found = [0; 33];
+    for snapshot in 0..10 {
+        let bytes = base64(json["snapshots"][snapshot]["data"].as_str().unwrap());
+        // The first sample is the lowest bit; 1 is a negative sample.
+        let bit = |byte: &u8, n: u32| if byte >> n & 1 == 1 { -1.0 } else { 1.0 };
+        let i: Vec<f32> = bytes.iter().flat_map(|byte| (0..8).map(move |n| bit(byte, n))).collect();
+        for hit in acquire(&metadata, &i, &vec![0.0; i.len()], &settings) {
+            times_found[usize::from(hit.sv.number)] += 1;
+        }
+    }
+    println!("{times_found:?}");
+    // PRN 18 is not in the list but found twice, three snapshots apart, at the same Doppler and a code phase that fits.
+    assert!(
+        (1..33).all(|prn| times_found[prn] == 0 || [5, 7, 13, 14, 15, 18, 20, 30].contains(&prn)),
+        "{times_found:?}"
+    );
+    assert!([5, 7, 13, 20, 30].iter().all(|&prn| times_found[prn] >= 5), "{times_found:?}");
+}

@@ -1,0 +1,326 @@
+//! The search proper: correlation with every code phase at once by FFT, for every Doppler.
+//!
+//! A dwell is a coherent sum over whole code periods, correlated linearly: the data segment is one
+//! period longer than the replica and the FFT holds both, so no lag wraps around and each lag's sum
+//! begins at its own code period (a data bit can only turn where a period begins). Dwells begin where
+//! the code of that Doppler says, to a fraction of a sample, so neither a period of broken samples
+//! nor code Doppler smears their sum. Only the band of the code's main lobe goes back to lags.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use num_complex::Complex;
+use rayon::prelude::*;
+use rustfft::{Fft, FftPlanner};
+
+use super::replica::Replica;
+use super::settings::AcquisitionSettings;
+use super::threshold::{of_one_cell, threshold};
+use crate::gnss::samples::IfMetadata;
+use crate::gnss::signal::Signal;
+use crate::receiver::source::Block;
+
+/// Cells within this of a peak are not noise.
+const PEAK_CHIPS: f64 = 2.0;
+
+/// Everything about one signal's search that does not depend on the samples.
+pub(super) struct Grid {
+    /// Samples of one code period without Doppler.
+    pub period_samples: f64,
+    pub chips_per_sample: f64,
+    pub rate_hz: f64,
+    if_hz: f64,
+    doppler_sign: f64,
+    carrier_hz: f64,
+    coherent_periods: f64,
+    sums: u32,
+    replica_samples: usize,
+    pub dopplers_hz: Vec<f64>,
+    /// Lags in one code period, and the samples between them.
+    pub lags: usize,
+    pub lag_samples: f64,
+    /// What a satellite's statistic has to exceed.
+    pub threshold: f64,
+    /// What the statistic is multiplied by where a real recording's noise is not circular.
+    image_scale: f64,
+    is_real: bool,
+    forward: Arc<dyn Fft<f32>>,
+    inverse: Arc<dyn Fft<f32>>,
+}
+
+/// The outcome for one satellite.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Peak {
+    /// In units in which noise alone is chi-square with 2K degrees of freedom.
+    pub statistic: f64,
+    pub doppler_hz: f64,
+    pub lag: usize,
+}
+
+/// One satellite at one Doppler: the largest cell, and sums over all cells and over those near it.
+#[derive(Clone, Copy)]
+struct Strip {
+    peak: f32,
+    lag: usize,
+    total: f64,
+    near: f64,
+    near_cells: usize,
+}
+
+/// Samples up to the last lag of the last dwell, at the code rate of the slowest code over the nominal one.
+pub(super) fn samples_needed(period_samples: f64, coherent_periods: f64, sums: u32, slowest: f64) -> u64 {
+    let coherent_samples = coherent_periods * period_samples;
+    let last_begins = f64::from(sums - 1) * coherent_samples / slowest;
+    last_begins.ceil() as u64 + coherent_samples.round() as u64 + period_samples.ceil() as u64
+}
+
+impl Grid {
+    pub fn new(signal: &Signal, metadata: &IfMetadata, settings: &AcquisitionSettings) -> Option<Self> {
+        let component = signal.components.first()?;
+        let rate_hz = metadata.rate.hz();
+        let period_samples = component.period_s() * rate_hz;
+        let periods = f64::from(settings.coherent_periods);
+        let replica_samples = (periods * period_samples).round() as usize;
+        let length = fast_length(replica_samples + period_samples.ceil() as usize);
+        // The narrower band must be worth its trouble.
+        let narrow = settings.cells_per_chip * component.chip_rate_hz / rate_hz * length as f64;
+        let band = if narrow < 0.8 * length as f64 { fast_length(narrow.ceil() as usize) } else { length };
+        let lag_samples = length as f64 / band as f64;
+        let step_hz = settings.doppler_step_cycles / (periods * component.period_s());
+        let side = (settings.doppler_max_hz / step_hz).ceil() as i64;
+        let dopplers_hz: Vec<f64> = (-side..=side).map(|bin| bin as f64 * step_hz).collect();
+        let lags = (period_samples / lag_samples).ceil() as usize;
+        let per_cell = of_one_cell(settings.false_alarm_probability, (lags * dopplers_hz.len()) as f64);
+        let sums = settings.noncoherent_sums;
+        let circular = threshold(per_cell, 2 * sums);
+        let mut planner = FftPlanner::new();
+        Some(Self {
+            period_samples,
+            chips_per_sample: component.chip_rate_hz / rate_hz,
+            rate_hz,
+            if_hz: metadata.if_hz(signal),
+            doppler_sign: if metadata.inverted { -1.0 } else { 1.0 },
+            carrier_hz: signal.carrier_hz,
+            coherent_periods: periods,
+            sums,
+            replica_samples,
+            dopplers_hz,
+            lags,
+            lag_samples,
+            threshold: circular,
+            // One degree of freedom a sum, with the same mean.
+            image_scale: circular / (2.0 * threshold(per_cell, sums)),
+            is_real: !metadata.format.is_complex(),
+            forward: planner.plan_fft_forward(length),
+            inverse: planner.plan_fft_inverse(band),
+        })
+    }
+
+    /// Samples that a search looks at.
+    pub fn samples_needed(&self) -> u64 {
+        let slowest_hz = self.dopplers_hz.first().copied().unwrap_or(0.0);
+        samples_needed(self.period_samples, self.coherent_periods, self.sums, 1.0 + slowest_hz / self.carrier_hz)
+    }
+
+    /// Whether the carrier lies so near its own image (at a multiple of half the rate of a real
+    /// recording) that a coherent sum's noise has one degree of freedom instead of two.
+    fn meets_image(&self, doppler_hz: f64) -> bool {
+        let turns = 2.0 * self.frequency_hz(doppler_hz) / self.rate_hz;
+        let coherent_samples = self.coherent_periods * self.period_samples;
+        self.is_real && (turns - turns.round()).abs() * coherent_samples < 0.75
+    }
+
+    /// Conjugate spectrum of a satellite's code, over the band. Sample n covers the phases from n to n + 1 samples.
+    pub fn spectrum(&self, replica: &Replica) -> Vec<Complex<f32>> {
+        let mut buffer = vec![Complex::default(); self.forward.len()];
+        // Scaled so that powers stay near one whatever the length.
+        let scale = 1.0 / self.forward.len() as f64;
+        for (sample, mean) in
+            buffer.iter_mut().zip(replica.means(0.0, self.chips_per_sample)).take(self.replica_samples)
+        {
+            *sample = Complex::new((mean * scale) as f32, 0.0);
+        }
+        self.forward.process(&mut buffer);
+        self.band(&buffer).map(|(_, bin)| bin.conj()).collect()
+    }
+
+    /// The bins within the band, with their signed numbers, in the order of the short transform.
+    fn band<'a>(&self, spectrum: &'a [Complex<f32>]) -> impl Iterator<Item = (f64, Complex<f32>)> + 'a {
+        let (length, band) = (spectrum.len(), self.inverse.len());
+        let positive = band.div_ceil(2);
+        (0..band).map(move |n| {
+            if n < positive { (n as f64, spectrum[n]) } else { (n as f64 - band as f64, spectrum[length - band + n]) }
+        })
+    }
+
+    /// The largest cell of every satellite, in their order.
+    pub fn search(&self, block: &Block, spectra: &[&[Complex<f32>]]) -> Vec<Peak> {
+        let power: f64 = block.i.iter().chain(block.q).map(|x| f64::from(x * x)).sum();
+        let rms = (power / block.i.len().max(1) as f64).sqrt();
+        if rms == 0.0 {
+            return vec![Peak { statistic: 0.0, doppler_hz: 0.0, lag: 0 }; spectra.len()];
+        }
+        let strips: Vec<Vec<Strip>> =
+            self.dopplers_hz.par_iter().map(|&doppler| self.one_doppler(block, 1.0 / rms, doppler, spectra)).collect();
+        (0..spectra.len()).map(|satellite| self.peak(&strips, satellite)).collect()
+    }
+
+    fn one_doppler(&self, block: &Block, scale: f64, doppler_hz: f64, spectra: &[&[Complex<f32>]]) -> Vec<Strip> {
+        let mut scratch = vec![
+            Complex::default();
+            self.forward.get_inplace_scratch_len().max(self.inverse.get_inplace_scratch_len())
+        ];
+        let mut long = vec![Complex::default(); self.forward.len()];
+        let dwells: Vec<Vec<Complex<f32>>> =
+            (0..self.sums).map(|dwell| self.dwell(block, scale, doppler_hz, dwell, &mut long, &mut scratch)).collect();
+        let mut short = vec![Complex::default(); self.inverse.len()];
+        let mut powers = vec![0.0_f32; self.lags];
+        spectra
+            .iter()
+            .map(|spectrum| {
+                powers.fill(0.0);
+                for data in &dwells {
+                    for ((product, x), code) in short.iter_mut().zip(data).zip(*spectrum) {
+                        *product = x * code;
+                    }
+                    self.inverse.process_with_scratch(&mut short, &mut scratch);
+                    for (power, r) in powers.iter_mut().zip(&short) {
+                        *power += r.norm_sqr();
+                    }
+                }
+                self.strip(&powers)
+            })
+            .collect()
+    }
+
+    /// The spectrum of one dwell's samples with carrier removed, shifted to where the dwell begins.
+    fn dwell(
+        &self,
+        block: &Block,
+        scale: f64,
+        doppler_hz: f64,
+        dwell: u32,
+        long: &mut [Complex<f32>],
+        scratch: &mut [Complex<f32>],
+    ) -> Vec<Complex<f32>> {
+        let begins =
+            f64::from(dwell) * self.coherent_periods * self.period_samples / (1.0 + doppler_hz / self.carrier_hz);
+        let first = begins.round();
+        let fraction = begins - first;
+        let samples = self.replica_samples + self.period_samples.ceil() as usize;
+        let step = self.phasor(-self.frequency_hz(doppler_hz), 1);
+        let mut rotation = Complex::new(scale, 0.0);
+        long.fill(Complex::default());
+        let data = block.i.iter().zip(block.q).skip(first as usize).take(samples);
+        for (out, (i, q)) in long.iter_mut().zip(data) {
+            let x = Complex::new(f64::from(*i), f64::from(*q)) * rotation;
+            *out = Complex::new(x.re as f32, x.im as f32);
+            rotation *= step;
+        }
+        self.forward.process_with_scratch(long, scratch);
+        let shift = |number: f64| {
+            let (sin, cos) = libm::sincos(TAU * fraction * number / self.forward.len() as f64);
+            Complex::new(cos, sin)
+        };
+        let (turn, mut ramp) = (shift(1.0), Complex::default());
+        let negative_begins = self.inverse.len().div_ceil(2);
+        let mut spectrum = Vec::with_capacity(self.inverse.len());
+        for (index, (number, bin)) in self.band(long).enumerate() {
+            if index == 0 || index == negative_begins {
+                ramp = shift(number);
+            }
+            spectrum.push(bin * Complex::new(ramp.re as f32, ramp.im as f32));
+            ramp *= turn;
+        }
+        spectrum
+    }
+
+    fn strip(&self, powers: &[f32]) -> Strip {
+        let (mut lag, mut peak, mut total) = (0, 0.0_f32, 0.0_f64);
+        for (n, &power) in powers.iter().enumerate() {
+            total += f64::from(power);
+            if power > peak {
+                (lag, peak) = (n, power);
+            }
+        }
+        let side = self.near_cells();
+        let near_cells = (2 * side + 1).min(powers.len());
+        let near = (0..near_cells)
+            .map(|n| f64::from(powers[(lag + powers.len() + n - side.min(powers.len())) % powers.len()]))
+            .sum();
+        Strip { peak, lag, total, near, near_cells }
+    }
+
+    fn near_cells(&self) -> usize {
+        (PEAK_CHIPS / (self.chips_per_sample * self.lag_samples)).ceil() as usize
+    }
+
+    /// The largest cell of a satellite over the noise floor of its map. Of each Doppler whose own largest
+    /// cell lies at the peak's code phase, the neighbourhood is left out of the floor.
+    fn peak(&self, strips: &[Vec<Strip>], satellite: usize) -> Peak {
+        let column = || strips.iter().filter_map(|strip| strip.get(satellite));
+        let (mut best, mut bin) = (Strip { peak: 0.0, lag: 0, total: 0.0, near: 0.0, near_cells: 0 }, 0);
+        let mut height = 0.0;
+        for (n, (strip, &doppler_hz)) in column().zip(&self.dopplers_hz).enumerate() {
+            let scale = if self.meets_image(doppler_hz) { self.image_scale } else { 1.0 };
+            if f64::from(strip.peak) * scale > height {
+                (best, bin, height) = (*strip, n, f64::from(strip.peak) * scale);
+            }
+        }
+        let (mut total, mut cells) = (0.0, 0);
+        for strip in column() {
+            let apart = strip.lag.abs_diff(best.lag);
+            let same = apart.min(self.lags - apart.min(self.lags)) <= self.near_cells();
+            total += strip.total - if same { strip.near } else { 0.0 };
+            cells += self.lags - if same { strip.near_cells } else { 0 };
+        }
+        let floor = total / cells.max(1) as f64 / (2.0 * f64::from(self.sums));
+        let statistic = if floor > 0.0 { height / floor } else { 0.0 };
+        Peak { statistic, doppler_hz: self.dopplers_hz.get(bin).copied().unwrap_or(0.0), lag: best.lag }
+    }
+
+    /// Where a carrier of that Doppler appears in the samples.
+    pub fn frequency_hz(&self, doppler_hz: f64) -> f64 {
+        self.if_hz + self.doppler_sign * doppler_hz
+    }
+
+    /// Doppler per hertz in the samples: −1 where the spectrum is inverted.
+    pub fn doppler_sign(&self) -> f64 {
+        self.doppler_sign
+    }
+
+    /// e^{jθ} of a tone at sample `n`.
+    pub fn phasor(&self, frequency_hz: f64, n: u64) -> Complex<f64> {
+        let turns = frequency_hz / self.rate_hz * n as f64;
+        let (sin, cos) = libm::sincos(TAU * (turns - turns.floor()));
+        Complex::new(cos, sin)
+    }
+
+    /// Chips that pass in one sample at that Doppler.
+    pub fn received_chips_per_sample(&self, doppler_hz: f64) -> f64 {
+        self.chips_per_sample * (1.0 + doppler_hz / self.carrier_hz)
+    }
+
+    /// Code phase at the first sample of the block, in chips (not reduced), if the largest cell is at `lag`.
+    pub fn code_phase_chips(&self, lag: usize, doppler_hz: f64) -> f64 {
+        // The replica's first sample stands for the middle of its interval.
+        0.5 * self.chips_per_sample - lag as f64 * self.lag_samples * self.received_chips_per_sample(doppler_hz)
+    }
+}
+
+/// The smallest even product of 2, 3 and 5 that is not below `least`.
+fn fast_length(least: usize) -> usize {
+    let least = least.max(2);
+    (least.next_multiple_of(2)..)
+        .step_by(2)
+        .find(|&n| {
+            let mut rest = n;
+            for prime in [2, 3, 5] {
+                while rest.is_multiple_of(prime) {
+                    rest /= prime;
+                }
+            }
+            rest == 1
+        })
+        .unwrap_or(least)
+}

@@ -1,0 +1,217 @@
+//! From a cell of the search to a start for tracking: Doppler to some hertz, code phase to a few hundredths of a chip, C/N0.
+//!
+//! Prompt sums over single code periods are squared, which removes data signs (Costas), and the
+//! frequency of the squares is read from a padded FFT. Then an early-minus-late comparison of
+//! amplitudes, half a chip to either side, centres the code phase. The noise power comes from
+//! correlators at code phases where the code's own autocorrelation is small.
+
+use num_complex::Complex;
+use rustfft::FftPlanner;
+
+use super::grid::Grid;
+use super::replica::Replica;
+use crate::gnss::signal::Component;
+use crate::receiver::source::Block;
+
+/// Correlators that measure the noise.
+const NOISE_TAPS: usize = 16;
+/// The FFT of the squares is padded by this factor at least, then a parabola takes over.
+const PADDING: usize = 8;
+
+/// A satellite's place after refinement.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Refined {
+    /// At the first sample of the block, in [0, code length).
+    pub code_phase_chips: f64,
+    pub doppler_hz: f64,
+    pub cn0_hz: f64,
+}
+
+/// One satellite's correlators over the samples that the search saw.
+struct Correlators<'a> {
+    grid: &'a Grid,
+    block: &'a Block<'a>,
+    replica: &'a Replica,
+    code_chips: f64,
+    periods: usize,
+}
+
+/// Refines what the search made of a satellite; its C/N0 is kept if the refined power does not exceed the noise.
+pub(super) fn refine(
+    grid: &Grid,
+    block: &Block,
+    component: &Component,
+    replica: &Replica,
+    coarse: Refined,
+    periods: usize,
+) -> Refined {
+    let code_chips = f64::from(component.code_chips);
+    let correlators = Correlators { grid, block, replica, code_chips, periods };
+    let mut phase = coarse.code_phase_chips.rem_euclid(code_chips);
+    let doppler_hz = correlators.fine_doppler_hz(phase, coarse.doppler_hz);
+
+    let noise_offsets = quiet_offsets(replica, component.code_chips);
+    let noise = mean(correlators.powers(phase, doppler_hz, &noise_offsets));
+    // BPSK triangle of one chip to either side: (early - late) / (early + late) is twice the error.
+    let reach = 0.5 / component.shape.pulse.len().max(1) as f64;
+    let mut power = 0.0;
+    for _ in 0..3 {
+        let taps = correlators.powers(phase, doppler_hz, &[reach, 0.0, -reach]);
+        let amplitude = |n: usize| taps.get(n).map_or(0.0, |p| (p - noise).max(0.0).sqrt());
+        power = taps.get(1).copied().unwrap_or(0.0);
+        let sum = amplitude(0) + amplitude(2);
+        if sum > 0.0 {
+            phase += reach * (amplitude(0) - amplitude(2)) / sum;
+        }
+    }
+    let measured = if noise > 0.0 { (power / noise - 1.0) / component.period_s() } else { 0.0 };
+    Refined {
+        code_phase_chips: phase.rem_euclid(code_chips),
+        doppler_hz,
+        cn0_hz: if measured > 0.0 { measured } else { coarse.cn0_hz },
+    }
+}
+
+fn mean(values: Vec<f64>) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+impl Correlators<'_> {
+    /// Prompt sums over whole code periods with the replica ahead by `offsets` chips: `[offset][period]`.
+    fn sums(&self, phase_chips: f64, doppler_hz: f64, offsets: &[f64]) -> Vec<Vec<Complex<f64>>> {
+        let step = self.grid.received_chips_per_sample(doppler_hz);
+        let frequency_hz = self.grid.frequency_hz(doppler_hz);
+        let turn = self.grid.phasor(-frequency_hz, 1);
+        let mut sums = vec![Vec::with_capacity(self.periods); offsets.len()];
+        let begin = |period: usize| ((((period + 1) as f64) * self.code_chips - phase_chips) / step).ceil() as usize;
+        let mut carrier_free = Vec::new();
+        for period in 0..self.periods {
+            let (from, to) = (begin(period), begin(period + 1));
+            let (Some(i), Some(q)) = (self.block.i.get(from..to), self.block.q.get(from..to)) else { break };
+            let mut rotation = self.grid.phasor(-frequency_hz, from as u64);
+            carrier_free.clear();
+            for (i, q) in i.iter().zip(q) {
+                carrier_free.push(Complex::new(f64::from(*i), f64::from(*q)) * rotation);
+                rotation *= turn;
+            }
+            // Code phase within the period, so that its resolution does not fall with the length of the block.
+            let start = phase_chips + from as f64 * step - (period + 1) as f64 * self.code_chips;
+            for (sum, offset) in sums.iter_mut().zip(offsets) {
+                let replica = self.replica.means(start + offset - 0.5 * step, step);
+                sum.push(carrier_free.iter().zip(replica).map(|(x, c)| x * c).sum());
+            }
+        }
+        sums
+    }
+
+    fn powers(&self, phase_chips: f64, doppler_hz: f64, offsets: &[f64]) -> Vec<f64> {
+        let sums = self.sums(phase_chips, doppler_hz, offsets);
+        sums.into_iter().map(|sum| mean(sum.iter().map(|s: &Complex<f64>| s.norm_sqr()).collect())).collect()
+    }
+
+    fn fine_doppler_hz(&self, phase_chips: f64, coarse_hz: f64) -> f64 {
+        let period_s = self.grid.period_samples / self.grid.rate_hz;
+        let prompts = self.sums(phase_chips, coarse_hz, &[0.0]).pop().unwrap_or_default();
+        if prompts.len() < 2 {
+            return coarse_hz;
+        }
+        let residual_hz = square_frequency_cycles(&prompts) / (2.0 * period_s);
+        // Squares repeat every 1/(2T), and one period's sum tells such neighbours apart by its own loss.
+        let spacing_hz = 0.5 / period_s;
+        let mut best = (f64::NEG_INFINITY, coarse_hz);
+        for alias in [0.0, -1.0, 1.0] {
+            let doppler_hz = coarse_hz + self.grid.doppler_sign() * (residual_hz + alias * spacing_hz);
+            if (doppler_hz - coarse_hz).abs() <= spacing_hz {
+                let power = self.powers(phase_chips, doppler_hz, &[0.0]).first().copied().unwrap_or(0.0);
+                if power > best.0 {
+                    best = (power, doppler_hz);
+                }
+            }
+        }
+        best.1
+    }
+}
+
+/// Frequency of the squared prompts in cycles a period, in [−½, ½).
+fn square_frequency_cycles(prompts: &[Complex<f64>]) -> f64 {
+    let length = (prompts.len() * PADDING).next_power_of_two();
+    let mut spectrum: Vec<Complex<f64>> = prompts.iter().map(|p| p * p).collect();
+    spectrum.resize(length, Complex::default());
+    FftPlanner::new().plan_fft_forward(length).process(&mut spectrum);
+    let power = |n: usize| spectrum[n % length].norm();
+    let mut best = 0;
+    for n in 1..length {
+        if power(n) > power(best) {
+            best = n;
+        }
+    }
+    let (before, at, after) = (power(best + length - 1), power(best), power(best + 1));
+    let curvature = before - 2.0 * at + after;
+    let vertex = if curvature < 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
+    let cycles = (best as f64 + vertex) / length as f64;
+    if cycles >= 0.5 { cycles - 1.0 } else { cycles }
+}
+
+/// Code offsets at which the code's own autocorrelation is smallest, out of a spread of candidates.
+fn quiet_offsets(replica: &Replica, code_chips: u32) -> Vec<f64> {
+    let length = code_chips as usize;
+    let code: Vec<f64> = replica.means(0.0, 1.0).take(length).collect();
+    let correlation = |shift: usize| {
+        let ahead = code.iter().cycle().skip(shift % length.max(1));
+        code.iter().zip(ahead).map(|(a, b)| a * b).sum::<f64>().abs()
+    };
+    let candidates = 4 * NOISE_TAPS;
+    let mut ranked: Vec<(f64, usize)> = (1..=candidates)
+        .map(|n| n * length / (candidates + 1))
+        .filter(|shift| (4..length.saturating_sub(4)).contains(shift))
+        .map(|shift| (correlation(shift - 1).max(correlation(shift)).max(correlation(shift + 1)), shift))
+        .collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    ranked.into_iter().take(NOISE_TAPS).map(|(_, shift)| shift as f64).collect()
+}
+
+/// Takes a found satellite out of the samples, one code period at a time with the amplitude and phase
+/// that it shows there. A real recording holds the carrier's cosine only.
+pub(super) fn subtract(
+    grid: &Grid,
+    code_chips: f64,
+    replica: &Replica,
+    hit: &Refined,
+    complex: bool,
+    (i, q): (&mut [f32], &mut [f32]),
+) {
+    let step = grid.received_chips_per_sample(hit.doppler_hz);
+    let frequency_hz = grid.frequency_hz(hit.doppler_hz);
+    let turn = grid.phasor(frequency_hz, 1);
+    let mut waveform: Vec<Complex<f64>> = Vec::new();
+    let (mut from, length) = (0, i.len());
+    for period in 1_u64.. {
+        let boundary = ((period as f64 * code_chips - hit.code_phase_chips) / step).ceil().max(0.0) as usize;
+        let to = boundary.min(length);
+        let start = hit.code_phase_chips + from as f64 * step - (period - 1) as f64 * code_chips;
+        let mut rotation = grid.phasor(frequency_hz, from as u64);
+        waveform.clear();
+        for chip in replica.means(start - 0.5 * step, step).take(to - from) {
+            waveform.push(rotation * chip);
+            rotation *= turn;
+        }
+        let (Some(i), Some(q)) = (i.get_mut(from..to), q.get_mut(from..to)) else { return };
+        let samples = i.iter().zip(q.iter()).map(|(i, q)| Complex::new(f64::from(*i), f64::from(*q)));
+        let sum: Complex<f64> = samples.zip(&waveform).map(|(x, w)| x * w.conj()).sum();
+        let energy: f64 = waveform.iter().map(|w| w.norm_sqr()).sum();
+        let amplitude = if energy > 0.0 { sum / energy } else { Complex::default() };
+        for ((i, q), w) in i.iter_mut().zip(q).zip(&waveform) {
+            let x = amplitude * w;
+            if complex {
+                *i -= x.re as f32;
+                *q -= x.im as f32;
+            } else {
+                *i -= 2.0 * x.re as f32;
+            }
+        }
+        if boundary >= length {
+            return;
+        }
+        from = to;
+    }
+}
