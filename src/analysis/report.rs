@@ -66,7 +66,7 @@ impl Summary {
 
     fn loop_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (tracking, limits) = (&self.tracking, &self.details.thresholds);
-        writeln!(f, "\n{:<26}{:>12}{:>12}", "loop (truth - replica)", "sigma", "threshold")?;
+        writeln!(f, "\n{:<26}{:>12}{:>12}", "loop (replica - truth)", "sigma", "threshold")?;
         let rows = [
             ("DLL (chips)", tracking.dll_sigma_chips, limits.dll_chips),
             ("PLL (degrees)", tracking.pll_sigma_deg, limits.pll_deg),

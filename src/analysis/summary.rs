@@ -78,7 +78,7 @@ pub struct Observables {
     pub cn0_bias_db: Option<f64>,
 }
 
-/// How well the loops held: truth minus the loop's oscillator, each satellite about its own mean, without the
+/// How well the loops held: the loop's oscillator minus truth, each satellite about its own mean, without the
 /// first [`PULL_IN_S`] of each lock.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tracking {

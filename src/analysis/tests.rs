@@ -404,3 +404,22 @@ fn every_picture_is_a_png_that_is_not_blank() {
         }
     }
 }
+
+#[test]
+fn the_pull_in_after_a_lock_is_an_error_but_no_jitter() {
+    let run = planted_run(&PLANTED);
+    let path = run.path().join("rx/observations.csv");
+    let mut rows: Vec<Observation> = csv::Reader::from_path(&path).unwrap().deserialize().map(Result::unwrap).collect();
+    for row in rows.iter_mut().filter(|row| row.sv == Sv::gps(18) && row.sample >= 500 * RATE_HZ / 10) {
+        row.locked_s = (row.sample - 500 * RATE_HZ / 10) as f64 / RATE_HZ as f64;
+        row.doppler_hz += if row.locked_s < 2.9 { 20.0 } else { 0.0 };
+        row.carrier_cycles += 12_345.0;
+    }
+    write(&path, &rows);
+    let summary = judge(run.path()).unwrap();
+    // 29 of 2700 rows are 20 Hz off: 2 Hz RMS.
+    assert!(summary.observables.doppler_rms_hz.unwrap() > 2.0);
+    // 5 sigma / sqrt(2 n) = 0.028 of 0.4 Hz.
+    assert!((summary.tracking.fll_sigma_hz.unwrap() - 0.4).abs() < 0.028);
+    assert_eq!(summary.tracking.cycle_slips, 1, "a new lock is no slip");
+}

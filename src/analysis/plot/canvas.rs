@@ -192,10 +192,12 @@ pub fn anchored(pixels: i32, horizontal: HPos, vertical: VPos) -> TextStyle<'sta
     font(pixels).pos(Pos::new(horizontal, vertical))
 }
 
+/// Free space around a chart: plotters hangs an axis label on the very edge of its area.
+const EDGE_PX: i32 = 6;
 const LEFT_PX: i32 = 74;
 const RIGHT_PX: i32 = 16;
 const TOP_PX: i32 = 32;
-const BOTTOM_PX: i32 = 48;
+const BOTTOM_PX: i32 = 42;
 
 /// Draws one chart into an area.
 pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
@@ -204,8 +206,8 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
     area.draw(&Text::new(chart.title.clone(), (width as i32 / 2, TOP_PX * FINE / 2), title))?;
     let (mut x, mut y) = (chart.x.clone(), chart.y.clone());
     if chart.equal {
-        let across = f64::from(width as i32 - (LEFT_PX + RIGHT_PX) * FINE).max(1.0);
-        let up = f64::from(height as i32 - (TOP_PX + BOTTOM_PX) * FINE).max(1.0);
+        let across = f64::from(width as i32 - (LEFT_PX + RIGHT_PX + EDGE_PX) * FINE).max(1.0);
+        let up = f64::from(height as i32 - (TOP_PX + BOTTOM_PX + EDGE_PX) * FINE).max(1.0);
         let per_pixel = (x.span() / across).max(y.span() / up);
         widen(&mut x, per_pixel * across);
         widen(&mut y, per_pixel * up);
@@ -213,6 +215,8 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
     let mut context = ChartBuilder::on(area)
         .margin_top(TOP_PX * FINE)
         .margin_right(RIGHT_PX * FINE)
+        .margin_left(EDGE_PX * FINE)
+        .margin_bottom(EDGE_PX * FINE)
         .set_label_area_size(LabelAreaPosition::Left, LEFT_PX * FINE)
         .set_label_area_size(LabelAreaPosition::Bottom, BOTTOM_PX * FINE)
         .build_cartesian_2d(x.from..x.to, y.from..y.to)?;
@@ -236,12 +240,12 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
     for series in &chart.series {
         draw_series(&mut context, series)?;
     }
-    let bottom = area.get_base_pixel().1 + height as i32 - (BOTTOM_PX - 7) * FINE;
+    let bottom = height as i32 - (BOTTOM_PX + EDGE_PX - 7) * FINE;
     let left = area.get_base_pixel().0;
     for (at, label) in chart.x_ticks.iter().flatten() {
         let (pixel, _) = context.plotting_area().map_coordinate(&(*at, y.from));
         let style = anchored(11, HPos::Center, VPos::Top);
-        area.draw(&Text::new(label.clone(), (pixel - left, bottom - area.get_base_pixel().1), style))?;
+        area.draw(&Text::new(label.clone(), (pixel - left, bottom), style))?;
     }
     Ok(())
 }

@@ -26,6 +26,17 @@ pub(crate) struct Judged<'a> {
     pub summary: &'a Summary,
 }
 
+impl Judged<'_> {
+    /// An axis over the times at which there is something, or the whole run if there is nothing.
+    fn time_axis(&self, times_s: impl Iterator<Item = f64>) -> canvas::Axis {
+        let first_s = times_s.fold(self.run.scene.duration_s, f64::min);
+        let end_s = self.run.scene.duration_s;
+        // Some room before the first point shows that nothing came before it.
+        let from_s = if first_s < end_s { (first_s - 0.05 * (end_s - first_s)).max(0.0) } else { 0.0 };
+        canvas::Axis::new("time (s)", (from_s, end_s))
+    }
+}
+
 /// Draws one picture into a file.
 type Picture = fn(&Path, &Judged<'_>) -> Result<(), JudgeError>;
 

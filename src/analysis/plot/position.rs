@@ -54,9 +54,10 @@ pub fn time(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let chart = |index: usize, title: &str, of: &dyn Fn(&PositionError) -> f64| {
         let points: Points = judged.errors.positions.iter().map(|error| (error.time_s, of(error))).collect();
         let y = Axis::around("error (m)", points.iter().map(|p| p.1).chain([0.0]), 0.1);
-        let zero = Series::new("", COLOURS[6], Mark::Line, vec![(0.0, 0.0), (judged.run.scene.duration_s, 0.0)]);
+        let x = judged.time_axis(points.iter().map(|p| p.0));
+        let zero = Series::new("", COLOURS[6], Mark::Line, vec![(x.from, 0.0), (x.to, 0.0)]);
         let fixes = Series::new("", COLOURS[index % COLOURS.len()], Mark::Dots, points);
-        Chart::new(title, Axis::new("time (s)", (0.0, judged.run.scene.duration_s)), y, vec![zero, fixes])
+        Chart::new(title, x, y, vec![zero, fixes])
     };
     let charts = [
         chart(0, "East", &|error| error.enu_m.x),

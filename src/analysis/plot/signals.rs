@@ -17,7 +17,7 @@ fn over_time(judged: &Judged<'_>, title: &str, y_label: &str, least: f64, data: 
     // Pull-in may be far outside; the axis shows what holds most of the time.
     let [low, high] = [0.002, 0.998].map(|p| percentile(&values, p).unwrap_or(0.0));
     let y = Axis::around(y_label, [low, high].into_iter(), least.max(1.3 * (high - low)));
-    let x = Axis::new("time (s)", (0.0, judged.run.scene.duration_s));
+    let x = judged.time_axis(data.iter().flat_map(|(_, points)| points.iter().map(|point| point.0)));
     let inside =
         |points: &Points| points.iter().copied().filter(|point| (y.from..=y.to).contains(&point.1)).collect::<Points>();
     let series: Vec<Series> = (data.iter().enumerate())
@@ -47,9 +47,15 @@ pub fn discriminators(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError
         links.iter().map(one).collect()
     };
     let charts = [
-        over_time(judged, "DLL discriminator", "chips", 0.02, &data(|row| row.dll_discriminator_chips)),
-        over_time(judged, "PLL discriminator", "degrees", 2.0, &data(|row| row.pll_discriminator_cycles * 360.0)),
-        over_time(judged, "FLL discriminator", "Hz", 2.0, &data(|row| row.fll_discriminator_hz)),
+        over_time(judged, "DLL discriminator", "output (chips)", 0.02, &data(|row| row.dll_discriminator_chips)),
+        over_time(
+            judged,
+            "PLL discriminator",
+            "output (degrees)",
+            2.0,
+            &data(|row| row.pll_discriminator_cycles * 360.0),
+        ),
+        over_time(judged, "FLL discriminator", "output (Hz)", 2.0, &data(|row| row.fll_discriminator_hz)),
     ];
     figure(path, (1100, 900), 1, &charts, &legend(links.iter().map(|link| link.0.to_string())))
 }
@@ -76,22 +82,22 @@ pub fn cn0(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         chart.series.push(line);
     }
     let difference = per_satellite(judged, |row| row.cn0_dbhz - row.cn0_true_dbhz);
-    let below = over_time(judged, "C/N0 measured minus set", "dB", 1.0, &difference);
+    let below = over_time(judged, "C/N0 measured minus set", "difference (dB)", 1.0, &difference);
     figure(path, (1100, 800), 1, &[chart, below], &satellites(judged))
 }
 
 /// Errors of code, carrier and Doppler.
 pub fn observables(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let charts = [
-        over_time(judged, "Code error", "m", 0.1, &per_satellite(judged, |row| row.code_m)),
+        over_time(judged, "Code error", "error (m)", 0.1, &per_satellite(judged, |row| row.code_m)),
         over_time(
             judged,
             "Carrier error, a constant removed from each arc",
-            "cycles",
+            "error (cycles)",
             0.01,
             &per_satellite(judged, |row| row.carrier_cycles),
         ),
-        over_time(judged, "Doppler error", "Hz", 0.1, &per_satellite(judged, |row| row.doppler_hz)),
+        over_time(judged, "Doppler error", "error (Hz)", 0.1, &per_satellite(judged, |row| row.doppler_hz)),
     ];
     figure(path, (1100, 900), 1, &charts, &satellites(judged))
 }
@@ -106,7 +112,7 @@ pub fn jitter(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         histogram("FLL", "Hz", &details.jitter.fll_hz, limits.fll_hz),
     ];
     let legend = [
-        Series::new("truth - replica", BLUE, Mark::Bars(1.0), Vec::new()),
+        Series::new("replica - truth", BLUE, Mark::Bars(1.0), Vec::new()),
         Series::new("±1σ", GREY, Mark::Dash, Vec::new()),
         Series::new("1σ threshold", ORANGE, Mark::Line, Vec::new()),
     ];
@@ -140,6 +146,6 @@ fn histogram(name: &str, unit: &str, values: &[f64], threshold: f64) -> Chart {
         }
     }
     let x = Axis::new(&format!("{name} error ({unit})"), (-half, half));
-    let title = format!("{name}: σ {sigma:.3}, threshold {threshold:.3} {unit}");
+    let title = format!("{name}: σ {sigma:.4}, threshold {threshold:.3} {unit}");
     Chart::new(title, x, Axis::new("share of observations (%)", (0.0, top)), series)
 }

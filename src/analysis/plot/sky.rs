@@ -19,7 +19,7 @@ const CENTRE: (i32, i32) = (375 * FINE, 395 * FINE);
 const RADIUS: f64 = (310 * FINE) as f64;
 
 /// Polar plot: north up, zenith in the middle, tracks ending in a labelled dot whose colour is the mean C/N0 as
-/// set; a satellite that no fix-worthy observation came from is hollow.
+/// set; a satellite that the receiver did not observe is hollow.
 pub fn sky(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let mut tracks: BTreeMap<Sv, Vec<&SkyRow>> = BTreeMap::new();
     for row in &judged.run.sky {
@@ -38,29 +38,40 @@ pub fn sky(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     render(path, (WIDTH_PX as u32, HEIGHT_PX as u32), |area| {
         frame(area)?;
         scale(area, low, high)?;
-        let mut taken: Vec<(i32, i32)> = Vec::new();
+        // Names keep clear of the dots, the tracks and each other.
+        let mut taken: Vec<(i32, i32)> =
+            tracks.values().flat_map(|rows| rows.iter().map(|row| place(row.azimuth_deg, row.elevation_deg))).collect();
+        taken.dedup();
+        let mut ends = Vec::new();
         for (sv, rows) in &tracks {
             let colour = strengths.get(sv).map_or(GREY, |cn0| shade(*cn0, low, high));
             let observed = judged.errors.signals.keys().any(|(seen, _)| seen == sv);
             let points: Vec<(i32, i32)> = rows.iter().map(|row| place(row.azimuth_deg, row.elevation_deg)).collect();
             let Some(&end) = points.last() else { continue };
             area.draw(&PathElement::new(points, colour.stroke_width(3 * FINE as u32)))?;
-            let dot = if observed { colour.filled() } else { colour.stroke_width(2 * FINE as u32) };
-            area.draw(&Circle::new(end, 8 * FINE, dot))?;
-            label(area, *sv, end, &mut taken)?;
+            area.draw(&Circle::new(end, 8 * FINE, if observed { colour.filled() } else { WHITE.filled() }))?;
+            area.draw(&Circle::new(end, 8 * FINE, colour.stroke_width(2 * FINE as u32)))?;
+            ends.push((*sv, end));
         }
+        for (sv, end) in ends {
+            label(area, sv, end, &mut taken)?;
+        }
+        let note = anchored(12, HPos::Left, VPos::Center);
+        area.draw(&Text::new("filled: observed by the receiver", (14 * FINE, (HEIGHT_PX - 16) * FINE), note))?;
         Ok(())
     })
 }
 
-/// Writes a satellite's name beside its dot, on the first of four sides where no other name is.
+/// Writes a satellite's name beside its dot, on the first side where nothing else is.
 fn label(area: &Area<'_>, sv: Sv, (x, y): (i32, i32), taken: &mut Vec<(i32, i32)>) -> Result<(), Failure> {
-    let sides = [(28, 0), (-28, 0), (0, -18), (0, 18)].map(|(dx, dy)| (x + dx * FINE, y + dy * FINE));
-    let free = |&(x, y): &(i32, i32)| {
-        taken.iter().all(|(other_x, other_y)| (x - other_x).abs() > 34 * FINE || (y - other_y).abs() > 15 * FINE)
+    let sides = [(28, 0), (-28, 0), (0, -18), (0, 18), (24, -15), (-24, -15), (24, 15), (-24, 15)];
+    let spots = sides.map(|(dx, dy)| (x + dx * FINE, y + dy * FINE));
+    let free = |spot: &(i32, i32)| {
+        taken.iter().all(|other| (spot.0 - other.0).abs() > 24 * FINE || (spot.1 - other.1).abs() > 13 * FINE)
     };
-    let spot = sides.into_iter().find(free).unwrap_or(sides[0]);
-    taken.push(spot);
+    let spot = spots.iter().copied().find(free).unwrap_or(spots[0]);
+    // A name is wider than a dot: its two ends stand for it.
+    taken.extend([(spot.0 - 12 * FINE, spot.1), (spot.0 + 12 * FINE, spot.1)]);
     area.draw(&Text::new(sv.to_string(), spot, anchored(14, HPos::Center, VPos::Center)))?;
     Ok(())
 }

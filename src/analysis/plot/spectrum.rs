@@ -58,18 +58,17 @@ pub fn acquisition(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         Series::new("not acquired", GREY, Mark::Bars(0.7), bars(false)),
         Series::new("threshold", ORANGE, Mark::Line, threshold),
     ];
-    let legend = series.clone();
+    let mut legend = series.clone();
     let x = Axis::new("satellite", (-0.8, best.len().max(1) as f64 - 0.2));
-    let y = Axis::new("largest statistic of the search", (0.0, 1.06 * top));
+    let y = Axis::new("largest statistic of the search", (0.0, 1.08 * top));
     let mut chart = Chart::new("Acquisition", x, y, series);
     chart.x_ticks = Some((0..).zip(best.keys()).map(|(place, sv)| (f64::from(place), tick(*sv))).collect());
     let truly: Vec<(f64, f64)> = (0..)
-        .zip(best.keys())
-        .filter(|(_, sv)| judged.run.truth.iter().any(|row| row.sv == **sv))
-        .map(|(place, _)| (f64::from(place), 0.015 * top))
+        .zip(best.values())
+        .filter(|(_, best)| judged.run.truth.iter().any(|row| row.sv == best.sv))
+        .map(|(place, best)| (f64::from(place), best.statistic + 0.03 * top))
         .collect();
-    let in_truth = Series::new("in the truth", GREEN, Mark::Dots, truly);
-    let mut legend = legend;
+    let in_truth = Series::new("in the truth", GREEN, Mark::Cross, truly);
     legend.push(in_truth.clone());
     chart.series.push(in_truth);
     figure(path, (1200, 500), 1, &[chart], &legend)
