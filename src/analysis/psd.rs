@@ -115,7 +115,7 @@ fn decibels(power: f64) -> f64 {
 }
 
 /// What theory expects at the frequencies of `psd.csv`, in the same decibels. Its level, which the truth does not
-/// state, is fitted as the median over frequency. Empty without a spectrum or without signals.
+/// state, is fitted: the median over frequencies less than 20 dB below the peak. Empty without a spectrum or without signals.
 pub fn theory_db(run: &Run) -> Vec<f64> {
     let signals = expected(run);
     let Some(center_hz) = run.scene.center_hz.filter(|_| !signals.is_empty() && !run.psd.is_empty()) else {
@@ -135,7 +135,15 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
             decibels(floor + signals.iter().map(of).sum::<f64>())
         })
         .collect();
-    let offsets: Vec<f64> = run.psd.iter().zip(&shape).map(|(row, shape)| row.density_db - shape).collect();
+    // Near the nulls quantisation, not the codes, sets the level.
+    let peak_db = shape.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let offsets: Vec<f64> = run
+        .psd
+        .iter()
+        .zip(&shape)
+        .filter(|(_, shape)| **shape > peak_db - 20.0)
+        .map(|(row, shape)| row.density_db - shape)
+        .collect();
     let level_db = median(&offsets).unwrap_or(0.0);
     shape.into_iter().map(|shape| shape + level_db).collect()
 }
@@ -168,9 +176,10 @@ fn expected(run: &Run) -> Vec<Expected> {
 /// Density of a unit-power rectangular-chip code, sampled, at `f_hz` from its carrier, per hertz.
 fn code_density(code_edge: &str, f_hz: f64, chip_rate_hz: f64, rate_hz: f64) -> f64 {
     let chip = |f: f64| sinc_squared(f / chip_rate_hz) / chip_rate_hz;
-    match code_edge {
+    let name: String = code_edge.chars().filter(char::is_ascii_alphabetic).collect();
+    match name.to_ascii_lowercase().as_str() {
         // Filtered to half the sample rate: no alias but the one that the frequency itself may be.
-        "band_limited" => chip(f_hz - rate_hz * (f_hz / rate_hz).round()),
+        "bandlimited" => chip(f_hz - rate_hz * (f_hz / rate_hz).round()),
         // A mean over the sample's interval has its own sinc² before it aliases.
         "area" => aliases(|f| chip(f) * sinc_squared(f / rate_hz), f_hz, rate_hz),
         _ => aliases(chip, f_hz, rate_hz),
