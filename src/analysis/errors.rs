@@ -53,7 +53,7 @@ pub struct PositionError {
 pub struct Errors {
     pub signals: BTreeMap<Link, Vec<SignalError>>,
     pub positions: Vec<PositionError>,
-    /// Changes of the carrier's constant: those declared by the receiver's events, and jumps of at
+    /// Changes of the carrier's constant: those declared by the receiver's events after a satellite's first observation, and jumps of at
     /// least [`SLIP_CYCLES`] that stay and that it did not declare.
     pub cycle_slips: usize,
     /// Observations of satellites or samples that the truth does not have.
@@ -98,10 +98,12 @@ impl Errors {
         }
         for (&(sv, signal), rows) in &mut self.signals {
             rows.sort_by_key(|row| row.sample);
+            let first = rows.first().map_or(0, |row| row.sample);
             let declared: Vec<u64> = run
                 .events
                 .iter()
                 .filter(|row| row.sv == sv && row.signal == signal && row.event == Event::CycleSlip)
+                .filter(|row| row.sample > first)
                 .map(|row| row.sample)
                 .collect();
             self.cycle_slips += declared.len() + level_carrier(rows, &declared);
