@@ -185,10 +185,10 @@ fn body<const T: usize, const AREA: bool>(job: &Job, starts: [u64; T]) -> Output
     let mut carrier = job.nco.carrier;
     for (i, q) in job.i.chunks(CHUNK).zip(job.q.chunks(CHUNK)) {
         let (sin, cos) = libm::sincos(radians(carrier));
-        for k in 0..LANES {
-            let phasor = powers[k] * Complex64::new(cos, sin);
-            lanes.cos[k] = phasor.re as f32;
-            lanes.sin[k] = phasor.im as f32;
+        let anchor = Complex64::new(cos, sin);
+        for ((cos, sin), power) in lanes.cos.iter_mut().zip(&mut lanes.sin).zip(&powers) {
+            let phasor = power * anchor;
+            (*cos, *sin) = (phasor.re as f32, phasor.im as f32);
         }
         let (vectors_i, rest_i) = i.as_chunks::<LANES>();
         let (vectors_q, rest_q) = q.as_chunks::<LANES>();
@@ -201,8 +201,8 @@ fn body<const T: usize, const AREA: bool>(job: &Job, starts: [u64; T]) -> Output
             q[..rest_q.len()].copy_from_slice(rest_q);
             vector::<T, AREA>(job.words, &i, &q, &mut lanes, &steps);
         }
-        for t in 0..T {
-            totals[t] += Complex64::new(drain(&mut lanes.re[t]), drain(&mut lanes.im[t]));
+        for (total, (re, im)) in totals.iter_mut().zip(lanes.re.iter_mut().zip(&mut lanes.im)) {
+            *total += Complex64::new(drain(re), drain(im));
         }
         power += drain(&mut lanes.power);
         carrier = carrier.wrapping_add(job.nco.carrier_step.wrapping_mul(CHUNK as u64));
