@@ -45,8 +45,10 @@ fn received(hex: &str) -> [u32; 10] {
     })
 }
 
-/// (satellite, week, TOW of the next subframe, words) of every line.
-fn real_subframes() -> Option<Vec<(Sv, u32, u32, [u32; 10])>> {
+/// Satellite, week, TOW of the next subframe, words.
+type RealSubframe = (Sv, u32, u32, [u32; 10]);
+
+fn real_subframes() -> Option<Vec<RealSubframe>> {
     let text = std::fs::read_to_string(external("lnav/046r_gpslnav.txt")?).unwrap();
     let parse = |line: &str| {
         let column: Vec<&str> = line.split_whitespace().collect();
