@@ -7,6 +7,7 @@
 pub mod catalogue;
 pub mod clock;
 pub mod effect;
+pub mod knots;
 pub mod ray;
 pub mod scenario;
 pub mod scene;
