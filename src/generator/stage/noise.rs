@@ -37,16 +37,17 @@ pub fn add_block(seed: u64, block: u64, sigma: f32, i: &mut [f32], q: &mut [f32]
 fn seeded(seed: u64, block: u64) -> [Words; 4] {
     // The block's number passes the mixer once before lanes are counted, so that blocks do not overlap.
     let mut counter = mix(seed ^ mix(block.wrapping_add(0x9e37_79b9_7f4a_7c15)));
-    let mut state = [[0; LANES]; 4];
-    for k in 0..LANES {
-        for pair in 0..2 {
-            counter = counter.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let word = mix(counter);
-            state[2 * pair][k] = word as u32;
-            state[2 * pair + 1][k] = (word >> 32) as u32;
-        }
+    let [mut a, mut b, mut c, mut d] = [[0; LANES]; 4];
+    let mut draw = || {
+        counter = counter.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let word = mix(counter);
+        (word as u32, (word >> 32) as u32)
+    };
+    for (((a, b), c), d) in a.iter_mut().zip(&mut b).zip(&mut c).zip(&mut d) {
+        (*a, *b) = draw();
+        (*c, *d) = draw();
     }
-    state
+    [a, b, c, d]
 }
 
 /// SplitMix64's finaliser (Steele, Lea, Flood 2014).

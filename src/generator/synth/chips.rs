@@ -113,10 +113,11 @@ impl Spreading {
         let span = (at.phase % CODE_ONE + step * samples as u64) / CODE_ONE;
         let mut left = span + 2 * MARGIN_STEPS + 1;
         let (mut word, mut filled) = (0_u64, 0_u64);
+        let mut inverted = negative(period);
         while left > 0 {
             let take = left.min(u64::from(self.steps) - chip).min(64 - filled);
             let mut signs = self.window(chip as usize);
-            if negative(period) {
+            if inverted {
                 signs = !signs;
             }
             word |= (signs & (u64::MAX << (64 - take))) >> filled;
@@ -130,6 +131,7 @@ impl Spreading {
             if chip == u64::from(self.steps) {
                 chip = 0;
                 period += 1;
+                inverted = negative(period);
             }
         }
         out.extend([word, 0, 0]);

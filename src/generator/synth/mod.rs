@@ -11,6 +11,7 @@ pub mod chips;
 pub mod isa;
 pub mod lanes;
 pub mod reference;
+pub mod transmitter;
 
 use band::Filter;
 
@@ -46,6 +47,13 @@ pub enum Edge<'a> {
     Nearest,
     Area,
     BandLimited(&'a Filter),
+}
+
+/// How samples are made: the edge model and the instruction set.
+#[derive(Clone, Copy, Debug)]
+pub struct Kernel<'a> {
+    pub edge: Edge<'a>,
+    pub level: isa::Level,
 }
 
 impl Edge<'_> {
