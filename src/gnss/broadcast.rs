@@ -121,7 +121,9 @@ impl Ephemeris {
         let inclination_rate = self.idot_radps + 2.0 * true_rate * (self.cis_rad * cos2 - self.cic_rad * sin2);
 
         let node_rate = self.omega_dot_radps - EARTH_ROTATION_RADPS;
-        let node_rad = self.omega0_rad + node_rate * anomaly.since_toe_s - EARTH_ROTATION_RADPS * self.toe.tow_s();
+        // Whole turns are taken from the constant part, so that rounding does not grow with the time of week.
+        let node_at_toe_rad = wrap(self.omega0_rad - EARTH_ROTATION_RADPS * self.toe.tow_s());
+        let node_rad = node_at_toe_rad + node_rate * anomaly.since_toe_s;
 
         let (sin_u, cos_u) = libm::sincos(argument_rad);
         let (sin_i, cos_i) = libm::sincos(inclination_rad);
@@ -225,13 +227,19 @@ impl Ephemeris {
     }
 }
 
+/// The angle in [−π, π] with the same direction.
+fn wrap(angle_rad: f64) -> f64 {
+    use std::f64::consts::TAU;
+    angle_rad - TAU * (angle_rad / TAU).round()
+}
+
 /// The eccentric anomaly in [−π, π] of a mean anomaly; `None` when 20 Newton steps leave a residual above 1e-13.
 ///
 /// For M in [0, π] the start min(M + e, π) lies above the root, where E − e sin E is convex, so
 /// Newton's steps descend to the root for every eccentricity below one.
 fn solve_kepler(mean_rad: f64, eccentricity: f64) -> Option<f64> {
-    use std::f64::consts::{PI, TAU};
-    let wrapped = mean_rad - TAU * (mean_rad / TAU).round();
+    use std::f64::consts::PI;
+    let wrapped = wrap(mean_rad);
     let target = wrapped.abs();
     let mut anomaly = (target + eccentricity).min(PI);
     for _ in 0..KEPLER_STEPS {
@@ -265,7 +273,7 @@ mod tests {
             l2_p_data_off: false,
             long_fit: false,
             aodo: 0,
-            sqrt_a_sqrtm: 5153.597_391_13,
+            sqrt_a_sqrtm: 5_153.597_391_13,
             eccentricity: 0.009_606_978_041_12,
             m0_rad: 1.657_721_674_12,
             delta_n_radps: 5.255_575_974_42e-9,
@@ -293,7 +301,7 @@ mod tests {
             for step in -2000..=2000 {
                 let mean = f64::from(step) * 0.004;
                 let anomaly = solve_kepler(mean, eccentricity).expect("converges");
-                let residual = anomaly - eccentricity * anomaly.sin() - mean;
+                let residual = anomaly - eccentricity * libm::sin(anomaly) - mean;
                 let turns = residual / std::f64::consts::TAU;
                 assert!((residual - turns.round() * std::f64::consts::TAU).abs() < 1e-13, "{eccentricity} {mean}");
             }

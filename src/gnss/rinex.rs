@@ -12,6 +12,7 @@ use std::sync::Once;
 
 use ::rinex::navigation::{Ephemeris as Frame, NavKey, NavMessageType};
 use ::rinex::prelude::{Constellation, Rinex, TimeScale};
+use ::rinex::record::{ParsingDiagnostic, ParsingDiagnosticKind};
 use thiserror::Error;
 
 use crate::gnss::broadcast::Ephemeris;
@@ -120,7 +121,7 @@ fn clean(bytes: &[u8]) -> Vec<u8> {
 
 fn check_first_line(text: &[u8], name: &str) -> Result<(), NavigationError> {
     let line: String = text.iter().take_while(|b| **b != b'\n').take(80).map(|b| char::from(*b)).collect();
-    if !line.get(60..).is_some_and(|label| label.trim_end() == "RINEX VERSION / TYPE") {
+    if line.get(60..).is_none_or(|label| label.trim_end() != "RINEX VERSION / TYPE") {
         return Err(NavigationError::NotRinex { name: name.to_owned(), found: line.trim_end().to_owned() });
     }
     match line.get(20..21) {
@@ -163,7 +164,7 @@ fn extract(text: &[u8]) -> Result<Found, String> {
     let mut navigation = Navigation {
         klobuchar: klobuchar(&file),
         leap_seconds: file.header.leap.map(|leap| i64::from(leap.leap)),
-        skipped: diagnostics.iter().map(|d| format!("body line {}: {:?}", d.record_line, d.kind)).collect(),
+        skipped: skipped(text, &diagnostics),
         ..Navigation::default()
     };
     let mut others = 0;
@@ -179,6 +180,35 @@ fn extract(text: &[u8]) -> Result<Found, String> {
     }
     navigation.ephemerides.sort_by_key(|set| (set.sv, set.toc.seconds()));
     Ok(Found { navigation, others })
+}
+
+/// What the crate dropped of GPS; records of other systems and faithful repetitions are no loss.
+fn skipped(text: &[u8], diagnostics: &[ParsingDiagnostic]) -> Vec<String> {
+    if diagnostics.is_empty() {
+        return Vec::new();
+    }
+    // `clean` left nothing but ASCII.
+    let text = String::from_utf8_lossy(text);
+    let body: Vec<&str> = text.lines().skip_while(|line| !line.contains("END OF HEADER")).collect();
+    let mut reasons = Vec::new();
+    for diagnostic in diagnostics {
+        let line = body.get(diagnostic.record_line).copied().unwrap_or_default();
+        // Version 4 has a line of its own before the record; version 2 has no letter.
+        let named = line.strip_prefix("> EPH ").unwrap_or(line);
+        if !named.starts_with(|first: char| first == 'G' || first == ' ' || first.is_ascii_digit()) {
+            continue;
+        }
+        let what = match &diagnostic.kind {
+            ParsingDiagnosticKind::NavigationFailure(error) => error.to_string(),
+            ParsingDiagnosticKind::DuplicateNavigation { conflicting: true, previous_record_line, .. } => {
+                format!("replaces a different record of the same time at body line {previous_record_line}")
+            }
+            _ => continue,
+        };
+        let label: String = line.chars().take(23).collect();
+        reasons.push(format!("body line {} ({label}): {what}", diagnostic.record_line));
+    }
+    reasons
 }
 
 fn klobuchar(file: &Rinex) -> Option<Klobuchar> {
@@ -220,8 +250,10 @@ fn ephemeris(key: &NavKey, frame: &Frame) -> Result<Ephemeris, String> {
     const HARMONIC_M: f64 = 1024.001;
     let both = |name, most: f64| field(frame, name, -most, most);
 
-    let number = u8::try_from(key.sv.prn).ok().filter(|prn| (1..=32).contains(prn));
-    let number = number.ok_or_else(|| format!("PRN {}: expected 1 to 32", key.sv.prn))?;
+    let number = key.sv.prn;
+    if !(1..=32).contains(&number) {
+        return Err(format!("PRN {number}: expected 1 to 32"));
+    }
     let toc = epoch(key)?;
     let toe = near(toc, field(frame, "toe", 0.0, 604_800.0)?);
     let week = f64::from(whole(frame, "week", 9999)?);
@@ -385,6 +417,9 @@ mod tests {
         other.extend(text.replace('\n', "\r\n").into_bytes());
         assert_eq!(read(&other, "crlf").unwrap(), reference);
         assert_eq!(read(text.replace('\n', "\r").as_bytes(), "cr").unwrap(), reference);
+        let trimmed: Vec<_> = text.lines().map(str::trim_end).collect();
+        assert_eq!(read(trimmed.join("\n").as_bytes(), "trimmed").unwrap(), reference);
+        assert_eq!(read(text.replace("D-", "E-").replace("D+", "e+").as_bytes(), "exponents").unwrap(), reference);
     }
 
     #[test]

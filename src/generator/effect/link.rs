@@ -161,7 +161,7 @@ pub(crate) mod tests {
     pub(crate) fn sight(elevation_deg: f64, height_m: f64) -> Sight {
         let elevation_rad = elevation_deg.to_radians();
         let (earth, orbit) = (6_378e3, 26_560e3);
-        let across = earth * elevation_rad.cos();
+        let across = earth * libm::cos(elevation_rad);
         Sight {
             sv: Sv::gps(1),
             received: Epoch::from_week(1590, 374_400.0),
@@ -169,9 +169,9 @@ pub(crate) mod tests {
             user_m: Vector3::zeros(),
             user_mps: Vector3::zeros(),
             satellite: State { position_m: Vector3::zeros(), velocity_mps: Vector3::zeros() },
-            range_m: (orbit * orbit - across * across).sqrt() - earth * elevation_rad.sin(),
+            range_m: (orbit * orbit - across * across).sqrt() - earth * libm::sin(elevation_rad),
             look: Look { azimuth_rad: 1.0, elevation_rad },
-            off_nadir_rad: (across / orbit).asin(),
+            off_nadir_rad: libm::asin(across / orbit),
         }
     }
 

@@ -25,7 +25,7 @@ const YEAR_DAYS: f64 = 365.25;
 /// Weather at a height, from which that at every other height follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weather {
-    /// Height at which the next three were measured.
+    /// Height at which the next three were measured, below 44 km.
     pub height_m: f64,
     pub pressure_hpa: f64,
     pub temperature_k: f64,
