@@ -153,9 +153,9 @@ fn models(scene: &Scene) -> Vec<Model> {
         })
         .collect();
     let mut add = |name: &str, present: bool, why: String| models.push(Model { name: name.to_owned(), present, why });
-    for (name, table) in [("klobuchar", "ionosphere"), ("saastamoinen", "troposphere")] {
+    for name in ["ionosphere", "troposphere"] {
         if !scene.effects.iter().any(|effect| effect.name() == name) {
-            add(name, false, format!("the scenario has no [{table}]"));
+            add(name, false, format!("the scenario has no [{name}]"));
         }
     }
     let clock = scene.receiver_clock;
@@ -233,7 +233,11 @@ impl fmt::Display for Plan {
         }
         for (title, present) in [("computed", true), ("not computed", false)] {
             writeln!(f, "\n{title}")?;
-            for model in self.models.iter().filter(|model| model.present == present) {
+            let mut models = self.models.iter().filter(|model| model.present == present).peekable();
+            if models.peek().is_none() {
+                writeln!(f, "  nothing that a scenario can name")?;
+            }
+            for model in models {
                 writeln!(f, "  {:16} {}", model.name, model.why)?;
             }
         }
@@ -276,6 +280,8 @@ mod tests {
         assert_eq!((plan.samples, plan.bytes), (156_000_000, 312_000_000));
         // 156e6 samples of 12 satellites at 1e8 a second.
         assert!((plan.time_s - 18.72).abs() < 1e-9 && plan.speed_mps == 0.0);
+        // The link budget's reach from 5 degrees to the zenith.
+        assert!(plan.satellites.iter().all(|s| s.cn0_dbhz.is_some_and(|x| (37.0..52.0).contains(&x))), "{plan}");
     }
 
     #[test]

@@ -23,6 +23,8 @@ pub use read::Place;
 use read::{Source, Table};
 
 use crate::generator::clock::ReceiverClock;
+use crate::generator::effect::link::{Antenna, LinkBudget};
+use crate::generator::effect::troposphere::Weather;
 use crate::generator::scene::{CodeEdge, Fidelity};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::samples::Format;
@@ -60,7 +62,7 @@ pub const KEYS: &[(&str, &[&str])] = &[
     ("front_end", &["sample_rate_hz", "if_hz", "spectrum_inverted", "format", "noise_lsb"]),
     ("power", &["kind", "cn0_dbhz", "satellites", "antenna", "noise_figure_db", "loss_db"]),
     ("ionosphere", &["model", "alpha", "beta"]),
-    ("troposphere", &["model", "pressure_hpa", "temperature_c", "relative_humidity"]),
+    ("troposphere", &["model", "height_m", "pressure_hpa", "temperature_c", "relative_humidity"]),
     ("receiver_clock", &["bias_s", "drift_sps"]),
     ("noise", &[]),
     ("fidelity", &["code_edge", "knot_tolerance_cycles"]),
@@ -97,13 +99,6 @@ pub struct FrontEnd {
     pub noise_lsb: Option<f32>,
 }
 
-/// Receiving antennas that the link budget knows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Antenna {
-    Isotropic,
-    Patch,
-}
-
 /// How strong the satellites are.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Power {
@@ -119,15 +114,6 @@ pub enum Ionosphere {
     /// The navigation file's.
     Broadcast,
     Given(Klobuchar),
-}
-
-/// Weather at the antenna.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Troposphere {
-    pub pressure_hpa: f64,
-    pub temperature_c: f64,
-    /// 0 to 1.
-    pub relative_humidity: f64,
 }
 
 /// A scenario whose every value is within its range. What is absent is `None` or not in the scene.
@@ -150,7 +136,7 @@ pub struct Scenario {
     pub front_end: FrontEnd,
     pub power: Power,
     pub ionosphere: Option<Ionosphere>,
-    pub troposphere: Option<Troposphere>,
+    pub troposphere: Option<Weather>,
     pub receiver_clock: ReceiverClock,
     pub noise: bool,
     pub fidelity: Fidelity,
@@ -286,8 +272,13 @@ fn front_end(table: Option<&Table<'_>>) -> Result<FrontEnd, ScenarioError> {
 }
 
 fn power(table: Option<&Table<'_>>) -> Result<Power, ScenarioError> {
-    const DEFAULT: Power = Power::LinkBudget { antenna: Antenna::Patch, noise_figure_db: 2.0, loss_db: 0.0 };
-    let Some(table) = table else { return Ok(DEFAULT) };
+    let ordinary = LinkBudget::default();
+    let budget = |antenna: Option<Antenna>, noise_figure_db: Option<f64>, loss_db: Option<f64>| Power::LinkBudget {
+        antenna: antenna.unwrap_or(ordinary.antenna),
+        noise_figure_db: noise_figure_db.unwrap_or(ordinary.noise_figure_db),
+        loss_db: loss_db.unwrap_or(ordinary.extra_loss_db),
+    };
+    let Some(table) = table else { return Ok(budget(None, None, None)) };
     let fixed = match table.choice("kind", &[("fixed", true), ("link_budget", false)])? {
         Some(fixed) => fixed,
         None => table.has("cn0_dbhz"),
@@ -306,11 +297,11 @@ fn power(table: Option<&Table<'_>>) -> Result<Power, ScenarioError> {
     }
     table.allow(&["kind", "antenna", "noise_figure_db", "loss_db"])?;
     let antennas = [("isotropic", Antenna::Isotropic), ("patch", Antenna::Patch)];
-    Ok(Power::LinkBudget {
-        antenna: table.choice("antenna", &antennas)?.unwrap_or(Antenna::Patch),
-        noise_figure_db: table.number("noise_figure_db", 0.0..=30.0, "dB")?.unwrap_or(2.0),
-        loss_db: table.number("loss_db", -20.0..=60.0, "dB")?.unwrap_or(0.0),
-    })
+    Ok(budget(
+        table.choice("antenna", &antennas)?,
+        table.number("noise_figure_db", 0.0..=30.0, "dB")?,
+        table.number("loss_db", -20.0..=60.0, "dB")?,
+    ))
 }
 
 fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError> {
@@ -324,12 +315,17 @@ fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError> {
     }
 }
 
-fn troposphere(table: &Table<'_>) -> Result<Troposphere, ScenarioError> {
+fn troposphere(table: &Table<'_>) -> Result<Weather, ScenarioError> {
     table.choice("model", &[("saastamoinen", ())])?.ok_or_else(|| table.bad("model", "one of saastamoinen"))?;
-    Ok(Troposphere {
-        pressure_hpa: table.number("pressure_hpa", 1.0..=1100.0, "hPa")?.unwrap_or(1013.25),
-        temperature_c: table.number("temperature_c", -90.0..=60.0, "C")?.unwrap_or(15.0),
-        relative_humidity: table.number("relative_humidity", 0.0..=1.0, "(a fraction)")?.unwrap_or(0.5),
+    let standard = Weather::STANDARD;
+    let celsius = table.number("temperature_c", -90.0..=60.0, "C")?;
+    Ok(Weather {
+        height_m: table.number("height_m", -500.0..=9_000.0, "m")?.unwrap_or(standard.height_m),
+        pressure_hpa: table.number("pressure_hpa", 1.0..=1100.0, "hPa")?.unwrap_or(standard.pressure_hpa),
+        temperature_k: celsius.map_or(standard.temperature_k, |c| c + 273.15),
+        relative_humidity: table
+            .number("relative_humidity", 0.0..=1.0, "(a fraction)")?
+            .unwrap_or(standard.relative_humidity),
     })
 }
 

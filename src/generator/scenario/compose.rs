@@ -7,7 +7,9 @@ use std::sync::Arc;
 use super::motion::{FileKind, MotionSpec};
 use super::{Scenario, ScenarioError, parts};
 use crate::generator::scene::Scene;
+use crate::generator::sky::emission;
 use crate::generator::vehicle::{Trajectory, file, route};
+use crate::gnss::broadcast::OrbitError;
 use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::time::SampleClock;
 
@@ -58,6 +60,13 @@ impl Scenario {
             truth_interval_s: self.truth_interval_s,
             metadata,
         };
+        let visible = visible_at_start(&scene).map_err(|e| self.conflict("navigation.file", e.to_string()))?;
+        if visible < 4 {
+            let mask_deg = self.mask_rad.to_degrees();
+            warnings.push(format!(
+                "{visible} satellites above satellites.mask_deg = {mask_deg} at the start: a position needs 4"
+            ));
+        }
         Ok((scene, warnings))
     }
 
@@ -228,6 +237,17 @@ impl Scenario {
         }
         std::fs::read(full).map_err(|e| self.unreadable(key, path, &e))
     }
+}
+
+/// Satellites of the scene above the mask at its start.
+fn visible_at_start(scene: &Scene) -> Result<usize, OrbitError> {
+    let motion = scene.trajectory.at(0.0);
+    let mut visible = 0;
+    for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
+        let found = emission(&scene.catalogue, sv, scene.clock.start, &motion)?;
+        visible += usize::from(found.is_some_and(|e| e.sight.look.elevation_rad >= scene.mask_rad));
+    }
+    Ok(visible)
 }
 
 /// Gain when the scenario sets none. Eleven satellites at 47 dB-Hz in 2.6 Msps add a tenth to the noise's standard

@@ -2,14 +2,18 @@
 
 use std::path::Path;
 
-use super::{Ionosphere, Overrides, Scenario, ScenarioError};
+use super::{Ionosphere, Overrides, Power, Scenario, ScenarioError};
 use crate::generator::catalogue::Catalogue;
-use crate::generator::ray::Effect;
+use crate::generator::effect::ionosphere::KlobucharIonosphere;
+use crate::generator::effect::link::{FixedCn0, LinkBudget};
+use crate::generator::effect::troposphere::Saastamoinen;
+use crate::generator::ray::{Effect, Ray, Sight};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::Broadcast;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::rinex::{self, Navigation};
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
 
 /// Warnings of one kind that are told in full.
 const TOLD: usize = 4;
@@ -55,6 +59,9 @@ pub(super) fn sky(
         if sending(at) == 0 {
             return Err(scenario.conflict("start", outside(&navigation.ephemerides, scenario)));
         }
+    }
+    for sv in scenario.excluded.iter().filter(|sv| catalogue.sent_at(**sv, start).is_none()) {
+        warnings.push(format!("satellites.exclude names {sv}, which has no ephemeris then"));
     }
     let mut excluded = scenario.excluded.clone();
     if !scenario.include_unhealthy {
@@ -119,12 +126,53 @@ fn tell(warnings: &mut Vec<String>, list: &[String], what: &str) {
     }
 }
 
-/// The effects in the order in which they act: delays first, then strength.
+/// The effects in the order in which they act: ionosphere, troposphere, then strength.
 pub(super) fn effects(scenario: &Scenario, navigation: &Navigation) -> Result<Vec<Box<dyn Effect>>, ScenarioError> {
-    if scenario.ionosphere.is_some() && coefficients(scenario, navigation).is_none() {
-        let reason = "the navigation file has no Klobuchar coefficients: write alpha and beta here, name a file that has \
-                      them, or remove [ionosphere]";
-        return Err(scenario.conflict("ionosphere", reason.to_owned()));
+    let mut effects: Vec<Box<dyn Effect>> = Vec::new();
+    if scenario.ionosphere.is_some() {
+        let model = coefficients(scenario, navigation).ok_or_else(|| {
+            let reason = "the navigation file has no Klobuchar coefficients: write alpha and beta here, name a file that \
+                          has them, or remove [ionosphere]";
+            scenario.conflict("ionosphere", reason.to_owned())
+        })?;
+        effects.push(Box::new(KlobucharIonosphere { model }));
     }
-    Ok(Vec::new())
+    if let Some(weather) = scenario.troposphere {
+        effects.push(Box::new(Saastamoinen { weather }));
+    }
+    match &scenario.power {
+        Power::LinkBudget { antenna, noise_figure_db, loss_db } => effects.push(Box::new(LinkBudget {
+            antenna: *antenna,
+            noise_figure_db: *noise_figure_db,
+            extra_loss_db: *loss_db,
+            ..LinkBudget::default()
+        })),
+        Power::Fixed { cn0_dbhz, satellites } => {
+            let default = FixedCn0 { cn0_dbhz: *cn0_dbhz };
+            if satellites.is_empty() {
+                effects.push(Box::new(default));
+            } else {
+                let satellites = satellites.iter().map(|&(sv, cn0_dbhz)| (sv, FixedCn0 { cn0_dbhz })).collect();
+                effects.push(Box::new(ListedCn0 { default, satellites }));
+            }
+        }
+    }
+    Ok(effects)
+}
+
+/// C/N0 by a list of satellites, and one value for all others.
+struct ListedCn0 {
+    default: FixedCn0,
+    satellites: Vec<(Sv, FixedCn0)>,
+}
+
+impl Effect for ListedCn0 {
+    fn name(&self) -> &'static str {
+        self.default.name()
+    }
+
+    fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
+        let listed = self.satellites.iter().find(|(sv, _)| *sv == sight.sv).map(|(_, fixed)| fixed);
+        listed.unwrap_or(&self.default).act(sight, signal, rays);
+    }
 }

@@ -16,7 +16,7 @@ const REST: &str = "[navigation]\nfile = \"brdc.10n\"\n[satellites]\nmask_deg = 
     [front_end]\nsample_rate_hz = 4e6\nif_hz = 1e6\nspectrum_inverted = true\nformat = \"ri8\"\nnoise_lsb = 3\n\
     [power]\nkind = \"link_budget\"\nantenna = \"patch\"\nnoise_figure_db = 2\nloss_db = 1\n\
     [ionosphere]\nmodel = \"klobuchar\"\nalpha = [1e-8, 0, 0, 0]\nbeta = [1e5, 0, 0, 0]\n\
-    [troposphere]\nmodel = \"saastamoinen\"\npressure_hpa = 1000\ntemperature_c = 30\nrelative_humidity = 0.5\n\
+    [troposphere]\nmodel = \"saastamoinen\"\nheight_m = 100\npressure_hpa = 1000\ntemperature_c = 30\nrelative_humidity = 0.5\n\
     [receiver_clock]\nbias_s = 1e-4\ndrift_sps = 1e-7\n[noise]\n\
     [fidelity]\ncode_edge = \"nearest\"\nknot_tolerance_cycles = 1e-3\n[truth]\ninterval_s = 0.5\n\
     [receiver.tracking]\nwhatever = 1\n";
@@ -163,6 +163,7 @@ fn numbers_outside_their_range_are_refused_with_range_and_unit() {
         ("front_end", "noise_lsb", "LSB"),
         ("power", "noise_figure_db", "dB"),
         ("power", "loss_db", "dB"),
+        ("troposphere", "height_m", "m"),
         ("troposphere", "pressure_hpa", "hPa"),
         ("troposphere", "temperature_c", "C"),
         ("troposphere", "relative_humidity", "fraction"),
@@ -279,7 +280,8 @@ fn shipped(name: &str) -> crate::generator::scene::Scene {
     let (_, text) = SHIPPED.iter().find(|(n, _)| *n == name).unwrap();
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     let (scene, warnings) = Scenario::parse(text, name).unwrap().compose(&directory, &Overrides::default()).unwrap();
-    println!("{name}: {warnings:?}");
+    // The one rogue record of that day, and the satellites that say themselves that they are unhealthy.
+    assert!(warnings.len() <= 2 && warnings.iter().all(|w| w.contains("left out")), "{name}: {warnings:?}");
     scene
 }
 
@@ -308,8 +310,100 @@ fn the_shipped_motions_do_what_their_comments_say() {
     let extremes = rocket.extremes(110.0);
     assert!(extremes.acceleration_mps2 > 20.0 * g && extremes.speed_mps > 700.0, "{extremes:?}");
     let height_m = |t_s| crate::gnss::earth::Geodetic::from_ecef(&rocket.at(t_s).position_m).height_m;
-    println!("high_dynamics: {extremes:?} height at the end {}", height_m(110.0));
     assert!(height_m(40.0) < 130.001 && height_m(110.0) > 10_000.0);
     let ride = shipped("trajectory_file").trajectory.extremes(60.0);
     assert!(ride.speed_mps < 4.0 && ride.acceleration_mps2 < 1.0, "{ride:?}");
+}
+
+#[test]
+fn the_boost_changes_some_satellite_s_doppler_by_about_a_thousand_hertz_a_second() {
+    let scene = shipped("high_dynamics");
+    let d = 0.01;
+    let mut fastest = 0.0_f64;
+    for sv in scene.catalogue.satellites() {
+        for k in 0..50 {
+            let t_s = 40.0 + f64::from(k) * 0.1;
+            let range = |t_s: f64| {
+                let at = scene.clock.start.plus_s(t_s);
+                let found = crate::generator::sky::emission(&scene.catalogue, sv, at, &scene.trajectory.at(t_s));
+                found.unwrap().map_or(f64::NAN, |e| e.sight.range_m)
+            };
+            let bend = (range(t_s + d) - 2.0 * range(t_s) + range(t_s - d)) / (d * d);
+            fastest = fastest.max((bend / crate::gnss::gps::l1ca::L1_CA.wavelength_m()).abs());
+        }
+    }
+    assert!((950.0..1150.0).contains(&fastest), "{fastest}");
+}
+
+fn warnings(text: &str) -> Result<Vec<String>, String> {
+    let composed = parse(text).unwrap().compose(Path::new("."), &Overrides::default());
+    composed.map(|(_, warnings)| warnings).map_err(|e| e.to_string())
+}
+
+#[test]
+fn a_scene_outside_its_navigation_file_is_refused_with_the_file_s_span() {
+    let base = format!("{MINIMAL}{STATIC}");
+    let error = warnings(&replaced(&base, "", "start", "2010-07-05T00:00:00")).unwrap_err();
+    assert!(error.contains("expected a scene within 2010-06-30T22:") && error.contains("2010-07-02T0"), "{error}");
+    let error = warnings(&replaced(&base, "", "duration_s", "200000")).unwrap_err();
+    assert!(error.contains("200000 s from then on"), "{error}");
+    let error =
+        warnings(&replaced(&replaced(&full(), "", "duration_s", "2678400"), "front_end", "sample_rate_hz", "60e6"));
+    // 2 678 400 s at 60 Msps.
+    assert!(error.unwrap_err().contains("1.60704e14 samples"));
+}
+
+#[test]
+fn what_looks_wrong_but_can_be_computed_is_warned_of() {
+    let base = format!("{MINIMAL}{STATIC}");
+    let told = warnings(&format!("{base}[satellites]\nmask_deg = 80\nexclude = [\"G99\"]\n")).unwrap();
+    assert!(told.iter().any(|w| w.contains("a position needs 4")), "{told:?}");
+    assert!(told.iter().any(|w| w.contains("exclude names G99")), "{told:?}");
+    let told = warnings(&format!("{base}[front_end]\nsample_rate_hz = 1.5e6\n")).unwrap();
+    assert!(told.iter().any(|w| w.contains("-1.023 to 1.023 MHz")), "{told:?}");
+    // Those of the file itself: a rogue record, and unhealthy satellites.
+    assert!(warnings(&base).unwrap().len() <= 2);
+}
+
+#[test]
+fn overrides_replace_what_the_scenario_says_and_are_checked_like_it() {
+    let scenario = parse(&format!("{MINIMAL}{STATIC}")).unwrap();
+    let compose = |overrides: Overrides| scenario.compose(Path::new("."), &overrides);
+    let (scene, _) = compose(Overrides { seed: Some(9), format: Some(Format::Cf32Le), allow_outside: false }).unwrap();
+    assert_eq!((scene.seed, scene.metadata.format, scene.noise_lsb), (9, Format::Cf32Le, 1.0));
+    let error = compose(Overrides { format: Some(Format::Ri8), ..Overrides::default() }).err().unwrap().to_string();
+    assert!(error.contains("front_end.if_hz: 0 Hz with the real format ri8"), "{error}");
+}
+
+#[test]
+fn power_by_satellite_reaches_the_rays() {
+    let text = format!("{MINIMAL}{STATIC}[power]\ncn0_dbhz = 45\n[power.satellites]\nG13 = 30.0\n");
+    let (scene, _) = parse(&text).unwrap().compose(Path::new("."), &Overrides::default()).unwrap();
+    let motion = scene.trajectory.at(0.0);
+    for (sv, cn0_hz) in [(Sv::gps(13), 1e3), (Sv::gps(23), 31_622.776_601_683_79)] {
+        let found = crate::generator::sky::emission(&scene.catalogue, sv, scene.clock.start, &motion).unwrap().unwrap();
+        let mut rays = vec![crate::generator::ray::Ray {
+            code_delay_s: 0.0,
+            carrier_delay_s: 0.0,
+            phase_cycles: 0.0,
+            cn0_hz: 0.0,
+        }];
+        scene.effects.iter().for_each(|e| e.act(&found.sight, scene.signals[0], &mut rays));
+        // Ten to the tenth of a decimal number: relative rounding of a few 1e-16.
+        assert!((rays[0].cn0_hz / cn0_hz - 1.0).abs() < 1e-12, "{sv} {rays:?}");
+        assert_eq!(rays[0].code_delay_s, 0.0);
+    }
+}
+
+proptest::proptest! {
+    #[test]
+    fn no_text_makes_the_parser_panic(text in "\\PC{0,200}", at in 0_usize..2_000, cut in 0_usize..40) {
+        let _ = parse(&text);
+        // The full scene with a piece replaced.
+        let whole = full();
+        let bytes = whole.as_bytes();
+        let (from, to) = (at.min(bytes.len()), (at + cut).min(bytes.len()));
+        let damaged = [&bytes[..from], text.as_bytes(), &bytes[to..]].concat();
+        let _ = parse(&String::from_utf8_lossy(&damaged));
+    }
 }
