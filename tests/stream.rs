@@ -28,7 +28,11 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
     let navigation = rinex::embedded().unwrap();
     let start = Epoch::parse("2010-07-01T08:12:30").unwrap();
     let (catalogue, _) = Catalogue::new(navigation.ephemerides);
-    let almanac: Vec<_> = catalogue.satellites().filter_map(|sv| catalogue.sent_at(sv, start).cloned()).collect();
+    let almanac: Vec<_> = catalogue
+        .satellites()
+        .filter(|sv| catalogue.healthy(*sv, start))
+        .filter_map(|sv| catalogue.sent_at(sv, start).cloned())
+        .collect();
     let rate = Rate::from_hz(rate_hz).unwrap();
     Scene {
         name: "test".to_owned(),
@@ -39,7 +43,7 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         metadata: IfMetadata { format, rate, center_hz, inverted, start: Some(start) },
         trajectory: Trajectory::fixed(Geodetic::from_degrees(26.5, 80.2, 120.0).to_ecef()),
         catalogue: Arc::new(catalogue),
-        broadcast: Arc::new(Broadcast::new(navigation.klobuchar, 15, &almanac, start)),
+        broadcast: Arc::new(Broadcast::new(navigation.klobuchar, 15, &almanac, start).unwrap()),
         signals: vec![&L1_CA],
         excluded: Vec::new(),
         mask_rad: 5_f64.to_radians(),
@@ -232,4 +236,57 @@ fn a_day_into_the_stream_the_carrier_is_where_the_equation_says() {
         checked += 1;
     }
     assert!(checked >= 5, "{checked}");
+}
+
+#[test]
+fn the_data_bits_in_the_samples_are_the_message_and_navigation_rows_are_its_parameters() {
+    use gnss_twin::gnss::gps::lnav::Subframe;
+    use gnss_twin::gnss::record::NavigationRow;
+    let directory = tempfile::tempdir().unwrap();
+    let rate_hz = 2.046e6;
+    let mut scene = scene(rate_hz, 14.0, Format::Ci8, 1_575.42e6, false);
+    scene.effects = vec![Box::new(FixedCn0 { cn0_dbhz: 55.0 })];
+    let all: Vec<_> = scene.catalogue.satellites().collect();
+    let sv = *all.iter().find(|sv| truth::in_view(&scene, **sv, scene.clock.start).unwrap()).unwrap();
+    scene.excluded = all.into_iter().filter(|other| *other != sv).collect();
+    let (bytes, _) = generated(&scene, directory.path(), &Options::default());
+    let (mut i, mut q) = (Vec::new(), Vec::new());
+    Format::Ci8.unpack(&bytes, &mut i, &mut q);
+    // The first subframe that begins inside the samples, found through the truth's own delay at each bit.
+    let delay_s = |n: u64| {
+        let seen = truth::seen(&scene, sv, &L1_CA, scene.clock.epoch(n)).unwrap().unwrap();
+        (seen.arrivals[0].delay_s, seen.arrivals[0].carrier_cycles)
+    };
+    let start = Epoch::new((scene.clock.start.seconds() / 6 + 1) * 6, 0.0);
+    let code = l1ca::code(sv.number).unwrap();
+    let mut words = [0_u32; 10];
+    for bit in 0..300 {
+        // Middle of the bit's first 19 whole code periods; phase by the carrier of truth.
+        let begin = start.plus_s(f64::from(bit) * 0.02).since(scene.clock.start);
+        let near = ((begin + 0.075) * rate_hz) as u64;
+        let first = ((begin + delay_s(near).0) * rate_hz).ceil() as u64;
+        let (here, carrier) = delay_s(first);
+        let (_, after) = delay_s(first + 38_874);
+        let mut sum = 0.0;
+        for n in 0..38_874_u64 {
+            let k = (first + n) as usize;
+            let turns = carrier + (after - carrier) * n as f64 / 38_874.0;
+            let (sin, cos) = libm::sincos(TAU * turns.fract());
+            let sent = first as f64 / rate_hz - here - begin + n as f64 / rate_hz;
+            let sign = if code[((sent * 1.023e6).max(0.0) as usize) % 1023] { -1.0 } else { 1.0 };
+            sum += sign * (f64::from(i[k]) * cos - f64::from(q[k]) * sin);
+        }
+        words[bit as usize / 30] = words[bit as usize / 30] << 1 | u32::from(sum < 0.0);
+    }
+    let subframe = Subframe::decode(&words, 0).unwrap();
+    assert_eq!(i64::from(subframe.tow_count), start.tow_whole_s() / 6 + 1);
+    let rows: Vec<NavigationRow> = csv::Reader::from_path(directory.path().join("navigation.csv"))
+        .unwrap()
+        .deserialize()
+        .map(Result::unwrap)
+        .collect();
+    assert!(rows.windows(2).all(|pair| pair[0] < pair[1]) && !rows.is_empty());
+    for (parameter, raw) in subframe.parameters().into_iter().filter(|_| subframe.id <= 3) {
+        assert!(rows.iter().any(|row| row.parameter == parameter && row.raw == raw), "{parameter}");
+    }
 }

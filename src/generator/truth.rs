@@ -68,11 +68,14 @@ pub fn seen(scene: &Scene, sv: Sv, signal: &Signal, local: Epoch) -> Result<Opti
     Ok(Some(Seen { emission, rays, arrivals }))
 }
 
-/// Whether `sv` is in the scene's sky when the receiver's clock reads `local`: it has a healthy message
-/// to send and stands above the mask.
+/// Whether `sv` is in the scene's sky when the receiver's clock reads `local`: it has a message to send
+/// and stands above the mask. Health is the scene's to judge, through its exclusions.
+///
+/// # Errors
+/// Those of the orbit.
 pub fn in_view(scene: &Scene, sv: Sv, local: Epoch) -> Result<bool, OrbitError> {
     let (time, _, motion) = received(scene, local);
-    if !scene.catalogue.healthy(sv, time) || scene.catalogue.sent_at(sv, time).is_none() {
+    if scene.catalogue.sent_at(sv, time).is_none() {
         return Ok(false);
     }
     let found = emission(&scene.catalogue, sv, time, &motion)?;
@@ -105,6 +108,9 @@ fn doppler_hz(scene: &Scene, sv: Sv, signal: &Signal, local: Epoch) -> Result<Op
 }
 
 /// The observation of `sv` at a sample, of its first ray, and where it stands in the sky.
+///
+/// # Errors
+/// Those of the orbit.
 pub fn observe(
     scene: &Scene,
     sv: Sv,
