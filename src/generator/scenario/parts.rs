@@ -82,15 +82,16 @@ pub(super) fn sky(
         .filter(|sv| catalogue.healthy(*sv, start))
         .filter_map(|sv| catalogue.sent_at(sv, start).cloned())
         .collect();
-    let broadcast = broadcast(scenario, navigation, &almanac);
+    let broadcast = broadcast(scenario, navigation, &almanac)?;
     Ok(Sky { catalogue, broadcast, excluded })
 }
 
-fn broadcast(scenario: &Scenario, navigation: &Navigation, almanac: &[Ephemeris]) -> Broadcast {
+fn broadcast(scenario: &Scenario, navigation: &Navigation, almanac: &[Ephemeris]) -> Result<Broadcast, ScenarioError> {
     let klobuchar = coefficients(scenario, navigation);
     let leap_seconds = navigation.leap_seconds.unwrap_or_else(|| scenario.start.leap_seconds());
-    let _ = (klobuchar, leap_seconds, almanac);
-    Broadcast
+    let key = if matches!(scenario.ionosphere, Some(Ionosphere::Given(_))) { "ionosphere" } else { "navigation.file" };
+    Broadcast::new(klobuchar, leap_seconds, almanac, scenario.start)
+        .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
 }
 
 /// What the satellites send about the ionosphere: what the scenario gives, or what the file says.

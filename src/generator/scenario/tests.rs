@@ -395,6 +395,30 @@ fn power_by_satellite_reaches_the_rays() {
     }
 }
 
+#[test]
+fn the_static_scene_sends_its_ionosphere_within_thirty_seconds() {
+    use crate::gnss::gps::lnav::Subframe;
+    let scene = shipped("static");
+    let first_bit = scene.clock.start.plus_s(20.0);
+    let ephemeris = scene.catalogue.sent_at(Sv::gps(13), first_bit).unwrap();
+    let words = scene.broadcast.subframe(ephemeris, first_bit).unwrap();
+    let subframe = Subframe::decode(&words, 0).unwrap();
+    let sent = subframe.klobuchar().unwrap();
+    let file = crate::gnss::rinex::embedded().unwrap().klobuchar.unwrap();
+    for (sent, file) in sent.alpha.iter().zip(file.alpha) {
+        // RINEX 2 prints five significant digits; half a step of the finest field is 2^-31 (IS-GPS-200N, table 20-X).
+        assert!((sent - file).abs() <= 4.7e-10, "{sent} {file}");
+    }
+}
+
+#[test]
+fn coefficients_that_the_message_cannot_carry_are_refused() {
+    let text =
+        format!("{MINIMAL}{STATIC}[ionosphere]\nmodel = \"klobuchar\"\nalpha = [1e-5, 0, 0, 0]\nbeta = [0, 0, 0, 0]");
+    let error = warnings(&text).unwrap_err();
+    assert!(error.contains("ionosphere") && error.contains("cannot carry"), "{error}");
+}
+
 proptest::proptest! {
     #[test]
     fn no_text_makes_the_parser_panic(text in "\\PC{0,200}", at in 0_usize..2_000, cut in 0_usize..40) {
