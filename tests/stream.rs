@@ -290,3 +290,52 @@ fn the_data_bits_in_the_samples_are_the_message_and_navigation_rows_are_its_para
         assert!(rows.iter().any(|row| row.parameter == parameter && row.raw == raw), "{parameter}");
     }
 }
+
+#[test]
+#[ignore = "prints speeds and knots of the shipped scenes; run alone with --ignored --nocapture"]
+fn speeds_of_the_shipped_scenes() {
+    use gnss_twin::generator::scenario::{Overrides, Scenario};
+    let directory = tempfile::tempdir().unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    for name in ["static", "moderate", "high_dynamics"] {
+        let text = std::fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();
+        let (mut scene, _) = Scenario::parse(&text, name).unwrap().compose(&folder, &Overrides::default()).unwrap();
+        for code_edge in [CodeEdge::Nearest, CodeEdge::Area, CodeEdge::BandLimited] {
+            scene.fidelity.code_edge = code_edge;
+            let mut writer = truth::Writer::create(directory.path()).unwrap();
+            let start = std::time::Instant::now();
+            let done =
+                generate_with(&scene, &mut std::io::sink(), &mut writer, &mut |_| (), &Options::default()).unwrap();
+            let wall_s = start.elapsed().as_secs_f64();
+            let duration_s = scene.clock.rate.elapsed_s(scene.samples);
+            println!(
+                "{name} {code_edge:?}: {:.1} x real time, {} satellites, {} knots, worst {:.1e} of {:.1e} cycles, {} clipped",
+                duration_s / wall_s,
+                done.satellites.len(),
+                done.knots,
+                done.worst_knot_cycles,
+                scene.fidelity.knot_tolerance_cycles,
+                done.clipped
+            );
+            assert!(done.worst_knot_cycles <= scene.fidelity.knot_tolerance_cycles);
+        }
+    }
+}
+
+#[test]
+fn an_error_of_the_output_stops_the_stream_and_is_told() {
+    struct Full;
+    impl std::io::Write for Full {
+        fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+            Err(std::io::Error::from(std::io::ErrorKind::StorageFull))
+        }
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let scene = scene(2.6e6, 0.1, Format::Ci8, 1_575.42e6, false);
+    let mut writer = truth::Writer::create(directory.path()).unwrap();
+    let result = generate_with(&scene, &mut Full, &mut writer, &mut |_| (), &Options::default());
+    assert!(matches!(result, Err(gnss_twin::generator::GenerateError::Write(_))));
+}
