@@ -105,7 +105,7 @@ fn correlate(i: &[f32], q: &[f32], rate_hz: f64, code: &[bool], chips: f64, chip
         re += sign * (f64::from(*i) * cos - f64::from(*q) * sin);
         im += sign * (f64::from(*i) * sin + f64::from(*q) * cos);
     }
-    re.hypot(im) / i.len() as f64
+    libm::hypot(re, im) / i.len() as f64
 }
 
 #[test]
@@ -338,4 +338,31 @@ fn an_error_of_the_output_stops_the_stream_and_is_told() {
     let mut writer = truth::Writer::create(directory.path()).unwrap();
     let result = generate_with(&scene, &mut Full, &mut writer, &mut |_| (), &Options::default());
     assert!(matches!(result, Err(gnss_twin::generator::GenerateError::Write(_))));
+}
+
+#[test]
+fn a_satellite_that_rises_appears_at_a_whole_second_in_samples_and_in_truth_alike() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut scene = scene(2.6e6, 4.0, Format::Cf32Le, 1_575.42e6, false);
+    scene.noise = false;
+    let elevation = |sv, sample| {
+        let seen = truth::seen(&scene, sv, &L1_CA, scene.clock.epoch(sample)).unwrap()?;
+        Some(seen.emission.sight.look.elevation_rad)
+    };
+    let all: Vec<_> = scene.catalogue.satellites().collect();
+    let rising = |sv: &_| elevation(*sv, 0).zip(elevation(*sv, scene.samples)).is_some_and(|(a, b)| a > 0.2 && b > a);
+    let sv = *all.iter().find(|sv| rising(sv)).unwrap();
+    // The mask is crossed 1.5 s into the scene: in view from second 2.
+    let mask_rad = elevation(sv, 3_900_000).unwrap();
+    scene.mask_rad = mask_rad;
+    scene.excluded = all.into_iter().filter(|other| *other != sv).collect();
+    let (bytes, done) = generated(&scene, directory.path(), &Options::default());
+    let (mut i, mut q) = (Vec::new(), Vec::new());
+    Format::Cf32Le.unpack(&bytes, &mut i, &mut q);
+    let first = i.iter().zip(&q).position(|(i, q)| *i != 0.0 || *q != 0.0).unwrap();
+    // Runs are 4096 samples at most, and each begins in or out of view.
+    assert!((5_200_000..5_200_000 + 4096).contains(&first), "{first}");
+    let rows = observations(directory.path());
+    assert_eq!((rows[0].sample, rows[0].locked_s, rows.len()), (5_200_000, 0.0, 20));
+    assert_eq!(done.satellites, [sv]);
 }

@@ -65,7 +65,7 @@ pub enum GenerateError {
     Truth(#[from] TruthError),
     #[error("samples could not be written: {0}")]
     Write(#[from] std::io::Error),
-    #[error("{signal} at {rate_hz} samples a second: expected at least 1/17 of its code rate")]
+    #[error("{signal} at {rate_hz} samples a second: expected at least 1/15 of its code rate")]
     Rate { rate_hz: f64, signal: &'static str },
     #[error("truth_interval_s = {0}: expected 1e-6 to 1e6 s")]
     TruthInterval(f64),

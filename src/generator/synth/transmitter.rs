@@ -22,6 +22,9 @@ use crate::gnss::time::{Epoch, tone_turns};
 const SUBFRAME_S: i64 = 6;
 const SUBFRAME_SYMBOLS: i64 = 300;
 
+/// Most code steps in a sample: 4096 of them and both margins fit in Q16.48.
+const MAX_STEP: f64 = 15.0;
+
 struct Sent {
     component: &'static Component,
     spreading: Spreading,
@@ -60,14 +63,15 @@ impl Transmitter {
     /// `None` if the signal's documents assign no code to `sv`.
     ///
     /// # Errors
-    /// [`GenerateError::Rate`] if a sample would span more code steps than a strip's margin holds.
+    /// [`GenerateError::Rate`] if a sample would span more than 15 code steps.
     pub fn new(scene: &Scene, sv: Sv, signal: &'static Signal, edge: Edge<'_>) -> Result<Option<Self>, GenerateError> {
         let rate_hz = scene.clock.rate.hz();
         let mut sent = Vec::new();
         for component in signal.components {
             let Some(spreading) = Spreading::new(component, sv.number) else { return Ok(None) };
             let step = spreading.step_rate_hz() / rate_hz;
-            if step * 9.0 + 2.0 > MARGIN_STEPS as f64 {
+            // A run's strip must stay below 2^16 steps, and nine samples within its margin.
+            if step > MAX_STEP || step * 9.0 + 2.0 > MARGIN_STEPS as f64 {
                 return Err(GenerateError::Rate { rate_hz, signal: signal.name });
             }
             let gain = component.power_share.sqrt() * edge.gain(spreading.correlation(), step);
