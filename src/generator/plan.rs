@@ -17,8 +17,9 @@ const INSTANTS: u32 = 240;
 /// What the plan cannot know of itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machinery {
-    /// Time between knots of the signal's delay, and why it is that.
+    /// Shortest and longest time between knots of the signal's delay, and why it is that.
     pub knot_spacing_s: f64,
+    pub longest_knot_spacing_s: f64,
     pub knot_reason: String,
     /// Memory of the generator's blocks, which does not grow with the scene.
     pub block_bytes: u64,
@@ -216,7 +217,12 @@ impl fmt::Display for Plan {
         writeln!(f, "signals    {}", self.signals.join(", "))?;
         writeln!(f, "samples    {}: {} samples, {}", self.sampling, self.samples, size(self.bytes))?;
         writeln!(f, "motion     up to {:.2} m/s and {:.2} m/s2", self.speed_mps, self.acceleration_mps2)?;
-        writeln!(f, "knots      every {:.4} s: {}", self.machinery.knot_spacing_s, self.machinery.knot_reason)?;
+        let Machinery { knot_spacing_s, longest_knot_spacing_s, knot_reason, .. } = &self.machinery;
+        if knot_spacing_s == longest_knot_spacing_s {
+            writeln!(f, "knots      every {knot_spacing_s:.4} s: {knot_reason}")?;
+        } else {
+            writeln!(f, "knots      every {knot_spacing_s:.4} to {longest_knot_spacing_s:.4} s: {knot_reason}")?;
+        }
         writeln!(f, "needs      {} of memory, about {:.1} s", size(self.memory_bytes), self.time_s)?;
         writeln!(f, "\n{} satellites above {:.1} deg", self.satellites.len(), self.mask_deg)?;
         writeln!(f, "  sv   azimuth  elevation  C/N0 dB-Hz")?;
@@ -258,6 +264,7 @@ mod tests {
         let (scene, _) = scenario.compose(&directory, &Overrides::default()).unwrap();
         let machinery = Machinery {
             knot_spacing_s: 0.5,
+            longest_knot_spacing_s: 0.5,
             knot_reason: "a test".to_owned(),
             block_bytes: 1 << 20,
             satellite_samples_per_s: 1e8,

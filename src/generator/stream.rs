@@ -5,11 +5,13 @@
 //! are written in order, so bytes depend neither on threads nor on block lengths, and memory stays flat.
 
 use std::collections::BTreeSet;
+use std::fmt;
 use std::io::Write;
 
 use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::generator::plan::Machinery;
 use crate::generator::scene::{CodeEdge, Scene};
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::isa::{self, Level};
@@ -23,6 +25,9 @@ use crate::gnss::satellite::Sv;
 
 /// Cut-off of band-limited edges, in cycles a sample.
 const CUTOFF_CPS: f64 = 0.45;
+
+/// Roots of each satellite's grid that a plan looks at.
+const PLANNED_ROOTS: u64 = 16;
 
 /// How the work is cut; no choice changes a byte.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +59,18 @@ pub struct Generated {
     pub worst_knot_cycles: f64,
 }
 
+impl fmt::Display for Generated {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names: Vec<String> = self.satellites.iter().map(Sv::to_string).collect();
+        write!(f, "{} samples of {} satellites ({})", self.samples, names.len(), names.join(" "))?;
+        if self.clipped > 0 {
+            let share = self.clipped as f64 / (2.0 * self.samples as f64);
+            write!(f, "; {} components clipped ({:.1e} of them)", self.clipped, share)?;
+        }
+        Ok(())
+    }
+}
+
 /// Why a scene could not be generated.
 #[derive(Debug, Error)]
 pub enum GenerateError {
@@ -69,6 +86,46 @@ pub enum GenerateError {
     Rate { rate_hz: f64, signal: &'static str },
     #[error("truth_interval_s = {0}: expected 1e-6 to 1e6 s")]
     TruthInterval(f64),
+}
+
+/// What the plan tells of the synthesiser: knots met along the scene, memory of a batch, and the usual speed.
+///
+/// # Errors
+/// Those of orbits.
+pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
+    let transmitters = transmitters(scene, Edge::Nearest)?;
+    let rate = scene.clock.rate;
+    let (mut shortest, mut longest) = (u64::MAX, 0);
+    for transmitter in &transmitters {
+        if !truth::in_view(scene, transmitter.sv, scene.clock.start)? {
+            continue;
+        }
+        let size = transmitter.root_samples();
+        let roots = scene.samples.div_ceil(size);
+        for root in (0..roots).step_by(roots.div_ceil(PLANNED_ROOTS).max(1) as usize) {
+            for part in transmitter.root(scene, root)? {
+                shortest = shortest.min(part.end - part.start);
+                longest = longest.max(part.end - part.start);
+            }
+        }
+    }
+    let shortest = shortest.min(longest);
+    let options = Options::default();
+    let batch = u64::from(options.block_runs) * u64::from(options.batch_blocks) * RUN_SAMPLES as u64;
+    let planar = 2 * std::mem::size_of::<f32>() as u64;
+    Ok(Machinery {
+        knot_spacing_s: rate.elapsed_s(shortest),
+        longest_knot_spacing_s: rate.elapsed_s(longest),
+        knot_reason: format!(
+            "the longest on which a cubic stays within {:e} cycles of the motion",
+            scene.fidelity.knot_tolerance_cycles
+        ),
+        block_bytes: batch.min(scene.samples) * (planar + scene.metadata.format.bytes() as u64),
+        satellite_samples_per_s: match scene.fidelity.code_edge {
+            CodeEdge::Nearest | CodeEdge::Area => 2.5e9,
+            CodeEdge::BandLimited => 0.7e9,
+        },
+    })
 }
 
 /// Writes the samples of `scene` and its truth; `progress` hears the samples done after each batch.

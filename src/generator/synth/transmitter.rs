@@ -102,6 +102,21 @@ impl Transmitter {
         }))
     }
 
+    /// The polynomials of one root part of the grid.
+    ///
+    /// # Errors
+    /// Those of orbits.
+    pub fn root(&self, scene: &Scene, root: u64) -> Result<Vec<Part>, GenerateError> {
+        let observe =
+            |n: u64| truth::seen(scene, self.sv, self.signal, scene.clock.epoch(n)).map(|s| s.map(|s| s.arrivals));
+        Ok(self.grid.root(root, &observe)?)
+    }
+
+    /// Samples of a root part.
+    pub fn root_samples(&self) -> u64 {
+        self.grid.root_samples()
+    }
+
     /// Gathers what samples `from..to` need, and forgets what lies before.
     ///
     /// # Errors
@@ -127,10 +142,7 @@ impl Transmitter {
         self.roots = self.roots.split_off(&(from / size));
         for root in from / size..=to.saturating_sub(1) / size {
             if self.roots.insert(root) {
-                let (sv, signal) = (self.sv, self.signal);
-                let observe =
-                    |n: u64| truth::seen(scene, sv, signal, scene.clock.epoch(n)).map(|s| s.map(|s| s.arrivals));
-                let parts = self.grid.root(root, &observe)?;
+                let parts = self.root(scene, root)?;
                 self.knots += parts.len() as u64;
                 self.worst_knot_cycles = parts.iter().fold(self.worst_knot_cycles, |w, p| w.max(p.error_cycles));
                 self.parts.extend(parts);
