@@ -3,7 +3,7 @@
 //! Blocks of samples come in order; channels are independent and run on as many threads as there are, and what they
 //! report is merged in the order of satellites, so that the result does not depend on threads.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::io::Read;
 
@@ -97,7 +97,6 @@ pub fn receive<R: Read>(
         receiver.take(&block, output)?;
         progress(block.first + block.i.len() as u64);
     }
-    receiver.end(output)?;
     output.finish()?;
     Ok(receiver.outcome(source.samples(), source.cut_bytes()))
 }
@@ -108,6 +107,8 @@ struct Tracked {
     decoder: Option<Decoder>,
     report: Report,
     found: Vec<Found>,
+    /// Whether a whole subframe came from it.
+    confirmed: bool,
 }
 
 /// Samples kept until there are enough for a search.
@@ -130,9 +131,9 @@ struct Receiver<'a> {
     next_search: u64,
     searched: bool,
     tracked: BTreeMap<(&'static str, Sv), Tracked>,
-    lost: Vec<(&'static Signal, Sv)>,
+    lost: BTreeSet<(&'static Signal, Sv)>,
     strongest: Option<AcquisitionRow>,
-    acquired: std::collections::BTreeSet<Sv>,
+    acquired: BTreeSet<Sv>,
     lost_channels: usize,
     ephemerides: BTreeMap<Sv, Ephemeris>,
     klobuchar: Option<Klobuchar>,
@@ -146,7 +147,8 @@ struct Receiver<'a> {
     used: u32,
     first_fix_s: Option<f64>,
     last_failure: Option<NoFix>,
-    seconds: f64,
+    /// Samples taken so far.
+    now: u64,
 }
 
 impl<'a> Receiver<'a> {
@@ -180,9 +182,9 @@ impl<'a> Receiver<'a> {
             next_search: 0,
             searched: false,
             tracked: BTreeMap::new(),
-            lost: Vec::new(),
+            lost: BTreeSet::new(),
             strongest: None,
-            acquired: std::collections::BTreeSet::new(),
+            acquired: BTreeSet::new(),
             lost_channels: 0,
             ephemerides: BTreeMap::new(),
             klobuchar: None,
@@ -195,14 +197,14 @@ impl<'a> Receiver<'a> {
             used: 0,
             first_fix_s: None,
             last_failure: None,
-            seconds: 0.0,
+            now: 0,
         })
     }
 
     /// The next block: into the search's window if one is open, and through the channels.
     fn take(&mut self, block: &Block, output: &mut Output) -> Result<(), ReceiveError> {
-        self.seconds = self.metadata.rate.elapsed_s(block.first + block.i.len() as u64);
-        if self.window.is_none() && block.first >= self.next_search && self.has_something_to_search() {
+        self.now = block.first + block.i.len() as u64;
+        if self.window.is_none() && block.first >= self.next_search {
             self.window = Some(Window::default());
         }
         let Some(window) = &mut self.window else { return self.advance(block, output) };
@@ -228,34 +230,33 @@ impl<'a> Receiver<'a> {
         if replay { Ok(()) } else { self.advance(block, output) }
     }
 
-    fn has_something_to_search(&self) -> bool {
-        !self.lost.is_empty() || self.settings.search_interval_s > 0.0
-    }
-
-    /// Searches for what is not tracked: everything the first time and at the search interval, else what was lost.
+    /// Searches everything, so that strong signals that are tracked already do not pass for weak ones that are not, and
+    /// returns hits that are new.
     fn search(&mut self, block: &Block, output: &mut Output) -> Result<Vec<Acquired>, ReceiveError> {
-        let candidates: Vec<_> = self
-            .candidates
-            .iter()
-            .filter(|(signal, sv)| !self.tracked.contains_key(&(signal.name, *sv)))
-            .copied()
-            .collect();
-        let everything = !self.searched;
-        let interval_s = if self.lost.is_empty() { self.settings.search_interval_s } else { LOST_SEARCH_S };
-        self.next_search = block.first + (interval_s * self.metadata.rate.hz()) as u64;
-        self.searched = true;
         let mut hits = Vec::new();
-        for (row, hit) in self.searcher.search(block, &candidates)? {
+        for (row, hit) in self.searcher.search(block, &self.candidates)? {
+            if self.tracked.contains_key(&(row.signal.name, row.sv)) {
+                continue;
+            }
             // Later searches leave rows of what they found only.
-            if everything || hit.is_some() {
+            if !self.searched || hit.is_some() {
                 output.acquisition(&row)?;
             }
             if self.strongest.as_ref().is_none_or(|other| row.statistic > other.statistic) {
                 self.strongest = Some(row);
             }
-            hits.extend(hit);
+            if let Some(hit) = hit {
+                self.lost.remove(&(hit.signal, hit.sv));
+                hits.push(hit);
+            }
         }
-        self.lost.clear();
+        self.searched = true;
+        let interval_s = match self.settings.search_interval_s {
+            _ if !self.lost.is_empty() => LOST_SEARCH_S,
+            interval_s if interval_s > 0.0 => interval_s,
+            _ => f64::MAX,
+        };
+        self.next_search = (block.first as f64 + interval_s * self.metadata.rate.hz()) as u64;
         Ok(hits)
     }
 
@@ -263,7 +264,7 @@ impl<'a> Receiver<'a> {
         for hit in hits {
             let channel = Channel::start(hit, self.metadata, &self.settings.tracking);
             let decoder = hit.signal.components.first().and_then(|component| Decoder::new(hit.sv, component));
-            let tracked = Tracked { channel, decoder, report: Report::default(), found: Vec::new() };
+            let tracked = Tracked { channel, decoder, report: Report::default(), found: Vec::new(), confirmed: false };
             self.tracked.insert((hit.signal.name, hit.sv), tracked);
             self.acquired.insert(hit.sv);
             output.event(&EventRow { sample: block.first, sv: hit.sv, signal: hit.signal, event: Event::Acquired })?;
@@ -303,9 +304,9 @@ impl<'a> Receiver<'a> {
     /// Takes in what channels and decoders found, in the order of satellites.
     fn merge(&mut self, output: &mut Output) -> Result<(), ReceiveError> {
         let rate = self.metadata.rate;
+        let now = self.now;
         for (&(_, sv), tracked) in &mut self.tracked {
             let signal = tracked.channel.signal();
-            let sample = tracked.report.events.last().map_or(0, |event| event.0);
             for &(sample, event) in &tracked.report.events {
                 output.event(&EventRow { sample, sv, signal, event })?;
             }
@@ -317,12 +318,12 @@ impl<'a> Receiver<'a> {
                 }
             }
             tracked.report.rows.clear();
-            let now = tracked.report.measurements.last().map_or(sample, |measurement| measurement.sample);
             for found in tracked.found.drain(..) {
                 let mut event = |event| output.event(&EventRow { sample: now, sv, signal, event });
                 match found {
                     Found::Frame { inverted } => {
                         tracked.channel.resolve_half_cycle(inverted);
+                        tracked.confirmed = true;
                         event(Event::FrameSynchronised)?;
                     }
                     Found::Ephemeris(ephemeris) => {
@@ -392,22 +393,19 @@ impl<'a> Receiver<'a> {
 
     /// Takes channels that lost their signal out, to be searched again soon, and forgets this block's measurements.
     fn drop_lost(&mut self) {
-        let rate_hz = self.metadata.rate.hz();
-        let now = (self.seconds * rate_hz) as u64;
+        let soon = self.now + (LOST_SEARCH_S * self.metadata.rate.hz()) as u64;
         for tracked in self.tracked.values_mut() {
             tracked.report.measurements.clear();
             if tracked.channel.is_lost() {
-                self.lost.push((tracked.channel.signal(), tracked.channel.sv()));
                 self.lost_channels += 1;
-                self.next_search = self.next_search.min(now + (LOST_SEARCH_S * rate_hz) as u64);
+                // What never sent a whole subframe was perhaps never there: it waits for the next search of everything.
+                if tracked.confirmed {
+                    self.lost.insert((tracked.channel.signal(), tracked.channel.sv()));
+                    self.next_search = self.next_search.min(soon);
+                }
             }
         }
         self.tracked.retain(|_, tracked| !tracked.channel.is_lost());
-    }
-
-    /// The recording is over: a first window that never filled was too short for a search.
-    fn end(&mut self, _output: &mut Output) -> Result<(), ReceiveError> {
-        Ok(())
     }
 
     fn outcome(self, samples: u64, cut_bytes: usize) -> Outcome {
