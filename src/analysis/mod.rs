@@ -5,6 +5,7 @@
 //! [`errors`] measures, [`statistics`] condenses, [`summary`] is what scripts gate on,
 //! [`plot`] draws, [`report`] prints, [`psd`] estimates the spectrum of the samples.
 
+pub mod access;
 pub mod errors;
 pub mod load;
 pub mod plot;
