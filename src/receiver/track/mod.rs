@@ -1,4 +1,31 @@
 //! Tracking: one channel follows one signal of one satellite.
+//!
+//! A [`Channel`] takes consecutive blocks of samples and gives the state of its replica at requested samples, message
+//! symbols, rows for the judge and events. Its loops ([`loops`]) are designed in the discrete domain; detectors
+//! are in [`lock`]. Limits: the first component of a signal only, one code period at least as long as a few samples.
+
+use crate::gnss::record::{Event, TrackingRow};
+
+mod channel;
+pub mod lock;
+pub mod loops;
+pub mod settings;
+#[cfg(test)]
+mod tests;
+
+pub use channel::Channel;
+pub use settings::{CodeDiscriminator, TrackingSettings, TrackingSettingsError};
+
+/// What a channel found in a block.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    pub measurements: Vec<Measurement>,
+    pub symbols: Vec<Symbol>,
+    /// One a measurement, with the latest loop update.
+    pub rows: Vec<TrackingRow>,
+    /// Events with the sample at which they were noticed.
+    pub events: Vec<(u64, Event)>,
+}
 
 /// The state of a channel's replica at a requested sample.
 #[derive(Clone, Copy, Debug)]
@@ -8,7 +35,7 @@ pub struct Measurement {
     pub code_periods: u64,
     pub code_fraction: f64,
     /// Accumulated carrier in the RINEX sense (grows with range, that is, against Doppler), nominal IF
-    /// removed: θ(n)/turns − f_IF·n/fs, negated. Unknown whole number, and half while `half_cycle_known` is false.
+    /// removed: θ(n)/turns − f_IF·n/fs, negated, and negated once more for an inverted spectrum. Unknown whole number, and half while `half_cycle_known` is false.
     pub carrier_cycles: f64,
     pub half_cycle_known: bool,
     pub doppler_hz: f64,
@@ -23,6 +50,6 @@ pub struct Measurement {
 pub struct Symbol {
     /// The channel's number of the code period in which the symbol began.
     pub first_period: u64,
-    /// In-phase prompt summed over the symbol, in noise standard deviations: its sign is the bit.
+    /// In-phase prompt summed over the symbol, in standard deviations of the noise of that sum: its sign is the bit.
     pub soft: f32,
 }

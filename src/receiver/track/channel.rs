@@ -1,0 +1,597 @@
+//! One channel: numerically controlled oscillators, the order of its states, and what it reports.
+//!
+//! A frequency loop pulls in, then an assisted phase loop locks and searches for symbol edges, then integrations
+//! and updates keep to the symbols. Every correlation spans one code period of the replica, from the first
+//! sample of the period on; samples of an unfinished period are kept, so that results do not depend on blocks.
+
+use num_complex::Complex64;
+
+use super::lock::{Cn0, PhaseLock, SymbolSync};
+use super::loops::{self, CodeShape, Gains, Rates};
+use super::{CodeDiscriminator, Measurement, Report, Symbol, TrackingSettings};
+use crate::gnss::record::{Event, TrackingRow};
+use crate::gnss::samples::IfMetadata;
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+use crate::gnss::time::{Rate, tone_turns};
+use crate::receiver::acquire::Acquired;
+use crate::receiver::correlate::{Nco, Replica, TURN, chips_to_units, correlation, units_to_chips};
+use crate::receiver::source::Block;
+
+/// Prompts over which phase lock is averaged before symbols are known; symbols afterwards.
+const LOCK_PERIODS: f64 = 100.0;
+const LOCK_SYMBOLS: f64 = 6.0;
+/// One symbol whose mean phase is 60° or more away is taken for a slip.
+const SLIP_COSINE: f64 = -0.5;
+/// Periods over which the power of the samples is averaged.
+const POWER_PERIODS: f64 = 100.0;
+/// A frequency error beyond this, in spite of phase lock, is a false lock: between 0 and the nearest one, 1/(2·symbol).
+const FALSE_LOCK_SHARE: f64 = 0.4;
+/// Symbols over which the frequency is verified.
+const VERIFY_SYMBOLS: u32 = 25;
+/// Phase lock must come within this share of the limit for symbols.
+const PHASE_LIMIT_SHARE: f64 = 0.5;
+/// Group of prompts and verification for signals without symbols.
+const PILOT_GROUP: u32 = 20;
+/// Below this T·C/N0 the code discriminator's lost gain is not given back any further.
+const LEAST_SNR: f64 = 1.0;
+
+/// How far a channel is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Frequency,
+    Assisted,
+    /// Symbols begin at code periods of this residue.
+    Tracking(u64),
+}
+
+/// Values of the last update, for [`TrackingRow`].
+#[derive(Clone, Copy, Debug, Default)]
+struct Update {
+    prompt: Complex64,
+    dll_chips: f64,
+    pll_cycles: f64,
+    fll_hz: f64,
+    integration_s: f64,
+}
+
+/// One signal of one satellite being followed.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    settings: TrackingSettings,
+    sv: Sv,
+    signal: &'static Signal,
+    hit: Acquired,
+    rate: Rate,
+    if_hz: f64,
+    /// +1, or −1 where the spectrum is inverted: sense of Doppler in the samples.
+    sense: f64,
+    chip_rate_hz: f64,
+    period_s: f64,
+    group: u32,
+    has_symbols: bool,
+    /// `None` where the documents assign no code: such a channel is lost from the start.
+    replica: Option<Replica>,
+    replica_power: f64,
+    taps: [i64; 3],
+    shape: CodeShape,
+
+    /// Number of the sample at which the running period begins, and the NCOs there.
+    start: Option<u64>,
+    first: u64,
+    code: i64,
+    period: u64,
+    /// Carrier without the nominal IF, in 2⁻⁶⁴ turns, never wrapped.
+    carrier: i128,
+    code_step: i64,
+    carrier_step: i128,
+    carry: (Vec<f32>, Vec<f32>),
+    whole: bool,
+
+    carrier_rates: Rates,
+    code_rates: Rates,
+    pll: Gains,
+    fll: Gains,
+    dll: Gains,
+    wide: bool,
+    stage: Stage,
+    stage_since: u64,
+    update_since: u64,
+
+    sums: [Complex64; 3],
+    summed: u32,
+    previous: Option<Complex64>,
+    symbol: (Complex64, u32),
+    rotation: (Complex64, u32),
+    power: Option<f64>,
+    cn0: Cn0,
+    phase_lock: PhaseLock,
+    sync: SymbolSync,
+    pending: Option<u64>,
+    locked_since: Option<u64>,
+    unlocked_since: Option<u64>,
+    polarity: Option<bool>,
+    lost: bool,
+    last: Update,
+}
+
+impl Channel {
+    /// A channel that begins at what the search found. The code phase is carried from the hit's sample to the first sample
+    /// of the first block with the code rate that belongs to the hit's Doppler. Settings are taken as validated.
+    pub fn start(hit: &Acquired, metadata: &IfMetadata, settings: &TrackingSettings) -> Self {
+        let component = hit.signal.components.first();
+        let chip_rate_hz = component.map_or(1.0, |c| c.chip_rate_hz);
+        let period_s = component.map_or(1.0, |c| c.period_s());
+        let message = component.and_then(|c| c.message);
+        let group = message.map_or(PILOT_GROUP, |m| m.periods_per_symbol());
+        let code = component.and_then(|c| (c.code)(hit.sv.number)).unwrap_or_default();
+        let replica = Replica::new(code, settings.replica);
+        let chips_per_sample = chip_rate_hz / metadata.rate.hz();
+        let half = 0.5 * settings.spacing_chips;
+        let (peak, _) = correlation(settings.replica, chips_per_sample, 0.0);
+        let (side, slope) = correlation(settings.replica, chips_per_sample, half);
+        let sense = if metadata.inverted { -1.0 } else { 1.0 };
+        let none = Gains::of_root(1, 1.0);
+        let mut channel = Self {
+            settings: settings.clone(),
+            sv: hit.sv,
+            signal: hit.signal,
+            hit: *hit,
+            rate: metadata.rate,
+            if_hz: metadata.if_hz(hit.signal),
+            sense,
+            chip_rate_hz,
+            period_s,
+            group,
+            has_symbols: message.is_some(),
+            lost: replica.is_none(),
+            replica,
+            replica_power: peak,
+            taps: [chips_to_units(half), 0, -chips_to_units(half)],
+            shape: CodeShape { value: side / peak, slope: -slope / peak },
+            start: None,
+            first: 0,
+            code: 0,
+            period: 0,
+            carrier: 0,
+            code_step: 0,
+            carrier_step: 0,
+            carry: (Vec::new(), Vec::new()),
+            whole: false,
+            carrier_rates: Rates { rate: sense * hit.doppler_hz, acceleration: 0.0 },
+            code_rates: Rates::default(),
+            pll: none,
+            fll: none,
+            dll: none,
+            wide: true,
+            stage: Stage::Frequency,
+            stage_since: 0,
+            update_since: 0,
+            sums: [Complex64::ZERO; 3],
+            summed: 0,
+            previous: None,
+            symbol: (Complex64::ZERO, 0),
+            rotation: (Complex64::ZERO, 0),
+            power: None,
+            cn0: Cn0::new(2, period_s, settings.cn0_average_s),
+            phase_lock: PhaseLock::new(LOCK_PERIODS),
+            sync: SymbolSync::new(group),
+            pending: None,
+            locked_since: None,
+            unlocked_since: None,
+            polarity: None,
+            last: Update::default(),
+        };
+        channel.design();
+        channel.set_steps();
+        channel
+    }
+
+    /// Whether the signal was lost; the channel does nothing any more.
+    pub fn is_lost(&self) -> bool {
+        self.lost
+    }
+
+    /// The satellite that is followed.
+    pub fn sv(&self) -> Sv {
+        self.sv
+    }
+
+    /// The signal that is followed.
+    pub fn signal(&self) -> &'static Signal {
+        self.signal
+    }
+
+    /// Tells the channel whether the message showed its symbols to be inverted: from now on, until the carrier is
+    /// interrupted, measurements have the half cycle right. Symbols keep their polarity.
+    pub fn resolve_half_cycle(&mut self, inverted: bool) {
+        self.polarity = Some(inverted);
+    }
+
+    /// Follows the signal through the next block. `ticks` are samples inside the block, ascending, at which to measure.
+    pub fn advance(&mut self, block: &Block, ticks: &[u64], report: &mut Report) {
+        if self.lost {
+            return;
+        }
+        let Some(replica) = self.replica.take() else { return };
+        if self.start.is_none() {
+            self.begin(block.first, &replica);
+        }
+        let mut ticks = ticks.iter().copied().peekable();
+        let end = block.first + block.i.len().min(block.q.len()) as u64;
+        let mut taken = block.first;
+        while !self.lost {
+            let next = self.first + self.samples_left(&replica);
+            while let Some(tick) = ticks.next_if(|&tick| tick < next.min(end)) {
+                self.measure(tick, &replica, report);
+            }
+            if next > end {
+                break;
+            }
+            let range = (taken - block.first) as usize..(next - block.first) as usize;
+            self.correlate(&replica, &block.i[range.clone()], &block.q[range], next, report);
+            taken = next;
+        }
+        let rest = (taken.min(end) - block.first) as usize..(end - block.first) as usize;
+        self.carry.0.extend_from_slice(&block.i[rest.clone()]);
+        self.carry.1.extend_from_slice(&block.q[rest]);
+        self.replica = Some(replica);
+    }
+
+    /// Carries the hit's code phase to the first sample that the channel sees.
+    fn begin(&mut self, first: u64, replica: &Replica) {
+        let samples = i128::from(first) - i128::from(self.hit.sample);
+        let moved = samples * i128::from(self.code_step) + i128::from(chips_to_units(self.hit.code_phase_chips));
+        self.code = moved.rem_euclid(i128::from(replica.period())) as i64;
+        (self.start, self.first, self.stage_since, self.update_since) = (Some(first), first, first, first);
+    }
+
+    /// Samples from the running period's first to the next one's.
+    fn samples_left(&self, replica: &Replica) -> u64 {
+        let left = replica.period() - self.code;
+        (left.max(1) as u64).div_ceil(self.code_step.max(1) as u64)
+    }
+
+    /// Sets the oscillators to what the loops know.
+    fn set_steps(&mut self) {
+        let rate_hz = self.rate.hz();
+        let update_s = self.period_s * f64::from(self.periods_per_update());
+        let offset_hz = self.carrier_rates.mean(update_s);
+        self.carrier_step = (offset_hz / rate_hz * TURN) as i128;
+        let aid_hz = self.sense * offset_hz * self.chip_rate_hz / self.signal.carrier_hz;
+        self.code_step = chips_to_units((self.chip_rate_hz + aid_hz + self.code_rates.mean(update_s)) / rate_hz).max(1);
+    }
+
+    fn periods_per_update(&self) -> u32 {
+        match self.stage {
+            Stage::Tracking(_) => {
+                (1..=self.settings.integration.max(1)).rev().find(|m| self.group.is_multiple_of(*m)).unwrap_or(1)
+            }
+            _ => 1,
+        }
+    }
+
+    /// Gains for the present stage.
+    fn design(&mut self) {
+        let update_s = self.period_s * f64::from(self.periods_per_update());
+        let settings = &self.settings;
+        let (fll_order, fll_hz) = match self.stage {
+            Stage::Frequency => (settings.fll_order, settings.fll_bandwidth_hz),
+            _ => (1, settings.fll_assist_bandwidth_hz),
+        };
+        let dll_hz = if self.wide { settings.dll_pull_in_bandwidth_hz } else { settings.dll_bandwidth_hz };
+        self.fll = Gains::design(fll_order, fll_hz * update_s);
+        self.pll = Gains::design(settings.pll_order, settings.pll_bandwidth_hz * update_s);
+        self.dll = Gains::design(settings.dll_order, dll_hz * update_s);
+    }
+
+    fn since_s(&self, sample: u64) -> f64 {
+        self.first.saturating_sub(sample) as f64 / self.rate.hz()
+    }
+
+    /// Correlates the running period, whose last samples these are, and moves on to the next, which begins at `next`.
+    fn correlate(&mut self, replica: &Replica, i: &[f32], q: &[f32], next: u64, report: &mut Report) {
+        let nco = Nco {
+            carrier: tone_turns(self.if_hz, self.rate, self.first).wrapping_add(self.carrier as u64),
+            carrier_step: tone_turns(self.if_hz, self.rate, 1).wrapping_add(self.carrier_step as u64),
+            code: self.code,
+            code_step: self.code_step as u64,
+        };
+        let sums = if self.carry.0.is_empty() {
+            replica.correlate(i, q, &nco, &self.taps)
+        } else {
+            self.carry.0.extend_from_slice(i);
+            self.carry.1.extend_from_slice(q);
+            let sums = replica.correlate(&self.carry.0, &self.carry.1, &nco, &self.taps);
+            self.carry.0.clear();
+            self.carry.1.clear();
+            sums
+        };
+        let samples = next - self.first;
+        self.carrier += self.carrier_step * i128::from(samples);
+        self.code += (i128::from(self.code_step) * i128::from(samples) - i128::from(replica.period())) as i64;
+        self.first = next;
+        let finished = self.period;
+        self.period += 1;
+        if !self.whole {
+            // The first period was met on its way.
+            self.whole = true;
+            self.update_since = next;
+            return;
+        }
+        let power = sums.power / samples as f64;
+        let mean = self.power.map_or(power, |mean| mean + (power - mean) / POWER_PERIODS);
+        self.power = Some(mean);
+        // Noise of a correlation, per component: half the samples' power (real samples too) times the replica's energy.
+        let deviation = (0.5 * mean * samples as f64 * self.replica_power).sqrt();
+        let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
+        let mut taps = [Complex64::ZERO; 3];
+        taps.iter_mut().zip(&sums.taps).for_each(|(tap, sum)| *tap = sum * scale);
+        self.take(finished, taps, report);
+    }
+
+    /// Takes the early, prompt and late correlations of code period `number`.
+    fn take(&mut self, number: u64, taps: [Complex64; 3], report: &mut Report) {
+        let prompt = taps[1];
+        self.sums.iter_mut().zip(taps).for_each(|(sum, tap)| *sum += tap);
+        self.summed += 1;
+        self.cn0.add(prompt);
+        match self.stage {
+            Stage::Frequency | Stage::Assisted => self.phase_lock.add(prompt, 2.0),
+            Stage::Tracking(begin) => self.take_in_symbol(number, begin, prompt, report),
+        }
+        if self.summed >= self.periods_per_update() {
+            self.update();
+            self.sums = [Complex64::ZERO; 3];
+            self.summed = 0;
+            self.update_since = self.first;
+        }
+        self.previous = Some(prompt);
+        self.supervise(number, prompt, report);
+        self.set_steps();
+    }
+
+    /// Collects the prompts of a symbol and gives it out at its end.
+    fn take_in_symbol(&mut self, number: u64, begin: u64, prompt: Complex64, report: &mut Report) {
+        if let (Some(previous), true) = (self.previous, self.symbol.1 > 0) {
+            self.rotation.0 += prompt * previous.conj();
+        }
+        self.symbol.0 += prompt;
+        self.symbol.1 += 1;
+        let length = u64::from(self.group);
+        if (number + 1) % length != begin {
+            return;
+        }
+        if self.symbol.1 == self.group {
+            self.rotation.1 += 1;
+            let cosine = self.phase_lock.add_equal(self.symbol.0);
+            if cosine < SLIP_COSINE && self.locked_since.is_some() {
+                self.interrupt(report);
+                self.unlocked_since = Some(self.first);
+            }
+            if self.has_symbols {
+                let soft = (self.symbol.0.re / f64::from(self.group).sqrt()) as f32;
+                report.symbols.push(Symbol { first_period: number + 1 - length, soft });
+            }
+        }
+        self.symbol = (Complex64::ZERO, 0);
+    }
+
+    /// Closes the loops with the sums of an integration.
+    fn update(&mut self) {
+        let periods = self.summed;
+        let t_s = self.period_s * f64::from(periods);
+        let [early, prompt, late] = self.sums;
+        let mut last = Update { prompt, integration_s: t_s, ..Update::default() };
+        last.prompt /= f64::from(periods).sqrt();
+        if let (Some(before), Stage::Frequency | Stage::Assisted) = (self.previous, self.stage) {
+            last.fll_hz = if self.has_symbols {
+                loops::frequency_two_quadrant(before, prompt, t_s)
+            } else {
+                loops::frequency_four_quadrant(before, prompt, t_s)
+            };
+            if self.stage == Stage::Frequency {
+                self.carrier_rates = loops::frequency_step(&self.fll, &self.carrier_rates, last.fll_hz, t_s);
+            } else {
+                self.carrier_rates.rate += self.fll.phase * last.fll_hz;
+            }
+        }
+        last.pll_cycles = if self.has_symbols { loops::costas(prompt) } else { loops::phase(prompt) };
+        if self.stage != Stage::Frequency {
+            let (rates, jump) = loops::step(&self.pll, &self.carrier_rates, last.pll_cycles, t_s);
+            self.carrier_rates = rates;
+            self.carrier += (jump * TURN) as i128;
+        }
+        let snr = self.cn0.hz().map_or(f64::INFINITY, |hz| (hz * t_s).max(LEAST_SNR));
+        last.dll_chips = match self.settings.dll_discriminator {
+            CodeDiscriminator::EarlyMinusLate => loops::early_minus_late(early, late, &self.shape, snr),
+            CodeDiscriminator::DotProduct => loops::dot_product(early, prompt, late, &self.shape, snr),
+        };
+        let (rates, jump) = loops::step(&self.dll, &self.code_rates, last.dll_chips, t_s);
+        self.code_rates = rates;
+        self.code += chips_to_units(jump);
+        self.last = last;
+    }
+
+    /// Detectors and changes of stage after code period `number`.
+    fn supervise(&mut self, number: u64, prompt: Complex64, report: &mut Report) {
+        self.watch_phase(report);
+        if self.wide && self.start.is_some_and(|start| self.since_s(start) >= self.settings.dll_pull_in_s) {
+            self.wide = false;
+            self.design();
+        }
+        let limit_s = self.settings.pull_in_limit_s;
+        match self.stage {
+            Stage::Frequency if self.since_s(self.stage_since) >= self.settings.fll_pull_in_s => {
+                if self.settings.pll_order < 3 {
+                    // No loop would correct it from here on.
+                    self.carrier_rates.acceleration = 0.0;
+                }
+                self.enter(Stage::Assisted);
+            }
+            Stage::Frequency => {}
+            Stage::Assisted => {
+                let waited_s = self.since_s(self.stage_since);
+                if waited_s > limit_s || (self.locked_since.is_none() && waited_s > PHASE_LIMIT_SHARE * limit_s) {
+                    self.lose(report);
+                } else if self.locked_since.is_some() {
+                    self.find_symbols(number, prompt, report);
+                }
+            }
+            Stage::Tracking(begin) => {
+                let moved = self.has_symbols && self.sync.add(number, prompt).is_some_and(|found| found != begin);
+                if moved {
+                    self.interrupt(report);
+                    self.enter(Stage::Assisted);
+                } else if self.rotation.1 >= VERIFY_SYMBOLS {
+                    self.verify_frequency(report);
+                }
+            }
+        }
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        self.stage = stage;
+        self.stage_since = self.first;
+        self.pending = None;
+        self.sync = SymbolSync::new(self.group);
+        self.rotation = (Complex64::ZERO, 0);
+        self.symbol = (Complex64::ZERO, 0);
+        self.sums = [Complex64::ZERO; 3];
+        self.summed = 0;
+        self.update_since = self.first;
+        let tracking = matches!(stage, Stage::Tracking(_));
+        let group = if tracking { self.group } else { 2 };
+        self.cn0 = Cn0::new(group, self.period_s, self.settings.cn0_average_s);
+        if !tracking {
+            self.phase_lock = PhaseLock::new(LOCK_PERIODS);
+        }
+        self.design();
+    }
+
+    /// Begins to track at the first symbol after its edge is known.
+    fn find_symbols(&mut self, number: u64, prompt: Complex64, report: &mut Report) {
+        if self.pending.is_none() {
+            self.pending = if self.has_symbols { self.sync.add(number, prompt) } else { Some(0) };
+        }
+        if let Some(begin) = self.pending
+            && (number + 1) % u64::from(self.group) == begin
+        {
+            self.enter(Stage::Tracking(begin));
+            // The lock just shown stands as the first of the longer means.
+            self.phase_lock = PhaseLock::new(LOCK_SYMBOLS);
+            self.phase_lock.add_equal(Complex64::ONE);
+            if self.has_symbols {
+                report.events.push((self.first, Event::BitSynchronised));
+            }
+        }
+    }
+
+    /// Follows phase lock; a dip is a slip, a long one the end.
+    fn watch_phase(&mut self, report: &mut Report) {
+        let value = self.phase_lock.value();
+        let weak = matches!(self.stage, Stage::Tracking(_))
+            && self.cn0.hz().is_some_and(|hz| 10.0 * libm::log10(hz) < self.settings.cn0_threshold_dbhz);
+        if self.locked_since.is_some() {
+            if value < self.settings.phase_unlock_threshold {
+                self.interrupt(report);
+                self.unlocked_since = Some(self.first);
+            }
+        } else if value >= self.settings.phase_lock_threshold && self.stage != Stage::Frequency {
+            let settled = self.phase_lock.settled();
+            if settled {
+                self.locked_since = Some(self.first);
+                report.events.push((self.first, Event::PhaseLocked));
+                if !weak {
+                    self.unlocked_since = None;
+                }
+            }
+        }
+        if weak && self.unlocked_since.is_none() {
+            self.unlocked_since = Some(self.first);
+        } else if !weak && self.locked_since.is_some() {
+            self.unlocked_since = None;
+        }
+        if self.unlocked_since.is_some_and(|since| self.since_s(since) >= self.settings.loss_s) {
+            self.lose(report);
+        }
+    }
+
+    /// The carrier's count is broken here.
+    fn interrupt(&mut self, report: &mut Report) {
+        if self.locked_since.take().is_some() {
+            report.events.push((self.first, Event::CycleSlip));
+        }
+        self.polarity = None;
+    }
+
+    fn lose(&mut self, report: &mut Report) {
+        if !self.lost {
+            self.lost = true;
+            self.locked_since = None;
+            report.events.push((self.first, Event::LossOfLock));
+        }
+    }
+
+    /// A Costas loop also locks where the phase turns by half cycles between symbols or updates; within symbols it shows.
+    fn verify_frequency(&mut self, report: &mut Report) {
+        let error_hz = loops::phase(self.rotation.0) / self.period_s;
+        self.rotation = (Complex64::ZERO, 0);
+        let nearest_hz = 0.5 / (self.period_s * f64::from(self.group));
+        if error_hz.abs() > FALSE_LOCK_SHARE * nearest_hz && self.locked_since.is_some() {
+            self.carrier_rates = Rates { rate: self.carrier_rates.rate + error_hz, acceleration: 0.0 };
+            self.interrupt(report);
+            self.enter(Stage::Frequency);
+        }
+    }
+
+    /// The replica's state at `tick`, in the running period.
+    fn measure(&self, tick: u64, replica: &Replica, report: &mut Report) {
+        let samples = i128::from(tick) - i128::from(self.first);
+        let length = i128::from(replica.period());
+        let code = i128::from(self.code) + samples * i128::from(self.code_step);
+        let periods = i128::from(self.period) + code.div_euclid(length);
+        let fraction = units_to_chips(code.rem_euclid(length) as i64) / units_to_chips(replica.period());
+        let carrier = self.carrier + samples * self.carrier_step;
+        let turns = (carrier >> 64) as f64 + carrier as u64 as f64 / TURN;
+        let half = if self.polarity == Some(true) { 0.5 } else { 0.0 };
+        let passed_s = tick.saturating_sub(self.update_since) as f64 / self.rate.hz();
+        let offset_hz = self.carrier_rates.rate + self.carrier_rates.acceleration * passed_s;
+        let cn0_dbhz = self.cn0.hz().map_or(self.hit.cn0_dbhz, |hz| 10.0 * libm::log10(hz));
+        report.measurements.push(Measurement {
+            sample: tick,
+            code_periods: periods.max(0) as u64,
+            code_fraction: fraction,
+            carrier_cycles: half - self.sense * turns,
+            half_cycle_known: self.polarity.is_some(),
+            doppler_hz: self.sense * offset_hz,
+            cn0_dbhz,
+            locked_s: self.locked_since.map_or(0.0, |since| tick.saturating_sub(since) as f64 / self.rate.hz()),
+            locked: self.locked_since.is_some(),
+        });
+        report.rows.push(TrackingRow {
+            sample: tick,
+            sv: self.sv,
+            signal: self.signal,
+            prompt_i: self.last.prompt.re,
+            prompt_q: self.last.prompt.im,
+            dll_discriminator_chips: self.last.dll_chips,
+            pll_discriminator_cycles: self.last.pll_cycles,
+            fll_discriminator_hz: self.last.fll_hz,
+            cn0_dbhz,
+            phase_lock: self.phase_lock.value(),
+            integration_s: self.last.integration_s,
+        });
+    }
+
+    #[cfg(test)]
+    pub(super) fn shift_frequency(&mut self, hz: f64) {
+        self.carrier_rates.rate += hz;
+        self.set_steps();
+    }
+
+    #[cfg(test)]
+    pub(super) fn is_tracking(&self) -> bool {
+        matches!(self.stage, Stage::Tracking(_))
+    }
+}

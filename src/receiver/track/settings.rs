@@ -1,0 +1,179 @@
+//! Choices of the tracking loops, as a settings file writes them.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::receiver::correlate::Edge;
+
+/// How the code error is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CodeDiscriminator {
+    /// Non-coherent early minus late power over early plus late power.
+    EarlyMinusLate,
+    /// (early − late)·prompt over prompt power.
+    DotProduct,
+}
+
+/// Settings of every tracking channel. Bandwidths are one-sided noise bandwidths of the discrete loop, exact.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrackingSettings {
+    /// Order of the carrier phase loop: 2 or 3. Order 3 follows a constant Doppler rate without error.
+    pub pll_order: u32,
+    pub pll_bandwidth_hz: f64,
+    /// Order of the frequency loop of the pull-in: 1 or 2.
+    pub fll_order: u32,
+    pub fll_bandwidth_hz: f64,
+    /// Bandwidth of the frequency loop while it assists the phase loop until that has locked; 0 for none.
+    pub fll_assist_bandwidth_hz: f64,
+    /// How long the frequency loop works alone.
+    pub fll_pull_in_s: f64,
+    /// Order of the code loop: 1 or 2. It is always aided by the carrier.
+    pub dll_order: u32,
+    pub dll_bandwidth_hz: f64,
+    /// Bandwidth of the code loop during the first `dll_pull_in_s`.
+    pub dll_pull_in_bandwidth_hz: f64,
+    pub dll_pull_in_s: f64,
+    pub dll_discriminator: CodeDiscriminator,
+    /// Distance from early to late.
+    pub spacing_chips: f64,
+    /// Code periods a loop update once symbols are known: a divisor of 20.
+    pub integration: u32,
+    pub replica: Edge,
+    /// Phase lock (mean cosine of twice the phase error) is declared at this value …
+    pub phase_lock_threshold: f64,
+    /// … and lost below this one, as a cycle slip; 0.4 leaves room for 30° of dynamic stress.
+    pub phase_unlock_threshold: f64,
+    /// The signal is lost when the phase stays unlocked or C/N0 stays below `cn0_threshold_dbhz` so long.
+    pub loss_s: f64,
+    pub cn0_threshold_dbhz: f64,
+    /// A channel that has not reached symbol lock after so long gives up.
+    pub pull_in_limit_s: f64,
+    /// Time constant of the C/N0 estimate.
+    pub cn0_average_s: f64,
+}
+
+impl Default for TrackingSettings {
+    fn default() -> Self {
+        Self {
+            pll_order: 3,
+            pll_bandwidth_hz: 18.0,
+            fll_order: 2,
+            fll_bandwidth_hz: 10.0,
+            fll_assist_bandwidth_hz: 2.0,
+            fll_pull_in_s: 0.25,
+            dll_order: 1,
+            dll_bandwidth_hz: 0.5,
+            dll_pull_in_bandwidth_hz: 2.5,
+            dll_pull_in_s: 1.0,
+            dll_discriminator: CodeDiscriminator::EarlyMinusLate,
+            spacing_chips: 0.5,
+            integration: 4,
+            replica: Edge::Area,
+            phase_lock_threshold: 0.85,
+            phase_unlock_threshold: 0.4,
+            loss_s: 0.2,
+            cn0_threshold_dbhz: 25.0,
+            pull_in_limit_s: 6.0,
+            cn0_average_s: 1.0,
+        }
+    }
+}
+
+/// A tracking setting that cannot work.
+#[derive(Debug, Error, PartialEq)]
+pub enum TrackingSettingsError {
+    #[error("tracking.{key} = {value}: expected {expected}")]
+    Range { key: &'static str, value: f64, expected: &'static str },
+    #[error(
+        "tracking.{key} = {value_hz} Hz with updates every {update_s} s: bandwidth times update time is {product}, \
+         above the limit {limit} (at most {largest_hz} Hz here)"
+    )]
+    Bandwidth { key: &'static str, value_hz: f64, update_s: f64, product: f64, limit: f64, largest_hz: f64 },
+}
+
+/// Largest bandwidth times update time that [`TrackingSettings::validate`] accepts. The loops are stable for every value
+/// (theory: order 1 below 0.5); beyond this their noise per update is no longer small against the discriminator's range.
+pub const LARGEST_BANDWIDTH_TIME: f64 = 0.4;
+
+impl TrackingSettings {
+    /// Checks every value and its range, for a code whose period is `period_s`.
+    ///
+    /// # Errors
+    /// The first key that is out of range, its value and what was expected.
+    pub fn validate(&self, period_s: f64) -> Result<(), TrackingSettingsError> {
+        let order = |value: u32, least: u32, most: u32| (least..=most).contains(&value);
+        let within = |value: f64, least: f64, most: f64| value >= least && value <= most;
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        #[rustfmt::skip]
+        let checks = [
+            ("pll_order", f64::from(self.pll_order), order(self.pll_order, 2, 3), "2 or 3"),
+            ("fll_order", f64::from(self.fll_order), order(self.fll_order, 1, 2), "1 or 2"),
+            ("dll_order", f64::from(self.dll_order), order(self.dll_order, 1, 2), "1 or 2"),
+            ("pll_bandwidth_hz", self.pll_bandwidth_hz, positive(self.pll_bandwidth_hz), "above 0"),
+            ("fll_bandwidth_hz", self.fll_bandwidth_hz, positive(self.fll_bandwidth_hz), "above 0"),
+            ("fll_assist_bandwidth_hz", self.fll_assist_bandwidth_hz, within(self.fll_assist_bandwidth_hz, 0.0, f64::MAX), "0 or more"),
+            ("fll_pull_in_s", self.fll_pull_in_s, within(self.fll_pull_in_s, 0.02, 10.0), "0.02 to 10"),
+            ("dll_bandwidth_hz", self.dll_bandwidth_hz, positive(self.dll_bandwidth_hz), "above 0"),
+            ("dll_pull_in_bandwidth_hz", self.dll_pull_in_bandwidth_hz, positive(self.dll_pull_in_bandwidth_hz), "above 0"),
+            ("dll_pull_in_s", self.dll_pull_in_s, within(self.dll_pull_in_s, 0.0, 60.0), "0 to 60"),
+            ("spacing_chips", self.spacing_chips, within(self.spacing_chips, 0.02, 1.5), "0.02 to 1.5"),
+            ("integration", f64::from(self.integration), [1, 2, 4, 5, 10, 20].contains(&self.integration), "1, 2, 4, 5, 10 or 20"),
+            ("phase_lock_threshold", self.phase_lock_threshold, within(self.phase_lock_threshold, 0.1, 0.99), "0.1 to 0.99"),
+            ("phase_unlock_threshold", self.phase_unlock_threshold, within(self.phase_unlock_threshold, 0.0, self.phase_lock_threshold), "0 to phase_lock_threshold"),
+            ("loss_s", self.loss_s, within(self.loss_s, 0.05, 10.0), "0.05 to 10"),
+            ("cn0_threshold_dbhz", self.cn0_threshold_dbhz, within(self.cn0_threshold_dbhz, 0.0, 60.0), "0 to 60"),
+            ("pull_in_limit_s", self.pull_in_limit_s, within(self.pull_in_limit_s, 1.0, 600.0), "1 to 600"),
+            ("cn0_average_s", self.cn0_average_s, within(self.cn0_average_s, 0.1, 60.0), "0.1 to 60"),
+        ];
+        if let Some(&(key, value, _, expected)) = checks.iter().find(|check| !check.2) {
+            return Err(TrackingSettingsError::Range { key, value, expected });
+        }
+        let update_s = period_s * f64::from(self.integration);
+        let bandwidths = [
+            ("pll_bandwidth_hz", self.pll_bandwidth_hz, update_s),
+            ("dll_bandwidth_hz", self.dll_bandwidth_hz, update_s),
+            ("dll_pull_in_bandwidth_hz", self.dll_pull_in_bandwidth_hz, update_s),
+            ("fll_bandwidth_hz", self.fll_bandwidth_hz, period_s),
+            ("fll_assist_bandwidth_hz", self.fll_assist_bandwidth_hz, period_s),
+        ];
+        for (key, value_hz, update_s) in bandwidths {
+            let product = value_hz * update_s;
+            if product > LARGEST_BANDWIDTH_TIME {
+                let (limit, largest_hz) = (LARGEST_BANDWIDTH_TIME, LARGEST_BANDWIDTH_TIME / update_s);
+                return Err(TrackingSettingsError::Bandwidth { key, value_hz, update_s, product, limit, largest_hz });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_and_a_bad_value_names_its_key() {
+        assert_eq!(TrackingSettings::default().validate(1e-3), Ok(()));
+        let bad = TrackingSettings { integration: 3, ..Default::default() };
+        assert!(bad.validate(1e-3).unwrap_err().to_string().contains("tracking.integration = 3"));
+        let bad = TrackingSettings { spacing_chips: f64::NAN, ..Default::default() };
+        assert!(bad.validate(1e-3).unwrap_err().to_string().contains("spacing_chips"));
+    }
+
+    #[test]
+    fn a_bandwidth_beyond_the_limit_is_refused_with_the_largest_that_fits() {
+        // 25 Hz x 20 ms = 0.5 > 0.4; 20 Hz would do.
+        let bad = TrackingSettings { pll_bandwidth_hz: 25.0, integration: 20, ..Default::default() };
+        let text = bad.validate(1e-3).unwrap_err().to_string();
+        assert!(text.contains("0.5") && text.contains("at most 20 Hz"), "{text}");
+    }
+
+    #[test]
+    fn unknown_keys_are_refused() {
+        assert!(serde_json::from_str::<TrackingSettings>(r#"{"pll_bandwith_hz": 15}"#).is_err());
+        let some: TrackingSettings = serde_json::from_str(r#"{"replica": "nearest", "pll_order": 2}"#).unwrap();
+        assert_eq!((some.replica, some.pll_order, some.dll_order), (Edge::Nearest, 2, 1));
+    }
+}
