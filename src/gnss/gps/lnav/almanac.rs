@@ -1,0 +1,227 @@
+//! What subframes 4 and 5 say of the whole constellation: almanac, health, ionosphere and UTC, page by page.
+//!
+//! Source: IS-GPS-200N, 20.3.3.5 and table 20-V. An almanac is an ephemeris without its
+//! corrections, moved to a common reference time; it is good to a few kilometres for days.
+
+use super::fields::{ALMANAC_PAGE, FieldError, IONOSPHERE_PAGE, UTC_PAGE, write_all};
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2, GPS_PI};
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::satellite::{Sv, System};
+use crate::gnss::time::{Epoch, WEEK_S};
+
+/// The inclination from which the almanac counts, in semicircles (IS-GPS-200N, table 20-VI).
+pub const ALMANAC_INCLINATION_SEMICIRCLES: f64 = 0.30;
+/// Step of an almanac's reference time (IS-GPS-200N, table 20-VI).
+const TOA_STEP_S: i64 = 4096;
+/// The last reference time inside a week (IS-GPS-200N, table 20-VI).
+const TOA_LAST_S: i64 = 602_112;
+/// "Data ID" of the present structure, 01, in bits 61 and 62 (IS-GPS-200N, 20.3.3.5.1.1).
+const DATA_ID: u32 = 1;
+/// Reserved bits alternate (IS-GPS-200N, 20.3.3.5.1).
+pub(super) const ALTERNATING: u32 = 0xAA_AAAA;
+/// A-S on, a satellite of block IIR (IS-GPS-200N, 20.3.3.5.1.4).
+const CONFIGURATION: u32 = 0b1001;
+/// Health of a satellite that is not there (IS-GPS-200N, table 20-VIII).
+const ABSENT: u32 = 0b11_1111;
+
+/// The SV ID of each page of subframe 4 (IS-GPS-200N, table 20-V).
+const SUBFRAME_4_IDS: [u8; 25] =
+    [57, 25, 26, 27, 28, 57, 29, 30, 31, 32, 57, 62, 52, 53, 54, 57, 55, 56, 58, 59, 57, 60, 61, 62, 63];
+/// The SV ID of page 25 of subframe 5 (IS-GPS-200N, table 20-V).
+const HEALTH_ID: u8 = 51;
+
+/// One satellite's almanac; the week of `toa_s` is in page 25 of subframe 5.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Almanac {
+    /// PRN.
+    pub number: u8,
+    pub eccentricity: f64,
+    /// Reference time in its week.
+    pub toa_s: f64,
+    /// Inclination minus [`ALMANAC_INCLINATION_SEMICIRCLES`].
+    pub delta_i_rad: f64,
+    pub omega_dot_radps: f64,
+    /// Eight bits: three of the message, five of the signals (IS-GPS-200N, 20.3.3.5.1.3).
+    pub health: u8,
+    pub sqrt_a_sqrtm: f64,
+    pub omega0_rad: f64,
+    pub omega_rad: f64,
+    pub m0_rad: f64,
+    pub af0_s: f64,
+    pub af1_sps: f64,
+}
+
+impl Almanac {
+    /// The almanac at `toa` that an ephemeris implies, not yet rounded.
+    ///
+    /// The mean-motion correction goes into the semi-major axis, for an almanac has no other place for it.
+    pub fn derive(ephemeris: &Ephemeris, toa: Epoch) -> Self {
+        let age_s = toa.since(ephemeris.toe);
+        let a = ephemeris.sqrt_a_sqrtm;
+        let motion_radps = GPS_MU_M3PS2.sqrt() / (a * a * a) + ephemeris.delta_n_radps;
+        // The node is counted from the week's start; another week's is Earth's rotation away.
+        let weeks = (toa.week() - ephemeris.toe.week()) as f64;
+        let clock_age_s = toa.since(ephemeris.toc);
+        Self {
+            number: ephemeris.sv.number,
+            eccentricity: ephemeris.eccentricity,
+            toa_s: toa.tow_s(),
+            delta_i_rad: ephemeris.i0_rad + ephemeris.idot_radps * age_s - ALMANAC_INCLINATION_SEMICIRCLES * GPS_PI,
+            omega_dot_radps: ephemeris.omega_dot_radps,
+            health: if ephemeris.health & 0x20 == 0 { ephemeris.health } else { 0xE0 | (ephemeris.health & 0x1F) },
+            sqrt_a_sqrtm: libm::cbrt(GPS_MU_M3PS2.sqrt() / motion_radps),
+            omega0_rad: ephemeris.omega0_rad + ephemeris.omega_dot_radps * age_s
+                - EARTH_ROTATION_RADPS * WEEK_S as f64 * weeks,
+            omega_rad: ephemeris.omega_rad,
+            m0_rad: ephemeris.m0_rad + motion_radps * age_s,
+            af0_s: ephemeris.af0_s + clock_age_s * (ephemeris.af1_sps + clock_age_s * ephemeris.af2_sps2),
+            af1_sps: ephemeris.af1_sps,
+        }
+    }
+}
+
+/// GPS time against UTC, as page 18 gives it; weeks modulo 256 (IS-GPS-200N, 20.3.3.5.2.4).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Utc {
+    pub a0_s: f64,
+    pub a1_sps: f64,
+    /// Reference time in its week.
+    pub tot_s: f64,
+    pub week: u8,
+    pub leap_s: i64,
+    /// Week and day (1..=7) at whose end `leap_after_s` takes effect.
+    pub event_week: u8,
+    pub event_day: u8,
+    pub leap_after_s: i64,
+}
+
+/// The multiple of 4096 s nearest to `reference` inside its week.
+fn reference_time(reference: Epoch) -> Epoch {
+    let tow_s = ((reference.tow_whole_s() + TOA_STEP_S / 2) / TOA_STEP_S * TOA_STEP_S).min(TOA_LAST_S);
+    Epoch::new(reference.week() * WEEK_S + tow_s, 0.0)
+}
+
+/// A page of reserved or dummy content: everything after the SV ID alternates.
+fn blank(sv_id: u8) -> [u32; 10] {
+    let mut data = [ALTERNATING; 10];
+    put(&mut data, 0, &[(DATA_ID << 6) | u32::from(sv_id)], 8);
+    data
+}
+
+/// Writes `values` of `length` bits each one after another from data bit `first` (0 is the first of word 3;
+/// parity is not counted).
+fn put(data: &mut [u32; 10], first: u32, values: &[u32], length: u32) {
+    let mut at = first;
+    for value in values {
+        for bit in (0..length).rev() {
+            if let Some(word) = data.get_mut(2 + (at / 24) as usize) {
+                let shift = 23 - at % 24;
+                *word = (*word & !(1 << shift)) | (((value >> bit) & 1) << shift);
+            }
+            at += 1;
+        }
+    }
+}
+
+fn almanac_page(sv_id: u8, almanac: &[Almanac]) -> Result<[u32; 10], FieldError> {
+    match almanac.iter().find(|entry| entry.number == sv_id) {
+        Some(entry) => {
+            let mut data = blank(sv_id);
+            write_all(&ALMANAC_PAGE, entry, &mut data)?;
+            Ok(data)
+        }
+        None => Ok(blank(0)),
+    }
+}
+
+fn health_of(number: u8, ephemerides: &[Ephemeris]) -> u32 {
+    ephemerides.iter().find(|e| e.sv.number == number).map_or(ABSENT, |e| u32::from(e.health))
+}
+
+/// The data words of all pages, subframe 4 first; words 1 and 2 are the caller's.
+pub(super) fn pages(
+    klobuchar: Option<&Klobuchar>,
+    leap_seconds: i64,
+    ephemerides: &[Ephemeris],
+    reference: Epoch,
+) -> Result<Vec<[u32; 10]>, FieldError> {
+    if let Some(stranger) = ephemerides.iter().find(|e| e.sv.system != System::Gps || !(1..=32).contains(&e.sv.number))
+    {
+        let value = f64::from(stranger.sv.number);
+        return Err(FieldError::OutOfRange { name: "sv_id", value, minimum: 1.0, maximum: 32.0 });
+    }
+    let toa = reference_time(reference);
+    let almanac: Vec<Almanac> = ephemerides.iter().map(|e| Almanac::derive(e, toa)).collect();
+    let mut all = Vec::with_capacity(50);
+    for id in SUBFRAME_4_IDS {
+        all.push(match id {
+            25..=32 => almanac_page(id, &almanac)?,
+            52 => correction_table(),
+            55 => special_message(),
+            56 => ionosphere_and_utc(klobuchar, leap_seconds, toa)?,
+            63 => configuration(ephemerides),
+            reserved => blank(reserved),
+        });
+    }
+    for number in 1..=24 {
+        all.push(almanac_page(number, &almanac)?);
+    }
+    all.push(health(ephemerides, toa));
+    Ok(all)
+}
+
+/// Page 13: the table is not available, nor is any of its entries (IS-GPS-200N, 20.3.3.5.1.9).
+fn correction_table() -> [u32; 10] {
+    let mut data = blank(52);
+    put(&mut data, 8, &[0b10], 2);
+    put(&mut data, 10, &[0b10_0000; 30], 6);
+    data
+}
+
+/// Page 17: 22 characters, all spaces (IS-GPS-200N, 20.3.3.5.1.8).
+fn special_message() -> [u32; 10] {
+    let mut data = blank(55);
+    put(&mut data, 8, &[0x20; 22], 8);
+    data
+}
+
+/// Page 18; a dummy page when there is no ionosphere to tell of, since the page cannot say "none".
+fn ionosphere_and_utc(
+    klobuchar: Option<&Klobuchar>,
+    leap_seconds: i64,
+    reference: Epoch,
+) -> Result<[u32; 10], FieldError> {
+    let Some(klobuchar) = klobuchar else { return Ok(blank(0)) };
+    let mut data = blank(56);
+    write_all(&IONOSPHERE_PAGE, klobuchar, &mut data)?;
+    let week = reference.week().rem_euclid(256) as u8;
+    let utc = Utc {
+        tot_s: reference.tow_s(),
+        week,
+        leap_s: leap_seconds,
+        event_week: week,
+        event_day: 7,
+        leap_after_s: leap_seconds,
+        ..Utc::default()
+    };
+    write_all(&UTC_PAGE, &utc, &mut data)?;
+    Ok(data)
+}
+
+/// Page 25 of subframe 4: configurations of all, health of 25 to 32 (figure 20-1, sheet 9).
+fn configuration(ephemerides: &[Ephemeris]) -> [u32; 10] {
+    let mut data = blank(63);
+    let present = |number| if ephemerides.iter().any(|e| e.sv == Sv::gps(number)) { CONFIGURATION } else { 0 };
+    put(&mut data, 8, &(1..=32).map(present).collect::<Vec<_>>(), 4);
+    put(&mut data, 138, &(25..=32).map(|number| health_of(number, ephemerides)).collect::<Vec<_>>(), 6);
+    data
+}
+
+/// Page 25 of subframe 5: reference time, health of 1 to 24 (figure 20-1, sheet 5).
+fn health(ephemerides: &[Ephemeris], toa: Epoch) -> [u32; 10] {
+    let mut data = blank(HEALTH_ID);
+    put(&mut data, 8, &[(toa.tow_whole_s() / TOA_STEP_S) as u32, toa.week().rem_euclid(256) as u32], 8);
+    put(&mut data, 24, &(1..=24).map(|number| health_of(number, ephemerides)).collect::<Vec<_>>(), 6);
+    data
+}

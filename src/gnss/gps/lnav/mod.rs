@@ -1,0 +1,298 @@
+//! The GPS legacy navigation message (LNAV): 300-bit subframes of six seconds, encoded and decoded.
+//!
+//! Source: IS-GPS-200N, 20.3. Limits: the telemetry message and the correction table (page 13 of
+//! subframe 4) are empty, reserved bits alternate, no leap second is announced ahead.
+
+mod almanac;
+mod fields;
+mod parity;
+
+use thiserror::Error;
+
+pub use almanac::{ALMANAC_INCLINATION_SEMICIRCLES, Almanac, Utc};
+pub use fields::{Field, FieldError, Kind, tables};
+pub use parity::check_parity;
+
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::{Epoch, WEEK_S};
+use fields::{
+    ALMANAC_PAGE, IONOSPHERE_PAGE, SUBFRAME_1, SUBFRAME_2, SUBFRAME_3, UTC_PAGE, integers, quantise_all, read_all,
+    write_all,
+};
+
+/// Seconds of a subframe (IS-GPS-200N, 20.3.2).
+pub const SUBFRAME_S: i64 = 6;
+/// First eight bits of every subframe (IS-GPS-200N, 20.3.3.1).
+pub const PREAMBLE: u32 = 0x8B;
+/// Subframes in a week: the HOW's count runs below it (IS-GPS-200N, 20.3.3.2).
+const TOW_COUNTS: u32 = (WEEK_S / SUBFRAME_S) as u32;
+/// Pages of subframes 4 and 5 (IS-GPS-200N, 20.3.2).
+const PAGES: i64 = 25;
+/// The anti-spoof flag of the HOW, as every operational satellite sets it (IS-GPS-200N, 20.3.3.2).
+const ANTI_SPOOF: u32 = 1;
+
+/// What all satellites say alike: the pages of subframes 4 and 5.
+#[derive(Clone, Debug)]
+pub struct Broadcast {
+    /// Pages 1..=25 of subframe 4, then those of subframe 5.
+    pages: Vec<[u32; 10]>,
+}
+
+impl Broadcast {
+    /// Builds all pages; almanac and UTC refer to the multiple of 4096 s nearest to `reference`.
+    ///
+    /// `almanac` holds one ephemeris a satellite (the first counts). Without `klobuchar` page 18 is a dummy page.
+    pub fn new(
+        klobuchar: Option<Klobuchar>,
+        leap_seconds: i64,
+        almanac: &[Ephemeris],
+        reference: Epoch,
+    ) -> Result<Self, FieldError> {
+        Ok(Self { pages: almanac::pages(klobuchar.as_ref(), leap_seconds, almanac, reference)? })
+    }
+
+    /// The ten 30-bit words (D30 is bit 0) whose first bit leaves at GPS time `start`, a multiple of 6 s.
+    ///
+    /// Subframe 1 carries the week of `start`. A value outside its field is an error.
+    pub fn subframe(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<[u32; 10], FieldError> {
+        let tow_s = start.tow_whole_s();
+        if tow_s % SUBFRAME_S != 0 || start.fraction() != 0.0 {
+            return Err(FieldError::NotMultiple { name: "start_s", value: start.tow_s(), step: SUBFRAME_S as f64 });
+        }
+        let id = (tow_s / SUBFRAME_S % 5 + 1) as u8;
+        let page = (tow_s / (5 * SUBFRAME_S) % PAGES) as usize;
+        let mut data = [almanac::ALTERNATING; 10];
+        match id {
+            1..=3 => {
+                check_issue(ephemeris)?;
+                let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
+                match id {
+                    1 => write_all(&SUBFRAME_1, &on_air, &mut data)?,
+                    2 => write_all(&SUBFRAME_2, &on_air, &mut data)?,
+                    _ => write_all(&SUBFRAME_3, &on_air, &mut data)?,
+                }
+            }
+            4 => data = self.pages.get(page).copied().unwrap_or(data),
+            _ => data = self.pages.get(PAGES as usize + page).copied().unwrap_or(data),
+        }
+        let next_count = ((tow_s / SUBFRAME_S + 1) as u32) % TOW_COUNTS;
+        data[0] = PREAMBLE << 16;
+        data[1] = (next_count << 7) | (ANTI_SPOOF << 5) | (u32::from(id) << 2);
+        Ok(with_parity(&data))
+    }
+}
+
+fn with_parity(data: &[u32; 10]) -> [u32; 10] {
+    let mut previous = 0;
+    let mut number = 0;
+    data.map(|bits| {
+        number += 1;
+        let bits = if number == 2 || number == 10 { parity::solve_tail(bits, previous) } else { bits };
+        previous = parity::encode(bits, previous);
+        previous
+    })
+}
+
+fn check_issue(ephemeris: &Ephemeris) -> Result<(), FieldError> {
+    if ephemeris.iodc & 0xFF == u16::from(ephemeris.iode) {
+        Ok(())
+    } else {
+        Err(FieldError::Issue { iode: ephemeris.iode, iodc: ephemeris.iodc })
+    }
+}
+
+/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+    check_issue(ephemeris)?;
+    let mut sent = ephemeris.clone();
+    quantise_all(&SUBFRAME_1, &mut sent)?;
+    quantise_all(&SUBFRAME_2, &mut sent)?;
+    quantise_all(&SUBFRAME_3, &mut sent)?;
+    Ok(sent)
+}
+
+/// Why words are no subframe, or subframes no ephemeris.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum SubframeError {
+    #[error("word {word} fails its parity")]
+    Parity { word: u8 },
+    #[error("the preamble is {found:#04x}: expected 0x8b")]
+    Preamble { found: u32 },
+    #[error("subframe id {id}: expected {expected}")]
+    Id { id: u8, expected: &'static str },
+    #[error("the count of the time of week is {count}: expected below 100800")]
+    TowCount { count: u32 },
+    #[error("words 2 and 10 do not end like the word before the subframe")]
+    Tail,
+    #[error("issues of data disagree: iodc {iodc}, iode {iode_2} in subframe 2 and {iode_3} in subframe 3")]
+    Issue { iodc: u16, iode_2: i64, iode_3: i64 },
+    #[error("{name} = {value_s} s is beyond the week")]
+    BeyondWeek { name: &'static str, value_s: i64 },
+}
+
+/// A subframe whose parity held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Subframe {
+    /// 1..=5.
+    pub id: u8,
+    /// Time of week of the next subframe's start, in 6 s.
+    pub tow_count: u32,
+    /// The signal's accuracy may be worse than the URA says (IS-GPS-200N, 20.3.3.2).
+    pub alert: bool,
+    pub antispoof: bool,
+    /// 24 bits a word, inversion removed.
+    pub data: [u32; 10],
+}
+
+impl Subframe {
+    /// Checks and opens ten received words. `previous_last_word` counts by its two low bits, which are 00 by
+    /// the message's law, or 11 where the stream is received upside down (preamble 0x74).
+    pub fn decode(words: &[u32; 10], previous_last_word: u32) -> Result<Self, SubframeError> {
+        let mut data = [0; 10];
+        let mut previous = previous_last_word;
+        for (number, (bits, &word)) in (1..).zip(data.iter_mut().zip(words)) {
+            *bits = check_parity(word, previous).ok_or(SubframeError::Parity { word: number })?;
+            previous = word;
+        }
+        let [telemetry, handover, ..] = data;
+        if telemetry >> 16 != PREAMBLE {
+            return Err(SubframeError::Preamble { found: telemetry >> 16 });
+        }
+        if (words[1] ^ previous_last_word) & 3 != 0 || (words[9] ^ previous_last_word) & 3 != 0 {
+            return Err(SubframeError::Tail);
+        }
+        let id = ((handover >> 2) & 7) as u8;
+        if !(1..=5).contains(&id) {
+            return Err(SubframeError::Id { id, expected: "1 to 5" });
+        }
+        let tow_count = handover >> 7;
+        if tow_count >= TOW_COUNTS {
+            return Err(SubframeError::TowCount { count: tow_count });
+        }
+        Ok(Self { id, tow_count, alert: handover & 0x40 != 0, antispoof: handover & 0x20 != 0, data })
+    }
+
+    /// SV ID of a page of subframe 4 or 5 (IS-GPS-200N, table 20-V); 0 is a dummy page.
+    pub fn sv_id(&self) -> Option<u8> {
+        (self.id >= 4).then_some(((self.data[2] >> 16) & 0x3F) as u8)
+    }
+
+    /// The raw integers of all parameters in the field table; none for pages without any.
+    pub fn parameters(&self) -> Vec<(&'static str, i64)> {
+        match (self.id, self.sv_id()) {
+            (1, _) => integers(&SUBFRAME_1, &self.data),
+            (2, _) => integers(&SUBFRAME_2, &self.data),
+            (3, _) => integers(&SUBFRAME_3, &self.data),
+            (_, Some(1..=32)) => integers(&ALMANAC_PAGE, &self.data),
+            (4, Some(56)) => {
+                let mut all = integers(&IONOSPHERE_PAGE, &self.data);
+                all.extend(integers(&UTC_PAGE, &self.data));
+                all
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// The ionosphere, if this is page 18 of subframe 4.
+    pub fn klobuchar(&self) -> Option<Klobuchar> {
+        let mut klobuchar = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
+        read_all(&IONOSPHERE_PAGE, &self.data, &mut klobuchar);
+        self.is_page_18().then_some(klobuchar)
+    }
+
+    /// GPS time against UTC, if this is page 18 of subframe 4.
+    pub fn utc(&self) -> Option<Utc> {
+        let mut utc = Utc::default();
+        read_all(&UTC_PAGE, &self.data, &mut utc);
+        self.is_page_18().then_some(utc)
+    }
+
+    /// A satellite's almanac, if this is such a page.
+    pub fn almanac(&self) -> Option<Almanac> {
+        let mut almanac = Almanac::default();
+        read_all(&ALMANAC_PAGE, &self.data, &mut almanac);
+        matches!(self.sv_id(), Some(1..=32)).then_some(almanac)
+    }
+
+    fn is_page_18(&self) -> bool {
+        self.id == 4 && self.sv_id() == Some(56)
+    }
+
+    fn parameter(&self, name: &str) -> i64 {
+        self.parameters().iter().find(|parameter| parameter.0 == name).map_or(0, |parameter| parameter.1)
+    }
+}
+
+/// The elements that subframes 1, 2 and 3 of one satellite hold together.
+///
+/// The 10-bit week is the one nearest to `near`; `transmitted` is the start of subframe 1, and the
+/// reference times are within half a week of it. Errors: other subframes, or different issues of data.
+pub fn ephemeris(
+    sv: Sv,
+    one: &Subframe,
+    two: &Subframe,
+    three: &Subframe,
+    near: Epoch,
+) -> Result<Ephemeris, SubframeError> {
+    for (subframe, id, expected) in [(one, 1, "1"), (two, 2, "2"), (three, 3, "3")] {
+        if subframe.id != id {
+            return Err(SubframeError::Id { id: subframe.id, expected });
+        }
+    }
+    let (iodc, iode_2, iode_3) = (one.parameter("iodc"), two.parameter("iode"), three.parameter("iode"));
+    if iode_2 != iode_3 || iode_2 != iodc & 0xFF {
+        return Err(SubframeError::Issue { iodc: iodc as u16, iode_2, iode_3 });
+    }
+    for (name, value_s) in [("toc_s", 16 * one.parameter("toc_s")), ("toe_s", 16 * two.parameter("toe_s"))] {
+        if value_s >= WEEK_S {
+            return Err(SubframeError::BeyondWeek { name, value_s });
+        }
+    }
+    let ahead = (one.parameter("week") - near.week() + 512).rem_euclid(1024) - 512;
+    let count = i64::from((one.tow_count + TOW_COUNTS - 1) % TOW_COUNTS);
+    let sent = Epoch::new((near.week() + ahead) * WEEK_S + count * SUBFRAME_S, 0.0);
+    let mut ephemeris = blank_ephemeris(sv, sent);
+    read_all(&SUBFRAME_1, &one.data, &mut ephemeris);
+    read_all(&SUBFRAME_2, &two.data, &mut ephemeris);
+    read_all(&SUBFRAME_3, &three.data, &mut ephemeris);
+    Ok(ephemeris)
+}
+
+/// All zero, with every time at `at`.
+fn blank_ephemeris(sv: Sv, at: Epoch) -> Ephemeris {
+    Ephemeris {
+        sv,
+        toe: at,
+        toc: at,
+        transmitted: at,
+        iode: 0,
+        iodc: 0,
+        ura_index: 0,
+        health: 0,
+        l2_codes: 0,
+        l2_p_data_off: false,
+        long_fit: false,
+        aodo: 0,
+        sqrt_a_sqrtm: 0.0,
+        eccentricity: 0.0,
+        m0_rad: 0.0,
+        delta_n_radps: 0.0,
+        omega0_rad: 0.0,
+        omega_dot_radps: 0.0,
+        omega_rad: 0.0,
+        i0_rad: 0.0,
+        idot_radps: 0.0,
+        cuc_rad: 0.0,
+        cus_rad: 0.0,
+        crc_m: 0.0,
+        crs_m: 0.0,
+        cic_rad: 0.0,
+        cis_rad: 0.0,
+        af0_s: 0.0,
+        af1_sps: 0.0,
+        af2_sps2: 0.0,
+        tgd_s: 0.0,
+    }
+}
