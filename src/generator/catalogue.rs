@@ -1,2 +1,256 @@
-//! stub
-pub struct Catalogue;
+//! Which broadcast set each satellite sends at each time, and the smooth orbit that the generator takes for true.
+//!
+//! A set goes on the air two hours before its reference time (IS-GPS-200N, 20.3.4.4), or when it was
+//! first received if its reference time is off the two-hour grid, which marks a fresh upload; it stays
+//! until the next one or the end of its curve fit interval. Neighbouring sets disagree by
+//! a metre or two, so the truth passes from one to the next over [`BLEND_S`]: the received phase
+//! stays smooth and the decoded set stays right to that metre.
+//!
+//! Records that their neighbours contradict are left out ([`Catalogue::new`]).
+
+use std::collections::BTreeMap;
+
+use crate::gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+/// Duration of a hand-over, centred on the instant when the broadcast set changes. A step of Δ metres
+/// becomes a rate of at most 1.875 Δ / 720 s: 2.6 mm/s a metre.
+pub const BLEND_S: f64 = 720.0;
+/// Sets further apart than this are not compared.
+const COMPARABLE_S: f64 = 6.0 * 3600.0;
+/// Good sets of one satellite agree to some ten metres half way between their reference times, where
+/// they are at most six hours apart.
+const CONTRADICTION_M: f64 = 2000.0;
+/// The same for clocks: 300 m.
+const CONTRADICTION_S: f64 = 1e-6;
+
+/// From when on which set is sent.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    from: Epoch,
+    set: Option<usize>,
+}
+
+#[derive(Clone, Debug)]
+struct Timeline {
+    sets: Vec<Ephemeris>,
+    spans: Vec<Span>,
+}
+
+/// The broadcast sets of every satellite, arranged by when they are sent.
+#[derive(Clone, Debug)]
+pub struct Catalogue {
+    satellites: BTreeMap<Sv, Timeline>,
+}
+
+impl Catalogue {
+    /// Arranges `sets`, whose order does not matter, and tells in words which were left out.
+    ///
+    /// Repeated sets count once. Two sets of a satellite contradict each other when, half way between
+    /// their reference times, their positions differ by more than 2 km or their clocks by more than
+    /// 1 µs; sets more than six hours apart are not compared. While some set is contradicted by more
+    /// others than agree with it, the worst are left out; of equally bad ones only those that do not
+    /// look like a GPS orbit, and all of them if that does not tell them apart.
+    pub fn new(sets: Vec<Ephemeris>) -> (Self, Vec<String>) {
+        let mut warnings = Vec::new();
+        let mut grouped: BTreeMap<Sv, Vec<Ephemeris>> = BTreeMap::new();
+        for set in sets {
+            match set.state(set.toe) {
+                Ok(_) => grouped.entry(set.sv).or_default().push(set),
+                Err(error) => warnings.push(format!("left out: {error}")),
+            }
+        }
+        warnings.sort();
+        let mut satellites = BTreeMap::new();
+        for (sv, mut sets) in grouped {
+            sets.sort_by(compare);
+            sets.dedup_by(|later, earlier| same_elements(later, earlier));
+            leave_out_rogues(&mut sets, &mut warnings);
+            if !sets.is_empty() {
+                let spans = spans(&sets);
+                satellites.insert(sv, Timeline { sets, spans });
+            }
+        }
+        (Self { satellites }, warnings)
+    }
+
+    /// Satellites of which there is at least one set.
+    pub fn satellites(&self) -> impl Iterator<Item = Sv> {
+        self.satellites.keys().copied()
+    }
+
+    /// The set that `sv` sends at `at`; `None` when none is within its fit interval.
+    pub fn sent_at(&self, sv: Sv, at: Epoch) -> Option<&Ephemeris> {
+        let timeline = self.satellites.get(&sv)?;
+        let count = timeline.spans.partition_point(|span| span.from <= at);
+        let span = timeline.spans.get(count.checked_sub(1)?)?;
+        timeline.sets.get(span.set?)
+    }
+
+    /// Whether `sv` sends a set at `at` that says it is healthy.
+    pub fn healthy(&self, sv: Sv, at: Epoch) -> bool {
+        self.sent_at(sv, at).is_some_and(|set| set.health == 0)
+    }
+
+    /// Orbit (in the ECEF axes of `at`) and L1 C/A clock, T_GD included, taken for true at GPS time
+    /// `at`; `None` where [`Self::sent_at`] is. Twice continuously differentiable across hand-overs.
+    ///
+    /// # Errors
+    /// [`OrbitError`] from the elements.
+    pub fn truth(&self, sv: Sv, at: Epoch) -> Result<Option<(State, ClockState)>, OrbitError> {
+        let Some(timeline) = self.satellites.get(&sv) else { return Ok(None) };
+        // Spans that may weigh in: those which begin before the blend's end and end after its begin.
+        let first = timeline.spans.partition_point(|s| s.from <= at.plus_s(-BLEND_S / 2.0)).saturating_sub(1);
+        let last = timeline.spans.partition_point(|s| s.from <= at.plus_s(BLEND_S / 2.0));
+        let mut sum: Option<(State, ClockState)> = None;
+        for index in first..last {
+            let Some(set) = timeline.spans.get(index).and_then(|s| s.set).and_then(|i| timeline.sets.get(i)) else {
+                continue;
+            };
+            let (begun, begun_rate) = step(timeline, index, at);
+            let (ended, ended_rate) = step(timeline, index + 1, at);
+            let (weight, rate) = (begun - ended, begun_rate - ended_rate);
+            if weight == 0.0 && rate == 0.0 {
+                continue;
+            }
+            let (state, clock) = (set.state(at)?, set.clock_l1(at)?);
+            let (total, total_clock) = sum.get_or_insert((
+                State { position_m: nalgebra::Vector3::zeros(), velocity_mps: nalgebra::Vector3::zeros() },
+                ClockState { offset_s: 0.0, drift: 0.0 },
+            ));
+            total.position_m += state.position_m * weight;
+            total.velocity_mps += state.velocity_mps * weight + state.position_m * rate;
+            total_clock.offset_s += clock.offset_s * weight;
+            total_clock.drift += clock.drift * weight + clock.offset_s * rate;
+        }
+        Ok(sum)
+    }
+}
+
+/// How far the change to span `index` is done at `at`, 0 to 1, and the rate of that: a quintic
+/// between two sets, a jump where one side has none.
+fn step(timeline: &Timeline, index: usize, at: Epoch) -> (f64, f64) {
+    let Some(span) = timeline.spans.get(index) else { return (0.0, 0.0) };
+    let since_s = at.since(span.from);
+    let before = index.checked_sub(1).and_then(|i| timeline.spans.get(i)).and_then(|s| s.set);
+    if before.is_none() || span.set.is_none() {
+        return (if since_s >= 0.0 { 1.0 } else { 0.0 }, 0.0);
+    }
+    let u = since_s / BLEND_S + 0.5;
+    if u <= 0.0 {
+        (0.0, 0.0)
+    } else if u >= 1.0 {
+        (1.0, 0.0)
+    } else {
+        (u * u * u * (10.0 + u * (6.0 * u - 15.0)), 30.0 * u * u * (1.0 - u) * (1.0 - u) / BLEND_S)
+    }
+}
+
+/// A total order that depends on the contents alone.
+fn compare(a: &Ephemeris, b: &Ephemeris) -> std::cmp::Ordering {
+    let key = |e: &Ephemeris| (e.toe.seconds(), e.iodc, e.iode, e.health, e.ura_index);
+    let number = |e: &Ephemeris| [e.transmitted.since(e.toe), e.m0_rad, e.sqrt_a_sqrtm, e.omega0_rad, e.af0_s, e.crs_m];
+    key(a).cmp(&key(b)).then_with(|| {
+        number(a)
+            .iter()
+            .zip(number(b))
+            .map(|(x, y)| x.total_cmp(&y))
+            .find(|o| o.is_ne())
+            .unwrap_or(std::cmp::Ordering::Equal)
+    })
+}
+
+/// Whether two records differ in nothing but when they were received.
+fn same_elements(a: &Ephemeris, b: &Ephemeris) -> bool {
+    Ephemeris { transmitted: b.transmitted, ..a.clone() } == *b
+}
+
+fn contradict(a: &Ephemeris, b: &Ephemeris) -> bool {
+    let middle = a.toe.plus_s(b.toe.since(a.toe) / 2.0);
+    let positions = a.state(middle).and_then(|x| Ok((x.position_m - b.state(middle)?.position_m).norm()));
+    let clocks = a.clock(middle).and_then(|x| Ok((x.offset_s - b.clock(middle)?.offset_s).abs()));
+    match (positions, clocks) {
+        (Ok(apart_m), Ok(apart_s)) => !(apart_m <= CONTRADICTION_M && apart_s <= CONTRADICTION_S),
+        _ => true,
+    }
+}
+
+/// Whether elements are those of the nominal constellation (IS-GPS-200N, table 20-III has wider fields):
+/// a 12 h sidereal orbit of 55° and small eccentricity.
+fn plausible(set: &Ephemeris) -> bool {
+    (set.sqrt_a_sqrtm - 5153.6).abs() < 5.0
+        && set.eccentricity < 0.03
+        && (set.i0_rad - 55_f64.to_radians()).abs() < 4_f64.to_radians()
+}
+
+fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
+    let against: Vec<Vec<Option<bool>>> = sets
+        .iter()
+        .enumerate()
+        .map(|(i, a)| {
+            let others = sets.iter().enumerate();
+            others
+                .map(|(j, b)| (i != j && a.toe.since(b.toe).abs() <= COMPARABLE_S).then(|| contradict(a, b)))
+                .collect()
+        })
+        .collect();
+    let mut kept = vec![true; sets.len()];
+    loop {
+        // Contradictions less agreements, among those still kept.
+        let score = |votes: &Vec<Option<bool>>| -> i64 {
+            votes.iter().zip(&kept).filter(|(_, k)| **k).filter_map(|(v, _)| *v).map(|c| if c { 1 } else { -1 }).sum()
+        };
+        let scores: Vec<Option<i64>> = against.iter().zip(&kept).map(|(votes, k)| k.then(|| score(votes))).collect();
+        let Some(worst) = scores.iter().flatten().copied().max().filter(|score| *score > 0) else { break };
+        let blamed: Vec<bool> = scores.iter().map(|score| *score == Some(worst)).collect();
+        let odd = |(set, blamed): (&Ephemeris, &bool)| *blamed && !plausible(set);
+        let any_odd = sets.iter().zip(&blamed).any(odd);
+        for ((set, kept), blamed) in sets.iter().zip(&mut kept).zip(&blamed) {
+            if *blamed && !(any_odd && plausible(set)) {
+                *kept = false;
+                warnings.push(format!(
+                    "{}: left out the set of reference time {} (IODE {}): its neighbours contradict it",
+                    set.sv, set.toe, set.iode
+                ));
+            }
+        }
+    }
+    let mut kept = kept.into_iter();
+    sets.retain(|_| kept.next().unwrap_or(true));
+}
+
+/// When a set goes on the air.
+fn first_sent(set: &Ephemeris) -> Epoch {
+    let nominal = set.toe.plus_s(-7200.0);
+    let on_grid = set.toe.seconds() % 7200 == 0;
+    let late_s = set.transmitted.since(nominal);
+    if on_grid || !(0.0..7200.0).contains(&late_s) { nominal } else { set.transmitted }
+}
+
+fn spans(sets: &[Ephemeris]) -> Vec<Span> {
+    let fits = |set: &Ephemeris| {
+        let half = set.fit_interval_s() / 2.0;
+        // A long fit begins with the transmission and is not centred on it, so never begin before.
+        (first_sent(set), set.toe.plus_s(half))
+    };
+    let mut instants: Vec<Epoch> = sets.iter().flat_map(|set| [fits(set).0, fits(set).1]).collect();
+    instants.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+    instants.dedup();
+    let mut spans: Vec<Span> = Vec::new();
+    for from in instants {
+        let on_air = sets.iter().enumerate().filter(|(_, set)| fits(set).0 <= from && from < fits(set).1);
+        // The one that began last; `sets` is in order of reference time, and the later wins a tie.
+        let set = on_air
+            .max_by(|(_, a), (_, b)| first_sent(a).partial_cmp(&first_sent(b)).unwrap_or(std::cmp::Ordering::Equal))
+            .map(|(index, _)| index);
+        if spans.last().is_none_or(|span| span.set != set) {
+            spans.push(Span { from, set });
+        }
+    }
+    spans
+}
+
+#[cfg(test)]
+#[path = "catalogue_tests.rs"]
+mod tests;

@@ -7,6 +7,7 @@
 use nalgebra::Vector3;
 use thiserror::Error;
 
+use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
 
@@ -76,24 +77,281 @@ pub enum OrbitError {
     Kepler { sv: Sv, eccentricity: f64 },
 }
 
+/// Relativistic clock constant F = −2√μ/c² in s/√m (IS-GPS-200N, 20.3.3.3.3.1).
+const RELATIVITY_SPSQRTM: f64 = -4.442_807_633e-10;
+/// Residual of Kepler's equation at which it counts as solved.
+const KEPLER_TOLERANCE_RAD: f64 = 1e-13;
+const KEPLER_STEPS: u32 = 20;
+
+/// Motion in the orbital plane: what orbit and clock have in common.
+struct Anomaly {
+    /// Time from the reference time of the orbit.
+    since_toe_s: f64,
+    semi_major_m: f64,
+    sin: f64,
+    cos: f64,
+    /// 1 − e cos E.
+    shrink: f64,
+    /// Rate of the eccentric anomaly.
+    rate_radps: f64,
+}
+
 impl Ephemeris {
-    /// ECEF state at GPS time `at`, in the ECEF axes of that same instant.
+    /// ECEF state at GPS time `at`, in the ECEF axes of that same instant; the velocity is that of
+    /// the rotating frame.
+    ///
+    /// # Errors
+    /// [`OrbitError`] for elements that describe no orbit. The age of the elements is not judged.
     pub fn state(&self, at: Epoch) -> Result<State, OrbitError> {
-        let _ = at;
-        todo!()
+        let anomaly = self.anomaly(at)?;
+        let flatness = (1.0 - self.eccentricity * self.eccentricity).sqrt();
+        let true_anomaly_rad = libm::atan2(flatness * anomaly.sin, anomaly.cos - self.eccentricity);
+        let true_rate = flatness * anomaly.rate_radps / anomaly.shrink;
+        let latitude_rad = true_anomaly_rad + self.omega_rad;
+        let (sin2, cos2) = libm::sincos(2.0 * latitude_rad);
+
+        // Second harmonic perturbations and their derivatives.
+        let argument_rad = latitude_rad + self.cus_rad * sin2 + self.cuc_rad * cos2;
+        let argument_rate = true_rate * (1.0 + 2.0 * (self.cus_rad * cos2 - self.cuc_rad * sin2));
+        let radius_m = anomaly.semi_major_m * anomaly.shrink + self.crs_m * sin2 + self.crc_m * cos2;
+        let radius_rate = anomaly.semi_major_m * self.eccentricity * anomaly.sin * anomaly.rate_radps
+            + 2.0 * true_rate * (self.crs_m * cos2 - self.crc_m * sin2);
+        let inclination_rad =
+            self.i0_rad + self.idot_radps * anomaly.since_toe_s + self.cis_rad * sin2 + self.cic_rad * cos2;
+        let inclination_rate = self.idot_radps + 2.0 * true_rate * (self.cis_rad * cos2 - self.cic_rad * sin2);
+
+        let node_rate = self.omega_dot_radps - EARTH_ROTATION_RADPS;
+        // Whole turns are taken from the constant part, so that rounding does not grow with the time of week.
+        let node_at_toe_rad = wrap(self.omega0_rad - EARTH_ROTATION_RADPS * self.toe.tow_s());
+        let node_rad = node_at_toe_rad + node_rate * anomaly.since_toe_s;
+
+        let (sin_u, cos_u) = libm::sincos(argument_rad);
+        let (sin_i, cos_i) = libm::sincos(inclination_rad);
+        let (sin_node, cos_node) = libm::sincos(node_rad);
+        let (x, y) = (radius_m * cos_u, radius_m * sin_u);
+        let x_rate = radius_rate * cos_u - y * argument_rate;
+        let y_rate = radius_rate * sin_u + x * argument_rate;
+        // The plane's y axis projected on the equator, and its rate.
+        let level = y * cos_i;
+        let level_rate = y_rate * cos_i - y * sin_i * inclination_rate;
+        let position_m = Vector3::new(x * cos_node - level * sin_node, x * sin_node + level * cos_node, y * sin_i);
+        let velocity_mps = Vector3::new(
+            x_rate * cos_node - level_rate * sin_node - position_m.y * node_rate,
+            x_rate * sin_node + level_rate * cos_node + position_m.x * node_rate,
+            y_rate * sin_i + y * cos_i * inclination_rate,
+        );
+        Ok(State { position_m, velocity_mps })
     }
 
     /// The satellite clock at GPS time `at` with the relativistic term, without group delay
     /// (IS-GPS-200N, 20.3.3.3.3.1, equation 1).
+    ///
+    /// # Errors
+    /// [`OrbitError`] for elements that describe no orbit.
     pub fn clock(&self, at: Epoch) -> Result<ClockState, OrbitError> {
-        let _ = at;
-        todo!()
+        let anomaly = self.anomaly(at)?;
+        let dt_s = at.since(self.toc);
+        let relativity_s = RELATIVITY_SPSQRTM * self.eccentricity * self.sqrt_a_sqrtm;
+        Ok(ClockState {
+            offset_s: self.af0_s + (self.af1_sps + self.af2_sps2 * dt_s) * dt_s + relativity_s * anomaly.sin,
+            drift: self.af1_sps + 2.0 * self.af2_sps2 * dt_s + relativity_s * anomaly.cos * anomaly.rate_radps,
+        })
     }
 
     /// The clock as a single-frequency L1 C/A user meets it: [`Self::clock`] minus T_GD
     /// (IS-GPS-200N, 20.3.3.3.3.2).
+    ///
+    /// # Errors
+    /// As [`Self::clock`].
     pub fn clock_l1(&self, at: Epoch) -> Result<ClockState, OrbitError> {
         let clock = self.clock(at)?;
         Ok(ClockState { offset_s: clock.offset_s - self.tgd_s, ..clock })
+    }
+
+    /// Curve fit interval: four hours, or what the issue of data says when the fit flag is set
+    /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).
+    pub fn fit_interval_s(&self) -> f64 {
+        let hours = match (self.long_fit, self.iodc) {
+            (false, _) => 4.0,
+            (true, 240..=247) => 8.0,
+            (true, 248..=255 | 496) => 14.0,
+            (true, 497..=503 | 1021..=1023) => 26.0,
+            (true, _) => 6.0,
+        };
+        hours * 3600.0
+    }
+
+    fn check(&self) -> Result<(), OrbitError> {
+        let error = |element, value, expected| Err(OrbitError::Element { sv: self.sv, element, value, expected });
+        if !(self.sqrt_a_sqrtm > 0.0 && self.sqrt_a_sqrtm < 1e5) {
+            return error("sqrt_a", self.sqrt_a_sqrtm, "above 0 and below 1e5");
+        }
+        if !(0.0..1.0).contains(&self.eccentricity) {
+            return error("eccentricity", self.eccentricity, "0 to below 1");
+        }
+        let elements = [
+            ("m0", self.m0_rad),
+            ("delta_n", self.delta_n_radps),
+            ("omega0", self.omega0_rad),
+            ("omega_dot", self.omega_dot_radps),
+            ("omega", self.omega_rad),
+            ("i0", self.i0_rad),
+            ("idot", self.idot_radps),
+            ("cuc", self.cuc_rad),
+            ("cus", self.cus_rad),
+            ("crc", self.crc_m),
+            ("crs", self.crs_m),
+            ("cic", self.cic_rad),
+            ("cis", self.cis_rad),
+            ("af0", self.af0_s),
+            ("af1", self.af1_sps),
+            ("af2", self.af2_sps2),
+            ("tgd", self.tgd_s),
+        ];
+        match elements.into_iter().find(|(_, value)| !value.is_finite()) {
+            Some((element, value)) => error(element, value, "a finite number"),
+            None => Ok(()),
+        }
+    }
+
+    fn anomaly(&self, at: Epoch) -> Result<Anomaly, OrbitError> {
+        self.check()?;
+        let since_toe_s = at.since(self.toe);
+        let semi_major_m = self.sqrt_a_sqrtm * self.sqrt_a_sqrtm;
+        let mean_motion = (GPS_MU_M3PS2 / (semi_major_m * semi_major_m * semi_major_m)).sqrt() + self.delta_n_radps;
+        let anomaly_rad = solve_kepler(self.m0_rad + mean_motion * since_toe_s, self.eccentricity)
+            .ok_or(OrbitError::Kepler { sv: self.sv, eccentricity: self.eccentricity })?;
+        let (sin, cos) = libm::sincos(anomaly_rad);
+        let shrink = 1.0 - self.eccentricity * cos;
+        Ok(Anomaly { since_toe_s, semi_major_m, sin, cos, shrink, rate_radps: mean_motion / shrink })
+    }
+}
+
+/// The angle in [−π, π] with the same direction.
+fn wrap(angle_rad: f64) -> f64 {
+    use std::f64::consts::TAU;
+    angle_rad - TAU * (angle_rad / TAU).round()
+}
+
+/// The eccentric anomaly in [−π, π] of a mean anomaly; `None` when 20 Newton steps leave a residual above 1e-13.
+///
+/// For M in [0, π] the start min(M + e, π) lies above the root, where E − e sin E is convex, so
+/// Newton's steps descend to the root for every eccentricity below one.
+fn solve_kepler(mean_rad: f64, eccentricity: f64) -> Option<f64> {
+    use std::f64::consts::PI;
+    let wrapped = wrap(mean_rad);
+    let target = wrapped.abs();
+    let mut anomaly = (target + eccentricity).min(PI);
+    for _ in 0..KEPLER_STEPS {
+        let (sin, cos) = libm::sincos(anomaly);
+        let residual = anomaly - eccentricity * sin - target;
+        anomaly -= residual / (1.0 - eccentricity * cos);
+        // The step just made squares what is left of the error: 1e-13 before it is round-off after it.
+        if residual.abs() < KEPLER_TOLERANCE_RAD {
+            return Some(if wrapped < 0.0 { -anomaly } else { anomaly });
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example() -> Ephemeris {
+        let toe = Epoch::from_week(1590, 345_600.0);
+        Ephemeris {
+            sv: Sv::gps(2),
+            toe,
+            toc: toe,
+            transmitted: toe,
+            iode: 85,
+            iodc: 85,
+            ura_index: 0,
+            health: 0,
+            l2_codes: 1,
+            l2_p_data_off: false,
+            long_fit: false,
+            aodo: 0,
+            sqrt_a_sqrtm: 5_153.597_391_13,
+            eccentricity: 0.009_606_978_041_12,
+            m0_rad: 1.657_721_674_12,
+            delta_n_radps: 5.255_575_974_42e-9,
+            omega0_rad: -1.274_587_197_64,
+            omega_dot_radps: -8.387_849_526_06e-9,
+            omega_rad: 3.097_399_039_49,
+            i0_rad: 0.939_349_150_611,
+            idot_radps: -2.321_525_263_69e-11,
+            cuc_rad: 2.322_718_501_09e-6,
+            cus_rad: 6.174_668_669_7e-6,
+            crc_m: 249.9375,
+            crs_m: 41.4375,
+            cic_rad: -5.587_935_447_69e-9,
+            cis_rad: 1.676_380_634_31e-7,
+            af0_s: 2.691_089_175_64e-4,
+            af1_sps: 3.183_231_456_21e-12,
+            af2_sps2: 0.0,
+            tgd_s: -1.722_946_751_76e-8,
+        }
+    }
+
+    #[test]
+    fn keplers_equation_is_solved_for_every_eccentricity_below_one() {
+        for eccentricity in [0.0, 0.01, 0.1, 0.7, 0.9, 0.99, 0.999, 0.9999] {
+            for step in -2000..=2000 {
+                let mean = f64::from(step) * 0.004;
+                let anomaly = solve_kepler(mean, eccentricity).expect("converges");
+                let residual = anomaly - eccentricity * libm::sin(anomaly) - mean;
+                let turns = residual / std::f64::consts::TAU;
+                assert!((residual - turns.round() * std::f64::consts::TAU).abs() < 1e-13, "{eccentricity} {mean}");
+            }
+            for tiny in [1e-3, 1e-5, 1e-9, 1e-15] {
+                assert!(solve_kepler(tiny, eccentricity).is_some(), "{eccentricity} {tiny}");
+            }
+        }
+    }
+
+    #[test]
+    fn velocity_and_drift_are_the_derivatives_of_position_and_offset() {
+        for eccentricity in [0.0, 0.0096, 0.1, 0.5] {
+            let set = Ephemeris { eccentricity, ..example() };
+            for minute in -12..=12 {
+                let at = set.toe.plus_s(f64::from(minute) * 600.0 + 0.3);
+                let p = |dt: f64| set.state(at.plus_s(dt)).unwrap().position_m;
+                // Five-point rule: truncation h^4/30 |r^(5)| = 3e-8 m/s at h = 10 s and e = 0.5;
+                // rounding 1.5 * 4e-9 m / 10 s = 6e-10 m/s.
+                let h = 10.0;
+                let numeric = (p(-2.0 * h) - p(2.0 * h) + (p(h) - p(-h)) * 8.0) / (12.0 * h);
+                assert!((numeric - set.state(at).unwrap().velocity_mps).norm() < 5e-6, "{eccentricity} {minute}");
+                let c = |dt: f64| set.clock(at.plus_s(dt)).unwrap().offset_s;
+                // Truncation h²/6 F e √A n³ < 1e-17; rounding 5e-20 / 10 s.
+                assert!(((c(h) - c(-h)) / (2.0 * h) - set.clock(at).unwrap().drift).abs() < 2e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_orbit_is_an_error_that_names_the_element() {
+        let at = example().toe;
+        let cases = [
+            (Ephemeris { sqrt_a_sqrtm: 0.0, ..example() }, "sqrt_a"),
+            (Ephemeris { eccentricity: 1.5, ..example() }, "eccentricity"),
+            (Ephemeris { eccentricity: f64::NAN, ..example() }, "eccentricity"),
+            (Ephemeris { crs_m: f64::INFINITY, ..example() }, "crs"),
+        ];
+        for (set, name) in cases {
+            assert!(matches!(set.state(at), Err(OrbitError::Element { element, .. }) if element == name));
+            assert!(set.clock_l1(at).is_err());
+        }
+    }
+
+    #[test]
+    fn the_week_s_end_leaves_no_step() {
+        // The reference time lies in the next week; the instants on both sides of the rollover.
+        let set = Ephemeris { toe: Epoch::from_week(1591, 0.0), toc: Epoch::from_week(1591, 0.0), ..example() };
+        let before = set.state(Epoch::from_week(1590, 604_799.0).plus_s(1.0 - 1e-9)).unwrap().position_m;
+        let after = set.state(Epoch::from_week(1591, 0.0)).unwrap().position_m;
+        // 4 km/s for a nanosecond is 4e-6 m.
+        assert!((after - before).norm() < 5e-6);
     }
 }
