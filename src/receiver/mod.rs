@@ -7,9 +7,14 @@
 pub mod acquire;
 pub mod correlate;
 pub mod decode;
+pub mod diagnosis;
 pub mod observe;
 pub mod output;
 pub mod position;
+mod run;
+mod session;
 pub mod settings;
 pub mod source;
 pub mod track;
+
+pub use run::{Outcome, ReceiveError, receive};

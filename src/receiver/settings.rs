@@ -1,1 +1,221 @@
-//! stub
+//! The receiver's settings as a TOML file writes them.
+//!
+//! Every key has a default, an unknown key is refused with the nearest right one, every value has a range.
+//! The known keys are those of the defaults themselves, so the list cannot go stale.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+use toml::{Table, Value};
+
+use crate::gnss::signal::SIGNALS;
+use crate::gnss::time::{Epoch, TimeError};
+use crate::receiver::acquire::{AcquireError, AcquisitionSettings};
+use crate::receiver::position::PositionSettings;
+use crate::receiver::track::{TrackingSettings, TrackingSettingsError};
+
+/// All choices of the receiver.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    pub acquisition: AcquisitionSettings,
+    pub tracking: TrackingSettings,
+    pub position: PositionSettings,
+    pub operation: OperationSettings,
+}
+
+/// What the main loop does when.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OperationSettings {
+    /// Milliseconds between observations and fixes.
+    pub measurement_interval_ms: u32,
+    /// Milliseconds between rows of `tracking.csv`: a divisor of the one before.
+    pub tracking_interval_ms: u32,
+    /// Time between searches for satellites that have not been found.
+    pub search_interval_s: f64,
+    /// Time between searches while a satellite is missing that was followed within the last 30 s.
+    pub reacquisition_interval_s: f64,
+    /// In searches after the first, the probability of a false alarm is multiplied by this.
+    pub repeated_false_alarm_share: f64,
+    /// A channel without frame synchronisation after so long is dropped.
+    pub frame_limit_s: f64,
+    /// GPS time near which the 10-bit week is resolved when the recording has no start time.
+    pub week_reference: String,
+}
+
+impl Default for OperationSettings {
+    fn default() -> Self {
+        Self {
+            measurement_interval_ms: 100,
+            tracking_interval_ms: 20,
+            search_interval_s: 15.0,
+            reacquisition_interval_s: 2.0,
+            repeated_false_alarm_share: 0.01,
+            frame_limit_s: 40.0,
+            week_reference: "2024-01-01T00:00:00".to_owned(),
+        }
+    }
+}
+
+/// Why settings are refused. `origin` is the file's name.
+#[derive(Debug, Error)]
+pub enum SettingsError {
+    #[error("{origin}: {source}")]
+    Toml { origin: String, source: Box<toml::de::Error> },
+    #[error("{origin}: unknown key '{key}': expected {expected}")]
+    UnknownKey { origin: String, key: String, expected: String },
+    #[error("{origin}: {key} = {value}: expected {expected}")]
+    Range { origin: String, key: &'static str, value: String, expected: String },
+    #[error("{origin}: {source}")]
+    Acquisition { origin: String, source: AcquireError },
+    #[error("{origin}: {source}")]
+    Tracking { origin: String, source: TrackingSettingsError },
+    #[error("{origin}: operation.week_reference: {source}")]
+    Week { origin: String, source: TimeError },
+}
+
+impl Settings {
+    /// Reads a TOML text; `origin` names it in errors.
+    ///
+    /// # Errors
+    /// Text that is no TOML, an unknown key, a value of the wrong type or out of its range.
+    pub fn parse(text: &str, origin: &str) -> Result<Self, SettingsError> {
+        let table = text
+            .parse::<Table>()
+            .map_err(|source| SettingsError::Toml { origin: origin.to_owned(), source: Box::new(source) })?;
+        Self::from_table(table, origin)
+    }
+
+    /// Reads a TOML table.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub fn from_table(table: Table, origin: &str) -> Result<Self, SettingsError> {
+        let toml = |source| SettingsError::Toml { origin: origin.to_owned(), source: Box::new(source) };
+        let known = Table::try_from(Self::default()).unwrap_or_default();
+        check_keys(&table, &known, "", origin)?;
+        let settings: Self = table.try_into().map_err(toml)?;
+        settings.validate(origin)?;
+        Ok(settings)
+    }
+
+    /// Checks every value's range.
+    ///
+    /// # Errors
+    /// The first value out of its range.
+    pub fn validate(&self, origin: &str) -> Result<(), SettingsError> {
+        self.acquisition
+            .validate()
+            .map_err(|source| SettingsError::Acquisition { origin: origin.to_owned(), source })?;
+        for component in SIGNALS.iter().filter_map(|signal| signal.components.first()) {
+            self.tracking
+                .validate(component.period_s())
+                .map_err(|source| SettingsError::Tracking { origin: origin.to_owned(), source })?;
+        }
+        let (position, operation) = (&self.position, &self.operation);
+        #[rustfmt::skip]
+        let ranges = [
+            ("position.mask_deg", position.mask_deg, 0.0, 90.0),
+            ("position.smoothing_s", position.smoothing_s, 0.0, 3600.0),
+            ("position.false_alarm", position.false_alarm, 1e-12, 0.5),
+            ("position.model_sigma_m", position.model_sigma_m, 1e-3, 100.0),
+            ("position.ionosphere_wait_s", position.ionosphere_wait_s, 0.0, 1500.0),
+            ("operation.measurement_interval_ms", f64::from(operation.measurement_interval_ms), 10.0, 60_000.0),
+            ("operation.tracking_interval_ms", f64::from(operation.tracking_interval_ms), 1.0, f64::from(operation.measurement_interval_ms)),
+            ("operation.search_interval_s", operation.search_interval_s, 0.1, 86_400.0),
+            ("operation.reacquisition_interval_s", operation.reacquisition_interval_s, 0.1, 86_400.0),
+            ("operation.repeated_false_alarm_share", operation.repeated_false_alarm_share, 1e-6, 1.0),
+            ("operation.frame_limit_s", operation.frame_limit_s, 12.0, 86_400.0),
+        ];
+        for (key, value, low, high) in ranges {
+            if !(low..=high).contains(&value) {
+                let expected = format!("{low} to {high}");
+                return Err(SettingsError::Range {
+                    origin: origin.to_owned(),
+                    key,
+                    value: value.to_string(),
+                    expected,
+                });
+            }
+        }
+        if !operation.measurement_interval_ms.is_multiple_of(operation.tracking_interval_ms) {
+            return Err(SettingsError::Range {
+                origin: origin.to_owned(),
+                key: "operation.tracking_interval_ms",
+                value: operation.tracking_interval_ms.to_string(),
+                expected: format!("a divisor of measurement_interval_ms, {}", operation.measurement_interval_ms),
+            });
+        }
+        self.week_reference().map_err(|source| SettingsError::Week { origin: origin.to_owned(), source })?;
+        Ok(())
+    }
+
+    /// The time near which weeks are resolved without a start time.
+    ///
+    /// # Errors
+    /// A text that is no time.
+    pub fn week_reference(&self) -> Result<Epoch, TimeError> {
+        Epoch::parse(&self.operation.week_reference)
+    }
+}
+
+/// Refuses the first key of `table` that `known` does not have, by walking both.
+fn check_keys(table: &Table, known: &Table, path: &str, origin: &str) -> Result<(), SettingsError> {
+    for (key, value) in table {
+        let whole = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+        match (known.get(key), value) {
+            (None, _) => {
+                let nearest = known.keys().max_by(|a, b| {
+                    strsim::jaro_winkler(a, key).total_cmp(&strsim::jaro_winkler(b, key)).then_with(|| b.cmp(a))
+                });
+                let expected = match nearest {
+                    Some(near) if strsim::jaro_winkler(near, key) > 0.7 => format!("perhaps '{near}'"),
+                    _ => format!("one of {}", known.keys().cloned().collect::<Vec<_>>().join(", ")),
+                };
+                return Err(SettingsError::UnknownKey { origin: origin.to_owned(), key: whole, expected });
+            }
+            (Some(Value::Table(inner)), Value::Table(given)) => check_keys(given, inner, &whole, origin)?,
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_written_is_the_default_and_defaults_are_valid() {
+        assert_eq!(Settings::parse("", "x").unwrap(), Settings::default());
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_with_the_nearest_right_one() {
+        for (text, key, near) in [
+            ("[tracking]\npll_bandwith_hz = 15.0", "tracking.pll_bandwith_hz", "pll_bandwidth_hz"),
+            ("[positon]", "positon", "position"),
+            ("[position]\nsmoothing = 3.0", "position.smoothing", "smoothing_s"),
+        ] {
+            let error = Settings::parse(text, "rx.toml").unwrap_err().to_string();
+            assert!(error.contains("rx.toml") && error.contains(key) && error.contains(near), "{error}");
+        }
+    }
+
+    #[test]
+    fn every_number_out_of_its_range_is_refused_by_name() {
+        // What no key can be: not a number. Walks all keys of the defaults, so that none is forgotten.
+        for (section, keys) in Table::try_from(Settings::default()).unwrap() {
+            for (key, value) in keys.as_table().unwrap() {
+                let bad = match value {
+                    Value::Float(_) => "nan",
+                    Value::Integer(_) => "4294967295",
+                    Value::String(_) => "'?'",
+                    _ => "7",
+                };
+                let error = Settings::parse(&format!("[{section}]\n{key} = {bad}"), "rx.toml").unwrap_err().to_string();
+                assert!(error.contains(key.as_str()), "{section}.{key}: {error}");
+            }
+        }
+    }
+}

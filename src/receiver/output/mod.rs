@@ -1,1 +1,227 @@
-//! stub
+//! What a receiver writes: one CSV file a kind of record, and `receiver.json` with what it was told.
+//!
+//! Rows go out as they come, so memory stays flat. Headers are written at once: a file without rows says that there were
+//! none, a missing file that nothing ran.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::gnss::record::{AcquisitionRow, EventRow, Fix, NavigationRow, Observation, TrackingRow};
+use crate::receiver::ReceiveError;
+
+/// One CSV file.
+struct Sheet {
+    path: PathBuf,
+    writer: csv::Writer<BufWriter<File>>,
+}
+
+impl Sheet {
+    fn create(directory: &Path, name: &str, header: &[&str]) -> Result<Self, ReceiveError> {
+        let path = directory.join(name);
+        let file = File::create(&path).map_err(|error| ReceiveError::output(&path, error))?;
+        let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(BufWriter::new(file));
+        writer.write_record(header).map_err(|error| ReceiveError::output(&path, error.into()))?;
+        Ok(Self { path, writer })
+    }
+
+    fn write<T: Serialize>(&mut self, row: &T) -> Result<(), ReceiveError> {
+        self.writer.serialize(row).map_err(|error| ReceiveError::output(&self.path, error.into()))
+    }
+
+    fn flush(&mut self) -> Result<(), ReceiveError> {
+        self.writer.flush().map_err(|error| ReceiveError::output(&self.path, error))
+    }
+}
+
+/// All files of one reception.
+pub struct Output {
+    directory: PathBuf,
+    observations: Sheet,
+    fixes: Sheet,
+    acquisition: Sheet,
+    tracking: Sheet,
+    navigation: Sheet,
+    events: Sheet,
+    /// Parameters written so far: those of one issue are written once.
+    parameters: BTreeSet<NavigationRow>,
+}
+
+const OBSERVATIONS: [&str; 10] = [
+    "sample",
+    "sv",
+    "signal",
+    "sent_s",
+    "sent_fraction_s",
+    "pseudorange_m",
+    "carrier_cycles",
+    "doppler_hz",
+    "cn0_dbhz",
+    "locked_s",
+];
+const FIXES: [&str; 24] = [
+    "sample",
+    "gps_s",
+    "gps_fraction_s",
+    "x_m",
+    "y_m",
+    "z_m",
+    "vx_mps",
+    "vy_mps",
+    "vz_mps",
+    "clock_bias_s",
+    "clock_drift",
+    "sigma_east_m",
+    "sigma_north_m",
+    "sigma_up_m",
+    "sigma_clock_m",
+    "gdop",
+    "pdop",
+    "hdop",
+    "vdop",
+    "tdop",
+    "satellites",
+    "chi_square",
+    "excluded",
+    "ionosphere",
+];
+const ACQUISITION: [&str; 9] =
+    ["sample", "sv", "signal", "acquired", "statistic", "threshold", "doppler_hz", "code_phase_chips", "cn0_dbhz"];
+const TRACKING: [&str; 11] = [
+    "sample",
+    "sv",
+    "signal",
+    "prompt_i",
+    "prompt_q",
+    "dll_discriminator_chips",
+    "pll_discriminator_cycles",
+    "fll_discriminator_hz",
+    "cn0_dbhz",
+    "phase_lock",
+    "integration_s",
+];
+const NAVIGATION: [&str; 4] = ["sv", "issue", "parameter", "raw"];
+const EVENTS: [&str; 4] = ["sample", "sv", "signal", "event"];
+
+impl Output {
+    /// Creates the directory, if it is not there, and the files in it.
+    ///
+    /// # Errors
+    /// [`ReceiveError::Output`] with the path that cannot be made.
+    pub fn create(directory: &Path) -> Result<Self, ReceiveError> {
+        fs::create_dir_all(directory).map_err(|error| ReceiveError::output(directory, error))?;
+        Ok(Self {
+            directory: directory.to_owned(),
+            observations: Sheet::create(directory, "observations.csv", &OBSERVATIONS)?,
+            fixes: Sheet::create(directory, "fixes.csv", &FIXES)?,
+            acquisition: Sheet::create(directory, "acquisition.csv", &ACQUISITION)?,
+            tracking: Sheet::create(directory, "tracking.csv", &TRACKING)?,
+            navigation: Sheet::create(directory, "navigation.csv", &NAVIGATION)?,
+            events: Sheet::create(directory, "events.csv", &EVENTS)?,
+            parameters: BTreeSet::new(),
+        })
+    }
+
+    /// Writes an observation.
+    pub fn observation(&mut self, row: &Observation) -> Result<(), ReceiveError> {
+        self.observations.write(row)
+    }
+
+    /// Writes a fix.
+    pub fn fix(&mut self, row: &Fix) -> Result<(), ReceiveError> {
+        self.fixes.write(row)
+    }
+
+    /// Writes the outcome of a search.
+    pub fn acquisition(&mut self, row: &AcquisitionRow) -> Result<(), ReceiveError> {
+        self.acquisition.write(row)
+    }
+
+    /// Writes the state of a loop.
+    pub fn tracking(&mut self, row: &TrackingRow) -> Result<(), ReceiveError> {
+        self.tracking.write(row)
+    }
+
+    /// Writes an event.
+    pub fn event(&mut self, row: &EventRow) -> Result<(), ReceiveError> {
+        self.events.write(row)
+    }
+
+    /// Writes decoded parameters, each but once.
+    pub fn navigation(&mut self, rows: &[NavigationRow]) -> Result<(), ReceiveError> {
+        for row in rows {
+            if self.parameters.insert(row.clone()) {
+                self.navigation.write(row)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what is buffered, and `receiver.json`.
+    pub fn finish(&mut self, summary: &serde_json::Value) -> Result<(), ReceiveError> {
+        for sheet in [
+            &mut self.observations,
+            &mut self.fixes,
+            &mut self.acquisition,
+            &mut self.tracking,
+            &mut self.navigation,
+            &mut self.events,
+        ] {
+            sheet.flush()?;
+        }
+        let path = self.directory.join("receiver.json");
+        let text = serde_json::to_string_pretty(summary).unwrap_or_default() + "\n";
+        fs::write(&path, text).map_err(|error| ReceiveError::output(&path, error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::record::Event;
+    use crate::gnss::satellite::Sv;
+
+    /// A row written under the header that serde would have written.
+    fn header<T: Serialize>(row: &T) -> String {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.serialize(row).unwrap();
+        let text = String::from_utf8(writer.into_inner().unwrap()).unwrap();
+        text.lines().next().unwrap().to_owned()
+    }
+
+    #[test]
+    fn headers_are_the_names_of_the_records_fields() {
+        let sv = Sv::gps(3);
+        let zero = |n: usize| vec!["0"; n].join(",");
+        let observation: Observation = from_csv(&OBSERVATIONS, &format!("0,G03,{},{}", L1_CA.name, zero(7)));
+        assert_eq!(header(&observation), OBSERVATIONS.join(","));
+        let fix: Fix = from_csv(&FIXES, &format!("{},,true", zero(22)));
+        assert_eq!(header(&fix), FIXES.join(","));
+        let row: AcquisitionRow = from_csv(&ACQUISITION, &format!("0,G03,{},true,{}", L1_CA.name, zero(5)));
+        assert_eq!(header(&row), ACQUISITION.join(","));
+        let row: TrackingRow = from_csv(&TRACKING, &format!("0,G03,{},{}", L1_CA.name, zero(8)));
+        assert_eq!(header(&row), TRACKING.join(","));
+        let row = NavigationRow { sv, issue: 1, parameter: "x".into(), raw: 0 };
+        assert_eq!(header(&row), NAVIGATION.join(","));
+        let row = EventRow { sample: 0, sv, signal: &L1_CA, event: Event::Acquired };
+        assert_eq!(header(&row), EVENTS.join(","));
+    }
+
+    fn from_csv<T: serde::de::DeserializeOwned>(names: &[&str], row: &str) -> T {
+        let text = format!("{}\n{row}\n", names.join(","));
+        csv::Reader::from_reader(text.as_bytes()).deserialize().next().unwrap().unwrap()
+    }
+
+    #[test]
+    fn what_cannot_be_made_is_an_error_with_its_path() {
+        let place = tempfile::tempdir().unwrap();
+        let file = place.path().join("taken");
+        fs::write(&file, "x").unwrap();
+        let error = Output::create(&file.join("rx")).err().unwrap().to_string();
+        assert!(error.contains("taken"), "{error}");
+    }
+}

@@ -1,1 +1,329 @@
-//! stub
+//! Place, velocity and time from observations and decoded ephemerides.
+//!
+//! A [`Solver`] smooths code with carrier ([`smooth`]), finds where satellites were, corrects the atmosphere by the decoded
+//! ionosphere and its own [`troposphere`], solves ([`least_squares`]) and tests the residuals, leaving out satellites
+//! that contradict the others. Limits: one clock for all signals; one contradicting satellite at a time is searched for.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use thiserror::Error;
+
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::record::{Fix, Observation};
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::{Epoch, Rate, SampleClock};
+
+pub mod least_squares;
+pub mod smooth;
+#[cfg(test)]
+mod tests;
+pub mod troposphere;
+
+use least_squares::{Corrections, Range, Solution, UNKNOWNS};
+use smooth::Smoother;
+
+/// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
+const HALF_FIT_S: f64 = 7200.0;
+const HALF_LONG_FIT_S: f64 = 10_800.0;
+/// A set is used a little beyond its interval, until the next one is decoded.
+const FIT_GRACE_S: f64 = 600.0;
+
+/// Choices of the position solution.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PositionSettings {
+    /// Satellites below this elevation are left out once a position is known.
+    pub mask_deg: f64,
+    /// Window of carrier smoothing; 0 for none.
+    pub smoothing_s: f64,
+    /// Probability that the residual test raises a false alarm.
+    pub false_alarm: f64,
+    /// Standard deviation of the models at the zenith, for weights; it grows with one over the elevation's sine.
+    pub model_sigma_m: f64,
+    /// Whether ionosphere and troposphere are corrected.
+    pub atmosphere: bool,
+    /// Whether there is no fix until the ionosphere's parameters are decoded.
+    pub require_ionosphere: bool,
+    /// Else the first fix waits for them this long: in the best case they come six seconds after the ephemerides.
+    pub ionosphere_wait_s: f64,
+}
+
+impl Default for PositionSettings {
+    fn default() -> Self {
+        Self {
+            mask_deg: 5.0,
+            smoothing_s: 30.0,
+            false_alarm: 1e-3,
+            model_sigma_m: 0.1,
+            atmosphere: true,
+            require_ionosphere: false,
+            ionosphere_wait_s: 8.0,
+        }
+    }
+}
+
+/// Thermal noise of a code loop, from its settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CodeNoise {
+    pub chip_m: f64,
+    pub spacing_chips: f64,
+    pub bandwidth_hz: f64,
+    pub integration_s: f64,
+}
+
+impl CodeNoise {
+    /// Standard deviation of a non-coherent early-minus-late loop (Kaplan and Hegarty, 2nd ed., equation 5.22).
+    pub fn sigma_m(&self, cn0_hz: f64) -> f64 {
+        let squaring = 1.0 + 2.0 / ((2.0 - self.spacing_chips) * self.integration_s * cn0_hz);
+        self.chip_m * (self.spacing_chips * self.bandwidth_hz / (2.0 * cn0_hz) * squaring).sqrt()
+    }
+}
+
+/// Why there is no position.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum NoFix {
+    #[error("{have} satellites with ephemeris: at least {need} are needed")]
+    TooFew { have: usize, need: usize },
+    #[error("the satellites' directions give no position: condition {condition:.3e}")]
+    Singular { condition: f64 },
+    #[error("the solution does not converge: the step is {step_m} m after {iterations} iterations")]
+    Diverged { iterations: u32, step_m: f64 },
+    #[error(
+        "the ranges contradict each other and no satellite stands out: chi-square {chi_square:.1} above {threshold:.1}"
+    )]
+    Inconsistent { chi_square: f64, threshold: f64 },
+    #[error("the ionosphere's parameters have not been decoded")]
+    AwaitingIonosphere,
+}
+
+/// A fix and what the records do not hold.
+#[derive(Clone, Debug)]
+pub struct Solved {
+    pub fix: Fix,
+    pub used: Vec<Sv>,
+    /// Satellites that the residual test left out, with their distance from the others' solution.
+    pub excluded: Vec<(Sv, f64)>,
+}
+
+/// Solves epoch after epoch.
+#[derive(Clone, Debug)]
+pub struct Solver {
+    settings: PositionSettings,
+    noise: CodeNoise,
+    smoother: Smoother,
+    rate: Rate,
+    last_m: Option<Vector3<f64>>,
+    ready_since: Option<u64>,
+}
+
+impl Solver {
+    /// A solver for loops with such noise.
+    pub fn new(settings: &PositionSettings, noise: CodeNoise, rate: Rate) -> Self {
+        let smoother = Smoother::new(settings.smoothing_s, noise.bandwidth_hz, rate);
+        Self { settings: settings.clone(), noise, smoother, rate, last_m: None, ready_since: None }
+    }
+
+    /// Solves from the observations of one sample.
+    ///
+    /// # Errors
+    /// Why there is no position.
+    pub fn solve(
+        &mut self,
+        sample: u64,
+        clock: SampleClock,
+        observations: &[Observation],
+        ephemerides: &BTreeMap<Sv, Ephemeris>,
+        klobuchar: Option<Klobuchar>,
+    ) -> Result<Solved, NoFix> {
+        let ranges: Vec<Range> = observations
+            .iter()
+            .filter_map(|observation| {
+                let smoothed = self.smoother.smooth(observation);
+                let cn0_hz = libm::pow(10.0, observation.cn0_dbhz / 10.0);
+                let noise_m = self.noise.sigma_m(cn0_hz) * smoothed.variance_ratio.sqrt();
+                range(observation, ephemerides.get(&observation.sv)?, smoothed.pseudorange_m, noise_m, cn0_hz)
+            })
+            .collect();
+        if ranges.len() < UNKNOWNS {
+            return Err(NoFix::TooFew { have: ranges.len(), need: UNKNOWNS });
+        }
+        self.await_ionosphere(sample, klobuchar)?;
+        let corrections = Corrections {
+            ionosphere: klobuchar,
+            atmosphere: self.settings.atmosphere,
+            model_sigma_m: self.settings.model_sigma_m,
+        };
+        let start_m = self.last_m.unwrap_or_else(Vector3::zeros);
+        let first = least_squares::position(&ranges, start_m, &corrections);
+        // A stale estimate may be too far away for its atmosphere.
+        let first = match (first, self.last_m) {
+            (Err(NoFix::Diverged { .. }), Some(_)) => least_squares::position(&ranges, Vector3::zeros(), &corrections)?,
+            (other, _) => other?,
+        };
+        let mask_rad = self.settings.mask_deg.to_radians();
+        let visible: Vec<Range> = ranges
+            .into_iter()
+            .zip(&first.elevations_rad)
+            .filter(|(_, elevation_rad)| **elevation_rad >= mask_rad)
+            .map(|(range, _)| range)
+            .collect();
+        let (kept, solution, excluded) =
+            consistent(visible, first.position_m, &corrections, self.settings.false_alarm)?;
+        let (velocity_mps, drift) = least_squares::velocity(&kept, &solution)?;
+        self.last_m = Some(solution.position_m);
+        let fix = fix(sample, clock, &solution, velocity_mps, drift, kept.len(), &excluded, klobuchar.is_some());
+        Ok(Solved { fix, used: kept.iter().map(|range| range.sv).collect(), excluded })
+    }
+
+    fn await_ionosphere(&mut self, sample: u64, klobuchar: Option<Klobuchar>) -> Result<(), NoFix> {
+        if klobuchar.is_some() || !self.settings.atmosphere {
+            return Ok(());
+        }
+        let since = *self.ready_since.get_or_insert(sample);
+        let waited_s = self.rate.elapsed_s(sample.saturating_sub(since));
+        if self.settings.require_ionosphere || waited_s < self.settings.ionosphere_wait_s {
+            Err(NoFix::AwaitingIonosphere)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// Where the satellite was when it sent what this observation met; `None` when its ephemeris is unhealthy, stale or no orbit.
+fn range(
+    observation: &Observation,
+    ephemeris: &Ephemeris,
+    pseudorange_m: f64,
+    noise_m: f64,
+    cn0_hz: f64,
+) -> Option<Range> {
+    let sent = observation.sent();
+    let half_s = FIT_GRACE_S + if ephemeris.long_fit { HALF_LONG_FIT_S } else { HALF_FIT_S };
+    if ephemeris.health != 0 || sent.since(ephemeris.toe).abs() > half_s {
+        return None;
+    }
+    // The clock's argument is GPS time; one correction leaves drift × offset², far below a picosecond.
+    let rough = ephemeris.clock_l1(sent).ok()?;
+    let emitted = sent.plus_s(-rough.offset_s);
+    let clock = ephemeris.clock_l1(emitted).ok()?;
+    let emitted = sent.plus_s(-clock.offset_s);
+    Some(Range {
+        sv: observation.sv,
+        satellite: ephemeris.state(emitted).ok()?,
+        clock,
+        emitted,
+        pseudorange_m,
+        doppler_hz: observation.doppler_hz,
+        carrier_hz: observation.signal.carrier_hz,
+        noise_m,
+        cn0_hz,
+    })
+}
+
+/// The value that chi-square with so many degrees of freedom exceeds with the probability `false_alarm`.
+pub fn chi_square_threshold(freedom: usize, false_alarm: f64) -> f64 {
+    ChiSquared::new(freedom as f64).map_or(f64::INFINITY, |law| law.inverse_cdf(1.0 - false_alarm))
+}
+
+/// Solves, and leaves out one satellite after another until the residuals fit.
+///
+/// # Errors
+/// As [`least_squares::position`], and [`NoFix::Inconsistent`] when a fault shows but cannot be located.
+pub fn consistent(
+    mut ranges: Vec<Range>,
+    start_m: Vector3<f64>,
+    corrections: &Corrections,
+    false_alarm: f64,
+) -> Result<(Vec<Range>, Solution, Vec<(Sv, f64)>), NoFix> {
+    let mut excluded: Vec<(Sv, f64)> = Vec::new();
+    let mut solution = least_squares::position(&ranges, start_m, corrections)?;
+    loop {
+        let freedom = ranges.len() - UNKNOWNS;
+        let threshold = chi_square_threshold(freedom.max(1), false_alarm);
+        if freedom == 0 {
+            // Four ranges always fit. After an exclusion that proves nothing.
+            let chi_square = solution.chi_square;
+            return if excluded.is_empty() {
+                Ok((ranges, solution, excluded))
+            } else {
+                Err(NoFix::Inconsistent { chi_square, threshold })
+            };
+        }
+        if solution.chi_square <= threshold {
+            return Ok((ranges, solution, excluded));
+        }
+        if freedom == 1 {
+            return Err(NoFix::Inconsistent { chi_square: solution.chi_square, threshold });
+        }
+        let mut best: Option<(usize, Solution)> = None;
+        for index in 0..ranges.len() {
+            let mut others = ranges.clone();
+            others.remove(index);
+            if let Ok(without) = least_squares::position(&others, solution.position_m, corrections)
+                && best.as_ref().is_none_or(|(_, found)| without.chi_square < found.chi_square)
+            {
+                best = Some((index, without));
+            }
+        }
+        let Some((index, without)) = best else {
+            return Err(NoFix::Inconsistent { chi_square: solution.chi_square, threshold });
+        };
+        let out = ranges.remove(index);
+        let sight_m = solution.residuals_m.get(index).copied().unwrap_or(0.0);
+        excluded.push((out.sv, sight_m));
+        solution = without;
+    }
+}
+
+#[expect(clippy::too_many_arguments, reason = "a record with as many sources")]
+fn fix(
+    sample: u64,
+    clock: SampleClock,
+    solution: &Solution,
+    velocity_mps: Vector3<f64>,
+    drift: f64,
+    satellites: usize,
+    excluded: &[(Sv, f64)],
+    ionosphere: bool,
+) -> Fix {
+    let bias_s = solution.clock_m / SPEED_OF_LIGHT_MPS;
+    let time: Epoch = clock.epoch(sample).plus_s(-bias_s);
+    let axes = Geodetic::from_ecef(&solution.position_m).ecef_to_enu();
+    let block = |m: &nalgebra::Matrix4<f64>| -> Matrix3<f64> { m.fixed_view::<3, 3>(0, 0).into_owned() };
+    let covariance = axes * block(&solution.covariance) * axes.transpose();
+    let dilution = axes * block(&solution.dilution) * axes.transpose();
+    let (de, dn, du) = (dilution[(0, 0)], dilution[(1, 1)], dilution[(2, 2)]);
+    let dt = solution.dilution[(3, 3)];
+    let names: Vec<String> = excluded.iter().map(|(sv, _)| sv.to_string()).collect();
+    Fix {
+        sample,
+        gps_s: time.seconds(),
+        gps_fraction_s: time.fraction(),
+        x_m: solution.position_m.x,
+        y_m: solution.position_m.y,
+        z_m: solution.position_m.z,
+        vx_mps: velocity_mps.x,
+        vy_mps: velocity_mps.y,
+        vz_mps: velocity_mps.z,
+        clock_bias_s: bias_s,
+        clock_drift: drift,
+        sigma_east_m: covariance[(0, 0)].sqrt(),
+        sigma_north_m: covariance[(1, 1)].sqrt(),
+        sigma_up_m: covariance[(2, 2)].sqrt(),
+        sigma_clock_m: solution.covariance[(3, 3)].sqrt(),
+        gdop: (de + dn + du + dt).sqrt(),
+        pdop: (de + dn + du).sqrt(),
+        hdop: (de + dn).sqrt(),
+        vdop: du.sqrt(),
+        tdop: dt.sqrt(),
+        satellites: satellites as u32,
+        chi_square: solution.chi_square,
+        excluded: names.join(" "),
+        ionosphere,
+    }
+}
