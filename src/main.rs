@@ -1,1 +1,5 @@
-fn main() {}
+//! The program; see `gnss_twin::cli`.
+
+fn main() -> std::process::ExitCode {
+    gnss_twin::cli::main()
+}

@@ -1,1 +1,58 @@
-//! stub
+//! The command line: arguments as written, one file a subcommand, and what they share.
+//!
+//! Everything printed goes through writers that return errors, so a full disk or a closed pipe
+//! ends in an exit code and never in a panic. Exit codes are listed in [`error`].
+
+pub mod analyze;
+pub mod args;
+pub mod error;
+pub mod generate;
+pub mod interrupt;
+pub mod pipe;
+pub mod plan;
+pub mod progress;
+pub mod receive;
+pub mod run;
+pub mod scenario;
+pub mod speed;
+pub mod staging;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Arguments, Command};
+use error::CliError;
+
+/// Runs the program with the process's arguments.
+pub fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(usage) => {
+            let code = usage.exit_code();
+            return match usage.print() {
+                Ok(()) => ExitCode::from(code as u8),
+                Err(io) => CliError::output("standard output", &io).exit_code(),
+            };
+        }
+    };
+    match execute(arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            error.print();
+            error.exit_code()
+        }
+    }
+}
+
+fn execute(arguments: Arguments) -> Result<(), CliError> {
+    interrupt::install()?;
+    let command = arguments.command.unwrap_or(Command::Run(args::Run::default()));
+    match command {
+        Command::Run(arguments) => run::execute(&arguments),
+        Command::Generate(arguments) => generate::execute(&arguments),
+        Command::Receive(arguments) => receive::execute(&arguments),
+        Command::Analyze(arguments) => analyze::execute(&arguments),
+        Command::Plan(arguments) => plan::execute(&arguments),
+    }
+}

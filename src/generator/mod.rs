@@ -7,11 +7,16 @@
 pub mod catalogue;
 pub mod clock;
 pub mod effect;
+pub mod knots;
+pub mod plan;
 pub mod ray;
 pub mod scenario;
 pub mod scene;
 pub mod sky;
 pub mod stage;
+pub mod stream;
 pub mod synth;
 pub mod truth;
 pub mod vehicle;
+
+pub use stream::{GenerateError, Generated, generate};

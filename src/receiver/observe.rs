@@ -153,3 +153,67 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+
+    fn reading(prn: u8, of_week: (i64, f64)) -> Reading {
+        let measurement = Measurement {
+            sample: 0,
+            code_periods: 0,
+            code_fraction: 0.0,
+            carrier_cycles: 0.0,
+            half_cycle_known: true,
+            doppler_hz: 0.0,
+            cn0_dbhz: 45.0,
+            locked_s: 1.0,
+            locked: true,
+        };
+        Reading { sv: Sv::gps(prn), signal: &L1_CA, measurement, sent_of_week: of_week }
+    }
+
+    fn rate() -> Rate {
+        Rate::from_hz(2.6e6).unwrap()
+    }
+
+    #[test]
+    fn a_stated_start_is_believed_within_a_second_and_not_beyond() {
+        let start = Epoch::from_week(1590, 1000.0);
+        let sent = [reading(1, (999, 0.93)), reading(2, (999, 0.925))];
+        let mut near = Timebase::new(rate(), Some(start));
+        assert_eq!(near.observe(0, &sent).len(), 2);
+        assert_eq!(near.clock().unwrap().start, start);
+        let mut far = Timebase::new(rate(), Some(start.plus_s(-5.0)));
+        assert!(far.observe(0, &sent).is_empty());
+        far.hear(Epoch::from_week(1590, 960.0));
+        // 70 ms to the nearest satellite, in whole milliseconds.
+        assert_eq!(far.observe(0, &sent).len(), 2);
+        assert!(far.clock().unwrap().start.since(start).abs() < 1e-15);
+    }
+
+    #[test]
+    fn pseudoranges_are_continuous_across_the_end_of_the_week() {
+        let start = Epoch::from_week(1590, 604_799.5);
+        let mut clock = Timebase::new(rate(), Some(start));
+        let before = clock.observe(0, &[reading(1, (604_799, 0.425))]);
+        // Half a second and 20 ms later: one second into the new week less what the travel takes.
+        let after = clock.observe(1_352_000, &[reading(1, (604_799, 0.945))]);
+        let later = clock.observe(1_560_000, &[reading(1, (0, 0.025))]);
+        for observed in [&before, &after, &later] {
+            // A tick of the last place of a half second is 1e-16 s, that is 3e-8 m.
+            assert!((observed[0].observation.pseudorange_m - 0.075 * SPEED_OF_LIGHT_MPS).abs() < 1e-6);
+        }
+        assert_eq!(later[0].observation.sent().week(), 1591);
+    }
+
+    #[test]
+    fn a_satellite_out_of_line_with_the_others_is_left_out() {
+        let mut clock = Timebase::new(rate(), Some(Epoch::from_week(1590, 1000.0)));
+        let sent =
+            [reading(1, (999, 0.93)), reading(2, (999, 0.925)), reading(3, (999, 0.92)), reading(4, (999, 0.86))];
+        let used: Vec<u8> = clock.observe(0, &sent).iter().map(|one| one.observation.sv.number).collect();
+        assert_eq!(used, vec![1, 2, 3]);
+    }
+}

@@ -6,7 +6,6 @@
 
 use std::fmt;
 use std::io::Read;
-use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use thiserror::Error;
@@ -16,7 +15,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{SIGNALS, Signal};
 use crate::receiver::acquire::{self, AcquireError};
 use crate::receiver::diagnosis::{Diagnosis, Stage};
-use crate::receiver::output::Output;
+use crate::receiver::output::{Output, OutputError};
 use crate::receiver::session::Session;
 use crate::receiver::settings::{Settings, SettingsError};
 use crate::receiver::source::{Source, SourceError};
@@ -30,14 +29,8 @@ pub enum ReceiveError {
     Acquire(#[from] AcquireError),
     #[error(transparent)]
     Source(#[from] SourceError),
-    #[error("cannot write {path}: {source}", path = path.display())]
-    Output { path: PathBuf, source: std::io::Error },
-}
-
-impl ReceiveError {
-    pub(super) fn output(path: &Path, source: std::io::Error) -> Self {
-        Self::Output { path: path.to_owned(), source }
-    }
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }
 
 /// What a reception came to.

@@ -28,6 +28,9 @@ use crate::receiver::track::{Channel, Report};
 const EAGER_S: f64 = 30.0;
 /// A channel that was dropped for what it said is not followed again so long.
 const REFUSED_S: f64 = 120.0;
+/// A C/A code shows 21 dB down in another's correlator; what is this much weaker than the strongest is not followed when
+/// it was found beside tracked satellites. A search cannot tell it from an echo.
+const ECHO_DB: f64 = 20.0;
 /// Residuals beyond this are no noise: the channel has the wrong time.
 const WRONG_TIME_M: f64 = 10_000.0;
 /// So many fixes in a row have to say so.
@@ -207,9 +210,11 @@ impl Session {
         let all_found = self.candidates.iter().all(|candidate| followed.contains(candidate));
         if !all_found {
             let searcher = if self.searched { &mut self.later_searches } else { &mut self.first_search };
+            let strongest_dbhz = self.tracks.iter().map(|track| track.cn0_dbhz).fold(f64::NEG_INFINITY, f64::max);
             let searched = Block { first: window.first, i: &window.i, q: &window.q };
             let results = searcher.search(&searched, &self.candidates)?;
-            for (row, hit) in results {
+            for (mut row, hit) in results {
+                row.acquired &= hit.is_some_and(|hit| hit.cn0_dbhz > strongest_dbhz - ECHO_DB);
                 let key = (row.signal, row.sv);
                 if followed.contains(&key) || self.refused.contains_key(&key) {
                     continue;
@@ -221,7 +226,7 @@ impl Session {
                 if row.acquired || !self.searched {
                     output.acquisition(&row)?;
                 }
-                let Some(hit) = hit else { continue };
+                let Some(hit) = hit.filter(|hit| hit.cn0_dbhz > strongest_dbhz - ECHO_DB) else { continue };
                 self.acquired.insert(hit.sv);
                 self.lost.remove(&key);
                 self.progress.entry(hit.sv).or_default();

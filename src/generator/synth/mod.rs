@@ -1,1 +1,108 @@
-//! stub
+//! Rays and waveforms become samples: spreading codes, chip edges, carrier rotation.
+//!
+//! A [`Run`] is up to 4096 samples of one ray with constant carrier and code steps, both phases
+//! as fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
+//! [`reference`] evaluates each sample in `f64`; [`lanes`] is the fast kernel, plain lane-array
+//! code that [`isa`] compiles for each instruction set with the same bits on all.
+//! Limits: 15 code steps a sample; lanes fall back to a wave buffer above one step a sample.
+
+pub mod band;
+pub mod chips;
+pub mod isa;
+pub mod lanes;
+pub mod reference;
+pub mod transmitter;
+
+use band::Filter;
+
+/// Longest run; the single-precision phasor of the fast kernel is re-anchored at least this often.
+pub const RUN_SAMPLES: usize = 4096;
+
+/// Fractional bits of a code phase: Q16.48 code steps.
+pub const CODE_BITS: u32 = 48;
+
+/// One code step as a Q16.48 phase.
+pub const CODE_ONE: u64 = 1 << CODE_BITS;
+
+/// A stretch of one ray on which carrier and code advance by constant steps.
+#[derive(Clone, Copy, Debug)]
+pub struct Run<'a> {
+    /// Signs of the code steps in order, data applied, most significant bit first; a set bit is −1.
+    /// At least [`chips::MARGIN_STEPS`] steps stand before `position` and after the last sample.
+    pub bits: &'a [u64],
+    /// Code position of sample 0 in `bits`, Q16.48 steps.
+    pub position: u64,
+    /// Code steps a sample, Q16.48.
+    pub step: u64,
+    /// Carrier phase of sample 0, in 2^-64 turn, and its advance a sample.
+    pub turns: u64,
+    pub turns_step: u64,
+    /// Peak amplitude of the carrier, in LSB.
+    pub amplitude: f64,
+}
+
+/// How a code edge falls between samples, with what it needs at hand.
+#[derive(Clone, Copy, Debug)]
+pub enum Edge<'a> {
+    Nearest,
+    Area,
+    BandLimited(&'a Filter),
+}
+
+/// How samples are made: the edge model and the instruction set.
+#[derive(Clone, Copy, Debug)]
+pub struct Kernel<'a> {
+    pub edge: Edge<'a>,
+    pub level: isa::Level,
+}
+
+impl Edge<'_> {
+    /// Factor that brings the mean power of the waveform to one, for a code of autocorrelation
+    /// `correlation` (by whole steps, 1 at lag 0) at `step` code steps a sample.
+    pub fn gain(&self, correlation: &[f64], step: f64) -> f64 {
+        match self {
+            Edge::Nearest => 1.0,
+            Edge::Area => 1.0 / area_power(correlation, step).sqrt(),
+            Edge::BandLimited(filter) => 1.0 / filter.power(correlation, step).sqrt(),
+        }
+    }
+}
+
+/// Mean power of a ±1 waveform averaged over an interval of `d` code steps.
+///
+/// `(2/d²) ∫₀^d (d − u) ρ(u) du` with ρ linear between the values of `correlation`. For `d` ≤ 1 this
+/// is `1 − (d/3)(1 − ρ(1))`, that is `1 − d/3` for a random code, whose neighbours differ half the time.
+fn area_power(correlation: &[f64], d: f64) -> f64 {
+    let rho = |lag: usize| correlation.get(lag).copied().unwrap_or(0.0);
+    let mut sum = 0.0;
+    let mut lag = 0;
+    while (lag as f64) < d {
+        let a = lag as f64;
+        let b = (a + 1.0).min(d);
+        let at = |u: f64| (d - u) * (rho(lag) + (u - a) * (rho(lag + 1) - rho(lag)));
+        // Simpson's rule is exact for this quadratic.
+        sum += (b - a) / 6.0 * (at(a) + 4.0 * at(0.5 * (a + b)) + at(b));
+        lag += 1;
+    }
+    2.0 * sum / (d * d)
+}
+
+/// A phase in 2^-64 turn as radians in [−π, π).
+pub(crate) fn radians(turns: u64) -> f64 {
+    turns as i64 as f64 * (std::f64::consts::TAU / 18_446_744_073_709_551_616.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_power_of_area_edges_is_one_minus_a_third_of_the_step() {
+        let random = [1.0];
+        for d in [0.04, 0.4, 1.0] {
+            assert!((area_power(&random, d) - (1.0 - d / 3.0)).abs() < 1e-15);
+        }
+        // For d >= 1 of a random code the integral ends at lag 1: 1/d - 1/(3 d^2).
+        assert!((area_power(&random, 2.5) - (1.0 / 2.5 - 1.0 / (3.0 * 6.25))).abs() < 1e-15);
+    }
+}

@@ -1,12 +1,229 @@
-//! stub
+//! How the antenna moves: one representation for every kind of motion.
+//!
+//! A [`Trajectory`] is a row of knots (time, ECEF position, velocity, acceleration) joined by quintic Hermite
+//! pieces, so position, velocity and acceleration are continuous and each is the exact derivative of the one
+//! before. One knot at rest is a static antenna. Where the acceleration's slope jumps, a break is reported, so
+//! that knots of the signal can be put there. Attitude is not modelled.
+
+pub mod file;
+pub mod ramp;
+pub mod rocket;
+pub mod route;
+pub mod spline;
+
 use nalgebra::Vector3;
 
-pub struct Trajectory;
-
-/// ECEF motion of the antenna at one instant.
+/// Position, velocity and acceleration of the antenna in ECEF.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     pub position_m: Vector3<f64>,
     pub velocity_mps: Vector3<f64>,
     pub acceleration_mps2: Vector3<f64>,
+}
+
+impl Motion {
+    /// At rest on the rotating Earth.
+    pub fn at_rest(position_m: Vector3<f64>) -> Self {
+        Self { position_m, velocity_mps: Vector3::zeros(), acceleration_mps2: Vector3::zeros() }
+    }
+
+    /// `dt_s` later with the acceleration kept.
+    fn extrapolated(&self, dt_s: f64) -> Self {
+        Self {
+            position_m: self.position_m + (self.velocity_mps + self.acceleration_mps2 * (0.5 * dt_s)) * dt_s,
+            velocity_mps: self.velocity_mps + self.acceleration_mps2 * dt_s,
+            acceleration_mps2: self.acceleration_mps2,
+        }
+    }
+}
+
+/// The motion at one instant, true seconds after the scene's start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Knot {
+    pub t_s: f64,
+    pub motion: Motion,
+}
+
+/// Antenna motion over true time since the scene's start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory {
+    /// At least one; times strictly ascending.
+    knots: Vec<Knot>,
+    breaks_s: Vec<f64>,
+    first: Knot,
+}
+
+impl Trajectory {
+    /// An antenna that does not move.
+    pub fn fixed(position_m: Vector3<f64>) -> Self {
+        let first = Knot { t_s: 0.0, motion: Motion::at_rest(position_m) };
+        Self { knots: vec![first], breaks_s: Vec::new(), first }
+    }
+
+    /// Motion through `knots`, whose times must ascend; `None` if they do not, or if there are none.
+    /// `breaks_s` are the times at which acceleration or its slope jumps.
+    pub fn through(knots: Vec<Knot>, mut breaks_s: Vec<f64>) -> Option<Self> {
+        let first = *knots.first()?;
+        let finite = knots.iter().all(|k| k.t_s.is_finite());
+        if !finite || knots.windows(2).any(|pair| matches!(pair, [a, b] if a.t_s >= b.t_s)) {
+            return None;
+        }
+        breaks_s.sort_by(f64::total_cmp);
+        breaks_s.dedup();
+        Some(Self { knots, breaks_s, first })
+    }
+
+    /// The motion `t_s` true seconds after the scene's start. Before the first knot and after the last one the
+    /// acceleration there continues; [`Self::span_s`] says where that is.
+    pub fn at(&self, t_s: f64) -> Motion {
+        let next = self.knots.partition_point(|knot| knot.t_s <= t_s);
+        let left = next.checked_sub(1).and_then(|i| self.knots.get(i)).unwrap_or(&self.first);
+        match self.knots.get(next) {
+            Some(right) if next > 0 => between(left, right, t_s),
+            _ => left.motion.extrapolated(t_s - left.t_s),
+        }
+    }
+
+    /// Times at which the acceleration or its slope jumps, ascending.
+    pub fn breaks_s(&self) -> &[f64] {
+        &self.breaks_s
+    }
+
+    /// The knots themselves.
+    pub fn knots(&self) -> &[Knot] {
+        &self.knots
+    }
+
+    /// Whether the antenna never moves.
+    pub fn is_static(&self) -> bool {
+        self.knots.iter().all(|knot| knot.motion == Motion::at_rest(self.first.motion.position_m))
+    }
+
+    /// First and last instant that the knots cover; for all times where nothing moves at that end.
+    pub fn span_s(&self) -> (f64, f64) {
+        let last = self.knots.last().unwrap_or(&self.first);
+        let rests = |knot: &Knot| knot.motion == Motion::at_rest(knot.motion.position_m);
+        let start = if rests(&self.first) { f64::NEG_INFINITY } else { self.first.t_s };
+        let end = if rests(last) { f64::INFINITY } else { last.t_s };
+        (start, end)
+    }
+
+    /// Largest acceleration, speed and height-independent distance from the first point up to `until_s`, sampled at
+    /// each knot and at nine instants between neighbours.
+    pub fn extremes(&self, until_s: f64) -> Extremes {
+        let mut extremes = Extremes::default();
+        let mut take = |motion: &Motion| {
+            extremes.acceleration_mps2 = extremes.acceleration_mps2.max(motion.acceleration_mps2.norm());
+            extremes.speed_mps = extremes.speed_mps.max(motion.velocity_mps.norm());
+        };
+        for pair in self.knots.windows(2) {
+            let [a, b] = pair else { continue };
+            for k in 0..10 {
+                let t_s = a.t_s + (b.t_s - a.t_s) * f64::from(k) / 10.0;
+                if t_s <= until_s {
+                    take(&between(a, b, t_s));
+                }
+            }
+        }
+        if let Some(last) = self.knots.last().filter(|k| k.t_s <= until_s) {
+            take(&last.motion);
+        }
+        extremes
+    }
+
+    /// Largest acceleration between the knots, in ECEF.
+    pub fn max_acceleration_mps2(&self) -> f64 {
+        self.extremes(f64::INFINITY).acceleration_mps2
+    }
+}
+
+/// The largest values that a motion reaches.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Extremes {
+    pub acceleration_mps2: f64,
+    pub speed_mps: f64,
+}
+
+/// The quintic with the position, velocity and acceleration of both knots, at `t_s`.
+fn between(left: &Knot, right: &Knot, t_s: f64) -> Motion {
+    let h = right.t_s - left.t_s;
+    let (a, b) = (&left.motion, &right.motion);
+    // Departures of the right knot from the left one's parabola, each scaled to metres; differences first, so
+    // that the size of ECEF coordinates costs one rounding only.
+    let gap = (b.position_m - a.position_m) - (a.velocity_mps + a.acceleration_mps2 * (0.5 * h)) * h;
+    let slope = (b.velocity_mps - a.velocity_mps - a.acceleration_mps2 * h) * h;
+    let bend = (b.acceleration_mps2 - a.acceleration_mps2) * (h * h);
+    let third = gap * 10.0 - slope * 4.0 + bend * 0.5;
+    let fourth = gap * -15.0 + slope * 7.0 - bend;
+    let fifth = gap * 6.0 - slope * 3.0 + bend * 0.5;
+    let t = t_s - left.t_s;
+    let x = t / h;
+    Motion {
+        position_m: a.position_m
+            + ((a.velocity_mps + a.acceleration_mps2 * (0.5 * t)) * t
+                + (third + (fourth + fifth * x) * x) * (x * x * x)),
+        velocity_mps: a.velocity_mps
+            + a.acceleration_mps2 * t
+            + (third * 3.0 + (fourth * 4.0 + fifth * (5.0 * x)) * x) * (x * x / h),
+        acceleration_mps2: a.acceleration_mps2
+            + (third * 6.0 + (fourth * 12.0 + fifth * (20.0 * x)) * x) * (x / (h * h)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A polynomial of degree five in each axis, about a place on the Earth.
+    fn quintic(t: f64) -> Motion {
+        let c = [0.0, 30.0, -4.0, 0.7, -0.05, 0.001];
+        let axis = |s: f64| {
+            let p = c.iter().enumerate().map(|(k, c)| s * c * libm::pow(t, k as f64)).sum::<f64>();
+            let v = c.iter().enumerate().skip(1).map(|(k, c)| s * c * k as f64 * libm::pow(t, (k - 1) as f64));
+            let a =
+                c.iter().enumerate().skip(2).map(|(k, c)| s * c * (k * (k - 1)) as f64 * libm::pow(t, (k - 2) as f64));
+            (p, v.sum::<f64>(), a.sum::<f64>())
+        };
+        let (x, y, z) = (axis(1.0), axis(-0.5), axis(2.0));
+        Motion {
+            position_m: Vector3::new(970_000.0 + x.0, 5_600_000.0 + y.0, 2_800_000.0 + z.0),
+            velocity_mps: Vector3::new(x.1, y.1, z.1),
+            acceleration_mps2: Vector3::new(x.2, y.2, z.2),
+        }
+    }
+
+    #[test]
+    fn a_quintic_motion_is_reproduced_exactly() {
+        let knots = [0.0, 1.0, 2.5, 6.0].map(|t_s| Knot { t_s, motion: quintic(t_s) });
+        let trajectory = Trajectory::through(knots.to_vec(), vec![]).unwrap();
+        for k in 0..=600 {
+            let t_s = f64::from(k) * 0.01;
+            let (got, want) = (trajectory.at(t_s), quintic(t_s));
+            // Knots are rounded to 4.7e-10 m; the Hermite weights of position are at most 1, of velocity
+            // 1.9/h, of acceleration 5.8/h² with h ≥ 1 s. Three axes and a few roundings on top.
+            assert!((got.position_m - want.position_m).norm() < 3e-9, "{t_s}");
+            assert!((got.velocity_mps - want.velocity_mps).norm() < 6e-9, "{t_s}");
+            assert!((got.acceleration_mps2 - want.acceleration_mps2).norm() < 2e-8, "{t_s}");
+        }
+    }
+
+    #[test]
+    fn a_static_antenna_has_one_position_and_no_rates_at_any_time() {
+        let place = Vector3::new(1.0, 2.0, 3.0);
+        let trajectory = Trajectory::fixed(place);
+        for t_s in [-5.0, 0.0, 1e9] {
+            assert_eq!(trajectory.at(t_s), Motion::at_rest(place));
+        }
+        assert!(trajectory.breaks_s().is_empty() && trajectory.is_static());
+        assert_eq!(trajectory.span_s(), (f64::NEG_INFINITY, f64::INFINITY));
+        assert_eq!(trajectory.max_acceleration_mps2(), 0.0);
+    }
+
+    #[test]
+    fn knots_that_do_not_ascend_make_no_trajectory() {
+        let knot = |t_s| Knot { t_s, motion: Motion::at_rest(Vector3::zeros()) };
+        assert!(Trajectory::through(vec![], vec![]).is_none());
+        assert!(Trajectory::through(vec![knot(1.0), knot(1.0)], vec![]).is_none());
+        assert!(Trajectory::through(vec![knot(0.0), knot(f64::NAN)], vec![]).is_none());
+    }
 }

@@ -9,9 +9,26 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use thiserror::Error;
 
 use crate::gnss::record::{AcquisitionRow, EventRow, Fix, NavigationRow, Observation, TrackingRow};
-use crate::receiver::ReceiveError;
+
+/// A file that could not be made or written.
+#[derive(Debug, Error)]
+pub enum OutputError {
+    #[error("cannot create {}: {error}", path.display())]
+    Create { path: PathBuf, error: std::io::Error },
+    #[error("cannot write {}: {error}", path.display())]
+    Write { path: PathBuf, error: std::io::Error },
+}
+
+fn create_error(path: &Path, error: std::io::Error) -> OutputError {
+    OutputError::Create { path: path.to_owned(), error }
+}
+
+fn write_error(path: &Path, error: std::io::Error) -> OutputError {
+    OutputError::Write { path: path.to_owned(), error }
+}
 
 /// One CSV file.
 struct Sheet {
@@ -20,20 +37,20 @@ struct Sheet {
 }
 
 impl Sheet {
-    fn create(directory: &Path, name: &str, header: &[&str]) -> Result<Self, ReceiveError> {
+    fn create(directory: &Path, name: &str, header: &[&str]) -> Result<Self, OutputError> {
         let path = directory.join(name);
-        let file = File::create(&path).map_err(|error| ReceiveError::output(&path, error))?;
+        let file = File::create(&path).map_err(|error| create_error(&path, error))?;
         let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(BufWriter::new(file));
-        writer.write_record(header).map_err(|error| ReceiveError::output(&path, error.into()))?;
+        writer.write_record(header).map_err(|error| write_error(&path, error.into()))?;
         Ok(Self { path, writer })
     }
 
-    fn write<T: Serialize>(&mut self, row: &T) -> Result<(), ReceiveError> {
-        self.writer.serialize(row).map_err(|error| ReceiveError::output(&self.path, error.into()))
+    fn write<T: Serialize>(&mut self, row: &T) -> Result<(), OutputError> {
+        self.writer.serialize(row).map_err(|error| write_error(&self.path, error.into()))
     }
 
-    fn flush(&mut self) -> Result<(), ReceiveError> {
-        self.writer.flush().map_err(|error| ReceiveError::output(&self.path, error))
+    fn flush(&mut self) -> Result<(), OutputError> {
+        self.writer.flush().map_err(|error| write_error(&self.path, error))
     }
 }
 
@@ -110,9 +127,9 @@ impl Output {
     /// Creates the directory, if it is not there, and the files in it.
     ///
     /// # Errors
-    /// [`ReceiveError::Output`] with the path that cannot be made.
-    pub fn create(directory: &Path) -> Result<Self, ReceiveError> {
-        fs::create_dir_all(directory).map_err(|error| ReceiveError::output(directory, error))?;
+    /// [`OutputError::Create`] with the path that cannot be made.
+    pub fn create(directory: &Path) -> Result<Self, OutputError> {
+        fs::create_dir_all(directory).map_err(|error| create_error(directory, error))?;
         Ok(Self {
             directory: directory.to_owned(),
             observations: Sheet::create(directory, "observations.csv", &OBSERVATIONS)?,
@@ -126,32 +143,32 @@ impl Output {
     }
 
     /// Writes an observation.
-    pub fn observation(&mut self, row: &Observation) -> Result<(), ReceiveError> {
+    pub fn observation(&mut self, row: &Observation) -> Result<(), OutputError> {
         self.observations.write(row)
     }
 
     /// Writes a fix.
-    pub fn fix(&mut self, row: &Fix) -> Result<(), ReceiveError> {
+    pub fn fix(&mut self, row: &Fix) -> Result<(), OutputError> {
         self.fixes.write(row)
     }
 
     /// Writes the outcome of a search.
-    pub fn acquisition(&mut self, row: &AcquisitionRow) -> Result<(), ReceiveError> {
+    pub fn acquisition(&mut self, row: &AcquisitionRow) -> Result<(), OutputError> {
         self.acquisition.write(row)
     }
 
     /// Writes the state of a loop.
-    pub fn tracking(&mut self, row: &TrackingRow) -> Result<(), ReceiveError> {
+    pub fn tracking(&mut self, row: &TrackingRow) -> Result<(), OutputError> {
         self.tracking.write(row)
     }
 
     /// Writes an event.
-    pub fn event(&mut self, row: &EventRow) -> Result<(), ReceiveError> {
+    pub fn event(&mut self, row: &EventRow) -> Result<(), OutputError> {
         self.events.write(row)
     }
 
     /// Writes decoded parameters, each but once.
-    pub fn navigation(&mut self, rows: &[NavigationRow]) -> Result<(), ReceiveError> {
+    pub fn navigation(&mut self, rows: &[NavigationRow]) -> Result<(), OutputError> {
         for row in rows {
             if self.parameters.insert(row.clone()) {
                 self.navigation.write(row)?;
@@ -161,7 +178,7 @@ impl Output {
     }
 
     /// Writes what is buffered, and `receiver.json`.
-    pub fn finish(&mut self, summary: &serde_json::Value) -> Result<(), ReceiveError> {
+    pub fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
         for sheet in [
             &mut self.observations,
             &mut self.fixes,
@@ -174,7 +191,7 @@ impl Output {
         }
         let path = self.directory.join("receiver.json");
         let text = serde_json::to_string_pretty(summary).unwrap_or_default() + "\n";
-        fs::write(&path, text).map_err(|error| ReceiveError::output(&path, error))
+        fs::write(&path, text).map_err(|error| write_error(&path, error))
     }
 }
 

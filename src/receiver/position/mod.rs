@@ -230,6 +230,9 @@ pub fn chi_square_threshold(freedom: usize, false_alarm: f64) -> f64 {
     ChiSquared::new(freedom as f64).map_or(f64::INFINITY, |law| law.inverse_cdf(1.0 - false_alarm))
 }
 
+/// Ranges that agree, their solution, and satellites left out with their residuals before.
+pub type Consistent = (Vec<Range>, Solution, Vec<(Sv, f64)>);
+
 /// Solves, and leaves out one satellite after another until the residuals fit.
 ///
 /// # Errors
@@ -239,7 +242,7 @@ pub fn consistent(
     start_m: Vector3<f64>,
     corrections: &Corrections,
     false_alarm: f64,
-) -> Result<(Vec<Range>, Solution, Vec<(Sv, f64)>), NoFix> {
+) -> Result<Consistent, NoFix> {
     let mut excluded: Vec<(Sv, f64)> = Vec::new();
     let mut solution = least_squares::position(&ranges, start_m, corrections)?;
     loop {

@@ -1,0 +1,247 @@
+//! Estimate minus truth, row by row.
+//!
+//! Observations are joined on (sample, satellite, signal), fixes on the sample. Code errors are
+//! differences of [`crate::gnss::time::Epoch`]s, exact to 1e-16 s; a carrier is compared after one
+//! constant, a multiple of half a cycle, is taken from each uninterrupted arc. What the receiver
+//! reports where the truth has no row (a satellite that is not there) is counted, not measured.
+
+use std::collections::{BTreeMap, HashMap};
+
+use nalgebra::Vector3;
+
+use crate::analysis::JudgeError;
+use crate::analysis::load::Run;
+use crate::analysis::statistics::median;
+use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use crate::gnss::record::{Event, Observation};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+
+/// A satellite and its signal.
+pub type Link = (Sv, &'static Signal);
+
+/// Errors of one observation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SignalError {
+    pub sample: u64,
+    pub time_s: f64,
+    /// Positive when the code is measured late: −c × (time sent as measured − as it was).
+    pub code_m: f64,
+    /// After the arc's constant is removed.
+    pub carrier_cycles: f64,
+    pub doppler_hz: f64,
+    pub cn0_dbhz: f64,
+    pub cn0_true_dbhz: f64,
+    /// Since the carrier locked, as the receiver says.
+    pub locked_s: f64,
+}
+
+/// Errors of one fix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PositionError {
+    pub sample: u64,
+    pub time_s: f64,
+    /// East, north, up about the true position.
+    pub enu_m: Vector3<f64>,
+    /// Speed of light times the error of GPS time.
+    pub clock_m: f64,
+    pub velocity_enu_mps: Vector3<f64>,
+}
+
+/// Every error of a run.
+#[derive(Clone, Debug, Default)]
+pub struct Errors {
+    pub signals: BTreeMap<Link, Vec<SignalError>>,
+    pub positions: Vec<PositionError>,
+    /// Changes of the carrier's constant: those declared by the receiver's events after a satellite's first observation, and jumps of at
+    /// least [`SLIP_CYCLES`] that stay and that it did not declare.
+    pub cycle_slips: usize,
+    /// Observations of satellites or samples that the truth does not have.
+    pub unmatched: usize,
+}
+
+/// A lasting jump of the carrier error from here on is a cycle slip: below the half cycle of a Costas loop.
+pub const SLIP_CYCLES: f64 = 0.4;
+/// Epochs on either side of a jump that decide whether it stays.
+const SIDE: usize = 5;
+
+impl Errors {
+    /// Joins and measures.
+    pub fn measure(run: &Run) -> Result<Self, JudgeError> {
+        let mut errors = Self::default();
+        errors.measure_signals(run)?;
+        errors.measure_positions(run)?;
+        Ok(errors)
+    }
+
+    fn measure_signals(&mut self, run: &Run) -> Result<(), JudgeError> {
+        let truth: HashMap<(u64, Sv, &str), &Observation> =
+            run.truth.iter().map(|row| ((row.sample, row.sv, row.signal.name), row)).collect();
+        for estimate in &run.observations {
+            let Some(true_row) = truth.get(&(estimate.sample, estimate.sv, estimate.signal.name)) else {
+                self.unmatched += 1;
+                continue;
+            };
+            self.signals.entry((estimate.sv, estimate.signal)).or_default().push(SignalError {
+                sample: estimate.sample,
+                time_s: run.time_s(estimate.sample),
+                code_m: -SPEED_OF_LIGHT_MPS * estimate.sent().since(true_row.sent()),
+                carrier_cycles: estimate.carrier_cycles - true_row.carrier_cycles,
+                doppler_hz: estimate.doppler_hz - true_row.doppler_hz,
+                cn0_dbhz: estimate.cn0_dbhz,
+                cn0_true_dbhz: true_row.cn0_dbhz,
+                locked_s: estimate.locked_s,
+            });
+        }
+        if self.signals.is_empty() && !run.observations.is_empty() {
+            return Err(JudgeError::NothingJoins { what: "observations", count: run.observations.len() });
+        }
+        for (&(sv, signal), rows) in &mut self.signals {
+            rows.sort_by_key(|row| row.sample);
+            let first = rows.first().map_or(0, |row| row.sample);
+            let declared: Vec<u64> = run
+                .events
+                .iter()
+                .filter(|row| row.sv == sv && row.signal == signal && row.event == Event::CycleSlip)
+                .filter(|row| row.sample > first)
+                .map(|row| row.sample)
+                .collect();
+            self.cycle_slips += declared.len() + level_carrier(rows, &declared);
+        }
+        Ok(())
+    }
+
+    fn measure_positions(&mut self, run: &Run) -> Result<(), JudgeError> {
+        let truth: HashMap<u64, _> = run.trajectory.iter().map(|row| (row.sample, row)).collect();
+        for fix in &run.fixes {
+            let Some(true_row) = truth.get(&fix.sample) else { continue };
+            let to_enu = Geodetic::from_ecef(&true_row.position_m()).ecef_to_enu();
+            self.positions.push(PositionError {
+                sample: fix.sample,
+                time_s: run.time_s(fix.sample),
+                enu_m: to_enu * (fix.position_m() - true_row.position_m()),
+                clock_m: SPEED_OF_LIGHT_MPS * fix.time().since(true_row.time()),
+                velocity_enu_mps: to_enu * (fix.velocity_mps() - true_row.velocity_mps()),
+            });
+        }
+        if self.positions.is_empty() && !run.fixes.is_empty() {
+            return Err(JudgeError::NothingJoins { what: "fixes", count: run.fixes.len() });
+        }
+        Ok(())
+    }
+
+    /// One number of every observation.
+    pub fn pooled(&self, of: impl Fn(&SignalError) -> f64) -> Vec<f64> {
+        self.signals.values().flatten().map(of).collect()
+    }
+
+    /// Code errors after the mean over the satellites of each epoch is removed; epochs of one satellite are
+    /// left out. With n satellites the mean takes 1/n of the variance with it.
+    pub fn code_without_clock_m(&self) -> Vec<f64> {
+        let mut epochs: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+        for row in self.signals.values().flatten() {
+            epochs.entry(row.sample).or_default().push(row.code_m);
+        }
+        let several = epochs.into_values().filter(|epoch| epoch.len() > 1);
+        several
+            .flat_map(|epoch| {
+                let clock = epoch.iter().sum::<f64>() / epoch.len() as f64;
+                epoch.into_iter().map(move |code| code - clock)
+            })
+            .collect()
+    }
+}
+
+/// Removes from each uninterrupted arc its constant, the multiple of half a cycle nearest to its median, and
+/// returns the number of jumps that the receiver did not declare. An arc ends where `locked_s` falls, at a
+/// declared slip, and at a jump.
+fn level_carrier(rows: &mut [SignalError], declared: &[u64]) -> usize {
+    let broken = |a: &SignalError, b: &SignalError| {
+        b.locked_s < a.locked_s || declared.iter().any(|&slip| (a.sample + 1..=b.sample).contains(&slip))
+    };
+    let mut slips = 0;
+    for arc in rows.chunk_by_mut(|a, b| !broken(a, b)) {
+        let mut rest = arc;
+        while let Some(jump) = first_jump(rest) {
+            let (before, after) = rest.split_at_mut(jump);
+            remove_constant(before);
+            slips += 1;
+            rest = after;
+        }
+        remove_constant(rest);
+    }
+    slips
+}
+
+/// The first row of an arc whose carrier jumped by [`SLIP_CYCLES`] or more against the rows before, and stayed.
+/// A slip may take place during a measurement and show as two half steps.
+fn first_jump(arc: &[SignalError]) -> Option<usize> {
+    let carrier: Vec<f64> = arc.iter().map(|row| row.carrier_cycles).collect();
+    (1..carrier.len().saturating_sub(1)).find(|&index| {
+        let (before, after) = carrier.split_at(index);
+        let (Some(last), Some(next)) = (before.last(), after.first()) else { return false };
+        if (next - last).abs() < SLIP_CYCLES / 2.0 {
+            return false;
+        }
+        let before = median(&before[before.len().saturating_sub(SIDE)..]);
+        let after = median(&after[..after.len().min(SIDE)]);
+        before.zip(after).is_some_and(|(before, after)| (after - before).abs() >= SLIP_CYCLES)
+    })
+}
+
+fn remove_constant(arc: &mut [SignalError]) {
+    let carrier: Vec<f64> = arc.iter().map(|row| row.carrier_cycles).collect();
+    let Some(middle) = median(&carrier) else { return };
+    let constant = (2.0 * middle).round() / 2.0;
+    arc.iter_mut().for_each(|row| row.carrier_cycles -= constant);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arc(carrier: &[f64]) -> Vec<SignalError> {
+        let row = |(index, &carrier_cycles): (usize, &f64)| SignalError {
+            sample: index as u64 * 100,
+            time_s: index as f64 * 0.1,
+            code_m: 0.0,
+            carrier_cycles,
+            doppler_hz: 0.0,
+            cn0_dbhz: 45.0,
+            cn0_true_dbhz: 45.0,
+            locked_s: 5.0 + index as f64 * 0.1,
+        };
+        carrier.iter().enumerate().map(row).collect()
+    }
+
+    fn levelled(mut rows: Vec<SignalError>, declared: &[u64]) -> (usize, Vec<f64>) {
+        let slips = level_carrier(&mut rows, declared);
+        (slips, rows.iter().map(|row| row.carrier_cycles).collect())
+    }
+
+    #[test]
+    fn a_jump_that_stays_is_a_slip_and_a_spike_is_none() {
+        let (slips, rest) = levelled(arc(&[7.5, 7.5, 7.5, 8.0, 8.0, 8.0, 8.0]), &[]);
+        assert_eq!((slips, rest), (1, vec![0.0; 7]));
+        let (slips, rest) = levelled(arc(&[3.0, 3.0, 3.0, 4.0, 3.0, 3.0]), &[]);
+        assert_eq!((slips, rest), (0, vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0]));
+        let (slips, _) = levelled(arc(&[3.0, 3.0, 3.0, 3.25, 3.5, 3.5, 3.5, 3.5]), &[]);
+        assert_eq!(slips, 1, "a slip that shows as two half steps");
+    }
+
+    #[test]
+    fn a_declared_slip_and_a_new_lock_start_an_arc_without_a_jump() {
+        let carrier = [7.0, 7.0, 7.0, 9.5, 9.5, 9.5];
+        assert_eq!(levelled(arc(&carrier), &[250]), (0, vec![0.0; 6]));
+        let mut rows = arc(&carrier);
+        rows[3..].iter_mut().for_each(|row| row.locked_s -= 5.3);
+        assert_eq!(levelled(rows, &[]), (0, vec![0.0; 6]));
+    }
+
+    #[test]
+    fn a_constant_phase_error_survives_the_constant() {
+        let (_, rest) = levelled(arc(&[1e8 + 0.02; 9]), &[]);
+        // An f64 of 1e8 cycles resolves 1.5e-8.
+        assert!(rest.iter().all(|cycles| (cycles - 0.02).abs() < 2e-8));
+    }
+}

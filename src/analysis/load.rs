@@ -1,0 +1,156 @@
+//! Everything that a run wrote, read into memory.
+//!
+//! Truth and estimate are CSV files of the rows in [`crate::gnss::record`]; the scene and the
+//! receiver's settings are JSON. A file that is missing is named together with what would write it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::analysis::JudgeError;
+use crate::gnss::record::{
+    AcquisitionRow, EventRow, Fix, NavigationRow, Observation, SkyRow, TrackingRow, TrajectoryRow,
+};
+
+/// What `truth/scene.json` says of the scene; other keys are left alone.
+#[derive(Clone, Debug, Deserialize)]
+pub struct SceneFacts {
+    pub name: String,
+    pub seed: u64,
+    pub duration_s: f64,
+    pub sample_rate_hz: f64,
+    #[serde(default)]
+    pub center_hz: Option<f64>,
+    /// Whether the samples' spectrum is mirrored about `center_hz`.
+    #[serde(default)]
+    pub inverted: bool,
+    /// SigMF name of the sample format.
+    #[serde(default)]
+    pub format: String,
+    #[serde(default)]
+    pub code_edge: String,
+    #[serde(default)]
+    pub mask_deg: Option<f64>,
+    /// Whether thermal noise was added.
+    #[serde(default = "yes")]
+    pub noise: bool,
+    #[serde(default)]
+    pub fidelity: String,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// How fast the stages ran: `speed.json`, and the section of the summary.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Speed {
+    pub generate_x_real_time: Option<f64>,
+    pub receive_x_real_time: Option<f64>,
+    pub run_x_real_time: Option<f64>,
+    pub cpu_s: Option<f64>,
+    pub peak_memory_mib: Option<f64>,
+}
+
+/// One point of `psd.csv`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PsdRow {
+    /// Frequency in the samples (0 is `center_hz`).
+    pub frequency_hz: f64,
+    /// Decibels of LSB²/Hz.
+    pub density_db: f64,
+}
+
+/// A run as read.
+pub struct Run {
+    pub scene: SceneFacts,
+    pub truth: Vec<Observation>,
+    pub sky: Vec<SkyRow>,
+    pub trajectory: Vec<TrajectoryRow>,
+    pub truth_navigation: Vec<NavigationRow>,
+    pub observations: Vec<Observation>,
+    pub fixes: Vec<Fix>,
+    pub acquisition: Vec<AcquisitionRow>,
+    pub tracking: Vec<TrackingRow>,
+    pub navigation: Vec<NavigationRow>,
+    pub events: Vec<EventRow>,
+    /// `rx/receiver.json`, or null when there is none.
+    pub receiver: Value,
+    pub psd: Vec<PsdRow>,
+    pub speed: Speed,
+}
+
+const TRUTH: &str = "the generator writes it: make the run again with `gnss-twin run`, or `gnss-twin generate`";
+const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
+
+impl Run {
+    /// Reads a run's directory. `psd.csv`, `speed.json` and `rx/receiver.json` may be missing.
+    pub fn read(run: &Path) -> Result<Self, JudgeError> {
+        let truth = run.join("truth");
+        let rx = run.join("rx");
+        let psd = run.join("psd.csv");
+        Ok(Self {
+            scene: json(&truth.join("scene.json"))?.ok_or_else(|| missing(&truth.join("scene.json"), TRUTH))?,
+            truth: rows(&truth.join("observations.csv"), TRUTH)?,
+            sky: rows(&truth.join("sky.csv"), TRUTH)?,
+            trajectory: rows(&truth.join("trajectory.csv"), TRUTH)?,
+            truth_navigation: rows(&truth.join("navigation.csv"), TRUTH)?,
+            observations: rows(&rx.join("observations.csv"), RECEIVER)?,
+            fixes: rows(&rx.join("fixes.csv"), RECEIVER)?,
+            acquisition: rows(&rx.join("acquisition.csv"), RECEIVER)?,
+            tracking: rows(&rx.join("tracking.csv"), RECEIVER)?,
+            navigation: rows(&rx.join("navigation.csv"), RECEIVER)?,
+            events: rows(&rx.join("events.csv"), RECEIVER)?,
+            receiver: json(&rx.join("receiver.json"))?.unwrap_or(Value::Null),
+            psd: if psd.exists() { rows(&psd, "")? } else { Vec::new() },
+            speed: json(&run.join("speed.json"))?.unwrap_or_default(),
+        })
+    }
+
+    /// Seconds from sample 0 by the receiver's clock.
+    pub fn time_s(&self, sample: u64) -> f64 {
+        sample as f64 / self.scene.sample_rate_hz
+    }
+
+    /// A number among the receiver's tracking settings, if they name it.
+    pub fn tracking_setting(&self, key: &str) -> Option<f64> {
+        let settings = self.receiver.get("settings").unwrap_or(&self.receiver);
+        settings.get("tracking")?.get(key)?.as_f64()
+    }
+}
+
+fn missing(path: &Path, remedy: &'static str) -> JudgeError {
+    JudgeError::Missing { path: path.to_owned(), remedy }
+}
+
+/// All rows of a CSV file; a file without even a header has none.
+fn rows<T: DeserializeOwned>(path: &Path, remedy: &'static str) -> Result<Vec<T>, JudgeError> {
+    let file = fs::File::open(path).map_err(|source| open_error(path, remedy, source))?;
+    csv::Reader::from_reader(io::BufReader::new(file))
+        .deserialize()
+        .collect::<Result<_, _>>()
+        .map_err(|source| JudgeError::Row { path: path.to_owned(), source })
+}
+
+fn open_error(path: &Path, remedy: &'static str, source: io::Error) -> JudgeError {
+    match source.kind() {
+        io::ErrorKind::NotFound => missing(path, remedy),
+        _ => JudgeError::File { path: path.to_owned(), source },
+    }
+}
+
+/// A JSON file, or `None` if there is none.
+fn json<T: DeserializeOwned>(path: &PathBuf) -> Result<Option<T>, JudgeError> {
+    match fs::read(path) {
+        Ok(bytes) => {
+            serde_json::from_slice(&bytes).map(Some).map_err(|source| JudgeError::Json { path: path.clone(), source })
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(JudgeError::File { path: path.clone(), source }),
+    }
+}

@@ -1,0 +1,375 @@
+//! Charts as data, drawn by plotters into SVG and by resvg into PNG, with the bundled font.
+//!
+//! plotters places everything on whole pixels, so the SVG is drawn at [`FINE`] times its size and
+//! scaled down; every size that plotters would choose is set here for that reason. No system font,
+//! no C library: a fresh machine draws the same picture.
+
+use std::error::Error;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use plotters::chart::LabelAreaPosition;
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{FontStyle, register_font};
+use resvg::{tiny_skia, usvg};
+
+use crate::analysis::JudgeError;
+
+/// Virtual pixels in one pixel of the picture.
+pub const FINE: i32 = 4;
+/// The drawing surface, in virtual pixels.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// Why a drawing failed; only its text reaches the user.
+pub type Failure = Box<dyn Error>;
+
+/// DejaVu Sans (assets/DejaVuSans.LICENSE.txt).
+static FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans.ttf");
+
+/// Colours that colour-blind people tell apart (Okabe and Ito 2008), without its yellow, too pale on white.
+pub const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+];
+pub const BLUE: RGBColor = COLOURS[0];
+pub const ORANGE: RGBColor = COLOURS[1];
+pub const GREEN: RGBColor = COLOURS[2];
+pub const GREY: RGBColor = RGBColor(120, 120, 120);
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mark {
+    Line,
+    /// A thin dashed line.
+    Dash,
+    Dots,
+    /// Hollow dots.
+    Rings,
+    /// A larger cross.
+    Cross,
+    /// Bars from zero, of that width in data units.
+    Bars(f64),
+}
+
+/// Points in data units and how they look.
+#[derive(Clone, Debug)]
+pub struct Series {
+    pub name: String,
+    pub colour: RGBColor,
+    pub mark: Mark,
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Series {
+    pub fn new(name: impl Into<String>, colour: RGBColor, mark: Mark, points: Vec<(f64, f64)>) -> Self {
+        Self { name: name.into(), colour, mark, points }
+    }
+
+    /// A series of a satellite: colours first, then the same colours hollow.
+    pub fn numbered(name: String, index: usize, points: Vec<(f64, f64)>) -> Self {
+        let colour = COLOURS[index % COLOURS.len()];
+        let mark = if (index / COLOURS.len()).is_multiple_of(2) { Mark::Dots } else { Mark::Rings };
+        Self { name, colour, mark, points }
+    }
+}
+
+/// An axis in data units.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    pub label: String,
+    pub from: f64,
+    pub to: f64,
+}
+
+impl Axis {
+    pub fn new(label: &str, (from, to): (f64, f64)) -> Self {
+        // plotters needs a range with a length.
+        let (from, to) = if from < to { (from, to) } else { (from - 0.5, from + 0.5) };
+        Self { label: label.to_owned(), from, to }
+    }
+
+    /// An axis around every finite value, with a margin, not shorter than `least`.
+    pub fn around(label: &str, values: impl Iterator<Item = f64>, least: f64) -> Self {
+        let (low, high) = values
+            .filter(|value| value.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
+        let half = ((high - low) * 0.54).max(least / 2.0);
+        let middle = (low + high) / 2.0;
+        Self::new(label, (middle - half, middle + half))
+    }
+
+    fn span(&self) -> f64 {
+        self.to - self.from
+    }
+}
+
+/// One pair of axes with what is drawn in it.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    pub title: String,
+    pub x: Axis,
+    pub y: Axis,
+    pub series: Vec<Series>,
+    /// One metre is as long up as across.
+    pub equal: bool,
+    /// Labels under the x axis in place of numbers.
+    pub x_ticks: Option<Vec<(f64, String)>>,
+}
+
+impl Chart {
+    pub fn new(title: impl Into<String>, x: Axis, y: Axis, series: Vec<Series>) -> Self {
+        Self { title: title.into(), x, y, series, equal: false, x_ticks: None }
+    }
+}
+
+/// Draws charts, `columns` a row, with one legend at the right for all of them, into a PNG of that size.
+pub fn figure(
+    path: &Path,
+    (width, height): (u32, u32),
+    columns: usize,
+    charts: &[Chart],
+    legend: &[Series],
+) -> Result<(), JudgeError> {
+    render(path, (width, height), |area| {
+        let text_px = legend.iter().map(|series| series.name.chars().count()).max().unwrap_or(0) as i32 * 8;
+        let legend_px = if legend.is_empty() { 0 } else { 34 + text_px };
+        let (plots, side) = area.split_horizontally((width as i32 - legend_px) * FINE);
+        let rows = charts.len().div_ceil(columns).max(1);
+        for (chart, cell) in charts.iter().zip(plots.split_evenly((rows, columns))) {
+            draw(&cell, chart)?;
+        }
+        draw_legend(&side, legend)
+    })
+}
+
+/// Draws into an SVG in memory and writes it as a PNG of `width` × `height` pixels.
+pub fn render(
+    path: &Path,
+    (width, height): (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> Result<(), Failure>,
+) -> Result<(), JudgeError> {
+    let failed = |reason: String| JudgeError::Plot { path: path.to_owned(), reason };
+    static REGISTERED: OnceLock<bool> = OnceLock::new();
+    if !*REGISTERED.get_or_init(|| register_font("sans-serif", FontStyle::Normal, FONT).is_ok()) {
+        return Err(failed("the bundled font is unreadable".to_owned()));
+    }
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, (width * FINE as u32, height * FINE as u32)).into_drawing_area();
+        let drawn = area.fill(&WHITE).map_err(Failure::from).and_then(|()| draw(&area));
+        drawn.and_then(|()| area.present().map_err(Failure::from)).map_err(|error| failed(error.to_string()))?;
+    }
+    let png = rasterise(&svg, width, height).map_err(|error| failed(error.to_string()))?;
+    super::super::write_whole(path, &png)
+}
+
+fn rasterise(svg: &str, width: u32, height: u32) -> Result<Vec<u8>, Failure> {
+    let mut options = usvg::Options::default();
+    let fonts = options.fontdb_mut();
+    fonts.load_font_data(FONT.to_vec());
+    fonts.set_sans_serif_family("DejaVu Sans");
+    let tree = usvg::Tree::from_str(svg, &options)?;
+    let mut pixels = tiny_skia::Pixmap::new(width, height).ok_or("a picture needs a size")?;
+    let scale = 1.0 / FINE as f32;
+    resvg::render(&tree, tiny_skia::Transform::from_scale(scale, scale), &mut pixels.as_mut());
+    Ok(pixels.encode_png()?)
+}
+
+/// A font of that many pixels.
+pub fn font(pixels: i32) -> TextStyle<'static> {
+    ("sans-serif", pixels * FINE).into_font().color(&RGBColor(30, 30, 30))
+}
+
+/// That font, hung on its point as told.
+pub fn anchored(pixels: i32, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
+    font(pixels).pos(Pos::new(horizontal, vertical))
+}
+
+/// Free space around a chart: plotters hangs an axis label on the very edge of its area.
+const EDGE_PX: i32 = 6;
+const LEFT_PX: i32 = 74;
+const RIGHT_PX: i32 = 16;
+const TOP_PX: i32 = 32;
+const BOTTOM_PX: i32 = 42;
+
+/// Draws one chart into an area.
+pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
+    let (width, height) = area.dim_in_pixel();
+    let title = anchored(15, HPos::Center, VPos::Center);
+    area.draw(&Text::new(chart.title.clone(), (width as i32 / 2, TOP_PX * FINE / 2), title))?;
+    let (mut x, mut y) = (chart.x.clone(), chart.y.clone());
+    if chart.equal {
+        let across = f64::from(width as i32 - (LEFT_PX + RIGHT_PX + EDGE_PX) * FINE).max(1.0);
+        let up = f64::from(height as i32 - (TOP_PX + BOTTOM_PX + EDGE_PX) * FINE).max(1.0);
+        let per_pixel = (x.span() / across).max(y.span() / up);
+        widen(&mut x, per_pixel * across);
+        widen(&mut y, per_pixel * up);
+    }
+    let mut context = ChartBuilder::on(area)
+        .margin_top(TOP_PX * FINE)
+        .margin_right(RIGHT_PX * FINE)
+        .margin_left(EDGE_PX * FINE)
+        .margin_bottom(EDGE_PX * FINE)
+        .set_label_area_size(LabelAreaPosition::Left, LEFT_PX * FINE)
+        .set_label_area_size(LabelAreaPosition::Bottom, BOTTOM_PX * FINE)
+        .build_cartesian_2d(x.from..x.to, y.from..y.to)?;
+    let (x_decimals, y_decimals) = (decimals(x.span()), decimals(y.span()));
+    let ticked = chart.x_ticks.is_some();
+    context
+        .configure_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(RGBColor(225, 225, 225).stroke_width(FINE as u32))
+        .axis_style(GREY.stroke_width(FINE as u32))
+        .set_all_tick_mark_size(5 * FINE)
+        .x_desc(x.label.clone())
+        .y_desc(y.label.clone())
+        .axis_desc_style(font(13))
+        .label_style(font(12))
+        .x_labels(if chart.equal { 7 } else { 10 })
+        .y_labels((height as i32 / FINE / 45).clamp(4, 12) as usize)
+        .x_label_formatter(&|value| if ticked { String::new() } else { tick(*value, x_decimals) })
+        .y_label_formatter(&|value| tick(*value, y_decimals))
+        .draw()?;
+    for series in &chart.series {
+        draw_series(&mut context, series)?;
+    }
+    let bottom = height as i32 - (BOTTOM_PX + EDGE_PX - 7) * FINE;
+    let left = area.get_base_pixel().0;
+    for (at, label) in chart.x_ticks.iter().flatten() {
+        let (pixel, _) = context.plotting_area().map_coordinate(&(*at, y.from));
+        let style = anchored(11, HPos::Center, VPos::Top);
+        area.draw(&Text::new(label.clone(), (pixel - left, bottom), style))?;
+    }
+    Ok(())
+}
+
+type Context<'a, 'b> = ChartContext<
+    'a,
+    SVGBackend<'b>,
+    Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
+>;
+
+fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Failure> {
+    let points = thinned(&series.points);
+    let line = series.colour.stroke_width(3 * FINE as u32 / 2);
+    match series.mark {
+        Mark::Line => {
+            context.draw_series(LineSeries::new(points, line))?;
+        }
+        Mark::Dash => {
+            context.draw_series(DashedLineSeries::new(points, 7 * FINE, 5 * FINE, line))?;
+        }
+        Mark::Dots => {
+            let dot = |point| Circle::new(point, 3 * FINE / 2, series.colour.mix(0.75).filled());
+            context.draw_series(points.into_iter().map(dot))?;
+        }
+        Mark::Rings => {
+            let ring = |point| Circle::new(point, 2 * FINE, series.colour.stroke_width(FINE as u32 * 3 / 4));
+            context.draw_series(points.into_iter().map(ring))?;
+        }
+        Mark::Cross => {
+            let cross =
+                |point| plotters::element::Cross::new(point, 7 * FINE, series.colour.stroke_width(2 * FINE as u32));
+            context.draw_series(points.into_iter().map(cross))?;
+        }
+        Mark::Bars(width) => {
+            let bar = |&(x, y): &(f64, f64)| {
+                Rectangle::new([(x - width / 2.0, 0.0), (x + width / 2.0, y)], series.colour.filled())
+            };
+            context.draw_series(series.points.iter().map(bar))?;
+        }
+    }
+    Ok(())
+}
+
+/// Names and marks, one below the other, at the left edge of an area.
+fn draw_legend(area: &Area<'_>, legend: &[Series]) -> Result<(), Failure> {
+    for (row, series) in (0_i32..).zip(legend) {
+        let y = (TOP_PX + 12 + row * 20) * FINE;
+        let (x, end) = (4 * FINE, 22 * FINE);
+        let thick = series.colour.stroke_width(2 * FINE as u32);
+        let middle = ((x + end) / 2, y);
+        match series.mark {
+            Mark::Line => area.draw(&PathElement::new([(x, y), (end, y)], thick))?,
+            Mark::Dash => {
+                area.draw(&PathElement::new([(x, y), (x + 7 * FINE, y)], thick))?;
+                area.draw(&PathElement::new([(end - 7 * FINE, y), (end, y)], thick))?;
+            }
+            Mark::Dots => area.draw(&Circle::new(middle, 4 * FINE, series.colour.filled()))?,
+            Mark::Rings => area.draw(&Circle::new(middle, 4 * FINE, thick))?,
+            Mark::Cross => area.draw(&plotters::element::Cross::new(middle, 5 * FINE, thick))?,
+            Mark::Bars(_) => {
+                area.draw(&Rectangle::new([(x, y - 5 * FINE), (end, y + 5 * FINE)], series.colour.filled()))?;
+            }
+        }
+        let style = anchored(12, HPos::Left, VPos::Center);
+        area.draw(&Text::new(series.name.clone(), (end + 6 * FINE, y), style))?;
+    }
+    Ok(())
+}
+
+fn widen(axis: &mut Axis, span: f64) {
+    let middle = (axis.from + axis.to) / 2.0;
+    (axis.from, axis.to) = (middle - span / 2.0, middle + span / 2.0);
+}
+
+/// Decimals that tell neighbouring ticks of an axis apart.
+fn decimals(span: f64) -> usize {
+    libm::ceil(-libm::log10(span / 5.0)).clamp(0.0, 12.0) as usize
+}
+
+fn tick(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    // A zero that rounding left negative.
+    if text.trim_start_matches('-').bytes().all(|b| matches!(b, b'0' | b'.')) { text.replace('-', "") } else { text }
+}
+
+/// Most points that a series is drawn with.
+const MOST_POINTS: usize = 1600;
+
+/// Few enough points to draw: of each run of neighbours the lowest and the highest, so that no spike is lost.
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+    if finite.len() <= MOST_POINTS {
+        return finite;
+    }
+    let extremes = |run: &[(f64, f64)]| {
+        let numbered = || run.iter().enumerate();
+        let low = numbered().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
+        let high = numbered().max_by(|a, b| a.1.1.total_cmp(&b.1.1));
+        let mut pair: Vec<(usize, (f64, f64))> =
+            low.into_iter().chain(high).map(|(index, point)| (index, *point)).collect();
+        pair.sort_by_key(|(index, _)| *index);
+        pair.into_iter().map(|(_, point)| point)
+    };
+    finite.chunks(finite.len().div_ceil(MOST_POINTS / 2)).flat_map(extremes).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_the_spikes_and_the_order() {
+        let mut points: Vec<(f64, f64)> = (0..100_000).map(|n| (f64::from(n), 0.0)).collect();
+        points[54_321].1 = 9.0;
+        points[54_400].1 = -9.0;
+        let few = thinned(&points);
+        assert!(few.len() <= MOST_POINTS + 2);
+        assert!(few.contains(&(54_321.0, 9.0)) && few.contains(&(54_400.0, -9.0)));
+        assert!(few.windows(2).all(|pair| pair[0].0 <= pair[1].0));
+    }
+
+    #[test]
+    fn ticks_have_as_many_decimals_as_tell_them_apart() {
+        assert_eq!((decimals(60.0), decimals(4.0), decimals(0.03)), (0, 1, 3));
+        assert_eq!((tick(-0.0, 1), tick(-0.04, 1), tick(-1.0, 0)), ("0.0".into(), "0.0".into(), "-1".into()));
+    }
+}

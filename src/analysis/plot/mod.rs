@@ -1,0 +1,61 @@
+//! The pictures of a run, one PNG a question.
+//!
+//! [`canvas`] wraps the drawing libraries; every other file here says what is drawn. A picture
+//! with nothing to show is drawn with empty axes, so that a script finds the files it expects;
+//! only `psd.png` depends on `psd.csv` being there.
+
+pub mod canvas;
+mod position;
+mod signals;
+mod sky;
+mod spectrum;
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::analysis::JudgeError;
+use crate::analysis::errors::Errors;
+use crate::analysis::load::Run;
+use crate::analysis::summary::Summary;
+
+/// Everything that a picture is drawn from.
+pub(crate) struct Judged<'a> {
+    pub run: &'a Run,
+    pub errors: &'a Errors,
+    pub summary: &'a Summary,
+}
+
+impl Judged<'_> {
+    /// An axis over the times at which there is something, or the whole run if there is nothing.
+    fn time_axis(&self, times_s: impl Iterator<Item = f64>) -> canvas::Axis {
+        let first_s = times_s.fold(self.run.scene.duration_s, f64::min);
+        let end_s = self.run.scene.duration_s;
+        // Some room before the first point shows that nothing came before it.
+        let from_s = if first_s < end_s { (first_s - 0.05 * (end_s - first_s)).max(0.0) } else { 0.0 };
+        canvas::Axis::new("time (s)", (from_s, end_s))
+    }
+}
+
+/// Draws one picture into a file.
+type Picture = fn(&Path, &Judged<'_>) -> Result<(), JudgeError>;
+
+/// The pictures by their file names.
+const PICTURES: [(&str, Picture); 10] = [
+    ("psd.png", spectrum::psd),
+    ("acquisition.png", spectrum::acquisition),
+    ("discriminators.png", signals::discriminators),
+    ("cn0.png", signals::cn0),
+    ("observables.png", signals::observables),
+    ("jitter.png", signals::jitter),
+    ("sky.png", sky::sky),
+    ("position_scatter.png", position::scatter),
+    ("position_time.png", position::time),
+    ("trajectory.png", position::trajectory),
+];
+
+/// Draws every picture of a run into its directory.
+pub fn all(directory: &Path, run: &Run, errors: &Errors, summary: &Summary) -> Result<(), JudgeError> {
+    let judged = Judged { run, errors, summary };
+    PICTURES.par_iter().try_for_each(|(name, picture)| picture(&directory.join(name), &judged))
+}

@@ -1,0 +1,151 @@
+//! Loops and observations over time, satellite by satellite.
+
+use std::path::Path;
+
+use crate::analysis::JudgeError;
+use crate::analysis::errors::{Link, SignalError};
+use crate::analysis::plot::Judged;
+use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREY, Mark, ORANGE, Series, figure};
+use crate::analysis::statistics::{percentile, std};
+use crate::gnss::record::TrackingRow;
+
+type Points = Vec<(f64, f64)>;
+
+/// One chart of something over time with a series a satellite.
+fn over_time(judged: &Judged<'_>, title: &str, y_label: &str, least: f64, data: &[(String, Points)]) -> Chart {
+    let values: Vec<f64> = data.iter().flat_map(|(_, points)| points.iter().map(|point| point.1)).collect();
+    // Pull-in may be far outside; the axis shows what holds most of the time.
+    let [low, high] = [0.002, 0.998].map(|p| percentile(&values, p).unwrap_or(0.0));
+    let y = Axis::around(y_label, [low, high].into_iter(), least.max(1.3 * (high - low)));
+    let x = judged.time_axis(data.iter().flat_map(|(_, points)| points.iter().map(|point| point.0)));
+    let inside =
+        |points: &Points| points.iter().copied().filter(|point| (y.from..=y.to).contains(&point.1)).collect::<Points>();
+    let series: Vec<Series> = (data.iter().enumerate())
+        .map(|(index, (name, points))| Series::numbered(name.clone(), index, inside(points)))
+        .collect();
+    let total = values.iter().filter(|value| value.is_finite()).count();
+    let outside = total - series.iter().map(|series| series.points.len()).sum::<usize>();
+    let title = if outside > 0 { format!("{title} ({outside} of {total} points outside)") } else { title.to_owned() };
+    Chart::new(title, x, y, series)
+}
+
+fn legend(names: impl Iterator<Item = String>) -> Vec<Series> {
+    names.enumerate().map(|(index, name)| Series::numbered(name, index, Vec::new())).collect()
+}
+
+/// Raw discriminators of the three loops.
+pub fn discriminators(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+    let run = judged.run;
+    let mut links: Vec<Link> = run.tracking.iter().map(|row| (row.sv, row.signal)).collect();
+    links.sort_unstable();
+    links.dedup();
+    let data = |of: fn(&TrackingRow) -> f64| -> Vec<(String, Points)> {
+        let one = |link: &Link| {
+            let rows = run.tracking.iter().filter(|row| (row.sv, row.signal) == *link);
+            (link.0.to_string(), rows.map(|row| (run.time_s(row.sample), of(row))).collect())
+        };
+        links.iter().map(one).collect()
+    };
+    let charts = [
+        over_time(judged, "DLL discriminator", "output (chips)", 0.02, &data(|row| row.dll_discriminator_chips)),
+        over_time(
+            judged,
+            "PLL discriminator",
+            "output (degrees)",
+            2.0,
+            &data(|row| row.pll_discriminator_cycles * 360.0),
+        ),
+        over_time(judged, "FLL discriminator", "output (Hz)", 2.0, &data(|row| row.fll_discriminator_hz)),
+    ];
+    figure(path, (1100, 900), 1, &charts, &legend(links.iter().map(|link| link.0.to_string())))
+}
+
+fn per_satellite(judged: &Judged<'_>, of: impl Fn(&SignalError) -> f64) -> Vec<(String, Points)> {
+    let points = |rows: &[SignalError]| rows.iter().map(|row| (row.time_s, of(row))).collect();
+    judged.errors.signals.iter().map(|((sv, _), rows)| (sv.to_string(), points(rows))).collect()
+}
+
+fn satellites(judged: &Judged<'_>) -> Vec<Series> {
+    legend(judged.errors.signals.keys().map(|(sv, _)| sv.to_string()))
+}
+
+/// C/N0 over time as measured and as it was, and the means side by side.
+pub fn cn0(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+    let measured = per_satellite(judged, |row| row.cn0_dbhz);
+    let mut chart = over_time(judged, "C/N0 as measured (points) and as set (lines)", "C/N0 (dB-Hz)", 4.0, &measured);
+    let truth = per_satellite(judged, |row| row.cn0_true_dbhz);
+    let all = measured.iter().chain(&truth).flat_map(|(_, points)| points.iter().map(|point| point.1));
+    chart.y = Axis::around("C/N0 (dB-Hz)", all, 4.0);
+    for (index, (name, points)) in truth.into_iter().enumerate() {
+        let mut line = Series::numbered(name, index, points);
+        line.mark = Mark::Line;
+        chart.series.push(line);
+    }
+    let difference = per_satellite(judged, |row| row.cn0_dbhz - row.cn0_true_dbhz);
+    let below = over_time(judged, "C/N0 measured minus set", "difference (dB)", 1.0, &difference);
+    figure(path, (1100, 800), 1, &[chart, below], &satellites(judged))
+}
+
+/// Errors of code, carrier and Doppler.
+pub fn observables(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+    let charts = [
+        over_time(judged, "Code error", "error (m)", 0.1, &per_satellite(judged, |row| row.code_m)),
+        over_time(
+            judged,
+            "Carrier error, a constant removed from each arc",
+            "error (cycles)",
+            0.01,
+            &per_satellite(judged, |row| row.carrier_cycles),
+        ),
+        over_time(judged, "Doppler error", "error (Hz)", 0.1, &per_satellite(judged, |row| row.doppler_hz)),
+    ];
+    figure(path, (1100, 900), 1, &charts, &satellites(judged))
+}
+
+/// Histograms of the loop errors with their thresholds.
+pub fn jitter(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+    let details = &judged.summary.details;
+    let limits = &details.thresholds;
+    let charts = [
+        histogram("DLL", "chips", &details.jitter.dll_chips, limits.dll_chips),
+        histogram("PLL", "degrees", &details.jitter.pll_deg, limits.pll_deg),
+        histogram("FLL", "Hz", &details.jitter.fll_hz, limits.fll_hz),
+    ];
+    let legend = [
+        Series::new("replica - truth", BLUE, Mark::Bars(1.0), Vec::new()),
+        Series::new("±1σ", GREY, Mark::Dash, Vec::new()),
+        Series::new("1σ threshold", ORANGE, Mark::Line, Vec::new()),
+    ];
+    figure(path, (1300, 420), 3, &charts, &legend)
+}
+
+const BINS: usize = 41;
+
+fn histogram(name: &str, unit: &str, values: &[f64], threshold: f64) -> Chart {
+    let sigma = std(values).unwrap_or(0.0);
+    // Wide enough for the tails; the threshold is drawn if it is not so far that the histogram would vanish.
+    let tails = (5.0 * sigma).max(1e-9);
+    let half = if threshold < 4.0 * tails { tails.max(1.15 * threshold) } else { tails };
+    let width = 2.0 * half / BINS as f64;
+    let mut counts = [0_usize; BINS];
+    for value in values {
+        let bin = ((value + half) / width).floor();
+        if let Some(count) = (bin >= 0.0).then(|| counts.get_mut(bin as usize)).flatten() {
+            *count += 1;
+        }
+    }
+    let share = |count: usize| 100.0 * count as f64 / values.len().max(1) as f64;
+    let bars: Points =
+        (0..).zip(counts).map(|(bin, count)| ((f64::from(bin) + 0.5) * width - half, share(count))).collect();
+    let top = 1.1 * bars.iter().map(|bar| bar.1).fold(1.0, f64::max);
+    let mut series = vec![Series::new("", BLUE, Mark::Bars(0.92 * width), bars)];
+    for sign in [-1.0, 1.0] {
+        series.push(Series::new("", GREY, Mark::Dash, vec![(sign * sigma, 0.0), (sign * sigma, top)]));
+        if threshold < half {
+            series.push(Series::new("", ORANGE, Mark::Line, vec![(sign * threshold, 0.0), (sign * threshold, top)]));
+        }
+    }
+    let x = Axis::new(&format!("{name} error ({unit})"), (-half, half));
+    let title = format!("{name}: σ {sigma:.4}, threshold {threshold:.3} {unit}");
+    Chart::new(title, x, Axis::new("share of observations (%)", (0.0, top)), series)
+}

@@ -1,0 +1,133 @@
+//! Where the satellites stood and how strong they were received.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, VPos};
+
+use crate::analysis::JudgeError;
+use crate::analysis::plot::Judged;
+use crate::analysis::plot::canvas::{Area, FINE, Failure, GREY, anchored, render};
+use crate::analysis::statistics::mean;
+use crate::gnss::record::SkyRow;
+use crate::gnss::satellite::Sv;
+
+const WIDTH_PX: i32 = 820;
+const HEIGHT_PX: i32 = 760;
+const CENTRE: (i32, i32) = (375 * FINE, 395 * FINE);
+const RADIUS: f64 = (310 * FINE) as f64;
+
+/// Polar plot: north up, zenith in the middle, tracks ending in a labelled dot whose colour is the mean C/N0 as
+/// set; a satellite that the receiver did not observe is hollow.
+pub fn sky(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+    let mut tracks: BTreeMap<Sv, Vec<&SkyRow>> = BTreeMap::new();
+    for row in &judged.run.sky {
+        tracks.entry(row.sv).or_default().push(row);
+    }
+    let strengths: BTreeMap<Sv, f64> = tracks
+        .keys()
+        .filter_map(|&sv| {
+            let rows = judged.run.truth.iter().filter(|row| row.sv == sv);
+            mean(&rows.map(|row| row.cn0_dbhz).collect::<Vec<_>>()).map(|cn0| (sv, cn0))
+        })
+        .collect();
+    let low = strengths.values().copied().fold(f64::INFINITY, f64::min).floor();
+    let high = strengths.values().copied().fold(f64::NEG_INFINITY, f64::max).ceil();
+    let (low, high) = if low < high { (low, high) } else { (30.0, 50.0) };
+    render(path, (WIDTH_PX as u32, HEIGHT_PX as u32), |area| {
+        frame(area)?;
+        scale(area, low, high)?;
+        // Names keep clear of the dots, the tracks and each other.
+        let mut taken: Vec<(i32, i32)> =
+            tracks.values().flat_map(|rows| rows.iter().map(|row| place(row.azimuth_deg, row.elevation_deg))).collect();
+        taken.dedup();
+        let mut ends = Vec::new();
+        for (sv, rows) in &tracks {
+            let colour = strengths.get(sv).map_or(GREY, |cn0| shade(*cn0, low, high));
+            let observed = judged.errors.signals.keys().any(|(seen, _)| seen == sv);
+            let points: Vec<(i32, i32)> = rows.iter().map(|row| place(row.azimuth_deg, row.elevation_deg)).collect();
+            let Some(&end) = points.last() else { continue };
+            area.draw(&PathElement::new(points, colour.stroke_width(3 * FINE as u32)))?;
+            area.draw(&Circle::new(end, 8 * FINE, if observed { colour.filled() } else { WHITE.filled() }))?;
+            area.draw(&Circle::new(end, 8 * FINE, colour.stroke_width(2 * FINE as u32)))?;
+            ends.push((*sv, end));
+        }
+        for (sv, end) in ends {
+            label(area, sv, end, &mut taken)?;
+        }
+        let note = anchored(12, HPos::Left, VPos::Center);
+        area.draw(&Text::new("filled: observed by the receiver", (14 * FINE, (HEIGHT_PX - 16) * FINE), note))?;
+        Ok(())
+    })
+}
+
+/// Writes a satellite's name beside its dot, on the first side where nothing else is.
+fn label(area: &Area<'_>, sv: Sv, (x, y): (i32, i32), taken: &mut Vec<(i32, i32)>) -> Result<(), Failure> {
+    let sides = [(28, 0), (-28, 0), (0, -18), (0, 18), (24, -15), (-24, -15), (24, 15), (-24, 15)];
+    let spots = sides.map(|(dx, dy)| (x + dx * FINE, y + dy * FINE));
+    let free = |spot: &(i32, i32)| {
+        taken.iter().all(|other| (spot.0 - other.0).abs() > 24 * FINE || (spot.1 - other.1).abs() > 13 * FINE)
+    };
+    let spot = spots.iter().copied().find(free).unwrap_or(spots[0]);
+    // A name is wider than a dot: its two ends stand for it.
+    taken.extend([(spot.0 - 12 * FINE, spot.1), (spot.0 + 12 * FINE, spot.1)]);
+    area.draw(&Text::new(sv.to_string(), spot, anchored(14, HPos::Center, VPos::Center)))?;
+    Ok(())
+}
+
+fn place(azimuth_deg: f64, elevation_deg: f64) -> (i32, i32) {
+    let (sin, cos) = libm::sincos(azimuth_deg.to_radians());
+    let distance = RADIUS * (90.0 - elevation_deg) / 90.0;
+    (CENTRE.0 + (distance * sin) as i32, CENTRE.1 - (distance * cos) as i32)
+}
+
+fn shade(cn0_dbhz: f64, low: f64, high: f64) -> RGBColor {
+    // The palest yellow end of the map is left out: it vanishes on white.
+    ViridisRGB.get_color_normalized((cn0_dbhz - low) / (high - low) * 0.92, 0.0, 1.0)
+}
+
+fn frame(area: &Area<'_>) -> Result<(), Failure> {
+    let title = anchored(16, HPos::Center, VPos::Center);
+    area.draw(&Text::new("Satellites above the horizon", (CENTRE.0, 20 * FINE), title))?;
+    let line = RGBColor(205, 205, 205).stroke_width(FINE as u32);
+    for elevation_deg in [0.0, 30.0, 60.0] {
+        let (x, y) = place(0.0, elevation_deg);
+        area.draw(&Circle::new(CENTRE, CENTRE.1 - y, line))?;
+        let style = anchored(12, HPos::Left, VPos::Bottom).color(&GREY);
+        area.draw(&Text::new(format!("{elevation_deg:.0}°"), (x + 4 * FINE, y - 2 * FINE), style))?;
+    }
+    for azimuth_deg in (0..360).step_by(30) {
+        let azimuth_deg = f64::from(azimuth_deg);
+        area.draw(&PathElement::new([CENTRE, place(azimuth_deg, 0.0)], line))?;
+        let name = match azimuth_deg as i32 {
+            0 => "N".to_owned(),
+            90 => "E".to_owned(),
+            180 => "S".to_owned(),
+            270 => "W".to_owned(),
+            other => format!("{other}°"),
+        };
+        area.draw(&Text::new(name, place(azimuth_deg, -7.0), anchored(13, HPos::Center, VPos::Center)))?;
+    }
+    Ok(())
+}
+
+/// The colours of C/N0 with their ends.
+fn scale(area: &Area<'_>, low: f64, high: f64) -> Result<(), Failure> {
+    let (left, top, width, height) = (738 * FINE, 110 * FINE, 18 * FINE, 3 * FINE);
+    let steps = 150;
+    for step in 0..steps {
+        let cn0 = high - (high - low) * f64::from(step) / f64::from(steps);
+        let corner = (left, top + step * height);
+        let opposite = (left + width, top + (step + 1) * height + 1);
+        area.draw(&Rectangle::new([corner, opposite], shade(cn0, low, high).filled()))?;
+    }
+    for tick in 0..=4 {
+        let cn0 = high - (high - low) * f64::from(tick) / 4.0;
+        let at = (left + width + 6 * FINE, top + steps * height * tick / 4);
+        area.draw(&Text::new(format!("{cn0:.1}"), at, anchored(12, HPos::Left, VPos::Center)))?;
+    }
+    let style = anchored(12, HPos::Center, VPos::Bottom);
+    area.draw(&Text::new("C/N0 (dB-Hz)", (left + 14 * FINE, top - 10 * FINE), style))?;
+    Ok(())
+}

@@ -1,0 +1,287 @@
+//! Power spectral density of the samples by Welch's method, and what theory says it should be.
+//!
+//! Hann window, half overlap, periodograms averaged in f64 (Welch 1967). The theory sums the main
+//! spectrum of each satellite's chips, sinc²(f/R_c)/R_c, over its aliases, on a flat noise floor;
+//! the lines 1 kHz apart of a repeating code and the data are below the resolution and left out.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+
+use crate::analysis::JudgeError;
+use crate::analysis::load::{PsdRow, Run};
+use crate::analysis::statistics::{mean, median};
+
+/// A spectrum being accumulated from blocks of planar samples.
+pub struct Psd {
+    rate_hz: f64,
+    one_sided: bool,
+    fft: Arc<dyn Fft<f32>>,
+    scratch: Vec<Complex<f32>>,
+    work: Vec<Complex<f32>>,
+    window: Vec<f32>,
+    /// Samples that the next segment starts with.
+    kept: Vec<Complex<f32>>,
+    sum: Vec<f64>,
+    segments: u64,
+}
+
+impl Psd {
+    /// A spectrum of `bins` frequencies (at least 8, made even) of samples at `rate_hz`; `one_sided` for real samples.
+    pub fn new(rate_hz: f64, one_sided: bool, bins: usize) -> Self {
+        let bins = bins.max(8).next_multiple_of(2);
+        let fft = FftPlanner::new().plan_fft_forward(bins);
+        let angle = |n: usize| std::f64::consts::TAU * n as f64 / bins as f64;
+        Self {
+            rate_hz,
+            one_sided,
+            scratch: vec![Complex::default(); fft.get_inplace_scratch_len()],
+            fft,
+            work: vec![Complex::default(); bins],
+            // Periodic Hann window.
+            window: (0..bins).map(|n| (0.5 - 0.5 * libm::cos(angle(n))) as f32).collect(),
+            kept: Vec::with_capacity(bins),
+            sum: vec![0.0; bins],
+            segments: 0,
+        }
+    }
+
+    /// Takes the next samples; blocks of any length are one stream. `q` may be empty for real samples.
+    pub fn add(&mut self, i: &[f32], q: &[f32]) {
+        let bins = self.window.len();
+        let quadrature = q.iter().copied().chain(std::iter::repeat(0.0));
+        for (&i, q) in i.iter().zip(quadrature) {
+            self.kept.push(Complex::new(i, q));
+            if self.kept.len() == bins {
+                self.segment();
+                self.kept.drain(..bins / 2);
+            }
+        }
+    }
+
+    fn segment(&mut self) {
+        for ((work, sample), window) in self.work.iter_mut().zip(&self.kept).zip(&self.window) {
+            *work = sample * window;
+        }
+        self.fft.process_with_scratch(&mut self.work, &mut self.scratch);
+        for (sum, bin) in self.sum.iter_mut().zip(&self.work) {
+            *sum += f64::from(bin.norm_sqr());
+        }
+        self.segments += 1;
+    }
+
+    /// Density against frequency, ascending, in LSB²/Hz: its integral is the mean power. `None` before the
+    /// first whole segment.
+    pub fn density(&self) -> Option<Vec<(f64, f64)>> {
+        if self.segments == 0 {
+            return None;
+        }
+        let bins = self.sum.len();
+        let window_power: f64 = self.window.iter().map(|w| f64::from(*w) * f64::from(*w)).sum();
+        let scale = 1.0 / (self.segments as f64 * window_power * self.rate_hz);
+        let at = |offset: i64| {
+            let power = self.sum.get(offset.rem_euclid(bins as i64) as usize).copied().unwrap_or(0.0);
+            (offset as f64 * self.rate_hz / bins as f64, power * scale)
+        };
+        let half = bins as i64 / 2;
+        Some(if self.one_sided {
+            let folded = |offset: i64| if offset == 0 || offset == half { 1.0 } else { 2.0 };
+            (0..=half).map(|offset| (at(offset).0, at(offset).1 * folded(offset))).collect()
+        } else {
+            (-half..half).map(at).collect()
+        })
+    }
+
+    /// Writes `psd.csv`; nothing before the first whole segment.
+    pub fn write(&self, path: &Path) -> Result<(), JudgeError> {
+        let Some(density) = self.density() else { return Ok(()) };
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let row_error = |source| JudgeError::Row { path: path.to_owned(), source };
+        for (frequency_hz, density) in density {
+            writer.serialize(PsdRow { frequency_hz, density_db: decibels(density) }).map_err(row_error)?;
+        }
+        let bytes = writer
+            .into_inner()
+            .map_err(|error| JudgeError::File { path: path.to_owned(), source: error.into_error() })?;
+        super::write_whole(path, &bytes)
+    }
+}
+
+/// 10 log10, with silence at −300 dB.
+fn decibels(power: f64) -> f64 {
+    10.0 * libm::log10(power.max(1e-30))
+}
+
+/// What theory expects at the frequencies of `psd.csv`, in the same decibels. Its level, which the truth does not
+/// state, is fitted: the median over frequencies less than 20 dB below the peak. Empty without a spectrum or without signals.
+pub fn theory_db(run: &Run) -> Vec<f64> {
+    let signals = expected(run);
+    let Some(center_hz) = run.scene.center_hz.filter(|_| !signals.is_empty() && !run.psd.is_empty()) else {
+        return Vec::new();
+    };
+    let rate_hz = run.scene.sample_rate_hz;
+    let floor = if run.scene.noise { 1.0 } else { 0.0 };
+    let sign = if run.scene.inverted { -1.0 } else { 1.0 };
+    let shape: Vec<f64> = run
+        .psd
+        .iter()
+        .map(|row| {
+            let of = |signal: &Expected| {
+                let from_carrier_hz = row.frequency_hz - sign * (signal.carrier_hz - center_hz);
+                signal.cn0_hz * code_density(&run.scene.code_edge, from_carrier_hz, signal.chip_rate_hz, rate_hz)
+            };
+            decibels(floor + signals.iter().map(of).sum::<f64>())
+        })
+        .collect();
+    // Near the nulls quantisation, not the codes, sets the level.
+    let peak_db = shape.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let offsets: Vec<f64> = run
+        .psd
+        .iter()
+        .zip(&shape)
+        .filter(|(_, shape)| **shape > peak_db - 20.0)
+        .map(|(row, shape)| row.density_db - shape)
+        .collect();
+    let level_db = median(&offsets).unwrap_or(0.0);
+    shape.into_iter().map(|shape| shape + level_db).collect()
+}
+
+struct Expected {
+    /// Carrier as received.
+    carrier_hz: f64,
+    chip_rate_hz: f64,
+    cn0_hz: f64,
+}
+
+/// The mean of each satellite's signal over the run.
+fn expected(run: &Run) -> Vec<Expected> {
+    let mut links: Vec<_> = run.truth.iter().map(|row| (row.sv, row.signal)).collect();
+    links.sort_unstable();
+    links.dedup();
+    let one = |&(sv, signal): &super::errors::Link| {
+        let rows = || run.truth.iter().filter(move |row| row.sv == sv && row.signal == signal);
+        let cn0: Vec<f64> = rows().map(|row| libm::pow(10.0, row.cn0_dbhz / 10.0)).collect();
+        let doppler: Vec<f64> = rows().map(|row| row.doppler_hz).collect();
+        Some(Expected {
+            carrier_hz: signal.carrier_hz + mean(&doppler)?,
+            chip_rate_hz: signal.components.first()?.chip_rate_hz,
+            cn0_hz: mean(&cn0)?,
+        })
+    };
+    links.iter().filter_map(one).collect()
+}
+
+/// Density of a unit-power rectangular-chip code, sampled, at `f_hz` from its carrier, per hertz.
+fn code_density(code_edge: &str, f_hz: f64, chip_rate_hz: f64, rate_hz: f64) -> f64 {
+    let chip = |f: f64| sinc_squared(f / chip_rate_hz) / chip_rate_hz;
+    let name: String = code_edge.chars().filter(char::is_ascii_alphabetic).collect();
+    match name.to_ascii_lowercase().as_str() {
+        // Filtered to half the sample rate: no alias but the one that the frequency itself may be.
+        "bandlimited" => chip(f_hz - rate_hz * (f_hz / rate_hz).round()),
+        // A mean over the sample's interval has its own sinc² before it aliases.
+        "area" => aliases(|f| chip(f) * sinc_squared(f / rate_hz), f_hz, rate_hz),
+        _ => aliases(chip, f_hz, rate_hz),
+    }
+}
+
+/// Sum over the aliases. The tail after ±50 is below 1 % of a density that is itself 50 dB down.
+fn aliases(density: impl Fn(f64) -> f64, f_hz: f64, rate_hz: f64) -> f64 {
+    (-50..=50).map(|k| density(f_hz + f64::from(k) * rate_hz)).sum()
+}
+
+fn sinc_squared(x: f64) -> f64 {
+    let angle = std::f64::consts::PI * x;
+    if angle.abs() < 1e-9 {
+        return 1.0;
+    }
+    let sinc = libm::sin(angle) / angle;
+    sinc * sinc
+}
+
+/// The lowest point of `psd.csv` within a tenth of a chip rate of each first null, for a scene without noise:
+/// the frequency in the samples minus the carrier's. Empty with noise, or where the band is too narrow.
+pub fn nulls_hz(run: &Run) -> Vec<f64> {
+    let Some(center_hz) = run.scene.center_hz.filter(|_| !run.scene.noise) else { return Vec::new() };
+    let Some(signal) = run.truth.first().map(|row| row.signal) else { return Vec::new() };
+    let Some(chip_rate_hz) = signal.components.first().map(|c| c.chip_rate_hz) else { return Vec::new() };
+    let sign = if run.scene.inverted { -1.0 } else { 1.0 };
+    let if_hz = sign * (signal.carrier_hz - center_hz);
+    let near = |null_hz: f64| {
+        let band = run.psd.iter().filter(move |row| (row.frequency_hz - if_hz - null_hz).abs() < chip_rate_hz / 10.0);
+        band.min_by(|a, b| a.density_db.total_cmp(&b.density_db)).map(|row| row.frequency_hz - if_hz)
+    };
+    [-chip_rate_hz, chip_rate_hz].into_iter().filter_map(near).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Uniform noise of unit variance, from a 64-bit congruential generator (Knuth's multiplier).
+    fn noise(count: usize) -> Vec<f32> {
+        let mut state = 1_u64;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 40) as f64 / f64::from(1 << 24) - 0.5) * 12.0_f64.sqrt()
+        };
+        (0..count).map(|_| next() as f32).collect()
+    }
+
+    #[test]
+    fn white_noise_has_its_power_over_its_band() {
+        let samples = noise(1 << 20);
+        let (i, q) = samples.split_at(1 << 19);
+        for (one_sided, expected_db) in [(false, decibels(2.0 / 4e6)), (true, decibels(2.0 / 4e6))] {
+            let mut psd = Psd::new(4e6, one_sided, 1024);
+            // Chunks of an odd length: the stream must not notice.
+            for (i, q) in i.chunks(777).zip(q.chunks(777)) {
+                psd.add(i, if one_sided { &[] } else { q });
+            }
+            let density = psd.density().unwrap();
+            let level = density.iter().map(|(_, d)| d).sum::<f64>() / density.len() as f64;
+            // The power of 2^19 samples is known to 1/sqrt(2^19) of itself: 0.006 dB.
+            assert!((decibels(level) - expected_db).abs() < 0.03, "{one_sided} {}", decibels(level));
+        }
+    }
+
+    #[test]
+    fn a_tone_has_its_power_at_its_frequency() {
+        let rate_hz = 2.6e6;
+        let tone_hz = -300_100.0;
+        let phase = |n: usize| std::f64::consts::TAU * (tone_hz * n as f64 / rate_hz).fract();
+        let i: Vec<f32> = (0..100_000).map(|n| 3.0 * libm::cos(phase(n)) as f32).collect();
+        let q: Vec<f32> = (0..100_000).map(|n| 3.0 * libm::sin(phase(n)) as f32).collect();
+        let mut psd = Psd::new(rate_hz, false, 2048);
+        psd.add(&i, &q);
+        let density = psd.density().unwrap();
+        let step_hz = rate_hz / 2048.0;
+        let power: f64 =
+            density.iter().filter(|(f, _)| (f - tone_hz).abs() < 6.0 * step_hz).map(|(_, d)| d * step_hz).sum();
+        assert!((decibels(power) - decibels(9.0)).abs() < 0.1, "{}", decibels(power));
+        let peak = density.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        assert!((peak.0 - tone_hz).abs() < step_hz);
+    }
+
+    #[test]
+    fn a_sampled_code_keeps_its_power_and_has_its_nulls() {
+        for edge in ["nearest", "band_limited"] {
+            let rate_hz = 10.0e6;
+            let step_hz = 1e3;
+            let power: f64 =
+                (-5000..5000).map(|k| step_hz * code_density(edge, f64::from(k) * step_hz, 1.023e6, rate_hz)).sum();
+            // Outside ±5 MHz lies 1/(pi^2 * 4.9) of the power or 2 %; aliases bring it back.
+            let expected = if edge == "nearest" { 1.0 } else { 0.98 };
+            assert!((power - expected).abs() < 5e-3, "{edge} {power}");
+        }
+        assert!(code_density("band_limited", 1.023e6, 1.023e6, 10e6) < 1e-20);
+    }
+
+    #[test]
+    fn too_few_samples_have_no_spectrum() {
+        let mut psd = Psd::new(1e6, false, 64);
+        psd.add(&[0.0; 63], &[0.0; 63]);
+        assert!(psd.density().is_none());
+    }
+}

@@ -1,0 +1,107 @@
+//! The table that a terminal shows after a run.
+
+use std::fmt;
+
+use crate::analysis::statistics::Spread;
+use crate::analysis::summary::Summary;
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rate_msps = self.sample_rate_hz / 1e6;
+        writeln!(f, "{} · {} s at {rate_msps} Msps · seed {}", self.scene, self.duration_s, self.seed)?;
+        self.satellite_lines(f)?;
+        writeln!(f, "\n{:<26}{:>12}{:>12}{:>12}", "error", "mean", "sigma", "95 %")?;
+        let details = &self.details;
+        line(f, "pseudorange* (m)", details.pseudorange_m)?;
+        line(f, "carrier phase (cycles)", details.carrier_cycles)?;
+        line(f, "Doppler (Hz)", details.doppler_hz)?;
+        line(f, "C/N0 (dB)", details.cn0_db)?;
+        line(f, "position east (m)", details.east_m)?;
+        line(f, "position north (m)", details.north_m)?;
+        line(f, "position up (m)", details.up_m)?;
+        line(f, "clock (m)", details.clock_m)?;
+        line(f, "velocity, magnitude (m/s)", details.velocity_mps)?;
+        if let (Some(mean), Some(p95)) = (self.position.horizontal_mean_m, self.position.horizontal_p95_m) {
+            writeln!(f, "{:<26}{mean:>12.3}{:>12}{p95:>12.3}", "horizontal distance (m)", "")?;
+        }
+        writeln!(f, "* the part common to all satellites of an epoch removed")?;
+        self.loop_lines(f)?;
+        self.speed_line(f)
+    }
+}
+
+impl Summary {
+    fn satellite_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = &self.satellites;
+        write!(f, "satellites    {} in view, {} acquired, {} used", count.in_view, count.acquired, count.used)?;
+        if !self.details.false_satellites.is_empty() {
+            let names: Vec<String> = self.details.false_satellites.iter().map(ToString::to_string).collect();
+            write!(f, ", false: {}", names.join(" "))?;
+        }
+        writeln!(f)?;
+        match self.position.first_fix_s {
+            Some(first_s) => writeln!(f, "first fix     {first_s:.1} s, {} fixes", self.position.fixes)?,
+            None => writeln!(f, "first fix     none")?,
+        }
+        let navigation = &self.navigation;
+        writeln!(
+            f,
+            "navigation    {} parameters checked, {} wrong",
+            navigation.parameters_checked, navigation.parameters_wrong
+        )?;
+        for row in self.details.wrong_parameters.iter().take(5) {
+            writeln!(f, "              {} issue {}: {} decoded as {}", row.sv, row.issue, row.parameter, row.raw)?;
+        }
+        if let (Some(measured), Some(set)) = (self.details.cn0_measured_dbhz, self.details.cn0_true_dbhz) {
+            writeln!(f, "C/N0          {measured:.2} dB-Hz measured, {set:.2} set, mean over satellites")?;
+        }
+        if self.details.unmatched_observations > 0 {
+            writeln!(f, "observations  {} have no truth", self.details.unmatched_observations)?;
+        }
+        for null_hz in &self.details.psd_nulls_hz {
+            writeln!(f, "spectrum      null at {:+.4} MHz from the carrier", null_hz / 1e6)?;
+        }
+        Ok(())
+    }
+
+    fn loop_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (tracking, limits) = (&self.tracking, &self.details.thresholds);
+        writeln!(f, "\n{:<26}{:>12}{:>12}", "loop (replica - truth)", "sigma", "threshold")?;
+        let rows = [
+            ("DLL (chips)", tracking.dll_sigma_chips, limits.dll_chips),
+            ("PLL (degrees)", tracking.pll_sigma_deg, limits.pll_deg),
+            ("FLL (Hz)", tracking.fll_sigma_hz, limits.fll_hz),
+        ];
+        for (name, sigma, limit) in rows {
+            writeln!(f, "{name:<26}{:>12}{limit:>12.4}", number(sigma, 4))?;
+        }
+        writeln!(f, "{} losses of lock, {} cycle slips", tracking.losses_of_lock, tracking.cycle_slips)
+    }
+
+    fn speed_line(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let speed = &self.speed;
+        let stages = [
+            ("generate", speed.generate_x_real_time),
+            ("receive", speed.receive_x_real_time),
+            ("run", speed.run_x_real_time),
+        ];
+        let mut parts: Vec<String> =
+            stages.iter().filter_map(|(name, times)| times.map(|times| format!("{name} {times:.1}x"))).collect();
+        if parts.is_empty() {
+            return Ok(());
+        }
+        parts.extend(speed.cpu_s.map(|cpu_s| format!("{cpu_s:.1} s of CPU")));
+        parts.extend(speed.peak_memory_mib.map(|mib| format!("{mib:.0} MiB")));
+        writeln!(f, "\nspeed         {} (x real time)", parts.join(", "))
+    }
+}
+
+fn line(f: &mut fmt::Formatter<'_>, name: &str, spread: Option<Spread>) -> fmt::Result {
+    let [mean, sigma, p95] =
+        [spread.map(|s| s.mean), spread.map(|s| s.sigma), spread.map(|s| s.p95)].map(|value| number(value, 4));
+    writeln!(f, "{name:<26}{mean:>12}{sigma:>12}{p95:>12}")
+}
+
+fn number(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+}

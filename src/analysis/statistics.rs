@@ -1,0 +1,114 @@
+//! Mean, spread and percentiles of a list of numbers.
+//!
+//! Every function gives `None` for an empty list and leaves out what is not finite, so that one
+//! bad row cannot hide the rest. Source of the percentile: linear interpolation between order
+//! statistics at rank p(n − 1), Hyndman and Fan's type 7.
+
+/// Mean, standard deviation and 95 % figure of one error.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// How many values there were.
+    pub count: usize,
+    pub mean: f64,
+    /// Standard deviation about the mean (n − 1 in the divisor; 0 for one value).
+    pub sigma: f64,
+    /// 95th percentile of the magnitude.
+    pub p95: f64,
+}
+
+fn finite(values: &[f64]) -> impl Iterator<Item = f64> + '_ {
+    values.iter().copied().filter(|value| value.is_finite())
+}
+
+/// Arithmetic mean.
+pub fn mean(values: &[f64]) -> Option<f64> {
+    let count = finite(values).count();
+    (count > 0).then(|| finite(values).sum::<f64>() / count as f64)
+}
+
+/// Root of the mean square about zero.
+pub fn rms(values: &[f64]) -> Option<f64> {
+    let count = finite(values).count();
+    (count > 0).then(|| (finite(values).map(|value| value * value).sum::<f64>() / count as f64).sqrt())
+}
+
+/// Standard deviation about the mean, n − 1 in the divisor; 0 for one value.
+pub fn std(values: &[f64]) -> Option<f64> {
+    let mean = mean(values)?;
+    let count = finite(values).count();
+    let squares: f64 = finite(values).map(|value| (value - mean) * (value - mean)).sum();
+    Some(if count > 1 { (squares / (count - 1) as f64).sqrt() } else { 0.0 })
+}
+
+/// The value below which a share `p` (0 to 1) of the list lies.
+pub fn percentile(values: &[f64], p: f64) -> Option<f64> {
+    let mut sorted: Vec<f64> = finite(values).collect();
+    sorted.sort_by(f64::total_cmp);
+    let rank = p.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
+    let below = *sorted.get(rank.floor() as usize)?;
+    let above = *sorted.get(rank.ceil() as usize)?;
+    Some(below + (above - below) * (rank - rank.floor()))
+}
+
+/// The middle value.
+pub fn median(values: &[f64]) -> Option<f64> {
+    percentile(values, 0.5)
+}
+
+/// Mean, σ and 95 % of the magnitude.
+pub fn spread(values: &[f64]) -> Option<Spread> {
+    let magnitudes: Vec<f64> = finite(values).map(f64::abs).collect();
+    Some(Spread {
+        count: magnitudes.len(),
+        mean: mean(values)?,
+        sigma: std(values)?,
+        p95: percentile(&magnitudes, 0.95)?,
+    })
+}
+
+/// Standard deviation of several groups together, each about its own mean.
+pub fn pooled_std<'a>(groups: impl IntoIterator<Item = &'a [f64]>) -> Option<f64> {
+    let (mut squares, mut freedom) = (0.0, 0);
+    for group in groups {
+        let count = finite(group).count();
+        if let (Some(sigma), true) = (std(group), count > 1) {
+            squares += sigma * sigma * (count - 1) as f64;
+            freedom += count - 1;
+        }
+    }
+    (freedom > 0).then(|| (squares / freedom as f64).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_answers() {
+        let values = [2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0];
+        assert_eq!(mean(&values), Some(5.0));
+        assert!((std(&values).unwrap() - (32.0_f64 / 7.0).sqrt()).abs() < 1e-15);
+        assert!((rms(&values).unwrap() - 29.0_f64.sqrt()).abs() < 1e-15);
+        // Rank 0.95 * 7 = 6.65 lies between 7 and 9.
+        assert!((percentile(&values, 0.95).unwrap() - 8.3).abs() < 1e-12);
+        assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(percentile(&[1.0, 2.0], 1.0), Some(2.0));
+        let spread = spread(&[-3.0, 1.0]).unwrap();
+        assert_eq!((spread.count, spread.mean), (2, -1.0));
+        assert!((spread.p95 - 2.9).abs() < 1e-12);
+    }
+
+    #[test]
+    fn groups_are_pooled_about_their_own_means() {
+        // Sums of squares 2 and 8 with 1 and 1 degrees of freedom.
+        let groups: [&[f64]; 3] = [&[1.0, 3.0], &[100.0, 104.0], &[7.0]];
+        assert_eq!(pooled_std(groups), Some(5.0_f64.sqrt()));
+    }
+
+    #[test]
+    fn nothing_gives_nothing_and_one_bad_value_hides_no_other() {
+        assert_eq!((mean(&[]), std(&[]), rms(&[]), percentile(&[], 0.5)), (None, None, None, None));
+        assert!(spread(&[f64::NAN]).is_none());
+        assert_eq!(mean(&[f64::NAN, 3.0]), Some(3.0));
+    }
+}

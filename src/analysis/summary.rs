@@ -1,0 +1,303 @@
+//! What a run comes to: the numbers that scripts gate on, and the finer ones that the report prints.
+//!
+//! The serialised keys and their order are a contract; a number that a scene cannot have is null.
+//! [`Details`] stays in memory.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+
+use crate::analysis::errors::{Errors, SignalError};
+use crate::analysis::load::{Run, Speed};
+use crate::analysis::psd;
+use crate::analysis::statistics::{Spread, mean, median, percentile, pooled_std, rms, spread};
+use crate::gnss::record::{Event, NavigationRow};
+use crate::gnss::satellite::Sv;
+
+/// Time after a lock that loop jitter leaves out as pull-in.
+pub const PULL_IN_S: f64 = 3.0;
+/// Rule-of-thumb bound of a Costas loop's 1σ error (theory: 3σ ≤ 45°).
+pub const PLL_THRESHOLD_DEG: f64 = 15.0;
+
+/// `summary.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    pub scene: String,
+    pub seed: u64,
+    pub duration_s: f64,
+    pub sample_rate_hz: f64,
+    pub fidelity: String,
+    pub satellites: Satellites,
+    pub position: Position,
+    pub observables: Observables,
+    pub tracking: Tracking,
+    pub navigation: Navigation,
+    pub speed: Speed,
+    #[serde(skip)]
+    pub details: Details,
+}
+
+/// How many satellites there were and what became of them.
+#[derive(Clone, Debug, Serialize)]
+pub struct Satellites {
+    /// Above the scene's mask at its first sample.
+    pub in_view: usize,
+    pub acquired: usize,
+    /// Most satellites in one fix.
+    pub used: usize,
+    /// Acquired though the truth never has them.
+    pub false_acquired: usize,
+}
+
+/// Errors of the fixes.
+#[derive(Clone, Debug, Serialize)]
+pub struct Position {
+    pub fixes: usize,
+    pub first_fix_s: Option<f64>,
+    pub horizontal_mean_m: Option<f64>,
+    pub horizontal_p95_m: Option<f64>,
+    pub vertical_p95_m: Option<f64>,
+    pub error_3d_p95_m: Option<f64>,
+    /// Mean of the errors east, north, up.
+    pub bias_enu_m: Option<[f64; 3]>,
+    /// Of the three-dimensional velocity error.
+    pub velocity_p95_mps: Option<f64>,
+}
+
+/// Errors of the observations, over every satellite and epoch.
+#[derive(Clone, Debug, Serialize)]
+pub struct Observables {
+    /// After the mean over the satellites of each epoch is removed.
+    pub pseudorange_rms_m: Option<f64>,
+    /// Mean of the satellites' mean code errors, nothing removed.
+    pub pseudorange_bias_m: Option<f64>,
+    pub carrier_rms_cycles: Option<f64>,
+    pub doppler_rms_hz: Option<f64>,
+    /// Mean of measured minus true. The truth knows thermal noise only: the other satellites' codes, the
+    /// quantiser and the filter lower what a receiver can measure, by some 0.1 to 0.5 dB in a full sky.
+    pub cn0_bias_db: Option<f64>,
+}
+
+/// How well the loops held: the loop's oscillator minus truth, each satellite about its own mean, without the
+/// first [`PULL_IN_S`] of each lock.
+#[derive(Clone, Debug, Serialize)]
+pub struct Tracking {
+    pub losses_of_lock: usize,
+    /// Declared by the receiver, or found against the truth and not declared.
+    pub cycle_slips: usize,
+    pub dll_sigma_chips: Option<f64>,
+    pub pll_sigma_deg: Option<f64>,
+    pub fll_sigma_hz: Option<f64>,
+}
+
+/// Decoded parameters against those sent.
+#[derive(Clone, Debug, Serialize)]
+pub struct Navigation {
+    pub parameters_checked: usize,
+    /// Different from what was sent, or never sent.
+    pub parameters_wrong: usize,
+}
+
+/// What the report adds to the summary.
+#[derive(Clone, Debug, Default)]
+pub struct Details {
+    /// Code error with the epoch's common part removed.
+    pub pseudorange_m: Option<Spread>,
+    pub carrier_cycles: Option<Spread>,
+    pub doppler_hz: Option<Spread>,
+    pub cn0_db: Option<Spread>,
+    pub cn0_true_dbhz: Option<f64>,
+    pub cn0_measured_dbhz: Option<f64>,
+    pub east_m: Option<Spread>,
+    pub north_m: Option<Spread>,
+    pub up_m: Option<Spread>,
+    pub clock_m: Option<Spread>,
+    pub velocity_mps: Option<Spread>,
+    pub thresholds: Thresholds,
+    /// Loop errors that went into the jitter, each satellite's mean removed.
+    pub jitter: Jitter,
+    /// Lowest point of the spectrum near each first null of the code, noise-free scenes only.
+    pub psd_nulls_hz: Vec<f64>,
+    /// Observations that the truth has no row for.
+    pub unmatched_observations: usize,
+    /// Wrong parameters, as decoded.
+    pub wrong_parameters: Vec<NavigationRow>,
+    pub false_satellites: Vec<Sv>,
+}
+
+/// Bounds for loop jitter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thresholds {
+    /// A sixth of the early-late spacing: 3σ stays inside the discriminator's linear zone.
+    pub dll_chips: f64,
+    pub pll_deg: f64,
+    /// A twelfth of the inverse integration time.
+    pub fll_hz: f64,
+}
+
+impl Default for Thresholds {
+    fn default() -> Self {
+        Self::new(0.5, 1e-3)
+    }
+}
+
+impl Thresholds {
+    fn new(spacing_chips: f64, integration_s: f64) -> Self {
+        Self { dll_chips: spacing_chips / 6.0, pll_deg: PLL_THRESHOLD_DEG, fll_hz: 1.0 / (12.0 * integration_s) }
+    }
+}
+
+/// Loop errors, one value an observation.
+#[derive(Clone, Debug, Default)]
+pub struct Jitter {
+    pub dll_chips: Vec<f64>,
+    pub pll_deg: Vec<f64>,
+    pub fll_hz: Vec<f64>,
+}
+
+impl Summary {
+    /// Condenses the errors of a run.
+    pub fn new(run: &Run, errors: &Errors) -> Self {
+        let mut details = Details::default();
+        let satellites = satellites(run, &mut details);
+        let position = position(run, errors, &mut details);
+        let observables = observables(errors, &mut details);
+        let tracking = tracking(run, errors, &mut details);
+        let navigation = navigation(run, &mut details);
+        details.psd_nulls_hz = psd::nulls_hz(run);
+        details.unmatched_observations = errors.unmatched;
+        Self {
+            scene: run.scene.name.clone(),
+            seed: run.scene.seed,
+            duration_s: run.scene.duration_s,
+            sample_rate_hz: run.scene.sample_rate_hz,
+            fidelity: run.scene.fidelity.clone(),
+            satellites,
+            position,
+            observables,
+            tracking,
+            navigation,
+            speed: run.speed,
+            details,
+        }
+    }
+}
+
+fn satellites(run: &Run, details: &mut Details) -> Satellites {
+    let first = run.sky.iter().map(|row| row.sample).min();
+    let mask_deg = run.scene.mask_deg.unwrap_or(f64::NEG_INFINITY);
+    let in_view: BTreeSet<Sv> = run
+        .sky
+        .iter()
+        .filter(|row| Some(row.sample) == first && row.elevation_deg >= mask_deg)
+        .map(|row| row.sv)
+        .collect();
+    let ever: BTreeSet<Sv> = run.sky.iter().map(|row| row.sv).chain(run.truth.iter().map(|row| row.sv)).collect();
+    let acquired: BTreeSet<Sv> = run.acquisition.iter().filter(|row| row.acquired).map(|row| row.sv).collect();
+    details.false_satellites = acquired.difference(&ever).copied().collect();
+    Satellites {
+        in_view: in_view.len(),
+        acquired: acquired.len(),
+        used: run.fixes.iter().map(|fix| fix.satellites as usize).max().unwrap_or(0),
+        false_acquired: details.false_satellites.len(),
+    }
+}
+
+fn position(run: &Run, errors: &Errors, details: &mut Details) -> Position {
+    let of = |f: &dyn Fn(&super::errors::PositionError) -> f64| errors.positions.iter().map(f).collect::<Vec<f64>>();
+    let [east, north, up] = [0, 1, 2].map(|axis| of(&|error| error.enu_m[axis]));
+    let horizontal = of(&|error| libm::hypot(error.enu_m.x, error.enu_m.y));
+    let vertical = of(&|error| error.enu_m.z.abs());
+    let error_3d = of(&|error| error.enu_m.norm());
+    let velocity = of(&|error| error.velocity_enu_mps.norm());
+    details.east_m = spread(&east);
+    details.north_m = spread(&north);
+    details.up_m = spread(&up);
+    details.clock_m = spread(&of(&|error| error.clock_m));
+    details.velocity_mps = spread(&velocity);
+    let bias = match (mean(&east), mean(&north), mean(&up)) {
+        (Some(east), Some(north), Some(up)) => Some([east, north, up]),
+        _ => None,
+    };
+    Position {
+        fixes: run.fixes.len(),
+        first_fix_s: run.fixes.iter().map(|fix| fix.sample).min().map(|sample| run.time_s(sample)),
+        horizontal_mean_m: mean(&horizontal),
+        horizontal_p95_m: percentile(&horizontal, 0.95),
+        vertical_p95_m: percentile(&vertical, 0.95),
+        error_3d_p95_m: percentile(&error_3d, 0.95),
+        bias_enu_m: bias,
+        velocity_p95_mps: percentile(&velocity, 0.95),
+    }
+}
+
+fn observables(errors: &Errors, details: &mut Details) -> Observables {
+    let code = errors.code_without_clock_m();
+    let carrier = errors.pooled(|error| error.carrier_cycles);
+    let doppler = errors.pooled(|error| error.doppler_hz);
+    let cn0 = errors.pooled(|error| error.cn0_dbhz - error.cn0_true_dbhz);
+    let means: Vec<f64> = errors
+        .signals
+        .values()
+        .filter_map(|rows| mean(&rows.iter().map(|row| row.code_m).collect::<Vec<_>>()))
+        .collect();
+    details.pseudorange_m = spread(&code);
+    details.carrier_cycles = spread(&carrier);
+    details.doppler_hz = spread(&doppler);
+    details.cn0_db = spread(&cn0);
+    details.cn0_true_dbhz = mean(&errors.pooled(|error| error.cn0_true_dbhz));
+    details.cn0_measured_dbhz = mean(&errors.pooled(|error| error.cn0_dbhz));
+    Observables {
+        pseudorange_rms_m: rms(&code),
+        pseudorange_bias_m: mean(&means),
+        carrier_rms_cycles: rms(&carrier),
+        doppler_rms_hz: rms(&doppler),
+        cn0_bias_db: mean(&cn0),
+    }
+}
+
+fn tracking(run: &Run, errors: &Errors, details: &mut Details) -> Tracking {
+    let chip_m = |signal: &crate::gnss::signal::Signal| {
+        signal.components.first().map_or(f64::NAN, |c| crate::gnss::earth::SPEED_OF_LIGHT_MPS / c.chip_rate_hz)
+    };
+    // One list a satellite of what `of` gives, pull-in left out.
+    let groups = |of: &dyn Fn(&SignalError, f64) -> f64| -> Vec<Vec<f64>> {
+        let settled = |rows: &[SignalError], chip_m: f64| {
+            rows.iter().filter(|row| row.locked_s >= PULL_IN_S).map(|row| of(row, chip_m)).collect()
+        };
+        errors.signals.iter().map(|((_, signal), rows)| settled(rows, chip_m(signal))).collect()
+    };
+    let dll = groups(&|row, chip_m| row.code_m / chip_m);
+    let pll = groups(&|row, _| row.carrier_cycles * 360.0);
+    let fll = groups(&|row, _| row.doppler_hz);
+    let sigma = |groups: &[Vec<f64>]| pooled_std(groups.iter().map(Vec::as_slice));
+
+    let integrations: Vec<f64> = run.tracking.iter().map(|row| row.integration_s).collect();
+    let integration_s = median(&integrations).or(run.tracking_setting("integration_s")).unwrap_or(1e-3);
+    details.thresholds = Thresholds::new(run.tracking_setting("spacing_chips").unwrap_or(0.5), integration_s);
+    let result = Tracking {
+        losses_of_lock: run.events.iter().filter(|row| row.event == Event::LossOfLock).count(),
+        cycle_slips: errors.cycle_slips,
+        dll_sigma_chips: sigma(&dll),
+        pll_sigma_deg: sigma(&pll),
+        fll_sigma_hz: sigma(&fll),
+    };
+    details.jitter = Jitter { dll_chips: centred(dll), pll_deg: centred(pll), fll_hz: centred(fll) };
+    result
+}
+
+/// Each group about its own mean, in one list.
+fn centred(groups: Vec<Vec<f64>>) -> Vec<f64> {
+    let centre = |group: Vec<f64>| {
+        let middle = mean(&group).unwrap_or(0.0);
+        group.into_iter().map(move |value| value - middle)
+    };
+    groups.into_iter().flat_map(centre).collect()
+}
+
+fn navigation(run: &Run, details: &mut Details) -> Navigation {
+    let sent: BTreeSet<&NavigationRow> = run.truth_navigation.iter().collect();
+    let decoded: BTreeSet<&NavigationRow> = run.navigation.iter().collect();
+    details.wrong_parameters = decoded.difference(&sent).map(|row| (*row).clone()).collect();
+    Navigation { parameters_checked: decoded.len(), parameters_wrong: details.wrong_parameters.len() }
+}

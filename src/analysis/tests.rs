@@ -1,0 +1,459 @@
+//! A run made by hand, with errors planted, and the summary that must find exactly those.
+
+use std::fs;
+use std::path::Path;
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::*;
+use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use crate::gnss::gps::l1ca::L1_CA;
+use crate::gnss::record::{
+    AcquisitionRow, Event, EventRow, Fix, NavigationRow, Observation, SkyRow, TrackingRow, TrajectoryRow,
+};
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+const RATE_HZ: u64 = 2_600_000;
+const TICKS: u64 = 600;
+const FIRST_TICK: u64 = 300;
+const PRNS: [u8; 9] = [2, 5, 7, 12, 15, 18, 21, 26, 29];
+const CHIP_M: f64 = SPEED_OF_LIGHT_MPS / 1.023e6;
+
+/// Near normal with unit variance: the sum of twelve uniforms minus six, from Knuth's congruential generator.
+struct Draw(u64);
+
+impl Draw {
+    fn normal(&mut self) -> f64 {
+        let mut uniform = || {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// What is planted.
+struct Planted {
+    code_bias_m: f64,
+    code_sigma_m: f64,
+    carrier_sigma_cycles: f64,
+    doppler_sigma_hz: f64,
+    cn0_bias_db: f64,
+    enu_bias_m: Vector3<f64>,
+    enu_sigma_m: f64,
+    fixes: bool,
+}
+
+const PLANTED: Planted = Planted {
+    code_bias_m: 0.25,
+    code_sigma_m: 0.7,
+    carrier_sigma_cycles: 0.008,
+    doppler_sigma_hz: 0.4,
+    cn0_bias_db: -0.3,
+    enu_bias_m: Vector3::new(0.2, -0.1, 0.5),
+    enu_sigma_m: 0.4,
+    fixes: true,
+};
+
+fn write<T: Serialize>(path: &Path, rows: &[T]) {
+    let mut writer = csv::Writer::from_path(path).unwrap();
+    rows.iter().for_each(|row| writer.serialize(row).unwrap());
+    writer.flush().unwrap();
+}
+
+fn start() -> Epoch {
+    Epoch::parse("2010-07-01T08:12:30").unwrap()
+}
+
+/// The true observation of a satellite at a tick of 0.1 s.
+fn true_observation(index: usize, tick: u64) -> Observation {
+    let t_s = tick as f64 * 0.1;
+    let doppler_hz = 3500.0 - 800.0 * index as f64 - 0.6 * t_s;
+    let range_m = 21.0e6 + 4.0e5 * index as f64 - doppler_hz * L1_CA.wavelength_m() * t_s;
+    let received = start().plus_s(t_s);
+    let sent = received.plus_s(-range_m / SPEED_OF_LIGHT_MPS);
+    Observation {
+        sample: tick * RATE_HZ / 10,
+        sv: Sv::gps(PRNS[index]),
+        signal: &L1_CA,
+        sent_s: sent.seconds(),
+        sent_fraction_s: sent.fraction(),
+        pseudorange_m: range_m,
+        carrier_cycles: range_m / L1_CA.wavelength_m(),
+        doppler_hz,
+        cn0_dbhz: 40.0 + 1.1 * index as f64 + 0.005 * t_s,
+        locked_s: t_s,
+    }
+}
+
+fn parameter(prn: u8, name: &str, raw: i64) -> NavigationRow {
+    NavigationRow { sv: Sv::gps(prn), issue: 17, parameter: name.to_owned(), raw }
+}
+
+/// Writes the truth's half of a run.
+fn write_truth(run: &Path) {
+    let truth = run.join("truth");
+    fs::create_dir_all(&truth).unwrap();
+    let all = || (0..TICKS).flat_map(|tick| (0..PRNS.len()).map(move |index| (tick, index)));
+    write(&truth.join("observations.csv"), &all().map(|(tick, i)| true_observation(i, tick)).collect::<Vec<_>>());
+    let sky = |(tick, index): (u64, usize)| SkyRow {
+        sample: tick * RATE_HZ / 10,
+        sv: Sv::gps(PRNS[index]),
+        azimuth_deg: 40.0 * index as f64 + 0.02 * tick as f64,
+        // The first stands below the mask of 5 degrees.
+        elevation_deg: 4.0 + 9.5 * index as f64 + 0.004 * tick as f64,
+        range_m: 2.1e7,
+        satellite_clock_m: 0.0,
+        ionosphere_m: 3.0,
+        troposphere_m: 4.0,
+    };
+    write(&truth.join("sky.csv"), &all().map(sky).collect::<Vec<_>>());
+    let place = |tick: u64| {
+        let origin = Geodetic::from_degrees(26.5, 80.2, 130.0);
+        let turn = libm::sincos(tick as f64 * 0.01);
+        let enu = Vector3::new(150.0 * turn.0, 90.0 * (1.0 - turn.1), 0.02 * tick as f64);
+        origin.to_ecef() + origin.ecef_to_enu().transpose() * enu
+    };
+    let trajectory = |tick: u64| {
+        let (at, time) = (place(tick), start().plus_s(tick as f64 * 0.1));
+        TrajectoryRow {
+            sample: tick * RATE_HZ / 10,
+            gps_s: time.seconds(),
+            gps_fraction_s: time.fraction(),
+            x_m: at.x,
+            y_m: at.y,
+            z_m: at.z,
+            vx_mps: 1.0,
+            vy_mps: -2.0,
+            vz_mps: 0.5,
+            clock_bias_s: 1e-4,
+            clock_drift: 1e-8,
+        }
+    };
+    write(&truth.join("trajectory.csv"), &(0..TICKS).map(trajectory).collect::<Vec<_>>());
+    let navigation: Vec<_> =
+        PRNS.iter().flat_map(|&prn| [parameter(prn, "sqrt_a", 2_702_000_000), parameter(prn, "m_0", -77)]).collect();
+    write(&truth.join("navigation.csv"), &navigation);
+    let scene = r#"{"name": "planted", "seed": 7, "duration_s": 60.0, "sample_rate_hz": 2600000.0,
+        "center_hz": 1575420000.0, "format": "ci8", "code_edge": "area", "knot_tolerance_cycles": 1e-4,
+        "mask_deg": 5.0, "signals": ["GPS L1 C/A"], "noise": true, "start": "2010-07-01T08:12:30",
+        "fidelity": "area edges"}"#;
+    fs::write(truth.join("scene.json"), scene).unwrap();
+}
+
+/// Writes the receiver's half: the truth with what is planted.
+fn write_estimate(run: &Path, planted: &Planted) {
+    let rx = run.join("rx");
+    fs::create_dir_all(&rx).unwrap();
+    let mut draw = Draw(1);
+    let mut observations = Vec::new();
+    for (tick, index) in (FIRST_TICK..TICKS).flat_map(|tick| (0..PRNS.len()).map(move |index| (tick, index))) {
+        let mut row = true_observation(index, tick);
+        let late_m = planted.code_bias_m + planted.code_sigma_m * draw.normal();
+        let sent = row.sent().plus_s(-late_m / SPEED_OF_LIGHT_MPS);
+        (row.sent_s, row.sent_fraction_s) = (sent.seconds(), sent.fraction());
+        // Every satellite has its own whole number; the fourth slips half a cycle at tick 450.
+        let slip = if index == 3 && tick >= 450 { 0.5 } else { 0.0 };
+        row.carrier_cycles += 1000.5 * index as f64 - 3e7 + slip + planted.carrier_sigma_cycles * draw.normal();
+        row.doppler_hz += planted.doppler_sigma_hz * draw.normal();
+        row.cn0_dbhz += planted.cn0_bias_db;
+        row.locked_s -= 1.0;
+        observations.push(row);
+    }
+    write(&rx.join("observations.csv"), &observations);
+
+    let truth: Vec<TrajectoryRow> =
+        csv::Reader::from_path(run.join("truth/trajectory.csv")).unwrap().deserialize().map(Result::unwrap).collect();
+    let fix = |row: &TrajectoryRow| {
+        let to_ecef = Geodetic::from_ecef(&row.position_m()).ecef_to_enu().transpose();
+        let noise = Vector3::new(draw.normal(), draw.normal(), draw.normal()) * planted.enu_sigma_m;
+        let at = row.position_m() + to_ecef * (planted.enu_bias_m + noise);
+        let time = row.time().plus_s(3.0 / SPEED_OF_LIGHT_MPS);
+        Fix {
+            sample: row.sample,
+            gps_s: time.seconds(),
+            gps_fraction_s: time.fraction(),
+            x_m: at.x,
+            y_m: at.y,
+            z_m: at.z,
+            vx_mps: row.vx_mps + 0.03,
+            vy_mps: row.vy_mps,
+            vz_mps: row.vz_mps + 0.04,
+            clock_bias_s: 1e-4,
+            clock_drift: 1e-8,
+            sigma_east_m: 0.4,
+            sigma_north_m: 0.4,
+            sigma_up_m: 0.4,
+            sigma_clock_m: 0.4,
+            gdop: 2.0,
+            pdop: 1.8,
+            hdop: 1.0,
+            vdop: 1.5,
+            tdop: 1.0,
+            satellites: 8,
+            chi_square: 4.0,
+            excluded: String::new(),
+            ionosphere: true,
+        }
+    };
+    let fixes: Vec<Fix> =
+        if planted.fixes { truth.iter().skip(FIRST_TICK as usize).map(fix).collect() } else { Vec::new() };
+    write(&rx.join("fixes.csv"), &fixes);
+    write_channels(&rx, &mut Draw(5));
+}
+
+/// Acquisition with one false hit, tracking, navigation with one wrong parameter and one never sent, events.
+fn write_channels(rx: &Path, draw: &mut Draw) {
+    let search = |prn: u8| {
+        let real = PRNS.contains(&prn);
+        AcquisitionRow {
+            sample: 0,
+            sv: Sv::gps(prn),
+            signal: &L1_CA,
+            acquired: real || prn == 31,
+            statistic: if real { 90.0 + 4.0 * f64::from(prn) } else { 40.0 } + if prn == 31 { 30.0 } else { 0.0 },
+            threshold: 65.421,
+            doppler_hz: 0.0,
+            code_phase_chips: 0.0,
+            cn0_dbhz: 45.0,
+        }
+    };
+    write(&rx.join("acquisition.csv"), &(1..=37).map(search).collect::<Vec<_>>());
+    let mut tracking = Vec::new();
+    for (tick, prn) in (5..TICKS).flat_map(|tick| PRNS.map(|prn| (tick, prn))) {
+        tracking.push(TrackingRow {
+            sample: tick * RATE_HZ / 10,
+            sv: Sv::gps(prn),
+            signal: &L1_CA,
+            prompt_i: 20.0,
+            prompt_q: draw.normal(),
+            dll_discriminator_chips: 0.03 * draw.normal(),
+            pll_discriminator_cycles: 0.02 * draw.normal(),
+            fll_discriminator_hz: 5.0 * draw.normal(),
+            cn0_dbhz: 45.0,
+            phase_lock: 0.98,
+            integration_s: 0.02,
+        });
+    }
+    write(&rx.join("tracking.csv"), &tracking);
+    let mut navigation: Vec<_> = PRNS.iter().map(|&prn| parameter(prn, "sqrt_a", 2_702_000_000)).collect();
+    navigation.push(parameter(5, "m_0", -78));
+    navigation.push(parameter(7, "omega_dot", 3));
+    write(&rx.join("navigation.csv"), &navigation);
+    let event = |prn: u8, event: Event| EventRow { sample: 700_000, sv: Sv::gps(prn), signal: &L1_CA, event };
+    write(
+        &rx.join("events.csv"),
+        &[event(2, Event::Acquired), event(31, Event::Acquired), event(31, Event::LossOfLock)],
+    );
+    fs::write(rx.join("receiver.json"), r#"{"settings": {"tracking": {"spacing_chips": 0.3}}}"#).unwrap();
+}
+
+fn planted_run(planted: &Planted) -> tempfile::TempDir {
+    let run = tempfile::tempdir().unwrap();
+    write_truth(run.path());
+    write_estimate(run.path(), planted);
+    run
+}
+
+#[test]
+fn the_summary_finds_exactly_what_was_planted() {
+    let run = planted_run(&PLANTED);
+    let summary = judge(run.path()).unwrap();
+    let count = 2700.0_f64;
+    let near = |name: &str, value: Option<f64>, expected: f64, tolerance: f64| {
+        let value = value.unwrap();
+        assert!((value - expected).abs() < tolerance, "{name}: {value}, expected {expected} ± {tolerance}");
+    };
+    let satellites = &summary.satellites;
+    assert_eq!((satellites.in_view, satellites.acquired, satellites.used, satellites.false_acquired), (8, 10, 8, 1));
+    assert_eq!((summary.navigation.parameters_checked, summary.navigation.parameters_wrong), (11, 2));
+    assert_eq!((summary.tracking.losses_of_lock, summary.tracking.cycle_slips), (1, 1));
+    assert_eq!((summary.position.fixes, summary.position.first_fix_s), (300, Some(30.0)));
+
+    // A mean of n values is known to σ/√n and a σ to σ/√(2n): five times that.
+    let mean_tolerance = |sigma: f64, n: f64| 5.0 * sigma / n.sqrt();
+    let sigma_tolerance = |sigma: f64, n: f64| 5.0 * sigma / (2.0 * n).sqrt();
+    let observables = &summary.observables;
+    near("code bias", observables.pseudorange_bias_m, 0.25, mean_tolerance(0.7, count));
+    // The epoch's mean takes a ninth of the variance.
+    let expected = 0.7 * (8.0_f64 / 9.0).sqrt();
+    near("code rms", observables.pseudorange_rms_m, expected, sigma_tolerance(0.7, count));
+    near("carrier rms", observables.carrier_rms_cycles, 0.008, sigma_tolerance(0.008, count));
+    near("Doppler rms", observables.doppler_rms_hz, 0.4, sigma_tolerance(0.4, count));
+    near("C/N0 bias", observables.cn0_bias_db, -0.3, 1e-9);
+    near("DLL", summary.tracking.dll_sigma_chips, 0.7 / CHIP_M, sigma_tolerance(0.7 / CHIP_M, count));
+    near("PLL", summary.tracking.pll_sigma_deg, 0.008 * 360.0, sigma_tolerance(2.88, count));
+    near("FLL", summary.tracking.fll_sigma_hz, 0.4, sigma_tolerance(0.4, count));
+    let bias = summary.position.bias_enu_m.unwrap();
+    for (bias, expected) in bias.into_iter().zip([0.2, -0.1, 0.5]) {
+        near("position bias", Some(bias), expected, mean_tolerance(0.4, 300.0));
+    }
+    near("velocity", summary.position.velocity_p95_mps, 0.05, 1e-9);
+    // Two epochs of a 1e-16 s resolution: 6e-8 m.
+    near("clock", summary.details.clock_m.map(|clock| clock.mean), 3.0, 1e-6);
+    let thresholds = summary.details.thresholds;
+    assert!((thresholds.dll_chips - 0.05).abs() < 1e-12 && (thresholds.fll_hz - 1.0 / 0.24).abs() < 1e-12);
+    let text = summary.to_string();
+    for part in ["8 in view, 10 acquired, 8 used, false: G31", "11 parameters checked, 2 wrong", "G05 issue 17: m_0"] {
+        assert!(text.contains(part), "{part} not in\n{text}");
+    }
+}
+
+#[test]
+fn the_keys_of_the_summary_are_a_contract() {
+    let run = planted_run(&PLANTED);
+    fs::write(run.path().join("speed.json"), r#"{"run_x_real_time": 7.5}"#).unwrap();
+    judge(run.path()).unwrap();
+    assert!(!run.path().join("summary.json.part").exists());
+    let value: serde_json::Value = serde_json::from_slice(&fs::read(run.path().join("summary.json")).unwrap()).unwrap();
+    let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>().join(" ");
+    assert_eq!(
+        keys(&value),
+        "scene seed duration_s sample_rate_hz fidelity satellites position observables tracking navigation speed"
+    );
+    for (section, expected) in [
+        ("satellites", "in_view acquired used false_acquired"),
+        (
+            "position",
+            "fixes first_fix_s horizontal_mean_m horizontal_p95_m vertical_p95_m error_3d_p95_m bias_enu_m velocity_p95_mps",
+        ),
+        ("observables", "pseudorange_rms_m pseudorange_bias_m carrier_rms_cycles doppler_rms_hz cn0_bias_db"),
+        ("tracking", "losses_of_lock cycle_slips dll_sigma_chips pll_sigma_deg fll_sigma_hz"),
+        ("navigation", "parameters_checked parameters_wrong"),
+        ("speed", "generate_x_real_time receive_x_real_time run_x_real_time cpu_s peak_memory_mib"),
+    ] {
+        assert_eq!(keys(&value[section]), expected);
+    }
+    assert_eq!(value["speed"]["run_x_real_time"], 7.5);
+    assert!(value["speed"]["cpu_s"].is_null());
+}
+
+#[test]
+fn a_run_without_a_fix_or_an_observation_has_nulls() {
+    let run = planted_run(&Planted { fixes: false, ..PLANTED });
+    for name in ["observations", "tracking", "navigation", "events", "acquisition"] {
+        fs::write(run.path().join(format!("rx/{name}.csv")), "").unwrap();
+    }
+    judge(run.path()).unwrap();
+    let value: serde_json::Value = serde_json::from_slice(&fs::read(run.path().join("summary.json")).unwrap()).unwrap();
+    assert_eq!((&value["position"]["fixes"], &value["satellites"]["used"]), (&0.into(), &0.into()));
+    for key in ["first_fix_s", "horizontal_p95_m", "bias_enu_m", "velocity_p95_mps"] {
+        assert!(value["position"][key].is_null(), "{key}");
+    }
+    assert!(value["tracking"]["dll_sigma_chips"].is_null() && value["observables"]["cn0_bias_db"].is_null());
+}
+
+#[test]
+fn what_is_missing_is_named_with_its_remedy() {
+    let run = planted_run(&PLANTED);
+    fs::remove_file(run.path().join("rx/fixes.csv")).unwrap();
+    let error = judge(run.path()).unwrap_err().to_string();
+    assert!(error.contains("fixes.csv is missing") && error.contains("gnss-twin receive"), "{error}");
+    fs::remove_file(run.path().join("truth/scene.json")).unwrap();
+    let error = judge(run.path()).unwrap_err().to_string();
+    assert!(error.contains("scene.json is missing") && error.contains("gnss-twin generate"), "{error}");
+}
+
+#[test]
+fn a_truth_of_another_run_is_refused() {
+    let run = planted_run(&PLANTED);
+    let path = run.path().join("rx/observations.csv");
+    let mut rows: Vec<Observation> = csv::Reader::from_path(&path).unwrap().deserialize().map(Result::unwrap).collect();
+    rows.iter_mut().for_each(|row| row.sample += 1);
+    write(&path, &rows);
+    assert!(matches!(judge(run.path()), Err(JudgeError::NothingJoins { what: "observations", count: 2700 })));
+}
+
+#[test]
+fn every_picture_is_a_png_that_is_not_blank() {
+    let run = planted_run(&PLANTED);
+    let mut psd = psd::Psd::new(RATE_HZ as f64, false, 256);
+    let mut draw = Draw(9);
+    let mut block = || (0..20_000).map(|_| draw.normal() as f32).collect::<Vec<f32>>();
+    psd.add(&block(), &block());
+    psd.write(&run.path().join("psd.csv")).unwrap();
+    judge(run.path()).unwrap();
+    for name in [
+        "psd",
+        "acquisition",
+        "discriminators",
+        "cn0",
+        "observables",
+        "jitter",
+        "sky",
+        "position_scatter",
+        "position_time",
+        "trajectory",
+    ] {
+        let path = run.path().join(format!("{name}.png"));
+        let picture = resvg::tiny_skia::Pixmap::load_png(&path).unwrap();
+        let inked = picture.pixels().iter().filter(|p| (p.red(), p.green(), p.blue()) != (255, 255, 255)).count();
+        // Axes and title alone ink more than 1 %.
+        assert!(inked * 100 > picture.pixels().len(), "{name}: {inked} pixels");
+        let coloured = picture.pixels().iter().filter(|p| p.red().abs_diff(p.blue()) > 60).count();
+        assert!(coloured > 200, "{name}: {coloured} coloured pixels");
+    }
+    if let Ok(kept) = std::env::var("GNSS_TWIN_KEEP_PICTURES") {
+        for entry in fs::read_dir(run.path()).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_file() {
+                fs::copy(&path, Path::new(&kept).join(path.file_name().unwrap())).unwrap();
+            }
+        }
+    }
+}
+
+#[test]
+fn the_pull_in_after_a_lock_is_an_error_but_no_jitter() {
+    let run = planted_run(&PLANTED);
+    let path = run.path().join("rx/observations.csv");
+    let mut rows: Vec<Observation> = csv::Reader::from_path(&path).unwrap().deserialize().map(Result::unwrap).collect();
+    for row in rows.iter_mut().filter(|row| row.sv == Sv::gps(18) && row.sample >= 500 * RATE_HZ / 10) {
+        row.locked_s = (row.sample - 500 * RATE_HZ / 10) as f64 / RATE_HZ as f64;
+        row.doppler_hz += if row.locked_s < 2.9 { 20.0 } else { 0.0 };
+        row.carrier_cycles += 12_345.0;
+    }
+    write(&path, &rows);
+    let summary = judge(run.path()).unwrap();
+    // 29 of 2700 rows are 20 Hz off: 2 Hz RMS.
+    assert!(summary.observables.doppler_rms_hz.unwrap() > 2.0);
+    // 5 sigma / sqrt(2 n) = 0.028 of 0.4 Hz.
+    assert!((summary.tracking.fll_sigma_hz.unwrap() - 0.4).abs() < 0.028);
+    assert_eq!(summary.tracking.cycle_slips, 1, "a new lock is no slip");
+}
+
+#[test]
+fn the_spectrum_of_random_chips_is_the_theory_s_and_has_its_nulls() {
+    let directory = planted_run(&PLANTED);
+    let mut run = load::Run::read(directory.path()).unwrap();
+    run.truth.iter_mut().for_each(|row| row.doppler_hz = 0.0);
+    (run.scene.noise, run.scene.code_edge, run.scene.sample_rate_hz) = (false, "nearest".to_owned(), 10.23e6);
+    let mut draw = Draw(3);
+    let chips = (0..400_000).map(|_| if draw.normal() < 0.0 { -30.0_f32 } else { 30.0 });
+    let samples: Vec<f32> = chips.flat_map(|chip| [chip; 10]).collect();
+    let silence = vec![0.0; samples.len()];
+    let mut spectrum = |bins: usize| {
+        let mut psd = psd::Psd::new(10.23e6, false, bins);
+        psd.add(&samples, &silence);
+        let row = |(frequency_hz, density): (f64, f64)| load::PsdRow {
+            frequency_hz,
+            density_db: 10.0 * libm::log10(density),
+        };
+        run.psd = psd.density().unwrap().into_iter().map(row).collect();
+        (psd::theory_db(&run), run.psd.clone(), psd::nulls_hz(&run))
+    };
+    let (theory_db, measured, _) = spectrum(512);
+    let peak_db = theory_db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // 15 600 segments, half overlapped: 1 % or 0.04 dB; the window's width costs 0.06 dB 20 dB down.
+    for (row, theory_db) in measured.iter().zip(&theory_db).filter(|(_, theory_db)| **theory_db > peak_db - 20.0) {
+        assert!((row.density_db - theory_db).abs() < 0.3, "{} Hz", row.frequency_hz);
+    }
+    // Bins are 2.5 kHz apart.
+    let (_, _, nulls_hz) = spectrum(4096);
+    assert_eq!(nulls_hz.len(), 2);
+    for (found_hz, expected_hz) in nulls_hz.iter().zip([-1.023e6, 1.023e6]) {
+        assert!((found_hz - expected_hz).abs() < 5e3, "{found_hz}");
+    }
+}

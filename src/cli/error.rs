@@ -1,0 +1,101 @@
+//! What ends the program, and with which exit code.
+//!
+//! 0 done · 2 usage · 3 a result is incomplete · 65 input data is bad · 70 our bug · 73 output cannot
+//! be created · 74 read or write failed · 75 passing trouble, try again · 129, 130, 141, 143 by signal.
+
+use std::fmt::Display;
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+/// An end that is not success: one message and its exit code.
+#[derive(Debug)]
+pub struct CliError {
+    code: u8,
+    message: String,
+}
+
+impl CliError {
+    /// The arguments do not fit together.
+    pub fn usage(message: impl Display) -> Self {
+        Self { code: 2, message: message.to_string() }
+    }
+
+    /// Input data is bad; trying again will not help.
+    pub fn input(message: impl Display) -> Self {
+        Self { code: 65, message: message.to_string() }
+    }
+
+    /// A file could not be read.
+    pub fn read(what: impl Display, error: &io::Error) -> Self {
+        let code = match error.kind() {
+            io::ErrorKind::NotFound | io::ErrorKind::IsADirectory | io::ErrorKind::InvalidData => 65,
+            _ if passing(error) => 75,
+            _ => 74,
+        };
+        Self { code, message: format!("cannot read {what}: {error}") }
+    }
+
+    /// An output could not be created.
+    pub fn create(what: impl Display, error: &io::Error) -> Self {
+        Self { code: if passing(error) { 75 } else { 73 }, message: format!("cannot create {what}: {error}") }
+    }
+
+    /// An output exists and is not ours to replace, or has no place to be.
+    pub fn refused_output(message: impl Display) -> Self {
+        Self { code: 73, message: message.to_string() }
+    }
+
+    /// A write failed; a closed pipe ends quietly.
+    pub fn output(what: impl Display, error: &io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::BrokenPipe => Self { code: 141, message: String::new() },
+            _ => Self { code: if passing(error) { 75 } else { 74 }, message: format!("cannot write {what}: {error}") },
+        }
+    }
+
+    /// The machine lacks something now that it may have later.
+    pub fn passing(message: impl Display) -> Self {
+        Self { code: 75, message: message.to_string() }
+    }
+
+    /// A signal asked the program to end.
+    pub fn signal(number: i32) -> Self {
+        Self { code: 128 + number as u8, message: String::new() }
+    }
+
+    /// Something that cannot happen.
+    pub fn bug(message: impl Display) -> Self {
+        Self { code: 70, message: format!("internal error, please report it: {message}") }
+    }
+
+    /// The exit code of this end.
+    pub fn exit_code(&self) -> ExitCode {
+        ExitCode::from(self.code)
+    }
+
+    /// Prints the message on standard error, control characters escaped; a failure to do so is silent.
+    pub fn print(&self) {
+        if self.message.is_empty() {
+            return;
+        }
+        let clean: String = self
+            .message
+            .chars()
+            .map(|c| if c.is_control() && c != '\n' { c.escape_default().to_string() } else { c.to_string() })
+            .collect();
+        let _ = writeln!(io::stderr(), "error: {clean}");
+    }
+}
+
+/// Whether an I/O error may go away by itself or by making room.
+fn passing(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::StorageFull
+            | io::ErrorKind::QuotaExceeded
+            | io::ErrorKind::FileTooLarge
+            | io::ErrorKind::WouldBlock
+            | io::ErrorKind::Interrupted
+            | io::ErrorKind::OutOfMemory
+    ) || matches!(error.raw_os_error(), Some(23 | 24)) // ENFILE, EMFILE
+}

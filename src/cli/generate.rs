@@ -1,0 +1,75 @@
+//! `generate`: samples, metadata and truth of a scene, without a receiver.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+
+use crate::cli::args;
+use crate::cli::error::CliError;
+use crate::cli::interrupt;
+use crate::cli::progress::Progress;
+use crate::cli::run::{generator_error, truth_error};
+use crate::cli::scenario;
+use crate::cli::staging::Staging;
+use crate::generator::{self, truth};
+use crate::gnss::sigmf;
+
+/// Writes a scene's samples to a file.
+pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
+    scenario::use_threads(arguments.threads)?;
+    let named = scenario::read(Some(&arguments.scenario))?;
+    let (scene, warnings) = scenario::compose(&named, arguments.seed, arguments.format)?;
+    for warning in warnings {
+        scenario::warn(&warning);
+    }
+    let meta_path = arguments.out.with_extension("sigmf-meta");
+    let truth_path = arguments.out.with_extension("truth");
+    if meta_path == arguments.out || truth_path == arguments.out {
+        return Err(CliError::usage(format!(
+            "--out {}: the samples need another name than their metadata (.sigmf-meta) and truth (.truth): use .sigmf-data",
+            arguments.out.display()
+        )));
+    }
+    let samples = Staging::file(&arguments.out)?;
+    let meta = Staging::file(&meta_path)?;
+    let truth = Staging::directory(&truth_path)?;
+
+    let file = File::create(samples.path()).map_err(|error| CliError::create(arguments.out.display(), &error))?;
+    let mut file = Interruptible(file);
+    let mut writer = truth::Writer::create(truth.path()).map_err(truth_error)?;
+    let progress = Progress::new(&format!("generate {}", scene.name), Some(scene.samples));
+    let generated = generator::generate(&scene, &mut file, &mut writer, &mut |done| progress.set(done));
+    drop(progress);
+    if let Some(signal) = interrupt::pending() {
+        return Err(signal);
+    }
+    let generated = generated.map_err(generator_error)?;
+    drop(writer);
+    fs::write(meta.path(), sigmf::write(&scene.metadata))
+        .map_err(|error| CliError::output(meta_path.display(), &error))?;
+    truth.commit()?;
+    samples.commit()?;
+    meta.commit()?;
+
+    scenario::print(&format!(
+        "{generated}\nsamples in {}, metadata in {}, truth in {}\n",
+        arguments.out.display(),
+        meta_path.display(),
+        truth_path.display()
+    ))
+}
+
+/// A file whose writes stop when a signal has come.
+struct Interruptible(File);
+
+impl Write for Interruptible {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if interrupt::pending().is_some() {
+            return Err(io::ErrorKind::BrokenPipe.into());
+        }
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}

@@ -1,0 +1,139 @@
+//! `receive`: a cold start on anyone's recording.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use crate::cli::args;
+use crate::cli::error::CliError;
+use crate::cli::interrupt;
+use crate::cli::progress::Progress;
+use crate::cli::run::{output_error, receiver_error};
+use crate::cli::scenario;
+use crate::cli::staging::Staging;
+use crate::gnss::gps::l1ca::L1_CA;
+use crate::gnss::samples::IfMetadata;
+use crate::gnss::sigmf;
+use crate::gnss::time::{Epoch, Rate};
+use crate::receiver;
+use crate::receiver::output::Output;
+use crate::receiver::settings::Settings;
+
+/// Receives a recording.
+pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
+    scenario::use_threads(arguments.threads)?;
+    let settings = match &arguments.receiver {
+        None => Settings::default(),
+        Some(path) => {
+            let name = path.display().to_string();
+            let text = fs::read_to_string(path).map_err(|error| CliError::read(&name, &error))?;
+            Settings::parse(&text, &name).map_err(CliError::input)?
+        }
+    };
+    let recording = open(arguments)?;
+    let staging = Staging::directory(&arguments.out)?;
+    let mut output = Output::create(staging.path()).map_err(output_error)?;
+    let progress = Progress::new("receive", recording.samples);
+    let mut samples = Interruptible(recording.reader);
+    let outcome =
+        receiver::receive(&recording.metadata, &mut samples, &settings, &mut output, &mut |done| progress.set(done));
+    drop(progress);
+    if let Some(signal) = interrupt::pending() {
+        return Err(signal);
+    }
+    let outcome = outcome.map_err(receiver_error)?;
+    drop(output);
+    staging.commit()?;
+    let mut text = format!("{outcome}\n");
+    if let Some(diagnosis) = &outcome.diagnosis {
+        text += &format!("{diagnosis}\n");
+    }
+    text += &format!("results in {}\n", arguments.out.display());
+    scenario::print(&text)
+}
+
+struct Recording {
+    metadata: IfMetadata,
+    reader: Box<dyn Read>,
+    samples: Option<u64>,
+}
+
+/// Opens the recording and finds out what it is: SigMF metadata if there are any, then flags over them.
+fn open(arguments: &args::Receive) -> Result<Recording, CliError> {
+    let stdin = arguments.file.as_os_str() == "-";
+    let (data_path, meta_path) = pair(&arguments.file);
+    let described = if !stdin && meta_path.is_file() {
+        let name = meta_path.display().to_string();
+        let text = fs::read_to_string(&meta_path).map_err(|error| CliError::read(&name, &error))?;
+        Some(sigmf::parse(&text, &name).map_err(CliError::input)?)
+    } else {
+        None
+    };
+    let metadata = metadata(arguments, described)?;
+    if stdin {
+        return Ok(Recording { metadata, reader: Box::new(io::stdin().lock()), samples: None });
+    }
+    let name = data_path.display().to_string();
+    let file = File::open(&data_path).map_err(|error| CliError::read(&name, &error))?;
+    let about = file.metadata().map_err(|error| CliError::read(&name, &error))?;
+    if about.is_dir() {
+        return Err(CliError::input(format!("{name} is a directory: expected a recording")));
+    }
+    let samples = about.is_file().then(|| about.len() / metadata.format.bytes() as u64);
+    Ok(Recording { metadata, reader: Box::new(file), samples })
+}
+
+/// The data and metadata files of a recording that is named by either.
+fn pair(file: &Path) -> (PathBuf, PathBuf) {
+    match file.extension().and_then(|extension| extension.to_str()) {
+        Some("sigmf-meta") => (file.with_extension("sigmf-data"), file.to_owned()),
+        _ => (file.to_owned(), file.with_extension("sigmf-meta")),
+    }
+}
+
+fn metadata(arguments: &args::Receive, described: Option<IfMetadata>) -> Result<IfMetadata, CliError> {
+    let rate = match arguments.rate_hz {
+        None => None,
+        Some(hz) => Some(
+            Rate::from_hz(hz)
+                .ok_or_else(|| CliError::usage(format!("--rate-hz {hz}: expected samples a second, above 0")))?,
+        ),
+    };
+    let start = match &arguments.start {
+        None => None,
+        Some(text) => Some(Epoch::parse(text).map_err(|error| CliError::usage(format!("--start: {error}")))?),
+    };
+    let missing = |flag: &str| {
+        CliError::usage(format!("{}: no .sigmf-meta beside it, so {flag} is needed", arguments.file.display()))
+    };
+    let mut metadata = match described {
+        Some(metadata) => metadata,
+        None => IfMetadata {
+            format: arguments.format.ok_or_else(|| missing("--format"))?,
+            rate: rate.ok_or_else(|| missing("--rate-hz"))?,
+            center_hz: L1_CA.carrier_hz,
+            inverted: false,
+            start: None,
+        },
+    };
+    metadata.format = arguments.format.unwrap_or(metadata.format);
+    metadata.rate = rate.unwrap_or(metadata.rate);
+    metadata.start = start.or(metadata.start);
+    metadata.inverted |= arguments.inverted;
+    if let Some(if_hz) = arguments.if_hz {
+        metadata.center_hz = L1_CA.carrier_hz - if metadata.inverted { -if_hz } else { if_hz };
+    }
+    Ok(metadata)
+}
+
+/// A reader that ends in an error when a signal has come.
+struct Interruptible(Box<dyn Read>);
+
+impl Read for Interruptible {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if interrupt::pending().is_some() {
+            return Err(io::Error::other("stopped by a signal"));
+        }
+        self.0.read(buffer)
+    }
+}

@@ -1,0 +1,76 @@
+//! Finding the scene that the user named.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use crate::cli::error::CliError;
+use crate::generator::scenario::{Overrides, Scenario};
+use crate::generator::scene::Scene;
+use crate::gnss::samples::Format;
+use crate::receiver::settings::Settings;
+
+/// The scene that runs when none is named.
+const EMBEDDED: &str = include_str!("../../scenarios/static.toml");
+
+/// A scenario as written, and the directory that its paths are relative to.
+pub struct Named {
+    pub scenario: Scenario,
+    pub directory: PathBuf,
+}
+
+/// Reads the scenario at `path`, or the embedded one.
+pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
+    let Some(path) = path else {
+        let scenario = Scenario::parse(EMBEDDED, "the embedded static scene").map_err(CliError::bug)?;
+        return Ok(Named { scenario, directory: PathBuf::from(".") });
+    };
+    let name = path.display().to_string();
+    let bytes = fs::read(path).map_err(|error| CliError::read(&name, &error))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|error| CliError::input(format!("{name}: not UTF-8 at byte {}", error.utf8_error().valid_up_to())))?;
+    let scenario = Scenario::parse(&text, &name).map_err(CliError::input)?;
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    Ok(Named { scenario, directory: directory.to_owned() })
+}
+
+/// Limits the threads that the work may use.
+pub fn use_threads(threads: Option<u16>) -> Result<(), CliError> {
+    let mut pool = rayon::ThreadPoolBuilder::new();
+    if let Some(threads) = threads {
+        pool = pool.num_threads(threads.into());
+    }
+    pool.build_global().map_err(|error| CliError::passing(format!("cannot start threads: {error}")))
+}
+
+/// The scene that the scenario means, with what the command line puts in its place.
+pub fn compose(named: &Named, seed: Option<u64>, format: Option<Format>) -> Result<(Scene, Vec<String>), CliError> {
+    named.scenario.compose(&named.directory, &Overrides { seed, format, allow_outside: false }).map_err(CliError::input)
+}
+
+/// The receiver's settings that the scenario carries for it.
+pub fn receiver_settings(named: &Named) -> Result<Settings, CliError> {
+    match &named.scenario.receiver {
+        None => Ok(Settings::default()),
+        Some(table) => Settings::from_table(table.clone(), "[receiver]").map_err(CliError::input),
+    }
+}
+
+/// A directory's name made of a scene's name.
+pub fn file_name(scene: &str) -> String {
+    scene.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
+}
+
+/// Prints on standard output.
+pub fn print(text: &str) -> Result<(), CliError> {
+    let mut stdout = std::io::stdout().lock();
+    stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush())
+        .map_err(|error| CliError::output("standard output", &error))
+}
+
+/// Prints a warning on standard error; a failure to do so is silent.
+pub fn warn(text: &str) {
+    let _ = writeln!(std::io::stderr(), "warning: {text}");
+}

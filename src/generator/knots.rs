@@ -1,0 +1,261 @@
+//! Delay and carrier of a satellite between knots: cubic polynomials on an absolute grid of samples.
+//!
+//! The grid's roots are 2^r samples, 8 to 16 s long. A root is halved until the cubic through four
+//! nodes of each part misses the truth at three further points by less than half the tolerance,
+//! so the knots follow from the scene and never from how the stream is cut or where it
+//! starts. Parts also end at breaks of the motion. Limits: parts are not shorter than 1024 samples.
+
+use crate::gnss::time::Rate;
+
+/// Parts of the grid are not halved below this; what error remains is reported.
+const SHORTEST_SAMPLES: u64 = 1024;
+
+/// What one ray's signal says at one reading of the receiver's clock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrival {
+    /// Reading of the receiver's clock minus the time sent, as the code says.
+    pub delay_s: f64,
+    /// Pseudorange of the carrier in cycles at RF, absolute: `rho_phi / lambda`.
+    pub carrier_cycles: f64,
+    /// Carrier power over noise density.
+    pub cn0_hz: f64,
+}
+
+/// Where polynomials are made.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    /// Samples of a root part, a power of two.
+    root_samples: u64,
+    /// Samples at which a part must end, ascending.
+    breaks: Vec<u64>,
+    tolerance_cycles: f64,
+    carrier_hz: f64,
+}
+
+/// A cubic in the fraction (0..1) of its part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cubic([f64; 4]);
+
+/// One ray within a part.
+#[derive(Clone, Copy, Debug)]
+pub struct Path {
+    /// Seconds.
+    pub delay: Cubic,
+    /// Cycles, with whole ones left out at the start of the part.
+    pub carrier: Cubic,
+    /// C/N0 at the ends of the part, linear (Hz).
+    pub cn0_hz: [f64; 2],
+    /// Longest power of two of samples on which a secant of the carrier stays within the tolerance.
+    pub run_samples: u64,
+}
+
+/// One part of the grid with the rays that are there all the time.
+#[derive(Clone, Debug)]
+pub struct Part {
+    pub start: u64,
+    pub end: u64,
+    pub paths: Vec<Path>,
+    /// Largest error met at the points of comparison.
+    pub error_cycles: f64,
+}
+
+impl Cubic {
+    /// Through four points of the unit interval.
+    fn through(u: [f64; 4], y: [f64; 4]) -> Self {
+        let f = |a: usize, b: usize, lower: f64, upper: f64| (upper - lower) / (u[b] - u[a]);
+        let (f01, f12, f23) = (f(0, 1, y[0], y[1]), f(1, 2, y[1], y[2]), f(2, 3, y[2], y[3]));
+        let (f012, f123) = (f(0, 2, f01, f12), f(1, 3, f12, f23));
+        let f0123 = f(0, 3, f012, f123);
+        // Newton's form expanded about u = 0 (u[0] = 0).
+        Self([y[0], f01 - f012 * u[1] + f0123 * u[1] * u[2], f012 - f0123 * (u[1] + u[2]), f0123])
+    }
+
+    /// Value at fraction `u`.
+    pub fn at(&self, u: f64) -> f64 {
+        let [a, b, c, d] = self.0;
+        a + u * (b + u * (c + u * d))
+    }
+
+    /// Value at `v` minus value at `u`, without their common part.
+    pub fn change(&self, u: f64, v: f64) -> f64 {
+        let [_, b, c, d] = self.0;
+        (v - u) * (b + c * (u + v) + d * (u * u + u * v + v * v))
+    }
+
+    /// Largest magnitude of the second derivative.
+    fn curvature(&self) -> f64 {
+        let [_, _, c, d] = self.0;
+        (2.0 * c).abs().max((2.0 * c + 6.0 * d).abs())
+    }
+}
+
+impl Part {
+    /// Where sample `n` stands in the part.
+    pub fn fraction(&self, n: u64) -> f64 {
+        (n as f64 - self.start as f64) / (self.end - self.start) as f64
+    }
+}
+
+impl Grid {
+    /// A grid for `rate` whose carrier error stays below `tolerance_cycles`.
+    pub fn new(rate: Rate, mut breaks: Vec<u64>, tolerance_cycles: f64, carrier_hz: f64) -> Self {
+        breaks.sort_unstable();
+        breaks.dedup();
+        let longest = (16.0 * rate.hz()).max(2.0 * SHORTEST_SAMPLES as f64) as u64;
+        Self { root_samples: 1 << longest.ilog2(), breaks, tolerance_cycles, carrier_hz }
+    }
+
+    /// Samples of a root part.
+    pub fn root_samples(&self) -> u64 {
+        self.root_samples
+    }
+
+    /// Parts that cover root number `root`; stretches where the satellite does not arrive are left out.
+    ///
+    /// `observe` gives the rays at a sample, or none where there is no orbit. Errors are its own.
+    pub fn root<E>(
+        &self,
+        root: u64,
+        observe: &impl Fn(u64) -> Result<Option<Vec<Arrival>>, E>,
+    ) -> Result<Vec<Part>, E> {
+        let (start, end) = (root * self.root_samples, (root + 1) * self.root_samples);
+        let mut parts = Vec::new();
+        self.halve(start, end, start, end, observe, &mut parts)?;
+        Ok(parts)
+    }
+
+    /// Covers the dyadic cell [`low`, `high`) within [`start`, `end`), its share between breaks.
+    fn halve<E>(
+        &self,
+        low: u64,
+        high: u64,
+        start: u64,
+        end: u64,
+        observe: &impl Fn(u64) -> Result<Option<Vec<Arrival>>, E>,
+        parts: &mut Vec<Part>,
+    ) -> Result<(), E> {
+        let inside = self.breaks.iter().find(|&&b| start < b && b < end);
+        if let Some(&b) = inside {
+            self.halve(low, high, start, b, observe, parts)?;
+            return self.halve(low, high, b, end, observe, parts);
+        }
+        let part = self.fit(start, end, observe)?;
+        let good = part.as_ref().is_some_and(|part| part.error_cycles <= 0.5 * self.tolerance_cycles);
+        if good || high - low <= SHORTEST_SAMPLES || end - start <= SHORTEST_SAMPLES {
+            parts.extend(part);
+            return Ok(());
+        }
+        let middle = low + (high - low) / 2;
+        if start < middle {
+            self.halve(low, middle, start, end.min(middle), observe, parts)?;
+        }
+        if middle < end {
+            self.halve(middle, high, start.max(middle), end, observe, parts)?;
+        }
+        Ok(())
+    }
+
+    fn fit<E>(
+        &self,
+        start: u64,
+        end: u64,
+        observe: &impl Fn(u64) -> Result<Option<Vec<Arrival>>, E>,
+    ) -> Result<Option<Part>, E> {
+        let length = end - start;
+        let nodes = [start, start + length / 3, start + 2 * length / 3, end];
+        if nodes[0] == nodes[1] || nodes[2] == nodes[3] || nodes[1] == nodes[2] {
+            return Ok(None);
+        }
+        let mut at = Vec::with_capacity(7);
+        // Nodes, then points of comparison at the middles of the thirds.
+        for n in nodes.into_iter().chain([start + length / 6, start + length / 2, start + 5 * length / 6]) {
+            match observe(n)? {
+                Some(rays) if rays.iter().all(|ray| ray.delay_s.is_finite() && ray.carrier_cycles.is_finite()) => {
+                    at.push((n, rays));
+                }
+                _ => return Ok(None),
+            }
+        }
+        let rays = at.iter().map(|(_, rays)| rays.len()).min().unwrap_or(0);
+        let mut part = Part { start, end, paths: Vec::with_capacity(rays), error_cycles: 0.0 };
+        for ray in 0..rays {
+            let seen: Vec<(f64, Arrival)> =
+                at.iter().filter_map(|(n, rays)| rays.get(ray).map(|r| (part.fraction(*n), *r))).collect();
+            if let Some((path, error_cycles)) = self.path(&seen, length) {
+                part.paths.push(path);
+                part.error_cycles = part.error_cycles.max(error_cycles);
+            }
+        }
+        Ok(Some(part))
+    }
+
+    fn path(&self, seen: &[(f64, Arrival)], length: u64) -> Option<(Path, f64)> {
+        let (nodes, checks) = seen.split_first_chunk::<4>()?;
+        let whole = nodes[0].1.carrier_cycles.floor();
+        let u = nodes.map(|(u, _)| u);
+        let delay = Cubic::through(u, nodes.map(|(_, r)| r.delay_s));
+        let carrier = Cubic::through(u, nodes.map(|(_, r)| r.carrier_cycles - whole));
+        let error = checks.iter().fold(0.0_f64, |worst, (u, r)| {
+            let code = (delay.at(*u) - r.delay_s).abs() * self.carrier_hz;
+            worst.max(code).max((carrier.at(*u) - (r.carrier_cycles - whole)).abs())
+        });
+        // A secant of length s misses by at most s²/8 of the second derivative.
+        let curvature = carrier.curvature() / (length as f64 * length as f64);
+        let mut run_samples = super::synth::RUN_SAMPLES as u64;
+        while run_samples > 64 && (run_samples * run_samples) as f64 * curvature / 8.0 > 0.5 * self.tolerance_cycles {
+            run_samples /= 2;
+        }
+        let cn0_hz = [nodes[0].1.cn0_hz, nodes[3].1.cn0_hz];
+        Some((Path { delay, carrier, cn0_hz, run_samples }, error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CARRIER_HZ: f64 = 1_575.42e6;
+
+    /// Range (m) of a passing satellite, sharpened by a jerk at 4 s.
+    fn arrival(t: f64, jerk: f64) -> Arrival {
+        let range = 2.2e7 + 600.0 * t + 0.07 * t * t + jerk * (t - 4.0).max(0.0).powi(3) / 6.0;
+        let delay_s = range / 299_792_458.0;
+        Arrival { delay_s, carrier_cycles: delay_s * CARRIER_HZ, cn0_hz: 1e4 }
+    }
+
+    fn parts(rate: Rate, jerk: f64, breaks: Vec<u64>) -> Vec<Part> {
+        let observe = |n: u64| Ok::<_, ()>(Some(vec![arrival(rate.elapsed_s(n), jerk)]));
+        Grid::new(rate, breaks, 1e-4, CARRIER_HZ).root(0, &observe).unwrap()
+    }
+
+    #[test]
+    fn a_smooth_range_takes_one_part_and_a_jerk_short_ones_unless_it_is_a_break() {
+        let rate = Rate::from_hz(2.6e6).unwrap();
+        assert_eq!(parts(rate, 0.0, vec![]).len(), 1);
+        let blind = parts(rate, 100.0, vec![]).len();
+        let told = parts(rate, 100.0, vec![4 * 2_600_000]).len();
+        assert_eq!(told, 2);
+        assert!(blind > told);
+    }
+
+    #[test]
+    fn parts_join_without_gap_and_stay_within_the_tolerance_everywhere() {
+        let rate = Rate::from_hz(2.6e6).unwrap();
+        for breaks in [vec![], vec![4 * 2_600_000]] {
+            let parts = parts(rate, 200.0, breaks);
+            for pair in parts.windows(2) {
+                assert_eq!(pair[0].end, pair[1].start);
+            }
+            for part in &parts {
+                for k in 0..=50 {
+                    let n = part.start + (part.end - part.start) * k / 50;
+                    let u = part.fraction(n);
+                    let truth = arrival(rate.elapsed_s(n), 200.0);
+                    let turns = part.paths[0].carrier.at(u) - truth.carrier_cycles;
+                    assert!((turns - turns.round()).abs() < 1e-4, "{n}");
+                    assert!((part.paths[0].delay.at(u) - truth.delay_s).abs() * CARRIER_HZ < 1e-4);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! What a scene will compute, told before it is computed.
+//!
+//! Nothing is generated: satellites are placed at a few hundred instants, effects act once a satellite, and sizes and
+//! times follow from counts. What concerns the synthesiser (knots, speed, memory) is given to it.
+
+use std::fmt;
+
+use crate::generator::ray::Ray;
+use crate::generator::scene::{CodeEdge, Scene};
+use crate::generator::sky::emission;
+use crate::gnss::broadcast::OrbitError;
+use crate::gnss::satellite::Sv;
+
+/// Instants between start and end at which the sky is looked at.
+const INSTANTS: u32 = 240;
+
+/// What the plan cannot know of itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machinery {
+    /// Shortest and longest time between knots of the signal's delay, and why it is that.
+    pub knot_spacing_s: f64,
+    pub longest_knot_spacing_s: f64,
+    pub knot_reason: String,
+    /// Memory of the generator's blocks, which does not grow with the scene.
+    pub block_bytes: u64,
+    /// Samples times satellites that this machine makes a second.
+    pub satellite_samples_per_s: f64,
+}
+
+/// A satellite that is in view for some of the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InView {
+    pub sv: Sv,
+    /// At the first instant at which it is above the mask.
+    pub azimuth_deg: f64,
+    pub elevation_deg: f64,
+    /// Of the first signal; `None` when nothing in the scene says how strong it is.
+    pub cn0_dbhz: Option<f64>,
+    /// Time since the start when it rises above the mask, if not in view from the beginning …
+    pub rises_s: Option<f64>,
+    /// … and when it sets, if not in view to the end; both to the step of the search.
+    pub sets_s: Option<f64>,
+}
+
+/// A thing that the scene has, or has not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    pub name: String,
+    pub present: bool,
+    pub why: String,
+}
+
+/// What a scene will compute.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    pub name: String,
+    pub start: String,
+    pub duration_s: f64,
+    pub signals: Vec<&'static str>,
+    pub mask_deg: f64,
+    /// Largest speed and acceleration of the antenna during the scene.
+    pub speed_mps: f64,
+    pub acceleration_mps2: f64,
+    pub satellites: Vec<InView>,
+    pub models: Vec<Model>,
+    pub sampling: String,
+    pub samples: u64,
+    pub bytes: u64,
+    pub memory_bytes: u64,
+    pub time_s: f64,
+    pub machinery: Machinery,
+}
+
+impl Plan {
+    /// Plans `scene` for a machine.
+    ///
+    /// # Errors
+    /// [`OrbitError`] from the ephemerides.
+    pub fn new(scene: &Scene, machinery: Machinery) -> Result<Self, OrbitError> {
+        let duration_s = scene.clock.rate.elapsed_s(scene.samples);
+        let extremes = scene.trajectory.extremes(duration_s);
+        let satellites = in_view(scene, duration_s)?;
+        let up = satellites.len() as f64 * scene.signals.len() as f64;
+        let bytes = scene.samples.saturating_mul(scene.metadata.format.bytes() as u64);
+        let knots =
+            scene.trajectory.knots().len() as u64 * std::mem::size_of::<crate::generator::vehicle::Knot>() as u64;
+        Ok(Self {
+            name: scene.name.clone(),
+            start: scene.clock.start.to_string(),
+            duration_s,
+            signals: scene.signals.iter().map(|signal| signal.name).collect(),
+            mask_deg: scene.mask_rad.to_degrees(),
+            speed_mps: extremes.speed_mps,
+            acceleration_mps2: extremes.acceleration_mps2,
+            models: models(scene),
+            sampling: sampling(scene),
+            samples: scene.samples,
+            bytes,
+            memory_bytes: machinery.block_bytes + knots,
+            time_s: scene.samples as f64 * up.max(1.0) / machinery.satellite_samples_per_s,
+            satellites,
+            machinery,
+        })
+    }
+}
+
+/// The satellites above the mask at any instant looked at, highest first.
+fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
+    let mut rows = Vec::new();
+    for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
+        let mut row: Option<InView> = None;
+        for k in 0..=INSTANTS {
+            let t_s = duration_s * f64::from(k) / f64::from(INSTANTS);
+            let received = scene.clock.start.plus_s(t_s);
+            let motion = scene.trajectory.at(t_s);
+            let found = emission(&scene.catalogue, sv, received, &motion)?.map(|e| e.sight);
+            match (found.filter(|sight| sight.look.elevation_rad >= scene.mask_rad), &mut row) {
+                (Some(sight), None) => {
+                    row = Some(InView {
+                        sv,
+                        azimuth_deg: sight.look.azimuth_rad.to_degrees(),
+                        elevation_deg: sight.look.elevation_rad.to_degrees(),
+                        cn0_dbhz: scene.signals.first().and_then(|signal| {
+                            let mut rays =
+                                vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
+                            scene.effects.iter().for_each(|effect| effect.act(&sight, signal, &mut rays));
+                            rays.first().filter(|ray| ray.cn0_hz > 0.0).map(|ray| 10.0 * libm::log10(ray.cn0_hz))
+                        }),
+                        rises_s: (k > 0).then_some(t_s),
+                        sets_s: None,
+                    });
+                }
+                (None, Some(row)) if row.sets_s.is_none() => row.sets_s = Some(t_s),
+                // It rose again (a vehicle that goes round the Earth): in view to the end, as far as this table tells.
+                (Some(_), Some(row)) => row.sets_s = None,
+                _ => {}
+            }
+        }
+        rows.extend(row);
+    }
+    rows.sort_by(|a, b| b.elevation_deg.total_cmp(&a.elevation_deg).then(a.sv.cmp(&b.sv)));
+    Ok(rows)
+}
+
+/// Everything that a scenario can switch on, and whether this one does.
+fn models(scene: &Scene) -> Vec<Model> {
+    let mut models: Vec<Model> = scene
+        .effects
+        .iter()
+        .map(|effect| Model {
+            name: effect.name().to_owned(),
+            present: true,
+            why: "acts on every ray at every knot".to_owned(),
+        })
+        .collect();
+    let mut add = |name: &str, present: bool, why: String| models.push(Model { name: name.to_owned(), present, why });
+    for name in ["ionosphere", "troposphere"] {
+        if !scene.effects.iter().any(|effect| effect.name() == name) {
+            add(name, false, format!("the scenario has no [{name}]"));
+        }
+    }
+    let clock = scene.receiver_clock;
+    let off = clock.bias_s != 0.0 || clock.drift != 0.0;
+    let why = if off {
+        format!("bias {:e} s, drift {:e} s/s", clock.bias_s, clock.drift)
+    } else {
+        "no [receiver_clock]: it reads GPS time".to_owned()
+    };
+    add("receiver clock", off, why);
+    let why = if scene.noise {
+        format!("seed {}, {} LSB a component", scene.seed, scene.noise_lsb)
+    } else {
+        "no [noise]".to_owned()
+    };
+    add("thermal noise", scene.noise, why);
+    let rounds = scene.metadata.format.full_scale_lsb().is_some();
+    add("quantiser", rounds, format!("format {}", scene.metadata.format));
+    add(
+        "chip edges",
+        scene.fidelity.code_edge != CodeEdge::Nearest,
+        match scene.fidelity.code_edge {
+            CodeEdge::Nearest => "nearest sample: biased by up to half a sample".to_owned(),
+            CodeEdge::Area => "mean of the chip over the sample's interval".to_owned(),
+            CodeEdge::BandLimited => "through a low-pass filter below half the rate".to_owned(),
+        },
+    );
+    models
+}
+
+fn sampling(scene: &Scene) -> String {
+    let metadata = &scene.metadata;
+    let kind = if metadata.format.is_complex() { "complex" } else { "real" };
+    let inverted = if metadata.inverted { ", spectrum inverted" } else { "" };
+    format!(
+        "{:.6} Msps, {kind} {}, centred on {:.6} MHz{inverted}",
+        metadata.rate.hz() / 1e6,
+        metadata.format,
+        metadata.center_hz / 1e6
+    )
+}
+
+/// A number of bytes in the unit that suits it.
+fn size(bytes: u64) -> String {
+    let mut value = bytes as f64;
+    for unit in ["B", "KiB", "MiB", "GiB"] {
+        if value < 1024.0 {
+            return format!("{value:.1} {unit}");
+        }
+        value /= 1024.0;
+    }
+    format!("{value:.1} TiB")
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "scene      {} from {} GPST, {:.3} s", self.name, self.start, self.duration_s)?;
+        writeln!(f, "signals    {}", self.signals.join(", "))?;
+        writeln!(f, "samples    {}: {} samples, {}", self.sampling, self.samples, size(self.bytes))?;
+        writeln!(f, "motion     up to {:.2} m/s and {:.2} m/s2", self.speed_mps, self.acceleration_mps2)?;
+        let Machinery { knot_spacing_s, longest_knot_spacing_s, knot_reason, .. } = &self.machinery;
+        if knot_spacing_s == longest_knot_spacing_s {
+            writeln!(f, "knots      every {knot_spacing_s:.4} s: {knot_reason}")?;
+        } else {
+            writeln!(f, "knots      every {knot_spacing_s:.4} to {longest_knot_spacing_s:.4} s: {knot_reason}")?;
+        }
+        writeln!(f, "needs      {} of memory, about {:.1} s", size(self.memory_bytes), self.time_s)?;
+        writeln!(f, "\n{} satellites above {:.1} deg", self.satellites.len(), self.mask_deg)?;
+        writeln!(f, "  sv   azimuth  elevation  C/N0 dB-Hz")?;
+        for row in &self.satellites {
+            let cn0 = row.cn0_dbhz.map_or_else(|| "-".to_owned(), |x| format!("{x:.1}"));
+            write!(f, "  {}  {:7.1}  {:9.1}  {cn0:>10}", row.sv, row.azimuth_deg, row.elevation_deg)?;
+            if let Some(t_s) = row.rises_s {
+                write!(f, "  rises by {t_s:.1} s")?;
+            }
+            if let Some(t_s) = row.sets_s {
+                write!(f, "  sets by {t_s:.1} s")?;
+            }
+            writeln!(f)?;
+        }
+        for (title, present) in [("computed", true), ("not computed", false)] {
+            writeln!(f, "\n{title}")?;
+            let mut models = self.models.iter().filter(|model| model.present == present).peekable();
+            if models.peek().is_none() {
+                writeln!(f, "  nothing that a scenario can name")?;
+            }
+            for model in models {
+                writeln!(f, "  {:16} {}", model.name, model.why)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::generator::scenario::{Overrides, Scenario};
+
+    fn plan(text: &str) -> Plan {
+        let scenario = Scenario::parse(text, "plan").unwrap();
+        let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+        let (scene, _) = scenario.compose(&directory, &Overrides::default()).unwrap();
+        let machinery = Machinery {
+            knot_spacing_s: 0.5,
+            longest_knot_spacing_s: 0.5,
+            knot_reason: "a test".to_owned(),
+            block_bytes: 1 << 20,
+            satellite_samples_per_s: 1e8,
+        };
+        Plan::new(&scene, machinery).unwrap()
+    }
+
+    #[test]
+    fn the_static_scene_has_the_satellites_that_its_comment_promises() {
+        let plan = plan(include_str!("../../scenarios/static.toml"));
+        let names: Vec<String> = plan.satellites.iter().map(|s| s.sv.to_string()).collect();
+        // Found independently from the same file by a short script.
+        let expected = ["G23", "G13", "G03", "G19", "G06", "G07", "G20", "G16", "G32", "G10", "G08", "G28"];
+        assert_eq!(names.len(), expected.len(), "{plan}");
+        assert!(expected.iter().all(|sv| names.iter().any(|n| n == sv)), "{plan}");
+        let (highest, lowest) = (&plan.satellites[0], &plan.satellites[11]);
+        assert!((highest.elevation_deg - 82.0).abs() < 0.6 && highest.sv == Sv::gps(23), "{plan}");
+        assert!((6.5..7.5).contains(&lowest.elevation_deg), "{plan}");
+        assert!(plan.satellites.iter().all(|s| s.rises_s.is_none() && s.sets_s.is_none()), "{plan}");
+        assert_eq!((plan.samples, plan.bytes), (156_000_000, 312_000_000));
+        // 156e6 samples of 12 satellites at 1e8 a second.
+        assert!((plan.time_s - 18.72).abs() < 1e-9 && plan.speed_mps == 0.0);
+        // The link budget's reach from 5 degrees to the zenith.
+        assert!(plan.satellites.iter().all(|s| s.cn0_dbhz.is_some_and(|x| (37.0..52.0).contains(&x))), "{plan}");
+    }
+
+    #[test]
+    fn what_is_absent_is_named_with_the_table_that_would_bring_it() {
+        let text = plan(include_str!("../../scenarios/noise_free.toml")).to_string();
+        let (_, absent) = text.split_once("not computed").unwrap();
+        for word in ["no [ionosphere]", "no [troposphere]", "no [noise]", "quantiser"] {
+            assert!(absent.contains(word), "{text}");
+        }
+    }
+
+    #[test]
+    fn satellites_that_rise_and_set_are_told_apart() {
+        let day = include_str!("../../scenarios/noise_free.toml").replace("duration_s = 60", "duration_s = 14400");
+        let plan = plan(&day);
+        assert!(
+            plan.satellites.iter().any(|s| s.rises_s.is_some()) && plan.satellites.iter().any(|s| s.sets_s.is_some())
+        );
+        // 11 satellites on average in view, each for some five hours: more than 12 and fewer than all in four hours.
+        assert!((13..=28).contains(&plan.satellites.len()), "{plan}");
+    }
+}

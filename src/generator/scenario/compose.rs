@@ -1,0 +1,262 @@
+//! From a scenario to a scene: files are loaded, effects put in order, and values checked against each other.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::motion::{FileKind, MotionSpec};
+use super::{Scenario, ScenarioError, parts};
+use crate::generator::scene::Scene;
+use crate::generator::sky::emission;
+use crate::generator::vehicle::{Trajectory, file, route};
+use crate::gnss::broadcast::OrbitError;
+use crate::gnss::samples::{Format, IfMetadata};
+use crate::gnss::time::SampleClock;
+
+/// Samples of one scene at most: 19 days at 60 Msps.
+const MAX_SAMPLES: f64 = 1e14;
+/// Largest navigation file, packed.
+const MAX_NAVIGATION_BYTES: u64 = 64 << 20;
+
+/// What the command line changes in a scenario.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Overrides {
+    pub seed: Option<u64>,
+    pub format: Option<Format>,
+    /// Whether files may lie outside the scenario's directory.
+    pub allow_outside: bool,
+}
+
+impl Scenario {
+    /// Makes the scene, reading files relative to `directory`; also returns what the user should know of.
+    pub fn compose(&self, directory: &Path, overrides: &Overrides) -> Result<(Scene, Vec<String>), ScenarioError> {
+        let mut warnings = Vec::new();
+        let metadata = self.metadata(overrides)?;
+        let clock = SampleClock { start: self.start, rate: metadata.rate };
+        let samples = self.samples()?;
+        let trajectory = self.trajectory(directory, overrides, &mut warnings)?;
+        let end_s = self.receiver_clock.true_elapsed_s(self.start, clock.epoch(samples));
+        self.covers(&trajectory, end_s)?;
+        self.check_band(&metadata, &mut warnings);
+        let navigation = parts::navigation(self, directory, overrides, &mut warnings)?;
+        let sky = parts::sky(self, &navigation, end_s, &mut warnings)?;
+        let effects = parts::effects(self, &navigation)?;
+        let scene = Scene {
+            name: self.name.clone(),
+            seed: overrides.seed.unwrap_or(self.seed),
+            samples,
+            clock,
+            receiver_clock: self.receiver_clock,
+            trajectory,
+            catalogue: Arc::new(sky.catalogue),
+            broadcast: Arc::new(sky.broadcast),
+            signals: self.signals.clone(),
+            excluded: sky.excluded,
+            mask_rad: self.mask_rad,
+            effects,
+            noise: self.noise,
+            noise_lsb: self.front_end.noise_lsb.unwrap_or_else(|| default_noise_lsb(metadata.format)),
+            fidelity: self.fidelity,
+            truth_interval_s: self.truth_interval_s,
+            metadata,
+        };
+        let visible = visible_at_start(&scene).map_err(|e| self.conflict("navigation.file", e.to_string()))?;
+        if visible < 4 {
+            let mask_deg = self.mask_rad.to_degrees();
+            warnings.push(format!(
+                "{visible} satellites above satellites.mask_deg = {mask_deg} at the start: a position needs 4"
+            ));
+        }
+        Ok((scene, warnings))
+    }
+
+    pub(super) fn conflict(&self, key: &'static str, reason: String) -> ScenarioError {
+        ScenarioError::Conflict { origin: self.origin.clone(), key, reason }
+    }
+
+    fn metadata(&self, overrides: &Overrides) -> Result<IfMetadata, ScenarioError> {
+        let front_end = &self.front_end;
+        let format = overrides.format.unwrap_or(front_end.format);
+        if !format.is_complex() && front_end.if_hz <= 0.0 {
+            let reason = format!("{} Hz with the real format {format}: expected more than 0", front_end.if_hz);
+            return Err(self.conflict("front_end.if_hz", reason));
+        }
+        let carrier_hz = crate::gnss::gps::l1ca::L1_CA.carrier_hz;
+        let offset_hz = if front_end.inverted { -front_end.if_hz } else { front_end.if_hz };
+        let center_hz = carrier_hz - offset_hz;
+        Ok(IfMetadata {
+            format,
+            rate: front_end.rate,
+            center_hz,
+            inverted: front_end.inverted,
+            start: Some(self.start),
+        })
+    }
+
+    /// Whole samples in the scene.
+    fn samples(&self) -> Result<u64, ScenarioError> {
+        let samples = (self.duration_s * self.front_end.rate.hz()).round();
+        if samples > MAX_SAMPLES {
+            let rate_hz = self.front_end.rate.hz();
+            let reason =
+                format!("{} s at {rate_hz} Hz are {samples:e} samples: expected at most 1e14", self.duration_s);
+            return Err(self.conflict("duration_s", reason));
+        }
+        Ok(samples as u64)
+    }
+
+    /// Warns when a signal's main lobe does not fit into the band of the samples.
+    fn check_band(&self, metadata: &IfMetadata, warnings: &mut Vec<String>) {
+        let half = 0.5 * metadata.rate.hz();
+        for signal in &self.signals {
+            let if_hz = metadata.if_hz(signal);
+            let lobe_hz = signal.components.iter().fold(0.0_f64, |lobe, c| lobe.max(c.chip_rate_hz));
+            let (low, high) = if metadata.format.is_complex() { (-half, half) } else { (0.0, half) };
+            if if_hz - lobe_hz < low || if_hz + lobe_hz > high {
+                warnings.push(format!(
+                    "{signal}: its main lobe, {:.3} to {:.3} MHz, does not fit into the samples' band, {:.3} to {:.3} MHz: it will fold over",
+                    (if_hz - lobe_hz) / 1e6,
+                    (if_hz + lobe_hz) / 1e6,
+                    low / 1e6,
+                    high / 1e6
+                ));
+            }
+        }
+    }
+
+    /// The motion, with its file read.
+    fn trajectory(
+        &self,
+        directory: &Path,
+        overrides: &Overrides,
+        warnings: &mut Vec<String>,
+    ) -> Result<Trajectory, ScenarioError> {
+        match &self.motion {
+            MotionSpec::Static(place) => Ok(Trajectory::fixed(place.to_ecef())),
+            MotionSpec::Waypoints { points, limits } => {
+                route::trajectory(points, limits).map_err(|e| self.conflict("motion.point", e.to_string()))
+            }
+            MotionSpec::Rocket(rocket) => {
+                // A second more than the scene, for a receiver's clock that lags.
+                let until_s =
+                    self.duration_s * (1.0 + self.receiver_clock.drift.abs()) + 1.0 + self.receiver_clock.bias_s.abs();
+                rocket.trajectory(until_s).map_err(|e| self.conflict("motion", e.to_string()))
+            }
+            MotionSpec::File { path, kind, max_gap_s } => {
+                let options = file::Options { start: self.start, max_gap_s: *max_gap_s };
+                let full = self.resolve("motion.file", directory, path, overrides)?;
+                let input = File::open(&full).map_err(|e| self.unreadable("motion.file", path, &e))?;
+                let name = path.display().to_string();
+                let refuse = |e: file::FileError| self.conflict("motion.file", e.to_string());
+                match kind {
+                    FileKind::Csv => {
+                        let (trajectory, ignored) = file::read_csv(input, &name, &options).map_err(refuse)?;
+                        if !ignored.is_empty() {
+                            warnings.push(format!("{name}: columns not used: {}", ignored.join(", ").escape_debug()));
+                        }
+                        Ok(trajectory)
+                    }
+                    FileKind::Nmea => {
+                        let (trajectory, skipped) = file::read_nmea(input, &name, &options).map_err(refuse)?;
+                        if skipped > 0 {
+                            warnings.push(format!("{name}: {skipped} GGA sentences without a fix left out"));
+                        }
+                        Ok(trajectory)
+                    }
+                }
+            }
+        }
+    }
+
+    /// Refuses a motion that does not last from the first sample to the last one.
+    fn covers(&self, trajectory: &Trajectory, end_s: f64) -> Result<(), ScenarioError> {
+        let start_s = self.receiver_clock.true_elapsed_s(self.start, self.start);
+        let (from_s, to_s) = trajectory.span_s();
+        // A file that begins at the scene's start must do with a receiver's clock that is ahead by its bias.
+        if from_s > start_s.max(0.0) || to_s < end_s.min(self.duration_s) {
+            let kind = self.motion.kind();
+            return Err(self.conflict(
+                "motion",
+                format!(
+                    "kind = {kind:?} is known from {from_s:.3} s to {to_s:.3} s, but the scene needs {start_s:.6} s to {end_s:.6} s: \
+                     change duration_s, or let the motion end at rest"
+                ),
+            ));
+        }
+        Ok(())
+    }
+
+    fn unreadable(&self, key: &'static str, path: &Path, error: &std::io::Error) -> ScenarioError {
+        ScenarioError::File { origin: self.origin.clone(), key, path: path.to_owned(), reason: error.to_string() }
+    }
+
+    /// The full path of a file that the scenario names; it must be a file below the scenario's directory.
+    fn resolve(
+        &self,
+        key: &'static str,
+        directory: &Path,
+        path: &Path,
+        overrides: &Overrides,
+    ) -> Result<PathBuf, ScenarioError> {
+        let refuse = |reason: &str| ScenarioError::File {
+            origin: self.origin.clone(),
+            key,
+            path: path.to_owned(),
+            reason: reason.to_owned(),
+        };
+        let io = |e: std::io::Error| self.unreadable(key, path, &e);
+        // An empty directory is that of a scenario named without one.
+        let directory = if directory.as_os_str().is_empty() { Path::new(".") } else { directory };
+        let full = directory.join(path).canonicalize().map_err(io)?;
+        if !overrides.allow_outside && !full.starts_with(directory.canonicalize().map_err(io)?) {
+            return Err(refuse("lies outside the scenario's directory (--allow-outside permits it)"));
+        }
+        if !full.is_file() {
+            return Err(refuse("is not a file"));
+        }
+        Ok(full)
+    }
+
+    /// The bytes of a file that the scenario names.
+    pub(super) fn load(
+        &self,
+        key: &'static str,
+        directory: &Path,
+        path: &Path,
+        overrides: &Overrides,
+    ) -> Result<Vec<u8>, ScenarioError> {
+        let full = self.resolve(key, directory, path, overrides)?;
+        let bytes = full.metadata().map_err(|e| self.unreadable(key, path, &e))?.len();
+        if bytes > MAX_NAVIGATION_BYTES {
+            return Err(ScenarioError::File {
+                origin: self.origin.clone(),
+                key,
+                path: path.to_owned(),
+                reason: format!("{bytes} bytes: expected at most {MAX_NAVIGATION_BYTES}"),
+            });
+        }
+        std::fs::read(full).map_err(|e| self.unreadable(key, path, &e))
+    }
+}
+
+/// Satellites of the scene above the mask at its start.
+fn visible_at_start(scene: &Scene) -> Result<usize, OrbitError> {
+    let motion = scene.trajectory.at(0.0);
+    let mut visible = 0;
+    for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
+        let found = emission(&scene.catalogue, sv, scene.clock.start, &motion)?;
+        visible += usize::from(found.is_some_and(|e| e.sight.look.elevation_rad >= scene.mask_rad));
+    }
+    Ok(visible)
+}
+
+/// Gain when the scenario sets none. Eleven satellites at 47 dB-Hz in 2.6 Msps add a tenth to the noise's standard
+/// deviation, so 8-bit full scale at 4.5 times the noise is 4 times the composite: 1e-4 of the samples saturate.
+/// 16 bits leave 24 dB of headroom on top; floating point has the noise as its unit.
+fn default_noise_lsb(format: Format) -> f32 {
+    match format {
+        Format::Ci8 | Format::Cu8 | Format::Ri8 => 28.0,
+        Format::Ci16Le | Format::Ri16Le => 512.0,
+        Format::Cf32Le => 1.0,
+    }
+}

@@ -1,0 +1,301 @@
+//! One satellite's signal as the stream needs it: when it is in view, its polynomials, its data.
+//!
+//! [`Transmitter::prepare`] gathers all of that for a stretch of samples; [`Transmitter::render`] then adds any
+//! block of the stretch to planar samples and changes nothing, so blocks run side by side.
+//! Everything is decided on absolute grids: view by whole seconds, parts and runs by sample numbers.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run, isa};
+use crate::generator::knots::{Grid, Part, Path};
+use crate::generator::scene::Scene;
+use crate::generator::stream::GenerateError;
+use crate::generator::synth::chips::{MARGIN_STEPS, Spreading};
+use crate::generator::truth;
+use crate::gnss::gps::lnav::Subframe;
+use crate::gnss::record::NavigationRow;
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Component, Message, Signal};
+use crate::gnss::time::{Epoch, tone_turns};
+
+/// Duration of an LNAV subframe and its symbols (IS-GPS-200N, 20.3.2).
+const SUBFRAME_S: i64 = 6;
+const SUBFRAME_SYMBOLS: i64 = 300;
+
+/// Most code steps in a sample: 4096 of them and both margins fit in Q16.48.
+const MAX_STEP: f64 = 15.0;
+
+struct Sent {
+    component: &'static Component,
+    spreading: Spreading,
+    /// Of the amplitude, for unit mean power of the waveform and the component's share.
+    gain: f64,
+}
+
+/// A satellite's signal in a scene.
+pub struct Transmitter {
+    pub sv: Sv,
+    pub signal: &'static Signal,
+    sent: Vec<Sent>,
+    grid: Grid,
+    /// View at the beginning of each second, by its number.
+    view: BTreeMap<u64, bool>,
+    /// Sample from which the satellite has been in view.
+    since: Option<u64>,
+    roots: BTreeSet<u64>,
+    parts: Vec<Part>,
+    subframes: BTreeMap<i64, [u32; 10]>,
+    /// What has been sent so far.
+    pub navigation: BTreeSet<NavigationRow>,
+    pub seen: bool,
+    pub knots: u64,
+    pub worst_knot_cycles: f64,
+}
+
+/// Buffers of one worker.
+#[derive(Default)]
+pub struct Scratch {
+    bits: Vec<u64>,
+    wave: Vec<f32>,
+}
+
+impl Transmitter {
+    /// `None` if the signal's documents assign no code to `sv`.
+    ///
+    /// # Errors
+    /// [`GenerateError::Rate`] if a sample would span more than 15 code steps.
+    pub fn new(scene: &Scene, sv: Sv, signal: &'static Signal, edge: Edge<'_>) -> Result<Option<Self>, GenerateError> {
+        let rate_hz = scene.clock.rate.hz();
+        let mut sent = Vec::new();
+        for component in signal.components {
+            let Some(spreading) = Spreading::new(component, sv.number) else { return Ok(None) };
+            let step = spreading.step_rate_hz() / rate_hz;
+            // A run's strip must stay below 2^16 steps, and nine samples within its margin.
+            if step > MAX_STEP || step * 9.0 + 2.0 > MARGIN_STEPS as f64 {
+                return Err(GenerateError::Rate { rate_hz, signal: signal.name });
+            }
+            let gain = component.power_share.sqrt() * edge.gain(spreading.correlation(), step);
+            sent.push(Sent { component, spreading, gain });
+        }
+        let clock = scene.receiver_clock;
+        let breaks = scene
+            .trajectory
+            .breaks_s()
+            .iter()
+            .map(|t_s| (((t_s + clock.bias_at(*t_s)) * rate_hz).ceil()).max(0.0) as u64)
+            .collect();
+        let grid = Grid::new(scene.clock.rate, breaks, scene.fidelity.knot_tolerance_cycles, signal.carrier_hz);
+        Ok(Some(Self {
+            sv,
+            signal,
+            sent,
+            grid,
+            view: BTreeMap::new(),
+            since: None,
+            roots: BTreeSet::new(),
+            parts: Vec::new(),
+            subframes: BTreeMap::new(),
+            navigation: BTreeSet::new(),
+            seen: false,
+            knots: 0,
+            worst_knot_cycles: 0.0,
+        }))
+    }
+
+    /// The polynomials of one root part of the grid.
+    ///
+    /// # Errors
+    /// Those of orbits.
+    pub fn root(&self, scene: &Scene, root: u64) -> Result<Vec<Part>, GenerateError> {
+        let observe =
+            |n: u64| truth::seen(scene, self.sv, self.signal, scene.clock.epoch(n)).map(|s| s.map(|s| s.arrivals));
+        Ok(self.grid.root(root, &observe)?)
+    }
+
+    /// Samples of a root part.
+    pub fn root_samples(&self) -> u64 {
+        self.grid.root_samples()
+    }
+
+    /// Gathers what samples `from..to` need, and forgets what lies before.
+    ///
+    /// # Errors
+    /// Those of orbits and messages.
+    pub fn prepare(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
+        let rate = scene.clock.rate;
+        let (first, last) = (rate.elapsed(from).0 as u64, rate.elapsed(to.saturating_sub(1)).0 as u64);
+        self.view = self.view.split_off(&first);
+        for second in first..=last {
+            if !self.view.contains_key(&second) {
+                let sample = rate.first_sample_at(second, 1);
+                let up = truth::in_view(scene, self.sv, scene.clock.epoch(sample))?;
+                self.since = if up { self.since.or(Some(sample)) } else { None };
+                self.view.insert(second, up);
+            }
+        }
+        self.parts.retain(|part| part.end > from);
+        if !self.view.values().any(|up| *up) {
+            return Ok(());
+        }
+        self.seen = true;
+        let size = self.grid.root_samples();
+        self.roots = self.roots.split_off(&(from / size));
+        for root in from / size..=to.saturating_sub(1) / size {
+            if self.roots.insert(root) {
+                let parts = self.root(scene, root)?;
+                self.knots += parts.len() as u64;
+                self.worst_knot_cycles = parts.iter().fold(self.worst_knot_cycles, |w, p| w.max(p.error_cycles));
+                self.parts.extend(parts);
+            }
+        }
+        self.prepare_messages(scene, from, to)
+    }
+
+    fn prepare_messages(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
+        if !self.sent.iter().any(|sent| sent.spreading.message() == Some(Message::GpsLnav)) {
+            return Ok(());
+        }
+        let delays = self
+            .parts
+            .iter()
+            .filter(|part| part.start < to)
+            .flat_map(|part| part.paths.iter().flat_map(|path| [path.delay.at(0.0), path.delay.at(1.0)]));
+        let (least, most) = delays.fold((f64::MAX, f64::MIN), |(a, b), d| (a.min(d), b.max(d)));
+        if least > most {
+            return Ok(());
+        }
+        // Margins of strips are code periods at most; a tenth of a second holds them.
+        let first = scene.clock.epoch(from).plus_s(-most - 0.1).seconds().div_euclid(SUBFRAME_S);
+        let last = scene.clock.epoch(to).plus_s(-least + 0.1).seconds().div_euclid(SUBFRAME_S);
+        self.subframes = self.subframes.split_off(&first);
+        for index in first..=last {
+            if self.subframes.contains_key(&index) {
+                continue;
+            }
+            let start = Epoch::new(index * SUBFRAME_S, 0.0);
+            let fallback = || scene.catalogue.sent_at(self.sv, scene.clock.epoch(from));
+            let Some(ephemeris) = scene.catalogue.sent_at(self.sv, start).or_else(fallback) else { continue };
+            let words = scene.broadcast.subframe(ephemeris, start)?;
+            if let Ok(subframe) = Subframe::decode(&words, 0) {
+                let issue = match subframe.id {
+                    1..=3 => Some(u32::from(ephemeris.iode)),
+                    _ => subframe.klobuchar().map(|_| 0),
+                };
+                if let Some(issue) = issue {
+                    self.navigation.extend(subframe.parameters().into_iter().map(|(parameter, raw)| NavigationRow {
+                        sv: self.sv,
+                        issue,
+                        parameter: parameter.to_owned(),
+                        raw,
+                    }));
+                }
+            }
+            self.subframes.insert(index, words);
+        }
+        Ok(())
+    }
+
+    /// Whether the satellite is in view at a sample of the prepared stretch.
+    pub fn in_view(&self, scene: &Scene, sample: u64) -> bool {
+        self.view.get(&(scene.clock.rate.elapsed(sample).0 as u64)).copied().unwrap_or(false)
+    }
+
+    /// Seconds that the satellite has been in view at a sample.
+    pub fn in_view_s(&self, scene: &Scene, sample: u64) -> f64 {
+        self.since.map_or(0.0, |since| scene.clock.rate.elapsed_s(sample.saturating_sub(since)))
+    }
+
+    /// Whether a code period of a component is sent inverted.
+    fn negative(&self, message: Option<Message>, period: i64) -> bool {
+        let Some(message) = message else { return false };
+        let symbol = period.div_euclid(i64::from(message.periods_per_symbol()));
+        let Some(words) = self.subframes.get(&symbol.div_euclid(SUBFRAME_SYMBOLS)) else { return false };
+        let bit = symbol.rem_euclid(SUBFRAME_SYMBOLS) as usize;
+        words.get(bit / 30).is_some_and(|word| word >> (29 - bit % 30) & 1 == 1)
+    }
+
+    /// Adds samples from `start` on, a multiple of 4096, to `i` and `q`.
+    pub fn render(
+        &self,
+        scene: &Scene,
+        kernel: Kernel<'_>,
+        start: u64,
+        i: &mut [f32],
+        q: &mut [f32],
+        scratch: &mut Scratch,
+    ) {
+        let end = start + i.len() as u64;
+        let first = self.parts.partition_point(|part| part.end <= start);
+        for part in self.parts.iter().skip(first).take_while(|part| part.start < end) {
+            for path in &part.paths {
+                let mut n = start.max(part.start);
+                while n < end.min(part.end) {
+                    let whole = ((n / path.run_samples + 1) * path.run_samples).min(part.end);
+                    let (a, b) = ((n - start) as usize, (whole.min(end) - start) as usize);
+                    if let (true, Some(i), Some(q)) = (self.in_view(scene, n), i.get_mut(a..b), q.get_mut(a..b)) {
+                        self.run(scene, kernel, (part, path), (n, whole), (i, q), scratch);
+                    }
+                    n = whole;
+                }
+            }
+        }
+    }
+
+    /// Adds one run: the samples of `span` as far as `i` and `q` reach.
+    fn run(
+        &self,
+        scene: &Scene,
+        kernel: Kernel<'_>,
+        (part, path): (&Part, &Path),
+        span: (u64, u64),
+        (i, q): (&mut [f32], &mut [f32]),
+        scratch: &mut Scratch,
+    ) {
+        let (n, length) = (span.0, (span.1 - span.0) as f64);
+        let (u, v) = (part.fraction(span.0), part.fraction(span.1));
+        let cn0_hz = path.cn0_hz[0] + (path.cn0_hz[1] - path.cn0_hz[0]) * 0.5 * (u + v);
+        let carrier = carrier(scene, self.signal, path, (n, length), (u, v));
+        let real = if scene.metadata.format.is_complex() { 1.0 } else { std::f64::consts::SQRT_2 };
+        let rate_hz = scene.clock.rate.hz();
+        let amplitude = real * (2.0 * cn0_hz.max(0.0) / rate_hz).sqrt() * f64::from(scene.noise_lsb);
+        for sent in &self.sent {
+            let sent_s = length / rate_hz - path.delay.change(u, v);
+            let step = (sent_s * sent.spreading.step_rate_hz() / length * CODE_ONE as f64) as u64;
+            let at = sent.spreading.at(scene.clock.epoch(n), path.delay.at(u));
+            let message = sent.spreading.message();
+            let position =
+                sent.spreading.strip(at, step, i.len(), |period| self.negative(message, period), &mut scratch.bits);
+            let phase = sent.component.phase_cycles * if scene.metadata.inverted { -1.0 } else { 1.0 };
+            let run = Run {
+                bits: &scratch.bits,
+                position,
+                step,
+                turns: carrier.0.wrapping_add(turns(phase)),
+                turns_step: carrier.1,
+                amplitude: amplitude * sent.gain,
+            };
+            isa::accumulate(kernel.level, kernel.edge, &run, i, q, &mut scratch.wave);
+        }
+    }
+}
+
+/// Carrier phase of sample `n` and its step, in 2^-64 turn: `if_hz · n / rate − s · rho_phi / lambda`
+/// with s = −1 in an inverted spectrum.
+fn carrier(scene: &Scene, signal: &Signal, path: &Path, (n, length): (u64, f64), (u, v): (f64, f64)) -> (u64, u64) {
+    let if_hz = scene.metadata.if_hz(signal);
+    let (at, step) = (turns(path.carrier.at(u)), turns(path.carrier.change(u, v) / length));
+    let tone = tone_turns(if_hz, scene.clock.rate, n);
+    let tone_step = tone_turns(if_hz, scene.clock.rate, 1);
+    if scene.metadata.inverted {
+        (tone.wrapping_add(at), tone_step.wrapping_add(step))
+    } else {
+        (tone.wrapping_sub(at), tone_step.wrapping_sub(step))
+    }
+}
+
+/// Cycles modulo one, in 2^-64 turn.
+fn turns(cycles: f64) -> u64 {
+    ((cycles - cycles.floor()) * 18_446_744_073_709_551_616.0) as u64
+}
+
+const _: () = assert!(RUN_SAMPLES == crate::generator::stage::noise::BLOCK_SAMPLES);

@@ -1,0 +1,224 @@
+//! The program as a user meets it: exit codes, messages, and outputs that are whole or absent.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+const TWIN: &str = env!("CARGO_BIN_EXE_gnss-twin");
+
+/// A static scene of two seconds that needs nothing but the program.
+const SHORT: &str = r#"
+name = "short"
+start = "2010-07-01T08:00:00"
+duration_s = 2
+seed = 1
+[motion]
+kind = "static"
+latitude_deg = 26.5123
+longitude_deg = 80.2329
+height_m = 130.0
+[front_end]
+sample_rate_hz = 2.6e6
+format = "ci8"
+[power]
+cn0_dbhz = 45.0
+[noise]
+"#;
+
+fn twin(arguments: &[&str], directory: &Path) -> Output {
+    Command::new(TWIN).args(arguments).current_dir(directory).stdin(Stdio::null()).output().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap_or(-1)
+}
+
+/// A directory with `short.toml` in it.
+fn workplace() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("short.toml"), SHORT).unwrap();
+    directory
+}
+
+fn names(directory: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn usage_errors_exit_with_two() {
+    let here = workplace();
+    for arguments in
+        [&["fly"][..], &["run", "--speed"], &["receive", "raw.bin", "--out", "x"], &["generate", "short.toml"]]
+    {
+        assert_eq!(code(&twin(arguments, here.path())), 2, "{arguments:?}");
+    }
+    assert_eq!(code(&twin(&["--help"], here.path())), 0);
+}
+
+#[test]
+fn a_misspelt_key_is_named_with_its_place_and_the_nearest_right_one() {
+    let here = workplace();
+    fs::write(here.path().join("typo.toml"), SHORT.replace("sample_rate_hz", "sampel_rate_hz")).unwrap();
+    let output = twin(&["plan", "typo.toml"], here.path());
+    assert_eq!(code(&output), 65);
+    let message = stderr(&output);
+    for part in ["typo.toml", "sampel_rate_hz", "sample_rate_hz"] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn a_bad_value_is_named_with_its_key_and_its_range() {
+    let here = workplace();
+    fs::write(here.path().join("bad.toml"), SHORT.replace("duration_s = 2", "duration_s = -2")).unwrap();
+    let output = twin(&["run", "bad.toml"], here.path());
+    assert_eq!(code(&output), 65);
+    let message = stderr(&output);
+    assert!(message.contains("duration_s") && message.contains("-2") && message.contains("bad.toml"), "{message}");
+    assert_eq!(names(here.path()), ["bad.toml", "short.toml"], "nothing may be written");
+}
+
+#[test]
+fn missing_or_foreign_inputs_are_bad_data() {
+    let here = workplace();
+    fs::create_dir(here.path().join("empty")).unwrap();
+    fs::write(here.path().join("noise.toml"), [0xff, 0xfe, 0x00]).unwrap();
+    for arguments in [
+        &["run", "absent.toml"][..],
+        &["plan", "noise.toml"],
+        &["plan", "empty"],
+        &["analyze", "empty"],
+        &["receive", "absent.bin", "--out", "x", "--format", "ci8", "--rate-hz", "4e6"],
+    ] {
+        let output = twin(arguments, here.path());
+        assert_eq!(code(&output), 65, "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).lines().count() <= 4, "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_directory_that_is_not_a_run_is_never_replaced() {
+    let here = workplace();
+    fs::create_dir(here.path().join("mine")).unwrap();
+    fs::write(here.path().join("mine/thesis.tex"), "years of work").unwrap();
+    let output = twin(&["run", "short.toml", "--out", "mine"], here.path());
+    assert_eq!(code(&output), 73, "{}", stderr(&output));
+    assert_eq!(fs::read_to_string(here.path().join("mine/thesis.tex")).unwrap(), "years of work");
+}
+
+#[test]
+fn the_same_scene_and_seed_give_the_same_bytes_on_any_threads_and_processor() {
+    let here = workplace();
+    let mut runs = Vec::new();
+    for (name, threads, tunables) in
+        [("a", "1", ""), ("b", "2", ""), ("c", "3", "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA")]
+    {
+        let output = Command::new(TWIN)
+            .args(["run", "short.toml", "--keep-if", "--threads", threads, "--out", name])
+            .env("GLIBC_TUNABLES", tunables)
+            .current_dir(here.path())
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        let files = [
+            "if.sigmf-data",
+            "if.sigmf-meta",
+            "truth/observations.csv",
+            "truth/trajectory.csv",
+            "rx/acquisition.csv",
+            "rx/tracking.csv",
+            "rx/events.csv",
+        ];
+        runs.push(files.map(|file| fs::read(here.path().join(name).join(file)).unwrap()));
+    }
+    assert!(runs[0][0].len() == 2 * 2 * 2_600_000);
+    assert!(runs[0] == runs[1] && runs[0] == runs[2]);
+    let other = twin(&["run", "short.toml", "--keep-if", "--seed", "2", "--out", "d"], here.path());
+    assert!(other.status.success());
+    assert!(fs::read(here.path().join("d/if.sigmf-data")).unwrap() != runs[0][0]);
+}
+
+#[test]
+fn generate_and_receive_are_the_same_as_run() {
+    let here = workplace();
+    assert!(twin(&["run", "short.toml", "--keep-if", "--out", "run"], here.path()).status.success());
+    let generated = twin(&["generate", "short.toml", "--out", "short.sigmf-data"], here.path());
+    assert!(generated.status.success(), "{}", stderr(&generated));
+    let received = twin(&["receive", "short.sigmf-meta", "--out", "rx"], here.path());
+    assert!(received.status.success(), "{}", stderr(&received));
+    for (one, two) in [
+        ("run/if.sigmf-data", "short.sigmf-data"),
+        ("run/truth/sky.csv", "short.truth/sky.csv"),
+        ("run/rx/tracking.csv", "rx/tracking.csv"),
+    ] {
+        assert!(fs::read(here.path().join(one)).unwrap() == fs::read(here.path().join(two)).unwrap(), "{one} {two}");
+    }
+    // Two seconds hold no ephemeris: the receiver says so.
+    let text = String::from_utf8_lossy(&received.stdout).into_owned();
+    assert!(text.contains("subframe"), "{text}");
+}
+
+#[test]
+fn a_recording_without_satellites_ends_with_the_strongest_peak_and_what_to_check() {
+    let here = workplace();
+    // A fixed multiplicative sequence: noise enough, and the same everywhere.
+    let mut state = 1_u64;
+    let noise: Vec<u8> = (0..4_000_000)
+        .map(|_| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 56) as i8 / 4) as u8
+        })
+        .collect();
+    fs::write(here.path().join("noise.bin"), noise).unwrap();
+    let output = twin(&["receive", "noise.bin", "--out", "rx", "--format", "ci8", "--rate-hz", "4e6"], here.path());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    for part in ["threshold", "rate", "format"] {
+        assert!(text.contains(part), "{text}");
+    }
+}
+
+#[test]
+fn a_full_disk_and_a_closed_pipe_end_in_their_exit_codes_without_a_panic() {
+    let here = workplace();
+    let full = Command::new(TWIN)
+        .args(["plan", "short.toml"])
+        .current_dir(here.path())
+        .stdout(fs::OpenOptions::new().write(true).open("/dev/full").unwrap())
+        .output()
+        .unwrap();
+    assert_eq!(code(&full), 75, "{}", stderr(&full));
+    let closed = Command::new("sh")
+        .args(["-c", &format!("{{ sleep 0.2; '{TWIN}' plan short.toml; echo $? >status; }} | true")])
+        .current_dir(here.path())
+        .output()
+        .unwrap();
+    assert!(!stderr(&closed).contains("panicked"), "{}", stderr(&closed));
+    assert_eq!(fs::read_to_string(here.path().join("status")).unwrap().trim(), "141");
+}
+
+#[test]
+fn an_interrupted_run_leaves_nothing_and_says_which_signal() {
+    let here = workplace();
+    fs::write(here.path().join("long.toml"), SHORT.replace("duration_s = 2", "duration_s = 600")).unwrap();
+    for (signal, expected) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
+        let mut child = Command::new(TWIN)
+            .args(["run", "long.toml", "--out", "long"])
+            .current_dir(here.path())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(1500));
+        let kill = Command::new("kill").args([&format!("-{signal}"), &child.id().to_string()]).status().unwrap();
+        assert!(kill.success());
+        assert_eq!(child.wait().unwrap().code(), Some(expected), "{signal}");
+        assert_eq!(names(here.path()), ["long.toml", "short.toml"], "{signal}");
+    }
+}

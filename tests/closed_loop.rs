@@ -1,0 +1,84 @@
+//! The whole twin as a user runs it: a scene in, a judged position out, held to its figures.
+//!
+//! Each test runs the program on one scene of `scenarios/` and reads `summary.json`.
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Runs a scene and returns its summary.
+fn run(scene: &str) -> Value {
+    let out = tempfile::tempdir().unwrap();
+    let target = out.path().join("run");
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{scene}.toml"));
+    let run = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
+        .args(["run".as_ref(), scenario.as_os_str(), "--out".as_ref(), target.as_os_str()])
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&run.stdout).into_owned() + &String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{text}");
+    println!("{text}");
+    serde_json::from_str(&std::fs::read_to_string(target.join("summary.json")).unwrap()).unwrap()
+}
+
+fn number(summary: &Value, pointer: &str) -> f64 {
+    summary
+        .pointer(pointer)
+        .and_then(Value::as_f64)
+        .unwrap_or_else(|| panic!("{pointer} is not a number in {summary:#}"))
+}
+
+fn at_most(summary: &Value, pointer: &str, limit: f64) {
+    let value = number(summary, pointer).abs();
+    assert!(value <= limit, "{pointer} is {value}, the limit {limit}");
+}
+
+/// Every satellite in view is found, no other is, and every decoded parameter is the one that was sent.
+fn found_and_decoded_what_is_there(summary: &Value) {
+    assert_eq!(summary.pointer("/satellites/acquired"), summary.pointer("/satellites/in_view"));
+    assert_eq!(number(summary, "/satellites/false_acquired"), 0.0);
+    assert_eq!(number(summary, "/navigation/parameters_wrong"), 0.0);
+    assert!(number(summary, "/navigation/parameters_checked") > 100.0);
+}
+
+#[test]
+fn a_static_receiver_finds_its_place_to_a_metre_within_forty_seconds() {
+    let summary = run("static");
+    found_and_decoded_what_is_there(&summary);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/position/bias_enu_m/0", 0.3);
+    at_most(&summary, "/position/bias_enu_m/1", 0.3);
+    at_most(&summary, "/position/first_fix_s", 40.0);
+    assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
+}
+
+#[test]
+fn a_moving_receiver_keeps_every_cycle_and_its_velocity_to_a_decimetre_a_second() {
+    let summary = run("moderate");
+    found_and_decoded_what_is_there(&summary);
+    at_most(&summary, "/position/horizontal_p95_m", 1.5);
+    at_most(&summary, "/position/velocity_p95_mps", 0.1);
+    assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
+}
+
+#[test]
+fn a_boost_above_twenty_g_loses_no_satellite_and_no_position() {
+    let summary = run("high_dynamics");
+    found_and_decoded_what_is_there(&summary);
+    at_most(&summary, "/position/error_3d_p95_m", 5.0);
+    assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
+}
+
+#[test]
+fn without_noise_the_loop_closes_to_centimetres() {
+    let summary = run("noise_free");
+    found_and_decoded_what_is_there(&summary);
+    at_most(&summary, "/observables/pseudorange_rms_m", 0.05);
+    let bias = ["/position/bias_enu_m/0", "/position/bias_enu_m/1", "/position/bias_enu_m/2"]
+        .map(|pointer| number(&summary, pointer).powi(2))
+        .iter()
+        .sum::<f64>()
+        .sqrt();
+    assert!(bias <= 0.02, "mean position error {bias} m, the limit 0.02");
+}

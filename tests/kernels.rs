@@ -1,0 +1,286 @@
+//! Laws of the sample kernels: the fast one against the obvious one, the noise, the phases.
+#![cfg(feature = "generator")]
+
+use gnss_twin::generator::stage::noise::BLOCK_SAMPLES;
+use gnss_twin::generator::synth::band::Filter;
+use gnss_twin::generator::synth::chips::{CodeTime, Spreading};
+use gnss_twin::generator::synth::isa::{Level, accumulate, add_noise};
+use gnss_twin::generator::synth::{CODE_ONE, Edge, Run, reference};
+use gnss_twin::gnss::gps::l1ca::L1_CA;
+
+const CHIP_HZ: f64 = 1.023e6;
+
+struct Case {
+    bits: Vec<u64>,
+    position: u64,
+    step: u64,
+}
+
+impl Case {
+    fn new(rate_hz: f64, at: CodeTime, samples: usize) -> Self {
+        let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
+        let step = (CHIP_HZ / rate_hz * CODE_ONE as f64) as u64;
+        let mut bits = Vec::new();
+        let position = spreading.strip(at, step, samples, |period| period % 2 == 1, &mut bits);
+        Self { bits, position, step }
+    }
+
+    fn run(&self, amplitude: f64) -> Run<'_> {
+        Run {
+            bits: &self.bits,
+            position: self.position,
+            step: self.step,
+            turns: 0x1234_5678_9abc_def0,
+            turns_step: 0x0765_4321_0fed_cba9,
+            amplitude,
+        }
+    }
+}
+
+fn edges(filter: &Filter) -> [Edge<'_>; 3] {
+    [Edge::Nearest, Edge::Area, Edge::BandLimited(filter)]
+}
+
+fn fast(level: Level, edge: Edge<'_>, run: &Run<'_>, samples: usize) -> (Vec<f32>, Vec<f32>) {
+    let (mut i, mut q, mut wave) = (vec![0.0; samples], vec![0.0; samples], Vec::new());
+    accumulate(level, edge, run, &mut i, &mut q, &mut wave);
+    (i, q)
+}
+
+#[test]
+fn the_fast_kernel_keeps_to_the_reference_at_all_lengths_phases_and_rates() {
+    let filter = Filter::new(0.45);
+    for rate_hz in [1.5e6, 2.046e6, 2.6e6, 25e6, 0.9e6] {
+        for edge in edges(&filter) {
+            for length in (0..=130).chain([1000, 4096]) {
+                // Chip 1020 puts the wrap of the code, with a change of data sign, into the run.
+                let phase = 1020 * CODE_ONE + length as u64 * (CODE_ONE / 131);
+                let case = Case::new(rate_hz, CodeTime { period: 8, phase }, length);
+                let run = case.run(1.0);
+                let (i, q) = fast(Level::Baseline, edge, &run, length);
+                let (mut ri, mut rq) = (vec![0.0; length], vec![0.0; length]);
+                reference::accumulate(edge, &run, &mut ri, &mut rq);
+                for n in 0..length {
+                    let error = (i[n] - ri[n]).abs().max((q[n] - rq[n]).abs());
+                    // A lane's code phase resolves 2^-27 chip: nearest chips may differ that close to an edge,
+                    // and the area's slope of 2/step per chip makes 2^-26/0.04 = 4e-7 of it.
+                    let p = run.position + run.step * n as u64;
+                    let near_edge = (p % CODE_ONE).min(CODE_ONE - p % CODE_ONE) < 1 << 22;
+                    // 128 rotations of f32 lose 128 * 6e-8 = 8e-6 at worst; the filter's table 4e-6 an edge.
+                    assert!(error < 2e-5 || near_edge, "{edge:?} {rate_hz} {length} {n} {error}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    let filter = Filter::new(0.45);
+    for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+        for rate_hz in [0.7e6, 1.5e6, 2.6e6, 60e6] {
+            for length in [1, 31, 32, 33, 500, 4096] {
+                let case = Case::new(rate_hz, CodeTime { period: 3, phase: 1000 * CODE_ONE + 12345 }, length);
+                for edge in edges(&filter) {
+                    let run = case.run(0.3);
+                    assert_eq!(fast(level, edge, &run, length), fast(Level::Baseline, edge, &run, length), "{level:?}");
+                }
+            }
+        }
+        let draw = |level| {
+            let (mut i, mut q) = (vec![0.0; BLOCK_SAMPLES], vec![0.0; BLOCK_SAMPLES]);
+            add_noise(level, 7, 123, 3.0, &mut i, &mut q);
+            (i, q)
+        };
+        assert_eq!(draw(level), draw(Level::Baseline), "{level:?}");
+    }
+}
+
+#[test]
+fn every_code_edge_keeps_the_mean_power_of_the_waveform() {
+    let filter = Filter::new(0.45);
+    let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
+    for rate_hz in [0.6e6, 1.5e6, 2.6e6, 10e6] {
+        for edge in edges(&filter) {
+            let gain = edge.gain(spreading.correlation(), CHIP_HZ / rate_hz);
+            let mut sum = 0.0;
+            let mut count = 0;
+            for k in 0..40 {
+                let at = CodeTime { period: 0, phase: k * 25 * CODE_ONE + k * (CODE_ONE / 40) };
+                let case = Case::new(rate_hz, at, 4096);
+                let run = case.run(gain);
+                let (i, q) = fast(Level::detect(), edge, &run, 4096);
+                sum += i.iter().zip(&q).map(|(i, q)| f64::from(i * i + q * q)).sum::<f64>();
+                count += 4096;
+            }
+            // 40 runs over whole periods: the chips' own patterns leave a fraction of a percent.
+            let power = sum / f64::from(count);
+            assert!((power - 1.0).abs() < 0.01, "{edge:?} {rate_hz} {power}");
+        }
+    }
+}
+
+/// Fourier coefficient of harmonic `k` of one period.
+fn harmonic(x: &[f64], k: usize) -> (f64, f64) {
+    let length = x.len();
+    x.iter().enumerate().fold((0.0, 0.0), |(re, im), (n, x)| {
+        let (sin, cos) = libm::sincos(-std::f64::consts::TAU * ((n * k) % length) as f64 / length as f64);
+        (re + x * cos, im + x * sin)
+    })
+}
+
+/// Where the code best matches one period of samples, in metres behind the true place: the zero of early
+/// minus late, half a chip apart, of the continuous correlation with the code below half the sample rate.
+///
+/// By Fourier series: the code's harmonics `k` kHz, from its chips and the pulse's sinc, times those of the samples.
+fn code_bias_m(edge: Edge<'_>, rate_khz: usize, start_chips: f64) -> f64 {
+    use std::f64::consts::{PI, TAU};
+    let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
+    let chips: Vec<f64> =
+        (L1_CA.components[0].code)(11).unwrap().iter().map(|&chip| if chip { -1.0 } else { 1.0 }).collect();
+    let step = (1023.0 / rate_khz as f64 * CODE_ONE as f64) as u64;
+    let mut bits = Vec::new();
+    let at = CodeTime { period: 0, phase: (start_chips * CODE_ONE as f64) as u64 };
+    let position = spreading.strip(at, step, rate_khz, |_| false, &mut bits);
+    let run = Run { bits: &bits, position, step, turns: 0, turns_step: 0, amplitude: 1.0 };
+    let wave: Vec<f64> = fast(Level::detect(), edge, &run, rate_khz).0.into_iter().map(f64::from).collect();
+    let cross: Vec<(f64, f64)> = (1..rate_khz.div_ceil(2))
+        .map(|k| {
+            let ((a, b), (c, d)) = (harmonic(&wave, k), harmonic(&chips, k));
+            // The pulse from 0 to 1 chip: sinc, and half a chip of delay; the samples start at `start_chips`.
+            let x = PI * k as f64 / 1023.0;
+            let pulse = libm::sin(x) / x;
+            let (sin, cos) = libm::sincos(TAU * k as f64 * (0.5 - start_chips) / 1023.0);
+            let (re, im) = (a * c + b * d, b * c - a * d);
+            ((re * cos - im * sin) * pulse, (re * sin + im * cos) * pulse)
+        })
+        .collect();
+    let correlation = |delay_chips: f64| {
+        cross.iter().enumerate().fold(0.0, |sum, (k, (re, im))| {
+            let (sin, cos) = libm::sincos(TAU * (k + 1) as f64 * delay_chips / 1023.0);
+            sum + re * cos - im * sin
+        })
+    };
+    let (mut low, mut high) = (-0.2, 0.2);
+    for _ in 0..25 {
+        let middle: f64 = 0.5 * (low + high);
+        if correlation(middle + 0.25) > correlation(middle - 0.25) { low = middle } else { high = middle }
+    }
+    0.5 * (low + high) * 299_792_458.0 / CHIP_HZ
+}
+
+#[test]
+fn band_limited_edges_leave_no_code_bias_and_area_edges_none_once_the_phase_moves() {
+    let filter = Filter::new(0.45);
+    let starts: Vec<f64> = (0..24).map(|k| f64::from(k) * 0.618_034 % 1.0 + f64::from(k * 37)).collect();
+    let [nearest, area, band] = edges(&filter).map(|edge| {
+        let bias: Vec<f64> = starts.iter().map(|&start| code_bias_m(edge, 2600, start)).collect();
+        let mean = bias.iter().sum::<f64>() / bias.len() as f64;
+        let rms = (bias.iter().map(|b| b * b).sum::<f64>() / bias.len() as f64).sqrt();
+        println!("code bias at 2.6 Msps, {:.4}: mean {mean:.4} rms {rms:.4} m", format!("{edge:?}"));
+        (mean, rms)
+    });
+    // A Doppler of 1 kHz moves the code by 0.65 chip a second past the sampling grid: what a loop of 1 Hz
+    // sees is the mean over phases; with no Doppler at all it is one draw of that rms.
+    assert!(band.1 < 0.05, "{band:?}");
+    assert!(area.0.abs() < 0.1 && area.1 < 0.25 && nearest.1 > 2.0 * area.1, "{area:?} {nearest:?}");
+}
+
+fn noise(seed: u64, blocks: u64) -> (Vec<f64>, Vec<f64>) {
+    let (mut i, mut q) = (Vec::new(), Vec::new());
+    for block in 0..blocks {
+        let (mut bi, mut bq) = (vec![0.0; BLOCK_SAMPLES], vec![0.0; BLOCK_SAMPLES]);
+        add_noise(Level::detect(), seed, block, 1.0, &mut bi, &mut bq);
+        i.extend(bi.into_iter().map(f64::from));
+        q.extend(bq.into_iter().map(f64::from));
+    }
+    (i, q)
+}
+
+#[test]
+fn the_noise_is_gaussian_to_the_sixth_moment_and_in_its_tails() {
+    let (i, q) = noise(1, 2000);
+    let count = (2 * i.len()) as f64;
+    let all = || i.iter().chain(&q);
+    let moment = |k: i32| all().map(|x| x.powi(k)).sum::<f64>() / count;
+    // Var(x^k) = (2k−1)!! − E(x^k)²; five standard deviations of the mean.
+    for (k, mean, variance) in
+        [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0), (5, 0.0, 945.0), (6, 15.0, 10_170.0)]
+    {
+        let bar = 5.0 * f64::sqrt(variance / count);
+        assert!((moment(k) - mean).abs() < bar, "moment {k}: {} not {mean} within {bar}", moment(k));
+    }
+    // Two-sided tail probabilities; Poisson counts within five sigma.
+    for (sigma, probability) in [(3.0, 2.699_796e-3), (4.0, 6.334_248e-5), (5.0, 5.733_031e-7)] {
+        let expected = count * probability;
+        let seen = all().filter(|x| x.abs() > sigma).count() as f64;
+        assert!((seen - expected).abs() < 5.0 * expected.sqrt() + 1.0, "{sigma}: {seen} of {expected}");
+    }
+    // 64 bins from −4 to 4 by the error function; 5 sigma of chi-square with 65 degrees is 57.
+    let edge = |k: usize| -4.0 + k as f64 / 8.0;
+    let mut bins = [0.0_f64; 66];
+    all().for_each(|x| bins[(((x + 4.0) * 8.0).floor() + 1.0).clamp(0.0, 65.0) as usize] += 1.0);
+    let cdf = |x: f64| 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2);
+    let chi: f64 = (0..66)
+        .map(|k| {
+            let low = if k == 0 { 0.0 } else { cdf(edge(k - 1)) };
+            let high = if k == 65 { 1.0 } else { cdf(edge(k)) };
+            let expected = (high - low) * count;
+            (bins[k] - expected).powi(2) / expected
+        })
+        .sum();
+    assert!((chi - 65.0).abs() < 57.0, "chi-square {chi}");
+}
+
+#[test]
+fn the_noise_is_white_and_its_components_and_seeds_are_independent() {
+    let (i, q) = noise(2, 500);
+    let (other, _) = noise(3, 500);
+    let n = i.len() as f64;
+    // Each mean of products of independent unit normals has standard deviation 1/√n; five of them.
+    let bar = 5.0 / n.sqrt();
+    let against = |a: &[f64], b: &[f64], lag: usize| a.iter().zip(&b[lag..]).map(|(a, b)| a * b).sum::<f64>() / n;
+    for lag in [1, 2, 3, 16, 31, 32, 33, 64, 4095, 4096, 4097] {
+        assert!(against(&i, &i, lag).abs() < bar && against(&i, &q, lag).abs() < bar, "{lag}");
+    }
+    assert!(against(&i, &q, 0).abs() < bar && against(&i, &other, 0).abs() < bar);
+    let squares = |a: &[f64]| a.iter().map(|x| x * x - 1.0).collect::<Vec<_>>();
+    // Squares too: what radius and angle share would show here.
+    assert!(against(&squares(&i), &squares(&q), 0).abs() < 2.0 * bar);
+    assert!(against(&squares(&i), &squares(&i), 1).abs() < 2.0 * bar);
+}
+
+#[test]
+#[ignore = "prints speeds; run alone with --ignored --nocapture"]
+fn speeds() {
+    let filter = Filter::new(0.45);
+    for rate_hz in [2.6e6, 25e6] {
+        let case = Case::new(rate_hz, CodeTime { period: 3, phase: 12345 }, 4096);
+        for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+            for edge in edges(&filter) {
+                let (mut i, mut q, mut wave) = (vec![0.0; 4096], vec![0.0; 4096], Vec::new());
+                let run = case.run(1e-3);
+                let best = (0..20)
+                    .map(|_| {
+                        let start = std::time::Instant::now();
+                        (0..100).for_each(|_| accumulate(level, edge, &run, &mut i, &mut q, &mut wave));
+                        start.elapsed().as_secs_f64() / 409_600.0 * 1e9
+                    })
+                    .fold(f64::MAX, f64::min);
+                let name = format!("{edge:?}");
+                println!("{rate_hz:e} {level:?} {} {best:.3} ns", &name[..4]);
+            }
+        }
+    }
+    for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+        let (mut i, mut q) = (vec![0.0; 4096], vec![0.0; 4096]);
+        let best = (0..20)
+            .map(|_| {
+                let start = std::time::Instant::now();
+                (0..100).for_each(|b| add_noise(level, 1, b, 1.0, &mut i, &mut q));
+                819_200.0 / start.elapsed().as_secs_f64() / 1e6
+            })
+            .fold(0.0, f64::max);
+        println!("noise {level:?} {best:.0} M normals/s");
+    }
+}
