@@ -48,12 +48,22 @@ pub struct Range {
     pub cn0_hz: f64,
 }
 
+/// What is known of the ionosphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ionosphere {
+    /// There is none.
+    Absent,
+    /// There is one, uncorrected: ranges weigh less by its size.
+    Unknown,
+    Known(Klobuchar),
+}
+
 /// What corrects and weights ranges.
 #[derive(Clone, Copy, Debug)]
 pub struct Corrections {
-    pub ionosphere: Option<Klobuchar>,
-    /// Whether ionosphere and troposphere are there at all.
-    pub atmosphere: bool,
+    pub ionosphere: Ionosphere,
+    /// Whether there is a troposphere to correct.
+    pub troposphere: bool,
     /// Standard deviation of the models at the zenith; grows with one over the sine of the elevation.
     pub model_sigma_m: f64,
 }
@@ -102,12 +112,10 @@ fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Co
         let direction = look(user, position_m, &seen_m);
         elevation_rad = direction.elevation_rad;
         let sine = libm::sin(elevation_rad);
-        if corrections.atmosphere {
-            let received = range.emitted.plus_s(distance_m / SPEED_OF_LIGHT_MPS);
-            let (delay_m, sigma_m) = atmosphere(range, corrections, user, direction, received, day);
-            computed_m += delay_m;
-            variance += sigma_m * sigma_m;
-        }
+        let received = range.emitted.plus_s(distance_m / SPEED_OF_LIGHT_MPS);
+        let (delay_m, sigma_m) = atmosphere(range, corrections, user, direction, received, day);
+        computed_m += delay_m;
+        variance += sigma_m * sigma_m;
         let model_m = corrections.model_sigma_m / sine.max(0.05);
         variance += model_m * model_m;
     }
@@ -124,16 +132,17 @@ fn atmosphere(
     day: f64,
 ) -> (f64, f64) {
     let sine = libm::sin(direction.elevation_rad);
-    let troposphere_m = troposphere::delay_m(user, sine, day);
+    let troposphere_m = if corrections.troposphere { troposphere::delay_m(user, sine, day) } else { 0.0 };
     if user.height_m > IONOSPHERE_TOP_M {
         return (troposphere_m, 0.0);
     }
     match corrections.ionosphere {
-        Some(klobuchar) => {
+        Ionosphere::Absent => (troposphere_m, 0.0),
+        Ionosphere::Known(klobuchar) => {
             let delay_s = klobuchar.delay_s(user, direction, received, range.carrier_hz);
             (troposphere_m + SPEED_OF_LIGHT_MPS * delay_s, 0.0)
         }
-        None => {
+        Ionosphere::Unknown => {
             // Thin shell at 350 km.
             let cosine = 0.948 * libm::cos(direction.elevation_rad);
             (troposphere_m, IONOSPHERE_SIGMA_M / (1.0 - cosine * cosine).sqrt())

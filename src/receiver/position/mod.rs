@@ -24,7 +24,7 @@ pub mod smooth;
 mod tests;
 pub mod troposphere;
 
-use least_squares::{Corrections, Range, Solution, UNKNOWNS};
+use least_squares::{Corrections, Ionosphere, Range, Solution, UNKNOWNS};
 use smooth::Smoother;
 
 /// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
@@ -32,6 +32,25 @@ const HALF_FIT_S: f64 = 7200.0;
 const HALF_LONG_FIT_S: f64 = 10_800.0;
 /// A set is used a little beyond its interval, until the next one is decoded.
 const FIT_GRACE_S: f64 = 600.0;
+
+/// How the ionosphere is corrected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum IonosphereChoice {
+    /// Klobuchar's model with the parameters that satellites send.
+    Broadcast,
+    /// Not at all: recordings made without an ionosphere.
+    None,
+}
+
+/// How the troposphere is corrected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TroposphereChoice {
+    /// A standard atmosphere, half saturated.
+    Standard,
+    None,
+}
 
 /// Choices of the position solution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,8 +64,8 @@ pub struct PositionSettings {
     pub false_alarm: f64,
     /// Standard deviation of the models at the zenith, for weights; it grows with one over the elevation's sine.
     pub model_sigma_m: f64,
-    /// Whether ionosphere and troposphere are corrected.
-    pub atmosphere: bool,
+    pub ionosphere: IonosphereChoice,
+    pub troposphere: TroposphereChoice,
     /// Whether there is no fix until the ionosphere's parameters are decoded.
     pub require_ionosphere: bool,
     /// Else the first fix waits for them this long: in the best case they come six seconds after the ephemerides.
@@ -60,7 +79,8 @@ impl Default for PositionSettings {
             smoothing_s: 30.0,
             false_alarm: 1e-3,
             model_sigma_m: 0.1,
-            atmosphere: true,
+            ionosphere: IonosphereChoice::Broadcast,
+            troposphere: TroposphereChoice::Standard,
             require_ionosphere: false,
             ionosphere_wait_s: 8.0,
         }
@@ -154,8 +174,12 @@ impl Solver {
         }
         self.await_ionosphere(sample, klobuchar)?;
         let corrections = Corrections {
-            ionosphere: klobuchar,
-            atmosphere: self.settings.atmosphere,
+            ionosphere: match (self.settings.ionosphere, klobuchar) {
+                (IonosphereChoice::None, _) => Ionosphere::Absent,
+                (IonosphereChoice::Broadcast, Some(model)) => Ionosphere::Known(model),
+                (IonosphereChoice::Broadcast, None) => Ionosphere::Unknown,
+            },
+            troposphere: self.settings.troposphere == TroposphereChoice::Standard,
             model_sigma_m: self.settings.model_sigma_m,
         };
         let start_m = self.last_m.unwrap_or_else(Vector3::zeros);
@@ -176,12 +200,13 @@ impl Solver {
             consistent(visible, first.position_m, &corrections, self.settings.false_alarm)?;
         let (velocity_mps, drift) = least_squares::velocity(&kept, &solution)?;
         self.last_m = Some(solution.position_m);
-        let fix = fix(sample, clock, &solution, velocity_mps, drift, kept.len(), &excluded, klobuchar.is_some());
+        let known = matches!(corrections.ionosphere, Ionosphere::Known(_));
+        let fix = fix(sample, clock, &solution, velocity_mps, drift, kept.len(), &excluded, known);
         Ok(Solved { fix, used: kept.iter().map(|range| range.sv).collect(), excluded })
     }
 
     fn await_ionosphere(&mut self, sample: u64, klobuchar: Option<Klobuchar>) -> Result<(), NoFix> {
-        if klobuchar.is_some() || !self.settings.atmosphere {
+        if klobuchar.is_some() || self.settings.ionosphere == IonosphereChoice::None {
             return Ok(());
         }
         let since = *self.ready_since.get_or_insert(sample);

@@ -1,6 +1,6 @@
 use nalgebra::{Vector3, Vector4};
 
-use super::least_squares::{Corrections, Range, position};
+use super::least_squares::{Corrections, Ionosphere, Range, position};
 use super::{NoFix, chi_square_threshold, consistent};
 use crate::gnss::broadcast::{ClockState, State};
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS, rotate_earth};
@@ -20,7 +20,7 @@ const SKY: [(f64, f64); 10] = [
     (335.0, 48.0),
     (15.0, 9.0),
 ];
-const BARE: Corrections = Corrections { ionosphere: None, atmosphere: false, model_sigma_m: 1e-6 };
+const BARE: Corrections = Corrections { ionosphere: Ionosphere::Absent, troposphere: false, model_sigma_m: 1e-6 };
 
 fn place() -> Geodetic {
     Geodetic::from_degrees(26.5, 80.2, 130.0)
