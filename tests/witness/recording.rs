@@ -220,7 +220,7 @@ fn half_a_second_of_real_signal_tracks_with_steady_power_and_bit_edges_twenty_mi
         // Signal to noise of a 1 ms prompt at 47 dB-Hz is 20 dB: its magnitude wanders by a tenth, so a mean of
         // 240 by 1 %, and the halves of the stretch agree to 5 %.
         let magnitude = |rows: &[gnss_twin::gnss::record::TrackingRow]| {
-            rows.iter().map(|row| row.prompt_i.hypot(row.prompt_q)).sum::<f64>() / rows.len() as f64
+            rows.iter().map(|row| libm::hypot(row.prompt_i, row.prompt_q)).sum::<f64>() / rows.len() as f64
         };
         let (first, second) = rows.split_at(rows.len() / 2);
         let ratio = magnitude(first) / magnitude(second);
@@ -229,7 +229,7 @@ fn half_a_second_of_real_signal_tracks_with_steady_power_and_bit_edges_twenty_mi
         // other programs differ by a decibel and a half.
         let quadrature = rows.iter().map(|row| row.prompt_q * row.prompt_q).sum::<f64>() / rows.len() as f64;
         let in_phase = rows.iter().map(|row| row.prompt_i.abs()).sum::<f64>() / rows.len() as f64;
-        let measured = 10.0 * (in_phase * in_phase / (2.0 * 1e-3 * quadrature)).log10();
+        let measured = 10.0 * libm::log10(in_phase * in_phase / (2.0 * 1e-3 * quadrature));
         assert!((measured - cn0_dbhz).abs() < 2.0, "PRN {prn}: {measured} dB-Hz");
         assert!(rows.last().unwrap().phase_lock > 0.9);
 
