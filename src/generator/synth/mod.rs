@@ -2,7 +2,7 @@
 //!
 //! A [`Run`] is up to 4096 samples of one ray with constant carrier and code steps, both phases
 //! as fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
-//! [`reference`] evaluates each sample in `f64`; [`lanes`] is the fast kernel, plain lane-array
+//! [`mod@reference`] evaluates each sample in `f64`; [`lanes`] is the fast kernel, plain lane-array
 //! code that [`isa`] compiles for each instruction set with the same bits on all.
 //! Limits: 15 code steps a sample; lanes fall back to a wave buffer above one step a sample.
 

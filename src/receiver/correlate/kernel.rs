@@ -73,7 +73,7 @@ struct Job<'a> {
     nco: Nco,
 }
 
-/// Correlates `taps` in groups of three, then one by one. `level` must be one that [`Level::all`] lists.
+/// Correlates `taps` in groups of three, then one by one. `level` must be one that this processor has.
 pub(super) fn run(level: Level, replica: &Replica, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64]) -> Sums {
     let length = i.len().min(q.len());
     let period = replica.period();
