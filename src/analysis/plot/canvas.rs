@@ -257,7 +257,7 @@ type Context<'a, 'b> = ChartContext<
 >;
 
 fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Failure> {
-    let points = thinned(&series.points);
+    let points = thinned(&series.points, series.mark);
     let line = series.colour.stroke_width(3 * FINE as u32 / 2);
     match series.mark {
         Mark::Line => {
@@ -334,11 +334,15 @@ fn tick(value: f64, decimals: usize) -> String {
 /// Most points that a series is drawn with.
 const MOST_POINTS: usize = 1600;
 
-/// Few enough points to draw: of each run of neighbours the lowest and the highest, so that no spike is lost.
-fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+/// Few enough points to draw. Of a line, the lowest and the highest of each run of neighbours, so that no spike is lost; of
+/// marks that stand alone, every so many, so that their density stays true.
+fn thinned(points: &[(f64, f64)], mark: Mark) -> Vec<(f64, f64)> {
     let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
     if finite.len() <= MOST_POINTS {
         return finite;
+    }
+    if !matches!(mark, Mark::Line | Mark::Dash) {
+        return finite.iter().copied().step_by(finite.len().div_ceil(MOST_POINTS)).collect();
     }
     let extremes = |run: &[(f64, f64)]| {
         let numbered = || run.iter().enumerate();
@@ -357,11 +361,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thinning_keeps_the_spikes_and_the_order() {
+    fn thinning_keeps_a_line_s_spikes_and_the_density_of_marks() {
         let mut points: Vec<(f64, f64)> = (0..100_000).map(|n| (f64::from(n), 0.0)).collect();
         points[54_321].1 = 9.0;
         points[54_400].1 = -9.0;
-        let few = thinned(&points);
+        let dots = thinned(&points, Mark::Dots);
+        assert!(dots.len() <= MOST_POINTS && dots.iter().filter(|point| point.1 != 0.0).count() <= 1);
+        let few = thinned(&points, Mark::Line);
         assert!(few.len() <= MOST_POINTS + 2);
         assert!(few.contains(&(54_321.0, 9.0)) && few.contains(&(54_400.0, -9.0)));
         assert!(few.windows(2).all(|pair| pair[0].0 <= pair[1].0));
