@@ -7,11 +7,14 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// Runs a scene and returns its summary.
+/// Runs a scene of the repository and returns its summary.
 fn run(scene: &str) -> Value {
+    run_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{scene}.toml")))
+}
+
+fn run_file(scenario: &Path) -> Value {
     let out = tempfile::tempdir().unwrap();
     let target = out.path().join("run");
-    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{scene}.toml"));
     let run = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
         .args(["run".as_ref(), scenario.as_os_str(), "--out".as_ref(), target.as_os_str()])
         .output()
@@ -81,4 +84,20 @@ fn without_noise_the_loop_closes_to_centimetres() {
         .sum::<f64>()
         .sqrt();
     assert!(bias <= 0.02, "mean position error {bias} m, the limit 0.02");
+}
+
+#[test]
+fn real_samples_at_an_if_with_a_mirrored_spectrum_close_the_loop_as_well() {
+    let scene = include_str!("../scenarios/static.toml")
+        .replace("sample_rate_hz = 2.6e6", "sample_rate_hz = 5.2e6\nif_hz = 1.3e6\nspectrum_inverted = true")
+        .replace("format = \"ci8\"", "format = \"ri8\"")
+        .replace("duration_s = 60", "duration_s = 40");
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("real.toml");
+    std::fs::write(&path, scene).unwrap();
+    let summary = run_file(&path);
+    found_and_decoded_what_is_there(&summary);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/observables/doppler_rms_hz", 0.2);
+    assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
