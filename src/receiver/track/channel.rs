@@ -15,7 +15,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
-use crate::receiver::correlate::{Nco, Replica, TURN, chips_to_units, correlation, units_to_chips};
+use crate::receiver::correlate::{self, Nco, Replica, TURN, chips_to_units, correlation, units_to_chips};
 use crate::receiver::source::Block;
 
 /// Prompts over which phase lock is averaged before symbols are known; symbols afterwards.
@@ -25,6 +25,8 @@ const LOCK_SYMBOLS: f64 = 6.0;
 const SLIP_COSINE: f64 = -0.5;
 /// Periods over which the power of the samples is averaged.
 const POWER_PERIODS: f64 = 100.0;
+/// The power is measured in one of this many periods.
+const POWER_EVERY: u64 = 8;
 /// A frequency error beyond this, in spite of phase lock, is a false lock: between 0 and the nearest one, 1/(2·symbol).
 const FALSE_LOCK_SHARE: f64 = 0.4;
 /// Symbols over which the frequency is verified.
@@ -297,16 +299,20 @@ impl Channel {
             code: self.code,
             code_step: self.code_step as u64,
         };
-        let sums = if self.carry.0.is_empty() {
-            replica.correlate(i, q, &nco, &self.taps)
-        } else {
+        let carried = !self.carry.0.is_empty();
+        if carried {
             self.carry.0.extend_from_slice(i);
             self.carry.1.extend_from_slice(q);
-            let sums = replica.correlate(&self.carry.0, &self.carry.1, &nco, &self.taps);
-            self.carry.0.clear();
-            self.carry.1.clear();
-            sums
-        };
+        }
+        let (i, q) = if carried { (&self.carry.0[..], &self.carry.1[..]) } else { (i, q) };
+        let sums = replica.correlate(i, q, &nco, &self.taps);
+        if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
+            let power = correlate::power(i, q) / i.len().max(1) as f64;
+            self.power =
+                Some(self.power.map_or(power, |mean| mean + (power - mean) * POWER_EVERY as f64 / POWER_PERIODS));
+        }
+        self.carry.0.clear();
+        self.carry.1.clear();
         let samples = next - self.first;
         self.carrier += self.carrier_step * i128::from(samples);
         self.code += (i128::from(self.code_step) * i128::from(samples) - i128::from(replica.period())) as i64;
@@ -319,14 +325,12 @@ impl Channel {
             self.update_since = next;
             return;
         }
-        let power = sums.power / samples as f64;
-        let mean = self.power.map_or(power, |mean| mean + (power - mean) / POWER_PERIODS);
-        self.power = Some(mean);
+        let mean = self.power.unwrap_or_default();
         // Noise of a correlation, per component: half the samples' power (real samples too) times the replica's energy.
         let deviation = (0.5 * mean * samples as f64 * self.replica_power).sqrt();
         let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
         let mut taps = [Complex64::ZERO; 3];
-        taps.iter_mut().zip(&sums.taps).for_each(|(tap, sum)| *tap = sum * scale);
+        taps.iter_mut().zip(&sums).for_each(|(tap, sum)| *tap = sum * scale);
         self.take(finished, taps, report);
     }
 
