@@ -8,7 +8,7 @@
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64 as x86;
 
-use num_complex::Complex64;
+use num_complex::{Complex32, Complex64};
 
 use super::{CODE_BITS, Edge, Nco, Replica, TURN};
 
@@ -20,7 +20,7 @@ const CHUNK: usize = LANES * VECTORS;
 const FINE: u32 = 27;
 const FINE_MASK: u32 = (1 << FINE) - 1;
 /// Entries of a chip table beyond one period.
-pub(super) const TABLE_MARGIN: usize = LANES;
+pub(super) const TABLE_MARGIN: usize = CHUNK + LANES;
 /// Steps of the code up to this keep a vector's chips within one register of the table.
 #[cfg(target_arch = "x86_64")]
 const LOOKUP_STEP: u64 = 15 << (CODE_BITS - 4);
@@ -163,7 +163,6 @@ struct Chunk<'a> {
 /// How the code moves.
 struct Steps {
     lane: [u32; LANES],
-    width: u32,
     inverse_width: f32,
     advance: u64,
     period: u64,
@@ -213,7 +212,6 @@ fn body<const T: usize>(
     let period = job.replica.period() as u64;
     let steps = Steps {
         lane: std::array::from_fn(|k| (step.wrapping_mul(k as u64) >> fine) as u32),
-        width,
         inverse_width: 1.0 / width.max(1) as f32,
         advance: step.wrapping_mul(LANES as u64) % period,
         period,
@@ -245,66 +243,58 @@ fn body<const T: usize>(
     })
 }
 
-/// Calls `each` with the phasor and sixteen samples of every vector; the last is filled up with zeros.
-#[inline(always)]
-fn for_each_vector(chunk: &Chunk, mut each: impl FnMut(f32, f32, &[f32; LANES], &[f32; LANES])) {
-    let (vectors_i, rest_i) = chunk.i.as_chunks::<LANES>();
-    let (vectors_q, rest_q) = chunk.q.as_chunks::<LANES>();
-    let phasors = chunk.cos.iter().zip(&chunk.sin);
-    for ((&cos, &sin), (i, q)) in phasors.clone().zip(vectors_i.iter().zip(vectors_q)) {
-        each(cos, sin, i, q);
-    }
-    if let Some((&cos, &sin)) = phasors.clone().nth(vectors_i.len())
-        && !rest_i.is_empty()
-    {
-        let (mut i, mut q) = ([0.0; LANES], [0.0; LANES]);
-        i[..rest_i.len()].copy_from_slice(rest_i);
-        q[..rest_q.len()].copy_from_slice(rest_q);
-        each(cos, sin, &i, &q);
-    }
-}
-
-/// Moves a code phase on by a vector and returns the chip and its fraction before.
-#[inline(always)]
-fn take_vector(code: &mut u64, steps: &Steps) -> (usize, u32) {
-    let (chip, fraction) = ((*code >> CODE_BITS) as usize, (*code >> (CODE_BITS - FINE)) as u32 & FINE_MASK);
-    let next = code.wrapping_add(steps.advance);
-    *code = if next >= steps.period { next.wrapping_sub(steps.period) } else { next };
-    (chip, fraction)
-}
-
-/// One chunk in plain lanes. Every shift and sum of phases wraps on purpose: indices stay below 32 while a chip is not
-/// shorter than a sample.
+/// One chunk in plain lanes; the last vector is filled up with zeros.
 #[inline(always)]
 fn lanes<const T: usize, const AREA: bool>(chunk: &Chunk, code: &mut [u64; T]) -> Lanes<T> {
-    let steps = chunk.steps;
     let mut sums = Lanes { re: [[0.0; LANES]; T], im: [[0.0; LANES]; T] };
-    for_each_vector(chunk, |cos, sin, i, q| {
-        let (mut re, mut im) = ([0.0_f32; LANES], [0.0_f32; LANES]);
-        for k in 0..LANES {
-            re[k] = i[k] * cos + q[k] * sin;
-            im[k] = q[k] * cos - i[k] * sin;
-        }
-        for t in 0..T {
-            let (chip, fraction) = take_vector(&mut code[t], steps);
-            let window = chunk.replica.words[chip >> 5].wrapping_shl((chip & 31) as u32);
-            let (window, window_after) = ((window >> 32) as u32, (window >> 31) as u32);
-            for k in 0..LANES {
-                let phase = fraction.wrapping_add(steps.lane[k]);
-                let chip = sign(window, phase >> FINE);
-                let value = if AREA {
-                    let share = ((phase & FINE_MASK) as i32 as f32 * steps.inverse_width).min(1.0);
-                    // The product is exact.
-                    chip + (sign(window_after, phase >> FINE) - chip) * share
-                } else {
-                    chip
-                };
-                sums.re[t][k] += re[k] * value;
-                sums.im[t][k] += im[k] * value;
-            }
-        }
-    });
+    let (vectors_i, rest_i) = chunk.i.as_chunks::<LANES>();
+    let (vectors_q, rest_q) = chunk.q.as_chunks::<LANES>();
+    let phasors = || chunk.cos.iter().zip(&chunk.sin);
+    for ((&cos, &sin), (i, q)) in phasors().zip(vectors_i.iter().zip(vectors_q)) {
+        vector::<T, AREA>(chunk, Complex32::new(cos, sin), i, q, code, &mut sums);
+    }
+    if let (Some((&cos, &sin)), false) = (phasors().nth(vectors_i.len()), rest_i.is_empty()) {
+        vector::<T, AREA>(chunk, Complex32::new(cos, sin), &filled(rest_i), &filled(rest_q), code, &mut sums);
+    }
     sums
+}
+
+/// Sixteen samples. Every shift and sum of phases wraps on purpose: indices stay below 32 while a chip is not shorter than
+/// a sample.
+#[inline(always)]
+fn vector<const T: usize, const AREA: bool>(
+    chunk: &Chunk,
+    phasor: Complex32,
+    i: &[f32; LANES],
+    q: &[f32; LANES],
+    code: &mut [u64; T],
+    sums: &mut Lanes<T>,
+) {
+    let steps = chunk.steps;
+    let (mut re, mut im) = ([0.0_f32; LANES], [0.0_f32; LANES]);
+    for k in 0..LANES {
+        re[k] = i[k] * phasor.re + q[k] * phasor.im;
+        im[k] = q[k] * phasor.re - i[k] * phasor.im;
+    }
+    for t in 0..T {
+        let (chip, fraction) = split(code[t]);
+        let window = chunk.replica.words[chip >> 5].wrapping_shl((chip & 31) as u32);
+        let (window, window_after) = ((window >> 32) as u32, (window >> 31) as u32);
+        for k in 0..LANES {
+            let phase = fraction.wrapping_add(steps.lane[k]);
+            let chip = sign(window, phase >> FINE);
+            let value = if AREA {
+                let share = ((phase & FINE_MASK) as i32 as f32 * steps.inverse_width).min(1.0);
+                // The product is exact.
+                chip + (sign(window_after, phase >> FINE) - chip) * share
+            } else {
+                chip
+            };
+            sums.re[t][k] += re[k] * value;
+            sums.im[t][k] += im[k] * value;
+        }
+        code[t] = wrapped(code[t].wrapping_add(steps.advance), steps.period);
+    }
 }
 
 /// The same with chips looked up in tables. The one fused operation has an exact product, so it rounds as [`lanes`] does.
@@ -319,38 +309,69 @@ fn lanes_avx512<const T: usize, const AREA: bool>(chunk: &Chunk, code: &mut [u64
     let one = x86::_mm512_set1_ps(1.0);
     let mut sums_re = [x86::_mm512_setzero_ps(); T];
     let mut sums_im = [x86::_mm512_setzero_ps(); T];
-    for_each_vector(chunk, |cos, sin, i, q| {
-        let (i, q) = (load(i), load(q));
-        let (cos, sin) = (x86::_mm512_set1_ps(cos), x86::_mm512_set1_ps(sin));
-        let re = x86::_mm512_add_ps(x86::_mm512_mul_ps(i, cos), x86::_mm512_mul_ps(q, sin));
-        let im = x86::_mm512_sub_ps(x86::_mm512_mul_ps(q, cos), x86::_mm512_mul_ps(i, sin));
-        for t in 0..T {
-            let (chip, fraction) = take_vector(&mut code[t], steps);
-            let phase = x86::_mm512_add_epi32(x86::_mm512_set1_epi32(fraction as i32), lane);
-            let index = x86::_mm512_srli_epi32::<FINE>(phase);
-            let mut value = x86::_mm512_permutexvar_ps(index, entries(&chunk.replica.values, chip));
-            if AREA {
-                let change = x86::_mm512_permutexvar_ps(index, entries(&chunk.replica.changes, chip));
-                let fraction = x86::_mm512_cvtepi32_ps(x86::_mm512_and_si512(phase, fine_mask));
-                let share = x86::_mm512_min_ps(x86::_mm512_mul_ps(fraction, inverse_width), one);
-                value = x86::_mm512_fmadd_ps(change, share, value);
+    // A chunk moves by less than 1024 chips, which the tables hold beyond a period.
+    let (values, changes) = (chunk.replica.values.as_slice(), chunk.replica.changes.as_slice());
+    let farthest = code.iter().map(|&code| (code.wrapping_add(CHUNK as u64 * LOOKUP_STEP) >> CODE_BITS) as usize).max();
+    assert!(farthest.unwrap_or(0) + LANES <= values.len().min(changes.len()));
+    let (vectors_i, rest_i) = chunk.i.as_chunks::<LANES>();
+    let (vectors_q, rest_q) = chunk.q.as_chunks::<LANES>();
+    let (last_i, last_q) = (filled(rest_i), filled(rest_q));
+    let rest = usize::from(!rest_i.is_empty());
+    let mut phases = *code;
+    let mut take = |vectors_i: &[[f32; LANES]], vectors_q: &[[f32; LANES]], cos: &[f32], sin: &[f32]| {
+        for ((i, q), (&cos, &sin)) in vectors_i.iter().zip(vectors_q).zip(cos.iter().zip(sin)) {
+            let (i, q) = (load(i), load(q));
+            let (cos, sin) = (x86::_mm512_set1_ps(cos), x86::_mm512_set1_ps(sin));
+            let re = x86::_mm512_add_ps(x86::_mm512_mul_ps(i, cos), x86::_mm512_mul_ps(q, sin));
+            let im = x86::_mm512_sub_ps(x86::_mm512_mul_ps(q, cos), x86::_mm512_mul_ps(i, sin));
+            for t in 0..T {
+                let (chip, fraction) = split(phases[t]);
+                phases[t] = phases[t].wrapping_add(steps.advance);
+                let phase = x86::_mm512_add_epi32(x86::_mm512_set1_epi32(fraction as i32), lane);
+                let index = x86::_mm512_srli_epi32::<FINE>(phase);
+                // SAFETY: `chip` is at most `farthest`, and sixteen entries from there on are in the table.
+                let near = unsafe { x86::_mm512_loadu_ps(values.as_ptr().add(chip)) };
+                let mut value = x86::_mm512_permutexvar_ps(index, near);
+                if AREA {
+                    // SAFETY: as above.
+                    let near = unsafe { x86::_mm512_loadu_ps(changes.as_ptr().add(chip)) };
+                    let change = x86::_mm512_permutexvar_ps(index, near);
+                    let fraction = x86::_mm512_cvtepi32_ps(x86::_mm512_and_si512(phase, fine_mask));
+                    let share = x86::_mm512_min_ps(x86::_mm512_mul_ps(fraction, inverse_width), one);
+                    value = x86::_mm512_fmadd_ps(change, share, value);
+                }
+                sums_re[t] = x86::_mm512_add_ps(sums_re[t], x86::_mm512_mul_ps(re, value));
+                sums_im[t] = x86::_mm512_add_ps(sums_im[t], x86::_mm512_mul_ps(im, value));
             }
-            sums_re[t] = x86::_mm512_add_ps(sums_re[t], x86::_mm512_mul_ps(re, value));
-            sums_im[t] = x86::_mm512_add_ps(sums_im[t], x86::_mm512_mul_ps(im, value));
         }
-    });
+    };
+    let whole = vectors_i.len();
+    take(vectors_i, vectors_q, &chunk.cos, &chunk.sin);
+    take(&[last_i][..rest], &[last_q][..rest], &chunk.cos[whole..], &chunk.sin[whole..]);
+    *code = phases.map(|phase| wrapped(phase, steps.period));
     Lanes { re: sums_re.map(|sum| store(sum)), im: sums_im.map(|sum| store(sum)) }
 }
 
-/// Sixteen entries of a chip table; the first sixteen if there are fewer from `first` on, which no code phase asks for.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-#[inline]
-fn entries(table: &[f32], first: usize) -> x86::__m512 {
-    match table.get(first..).and_then(|rest| rest.first_chunk::<LANES>()) {
-        Some(entries) => load(entries),
-        None => x86::_mm512_setzero_ps(),
+/// Chip and fraction of a code phase.
+#[inline(always)]
+fn split(code: u64) -> (usize, u32) {
+    ((code >> CODE_BITS) as usize, (code >> (CODE_BITS - FINE)) as u32 & FINE_MASK)
+}
+
+/// A code phase below `period`; few periods are taken off.
+#[inline(always)]
+fn wrapped(mut code: u64, period: u64) -> u64 {
+    while code >= period {
+        code -= period;
     }
+    code
+}
+
+#[inline(always)]
+fn filled(rest: &[f32]) -> [f32; LANES] {
+    let mut all = [0.0; LANES];
+    all[..rest.len()].copy_from_slice(rest);
+    all
 }
 
 #[cfg(target_arch = "x86_64")]
