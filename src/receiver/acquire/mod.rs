@@ -22,6 +22,7 @@
 //! against a threshold of 95. 32 satellites take 0.24 s so on two cores.
 
 mod grid;
+mod kernel;
 mod refine;
 mod replica;
 mod settings;
