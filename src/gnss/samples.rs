@@ -100,26 +100,30 @@ impl Format {
     pub fn unpack(self, bytes: &[u8], i: &mut Vec<f32>, q: &mut Vec<f32>) {
         i.clear();
         q.clear();
-        let samples = bytes.chunks_exact(self.bytes());
+        // One pass a component, which the compiler turns into vectors.
         match self {
-            Self::Ci8 => samples.for_each(|s| {
-                i.push(f32::from(s[0] as i8));
-                q.push(f32::from(s[1] as i8));
-            }),
-            Self::Cu8 => samples.for_each(|s| {
-                i.push(f32::from(s[0]) - 127.5);
-                q.push(f32::from(s[1]) - 127.5);
-            }),
-            Self::Ci16Le => samples.for_each(|s| {
-                i.push(f32::from(i16::from_le_bytes([s[0], s[1]])));
-                q.push(f32::from(i16::from_le_bytes([s[2], s[3]])));
-            }),
-            Self::Cf32Le => samples.for_each(|s| {
-                i.push(finite(f32::from_le_bytes([s[0], s[1], s[2], s[3]])));
-                q.push(finite(f32::from_le_bytes([s[4], s[5], s[6], s[7]])));
-            }),
+            Self::Ci8 => {
+                let (samples, _) = bytes.as_chunks::<2>();
+                i.extend(samples.iter().map(|s| f32::from(s[0] as i8)));
+                q.extend(samples.iter().map(|s| f32::from(s[1] as i8)));
+            }
+            Self::Cu8 => {
+                let (samples, _) = bytes.as_chunks::<2>();
+                i.extend(samples.iter().map(|s| f32::from(s[0]) - 127.5));
+                q.extend(samples.iter().map(|s| f32::from(s[1]) - 127.5));
+            }
+            Self::Ci16Le => {
+                let (samples, _) = bytes.as_chunks::<4>();
+                i.extend(samples.iter().map(|&[a, b, _, _]| f32::from(i16::from_le_bytes([a, b]))));
+                q.extend(samples.iter().map(|&[_, _, c, d]| f32::from(i16::from_le_bytes([c, d]))));
+            }
+            Self::Cf32Le => {
+                let (samples, _) = bytes.as_chunks::<8>();
+                i.extend(samples.iter().map(|&[a, b, c, d, ..]| finite(f32::from_le_bytes([a, b, c, d]))));
+                q.extend(samples.iter().map(|&[.., a, b, c, d]| finite(f32::from_le_bytes([a, b, c, d]))));
+            }
             Self::Ri8 => i.extend(bytes.iter().map(|b| f32::from(*b as i8))),
-            Self::Ri16Le => samples.for_each(|s| i.push(f32::from(i16::from_le_bytes([s[0], s[1]])))),
+            Self::Ri16Le => i.extend(bytes.as_chunks::<2>().0.iter().map(|&s| f32::from(i16::from_le_bytes(s)))),
         }
         q.resize(i.len(), 0.0);
     }
