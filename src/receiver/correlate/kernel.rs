@@ -139,6 +139,8 @@ fn at_level<const T: usize>(level: Level, job: &Job, begins: [u64; T]) -> [Compl
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
+// A closure has the instruction set of its function, `lanes` as a value has not.
+#[expect(clippy::redundant_closure)]
 fn body_avx2<const T: usize, const AREA: bool>(job: &Job, begins: [u64; T]) -> [Complex64; T] {
     body::<T>(job, begins, |chunk, code| lanes::<T, AREA>(chunk, code))
 }
@@ -276,8 +278,8 @@ fn vector<const T: usize, const AREA: bool>(
         re[k] = i[k] * phasor.re + q[k] * phasor.im;
         im[k] = q[k] * phasor.re - i[k] * phasor.im;
     }
-    for t in 0..T {
-        let (chip, fraction) = split(code[t]);
+    for (code, (sum_re, sum_im)) in code.iter_mut().zip(sums.re.iter_mut().zip(&mut sums.im)) {
+        let (chip, fraction) = split(*code);
         let window = chunk.replica.words[chip >> 5].wrapping_shl((chip & 31) as u32);
         let (window, window_after) = ((window >> 32) as u32, (window >> 31) as u32);
         for k in 0..LANES {
@@ -290,10 +292,10 @@ fn vector<const T: usize, const AREA: bool>(
             } else {
                 chip
             };
-            sums.re[t][k] += re[k] * value;
-            sums.im[t][k] += im[k] * value;
+            sum_re[k] += re[k] * value;
+            sum_im[k] += im[k] * value;
         }
-        code[t] = wrapped(code[t].wrapping_add(steps.advance), steps.period);
+        *code = wrapped(code.wrapping_add(steps.advance), steps.period);
     }
 }
 
