@@ -98,34 +98,40 @@ impl Format {
     /// Reads the whole samples in `bytes` into planar LSB values, replacing what `i` and `q` held.
     /// Real formats give `q` = 0; a cut sample at the end is left out. A non-finite float reads as 0.
     pub fn unpack(self, bytes: &[u8], i: &mut Vec<f32>, q: &mut Vec<f32>) {
-        i.clear();
-        q.clear();
-        // One pass a component, which the compiler turns into vectors.
+        // Whole samples as integers: shifts make vectors where picking bytes does not.
         match self {
-            Self::Ci8 => {
-                let (samples, _) = bytes.as_chunks::<2>();
-                i.extend(samples.iter().map(|s| f32::from(s[0] as i8)));
-                q.extend(samples.iter().map(|s| f32::from(s[1] as i8)));
-            }
-            Self::Cu8 => {
-                let (samples, _) = bytes.as_chunks::<2>();
-                i.extend(samples.iter().map(|s| f32::from(s[0]) - 127.5));
-                q.extend(samples.iter().map(|s| f32::from(s[1]) - 127.5));
-            }
-            Self::Ci16Le => {
-                let (samples, _) = bytes.as_chunks::<4>();
-                i.extend(samples.iter().map(|&[a, b, _, _]| f32::from(i16::from_le_bytes([a, b]))));
-                q.extend(samples.iter().map(|&[_, _, c, d]| f32::from(i16::from_le_bytes([c, d]))));
-            }
-            Self::Cf32Le => {
-                let (samples, _) = bytes.as_chunks::<8>();
-                i.extend(samples.iter().map(|&[a, b, c, d, ..]| finite(f32::from_le_bytes([a, b, c, d]))));
-                q.extend(samples.iter().map(|&[.., a, b, c, d]| finite(f32::from_le_bytes([a, b, c, d]))));
-            }
-            Self::Ri8 => i.extend(bytes.iter().map(|b| f32::from(*b as i8))),
-            Self::Ri16Le => i.extend(bytes.as_chunks::<2>().0.iter().map(|&s| f32::from(i16::from_le_bytes(s)))),
+            Self::Ci8 => split(bytes.as_chunks().0, i, q, |s| {
+                let both = i16::from_le_bytes(*s);
+                (f32::from((both << 8) >> 8), f32::from(both >> 8))
+            }),
+            Self::Cu8 => split(bytes.as_chunks().0, i, q, |s| {
+                let both = u16::from_le_bytes(*s);
+                (f32::from(both & 0xff) - 127.5, f32::from(both >> 8) - 127.5)
+            }),
+            Self::Ci16Le => split(bytes.as_chunks().0, i, q, |s| {
+                let both = i32::from_le_bytes(*s);
+                (((both << 16) >> 16) as f32, (both >> 16) as f32)
+            }),
+            Self::Cf32Le => split(bytes.as_chunks().0, i, q, |&[a, b, c, d, e, f, g, h]| {
+                (finite(f32::from_le_bytes([a, b, c, d])), finite(f32::from_le_bytes([e, f, g, h])))
+            }),
+            Self::Ri8 => split(bytes.as_chunks().0, i, q, |&[s]| (f32::from(s as i8), 0.0)),
+            Self::Ri16Le => split(bytes.as_chunks().0, i, q, |s| (f32::from(i16::from_le_bytes(*s)), 0.0)),
         }
-        q.resize(i.len(), 0.0);
+    }
+}
+
+/// Fills `i` and `q` with the components of every sample.
+fn split<const N: usize>(
+    samples: &[[u8; N]],
+    i: &mut Vec<f32>,
+    q: &mut Vec<f32>,
+    components: impl Fn(&[u8; N]) -> (f32, f32),
+) {
+    i.resize(samples.len(), 0.0);
+    q.resize(samples.len(), 0.0);
+    for ((i, q), sample) in i.iter_mut().zip(q).zip(samples) {
+        (*i, *q) = components(sample);
     }
 }
 
