@@ -25,7 +25,7 @@ use read::{Source, Table};
 use crate::generator::clock::ReceiverClock;
 use crate::generator::effect::link::{Antenna, LinkBudget};
 use crate::generator::effect::troposphere::Weather;
-use crate::generator::scene::{CodeEdge, Fidelity};
+use crate::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::samples::Format;
 use crate::gnss::satellite::Sv;
@@ -65,7 +65,7 @@ pub const KEYS: &[(&str, &[&str])] = &[
     ("troposphere", &["model", "height_m", "pressure_hpa", "temperature_c", "relative_humidity"]),
     ("receiver_clock", &["bias_s", "drift_sps"]),
     ("noise", &[]),
-    ("fidelity", &["code_edge", "knot_tolerance_cycles"]),
+    ("fidelity", &["level", "code_edge", "carrier", "noise", "knot_tolerance_cycles"]),
     ("truth", &["interval_s"]),
 ];
 
@@ -337,16 +337,18 @@ fn receiver_clock(table: Option<&Table<'_>>) -> Result<ReceiverClock, ScenarioEr
     })
 }
 
+/// A level's knobs, each overridden where the table names it.
 fn fidelity(table: Option<&Table<'_>>) -> Result<Fidelity, ScenarioError> {
-    // Area-exact chips keep the bias of code tracking below 0.1 m; 1e-4 cycles is 19 µm, far below any noise.
-    const DEFAULT: Fidelity = Fidelity { code_edge: CodeEdge::Area, knot_tolerance_cycles: 1e-4 };
-    let Some(table) = table else { return Ok(DEFAULT) };
-    let edges = [("nearest", CodeEdge::Nearest), ("area", CodeEdge::Area), ("band_limited", CodeEdge::BandLimited)];
+    let Some(table) = table else { return Ok(Fidelity::of(Grade::Balanced)) };
+    let level = Fidelity::of(table.choice("level", &Grade::NAMES)?.unwrap_or(Grade::Balanced));
     Ok(Fidelity {
-        code_edge: table.choice("code_edge", &edges)?.unwrap_or(DEFAULT.code_edge),
+        grade: level.grade,
+        code_edge: table.choice("code_edge", &CodeEdge::NAMES)?.unwrap_or(level.code_edge),
+        carrier: table.choice("carrier", &Arithmetic::NAMES)?.unwrap_or(level.carrier),
+        noise: table.choice("noise", &Arithmetic::NAMES)?.unwrap_or(level.noise),
         knot_tolerance_cycles: table
             .number("knot_tolerance_cycles", 1e-7..=0.1, "cycles")?
-            .unwrap_or(DEFAULT.knot_tolerance_cycles),
+            .unwrap_or(level.knot_tolerance_cycles),
     })
 }
 

@@ -73,6 +73,22 @@ impl Filter {
         }
     }
 
+    /// [`Filter::residual`] in `f64`, linear between points of 1/4096 sample (error below 2e-8).
+    #[inline(always)]
+    pub fn exact_residual(&self, fraction: f64) -> [f64; WIDTH] {
+        let place = fraction * FINE as f64;
+        let index = (place as usize).min(FINE - 1);
+        let weight = place - index as f64;
+        std::array::from_fn(|k| {
+            let at = index + k * FINE;
+            let value = match (self.fine.get(at), self.fine.get(at + 1)) {
+                (Some(a), Some(b)) => a + (b - a) * weight,
+                _ => 1.0,
+            };
+            value - if k >= HALF_WIDTH { 1.0 } else { 0.0 }
+        })
+    }
+
     /// Mean power of a code of ±1 steps behind the filter, for its autocorrelation by whole steps.
     ///
     /// The pulse of one step is `g(x) = H(x) − H(x − 1/step)`; the power is
