@@ -121,11 +121,15 @@ pub struct Chart {
     pub equal: bool,
     /// Labels under the x axis in place of numbers.
     pub x_ticks: Option<Vec<(f64, String)>>,
+    /// Labels beside the y axis in place of numbers.
+    pub y_ticks: Option<Vec<(f64, String)>>,
+    /// Words at the right of points.
+    pub labels: Vec<((f64, f64), String)>,
 }
 
 impl Chart {
     pub fn new(title: impl Into<String>, x: Axis, y: Axis, series: Vec<Series>) -> Self {
-        Self { title: title.into(), x, y, series, equal: false, x_ticks: None }
+        Self { title: title.into(), x, y, series, equal: false, x_ticks: None, y_ticks: None, labels: Vec::new() }
     }
 }
 
@@ -221,7 +225,7 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         .set_label_area_size(LabelAreaPosition::Bottom, BOTTOM_PX * FINE)
         .build_cartesian_2d(x.from..x.to, y.from..y.to)?;
     let (x_decimals, y_decimals) = (decimals(x.span()), decimals(y.span()));
-    let ticked = chart.x_ticks.is_some();
+    let (ticked, y_ticked) = (chart.x_ticks.is_some(), chart.y_ticks.is_some());
     context
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -235,17 +239,27 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         .x_labels(if chart.equal { 7 } else { 10 })
         .y_labels((height as i32 / FINE / 45).clamp(4, 12) as usize)
         .x_label_formatter(&|value| if ticked { String::new() } else { tick(*value, x_decimals) })
-        .y_label_formatter(&|value| tick(*value, y_decimals))
+        .y_label_formatter(&|value| if y_ticked { String::new() } else { tick(*value, y_decimals) })
         .draw()?;
     for series in &chart.series {
         draw_series(&mut context, series)?;
     }
     let bottom = height as i32 - (BOTTOM_PX + EDGE_PX - 7) * FINE;
-    let left = area.get_base_pixel().0;
+    let (left, top) = area.get_base_pixel();
     for (at, label) in chart.x_ticks.iter().flatten() {
         let (pixel, _) = context.plotting_area().map_coordinate(&(*at, y.from));
         let style = anchored(11, HPos::Center, VPos::Top);
         area.draw(&Text::new(label.clone(), (pixel - left, bottom), style))?;
+    }
+    for (at, label) in chart.y_ticks.iter().flatten() {
+        let (pixel_x, pixel_y) = context.plotting_area().map_coordinate(&(x.from, *at));
+        let style = anchored(11, HPos::Right, VPos::Center);
+        area.draw(&Text::new(label.clone(), (pixel_x - left - 8 * FINE, pixel_y - top), style))?;
+    }
+    for (at, label) in &chart.labels {
+        let (pixel_x, pixel_y) = context.plotting_area().map_coordinate(at);
+        let style = anchored(11, HPos::Left, VPos::Center);
+        area.draw(&Text::new(label.clone(), (pixel_x - left + 7 * FINE, pixel_y - top), style))?;
     }
     Ok(())
 }
