@@ -251,15 +251,23 @@ fn position(fidelity: Fidelity) -> [f64; 3] {
     analysis::judge(run.path()).unwrap().position.bias_enu_m.unwrap()
 }
 
-/// Every setting with its name.
-fn settings() -> Vec<(String, Fidelity)> {
-    let reference = Fidelity::of(Grade::Reference);
-    let mut found: Vec<(String, Fidelity)> =
-        Grade::NAMES.iter().map(|(name, grade)| ((*name).to_owned(), Fidelity::of(*grade))).collect();
-    let balanced = Fidelity::of(Grade::Balanced);
-    found.push(("nearest, f64".to_owned(), Fidelity { code_edge: CodeEdge::Nearest, ..reference }));
-    found.push(("area, f64".to_owned(), Fidelity { code_edge: CodeEdge::Area, ..reference }));
-    found.push(("band_limited, f32".to_owned(), Fidelity { code_edge: CodeEdge::BandLimited, ..balanced }));
+/// The levels, then every edge in both arithmetics that no level takes.
+fn settings(rate_msps: f64) -> Vec<(String, Fidelity)> {
+    let mut found: Vec<(String, Fidelity)> = Grade::NAMES
+        .iter()
+        .map(|(name, grade)| ((*name).to_owned(), Fidelity::suited(*grade, rate_msps * 1e6)))
+        .collect();
+    for (carrier_name, carrier) in Arithmetic::NAMES {
+        for (edge_name, code_edge) in CodeEdge::NAMES {
+            if !found.iter().any(|(_, f)| f.carrier == carrier && f.code_edge == code_edge) {
+                let grade = if carrier == Arithmetic::F32 { Grade::Balanced } else { Grade::Reference };
+                found.push((
+                    format!("{edge_name}, {carrier_name}"),
+                    Fidelity { carrier, code_edge, ..Fidelity::of(grade) },
+                ));
+            }
+        }
+    }
     found
 }
 
@@ -355,17 +363,16 @@ fn preface() -> String {
 
 fn main() {
     let mut rows = Vec::new();
-    measure(STATIC, &settings(), 5, 3, &mut rows);
+    measure(STATIC, &settings(STATIC.rate_msps), 7, 3, &mut rows);
     let places: Vec<[f64; 3]> = Grade::NAMES.iter().map(|(_, grade)| position(Fidelity::of(*grade))).collect();
     println!("mean positions (m): {places:.3?}");
     for (row, place) in rows.iter_mut().zip(&places) {
         let squares = place.iter().zip(&places[2]).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         row.position_m = Some(squares.sqrt());
     }
-    measure(Site { rate_msps: 4.092, error_s: 2.0, time_s: 4.0, ..STATIC }, &settings(), 3, 3, &mut rows);
-    measure(Site { rate_msps: 10.0, error_s: 1.0, time_s: 2.0, ..STATIC }, &settings(), 3, 3, &mut rows);
-    measure(Site { rate_msps: 25.0, error_s: 0.5, time_s: 1.0, ..STATIC }, &settings(), 3, 3, &mut rows);
+    for (rate_msps, error_s, time_s) in [(4.092, 2.0, 4.0), (10.0, 1.0, 2.0), (10.23, 1.0, 2.0), (25.0, 0.5, 1.0)] {
+        measure(Site { rate_msps, error_s, time_s, ..STATIC }, &settings(rate_msps), 3, 3, &mut rows);
+    }
     measure(BOOST, &knots(), 3, 3, &mut rows);
-    assert!(matches!(Fidelity::of(Grade::Reference).carrier, Arithmetic::F64));
     trade::write(Path::new("reports"), &rows, &preface()).unwrap();
 }

@@ -109,14 +109,15 @@ fn markdown(rows: &[Row], preface: &str) -> String {
             row.carrier_cycles,
             row.doppler_hz,
             row.spur_dbc,
-            row.cn0_loss_db,
+            // No zero that rounding left negative.
+            (row.cn0_loss_db * 1e3).round() / 1e3 + 0.0,
         );
     }
     text
 }
 
 /// Errors below this are drawn on the lower edge.
-const FLOOR_M: f64 = 1e-3;
+const FLOOR_M: f64 = 1e-4;
 
 /// One chart for each scene and rate that has more than two settings with different errors.
 fn draw(path: &Path, rows: &[Row]) -> Result<(), JudgeError> {
@@ -129,12 +130,12 @@ fn draw(path: &Path, rows: &[Row]) -> Result<(), JudgeError> {
     }
     let differ = |group: &&Vec<usize>| {
         let errors = || group.iter().filter_map(|index| rows.get(*index)).map(Row::pseudorange_m);
-        errors().fold(0.0, f64::max) > 10.0 * FLOOR_M && group.len() > 2
+        errors().fold(0.0, f64::max) > 100.0 * FLOOR_M && group.len() > 2
     };
     let charts: Vec<Chart> = groups.iter().filter(differ).map(|group| chart(rows, group)).collect();
     let legend = [
-        Series::new("on the Pareto front", BLUE, Mark::Dots, Vec::new()),
-        Series::new("dominated", GREY, Mark::Rings, Vec::new()),
+        Series::new("on the Pareto front", BLUE, Mark::Balls, Vec::new()),
+        Series::new("dominated", GREY, Mark::Balls, Vec::new()),
         Series::new("front", BLUE, Mark::Line, Vec::new()),
         Series::new("0.1 m", ORANGE, Mark::Dash, Vec::new()),
     ];
@@ -151,27 +152,35 @@ fn chart(rows: &[Row], group: &[usize]) -> Chart {
     for &index in group {
         let Some(row) = rows.get(index) else { continue };
         title = format!("{}, {} Msps", row.scene, row.sample_rate_msps);
-        labels.push((place(row), row.setting.clone()));
-        if dominated(rows, index) { beaten.push(place(row)) } else { front.push(place(row)) }
+        if dominated(rows, index) {
+            beaten.push(place(row));
+            labels.push((place(row), row.setting.clone(), -11));
+        } else {
+            front.push(place(row));
+            labels.push((place(row), row.setting.clone(), 11));
+        }
     }
     front.sort_by(|a, b| a.0.total_cmp(&b.0));
     let all = || front.iter().chain(&beaten);
     let (low, high) = all().fold((0.0_f64, 0.0_f64), |(low, high), (x, _)| (low.min(*x), high.max(*x)));
     let top = all().fold(0.0_f64, |top, (_, y)| top.max(*y));
     let x = Axis::new("ns for a sample of a satellite, one core", (low - 0.12, high + 0.45));
-    let y = Axis::new("pseudorange error (m, rms)", (libm::log10(FLOOR_M) - 0.1, top + 0.3));
+    let y = Axis::new("pseudorange error (m, rms)", (libm::log10(FLOOR_M) - 0.3, top + 0.4));
     let limit = vec![(x.from, -1.0), (x.to, -1.0)];
+    let name = |value: f64| if value <= 1.5 * FLOOR_M { format!("≤ {FLOOR_M}") } else { format!("{value}") };
     let ticks = |axis: &Axis| {
-        let marks = (-4..=3).flat_map(|decade: i32| [1.0, 2.0, 5.0].map(|m| m * 10_f64.powi(decade)));
+        let marks = (-4..=3).flat_map(|decade: i32| {
+            [1.0, 2.0, 5.0].map(|m| if decade < 0 { m / 10_f64.powi(-decade) } else { m * 10_f64.powi(decade) })
+        });
         let shown = marks.filter(|value| (axis.from..=axis.to).contains(&libm::log10(*value)));
-        Some(shown.map(|value| (libm::log10(value), format!("{value}"))).collect())
+        Some(shown.map(|value| (libm::log10(value), name(value))).collect())
     };
     let (x_ticks, y_ticks) = (ticks(&x), ticks(&y));
     let series = vec![
         Series::new("0.1 m", ORANGE, Mark::Dash, limit),
         Series::new("front", BLUE, Mark::Line, front.clone()),
-        Series::new("on the Pareto front", BLUE, Mark::Dots, front),
-        Series::new("dominated", GREY, Mark::Rings, beaten),
+        Series::new("on the Pareto front", BLUE, Mark::Balls, front),
+        Series::new("dominated", GREY, Mark::Balls, beaten),
     ];
     Chart { x_ticks, y_ticks, labels, ..Chart::new(title, x, y, series) }
 }

@@ -138,16 +138,49 @@ impl Fidelity {
         }
     }
 
-    /// Measured bias of a code whose phase stands still on the sampling grid, root mean square over phases, in metres.
+    /// The knobs of a level for samples at `rate_hz`: `balanced` takes band-limited edges where area edges would leave
+    /// more than 0.1 m, at multiples of the chip rate and near simple ratios to it.
+    pub fn suited(grade: Grade, rate_hz: f64) -> Self {
+        let level = Self::of(grade);
+        match grade {
+            Grade::Balanced if standing_bias_m(CodeEdge::Area, rate_hz) > 0.1 => {
+                Self { code_edge: CodeEdge::BandLimited, ..level }
+            }
+            _ => level,
+        }
+    }
+
+    /// Measured error of a code whose phase stands still on the sampling grid, root mean square over phases, in metres.
     pub fn code_bias_m(&self, rate_hz: f64) -> f64 {
         let near = |at: [(f64, f64); 3]| {
             at.into_iter().rev().find(|(from_hz, _)| rate_hz >= *from_hz).map_or(at[0].1, |(_, bias_m)| bias_m)
         };
-        match self.code_edge {
-            CodeEdge::Nearest => near([(0.0, 0.9), (8e6, 0.35), (20e6, 0.15)]),
-            CodeEdge::Area => near([(0.0, 0.15), (8e6, 0.05), (20e6, 0.02)]),
-            CodeEdge::BandLimited => 0.01,
-        }
+        let moving = match self.code_edge {
+            CodeEdge::Nearest => near([(0.0, 1.1), (8e6, 0.3), (20e6, 0.1)]),
+            CodeEdge::Area => near([(0.0, 0.1), (8e6, 0.02), (20e6, 0.01)]),
+            CodeEdge::BandLimited => 1e-4,
+        };
+        moving.max(standing_bias_m(self.code_edge, rate_hz))
+    }
+}
+
+/// Error where every chip meets the same few places between samples, root mean square, in metres.
+///
+/// With `q` places in turn, nearest edges know the code to a sample in `q` (uniform: over √12); for area edges
+/// it falls with the square, from 1.6 m measured at 4.092 Msps.
+fn standing_bias_m(edge: CodeEdge, rate_hz: f64) -> f64 {
+    const CHIP_HZ: f64 = 1.023e6;
+    // Places drift apart within a code period of 1023 chips when the ratio misses by more than this.
+    let meets = |q: u32| {
+        let samples = f64::from(q) * rate_hz / CHIP_HZ;
+        (samples - samples.round()).abs() < 1.0 / 1023.0
+    };
+    let Some(q) = (1..=32).find(|q| meets(*q)) else { return 0.0 };
+    let finest_hz = f64::from(q) * rate_hz;
+    match edge {
+        CodeEdge::Nearest => 299_792_458.0 / finest_hz / 12_f64.sqrt(),
+        CodeEdge::Area => 1.6 * (4.092e6 / finest_hz).powi(2),
+        CodeEdge::BandLimited => 0.0,
     }
 }
 
@@ -166,8 +199,8 @@ pub struct Choice {
 
 /// What a scene chose for each knob, the error to expect of it and its cost.
 pub fn choices(scene: &Scene) -> Vec<Choice> {
-    let (chosen, level) = (scene.fidelity, Fidelity::of(scene.fidelity.grade));
     let rate_hz = scene.clock.rate.hz();
+    let (chosen, level) = (scene.fidelity, Fidelity::suited(scene.fidelity.grade, rate_hz));
     let f32_carrier = Fidelity { carrier: Arithmetic::F32, ..chosen };
     let edge_ns = f32_carrier.satellite_sample_ns(rate_hz);
     let mut found = vec![
@@ -175,7 +208,7 @@ pub fn choices(scene: &Scene) -> Vec<Choice> {
             knob: "code_edge",
             value: chosen.code_edge.name().to_owned(),
             own: chosen.code_edge != level.code_edge,
-            error: format!("pseudorange {} m rms where the code stands still", chosen.code_bias_m(rate_hz)),
+            error: format!("pseudorange {:.1e} m rms, less as the code moves", chosen.code_bias_m(rate_hz)),
             cost: format!("{edge_ns:.2} ns"),
         },
         Choice {
@@ -183,7 +216,7 @@ pub fn choices(scene: &Scene) -> Vec<Choice> {
             value: chosen.carrier.name().to_owned(),
             own: chosen.carrier != level.carrier,
             error: match chosen.carrier {
-                Arithmetic::F32 => "carrier 2e-6 cycle".to_owned(),
+                Arithmetic::F32 => "carrier 1e-6 cycle".to_owned(),
                 Arithmetic::F64 => "carrier 1e-10 cycle".to_owned(),
             },
             cost: format!("{:.2} ns", chosen.satellite_sample_ns(rate_hz) - edge_ns),
@@ -210,4 +243,24 @@ pub fn choices(scene: &Scene) -> Vec<Choice> {
         });
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn balanced_keeps_to_a_decimetre_where_the_rate_meets_the_chips() {
+        let edge = |rate_hz: f64| Fidelity::suited(Grade::Balanced, rate_hz).code_edge;
+        for rate_hz in [2.046e6, 4.092e6, 5.115e6, 10.23e6, 2.5575e6] {
+            assert_eq!(edge(rate_hz), CodeEdge::BandLimited, "{rate_hz}");
+        }
+        for rate_hz in [2.6e6, 4e6, 10e6, 12e6, 25e6, 50e6] {
+            assert_eq!(edge(rate_hz), CodeEdge::Area, "{rate_hz}");
+        }
+        for rate_hz in [2.046e6, 2.6e6, 4.092e6, 10e6, 20.46e6] {
+            assert!(Fidelity::suited(Grade::Balanced, rate_hz).code_bias_m(rate_hz) <= 0.1, "{rate_hz}");
+            assert_eq!(Fidelity::suited(Grade::Fast, rate_hz).code_edge, CodeEdge::Nearest);
+        }
+    }
 }

@@ -189,7 +189,7 @@ impl Scenario {
             troposphere: open("troposphere")?.map(|t| troposphere(&t)).transpose()?,
             receiver_clock: receiver_clock(open("receiver_clock")?.as_ref())?,
             noise,
-            fidelity: fidelity(open("fidelity")?.as_ref())?,
+            fidelity: fidelity(open("fidelity")?.as_ref(), front_end.rate)?,
             truth_interval_s: match open("truth")? {
                 Some(table) => table.number("interval_s", 0.001..=3600.0, "s")?.unwrap_or(0.1),
                 None => 0.1,
@@ -338,9 +338,10 @@ fn receiver_clock(table: Option<&Table<'_>>) -> Result<ReceiverClock, ScenarioEr
 }
 
 /// A level's knobs, each overridden where the table names it.
-fn fidelity(table: Option<&Table<'_>>) -> Result<Fidelity, ScenarioError> {
-    let Some(table) = table else { return Ok(Fidelity::of(Grade::Balanced)) };
-    let level = Fidelity::of(table.choice("level", &Grade::NAMES)?.unwrap_or(Grade::Balanced));
+fn fidelity(table: Option<&Table<'_>>, rate: Rate) -> Result<Fidelity, ScenarioError> {
+    let Some(table) = table else { return Ok(Fidelity::suited(Grade::Balanced, rate.hz())) };
+    let grade = table.choice("level", &Grade::NAMES)?.unwrap_or(Grade::Balanced);
+    let level = Fidelity::suited(grade, rate.hz());
     Ok(Fidelity {
         grade: level.grade,
         code_edge: table.choice("code_edge", &CodeEdge::NAMES)?.unwrap_or(level.code_edge),

@@ -11,27 +11,43 @@ use super::{CODE_ONE, Edge, Run, reference};
 /// Samples side by side; results do not depend on it.
 const LANES: usize = 16;
 
+/// Samples before and after a run that edges reach.
+const BORDER: usize = 2 * HALF_WIDTH + 2;
+
 /// Adds the run to planar samples; `i` and `q` have the same length, `wave` is scratch.
 #[inline(always)]
 pub fn accumulate(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32], wave: &mut Vec<f64>) {
-    waveform(edge, run, i.len(), wave);
+    let skip = waveform(edge, run, i.len(), wave);
+    let wave = wave.get(skip..).unwrap_or(&[]);
     let mut turns: [u64; LANES] =
         std::array::from_fn(|k| run.turns.wrapping_add(run.turns_step.wrapping_mul(k as u64)));
     let stride = run.turns_step.wrapping_mul(LANES as u64);
     for ((bi, bq), bw) in i.chunks_mut(LANES).zip(q.chunks_mut(LANES)).zip(wave.chunks(LANES)) {
         let (cos, sin) = cos_sin(&turns);
-        for (k, ((i, q), w)) in bi.iter_mut().zip(bq).zip(bw).enumerate() {
-            let value = run.amplitude * w;
-            *i += (value * cos[k]) as f32;
-            *q += (value * sin[k]) as f32;
+        if let (Ok(bi), Ok(bq), Ok(bw)) = (
+            <&mut [f32; LANES]>::try_from(&mut *bi),
+            <&mut [f32; LANES]>::try_from(&mut *bq),
+            <&[f64; LANES]>::try_from(bw),
+        ) {
+            for k in 0..LANES {
+                let value = run.amplitude * bw[k];
+                bi[k] += (value * cos[k]) as f32;
+                bq[k] += (value * sin[k]) as f32;
+            }
+        } else {
+            for (k, ((i, q), w)) in bi.iter_mut().zip(bq).zip(bw).enumerate() {
+                let value = run.amplitude * w;
+                *i += (value * cos[k]) as f32;
+                *q += (value * sin[k]) as f32;
+            }
         }
         turns.iter_mut().for_each(|t| *t = t.wrapping_add(stride));
     }
 }
 
-/// The code at each sample.
+/// Writes the code at each sample and returns where sample 0 stands.
 #[inline(always)]
-fn waveform(edge: Edge<'_>, run: &Run<'_>, samples: usize, wave: &mut Vec<f64>) {
+fn waveform(edge: Edge<'_>, run: &Run<'_>, samples: usize, wave: &mut Vec<f64>) -> usize {
     wave.clear();
     let at = |n: usize| run.position + run.step * n as u64;
     match edge {
@@ -47,34 +63,45 @@ fn waveform(edge: Edge<'_>, run: &Run<'_>, samples: usize, wave: &mut Vec<f64>) 
             }));
         }
         Edge::Area => wave.extend((0..samples).map(|n| reference::waveform(edge, run, at(n)))),
-        Edge::BandLimited(filter) => band_limited(filter, run, samples, wave),
+        Edge::BandLimited(filter) => {
+            band_limited(filter, run, samples, wave);
+            return BORDER;
+        }
     }
+    0
 }
 
-/// The square wave, plus at each edge the filter's response minus the ideal step.
+/// The square wave between edges, plus at each edge the filter's response minus the ideal step.
 #[inline(always)]
 fn band_limited(filter: &Filter, run: &Run<'_>, samples: usize, wave: &mut Vec<f64>) {
-    wave.extend((0..samples).map(|n| sign(run.bits, ((run.position + run.step * n as u64) / CODE_ONE) as usize)));
+    wave.resize(samples + 2 * BORDER, 0.0);
     let reach = (HALF_WIDTH as u64 + 1) * run.step;
     let first = (run.position - reach) / CODE_ONE;
     let last = (run.position + run.step * samples as u64 + reach) / CODE_ONE;
     let per_step = 1.0 / run.step as f64;
+    let mut filled = 0;
     for step in first + 1..=last {
         let signs = window(run.bits, step as usize - 1);
-        let change = 2.0 * ((signs >> 63) as f64 - (signs >> 62 & 1) as f64);
-        if change == 0.0 {
-            continue;
-        }
+        let (old, new) = (1.0 - 2.0 * (signs >> 63) as f64, 1.0 - 2.0 * (signs >> 62 & 1) as f64);
         // Samples from the run's first one to the edge.
         let x = ((step * CODE_ONE) as i64 - run.position as i64) as f64 * per_step;
         let place = x.ceil();
-        let begin = place as i64 - HALF_WIDTH as i64;
-        for (k, residual) in (begin..).zip(filter.exact_residual(place - x)) {
-            if let Some(w) = usize::try_from(k).ok().and_then(|k| wave.get_mut(k)) {
-                *w += change * residual;
+        let at = (place as i64 + BORDER as i64).max(0) as usize;
+        if let Some(stretch) = wave.get_mut(filled..at) {
+            stretch.iter_mut().for_each(|w| *w += old);
+        }
+        filled = filled.max(at);
+        if old == new {
+            continue;
+        }
+        if let Some(near) = at.checked_sub(HALF_WIDTH).and_then(|from| wave.get_mut(from..from + 2 * HALF_WIDTH)) {
+            for (w, residual) in near.iter_mut().zip(filter.exact_residual(place - x)) {
+                *w += (new - old) * residual;
             }
         }
     }
+    let rest = sign(run.bits, last as usize);
+    wave.iter_mut().skip(filled).for_each(|w| *w += rest);
 }
 
 /// Cosine and sine of phases in 2^-64 turn.
