@@ -186,7 +186,7 @@ fn errors(site: Site, fidelity: Fidelity, all: &[Replicas]) -> Errors {
             worst.doppler_hz = worst.doppler_hz.max((pair[1] * pair[0].conj()).arg().abs() / TAU / 0.02);
         }
         let amplitude = z.iter().map(|z| z.norm()).sum::<f64>() / replicas.power;
-        losses.push(-20.0 * amplitude.log10());
+        losses.push(-20.0 * libm::log10(amplitude));
         // The carrier alone: against the same edges in f64, where the code is not near zero.
         let exact = Fidelity { code_edge: fidelity.code_edge, ..Fidelity::of(Grade::Reference) };
         let base = samples(site, exact, replicas.sv, 0.0);
@@ -215,7 +215,8 @@ fn spur_dbc(tested: &[Complex<f32>], base: &[Complex<f32>]) -> f64 {
                 last = t / b;
             }
             let x = TAU * n as f64 / LENGTH as f64;
-            let window = 0.358_75 - 0.488_29 * x.cos() + 0.141_28 * (2.0 * x).cos() - 0.011_68 * (3.0 * x).cos();
+            let [a, b, c] = [1.0, 2.0, 3.0].map(|k| libm::cos(k * x));
+            let window = 0.358_75 - 0.488_29 * a + 0.141_28 * b - 0.011_68 * c;
             last * window
         })
         .collect();
@@ -223,7 +224,7 @@ fn spur_dbc(tested: &[Complex<f32>], base: &[Complex<f32>]) -> f64 {
     FftPlanner::new().plan_fft_forward(LENGTH).process(&mut buffer);
     let carrier = buffer[0].norm();
     let spur = buffer[8..LENGTH - 8].iter().map(|x| x.norm()).fold(0.0, f64::max);
-    20.0 * (spur / carrier).max(1e-15).log10()
+    20.0 * libm::log10((spur / carrier).max(1e-15))
 }
 
 /// Processor time of this thread in seconds, which other programs on the machine disturb less than the clock on the
