@@ -12,7 +12,8 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::generator::plan::Machinery;
-use crate::generator::scene::{CodeEdge, Scene};
+use crate::generator::scene::{Arithmetic, CodeEdge, Scene};
+use crate::generator::stage::noise;
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::isa::{self, Level};
 use crate::generator::synth::transmitter::{Scratch, Transmitter};
@@ -121,10 +122,7 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
             scene.fidelity.knot_tolerance_cycles
         ),
         block_bytes: batch.min(scene.samples) * (planar + scene.metadata.format.bytes() as u64),
-        satellite_samples_per_s: match scene.fidelity.code_edge {
-            CodeEdge::Nearest | CodeEdge::Area => 2.5e9,
-            CodeEdge::BandLimited => 0.7e9,
-        },
+        satellite_samples_per_s: 1e9 / scene.fidelity.satellite_sample_ns(rate.hz()),
     })
 }
 
@@ -158,7 +156,7 @@ pub fn generate_with(
         CodeEdge::Area => Edge::Area,
         CodeEdge::BandLimited => Edge::BandLimited(&filter),
     };
-    let kernel = Kernel { edge, level: options.level };
+    let kernel = Kernel { edge, arithmetic: scene.fidelity.carrier, level: options.level };
     let mut transmitters = transmitters(scene, edge)?;
     truth.scene(scene)?;
     let mut ticks = Ticks::new(scene)?;
@@ -236,7 +234,10 @@ fn render(
     if scene.noise {
         let first = start / RUN_SAMPLES as u64;
         for ((block, i), q) in (first..).zip(i.chunks_mut(RUN_SAMPLES)).zip(q.chunks_mut(RUN_SAMPLES)) {
-            isa::add_noise(kernel.level, scene.seed, block, scene.noise_lsb, i, q);
+            match scene.fidelity.noise {
+                Arithmetic::F32 => isa::add_noise(kernel.level, scene.seed, block, scene.noise_lsb, i, q),
+                Arithmetic::F64 => noise::add_block_exact(scene.seed, block, scene.noise_lsb, i, q),
+            }
         }
     }
     let format = scene.metadata.format;
