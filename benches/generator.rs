@@ -236,7 +236,7 @@ fn required(lines: &mut Vec<Line>) {
 
 /// A batch of blocks in the first minute and in the last minute of a day.
 fn day(lines: &mut Vec<Line>) {
-    let scene = Case::at("00:00:00", "day", "", (Grade::Balanced, 2.6e6), 86_400.0, 11).scene;
+    let scene = Case::at("00:00:00", "day", "", (Grade::Balanced, 2.6e6), 86_400.0, 9).scene;
     let satellites: Vec<Sv> = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)).collect();
     let mut times = [Vec::new(), Vec::new()];
     let stretch = 2600 * 60_000_u64;
