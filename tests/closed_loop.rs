@@ -5,13 +5,17 @@
 use std::path::Path;
 use std::process::Command;
 
+use gnss_twin::gnss::earth::Geodetic;
 use serde_json::Value;
 
-/// Runs a scene and returns its summary.
+/// Runs a scene of the repository and returns its summary.
 fn run(scene: &str) -> Value {
+    run_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{scene}.toml")))
+}
+
+fn run_file(scenario: &Path) -> Value {
     let out = tempfile::tempdir().unwrap();
     let target = out.path().join("run");
-    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{scene}.toml"));
     let run = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
         .args(["run".as_ref(), scenario.as_os_str(), "--out".as_ref(), target.as_os_str()])
         .output()
@@ -81,4 +85,68 @@ fn without_noise_the_loop_closes_to_centimetres() {
         .sum::<f64>()
         .sqrt();
     assert!(bias <= 0.02, "mean position error {bias} m, the limit 0.02");
+}
+
+#[test]
+fn real_samples_at_an_if_with_a_mirrored_spectrum_close_the_loop_as_well() {
+    let scene = include_str!("../scenarios/static.toml")
+        .replace("sample_rate_hz = 2.6e6", "sample_rate_hz = 5.2e6\nif_hz = 1.3e6\nspectrum_inverted = true")
+        .replace("format = \"ci8\"", "format = \"ri8\"")
+        .replace("duration_s = 60", "duration_s = 40");
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("real.toml");
+    std::fs::write(&path, scene).unwrap();
+    let summary = run_file(&path);
+    found_and_decoded_what_is_there(&summary);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/observables/doppler_rms_hz", 0.2);
+    assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
+}
+
+#[test]
+fn after_a_second_of_silence_every_satellite_is_lost_found_again_and_used_again() {
+    let directory = tempfile::tempdir().unwrap();
+    let twin = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
+            .args(arguments)
+            .current_dir(directory.path())
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/static.toml");
+    twin(&["generate", scenario.to_str().unwrap(), "--out", "gap.sigmf-data"]);
+    let samples = directory.path().join("gap.sigmf-data");
+    let mut bytes = std::fs::read(&samples).unwrap();
+    let at = |second: f64| 2 * (second * 2.6e6) as usize;
+    bytes[at(34.0)..at(35.0)].fill(0);
+    std::fs::write(&samples, bytes).unwrap();
+    twin(&["receive", "gap.sigmf-data", "--out", "rx"]);
+
+    let rows = |name: &str| -> Vec<csv::StringRecord> {
+        csv::Reader::from_path(directory.path().join("rx").join(name)).unwrap().records().map(Result::unwrap).collect()
+    };
+    let second = |row: &csv::StringRecord| row[0].parse::<f64>().unwrap() / 2.6e6;
+    let events = rows("events.csv");
+    let count = |event: &str, from: f64, to: f64| {
+        events.iter().filter(|row| &row[3] == event && (from..to).contains(&second(row))).count()
+    };
+    // Loss is declared after 0.2 s without a signal; a search comes every 2 s then.
+    assert_eq!(count("loss_of_lock", 34.0, 34.6), 12, "{events:?}");
+    assert_eq!(count("acquired", 34.0, 40.0), 12, "{events:?}");
+    assert_eq!(count("loss_of_lock", 35.0, 61.0), 0, "{events:?}");
+    // Up to 2 s of search, 1 s to the bits, 12 s to a whole subframe.
+    let fixes = rows("fixes.csv");
+    assert!(fixes.iter().all(|row| !(34.7..37.0).contains(&second(row))), "fixes without a signal");
+    let late: Vec<_> = fixes.iter().filter(|row| second(row) > 52.0).collect();
+    assert!(late.len() > 70, "{} fixes after 52 s", late.len());
+    let truth = Geodetic::from_degrees(26.5123, 80.2329, 130.0).to_ecef();
+    for row in late {
+        let position = [3, 4, 5].map(|column| row[column].parse::<f64>().unwrap());
+        let error =
+            ((position[0] - truth.x).powi(2) + (position[1] - truth.y).powi(2) + (position[2] - truth.z).powi(2))
+                .sqrt();
+        // A young smoother: 0.8 m rms of code times a PDOP of 2, three sigma.
+        assert!(error < 5.0, "{error} m at {} s", second(row));
+    }
 }

@@ -11,7 +11,7 @@ use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
 use gnss_twin::generator::effect::link::FixedCn0;
 use gnss_twin::generator::knots::Grid;
 use gnss_twin::generator::ray::Effect;
-use gnss_twin::generator::scene::{CodeEdge, Fidelity, Scene};
+use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade, Scene};
 use gnss_twin::generator::stream::{Generated, Options, generate_with};
 use gnss_twin::generator::synth::isa::Level;
 use gnss_twin::generator::truth;
@@ -50,7 +50,7 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         effects: vec![Box::new(FixedCn0 { cn0_dbhz: 45.0 })],
         noise: true,
         noise_lsb: 20.0,
-        fidelity: Fidelity { code_edge: CodeEdge::Area, knot_tolerance_cycles: 1e-5 },
+        fidelity: Fidelity { knot_tolerance_cycles: 1e-5, ..Fidelity::of(Grade::Balanced) },
         truth_interval_s: 0.1,
     }
 }
@@ -91,6 +91,51 @@ fn bytes_and_truth_depend_neither_on_threads_nor_on_the_cut_nor_on_the_instructi
             assert!(files == *expected_files);
         }
     }
+}
+
+/// Samples of the scene at a level, each from −full scale to full scale of `f32`.
+fn at_level(fidelity: Fidelity, rate_hz: f64, noise: bool) -> Vec<f32> {
+    let directory = tempfile::tempdir().unwrap();
+    let mut scene = scene(rate_hz, 0.2, Format::Cf32Le, 1_575.42e6, false);
+    (scene.fidelity, scene.noise, scene.noise_lsb) = (fidelity, noise, 1.0);
+    let (bytes, _) = generated(&scene, directory.path(), &Options::default());
+    bytes.chunks_exact(4).map(|x| f32::from_le_bytes([x[0], x[1], x[2], x[3]])).collect()
+}
+
+#[test]
+fn levels_keep_to_the_reference_within_their_bounds() {
+    let reference = Fidelity::of(Grade::Reference);
+    let distance = |fidelity: Fidelity, base: &[f32]| {
+        let samples = at_level(fidelity, 2.6e6, false);
+        let squares = |x: &mut dyn Iterator<Item = f32>| x.map(|x| f64::from(x).powi(2)).sum::<f64>();
+        let error = squares(&mut samples.iter().zip(base).map(|(a, b)| a - b));
+        error / squares(&mut base.iter().copied())
+    };
+    let edges = |grade: Grade| Fidelity { code_edge: Fidelity::of(grade).code_edge, ..reference };
+    for grade in [Grade::Fast, Grade::Balanced, Grade::Reference] {
+        // Against its own edges in f64 a level differs by its carrier: a phase error of `tolerance` cycles moves a
+        // sample by 2π of it, single precision by 2e-5; nearest chips fall on the other side of an edge once in
+        // 2^27/0.4 samples.
+        let base = at_level(edges(grade), 2.6e6, false);
+        let bound = std::f64::consts::TAU * Fidelity::of(grade).knot_tolerance_cycles + 2e-5;
+        let error = distance(Fidelity::of(grade), &base).sqrt();
+        assert!(error < bound, "{grade:?}: {error} of {bound}");
+    }
+    // A chip changes half the time; nearest edges put a step up to half a sample away: about a sixth of the power of
+    // the changes' samples. Area edges stay closer to the band-limited waveform than nearest ones do.
+    let base = at_level(reference, 2.6e6, false);
+    let [fast, balanced] = [Grade::Fast, Grade::Balanced].map(|grade| distance(Fidelity::of(grade), &base));
+    assert!(balanced < fast && fast < 0.25 && balanced > 1e-4, "{fast} {balanced}");
+}
+
+#[test]
+fn the_noise_in_double_precision_is_the_same_noise() {
+    let fidelity = Fidelity::of(Grade::Balanced);
+    let single = at_level(fidelity, 2.6e6, true);
+    let double = at_level(Fidelity { noise: Arithmetic::F64, ..fidelity }, 2.6e6, true);
+    // Logarithm and sines within 3e-7 each, of a radius up to 6.8, and the rounding of a sum of that size.
+    let worst = single.iter().zip(&double).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(worst > 0.0 && worst < 1e-5, "{worst}");
 }
 
 /// Correlation of one code period of samples, from `first`, with a carrier of `frequency_hz` and the code
@@ -220,7 +265,7 @@ fn a_day_into_the_stream_the_carrier_is_where_the_equation_says() {
             continue;
         }
         let (mut i, mut q) = (vec![0.0; 4096], vec![0.0; 4096]);
-        let kernel = Kernel { edge: Edge::Nearest, level: Level::detect() };
+        let kernel = Kernel { edge: Edge::Nearest, arithmetic: Arithmetic::F32, level: Level::detect() };
         transmitter.render(&scene, kernel, first, &mut i, &mut q, &mut Scratch::default());
         for k in (0..4096).step_by(13) {
             let n = first + k as u64;

@@ -10,6 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 use nalgebra::Vector3;
 
 use crate::analysis::JudgeError;
+use crate::analysis::access::Access;
 use crate::analysis::load::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
@@ -32,6 +33,8 @@ pub struct SignalError {
     pub doppler_hz: f64,
     pub cn0_dbhz: f64,
     pub cn0_true_dbhz: f64,
+    /// The true one with the other satellites counted as noise.
+    pub cn0_effective_dbhz: f64,
     /// Since the carrier locked, as the receiver says.
     pub locked_s: f64,
 }
@@ -77,6 +80,7 @@ impl Errors {
     fn measure_signals(&mut self, run: &Run) -> Result<(), JudgeError> {
         let truth: HashMap<(u64, Sv, &str), &Observation> =
             run.truth.iter().map(|row| ((row.sample, row.sv, row.signal.name), row)).collect();
+        let access = Access::new(run);
         for estimate in &run.observations {
             let Some(true_row) = truth.get(&(estimate.sample, estimate.sv, estimate.signal.name)) else {
                 self.unmatched += 1;
@@ -90,6 +94,7 @@ impl Errors {
                 doppler_hz: estimate.doppler_hz - true_row.doppler_hz,
                 cn0_dbhz: estimate.cn0_dbhz,
                 cn0_true_dbhz: true_row.cn0_dbhz,
+                cn0_effective_dbhz: access.effective_dbhz(true_row),
                 locked_s: estimate.locked_s,
             });
         }
@@ -209,6 +214,7 @@ mod tests {
             doppler_hz: 0.0,
             cn0_dbhz: 45.0,
             cn0_true_dbhz: 45.0,
+            cn0_effective_dbhz: 45.0,
             locked_s: 5.0 + index as f64 * 0.1,
         };
         carrier.iter().enumerate().map(row).collect()

@@ -3,8 +3,9 @@
 //! It reads only what generator and receiver wrote into a run's directory, joins the rows on
 //! (sample number, satellite, signal) and writes `summary.json` and pictures beside them.
 //! [`errors`] measures, [`statistics`] condenses, [`summary`] is what scripts gate on,
-//! [`plot`] draws, [`report`] prints, [`psd`] estimates the spectrum of the samples.
+//! [`plot`] draws, [`report`] prints, [`psd`] estimates the spectrum of the samples, [`trade`] weighs speed against accuracy.
 
+pub mod access;
 pub mod errors;
 pub mod load;
 pub mod plot;
@@ -12,6 +13,7 @@ pub mod psd;
 pub mod report;
 pub mod statistics;
 pub mod summary;
+pub mod trade;
 
 use std::fs;
 use std::io;

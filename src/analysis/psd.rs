@@ -173,16 +173,39 @@ fn expected(run: &Run) -> Vec<Expected> {
     links.iter().filter_map(one).collect()
 }
 
-/// Density of a unit-power rectangular-chip code, sampled, at `f_hz` from its carrier, per hertz.
-fn code_density(code_edge: &str, f_hz: f64, chip_rate_hz: f64, rate_hz: f64) -> f64 {
-    let chip = |f: f64| sinc_squared(f / chip_rate_hz) / chip_rate_hz;
+/// Density of a rectangular-chip code at `f_hz` from its carrier as the sampler meets it, before anything aliases, per hertz.
+pub(super) fn pulse_density(code_edge: &str, f_hz: f64, chip_rate_hz: f64, rate_hz: f64) -> f64 {
+    let chip = sinc_squared(f_hz / chip_rate_hz) / chip_rate_hz;
+    match edge(code_edge) {
+        Edge::BandLimited if f_hz.abs() > 0.5 * rate_hz => 0.0,
+        Edge::BandLimited | Edge::Nearest => chip,
+        // A mean over the sample's interval has its own sinc².
+        Edge::Area => chip * sinc_squared(f_hz / rate_hz),
+    }
+}
+
+enum Edge {
+    Nearest,
+    Area,
+    BandLimited,
+}
+
+fn edge(code_edge: &str) -> Edge {
     let name: String = code_edge.chars().filter(char::is_ascii_alphabetic).collect();
     match name.to_ascii_lowercase().as_str() {
+        "bandlimited" => Edge::BandLimited,
+        "area" => Edge::Area,
+        _ => Edge::Nearest,
+    }
+}
+
+/// Density of a unit-power rectangular-chip code, sampled, at `f_hz` from its carrier, per hertz.
+fn code_density(code_edge: &str, f_hz: f64, chip_rate_hz: f64, rate_hz: f64) -> f64 {
+    let density = |f: f64| pulse_density(code_edge, f, chip_rate_hz, rate_hz);
+    match edge(code_edge) {
         // Filtered to half the sample rate: no alias but the one that the frequency itself may be.
-        "bandlimited" => chip(f_hz - rate_hz * (f_hz / rate_hz).round()),
-        // A mean over the sample's interval has its own sinc² before it aliases.
-        "area" => aliases(|f| chip(f) * sinc_squared(f / rate_hz), f_hz, rate_hz),
-        _ => aliases(chip, f_hz, rate_hz),
+        Edge::BandLimited => density(f_hz - rate_hz * (f_hz / rate_hz).round()),
+        Edge::Area | Edge::Nearest => aliases(density, f_hz, rate_hz),
     }
 }
 

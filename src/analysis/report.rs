@@ -52,8 +52,14 @@ impl Summary {
         for row in self.details.wrong_parameters.iter().take(5) {
             writeln!(f, "              {} issue {}: {} decoded as {}", row.sv, row.issue, row.parameter, row.raw)?;
         }
-        if let (Some(measured), Some(set)) = (self.details.cn0_measured_dbhz, self.details.cn0_true_dbhz) {
-            writeln!(f, "C/N0          {measured:.2} dB-Hz measured, {set:.2} set, mean over satellites")?;
+        let details = &self.details;
+        if let (Some(measured), Some(effective), Some(set)) =
+            (details.cn0_measured_dbhz, details.cn0_effective_dbhz, details.cn0_true_dbhz)
+        {
+            writeln!(
+                f,
+                "C/N0          {measured:.2} dB-Hz measured, {effective:.2} expected: {set:.2} set, less the other satellites' codes"
+            )?;
         }
         if self.details.unmatched_observations > 0 {
             writeln!(f, "observations  {} have no truth", self.details.unmatched_observations)?;

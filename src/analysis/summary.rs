@@ -73,8 +73,8 @@ pub struct Observables {
     pub pseudorange_bias_m: Option<f64>,
     pub carrier_rms_cycles: Option<f64>,
     pub doppler_rms_hz: Option<f64>,
-    /// Mean of measured minus true. The truth knows thermal noise only: the other satellites' codes, the
-    /// quantiser and the filter lower what a receiver can measure, by some 0.1 to 0.5 dB in a full sky.
+    /// Mean of measured minus expected: the scene's C/N0 with the other satellites counted as noise (see
+    /// [`super::access`]). The quantiser's loss is not counted.
     pub cn0_bias_db: Option<f64>,
 }
 
@@ -107,6 +107,7 @@ pub struct Details {
     pub doppler_hz: Option<Spread>,
     pub cn0_db: Option<Spread>,
     pub cn0_true_dbhz: Option<f64>,
+    pub cn0_effective_dbhz: Option<f64>,
     pub cn0_measured_dbhz: Option<f64>,
     pub east_m: Option<Spread>,
     pub north_m: Option<Spread>,
@@ -235,7 +236,7 @@ fn observables(errors: &Errors, details: &mut Details) -> Observables {
     let code = errors.code_without_clock_m();
     let carrier = errors.pooled(|error| error.carrier_cycles);
     let doppler = errors.pooled(|error| error.doppler_hz);
-    let cn0 = errors.pooled(|error| error.cn0_dbhz - error.cn0_true_dbhz);
+    let cn0 = errors.pooled(|error| error.cn0_dbhz - error.cn0_effective_dbhz);
     let means: Vec<f64> = errors
         .signals
         .values()
@@ -246,6 +247,7 @@ fn observables(errors: &Errors, details: &mut Details) -> Observables {
     details.doppler_hz = spread(&doppler);
     details.cn0_db = spread(&cn0);
     details.cn0_true_dbhz = mean(&errors.pooled(|error| error.cn0_true_dbhz));
+    details.cn0_effective_dbhz = mean(&errors.pooled(|error| error.cn0_effective_dbhz));
     details.cn0_measured_dbhz = mean(&errors.pooled(|error| error.cn0_dbhz));
     Observables {
         pseudorange_rms_m: rms(&code),

@@ -7,6 +7,7 @@
 pub mod catalogue;
 pub mod clock;
 pub mod effect;
+pub mod fidelity;
 pub mod knots;
 pub mod plan;
 pub mod ray;

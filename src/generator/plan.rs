@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use crate::generator::fidelity::{self, Choice};
 use crate::generator::ray::Ray;
 use crate::generator::scene::{CodeEdge, Scene};
 use crate::generator::sky::emission;
@@ -63,6 +64,10 @@ pub struct Plan {
     pub acceleration_mps2: f64,
     pub satellites: Vec<InView>,
     pub models: Vec<Model>,
+    /// The level of fidelity, its time for a sample of a satellite (ns on one core), and each knob.
+    pub level: &'static str,
+    pub satellite_sample_ns: f64,
+    pub knobs: Vec<Choice>,
     pub sampling: String,
     pub samples: u64,
     pub bytes: u64,
@@ -93,6 +98,9 @@ impl Plan {
             speed_mps: extremes.speed_mps,
             acceleration_mps2: extremes.acceleration_mps2,
             models: models(scene),
+            level: scene.fidelity.grade.name(),
+            satellite_sample_ns: scene.fidelity.satellite_sample_ns(scene.clock.rate.hz()),
+            knobs: fidelity::choices(scene),
             sampling: sampling(scene),
             samples: scene.samples,
             bytes,
@@ -237,6 +245,12 @@ impl fmt::Display for Plan {
             }
             writeln!(f)?;
         }
+        let ns = self.satellite_sample_ns;
+        writeln!(f, "\nfidelity {}: {ns:.2} ns for a sample of a satellite on one core", self.level)?;
+        for Choice { knob, value, own, error, cost } in &self.knobs {
+            let value = if *own { format!("{value} (own)") } else { value.clone() };
+            writeln!(f, "  {knob:21}  {value:12}  {cost:24}  {error}")?;
+        }
         for (title, present) in [("computed", true), ("not computed", false)] {
             writeln!(f, "\n{title}")?;
             let mut models = self.models.iter().filter(|model| model.present == present).peekable();
@@ -298,6 +312,24 @@ mod tests {
         for word in ["no [ionosphere]", "no [troposphere]", "no [noise]", "quantiser"] {
             assert!(absent.contains(word), "{text}");
         }
+    }
+
+    #[test]
+    fn every_knob_is_named_with_its_choice_its_error_and_its_cost() {
+        let bare = include_str!("../../scenarios/static.toml");
+        let balanced = plan(bare).to_string();
+        assert!(balanced.contains("fidelity balanced"), "{balanced}");
+        for knob in ["code_edge", "carrier", "knot_tolerance_cycles", "noise"] {
+            let line = balanced.lines().find(|line| line.trim_start().starts_with(knob)).expect(knob);
+            assert!(!line.contains("(own)"), "{line}");
+        }
+        let reference = plan(&format!("{bare}[fidelity]\nlevel = \"reference\"\ncode_edge = \"area\"\n"));
+        let text = reference.to_string();
+        assert!(text.contains("area (own)") && text.contains("fidelity reference"), "{text}");
+        assert!(reference.satellite_sample_ns > plan(bare).satellite_sample_ns);
+        // Without noise there is nothing for its knob to do.
+        let free = plan(include_str!("../../scenarios/noise_free.toml"));
+        assert!(free.knobs.iter().all(|choice| choice.knob != "noise"));
     }
 
     #[test]

@@ -25,7 +25,7 @@ use read::{Source, Table};
 use crate::generator::clock::ReceiverClock;
 use crate::generator::effect::link::{Antenna, LinkBudget};
 use crate::generator::effect::troposphere::Weather;
-use crate::generator::scene::{CodeEdge, Fidelity};
+use crate::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::samples::Format;
 use crate::gnss::satellite::Sv;
@@ -65,7 +65,7 @@ pub const KEYS: &[(&str, &[&str])] = &[
     ("troposphere", &["model", "height_m", "pressure_hpa", "temperature_c", "relative_humidity"]),
     ("receiver_clock", &["bias_s", "drift_sps"]),
     ("noise", &[]),
-    ("fidelity", &["code_edge", "knot_tolerance_cycles"]),
+    ("fidelity", &["level", "code_edge", "carrier", "noise", "knot_tolerance_cycles"]),
     ("truth", &["interval_s"]),
 ];
 
@@ -189,7 +189,7 @@ impl Scenario {
             troposphere: open("troposphere")?.map(|t| troposphere(&t)).transpose()?,
             receiver_clock: receiver_clock(open("receiver_clock")?.as_ref())?,
             noise,
-            fidelity: fidelity(open("fidelity")?.as_ref())?,
+            fidelity: fidelity(open("fidelity")?.as_ref(), front_end.rate)?,
             truth_interval_s: match open("truth")? {
                 Some(table) => table.number("interval_s", 0.001..=3600.0, "s")?.unwrap_or(0.1),
                 None => 0.1,
@@ -337,16 +337,19 @@ fn receiver_clock(table: Option<&Table<'_>>) -> Result<ReceiverClock, ScenarioEr
     })
 }
 
-fn fidelity(table: Option<&Table<'_>>) -> Result<Fidelity, ScenarioError> {
-    // Area-exact chips keep the bias of code tracking below 0.1 m; 1e-4 cycles is 19 µm, far below any noise.
-    const DEFAULT: Fidelity = Fidelity { code_edge: CodeEdge::Area, knot_tolerance_cycles: 1e-4 };
-    let Some(table) = table else { return Ok(DEFAULT) };
-    let edges = [("nearest", CodeEdge::Nearest), ("area", CodeEdge::Area), ("band_limited", CodeEdge::BandLimited)];
+/// A level's knobs, each overridden where the table names it.
+fn fidelity(table: Option<&Table<'_>>, rate: Rate) -> Result<Fidelity, ScenarioError> {
+    let Some(table) = table else { return Ok(Fidelity::suited(Grade::Balanced, rate.hz())) };
+    let grade = table.choice("level", &Grade::NAMES)?.unwrap_or(Grade::Balanced);
+    let level = Fidelity::suited(grade, rate.hz());
     Ok(Fidelity {
-        code_edge: table.choice("code_edge", &edges)?.unwrap_or(DEFAULT.code_edge),
+        grade: level.grade,
+        code_edge: table.choice("code_edge", &CodeEdge::NAMES)?.unwrap_or(level.code_edge),
+        carrier: table.choice("carrier", &Arithmetic::NAMES)?.unwrap_or(level.carrier),
+        noise: table.choice("noise", &Arithmetic::NAMES)?.unwrap_or(level.noise),
         knot_tolerance_cycles: table
             .number("knot_tolerance_cycles", 1e-7..=0.1, "cycles")?
-            .unwrap_or(DEFAULT.knot_tolerance_cycles),
+            .unwrap_or(level.knot_tolerance_cycles),
     })
 }
 

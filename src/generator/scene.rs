@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::generator::catalogue::Catalogue;
 use crate::generator::clock::ReceiverClock;
+pub use crate::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::generator::ray::Effect;
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::gps::lnav::Broadcast;
@@ -43,23 +44,4 @@ pub struct Scene {
     pub fidelity: Fidelity,
     /// Spacing of truth records.
     pub truth_interval_s: f64,
-}
-
-/// Choices that trade speed for accuracy.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fidelity {
-    pub code_edge: CodeEdge,
-    /// Largest error of the carrier between knots.
-    pub knot_tolerance_cycles: f64,
-}
-
-/// How a chip's edge falls between samples. Each keeps the mean power of the waveform at one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CodeEdge {
-    /// The chip at the sample's instant.
-    Nearest,
-    /// The mean of the waveform over the sample's interval.
-    Area,
-    /// The waveform through a linear-phase low-pass filter just below half the sample rate.
-    BandLimited,
 }

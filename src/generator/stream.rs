@@ -12,7 +12,8 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::generator::plan::Machinery;
-use crate::generator::scene::{CodeEdge, Scene};
+use crate::generator::scene::{Arithmetic, CodeEdge, Scene};
+use crate::generator::stage::noise;
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::isa::{self, Level};
 use crate::generator::synth::transmitter::{Scratch, Transmitter};
@@ -120,10 +121,7 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
             scene.fidelity.knot_tolerance_cycles
         ),
         block_bytes: batch.min(scene.samples) * scene.metadata.format.bytes() as u64,
-        satellite_samples_per_s: match scene.fidelity.code_edge {
-            CodeEdge::Nearest | CodeEdge::Area => 2.5e9,
-            CodeEdge::BandLimited => 0.7e9,
-        },
+        satellite_samples_per_s: 1e9 / scene.fidelity.satellite_sample_ns(rate.hz()),
     })
 }
 
@@ -157,7 +155,7 @@ pub fn generate_with(
         CodeEdge::Area => Edge::Area,
         CodeEdge::BandLimited => Edge::BandLimited(&filter),
     };
-    let kernel = Kernel { edge, level: options.level };
+    let kernel = Kernel { edge, arithmetic: scene.fidelity.carrier, level: options.level };
     let mut transmitters = transmitters(scene, edge)?;
     truth.scene(scene)?;
     let mut ticks = Ticks::new(scene)?;
@@ -246,7 +244,10 @@ fn render(
             transmitter.render(scene, kernel, run * RUN_SAMPLES as u64, i, q, scratch);
         }
         if scene.noise {
-            isa::add_noise(kernel.level, scene.seed, run, scene.noise_lsb, i, q);
+            match scene.fidelity.noise {
+                Arithmetic::F32 => isa::add_noise(kernel.level, scene.seed, run, scene.noise_lsb, i, q),
+                Arithmetic::F64 => noise::add_block_exact(scene.seed, run, scene.noise_lsb, i, q),
+            }
         }
         clipped += isa::pack(kernel.level, format, i, q, bytes);
     }

@@ -101,30 +101,40 @@ impl Format {
     /// Reads the whole samples in `bytes` into planar LSB values, replacing what `i` and `q` held.
     /// Real formats give `q` = 0; a cut sample at the end is left out. A non-finite float reads as 0.
     pub fn unpack(self, bytes: &[u8], i: &mut Vec<f32>, q: &mut Vec<f32>) {
-        i.clear();
-        q.clear();
-        let samples = bytes.chunks_exact(self.bytes());
+        // Whole samples as integers: shifts make vectors where picking bytes does not.
         match self {
-            Self::Ci8 => samples.for_each(|s| {
-                i.push(f32::from(s[0] as i8));
-                q.push(f32::from(s[1] as i8));
+            Self::Ci8 => split(bytes.as_chunks().0, i, q, |s| {
+                let both = i16::from_le_bytes(*s);
+                (f32::from((both << 8) >> 8), f32::from(both >> 8))
             }),
-            Self::Cu8 => samples.for_each(|s| {
-                i.push(f32::from(s[0]) - 127.5);
-                q.push(f32::from(s[1]) - 127.5);
+            Self::Cu8 => split(bytes.as_chunks().0, i, q, |s| {
+                let both = u16::from_le_bytes(*s);
+                (f32::from(both & 0xff) - 127.5, f32::from(both >> 8) - 127.5)
             }),
-            Self::Ci16Le => samples.for_each(|s| {
-                i.push(f32::from(i16::from_le_bytes([s[0], s[1]])));
-                q.push(f32::from(i16::from_le_bytes([s[2], s[3]])));
+            Self::Ci16Le => split(bytes.as_chunks().0, i, q, |s| {
+                let both = i32::from_le_bytes(*s);
+                (((both << 16) >> 16) as f32, (both >> 16) as f32)
             }),
-            Self::Cf32Le => samples.for_each(|s| {
-                i.push(finite(f32::from_le_bytes([s[0], s[1], s[2], s[3]])));
-                q.push(finite(f32::from_le_bytes([s[4], s[5], s[6], s[7]])));
+            Self::Cf32Le => split(bytes.as_chunks().0, i, q, |&[a, b, c, d, e, f, g, h]| {
+                (finite(f32::from_le_bytes([a, b, c, d])), finite(f32::from_le_bytes([e, f, g, h])))
             }),
-            Self::Ri8 => i.extend(bytes.iter().map(|b| f32::from(*b as i8))),
-            Self::Ri16Le => samples.for_each(|s| i.push(f32::from(i16::from_le_bytes([s[0], s[1]])))),
+            Self::Ri8 => split(bytes.as_chunks().0, i, q, |&[s]| (f32::from(s as i8), 0.0)),
+            Self::Ri16Le => split(bytes.as_chunks().0, i, q, |s| (f32::from(i16::from_le_bytes(*s)), 0.0)),
         }
-        q.resize(i.len(), 0.0);
+    }
+}
+
+/// Fills `i` and `q` with the components of every sample.
+fn split<const N: usize>(
+    samples: &[[u8; N]],
+    i: &mut Vec<f32>,
+    q: &mut Vec<f32>,
+    components: impl Fn(&[u8; N]) -> (f32, f32),
+) {
+    i.resize(samples.len(), 0.0);
+    q.resize(samples.len(), 0.0);
+    for ((i, q), sample) in i.iter_mut().zip(q).zip(samples) {
+        (*i, *q) = components(sample);
     }
 }
 

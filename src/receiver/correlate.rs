@@ -40,6 +40,9 @@ pub struct Replica {
     chips: Vec<bool>,
     /// Entry j holds the 64 chips from chip 32 j on, cyclically, first chip in the top bit, 1 for a logical 1.
     words: Vec<u64>,
+    /// What chips are sent as, and what each is short of the next; a little longer than the period.
+    values: Vec<f32>,
+    changes: Vec<f32>,
     edge: Edge,
 }
 
@@ -55,15 +58,6 @@ pub struct Nco {
     pub code_step: u64,
 }
 
-/// Sums over the samples.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sums {
-    /// Σ x·conj(replica), one a tap.
-    pub taps: Vec<Complex64>,
-    /// Σ |x|².
-    pub power: f64,
-}
-
 impl Replica {
     /// A replica of that code (`true` for a logical 1, sent as −1); `None` below 64 chips.
     pub fn new(chips: Vec<bool>, edge: Edge) -> Option<Self> {
@@ -74,7 +68,11 @@ impl Replica {
             chips.iter().cycle().skip(start).take(64).fold(0_u64, |word, &chip| word << 1 | u64::from(chip))
         };
         let words = (0..=chips.len() / 32).map(|j| word(32 * j)).collect();
-        Some(Self { chips, words, edge })
+        let sent = |&one: &bool| if one { -1.0_f32 } else { 1.0 };
+        let length = chips.len() + kernel::TABLE_MARGIN;
+        let values: Vec<f32> = chips.iter().cycle().map(sent).take(length + 1).collect();
+        let changes = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        Some(Self { chips, words, values, changes, edge })
     }
 
     /// Length of the period in code phase units.
@@ -82,24 +80,22 @@ impl Replica {
         (self.chips.len() as i64) << CODE_BITS
     }
 
-    /// Correlates with the replica at each of `taps` (code phase units ahead of the prompt). The sums do not depend on the
-    /// processor: sixteen fixed lanes, each 1024 samples added in one order.
-    pub fn correlate(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64]) -> Sums {
-        kernel::run(kernel::Level::best(), self, i, q, nco, taps)
+    /// Σ x·conj(replica) with the replica at each of `taps` (code phase units ahead of the prompt). The sums do not depend
+    /// on the processor: sixteen fixed lanes, each 1024 samples added in one order.
+    pub fn correlate<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
+        kernel::correlate(kernel::Level::best(), self, i, q, nco, taps)
     }
 
     /// The same in the obvious way: `f64`, one sample after the other.
-    pub fn slow(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64]) -> Sums {
-        let mut sums = Sums { taps: vec![Complex64::ZERO; taps.len()], power: 0.0 };
+    pub fn slow<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
+        let mut sums = [Complex64::ZERO; T];
         let (mut carrier, mut code) = (nco.carrier, nco.code);
         for (&i, &q) in i.iter().zip(q) {
-            let x = Complex64::new(f64::from(i), f64::from(q));
             let (sin, cos) = libm::sincos(carrier as f64 / TURN * std::f64::consts::TAU);
-            let wiped = x * Complex64::new(cos, -sin);
-            for (sum, tap) in sums.taps.iter_mut().zip(taps) {
+            let wiped = Complex64::new(f64::from(i), f64::from(q)) * Complex64::new(cos, -sin);
+            for (sum, tap) in sums.iter_mut().zip(taps) {
                 *sum += wiped * self.value(code + tap, nco.code_step);
             }
-            sums.power += x.norm_sqr();
             carrier = carrier.wrapping_add(nco.carrier_step);
             code += nco.code_step as i64;
         }
@@ -123,6 +119,11 @@ impl Replica {
             }
         }
     }
+}
+
+/// Σ |x|² of samples.
+pub fn power(i: &[f32], q: &[f32]) -> f64 {
+    kernel::power(kernel::Level::best(), i, q)
 }
 
 /// 2⁶⁴ as a float.
@@ -199,10 +200,11 @@ mod tests {
                     let fast = replica.correlate(i, q, &nco, &taps);
                     let slow = replica.slow(i, q, &nco, &taps);
                     // f32 rounding: 130 terms of size 0.7, each 6e-8, and the phasor 1e-6 after 9 turns.
-                    for (a, b) in fast.taps.iter().zip(&slow.taps) {
+                    for (a, b) in fast.iter().zip(&slow) {
                         assert!((a - b).norm() < 3e-5, "{edge:?} {length} {offset}: {a} {b}");
                     }
-                    assert!((fast.power - slow.power).abs() < 1e-4);
+                    let energy: f64 = i.iter().chain(q).map(|&x| f64::from(x) * f64::from(x)).sum();
+                    assert!((power(i, q) - energy).abs() < 1e-4);
                 }
             }
         }
@@ -220,14 +222,14 @@ mod tests {
                 code_step: chips_to_units(1.023 / rate) as u64,
             };
             let taps = [chips_to_units(0.25), 0, chips_to_units(-0.25)];
-            let all: Vec<Sums> = kernel::Level::all()
+            let all: Vec<_> = kernel::Level::all()
                 .into_iter()
-                .map(|level| kernel::run(level, &replica, &i, &q, &nco, &taps))
+                .map(|level| (kernel::correlate(level, &replica, &i, &q, &nco, &taps), kernel::power(level, &i, &q)))
                 .collect();
             assert!(all.windows(2).all(|pair| pair[0] == pair[1]));
             let slow = replica.slow(&i, &q, &nco, &taps);
             // Noise of the sum: sqrt(30011/6) = 71; f32 lanes of 64 terms keep 1e-4 of it.
-            for (a, b) in all[0].taps.iter().zip(&slow.taps) {
+            for (a, b) in all[0].0.iter().zip(&slow) {
                 assert!((a - b).norm() < 7e-3, "{a} {b}");
             }
         }
@@ -243,7 +245,7 @@ mod tests {
             for level in kernel::Level::all() {
                 let replica = replica(edge);
                 let begin = std::time::Instant::now();
-                let sum: f64 = (0..20_000).map(|_| kernel::run(level, &replica, &i, &q, &nco, &taps).power).sum();
+                let sum: f64 = (0..20_000).map(|_| kernel::correlate(level, &replica, &i, &q, &nco, &taps)[1].re).sum();
                 let ns = begin.elapsed().as_secs_f64() * 1e9 / (20_000.0 * 2600.0);
                 println!("{edge:?} {level:?}: {ns:.3} ns a sample ({sum:.0})");
             }

@@ -1,112 +1,219 @@
-//! Measurements of channels become observations: times sent, pseudoranges, carriers.
+//! Observables at common epochs: what a channel's replica reads, in metres, cycles and hertz.
 //!
-//! The time sent is an integer count of code periods since a decoded instant and the fraction of the running
-//! period; it never passes through one floating-point number of seconds.
+//! The time sent is an exact count of code periods since the week began and a fraction of one, never one number of seconds.
+//! The receiver labels samples with its own clock: as the recording says if that agrees with the satellites
+//! to a second, otherwise so that the nearest satellite is about 70 ms away. Satellites whose time of sending is out of line
+//! with the others' (a wrong bit edge or code period of another) are left out.
 
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::Observation;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, SampleClock, WEEK_S};
-use crate::receiver::decode::TimeTag;
+use crate::gnss::time::{Epoch, Rate, SampleClock, WEEK_S};
+use crate::receiver::decode::Decoder;
 use crate::receiver::track::Measurement;
 
-/// Light time that the receiver's clock is set with when nothing else is known.
-const TYPICAL_LIGHT_TIME_S: f64 = 0.070;
-/// A start time that disagrees with the satellites by more is not believed.
-const LARGEST_START_ERROR_S: f64 = 1.0;
+/// Travel time to the nearest satellite that is assumed when the clock is set from satellites alone.
+const NEAREST_TRAVEL_S: f64 = 0.070;
+/// From near the Earth, travel times lie between 60 and 95 ms.
+const LARGEST_SPREAD_S: f64 = 0.035;
+/// The recording's start time is believed when it is this near.
+const BELIEVED_S: f64 = 1.0;
 
-/// When the signal at a measurement was sent, by the satellite's clock; `near` tells the week.
-pub fn sent(measurement: &Measurement, tag: TimeTag, signal: &Signal, near: Epoch) -> Option<Epoch> {
-    let component = signal.components.first()?;
-    // Chips since the tagged period, in integers: a second is a whole number of chips for every signal.
-    let chips = (measurement.code_periods as i64 - tag.period as i64) * i64::from(component.code_chips);
-    let rate = component.chip_rate_hz as i64;
-    let (seconds, rest) = (chips.div_euclid(rate), chips.rem_euclid(rate));
-    let fraction = (rest as f64 + measurement.code_fraction * f64::from(component.code_chips)) / component.chip_rate_hz;
-    let second_of_week = tag.second_of_week + seconds;
-    let week = (near.seconds() - second_of_week + WEEK_S / 2).div_euclid(WEEK_S);
-    Some(Epoch::new(week * WEEK_S + second_of_week, fraction))
+/// One channel at one tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    pub sv: Sv,
+    pub signal: &'static Signal,
+    pub measurement: Measurement,
+    /// Time of week sent: whole seconds and a fraction.
+    pub sent_of_week: (i64, f64),
 }
 
-/// The receiver's clock: what it reads at each sample.
-///
-/// It starts at the recording's own start time if the satellites agree with that to a second, and is else set
-/// so that the first satellites decoded are 70 ms away, to the millisecond.
-pub fn set_clock(described: SampleClock, known: bool, sample: u64, sent: &[Epoch]) -> Option<SampleClock> {
-    let nearest = sent.iter().copied().reduce(|a, b| if a.since(b) > 0.0 { a } else { b })?;
-    let light_time_s = described.epoch(sample).since(nearest);
-    if known && (light_time_s - TYPICAL_LIGHT_TIME_S).abs() < LARGEST_START_ERROR_S {
-        return Some(described);
+impl Reading {
+    /// What a locked channel with a known frame reads.
+    pub fn new(sv: Sv, signal: &'static Signal, measurement: &Measurement, decoder: &Decoder) -> Option<Self> {
+        if !measurement.locked {
+            return None;
+        }
+        let sent_of_week = decoder.time_of_week(measurement.code_periods, measurement.code_fraction)?;
+        Some(Self { sv, signal, measurement: *measurement, sent_of_week })
     }
-    let shift_ms = ((TYPICAL_LIGHT_TIME_S - light_time_s) * 1000.0).round();
-    Some(SampleClock { start: described.start.plus_s(shift_ms / 1000.0), rate: described.rate })
+
+    /// The time sent, in the week that brings it nearest to `near`.
+    fn sent(&self, near: Epoch) -> Epoch {
+        let (whole, fraction) = self.sent_of_week;
+        let ahead = whole - near.tow_whole_s();
+        let weeks = if ahead > WEEK_S / 2 {
+            -1
+        } else if ahead < -WEEK_S / 2 {
+            1
+        } else {
+            0
+        };
+        Epoch::new((near.week() + weeks) * WEEK_S + whole, fraction)
+    }
 }
 
-/// The observation that a measurement makes when the receiver's clock reads `reading`.
-pub fn observation(
-    measurement: &Measurement,
-    sv: Sv,
-    signal: &'static Signal,
-    sent: Epoch,
-    reading: Epoch,
-) -> Observation {
-    Observation {
-        sample: measurement.sample,
-        sv,
-        signal,
-        sent_s: sent.seconds(),
-        sent_fraction_s: sent.fraction(),
-        pseudorange_m: reading.since(sent) * SPEED_OF_LIGHT_MPS,
-        carrier_cycles: measurement.carrier_cycles,
-        doppler_hz: measurement.doppler_hz,
-        cn0_dbhz: measurement.cn0_dbhz,
-        locked_s: measurement.locked_s,
+/// An observation, and whether its carrier is known to the half cycle.
+#[derive(Clone, Debug)]
+pub struct Observed {
+    pub observation: Observation,
+    pub half_cycle_known: bool,
+}
+
+/// The receiver's own clock.
+#[derive(Clone, Debug)]
+pub struct Timebase {
+    rate: Rate,
+    stated: Option<Epoch>,
+    clock: Option<SampleClock>,
+    heard: Option<Epoch>,
+}
+
+impl Timebase {
+    /// A clock that has read nothing but the recording's metadata.
+    pub fn new(rate: Rate, stated: Option<Epoch>) -> Self {
+        Self { rate, stated, clock: None, heard: None }
     }
+
+    /// What labels samples, once it is set.
+    pub fn clock(&self) -> Option<SampleClock> {
+        self.clock
+    }
+
+    /// Takes a time that a satellite's message says, right within half a week.
+    pub fn hear(&mut self, time: Epoch) {
+        self.heard.get_or_insert(time);
+    }
+
+    /// Observations of these readings, which belong to one sample; none while the clock cannot be set.
+    pub fn observe(&mut self, sample: u64, readings: &[Reading]) -> Vec<Observed> {
+        if self.clock.is_none() {
+            self.set(sample, readings);
+        }
+        let Some(clock) = self.clock else { return Vec::new() };
+        let label = clock.epoch(sample);
+        let travels: Vec<(Epoch, f64)> = readings
+            .iter()
+            .map(|reading| {
+                let sent = reading.sent(label);
+                (sent, label.since(sent))
+            })
+            .collect();
+        let typical_s = median(travels.iter().map(|travel| travel.1).collect());
+        readings
+            .iter()
+            .zip(travels)
+            .filter(|(_, (_, travel_s))| (travel_s - typical_s).abs() <= LARGEST_SPREAD_S)
+            .map(|(reading, (sent, travel_s))| Observed {
+                observation: Observation {
+                    sample,
+                    sv: reading.sv,
+                    signal: reading.signal,
+                    sent_s: sent.seconds(),
+                    sent_fraction_s: sent.fraction(),
+                    pseudorange_m: SPEED_OF_LIGHT_MPS * travel_s,
+                    carrier_cycles: reading.measurement.carrier_cycles,
+                    doppler_hz: reading.measurement.doppler_hz,
+                    cn0_dbhz: reading.measurement.cn0_dbhz,
+                    locked_s: reading.measurement.locked_s,
+                },
+                half_cycle_known: reading.measurement.half_cycle_known,
+            })
+            .collect()
+    }
+
+    fn set(&mut self, sample: u64, readings: &[Reading]) {
+        if readings.is_empty() {
+            return;
+        }
+        if let Some(start) = self.stated {
+            let clock = SampleClock { start, rate: self.rate };
+            let label = clock.epoch(sample);
+            let travel_s = median(readings.iter().map(|reading| label.since(reading.sent(label))).collect());
+            if (travel_s - NEAREST_TRAVEL_S).abs() < BELIEVED_S {
+                self.clock = Some(clock);
+                return;
+            }
+        }
+        let Some(near) = self.heard else { return };
+        let sent = readings.iter().map(|reading| reading.sent(near));
+        let Some(latest) = sent.reduce(|latest, sent| if sent > latest { sent } else { latest }) else { return };
+        // Whole milliseconds, so that the label is a clock that a person could have set.
+        let milliseconds = ((latest.fraction() + NEAREST_TRAVEL_S) * 1e3).round();
+        let label = Epoch::new(latest.seconds(), milliseconds * 1e-3);
+        let (whole, fraction) = self.rate.elapsed(sample);
+        let start = Epoch::new(label.seconds() - whole, label.fraction() - fraction);
+        self.clock = Some(SampleClock { start, rate: self.rate });
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::time::Rate;
 
-    fn measurement(code_periods: u64, code_fraction: f64) -> Measurement {
-        Measurement {
+    fn reading(prn: u8, of_week: (i64, f64)) -> Reading {
+        let measurement = Measurement {
             sample: 0,
-            code_periods,
-            code_fraction,
+            code_periods: 0,
+            code_fraction: 0.0,
             carrier_cycles: 0.0,
             half_cycle_known: true,
             doppler_hz: 0.0,
             cn0_dbhz: 45.0,
-            locked_s: 10.0,
+            locked_s: 1.0,
             locked: true,
+        };
+        Reading { sv: Sv::gps(prn), signal: &L1_CA, measurement, sent_of_week: of_week }
+    }
+
+    fn rate() -> Rate {
+        Rate::from_hz(2.6e6).unwrap()
+    }
+
+    #[test]
+    fn a_stated_start_is_believed_within_a_second_and_not_beyond() {
+        let start = Epoch::from_week(1590, 1000.0);
+        let sent = [reading(1, (999, 0.93)), reading(2, (999, 0.925))];
+        let mut near = Timebase::new(rate(), Some(start));
+        assert_eq!(near.observe(0, &sent).len(), 2);
+        assert_eq!(near.clock().unwrap().start, start);
+        let mut far = Timebase::new(rate(), Some(start.plus_s(-5.0)));
+        assert!(far.observe(0, &sent).is_empty());
+        far.hear(Epoch::from_week(1590, 960.0));
+        // 70 ms to the nearest satellite, in whole milliseconds.
+        assert_eq!(far.observe(0, &sent).len(), 2);
+        assert!(far.clock().unwrap().start.since(start).abs() < 1e-15);
+    }
+
+    #[test]
+    fn pseudoranges_are_continuous_across_the_end_of_the_week() {
+        let start = Epoch::from_week(1590, 604_799.5);
+        let mut clock = Timebase::new(rate(), Some(start));
+        let before = clock.observe(0, &[reading(1, (604_799, 0.425))]);
+        // Half a second and 20 ms later: one second into the new week less what the travel takes.
+        let after = clock.observe(1_352_000, &[reading(1, (604_799, 0.945))]);
+        let later = clock.observe(1_560_000, &[reading(1, (0, 0.025))]);
+        for observed in [&before, &after, &later] {
+            // A tick of the last place of a half second is 1e-16 s, that is 3e-8 m.
+            assert!((observed[0].observation.pseudorange_m - 0.075 * SPEED_OF_LIGHT_MPS).abs() < 1e-6);
         }
+        assert_eq!(later[0].observation.sent().week(), 1591);
     }
 
     #[test]
-    fn time_sent_counts_periods_over_the_week_s_end() {
-        let tag = TimeTag { period: 500, second_of_week: WEEK_S - 6 };
-        let near = Epoch::new(1590 * WEEK_S + 3, 0.0);
-        let time = sent(&measurement(500 + 6_001, 0.25), tag, &L1_CA, near).unwrap();
-        assert_eq!(time.seconds(), 1590 * WEEK_S);
-        // 1.25 ms to the ulp of a millisecond.
-        assert!((time.fraction() - 1.25e-3).abs() < 2.2e-19 * 2.0);
-        let before = sent(&measurement(499, 0.5), tag, &L1_CA, near).unwrap();
-        assert!((before.since(Epoch::new(1590 * WEEK_S - 6, 0.0)) + 0.5e-3).abs() < 2e-16);
-    }
-
-    #[test]
-    fn the_clock_is_the_recording_s_if_satellites_agree_and_else_set_to_seventy_milliseconds() {
-        let rate = Rate::from_hz(1e6).unwrap();
-        let start = Epoch::new(1_000_000_000, 0.25);
-        let described = SampleClock { start, rate };
-        let sent = [start.plus_s(1.0 - 0.080), start.plus_s(1.0 - 0.068)];
-        assert_eq!(set_clock(described, true, 1_000_000, &sent), Some(described));
-        let far = sent.map(|epoch| epoch.plus_s(3600.0));
-        let set = set_clock(described, true, 1_000_000, &far).unwrap();
-        assert!((set.epoch(1_000_000).since(far[1]) - 0.070).abs() < 0.5e-3);
-        assert_eq!(set_clock(described, true, 0, &[]), None);
+    fn a_satellite_out_of_line_with_the_others_is_left_out() {
+        let mut clock = Timebase::new(rate(), Some(Epoch::from_week(1590, 1000.0)));
+        let sent =
+            [reading(1, (999, 0.93)), reading(2, (999, 0.925)), reading(3, (999, 0.92)), reading(4, (999, 0.86))];
+        let used: Vec<u8> = clock.observe(0, &sent).iter().map(|one| one.observation.sv.number).collect();
+        assert_eq!(used, vec![1, 2, 3]);
     }
 }

@@ -1,149 +1,180 @@
-//! The receiver's settings as a TOML file or a scenario's `[receiver]` table writes them.
+//! The receiver's settings as a TOML file writes them.
 //!
-//! Every key has a default; an unknown key is refused with the nearest right one, a bad value with its key and range.
+//! Every key has a default, an unknown key is refused with the nearest right one, every value has a range.
+//! The known keys are those of the defaults themselves, so the list cannot go stale.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+use toml::{Table, Value};
 
-use crate::receiver::acquire::AcquisitionSettings;
+use crate::gnss::signal::SIGNALS;
+use crate::gnss::time::{Epoch, TimeError};
+use crate::receiver::acquire::{AcquireError, AcquisitionSettings};
 use crate::receiver::position::PositionSettings;
-use crate::receiver::track::TrackingSettings;
+use crate::receiver::track::{TrackingSettings, TrackingSettingsError};
 
 /// All choices of the receiver.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Spacing of observations and fixes: a whole number of milliseconds.
-    pub interval_s: f64,
-    /// Spacing of rows in `tracking.csv`.
-    pub tracking_row_interval_s: f64,
-    /// How often satellites that are not tracked are searched again; 0 for never.
-    pub search_interval_s: f64,
-    /// Earliest GPS week that the recording can be of, when its start was not written down: the message gives weeks modulo
-    /// 1024. 1526 is April 2009, so weeks up to November 2028 are told apart.
-    pub earliest_week: u32,
     pub acquisition: AcquisitionSettings,
     pub tracking: TrackingSettings,
     pub position: PositionSettings,
+    pub operation: OperationSettings,
 }
 
-impl Default for Settings {
+/// What the main loop does when.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OperationSettings {
+    /// Milliseconds between observations and fixes.
+    pub measurement_interval_ms: u32,
+    /// Milliseconds between rows of `tracking.csv`: a divisor of the one before.
+    pub tracking_interval_ms: u32,
+    /// Time between searches for satellites that have not been found.
+    pub search_interval_s: f64,
+    /// Time between searches while a satellite is missing that was followed within the last 30 s.
+    pub reacquisition_interval_s: f64,
+    /// In searches after the first, the probability of a false alarm is multiplied by this.
+    pub repeated_false_alarm_share: f64,
+    /// A channel without frame synchronisation after so long is dropped.
+    pub frame_limit_s: f64,
+    /// GPS time near which the 10-bit week is resolved when the recording has no start time.
+    pub week_reference: String,
+}
+
+impl Default for OperationSettings {
     fn default() -> Self {
         Self {
-            interval_s: 0.1,
-            tracking_row_interval_s: 0.1,
-            search_interval_s: 30.0,
-            earliest_week: 1526,
-            acquisition: AcquisitionSettings::default(),
-            tracking: TrackingSettings::default(),
-            position: PositionSettings::default(),
+            measurement_interval_ms: 100,
+            tracking_interval_ms: 20,
+            search_interval_s: 15.0,
+            reacquisition_interval_s: 2.0,
+            repeated_false_alarm_share: 0.01,
+            frame_limit_s: 40.0,
+            week_reference: "2024-01-01T00:00:00".to_owned(),
         }
     }
 }
 
-/// Why settings are not accepted.
+/// Why settings are refused. `origin` is the file's name.
 #[derive(Debug, Error)]
 pub enum SettingsError {
-    #[error("{origin}: {message}")]
-    Syntax { origin: String, message: String },
-    #[error("{origin}: unknown key '{key}'{}", nearest.as_ref().map_or(String::new(), |n| format!(": did you mean '{n}'?")))]
-    UnknownKey { origin: String, key: String, nearest: Option<String> },
+    #[error("{origin}: {source}")]
+    Toml { origin: String, source: Box<toml::de::Error> },
+    #[error("{origin}: unknown key '{key}': expected {expected}")]
+    UnknownKey { origin: String, key: String, expected: String },
     #[error("{origin}: {key} = {value}: expected {expected}")]
-    Range { origin: String, key: String, value: f64, expected: &'static str },
-    #[error("{origin}: {message}")]
-    Room { origin: String, message: String },
+    Range { origin: String, key: &'static str, value: String, expected: String },
+    #[error("{origin}: {source}")]
+    Acquisition { origin: String, source: AcquireError },
+    #[error("{origin}: {source}")]
+    Tracking { origin: String, source: TrackingSettingsError },
+    #[error("{origin}: operation.week_reference: {source}")]
+    Week { origin: String, source: TimeError },
 }
 
 impl Settings {
-    /// Reads a settings file's text; `origin` names it in messages.
+    /// Reads a TOML text; `origin` names it in errors.
     ///
     /// # Errors
-    /// The first thing that is wrong, see [`SettingsError`].
+    /// Text that is no TOML, an unknown key, a value of the wrong type or out of its range.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SettingsError> {
         let table = text
-            .parse::<toml::Table>()
-            .map_err(|error| SettingsError::Syntax { origin: origin.to_owned(), message: error.to_string() })?;
+            .parse::<Table>()
+            .map_err(|source| SettingsError::Toml { origin: origin.to_owned(), source: Box::new(source) })?;
         Self::from_table(table, origin)
     }
 
-    /// Reads a table that was already parsed.
+    /// Reads a TOML table.
     ///
     /// # Errors
-    /// The first thing that is wrong, see [`SettingsError`].
-    pub fn from_table(table: toml::Table, origin: &str) -> Result<Self, SettingsError> {
-        unknown_key(&table, &known(), "", origin)?;
-        let settings: Self = toml::Value::Table(table)
-            .try_into()
-            .map_err(|error| SettingsError::Syntax { origin: origin.to_owned(), message: error.to_string() })?;
+    /// As [`Self::parse`].
+    pub fn from_table(table: Table, origin: &str) -> Result<Self, SettingsError> {
+        let toml = |source| SettingsError::Toml { origin: origin.to_owned(), source: Box::new(source) };
+        let known = Table::try_from(Self::default()).unwrap_or_default();
+        check_keys(&table, &known, "", origin)?;
+        let settings: Self = table.try_into().map_err(toml)?;
         settings.validate(origin)?;
         Ok(settings)
     }
 
-    fn validate(&self, origin: &str) -> Result<(), SettingsError> {
-        let milliseconds = self.interval_s * 1000.0;
-        let whole = (milliseconds - milliseconds.round()).abs() < 1e-9 && (1.0..=60_000.0).contains(&milliseconds);
-        let mut checks = vec![
-            ("interval_s".to_owned(), self.interval_s, whole, "a whole number of milliseconds, 0.001 to 60"),
-            (
-                "tracking_row_interval_s".to_owned(),
-                self.tracking_row_interval_s,
-                (0.001..=60.0).contains(&self.tracking_row_interval_s),
-                "0.001 to 60",
-            ),
-            (
-                "search_interval_s".to_owned(),
-                self.search_interval_s,
-                self.search_interval_s == 0.0 || (0.1..=86_400.0).contains(&self.search_interval_s),
-                "0 for never, or 0.1 to 86400",
-            ),
-            ("earliest_week".to_owned(), f64::from(self.earliest_week), self.earliest_week < 10_000, "0 to 9999"),
-        ];
-        checks.extend(
-            self.position.checks().map(|(key, value, good, range)| (format!("position.{key}"), value, good, range)),
-        );
-        if let Some((key, value, _, expected)) = checks.into_iter().find(|check| !check.2) {
-            return Err(SettingsError::Range { origin: origin.to_owned(), key, value, expected });
+    /// Checks every value's range.
+    ///
+    /// # Errors
+    /// The first value out of its range.
+    pub fn validate(&self, origin: &str) -> Result<(), SettingsError> {
+        self.acquisition
+            .validate()
+            .map_err(|source| SettingsError::Acquisition { origin: origin.to_owned(), source })?;
+        for component in SIGNALS.iter().filter_map(|signal| signal.components.first()) {
+            self.tracking
+                .validate(component.period_s())
+                .map_err(|source| SettingsError::Tracking { origin: origin.to_owned(), source })?;
         }
-        let room = |message: String| SettingsError::Room { origin: origin.to_owned(), message };
-        self.acquisition.validate().map_err(|error| room(error.to_string()))?;
-        // The shortest code period of any signal limits how often loops can be updated.
-        let period_s = crate::gnss::signal::SIGNALS
-            .iter()
-            .flat_map(|signal| signal.components)
-            .map(|component| component.period_s())
-            .fold(f64::INFINITY, f64::min);
-        self.tracking.validate(period_s).map_err(|error| room(error.to_string()))
-    }
-
-    /// Ticks of observations in milliseconds.
-    pub fn interval_ms(&self) -> u64 {
-        (self.interval_s * 1000.0).round() as u64
-    }
-}
-
-/// Every key that exists, as the default settings write it.
-fn known() -> toml::Table {
-    toml::Table::try_from(Settings::default()).unwrap_or_default()
-}
-
-fn unknown_key(table: &toml::Table, known: &toml::Table, prefix: &str, origin: &str) -> Result<(), SettingsError> {
-    for (key, value) in table {
-        match (known.get(key), value) {
-            (None, _) => {
-                let nearest = known
-                    .keys()
-                    .map(|other| (strsim::damerau_levenshtein(key, other), other))
-                    .min()
-                    .map(|(_, other)| format!("{prefix}{other}"));
-                return Err(SettingsError::UnknownKey {
+        let (position, operation) = (&self.position, &self.operation);
+        #[rustfmt::skip]
+        let ranges = [
+            ("position.mask_deg", position.mask_deg, 0.0, 90.0),
+            ("position.smoothing_s", position.smoothing_s, 0.0, 3600.0),
+            ("position.false_alarm", position.false_alarm, 1e-12, 0.5),
+            ("position.model_sigma_m", position.model_sigma_m, 1e-3, 100.0),
+            ("position.ionosphere_wait_s", position.ionosphere_wait_s, 0.0, 1500.0),
+            ("operation.measurement_interval_ms", f64::from(operation.measurement_interval_ms), 10.0, 60_000.0),
+            ("operation.tracking_interval_ms", f64::from(operation.tracking_interval_ms), 1.0, f64::from(operation.measurement_interval_ms)),
+            ("operation.search_interval_s", operation.search_interval_s, 0.1, 86_400.0),
+            ("operation.reacquisition_interval_s", operation.reacquisition_interval_s, 0.1, 86_400.0),
+            ("operation.repeated_false_alarm_share", operation.repeated_false_alarm_share, 1e-6, 1.0),
+            ("operation.frame_limit_s", operation.frame_limit_s, 12.0, 86_400.0),
+        ];
+        for (key, value, low, high) in ranges {
+            if !(low..=high).contains(&value) {
+                let expected = format!("{low} to {high}");
+                return Err(SettingsError::Range {
                     origin: origin.to_owned(),
-                    key: format!("{prefix}{key}"),
-                    nearest,
+                    key,
+                    value: value.to_string(),
+                    expected,
                 });
             }
-            (Some(toml::Value::Table(inner_known)), toml::Value::Table(inner)) => {
-                unknown_key(inner, inner_known, &format!("{prefix}{key}."), origin)?;
+        }
+        if !operation.measurement_interval_ms.is_multiple_of(operation.tracking_interval_ms) {
+            return Err(SettingsError::Range {
+                origin: origin.to_owned(),
+                key: "operation.tracking_interval_ms",
+                value: operation.tracking_interval_ms.to_string(),
+                expected: format!("a divisor of measurement_interval_ms, {}", operation.measurement_interval_ms),
+            });
+        }
+        self.week_reference().map_err(|source| SettingsError::Week { origin: origin.to_owned(), source })?;
+        Ok(())
+    }
+
+    /// The time near which weeks are resolved without a start time.
+    ///
+    /// # Errors
+    /// A text that is no time.
+    pub fn week_reference(&self) -> Result<Epoch, TimeError> {
+        Epoch::parse(&self.operation.week_reference)
+    }
+}
+
+/// Refuses the first key of `table` that `known` does not have, by walking both.
+fn check_keys(table: &Table, known: &Table, path: &str, origin: &str) -> Result<(), SettingsError> {
+    for (key, value) in table {
+        let whole = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+        match (known.get(key), value) {
+            (None, _) => {
+                let nearest = known.keys().max_by(|a, b| {
+                    strsim::jaro_winkler(a, key).total_cmp(&strsim::jaro_winkler(b, key)).then_with(|| b.cmp(a))
+                });
+                let expected = match nearest {
+                    Some(near) if strsim::jaro_winkler(near, key) > 0.7 => format!("perhaps '{near}'"),
+                    _ => format!("one of {}", known.keys().cloned().collect::<Vec<_>>().join(", ")),
+                };
+                return Err(SettingsError::UnknownKey { origin: origin.to_owned(), key: whole, expected });
             }
+            (Some(Value::Table(inner)), Value::Table(given)) => check_keys(given, inner, &whole, origin)?,
             _ => {}
         }
     }
@@ -155,48 +186,36 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_written_keeps_its_default() {
-        let settings =
-            Settings::parse("[tracking]\npll_bandwidth_hz = 25\n[position]\nmask_deg = 10", "a.toml").unwrap();
-        assert_eq!(settings.tracking.pll_bandwidth_hz, 25.0);
-        assert_eq!(settings.position.mask_deg, 10.0);
-        assert_eq!(settings.acquisition, AcquisitionSettings::default());
+    fn nothing_written_is_the_default_and_defaults_are_valid() {
+        assert_eq!(Settings::parse("", "x").unwrap(), Settings::default());
     }
 
     #[test]
-    fn every_misspelt_key_is_refused_with_the_right_one() {
-        fn walk(table: &toml::Table, path: &[String], found: &mut Vec<Vec<String>>) {
-            for (key, value) in table {
-                let mut here = path.to_vec();
-                here.push(key.clone());
-                match value {
-                    toml::Value::Table(inner) => walk(inner, &here, found),
-                    _ => found.push(here),
-                }
-            }
-        }
-        let mut keys = Vec::new();
-        walk(&known(), &[], &mut keys);
-        assert!(keys.len() > 20);
-        for path in keys {
-            let (last, tables) = path.split_last().unwrap();
-            let header = if tables.is_empty() { String::new() } else { format!("[{}]\n", tables.join(".")) };
-            // One letter twice.
-            let typo = format!("{}{last}", &last[..1]);
-            let error = Settings::parse(&format!("{header}{typo} = 1"), "a.toml").unwrap_err().to_string();
-            assert!(error.contains(&typo) && error.contains(&format!("'{}'", path.join("."))), "{error}");
-        }
-    }
-
-    #[test]
-    fn a_bad_value_names_its_key_value_and_range() {
-        for (text, parts) in [
-            ("interval_s = 0.00015", ["interval_s", "0.00015", "millisecond"]),
-            ("[position]\nmask_deg = 91", ["position.mask_deg", "91", "-90 to 90"]),
-            ("[tracking]\nintegration = 3", ["tracking.integration", "3", "20"]),
+    fn an_unknown_key_is_refused_with_the_nearest_right_one() {
+        for (text, key, near) in [
+            ("[tracking]\npll_bandwith_hz = 15.0", "tracking.pll_bandwith_hz", "pll_bandwidth_hz"),
+            ("[positon]", "positon", "position"),
+            ("[position]\nsmoothing = 3.0", "position.smoothing", "smoothing_s"),
         ] {
-            let error = Settings::parse(text, "a.toml").unwrap_err().to_string();
-            assert!(parts.iter().all(|part| error.contains(part)), "{error}");
+            let error = Settings::parse(text, "rx.toml").unwrap_err().to_string();
+            assert!(error.contains("rx.toml") && error.contains(key) && error.contains(near), "{error}");
+        }
+    }
+
+    #[test]
+    fn every_number_out_of_its_range_is_refused_by_name() {
+        // What no key can be: not a number. Walks all keys of the defaults, so that none is forgotten.
+        for (section, keys) in Table::try_from(Settings::default()).unwrap() {
+            for (key, value) in keys.as_table().unwrap() {
+                let bad = match value {
+                    Value::Float(_) => "nan",
+                    Value::Integer(_) => "4294967295",
+                    Value::String(_) => "'?'",
+                    _ => "7",
+                };
+                let error = Settings::parse(&format!("[{section}]\n{key} = {bad}"), "rx.toml").unwrap_err().to_string();
+                assert!(error.contains(key.as_str()), "{section}.{key}: {error}");
+            }
         }
     }
 }

@@ -41,6 +41,7 @@ pub const BLUE: RGBColor = COLOURS[0];
 pub const ORANGE: RGBColor = COLOURS[1];
 pub const GREEN: RGBColor = COLOURS[2];
 pub const GREY: RGBColor = RGBColor(120, 120, 120);
+const LIGHT: RGBColor = RGBColor(225, 225, 225);
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +54,8 @@ pub enum Mark {
     Rings,
     /// A larger cross.
     Cross,
+    /// Larger dots.
+    Balls,
     /// Bars from zero, of that width in data units.
     Bars(f64),
 }
@@ -121,11 +124,15 @@ pub struct Chart {
     pub equal: bool,
     /// Labels under the x axis in place of numbers.
     pub x_ticks: Option<Vec<(f64, String)>>,
+    /// Labels beside the y axis in place of numbers; the grid then follows both lists.
+    pub y_ticks: Option<Vec<(f64, String)>>,
+    /// Words at points, so many pixels above them.
+    pub labels: Vec<((f64, f64), String, i32)>,
 }
 
 impl Chart {
     pub fn new(title: impl Into<String>, x: Axis, y: Axis, series: Vec<Series>) -> Self {
-        Self { title: title.into(), x, y, series, equal: false, x_ticks: None }
+        Self { title: title.into(), x, y, series, equal: false, x_ticks: None, y_ticks: None, labels: Vec::new() }
     }
 }
 
@@ -221,13 +228,15 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         .set_label_area_size(LabelAreaPosition::Bottom, BOTTOM_PX * FINE)
         .build_cartesian_2d(x.from..x.to, y.from..y.to)?;
     let (x_decimals, y_decimals) = (decimals(x.span()), decimals(y.span()));
-    let ticked = chart.x_ticks.is_some();
-    context
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(RGBColor(225, 225, 225).stroke_width(FINE as u32))
+    let (ticked, y_ticked) = (chart.x_ticks.is_some(), chart.y_ticks.is_some());
+    let mut mesh = context.configure_mesh();
+    if y_ticked {
+        mesh.disable_mesh();
+    }
+    mesh.light_line_style(TRANSPARENT)
+        .bold_line_style(LIGHT.stroke_width(FINE as u32))
         .axis_style(GREY.stroke_width(FINE as u32))
-        .set_all_tick_mark_size(5 * FINE)
+        .set_all_tick_mark_size(if y_ticked { 0 } else { 5 * FINE })
         .x_desc(x.label.clone())
         .y_desc(y.label.clone())
         .axis_desc_style(font(13))
@@ -235,17 +244,34 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         .x_labels(if chart.equal { 7 } else { 10 })
         .y_labels((height as i32 / FINE / 45).clamp(4, 12) as usize)
         .x_label_formatter(&|value| if ticked { String::new() } else { tick(*value, x_decimals) })
-        .y_label_formatter(&|value| tick(*value, y_decimals))
+        .y_label_formatter(&|value| if y_ticked { String::new() } else { tick(*value, y_decimals) })
         .draw()?;
+    if let (Some(columns), Some(rows)) = (&chart.x_ticks, &chart.y_ticks) {
+        let across = rows.iter().map(|(at, _)| vec![(x.from, *at), (x.to, *at)]);
+        let up = columns.iter().map(|(at, _)| vec![(*at, y.from), (*at, y.to)]);
+        for line in across.chain(up) {
+            context.draw_series(LineSeries::new(line, LIGHT.stroke_width(FINE as u32)))?;
+        }
+    }
     for series in &chart.series {
         draw_series(&mut context, series)?;
     }
     let bottom = height as i32 - (BOTTOM_PX + EDGE_PX - 7) * FINE;
-    let left = area.get_base_pixel().0;
+    let (left, top) = area.get_base_pixel();
     for (at, label) in chart.x_ticks.iter().flatten() {
         let (pixel, _) = context.plotting_area().map_coordinate(&(*at, y.from));
         let style = anchored(11, HPos::Center, VPos::Top);
         area.draw(&Text::new(label.clone(), (pixel - left, bottom), style))?;
+    }
+    for (at, label) in chart.y_ticks.iter().flatten() {
+        let (pixel_x, pixel_y) = context.plotting_area().map_coordinate(&(x.from, *at));
+        let style = anchored(11, HPos::Right, VPos::Center);
+        area.draw(&Text::new(label.clone(), (pixel_x - left - 8 * FINE, pixel_y - top), style))?;
+    }
+    for (at, label, above_px) in &chart.labels {
+        let (pixel_x, pixel_y) = context.plotting_area().map_coordinate(at);
+        let style = anchored(11, HPos::Left, VPos::Center);
+        area.draw(&Text::new(label.clone(), (pixel_x - left - 2 * FINE, pixel_y - top - above_px * FINE), style))?;
     }
     Ok(())
 }
@@ -257,7 +283,7 @@ type Context<'a, 'b> = ChartContext<
 >;
 
 fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Failure> {
-    let points = thinned(&series.points);
+    let points = thinned(&series.points, series.mark);
     let line = series.colour.stroke_width(3 * FINE as u32 / 2);
     match series.mark {
         Mark::Line => {
@@ -269,6 +295,10 @@ fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Fai
         Mark::Dots => {
             let dot = |point| Circle::new(point, 3 * FINE / 2, series.colour.mix(0.75).filled());
             context.draw_series(points.into_iter().map(dot))?;
+        }
+        Mark::Balls => {
+            let ball = |point| Circle::new(point, 4 * FINE, series.colour.filled());
+            context.draw_series(points.into_iter().map(ball))?;
         }
         Mark::Rings => {
             let ring = |point| Circle::new(point, 2 * FINE, series.colour.stroke_width(FINE as u32 * 3 / 4));
@@ -302,7 +332,7 @@ fn draw_legend(area: &Area<'_>, legend: &[Series]) -> Result<(), Failure> {
                 area.draw(&PathElement::new([(x, y), (x + 7 * FINE, y)], thick))?;
                 area.draw(&PathElement::new([(end - 7 * FINE, y), (end, y)], thick))?;
             }
-            Mark::Dots => area.draw(&Circle::new(middle, 4 * FINE, series.colour.filled()))?,
+            Mark::Dots | Mark::Balls => area.draw(&Circle::new(middle, 4 * FINE, series.colour.filled()))?,
             Mark::Rings => area.draw(&Circle::new(middle, 4 * FINE, thick))?,
             Mark::Cross => area.draw(&plotters::element::Cross::new(middle, 5 * FINE, thick))?,
             Mark::Bars(_) => {
@@ -334,11 +364,15 @@ fn tick(value: f64, decimals: usize) -> String {
 /// Most points that a series is drawn with.
 const MOST_POINTS: usize = 1600;
 
-/// Few enough points to draw: of each run of neighbours the lowest and the highest, so that no spike is lost.
-fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+/// Few enough points to draw. Of a line, the lowest and the highest of each run of neighbours, so that no spike is lost; of
+/// marks that stand alone, every so many, so that their density stays true.
+fn thinned(points: &[(f64, f64)], mark: Mark) -> Vec<(f64, f64)> {
     let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
     if finite.len() <= MOST_POINTS {
         return finite;
+    }
+    if !matches!(mark, Mark::Line | Mark::Dash) {
+        return finite.iter().copied().step_by(finite.len().div_ceil(MOST_POINTS)).collect();
     }
     let extremes = |run: &[(f64, f64)]| {
         let numbered = || run.iter().enumerate();
@@ -357,11 +391,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thinning_keeps_the_spikes_and_the_order() {
+    fn thinning_keeps_a_line_s_spikes_and_the_density_of_marks() {
         let mut points: Vec<(f64, f64)> = (0..100_000).map(|n| (f64::from(n), 0.0)).collect();
         points[54_321].1 = 9.0;
         points[54_400].1 = -9.0;
-        let few = thinned(&points);
+        let dots = thinned(&points, Mark::Dots);
+        assert!(dots.len() <= MOST_POINTS && dots.iter().filter(|point| point.1 != 0.0).count() <= 1);
+        let few = thinned(&points, Mark::Line);
         assert!(few.len() <= MOST_POINTS + 2);
         assert!(few.contains(&(54_321.0, 9.0)) && few.contains(&(54_400.0, -9.0)));
         assert!(few.windows(2).all(|pair| pair[0].0 <= pair[1].0));

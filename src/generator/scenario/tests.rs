@@ -18,7 +18,7 @@ const REST: &str = "[navigation]\nfile = \"brdc.10n\"\n[satellites]\nmask_deg = 
     [ionosphere]\nmodel = \"klobuchar\"\nalpha = [1e-8, 0, 0, 0]\nbeta = [1e5, 0, 0, 0]\n\
     [troposphere]\nmodel = \"saastamoinen\"\nheight_m = 100\npressure_hpa = 1000\ntemperature_c = 30\nrelative_humidity = 0.5\n\
     [receiver_clock]\nbias_s = 1e-4\ndrift_sps = 1e-7\n[noise]\n\
-    [fidelity]\ncode_edge = \"nearest\"\nknot_tolerance_cycles = 1e-3\n[truth]\ninterval_s = 0.5\n\
+    [fidelity]\nlevel = \"balanced\"\ncarrier = \"f64\"\nnoise = \"f32\"\ncode_edge = \"nearest\"\nknot_tolerance_cycles = 1e-3\n[truth]\ninterval_s = 0.5\n\
     [receiver.tracking]\nwhatever = 1\n";
 
 fn parse(text: &str) -> Result<Scenario, ScenarioError> {
@@ -203,6 +203,33 @@ fn what_contradicts_itself_is_refused_with_the_computed_number() {
     assert!(error.to_string().contains("GPS L1 C/A"), "{error}");
     let error = parse(&with("fidelity", "code_edge = \"aera\"")).unwrap_err().to_string();
     assert!(error.contains("did you mean area?"), "{error}");
+}
+
+#[test]
+fn a_level_sets_every_knob_and_a_knob_overrides_its_level() {
+    let fidelity = |lines: &str| parse(&with("fidelity", lines)).unwrap().fidelity;
+    assert_eq!(parse(&format!("{MINIMAL}{STATIC}")).unwrap().fidelity, Fidelity::of(Grade::Balanced));
+    for (name, grade) in Grade::NAMES {
+        assert_eq!(fidelity(&format!("level = \"{name}\"")), Fidelity::of(grade));
+        let own = fidelity(&format!("level = \"{name}\"\nknot_tolerance_cycles = 3e-5"));
+        assert_eq!(own, Fidelity { knot_tolerance_cycles: 3e-5, ..Fidelity::of(grade) });
+    }
+    let every = fidelity("level = \"fast\"\ncode_edge = \"band_limited\"\ncarrier = \"f64\"\nnoise = \"f64\"");
+    let expected = Fidelity { grade: Grade::Fast, knot_tolerance_cycles: 4e-4, ..Fidelity::of(Grade::Reference) };
+    assert_eq!(every, expected);
+    for (key, value, hint) in [
+        ("level", "\"refrence\"", "did you mean reference?"),
+        ("level", "3", "fast, balanced, reference"),
+        ("carrier", "\"f16\"", "f32, f64"),
+        ("noise", "\"\"", "f32, f64"),
+        ("code_edge", "true", "nearest, area, band_limited"),
+    ] {
+        let error = parse(&with("fidelity", &format!("{key} = {value}"))).unwrap_err().to_string();
+        assert!(error.starts_with("scene.toml:") && error.contains(&format!("fidelity.{key} = ")), "{error}");
+        assert!(error.contains(hint), "{error}");
+    }
+    let error = parse(&with("fidelity", "sample_width = 8")).unwrap_err().to_string();
+    assert!(error.contains("unknown key 'fidelity.sample_width'"), "{error}");
 }
 
 #[test]

@@ -116,3 +116,18 @@ fn cos_sin(words: &Words) -> ([f32; LANES], [f32; LANES]) {
     }
     (cos, sin)
 }
+
+/// [`add_block`] in `f64`: the same words, with logarithm, sine and cosine from `libm`.
+pub fn add_block_exact(seed: u64, block: u64, sigma: f32, i: &mut [f32], q: &mut [f32]) {
+    let mut state = seeded(seed, block);
+    for (bi, bq) in i.chunks_mut(LANES).zip(q.chunks_mut(LANES)) {
+        let (radii, angles) = (next(&mut state), next(&mut state));
+        for (((i, q), radius), angle) in bi.iter_mut().zip(bq).zip(radii).zip(angles) {
+            let u = (f64::from(radius) + 0.5) / 4_294_967_296.0;
+            let radius = f64::from(sigma) * (-2.0 * libm::log(u)).sqrt();
+            let (sin, cos) = libm::sincos(f64::from(angle) * (std::f64::consts::TAU / 4_294_967_296.0));
+            *i += (radius * cos) as f32;
+            *q += (radius * sin) as f32;
+        }
+    }
+}

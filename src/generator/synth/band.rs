@@ -20,6 +20,8 @@ const BETA: f64 = 5.65;
 pub struct Filter {
     fine: Vec<f64>,
     rows: Vec<[f32; WIDTH]>,
+    /// The same from `fine`, side by side.
+    exact_rows: Vec<[f64; WIDTH]>,
 }
 
 impl Filter {
@@ -35,12 +37,20 @@ impl Filter {
             fine.push(sum);
         }
         fine.iter_mut().for_each(|value| *value /= sum);
-        let mut filter = Self { fine, rows: Vec::new() };
+        let mut filter = Self { fine, rows: Vec::new(), exact_rows: Vec::new() };
         filter.rows = (0..=ROWS)
             .map(|row| {
                 std::array::from_fn(|k| {
                     let x = k as f64 - HALF_WIDTH as f64 + row as f64 / ROWS as f64;
                     (filter.step(x) - if k >= HALF_WIDTH { 1.0 } else { 0.0 }) as f32
+                })
+            })
+            .collect();
+        filter.exact_rows = (0..=FINE)
+            .map(|row| {
+                std::array::from_fn(|k| {
+                    let value = filter.fine.get(row + k * FINE).copied().unwrap_or(1.0);
+                    value - if k >= HALF_WIDTH { 1.0 } else { 0.0 }
                 })
             })
             .collect();
@@ -68,6 +78,18 @@ impl Filter {
         let index = (place as usize).min(ROWS - 1);
         let weight = (place - index as f64) as f32;
         match self.rows.get(index..index + 2) {
+            Some([a, b]) => std::array::from_fn(|k| a[k] + (b[k] - a[k]) * weight),
+            _ => [0.0; WIDTH],
+        }
+    }
+
+    /// [`Filter::residual`] in `f64`, linear between rows of 1/4096 sample (error below 2e-8).
+    #[inline(always)]
+    pub fn exact_residual(&self, fraction: f64) -> [f64; WIDTH] {
+        let place = fraction * FINE as f64;
+        let index = (place as usize).min(FINE - 1);
+        let weight = place - index as f64;
+        match self.exact_rows.get(index..index + 2) {
             Some([a, b]) => std::array::from_fn(|k| a[k] + (b[k] - a[k]) * weight),
             _ => [0.0; WIDTH],
         }

@@ -3,7 +3,7 @@
 //! The only file of the generator with `unsafe`: each call enters a function compiled for
 //! instructions that [`Level::is_available`] found on this processor.
 
-use super::{Edge, Run, lanes};
+use super::{Edge, Run, exact, lanes};
 use crate::generator::stage::noise;
 use crate::gnss::samples::Format;
 
@@ -54,6 +54,38 @@ pub fn accumulate(level: Level, edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q:
         Level::Avx2 if level.is_available() => unsafe { accumulate_avx2(edge, run, i, q, wave) },
         _ => lanes::accumulate(edge, run, i, q, wave),
     }
+}
+
+/// [`exact::accumulate`] on one instruction set; the baseline where the processor lacks it.
+pub fn accumulate_exact(
+    level: Level,
+    edge: Edge<'_>,
+    run: &Run<'_>,
+    i: &mut [f32],
+    q: &mut [f32],
+    wave: &mut Vec<f64>,
+) {
+    match level {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the processor has these instructions.
+        Level::Avx512 if level.is_available() => unsafe { exact_avx512(edge, run, i, q, wave) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the processor has these instructions.
+        Level::Avx2 if level.is_available() => unsafe { exact_avx2(edge, run, i, q, wave) },
+        _ => exact::accumulate(edge, run, i, q, wave),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+fn exact_avx512(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32], wave: &mut Vec<f64>) {
+    exact::accumulate(edge, run, i, q, wave);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn exact_avx2(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32], wave: &mut Vec<f64>) {
+    exact::accumulate(edge, run, i, q, wave);
 }
 
 /// [`noise::add_block`] on one instruction set; the baseline where the processor lacks it.

@@ -2,18 +2,21 @@
 //!
 //! A [`Run`] is up to 4096 samples of one ray with constant carrier and code steps, both phases
 //! as fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
-//! [`reference`] evaluates each sample in `f64`; [`lanes`] is the fast kernel, plain lane-array
-//! code that [`isa`] compiles for each instruction set with the same bits on all.
+//! [`mod@reference`] evaluates each sample in `f64`, [`exact`] the same at speed; [`lanes`] is the fast
+//! kernel. Both are plain lane-array code that [`isa`] compiles for each instruction set with the same bits on all.
 //! Limits: 15 code steps a sample; lanes fall back to a wave buffer above one step a sample.
 
 pub mod band;
 pub mod chips;
+pub mod exact;
 pub mod isa;
 pub mod lanes;
 pub mod reference;
 pub mod transmitter;
 
 use band::Filter;
+
+use crate::generator::fidelity::Arithmetic;
 
 /// Longest run; the single-precision phasor of the fast kernel is re-anchored at least this often.
 pub const RUN_SAMPLES: usize = 4096;
@@ -49,10 +52,11 @@ pub enum Edge<'a> {
     BandLimited(&'a Filter),
 }
 
-/// How samples are made: the edge model and the instruction set.
+/// How samples are made: the edge model, the arithmetic and the instruction set.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel<'a> {
     pub edge: Edge<'a>,
+    pub arithmetic: Arithmetic,
     pub level: isa::Level,
 }
 

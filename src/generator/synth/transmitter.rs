@@ -7,6 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run, isa};
+use crate::generator::fidelity::Arithmetic;
 use crate::generator::knots::{Grid, Part, Path};
 use crate::generator::scene::Scene;
 use crate::generator::stream::GenerateError;
@@ -60,6 +61,7 @@ pub struct Transmitter {
 pub struct Scratch {
     bits: Vec<u64>,
     wave: Vec<f32>,
+    exact: Vec<f64>,
     anchor: Option<Anchor>,
 }
 
@@ -303,7 +305,10 @@ impl Transmitter {
                 turns_step: carrier.1,
                 amplitude: amplitude * sent.gain,
             };
-            isa::accumulate(kernel.level, kernel.edge, &run, i, q, &mut scratch.wave);
+            match kernel.arithmetic {
+                Arithmetic::F32 => isa::accumulate(kernel.level, kernel.edge, &run, i, q, &mut scratch.wave),
+                Arithmetic::F64 => isa::accumulate_exact(kernel.level, kernel.edge, &run, i, q, &mut scratch.exact),
+            }
         }
     }
 }

@@ -16,7 +16,7 @@ pub struct Row {
     pub velocity_mps: Option<Vector3<f64>>,
 }
 
-/// One equation: below·x[i−1] + middle·x[i] + above·x[i+1] = right.
+/// One equation: `below * x[i - 1] + middle * x[i] + above * x[i + 1] = right`.
 struct Equation {
     below: f64,
     middle: f64,

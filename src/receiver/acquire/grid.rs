@@ -1,10 +1,11 @@
 //! The search proper: correlation with every code phase at once by FFT, for every Doppler.
 //!
-//! A dwell is a coherent sum over whole code periods, correlated linearly: the data segment is one
-//! period longer than the replica and the FFT holds both, so no lag wraps around and each lag's sum
-//! begins at its own code period (a data bit can only turn where a period begins). Dwells begin where
-//! the code of that Doppler says, to a fraction of a sample, so neither a period of broken samples
-//! nor code Doppler smears their sum. Only the band of the code's main lobe goes back to lags.
+//! A dwell is a coherent sum over whole code periods. Each period is transformed by itself, from the sample at which
+//! the code of that Doppler says it begins, turned to a fraction of a sample, and the spectra are added, so neither a
+//! period of broken samples nor code Doppler smears the sum. Correlation is circular over one period: with a period
+//! that is no whole number of samples its seam is off by at most half a sample, and a data bit may turn anywhere
+//! within a dwell (it takes two thirds of that dwell's power on average). Only the band of the code's main lobe
+//! goes back to lags.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -13,6 +14,7 @@ use num_complex::Complex;
 use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
+use super::kernel;
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
 use super::threshold::{of_one_cell, threshold};
@@ -22,6 +24,8 @@ use crate::receiver::source::Block;
 
 /// Cells within this of a peak are not noise.
 const PEAK_CHIPS: f64 = 2.0;
+/// The band that goes back to lags, over the one asked for or that of the samples, is this at least.
+const BAND_SHARE: f64 = 0.98;
 
 /// Everything about one signal's search that does not depend on the samples.
 pub(super) struct Grid {
@@ -34,7 +38,6 @@ pub(super) struct Grid {
     carrier_hz: f64,
     coherent_periods: f64,
     sums: u32,
-    replica_samples: usize,
     pub dopplers_hz: Vec<f64>,
     /// Lags in one code period, and the samples between them.
     pub lags: usize,
@@ -80,11 +83,10 @@ impl Grid {
         let rate_hz = metadata.rate.hz();
         let period_samples = component.period_s() * rate_hz;
         let periods = f64::from(settings.coherent_periods);
-        let replica_samples = (periods * period_samples).round() as usize;
-        let length = fast_length(replica_samples + period_samples.ceil() as usize);
-        // The narrower band must be worth its trouble.
+        let length = (period_samples.round() as usize).max(2);
         let narrow = settings.cells_per_chip * component.chip_rate_hz / rate_hz * length as f64;
-        let band = if narrow < 0.8 * length as f64 { fast_length(narrow.ceil() as usize) } else { length };
+        // A hair of the band is given for a length that transforms faster.
+        let band = fast_length((BAND_SHARE * narrow.min(length as f64)).ceil() as usize);
         let lag_samples = length as f64 / band as f64;
         let step_hz = settings.doppler_step_cycles / (periods * component.period_s());
         let side = (settings.doppler_max_hz / step_hz).ceil() as i64;
@@ -103,7 +105,6 @@ impl Grid {
             carrier_hz: signal.carrier_hz,
             coherent_periods: periods,
             sums,
-            replica_samples,
             dopplers_hz,
             lags,
             lag_samples,
@@ -135,21 +136,26 @@ impl Grid {
         let mut buffer = vec![Complex::default(); self.forward.len()];
         // Scaled so that powers stay near one whatever the length.
         let scale = 1.0 / self.forward.len() as f64;
-        for (sample, mean) in
-            buffer.iter_mut().zip(replica.means(0.0, self.chips_per_sample)).take(self.replica_samples)
-        {
+        for (sample, mean) in buffer.iter_mut().zip(replica.means(0.0, self.chips_per_sample)) {
             *sample = Complex::new((mean * scale) as f32, 0.0);
         }
         self.forward.process(&mut buffer);
         self.band(&buffer).map(|(_, bin)| bin.conj()).collect()
     }
 
-    /// The bins within the band, with their signed numbers, in the order of the short transform.
+    /// The bins within the band, with their signed numbers, in the order of the short transform; zeros where the
+    /// long one has none.
     fn band<'a>(&self, spectrum: &'a [Complex<f32>]) -> impl Iterator<Item = (f64, Complex<f32>)> + 'a {
         let (length, band) = (spectrum.len(), self.inverse.len());
         let positive = band.div_ceil(2);
+        let reach = length.div_ceil(2);
         (0..band).map(move |n| {
-            if n < positive { (n as f64, spectrum[n]) } else { (n as f64 - band as f64, spectrum[length - band + n]) }
+            let (number, place, apart) = if n < positive {
+                (n as f64, n, n)
+            } else {
+                (n as f64 - band as f64, (length + n).saturating_sub(band), band - n)
+            };
+            (number, if apart < reach { spectrum[place] } else { Complex::default() })
         })
     }
 
@@ -171,8 +177,16 @@ impl Grid {
             self.forward.get_inplace_scratch_len().max(self.inverse.get_inplace_scratch_len())
         ];
         let mut long = vec![Complex::default(); self.forward.len()];
-        let dwells: Vec<Vec<Complex<f32>>> =
-            (0..self.sums).map(|dwell| self.dwell(block, scale, doppler_hz, dwell, &mut long, &mut scratch)).collect();
+        let periods = self.coherent_periods as u32;
+        let dwells: Vec<Vec<Complex<f32>>> = (0..self.sums)
+            .map(|dwell| {
+                let mut spectrum = vec![Complex::default(); self.inverse.len()];
+                for period in dwell * periods..(dwell + 1) * periods {
+                    self.add_period(block, scale, doppler_hz, period, (&mut long, &mut scratch), &mut spectrum);
+                }
+                spectrum
+            })
+            .collect();
         let mut short = vec![Complex::default(); self.inverse.len()];
         let mut powers = vec![0.0_f32; self.lags];
         spectra
@@ -180,38 +194,32 @@ impl Grid {
             .map(|spectrum| {
                 powers.fill(0.0);
                 for data in &dwells {
-                    for ((product, x), code) in short.iter_mut().zip(data).zip(*spectrum) {
-                        *product = x * code;
-                    }
+                    kernel::multiply(&mut short, data, spectrum);
                     self.inverse.process_with_scratch(&mut short, &mut scratch);
-                    for (power, r) in powers.iter_mut().zip(&short) {
-                        *power += r.norm_sqr();
-                    }
+                    kernel::add_powers(&mut powers, &short);
                 }
                 self.strip(&powers)
             })
             .collect()
     }
 
-    /// The spectrum of one dwell's samples with carrier removed, shifted to where the dwell begins.
-    fn dwell(
+    /// Adds the spectrum of one code period with carrier removed, turned to where the period begins.
+    fn add_period(
         &self,
         block: &Block,
         scale: f64,
         doppler_hz: f64,
-        dwell: u32,
-        long: &mut [Complex<f32>],
-        scratch: &mut [Complex<f32>],
-    ) -> Vec<Complex<f32>> {
-        let begins =
-            f64::from(dwell) * self.coherent_periods * self.period_samples / (1.0 + doppler_hz / self.carrier_hz);
+        period: u32,
+        (long, scratch): (&mut [Complex<f32>], &mut [Complex<f32>]),
+        spectrum: &mut [Complex<f32>],
+    ) {
+        let begins = f64::from(period) * self.period_samples / (1.0 + doppler_hz / self.carrier_hz);
         let first = begins.round();
         let fraction = begins - first;
-        let samples = self.replica_samples + self.period_samples.ceil() as usize;
         let step = self.phasor(-self.frequency_hz(doppler_hz), 1);
-        let mut rotation = Complex::new(scale, 0.0);
+        let mut rotation = self.phasor(-self.frequency_hz(doppler_hz), first as u64) * scale;
         long.fill(Complex::default());
-        let data = block.i.iter().zip(block.q).skip(first as usize).take(samples);
+        let data = block.i.iter().zip(block.q).skip(first as usize);
         for (out, (i, q)) in long.iter_mut().zip(data) {
             let x = Complex::new(f64::from(*i), f64::from(*q)) * rotation;
             *out = Complex::new(x.re as f32, x.im as f32);
@@ -224,15 +232,13 @@ impl Grid {
         };
         let (turn, mut ramp) = (shift(1.0), Complex::default());
         let negative_begins = self.inverse.len().div_ceil(2);
-        let mut spectrum = Vec::with_capacity(self.inverse.len());
-        for (index, (number, bin)) in self.band(long).enumerate() {
+        for (index, (sum, (number, bin))) in spectrum.iter_mut().zip(self.band(long)).enumerate() {
             if index == 0 || index == negative_begins {
                 ramp = shift(number);
             }
-            spectrum.push(bin * Complex::new(ramp.re as f32, ramp.im as f32));
+            *sum += bin * Complex::new(ramp.re as f32, ramp.im as f32);
             ramp *= turn;
         }
-        spectrum
     }
 
     fn strip(&self, powers: &[f32]) -> Strip {
@@ -308,11 +314,11 @@ impl Grid {
     }
 }
 
-/// The smallest even product of 2, 3 and 5 that is not below `least`.
+/// The smallest product of 2, 3 and 5 that is a multiple of 16 and not below `least`.
 fn fast_length(least: usize) -> usize {
-    let least = least.max(2);
-    (least.next_multiple_of(2)..)
-        .step_by(2)
+    let least = least.next_multiple_of(16).max(16);
+    (least..)
+        .step_by(16)
         .find(|&n| {
             let mut rest = n;
             for prime in [2, 3, 5] {

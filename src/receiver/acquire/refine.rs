@@ -11,6 +11,7 @@ use rustfft::FftPlanner;
 use super::grid::Grid;
 use super::replica::Replica;
 use crate::gnss::signal::Component;
+use crate::receiver::correlate::{Nco, TURN, chips_to_units};
 use crate::receiver::source::Block;
 
 /// Correlators that measure the noise.
@@ -51,17 +52,16 @@ pub(super) fn refine(
     let doppler_hz = correlators.fine_doppler_hz(phase, coarse.doppler_hz);
 
     let noise_offsets = quiet_offsets(replica, component.code_chips);
-    let noise = mean(correlators.powers(phase, doppler_hz, &noise_offsets));
+    let noise = mean(noise_offsets.iter().map(|&offset| correlators.powers(phase, doppler_hz, &[offset])[0]));
     // BPSK triangle of one chip to either side: (early - late) / (early + late) is twice the error.
     let reach = 0.5 / component.shape.pulse.len().max(1) as f64;
     let mut power = 0.0;
     for _ in 0..3 {
         let taps = correlators.powers(phase, doppler_hz, &[reach, 0.0, -reach]);
-        let amplitude = |n: usize| taps.get(n).map_or(0.0, |p| (p - noise).max(0.0).sqrt());
-        power = taps.get(1).copied().unwrap_or(0.0);
-        let sum = amplitude(0) + amplitude(2);
-        if sum > 0.0 {
-            phase += reach * (amplitude(0) - amplitude(2)) / sum;
+        let [early, _, late] = taps.map(|power| (power - noise).max(0.0).sqrt());
+        power = taps[1];
+        if early + late > 0.0 {
+            phase += reach * (early - late) / (early + late);
         }
     }
     let measured = if noise > 0.0 { (power / noise - 1.0) / component.period_s() } else { 0.0 };
@@ -72,46 +72,48 @@ pub(super) fn refine(
     }
 }
 
-fn mean(values: Vec<f64>) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    values.sum::<f64>() / count
+}
+
+/// Turns without their whole number, in 2⁻⁶⁴ turns.
+fn fraction_of_turn(turns: f64) -> u64 {
+    ((turns - turns.round()) * TURN) as i64 as u64
 }
 
 impl Correlators<'_> {
     /// Prompt sums over whole code periods with the replica ahead by `offsets` chips: `[offset][period]`.
-    fn sums(&self, phase_chips: f64, doppler_hz: f64, offsets: &[f64]) -> Vec<Vec<Complex<f64>>> {
+    fn sums<const T: usize>(&self, phase_chips: f64, doppler_hz: f64, offsets: &[f64; T]) -> [Vec<Complex<f64>>; T] {
         let step = self.grid.received_chips_per_sample(doppler_hz);
-        let frequency_hz = self.grid.frequency_hz(doppler_hz);
-        let turn = self.grid.phasor(-frequency_hz, 1);
-        let mut sums = vec![Vec::with_capacity(self.periods); offsets.len()];
+        let turns = self.grid.frequency_hz(doppler_hz) / self.grid.rate_hz;
+        let units = |chips: f64| chips_to_units(chips * self.replica.steps_per_chip());
+        let taps = offsets.map(units);
+        let mut sums = offsets.map(|_| Vec::with_capacity(self.periods));
         let begin = |period: usize| ((((period + 1) as f64) * self.code_chips - phase_chips) / step).ceil() as usize;
-        let mut carrier_free = Vec::new();
         for period in 0..self.periods {
             let (from, to) = (begin(period), begin(period + 1));
             let (Some(i), Some(q)) = (self.block.i.get(from..to), self.block.q.get(from..to)) else { break };
-            let mut rotation = self.grid.phasor(-frequency_hz, from as u64);
-            carrier_free.clear();
-            for (i, q) in i.iter().zip(q) {
-                carrier_free.push(Complex::new(f64::from(*i), f64::from(*q)) * rotation);
-                rotation *= turn;
-            }
-            // Code phase within the period, so that its resolution does not fall with the length of the block.
-            let start = phase_chips + from as f64 * step - (period + 1) as f64 * self.code_chips;
-            for (sum, offset) in sums.iter_mut().zip(offsets) {
-                let replica = self.replica.means(start + offset - 0.5 * step, step);
-                sum.push(carrier_free.iter().zip(replica).map(|(x, c)| x * c).sum());
-            }
+            let nco = Nco {
+                carrier: fraction_of_turn(turns * from as f64),
+                carrier_step: fraction_of_turn(turns),
+                // Code phase within the period, so that its resolution does not fall with the length of the block.
+                code: units(phase_chips + from as f64 * step - (period + 1) as f64 * self.code_chips),
+                code_step: units(step) as u64,
+            };
+            let taps = self.replica.correlator().correlate(i, q, &nco, &taps);
+            sums.iter_mut().zip(taps).for_each(|(sum, tap)| sum.push(tap));
         }
         sums
     }
 
-    fn powers(&self, phase_chips: f64, doppler_hz: f64, offsets: &[f64]) -> Vec<f64> {
-        let sums = self.sums(phase_chips, doppler_hz, offsets);
-        sums.into_iter().map(|sum| mean(sum.iter().map(|s: &Complex<f64>| s.norm_sqr()).collect())).collect()
+    fn powers<const T: usize>(&self, phase_chips: f64, doppler_hz: f64, offsets: &[f64; T]) -> [f64; T] {
+        self.sums(phase_chips, doppler_hz, offsets).map(|sum| mean(sum.iter().map(|s| s.norm_sqr())))
     }
 
     fn fine_doppler_hz(&self, phase_chips: f64, coarse_hz: f64) -> f64 {
         let period_s = self.grid.period_samples / self.grid.rate_hz;
-        let prompts = self.sums(phase_chips, coarse_hz, &[0.0]).pop().unwrap_or_default();
+        let [prompts] = self.sums(phase_chips, coarse_hz, &[0.0]);
         if prompts.len() < 2 {
             return coarse_hz;
         }
@@ -122,7 +124,7 @@ impl Correlators<'_> {
         for alias in [0.0, -1.0, 1.0] {
             let doppler_hz = coarse_hz + self.grid.doppler_sign() * (residual_hz + alias * spacing_hz);
             if (doppler_hz - coarse_hz).abs() <= spacing_hz {
-                let power = self.powers(phase_chips, doppler_hz, &[0.0]).first().copied().unwrap_or(0.0);
+                let [power] = self.powers(phase_chips, doppler_hz, &[0.0]);
                 if power > best.0 {
                     best = (power, doppler_hz);
                 }

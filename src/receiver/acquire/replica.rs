@@ -4,14 +4,23 @@
 //! says and not on the nearest sample; any chip shape made of equal steps works.
 
 use crate::gnss::signal::Component;
+use crate::receiver::correlate::{self, Edge};
 
 /// The running integral of one code period, in steps of the chip's shape.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Replica {
     /// Integral at each step's beginning, and at the end.
     integral: Vec<f64>,
     levels: Vec<f64>,
     steps_per_chip: f64,
+    /// The same steps for the tracking correlator.
+    correlator: correlate::Replica,
+}
+
+impl PartialEq for Replica {
+    fn eq(&self, other: &Self) -> bool {
+        self.levels == other.levels && self.steps_per_chip == other.steps_per_chip
+    }
 }
 
 impl Replica {
@@ -30,7 +39,17 @@ impl Replica {
                 Some(*sum)
             }))
             .collect();
-        (!levels.is_empty()).then_some(Self { integral, levels, steps_per_chip: pulse.len() as f64 })
+        let correlator = correlate::Replica::new(levels.iter().map(|&level| level < 0.0).collect(), Edge::Area)?;
+        Some(Self { integral, levels, steps_per_chip: pulse.len() as f64, correlator })
+    }
+
+    /// For correlation with phases in steps of the chip's shape.
+    pub fn correlator(&self) -> &correlate::Replica {
+        &self.correlator
+    }
+
+    pub fn steps_per_chip(&self) -> f64 {
+        self.steps_per_chip
     }
 
     /// Integral of the periodic code from phase 0, in steps.

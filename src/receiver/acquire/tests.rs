@@ -226,8 +226,8 @@ fn detection_probability(value: f64, degrees: u32, noncentrality: f64) -> f64 {
 
 #[test]
 fn detections_come_as_often_as_theory_says() {
-    // Two samples a chip, Doppler on the grid and code phase on a cell: no loss but the data bit, which
-    // here turns after 7 periods where a dwell of one period ends.
+    // Two samples a chip, Doppler on the grid and code phase on a cell: no loss, for the data bit turns where the seventh
+    // dwell of one period ends but for a quarter of a chip.
     let metadata = metadata(Format::Ci8, 2.046e6, 0.0, false);
     let settings = AcquisitionSettings {
         doppler_max_hz: 500.0,
@@ -243,12 +243,12 @@ fn detections_come_as_often_as_theory_says() {
         let mut limit = 0.0;
         for seed in 0..trials {
             // A replica's sample stands for the middle of half a chip.
-            let sent = Sent { prn: 9, doppler_hz: 0.0, phase_chips: 200.25, cn0_dbhz };
+            let sent = Sent { prn: 9, doppler_hz: 0.0, phase_chips: 0.25, cn0_dbhz };
             let recording = record(metadata.clone(), samples, &[sent], 5000 + seed);
             let block = Block { first: 0, i: &recording.i, q: &recording.q };
             let rows = searcher.search(&block, &[(&L1_CA, Sv::gps(9))]).unwrap();
             limit = rows[0].0.threshold;
-            let here = rows[0].1.is_some_and(|hit| difference_chips(hit.code_phase_chips, 200.25).abs() < 1.0);
+            let here = rows[0].1.is_some_and(|hit| difference_chips(hit.code_phase_chips, 0.25).abs() < 1.0);
             found += u32::from(here);
         }
         let noncentrality = 2.0 * 10.0 * libm::pow(10.0, cn0_dbhz / 10.0) * 1e-3;

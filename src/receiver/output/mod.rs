@@ -1,5 +1,9 @@
-//! Where the receiver writes what it finds: one CSV file a kind of row, and its settings.
+//! What a receiver writes: one CSV file a kind of record, and `receiver.json` with what it was told.
+//!
+//! Rows go out as they come, so memory stays flat. Headers are written at once: a file without rows says that there were
+//! none, a missing file that nothing ran.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
@@ -8,10 +12,8 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::gnss::record::{AcquisitionRow, EventRow, Fix, NavigationRow, Observation, TrackingRow};
-use crate::gnss::samples::IfMetadata;
-use crate::receiver::settings::Settings;
 
-/// An output that could not be created or written.
+/// A file that could not be made or written.
 #[derive(Debug, Error)]
 pub enum OutputError {
     #[error("cannot create {}: {error}", path.display())]
@@ -20,77 +22,124 @@ pub enum OutputError {
     Write { path: PathBuf, error: std::io::Error },
 }
 
-/// The files of one run of the receiver.
-pub struct Output {
-    directory: PathBuf,
-    observations: Table<Observation>,
-    fixes: Table<Fix>,
-    acquisition: Table<AcquisitionRow>,
-    tracking: Table<TrackingRow>,
-    navigation: Table<NavigationRow>,
-    events: Table<EventRow>,
+fn create_error(path: &Path, error: std::io::Error) -> OutputError {
+    OutputError::Create { path: path.to_owned(), error }
 }
 
-impl Output {
-    /// Creates the files in `directory`, which is made if it does not exist.
-    ///
-    /// # Errors
-    /// [`OutputError::Create`] with the path.
-    pub fn create(directory: &Path) -> Result<Self, OutputError> {
-        fs::create_dir_all(directory).map_err(|error| OutputError::Create { path: directory.to_owned(), error })?;
-        Ok(Self {
-            directory: directory.to_owned(),
-            observations: Table::create(
-                directory.join("observations.csv"),
-                "sample,sv,signal,sent_s,sent_fraction_s,pseudorange_m,carrier_cycles,doppler_hz,cn0_dbhz,locked_s",
-            )?,
-            fixes: Table::create(
-                directory.join("fixes.csv"),
-                "sample,gps_s,gps_fraction_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,clock_bias_s,clock_drift,sigma_east_m,\
-                 sigma_north_m,sigma_up_m,sigma_clock_m,gdop,pdop,hdop,vdop,tdop,satellites,chi_square,excluded,ionosphere",
-            )?,
-            acquisition: Table::create(
-                directory.join("acquisition.csv"),
-                "sample,sv,signal,acquired,statistic,threshold,doppler_hz,code_phase_chips,cn0_dbhz",
-            )?,
-            tracking: Table::create(
-                directory.join("tracking.csv"),
-                "sample,sv,signal,prompt_i,prompt_q,dll_discriminator_chips,pll_discriminator_cycles,\
-                 fll_discriminator_hz,cn0_dbhz,phase_lock,integration_s",
-            )?,
-            navigation: Table::create(directory.join("navigation.csv"), "sv,issue,parameter,raw")?,
-            events: Table::create(directory.join("events.csv"), "sample,sv,signal,event")?,
-        })
+fn write_error(path: &Path, error: std::io::Error) -> OutputError {
+    OutputError::Write { path: path.to_owned(), error }
+}
+
+/// One CSV file.
+struct Sheet {
+    path: PathBuf,
+    writer: csv::Writer<BufWriter<File>>,
+}
+
+impl Sheet {
+    fn create(directory: &Path, name: &str, header: &[&str]) -> Result<Self, OutputError> {
+        let path = directory.join(name);
+        let file = File::create(&path).map_err(|error| create_error(&path, error))?;
+        let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(BufWriter::new(file));
+        writer.write_record(header).map_err(|error| write_error(&path, error.into()))?;
+        Ok(Self { path, writer })
     }
 
-    /// Writes `receiver.json`: the settings and what the metadata said.
-    pub fn describe(&mut self, metadata: &IfMetadata, settings: &Settings) -> Result<(), OutputError> {
-        #[derive(Serialize)]
-        struct Description<'a> {
-            program: &'static str,
-            version: &'static str,
-            format: &'static str,
-            sample_rate_hz: f64,
-            center_hz: f64,
-            inverted: bool,
-            start: Option<String>,
-            settings: &'a Settings,
-        }
-        let description = Description {
-            program: env!("CARGO_PKG_NAME"),
-            version: env!("CARGO_PKG_VERSION"),
-            format: metadata.format.name(),
-            sample_rate_hz: metadata.rate.hz(),
-            center_hz: metadata.center_hz,
-            inverted: metadata.inverted,
-            start: metadata.start.map(|start| start.to_string()),
-            settings,
-        };
-        let path = self.directory.join("receiver.json");
-        serde_json::to_string_pretty(&description)
-            .map_err(std::io::Error::from)
-            .and_then(|text| fs::write(&path, text + "\n"))
-            .map_err(|error| OutputError::Write { path, error })
+    fn write<T: Serialize>(&mut self, row: &T) -> Result<(), OutputError> {
+        self.writer.serialize(row).map_err(|error| write_error(&self.path, error.into()))
+    }
+
+    fn flush(&mut self) -> Result<(), OutputError> {
+        self.writer.flush().map_err(|error| write_error(&self.path, error))
+    }
+}
+
+/// All files of one reception.
+pub struct Output {
+    directory: PathBuf,
+    observations: Sheet,
+    fixes: Sheet,
+    acquisition: Sheet,
+    tracking: Sheet,
+    navigation: Sheet,
+    events: Sheet,
+    /// Parameters written so far: those of one issue are written once.
+    parameters: BTreeSet<NavigationRow>,
+}
+
+const OBSERVATIONS: [&str; 10] = [
+    "sample",
+    "sv",
+    "signal",
+    "sent_s",
+    "sent_fraction_s",
+    "pseudorange_m",
+    "carrier_cycles",
+    "doppler_hz",
+    "cn0_dbhz",
+    "locked_s",
+];
+const FIXES: [&str; 24] = [
+    "sample",
+    "gps_s",
+    "gps_fraction_s",
+    "x_m",
+    "y_m",
+    "z_m",
+    "vx_mps",
+    "vy_mps",
+    "vz_mps",
+    "clock_bias_s",
+    "clock_drift",
+    "sigma_east_m",
+    "sigma_north_m",
+    "sigma_up_m",
+    "sigma_clock_m",
+    "gdop",
+    "pdop",
+    "hdop",
+    "vdop",
+    "tdop",
+    "satellites",
+    "chi_square",
+    "excluded",
+    "ionosphere",
+];
+const ACQUISITION: [&str; 9] =
+    ["sample", "sv", "signal", "acquired", "statistic", "threshold", "doppler_hz", "code_phase_chips", "cn0_dbhz"];
+const TRACKING: [&str; 11] = [
+    "sample",
+    "sv",
+    "signal",
+    "prompt_i",
+    "prompt_q",
+    "dll_discriminator_chips",
+    "pll_discriminator_cycles",
+    "fll_discriminator_hz",
+    "cn0_dbhz",
+    "phase_lock",
+    "integration_s",
+];
+const NAVIGATION: [&str; 4] = ["sv", "issue", "parameter", "raw"];
+const EVENTS: [&str; 4] = ["sample", "sv", "signal", "event"];
+
+impl Output {
+    /// Creates the directory, if it is not there, and the files in it.
+    ///
+    /// # Errors
+    /// [`OutputError::Create`] with the path that cannot be made.
+    pub fn create(directory: &Path) -> Result<Self, OutputError> {
+        fs::create_dir_all(directory).map_err(|error| create_error(directory, error))?;
+        Ok(Self {
+            directory: directory.to_owned(),
+            observations: Sheet::create(directory, "observations.csv", &OBSERVATIONS)?,
+            fixes: Sheet::create(directory, "fixes.csv", &FIXES)?,
+            acquisition: Sheet::create(directory, "acquisition.csv", &ACQUISITION)?,
+            tracking: Sheet::create(directory, "tracking.csv", &TRACKING)?,
+            navigation: Sheet::create(directory, "navigation.csv", &NAVIGATION)?,
+            events: Sheet::create(directory, "events.csv", &EVENTS)?,
+            parameters: BTreeSet::new(),
+        })
     }
 
     /// Writes an observation.
@@ -108,14 +157,9 @@ impl Output {
         self.acquisition.write(row)
     }
 
-    /// Writes the state of a tracking loop.
+    /// Writes the state of a loop.
     pub fn tracking(&mut self, row: &TrackingRow) -> Result<(), OutputError> {
         self.tracking.write(row)
-    }
-
-    /// Writes a decoded parameter.
-    pub fn navigation(&mut self, row: &NavigationRow) -> Result<(), OutputError> {
-        self.navigation.write(row)
     }
 
     /// Writes an event.
@@ -123,70 +167,78 @@ impl Output {
         self.events.write(row)
     }
 
-    /// Brings everything to the files.
-    pub fn finish(&mut self) -> Result<(), OutputError> {
-        self.observations.flush()?;
-        self.fixes.flush()?;
-        self.acquisition.flush()?;
-        self.tracking.flush()?;
-        self.navigation.flush()?;
-        self.events.flush()
-    }
-}
-
-/// A CSV file of one kind of row; its header is there even when no row is.
-struct Table<T> {
-    path: PathBuf,
-    writer: csv::Writer<BufWriter<File>>,
-    row: std::marker::PhantomData<fn(&T)>,
-}
-
-impl<T: Serialize> Table<T> {
-    fn create(path: PathBuf, header: &str) -> Result<Self, OutputError> {
-        let file = File::create(&path).map_err(|error| OutputError::Create { path: path.clone(), error })?;
-        let writer = csv::WriterBuilder::new().has_headers(false).from_writer(BufWriter::new(file));
-        let mut table = Self { path, writer, row: std::marker::PhantomData };
-        let header = table.writer.write_record(header.split(',')).map_err(std::io::Error::from);
-        table.check(header)?;
-        Ok(table)
+    /// Writes decoded parameters, each but once.
+    pub fn navigation(&mut self, rows: &[NavigationRow]) -> Result<(), OutputError> {
+        for row in rows {
+            if self.parameters.insert(row.clone()) {
+                self.navigation.write(row)?;
+            }
+        }
+        Ok(())
     }
 
-    fn write(&mut self, row: &T) -> Result<(), OutputError> {
-        let written = self.writer.serialize(row).map_err(std::io::Error::from);
-        self.check(written)
-    }
-
-    fn flush(&mut self) -> Result<(), OutputError> {
-        let flushed = self.writer.flush();
-        self.check(flushed)
-    }
-
-    fn check(&self, result: std::io::Result<()>) -> Result<(), OutputError> {
-        result.map_err(|error| OutputError::Write { path: self.path.clone(), error })
+    /// Writes what is buffered, and `receiver.json`.
+    pub fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
+        for sheet in [
+            &mut self.observations,
+            &mut self.fixes,
+            &mut self.acquisition,
+            &mut self.tracking,
+            &mut self.navigation,
+            &mut self.events,
+        ] {
+            sheet.flush()?;
+        }
+        let path = self.directory.join("receiver.json");
+        let text = serde_json::to_string_pretty(summary).unwrap_or_default() + "\n";
+        fs::write(&path, text).map_err(|error| write_error(&path, error))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::record::Event;
     use crate::gnss::satellite::Sv;
 
+    /// A row written under the header that serde would have written.
+    fn header<T: Serialize>(row: &T) -> String {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.serialize(row).unwrap();
+        let text = String::from_utf8(writer.into_inner().unwrap()).unwrap();
+        text.lines().next().unwrap().to_owned()
+    }
+
     #[test]
-    fn headers_stand_above_rows_and_alone_where_there_is_none() {
-        let directory = tempfile::tempdir().unwrap();
-        let mut output = Output::create(&directory.path().join("rx")).unwrap();
-        let row = NavigationRow { sv: Sv::gps(5), issue: 7, parameter: "toe_s".into(), raw: -3 };
-        output.navigation(&row).unwrap();
-        output.finish().unwrap();
-        let mut reader = csv::Reader::from_path(directory.path().join("rx/navigation.csv")).unwrap();
-        let rows: Vec<NavigationRow> = reader.deserialize().map(Result::unwrap).collect();
-        assert_eq!(rows, [row]);
-        for (name, columns) in
-            [("observations", 10), ("fixes", 24), ("acquisition", 9), ("tracking", 11), ("events", 4)]
-        {
-            let text = fs::read_to_string(directory.path().join(format!("rx/{name}.csv"))).unwrap();
-            assert_eq!(text.lines().count(), 1);
-            assert_eq!(text.trim().split(',').count(), columns, "{name}");
-        }
+    fn headers_are_the_names_of_the_records_fields() {
+        let sv = Sv::gps(3);
+        let zero = |n: usize| vec!["0"; n].join(",");
+        let observation: Observation = from_csv(&OBSERVATIONS, &format!("0,G03,{},{}", L1_CA.name, zero(7)));
+        assert_eq!(header(&observation), OBSERVATIONS.join(","));
+        let fix: Fix = from_csv(&FIXES, &format!("{},,true", zero(22)));
+        assert_eq!(header(&fix), FIXES.join(","));
+        let row: AcquisitionRow = from_csv(&ACQUISITION, &format!("0,G03,{},true,{}", L1_CA.name, zero(5)));
+        assert_eq!(header(&row), ACQUISITION.join(","));
+        let row: TrackingRow = from_csv(&TRACKING, &format!("0,G03,{},{}", L1_CA.name, zero(8)));
+        assert_eq!(header(&row), TRACKING.join(","));
+        let row = NavigationRow { sv, issue: 1, parameter: "x".into(), raw: 0 };
+        assert_eq!(header(&row), NAVIGATION.join(","));
+        let row = EventRow { sample: 0, sv, signal: &L1_CA, event: Event::Acquired };
+        assert_eq!(header(&row), EVENTS.join(","));
+    }
+
+    fn from_csv<T: serde::de::DeserializeOwned>(names: &[&str], row: &str) -> T {
+        let text = format!("{}\n{row}\n", names.join(","));
+        csv::Reader::from_reader(text.as_bytes()).deserialize().next().unwrap().unwrap()
+    }
+
+    #[test]
+    fn what_cannot_be_made_is_an_error_with_its_path() {
+        let place = tempfile::tempdir().unwrap();
+        let file = place.path().join("taken");
+        fs::write(&file, "x").unwrap();
+        let error = Output::create(&file.join("rx")).err().unwrap().to_string();
+        assert!(error.contains("taken"), "{error}");
     }
 }

@@ -1,1 +1,230 @@
+use nalgebra::{Vector3, Vector4};
 
+use super::least_squares::{Corrections, Ionosphere, Range, position};
+use super::{NoFix, chi_square_threshold, consistent};
+use crate::gnss::broadcast::{ClockState, State};
+use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS, rotate_earth};
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+/// Azimuth and elevation in degrees of a reference sky with known dilutions of precision.
+const SKY: [(f64, f64); 10] = [
+    (20.0, 75.0),
+    (65.0, 42.0),
+    (110.0, 18.0),
+    (150.0, 55.0),
+    (190.0, 33.0),
+    (225.0, 12.0),
+    (260.0, 63.0),
+    (300.0, 25.0),
+    (335.0, 48.0),
+    (15.0, 9.0),
+];
+const BARE: Corrections = Corrections { ionosphere: Ionosphere::Absent, troposphere: false, model_sigma_m: 1e-6 };
+
+fn place() -> Geodetic {
+    Geodetic::from_degrees(26.5, 80.2, 130.0)
+}
+
+/// Ranges to satellites in these directions, with unit noise and a receiver clock ahead by `bias_s`.
+fn ranges(sky: &[(f64, f64)], bias_s: f64) -> Vec<Range> {
+    let here_m = place().to_ecef();
+    let axes = place().ecef_to_enu().transpose();
+    sky.iter()
+        .zip(1..)
+        .map(|(&(azimuth_deg, elevation_deg), prn)| {
+            let (azimuth, elevation) = (f64::to_radians(azimuth_deg), f64::to_radians(elevation_deg));
+            let level = libm::cos(elevation);
+            let direction =
+                axes * Vector3::new(level * libm::sin(azimuth), level * libm::cos(azimuth), libm::sin(elevation));
+            let distance_m = 2.2e7 + 1e5 * f64::from(prn);
+            let travel_s = distance_m / SPEED_OF_LIGHT_MPS;
+            let clock = ClockState { offset_s: 1e-4 * f64::from(prn), drift: 0.0 };
+            Range {
+                sv: Sv::gps(prn),
+                // Back into the axes of the instant of emission.
+                satellite: State {
+                    position_m: rotate_earth(&(here_m + distance_m * direction), -travel_s),
+                    velocity_mps: Vector3::zeros(),
+                },
+                clock,
+                emitted: Epoch::from_week(1590, 374_400.0),
+                pseudorange_m: distance_m + SPEED_OF_LIGHT_MPS * (bias_s - clock.offset_s),
+                doppler_hz: 0.0,
+                carrier_hz: 1_575.42e6,
+                noise_m: 1.0,
+                cn0_hz: 1e4,
+            }
+        })
+        .collect()
+}
+
+/// Sums of twelve uniforms from a seeded generator.
+fn noise(state: &mut u64) -> f64 {
+    (0..12)
+        .map(|_| {
+            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (*state >> 11) as f64 / (1_u64 << 53) as f64
+        })
+        .sum::<f64>()
+        - 6.0
+}
+
+#[test]
+fn from_the_earth_s_centre_a_position_is_found_in_eight_iterations() {
+    let found = position(&ranges(&SKY, 1e-3), Vector3::zeros(), &BARE).unwrap();
+    assert!(found.iterations <= 8, "{}", found.iterations);
+    assert!((found.position_m - place().to_ecef()).norm() < 2e-5);
+    assert!((found.clock_m / SPEED_OF_LIGHT_MPS - 1e-3).abs() < 1e-13);
+}
+
+#[test]
+fn the_reference_sky_has_the_reference_dilutions_of_precision() {
+    let found = position(&ranges(&SKY, 0.0), Vector3::zeros(), &BARE).unwrap();
+    let axes = place().ecef_to_enu();
+    let local = axes * found.dilution.fixed_view::<3, 3>(0, 0) * axes.transpose();
+    let tdop = found.dilution[(3, 3)].sqrt();
+    let hdop = (local[(0, 0)] + local[(1, 1)]).sqrt();
+    // Printed to three digits.
+    for (have, expected) in
+        [(hdop, 0.822), (local[(2, 2)].sqrt(), 1.152), (tdop, 0.732), (found.dilution.trace().sqrt(), 1.593)]
+    {
+        assert!((have - expected).abs() < 1e-3, "{have} {expected}");
+    }
+}
+
+#[test]
+fn a_clock_bias_of_eleven_milliseconds_does_not_move_the_position() {
+    // A rotation by the raw pseudorange would move it 4.6 m east.
+    let found = position(&ranges(&SKY, 0.011), Vector3::zeros(), &BARE).unwrap();
+    assert!((found.position_m - place().to_ecef()).norm() < 2e-5);
+}
+
+#[test]
+fn three_satellites_and_a_cone_of_satellites_give_no_position() {
+    let three = position(&ranges(&SKY[..3], 0.0), Vector3::zeros(), &BARE);
+    assert_eq!(three.err(), Some(NoFix::TooFew { have: 3, need: 4 }));
+    let cone: Vec<(f64, f64)> = (0..6).map(|k| (60.0 * f64::from(k), 40.0)).collect();
+    // From nearby, where the directions lie on the cone.
+    let singular = position(&ranges(&cone, 0.0), place().to_ecef(), &BARE);
+    assert!(matches!(singular, Err(NoFix::Singular { .. })), "{singular:?}");
+    let flat = [(0.0, 20.0), (0.0, 50.0), (0.0, 80.0), (180.0, 60.0), (180.0, 30.0)];
+    let singular = position(&ranges(&flat, 0.0), place().to_ecef(), &BARE);
+    assert!(matches!(singular, Err(NoFix::Singular { .. })), "{singular:?}");
+}
+
+#[test]
+fn a_fault_of_sixty_metres_on_any_satellite_is_found_and_left_out() {
+    for faulty in 0..SKY.len() {
+        let mut all = ranges(&SKY, 1e-4);
+        all[faulty].pseudorange_m += 60.0;
+        let name = all[faulty].sv;
+        let (kept, solution, excluded) = consistent(all, Vector3::zeros(), &BARE, 1e-3).unwrap();
+        assert_eq!(excluded.iter().map(|(sv, _)| *sv).collect::<Vec<_>>(), vec![name]);
+        assert_eq!(kept.len(), SKY.len() - 1);
+        assert!((solution.position_m - place().to_ecef()).norm() < 2e-5);
+    }
+}
+
+#[test]
+fn with_five_satellites_a_fault_is_seen_but_gives_no_position() {
+    let mut five = ranges(&SKY[..5], 0.0);
+    five[2].pseudorange_m += 200.0;
+    let found = consistent(five, Vector3::zeros(), &BARE, 1e-3);
+    assert!(matches!(found, Err(NoFix::Inconsistent { .. })), "{found:?}");
+}
+
+#[test]
+fn thresholds_are_those_of_the_chi_square_tables() {
+    for (freedom, expected) in (1..).zip([10.828, 13.816, 16.266, 18.467, 20.515, 22.458]) {
+        assert!((chi_square_threshold(freedom, 1e-3) - expected).abs() < 5e-4);
+    }
+}
+
+#[test]
+fn residuals_and_positions_have_the_stated_statistics() {
+    let truth_m = place().to_ecef();
+    let (mut state, runs) = (11, 4000);
+    let (mut sum, mut above, mut nees) = (0.0, 0, 0.0);
+    for _ in 0..runs {
+        let mut noisy = ranges(&SKY, 0.0);
+        noisy.iter_mut().for_each(|range| range.pseudorange_m += noise(&mut state));
+        let found = position(&noisy, truth_m, &BARE).unwrap();
+        sum += found.chi_square;
+        above += usize::from(found.chi_square > chi_square_threshold(6, 1e-2));
+        let miss = found.position_m - truth_m;
+        let error = Vector4::new(miss.x, miss.y, miss.z, found.clock_m);
+        nees += (error.transpose() * found.covariance.try_inverse().unwrap() * error)[(0, 0)];
+    }
+    let runs = f64::from(runs);
+    // Six degrees of freedom: variance 12 a run; four deviations of the mean. Four for position and clock: variance 8.
+    assert!((sum / runs - 6.0).abs() < 4.0 * (12.0 / runs).sqrt(), "{}", sum / runs);
+    assert!((nees / runs - 4.0).abs() < 4.0 * (8.0 / runs).sqrt(), "{}", nees / runs);
+    // 40 expected, deviation 6.3; sums of twelve uniforms have slightly light tails.
+    assert!((15..=65).contains(&above), "{above}");
+}
+
+#[cfg(feature = "generator")]
+mod with_real_orbits {
+    use super::*;
+    use crate::gnss::broadcast::Ephemeris;
+    use crate::gnss::rinex;
+    use crate::receiver::position::least_squares::velocity;
+
+    /// When a satellite sent what arrives at `seconds` after `start` at a place that moves, by its clock, relative to `start`.
+    fn sent_s(ephemeris: &Ephemeris, start: Epoch, seconds: f64, here_m: Vector3<f64>) -> (f64, f64) {
+        let mut travel_s = 0.075;
+        for _ in 0..6 {
+            let state = ephemeris.state(start.plus_s(seconds - travel_s)).unwrap();
+            travel_s = (rotate_earth(&state.position_m, travel_s) - here_m).norm() / SPEED_OF_LIGHT_MPS;
+        }
+        let clock = ephemeris.clock_l1(start.plus_s(seconds - travel_s)).unwrap();
+        (seconds - travel_s + clock.offset_s, travel_s)
+    }
+
+    #[test]
+    fn velocity_and_drift_follow_exactly_from_the_rate_of_received_time() {
+        let start = Epoch::parse("2010-07-01T08:06:00").unwrap();
+        let mut sets: Vec<Ephemeris> = rinex::embedded().unwrap().ephemerides;
+        sets.retain(|set| set.toe.since(start).abs() < 3600.0 && set.health == 0);
+        sets.dedup_by_key(|set| set.sv);
+        let here_m = place().to_ecef();
+        // Fast enough that second-order terms of v/c count (7.5 km/s gives 0.5 Hz).
+        let motion_mps = Vector3::new(-3000.0, 5000.0, 4000.0);
+        let drift = 3e-7;
+        let mut ranges = Vec::new();
+        for set in &sets {
+            let at = |t: f64| sent_s(set, start, t, here_m + t * motion_mps);
+            let (now, travel_s) = at(0.0);
+            let emitted = start.plus_s(-travel_s);
+            let state = set.state(emitted).unwrap();
+            let up = (rotate_earth(&state.position_m, travel_s) - here_m).normalize().dot(&here_m.normalize());
+            if up < 0.1 {
+                continue;
+            }
+            // Five-point derivative; its error h⁴/30 × fifth derivative of range / c is below 1e-16.
+            let h = 0.1;
+            let rate = (8.0 * (at(h).0 - at(-h).0) - (at(2.0 * h).0 - at(-2.0 * h).0)) / (12.0 * h);
+            let carrier_hz = 1_575.42e6;
+            ranges.push(Range {
+                sv: set.sv,
+                satellite: state,
+                clock: set.clock_l1(emitted).unwrap(),
+                emitted,
+                pseudorange_m: SPEED_OF_LIGHT_MPS * -now,
+                // The receiver's seconds are (1 + drift) true ones.
+                doppler_hz: carrier_hz * (rate / (1.0 + drift) - 1.0),
+                carrier_hz,
+                noise_m: 1.0,
+                cn0_hz: 1e4,
+            });
+        }
+        assert!(ranges.len() >= 6);
+        let found = position(&ranges, Vector3::zeros(), &BARE).unwrap();
+        assert!((found.position_m - here_m).norm() < 1e-4);
+        let (velocity_mps, found_drift) = velocity(&ranges, &found).unwrap();
+        // The orbit's velocity is a derivative of what it prints to 1e-5 m/s; a difference of 0.1 s resolves 1e-7.
+        assert!((velocity_mps - motion_mps).norm() < 1e-4, "{}", (velocity_mps - motion_mps).norm());
+        assert!((found_drift - drift).abs() < 1e-12);
+    }
+}

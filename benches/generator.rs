@@ -1,0 +1,307 @@
+//! The generator's speed and memory against their bars: `cargo bench --bench generator` prints the rows of
+//! `reports/performance.md` and, with `-- --write`, writes them there.
+//!
+//! Every rate is the whole generator (knots, truth, synthesis, rounding and packing) on one thread: processor time of
+//! that thread, the median of interleaved runs. The end-to-end rows start the program itself on two threads.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+use gnss_twin::analysis::statistics::median;
+use gnss_twin::generator::scenario::{Overrides, Scenario};
+use gnss_twin::generator::scene::{Fidelity, Grade, Scene};
+use gnss_twin::generator::stage::noise::{BLOCK_SAMPLES, add_block_exact};
+use gnss_twin::generator::stream::{Options, generate_with};
+use gnss_twin::generator::synth::isa::{Level, add_noise};
+use gnss_twin::generator::synth::transmitter::Transmitter;
+use gnss_twin::generator::synth::{Edge, RUN_SAMPLES};
+use gnss_twin::generator::truth;
+use gnss_twin::gnss::satellite::Sv;
+
+/// Nothing but a place: effects are added by name.
+const BARE: &str = "name = \"bench\"\nstart = 2010-07-01T08:05:58\nseed = 1\n[motion]\nkind = \"static\"\n\
+    latitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\n";
+const IONOSPHERE: &str = "[ionosphere]\nmodel = \"klobuchar\"\n";
+const TROPOSPHERE: &str = "[troposphere]\nmodel = \"saastamoinen\"\n";
+const CLOCK: &str = "[receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n";
+const NOISE: &str = "[noise]\n";
+
+/// Processor time of this thread in seconds, which other programs on the machine disturb less than the clock on the
+/// wall; the latter where the system does not tell.
+fn busy_s(start: Instant) -> f64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let ns = told.and_then(|text| text.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()));
+    ns.map_or_else(|| start.elapsed().as_secs_f64(), |ns| ns * 1e-9)
+}
+
+/// One thing to time.
+struct Case {
+    name: String,
+    scene: Scene,
+}
+
+impl Case {
+    fn new(name: &str, tables: &str, grade: Grade, rate_hz: f64, seconds: f64, satellites: usize) -> Self {
+        Self::at("08:05:58", name, tables, (grade, rate_hz), seconds, satellites)
+    }
+
+    /// As [`Case::new`], from that time of 2010-07-01 on.
+    fn at(
+        time: &str,
+        name: &str,
+        tables: &str,
+        (grade, rate_hz): (Grade, f64),
+        seconds: f64,
+        satellites: usize,
+    ) -> Self {
+        let bare = BARE.replace("08:05:58", time);
+        let text = format!("duration_s = {seconds}\n{bare}{tables}[front_end]\nsample_rate_hz = {rate_hz}\n");
+        let scenario = Scenario::parse(&text, "bench").unwrap();
+        let (mut scene, _) = scenario.compose(Path::new("scenarios"), &Overrides::default()).unwrap();
+        scene.fidelity = Fidelity::suited(grade, rate_hz);
+        let up: Vec<Sv> = scene
+            .catalogue
+            .satellites()
+            .filter(|sv| !scene.excluded.contains(sv) && truth::in_view(&scene, *sv, scene.clock.start).unwrap())
+            .collect();
+        assert!(up.len() >= satellites, "{} satellites in view", up.len());
+        scene.excluded.extend(up.into_iter().skip(satellites));
+        Self { name: name.to_owned(), scene }
+    }
+
+    /// Seconds for the whole scene.
+    fn once(&self) -> f64 {
+        let directory = tempfile::tempdir().unwrap();
+        let mut writer = truth::Writer::create(directory.path()).unwrap();
+        let start = Instant::now();
+        let before_s = busy_s(start);
+        generate_with(&self.scene, &mut std::io::sink(), &mut writer, &mut |_| (), &Options::default()).unwrap();
+        busy_s(start) - before_s
+    }
+}
+
+/// Median seconds of each case, run in turn on one thread.
+fn medians(cases: &[Case], rounds: usize) -> Vec<f64> {
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let mut times = vec![Vec::new(); cases.len()];
+    for _ in 0..rounds {
+        for (times, case) in times.iter_mut().zip(cases) {
+            times.push(one.install(|| case.once()));
+        }
+    }
+    times.iter().map(|times| median(times).unwrap()).collect()
+}
+
+struct Line {
+    figure: String,
+    value: f64,
+    unit: &'static str,
+    /// Smallest, or with a minus sign largest, value wanted.
+    bar: Option<f64>,
+}
+
+impl Line {
+    fn new(figure: &str, value: f64, unit: &'static str, bar: Option<f64>) -> Self {
+        let line = Self { figure: figure.to_owned(), value, unit, bar };
+        println!("{}", line.text().trim_matches('|').replace('|', " | "));
+        line
+    }
+
+    fn text(&self) -> String {
+        let (bar, met) = match self.bar {
+            None => (String::new(), ""),
+            Some(bar) if bar < 0.0 => (format!("at most {}", -bar), if self.value <= -bar { "yes" } else { "no" }),
+            Some(bar) => (format!("at least {bar}"), if self.value >= bar { "yes" } else { "no" }),
+        };
+        format!("|{}|{:.3}|{}|{bar}|{met}|", self.figure, self.value, self.unit)
+    }
+}
+
+fn synthesis(lines: &mut Vec<Line>) {
+    use Grade::{Balanced, Fast, Reference};
+    let table: [(&str, &str, Grade, f64, f64, f64); 7] = [
+        ("fast, noise-free, 2.6 Msps, ci8", "", Fast, 2.6e6, 20.0, 3.0),
+        ("balanced, noise-free, 2.6 Msps, ci8", "", Balanced, 2.6e6, 20.0, 2.0),
+        ("balanced, seeded noise, 2.6 Msps, ci8", NOISE, Balanced, 2.6e6, 20.0, 1.2),
+        ("fast, noise-free, 25 Msps, ci8", "", Fast, 25e6, 2.0, 4.0),
+        ("balanced, noise-free, 25 Msps, ci8", "", Balanced, 25e6, 2.0, 3.0),
+        ("reference, noise-free, 2.6 Msps, ci8", "", Reference, 2.6e6, 3.0, 0.1),
+        ("reference, noise-free, 25 Msps, ci8", "", Reference, 25e6, 0.3, 0.1),
+    ];
+    let cases: Vec<Case> =
+        table.iter().map(|(name, tables, grade, rate, s, _)| Case::new(name, tables, *grade, *rate, *s, 11)).collect();
+    for ((case, seconds), row) in cases.iter().zip(medians(&cases, 7)).zip(table) {
+        let giga = case.scene.samples as f64 * 11.0 / seconds / 1e9;
+        lines.push(Line::new(&case.name, giga, "G satellite·samples/s/core", Some(row.5)));
+    }
+}
+
+/// Adds a block of noise.
+type Add<'a> = &'a dyn Fn(u64, &mut [f32], &mut [f32]);
+
+fn normals(lines: &mut Vec<Line>) {
+    let (mut i, mut q) = (vec![0.0; BLOCK_SAMPLES], vec![0.0; BLOCK_SAMPLES]);
+    let mut rate = |blocks: u64, add: Add<'_>| {
+        let once = |_| {
+            let start = Instant::now();
+            let before_s = busy_s(start);
+            (0..blocks).for_each(|block| add(block, &mut i, &mut q));
+            (2 * blocks) as f64 * BLOCK_SAMPLES as f64 / (busy_s(start) - before_s) / 1e6
+        };
+        median(&(0..9).map(once).collect::<Vec<_>>()).unwrap()
+    };
+    let single = rate(20_000, &|block, i, q| add_noise(Level::detect(), 1, block, 1.0, i, q));
+    let double = rate(1000, &|block, i, q| add_block_exact(1, block, 1.0, i, q));
+    lines.push(Line::new("Gaussian noise", single, "M normals/s/core", Some(400.0)));
+    lines.push(Line::new("Gaussian noise in f64", double, "M normals/s/core", None));
+}
+
+/// Runs the program on a scene: times real time of generator and receiver together (pictures apart), and the most
+/// memory that it took, in MiB.
+fn run(program: &Path, text: &str) -> Option<(f64, f64)> {
+    let directory = tempfile::tempdir().ok()?;
+    let scenario = directory.path().join("scene.toml");
+    std::fs::write(&scenario, text).ok()?;
+    let out = directory.path().join("out");
+    let status = Command::new(program)
+        .args(["run".as_ref(), scenario.as_os_str(), "--out".as_ref(), out.as_os_str()])
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .status()
+        .ok()?;
+    let speed = std::fs::read_to_string(out.join("speed.json")).ok().filter(|_| status.success())?;
+    let speed: serde_json::Value = serde_json::from_str(&speed).ok()?;
+    Some((speed["run_x_real_time"].as_f64()?, speed["peak_memory_mib"].as_f64()?))
+}
+
+fn whole(lines: &mut Vec<Line>) {
+    let program = Path::new("target/release/gnss-twin");
+    if !program.exists() {
+        println!("{} is not there: rows of the whole run left out", program.display());
+        return;
+    }
+    let minute = std::fs::read_to_string("scenarios/static.toml").unwrap();
+    let found: Vec<(f64, f64)> = (0..3).filter_map(|_| run(program, &minute)).collect();
+    let of = |pick: fn(&(f64, f64)) -> f64| median(&found.iter().map(pick).collect::<Vec<_>>());
+    if let (Some(realtime), Some(memory)) = (of(|x| x.0), of(|x| x.1)) {
+        lines.push(Line::new("run, static scene, 60 s, two cores", realtime, "× real time", Some(40.0)));
+        lines.push(Line::new("memory of that run", memory, "MiB", Some(-200.0)));
+    }
+    if let Some((realtime, memory)) = run(program, &minute.replace("duration_s = 60", "duration_s = 600")) {
+        lines.push(Line::new("run, static scene, 600 s, two cores", realtime, "× real time", None));
+        lines.push(Line::new("memory of that run (600 s)", memory, "MiB", Some(-200.0)));
+    }
+}
+
+/// What each thing costs when it enters.
+fn required(lines: &mut Vec<Line>) {
+    let scenes = [
+        ("bare", String::new()),
+        ("+ ionosphere", IONOSPHERE.to_owned()),
+        ("+ troposphere", format!("{IONOSPHERE}{TROPOSPHERE}")),
+        ("+ receiver clock", format!("{IONOSPHERE}{TROPOSPHERE}{CLOCK}")),
+        ("+ noise", format!("{IONOSPHERE}{TROPOSPHERE}{CLOCK}{NOISE}")),
+        ("mask 60 deg, two satellites above it", "[satellites]\nmask_deg = 60\n".to_owned()),
+    ];
+    let mut cases: Vec<Case> = scenes
+        .iter()
+        .map(|(name, tables)| {
+            let satellites = if name.starts_with("mask") { 2 } else { 11 };
+            Case::new(name, tables, Grade::Balanced, 2.6e6, 10.0, satellites)
+        })
+        .collect();
+    for satellites in [1, 2, 4, 8] {
+        cases.push(Case::new(
+            &format!("{satellites} of the satellites, bare"),
+            "",
+            Grade::Balanced,
+            2.6e6,
+            10.0,
+            satellites,
+        ));
+    }
+    for rate_msps in [5.2, 10.4, 20.8] {
+        cases.push(Case::new(&format!("bare at {rate_msps} Msps"), "", Grade::Balanced, rate_msps * 1e6, 10.0, 11));
+    }
+    for seconds in [20.0, 40.0, 80.0] {
+        cases.push(Case::new(&format!("bare for {seconds} s"), "", Grade::Balanced, 2.6e6, seconds, 11));
+    }
+    for (case, seconds) in cases.iter().zip(medians(&cases, 5)) {
+        let ns = seconds * 1e9 / case.scene.samples as f64;
+        lines.push(Line::new(&case.name, ns, "ns a sample, all satellites", None));
+    }
+}
+
+/// A batch of blocks in the first minute and in the last minute of a day.
+fn day(lines: &mut Vec<Line>) {
+    let scene = Case::at("00:00:00", "day", "", (Grade::Balanced, 2.6e6), 86_400.0, 11).scene;
+    let satellites: Vec<Sv> = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)).collect();
+    let mut times = [Vec::new(), Vec::new()];
+    let stretch = 2600 * 60_000_u64;
+    for _ in 0..5 {
+        for (times, from) in times.iter_mut().zip([0, scene.samples - stretch]) {
+            let from = from / RUN_SAMPLES as u64 * RUN_SAMPLES as u64;
+            let (mut count, mut seconds) = (0.0, 0.0);
+            for sv in &satellites {
+                let mut transmitter = Transmitter::new(&scene, *sv, scene.signals[0], Edge::Area).unwrap().unwrap();
+                let start = Instant::now();
+                transmitter.prepare(&scene, from, from + stretch).unwrap();
+                if transmitter.in_view(&scene, from) {
+                    (count, seconds) = (count + 1.0, seconds + start.elapsed().as_secs_f64());
+                }
+            }
+            times.push(seconds / count * 1e3);
+        }
+    }
+    for (name, times) in ["first minute of a day", "last minute of a day"].iter().zip(times) {
+        let name = format!("{name}: knots and messages of a satellite");
+        lines.push(Line::new(&name, median(&times).unwrap(), "ms", None));
+    }
+}
+
+fn output_of(program: &str, arguments: &[&str]) -> String {
+    let found = Command::new(program).args(arguments).output().ok();
+    found.map_or_else(String::new, |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
+}
+
+/// Replaces what stands between two marks of `reports/performance.md`.
+fn publish(lines: &[Line], split: usize) {
+    const HEAD: &str = "|figure|value|unit|bar|met|\n|---|---|---|---|---|\n";
+    let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model =
+        cpu.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or("").trim_start_matches(['\t', ' ', ':']);
+    let mut text = format!(
+        "{model}, {} cores; {}; release profile, instruction set chosen at run time ({:?}); {}.\n\n{HEAD}",
+        std::thread::available_parallelism().map_or(1, |n| n.get()),
+        output_of("rustc", &["--version"]),
+        Level::detect(),
+        output_of("date", &["-u", "+%F"]),
+    );
+    for (index, line) in lines.iter().enumerate() {
+        if index == split {
+            let _ = write!(text, "\n### Only what the scene requires\n\n{HEAD}");
+        }
+        let _ = writeln!(text, "{}", line.text());
+    }
+    let path = Path::new("reports/performance.md");
+    let page = std::fs::read_to_string(path).unwrap();
+    let (begin, end) = ("<!-- generator -->\n", "<!-- end of generator -->\n");
+    let (before, rest) = page.split_once(begin).unwrap();
+    let (_, after) = rest.split_once(end).unwrap();
+    std::fs::write(path, format!("{before}{begin}{text}{end}{after}")).unwrap();
+}
+
+fn main() {
+    let mut lines = Vec::new();
+    synthesis(&mut lines);
+    normals(&mut lines);
+    whole(&mut lines);
+    let split = lines.len();
+    required(&mut lines);
+    day(&mut lines);
+    if std::env::args().any(|argument| argument == "--write") {
+        publish(&lines, split);
+    }
+}

@@ -1,0 +1,262 @@
+//! Choices that trade speed for accuracy, each with the error and the cost that were measured for it.
+//!
+//! A scene names a level or single knobs; [`choices`] says what was picked and what it is worth. The figures are those
+//! of `reports/trade.csv` (`cargo bench --bench trade` fills it), rounded up; costs are one core of the machine named
+//! there. Limits: a knob's figure assumes that every other knob is at its best.
+
+use crate::generator::scene::Scene;
+
+/// A name for a value of every knob.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grade {
+    /// Nearest chips, carrier within 1e-3 cycle and spurs below −70 dBc.
+    Fast,
+    /// The cheapest value of each knob whose error is below the noise of an ordinary scene.
+    Balanced,
+    /// `f64` for every sample: what the others are measured against.
+    Reference,
+}
+
+/// How a chip's edge falls between samples. Each keeps the mean power of the waveform at one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CodeEdge {
+    /// The chip at the sample's instant.
+    Nearest,
+    /// The mean of the waveform over the sample's interval.
+    Area,
+    /// The waveform through a linear-phase low-pass filter just below half the sample rate.
+    BandLimited,
+}
+
+/// How samples are evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arithmetic {
+    /// Lanes of single precision, anchored again in `f64` every 4096 samples at least.
+    F32,
+    /// Each sample by itself in double precision.
+    F64,
+}
+
+/// Every knob, with the level that they were taken from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fidelity {
+    pub grade: Grade,
+    pub code_edge: CodeEdge,
+    /// Of the carrier and the code's place, sample by sample.
+    pub carrier: Arithmetic,
+    /// Of the thermal noise's radius and angle; the random words are the same.
+    pub noise: Arithmetic,
+    /// Largest error of the carrier between knots.
+    pub knot_tolerance_cycles: f64,
+}
+
+impl Grade {
+    /// Every level and its name in a scenario.
+    pub const NAMES: [(&'static str, Self); 3] =
+        [("fast", Self::Fast), ("balanced", Self::Balanced), ("reference", Self::Reference)];
+
+    /// Its name in a scenario.
+    pub fn name(self) -> &'static str {
+        name_of(&Self::NAMES, self)
+    }
+}
+
+impl CodeEdge {
+    /// Every edge and its name in a scenario.
+    pub const NAMES: [(&'static str, Self); 3] =
+        [("nearest", Self::Nearest), ("area", Self::Area), ("band_limited", Self::BandLimited)];
+
+    /// Its name in a scenario.
+    pub fn name(self) -> &'static str {
+        name_of(&Self::NAMES, self)
+    }
+}
+
+impl Arithmetic {
+    /// Both and their names in a scenario.
+    pub const NAMES: [(&'static str, Self); 2] = [("f32", Self::F32), ("f64", Self::F64)];
+
+    /// Its name in a scenario.
+    pub fn name(self) -> &'static str {
+        name_of(&Self::NAMES, self)
+    }
+}
+
+fn name_of<T: PartialEq>(names: &[(&'static str, T)], value: T) -> &'static str {
+    names.iter().find(|(_, known)| *known == value).map_or("", |(name, _)| *name)
+}
+
+impl Fidelity {
+    /// The knobs of a level.
+    pub const fn of(grade: Grade) -> Self {
+        match grade {
+            // Half the tolerance is the secant's within a run, a parabola of that height A (cycles) that repeats
+            // with the runs: its first sideband is 2π·A·2/π², −72 dBc for A = 2e-4.
+            Grade::Fast => Self {
+                grade,
+                code_edge: CodeEdge::Nearest,
+                carrier: Arithmetic::F32,
+                noise: Arithmetic::F32,
+                knot_tolerance_cycles: 4e-4,
+            },
+            // 1e-4 cycle is 19 µm: a carrier loop at 50 dB-Hz has forty times that.
+            Grade::Balanced => Self {
+                grade,
+                code_edge: CodeEdge::Area,
+                carrier: Arithmetic::F32,
+                noise: Arithmetic::F32,
+                knot_tolerance_cycles: 1e-4,
+            },
+            // Finer knots would only follow the rounding of 1.3e8 cycles in f64 (1.5e-8 for each operation).
+            Grade::Reference => Self {
+                grade,
+                code_edge: CodeEdge::BandLimited,
+                carrier: Arithmetic::F64,
+                noise: Arithmetic::F64,
+                knot_tolerance_cycles: 1e-6,
+            },
+        }
+    }
+
+    /// Measured time for one sample of one satellite, in ns on one core, everything that the generator does included.
+    pub fn satellite_sample_ns(&self, rate_hz: f64) -> f64 {
+        // Edges come once in so many samples: what a filter's response costs falls with the rate.
+        let dense = rate_hz >= 8e6;
+        match (self.carrier, self.code_edge, dense) {
+            (Arithmetic::F32, CodeEdge::Nearest, _) => 0.5,
+            (Arithmetic::F32, CodeEdge::Area, _) => 0.6,
+            (Arithmetic::F32, CodeEdge::BandLimited, false) => 3.4,
+            (Arithmetic::F32, CodeEdge::BandLimited, true) => 1.5,
+            (Arithmetic::F64, CodeEdge::Nearest, _) => 4.1,
+            (Arithmetic::F64, CodeEdge::Area, _) => 6.2,
+            (Arithmetic::F64, CodeEdge::BandLimited, false) => 7.6,
+            (Arithmetic::F64, CodeEdge::BandLimited, true) => 5.0,
+        }
+    }
+
+    /// The knobs of a level for samples at `rate_hz`: `balanced` takes band-limited edges where area edges would leave
+    /// more than 0.1 m, at multiples of the chip rate and near simple ratios to it.
+    pub fn suited(grade: Grade, rate_hz: f64) -> Self {
+        let level = Self::of(grade);
+        match grade {
+            Grade::Balanced if standing_bias_m(CodeEdge::Area, rate_hz) > 0.1 => {
+                Self { code_edge: CodeEdge::BandLimited, ..level }
+            }
+            _ => level,
+        }
+    }
+
+    /// Measured error of a code whose phase stands still on the sampling grid, root mean square over phases, in metres.
+    pub fn code_bias_m(&self, rate_hz: f64) -> f64 {
+        let near = |at: [(f64, f64); 3]| {
+            at.into_iter().rev().find(|(from_hz, _)| rate_hz >= *from_hz).map_or(at[0].1, |(_, bias_m)| bias_m)
+        };
+        let moving = match self.code_edge {
+            CodeEdge::Nearest => near([(0.0, 1.1), (8e6, 0.3), (20e6, 0.1)]),
+            CodeEdge::Area => near([(0.0, 0.1), (8e6, 0.02), (20e6, 0.01)]),
+            CodeEdge::BandLimited => 1e-4,
+        };
+        moving.max(standing_bias_m(self.code_edge, rate_hz))
+    }
+}
+
+/// Error where every chip meets the same few places between samples, root mean square, in metres.
+///
+/// With `q` places in turn, nearest edges know the code to a sample in `q` (uniform: over √12); for area edges
+/// it falls with the square, from 1.6 m measured at 4.092 Msps.
+fn standing_bias_m(edge: CodeEdge, rate_hz: f64) -> f64 {
+    const CHIP_HZ: f64 = 1.023e6;
+    // Places drift apart within a code period of 1023 chips when the ratio misses by more than this.
+    let meets = |q: u32| {
+        let samples = f64::from(q) * rate_hz / CHIP_HZ;
+        (samples - samples.round()).abs() < 1.0 / 1023.0
+    };
+    let Some(q) = (1..=32).find(|q| meets(*q)) else { return 0.0 };
+    let finest_hz = f64::from(q) * rate_hz;
+    match edge {
+        CodeEdge::Nearest => 299_792_458.0 / finest_hz / 12_f64.sqrt(),
+        CodeEdge::Area => 1.6 * (4.092e6 / finest_hz).powi(2),
+        CodeEdge::BandLimited => 0.0,
+    }
+}
+
+/// One knob as a plan shows it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// Its key in `[fidelity]`.
+    pub knob: &'static str,
+    pub value: String,
+    /// Whether the level would have chosen another value.
+    pub own: bool,
+    /// What it does to the samples, and for how much.
+    pub error: String,
+    pub cost: String,
+}
+
+/// What a scene chose for each knob, the error to expect of it and its cost.
+pub fn choices(scene: &Scene) -> Vec<Choice> {
+    let rate_hz = scene.clock.rate.hz();
+    let (chosen, level) = (scene.fidelity, Fidelity::suited(scene.fidelity.grade, rate_hz));
+    let f32_carrier = Fidelity { carrier: Arithmetic::F32, ..chosen };
+    let edge_ns = f32_carrier.satellite_sample_ns(rate_hz);
+    let mut found = vec![
+        Choice {
+            knob: "code_edge",
+            value: chosen.code_edge.name().to_owned(),
+            own: chosen.code_edge != level.code_edge,
+            error: format!("pseudorange {:.1e} m rms, less as the code moves", chosen.code_bias_m(rate_hz)),
+            cost: format!("{edge_ns:.2} ns"),
+        },
+        Choice {
+            knob: "carrier",
+            value: chosen.carrier.name().to_owned(),
+            own: chosen.carrier != level.carrier,
+            error: match chosen.carrier {
+                Arithmetic::F32 => "carrier 1e-6 cycle".to_owned(),
+                Arithmetic::F64 => "carrier 1e-10 cycle".to_owned(),
+            },
+            cost: format!("{:.2} ns", chosen.satellite_sample_ns(rate_hz) - edge_ns),
+        },
+        Choice {
+            knob: "knot_tolerance_cycles",
+            value: format!("{:e}", chosen.knot_tolerance_cycles),
+            own: chosen.knot_tolerance_cycles != level.knot_tolerance_cycles,
+            error: format!("carrier {:e} cycle at most", chosen.knot_tolerance_cycles),
+            cost: "none per sample".to_owned(),
+        },
+    ];
+    if scene.noise {
+        let (error, ns) = match chosen.noise {
+            Arithmetic::F32 => ("3e-7 of its size", 1.3),
+            Arithmetic::F64 => ("1e-16 of its size", 20.0),
+        };
+        found.push(Choice {
+            knob: "noise",
+            value: chosen.noise.name().to_owned(),
+            own: chosen.noise != level.noise,
+            error: error.to_owned(),
+            cost: format!("{ns:.1} ns, satellites or not"),
+        });
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn balanced_keeps_to_a_decimetre_where_the_rate_meets_the_chips() {
+        let edge = |rate_hz: f64| Fidelity::suited(Grade::Balanced, rate_hz).code_edge;
+        for rate_hz in [2.046e6, 4.092e6, 5.115e6, 10.23e6, 2.5575e6] {
+            assert_eq!(edge(rate_hz), CodeEdge::BandLimited, "{rate_hz}");
+        }
+        for rate_hz in [2.6e6, 4e6, 10e6, 12e6, 25e6, 50e6] {
+            assert_eq!(edge(rate_hz), CodeEdge::Area, "{rate_hz}");
+        }
+        for rate_hz in [2.046e6, 2.6e6, 4.092e6, 10e6, 20.46e6] {
+            assert!(Fidelity::suited(Grade::Balanced, rate_hz).code_bias_m(rate_hz) <= 0.1, "{rate_hz}");
+            assert_eq!(Fidelity::suited(Grade::Fast, rate_hz).code_edge, CodeEdge::Nearest);
+        }
+    }
+}

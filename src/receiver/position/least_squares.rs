@@ -1,0 +1,259 @@
+//! Position and clock by iterated weighted least squares, velocity and drift by one linear solution.
+//!
+//! Model: ρ = |R(Ωτ) r_s(t_e) − r| + b − c Δt_s + I + T with τ the geometric light time (the raw pseudorange would let a
+//! clock bias of 11 ms shift the fix by metres). Source: IS-GPS-200N, 20.3.3.4.3.4 and any
+//! textbook of estimation. Normal equations of four unknowns with lines of sight of unit length: their condition is that of
+//! the geometry, and is checked before they are solved.
+
+use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
+
+use crate::gnss::broadcast::{ClockState, State};
+use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_earth};
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+use crate::receiver::position::{NoFix, troposphere};
+
+/// Unknowns: three coordinates and the clock.
+pub const UNKNOWNS: usize = 4;
+/// Iterations of a solution, from the Earth's centre.
+const LARGEST_ITERATIONS: u32 = 8;
+/// A step below this ends the iteration.
+const CONVERGED_M: f64 = 1e-4;
+/// Largest ratio of singular values of the geometry: position errors would be thousands of times range errors.
+const LARGEST_CONDITION: f64 = 1e4;
+/// Corrections of the atmosphere wait until the estimate is near the Earth's surface or above it.
+const NEAR_EARTH_M: f64 = 6.2e6;
+/// Klobuchar's model describes the whole ionosphere, which ends about here.
+const IONOSPHERE_TOP_M: f64 = 1e6;
+/// Standard deviation of an uncorrected ionosphere at the zenith.
+const IONOSPHERE_SIGMA_M: f64 = 5.0;
+
+/// A pseudorange and where its satellite was.
+#[derive(Clone, Debug)]
+pub struct Range {
+    pub sv: Sv,
+    /// Satellite at emission, in the ECEF axes of that instant.
+    pub satellite: State,
+    /// Satellite clock as this signal carries it.
+    pub clock: ClockState,
+    /// GPS time of emission.
+    pub emitted: Epoch,
+    pub pseudorange_m: f64,
+    pub doppler_hz: f64,
+    pub carrier_hz: f64,
+    /// Standard deviation of the pseudorange by thermal noise.
+    pub noise_m: f64,
+    /// Relative weight of the Doppler: carrier power over noise density.
+    pub cn0_hz: f64,
+}
+
+/// What is known of the ionosphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ionosphere {
+    /// There is none.
+    Absent,
+    /// There is one, uncorrected: ranges weigh less by its size.
+    Unknown,
+    Known(Klobuchar),
+}
+
+/// What corrects and weights ranges.
+#[derive(Clone, Copy, Debug)]
+pub struct Corrections {
+    pub ionosphere: Ionosphere,
+    /// Whether there is a troposphere to correct.
+    pub troposphere: bool,
+    /// Standard deviation of the models at the zenith; grows with one over the sine of the elevation.
+    pub model_sigma_m: f64,
+}
+
+/// A position and clock.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    pub position_m: Vector3<f64>,
+    /// Reading of the receiver's clock minus GPS time, in metres.
+    pub clock_m: f64,
+    /// Of each range: measured minus computed, standard deviation, unit vector to the satellite, elevation.
+    pub residuals_m: Vec<f64>,
+    pub sigmas_m: Vec<f64>,
+    pub sights: Vec<Vector3<f64>>,
+    pub elevations_rad: Vec<f64>,
+    /// Covariance of ECEF coordinates and clock, in m².
+    pub covariance: Matrix4<f64>,
+    /// The same for unit variances: squares of the dilutions of precision.
+    pub dilution: Matrix4<f64>,
+    /// Weighted sum of squared residuals.
+    pub chi_square: f64,
+    pub iterations: u32,
+}
+
+/// One range at an estimate: computed value and derivative.
+struct Line {
+    computed_m: f64,
+    sight: Vector3<f64>,
+    sigma_m: f64,
+    elevation_rad: f64,
+}
+
+fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Corrections, day: f64) -> Line {
+    // Light time and rotation: the correction of the second pass is below a micrometre.
+    let mut seen_m = range.satellite.position_m;
+    for _ in 0..3 {
+        seen_m = rotate_earth(&range.satellite.position_m, (seen_m - position_m).norm() / SPEED_OF_LIGHT_MPS);
+    }
+    let distance_m = (seen_m - position_m).norm();
+    let sight = (seen_m - position_m) / distance_m;
+    let mut computed_m = distance_m + clock_m - SPEED_OF_LIGHT_MPS * range.clock.offset_s;
+    let mut variance = range.noise_m * range.noise_m;
+    let mut elevation_rad = std::f64::consts::FRAC_PI_2;
+    if position_m.norm() > NEAR_EARTH_M {
+        let user = Geodetic::from_ecef(position_m);
+        let direction = look(user, position_m, &seen_m);
+        elevation_rad = direction.elevation_rad;
+        let sine = libm::sin(elevation_rad);
+        let received = range.emitted.plus_s(distance_m / SPEED_OF_LIGHT_MPS);
+        let (delay_m, sigma_m) = atmosphere(range, corrections, user, direction, received, day);
+        computed_m += delay_m;
+        variance += sigma_m * sigma_m;
+        let model_m = corrections.model_sigma_m / sine.max(0.05);
+        variance += model_m * model_m;
+    }
+    Line { computed_m, sight, sigma_m: variance.sqrt(), elevation_rad }
+}
+
+/// Delay by the atmosphere, and its standard deviation where the ionosphere is not corrected.
+fn atmosphere(
+    range: &Range,
+    corrections: &Corrections,
+    user: Geodetic,
+    direction: Look,
+    received: Epoch,
+    day: f64,
+) -> (f64, f64) {
+    let sine = libm::sin(direction.elevation_rad);
+    let troposphere_m = if corrections.troposphere { troposphere::delay_m(user, sine, day) } else { 0.0 };
+    if user.height_m > IONOSPHERE_TOP_M {
+        return (troposphere_m, 0.0);
+    }
+    match corrections.ionosphere {
+        Ionosphere::Absent => (troposphere_m, 0.0),
+        Ionosphere::Known(klobuchar) => {
+            let delay_s = klobuchar.delay_s(user, direction, received, range.carrier_hz);
+            (troposphere_m + SPEED_OF_LIGHT_MPS * delay_s, 0.0)
+        }
+        Ionosphere::Unknown => {
+            // Thin shell at 350 km.
+            let cosine = 0.948 * libm::cos(direction.elevation_rad);
+            (troposphere_m, IONOSPHERE_SIGMA_M / (1.0 - cosine * cosine).sqrt())
+        }
+    }
+}
+
+/// Solves for position and clock from a first estimate, which may be the Earth's centre.
+///
+/// # Errors
+/// Fewer than four ranges, a geometry that gives no position, or no convergence.
+pub fn position(ranges: &[Range], start_m: Vector3<f64>, corrections: &Corrections) -> Result<Solution, NoFix> {
+    if ranges.len() < UNKNOWNS {
+        return Err(NoFix::TooFew { have: ranges.len(), need: UNKNOWNS });
+    }
+    let day = ranges.first().map_or(1.0, |range| range.emitted.day_of_year());
+    let mut position_m = start_m;
+    // The clock enters linearly; starting near it only keeps the first residuals small.
+    let mut clock_m = 0.0;
+    let mut step_m = f64::INFINITY;
+    for iteration in 1..=LARGEST_ITERATIONS {
+        let lines: Vec<Line> = ranges.iter().map(|range| line(range, &position_m, clock_m, corrections, day)).collect();
+        let (mut plain, mut normal, mut right) = (Matrix4::zeros(), Matrix4::zeros(), Vector4::zeros());
+        for (range, line) in ranges.iter().zip(&lines) {
+            let row = Vector4::new(-line.sight.x, -line.sight.y, -line.sight.z, 1.0);
+            let weight = 1.0 / (line.sigma_m * line.sigma_m);
+            plain += row * row.transpose();
+            normal += weight * row * row.transpose();
+            right += weight * (range.pseudorange_m - line.computed_m) * row;
+        }
+        check_condition(&plain)?;
+        let solver = Cholesky::new(normal).ok_or(NoFix::Singular { condition: f64::INFINITY })?;
+        let step = solver.solve(&right);
+        position_m += Vector3::new(step.x, step.y, step.z);
+        clock_m += step.w;
+        step_m = step.norm();
+        if !step_m.is_finite() {
+            break;
+        }
+        if step_m < CONVERGED_M {
+            let dilution = Cholesky::new(plain).ok_or(NoFix::Singular { condition: f64::INFINITY })?.inverse();
+            return Ok(finish(ranges, position_m, clock_m, corrections, day, solver.inverse(), dilution, iteration));
+        }
+    }
+    Err(NoFix::Diverged { iterations: LARGEST_ITERATIONS, step_m })
+}
+
+/// Ratio of the extreme singular values of the geometry.
+fn check_condition(plain: &Matrix4<f64>) -> Result<(), NoFix> {
+    let values = plain.symmetric_eigenvalues();
+    let (low, high) = (values.min(), values.max());
+    let condition = if low > 0.0 { (high / low).sqrt() } else { f64::INFINITY };
+    if condition < LARGEST_CONDITION { Ok(()) } else { Err(NoFix::Singular { condition }) }
+}
+
+#[expect(clippy::too_many_arguments, reason = "the last step of one function, split so that it fits a screen")]
+fn finish(
+    ranges: &[Range],
+    position_m: Vector3<f64>,
+    clock_m: f64,
+    corrections: &Corrections,
+    day: f64,
+    covariance: Matrix4<f64>,
+    dilution: Matrix4<f64>,
+    iterations: u32,
+) -> Solution {
+    let lines: Vec<Line> = ranges.iter().map(|range| line(range, &position_m, clock_m, corrections, day)).collect();
+    let residuals_m: Vec<f64> =
+        ranges.iter().zip(&lines).map(|(range, line)| range.pseudorange_m - line.computed_m).collect();
+    let chi_square = residuals_m.iter().zip(&lines).map(|(v, line)| (v / line.sigma_m) * (v / line.sigma_m)).sum();
+    Solution {
+        position_m,
+        clock_m,
+        residuals_m,
+        sigmas_m: lines.iter().map(|line| line.sigma_m).collect(),
+        sights: lines.iter().map(|line| line.sight).collect(),
+        elevations_rad: lines.iter().map(|line| line.elevation_rad).collect(),
+        covariance,
+        dilution,
+        chi_square,
+        iterations,
+    }
+}
+
+/// Velocity in ECEF and clock drift from Dopplers, at a solved position.
+///
+/// With q = 1 + f_D/f the received rate, g = q (1 + n·v_s/c) / (1 + satellite drift) and inertial
+/// velocities, (1 + drift) g = 1 + n·v_u/c exactly: linear in the unknowns. Rates of the atmosphere are left out (mm/s).
+///
+/// # Errors
+/// As the position's geometry.
+pub fn velocity(ranges: &[Range], solution: &Solution) -> Result<(Vector3<f64>, f64), NoFix> {
+    let spin = Vector3::new(0.0, 0.0, EARTH_ROTATION_RADPS);
+    let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    for (range, sight) in ranges.iter().zip(&solution.sights) {
+        let inertial_mps = range.satellite.velocity_mps + spin.cross(&range.satellite.position_m);
+        let mut travel_s = 0.0;
+        for _ in 0..3 {
+            let seen_m = rotate_earth(&range.satellite.position_m, travel_s);
+            travel_s = (seen_m - solution.position_m).norm() / SPEED_OF_LIGHT_MPS;
+        }
+        let along_mps = sight.dot(&rotate_earth(&inertial_mps, travel_s));
+        let received = 1.0 + range.doppler_hz / range.carrier_hz;
+        let rate = received * (1.0 + along_mps / SPEED_OF_LIGHT_MPS) / (1.0 + range.clock.drift);
+        // The fourth unknown is c times the drift.
+        let row = Vector4::new(sight.x, sight.y, sight.z, -rate);
+        normal += range.cn0_hz * row * row.transpose();
+        right += range.cn0_hz * SPEED_OF_LIGHT_MPS * (rate - 1.0) * row;
+    }
+    let solver = Cholesky::new(normal).ok_or(NoFix::Singular { condition: f64::INFINITY })?;
+    let found = solver.solve(&right);
+    let inertial_mps = Vector3::new(found.x, found.y, found.z);
+    Ok((inertial_mps - spin.cross(&solution.position_m), found.w / SPEED_OF_LIGHT_MPS))
+}
