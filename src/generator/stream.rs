@@ -113,7 +113,6 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
     let shortest = shortest.min(longest);
     let options = Options::default();
     let batch = u64::from(options.block_runs) * u64::from(options.batch_blocks) * RUN_SAMPLES as u64;
-    let planar = 2 * std::mem::size_of::<f32>() as u64;
     Ok(Machinery {
         knot_spacing_s: rate.elapsed_s(shortest),
         longest_knot_spacing_s: rate.elapsed_s(longest),
@@ -121,7 +120,7 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
             "the longest on which a cubic stays within {:e} cycles of the motion",
             scene.fidelity.knot_tolerance_cycles
         ),
-        block_bytes: batch.min(scene.samples) * (planar + scene.metadata.format.bytes() as u64),
+        block_bytes: batch.min(scene.samples) * scene.metadata.format.bytes() as u64,
         satellite_samples_per_s: 1e9 / scene.fidelity.satellite_sample_ns(rate.hz()),
     })
 }
@@ -162,23 +161,27 @@ pub fn generate_with(
     let mut ticks = Ticks::new(scene)?;
     let block = u64::from(options.block_runs.max(1)) * RUN_SAMPLES as u64;
     let batch = block * u64::from(options.batch_blocks.max(1));
+    let sample_bytes = scene.metadata.format.bytes();
+    let mut packed = vec![0; batch.min(scene.samples) as usize * sample_bytes];
     let mut done = Generated::default();
     while done.samples < scene.samples {
         let (from, to) = (done.samples, (done.samples + batch).min(scene.samples));
         transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, from, to))?;
         ticks.write(scene, &transmitters, to, truth)?;
-        let starts: Vec<u64> = (from..to).step_by(block as usize).collect();
-        let packed: Vec<(Vec<u8>, u64)> = starts
-            .into_par_iter()
-            .map_init(Scratch::default, |scratch, start| {
-                let length = (block.min(to - start)) as usize;
-                render(scene, &transmitters, kernel, start, length, scratch)
+        let bytes = usize::try_from(to - from).unwrap_or(usize::MAX).saturating_mul(sample_bytes);
+        packed.truncate(bytes);
+        let clipped: u64 = packed
+            .par_chunks_mut(block as usize * sample_bytes)
+            .enumerate()
+            .map_init(Scratch::default, |scratch, (index, bytes)| {
+                render(scene, &transmitters, kernel, from + index as u64 * block, bytes, scratch)
             })
-            .collect();
-        for (bytes, clipped) in packed {
-            samples.write_all(&bytes)?;
-            done.clipped += clipped;
+            .sum();
+        // In pieces, so that a reader beside the generator can begin early.
+        for bytes in packed.chunks(block as usize * sample_bytes) {
+            samples.write_all(bytes)?;
         }
+        done.clipped += clipped;
         done.samples = to;
         progress(to);
     }
@@ -218,36 +221,37 @@ fn transmitters(scene: &Scene, edge: Edge<'_>) -> Result<Vec<Transmitter>, Gener
     Ok(found)
 }
 
-/// One block, packed, and how many of its components were clipped.
+/// Renders one block into `bytes`, and returns how many of its components were clipped.
+///
+/// Run by run, so that the planar samples of one stay in the first-level cache.
 fn render(
     scene: &Scene,
     transmitters: &[Transmitter],
     kernel: Kernel<'_>,
     start: u64,
-    length: usize,
+    bytes: &mut [u8],
     scratch: &mut Scratch,
-) -> (Vec<u8>, u64) {
-    let (mut i, mut q) = (vec![0.0_f32; length], vec![0.0_f32; length]);
-    for transmitter in transmitters {
-        transmitter.render(scene, kernel, start, &mut i, &mut q, scratch);
-    }
-    if scene.noise {
-        let first = start / RUN_SAMPLES as u64;
-        for ((block, i), q) in (first..).zip(i.chunks_mut(RUN_SAMPLES)).zip(q.chunks_mut(RUN_SAMPLES)) {
+) -> u64 {
+    let format = scene.metadata.format;
+    let (mut i, mut q) = ([0.0_f32; RUN_SAMPLES], [0.0_f32; RUN_SAMPLES]);
+    let mut clipped = 0;
+    for (run, bytes) in (start / RUN_SAMPLES as u64..).zip(bytes.chunks_mut(RUN_SAMPLES * format.bytes())) {
+        let length = bytes.len() / format.bytes();
+        let (Some(i), Some(q)) = (i.get_mut(..length), q.get_mut(..length)) else { continue };
+        i.fill(0.0);
+        q.fill(0.0);
+        for transmitter in transmitters {
+            transmitter.render(scene, kernel, run * RUN_SAMPLES as u64, i, q, scratch);
+        }
+        if scene.noise {
             match scene.fidelity.noise {
-                Arithmetic::F32 => isa::add_noise(kernel.level, scene.seed, block, scene.noise_lsb, i, q),
-                Arithmetic::F64 => noise::add_block_exact(scene.seed, block, scene.noise_lsb, i, q),
+                Arithmetic::F32 => isa::add_noise(kernel.level, scene.seed, run, scene.noise_lsb, i, q),
+                Arithmetic::F64 => noise::add_block_exact(scene.seed, run, scene.noise_lsb, i, q),
             }
         }
+        clipped += isa::pack(kernel.level, format, i, q, bytes);
     }
-    let format = scene.metadata.format;
-    let clipped = format.full_scale_lsb().map_or(0, |full| {
-        let outside = |x: &[f32]| x.iter().map(|x| u64::from(x.abs() > full + 0.5)).sum::<u64>();
-        outside(&i) + if format.is_complex() { outside(&q) } else { 0 }
-    });
-    let mut bytes = Vec::with_capacity(length * format.bytes());
-    format.pack(&i, &q, &mut bytes);
-    (bytes, clipped)
+    clipped
 }
 
 /// The samples at which truth is written.

@@ -76,22 +76,25 @@ impl Format {
 
     /// Appends samples `i + jq`, in LSB, to `out`. Real formats ignore `q`.
     pub fn pack(self, i: &[f32], q: &[f32], out: &mut Vec<u8>) {
-        out.reserve(i.len() * self.bytes());
-        let pairs = i.iter().zip(q);
+        let samples = if self.is_complex() { i.len().min(q.len()) } else { i.len() };
+        let begin = out.len();
+        out.resize(begin + samples * self.bytes(), 0);
+        self.pack_into(i, q, &mut out[begin..]);
+    }
+
+    /// [`Self::pack`] over the bytes of `out`, as many whole samples as all three hold.
+    #[inline(always)]
+    pub fn pack_into(self, i: &[f32], q: &[f32], out: &mut [u8]) {
         match self {
-            Self::Ci8 => pairs.for_each(|(i, q)| out.extend([round_i8(*i) as u8, round_i8(*q) as u8])),
-            Self::Cu8 => pairs.for_each(|(i, q)| out.extend([round_u8(*i), round_u8(*q)])),
-            Self::Ci16Le => pairs.for_each(|(i, q)| {
-                let [a, b] = round_i16(*i).to_le_bytes();
-                let [c, d] = round_i16(*q).to_le_bytes();
-                out.extend([a, b, c, d]);
-            }),
-            Self::Cf32Le => pairs.for_each(|(i, q)| {
-                out.extend(i.to_le_bytes());
-                out.extend(q.to_le_bytes());
-            }),
-            Self::Ri8 => out.extend(i.iter().map(|i| round_i8(*i) as u8)),
-            Self::Ri16Le => i.iter().for_each(|i| out.extend(round_i16(*i).to_le_bytes())),
+            Self::Ci8 => interleave(i, q, out, |x| [round_i8(x) as u8]),
+            Self::Cu8 => interleave(i, q, out, |x| [round_u8(x)]),
+            Self::Ci16Le => interleave(i, q, out, |x| round_i16(x).to_le_bytes()),
+            Self::Cf32Le => interleave(i, q, out, f32::to_le_bytes),
+            Self::Ri8 => out.iter_mut().zip(i).for_each(|(out, i)| *out = round_i8(*i) as u8),
+            Self::Ri16Le => {
+                let (pairs, _) = out.as_chunks_mut::<2>();
+                pairs.iter_mut().zip(i).for_each(|(out, i)| *out = round_i16(*i).to_le_bytes());
+            }
         }
     }
 
@@ -135,17 +138,30 @@ fn split<const N: usize>(
     }
 }
 
+/// Writes `i`, `q` in turn, each as the `N` bytes that `write` makes of it.
+#[inline(always)]
+fn interleave<const N: usize>(i: &[f32], q: &[f32], out: &mut [u8], write: impl Fn(f32) -> [u8; N]) {
+    let (components, _) = out.as_chunks_mut::<N>();
+    let (pairs, _) = components.as_chunks_mut::<2>();
+    for ((pair, i), q) in pairs.iter_mut().zip(i).zip(q) {
+        *pair = [write(*i), write(*q)];
+    }
+}
+
 /// Adding this to an `f32` of magnitude below 2^22 leaves its integer, rounded half to even, in the low bits.
 const ROUNDING_BIAS: f32 = 12_582_912.0;
 
+#[inline(always)]
 fn round_i8(x: f32) -> i8 {
     (x.clamp(-127.0, 127.0) + ROUNDING_BIAS).to_bits() as i8
 }
 
+#[inline(always)]
 fn round_u8(x: f32) -> u8 {
     ((x + 127.5).clamp(0.0, 255.0) + ROUNDING_BIAS).to_bits() as u8
 }
 
+#[inline(always)]
 fn round_i16(x: f32) -> i16 {
     (x.clamp(-32_767.0, 32_767.0) + ROUNDING_BIAS).to_bits() as i16
 }

@@ -5,6 +5,7 @@
 
 use super::{Edge, Run, exact, lanes};
 use crate::generator::stage::noise;
+use crate::gnss::samples::Format;
 
 /// An instruction set for which kernels are compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,6 +99,41 @@ pub fn add_noise(level: Level, seed: u64, block: u64, sigma: f32, i: &mut [f32],
         Level::Avx2 if level.is_available() => unsafe { noise_avx2(seed, block, sigma, i, q) },
         _ => noise::add_block(seed, block, sigma, i, q),
     }
+}
+
+/// Rounds and packs samples into `out`, and counts the components that `format` cannot hold.
+pub fn pack(level: Level, format: Format, i: &[f32], q: &[f32], out: &mut [u8]) -> u64 {
+    match level {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the processor has these instructions.
+        Level::Avx512 if level.is_available() => unsafe { pack_avx512(format, i, q, out) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the processor has these instructions.
+        Level::Avx2 if level.is_available() => unsafe { pack_avx2(format, i, q, out) },
+        _ => pack_lanes(format, i, q, out),
+    }
+}
+
+#[inline(always)]
+fn pack_lanes(format: Format, i: &[f32], q: &[f32], out: &mut [u8]) -> u64 {
+    format.pack_into(i, q, out);
+    format.full_scale_lsb().map_or(0, |full| {
+        // `u32` vectorises twice as wide; a slice of samples in memory is far shorter than 2^32.
+        let outside = |x: &[f32]| u64::from(x.iter().map(|x| u32::from(x.abs() > full + 0.5)).sum::<u32>());
+        outside(i) + if format.is_complex() { outside(q) } else { 0 }
+    })
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+fn pack_avx512(format: Format, i: &[f32], q: &[f32], out: &mut [u8]) -> u64 {
+    pack_lanes(format, i, q, out)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn pack_avx2(format: Format, i: &[f32], q: &[f32], out: &mut [u8]) -> u64 {
+    pack_lanes(format, i, q, out)
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -37,6 +37,9 @@ struct Sent {
 pub struct Transmitter {
     pub sv: Sv,
     pub signal: &'static Signal,
+    if_hz: f64,
+    /// Of the IF, in 2^-64 turn a sample.
+    tone_step: u64,
     sent: Vec<Sent>,
     grid: Grid,
     /// View at the beginning of each second, by its number.
@@ -59,6 +62,28 @@ pub struct Scratch {
     bits: Vec<u64>,
     wave: Vec<f32>,
     exact: Vec<f64>,
+    anchor: Option<Anchor>,
+}
+
+/// What satellites share at the first sample of a run; 128-bit divisions that are worth keeping.
+#[derive(Clone, Copy)]
+struct Anchor {
+    n: u64,
+    if_hz: f64,
+    epoch: Epoch,
+    tone: u64,
+}
+
+impl Scratch {
+    fn anchor(&mut self, scene: &Scene, if_hz: f64, n: u64) -> Anchor {
+        match self.anchor {
+            Some(anchor) if anchor.n == n && anchor.if_hz == if_hz => anchor,
+            _ => {
+                let tone = tone_turns(if_hz, scene.clock.rate, n);
+                *self.anchor.insert(Anchor { n, if_hz, epoch: scene.clock.epoch(n), tone })
+            }
+        }
+    }
 }
 
 impl Transmitter {
@@ -79,6 +104,7 @@ impl Transmitter {
             let gain = component.power_share.sqrt() * edge.gain(spreading.correlation(), step);
             sent.push(Sent { component, spreading, gain });
         }
+        let if_hz = scene.metadata.if_hz(signal);
         let clock = scene.receiver_clock;
         let breaks = scene
             .trajectory
@@ -90,6 +116,8 @@ impl Transmitter {
         Ok(Some(Self {
             sv,
             signal,
+            if_hz,
+            tone_step: tone_turns(if_hz, scene.clock.rate, 1),
             sent,
             grid,
             view: BTreeMap::new(),
@@ -256,14 +284,15 @@ impl Transmitter {
         let (n, length) = (span.0, (span.1 - span.0) as f64);
         let (u, v) = (part.fraction(span.0), part.fraction(span.1));
         let cn0_hz = path.cn0_hz[0] + (path.cn0_hz[1] - path.cn0_hz[0]) * 0.5 * (u + v);
-        let carrier = carrier(scene, self.signal, path, (n, length), (u, v));
+        let anchor = scratch.anchor(scene, self.if_hz, n);
+        let carrier = carrier(scene.metadata.inverted, (anchor.tone, self.tone_step), path, length, (u, v));
         let real = if scene.metadata.format.is_complex() { 1.0 } else { std::f64::consts::SQRT_2 };
         let rate_hz = scene.clock.rate.hz();
         let amplitude = real * (2.0 * cn0_hz.max(0.0) / rate_hz).sqrt() * f64::from(scene.noise_lsb);
         for sent in &self.sent {
             let sent_s = length / rate_hz - path.delay.change(u, v);
             let step = (sent_s * sent.spreading.step_rate_hz() / length * CODE_ONE as f64) as u64;
-            let at = sent.spreading.at(scene.clock.epoch(n), path.delay.at(u));
+            let at = sent.spreading.at(anchor.epoch, path.delay.at(u));
             let message = sent.spreading.message();
             let position =
                 sent.spreading.strip(at, step, i.len(), |period| self.negative(message, period), &mut scratch.bits);
@@ -284,17 +313,14 @@ impl Transmitter {
     }
 }
 
-/// Carrier phase of sample `n` and its step, in 2^-64 turn: `if_hz · n / rate − s · rho_phi / lambda`
-/// with s = −1 in an inverted spectrum.
-fn carrier(scene: &Scene, signal: &Signal, path: &Path, (n, length): (u64, f64), (u, v): (f64, f64)) -> (u64, u64) {
-    let if_hz = scene.metadata.if_hz(signal);
+/// Carrier phase at the start of a run and its step, in 2^-64 turn: `if_hz · n / rate − s · rho_phi / lambda`
+/// with s = −1 in an inverted spectrum. `tone` is the first term, and its step.
+fn carrier(inverted: bool, tone: (u64, u64), path: &Path, length: f64, (u, v): (f64, f64)) -> (u64, u64) {
     let (at, step) = (turns(path.carrier.at(u)), turns(path.carrier.change(u, v) / length));
-    let tone = tone_turns(if_hz, scene.clock.rate, n);
-    let tone_step = tone_turns(if_hz, scene.clock.rate, 1);
-    if scene.metadata.inverted {
-        (tone.wrapping_add(at), tone_step.wrapping_add(step))
+    if inverted {
+        (tone.0.wrapping_add(at), tone.1.wrapping_add(step))
     } else {
-        (tone.wrapping_sub(at), tone_step.wrapping_sub(step))
+        (tone.0.wrapping_sub(at), tone.1.wrapping_sub(step))
     }
 }
 
