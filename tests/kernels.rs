@@ -249,38 +249,3 @@ fn the_noise_is_white_and_its_components_and_seeds_are_independent() {
     assert!(against(&squares(&i), &squares(&q), 0).abs() < 2.0 * bar);
     assert!(against(&squares(&i), &squares(&i), 1).abs() < 2.0 * bar);
 }
-
-#[test]
-#[ignore = "prints speeds; run alone with --ignored --nocapture"]
-fn speeds() {
-    let filter = Filter::new(0.45);
-    for rate_hz in [2.6e6, 25e6] {
-        let case = Case::new(rate_hz, CodeTime { period: 3, phase: 12345 }, 4096);
-        for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
-            for edge in edges(&filter) {
-                let (mut i, mut q, mut wave) = (vec![0.0; 4096], vec![0.0; 4096], Vec::new());
-                let run = case.run(1e-3);
-                let best = (0..20)
-                    .map(|_| {
-                        let start = std::time::Instant::now();
-                        (0..100).for_each(|_| accumulate(level, edge, &run, &mut i, &mut q, &mut wave));
-                        start.elapsed().as_secs_f64() / 409_600.0 * 1e9
-                    })
-                    .fold(f64::MAX, f64::min);
-                let name = format!("{edge:?}");
-                println!("{rate_hz:e} {level:?} {} {best:.3} ns", &name[..4]);
-            }
-        }
-    }
-    for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
-        let (mut i, mut q) = (vec![0.0; 4096], vec![0.0; 4096]);
-        let best = (0..20)
-            .map(|_| {
-                let start = std::time::Instant::now();
-                (0..100).for_each(|b| add_noise(level, 1, b, 1.0, &mut i, &mut q));
-                819_200.0 / start.elapsed().as_secs_f64() / 1e6
-            })
-            .fold(0.0, f64::max);
-        println!("noise {level:?} {best:.0} M normals/s");
-    }
-}

@@ -337,33 +337,16 @@ fn the_data_bits_in_the_samples_are_the_message_and_navigation_rows_are_its_para
 }
 
 #[test]
-#[ignore = "prints speeds and knots of the shipped scenes; run alone with --ignored --nocapture"]
-fn speeds_of_the_shipped_scenes() {
+fn the_shipped_scenes_keep_to_their_knot_tolerance() {
     use gnss_twin::generator::scenario::{Overrides, Scenario};
     let directory = tempfile::tempdir().unwrap();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     for name in ["static", "moderate", "high_dynamics"] {
         let text = std::fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();
-        let (mut scene, _) = Scenario::parse(&text, name).unwrap().compose(&folder, &Overrides::default()).unwrap();
-        for code_edge in [CodeEdge::Nearest, CodeEdge::Area, CodeEdge::BandLimited] {
-            scene.fidelity.code_edge = code_edge;
-            let mut writer = truth::Writer::create(directory.path()).unwrap();
-            let start = std::time::Instant::now();
-            let done =
-                generate_with(&scene, &mut std::io::sink(), &mut writer, &mut |_| (), &Options::default()).unwrap();
-            let wall_s = start.elapsed().as_secs_f64();
-            let duration_s = scene.clock.rate.elapsed_s(scene.samples);
-            println!(
-                "{name} {code_edge:?}: {:.1} x real time, {} satellites, {} knots, worst {:.1e} of {:.1e} cycles, {} clipped",
-                duration_s / wall_s,
-                done.satellites.len(),
-                done.knots,
-                done.worst_knot_cycles,
-                scene.fidelity.knot_tolerance_cycles,
-                done.clipped
-            );
-            assert!(done.worst_knot_cycles <= scene.fidelity.knot_tolerance_cycles);
-        }
+        let (scene, _) = Scenario::parse(&text, name).unwrap().compose(&folder, &Overrides::default()).unwrap();
+        let mut writer = truth::Writer::create(directory.path()).unwrap();
+        let done = generate_with(&scene, &mut std::io::sink(), &mut writer, &mut |_| (), &Options::default()).unwrap();
+        assert!(done.worst_knot_cycles <= scene.fidelity.knot_tolerance_cycles, "{name}: {}", done.worst_knot_cycles);
     }
 }
 
@@ -410,46 +393,4 @@ fn a_satellite_that_rises_appears_at_a_whole_second_in_samples_and_in_truth_alik
     let rows = observations(directory.path());
     assert_eq!((rows[0].sample, rows[0].locked_s, rows.len()), (5_200_000, 0.0, 20));
     assert_eq!(done.satellites, [sv]);
-}
-
-/// Processor time of this thread (Linux).
-fn thread_busy_s() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
-    text.split_whitespace().next().unwrap().parse::<f64>().unwrap() * 1e-9
-}
-
-#[test]
-#[ignore = "prints speeds; run alone with --ignored --nocapture"]
-fn speeds_from_scene_to_bytes_on_one_thread() {
-    let directory = tempfile::tempdir().unwrap();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    for (rate_hz, duration_s) in [(2.6e6, 10.0), (25e6, 1.5)] {
-        for (code_edge, noise) in [
-            (CodeEdge::Nearest, false),
-            (CodeEdge::Area, false),
-            (CodeEdge::Nearest, true),
-            (CodeEdge::Area, true),
-            (CodeEdge::BandLimited, false),
-        ] {
-            let mut scene = scene(rate_hz, duration_s, Format::Ci8, 1_575.42e6, false);
-            (scene.fidelity.code_edge, scene.noise) = (code_edge, noise);
-            let mut satellites = 0;
-            let best_s = (0..5)
-                .map(|_| {
-                    let mut writer = truth::Writer::create(directory.path()).unwrap();
-                    let options = Options::default();
-                    pool.install(|| {
-                        let start_s = thread_busy_s();
-                        let made = generate_with(&scene, &mut std::io::sink(), &mut writer, &mut |_| (), &options);
-                        satellites = made.unwrap().satellites.len();
-                        thread_busy_s() - start_s
-                    })
-                })
-                .fold(f64::MAX, f64::min);
-            let rate = scene.samples as f64 * satellites as f64 / best_s / 1e9;
-            println!(
-                "{rate_hz:e} {code_edge:?} noise {noise}: {satellites} satellites, {rate:.2} G satellite samples/s"
-            );
-        }
-    }
 }

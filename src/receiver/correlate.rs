@@ -236,23 +236,6 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "prints nanoseconds; run by hand with --release -- --ignored --nocapture"]
-    fn speed() {
-        let (i, q) = (noise(2600, 3), noise(2600, 4));
-        let taps = [chips_to_units(0.25), 0, chips_to_units(-0.25)];
-        let nco = Nco { carrier: 77, carrier_step: 1 << 60, code: 5, code_step: chips_to_units(1.023 / 2.6) as u64 };
-        for edge in [Edge::Area, Edge::Nearest] {
-            for level in kernel::Level::all() {
-                let replica = replica(edge);
-                let begin = std::time::Instant::now();
-                let sum: f64 = (0..20_000).map(|_| kernel::correlate(level, &replica, &i, &q, &nco, &taps)[1].re).sum();
-                let ns = begin.elapsed().as_secs_f64() * 1e9 / (20_000.0 * 2600.0);
-                println!("{edge:?} {level:?}: {ns:.3} ns a sample ({sum:.0})");
-            }
-        }
-    }
-
-    #[test]
     fn the_correlation_model_is_the_measured_one() {
         // Mean over many sub-sample phases of the replica's own products; sidelobes of a Gold code are below 65/1023.
         for (edge, rate) in [(Edge::Area, 2.6007), (Edge::Nearest, 2.6007), (Edge::Area, 10.3007)] {
