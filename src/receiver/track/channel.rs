@@ -98,6 +98,8 @@ pub struct Channel {
     sums: [Complex64; 3],
     summed: u32,
     previous: Option<Complex64>,
+    /// Prompt sum of the last update.
+    previous_sum: Option<Complex64>,
     symbol: (Complex64, u32),
     rotation: (Complex64, u32),
     power: Option<f64>,
@@ -167,6 +169,7 @@ impl Channel {
             sums: [Complex64::ZERO; 3],
             summed: 0,
             previous: None,
+            previous_sum: None,
             symbol: (Complex64::ZERO, 0),
             rotation: (Complex64::ZERO, 0),
             power: None,
@@ -395,6 +398,11 @@ impl Channel {
                 self.carrier_rates.rate += self.fll.phase * last.fll_hz;
             }
         }
+        if let (Some(before), Stage::Tracking(_)) = (self.previous_sum, self.stage) {
+            // Only reported: the frequency loop has done its work. Two quadrants do not mind a symbol in between.
+            last.fll_hz = loops::frequency_two_quadrant(before, prompt, t_s);
+        }
+        self.previous_sum = Some(prompt);
         last.pll_cycles = if self.has_symbols { loops::costas(prompt) } else { loops::phase(prompt) };
         if self.stage != Stage::Frequency {
             let (rates, jump) = loops::step(&self.pll, &self.carrier_rates, last.pll_cycles, t_s);
