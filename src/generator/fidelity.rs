@@ -123,8 +123,8 @@ impl Fidelity {
         // Edges come once in so many samples: what a filter's response costs falls with the rate.
         let dense = rate_hz >= 8e6;
         match (self.carrier, self.code_edge, dense) {
-            (Arithmetic::F32, CodeEdge::Nearest, _) => 0.5,
-            (Arithmetic::F32, CodeEdge::Area, _) => 0.6,
+            (Arithmetic::F32, CodeEdge::Nearest, _) => 0.3,
+            (Arithmetic::F32, CodeEdge::Area, _) => 0.4,
             (Arithmetic::F32, CodeEdge::BandLimited, false) => 3.4,
             (Arithmetic::F32, CodeEdge::BandLimited, true) => 1.5,
             (Arithmetic::F64, CodeEdge::Nearest, _) => 4.1,
