@@ -72,6 +72,13 @@ fn a_misspelt_key_is_named_with_its_place_and_the_nearest_right_one() {
     for part in ["typo.toml", "sampel_rate_hz", "sample_rate_hz"] {
         assert!(message.contains(part), "{message}");
     }
+    fs::write(here.path().join("typo.toml"), format!("{SHORT}[receiver.trackng]\npll_order = 2\n")).unwrap();
+    let output = twin(&["run", "typo.toml"], here.path());
+    assert_eq!(code(&output), 65);
+    let message = stderr(&output);
+    for part in ["typo.toml", "trackng", "tracking"] {
+        assert!(message.contains(part), "{message}");
+    }
 }
 
 #[test]

@@ -16,14 +16,17 @@ const EMBEDDED: &str = include_str!("../../scenarios/static.toml");
 /// A scenario as written, and the directory that its paths are relative to.
 pub struct Named {
     pub scenario: Scenario,
+    /// What messages call it.
+    pub name: String,
     pub directory: PathBuf,
 }
 
 /// Reads the scenario at `path`, or the embedded one.
 pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
     let Some(path) = path else {
-        let scenario = Scenario::parse(EMBEDDED, "the embedded static scene").map_err(CliError::bug)?;
-        return Ok(Named { scenario, directory: PathBuf::from(".") });
+        let name = "the embedded static scene".to_owned();
+        let scenario = Scenario::parse(EMBEDDED, &name).map_err(CliError::bug)?;
+        return Ok(Named { scenario, name, directory: PathBuf::from(".") });
     };
     let name = path.display().to_string();
     let bytes = fs::read(path).map_err(|error| CliError::read(&name, &error))?;
@@ -31,7 +34,7 @@ pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
         .map_err(|error| CliError::input(format!("{name}: not UTF-8 at byte {}", error.utf8_error().valid_up_to())))?;
     let scenario = Scenario::parse(&text, &name).map_err(CliError::input)?;
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    Ok(Named { scenario, directory: directory.to_owned() })
+    Ok(Named { scenario, name, directory: directory.to_owned() })
 }
 
 /// Limits the threads that the work may use.
@@ -52,7 +55,9 @@ pub fn compose(named: &Named, seed: Option<u64>, format: Option<Format>) -> Resu
 pub fn receiver_settings(named: &Named) -> Result<Settings, CliError> {
     match &named.scenario.receiver {
         None => Ok(Settings::default()),
-        Some(table) => Settings::from_table(table.clone(), "[receiver]").map_err(CliError::input),
+        Some(table) => {
+            Settings::from_table(table.clone(), &format!("{}: [receiver]", named.name)).map_err(CliError::input)
+        }
     }
 }
 
