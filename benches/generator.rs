@@ -5,19 +5,24 @@
 //! that thread, the median of interleaved runs. The end-to-end rows start the program itself on two threads.
 
 use std::fmt::Write as _;
+use std::hint::black_box;
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
 use gnss_twin::analysis::statistics::median;
 use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::{Fidelity, Grade, Scene};
+use gnss_twin::generator::scene::{Arithmetic, Fidelity, Grade, Scene};
 use gnss_twin::generator::stage::noise::{BLOCK_SAMPLES, add_block_exact};
 use gnss_twin::generator::stream::{Options, generate_with};
-use gnss_twin::generator::synth::isa::{Level, add_noise};
-use gnss_twin::generator::synth::transmitter::Transmitter;
-use gnss_twin::generator::synth::{Edge, RUN_SAMPLES};
+use gnss_twin::generator::synth::chips::{CodeTime, Spreading};
+use gnss_twin::generator::synth::isa::{self, Level, add_noise};
+use gnss_twin::generator::synth::lanes::{Buffers, GROUP};
+use gnss_twin::generator::synth::transmitter::{Scratch, Transmitter};
+use gnss_twin::generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run};
 use gnss_twin::generator::truth;
+use gnss_twin::gnss::gps::l1ca::L1_CA;
+use gnss_twin::gnss::samples::Format;
 use gnss_twin::gnss::satellite::Sv;
 
 /// Nothing but a place: effects are added by name.
@@ -35,6 +40,14 @@ fn busy_s(start: Instant) -> f64 {
     let ns = told.and_then(|text| text.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()));
     ns.map_or_else(|| start.elapsed().as_secs_f64(), |ns| ns * 1e-9)
 }
+
+/// Vector operations of the fast kernel on a group of 32 samples of one satellite with AVX-512, counted in its machine code.
+const NEAREST_OPERATIONS: f64 = 26.0;
+const AREA_OPERATIONS: f64 = 40.0;
+
+/// Operations of 512 bits that a core begins in a cycle: Zen 4 has four vector pipes of 256 bits, Intel's server
+/// cores two of 512.
+const OPERATIONS_PER_CYCLE: f64 = 2.0;
 
 /// One thing to time.
 struct Case {
@@ -60,7 +73,7 @@ impl Case {
         let text = format!("duration_s = {seconds}\n{bare}{tables}[front_end]\nsample_rate_hz = {rate_hz}\n");
         let scenario = Scenario::parse(&text, "bench").unwrap();
         let (mut scene, _) = scenario.compose(Path::new("scenarios"), &Overrides::default()).unwrap();
-        scene.fidelity = Fidelity::suited(grade, rate_hz);
+        scene.fidelity = Fidelity::suited(grade, rate_hz, scene.fidelity.allowed_m);
         let up: Vec<Sv> = scene
             .catalogue
             .satellites()
@@ -158,6 +171,95 @@ fn normals(lines: &mut Vec<Line>) {
     lines.push(Line::new("Gaussian noise in f64", double, "M normals/s/core", None));
 }
 
+/// Packing and unpacking, a run at a time.
+fn formats(lines: &mut Vec<Line>) {
+    let i: Vec<f32> = (0..RUN_SAMPLES).map(|n| (n % 255) as f32 - 127.0).collect();
+    let q: Vec<f32> = i.iter().rev().copied().collect();
+    for format in [Format::Ci8, Format::Ci16Le] {
+        let mut bytes = vec![0; RUN_SAMPLES * format.bytes()];
+        let (mut back_i, mut back_q) = (Vec::new(), Vec::new());
+        let packing = nanoseconds(|| {
+            isa::pack(Level::detect(), format, black_box(&i), black_box(&q), &mut bytes);
+        });
+        let unpacking = nanoseconds(|| format.unpack(black_box(&bytes), &mut back_i, &mut back_q));
+        for (what, ns) in [("packing", packing), ("unpacking", unpacking)] {
+            let giga = RUN_SAMPLES as f64 / ns;
+            lines.push(Line::new(&format!("{what} {format}, in cache"), giga, "G samples/s/core", None));
+        }
+    }
+}
+
+/// Median time of one call, in ns. A turn lasts about 0.1 s: the system tells processor time in steps of milliseconds.
+fn nanoseconds(mut call: impl FnMut()) -> f64 {
+    (0..200).for_each(|_| call());
+    let start = Instant::now();
+    (0..200).for_each(|_| call());
+    let calls = (20.0 / start.elapsed().as_secs_f64()) as usize + 1;
+    let mut turn = |_| {
+        let start = Instant::now();
+        let before_s = busy_s(start);
+        (0..calls).for_each(|_| call());
+        (busy_s(start) - before_s) / calls as f64 * 1e9
+    };
+    median(&(0..9).map(&mut turn).collect::<Vec<_>>()).unwrap()
+}
+
+/// Where the time of a satellite's sample goes at 2.6 Msps, and the least that the processor's arithmetic allows.
+fn profile() -> Vec<Line> {
+    const SATELLITES: usize = 11;
+    let level = Level::detect();
+    let samples = (SATELLITES * RUN_SAMPLES) as f64;
+    // Each line of xorshift is a shift and an exclusive or that wait for each other: six cycles a step.
+    let mut x = 1_u64;
+    let chain_ns = nanoseconds(|| {
+        for _ in 0..1000 {
+            x ^= x << 13;
+            x ^= x >> 7;
+            x ^= x << 17;
+        }
+        black_box(x);
+    });
+    let clock_ghz = 6000.0 / chain_ns;
+    let mut lines = vec![Line::new("clock, from a chain of six cycles", clock_ghz, "GHz", None)];
+    let mut case = Case::new("", "", Grade::Balanced, 2.6e6, 1.0, SATELLITES);
+    for (name, grade, edge, operations) in [
+        ("nearest edges", Grade::Fast, Edge::Nearest, NEAREST_OPERATIONS),
+        ("area edges", Grade::Balanced, Edge::Area, AREA_OPERATIONS),
+    ] {
+        case.scene.fidelity = Fidelity::of(grade);
+        let mut transmitters: Vec<Transmitter> = (case.scene.catalogue.satellites())
+            .filter(|sv| !case.scene.excluded.contains(sv))
+            .filter_map(|sv| Transmitter::new(&case.scene, sv, &L1_CA, edge).unwrap())
+            .collect();
+        transmitters.iter_mut().for_each(|t| t.prepare(&case.scene, 0, RUN_SAMPLES as u64).unwrap());
+        let mut scratch = Scratch::default();
+        let (mut i, mut q) = (vec![0.0; RUN_SAMPLES], vec![0.0; RUN_SAMPLES]);
+        let kernel = Kernel { edge, arithmetic: Arithmetic::F32, level };
+        let both_ns = nanoseconds(|| {
+            transmitters.iter().for_each(|t| t.arrange(&case.scene, 0, RUN_SAMPLES, &mut scratch));
+            scratch.bank.render(kernel, &mut i, &mut q);
+        });
+        let mut bits = Vec::new();
+        let step = (1.023 / 2.6 * CODE_ONE as f64) as u64;
+        let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
+        let position = spreading.strip(CodeTime { period: 0, phase: 0 }, step, RUN_SAMPLES, |_| false, &mut bits);
+        let run =
+            Run { bits: &bits, position, step, turns: 1 << 60, turns_step: 0x0765_4321_0fed_cba9, amplitude: 0.3 };
+        let mut buffers = Buffers::default();
+        let kernel_ns = nanoseconds(|| {
+            isa::accumulate(level, edge, black_box(&[run; SATELLITES]), &mut i, &mut q, &mut buffers);
+        });
+        let unit = "ns a sample and satellite";
+        lines.push(Line::new(&format!("{name}: gathering runs"), (both_ns - kernel_ns) / samples, unit, None));
+        lines.push(Line::new(&format!("{name}: kernel"), kernel_ns / samples, unit, None));
+        if level == Level::Avx512 {
+            let limit_ns = operations / OPERATIONS_PER_CYCLE / GROUP as f64 / clock_ghz;
+            lines.push(Line::new(&format!("{name}: limit of the kernel's arithmetic"), limit_ns, unit, None));
+        }
+    }
+    lines
+}
+
 /// Runs the program on a scene: times real time of generator and receiver together (pictures apart), and the most
 /// memory that it took, in MiB.
 fn run(program: &Path, text: &str) -> Option<(f64, f64)> {
@@ -195,6 +297,11 @@ fn whole(lines: &mut Vec<Line>) {
     }
 }
 
+/// A source of interference as strong as a satellite with link budget.
+fn jammer(kind: &str, keys: &str) -> String {
+    format!("[[interference]]\nkind = \"{kind}\"\npower_dbw = -130\n{keys}")
+}
+
 /// What each thing costs when it enters.
 fn required(lines: &mut Vec<Line>) {
     let scenes = [
@@ -204,6 +311,11 @@ fn required(lines: &mut Vec<Line>) {
         ("+ receiver clock", format!("{IONOSPHERE}{TROPOSPHERE}{CLOCK}")),
         ("+ noise", format!("{IONOSPHERE}{TROPOSPHERE}{CLOCK}{NOISE}")),
         ("mask 60 deg, two satellites above it", "[satellites]\nmask_deg = 60\n".to_owned()),
+        ("bare + a tone", jammer("cw", "")),
+        ("bare + a chirp", jammer("chirp", "sweep_hz = 2e6\nsweep_s = 1e-5\n")),
+        ("bare + sinusoidal FM", jammer("sine_fm", "deviation_hz = 1e6\nrate_hz = 1e4\n")),
+        ("bare + a matched jammer", jammer("matched", "")),
+        ("bare + noise of 1 MHz", jammer("noise", "bandwidth_hz = 1e6\n")),
     ];
     let mut cases: Vec<Case> = scenes
         .iter()
@@ -234,14 +346,21 @@ fn required(lines: &mut Vec<Line>) {
     }
 }
 
-/// A batch of blocks in the first minute and in the last minute of a day.
+/// Knots and messages of a minute at the beginning of a day, late in it, and at its end. Broadcast sets change on even
+/// hours: in the last minute the orbit passes from one set to the next, so each evaluation is two and the curve takes
+/// shorter polynomials; the first minute of the file has no set before, and 23:00 is as far from a change as can be.
 fn day(lines: &mut Vec<Line>) {
     let scene = Case::at("00:00:00", "day", "", (Grade::Balanced, 2.6e6), 86_400.0, 9).scene;
     let satellites: Vec<Sv> = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)).collect();
-    let mut times = [Vec::new(), Vec::new()];
     let stretch = 2600 * 60_000_u64;
+    let minutes = [
+        ("first minute of a day", 0),
+        ("minute after 23:00", 2_600_000 * 3600 * 23),
+        ("last minute of a day, sets changing", scene.samples - stretch),
+    ];
+    let mut times = minutes.map(|_| Vec::new());
     for _ in 0..5 {
-        for (times, from) in times.iter_mut().zip([0, scene.samples - stretch]) {
+        for (times, (_, from)) in times.iter_mut().zip(minutes) {
             let from = from / RUN_SAMPLES as u64 * RUN_SAMPLES as u64;
             let (mut count, mut seconds) = (0.0, 0.0);
             for sv in &satellites {
@@ -255,7 +374,7 @@ fn day(lines: &mut Vec<Line>) {
             times.push(seconds / count * 1e3);
         }
     }
-    for (name, times) in ["first minute of a day", "last minute of a day"].iter().zip(times) {
+    for ((name, _), times) in minutes.iter().zip(times) {
         let name = format!("{name}: knots and messages of a satellite");
         lines.push(Line::new(&name, median(&times).unwrap(), "ms", None));
     }
@@ -266,8 +385,8 @@ fn output_of(program: &str, arguments: &[&str]) -> String {
     found.map_or_else(String::new, |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
 }
 
-/// Replaces what stands between two marks of `reports/performance.md`.
-fn publish(lines: &[Line], split: usize) {
+/// Replaces what stands between the marks of `reports/performance.md`.
+fn publish(lines: &[Line], split: usize, profile: &[Line]) {
     const HEAD: &str = "|figure|value|unit|bar|met|\n|---|---|---|---|---|\n";
     let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model =
@@ -285,23 +404,32 @@ fn publish(lines: &[Line], split: usize) {
         }
         let _ = writeln!(text, "{}", line.text());
     }
+    let mut shares = "|figure|value|unit|\n|---|---|---|\n".to_owned();
+    for line in profile {
+        let _ = writeln!(shares, "|{}|{:.3}|{}|", line.figure, line.value, line.unit);
+    }
     let path = Path::new("reports/performance.md");
-    let page = std::fs::read_to_string(path).unwrap();
-    let (begin, end) = ("<!-- generator -->\n", "<!-- end of generator -->\n");
-    let (before, rest) = page.split_once(begin).unwrap();
-    let (_, after) = rest.split_once(end).unwrap();
-    std::fs::write(path, format!("{before}{begin}{text}{end}{after}")).unwrap();
+    let mut page = std::fs::read_to_string(path).unwrap();
+    for (mark, text) in [("generator", text), ("profile", shares)] {
+        let (begin, end) = (format!("<!-- {mark} -->\n"), format!("<!-- end of {mark} -->\n"));
+        let (before, rest) = page.split_once(&begin).unwrap();
+        let (_, after) = rest.split_once(&end).unwrap();
+        page = format!("{before}{begin}{text}{end}{after}");
+    }
+    std::fs::write(path, page).unwrap();
 }
 
 fn main() {
     let mut lines = Vec::new();
+    let profile = profile();
     synthesis(&mut lines);
     normals(&mut lines);
+    formats(&mut lines);
     whole(&mut lines);
     let split = lines.len();
     required(&mut lines);
     day(&mut lines);
     if std::env::args().any(|argument| argument == "--write") {
-        publish(&lines, split);
+        publish(&lines, split, &profile);
     }
 }

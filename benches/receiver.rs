@@ -1,9 +1,16 @@
-//! Speed of the receiver: `cargo bench --bench receiver` prints one row a figure, "figure, value, unit, bar".
+//! Speed of the receiver against its bars, and what its correlators err: `cargo bench --bench receiver` prints the rows of
+//! `reports/performance.md` and, with `-- --write`, writes them there.
 //!
-//! Values are medians of runs that take turns, so that a disturbance of the machine meets all of them.
+//! Speeds are medians of runs that take turns, so that a disturbance of the machine meets all of them. Errors are against
+//! correlation in `f64` of the same samples, millisecond by millisecond.
 
+use std::fmt::Write as _;
 use std::hint::black_box;
+use std::path::Path;
+use std::process::Command;
 use std::time::Instant;
+
+use num_complex::Complex64;
 
 use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
 use gnss_twin::gnss::samples::{Format, IfMetadata};
@@ -11,17 +18,26 @@ use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::signal::Signal;
 use gnss_twin::gnss::time::Rate;
 use gnss_twin::receiver::acquire::{AcquisitionSettings, Searcher, samples_needed};
-use gnss_twin::receiver::correlate::{Edge, Nco, Replica, chips_to_units};
+use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
 use gnss_twin::receiver::source::Block;
 
 const ROUNDS: usize = 15;
 const CHANNELS: usize = 12;
 const CHIP_HZ: f64 = 1.023e6;
+const CHIP_M: f64 = 299_792_458.0 / CHIP_HZ;
+/// Early, prompt and late, in chips.
+const TAPS: [f64; 3] = [0.25, 0.0, -0.25];
+/// Vector operations of 512 bits for 32 samples and three taps with area edges in 16 bits, counted in the source: 8 to
+/// make integers, 6 to turn them, 14 a tap.
+const OPERATIONS: f64 = 8.0 + 6.0 + 3.0 * 14.0;
+/// Such operations a cycle at most, on Zen 4 (two halves each on four ports) as on two ports of Intel's.
+const OPERATIONS_A_CYCLE: f64 = 2.0;
 
 struct Row {
     figure: String,
     unit: &'static str,
-    bar: &'static str,
+    /// Smallest, or with a minus sign largest, value wanted.
+    bar: Option<f64>,
     run: Box<dyn FnMut() -> f64>,
     values: Vec<f64>,
 }
@@ -38,18 +54,20 @@ fn noise(bytes: usize) -> Vec<u8> {
 }
 
 /// Channel·samples a second, in 1e9: blocks of 50 ms (at most 2^17 samples) unpacked once, then every channel period by period.
-fn tracking(rate_hz: f64, edge: Edge) -> Box<dyn FnMut() -> f64> {
+fn tracking(rate_hz: f64, edge: Edge, arithmetic: Arithmetic) -> Box<dyn FnMut() -> f64> {
     let block = ((rate_hz * 0.05) as usize).min(1 << 17);
     let period = (rate_hz * 1e-3) as usize;
     let bytes = noise(2 * block);
     let replicas: Vec<Replica> = (1..=CHANNELS).filter_map(|prn| Replica::new(l1ca::code(prn as u8)?, edge)).collect();
-    let taps = [0.25, 0.0, -0.25].map(chips_to_units);
+    let taps = TAPS.map(chips_to_units);
+    // The twin is not waited for.
+    let channels = if arithmetic == Arithmetic::F64 { 1 } else { CHANNELS };
     let (mut i, mut q) = (Vec::new(), Vec::new());
     Box::new(move || {
         let begin = Instant::now();
         Format::Ci8.unpack(&bytes, &mut i, &mut q);
         let mut done = 0;
-        for (n, replica) in replicas.iter().enumerate() {
+        for (n, replica) in replicas.iter().take(channels).enumerate() {
             let nco = Nco {
                 carrier: 0,
                 carrier_step: (n as u64 + 1) << 52,
@@ -59,7 +77,7 @@ fn tracking(rate_hz: f64, edge: Edge) -> Box<dyn FnMut() -> f64> {
             // Periods of a real channel begin anywhere.
             let (i, q) = (&i[n..], &q[n..]);
             for (i, q) in i.chunks_exact(period).zip(q.chunks_exact(period)) {
-                black_box(replica.correlate(i, q, &nco, &taps));
+                black_box(replica.correlate_in(arithmetic, (i, q), &nco, &taps));
                 done += period;
             }
         }
@@ -111,30 +129,197 @@ fn unpacking() -> Box<dyn FnMut() -> f64> {
     })
 }
 
-fn main() {
-    let row = |figure: String, unit, bar, run| Row { figure, unit, bar, run, values: Vec::new() };
+/// What an arithmetic errs against `f64`: code in metres and carrier in cycles, largest mean of a satellite and root mean
+/// square of a millisecond, and lost C/N0 in decibels.
+struct Errors {
+    code_mean_m: f64,
+    code_rms_m: f64,
+    carrier_rms_cycles: f64,
+    loss_db: f64,
+}
+
+/// Over a second of three satellites at 45 dB-Hz in noise of 18 LSB, rounded to 8 bits.
+fn errors(arithmetic: Arithmetic, rate_hz: f64) -> Errors {
+    let period = (rate_hz * 1e-3) as usize;
+    let mut worst = Errors { code_mean_m: 0.0, code_rms_m: 0.0, carrier_rms_cycles: 0.0, loss_db: 0.0 };
+    for (prn, doppler_hz) in [(3_u8, -2100.0), (11, 40.0), (22, 1700.0)] {
+        let code = l1ca::code(prn).expect("a code");
+        let replica = Replica::new(code.clone(), Edge::Area).expect("a replica");
+        let step = chips_to_units(CHIP_HZ * (1.0 + doppler_hz / L1_CA.carrier_hz) / rate_hz);
+        let carrier_step = (doppler_hz / rate_hz * 18_446_744_073_709_551_616.0) as i64 as u64;
+        let amplitude = 18.5 * (2.0 * libm::pow(10.0, 4.5) / rate_hz).sqrt();
+        let taps = TAPS.map(chips_to_units);
+        let (mut code_m, mut cycles) = (Vec::new(), Vec::new());
+        let (mut tested_power, mut exact_power) = (0.0, 0.0);
+        let bytes = noise(2 * period * 1000);
+        for ms in 0..1000 {
+            let first = (ms * period) as i64;
+            let nco = Nco {
+                carrier: carrier_step.wrapping_mul(first as u64),
+                carrier_step,
+                code: (first * step).rem_euclid(replica.period()),
+                code_step: step as u64,
+            };
+            let (mut i, mut q) = (Vec::new(), Vec::new());
+            Format::Ci8.unpack(&bytes[2 * first as usize..][..2 * period], &mut i, &mut q);
+            for n in 0..period {
+                let chip = ((nco.code + n as i64 * step).rem_euclid(replica.period()) >> 48) as usize;
+                let sign = if code[chip] { -amplitude } else { amplitude };
+                let turns = carrier_step.wrapping_mul((first + n as i64) as u64) as f64 / 18_446_744_073_709_551_616.0;
+                let (sin, cos) = libm::sincos(std::f64::consts::TAU * turns);
+                i[n] = (f64::from(i[n]) + sign * cos).round().clamp(-127.0, 127.0) as f32;
+                q[n] = (f64::from(q[n]) + sign * sin).round().clamp(-127.0, 127.0) as f32;
+            }
+            let tested = replica.correlate_in(arithmetic, (&i, &q), &nco, &taps);
+            let exact = replica.slow(&i, &q, &nco, &taps);
+            // Early less late is twice the error of a triangle, over the prompt that the signal has on average.
+            let prompt = amplitude * period as f64;
+            let chips = |[early, _, late]: [Complex64; 3]| (early - late).re / (2.0 * prompt);
+            code_m.push((chips(tested) - chips(exact)) * CHIP_M);
+            cycles.push((tested[1] - exact[1]).im / prompt / std::f64::consts::TAU);
+            tested_power += tested[1].re;
+            exact_power += exact[1].re;
+        }
+        let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
+        let mean = code_m.iter().sum::<f64>() / code_m.len() as f64;
+        worst.code_mean_m = worst.code_mean_m.max(mean.abs());
+        worst.code_rms_m = worst.code_rms_m.max(rms(&code_m));
+        worst.carrier_rms_cycles = worst.carrier_rms_cycles.max(rms(&cycles));
+        worst.loss_db = worst.loss_db.max(-20.0 * libm::log10(tested_power / exact_power));
+    }
+    worst
+}
+
+/// Cycles a second of this core: a rotation and a multiplication that wait for each other take four.
+fn clock_ghz() -> f64 {
+    const STEPS: u32 = 20_000_000;
+    let once = || {
+        let begin = Instant::now();
+        let mut x = black_box(1_u64);
+        for _ in 0..STEPS {
+            x = x.rotate_left(7).wrapping_mul(6_364_136_223_846_793_005);
+        }
+        black_box(x);
+        4.0 * f64::from(STEPS) / begin.elapsed().as_secs_f64() / 1e9
+    };
+    (0..5).map(|_| once()).fold(0.0, f64::max)
+}
+
+fn rows() -> Vec<Row> {
     let mut rows = Vec::new();
-    for (edge, name) in [(Edge::Area, "area"), (Edge::Nearest, "nearest")] {
-        for msps in [2.6, 10.0] {
-            let figure = format!("tracking {name} edges 3 taps ci8 {msps} Msps 1 core");
-            rows.push(row(figure, "G channel samples/s", ">= 1.6", tracking(msps * 1e6, edge)));
+    let mut add = |figure: String, unit, bar, run| rows.push(Row { figure, unit, bar, run, values: Vec::new() });
+    for (arithmetic, name, bar) in
+        [(Arithmetic::I16, "i16", Some(1.6)), (Arithmetic::F32, "f32", None), (Arithmetic::F64, "f64", None)]
+    {
+        for (edge, edges) in [(Edge::Area, "area"), (Edge::Nearest, "nearest")] {
+            for msps in [2.6, 10.0] {
+                let figure = format!("tracking in {name}, {edges} edges, 3 taps, ci8, {msps} Msps");
+                add(figure, "G channel·samples/s/core", bar, tracking(msps * 1e6, edge, arithmetic));
+            }
         }
     }
     let noncoherent = AcquisitionSettings { coherent_periods: 1, doppler_step_cycles: 0.5, ..Default::default() };
-    for (settings, name) in [(AcquisitionSettings::default(), "10 x 2 ms"), (noncoherent, "10 x 1 ms")] {
-        let figure = format!("acquisition 32 PRN 5 kHz {name} 2.6 Msps 2 cores");
-        rows.push(row(figure, "s", "<= 0.15", acquisition(settings, 2)));
+    for (settings, name) in [(AcquisitionSettings::default(), "10 × 2 ms"), (noncoherent, "10 × 1 ms")] {
+        let figure = format!("search, 32 PRNs, ±5 kHz, {name}, 2.6 Msps, two cores");
+        add(figure, "s", Some(-0.15), acquisition(settings, 2));
     }
-    rows.push(row("unpack ci8 1 core".to_owned(), "G samples/s", "-", unpacking()));
+    add("unpacking ci8".to_owned(), "G samples/s/core", None, unpacking());
+    rows
+}
+
+impl Row {
+    fn median(&self) -> f64 {
+        let mut values = self.values.clone();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    }
+
+    fn text(&self) -> String {
+        let value = self.median();
+        let (bar, met) = match self.bar {
+            None => (String::new(), ""),
+            Some(bar) if bar < 0.0 => (format!("at most {}", -bar), if value <= -bar { "yes" } else { "no" }),
+            Some(bar) => (format!("at least {bar}"), if value >= bar { "yes" } else { "no" }),
+        };
+        format!("|{}|{value:.3}|{}|{bar}|{met}|", self.figure, self.unit)
+    }
+}
+
+/// What bounds the default correlator, from the medians at 2.6 and 10 Msps.
+fn limits(rows: &[Row]) -> String {
+    let ghz = clock_ghz();
+    let [slow, fast] = [0, 1].map(|n| rows.get(n).map_or(f64::NAN, Row::median));
+    let limit = 32.0 * OPERATIONS_A_CYCLE * ghz / OPERATIONS;
+    // Time of a period: a sample's times their number, and something fixed.
+    let (short_ns, long_ns) = (2600.0 / slow, 10_000.0 / fast);
+    let sample_ns = (long_ns - short_ns) / 7400.0;
+    let fixed_ns = short_ns - 2600.0 * sample_ns;
+    format!(
+        "**Limit.** With AVX-512, 32 samples and three taps with area edges take {OPERATIONS} operations of 512 bits in 16-bit \
+         integers, {OPERATIONS_A_CYCLE} a cycle at most: {limit:.1} G channel·samples a second at the {ghz:.2} GHz measured here. Of \
+         a period at 2.6 Msps {:.0} % is fixed ({fixed_ns:.0} ns: powers of the carrier's turn, the last sums, both in f64), and \
+         its samples take {sample_ns:.3} ns each, {:.0} % of the limit's speed; loads that cross cache lines, and a processor's \
+         window that holds about one group's operations, are what else is known of the rest.\n",
+        100.0 * fixed_ns / short_ns,
+        100.0 / sample_ns / limit,
+    )
+}
+
+fn output_of(program: &str, arguments: &[&str]) -> String {
+    let found = Command::new(program).args(arguments).output().ok();
+    found.map_or_else(String::new, |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
+}
+
+/// Replaces what stands between two marks of `reports/performance.md`.
+fn publish(text: &str) {
+    let path = Path::new("reports/performance.md");
+    let page = std::fs::read_to_string(path).expect("the page");
+    let (begin, end) = ("<!-- receiver -->\n", "<!-- end of receiver -->\n");
+    let (before, rest) = page.split_once(begin).expect("the first mark");
+    let (_, after) = rest.split_once(end).expect("the second mark");
+    std::fs::write(path, format!("{before}{begin}{text}{end}{after}")).expect("room for the page");
+}
+
+fn main() {
+    let mut rows = rows();
     for _ in 0..ROUNDS {
         for row in &mut rows {
             let value = (row.run)();
             row.values.push(value);
         }
     }
-    println!("figure, value, unit, bar");
-    for row in &mut rows {
-        row.values.sort_by(f64::total_cmp);
-        println!("{}, {:.3}, {}, {}", row.figure, row.values[ROUNDS / 2], row.unit, row.bar);
+    let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model =
+        cpu.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or("").trim_start_matches(['\t', ' ', ':']);
+    let mut text = format!(
+        "{model}, {} cores; {}; release profile, instruction set chosen at run time; {}; medians of {ROUNDS} interleaved \
+         runs. The default is i16 for 8-bit formats.\n\n|figure|value|unit|bar|met|\n|---|---|---|---|---|\n",
+        std::thread::available_parallelism().map_or(1, |n| n.get()),
+        output_of("rustc", &["--version"]),
+        output_of("date", &["-u", "+%F"]),
+    );
+    for row in &rows {
+        let _ = writeln!(text, "{}", row.text());
+    }
+    let _ = write!(
+        text,
+        "\n{}\nWhat `tracking.arithmetic` errs against f64, area edges, three satellites at 45 dB-Hz for a second; rms of one \
+         millisecond, whose noise is 18 m and 0.02 cycles:\n\n\
+         |arithmetic|Msps|code, largest mean (m)|code, rms (m)|carrier, rms (cycles)|C/N0 loss (dB)|\n|---|---|---|---|---|---|\n",
+        limits(&rows)
+    );
+    for (arithmetic, name) in [(Arithmetic::I16, "i16"), (Arithmetic::F32, "f32")] {
+        for msps in [2.6, 10.0] {
+            let found = errors(arithmetic, msps * 1e6);
+            let _ = writeln!(
+                text,
+                "|{name}|{msps}|{:.1e}|{:.1e}|{:.1e}|{:.1e}|",
+                found.code_mean_m, found.code_rms_m, found.carrier_rms_cycles, found.loss_db
+            );
+        }
+    }
+    println!("{text}");
+    if std::env::args().any(|argument| argument == "--write") {
+        publish(&text);
     }
 }

@@ -13,6 +13,7 @@ use std::time::Instant;
 use gnss_twin::analysis;
 use gnss_twin::analysis::statistics::{mean, median};
 use gnss_twin::analysis::trade::{self, Row};
+use gnss_twin::generator::fidelity::allowed_m;
 use gnss_twin::generator::ray::{Effect, Ray, Sight};
 use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade, Scene};
@@ -35,6 +36,10 @@ struct Moved(f64);
 impl Effect for Moved {
     fn name(&self) -> &'static str {
         "moved code"
+    }
+
+    fn describe(&self) -> String {
+        format!("{} chips", self.0)
     }
 
     fn act(&self, _: &Sight, _: &Signal, rays: &mut Vec<Ray>) {
@@ -265,7 +270,7 @@ fn position(fidelity: Fidelity) -> [f64; 3] {
 fn settings(rate_msps: f64) -> Vec<(String, Fidelity)> {
     let mut found: Vec<(String, Fidelity)> = Grade::NAMES
         .iter()
-        .map(|(name, grade)| ((*name).to_owned(), Fidelity::suited(*grade, rate_msps * 1e6)))
+        .map(|(name, grade)| ((*name).to_owned(), Fidelity::suited(*grade, rate_msps * 1e6, allowed_m(None))))
         .collect();
     for (carrier_name, carrier) in Arithmetic::NAMES {
         for (edge_name, code_edge) in CodeEdge::NAMES {
@@ -328,20 +333,7 @@ fn measure(site: Site, settings: &[(String, Fidelity)], rounds: usize, count: us
             cn0_loss_db: found.loss_db,
             position_m: None,
         };
-        println!(
-            "{:8} {:6} {:18} {:7.3} ns  code {:.4} / {:.4} / {:.4} m  carrier {:.1e}  Doppler {:.1e} Hz  spur {:.0} dBc  loss {:.3} dB",
-            row.scene,
-            row.sample_rate_msps,
-            row.setting,
-            row.ns,
-            row.pseudorange_mean_m,
-            row.pseudorange_sigma_m,
-            row.pseudorange_max_m,
-            row.carrier_cycles,
-            row.doppler_hz,
-            row.spur_dbc,
-            row.cn0_loss_db
-        );
+        println!("{} {} Msps | {row}", row.scene, row.sample_rate_msps);
         rows.push(row);
     }
 }

@@ -10,6 +10,8 @@
 //! - [`analysis`] is the judge: it joins what the receiver found with the truth on
 //!   (sample number, satellite, signal) and measures every error.
 //!
+//! Above the three stands [`study`]: the receiver's loops on modelled correlations, held against the judge's theory.
+//!
 //! Each world is a cargo feature and compiles without the others. Units: SI and radians
 //! inside, cycles for carrier phase, GPS time; a name ends with its unit.
 
@@ -23,3 +25,5 @@ pub mod cli;
 pub mod generator;
 #[cfg(feature = "receiver")]
 pub mod receiver;
+#[cfg(feature = "study")]
+pub mod study;

@@ -5,6 +5,7 @@ use gnss_twin::generator::stage::noise::BLOCK_SAMPLES;
 use gnss_twin::generator::synth::band::Filter;
 use gnss_twin::generator::synth::chips::{CodeTime, Spreading};
 use gnss_twin::generator::synth::isa::{Level, accumulate, add_noise};
+use gnss_twin::generator::synth::lanes::Buffers;
 use gnss_twin::generator::synth::{CODE_ONE, Edge, Run, reference};
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 
@@ -42,8 +43,8 @@ fn edges(filter: &Filter) -> [Edge<'_>; 3] {
 }
 
 fn fast(level: Level, edge: Edge<'_>, run: &Run<'_>, samples: usize) -> (Vec<f32>, Vec<f32>) {
-    let (mut i, mut q, mut wave) = (vec![0.0; samples], vec![0.0; samples], Vec::new());
-    accumulate(level, edge, run, &mut i, &mut q, &mut wave);
+    let (mut i, mut q) = (vec![0.0; samples], vec![0.0; samples]);
+    accumulate(level, edge, &[*run], &mut i, &mut q, &mut Buffers::default());
     (i, q)
 }
 
@@ -62,14 +63,87 @@ fn the_fast_kernel_keeps_to_the_reference_at_all_lengths_phases_and_rates() {
                 reference::accumulate(edge, &run, &mut ri, &mut rq);
                 for n in 0..length {
                     let error = (i[n] - ri[n]).abs().max((q[n] - rq[n]).abs());
-                    // A lane's code phase resolves 2^-27 chip: nearest chips may differ that close to an edge,
-                    // and the area's slope of 2/step per chip makes 2^-26/0.04 = 4e-7 of it.
+                    // A lane's code phase resolves 2^-27 chip: nearest chips may differ that close to an edge.
                     let p = run.position + run.step * n as u64;
-                    let near_edge = (p % CODE_ONE).min(CODE_ONE - p % CODE_ONE) < 1 << 22;
-                    // 128 rotations of f32 lose 128 * 6e-8 = 8e-6 at worst; the filter's table 4e-6 an edge.
-                    assert!(error < 2e-5 || near_edge, "{edge:?} {rate_hz} {length} {n} {error}");
+                    let near_edge = edge_is_nearest(edge) && (p % CODE_ONE).min(CODE_ONE - p % CODE_ONE) < 1 << 22;
+                    // Carrier: 2e-7 for each of three sines, 2e-7 for each of seven rotations. An area edge: two
+                    // roundings of 2^-27 chip, times 2/0.04. A filter's table: 4e-6 an edge, some edges at once.
+                    let bound = match edge {
+                        Edge::Nearest => 2e-6,
+                        Edge::Area => 2e-6 + 8e-7,
+                        Edge::BandLimited(_) => 2e-5,
+                    };
+                    assert!(error < bound || near_edge, "{edge:.0?} {rate_hz} {length} {n} {error}");
                 }
             }
+        }
+    }
+}
+
+fn edge_is_nearest(edge: Edge<'_>) -> bool {
+    matches!(edge, Edge::Nearest)
+}
+
+#[test]
+fn runs_together_are_the_sum_of_each_by_itself() {
+    let filter = Filter::new(0.45);
+    for rates in [[2.6e6; 5], [25e6; 5], [2.6e6, 0.9e6, 1.5e6, 0.9e6, 25e6]] {
+        for length in [1, 31, 32, 33, 1000, 4096] {
+            let cases: Vec<Case> = (0..)
+                .zip(rates)
+                .map(|(k, rate_hz)| Case::new(rate_hz, CodeTime { period: k, phase: 777 * CODE_ONE }, length))
+                .collect();
+            let runs: Vec<Run<'_>> = (1..)
+                .zip(&cases)
+                .map(|(k, case)| Run { turns_step: k << 55, ..case.run(1.0 / f64::from(k as u32)) })
+                .collect();
+            for edge in edges(&filter) {
+                let (mut i, mut q) = (vec![0.0; length], vec![0.0; length]);
+                accumulate(Level::detect(), edge, &runs, &mut i, &mut q, &mut Buffers::default());
+                let single: Vec<_> = runs.iter().map(|run| fast(Level::detect(), edge, run, length)).collect();
+                for n in 0..length {
+                    let (si, sq) =
+                        single.iter().fold((0.0, 0.0), |(si, sq), (i, q)| (si + f64::from(i[n]), sq + f64::from(q[n])));
+                    let (di, dq) = (f64::from(i[n]) - si, f64::from(q[n]) - sq);
+                    // Five additions of numbers below three, rounded to half of 2^-22 each.
+                    assert!(di.abs().max(dq.abs()) < 6e-7, "{edge:.0?} {rates:?} {length} {n} {di} {dq}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_carrier_of_the_fast_kernel_is_within_a_millionth_of_a_cycle_and_has_no_spur_above_minus_110_dbc() {
+    use std::f64::consts::TAU;
+    const LENGTH: usize = 4096;
+    let bits = [0; 128];
+    for turns_step in [0, 1 << 40, 0x0123_4567_89ab_cdef, 0x4000_0000_0000_0001, 0x7654_3210_fedc_ba98, u64::MAX / 3] {
+        for edge in [Edge::Nearest, Edge::Area] {
+            let run = Run {
+                bits: &bits,
+                position: 200 * CODE_ONE,
+                step: CODE_ONE / 3,
+                turns: 0xfedc << 44,
+                turns_step,
+                amplitude: 1.0,
+            };
+            let (i, q) = fast(Level::detect(), edge, &run, LENGTH);
+            // What is left of the samples on the true carrier.
+            let left: Vec<(f64, f64)> = (0_u64..)
+                .zip(i.iter().zip(&q))
+                .map(|(n, (i, q))| {
+                    let turns = run.turns.wrapping_add(turns_step.wrapping_mul(n));
+                    let (sin, cos) = libm::sincos(turns as f64 / 18_446_744_073_709_551_616.0 * TAU);
+                    let (i, q) = (f64::from(*i), f64::from(*q));
+                    (i * cos + q * sin - 1.0, q * cos - i * sin)
+                })
+                .collect();
+            let worst = left.iter().fold(0.0_f64, |worst, (_, im)| worst.max(im.abs())) / TAU;
+            assert!(worst < 1e-6, "{turns_step:x} {worst}");
+            // No line of a spectrum is above the largest value in time.
+            let spur = left.iter().fold(0.0_f64, |worst, (re, im)| worst.max((re * re + im * im).sqrt()));
+            assert!(20.0 * libm::log10(spur.max(1e-20)) < -110.0, "{turns_step:x} {spur}");
         }
     }
 }

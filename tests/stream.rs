@@ -7,10 +7,7 @@ use std::sync::Arc;
 
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::clock::ReceiverClock;
-use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
 use gnss_twin::generator::effect::link::FixedCn0;
-use gnss_twin::generator::knots::Grid;
-use gnss_twin::generator::ray::Effect;
 use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade, Scene};
 use gnss_twin::generator::stream::{Generated, Options, generate_with};
 use gnss_twin::generator::synth::isa::Level;
@@ -23,6 +20,9 @@ use gnss_twin::gnss::record::Observation;
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::samples::{Format, IfMetadata};
 use gnss_twin::gnss::time::{Epoch, Rate, SampleClock};
+
+#[path = "stream/long.rs"]
+mod long;
 
 fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted: bool) -> Scene {
     let navigation = rinex::embedded().unwrap();
@@ -39,7 +39,7 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         seed: 5,
         samples: (duration_s * rate_hz) as u64,
         clock: SampleClock { start, rate },
-        receiver_clock: ReceiverClock { bias_s: 1.3e-4, drift: 5e-8 },
+        receiver_clock: ReceiverClock::steady(1.3e-4, 5e-8),
         metadata: IfMetadata { format, rate, center_hz, inverted, start: Some(start) },
         trajectory: Trajectory::fixed(Geodetic::from_degrees(26.5, 80.2, 120.0).to_ecef()),
         catalogue: Arc::new(catalogue),
@@ -48,7 +48,12 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         excluded: Vec::new(),
         mask_rad: 5_f64.to_radians(),
         effects: vec![Box::new(FixedCn0 { cn0_dbhz: 45.0 })],
+        scintillation: None,
+        playback: None,
+        interference: Vec::new(),
+        spoofers: Vec::new(),
         noise: true,
+        front_end: Vec::new(),
         noise_lsb: 20.0,
         fidelity: Fidelity { knot_tolerance_cycles: 1e-5, ..Fidelity::of(Grade::Balanced) },
         truth_interval_s: 0.1,
@@ -191,36 +196,6 @@ fn a_plain_correlation_finds_every_satellite_where_truth_says() {
 }
 
 #[test]
-fn code_and_carrier_stay_together_for_an_hour_and_the_ionosphere_parts_them_by_twice_its_delay() {
-    let mut scene = scene(25e6, 3600.0, Format::Ci8, 1_575.42e6, false);
-    let sv = scene.catalogue.satellites().find(|sv| truth::in_view(&scene, *sv, scene.clock.start).unwrap()).unwrap();
-    for ionosphere in [false, true] {
-        if ionosphere {
-            let model = rinex::embedded().unwrap().klobuchar.unwrap();
-            scene.effects.push(Box::new(KlobucharIonosphere { model }) as Box<dyn Effect>);
-        }
-        let grid = Grid::new(scene.clock.rate, vec![], 1e-5, L1_CA.carrier_hz);
-        let observe =
-            |n: u64| truth::seen(&scene, sv, &L1_CA, scene.clock.epoch(n)).map(|seen| seen.map(|seen| seen.arrivals));
-        for root in (0..scene.samples / grid.root_samples()).step_by(7) {
-            for part in grid.root(root, &observe).unwrap() {
-                let path = part.paths[0];
-                for n in (part.start..part.end).step_by(((part.end - part.start) / 9) as usize) {
-                    let u = part.fraction(n);
-                    let seen = truth::seen(&scene, sv, &L1_CA, scene.clock.epoch(n)).unwrap().unwrap();
-                    let parted = path.delay.at(u) * L1_CA.carrier_hz - path.carrier.at(u);
-                    let ray = seen.rays[0];
-                    let expected = (ray.code_delay_s - ray.carrier_delay_s) * L1_CA.carrier_hz;
-                    let error = parted - expected;
-                    // 0.1 mm is 5.3e-4 cycle.
-                    assert!((error - error.round()).abs() < 5.3e-4, "{n}: {error}");
-                }
-            }
-        }
-    }
-}
-
-#[test]
 fn without_satellites_the_noise_has_its_set_power_and_without_noise_the_signal_has_its_own() {
     let directory = tempfile::tempdir().unwrap();
     for (format, share) in [(Format::Cf32Le, 2.0), (Format::Ri16Le, 1.0)] {
@@ -266,7 +241,9 @@ fn a_day_into_the_stream_the_carrier_is_where_the_equation_says() {
         }
         let (mut i, mut q) = (vec![0.0; 4096], vec![0.0; 4096]);
         let kernel = Kernel { edge: Edge::Nearest, arithmetic: Arithmetic::F32, level: Level::detect() };
-        transmitter.render(&scene, kernel, first, &mut i, &mut q, &mut Scratch::default());
+        let mut scratch = Scratch::default();
+        transmitter.arrange(&scene, first, 4096, &mut scratch);
+        scratch.bank.render(kernel, &mut i, &mut q);
         for k in (0..4096).step_by(13) {
             let n = first + k as u64;
             // The IF is 4.092 MHz: n · 4092 / 25000 turns, in integers.

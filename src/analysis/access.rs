@@ -1,12 +1,14 @@
-//! Multiple access: what the other satellites' codes take from a satellite's C/N0.
+//! Multiple access and interference: what other waves take from a satellite's C/N0.
 //!
 //! Codes of the same kind are no more orthogonal than noise: each adds its power times the spectral separation
 //! coefficient κ = ∫S² df / (∫S df)² to the noise density (J. W. Betz, NAVIGATION 48(4), 2001). For rectangular chips of
 //! duration T that is 2T/3. S is the spectrum of the correlation between signal and replica, so a sampler that averages
 //! over its interval, and a replica that does too, narrow it and raise κ. Satellites of other signals are not counted.
+//! Interference adds its own power times its own separation ([`super::jamming`]).
 
 use std::collections::HashMap;
 
+use super::jamming;
 use super::load::Run;
 use super::psd::pulse_density;
 use crate::gnss::record::Observation;
@@ -17,6 +19,8 @@ pub struct Access {
     /// Sum of C/N0 of a signal's satellites at a sample.
     sums_hz: HashMap<(u64, &'static str), f64>,
     kappa_s: HashMap<&'static str, f64>,
+    /// What interference adds to the noise density at a sample, in units of the thermal one.
+    jammed: HashMap<(u64, &'static str), f64>,
     noise: bool,
 }
 
@@ -31,17 +35,39 @@ impl Access {
                 .entry(row.signal.name)
                 .or_insert_with(|| kappa(row.signal, &run.scene.code_edge, run.scene.sample_rate_hz));
         }
-        Self { sums_hz, kappa_s, noise: run.scene.noise }
+        Self { sums_hz, jammed: jammed(run, kappa_s.keys().copied()), kappa_s, noise: run.scene.noise }
     }
 
-    /// C/N0 of a true observation with the other satellites counted as noise; infinite without either.
+    /// C/N0 of a true observation with the other satellites and interference counted as noise; infinite without any.
     pub fn effective_dbhz(&self, row: &Observation) -> f64 {
         let own_hz = linear(row.cn0_dbhz);
         let sum_hz = self.sums_hz.get(&(row.sample, row.signal.name)).copied().unwrap_or(own_hz);
         let kappa_s = self.kappa_s.get(row.signal.name).copied().unwrap_or(0.0);
         let thermal = if self.noise { 1.0 } else { 0.0 };
-        10.0 * libm::log10(own_hz / (thermal + kappa_s * (sum_hz - own_hz)))
+        let jammed = self.jammed.get(&(row.sample, row.signal.name)).copied().unwrap_or(0.0);
+        10.0 * libm::log10(own_hz / (thermal + kappa_s * (sum_hz - own_hz) + jammed))
     }
+}
+
+fn jammed(run: &Run, signals: impl Iterator<Item = &'static str>) -> HashMap<(u64, &'static str), f64> {
+    let sources = jamming::sources(run);
+    let mut sums = HashMap::new();
+    for signal in signals.filter_map(Signal::find) {
+        let sign = if run.scene.inverted { -1.0 } else { 1.0 };
+        let signal_hz = sign * (signal.carrier_hz - run.scene.center_hz.unwrap_or(signal.carrier_hz));
+        let kappa: HashMap<usize, f64> = sources
+            .iter()
+            .map(|(number, source)| {
+                let (edge, rate_hz) = (&run.scene.code_edge, run.scene.sample_rate_hz);
+                (*number, jamming::separation_s(source, signal, signal_hz, edge, rate_hz))
+            })
+            .collect();
+        for row in &run.interference {
+            let kappa_s = kappa.get(&row.source).copied().unwrap_or(0.0);
+            *sums.entry((row.sample, signal.name)).or_insert(0.0) += kappa_s * linear(row.jn0_dbhz);
+        }
+    }
+    sums
 }
 
 fn linear(cn0_dbhz: f64) -> f64 {

@@ -48,6 +48,8 @@ pub struct PositionError {
     pub enu_m: Vector3<f64>,
     /// Speed of light times the error of GPS time.
     pub clock_m: f64,
+    /// What the receiver's clock read minus GPS time, in truth.
+    pub true_clock_s: f64,
     pub velocity_enu_mps: Vector3<f64>,
 }
 
@@ -63,6 +65,8 @@ pub struct Errors {
     pub unmatched: usize,
 }
 
+/// Time after a lock that loop jitter leaves out as pull-in.
+pub const PULL_IN_S: f64 = 3.0;
 /// A lasting jump of the carrier error from here on is a cycle slip: below the half cycle of a Costas loop.
 pub const SLIP_CYCLES: f64 = 0.4;
 /// Epochs on either side of a jump that decide whether it stays.
@@ -126,6 +130,7 @@ impl Errors {
                 time_s: run.time_s(fix.sample),
                 enu_m: to_enu * (fix.position_m() - true_row.position_m()),
                 clock_m: SPEED_OF_LIGHT_MPS * fix.time().since(true_row.time()),
+                true_clock_s: true_row.clock_bias_s,
                 velocity_enu_mps: to_enu * (fix.velocity_mps() - true_row.velocity_mps()),
             });
         }
@@ -138,6 +143,14 @@ impl Errors {
     /// One number of every observation.
     pub fn pooled(&self, of: impl Fn(&SignalError) -> f64) -> Vec<f64> {
         self.signals.values().flatten().map(of).collect()
+    }
+
+    /// One number of every observation that is past its pull-in, a list a satellite.
+    pub fn settled(&self, of: impl Fn(&Link, &SignalError) -> f64) -> Vec<Vec<f64>> {
+        let one = |(link, rows): (&Link, &Vec<SignalError>)| {
+            rows.iter().filter(|row| row.locked_s >= PULL_IN_S).map(|row| of(link, row)).collect()
+        };
+        self.signals.iter().map(one).collect()
     }
 
     /// Code errors after the mean over the satellites of each epoch is removed; epochs of one satellite are

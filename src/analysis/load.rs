@@ -12,8 +12,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::analysis::JudgeError;
+use crate::analysis::jamming::Shape;
 use crate::gnss::record::{
-    AcquisitionRow, EventRow, Fix, NavigationRow, Observation, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, EventRow, Fix, InterferenceRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
+    TrajectoryRow,
 };
 
 /// What `truth/scene.json` says of the scene; other keys are left alone.
@@ -40,6 +42,22 @@ pub struct SceneFacts {
     pub noise: bool,
     #[serde(default)]
     pub fidelity: String,
+    /// Azimuth and elevation in degrees below which the direct path is obstructed at the start.
+    #[serde(default)]
+    pub skyline_deg: Vec<[f64; 2]>,
+    /// Shapes of the sources of interference, in the order of their numbers.
+    #[serde(default)]
+    pub interference: Vec<Shape>,
+    /// The receiver's oscillator, if the scene has one.
+    #[serde(default)]
+    pub oscillator: Option<Oscillator>,
+}
+
+/// Noise of an oscillator; other keys are left alone.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+pub struct Oscillator {
+    /// Strengths h₂, h₁, h₀, h₋₁, h₋₂ of S_y = Σ h f^α, in Hz^(−α − 1).
+    pub h: [f64; 5],
 }
 
 fn yes() -> bool {
@@ -71,8 +89,14 @@ pub struct Run {
     pub scene: SceneFacts,
     pub truth: Vec<Observation>,
     pub sky: Vec<SkyRow>,
+    /// Reflected rays; none in a scene without multipath.
+    pub rays: Vec<RayRow>,
     pub trajectory: Vec<TrajectoryRow>,
     pub truth_navigation: Vec<NavigationRow>,
+    /// Empty without interference.
+    pub interference: Vec<InterferenceRow>,
+    /// What the first spoofer claims; empty without one.
+    pub claimed: Vec<TrajectoryRow>,
     pub observations: Vec<Observation>,
     pub fixes: Vec<Fix>,
     pub acquisition: Vec<AcquisitionRow>,
@@ -94,12 +118,16 @@ impl Run {
         let truth = run.join("truth");
         let rx = run.join("rx");
         let psd = run.join("psd.csv");
+        let rays = truth.join("rays.csv");
         Ok(Self {
             scene: json(&truth.join("scene.json"))?.ok_or_else(|| missing(&truth.join("scene.json"), TRUTH))?,
             truth: rows(&truth.join("observations.csv"), TRUTH)?,
             sky: rows(&truth.join("sky.csv"), TRUTH)?,
+            rays: if rays.exists() { rows(&rays, TRUTH)? } else { Vec::new() },
             trajectory: rows(&truth.join("trajectory.csv"), TRUTH)?,
             truth_navigation: rows(&truth.join("navigation.csv"), TRUTH)?,
+            interference: optional(&truth.join("interference.csv"))?,
+            claimed: optional(&truth.join("claimed.csv"))?,
             observations: rows(&rx.join("observations.csv"), RECEIVER)?,
             fixes: rows(&rx.join("fixes.csv"), RECEIVER)?,
             acquisition: rows(&rx.join("acquisition.csv"), RECEIVER)?,
@@ -107,7 +135,7 @@ impl Run {
             navigation: rows(&rx.join("navigation.csv"), RECEIVER)?,
             events: rows(&rx.join("events.csv"), RECEIVER)?,
             receiver: json(&rx.join("receiver.json"))?.unwrap_or(Value::Null),
-            psd: if psd.exists() { rows(&psd, "")? } else { Vec::new() },
+            psd: optional(&psd)?,
             speed: json(&run.join("speed.json"))?.unwrap_or_default(),
         })
     }
@@ -135,6 +163,11 @@ fn rows<T: DeserializeOwned>(path: &Path, remedy: &'static str) -> Result<Vec<T>
         .deserialize()
         .collect::<Result<_, _>>()
         .map_err(|source| JudgeError::Row { path: path.to_owned(), source })
+}
+
+/// All rows of a CSV file that a run may lack.
+fn optional<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, JudgeError> {
+    if path.exists() { rows(path, "") } else { Ok(Vec::new()) }
 }
 
 fn open_error(path: &Path, remedy: &'static str, source: io::Error) -> JudgeError {

@@ -2,7 +2,8 @@
 //!
 //! Hann window, half overlap, periodograms averaged in f64 (Welch 1967). The theory sums the main
 //! spectrum of each satellite's chips, sinc²(f/R_c)/R_c, over its aliases, on a flat noise floor;
-//! the lines 1 kHz apart of a repeating code and the data are below the resolution and left out.
+//! interference is added as it is on average over the run.
+//! The lines 1 kHz apart of a repeating code and the data are below the resolution and left out.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -11,6 +12,7 @@ use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
 use crate::analysis::JudgeError;
+use crate::analysis::jamming;
 use crate::analysis::load::{PsdRow, Run};
 use crate::analysis::statistics::{mean, median};
 
@@ -59,6 +61,11 @@ impl Psd {
                 self.kept.drain(..bins / 2);
             }
         }
+    }
+
+    /// Says that the next samples do not follow on the last ones.
+    pub fn cut(&mut self) {
+        self.kept.clear();
     }
 
     fn segment(&mut self) {
@@ -118,12 +125,14 @@ fn decibels(power: f64) -> f64 {
 /// state, is fitted: the median over frequencies less than 20 dB below the peak. Empty without a spectrum or without signals.
 pub fn theory_db(run: &Run) -> Vec<f64> {
     let signals = expected(run);
+    let sources = jamming::sources(run);
     let Some(center_hz) = run.scene.center_hz.filter(|_| !signals.is_empty() && !run.psd.is_empty()) else {
         return Vec::new();
     };
     let rate_hz = run.scene.sample_rate_hz;
     let floor = if run.scene.noise { 1.0 } else { 0.0 };
     let sign = if run.scene.inverted { -1.0 } else { 1.0 };
+    let bin_hz = run.psd.get(1).zip(run.psd.first()).map_or(1.0, |(b, a)| b.frequency_hz - a.frequency_hz);
     let shape: Vec<f64> = run
         .psd
         .iter()
@@ -132,7 +141,8 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
                 let from_carrier_hz = row.frequency_hz - sign * (signal.carrier_hz - center_hz);
                 signal.cn0_hz * code_density(&run.scene.code_edge, from_carrier_hz, signal.chip_rate_hz, rate_hz)
             };
-            decibels(floor + signals.iter().map(of).sum::<f64>())
+            let jammed: f64 = sources.values().map(|source| jamming::density(source, row.frequency_hz, bin_hz)).sum();
+            decibels(floor + signals.iter().map(of).sum::<f64>() + jammed)
         })
         .collect();
     // Near the nulls quantisation, not the codes, sets the level.
@@ -200,7 +210,7 @@ fn edge(code_edge: &str) -> Edge {
 }
 
 /// Density of a unit-power rectangular-chip code, sampled, at `f_hz` from its carrier, per hertz.
-fn code_density(code_edge: &str, f_hz: f64, chip_rate_hz: f64, rate_hz: f64) -> f64 {
+pub(super) fn code_density(code_edge: &str, f_hz: f64, chip_rate_hz: f64, rate_hz: f64) -> f64 {
     let density = |f: f64| pulse_density(code_edge, f, chip_rate_hz, rate_hz);
     match edge(code_edge) {
         // Filtered to half the sample rate: no alias but the one that the frequency itself may be.
@@ -214,7 +224,7 @@ fn aliases(density: impl Fn(f64) -> f64, f_hz: f64, rate_hz: f64) -> f64 {
     (-50..=50).map(|k| density(f_hz + f64::from(k) * rate_hz)).sum()
 }
 
-fn sinc_squared(x: f64) -> f64 {
+pub(super) fn sinc_squared(x: f64) -> f64 {
     let angle = std::f64::consts::PI * x;
     if angle.abs() < 1e-9 {
         return 1.0;

@@ -26,6 +26,7 @@ impl fmt::Display for Summary {
         }
         writeln!(f, "* the part common to all satellites of an epoch removed")?;
         self.loop_lines(f)?;
+        self.clock_lines(f)?;
         self.speed_line(f)
     }
 }
@@ -58,11 +59,23 @@ impl Summary {
         {
             writeln!(
                 f,
-                "C/N0          {measured:.2} dB-Hz measured, {effective:.2} expected: {set:.2} set, less the other satellites' codes"
+                "C/N0          {measured:.2} dB-Hz measured, {effective:.2} expected: {set:.2} set, less the other satellites' codes{}",
+                if self.jammed { " and interference" } else { "" }
             )?;
         }
         if self.details.unmatched_observations > 0 {
             writeln!(f, "observations  {} have no truth", self.details.unmatched_observations)?;
+        }
+        if let Some(spoofing) = &self.spoofing {
+            let metres = |value: Option<f64>| number(value, 1);
+            writeln!(
+                f,
+                "spoofing      fixes up to {} m from the truth, claims up to {:.1} m; {} % of the fixes captured, 95 % within {} m of the claim",
+                metres(spoofing.displacement_max_m),
+                spoofing.claimed_displacement_max_m,
+                number(spoofing.captured_share.map(|share| 100.0 * share), 0),
+                metres(spoofing.from_claim_p95_m)
+            )?;
         }
         for null_hz in &self.details.psd_nulls_hz {
             writeln!(f, "spectrum      null at {:+.4} MHz from the carrier", null_hz / 1e6)?;
@@ -82,6 +95,26 @@ impl Summary {
             writeln!(f, "{name:<26}{:>12}{limit:>12.4}", number(sigma, 4))?;
         }
         writeln!(f, "{} losses of lock, {} cycle slips", tracking.losses_of_lock, tracking.cycle_slips)
+    }
+
+    fn clock_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let clock = &self.clock;
+        if let (Some(drift), Some(true_drift)) = (clock.drift, clock.true_drift) {
+            writeln!(f, "\nclock         drift {drift:+.4e} found, {true_drift:+.4e} true")?;
+        }
+        let Some(point) = self.details.clock_oadev_1s else { return Ok(()) };
+        write!(f, "Allan, 1 s    {:.2e} found", point.deviation)?;
+        if let Some((low, high)) = point.interval {
+            write!(f, " (95 % within {low:.2e} to {high:.2e})")?;
+        }
+        match clock.true_oadev_1s {
+            Some(truth) => write!(f, ", {truth:.2e} true")?,
+            None => write!(f, ", a true clock without noise")?,
+        }
+        match clock.code_noise_oadev_1s {
+            Some(code) => writeln!(f, ", {code:.2e} if code noise were white"),
+            None => writeln!(f),
+        }
     }
 
     fn speed_line(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

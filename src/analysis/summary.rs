@@ -7,15 +7,17 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use crate::analysis::errors::{Errors, SignalError};
+use crate::analysis::allan::{Deviation, Point};
+use crate::analysis::clock::{Of, Series};
+use crate::analysis::errors::Errors;
 use crate::analysis::load::{Run, Speed};
-use crate::analysis::psd;
-use crate::analysis::statistics::{Spread, mean, median, percentile, pooled_std, rms, spread};
+use crate::analysis::spoofing::Spoofing;
+use crate::analysis::statistics::{Spread, mean, median, percentile, pooled_std, rms, spread, std};
+use crate::analysis::theory::clock::white_phase;
+use crate::analysis::{clock, psd};
 use crate::gnss::record::{Event, NavigationRow};
 use crate::gnss::satellite::Sv;
 
-/// Time after a lock that loop jitter leaves out as pull-in.
-pub const PULL_IN_S: f64 = 3.0;
 /// Rule-of-thumb bound of a Costas loop's 1σ error (theory: 3σ ≤ 45°).
 pub const PLL_THRESHOLD_DEG: f64 = 15.0;
 
@@ -29,10 +31,16 @@ pub struct Summary {
     pub fidelity: String,
     pub satellites: Satellites,
     pub position: Position,
+    pub clock: Clock,
     pub observables: Observables,
     pub tracking: Tracking,
     pub navigation: Navigation,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spoofing: Option<Spoofing>,
     pub speed: Speed,
+    /// Whether there was interference.
+    #[serde(skip)]
+    pub jammed: bool,
     #[serde(skip)]
     pub details: Details,
 }
@@ -64,6 +72,34 @@ pub struct Position {
     pub velocity_p95_mps: Option<f64>,
 }
 
+/// The receiver's clock, over the longest stretch of fixes without a gap. Deviations at an averaging time of 1 s are null where
+/// the record is too short for them, or the clock is steady to rounding.
+#[derive(Clone, Debug, Serialize)]
+pub struct Clock {
+    /// In that stretch.
+    pub fixes: usize,
+    /// Mean of estimated minus true bias.
+    pub bias_mean_s: Option<f64>,
+    /// Standard deviation of the same, its straight line removed.
+    pub bias_sigma_s: Option<f64>,
+    /// Slopes of the straight lines through the bias as estimated and as it was, in seconds a second.
+    pub drift: Option<f64>,
+    pub true_drift: Option<f64>,
+    /// Overlapping Allan, modified Allan, overlapping Hadamard and time deviation of the estimate.
+    pub oadev_1s: Option<f64>,
+    pub mdev_1s: Option<f64>,
+    pub ohdev_1s: Option<f64>,
+    pub tdev_1s_s: Option<f64>,
+    /// The true clock's, over the whole run.
+    pub true_oadev_1s: Option<f64>,
+    /// That of a clock solved from independent code measurements: √3 × TDOP × σ of the code/(speed of light × 1 s).
+    pub code_noise_oadev_1s: Option<f64>,
+    /// Strengths h₂, h₁, h₀, h₋₁, h₋₂ of power-law noises (S_y = Σ h f^α, in Hz^(−α − 1)) fitted to the Allan deviations of the
+    /// estimate and of the true clock.
+    pub h: Option<[f64; 5]>,
+    pub true_h: Option<[f64; 5]>,
+}
+
 /// Errors of the observations, over every satellite and epoch.
 #[derive(Clone, Debug, Serialize)]
 pub struct Observables {
@@ -73,13 +109,13 @@ pub struct Observables {
     pub pseudorange_bias_m: Option<f64>,
     pub carrier_rms_cycles: Option<f64>,
     pub doppler_rms_hz: Option<f64>,
-    /// Mean of measured minus expected: the scene's C/N0 with the other satellites counted as noise (see
+    /// Mean of measured minus expected: the scene's C/N0 with other satellites and interference counted as noise (see
     /// [`super::access`]). The quantiser's loss is not counted.
     pub cn0_bias_db: Option<f64>,
 }
 
 /// How well the loops held: the loop's oscillator minus truth, each satellite about its own mean, without the
-/// first [`PULL_IN_S`] of each lock.
+/// first [`PULL_IN_S`](crate::analysis::errors::PULL_IN_S) of each lock.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tracking {
     pub losses_of_lock: usize,
@@ -114,6 +150,8 @@ pub struct Details {
     pub up_m: Option<Spread>,
     pub clock_m: Option<Spread>,
     pub velocity_mps: Option<Spread>,
+    /// Overlapping Allan deviation of the clock's estimate at 1 s.
+    pub clock_oadev_1s: Option<Point>,
     pub thresholds: Thresholds,
     /// Loop errors that went into the jitter, each satellite's mean removed.
     pub jitter: Jitter,
@@ -158,10 +196,11 @@ pub struct Jitter {
 
 impl Summary {
     /// Condenses the errors of a run.
-    pub fn new(run: &Run, errors: &Errors) -> Self {
+    pub fn new(run: &Run, errors: &Errors, clock: &clock::Clock) -> Self {
         let mut details = Details::default();
         let satellites = satellites(run, &mut details);
         let position = position(run, errors, &mut details);
+        let clock = clock_section(clock, &mut details);
         let observables = observables(errors, &mut details);
         let tracking = tracking(run, errors, &mut details);
         let navigation = navigation(run, &mut details);
@@ -175,9 +214,12 @@ impl Summary {
             fidelity: run.scene.fidelity.clone(),
             satellites,
             position,
+            clock,
             observables,
             tracking,
             navigation,
+            spoofing: Spoofing::of(run),
+            jammed: !run.scene.interference.is_empty(),
             speed: run.speed,
             details,
         }
@@ -232,6 +274,31 @@ fn position(run: &Run, errors: &Errors, details: &mut Details) -> Position {
     }
 }
 
+fn clock_section(clock: &clock::Clock, details: &mut Details) -> Clock {
+    let errors: Vec<f64> = clock.rows.iter().map(|row| row.error_s).collect();
+    let detrended =
+        |line: clock::Line| -> Vec<f64> { clock.rows.iter().map(|row| row.error_s - line.at(row.time_s)).collect() };
+    let (estimate, truth) = (clock.series(Of::Estimate), clock.series(Of::Truth));
+    let at = |series: Option<&Series>, deviation| series?.at(deviation, 1.0);
+    let value = |series, deviation| at(series, deviation).map(|point| point.deviation);
+    details.clock_oadev_1s = at(estimate, Deviation::Oadev);
+    Clock {
+        fixes: clock.rows.len(),
+        bias_mean_s: mean(&errors),
+        bias_sigma_s: clock.error_line.and_then(|line| std(&detrended(line))),
+        drift: clock.estimate_line.map(|line| line.slope),
+        true_drift: clock.truth_line.map(|line| line.slope),
+        oadev_1s: details.clock_oadev_1s.map(|point| point.deviation),
+        mdev_1s: value(estimate, Deviation::Mdev),
+        ohdev_1s: value(estimate, Deviation::Ohdev),
+        tdev_1s_s: value(estimate, Deviation::Tdev),
+        true_oadev_1s: value(truth, Deviation::Oadev),
+        code_noise_oadev_1s: clock.code_sigma_s.map(|sigma_s| white_phase(Deviation::Oadev, sigma_s, 1.0, 1.0)),
+        h: estimate.and_then(Series::power_law).map(|law| law.h),
+        true_h: truth.and_then(Series::power_law).map(|law| law.h),
+    }
+}
+
 fn observables(errors: &Errors, details: &mut Details) -> Observables {
     let code = errors.code_without_clock_m();
     let carrier = errors.pooled(|error| error.carrier_cycles);
@@ -262,16 +329,9 @@ fn tracking(run: &Run, errors: &Errors, details: &mut Details) -> Tracking {
     let chip_m = |signal: &crate::gnss::signal::Signal| {
         signal.components.first().map_or(f64::NAN, |c| crate::gnss::earth::SPEED_OF_LIGHT_MPS / c.chip_rate_hz)
     };
-    // One list a satellite of what `of` gives, pull-in left out.
-    let groups = |of: &dyn Fn(&SignalError, f64) -> f64| -> Vec<Vec<f64>> {
-        let settled = |rows: &[SignalError], chip_m: f64| {
-            rows.iter().filter(|row| row.locked_s >= PULL_IN_S).map(|row| of(row, chip_m)).collect()
-        };
-        errors.signals.iter().map(|((_, signal), rows)| settled(rows, chip_m(signal))).collect()
-    };
-    let dll = groups(&|row, chip_m| row.code_m / chip_m);
-    let pll = groups(&|row, _| row.carrier_cycles * 360.0);
-    let fll = groups(&|row, _| row.doppler_hz);
+    let dll = errors.settled(|(_, signal), row| row.code_m / chip_m(signal));
+    let pll = errors.settled(|_, row| row.carrier_cycles * 360.0);
+    let fll = errors.settled(|_, row| row.doppler_hz);
     let sigma = |groups: &[Vec<f64>]| pooled_std(groups.iter().map(Vec::as_slice));
 
     let integrations: Vec<f64> = run.tracking.iter().map(|row| row.integration_s).collect();

@@ -6,6 +6,8 @@ use std::path::Path;
 use nalgebra::Vector3;
 use serde::Serialize;
 
+mod clock;
+
 use super::*;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::gps::l1ca::L1_CA;
@@ -317,13 +319,18 @@ fn the_keys_of_the_summary_are_a_contract() {
     let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>().join(" ");
     assert_eq!(
         keys(&value),
-        "scene seed duration_s sample_rate_hz fidelity satellites position observables tracking navigation speed"
+        "scene seed duration_s sample_rate_hz fidelity satellites position clock observables tracking navigation speed"
     );
     for (section, expected) in [
         ("satellites", "in_view acquired used false_acquired"),
         (
             "position",
             "fixes first_fix_s horizontal_mean_m horizontal_p95_m vertical_p95_m error_3d_p95_m bias_enu_m velocity_p95_mps",
+        ),
+        (
+            "clock",
+            "fixes bias_mean_s bias_sigma_s drift true_drift oadev_1s mdev_1s ohdev_1s tdev_1s_s true_oadev_1s \
+             code_noise_oadev_1s h true_h",
         ),
         ("observables", "pseudorange_rms_m pseudorange_bias_m carrier_rms_cycles doppler_rms_hz cn0_bias_db"),
         ("tracking", "losses_of_lock cycle_slips dll_sigma_chips pll_sigma_deg fll_sigma_hz"),
@@ -348,6 +355,8 @@ fn a_run_without_a_fix_or_an_observation_has_nulls() {
     for key in ["first_fix_s", "horizontal_p95_m", "bias_enu_m", "velocity_p95_mps"] {
         assert!(value["position"][key].is_null(), "{key}");
     }
+    assert_eq!(value["clock"]["fixes"], 0);
+    assert!(value["clock"].as_object().unwrap().values().skip(1).all(serde_json::Value::is_null));
     assert!(value["tracking"]["dll_sigma_chips"].is_null() && value["observables"]["cn0_bias_db"].is_null());
 }
 
@@ -392,6 +401,8 @@ fn every_picture_is_a_png_that_is_not_blank() {
         "position_scatter",
         "position_time",
         "trajectory",
+        "clock_bias",
+        "allan",
     ] {
         let path = run.path().join(format!("{name}.png"));
         let picture = resvg::tiny_skia::Pixmap::load_png(&path).unwrap();

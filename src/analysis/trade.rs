@@ -4,13 +4,13 @@
 //! `benches/trade.rs`. A row is dominated if another of the same scene and rate costs no more and errs no more; what remains is the
 //! Pareto front. Limits: nothing is measured here, and fronts look at cost and pseudorange error alone.
 
-use std::fmt::Write;
+use std::fmt::{self, Write};
 use std::path::Path;
 
 use serde::Serialize;
 
 use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREY, Mark, ORANGE, Series, figure};
-use crate::analysis::{JudgeError, write_whole};
+use crate::analysis::{JudgeError, write_rows, write_whole};
 
 /// One setting and what was measured for it; errors are against the `reference` level.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -51,6 +51,29 @@ impl Row {
     }
 }
 
+impl fmt::Display for Row {
+    /// The setting and its figures as cells of a table, without the position.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} | {} | {} | {:e} | {:.3} | {:.4} / {:.4} / {:.4} | {:.1e} | {:.1e} | {:.0} | {:.3}",
+            self.setting,
+            self.code_edge,
+            self.carrier,
+            self.knot_tolerance_cycles,
+            self.ns,
+            self.pseudorange_mean_m,
+            self.pseudorange_sigma_m,
+            self.pseudorange_max_m,
+            self.carrier_cycles,
+            self.doppler_hz,
+            self.spur_dbc,
+            // No zero that rounding left negative.
+            (self.cn0_loss_db * 1e3).round() / 1e3 + 0.0,
+        )
+    }
+}
+
 /// Whether row `index` is beaten or equalled in cost and error by another of its scene, and beaten in one of them.
 pub fn dominated(rows: &[Row], index: usize) -> bool {
     let Some(row) = rows.get(index) else { return false };
@@ -66,14 +89,7 @@ pub fn dominated(rows: &[Row], index: usize) -> bool {
 /// # Errors
 /// [`JudgeError`] with the file that could not be written.
 pub fn write(directory: &Path, rows: &[Row], preface: &str) -> Result<(), JudgeError> {
-    let path = directory.join("trade.csv");
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        table.serialize(row).map_err(|source| JudgeError::Row { path: path.clone(), source })?;
-    }
-    let csv =
-        table.into_inner().map_err(|error| JudgeError::File { path: path.clone(), source: error.into_error() })?;
-    write_whole(&path, &csv)?;
+    write_rows(&directory.join("trade.csv"), rows.iter())?;
     write_whole(&directory.join("trade.md"), markdown(rows, preface).as_bytes())?;
     draw(&directory.join("trade.png"), rows)
 }
@@ -95,23 +111,7 @@ fn markdown(rows: &[Row], preface: &str) -> String {
         last = Some(row);
         let position = row.position_m.map_or_else(String::new, |m| format!("{m:.3}"));
         let front = if dominated(rows, index) { "" } else { "yes" };
-        let _ = writeln!(
-            text,
-            "| {} | {} | {} | {:e} | {:.3} | {:.4} / {:.4} / {:.4} | {:.1e} | {:.1e} | {:.0} | {:.3} | {position} | {front} |",
-            row.setting,
-            row.code_edge,
-            row.carrier,
-            row.knot_tolerance_cycles,
-            row.ns,
-            row.pseudorange_mean_m,
-            row.pseudorange_sigma_m,
-            row.pseudorange_max_m,
-            row.carrier_cycles,
-            row.doppler_hz,
-            row.spur_dbc,
-            // No zero that rounding left negative.
-            (row.cn0_loss_db * 1e3).round() / 1e3 + 0.0,
-        );
+        let _ = writeln!(text, "| {row} | {position} | {front} |");
     }
     text
 }
@@ -168,13 +168,7 @@ fn chart(rows: &[Row], group: &[usize]) -> Chart {
     let y = Axis::new("pseudorange error (m, rms)", (libm::log10(FLOOR_M) - 0.3, top + 0.4));
     let limit = vec![(x.from, -1.0), (x.to, -1.0)];
     let name = |value: f64| if value <= 1.5 * FLOOR_M { format!("≤ {FLOOR_M}") } else { format!("{value}") };
-    let ticks = |axis: &Axis| {
-        let marks = (-4..=3).flat_map(|decade: i32| {
-            [1.0, 2.0, 5.0].map(|m| if decade < 0 { m / 10_f64.powi(-decade) } else { m * 10_f64.powi(decade) })
-        });
-        let shown = marks.filter(|value| (axis.from..=axis.to).contains(&libm::log10(*value)));
-        Some(shown.map(|value| (libm::log10(value), name(value))).collect())
-    };
+    let ticks = |axis: &Axis| Some(axis.log_ticks(&[1.0, 2.0, 5.0], name));
     let (x_ticks, y_ticks) = (ticks(&x), ticks(&y));
     let series = vec![
         Series::new("0.1 m", ORANGE, Mark::Dash, limit),

@@ -8,7 +8,6 @@ pub mod args;
 pub mod error;
 pub mod generate;
 pub mod interrupt;
-pub mod pipe;
 pub mod plan;
 pub mod progress;
 pub mod receive;

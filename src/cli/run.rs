@@ -1,7 +1,10 @@
 //! `run`: generator and receiver side by side with samples passed in memory, then the judge.
+//!
+//! Two batches of samples are in memory at a time: the one that is received and the one that is made meanwhile.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -10,24 +13,23 @@ use crate::analysis::{self, JudgeError};
 use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::interrupt;
-use crate::cli::pipe::{Inlet, Outlet, pipe};
 use crate::cli::progress::Progress;
 use crate::cli::scenario;
 use crate::cli::speed::Speed;
 use crate::cli::staging::Staging;
 use crate::generator::scene::Scene;
-use crate::generator::{self, GenerateError, Generated, truth};
+use crate::generator::stream::{Options, Stream};
+use crate::generator::{GenerateError, truth};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::sigmf;
 use crate::receiver::output::{Output, OutputError};
 use crate::receiver::settings::Settings;
-use crate::receiver::source::SourceError;
-use crate::receiver::{self, Outcome, ReceiveError};
+use crate::receiver::{Outcome, ReceiveError, Reception};
 
-/// Blocks in flight between generator and receiver.
-const PIPE_BLOCKS: usize = 8;
 /// Length of the signal's start from which the spectrum is estimated.
 const SPECTRUM_S: f64 = 0.2;
+/// Pieces that share it where the spectrum changes.
+const SPECTRUM_PIECES: u64 = 60;
 /// Points of that spectrum.
 const SPECTRUM_BINS: usize = 2048;
 
@@ -73,7 +75,8 @@ struct Both {
     whole: Duration,
 }
 
-/// Generates on one thread and receives on another; the first failure that is not a consequence of the other's wins.
+/// Generates and receives side by side: while the receiver takes one batch of samples, the generator makes the next,
+/// and whichever core has nothing left to do for one helps the other.
 fn both(
     scene: &Scene,
     settings: &Settings,
@@ -81,82 +84,54 @@ fn both(
     output: &mut Output,
     tap: &mut Tap,
 ) -> Result<Both, CliError> {
-    let start = Instant::now();
-    let (inlet, mut outlet) = pipe(PIPE_BLOCKS);
     let progress = Progress::new(&format!("run {}", scene.name), Some(scene.samples));
-    let ((generated, generator_busy), received) = std::thread::scope(|scope| {
-        let generator = std::thread::Builder::new()
-            .name("generator".into())
-            .spawn_scoped(scope, move || generate(scene, inlet, truth, tap))
-            .map_err(|error| CliError::passing(format!("cannot start a thread: {error}")))?;
-        let received = receive(&scene.metadata, &mut outlet, settings, output, &progress);
-        let busy = start.elapsed().saturating_sub(outlet.waited);
-        // Without a reader the generator's next write fails, and it ends.
-        drop(outlet);
-        let generated = generator.join().map_err(|_| CliError::bug("the generator panicked"))?;
-        Ok::<_, CliError>((generated, (received, busy)))
-    })?;
-    drop(progress);
-    if let Some(signal) = interrupt::pending() {
-        return Err(signal);
-    }
-    let (received, receiver_busy) = received;
-    match (generated, received) {
-        // The generator's write fails because the receiver has stopped: the receiver knows why.
-        (Err(GenerateError::Write(error)), Err(cause)) if error.kind() == io::ErrorKind::BrokenPipe => Err(cause),
-        (Err(error), _) => Err(generator_error(error)),
-        (Ok(_), Err(cause)) => Err(cause),
-        (Ok(_), Ok(outcome)) => Ok(Both { outcome, generator_busy, receiver_busy, whole: start.elapsed() }),
-    }
-}
-
-fn generate(
-    scene: &Scene,
-    inlet: Inlet,
-    truth: &mut truth::Writer,
-    tap: &mut Tap,
-) -> (Result<Generated, GenerateError>, Duration) {
     let start = Instant::now();
-    let mut splitter = Splitter { inlet, tap };
-    let generated = generator::generate(scene, &mut splitter, truth, &mut |_| {});
-    (generated, start.elapsed().saturating_sub(splitter.inlet.waited))
-}
-
-fn receive(
-    metadata: &IfMetadata,
-    samples: &mut Outlet,
-    settings: &Settings,
-    output: &mut Output,
-    progress: &Progress,
-) -> Result<Outcome, CliError> {
-    receiver::receive(metadata, samples, settings, output, &mut |done| progress.set(done)).map_err(receiver_error)
-}
-
-/// Copies what the generator writes: to the receiver, and to the tap.
-struct Splitter<'a> {
-    inlet: Inlet,
-    tap: &'a mut Tap,
-}
-
-impl Write for Splitter<'_> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if interrupt::pending().is_some() {
-            return Err(io::ErrorKind::BrokenPipe.into());
+    let (mut generator_busy, mut receiver_busy) = (Duration::ZERO, Duration::ZERO);
+    // Inside the pool, so that no batch has to wake its threads up.
+    let outcome = rayon::scope(|_| {
+        let mut stream = Stream::new(scene, truth, &Options::default()).map_err(generator_error)?;
+        let mut reception = Reception::new(&scene.metadata, settings).map_err(receiver_error)?;
+        let (mut made, mut taken) = (Vec::new(), Vec::new());
+        let mut more = true;
+        while more {
+            let (generated, received) = rayon::join(
+                || timed(&mut generator_busy, || stream.next(truth, &mut made)),
+                || {
+                    tap.see(&taken).map_err(|error| CliError::output("samples", &error))?;
+                    timed(&mut receiver_busy, || reception.take(&taken, output)).map_err(receiver_error)
+                },
+            );
+            received?;
+            more = generated.map_err(generator_error)?;
+            std::mem::swap(&mut made, &mut taken);
+            progress.set(reception.samples());
+            if let Some(signal) = interrupt::pending() {
+                return Err(signal);
+            }
         }
-        self.tap.see(bytes)?;
-        self.inlet.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
+        stream.finish(truth).map_err(generator_error)?;
+        reception.finish(output).map_err(receiver_error)
+    })?;
+    Ok(Both { outcome, generator_busy, receiver_busy, whole: start.elapsed() })
 }
 
-/// Looks at the samples on their way: estimates the spectrum of the first part, and keeps all of them if asked to.
+/// Does `work` and adds the time that it took to `busy`.
+fn timed<T>(busy: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let done = work();
+    *busy += start.elapsed();
+    done
+}
+
+/// Looks at the samples on their way: estimates the spectrum of the first part, or of pieces all over a scene whose
+/// spectrum changes, and keeps all samples if asked to.
 struct Tap {
     metadata: IfMetadata,
     psd: Psd,
-    left_bytes: usize,
+    /// Bytes seen, the piece that is looked at next, and the way from one to the next.
+    seen: u64,
+    piece: Range<u64>,
+    stride: u64,
     i: Vec<f32>,
     q: Vec<f32>,
     kept: Option<BufWriter<File>>,
@@ -172,18 +147,28 @@ impl Tap {
             None
         };
         let metadata = scene.metadata.clone();
-        let samples = (SPECTRUM_S * metadata.rate.hz()) as usize;
-        let left_bytes = samples * metadata.format.bytes();
+        let pieces = if scene.interference.is_empty() { 1 } else { SPECTRUM_PIECES };
+        let sample_bytes = metadata.format.bytes() as u64;
+        let length = (SPECTRUM_S * metadata.rate.hz()) as u64 / pieces * sample_bytes;
+        let stride = scene.samples / pieces * sample_bytes;
         let psd = Psd::new(metadata.rate.hz(), !metadata.format.is_complex(), SPECTRUM_BINS);
-        Ok(Self { psd, metadata, left_bytes, i: Vec::new(), q: Vec::new(), kept })
+        Ok(Self { psd, metadata, seen: 0, piece: 0..length, stride, i: Vec::new(), q: Vec::new(), kept })
     }
 
     fn see(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let count = bytes.len().min(self.left_bytes);
-        if count > 0 {
-            self.left_bytes -= count;
-            self.metadata.format.unpack(&bytes[..count], &mut self.i, &mut self.q);
+        let begin = self.seen;
+        self.seen += bytes.len() as u64;
+        while self.piece.start < self.seen {
+            let place = |at: u64| (at.clamp(begin, self.seen) - begin) as usize;
+            let inside = bytes.get(place(self.piece.start)..place(self.piece.end)).unwrap_or(&[]);
+            self.metadata.format.unpack(inside, &mut self.i, &mut self.q);
             self.psd.add(&self.i, &self.q);
+            if self.piece.end > self.seen {
+                break;
+            }
+            self.psd.cut();
+            let step = self.stride.max(self.piece.end - self.piece.start);
+            self.piece = self.piece.start + step..self.piece.end + step;
         }
         match &mut self.kept {
             Some(file) => file.write_all(bytes),
@@ -231,7 +216,7 @@ pub fn truth_error(error: truth::TruthError) -> CliError {
 pub fn receiver_error(error: ReceiveError) -> CliError {
     match error {
         ReceiveError::Output(error) => output_error(error),
-        ReceiveError::Source(SourceError::Read { error, .. }) => CliError::read("samples", &error),
+        ReceiveError::Read { error, .. } => CliError::read("samples", &error),
         other => CliError::input(other),
     }
 }

@@ -114,7 +114,7 @@ impl Catalogue {
             if weight == 0.0 && rate == 0.0 {
                 continue;
             }
-            let (state, clock) = (set.state(at)?, set.clock_l1(at)?);
+            let (state, clock) = set.state_and_clock_l1(at)?;
             let (total, total_clock) = sum.get_or_insert((
                 State { position_m: nalgebra::Vector3::zeros(), velocity_mps: nalgebra::Vector3::zeros() },
                 ClockState { offset_s: 0.0, drift: 0.0 },

@@ -5,6 +5,10 @@
 //! there. Limits: a knob's figure assumes that every other knob is at its best.
 
 use crate::generator::scene::Scene;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+
+/// Rate of the code that the figures were measured with.
+const CHIP_HZ: f64 = 1.023e6;
 
 /// A name for a value of every knob.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +35,7 @@ pub enum CodeEdge {
 /// How samples are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
-    /// Lanes of single precision, anchored again in `f64` every 4096 samples at least.
+    /// Lanes of single precision, anchored again at the 64-bit phase every 4096 samples at least.
     F32,
     /// Each sample by itself in double precision.
     F64,
@@ -48,6 +52,8 @@ pub struct Fidelity {
     pub noise: Arithmetic,
     /// Largest error of the carrier between knots.
     pub knot_tolerance_cycles: f64,
+    /// Error of the code below which `balanced` chooses.
+    pub allowed_m: f64,
 }
 
 impl Grade {
@@ -98,6 +104,7 @@ impl Fidelity {
                 carrier: Arithmetic::F32,
                 noise: Arithmetic::F32,
                 knot_tolerance_cycles: 4e-4,
+                allowed_m: LARGEST_BIAS_M,
             },
             // 1e-4 cycle is 19 µm: a carrier loop at 50 dB-Hz has forty times that.
             Grade::Balanced => Self {
@@ -106,6 +113,7 @@ impl Fidelity {
                 carrier: Arithmetic::F32,
                 noise: Arithmetic::F32,
                 knot_tolerance_cycles: 1e-4,
+                allowed_m: LARGEST_BIAS_M,
             },
             // Finer knots would only follow the rounding of 1.3e8 cycles in f64 (1.5e-8 for each operation).
             Grade::Reference => Self {
@@ -114,6 +122,7 @@ impl Fidelity {
                 carrier: Arithmetic::F64,
                 noise: Arithmetic::F64,
                 knot_tolerance_cycles: 1e-6,
+                allowed_m: LARGEST_BIAS_M,
             },
         }
     }
@@ -134,16 +143,19 @@ impl Fidelity {
         }
     }
 
-    /// The knobs of a level for samples at `rate_hz`: `balanced` takes band-limited edges where area edges would leave
-    /// more than 0.1 m, at multiples of the chip rate and near simple ratios to it.
-    pub fn suited(grade: Grade, rate_hz: f64) -> Self {
-        let level = Self::of(grade);
-        match grade {
-            Grade::Balanced if standing_bias_m(CodeEdge::Area, rate_hz) > 0.1 => {
-                Self { code_edge: CodeEdge::BandLimited, ..level }
-            }
-            _ => level,
+    /// The knobs of a level for samples at `rate_hz`: `balanced` takes the cheapest edges whose code error is below
+    /// `allowed_m`, for which see [`allowed_m`].
+    pub fn suited(grade: Grade, rate_hz: f64, allowed_m: f64) -> Self {
+        let level = Self { allowed_m, ..Self::of(grade) };
+        if grade != Grade::Balanced {
+            return level;
         }
+        CodeEdge::NAMES
+            .into_iter()
+            .map(|(_, code_edge)| Self { code_edge, ..level })
+            .filter(|fidelity| fidelity.code_bias_m(rate_hz) < allowed_m)
+            .min_by(|a, b| a.satellite_sample_ns(rate_hz).total_cmp(&b.satellite_sample_ns(rate_hz)))
+            .unwrap_or(Self { code_edge: CodeEdge::BandLimited, ..level })
     }
 
     /// Measured error of a code whose phase stands still on the sampling grid, root mean square over phases, in metres.
@@ -153,11 +165,30 @@ impl Fidelity {
         };
         let moving = match self.code_edge {
             CodeEdge::Nearest => near([(0.0, 1.1), (8e6, 0.3), (20e6, 0.1)]),
-            CodeEdge::Area => near([(0.0, 0.1), (8e6, 0.02), (20e6, 0.01)]),
+            CodeEdge::Area => near([(0.0, 0.09), (8e6, 0.02), (20e6, 0.01)]),
             CodeEdge::BandLimited => 1e-4,
         };
         moving.max(standing_bias_m(self.code_edge, rate_hz))
     }
+}
+
+/// Largest error of the code that `balanced` leaves, whatever the noise.
+const LARGEST_BIAS_M: f64 = 0.1;
+
+/// Error of the code that a scene's own noise hides, in metres: that of a delay loop on its strongest signal, 0.1 m at most.
+///
+/// Thermal noise of a loop of bandwidth B with correlators d chips apart is √(B·d / (2·C/N0)) chips where T·C/N0 is far
+/// above one (Kaplan & Hegarty, equation 5.23, first branch). With 1 Hz and half a chip it is 0.1 m at 63 dB-Hz: above
+/// what any GPS signal reaches on the ground (52 dB-Hz, 0.37 m), so that only signals set stronger than nature's
+/// ask for less. Without noise nothing hides an error, and the 0.1 m stand by themselves.
+pub fn allowed_m(cn0_dbhz: Option<f64>) -> f64 {
+    const BANDWIDTH_HZ: f64 = 1.0;
+    const SPACING_CHIPS: f64 = 0.5;
+    cn0_dbhz.map_or(LARGEST_BIAS_M, |cn0_dbhz| {
+        let cn0_hz = libm::pow(10.0, 0.1 * cn0_dbhz);
+        let noise_m = SPEED_OF_LIGHT_MPS / CHIP_HZ * (BANDWIDTH_HZ * SPACING_CHIPS / (2.0 * cn0_hz)).sqrt();
+        noise_m.min(LARGEST_BIAS_M)
+    })
 }
 
 /// Error where every chip meets the same few places between samples, root mean square, in metres.
@@ -165,7 +196,6 @@ impl Fidelity {
 /// With `q` places in turn, nearest edges know the code to a sample in `q` (uniform: over √12); for area edges
 /// it falls with the square, from 1.6 m measured at 4.092 Msps.
 fn standing_bias_m(edge: CodeEdge, rate_hz: f64) -> f64 {
-    const CHIP_HZ: f64 = 1.023e6;
     // Places drift apart within a code period of 1023 chips when the ratio misses by more than this.
     let meets = |q: u32| {
         let samples = f64::from(q) * rate_hz / CHIP_HZ;
@@ -174,7 +204,7 @@ fn standing_bias_m(edge: CodeEdge, rate_hz: f64) -> f64 {
     let Some(q) = (1..=32).find(|q| meets(*q)) else { return 0.0 };
     let finest_hz = f64::from(q) * rate_hz;
     match edge {
-        CodeEdge::Nearest => 299_792_458.0 / finest_hz / 12_f64.sqrt(),
+        CodeEdge::Nearest => SPEED_OF_LIGHT_MPS / finest_hz / 12_f64.sqrt(),
         CodeEdge::Area => 1.6 * (4.092e6 / finest_hz).powi(2),
         CodeEdge::BandLimited => 0.0,
     }
@@ -196,7 +226,7 @@ pub struct Choice {
 /// What a scene chose for each knob, the error to expect of it and its cost.
 pub fn choices(scene: &Scene) -> Vec<Choice> {
     let rate_hz = scene.clock.rate.hz();
-    let (chosen, level) = (scene.fidelity, Fidelity::suited(scene.fidelity.grade, rate_hz));
+    let (chosen, level) = (scene.fidelity, Fidelity::suited(scene.fidelity.grade, rate_hz, scene.fidelity.allowed_m));
     let f32_carrier = Fidelity { carrier: Arithmetic::F32, ..chosen };
     let edge_ns = f32_carrier.satellite_sample_ns(rate_hz);
     let mut found = vec![
@@ -204,7 +234,11 @@ pub fn choices(scene: &Scene) -> Vec<Choice> {
             knob: "code_edge",
             value: chosen.code_edge.name().to_owned(),
             own: chosen.code_edge != level.code_edge,
-            error: format!("pseudorange {:.1e} m rms, less as the code moves", chosen.code_bias_m(rate_hz)),
+            error: format!(
+                "pseudorange {:.1e} m rms, less as the code moves (balanced: below {:.1e} m)",
+                chosen.code_bias_m(rate_hz),
+                chosen.allowed_m
+            ),
             cost: format!("{edge_ns:.2} ns"),
         },
         Choice {
@@ -247,16 +281,29 @@ mod tests {
 
     #[test]
     fn balanced_keeps_to_a_decimetre_where_the_rate_meets_the_chips() {
-        let edge = |rate_hz: f64| Fidelity::suited(Grade::Balanced, rate_hz).code_edge;
+        let suited = |grade: Grade, rate_hz: f64| Fidelity::suited(grade, rate_hz, LARGEST_BIAS_M);
         for rate_hz in [2.046e6, 4.092e6, 5.115e6, 10.23e6, 2.5575e6] {
-            assert_eq!(edge(rate_hz), CodeEdge::BandLimited, "{rate_hz}");
+            assert_eq!(suited(Grade::Balanced, rate_hz).code_edge, CodeEdge::BandLimited, "{rate_hz}");
         }
         for rate_hz in [2.6e6, 4e6, 10e6, 12e6, 25e6, 50e6] {
-            assert_eq!(edge(rate_hz), CodeEdge::Area, "{rate_hz}");
+            assert_eq!(suited(Grade::Balanced, rate_hz).code_edge, CodeEdge::Area, "{rate_hz}");
         }
         for rate_hz in [2.046e6, 2.6e6, 4.092e6, 10e6, 20.46e6] {
-            assert!(Fidelity::suited(Grade::Balanced, rate_hz).code_bias_m(rate_hz) <= 0.1, "{rate_hz}");
-            assert_eq!(Fidelity::suited(Grade::Fast, rate_hz).code_edge, CodeEdge::Nearest);
+            assert!(suited(Grade::Balanced, rate_hz).code_bias_m(rate_hz) < 0.1, "{rate_hz}");
+            assert_eq!(suited(Grade::Fast, rate_hz).code_edge, CodeEdge::Nearest);
         }
+    }
+
+    #[test]
+    fn signals_stronger_than_nature_s_ask_for_better_edges() {
+        // σ = 293.05 m · √(0.25 / 10^(x/10)): 0.46 m at 50 dB-Hz, hidden under the cap, and 0.1 m at 63.3 dB-Hz.
+        assert_eq!((allowed_m(None), allowed_m(Some(50.0))), (0.1, 0.1));
+        assert!((allowed_m(Some(70.0)) - 0.046_335).abs() < 1e-6);
+        let edge = |rate_hz: f64, cn0_dbhz: f64| {
+            Fidelity::suited(Grade::Balanced, rate_hz, allowed_m(Some(cn0_dbhz))).code_edge
+        };
+        assert_eq!((edge(2.6e6, 63.0), edge(2.6e6, 70.0)), (CodeEdge::Area, CodeEdge::BandLimited));
+        // Area edges err by 0.01 m at most at 25 Msps.
+        assert_eq!((edge(25e6, 70.0), edge(25e6, 90.0)), (CodeEdge::Area, CodeEdge::BandLimited));
     }
 }

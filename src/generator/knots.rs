@@ -3,12 +3,20 @@
 //! The grid's roots are 2^r samples, 8 to 16 s long. A root is halved until the cubic through four
 //! nodes of each part misses the truth at three further points by less than half the tolerance,
 //! so the knots follow from the scene and never from how the stream is cut or where it
-//! starts. Parts also end at breaks of the motion. Limits: parts are not shorter than 1024 samples.
+//! starts. Power is a straight line through the ends where that keeps the amplitude to [`AMPLITUDE_ERROR`], a cubic
+//! elsewhere, and parts are halved until it does. Parts also end at breaks of the motion. Rays that are silent
+//! throughout a part are left out of it. Limits: parts are not shorter than 1024 samples.
 
+use crate::generator::ripple::Ripple;
 use crate::gnss::time::Rate;
 
 /// Parts of the grid are not halved below this; what error remains is reported.
 const SHORTEST_SAMPLES: u64 = 1024;
+/// Error of a ray's amplitude between knots at most, of its largest in the part: 0.0087 dB.
+pub const AMPLITUDE_ERROR: f64 = 1e-3;
+/// Half the step of the amplitude from run to run at most, of its largest in the part: a run keeps the power of its
+/// middle, so the staircase does not bias it, and its rms error is 45 dB below the ray.
+pub const AMPLITUDE_STEP: f64 = 1e-2;
 
 /// What one ray's signal says at one reading of the receiver's clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +27,17 @@ pub struct Arrival {
     pub carrier_cycles: f64,
     /// Carrier power over noise density.
     pub cn0_hz: f64,
+}
+
+impl Arrival {
+    /// With what is too quick for knots.
+    pub fn rippled(self, ripple: Ripple) -> Self {
+        Self {
+            delay_s: self.delay_s + ripple.delay_s,
+            carrier_cycles: self.carrier_cycles + ripple.carrier_cycles,
+            cn0_hz: self.cn0_hz * ripple.gain * ripple.gain,
+        }
+    }
 }
 
 /// Where polynomials are made.
@@ -43,9 +62,10 @@ pub struct Path {
     pub delay: Cubic,
     /// Cycles, with whole ones left out at the start of the part.
     pub carrier: Cubic,
-    /// C/N0 at the ends of the part, linear (Hz).
-    pub cn0_hz: [f64; 2],
-    /// Longest power of two of samples on which a secant of the carrier stays within the tolerance.
+    /// Linear C/N0 (Hz).
+    pub cn0_hz: Cubic,
+    /// Longest power of two of samples on which a secant of the carrier stays within the tolerance and the amplitude
+    /// within [`AMPLITUDE_STEP`].
     pub run_samples: u64,
 }
 
@@ -57,9 +77,16 @@ pub struct Part {
     pub paths: Vec<Path>,
     /// Largest error met at the points of comparison.
     pub error_cycles: f64,
+    /// The same of amplitudes, each of its ray's largest.
+    pub amplitude_error: f64,
 }
 
 impl Cubic {
+    /// The straight line from `left` to `right`.
+    fn line(left: f64, right: f64) -> Self {
+        Self([left, right - left, 0.0, 0.0])
+    }
+
     /// Through four points of the unit interval.
     fn through(u: [f64; 4], y: [f64; 4]) -> Self {
         let f = |a: usize, b: usize, lower: f64, upper: f64| (upper - lower) / (u[b] - u[a]);
@@ -80,6 +107,12 @@ impl Cubic {
     pub fn change(&self, u: f64, v: f64) -> f64 {
         let [_, b, c, d] = self.0;
         (v - u) * (b + c * (u + v) + d * (u * u + u * v + v * v))
+    }
+
+    /// A bound on the magnitude of the first derivative.
+    fn steepness(&self) -> f64 {
+        let [_, b, c, d] = self.0;
+        b.abs() + 2.0 * c.abs() + 3.0 * d.abs()
     }
 
     /// Largest magnitude of the second derivative.
@@ -140,7 +173,9 @@ impl Grid {
             return self.halve(low, high, b, end, observe, parts);
         }
         let part = self.fit(start, end, observe)?;
-        let good = part.as_ref().is_some_and(|part| part.error_cycles <= 0.5 * self.tolerance_cycles);
+        let good = part.as_ref().is_some_and(|part| {
+            part.error_cycles <= 0.5 * self.tolerance_cycles && part.amplitude_error <= AMPLITUDE_ERROR
+        });
         if good || high - low <= SHORTEST_SAMPLES || end - start <= SHORTEST_SAMPLES {
             parts.extend(part);
             return Ok(());
@@ -177,19 +212,24 @@ impl Grid {
             }
         }
         let rays = at.iter().map(|(_, rays)| rays.len()).min().unwrap_or(0);
-        let mut part = Part { start, end, paths: Vec::with_capacity(rays), error_cycles: 0.0 };
+        let mut part = Part { start, end, paths: Vec::with_capacity(rays), error_cycles: 0.0, amplitude_error: 0.0 };
         for ray in 0..rays {
             let seen: Vec<(f64, Arrival)> =
                 at.iter().filter_map(|(n, rays)| rays.get(ray).map(|r| (part.fraction(*n), *r))).collect();
-            if let Some((path, error_cycles)) = self.path(&seen, length) {
+            if seen.iter().all(|(_, r)| r.cn0_hz == 0.0) {
+                continue;
+            }
+            if let Some((path, error_cycles, amplitude_error)) = self.path(&seen, length) {
                 part.paths.push(path);
                 part.error_cycles = part.error_cycles.max(error_cycles);
+                part.amplitude_error = part.amplitude_error.max(amplitude_error);
             }
         }
         Ok(Some(part))
     }
 
-    fn path(&self, seen: &[(f64, Arrival)], length: u64) -> Option<(Path, f64)> {
+    /// The path through seven sights of a ray, its error in cycles and that of its amplitude.
+    fn path(&self, seen: &[(f64, Arrival)], length: u64) -> Option<(Path, f64, f64)> {
         let (nodes, checks) = seen.split_first_chunk::<4>()?;
         let whole = nodes[0].1.carrier_cycles.floor();
         let u = nodes.map(|(u, _)| u);
@@ -199,15 +239,40 @@ impl Grid {
             let code = (delay.at(*u) - r.delay_s).abs() * self.carrier_hz;
             worst.max(code).max((carrier.at(*u) - (r.carrier_cycles - whole)).abs())
         });
+        let (cn0_hz, amplitude_error) = power(seen, u, nodes.map(|(_, r)| r.cn0_hz));
         // A secant of length s misses by at most s²/8 of the second derivative.
         let curvature = carrier.curvature() / (length as f64 * length as f64);
+        // Power changes twice as fast as amplitude, and a run's ends are half of it away from its middle.
+        let strongest = seen.iter().fold(0.0_f64, |most, (_, r)| most.max(r.cn0_hz));
+        let steepness = cn0_hz.steepness() / (length as f64 * 4.0 * strongest);
+        let within = |run: u64| {
+            (run * run) as f64 * curvature / 8.0 <= 0.5 * self.tolerance_cycles
+                && run as f64 * steepness <= AMPLITUDE_STEP
+        };
         let mut run_samples = super::synth::RUN_SAMPLES as u64;
-        while run_samples > 64 && (run_samples * run_samples) as f64 * curvature / 8.0 > 0.5 * self.tolerance_cycles {
+        while run_samples > 64 && !within(run_samples) {
             run_samples /= 2;
         }
-        let cn0_hz = [nodes[0].1.cn0_hz, nodes[3].1.cn0_hz];
-        Some((Path { delay, carrier, cn0_hz, run_samples }, error))
+        Some((Path { delay, carrier, cn0_hz, run_samples }, error, amplitude_error))
     }
+}
+
+/// The power between the ends of a part, and the largest error of its amplitude, of the largest amplitude seen.
+fn power(seen: &[(f64, Arrival)], u: [f64; 4], nodes: [f64; 4]) -> (Cubic, f64) {
+    let strongest = seen.iter().fold(0.0_f64, |most, (_, r)| most.max(r.cn0_hz)).sqrt();
+    let error = |cubic: &Cubic| {
+        seen.iter().fold(0.0_f64, |worst, (u, r)| {
+            worst.max((cubic.at(*u).max(0.0).sqrt() - r.cn0_hz.max(0.0).sqrt()).abs() / strongest)
+        })
+    };
+    let line = Cubic::line(nodes[0], nodes[3]);
+    let missed = error(&line);
+    if missed <= AMPLITUDE_ERROR {
+        return (line, missed);
+    }
+    let cubic = Cubic::through(u, nodes);
+    let missed = error(&cubic);
+    (cubic, missed)
 }
 
 #[cfg(test)]
@@ -236,6 +301,44 @@ mod tests {
         let told = parts(rate, 100.0, vec![4 * 2_600_000]).len();
         assert_eq!(told, 2);
         assert!(blind > told);
+    }
+
+    #[test]
+    fn power_is_a_line_where_that_will_do_and_keeps_its_bound_where_an_antenna_turns() {
+        let rate = Rate::from_hz(2.6e6).unwrap();
+        let made = |cn0_hz: &dyn Fn(f64) -> f64| {
+            let observe = |n: u64| {
+                let t_s = rate.elapsed_s(n);
+                Ok::<_, ()>(Some(vec![Arrival { cn0_hz: cn0_hz(t_s), ..arrival(t_s, 0.0) }]))
+            };
+            Grid::new(rate, vec![], 1e-4, CARRIER_HZ).root(0, &observe).unwrap()
+        };
+        // A hundredth of a decibel a second, as satellites rise.
+        let slow = |t_s: f64| 1e4 * libm::pow(10.0, 1e-3 * t_s);
+        let rising = made(&slow);
+        assert_eq!((rising.len(), rising[0].paths[0].run_samples), (1, crate::generator::synth::RUN_SAMPLES as u64));
+        assert_eq!(rising[0].paths[0].cn0_hz, Cubic::line(slow(0.0), slow(rate.elapsed_s(rising[0].end))));
+        // 9.5 dB from side to side, a hundred times a second.
+        let turning = |t_s: f64| {
+            let amplitude = 1.0 + 0.5 * libm::sin(std::f64::consts::TAU * 100.0 * t_s);
+            1e4 * amplitude * amplitude
+        };
+        let parts = made(&turning);
+        assert!(parts.iter().all(|part| part.amplitude_error <= AMPLITUDE_ERROR));
+        for part in parts.iter().step_by(37) {
+            for k in 0..=40 {
+                let n = part.start + (part.end - part.start) * k / 40;
+                let cn0_hz = part.paths[0].cn0_hz.at(part.fraction(n));
+                // Points of comparison lie where a cubic's error is half its largest and more.
+                let error = (cn0_hz.sqrt() - turning(rate.elapsed_s(n)).sqrt()).abs() / 150.0;
+                assert!(error < 2.0 * AMPLITUDE_ERROR, "{n}: {error}");
+            }
+            let steepest = 2.0 * 150.0 * 50.0 * std::f64::consts::TAU * 100.0 / 2.6e6;
+            let run = part.paths[0].run_samples as f64;
+            assert!(run <= 64.0 || steepest * run / (4.0 * 150.0 * 150.0) < AMPLITUDE_STEP * 1.5, "{run}");
+        }
+        // A ray that is silent needs no path.
+        assert!(made(&|_| 0.0).iter().all(|part| part.paths.is_empty()));
     }
 
     #[test]

@@ -7,10 +7,11 @@ use std::fmt;
 
 use crate::generator::fidelity::{self, Choice};
 use crate::generator::ray::Ray;
-use crate::generator::scene::{CodeEdge, Scene};
+use crate::generator::scene::{CodeEdge, Scene, is_outside};
 use crate::generator::sky::emission;
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::SIGNALS;
 
 /// Instants between start and end at which the sky is looked at.
 const INSTANTS: u32 = 240;
@@ -85,7 +86,9 @@ impl Plan {
         let duration_s = scene.clock.rate.elapsed_s(scene.samples);
         let extremes = scene.trajectory.extremes(duration_s);
         let satellites = in_view(scene, duration_s)?;
-        let up = satellites.len() as f64 * scene.signals.len() as f64;
+        // A spoofer sends about as many signals again.
+        let sources = (1 + scene.spoofers.len()) as f64;
+        let up = satellites.len() as f64 * scene.signals.len() as f64 * sources + scene.interference.len() as f64;
         let bytes = scene.samples.saturating_mul(scene.metadata.format.bytes() as u64);
         let knots =
             scene.trajectory.knots().len() as u64 * std::mem::size_of::<crate::generator::vehicle::Knot>() as u64;
@@ -155,11 +158,7 @@ fn models(scene: &Scene) -> Vec<Model> {
     let mut models: Vec<Model> = scene
         .effects
         .iter()
-        .map(|effect| Model {
-            name: effect.name().to_owned(),
-            present: true,
-            why: "acts on every ray at every knot".to_owned(),
-        })
+        .map(|effect| Model { name: effect.name().to_owned(), present: true, why: effect.describe() })
         .collect();
     let mut add = |name: &str, present: bool, why: String| models.push(Model { name: name.to_owned(), present, why });
     for name in ["ionosphere", "troposphere"] {
@@ -167,20 +166,54 @@ fn models(scene: &Scene) -> Vec<Model> {
             add(name, false, format!("the scenario has no [{name}]"));
         }
     }
-    let clock = scene.receiver_clock;
-    let off = clock.bias_s != 0.0 || clock.drift != 0.0;
+    for signal in SIGNALS.into_iter().filter(|signal| !scene.signals.contains(signal)) {
+        let outside = is_outside(&scene.metadata, signal);
+        let why =
+            if outside { "its main lobe lies outside the samples' band" } else { "not among the scenario's signals" };
+        add(signal.name, false, why.to_owned());
+    }
+    if scene.trajectory.attitude().is_none() {
+        add("attitude", false, "the scenario has no [attitude]: the antenna looks up, no wind-up".to_owned());
+    }
+    if !scene.effects.iter().any(|effect| effect.name() == "multipath") {
+        add("multipath", false, "the scenario has no [[multipath]]".to_owned());
+    }
+    if !scene.effects.iter().any(|effect| effect.name() == "obstruction") {
+        add("obstruction", false, "the scenario has no [[obstruction]]".to_owned());
+    }
+    let fading = scene.scintillation.as_ref().map(|fading| {
+        let strength = &fading.strength;
+        let who = strength
+            .satellites
+            .as_ref()
+            .map_or("all satellites".to_owned(), |list| format!("{} satellites", list.len()));
+        format!("S4 {}, decorrelation {} s, {who}", strength.s4, strength.decorrelation_s)
+    });
+    let absent = || "the scenario has no [scintillation]".to_owned();
+    add("scintillation", fading.is_some(), fading.unwrap_or_else(absent));
+    let clock = &scene.receiver_clock;
+    let noisy = clock.oscillator.as_ref().map(|oscillator| format!(", noise h = {:?}", oscillator.law.levels()));
+    let aged = (clock.ageing_per_s != 0.0).then(|| format!(", ageing {:e} a second", clock.ageing_per_s));
+    let shaken = clock.shaking.as_ref().map(|shaking| format!(", {:e} for 1 m/s2", shaking.per_mps2));
+    let off = clock.bias_s != 0.0 || clock.drift != 0.0 || noisy.is_some() || aged.is_some() || shaken.is_some();
     let why = if off {
-        format!("bias {:e} s, drift {:e} s/s", clock.bias_s, clock.drift)
+        let rest: String = [aged, shaken, noisy].into_iter().flatten().collect();
+        format!("bias {:e} s, drift {:e} s/s{rest}", clock.bias_s, clock.drift)
     } else {
         "no [receiver_clock]: it reads GPS time".to_owned()
     };
     add("receiver clock", off, why);
-    let why = if scene.noise {
-        format!("seed {}, {} LSB a component", scene.seed, scene.noise_lsb)
-    } else {
-        "no [noise]".to_owned()
-    };
-    add("thermal noise", scene.noise, why);
+    scene.stages(|stage| add(stage.name(), true, stage.describe()));
+    scene.spoofers.iter().for_each(|spoofer| add("spoofer", true, spoofer.describe()));
+    if scene.interference.is_empty() {
+        add("interference", false, "no [[interference]] in the samples' band".to_owned());
+    }
+    if scene.spoofers.is_empty() {
+        add("spoofer", false, "no [[spoofer]]".to_owned());
+    }
+    if !scene.noise {
+        add("noise", false, "no [noise]".to_owned());
+    }
     let rounds = scene.metadata.format.full_scale_lsb().is_some();
     add("quantiser", rounds, format!("format {}", scene.metadata.format));
     add(

@@ -47,6 +47,8 @@ pub struct Ray {
 pub trait Effect: Send + Sync {
     /// Name as a scenario writes it.
     fn name(&self) -> &'static str;
+    /// What it does, for the plan.
+    fn describe(&self) -> String;
     /// Acts on every ray of `signal` along `sight`, or adds rays.
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>);
 }

@@ -5,10 +5,20 @@
 //! [`Scene`](crate::generator::scene::Scene). Units stand in the names of the keys: degrees and dB here, radians and
 //! ratios from here on. `[receiver]` is kept as written for the receiver's own settings.
 
+mod attitude;
 mod compose;
+mod hardware;
+mod hostile;
+pub mod interference;
+mod link;
 mod motion;
+mod multipath;
+mod obstruction;
 mod parts;
+mod propagation;
 mod read;
+mod scintillation;
+mod stages;
 #[cfg(test)]
 mod tests;
 
@@ -18,21 +28,27 @@ use thiserror::Error;
 use toml::de::DeTable;
 
 pub use compose::Overrides;
+pub use hardware::{ClockSpec, FrontEnd};
+pub use interference::{InterferenceSpec, SpooferSpec};
+pub use link::{AntennaSpec, Power, Transmit};
 pub use motion::{FileKind, MotionSpec};
+pub use propagation::{Electrons, Ionosphere, MappingKind, NeutralAtmosphere};
 pub use read::Place;
 use read::{Source, Table};
+use stages::Stages;
 
-use crate::generator::clock::ReceiverClock;
-use crate::generator::effect::link::{Antenna, LinkBudget};
-use crate::generator::effect::troposphere::Weather;
+use crate::generator::effect::multipath::Echo;
+use crate::generator::effect::obstruction::Obstacle;
+use crate::generator::fidelity::allowed_m;
+use crate::generator::ripple::scintillation::Strength;
 use crate::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::samples::Format;
+use crate::generator::vehicle::attitude::Attitude;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{SIGNALS, Signal};
 use crate::gnss::time::{Epoch, Rate};
 
-/// Every table and the keys that it may hold. `[power.satellites]` holds satellites, `[receiver]` anything.
+/// Every table and the keys that it may hold. `[power.satellites]` and `[power.blocks]` hold satellites, `[receiver]`
+/// anything; the keys of lists of tables are in their families' files.
 pub const KEYS: &[(&str, &[&str])] = &[
     (
         "",
@@ -45,12 +61,23 @@ pub const KEYS: &[(&str, &[&str])] = &[
             "navigation",
             "satellites",
             "motion",
+            "attitude",
             "front_end",
             "power",
+            "multipath",
             "ionosphere",
             "troposphere",
+            "obstruction",
+            "scintillation",
             "receiver_clock",
             "noise",
+            "playback",
+            "local_oscillator",
+            "filter",
+            "iq",
+            "adc",
+            "interference",
+            "spoofer",
             "fidelity",
             "truth",
             "receiver",
@@ -59,12 +86,21 @@ pub const KEYS: &[(&str, &[&str])] = &[
     ("navigation", &["file"]),
     ("satellites", &["mask_deg", "exclude", "include_unhealthy"]),
     ("motion", motion::KEYS),
+    ("attitude", attitude::KEYS),
     ("front_end", &["sample_rate_hz", "if_hz", "spectrum_inverted", "format", "noise_lsb"]),
-    ("power", &["kind", "cn0_dbhz", "satellites", "antenna", "noise_figure_db", "loss_db"]),
-    ("ionosphere", &["model", "alpha", "beta"]),
-    ("troposphere", &["model", "height_m", "pressure_hpa", "temperature_c", "relative_humidity"]),
-    ("receiver_clock", &["bias_s", "drift_sps"]),
+    ("power", link::KEYS),
+    ("ionosphere", propagation::IONOSPHERE_KEYS),
+    ("troposphere", propagation::TROPOSPHERE_KEYS),
+    ("scintillation", &["s4", "sigma_phi_rad", "decorrelation_s", "satellites"]),
+    ("receiver_clock", &["bias_s", "drift_sps", "ageing_per_day", "sensitivity_per_g", "oscillator", "power_law"]),
     ("noise", &[]),
+    ("playback", &["bits", "load_sigma", "attenuation_db"]),
+    ("local_oscillator", &["offset_hz", "phase_noise_rad", "phase_noise_bandwidth_hz"]),
+    ("filter", &["kind", "order", "bandwidth_hz"]),
+    ("iq", &["gain_db", "phase_deg", "dc_i_lsb", "dc_q_lsb"]),
+    ("adc", &["bits", "step_sigma", "agc_window_s"]),
+    ("interference", interference::KEYS),
+    ("spoofer", interference::SPOOFER_KEYS),
     ("fidelity", &["level", "code_edge", "carrier", "noise", "knot_tolerance_cycles"]),
     ("truth", &["interval_s"]),
 ];
@@ -87,35 +123,6 @@ pub enum ScenarioError {
     File { origin: String, key: &'static str, path: PathBuf, reason: String },
 }
 
-/// The sampling of the scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrontEnd {
-    pub rate: Rate,
-    /// Where GPS L1 appears in the samples.
-    pub if_hz: f64,
-    pub inverted: bool,
-    pub format: Format,
-    /// The gain, if the scenario sets it.
-    pub noise_lsb: Option<f32>,
-}
-
-/// How strong the satellites are.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Power {
-    /// The same for all but those listed.
-    Fixed { cn0_dbhz: f64, satellites: Vec<(Sv, f64)> },
-    /// From range, elevation and antennas.
-    LinkBudget { antenna: Antenna, noise_figure_db: f64, loss_db: f64 },
-}
-
-/// Where the ionosphere's coefficients come from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Ionosphere {
-    /// The navigation file's.
-    Broadcast,
-    Given(Klobuchar),
-}
-
 /// A scenario whose every value is within its range. What is absent is `None` or not in the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenario {
@@ -133,12 +140,20 @@ pub struct Scenario {
     pub excluded: Vec<Sv>,
     pub include_unhealthy: bool,
     pub motion: MotionSpec,
+    pub attitude: Option<Attitude>,
     pub front_end: FrontEnd,
     pub power: Power,
+    pub multipath: Vec<Echo>,
     pub ionosphere: Option<Ionosphere>,
-    pub troposphere: Option<Weather>,
-    pub receiver_clock: ReceiverClock,
+    pub troposphere: Option<NeutralAtmosphere>,
+    /// What stands in the way; buildings are measured from where the motion starts.
+    pub obstacles: Vec<Obstacle>,
+    pub scintillation: Option<Strength>,
+    pub receiver_clock: ClockSpec,
     pub noise: bool,
+    pub stages: Stages,
+    pub interference: Vec<InterferenceSpec>,
+    pub spoofers: Vec<SpooferSpec>,
     pub fidelity: Fidelity,
     pub truth_interval_s: f64,
     /// For the receiver's own parser.
@@ -166,11 +181,13 @@ impl Scenario {
             Ok(table)
         };
         let (mask_rad, excluded, include_unhealthy) = satellites(open("satellites")?.as_ref())?;
-        let front_end = front_end(open("front_end")?.as_ref())?;
+        let front_end = hardware::front_end(open("front_end")?.as_ref())?;
         let motion = open("motion")?.ok_or_else(|| root.bad("motion", "a table with kind = \"static\", …"))?;
         let start = root.instant("start")?.ok_or_else(|| root.bad("start", "GPS time like \"2010-07-01T08:12:30\""))?;
         let file = open("navigation")?.map(|t| t.text("file", "a path")).transpose()?.flatten();
         let noise = open("noise")?.is_some();
+        let power = link::power(open("power")?.as_ref())?;
+        let allowed_m = allowed_m(noise.then(|| power.strongest_dbhz()));
         Ok(Self {
             origin: origin.to_owned(),
             name: name(&root)?,
@@ -183,13 +200,26 @@ impl Scenario {
             excluded,
             include_unhealthy,
             motion: MotionSpec::read(&motion)?,
+            attitude: open("attitude")?.map(|t| attitude::attitude(&t)).transpose()?,
             front_end,
-            power: power(open("power")?.as_ref())?,
-            ionosphere: open("ionosphere")?.map(|t| ionosphere(&t)).transpose()?,
-            troposphere: open("troposphere")?.map(|t| troposphere(&t)).transpose()?,
-            receiver_clock: receiver_clock(open("receiver_clock")?.as_ref())?,
+            power,
+            multipath: multipath::echoes(&root.tables("multipath")?.unwrap_or_default())?,
+            ionosphere: open("ionosphere")?.map(|t| propagation::ionosphere(&t)).transpose()?,
+            troposphere: open("troposphere")?.map(|t| propagation::troposphere(&t)).transpose()?,
+            obstacles: obstruction::obstacles(&root.tables("obstruction")?.unwrap_or_default())?,
+            scintillation: open("scintillation")?.map(|t| scintillation::scintillation(&t)).transpose()?,
+            receiver_clock: hardware::receiver_clock(open("receiver_clock")?.as_ref())?,
             noise,
-            fidelity: fidelity(open("fidelity")?.as_ref(), front_end.rate)?,
+            stages: Stages {
+                playback: open("playback")?.map(|t| stages::playback(&t)).transpose()?,
+                oscillator: open("local_oscillator")?.map(|t| stages::local_oscillator(&t)).transpose()?,
+                filter: open("filter")?.map(|t| stages::filter(&t)).transpose()?,
+                balance: open("iq")?.map(|t| stages::balance(&t, front_end.format)).transpose()?,
+                converter: open("adc")?.map(|t| stages::converter(&t, front_end.format)).transpose()?,
+            },
+            interference: each(&root, "interference", interference::interference)?,
+            spoofers: each(&root, "spoofer", interference::spoofer)?,
+            fidelity: fidelity(open("fidelity")?.as_ref(), front_end.rate, allowed_m)?,
             truth_interval_s: match open("truth")? {
                 Some(table) => table.number("interval_s", 0.001..=3600.0, "s")?.unwrap_or(0.1),
                 None => 0.1,
@@ -197,6 +227,15 @@ impl Scenario {
             receiver: receiver(&root, text).map_err(|e| refuse(&e))?,
         })
     }
+}
+
+/// Every table of an array of tables.
+fn each<T>(
+    root: &Table<'_>,
+    name: &str,
+    read: impl Fn(&Table<'_>) -> Result<T, ScenarioError>,
+) -> Result<Vec<T>, ScenarioError> {
+    root.tables(name)?.unwrap_or_default().iter().map(read).collect()
 }
 
 /// The keys of a table.
@@ -228,120 +267,23 @@ fn signals(root: &Table<'_>) -> Result<Vec<&'static Signal>, ScenarioError> {
 fn satellites(table: Option<&Table<'_>>) -> Result<(f64, Vec<Sv>, bool), ScenarioError> {
     let Some(table) = table else { return Ok((5_f64.to_radians(), Vec::new(), false)) };
     let mask_deg = table.number("mask_deg", -10.0..=89.0, "deg")?.unwrap_or(5.0);
-    let expected = "an array of satellites like [\"G01\", \"G12\"]";
-    let words = table.words("exclude", expected)?.unwrap_or_default();
-    let excluded: Result<Vec<Sv>, _> = words.iter().map(|word| word.parse::<Sv>()).collect();
-    let excluded = excluded.map_err(|_| table.bad("exclude", expected))?;
+    let excluded = satellite_list(table, "exclude")?.unwrap_or_default();
     Ok((mask_deg.to_radians(), excluded, table.flag("include_unhealthy")?.unwrap_or(false)))
 }
 
-fn front_end(table: Option<&Table<'_>>) -> Result<FrontEnd, ScenarioError> {
-    let default_rate = Rate::from_hz(2.6e6);
-    let Some(table) = table else {
-        let rate = default_rate.ok_or_else(|| ScenarioError::Conflict {
-            origin: String::new(),
-            key: "front_end",
-            reason: "no sample rate".to_owned(),
-        })?;
-        return Ok(FrontEnd { rate, if_hz: 0.0, inverted: false, format: Format::Ci8, noise_lsb: None });
-    };
-    let rate_hz = table.number("sample_rate_hz", 1.5e6..=60e6, "Hz")?.unwrap_or(2.6e6);
-    let rate = Rate::from_hz(rate_hz).ok_or_else(|| table.bad("sample_rate_hz", "a rate"))?;
-    let expected = "one of ci8, cu8, ci16, cf32, ri8, ri16";
-    let format = match table.text("format", expected)? {
-        Some(text) => text.parse().map_err(|_| table.bad("format", expected))?,
-        None => Format::Ci8,
-    };
-    let half = 0.5 * rate.hz();
-    let if_hz = table.number("if_hz", -60e6..=60e6, "Hz")?.unwrap_or(0.0);
-    if if_hz.abs() >= half {
-        return Err(table.bad("if_hz", format!("less than half of sample_rate_hz in size, {half} Hz")));
-    }
-    if !format.is_complex() && if_hz <= 0.0 {
-        return Err(
-            table.bad("if_hz", format!("more than 0 and less than {half} Hz, because format = {format} is real"))
-        );
-    }
-    Ok(FrontEnd {
-        rate,
-        if_hz,
-        inverted: table.flag("spectrum_inverted")?.unwrap_or(false),
-        format,
-        noise_lsb: table.number("noise_lsb", 0.01..=32_767.0, "LSB")?.map(|x| x as f32),
-    })
-}
-
-fn power(table: Option<&Table<'_>>) -> Result<Power, ScenarioError> {
-    let ordinary = LinkBudget::default();
-    let budget = |antenna: Option<Antenna>, noise_figure_db: Option<f64>, loss_db: Option<f64>| Power::LinkBudget {
-        antenna: antenna.unwrap_or(ordinary.antenna),
-        noise_figure_db: noise_figure_db.unwrap_or(ordinary.noise_figure_db),
-        loss_db: loss_db.unwrap_or(ordinary.extra_loss_db),
-    };
-    let Some(table) = table else { return Ok(budget(None, None, None)) };
-    let fixed = match table.choice("kind", &[("fixed", true), ("link_budget", false)])? {
-        Some(fixed) => fixed,
-        None => table.has("cn0_dbhz"),
-    };
-    if fixed {
-        table.allow(&["kind", "cn0_dbhz", "satellites"])?;
-        let cn0_dbhz = table.required("cn0_dbhz", 0.0..=100.0, "dB-Hz")?;
-        let mut satellites = Vec::new();
-        if let Some(each) = table.table("satellites")? {
-            for name in each.names() {
-                let sv = name.parse().map_err(|e| each.bad(name, e))?;
-                satellites.push((sv, each.required(name, 0.0..=100.0, "dB-Hz")?));
-            }
-        }
-        return Ok(Power::Fixed { cn0_dbhz, satellites });
-    }
-    table.allow(&["kind", "antenna", "noise_figure_db", "loss_db"])?;
-    let antennas = [("isotropic", Antenna::Isotropic), ("patch", Antenna::Patch)];
-    Ok(budget(
-        table.choice("antenna", &antennas)?,
-        table.number("noise_figure_db", 0.0..=30.0, "dB")?,
-        table.number("loss_db", -20.0..=60.0, "dB")?,
-    ))
-}
-
-fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError> {
-    table.choice("model", &[("klobuchar", ())])?.ok_or_else(|| table.bad("model", "one of klobuchar"))?;
-    // Eight-bit integers times 2^-24 and 2^16 at most (IS-GPS-200N, table 20-X).
-    match (table.numbers("alpha", 1e-4)?, table.numbers("beta", 1e7)?) {
-        (None, None) => Ok(Ionosphere::Broadcast),
-        (Some(alpha), Some(beta)) => Ok(Ionosphere::Given(Klobuchar { alpha, beta })),
-        (None, _) => Err(table.bad("alpha", "four numbers, because beta is given")),
-        (_, None) => Err(table.bad("beta", "four numbers, because alpha is given")),
-    }
-}
-
-fn troposphere(table: &Table<'_>) -> Result<Weather, ScenarioError> {
-    table.choice("model", &[("saastamoinen", ())])?.ok_or_else(|| table.bad("model", "one of saastamoinen"))?;
-    let standard = Weather::STANDARD;
-    let celsius = table.number("temperature_c", -90.0..=60.0, "C")?;
-    Ok(Weather {
-        height_m: table.number("height_m", -500.0..=9_000.0, "m")?.unwrap_or(standard.height_m),
-        pressure_hpa: table.number("pressure_hpa", 1.0..=1100.0, "hPa")?.unwrap_or(standard.pressure_hpa),
-        temperature_k: celsius.map_or(standard.temperature_k, |c| c + 273.15),
-        relative_humidity: table
-            .number("relative_humidity", 0.0..=1.0, "(a fraction)")?
-            .unwrap_or(standard.relative_humidity),
-    })
-}
-
-fn receiver_clock(table: Option<&Table<'_>>) -> Result<ReceiverClock, ScenarioError> {
-    let Some(table) = table else { return Ok(ReceiverClock::PERFECT) };
-    Ok(ReceiverClock {
-        bias_s: table.number("bias_s", -1.0..=1.0, "s")?.unwrap_or(0.0),
-        drift: table.number("drift_sps", -1e-4..=1e-4, "s/s")?.unwrap_or(0.0),
-    })
+/// An array of satellites.
+fn satellite_list(table: &Table<'_>, key: &str) -> Result<Option<Vec<Sv>>, ScenarioError> {
+    let expected = "an array of satellites like [\"G01\", \"G12\"]";
+    let Some(words) = table.words(key, expected)? else { return Ok(None) };
+    let satellites: Result<Vec<Sv>, _> = words.iter().map(|word| word.parse::<Sv>()).collect();
+    satellites.map(Some).map_err(|_| table.bad(key, expected))
 }
 
 /// A level's knobs, each overridden where the table names it.
-fn fidelity(table: Option<&Table<'_>>, rate: Rate) -> Result<Fidelity, ScenarioError> {
-    let Some(table) = table else { return Ok(Fidelity::suited(Grade::Balanced, rate.hz())) };
+fn fidelity(table: Option<&Table<'_>>, rate: Rate, allowed_m: f64) -> Result<Fidelity, ScenarioError> {
+    let Some(table) = table else { return Ok(Fidelity::suited(Grade::Balanced, rate.hz(), allowed_m)) };
     let grade = table.choice("level", &Grade::NAMES)?.unwrap_or(Grade::Balanced);
-    let level = Fidelity::suited(grade, rate.hz());
+    let level = Fidelity::suited(grade, rate.hz(), allowed_m);
     Ok(Fidelity {
         grade: level.grade,
         code_edge: table.choice("code_edge", &CodeEdge::NAMES)?.unwrap_or(level.code_edge),
@@ -350,6 +292,7 @@ fn fidelity(table: Option<&Table<'_>>, rate: Rate) -> Result<Fidelity, ScenarioE
         knot_tolerance_cycles: table
             .number("knot_tolerance_cycles", 1e-7..=0.1, "cycles")?
             .unwrap_or(level.knot_tolerance_cycles),
+        allowed_m,
     })
 }
 

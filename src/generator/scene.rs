@@ -6,6 +6,12 @@ use crate::generator::catalogue::Catalogue;
 use crate::generator::clock::ReceiverClock;
 pub use crate::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::generator::ray::Effect;
+use crate::generator::ripple::scintillation::Scintillation;
+use crate::generator::spoof::Constellation;
+use crate::generator::stage::Stage;
+use crate::generator::stage::interference::Interferer;
+use crate::generator::stage::noise::Thermal;
+use crate::generator::stage::playback::Playback;
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::gps::lnav::Broadcast;
 use crate::gnss::samples::IfMetadata;
@@ -36,12 +42,56 @@ pub struct Scene {
     /// Satellites below this elevation are not computed.
     pub mask_rad: f64,
     pub effects: Vec<Box<dyn Effect>>,
+    /// Quick fading of satellites.
+    pub scintillation: Option<Scintillation>,
+    /// A transmitter that plays the satellites' signals back, before anything else is added.
+    pub playback: Option<Playback>,
+    /// What the antenna hears besides satellites, in order.
+    pub interference: Vec<Interferer>,
+    /// Who sends other satellites' signals over the true ones.
+    pub spoofers: Vec<Arc<Constellation>>,
     /// Thermal noise; absent means none.
     pub noise: bool,
+    /// What the front end does to the sum, in the order of the hardware.
+    pub front_end: Vec<Box<dyn Stage>>,
     /// Standard deviation of the noise per component, in LSB of the sample format (the gain). Without
     /// noise the same gain scales the signals: a ray has amplitude `sqrt(cn0_hz / rate) * sqrt(2) * noise_lsb`.
     pub noise_lsb: f32,
     pub fidelity: Fidelity,
     /// Spacing of truth records.
     pub truth_interval_s: f64,
+}
+
+impl Scene {
+    /// Shows `visit` everything that acts on blocks of samples, in order.
+    pub fn stages(&self, mut visit: impl FnMut(&dyn Stage)) {
+        self.playback.iter().for_each(|stage| visit(stage));
+        self.interference.iter().for_each(|stage| visit(stage));
+        if self.noise {
+            visit(&Thermal { seed: self.seed, sigma_lsb: self.noise_lsb, arithmetic: self.fidelity.noise });
+        }
+        self.front_end.iter().for_each(|stage| visit(stage.as_ref()));
+    }
+
+    /// Samples before a block that its stages must see.
+    pub fn memory_samples(&self) -> usize {
+        let mut sum = 0;
+        self.stages(|stage| sum += stage.memory_samples());
+        sum
+    }
+}
+
+/// Where the main lobe of a signal without Doppler lies in the samples' spectrum, from and to, in hertz.
+pub fn main_lobe_hz(metadata: &IfMetadata, signal: &Signal) -> (f64, f64) {
+    let if_hz = metadata.if_hz(signal);
+    let half_hz = signal.components.iter().fold(0.0_f64, |half, c| half.max(c.chip_rate_hz));
+    (if_hz - half_hz, if_hz + half_hz)
+}
+
+/// Whether the main lobe lies wholly outside the band of complex samples. Of real samples the band is not known: an IF
+/// beyond half the rate is how bandpass sampling works.
+pub fn is_outside(metadata: &IfMetadata, signal: &Signal) -> bool {
+    let half_hz = 0.5 * metadata.rate.hz();
+    let (low_hz, high_hz) = main_lobe_hz(metadata, signal);
+    metadata.format.is_complex() && (low_hz >= half_hz || high_hz <= -half_hz)
 }

@@ -7,13 +7,15 @@
 use std::collections::BTreeSet;
 use std::fmt;
 use std::io::Write;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::generator::plan::Machinery;
-use crate::generator::scene::{Arithmetic, CodeEdge, Scene};
-use crate::generator::stage::noise;
+use crate::generator::scene::{CodeEdge, Scene};
+use crate::generator::spoof::Constellation;
+use crate::generator::stage::Block;
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::isa::{self, Level};
 use crate::generator::synth::transmitter::{Scratch, Transmitter};
@@ -21,11 +23,13 @@ use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
 use crate::generator::truth::{self, TruthError};
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::gps::lnav::FieldError;
-use crate::gnss::record::{Observation, SkyRow};
 use crate::gnss::satellite::Sv;
 
 /// Cut-off of band-limited edges, in cycles a sample.
 const CUTOFF_CPS: f64 = 0.45;
+
+/// Length of a block at least, in units of what its stages look back at.
+const LEADS_PER_BLOCK: u64 = 8;
 
 /// Roots of each satellite's grid that a plan looks at.
 const PLANNED_ROOTS: u64 = 16;
@@ -98,7 +102,7 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
     let rate = scene.clock.rate;
     let (mut shortest, mut longest) = (u64::MAX, 0);
     for transmitter in &transmitters {
-        if !truth::in_view(scene, transmitter.sv, scene.clock.start)? {
+        if !truth::in_view_from(scene, &transmitter.from, transmitter.sv, scene.clock.start)? {
             continue;
         }
         let size = transmitter.root_samples();
@@ -149,56 +153,113 @@ pub fn generate_with(
     progress: &mut dyn FnMut(u64),
     options: &Options,
 ) -> Result<Generated, GenerateError> {
-    let filter = Filter::new(cutoff_cps(scene));
-    let edge = match scene.fidelity.code_edge {
-        CodeEdge::Nearest => Edge::Nearest,
-        CodeEdge::Area => Edge::Area,
-        CodeEdge::BandLimited => Edge::BandLimited(&filter),
-    };
-    let kernel = Kernel { edge, arithmetic: scene.fidelity.carrier, level: options.level };
-    let mut transmitters = transmitters(scene, edge)?;
-    truth.scene(scene)?;
-    let mut ticks = Ticks::new(scene)?;
-    let block = u64::from(options.block_runs.max(1)) * RUN_SAMPLES as u64;
-    let batch = block * u64::from(options.batch_blocks.max(1));
-    let sample_bytes = scene.metadata.format.bytes();
-    let mut packed = vec![0; batch.min(scene.samples) as usize * sample_bytes];
-    let mut done = Generated::default();
-    while done.samples < scene.samples {
-        let (from, to) = (done.samples, (done.samples + batch).min(scene.samples));
-        transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, from, to))?;
-        ticks.write(scene, &transmitters, to, truth)?;
-        let bytes = usize::try_from(to - from).unwrap_or(usize::MAX).saturating_mul(sample_bytes);
-        packed.truncate(bytes);
+    let mut stream = Stream::new(scene, truth, options)?;
+    let mut packed = Vec::new();
+    while stream.next(truth, &mut packed)? {
+        samples.write_all(&packed)?;
+        progress(stream.samples());
+    }
+    stream.finish(truth)
+}
+
+/// A scene on its way to samples, batch by batch.
+pub struct Stream<'a> {
+    scene: &'a Scene,
+    /// Of band-limited edges, where the scene has them.
+    filter: Option<Filter>,
+    level: Level,
+    transmitters: Vec<Transmitter>,
+    ticks: Ticks,
+    /// Samples that a block's stages look back at, of a block and of a batch.
+    lead: u64,
+    block: u64,
+    batch: u64,
+    done: Generated,
+}
+
+impl<'a> Stream<'a> {
+    /// The stream of `scene` from its first sample on; tells `truth` what the scene is.
+    ///
+    /// # Errors
+    /// A rate that the scene's signals cannot have, a truth that cannot be written.
+    pub fn new(scene: &'a Scene, truth: &mut truth::Writer, options: &Options) -> Result<Self, GenerateError> {
+        let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
+        let filter = limited.then(|| Filter::new(cutoff_cps(scene)));
+        let transmitters = transmitters(scene, edge(scene, filter.as_ref()))?;
+        truth.scene(scene)?;
+        // What stages look back at is rendered twice: blocks are long against it.
+        let lead = scene.memory_samples().next_multiple_of(RUN_SAMPLES) as u64;
+        let block = (u64::from(options.block_runs.max(1)) * RUN_SAMPLES as u64).max(LEADS_PER_BLOCK * lead);
+        let batch = block * u64::from(options.batch_blocks.max(1));
+        let (ticks, done) = (Ticks::new(scene)?, Generated::default());
+        Ok(Self { scene, filter, level: options.level, transmitters, ticks, lead, block, batch, done })
+    }
+
+    /// Samples made so far.
+    pub fn samples(&self) -> u64 {
+        self.done.samples
+    }
+
+    /// Replaces what `packed` holds by the next batch, and writes the truth as far; `false` after the last sample.
+    ///
+    /// # Errors
+    /// [`GenerateError`] of orbits, messages and truth.
+    pub fn next(&mut self, truth: &mut truth::Writer, packed: &mut Vec<u8>) -> Result<bool, GenerateError> {
+        let scene = self.scene;
+        let (from, to) = (self.done.samples, (self.done.samples + self.batch).min(scene.samples));
+        let sample_bytes = scene.metadata.format.bytes();
+        packed.resize((to - from) as usize * sample_bytes, 0);
+        if from == to {
+            return Ok(false);
+        }
+        let needed = from.saturating_sub(self.lead);
+        self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, to))?;
+        self.ticks.write(scene, &self.transmitters, to, truth)?;
+        let kernel =
+            Kernel { edge: edge(scene, self.filter.as_ref()), arithmetic: scene.fidelity.carrier, level: self.level };
+        let (transmitters, block) = (&self.transmitters, self.block);
         let clipped: u64 = packed
             .par_chunks_mut(block as usize * sample_bytes)
             .enumerate()
-            .map_init(Scratch::default, |scratch, (index, bytes)| {
-                render(scene, &transmitters, kernel, from + index as u64 * block, bytes, scratch)
+            .map_init(Worker::default, |worker, (index, bytes)| {
+                render(scene, transmitters, kernel, from + index as u64 * block, bytes, worker)
             })
             .sum();
-        // In pieces, so that a reader beside the generator can begin early.
-        for bytes in packed.chunks(block as usize * sample_bytes) {
-            samples.write_all(bytes)?;
+        self.done.clipped += clipped;
+        self.done.samples = to;
+        Ok(true)
+    }
+
+    /// Writes the rest of the truth, and tells what was done.
+    ///
+    /// # Errors
+    /// A truth that cannot be written.
+    pub fn finish(mut self, truth: &mut truth::Writer) -> Result<Generated, GenerateError> {
+        let mut navigation = BTreeSet::new();
+        for transmitter in &mut self.transmitters {
+            navigation.append(&mut transmitter.navigation);
+            self.done.knots += transmitter.knots;
+            self.done.worst_knot_cycles = self.done.worst_knot_cycles.max(transmitter.worst_knot_cycles);
         }
-        done.clipped += clipped;
-        done.samples = to;
-        progress(to);
+        let seen: BTreeSet<Sv> =
+            self.transmitters.iter().filter(|t| t.seen && t.from.number == 0).map(|t| t.sv).collect();
+        self.done.satellites = seen.into_iter().collect();
+        truth.finish(&navigation)?;
+        Ok(self.done)
     }
-    let mut navigation = BTreeSet::new();
-    for transmitter in &mut transmitters {
-        navigation.append(&mut transmitter.navigation);
-        done.knots += transmitter.knots;
-        done.worst_knot_cycles = done.worst_knot_cycles.max(transmitter.worst_knot_cycles);
+}
+
+/// The scene's edges; band-limited where there is a `filter`.
+fn edge<'a>(scene: &Scene, filter: Option<&'a Filter>) -> Edge<'a> {
+    match filter {
+        Some(filter) => Edge::BandLimited(filter),
+        None if scene.fidelity.code_edge == CodeEdge::Nearest => Edge::Nearest,
+        None => Edge::Area,
     }
-    let seen: BTreeSet<Sv> = transmitters.iter().filter(|t| t.seen).map(|t| t.sv).collect();
-    done.satellites = seen.into_iter().collect();
-    truth.finish(&navigation)?;
-    Ok(done)
 }
 
 /// In a real format the band around the IF must fit between zero and half the rate.
-fn cutoff_cps(scene: &Scene) -> f64 {
+pub(crate) fn cutoff_cps(scene: &Scene) -> f64 {
     if scene.metadata.format.is_complex() {
         return CUTOFF_CPS;
     }
@@ -213,43 +274,62 @@ fn cutoff_cps(scene: &Scene) -> f64 {
 fn transmitters(scene: &Scene, edge: Edge<'_>) -> Result<Vec<Transmitter>, GenerateError> {
     let satellites: BTreeSet<Sv> = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)).collect();
     let mut found = Vec::new();
-    for sv in satellites {
-        for signal in scene.signals.iter().filter(|signal| signal.system == sv.system) {
-            found.extend(Transmitter::new(scene, sv, signal, edge)?);
+    let authentic = Arc::new(Constellation::authentic());
+    for from in std::iter::once(&authentic).chain(&scene.spoofers) {
+        for &sv in satellites.iter().filter(|sv| from.sends(**sv)) {
+            for signal in scene.signals.iter().filter(|signal| signal.system == sv.system) {
+                found.extend(Transmitter::of(scene, Arc::clone(from), sv, signal, edge)?);
+            }
         }
     }
     Ok(found)
 }
 
+/// Buffers of one worker.
+#[derive(Default)]
+struct Worker {
+    scratch: Scratch,
+    i: Vec<f32>,
+    q: Vec<f32>,
+}
+
 /// Renders one block into `bytes`, and returns how many of its components were clipped.
 ///
-/// Run by run, so that the planar samples of one stay in the first-level cache.
+/// Run by run, so that the planar samples of one stay in the first-level cache; in one piece with what lies before it
+/// if a stage looks back.
 fn render(
     scene: &Scene,
     transmitters: &[Transmitter],
     kernel: Kernel<'_>,
     start: u64,
     bytes: &mut [u8],
-    scratch: &mut Scratch,
+    worker: &mut Worker,
 ) -> u64 {
     let format = scene.metadata.format;
-    let (mut i, mut q) = ([0.0_f32; RUN_SAMPLES], [0.0_f32; RUN_SAMPLES]);
+    let memory = scene.memory_samples();
+    let piece_bytes = if memory == 0 { RUN_SAMPLES * format.bytes() } else { bytes.len() };
     let mut clipped = 0;
-    for (run, bytes) in (start / RUN_SAMPLES as u64..).zip(bytes.chunks_mut(RUN_SAMPLES * format.bytes())) {
-        let length = bytes.len() / format.bytes();
-        let (Some(i), Some(q)) = (i.get_mut(..length), q.get_mut(..length)) else { continue };
-        i.fill(0.0);
-        q.fill(0.0);
-        for transmitter in transmitters {
-            transmitter.render(scene, kernel, run * RUN_SAMPLES as u64, i, q, scratch);
+    let mut first = start;
+    for bytes in bytes.chunks_mut(piece_bytes.max(1)) {
+        let from = first.saturating_sub(memory as u64) / RUN_SAMPLES as u64 * RUN_SAMPLES as u64;
+        let lead = (first - from) as usize;
+        let length = lead + bytes.len() / format.bytes();
+        let Worker { scratch, i, q } = &mut *worker;
+        for plane in [&mut *i, &mut *q] {
+            plane.clear();
+            plane.resize(length, 0.0);
         }
-        if scene.noise {
-            match scene.fidelity.noise {
-                Arithmetic::F32 => isa::add_noise(kernel.level, scene.seed, run, scene.noise_lsb, i, q),
-                Arithmetic::F64 => noise::add_block_exact(scene.seed, run, scene.noise_lsb, i, q),
+        for (run, (i, q)) in (0_u64..).zip(i.chunks_mut(RUN_SAMPLES).zip(q.chunks_mut(RUN_SAMPLES))) {
+            for transmitter in transmitters {
+                transmitter.arrange(scene, from + run * RUN_SAMPLES as u64, i.len(), scratch);
             }
+            scratch.bank.render(kernel, i, q);
         }
-        clipped += isa::pack(kernel.level, format, i, q, bytes);
+        let mut block = Block { start: from, i, q, lead, clipped: 0, level: kernel.level };
+        scene.stages(|stage| stage.act(&mut block));
+        let (Some(i), Some(q)) = (block.i.get(lead..), block.q.get(lead..)) else { continue };
+        clipped += block.clipped + isa::pack(kernel.level, format, i, q, bytes);
+        first = from + length as u64;
     }
     clipped
 }
@@ -276,18 +356,26 @@ impl Ticks {
         to: u64,
         truth: &mut truth::Writer,
     ) -> Result<(), GenerateError> {
+        let rows = |from: &Constellation, sample: u64| -> Result<Vec<truth::Truth>, OrbitError> {
+            transmitters
+                .par_iter()
+                .filter(|t| t.from.number == from.number && t.in_view(scene, sample))
+                .filter_map(|t| {
+                    truth::observe(scene, &t.from, t.sv, t.signal, sample, t.in_view_s(scene, sample)).transpose()
+                })
+                .collect()
+        };
         loop {
             let sample = scene.clock.rate.first_sample_at(self.next * self.interval_us, 1_000_000);
             if sample >= to {
                 return Ok(());
             }
-            let rows: Vec<Option<(Observation, SkyRow)>> = transmitters
-                .par_iter()
-                .filter(|t| t.in_view(scene, sample))
-                .map(|t| truth::observe(scene, t.sv, t.signal, sample, t.in_view_s(scene, sample)))
-                .collect::<Result<_, _>>()?;
-            let rows: Vec<_> = rows.into_iter().flatten().collect();
-            truth.epoch(&truth::trajectory(scene, sample), &rows)?;
+            let authentic = Constellation::authentic();
+            truth.epoch(&truth::trajectory(scene, &authentic, sample), &rows(&authentic, sample)?)?;
+            truth.interference(scene, sample)?;
+            for spoofer in scene.spoofers.iter().filter(|spoofer| spoofer.on(scene).contains(&sample)) {
+                truth.claim(spoofer, &truth::trajectory(scene, spoofer, sample), &rows(spoofer, sample)?)?;
+            }
             self.next += 1;
         }
     }

@@ -14,20 +14,26 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use thiserror::Error;
 
+use crate::generator::effect::obstruction;
 use crate::generator::knots::Arrival;
 use crate::generator::ray::Ray;
-use crate::generator::scene::{CodeEdge, Scene};
-use crate::generator::sky::{Emission, emission};
+use crate::generator::ripple;
+use crate::generator::scene::Scene;
+use crate::generator::sky::{Arc, Emission, LIGHT_TIME_S, emission, emission_near};
+use crate::generator::spoof::Constellation;
+use crate::generator::stage::interference::{Interferer, Spectrum};
 use crate::generator::vehicle::Motion;
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::{NavigationRow, Observation, SkyRow, TrajectoryRow};
+use crate::gnss::record::{NavigationRow, Observation, RayRow, SkyRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
-/// Step of the difference quotient behind the Doppler.
+/// Step of the difference quotient behind the Doppler, and its share of a turn where the antenna spins. What five points
+/// leave of a sinusoid of ω is (ω step)⁴/30 of its slope: 3e-6.
 const DOPPLER_STEP_S: f64 = 0.01;
+const DOPPLER_STEP_TURNS: f64 = 1.0 / 64.0;
 
 /// A satellite's signal as it arrives at one reading of the receiver's clock.
 #[derive(Clone, Debug)]
@@ -37,26 +43,76 @@ pub struct Seen {
     pub arrivals: Vec<Arrival>,
 }
 
-/// Antenna motion and true time when the receiver's clock reads `local`.
-fn received(scene: &Scene, local: Epoch) -> (Epoch, f64, Motion) {
+/// True time, and the motion that a constellation's signals are made for, when the receiver's clock reads `local`.
+fn received(scene: &Scene, from: &Constellation, local: Epoch) -> (Epoch, f64, Motion) {
     let start = scene.clock.start;
     let elapsed_s = scene.receiver_clock.true_elapsed_s(start, local);
-    (scene.receiver_clock.true_time(start, local), elapsed_s, scene.trajectory.at(elapsed_s))
+    (scene.receiver_clock.true_time(start, local), elapsed_s, from.motion(scene, elapsed_s))
 }
 
-/// What arrives from `sv` when the receiver's clock reads `local`; `None` without an ephemeris.
+/// What arrives from the true satellite `sv` when the receiver's clock reads `local`; `None` without an ephemeris.
 ///
 /// # Errors
 /// Those of the orbit.
 pub fn seen(scene: &Scene, sv: Sv, signal: &Signal, local: Epoch) -> Result<Option<Seen>, OrbitError> {
-    let (time, _, motion) = received(scene, local);
-    let Some(emission) = emission(&scene.catalogue, sv, time, &motion)? else { return Ok(None) };
+    seen_from(scene, &Constellation::authentic(), sv, signal, local)
+}
+
+/// What a constellation sends as `sv` that arrives when the receiver's clock reads `local`.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn seen_from(
+    scene: &Scene,
+    from: &Constellation,
+    sv: Sv,
+    signal: &Signal,
+    local: Epoch,
+) -> Result<Option<Seen>, OrbitError> {
+    seen_near(scene, from, sv, signal, local, LIGHT_TIME_S)
+}
+
+/// [`seen_from`] with a guess of the light time.
+fn seen_near(
+    scene: &Scene,
+    from: &Constellation,
+    sv: Sv,
+    signal: &Signal,
+    local: Epoch,
+    guess_s: f64,
+) -> Result<Option<Seen>, OrbitError> {
+    let (time, elapsed_s, motion) = received(scene, from, local);
+    let Some(emission) = emission_near(&scene.catalogue, sv, time, &motion, guess_s)? else { return Ok(None) };
+    let bias_s = local.since(time) - from.clock_s(elapsed_s);
+    Ok(Some(arriving(scene, signal, bias_s, from.gain(elapsed_s), emission)))
+}
+
+/// [`seen_from`] of a satellite on a short arc of its orbit.
+///
+/// # Errors
+/// None by itself; the type is that of [`seen_from`].
+pub fn seen_on(
+    scene: &Scene,
+    from: &Constellation,
+    arc: &Arc,
+    signal: &Signal,
+    local: Epoch,
+) -> Result<Option<Seen>, OrbitError> {
+    let (time, elapsed_s, motion) = received(scene, from, local);
+    let bias_s = local.since(time) - from.clock_s(elapsed_s);
+    let found = arc.emission(time, &motion)?;
+    Ok(found.map(|emission| arriving(scene, signal, bias_s, from.gain(elapsed_s), emission)))
+}
+
+/// The rays of what was emitted with `gain` on its power, when the receiver's clock is `bias_s` ahead of the sender's.
+fn arriving(scene: &Scene, signal: &Signal, bias_s: f64, gain: f64, emission: Emission) -> Seen {
     let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
     for effect in &scene.effects {
         effect.act(&emission.sight, signal, &mut rays);
     }
     // Small numbers only: no reading of a clock enters a sum of seconds.
-    let common_s = local.since(time) + emission.travel_s - emission.satellite_clock_s;
+    let common_s = bias_s + emission.travel_s - emission.satellite_clock_s;
+    rays.iter_mut().for_each(|ray| ray.cn0_hz *= gain);
     let arrivals = rays
         .iter()
         .map(|ray| Arrival {
@@ -65,7 +121,7 @@ pub fn seen(scene: &Scene, sv: Sv, signal: &Signal, local: Epoch) -> Result<Opti
             cn0_hz: ray.cn0_hz,
         })
         .collect();
-    Ok(Some(Seen { emission, rays, arrivals }))
+    Seen { emission, rays, arrivals }
 }
 
 /// Whether `sv` is in the scene's sky when the receiver's clock reads `local`: it has a message to send
@@ -74,7 +130,15 @@ pub fn seen(scene: &Scene, sv: Sv, signal: &Signal, local: Epoch) -> Result<Opti
 /// # Errors
 /// Those of the orbit.
 pub fn in_view(scene: &Scene, sv: Sv, local: Epoch) -> Result<bool, OrbitError> {
-    let (time, _, motion) = received(scene, local);
+    in_view_from(scene, &Constellation::authentic(), sv, local)
+}
+
+/// Whether `sv` is in the sky of the place that a constellation's signals are made for.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn in_view_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -> Result<bool, OrbitError> {
+    let (time, _, motion) = received(scene, from, local);
     if scene.catalogue.sent_at(sv, time).is_none() {
         return Ok(false);
     }
@@ -82,46 +146,75 @@ pub fn in_view(scene: &Scene, sv: Sv, local: Epoch) -> Result<bool, OrbitError> 
     Ok(found.is_some_and(|emission| emission.sight.look.elevation_rad >= scene.mask_rad))
 }
 
-/// Doppler: minus the derivative of the carrier, by five points 10 ms apart that do not straddle a break.
-fn doppler_hz(scene: &Scene, sv: Sv, signal: &Signal, local: Epoch) -> Result<Option<f64>, OrbitError> {
-    let (_, elapsed_s, _) = received(scene, local);
-    let reach_s = 2.0 * DOPPLER_STEP_S;
-    let breaks = scene.trajectory.breaks_s();
+/// Doppler: minus the derivative of the carrier, by a stencil of five points 10 ms apart that does not straddle a break.
+/// `here` is what is seen at the sample, which is one of the five.
+fn doppler_hz(
+    scene: &Scene,
+    from: &Constellation,
+    sv: Sv,
+    signal: &Signal,
+    sample: u64,
+    here: &Seen,
+) -> Result<Option<f64>, OrbitError> {
+    let local = scene.clock.epoch(sample);
+    let elapsed_s = scene.receiver_clock.true_elapsed_s(scene.clock.start, local);
+    let spin_hz = scene.trajectory.attitude().map_or(0.0, |attitude| attitude.spin_hz.abs());
+    let step_s = if spin_hz > 0.0 { DOPPLER_STEP_S.min(DOPPLER_STEP_TURNS / spin_hz) } else { DOPPLER_STEP_S };
+    let reach_s = 2.0 * step_s;
+    let breaks = from.motion_breaks_s(scene);
+    let rippled = |seen: &Seen, away_s: f64| {
+        let place = sample as f64 + away_s * scene.clock.rate.hz();
+        let ripple = ripple::at(scene, from.fading(sv), signal, place);
+        seen.arrivals.first().map(|arrival| arrival.rippled(ripple).carrier_cycles)
+    };
     let near = |b: &&f64| (**b - elapsed_s).abs() < reach_s;
     // Lagrange's derivative weights; the middle of the stencil moves away from the break.
     let (offset, weights) = match breaks.iter().find(near) {
-        None => (-2.0, [1.0, -8.0, 0.0, 8.0, -1.0]),
-        Some(b) if *b <= elapsed_s => (0.0, [-25.0, 48.0, -36.0, 16.0, -3.0]),
-        Some(_) => (-4.0, [3.0, -16.0, 36.0, -48.0, 25.0]),
+        None => (-2, [1.0, -8.0, 0.0, 8.0, -1.0]),
+        Some(b) if *b <= elapsed_s => (0, [-25.0, 48.0, -36.0, 16.0, -3.0]),
+        Some(_) => (-4, [3.0, -16.0, 36.0, -48.0, 25.0]),
     };
+    let Some(base) = rippled(here, 0.0) else { return Ok(None) };
     let mut sum = 0.0;
-    let mut base = None;
-    for (k, weight) in weights.into_iter().enumerate() {
-        let at = local.plus_s((offset + k as f64) * DOPPLER_STEP_S);
-        let Some(seen) = seen(scene, sv, signal, at)? else { return Ok(None) };
-        let Some(arrival) = seen.arrivals.first() else { return Ok(None) };
-        // Weights add up to zero, so the first value can be left out of all.
-        let base = *base.get_or_insert(arrival.carrier_cycles);
-        sum += weight * (arrival.carrier_cycles - base);
+    for (steps, weight) in (offset..).zip(weights) {
+        // Weights add up to zero, so the value here can be left out of all: its own term is none.
+        if steps == 0 || weight == 0.0 {
+            continue;
+        }
+        let away_s = f64::from(steps) * step_s;
+        let guess_s = here.emission.travel_s;
+        let Some(seen) = seen_near(scene, from, sv, signal, local.plus_s(away_s), guess_s)? else { return Ok(None) };
+        let Some(carrier_cycles) = rippled(&seen, away_s) else { return Ok(None) };
+        sum += weight * (carrier_cycles - base);
     }
-    Ok(Some(-sum / (12.0 * DOPPLER_STEP_S)))
+    Ok(Some(-sum / (12.0 * step_s)))
 }
 
-/// The observation of `sv` at a sample, of its first ray, and where it stands in the sky.
+/// What is true of a satellite at a sample: the observation of its first ray, where it stands in the sky, and the other
+/// rays as they come beside the first.
+pub type Truth = (Observation, SkyRow, Vec<RayRow>);
+
+/// What is true of `sv` at a sample.
 ///
 /// # Errors
 /// Those of the orbit.
 pub fn observe(
     scene: &Scene,
+    from: &Constellation,
     sv: Sv,
     signal: &'static Signal,
     sample: u64,
     locked_s: f64,
-) -> Result<Option<(Observation, SkyRow)>, OrbitError> {
+) -> Result<Option<Truth>, OrbitError> {
     let local = scene.clock.epoch(sample);
-    let Some(seen) = seen(scene, sv, signal, local)? else { return Ok(None) };
-    let (Some(arrival), Some(ray)) = (seen.arrivals.first(), seen.rays.first()) else { return Ok(None) };
-    let Some(doppler_hz) = doppler_hz(scene, sv, signal, local)? else { return Ok(None) };
+    let Some(seen) = seen_from(scene, from, sv, signal, local)? else { return Ok(None) };
+    let (Some(&arrival), Some(ray)) = (seen.arrivals.first(), seen.rays.first()) else { return Ok(None) };
+    // What is blocked altogether is not there to be observed.
+    if ray.cn0_hz <= 0.0 {
+        return Ok(None);
+    }
+    let arrival = arrival.rippled(ripple::at(scene, from.fading(sv), signal, sample as f64));
+    let Some(doppler_hz) = doppler_hz(scene, from, sv, signal, sample, &seen)? else { return Ok(None) };
     let sent = local.plus_s(-arrival.delay_s);
     let observation = Observation {
         sample,
@@ -146,12 +239,30 @@ pub fn observe(
         ionosphere_m: 0.5 * SPEED_OF_LIGHT_MPS * (ray.code_delay_s - ray.carrier_delay_s),
         troposphere_m: 0.5 * SPEED_OF_LIGHT_MPS * (ray.code_delay_s + ray.carrier_delay_s),
     };
-    Ok(Some((observation, sky)))
+    let rays = (1..).zip(seen.rays.iter().skip(1)).map(|(number, other)| RayRow {
+        sample,
+        sv,
+        signal,
+        ray: number,
+        excess_m: SPEED_OF_LIGHT_MPS * (other.code_delay_s - ray.code_delay_s),
+        amplitude_ratio: (other.cn0_hz / ray.cn0_hz).sqrt(),
+        phase_cycles: {
+            let delay_s = ray.carrier_delay_s - other.carrier_delay_s;
+            let cycles = signal.carrier_hz * delay_s + ray.phase_cycles - other.phase_cycles;
+            cycles - cycles.floor()
+        },
+    });
+    let rays = rays.collect();
+    Ok(Some((observation, sky, rays)))
 }
 
-/// Antenna and clock at a sample.
-pub fn trajectory(scene: &Scene, sample: u64) -> TrajectoryRow {
-    let (time, elapsed_s, motion) = received(scene, scene.clock.epoch(sample));
+/// Antenna and clock at a sample, as they are or as a spoofer claims them: the receiver's clock against its clock.
+pub fn trajectory(scene: &Scene, from: &Constellation, sample: u64) -> TrajectoryRow {
+    let local = scene.clock.epoch(sample);
+    let (time, elapsed_s, motion) = received(scene, from, local);
+    let clock = &scene.receiver_clock;
+    let quick_s = clock.oscillator.as_ref().map_or(0.0, |oscillator| oscillator.quick_at_s(sample as f64));
+    let time = time.plus_s(from.clock_s(elapsed_s) - quick_s);
     TrajectoryRow {
         sample,
         gps_s: time.seconds(),
@@ -162,8 +273,8 @@ pub fn trajectory(scene: &Scene, sample: u64) -> TrajectoryRow {
         vx_mps: motion.velocity_mps.x,
         vy_mps: motion.velocity_mps.y,
         vz_mps: motion.velocity_mps.z,
-        clock_bias_s: scene.receiver_clock.bias_at(elapsed_s),
-        clock_drift: scene.receiver_clock.drift,
+        clock_bias_s: clock.offset_at_reading_s(scene.clock.start, local) + quick_s - from.clock_s(elapsed_s),
+        clock_drift: clock.drift_at_reading(scene.clock.start, local) - from.clock_drift,
     }
 }
 
@@ -197,12 +308,23 @@ impl Table {
     }
 }
 
-/// Writes `observations.csv`, `sky.csv`, `trajectory.csv`, `navigation.csv` and `scene.json`.
+/// What a spoofer claims: observables like `observations.csv`, places like `trajectory.csv`.
+struct Claims {
+    observations: Table,
+    trajectory: Table,
+}
+
+/// Writes `observations.csv`, `sky.csv`, `trajectory.csv`, `navigation.csv` and `scene.json`; `rays.csv` where a satellite
+/// has more than one ray, with interference `interference.csv`, with spoofers `spoofed.csv` and `claimed.csv`
+/// (`spoofed_2.csv`, … from the second one on).
 pub struct Writer {
     directory: PathBuf,
     observations: Table,
     sky: Table,
+    rays: Option<Table>,
     trajectory: Table,
+    interference: Option<Table>,
+    claims: Vec<Claims>,
 }
 
 #[derive(Serialize)]
@@ -216,13 +338,30 @@ struct SceneFile<'a> {
     center_hz: f64,
     inverted: bool,
     format: &'a str,
+    fidelity: &'a str,
     code_edge: &'a str,
+    carrier: &'a str,
     knot_tolerance_cycles: f64,
     mask_deg: f64,
     truth_interval_s: f64,
     signals: Vec<&'a str>,
     noise: bool,
+    noise_arithmetic: &'a str,
     noise_lsb: f32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    skyline_deg: Option<Vec<[f64; 2]>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    oscillator: Option<OscillatorFile>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    interference: Vec<Spectrum>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    spoofers: Vec<String>,
+}
+
+/// Power law of the receiver's oscillator, from white phase noise to random-walk frequency noise.
+#[derive(Serialize)]
+struct OscillatorFile {
+    h: [f64; 5],
 }
 
 impl Writer {
@@ -232,16 +371,33 @@ impl Writer {
     /// [`TruthError`] with the path that failed.
     pub fn create(directory: &Path) -> Result<Self, TruthError> {
         fs::create_dir_all(directory).map_err(|source| TruthError::File { path: directory.to_owned(), source })?;
+        let rays = directory.join("rays.csv");
+        if rays.exists() {
+            fs::remove_file(&rays).map_err(|source| TruthError::File { path: rays, source })?;
+        }
         Ok(Self {
             directory: directory.to_owned(),
             observations: Table::create(directory, "observations.csv")?,
             sky: Table::create(directory, "sky.csv")?,
+            rays: None,
             trajectory: Table::create(directory, "trajectory.csv")?,
+            interference: None,
+            claims: Vec::new(),
         })
     }
 
-    /// Writes `scene.json`.
+    /// Writes `scene.json`, and creates the files that only this scene has.
     pub fn scene(&mut self, scene: &Scene) -> Result<(), TruthError> {
+        if !scene.interference.is_empty() {
+            self.interference = Some(Table::create(&self.directory, "interference.csv")?);
+        }
+        for spoofer in &scene.spoofers {
+            let suffix = if spoofer.number > 1 { format!("_{}", spoofer.number) } else { String::new() };
+            self.claims.push(Claims {
+                observations: Table::create(&self.directory, &format!("spoofed{suffix}.csv"))?,
+                trajectory: Table::create(&self.directory, &format!("claimed{suffix}.csv"))?,
+            });
+        }
         let file = SceneFile {
             name: &scene.name,
             seed: scene.seed,
@@ -252,17 +408,21 @@ impl Writer {
             center_hz: scene.metadata.center_hz,
             inverted: scene.metadata.inverted,
             format: scene.metadata.format.name(),
-            code_edge: match scene.fidelity.code_edge {
-                CodeEdge::Nearest => "nearest",
-                CodeEdge::Area => "area",
-                CodeEdge::BandLimited => "band_limited",
-            },
+            fidelity: scene.fidelity.grade.name(),
+            code_edge: scene.fidelity.code_edge.name(),
+            carrier: scene.fidelity.carrier.name(),
             knot_tolerance_cycles: scene.fidelity.knot_tolerance_cycles,
             mask_deg: scene.mask_rad.to_degrees(),
             truth_interval_s: scene.truth_interval_s,
             signals: scene.signals.iter().map(|signal| signal.name).collect(),
             noise: scene.noise,
+            noise_arithmetic: scene.fidelity.noise.name(),
             noise_lsb: scene.noise_lsb,
+            skyline_deg: obstruction::skyline_deg(scene),
+            oscillator: (scene.receiver_clock.oscillator.as_ref())
+                .map(|oscillator| OscillatorFile { h: oscillator.law.levels() }),
+            interference: scene.interference.iter().map(Interferer::spectrum).collect(),
+            spoofers: scene.spoofers.iter().map(|spoofer| spoofer.describe()).collect(),
         };
         let path = self.directory.join("scene.json");
         serde_json::to_string_pretty(&file)
@@ -272,17 +432,40 @@ impl Writer {
     }
 
     /// Appends what is true at one sample.
-    pub fn epoch(
-        &mut self,
-        trajectory: &TrajectoryRow,
-        satellites: &[(Observation, SkyRow)],
-    ) -> Result<(), TruthError> {
+    pub fn epoch(&mut self, trajectory: &TrajectoryRow, satellites: &[Truth]) -> Result<(), TruthError> {
         self.trajectory.write(trajectory)?;
-        for (observation, sky) in satellites {
+        for (observation, sky, rays) in satellites {
             self.observations.write(observation)?;
             self.sky.write(sky)?;
+            for ray in rays {
+                if self.rays.is_none() {
+                    self.rays = Some(Table::create(&self.directory, "rays.csv")?);
+                }
+                self.rays.as_mut().map_or(Ok(()), |table| table.write(ray))?;
+            }
         }
         Ok(())
+    }
+
+    /// Appends what interference there is at one sample.
+    pub fn interference(&mut self, scene: &Scene, sample: u64) -> Result<(), TruthError> {
+        let Some(table) = &mut self.interference else { return Ok(()) };
+        let mut rows = (1..).zip(&scene.interference).filter_map(|(number, source)| source.row(number, sample));
+        rows.try_for_each(|row| table.write(row))
+    }
+
+    /// Appends what a spoofer claims at one sample.
+    pub fn claim(
+        &mut self,
+        spoofer: &Constellation,
+        claimed: &TrajectoryRow,
+        satellites: &[Truth],
+    ) -> Result<(), TruthError> {
+        let Some(claims) = spoofer.number.checked_sub(1).and_then(|index| self.claims.get_mut(index)) else {
+            return Ok(());
+        };
+        claims.trajectory.write(claimed)?;
+        satellites.iter().try_for_each(|(observation, ..)| claims.observations.write(observation))
     }
 
     /// Writes `navigation.csv` and everything that is still buffered.
@@ -294,6 +477,11 @@ impl Writer {
         table.flush()?;
         self.observations.flush()?;
         self.sky.flush()?;
+        self.rays.iter_mut().chain(&mut self.interference).try_for_each(Table::flush)?;
+        for claims in &mut self.claims {
+            claims.observations.flush()?;
+            claims.trajectory.flush()?;
+        }
         self.trajectory.flush()
     }
 }

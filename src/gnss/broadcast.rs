@@ -103,7 +103,20 @@ impl Ephemeris {
     /// # Errors
     /// [`OrbitError`] for elements that describe no orbit. The age of the elements is not judged.
     pub fn state(&self, at: Epoch) -> Result<State, OrbitError> {
+        Ok(self.state_of(&self.anomaly(at)?))
+    }
+
+    /// [`Self::state`] and [`Self::clock_l1`] of the same instant, for one solution of Kepler's equation.
+    ///
+    /// # Errors
+    /// As [`Self::state`].
+    pub fn state_and_clock_l1(&self, at: Epoch) -> Result<(State, ClockState), OrbitError> {
         let anomaly = self.anomaly(at)?;
+        let clock = self.clock_of(&anomaly, at);
+        Ok((self.state_of(&anomaly), ClockState { offset_s: clock.offset_s - self.tgd_s, ..clock }))
+    }
+
+    fn state_of(&self, anomaly: &Anomaly) -> State {
         let flatness = (1.0 - self.eccentricity * self.eccentricity).sqrt();
         let true_anomaly_rad = libm::atan2(flatness * anomaly.sin, anomaly.cos - self.eccentricity);
         let true_rate = flatness * anomaly.rate_radps / anomaly.shrink;
@@ -140,7 +153,7 @@ impl Ephemeris {
             x_rate * sin_node + level_rate * cos_node + position_m.x * node_rate,
             y_rate * sin_i + y * cos_i * inclination_rate,
         );
-        Ok(State { position_m, velocity_mps })
+        State { position_m, velocity_mps }
     }
 
     /// The satellite clock at GPS time `at` with the relativistic term, without group delay
@@ -149,13 +162,16 @@ impl Ephemeris {
     /// # Errors
     /// [`OrbitError`] for elements that describe no orbit.
     pub fn clock(&self, at: Epoch) -> Result<ClockState, OrbitError> {
-        let anomaly = self.anomaly(at)?;
+        Ok(self.clock_of(&self.anomaly(at)?, at))
+    }
+
+    fn clock_of(&self, anomaly: &Anomaly, at: Epoch) -> ClockState {
         let dt_s = at.since(self.toc);
         let relativity_s = RELATIVITY_SPSQRTM * self.eccentricity * self.sqrt_a_sqrtm;
-        Ok(ClockState {
+        ClockState {
             offset_s: self.af0_s + (self.af1_sps + self.af2_sps2 * dt_s) * dt_s + relativity_s * anomaly.sin,
             drift: self.af1_sps + 2.0 * self.af2_sps2 * dt_s + relativity_s * anomaly.cos * anomaly.rate_radps,
-        })
+        }
     }
 
     /// The clock as a single-frequency L1 C/A user meets it: [`Self::clock`] minus T_GD

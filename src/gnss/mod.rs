@@ -7,6 +7,10 @@
 pub mod broadcast;
 pub mod earth;
 pub mod gps;
+#[cfg(feature = "generator")]
+pub mod inflate;
+#[cfg(feature = "generator")]
+pub mod ionex;
 pub mod klobuchar;
 pub mod record;
 #[cfg(feature = "generator")]
@@ -16,3 +20,5 @@ pub mod satellite;
 pub mod sigmf;
 pub mod signal;
 pub mod time;
+#[cfg(feature = "generator")]
+pub mod vienna;

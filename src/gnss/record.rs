@@ -56,6 +56,23 @@ pub struct SkyRow {
     pub troposphere_m: f64,
 }
 
+/// A ray that comes beside the direct one: `truth/rays.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RayRow {
+    pub sample: u64,
+    pub sv: Sv,
+    #[serde(with = "by_name")]
+    pub signal: &'static Signal,
+    /// Counted from 1; the direct ray is 0.
+    pub ray: u32,
+    /// Delay of its code against the direct ray's.
+    pub excess_m: f64,
+    /// Of the direct ray's; 0 while there is none.
+    pub amplitude_ratio: f64,
+    /// Its carrier ahead of the direct ray's, 0 to 1.
+    pub phase_cycles: f64,
+}
+
 /// Where the antenna was and what the clocks read: `truth/trajectory.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TrajectoryRow {
@@ -90,6 +107,18 @@ impl TrajectoryRow {
     pub fn velocity_mps(&self) -> Vector3<f64> {
         Vector3::new(self.vx_mps, self.vy_mps, self.vz_mps)
     }
+}
+
+/// A source of interference at one sample: `truth/interference.csv`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InterferenceRow {
+    pub sample: u64,
+    /// Its number among those that are computed, from 1.
+    pub source: usize,
+    /// Mean power over a repetition, over the density of the thermal noise.
+    pub jn0_dbhz: f64,
+    /// Where its carrier appears in the samples, Doppler and the receiver's clock in.
+    pub frequency_hz: f64,
 }
 
 /// One position solution: `rx/fixes.csv`.

@@ -6,7 +6,7 @@
 //! 20-III). A record that fails is left out and named in [`Navigation::skipped`].
 
 use std::cell::Cell;
-use std::io::{BufReader, Read};
+use std::io::BufReader;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
 
@@ -16,13 +16,13 @@ use ::rinex::record::{ParsingDiagnostic, ParsingDiagnosticKind};
 use thiserror::Error;
 
 use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::inflate::{InflateError, inflate};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
 
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// What a navigation file says about GPS.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -66,7 +66,7 @@ pub fn embedded() -> Result<Navigation, NavigationError> {
 /// # Errors
 /// [`NavigationError`], also when not one usable GPS LNAV ephemeris is in it.
 pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
-    let text = clean(&inflate(bytes, name)?);
+    let text = clean(&unpack(bytes, name)?);
     check_first_line(&text, name)?;
     let damaged = |detail: String| NavigationError::Damaged { name: name.to_owned(), detail };
     let found = quietly(|| extract(&text))
@@ -85,22 +85,11 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     Ok(found.navigation)
 }
 
-fn inflate(bytes: &[u8], name: &str) -> Result<Vec<u8>, NavigationError> {
-    let mut plain = Vec::new();
-    if bytes.starts_with(&GZIP_MAGIC) {
-        flate2::read::MultiGzDecoder::new(bytes)
-            .take(LARGEST_BYTES + 1)
-            .read_to_end(&mut plain)
-            .map_err(|e| NavigationError::Gzip { name: name.to_owned(), detail: e.to_string() })?;
-    } else if bytes.len() as u64 <= LARGEST_BYTES {
-        plain.extend_from_slice(bytes);
-    } else {
-        return Err(NavigationError::TooLarge { name: name.to_owned() });
-    }
-    if plain.len() as u64 > LARGEST_BYTES {
-        return Err(NavigationError::TooLarge { name: name.to_owned() });
-    }
-    Ok(plain)
+fn unpack(bytes: &[u8], name: &str) -> Result<Vec<u8>, NavigationError> {
+    inflate(bytes, LARGEST_BYTES).map_err(|error| match error {
+        InflateError::TooLarge(_) => NavigationError::TooLarge { name: name.to_owned() },
+        InflateError::Damaged(detail) => NavigationError::Gzip { name: name.to_owned(), detail },
+    })
 }
 
 /// ASCII with line feeds: no byte order mark, `?` for foreign bytes, one kind of line end.
@@ -383,7 +372,7 @@ mod tests {
 
     #[test]
     fn damaged_files_give_errors_and_never_half_an_ephemeris() {
-        let whole = inflate(include_bytes!("../../data/brdc1820-2010.n.gz"), "test").unwrap();
+        let whole = unpack(include_bytes!("../../data/brdc1820-2010.n.gz"), "test").unwrap();
         let head = &whole[..whole.len().min(4000)];
         let reference = read(head, "head").unwrap();
         for cut in 0..head.len() {
@@ -424,7 +413,7 @@ mod tests {
 
     #[test]
     fn elements_out_of_their_field_s_range_leave_the_record_out_with_a_reason() {
-        let whole = inflate(include_bytes!("../../data/brdc1820-2010.n.gz"), "test").unwrap();
+        let whole = unpack(include_bytes!("../../data/brdc1820-2010.n.gz"), "test").unwrap();
         let text = String::from_utf8(whole[..3000].to_vec()).unwrap();
         let broken = text.replacen("0.483528291807D-02", "0.483528291807D+02", 1);
         assert_ne!(text, broken);

@@ -86,7 +86,13 @@ impl Format {
     #[inline(always)]
     pub fn pack_into(self, i: &[f32], q: &[f32], out: &mut [u8]) {
         match self {
-            Self::Ci8 => interleave(i, q, out, |x| [round_i8(x) as u8]),
+            Self::Ci8 => {
+                // Both components as one integer: shifts make vectors where placing bytes does not.
+                let (pairs, _) = out.as_chunks_mut::<2>();
+                for ((pair, i), q) in pairs.iter_mut().zip(i).zip(q) {
+                    *pair = (u16::from(round_i8(*i) as u8) | u16::from(round_i8(*q) as u8) << 8).to_le_bytes();
+                }
+            }
             Self::Cu8 => interleave(i, q, out, |x| [round_u8(x)]),
             Self::Ci16Le => interleave(i, q, out, |x| round_i16(x).to_le_bytes()),
             Self::Cf32Le => interleave(i, q, out, f32::to_le_bytes),

@@ -196,6 +196,17 @@ impl Rate {
         whole as f64 + fraction
     }
 
+    /// Whole turns, and 2^-64 turns, at sample `n` of something that turns `count` times in `seconds`; exact up to
+    /// 1e14 samples, 1e12 turns and 1e13 seconds.
+    pub fn turns(self, n: u64, count: u64, seconds: u64) -> (i64, u64) {
+        let turns = u128::from(n) * u128::from(self.seconds) * u128::from(count);
+        let one = u128::from(self.samples) * u128::from(seconds);
+        let (whole, rest) = (turns / one, turns % one);
+        // The divisor is below 2^80, so 64 bits come in two pieces.
+        let (high, low) = ((rest << 48) / one, (rest << 48) % one);
+        (whole as i64, ((high << 16) | ((low << 16) / one)) as u64)
+    }
+
     /// The number of the first sample at or after `numerator / denominator` seconds.
     pub fn first_sample_at(self, numerator: u64, denominator: u64) -> u64 {
         let ticks = u128::from(numerator) * u128::from(self.samples);

@@ -2,14 +2,18 @@
 //!
 //! The replica's phases are exact integers: carrier in 2⁻⁶⁴ turns, code in 2⁻⁴⁸ chips. A replica sample is the
 //! chip at the sample's instant ([`Edge::Nearest`]) or the mean of the chips over the interval of one sample
-//! centred on that instant ([`Edge::Area`]). [`Replica::correlate`] is the fast kernel and [`Replica::slow`] its
-//! obvious twin in `f64`. Limits: area edges are exact up to one chip a sample (rate ≥ chip rate); beyond one chip a
+//! centred on that instant ([`Edge::Area`]). Sums come in three arithmetics: integers of 16 bits for samples of 8
+//! ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin of both in `f64`
+//! ([`Replica::slow`]). Limits: area edges are exact up to one chip a sample (rate ≥ chip rate); beyond one chip a
 //! sample they leave chips out. Only one-step pulses (BPSK) are made.
 
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
+mod carrier;
 mod kernel;
+mod short;
+mod single;
 
 /// How a replica's chips meet the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,6 +23,17 @@ pub enum Edge {
     Area,
     /// Chip at the sample's instant: 0.7 to 1.5 m rms at 2.6 Msps, and a dead zone at multiples of the chip rate.
     Nearest,
+}
+
+/// What correlations are computed in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Arithmetic {
+    /// Integers of 16 bits where samples have 8, `f32` where they have more.
+    I16,
+    F32,
+    /// One sample after the other: the exact twin, thirty times slower and more.
+    F64,
 }
 
 /// Fraction bits of a code phase.
@@ -43,6 +58,9 @@ pub struct Replica {
     /// What chips are sent as, and what each is short of the next; a little longer than the period.
     values: Vec<f32>,
     changes: Vec<f32>,
+    /// The same in short integers; changes are −1, 0 or 1.
+    short_values: Vec<i16>,
+    short_changes: Vec<i16>,
     edge: Edge,
 }
 
@@ -68,11 +86,13 @@ impl Replica {
             chips.iter().cycle().skip(start).take(64).fold(0_u64, |word, &chip| word << 1 | u64::from(chip))
         };
         let words = (0..=chips.len() / 32).map(|j| word(32 * j)).collect();
-        let sent = |&one: &bool| if one { -1.0_f32 } else { 1.0 };
-        let length = chips.len() + kernel::TABLE_MARGIN;
-        let values: Vec<f32> = chips.iter().cycle().map(sent).take(length + 1).collect();
+        let cyclic = |margin: usize| chips.iter().cycle().take(chips.len() + margin + 1);
+        let values: Vec<f32> = cyclic(kernel::TABLE_MARGIN).map(|&one| if one { -1.0 } else { 1.0 }).collect();
         let changes = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        Some(Self { chips, words, values, changes, edge })
+        let signs: Vec<i16> = cyclic(kernel::SHORT_MARGIN).map(|&one| if one { -1 } else { 1 }).collect();
+        let short_values = signs.iter().map(|sign| sign * short::AMPLITUDE).collect();
+        let short_changes = signs.windows(2).map(|pair| (pair[1] - pair[0]) / 2).collect();
+        Some(Self { chips, words, values, changes, short_values, short_changes, edge })
     }
 
     /// Length of the period in code phase units.
@@ -80,10 +100,31 @@ impl Replica {
         (self.chips.len() as i64) << CODE_BITS
     }
 
-    /// Σ x·conj(replica) with the replica at each of `taps` (code phase units ahead of the prompt). The sums do not depend
-    /// on the processor: sixteen fixed lanes, each 1024 samples added in one order.
+    /// Σ x·conj(replica) with the replica at each of `taps` (code phase units ahead of the prompt), in `f32`. The sums do
+    /// not depend on the processor: sixteen fixed lanes, each 1024 samples added in one order.
     pub fn correlate<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
-        kernel::correlate(kernel::Level::best(), self, i, q, nco, taps)
+        kernel::correlate(kernel::Level::best(), kernel::Fast::Single, self, (i, q), nco, taps)
+    }
+
+    /// The same in integers of 16 bits, for samples of 8 bits: within ±127.5, in steps of 2⁻⁷ or more. At steps of the code
+    /// that do not suit 16 bits (C/A: below 1.06 and above 65 Msps) it is [`Self::correlate`].
+    pub fn correlate_short<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
+        kernel::correlate(kernel::Level::best(), kernel::Fast::Short, self, (i, q), nco, taps)
+    }
+
+    /// One of the three. [`Arithmetic::I16`] is for samples that [`Self::correlate_short`] can take.
+    pub fn correlate_in<const T: usize>(
+        &self,
+        arithmetic: Arithmetic,
+        (i, q): (&[f32], &[f32]),
+        nco: &Nco,
+        taps: &[i64; T],
+    ) -> [Complex64; T] {
+        match arithmetic {
+            Arithmetic::I16 => self.correlate_short(i, q, nco, taps),
+            Arithmetic::F32 => self.correlate(i, q, nco, taps),
+            Arithmetic::F64 => self.slow(i, q, nco, taps),
+        }
     }
 
     /// The same in the obvious way: `f64`, one sample after the other.
@@ -210,10 +251,57 @@ mod tests {
         }
     }
 
+    /// Samples of 8 bits, uniform within ±64.
+    fn bytes(n: usize, seed: u64) -> Vec<f32> {
+        noise(n, seed).into_iter().map(|x| (128.0 * x).round()).collect()
+    }
+
+    #[test]
+    fn short_integers_agree_with_the_slow_twin_for_every_short_length_and_offset() {
+        let (i, q) = (bytes(200, 5), bytes(200, 6));
+        let taps = [chips_to_units(0.25), 0, chips_to_units(-0.25), chips_to_units(-31.0)];
+        for (edge, rate) in [(Edge::Area, 2.6), (Edge::Nearest, 2.6), (Edge::Area, 1.1), (Edge::Area, 26.0)] {
+            let replica = replica(edge);
+            let step = chips_to_units(1.023 / rate);
+            let steps = short::Steps::new(&replica, step as u64).unwrap();
+            for length in 0..=130 {
+                for offset in 0..32_usize {
+                    let nco = Nco {
+                        carrier: 0x1234_5678_9abc_def0_u64.wrapping_mul(offset as u64 + 1),
+                        carrier_step: (0.173 * TURN) as u64,
+                        code: chips_to_units(1023.0 - 1.37 * offset as f64),
+                        code_step: step as u64,
+                    };
+                    let (i, q) = (&i[offset..offset + length], &q[offset..offset + length]);
+                    let fast = replica.correlate_short(i, q, &nco, &taps);
+                    let slow = replica.slow(i, q, &nco, &taps);
+                    for ((a, b), tap) in fast.iter().zip(&slow).zip(taps) {
+                        // A sample of at most 90 LSB: its replica errs by half of 2⁻⁸ and, at an edge, by two halves of the
+                        // phase's last bit times the slope of 2 a step; its rotation by 2⁻⁷ LSB and 2⁻¹⁶ of it.
+                        let unit = 1.0 / f64::from(1_u32 << steps.fine);
+                        let sample = 90.0 * (1.0 / 512.0 + 2.0 * unit / units_to_chips(step) + 2e-5) + 0.011;
+                        // Errors have any sign: four standard deviations of the sum, were they all this large.
+                        let mut bar = sample * (4.0 * (length as f64).sqrt()).min(length as f64);
+                        if edge == Edge::Nearest {
+                            // Within the phase's last bit of an edge either chip will do.
+                            let near = |n: i64| {
+                                let phase = units_to_chips((nco.code + tap + n * step).rem_euclid(1 << CODE_BITS));
+                                phase.min(1.0 - phase) < unit
+                            };
+                            bar += 180.0 * (0..length as i64).filter(|&n| near(n)).count() as f64;
+                        }
+                        assert!((a - b).norm() <= bar, "{edge:?} {rate} {length} {offset}: {a} {b} {bar}");
+                    }
+                }
+            }
+        }
+    }
+
     #[test]
     fn every_instruction_set_gives_the_same_bits_and_long_sums_stay_exact() {
-        let (i, q) = (noise(30_011, 3), noise(30_011, 4));
-        for (edge, rate) in [(Edge::Area, 26.0), (Edge::Nearest, 26.0), (Edge::Area, 1.5)] {
+        let single = (noise(30_011, 3), noise(30_011, 4));
+        let short = (bytes(30_011, 3), bytes(30_011, 4));
+        for (edge, rate) in [(Edge::Area, 26.0), (Edge::Nearest, 26.0), (Edge::Area, 2.6), (Edge::Area, 1.5)] {
             let replica = replica(edge);
             let nco = Nco {
                 carrier: 77,
@@ -222,17 +310,36 @@ mod tests {
                 code_step: chips_to_units(1.023 / rate) as u64,
             };
             let taps = [chips_to_units(0.25), 0, chips_to_units(-0.25)];
-            let all: Vec<_> = kernel::Level::all()
-                .into_iter()
-                .map(|level| (kernel::correlate(level, &replica, &i, &q, &nco, &taps), kernel::power(level, &i, &q)))
-                .collect();
-            assert!(all.windows(2).all(|pair| pair[0] == pair[1]));
-            let slow = replica.slow(&i, &q, &nco, &taps);
-            // Noise of the sum: sqrt(30011/6) = 71; f32 lanes of 64 terms keep 1e-4 of it.
-            for (a, b) in all[0].0.iter().zip(&slow) {
-                assert!((a - b).norm() < 7e-3, "{a} {b}");
+            // Noise of the sum: √(30011/6) = 71 times the samples' width. Lanes of 64 terms keep 1e-4 of it in f32; in 16
+            // bits a sample errs by 2⁻⁹ to 2⁻⁸ of itself, and with nearest edges 2 in 10⁴ samples have the other chip.
+            for (fast, (i, q), bar) in
+                [(kernel::Fast::Single, &single, 7e-3), (kernel::Fast::Short, &short, 71.0 * 128.0 * 0.03)]
+            {
+                let all: Vec<_> = kernel::Level::all()
+                    .into_iter()
+                    .map(|level| {
+                        let sums = kernel::correlate(level, fast, &replica, (i, q), &nco, &taps);
+                        (sums, kernel::power(level, i, q))
+                    })
+                    .collect();
+                assert!(all.windows(2).all(|pair| pair[0] == pair[1]), "{edge:?} {rate} {fast:?}");
+                let slow = replica.slow(i, q, &nco, &taps);
+                for (a, b) in all[0].0.iter().zip(&slow) {
+                    assert!((a - b).norm() < bar, "{edge:?} {rate} {fast:?}: {a} {b}");
+                }
             }
         }
+    }
+
+    #[test]
+    fn full_scale_in_step_with_the_replica_does_not_overflow_short_integers() {
+        let replica = replica(Edge::Nearest);
+        let step = chips_to_units(1.023 / 2.6);
+        let nco = Nco { carrier: 0, carrier_step: 0, code: 0, code_step: step as u64 };
+        let i: Vec<f32> = (0..5000).map(|n| 127.5 * replica.value(n * step, step as u64) as f32).collect();
+        let [sum] = replica.correlate_short(&i, &i, &nco, &[0]);
+        // Within 2⁻¹³ chip of an edge either chip will do: about 5000 · 2⁻¹² samples.
+        assert!((sum / (5000.0 * 127.5) - Complex64::new(1.0, 1.0)).norm() < 0.002, "{sum}");
     }
 
     #[test]

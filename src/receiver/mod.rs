@@ -17,4 +17,4 @@ pub mod settings;
 pub mod source;
 pub mod track;
 
-pub use run::{Outcome, ReceiveError, receive};
+pub use run::{Outcome, ReceiveError, Reception, receive};

@@ -5,7 +5,7 @@
 //! window and what the satellites said.
 
 use std::fmt;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 
 use serde_json::json;
 use thiserror::Error;
@@ -18,12 +18,14 @@ use crate::receiver::diagnosis::{Diagnosis, Stage};
 use crate::receiver::output::{Output, OutputError};
 use crate::receiver::session::Session;
 use crate::receiver::settings::{Settings, SettingsError};
-use crate::receiver::source::{Source, SourceError};
+use crate::receiver::source::Source;
 
 /// Length of the blocks that channels work on.
 const BLOCK_MS: u64 = 50;
-/// Samples in a block at most: 1 MiB in planar `f32`, which stays in a core's cache while all channels go over it.
+/// Samples in a block at most.
 const BLOCK_SAMPLES: u64 = 1 << 17;
+/// Bytes read at a time.
+const READ_BYTES: usize = 1 << 18;
 
 /// Why a reception was broken off.
 #[derive(Debug, Error)]
@@ -32,8 +34,8 @@ pub enum ReceiveError {
     Settings(#[from] SettingsError),
     #[error(transparent)]
     Acquire(#[from] AcquireError),
-    #[error(transparent)]
-    Source(#[from] SourceError),
+    #[error("cannot read the samples after sample {sample}: {error}")]
+    Read { sample: u64, error: std::io::Error },
     #[error(transparent)]
     Output(#[from] OutputError),
 }
@@ -87,6 +89,79 @@ pub(super) fn candidates(metadata: &IfMetadata) -> Vec<(&'static Signal, Sv)> {
         .collect()
 }
 
+/// A reception that is given its samples piece by piece.
+pub struct Reception {
+    metadata: IfMetadata,
+    settings: Settings,
+    source: Source,
+    session: Session,
+}
+
+impl Reception {
+    /// A cold start on samples that are packed as `metadata` says.
+    ///
+    /// # Errors
+    /// Settings out of range, samples that cannot be searched.
+    pub fn new(metadata: &IfMetadata, settings: &Settings) -> Result<Self, ReceiveError> {
+        settings.validate("settings")?;
+        let interval = u64::from(settings.operation.measurement_interval_ms);
+        let block = metadata.rate.first_sample_at(interval.min(BLOCK_MS), 1000).min(BLOCK_SAMPLES);
+        Ok(Self {
+            metadata: metadata.clone(),
+            settings: settings.clone(),
+            source: Source::new(metadata.format, block as usize),
+            session: Session::new(metadata, settings)?,
+        })
+    }
+
+    /// Takes the next bytes, cut anywhere, and writes what they bring to `output`.
+    ///
+    /// # Errors
+    /// Records that cannot be written.
+    pub fn take(&mut self, mut bytes: &[u8], output: &mut Output) -> Result<(), ReceiveError> {
+        while let Some(block) = self.source.next(&mut bytes) {
+            self.session.process(&block, output)?;
+        }
+        Ok(())
+    }
+
+    /// Samples taken so far, those of a block that is not full yet left out.
+    pub fn samples(&self) -> u64 {
+        self.source.samples()
+    }
+
+    /// Ends the reception: writes what is left to `output` and tells what came of it.
+    ///
+    /// # Errors
+    /// Records that cannot be written.
+    pub fn finish(mut self, output: &mut Output) -> Result<Outcome, ReceiveError> {
+        let (rest, cut_bytes) = self.source.rest();
+        if let Some(block) = rest {
+            self.session.process(&block, output)?;
+        }
+        let (metadata, settings) = (&self.metadata, &self.settings);
+        let count = self.source.samples();
+        let seconds = metadata.rate.elapsed_s(count);
+        let mut outcome = self.session.outcome();
+        outcome.samples = count;
+        outcome.seconds = seconds;
+        outcome.cut_bytes = cut_bytes;
+        if outcome.fixes == 0 {
+            let needed = acquire::samples_needed(metadata, &settings.acquisition)?;
+            let stage = if count < needed {
+                Stage::NothingSearched { samples: count, needed }
+            } else {
+                self.session.failed_stage()
+            };
+            let if_hz = SIGNALS.first().map_or(0.0, |signal| metadata.if_hz(signal));
+            let format = metadata.format.name();
+            outcome.diagnosis = Some(Diagnosis::new(stage, seconds, metadata.rate.hz(), format, if_hz, cut_bytes));
+        }
+        output.finish(&summary(metadata, settings, &outcome))?;
+        Ok(outcome)
+    }
+}
+
 /// Receives `samples`, packed as `metadata` says, from the first to the last, and writes everything to `output`.
 /// `progress` is told the number of samples done after every block.
 ///
@@ -95,36 +170,22 @@ pub(super) fn candidates(metadata: &IfMetadata) -> Vec<(&'static Signal, Sv)> {
 /// [`Outcome::diagnosis`].
 pub fn receive<R: Read>(
     metadata: &IfMetadata,
-    samples: R,
+    mut samples: R,
     settings: &Settings,
     output: &mut Output,
     progress: &mut dyn FnMut(u64),
 ) -> Result<Outcome, ReceiveError> {
-    settings.validate("settings")?;
-    let interval = u64::from(settings.operation.measurement_interval_ms);
-    let stride = metadata.rate.first_sample_at(interval.min(BLOCK_MS), 1000).clamp(1, BLOCK_SAMPLES);
-    let mut source = Source::new(samples, metadata.format, stride as usize)?;
-    let mut session = Session::new(metadata, settings)?;
-    while let Some(block) = source.next_block()? {
-        session.process(&block, output)?;
-        progress(block.first + block.i.len() as u64);
+    let mut reception = Reception::new(metadata, settings)?;
+    let mut bytes = vec![0; READ_BYTES];
+    loop {
+        match samples.read(&mut bytes) {
+            Ok(0) => return reception.finish(output),
+            Ok(count) => reception.take(bytes.get(..count).unwrap_or_default(), output)?,
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return Err(ReceiveError::Read { sample: reception.samples(), error }),
+        }
+        progress(reception.samples());
     }
-    let (count, cut_bytes) = (source.samples(), source.cut_bytes());
-    let seconds = metadata.rate.elapsed_s(count);
-    let mut outcome = session.outcome();
-    outcome.samples = count;
-    outcome.seconds = seconds;
-    outcome.cut_bytes = cut_bytes;
-    if outcome.fixes == 0 {
-        let needed = acquire::samples_needed(metadata, &settings.acquisition)?;
-        let stage =
-            if count < needed { Stage::NothingSearched { samples: count, needed } } else { session.failed_stage() };
-        let if_hz = SIGNALS.first().map_or(0.0, |signal| metadata.if_hz(signal));
-        let format = metadata.format.name();
-        outcome.diagnosis = Some(Diagnosis::new(stage, seconds, metadata.rate.hz(), format, if_hz, cut_bytes));
-    }
-    output.finish(&summary(metadata, settings, &outcome))?;
-    Ok(outcome)
 }
 
 /// What `receiver.json` says.
@@ -149,4 +210,33 @@ fn summary(metadata: &IfMetadata, settings: &Settings, outcome: &Outcome) -> ser
         "losses": outcome.losses,
         "diagnosis": outcome.diagnosis.as_ref().map(ToString::to_string),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::samples::Format;
+    use crate::gnss::time::Rate;
+
+    #[test]
+    fn a_failing_reader_is_an_error_with_its_place_and_an_interruption_is_none() {
+        /// Gives 1000 bytes, is interrupted, gives 1000 more and breaks.
+        struct Broken(u32);
+        impl Read for Broken {
+            fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+                self.0 += 1;
+                match self.0 {
+                    1 | 3 => Ok(buffer.len().min(1000)),
+                    2 => Err(ErrorKind::Interrupted.into()),
+                    _ => Err(std::io::Error::other("unplugged")),
+                }
+            }
+        }
+        let rate = Rate::from_hz(1e5).unwrap();
+        let metadata = IfMetadata { format: Format::Ci8, rate, center_hz: 1_575.42e6, inverted: false, start: None };
+        let directory = tempfile::tempdir().unwrap();
+        let mut output = Output::create(directory.path()).unwrap();
+        let error = receive(&metadata, Broken(0), &Settings::default(), &mut output, &mut |_| ()).unwrap_err();
+        assert!(error.to_string().contains("sample 0") && error.to_string().contains("unplugged"), "{error}");
+    }
 }

@@ -21,7 +21,7 @@ use crate::receiver::position::least_squares::UNKNOWNS;
 use crate::receiver::position::{CodeNoise, NoFix, Solver};
 use crate::receiver::run::{Outcome, ReceiveError, candidates};
 use crate::receiver::settings::Settings;
-use crate::receiver::source::Block;
+use crate::receiver::source::{Block, Packed, Planes};
 use crate::receiver::track::{Channel, Report};
 
 /// A satellite that was lost is searched for eagerly so long.
@@ -35,6 +35,11 @@ const ECHO_DB: f64 = 20.0;
 const WRONG_TIME_M: f64 = 10_000.0;
 /// So many fixes in a row have to say so.
 const WRONG_TIME_FIXES: u32 = 10;
+
+/// Channels go over a block in parts of so many samples at least: 512 KiB in planar `f32`, a core's own cache …
+const PART_SAMPLES: usize = 1 << 16;
+/// … and so long at least, as a code period that a part's end cuts is copied.
+const PART_S: f64 = 0.01;
 
 /// One channel and its decoder.
 struct Track {
@@ -51,8 +56,7 @@ struct Track {
 /// Samples collected for a search.
 struct Window {
     first: u64,
-    i: Vec<f32>,
-    q: Vec<f32>,
+    samples: Planes,
 }
 
 /// What became of a satellite, for the diagnosis.
@@ -75,6 +79,8 @@ pub(super) struct Session {
     next_search: u64,
     window: Option<Window>,
     tracks: Vec<Track>,
+    /// Of each share of the tracks.
+    planes: Vec<Planes>,
     lost: BTreeMap<(&'static Signal, Sv), u64>,
     refused: BTreeMap<(&'static Signal, Sv), u64>,
     timebase: Timebase,
@@ -120,6 +126,7 @@ impl Session {
             next_search: 0,
             window: None,
             tracks: Vec::new(),
+            planes: Vec::new(),
             lost: BTreeMap::new(),
             refused: BTreeMap::new(),
             timebase: Timebase::new(metadata.rate, metadata.start),
@@ -143,31 +150,44 @@ impl Session {
     }
 
     /// Takes the next block through the whole chain.
-    pub(super) fn process(&mut self, block: &Block, output: &mut Output) -> Result<(), ReceiveError> {
+    pub(super) fn process(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
         self.search(block, output)?;
         let (ticks, measured) = self.ticks(block);
-        self.tracks.par_iter_mut().for_each(|track| {
-            let report = &mut track.report;
-            report.measurements.clear();
-            report.symbols.clear();
-            report.rows.clear();
-            report.events.clear();
-            track.channel.advance(block, &ticks, report);
-        });
+        self.follow(block, &ticks);
         self.record(output)?;
         self.decode(output)?;
         for tick in measured {
             self.measure(tick, output)?;
         }
-        self.retire(block.first + block.i.len() as u64, output)
+        self.retire(block.end(), output)
+    }
+
+    /// Takes every channel through the block, on every core its share of them.
+    ///
+    /// Each share unpacks the samples for itself, in parts that stay in its core's cache: to read what another core has
+    /// written takes longer than to unpack it again.
+    fn follow(&mut self, block: &Packed, ticks: &[u64]) {
+        let share = self.tracks.len().div_ceil(rayon::current_num_threads()).max(1);
+        self.planes.resize_with(self.tracks.len().div_ceil(share), Planes::default);
+        let part = PART_SAMPLES.max(self.samples(PART_S) as usize);
+        self.tracks.par_chunks_mut(share).zip(&mut self.planes).for_each(|(tracks, planes)| {
+            tracks.iter_mut().for_each(|track| clear(&mut track.report));
+            for start in (0..block.samples()).step_by(part) {
+                let samples = block.unpack(start..start + part, planes);
+                let ticks = within(ticks, samples.first, samples.first + samples.i.len() as u64);
+                for track in tracks.iter_mut() {
+                    track.channel.advance(&samples, ticks, &mut track.report);
+                }
+            }
+        });
     }
 
     /// Samples of this block at which channels report, and those of them at which the receiver measures.
-    fn ticks(&mut self, block: &Block) -> (Vec<u64>, Vec<u64>) {
+    fn ticks(&mut self, block: &Packed) -> (Vec<u64>, Vec<u64>) {
         let operation = &self.settings.operation;
         let step_ms = u64::from(operation.tracking_interval_ms);
         let each = u64::from(operation.measurement_interval_ms / operation.tracking_interval_ms).max(1);
-        let end = block.first + block.i.len() as u64;
+        let end = block.end();
         let (mut ticks, mut measured) = (Vec::new(), Vec::new());
         loop {
             let sample = self.metadata.rate.first_sample_at(self.next_tick * step_ms, 1000);
@@ -186,19 +206,21 @@ impl Session {
     }
 
     /// Collects samples while a search is due, searches when there are enough, starts channels.
-    fn search(&mut self, block: &Block, output: &mut Output) -> Result<(), ReceiveError> {
-        let end = block.first + block.i.len() as u64;
+    fn search(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
+        let end = block.end();
         if self.window.is_none() {
             if end <= self.next_search {
                 return Ok(());
             }
-            self.window = Some(Window { first: block.first, i: Vec::new(), q: Vec::new() });
+            self.window = Some(Window { first: block.first, samples: Planes::default() });
         }
         let Some(window) = &mut self.window else { return Ok(()) };
-        let missing = (self.needed as usize).saturating_sub(window.i.len()).min(block.i.len());
-        window.i.extend_from_slice(&block.i[..missing]);
-        window.q.extend_from_slice(&block.q[..missing]);
-        if (window.i.len() as u64) < self.needed {
+        let missing = (self.needed as usize).saturating_sub(window.samples.i.len());
+        let mut planes = Planes::default();
+        let samples = block.unpack(0..missing, &mut planes);
+        window.samples.i.extend_from_slice(samples.i);
+        window.samples.q.extend_from_slice(samples.q);
+        if (window.samples.i.len() as u64) < self.needed {
             return Ok(());
         }
         let Some(window) = self.window.take() else { return Ok(()) };
@@ -211,7 +233,7 @@ impl Session {
         if !all_found {
             let searcher = if self.searched { &mut self.later_searches } else { &mut self.first_search };
             let strongest_dbhz = self.tracks.iter().map(|track| track.cn0_dbhz).fold(f64::NEG_INFINITY, f64::max);
-            let searched = Block { first: window.first, i: &window.i, q: &window.q };
+            let searched = Block { first: window.first, i: &window.samples.i, q: &window.samples.q };
             let results = searcher.search(&searched, &self.candidates)?;
             for (mut row, hit) in results {
                 row.acquired &= hit.is_some_and(|hit| hit.cn0_dbhz > strongest_dbhz - ECHO_DB);
@@ -476,4 +498,18 @@ impl Session {
         }
         Stage::NoPosition { with_ephemeris: complete, reason: self.reason.clone() }
     }
+}
+
+/// Empties a report and keeps its room.
+fn clear(report: &mut Report) {
+    report.measurements.clear();
+    report.symbols.clear();
+    report.rows.clear();
+    report.events.clear();
+}
+
+/// Those of the ascending `ticks` that lie in `first..end`.
+fn within(ticks: &[u64], first: u64, end: u64) -> &[u64] {
+    let of = |sample: u64| ticks.partition_point(|tick| *tick < sample);
+    ticks.get(of(first)..of(end)).unwrap_or_default()
 }

@@ -1,12 +1,9 @@
-//! Samples as the receiver meets them: blocks of planar `f32` with the number of their first sample.
+//! Samples as the receiver meets them: packed bytes, however they arrive, become blocks of a fixed number of samples.
 //!
-//! A [`Source`] reads packed bytes from any reader in blocks of a fixed number of samples, so that
-//! memory stays flat however long the recording is. Short reads and interruptions are absorbed; a
-//! sample cut off at the end of the stream is left out and its bytes are counted.
+//! A [`Source`] keeps at most one unfinished block, so that memory stays flat however long the recording is. A sample cut
+//! off at the end of the stream is left out and its bytes are counted.
 
-use std::io::{ErrorKind, Read};
-
-use thiserror::Error;
+use std::ops::Range;
 
 use crate::gnss::samples::Format;
 
@@ -19,156 +16,143 @@ pub struct Block<'a> {
     pub q: &'a [f32],
 }
 
-/// Why samples could not be read.
-#[derive(Debug, Error)]
-pub enum SourceError {
-    /// A block must hold at least one sample.
-    #[error("a block of 0 samples was asked for: expected at least 1")]
-    EmptyStride,
-    /// The reader failed.
-    #[error("cannot read the samples after sample {sample}: {error}")]
-    Read { sample: u64, error: std::io::Error },
+/// Planar samples of some piece, kept to be filled again.
+#[derive(Clone, Debug, Default)]
+pub struct Planes {
+    pub i: Vec<f32>,
+    pub q: Vec<f32>,
 }
 
-/// Packed samples of one format, read block by block.
-#[derive(Debug)]
-pub struct Source<R> {
-    reader: R,
+/// Consecutive samples as they were packed.
+#[derive(Clone, Copy, Debug)]
+pub struct Packed<'a> {
+    /// Number of the first sample since the start of the recording.
+    pub first: u64,
     format: Format,
-    bytes: Vec<u8>,
-    i: Vec<f32>,
-    q: Vec<f32>,
-    samples: u64,
-    cut_bytes: usize,
-    ended: bool,
+    bytes: &'a [u8],
 }
 
-impl<R: Read> Source<R> {
-    /// Samples of `format` from `reader`, in blocks of `stride_samples`.
-    ///
-    /// # Errors
-    /// [`SourceError::EmptyStride`] if `stride_samples` is 0.
-    pub fn new(reader: R, format: Format, stride_samples: usize) -> Result<Self, SourceError> {
-        let mut source = Self {
-            reader,
-            format,
-            bytes: Vec::new(),
-            i: Vec::new(),
-            q: Vec::new(),
-            samples: 0,
-            cut_bytes: 0,
-            ended: false,
+impl Packed<'_> {
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.bytes.len() / self.format.bytes()
+    }
+
+    /// Number of the sample after the last one.
+    pub fn end(&self) -> u64 {
+        self.first + self.samples() as u64
+    }
+
+    /// The samples of `range`, counted from the first one and cut to those that are there, unpacked into `planes`.
+    pub fn unpack<'b>(&self, range: Range<usize>, planes: &'b mut Planes) -> Block<'b> {
+        let size = self.format.bytes();
+        let end = range.end.min(self.samples());
+        let start = range.start.min(end);
+        let bytes = self.bytes.get(start * size..end * size).unwrap_or_default();
+        self.format.unpack(bytes, &mut planes.i, &mut planes.q);
+        Block { first: self.first + start as u64, i: &planes.i, q: &planes.q }
+    }
+}
+
+/// Cuts packed samples of one format into blocks.
+#[derive(Debug)]
+pub struct Source {
+    format: Format,
+    block_bytes: usize,
+    /// The beginning of a block, or a whole one that has been given out.
+    kept: Vec<u8>,
+    samples: u64,
+}
+
+impl Source {
+    /// Blocks of `block_samples`, at least one, of samples in `format`.
+    pub fn new(format: Format, block_samples: usize) -> Self {
+        Self { format, block_bytes: block_samples.max(1) * format.bytes(), kept: Vec::new(), samples: 0 }
+    }
+
+    /// The next whole block of what was kept and what stands in `bytes`, which moves on; `None` when they hold no more.
+    pub fn next<'a, 'b: 'a>(&'a mut self, bytes: &mut &'b [u8]) -> Option<Packed<'a>> {
+        if self.kept.len() == self.block_bytes {
+            self.kept.clear();
+        }
+        let Some((head, rest)) = bytes.split_at_checked(self.block_bytes - self.kept.len()) else {
+            self.kept.extend_from_slice(bytes);
+            *bytes = &[];
+            return None;
         };
-        source.set_stride(stride_samples)?;
-        Ok(source)
-    }
-
-    /// Makes the next blocks `stride_samples` long.
-    ///
-    /// # Errors
-    /// [`SourceError::EmptyStride`] if `stride_samples` is 0.
-    pub fn set_stride(&mut self, stride_samples: usize) -> Result<(), SourceError> {
-        if stride_samples == 0 {
-            return Err(SourceError::EmptyStride);
-        }
-        self.bytes.resize(stride_samples * self.format.bytes(), 0);
-        Ok(())
-    }
-
-    /// The next block: exactly one stride of samples, fewer only at the end; `None` after the last one.
-    ///
-    /// # Errors
-    /// [`SourceError::Read`] as the reader reports it; an interruption is tried again.
-    pub fn next_block(&mut self) -> Result<Option<Block<'_>>, SourceError> {
-        let mut filled = 0;
-        while filled < self.bytes.len() && !self.ended {
-            match self.reader.read(&mut self.bytes[filled..]) {
-                Ok(0) => self.ended = true,
-                Ok(count) => filled += count,
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error) => return Err(SourceError::Read { sample: self.samples, error }),
-            }
-        }
-        // Only the end of the stream leaves a block unfilled, so a cut sample happens at most once.
-        let whole = filled - filled % self.format.bytes();
-        self.cut_bytes += filled - whole;
-        self.format.unpack(&self.bytes[..whole], &mut self.i, &mut self.q);
-        if self.i.is_empty() {
-            return Ok(None);
-        }
+        *bytes = rest;
         let first = self.samples;
-        self.samples += self.i.len() as u64;
-        Ok(Some(Block { first, i: &self.i, q: &self.q }))
+        self.samples += (self.block_bytes / self.format.bytes()) as u64;
+        if self.kept.is_empty() {
+            return Some(Packed { first, format: self.format, bytes: head });
+        }
+        self.kept.extend_from_slice(head);
+        Some(Packed { first, format: self.format, bytes: &self.kept })
     }
 
-    /// Whole samples given out so far.
+    /// At the end of the stream: the whole samples of a block that was not filled, if there are any, and the bytes of a
+    /// sample that was cut off. More than none of the latter usually means a wrong format.
+    pub fn rest(&mut self) -> (Option<Packed<'_>>, usize) {
+        if self.kept.len() == self.block_bytes {
+            self.kept.clear();
+        }
+        let (whole, cut_bytes) = (self.kept.len() / self.format.bytes(), self.kept.len() % self.format.bytes());
+        let first = self.samples;
+        self.samples += whole as u64;
+        let bytes = self.kept.get(..whole * self.format.bytes()).unwrap_or_default();
+        ((whole > 0).then_some(Packed { first, format: self.format, bytes }), cut_bytes)
+    }
+
+    /// Samples given out so far.
     pub fn samples(&self) -> u64 {
         self.samples
-    }
-
-    /// Bytes of a sample that the end of the stream cut off: not 0 usually means a wrong format.
-    pub fn cut_bytes(&self) -> usize {
-        self.cut_bytes
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::io;
-
     use super::*;
-
-    /// Gives one to three bytes a call and is interrupted every fourth call.
-    struct Stutter<'a> {
-        bytes: &'a [u8],
-        calls: usize,
-    }
-
-    impl Read for Stutter<'_> {
-        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-            self.calls += 1;
-            if self.calls.is_multiple_of(4) {
-                return Err(ErrorKind::Interrupted.into());
-            }
-            let count = (1 + self.calls % 3).min(buffer.len()).min(self.bytes.len());
-            let (head, tail) = self.bytes.split_at(count);
-            buffer[..count].copy_from_slice(head);
-            self.bytes = tail;
-            Ok(count)
-        }
-    }
 
     #[test]
     fn blocks_do_not_depend_on_how_the_bytes_arrive() {
         for (format, _) in Format::NAMES {
             let bytes: Vec<u8> = (0..1003_u32).map(|n| (n * 37 % 251) as u8).collect();
-            let (mut all_i, mut all_q) = (Vec::new(), Vec::new());
-            format.unpack(&bytes, &mut all_i, &mut all_q);
-            let mut source = Source::new(Stutter { bytes: &bytes, calls: 0 }, format, 7).unwrap();
-            let (mut i, mut q) = (Vec::new(), Vec::new());
-            while let Some(block) = source.next_block().unwrap() {
-                assert_eq!(block.first, i.len() as u64);
-                assert!(block.i.len() == 7 || i.len() + block.i.len() == all_i.len());
-                i.extend_from_slice(block.i);
-                q.extend_from_slice(block.q);
+            let mut all = Planes::default();
+            format.unpack(&bytes, &mut all.i, &mut all.q);
+            for piece in [1, 3, 56, 57, 400, 1003] {
+                let mut source = Source::new(format, 7);
+                let (mut i, mut q, mut planes) = (Vec::new(), Vec::new(), Planes::default());
+                let mut take = |packed: Packed, whole: bool| {
+                    assert_eq!(packed.first, i.len() as u64);
+                    assert!(packed.samples() == 7 || !whole && (1..7).contains(&packed.samples()));
+                    let block = packed.unpack(0..usize::MAX, &mut planes);
+                    i.extend_from_slice(block.i);
+                    q.extend_from_slice(block.q);
+                };
+                for mut bytes in bytes.chunks(piece) {
+                    while let Some(packed) = source.next(&mut bytes) {
+                        take(packed, true);
+                    }
+                    assert!(bytes.is_empty());
+                }
+                let (rest, cut_bytes) = source.rest();
+                rest.into_iter().for_each(|packed| take(packed, false));
+                assert_eq!((&i, &q), (&all.i, &all.q), "{format} {piece}");
+                assert_eq!((source.samples(), cut_bytes), (i.len() as u64, 1003 % format.bytes()), "{format}");
             }
-            assert!(source.next_block().unwrap().is_none());
-            assert_eq!((&i, &q), (&all_i, &all_q), "{format}");
-            assert_eq!(source.samples(), i.len() as u64);
-            assert_eq!(source.cut_bytes(), 1003 % format.bytes(), "{format}");
         }
     }
 
     #[test]
-    fn a_failing_reader_and_an_empty_stride_are_errors() {
-        struct Broken;
-        impl Read for Broken {
-            fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
-                Err(io::Error::other("unplugged"))
-            }
-        }
-        let error = Source::new(Broken, Format::Ci8, 8).unwrap().next_block().unwrap_err().to_string();
-        assert!(error.contains("sample 0") && error.contains("unplugged"), "{error}");
-        assert!(matches!(Source::new(Broken, Format::Ci8, 0), Err(SourceError::EmptyStride)));
+    fn a_part_of_a_block_is_numbered_from_the_recording_s_first_sample() {
+        let bytes: Vec<u8> = (0..40).collect();
+        let mut source = Source::new(Format::Ci8, 10);
+        let mut rest = &bytes[..];
+        let _ = source.next(&mut rest);
+        let packed = source.next(&mut rest).unwrap();
+        let mut planes = Planes::default();
+        let part = packed.unpack(8..20, &mut planes);
+        assert_eq!((part.first, part.i, part.q), (18, &[36.0, 38.0][..], &[37.0, 39.0][..]));
+        assert_eq!((packed.first, packed.end()), (10, 20));
     }
 }

@@ -9,3 +9,4 @@ mod lnav;
 mod orbit;
 mod pseudorange;
 mod recording;
+mod stability;

@@ -2,7 +2,8 @@
 
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
-use gnss_twin::generator::effect::troposphere::{Saastamoinen, Weather};
+use gnss_twin::generator::effect::mapping::Mapping;
+use gnss_twin::generator::effect::troposphere::{Air, Troposphere, Weather};
 use gnss_twin::generator::ray::{Effect, Ray};
 use gnss_twin::generator::sky::emission;
 use gnss_twin::generator::vehicle::Motion;
@@ -96,7 +97,8 @@ struct Solved {
 fn solve(name: &str, navigation: &[u8], station: &Station, known_m: Vector3<f64>, model: Model) -> Solved {
     let navigation = rinex::read(navigation, name).unwrap();
     let (catalogue, _) = Catalogue::new(navigation.ephemerides);
-    let mut effects: Vec<Box<dyn Effect>> = vec![Box::new(Saastamoinen { weather: Weather::STANDARD })];
+    let mut effects: Vec<Box<dyn Effect>> =
+        vec![Box::new(Troposphere { air: Air::Weather(Weather::STANDARD), mapping: Mapping::Niell })];
     if model.ionosphere {
         effects.push(Box::new(KlobucharIonosphere { model: navigation.klobuchar.unwrap() }));
     }

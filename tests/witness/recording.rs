@@ -6,7 +6,7 @@ use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::signal::Signal;
 use gnss_twin::gnss::time::Rate;
 use gnss_twin::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
-use gnss_twin::receiver::source::{Block, Source};
+use gnss_twin::receiver::source::Block;
 use gnss_twin::receiver::track::{Channel, Report, TrackingSettings};
 
 use crate::data::external;
@@ -35,14 +35,10 @@ fn acquire(metadata: &IfMetadata, i: &[f32], q: &[f32], settings: &AcquisitionSe
 
 /// The whole recording as planar samples.
 fn read(name: &str, format: Format) -> Option<(Vec<f32>, Vec<f32>)> {
-    let file = std::fs::File::open(external(name)?).unwrap();
-    let mut source = Source::new(file, format, 1 << 16).unwrap();
+    let bytes = std::fs::read(external(name)?).unwrap();
+    assert!(bytes.len().is_multiple_of(format.bytes()));
     let (mut i, mut q) = (Vec::new(), Vec::new());
-    while let Some(block) = source.next_block().unwrap() {
-        i.extend_from_slice(block.i);
-        q.extend_from_slice(block.q);
-    }
-    assert_eq!(source.cut_bytes(), 0);
+    format.unpack(&bytes, &mut i, &mut q);
     Some((i, q))
 }
 

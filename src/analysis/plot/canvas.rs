@@ -108,6 +108,19 @@ impl Axis {
         Self::new(label, (middle - half, middle + half))
     }
 
+    /// Marks of an axis of common logarithms: these multiples of every power of ten, as `name` writes them.
+    pub fn log_ticks(&self, multiples: &[f64], name: impl Fn(f64) -> String) -> Vec<(f64, String)> {
+        let decades = self.from.floor() as i32..=self.to.ceil() as i32;
+        let value = |decade: i32, multiple: f64| {
+            // Powers of ten from 1 up are exact, their inverses are not.
+            if decade < 0 { multiple / 10_f64.powi(-decade) } else { multiple * 10_f64.powi(decade) }
+        };
+        let values = decades.flat_map(|decade| multiples.iter().map(move |multiple| value(decade, *multiple)));
+        let placed = values.map(|value| (libm::log10(value), value));
+        let shown = placed.filter(|(place, _)| (self.from..=self.to).contains(place));
+        shown.map(|(place, value)| (place, name(value))).collect()
+    }
+
     fn span(&self) -> f64 {
         self.to - self.from
     }

@@ -2,9 +2,12 @@
 //!
 //! [`canvas`] wraps the drawing libraries; every other file here says what is drawn. A picture
 //! with nothing to show is drawn with empty axes, so that a script finds the files it expects;
-//! only `psd.png` depends on `psd.csv` being there.
+//! only `psd.png` depends on `psd.csv` being there, `spoofing.png` on a spoofer and `multipath.png` on `truth/rays.csv`.
 
 pub mod canvas;
+mod clock;
+mod delays;
+mod multipath;
 mod position;
 mod signals;
 mod sky;
@@ -15,6 +18,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use crate::analysis::JudgeError;
+use crate::analysis::clock::Clock;
 use crate::analysis::errors::Errors;
 use crate::analysis::load::Run;
 use crate::analysis::summary::Summary;
@@ -23,6 +27,7 @@ use crate::analysis::summary::Summary;
 pub(crate) struct Judged<'a> {
     pub run: &'a Run,
     pub errors: &'a Errors,
+    pub clock: &'a Clock,
     pub summary: &'a Summary,
 }
 
@@ -41,21 +46,25 @@ impl Judged<'_> {
 type Picture = fn(&Path, &Judged<'_>) -> Result<(), JudgeError>;
 
 /// The pictures by their file names.
-const PICTURES: [(&str, Picture); 10] = [
+const PICTURES: [(&str, Picture); 15] = [
     ("psd.png", spectrum::psd),
     ("acquisition.png", spectrum::acquisition),
     ("discriminators.png", signals::discriminators),
     ("cn0.png", signals::cn0),
     ("observables.png", signals::observables),
     ("jitter.png", signals::jitter),
+    ("multipath.png", multipath::multipath),
     ("sky.png", sky::sky),
+    ("delays.png", delays::delays),
     ("position_scatter.png", position::scatter),
     ("position_time.png", position::time),
     ("trajectory.png", position::trajectory),
+    ("clock_bias.png", clock::bias),
+    ("allan.png", clock::stability),
+    ("spoofing.png", position::spoofing),
 ];
 
 /// Draws every picture of a run into its directory.
-pub fn all(directory: &Path, run: &Run, errors: &Errors, summary: &Summary) -> Result<(), JudgeError> {
-    let judged = Judged { run, errors, summary };
-    PICTURES.par_iter().try_for_each(|(name, picture)| picture(&directory.join(name), &judged))
+pub(crate) fn all(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+    PICTURES.par_iter().try_for_each(|(name, picture)| picture(&directory.join(name), judged))
 }

@@ -8,6 +8,7 @@ use crate::analysis::JudgeError;
 use crate::analysis::errors::PositionError;
 use crate::analysis::plot::Judged;
 use crate::analysis::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, Mark, ORANGE, Series, figure};
+use crate::analysis::spoofing;
 use crate::analysis::statistics::percentile;
 use crate::gnss::earth::Geodetic;
 
@@ -66,6 +67,47 @@ pub fn time(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         chart(3, "Clock (speed of light times the error of time)", &|error| error.clock_m),
     ];
     figure(path, (1100, 720), 2, &charts, &[])
+}
+
+/// Where the fixes went between the truth and what a spoofer claims; nothing without one.
+pub fn spoofing(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+    let run = judged.run;
+    let (Some(origin), false) = (run.trajectory.first(), run.claimed.is_empty()) else { return Ok(()) };
+    let origin_m = origin.position_m();
+    let to_enu = Geodetic::from_ecef(&origin_m).ecef_to_enu();
+    let plan = |position_m: Vector3<f64>| {
+        let enu = to_enu * (position_m - origin_m);
+        (enu.x, enu.y)
+    };
+    let series = vec![
+        Series::new("fixes", ORANGE, Mark::Dots, run.fixes.iter().map(|fix| plan(fix.position_m())).collect()),
+        Series::new("claimed", GREEN, Mark::Dash, run.claimed.iter().map(|row| plan(row.position_m())).collect()),
+        Series::new(
+            "truth",
+            BLUE,
+            Mark::Cross,
+            run.trajectory.iter().step_by(50).map(|row| plan(row.position_m())).collect(),
+        ),
+    ];
+    let values =
+        |of: fn(&(f64, f64)) -> f64| series.iter().flat_map(move |one| one.points.iter().map(of)).collect::<Vec<_>>();
+    let east = Axis::around("east of the start (m)", values(|p| p.0).into_iter(), 2.0);
+    let north = Axis::around("north of the start (m)", values(|p| p.1).into_iter(), 2.0);
+    let moved = spoofing::moved(run);
+    let distance = |name: &str, colour, mark, of: fn(&spoofing::Moved) -> f64| {
+        Series::new(name, colour, mark, moved.iter().map(|fix| (fix.time_s, of(fix))).collect())
+    };
+    let distances = vec![
+        distance("fix from truth", ORANGE, Mark::Dots, |fix| fix.from_truth_m),
+        distance("claim from truth", GREEN, Mark::Dash, |fix| fix.claim_from_truth_m),
+        distance("fix from claim", COLOURS[3], Mark::Line, |fix| fix.from_claim_m),
+    ];
+    let y = Axis::around("distance (m)", distances.iter().flat_map(|one| one.points.iter().map(|p| p.1)), 1.0);
+    let x = judged.time_axis(moved.iter().map(|fix| fix.time_s));
+    let legend = [series.clone(), distances.clone()].concat();
+    let mut plan = Chart::new("Plan view", east, north, series);
+    plan.equal = true;
+    figure(path, (1300, 560), 2, &[plan, Chart::new("While the spoofer is on", x, y, distances)], &legend)
 }
 
 /// The way in plan and its height over time, as it was and as found.

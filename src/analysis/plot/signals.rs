@@ -9,10 +9,16 @@ use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREY, Mark, ORANGE, Serie
 use crate::analysis::statistics::{percentile, std};
 use crate::gnss::record::TrackingRow;
 
-type Points = Vec<(f64, f64)>;
+pub(super) type Points = Vec<(f64, f64)>;
 
 /// One chart of something over time with a series a satellite.
-fn over_time(judged: &Judged<'_>, title: &str, y_label: &str, least: f64, data: &[(String, Points)]) -> Chart {
+pub(super) fn over_time(
+    judged: &Judged<'_>,
+    title: &str,
+    y_label: &str,
+    least: f64,
+    data: &[(String, Points)],
+) -> Chart {
     let values: Vec<f64> = data.iter().flat_map(|(_, points)| points.iter().map(|point| point.1)).collect();
     // Pull-in may be far outside; the axis shows what holds most of the time.
     let [low, high] = [0.002, 0.998].map(|p| percentile(&values, p).unwrap_or(0.0));
@@ -29,7 +35,7 @@ fn over_time(judged: &Judged<'_>, title: &str, y_label: &str, least: f64, data: 
     Chart::new(title, x, y, series)
 }
 
-fn legend(names: impl Iterator<Item = String>) -> Vec<Series> {
+pub(super) fn legend(names: impl Iterator<Item = String>) -> Vec<Series> {
     names.enumerate().map(|(index, name)| Series::numbered(name, index, Vec::new())).collect()
 }
 
@@ -60,7 +66,7 @@ pub fn discriminators(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError
     figure(path, (1100, 900), 1, &charts, &legend(links.iter().map(|link| link.0.to_string())))
 }
 
-fn per_satellite(judged: &Judged<'_>, of: impl Fn(&SignalError) -> f64) -> Vec<(String, Points)> {
+pub(super) fn per_satellite(judged: &Judged<'_>, of: impl Fn(&SignalError) -> f64) -> Vec<(String, Points)> {
     let points = |rows: &[SignalError]| rows.iter().map(|row| (row.time_s, of(row))).collect();
     judged.errors.signals.iter().map(|((sv, _), rows)| (sv.to_string(), points(rows))).collect()
 }
@@ -72,8 +78,15 @@ fn satellites(judged: &Judged<'_>) -> Vec<Series> {
 /// C/N0 over time as measured and as it was, and the means side by side.
 pub fn cn0(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let measured = per_satellite(judged, |row| row.cn0_dbhz);
-    let mut chart = over_time(judged, "C/N0 as measured (points) and as set (lines)", "C/N0 (dB-Hz)", 4.0, &measured);
-    let truth = per_satellite(judged, |row| row.cn0_true_dbhz);
+    // Under interference what is expected is far from what is set.
+    let (word, reference): (&str, fn(&SignalError) -> f64) = if judged.summary.jammed {
+        ("expected", |row| row.cn0_effective_dbhz)
+    } else {
+        ("set", |row| row.cn0_true_dbhz)
+    };
+    let title = format!("C/N0 as measured (points) and as {word} (lines)");
+    let mut chart = over_time(judged, &title, "C/N0 (dB-Hz)", 4.0, &measured);
+    let truth = per_satellite(judged, reference);
     let all = measured.iter().chain(&truth).flat_map(|(_, points)| points.iter().map(|point| point.1));
     chart.y = Axis::around("C/N0 (dB-Hz)", all, 4.0);
     for (index, (name, points)) in truth.into_iter().enumerate() {
@@ -81,8 +94,8 @@ pub fn cn0(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         line.mark = Mark::Line;
         chart.series.push(line);
     }
-    let difference = per_satellite(judged, |row| row.cn0_dbhz - row.cn0_true_dbhz);
-    let below = over_time(judged, "C/N0 measured minus set", "difference (dB)", 1.0, &difference);
+    let difference = per_satellite(judged, |row| row.cn0_dbhz - reference(row));
+    let below = over_time(judged, &format!("C/N0 measured minus {word}"), "difference (dB)", 1.0, &difference);
     figure(path, (1100, 800), 1, &[chart, below], &satellites(judged))
 }
 

@@ -36,6 +36,7 @@ pub fn sky(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let high = strengths.values().copied().fold(f64::NEG_INFINITY, f64::max).ceil();
     let (low, high) = if low < high { (low, high) } else { (30.0, 50.0) };
     render(path, (WIDTH_PX as u32, HEIGHT_PX as u32), |area| {
+        obstructed(area, &judged.run.scene.skyline_deg)?;
         frame(area)?;
         scale(area, low, high)?;
         // Names keep clear of the dots, the tracks and each other.
@@ -57,9 +58,22 @@ pub fn sky(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
             label(area, sv, end, &mut taken)?;
         }
         let note = anchored(12, HPos::Left, VPos::Center);
-        area.draw(&Text::new("filled: observed by the receiver", (14 * FINE, (HEIGHT_PX - 16) * FINE), note))?;
+        let shaded = if judged.run.scene.skyline_deg.is_empty() { "" } else { "; shaded: obstructed at the start" };
+        area.draw(&Text::new(
+            format!("filled: observed by the receiver{shaded}"),
+            (14 * FINE, (HEIGHT_PX - 16) * FINE),
+            note,
+        ))?;
         Ok(())
     })
+}
+
+/// Shades what lies between the horizon and the skyline.
+fn obstructed(area: &Area<'_>, skyline_deg: &[[f64; 2]]) -> Result<(), Failure> {
+    let skyline = skyline_deg.iter().map(|[azimuth_deg, elevation_deg]| place(*azimuth_deg, *elevation_deg));
+    let rim = skyline_deg.iter().rev().map(|[azimuth_deg, _]| place(*azimuth_deg, 0.0));
+    area.draw(&Polygon::new(skyline.chain(rim).collect::<Vec<_>>(), RGBColor(226, 222, 214).filled()))?;
+    Ok(())
 }
 
 /// Writes a satellite's name beside its dot, on the first side where nothing else is.

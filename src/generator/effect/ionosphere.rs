@@ -35,15 +35,18 @@ impl KlobucharIonosphere {
     /// continuously differentiable in time wherever the printed model's limits on φ, AMP and PER do not act.
     pub fn delay_s(&self, user: Geodetic, look: Look, at: Epoch, carrier_hz: f64) -> f64 {
         let bulge = self.model.bulge(user, look, at);
-        let below = 1.0 - smooth((user.height_m - SHELL_M) / (TOP_M - SHELL_M));
         let scale = L1_HZ / carrier_hz;
-        bulge.obliquity * (NIGHT_S + day_s(&bulge)) * scale * scale * below
+        bulge.obliquity * (NIGHT_S + day_s(&bulge)) * scale * scale * share_above(user.height_m)
     }
 }
 
 impl Effect for KlobucharIonosphere {
     fn name(&self) -> &'static str {
         "ionosphere"
+    }
+
+    fn describe(&self) -> String {
+        "Klobuchar's model: code delayed, carrier advanced".to_owned()
     }
 
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
@@ -53,6 +56,11 @@ impl Effect for KlobucharIonosphere {
             ray.carrier_delay_s -= delay_s;
         }
     }
+}
+
+/// How much of the ionosphere lies above a height, from 1 on the ground to 0 at its top.
+pub(crate) fn share_above(height_m: f64) -> f64 {
+    1.0 - smooth((height_m - SHELL_M) / (TOP_M - SHELL_M))
 }
 
 /// The bulge at its local time, with the neighbouring day's mixed in around midnight.

@@ -1,64 +1,32 @@
 //! Carrier power over noise density: a link budget from transmitter to receiver, or a fixed value.
 //!
-//! C/N0 = P_t + G_t(off-nadir) − 20 lg(4πRf/c) − L_a + G_r(elevation) − N0 − L_i, in dB. The transmit
-//! pattern is that of a shaped GPS L1 beam (Kaplan & Hegarty; beyond the Earth's edge at 13.9° the mean
-//! Block IIR pattern falls away likewise), the receive pattern that of a patch above a ground plane. Patterns
-//! are typical, not those of one satellite or antenna.
+//! C/N0 = P_t + G_t(off-nadir) − 20 lg(4πRf/c) − L_a + G_r(direction) − N0 − L_i, in dB (Friis). Transmit patterns
+//! are means of a block of satellites, as published, or that of a typical shaped L1 beam (Kaplan & Hegarty; beyond the
+//! Earth's edge at 13.9° it falls away as the mean of Block IIR). Limits: patterns are means over azimuth, not those of
+//! one satellite; beyond their last angle they keep its gain.
 
+use super::antenna::{Antenna, Curve, Pattern, gain_db};
+use super::transmit::Block;
 use crate::generator::ray::{Effect, Ray, Sight};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 
-/// Gain over angle (degrees, ascending), linear between the points and constant outside.
-type Pattern = [(f64, f64)];
-
-/// Transmit gain over off-nadir angle, dBi.
-const TRANSMIT: [(f64, f64); 13] = [
-    (0.0, 12.1),
-    (4.0, 12.7),
-    (8.0, 13.8),
-    (10.0, 14.2),
-    (12.0, 13.9),
-    (13.8, 13.2),
-    (13.9, 13.2),
-    (16.0, 10.5),
-    (18.0, 6.5),
-    (20.0, -0.5),
-    (22.0, -10.0),
-    (26.0, -2.0),
-    (30.0, -1.5),
-];
-/// Receive gain of a patch over elevation, dBic.
-const PATCH: [(f64, f64); 11] = [
-    (-90.0, -15.0),
-    (-10.0, -8.0),
-    (0.0, -5.0),
-    (5.0, -4.0),
-    (10.0, -2.5),
-    (20.0, -0.5),
-    (30.0, 1.0),
-    (45.0, 2.8),
-    (60.0, 4.0),
-    (75.0, 4.8),
-    (90.0, 5.0),
-];
 /// k·T0 in dBW/Hz as the budget rounds it: a matched source at 290 K gives −203.98.
 const REFERENCE_NOISE_DBWHZ: f64 = -204.0;
 
-/// How a receiving antenna hears over elevation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Antenna {
-    /// 0 dBic everywhere.
-    Isotropic,
-    /// A patch: 5 dBic at the zenith, −4 dBic at 5°.
-    Patch,
-}
+/// Height of a GPS orbit's lowest point: 26 560 km less 2 % (plausible eccentricities) less the Earth's radius.
+const ZENITH_RANGE_M: f64 = 1.965e7;
 
 /// A link budget; [`LinkBudget::default`] is a GPS L1 C/A satellite and an ordinary receiver.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct LinkBudget {
     /// Power into the satellite's antenna, dBW.
     pub transmit_dbw: f64,
+    /// The satellites' block …
+    pub block: Block,
+    /// … and those that have one of their own.
+    pub blocks: Vec<(Sv, Block)>,
     /// Atmospheric and polarisation losses.
     pub path_loss_db: f64,
     pub antenna: Antenna,
@@ -74,8 +42,10 @@ impl Default for LinkBudget {
     fn default() -> Self {
         Self {
             transmit_dbw: 14.3,
+            block: Block::Typical,
+            blocks: Vec::new(),
             path_loss_db: 0.5,
-            antenna: Antenna::Patch,
+            antenna: Antenna::level(Pattern::Patch),
             noise_figure_db: 2.5,
             implementation_loss_db: 2.0,
             extra_loss_db: 0.0,
@@ -86,18 +56,38 @@ impl Default for LinkBudget {
 impl LinkBudget {
     /// C/N0 in dB-Hz along `sight` on `carrier_hz`.
     pub fn cn0_dbhz(&self, sight: &Sight, carrier_hz: f64) -> f64 {
-        let spreading = 4.0 * std::f64::consts::PI * sight.range_m * carrier_hz / SPEED_OF_LIGHT_MPS;
-        let received_dbw = self.transmit_dbw + gain_db(&TRANSMIT, sight.off_nadir_rad.to_degrees())
-            - 20.0 * libm::log10(spreading)
-            - self.path_loss_db;
-        let receive_db = match self.antenna {
-            Antenna::Isotropic => 0.0,
-            Antenna::Patch => gain_db(&PATCH, sight.look.elevation_rad.to_degrees()),
-        };
-        received_dbw + receive_db
-            - (REFERENCE_NOISE_DBWHZ + self.noise_figure_db)
-            - self.implementation_loss_db
-            - self.extra_loss_db
+        self.budget(sight, carrier_hz).0
+    }
+
+    /// What no C/N0 on the Earth's surface exceeds with a receiving antenna of `peak_dbic`: the best of both patterns at
+    /// once, from a satellite at the zenith.
+    pub fn strongest_dbhz(&self, peak_dbic: f64, carrier_hz: f64) -> f64 {
+        let blocks = self.blocks.iter().map(|(_, block)| block.peak_dbi());
+        let transmit_db = blocks.fold(self.block.peak_dbi(), f64::max);
+        self.over_noise_dbhz(self.incident_dbw(transmit_db, ZENITH_RANGE_M, carrier_hz) + peak_dbic)
+    }
+
+    /// C/N0 in dB-Hz and the receiving antenna's phase in cycles.
+    fn budget(&self, sight: &Sight, carrier_hz: f64) -> (f64, f64) {
+        let transmit_db = gain_db(self.transmit(sight.sv), sight.off_nadir_rad.to_degrees());
+        let (receive_db, phase_cycles) = self.antenna.response(sight);
+        let received_dbw = self.incident_dbw(transmit_db, sight.range_m, carrier_hz);
+        (self.over_noise_dbhz(received_dbw + receive_db), phase_cycles)
+    }
+
+    /// Power into an isotropic antenna at a range.
+    fn incident_dbw(&self, transmit_db: f64, range_m: f64, carrier_hz: f64) -> f64 {
+        let spreading = 4.0 * std::f64::consts::PI * range_m * carrier_hz / SPEED_OF_LIGHT_MPS;
+        self.transmit_dbw + transmit_db - 20.0 * libm::log10(spreading) - self.path_loss_db
+    }
+
+    /// Power at the antenna's port over the noise density, in dB-Hz.
+    pub fn over_noise_dbhz(&self, received_dbw: f64) -> f64 {
+        received_dbw - (REFERENCE_NOISE_DBWHZ + self.noise_figure_db) - self.implementation_loss_db - self.extra_loss_db
+    }
+
+    fn transmit(&self, sv: Sv) -> &'static Curve {
+        self.blocks.iter().find(|(own, _)| *own == sv).map_or(self.block, |(_, block)| *block).gain_dbi()
     }
 }
 
@@ -106,9 +96,25 @@ impl Effect for LinkBudget {
         "link_budget"
     }
 
-    /// Sets the power of every ray to that of the direct one.
+    fn describe(&self) -> String {
+        let blocks = match (self.block, self.blocks.is_empty()) {
+            (_, false) => ", transmit patterns by block".to_owned(),
+            (Block::Typical, true) => String::new(),
+            (block, true) => format!(", transmit pattern of block {block:?}"),
+        };
+        format!(
+            "{}, noise figure {} dB, losses {} dB{blocks}",
+            self.antenna.pattern, self.noise_figure_db, self.extra_loss_db
+        )
+    }
+
+    /// Sets the power of every ray to that of the direct one, and adds the antenna's phase.
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
-        set_all(rays, self.cn0_dbhz(sight, signal.carrier_hz));
+        let (cn0_dbhz, phase_cycles) = self.budget(sight, signal.carrier_hz);
+        set_all(rays, cn0_dbhz);
+        for ray in rays {
+            ray.phase_cycles += phase_cycles;
+        }
     }
 }
 
@@ -123,6 +129,10 @@ impl Effect for FixedCn0 {
         "fixed_cn0"
     }
 
+    fn describe(&self) -> String {
+        format!("{} dB-Hz for every satellite", self.cn0_dbhz)
+    }
+
     /// Sets the power of every ray.
     fn act(&self, _sight: &Sight, _signal: &Signal, rays: &mut Vec<Ray>) {
         set_all(rays, self.cn0_dbhz);
@@ -133,16 +143,6 @@ fn set_all(rays: &mut [Ray], cn0_dbhz: f64) {
     let cn0_hz = libm::pow(10.0, cn0_dbhz / 10.0);
     for ray in rays {
         ray.cn0_hz = cn0_hz;
-    }
-}
-
-fn gain_db(pattern: &Pattern, angle_deg: f64) -> f64 {
-    let right = pattern.partition_point(|(angle, _)| *angle <= angle_deg);
-    let left = right.checked_sub(1).and_then(|i| pattern.get(i));
-    match (left, pattern.get(right)) {
-        (Some((a, low)), Some((b, high))) => low + (high - low) * (angle_deg - a) / (b - a),
-        (Some((_, gain)), None) | (None, Some((_, gain))) => *gain,
-        (None, None) => 0.0,
     }
 }
 
@@ -201,7 +201,7 @@ pub(crate) mod tests {
     fn the_power_on_the_ground_keeps_the_documents_minimum() {
         // IS-GPS-200N, table 3-Va: −158.5 dBW into a 3 dBi linearly polarised antenna above 5°, here 0 dBic.
         for elevation in [5.0, 45.0, 90.0] {
-            let budget = LinkBudget { antenna: Antenna::Isotropic, ..LinkBudget::default() };
+            let budget = LinkBudget { antenna: Antenna::level(Pattern::Isotropic), ..LinkBudget::default() };
             let received_dbw = budget.cn0_dbhz(&sight(elevation, 0.0), L1_CA.carrier_hz) - 204.0 + 2.5 + 2.0;
             assert!((-158.5..-154.0).contains(&received_dbw), "{elevation}: {received_dbw}");
         }

@@ -1,5 +1,12 @@
 //! What nature and hardware do to the rays of a satellite, one file a cause.
 
+pub mod antenna;
 pub mod ionosphere;
 pub mod link;
+pub mod mapping;
+pub mod multipath;
+pub mod obstruction;
+pub mod tec;
+pub mod transmit;
 pub mod troposphere;
+pub mod wind_up;

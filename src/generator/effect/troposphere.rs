@@ -1,26 +1,27 @@
-//! The neutral atmosphere: zenith delays after Saastamoinen, brought to the line of sight by Niell's mapping functions.
+//! The neutral atmosphere: hydrostatic and wet zenith delays, each brought to the line of sight by its mapping function.
 //!
-//! Sources: Davis et al. 1985 (hydrostatic, with Saastamoinen's gravity term), Saastamoinen 1972 (wet),
-//! Niell 1996 (NMF), the Magnus formula with 237.3 °C. Weather below the tropopause follows the standard
-//! atmosphere from a reference height. Limits: elevations below [`LOWEST_RAD`] take its mapping, where
-//! the continued fractions still make sense; above 44.3 km the pressure, and so the delay, is zero.
+//! Sources: Davis et al. 1985 (hydrostatic, with Saastamoinen's gravity term), Saastamoinen 1972 (wet), the Magnus
+//! formula with 237.3 °C; mapping functions are in [`super::mapping`]. Weather is the scene's, which follows the
+//! standard atmosphere from a reference height, or GPT3's by place and season with the wet delay of Askne & Nordius
+//! 1987. Limits: above 44.3 km the pressure of the standard atmosphere, and so the delay, is zero; GPT3's fades there.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
-
+use crate::generator::effect::ionosphere::smooth;
+use crate::generator::effect::mapping::{Mapping, season_day};
 use crate::generator::ray::{Effect, Ray, Sight};
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
+use crate::gnss::vienna::{self, Gpt3};
 
-/// Elevation below which the mapping no longer grows: 1°. NMF was fitted from 3° up.
-pub const LOWEST_RAD: f64 = PI / 180.0;
 /// Standard atmosphere: relative loss of pressure base per metre, exponent, lapse rate (ICAO Doc 7488).
 const PRESSURE_LAPSE_PM: f64 = 2.2557e-5;
 const PRESSURE_EXPONENT: f64 = 5.2568;
 const TEMPERATURE_LAPSE_KPM: f64 = 6.5e-3;
 const TROPOPAUSE_M: f64 = 11_000.0;
 const CELSIUS_K: f64 = 273.15;
-const YEAR_DAYS: f64 = 365.25;
+/// Heights between which what GPT3 says fades away: its own decay leaves 0.4 % of the delay there.
+const FADE_M: f64 = 40e3;
+const TOP_M: f64 = 50e3;
 
 /// Weather at a height, from which that at every other height follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,82 +72,66 @@ pub fn zenith_wet_m(temperature_k: f64, vapour_hpa: f64) -> f64 {
     0.002_277 * (1255.0 / temperature_k + 0.05) * vapour_hpa
 }
 
-/// Niell's hydrostatic and wet mapping factors at an elevation, by place and day of year (from 1.0).
-///
-/// Niell 1996, equations 4 to 6 and tables 3 and 4; the factors hold still below [`LOWEST_RAD`].
-pub fn niell(user: Geodetic, elevation_rad: f64, day_of_year: f64) -> (f64, f64) {
-    let sin = libm::sin(elevation_rad.clamp(LOWEST_RAD, FRAC_PI_2));
-    let south_days = if user.latitude_rad < 0.0 { YEAR_DAYS / 2.0 } else { 0.0 };
-    let season = libm::cos(TAU * (day_of_year - 28.0 + south_days) / YEAR_DAYS);
-    let latitude_deg = user.latitude_rad.abs().to_degrees();
-    let dry = [0, 1, 2].map(|k| {
-        interpolate(&HYDROSTATIC_AVERAGE[k], latitude_deg)
-            - interpolate(&HYDROSTATIC_AMPLITUDE[k], latitude_deg) * season
-    });
-    let wet = [0, 1, 2].map(|k| interpolate(&WET[k], latitude_deg));
-    let height_correction = (1.0 / sin - herring(sin, HEIGHT)) * user.height_m * 1e-3;
-    (herring(sin, dry) + height_correction, herring(sin, wet))
+/// Where pressure, temperature and humidity come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Air {
+    /// One weather, and the standard atmosphere's change with height.
+    Weather(Weather),
+    /// A climatology by place and season.
+    Gpt3(Box<Gpt3>),
 }
 
-/// Columns are latitudes 15°, 30°, 45°, 60°, 75°; rows a, b, c.
-const HYDROSTATIC_AVERAGE: [[f64; 5]; 3] = [
-    [1.2769934e-3, 1.2683230e-3, 1.2465397e-3, 1.2196049e-3, 1.2045996e-3],
-    [2.9153695e-3, 2.9152299e-3, 2.9288445e-3, 2.9022565e-3, 2.9024912e-3],
-    [62.610505e-3, 62.837393e-3, 63.721774e-3, 63.824265e-3, 64.258455e-3],
-];
-const HYDROSTATIC_AMPLITUDE: [[f64; 5]; 3] = [
-    [0.0, 1.2709626e-5, 2.6523662e-5, 3.4000452e-5, 4.1202191e-5],
-    [0.0, 2.1414979e-5, 3.0160779e-5, 7.2562722e-5, 11.723375e-5],
-    [0.0, 9.0128400e-5, 4.3497037e-5, 84.795348e-5, 170.37206e-5],
-];
-const WET: [[f64; 5]; 3] = [
-    [5.8021897e-4, 5.6794847e-4, 5.8118019e-4, 5.9727542e-4, 6.1641693e-4],
-    [1.4275268e-3, 1.5138625e-3, 1.4572752e-3, 1.5007428e-3, 1.7599082e-3],
-    [4.3472961e-2, 4.6729510e-2, 4.3908931e-2, 4.4626982e-2, 5.4736038e-2],
-];
-const HEIGHT: [f64; 3] = [2.53e-5, 5.49e-3, 1.14e-3];
+/// Zenith delays × mapping functions, the same for code and carrier.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Troposphere {
+    pub air: Air,
+    pub mapping: Mapping,
+}
 
-fn interpolate(row: &[f64; 5], latitude_deg: f64) -> f64 {
-    let place = ((latitude_deg - 15.0) / 15.0).clamp(0.0, 4.0);
-    let left = (place as usize).min(3);
-    let share = place - left as f64;
-    match (row.get(left), row.get(left + 1)) {
-        (Some(a), Some(b)) => a * (1.0 - share) + b * share,
-        _ => f64::NAN,
+impl Troposphere {
+    /// Hydrostatic and wet zenith delays in metres.
+    pub fn zenith_m(&self, user: Geodetic, at: Epoch) -> (f64, f64) {
+        match &self.air {
+            Air::Weather(weather) => {
+                let (pressure_hpa, temperature_k, vapour_hpa) = weather.at(user.height_m);
+                if pressure_hpa <= 0.0 {
+                    return (0.0, 0.0);
+                }
+                (zenith_hydrostatic_m(user, pressure_hpa), zenith_wet_m(temperature_k, vapour_hpa))
+            }
+            Air::Gpt3(gpt3) => {
+                let weather = gpt3.at(user.latitude_rad, user.longitude_rad, user.height_m, season_day(at));
+                let left = 1.0 - smooth((user.height_m - FADE_M) / (TOP_M - FADE_M));
+                (zenith_hydrostatic_m(user, weather.pressure_hpa) * left, vienna::zenith_wet_m(&weather) * left)
+            }
+        }
     }
-}
 
-fn herring(sin: f64, [a, b, c]: [f64; 3]) -> f64 {
-    (1.0 + a / (1.0 + b / (1.0 + c))) / (sin + a / (sin + b / (sin + c)))
-}
-
-/// Days into a mean year, 1.0 on the first of January of 1980. Within 0.8 days of the calendar, and
-/// without its step at the turn of the year.
-fn season_day(at: Epoch) -> f64 {
-    (at.seconds() as f64 / 86_400.0 + 6.0).rem_euclid(YEAR_DAYS)
-}
-
-/// Saastamoinen's zenith delays × Niell's mapping functions, the same for code and carrier.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Saastamoinen {
-    pub weather: Weather,
-}
-
-impl Saastamoinen {
     /// Slant delay in metres.
     pub fn delay_m(&self, user: Geodetic, elevation_rad: f64, at: Epoch) -> f64 {
-        let (pressure_hpa, temperature_k, vapour_hpa) = self.weather.at(user.height_m);
-        if pressure_hpa <= 0.0 {
+        let (zenith_hydrostatic_m, zenith_wet_m) = self.zenith_m(user, at);
+        if zenith_hydrostatic_m <= 0.0 {
             return 0.0;
         }
-        let (hydrostatic, wet) = niell(user, elevation_rad, season_day(at));
-        hydrostatic * zenith_hydrostatic_m(user, pressure_hpa) + wet * zenith_wet_m(temperature_k, vapour_hpa)
+        let (hydrostatic, wet) = self.mapping.factors(user, elevation_rad, at);
+        hydrostatic * zenith_hydrostatic_m + wet * zenith_wet_m
     }
 }
 
-impl Effect for Saastamoinen {
+impl Effect for Troposphere {
     fn name(&self) -> &'static str {
         "troposphere"
+    }
+
+    fn describe(&self) -> String {
+        let mapping = self.mapping.describe();
+        match &self.air {
+            Air::Weather(weather) => format!(
+                "Saastamoinen: {} hPa, {:.2} K, humidity {}, at {} m; {mapping}",
+                weather.pressure_hpa, weather.temperature_k, weather.relative_humidity, weather.height_m
+            ),
+            Air::Gpt3(_) => format!("Saastamoinen with GPT3's pressure and vapour; {mapping}"),
+        }
     }
 
     fn act(&self, sight: &Sight, _signal: &Signal, rays: &mut Vec<Ray>) {
@@ -181,23 +166,8 @@ mod tests {
     }
 
     #[test]
-    fn mapping_factors_are_those_of_an_independent_program() {
-        let cases = [
-            (28.0, 45.0, 0.0, 5.0, 10.151_761_745, 10.750_884_210),
-            (210.5, 26.5, 130.0, 10.0, 5.546_867_982, 5.658_966_023),
-            (100.0, -33.0, 2000.0, 15.0, 3.801_567_919, 3.833_858_129),
-            (200.0, 80.0, 0.0, 3.0, 14.653_174_860, 16.323_500_496),
-        ];
-        for (day, latitude, height_m, elevation, dry, wet) in cases {
-            let user = Geodetic::from_degrees(latitude, 0.0, height_m);
-            let found = niell(user, f64::to_radians(elevation), day);
-            assert!((found.0 - dry).abs() < 1e-8 && (found.1 - wet).abs() < 1e-8, "{found:?} {dry} {wet}");
-        }
-    }
-
-    #[test]
     fn the_delay_falls_with_height_and_elevation_and_never_leaves_reason() {
-        let model = Saastamoinen { weather: Weather::STANDARD };
+        let model = Troposphere { air: Air::Weather(Weather::STANDARD), mapping: Mapping::Niell };
         let at = Epoch::from_week(1590, 0.0);
         let delay = |height_m: f64, elevation: f64| {
             model.delay_m(Geodetic::from_degrees(26.5, 80.2, height_m), f64::to_radians(elevation), at)
@@ -214,16 +184,6 @@ mod tests {
             let now = delay(100.0, elevation);
             assert!(now > 2.3 && now <= before && now < 70.0, "{elevation}: {now}");
             before = now;
-        }
-    }
-
-    #[test]
-    fn the_season_stays_near_the_calendar_and_takes_no_step() {
-        for text in ["1980-01-06T00:00:00", "2010-07-01T00:00:00", "2026-12-31T12:00:00", "2100-01-01T00:00:00"] {
-            let at = Epoch::parse(text).unwrap();
-            let apart = season_day(at) - at.day_of_year();
-            // Quarter days of leap years, and the day that 2100 lacks.
-            assert!(apart.abs() < 1.8 || apart.abs() > YEAR_DAYS - 1.8, "{text}: {apart}");
         }
     }
 }

@@ -5,12 +5,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::motion::{FileKind, MotionSpec};
-use super::{Scenario, ScenarioError, parts};
-use crate::generator::scene::Scene;
+use super::stages::PlaybackSpec;
+use super::{Scenario, ScenarioError, hostile, parts};
+use crate::generator::random::Stream;
+use crate::generator::ray::Ray;
+use crate::generator::ripple::scintillation::Scintillation;
+use crate::generator::scene::{Scene, is_outside, main_lobe_hz};
 use crate::generator::sky::emission;
+use crate::generator::stage::playback::Playback;
+use crate::generator::vehicle::attitude::Nose;
 use crate::generator::vehicle::{Trajectory, file, route};
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::samples::{Format, IfMetadata};
+use crate::gnss::signal::Signal;
 use crate::gnss::time::SampleClock;
 
 /// Samples of one scene at most: 19 days at 60 Msps.
@@ -27,6 +34,12 @@ pub struct Overrides {
     pub allow_outside: bool,
 }
 
+/// Where a scenario's files are.
+pub(super) struct Files<'a> {
+    pub directory: &'a Path,
+    pub overrides: &'a Overrides,
+}
+
 impl Scenario {
     /// Makes the scene, reading files relative to `directory`; also returns what the user should know of.
     pub fn compose(&self, directory: &Path, overrides: &Overrides) -> Result<(Scene, Vec<String>), ScenarioError> {
@@ -34,33 +47,59 @@ impl Scenario {
         let metadata = self.metadata(overrides)?;
         let clock = SampleClock { start: self.start, rate: metadata.rate };
         let samples = self.samples()?;
-        let trajectory = self.trajectory(directory, overrides, &mut warnings)?;
-        let end_s = self.receiver_clock.true_elapsed_s(self.start, clock.epoch(samples));
-        self.covers(&trajectory, end_s)?;
-        self.check_band(&metadata, &mut warnings);
+        let trajectory = self.turned(self.trajectory_of(&self.motion, directory, overrides, &mut warnings)?)?;
+        let seed = overrides.seed.unwrap_or(self.seed);
+        let receiver_clock = self.receiver_clock.clock(seed, metadata.rate, &trajectory);
+        let end_s = receiver_clock.true_elapsed_s(self.start, clock.epoch(samples));
+        let start_s = receiver_clock.true_elapsed_s(self.start, self.start);
+        // A file that begins at the scene's start must do with a receiver's clock that is ahead by its bias.
+        self.covers(&self.motion, &trajectory, start_s.max(0.0), end_s.min(self.duration_s))?;
+        let signals = self.signals_in_band(&metadata, &mut warnings)?;
         let navigation = parts::navigation(self, directory, overrides, &mut warnings)?;
         let sky = parts::sky(self, &navigation, end_s, &mut warnings)?;
-        let effects = parts::effects(self, &navigation)?;
-        let scene = Scene {
+        let files = Files { directory, overrides };
+        let effects = parts::effects(self, &files, &navigation, (&sky, &trajectory), end_s)?;
+        let noise_lsb = self.front_end.noise_lsb.unwrap_or_else(|| default_noise_lsb(metadata.format));
+        let front_end = self.stages.front_end(&self.front_end, metadata.format, seed, noise_lsb);
+        let mut scene = Scene {
             name: self.name.clone(),
-            seed: overrides.seed.unwrap_or(self.seed),
+            seed,
             samples,
             clock,
-            receiver_clock: self.receiver_clock,
+            receiver_clock,
             trajectory,
             catalogue: Arc::new(sky.catalogue),
             broadcast: Arc::new(sky.broadcast),
-            signals: self.signals.clone(),
+            signals,
             excluded: sky.excluded,
             mask_rad: self.mask_rad,
             effects,
+            scintillation: self
+                .scintillation
+                .clone()
+                .filter(|strength| strength.is_felt())
+                .map(|strength| Scintillation::new(strength, metadata.rate, Stream::new(seed, "scintillation"))),
+            playback: None,
+            interference: Vec::new(),
+            spoofers: Vec::new(),
             noise: self.noise,
-            noise_lsb: self.front_end.noise_lsb.unwrap_or_else(|| default_noise_lsb(metadata.format)),
+            front_end: front_end.map_err(|reason| self.conflict("filter.bandwidth_hz", reason))?,
+            noise_lsb,
             fidelity: self.fidelity,
             truth_interval_s: self.truth_interval_s,
             metadata,
         };
-        let visible = visible_at_start(&scene).map_err(|e| self.conflict("navigation.file", e.to_string()))?;
+        scene.interference = hostile::interferers(self, &scene, directory, overrides, &mut warnings)?;
+        scene.spoofers = hostile::spoofers(self, &scene, end_s, directory, overrides, &mut warnings)?;
+        let (visible, signals_lsb) = at_start(&scene).map_err(|e| self.conflict("navigation.file", e.to_string()))?;
+        if let Some(PlaybackSpec { bits, load_sigma, attenuation_db }) = self.stages.playback {
+            let step_lsb = signals_lsb * 2.0 * load_sigma / libm::exp2(f64::from(bits));
+            if signals_lsb == 0.0 {
+                let reason = "no satellite is above the mask at the start: there is nothing to set its level by";
+                return Err(self.conflict("playback", reason.to_owned()));
+            }
+            scene.playback = Some(Playback { bits, step_lsb: step_lsb as f32, attenuation_db });
+        }
         if visible < 4 {
             let mask_deg = self.mask_rad.to_degrees();
             warnings.push(format!(
@@ -105,33 +144,56 @@ impl Scenario {
         Ok(samples as u64)
     }
 
-    /// Warns when a signal's main lobe does not fit into the band of the samples.
-    fn check_band(&self, metadata: &IfMetadata, warnings: &mut Vec<String>) {
+    /// The signals whose main lobe reaches into the band of the samples; warns when one does not fit as a whole.
+    fn signals_in_band(
+        &self,
+        metadata: &IfMetadata,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<&'static Signal>, ScenarioError> {
         let half = 0.5 * metadata.rate.hz();
-        for signal in &self.signals {
-            let if_hz = metadata.if_hz(signal);
-            let lobe_hz = signal.components.iter().fold(0.0_f64, |lobe, c| lobe.max(c.chip_rate_hz));
-            let (low, high) = if metadata.format.is_complex() { (-half, half) } else { (0.0, half) };
-            if if_hz - lobe_hz < low || if_hz + lobe_hz > high {
-                warnings.push(format!(
-                    "{signal}: its main lobe, {:.3} to {:.3} MHz, does not fit into the samples' band, {:.3} to {:.3} MHz: it will fold over",
-                    (if_hz - lobe_hz) / 1e6,
-                    (if_hz + lobe_hz) / 1e6,
-                    low / 1e6,
-                    high / 1e6
-                ));
+        let (low, high) = if metadata.format.is_complex() { (-half, half) } else { (0.0, half) };
+        let mut inside = Vec::new();
+        for &signal in &self.signals {
+            let (from, to) = main_lobe_hz(metadata, signal);
+            let told = format!(
+                "{signal}: its main lobe, {:.3} to {:.3} MHz, does not fit into the samples' band, {:.3} to {:.3} MHz",
+                from / 1e6,
+                to / 1e6,
+                low / 1e6,
+                high / 1e6
+            );
+            if is_outside(metadata, signal) {
+                warnings.push(format!("{told} at all: it is not computed"));
+                continue;
             }
+            if from < low || to > high {
+                warnings.push(format!("{told}: it will fold over"));
+            }
+            inside.push(signal);
         }
+        if inside.is_empty() {
+            let names: Vec<&str> = self.signals.iter().map(|signal| signal.name).collect();
+            let reason = format!(
+                "{} Hz: expected one at which the main lobe of some signal ({}) reaches into the samples' band, {:.3} to {:.3} MHz",
+                self.front_end.if_hz,
+                names.join(", "),
+                low / 1e6,
+                high / 1e6
+            );
+            return Err(self.conflict("front_end.if_hz", reason));
+        }
+        Ok(inside)
     }
 
-    /// The motion, with its file read.
-    fn trajectory(
+    /// A motion, with its file read.
+    pub(super) fn trajectory_of(
         &self,
+        motion: &MotionSpec,
         directory: &Path,
         overrides: &Overrides,
         warnings: &mut Vec<String>,
     ) -> Result<Trajectory, ScenarioError> {
-        match &self.motion {
+        match motion {
             MotionSpec::Static(place) => Ok(Trajectory::fixed(place.to_ecef())),
             MotionSpec::Waypoints { points, limits } => {
                 route::trajectory(points, limits).map_err(|e| self.conflict("motion.point", e.to_string()))
@@ -168,13 +230,27 @@ impl Scenario {
         }
     }
 
-    /// Refuses a motion that does not last from the first sample to the last one.
-    fn covers(&self, trajectory: &Trajectory, end_s: f64) -> Result<(), ScenarioError> {
-        let start_s = self.receiver_clock.true_elapsed_s(self.start, self.start);
+    /// The motion of a body with the scenario's attitude.
+    fn turned(&self, trajectory: Trajectory) -> Result<Trajectory, ScenarioError> {
+        let Some(attitude) = self.attitude else { return Ok(trajectory) };
+        if matches!(attitude.nose, Nose::Velocity { .. }) && trajectory.is_static() {
+            let reason = "kind = \"velocity\", but the motion stands still: use kind = \"fixed\", or let it move";
+            return Err(self.conflict("attitude", reason.to_owned()));
+        }
+        Ok(trajectory.with_attitude(attitude))
+    }
+
+    /// Refuses a motion that does not last from `start_s` to `end_s`.
+    pub(super) fn covers(
+        &self,
+        motion: &MotionSpec,
+        trajectory: &Trajectory,
+        start_s: f64,
+        end_s: f64,
+    ) -> Result<(), ScenarioError> {
         let (from_s, to_s) = trajectory.span_s();
-        // A file that begins at the scene's start must do with a receiver's clock that is ahead by its bias.
-        if from_s > start_s.max(0.0) || to_s < end_s.min(self.duration_s) {
-            let kind = self.motion.kind();
+        if from_s > start_s || to_s < end_s {
+            let kind = motion.kind();
             return Err(self.conflict(
                 "motion",
                 format!(
@@ -239,15 +315,22 @@ impl Scenario {
     }
 }
 
-/// Satellites of the scene above the mask at its start.
-fn visible_at_start(scene: &Scene) -> Result<usize, OrbitError> {
+/// Satellites of the scene above the mask at its start, and the standard deviation per component of their sum in LSB.
+fn at_start(scene: &Scene) -> Result<(usize, f64), OrbitError> {
     let motion = scene.trajectory.at(0.0);
-    let mut visible = 0;
+    let (mut visible, mut sum_hz) = (0, 0.0);
     for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
         let found = emission(&scene.catalogue, sv, scene.clock.start, &motion)?;
-        visible += usize::from(found.is_some_and(|e| e.sight.look.elevation_rad >= scene.mask_rad));
+        let Some(found) = found.filter(|e| e.sight.look.elevation_rad >= scene.mask_rad) else { continue };
+        visible += 1;
+        for signal in &scene.signals {
+            let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
+            scene.effects.iter().for_each(|effect| effect.act(&found.sight, signal, &mut rays));
+            sum_hz += rays.iter().fold(0.0, |sum, ray| sum + ray.cn0_hz);
+        }
     }
-    Ok(visible)
+    let real = if scene.metadata.format.is_complex() { 1.0 } else { 2.0 };
+    Ok((visible, f64::from(scene.noise_lsb) * (real * sum_hz / scene.clock.rate.hz()).sqrt()))
 }
 
 /// Gain when the scenario sets none. Eleven satellites at 47 dB-Hz in 2.6 Msps add a tenth to the noise's standard

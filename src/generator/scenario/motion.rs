@@ -30,7 +30,7 @@ pub(super) const KEYS: &[&str] = &[
     "drag_m2pkg",
     "gravity",
 ];
-const PLACE: [&str; 3] = ["latitude_deg", "longitude_deg", "height_m"];
+pub(super) const PLACE: [&str; 3] = ["latitude_deg", "longitude_deg", "height_m"];
 /// Keys of `[[motion.point]]`.
 pub(super) const POINT_KEYS: &[&str] = &["latitude_deg", "longitude_deg", "height_m", "speed_mps", "hold_s"];
 
@@ -86,7 +86,7 @@ impl MotionSpec {
     }
 }
 
-fn place(table: &Table<'_>) -> Result<Geodetic, ScenarioError> {
+pub(super) fn place(table: &Table<'_>) -> Result<Geodetic, ScenarioError> {
     Ok(Geodetic::from_degrees(
         table.required("latitude_deg", -90.0..=90.0, "deg")?,
         table.required("longitude_deg", -180.0..=360.0, "deg")?,

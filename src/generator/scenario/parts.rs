@@ -2,18 +2,17 @@
 
 use std::path::Path;
 
-use super::{Ionosphere, Overrides, Power, Scenario, ScenarioError};
+use super::compose::Files;
+use super::{Ionosphere, Overrides, Scenario, ScenarioError, multipath};
 use crate::generator::catalogue::Catalogue;
-use crate::generator::effect::ionosphere::KlobucharIonosphere;
-use crate::generator::effect::link::{FixedCn0, LinkBudget};
-use crate::generator::effect::troposphere::Saastamoinen;
-use crate::generator::ray::{Effect, Ray, Sight};
+use crate::generator::effect::obstruction::Obstruction;
+use crate::generator::effect::wind_up::WindUp;
+use crate::generator::ray::Effect;
+use crate::generator::vehicle::Trajectory;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::Broadcast;
-use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::rinex::{self, Navigation};
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
 
 /// Warnings of one kind that are told in full.
 const TOLD: usize = 4;
@@ -86,20 +85,13 @@ pub(super) fn sky(
     Ok(Sky { catalogue, broadcast, excluded })
 }
 
+/// What the satellites send about the ionosphere is what the scenario gives, or what the file says.
 fn broadcast(scenario: &Scenario, navigation: &Navigation, almanac: &[Ephemeris]) -> Result<Broadcast, ScenarioError> {
-    let klobuchar = coefficients(scenario, navigation);
+    let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent);
     let leap_seconds = navigation.leap_seconds.unwrap_or_else(|| scenario.start.leap_seconds());
-    let key = if matches!(scenario.ionosphere, Some(Ionosphere::Given(_))) { "ionosphere" } else { "navigation.file" };
-    Broadcast::new(klobuchar, leap_seconds, almanac, scenario.start)
+    let key = if given.is_some() { "ionosphere" } else { "navigation.file" };
+    Broadcast::new(given.or(navigation.klobuchar), leap_seconds, almanac, scenario.start)
         .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
-}
-
-/// What the satellites send about the ionosphere: what the scenario gives, or what the file says.
-fn coefficients(scenario: &Scenario, navigation: &Navigation) -> Option<Klobuchar> {
-    match scenario.ionosphere {
-        Some(Ionosphere::Given(klobuchar)) => Some(klobuchar),
-        Some(Ionosphere::Broadcast) | None => navigation.klobuchar,
-    }
 }
 
 /// Why no ephemeris fits: the span of the file against that of the scene.
@@ -127,53 +119,33 @@ fn tell(warnings: &mut Vec<String>, list: &[String], what: &str) {
     }
 }
 
-/// The effects in the order in which they act: ionosphere, troposphere, then strength.
-pub(super) fn effects(scenario: &Scenario, navigation: &Navigation) -> Result<Vec<Box<dyn Effect>>, ScenarioError> {
+/// The effects in the order in which they act: ionosphere, troposphere, wind-up, strength, echoes of all that, then what
+/// stands in the way of the direct ray.
+pub(super) fn effects(
+    scenario: &Scenario,
+    files: &Files<'_>,
+    navigation: &Navigation,
+    (sky, trajectory): (&Sky, &Trajectory),
+    end_s: f64,
+) -> Result<Vec<Box<dyn Effect>>, ScenarioError> {
     let mut effects: Vec<Box<dyn Effect>> = Vec::new();
-    if scenario.ionosphere.is_some() {
-        let model = coefficients(scenario, navigation).ok_or_else(|| {
-            let reason = "the navigation file has no Klobuchar coefficients: write alpha and beta here, name a file that \
-                          has them, or remove [ionosphere]";
-            scenario.conflict("ionosphere", reason.to_owned())
-        })?;
-        effects.push(Box::new(KlobucharIonosphere { model }));
+    if let Some(ionosphere) = &scenario.ionosphere {
+        effects.push(ionosphere.effect(scenario, files, navigation.klobuchar, end_s)?);
     }
-    if let Some(weather) = scenario.troposphere {
-        effects.push(Box::new(Saastamoinen { weather }));
+    if let Some(troposphere) = &scenario.troposphere {
+        effects.push(troposphere.effect(scenario, files)?);
     }
-    match &scenario.power {
-        Power::LinkBudget { antenna, noise_figure_db, loss_db } => effects.push(Box::new(LinkBudget {
-            antenna: *antenna,
-            noise_figure_db: *noise_figure_db,
-            extra_loss_db: *loss_db,
-            ..LinkBudget::default()
-        })),
-        Power::Fixed { cn0_dbhz, satellites } => {
-            let default = FixedCn0 { cn0_dbhz: *cn0_dbhz };
-            if satellites.is_empty() {
-                effects.push(Box::new(default));
-            } else {
-                let satellites = satellites.iter().map(|&(sv, cn0_dbhz)| (sv, FixedCn0 { cn0_dbhz })).collect();
-                effects.push(Box::new(ListedCn0 { default, satellites }));
-            }
-        }
+    let wind_up = WindUp::new(scenario.start, trajectory.clone(), &sky.catalogue)
+        .map_err(|e| scenario.conflict("navigation.file", e.to_string()))?;
+    if let Some(wind_up) = wind_up {
+        effects.push(Box::new(wind_up));
+    }
+    effects.push(scenario.power.effect(scenario, trajectory, files.directory, files.overrides)?);
+    if !scenario.multipath.is_empty() {
+        effects.push(Box::new(multipath::effect(scenario, trajectory)?));
+    }
+    if !scenario.obstacles.is_empty() {
+        effects.push(Box::new(Obstruction::new(scenario.obstacles.clone(), trajectory.at(0.0).position_m)));
     }
     Ok(effects)
-}
-
-/// C/N0 by a list of satellites, and one value for all others.
-struct ListedCn0 {
-    default: FixedCn0,
-    satellites: Vec<(Sv, FixedCn0)>,
-}
-
-impl Effect for ListedCn0 {
-    fn name(&self) -> &'static str {
-        self.default.name()
-    }
-
-    fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
-        let listed = self.satellites.iter().find(|(sv, _)| *sv == sight.sv).map(|(_, fixed)| fixed);
-        listed.unwrap_or(&self.default).act(sight, signal, rays);
-    }
 }

@@ -133,6 +133,17 @@ impl<'t> Table<'t> {
         if items.len() != N { Err(bad()) } else { numbers.try_into().map(Some).map_err(|_| bad()) }
     }
 
+    /// An array of numbers of any length.
+    pub fn list(&self, name: &str, range: RangeInclusive<f64>, unit: &str) -> Result<Option<Vec<f64>>, ScenarioError> {
+        let Some(value) = self.get(name) else { return Ok(None) };
+        let expected =
+            || format!("an array of numbers from {} to {} {unit}", Short(*range.start()), Short(*range.end()));
+        let DeValue::Array(items) = value.get_ref() else { return Err(self.bad(name, expected())) };
+        let number = |item: &Spanned<DeValue<'_>>| as_number(item.get_ref()).filter(|x| range.contains(x));
+        let numbers: Option<Vec<f64>> = items.iter().map(number).collect();
+        numbers.map(Some).ok_or_else(|| self.bad(name, expected()))
+    }
+
     pub fn integer(&self, name: &str) -> Result<Option<u64>, ScenarioError> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let number = match value.get_ref() {

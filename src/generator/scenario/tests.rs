@@ -1,7 +1,20 @@
+mod hostile;
+mod propagation;
+
 use std::path::Path;
 
+use propagation::{IONEX, TEC, VIENNA};
+
+use super::interference::DRAG_KEYS;
 use super::motion::{KEYS as MOTION_KEYS, POINT_KEYS};
+use super::multipath::KEYS as MULTIPATH_KEYS;
+use super::obstruction::KEYS as OBSTRUCTION_KEYS;
 use super::*;
+use crate::generator::effect::multipath::Detour;
+use crate::generator::effect::transmit::Block;
+use crate::generator::ripple::oscillator::PowerLaw;
+use crate::generator::vehicle::attitude::Nose;
+use crate::gnss::samples::Format;
 
 const MINIMAL: &str = "name = \"test\"\nstart = 2010-07-01T10:00:00\nduration_s = 10\n";
 const STATIC: &str = "[motion]\nkind = \"static\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n";
@@ -14,19 +27,43 @@ const FILE: &str = "[motion]\nkind = \"file\"\nfile = \"ride.csv\"\nformat = \"c
 const RADIUS: &str = "[motion]\nkind = \"waypoints\"\nturn_radius_m = 30\n";
 const REST: &str = "[navigation]\nfile = \"brdc.10n\"\n[satellites]\nmask_deg = 10\nexclude = [\"G01\"]\ninclude_unhealthy = true\n\
     [front_end]\nsample_rate_hz = 4e6\nif_hz = 1e6\nspectrum_inverted = true\nformat = \"ri8\"\nnoise_lsb = 3\n\
-    [power]\nkind = \"link_budget\"\nantenna = \"patch\"\nnoise_figure_db = 2\nloss_db = 1\n\
+    [attitude]\nkind = \"fixed\"\nyaw_deg = 30\npitch_deg = 10\nroll_deg = 5\nspin_hz = 2\nlever_arm_m = [1, 0, 0]\nboresight = [0, 1, -1]\n\
+    [power]\nkind = \"link_budget\"\ntransmit = \"IIR\"\ntransmit_dbw = 15\nantenna = \"table\"\nantenna_file = \"gain.csv\"\nnoise_figure_db = 2\nloss_db = 1\n\
+    blocks = { G05 = \"IIR-M\" }\n\
     [ionosphere]\nmodel = \"klobuchar\"\nalpha = [1e-8, 0, 0, 0]\nbeta = [1e5, 0, 0, 0]\n\
+    broadcast_alpha = [2e-8, 0, 0, 0]\nbroadcast_beta = [2e5, 0, 0, 0]\n\
     [troposphere]\nmodel = \"saastamoinen\"\nheight_m = 100\npressure_hpa = 1000\ntemperature_c = 30\nrelative_humidity = 0.5\n\
-    [receiver_clock]\nbias_s = 1e-4\ndrift_sps = 1e-7\n[noise]\n\
+    mapping = \"niell\"\n\
+    [[obstruction]]\nkind = \"horizon\"\nazimuth_deg = [0, 90]\nelevation_deg = [10, 20]\nedge_deg = 1\nloss_db = 20\n\
+    [[obstruction]]\nkind = \"sector\"\nfrom_deg = 350\nto_deg = 10\nroof_deg = 40\n\
+    [[obstruction]]\nkind = \"building\"\neast_m = [10, 20]\nnorth_m = [-5, 5]\ntop_m = 20\n\
+    [scintillation]\ns4 = 0.5\nsigma_phi_rad = 0.8\ndecorrelation_s = 1\nsatellites = [\"G02\"]\n\
+    [receiver_clock]\nbias_s = 1e-4\ndrift_sps = 1e-7\nageing_per_day = 1e-9\nsensitivity_per_g = 1e-9\noscillator = \"tcxo\"\n[noise]\n\
+    [playback]\nbits = 8\nload_sigma = 3\nattenuation_db = 1\n\
+    [local_oscillator]\noffset_hz = 10\nphase_noise_rad = 0.1\nphase_noise_bandwidth_hz = 1000\n\
+    [filter]\nkind = \"butterworth\"\norder = 4\nbandwidth_hz = 1.8e6\n[iq]\ndc_i_lsb = 0.5\n\
+    [adc]\nbits = 2\nstep_sigma = 1\nagc_window_s = 0.001\n\
     [fidelity]\nlevel = \"balanced\"\ncarrier = \"f64\"\nnoise = \"f32\"\ncode_edge = \"nearest\"\nknot_tolerance_cycles = 1e-3\n[truth]\ninterval_s = 0.5\n\
     [receiver.tracking]\nwhatever = 1\n";
+const ECHOES: &str = "[[multipath]]\nkind = \"given\"\namplitude = 0.5\nphase_deg = 90\nsatellites = [\"G13\"]\nexcess_m = 30\nrate_mps = -0.5\n\
+    [[multipath]]\nkind = \"ground\"\namplitude = 0.3\nheight_m = 2\n\
+    [[multipath]]\nkind = \"wall\"\namplitude = 0.4\nazimuth_deg = 90\ndistance_m = 12\n";
+
+/// Every key of the tables that may stand several times.
+const HOSTILE: &str = "[[interference]]\nkind = \"chirp\"\noffset_hz = 1e5\njs_db = 30\non_s = 1\noff_s = 2\nsweep_hz = -2e6\n\
+    sweep_s = 1e-5\n[[interference]]\nkind = \"sine_fm\"\npower_dbw = -130\ndeviation_hz = 5e4\nrate_hz = 1e4\n\
+    [[interference]]\nkind = \"pulse\"\neirp_dbw = -20\nwidth_s = 1e-5\nrate_hz = 1e4\njitter = 0.5\n\
+    latitude_deg = 26.6\nlongitude_deg = 80.2\nheight_m = 100\n[[interference]]\nkind = \"noise\"\njs_db = 1\nbandwidth_hz = 1e6\n\
+    [[interference]]\nkind = \"recording\"\njs_db = 1\nfile = \"iq.bin\"\nformat = \"ci8\"\nsample_rate_hz = 4e6\nrepeat = true\n\
+    [[spoofer]]\npower_db = 6\npower_start_db = -10\nramp_s = 5\non_s = 1\noff_s = 9\nsatellites = [\"G13\"]\nclock_bias_s = 1e-6\n\
+    clock_drift_sps = 1e-9\n[spoofer.drag]\nstart_s = 3\nazimuth_deg = 90\nelevation_deg = 0\nspeed_mps = 5\nacceleration_mps2 = 2\n";
 
 fn parse(text: &str) -> Result<Scenario, ScenarioError> {
     Scenario::parse(text, "scene.toml")
 }
 
 fn full() -> String {
-    format!("{MINIMAL}seed = 7\nsignals = [\"GPS L1 C/A\"]\n{STATIC}{REST}")
+    format!("{MINIMAL}seed = 7\nsignals = [\"GPS L1 C/A\"]\n{STATIC}{ECHOES}{REST}")
 }
 
 #[test]
@@ -37,9 +74,40 @@ fn every_value_arrives_where_it_belongs_in_si_units() {
     assert_eq!(scenario.mask_rad, 10_f64.to_radians());
     assert_eq!((scenario.excluded.as_slice(), scenario.include_unhealthy), ([Sv::gps(1)].as_slice(), true));
     assert_eq!((scenario.front_end.format, scenario.front_end.inverted), (Format::Ri8, true));
-    assert_eq!(scenario.power, Power::LinkBudget { antenna: Antenna::Patch, noise_figure_db: 2.0, loss_db: 1.0 });
-    assert!(matches!(scenario.ionosphere, Some(Ionosphere::Given(k)) if k.alpha[0] == 1e-8));
-    assert_eq!(scenario.receiver_clock, ReceiverClock { bias_s: 1e-4, drift: 1e-7 });
+    let power = Power::LinkBudget {
+        transmit: Transmit::Block(Block::Iir),
+        transmit_dbw: 15.0,
+        blocks: vec![(Sv::gps(5), Block::IirM)],
+        antenna: AntennaSpec::Table("gain.csv".into()),
+        noise_figure_db: 2.0,
+        loss_db: 1.0,
+    };
+    assert_eq!(scenario.power, power);
+    let attitude = scenario.attitude.unwrap();
+    let [yaw_rad, pitch_rad, roll_rad] = [30.0_f64, 10.0, 5.0].map(f64::to_radians);
+    assert_eq!((attitude.nose, attitude.spin_hz), (Nose::Fixed { yaw_rad, pitch_rad, roll_rad }, 2.0));
+    assert_eq!(attitude.lever_arm_m, nalgebra::Vector3::x());
+    let [given, ground, wall] = scenario.multipath.as_slice() else { panic!("{:?}", scenario.multipath) };
+    assert_eq!(given.detour, Detour::Given { excess_m: 30.0, rate_mps: -0.5 });
+    assert_eq!(
+        (given.amplitude, given.phase_cycles, given.satellites.as_slice()),
+        (0.5, 0.25, [Sv::gps(13)].as_slice())
+    );
+    assert_eq!((ground.detour, ground.phase_cycles), (Detour::Ground { height_m: 2.0 }, 0.5));
+    assert_eq!(wall.detour, Detour::Wall { azimuth_rad: 90_f64.to_radians(), distance_m: 12.0 });
+    let ionosphere = scenario.ionosphere.unwrap();
+    assert!(matches!(ionosphere.truth, Electrons::Klobuchar(Some(k)) if k.alpha[0] == 1e-8));
+    assert_eq!(ionosphere.broadcast.unwrap().beta[0], 2e5);
+    assert_eq!(scenario.obstacles.len(), 3);
+    let Obstacle::Horizon { points_rad, edge_rad, share } = &scenario.obstacles[0] else { panic!("not a horizon") };
+    assert_eq!(
+        (points_rad[1], *edge_rad, *share),
+        ((90_f64.to_radians(), 20_f64.to_radians()), 1_f64.to_radians(), 0.01)
+    );
+    let tcxo = PowerLaw { h0: 1e-21, hm1: 1e-20, hm2: 2e-20, ..PowerLaw::default() };
+    let clock = ClockSpec { bias_s: 1e-4, drift: 1e-7, ageing_per_s: 1e-9 / 86_400.0, per_g: 1e-9, noise: Some(tcxo) };
+    assert_eq!(scenario.receiver_clock, clock);
+    assert!(scenario.scintillation.is_some_and(|s| s.s4 == 0.5 && s.satellites == Some(vec![Sv::gps(2)])));
     assert!(scenario.noise && scenario.fidelity.code_edge == CodeEdge::Nearest && scenario.truth_interval_s == 0.5);
     assert!(scenario.receiver.unwrap().contains_key("tracking"));
 }
@@ -48,7 +116,8 @@ fn every_value_arrives_where_it_belongs_in_si_units() {
 fn absence_is_the_switch() {
     let scenario = parse(&format!("{MINIMAL}{STATIC}")).unwrap();
     assert!(!scenario.noise && scenario.ionosphere.is_none() && scenario.troposphere.is_none());
-    assert_eq!(scenario.receiver_clock, ReceiverClock::PERFECT);
+    assert!(scenario.obstacles.is_empty());
+    assert_eq!(scenario.receiver_clock, ClockSpec::default());
     assert!(scenario.receiver.is_none() && scenario.navigation.is_none());
 }
 
@@ -57,14 +126,24 @@ fn with(table: &str, line: &str) -> String {
     match table {
         "" => format!("{line}\n{MINIMAL}{STATIC}"),
         "motion" => format!("{MINIMAL}{STATIC}{line}\n"),
+        "interference" | "spoofer" => format!("{MINIMAL}{STATIC}[[{table}]]\n{line}\n"),
+        "spoofer.drag" => format!("{MINIMAL}{STATIC}[[spoofer]]\npower_db = 6\n[spoofer.drag]\n{line}\n"),
         "motion.point" => format!("{MINIMAL}{WAYPOINTS}{line}\n"),
+        "obstruction" => format!("{MINIMAL}{STATIC}[[obstruction]]\n{line}\n"),
+        "multipath" => format!("{MINIMAL}{STATIC}[[multipath]]\n{line}\n"),
         table => format!("{MINIMAL}{STATIC}[{table}]\n{line}\n"),
     }
 }
 
 #[test]
 fn every_mistyped_key_is_refused_at_its_place_with_the_right_one() {
-    for (table, keys) in KEYS.iter().copied().chain([("motion.point", POINT_KEYS)]) {
+    let inner = [
+        ("motion.point", POINT_KEYS),
+        ("spoofer.drag", DRAG_KEYS),
+        ("obstruction", OBSTRUCTION_KEYS),
+        ("multipath", MULTIPATH_KEYS),
+    ];
+    for (table, keys) in KEYS.iter().copied().chain(inner) {
         for key in keys {
             let dropped = &key[..key.len() - 1];
             let doubled = format!("{}{}", &key[..2], &key[1..]);
@@ -89,29 +168,28 @@ fn a_key_of_another_kind_of_motion_is_refused() {
     assert!(parse(&both).unwrap_err().to_string().contains("only one of"));
 }
 
-/// Replaces the value of `key` in the first line of `text`, after `table` begins, that sets it.
-fn replaced(text: &str, header: &str, key: &str, value: &str) -> String {
+/// The first line of `text`, within the table `header`, that sets `key`.
+fn line_of(text: &str, header: &str, key: &str) -> Option<usize> {
     let mut inside = header.is_empty();
-    let mut done = false;
-    let mut lines = Vec::new();
-    for line in text.lines() {
+    text.lines().position(|line| {
         if line.starts_with('[') {
             inside = line.trim_matches(['[', ']']) == header;
         }
-        if inside && !done && line.split('=').next().unwrap().trim() == key {
-            lines.push(format!("{key} = {value}"));
-            done = true;
-        } else {
-            lines.push(line.to_owned());
-        }
-    }
-    assert!(done, "{header}.{key} is not in the text");
+        inside && line.split('=').next().unwrap().trim() == key
+    })
+}
+
+/// Replaces the value of `key` where the table `header` of `text` sets it first.
+fn replaced(text: &str, header: &str, key: &str, value: &str) -> String {
+    let at = line_of(text, header, key).unwrap_or_else(|| panic!("{header}.{key} is not in the text"));
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    lines[at] = format!("{key} = {value}");
     lines.join("\n")
 }
 
 #[test]
 fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
-    let full = full();
+    let full = full() + HOSTILE;
     let fixed = "[power]\nkind = \"fixed\"\ncn0_dbhz = 45\n";
     let mut cases: Vec<(String, &str, &str)> = Vec::new();
     for (table, keys) in KEYS.iter().filter(|(table, _)| *table != "motion") {
@@ -120,7 +198,23 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
             let is_table = table.is_empty() && (full.contains(&header) || *key == "receiver");
             match (*table, *key) {
                 ("power", "cn0_dbhz") => cases.push((format!("{MINIMAL}{STATIC}{fixed}"), table, key)),
+                ("iq", "gain_db" | "phase_deg" | "dc_q_lsb") => {
+                    let text = format!("{MINIMAL}{STATIC}[iq]\ngain_db = 1\nphase_deg = 2\ndc_q_lsb = 1\n");
+                    cases.push((text, table, key));
+                }
+                ("receiver_clock", "power_law") => {
+                    let text = format!("{MINIMAL}{STATIC}[receiver_clock]\npower_law = [0, 0, 1e-21, 1e-20, 2e-20]\n");
+                    cases.push((text, table, key));
+                }
                 ("power", "satellites") => cases.push((format!("{MINIMAL}{STATIC}{fixed}satellites = 1"), table, key)),
+                ("spoofer", "motion" | "drag") => {
+                    cases.push((with("spoofer", &format!("power_db = 6\n{key} = 1")), table, key));
+                }
+                ("ionosphere" | "troposphere", key) if line_of(&full, table, key).is_none() => {
+                    let others = [IONEX, TEC, VIENNA].map(|other| format!("{MINIMAL}{STATIC}{other}"));
+                    let with_it = others.iter().find(|text| line_of(text, table, key).is_some()).unwrap();
+                    cases.push((with_it.clone(), table, key));
+                }
                 _ if is_table => {
                     let text = format!("{key} = 1979-05-27\n{MINIMAL}");
                     cases.push((if *key == "motion" { text } else { text + STATIC }, "", key));
@@ -136,8 +230,18 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
             None => assert_eq!(*key, "point"),
         }
     }
+    for key in DRAG_KEYS {
+        cases.push((full.clone(), "spoofer.drag", key));
+    }
+    for key in OBSTRUCTION_KEYS {
+        cases.push((full.clone(), "obstruction", key));
+    }
     for key in POINT_KEYS {
         cases.push((format!("{MINIMAL}{WAYPOINTS}"), "motion.point", key));
+    }
+    for key in MULTIPATH_KEYS {
+        let own = ECHOES.split("[[").find(|echo| echo.contains(&format!("\n{key} ="))).unwrap();
+        cases.push((format!("{MINIMAL}{STATIC}[[{own}"), "multipath", key));
     }
     for (text, table, key) in cases {
         // A list is of no key's type but the lists', and they do not take dates.
@@ -161,19 +265,51 @@ fn numbers_outside_their_range_are_refused_with_range_and_unit() {
         ("front_end", "sample_rate_hz", "Hz"),
         ("front_end", "if_hz", "Hz"),
         ("front_end", "noise_lsb", "LSB"),
+        ("attitude", "yaw_deg", "deg"),
+        ("attitude", "pitch_deg", "deg"),
+        ("attitude", "roll_deg", "deg"),
+        ("attitude", "spin_hz", "Hz"),
+        ("multipath", "amplitude", "direct"),
+        ("multipath", "phase_deg", "deg"),
+        ("multipath", "excess_m", "m"),
+        ("power", "transmit_dbw", "dBW"),
         ("power", "noise_figure_db", "dB"),
         ("power", "loss_db", "dB"),
         ("troposphere", "height_m", "m"),
         ("troposphere", "pressure_hpa", "hPa"),
         ("troposphere", "temperature_c", "C"),
         ("troposphere", "relative_humidity", "fraction"),
+        ("obstruction", "from_deg", "deg"),
+        ("obstruction", "to_deg", "deg"),
+        ("obstruction", "roof_deg", "deg"),
+        ("obstruction", "edge_deg", "deg"),
+        ("obstruction", "loss_db", "dB"),
+        ("obstruction", "top_m", "m"),
         ("receiver_clock", "bias_s", "s"),
         ("receiver_clock", "drift_sps", "s/s"),
+        ("receiver_clock", "ageing_per_day", "a day"),
+        ("receiver_clock", "sensitivity_per_g", "a g"),
+        ("scintillation", "sigma_phi_rad", "rad"),
+        ("local_oscillator", "offset_hz", "Hz"),
+        ("filter", "bandwidth_hz", "Hz"),
+        ("iq", "dc_i_lsb", "LSB"),
+        ("adc", "agc_window_s", "s"),
+        ("playback", "attenuation_db", "dB"),
+        ("scintillation", "decorrelation_s", "s"),
         ("fidelity", "knot_tolerance_cycles", "cycles"),
         ("truth", "interval_s", "s"),
+        ("interference", "offset_hz", "Hz"),
+        ("interference", "js_db", "dB"),
+        ("interference", "power_dbw", "dBW"),
+        ("interference", "sweep_s", "s"),
+        ("interference", "jitter", "of a period"),
+        ("interference", "bandwidth_hz", "Hz"),
+        ("spoofer", "power_db", "dB"),
+        ("spoofer", "clock_drift_sps", "s/s"),
+        ("spoofer.drag", "speed_mps", "m/s"),
     ] {
         for value in ["-1e308", "1e308", "nan", "inf", "-inf", "\"5 m\"", "true", "9223372036854775807", "''"] {
-            let text = replaced(&full(), table, key, value);
+            let text = replaced(&(full() + HOSTILE), table, key, value);
             let error = parse(&text).unwrap_err();
             let message = error.to_string();
             assert!(matches!(error, ScenarioError::Value { .. }), "{message}");
@@ -199,10 +335,44 @@ fn what_contradicts_itself_is_refused_with_the_computed_number() {
     assert!(error.to_string().contains("beta"), "{error}");
     let error = parse(&format!("{MINIMAL}{STATIC}[power]\nkind = \"link_budget\"\ncn0_dbhz = 45")).unwrap_err();
     assert!(error.to_string().contains("unknown key 'power.cn0_dbhz'"), "{error}");
+    let iq = format!("{MINIMAL}{STATIC}[front_end]\nformat = \"ri8\"\nif_hz = 1e6\n[iq]\nphase_deg = 1\n");
+    assert!(parse(&iq).unwrap_err().to_string().contains("has no Q"));
+    let adc = parse(&with("adc", "bits = 12")).unwrap_err().to_string();
+    assert!(adc.contains("at most 8 for front_end.format = ci8"), "{adc}");
+    let filter = parse(&with("filter", "kind = \"brick_wall\"\norder = 3")).unwrap_err().to_string();
+    assert!(filter.contains("no order"), "{filter}");
     let error = parse(&with("", "signals = [\"GPS L1 CA\"]")).unwrap_err();
     assert!(error.to_string().contains("GPS L1 C/A"), "{error}");
     let error = parse(&with("fidelity", "code_edge = \"aera\"")).unwrap_err().to_string();
     assert!(error.contains("did you mean area?"), "{error}");
+}
+
+#[test]
+fn what_cannot_be_turned_or_reflected_is_refused_with_the_remedy() {
+    let parsed = |tables: &str| parse(&format!("{MINIMAL}{STATIC}{tables}")).unwrap_err().to_string();
+    assert!(parsed("[attitude]\nkind = \"velocity\"\nroll_deg = 3").contains("level"));
+    assert!(parsed("[attitude]\nkind = \"fixed\"\nboresight = [0, 0, 0]").contains("a direction"));
+    assert!(
+        parsed("[[multipath]]\nkind = \"ground\"\namplitude = 0.5\nheight_m = 2\nexcess_m = 3").contains("excess_m")
+    );
+    assert!(parsed("[[multipath]]\nkind = \"wall\"\namplitude = 0.5\nazimuth_deg = 3").contains("distance_m"));
+    assert!(
+        parsed("[[multipath]]\nkind = \"given\"\namplitude = 0.5\nexcess_m = 3\nsatellites = []").contains("absent")
+    );
+    assert!(parsed("[power]\nantenna = \"table\"").contains("antenna_file"));
+    assert!(parsed("[power]\nantenna_file = \"x.csv\"").contains("unless antenna"));
+    let composed = |text: &str| warnings(text).unwrap_err();
+    let error = composed(&format!("{MINIMAL}{STATIC}[attitude]\nkind = \"velocity\"\n"));
+    assert!(error.contains("use kind = \"fixed\""), "{error}");
+    let wall = "[[multipath]]\nkind = \"wall\"\namplitude = 0.5\nazimuth_deg = 0\ndistance_m = 12\n";
+    let error = composed(&format!("{MINIMAL}{WAYPOINTS}{wall}"));
+    assert!(error.contains("behind the wall") && error.contains("12 m off"), "{error}");
+    let given = "[[multipath]]\nkind = \"given\"\namplitude = 0.5\nexcess_m = 3\nrate_mps = -1\n";
+    let error = composed(&format!("{MINIMAL}{STATIC}{given}"));
+    assert!(error.contains("below 0 after 3.000 s"), "{error}");
+    let later = replaced(&format!("{MINIMAL}{STATIC}"), "", "start", "2010-05-01T00:00:00");
+    let error = composed(&format!("{later}\n[power]\ntransmit = \"constellation\"\n"));
+    assert!(error.contains("power.transmit") || error.contains("expected a scene within"), "{error}");
 }
 
 #[test]
@@ -285,6 +455,7 @@ fn a_front_end_puts_l1_where_the_scenario_says() {
     for (inverted, center_hz) in [(false, 1_574.42e6), (true, 1_576.42e6)] {
         let text = replaced(&full(), "front_end", "spectrum_inverted", &inverted.to_string());
         let text = text.replace("[navigation]\nfile = \"brdc.10n\"\n", "");
+        let text = text.replace("antenna = \"table\"\nantenna_file = \"gain.csv\"\n", "antenna = \"patch\"\n");
         let (scene, warnings) = parse(&text).unwrap().compose(Path::new("."), &Overrides::default()).unwrap();
         assert_eq!(scene.metadata.center_hz, center_hz);
         assert_eq!(scene.metadata.if_hz(scene.signals[0]), 1e6);
@@ -295,12 +466,21 @@ fn a_front_end_puts_l1_where_the_scenario_says() {
 }
 
 /// The scenarios that come with the program.
-const SHIPPED: [(&str, &str); 5] = [
+const SHIPPED: [(&str, &str); 14] = [
     ("static", include_str!("../../../scenarios/static.toml")),
     ("moderate", include_str!("../../../scenarios/moderate.toml")),
     ("high_dynamics", include_str!("../../../scenarios/high_dynamics.toml")),
     ("noise_free", include_str!("../../../scenarios/noise_free.toml")),
     ("trajectory_file", include_str!("../../../scenarios/trajectory_file.toml")),
+    ("ionex", include_str!("../../../scenarios/ionex.toml")),
+    ("canyon", include_str!("../../../scenarios/canyon.toml")),
+    ("urban", include_str!("../../../scenarios/urban.toml")),
+    ("spinning", include_str!("../../../scenarios/spinning.toml")),
+    ("oscillator", include_str!("../../../scenarios/oscillator.toml")),
+    ("scintillation", include_str!("../../../scenarios/scintillation.toml")),
+    ("front_end", include_str!("../../../scenarios/front_end.toml")),
+    ("jammed", include_str!("../../../scenarios/jammed.toml")),
+    ("spoofed", include_str!("../../../scenarios/spoofed.toml")),
 ];
 
 fn shipped(name: &str) -> crate::generator::scene::Scene {
@@ -390,6 +570,36 @@ fn what_looks_wrong_but_can_be_computed_is_warned_of() {
     assert!(told.iter().any(|w| w.contains("-1.023 to 1.023 MHz")), "{told:?}");
     // Those of the file itself: a rogue record, and unhealthy satellites.
     assert!(warnings(&base).unwrap().len() <= 2);
+}
+
+#[test]
+fn a_signal_outside_the_band_is_refused_where_it_is_the_only_one() {
+    let place = |if_hz: f64, format: Format| {
+        let mut scenario = parse(&format!("{MINIMAL}{STATIC}[front_end]\nsample_rate_hz = 2.6e6\n")).unwrap();
+        // No text comes here: the parser keeps the IF of the one signal that there is below half the rate.
+        (scenario.front_end.if_hz, scenario.front_end.format) = (if_hz, format);
+        let (_, warnings) = scenario.compose(Path::new("."), &Overrides::default()).map_err(|e| e.to_string())?;
+        Ok::<_, String>(warnings)
+    };
+    // The band ends at 1.3 MHz and half the main lobe is 1.023 MHz wide.
+    for if_hz in [2.33e6, -2.33e6, 9e6] {
+        let error = place(if_hz, Format::Ci8).unwrap_err();
+        assert!(error.contains("front_end.if_hz") && error.contains("-1.300 to 1.300 MHz"), "{error}");
+    }
+    for if_hz in [2.31e6, -2.31e6] {
+        assert!(place(if_hz, Format::Ci8).unwrap().iter().any(|w| w.contains("fold over")));
+    }
+    // Real samples of an IF beyond half the rate: bandpass sampling.
+    assert!(place(9e6, Format::Ri8).is_ok());
+}
+
+#[test]
+fn noise_and_strong_signals_decide_how_good_balanced_edges_are() {
+    let edge = |tables: &str| parse(&format!("{MINIMAL}{STATIC}{tables}")).unwrap().fidelity.code_edge;
+    assert_eq!(edge("[noise]\n"), CodeEdge::Area);
+    assert_eq!(edge("[power]\ncn0_dbhz = 80\n"), CodeEdge::Area);
+    assert_eq!(edge("[noise]\n[power]\ncn0_dbhz = 80\n"), CodeEdge::BandLimited);
+    assert_eq!(edge("[noise]\n[power]\ncn0_dbhz = 45\n[power.satellites]\nG13 = 80\n"), CodeEdge::BandLimited);
 }
 
 #[test]

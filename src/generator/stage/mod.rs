@@ -1,5 +1,46 @@
-//! What acts on whole blocks of samples after the satellites are added: so far, thermal noise.
+//! What acts on samples after the satellites are added: noise, and all that a front end does.
 //!
-//! Stages are functions of the absolute sample number, so that the stream is the same however it is cut.
+//! A stage is a function of the absolute sample number and of a bounded number of samples before it, so the stream is
+//! the same however it is cut and wherever it starts. The scene fixes the order, which is that of the hardware: what the
+//! antenna hears, thermal noise, then the front end. Limits: before sample 0 there is silence.
 
+pub mod converter;
+pub mod filter;
+pub mod interference;
+pub mod mixer;
 pub mod noise;
+pub mod playback;
+
+use crate::generator::synth::isa::Level;
+
+/// A stretch of planar samples on its way from the antenna to the file, in LSB of the sample format.
+pub struct Block<'a> {
+    /// Number of the first sample, a multiple of 4096.
+    pub start: u64,
+    /// In-phase and quadrature components, of one length.
+    pub i: &'a mut [f32],
+    pub q: &'a mut [f32],
+    /// Samples at the front that only serve the memory of stages and are not sent on.
+    pub lead: usize,
+    /// Components after the lead that a stage could not hold.
+    pub clipped: u64,
+    /// Instruction set of the kernels.
+    pub level: Level,
+}
+
+/// Something that acts on all samples of the scene.
+///
+/// Laws: a stage of zero strength gives the same bits as its absence; sample n depends on n, on the scene and on
+/// samples n − [`Stage::memory_samples`] to n alone.
+pub trait Stage: Send + Sync {
+    /// Name as a scenario writes it.
+    fn name(&self) -> &'static str;
+    /// What it does, for the plan.
+    fn describe(&self) -> String;
+    /// Samples before the present one on which its result depends.
+    fn memory_samples(&self) -> usize {
+        0
+    }
+    /// Acts on a block. Unless it begins at sample 0, its first [`Stage::memory_samples`] lack their past and are not used.
+    fn act(&self, block: &mut Block<'_>);
+}

@@ -4,12 +4,48 @@
 //! by SplitMix64 from (seed, block, lane); polynomial Box–Muller turns two draws into a complex
 //! sample (cosine to I, sine to Q). Limits: |x| ≤ 6.77 σ; logarithm and sines within 3e-7.
 
+use crate::generator::fidelity::Arithmetic;
+use crate::generator::random::mix;
+use crate::generator::stage::{Block, Stage};
+use crate::generator::synth::angle::cos_sin;
+use crate::generator::synth::isa;
+
 /// Samples in one independently seeded block.
 pub const BLOCK_SAMPLES: usize = 4096;
 
-const LANES: usize = 32;
+/// Thermal noise of the receiver, white over the band of the samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thermal {
+    pub seed: u64,
+    /// Standard deviation per component, in LSB.
+    pub sigma_lsb: f32,
+    pub arithmetic: Arithmetic,
+}
 
-type Words = [u32; LANES];
+impl Stage for Thermal {
+    fn name(&self) -> &'static str {
+        "noise"
+    }
+
+    fn describe(&self) -> String {
+        format!("seed {}, {} LSB a component", self.seed, self.sigma_lsb)
+    }
+
+    fn act(&self, block: &mut Block<'_>) {
+        let pieces = block.i.chunks_mut(BLOCK_SAMPLES).zip(block.q.chunks_mut(BLOCK_SAMPLES));
+        for (number, (i, q)) in (block.start / BLOCK_SAMPLES as u64..).zip(pieces) {
+            match self.arithmetic {
+                Arithmetic::F32 => isa::add_noise(block.level, self.seed, number, self.sigma_lsb, i, q),
+                Arithmetic::F64 => add_block_exact(self.seed, number, self.sigma_lsb, i, q),
+            }
+        }
+    }
+}
+
+/// Samples side by side.
+pub(super) const LANES: usize = 32;
+
+pub(super) type Words = [u32; LANES];
 
 /// Adds noise of `sigma` per component to the samples of block number `block`, from its first one on.
 /// At most [`BLOCK_SAMPLES`] samples; `i` and `q` have the same length.
@@ -50,13 +86,6 @@ fn seeded(seed: u64, block: u64) -> [Words; 4] {
     [a, b, c, d]
 }
 
-/// SplitMix64's finaliser (Steele, Lea, Flood 2014).
-fn mix(x: u64) -> u64 {
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
-}
-
 #[inline(always)]
 fn next(state: &mut [Words; 4]) -> Words {
     let mut out = [0; LANES];
@@ -92,29 +121,6 @@ fn radius(words: &Words, sigma: f32) -> [f32; LANES] {
         out[k] = sigma * (-2.0 * ln).max(0.0).sqrt();
     }
     out
-}
-
-/// Cosine and sine of word / 2^32 turns.
-#[inline(always)]
-fn cos_sin(words: &Words) -> ([f32; LANES], [f32; LANES]) {
-    let (mut cos, mut sin) = ([0.0; LANES], [0.0; LANES]);
-    for k in 0..LANES {
-        let quadrant = words[k].wrapping_add(1 << 29) >> 30;
-        // Signed rest of the quadrant, in 2^-32 turn: the angle is within ±π/4.
-        let rest = ((words[k] << 2) as i32) >> 2;
-        let x = rest as f32 * (std::f32::consts::TAU / 4_294_967_296.0);
-        let z = x * x;
-        // Taylor series; the first terms left out are 2e-9 (sine) and 2.5e-8 (cosine).
-        let s = x + x * z * (-1.0 / 6.0 + z * (1.0 / 120.0 + z * (-1.0 / 5040.0 + z * (1.0 / 362_880.0))));
-        let c = 1.0 + z * (-0.5 + z * (1.0 / 24.0 + z * (-1.0 / 720.0 + z * (1.0 / 40_320.0))));
-        let odd = (quadrant & 1).wrapping_neg();
-        let (s, c) = (s.to_bits(), c.to_bits());
-        let cosine = (c & !odd) | (s & odd);
-        let sine = (s & !odd) | (c & odd);
-        cos[k] = f32::from_bits(cosine ^ ((quadrant ^ (quadrant >> 1)) << 31));
-        sin[k] = f32::from_bits(sine ^ ((quadrant >> 1) << 31));
-    }
-    (cos, sin)
 }
 
 /// [`add_block`] in `f64`: the same words, with logarithm, sine and cosine from `libm`.

@@ -122,10 +122,15 @@ impl Filter {
 }
 
 fn impulse(x: f64, cutoff_cps: f64) -> f64 {
+    windowed_sinc(x, cutoff_cps, HALF_WIDTH as f64, BETA)
+}
+
+/// The impulse response `x` samples from the middle of a low-pass filter under a Kaiser window of ±`half_width` samples.
+pub(crate) fn windowed_sinc(x: f64, cutoff_cps: f64, half_width: f64, beta: f64) -> f64 {
     let angle = 2.0 * PI * cutoff_cps * x;
     let sinc = if angle.abs() < 1e-9 { 1.0 } else { libm::sin(angle) / angle };
-    let place = x / HALF_WIDTH as f64;
-    2.0 * cutoff_cps * sinc * bessel_i0(BETA * (1.0 - place * place).max(0.0).sqrt()) / bessel_i0(BETA)
+    let place = x / half_width;
+    2.0 * cutoff_cps * sinc * bessel_i0(beta * (1.0 - place * place).max(0.0).sqrt()) / bessel_i0(beta)
 }
 
 /// Modified Bessel function of order zero by its power series.

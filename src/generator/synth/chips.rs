@@ -20,7 +20,7 @@ pub struct Spreading {
     /// Steps in one period.
     steps: u32,
     /// Steps a second in thousandths, by the satellite's clock.
-    step_rate_mhz: i128,
+    step_rate_mhz: i64,
     message: Option<Message>,
     correlation: Vec<f64>,
 }
@@ -51,7 +51,7 @@ impl Spreading {
                 1.0 - 2.0 * differ as f64 / signs.len() as f64
             })
             .collect();
-        let step_rate_mhz = (component.chip_rate_hz * pulse.len() as f64 * 1000.0).round() as i128;
+        let step_rate_mhz = (component.chip_rate_hz * pulse.len() as f64 * 1000.0).round() as i64;
         Some(Self { words, steps, step_rate_mhz, message: component.message, correlation })
     }
 
@@ -80,12 +80,14 @@ impl Spreading {
     /// Whole seconds are turned into steps as integers; the fraction resolves 1e-10 step.
     pub fn at(&self, received: Epoch, delay_s: f64) -> CodeTime {
         let sent = received.plus_s(-delay_s);
-        let per_period = i128::from(self.steps) * 1000;
-        let whole = i128::from(sent.seconds()) * self.step_rate_mhz;
-        let steps = whole.rem_euclid(per_period) as f64 / 1000.0 + sent.fraction() * self.step_rate_hz();
+        // A period is `steps` · 1000 thousandths, and a second some whole periods and a rest.
+        let per_period = i64::from(self.steps) * 1000;
+        let rest = sent.seconds() * (self.step_rate_mhz % per_period);
+        let whole = sent.seconds() * (self.step_rate_mhz / per_period) + rest.div_euclid(per_period);
+        let steps = rest.rem_euclid(per_period) as f64 / 1000.0 + sent.fraction() * self.step_rate_hz();
         let length = f64::from(self.steps);
         let periods = (steps / length).floor();
-        let mut period = whole.div_euclid(per_period) as i64 + periods as i64;
+        let mut period = whole + periods as i64;
         let mut phase = ((steps - periods * length) * CODE_ONE as f64) as u64;
         if phase >= u64::from(self.steps) * CODE_ONE {
             phase -= u64::from(self.steps) * CODE_ONE;
@@ -94,7 +96,7 @@ impl Spreading {
         CodeTime { period, phase }
     }
 
-    /// Writes the signs around `samples` samples that start at `at` and advance by `step`, with the
+    /// Appends the signs around `samples` samples that start at `at` and advance by `step`, with the
     /// data of each period (`negative` says whether it is sent inverted), and returns the position
     /// of the first sample in them.
     pub fn strip(
@@ -105,49 +107,45 @@ impl Spreading {
         negative: impl Fn(i64) -> bool,
         out: &mut Vec<u64>,
     ) -> u64 {
-        out.clear();
+        let per_period = u64::from(self.steps);
         let first = at.phase / CODE_ONE;
-        let behind = MARGIN_STEPS.saturating_sub(first).div_ceil(u64::from(self.steps));
+        let behind = MARGIN_STEPS.saturating_sub(first).div_ceil(per_period);
         let mut period = at.period - behind as i64;
-        let mut chip = first + behind * u64::from(self.steps) - MARGIN_STEPS;
+        let mut chip = first + behind * per_period - MARGIN_STEPS;
         let span = (at.phase % CODE_ONE + step * samples as u64) / CODE_ONE;
-        let mut left = span + 2 * MARGIN_STEPS + 1;
-        let (mut word, mut filled) = (0_u64, 0_u64);
-        let mut inverted = negative(period);
-        while left > 0 {
-            let take = left.min(u64::from(self.steps) - chip).min(64 - filled);
-            let mut signs = self.window(chip as usize);
-            if inverted {
-                signs = !signs;
-            }
-            word |= (signs & (u64::MAX << (64 - take))) >> filled;
+        let total = (span + 2 * MARGIN_STEPS + 1) as usize;
+        let begin = out.len();
+        out.resize(begin + total.div_ceil(64) + 2, 0);
+        let mut filled = 0;
+        while filled < total {
+            let take = (total - filled).min((per_period - chip) as usize);
+            let words = out.get_mut(begin + filled / 64..begin + (filled + take).div_ceil(64)).unwrap_or(&mut []);
+            self.copy(chip as usize, negative(period), filled % 64, words);
             filled += take;
-            left -= take;
-            chip += take;
-            if filled == 64 {
-                out.push(word);
-                (word, filled) = (0, 0);
-            }
-            if chip == u64::from(self.steps) {
-                chip = 0;
-                period += 1;
-                inverted = negative(period);
-            }
+            (chip, period) = (0, period + 1);
         }
-        out.extend([word, 0, 0]);
         MARGIN_STEPS * CODE_ONE + at.phase % CODE_ONE
     }
 
-    fn window(&self, step: usize) -> u64 {
-        window(&self.words, step)
+    /// Writes the signs from `chip` on into `out` from its bit `from` to its end.
+    fn copy(&self, chip: usize, inverted: bool, from: usize, out: &mut [u64]) {
+        let data = if inverted { u64::MAX } else { 0 };
+        let Some((head, rest)) = out.split_first_mut() else { return };
+        let own = u64::MAX >> from;
+        *head = (*head & !own) | ((window(&self.words, chip) ^ data) >> from);
+        let next = chip + 64 - from;
+        let shift = (next % 64) as u32;
+        let pairs = self.words.get(next / 64..).unwrap_or(&[]).windows(2);
+        for (out, pair) in rest.iter_mut().zip(pairs) {
+            *out = ((pair[0] << shift) | (pair[1] >> 1 >> (63 - shift))) ^ data;
+        }
     }
 }
 
-/// The 64 signs that begin at bit `offset`; zeros beyond the end.
+/// The 64 signs that begin at bit `offset`; zeros where the word behind is missing.
 #[inline(always)]
 pub(crate) fn window(words: &[u64], offset: usize) -> u64 {
-    let high = words.get(offset / 64).copied().unwrap_or(0);
-    let low = words.get(offset / 64 + 1).copied().unwrap_or(0);
+    let Some(&[high, low]) = words.get(offset / 64..offset / 64 + 2) else { return 0 };
     let shift = (offset % 64) as u32;
     (high << shift) | (low >> 1 >> (63 - shift))
 }
@@ -170,6 +168,7 @@ mod tests {
         let mut out = Vec::new();
         for (period, chip, step) in [(0, 0, CODE_ONE / 3), (41, 1022, CODE_ONE), (5, 500, CODE_ONE / 25)] {
             let at = CodeTime { period, phase: chip * CODE_ONE + CODE_ONE / 7 };
+            out.clear();
             let position = spreading.strip(at, step, 4096, negative, &mut out);
             assert_eq!(position % CODE_ONE, CODE_ONE / 7);
             let last = (position + step * 4096) / CODE_ONE + MARGIN_STEPS;

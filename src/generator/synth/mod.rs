@@ -3,10 +3,12 @@
 //! A [`Run`] is up to 4096 samples of one ray with constant carrier and code steps, both phases
 //! as fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
 //! [`mod@reference`] evaluates each sample in `f64`, [`exact`] the same at speed; [`lanes`] is the fast
-//! kernel. Both are plain lane-array code that [`isa`] compiles for each instruction set with the same bits on all.
+//! kernel, for all runs of a stretch at once as [`bank`] gathers them. Both are plain lane-array code that [`isa`] compiles for each instruction set with the same bits on all.
 //! Limits: 15 code steps a sample; lanes fall back to a wave buffer above one step a sample.
 
+pub(crate) mod angle;
 pub mod band;
+pub mod bank;
 pub mod chips;
 pub mod exact;
 pub mod isa;
@@ -18,7 +20,7 @@ use band::Filter;
 
 use crate::generator::fidelity::Arithmetic;
 
-/// Longest run; the single-precision phasor of the fast kernel is re-anchored at least this often.
+/// Longest run; the single-precision carrier of the fast kernel is re-anchored at least this often.
 pub const RUN_SAMPLES: usize = 4096;
 
 /// Fractional bits of a code phase: Q16.48 code steps.

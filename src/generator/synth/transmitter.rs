@@ -1,17 +1,22 @@
 //! One satellite's signal as the stream needs it: when it is in view, its polynomials, its data.
 //!
-//! [`Transmitter::prepare`] gathers all of that for a stretch of samples; [`Transmitter::render`] then adds any
-//! block of the stretch to planar samples and changes nothing, so blocks run side by side.
+//! [`Transmitter::prepare`] gathers all of that for a stretch of samples; [`Transmitter::arrange`] then lists the
+//! runs of any block of the stretch and changes nothing, so blocks are made side by side.
 //! Everything is decided on absolute grids: view by whole seconds, parts and runs by sample numbers.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::sync::Arc;
 
-use super::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run, isa};
-use crate::generator::fidelity::Arithmetic;
+use super::bank::Bank;
+use super::{CODE_ONE, Edge, RUN_SAMPLES, Run};
 use crate::generator::knots::{Grid, Part, Path};
+use crate::generator::ripple::Ripples;
 use crate::generator::scene::Scene;
+use crate::generator::sky;
+use crate::generator::spoof::Constellation;
 use crate::generator::stream::GenerateError;
-use crate::generator::synth::chips::{MARGIN_STEPS, Spreading};
+use crate::generator::synth::chips::{CodeTime, MARGIN_STEPS, Spreading};
 use crate::generator::truth;
 use crate::gnss::gps::lnav::Subframe;
 use crate::gnss::record::NavigationRow;
@@ -35,6 +40,10 @@ struct Sent {
 
 /// A satellite's signal in a scene.
 pub struct Transmitter {
+    /// Whose signal it is.
+    pub from: Arc<Constellation>,
+    /// Samples in which that one sends.
+    on: Range<u64>,
     pub sv: Sv,
     pub signal: &'static Signal,
     if_hz: f64,
@@ -48,6 +57,7 @@ pub struct Transmitter {
     since: Option<u64>,
     roots: BTreeSet<u64>,
     parts: Vec<Part>,
+    ripples: Ripples,
     subframes: BTreeMap<i64, [u32; 10]>,
     /// What has been sent so far.
     pub navigation: BTreeSet<NavigationRow>,
@@ -59,9 +69,8 @@ pub struct Transmitter {
 /// Buffers of one worker.
 #[derive(Default)]
 pub struct Scratch {
-    bits: Vec<u64>,
-    wave: Vec<f32>,
-    exact: Vec<f64>,
+    /// What [`Transmitter::arrange`] has gathered.
+    pub bank: Bank,
     anchor: Option<Anchor>,
 }
 
@@ -70,6 +79,8 @@ pub struct Scratch {
 struct Anchor {
     n: u64,
     if_hz: f64,
+    /// Whole seconds of the stream.
+    second: u64,
     epoch: Epoch,
     tone: u64,
 }
@@ -80,18 +91,33 @@ impl Scratch {
             Some(anchor) if anchor.n == n && anchor.if_hz == if_hz => anchor,
             _ => {
                 let tone = tone_turns(if_hz, scene.clock.rate, n);
-                *self.anchor.insert(Anchor { n, if_hz, epoch: scene.clock.epoch(n), tone })
+                let second = scene.clock.rate.elapsed(n).0 as u64;
+                *self.anchor.insert(Anchor { n, if_hz, second, epoch: scene.clock.epoch(n), tone })
             }
         }
     }
 }
 
 impl Transmitter {
-    /// `None` if the signal's documents assign no code to `sv`.
+    /// A true satellite's signal; `None` if the signal's documents assign no code to `sv`.
     ///
     /// # Errors
     /// [`GenerateError::Rate`] if a sample would span more than 15 code steps.
     pub fn new(scene: &Scene, sv: Sv, signal: &'static Signal, edge: Edge<'_>) -> Result<Option<Self>, GenerateError> {
+        Self::of(scene, Arc::new(Constellation::authentic()), sv, signal, edge)
+    }
+
+    /// The signal that a constellation sends as `sv`.
+    ///
+    /// # Errors
+    /// Those of [`Transmitter::new`].
+    pub fn of(
+        scene: &Scene,
+        from: Arc<Constellation>,
+        sv: Sv,
+        signal: &'static Signal,
+        edge: Edge<'_>,
+    ) -> Result<Option<Self>, GenerateError> {
         let rate_hz = scene.clock.rate.hz();
         let mut sent = Vec::new();
         for component in signal.components {
@@ -105,15 +131,13 @@ impl Transmitter {
             sent.push(Sent { component, spreading, gain });
         }
         let if_hz = scene.metadata.if_hz(signal);
-        let clock = scene.receiver_clock;
-        let breaks = scene
-            .trajectory
-            .breaks_s()
-            .iter()
-            .map(|t_s| (((t_s + clock.bias_at(*t_s)) * rate_hz).ceil()).max(0.0) as u64)
-            .collect();
+        let reading_s = |t_s: &f64| scene.receiver_clock.reading_elapsed_s(scene.clock.start, *t_s);
+        let breaks = from.breaks_s(scene);
+        let breaks = breaks.iter().map(|t_s| (reading_s(t_s) * rate_hz).ceil().max(0.0) as u64).collect();
         let grid = Grid::new(scene.clock.rate, breaks, scene.fidelity.knot_tolerance_cycles, signal.carrier_hz);
         Ok(Some(Self {
+            on: from.on(scene),
+            from,
             sv,
             signal,
             if_hz,
@@ -124,6 +148,7 @@ impl Transmitter {
             since: None,
             roots: BTreeSet::new(),
             parts: Vec::new(),
+            ripples: Ripples::default(),
             subframes: BTreeMap::new(),
             navigation: BTreeSet::new(),
             seen: false,
@@ -137,8 +162,21 @@ impl Transmitter {
     /// # Errors
     /// Those of orbits.
     pub fn root(&self, scene: &Scene, root: u64) -> Result<Vec<Part>, GenerateError> {
-        let observe =
-            |n: u64| truth::seen(scene, self.sv, self.signal, scene.clock.epoch(n)).map(|s| s.map(|s| s.arrivals));
+        // A spinning antenna needs thousands of nodes a second, between which the orbit is a short polynomial.
+        let arc = if scene.trajectory.spins() {
+            let (first, last) = (root * self.root_samples(), (root + 1) * self.root_samples());
+            sky::Arc::through(&scene.catalogue, self.sv, scene.clock.epoch(first), scene.clock.epoch(last))?
+        } else {
+            None
+        };
+        let observe = |n: u64| {
+            let local = scene.clock.epoch(n);
+            let seen = match &arc {
+                Some(arc) => truth::seen_on(scene, &self.from, arc, self.signal, local),
+                None => truth::seen_from(scene, &self.from, self.sv, self.signal, local),
+            };
+            seen.map(|seen| seen.map(|seen| seen.arrivals))
+        };
         Ok(self.grid.root(root, &observe)?)
     }
 
@@ -158,12 +196,15 @@ impl Transmitter {
         for second in first..=last {
             if !self.view.contains_key(&second) {
                 let sample = rate.first_sample_at(second, 1);
-                let up = truth::in_view(scene, self.sv, scene.clock.epoch(sample))?;
+                let up = truth::in_view_from(scene, &self.from, self.sv, scene.clock.epoch(sample))?;
                 self.since = if up { self.since.or(Some(sample)) } else { None };
                 self.view.insert(second, up);
             }
         }
         self.parts.retain(|part| part.end > from);
+        if to <= self.on.start || from >= self.on.end {
+            return Ok(());
+        }
         if !self.view.values().any(|up| *up) {
             return Ok(());
         }
@@ -178,6 +219,7 @@ impl Transmitter {
                 self.parts.extend(parts);
             }
         }
+        self.ripples.prepare(scene, self.from.fading(self.sv), self.signal, from, to);
         self.prepare_messages(scene, from, to)
     }
 
@@ -225,14 +267,27 @@ impl Transmitter {
         Ok(())
     }
 
-    /// Whether the satellite is in view at a sample of the prepared stretch.
+    /// Whether the satellite is sent and in view at a sample of the prepared stretch.
     pub fn in_view(&self, scene: &Scene, sample: u64) -> bool {
-        self.view.get(&(scene.clock.rate.elapsed(sample).0 as u64)).copied().unwrap_or(false)
+        self.on.contains(&sample)
+            && self.view.get(&(scene.clock.rate.elapsed(sample).0 as u64)).copied().unwrap_or(false)
     }
 
     /// Seconds that the satellite has been in view at a sample.
     pub fn in_view_s(&self, scene: &Scene, sample: u64) -> f64 {
         self.since.map_or(0.0, |since| scene.clock.rate.elapsed_s(sample.saturating_sub(since)))
+    }
+
+    /// Phases that a run beginning at sample `n` of the prepared stretch has there: the carrier of the first ray and
+    /// component in 2^-64 turn, and its code. `None` where the satellite does not arrive.
+    pub fn phases(&self, scene: &Scene, n: u64) -> Option<(u64, CodeTime)> {
+        let part = self.parts.iter().find(|part| (part.start..part.end).contains(&n))?;
+        let (path, sent, u) = (part.paths.first()?, self.sent.first()?, part.fraction(n));
+        let tone = (tone_turns(self.if_hz, scene.clock.rate, n), self.tone_step);
+        let [ripple, _] = self.ripples.ends(n, n);
+        let rho_cycles = path.carrier.at(u) + ripple.carrier_cycles;
+        let (turns, _) = carrier(scene.metadata.inverted, tone, rho_cycles, 0.0);
+        Some((turns, sent.spreading.at(scene.clock.epoch(n), path.delay.at(u) + ripple.delay_s)))
     }
 
     /// Whether a code period of a component is sent inverted.
@@ -244,26 +299,20 @@ impl Transmitter {
         words.get(bit / 30).is_some_and(|word| word >> (29 - bit % 30) & 1 == 1)
     }
 
-    /// Adds samples from `start` on, a multiple of 4096, to `i` and `q`.
-    pub fn render(
-        &self,
-        scene: &Scene,
-        kernel: Kernel<'_>,
-        start: u64,
-        i: &mut [f32],
-        q: &mut [f32],
-        scratch: &mut Scratch,
-    ) {
-        let end = start + i.len() as u64;
+    /// Gathers the runs of `samples` samples from `start` on, a multiple of 4096, in the bank of `scratch`.
+    pub fn arrange(&self, scene: &Scene, start: u64, samples: usize, scratch: &mut Scratch) {
+        let end = start + samples as u64;
         let first = self.parts.partition_point(|part| part.end <= start);
         for part in self.parts.iter().skip(first).take_while(|part| part.start < end) {
             for path in &part.paths {
+                let run_samples = self.ripples.run_samples().map_or(path.run_samples, |r| r.min(path.run_samples));
                 let mut n = start.max(part.start);
                 while n < end.min(part.end) {
-                    let whole = ((n / path.run_samples + 1) * path.run_samples).min(part.end);
-                    let (a, b) = ((n - start) as usize, (whole.min(end) - start) as usize);
-                    if let (true, Some(i), Some(q)) = (self.in_view(scene, n), i.get_mut(a..b), q.get_mut(a..b)) {
-                        self.run(scene, kernel, (part, path), (n, whole), (i, q), scratch);
+                    let whole = ((n / run_samples + 1) * run_samples).min(part.end);
+                    let anchor = scratch.anchor(scene, self.if_hz, n);
+                    if self.on.contains(&n) && self.view.get(&anchor.second) == Some(&true) {
+                        let samples = (n - start) as usize..(whole.min(end) - start) as usize;
+                        self.run(scene, (part, path), anchor, whole, samples, &mut scratch.bank);
                     }
                     n = whole;
                 }
@@ -271,52 +320,50 @@ impl Transmitter {
         }
     }
 
-    /// Adds one run: the samples of `span` as far as `i` and `q` reach.
+    /// Gathers one run of every component: from the anchor to `end`, as far as `samples` reach.
     fn run(
         &self,
         scene: &Scene,
-        kernel: Kernel<'_>,
         (part, path): (&Part, &Path),
-        span: (u64, u64),
-        (i, q): (&mut [f32], &mut [f32]),
-        scratch: &mut Scratch,
+        anchor: Anchor,
+        end: u64,
+        samples: Range<usize>,
+        bank: &mut Bank,
     ) {
-        let (n, length) = (span.0, (span.1 - span.0) as f64);
-        let (u, v) = (part.fraction(span.0), part.fraction(span.1));
-        let cn0_hz = path.cn0_hz[0] + (path.cn0_hz[1] - path.cn0_hz[0]) * 0.5 * (u + v);
-        let anchor = scratch.anchor(scene, self.if_hz, n);
-        let carrier = carrier(scene.metadata.inverted, (anchor.tone, self.tone_step), path, length, (u, v));
+        let length = (end - anchor.n) as f64;
+        let (u, v) = (part.fraction(anchor.n), part.fraction(end));
+        let [first, last] = self.ripples.ends(anchor.n, end);
+        let cn0_hz = path.cn0_hz.at(0.5 * (u + v));
+        let rho_cycles = path.carrier.at(u) + first.carrier_cycles;
+        let gained_cycles = path.carrier.change(u, v) + (last.carrier_cycles - first.carrier_cycles);
+        let tone = (anchor.tone, self.tone_step);
+        let carrier = carrier(scene.metadata.inverted, tone, rho_cycles, gained_cycles / length);
         let real = if scene.metadata.format.is_complex() { 1.0 } else { std::f64::consts::SQRT_2 };
         let rate_hz = scene.clock.rate.hz();
-        let amplitude = real * (2.0 * cn0_hz.max(0.0) / rate_hz).sqrt() * f64::from(scene.noise_lsb);
+        let gain = 0.5 * (first.gain + last.gain);
+        let amplitude = real * gain * (2.0 * cn0_hz.max(0.0) / rate_hz).sqrt() * f64::from(scene.noise_lsb);
         for sent in &self.sent {
-            let sent_s = length / rate_hz - path.delay.change(u, v);
+            let sent_s = length / rate_hz - path.delay.change(u, v) - (last.delay_s - first.delay_s);
             let step = (sent_s * sent.spreading.step_rate_hz() / length * CODE_ONE as f64) as u64;
-            let at = sent.spreading.at(anchor.epoch, path.delay.at(u));
+            let at = sent.spreading.at(anchor.epoch, path.delay.at(u) + first.delay_s);
             let message = sent.spreading.message();
-            let position =
-                sent.spreading.strip(at, step, i.len(), |period| self.negative(message, period), &mut scratch.bits);
             let phase = sent.component.phase_cycles * if scene.metadata.inverted { -1.0 } else { 1.0 };
-            let run = Run {
-                bits: &scratch.bits,
-                position,
+            bank.push((anchor.n, end), samples.clone(), |bits| Run {
+                bits: &[],
+                position: sent.spreading.strip(at, step, samples.len(), |period| self.negative(message, period), bits),
                 step,
                 turns: carrier.0.wrapping_add(turns(phase)),
                 turns_step: carrier.1,
                 amplitude: amplitude * sent.gain,
-            };
-            match kernel.arithmetic {
-                Arithmetic::F32 => isa::accumulate(kernel.level, kernel.edge, &run, i, q, &mut scratch.wave),
-                Arithmetic::F64 => isa::accumulate_exact(kernel.level, kernel.edge, &run, i, q, &mut scratch.exact),
-            }
+            });
         }
     }
 }
 
 /// Carrier phase at the start of a run and its step, in 2^-64 turn: `if_hz · n / rate − s · rho_phi / lambda`
 /// with s = −1 in an inverted spectrum. `tone` is the first term, and its step.
-fn carrier(inverted: bool, tone: (u64, u64), path: &Path, length: f64, (u, v): (f64, f64)) -> (u64, u64) {
-    let (at, step) = (turns(path.carrier.at(u)), turns(path.carrier.change(u, v) / length));
+fn carrier(inverted: bool, tone: (u64, u64), rho_cycles: f64, step_cycles: f64) -> (u64, u64) {
+    let (at, step) = (turns(rho_cycles), turns(step_cycles));
     if inverted {
         (tone.0.wrapping_add(at), tone.1.wrapping_add(step))
     } else {

@@ -3,14 +3,17 @@
 //! A [`Trajectory`] is a row of knots (time, ECEF position, velocity, acceleration) joined by quintic Hermite
 //! pieces, so position, velocity and acceleration are continuous and each is the exact derivative of the one
 //! before. One knot at rest is a static antenna. Where the acceleration's slope jumps, a break is reported, so
-//! that knots of the signal can be put there. Attitude is not modelled.
+//! that knots of the signal can be put there. With an [`Attitude`] the antenna sits on a body that turns.
 
+pub mod attitude;
 pub mod file;
 pub mod ramp;
 pub mod rocket;
 pub mod route;
+pub mod shaking;
 pub mod spline;
 
+use attitude::{Attitude, Orientation};
 use nalgebra::Vector3;
 
 /// Position, velocity and acceleration of the antenna in ECEF.
@@ -51,13 +54,14 @@ pub struct Trajectory {
     knots: Vec<Knot>,
     breaks_s: Vec<f64>,
     first: Knot,
+    attitude: Option<Attitude>,
 }
 
 impl Trajectory {
     /// An antenna that does not move.
     pub fn fixed(position_m: Vector3<f64>) -> Self {
         let first = Knot { t_s: 0.0, motion: Motion::at_rest(position_m) };
-        Self { knots: vec![first], breaks_s: Vec::new(), first }
+        Self { knots: vec![first], breaks_s: Vec::new(), first, attitude: None }
     }
 
     /// Motion through `knots`, whose times must ascend; `None` if they do not, or if there are none.
@@ -70,12 +74,38 @@ impl Trajectory {
         }
         breaks_s.sort_by(f64::total_cmp);
         breaks_s.dedup();
-        Some(Self { knots, breaks_s, first })
+        Some(Self { knots, breaks_s, first, attitude: None })
     }
 
-    /// The motion `t_s` true seconds after the scene's start. Before the first knot and after the last one the
-    /// acceleration there continues; [`Self::span_s`] says where that is.
+    /// The same motion of a body with an attitude.
+    pub fn with_attitude(self, attitude: Attitude) -> Self {
+        Self { attitude: Some(attitude), ..self }
+    }
+
+    /// The body's attitude, where the scene gives it one.
+    pub fn attitude(&self) -> Option<&Attitude> {
+        self.attitude.as_ref()
+    }
+
+    /// The body's axes `t_s` true seconds after the scene's start, where it has an attitude.
+    pub fn orientation(&self, t_s: f64) -> Option<Orientation> {
+        self.attitude.map(|attitude| attitude.at(t_s, &self.body(t_s)))
+    }
+
+    /// Whether the body spins.
+    pub fn spins(&self) -> bool {
+        self.attitude.is_some_and(|attitude| attitude.spin_hz != 0.0)
+    }
+
+    /// The antenna's motion `t_s` true seconds after the scene's start.
     pub fn at(&self, t_s: f64) -> Motion {
+        let body = self.body(t_s);
+        self.attitude.map_or(body, |attitude| attitude.antenna(t_s, &body))
+    }
+
+    /// The body's motion. Before the first knot and after the last one the acceleration there continues;
+    /// [`Self::span_s`] says where that is.
+    fn body(&self, t_s: f64) -> Motion {
         let next = self.knots.partition_point(|knot| knot.t_s <= t_s);
         let left = next.checked_sub(1).and_then(|i| self.knots.get(i)).unwrap_or(&self.first);
         match self.knots.get(next) {
@@ -96,7 +126,8 @@ impl Trajectory {
 
     /// Whether the antenna never moves.
     pub fn is_static(&self) -> bool {
-        self.knots.iter().all(|knot| knot.motion == Motion::at_rest(self.first.motion.position_m))
+        let swings = self.spins() && self.attitude.is_some_and(|attitude| attitude.lever_arm_m.yz().norm() > 0.0);
+        !swings && self.knots.iter().all(|knot| knot.motion == Motion::at_rest(self.first.motion.position_m))
     }
 
     /// First and last instant that the knots cover; for all times where nothing moves at that end.

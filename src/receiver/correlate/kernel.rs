@@ -1,29 +1,37 @@
-//! The fast correlator: sixteen lanes of plain Rust, compiled for three instruction sets.
+//! The fast correlators compiled for three instruction sets, and all that is written for one of them.
 //!
-//! No fused multiply-add that could round otherwise and a fixed order of sums, so that every level gives the same bits.
-//! A vector of sixteen samples is turned by the phasor of its first sample only; what is left, the turn within a
-//! vector, is the same for every vector and is applied to the sums. Phasors come from powers in `f64` and carry an error
-//! of a few 1e-7; code phases of lanes resolve 2⁻²⁷ chip. With AVX-512 chips are looked up sixteen at a time.
+//! [`single`] and [`short`] are plain Rust for any processor and for AVX2. With AVX-512 chips are looked up in tables,
+//! sixteen or thirty-two at a time. Every level gives the same bits.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64 as x86;
 
-use num_complex::{Complex32, Complex64};
+use num_complex::Complex64;
 
-use super::{CODE_BITS, Edge, Nco, Replica, TURN};
+use super::carrier::LANES;
+#[cfg(target_arch = "x86_64")]
+use super::carrier::filled;
+use super::short::{self, GROUP};
+use super::single::{self, CHUNK};
+#[cfg(target_arch = "x86_64")]
+use super::single::{Chunk, FINE, FINE_MASK, Lanes, split};
+use super::{CODE_BITS, Edge, Nco, Replica};
 
-const LANES: usize = 16;
-/// Vectors whose sums stay in `f32`.
-const VECTORS: usize = 64;
-const CHUNK: usize = LANES * VECTORS;
-/// Fraction bits of a lane's code phase.
-const FINE: u32 = 27;
-const FINE_MASK: u32 = (1 << FINE) - 1;
 /// Entries of a chip table beyond one period.
 pub(super) const TABLE_MARGIN: usize = CHUNK + LANES;
+/// The same of a table of short integers.
+pub(super) const SHORT_MARGIN: usize = GROUP;
 /// Steps of the code up to this keep a vector's chips within one register of the table.
 #[cfg(target_arch = "x86_64")]
 const LOOKUP_STEP: u64 = 15 << (CODE_BITS - 4);
+
+/// What the fast correlators compute in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fast {
+    /// `short`, or `single` where the code's step does not suit it.
+    Short,
+    Single,
+}
 
 /// An instruction set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,24 +85,30 @@ fn avx512() -> bool {
 }
 
 /// Samples and replica of one call.
-struct Job<'a> {
-    replica: &'a Replica,
-    i: &'a [f32],
-    q: &'a [f32],
-    nco: Nco,
+pub(super) struct Job<'a> {
+    pub replica: &'a Replica,
+    pub i: &'a [f32],
+    pub q: &'a [f32],
+    pub nco: Nco,
+    /// In 16 bits, if asked for and possible.
+    short: Option<short::Steps>,
 }
 
 /// Correlates `taps` in groups of three, then one by one. `level` must be one that this processor has.
 pub(super) fn correlate<const T: usize>(
     level: Level,
+    fast: Fast,
     replica: &Replica,
-    i: &[f32],
-    q: &[f32],
+    (i, q): (&[f32], &[f32]),
     nco: &Nco,
     taps: &[i64; T],
 ) -> [Complex64; T] {
     let length = i.len().min(q.len());
-    let job = Job { replica, i: &i[..length], q: &q[..length], nco: *nco };
+    let short = match fast {
+        Fast::Short => short::Steps::new(replica, nco.code_step),
+        Fast::Single => None,
+    };
+    let job = Job { replica, i: &i[..length], q: &q[..length], nco: *nco, short };
     let step = nco.code_step as i64;
     // Area edges look at the chip in which the sample's interval ends, and at the one before.
     let ahead = match replica.edge {
@@ -116,24 +130,27 @@ pub(super) fn correlate<const T: usize>(
 
 fn at_level<const T: usize>(level: Level, job: &Job, begins: [u64; T]) -> [Complex64; T] {
     match (level, job.replica.edge) {
-        (Level::Baseline, Edge::Area) => body::<T>(job, begins, lanes::<T, true>),
-        (Level::Baseline, Edge::Nearest) => body::<T>(job, begins, lanes::<T, false>),
+        (Level::Baseline, Edge::Area) => plain::<T, true>(job, begins),
+        (Level::Baseline, Edge::Nearest) => plain::<T, false>(job, begins),
         // SAFETY: `Level` values beyond the baseline come from `best` (and `all` in tests), which detected the features.
         #[cfg(target_arch = "x86_64")]
-        (Level::Avx512, Edge::Area) if job.nco.code_step <= LOOKUP_STEP => unsafe {
-            body_avx512::<T, true>(job, begins)
-        },
+        (Level::Avx2, Edge::Area) => unsafe { plain_avx2::<T, true>(job, begins) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        (Level::Avx512, Edge::Nearest) if job.nco.code_step <= LOOKUP_STEP => unsafe {
-            body_avx512::<T, false>(job, begins)
-        },
+        (Level::Avx2, Edge::Nearest) => unsafe { plain_avx2::<T, false>(job, begins) },
         // SAFETY: as above; `avx512` asks for AVX2 too.
         #[cfg(target_arch = "x86_64")]
-        (Level::Avx2 | Level::Avx512, Edge::Area) => unsafe { body_avx2::<T, true>(job, begins) },
+        (Level::Avx512, Edge::Area) => unsafe { avx512_or_less::<T, true>(job, begins) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        (Level::Avx2 | Level::Avx512, Edge::Nearest) => unsafe { body_avx2::<T, false>(job, begins) },
+        (Level::Avx512, Edge::Nearest) => unsafe { avx512_or_less::<T, false>(job, begins) },
+    }
+}
+
+fn plain<const T: usize, const AREA: bool>(job: &Job, begins: [u64; T]) -> [Complex64; T] {
+    match &job.short {
+        Some(steps) => short::body(job, steps, begins, short::lanes::<T, AREA>),
+        None => single::body(job, begins, single::lanes::<T, AREA>),
     }
 }
 
@@ -141,165 +158,122 @@ fn at_level<const T: usize>(level: Level, job: &Job, begins: [u64; T]) -> [Compl
 #[target_feature(enable = "avx2")]
 // A closure has the instruction set of its function, `lanes` as a value has not.
 #[expect(clippy::redundant_closure)]
-fn body_avx2<const T: usize, const AREA: bool>(job: &Job, begins: [u64; T]) -> [Complex64; T] {
-    body::<T>(job, begins, |chunk, code| lanes::<T, AREA>(chunk, code))
+fn plain_avx2<const T: usize, const AREA: bool>(job: &Job, begins: [u64; T]) -> [Complex64; T] {
+    match &job.short {
+        Some(steps) => short::body(job, steps, begins, |chunk, code| short::lanes::<T, AREA>(chunk, code)),
+        None => single::body(job, begins, |chunk, code| single::lanes::<T, AREA>(chunk, code)),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2")]
+fn avx512_or_less<const T: usize, const AREA: bool>(job: &Job, begins: [u64; T]) -> [Complex64; T] {
+    match &job.short {
+        Some(steps) => short_avx512::<T, AREA>(job, steps, begins),
+        None if job.nco.code_step <= LOOKUP_STEP => single_avx512::<T, AREA>(job, begins),
+        None => plain_avx2::<T, AREA>(job, begins),
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn body_avx512<const T: usize, const AREA: bool>(job: &Job, begins: [u64; T]) -> [Complex64; T] {
-    body::<T>(job, begins, |chunk, code| lanes_avx512::<T, AREA>(chunk, code))
+fn single_avx512<const T: usize, const AREA: bool>(job: &Job, begins: [u64; T]) -> [Complex64; T] {
+    single::body(job, begins, |chunk, code| lanes_avx512::<T, AREA>(chunk, code))
 }
 
-/// Up to [`CHUNK`] samples, and what is needed to correlate them.
-struct Chunk<'a> {
-    replica: &'a Replica,
-    steps: &'a Steps,
-    i: &'a [f32],
-    q: &'a [f32],
-    /// Phasor of each vector's first sample.
-    cos: [f32; VECTORS],
-    sin: [f32; VECTORS],
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+fn short_avx512<const T: usize, const AREA: bool>(job: &Job, steps: &short::Steps, begins: [u64; T]) -> [Complex64; T] {
+    short::body(job, steps, begins, |chunk, code| short_lanes_avx512::<T, AREA>(chunk, code))
 }
 
-/// How the code moves.
-struct Steps {
-    lane: [u32; LANES],
-    inverse_width: f32,
-    advance: u64,
-    period: u64,
-}
-
-/// Sums of each lane, a tap.
-struct Lanes<const T: usize> {
-    re: [[f32; LANES]; T],
-    im: [[f32; LANES]; T],
-}
-
-/// Powers of one phasor.
-struct Powers<const N: usize> {
-    re: [f64; N],
-    im: [f64; N],
-}
-
-impl<const N: usize> Powers<N> {
-    /// Powers 0 to N − 1 and the N-th; N is a power of two.
-    #[inline(always)]
-    fn of(base: Complex64) -> (Self, Complex64) {
-        let mut powers = Self { re: [1.0; N], im: [0.0; N] };
-        let (mut size, mut next) = (1, base);
-        while size < N {
-            let (low_re, high_re) = powers.re.split_at_mut(size);
-            let (low_im, high_im) = powers.im.split_at_mut(size);
-            for k in 0..size {
-                high_re[k] = low_re[k] * next.re - low_im[k] * next.im;
-                high_im[k] = low_re[k] * next.im + low_im[k] * next.re;
-            }
-            next *= next;
-            size *= 2;
-        }
-        (powers, next)
-    }
-}
-
-#[inline(always)]
-fn body<const T: usize>(
-    job: &Job,
-    begins: [u64; T],
-    lanes: impl Fn(&Chunk, &mut [u64; T]) -> Lanes<T>,
-) -> [Complex64; T] {
-    let step = job.nco.code_step;
-    let fine = CODE_BITS - FINE;
-    let width = (step >> fine) as u32;
-    let period = job.replica.period() as u64;
-    let steps = Steps {
-        lane: std::array::from_fn(|k| (step.wrapping_mul(k as u64) >> fine) as u32),
-        inverse_width: 1.0 / width.max(1) as f32,
-        advance: step.wrapping_mul(LANES as u64) % period,
-        period,
-    };
-    let (within, vector_turn) = Powers::<LANES>::of(phasor(job.nco.carrier_step));
-    let (turns, chunk_turn) = Powers::<VECTORS>::of(vector_turn);
-    let (turns_re, turns_im) = (turns.re.map(|x| x as f32), turns.im.map(|x| x as f32));
-    let mut anchor = phasor(job.nco.carrier);
-    let mut code = begins;
-    let mut totals = [([0.0_f64; LANES], [0.0_f64; LANES]); T];
-    for (i, q) in job.i.chunks(CHUNK).zip(job.q.chunks(CHUNK)) {
-        let (re, im) = (anchor.re as f32, anchor.im as f32);
-        let mut chunk = Chunk { replica: job.replica, steps: &steps, i, q, cos: [0.0; VECTORS], sin: [0.0; VECTORS] };
-        for m in 0..VECTORS {
-            chunk.cos[m] = turns_re[m] * re - turns_im[m] * im;
-            chunk.sin[m] = turns_re[m] * im + turns_im[m] * re;
-        }
-        let sums = lanes(&chunk, &mut code);
-        for (total, (re, im)) in totals.iter_mut().zip(sums.re.iter().zip(&sums.im)) {
-            for k in 0..LANES {
-                total.0[k] += f64::from(re[k]);
-                total.1[k] += f64::from(im[k]);
-            }
-        }
-        anchor *= chunk_turn;
-    }
-    totals.map(|(re, im)| {
-        (0..LANES).map(|k| Complex64::new(re[k], im[k]) * Complex64::new(within.re[k], -within.im[k])).sum()
-    })
-}
-
-/// One chunk in plain lanes; the last vector is filled up with zeros.
-#[inline(always)]
-fn lanes<const T: usize, const AREA: bool>(chunk: &Chunk, code: &mut [u64; T]) -> Lanes<T> {
-    let mut sums = Lanes { re: [[0.0; LANES]; T], im: [[0.0; LANES]; T] };
-    let (vectors_i, rest_i) = chunk.i.as_chunks::<LANES>();
-    let (vectors_q, rest_q) = chunk.q.as_chunks::<LANES>();
-    let phasors = || chunk.cos.iter().zip(&chunk.sin);
-    for ((&cos, &sin), (i, q)) in phasors().zip(vectors_i.iter().zip(vectors_q)) {
-        vector::<T, AREA>(chunk, Complex32::new(cos, sin), i, q, code, &mut sums);
-    }
-    if let (Some((&cos, &sin)), false) = (phasors().nth(vectors_i.len()), rest_i.is_empty()) {
-        vector::<T, AREA>(chunk, Complex32::new(cos, sin), &filled(rest_i), &filled(rest_q), code, &mut sums);
-    }
-    sums
-}
-
-/// Sixteen samples. Every shift and sum of phases wraps on purpose: indices stay below 32 while a chip is not shorter than
-/// a sample.
-#[inline(always)]
-fn vector<const T: usize, const AREA: bool>(
-    chunk: &Chunk,
-    phasor: Complex32,
-    i: &[f32; LANES],
-    q: &[f32; LANES],
-    code: &mut [u64; T],
-    sums: &mut Lanes<T>,
-) {
+/// [`short::lanes`] with chips looked up in tables.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+#[inline]
+fn short_lanes_avx512<const T: usize, const AREA: bool>(chunk: &short::Chunk, code: &mut [u64; T]) -> short::Sums<T> {
     let steps = chunk.steps;
-    let (mut re, mut im) = ([0.0_f32; LANES], [0.0_f32; LANES]);
-    for k in 0..LANES {
-        re[k] = i[k] * phasor.re + q[k] * phasor.im;
-        im[k] = q[k] * phasor.re - i[k] * phasor.im;
-    }
-    for (code, (sum_re, sum_im)) in code.iter_mut().zip(sums.re.iter_mut().zip(&mut sums.im)) {
-        let (chip, fraction) = split(*code);
-        let window = chunk.replica.words[chip >> 5].wrapping_shl((chip & 31) as u32);
-        let (window, window_after) = ((window >> 32) as u32, (window >> 31) as u32);
-        for k in 0..LANES {
-            let phase = fraction.wrapping_add(steps.lane[k]);
-            let chip = sign(window, phase >> FINE);
-            let value = if AREA {
-                let share = ((phase & FINE_MASK) as i32 as f32 * steps.inverse_width).min(1.0);
-                // The product is exact.
-                chip + (sign(window_after, phase >> FINE) - chip) * share
-            } else {
-                chip
-            };
-            sum_re[k] += re[k] * value;
-            sum_im[k] += im[k] * value;
+    let (values, changes) = (chunk.replica.short_values.as_slice(), chunk.replica.short_changes.as_slice());
+    // Code phases are below the period.
+    assert!((steps.period >> CODE_BITS) as usize + GROUP <= values.len().min(changes.len()));
+    let lanes = load_lanes(&steps.lanes);
+    let fine = x86::_mm_cvtsi32_si128(steps.fine as i32);
+    let fine_mask = x86::_mm512_set1_epi16(((1_u32 << steps.fine) - 1) as i16);
+    let width = x86::_mm512_set1_epi16(steps.width as i16);
+    let slope = x86::_mm512_set1_epi16(steps.slope);
+    let none = x86::_mm512_setzero_si512();
+    let (mut sums_re, mut sums_im) = ([none; T], [none; T]);
+    let mut codes = *code;
+    let phasors = chunk.cos.iter().zip(chunk.sin);
+    for ((i, q), (&cos, &sin)) in chunk.i.iter().zip(chunk.q).zip(phasors) {
+        let (i, q) = (fixed_avx512(i), fixed_avx512(q));
+        let (cos, sin) = (x86::_mm512_set1_epi32(cos), x86::_mm512_set1_epi32(sin));
+        let re = x86::_mm512_add_epi16(x86::_mm512_mulhrs_epi16(i, cos), x86::_mm512_mulhrs_epi16(q, sin));
+        let im = x86::_mm512_sub_epi16(x86::_mm512_mulhrs_epi16(q, cos), x86::_mm512_mulhrs_epi16(i, sin));
+        let (mut phase, mut index, mut value, mut within) = ([none; T], [none; T], [none; T], [none; T]);
+        let (mut near, mut near_slope) = ([none; T], [none; T]);
+        for t in 0..T {
+            let (chip, fraction) = steps.split(codes[t]);
+            codes[t] = steps.next(codes[t]);
+            phase[t] = x86::_mm512_set1_epi16(fraction as i16);
+            // SAFETY: `chip` is within the period, and thirty-two entries from there on are in the table.
+            near[t] = unsafe { x86::_mm512_loadu_epi16(values.as_ptr().add(chip)) };
+            if AREA {
+                // SAFETY: as above.
+                near_slope[t] = unsafe { x86::_mm512_loadu_epi16(changes.as_ptr().add(chip)) };
+            }
         }
-        *code = wrapped(code.wrapping_add(steps.advance), steps.period);
+        for phase in &mut phase {
+            *phase = x86::_mm512_add_epi16(*phase, lanes);
+        }
+        for t in 0..T {
+            index[t] = x86::_mm512_srl_epi16(phase[t], fine);
+        }
+        if AREA {
+            for near_slope in &mut near_slope {
+                *near_slope = x86::_mm512_mullo_epi16(*near_slope, slope);
+            }
+            for t in 0..T {
+                within[t] = x86::_mm512_min_epu16(x86::_mm512_and_si512(phase[t], fine_mask), width);
+            }
+            for t in 0..T {
+                near_slope[t] = x86::_mm512_permutexvar_epi16(index[t], near_slope[t]);
+            }
+        }
+        for t in 0..T {
+            value[t] = x86::_mm512_permutexvar_epi16(index[t], near[t]);
+        }
+        if AREA {
+            for t in 0..T {
+                within[t] = x86::_mm512_mulhrs_epi16(near_slope[t], within[t]);
+            }
+            for t in 0..T {
+                value[t] = x86::_mm512_add_epi16(value[t], within[t]);
+            }
+        }
+        for t in 0..T {
+            sums_re[t] = x86::_mm512_add_epi32(sums_re[t], x86::_mm512_madd_epi16(re, value[t]));
+            sums_im[t] = x86::_mm512_add_epi32(sums_im[t], x86::_mm512_madd_epi16(im, value[t]));
+        }
     }
+    *code = codes;
+    short::Sums { re: sums_re.map(|sum| store_int(sum)), im: sums_im.map(|sum| store_int(sum)) }
 }
 
-/// The same with chips looked up in tables. The one fused operation has an exact product, so it rounds as [`lanes`] does.
+/// Samples k and k + 16 side by side, in 2⁻⁷ LSB.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw")]
+#[inline]
+fn fixed_avx512(x: &[f32; GROUP]) -> x86::__m512i {
+    let align = x86::_mm512_set1_ps(short::ALIGN);
+    // SAFETY: thirty-two values are there, and any alignment will do.
+    let (first, second) = unsafe { (x86::_mm512_loadu_ps(x.as_ptr()), x86::_mm512_loadu_ps(x.as_ptr().add(LANES))) };
+    let first = x86::_mm512_castps_si512(x86::_mm512_add_ps(first, align));
+    let second = x86::_mm512_castps_si512(x86::_mm512_add_ps(second, align));
+    x86::_mm512_mask_blend_epi16(0xaaaa_aaaa, first, x86::_mm512_slli_epi32::<16>(second))
+}
+
+/// [`single::lanes`] with chips looked up in tables. The one fused operation has an exact product, so it rounds as [`single::lanes`] does.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
 #[inline]
@@ -354,26 +328,13 @@ fn lanes_avx512<const T: usize, const AREA: bool>(chunk: &Chunk, code: &mut [u64
     Lanes { re: sums_re.map(|sum| store(sum)), im: sums_im.map(|sum| store(sum)) }
 }
 
-/// Chip and fraction of a code phase.
-#[inline(always)]
-fn split(code: u64) -> (usize, u32) {
-    ((code >> CODE_BITS) as usize, (code >> (CODE_BITS - FINE)) as u32 & FINE_MASK)
-}
-
 /// A code phase below `period`; few periods are taken off.
 #[inline(always)]
-fn wrapped(mut code: u64, period: u64) -> u64 {
+pub(super) fn wrapped(mut code: u64, period: u64) -> u64 {
     while code >= period {
         code -= period;
     }
     code
-}
-
-#[inline(always)]
-fn filled(rest: &[f32]) -> [f32; LANES] {
-    let mut all = [0.0; LANES];
-    all[..rest.len()].copy_from_slice(rest);
-    all
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -390,6 +351,24 @@ fn load(x: &[f32; LANES]) -> x86::__m512 {
 fn load_u32(x: &[u32; LANES]) -> x86::__m512i {
     // SAFETY: as `load`.
     unsafe { x86::_mm512_loadu_si512(x.as_ptr().cast()) }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+#[inline]
+fn load_lanes(x: &[[u16; 2]; LANES]) -> x86::__m512i {
+    // SAFETY: as `load`.
+    unsafe { x86::_mm512_loadu_si512(x.as_ptr().cast()) }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+#[inline]
+fn store_int(x: x86::__m512i) -> [i32; LANES] {
+    let mut out = [0; LANES];
+    // SAFETY: there is room for sixteen values, and any alignment will do.
+    unsafe { x86::_mm512_storeu_si512(out.as_mut_ptr().cast(), x) };
+    out
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -436,16 +415,4 @@ fn power_lanes(i: &[f32], q: &[f32]) -> f64 {
         total += lanes.iter().map(|&x| f64::from(x)).sum::<f64>();
     }
     total
-}
-
-/// −1 where that chip of the window is a logical 1.
-#[inline(always)]
-fn sign(window: u32, index: u32) -> f32 {
-    f32::from_bits(0x3f80_0000 ^ (window.wrapping_shl(index) & 0x8000_0000))
-}
-
-/// e^{jθ} of a phase in 2⁻⁶⁴ turns.
-fn phasor(turns: u64) -> Complex64 {
-    let (sin, cos) = libm::sincos(turns as i64 as f64 / TURN * std::f64::consts::TAU);
-    Complex64::new(cos, sin)
 }

@@ -6,32 +6,29 @@
 
 use num_complex::Complex64;
 
-use super::lock::{Cn0, PhaseLock, SymbolSync};
-use super::loops::{self, CodeShape, Gains, Rates};
-use super::{CodeDiscriminator, Measurement, Report, Symbol, TrackingSettings};
+use super::closed::{Loops, Mode, Update};
+use super::lock::{Cn0, PhaseLock, SLIP_COSINE, SymbolSync};
+use super::loops::CodeShape;
+use super::{Measurement, Report, Symbol, TrackingSettings};
 use crate::gnss::record::TrackingRow;
-use crate::gnss::samples::IfMetadata;
+use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
-use crate::receiver::correlate::{self, Nco, Replica, TURN, chips_to_units, correlation, units_to_chips};
+use crate::receiver::correlate::{self, Arithmetic, Nco, Replica, TURN, chips_to_units, correlation, units_to_chips};
 use crate::receiver::source::Block;
 
 mod supervise;
 
 /// Prompts over which phase lock is averaged before symbols are known.
 const LOCK_PERIODS: f64 = 100.0;
-/// One symbol whose mean phase is 60° or more away is taken for a slip.
-const SLIP_COSINE: f64 = -0.5;
 /// Periods over which the power of the samples is averaged.
 const POWER_PERIODS: f64 = 100.0;
 /// The power is measured in one of this many periods.
 const POWER_EVERY: u64 = 8;
 /// Group of prompts and verification for signals without symbols.
 const PILOT_GROUP: u32 = 20;
-/// Below this T·C/N0 the code discriminator's lost gain is not given back any further.
-const LEAST_SNR: f64 = 1.0;
 
 /// How far a channel is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,14 +39,14 @@ enum Stage {
     Tracking(u64),
 }
 
-/// Values of the last update, for [`TrackingRow`].
-#[derive(Clone, Copy, Debug, Default)]
-struct Update {
-    prompt: Complex64,
-    dll_chips: f64,
-    pll_cycles: f64,
-    fll_hz: f64,
-    integration_s: f64,
+impl Stage {
+    fn mode(self) -> Mode {
+        match self {
+            Self::Frequency => Mode::Frequency,
+            Self::Assisted => Mode::Assisted,
+            Self::Tracking(_) => Mode::Phase,
+        }
+    }
 }
 
 /// One signal of one satellite being followed.
@@ -61,6 +58,8 @@ pub struct Channel {
     hit: Acquired,
     rate: Rate,
     if_hz: f64,
+    /// Turns a sample at the nominal IF, in 2⁻⁶⁴ turns.
+    if_step: u64,
     /// +1, or −1 where the spectrum is inverted: sense of Doppler in the samples.
     sense: f64,
     chip_rate_hz: f64,
@@ -69,9 +68,9 @@ pub struct Channel {
     has_symbols: bool,
     /// `None` where the documents assign no code: such a channel is lost from the start.
     replica: Option<Replica>,
+    arithmetic: Arithmetic,
     replica_power: f64,
     taps: [i64; 3],
-    shape: CodeShape,
 
     /// Number of the sample at which the running period begins, and the NCOs there.
     start: Option<u64>,
@@ -85,11 +84,7 @@ pub struct Channel {
     carry: (Vec<f32>, Vec<f32>),
     whole: bool,
 
-    carrier_rates: Rates,
-    code_rates: Rates,
-    pll: Gains,
-    fll: Gains,
-    dll: Gains,
+    loops: Loops,
     wide: bool,
     stage: Stage,
     stage_since: u64,
@@ -130,7 +125,9 @@ impl Channel {
         let (peak, _) = correlation(settings.replica, chips_per_sample, 0.0);
         let (side, slope) = correlation(settings.replica, chips_per_sample, half);
         let sense = if metadata.inverted { -1.0 } else { 1.0 };
-        let none = Gains::of_root(1, 1.0);
+        let (common, _) = correlation(settings.replica, chips_per_sample, settings.spacing_chips);
+        let shape = CodeShape { value: side / peak, slope: -slope / peak, common: common / peak };
+        let loops = Loops::new(settings, shape, message.is_some(), sense * hit.doppler_hz);
         let mut channel = Self {
             settings: settings.clone(),
             sv: hit.sv,
@@ -138,6 +135,7 @@ impl Channel {
             hit: *hit,
             rate: metadata.rate,
             if_hz: metadata.if_hz(hit.signal),
+            if_step: tone_turns(metadata.if_hz(hit.signal), metadata.rate, 1),
             sense,
             chip_rate_hz,
             period_s,
@@ -145,9 +143,13 @@ impl Channel {
             has_symbols: message.is_some(),
             lost: replica.is_none(),
             replica,
+            arithmetic: match (settings.arithmetic, metadata.format) {
+                (Arithmetic::I16, Format::Ci8 | Format::Cu8 | Format::Ri8) => Arithmetic::I16,
+                (Arithmetic::I16 | Arithmetic::F32, _) => Arithmetic::F32,
+                (Arithmetic::F64, _) => Arithmetic::F64,
+            },
             replica_power: peak,
             taps: [chips_to_units(half), 0, -chips_to_units(half)],
-            shape: CodeShape { value: side / peak, slope: -slope / peak },
             start: None,
             first: 0,
             code: 0,
@@ -157,11 +159,7 @@ impl Channel {
             carrier_step: 0,
             carry: (Vec::new(), Vec::new()),
             whole: false,
-            carrier_rates: Rates { rate: sense * hit.doppler_hz, acceleration: 0.0 },
-            code_rates: Rates::default(),
-            pll: none,
-            fll: none,
-            dll: none,
+            loops,
             wide: true,
             stage: Stage::Frequency,
             stage_since: 0,
@@ -256,33 +254,20 @@ impl Channel {
     fn set_steps(&mut self) {
         let rate_hz = self.rate.hz();
         let update_s = self.period_s * f64::from(self.periods_per_update());
-        let offset_hz = self.carrier_rates.mean(update_s);
+        let offset_hz = self.loops.carrier.mean(update_s);
         self.carrier_step = (offset_hz / rate_hz * TURN) as i128;
         let aid_hz = self.sense * offset_hz * self.chip_rate_hz / self.signal.carrier_hz;
-        self.code_step = chips_to_units((self.chip_rate_hz + aid_hz + self.code_rates.mean(update_s)) / rate_hz).max(1);
+        self.code_step = chips_to_units((self.chip_rate_hz + aid_hz + self.loops.code.mean(update_s)) / rate_hz).max(1);
     }
 
     fn periods_per_update(&self) -> u32 {
-        match self.stage {
-            Stage::Tracking(_) => {
-                (1..=self.settings.integration.max(1)).rev().find(|m| self.group.is_multiple_of(*m)).unwrap_or(1)
-            }
-            _ => 1,
-        }
+        self.stage.mode().periods_per_update(&self.settings, self.group)
     }
 
     /// Gains for the present stage.
     fn design(&mut self) {
         let update_s = self.period_s * f64::from(self.periods_per_update());
-        let settings = &self.settings;
-        let (fll_order, fll_hz) = match self.stage {
-            Stage::Frequency => (settings.fll_order, settings.fll_bandwidth_hz),
-            _ => (1, settings.fll_assist_bandwidth_hz),
-        };
-        let dll_hz = if self.wide { settings.dll_pull_in_bandwidth_hz } else { settings.dll_bandwidth_hz };
-        self.fll = Gains::design(fll_order, fll_hz * update_s);
-        self.pll = Gains::design(settings.pll_order, settings.pll_bandwidth_hz * update_s);
-        self.dll = Gains::design(settings.dll_order, dll_hz * update_s);
+        self.loops.design(&self.settings, self.stage.mode(), self.wide, update_s);
     }
 
     fn since_s(&self, sample: u64) -> f64 {
@@ -293,7 +278,7 @@ impl Channel {
     fn correlate(&mut self, replica: &Replica, i: &[f32], q: &[f32], next: u64, report: &mut Report) {
         let nco = Nco {
             carrier: tone_turns(self.if_hz, self.rate, self.first).wrapping_add(self.carrier as u64),
-            carrier_step: tone_turns(self.if_hz, self.rate, 1).wrapping_add(self.carrier_step as u64),
+            carrier_step: self.if_step.wrapping_add(self.carrier_step as u64),
             code: self.code,
             code_step: self.code_step as u64,
         };
@@ -303,7 +288,7 @@ impl Channel {
             self.carry.1.extend_from_slice(q);
         }
         let (i, q) = if carried { (&self.carry.0[..], &self.carry.1[..]) } else { (i, q) };
-        let sums = replica.correlate(i, q, &nco, &self.taps);
+        let sums = replica.correlate_in(self.arithmetic, (i, q), &nco, &self.taps);
         if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
             let power = correlate::power(i, q) / i.len().max(1) as f64;
             self.power =
@@ -381,43 +366,15 @@ impl Channel {
 
     /// Closes the loops with the sums of an integration.
     fn update(&mut self) {
-        let periods = self.summed;
-        let t_s = self.period_s * f64::from(periods);
-        let [early, prompt, late] = self.sums;
-        let mut last = Update { prompt, integration_s: t_s, ..Update::default() };
-        last.prompt /= f64::from(periods).sqrt();
-        if let (Some(before), Stage::Frequency | Stage::Assisted) = (self.previous, self.stage) {
-            last.fll_hz = if self.has_symbols {
-                loops::frequency_two_quadrant(before, prompt, t_s)
-            } else {
-                loops::frequency_four_quadrant(before, prompt, t_s)
-            };
-            if self.stage == Stage::Frequency {
-                self.carrier_rates = loops::frequency_step(&self.fll, &self.carrier_rates, last.fll_hz, t_s);
-            } else {
-                self.carrier_rates.rate += self.fll.phase * last.fll_hz;
-            }
-        }
-        if let (Some(before), Stage::Tracking(_)) = (self.previous_sum, self.stage) {
-            // Only reported: the frequency loop has done its work. Two quadrants do not mind a symbol in between.
-            last.fll_hz = loops::frequency_two_quadrant(before, prompt, t_s);
-        }
-        self.previous_sum = Some(prompt);
-        last.pll_cycles = if self.has_symbols { loops::costas(prompt) } else { loops::phase(prompt) };
-        if self.stage != Stage::Frequency {
-            let (rates, jump) = loops::step(&self.pll, &self.carrier_rates, last.pll_cycles, t_s);
-            self.carrier_rates = rates;
-            self.carrier += (jump * TURN) as i128;
-        }
-        let snr = self.cn0.hz().map_or(f64::INFINITY, |hz| (hz * t_s).max(LEAST_SNR));
-        last.dll_chips = match self.settings.dll_discriminator {
-            CodeDiscriminator::EarlyMinusLate => loops::early_minus_late(early, late, &self.shape, snr),
-            CodeDiscriminator::DotProduct => loops::dot_product(early, prompt, late, &self.shape, snr),
+        let t_s = self.period_s * f64::from(self.summed);
+        let before = match self.stage {
+            Stage::Tracking(_) => self.previous_sum,
+            Stage::Frequency | Stage::Assisted => self.previous,
         };
-        let (rates, jump) = loops::step(&self.dll, &self.code_rates, last.dll_chips, t_s);
-        self.code_rates = rates;
-        self.code += chips_to_units(jump);
-        self.last = last;
+        self.previous_sum = Some(self.sums[1]);
+        self.last = self.loops.close(self.stage.mode(), self.sums, before, self.summed, t_s, self.cn0.hz());
+        self.carrier += (self.last.carrier_jump_cycles * TURN) as i128;
+        self.code += chips_to_units(self.last.code_jump_chips);
     }
 
     /// The replica's state at `tick`, in the running period.
@@ -431,7 +388,7 @@ impl Channel {
         let turns = (carrier >> 64) as f64 + carrier as u64 as f64 / TURN;
         let half = if self.polarity == Some(true) { 0.5 } else { 0.0 };
         let passed_s = tick.saturating_sub(self.update_since) as f64 / self.rate.hz();
-        let offset_hz = self.carrier_rates.rate + self.carrier_rates.acceleration * passed_s;
+        let offset_hz = self.loops.carrier.rate + self.loops.carrier.acceleration * passed_s;
         let cn0_dbhz = self.cn0.hz().map_or(self.hit.cn0_dbhz, |hz| 10.0 * libm::log10(hz));
         report.measurements.push(Measurement {
             sample: tick,
@@ -461,7 +418,7 @@ impl Channel {
 
     #[cfg(test)]
     pub(super) fn shift_frequency(&mut self, hz: f64) {
-        self.carrier_rates.rate += hz;
+        self.loops.carrier.rate += hz;
         self.set_steps();
     }
 

@@ -80,6 +80,11 @@ impl Cn0 {
     }
 }
 
+/// Symbols over which phase lock is averaged once they are known.
+pub const LOCK_SYMBOLS: f64 = 6.0;
+/// One symbol whose mean phase is 60° or more away is taken for a slip.
+pub const SLIP_COSINE: f64 = -0.5;
+
 /// Mean cosine of twice the phase error.
 #[derive(Clone, Debug)]
 pub struct PhaseLock {

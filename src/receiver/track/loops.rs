@@ -126,36 +126,92 @@ pub struct CodeShape {
     pub value: f64,
     /// −R'(d/2)/R(0), per chip.
     pub slope: f64,
+    /// R(d)/R(0), which is also the correlation of the noise of early and late.
+    pub common: f64,
 }
 
 impl CodeShape {
     /// The triangle of unlimited bandwidth at a spacing `d` chips.
     pub fn triangle(d: f64) -> Self {
-        Self { value: 1.0 - 0.5 * d, slope: 1.0 }
+        Self { value: 1.0 - 0.5 * d, slope: 1.0, common: (1.0 - d).max(0.0) }
+    }
+
+    /// Mean gain of [`early_minus_late`] at a T·C/N0 of the prompts.
+    ///
+    /// Sum and difference of early and late are independent, so with 1/x = ∫e^(−xt)dt the mean of the quotient is
+    /// x·∫₀¹[(1−u)/(1−(1−r)u)]²·e^(−xu)du, x = 2·snr·value²/(1+common), r = (1−common)/(1+common): about 1−2r/x.
+    pub fn early_minus_late_gain(&self, snr: f64) -> f64 {
+        let x = 2.0 * snr * self.value * self.value / (1.0 + self.common);
+        let r = (1.0 - self.common) / (1.0 + self.common);
+        // Beyond e⁻⁴⁰ nothing is left; Simpson's rule then errs by less than 1e-5.
+        let step = f64::min(1.0, 40.0 / x) / f64::from(INTERVALS);
+        let sum: f64 = (0..=INTERVALS)
+            .map(|k| {
+                let u = f64::from(k) * step;
+                let quotient = if u < 1.0 { (1.0 - u) / (1.0 - u + r * u) } else { 0.0 };
+                let weight = if k == 0 || k == INTERVALS { 1.0 } else { f64::from(2 + 2 * (k % 2)) };
+                weight * quotient * quotient * libm::exp(-x * u)
+            })
+            .sum();
+        x * sum * step / 3.0
+    }
+}
+
+/// Intervals of the gain's integral.
+const INTERVALS: u32 = 256;
+
+/// Mean gain of [`dot_product`] at a T·C/N0 of the prompts: 1−e^(−snr), the mean of Re(P)/|P|² of a complex Gaussian.
+pub fn dot_product_gain(snr: f64) -> f64 {
+    -libm::expm1(-snr)
+}
+
+/// The gain of a code discriminator over T·C/N0 from 1 (below, that of 1) to 2²⁰ (beyond, one).
+#[derive(Clone, Debug)]
+pub struct CodeGain {
+    table: Vec<f64>,
+}
+
+/// Entries of the table an octave, and octaves: interpolation errs by less than 1e-3.
+const ENTRIES: f64 = 4.0;
+const OCTAVES: f64 = 20.0;
+
+impl CodeGain {
+    /// Tabulates a gain.
+    pub fn new(gain: impl Fn(f64) -> f64) -> Self {
+        let entries = (ENTRIES * OCTAVES) as u32;
+        Self { table: (0..=entries).map(|k| gain(libm::exp2(f64::from(k) / ENTRIES))).collect() }
+    }
+
+    /// The gain at T·C/N0.
+    pub fn at(&self, snr: f64) -> f64 {
+        let x = ENTRIES * libm::log2(snr.max(1.0));
+        let rest = self.table.get(x.min(ENTRIES * OCTAVES) as usize..);
+        match rest.and_then(|rest| rest.first_chunk()) {
+            Some([a, b]) => a + (b - a) * (x - x.floor()),
+            None => 1.0,
+        }
     }
 }
 
 /// Code error in chips: (|E|²−|L|²)/(|E|²+|L|²), scaled by its slope at zero, 2·slope/value (4/(2−d) for the triangle).
 ///
-/// Noise adds to the denominator, so the mean gain falls to 1/(1+1/(value²·T·C/N0)); `snr` = T·C/N0 of the prompts gives
-/// it back (infinite: no correction). Positive when the received code is ahead of the replica.
-pub fn early_minus_late(early: Complex64, late: Complex64, shape: &CodeShape, snr: f64) -> f64 {
+/// Noise in the denominator lowers the mean gain to `gain` ([`CodeShape::early_minus_late_gain`]), which is given back.
+/// Positive when the received code is ahead of the replica.
+pub fn early_minus_late(early: Complex64, late: Complex64, shape: &CodeShape, gain: f64) -> f64 {
     let (e, l) = (early.norm_sqr(), late.norm_sqr());
     if e + l <= 0.0 {
         return 0.0;
     }
-    let gain = 1.0 / (1.0 + 1.0 / (shape.value * shape.value * snr));
-    (e - l) / (e + l) * shape.value / (2.0 * shape.slope) / gain
+    (e - l) / (e + l) * shape.value / (2.0 * shape.slope * gain)
 }
 
-/// Code error in chips: Re((E−L)·P*)/|P|², scaled by 2·slope; the gain falls to 1/(1+1/(T·C/N0)) and is given back.
-pub fn dot_product(early: Complex64, prompt: Complex64, late: Complex64, shape: &CodeShape, snr: f64) -> f64 {
+/// Code error in chips: Re((E−L)·P*)/|P|², scaled by 2·slope; `gain` is that of [`dot_product_gain`].
+pub fn dot_product(early: Complex64, prompt: Complex64, late: Complex64, shape: &CodeShape, gain: f64) -> f64 {
     let power = prompt.norm_sqr();
     if power <= 0.0 {
         return 0.0;
     }
-    let gain = 1.0 / (1.0 + 1.0 / snr);
-    ((early - late) * prompt.conj()).re / power / (2.0 * shape.slope) / gain
+    ((early - late) * prompt.conj()).re / power / (2.0 * shape.slope * gain)
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! Tracking: one channel follows one signal of one satellite.
 //!
 //! A [`Channel`] takes consecutive blocks of samples and gives the state of its replica at requested samples, message
-//! symbols, rows for the judge and events. Its loops ([`loops`]) are designed in the discrete domain; detectors
-//! are in [`lock`]. Limits: the first component of a signal only, one code period at least as long as a few samples.
+//! symbols, rows for the judge and events. Its loops ([`loops`]) are designed in the discrete domain and
+//! closed in [`closed`]; detectors are in [`lock`]. Limits: the first component of a signal only, one code period at least as long as a few samples.
 
 use crate::gnss::record::{Event, TrackingRow};
 
 mod channel;
+pub mod closed;
 pub mod lock;
 pub mod loops;
 pub mod settings;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::receiver::correlate::Edge;
+use crate::receiver::correlate::{Arithmetic, Edge};
 
 /// How the code error is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,6 +41,8 @@ pub struct TrackingSettings {
     /// Code periods a loop update once symbols are known: a divisor of 20.
     pub integration: u32,
     pub replica: Edge,
+    /// What correlations are computed in.
+    pub arithmetic: Arithmetic,
     /// Phase lock (mean cosine of twice the phase error) is declared at this value …
     pub phase_lock_threshold: f64,
     /// … and lost below this one, as a cycle slip; 0.4 leaves room for 30° of dynamic stress.
@@ -71,6 +73,7 @@ impl Default for TrackingSettings {
             spacing_chips: 0.5,
             integration: 4,
             replica: Edge::Area,
+            arithmetic: Arithmetic::I16,
             phase_lock_threshold: 0.85,
             phase_unlock_threshold: 0.4,
             loss_s: 0.2,
@@ -173,6 +176,7 @@ mod tests {
     #[test]
     fn unknown_keys_are_refused() {
         assert!(serde_json::from_str::<TrackingSettings>(r#"{"pll_bandwith_hz": 15}"#).is_err());
+        assert!(serde_json::from_str::<TrackingSettings>(r#"{"arithmetic": "f16"}"#).is_err());
         let some: TrackingSettings = serde_json::from_str(r#"{"replica": "nearest", "pll_order": 2}"#).unwrap();
         assert_eq!((some.replica, some.pll_order, some.dll_order), (Edge::Nearest, 2, 1));
     }

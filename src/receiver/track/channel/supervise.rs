@@ -5,11 +5,9 @@ use num_complex::Complex64;
 use super::{Channel, LOCK_PERIODS, Stage};
 use crate::gnss::record::Event;
 use crate::receiver::track::Report;
-use crate::receiver::track::lock::{Cn0, PhaseLock, SymbolSync};
+use crate::receiver::track::lock::{Cn0, LOCK_SYMBOLS, PhaseLock, SymbolSync};
 use crate::receiver::track::loops::{self, Rates};
 
-/// Symbols over which phase lock is averaged once they are known.
-const LOCK_SYMBOLS: f64 = 6.0;
 /// A frequency error beyond this, in spite of phase lock, is a false lock: between 0 and the nearest one, 1/(2·symbol).
 const FALSE_LOCK_SHARE: f64 = 0.4;
 /// Symbols over which the frequency is verified.
@@ -30,7 +28,7 @@ impl Channel {
             Stage::Frequency if self.since_s(self.stage_since) >= self.settings.fll_pull_in_s => {
                 if self.settings.pll_order < 3 {
                     // No loop would correct it from here on.
-                    self.carrier_rates.acceleration = 0.0;
+                    self.loops.carrier.acceleration = 0.0;
                 }
                 self.enter(Stage::Assisted);
             }
@@ -144,7 +142,7 @@ impl Channel {
         self.rotation = (Complex64::ZERO, 0);
         let nearest_hz = 0.5 / (self.period_s * f64::from(self.group));
         if error_hz.abs() > FALSE_LOCK_SHARE * nearest_hz && self.locked_since.is_some() {
-            self.carrier_rates = Rates { rate: self.carrier_rates.rate + error_hz, acceleration: 0.0 };
+            self.loops.carrier = Rates { rate: self.loops.carrier.rate + error_hz, acceleration: 0.0 };
             self.interrupt(report);
             self.enter(Stage::Frequency);
         }

@@ -1,0 +1,236 @@
+//! What lies between satellites and antenna, as written, and the effects that it becomes.
+
+use std::path::PathBuf;
+
+use super::compose::Files;
+use super::read::Table;
+use super::{Scenario, ScenarioError};
+use crate::generator::effect::ionosphere::KlobucharIonosphere;
+use crate::generator::effect::mapping;
+use crate::generator::effect::tec::{Content, EARTH_RADIUS_M, Mapping, Shell, ShellIonosphere};
+use crate::generator::effect::troposphere::{Air, Troposphere, Weather};
+use crate::generator::ray::Effect;
+use crate::gnss::ionex::{Interpolation, Maps};
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::time::Epoch;
+use crate::gnss::vienna::{Gpt3, MappingGrid};
+
+pub(super) const IONOSPHERE_KEYS: &[&str] = &[
+    "model",
+    "alpha",
+    "beta",
+    "vtec_tecu",
+    "shell_km",
+    "file",
+    "map_start",
+    "interpolation",
+    "mapping",
+    "broadcast_alpha",
+    "broadcast_beta",
+];
+pub(super) const TROPOSPHERE_KEYS: &[&str] =
+    &["model", "height_m", "pressure_hpa", "temperature_c", "relative_humidity", "gpt3_file", "mapping", "vmf_file"];
+/// Height of the shell unless the scene says otherwise: that of the IGS's maps.
+const SHELL_KM: f64 = 450.0;
+
+/// What the ionosphere truly is, and what the satellites say that it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ionosphere {
+    pub truth: Electrons,
+    /// Coefficients that the satellites send; absent means those of `truth`, or else the navigation file's.
+    pub broadcast: Option<Klobuchar>,
+}
+
+/// Where the electrons are.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Electrons {
+    /// Klobuchar's model with the given coefficients, or those of the navigation file.
+    Klobuchar(Option<Klobuchar>),
+    /// The same vertical content everywhere.
+    Constant { vtec_tecu: f64, shell: Shell },
+    /// Maps from a file; `map_start` is the instant of the maps that stands at the scene's start.
+    Ionex { file: PathBuf, map_start: Option<Epoch>, interpolation: Interpolation, mapping: Mapping },
+}
+
+pub(super) fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError> {
+    let models = [("klobuchar", 0), ("constant_tec", 1), ("ionex", 2)];
+    let model =
+        table.choice("model", &models)?.ok_or_else(|| table.bad("model", "klobuchar, constant_tec or ionex"))?;
+    let broadcast = coefficients(table, "broadcast_alpha", "broadcast_beta")?;
+    let mappings = [("single_layer", Mapping::SingleLayer), ("modified_single_layer", Mapping::ModifiedSingleLayer)];
+    let mapping = |table: &Table<'_>| Ok(table.choice("mapping", &mappings)?.unwrap_or(Mapping::SingleLayer));
+    let truth = match model {
+        0 => {
+            table.allow(&["model", "alpha", "beta", "broadcast_alpha", "broadcast_beta"])?;
+            Electrons::Klobuchar(coefficients(table, "alpha", "beta")?)
+        }
+        1 => {
+            table.allow(&["model", "vtec_tecu", "shell_km", "mapping", "broadcast_alpha", "broadcast_beta"])?;
+            let height_m = table.number("shell_km", 100.0..=1000.0, "km")?.unwrap_or(SHELL_KM) * 1e3;
+            let shell = Shell { radius_m: EARTH_RADIUS_M, height_m, mapping: mapping(table)? };
+            Electrons::Constant { vtec_tecu: table.required("vtec_tecu", 0.0..=1000.0, "TECU")?, shell }
+        }
+        _ => {
+            table.allow(&[
+                "model",
+                "file",
+                "map_start",
+                "interpolation",
+                "mapping",
+                "broadcast_alpha",
+                "broadcast_beta",
+            ])?;
+            let file = table.text("file", "a path")?.ok_or_else(|| table.bad("file", "the path of an IONEX file"))?;
+            let start = table.instant("map_start")?;
+            let ways = [("bilinear", Interpolation::Bilinear), ("bicubic", Interpolation::Bicubic)];
+            Electrons::Ionex {
+                file: PathBuf::from(file),
+                map_start: start.map(|s| Epoch::parse(&s).map_err(|e| table.bad("map_start", e))).transpose()?,
+                interpolation: table.choice("interpolation", &ways)?.unwrap_or(Interpolation::Bilinear),
+                mapping: mapping(table)?,
+            }
+        }
+    };
+    Ok(Ionosphere { truth, broadcast })
+}
+
+/// Klobuchar's coefficients, both lists or none.
+fn coefficients(table: &Table<'_>, alpha: &str, beta: &str) -> Result<Option<Klobuchar>, ScenarioError> {
+    // Eight-bit integers times 2^-24 and 2^16 at most (IS-GPS-200N, table 20-X).
+    match (table.numbers(alpha, 1e-4)?, table.numbers(beta, 1e7)?) {
+        (None, None) => Ok(None),
+        (Some(alpha), Some(beta)) => Ok(Some(Klobuchar { alpha, beta })),
+        (None, _) => Err(table.bad(alpha, format!("four numbers, because {beta} is given"))),
+        (_, None) => Err(table.bad(beta, format!("four numbers, because {alpha} is given"))),
+    }
+}
+
+impl Ionosphere {
+    /// What the satellites send, if the scenario says it.
+    pub(super) fn sent(&self) -> Option<Klobuchar> {
+        self.broadcast.or(match self.truth {
+            Electrons::Klobuchar(given) => given,
+            _ => None,
+        })
+    }
+
+    /// The effect, with its file read; `file_klobuchar` is what the navigation file says, `end_s` the scene's end.
+    pub(super) fn effect(
+        &self,
+        scenario: &Scenario,
+        files: &Files<'_>,
+        file_klobuchar: Option<Klobuchar>,
+        end_s: f64,
+    ) -> Result<Box<dyn Effect>, ScenarioError> {
+        match &self.truth {
+            Electrons::Klobuchar(given) => {
+                let model = given.or(file_klobuchar).ok_or_else(|| {
+                    let reason = "the navigation file has no Klobuchar coefficients: write alpha and beta here, name a file that \
+                                  has them, or remove [ionosphere]";
+                    scenario.conflict("ionosphere", reason.to_owned())
+                })?;
+                Ok(Box::new(KlobucharIonosphere { model }))
+            }
+            Electrons::Constant { vtec_tecu, shell } => {
+                Ok(Box::new(ShellIonosphere { content: Content::Constant(*vtec_tecu), shell: *shell }))
+            }
+            Electrons::Ionex { file, map_start, interpolation, mapping } => {
+                let bytes = scenario.load("ionosphere.file", files.directory, file, files.overrides)?;
+                let maps = Maps::read(&bytes, &file.display().to_string())
+                    .map_err(|e| scenario.conflict("ionosphere.file", e.to_string()))?;
+                let from = map_start.unwrap_or(scenario.start);
+                let (first, last) = maps.span();
+                if from.since(first) < 0.0 || last.since(from.plus_s(end_s)) < 0.0 {
+                    let until = from.plus_s(end_s);
+                    let reason = format!(
+                        "the maps are of {first} to {last}, the scene needs {from} to {until}: name the maps of that day, \
+                         or say with ionosphere.map_start which instant of theirs stands at the scene's start"
+                    );
+                    return Err(scenario.conflict("ionosphere.file", reason));
+                }
+                let shell = Shell { radius_m: maps.radius_m, height_m: maps.height_m, mapping: *mapping };
+                let later_s = from.since(scenario.start);
+                let content = Content::Maps { maps: Box::new(maps), later_s, interpolation: *interpolation };
+                Ok(Box::new(ShellIonosphere { content, shell }))
+            }
+        }
+    }
+}
+
+/// The neutral atmosphere as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NeutralAtmosphere {
+    pub weather: Weather,
+    /// Taken for the weather, and for the mapping if that wants coefficients.
+    pub gpt3_file: Option<PathBuf>,
+    pub mapping: MappingKind,
+}
+
+/// Which mapping function is wanted.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MappingKind {
+    Cosecant,
+    Niell,
+    /// With coefficients from this grid, or from GPT3.
+    Vmf1(Option<PathBuf>),
+}
+
+pub(super) fn troposphere(table: &Table<'_>) -> Result<NeutralAtmosphere, ScenarioError> {
+    table.choice("model", &[("saastamoinen", ())])?.ok_or_else(|| table.bad("model", "one of saastamoinen"))?;
+    let path = |key: &str| Ok(table.text(key, "a path")?.map(PathBuf::from));
+    let (gpt3_file, vmf_file) = (path("gpt3_file")?, path("vmf_file")?);
+    let standard = Weather::STANDARD;
+    let celsius = table.number("temperature_c", -90.0..=60.0, "C")?;
+    let weather = Weather {
+        height_m: table.number("height_m", -500.0..=9_000.0, "m")?.unwrap_or(standard.height_m),
+        pressure_hpa: table.number("pressure_hpa", 1.0..=1100.0, "hPa")?.unwrap_or(standard.pressure_hpa),
+        temperature_k: celsius.map_or(standard.temperature_k, |c| c + 273.15),
+        relative_humidity: table
+            .number("relative_humidity", 0.0..=1.0, "(a fraction)")?
+            .unwrap_or(standard.relative_humidity),
+    };
+    if gpt3_file.is_some() && weather != standard {
+        return Err(table.bad("gpt3_file", "no weather of the scene beside it, because it brings its own"));
+    }
+    let kinds = [("niell", MappingKind::Niell), ("cosecant", MappingKind::Cosecant), ("vmf1", MappingKind::Vmf1(None))];
+    let names: Vec<(&str, usize)> = kinds.iter().enumerate().map(|(index, (name, _))| (*name, index)).collect();
+    let index = table.choice("mapping", &names)?.unwrap_or(0);
+    let mapping = match (index, vmf_file) {
+        (2, None) if gpt3_file.is_none() => {
+            return Err(table.bad("mapping", "vmf1 together with vmf_file or gpt3_file, which hold its coefficients"));
+        }
+        (2, file) => MappingKind::Vmf1(file),
+        (_, Some(_)) => return Err(table.bad("vmf_file", "mapping = \"vmf1\" beside it")),
+        (1, None) => MappingKind::Cosecant,
+        (_, None) => MappingKind::Niell,
+    };
+    Ok(NeutralAtmosphere { weather, gpt3_file, mapping })
+}
+
+impl NeutralAtmosphere {
+    /// The effect, with its files read.
+    pub(super) fn effect(&self, scenario: &Scenario, files: &Files<'_>) -> Result<Box<dyn Effect>, ScenarioError> {
+        let gpt3 = match &self.gpt3_file {
+            None => None,
+            Some(path) => {
+                let key = "troposphere.gpt3_file";
+                let bytes = scenario.load(key, files.directory, path, files.overrides)?;
+                let read = Gpt3::read(&bytes, &path.display().to_string());
+                Some(read.map_err(|e| scenario.conflict(key, e.to_string()))?)
+            }
+        };
+        let mapping = match (&self.mapping, &gpt3) {
+            (MappingKind::Cosecant, _) => mapping::Mapping::Cosecant,
+            (MappingKind::Vmf1(Some(path)), _) => {
+                let key = "troposphere.vmf_file";
+                let bytes = scenario.load(key, files.directory, path, files.overrides)?;
+                let read = MappingGrid::read(&bytes, &path.display().to_string());
+                mapping::Mapping::ViennaGrid(Box::new(read.map_err(|e| scenario.conflict(key, e.to_string()))?))
+            }
+            (MappingKind::Vmf1(None), Some(gpt3)) => mapping::Mapping::ViennaGpt3(Box::new(gpt3.clone())),
+            (MappingKind::Niell | MappingKind::Vmf1(None), _) => mapping::Mapping::Niell,
+        };
+        let air = gpt3.map_or(Air::Weather(self.weather), |gpt3| Air::Gpt3(Box::new(gpt3)));
+        Ok(Box::new(Troposphere { air, mapping }))
+    }
+}

@@ -1,0 +1,57 @@
+//! Interference and spoofers as written.
+
+use std::path::Path;
+
+use super::super::interference::{Kind, Strength};
+use super::*;
+
+#[test]
+fn interference_and_spoofers_arrive_as_written() {
+    let scenario = parse(&(full() + HOSTILE)).unwrap();
+    let kinds: Vec<&str> = scenario.interference.iter().map(|spec| spec.kind.name()).collect();
+    assert_eq!(kinds, ["chirp", "sine_fm", "pulse", "noise", "recording"]);
+    let chirp = &scenario.interference[0];
+    assert_eq!(chirp.kind, Kind::Chirp { sweep_hz: -2e6, sweep_s: 1e-5 });
+    assert_eq!((chirp.strength, chirp.on_s, chirp.off_s), (Strength::OverSignal { db: 30.0 }, 1.0, Some(2.0)));
+    assert!(scenario.interference[2].place.is_some() && scenario.interference[0].place.is_none());
+    let spoofer = &scenario.spoofers[0];
+    assert_eq!((spoofer.advantage.start_db, spoofer.advantage.end_db, spoofer.advantage.ramp_s), (-10.0, 6.0, 5.0));
+    assert!(spoofer.motion.is_none() && spoofer.drag.is_some_and(|drag| drag.speed_mps == 5.0));
+}
+
+#[test]
+fn interference_that_contradicts_itself_is_refused_with_its_remedy() {
+    let refused = |text: &str| match parse(&format!("{MINIMAL}{STATIC}{text}")) {
+        Err(error) => error.to_string(),
+        Ok(scenario) => scenario.compose(Path::new("."), &Overrides::default()).err().unwrap().to_string(),
+    };
+    let fixed = "[power]\ncn0_dbhz = 45\n";
+    let cw = |lines: &str| format!("[[interference]]\nkind = \"cw\"\n{lines}\n");
+    assert!(refused(&cw("")).contains("exactly one of"));
+    assert!(refused(&cw("js_db = 3\npower_dbw = -130")).contains("exactly one of"));
+    assert!(refused(&cw("eirp_dbw = 3")).contains("a place with it"));
+    assert!(refused(&cw("js_db = 3")).contains("write power_dbw instead"));
+    assert!(refused(&(fixed.to_owned() + &cw("power_dbw = -120"))).contains("write js_db instead"));
+    assert!(refused(&cw("js_db = 3\non_s = 5\noff_s = 4")).contains("off_s"));
+    assert!(refused(&cw("js_db = 3\nsweep_hz = 5")).contains("unknown key 'interference[1].sweep_hz'"));
+    let pulse = |lines: &str| format!("{fixed}[[interference]]\nkind = \"pulse\"\njs_db = 3\n{lines}\n");
+    assert!(refused(&pulse("width_s = 1e-3\nrate_hz = 900\njitter = 0.2")).contains("the period less the jitter"));
+    assert!(refused(&pulse("width_s = 1e-7\nrate_hz = 900")).contains("two samples"));
+    assert!(refused("[[spoofer]]\npower_db = 3\nramp_s = 3\n").contains("both or none"));
+    let lost = "[[spoofer]]\npower_db = 3\n[spoofer.motion]\nkind = \"rocket\"\n";
+    assert!(refused(lost).contains("spoofer[1].motion"));
+}
+
+#[test]
+fn power_at_the_antenna_and_radiated_power_agree_through_free_space() {
+    let of = |lines: &str| {
+        let text = format!("{MINIMAL}{STATIC}[[interference]]\nkind = \"cw\"\n{lines}\n");
+        let (scene, _) = parse(&text).unwrap().compose(Path::new("."), &Overrides::default()).unwrap();
+        10.0 * libm::log10(scene.interference[0].jn0_hz)
+    };
+    // N0 of the default budget: −204 + 2.5 dBW/Hz, and 2 dB of losses.
+    assert!((of("power_dbw = -130") - 69.5).abs() < 1e-9);
+    // 1 km straight up, 1575.42 MHz: 20 lg(4π · 1000 / 0.190294) = 96.396 dB.
+    let radiated = of("eirp_dbw = -30\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 1130");
+    assert!((radiated - (-30.0 - 96.396 + 204.0 - 4.5)).abs() < 1e-3, "{radiated}");
+}

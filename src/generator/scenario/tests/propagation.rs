@@ -1,0 +1,73 @@
+//! What lies between satellites and antenna, as a scenario writes it.
+
+use super::*;
+
+pub(super) const IONEX: &str = "[ionosphere]\nmodel = \"ionex\"\nfile = \"igrg3380.10i.gz\"\nmap_start = 2010-12-04T10:00:00\n\
+    interpolation = \"bicubic\"\nmapping = \"modified_single_layer\"\n";
+pub(super) const TEC: &str =
+    "[ionosphere]\nmodel = \"constant_tec\"\nvtec_tecu = 20\nshell_km = 400\nmapping = \"single_layer\"\n";
+pub(super) const VIENNA: &str = "[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf1\"\ngpt3_file = \"gpt3_5.grd\"\nvmf_file = \"VMF3_20181125.H00\"\n";
+
+#[test]
+fn what_the_satellites_send_stands_apart_from_what_nature_does() {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let sent = "broadcast_alpha = [2e-8, 0, 0, 0]\nbroadcast_beta = [1e5, 0, 0, 0]\n";
+    let message = |lines: &str| {
+        let text = format!("{MINIMAL}{STATIC}{lines}");
+        let (scene, _) = parse(&text).unwrap().compose(&directory, &Overrides::default()).unwrap();
+        let truth = scene.effects[0].describe();
+        let ephemeris = scene.catalogue.sent_at(Sv::gps(13), scene.clock.start).unwrap();
+        // Page 18 of subframe 4 comes within 25 frames of 30 s, the fourth subframe 18 s into a frame.
+        let found = (0..26).find_map(|k| {
+            let at = Epoch::new(scene.clock.start.seconds() / 30 * 30 + 30 * k + 18, 0.0);
+            let words = scene.broadcast.subframe(ephemeris, at).ok()?;
+            crate::gnss::gps::lnav::Subframe::decode(&words, 0).ok()?.klobuchar()
+        });
+        (truth, found)
+    };
+    let (truth, found) = message(&format!("{IONEX}{sent}"));
+    assert!(truth.contains("IONEX") && truth.contains("bicubic"), "{truth}");
+    // 2e-8 in steps of 2^-30.
+    assert!((found.unwrap().alpha[0] - 2e-8).abs() < 5e-10);
+    let file = crate::gnss::rinex::embedded().unwrap().klobuchar.unwrap();
+    for lines in [IONEX, TEC] {
+        assert!((message(lines).1.unwrap().alpha[0] - file.alpha[0]).abs() < 5e-10);
+    }
+}
+
+#[test]
+fn maps_of_another_day_are_refused_unless_the_scene_says_so() {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let compose = |lines: &str| {
+        let text = format!("{MINIMAL}{STATIC}{lines}");
+        let composed = parse(&text).unwrap().compose(&directory, &Overrides::default());
+        composed.map(|_| ()).map_err(|e| e.to_string())
+    };
+    assert_eq!(compose(IONEX), Ok(()));
+    let error = compose(&IONEX.replace("map_start = 2010-12-04T10:00:00\n", "")).unwrap_err();
+    assert!(error.contains("2010-12-04T00:00:15") && error.contains("2010-07-01T10:00:00"), "{error}");
+    assert!(error.contains("ionosphere.map_start"), "{error}");
+    let error = compose(&IONEX.replace("2010-12-04T10", "2010-12-05T10")).unwrap_err();
+    assert!(error.contains("ionosphere.file"), "{error}");
+    let error = compose(&IONEX.replace("igrg3380.10i.gz", "ride.csv")).unwrap_err();
+    assert!(error.contains("ride.csv:1") && error.contains("IONEX VERSION / TYPE"), "{error}");
+}
+
+#[test]
+fn a_key_of_another_model_is_refused() {
+    let error = |lines: &str| parse(&format!("{MINIMAL}{STATIC}{lines}")).unwrap_err().to_string();
+    assert!(error(&format!("{TEC}alpha = [0, 0, 0, 0]\n")).contains("unknown key 'ionosphere.alpha'"));
+    assert!(error(&format!("{IONEX}broadcast_alpha = [0, 0, 0, 0]\n")).contains("broadcast_beta"));
+    assert!(error("[[obstruction]]\nkind = \"sector\"\ntop_m = 3\n").contains("unknown key 'obstruction[1].top_m'"));
+    let horizon = |azimuths: &str| {
+        format!("[[obstruction]]\nkind = \"horizon\"\nazimuth_deg = {azimuths}\nelevation_deg = [10, 20]\n")
+    };
+    assert!(error(&horizon("[0, 10, 20]")).contains("as many as azimuth_deg has: 3"));
+    assert!(error(&horizon("[10, 0]")).contains("ascending"));
+    let building = "[[obstruction]]\nkind = \"building\"\neast_m = [20, 10]\nnorth_m = [0, 1]\ntop_m = 3\n";
+    assert!(error(building).contains("smaller"));
+    let vmf1 = "[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf1\"\n";
+    assert!(error(vmf1).contains("vmf_file or gpt3_file"));
+    assert!(error(&VIENNA.replace("vmf1", "niell")).contains("vmf_file"));
+    assert!(error(&format!("{VIENNA}height_m = 3\n")).contains("brings its own"));
+}

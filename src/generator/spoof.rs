@@ -1,0 +1,228 @@
+//! Whose signals reach the antenna: the true constellation, or that of a spoofer.
+//!
+//! A spoofer sends what the true satellites would be heard to send at a claimed place and by a clock of its own, with the
+//! same messages; every signal of it goes through the machinery of the true ones. It may begin on top of them (claiming the
+//! antenna's true motion) and drag the place off smoothly. Limits: its carriers are those of the claimed geometry (no
+//! phase of its own), its own path's delay is taken as compensated, and it knows the victim's motion without error.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+use crate::generator::scene::Scene;
+use crate::generator::vehicle::{Motion, Trajectory};
+use crate::gnss::satellite::Sv;
+
+/// Pieces of a power ramp, each linear in power: of 60 dB, a piece is 0.9 dB and off by 0.02 dB at most.
+const RAMP_PIECES: u32 = 64;
+
+/// Where the signals are made for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Place {
+    /// Where the antenna is.
+    Antenna,
+    Claimed(Box<Trajectory>),
+}
+
+/// How the place is moved away from where it began.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drag {
+    /// True time since the scene's start.
+    pub start_s: f64,
+    /// Unit vector, ECEF.
+    pub direction: Vector3<f64>,
+    pub speed_mps: f64,
+    /// Until the speed is reached.
+    pub acceleration_mps2: f64,
+}
+
+/// Power over that of the true signals (what the scene's effects give at the claimed place).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Advantage {
+    pub start_db: f64,
+    pub end_db: f64,
+    /// Time from one to the other after switching on, linear in decibels.
+    pub ramp_s: f64,
+}
+
+/// A set of satellites' signals that have one origin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constellation {
+    /// 0 for the true satellites; spoofers count from 1.
+    pub number: usize,
+    pub place: Place,
+    pub drag: Option<Drag>,
+    /// Its clock minus GPS time at the scene's start, and its gain in seconds a second.
+    pub clock_bias_s: f64,
+    pub clock_drift: f64,
+    /// `None` for all in view of the claimed place.
+    pub satellites: Option<Vec<Sv>>,
+    /// `None` for the true satellites.
+    pub advantage: Option<Advantage>,
+    /// True time since the scene's start in which it sends.
+    pub on_s: Range<f64>,
+}
+
+impl Drag {
+    /// What it adds to the motion, `t_s` true seconds after the scene's start.
+    fn motion(&self, t_s: f64) -> Motion {
+        let t_s = (t_s - self.start_s).max(0.0);
+        let full_s = self.speed_mps / self.acceleration_mps2;
+        let (way, speed, acceleration) = if t_s == 0.0 {
+            (0.0, 0.0, 0.0)
+        } else if t_s < full_s {
+            (0.5 * self.acceleration_mps2 * t_s * t_s, self.acceleration_mps2 * t_s, self.acceleration_mps2)
+        } else {
+            (self.speed_mps * (t_s - 0.5 * full_s), self.speed_mps, 0.0)
+        };
+        Motion {
+            position_m: self.direction * way,
+            velocity_mps: self.direction * speed,
+            acceleration_mps2: self.direction * acceleration,
+        }
+    }
+}
+
+impl Constellation {
+    /// The true satellites as the antenna hears them.
+    pub fn authentic() -> Self {
+        Self {
+            number: 0,
+            place: Place::Antenna,
+            drag: None,
+            clock_bias_s: 0.0,
+            clock_drift: 0.0,
+            satellites: None,
+            advantage: None,
+            on_s: f64::NEG_INFINITY..f64::INFINITY,
+        }
+    }
+
+    /// The motion that its signals are made for.
+    pub fn motion(&self, scene: &Scene, t_s: f64) -> Motion {
+        let mut motion = match &self.place {
+            Place::Antenna => scene.trajectory.at(t_s),
+            Place::Claimed(trajectory) => trajectory.at(t_s),
+        };
+        if let Some(drag) = &self.drag {
+            let more = drag.motion(t_s);
+            motion.position_m += more.position_m;
+            motion.velocity_mps += more.velocity_mps;
+            motion.acceleration_mps2 += more.acceleration_mps2;
+        }
+        motion
+    }
+
+    /// Its clock minus GPS time, `t_s` true seconds after the scene's start.
+    pub fn clock_s(&self, t_s: f64) -> f64 {
+        self.clock_bias_s + self.clock_drift * t_s
+    }
+
+    /// Factor on the power of every ray.
+    pub fn gain(&self, t_s: f64) -> f64 {
+        let Some(Advantage { start_db, end_db, ramp_s }) = self.advantage else { return 1.0 };
+        let share = if ramp_s > 0.0 { ((t_s - self.on_s.start) / ramp_s).clamp(0.0, 1.0) } else { 1.0 };
+        libm::pow(10.0, (start_db + (end_db - start_db) * share) / 10.0)
+    }
+
+    /// Whether it sends the signals of a satellite at all.
+    pub fn sends(&self, sv: Sv) -> bool {
+        self.satellites.as_ref().is_none_or(|list| list.contains(&sv))
+    }
+
+    /// The satellite whose path through the ionosphere a signal takes: none for a spoofer's.
+    pub fn fading(&self, sv: Sv) -> Option<Sv> {
+        self.advantage.is_none().then_some(sv)
+    }
+
+    /// Times at which the motion's acceleration or its slope jumps, ascending.
+    pub fn motion_breaks_s(&self, scene: &Scene) -> Vec<f64> {
+        let mut breaks = match &self.place {
+            Place::Antenna => scene.trajectory.breaks_s().to_vec(),
+            Place::Claimed(trajectory) => trajectory.breaks_s().to_vec(),
+        };
+        if let Some(drag) = &self.drag {
+            breaks.extend([drag.start_s, drag.start_s + drag.speed_mps / drag.acceleration_mps2]);
+        }
+        breaks.sort_by(f64::total_cmp);
+        breaks
+    }
+
+    /// Those, and the times at which its power changes its slope.
+    pub fn breaks_s(&self, scene: &Scene) -> Vec<f64> {
+        let mut breaks = self.motion_breaks_s(scene);
+        if let Some(Advantage { ramp_s, .. }) = self.advantage.filter(|a| a.ramp_s > 0.0) {
+            breaks.extend((1..=RAMP_PIECES).map(|k| self.on_s.start + ramp_s * f64::from(k) / f64::from(RAMP_PIECES)));
+        }
+        breaks.extend([self.on_s.start, self.on_s.end].into_iter().filter(|t_s| t_s.is_finite()));
+        breaks
+    }
+
+    /// Samples in which it sends.
+    pub fn on(&self, scene: &Scene) -> Range<u64> {
+        let sample = |t_s: f64| {
+            let reading_s = scene.receiver_clock.reading_elapsed_s(scene.clock.start, t_s);
+            (reading_s * scene.clock.rate.hz()).ceil().max(0.0) as u64
+        };
+        let end = if self.on_s.end.is_finite() { sample(self.on_s.end) } else { u64::MAX };
+        (if self.on_s.start.is_finite() { sample(self.on_s.start) } else { 0 })..end
+    }
+
+    /// What it does, for the plan.
+    pub fn describe(&self) -> String {
+        let place = match &self.place {
+            Place::Antenna => "the antenna's true place".to_owned(),
+            Place::Claimed(trajectory) => {
+                let here = crate::gnss::earth::Geodetic::from_ecef(&trajectory.at(self.on_s.start).position_m);
+                let (latitude, longitude) = (here.latitude_rad.to_degrees(), here.longitude_rad.to_degrees());
+                format!("{latitude:.5} deg, {longitude:.5} deg, {:.0} m", here.height_m)
+            }
+        };
+        let mut text = format!("claims {place} from {} s", self.on_s.start);
+        if self.on_s.end.is_finite() {
+            text += &format!(" to {} s", self.on_s.end);
+        }
+        if let Some(Advantage { start_db, end_db, ramp_s }) = self.advantage {
+            text += &format!(", {end_db:+} dB");
+            if ramp_s > 0.0 {
+                text += &format!(" after a ramp from {start_db:+} dB in {ramp_s} s");
+            }
+        }
+        if let Some(drag) = &self.drag {
+            text += &format!(", dragged at {} m/s from {} s", drag.speed_mps, drag.start_s);
+        }
+        if (self.clock_bias_s, self.clock_drift) != (0.0, 0.0) {
+            text += &format!(", clock {:e} s {:+e} s/s", self.clock_bias_s, self.clock_drift);
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drag_is_the_integral_of_its_speed_and_begins_at_rest() {
+        let drag = Drag { start_s: 5.0, direction: Vector3::x(), speed_mps: 4.0, acceleration_mps2: 0.5 };
+        assert_eq!(drag.motion(5.0).position_m, Vector3::zeros());
+        // Half of 8 s at 4 m/s, then 4 m/s.
+        assert!((drag.motion(13.0).position_m.x - 16.0).abs() < 1e-12);
+        assert!((drag.motion(20.0).position_m.x - 44.0).abs() < 1e-12);
+        let h = 1e-4;
+        for t_s in [6.0, 12.0, 13.5] {
+            let slope = (drag.motion(t_s + h).position_m.x - drag.motion(t_s - h).position_m.x) / (2.0 * h);
+            assert!((slope - drag.motion(t_s).velocity_mps.x).abs() < 1e-9, "{t_s}");
+        }
+    }
+
+    #[test]
+    fn power_ramps_in_decibels_from_the_moment_of_switching_on() {
+        let advantage = Some(Advantage { start_db: -10.0, end_db: 6.0, ramp_s: 8.0 });
+        let spoofer = Constellation { number: 1, advantage, on_s: 10.0..50.0, ..Constellation::authentic() };
+        for (t_s, db) in [(10.0, -10.0), (14.0, -2.0), (18.0, 6.0), (40.0, 6.0)] {
+            assert!((10.0 * libm::log10(spoofer.gain(t_s)) - db).abs() < 1e-12, "{t_s}");
+        }
+        assert_eq!(Constellation::authentic().gain(3.0), 1.0);
+    }
+}

@@ -1,0 +1,279 @@
+//! The front end's band-pass filter, as a finite response around the signal's IF.
+//!
+//! A `brick_wall` is a sinc under a Kaiser window of 80 dB (Kaiser 1974), of linear phase; a `butterworth` is the
+//! impulse response of the analogue prototype of its order sampled at the scene's rate and cut off at −100 dB. In a
+//! real format the filter acts on the real samples, on both sides of zero. Limits: a filter delays code and carrier's
+//! envelope by its group delay, which every satellite shares; an ideal wall has edges of a twentieth of its width.
+
+use std::f64::consts::PI;
+
+use num_complex::Complex64;
+
+use crate::generator::stage::{Block, Stage};
+
+/// Shapes of filters, by the name that a scenario uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    BrickWall,
+    Butterworth { order: u32 },
+}
+
+/// Attenuation of a Kaiser window's side lobes, dB, and the β that it takes.
+const KAISER_DB: f64 = 80.0;
+/// Width of a wall's edge against the filter's width.
+const EDGE: f64 = 0.05;
+/// What is left out of an endless response, against its largest value.
+const CUT: f64 = 1e-5;
+/// Longest response.
+const MAX_TAPS: usize = 8192;
+
+/// A band-pass filter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Filter {
+    pub shape: Shape,
+    /// Width between the points of half power (both sides of the IF together).
+    pub bandwidth_hz: f64,
+    /// Delay of the envelope in the middle of the band.
+    pub group_delay_s: f64,
+    /// The response by ascending lag; imaginary parts are zero for a filter around zero.
+    re: Vec<f32>,
+    im: Vec<f32>,
+    /// Whether only the in-phase plane is sent.
+    real: bool,
+}
+
+/// Why a filter cannot be made.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum FilterError {
+    #[error("{bandwidth_hz} Hz at {rate_hz} samples a second: expected less than {limit_hz} Hz, or no filter")]
+    Wide { bandwidth_hz: f64, rate_hz: f64, limit_hz: f64 },
+    #[error("{bandwidth_hz} Hz at {rate_hz} samples a second takes {taps} taps: expected at most 8192")]
+    Narrow { bandwidth_hz: f64, rate_hz: f64, taps: usize },
+}
+
+impl Filter {
+    /// A filter around `if_hz`. `real` for a format without quadrature.
+    ///
+    /// # Errors
+    /// [`FilterError`] if the band does not fit into that of the samples, or needs too long a response.
+    pub fn new(shape: Shape, bandwidth_hz: f64, rate_hz: f64, if_hz: f64, real: bool) -> Result<Self, FilterError> {
+        let room_hz = if real { 2.0 * if_hz.abs().min(0.5 * rate_hz - if_hz.abs()) } else { rate_hz };
+        let limit_hz = room_hz / (1.0 + EDGE);
+        if bandwidth_hz >= limit_hz {
+            return Err(FilterError::Wide { bandwidth_hz, rate_hz, limit_hz });
+        }
+        let width = bandwidth_hz / rate_hz;
+        let (low_pass, delay) = match shape {
+            Shape::BrickWall => brick_wall(width),
+            Shape::Butterworth { order } => butterworth(order, width),
+        };
+        if low_pass.len() > MAX_TAPS {
+            return Err(FilterError::Narrow { bandwidth_hz, rate_hz, taps: low_pass.len() });
+        }
+        // Around the IF; a real filter keeps both sides, each at full strength.
+        let turn = std::f64::consts::TAU * if_hz / rate_hz;
+        let phase = |k: usize| libm::sincos(turn * (k as f64 - delay));
+        let scale = if real { 2.0 } else { 1.0 };
+        let re = low_pass.iter().enumerate().map(|(k, h)| (scale * h * phase(k).1) as f32).collect();
+        let im =
+            if real { Vec::new() } else { low_pass.iter().enumerate().map(|(k, h)| (h * phase(k).0) as f32).collect() };
+        Ok(Self { shape, bandwidth_hz, group_delay_s: delay / rate_hz, re, im, real })
+    }
+
+    /// Length of the response.
+    pub fn taps(&self) -> usize {
+        self.re.len()
+    }
+
+    /// Gain at `cycles` a sample.
+    pub fn response(&self, cycles: f64) -> Complex64 {
+        let im = self.im.iter().copied().chain(std::iter::repeat(0.0));
+        self.re.iter().zip(im).enumerate().fold(Complex64::ZERO, |sum, (k, (re, im))| {
+            let (sin, cos) = libm::sincos(-std::f64::consts::TAU * cycles * k as f64);
+            sum + Complex64::new(f64::from(*re), f64::from(im)) * Complex64::new(cos, sin)
+        })
+    }
+}
+
+/// A sinc of `width` cycles a sample under a Kaiser window, of unit gain in the middle, and its delay in samples.
+fn brick_wall(width: f64) -> (Vec<f64>, f64) {
+    // Kaiser's length for this attenuation and an edge of EDGE · width.
+    let length = ((KAISER_DB - 7.95) / (14.36 * EDGE * width)).ceil() as usize | 1;
+    let beta = 0.1102 * (KAISER_DB - 8.7);
+    let middle = 0.5 * (length - 1) as f64;
+    let taps: Vec<f64> = (0..length)
+        .map(|k| {
+            let x = k as f64 - middle;
+            let sinc = if x == 0.0 { width } else { libm::sin(PI * width * x) / (PI * x) };
+            let u = x / (middle + 0.5);
+            sinc * bessel_i0(beta * (1.0 - u * u).sqrt()) / bessel_i0(beta)
+        })
+        .collect();
+    (normal(taps), middle)
+}
+
+/// The response of an analogue Butterworth low-pass with half-power points at ±`width`/2 cycles a sample, as a sum of
+/// its poles' exponentials, and its delay in samples at zero frequency.
+fn butterworth(order: u32, width: f64) -> (Vec<f64>, f64) {
+    let omega = PI * width;
+    let poles: Vec<Complex64> = (0..order)
+        .map(|k| PI * (2.0 * f64::from(k) + f64::from(order) + 1.0) / (2.0 * f64::from(order)))
+        .map(|angle| Complex64::new(omega * libm::cos(angle), omega * libm::sin(angle)))
+        .collect();
+    let residues: Vec<Complex64> = poles
+        .iter()
+        .enumerate()
+        .map(|(k, pole)| {
+            let others = poles.iter().enumerate().filter(|(j, _)| *j != k);
+            others.fold(Complex64::new(libm::pow(omega, f64::from(order)), 0.0), |product, (_, p)| product / (pole - p))
+        })
+        .collect();
+    let at = |t: f64| {
+        poles.iter().zip(&residues).fold(0.0, |sum, (pole, residue)| {
+            let (sin, cos) = libm::sincos(pole.im * t);
+            sum + (residue * Complex64::new(cos, sin) * libm::exp(pole.re * t)).re
+        })
+    };
+    let slowest = poles.iter().fold(f64::MAX, |least, pole| least.min(-pole.re));
+    // Sampled at the middles of intervals, so that a first-order filter's step at zero counts half on each side.
+    let length = (-libm::log(CUT) / slowest).ceil() as usize + 1;
+    let taps = normal((0..length).map(|k| at(k as f64 + 0.5)).collect());
+    let delay = taps.iter().enumerate().fold(0.0, |sum, (k, h)| sum + k as f64 * h);
+    (taps, delay)
+}
+
+/// With unit gain at zero frequency.
+fn normal(mut taps: Vec<f64>) -> Vec<f64> {
+    let sum = taps.iter().fold(0.0, |sum, h| sum + h);
+    taps.iter_mut().for_each(|h| *h /= sum);
+    taps
+}
+
+/// Modified Bessel function of the first kind and order zero, by its series.
+fn bessel_i0(x: f64) -> f64 {
+    let quarter = 0.25 * x * x;
+    let (mut sum, mut term, mut k) = (1.0, 1.0, 1.0);
+    while term > 1e-17 * sum {
+        term *= quarter / (k * k);
+        sum += term;
+        k += 1.0;
+    }
+    sum
+}
+
+impl Stage for Filter {
+    fn name(&self) -> &'static str {
+        "filter"
+    }
+
+    fn describe(&self) -> String {
+        let shape = match self.shape {
+            Shape::BrickWall => "brick wall".to_owned(),
+            Shape::Butterworth { order } => format!("Butterworth of order {order}"),
+        };
+        let delay_ns = 1e9 * self.group_delay_s;
+        format!("{shape}, {} Hz wide, delay {delay_ns:.1} ns, {} taps", self.bandwidth_hz, self.taps())
+    }
+
+    fn memory_samples(&self) -> usize {
+        self.taps() - 1
+    }
+
+    fn act(&self, block: &mut Block<'_>) {
+        let (i, q) = (block.i.to_vec(), block.q.to_vec());
+        block.i.fill(0.0);
+        block.q.fill(0.0);
+        add(block.i, &i, &self.re, 1.0);
+        if self.real {
+            return;
+        }
+        add(block.q, &q, &self.re, 1.0);
+        if self.im.iter().any(|h| *h != 0.0) {
+            add(block.i, &q, &self.im, -1.0);
+            add(block.q, &i, &self.im, 1.0);
+        }
+    }
+}
+
+/// Adds `sign` times the convolution of `input` with `taps`; before `input` there is silence. Tap by tap, so that each
+/// sample's sum has one order however many samples are done at once.
+fn add(output: &mut [f32], input: &[f32], taps: &[f32], sign: f32) {
+    const PIECE: usize = 2048;
+    for (piece, output) in output.chunks_mut(PIECE).enumerate() {
+        let start = piece * PIECE;
+        for (lag, tap) in taps.iter().enumerate() {
+            let tap = sign * tap;
+            let skip = lag.saturating_sub(start).min(output.len());
+            let from = start + skip - lag.min(start + skip);
+            let Some(input) = input.get(from..from + output.len() - skip) else { continue };
+            for (sum, x) in output[skip..].iter_mut().zip(input) {
+                *sum += tap * x;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generator::synth::isa::Level;
+
+    fn acted(filter: &Filter, mut i: Vec<f32>, mut q: Vec<f32>) -> (Vec<f32>, Vec<f32>) {
+        let mut block = Block { start: 0, i: &mut i, q: &mut q, lead: 0, clipped: 0, level: Level::detect() };
+        filter.act(&mut block);
+        (i, q)
+    }
+
+    #[test]
+    fn half_power_is_where_the_filter_says_and_a_wall_keeps_its_edges() {
+        for (shape, rate_hz, if_hz, real) in [
+            (Shape::BrickWall, 10e6, 0.0, false),
+            (Shape::BrickWall, 10e6, 1.1e6, false),
+            (Shape::Butterworth { order: 4 }, 20e6, 0.0, false),
+            (Shape::BrickWall, 12e6, 3e6, true),
+        ] {
+            let filter = Filter::new(shape, 2.5e6, rate_hz, if_hz, real).unwrap();
+            let gain = |hz: f64| filter.response((if_hz + hz) / rate_hz).norm();
+            // Half power of the sampled prototype moves by its aliases: order 4 at a sixteenth of the rate, 0.5 %.
+            for edge_hz in [-1.25e6, 1.25e6] {
+                let expected = if shape == Shape::BrickWall { 0.5 } else { 0.5_f64.sqrt() };
+                assert!((gain(edge_hz) - expected).abs() < 0.01, "{shape:?} {if_hz}: {}", gain(edge_hz));
+            }
+            assert!((gain(0.0) - 1.0).abs() < 1e-3, "{}", gain(0.0));
+            if shape == Shape::BrickWall {
+                // 80 dB of ripple and of side lobes.
+                assert!((gain(1.15e6) - 1.0).abs() < 2e-4 && gain(1.35e6) < 2e-4);
+            } else {
+                // Order 4: 24 dB an octave beyond the edge; aliases of a sampled response add to it.
+                assert!((gain(2.5e6) - 1.0 / 257_f64.sqrt()).abs() < 0.01, "{}", gain(2.5e6));
+            }
+        }
+    }
+
+    #[test]
+    fn a_tone_comes_out_with_the_response_of_its_frequency() {
+        let filter = Filter::new(Shape::Butterworth { order: 2 }, 3e6, 10e6, 1e6, false).unwrap();
+        let cycles = 0.23;
+        let tone = |n: usize| libm::sincos(std::f64::consts::TAU * cycles * n as f64);
+        let (i, q) = acted(
+            &filter,
+            (0..9000).map(|n| tone(n).1 as f32).collect(),
+            (0..9000).map(|n| tone(n).0 as f32).collect(),
+        );
+        let expected = filter.response(cycles);
+        for n in [2047, 2048, 5000, 8999] {
+            let found = Complex64::new(f64::from(i[n]), f64::from(q[n]));
+            let carrier = Complex64::new(tone(n).1, tone(n).0);
+            // Single precision: a few hundred products of 6e-8 each.
+            assert!((found - expected * carrier).norm() < 1e-5, "{n}");
+        }
+    }
+
+    #[test]
+    fn a_band_that_does_not_fit_is_refused_with_the_one_that_does() {
+        let wide = Filter::new(Shape::BrickWall, 11e6, 10e6, 0.0, false).unwrap_err();
+        assert!(wide.to_string().contains("9523809"), "{wide}");
+        assert!(matches!(Filter::new(Shape::BrickWall, 10.0, 10e6, 0.0, false), Err(FilterError::Narrow { .. })));
+        assert!(matches!(Filter::new(Shape::BrickWall, 3e6, 10e6, 1e6, true), Err(FilterError::Wide { .. })));
+    }
+}

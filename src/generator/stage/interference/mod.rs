@@ -1,0 +1,436 @@
+//! Interference: waveforms that reach the antenna beside the satellites.
+//!
+//! An [`Interferer`] is a waveform on a carrier with a power, a time and perhaps a place. It lives in true time and arrives at
+//! RF, so the receiver's oscillator shifts it as it shifts satellites. Phases are anchored at every run of 4096
+//! samples and linear within it (a Doppler rate of 1000 Hz/s leaves 3e-4 cycle at 2.6 Msps). Power is that at the antenna's
+//! port in the waveform's whole band. Limits: no polarisation, no pattern, one straight path.
+
+pub mod arrival;
+pub mod resample;
+pub mod tone;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use arrival::{Path, Repetition, Tuning};
+use resample::{Interpolator, Position, draw};
+use tone::{Modulation, Tone};
+
+use crate::generator::random::mix;
+use crate::generator::stage::noise::BLOCK_SAMPLES;
+use crate::generator::stage::{Block, Stage};
+use crate::generator::synth::band::Filter;
+use crate::generator::synth::chips::MARGIN_STEPS;
+use crate::generator::synth::isa::{self, Level};
+use crate::generator::synth::lanes::Buffers;
+use crate::generator::synth::{CODE_ONE, Edge, Run};
+use crate::gnss::record::InterferenceRow;
+
+/// Samples of a run, on an absolute grid.
+const RUN: u64 = BLOCK_SAMPLES as u64;
+
+/// Shares of a sample by which a pulse's edge is moved, so that rounding does not decide about a sample on it.
+const EDGE_SAMPLES: f64 = 1e-6;
+
+/// How the chips of a matched waveform meet the samples.
+#[derive(Clone, Debug)]
+pub enum ChipEdge {
+    Nearest,
+    Area,
+    BandLimited(Box<Filter>),
+}
+
+/// What an interferer sends.
+#[derive(Clone, Debug)]
+pub enum Waveform {
+    Cw,
+    /// Linear sweep over `sweep_hz` (downwards if negative), from the start again at once.
+    Chirp {
+        sweep_hz: f64,
+        repetition: Repetition,
+    },
+    /// Linear up and down; a repetition is both.
+    Fmcw {
+        sweep_hz: f64,
+        repetition: Repetition,
+    },
+    /// Frequency that follows a cosine.
+    SineFm {
+        deviation_hz: f64,
+        repetition: Repetition,
+    },
+    /// A carrier that is on for `width_s`; each pulse comes late by up to `jitter` of a period, at random.
+    Pulse {
+        width_s: f64,
+        repetition: Repetition,
+        jitter: f64,
+    },
+    /// Random chips, so that the spectrum is that of a code.
+    Matched {
+        chips: Repetition,
+        edge: ChipEdge,
+    },
+    /// Gaussian noise over the samples' whole band.
+    White,
+    /// Gaussian noise of a band; `step` source samples a sample, in 2^-32.
+    Noise {
+        width_hz: f64,
+        step: u64,
+        by: Interpolator,
+    },
+    /// Recorded samples of unit mean power.
+    Recording {
+        samples: Arc<Recorded>,
+        rate: Repetition,
+        by: Interpolator,
+        repeat: bool,
+    },
+}
+
+/// Planar samples of a file.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    pub i: Vec<f32>,
+    pub q: Vec<f32>,
+}
+
+/// What the judge must know of a waveform's spectrum, in `scene.json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Spectrum {
+    pub kind: &'static str,
+    /// Of the band, the sweep or the recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub width_hz: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deviation_hz: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repetition_hz: Option<f64>,
+    /// Share of a repetition in which it is on, and by how much of one it comes late.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub duty: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jitter: Option<f64>,
+}
+
+/// One source of interference in a scene.
+#[derive(Clone, Debug)]
+pub struct Interferer {
+    /// Its kind as a scenario writes it.
+    pub kind: &'static str,
+    pub waveform: Waveform,
+    /// Carrier, or middle of the band, as sent.
+    pub carrier_hz: f64,
+    /// Power over noise density at the antenna when the scene starts; of a pulse while it is on.
+    pub jn0_hz: f64,
+    pub path: Option<Path>,
+    /// Samples in which it is on, at the antenna.
+    pub on: Range<u64>,
+    pub seed: u64,
+    pub tuning: Tuning,
+    /// For the plan.
+    pub description: String,
+}
+
+/// What holds over one run.
+struct Anchor {
+    n: u64,
+    /// Reading of the receiver's clock minus the time sent, at both ends.
+    behind_s: [f64; 2],
+    turns: u64,
+    turns_step: u64,
+    amplitude: f64,
+}
+
+impl Interferer {
+    fn travel_s(&self, n: u64) -> f64 {
+        self.path.as_ref().map_or(0.0, |path| path.travel_s(self.tuning.elapsed_s(n)))
+    }
+
+    /// Reading of the receiver's clock at sample `n` minus the time at which what arrives was sent.
+    fn behind_s(&self, n: u64) -> f64 {
+        let (clock, local) = (&self.tuning.clock, self.tuning.clock.epoch(n));
+        local.since(self.tuning.receiver_clock.true_time(clock.start, local)) + self.travel_s(n)
+    }
+
+    /// Power over noise density at sample `n`, while on: falls with the square of the distance.
+    fn jn0_at(&self, n: u64) -> f64 {
+        self.path.as_ref().map_or(self.jn0_hz, |path| {
+            let nearer = path.travel_s(0.0) / self.travel_s(n);
+            self.jn0_hz * nearer * nearer
+        })
+    }
+
+    /// Its spectrum's shape.
+    pub fn spectrum(&self) -> Spectrum {
+        let bare = Spectrum {
+            kind: self.kind,
+            width_hz: None,
+            deviation_hz: None,
+            repetition_hz: None,
+            duty: None,
+            jitter: None,
+        };
+        let rate_hz = self.tuning.clock.rate.hz();
+        match &self.waveform {
+            Waveform::Cw => bare,
+            Waveform::Chirp { sweep_hz, repetition } | Waveform::Fmcw { sweep_hz, repetition } => {
+                Spectrum { width_hz: Some(*sweep_hz), repetition_hz: Some(repetition.hz()), ..bare }
+            }
+            Waveform::SineFm { deviation_hz, repetition } => {
+                Spectrum { deviation_hz: Some(*deviation_hz), repetition_hz: Some(repetition.hz()), ..bare }
+            }
+            Waveform::Pulse { width_s, repetition, jitter } => Spectrum {
+                repetition_hz: Some(repetition.hz()),
+                duty: Some(width_s * repetition.hz()),
+                jitter: Some(*jitter),
+                ..bare
+            },
+            Waveform::Matched { chips, .. } => Spectrum { repetition_hz: Some(chips.hz()), ..bare },
+            Waveform::White => Spectrum { width_hz: Some(rate_hz), ..bare },
+            Waveform::Noise { width_hz, .. } => Spectrum { width_hz: Some(*width_hz), ..bare },
+            Waveform::Recording { rate, .. } => Spectrum { width_hz: Some(rate.hz()), ..bare },
+        }
+    }
+
+    /// What is true of it at a sample; `None` while it is off. Its power is the mean over a repetition.
+    pub fn row(&self, source: usize, sample: u64) -> Option<InterferenceRow> {
+        if !self.on.contains(&sample) {
+            return None;
+        }
+        let duty = match &self.waveform {
+            Waveform::Pulse { width_s, repetition, .. } => width_s * repetition.hz(),
+            _ => 1.0,
+        };
+        let step = self.tuning.turns_step(self.carrier_hz, self.behind_s(sample + RUN) - self.behind_s(sample), RUN);
+        Some(InterferenceRow {
+            sample,
+            source,
+            jn0_dbhz: 10.0 * libm::log10(self.jn0_at(sample) * duty),
+            frequency_hz: step as i64 as f64 / 18_446_744_073_709_551_616.0 * self.tuning.clock.rate.hz(),
+        })
+    }
+
+    fn anchor(&self, n: u64) -> Anchor {
+        let behind_s = [self.behind_s(n), self.behind_s(n + RUN)];
+        let tuning = &self.tuning;
+        Anchor {
+            n,
+            behind_s,
+            turns: tuning.turns(self.carrier_hz, n, behind_s[0]),
+            turns_step: tuning.turns_step(self.carrier_hz, behind_s[1] - behind_s[0], RUN),
+            amplitude: tuning.amplitude_lsb(self.jn0_at(n + RUN / 2)),
+        }
+    }
+
+    /// Place in a repetition at the start of the run, whole and in 2^-64, and its advance a sample.
+    fn place(&self, anchor: &Anchor, repetition: Repetition, late_s: f64) -> (i64, u64, i128) {
+        let at = |end: usize| {
+            let n = anchor.n + RUN * end as u64;
+            let behind_s = anchor.behind_s.get(end).copied().unwrap_or(0.0);
+            repetition.at(self.tuning.clock.rate, n, behind_s + late_s)
+        };
+        let ((whole, first), (end, last)) = (at(0), at(1));
+        let advance = (i128::from(end - whole) << 64) + i128::from(last) - i128::from(first);
+        (whole, first, advance / i128::from(RUN))
+    }
+
+    /// Adds samples `from` to `from + i.len()` of the run.
+    fn add(&self, level: Level, anchor: &Anchor, from: u64, i: &mut [f32], q: &mut [f32]) {
+        match &self.waveform {
+            Waveform::Cw => isa::add_tone(level, &self.tone(anchor, from, Modulation::None, None), i, q),
+            Waveform::Chirp { sweep_hz, repetition } => {
+                let cycles = self.tuning.sign() * sweep_hz / repetition.hz();
+                isa::add_tone(
+                    level,
+                    &self.tone(anchor, from, Modulation::Sawtooth { cycles }, Some(*repetition)),
+                    i,
+                    q,
+                );
+            }
+            Waveform::Fmcw { sweep_hz, repetition } => {
+                let cycles = 0.5 * self.tuning.sign() * sweep_hz / repetition.hz();
+                isa::add_tone(
+                    level,
+                    &self.tone(anchor, from, Modulation::Triangle { cycles }, Some(*repetition)),
+                    i,
+                    q,
+                );
+            }
+            Waveform::SineFm { deviation_hz, repetition } => {
+                let cycles = self.tuning.sign() * deviation_hz / (std::f64::consts::TAU * repetition.hz());
+                isa::add_tone(level, &self.tone(anchor, from, Modulation::Sine { cycles }, Some(*repetition)), i, q);
+            }
+            Waveform::Pulse { width_s, repetition, jitter } => {
+                self.pulses(level, anchor, from, (width_s * repetition.hz(), *repetition, *jitter), i, q);
+            }
+            Waveform::Matched { chips, edge } => self.chips(level, anchor, from, (*chips, edge), i, q),
+            Waveform::White => {
+                let first = (anchor.n + from) as i64;
+                let (wi, wq) = draw(level, self.seed, (first, first + i.len() as i64));
+                self.turn(level, anchor, from, (&wi, &wq), i, q);
+            }
+            Waveform::Noise { step, by, .. } => {
+                let place = u128::from(anchor.n + from) * u128::from(*step);
+                let position = Position { whole: (place >> 32) as i64, fraction: place as u32, step: *step };
+                let source = draw(level, self.seed, Interpolator::reach(position, i.len()));
+                self.resampled(level, anchor, from, (by, position, source), i, q);
+            }
+            Waveform::Recording { samples, rate, by, repeat } => {
+                // Its first sample is sent when it is switched on.
+                let late_s = self.tuning.elapsed_s(self.on.start);
+                let (whole, first, advance) = self.place(anchor, *rate, late_s);
+                let place = (i128::from(whole) << 64) + i128::from(first) + advance * i128::from(from);
+                let step = (advance >> 32) as u64;
+                let position = Position { whole: (place >> 64) as i64, fraction: (place >> 32) as u32, step };
+                let source = samples.read(Interpolator::reach(position, i.len()), *repeat, self.tuning.inverted);
+                self.resampled(level, anchor, from, (by, position, source), i, q);
+            }
+        }
+    }
+
+    fn tone(&self, anchor: &Anchor, from: u64, modulation: Modulation, repetition: Option<Repetition>) -> Tone {
+        let (place, place_step) = repetition.map_or((0, 0), |repetition| {
+            let (_, place, step) = self.place(anchor, repetition, 0.0);
+            let step = step as u64;
+            (place.wrapping_add(step.wrapping_mul(from)), step)
+        });
+        let rate_hz = self.tuning.clock.rate.hz();
+        let (low_hz, high_hz) = self.tuning.band_hz();
+        let carrier_hz = self.tuning.place_hz(self.carrier_hz);
+        Tone {
+            turns: anchor.turns.wrapping_add(anchor.turns_step.wrapping_mul(from)),
+            turns_step: anchor.turns_step,
+            place,
+            place_step,
+            modulation,
+            band_cps: ((low_hz - carrier_hz) / rate_hz, (high_hz - carrier_hz) / rate_hz),
+            amplitude: anchor.amplitude as f32,
+        }
+    }
+
+    /// The carrier wherever a pulse is on: `duty` of a period, late by `jitter` times a random share of it.
+    fn pulses(
+        &self,
+        level: Level,
+        anchor: &Anchor,
+        from: u64,
+        (duty, repetition, jitter): (f64, Repetition, f64),
+        i: &mut [f32],
+        q: &mut [f32],
+    ) {
+        let unit = 18_446_744_073_709_551_616.0;
+        let (whole, first, advance) = self.place(anchor, repetition, 0.0);
+        let (first, advance) = (first as f64 / unit, advance as f64 / unit);
+        let end = from + i.len() as u64;
+        // Periods, counted from that of the run's start, whose pulse can reach into the run.
+        let last = (first + advance * end as f64).floor() as i64;
+        for period in -2..=last {
+            let late = jitter * random_share(self.seed, whole + period);
+            let begin = (period as f64 + late - first) / advance;
+            let sample = |at: f64| ((at - EDGE_SAMPLES).ceil().max(from as f64) as u64).min(end);
+            let (a, b) = (sample(begin), sample(begin + duty / advance));
+            let inside = (a - from) as usize..(b.max(a) - from) as usize;
+            if let (Some(i), Some(q)) = (i.get_mut(inside.clone()), q.get_mut(inside)) {
+                isa::add_tone(level, &self.tone(anchor, a, Modulation::None, None), i, q);
+            }
+        }
+    }
+
+    /// Random chips through the kernel of spreading codes.
+    fn chips(
+        &self,
+        level: Level,
+        anchor: &Anchor,
+        from: u64,
+        (chips, edge): (Repetition, &ChipEdge),
+        i: &mut [f32],
+        q: &mut [f32],
+    ) {
+        let (whole, first, advance) = self.place(anchor, chips, 0.0);
+        let place = (i128::from(whole) << 64) + i128::from(first) + advance * i128::from(from);
+        let step = (advance >> 16) as u64;
+        let chip = (place >> 64) as i64;
+        let start = (chip - MARGIN_STEPS as i64).div_euclid(64);
+        let span = (step * i.len() as u64 / CODE_ONE) as i64 + 2 * MARGIN_STEPS as i64 + 2;
+        let bits: Vec<u64> = (start..=start + span / 64 + 2).map(|word| mix(self.seed ^ mix(word as u64))).collect();
+        let edge = match edge {
+            ChipEdge::Nearest => Edge::Nearest,
+            ChipEdge::Area => Edge::Area,
+            ChipEdge::BandLimited(filter) => Edge::BandLimited(filter),
+        };
+        let run = Run {
+            bits: &bits,
+            position: (chip - start * 64) as u64 * CODE_ONE + ((place as u64) >> 16),
+            step,
+            turns: anchor.turns.wrapping_add(anchor.turns_step.wrapping_mul(from)),
+            turns_step: anchor.turns_step,
+            amplitude: anchor.amplitude * edge.gain(&[1.0], step as f64 / CODE_ONE as f64),
+        };
+        isa::accumulate(level, edge, &[run], i, q, &mut Buffers::default());
+    }
+
+    fn resampled(
+        &self,
+        level: Level,
+        anchor: &Anchor,
+        from: u64,
+        (by, position, source): (&Interpolator, Position, (Vec<f32>, Vec<f32>)),
+        i: &mut [f32],
+        q: &mut [f32],
+    ) {
+        let (mut wi, mut wq) = (vec![0.0; i.len()], vec![0.0; q.len()]);
+        isa::interpolate(level, by, position, (&source.0, &source.1), (&mut wi, &mut wq));
+        self.turn(level, anchor, from, (&wi, &wq), i, q);
+    }
+
+    fn turn(&self, level: Level, anchor: &Anchor, from: u64, wave: (&[f32], &[f32]), i: &mut [f32], q: &mut [f32]) {
+        let turns = anchor.turns.wrapping_add(anchor.turns_step.wrapping_mul(from));
+        isa::turn(level, wave, (turns, anchor.turns_step), anchor.amplitude as f32, (i, q));
+    }
+}
+
+/// A share in [0, 1) that belongs to a number.
+fn random_share(seed: u64, number: i64) -> f64 {
+    (mix(seed ^ mix(number as u64)) >> 11) as f64 / 9_007_199_254_740_992.0
+}
+
+impl Recorded {
+    /// Samples `first` to `last` (exclusive): again from the start where the file ends, or silence.
+    fn read(&self, (first, last): (i64, i64), repeat: bool, inverted: bool) -> (Vec<f32>, Vec<f32>) {
+        let length = self.i.len().max(1) as i64;
+        let sign = if inverted { -1.0 } else { 1.0 };
+        let sample = |plane: &[f32], k: i64| {
+            let k = if repeat { k.rem_euclid(length) } else { k };
+            usize::try_from(k).ok().and_then(|k| plane.get(k)).copied().unwrap_or(0.0)
+        };
+        (
+            (first..last).map(|k| sample(&self.i, k)).collect(),
+            (first..last).map(|k| sign * sample(&self.q, k)).collect(),
+        )
+    }
+}
+
+impl Stage for Interferer {
+    fn name(&self) -> &'static str {
+        "interference"
+    }
+
+    fn describe(&self) -> String {
+        self.description.clone()
+    }
+
+    fn act(&self, block: &mut Block<'_>) {
+        let pieces = block.i.chunks_mut(BLOCK_SAMPLES).zip(block.q.chunks_mut(BLOCK_SAMPLES));
+        for (number, (i, q)) in (0_u64..).zip(pieces) {
+            let n = block.start + number * RUN;
+            let begin = self.on.start.clamp(n, n + i.len() as u64) - n;
+            let end = self.on.end.clamp(n, n + i.len() as u64) - n;
+            let inside = begin as usize..end as usize;
+            if let (false, Some(i), Some(q)) = (begin >= end, i.get_mut(inside.clone()), q.get_mut(inside)) {
+                self.add(block.level, &self.anchor(n), begin, i, q);
+            }
+        }
+    }
+}

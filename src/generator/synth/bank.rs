@@ -1,0 +1,60 @@
+//! The runs of all rays in one stretch of samples, gathered before any is made.
+//!
+//! Kernels are faster with all satellites at hand: sums stay in registers and memory is written once. Runs that share
+//! their first and last sample go together; sums of `f32` are in the order of those spans, then in that of arrival.
+
+use std::ops::Range;
+
+use super::lanes::Buffers;
+use super::{Kernel, Run, isa};
+use crate::generator::fidelity::Arithmetic;
+
+/// Runs, the strips that they read, and scratch of the kernels.
+#[derive(Default)]
+pub struct Bank {
+    bits: Vec<u64>,
+    entries: Vec<Entry>,
+    buffers: Buffers,
+    exact: Vec<f64>,
+}
+
+struct Entry {
+    /// First sample and end of the run; the stretch may end before.
+    span: (u64, u64),
+    /// Samples of the stretch that it makes.
+    samples: Range<usize>,
+    strip: Range<usize>,
+    /// All but its bits.
+    run: Run<'static>,
+}
+
+impl Bank {
+    /// Adds a run for `samples` of the stretch, part of `span`: `make` appends its signs to the strip that it is handed
+    /// and returns everything else.
+    pub fn push(&mut self, span: (u64, u64), samples: Range<usize>, make: impl FnOnce(&mut Vec<u64>) -> Run<'static>) {
+        let begin = self.bits.len();
+        let run = make(&mut self.bits);
+        self.entries.push(Entry { span, samples, strip: begin..self.bits.len(), run });
+    }
+
+    /// Adds the samples of all runs to the planar stretch and forgets the runs.
+    pub fn render(&mut self, kernel: Kernel<'_>, i: &mut [f32], q: &mut [f32]) {
+        self.entries.sort_by_key(|entry| entry.span);
+        for entries in self.entries.chunk_by(|a, b| a.span == b.span) {
+            let runs: Vec<Run<'_>> = entries
+                .iter()
+                .map(|entry| Run { bits: self.bits.get(entry.strip.clone()).unwrap_or(&[]), ..entry.run })
+                .collect();
+            let Some(samples) = entries.first().map(|entry| entry.samples.clone()) else { continue };
+            let (Some(i), Some(q)) = (i.get_mut(samples.clone()), q.get_mut(samples)) else { continue };
+            match kernel.arithmetic {
+                Arithmetic::F32 => isa::accumulate(kernel.level, kernel.edge, &runs, i, q, &mut self.buffers),
+                Arithmetic::F64 => runs
+                    .iter()
+                    .for_each(|run| isa::accumulate_exact(kernel.level, kernel.edge, run, i, q, &mut self.exact)),
+            }
+        }
+        self.entries.clear();
+        self.bits.clear();
+    }
+}

@@ -1,0 +1,173 @@
+//! Attitude of the body that carries the antenna, and where on it the antenna sits.
+//!
+//! Body axes are nose, right, down. The nose either keeps a direction of the local frame (yaw, pitch, roll about
+//! down, right, nose) or follows the velocity; the body may spin about its nose at a constant rate, right-handed. The
+//! spin stays a number of turns, so that a carrier can count it over any time. Limits: a nose along the velocity has no
+//! roll of its own (its right side stays level), which is undefined while it points straight up or down, and it leans
+//! towards its direction at rest by up to 1 m/s over the speed.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
+
+use super::Motion;
+use crate::gnss::earth::Geodetic;
+
+/// Weight of the direction at rest against the velocity.
+const REST_MPS: f64 = 1.0;
+
+/// Where the nose points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Nose {
+    /// Yaw from north over east, pitch above the horizon, roll to the right.
+    Fixed { yaw_rad: f64, pitch_rad: f64, roll_rad: f64 },
+    /// Along the velocity over ground, and in this direction at rest.
+    Velocity { yaw_rad: f64, pitch_rad: f64 },
+}
+
+/// How a body is turned, and how the antenna is mounted on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attitude {
+    pub nose: Nose,
+    /// Turns a second about the nose, positive to the right.
+    pub spin_hz: f64,
+    /// From the point that moves along the trajectory to the antenna, in body axes.
+    pub lever_arm_m: Vector3<f64>,
+    /// Direction in which the antenna looks, in body axes.
+    pub boresight: Unit<Vector3<f64>>,
+}
+
+/// A body's axes at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orientation {
+    /// From body axes to ECEF, as if the body had never spun.
+    pub still: Rotation3<f64>,
+    /// Turns about the nose since the scene's start, whole ones included.
+    pub spin_cycles: f64,
+}
+
+impl Orientation {
+    /// From body axes to ECEF.
+    pub fn axes(&self) -> Rotation3<f64> {
+        let turn = TAU * (self.spin_cycles - self.spin_cycles.floor());
+        self.still * about_nose(turn)
+    }
+}
+
+impl Attitude {
+    /// The body's axes `t_s` seconds after the scene's start, when its trajectory says `motion`.
+    pub fn at(&self, t_s: f64, motion: &Motion) -> Orientation {
+        let local = local_axes(Geodetic::from_ecef(&motion.position_m));
+        let still = match self.nose {
+            Nose::Fixed { yaw_rad, pitch_rad, roll_rad } => local * turned(yaw_rad, pitch_rad, roll_rad),
+            Nose::Velocity { yaw_rad, pitch_rad } => {
+                let at_rest = turned(yaw_rad, pitch_rad, 0.0) * Vector3::x();
+                let nose = local.inverse() * motion.velocity_mps + at_rest * REST_MPS;
+                let level = libm::hypot(nose.x, nose.y);
+                local * turned(libm::atan2(nose.y, nose.x), libm::atan2(-nose.z, level), 0.0)
+            }
+        };
+        Orientation { still, spin_cycles: self.spin_hz * t_s }
+    }
+
+    /// The antenna's motion `t_s` seconds after the scene's start, when the trajectory says `motion`. The slow
+    /// turning of the nose moves the lever arm, but does not enter its velocity and acceleration.
+    pub fn antenna(&self, t_s: f64, motion: &Motion) -> Motion {
+        if self.lever_arm_m == Vector3::zeros() {
+            return *motion;
+        }
+        let axes = self.at(t_s, motion).axes();
+        let rate = Vector3::x() * (TAU * self.spin_hz);
+        let velocity = rate.cross(&self.lever_arm_m);
+        Motion {
+            position_m: motion.position_m + axes * self.lever_arm_m,
+            velocity_mps: motion.velocity_mps + axes * velocity,
+            acceleration_mps2: motion.acceleration_mps2 + axes * rate.cross(&velocity),
+        }
+    }
+}
+
+/// From north, east, down at a place to ECEF.
+fn local_axes(place: Geodetic) -> Rotation3<f64> {
+    let enu = place.ecef_to_enu();
+    let axes = Matrix3::from_columns(&[enu.row(1).transpose(), enu.row(0).transpose(), -enu.row(2).transpose()]);
+    Rotation3::from_matrix_unchecked(axes)
+}
+
+/// From body axes to north, east, down.
+fn turned(yaw_rad: f64, pitch_rad: f64, roll_rad: f64) -> Rotation3<f64> {
+    let (sin_yaw, cos_yaw) = libm::sincos(yaw_rad);
+    let (sin_pitch, cos_pitch) = libm::sincos(pitch_rad);
+    #[rustfmt::skip]
+    let nose = Matrix3::new(
+        cos_yaw * cos_pitch, -sin_yaw, cos_yaw * sin_pitch,
+        sin_yaw * cos_pitch,  cos_yaw, sin_yaw * sin_pitch,
+        -sin_pitch,           0.0,     cos_pitch,
+    );
+    Rotation3::from_matrix_unchecked(nose) * about_nose(roll_rad)
+}
+
+/// A right-handed turn about the nose.
+fn about_nose(angle_rad: f64) -> Rotation3<f64> {
+    let (sin, cos) = libm::sincos(angle_rad);
+    Rotation3::from_matrix_unchecked(Matrix3::new(1.0, 0.0, 0.0, 0.0, cos, -sin, 0.0, sin, cos))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn attitude(nose: Nose, spin_hz: f64) -> Attitude {
+        Attitude { nose, spin_hz, lever_arm_m: Vector3::new(0.1, 0.2, -0.3), boresight: -Vector3::z_axis() }
+    }
+
+    /// On the equator at longitude 0, north, east, down are z, y, −x of ECEF.
+    fn there(velocity_mps: Vector3<f64>) -> Motion {
+        let position_m = Geodetic::from_degrees(0.0, 0.0, 0.0).to_ecef();
+        Motion { position_m, velocity_mps, acceleration_mps2: Vector3::zeros() }
+    }
+
+    #[test]
+    fn yaw_pitch_and_roll_turn_the_axes_as_an_aircraft_s() {
+        let still = |yaw: f64, pitch: f64, roll: f64| {
+            let nose =
+                Nose::Fixed { yaw_rad: yaw.to_radians(), pitch_rad: pitch.to_radians(), roll_rad: roll.to_radians() };
+            attitude(nose, 0.0).at(0.0, &there(Vector3::zeros())).axes()
+        };
+        let (north, east, up) = (Vector3::z(), Vector3::y(), Vector3::x());
+        // Products of sines and cosines, each within 1e-16.
+        let same = |a: Vector3<f64>, b: Vector3<f64>| assert!((a - b).norm() < 1e-15, "{a} {b}");
+        same(still(0.0, 0.0, 0.0) * Vector3::x(), north);
+        same(still(90.0, 0.0, 0.0) * Vector3::x(), east);
+        same(still(90.0, 0.0, 0.0) * Vector3::y(), -north);
+        same(still(0.0, 90.0, 0.0) * Vector3::x(), up);
+        same(still(0.0, 0.0, 90.0) * Vector3::y(), -up);
+        same(still(0.0, 0.0, 0.0) * Vector3::z(), -up);
+    }
+
+    #[test]
+    fn the_nose_follows_the_velocity_and_rests_where_it_is_told() {
+        let body = attitude(Nose::Velocity { yaw_rad: 0.0, pitch_rad: 1.0 }, 0.0);
+        let nose = |velocity_mps| body.at(0.0, &there(velocity_mps)).axes() * Vector3::x();
+        let at_rest = Vector3::new(libm::sin(1.0), 0.0, libm::cos(1.0));
+        assert!((nose(Vector3::zeros()) - at_rest).norm() < 1e-15);
+        // One metre a second in six hundred: 1/600 rad at most.
+        let flying = Vector3::new(0.0, 600.0, 10.0);
+        assert!((nose(flying) - flying.normalize()).norm() < 1.0 / 600.0);
+    }
+
+    #[test]
+    fn the_antenna_s_velocity_is_the_derivative_of_its_place() {
+        let body = attitude(Nose::Fixed { yaw_rad: 0.3, pitch_rad: 0.2, roll_rad: 0.1 }, 7.0);
+        let motion = there(Vector3::zeros());
+        let step_s = 1e-5;
+        for t_s in [0.0, 0.123, 10.01] {
+            let [before, now, after] = [t_s - step_s, t_s, t_s + step_s].map(|t_s| body.antenna(t_s, &motion));
+            let slope = (after.position_m - before.position_m) / (2.0 * step_s);
+            // Third derivative 0.36 m (44/s)³ times step²/6 is 5e-7; positions rounded to 1e-9 m over 2e-5 s are 1e-4.
+            assert!((slope - now.velocity_mps).norm() < 2e-4, "{t_s}");
+            let bend = (after.velocity_mps - before.velocity_mps) / (2.0 * step_s);
+            assert!((bend - now.acceleration_mps2).norm() < 1e-4, "{t_s}");
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! The three loops of a channel as they are closed: which discriminator drives which loop, with which gains.
+//!
+//! Takes the correlations of an integration and gives the rates and jumps of the oscillators. It knows neither samples
+//! nor time of day, so that modelled correlations can drive the loops of a channel as well as real ones. The
+//! code loop is aided by the carrier, which is left to the owner of the oscillators.
+
+use num_complex::Complex64;
+
+use super::loops::{self, CodeGain, CodeShape, Gains, Rates};
+use super::{CodeDiscriminator, TrackingSettings};
+
+/// Which loops correct the carrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// The frequency loop alone, updated every code period.
+    Frequency,
+    /// The phase loop with a frequency loop of order 1 beside it, updated every code period.
+    Assisted,
+    /// The phase loop alone, updated every `integration` code periods.
+    Phase,
+}
+
+impl Mode {
+    /// Code periods a loop update, of `group` in a symbol.
+    pub fn periods_per_update(self, settings: &TrackingSettings, group: u32) -> u32 {
+        match self {
+            Self::Phase => (1..=settings.integration.max(1)).rev().find(|m| group.is_multiple_of(*m)).unwrap_or(1),
+            Self::Frequency | Self::Assisted => 1,
+        }
+    }
+}
+
+/// What an update measured, and the jumps of the oscillators' phases that follow from it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Update {
+    /// Prompt sum, scaled to noise of the variance of one code period's.
+    pub prompt: Complex64,
+    pub integration_s: f64,
+    pub dll_chips: f64,
+    pub pll_cycles: f64,
+    /// In mode [`Mode::Phase`] only reported: the frequency loop has done its work.
+    pub fll_hz: f64,
+    pub carrier_jump_cycles: f64,
+    pub code_jump_chips: f64,
+}
+
+/// Gains and rates of the loops of one channel.
+#[derive(Clone, Debug)]
+pub struct Loops {
+    /// Carrier: hertz. Its [`Rates::mean`] over an update is what the oscillator runs at.
+    pub carrier: Rates,
+    /// Code, beyond what the carrier's aid brings: chips a second.
+    pub code: Rates,
+    pll: Gains,
+    fll: Gains,
+    dll: Gains,
+    discriminator: CodeDiscriminator,
+    shape: CodeShape,
+    gain: CodeGain,
+    has_symbols: bool,
+}
+
+impl Loops {
+    /// Loops that run at `carrier_hz` and correct nothing before they are designed.
+    pub fn new(settings: &TrackingSettings, shape: CodeShape, has_symbols: bool, carrier_hz: f64) -> Self {
+        let none = Gains::of_root(1, 1.0);
+        let gain = match settings.dll_discriminator {
+            CodeDiscriminator::EarlyMinusLate => CodeGain::new(|snr| shape.early_minus_late_gain(snr)),
+            CodeDiscriminator::DotProduct => CodeGain::new(loops::dot_product_gain),
+        };
+        Self {
+            carrier: Rates { rate: carrier_hz, acceleration: 0.0 },
+            code: Rates::default(),
+            pll: none,
+            fll: none,
+            dll: none,
+            discriminator: settings.dll_discriminator,
+            shape,
+            gain,
+            has_symbols,
+        }
+    }
+
+    /// Sets the gains for updates every `update_s`; `wide` asks for the code loop's pull-in bandwidth.
+    pub fn design(&mut self, settings: &TrackingSettings, mode: Mode, wide: bool, update_s: f64) {
+        let (fll_order, fll_hz) = match mode {
+            Mode::Frequency => (settings.fll_order, settings.fll_bandwidth_hz),
+            Mode::Assisted | Mode::Phase => (1, settings.fll_assist_bandwidth_hz),
+        };
+        let dll_hz = if wide { settings.dll_pull_in_bandwidth_hz } else { settings.dll_bandwidth_hz };
+        self.fll = Gains::design(fll_order, fll_hz * update_s);
+        self.pll = Gains::design(settings.pll_order, settings.pll_bandwidth_hz * update_s);
+        self.dll = Gains::design(settings.dll_order, dll_hz * update_s);
+    }
+
+    /// Closes the loops with the sums of early, prompt and late over the `periods` code periods of an integration of
+    /// `t_s`. `before` is the prompt `t_s` earlier, `cn0_hz` the best estimate of C/N0.
+    pub fn close(
+        &mut self,
+        mode: Mode,
+        [early, prompt, late]: [Complex64; 3],
+        before: Option<Complex64>,
+        periods: u32,
+        t_s: f64,
+        cn0_hz: Option<f64>,
+    ) -> Update {
+        let mut update = Update { prompt, integration_s: t_s, ..Update::default() };
+        update.prompt /= f64::from(periods).sqrt();
+        if let Some(before) = before {
+            // Two quadrants do not mind a symbol in between.
+            update.fll_hz = if self.has_symbols || mode == Mode::Phase {
+                loops::frequency_two_quadrant(before, prompt, t_s)
+            } else {
+                loops::frequency_four_quadrant(before, prompt, t_s)
+            };
+            match mode {
+                Mode::Frequency => self.carrier = loops::frequency_step(&self.fll, &self.carrier, update.fll_hz, t_s),
+                Mode::Assisted => self.carrier.rate += self.fll.phase * update.fll_hz,
+                Mode::Phase => {}
+            }
+        }
+        update.pll_cycles = if self.has_symbols { loops::costas(prompt) } else { loops::phase(prompt) };
+        if mode != Mode::Frequency {
+            (self.carrier, update.carrier_jump_cycles) = loops::step(&self.pll, &self.carrier, update.pll_cycles, t_s);
+        }
+        let gain = cn0_hz.map_or(1.0, |hz| self.gain.at(hz * t_s));
+        update.dll_chips = match self.discriminator {
+            CodeDiscriminator::EarlyMinusLate => loops::early_minus_late(early, late, &self.shape, gain),
+            CodeDiscriminator::DotProduct => loops::dot_product(early, prompt, late, &self.shape, gain),
+        };
+        (self.code, update.code_jump_chips) = loops::step(&self.dll, &self.code, update.dll_chips, t_s);
+        update
+    }
+}

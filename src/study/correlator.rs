@@ -1,0 +1,324 @@
+//! The receiver's loops on modelled correlations: one channel in steady tracking, without a sample.
+//!
+//! Every code period early, prompt and late are drawn with means √(2T·C/N0)·R(ε)·sinc(ΔfT)·e^(jφ) and unit noise a component
+//! whose covariance is that of the taps; they go through the loops, discriminators and C/N0 estimate of
+//! `receiver::track`, and what is left between truth and oscillators is measured. Source of the model: Kaplan and
+//! Hegarty, Understanding GPS 2nd ed., 5.3. Limits: one satellite, constant C/N0, no multipath; a period lasts its nominal time.
+
+use num_complex::Complex64;
+
+use super::correlation::Correlation;
+use super::measure::Moments;
+use super::motion::{Motion, Truth};
+use super::normal::{Normals, Purpose, symbol};
+use super::watch::Watch;
+use crate::analysis::theory::clock::PowerLaw;
+use crate::gnss::signal::Signal;
+use crate::receiver::track::TrackingSettings;
+use crate::receiver::track::closed::{Loops, Mode, Update};
+use crate::receiver::track::lock::Cn0;
+use crate::receiver::track::loops::Rates;
+
+/// Code periods of a group in which a signal without symbols is integrated.
+const PILOT_GROUP: u32 = 20;
+
+/// One channel to be simulated.
+#[derive(Clone, Debug)]
+pub struct Case {
+    pub signal: &'static Signal,
+    /// As validated.
+    pub settings: TrackingSettings,
+    pub mode: Mode,
+    /// `None` for no noise.
+    pub cn0_dbhz: Option<f64>,
+    pub motion: Motion,
+    pub oscillator: Option<PowerLaw>,
+    pub correlation: Correlation,
+    /// Whether the receiver's detectors may give the signal up.
+    pub watched: bool,
+    /// Time before anything is measured; the loops begin on the true Doppler and its rate.
+    pub settle_s: f64,
+    pub duration_s: f64,
+    pub seed: u64,
+}
+
+impl Case {
+    /// Code periods that carry a symbol, or that are grouped without one.
+    fn group(&self) -> u32 {
+        let message = self.signal.components.first().and_then(|c| c.message);
+        message.map_or(PILOT_GROUP, |m| m.periods_per_symbol())
+    }
+
+    fn period_s(&self) -> f64 {
+        self.signal.components.first().map_or(1.0, |c| c.period_s())
+    }
+
+    pub(super) fn has_symbols(&self) -> bool {
+        self.signal.components.first().is_some_and(|c| c.message.is_some())
+    }
+
+    /// Time between loop updates, which is the coherent integration.
+    pub fn update_s(&self) -> f64 {
+        self.period_s() * f64::from(self.mode.periods_per_update(&self.settings, self.group()))
+    }
+}
+
+/// Why a run ended early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loss {
+    /// The replica left the correlation peak.
+    Code,
+    /// The frequency error left the range of the carrier's discriminator.
+    Carrier,
+    /// The receiver's detectors gave the signal up: phase unlocked or C/N0 too low for `loss_s`.
+    Declared,
+}
+
+/// True errors and raw discriminators at one loop update.
+#[derive(Clone, Copy, Debug)]
+pub struct Epoch {
+    /// End of the integration.
+    pub time_s: f64,
+    /// Mean errors over the integration, truth minus oscillator.
+    pub code_chips: f64,
+    /// Since the start, without regard to slips.
+    pub phase_cycles: f64,
+    pub frequency_hz: f64,
+    pub update: Update,
+}
+
+/// What was measured over a run.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Outcome {
+    pub update_s: f64,
+    /// Truth minus oscillator, means over an integration.
+    pub code_chips: Moments,
+    /// From the point of lock nearest in time; empty in [`Mode::Frequency`].
+    pub phase_cycles: Moments,
+    pub frequency_hz: Moments,
+    /// Values of the discriminators.
+    pub raw_code_chips: Moments,
+    pub raw_phase_cycles: Moments,
+    pub raw_frequency_hz: Moments,
+    /// Passages to the next point of lock, half a cycle away with symbols and a whole one without.
+    pub slips: u64,
+    /// Breaks of the carrier that the receiver's detectors declared, from the start on.
+    pub interruptions: u64,
+    /// When the signal was lost, and why.
+    pub lost: Option<(f64, Loss)>,
+}
+
+/// Runs a case and condenses it.
+pub fn run(case: &Case) -> Outcome {
+    let mut outcome = Outcome::default();
+    let spacing = if case.has_symbols() { 0.5 } else { 1.0 };
+    let mut locked_at = 0.0;
+    let follows_phase = case.mode != Mode::Frequency;
+    let end = simulate(case, |epoch| {
+        outcome.update_s = epoch.update.integration_s;
+        let settled = epoch.time_s > case.settle_s;
+        while follows_phase && (epoch.phase_cycles - locked_at).abs() > spacing {
+            locked_at += spacing.copysign(epoch.phase_cycles - locked_at);
+            outcome.slips += u64::from(settled);
+        }
+        if !settled {
+            return;
+        }
+        outcome.code_chips.add(epoch.code_chips);
+        outcome.frequency_hz.add(epoch.frequency_hz);
+        if follows_phase {
+            outcome.phase_cycles.add(epoch.phase_cycles - locked_at);
+        }
+        outcome.raw_code_chips.add(epoch.update.dll_chips);
+        outcome.raw_phase_cycles.add(epoch.update.pll_cycles);
+        outcome.raw_frequency_hz.add(epoch.update.fll_hz);
+    });
+    (outcome.interruptions, outcome.lost) = end;
+    outcome
+}
+
+/// Runs a case and hands out every loop update; gives the breaks that the receiver's detectors declared, and when and why
+/// the signal was lost.
+pub fn simulate(case: &Case, mut each: impl FnMut(&Epoch)) -> (u64, Option<(f64, Loss)>) {
+    let mut channel = Channel::new(case);
+    let updates = (case.duration_s + case.settle_s) / channel.update_s;
+    for _ in 0..updates.ceil() as u64 {
+        let epoch = channel.integrate();
+        each(&epoch);
+        let loss = if epoch.code_chips.abs() > 1.0 {
+            Some(Loss::Code)
+        } else if epoch.frequency_hz.abs() * channel.update_s > 0.5 {
+            Some(Loss::Carrier)
+        } else if channel.given_up {
+            Some(Loss::Declared)
+        } else {
+            None
+        };
+        if let Some(loss) = loss {
+            return (channel.watch.interruptions, Some((epoch.time_s, loss)));
+        }
+    }
+    (channel.watch.interruptions, None)
+}
+
+/// Factors that give three taps their covariance, from three independent normals (Cholesky).
+#[derive(Clone, Copy, Debug)]
+struct Covariance {
+    prompt: [f64; 2],
+    late: [f64; 3],
+}
+
+impl Covariance {
+    fn new(correlation: &Correlation, spacing_chips: f64) -> Self {
+        let peak = correlation.value(0.0);
+        let near = correlation.value(0.5 * spacing_chips) / peak;
+        let far = correlation.value(spacing_chips) / peak;
+        let own = (1.0 - near * near).sqrt();
+        let shared = (near - near * far) / own;
+        Self { prompt: [near, own], late: [far, shared, (1.0 - far * far - shared * shared).max(0.0).sqrt()] }
+    }
+}
+
+/// Oscillators, loops and truth of one channel.
+struct Channel<'a> {
+    case: &'a Case,
+    truth: Truth<'a>,
+    normals: Normals,
+    covariance: Covariance,
+    /// Mean of a prompt without errors, over R(0).
+    amplitude: f64,
+    noisy: bool,
+    chips_per_cycle: f64,
+    period_s: f64,
+    group: u32,
+    periods: u32,
+    update_s: f64,
+    has_symbols: bool,
+    symbol: f64,
+    loops: Loops,
+    cn0: Cn0,
+    before: Option<Complex64>,
+    watch: Watch,
+    given_up: bool,
+    symbol_sum: Complex64,
+    number: u64,
+    /// Truth minus oscillator at the start of the running period.
+    phase_cycles: f64,
+    code_chips: f64,
+}
+
+impl<'a> Channel<'a> {
+    fn new(case: &'a Case) -> Self {
+        let chip_rate_hz = case.signal.components.first().map_or(1.0, |c| c.chip_rate_hz);
+        let (period_s, update_s, group) = (case.period_s(), case.update_s(), case.group());
+        let shape = case.correlation.code_shape(case.settings.spacing_chips);
+        let mut loops = Loops::new(&case.settings, shape, case.has_symbols(), case.motion.doppler_hz);
+        loops.design(&case.settings, case.mode, false, update_s);
+        loops.carrier = Rates { acceleration: case.motion.rate_hz_s, ..loops.carrier };
+        let cn0_hz = case.cn0_dbhz.map(|dbhz| libm::pow(10.0, dbhz / 10.0));
+        Self {
+            case,
+            truth: Truth::new(&case.motion, case.oscillator.as_ref(), case.signal.carrier_hz, period_s, case.seed),
+            normals: Normals::new(case.seed, Purpose::Thermal),
+            covariance: Covariance::new(&case.correlation, case.settings.spacing_chips),
+            amplitude: (2.0 * period_s * cn0_hz.unwrap_or(1.0) / case.correlation.value(0.0)).sqrt(),
+            noisy: cn0_hz.is_some(),
+            chips_per_cycle: chip_rate_hz / case.signal.carrier_hz,
+            period_s,
+            group,
+            periods: case.mode.periods_per_update(&case.settings, group),
+            update_s,
+            has_symbols: case.has_symbols(),
+            symbol: 1.0,
+            loops,
+            cn0: Cn0::new(if case.mode == Mode::Phase { group } else { 2 }, period_s, case.settings.cn0_average_s),
+            before: None,
+            watch: Watch::new(),
+            given_up: false,
+            symbol_sum: Complex64::ZERO,
+            number: 0,
+            phase_cycles: 0.0,
+            code_chips: 0.0,
+        }
+    }
+
+    /// One loop update: the periods of an integration, then the loops.
+    fn integrate(&mut self) -> Epoch {
+        let carrier_hz = self.loops.carrier.mean(self.update_s);
+        let code_hz = self.loops.code.mean(self.update_s);
+        let mut sums = [Complex64::ZERO; 3];
+        let (mut phase, mut code, mut frequency) = (0.0, 0.0, 0.0);
+        for _ in 0..self.periods {
+            let truth = self.truth.advance();
+            let ran = carrier_hz * self.period_s;
+            let gained = truth.cycles - ran;
+            let mean_cycles = self.phase_cycles + truth.mean_cycles - 0.5 * ran;
+            // The code's truth follows the carrier's, and so does the aid of its oscillator.
+            let code_gained = gained * self.chips_per_cycle - code_hz * self.period_s;
+            let mean_chips = self.code_chips + 0.5 * code_gained;
+            let taps = self.correlate(mean_cycles, gained, mean_chips);
+            self.cn0.add(taps[1]);
+            sums.iter_mut().zip(taps).for_each(|(sum, tap)| *sum += tap);
+            phase += mean_cycles;
+            code += mean_chips;
+            frequency += gained;
+            self.phase_cycles += gained;
+            self.code_chips += code_gained;
+            self.number += 1;
+            self.watch(taps[1]);
+        }
+        let update = self.loops.close(self.case.mode, sums, self.before, self.periods, self.update_s, self.cn0.hz());
+        self.before = Some(sums[1]);
+        self.phase_cycles -= update.carrier_jump_cycles;
+        self.code_chips -= update.code_jump_chips;
+        let share = 1.0 / f64::from(self.periods);
+        Epoch {
+            time_s: self.number as f64 * self.period_s,
+            code_chips: code * share,
+            phase_cycles: phase * share,
+            frequency_hz: frequency / self.update_s,
+            update,
+        }
+    }
+
+    /// Shows the prompt of the period just ended to the detectors of steady tracking.
+    fn watch(&mut self, prompt: Complex64) {
+        if !self.case.watched || self.case.mode != Mode::Phase {
+            return;
+        }
+        self.symbol_sum += prompt;
+        if self.number.is_multiple_of(u64::from(self.group)) {
+            let time_s = self.number as f64 * self.period_s;
+            self.given_up |= self.watch.add(self.symbol_sum, self.cn0.hz(), time_s, &self.case.settings);
+            self.symbol_sum = Complex64::ZERO;
+        }
+    }
+
+    /// Early, prompt and late of one period, of mean phase error `cycles`, which turns by `turned` cycles in it, and mean
+    /// code error `chips`.
+    fn correlate(&mut self, cycles: f64, turned: f64, chips: f64) -> [Complex64; 3] {
+        if self.has_symbols && self.number.is_multiple_of(u64::from(self.group)) {
+            self.symbol = symbol(self.case.seed, self.number / u64::from(self.group));
+        }
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * (cycles - cycles.floor()));
+        let carrier = Complex64::new(cos, sin) * (self.amplitude * self.symbol * sinc(turned));
+        let half = 0.5 * self.case.settings.spacing_chips;
+        let shape = &self.case.correlation;
+        let mut taps = [chips - half, chips, chips + half].map(|offset| carrier * shape.value(offset));
+        if self.noisy {
+            let normals = [self.normals.next(), self.normals.next(), self.normals.next()];
+            let Covariance { prompt, late } = self.covariance;
+            taps[0] += normals[0];
+            taps[1] += normals[0] * prompt[0] + normals[1] * prompt[1];
+            taps[2] += normals[0] * late[0] + normals[1] * late[1] + normals[2] * late[2];
+        }
+        taps
+    }
+}
+
+/// sin(πx)/(πx); the series of three terms below 0.1 errs by 2e-7.
+fn sinc(x: f64) -> f64 {
+    let angle = std::f64::consts::PI * x;
+    let square = angle * angle;
+    if square < 0.1 { 1.0 - square / 6.0 * (1.0 - square / 20.0) } else { libm::sin(angle) / angle }
+}

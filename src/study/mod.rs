@@ -1,0 +1,19 @@
+//! Studies: the receiver's loops on modelled correlations, thousands of times faster than on samples.
+//!
+//! [`correlator`] drives the loops of a receiver's channel with early, prompt and late correlations drawn from their
+//! statistics; [`motion`] is the truth that it follows, [`correlation`] the shape of the peak. [`expect`] says what theory
+//! predicts for the same loops, [`proof`] compares both over a grid, [`limits`] holds
+//! them against rules of thumb and [`report`] writes both down. This is the only module that sees receiver, generator and judge at once; none of them sees it.
+
+pub mod correlation;
+pub mod correlator;
+pub mod expect;
+pub mod limits;
+pub mod measure;
+pub mod motion;
+mod normal;
+pub mod proof;
+pub mod report;
+#[cfg(test)]
+mod tests;
+mod watch;

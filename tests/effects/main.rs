@@ -1,0 +1,13 @@
+//! Effects and stages: each against its closed form or its published figures, through the samples.
+#![cfg(all(feature = "generator", feature = "receiver", feature = "analysis"))]
+
+mod front_end;
+mod interference;
+mod laws;
+mod link;
+mod multipath;
+mod oscillator;
+mod propagation;
+mod separation;
+mod single;
+mod spoofing;
