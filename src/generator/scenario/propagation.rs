@@ -197,7 +197,7 @@ pub(super) fn troposphere(table: &Table<'_>) -> Result<NeutralAtmosphere, Scenar
     let mapping = match (table.choice("mapping", &names)?.unwrap_or(0), vmf_file) {
         (2 | 3, None) if gpt3_file.is_none() => {
             let expected =
-                "a mapping that needs no file, or vmf_file or gpt3_file, which hold vmf1's and vmf3's coefficients";
+                "vmf_file or gpt3_file beside it, which hold vmf1's and vmf3's coefficients, or niell or cosecant";
             return Err(table.bad("mapping", expected));
         }
         (2, file) => MappingKind::Vienna(Vienna::Vmf1, file),
