@@ -140,6 +140,30 @@ impl Run {
         })
     }
 
+    /// Reads a truth alone, for a receiver that writes files of its own.
+    pub fn read_truth(truth: &Path) -> Result<Self, JudgeError> {
+        let scene = truth.join("scene.json");
+        Ok(Self {
+            scene: json(&scene)?.ok_or_else(|| missing(&scene, TRUTH))?,
+            truth: rows(&truth.join("observations.csv"), TRUTH)?,
+            sky: rows(&truth.join("sky.csv"), TRUTH)?,
+            rays: Vec::new(),
+            trajectory: rows(&truth.join("trajectory.csv"), TRUTH)?,
+            truth_navigation: Vec::new(),
+            interference: optional(&truth.join("interference.csv"))?,
+            claimed: Vec::new(),
+            observations: Vec::new(),
+            fixes: Vec::new(),
+            acquisition: Vec::new(),
+            tracking: Vec::new(),
+            navigation: Vec::new(),
+            events: Vec::new(),
+            receiver: Value::Null,
+            psd: Vec::new(),
+            speed: Speed::default(),
+        })
+    }
+
     /// Seconds from sample 0 by the receiver's clock.
     pub fn time_s(&self, sample: u64) -> f64 {
         sample as f64 / self.scene.sample_rate_hz

@@ -7,6 +7,8 @@
 pub mod canvas;
 mod clock;
 mod delays;
+pub(crate) mod foreign;
+mod honesty;
 mod multipath;
 mod position;
 mod signals;
@@ -20,6 +22,7 @@ use rayon::prelude::*;
 use crate::analysis::JudgeError;
 use crate::analysis::clock::Clock;
 use crate::analysis::errors::Errors;
+use crate::analysis::honesty::Honesty;
 use crate::analysis::load::Run;
 use crate::analysis::summary::Summary;
 
@@ -28,6 +31,7 @@ pub(crate) struct Judged<'a> {
     pub run: &'a Run,
     pub errors: &'a Errors,
     pub clock: &'a Clock,
+    pub honesty: &'a Honesty,
     pub summary: &'a Summary,
 }
 
@@ -46,7 +50,7 @@ impl Judged<'_> {
 type Picture = fn(&Path, &Judged<'_>) -> Result<(), JudgeError>;
 
 /// The pictures by their file names.
-const PICTURES: [(&str, Picture); 15] = [
+const PICTURES: [(&str, Picture); 16] = [
     ("psd.png", spectrum::psd),
     ("acquisition.png", spectrum::acquisition),
     ("discriminators.png", signals::discriminators),
@@ -58,6 +62,7 @@ const PICTURES: [(&str, Picture); 15] = [
     ("delays.png", delays::delays),
     ("position_scatter.png", position::scatter),
     ("position_time.png", position::time),
+    ("position_honesty.png", honesty::honesty),
     ("trajectory.png", position::trajectory),
     ("clock_bias.png", clock::bias),
     ("allan.png", clock::stability),

@@ -324,6 +324,7 @@ fn fix(
     let axes = Geodetic::from_ecef(&solution.position_m).ecef_to_enu();
     let block = |m: &nalgebra::Matrix4<f64>| -> Matrix3<f64> { m.fixed_view::<3, 3>(0, 0).into_owned() };
     let covariance = axes * block(&solution.covariance) * axes.transpose();
+    let correlation = |a, b| covariance[(a, b)] / (covariance[(a, a)] * covariance[(b, b)]).sqrt();
     let dilution = axes * block(&solution.dilution) * axes.transpose();
     let (de, dn, du) = (dilution[(0, 0)], dilution[(1, 1)], dilution[(2, 2)]);
     let dt = solution.dilution[(3, 3)];
@@ -344,6 +345,9 @@ fn fix(
         sigma_north_m: covariance[(1, 1)].sqrt(),
         sigma_up_m: covariance[(2, 2)].sqrt(),
         sigma_clock_m: solution.covariance[(3, 3)].sqrt(),
+        correlation_en: correlation(0, 1),
+        correlation_eu: correlation(0, 2),
+        correlation_nu: correlation(1, 2),
         gdop: (de + dn + du + dt).sqrt(),
         pdop: (de + dn + du).sqrt(),
         hdop: (de + dn).sqrt(),
