@@ -26,9 +26,8 @@ impl Correlated {
         let longest = groups.iter().map(Vec::len).max()?;
         let mut covariance = Vec::new();
         for lag in 0..longest.min(MOST_LAGS) {
-            let product = |group: &Vec<f64>| {
-                group.iter().zip(group.get(lag..).unwrap_or(&[])).map(|(a, b)| a * b).sum::<f64>()
-            };
+            let product =
+                |group: &Vec<f64>| group.iter().zip(group.get(lag..).unwrap_or(&[])).map(|(a, b)| a * b).sum::<f64>();
             let value = groups.iter().map(product).sum::<f64>() / count as f64;
             if value <= 0.0 || !value.is_finite() {
                 break;
@@ -147,7 +146,12 @@ pub(crate) mod tests {
         // Binomial of 200 at 95 %: 190 ± 3·3.1; the sum of twelve uniforms has itself a kurtosis of 2.9.
         assert!((178..=200).contains(&passed), "{passed}");
         let mut state = Draw(5);
-        let flat: Vec<f64> = (0..2000).map(|_| { let x = state.normal(); x - x.round() }).collect();
+        let flat: Vec<f64> = (0..2000)
+            .map(|_| {
+                let x = state.normal();
+                x - x.round()
+            })
+            .collect();
         let found = Correlated::about_zero(std::slice::from_ref(&flat)).unwrap();
         assert!(found.normality(flat.iter().copied()).unwrap() < 1e-6);
     }

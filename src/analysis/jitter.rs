@@ -209,7 +209,9 @@ impl Peak {
         match self.averages {
             0 => (1.0 - x.abs()).max(0.0),
             // Integrals of |x|/2: x|x|/4 and |x|³/12.
-            1 => second(|y| (y + 0.5 * w) * (y + 0.5 * w).abs() / 4.0 - (y - 0.5 * w) * (y - 0.5 * w).abs() / 4.0, x) / w,
+            1 => {
+                second(|y| (y + 0.5 * w) * (y + 0.5 * w).abs() / 4.0 - (y - 0.5 * w) * (y - 0.5 * w).abs() / 4.0, x) / w
+            }
             _ => {
                 let cube = |y: f64| y.abs() * y * y / 12.0;
                 second(|y| cube(y + w) - 2.0 * cube(y) + cube(y - w), x) / (w * w)

@@ -13,6 +13,7 @@ use serde_json::Value;
 
 use crate::analysis::JudgeError;
 use crate::analysis::jamming::Shape;
+use crate::analysis::spectrum::Stage;
 use crate::gnss::record::{
     AcquisitionRow, EventRow, Fix, InterferenceRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
     TrajectoryRow,
@@ -48,6 +49,12 @@ pub struct SceneFacts {
     /// Shapes of the sources of interference, in the order of their numbers.
     #[serde(default)]
     pub interference: Vec<Shape>,
+    /// Standard deviation of the thermal noise per component, in LSB: the gain, also of a scene without noise.
+    #[serde(default)]
+    pub noise_lsb: Option<f64>,
+    /// Stages of the front end, in order.
+    #[serde(default)]
+    pub front_end: Vec<Stage>,
     /// The receiver's oscillator, if the scene has one.
     #[serde(default)]
     pub oscillator: Option<Oscillator>,

@@ -155,7 +155,8 @@ fn undeclared(all: &[SignalError], declared: &[u64]) -> Vec<(u64, f64)> {
             let carrier: Vec<f64> = rest.iter().map(|row| row.carrier_cycles).collect();
             let Some(jump) = first_jump_of(&carrier) else { break };
             let (before, after) = carrier.split_at(jump);
-            let side = median(&before[before.len().saturating_sub(SIDE)..]).zip(median(&after[..after.len().min(SIDE)]));
+            let side =
+                median(&before[before.len().saturating_sub(SIDE)..]).zip(median(&after[..after.len().min(SIDE)]));
             let (Some((before, after)), Some(row)) = (side, rest.get(jump)) else { break };
             if (after - before).abs() >= SLIP_CYCLES {
                 found.push((row.sample, after - before));

@@ -8,16 +8,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use crate::analysis::allan::{Deviation, Point};
+use crate::analysis::clock;
 use crate::analysis::clock::{Of, Series};
 use crate::analysis::errors::Errors;
 use crate::analysis::honesty::{Honesty, Verdict};
 use crate::analysis::jitter::{Jitter as LoopJitter, Loop, Pooled};
 use crate::analysis::load::{Run, Speed};
 use crate::analysis::slips::{Cause, Slips};
+use crate::analysis::spectrum::{self, Spectrum};
 use crate::analysis::spoofing::Spoofing;
 use crate::analysis::statistics::{Spread, mean, median, percentile, pooled_std, rms, spread, std};
 use crate::analysis::theory::clock::white_phase;
-use crate::analysis::{clock, psd};
 use crate::gnss::record::{Event, NavigationRow};
 use crate::gnss::satellite::Sv;
 
@@ -38,6 +39,7 @@ pub struct Summary {
     pub observables: Observables,
     pub tracking: Tracking,
     pub navigation: Navigation,
+    pub psd: Spectrum,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spoofing: Option<Spoofing>,
     pub speed: Speed,
@@ -220,7 +222,8 @@ impl Summary {
         let observables = observables(errors, &mut details);
         let tracking = tracking(run, errors, &mut details);
         let navigation = navigation(run, &mut details);
-        details.psd_nulls_hz = psd::nulls_hz(run);
+        let psd = spectrum::judge(run);
+        details.psd_nulls_hz = psd.null_low_hz.into_iter().chain(psd.null_high_hz).collect();
         details.unmatched_observations = errors.unmatched;
         Self {
             scene: run.scene.name.clone(),
@@ -234,6 +237,7 @@ impl Summary {
             observables,
             tracking,
             navigation,
+            psd,
             spoofing: Spoofing::of(run),
             jammed: !run.scene.interference.is_empty(),
             speed: run.speed,

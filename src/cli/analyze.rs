@@ -14,7 +14,9 @@ pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
     if let Some(truth) = &arguments.truth {
         return another_receiver(truth, arguments);
     }
-    let Some(run) = &arguments.run else { return Err(CliError::usage("analyze: expected a run's directory, or --truth")) };
+    let Some(run) = &arguments.run else {
+        return Err(CliError::usage("analyze: expected a run's directory, or --truth"));
+    };
     let summary = analysis::judge(run).map_err(judge_error)?;
     scenario::print(&format!("{summary}\nresults in {}\n", run.display()))
 }

@@ -127,8 +127,8 @@ impl Judgement {
         }
         plot::foreign::all(out, &self.judged)?;
         let path = out.join("foreign.json");
-        let mut json =
-            serde_json::to_vec_pretty(&self.summary).map_err(|source| JudgeError::Json { path: path.clone(), source })?;
+        let mut json = serde_json::to_vec_pretty(&self.summary)
+            .map_err(|source| JudgeError::Json { path: path.clone(), source })?;
         json.push(b'\n');
         write_whole(&path, &json)
     }
@@ -138,9 +138,10 @@ fn bytes(path: &Path) -> Result<Vec<u8>, JudgeError> {
     let remedy = "it is the file of the receiver under test that the command names";
     let size = fs::metadata(path).map(|data| data.len());
     match size {
-        Ok(size) if size > rinex_obs::LARGEST_BYTES => {
-            Err(JudgeError::NotOfThisTruth { path: path.to_owned(), what: format!("{size} bytes: expected at most 256 MiB") })
-        }
+        Ok(size) if size > rinex_obs::LARGEST_BYTES => Err(JudgeError::NotOfThisTruth {
+            path: path.to_owned(),
+            what: format!("{size} bytes: expected at most 256 MiB"),
+        }),
         _ => fs::read(path).map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => JudgeError::Missing { path: path.to_owned(), remedy },
             _ => JudgeError::NotOfThisTruth { path: path.to_owned(), what: format!("cannot be read: {source}") },
@@ -167,7 +168,8 @@ fn rollover(labels: &[Epoch], timeline: &truth::Timeline) -> Option<i64> {
 fn elsewhere(path: &Path, labels: &[Epoch], timeline: &truth::Timeline) -> JudgeError {
     let (from_s, to_s) = timeline.span_s();
     let [from, to] = [from_s, to_s].map(|t_s| timeline.origin.plus_s(t_s));
-    let own = labels.first().zip(labels.last()).map_or("nothing".to_owned(), |(first, last)| format!("{first} to {last}"));
+    let own =
+        labels.first().zip(labels.last()).map_or("nothing".to_owned(), |(first, last)| format!("{first} to {last}"));
     JudgeError::NotOfThisTruth {
         path: path.to_owned(),
         what: format!("epochs from {own} of GPS time have no truth: expected epochs from {from} to {to}"),

@@ -99,7 +99,8 @@ fn dated(ggas: &[Gga], rmcs: &[Rmc], day: &str) -> Result<Vec<PlaceFix>, Fault> 
             next += step + 1;
             date = rmc.date.clone();
         }
-        let [hours, minutes, seconds] = [gga.time.get(..2), gga.time.get(2..4), gga.time.get(4..)].map(Option::unwrap_or_default);
+        let [hours, minutes, seconds] =
+            [gga.time.get(..2), gga.time.get(2..4), gga.time.get(4..)].map(Option::unwrap_or_default);
         let label = Epoch::parse(&format!("{date}T{hours}:{minutes}:{seconds}Z"))
             .map_err(|error| Fault { line: gga.line, what: error.to_string() })?;
         if fixes.last().is_some_and(|before| label.since(before.label) <= 0.0) {
@@ -118,7 +119,8 @@ fn dated(ggas: &[Gga], rmcs: &[Rmc], day: &str) -> Result<Vec<PlaceFix>, Fault> 
 
 /// Fields of a sentence whose checksum is right; the first is its name.
 fn fields(text: &str) -> Result<Vec<&str>, &'static str> {
-    let (body, sum) = text.strip_prefix('$').and_then(|t| t.split_once('*')).ok_or("no checksum: expected *hh at the end")?;
+    let (body, sum) =
+        text.strip_prefix('$').and_then(|t| t.split_once('*')).ok_or("no checksum: expected *hh at the end")?;
     let sum = u8::from_str_radix(sum.trim(), 16).map_err(|_| "the checksum is not two hexadecimal digits")?;
     if body.bytes().fold(0, |x, b| x ^ b) != sum {
         return Err("the checksum is wrong");
@@ -158,7 +160,8 @@ fn gga(fields: &[&str], line: u64, resolution_m: &mut f64) -> Result<Option<Gga>
         .ok_or_else(|| bad("longitude", &format!("{longitude},{east}"), "dddmm.mm and E or W"))?;
     let height_m = number(height).ok_or_else(|| bad("height", height, "a number"))?;
     // Receivers that give heights above the ellipsoid leave the separation empty or zero.
-    let geoid_m = if geoid.is_empty() { 0.0 } else { number(geoid).ok_or_else(|| bad("geoid separation", geoid, "a number"))? };
+    let geoid_m =
+        if geoid.is_empty() { 0.0 } else { number(geoid).ok_or_else(|| bad("geoid separation", geoid, "a number"))? };
     let decimals = latitude.split_once('.').map_or(0, |(_, rest)| rest.len()) as i32;
     // A minute of latitude is a nautical mile.
     *resolution_m = resolution_m.min(1852.0 * libm::pow(10.0, -f64::from(decimals)));

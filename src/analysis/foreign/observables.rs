@@ -224,13 +224,21 @@ fn time_tag(pairs: &[Pair<'_>]) -> Option<Estimate> {
         let speed = |pair: &Pair<'_>| pair.link.1.wavelength_m() * pair.truth.doppler_hz;
         let Some(speed_mean) = mean(&with_code.iter().map(|pair| speed(pair)).collect::<Vec<_>>()) else { continue };
         points.extend(
-            with_code.iter().filter_map(|pair| Some((pair.link.0, speed(pair) - speed_mean, pair.code_m()? - common_m))),
+            with_code
+                .iter()
+                .filter_map(|pair| Some((pair.link.0, speed(pair) - speed_mean, pair.code_m()? - common_m))),
         );
     }
     slope(&points)
 }
 
-fn clock(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BTreeMap<usize, f64>, timeline: &Timeline, late_s: f64) {
+fn clock(
+    measured: &mut Measured,
+    pairs: &[Pair<'_>],
+    common_m: &BTreeMap<usize, f64>,
+    timeline: &Timeline,
+    late_s: f64,
+) {
     for epoch in by_epoch(pairs) {
         let Some(first) = epoch.first() else { continue };
         let Some(bias_m) = common_m.get(&first.epoch) else { continue };
@@ -353,10 +361,10 @@ fn carriers(measured: &mut Measured, pairs: &[Pair<'_>]) -> (Carriers, Arcs) {
     let (mut found, mut arcs): (Carriers, Arcs) = (vec![None; pairs.len()], Vec::new());
     for (link, indices) in &of_link {
         let wavelength_m = link.1.wavelength_m();
-        let level = |index: usize| (raw_m(index) - clock_m.get(&pairs[index].epoch).copied().unwrap_or(0.0)) / wavelength_m;
-        let whole = |a: &usize, b: &usize| {
-            pairs[*b].label_s - pairs[*a].label_s <= GAP * step_s && !pairs[*b].values.lost_lock
-        };
+        let level =
+            |index: usize| (raw_m(index) - clock_m.get(&pairs[index].epoch).copied().unwrap_or(0.0)) / wavelength_m;
+        let whole =
+            |a: &usize, b: &usize| pairs[*b].label_s - pairs[*a].label_s <= GAP * step_s && !pairs[*b].values.lost_lock;
         let mut last: Option<f64> = None;
         for stretch in indices.chunk_by(whole) {
             let mut rest: Vec<usize> = stretch.to_vec();

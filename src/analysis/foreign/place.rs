@@ -74,10 +74,8 @@ pub fn measure(fixes: &[PlaceFix], timeline: &Timeline, shift_s: i64) -> Places 
     let of = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
     let horizontal = of(&|row| libm::hypot(row.east_m, row.north_m));
     let axes = [of(&|row| row.east_m), of(&|row| row.north_m), of(&|row| row.up_m)];
-    let ground: Vec<f64> = rows
-        .iter()
-        .filter_map(|row| Some(libm::hypot(row.velocity_east_mps?, row.velocity_north_mps?)))
-        .collect();
+    let ground: Vec<f64> =
+        rows.iter().filter_map(|row| Some(libm::hypot(row.velocity_east_mps?, row.velocity_north_mps?))).collect();
     let [east, north, up] = axes.each_ref().map(|axis| bias(axis));
     Places {
         fixes: fixes.len(),

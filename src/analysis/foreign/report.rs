@@ -213,7 +213,9 @@ impl ForeignSummary {
             [("observations", self.join.observations_week_offset), ("positions", self.join.positions_week_offset)]
         {
             if weeks != 0 {
-                found.push(format!("dates of {what} are {weeks:+} weeks off: the week number's rollover was resolved wrongly"));
+                found.push(format!(
+                    "dates of {what} are {weeks:+} weeks off: the week number's rollover was resolved wrongly"
+                ));
             }
         }
         if judged.observables.is_some() {
@@ -227,21 +229,39 @@ impl ForeignSummary {
                 found.push("Doppler is positive for a receding satellite: the opposite of RINEX's sign".to_owned());
             }
             let magnitude = measured.doppler_scale.map(|s| Estimate { value: s.value.abs(), ..s });
-            named(&mut found, "scale of Doppler", magnitude.map(|s| Estimate { value: (s.value - 1.0) * 1e6, sigma: s.sigma * 1e6 }), 0.0, "ppm");
+            named(
+                &mut found,
+                "scale of Doppler",
+                magnitude.map(|s| Estimate { value: (s.value - 1.0) * 1e6, sigma: s.sigma * 1e6 }),
+                0.0,
+                "ppm",
+            );
             named(&mut found, "Doppler plus the carrier's rate", measured.doppler_carrier_hz, 0.0, "Hz");
             named(&mut found, "C/N0", measured.cn0_db, 0.0, "dB against what the scene allows");
             if self.carrier.slips > 0 {
-                found.push(format!("{} breaks of the carrier, {} of them undeclared", self.carrier.slips, self.carrier.slips_undeclared));
+                found.push(format!(
+                    "{} breaks of the carrier, {} of them undeclared",
+                    self.carrier.slips, self.carrier.slips_undeclared
+                ));
             }
             if self.join.observations_outliers > 0 {
-                found.push(format!("{} pseudoranges are of another signal than the file says", self.join.observations_outliers));
+                found.push(format!(
+                    "{} pseudoranges are of another signal than the file says",
+                    self.join.observations_outliers
+                ));
             }
         }
         if let Some([east, north, up]) = judged.places.as_ref().and_then(|places| places.bias_enu_m) {
             for (axis, estimate) in [("east", east), ("north", north), ("up", up)] {
                 named(&mut found, &format!("position {axis}"), Some(estimate), 0.0, "m");
             }
-            named(&mut found, "time tags of positions", judged.places.as_ref().and_then(|p| p.time_tag_s).map(scaled(1e3)), 0.0, "ms late");
+            named(
+                &mut found,
+                "time tags of positions",
+                judged.places.as_ref().and_then(|p| p.time_tag_s).map(scaled(1e3)),
+                0.0,
+                "ms late",
+            );
         }
         found
     }
@@ -249,11 +269,16 @@ impl ForeignSummary {
     fn clock_findings(&self, found: &mut Vec<String>) {
         let clock = &self.clock;
         if let Some(common_m) = clock.pseudorange_common_m {
-            found.push(format!("pseudoranges have {common_m:+.3} m in common ({:+.3} us of clock)", common_m / SPEED_OF_LIGHT_MPS * 1e6));
+            found.push(format!(
+                "pseudoranges have {common_m:+.3} m in common ({:+.3} us of clock)",
+                common_m / SPEED_OF_LIGHT_MPS * 1e6
+            ));
         }
         // A tenth of a hertz at L1 tells two clocks apart.
         let same = |drift: f64| (drift - clock.sampler_drift).abs() < 6e-11;
-        for (what, drift) in [("pseudoranges", clock.drift_code), ("carriers", clock.drift_carrier), ("Dopplers", clock.drift_doppler)] {
+        for (what, drift) in
+            [("pseudoranges", clock.drift_code), ("carriers", clock.drift_carrier), ("Dopplers", clock.drift_doppler)]
+        {
             let Some(drift) = drift else { continue };
             let whose = if what != "pseudoranges" && same(drift) {
                 ", that of the sampler: not steered".to_owned()
@@ -266,7 +291,9 @@ impl ForeignSummary {
 
     fn code_findings(&self, measured: &Measured, found: &mut Vec<String>) {
         let biases: Vec<f64> = measured.satellites.iter().filter_map(|row| row.code_bias_m).collect();
-        if let (Some(largest_m), Some(sv), true) = (self.code.largest_bias_m, &self.code.largest_bias_sv, biases.len() > 1) {
+        if let (Some(largest_m), Some(sv), true) =
+            (self.code.largest_bias_m, &self.code.largest_bias_sv, biases.len() > 1)
+        {
             found.push(format!("largest pseudorange bias of one satellite against the others: {sv} {largest_m:+.3} m"));
         }
         let drift = measured.code_carrier_mps;
@@ -321,7 +348,11 @@ impl fmt::Display for ForeignSummary {
             writeln!(
                 f,
                 "observations  {} epochs, {} joined; {} observations, {} without truth, {} outliers",
-                join.epochs, join.epochs_joined, join.observations, join.observations_unmatched, join.observations_outliers
+                join.epochs,
+                join.epochs_joined,
+                join.observations,
+                join.observations_unmatched,
+                join.observations_outliers
             )?;
             writeln!(
                 f,

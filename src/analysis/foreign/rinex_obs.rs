@@ -163,7 +163,10 @@ fn types(line: &str, at: usize, header: &mut Header, wanted: &mut Option<(char, 
     };
     for code in columns(line, 6, 60).split_whitespace() {
         if code.len() != 3 || *missing == 0 {
-            return Err(fault(at, format!("observation type '{code}': expected {missing} more codes of three characters")));
+            return Err(fault(
+                at,
+                format!("observation type '{code}': expected {missing} more codes of three characters"),
+            ));
         }
         header.types.entry(*system).or_default().push(code.to_owned());
         *missing -= 1;
@@ -174,8 +177,8 @@ fn types(line: &str, at: usize, header: &mut Header, wanted: &mut Option<(char, 
 fn scale(line: &str, at: usize, header: &mut Header) -> Parsed<()> {
     let system = line.chars().next().unwrap_or(' ');
     let factor = columns(line, 2, 6).parse::<f64>().ok().filter(|f| [1.0, 10.0, 100.0, 1000.0].contains(f));
-    let factor =
-        factor.ok_or_else(|| fault(at, format!("scale factor '{}': expected 1, 10, 100 or 1000", columns(line, 2, 6))))?;
+    let factor = factor
+        .ok_or_else(|| fault(at, format!("scale factor '{}': expected 1, 10, 100 or 1000", columns(line, 2, 6))))?;
     let named: Vec<String> = columns(line, 10, 60).split_whitespace().map(str::to_owned).collect();
     let of = if named.is_empty() { header.types.get(&system).cloned().unwrap_or_default() } else { named };
     header.scales.extend(of.into_iter().map(|code| ((system, code), factor)));
@@ -205,7 +208,8 @@ fn epoch(lines: &[&str], at: usize, header: &Header, found: &mut Observations) -
         }
         other => return Err(fault(at, format!("epoch flag '{other}': expected 0 to 6"))),
     }
-    let label = time(line).ok_or_else(|| fault(at, format!("time '{}': expected yyyy mm dd hh mm ss.s", columns(line, 2, 29))))?;
+    let label = time(line)
+        .ok_or_else(|| fault(at, format!("time '{}': expected yyyy mm dd hh mm ss.s", columns(line, 2, 29))))?;
     if found.epochs.last().is_some_and(|before| label.since(before.label) <= 0.0) {
         return Err(fault(at, format!("epoch {label} does not come after the one before")));
     }
@@ -237,7 +241,9 @@ fn satellite(line: &str, at: usize, header: &Header, all: &mut BTreeMap<(Sv, Str
             continue;
         }
         let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-        let value = value.ok_or_else(|| fault(at, format!("{sv} {code} = '{text}': expected a number in columns {} to {}", from + 1, from + 14)))?;
+        let value = value.ok_or_else(|| {
+            fault(at, format!("{sv} {code} = '{text}': expected a number in columns {} to {}", from + 1, from + 14))
+        })?;
         // A zero stands for no observation (RINEX 3.05, 6.7).
         if value == 0.0 {
             continue;
@@ -266,8 +272,7 @@ fn time(line: &str) -> Option<Epoch> {
     let two = |from: usize| format!("{:0>2}", part(from, from + 2));
     let seconds = part(18, 29);
     let (whole, rest) = seconds.split_once('.').unwrap_or((seconds, "0"));
-    let text =
-        format!("{}-{}-{}T{}:{}:{whole:0>2}.{rest}", part(2, 6), two(7), two(10), two(13), two(16));
+    let text = format!("{}-{}-{}T{}:{}:{whole:0>2}.{rest}", part(2, 6), two(7), two(10), two(13), two(16));
     Epoch::parse(&text).ok()
 }
 

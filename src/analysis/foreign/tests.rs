@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use nalgebra::Vector3;
+
 use super::*;
 use crate::analysis::independent::tests::Draw;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
@@ -166,7 +168,8 @@ fn nmea(late_s: f64) -> String {
     for k in 0..50 {
         let label = start().plus_s(4.0 + f64::from(k));
         let t_s = label.since(start()) - late_s;
-        let enu = Vector3::new(east(t_s).0 + 0.4 * draw.normal(), 1.5 + 0.4 * draw.normal(), -2.0 + 0.4 * draw.normal());
+        let enu =
+            Vector3::new(east(t_s).0 + 0.4 * draw.normal(), 1.5 + 0.4 * draw.normal(), -2.0 + 0.4 * draw.normal());
         let place = Geodetic::from_ecef(&(origin().to_ecef() + origin().ecef_to_enu().transpose() * enu));
         let (latitude, longitude) = (place.latitude_rad.to_degrees(), place.longitude_rad.to_degrees());
         let utc = label.to_utc_text();
@@ -204,7 +207,10 @@ fn every_planted_bias_is_named_with_its_size() {
     let found = &judgement.summary;
     let count = 200.0 * 9.0_f64;
     let join = &found.join;
-    assert_eq!((join.epochs, join.epochs_joined, join.observations_unmatched, join.observations_outliers), (200, 200, 0, 0));
+    assert_eq!(
+        (join.epochs, join.epochs_joined, join.observations_unmatched, join.observations_outliers),
+        (200, 200, 0, 0)
+    );
     // The motion's sinusoid: 3 m · 0.5⁴/384 · 0.1⁴ = 5e-8 m, and rounding of 2e7 m to 4e-9 m a step.
     assert!(join.interpolation_code_m < 1e-7 && join.interpolation_carrier_cycles < 1e-6, "{join:?}");
     // Speeds spread by 150 m/s · √(60/9) = 387 m/s: noise alone leaves 0.3/(387·√1800) = 18 µs; the biased satellite, some 2 m/s
@@ -220,8 +226,18 @@ fn every_planted_bias_is_named_with_its_size() {
     let biased = judgement.judged.observables.as_ref().unwrap().satellites.iter().find(|row| row.sv == "G15").unwrap();
     near("satellite's bias", biased.code_bias_m, 2.0 * 8.0 / 9.0, 5.0 * CODE_SIGMA_M / 200.0_f64.sqrt());
     assert_eq!(found.code.largest_bias_sv.as_deref(), Some("G15"));
-    near("code sigma", found.code.sigma_m, CODE_SIGMA_M * (8.0 / 9.0_f64).sqrt(), 5.0 * CODE_SIGMA_M / (2.0 * count).sqrt());
-    near("carrier", found.carrier.rms_cycles, CARRIER_SIGMA * (8.0 / 9.0_f64).sqrt(), 5.0 * CARRIER_SIGMA / (2.0 * count).sqrt());
+    near(
+        "code sigma",
+        found.code.sigma_m,
+        CODE_SIGMA_M * (8.0 / 9.0_f64).sqrt(),
+        5.0 * CODE_SIGMA_M / (2.0 * count).sqrt(),
+    );
+    near(
+        "carrier",
+        found.carrier.rms_cycles,
+        CARRIER_SIGMA * (8.0 / 9.0_f64).sqrt(),
+        5.0 * CARRIER_SIGMA / (2.0 * count).sqrt(),
+    );
     assert_eq!((found.carrier.sign, found.carrier.slips, found.carrier.slips_undeclared), (Some(1.0), 2, 1));
     let slips = &judgement.judged.observables.as_ref().unwrap().slips;
     let undeclared = slips.iter().find(|slip| !slip.declared).unwrap();
@@ -233,7 +249,12 @@ fn every_planted_bias_is_named_with_its_size() {
     let sum: f64 = (0..9).map(linear).sum();
     let loss: f64 = (0..9).map(|i| 10.0 * libm::log10(1.0 + 0.8267 / 1.023e6 * (sum - linear(i)))).sum::<f64>() / 9.0;
     near("C/N0", found.cn0.bias_db, loss - 1.5, 0.01);
-    near("code minus carrier", found.code.minus_carrier_drift_mps, 0.0, 3.0 * found.code.minus_carrier_drift_sigma_mps.unwrap());
+    near(
+        "code minus carrier",
+        found.code.minus_carrier_drift_mps,
+        0.0,
+        3.0 * found.code.minus_carrier_drift_sigma_mps.unwrap(),
+    );
     let position = &found.position;
     // Late labels: 20 m/s · 3 ms = 6 cm; means of fifty of 0.4 m.
     near("east", position.bias_east_m, -0.06, 5.0 * 0.4 / 50.0_f64.sqrt());
@@ -241,7 +262,16 @@ fn every_planted_bias_is_named_with_its_size() {
     near("up", position.bias_up_m, -2.0, 5.0 * 0.4 / 50.0_f64.sqrt());
     near("time tag of positions", position.time_tag_offset_s, 3e-3, 5.0 * 0.4 / 20.0 / 50.0_f64.sqrt());
     judgement.write(place.path()).unwrap();
-    for name in ["foreign.json", "foreign_observations.csv", "foreign_satellites.csv", "foreign_clock.csv", "foreign_slips.csv", "foreign_fixes.csv", "foreign_observables.png", "foreign_position.png"] {
+    for name in [
+        "foreign.json",
+        "foreign_observations.csv",
+        "foreign_satellites.csv",
+        "foreign_clock.csv",
+        "foreign_slips.csv",
+        "foreign_fixes.csv",
+        "foreign_observables.png",
+        "foreign_position.png",
+    ] {
         assert!(fs::metadata(place.path().join(name)).unwrap().len() > 100, "{name}");
     }
 }

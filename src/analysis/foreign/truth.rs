@@ -86,7 +86,8 @@ impl Timeline {
             })
             .collect();
         let steps: Vec<f64> = places.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
-        let at: HashMap<u64, (f64, Place)> = run.trajectory.iter().zip(&places).map(|(row, place)| (row.sample, *place)).collect();
+        let at: HashMap<u64, (f64, Place)> =
+            run.trajectory.iter().zip(&places).map(|(row, place)| (row.sample, *place)).collect();
         let elevations: HashMap<(u64, Sv), f64> =
             run.sky.iter().map(|row| ((row.sample, row.sv), row.elevation_deg)).collect();
         let access = Access::new(run);
@@ -171,7 +172,8 @@ impl Timeline {
                 }
                 let guess = between(link, a, c, b.0);
                 worst.range_m = worst.range_m.max((guess.range_m - b.1.range_m).abs() / 16.0);
-                worst.carrier_cycles = worst.carrier_cycles.max((guess.carrier_cycles - b.1.carrier_cycles).abs() / 16.0);
+                worst.carrier_cycles =
+                    worst.carrier_cycles.max((guess.carrier_cycles - b.1.carrier_cycles).abs() / 16.0);
                 worst.doppler_hz = worst.doppler_hz.max((guess.doppler_hz - b.1.doppler_hz).abs() / 8.0);
             }
         }
@@ -220,7 +222,9 @@ fn between(link: &Link, a: &(f64, State), b: &(f64, State), t_s: f64) -> State {
     State {
         range_m: near.range_m + blend(&cubic.value, range_rise, range_rates),
         carrier_cycles: near.carrier_cycles + blend(&cubic.value, carrier_rise, carrier_rates),
-        doppler_hz: -(cubic.rate[2] * carrier_rise / h_s + cubic.rate[1] * carrier_rates.0 + cubic.rate[3] * carrier_rates.1),
+        doppler_hz: -(cubic.rate[2] * carrier_rise / h_s
+            + cubic.rate[1] * carrier_rates.0
+            + cubic.rate[3] * carrier_rates.1),
         cn0_dbhz: line(near.cn0_dbhz, far.cn0_dbhz),
         effective_dbhz: line(near.effective_dbhz, far.effective_dbhz),
         elevation_deg: line(near.elevation_deg, far.elevation_deg),

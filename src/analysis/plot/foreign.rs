@@ -49,7 +49,12 @@ fn observables(path: &Path, judged: &Judged) -> Result<(), JudgeError> {
     let middle_s = mean(&clock.iter().map(|point| point.1).collect::<Vec<_>>()).unwrap_or(0.0);
     let clock = clock.into_iter().map(|(time, bias_s)| (time, (bias_s - middle_s) * 1e9)).collect();
     let charts = [
-        over_time("Code error, the epoch's common part removed", "error (m)", 0.1, per_satellite(rows, |row| row.code_m)),
+        over_time(
+            "Code error, the epoch's common part removed",
+            "error (m)",
+            0.1,
+            per_satellite(rows, |row| row.code_m),
+        ),
         over_time(
             "Carrier error, common part and a constant removed",
             "error (cycles)",

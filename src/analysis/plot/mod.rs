@@ -7,6 +7,7 @@
 pub mod canvas;
 mod clock;
 mod delays;
+mod elevation;
 pub(crate) mod foreign;
 mod honesty;
 mod multipath;
@@ -21,6 +22,7 @@ use rayon::prelude::*;
 
 use crate::analysis::JudgeError;
 use crate::analysis::clock::Clock;
+use crate::analysis::elevation::Elevations;
 use crate::analysis::errors::Errors;
 use crate::analysis::honesty::Honesty;
 use crate::analysis::load::Run;
@@ -32,6 +34,7 @@ pub(crate) struct Judged<'a> {
     pub errors: &'a Errors,
     pub clock: &'a Clock,
     pub honesty: &'a Honesty,
+    pub elevations: &'a Elevations,
     pub summary: &'a Summary,
 }
 
@@ -50,12 +53,13 @@ impl Judged<'_> {
 type Picture = fn(&Path, &Judged<'_>) -> Result<(), JudgeError>;
 
 /// The pictures by their file names.
-const PICTURES: [(&str, Picture); 16] = [
+const PICTURES: [(&str, Picture); 17] = [
     ("psd.png", spectrum::psd),
     ("acquisition.png", spectrum::acquisition),
     ("discriminators.png", signals::discriminators),
     ("cn0.png", signals::cn0),
     ("observables.png", signals::observables),
+    ("elevation.png", elevation::elevation),
     ("jitter.png", signals::jitter),
     ("multipath.png", multipath::multipath),
     ("sky.png", sky::sky),
