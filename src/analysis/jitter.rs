@@ -3,7 +3,7 @@
 //!
 //! Raw and closed-loop figures are never mixed: a discriminator's value is noise of one integration, √(1/(2B·T)) times what the
 //! loop lets through. The theory takes the loops as the settings file describes them, controlled roots of exact bandwidth, with
-//! phase and rate fed back ([`theory::linear`]), and adds the scene's oscillator and the stress that the true motion puts on
+//! phase and rate fed back ([`crate::analysis::theory::linear`]), and adds the scene's oscillator and the stress that the true motion puts on
 //! that same linear loop. In the tracking stage the frequency is that of the phase loop; its row judges the rate. Limits: discriminators
 //! as of early minus late power and two-quadrant arctangent; a front-end filter's rounding of the correlation is left out.
 

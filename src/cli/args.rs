@@ -120,13 +120,13 @@ pub struct Analyze {
 }
 
 #[derive(Args, Debug)]
-#[group(id = "files", multiple = true, requires = "truth")]
+#[group(id = "files", multiple = true)]
 pub struct ReceiverFiles {
     /// Its observations: a RINEX 3 file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "truth")]
     pub rinex_obs: Option<PathBuf>,
     /// Its positions: NMEA 0183 with GGA, and RMC for date and velocity
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "truth")]
     pub nmea: Option<PathBuf>,
 }
 

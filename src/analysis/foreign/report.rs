@@ -59,6 +59,8 @@ pub struct Join {
 pub struct Clock {
     /// Mean over the epochs of the pseudoranges' common error: label minus GPS time, as the file has it.
     pub pseudorange_common_m: Option<f64>,
+    /// The same less the sampler's clock: a bias of all pseudoranges, of a receiver that labels its epochs by counting samples.
+    pub pseudorange_common_less_sampler_m: Option<f64>,
     pub bias_mean_s: Option<f64>,
     pub drift_code: Option<f64>,
     pub drift_carrier: Option<f64>,
@@ -171,6 +173,9 @@ impl ForeignSummary {
             },
             clock: Clock {
                 pseudorange_common_m: bias_mean_s.map(|bias| bias * SPEED_OF_LIGHT_MPS),
+                pseudorange_common_less_sampler_m: bias_mean_s
+                    .zip(mean(&samplers))
+                    .map(|(bias, sampler)| (bias - sampler) * SPEED_OF_LIGHT_MPS),
                 bias_mean_s,
                 drift_code: measured.drift_code,
                 drift_carrier: measured.drift_carrier,

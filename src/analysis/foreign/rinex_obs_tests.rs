@@ -82,3 +82,37 @@ fn a_file_cut_anywhere_or_with_any_byte_changed_is_read_or_refused() {
         }
     }
 }
+
+/// The crate that everyone uses reads the same numbers from the same file.
+#[cfg(feature = "generator")]
+#[test]
+fn the_rinex_crate_reads_the_same_values() {
+    use ::rinex::prelude::{Rinex, TimeScale};
+
+    let lines: Vec<&str> = FILE.lines().filter(|line| !line.contains("  4  1") && !line.contains("a remark")).collect();
+    let text = (lines.join("\n") + "\n").replace("G 3 ", "G03 ");
+    let ours = read(text.as_bytes()).unwrap();
+    let theirs = Rinex::parse(&mut std::io::BufReader::new(text.as_bytes())).unwrap();
+    let mut compared = 0;
+    for (key, observed) in theirs.observations_iter() {
+        let at_ns = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();
+        let same = |epoch: &&ObservedEpoch| {
+            (epoch.label.since(Epoch::new((at_ns / 1_000_000_000) as i64, (at_ns % 1_000_000_000) as f64 * 1e-9))).abs() < 1e-9
+        };
+        let epoch = ours.epochs.iter().find(same).expect("an epoch that the crate has");
+        for signal in observed.signals.iter().filter(|signal| signal.value != 0.0) {
+            let (sv, code) = (signal.sv.to_string(), signal.observable.to_string());
+            let values = &epoch.values[&(sv.parse().unwrap(), code[1..].to_owned())];
+            let found = match &code[..1] {
+                "C" => values.pseudorange_m,
+                "L" => values.carrier_cycles,
+                "D" => values.doppler_hz,
+                _ => values.cn0_dbhz,
+            };
+            assert_eq!(found, Some(signal.value), "{sv} {code}");
+            compared += 1;
+        }
+    }
+    // Four values of two satellites, one of the third, two in the second epoch.
+    assert_eq!(compared, 11);
+}
