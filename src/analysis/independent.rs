@@ -79,7 +79,8 @@ impl Correlated {
     /// variances that correlation gives them (Lobato and Velasco 2004), chi-square of two degrees. `None` of fewer than 20 values.
     pub fn normality(&self, values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
         let n = self.count as f64;
-        let moment = |k: i32| values.clone().map(|value| value.powi(k)).sum::<f64>() / n;
+        let middle = values.clone().sum::<f64>() / n;
+        let moment = |k: i32| values.clone().map(|value| (value - middle).powi(k)).sum::<f64>() / n;
         let (m2, m3, m4) = (moment(2), moment(3), moment(4));
         if self.count < 20 || m2 <= 0.0 {
             return None;

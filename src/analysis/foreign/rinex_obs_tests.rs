@@ -1,8 +1,7 @@
 use super::*;
 
 /// Written by GNSS-SDR 0.0.17, with one satellite of another system and an event record put in.
-const FILE: &str = "\
-     3.02           OBSERVATION DATA    M                   RINEX VERSION / TYPE
+const FILE: &str = "     3.02           OBSERVATION DATA    M                   RINEX VERSION / TYPE
 GNSS-SDR            Software Receiver   0.0.17              REC # / TYPE / VERS 
 G    4 C1C L1C D1C S1C                                      SYS / # / OBS TYPES 
 E    2 C1B L1B                                              SYS / # / OBS TYPES 
@@ -97,7 +96,8 @@ fn the_rinex_crate_reads_the_same_values() {
     for (key, observed) in theirs.observations_iter() {
         let at_ns = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();
         let same = |epoch: &&ObservedEpoch| {
-            (epoch.label.since(Epoch::new((at_ns / 1_000_000_000) as i64, (at_ns % 1_000_000_000) as f64 * 1e-9))).abs() < 1e-9
+            (epoch.label.since(Epoch::new((at_ns / 1_000_000_000) as i64, (at_ns % 1_000_000_000) as f64 * 1e-9))).abs()
+                < 1e-9
         };
         let epoch = ours.epochs.iter().find(same).expect("an epoch that the crate has");
         for signal in observed.signals.iter().filter(|signal| signal.value != 0.0) {

@@ -181,8 +181,11 @@ impl Timeline {
     }
 }
 
+/// Something at a time.
+type At<T> = (f64, T);
+
 /// The rows on either side of a time.
-fn around<T>(nodes: &[(f64, T)], t_s: f64) -> Option<(&(f64, T), &(f64, T))> {
+fn around<T>(nodes: &[At<T>], t_s: f64) -> Option<(&At<T>, &At<T>)> {
     let after = nodes.partition_point(|node| node.0 <= t_s);
     let after = if after == nodes.len() && nodes.last().is_some_and(|last| last.0 == t_s) { after - 1 } else { after };
     Some((nodes.get(after.checked_sub(1)?)?, nodes.get(after)?))

@@ -17,6 +17,7 @@ use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::{Fix, Observation};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, Rate, SampleClock};
+use crate::receiver::track::loops::CodeShape;
 
 pub mod least_squares;
 pub mod smooth;
@@ -91,16 +92,22 @@ impl Default for PositionSettings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CodeNoise {
     pub chip_m: f64,
-    pub spacing_chips: f64,
+    /// The correlation that early and late meet: averaging replicas round it and correlate its noise.
+    pub shape: CodeShape,
     pub bandwidth_hz: f64,
     pub integration_s: f64,
 }
 
 impl CodeNoise {
-    /// Standard deviation of a non-coherent early-minus-late loop (Kaplan and Hegarty, 2nd ed., equation 5.22).
+    /// Standard deviation of a non-coherent early-minus-late loop.
+    ///
+    /// B·(1−ρ)/(2·C/N0·a′²)·(1 + (1+ρ)/(2·T·C/N0·a²)) with height a, slope a′ and noise correlation ρ of early and late; on a triangle
+    /// that is Kaplan and Hegarty's equation 5.23 (2nd ed.), first branch.
     pub fn sigma_m(&self, cn0_hz: f64) -> f64 {
-        let squaring = 1.0 + 2.0 / ((2.0 - self.spacing_chips) * self.integration_s * cn0_hz);
-        self.chip_m * (self.spacing_chips * self.bandwidth_hz / (2.0 * cn0_hz) * squaring).sqrt()
+        let CodeShape { value, slope, common } = self.shape;
+        let squaring = 1.0 + (1.0 + common) / (2.0 * self.integration_s * cn0_hz * value * value);
+        let spread = (1.0 - common) / (slope * slope);
+        self.chip_m * (self.bandwidth_hz * spread / (2.0 * cn0_hz) * squaring).sqrt()
     }
 }
 
