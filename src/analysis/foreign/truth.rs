@@ -71,7 +71,9 @@ const GAP: f64 = 1.5;
 impl Timeline {
     /// From a run's truth; `None` without a trajectory.
     pub fn new(run: &Run) -> Option<Self> {
-        let origin = Epoch::new(run.trajectory.first()?.gps_s, 0.0);
+        let first = run.trajectory.first()?;
+        // The nearest second: a clock that is a little ahead does not begin a second earlier.
+        let origin = Epoch::new(first.gps_s, first.gps_fraction_s.round());
         let places: Vec<(f64, Place)> = run
             .trajectory
             .iter()
