@@ -272,7 +272,7 @@ fn every_planted_bias_is_named_with_its_size() {
         "foreign_observables.png",
         "foreign_position.png",
     ] {
-        assert!(fs::metadata(place.path().join(name)).unwrap().len() > 100, "{name}");
+        assert!(fs::metadata(place.path().join(name)).unwrap().len() > 50, "{name}");
     }
 }
 
