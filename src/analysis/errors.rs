@@ -57,6 +57,8 @@ pub struct PositionError {
 #[derive(Clone, Debug, Default)]
 pub struct Errors {
     pub signals: BTreeMap<Link, Vec<SignalError>>,
+    /// The same with the carriers' constants still in.
+    pub raw: BTreeMap<Link, Vec<SignalError>>,
     pub positions: Vec<PositionError>,
     /// Changes of the carrier's constant: those declared by the receiver's events after a satellite's first observation, and jumps of at
     /// least [`SLIP_CYCLES`] that stay and that it did not declare.
@@ -105,8 +107,9 @@ impl Errors {
         if self.signals.is_empty() && !run.observations.is_empty() {
             return Err(JudgeError::NothingJoins { what: "observations", count: run.observations.len() });
         }
+        self.signals.values_mut().for_each(|rows| rows.sort_by_key(|row| row.sample));
+        self.raw = self.signals.clone();
         for (&(sv, signal), rows) in &mut self.signals {
-            rows.sort_by_key(|row| row.sample);
             let first = rows.first().map_or(0, |row| row.sample);
             let declared: Vec<u64> = run
                 .events
@@ -194,7 +197,11 @@ fn level_carrier(rows: &mut [SignalError], declared: &[u64]) -> usize {
 /// The first row of an arc whose carrier jumped by [`SLIP_CYCLES`] or more against the rows before, and stayed.
 /// A slip may take place during a measurement and show as two half steps.
 fn first_jump(arc: &[SignalError]) -> Option<usize> {
-    let carrier: Vec<f64> = arc.iter().map(|row| row.carrier_cycles).collect();
+    first_jump_of(&arc.iter().map(|row| row.carrier_cycles).collect::<Vec<_>>())
+}
+
+/// [`first_jump`] of carriers in cycles.
+pub(super) fn first_jump_of(carrier: &[f64]) -> Option<usize> {
     (1..carrier.len().saturating_sub(1)).find(|&index| {
         let (before, after) = carrier.split_at(index);
         let (Some(last), Some(next)) = (before.last(), after.first()) else { return false };

@@ -177,7 +177,7 @@ pub fn density(source: &Source, f_hz: f64, bin_hz: f64) -> f64 {
 }
 
 /// A line's share of density times bin width, `x` bins from it, after a Hann window: its transform squared over its power.
-fn hann(x: f64) -> f64 {
+pub(super) fn hann(x: f64) -> f64 {
     let edge = 1.0 - x * x;
     // At one bin sinc(x)/(1 − x²) is 1/2.
     let response = if edge.abs() < 1e-6 { 0.25 } else { sinc_squared(x) / (edge * edge) };

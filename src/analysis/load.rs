@@ -13,6 +13,7 @@ use serde_json::Value;
 
 use crate::analysis::JudgeError;
 use crate::analysis::jamming::Shape;
+use crate::analysis::spectrum::Stage;
 use crate::gnss::record::{
     AcquisitionRow, EventRow, Fix, InterferenceRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
     TrajectoryRow,
@@ -48,6 +49,12 @@ pub struct SceneFacts {
     /// Shapes of the sources of interference, in the order of their numbers.
     #[serde(default)]
     pub interference: Vec<Shape>,
+    /// Standard deviation of the thermal noise per component, in LSB: the gain, also of a scene without noise.
+    #[serde(default)]
+    pub noise_lsb: Option<f64>,
+    /// Stages of the front end, in order.
+    #[serde(default)]
+    pub front_end: Vec<Stage>,
     /// The receiver's oscillator, if the scene has one.
     #[serde(default)]
     pub oscillator: Option<Oscillator>,
@@ -137,6 +144,30 @@ impl Run {
             receiver: json(&rx.join("receiver.json"))?.unwrap_or(Value::Null),
             psd: optional(&psd)?,
             speed: json(&run.join("speed.json"))?.unwrap_or_default(),
+        })
+    }
+
+    /// Reads a truth alone, for a receiver that writes files of its own.
+    pub fn read_truth(truth: &Path) -> Result<Self, JudgeError> {
+        let scene = truth.join("scene.json");
+        Ok(Self {
+            scene: json(&scene)?.ok_or_else(|| missing(&scene, TRUTH))?,
+            truth: rows(&truth.join("observations.csv"), TRUTH)?,
+            sky: rows(&truth.join("sky.csv"), TRUTH)?,
+            rays: Vec::new(),
+            trajectory: rows(&truth.join("trajectory.csv"), TRUTH)?,
+            truth_navigation: Vec::new(),
+            interference: optional(&truth.join("interference.csv"))?,
+            claimed: Vec::new(),
+            observations: Vec::new(),
+            fixes: Vec::new(),
+            acquisition: Vec::new(),
+            tracking: Vec::new(),
+            navigation: Vec::new(),
+            events: Vec::new(),
+            receiver: Value::Null,
+            psd: Vec::new(),
+            speed: Speed::default(),
         })
     }
 

@@ -2,20 +2,28 @@
 //!
 //! It reads only what generator and receiver wrote into a run's directory, joins the rows on
 //! (sample number, satellite, signal) and writes `summary.json` and pictures beside them.
-//! [`errors`] measures, [`clock`] does so for the receiver's clock with the deviations of [`allan`], [`statistics`]
+//! [`errors`] measures, [`slips`] finds breaks and their causes, [`elevation`] sorts errors by satellite and elevation, [`jitter`] holds each loop against theory, [`honesty`] the fixes against
+//! their own covariance, [`clock`] does so for the receiver's clock with the deviations of [`allan`], [`statistics`]
 //! condenses, [`access`] and [`jamming`] expect C/N0 under other codes and interference, [`spoofing`] tells what a
 //! spoofer did, [`summary`] is what scripts gate on, [`plot`] draws, [`report`] prints, [`psd`] estimates the spectrum of
-//! the samples, [`trade`] weighs speed against accuracy, [`theory`] says what errors to expect.
+//! the samples, [`spectrum`] says what it should be, [`foreign`] judges receivers that this project did not write, [`trade`] weighs speed against accuracy, [`theory`] says what errors to expect.
 
 pub mod access;
 pub mod allan;
 pub mod clock;
+pub mod elevation;
 pub mod errors;
+pub mod foreign;
+pub mod honesty;
+pub mod independent;
 pub mod jamming;
+pub mod jitter;
 pub mod load;
 pub mod plot;
 pub mod psd;
 pub mod report;
+pub mod slips;
+pub mod spectrum;
 pub mod spoofing;
 pub mod statistics;
 pub mod summary;
@@ -49,6 +57,10 @@ pub enum JudgeError {
          with the same measurement interval?"
     )]
     NothingJoins { what: &'static str, count: usize },
+    #[error("{}: line {line}: {what}", path.display())]
+    Line { path: PathBuf, line: u64, what: String },
+    #[error("{}: {what}", path.display())]
+    NotOfThisTruth { path: PathBuf, what: String },
     #[error("{} could not be drawn: {reason}", path.display())]
     Plot { path: PathBuf, reason: String },
 }
@@ -62,9 +74,28 @@ pub fn judge(run: &Path) -> Result<Summary, JudgeError> {
     let read = load::Run::read(run)?;
     let errors = errors::Errors::measure(&read)?;
     let clock = clock::Clock::measure(&read, &errors);
-    let summary = Summary::new(&read, &errors, &clock);
-    plot::all(run, &plot::Judged { run: &read, errors: &errors, clock: &clock, summary: &summary })?;
+    let honesty = honesty::Honesty::measure(&read, &errors);
+    let slips = slips::Slips::find(&read, &errors.raw);
+    let jitter = jitter::Jitter::measure(&read, &errors);
+    let elevations = elevation::Elevations::measure(&read, &errors);
+    let mut summary = Summary::new(&read, &errors, &clock);
+    summary.add(&honesty, &slips, &jitter);
+    plot::all(
+        run,
+        &plot::Judged {
+            run: &read,
+            errors: &errors,
+            clock: &clock,
+            honesty: &honesty,
+            elevations: &elevations,
+            summary: &summary,
+        },
+    )?;
     clock.write(run)?;
+    honesty.write(run)?;
+    elevations.write(run)?;
+    slips.write(run)?;
+    jitter.write(run)?;
     let path = run.join("summary.json");
     let mut json =
         serde_json::to_vec_pretty(&summary).map_err(|source| JudgeError::Json { path: path.clone(), source })?;

@@ -1,8 +1,7 @@
-//! Power spectral density of the samples by Welch's method, and what theory says it should be.
+//! Power spectral density of the samples by Welch's method, and the spectra of codes.
 //!
-//! Hann window, half overlap, periodograms averaged in f64 (Welch 1967). The theory sums the main
-//! spectrum of each satellite's chips, sinc²(f/R_c)/R_c, over its aliases, on a flat noise floor;
-//! interference is added as it is on average over the run.
+//! Hann window, half overlap, periodograms averaged in f64 (Welch 1967). A code's spectrum is that of its chips,
+//! sinc²(f/R_c)/R_c, summed over its aliases; [`super::spectrum`] builds what is expected of the samples from it.
 //! The lines 1 kHz apart of a repeating code and the data are below the resolution and left out.
 
 use std::path::Path;
@@ -12,9 +11,8 @@ use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
 use crate::analysis::JudgeError;
-use crate::analysis::jamming;
 use crate::analysis::load::{PsdRow, Run};
-use crate::analysis::statistics::{mean, median};
+use crate::analysis::statistics::mean;
 
 /// A spectrum being accumulated from blocks of planar samples.
 pub struct Psd {
@@ -121,52 +119,17 @@ fn decibels(power: f64) -> f64 {
     10.0 * libm::log10(power.max(1e-30))
 }
 
-/// What theory expects at the frequencies of `psd.csv`, in the same decibels. Its level, which the truth does not
-/// state, is fitted: the median over frequencies less than 20 dB below the peak. Empty without a spectrum or without signals.
-pub fn theory_db(run: &Run) -> Vec<f64> {
-    let signals = expected(run);
-    let sources = jamming::sources(run);
-    let Some(center_hz) = run.scene.center_hz.filter(|_| !signals.is_empty() && !run.psd.is_empty()) else {
-        return Vec::new();
-    };
-    let rate_hz = run.scene.sample_rate_hz;
-    let floor = if run.scene.noise { 1.0 } else { 0.0 };
-    let sign = if run.scene.inverted { -1.0 } else { 1.0 };
-    let bin_hz = run.psd.get(1).zip(run.psd.first()).map_or(1.0, |(b, a)| b.frequency_hz - a.frequency_hz);
-    let shape: Vec<f64> = run
-        .psd
-        .iter()
-        .map(|row| {
-            let of = |signal: &Expected| {
-                let from_carrier_hz = row.frequency_hz - sign * (signal.carrier_hz - center_hz);
-                signal.cn0_hz * code_density(&run.scene.code_edge, from_carrier_hz, signal.chip_rate_hz, rate_hz)
-            };
-            let jammed: f64 = sources.values().map(|source| jamming::density(source, row.frequency_hz, bin_hz)).sum();
-            decibels(floor + signals.iter().map(of).sum::<f64>() + jammed)
-        })
-        .collect();
-    // Near the nulls quantisation, not the codes, sets the level.
-    let peak_db = shape.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let offsets: Vec<f64> = run
-        .psd
-        .iter()
-        .zip(&shape)
-        .filter(|(_, shape)| **shape > peak_db - 20.0)
-        .map(|(row, shape)| row.density_db - shape)
-        .collect();
-    let level_db = median(&offsets).unwrap_or(0.0);
-    shape.into_iter().map(|shape| shape + level_db).collect()
-}
-
-struct Expected {
-    /// Carrier as received.
-    carrier_hz: f64,
-    chip_rate_hz: f64,
-    cn0_hz: f64,
+/// A satellite's signal on average over the run.
+pub(super) struct Expected {
+    /// Carrier as received, and as sent.
+    pub carrier_hz: f64,
+    pub nominal_hz: f64,
+    pub chip_rate_hz: f64,
+    pub cn0_hz: f64,
 }
 
 /// The mean of each satellite's signal over the run.
-fn expected(run: &Run) -> Vec<Expected> {
+pub(super) fn expected(run: &Run) -> Vec<Expected> {
     let mut links: Vec<_> = run.truth.iter().map(|row| (row.sv, row.signal)).collect();
     links.sort_unstable();
     links.dedup();
@@ -176,6 +139,7 @@ fn expected(run: &Run) -> Vec<Expected> {
         let doppler: Vec<f64> = rows().map(|row| row.doppler_hz).collect();
         Some(Expected {
             carrier_hz: signal.carrier_hz + mean(&doppler)?,
+            nominal_hz: signal.carrier_hz,
             chip_rate_hz: signal.components.first()?.chip_rate_hz,
             cn0_hz: mean(&cn0)?,
         })
@@ -231,21 +195,6 @@ pub(super) fn sinc_squared(x: f64) -> f64 {
     }
     let sinc = libm::sin(angle) / angle;
     sinc * sinc
-}
-
-/// The lowest point of `psd.csv` within a tenth of a chip rate of each first null, for a scene without noise:
-/// the frequency in the samples minus the carrier's. Empty with noise, or where the band is too narrow.
-pub fn nulls_hz(run: &Run) -> Vec<f64> {
-    let Some(center_hz) = run.scene.center_hz.filter(|_| !run.scene.noise) else { return Vec::new() };
-    let Some(signal) = run.truth.first().map(|row| row.signal) else { return Vec::new() };
-    let Some(chip_rate_hz) = signal.components.first().map(|c| c.chip_rate_hz) else { return Vec::new() };
-    let sign = if run.scene.inverted { -1.0 } else { 1.0 };
-    let if_hz = sign * (signal.carrier_hz - center_hz);
-    let near = |null_hz: f64| {
-        let band = run.psd.iter().filter(move |row| (row.frequency_hz - if_hz - null_hz).abs() < chip_rate_hz / 10.0);
-        band.min_by(|a, b| a.density_db.total_cmp(&b.density_db)).map(|row| row.frequency_hz - if_hz)
-    };
-    [-chip_rate_hz, chip_rate_hz].into_iter().filter_map(near).collect()
 }
 
 #[cfg(test)]

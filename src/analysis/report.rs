@@ -94,7 +94,25 @@ impl Summary {
         for (name, sigma, limit) in rows {
             writeln!(f, "{name:<26}{:>12}{limit:>12.4}", number(sigma, 4))?;
         }
-        writeln!(f, "{} losses of lock, {} cycle slips", tracking.losses_of_lock, tracking.cycle_slips)
+        writeln!(f, "{} losses of lock, {} cycle slips", tracking.losses_of_lock, tracking.cycle_slips)?;
+        for (name, pooled) in [("DLL", tracking.dll_chips), ("PLL", tracking.pll_deg), ("FLL", tracking.fll_hz)] {
+            let Some(pooled) = pooled else { continue };
+            let (sigma, theory) = (pooled.sigma, pooled.theory_sigma);
+            writeln!(
+                f,
+                "{name} against theory    closed loop {:.3} of it, {} rules broken",
+                sigma / theory,
+                pooled.rules_broken
+            )?;
+        }
+        if let (Some(mean), Some([low, high])) = (self.position.nees_mean, self.position.nees_band) {
+            let fixes = number(self.position.nees_independent, 0);
+            writeln!(
+                f,
+                "covariance    normalised error squared {mean:.2}, honest within {low:.2} to {high:.2} ({fixes} independent fixes)"
+            )?;
+        }
+        Ok(())
     }
 
     fn clock_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

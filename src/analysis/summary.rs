@@ -3,18 +3,22 @@
 //! The serialised keys and their order are a contract; a number that a scene cannot have is null.
 //! [`Details`] stays in memory.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
 use crate::analysis::allan::{Deviation, Point};
+use crate::analysis::clock;
 use crate::analysis::clock::{Of, Series};
 use crate::analysis::errors::Errors;
+use crate::analysis::honesty::{Honesty, Verdict};
+use crate::analysis::jitter::{Jitter as LoopJitter, Loop, Pooled};
 use crate::analysis::load::{Run, Speed};
+use crate::analysis::slips::{Cause, Slips};
+use crate::analysis::spectrum::{self, Spectrum};
 use crate::analysis::spoofing::Spoofing;
 use crate::analysis::statistics::{Spread, mean, median, percentile, pooled_std, rms, spread, std};
 use crate::analysis::theory::clock::white_phase;
-use crate::analysis::{clock, psd};
 use crate::gnss::record::{Event, NavigationRow};
 use crate::gnss::satellite::Sv;
 
@@ -35,6 +39,7 @@ pub struct Summary {
     pub observables: Observables,
     pub tracking: Tracking,
     pub navigation: Navigation,
+    pub psd: Spectrum,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spoofing: Option<Spoofing>,
     pub speed: Speed,
@@ -70,6 +75,12 @@ pub struct Position {
     pub bias_enu_m: Option<[f64; 3]>,
     /// Of the three-dimensional velocity error.
     pub velocity_p95_mps: Option<f64>,
+    /// Mean normalised error squared with the receiver's own covariance, 3 of an honest one; the 95 % band of that mean for as
+    /// many independent fixes as the errors' autocorrelation leaves.
+    pub nees_mean: Option<f64>,
+    pub nees_band: Option<[f64; 2]>,
+    pub nees_independent: Option<f64>,
+    pub nees_verdict: Option<Verdict>,
 }
 
 /// The receiver's clock, over the longest stretch of fixes without a gap. Deviations at an averaging time of 1 s are null where
@@ -124,6 +135,13 @@ pub struct Tracking {
     pub dll_sigma_chips: Option<f64>,
     pub pll_sigma_deg: Option<f64>,
     pub fll_sigma_hz: Option<f64>,
+    /// Slips that the receiver did not declare, and how many slips and losses have which cause (`slips.csv`).
+    pub slips_undeclared: usize,
+    pub slip_causes: BTreeMap<Cause, usize>,
+    /// The loops of all satellites three ways (`jitter.csv`): chips, degrees, hertz. Null where the receiver names no settings.
+    pub dll_chips: Option<Pooled>,
+    pub pll_deg: Option<Pooled>,
+    pub fll_hz: Option<Pooled>,
 }
 
 /// Decoded parameters against those sent.
@@ -204,7 +222,8 @@ impl Summary {
         let observables = observables(errors, &mut details);
         let tracking = tracking(run, errors, &mut details);
         let navigation = navigation(run, &mut details);
-        details.psd_nulls_hz = psd::nulls_hz(run);
+        let psd = spectrum::judge(run);
+        details.psd_nulls_hz = psd.null_low_hz.into_iter().chain(psd.null_high_hz).collect();
         details.unmatched_observations = errors.unmatched;
         Self {
             scene: run.scene.name.clone(),
@@ -218,11 +237,27 @@ impl Summary {
             observables,
             tracking,
             navigation,
+            psd,
             spoofing: Spoofing::of(run),
             jammed: !run.scene.interference.is_empty(),
             speed: run.speed,
             details,
         }
+    }
+
+    /// Adds what covariance, slips and loops come to.
+    pub fn add(&mut self, honesty: &Honesty, slips: &Slips, jitter: &LoopJitter) {
+        let position = &mut self.position;
+        position.nees_mean = honesty.nees_mean;
+        position.nees_band = honesty.band.map(|(low, high)| [low, high]);
+        position.nees_independent = honesty.independent;
+        position.nees_verdict = honesty.verdict;
+        let tracking = &mut self.tracking;
+        tracking.slips_undeclared = slips.rows.iter().filter(|row| !row.declared).count();
+        tracking.slip_causes = slips.causes();
+        tracking.dll_chips = jitter.pooled(Loop::Dll);
+        tracking.pll_deg = jitter.pooled(Loop::Pll);
+        tracking.fll_hz = jitter.pooled(Loop::Fll);
     }
 }
 
@@ -271,6 +306,10 @@ fn position(run: &Run, errors: &Errors, details: &mut Details) -> Position {
         error_3d_p95_m: percentile(&error_3d, 0.95),
         bias_enu_m: bias,
         velocity_p95_mps: percentile(&velocity, 0.95),
+        nees_mean: None,
+        nees_band: None,
+        nees_independent: None,
+        nees_verdict: None,
     }
 }
 
@@ -343,6 +382,11 @@ fn tracking(run: &Run, errors: &Errors, details: &mut Details) -> Tracking {
         dll_sigma_chips: sigma(&dll),
         pll_sigma_deg: sigma(&pll),
         fll_sigma_hz: sigma(&fll),
+        slips_undeclared: 0,
+        slip_causes: BTreeMap::new(),
+        dll_chips: None,
+        pll_deg: None,
+        fll_hz: None,
     };
     details.jitter = Jitter { dll_chips: centred(dll), pll_deg: centred(pll), fll_hz: centred(fll) };
     result

@@ -189,6 +189,9 @@ fn write_estimate(run: &Path, planted: &Planted) {
             sigma_north_m: 0.4,
             sigma_up_m: 0.4,
             sigma_clock_m: 0.4,
+            correlation_en: 0.0,
+            correlation_eu: 0.0,
+            correlation_nu: 0.0,
             gdop: 2.0,
             pdop: 1.8,
             hdop: 1.0,
@@ -319,13 +322,14 @@ fn the_keys_of_the_summary_are_a_contract() {
     let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>().join(" ");
     assert_eq!(
         keys(&value),
-        "scene seed duration_s sample_rate_hz fidelity satellites position clock observables tracking navigation speed"
+        "scene seed duration_s sample_rate_hz fidelity satellites position clock observables tracking navigation psd speed"
     );
     for (section, expected) in [
         ("satellites", "in_view acquired used false_acquired"),
         (
             "position",
-            "fixes first_fix_s horizontal_mean_m horizontal_p95_m vertical_p95_m error_3d_p95_m bias_enu_m velocity_p95_mps",
+            "fixes first_fix_s horizontal_mean_m horizontal_p95_m vertical_p95_m error_3d_p95_m bias_enu_m velocity_p95_mps \
+             nees_mean nees_band nees_independent nees_verdict",
         ),
         (
             "clock",
@@ -333,7 +337,15 @@ fn the_keys_of_the_summary_are_a_contract() {
              code_noise_oadev_1s h true_h",
         ),
         ("observables", "pseudorange_rms_m pseudorange_bias_m carrier_rms_cycles doppler_rms_hz cn0_bias_db"),
-        ("tracking", "losses_of_lock cycle_slips dll_sigma_chips pll_sigma_deg fll_sigma_hz"),
+        (
+            "tracking",
+            "losses_of_lock cycle_slips dll_sigma_chips pll_sigma_deg fll_sigma_hz slips_undeclared slip_causes dll_chips \
+             pll_deg fll_hz",
+        ),
+        (
+            "psd",
+            "level_error_db shape_error_p95_db null_low_hz null_high_hz null_low_expected_hz null_high_expected_hz null_reason",
+        ),
         ("navigation", "parameters_checked parameters_wrong"),
         ("speed", "generate_x_real_time receive_x_real_time run_x_real_time cpu_s peak_memory_mib"),
     ] {
@@ -400,6 +412,8 @@ fn every_picture_is_a_png_that_is_not_blank() {
         "sky",
         "position_scatter",
         "position_time",
+        "position_honesty",
+        "elevation",
         "trajectory",
         "clock_bias",
         "allan",
@@ -451,7 +465,7 @@ fn the_spectrum_of_random_chips_is_the_theory_s_and_has_its_nulls() {
     let chips = (0..400_000).map(|_| if draw.normal() < 0.0 { -30.0_f32 } else { 30.0 });
     let samples: Vec<f32> = chips.flat_map(|chip| [chip; 10]).collect();
     let silence = vec![0.0; samples.len()];
-    let mut spectrum = |bins: usize| {
+    let mut estimate = |bins: usize| {
         let mut psd = psd::Psd::new(10.23e6, false, bins);
         psd.add(&samples, &silence);
         let row = |(frequency_hz, density): (f64, f64)| load::PsdRow {
@@ -459,18 +473,25 @@ fn the_spectrum_of_random_chips_is_the_theory_s_and_has_its_nulls() {
             density_db: 10.0 * libm::log10(density),
         };
         run.psd = psd.density().unwrap().into_iter().map(row).collect();
-        (psd::theory_db(&run), run.psd.clone(), psd::nulls_hz(&run))
+        (spectrum::theory_db(&run), run.psd.clone(), spectrum::judge(&run))
     };
-    let (theory_db, measured, _) = spectrum(512);
+    let (theory_db, measured, _) = estimate(512);
     let peak_db = theory_db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     // 15 600 segments, half overlapped: 1 % or 0.04 dB; the window's width costs 0.06 dB 20 dB down.
     for (row, theory_db) in measured.iter().zip(&theory_db).filter(|(_, theory_db)| **theory_db > peak_db - 20.0) {
         assert!((row.density_db - theory_db).abs() < 0.3, "{} Hz", row.frequency_hz);
     }
     // Bins are 2.5 kHz apart.
-    let (_, _, nulls_hz) = spectrum(4096);
-    assert_eq!(nulls_hz.len(), 2);
-    for (found_hz, expected_hz) in nulls_hz.iter().zip([-1.023e6, 1.023e6]) {
-        assert!((found_hz - expected_hz).abs() < 5e3, "{found_hz}");
+    let (_, _, found) = estimate(4096);
+    // A parabola over ±2 % of a chip rate lies 0.00024 of it, 250 Hz, outside the null, here as there.
+    for (found_hz, expected_hz, null_hz) in [
+        (found.null_low_hz, found.null_low_expected_hz, -1.023e6),
+        (found.null_high_hz, found.null_high_expected_hz, 1.023e6),
+    ] {
+        let (found_hz, expected_hz) = (found_hz.unwrap(), expected_hz.unwrap());
+        assert!((found_hz - null_hz).abs() < 1e3 && (found_hz - expected_hz).abs() < 500.0, "{found_hz} {expected_hz}");
     }
+    run.scene.noise = true;
+    let hidden = spectrum::judge(&run);
+    assert!(hidden.null_low_hz.is_none() && hidden.null_reason.unwrap().starts_with("hidden"), "{hidden:?}");
 }

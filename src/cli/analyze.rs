@@ -1,13 +1,34 @@
-//! `analyze`: judge an existing run again.
+//! `analyze`: judge an existing run again, or another receiver by its files.
+
+use std::path::{Path, PathBuf};
 
 use crate::analysis;
+use crate::analysis::foreign::{self, Files};
 use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::run::judge_error;
 use crate::cli::scenario;
 
-/// Judges the run in a directory.
+/// Judges the run in a directory, or a receiver against a truth.
 pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
-    let summary = analysis::judge(&arguments.run).map_err(judge_error)?;
-    scenario::print(&format!("{summary}\nresults in {}\n", arguments.run.display()))
+    if let Some(truth) = &arguments.truth {
+        return another_receiver(truth, arguments);
+    }
+    let Some(run) = &arguments.run else {
+        return Err(CliError::usage("analyze: expected a run's directory, or --truth"));
+    };
+    let summary = analysis::judge(run).map_err(judge_error)?;
+    scenario::print(&format!("{summary}\nresults in {}\n", run.display()))
+}
+
+fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliError> {
+    let files = Files { rinex_obs: arguments.files.rinex_obs.clone(), nmea: arguments.files.nmea.clone() };
+    let judgement = foreign::judge(truth, &files).map_err(judge_error)?;
+    let out = arguments.out.clone().unwrap_or_else(|| {
+        let name = format!("{}-foreign", scenario::file_name(&judgement.summary.scene));
+        PathBuf::from("reports").join(name)
+    });
+    std::fs::create_dir_all(&out).map_err(|error| CliError::create(out.display(), &error))?;
+    judgement.write(&out).map_err(judge_error)?;
+    scenario::print(&format!("{}\nresults in {}\n", judgement.summary, out.display()))
 }

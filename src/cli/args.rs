@@ -102,10 +102,32 @@ pub struct Receive {
 }
 
 #[derive(Args, Debug)]
-#[command(after_help = "Example: gnss-twin analyze reports/static")]
+#[command(
+    after_help = "Examples:\n  gnss-twin analyze reports/static\n  gnss-twin analyze --truth static.truth --rinex-obs rx.26O --nmea rx.nmea --out reports/mine"
+)]
 pub struct Analyze {
     /// Directory of a run, with truth/ and rx/
-    pub run: PathBuf,
+    #[arg(required_unless_present = "truth", conflicts_with = "truth")]
+    pub run: Option<PathBuf>,
+    /// Judge another receiver, which was fed a scene's samples, against that scene's truth/ directory
+    #[arg(long, value_name = "DIR", requires = "files")]
+    pub truth: Option<PathBuf>,
+    #[command(flatten)]
+    pub files: ReceiverFiles,
+    /// Directory for what is found of another receiver [default: reports/<scene's name>-foreign]
+    #[arg(long, value_name = "DIR", requires = "truth")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+#[group(id = "files", multiple = true)]
+pub struct ReceiverFiles {
+    /// Its observations: a RINEX 3 file
+    #[arg(long, value_name = "FILE", requires = "truth")]
+    pub rinex_obs: Option<PathBuf>,
+    /// Its positions: NMEA 0183 with GGA, and RMC for date and velocity
+    #[arg(long, value_name = "FILE", requires = "truth")]
+    pub nmea: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]

@@ -21,6 +21,7 @@ use crate::generator::ripple;
 use crate::generator::scene::Scene;
 use crate::generator::sky::{Arc, Emission, LIGHT_TIME_S, emission, emission_near};
 use crate::generator::spoof::Constellation;
+use crate::generator::stage::Fact;
 use crate::generator::stage::interference::{Interferer, Spectrum};
 use crate::generator::vehicle::Motion;
 use crate::gnss::broadcast::OrbitError;
@@ -348,6 +349,8 @@ struct SceneFile<'a> {
     noise: bool,
     noise_arithmetic: &'a str,
     noise_lsb: f32,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    front_end: Vec<Fact>,
     #[serde(skip_serializing_if = "Option::is_none")]
     skyline_deg: Option<Vec<[f64; 2]>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -418,6 +421,7 @@ impl Writer {
             noise: scene.noise,
             noise_arithmetic: scene.fidelity.noise.name(),
             noise_lsb: scene.noise_lsb,
+            front_end: scene.front_end.iter().filter_map(|stage| stage.fact()).collect(),
             skyline_deg: obstruction::skyline_deg(scene),
             oscillator: (scene.receiver_clock.oscillator.as_ref())
                 .map(|oscillator| OscillatorFile { h: oscillator.law.levels() }),

@@ -143,6 +143,10 @@ pub struct Fix {
     pub sigma_north_m: f64,
     pub sigma_up_m: f64,
     pub sigma_clock_m: f64,
+    /// Formal correlations of east and north, east and up, north and up.
+    pub correlation_en: f64,
+    pub correlation_eu: f64,
+    pub correlation_nu: f64,
     pub gdop: f64,
     pub pdop: f64,
     pub hdop: f64,

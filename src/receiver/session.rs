@@ -22,7 +22,7 @@ use crate::receiver::position::{CodeNoise, NoFix, Solver};
 use crate::receiver::run::{Outcome, ReceiveError, candidates};
 use crate::receiver::settings::Settings;
 use crate::receiver::source::{Block, Packed, Planes};
-use crate::receiver::track::{Channel, Report};
+use crate::receiver::track::{Channel, Report, code_shape};
 
 /// A satellite that was lost is searched for eagerly so long.
 const EAGER_S: f64 = 30.0;
@@ -110,7 +110,7 @@ impl Session {
         let (chip_rate_hz, period_s) = component.map_or((1.0, 1.0), |c| (c.chip_rate_hz, c.period_s()));
         let noise = CodeNoise {
             chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
-            spacing_chips: settings.tracking.spacing_chips,
+            shape: code_shape(&settings.tracking, chip_rate_hz / metadata.rate.hz()),
             bandwidth_hz: settings.tracking.dll_bandwidth_hz,
             integration_s: period_s * f64::from(settings.tracking.integration),
         };

@@ -7,6 +7,9 @@
 pub mod canvas;
 mod clock;
 mod delays;
+mod elevation;
+pub(crate) mod foreign;
+mod honesty;
 mod multipath;
 mod position;
 mod signals;
@@ -19,7 +22,9 @@ use rayon::prelude::*;
 
 use crate::analysis::JudgeError;
 use crate::analysis::clock::Clock;
+use crate::analysis::elevation::Elevations;
 use crate::analysis::errors::Errors;
+use crate::analysis::honesty::Honesty;
 use crate::analysis::load::Run;
 use crate::analysis::summary::Summary;
 
@@ -28,6 +33,8 @@ pub(crate) struct Judged<'a> {
     pub run: &'a Run,
     pub errors: &'a Errors,
     pub clock: &'a Clock,
+    pub honesty: &'a Honesty,
+    pub elevations: &'a Elevations,
     pub summary: &'a Summary,
 }
 
@@ -46,18 +53,20 @@ impl Judged<'_> {
 type Picture = fn(&Path, &Judged<'_>) -> Result<(), JudgeError>;
 
 /// The pictures by their file names.
-const PICTURES: [(&str, Picture); 15] = [
+const PICTURES: [(&str, Picture); 17] = [
     ("psd.png", spectrum::psd),
     ("acquisition.png", spectrum::acquisition),
     ("discriminators.png", signals::discriminators),
     ("cn0.png", signals::cn0),
     ("observables.png", signals::observables),
+    ("elevation.png", elevation::elevation),
     ("jitter.png", signals::jitter),
     ("multipath.png", multipath::multipath),
     ("sky.png", sky::sky),
     ("delays.png", delays::delays),
     ("position_scatter.png", position::scatter),
     ("position_time.png", position::time),
+    ("position_honesty.png", honesty::honesty),
     ("trajectory.png", position::trajectory),
     ("clock_bias.png", clock::bias),
     ("allan.png", clock::stability),

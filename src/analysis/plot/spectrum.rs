@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::analysis::JudgeError;
 use crate::analysis::plot::Judged;
 use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
-use crate::analysis::psd;
+use crate::analysis::spectrum;
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::satellite::Sv;
 
@@ -18,7 +18,7 @@ pub fn psd(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     }
     let measured: Vec<(f64, f64)> = rows.iter().map(|row| (row.frequency_hz / 1e6, row.density_db)).collect();
     let theory: Vec<(f64, f64)> =
-        measured.iter().zip(psd::theory_db(judged.run)).map(|((mhz, _), theory_db)| (*mhz, theory_db)).collect();
+        measured.iter().zip(spectrum::theory_db(judged.run)).map(|((mhz, _), theory_db)| (*mhz, theory_db)).collect();
     let x = Axis::new(
         "frequency in the samples (MHz)",
         (measured.first().map_or(0.0, |p| p.0), measured.last().map_or(1.0, |p| p.0)),

@@ -6,7 +6,7 @@
 //! deviation is measured over the window before each run of 4096 samples; without, it is the thermal noise's as the
 //! scene sets it. Limits: the gain of a run is constant.
 
-use crate::generator::stage::{Block, Stage};
+use crate::generator::stage::{Block, Fact, Stage};
 use crate::generator::synth::RUN_SAMPLES;
 
 /// Steps in units of the deviation that lose least, by bits.
@@ -60,6 +60,18 @@ impl Stage for Converter {
             None => format!("fixed gain for {} LSB", self.nominal_lsb),
         };
         format!("{} bits, step {} sigma, {gain}", self.bits, self.step_sigma)
+    }
+
+    fn fact(&self) -> Option<Fact> {
+        Some(Fact {
+            stage: self.name(),
+            bits: Some(self.bits),
+            step_sigma: Some(self.step_sigma),
+            nominal_lsb: Some(f64::from(self.nominal_lsb)),
+            gain_control: Some(self.window_runs.is_some()),
+            whole: Some(self.whole),
+            ..Fact::default()
+        })
     }
 
     fn memory_samples(&self) -> usize {

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use crate::generator::stage::{Block, Stage};
+use crate::generator::stage::{Block, Fact, Stage};
 
 /// Shapes of filters, by the name that a scenario uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,6 +173,15 @@ impl Stage for Filter {
         };
         let delay_ns = 1e9 * self.group_delay_s;
         format!("{shape}, {} Hz wide, delay {delay_ns:.1} ns, {} taps", self.bandwidth_hz, self.taps())
+    }
+
+    fn fact(&self) -> Option<Fact> {
+        let (shape, order) = match self.shape {
+            Shape::BrickWall => ("brick_wall", None),
+            Shape::Butterworth { order } => ("butterworth", Some(order)),
+        };
+        let bandwidth_hz = Some(self.bandwidth_hz);
+        Some(Fact { stage: self.name(), shape: Some(shape), order, bandwidth_hz, ..Fact::default() })
     }
 
     fn memory_samples(&self) -> usize {

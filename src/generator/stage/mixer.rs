@@ -6,7 +6,7 @@
 //! Limits: noise of the reference itself is the receiver clock's; what is left out of the response is e^−12.
 
 use crate::generator::random::Stream;
-use crate::generator::stage::{Block, Stage};
+use crate::generator::stage::{Block, Fact, Stage};
 use crate::gnss::time::{Rate, tone_turns};
 
 /// Nodes in a time constant, and time constants of response.
@@ -142,6 +142,17 @@ impl Stage for Balance {
             format!("image {:.1} dB, ", self.image_db())
         };
         format!("{image}direct current {} and {} LSB", self.dc_i_lsb, self.dc_q_lsb)
+    }
+
+    fn fact(&self) -> Option<Fact> {
+        let (i, q) = (f64::from(self.dc_i_lsb), f64::from(self.dc_q_lsb));
+        let unbalanced = self.gain != 0.0 || self.phase_rad != 0.0;
+        Some(Fact {
+            stage: self.name(),
+            image_db: unbalanced.then(|| self.image_db()),
+            dc_power_lsb2: Some(i * i + q * q),
+            ..Fact::default()
+        })
     }
 
     fn act(&self, block: &mut Block<'_>) {

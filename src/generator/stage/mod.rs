@@ -11,6 +11,8 @@ pub mod mixer;
 pub mod noise;
 pub mod playback;
 
+use serde::Serialize;
+
 use crate::generator::synth::isa::Level;
 
 /// A stretch of planar samples on its way from the antenna to the file, in LSB of the sample format.
@@ -28,6 +30,32 @@ pub struct Block<'a> {
     pub level: Level,
 }
 
+/// A stage as `scene.json` states it.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Fact {
+    pub stage: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub order: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bandwidth_hz: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub image_db: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dc_power_lsb2: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bits: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step_sigma: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nominal_lsb: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gain_control: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub whole: Option<bool>,
+}
+
 /// Something that acts on all samples of the scene.
 ///
 /// Laws: a stage of zero strength gives the same bits as its absence; sample n depends on n, on the scene and on
@@ -37,6 +65,10 @@ pub trait Stage: Send + Sync {
     fn name(&self) -> &'static str;
     /// What it does, for the plan.
     fn describe(&self) -> String;
+    /// What it does, for the judge's spectrum; nothing where it leaves that alone.
+    fn fact(&self) -> Option<Fact> {
+        None
+    }
     /// Samples before the present one on which its result depends.
     fn memory_samples(&self) -> usize {
         0

@@ -79,7 +79,7 @@ const OBSERVATIONS: [&str; 10] = [
     "cn0_dbhz",
     "locked_s",
 ];
-const FIXES: [&str; 24] = [
+const FIXES: [&str; 27] = [
     "sample",
     "gps_s",
     "gps_fraction_s",
@@ -95,6 +95,9 @@ const FIXES: [&str; 24] = [
     "sigma_north_m",
     "sigma_up_m",
     "sigma_clock_m",
+    "correlation_en",
+    "correlation_eu",
+    "correlation_nu",
     "gdop",
     "pdop",
     "hdop",
@@ -216,7 +219,7 @@ mod tests {
         let zero = |n: usize| vec!["0"; n].join(",");
         let observation: Observation = from_csv(&OBSERVATIONS, &format!("0,G03,{},{}", L1_CA.name, zero(7)));
         assert_eq!(header(&observation), OBSERVATIONS.join(","));
-        let fix: Fix = from_csv(&FIXES, &format!("{},,true", zero(22)));
+        let fix: Fix = from_csv(&FIXES, &format!("{},,true", zero(25)));
         assert_eq!(header(&fix), FIXES.join(","));
         let row: AcquisitionRow = from_csv(&ACQUISITION, &format!("0,G03,{},true,{}", L1_CA.name, zero(5)));
         assert_eq!(header(&row), ACQUISITION.join(","));

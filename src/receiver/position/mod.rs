@@ -17,6 +17,7 @@ use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::{Fix, Observation};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, Rate, SampleClock};
+use crate::receiver::track::loops::CodeShape;
 
 pub mod least_squares;
 pub mod smooth;
@@ -91,16 +92,22 @@ impl Default for PositionSettings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CodeNoise {
     pub chip_m: f64,
-    pub spacing_chips: f64,
+    /// The correlation that early and late meet: averaging replicas round it and correlate its noise.
+    pub shape: CodeShape,
     pub bandwidth_hz: f64,
     pub integration_s: f64,
 }
 
 impl CodeNoise {
-    /// Standard deviation of a non-coherent early-minus-late loop (Kaplan and Hegarty, 2nd ed., equation 5.22).
+    /// Standard deviation of a non-coherent early-minus-late loop.
+    ///
+    /// B·(1−ρ)/(2·C/N0·a′²)·(1 + (1+ρ)/(2·T·C/N0·a²)) with height a, slope a′ and noise correlation ρ of early and late; on a triangle
+    /// that is Kaplan and Hegarty's equation 5.23 (2nd ed.), first branch.
     pub fn sigma_m(&self, cn0_hz: f64) -> f64 {
-        let squaring = 1.0 + 2.0 / ((2.0 - self.spacing_chips) * self.integration_s * cn0_hz);
-        self.chip_m * (self.spacing_chips * self.bandwidth_hz / (2.0 * cn0_hz) * squaring).sqrt()
+        let CodeShape { value, slope, common } = self.shape;
+        let squaring = 1.0 + (1.0 + common) / (2.0 * self.integration_s * cn0_hz * value * value);
+        let spread = (1.0 - common) / (slope * slope);
+        self.chip_m * (self.bandwidth_hz * spread / (2.0 * cn0_hz) * squaring).sqrt()
     }
 }
 
@@ -324,6 +331,7 @@ fn fix(
     let axes = Geodetic::from_ecef(&solution.position_m).ecef_to_enu();
     let block = |m: &nalgebra::Matrix4<f64>| -> Matrix3<f64> { m.fixed_view::<3, 3>(0, 0).into_owned() };
     let covariance = axes * block(&solution.covariance) * axes.transpose();
+    let correlation = |a, b| covariance[(a, b)] / (covariance[(a, a)] * covariance[(b, b)]).sqrt();
     let dilution = axes * block(&solution.dilution) * axes.transpose();
     let (de, dn, du) = (dilution[(0, 0)], dilution[(1, 1)], dilution[(2, 2)]);
     let dt = solution.dilution[(3, 3)];
@@ -344,6 +352,9 @@ fn fix(
         sigma_north_m: covariance[(1, 1)].sqrt(),
         sigma_up_m: covariance[(2, 2)].sqrt(),
         sigma_clock_m: solution.covariance[(3, 3)].sqrt(),
+        correlation_en: correlation(0, 1),
+        correlation_eu: correlation(0, 2),
+        correlation_nu: correlation(1, 2),
         gdop: (de + dn + du + dt).sqrt(),
         pdop: (de + dn + du).sqrt(),
         hdop: (de + dn).sqrt(),

@@ -109,6 +109,14 @@ pub struct Channel {
     last: Update,
 }
 
+/// The correlation at early and late of a receiver with such settings.
+pub fn code_shape(settings: &TrackingSettings, chips_per_sample: f64) -> CodeShape {
+    let (peak, _) = correlation(settings.replica, chips_per_sample, 0.0);
+    let (side, slope) = correlation(settings.replica, chips_per_sample, 0.5 * settings.spacing_chips);
+    let (common, _) = correlation(settings.replica, chips_per_sample, settings.spacing_chips);
+    CodeShape { value: side / peak, slope: -slope / peak, common: common / peak }
+}
+
 impl Channel {
     /// A channel that begins at what the search found. The code phase is carried from the hit's sample to the first sample
     /// of the first block with the code rate that belongs to the hit's Doppler. Settings are taken as validated.
@@ -123,10 +131,8 @@ impl Channel {
         let chips_per_sample = chip_rate_hz / metadata.rate.hz();
         let half = 0.5 * settings.spacing_chips;
         let (peak, _) = correlation(settings.replica, chips_per_sample, 0.0);
-        let (side, slope) = correlation(settings.replica, chips_per_sample, half);
         let sense = if metadata.inverted { -1.0 } else { 1.0 };
-        let (common, _) = correlation(settings.replica, chips_per_sample, settings.spacing_chips);
-        let shape = CodeShape { value: side / peak, slope: -slope / peak, common: common / peak };
+        let shape = code_shape(settings, chips_per_sample);
         let loops = Loops::new(settings, shape, message.is_some(), sense * hit.doppler_hz);
         let mut channel = Self {
             settings: settings.clone(),

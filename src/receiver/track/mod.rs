@@ -14,7 +14,7 @@ pub mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use channel::Channel;
+pub use channel::{Channel, code_shape};
 pub use settings::{CodeDiscriminator, TrackingSettings, TrackingSettingsError};
 
 /// What a channel found in a block.

@@ -1,0 +1,206 @@
+//! Errors of observations by satellite and by elevation, and the multipath combination of one frequency.
+//!
+//! Code minus carrier is free of orbits, clocks and the troposphere; it holds code noise, multipath, a constant and twice the
+//! ionosphere, which the truth gives and which is taken out here: M = P − λφ − 2I, each arc about its mean. It is what a user of one
+//! frequency can see of multipath, and beside it stands what only the truth can tell, the code's error. Bands of
+//! elevation are ten degrees wide; errors in them are without the epoch's common part.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::analysis::errors::{Errors, Link, SignalError};
+use crate::analysis::load::Run;
+use crate::analysis::statistics::{mean, percentile, rms, std};
+use crate::analysis::{JudgeError, write_rows};
+use crate::gnss::satellite::Sv;
+
+/// Width of a band of elevation.
+const BAND_DEG: f64 = 10.0;
+
+/// One observation: a row of `multipath.csv`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    pub time_s: f64,
+    pub elevation_deg: f64,
+    /// Without the epoch's common part.
+    pub code_m: f64,
+    pub carrier_cycles: f64,
+    pub doppler_hz: f64,
+    /// Measured minus expected.
+    pub cn0_db: f64,
+    /// Code minus carrier without twice the ionosphere, about its arc's mean.
+    pub multipath_m: f64,
+}
+
+/// One satellite: a row of `satellites.csv`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Satellite {
+    pub sv: Sv,
+    pub signal: &'static str,
+    pub observations: usize,
+    pub elevation_mean_deg: Option<f64>,
+    pub code_mean_m: Option<f64>,
+    pub code_sigma_m: Option<f64>,
+    pub carrier_sigma_cycles: Option<f64>,
+    pub doppler_mean_hz: Option<f64>,
+    pub doppler_sigma_hz: Option<f64>,
+    pub cn0_bias_db: Option<f64>,
+    pub cn0_sigma_db: Option<f64>,
+    pub multipath_rms_m: Option<f64>,
+}
+
+/// A band of elevation: a row of `elevation.csv`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Band {
+    pub from_deg: f64,
+    pub to_deg: f64,
+    pub observations: usize,
+    pub code_rms_m: Option<f64>,
+    pub code_p95_m: Option<f64>,
+    pub carrier_rms_cycles: Option<f64>,
+    pub doppler_rms_hz: Option<f64>,
+    pub cn0_bias_db: Option<f64>,
+    pub multipath_rms_m: Option<f64>,
+}
+
+/// Points of every satellite.
+#[derive(Clone, Debug, Default)]
+pub struct Elevations {
+    pub points: BTreeMap<Link, Vec<Point>>,
+}
+
+impl Elevations {
+    /// Measures them.
+    pub fn measure(run: &Run, errors: &Errors) -> Self {
+        let elevations: HashMap<(u64, Sv), f64> =
+            run.sky.iter().map(|row| ((row.sample, row.sv), row.elevation_deg)).collect();
+        let mut common: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
+        for row in errors.signals.values().flatten() {
+            let sum = common.entry(row.sample).or_default();
+            *sum = (sum.0 + row.code_m, sum.1 + 1.0);
+        }
+        let mut points = BTreeMap::new();
+        for (link, rows) in &errors.signals {
+            let multipath = multipath_m(link, rows);
+            let one = |(row, multipath_m): (&SignalError, f64)| {
+                let (sum, count) = common.get(&row.sample)?;
+                Some(Point {
+                    time_s: row.time_s,
+                    elevation_deg: *elevations.get(&(row.sample, link.0))?,
+                    code_m: row.code_m - sum / count,
+                    carrier_cycles: row.carrier_cycles,
+                    doppler_hz: row.doppler_hz,
+                    cn0_db: row.cn0_dbhz - row.cn0_effective_dbhz,
+                    multipath_m,
+                })
+            };
+            points.insert(*link, rows.iter().zip(multipath).filter_map(one).collect());
+        }
+        Self { points }
+    }
+
+    /// Each satellite.
+    pub fn satellites(&self) -> Vec<Satellite> {
+        let one = |(link, points): (&Link, &Vec<Point>)| {
+            let of = |of: fn(&Point) -> f64| points.iter().map(of).collect::<Vec<f64>>();
+            let (code, doppler, cn0) = (of(|p| p.code_m), of(|p| p.doppler_hz), of(|p| p.cn0_db));
+            Satellite {
+                sv: link.0,
+                signal: link.1.name,
+                observations: points.len(),
+                elevation_mean_deg: mean(&of(|p| p.elevation_deg)),
+                code_mean_m: mean(&code),
+                code_sigma_m: std(&code),
+                carrier_sigma_cycles: std(&of(|p| p.carrier_cycles)),
+                doppler_mean_hz: mean(&doppler),
+                doppler_sigma_hz: std(&doppler),
+                cn0_bias_db: mean(&cn0),
+                cn0_sigma_db: std(&cn0),
+                multipath_rms_m: rms(&of(|p| p.multipath_m)),
+            }
+        };
+        self.points.iter().map(one).collect()
+    }
+
+    /// Each band that has observations.
+    pub fn bands(&self) -> Vec<Band> {
+        let mut found: BTreeMap<i64, Vec<&Point>> = BTreeMap::new();
+        for point in self.points.values().flatten() {
+            found.entry((point.elevation_deg / BAND_DEG).floor() as i64).or_default().push(point);
+        }
+        let one = |(number, points): (i64, Vec<&Point>)| {
+            let of = |of: fn(&Point) -> f64| points.iter().map(|point| of(point)).collect::<Vec<f64>>();
+            Band {
+                from_deg: number as f64 * BAND_DEG,
+                to_deg: (number + 1) as f64 * BAND_DEG,
+                observations: points.len(),
+                code_rms_m: rms(&of(|p| p.code_m)),
+                code_p95_m: percentile(&of(|p| p.code_m.abs()), 0.95),
+                carrier_rms_cycles: rms(&of(|p| p.carrier_cycles)),
+                doppler_rms_hz: rms(&of(|p| p.doppler_hz)),
+                cn0_bias_db: mean(&of(|p| p.cn0_db)),
+                multipath_rms_m: rms(&of(|p| p.multipath_m)),
+            }
+        };
+        found.into_iter().map(one).collect()
+    }
+
+    /// Writes `satellites.csv` and `elevation.csv` into a run's directory.
+    pub fn write(&self, directory: &Path) -> Result<(), JudgeError> {
+        write_rows(&directory.join("satellites.csv"), self.satellites().iter())?;
+        write_rows(&directory.join("elevation.csv"), self.bands().iter())
+    }
+}
+
+/// P − λφ − 2I of each row, about the mean of its arc. Errors are against the truth, whose code minus carrier is 2I and a
+/// constant, so that their difference is the combination already.
+fn multipath_m(link: &Link, rows: &[SignalError]) -> Vec<f64> {
+    let mut found = Vec::with_capacity(rows.len());
+    for arc in rows.chunk_by(|a, b| b.locked_s > a.locked_s) {
+        let combined: Vec<f64> =
+            arc.iter().map(|row| row.code_m - row.carrier_cycles * link.1.wavelength_m()).collect();
+        let middle = mean(&combined).unwrap_or(0.0);
+        found.extend(combined.into_iter().map(|value| value - middle));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+
+    #[test]
+    fn bands_part_errors_by_elevation_and_the_clock_is_no_error() {
+        let row = |sample: u64, code_m: f64, carrier_cycles: f64| SignalError {
+            sample,
+            time_s: sample as f64,
+            code_m,
+            carrier_cycles,
+            doppler_hz: 0.5,
+            cn0_dbhz: 44.0,
+            cn0_true_dbhz: 45.0,
+            cn0_effective_dbhz: 44.5,
+            locked_s: sample as f64,
+        };
+        let link = (Sv::gps(3), &L1_CA);
+        let rows = vec![row(1, 101.0, 0.0), row(2, 103.0, 0.0)];
+        assert_eq!(multipath_m(&link, &rows), vec![-1.0, 1.0]);
+        let point = |elevation_deg: f64, code_m: f64| Point {
+            time_s: 0.0,
+            elevation_deg,
+            code_m,
+            carrier_cycles: 0.0,
+            doppler_hz: 0.0,
+            cn0_db: -0.5,
+            multipath_m: code_m,
+        };
+        let found = Elevations { points: [(link, vec![point(5.0, 3.0), point(8.0, -3.0), point(42.0, 1.0)])].into() };
+        let bands = found.bands();
+        assert_eq!(bands.iter().map(|b| (b.from_deg, b.observations)).collect::<Vec<_>>(), vec![(0.0, 2), (40.0, 1)]);
+        assert_eq!((bands[0].code_rms_m, bands[1].cn0_bias_db), (Some(3.0), Some(-0.5)));
+        assert!((found.satellites()[0].code_mean_m.unwrap() - 1.0 / 3.0).abs() < 1e-12);
+    }
+}

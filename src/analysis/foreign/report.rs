@@ -1,0 +1,389 @@
+//! What a foreign receiver comes to: `foreign.json`, and the biases by name.
+//!
+//! A bias is named when it differs from nothing (a scale: from one) by more than three of its standard deviations, and said to be
+//! absent otherwise, with the bound that the file allows. The clock is no error: it is named for who builds on the file.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::observables::Measured;
+use super::{Estimate, Judged};
+use crate::analysis::statistics::mean;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+
+/// `foreign.json`. A number that the files cannot tell is null.
+#[derive(Clone, Debug, Serialize)]
+pub struct ForeignSummary {
+    pub scene: String,
+    /// As its RINEX header says.
+    pub receiver: Option<String>,
+    pub join: Join,
+    pub clock: Clock,
+    pub code: Code,
+    pub carrier: Carrier,
+    pub doppler: Doppler,
+    pub cn0: Cn0,
+    pub position: Position,
+    /// Each bias in one sentence.
+    pub findings: Vec<String>,
+}
+
+/// How files and truth were brought together.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Join {
+    pub epochs: usize,
+    pub epochs_joined: usize,
+    pub observations: usize,
+    /// Of satellites or times that the truth does not have.
+    pub observations_unmatched: usize,
+    /// Pseudoranges so far from the others that another signal must have been followed.
+    pub observations_outliers: usize,
+    pub truth_interval_s: f64,
+    /// Largest errors of the truth between its rows.
+    pub interpolation_code_m: f64,
+    pub interpolation_carrier_cycles: f64,
+    pub interpolation_doppler_hz: f64,
+    /// By how many weeks the dates of observations and positions were off.
+    pub observations_week_offset: i64,
+    pub positions_week_offset: i64,
+    /// By how much labels of observations are late, from the slope of pseudorange errors over Doppler.
+    pub time_tag_offset_s: Option<f64>,
+    pub time_tag_sigma_s: Option<f64>,
+    /// Whether that was significant, and the truth taken at the corrected times.
+    pub time_tag_applied: bool,
+}
+
+/// The part of pseudoranges, carriers and Dopplers that satellites have in common.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Clock {
+    /// Mean over the epochs of the pseudoranges' common error: label minus GPS time, as the file has it.
+    pub pseudorange_common_m: Option<f64>,
+    /// The same less the sampler's clock: a bias of all pseudoranges, of a receiver that labels its epochs by counting samples.
+    pub pseudorange_common_less_sampler_m: Option<f64>,
+    pub bias_mean_s: Option<f64>,
+    pub drift_code: Option<f64>,
+    pub drift_carrier: Option<f64>,
+    pub drift_doppler: Option<f64>,
+    /// Drift of the clock that sampled the signal, in truth.
+    pub sampler_drift: f64,
+    pub sampler_bias_mean_s: Option<f64>,
+}
+
+/// Pseudoranges without the clock.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Code {
+    pub rms_m: Option<f64>,
+    /// Each satellite about its own mean.
+    pub sigma_m: Option<f64>,
+    /// The largest bias of one satellite against the others, and whose.
+    pub largest_bias_m: Option<f64>,
+    pub largest_bias_sv: Option<String>,
+    /// Slope over time of code minus carrier.
+    pub minus_carrier_drift_mps: Option<f64>,
+    pub minus_carrier_drift_sigma_mps: Option<f64>,
+}
+
+/// Carriers without the clock and a constant an arc.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Carrier {
+    /// +1 where it grows with range, as RINEX has it.
+    pub sign: Option<f64>,
+    pub rms_cycles: Option<f64>,
+    pub slips: usize,
+    pub slips_undeclared: usize,
+}
+
+/// Dopplers.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Doppler {
+    /// Slope of what is reported over the truth: 1, or −1 with the opposite sign.
+    pub scale: Option<f64>,
+    pub scale_sigma: Option<f64>,
+    /// Without the clock's drift.
+    pub rms_hz: Option<f64>,
+    /// Doppler plus the carrier's own rate.
+    pub minus_carrier_rate_hz: Option<f64>,
+    pub minus_carrier_rate_sigma_hz: Option<f64>,
+}
+
+/// C/N0 against what the scene allows: other satellites and interference counted as noise.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Cn0 {
+    pub bias_db: Option<f64>,
+    pub bias_sigma_db: Option<f64>,
+}
+
+/// Positions.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Position {
+    pub fixes: usize,
+    pub fixes_joined: usize,
+    pub bias_east_m: Option<f64>,
+    pub bias_north_m: Option<f64>,
+    pub bias_up_m: Option<f64>,
+    pub bias_east_sigma_m: Option<f64>,
+    pub bias_north_sigma_m: Option<f64>,
+    pub bias_up_sigma_m: Option<f64>,
+    pub horizontal_rms_m: Option<f64>,
+    pub horizontal_p95_m: Option<f64>,
+    pub up_rms_m: Option<f64>,
+    pub error_3d_p95_m: Option<f64>,
+    pub ground_speed_rms_mps: Option<f64>,
+    /// Null in a scene at rest.
+    pub time_tag_offset_s: Option<f64>,
+    pub time_tag_sigma_s: Option<f64>,
+}
+
+const WEEK_S: i64 = crate::gnss::time::WEEK_S;
+
+impl ForeignSummary {
+    /// Condenses what was measured.
+    pub fn new(judged: &Judged) -> Self {
+        let none = Measured::default();
+        let measured = judged.observables.as_ref().unwrap_or(&none);
+        let biases: Vec<f64> = measured.clock.iter().map(|row| row.bias_s).collect();
+        let samplers: Vec<f64> = measured.clock.iter().map(|row| row.sampler_bias_s).collect();
+        let bias_mean_s = mean(&biases);
+        let largest = measured
+            .satellites
+            .iter()
+            .filter_map(|row| Some((row.code_bias_m?, &row.sv)))
+            .max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+        let value = |estimate: Option<Estimate>| estimate.map(|estimate| estimate.value);
+        let sigma = |estimate: Option<Estimate>| estimate.map(|estimate| estimate.sigma);
+        let mut summary = Self {
+            scene: judged.scene.clone(),
+            receiver: judged.receiver.clone(),
+            join: Join {
+                epochs: measured.epochs,
+                epochs_joined: measured.joined,
+                observations: measured.observations,
+                observations_unmatched: measured.unmatched,
+                observations_outliers: measured.outliers,
+                truth_interval_s: judged.truth_interval_s,
+                interpolation_code_m: judged.interpolation.range_m,
+                interpolation_carrier_cycles: judged.interpolation.carrier_cycles,
+                interpolation_doppler_hz: judged.interpolation.doppler_hz,
+                observations_week_offset: judged.rollover_s[0] / WEEK_S,
+                positions_week_offset: judged.rollover_s[1] / WEEK_S,
+                time_tag_offset_s: value(measured.time_tag_s),
+                time_tag_sigma_s: sigma(measured.time_tag_s),
+                time_tag_applied: measured.time_tag_applied,
+            },
+            clock: Clock {
+                pseudorange_common_m: bias_mean_s.map(|bias| bias * SPEED_OF_LIGHT_MPS),
+                pseudorange_common_less_sampler_m: bias_mean_s
+                    .zip(mean(&samplers))
+                    .map(|(bias, sampler)| (bias - sampler) * SPEED_OF_LIGHT_MPS),
+                bias_mean_s,
+                drift_code: measured.drift_code,
+                drift_carrier: measured.drift_carrier,
+                drift_doppler: measured.drift_doppler,
+                sampler_drift: judged.sampler_drift,
+                sampler_bias_mean_s: mean(&samplers),
+            },
+            code: Code {
+                rms_m: measured.code_rms_m,
+                sigma_m: measured.code_sigma_m,
+                largest_bias_m: largest.map(|(bias, _)| bias),
+                largest_bias_sv: largest.map(|(_, sv)| sv.clone()),
+                minus_carrier_drift_mps: value(measured.code_carrier_mps),
+                minus_carrier_drift_sigma_mps: sigma(measured.code_carrier_mps),
+            },
+            carrier: Carrier {
+                sign: measured.carrier_sign,
+                rms_cycles: measured.carrier_rms_cycles,
+                slips: measured.slips.len(),
+                slips_undeclared: measured.slips.iter().filter(|slip| !slip.declared).count(),
+            },
+            doppler: Doppler {
+                scale: value(measured.doppler_scale),
+                scale_sigma: sigma(measured.doppler_scale),
+                rms_hz: measured.doppler_rms_hz,
+                minus_carrier_rate_hz: value(measured.doppler_carrier_hz),
+                minus_carrier_rate_sigma_hz: sigma(measured.doppler_carrier_hz),
+            },
+            cn0: Cn0 { bias_db: value(measured.cn0_db), bias_sigma_db: sigma(measured.cn0_db) },
+            position: position(judged),
+            findings: Vec::new(),
+        };
+        summary.findings = summary.findings(judged, measured);
+        summary
+    }
+
+    fn findings(&self, judged: &Judged, measured: &Measured) -> Vec<String> {
+        let mut found = Vec::new();
+        for (what, weeks) in
+            [("observations", self.join.observations_week_offset), ("positions", self.join.positions_week_offset)]
+        {
+            if weeks != 0 {
+                found.push(format!(
+                    "dates of {what} are {weeks:+} weeks off: the week number's rollover was resolved wrongly"
+                ));
+            }
+        }
+        if judged.observables.is_some() {
+            self.clock_findings(&mut found);
+            named(&mut found, "time tags", measured.time_tag_s.map(scaled(1e3)), 0.0, "ms late");
+            self.code_findings(measured, &mut found);
+            if self.carrier.sign == Some(-1.0) {
+                found.push("carrier phase falls while the range grows: the opposite of RINEX's sign".to_owned());
+            }
+            if self.doppler.scale.is_some_and(|scale| scale < 0.0) {
+                found.push("Doppler is positive for a receding satellite: the opposite of RINEX's sign".to_owned());
+            }
+            let magnitude = measured.doppler_scale.map(|s| Estimate { value: s.value.abs(), ..s });
+            named(
+                &mut found,
+                "scale of Doppler",
+                magnitude.map(|s| Estimate { value: (s.value - 1.0) * 1e6, sigma: s.sigma * 1e6 }),
+                0.0,
+                "ppm",
+            );
+            named(&mut found, "Doppler plus the carrier's rate", measured.doppler_carrier_hz, 0.0, "Hz");
+            named(&mut found, "C/N0", measured.cn0_db, 0.0, "dB against what the scene allows");
+            if self.carrier.slips > 0 {
+                found.push(format!(
+                    "{} breaks of the carrier, {} of them undeclared",
+                    self.carrier.slips, self.carrier.slips_undeclared
+                ));
+            }
+            if self.join.observations_outliers > 0 {
+                found.push(format!(
+                    "{} pseudoranges are of another signal than the file says",
+                    self.join.observations_outliers
+                ));
+            }
+        }
+        if let Some([east, north, up]) = judged.places.as_ref().and_then(|places| places.bias_enu_m) {
+            for (axis, estimate) in [("east", east), ("north", north), ("up", up)] {
+                named(&mut found, &format!("position {axis}"), Some(estimate), 0.0, "m");
+            }
+            named(
+                &mut found,
+                "time tags of positions",
+                judged.places.as_ref().and_then(|p| p.time_tag_s).map(scaled(1e3)),
+                0.0,
+                "ms late",
+            );
+        }
+        found
+    }
+
+    fn clock_findings(&self, found: &mut Vec<String>) {
+        let clock = &self.clock;
+        if let Some(common_m) = clock.pseudorange_common_m {
+            found.push(format!(
+                "pseudoranges have {common_m:+.3} m in common ({:+.3} us of clock)",
+                common_m / SPEED_OF_LIGHT_MPS * 1e6
+            ));
+        }
+        // A tenth of a hertz at L1 tells two clocks apart.
+        let same = |drift: f64| (drift - clock.sampler_drift).abs() < 6e-11;
+        for (what, drift) in
+            [("pseudoranges", clock.drift_code), ("carriers", clock.drift_carrier), ("Dopplers", clock.drift_doppler)]
+        {
+            let Some(drift) = drift else { continue };
+            let whose = if what != "pseudoranges" && same(drift) {
+                ", that of the sampler: not steered".to_owned()
+            } else {
+                format!(" (the sampler's is {:+.3e})", clock.sampler_drift)
+            };
+            found.push(format!("clock in {what} drifts by {drift:+.3e}{whose}"));
+        }
+    }
+
+    fn code_findings(&self, measured: &Measured, found: &mut Vec<String>) {
+        let biases: Vec<f64> = measured.satellites.iter().filter_map(|row| row.code_bias_m).collect();
+        if let (Some(largest_m), Some(sv), true) =
+            (self.code.largest_bias_m, &self.code.largest_bias_sv, biases.len() > 1)
+        {
+            found.push(format!("largest pseudorange bias of one satellite against the others: {sv} {largest_m:+.3} m"));
+        }
+        let drift = measured.code_carrier_mps;
+        named(found, "code minus carrier", drift.map(scaled(1e3)), 0.0, "mm/s");
+    }
+}
+
+fn scaled(by: f64) -> impl Fn(Estimate) -> Estimate {
+    move |estimate| Estimate { value: by * estimate.value, sigma: by * estimate.sigma }
+}
+
+/// A bias in words, or its absence with three sigmas as a bound.
+fn named(found: &mut Vec<String>, what: &str, estimate: Option<Estimate>, neutral: f64, unit: &str) {
+    let Some(estimate) = estimate else { return };
+    let (value, sigma) = (estimate.value, estimate.sigma);
+    found.push(if estimate.differs_from(neutral) {
+        format!("{what}: {value:+.3} {unit} (sigma {sigma:.3})")
+    } else {
+        format!("{what}: no bias beyond {:.3} {unit} (found {value:+.3}, sigma {sigma:.3})", 3.0 * sigma)
+    });
+}
+
+fn position(judged: &Judged) -> Position {
+    let Some(places) = &judged.places else { return Position::default() };
+    let axis = |index: usize| places.bias_enu_m.and_then(|bias| bias.get(index).copied());
+    let value = |index| axis(index).map(|estimate| estimate.value);
+    let sigma = |index| axis(index).map(|estimate| estimate.sigma);
+    Position {
+        fixes: places.fixes,
+        fixes_joined: places.rows.len(),
+        bias_east_m: value(0),
+        bias_north_m: value(1),
+        bias_up_m: value(2),
+        bias_east_sigma_m: sigma(0),
+        bias_north_sigma_m: sigma(1),
+        bias_up_sigma_m: sigma(2),
+        horizontal_rms_m: places.horizontal_rms_m,
+        horizontal_p95_m: places.horizontal_p95_m,
+        up_rms_m: places.up_rms_m,
+        error_3d_p95_m: places.error_3d_p95_m,
+        ground_speed_rms_mps: places.ground_speed_rms_mps,
+        time_tag_offset_s: places.time_tag_s.map(|estimate| estimate.value),
+        time_tag_sigma_s: places.time_tag_s.map(|estimate| estimate.sigma),
+    }
+}
+
+impl fmt::Display for ForeignSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{} against the truth of {}", self.receiver.as_deref().unwrap_or("a receiver"), self.scene)?;
+        let join = &self.join;
+        if join.epochs > 0 {
+            writeln!(
+                f,
+                "observations  {} epochs, {} joined; {} observations, {} without truth, {} outliers",
+                join.epochs,
+                join.epochs_joined,
+                join.observations,
+                join.observations_unmatched,
+                join.observations_outliers
+            )?;
+            writeln!(
+                f,
+                "truth between its rows is right to {:.1e} m, {:.1e} cycles, {:.1e} Hz",
+                join.interpolation_code_m, join.interpolation_carrier_cycles, join.interpolation_doppler_hz
+            )?;
+        }
+        if self.position.fixes > 0 {
+            writeln!(f, "positions     {} fixes, {} joined", self.position.fixes, self.position.fixes_joined)?;
+        }
+        writeln!(f)?;
+        let rows = [
+            ("pseudorange* rms (m)", self.code.rms_m),
+            ("pseudorange sigma (m)", self.code.sigma_m),
+            ("carrier* rms (cycles)", self.carrier.rms_cycles),
+            ("Doppler* rms (Hz)", self.doppler.rms_hz),
+            ("C/N0 bias (dB)", self.cn0.bias_db),
+            ("horizontal rms (m)", self.position.horizontal_rms_m),
+            ("up rms (m)", self.position.up_rms_m),
+        ];
+        for (name, value) in rows {
+            if let Some(value) = value {
+                writeln!(f, "{name:<26}{value:>12.4}")?;
+            }
+        }
+        writeln!(f, "* the part common to all satellites of an epoch removed, of carriers a constant an arc\n")?;
+        self.findings.iter().try_for_each(|finding| writeln!(f, "- {finding}"))
+    }
+}

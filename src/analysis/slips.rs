@@ -1,0 +1,293 @@
+//! Cycle slips and losses of lock, each with its time, its size and what the truth says of its cause.
+//!
+//! A slip is a change of the constant between measured and true carrier: declared by the receiver's events, or found against the
+//! truth and not declared. Its size is the difference of the medians around it, to the half cycle of a Costas loop; where the
+//! count began anew (another lock) it has none. The cause is the first of these that the half second before it shows: the
+//! signal is not there or fell by [`FADE_DB`]; interference takes [`JAMMED_DB`] and leaves less than the loop needs; the true motion
+//! leaves a phase error of which 3σ + θ > 45° (the loop of the receiver's settings, [`super::jitter`]); noise alone breaks that
+//! rule. What is left is unexplained. Limits: causes are those that the truth's rows, a tenth of a second apart, can show.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::analysis::access::Access;
+use crate::analysis::errors::{Link, SLIP_CYCLES, SignalError, first_jump_of};
+use crate::analysis::jitter::{Settings, motion_error_deg};
+use crate::analysis::load::Run;
+use crate::analysis::statistics::median;
+use crate::analysis::theory::pll;
+use crate::analysis::{JudgeError, write_rows};
+use crate::gnss::record::{Event, Observation};
+
+/// A fall of the true C/N0 against its median over the run that counts as an obstruction or a fade.
+pub const FADE_DB: f64 = 6.0;
+/// What interference must take from C/N0 to count.
+pub const JAMMED_DB: f64 = 3.0;
+/// How far back a cause is looked for.
+const BEFORE_S: f64 = 0.5;
+/// Rows on either side that fix the constant.
+const SIDE: usize = 10;
+
+/// What happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    CycleSlip,
+    LossOfLock,
+}
+
+/// Why it happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// The truth has no such satellite: a false lock ended.
+    NotThere,
+    /// The signal was blocked or faded.
+    Obstruction,
+    Interference,
+    Dynamics,
+    /// Too little C/N0 for the loop.
+    WeakSignal,
+    Unexplained,
+}
+
+/// A row of `slips.csv`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Slip {
+    pub sample: u64,
+    pub time_s: f64,
+    pub sv: String,
+    pub signal: &'static str,
+    pub kind: Kind,
+    /// Whether the receiver said so itself.
+    pub declared: bool,
+    /// Change of the carrier's constant, to the half cycle.
+    pub size_cycles: Option<f64>,
+    /// What rounding to the half cycle took away.
+    pub remainder_cycles: Option<f64>,
+    pub cause: Cause,
+    /// The evidence: least C/N0 that the scene allowed, what interference took of it, largest error that the motion leaves in the
+    /// phase loop, and 3σ of its noise at that C/N0.
+    pub cn0_dbhz: Option<f64>,
+    pub interference_db: Option<f64>,
+    pub motion_deg: Option<f64>,
+    pub noise_3sigma_deg: Option<f64>,
+}
+
+/// All slips and losses of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Slips {
+    pub rows: Vec<Slip>,
+}
+
+/// Observations of one satellite with their carrier errors as they were before any constant was removed.
+pub type Raw = BTreeMap<Link, Vec<SignalError>>;
+
+impl Slips {
+    /// Finds them; `raw` are carrier errors with their constants.
+    pub fn find(run: &Run, raw: &Raw) -> Self {
+        let evidence = Evidence::new(run);
+        let mut rows = Vec::new();
+        for row in run.events.iter().filter(|row| row.event == Event::LossOfLock) {
+            rows.push(evidence.slip(run, (row.sv, row.signal), row.sample, Kind::LossOfLock, true, None));
+        }
+        for (link, all) in raw {
+            let first = all.first().map_or(0, |row| row.sample);
+            let of = |event: Event| {
+                let own = run.events.iter().filter(move |row| (row.sv, row.signal) == *link && row.event == event);
+                own.map(|row| row.sample).filter(|sample| *sample > first).collect::<Vec<u64>>()
+            };
+            let (declared, lost) = (of(Event::CycleSlip), of(Event::LossOfLock));
+            for &sample in &declared {
+                let size = size_across(all, sample, &lost);
+                rows.push(evidence.slip(run, *link, sample, Kind::CycleSlip, true, size));
+            }
+            for (sample, size) in undeclared(all, &declared) {
+                rows.push(evidence.slip(run, *link, sample, Kind::CycleSlip, false, Some(size)));
+            }
+        }
+        rows.sort_by(|a, b| (a.sample, &a.sv).cmp(&(b.sample, &b.sv)));
+        Self { rows }
+    }
+
+    /// How many have each cause.
+    pub fn causes(&self) -> BTreeMap<Cause, usize> {
+        let mut counts = BTreeMap::new();
+        for row in &self.rows {
+            *counts.entry(row.cause).or_insert(0) += 1;
+        }
+        counts
+    }
+
+    /// Writes `slips.csv` into a run's directory.
+    pub fn write(&self, directory: &Path) -> Result<(), JudgeError> {
+        write_rows(&directory.join("slips.csv"), self.rows.iter())
+    }
+}
+
+/// Difference of the carrier's constants on either side of a declared slip; `None` where a lock was lost in between or a side has
+/// no rows.
+fn size_across(all: &[SignalError], sample: u64, lost: &[u64]) -> Option<f64> {
+    let at = all.partition_point(|row| row.sample < sample);
+    let (before, after) = all.split_at(at);
+    // The first rows after an interruption come when the carrier is locked again.
+    let (last, next) = (before.last()?, after.first()?);
+    if lost.iter().any(|lost| (last.sample..=next.sample).contains(lost)) {
+        return None;
+    }
+    let carriers = |rows: &[SignalError]| median(&rows.iter().map(|row| row.carrier_cycles).collect::<Vec<_>>());
+    let before = carriers(&before[before.len().saturating_sub(SIDE)..])?;
+    let after = carriers(&after[..after.len().min(SIDE)])?;
+    Some(after - before)
+}
+
+/// Samples and sizes of jumps that the receiver did not declare.
+fn undeclared(all: &[SignalError], declared: &[u64]) -> Vec<(u64, f64)> {
+    let broken = |a: &SignalError, b: &SignalError| {
+        b.locked_s < a.locked_s || declared.iter().any(|slip| (a.sample + 1..=b.sample).contains(slip))
+    };
+    let mut found = Vec::new();
+    for arc in all.chunk_by(|a, b| !broken(a, b)) {
+        let mut rest = arc;
+        loop {
+            let carrier: Vec<f64> = rest.iter().map(|row| row.carrier_cycles).collect();
+            let Some(jump) = first_jump_of(&carrier) else { break };
+            let (before, after) = carrier.split_at(jump);
+            let side =
+                median(&before[before.len().saturating_sub(SIDE)..]).zip(median(&after[..after.len().min(SIDE)]));
+            let (Some((before, after)), Some(row)) = (side, rest.get(jump)) else { break };
+            if (after - before).abs() >= SLIP_CYCLES {
+                found.push((row.sample, after - before));
+            }
+            rest = &rest[jump..];
+        }
+    }
+    found
+}
+
+/// What the truth knows of each satellite.
+struct Evidence<'r> {
+    truth: BTreeMap<Link, Vec<&'r Observation>>,
+    effective_dbhz: BTreeMap<Link, Vec<f64>>,
+    usual_dbhz: BTreeMap<Link, f64>,
+    motion_deg: BTreeMap<Link, Vec<(f64, f64)>>,
+    loop_: Option<(Settings, f64)>,
+    least_dbhz: f64,
+    last: u64,
+}
+
+impl<'r> Evidence<'r> {
+    fn new(run: &'r Run) -> Self {
+        let access = Access::new(run);
+        let mut truth: BTreeMap<Link, Vec<&Observation>> = BTreeMap::new();
+        for row in &run.truth {
+            truth.entry((row.sv, row.signal)).or_default().push(row);
+        }
+        let effective = |rows: &Vec<&Observation>| rows.iter().map(|row| access.effective_dbhz(row)).collect();
+        let usual = |rows: &Vec<&Observation>| median(&rows.iter().map(|row| row.cn0_dbhz).collect::<Vec<_>>());
+        let times: Vec<f64> = run.tracking.iter().map(|row| row.integration_s).collect();
+        let loop_ = Settings::of(run).zip(median(&times));
+        Self {
+            effective_dbhz: truth.iter().map(|(link, rows)| (*link, effective(rows))).collect(),
+            usual_dbhz: truth.iter().filter_map(|(link, rows)| Some((*link, usual(rows)?))).collect(),
+            motion_deg: loop_.map(|(settings, update_s)| motion_error_deg(run, settings, update_s)).unwrap_or_default(),
+            truth,
+            loop_,
+            least_dbhz: run.tracking_setting("cn0_threshold_dbhz").unwrap_or(f64::NEG_INFINITY),
+            last: run.trajectory.last().map_or(0, |row| row.sample),
+        }
+    }
+
+    fn slip(&self, run: &Run, link: Link, sample: u64, kind: Kind, declared: bool, size: Option<f64>) -> Slip {
+        let time_s = run.time_s(sample);
+        let rounded = size.map(|size| (2.0 * size).round() / 2.0);
+        let mut slip = Slip {
+            sample,
+            time_s,
+            sv: link.0.to_string(),
+            signal: link.1.name,
+            kind,
+            declared,
+            size_cycles: rounded,
+            remainder_cycles: size.zip(rounded).map(|(size, rounded)| size - rounded),
+            cause: Cause::Unexplained,
+            cn0_dbhz: None,
+            interference_db: None,
+            motion_deg: None,
+            noise_3sigma_deg: None,
+        };
+        let (Some(rows), Some(effective)) = (self.truth.get(&link), self.effective_dbhz.get(&link)) else {
+            slip.cause = Cause::NotThere;
+            return slip;
+        };
+        // The channel notices after its own loss time.
+        let back_s = BEFORE_S + run.tracking_setting("loss_s").unwrap_or(0.0);
+        let within = |at: u64| (time_s - back_s..=time_s).contains(&run.time_s(at));
+        let near: Vec<usize> = (0..rows.len()).filter(|index| within(rows[*index].sample)).collect();
+        let least = |of: &dyn Fn(usize) -> f64| near.iter().map(|index| of(*index)).reduce(f64::min);
+        slip.cn0_dbhz = least(&|index| effective[index]);
+        let set_dbhz = least(&|index| rows[index].cn0_dbhz);
+        slip.interference_db = near.iter().map(|index| rows[*index].cn0_dbhz - effective[*index]).reduce(f64::max);
+        slip.motion_deg = self.motion_deg.get(&link).and_then(|series| {
+            let inside = series.iter().filter(|(t_s, _)| (time_s - back_s..=time_s).contains(t_s));
+            inside.map(|(_, error)| error.abs()).reduce(f64::max)
+        });
+        slip.noise_3sigma_deg = slip.cn0_dbhz.zip(self.loop_).map(|(dbhz, (settings, update_s))| {
+            let cn0_hz = libm::pow(10.0, dbhz / 10.0);
+            3.0 * pll::jitter_rad(settings.pll_bandwidth_hz, update_s, cn0_hz).to_degrees()
+        });
+        let gone = near.len() < 2 && sample < self.last;
+        let usual_dbhz = self.usual_dbhz.get(&link).copied().unwrap_or(f64::INFINITY);
+        let limit_deg = pll::LIMIT_RAD.to_degrees();
+        let noise_deg = slip.noise_3sigma_deg.unwrap_or(0.0);
+        let weak = noise_deg > limit_deg || slip.cn0_dbhz.is_some_and(|dbhz| dbhz < self.least_dbhz);
+        slip.cause = if gone || set_dbhz.is_some_and(|dbhz| dbhz < usual_dbhz - FADE_DB) {
+            Cause::Obstruction
+        } else if weak && slip.interference_db.is_some_and(|db| db > JAMMED_DB) {
+            Cause::Interference
+        } else if slip.motion_deg.is_some_and(|motion| motion + noise_deg > limit_deg && motion > 0.5 * noise_deg) {
+            Cause::Dynamics
+        } else if weak {
+            Cause::WeakSignal
+        } else {
+            Cause::Unexplained
+        };
+        slip
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(carrier: &[f64]) -> Vec<SignalError> {
+        let row = |(index, &carrier_cycles): (usize, &f64)| SignalError {
+            sample: index as u64 * 100,
+            time_s: index as f64 * 0.1,
+            code_m: 0.0,
+            carrier_cycles,
+            doppler_hz: 0.0,
+            cn0_dbhz: 45.0,
+            cn0_true_dbhz: 45.0,
+            cn0_effective_dbhz: 45.0,
+            locked_s: 5.0 + index as f64 * 0.1,
+        };
+        carrier.iter().enumerate().map(row).collect()
+    }
+
+    #[test]
+    fn sizes_are_those_of_the_steps_and_what_is_declared_is_found_once() {
+        let carrier: Vec<f64> =
+            (0..60).map(|k| 7.3 + if k >= 20 { 0.5 } else { 0.0 } + if k >= 40 { -1.0 } else { 0.0 }).collect();
+        let all = rows(&carrier);
+        let found = undeclared(&all, &[]);
+        assert_eq!(found.iter().map(|slip| slip.0).collect::<Vec<_>>(), vec![2000, 4000]);
+        assert!((found[0].1 - 0.5).abs() < 1e-12 && (found[1].1 + 1.0).abs() < 1e-12, "{found:?}");
+        assert_eq!(undeclared(&all, &[1950]).len(), 1);
+        assert!((size_across(&all, 1950, &[]).unwrap() - 0.5).abs() < 1e-12);
+        assert_eq!(size_across(&all, 1950, &[1950]), None);
+        assert_eq!(size_across(&all, 0, &[]), None);
+    }
+}
