@@ -13,6 +13,8 @@ pub mod clock;
 pub mod errors;
 pub mod jamming;
 pub mod load;
+#[cfg(feature = "pdf")]
+pub mod pdf;
 pub mod plot;
 pub mod psd;
 pub mod report;
