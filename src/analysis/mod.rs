@@ -4,7 +4,8 @@
 //! (sample number, satellite, signal) and writes `summary.json` and pictures beside them.
 //! [`errors`] measures, [`clock`] does so for the receiver's clock with the deviations of [`allan`], [`statistics`]
 //! condenses, [`access`] and [`jamming`] expect C/N0 under other codes and interference, [`spoofing`] tells what a
-//! spoofer did, [`summary`] is what scripts gate on, [`plot`] draws, [`report`] prints, [`psd`] estimates the spectrum of
+//! spoofer did, [`summary`] is what scripts gate on with its [`schema`], [`verdict`] holds it against theory and a user's
+//! [`limits`], [`plot`] draws, [`report`] prints on a terminal and `pdf` on paper, [`psd`] estimates the spectrum of
 //! the samples, [`trade`] weighs speed against accuracy, [`theory`] says what errors to expect.
 
 pub mod access;
@@ -12,17 +13,23 @@ pub mod allan;
 pub mod clock;
 pub mod errors;
 pub mod jamming;
+pub mod limits;
 pub mod load;
 #[cfg(feature = "pdf")]
 pub mod pdf;
 pub mod plot;
 pub mod psd;
 pub mod report;
+#[cfg(feature = "pdf")]
+mod run_report;
+pub mod schema;
 pub mod spoofing;
 pub mod statistics;
 pub mod summary;
+mod tables;
 pub mod theory;
 pub mod trade;
+pub mod verdict;
 
 use std::fs;
 use std::io;
@@ -55,21 +62,43 @@ pub enum JudgeError {
     Plot { path: PathBuf, reason: String },
 }
 
-/// Judges the run in a directory: writes `summary.json`, `clock.csv`, `allan.csv` and the pictures there and returns the summary.
+/// Judges the run in a directory: writes `summary.json`, tables, pictures and `report.pdf` there and returns the summary.
 ///
 /// Reads `truth/{observations,sky,trajectory,navigation}.csv`, `truth/scene.json`,
 /// `rx/{observations,fixes,acquisition,tracking,navigation,events}.csv`, and where they exist
-/// `rx/receiver.json`, `psd.csv`, `speed.json`, `truth/interference.csv` and `truth/claimed.csv`.
+/// `rx/receiver.json`, `psd.csv`, `speed.json`, `scenario.toml`, `truth/interference.csv` and `truth/claimed.csv`.
+///
+/// # Errors
+/// [`JudgeError`] with the file that is missing, is not as expected or cannot be written.
 pub fn judge(run: &Path) -> Result<Summary, JudgeError> {
+    judge_against(run, None)
+}
+
+/// The same with a user's limits beside those of theory; what came of them is in the summary's details.
+///
+/// # Errors
+/// As [`judge`].
+pub fn judge_against(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
     let read = load::Run::read(run)?;
     let errors = errors::Errors::measure(&read)?;
     let clock = clock::Clock::measure(&read, &errors);
-    let summary = Summary::new(&read, &errors, &clock);
-    plot::all(run, &plot::Judged { run: &read, errors: &errors, clock: &clock, summary: &summary })?;
-    clock.write(run)?;
+    let mut summary = Summary::new(&read, &errors, &clock);
     let path = run.join("summary.json");
-    let mut json =
-        serde_json::to_vec_pretty(&summary).map_err(|source| JudgeError::Json { path: path.clone(), source })?;
+    let not_json = |source| JudgeError::Json { path: path.clone(), source };
+    let verdict = verdict::Verdict::of(&read, &errors, &summary);
+    summary.details.verdict = match limits {
+        Some(limits) => verdict.with_user(limits.judge(&serde_json::to_value(&summary).map_err(not_json)?)),
+        None => verdict,
+    };
+    let judged = plot::Judged { run: &read, errors: &errors, clock: &clock, summary: &summary };
+    let pictures = plot::all(run, &judged)?;
+    clock.write(run)?;
+    tables::write(run, &judged)?;
+    #[cfg(feature = "pdf")]
+    run_report::write(run, &judged, pictures)?;
+    #[cfg(not(feature = "pdf"))]
+    drop(pictures);
+    let mut json = serde_json::to_vec_pretty(&summary).map_err(not_json)?;
     json.push(b'\n');
     write_whole(&path, &json)?;
     Ok(summary)

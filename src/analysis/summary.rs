@@ -14,6 +14,7 @@ use crate::analysis::load::{Run, Speed};
 use crate::analysis::spoofing::Spoofing;
 use crate::analysis::statistics::{Spread, mean, median, percentile, pooled_std, rms, spread, std};
 use crate::analysis::theory::clock::white_phase;
+use crate::analysis::verdict::Verdict;
 use crate::analysis::{clock, psd};
 use crate::gnss::record::{Event, NavigationRow};
 use crate::gnss::satellite::Sv;
@@ -162,6 +163,7 @@ pub struct Details {
     /// Wrong parameters, as decoded.
     pub wrong_parameters: Vec<NavigationRow>,
     pub false_satellites: Vec<Sv>,
+    pub verdict: Verdict,
 }
 
 /// Bounds for loop jitter.

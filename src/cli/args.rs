@@ -47,6 +47,9 @@ pub struct Run {
     /// Also keep the samples: if.sigmf-data and if.sigmf-meta
     #[arg(long)]
     pub keep_if: bool,
+    /// Hold the figures of summary.json against these limits; exit with 3 if one is broken
+    #[arg(long, value_name = "LIMITS.toml")]
+    pub check: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]
@@ -102,10 +105,13 @@ pub struct Receive {
 }
 
 #[derive(Args, Debug)]
-#[command(after_help = "Example: gnss-twin analyze reports/static")]
+#[command(after_help = "Example: gnss-twin analyze reports/static --check scenarios/limits.toml")]
 pub struct Analyze {
     /// Directory of a run, with truth/ and rx/
     pub run: PathBuf,
+    /// Hold the figures of summary.json against these limits; exit with 3 if one is broken
+    #[arg(long, value_name = "LIMITS.toml")]
+    pub check: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]

@@ -49,6 +49,11 @@ pub(super) struct Glyph {
     pub range: Range<usize>,
 }
 
+/// Where a line may break: at blanks and tabulators, not at the blanks that bind.
+pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split([' ', '\t', '\n']).filter(|word| !word.is_empty())
+}
+
 /// The fonts, read.
 pub(super) struct Fonts {
     parsed: [Parsed<'static>; 3],
@@ -74,8 +79,10 @@ impl Fonts {
         let find = |face: Face, c: char| Some((face, self.of(face).glyph_index(c)?));
         let one = |(at, c): (usize, char)| {
             let shown = if c.is_control() { ' ' } else { c };
-            let (face, id) =
-                find(face, shown).or_else(|| find(Face::Regular, shown)).or_else(|| find(face, '?')).unwrap_or((face, GlyphId(0)));
+            let (face, id) = find(face, shown)
+                .or_else(|| find(Face::Regular, shown))
+                .or_else(|| find(face, '?'))
+                .unwrap_or((face, GlyphId(0)));
             let parsed = self.of(face);
             let advance = f32::from(parsed.glyph_hor_advance(id).unwrap_or(0)) / f32::from(parsed.units_per_em());
             Glyph { face, id: id.0, advance, range: at..at + c.len_utf8() }
@@ -99,7 +106,7 @@ impl Fonts {
                 lines.push(String::new());
                 room = width;
             }
-            for word in paragraph.split_whitespace() {
+            for word in words(paragraph) {
                 let length = self.width(face, size, word);
                 let line = lines.last_mut().filter(|line| line.is_empty() || length + blank <= room);
                 if let Some(line) = line.filter(|line| !line.is_empty() || length <= room) {

@@ -41,9 +41,29 @@ fn ground(tone: Tone) -> Colour {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Mark<'a> {
     /// `y` is the baseline.
-    Words { x: f32, y: f32, face: Face, size: f32, colour: Colour, text: String },
-    Block { x: f32, y: f32, width: f32, height: f32, colour: Colour },
-    Picture { x: f32, y: f32, width: f32, height: f32, number: usize, drawing: &'a Drawing },
+    Words {
+        x: f32,
+        y: f32,
+        face: Face,
+        size: f32,
+        colour: Colour,
+        text: String,
+    },
+    Block {
+        x: f32,
+        y: f32,
+        width: f32,
+        height: f32,
+        colour: Colour,
+    },
+    Picture {
+        x: f32,
+        y: f32,
+        width: f32,
+        height: f32,
+        number: usize,
+        drawing: &'a Drawing,
+    },
 }
 
 /// Pages, and where chapters begin.

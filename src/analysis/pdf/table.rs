@@ -1,13 +1,15 @@
 //! Tables: how wide their columns are, and their rows down the pages under a header that each page repeats.
 
-use super::fonts::{Face, Fonts};
+use super::fonts::{Face, Fonts, words};
 use super::layout::{FAINT, INK, RULE, Sheet, WIDTH, ink};
 use super::{Cell, Side, Table, Tone};
 
 const SIZE: f32 = 8.0;
 const LEADING: f32 = 10.4;
-const PADDING: f32 = 3.0;
+const PADDING: f32 = 2.3;
 const GAP: f32 = 12.0;
+/// Rows of a table that is not broken over pages.
+const SHORT: usize = 12;
 
 /// One row with its cells wrapped.
 struct Row {
@@ -15,10 +17,11 @@ struct Row {
     height: f32,
 }
 
-/// Height of a table's caption, header and first rows: what must fit for it to begin on a page.
+/// Height of a table's caption, header and first rows, or of all of a short one: what must fit for it to begin on a page.
 pub(super) fn least_height(table: &Table, fonts: &Fonts) -> f32 {
     let widths = widths(table, fonts);
-    let rows = table.rows.iter().take(2).map(|cells| row(cells, &widths, fonts).height).sum::<f32>();
+    let rows = if table.rows.len() <= SHORT { SHORT } else { 2 };
+    let rows = table.rows.iter().take(rows).map(|cells| row(cells, &widths, fonts).height).sum::<f32>();
     20.0 + header(table, &widths, fonts).height + rows
 }
 
@@ -95,7 +98,7 @@ fn widths(table: &Table, fonts: &Fonts) -> Vec<f32> {
         for ((cell, natural), least) in row.iter().zip(&mut natural).zip(&mut least) {
             let width = |text: &str| fonts.width(face(cell.tone), SIZE, text);
             *natural = cell.text.split('\n').map(width).fold(*natural, f32::max);
-            *least = cell.text.split_whitespace().map(width).fold(*least, f32::max);
+            *least = words(&cell.text).map(width).fold(*least, f32::max);
         }
     }
     let room = WIDTH - GAP * columns.saturating_sub(1) as f32;

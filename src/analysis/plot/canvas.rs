@@ -195,13 +195,13 @@ pub fn anchored(pixels: i32, horizontal: HPos, vertical: VPos) -> TextStyle<'sta
 const EDGE_PX: i32 = 6;
 const LEFT_PX: i32 = 74;
 const RIGHT_PX: i32 = 16;
-const TOP_PX: i32 = 32;
-const BOTTOM_PX: i32 = 42;
+const TOP_PX: i32 = 26;
+const BOTTOM_PX: i32 = 38;
 
 /// Draws one chart into an area.
 pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
     let (width, height) = area.dim_in_pixel();
-    let title = anchored(15, HPos::Center, VPos::Center);
+    let title = anchored(14, HPos::Center, VPos::Center);
     area.draw(&Text::new(chart.title.clone(), (width as i32 / 2, TOP_PX * FINE / 2), title))?;
     let (mut x, mut y) = (chart.x.clone(), chart.y.clone());
     if chart.equal {
@@ -220,10 +220,11 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         .set_label_area_size(LabelAreaPosition::Bottom, BOTTOM_PX * FINE)
         .build_cartesian_2d(x.from..x.to, y.from..y.to)?;
     let (x_decimals, y_decimals) = (decimals(x.span()), decimals(y.span()));
-    // As many as fit side by side, a digit being 8 pixels wide at most.
+    // As many as fit side by side, a digit being 7 pixels wide at most.
     let digits = [x.from, x.to].map(|end| tick(end, x_decimals).len()).into_iter().max().unwrap_or(1);
     let across_px = width as i32 / FINE - LEFT_PX - RIGHT_PX - EDGE_PX;
-    let x_labels = (across_px / (8 * digits as i32 + 14)).clamp(2, 10) as usize;
+    let x_labels = (across_px / (7 * digits as i32 + 12)).clamp(3, 10) as usize;
+    let y_labels = ((height as i32 / FINE - TOP_PX - BOTTOM_PX - EDGE_PX) / 18).clamp(4, 12) as usize;
     let (ticked, y_ticked) = (chart.x_ticks.is_some(), chart.y_ticks.is_some());
     let mut mesh = context.configure_mesh();
     if y_ticked {
@@ -238,7 +239,7 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         .axis_desc_style(font(13))
         .label_style(font(12))
         .x_labels(x_labels)
-        .y_labels((height as i32 / FINE / 45).clamp(4, 12) as usize)
+        .y_labels(y_labels)
         .x_label_formatter(&|value| if ticked { String::new() } else { tick(*value, x_decimals) })
         .y_label_formatter(&|value| if y_ticked { String::new() } else { tick(*value, y_decimals) })
         .draw()?;
@@ -351,7 +352,9 @@ fn draw_entry(area: &Area<'_>, x_px: i32, y_px: i32, series: &Series) -> Result<
         Mark::Dots | Mark::Balls => area.draw(&Circle::new(middle, 4 * FINE, series.colour.filled()))?,
         Mark::Rings => area.draw(&Circle::new(middle, 4 * FINE, thick))?,
         Mark::Cross => area.draw(&plotters::element::Cross::new(middle, 5 * FINE, thick))?,
-        Mark::Bars(_) => area.draw(&Rectangle::new([(x, y - 5 * FINE), (end, y + 5 * FINE)], series.colour.filled()))?,
+        Mark::Bars(_) => {
+            area.draw(&Rectangle::new([(x, y - 5 * FINE), (end, y + 5 * FINE)], series.colour.filled()))?
+        }
     }
     let style = anchored(12, HPos::Left, VPos::Center);
     area.draw(&Text::new(series.name.clone(), (x + MARK_PX * FINE, y), style))?;

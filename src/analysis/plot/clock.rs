@@ -1,12 +1,13 @@
 //! The receiver's clock: its bias over time, and its stability over averaging time.
 
-
 use plotters::style::RGBColor;
 
 use crate::analysis::allan::{Deviation, Point};
 use crate::analysis::clock::{ClockRow, Line, Of};
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Drawing, Failure, Series, WIDTH_PX, compose};
+use crate::analysis::plot::canvas::{
+    Axis, BLUE, COLOURS, Chart, Drawing, Failure, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX, compose,
+};
 use crate::analysis::theory::clock::white_phase;
 
 type Points = Vec<(f64, f64)>;
@@ -45,7 +46,7 @@ pub fn bias(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         chart("Estimate minus truth".to_owned(), "error (ns)", 0.1, error),
         chart("Estimate and truth, each without its straight line".to_owned(), "bias (ns)", 0.1, rest),
     ];
-    compose((WIDTH_PX, 640), 1, &charts, &legend).map(Some)
+    compose((WIDTH_PX, 540), 1, &charts, &legend).map(Some)
 }
 
 /// Points and lines of one chart of deviations, in common logarithms.
@@ -71,7 +72,7 @@ pub fn stability(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
             legend.push(series.clone());
         }
     }
-    compose((WIDTH_PX, 620), 2, &charts, &legend).map(Some)
+    compose((WIDTH_PX, 540), 2, &charts, &legend).map(Some)
 }
 
 impl Curves<'_> {

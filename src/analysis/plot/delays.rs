@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Axis, COLOURS, Chart, Mark, Drawing, Failure, Series, WIDTH_PX, compose};
+use crate::analysis::plot::canvas::{Axis, COLOURS, Chart, Drawing, Failure, Mark, Series, WIDTH_PX, compose};
 use crate::gnss::record::SkyRow;
 use crate::gnss::satellite::Sv;
 
@@ -27,7 +27,7 @@ pub fn delays(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         chart("Troposphere, as it is", |row| row.troposphere_m),
     ];
     let names: Vec<Series> = tracks.keys().enumerate().map(|(index, sv)| line(*sv, index, Vec::new())).collect();
-    compose((WIDTH_PX, 500), 1, &charts, &names).map(Some)
+    compose((WIDTH_PX, 340), 2, &charts, &names).map(Some)
 }
 
 /// A satellite's line, dashed once the colours begin again.

@@ -67,8 +67,8 @@ impl Drawing {
     /// Whatever the rasteriser reports.
     pub fn png(&self, scale: f32) -> Result<Vec<u8>, Failure> {
         let size = |pixels: u32| (pixels as f32 * scale).round() as u32;
-        let mut pixels = tiny_skia::Pixmap::new(size(self.width_px), size(self.height_px))
-            .ok_or("a picture needs a size")?;
+        let mut pixels =
+            tiny_skia::Pixmap::new(size(self.width_px), size(self.height_px)).ok_or("a picture needs a size")?;
         let shrink = scale / FINE as f32;
         resvg::render(&self.tree()?, tiny_skia::Transform::from_scale(shrink, shrink), &mut pixels.as_mut());
         Ok(pixels.encode_png()?)
@@ -94,28 +94,38 @@ fn fonts() -> Arc<fontdb::Database> {
 }
 
 /// Joins circles of the same look that follow each other into one path: filled ones as strokes without length under round
-/// caps, hollow ones as arcs.
+/// caps, hollow ones as arcs. Circles at one and the same place stay: a stroke without any extent is not drawn.
 fn with_dots_joined(svg: &str) -> String {
     let mut joined = String::with_capacity(svg.len());
-    let mut look: Option<Look<'_>> = None;
+    let mut run: Vec<(Circle<'_>, &str)> = Vec::new();
     for line in svg.lines() {
         let circle = Circle::read(line);
-        if look.is_some() && circle.as_ref().map(|circle| circle.look) != look {
-            joined.push_str("\"/>\n");
-            look = None;
+        if circle.as_ref().map(|circle| circle.look) != run.first().map(|(first, _)| first.look) {
+            join(&run, &mut joined);
+            run.clear();
         }
-        let Some(circle) = circle else {
-            joined.push_str(line);
-            joined.push('\n');
-            continue;
-        };
-        if look.is_none() {
-            circle.look.open(&mut joined);
-            look = Some(circle.look);
+        match circle {
+            Some(circle) => run.push((circle, line)),
+            None => {
+                joined.push_str(line);
+                joined.push('\n');
+            }
         }
-        circle.place(&mut joined);
     }
+    join(&run, &mut joined);
     joined
+}
+
+/// Writes circles of one look as one path, or as they are.
+fn join(run: &[(Circle<'_>, &str)], svg: &mut String) {
+    let Some((first, _)) = run.first() else { return };
+    if run.iter().all(|(circle, _)| (circle.x, circle.y) == (first.x, first.y)) {
+        run.iter().for_each(|(_, line)| svg.extend([line, "\n"]));
+        return;
+    }
+    first.look.open(svg);
+    run.iter().for_each(|(circle, _)| circle.place(svg));
+    svg.push_str("\"/>\n");
 }
 
 /// What circles must share to be one path.
@@ -209,8 +219,8 @@ mod tests {
     fn joined_dots_are_one_path_and_look_the_same() {
         let apart = picture();
         let joined = with_dots_joined(&apart);
-        assert_eq!((apart.matches("<circle").count(), joined.matches("<circle").count()), (19, 0));
-        assert_eq!(joined.matches("<path").count(), 3);
+        assert_eq!((apart.matches("<circle").count(), joined.matches("<circle").count()), (19, 1));
+        assert_eq!(joined.matches("<path").count(), 2);
         let render = |svg: &str| Drawing { svg: svg.to_owned(), width_px: 100, height_px: 100 }.png(4.0).unwrap();
         let pixels = |svg: &str| tiny_skia::Pixmap::decode_png(&render(svg)).unwrap();
         let (one, other) = (pixels(&apart), pixels(&joined));

@@ -8,6 +8,7 @@ use crate::analysis::plot::canvas::{
 };
 use crate::analysis::statistics::std;
 use crate::analysis::summary::Details;
+use crate::analysis::verdict::digits;
 
 /// The errors of one loop and the rule for their σ.
 pub(crate) struct Loop<'a> {
@@ -81,7 +82,7 @@ pub fn jitter(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         Series::new("±1σ", GREY, Mark::Dash, Vec::new()),
         Series::new("threshold for 1σ", ORANGE, Mark::Line, Vec::new()),
     ];
-    compose((WIDTH_PX, 620), 1, &charts, &legend).map(Some)
+    compose((WIDTH_PX, 270), 3, &charts, &legend).map(Some)
 }
 
 fn histogram(of: &Loop<'_>) -> Chart {
@@ -96,18 +97,15 @@ fn histogram(of: &Loop<'_>) -> Chart {
         Vec::new()
     };
     let top = 1.1 * bars.iter().chain(&curve).map(|point| point.1).fold(1.0, f64::max);
-    let mut series = vec![
-        Series::new("", BLUE, Mark::Bars(0.92 * width), bars),
-        Series::new("", COLOURS[6], Mark::Line, curve),
-    ];
+    let mut series =
+        vec![Series::new("", BLUE, Mark::Bars(0.92 * width), bars), Series::new("", COLOURS[6], Mark::Line, curve)];
     for sign in [-1.0, 1.0] {
         series.push(Series::new("", GREY, Mark::Dash, vec![(sign * sigma, 0.0), (sign * sigma, top)]));
         if *threshold < half {
             series.push(Series::new("", ORANGE, Mark::Line, vec![(sign * threshold, 0.0), (sign * threshold, top)]));
         }
     }
-    let x = Axis::new(&format!("{name} error ({unit})"), (-half, half));
-    let beyond = if *threshold < half { "" } else { ", beyond the picture" };
-    let title = format!("{name}: σ {sigma:.4}, threshold {threshold:.3} {unit}{beyond}");
+    let x = Axis::new(&format!("error ({unit})"), (-half, half));
+    let title = format!("{name}: σ {}, threshold {}", digits(sigma, 3), digits(*threshold, 3));
     Chart::new(title, x, Axis::new("observations (%)", (0.0, top)), series)
 }

@@ -8,7 +8,7 @@ pub mod canvas;
 mod clock;
 mod delays;
 pub mod drawing;
-mod jitter;
+pub(crate) mod jitter;
 mod multipath;
 mod position;
 mod signals;
@@ -59,7 +59,7 @@ pub(crate) struct Picture {
     draw: Draw,
 }
 
-/// The pictures in the order of the report.
+/// The pictures in the order of the report, where a tall one and a low one share a page.
 pub(crate) const PICTURES: [Picture; 15] = [
     Picture {
         name: "sky",
@@ -69,20 +69,20 @@ pub(crate) const PICTURES: [Picture; 15] = [
         draw: sky::sky,
     },
     Picture {
-        name: "psd",
-        caption: "Power spectral density of the samples (Welch, Hann window, half overlap) with the theory of this scene: \
-                  main spectra of the codes over their aliases, noise floor, interference. Look for lines or slopes \
-                  that theory does not have.",
-        numbers: &["psd.csv", "psd_theory.csv"],
-        draw: spectrum::psd,
-    },
-    Picture {
         name: "acquisition",
         caption: "Largest statistic of the search for every code with the threshold of the designed false-alarm \
                   probability. A cross marks what the scene has: a bar above the threshold without a cross is a false \
                   acquisition, a cross over a short bar a miss.",
         numbers: &["rx/acquisition.csv"],
         draw: spectrum::acquisition,
+    },
+    Picture {
+        name: "psd",
+        caption: "Power spectral density of the samples (Welch, Hann window, half overlap) with the theory of this scene: \
+                  main spectra of the codes over their aliases, noise floor, interference. Look for lines or slopes \
+                  that theory does not have.",
+        numbers: &["psd.csv", "psd_theory.csv"],
+        draw: spectrum::psd,
     },
     Picture {
         name: "cn0",
@@ -114,19 +114,6 @@ pub(crate) const PICTURES: [Picture; 15] = [
         draw: signals::observables,
     },
     Picture {
-        name: "multipath",
-        caption: "Code errors beside the fading that reflected rays cause: a code error that follows the fading is \
-                  multipath.",
-        numbers: &["errors.csv", "truth/rays.csv"],
-        draw: multipath::multipath,
-    },
-    Picture {
-        name: "delays",
-        caption: "What ionosphere and troposphere truly add to the code of each satellite.",
-        numbers: &["truth/sky.csv"],
-        draw: delays::delays,
-    },
-    Picture {
         name: "position_scatter",
         caption: "Horizontal errors of the fixes about the truth with the ellipses that would hold 50 % and 95 % of a normal \
                   scatter of the same covariance, and how errors are distributed. A cloud off the cross is a bias.",
@@ -153,11 +140,24 @@ pub(crate) const PICTURES: [Picture; 15] = [
         draw: clock::bias,
     },
     Picture {
+        name: "delays",
+        caption: "What ionosphere and troposphere truly add to the code of each satellite.",
+        numbers: &["truth/sky.csv"],
+        draw: delays::delays,
+    },
+    Picture {
         name: "allan",
         caption: "Stability of the clock with intervals of 95 %: its estimate, the truth, the error, and what white noise \
                   of code or carrier alone would give.",
         numbers: &["allan.csv"],
         draw: clock::stability,
+    },
+    Picture {
+        name: "multipath",
+        caption: "Code errors beside the fading that reflected rays cause: a code error that follows the fading is \
+                  multipath.",
+        numbers: &["errors.csv", "truth/rays.csv"],
+        draw: multipath::multipath,
     },
     Picture {
         name: "spoofing",
@@ -171,10 +171,7 @@ pub(crate) const PICTURES: [Picture; 15] = [
 const PNG_SCALE: f32 = 2.0;
 
 /// Draws every picture of a run into its directory and returns those that there are.
-pub(crate) fn all(
-    directory: &Path,
-    judged: &Judged<'_>,
-) -> Result<Vec<(&'static Picture, Drawing)>, JudgeError> {
+pub(crate) fn all(directory: &Path, judged: &Judged<'_>) -> Result<Vec<(&'static Picture, Drawing)>, JudgeError> {
     let one = |picture: &'static Picture| {
         let path = directory.join(picture.name).with_extension("png");
         let failed = |error: Failure| JudgeError::Plot { path: path.clone(), reason: error.to_string() };

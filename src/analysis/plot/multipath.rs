@@ -33,8 +33,8 @@ pub fn multipath(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         .collect();
     let charts = [
         over_time(judged, "Code error", "error (m)", 0.1, &errors),
-        over_time(judged, "All rays against the direct one, at the antenna", "amplitude (dB)", 1.0, &fading),
+        over_time(judged, "All rays against the direct one", "amplitude (dB)", 1.0, &fading),
     ];
     let names = legend(errors.iter().map(|(name, _)| name.clone()));
-    compose((WIDTH_PX, 500), 1, &charts, &names).map(Some)
+    compose((WIDTH_PX, 340), 2, &charts, &names).map(Some)
 }

@@ -52,7 +52,7 @@ pub fn scatter(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     };
     let curves = marks.into_iter().chain(distributions).collect();
     let share = Chart::new(title, x, Axis::new("fixes below (%)", (0.0, 100.0)), curves);
-    compose((WIDTH_PX, 390), 2, &[cloud, share], &legend).map(Some)
+    compose((WIDTH_PX, 340), 2, &[cloud, share], &legend).map(Some)
 }
 
 /// Mean and covariance of a cloud.
@@ -113,7 +113,7 @@ pub fn time(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         let bounds = [bound(-1.0), bound(1.0)];
         // A bound far outside the errors would hide them.
         let own = points.iter().map(|p| p.1.abs()).fold(0.05, f64::max);
-        let near = bounds.iter().flatten().map(|p| p.1).filter(|value| value.abs() < 4.0 * own);
+        let near = bounds.iter().flatten().map(|p| p.1).filter(|value| value.abs() < 12.0 * own);
         let y = Axis::around("error (m)", points.iter().map(|p| p.1).chain([0.0]).chain(near), 0.1);
         let x = judged.time_axis(points.iter().map(|p| p.0));
         let inside = |points: Points| points.into_iter().filter(|p| (y.from..=y.to).contains(&p.1)).collect();
@@ -132,7 +132,7 @@ pub fn time(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         Series::new("fixes", BLUE, Mark::Dots, Vec::new()),
         Series::new("±1.96 σ of the receiver's covariance", ORANGE, Mark::Line, Vec::new()),
     ];
-    compose((WIDTH_PX, 500), 2, &charts, &legend).map(Some)
+    compose((WIDTH_PX, 430), 2, &charts, &legend).map(Some)
 }
 
 /// Quantile of the normal distribution that leaves 2.5 % above.
@@ -176,7 +176,7 @@ pub fn spoofing(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let legend = [series.clone(), distances.clone()].concat();
     let mut plan = Chart::new("Plan view", east, north, series);
     plan.equal = true;
-    compose((WIDTH_PX, 390), 2, &[plan, Chart::new("While the spoofer is on", x, y, distances)], &legend).map(Some)
+    compose((WIDTH_PX, 340), 2, &[plan, Chart::new("While the spoofer is on", x, y, distances)], &legend).map(Some)
 }
 
 /// The way in plan and its height over time, as it was and as found.
@@ -211,7 +211,7 @@ pub fn trajectory(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let mut plan = Chart::new("Plan view", east, north, legend.clone());
     plan.equal = true;
     let time = Axis::new("time (s)", (0.0, run.scene.duration_s));
-    compose((WIDTH_PX, 370), 2, &[plan, Chart::new("Height", time, up, heights)], &legend).map(Some)
+    compose((WIDTH_PX, 340), 2, &[plan, Chart::new("Height", time, up, heights)], &legend).map(Some)
 }
 
 #[cfg(test)]

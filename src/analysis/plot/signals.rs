@@ -1,6 +1,5 @@
 //! Loops and observations over time, satellite by satellite.
 
-
 use crate::analysis::errors::{Link, SignalError};
 use crate::analysis::plot::Judged;
 use crate::analysis::plot::canvas::{Axis, Chart, Drawing, Failure, Mark, Series, WIDTH_PX, compose};
@@ -62,7 +61,7 @@ pub fn discriminators(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         over_time(judged, "FLL discriminator", "output (Hz)", 2.0, &data(|row| row.fll_discriminator_hz)),
     ];
     let names = legend(links.iter().map(|link| link.0.to_string()));
-    compose((WIDTH_PX, 640), 1, &charts, &names).map(Some)
+    compose((WIDTH_PX, 540), 1, &charts, &names).map(Some)
 }
 
 pub(super) fn per_satellite(judged: &Judged<'_>, of: impl Fn(&SignalError) -> f64) -> Vec<(String, Points)> {
@@ -95,7 +94,7 @@ pub fn cn0(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     }
     let difference = per_satellite(judged, |row| row.cn0_dbhz - reference(row));
     let below = over_time(judged, &format!("C/N0 measured minus {word}"), "difference (dB)", 1.0, &difference);
-    compose((WIDTH_PX, 500), 1, &[chart, below], &satellites(judged)).map(Some)
+    compose((WIDTH_PX, 430), 1, &[chart, below], &satellites(judged)).map(Some)
 }
 
 /// Errors of code, carrier and Doppler.
@@ -111,5 +110,5 @@ pub fn observables(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         ),
         over_time(judged, "Doppler error", "error (Hz)", 0.1, &per_satellite(judged, |row| row.doppler_hz)),
     ];
-    compose((WIDTH_PX, 640), 1, &charts, &satellites(judged)).map(Some)
+    compose((WIDTH_PX, 540), 1, &charts, &satellites(judged)).map(Some)
 }

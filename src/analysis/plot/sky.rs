@@ -11,9 +11,9 @@ use crate::analysis::statistics::mean;
 use crate::gnss::record::SkyRow;
 use crate::gnss::satellite::Sv;
 
-const HEIGHT_PX: i32 = 570;
-const CENTRE: (i32, i32) = (290 * FINE, 295 * FINE);
-const RADIUS: f64 = (225 * FINE) as f64;
+const HEIGHT_PX: i32 = 490;
+const CENTRE: (i32, i32) = (290 * FINE, 255 * FINE);
+const RADIUS: f64 = (195 * FINE) as f64;
 
 /// Polar plot: north up, zenith in the middle, tracks ending in a labelled dot whose colour is the mean C/N0 as
 /// set; a satellite that the receiver did not observe is hollow.
@@ -103,9 +103,12 @@ fn frame(area: &Area<'_>) -> Result<(), Failure> {
     let title = anchored(15, HPos::Center, VPos::Center);
     area.draw(&Text::new("Satellites above the horizon", (CENTRE.0, 20 * FINE), title))?;
     let line = RGBColor(205, 205, 205).stroke_width(FINE as u32);
-    for elevation_deg in [0.0, 30.0, 60.0] {
+    for elevation_deg in [0.0, 30.0, 60.0_f64] {
         let (x, y) = place(0.0, elevation_deg);
         area.draw(&Circle::new(CENTRE, CENTRE.1 - y, line))?;
+        if elevation_deg == 0.0 {
+            continue;
+        }
         let style = anchored(12, HPos::Left, VPos::Bottom).color(&GREY);
         area.draw(&Text::new(format!("{elevation_deg:.0}°"), (x + 4 * FINE, y - 2 * FINE), style))?;
     }
@@ -119,7 +122,7 @@ fn frame(area: &Area<'_>) -> Result<(), Failure> {
             270 => "W".to_owned(),
             other => format!("{other}°"),
         };
-        area.draw(&Text::new(name, place(azimuth_deg, -7.0), anchored(13, HPos::Center, VPos::Center)))?;
+        area.draw(&Text::new(name, place(azimuth_deg, -8.0), anchored(13, HPos::Center, VPos::Center)))?;
     }
     Ok(())
 }

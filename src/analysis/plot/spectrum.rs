@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Drawing, Failure, Series, WIDTH_PX, compose};
+use crate::analysis::plot::canvas::{
+    Axis, BLUE, Chart, Drawing, Failure, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX, compose,
+};
 use crate::analysis::psd;
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::satellite::Sv;
@@ -24,12 +26,12 @@ pub fn psd(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let y = Axis::around("density (dB LSB²/Hz)", measured.iter().chain(&theory).map(|p| p.1), 2.0);
     let mut series = vec![Series::new("measured", BLUE, Mark::Line, measured)];
     if !theory.is_empty() {
-        series.push(Series::new("theory", ORANGE, Mark::Dash, theory));
+        series.push(Series::new("theory", ORANGE, Mark::Line, theory));
     }
     let legend = series.clone();
     let noise = if judged.run.scene.noise { "with noise" } else { "without noise" };
     let chart = Chart::new(format!("Power spectral density of the samples, {noise}"), x, y, series);
-    compose((WIDTH_PX, 380), 1, &[chart], &legend).map(Some)
+    compose((WIDTH_PX, 340), 1, &[chart], &legend).map(Some)
 }
 
 /// The largest statistic of each satellite that was searched, with the threshold.
