@@ -22,7 +22,7 @@ pub(super) fn least_height(table: &Table, fonts: &Fonts) -> f32 {
     let widths = widths(table, fonts);
     let rows = if table.rows.len() <= SHORT { SHORT } else { 2 };
     let rows = table.rows.iter().take(rows).map(|cells| row(cells, &widths, fonts).height).sum::<f32>();
-    20.0 + header(table, &widths, fonts).height + rows
+    26.0 + header(table, &widths, fonts).height + rows
 }
 
 /// Lays a table out below what is there.

@@ -298,7 +298,7 @@ fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Fai
             context.draw_series(points.into_iter().map(ball))?;
         }
         Mark::Rings => {
-            let ring = |point| Circle::new(point, 2 * FINE, series.colour.stroke_width(FINE as u32 * 3 / 4));
+            let ring = |point| Circle::new(point, 3 * FINE / 2, series.colour.stroke_width(FINE as u32 * 3 / 4));
             context.draw_series(points.into_iter().map(ring))?;
         }
         Mark::Cross => {

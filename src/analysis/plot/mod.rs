@@ -102,7 +102,7 @@ pub(crate) const PICTURES: [Picture; 15] = [
         name: "jitter",
         caption: "Errors of the closed loops, replica minus truth, each satellite about its mean and without the pull-in, \
                   with the normal curve of the same mean and σ. The rules of thumb (d/6, 15°, 1/(12T)) are \
-                  bounds for σ, and are drawn where they come near.",
+                  bounds for σ, and are drawn where they come near. Satellites of different C/N0 together are more peaked than normal.",
         numbers: &["jitter.csv", "errors.csv"],
         draw: jitter::jitter,
     },
