@@ -88,8 +88,8 @@ fn draw(sheet: &mut Sheet<'_>, table: &Table, row: &Row, widths: &[f32]) {
     sheet.skip(row.height);
 }
 
-/// As wide as their longest cells if the page holds that; otherwise no column is narrower than its longest word while
-/// there is room for all of those, and the rest goes to those that would like more.
+/// As wide as their longest cells if the page holds that; otherwise the longest are cut, though no column below its
+/// longest word while there is room for all of those.
 fn widths(table: &Table, fonts: &Fonts) -> Vec<f32> {
     let columns = table.columns.len();
     let (mut natural, mut least) = (vec![0.0_f32; columns], vec![0.0_f32; columns]);
@@ -112,6 +112,12 @@ fn widths(table: &Table, fonts: &Fonts) -> Vec<f32> {
     if needed >= room {
         return least.iter().map(|width| width * room / needed).collect();
     }
-    let share = (room - needed) / (wanted - needed);
-    natural.iter().zip(&least).map(|(natural, least)| least + share * (natural - least)).collect()
+    // Long columns give way first: none is wider than a common bound, none narrower than its longest word.
+    let bounded = |bound: f32| natural.iter().zip(&least).map(move |(natural, least)| natural.min(bound).max(*least));
+    let (mut low, mut high) = (0.0, room);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if bounded(middle).sum::<f32>() <= room { low = middle } else { high = middle }
+    }
+    bounded(low).collect()
 }
