@@ -153,6 +153,39 @@ fn the_same_scene_and_seed_give_the_same_bytes_on_any_threads_and_processor() {
 }
 
 #[test]
+fn broken_limits_exit_with_three_and_say_by_how_much_and_unusable_ones_stop_before_the_run() {
+    let here = workplace();
+    let limits = |name: &str, text: &str| fs::write(here.path().join(name), text).unwrap();
+    limits("good.toml", "\"satellites.false_acquired\" = { max = 0 }\n[tracking]\nlosses_of_lock = { equals = 0 }\n");
+    limits("broken.toml", "\"satellites.acquired\" = { max = 2 }\n\"position.horizontal_p95_m\" = { max = 1.5 }\n");
+    limits("typo.toml", "\"position.horizontal_95_m\" = { max = 1.5 }\n");
+    for (name, expected) in [("typo.toml", 65), ("absent.toml", 65)] {
+        let output = twin(&["run", "short.toml", "--out", "run", "--check", name], here.path());
+        assert_eq!(code(&output), expected, "{}", stderr(&output));
+        assert!(!here.path().join("run").exists(), "limits are read before the run");
+    }
+    let typo = twin(&["analyze", "run", "--check", "typo.toml"], here.path());
+    let message = stderr(&typo);
+    assert!(message.contains("position.horizontal_95_m") && message.contains("position.horizontal_p95_m"), "{message}");
+
+    let output = twin(&["run", "short.toml", "--out", "run", "--check", "good.toml"], here.path());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("all 2 limits of good.toml hold"));
+    assert_eq!(fs::read_to_string(here.path().join("run/scenario.toml")).unwrap(), SHORT);
+    let report = fs::read(here.path().join("run/report.pdf")).unwrap();
+    assert!(report.starts_with(b"%PDF-"));
+
+    let output = twin(&["analyze", "run", "--check", "broken.toml"], here.path());
+    assert_eq!(code(&output), 3);
+    let (text, message) = (String::from_utf8_lossy(&output.stdout).into_owned(), stderr(&output));
+    for part in ["satellites.acquired", "≤ 2", "% beyond", "position.horizontal_p95_m", "no figure"] {
+        assert!(text.contains(part), "{part} not in\n{text}");
+    }
+    assert!(message.contains("2 of 2 limits of broken.toml are broken"), "{message}");
+    assert!(fs::read(here.path().join("run/report.pdf")).unwrap() != report, "the limits are in the report");
+}
+
+#[test]
 fn generate_and_receive_are_the_same_as_run() {
     let here = workplace();
     assert!(twin(&["run", "short.toml", "--keep-if", "--out", "run"], here.path()).status.success());

@@ -2,7 +2,8 @@
 //!
 //! Each test runs the program on one scene of `scenarios/` and reads `summary.json`.
 
-use std::path::Path;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use gnss_twin::gnss::earth::Geodetic;
@@ -10,14 +11,29 @@ use serde_json::Value;
 
 /// Runs a scene of the repository and returns its summary.
 fn run(scene: &str) -> Value {
-    run_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(format!("{scene}.toml")))
+    run_file(&scenarios().join(format!("{scene}.toml")))
+}
+
+/// The same for a scene that keeps the shipped example of limits.
+fn run_within_limits(scene: &str) -> Value {
+    let limits = scenarios().join("limits.toml");
+    run_with(&scenarios().join(format!("{scene}.toml")), &["--check".as_ref(), limits.as_os_str()])
+}
+
+fn scenarios() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios")
 }
 
 fn run_file(scenario: &Path) -> Value {
+    run_with(scenario, &[])
+}
+
+fn run_with(scenario: &Path, more: &[&OsStr]) -> Value {
     let out = tempfile::tempdir().unwrap();
     let target = out.path().join("run");
     let run = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
         .args(["run".as_ref(), scenario.as_os_str(), "--out".as_ref(), target.as_os_str()])
+        .args(more)
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&run.stdout).into_owned() + &String::from_utf8_lossy(&run.stderr);
@@ -48,7 +64,7 @@ fn found_and_decoded_what_is_there(summary: &Value) {
 
 #[test]
 fn a_static_receiver_finds_its_place_to_a_metre_within_forty_seconds() {
-    let summary = run("static");
+    let summary = run_within_limits("static");
     found_and_decoded_what_is_there(&summary);
     at_most(&summary, "/position/horizontal_p95_m", 1.0);
     at_most(&summary, "/position/bias_enu_m/0", 0.3);
@@ -59,7 +75,7 @@ fn a_static_receiver_finds_its_place_to_a_metre_within_forty_seconds() {
 
 #[test]
 fn a_moving_receiver_keeps_every_cycle_and_its_velocity_to_a_decimetre_a_second() {
-    let summary = run("moderate");
+    let summary = run_within_limits("moderate");
     found_and_decoded_what_is_there(&summary);
     at_most(&summary, "/position/horizontal_p95_m", 1.5);
     at_most(&summary, "/position/velocity_p95_mps", 0.1);
@@ -68,7 +84,7 @@ fn a_moving_receiver_keeps_every_cycle_and_its_velocity_to_a_decimetre_a_second(
 
 #[test]
 fn a_boost_above_twenty_g_loses_no_satellite_and_no_position() {
-    let summary = run("high_dynamics");
+    let summary = run_within_limits("high_dynamics");
     found_and_decoded_what_is_there(&summary);
     at_most(&summary, "/position/error_3d_p95_m", 5.0);
     assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);

@@ -94,6 +94,10 @@ pub struct PsdRow {
 /// A run as read.
 pub struct Run {
     pub scene: SceneFacts,
+    /// The whole of `truth/scene.json`.
+    pub scene_json: Value,
+    /// The scene as it was written, where the run kept it.
+    pub scenario: Option<String>,
     pub truth: Vec<Observation>,
     pub sky: Vec<SkyRow>,
     /// Reflected rays; none in a scene without multipath.
@@ -120,7 +124,7 @@ const TRUTH: &str = "the generator writes it: make the run again with `gnss-twin
 const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
 
 impl Run {
-    /// Reads a run's directory. `psd.csv`, `speed.json` and `rx/receiver.json` may be missing.
+    /// Reads a run's directory. `psd.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json` may be missing.
     pub fn read(run: &Path) -> Result<Self, JudgeError> {
         let truth = run.join("truth");
         let rx = run.join("rx");
@@ -128,6 +132,8 @@ impl Run {
         let rays = truth.join("rays.csv");
         Ok(Self {
             scene: json(&truth.join("scene.json"))?.ok_or_else(|| missing(&truth.join("scene.json"), TRUTH))?,
+            scene_json: json(&truth.join("scene.json"))?.unwrap_or(Value::Null),
+            scenario: text(&run.join("scenario.toml"))?,
             truth: rows(&truth.join("observations.csv"), TRUTH)?,
             sky: rows(&truth.join("sky.csv"), TRUTH)?,
             rays: if rays.exists() { rows(&rays, TRUTH)? } else { Vec::new() },
@@ -152,6 +158,8 @@ impl Run {
         let scene = truth.join("scene.json");
         Ok(Self {
             scene: json(&scene)?.ok_or_else(|| missing(&scene, TRUTH))?,
+            scene_json: Value::Null,
+            scenario: None,
             truth: rows(&truth.join("observations.csv"), TRUTH)?,
             sky: rows(&truth.join("sky.csv"), TRUTH)?,
             rays: Vec::new(),
@@ -216,5 +224,14 @@ fn json<T: DeserializeOwned>(path: &PathBuf) -> Result<Option<T>, JudgeError> {
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(source) => Err(JudgeError::File { path: path.clone(), source }),
+    }
+}
+
+/// A text file, or `None` if there is none.
+fn text(path: &Path) -> Result<Option<String>, JudgeError> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(String::from_utf8_lossy(&bytes).into_owned())),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(JudgeError::File { path: path.to_owned(), source }),
     }
 }

@@ -5,8 +5,10 @@
 //! [`errors`] measures, [`slips`] finds breaks and their causes, [`elevation`] sorts errors by satellite and elevation, [`jitter`] holds each loop against theory, [`honesty`] the fixes against
 //! their own covariance, [`clock`] does so for the receiver's clock with the deviations of [`allan`], [`statistics`]
 //! condenses, [`access`] and [`jamming`] expect C/N0 under other codes and interference, [`spoofing`] tells what a
-//! spoofer did, [`summary`] is what scripts gate on, [`plot`] draws, [`report`] prints, [`psd`] estimates the spectrum of
-//! the samples, [`spectrum`] says what it should be, [`foreign`] judges receivers that this project did not write, [`trade`] weighs speed against accuracy, [`theory`] says what errors to expect.
+//! spoofer did, [`summary`] is what scripts gate on with its [`schema`], [`verdict`] holds it against theory and a user's
+//! [`limits`], [`plot`] draws, [`report`] prints on a terminal and `pdf` on paper, [`psd`] estimates the spectrum of
+//! the samples, [`spectrum`] says what it should be, [`foreign`] judges receivers that this project did not write, [`trade`]
+//! weighs speed against accuracy, [`theory`] says what errors to expect.
 
 pub mod access;
 pub mod allan;
@@ -18,17 +20,25 @@ pub mod honesty;
 pub mod independent;
 pub mod jamming;
 pub mod jitter;
+pub mod limits;
 pub mod load;
+#[cfg(feature = "pdf")]
+pub mod pdf;
 pub mod plot;
 pub mod psd;
 pub mod report;
+#[cfg(feature = "pdf")]
+mod run_report;
+pub mod schema;
 pub mod slips;
 pub mod spectrum;
 pub mod spoofing;
 pub mod statistics;
 pub mod summary;
+mod tables;
 pub mod theory;
 pub mod trade;
+pub mod verdict;
 
 use std::fs;
 use std::io;
@@ -65,12 +75,23 @@ pub enum JudgeError {
     Plot { path: PathBuf, reason: String },
 }
 
-/// Judges the run in a directory: writes `summary.json`, `clock.csv`, `allan.csv` and the pictures there and returns the summary.
+/// Judges the run in a directory: writes `summary.json`, tables, pictures and `report.pdf` there and returns the summary.
 ///
 /// Reads `truth/{observations,sky,trajectory,navigation}.csv`, `truth/scene.json`,
 /// `rx/{observations,fixes,acquisition,tracking,navigation,events}.csv`, and where they exist
-/// `rx/receiver.json`, `psd.csv`, `speed.json`, `truth/interference.csv` and `truth/claimed.csv`.
+/// `rx/receiver.json`, `psd.csv`, `speed.json`, `scenario.toml`, `truth/interference.csv` and `truth/claimed.csv`.
+///
+/// # Errors
+/// [`JudgeError`] with the file that is missing, is not as expected or cannot be written.
 pub fn judge(run: &Path) -> Result<Summary, JudgeError> {
+    judge_against(run, None)
+}
+
+/// The same with a user's limits beside those of theory; what came of them is in the summary's details.
+///
+/// # Errors
+/// As [`judge`].
+pub fn judge_against(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
     let read = load::Run::read(run)?;
     let errors = errors::Errors::measure(&read)?;
     let clock = clock::Clock::measure(&read, &errors);
@@ -80,25 +101,33 @@ pub fn judge(run: &Path) -> Result<Summary, JudgeError> {
     let elevations = elevation::Elevations::measure(&read, &errors);
     let mut summary = Summary::new(&read, &errors, &clock);
     summary.add(&honesty, &slips, &jitter);
-    plot::all(
-        run,
-        &plot::Judged {
-            run: &read,
-            errors: &errors,
-            clock: &clock,
-            honesty: &honesty,
-            elevations: &elevations,
-            summary: &summary,
-        },
-    )?;
+    let path = run.join("summary.json");
+    let not_json = |source| JudgeError::Json { path: path.clone(), source };
+    let verdict = verdict::Verdict::of(&read, &errors, &summary);
+    summary.details.verdict = match limits {
+        Some(limits) => verdict.with_user(limits.judge(&serde_json::to_value(&summary).map_err(not_json)?)),
+        None => verdict,
+    };
+    let judged = plot::Judged {
+        run: &read,
+        errors: &errors,
+        clock: &clock,
+        honesty: &honesty,
+        elevations: &elevations,
+        summary: &summary,
+    };
+    let pictures = plot::all(run, &judged)?;
     clock.write(run)?;
     honesty.write(run)?;
     elevations.write(run)?;
     slips.write(run)?;
     jitter.write(run)?;
-    let path = run.join("summary.json");
-    let mut json =
-        serde_json::to_vec_pretty(&summary).map_err(|source| JudgeError::Json { path: path.clone(), source })?;
+    tables::write(run, &judged)?;
+    #[cfg(feature = "pdf")]
+    run_report::write(run, &judged, pictures)?;
+    #[cfg(not(feature = "pdf"))]
+    drop(pictures);
+    let mut json = serde_json::to_vec_pretty(&summary).map_err(not_json)?;
     json.push(b'\n');
     write_whole(&path, &json)?;
     Ok(summary)

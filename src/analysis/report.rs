@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::analysis::statistics::Spread;
 use crate::analysis::summary::Summary;
+use crate::analysis::verdict::Status;
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -27,6 +28,7 @@ impl fmt::Display for Summary {
         writeln!(f, "* the part common to all satellites of an epoch removed")?;
         self.loop_lines(f)?;
         self.clock_lines(f)?;
+        self.verdict_lines(f)?;
         self.speed_line(f)
     }
 }
@@ -133,6 +135,16 @@ impl Summary {
             Some(code) => writeln!(f, ", {code:.2e} if code noise were white"),
             None => writeln!(f),
         }
+    }
+
+    fn verdict_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = &self.details.verdict;
+        writeln!(f, "\nverdict       {}", verdict.in_words())?;
+        for row in verdict.rows.iter().filter(|row| row.status != Status::Pass) {
+            let (value, word, margin) = (row.value_text(), row.status.word(), row.margin_text());
+            writeln!(f, "{word:<14}{} {value} {}, limit {}: {margin}", row.figure, row.unit, row.bound)?;
+        }
+        Ok(())
     }
 
     fn speed_line(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -11,7 +11,7 @@ use crate::analysis::allan::{Deviation, Point};
 use crate::analysis::clock;
 use crate::analysis::clock::{Of, Series};
 use crate::analysis::errors::Errors;
-use crate::analysis::honesty::{Honesty, Verdict};
+use crate::analysis::honesty::{self, Honesty};
 use crate::analysis::jitter::{Jitter as LoopJitter, Loop, Pooled};
 use crate::analysis::load::{Run, Speed};
 use crate::analysis::slips::{Cause, Slips};
@@ -19,6 +19,7 @@ use crate::analysis::spectrum::{self, Spectrum};
 use crate::analysis::spoofing::Spoofing;
 use crate::analysis::statistics::{Spread, mean, median, percentile, pooled_std, rms, spread, std};
 use crate::analysis::theory::clock::white_phase;
+use crate::analysis::verdict::Verdict;
 use crate::gnss::record::{Event, NavigationRow};
 use crate::gnss::satellite::Sv;
 
@@ -80,7 +81,7 @@ pub struct Position {
     pub nees_mean: Option<f64>,
     pub nees_band: Option<[f64; 2]>,
     pub nees_independent: Option<f64>,
-    pub nees_verdict: Option<Verdict>,
+    pub nees_verdict: Option<honesty::Verdict>,
 }
 
 /// The receiver's clock, over the longest stretch of fixes without a gap. Deviations at an averaging time of 1 s are null where
@@ -180,6 +181,7 @@ pub struct Details {
     /// Wrong parameters, as decoded.
     pub wrong_parameters: Vec<NavigationRow>,
     pub false_satellites: Vec<Sv>,
+    pub verdict: Verdict,
 }
 
 /// Bounds for loop jitter.

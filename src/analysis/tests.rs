@@ -394,7 +394,7 @@ fn a_truth_of_another_run_is_refused() {
 }
 
 #[test]
-fn every_picture_is_a_png_that_is_not_blank() {
+fn every_picture_is_a_png_that_is_not_blank_and_its_numbers_are_in_a_table() {
     let run = planted_run(&PLANTED);
     let mut psd = psd::Psd::new(RATE_HZ as f64, false, 256);
     let mut draw = Draw(9);
@@ -402,22 +402,13 @@ fn every_picture_is_a_png_that_is_not_blank() {
     psd.add(&block(), &block());
     psd.write(&run.path().join("psd.csv")).unwrap();
     judge(run.path()).unwrap();
-    for name in [
-        "psd",
-        "acquisition",
-        "discriminators",
-        "cn0",
-        "observables",
-        "jitter",
-        "sky",
-        "position_scatter",
-        "position_time",
-        "position_honesty",
-        "elevation",
-        "trajectory",
-        "clock_bias",
-        "allan",
-    ] {
+    let only_elsewhere = ["multipath", "spoofing"];
+    for picture in plot::PICTURES.iter().filter(|picture| !only_elsewhere.contains(&picture.name)) {
+        let name = picture.name;
+        for numbers in picture.numbers {
+            let rows = csv::Reader::from_path(run.path().join(numbers)).unwrap().into_records().count();
+            assert!(rows > 5, "{name}: {rows} rows in {numbers}");
+        }
         let path = run.path().join(format!("{name}.png"));
         let picture = resvg::tiny_skia::Pixmap::load_png(&path).unwrap();
         let inked = picture.pixels().iter().filter(|p| (p.red(), p.green(), p.blue()) != (255, 255, 255)).count();
@@ -434,6 +425,85 @@ fn every_picture_is_a_png_that_is_not_blank() {
             }
         }
     }
+}
+
+#[test]
+fn every_key_of_the_summary_is_in_the_schema_with_unit_and_meaning_and_no_other() {
+    fn paths(path: &str, value: &serde_json::Value, found: &mut Vec<String>) {
+        let below = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+        match value {
+            serde_json::Value::Object(map) => map.iter().for_each(|(key, value)| paths(&below(key), value, found)),
+            serde_json::Value::Array(list) => {
+                list.iter().enumerate().for_each(|(index, value)| paths(&below(&index.to_string()), value, found));
+            }
+            _ => found.push(path.to_owned()),
+        }
+    }
+    let run = planted_run(&PLANTED);
+    fs::copy(run.path().join("truth/trajectory.csv"), run.path().join("truth/claimed.csv")).unwrap();
+    let summary = judge(run.path()).unwrap();
+    let mut written = Vec::new();
+    paths("", &serde_json::to_value(&summary).unwrap(), &mut written);
+    let documented: Vec<&str> = schema::leaves().iter().map(|leaf| leaf.path.as_str()).collect();
+    // A list that this run does not have is one null.
+    let covered = |path: &str| documented.contains(&path) || schema::is_branch(path);
+    let undocumented: Vec<_> = written.iter().filter(|path| !covered(path)).collect();
+    assert!(undocumented.is_empty(), "not in assets/summary.schema.json: {undocumented:?}");
+    let there = |path: &str| written.iter().any(|own| own == path || path.starts_with(&format!("{own}.")));
+    let absent: Vec<_> = documented.iter().filter(|path| !there(path)).collect();
+    assert!(absent.is_empty(), "in assets/summary.schema.json, but not written: {absent:?}");
+    for leaf in schema::leaves() {
+        assert!(!leaf.unit.is_empty() && leaf.meaning.len() > 3, "{} has no unit or no meaning", leaf.path);
+        // Where a key ends with a unit, the schema says the same one.
+        let endings = [("_m", "m"), ("_s", "s"), ("_hz", "Hz"), ("_deg", "degrees"), ("_db", "dB"), ("_mps", "m/s")];
+        let key = leaf.path.rsplit('.').next().unwrap_or_default();
+        for (ending, unit) in endings.into_iter().filter(|(ending, _)| key.ends_with(ending) && !key.ends_with("1s")) {
+            assert_eq!(leaf.unit, unit, "{} ends with {ending}", leaf.path);
+        }
+    }
+}
+
+#[test]
+fn the_verdict_names_what_was_planted_and_a_user_s_limits_come_first() {
+    use super::verdict::Status;
+    let run = planted_run(&PLANTED);
+    let limits = "\"position.horizontal_p95_m\" = { max = 5 }\n\"tracking.cycle_slips\" = { max = 0 }\n\
+                  \"spoofing.captured_share\" = { max = 0 }\n";
+    let limits = limits::Limits::parse(limits, "lab.toml").unwrap();
+    let verdict = judge_against(run.path(), Some(&limits)).unwrap().details.verdict;
+    let status = |figure: &str| verdict.rows.iter().find(|row| row.figure == figure).map(|row| row.status);
+    assert_eq!(verdict.of_user, 3);
+    assert_eq!(status("position.horizontal_p95_m"), Some(Status::Pass));
+    assert_eq!(status("horizontal error, 95 %"), None, "the user's limit stands in its place");
+    let mut broken: Vec<&str> = verdict.broken().map(|row| row.figure.as_str()).collect();
+    broken.sort_unstable();
+    assert_eq!(broken, ["spoofing.captured_share", "tracking.cycle_slips"], "the first is a figure that is missing");
+    // Formal sigmas are 0.4 m like the planted ones, the bias of 0.5 m up comes on top.
+    assert_eq!(status("vertical error, 95 %"), Some(Status::Fail));
+    assert_eq!(status("false acquisitions"), Some(Status::Fail));
+    assert_eq!(status("wrong navigation parameters"), Some(Status::Fail));
+    assert_eq!(status("PLL jitter, 1σ"), Some(Status::Pass));
+    // 31 was lost, but the truth never had it: a signal too weak to hold.
+    assert_eq!(status("unexpected losses of lock"), Some(Status::Pass));
+    assert_eq!(verdict.status(), Status::Fail);
+    let table = fs::read_to_string(run.path().join("verdict.csv")).unwrap();
+    assert_eq!(table.lines().count(), 1 + verdict.rows.len());
+}
+
+#[cfg(feature = "pdf")]
+#[test]
+fn the_report_of_a_run_is_the_same_twice_and_has_its_fonts_and_pages() {
+    let run = planted_run(&PLANTED);
+    fs::write(run.path().join("scenario.toml"), "name = \"planted\"\n").unwrap();
+    let report = || {
+        judge(run.path()).unwrap();
+        fs::read(run.path().join("report.pdf")).unwrap()
+    };
+    let pdf = report();
+    assert!(pdf.starts_with(b"%PDF-") && pdf == report());
+    let count = |what: &[u8]| pdf.windows(what.len()).filter(|window| window == &what).count();
+    assert!(count(b"/MediaBox") > 5 && count(b"/FontFile2") == 3);
+    assert!(pdf.len() < 5_000_000, "{} bytes", pdf.len());
 }
 
 #[test]

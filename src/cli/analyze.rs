@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use crate::analysis;
 use crate::analysis::foreign::{self, Files};
 use crate::cli::args;
+use crate::cli::check;
 use crate::cli::error::CliError;
 use crate::cli::run::judge_error;
 use crate::cli::scenario;
 
-/// Judges the run in a directory, or a receiver against a truth.
+/// Judges the run in a directory, against a user's limits if there are any, or a receiver against a truth.
 pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
     if let Some(truth) = &arguments.truth {
         return another_receiver(truth, arguments);
@@ -17,8 +18,10 @@ pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
     let Some(run) = &arguments.run else {
         return Err(CliError::usage("analyze: expected a run's directory, or --truth"));
     };
-    let summary = analysis::judge(run).map_err(judge_error)?;
-    scenario::print(&format!("{summary}\nresults in {}\n", run.display()))
+    let limits = check::read(arguments.check.as_deref())?;
+    let summary = analysis::judge_against(run, limits.as_ref()).map_err(judge_error)?;
+    scenario::print(&format!("{summary}\nresults in {}\n", run.display()))?;
+    check::enforce(limits.as_ref(), &summary)
 }
 
 fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliError> {

@@ -47,6 +47,9 @@ pub struct Run {
     /// Also keep the samples: if.sigmf-data and if.sigmf-meta
     #[arg(long)]
     pub keep_if: bool,
+    /// Hold the figures of summary.json against these limits; exit with 3 if one is broken
+    #[arg(long, value_name = "LIMITS.toml")]
+    pub check: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]
@@ -103,12 +106,15 @@ pub struct Receive {
 
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Examples:\n  gnss-twin analyze reports/static\n  gnss-twin analyze --truth static.truth --rinex-obs rx.26O --nmea rx.nmea --out reports/mine"
+    after_help = "Examples:\n  gnss-twin analyze reports/static --check scenarios/limits.toml\n  gnss-twin analyze --truth static.truth --rinex-obs rx.26O --nmea rx.nmea --out reports/mine"
 )]
 pub struct Analyze {
     /// Directory of a run, with truth/ and rx/
     #[arg(required_unless_present = "truth", conflicts_with = "truth")]
     pub run: Option<PathBuf>,
+    /// Hold the figures of summary.json against these limits; exit with 3 if one is broken
+    #[arg(long, value_name = "LIMITS.toml", conflicts_with = "truth")]
+    pub check: Option<PathBuf>,
     /// Judge another receiver, which was fed a scene's samples, against that scene's truth/ directory
     #[arg(long, value_name = "DIR", requires = "files")]
     pub truth: Option<PathBuf>,

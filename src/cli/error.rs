@@ -1,6 +1,6 @@
 //! What ends the program, and with which exit code.
 //!
-//! 0 done · 2 usage · 3 a result is incomplete · 65 input data is bad · 70 our bug · 73 output cannot
+//! 0 done · 2 usage · 3 a check failed or a result is incomplete · 65 input data is bad · 70 our bug · 73 output cannot
 //! be created · 74 read or write failed · 75 passing trouble, try again · 129, 130, 141, 143 by signal.
 
 use std::fmt::Display;
@@ -18,6 +18,11 @@ impl CliError {
     /// The arguments do not fit together.
     pub fn usage(message: impl Display) -> Self {
         Self { code: 2, message: message.to_string() }
+    }
+
+    /// A limit that the user set is broken.
+    pub fn check(message: impl Display) -> Self {
+        Self { code: 3, message: message.to_string() }
     }
 
     /// Input data is bad; trying again will not help.

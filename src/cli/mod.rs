@@ -5,6 +5,7 @@
 
 pub mod analyze;
 pub mod args;
+pub mod check;
 pub mod error;
 pub mod generate;
 pub mod interrupt;

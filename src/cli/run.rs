@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use crate::analysis::psd::Psd;
 use crate::analysis::{self, JudgeError};
 use crate::cli::args;
+use crate::cli::check;
 use crate::cli::error::CliError;
 use crate::cli::interrupt;
 use crate::cli::progress::Progress;
@@ -37,6 +38,7 @@ const SPECTRUM_BINS: usize = 2048;
 pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
     let named = scenario::read(arguments.scenario.as_deref())?;
+    let limits = check::read(arguments.check.as_deref())?;
     let (scene, warnings) = scenario::compose(&named, arguments.seed, None)?;
     let settings = scenario::receiver_settings(&named)?;
     for warning in warnings {
@@ -57,7 +59,9 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     let duration_s = scene.metadata.rate.elapsed_s(scene.samples);
     let speed = Speed::new(duration_s, both.generator_busy, both.receiver_busy, both.whole);
     write_json(&run.join("speed.json"), &speed)?;
-    let summary = analysis::judge(run).map_err(judge_error)?;
+    let path = run.join("scenario.toml");
+    fs::write(&path, &named.text).map_err(|error| CliError::output(path.display(), &error))?;
+    let summary = analysis::judge_against(run, limits.as_ref()).map_err(judge_error)?;
     staging.commit()?;
 
     let mut text = format!("{summary}\n");
@@ -65,7 +69,8 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
         text += &format!("{diagnosis}\n");
     }
     text += &format!("results in {}\n", target.display());
-    scenario::print(&text)
+    scenario::print(&text)?;
+    check::enforce(limits.as_ref(), &summary)
 }
 
 struct Both {

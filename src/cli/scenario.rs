@@ -16,6 +16,8 @@ const EMBEDDED: &str = include_str!("../../scenarios/static.toml");
 /// A scenario as written, and the directory that its paths are relative to.
 pub struct Named {
     pub scenario: Scenario,
+    /// Its text.
+    pub text: String,
     /// What messages call it.
     pub name: String,
     pub directory: PathBuf,
@@ -26,7 +28,7 @@ pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
     let Some(path) = path else {
         let name = "the embedded static scene".to_owned();
         let scenario = Scenario::parse(EMBEDDED, &name).map_err(CliError::bug)?;
-        return Ok(Named { scenario, name, directory: PathBuf::from(".") });
+        return Ok(Named { scenario, text: EMBEDDED.to_owned(), name, directory: PathBuf::from(".") });
     };
     let name = path.display().to_string();
     let bytes = fs::read(path).map_err(|error| CliError::read(&name, &error))?;
@@ -34,7 +36,7 @@ pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
         .map_err(|error| CliError::input(format!("{name}: not UTF-8 at byte {}", error.utf8_error().valid_up_to())))?;
     let scenario = Scenario::parse(&text, &name).map_err(CliError::input)?;
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    Ok(Named { scenario, name, directory: directory.to_owned() })
+    Ok(Named { scenario, text, name, directory: directory.to_owned() })
 }
 
 /// Limits the threads that the work may use.

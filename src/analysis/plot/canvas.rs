@@ -1,31 +1,26 @@
-//! Charts as data, drawn by plotters into SVG and by resvg into PNG, with the bundled font.
+//! Charts as data, drawn by plotters with the bundled font: what every picture is made of.
 //!
-//! plotters places everything on whole pixels, so the SVG is drawn at [`FINE`] times its size and
-//! scaled down; every size that plotters would choose is set here for that reason. No system font,
-//! no C library: a fresh machine draws the same picture.
+//! Sizes are chosen for print: a picture [`WIDTH_PX`] wide fills the text width of an A4 page and its smallest words are
+//! then above 6 points. Every size that plotters would choose is set here, for [`FINE`] virtual pixels in one. No system
+//! font, no C library: a fresh machine draws the same picture.
 
 use std::error::Error;
 use std::path::Path;
-use std::sync::OnceLock;
 
 use plotters::chart::LabelAreaPosition;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{FontStyle, register_font};
-use resvg::{tiny_skia, usvg};
 
 use crate::analysis::JudgeError;
+pub use crate::analysis::plot::drawing::{Drawing, FINE};
 
-/// Virtual pixels in one pixel of the picture.
-pub const FINE: i32 = 4;
+/// Width of a picture that fills a page's text width.
+pub const WIDTH_PX: u32 = 680;
 /// The drawing surface, in virtual pixels.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// Why a drawing failed; only its text reaches the user.
 pub type Failure = Box<dyn Error>;
-
-/// DejaVu Sans (assets/DejaVuSans.LICENSE.txt).
-static FONT: &[u8] = include_bytes!("../../../assets/DejaVuSans.ttf");
 
 /// Colours that colour-blind people tell apart (Okabe and Ito 2008), without its yellow, too pale on white.
 pub const COLOURS: [RGBColor; 7] = [
@@ -149,57 +144,41 @@ impl Chart {
     }
 }
 
-/// Draws charts, `columns` a row, with one legend at the right for all of them, into a PNG of that size.
+/// Draws charts, `columns` a row, with one legend below all of them, as a PNG of that size.
+///
+/// # Errors
+/// [`JudgeError::Plot`] or [`JudgeError::File`] with the path.
 pub fn figure(
     path: &Path,
-    (width, height): (u32, u32),
+    size: (u32, u32),
     columns: usize,
     charts: &[Chart],
     legend: &[Series],
 ) -> Result<(), JudgeError> {
-    render(path, (width, height), |area| {
-        let text_px = legend.iter().map(|series| series.name.chars().count()).max().unwrap_or(0) as i32 * 8;
-        let legend_px = if legend.is_empty() { 0 } else { 34 + text_px };
-        let (plots, side) = area.split_horizontally((width as i32 - legend_px) * FINE);
+    let failed = |error: Failure| JudgeError::Plot { path: path.to_owned(), reason: error.to_string() };
+    compose(size, columns, charts, legend).map_err(failed)?.write_png(path, 1.0)
+}
+
+/// Draws charts, `columns` a row, with one legend below all of them.
+///
+/// # Errors
+/// Whatever the drawing library reports.
+pub fn compose(
+    (width, height): (u32, u32),
+    columns: usize,
+    charts: &[Chart],
+    legend: &[Series],
+) -> Result<Drawing, Failure> {
+    Drawing::new((width, height), |area| {
+        let entries = placed(area, legend, width as i32)?;
+        let legend_px = entries.last().map_or(0, |(_, row, _)| (row + 1) * LEGEND_ROW_PX + 8);
+        let (plots, below) = area.split_vertically((height as i32 - legend_px) * FINE);
         let rows = charts.len().div_ceil(columns).max(1);
         for (chart, cell) in charts.iter().zip(plots.split_evenly((rows, columns))) {
             draw(&cell, chart)?;
         }
-        draw_legend(&side, legend)
+        entries.iter().try_for_each(|&(x, row, series)| draw_entry(&below, x, row * LEGEND_ROW_PX, series))
     })
-}
-
-/// Draws into an SVG in memory and writes it as a PNG of `width` × `height` pixels.
-pub fn render(
-    path: &Path,
-    (width, height): (u32, u32),
-    draw: impl FnOnce(&Area<'_>) -> Result<(), Failure>,
-) -> Result<(), JudgeError> {
-    let failed = |reason: String| JudgeError::Plot { path: path.to_owned(), reason };
-    static REGISTERED: OnceLock<bool> = OnceLock::new();
-    if !*REGISTERED.get_or_init(|| register_font("sans-serif", FontStyle::Normal, FONT).is_ok()) {
-        return Err(failed("the bundled font is unreadable".to_owned()));
-    }
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, (width * FINE as u32, height * FINE as u32)).into_drawing_area();
-        let drawn = area.fill(&WHITE).map_err(Failure::from).and_then(|()| draw(&area));
-        drawn.and_then(|()| area.present().map_err(Failure::from)).map_err(|error| failed(error.to_string()))?;
-    }
-    let png = rasterise(&svg, width, height).map_err(|error| failed(error.to_string()))?;
-    super::super::write_whole(path, &png)
-}
-
-fn rasterise(svg: &str, width: u32, height: u32) -> Result<Vec<u8>, Failure> {
-    let mut options = usvg::Options::default();
-    let fonts = options.fontdb_mut();
-    fonts.load_font_data(FONT.to_vec());
-    fonts.set_sans_serif_family("DejaVu Sans");
-    let tree = usvg::Tree::from_str(svg, &options)?;
-    let mut pixels = tiny_skia::Pixmap::new(width, height).ok_or("a picture needs a size")?;
-    let scale = 1.0 / FINE as f32;
-    resvg::render(&tree, tiny_skia::Transform::from_scale(scale, scale), &mut pixels.as_mut());
-    Ok(pixels.encode_png()?)
 }
 
 /// A font of that many pixels.
@@ -216,13 +195,13 @@ pub fn anchored(pixels: i32, horizontal: HPos, vertical: VPos) -> TextStyle<'sta
 const EDGE_PX: i32 = 6;
 const LEFT_PX: i32 = 74;
 const RIGHT_PX: i32 = 16;
-const TOP_PX: i32 = 32;
-const BOTTOM_PX: i32 = 42;
+const TOP_PX: i32 = 26;
+const BOTTOM_PX: i32 = 38;
 
 /// Draws one chart into an area.
 pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
     let (width, height) = area.dim_in_pixel();
-    let title = anchored(15, HPos::Center, VPos::Center);
+    let title = anchored(14, HPos::Center, VPos::Center);
     area.draw(&Text::new(chart.title.clone(), (width as i32 / 2, TOP_PX * FINE / 2), title))?;
     let (mut x, mut y) = (chart.x.clone(), chart.y.clone());
     if chart.equal {
@@ -241,6 +220,11 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         .set_label_area_size(LabelAreaPosition::Bottom, BOTTOM_PX * FINE)
         .build_cartesian_2d(x.from..x.to, y.from..y.to)?;
     let (x_decimals, y_decimals) = (decimals(x.span()), decimals(y.span()));
+    // As many as fit side by side, a digit being 7 pixels wide at most.
+    let digits = [x.from, x.to].map(|end| tick(end, x_decimals).len()).into_iter().max().unwrap_or(1);
+    let across_px = width as i32 / FINE - LEFT_PX - RIGHT_PX - EDGE_PX;
+    let x_labels = (across_px / (7 * digits as i32 + 12)).clamp(3, 10) as usize;
+    let y_labels = ((height as i32 / FINE - TOP_PX - BOTTOM_PX - EDGE_PX) / 18).clamp(4, 12) as usize;
     let (ticked, y_ticked) = (chart.x_ticks.is_some(), chart.y_ticks.is_some());
     let mut mesh = context.configure_mesh();
     if y_ticked {
@@ -254,8 +238,8 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         .y_desc(y.label.clone())
         .axis_desc_style(font(13))
         .label_style(font(12))
-        .x_labels(if chart.equal { 7 } else { 10 })
-        .y_labels((height as i32 / FINE / 45).clamp(4, 12) as usize)
+        .x_labels(x_labels)
+        .y_labels(y_labels)
         .x_label_formatter(&|value| if ticked { String::new() } else { tick(*value, x_decimals) })
         .y_label_formatter(&|value| if y_ticked { String::new() } else { tick(*value, y_decimals) })
         .draw()?;
@@ -314,7 +298,7 @@ fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Fai
             context.draw_series(points.into_iter().map(ball))?;
         }
         Mark::Rings => {
-            let ring = |point| Circle::new(point, 2 * FINE, series.colour.stroke_width(FINE as u32 * 3 / 4));
+            let ring = |point| Circle::new(point, 3 * FINE / 2, series.colour.stroke_width(FINE as u32 * 3 / 4));
             context.draw_series(points.into_iter().map(ring))?;
         }
         Mark::Cross => {
@@ -332,29 +316,48 @@ fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Fai
     Ok(())
 }
 
-/// Names and marks, one below the other, at the left edge of an area.
-fn draw_legend(area: &Area<'_>, legend: &[Series]) -> Result<(), Failure> {
-    for (row, series) in (0_i32..).zip(legend) {
-        let y = (TOP_PX + 12 + row * 20) * FINE;
-        let (x, end) = (4 * FINE, 22 * FINE);
-        let thick = series.colour.stroke_width(2 * FINE as u32);
-        let middle = ((x + end) / 2, y);
-        match series.mark {
-            Mark::Line => area.draw(&PathElement::new([(x, y), (end, y)], thick))?,
-            Mark::Dash => {
-                area.draw(&PathElement::new([(x, y), (x + 7 * FINE, y)], thick))?;
-                area.draw(&PathElement::new([(end - 7 * FINE, y), (end, y)], thick))?;
-            }
-            Mark::Dots | Mark::Balls => area.draw(&Circle::new(middle, 4 * FINE, series.colour.filled()))?,
-            Mark::Rings => area.draw(&Circle::new(middle, 4 * FINE, thick))?,
-            Mark::Cross => area.draw(&plotters::element::Cross::new(middle, 5 * FINE, thick))?,
-            Mark::Bars(_) => {
-                area.draw(&Rectangle::new([(x, y - 5 * FINE), (end, y + 5 * FINE)], series.colour.filled()))?;
-            }
+const LEGEND_ROW_PX: i32 = 20;
+/// From a mark's left end to its name, and from a name's end to the next mark.
+const MARK_PX: i32 = 24;
+const GAP_PX: i32 = 18;
+
+/// Where each named series of a legend stands: its left end, its row, itself. Rows are as long as the picture is wide.
+fn placed<'a>(area: &Area<'_>, legend: &'a [Series], width_px: i32) -> Result<Vec<(i32, i32, &'a Series)>, Failure> {
+    let (mut x, mut row) = (LEFT_PX + EDGE_PX, 0);
+    let mut entries = Vec::new();
+    for series in legend.iter().filter(|series| !series.name.is_empty()) {
+        let (fine_px, _) = area.estimate_text_size(&series.name, &font(12))?;
+        let length_px = MARK_PX + fine_px as i32 / FINE;
+        if x + length_px > width_px - RIGHT_PX && x > LEFT_PX + EDGE_PX {
+            (x, row) = (LEFT_PX + EDGE_PX, row + 1);
         }
-        let style = anchored(12, HPos::Left, VPos::Center);
-        area.draw(&Text::new(series.name.clone(), (end + 6 * FINE, y), style))?;
+        entries.push((x, row, series));
+        x += length_px + GAP_PX;
     }
+    Ok(entries)
+}
+
+/// A series' mark and name.
+fn draw_entry(area: &Area<'_>, x_px: i32, y_px: i32, series: &Series) -> Result<(), Failure> {
+    let y = (y_px + LEGEND_ROW_PX / 2) * FINE;
+    let (x, end) = (x_px * FINE, (x_px + 18) * FINE);
+    let thick = series.colour.stroke_width(2 * FINE as u32);
+    let middle = ((x + end) / 2, y);
+    match series.mark {
+        Mark::Line => area.draw(&PathElement::new([(x, y), (end, y)], thick))?,
+        Mark::Dash => {
+            area.draw(&PathElement::new([(x, y), (x + 7 * FINE, y)], thick))?;
+            area.draw(&PathElement::new([(end - 7 * FINE, y), (end, y)], thick))?;
+        }
+        Mark::Dots | Mark::Balls => area.draw(&Circle::new(middle, 4 * FINE, series.colour.filled()))?,
+        Mark::Rings => area.draw(&Circle::new(middle, 4 * FINE, thick))?,
+        Mark::Cross => area.draw(&plotters::element::Cross::new(middle, 5 * FINE, thick))?,
+        Mark::Bars(_) => {
+            area.draw(&Rectangle::new([(x, y - 5 * FINE), (end, y + 5 * FINE)], series.colour.filled()))?
+        }
+    }
+    let style = anchored(12, HPos::Left, VPos::Center);
+    area.draw(&Text::new(series.name.clone(), (x + MARK_PX * FINE, y), style))?;
     Ok(())
 }
 
@@ -375,7 +378,7 @@ fn tick(value: f64, decimals: usize) -> String {
 }
 
 /// Most points that a series is drawn with.
-const MOST_POINTS: usize = 1600;
+const MOST_POINTS: usize = 1000;
 
 /// Few enough points to draw. Of a line, the lowest and the highest of each run of neighbours, so that no spike is lost; of
 /// marks that stand alone, every so many, so that their density stays true.

@@ -1,20 +1,19 @@
 //! The receiver's clock: its bias over time, and its stability over averaging time.
 
-use std::path::Path;
-
 use plotters::style::RGBColor;
 
-use crate::analysis::JudgeError;
 use crate::analysis::allan::{Deviation, Point};
 use crate::analysis::clock::{ClockRow, Line, Of};
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
+use crate::analysis::plot::canvas::{
+    Axis, BLUE, COLOURS, Chart, Drawing, Failure, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX, compose,
+};
 use crate::analysis::theory::clock::white_phase;
 
 type Points = Vec<(f64, f64)>;
 
 /// Bias as estimated and as it was with the straight line through it, the error, and both without their lines.
-pub fn bias(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn bias(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let clock = judged.clock;
     let points = |scale: f64, of: &dyn Fn(&ClockRow) -> f64| -> Points {
         clock.rows.iter().map(|row| (row.time_s, scale * of(row))).collect()
@@ -47,7 +46,7 @@ pub fn bias(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         chart("Estimate minus truth".to_owned(), "error (ns)", 0.1, error),
         chart("Estimate and truth, each without its straight line".to_owned(), "bias (ns)", 0.1, rest),
     ];
-    figure(path, (1100, 900), 1, &charts, &legend)
+    compose((WIDTH_PX, 540), 1, &charts, &legend).map(Some)
 }
 
 /// Points and lines of one chart of deviations, in common logarithms.
@@ -57,7 +56,7 @@ struct Curves<'a> {
 }
 
 /// Four deviations over averaging time, with intervals of 95 %, what independent measurements would give, and theory.
-pub fn stability(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn stability(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let charts = [
         (Deviation::Oadev, "Allan deviation, overlapping", "deviation of relative frequency"),
         (Deviation::Mdev, "Modified Allan deviation", "deviation of relative frequency"),
@@ -73,7 +72,7 @@ pub fn stability(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
             legend.push(series.clone());
         }
     }
-    figure(path, (1300, 900), 2, &charts, &legend)
+    compose((WIDTH_PX, 540), 2, &charts, &legend).map(Some)
 }
 
 impl Curves<'_> {

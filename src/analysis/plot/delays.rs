@@ -1,16 +1,14 @@
 //! What the atmosphere truly adds to each satellite's code.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use crate::analysis::JudgeError;
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Axis, COLOURS, Chart, Mark, Series, figure};
+use crate::analysis::plot::canvas::{Axis, COLOURS, Chart, Drawing, Failure, Mark, Series, WIDTH_PX, compose};
 use crate::gnss::record::SkyRow;
 use crate::gnss::satellite::Sv;
 
 /// Slant delays over time, satellite by satellite: ionosphere above, troposphere below.
-pub fn delays(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn delays(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let mut tracks: BTreeMap<Sv, Vec<&SkyRow>> = BTreeMap::new();
     for row in &judged.run.sky {
         tracks.entry(row.sv).or_default().push(row);
@@ -29,7 +27,7 @@ pub fn delays(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         chart("Troposphere, as it is", |row| row.troposphere_m),
     ];
     let names: Vec<Series> = tracks.keys().enumerate().map(|(index, sv)| line(*sv, index, Vec::new())).collect();
-    figure(path, (1100, 800), 1, &charts, &names)
+    compose((WIDTH_PX, 340), 2, &charts, &names).map(Some)
 }
 
 /// A satellite's line, dashed once the colours begin again.

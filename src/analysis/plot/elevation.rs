@@ -1,16 +1,13 @@
 //! Errors of observations over elevation, and the multipath combination over time.
 
-use std::path::Path;
-
-use crate::analysis::JudgeError;
 use crate::analysis::elevation::Point;
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Axis, Chart, Series, figure};
+use crate::analysis::plot::canvas::{Axis, Chart, Drawing, Failure, Series, WIDTH_PX, compose};
 use crate::analysis::plot::signals::{legend, over_time};
 use crate::analysis::statistics::percentile;
 
 /// Draws them.
-pub fn elevation(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn elevation(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let all = &judged.elevations.points;
     let chart = |title: &str, label: &str, least: f64, of: fn(&Point) -> f64| {
         let values: Vec<f64> = all.values().flatten().map(of).collect();
@@ -35,5 +32,5 @@ pub fn elevation(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         chart("C/N0 measured minus expected", "difference (dB)", 1.0, |point| point.cn0_db),
         over_time(judged, "Code minus carrier without twice the ionosphere", "combination (m)", 0.1, &multipath),
     ];
-    figure(path, (1100, 1350), 1, &charts, &legend(all.keys().map(|(sv, _)| sv.to_string())))
+    compose((WIDTH_PX, 900), 1, &charts, &legend(all.keys().map(|(sv, _)| sv.to_string()))).map(Some)
 }

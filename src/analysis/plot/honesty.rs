@@ -1,16 +1,15 @@
 //! Errors of the fixes within twice the sigma that the receiver states, and the normalised error squared.
 
-use std::path::Path;
-
-use crate::analysis::JudgeError;
 use crate::analysis::honesty::{FREEDOM, Row};
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
+use crate::analysis::plot::canvas::{
+    Axis, BLUE, Chart, Drawing, Failure, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX, compose,
+};
 
 type Points = Vec<(f64, f64)>;
 
 /// Draws them.
-pub fn honesty(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn honesty(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let found = judged.honesty;
     let x = judged.time_axis(found.rows.iter().map(|row| row.time_s));
     let over = |of: &dyn Fn(&Row) -> f64| -> Points { found.rows.iter().map(|row| (row.time_s, of(row))).collect() };
@@ -56,5 +55,5 @@ pub fn honesty(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         Series::new("expected", GREEN, Mark::Dash, Vec::new()),
         Series::new("95 % band", GREY, Mark::Dash, Vec::new()),
     ];
-    figure(path, (1100, 1100), 1, &charts, &legend)
+    compose((WIDTH_PX, 700), 1, &charts, &legend).map(Some)
 }

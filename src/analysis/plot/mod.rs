@@ -1,15 +1,17 @@
-//! The pictures of a run, one PNG a question.
+//! The pictures of a run, one a question, with the words that go below them.
 //!
-//! [`canvas`] wraps the drawing libraries; every other file here says what is drawn. A picture
-//! with nothing to show is drawn with empty axes, so that a script finds the files it expects;
-//! only `psd.png` depends on `psd.csv` being there, `spoofing.png` on a spoofer and `multipath.png` on `truth/rays.csv`.
+//! [`canvas`] wraps the drawing library and [`drawing`] what becomes of its SVG; every other file here says what is drawn.
+//! A picture with nothing to show is drawn with empty axes, so that a script finds the files it expects; only `psd.png`
+//! depends on `psd.csv` being there, `spoofing.png` on a spoofer and `multipath.png` on `truth/rays.csv`.
 
 pub mod canvas;
 mod clock;
 mod delays;
+pub mod drawing;
 mod elevation;
 pub(crate) mod foreign;
 mod honesty;
+pub(crate) mod jitter;
 mod multipath;
 mod position;
 mod signals;
@@ -27,6 +29,8 @@ use crate::analysis::errors::Errors;
 use crate::analysis::honesty::Honesty;
 use crate::analysis::load::Run;
 use crate::analysis::summary::Summary;
+use canvas::Failure;
+use drawing::Drawing;
 
 /// Everything that a picture is drawn from.
 pub(crate) struct Judged<'a> {
@@ -49,31 +53,153 @@ impl Judged<'_> {
     }
 }
 
-/// Draws one picture into a file.
-type Picture = fn(&Path, &Judged<'_>) -> Result<(), JudgeError>;
+/// One picture of a run; `None` where the run has nothing of the kind.
+type Draw = fn(&Judged<'_>) -> Result<Option<Drawing>, Failure>;
 
-/// The pictures by their file names.
-const PICTURES: [(&str, Picture); 17] = [
-    ("psd.png", spectrum::psd),
-    ("acquisition.png", spectrum::acquisition),
-    ("discriminators.png", signals::discriminators),
-    ("cn0.png", signals::cn0),
-    ("observables.png", signals::observables),
-    ("elevation.png", elevation::elevation),
-    ("jitter.png", signals::jitter),
-    ("multipath.png", multipath::multipath),
-    ("sky.png", sky::sky),
-    ("delays.png", delays::delays),
-    ("position_scatter.png", position::scatter),
-    ("position_time.png", position::time),
-    ("position_honesty.png", honesty::honesty),
-    ("trajectory.png", position::trajectory),
-    ("clock_bias.png", clock::bias),
-    ("allan.png", clock::stability),
-    ("spoofing.png", position::spoofing),
+/// A picture by its name, what to look at in it, and the files that hold its numbers.
+pub(crate) struct Picture {
+    /// The PNG's, without its ending.
+    pub name: &'static str,
+    pub caption: &'static str,
+    /// Relative to the run's directory.
+    pub numbers: &'static [&'static str],
+    draw: Draw,
+}
+
+/// The pictures in the order of the report, where a tall one and a low one share a page.
+pub(crate) const PICTURES: [Picture; 17] = [
+    Picture {
+        name: "sky",
+        caption: "Sky at the antenna. Each track ends in a dot at its last place, coloured by the mean C/N0 that the scene \
+                  sets; a hollow dot was never observed by the receiver.",
+        numbers: &["truth/sky.csv", "truth/observations.csv"],
+        draw: sky::sky,
+    },
+    Picture {
+        name: "acquisition",
+        caption: "Largest statistic of the search for every code with the threshold of the designed false-alarm \
+                  probability. A cross marks what the scene has: a bar above the threshold without a cross is a false \
+                  acquisition, a cross over a short bar a miss.",
+        numbers: &["rx/acquisition.csv"],
+        draw: spectrum::acquisition,
+    },
+    Picture {
+        name: "psd",
+        caption: "Power spectral density of the samples (Welch, Hann window, half overlap) with the theory of this scene: \
+                  main spectra of the codes over their aliases, noise floor, interference. Look for lines or slopes \
+                  that theory does not have.",
+        numbers: &["psd.csv", "psd_theory.csv"],
+        draw: spectrum::psd,
+    },
+    Picture {
+        name: "cn0",
+        caption: "C/N0 as the receiver estimates it against what the scene sets. Below, the difference: the codes of the \
+                  other satellites cost about 1 dB, quantisation up to 1.96 dB with one bit.",
+        numbers: &["errors.csv"],
+        draw: signals::cn0,
+    },
+    Picture {
+        name: "discriminators",
+        caption: "Raw discriminator outputs of the three loops while they track, before any filter. They scatter more than \
+                  the loops' errors by the root of the loop's bandwidth; a mean off zero shows dynamic stress.",
+        numbers: &["rx/tracking.csv"],
+        draw: signals::discriminators,
+    },
+    Picture {
+        name: "jitter",
+        caption: "Errors of the closed loops, replica minus truth, each satellite about its mean and without the pull-in, \
+                  with the normal curve of the same mean and σ. The rules of thumb (d/6, 15°, 1/(12T)) are \
+                  bounds for σ, and are drawn where they come near. Satellites of different C/N0 together are more peaked than normal.",
+        numbers: &["histograms.csv", "errors.csv"],
+        draw: jitter::jitter,
+    },
+    Picture {
+        name: "observables",
+        caption: "Errors of the observables against the truth. Code and carrier share the delays that the receiver cannot \
+                  see; what all satellites share is the clock's and harmless to the position.",
+        numbers: &["errors.csv"],
+        draw: signals::observables,
+    },
+    Picture {
+        name: "elevation",
+        caption: "Errors of the observables over elevation, and the multipath combination over time: code that errs more low down, \
+                  or a combination that swings, is multipath or atmosphere.",
+        numbers: &["satellites.csv", "elevation.csv"],
+        draw: elevation::elevation,
+    },
+    Picture {
+        name: "position_scatter",
+        caption: "Horizontal errors of the fixes about the truth with the ellipses that would hold 50 % and 95 % of a normal \
+                  scatter of the same covariance, and how errors are distributed. A cloud off the cross is a bias.",
+        numbers: &["position.csv"],
+        draw: position::scatter,
+    },
+    Picture {
+        name: "position_time",
+        caption: "Errors of the fixes over time between the bounds that the receiver's own covariance sets (±1.96 σ).",
+        numbers: &["position.csv"],
+        draw: position::time,
+    },
+    Picture {
+        name: "position_honesty",
+        caption: "Whether the receiver's own σ is honest: errors between ±2σ, and the normalised error squared, whose mean should \
+                  lie in the band that so many independent fixes allow. Above it the receiver is optimistic, below pessimistic.",
+        numbers: &["honesty.csv"],
+        draw: honesty::honesty,
+    },
+    Picture {
+        name: "trajectory",
+        caption: "The way in plan and the height over time, as it was and as the receiver found it.",
+        numbers: &["truth/trajectory.csv", "rx/fixes.csv"],
+        draw: position::trajectory,
+    },
+    Picture {
+        name: "clock_bias",
+        caption: "The receiver's clock: its bias as estimated and as it was with the straight line of least squares, the \
+                  difference, and both without their lines.",
+        numbers: &["clock.csv"],
+        draw: clock::bias,
+    },
+    Picture {
+        name: "delays",
+        caption: "What ionosphere and troposphere truly add to the code of each satellite.",
+        numbers: &["truth/sky.csv"],
+        draw: delays::delays,
+    },
+    Picture {
+        name: "allan",
+        caption: "Stability of the clock with intervals of 95 %: its estimate, the truth, the error, and what white noise \
+                  of code or carrier alone would give.",
+        numbers: &["allan.csv"],
+        draw: clock::stability,
+    },
+    Picture {
+        name: "multipath",
+        caption: "Code errors beside the fading that reflected rays cause: a code error that follows the fading is \
+                  multipath.",
+        numbers: &["errors.csv", "truth/rays.csv"],
+        draw: multipath::multipath,
+    },
+    Picture {
+        name: "spoofing",
+        caption: "Where the fixes went between the truth and what the spoofer claims.",
+        numbers: &["position.csv", "truth/claimed.csv"],
+        draw: position::spoofing,
+    },
 ];
 
-/// Draws every picture of a run into its directory.
-pub(crate) fn all(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
-    PICTURES.par_iter().try_for_each(|(name, picture)| picture(&directory.join(name), judged))
+/// Pixels of a PNG in one pixel of a picture.
+const PNG_SCALE: f32 = 2.0;
+
+/// Draws every picture of a run into its directory and returns those that there are.
+pub(crate) fn all(directory: &Path, judged: &Judged<'_>) -> Result<Vec<(&'static Picture, Drawing)>, JudgeError> {
+    let one = |picture: &'static Picture| {
+        let path = directory.join(picture.name).with_extension("png");
+        let failed = |error: Failure| JudgeError::Plot { path: path.clone(), reason: error.to_string() };
+        let Some(drawing) = (picture.draw)(judged).map_err(failed)? else { return Ok(None) };
+        drawing.write_png(&path, PNG_SCALE)?;
+        Ok(Some((picture, drawing)))
+    };
+    let drawn: Result<Vec<_>, JudgeError> = PICTURES.par_iter().map(one).collect();
+    Ok(drawn?.into_iter().flatten().collect())
 }

@@ -2,18 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::path::Path;
 
-use crate::analysis::JudgeError;
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::figure;
+use crate::analysis::plot::canvas::{Drawing, Failure, WIDTH_PX, compose};
 use crate::analysis::plot::signals::{Points, legend, over_time, per_satellite};
 use crate::gnss::satellite::Sv;
 
 /// Code errors over time, and the amplitude of all rays against the direct one.
-pub fn multipath(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn multipath(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     if judged.run.rays.is_empty() {
-        return Ok(());
+        return Ok(None);
     }
     // Phasors of the echoes, summed at each instant.
     let mut sums: BTreeMap<Sv, BTreeMap<u64, (f64, f64)>> = BTreeMap::new();
@@ -35,7 +33,8 @@ pub fn multipath(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         .collect();
     let charts = [
         over_time(judged, "Code error", "error (m)", 0.1, &errors),
-        over_time(judged, "All rays against the direct one, at the antenna", "amplitude (dB)", 1.0, &fading),
+        over_time(judged, "All rays against the direct one", "amplitude (dB)", 1.0, &fading),
     ];
-    figure(path, (1100, 800), 1, &charts, &legend(errors.iter().map(|(name, _)| name.clone())))
+    let names = legend(errors.iter().map(|(name, _)| name.clone()));
+    compose((WIDTH_PX, 340), 2, &charts, &names).map(Some)
 }

@@ -1,12 +1,9 @@
 //! Loops and observations over time, satellite by satellite.
 
-use std::path::Path;
-
-use crate::analysis::JudgeError;
 use crate::analysis::errors::{Link, SignalError};
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREY, Mark, ORANGE, Series, figure};
-use crate::analysis::statistics::{percentile, std};
+use crate::analysis::plot::canvas::{Axis, Chart, Drawing, Failure, Mark, Series, WIDTH_PX, compose};
+use crate::analysis::statistics::percentile;
 use crate::gnss::record::TrackingRow;
 
 pub(super) type Points = Vec<(f64, f64)>;
@@ -40,7 +37,7 @@ pub(super) fn legend(names: impl Iterator<Item = String>) -> Vec<Series> {
 }
 
 /// Raw discriminators of the three loops.
-pub fn discriminators(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn discriminators(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let run = judged.run;
     let mut links: Vec<Link> = run.tracking.iter().map(|row| (row.sv, row.signal)).collect();
     links.sort_unstable();
@@ -63,7 +60,8 @@ pub fn discriminators(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError
         ),
         over_time(judged, "FLL discriminator", "output (Hz)", 2.0, &data(|row| row.fll_discriminator_hz)),
     ];
-    figure(path, (1100, 900), 1, &charts, &legend(links.iter().map(|link| link.0.to_string())))
+    let names = legend(links.iter().map(|link| link.0.to_string()));
+    compose((WIDTH_PX, 540), 1, &charts, &names).map(Some)
 }
 
 pub(super) fn per_satellite(judged: &Judged<'_>, of: impl Fn(&SignalError) -> f64) -> Vec<(String, Points)> {
@@ -76,7 +74,7 @@ fn satellites(judged: &Judged<'_>) -> Vec<Series> {
 }
 
 /// C/N0 over time as measured and as it was, and the means side by side.
-pub fn cn0(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn cn0(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let measured = per_satellite(judged, |row| row.cn0_dbhz);
     // Under interference what is expected is far from what is set.
     let (word, reference): (&str, fn(&SignalError) -> f64) = if judged.summary.jammed {
@@ -96,11 +94,11 @@ pub fn cn0(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     }
     let difference = per_satellite(judged, |row| row.cn0_dbhz - reference(row));
     let below = over_time(judged, &format!("C/N0 measured minus {word}"), "difference (dB)", 1.0, &difference);
-    figure(path, (1100, 800), 1, &[chart, below], &satellites(judged))
+    compose((WIDTH_PX, 430), 1, &[chart, below], &satellites(judged)).map(Some)
 }
 
 /// Errors of code, carrier and Doppler.
-pub fn observables(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn observables(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let charts = [
         over_time(judged, "Code error", "error (m)", 0.1, &per_satellite(judged, |row| row.code_m)),
         over_time(
@@ -112,53 +110,5 @@ pub fn observables(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         ),
         over_time(judged, "Doppler error", "error (Hz)", 0.1, &per_satellite(judged, |row| row.doppler_hz)),
     ];
-    figure(path, (1100, 900), 1, &charts, &satellites(judged))
-}
-
-/// Histograms of the loop errors with their thresholds.
-pub fn jitter(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
-    let details = &judged.summary.details;
-    let limits = &details.thresholds;
-    let charts = [
-        histogram("DLL", "chips", &details.jitter.dll_chips, limits.dll_chips),
-        histogram("PLL", "degrees", &details.jitter.pll_deg, limits.pll_deg),
-        histogram("FLL", "Hz", &details.jitter.fll_hz, limits.fll_hz),
-    ];
-    let legend = [
-        Series::new("replica - truth", BLUE, Mark::Bars(1.0), Vec::new()),
-        Series::new("±1σ", GREY, Mark::Dash, Vec::new()),
-        Series::new("1σ threshold", ORANGE, Mark::Line, Vec::new()),
-    ];
-    figure(path, (1300, 420), 3, &charts, &legend)
-}
-
-const BINS: usize = 41;
-
-fn histogram(name: &str, unit: &str, values: &[f64], threshold: f64) -> Chart {
-    let sigma = std(values).unwrap_or(0.0);
-    // Wide enough for the tails; the threshold is drawn if it is not so far that the histogram would vanish.
-    let tails = (5.0 * sigma).max(1e-9);
-    let half = if threshold < 4.0 * tails { tails.max(1.15 * threshold) } else { tails };
-    let width = 2.0 * half / BINS as f64;
-    let mut counts = [0_usize; BINS];
-    for value in values {
-        let bin = ((value + half) / width).floor();
-        if let Some(count) = (bin >= 0.0).then(|| counts.get_mut(bin as usize)).flatten() {
-            *count += 1;
-        }
-    }
-    let share = |count: usize| 100.0 * count as f64 / values.len().max(1) as f64;
-    let bars: Points =
-        (0..).zip(counts).map(|(bin, count)| ((f64::from(bin) + 0.5) * width - half, share(count))).collect();
-    let top = 1.1 * bars.iter().map(|bar| bar.1).fold(1.0, f64::max);
-    let mut series = vec![Series::new("", BLUE, Mark::Bars(0.92 * width), bars)];
-    for sign in [-1.0, 1.0] {
-        series.push(Series::new("", GREY, Mark::Dash, vec![(sign * sigma, 0.0), (sign * sigma, top)]));
-        if threshold < half {
-            series.push(Series::new("", ORANGE, Mark::Line, vec![(sign * threshold, 0.0), (sign * threshold, top)]));
-        }
-    }
-    let x = Axis::new(&format!("{name} error ({unit})"), (-half, half));
-    let title = format!("{name}: σ {sigma:.4}, threshold {threshold:.3} {unit}");
-    Chart::new(title, x, Axis::new("share of observations (%)", (0.0, top)), series)
+    compose((WIDTH_PX, 540), 1, &charts, &satellites(judged)).map(Some)
 }

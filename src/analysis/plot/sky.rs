@@ -1,26 +1,23 @@
 //! Where the satellites stood and how strong they were received.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use crate::analysis::JudgeError;
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Area, FINE, Failure, GREY, anchored, render};
+use crate::analysis::plot::canvas::{Area, Drawing, FINE, Failure, GREY, WIDTH_PX, anchored};
 use crate::analysis::statistics::mean;
 use crate::gnss::record::SkyRow;
 use crate::gnss::satellite::Sv;
 
-const WIDTH_PX: i32 = 820;
-const HEIGHT_PX: i32 = 760;
-const CENTRE: (i32, i32) = (375 * FINE, 395 * FINE);
-const RADIUS: f64 = (310 * FINE) as f64;
+const HEIGHT_PX: i32 = 490;
+const CENTRE: (i32, i32) = (290 * FINE, 255 * FINE);
+const RADIUS: f64 = (195 * FINE) as f64;
 
 /// Polar plot: north up, zenith in the middle, tracks ending in a labelled dot whose colour is the mean C/N0 as
 /// set; a satellite that the receiver did not observe is hollow.
-pub fn sky(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn sky(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let mut tracks: BTreeMap<Sv, Vec<&SkyRow>> = BTreeMap::new();
     for row in &judged.run.sky {
         tracks.entry(row.sv).or_default().push(row);
@@ -35,7 +32,7 @@ pub fn sky(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let low = strengths.values().copied().fold(f64::INFINITY, f64::min).floor();
     let high = strengths.values().copied().fold(f64::NEG_INFINITY, f64::max).ceil();
     let (low, high) = if low < high { (low, high) } else { (30.0, 50.0) };
-    render(path, (WIDTH_PX as u32, HEIGHT_PX as u32), |area| {
+    Drawing::new((WIDTH_PX, HEIGHT_PX as u32), |area| {
         obstructed(area, &judged.run.scene.skyline_deg)?;
         frame(area)?;
         scale(area, low, high)?;
@@ -66,6 +63,7 @@ pub fn sky(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
         ))?;
         Ok(())
     })
+    .map(Some)
 }
 
 /// Shades what lies between the horizon and the skyline.
@@ -102,12 +100,15 @@ fn shade(cn0_dbhz: f64, low: f64, high: f64) -> RGBColor {
 }
 
 fn frame(area: &Area<'_>) -> Result<(), Failure> {
-    let title = anchored(16, HPos::Center, VPos::Center);
+    let title = anchored(15, HPos::Center, VPos::Center);
     area.draw(&Text::new("Satellites above the horizon", (CENTRE.0, 20 * FINE), title))?;
     let line = RGBColor(205, 205, 205).stroke_width(FINE as u32);
-    for elevation_deg in [0.0, 30.0, 60.0] {
+    for elevation_deg in [0.0, 30.0, 60.0_f64] {
         let (x, y) = place(0.0, elevation_deg);
         area.draw(&Circle::new(CENTRE, CENTRE.1 - y, line))?;
+        if elevation_deg == 0.0 {
+            continue;
+        }
         let style = anchored(12, HPos::Left, VPos::Bottom).color(&GREY);
         area.draw(&Text::new(format!("{elevation_deg:.0}°"), (x + 4 * FINE, y - 2 * FINE), style))?;
     }
@@ -121,14 +122,14 @@ fn frame(area: &Area<'_>) -> Result<(), Failure> {
             270 => "W".to_owned(),
             other => format!("{other}°"),
         };
-        area.draw(&Text::new(name, place(azimuth_deg, -7.0), anchored(13, HPos::Center, VPos::Center)))?;
+        area.draw(&Text::new(name, place(azimuth_deg, -8.0), anchored(13, HPos::Center, VPos::Center)))?;
     }
     Ok(())
 }
 
 /// The colours of C/N0 with their ends.
 fn scale(area: &Area<'_>, low: f64, high: f64) -> Result<(), Failure> {
-    let (left, top, width, height) = (738 * FINE, 110 * FINE, 18 * FINE, 3 * FINE);
+    let (left, top, width, height) = (580 * FINE, 80 * FINE, 18 * FINE, 2 * FINE);
     let steps = 150;
     for step in 0..steps {
         let cn0 = high - (high - low) * f64::from(step) / f64::from(steps);

@@ -1,20 +1,20 @@
 //! The spectrum of the samples against theory, and the search's statistics against their threshold.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use crate::analysis::JudgeError;
 use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
+use crate::analysis::plot::canvas::{
+    Axis, BLUE, Chart, Drawing, Failure, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX, compose,
+};
 use crate::analysis::spectrum;
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::satellite::Sv;
 
 /// Measured density and the theory's; nothing without `psd.csv`.
-pub fn psd(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn psd(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let rows = &judged.run.psd;
     if rows.is_empty() {
-        return Ok(());
+        return Ok(None);
     }
     let measured: Vec<(f64, f64)> = rows.iter().map(|row| (row.frequency_hz / 1e6, row.density_db)).collect();
     let theory: Vec<(f64, f64)> =
@@ -26,16 +26,16 @@ pub fn psd(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let y = Axis::around("density (dB LSB²/Hz)", measured.iter().chain(&theory).map(|p| p.1), 2.0);
     let mut series = vec![Series::new("measured", BLUE, Mark::Line, measured)];
     if !theory.is_empty() {
-        series.push(Series::new("theory", ORANGE, Mark::Dash, theory));
+        series.push(Series::new("theory", ORANGE, Mark::Line, theory));
     }
     let legend = series.clone();
     let noise = if judged.run.scene.noise { "with noise" } else { "without noise" };
     let chart = Chart::new(format!("Power spectral density of the samples, {noise}"), x, y, series);
-    figure(path, (1000, 600), 1, &[chart], &legend)
+    compose((WIDTH_PX, 340), 1, &[chart], &legend).map(Some)
 }
 
 /// The largest statistic of each satellite that was searched, with the threshold.
-pub fn acquisition(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub fn acquisition(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let mut best: BTreeMap<Sv, &AcquisitionRow> = BTreeMap::new();
     for row in &judged.run.acquisition {
         let kept = best.entry(row.sv).or_insert(row);
@@ -71,7 +71,7 @@ pub fn acquisition(path: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let in_truth = Series::new("in the truth", GREEN, Mark::Cross, truly);
     legend.push(in_truth.clone());
     chart.series.push(in_truth);
-    figure(path, (1200, 500), 1, &[chart], &legend)
+    compose((WIDTH_PX, 330), 1, &[chart], &legend).map(Some)
 }
 
 /// GPS satellites by number alone, to fit side by side.

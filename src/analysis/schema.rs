@@ -1,0 +1,76 @@
+//! The schema of `summary.json`: every key with its unit and meaning, and paths into it.
+//!
+//! `assets/summary.schema.json` is a JSON Schema (draft 2020-12) with one annotation more: `unit`, which is `1` for counts,
+//! ratios and names. A test holds it against what a run really writes.
+
+use serde_json::{Map, Value};
+use std::sync::OnceLock;
+
+/// The schema's text.
+pub static TEXT: &str = include_str!("../../assets/summary.schema.json");
+
+/// One figure of the summary.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Leaf {
+    /// Keys and list positions, joined by dots.
+    pub path: String,
+    pub unit: String,
+    pub meaning: String,
+    pub is_number: bool,
+}
+
+/// Every figure, in the order of the schema.
+pub fn leaves() -> &'static [Leaf] {
+    static LEAVES: OnceLock<Vec<Leaf>> = OnceLock::new();
+    LEAVES.get_or_init(|| {
+        let mut leaves = Vec::new();
+        // The text is part of the program and a test reads it: were it damaged there would be no paths.
+        if let Ok(schema) = serde_json::from_str::<Value>(TEXT) {
+            walk("", &schema, &mut leaves);
+        }
+        leaves
+    })
+}
+
+fn walk(path: &str, schema: &Value, leaves: &mut Vec<Leaf>) {
+    let below = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+    if let Some(properties) = schema.get("properties").and_then(Value::as_object) {
+        properties.iter().for_each(|(key, schema)| walk(&below(key), schema, leaves));
+    } else if let Some(items) = schema.get("prefixItems").and_then(Value::as_array) {
+        items.iter().enumerate().for_each(|(index, schema)| walk(&below(&index.to_string()), schema, leaves));
+    } else {
+        let text = |key: &str| schema.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
+        let of = |kind: &str| match schema.get("type") {
+            Some(Value::String(one)) => one == kind,
+            Some(Value::Array(several)) => several.iter().any(|one| one == kind),
+            _ => false,
+        };
+        let is_number = of("number") || of("integer");
+        leaves.push(Leaf { path: path.to_owned(), unit: text("unit"), meaning: text("description"), is_number });
+    }
+}
+
+/// The figure at a path.
+pub fn leaf(path: &str) -> Option<Leaf> {
+    leaves().iter().find(|leaf| leaf.path == path).cloned()
+}
+
+/// Whether figures lie below a path.
+pub fn is_branch(path: &str) -> bool {
+    leaves().iter().any(|leaf| leaf.path.strip_prefix(path).is_some_and(|rest| rest.starts_with('.')))
+}
+
+/// The path most like another.
+pub fn nearest(path: &str) -> String {
+    let distance = |leaf: &&Leaf| strsim::damerau_levenshtein(&leaf.path, path);
+    leaves().iter().min_by_key(distance).map(|leaf| leaf.path.clone()).unwrap_or_default()
+}
+
+/// The value at a path.
+pub fn find<'a>(summary: &'a Value, path: &str) -> Option<&'a Value> {
+    path.split('.').try_fold(summary, |value, key| match value {
+        Value::Object(map) => Map::get(map, key),
+        Value::Array(list) => list.get(key.parse::<usize>().ok()?),
+        _ => None,
+    })
+}
