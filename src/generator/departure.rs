@@ -64,7 +64,8 @@ impl Departure {
     /// What it does, for the plan.
     pub fn describe(&self) -> String {
         let names: Vec<String> = self.satellites.iter().map(Sv::to_string).collect();
-        let growth = self.growth.map_or("from the beginning".to_owned(), |(from, s)| format!("grown in {s} s from {from}"));
+        let growth =
+            self.growth.map_or("from the beginning".to_owned(), |(from, s)| format!("grown in {s} s from {from}"));
         format!(
             "{} off the broadcast by {} m radially, {} m along, {} m across, {growth}",
             names.join(" "),
@@ -98,8 +99,7 @@ mod tests {
             assert!((offset_m.norm() - 50.0 * 51.0 / 243.0).abs() < 1e-6);
             let outwards = offset_m.normalize().dot(&without.position_m.normalize());
             assert!((outwards - if radial_m > 0.0 { 1.0 } else { 0.0 }).abs() < 1e-6, "{outwards}");
-            let along = without.velocity_mps
-                + Vector3::new(0.0, 0.0, EARTH_ROTATION_RADPS).cross(&without.position_m);
+            let along = without.velocity_mps + Vector3::new(0.0, 0.0, EARTH_ROTATION_RADPS).cross(&without.position_m);
             let forwards = offset_m.normalize().dot(&along.normalize());
             // The orbit's slope against the horizon is its eccentricity, 0.006, at most.
             assert!(forwards.abs() < 0.02 || along_m > 0.0 && forwards > 0.999, "{forwards}");

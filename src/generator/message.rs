@@ -124,13 +124,14 @@ pub fn subframe(
 impl MessageFault {
     /// What it does, for the plan; times in seconds since `start`.
     pub fn describe(&self, start: Epoch) -> String {
-        let who = self.satellites.as_ref().map_or("all satellites".to_owned(), |list| {
-            list.iter().map(Sv::to_string).collect::<Vec<_>>().join(" ")
-        });
+        let who = self
+            .satellites
+            .as_ref()
+            .map_or("all satellites".to_owned(), |list| list.iter().map(Sv::to_string).collect::<Vec<_>>().join(" "));
         let what = match &self.kind {
             Kind::BitErrors { rate, .. } => format!("bits wrong with a probability of {rate:e}"),
             Kind::Bit { subframe, word, bit } => format!("bit {bit} of word {word} of subframe {subframe} flipped"),
-            Kind::Health(health) => format!("health {health} of 63"),
+            Kind::Health(health) => format!("health = {health}"),
             Kind::Parameter { name, add } => format!("{name} wrong by {add:e}"),
         };
         let from_s = self.on.start.since(start);

@@ -4,8 +4,8 @@
 //! an epoch of the table, so the position is continuous; velocity is the polynomial's own. Tables are every 15 minutes and
 //! the quickest term of a GPS orbit in these axes with any size has ω = 2n + Ω = 3.6e-4 rad/s (the eccentricity's, some
 //! 2e5 m), of which twelve nodes 900 s apart miss (ω h)¹² · (1 · 3 · … · 11)² / (2¹² · 12!) or 17 µm; the printed digit, 1 mm, counts
-//! 1.5 times. Of a satellite's clock nothing smooth is known between epochs: a line, which real clocks leave by
-//! 0.07 m rms in 2010. Its kinks are below 1e-12 of frequency.
+//! 1.5 times. Of a satellite's clock nothing smooth is known between epochs: a line, which real clocks
+//! of 2010 leave by 0.09 m rms in the middle of half an hour.
 //!
 //! Added to what the table has: relativity's periodic term, −2 r·v/c² (IS-GPS-200N, 20.3.3.3.3.1); T_GD as that satellite
 //! broadcasts it at the scene's start, because the products' clocks like the broadcast ones belong to the combination of P1 and
@@ -25,6 +25,8 @@ use crate::gnss::time::Epoch;
 /// Epochs that a position is taken through; half of them lie before it.
 pub const NODES: usize = 12;
 const HALF: usize = NODES / 2;
+/// Epochs of a table at most: more than a year every 15 minutes.
+const MOST_EPOCHS: i64 = 50_000;
 
 /// What the table does not have of a satellite.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,14 +52,16 @@ pub struct Orbits {
 }
 
 impl Orbits {
-    /// The orbits of those satellites of `precise` that `hardware` knows; `None` when there are not two epochs.
+    /// The orbits of those satellites of `precise` that `hardware` knows; `None` with fewer than twelve epochs between first and
+    /// last, or more than 50 000.
     pub fn new(precise: &Precise, hardware: impl Fn(Sv) -> Option<Hardware>) -> Option<Self> {
         let mut epochs: Vec<i64> = precise.satellites.values().flat_map(BTreeMap::keys).copied().collect();
         epochs.sort_unstable();
         epochs.dedup();
         let (first_s, last_s) = (*epochs.first()?, *epochs.last()?);
         let step_s = epochs.windows(2).filter_map(|pair| Some(pair.last()? - pair.first()?)).min()?;
-        let count = usize::try_from((last_s - first_s) / step_s).ok()? + 1;
+        let count = (last_s - first_s) / step_s + 1;
+        let count = usize::try_from(count).ok().filter(|_| (NODES as i64..=MOST_EPOCHS).contains(&count))?;
         let track = |(sv, samples): (&Sv, &BTreeMap<i64, Sample>)| {
             let at = |index: usize| samples.get(&(first_s + step_s * index as i64)).copied();
             Some((*sv, Track { nodes: (0..count).map(at).collect(), hardware: hardware(*sv)? }))

@@ -81,7 +81,8 @@ pub(super) fn sky(
         let missing: Vec<Sv> = missing.filter(|sv| !excluded.contains(sv)).collect();
         if !missing.is_empty() {
             let names: Vec<String> = missing.iter().map(Sv::to_string).collect();
-            warnings.push(format!("without a precise orbit and clock over the scene and left out: {}", names.join(", ")));
+            warnings
+                .push(format!("without a precise orbit and clock over the scene and left out: {}", names.join(", ")));
         }
         excluded.extend(missing);
     }

@@ -105,6 +105,11 @@ fn named(table: &Table<'_>) -> Result<Vec<Sv>, ScenarioError> {
         .ok_or_else(|| table.bad("satellites", "an array of satellites like [\"G01\", \"G12\"]"))
 }
 
+/// The satellites that a fault may name; all, if it names none.
+fn some(table: &Table<'_>) -> Result<Option<Vec<Sv>>, ScenarioError> {
+    if table.has("satellites") { named(table).map(Some) } else { Ok(None) }
+}
+
 pub(super) fn satellite_fault(table: &Table<'_>) -> Result<SatelliteFault, ScenarioError> {
     table.allow(FAULT_KEYS)?;
     let kinds = [("clock_step", 0), ("clock_ramp", 1), ("clock_noise", 2), ("orbit", 3)];
@@ -127,7 +132,7 @@ pub(super) fn satellite_fault(table: &Table<'_>) -> Result<SatelliteFault, Scena
             let law = power_law(table)?;
             let expected = "the oscillator by name, or power_law = [h2, h1, h0, h-1, h-2]";
             let law = law.ok_or_else(|| table.bad("oscillator", expected))?;
-            Ok(SatelliteFault::Noise { satellites: satellite_list(table, "satellites")?, law })
+            Ok(SatelliteFault::Noise { satellites: some(table)?, law })
         }
         _ => {
             table.allow(&["kind", "satellites", "on_s", "ramp_s", "radial_m", "along_m", "cross_m"])?;
@@ -137,9 +142,13 @@ pub(super) fn satellite_fault(table: &Table<'_>) -> Result<SatelliteFault, Scena
                 (None, None) => None,
                 (Some(on_s), Some(ramp_s)) => Some((on_s, ramp_s)),
                 (Some(_), None) => {
-                    return Err(table.bad("ramp_s", "the time that it takes, because on_s is given and orbits do not jump"));
+                    return Err(
+                        table.bad("ramp_s", "the time that it takes, because on_s is given and orbits do not jump")
+                    );
                 }
-                (None, Some(_)) => return Err(table.bad("on_s", "the time at which it begins, because ramp_s is given")),
+                (None, Some(_)) => {
+                    return Err(table.bad("on_s", "the time at which it begins, because ramp_s is given"));
+                }
             };
             Ok(SatelliteFault::Orbit {
                 satellites: named(table)?,
@@ -164,7 +173,7 @@ pub(super) fn message_fault(table: &Table<'_>) -> Result<MessageSpec, ScenarioEr
         value.map(|value| value as u8).ok_or_else(|| table.bad(key, format!("an integer from {least} to {most}")))
     };
     let (on_s, off_s) = times(table)?;
-    let satellites = satellite_list(table, "satellites")?.filter(|list| !list.is_empty());
+    let satellites = some(table)?;
     let kind = match kind {
         0 => {
             allow(&["rate"])?;
@@ -189,7 +198,8 @@ pub(super) fn message_fault(table: &Table<'_>) -> Result<MessageSpec, ScenarioEr
                 .flat_map(|(_, fields)| fields.iter().map(|field| (field.name, field.name)))
                 .filter(|(name, _)| !FIXED_PARAMETERS.contains(name))
                 .collect();
-            let name = table.choice("parameter", &names)?.ok_or_else(|| table.bad("parameter", "a parameter's name"))?;
+            let name =
+                table.choice("parameter", &names)?.ok_or_else(|| table.bad("parameter", "a parameter's name"))?;
             MessageKind::Parameter { name, add: table.required("add", -1e6..=1e6, "in the parameter's unit")? }
         }
     };
@@ -218,7 +228,7 @@ impl OrbitsSpec {
             Some(Hardware { tgd_s, antenna_m: own.unwrap_or(self.antenna_m) })
         };
         let orbits = Orbits::new(&precise, hardware)
-            .ok_or_else(|| refuse("holds a single epoch: expected at least twelve".to_owned()))?;
+            .ok_or_else(|| refuse("expected 12 to 50000 epochs between the first and the last".to_owned()))?;
         let (from, to) = (scenario.start.plus_s(-MARGIN_S), scenario.start.plus_s(end_s + MARGIN_S));
         let (held, missing): (Vec<Sv>, Vec<Sv>) = catalogue.satellites().partition(|sv| orbits.covers(*sv, from, to));
         if held.is_empty() {
@@ -311,7 +321,9 @@ pub(super) fn message_faults(
         let at = |t_s: f64| scenario.start.plus_s(t_s);
         let kind = match spec.kind {
             MessageKind::BitErrors { rate: 0.0 } => continue,
-            MessageKind::BitErrors { rate } => Kind::BitErrors { rate, stream: Stream::new(seed, "message").part(number) },
+            MessageKind::BitErrors { rate } => {
+                Kind::BitErrors { rate, stream: Stream::new(seed, "message").part(number) }
+            }
             MessageKind::Bit { subframe, word, bit } => Kind::Bit { subframe, word, bit },
             MessageKind::Health(health) => Kind::Health(health),
             MessageKind::Parameter { add: 0.0, .. } => continue,
