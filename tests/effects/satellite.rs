@@ -374,10 +374,15 @@ fn each_fault_of_the_satellites_is_met_by_what_should_meet_it() {
     let fixes = misses_m(run);
     let events: Vec<EventRow> = rows(run, "rx/events.csv");
     let at_s = |row: &EventRow| row.sample as f64 / 2.6e6;
-    // Health goes out with the subframe 1 that begins 62 s into the scene, and is read at its end.
-    let sick: Vec<(Sv, f64)> =
-        events.iter().filter(|row| row.event == Event::Unhealthy).map(|row| (row.sv, at_s(row))).collect();
-    assert!(matches!(sick.as_slice(), [(sv, t_s)] if *sv == Sv::gps(6) && (67.9..69.0).contains(t_s)), "{sick:?}");
+    // Health goes out with subframe 1, every 30 s from 2 s on, and is read at its end, or with the first whole ephemeris.
+    let said = |event: Event| -> Vec<(Sv, f64)> {
+        events.iter().filter(|row| row.event == event).map(|row| (row.sv, at_s(row))).collect()
+    };
+    let (sick, well) = (said(Event::Unhealthy), said(Event::Healthy));
+    let [(first, first_s), (second, second_s)] = sick.as_slice() else { panic!("{sick:?}") };
+    assert!(*first == Sv::gps(7) && (19.9..21.0).contains(first_s), "{sick:?}");
+    assert!(*second == Sv::gps(6) && (67.9..69.0).contains(second_s), "{sick:?}");
+    assert!(matches!(well.as_slice(), [(sv, t_s)] if *sv == Sv::gps(7) && (37.9..39.0).contains(t_s)), "{well:?}");
     let between = |from_s: f64, to_s: f64| fixes.iter().filter(move |(t_s, ..)| (from_s..to_s).contains(t_s));
     let share = |name: &str, from_s: f64, to_s: f64| {
         let out = between(from_s, to_s).filter(|(_, fix, _)| fix.excluded.split(' ').any(|sv| sv == name)).count();
@@ -403,6 +408,7 @@ fn each_fault_of_the_satellites_is_met_by_what_should_meet_it() {
         let sum = |fix: &Fix| fix.satellites as usize + fix.excluded.split_whitespace().count();
         between(from_s, to_s).map(|(_, fix, _)| sum(fix)).collect::<Vec<_>>()
     };
+    assert!(with(27.0, 37.8).iter().all(|n| n + 1 == with(39.0, 40.0)[0]), "{:?}", with(27.0, 40.0));
     let (before, after) = (with(64.0, 67.8), with(68.3, 73.0));
     assert!(
         before.iter().all(|n| *n == before[0]) && after.iter().all(|n| *n == before[0] - 1),
