@@ -24,3 +24,5 @@ pub mod sp3;
 pub mod time;
 #[cfg(feature = "generator")]
 pub mod vienna;
+#[cfg(feature = "generator")]
+pub mod vmf3;
