@@ -8,6 +8,7 @@ use std::sync::Arc;
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::clock::ReceiverClock;
 use gnss_twin::generator::effect::link::FixedCn0;
+use gnss_twin::generator::ripple::satellite::SatelliteClocks;
 use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade, Scene};
 use gnss_twin::generator::stream::{Generated, Options, generate_with};
 use gnss_twin::generator::synth::isa::Level;
@@ -44,6 +45,8 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         trajectory: Trajectory::fixed(Geodetic::from_degrees(26.5, 80.2, 120.0).to_ecef()),
         catalogue: Arc::new(catalogue),
         broadcast: Arc::new(Broadcast::new(navigation.klobuchar, 15, &almanac, start).unwrap()),
+        message_faults: Vec::new(),
+        satellite_clocks: SatelliteClocks::default(),
         signals: vec![&L1_CA],
         excluded: Vec::new(),
         mask_rad: 5_f64.to_radians(),

@@ -6,10 +6,13 @@
 //! a metre or two, so the truth passes from one to the next over [`BLEND_S`]: the received phase
 //! stays smooth and the decoded set stays right to that metre.
 //!
-//! Records that their neighbours contradict are left out ([`Catalogue::new`]).
+//! Records that their neighbours contradict are left out ([`Catalogue::new`]). Precise orbits may stand in for the true ones
+//! ([`Catalogue::follow`]), and faults add to either ([`Catalogue::depart`]); what is sent stays as it is.
 
 use std::collections::BTreeMap;
 
+use crate::generator::departure::{Departure, minimum_jerk};
+use crate::generator::precise::Orbits;
 use crate::gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
@@ -38,10 +41,12 @@ struct Timeline {
     spans: Vec<Span>,
 }
 
-/// The broadcast sets of every satellite, arranged by when they are sent.
+/// The broadcast sets of every satellite, arranged by when they are sent, and what is true besides.
 #[derive(Clone, Debug)]
 pub struct Catalogue {
     satellites: BTreeMap<Sv, Timeline>,
+    precise: Option<Orbits>,
+    departures: Vec<Departure>,
 }
 
 impl Catalogue {
@@ -72,7 +77,23 @@ impl Catalogue {
                 satellites.insert(sv, Timeline { sets, spans });
             }
         }
-        (Self { satellites }, warnings)
+        (Self { satellites, precise: None, departures: Vec::new() }, warnings)
+    }
+
+    /// Takes `orbits` for true from here on, instead of the broadcast sets.
+    pub fn follow(&mut self, orbits: Orbits) {
+        self.precise = Some(orbits);
+    }
+
+    /// Adds what true orbits depart by.
+    pub fn depart(&mut self, departures: Vec<Departure>) {
+        self.departures = departures;
+    }
+
+    /// What is true besides the broadcast sets, in words: precise orbits, and departures.
+    pub fn describe(&self) -> (Option<String>, Vec<String>) {
+        let precise = self.precise.as_ref().map(Orbits::describe);
+        (precise, self.departures.iter().map(Departure::describe).collect())
     }
 
     /// Satellites of which there is at least one set.
@@ -94,11 +115,24 @@ impl Catalogue {
     }
 
     /// Orbit (in the ECEF axes of `at`) and L1 C/A clock, T_GD included, taken for true at GPS time
-    /// `at`; `None` where [`Self::sent_at`] is. Twice continuously differentiable across hand-overs.
+    /// `at`; `None` where [`Self::sent_at`] is, or where precise orbits are taken for true and have none.
     ///
     /// # Errors
     /// [`OrbitError`] from the elements.
     pub fn truth(&self, sv: Sv, at: Epoch) -> Result<Option<(State, ClockState)>, OrbitError> {
+        let found = match &self.precise {
+            Some(orbits) => orbits.truth(sv, at),
+            None => self.broadcast_truth(sv, at)?,
+        };
+        let departed = |state: State| {
+            let own = self.departures.iter().filter(|departure| departure.satellites.contains(&sv));
+            own.fold(state, |state, departure| departure.apply(state, at))
+        };
+        Ok(found.map(|(state, clock)| (departed(state), clock)))
+    }
+
+    /// The broadcast sets' orbit and clock; twice continuously differentiable across hand-overs.
+    fn broadcast_truth(&self, sv: Sv, at: Epoch) -> Result<Option<(State, ClockState)>, OrbitError> {
         let Some(timeline) = self.satellites.get(&sv) else { return Ok(None) };
         // Spans that may weigh in: those which begin before the blend's end and end after its begin.
         let first = timeline.spans.partition_point(|s| s.from <= at.plus_s(-BLEND_S / 2.0)).saturating_sub(1);
@@ -137,14 +171,8 @@ fn step(timeline: &Timeline, index: usize, at: Epoch) -> (f64, f64) {
     if before.is_none() || span.set.is_none() {
         return (if since_s >= 0.0 { 1.0 } else { 0.0 }, 0.0);
     }
-    let u = since_s / BLEND_S + 0.5;
-    if u <= 0.0 {
-        (0.0, 0.0)
-    } else if u >= 1.0 {
-        (1.0, 0.0)
-    } else {
-        (u * u * u * (10.0 + u * (6.0 * u - 15.0)), 30.0 * u * u * (1.0 - u) * (1.0 - u) / BLEND_S)
-    }
+    let (done, rate) = minimum_jerk(since_s / BLEND_S + 0.5);
+    (done, rate / BLEND_S)
 }
 
 /// A total order that depends on the contents alone.

@@ -6,10 +6,13 @@
 
 pub mod catalogue;
 pub mod clock;
+pub mod departure;
 pub mod effect;
 pub mod fidelity;
 pub mod knots;
+pub mod message;
 pub mod plan;
+pub mod precise;
 pub mod random;
 pub mod ray;
 pub mod ripple;

@@ -161,6 +161,18 @@ fn models(scene: &Scene) -> Vec<Model> {
         .map(|effect| Model { name: effect.name().to_owned(), present: true, why: effect.describe() })
         .collect();
     let mut add = |name: &str, present: bool, why: String| models.push(Model { name: name.to_owned(), present, why });
+    let (orbits, departures) = scene.catalogue.describe();
+    let broadcast = "no [orbits]: what satellites broadcast is true, smoothed where one set follows another";
+    add("true orbits", orbits.is_some(), orbits.unwrap_or_else(|| broadcast.to_owned()));
+    let faults = [departures, scene.satellite_clocks.descriptions.clone()].concat();
+    if faults.is_empty() {
+        add("satellite fault", false, "no [[satellite_fault]]".to_owned());
+    }
+    faults.into_iter().for_each(|fault| add("satellite fault", true, fault));
+    if scene.message_faults.is_empty() {
+        add("message fault", false, "no [[message_fault]]".to_owned());
+    }
+    scene.message_faults.iter().for_each(|fault| add("message fault", true, fault.describe(scene.clock.start)));
     for name in ["ionosphere", "troposphere"] {
         if !scene.effects.iter().any(|effect| effect.name() == name) {
             add(name, false, format!("the scenario has no [{name}]"));

@@ -17,6 +17,7 @@ mod obstruction;
 mod parts;
 mod propagation;
 mod read;
+mod satellite;
 mod scintillation;
 mod stages;
 #[cfg(test)]
@@ -35,6 +36,7 @@ pub use motion::{FileKind, MotionSpec};
 pub use propagation::{Electrons, Ionosphere, MappingKind, NeutralAtmosphere};
 pub use read::Place;
 use read::{Source, Table};
+pub use satellite::{MessageKind, MessageSpec, OrbitsSpec, SatelliteFault};
 use stages::Stages;
 
 use crate::generator::effect::multipath::Echo;
@@ -47,8 +49,8 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{SIGNALS, Signal};
 use crate::gnss::time::{Epoch, Rate};
 
-/// Every table and the keys that it may hold. `[power.satellites]` and `[power.blocks]` hold satellites, `[receiver]`
-/// anything; the keys of lists of tables are in their families' files.
+/// Every table and the keys that it may hold. `[power.satellites]`, `[power.blocks]` and `[orbits.antenna_offsets_m]` hold
+/// satellites, `[receiver]` anything; the keys of lists of tables are in their families' files.
 pub const KEYS: &[(&str, &[&str])] = &[
     (
         "",
@@ -60,6 +62,9 @@ pub const KEYS: &[(&str, &[&str])] = &[
             "signals",
             "navigation",
             "satellites",
+            "orbits",
+            "satellite_fault",
+            "message_fault",
             "motion",
             "attitude",
             "front_end",
@@ -85,6 +90,9 @@ pub const KEYS: &[(&str, &[&str])] = &[
     ),
     ("navigation", &["file"]),
     ("satellites", &["mask_deg", "exclude", "include_unhealthy"]),
+    ("orbits", satellite::ORBITS_KEYS),
+    ("satellite_fault", satellite::FAULT_KEYS),
+    ("message_fault", satellite::MESSAGE_KEYS),
     ("motion", motion::KEYS),
     ("attitude", attitude::KEYS),
     ("front_end", &["sample_rate_hz", "if_hz", "spectrum_inverted", "format", "noise_lsb"]),
@@ -139,6 +147,10 @@ pub struct Scenario {
     pub mask_rad: f64,
     pub excluded: Vec<Sv>,
     pub include_unhealthy: bool,
+    /// True orbits and clocks; absent means those that are broadcast.
+    pub orbits: Option<OrbitsSpec>,
+    pub satellite_faults: Vec<SatelliteFault>,
+    pub message_faults: Vec<MessageSpec>,
     pub motion: MotionSpec,
     pub attitude: Option<Attitude>,
     pub front_end: FrontEnd,
@@ -199,6 +211,9 @@ impl Scenario {
             mask_rad,
             excluded,
             include_unhealthy,
+            orbits: open("orbits")?.map(|t| satellite::orbits(&t)).transpose()?,
+            satellite_faults: each(&root, "satellite_fault", satellite::satellite_fault)?,
+            message_faults: each(&root, "message_fault", satellite::message_fault)?,
             motion: MotionSpec::read(&motion)?,
             attitude: open("attitude")?.map(|t| attitude::attitude(&t)).transpose()?,
             front_end,

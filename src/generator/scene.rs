@@ -5,7 +5,9 @@ use std::sync::Arc;
 use crate::generator::catalogue::Catalogue;
 use crate::generator::clock::ReceiverClock;
 pub use crate::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
+use crate::generator::message::MessageFault;
 use crate::generator::ray::Effect;
+use crate::generator::ripple::satellite::SatelliteClocks;
 use crate::generator::ripple::scintillation::Scintillation;
 use crate::generator::spoof::Constellation;
 use crate::generator::stage::Stage;
@@ -32,10 +34,14 @@ pub struct Scene {
     pub metadata: IfMetadata,
     /// Antenna motion over true time since `clock.start`.
     pub trajectory: Trajectory,
-    /// Orbits and clocks as they are (in this program: smooth hand-over between broadcast sets).
+    /// What the satellites send of themselves, and orbits and clocks as they are.
     pub catalogue: Arc<Catalogue>,
     /// What the satellites send besides their own ephemeris.
     pub broadcast: Arc<Broadcast>,
+    /// What goes wrong with what they send.
+    pub message_faults: Vec<MessageFault>,
+    /// What satellites' clocks do that they do not broadcast.
+    pub satellite_clocks: SatelliteClocks,
     pub signals: Vec<&'static Signal>,
     /// Satellites that the scene leaves out.
     pub excluded: Vec<Sv>,

@@ -162,7 +162,11 @@ fn doppler_hz(
     let spin_hz = scene.trajectory.attitude().map_or(0.0, |attitude| attitude.spin_hz.abs());
     let step_s = if spin_hz > 0.0 { DOPPLER_STEP_S.min(DOPPLER_STEP_TURNS / spin_hz) } else { DOPPLER_STEP_S };
     let reach_s = 2.0 * step_s;
-    let breaks = from.motion_breaks_s(scene);
+    let mut breaks = from.motion_breaks_s(scene);
+    if let Some(clock) = from.fading(sv).and_then(|sv| scene.satellite_clocks.of(sv)) {
+        breaks.extend(clock.breaks_s(scene));
+        breaks.sort_by(f64::total_cmp);
+    }
     let rippled = |seen: &Seen, away_s: f64| {
         let place = sample as f64 + away_s * scene.clock.rate.hz();
         let ripple = ripple::at(scene, from.fading(sv), signal, place);
@@ -230,13 +234,15 @@ pub fn observe(
         locked_s,
     };
     let sight = &seen.emission.sight;
+    let clock = from.fading(sv).and_then(|sv| scene.satellite_clocks.of(sv));
+    let departed_s = clock.map_or(0.0, |clock| clock.at_s(scene, sample as f64));
     let sky = SkyRow {
         sample,
         sv,
         azimuth_deg: sight.look.azimuth_rad.to_degrees(),
         elevation_deg: sight.look.elevation_rad.to_degrees(),
         range_m: sight.range_m,
-        satellite_clock_m: SPEED_OF_LIGHT_MPS * seen.emission.satellite_clock_s,
+        satellite_clock_m: SPEED_OF_LIGHT_MPS * (seen.emission.satellite_clock_s + departed_s),
         ionosphere_m: 0.5 * SPEED_OF_LIGHT_MPS * (ray.code_delay_s - ray.carrier_delay_s),
         troposphere_m: 0.5 * SPEED_OF_LIGHT_MPS * (ray.code_delay_s + ray.carrier_delay_s),
     };
@@ -359,6 +365,13 @@ struct SceneFile<'a> {
     interference: Vec<Spectrum>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     spoofers: Vec<String>,
+    /// What is true of the satellites that they do not broadcast.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    orbits: Option<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    satellite_faults: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    message_faults: Vec<String>,
 }
 
 /// Power law of the receiver's oscillator, from white phase noise to random-walk frequency noise.
@@ -401,6 +414,7 @@ impl Writer {
                 trajectory: Table::create(&self.directory, &format!("claimed{suffix}.csv"))?,
             });
         }
+        let (orbits, departures) = scene.catalogue.describe();
         let file = SceneFile {
             name: &scene.name,
             seed: scene.seed,
@@ -427,6 +441,9 @@ impl Writer {
                 .map(|oscillator| OscillatorFile { h: oscillator.law.levels() }),
             interference: scene.interference.iter().map(Interferer::spectrum).collect(),
             spoofers: scene.spoofers.iter().map(|spoofer| spoofer.describe()).collect(),
+            orbits,
+            satellite_faults: [departures, scene.satellite_clocks.descriptions.clone()].concat(),
+            message_faults: scene.message_faults.iter().map(|fault| fault.describe(scene.clock.start)).collect(),
         };
         let path = self.directory.join("scene.json");
         serde_json::to_string_pretty(&file)

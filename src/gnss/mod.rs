@@ -19,6 +19,8 @@ pub mod samples;
 pub mod satellite;
 pub mod sigmf;
 pub mod signal;
+#[cfg(feature = "generator")]
+pub mod sp3;
 pub mod time;
 #[cfg(feature = "generator")]
 pub mod vienna;

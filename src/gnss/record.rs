@@ -247,6 +247,10 @@ pub enum Event {
     BitSynchronised,
     FrameSynchronised,
     EphemerisComplete,
+    /// The satellite says that it is unhealthy: it is not used from here on.
+    Unhealthy,
+    /// It says that it is healthy again.
+    Healthy,
     LossOfLock,
     /// The half-cycle or whole-cycle count of the carrier was broken and restarted.
     CycleSlip,

@@ -93,7 +93,7 @@ fn unpack(bytes: &[u8], name: &str) -> Result<Vec<u8>, NavigationError> {
 }
 
 /// ASCII with line feeds: no byte order mark, `?` for foreign bytes, one kind of line end.
-fn clean(bytes: &[u8]) -> Vec<u8> {
+pub(super) fn clean(bytes: &[u8]) -> Vec<u8> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut text = Vec::with_capacity(bytes.len());
     let mut previous = 0;
@@ -126,7 +126,7 @@ thread_local! {
 }
 
 /// Runs what may panic; its panic becomes `Err` and prints nothing. Panics elsewhere print as before.
-fn quietly<T>(run: impl FnOnce() -> T) -> Result<T, ()> {
+pub(super) fn quietly<T>(run: impl FnOnce() -> T) -> Result<T, ()> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let previous = std::panic::take_hook();

@@ -343,8 +343,14 @@ impl Session {
                         None
                     }
                     News::Ephemeris(ephemeris) => {
-                        self.ephemerides.insert(sv, *ephemeris);
-                        Some(Event::EphemerisComplete)
+                        let sick = ephemeris.health != 0;
+                        let before = self.ephemerides.insert(sv, *ephemeris).is_some_and(|set| set.health != 0);
+                        output.event(&EventRow { sample, sv, signal, event: Event::EphemerisComplete })?;
+                        match (before, sick) {
+                            (false, true) => Some(Event::Unhealthy),
+                            (true, false) => Some(Event::Healthy),
+                            _ => None,
+                        }
                     }
                 };
                 if let Some(event) = event {

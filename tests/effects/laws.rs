@@ -48,6 +48,26 @@ const TABLES: &[(&str, Option<&str>)] = &[
         "[iq]\ngain_db = 1\nphase_deg = 3\ndc_i_lsb = 2",
         Some("[iq]\ngain_db = 0\nphase_deg = 0\ndc_i_lsb = 0\ndc_q_lsb = 0"),
     ),
+    ("[orbits]\nsp3 = \"data/witness/igs15904.sp3.gz\"", None),
+    (
+        "[[satellite_fault]]\nkind = \"clock_step\"\nsatellites = [\"G23\"]\nstep_s = 1e-7\non_s = 0.05",
+        Some("[[satellite_fault]]\nkind = \"clock_step\"\nsatellites = [\"G23\"]\nstep_s = 0"),
+    ),
+    (
+        "[[satellite_fault]]\nkind = \"clock_ramp\"\nsatellites = [\"G23\"]\ndrift_sps = 1e-8\non_s = 0.01\noff_s = 0.1",
+        Some("[[satellite_fault]]\nkind = \"clock_ramp\"\nsatellites = [\"G23\"]\ndrift_sps = 0"),
+    ),
+    ("[[satellite_fault]]\nkind = \"clock_noise\"\noscillator = \"cesium1\"", None),
+    (
+        "[[satellite_fault]]\nkind = \"orbit\"\nsatellites = [\"G23\"]\nradial_m = 30",
+        Some("[[satellite_fault]]\nkind = \"orbit\"\nsatellites = [\"G23\"]\nradial_m = 0"),
+    ),
+    (
+        "[[message_fault]]\nkind = \"bit_errors\"\nrate = 0.3",
+        Some("[[message_fault]]\nkind = \"bit_errors\"\nrate = 0"),
+    ),
+    // The fault begins at 58.00 s of the minute, and what is sent to 58.05 s is bits 21 to 23 of word 7 of subframe 5.
+    ("[[message_fault]]\nkind = \"bit\"\nsubframe = 5\nword = 7\nbit = 22", None),
     ("[noise]\n[adc]\nbits = 2\nagc_window_s = 0.004", None),
 ];
 
@@ -91,8 +111,9 @@ fn everything_present_changes_the_samples_and_nothing_of_zero_strength_does() {
 #[test]
 fn the_seed_moves_what_is_random_and_nothing_else() {
     for (tables, _) in TABLES {
-        let random =
-            ["oscillator = ", "scintillation", "[noise]", "phase_noise"].iter().any(|word| tables.contains(word));
+        let random = ["oscillator = ", "scintillation", "[noise]", "phase_noise", "bit_errors"]
+            .iter()
+            .any(|word| tables.contains(word));
         let [a, b] = [1, 2].map(|seed| bytes(&scene(tables, Some(seed)), &Options::default()));
         assert_eq!(a != b, random, "{tables}");
     }

@@ -9,6 +9,7 @@ mod multipath;
 mod oscillator;
 mod propagation;
 mod reaction;
+mod satellite;
 mod separation;
 mod single;
 mod spoofing;

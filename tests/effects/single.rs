@@ -38,6 +38,14 @@ pub fn rows<T: serde::de::DeserializeOwned>(directory: &Path, name: &str) -> Vec
 
 /// Truth and measurement at each instant of the truth at which the channel had locked.
 pub fn track(scene: &Scene, settings: &TrackingSettings) -> (Vec<(Observation, Measurement)>, tempfile::TempDir) {
+    let (truth, report, directory) = follow(scene, settings);
+    let seen = report.measurements.iter().filter(|m| m.locked);
+    let pairs = seen.filter_map(|m| Some((truth.iter().find(|row| row.sample == m.sample)?.clone(), *m))).collect();
+    (pairs, directory)
+}
+
+/// The truth, and all that a channel reports.
+pub fn follow(scene: &Scene, settings: &TrackingSettings) -> (Vec<Observation>, Report, tempfile::TempDir) {
     let directory = tempfile::tempdir().unwrap();
     let bytes = samples(scene, directory.path());
     let truth: Vec<Observation> = rows(directory.path(), "observations.csv");
@@ -64,9 +72,7 @@ pub fn track(scene: &Scene, settings: &TrackingSettings) -> (Vec<(Observation, M
         channel.advance(&Block { first: from, i: &i, q: &q }, &ticks, &mut report);
     }
     assert!(!channel.is_lost());
-    let seen = report.measurements.iter().filter(|m| m.locked);
-    let pairs = seen.filter_map(|m| Some((truth.iter().find(|row| row.sample == m.sample)?.clone(), *m))).collect();
-    (pairs, directory)
+    (truth, report, directory)
 }
 
 /// How much longer the measured pseudorange is than the true one, within a code period.

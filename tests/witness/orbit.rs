@@ -8,6 +8,7 @@ use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss_twin::gnss::rinex::{self, Navigation};
 use gnss_twin::gnss::satellite::Sv;
+use gnss_twin::gnss::sp3;
 use gnss_twin::gnss::time::Epoch;
 use nalgebra::Vector3;
 
@@ -31,7 +32,7 @@ pub fn load(shipped: Option<&str>, outside: &str) -> Option<Vec<u8>> {
 /// Epochs of an SP3 file with the position (m) and clock (s, NaN where absent) of each GPS satellite.
 type Precise = Vec<(Epoch, BTreeMap<Sv, (Vector3<f64>, f64)>)>;
 
-fn sp3(text: &[u8]) -> Precise {
+fn sp3_columns(text: &[u8]) -> Precise {
     let text = String::from_utf8_lossy(text);
     let mut epochs = Precise::new();
     for line in text.lines() {
@@ -50,6 +51,35 @@ fn sp3(text: &[u8]) -> Precise {
         }
     }
     epochs
+}
+
+#[test]
+fn the_adapter_over_the_crate_reads_what_the_columns_hold() {
+    let mut files = 0;
+    for (shipped, outside) in [
+        (Some("igs15904.sp3.gz"), ""),
+        (None, "rtklib/igs15905.sp3"),
+        (None, "gnss-benchmark/COD21340.sp3.gz"),
+        (None, "gnss-benchmark/igr21340.sp3.gz"),
+    ] {
+        let Some(bytes) = load(shipped, outside) else { continue };
+        let found = sp3::read(&bytes, outside).unwrap();
+        let mut samples = 0;
+        for (at, satellites) in sp3_columns(&bytes) {
+            for (sv, (position_m, clock_s)) in satellites {
+                let sample = found.satellites[&sv][&at.seconds()];
+                // Both parse the same decimals; scales are applied alike, but for half an ulp.
+                assert!((sample.position_m - position_m).norm() < 1e-8, "{outside} {sv} {at}");
+                let clock = sample.clock_s.unwrap_or(f64::NAN);
+                let both = clock.is_nan() && clock_s.is_nan();
+                assert!(both || (clock - clock_s).abs() <= 1e-18, "{outside} {sv} {at}");
+                samples += 1;
+            }
+        }
+        assert_eq!(samples, found.satellites.values().map(|samples| samples.len()).sum::<usize>(), "{outside}");
+        files += 1;
+    }
+    assert!(files > 0);
 }
 
 struct Compared {
@@ -105,7 +135,7 @@ fn compare(navigation: Navigation, precise: &Precise) -> Compared {
 
 #[test]
 fn broadcast_orbits_of_2010_meet_the_igs_final_ones() {
-    let precise = sp3(&load(Some("igs15904.sp3.gz"), "").unwrap());
+    let precise = sp3_columns(&load(Some("igs15904.sp3.gz"), "").unwrap());
     let found = compare(rinex::embedded().unwrap(), &precise);
     assert!(found.points > 2500);
     // Independent evaluation of the same files: 1.8 to 1.9 m, radial mean −0.65 to −0.83 m (antenna
@@ -119,7 +149,7 @@ fn broadcast_orbits_of_2010_meet_the_igs_final_ones() {
 #[test]
 fn broadcast_orbits_of_2020_meet_those_of_code() {
     let Some(navigation) = load(None, "gnss-benchmark/CARD00ESP_R_20203340900_15H_MN.rnx") else { return };
-    let precise = sp3(&load(None, "gnss-benchmark/COD21340.sp3.gz").unwrap());
+    let precise = sp3_columns(&load(None, "gnss-benchmark/COD21340.sp3.gz").unwrap());
     let found = compare(rinex::read(&navigation, "CARD").unwrap(), &precise);
     // Independent evaluation: 1.39 m, clocks 0.66 m.
     assert!(found.points > 100);

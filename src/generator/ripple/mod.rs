@@ -1,11 +1,12 @@
-//! What changes too quickly for knots: the noise of the receiver's oscillator, scintillation.
+//! What changes too quickly for knots: the noise of the receiver's oscillator, scintillation, faults of satellites' clocks.
 //!
 //! Such a thing is known at nodes on an absolute grid of samples, less than a millisecond apart, and is linear between
-//! them; runs of the synthesiser end at nodes, so samples and truth follow the same line. Limits: a ripple of the clock
+//! them, but for a clock that steps at one; runs of the synthesiser end at nodes, so samples and truth follow the same line. Limits: a ripple of the clock
 //! moves code and carrier by its own size, not the satellites (1 ns at 1 km/s is a micrometre).
 
 pub mod markov;
 pub mod oscillator;
+pub mod satellite;
 pub mod scintillation;
 
 use crate::generator::scene::Scene;
@@ -43,9 +44,11 @@ impl Ripple {
     }
 }
 
-/// Whether anything in the scene ripples.
-pub fn any(scene: &Scene) -> bool {
-    scene.receiver_clock.oscillator.is_some() || scene.scintillation.is_some()
+/// Whether anything ripples in a signal that fades with satellite `fading`.
+fn any(scene: &Scene, fading: Option<Sv>) -> bool {
+    scene.receiver_clock.oscillator.is_some()
+        || scene.scintillation.is_some()
+        || fading.is_some_and(|sv| scene.satellite_clocks.of(sv).is_some())
 }
 
 /// The ripple of a signal, which fades with satellite `fading`, at node number `node`.
@@ -65,14 +68,30 @@ fn at_node(scene: &Scene, fading: Option<Sv>, signal: &Signal, node: u64) -> Rip
     ripple
 }
 
+/// The ripple between node number `node` and the next: at its beginning and at its end.
+fn cell(scene: &Scene, fading: Option<Sv>, signal: &Signal, node: u64, ends: [Ripple; 2]) -> [Ripple; 2] {
+    let clock = fading.and_then(|sv| scene.satellite_clocks.of(sv));
+    let Some(clock) = clock else { return ends };
+    let [from_s, to_s] = clock.cell_s(scene, node);
+    // A satellite's clock that is ahead makes its signal older.
+    let older = |ripple: Ripple, offset_s: f64| Ripple {
+        delay_s: ripple.delay_s - offset_s,
+        carrier_cycles: ripple.carrier_cycles - signal.carrier_hz * offset_s,
+        gain: ripple.gain,
+    };
+    let [from, to] = ends;
+    [older(from, from_s), older(to, to_s)]
+}
+
 /// The ripple of a signal, which fades with satellite `fading`, at a place between samples; before the first sample that of the first.
 pub fn at(scene: &Scene, fading: Option<Sv>, signal: &Signal, sample: f64) -> Ripple {
-    if !any(scene) {
+    if !any(scene, fading) {
         return Ripple::STILL;
     }
     let place = sample.max(0.0) / node_samples(scene.clock.rate) as f64;
     let node = place.floor();
-    let (from, to) = (at_node(scene, fading, signal, node as u64), at_node(scene, fading, signal, node as u64 + 1));
+    let ends = [node as u64, node as u64 + 1].map(|node| at_node(scene, fading, signal, node));
+    let [from, to] = cell(scene, fading, signal, node as u64, ends);
     from.between(to, place - node)
 }
 
@@ -81,32 +100,38 @@ pub fn at(scene: &Scene, fading: Option<Sv>, signal: &Signal, sample: f64) -> Ri
 pub struct Ripples {
     spacing: u64,
     first: u64,
-    nodes: Vec<Ripple>,
+    /// Beginning and end of the stretch behind each node.
+    cells: Vec<[Ripple; 2]>,
 }
 
 impl Ripples {
     /// Gathers what samples `from..=to` need; nothing where nothing ripples.
     pub fn prepare(&mut self, scene: &Scene, fading: Option<Sv>, signal: &Signal, from: u64, to: u64) {
-        if !any(scene) {
+        if !any(scene, fading) {
             return;
         }
         self.spacing = node_samples(scene.clock.rate);
         self.first = from / self.spacing;
-        self.nodes.clear();
-        self.nodes.extend((self.first..=to / self.spacing + 1).map(|node| at_node(scene, fading, signal, node)));
+        self.cells.clear();
+        let mut here = at_node(scene, fading, signal, self.first);
+        for node in self.first..=to / self.spacing {
+            let next = at_node(scene, fading, signal, node + 1);
+            self.cells.push(cell(scene, fading, signal, node, [here, next]));
+            here = next;
+        }
     }
 
     /// Longest run of samples that ends at nodes, if there are any.
     pub fn run_samples(&self) -> Option<u64> {
-        (!self.nodes.is_empty()).then_some(self.spacing)
+        (!self.cells.is_empty()).then_some(self.spacing)
     }
 
     /// The ripple at the ends of a run between two nodes.
     pub fn ends(&self, from: u64, to: u64) -> [Ripple; 2] {
         let Some(spacing) = self.run_samples() else { return [Ripple::STILL; 2] };
         let node = from / spacing;
-        let at = |node: u64| self.nodes.get((node - self.first) as usize).copied().unwrap_or(Ripple::STILL);
-        let (left, right) = (at(node), at(node + 1));
+        let cell = self.cells.get((node - self.first) as usize).copied();
+        let [left, right] = cell.unwrap_or([Ripple::STILL; 2]);
         let fraction = |sample: u64| (sample - node * spacing) as f64 / spacing as f64;
         [left.between(right, fraction(from)), left.between(right, fraction(to))]
     }

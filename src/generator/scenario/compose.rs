@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::motion::{FileKind, MotionSpec};
 use super::stages::PlaybackSpec;
-use super::{Scenario, ScenarioError, hostile, parts};
+use super::{Scenario, ScenarioError, hostile, parts, satellite};
 use crate::generator::random::Stream;
 use crate::generator::ray::Ray;
 use crate::generator::ripple::scintillation::Scintillation;
@@ -56,8 +56,10 @@ impl Scenario {
         self.covers(&self.motion, &trajectory, start_s.max(0.0), end_s.min(self.duration_s))?;
         let signals = self.signals_in_band(&metadata, &mut warnings)?;
         let navigation = parts::navigation(self, directory, overrides, &mut warnings)?;
-        let sky = parts::sky(self, &navigation, end_s, &mut warnings)?;
         let files = Files { directory, overrides };
+        let sky = parts::sky(self, &navigation, &files, end_s, &mut warnings)?;
+        let message_faults = satellite::message_faults(self, &sky.catalogue, seed)?;
+        let satellite_clocks = satellite::clocks(self, &sky.catalogue, &receiver_clock, seed, metadata.rate);
         let effects = parts::effects(self, &files, &navigation, (&sky, &trajectory), end_s)?;
         let noise_lsb = self.front_end.noise_lsb.unwrap_or_else(|| default_noise_lsb(metadata.format));
         let front_end = self.stages.front_end(&self.front_end, metadata.format, seed, noise_lsb);
@@ -70,6 +72,8 @@ impl Scenario {
             trajectory,
             catalogue: Arc::new(sky.catalogue),
             broadcast: Arc::new(sky.broadcast),
+            message_faults,
+            satellite_clocks,
             signals,
             excluded: sky.excluded,
             mask_rad: self.mask_rad,

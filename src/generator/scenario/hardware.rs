@@ -86,24 +86,26 @@ impl ClockSpec {
     }
 }
 
+/// An oscillator's noise by `oscillator` or `power_law`.
+pub(super) fn power_law(table: &Table<'_>) -> Result<Option<PowerLaw>, ScenarioError> {
+    let preset = table.choice("oscillator", &PowerLaw::PRESETS)?;
+    // Far above any oscillator: white frequency noise of 1e-12 is a microsecond in a second.
+    match (preset, table.numbers("power_law", 1e-12)?) {
+        (Some(_), Some(_)) => Err(table.bad("power_law", "nothing beside oscillator, which names a power law")),
+        (preset, None) => Ok(preset),
+        (None, Some(h)) if h.iter().all(|level| *level >= 0.0) && h.iter().any(|level| *level > 0.0) => {
+            let [h2, h1, h0, hm1, hm2] = h;
+            Ok(Some(PowerLaw { h2, h1, h0, hm1, hm2 }))
+        }
+        (None, Some(_)) => Err(table.bad("power_law", "levels [h2, h1, h0, h-1, h-2], none negative, not all zero")),
+    }
+}
+
 const DAY_S: f64 = 86_400.0;
 
 pub(super) fn receiver_clock(table: Option<&Table<'_>>) -> Result<ClockSpec, ScenarioError> {
     let Some(table) = table else { return Ok(ClockSpec::default()) };
-    let preset = table.choice("oscillator", &PowerLaw::PRESETS)?;
-    // Far above any oscillator: white frequency noise of 1e-12 is a microsecond in a second.
-    let given = table.numbers("power_law", 1e-12)?;
-    let noise = match (preset, given) {
-        (Some(_), Some(_)) => return Err(table.bad("power_law", "nothing beside oscillator, which names a power law")),
-        (preset, None) => preset,
-        (None, Some(h)) if h.iter().all(|level| *level >= 0.0) && h.iter().any(|level| *level > 0.0) => {
-            let [h2, h1, h0, hm1, hm2] = h;
-            Some(PowerLaw { h2, h1, h0, hm1, hm2 })
-        }
-        (None, Some(_)) => {
-            return Err(table.bad("power_law", "levels [h2, h1, h0, h-1, h-2], none negative, not all zero"));
-        }
-    };
+    let noise = power_law(table)?;
     Ok(ClockSpec {
         bias_s: table.number("bias_s", -1.0..=1.0, "s")?.unwrap_or(0.0),
         drift: table.number("drift_sps", -1e-4..=1e-4, "s/s")?.unwrap_or(0.0),

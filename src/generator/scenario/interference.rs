@@ -128,10 +128,10 @@ pub struct SpooferSpec {
     pub drag: Option<DragSpec>,
 }
 
-const SECONDS: std::ops::RangeInclusive<f64> = 0.0..=2_678_400.0;
+pub(super) const SECONDS: std::ops::RangeInclusive<f64> = 0.0..=2_678_400.0;
 
 /// The times between which something is on.
-fn times(table: &Table<'_>) -> Result<(f64, Option<f64>), ScenarioError> {
+pub(super) fn times(table: &Table<'_>) -> Result<(f64, Option<f64>), ScenarioError> {
     let on_s = table.number("on_s", SECONDS, "s")?.unwrap_or(0.0);
     let off_s = table.number("off_s", SECONDS, "s")?;
     match off_s {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::compose::Files;
-use super::{Ionosphere, Overrides, Scenario, ScenarioError, multipath};
+use super::{Ionosphere, Overrides, Scenario, ScenarioError, multipath, satellite};
 use crate::generator::catalogue::Catalogue;
 use crate::generator::effect::obstruction::Obstruction;
 use crate::generator::effect::wind_up::WindUp;
@@ -47,10 +47,11 @@ pub(super) fn navigation(
 pub(super) fn sky(
     scenario: &Scenario,
     navigation: &Navigation,
+    files: &Files<'_>,
     end_s: f64,
     warnings: &mut Vec<String>,
 ) -> Result<Sky, ScenarioError> {
-    let (catalogue, rogues) = Catalogue::new(navigation.ephemerides.clone());
+    let (mut catalogue, rogues) = Catalogue::new(navigation.ephemerides.clone());
     tell(warnings, &rogues, "ephemerides left out");
     let (start, end) = (scenario.start, scenario.start.plus_s(end_s));
     let sending = |at| catalogue.satellites().filter(|sv| catalogue.sent_at(*sv, at).is_some()).count();
@@ -74,6 +75,19 @@ pub(super) fn sky(
         }
         excluded.extend(sick);
     }
+    if let Some(orbits) = &scenario.orbits {
+        let missing = orbits.follow(scenario, files, &mut catalogue, end_s)?;
+        let missing = missing.into_iter().filter(|sv| catalogue.sent_at(*sv, start).is_some());
+        let missing: Vec<Sv> = missing.filter(|sv| !excluded.contains(sv)).collect();
+        if !missing.is_empty() {
+            let names: Vec<String> = missing.iter().map(Sv::to_string).collect();
+            warnings
+                .push(format!("without a precise orbit and clock over the scene and left out: {}", names.join(", ")));
+        }
+        excluded.extend(missing);
+    }
+    catalogue.depart(satellite::departures(scenario));
+    warnings.extend(satellite::strangers(scenario, &catalogue));
     excluded.sort();
     excluded.dedup();
     let almanac: Vec<Ephemeris> = catalogue

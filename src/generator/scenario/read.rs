@@ -201,6 +201,14 @@ impl<'t> Table<'t> {
         words.map(Some).ok_or_else(|| self.bad(name, expected))
     }
 
+    /// A string, or an array of them.
+    pub fn texts(&self, name: &str, expected: &str) -> Result<Option<Vec<&'t str>>, ScenarioError> {
+        match self.get(name).map(Spanned::get_ref) {
+            Some(DeValue::Array(_)) => self.words(name, expected),
+            _ => Ok(self.text(name, expected)?.map(|text| vec![text])),
+        }
+    }
+
     pub fn table(&self, name: &str) -> Result<Option<Table<'t>>, ScenarioError> {
         match self.get(name) {
             None => Ok(None),

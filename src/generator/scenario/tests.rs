@@ -1,9 +1,11 @@
 mod hostile;
 mod propagation;
+mod satellite;
 
 use std::path::Path;
 
 use propagation::{IONEX, TEC, VIENNA};
+use satellite::FAULTS;
 
 use super::interference::DRAG_KEYS;
 use super::motion::{KEYS as MOTION_KEYS, POINT_KEYS};
@@ -126,7 +128,9 @@ fn with(table: &str, line: &str) -> String {
     match table {
         "" => format!("{line}\n{MINIMAL}{STATIC}"),
         "motion" => format!("{MINIMAL}{STATIC}{line}\n"),
-        "interference" | "spoofer" => format!("{MINIMAL}{STATIC}[[{table}]]\n{line}\n"),
+        "interference" | "spoofer" | "satellite_fault" | "message_fault" => {
+            format!("{MINIMAL}{STATIC}[[{table}]]\n{line}\n")
+        }
         "spoofer.drag" => format!("{MINIMAL}{STATIC}[[spoofer]]\npower_db = 6\n[spoofer.drag]\n{line}\n"),
         "motion.point" => format!("{MINIMAL}{WAYPOINTS}{line}\n"),
         "obstruction" => format!("{MINIMAL}{STATIC}[[obstruction]]\n{line}\n"),
@@ -189,7 +193,7 @@ fn replaced(text: &str, header: &str, key: &str, value: &str) -> String {
 
 #[test]
 fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
-    let full = full() + HOSTILE;
+    let full = full() + HOSTILE + FAULTS;
     let fixed = "[power]\nkind = \"fixed\"\ncn0_dbhz = 45\n";
     let mut cases: Vec<(String, &str, &str)> = Vec::new();
     for (table, keys) in KEYS.iter().filter(|(table, _)| *table != "motion") {
@@ -307,9 +311,16 @@ fn numbers_outside_their_range_are_refused_with_range_and_unit() {
         ("spoofer", "power_db", "dB"),
         ("spoofer", "clock_drift_sps", "s/s"),
         ("spoofer.drag", "speed_mps", "m/s"),
+        ("orbits", "antenna_offset_m", "m"),
+        ("satellite_fault", "step_s", "s"),
+        ("satellite_fault", "drift_sps", "s/s"),
+        ("satellite_fault", "along_m", "m"),
+        ("satellite_fault", "ramp_s", "s"),
+        ("message_fault", "rate", "a probability"),
+        ("message_fault", "add", "in the parameter's unit"),
     ] {
         for value in ["-1e308", "1e308", "nan", "inf", "-inf", "\"5 m\"", "true", "9223372036854775807", "''"] {
-            let text = replaced(&(full() + HOSTILE), table, key, value);
+            let text = replaced(&(full() + HOSTILE + FAULTS), table, key, value);
             let error = parse(&text).unwrap_err();
             let message = error.to_string();
             assert!(matches!(error, ScenarioError::Value { .. }), "{message}");
@@ -466,7 +477,7 @@ fn a_front_end_puts_l1_where_the_scenario_says() {
 }
 
 /// The scenarios that come with the program.
-const SHIPPED: [(&str, &str); 14] = [
+const SHIPPED: [(&str, &str); 16] = [
     ("static", include_str!("../../../scenarios/static.toml")),
     ("moderate", include_str!("../../../scenarios/moderate.toml")),
     ("high_dynamics", include_str!("../../../scenarios/high_dynamics.toml")),
@@ -481,6 +492,8 @@ const SHIPPED: [(&str, &str); 14] = [
     ("front_end", include_str!("../../../scenarios/front_end.toml")),
     ("jammed", include_str!("../../../scenarios/jammed.toml")),
     ("spoofed", include_str!("../../../scenarios/spoofed.toml")),
+    ("precise", include_str!("../../../scenarios/precise.toml")),
+    ("satellite_faults", include_str!("../../../scenarios/satellite_faults.toml")),
 ];
 
 fn shipped(name: &str) -> crate::generator::scene::Scene {

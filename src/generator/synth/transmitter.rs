@@ -11,6 +11,7 @@ use std::sync::Arc;
 use super::bank::Bank;
 use super::{CODE_ONE, Edge, RUN_SAMPLES, Run};
 use crate::generator::knots::{Grid, Part, Path};
+use crate::generator::message::{self, Sent as SentWords};
 use crate::generator::ripple::Ripples;
 use crate::generator::scene::Scene;
 use crate::generator::sky;
@@ -247,8 +248,10 @@ impl Transmitter {
             let start = Epoch::new(index * SUBFRAME_S, 0.0);
             let fallback = || scene.catalogue.sent_at(self.sv, scene.clock.epoch(from));
             let Some(ephemeris) = scene.catalogue.sent_at(self.sv, start).or_else(fallback) else { continue };
-            let words = scene.broadcast.subframe(ephemeris, start)?;
-            if let Ok(subframe) = Subframe::decode(&words, 0) {
+            let faults = if self.from.number == 0 { scene.message_faults.as_slice() } else { &[] };
+            let SentWords { encoded, words } = message::subframe(faults, &scene.broadcast, self.sv, ephemeris, start)?;
+            // What was meant and, where wrong bits pass for right ones, what was sent.
+            for subframe in [encoded, words].iter().filter_map(|words| Subframe::decode(words, 0).ok()) {
                 let issue = match subframe.id {
                     1..=3 => Some(u32::from(ephemeris.iode)),
                     _ => subframe.klobuchar().map(|_| 0),

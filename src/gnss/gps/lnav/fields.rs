@@ -174,6 +174,13 @@ pub(super) fn quantise_all<T>(table: &[Element<T>], into: &mut T) -> Result<(), 
     })
 }
 
+/// Adds `by` to the field of `table` called `name`; whether there is one.
+pub(super) fn add_to<T>(table: &[Element<T>], name: &str, into: &mut T, by: f64) -> bool {
+    let Some(element) = table.iter().find(|element| element.field.name == name) else { return false };
+    (element.set)(into, (element.get)(into) + by);
+    true
+}
+
 /// The fields of `table` with their integers in `data`.
 pub(super) fn integers<T>(table: &[Element<T>], data: &[u32; 10]) -> Vec<(&'static str, i64)> {
     table.iter().map(|element| (element.field.name, element.field.read(data))).collect()

@@ -18,8 +18,8 @@ use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
 use fields::{
-    ALMANAC_PAGE, IONOSPHERE_PAGE, SUBFRAME_1, SUBFRAME_2, SUBFRAME_3, UTC_PAGE, integers, quantise_all, read_all,
-    write_all,
+    ALMANAC_PAGE, IONOSPHERE_PAGE, SUBFRAME_1, SUBFRAME_2, SUBFRAME_3, UTC_PAGE, add_to, integers, quantise_all,
+    read_all, write_all,
 };
 
 /// Seconds of a subframe (IS-GPS-200N, 20.3.2).
@@ -111,6 +111,13 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     quantise_all(&SUBFRAME_2, &mut sent)?;
     quantise_all(&SUBFRAME_3, &mut sent)?;
     Ok(sent)
+}
+
+/// Adds `by` to the parameter of subframes 1 to 3 that the field table calls `parameter`, in its unit; whether there is one.
+pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+    add_to(&SUBFRAME_1, parameter, ephemeris, by)
+        || add_to(&SUBFRAME_2, parameter, ephemeris, by)
+        || add_to(&SUBFRAME_3, parameter, ephemeris, by)
 }
 
 /// Why words are no subframe, or subframes no ephemeris.

@@ -1,0 +1,362 @@
+//! The satellites' side as written: `[orbits]`, `[[satellite_fault]]` and `[[message_fault]]`, and what becomes of them.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use super::compose::Files;
+use super::hardware::power_law;
+use super::interference::{SECONDS, times};
+use super::read::Table;
+use super::{Scenario, ScenarioError, satellite_list};
+use crate::generator::catalogue::Catalogue;
+use crate::generator::clock::ReceiverClock;
+use crate::generator::departure::Departure;
+use crate::generator::message::{FOREVER_S, Kind, MessageFault, spoiled};
+use crate::generator::precise::{Hardware, Orbits};
+use crate::generator::random::Stream;
+use crate::generator::ripple::node_samples;
+use crate::generator::ripple::oscillator::{Oscillator, PowerLaw};
+use crate::generator::ripple::satellite::{Change, ChangeKind, SatelliteClocks};
+use crate::gnss::gps::lnav;
+use crate::gnss::satellite::Sv;
+use crate::gnss::sp3::{self, Precise};
+use crate::gnss::time::Rate;
+
+pub(super) const ORBITS_KEYS: &[&str] = &["sp3", "antenna_offset_m", "antenna_offsets_m"];
+/// Every key of `[[satellite_fault]]`; each kind knows some of them.
+pub(super) const FAULT_KEYS: &[&str] = &[
+    "kind",
+    "satellites",
+    "on_s",
+    "off_s",
+    "step_s",
+    "drift_sps",
+    "oscillator",
+    "power_law",
+    "radial_m",
+    "along_m",
+    "cross_m",
+    "ramp_s",
+];
+/// Every key of `[[message_fault]]`.
+pub(super) const MESSAGE_KEYS: &[&str] =
+    &["kind", "satellites", "on_s", "off_s", "rate", "subframe", "word", "bit", "health", "parameter", "add"];
+/// Parameters that a fault cannot change: sets are told apart by them.
+const FIXED_PARAMETERS: [&str; 4] = ["week", "iodc", "iode", "health"];
+/// True time beyond both ends of the scene for which there must be orbits: light times and the receiver's clock.
+const MARGIN_S: f64 = 2.0;
+
+/// `[orbits]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OrbitsSpec {
+    pub files: Vec<PathBuf>,
+    /// Antenna below the centre of mass: of all satellites, and of some by name.
+    pub antenna_m: f64,
+    pub antennas_m: Vec<(Sv, f64)>,
+}
+
+/// One `[[satellite_fault]]`. Times are true ones since the scene's start.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SatelliteFault {
+    Step { satellites: Vec<Sv>, step_s: f64, on_s: f64, off_s: Option<f64> },
+    Ramp { satellites: Vec<Sv>, drift: f64, on_s: f64, off_s: Option<f64> },
+    Noise { satellites: Option<Vec<Sv>>, law: PowerLaw },
+    Orbit { satellites: Vec<Sv>, radial_m: f64, along_m: f64, cross_m: f64, growth_s: Option<(f64, f64)> },
+}
+
+/// One `[[message_fault]]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MessageSpec {
+    pub satellites: Option<Vec<Sv>>,
+    pub on_s: f64,
+    pub off_s: Option<f64>,
+    pub kind: MessageKind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MessageKind {
+    BitErrors { rate: f64 },
+    Bit { subframe: u8, word: u8, bit: u8 },
+    Health(u8),
+    Parameter { name: &'static str, add: f64 },
+}
+
+pub(super) fn orbits(table: &Table<'_>) -> Result<OrbitsSpec, ScenarioError> {
+    let expected = "the path of an SP3 file, or an array of such paths";
+    let files = table.texts("sp3", expected)?.filter(|files| !files.is_empty());
+    let mut antennas_m = Vec::new();
+    if let Some(each) = table.table("antenna_offsets_m")? {
+        for name in each.names() {
+            let sv = name.parse().map_err(|e| each.bad(name, e))?;
+            antennas_m.push((sv, each.required(name, -5.0..=5.0, "m")?));
+        }
+    }
+    Ok(OrbitsSpec {
+        files: files.ok_or_else(|| table.bad("sp3", expected))?.iter().map(PathBuf::from).collect(),
+        antenna_m: table.number("antenna_offset_m", -5.0..=5.0, "m")?.unwrap_or(0.0),
+        antennas_m,
+    })
+}
+
+/// The satellites that a fault must name.
+fn named(table: &Table<'_>) -> Result<Vec<Sv>, ScenarioError> {
+    satellite_list(table, "satellites")?
+        .filter(|list| !list.is_empty())
+        .ok_or_else(|| table.bad("satellites", "an array of satellites like [\"G01\", \"G12\"]"))
+}
+
+/// The satellites that a fault may name; all, if it names none.
+fn some(table: &Table<'_>) -> Result<Option<Vec<Sv>>, ScenarioError> {
+    if table.has("satellites") { named(table).map(Some) } else { Ok(None) }
+}
+
+pub(super) fn satellite_fault(table: &Table<'_>) -> Result<SatelliteFault, ScenarioError> {
+    table.allow(FAULT_KEYS)?;
+    let kinds = [("clock_step", 0), ("clock_ramp", 1), ("clock_noise", 2), ("orbit", 3)];
+    let kind = table.choice("kind", &kinds)?;
+    match kind.ok_or_else(|| table.bad("kind", "clock_step, clock_ramp, clock_noise or orbit"))? {
+        0 => {
+            table.allow(&["kind", "satellites", "on_s", "off_s", "step_s"])?;
+            let (on_s, off_s) = times(table)?;
+            let step_s = table.required("step_s", -1e-3..=1e-3, "s")?;
+            Ok(SatelliteFault::Step { satellites: named(table)?, step_s, on_s, off_s })
+        }
+        1 => {
+            table.allow(&["kind", "satellites", "on_s", "off_s", "drift_sps"])?;
+            let (on_s, off_s) = times(table)?;
+            let drift = table.required("drift_sps", -1e-6..=1e-6, "s/s")?;
+            Ok(SatelliteFault::Ramp { satellites: named(table)?, drift, on_s, off_s })
+        }
+        2 => {
+            table.allow(&["kind", "satellites", "oscillator", "power_law"])?;
+            let law = power_law(table)?;
+            let expected = "the oscillator by name, or power_law = [h2, h1, h0, h-1, h-2]";
+            let law = law.ok_or_else(|| table.bad("oscillator", expected))?;
+            Ok(SatelliteFault::Noise { satellites: some(table)?, law })
+        }
+        _ => {
+            table.allow(&["kind", "satellites", "on_s", "ramp_s", "radial_m", "along_m", "cross_m"])?;
+            let axis = |key: &str| Ok(table.number(key, -1e5..=1e5, "m")?.unwrap_or(0.0));
+            let times = (table.number("on_s", SECONDS, "s")?, table.number("ramp_s", 1.0..=1e6, "s")?);
+            let growth_s = match times {
+                (None, None) => None,
+                (Some(on_s), Some(ramp_s)) => Some((on_s, ramp_s)),
+                (Some(_), None) => {
+                    return Err(
+                        table.bad("ramp_s", "the time that it takes, because on_s is given and orbits do not jump")
+                    );
+                }
+                (None, Some(_)) => {
+                    return Err(table.bad("on_s", "the time at which it begins, because ramp_s is given"));
+                }
+            };
+            Ok(SatelliteFault::Orbit {
+                satellites: named(table)?,
+                radial_m: axis("radial_m")?,
+                along_m: axis("along_m")?,
+                cross_m: axis("cross_m")?,
+                growth_s,
+            })
+        }
+    }
+}
+
+pub(super) fn message_fault(table: &Table<'_>) -> Result<MessageSpec, ScenarioError> {
+    table.allow(MESSAGE_KEYS)?;
+    let kinds = [("bit_errors", 0), ("bit", 1), ("health", 2), ("parameter", 3)];
+    let kind = table.choice("kind", &kinds)?;
+    let kind = kind.ok_or_else(|| table.bad("kind", "bit_errors, bit, health or parameter"))?;
+    let common = ["kind", "satellites", "on_s", "off_s"];
+    let allow = |own: &[&str]| table.allow(&[&common, own].concat());
+    let count = |key: &str, least: u64, most: u64| {
+        let value = table.integer(key)?.filter(|value| (least..=most).contains(value));
+        value.map(|value| value as u8).ok_or_else(|| table.bad(key, format!("an integer from {least} to {most}")))
+    };
+    let (on_s, off_s) = times(table)?;
+    let satellites = some(table)?;
+    let kind = match kind {
+        0 => {
+            allow(&["rate"])?;
+            MessageKind::BitErrors { rate: table.required("rate", 0.0..=0.5, "(a probability)")? }
+        }
+        1 => {
+            allow(&["subframe", "word", "bit"])?;
+            let (subframe, word) = (count("subframe", 1, 5)?, count("word", 1, 10)?);
+            MessageKind::Bit { subframe, word, bit: count("bit", 1, 30)? }
+        }
+        2 => {
+            allow(&["health"])?;
+            named(table)?;
+            MessageKind::Health(count("health", 0, 63)?)
+        }
+        _ => {
+            allow(&["parameter", "add"])?;
+            named(table)?;
+            let tables = lnav::tables();
+            let ephemeris = tables.iter().filter(|(name, _)| name.starts_with("subframe "));
+            let names: Vec<(&str, &'static str)> = ephemeris
+                .flat_map(|(_, fields)| fields.iter().map(|field| (field.name, field.name)))
+                .filter(|(name, _)| !FIXED_PARAMETERS.contains(name))
+                .collect();
+            let name =
+                table.choice("parameter", &names)?.ok_or_else(|| table.bad("parameter", "a parameter's name"))?;
+            MessageKind::Parameter { name, add: table.required("add", -1e6..=1e6, "in the parameter's unit")? }
+        }
+    };
+    Ok(MessageSpec { satellites, on_s, off_s, kind })
+}
+
+impl OrbitsSpec {
+    /// Lets `catalogue` follow the files' orbits, and tells which of its satellites they do not hold over the scene, which
+    /// lasts to `end_s`.
+    pub(super) fn follow(
+        &self,
+        scenario: &Scenario,
+        files: &Files<'_>,
+        catalogue: &mut Catalogue,
+        end_s: f64,
+    ) -> Result<Vec<Sv>, ScenarioError> {
+        let refuse = |reason: String| scenario.conflict("orbits.sp3", reason);
+        let mut precise = Precise::default();
+        for path in &self.files {
+            let bytes = scenario.load("orbits.sp3", files.directory, path, files.overrides)?;
+            precise.extend(sp3::read(&bytes, &path.display().to_string()).map_err(|e| refuse(e.to_string()))?);
+        }
+        let hardware = |sv: Sv| {
+            let own = self.antennas_m.iter().find(|(named, _)| *named == sv).map(|(_, offset_m)| *offset_m);
+            let tgd_s = catalogue.sent_at(sv, scenario.start)?.tgd_s;
+            Some(Hardware { tgd_s, antenna_m: own.unwrap_or(self.antenna_m) })
+        };
+        let orbits = Orbits::new(&precise, hardware)
+            .ok_or_else(|| refuse("expected 12 to 50000 epochs between the first and the last".to_owned()))?;
+        let (from, to) = (scenario.start.plus_s(-MARGIN_S), scenario.start.plus_s(end_s + MARGIN_S));
+        let (held, missing): (Vec<Sv>, Vec<Sv>) = catalogue.satellites().partition(|sv| orbits.covers(*sv, from, to));
+        if held.is_empty() {
+            let (first, last) = orbits.reach();
+            let (begin, end) = precise.span().unwrap_or((first, last));
+            return Err(refuse(format!(
+                "epochs from {begin} to {end} give orbits from {first} to {last} (six epochs on either side), the scene needs \
+                 {from} to {to}: name the files of its days, the neighbouring day's too near midnight"
+            )));
+        }
+        catalogue.follow(orbits);
+        Ok(missing)
+    }
+}
+
+/// What a fault of true orbits comes to; those of no size are left out.
+pub(super) fn departures(scenario: &Scenario) -> Vec<Departure> {
+    let departure = |fault: &SatelliteFault| match fault {
+        SatelliteFault::Orbit { satellites, radial_m, along_m, cross_m, growth_s } => {
+            let growth = growth_s.map(|(on_s, ramp_s)| (scenario.start.plus_s(on_s), ramp_s));
+            let felt = (*radial_m, *along_m, *cross_m) != (0.0, 0.0, 0.0);
+            felt.then(|| Departure {
+                satellites: satellites.clone(),
+                radial_m: *radial_m,
+                along_m: *along_m,
+                cross_m: *cross_m,
+                growth,
+            })
+        }
+        _ => None,
+    };
+    scenario.satellite_faults.iter().filter_map(departure).collect()
+}
+
+/// The clocks that faults make depart; those of no size are left out. `catalogue` knows who there is.
+pub(super) fn clocks(
+    scenario: &Scenario,
+    catalogue: &Catalogue,
+    receiver_clock: &ReceiverClock,
+    seed: u64,
+    rate: Rate,
+) -> SatelliteClocks {
+    let mut clocks = SatelliteClocks::default();
+    let node = |t_s: f64| {
+        let sample = receiver_clock.reading_elapsed_s(scenario.start, t_s) * rate.hz();
+        (sample / node_samples(rate) as f64).ceil().max(0.0) as u64
+    };
+    let names = |list: &[Sv]| list.iter().map(Sv::to_string).collect::<Vec<_>>().join(" ");
+    for (number, fault) in (1_u64..).zip(&scenario.satellite_faults) {
+        let (satellites, kind, on_s, off_s, text) = match fault {
+            SatelliteFault::Step { satellites, step_s, on_s, off_s } if *step_s != 0.0 => {
+                let text = format!("clock steps by {step_s:e} s");
+                (satellites, ChangeKind::Step { step_s: *step_s }, *on_s, *off_s, text)
+            }
+            SatelliteFault::Ramp { satellites, drift, on_s, off_s } if *drift != 0.0 => {
+                let text = format!("clock drifts by {drift:e} s/s");
+                (satellites, ChangeKind::Ramp { drift: *drift }, *on_s, *off_s, text)
+            }
+            SatelliteFault::Noise { satellites, law } => {
+                let stream = Stream::new(seed, "satellite clock").part(number);
+                let all: Vec<Sv> = satellites.clone().unwrap_or_else(|| catalogue.satellites().collect());
+                for sv in &all {
+                    let oscillator = Oscillator::new(*law, rate, stream.part(u64::from(sv.number)));
+                    clocks.clocks.entry(*sv).or_default().noise.push(oscillator);
+                }
+                let who = satellites.as_ref().map_or("all satellites".to_owned(), |list| names(list));
+                clocks.descriptions.push(format!("{who}: clock noise h = {:?}", law.levels()));
+                continue;
+            }
+            _ => continue,
+        };
+        let change = Change { from_node: node(on_s), until_node: off_s.map_or(u64::MAX, node), kind };
+        for sv in satellites {
+            clocks.clocks.entry(*sv).or_default().changes.push(change);
+        }
+        let until = off_s.map_or(String::new(), |off_s| format!(" to {off_s} s"));
+        clocks.descriptions.push(format!("{}: {text} from {on_s} s{until}", names(satellites)));
+    }
+    clocks
+}
+
+/// Faults of messages, each tried on what is sent when it begins; those of no size are left out.
+pub(super) fn message_faults(
+    scenario: &Scenario,
+    catalogue: &Catalogue,
+    seed: u64,
+) -> Result<Vec<MessageFault>, ScenarioError> {
+    let mut faults = Vec::new();
+    for (number, spec) in (1_u64..).zip(&scenario.message_faults) {
+        let at = |t_s: f64| scenario.start.plus_s(t_s);
+        let kind = match spec.kind {
+            MessageKind::BitErrors { rate: 0.0 } => continue,
+            MessageKind::BitErrors { rate } => {
+                Kind::BitErrors { rate, stream: Stream::new(seed, "message").part(number) }
+            }
+            MessageKind::Bit { subframe, word, bit } => Kind::Bit { subframe, word, bit },
+            MessageKind::Health(health) => Kind::Health(health),
+            MessageKind::Parameter { add: 0.0, .. } => continue,
+            MessageKind::Parameter { name, add } => Kind::Parameter { name, add },
+        };
+        let fault = MessageFault {
+            satellites: spec.satellites.clone(),
+            on: at(spec.on_s)..at(spec.off_s.unwrap_or(FOREVER_S)),
+            kind,
+        };
+        for sv in spec.satellites.iter().flatten() {
+            let sent = catalogue.sent_at(*sv, fault.on.start);
+            let wrong = sent.and_then(|set| spoiled(std::slice::from_ref(&fault), *sv, set, fault.on.start));
+            if let Some(Err(error)) = wrong.map(|set| lnav::quantised(&set)) {
+                let reason = format!("number {number}, {sv}: {error}");
+                return Err(scenario.conflict("message_fault", reason));
+            }
+        }
+        faults.push(fault);
+    }
+    Ok(faults)
+}
+
+/// Satellites that faults name and that have no message at the scene's start.
+pub(super) fn strangers(scenario: &Scenario, catalogue: &Catalogue) -> Vec<String> {
+    let of_satellites = scenario.satellite_faults.iter().filter_map(|fault| match fault {
+        SatelliteFault::Step { satellites, .. }
+        | SatelliteFault::Ramp { satellites, .. }
+        | SatelliteFault::Orbit { satellites, .. } => Some(satellites),
+        SatelliteFault::Noise { satellites, .. } => satellites.as_ref(),
+    });
+    let of_messages = scenario.message_faults.iter().filter_map(|fault| fault.satellites.as_ref());
+    let named: BTreeSet<Sv> = of_satellites.chain(of_messages).flatten().copied().collect();
+    let unknown = named.into_iter().filter(|sv| catalogue.sent_at(*sv, scenario.start).is_none());
+    unknown.map(|sv| format!("a fault names {sv}, which has no ephemeris then")).collect()
+}

@@ -1,0 +1,103 @@
+//! Precise orbits and faults of satellites and messages as written.
+
+use std::path::Path;
+
+use super::*;
+
+/// Every key of the tables.
+pub(super) const FAULTS: &str = "[orbits]\nsp3 = [\"a.sp3\", \"b.sp3.gz\"]\nantenna_offset_m = 0.7\nantenna_offsets_m = { G13 = 1.5 }\n\
+    [[satellite_fault]]\nkind = \"clock_step\"\nsatellites = [\"G13\"]\nstep_s = 1e-7\non_s = 3\noff_s = 5\n\
+    [[satellite_fault]]\nkind = \"clock_ramp\"\nsatellites = [\"G13\"]\ndrift_sps = 1e-9\n\
+    [[satellite_fault]]\nkind = \"clock_noise\"\noscillator = \"rubidium1\"\n\
+    [[satellite_fault]]\nkind = \"clock_noise\"\npower_law = [0, 0, 1e-22, 0, 0]\n\
+    [[satellite_fault]]\nkind = \"orbit\"\nsatellites = [\"G13\"]\nradial_m = 1\nalong_m = 20\ncross_m = 3\non_s = 2\nramp_s = 60\n\
+    [[message_fault]]\nkind = \"bit_errors\"\nsatellites = [\"G13\"]\nrate = 1e-3\non_s = 3\noff_s = 5\n\
+    [[message_fault]]\nkind = \"bit\"\nsubframe = 2\nword = 3\nbit = 30\n\
+    [[message_fault]]\nkind = \"health\"\nsatellites = [\"G13\"]\nhealth = 63\n\
+    [[message_fault]]\nkind = \"parameter\"\nsatellites = [\"G13\"]\nparameter = \"m0_rad\"\nadd = 1e-6\n";
+
+#[test]
+fn orbits_and_faults_arrive_as_written() {
+    let scenario = parse(&(full() + FAULTS)).unwrap();
+    let orbits = scenario.orbits.unwrap();
+    assert_eq!(orbits.files, [Path::new("a.sp3"), Path::new("b.sp3.gz")]);
+    assert_eq!((orbits.antenna_m, orbits.antennas_m.as_slice()), (0.7, [(Sv::gps(13), 1.5)].as_slice()));
+    let satellites = vec![Sv::gps(13)];
+    let step = SatelliteFault::Step { satellites: satellites.clone(), step_s: 1e-7, on_s: 3.0, off_s: Some(5.0) };
+    assert_eq!(scenario.satellite_faults[0], step);
+    let law = PowerLaw { h0: 1e-22, ..PowerLaw::default() };
+    assert_eq!(scenario.satellite_faults[3], SatelliteFault::Noise { satellites: None, law });
+    let orbit = SatelliteFault::Orbit {
+        satellites: satellites.clone(),
+        radial_m: 1.0,
+        along_m: 20.0,
+        cross_m: 3.0,
+        growth_s: Some((2.0, 60.0)),
+    };
+    assert_eq!(scenario.satellite_faults[4], orbit);
+    let kinds: Vec<MessageKind> = scenario.message_faults.iter().map(|spec| spec.kind).collect();
+    let expected = [
+        MessageKind::BitErrors { rate: 1e-3 },
+        MessageKind::Bit { subframe: 2, word: 3, bit: 30 },
+        MessageKind::Health(63),
+        MessageKind::Parameter { name: "m0_rad", add: 1e-6 },
+    ];
+    assert_eq!(kinds, expected);
+    assert!(scenario.message_faults[1].satellites.is_none());
+}
+
+#[test]
+fn faults_that_cannot_be_are_refused_with_their_remedy() {
+    let refused = |text: &str| match parse(&format!("{MINIMAL}{STATIC}{text}")) {
+        Err(error) => error.to_string(),
+        Ok(scenario) => scenario.compose(Path::new("."), &Overrides::default()).err().unwrap().to_string(),
+    };
+    let fault = |lines: &str| format!("[[satellite_fault]]\n{lines}\n");
+    let message = |lines: &str| format!("[[message_fault]]\nsatellites = [\"G13\"]\n{lines}\n");
+    assert!(refused(&fault("step_s = 1e-7")).contains("clock_step, clock_ramp"));
+    assert!(refused(&fault("kind = \"clock_step\"\nstep_s = 1e-7")).contains("an array of satellites"));
+    assert!(
+        refused(&fault("kind = \"clock_step\"\nsatellites = [\"G13\"]\nstep_s = 1e-7\non_s = 4\noff_s = 3"))
+            .contains("off_s")
+    );
+    assert!(refused(&fault("kind = \"clock_noise\"")).contains("power_law = [h2"));
+    assert!(
+        refused(&fault("kind = \"clock_noise\"\nstep_s = 1e-7")).contains("unknown key 'satellite_fault[1].step_s'")
+    );
+    let jump = refused(&fault("kind = \"orbit\"\nsatellites = [\"G13\"]\non_s = 3\nalong_m = 10"));
+    assert!(jump.contains("orbits do not jump"), "{jump}");
+    assert!(refused(&message("kind = \"bit\"\nsubframe = 6\nword = 1\nbit = 1")).contains("an integer from 1 to 5"));
+    assert!(refused(&message("kind = \"health\"\nhealth = 64")).contains("an integer from 0 to 63"));
+    let misspelt = refused(&message("kind = \"parameter\"\nparameter = \"m0\"\nadd = 1"));
+    assert!(misspelt.contains("did you mean m0_rad?"), "{misspelt}");
+    // Half a semicircle of eccentricity does not fit, and the message says what would.
+    let large = refused(&message("kind = \"parameter\"\nparameter = \"eccentricity\"\nadd = 1"));
+    assert!(large.contains("message_fault") && large.contains("eccentricity") && large.contains("0.49999"), "{large}");
+    let all = refused("[[message_fault]]\nkind = \"health\"\nhealth = 63\n");
+    assert!(all.contains("an array of satellites"), "{all}");
+}
+
+#[test]
+fn orbits_that_do_not_reach_over_the_scene_are_refused_with_their_reach() {
+    let witness = "[orbits]\nsp3 = \"data/witness/igs15904.sp3.gz\"\n";
+    let composed = |start: &str, tables: &str| {
+        let text = replaced(&format!("{MINIMAL}{STATIC}"), "", "start", start) + "\n" + tables;
+        let scenario = parse(&text).unwrap();
+        scenario.compose(Path::new("."), &Overrides::default()).map_err(|e| e.to_string())
+    };
+    // 00:00 to 23:45 every 15 minutes: five epochs before the one at the start, five after that at the end.
+    let early = composed("2010-07-01T01:00:00", witness).err().unwrap();
+    assert!(early.contains("2010-07-01T01:15:00") && early.contains("2010-07-01T22:30:00"), "{early}");
+    let (scene, told) = composed("2010-07-01T10:00:00", witness).unwrap();
+    // PRN 1 has positions and no clock that day; it is unhealthy by its message, too.
+    assert!(scene.excluded.contains(&Sv::gps(1)) && !scene.excluded.contains(&Sv::gps(13)), "{told:?}");
+    let (scene, told) =
+        composed("2010-07-01T10:00:00", &format!("{witness}[satellites]\ninclude_unhealthy = true\n")).unwrap();
+    assert!(scene.excluded.contains(&Sv::gps(1)));
+    assert!(told.iter().any(|line| line.contains("without a precise orbit") && line.contains("G01")), "{told:?}");
+    let other = composed("2010-07-01T10:00:00", "[orbits]\nsp3 = \"Cargo.toml\"\n").err().unwrap();
+    assert!(other.contains("orbits.sp3") && other.contains("begins with '[package]'"), "{other}");
+    let stranger = "[[message_fault]]\nkind = \"health\"\nsatellites = [\"G99\"]\nhealth = 1\n";
+    let (_, told) = composed("2010-07-01T10:00:00", stranger).unwrap();
+    assert!(told.iter().any(|line| line.contains("a fault names G99")), "{told:?}");
+}
