@@ -53,6 +53,12 @@ pub enum Cause {
     Unexplained,
 }
 
+impl Cause {
+    /// Every cause.
+    pub const ALL: [Self; 6] =
+        [Self::NotThere, Self::Obstruction, Self::Interference, Self::Dynamics, Self::WeakSignal, Self::Unexplained];
+}
+
 /// A row of `slips.csv`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Slip {
@@ -114,7 +120,7 @@ impl Slips {
 
     /// How many have each cause.
     pub fn causes(&self) -> BTreeMap<Cause, usize> {
-        let mut counts = BTreeMap::new();
+        let mut counts: BTreeMap<Cause, usize> = Cause::ALL.into_iter().map(|cause| (cause, 0)).collect();
         for row in &self.rows {
             *counts.entry(row.cause).or_insert(0) += 1;
         }
