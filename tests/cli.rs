@@ -175,9 +175,8 @@ fn generate_and_receive_are_the_same_as_run() {
 #[test]
 fn a_sought_part_is_that_part_of_the_whole_and_one_outside_is_refused() {
     let here = workplace();
-    let generate = |out: &str, more: &[&str]| {
-        twin(&[&["generate", "short.toml", "--out", out], more].concat(), here.path())
-    };
+    let generate =
+        |out: &str, more: &[&str]| twin(&[&["generate", "short.toml", "--out", out], more].concat(), here.path());
     assert!(generate("whole.sigmf-data", &[]).status.success());
     let found = generate("part.sigmf-data", &["--seek", "2600001", "--samples", "50000"]);
     assert!(found.status.success(), "{}", stderr(&found));

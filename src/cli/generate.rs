@@ -59,8 +59,7 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     drop(writer);
     // What the receiver's clock reads at the first sample of the file.
     let metadata = IfMetadata { start: Some(scene.clock.epoch(first)), ..scene.metadata.clone() };
-    fs::write(meta.path(), sigmf::write(&metadata))
-        .map_err(|error| CliError::output(meta_path.display(), &error))?;
+    fs::write(meta.path(), sigmf::write(&metadata)).map_err(|error| CliError::output(meta_path.display(), &error))?;
     truth.commit()?;
     samples.commit()?;
     meta.commit()?;

@@ -253,14 +253,14 @@ impl<'a> Stream<'a> {
         let scene = self.scene;
         // From the second batch on blocks begin with runs.
         let from = self.next;
-        let to = (from / RUN_SAMPLES as u64 * RUN_SAMPLES as u64 + self.batch).min(self.part.end);
+        let to = (run_begin(from) + self.batch).min(self.part.end);
         let sample_bytes = scene.metadata.format.bytes();
         packed.resize(to.saturating_sub(from) as usize * sample_bytes, 0);
         if from >= to {
             return Ok(false);
         }
         // Runs are made from their beginning on.
-        let needed = from.saturating_sub(self.lead) / RUN_SAMPLES as u64 * RUN_SAMPLES as u64;
+        let needed = run_begin(from).saturating_sub(self.lead);
         self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, to))?;
         self.ticks.write(scene, &self.transmitters, to, truth)?;
         let kernel =
@@ -297,6 +297,11 @@ impl<'a> Stream<'a> {
         truth.finish(&navigation)?;
         Ok(self.done)
     }
+}
+
+/// The sample at which the run of a sample begins.
+fn run_begin(sample: u64) -> u64 {
+    sample / RUN_SAMPLES as u64 * RUN_SAMPLES as u64
 }
 
 /// The scene's edges; band-limited where there is a `filter`.
@@ -361,7 +366,7 @@ fn render(
     let mut clipped = 0;
     let mut first = start;
     for bytes in bytes.chunks_mut(piece_bytes.max(1)) {
-        let from = first.saturating_sub(memory as u64) / RUN_SAMPLES as u64 * RUN_SAMPLES as u64;
+        let from = run_begin(run_begin(first).saturating_sub(memory as u64));
         let lead = (first - from) as usize;
         let length = lead + bytes.len() / format.bytes();
         let Worker { scratch, i, q } = &mut *worker;

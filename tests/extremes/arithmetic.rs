@@ -71,7 +71,12 @@ fn full_scale_for_a_second_overflows_nothing() {
         let [sum] = replica.correlate_in(arithmetic, (&i, &q), &nco, &[0]);
         // Nearest chips of the two may fall on the other side of an edge once in a while, 2 in 1e5; a wrapped integer would
         // miss by all.
-        the.at_most(&format!("{name}: sum of 2e6 full-scale products, relative"), (sum.re / expected - 1.0).abs(), 1e-3, "");
+        the.at_most(
+            &format!("{name}: sum of 2e6 full-scale products, relative"),
+            (sum.re / expected - 1.0).abs(),
+            1e-3,
+            "",
+        );
     }
 }
 

@@ -35,7 +35,12 @@ fn towards(scene: &Scene) -> Vector3<f64> {
 
 /// A piece of constant jerk after a knot.
 fn after(&[t, s, v, a]: &[f64; 4], dt: f64, jerk: f64) -> [f64; 4] {
-    [t + dt, s + v * dt + a * dt * dt / 2.0 + jerk * dt * dt * dt / 6.0, v + a * dt + jerk * dt * dt / 2.0, a + jerk * dt]
+    [
+        t + dt,
+        s + v * dt + a * dt * dt / 2.0 + jerk * dt * dt * dt / 6.0,
+        v + a * dt + jerk * dt * dt / 2.0,
+        a + jerk * dt,
+    ]
 }
 
 /// Largest departure of the synthesiser's carrier and code (as cycles) from the truth over samples `from..to`, taken at
@@ -153,7 +158,8 @@ fn a_minute_of_twenty_g_ends_at_sixty_kilohertz_with_code_and_carrier_together()
     for sv in run::in_view(&scene) {
         let (a, b) = worst_cycles(&scene, sv, (first, first + 2_000_000), 1000);
         (carrier, code) = (carrier.max(a), code.max(b));
-        let at = |n: u64| truth::seen(&scene, sv, &L1_CA, scene.clock.epoch(n)).unwrap().unwrap().arrivals[0].carrier_cycles;
+        let at =
+            |n: u64| truth::seen(&scene, sv, &L1_CA, scene.clock.epoch(n)).unwrap().unwrap().arrivals[0].carrier_cycles;
         most_hz = most_hz.max(((at(first + 26_000) - at(first)) / 0.01).abs());
     }
     the.at_least("largest Doppler", most_hz, 55e3, "Hz");
@@ -185,7 +191,8 @@ fn beyond_a_tenth_of_light_s_speed_a_motion_is_refused() {
 fn at_the_zero_of_doppler_nothing_divides() {
     let the = case(27, "Doppler zero crossing");
     // A satellite whose Doppler passes zero: between samples of an hour, then by halves.
-    let scene = run::scene(3600.0, "[front_end]\nsample_rate_hz = 4.092e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 45\n");
+    let scene =
+        run::scene(3600.0, "[front_end]\nsample_rate_hz = 4.092e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 45\n");
     let doppler_hz = |sv: Sv, sample: u64| {
         let authentic = gnss_twin::generator::spoof::Constellation::authentic();
         truth::observe(&scene, &authentic, sv, &L1_CA, sample, 0.0).unwrap().unwrap().0.doppler_hz
@@ -209,11 +216,20 @@ fn at_the_zero_of_doppler_nothing_divides() {
     let cycles = turns_b.wrapping_sub(turns_a) as i64 as f64 / TURN;
     the.at_most("Doppler at the crossing", doppler_hz(crossing, low).abs(), 1e-3, "Hz");
     // Two places of the code, 1e-10 chip each.
-    the.at_most("code rate less 1.023 MHz less f_D/1540", (chips - 1.023e6 * seconds - cycles / 1540.0).abs() / seconds, 1e-8, "chip/s");
+    the.at_most(
+        "code rate less 1.023 MHz less f_D/1540",
+        (chips - 1.023e6 * seconds - cycles / 1540.0).abs() / seconds,
+        1e-8,
+        "chip/s",
+    );
     let alone = run::only(scene, &[crossing]);
     let bytes = run::part(&alone, low..low + 40_920, tempfile::tempdir().unwrap().path());
     let (i, q) = run::planes(&alone, &bytes);
-    the.all("samples finite", i.iter().zip(&q).filter(|(i, q)| i.is_finite() && q.is_finite() && **i * **i + **q * **q > 0.0).count(), 40_920);
+    the.all(
+        "samples finite",
+        i.iter().zip(&q).filter(|(i, q)| i.is_finite() && q.is_finite() && **i * **i + **q * **q > 0.0).count(),
+        40_920,
+    );
 }
 
 #[test]

@@ -97,7 +97,13 @@ fn short(value: f64) -> String {
     } else if size >= 100.0 || value.fract() == 0.0 {
         format!("{value:.0}")
     } else {
-        let digits = if size >= 10.0 { 1 } else if size >= 1.0 { 2 } else { 4 };
+        let digits = if size >= 10.0 {
+            1
+        } else if size >= 1.0 {
+            2
+        } else {
+            4
+        };
         format!("{value:.digits$}")
     }
 }
@@ -114,7 +120,10 @@ fn write(rows: &BTreeMap<(u32, usize), (Case, [String; 3])>) {
     for ((number, _), (case, [figure, value, bar])) in rows {
         let now = FAMILIES.iter().rev().find(|(first, _)| first <= number).map_or("", |(_, name)| *name);
         if now != family {
-            let _ = write!(text, "\n## {now}\n\n| case | subject | figure | measured | bar |\n| --- | --- | --- | --- | --- |\n");
+            let _ = write!(
+                text,
+                "\n## {now}\n\n| case | subject | figure | measured | bar |\n| --- | --- | --- | --- | --- |\n"
+            );
             family = now;
         }
         let (number_text, subject) =

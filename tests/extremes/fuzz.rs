@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use gnss_twin::generator::ripple;
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
@@ -30,7 +31,10 @@ pub struct Period {
 impl Period {
     pub fn after(scene: &Scene, sv: Sv, near: u64) -> Option<Self> {
         let rate_hz = scene.clock.rate.hz();
-        let seen = |n: u64| truth::seen(scene, sv, &L1_CA, scene.clock.epoch(n)).unwrap().map(|seen| seen.arrivals[0]);
+        let seen = |n: u64| {
+            let seen = truth::seen(scene, sv, &L1_CA, scene.clock.epoch(n)).unwrap()?;
+            Some(seen.arrivals[0].rippled(ripple::at(scene, Some(sv), &L1_CA, n as f64)))
+        };
         let sent = |n: u64, delay_s: f64| scene.clock.epoch(n).plus_s(-delay_s);
         let into_s = (sent(near, seen(near)?.delay_s).fraction() * 1e3).fract() * 1e-3;
         let first = near + ((1e-3 - into_s) * rate_hz).ceil() as u64 + 1;
@@ -62,7 +66,8 @@ impl Period {
             let turns = tone + sense * Self::at(self.carrier, u);
             let (sin, cos) = libm::sincos(TAU * turns.fract());
             let chip = if code[Self::at(self.chips, u) as usize % 1023] { -1.0 } else { 1.0 };
-            sum += Complex64::new(f64::from(i[k as usize]), f64::from(q[k as usize])) * Complex64::new(cos, -sin) * chip;
+            sum +=
+                Complex64::new(f64::from(i[k as usize]), f64::from(q[k as usize])) * Complex64::new(cos, -sin) * chip;
         }
         sum / self.samples as f64
     }
@@ -106,7 +111,10 @@ fn scenes() -> impl Strategy<Value = (String, f64)> {
     let band = prop_oneof![
         (2.046e6..12e6, -0.2..0.2, any::<bool>()).prop_map(|(rate, place, inverted): (f64, f64, bool)| {
             let if_hz = (place * rate).round();
-            format!("sample_rate_hz = {:.0}\nif_hz = {if_hz:.0}\nspectrum_inverted = {inverted}\nformat = \"cf32\"\n", rate.round())
+            format!(
+                "sample_rate_hz = {:.0}\nif_hz = {if_hz:.0}\nspectrum_inverted = {inverted}\nformat = \"cf32\"\n",
+                rate.round()
+            )
         }),
         (5e6..12e6, 0.22..0.28, any::<bool>()).prop_map(|(rate, place, inverted): (f64, f64, bool)| {
             format!(
@@ -149,8 +157,9 @@ fn departures(text: &str, share: f64) -> Result<Option<[f64; 4]>, TestCaseError>
     let (i, q) = run::planes(&scene, &bytes);
     prop_assert!(i.iter().chain(&q).all(|x| x.is_finite()), "a sample is no number");
     let at_second = scene.clock.epoch(near / scene.clock.rate.hz() as u64 * scene.clock.rate.hz() as u64);
-    let up: Vec<Sv> =
-        (scene.catalogue.satellites()).filter(|sv| !scene.excluded.contains(sv) && truth::in_view(&scene, *sv, at_second).unwrap()).collect();
+    let up: Vec<Sv> = (scene.catalogue.satellites())
+        .filter(|sv| !scene.excluded.contains(sv) && truth::in_view(&scene, *sv, at_second).unwrap())
+        .collect();
     let Some(sv) = up.get(near as usize % up.len().max(1)).copied() else { return Ok(None) };
     let mut alone = run::only(scene, &[sv]);
     alone.noise = false;
@@ -169,7 +178,8 @@ fn departures(text: &str, share: f64) -> Result<Option<[f64; 4]>, TestCaseError>
     let limit_mps2 = alone.trajectory.extremes(f64::INFINITY).acceleration_mps2 + 12.0;
     let (mut bend_m, mut parted_m) = (0.0_f64, 0.0_f64);
     let steps = (0.005 * rate_hz) as u64;
-    let seen: Vec<_> = (0..12).filter_map(|k| truth::seen(&alone, sv, &L1_CA, alone.clock.epoch(near + k * steps)).unwrap()).collect();
+    let seen: Vec<_> =
+        (0..12).filter_map(|k| truth::seen(&alone, sv, &L1_CA, alone.clock.epoch(near + k * steps)).unwrap()).collect();
     for three in seen.windows(3) {
         let range_m = |k: usize| three[k].arrivals[0].delay_s * SPEED_OF_LIGHT_MPS;
         let bend = (range_m(2) - 2.0 * range_m(1) + range_m(0)).abs();
@@ -177,7 +187,8 @@ fn departures(text: &str, share: f64) -> Result<Option<[f64; 4]>, TestCaseError>
     }
     for one in &seen {
         let (arrival, ray) = (one.arrivals[0], one.rays[0]);
-        let parted = (arrival.delay_s - arrival.carrier_cycles / L1_CA.carrier_hz) - (ray.code_delay_s - ray.carrier_delay_s)
+        let parted = (arrival.delay_s - arrival.carrier_cycles / L1_CA.carrier_hz)
+            - (ray.code_delay_s - ray.carrier_delay_s)
             + ray.phase_cycles / L1_CA.carrier_hz;
         parted_m = parted_m.max((parted * SPEED_OF_LIGHT_MPS).abs());
     }
@@ -200,8 +211,9 @@ fn random_scenes_keep_the_laws_of_all_scenes() {
         for (worst, found) in worst.0.iter_mut().zip(found) {
             *worst = worst.max(found);
         }
-        // A noisy oscillator's quick part is in the samples alone: 2e-3 cycle over a millisecond.
-        prop_assert!(found[0] < 1e-2 && found[1] < 0.3 && found[2] < 1e-6 && found[3] < 1e-6, "{found:?} of\n{text}");
+        // Knots leave 1e-4 cycle, single precision 1e-6, a kink of a noisy oscillator within the period some 1e-4; 5000
+        // samples of a ri16 signal of 20 LSB are rounded to 1/(√12 · 20 · √2500) rad, 5e-5 cycle.
+        prop_assert!(found[0] < 1e-3 && found[1] < 0.3 && found[2] < 1e-6 && found[3] < 1e-6, "{found:?} of\n{text}");
         Ok(())
     });
     if let Err(error) = found {
@@ -210,7 +222,7 @@ fn random_scenes_keep_the_laws_of_all_scenes() {
     let ([carrier, cn0_db, bend_m, parted_m], judged) = *worst.lock().unwrap();
     the.all("scenes with finite samples", count as usize, count as usize);
     the.at_least("of those, with a satellite in view and judged", judged as f64, 0.6 * f64::from(count), "");
-    the.at_most("carrier against an independent replica, noise-free", carrier, 1e-2, "cycle");
+    the.at_most("carrier against an independent replica, noise-free", carrier, 1e-3, "cycle");
     the.at_most("C/N0 in the samples against the truth's", cn0_db, 0.3, "dB");
     the.at_most("range bends more than the motion", bend_m, 1e-6, "m");
     the.at_most("code and carrier parted by other than their rays say", parted_m, 1e-6, "m");

@@ -3,9 +3,9 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
+use gnss_twin::generator::effect::mapping::Mapping;
 use gnss_twin::generator::effect::mapping::niell;
 use gnss_twin::generator::effect::troposphere::{Air, Troposphere, Weather};
-use gnss_twin::generator::effect::mapping::Mapping;
 use gnss_twin::generator::sky;
 use gnss_twin::generator::truth;
 use gnss_twin::generator::vehicle::Motion;
@@ -68,9 +68,12 @@ fn the_two_names_of_the_antimeridian_are_one_place() {
                 let delay_m = |longitude: f64| {
                     let user = Geodetic::from_degrees(latitude, longitude, 100.0);
                     SPEED_OF_LIGHT_MPS
-                        * [model.delay_s(user, towards, at, L1_HZ), KlobucharIonosphere { model }.delay_s(user, towards, at, L1_HZ)]
-                            .iter()
-                            .sum::<f64>()
+                        * [
+                            model.delay_s(user, towards, at, L1_HZ),
+                            KlobucharIonosphere { model }.delay_s(user, towards, at, L1_HZ),
+                        ]
+                        .iter()
+                        .sum::<f64>()
                 };
                 worst_m = worst_m.max((delay_m(180.0) - delay_m(-180.0)).abs());
             }
@@ -134,7 +137,8 @@ fn at_and_below_the_horizon_delays_stand_still_and_keep_their_sign() {
         let printed_m = SPEED_OF_LIGHT_MPS * model.delay_s(user, towards, at, L1_HZ);
         of += 1;
         held += usize::from(
-            (10.0..60.0).contains(&dry) && (10.0..60.0).contains(&wet)
+            (10.0..60.0).contains(&dry)
+                && (10.0..60.0).contains(&wet)
                 && (1.0..100.0).contains(&slant_m)
                 && (1.0..100.0).contains(&printed_m),
         );
@@ -147,7 +151,10 @@ fn at_and_below_the_horizon_delays_stand_still_and_keep_their_sign() {
 #[test]
 fn overhead_there_is_no_azimuth_and_in_the_antenna_no_direction() {
     let the = case(19, "satellite at the zenith, and at the antenna");
-    let scene = run::scene(60.0, "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\nmodel = \"klobuchar\"\n");
+    let scene = run::scene(
+        60.0,
+        "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\nmodel = \"klobuchar\"\n",
+    );
     let (mut finite, mut refused, mut of, mut worst) = (0, 0, 0, 0.0_f64);
     for sv in scene.catalogue.satellites() {
         let at = scene.clock.start;
@@ -159,19 +166,26 @@ fn overhead_there_is_no_azimuth_and_in_the_antenna_no_direction() {
             let seen = sky::emission(&scene.catalogue, sv, at, &Motion::at_rest(place)).unwrap().unwrap();
             place = under(&seen.sight.satellite.position_m, 0.0);
         }
-        let mut overhead = run::scene(60.0, "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\nmodel = \"klobuchar\"\n");
+        let mut overhead = run::scene(
+            60.0,
+            "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\nmodel = \"klobuchar\"\n",
+        );
         overhead.trajectory = gnss_twin::generator::vehicle::Trajectory::fixed(place);
         let seen = truth::seen(&overhead, sv, &L1_CA, at).unwrap().unwrap();
         let towards = seen.emission.sight.look;
         let arrival = seen.arrivals[0];
         of += 1;
         finite += usize::from(
-            towards.azimuth_rad.is_finite() && arrival.delay_s.is_finite() && arrival.carrier_cycles.is_finite() && arrival.cn0_hz > 0.0,
+            towards.azimuth_rad.is_finite()
+                && arrival.delay_s.is_finite()
+                && arrival.carrier_cycles.is_finite()
+                && arrival.cn0_hz > 0.0,
         );
         worst = worst.max((FRAC_PI_2 - towards.elevation_rad).abs());
         // In the satellite, to a millimetre.
         let inside = Motion::at_rest(state.position_m + Vector3::new(1e-3, 0.0, 0.0));
-        refused += usize::from(matches!(sky::emission(&scene.catalogue, sv, at, &inside), Err(OrbitError::Near { .. })));
+        refused +=
+            usize::from(matches!(sky::emission(&scene.catalogue, sv, at, &inside), Err(OrbitError::Near { .. })));
     }
     the.all("overhead: everything finite", finite, of);
     the.at_most("overhead: zenith distance", worst, 1e-6, "rad");
@@ -211,7 +225,8 @@ fn ranges(sky: &[(f64, f64)]) -> Vec<Range> {
 fn satellites_on_a_cone_or_in_a_plane_give_no_position_but_their_condition() {
     let the = case(20, "satellites on a cone");
     let cone = |opening: f64| (0..6).map(|k| (60.0 * f64::from(k), opening)).collect::<Vec<_>>();
-    let plane: Vec<(f64, f64)> = (1..7).map(|k| (if k < 4 { 40.0 } else { 220.0 }, 25.0 * f64::from(1 + (k - 1) % 3))).collect();
+    let plane: Vec<(f64, f64)> =
+        (1..7).map(|k| (if k < 4 { 40.0 } else { 220.0 }, 25.0 * f64::from(1 + (k - 1) % 3))).collect();
     let (mut refused, mut least) = (0, f64::INFINITY);
     for sky in [cone(10.0), cone(45.0), cone(80.0), plane, vec![(10.0, 40.0); 5]] {
         if let Err(NoFix::Singular { condition }) = position(&ranges(&sky), Vector3::zeros(), &BARE) {
@@ -274,7 +289,8 @@ fn a_position_is_as_good_as_its_condition_says_or_refused_with_it() {
     for step in 0..60 {
         // From a cone to a fair sky: satellite after satellite leaves the common elevation.
         let off_deg = libm::pow(10.0, -5.0 + 0.1 * f64::from(step));
-        let sky: Vec<(f64, f64)> = (0..6).map(|k| (60.0 * f64::from(k), 45.0 - off_deg.min(40.0) * f64::from(k % 3) / 2.0)).collect();
+        let sky: Vec<(f64, f64)> =
+            (0..6).map(|k| (60.0 * f64::from(k), 45.0 - off_deg.min(40.0) * f64::from(k % 3) / 2.0)).collect();
         let mut seen = ranges(&sky);
         let place = Geodetic::from_degrees(26.5, 80.2, 130.0).to_ecef();
         // A millimetre on one range.

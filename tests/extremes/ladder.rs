@@ -118,10 +118,9 @@ fn chart(title: &str, x_label: &str, y_label: &str, curves: &Curves) -> Chart {
     let y = Axis::around(y_label, points().map(|p| p.1), 2.0);
     let (x_ticks, y_ticks) = (x.log_ticks(&[1.0], |v| format!("{v}")), y.log_ticks(&[1.0], |v| format!("{v:e}")));
     let colours = [ORANGE, BLUE, GREEN];
-    let series = curves
-        .iter()
-        .zip(colours)
-        .map(|((name, points), colour)| Series::new(*name, colour, Mark::Line, points.iter().map(|(x, y)| place(*x, *y)).collect()));
+    let series = curves.iter().zip(colours).map(|((name, points), colour)| {
+        Series::new(*name, colour, Mark::Line, points.iter().map(|(x, y)| place(*x, *y)).collect())
+    });
     let mut chart = Chart::new(title, x, y, series.collect());
     (chart.x_ticks, chart.y_ticks) = (Some(x_ticks), Some(y_ticks));
     chart
@@ -142,7 +141,12 @@ fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
         }
         let (now, later) = (curve[0].1, curve[curve.len() - 1].1);
         // An hour's places are others than the first second's; what is rounded late is a month's drift, 6e-8 cycle.
-        the.at_most(&format!("{}: carrier after 30 d over that at first", grade.name()), later, 1.5 * now + 2e-6, "cycle rms");
+        the.at_most(
+            &format!("{}: carrier after 30 d over that at first", grade.name()),
+            later,
+            1.5 * now + 2e-6,
+            "cycle rms",
+        );
         over_time.push((grade.name(), curve));
         let mut curve = Vec::new();
         for rate_hz in [2.046e6, 2.6e6, 5e6, 10e6, 25e6, 50e6] {
@@ -151,7 +155,12 @@ fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
             curve.push((rate_hz / 1e6, rms));
             assert!(worst < allowed(grade), "{grade:?} at {rate_hz}: {worst}");
         }
-        the.at_most(&format!("{}: carrier at any rate", grade.name()), curve.iter().fold(0.0, |w, p| w.max(p.1)), allowed(grade), "cycle rms");
+        the.at_most(
+            &format!("{}: carrier at any rate", grade.name()),
+            curve.iter().fold(0.0, |w, p| w.max(p.1)),
+            allowed(grade),
+            "cycle rms",
+        );
         over_rate.push((grade.name(), curve));
         let mut curve = Vec::new();
         for g in [0.1, 1.0, 20.0, 100.0] {
@@ -160,14 +169,28 @@ fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
             let (rms, _) = carrier_error(&scene, grade, first + 26_000, 25, 0.053);
             curve.push((g, rms));
         }
-        the.at_most(&format!("{}: carrier shaken by up to 100 g at 1 Hz", grade.name()), curve.iter().fold(0.0, |w, p| w.max(p.1)), allowed(grade), "cycle rms");
+        the.at_most(
+            &format!("{}: carrier shaken by up to 100 g at 1 Hz", grade.name()),
+            curve.iter().fold(0.0, |w, p| w.max(p.1)),
+            allowed(grade),
+            "cycle rms",
+        );
         over_dynamics.push((grade.name(), curve));
     }
     let counts = [1_000, 10_000, 100_000, 1_000_000];
     let mut over_length: Curves = Vec::new();
-    for (name, arithmetic, dc) in [("f32", correlate::Arithmetic::F32, 0.0), ("f32, DC 10 σ", correlate::Arithmetic::F32, 10.0), ("f64", correlate::Arithmetic::F64, 0.0)] {
+    for (name, arithmetic, dc) in [
+        ("f32", correlate::Arithmetic::F32, 0.0),
+        ("f32, DC 10 σ", correlate::Arithmetic::F32, 10.0),
+        ("f64", correlate::Arithmetic::F64, 0.0),
+    ] {
         let curve: Vec<_> = counts.iter().map(|count| (*count as f64, sum_error(arithmetic, *count, dc))).collect();
-        the.at_most(&format!("{name} sums: error of 1e6 samples over the noise, against that of 1e4"), curve[3].1, 4.0 * curve[1].1 + 1e-12, "");
+        the.at_most(
+            &format!("{name} sums: error of 1e6 samples over the noise, against that of 1e4"),
+            curve[3].1,
+            4.0 * curve[1].1 + 1e-12,
+            "",
+        );
         over_length.push((name, curve));
     }
     assert_eq!(Fidelity::of(Grade::Reference).carrier, Arithmetic::F64);
@@ -178,8 +201,11 @@ fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
             chart("Carrier over dynamics", "g at 1 Hz", "cycles rms", &over_dynamics),
             chart("Sums over their length (f32, f32 with DC, f64)", "samples", "error over noise", &over_length),
         ];
-        let legend: Vec<Series> =
-            LEVELS.iter().zip([ORANGE, BLUE, GREEN]).map(|(grade, c)| Series::new(grade.name(), c, Mark::Line, Vec::new())).collect();
+        let legend: Vec<Series> = LEVELS
+            .iter()
+            .zip([ORANGE, BLUE, GREEN])
+            .map(|(grade, c)| Series::new(grade.name(), c, Mark::Line, Vec::new()))
+            .collect();
         figure(&path.with_extension("png"), (1280, 900), 2, &charts, &legend).unwrap();
         let name = path.with_extension("png").file_name().unwrap().to_string_lossy().into_owned();
         let text = format!(

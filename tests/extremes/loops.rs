@@ -24,7 +24,10 @@ fn sums_over_unknown_bits_lose_what_theory_says_and_two_quadrants_see_no_bit() {
     let the = case(47, "T = 20 ms, bits unsynchronised");
     // Prompts of a code period each from the generator's own signal, by the truth's code and carrier.
     let sv = Sv::gps(23);
-    let mut still = run::only(run::scene(7.0, "[front_end]\nsample_rate_hz = 1.5e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 45\n"), &[sv]);
+    let mut still = run::only(
+        run::scene(7.0, "[front_end]\nsample_rate_hz = 1.5e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 45\n"),
+        &[sv],
+    );
     still.noise = false;
     let bytes = run::samples(&still);
     let (i, q) = run::planes(&still, &bytes);
@@ -35,14 +38,21 @@ fn sums_over_unknown_bits_lose_what_theory_says_and_two_quadrants_see_no_bit() {
         near = period.first + period.samples / 2;
     }
     let mean = prompts.iter().map(|x| x.abs()).sum::<f64>() / prompts.len() as f64;
-    let power = prompts.windows(20).map(|w| (w.iter().sum::<f64>() / 20.0 / mean).powi(2)).sum::<f64>() / (prompts.len() - 19) as f64;
+    let power = prompts.windows(20).map(|w| (w.iter().sum::<f64>() / 20.0 / mean).powi(2)).sum::<f64>()
+        / (prompts.len() - 19) as f64;
     // Of these bits a share p turns. Then (1 − k/10)² is left for k = 0 … 19 periods, 0.335 on average; half of them
     // turning would leave 0.6675, the −1.76 dB of the textbook.
     let turns = prompts.windows(2).filter(|w| w[0] * w[1] < 0.0).count() as f64 / (prompts.len() as f64 / 20.0);
     let theory_db = 10.0 * libm::log10(1.0 - turns * (1.0 - 0.335));
     assert!((0.4..0.6).contains(&turns), "{turns}");
     the.near("mean loss of 20 ms over unknown bits", 10.0 * libm::log10(power), theory_db, 0.02, "dB");
-    the.near("the same for bits of which half turn", 10.0 * libm::log10(1.0 - (1.0 - power) * 0.5 / turns), -1.76, 0.03, "dB");
+    the.near(
+        "the same for bits of which half turn",
+        10.0 * libm::log10(1.0 - (1.0 - power) * 0.5 / turns),
+        -1.76,
+        0.03,
+        "dB",
+    );
     let (mut worst, mut jumps) = (0.0_f64, 0.0_f64);
     for f_hz in [-20.0, -3.0, 0.0, 7.0, 20.0] {
         let before = Complex64::from_polar(1.0, 0.4);
@@ -53,7 +63,10 @@ fn sums_over_unknown_bits_lose_what_theory_says_and_two_quadrants_see_no_bit() {
     the.at_most("two-quadrant FLL across a bit edge", worst, 1e-9, "Hz");
     the.near("four-quadrant FLL across a bit edge jumps by 1/(2T)", jumps, 500.0, 1e-9, "Hz");
     // The receiver itself, started in the middle of a bit at the longest integration.
-    let scene = run::only(run::scene(3.0, "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[noise]\n[power]\ncn0_dbhz = 45\n"), &[Sv::gps(23)]);
+    let scene = run::only(
+        run::scene(3.0, "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[noise]\n[power]\ncn0_dbhz = 45\n"),
+        &[Sv::gps(23)],
+    );
     let settings = TrackingSettings { integration: 20, pll_bandwidth_hz: 10.0, ..Default::default() };
     let bytes = run::samples(&scene);
     let (channel, report) = run::track(&scene, &bytes, &run::hit(&scene, Sv::gps(23), 0.2, 60.0), &settings, 260_000);
@@ -118,16 +131,27 @@ fn a_correlator_too_narrow_or_too_wide_is_refused_and_its_noise_stays_finite() {
         let noise = CodeNoise { chip_m: 293.0, spacing_chips: **d, bandwidth_hz: 0.5, integration_s: 1e-3 };
         let shape = loops::CodeShape::triangle(**d);
         let gain = shape.early_minus_late_gain(1.0);
-        [1.0, 1e3, 1e10].iter().all(|cn0| noise.sigma_m(*cn0).is_finite() && noise.sigma_m(*cn0) > 0.0) && gain > 0.0 && gain <= 1.0
+        [1.0, 1e3, 1e10].iter().all(|cn0| noise.sigma_m(*cn0).is_finite() && noise.sigma_m(*cn0) > 0.0)
+            && gain > 0.0
+            && gain <= 1.0
     });
     the.all("0.02 to 1.5: jitter and gain finite", finite.count(), 5);
     // A whole channel at d = 1.5.
-    let scene = run::only(run::scene(2.5, "[front_end]\nsample_rate_hz = 5e6\nformat = \"ci8\"\n[noise]\n[power]\ncn0_dbhz = 50\n"), &[Sv::gps(23)]);
+    let scene = run::only(
+        run::scene(2.5, "[front_end]\nsample_rate_hz = 5e6\nformat = \"ci8\"\n[noise]\n[power]\ncn0_dbhz = 50\n"),
+        &[Sv::gps(23)],
+    );
     let settings = TrackingSettings { spacing_chips: 1.5, ..Default::default() };
-    let (_, report) = run::track(&scene, &run::samples(&scene), &run::hit(&scene, Sv::gps(23), 0.1, 20.0), &settings, 500_000);
+    let (_, report) =
+        run::track(&scene, &run::samples(&scene), &run::hit(&scene, Sv::gps(23), 0.1, 20.0), &settings, 500_000);
     let last = report.measurements.last().unwrap();
     // σ at 50 dB-Hz, 0.5 Hz, d = 1.5: 0.57 m; three of them.
-    the.at_most("d = 1.5: code after 2.5 s at 50 dB-Hz", run::code_error_m(&scene, Sv::gps(23), last.sample, last.code_fraction).abs(), 1.8, "m");
+    the.at_most(
+        "d = 1.5: code after 2.5 s at 50 dB-Hz",
+        run::code_error_m(&scene, Sv::gps(23), last.sample, last.code_fraction).abs(),
+        1.8,
+        "m",
+    );
 }
 
 #[test]
@@ -152,14 +176,20 @@ fn data_upside_down_are_the_same_data() {
             found.extend(decoder.take(&symbol, Epoch::new(start, 0.0)));
         }
         let time = decoder.time_of_week(20 * 2000, 0.0);
-        (format!("{:?}", found.iter().filter(|news| matches!(news, News::Ephemeris { .. })).collect::<Vec<_>>()), time, found.len())
+        (
+            format!("{:?}", found.iter().filter(|news| matches!(news, News::Ephemeris { .. })).collect::<Vec<_>>()),
+            time,
+            found.len(),
+        )
     };
     let (mut held, mut of) = (0, 0);
     for from in [0, 1, 17, 299, 300] {
         let (upright, inverted) = (read(false, from), read(true, from));
         of += 1;
         let tow = (start + 40).rem_euclid(WEEK_S);
-        held += usize::from(upright.0 == inverted.0 && upright.1 == inverted.1 && upright.1 == Some((tow, 0.0)) && upright.2 > 5);
+        held += usize::from(
+            upright.0 == inverted.0 && upright.1 == inverted.1 && upright.1 == Some((tow, 0.0)) && upright.2 > 5,
+        );
     }
     the.all("ephemeris and time alike both ways up (preambles 8B and 74)", held, of);
 }
@@ -168,11 +198,15 @@ fn data_upside_down_are_the_same_data() {
 fn away_from_the_peak_a_channel_comes_back_or_gives_up() {
     let the = case(51, "false lock half a chip and a chip off");
     let sv = Sv::gps(23);
-    let scene = run::only(run::scene(8.0, "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[noise]\n[power]\ncn0_dbhz = 45\n"), &[sv]);
+    let scene = run::only(
+        run::scene(8.0, "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[noise]\n[power]\ncn0_dbhz = 45\n"),
+        &[sv],
+    );
     let bytes = run::samples(&scene);
     let (mut held, mut of, mut worst_m) = (0, 0, 0.0_f64);
     for chips in [-1.1, -1.0, -0.75, -0.5, 0.5, 0.75, 1.0, 1.1, 3.3, -511.5] {
-        let (channel, report) = run::track(&scene, &bytes, &run::hit(&scene, sv, chips, 30.0), &TrackingSettings::default(), 260_000);
+        let (channel, report) =
+            run::track(&scene, &bytes, &run::hit(&scene, sv, chips, 30.0), &TrackingSettings::default(), 260_000);
         let last = report.measurements.iter().rev().find(|m| m.locked);
         let late = last.filter(|m| m.sample > 18_000_000);
         let error_m = late.map(|m| run::code_error_m(&scene, sv, m.sample, m.code_fraction).abs());
@@ -191,7 +225,13 @@ fn away_from_the_peak_a_channel_comes_back_or_gives_up() {
         let nco = Nco { carrier: 0, carrier_step: 0, code: chips_to_units(f64::from(lag) + 0.5), code_step: 1 << 48 };
         replica.slow(&i, &vec![0.0; 1023], &nco, &[0])[0].norm() / 1023.0
     });
-    the.near("highest lobe of the code beside its peak", 20.0 * libm::log10(highest.fold(0.0, f64::max)), -23.94, 0.01, "dB");
+    the.near(
+        "highest lobe of the code beside its peak",
+        20.0 * libm::log10(highest.fold(0.0, f64::max)),
+        -23.94,
+        0.01,
+        "dB",
+    );
 }
 
 #[test]

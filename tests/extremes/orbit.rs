@@ -30,8 +30,7 @@ fn a_circle_has_no_perigee_and_needs_none() {
         let at = circle.toe.plus_s(72.0 * f64::from(k) - 7200.0);
         // The perigee may be anywhere on a circle.
         let turn = 0.031 * f64::from(k);
-        let other =
-            Ephemeris { omega_rad: circle.omega_rad + turn, m0_rad: circle.m0_rad - turn, ..circle.clone() };
+        let other = Ephemeris { omega_rad: circle.omega_rad + turn, m0_rad: circle.m0_rad - turn, ..circle.clone() };
         let (a, b) = (circle.state(at).unwrap(), other.state(at).unwrap());
         let clock = circle.clock_l1(at).unwrap();
         let all = a.position_m.iter().chain(&a.velocity_mps).all(|x| x.is_finite()) && clock.offset_s.is_finite();
@@ -84,7 +83,11 @@ fn no_semi_major_axis_and_no_reference_time_are_no_orbit() {
     lines[3].replace_range(3..22, &" ".repeat(19));
     let damaged = format!("{}{}\n", &text[..body], lines.join("\n"));
     let found = rinex::read(damaged.as_bytes(), "damaged").unwrap();
-    the.all("record without toe: left out and told, its neighbour kept", usize::from(found.ephemerides.len() == 1 && !found.skipped.is_empty()), 1);
+    the.all(
+        "record without toe: left out and told, its neighbour kept",
+        usize::from(found.ephemerides.len() == 1 && !found.skipped.is_empty()),
+        1,
+    );
 }
 
 /// Observations of a sky at `at`, as a receiver would have them, from the sets' own orbits.
@@ -121,12 +124,19 @@ fn an_old_set_is_sent_by_no_satellite_and_used_by_no_receiver() {
         &run::text(60.0, &format!("{}[front_end]\nsample_rate_hz = 2.6e6\n[power]\ncn0_dbhz = 45\n", run::PLACE))
             .replace("2010-07-01T08:05:58", "2010-07-03T08:05:58"),
     );
-    the.all("scene two days after its file: refused with the file's span", usize::from(scene.is_err_and(|e| e.contains("navigation"))), 1);
+    the.all(
+        "scene two days after its file: refused with the file's span",
+        usize::from(scene.is_err_and(|e| e.contains("navigation"))),
+        1,
+    );
     // A receiver keeps a set ten minutes longer, for want of a newer one.
     let sets = rinex::embedded().unwrap().ephemerides;
     let toe = Epoch::parse("2010-07-01T08:00:00").unwrap();
-    let sets: BTreeMap<Sv, Ephemeris> =
-        sets.into_iter().filter(|set| set.toe == toe && set.health == 0 && !set.long_fit).map(|set| (set.sv, set)).collect();
+    let sets: BTreeMap<Sv, Ephemeris> = sets
+        .into_iter()
+        .filter(|set| set.toe == toe && set.health == 0 && !set.long_fit)
+        .map(|set| (set.sv, set))
+        .collect();
     let settings = PositionSettings {
         ionosphere: IonosphereChoice::None,
         troposphere: TroposphereChoice::None,

@@ -125,18 +125,14 @@ impl Received {
         rows(&self.directory.path().join("truth"), "observations.csv")
     }
 
-    pub fn observations(&self) -> Vec<Observation> {
-        rows(&self.directory.path().join("rx"), "observations.csv")
-    }
-
     /// Whether every number in every table that the receiver wrote is finite.
     pub fn finite(&self) -> bool {
         ["observations", "fixes", "acquisition", "tracking"].iter().all(|name| {
             let path = self.directory.path().join("rx").join(format!("{name}.csv"));
             let mut table = csv::Reader::from_path(path).unwrap();
-            table.records().all(|row| {
-                row.unwrap().iter().all(|field| field.parse::<f64>().map_or(true, f64::is_finite))
-            })
+            table
+                .records()
+                .all(|row| row.unwrap().iter().all(|field| field.parse::<f64>().map_or(true, f64::is_finite)))
         })
     }
 

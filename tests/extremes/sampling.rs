@@ -7,8 +7,8 @@ use gnss_twin::generator::synth::band::Filter;
 use gnss_twin::generator::synth::bank::Bank;
 use gnss_twin::generator::synth::chips::{CodeTime, Spreading};
 use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::synth::{Edge, Kernel, Run};
 use gnss_twin::generator::synth::transmitter::Transmitter;
+use gnss_twin::generator::synth::{Edge, Kernel, Run};
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
 use gnss_twin::gnss::satellite::Sv;
@@ -56,11 +56,16 @@ fn bias_m(rate_khz: usize, edge: Edge<'_>) -> f64 {
                 // The pulse from 0 to 1 chip: sinc, and half a chip of delay; the samples begin at `start`.
                 let x = PI * k as f64 / 1023.0;
                 let pulse = if k % 1023 == 0 { 0.0 } else { libm::sin(x) / x };
-                wave[k] * chips[k % 1023].conj() * pulse * Complex64::from_polar(1.0, TAU * k as f64 * (0.5 - start) / 1023.0)
+                wave[k]
+                    * chips[k % 1023].conj()
+                    * pulse
+                    * Complex64::from_polar(1.0, TAU * k as f64 * (0.5 - start) / 1023.0)
             })
             .collect();
         let correlation = |delay: f64| {
-            let turned = |(k, x): (usize, &Complex64)| (x * Complex64::from_polar(1.0, TAU * (k + 1) as f64 * delay / 1023.0)).re;
+            let turned = |(k, x): (usize, &Complex64)| {
+                (x * Complex64::from_polar(1.0, TAU * (k + 1) as f64 * delay / 1023.0)).re
+            };
             cross.iter().enumerate().map(turned).sum::<f64>()
         };
         let (mut low, mut high) = (-0.4, 0.4);
@@ -189,10 +194,22 @@ fn folded_and_mirrored_bands_give_the_doppler_its_sign() {
         );
     }
     the.all("locked with Doppler, its sign and code right", held, of);
-    let text = run::text(10.0, &format!("{}[front_end]\nsample_rate_hz = 5.2e6\nformat = \"ri8\"\n[power]\n", run::PLACE));
-    let beyond = run::text(10.0, &format!("{}[front_end]\nsample_rate_hz = 5.2e6\nif_hz = 6.5e6\nformat = \"ri8\"\n[power]\n", run::PLACE));
-    the.all("scene that would fold: refused with the limit", usize::from(run::try_scene(&beyond).is_err_and(|e| e.contains("2600000 Hz"))), 1);
-    the.all("real samples at no IF: refused", usize::from(run::try_scene(&text).is_err_and(|e| e.contains("front_end.if_hz"))), 1);
+    let text =
+        run::text(10.0, &format!("{}[front_end]\nsample_rate_hz = 5.2e6\nformat = \"ri8\"\n[power]\n", run::PLACE));
+    let beyond = run::text(
+        10.0,
+        &format!("{}[front_end]\nsample_rate_hz = 5.2e6\nif_hz = 6.5e6\nformat = \"ri8\"\n[power]\n", run::PLACE),
+    );
+    the.all(
+        "scene that would fold: refused with the limit",
+        usize::from(run::try_scene(&beyond).is_err_and(|e| e.contains("2600000 Hz"))),
+        1,
+    );
+    the.all(
+        "real samples at no IF: refused",
+        usize::from(run::try_scene(&text).is_err_and(|e| e.contains("front_end.if_hz"))),
+        1,
+    );
 }
 
 #[test]

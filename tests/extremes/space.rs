@@ -56,14 +56,12 @@ fn dopplers(scene: &Scene, step_s: f64) -> [f64; 4] {
                 let row = truth::observe(scene, &authentic, sv, &L1_CA, sample, 0.0).unwrap();
                 row.map(|(row, ..)| row.doppler_hz)
             };
-            let (Some(here_hz), Some(next_hz)) = (truth_hz(sample), truth_hz(sample + rate_hz as u64)) else { continue };
+            let (Some(here_hz), Some(next_hz)) = (truth_hz(sample), truth_hz(sample + rate_hz as u64)) else {
+                continue;
+            };
             let exact_hz = doppler_hz(scene, sv, sample, true);
-            let found = [
-                here_hz - exact_hz,
-                exact_hz,
-                exact_hz - doppler_hz(scene, sv, sample, false),
-                next_hz - here_hz,
-            ];
+            let found =
+                [here_hz - exact_hz, exact_hz, exact_hz - doppler_hz(scene, sv, sample, false), next_hz - here_hz];
             for (most, found) in most.iter_mut().zip(found) {
                 *most = most.max(found.abs());
             }
@@ -108,7 +106,12 @@ fn knots_hold(the: Case, scene: &Scene) {
     let part = first..first + 1_000_000;
     let options = Options::default();
     let done = generate_part(scene, part, &mut std::io::sink(), &mut writer, &mut |_| (), &options).unwrap();
-    the.at_most("carrier between knots", done.worst_knot_cycles, Fidelity::of(Grade::Balanced).knot_tolerance_cycles, "cycle");
+    the.at_most(
+        "carrier between knots",
+        done.worst_knot_cycles,
+        Fidelity::of(Grade::Balanced).knot_tolerance_cycles,
+        "cycle",
+    );
 }
 
 #[test]
@@ -127,7 +130,8 @@ fn above_the_satellites_the_earth_hides_what_it_covers_and_side_lobes_carry_the_
             // Least height of the straight line, by its points 20 km apart.
             let line = sight.satellite.position_m - sight.user_m;
             let steps = (line.norm() / 2e4) as u32;
-            let height = |k: u32| Geodetic::from_ecef(&(sight.user_m + line * (f64::from(k) / f64::from(steps)))).height_m;
+            let height =
+                |k: u32| Geodetic::from_ecef(&(sight.user_m + line * (f64::from(k) / f64::from(steps)))).height_m;
             let lowest_m = (0..=steps).map(height).fold(f64::INFINITY, f64::min);
             // Within a kilometre of the limb the two may differ by their steps and the height's meaning.
             if (lowest_m - 50e3).abs() > 1e3 {
@@ -137,10 +141,14 @@ fn above_the_satellites_the_earth_hides_what_it_covers_and_side_lobes_carry_the_
             if scene.sees(sight) && sight.off_nadir_rad < 1.5 {
                 seen += 1;
                 worst_off_deg = worst_off_deg.min(sight.off_nadir_rad.to_degrees());
-                air_m = air_m.max((truth.rays[0].code_delay_s.abs() + truth.rays[0].carrier_delay_s.abs()) * SPEED_OF_LIGHT_MPS);
+                air_m = air_m
+                    .max((truth.rays[0].code_delay_s.abs() + truth.rays[0].carrier_delay_s.abs()) * SPEED_OF_LIGHT_MPS);
                 let cn0_dbhz = 10.0 * libm::log10(truth.arrivals[0].cn0_hz);
                 (brightest, faintest) = (brightest.max(cn0_dbhz), faintest.min(cn0_dbhz));
-                beyond += usize::from(sight.off_nadir_rad.to_degrees() > 16.0 && cn0_dbhz < 41.0 || sight.off_nadir_rad.to_degrees() <= 16.0);
+                beyond += usize::from(
+                    sight.off_nadir_rad.to_degrees() > 16.0 && cn0_dbhz < 41.0
+                        || sight.off_nadir_rad.to_degrees() <= 16.0,
+                );
             }
         }
     }
@@ -160,7 +168,11 @@ fn above_the_satellites_the_earth_hides_what_it_covers_and_side_lobes_carry_the_
     }
     the.at_most("GEO: delay of troposphere and ionosphere", air_m, 0.0, "m");
     let deep = text("geo").replace("35786000", "-6.3e6");
-    the.all("h = −6300 km: refused with its range", usize::from(run::try_scene(&deep).is_err_and(|e| e.contains("height_m") && e.contains("-12000"))), 1);
+    the.all(
+        "h = −6300 km: refused with its range",
+        usize::from(run::try_scene(&deep).is_err_and(|e| e.contains("height_m") && e.contains("-12000"))),
+        1,
+    );
 }
 
 #[test]

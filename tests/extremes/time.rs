@@ -203,6 +203,9 @@ fn a_part_of_a_scene_has_the_bits_that_the_whole_has_there() {
             .map(|row| row.iter().map(str::to_owned).collect())
             .collect();
         assert_eq!(found, expected, "{part:?}");
+        let whole = &whole[2 * part.start as usize..2 * part.end as usize];
+        let other = bytes.iter().zip(whole).position(|(a, b)| a != b);
+        println!("{part:?}: first other byte {other:?}, {} others", whole.len() - equal(&bytes, whole));
         held += usize::from(same);
     }
     the.all("parts equal to the whole, bit for bit, and their truth", held, parts.len());
@@ -211,7 +214,11 @@ fn a_part_of_a_scene_has_the_bits_that_the_whole_has_there() {
     let first = 1_u64 << 40;
     let near = run::part(&late, first - 20_001..first + 10_000, whole_truth.path());
     let sought = run::part(&late, first..first + 10_000, whole_truth.path());
-    the.all("samples at 2^40 (6 h at 50 Msps), from there and from before", equal(&near[2 * 20_001..], &sought), 20_000);
+    the.all(
+        "samples at 2^40 (6 h at 50 Msps), from there and from before",
+        equal(&near[2 * 20_001..], &sought),
+        20_000,
+    );
 }
 
 fn equal(a: &[u8], b: &[u8]) -> usize {
@@ -236,9 +243,8 @@ fn a_start_a_nanosecond_later_is_a_nanosecond_later() {
             transmitter.prepare(scene, 0, 4096).unwrap();
             transmitter.phases(scene, 0).unwrap().1
         };
-        let delay_s = |scene: &Scene, at: Epoch| {
-            truth::seen(scene, sv, &L1_CA, at).unwrap().unwrap().arrivals[0].delay_s
-        };
+        let delay_s =
+            |scene: &Scene, at: Epoch| truth::seen(scene, sv, &L1_CA, at).unwrap().unwrap().arrivals[0].delay_s;
         let (a, b) = (phases(&whole), phases(&late));
         let gained = b.phase as i64 - a.phase as i64 + ((b.period - a.period) * 1023 * (1 << 48));
         // A nanosecond is 1.023e-3 chip, and the range moves by 1e-6 m, 3e-9 chip.

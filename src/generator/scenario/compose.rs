@@ -54,7 +54,8 @@ impl Scenario {
         let trajectory = self.turned(self.trajectory_of(&self.motion, directory, overrides, &mut warnings)?)?;
         let speed_mps = trajectory.knots().iter().fold(0.0_f64, |most, knot| most.max(knot.motion.velocity_mps.norm()));
         if speed_mps > LARGEST_SPEED_MPS {
-            let reason = format!("reaches {speed_mps:e} m/s: expected at most {LARGEST_SPEED_MPS:e} m/s, a tenth of light's");
+            let reason =
+                format!("reaches {speed_mps:e} m/s: expected at most {LARGEST_SPEED_MPS:e} m/s, a tenth of light's");
             return Err(self.conflict("motion", reason));
         }
         let seed = overrides.seed.unwrap_or(self.seed);
