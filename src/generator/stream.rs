@@ -167,6 +167,7 @@ pub fn generate_with(
 }
 
 /// The samples of `part` of the scene, the same bits as those of the whole; the truth counts from the part's first sample.
+/// Limit: a gain control measures its first run of 4096 samples itself, so a part that ends within that run has another gain.
 ///
 /// # Errors
 /// As [`generate`], and [`GenerateError::Part`] for a part that the scene does not have.

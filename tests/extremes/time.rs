@@ -184,7 +184,8 @@ fn a_part_of_a_scene_has_the_bits_that_the_whole_has_there() {
     let whole_truth = tempfile::tempdir().unwrap();
     let whole = run::part(&scene, 0..scene.samples, whole_truth.path());
     let all: Vec<csv::StringRecord> = run_records(whole_truth.path(), "observations.csv");
-    let parts = [0..1, 1..4097, 4095..4098, 777_777..1_000_003, 4096 * 150..4096 * 200, 2_599_999..2_600_000];
+    // Without a past the gain control measures its first run itself, so that run is asked for whole.
+    let parts = [0..4096, 1..4097, 4095..4098, 777_777..1_000_003, 4096 * 150..4096 * 200, 2_599_999..2_600_000];
     let mut held = 0;
     for part in parts.clone() {
         let directory = tempfile::tempdir().unwrap();
@@ -203,9 +204,6 @@ fn a_part_of_a_scene_has_the_bits_that_the_whole_has_there() {
             .map(|row| row.iter().map(str::to_owned).collect())
             .collect();
         assert_eq!(found, expected, "{part:?}");
-        let whole = &whole[2 * part.start as usize..2 * part.end as usize];
-        let other = bytes.iter().zip(whole).position(|(a, b)| a != b);
-        println!("{part:?}: first other byte {other:?}, {} others", whole.len() - equal(&bytes, whole));
         held += usize::from(same);
     }
     the.all("parts equal to the whole, bit for bit, and their truth", held, parts.len());
