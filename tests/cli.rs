@@ -206,6 +206,29 @@ fn generate_and_receive_are_the_same_as_run() {
 }
 
 #[test]
+fn a_sought_part_is_that_part_of_the_whole_and_one_outside_is_refused() {
+    let here = workplace();
+    let generate =
+        |out: &str, more: &[&str]| twin(&[&["generate", "short.toml", "--out", out], more].concat(), here.path());
+    assert!(generate("whole.sigmf-data", &[]).status.success());
+    let found = generate("part.sigmf-data", &["--seek", "2600001", "--samples", "50000"]);
+    assert!(found.status.success(), "{}", stderr(&found));
+    let read = |name: &str| fs::read(here.path().join(name)).unwrap();
+    assert!(read("part.sigmf-data") == read("whole.sigmf-data")[2 * 2_600_001..2 * 2_650_001]);
+    // A second and a sample after the start, by the receiver's clock: the metadata say so, and the truth counts from there.
+    let meta = String::from_utf8(read("part.sigmf-meta")).unwrap();
+    assert!(meta.contains("2010-07-01T07:59:46.000000"), "{meta}");
+    let scene = String::from_utf8(read("part.truth/scene.json")).unwrap();
+    assert!(scene.contains("\"first_sample\": 2600001") && scene.contains("\"samples\": 50000"), "{scene}");
+    for outside in [&["--seek", "5200000"][..], &["--seek", "5199999", "--samples", "2"], &["--samples", "0"]] {
+        let output = generate("none.sigmf-data", outside);
+        assert_eq!(code(&output), 2, "{outside:?}");
+        assert!(stderr(&output).contains("0 to 5199999"), "{}", stderr(&output));
+    }
+    assert!(!here.path().join("none.sigmf-data").exists());
+}
+
+#[test]
 fn a_recording_without_satellites_ends_with_the_strongest_peak_and_what_to_check() {
     let here = workplace();
     // A fixed multiplicative sequence: noise enough, and the same everywhere.

@@ -22,9 +22,6 @@ use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::samples::{Format, IfMetadata};
 use gnss_twin::gnss::time::{Epoch, Rate, SampleClock};
 
-#[path = "stream/long.rs"]
-mod long;
-
 fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted: bool) -> Scene {
     let navigation = rinex::embedded().unwrap();
     let start = Epoch::parse("2010-07-01T08:12:30").unwrap();

@@ -265,13 +265,8 @@ impl Summary {
 
 fn satellites(run: &Run, details: &mut Details) -> Satellites {
     let first = run.sky.iter().map(|row| row.sample).min();
-    let mask_deg = run.scene.mask_deg.unwrap_or(f64::NEG_INFINITY);
-    let in_view: BTreeSet<Sv> = run
-        .sky
-        .iter()
-        .filter(|row| Some(row.sample) == first && row.elevation_deg >= mask_deg)
-        .map(|row| row.sv)
-        .collect();
+    // The truth's sky holds what is in view and nothing else; from space the mask does not bound it.
+    let in_view: BTreeSet<Sv> = run.sky.iter().filter(|row| Some(row.sample) == first).map(|row| row.sv).collect();
     let ever: BTreeSet<Sv> = run.sky.iter().map(|row| row.sv).chain(run.truth.iter().map(|row| row.sv)).collect();
     let acquired: BTreeSet<Sv> = run.acquisition.iter().filter(|row| row.acquired).map(|row| row.sv).collect();
     details.false_satellites = acquired.difference(&ever).copied().collect();

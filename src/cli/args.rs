@@ -63,6 +63,12 @@ pub struct Generate {
     /// Sample format, in place of the scene's: ci8, cu8, ci16, cf32, ri8, ri16
     #[arg(long)]
     pub format: Option<Format>,
+    /// First sample of the scene to write: the same bits as in the whole, without making what lies before
+    #[arg(long, value_name = "SAMPLE", default_value_t = 0)]
+    pub seek: u64,
+    /// Samples to write [default: to the scene's end]
+    #[arg(long, value_name = "COUNT")]
+    pub samples: Option<u64>,
     /// Seed of the noise, in place of the scene's
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,

@@ -10,7 +10,9 @@ use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, truth_error};
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
+use crate::generator::stream::Options;
 use crate::generator::{self, truth};
+use crate::gnss::samples::IfMetadata;
 use crate::gnss::sigmf;
 
 /// Writes a scene's samples to a file.
@@ -20,6 +22,15 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     let (scene, warnings) = scenario::compose(&named, arguments.seed, arguments.format)?;
     for warning in warnings {
         scenario::warn(&warning);
+    }
+    let first = arguments.seek;
+    let end = arguments.samples.map_or(scene.samples, |count| first.saturating_add(count));
+    if first >= scene.samples || end > scene.samples || end == first {
+        return Err(CliError::usage(format!(
+            "--seek {first}{}: the scene has samples 0 to {}",
+            arguments.samples.map_or_else(String::new, |count| format!(" --samples {count}")),
+            scene.samples.saturating_sub(1)
+        )));
     }
     let meta_path = arguments.out.with_extension("sigmf-meta");
     let truth_path = arguments.out.with_extension("truth");
@@ -36,16 +47,19 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     let file = File::create(samples.path()).map_err(|error| CliError::create(arguments.out.display(), &error))?;
     let mut file = Interruptible(file);
     let mut writer = truth::Writer::create(truth.path()).map_err(truth_error)?;
-    let progress = Progress::new(&format!("generate {}", scene.name), Some(scene.samples));
-    let generated = generator::generate(&scene, &mut file, &mut writer, &mut |done| progress.set(done));
+    let progress = Progress::new(&format!("generate {}", scene.name), Some(end - first));
+    let options = Options::default();
+    let generated =
+        generator::generate_part(&scene, first..end, &mut file, &mut writer, &mut |done| progress.set(done), &options);
     drop(progress);
     if let Some(signal) = interrupt::pending() {
         return Err(signal);
     }
     let generated = generated.map_err(generator_error)?;
     drop(writer);
-    fs::write(meta.path(), sigmf::write(&scene.metadata))
-        .map_err(|error| CliError::output(meta_path.display(), &error))?;
+    // What the receiver's clock reads at the first sample of the file.
+    let metadata = IfMetadata { start: Some(scene.clock.epoch(first)), ..scene.metadata.clone() };
+    fs::write(meta.path(), sigmf::write(&metadata)).map_err(|error| CliError::output(meta_path.display(), &error))?;
     truth.commit()?;
     samples.commit()?;
     meta.commit()?;

@@ -26,4 +26,4 @@ pub mod synth;
 pub mod truth;
 pub mod vehicle;
 
-pub use stream::{GenerateError, Generated, generate};
+pub use stream::{GenerateError, Generated, generate, generate_part};

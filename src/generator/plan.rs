@@ -7,9 +7,10 @@ use std::fmt;
 
 use crate::generator::fidelity::{self, Choice};
 use crate::generator::ray::Ray;
-use crate::generator::scene::{CodeEdge, Scene, is_outside};
+use crate::generator::scene::{CodeEdge, SPACE_M, Scene, is_outside};
 use crate::generator::sky::emission;
 use crate::gnss::broadcast::OrbitError;
+use crate::gnss::earth::Geodetic;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::SIGNALS;
 
@@ -60,6 +61,8 @@ pub struct Plan {
     pub duration_s: f64,
     pub signals: Vec<&'static str>,
     pub mask_deg: f64,
+    /// Whether the scene begins so high that the Earth takes the mask's place.
+    pub in_space: bool,
     /// Largest speed and acceleration of the antenna during the scene.
     pub speed_mps: f64,
     pub acceleration_mps2: f64,
@@ -98,6 +101,7 @@ impl Plan {
             duration_s,
             signals: scene.signals.iter().map(|signal| signal.name).collect(),
             mask_deg: scene.mask_rad.to_degrees(),
+            in_space: Geodetic::from_ecef(&scene.trajectory.at(0.0).position_m).height_m >= SPACE_M,
             speed_mps: extremes.speed_mps,
             acceleration_mps2: extremes.acceleration_mps2,
             models: models(scene),
@@ -125,7 +129,7 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
             let received = scene.clock.start.plus_s(t_s);
             let motion = scene.trajectory.at(t_s);
             let found = emission(&scene.catalogue, sv, received, &motion)?.map(|e| e.sight);
-            match (found.filter(|sight| sight.look.elevation_rad >= scene.mask_rad), &mut row) {
+            match (found.filter(|sight| scene.sees(sight)), &mut row) {
                 (Some(sight), None) => {
                     row = Some(InView {
                         sv,
@@ -277,7 +281,11 @@ impl fmt::Display for Plan {
             writeln!(f, "knots      every {knot_spacing_s:.4} to {longest_knot_spacing_s:.4} s: {knot_reason}")?;
         }
         writeln!(f, "needs      {} of memory, about {:.1} s", size(self.memory_bytes), self.time_s)?;
-        writeln!(f, "\n{} satellites above {:.1} deg", self.satellites.len(), self.mask_deg)?;
+        if self.in_space {
+            writeln!(f, "\n{} satellites not behind the Earth", self.satellites.len())?;
+        } else {
+            writeln!(f, "\n{} satellites above {:.1} deg", self.satellites.len(), self.mask_deg)?;
+        }
         writeln!(f, "  sv   azimuth  elevation  C/N0 dB-Hz")?;
         for row in &self.satellites {
             let cn0 = row.cn0_dbhz.map_or_else(|| "-".to_owned(), |x| format!("{x:.1}"));

@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
+
 use crate::generator::catalogue::Catalogue;
 use crate::generator::clock::ReceiverClock;
 pub use crate::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::generator::message::MessageFault;
-use crate::generator::ray::Effect;
+use crate::generator::ray::{Effect, Sight};
 use crate::generator::ripple::satellite::SatelliteClocks;
 use crate::generator::ripple::scintillation::Scintillation;
 use crate::generator::spoof::Constellation;
@@ -15,11 +17,18 @@ use crate::generator::stage::interference::Interferer;
 use crate::generator::stage::noise::Thermal;
 use crate::generator::stage::playback::Playback;
 use crate::generator::vehicle::Trajectory;
+use crate::gnss::earth::{FLATTENING, SEMI_MAJOR_AXIS_M};
 use crate::gnss::gps::lnav::Broadcast;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::SampleClock;
+
+/// Height from which on the Earth hides satellites, and no longer the mask.
+pub const SPACE_M: f64 = 100e3;
+/// Height below which no ray to a user in space may pass: the neutral atmosphere, which is modelled for rays that come
+/// down through it once.
+const LIMB_M: f64 = 50e3;
 
 /// Everything that the generator computes, and nothing that it does not.
 pub struct Scene {
@@ -45,7 +54,7 @@ pub struct Scene {
     pub signals: Vec<&'static Signal>,
     /// Satellites that the scene leaves out.
     pub excluded: Vec<Sv>,
-    /// Satellites below this elevation are not computed.
+    /// Satellites below this elevation are not computed for a user below [`SPACE_M`].
     pub mask_rad: f64,
     pub effects: Vec<Box<dyn Effect>>,
     /// Quick fading of satellites.
@@ -79,12 +88,33 @@ impl Scene {
         self.front_end.iter().for_each(|stage| visit(stage.as_ref()));
     }
 
+    /// Whether a satellite is in view: above the mask, or from space not behind the Earth.
+    pub fn sees(&self, sight: &Sight) -> bool {
+        if sight.user.height_m < SPACE_M {
+            sight.look.elevation_rad >= self.mask_rad
+        } else {
+            !occulted(&sight.user_m, &sight.satellite.position_m)
+        }
+    }
+
     /// Samples before a block that its stages must see.
     pub fn memory_samples(&self) -> usize {
         let mut sum = 0;
         self.stages(|stage| sum += stage.memory_samples());
         sum
     }
+}
+
+/// Whether the Earth, with its air up to [`LIMB_M`], lies between two places.
+fn occulted(from_m: &Vector3<f64>, to_m: &Vector3<f64>) -> bool {
+    // Axes in which the ellipsoid is the unit sphere.
+    let equator_m = SEMI_MAJOR_AXIS_M + LIMB_M;
+    let pole_m = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING) + LIMB_M;
+    let scaled = |m: &Vector3<f64>| Vector3::new(m.x / equator_m, m.y / equator_m, m.z / pole_m);
+    let (from, to) = (scaled(from_m), scaled(to_m));
+    let along = to - from;
+    let share = (-from.dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+    (from + along * share).norm_squared() < 1.0
 }
 
 /// Where the main lobe of a signal without Doppler lies in the samples' spectrum, from and to, in hertz.

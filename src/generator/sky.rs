@@ -22,6 +22,9 @@ const STRAIGHT_S: f64 = 3e-5;
 /// Evaluations of the orbit at most; from any guess within a second the second step is below 1e-8 s.
 const PASSES: u32 = 4;
 
+/// Ranges that have no direction.
+const LEAST_RANGE_M: f64 = 1.0;
+
 /// Geometry and satellite clock behind what is received at one instant.
 #[derive(Clone, Debug)]
 pub struct Emission {
@@ -83,6 +86,9 @@ fn emission_of(
         let inertial_mps = velocity_mps + earth_rotation().cross(&position_m);
         let sight_m = position_m - motion.position_m;
         let range_m = sight_m.norm();
+        if range_m < LEAST_RANGE_M {
+            return Err(OrbitError::Near { sv, range_m });
+        }
         let approach_mps = inertial_mps.dot(&sight_m) / range_m;
         let step_s = (range_m - SPEED_OF_LIGHT_MPS * travel_s) / (SPEED_OF_LIGHT_MPS + approach_mps);
         travel_s += step_s;

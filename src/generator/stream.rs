@@ -7,6 +7,7 @@
 use std::collections::BTreeSet;
 use std::fmt;
 use std::io::Write;
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -23,6 +24,7 @@ use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
 use crate::generator::truth::{self, TruthError};
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::gps::lnav::FieldError;
+use crate::gnss::record::TrajectoryRow;
 use crate::gnss::satellite::Sv;
 
 /// Cut-off of band-limited edges, in cycles a sample.
@@ -62,6 +64,8 @@ pub struct Generated {
     /// Polynomials made, and the largest error met between their knots.
     pub knots: u64,
     pub worst_knot_cycles: f64,
+    /// What the scene allows of it.
+    pub knot_tolerance_cycles: f64,
 }
 
 impl fmt::Display for Generated {
@@ -71,6 +75,10 @@ impl fmt::Display for Generated {
         if self.clipped > 0 {
             let share = self.clipped as f64 / (2.0 * self.samples as f64);
             write!(f, "; {} components clipped ({:.1e} of them)", self.clipped, share)?;
+        }
+        if self.worst_knot_cycles > self.knot_tolerance_cycles {
+            let (worst, allowed) = (self.worst_knot_cycles, self.knot_tolerance_cycles);
+            write!(f, "; the carrier is up to {worst:.1e} cycles off between knots, the scene allows {allowed:e}")?;
         }
         Ok(())
     }
@@ -91,6 +99,8 @@ pub enum GenerateError {
     Rate { rate_hz: f64, signal: &'static str },
     #[error("truth_interval_s = {0}: expected 1e-6 to 1e6 s")]
     TruthInterval(f64),
+    #[error("samples {first} to {end} of a scene that has {samples}: expected a first one before the last")]
+    Part { first: u64, end: u64, samples: u64 },
 }
 
 /// What the plan tells of the synthesiser: knots met along the scene, memory of a batch, and the usual speed.
@@ -153,7 +163,23 @@ pub fn generate_with(
     progress: &mut dyn FnMut(u64),
     options: &Options,
 ) -> Result<Generated, GenerateError> {
-    let mut stream = Stream::new(scene, truth, options)?;
+    generate_part(scene, 0..scene.samples, samples, truth, progress, options)
+}
+
+/// The samples of `part` of the scene, the same bits as those of the whole; the truth counts from the part's first sample.
+/// Limit: a gain control measures its first run of 4096 samples itself, so a part that ends within that run has another gain.
+///
+/// # Errors
+/// As [`generate`], and [`GenerateError::Part`] for a part that the scene does not have.
+pub fn generate_part(
+    scene: &Scene,
+    part: Range<u64>,
+    samples: &mut dyn Write,
+    truth: &mut truth::Writer,
+    progress: &mut dyn FnMut(u64),
+    options: &Options,
+) -> Result<Generated, GenerateError> {
+    let mut stream = Stream::of(scene, part, truth, options)?;
     let mut packed = Vec::new();
     while stream.next(truth, &mut packed)? {
         samples.write_all(&packed)?;
@@ -169,6 +195,9 @@ pub struct Stream<'a> {
     filter: Option<Filter>,
     level: Level,
     transmitters: Vec<Transmitter>,
+    /// Samples of the scene that are asked for, and the next of them.
+    part: Range<u64>,
+    next: u64,
     ticks: Ticks,
     /// Samples that a block's stages look back at, of a block and of a batch.
     lead: u64,
@@ -183,16 +212,33 @@ impl<'a> Stream<'a> {
     /// # Errors
     /// A rate that the scene's signals cannot have, a truth that cannot be written.
     pub fn new(scene: &'a Scene, truth: &mut truth::Writer, options: &Options) -> Result<Self, GenerateError> {
+        Self::of(scene, 0..scene.samples, truth, options)
+    }
+
+    /// The stream of a part of `scene`.
+    ///
+    /// # Errors
+    /// As [`Stream::new`], and [`GenerateError::Part`].
+    pub fn of(
+        scene: &'a Scene,
+        part: Range<u64>,
+        truth: &mut truth::Writer,
+        options: &Options,
+    ) -> Result<Self, GenerateError> {
+        if part.start > part.end || part.end > scene.samples {
+            return Err(GenerateError::Part { first: part.start, end: part.end, samples: scene.samples });
+        }
         let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
         let filter = limited.then(|| Filter::new(cutoff_cps(scene)));
         let transmitters = transmitters(scene, edge(scene, filter.as_ref()))?;
-        truth.scene(scene)?;
+        truth.scene(scene, &part)?;
         // What stages look back at is rendered twice: blocks are long against it.
         let lead = scene.memory_samples().next_multiple_of(RUN_SAMPLES) as u64;
         let block = (u64::from(options.block_runs.max(1)) * RUN_SAMPLES as u64).max(LEADS_PER_BLOCK * lead);
         let batch = block * u64::from(options.batch_blocks.max(1));
-        let (ticks, done) = (Ticks::new(scene)?, Generated::default());
-        Ok(Self { scene, filter, level: options.level, transmitters, ticks, lead, block, batch, done })
+        let (ticks, done, next) = (Ticks::new(scene, part.start)?, Generated::default(), part.start);
+        let level = options.level;
+        Ok(Self { scene, filter, level, transmitters, part, next, ticks, lead, block, batch, done })
     }
 
     /// Samples made so far.
@@ -206,13 +252,16 @@ impl<'a> Stream<'a> {
     /// [`GenerateError`] of orbits, messages and truth.
     pub fn next(&mut self, truth: &mut truth::Writer, packed: &mut Vec<u8>) -> Result<bool, GenerateError> {
         let scene = self.scene;
-        let (from, to) = (self.done.samples, (self.done.samples + self.batch).min(scene.samples));
+        // From the second batch on blocks begin with runs.
+        let from = self.next;
+        let to = (run_begin(from) + self.batch).min(self.part.end);
         let sample_bytes = scene.metadata.format.bytes();
-        packed.resize((to - from) as usize * sample_bytes, 0);
-        if from == to {
+        packed.resize(to.saturating_sub(from) as usize * sample_bytes, 0);
+        if from >= to {
             return Ok(false);
         }
-        let needed = from.saturating_sub(self.lead);
+        // Runs are made from their beginning on.
+        let needed = run_begin(from).saturating_sub(self.lead);
         self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, to))?;
         self.ticks.write(scene, &self.transmitters, to, truth)?;
         let kernel =
@@ -226,7 +275,8 @@ impl<'a> Stream<'a> {
             })
             .sum();
         self.done.clipped += clipped;
-        self.done.samples = to;
+        self.done.samples = to - self.part.start;
+        self.next = to;
         Ok(true)
     }
 
@@ -241,12 +291,18 @@ impl<'a> Stream<'a> {
             self.done.knots += transmitter.knots;
             self.done.worst_knot_cycles = self.done.worst_knot_cycles.max(transmitter.worst_knot_cycles);
         }
+        self.done.knot_tolerance_cycles = self.scene.fidelity.knot_tolerance_cycles;
         let seen: BTreeSet<Sv> =
             self.transmitters.iter().filter(|t| t.seen && t.from.number == 0).map(|t| t.sv).collect();
         self.done.satellites = seen.into_iter().collect();
         truth.finish(&navigation)?;
         Ok(self.done)
     }
+}
+
+/// The sample at which the run of a sample begins.
+fn run_begin(sample: u64) -> u64 {
+    sample / RUN_SAMPLES as u64 * RUN_SAMPLES as u64
 }
 
 /// The scene's edges; band-limited where there is a `filter`.
@@ -311,7 +367,7 @@ fn render(
     let mut clipped = 0;
     let mut first = start;
     for bytes in bytes.chunks_mut(piece_bytes.max(1)) {
-        let from = first.saturating_sub(memory as u64) / RUN_SAMPLES as u64 * RUN_SAMPLES as u64;
+        let from = run_begin(run_begin(first).saturating_sub(memory as u64));
         let lead = (first - from) as usize;
         let length = lead + bytes.len() / format.bytes();
         let Worker { scratch, i, q } = &mut *worker;
@@ -338,14 +394,22 @@ fn render(
 struct Ticks {
     next: u64,
     interval_us: u64,
+    /// Sample of the scene from which rows count.
+    origin: u64,
 }
 
 impl Ticks {
-    fn new(scene: &Scene) -> Result<Self, GenerateError> {
+    fn new(scene: &Scene, origin: u64) -> Result<Self, GenerateError> {
         if !(1e-6..=1e6).contains(&scene.truth_interval_s) {
             return Err(GenerateError::TruthInterval(scene.truth_interval_s));
         }
-        Ok(Self { next: 0, interval_us: (scene.truth_interval_s * 1e6).round() as u64 })
+        let interval_us = (scene.truth_interval_s * 1e6).round() as u64;
+        let (whole, fraction) = scene.clock.rate.elapsed(origin);
+        let mut next = (whole as u64 * 1_000_000 + (fraction * 1e6) as u64) / interval_us;
+        while scene.clock.rate.first_sample_at(next * interval_us, 1_000_000) < origin {
+            next += 1;
+        }
+        Ok(Self { next, interval_us, origin })
     }
 
     /// Writes every tick before sample `to`.
@@ -356,14 +420,26 @@ impl Ticks {
         to: u64,
         truth: &mut truth::Writer,
     ) -> Result<(), GenerateError> {
+        let origin = self.origin;
         let rows = |from: &Constellation, sample: u64| -> Result<Vec<truth::Truth>, OrbitError> {
-            transmitters
+            let found: Result<Vec<_>, _> = transmitters
                 .par_iter()
                 .filter(|t| t.from.number == from.number && t.in_view(scene, sample))
                 .filter_map(|t| {
                     truth::observe(scene, &t.from, t.sv, t.signal, sample, t.in_view_s(scene, sample)).transpose()
                 })
-                .collect()
+                .collect();
+            let mut found = found?;
+            for (observation, sky, rays) in &mut found {
+                observation.sample -= origin;
+                sky.sample -= origin;
+                rays.iter_mut().for_each(|ray| ray.sample -= origin);
+            }
+            Ok(found)
+        };
+        let place = |from: &Constellation, sample: u64| {
+            let row = truth::trajectory(scene, from, sample);
+            TrajectoryRow { sample: sample - origin, ..row }
         };
         loop {
             let sample = scene.clock.rate.first_sample_at(self.next * self.interval_us, 1_000_000);
@@ -371,10 +447,10 @@ impl Ticks {
                 return Ok(());
             }
             let authentic = Constellation::authentic();
-            truth.epoch(&truth::trajectory(scene, &authentic, sample), &rows(&authentic, sample)?)?;
-            truth.interference(scene, sample)?;
+            truth.epoch(&place(&authentic, sample), &rows(&authentic, sample)?)?;
+            truth.interference(scene, sample, origin)?;
             for spoofer in scene.spoofers.iter().filter(|spoofer| spoofer.on(scene).contains(&sample)) {
-                truth.claim(spoofer, &truth::trajectory(scene, spoofer, sample), &rows(spoofer, sample)?)?;
+                truth.claim(spoofer, &place(spoofer, sample), &rows(spoofer, sample)?)?;
             }
             self.next += 1;
         }

@@ -9,6 +9,7 @@
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -26,7 +27,7 @@ use crate::generator::stage::interference::{Interferer, Spectrum};
 use crate::generator::vehicle::Motion;
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::{NavigationRow, Observation, RayRow, SkyRow, TrajectoryRow};
+use crate::gnss::record::{InterferenceRow, NavigationRow, Observation, RayRow, SkyRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
@@ -126,7 +127,7 @@ fn arriving(scene: &Scene, signal: &Signal, bias_s: f64, gain: f64, emission: Em
 }
 
 /// Whether `sv` is in the scene's sky when the receiver's clock reads `local`: it has a message to send
-/// and stands above the mask. Health is the scene's to judge, through its exclusions.
+/// and stands above the mask, or from space not behind the Earth. Health is the scene's to judge, through its exclusions.
 ///
 /// # Errors
 /// Those of the orbit.
@@ -144,7 +145,7 @@ pub fn in_view_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -
         return Ok(false);
     }
     let found = emission(&scene.catalogue, sv, time, &motion)?;
-    Ok(found.is_some_and(|emission| emission.sight.look.elevation_rad >= scene.mask_rad))
+    Ok(found.is_some_and(|emission| scene.sees(&emission.sight)))
 }
 
 /// Doppler: minus the derivative of the carrier, by a stencil of five points 10 ms apart that does not straddle a break.
@@ -339,6 +340,9 @@ struct SceneFile<'a> {
     name: &'a str,
     seed: u64,
     start: String,
+    /// Of the scene, where only a part of it was made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    first_sample: Option<u64>,
     duration_s: f64,
     samples: u64,
     sample_rate_hz: f64,
@@ -402,8 +406,8 @@ impl Writer {
         })
     }
 
-    /// Writes `scene.json`, and creates the files that only this scene has.
-    pub fn scene(&mut self, scene: &Scene) -> Result<(), TruthError> {
+    /// Writes `scene.json` for a part of the scene, and creates the files that only this scene has.
+    pub fn scene(&mut self, scene: &Scene, part: &Range<u64>) -> Result<(), TruthError> {
         if !scene.interference.is_empty() {
             self.interference = Some(Table::create(&self.directory, "interference.csv")?);
         }
@@ -418,9 +422,10 @@ impl Writer {
         let file = SceneFile {
             name: &scene.name,
             seed: scene.seed,
-            start: scene.clock.start.to_string(),
-            duration_s: scene.clock.rate.elapsed_s(scene.samples),
-            samples: scene.samples,
+            start: scene.clock.epoch(part.start).to_string(),
+            first_sample: (part.start > 0).then_some(part.start),
+            duration_s: scene.clock.rate.elapsed_s(part.end - part.start),
+            samples: part.end - part.start,
             sample_rate_hz: scene.clock.rate.hz(),
             center_hz: scene.metadata.center_hz,
             inverted: scene.metadata.inverted,
@@ -468,11 +473,11 @@ impl Writer {
         Ok(())
     }
 
-    /// Appends what interference there is at one sample.
-    pub fn interference(&mut self, scene: &Scene, sample: u64) -> Result<(), TruthError> {
+    /// Appends what interference there is at one sample of the scene, counted from `origin`.
+    pub fn interference(&mut self, scene: &Scene, sample: u64, origin: u64) -> Result<(), TruthError> {
         let Some(table) = &mut self.interference else { return Ok(()) };
         let mut rows = (1..).zip(&scene.interference).filter_map(|(number, source)| source.row(number, sample));
-        rows.try_for_each(|row| table.write(row))
+        rows.try_for_each(|row| table.write(InterferenceRow { sample: sample - origin, ..row }))
     }
 
     /// Appends what a spoofer claims at one sample.

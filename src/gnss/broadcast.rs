@@ -75,6 +75,8 @@ pub enum OrbitError {
     Element { sv: Sv, element: &'static str, value: f64, expected: &'static str },
     #[error("{sv}: Kepler's equation did not converge for eccentricity {eccentricity}")]
     Kepler { sv: Sv, eccentricity: f64 },
+    #[error("{sv}: the antenna is {range_m:.3} m away from the satellite: expected at least 1 m")]
+    Near { sv: Sv, range_m: f64 },
 }
 
 /// Relativistic clock constant F = −2√μ/c² in s/√m (IS-GPS-200N, 20.3.3.3.3.1).
@@ -253,7 +255,7 @@ fn wrap(angle_rad: f64) -> f64 {
 ///
 /// For M in [0, π] the start min(M + e, π) lies above the root, where E − e sin E is convex, so
 /// Newton's steps descend to the root for every eccentricity below one.
-fn solve_kepler(mean_rad: f64, eccentricity: f64) -> Option<f64> {
+pub fn solve_kepler(mean_rad: f64, eccentricity: f64) -> Option<f64> {
     use std::f64::consts::PI;
     let wrapped = wrap(mean_rad);
     let target = wrapped.abs();

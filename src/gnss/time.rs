@@ -11,6 +11,8 @@ use thiserror::Error;
 
 /// Seconds in a GPS week (IS-GPS-200N, 3.3.4).
 pub const WEEK_S: i64 = 604_800;
+/// Seconds around a leap second within which tables and labels are looked at twice.
+const LEAP_SEARCH_S: i64 = 60;
 
 /// An instant of GPS time: whole seconds since 1980-01-06T00:00:00 and a fraction in [0, 1).
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
@@ -49,10 +51,7 @@ impl Epoch {
     /// Reads `YYYY-MM-DDThh:mm:ss[.f]` as GPS time, or as UTC when it ends in `Z`.
     pub fn parse(text: &str) -> Result<Self, TimeError> {
         let error = || TimeError { text: text.to_owned() };
-        let (body, scale) = match text.trim().strip_suffix('Z') {
-            Some(body) => (body, hifitime::TimeScale::UTC),
-            None => (text.trim(), hifitime::TimeScale::GPST),
-        };
+        let (body, utc) = text.trim().strip_suffix('Z').map_or((text.trim(), false), |body| (body, true));
         let (date, clock) = body.split_once(['T', ' ']).ok_or_else(error)?;
         let mut date = date.splitn(3, '-');
         let mut clock = clock.splitn(3, ':');
@@ -73,15 +72,22 @@ impl Epoch {
         if !(1980..=2180).contains(&year) {
             return Err(error());
         }
-        let epoch = hifitime::Epoch::maybe_from_gregorian(year, month, day, hour, minute, second, 0, scale)
-            .map_err(|_| error())?
-            .to_time_scale(hifitime::TimeScale::GPST);
-        let nanoseconds = epoch.duration.total_nanoseconds();
-        if nanoseconds < 0 {
+        let gps = hifitime::TimeScale::GPST;
+        let epoch = hifitime::Epoch::maybe_from_gregorian(year, month, day, hour, minute, second, 0, gps)
+            .map_err(|_| error())?;
+        let label = i64::try_from(epoch.duration.total_nanoseconds() / 1_000_000_000).map_err(|_| error())?;
+        let leap = if utc { Self::leap_seconds_of_label(label) } else { 0 };
+        if epoch.duration.total_nanoseconds() < 0 {
             return Err(error());
         }
-        let seconds = i64::try_from(nanoseconds / 1_000_000_000).map_err(|_| error())?;
-        Ok(Self::new(seconds, fraction))
+        Ok(Self::new(label + leap, fraction))
+    }
+
+    /// GPS time minus UTC where UTC's calendar reads `label` seconds after 1980-01-06.
+    fn leap_seconds_of_label(label: i64) -> i64 {
+        let later = Self::new(label + LEAP_SEARCH_S, 0.0).leap_seconds();
+        let here = Self::new(label + later, 0.0).leap_seconds();
+        if here == later { later } else { here }
     }
 
     /// Whole seconds since 1980-01-06T00:00:00 GPST.
@@ -129,9 +135,14 @@ impl Epoch {
         .to_time_scale(scale)
     }
 
-    /// `YYYY-MM-DDThh:mm:ss.ssssssZ`, in UTC.
+    /// `YYYY-MM-DDThh:mm:ss.ssssssZ`, in UTC; an inserted second is the sixtieth.
     pub fn to_utc_text(self) -> String {
-        let (y, m, d, hh, mm, ss, ns) = self.hifitime(hifitime::TimeScale::UTC).to_gregorian(hifitime::TimeScale::UTC);
+        let leap = self.leap_seconds();
+        let inserted = Self { seconds: self.seconds + 1, ..self }.leap_seconds() - leap;
+        let label = Self { seconds: self.seconds - leap - inserted, ..self };
+        let (y, m, d, hh, mm, ss, ns) =
+            label.hifitime(hifitime::TimeScale::GPST).to_gregorian(hifitime::TimeScale::GPST);
+        let ss = i64::from(ss) + inserted;
         format!("{y:04}-{m:02}-{d:02}T{hh:02}:{mm:02}:{ss:02}.{:06}Z", ns / 1000)
     }
 
@@ -140,10 +151,17 @@ impl Epoch {
         self.hifitime(hifitime::TimeScale::UTC).day_of_year()
     }
 
-    /// GPS time minus UTC, in whole seconds, at this instant.
+    /// GPS time minus UTC, in whole seconds, at this instant: the new number from the end of an inserted second on.
     pub fn leap_seconds(self) -> i64 {
-        // TAI - GPST is 19 s by definition.
-        self.hifitime(hifitime::TimeScale::UTC).leap_seconds(true).map_or(0, |tai_utc| tai_utc as i64 - 19)
+        // The crate holds UTC readings against atomic time, and so changes over up to 37 s early.
+        let table = |seconds: i64| {
+            let at = Self { seconds, ..self }.hifitime(hifitime::TimeScale::UTC);
+            // TAI - GPST is 19 s by definition.
+            at.leap_seconds(true).map_or(0, |tai_utc| tai_utc as i64 - 19)
+        };
+        let (before, after) = (table(self.seconds - LEAP_SEARCH_S), table(self.seconds));
+        let midnight_comes = (self.seconds - after).rem_euclid(86_400) > 43_200;
+        if before != after && midnight_comes { before } else { after }
     }
 }
 
@@ -256,6 +274,27 @@ mod tests {
         assert_eq!((gps.week(), gps.tow_whole_s()), (1590, 4 * 86_400 + 15));
         assert_eq!(gps.to_utc_text(), "2010-07-01T00:00:00.000000Z");
         assert_eq!(Epoch::parse("2010-07-01T08:12:30.25").unwrap().to_string(), "2010-07-01T08:12:30.250000");
+    }
+
+    #[test]
+    fn a_leap_second_is_inserted_at_the_end_of_its_day_and_not_before() {
+        // IERS Bulletin C 52: 2016-12-31T23:59:60Z; GPS minus UTC is 17 s before and 18 s after it.
+        let midnight = Epoch::parse("2017-01-01T00:00:00Z").unwrap();
+        assert_eq!(midnight, Epoch::parse("2017-01-01T00:00:18").unwrap());
+        for (before_s, leap, text) in [
+            (60, 17, "2016-12-31T23:59:01.000000Z"),
+            (20, 17, "2016-12-31T23:59:41.000000Z"),
+            (2, 17, "2016-12-31T23:59:59.000000Z"),
+            (1, 17, "2016-12-31T23:59:60.000000Z"),
+            (0, 18, "2017-01-01T00:00:00.000000Z"),
+            (-30, 18, "2017-01-01T00:00:30.000000Z"),
+        ] {
+            let at = Epoch::new(midnight.seconds() - before_s, 0.0);
+            assert_eq!((at.leap_seconds(), at.to_utc_text().as_str()), (leap, text));
+            if before_s != 1 {
+                assert_eq!(Epoch::parse(text).unwrap(), at);
+            }
+        }
     }
 
     #[test]

@@ -16,12 +16,16 @@ use crate::generator::stage::playback::Playback;
 use crate::generator::vehicle::attitude::Nose;
 use crate::generator::vehicle::{Trajectory, file, route};
 use crate::gnss::broadcast::OrbitError;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::SampleClock;
 
 /// Samples of one scene at most: 19 days at 60 Msps.
 const MAX_SAMPLES: f64 = 1e14;
+/// Beyond this the equations of [`crate::generator::sky`], which keep no square of speed over light's for the user, are no
+/// longer a receiver's world.
+const LARGEST_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;
 /// Largest navigation file, packed.
 const MAX_NAVIGATION_BYTES: u64 = 64 << 20;
 
@@ -48,6 +52,12 @@ impl Scenario {
         let clock = SampleClock { start: self.start, rate: metadata.rate };
         let samples = self.samples()?;
         let trajectory = self.turned(self.trajectory_of(&self.motion, directory, overrides, &mut warnings)?)?;
+        let speed_mps = trajectory.knots().iter().fold(0.0_f64, |most, knot| most.max(knot.motion.velocity_mps.norm()));
+        if speed_mps > LARGEST_SPEED_MPS {
+            let reason =
+                format!("reaches {speed_mps:e} m/s: expected at most {LARGEST_SPEED_MPS:e} m/s, a tenth of light's");
+            return Err(self.conflict("motion", reason));
+        }
         let seed = overrides.seed.unwrap_or(self.seed);
         let receiver_clock = self.receiver_clock.clock(seed, metadata.rate, &trajectory);
         let end_s = receiver_clock.true_elapsed_s(self.start, clock.epoch(samples));
@@ -95,7 +105,10 @@ impl Scenario {
         };
         scene.interference = hostile::interferers(self, &scene, directory, overrides, &mut warnings)?;
         scene.spoofers = hostile::spoofers(self, &scene, end_s, directory, overrides, &mut warnings)?;
-        let (visible, signals_lsb) = at_start(&scene).map_err(|e| self.conflict("navigation.file", e.to_string()))?;
+        let (visible, signals_lsb) = at_start(&scene).map_err(|e| {
+            let key = if matches!(e, OrbitError::Near { .. }) { "motion" } else { "navigation.file" };
+            self.conflict(key, e.to_string())
+        })?;
         if let Some(PlaybackSpec { bits, load_sigma, attenuation_db }) = self.stages.playback {
             let step_lsb = signals_lsb * 2.0 * load_sigma / libm::exp2(f64::from(bits));
             if signals_lsb == 0.0 {
@@ -107,7 +120,8 @@ impl Scenario {
         if visible < 4 {
             let mask_deg = self.mask_rad.to_degrees();
             warnings.push(format!(
-                "{visible} satellites above satellites.mask_deg = {mask_deg} at the start: a position needs 4"
+                "{visible} satellites above satellites.mask_deg = {mask_deg}, or from space not behind the Earth, at the \
+                 start: a position needs 4"
             ));
         }
         Ok((scene, warnings))
@@ -207,6 +221,11 @@ impl Scenario {
                 let until_s =
                     self.duration_s * (1.0 + self.receiver_clock.drift.abs()) + 1.0 + self.receiver_clock.bias_s.abs();
                 rocket.trajectory(until_s).map_err(|e| self.conflict("motion", e.to_string()))
+            }
+            MotionSpec::Orbit(orbit) => {
+                let reach_s = 2.0 + self.receiver_clock.bias_s.abs();
+                let until_s = self.duration_s * (1.0 + self.receiver_clock.drift.abs()) + reach_s;
+                orbit.trajectory(-reach_s, until_s).map_err(|e| self.conflict("motion", e.to_string()))
             }
             MotionSpec::File { path, kind, max_gap_s } => {
                 let options = file::Options { start: self.start, max_gap_s: *max_gap_s };
@@ -325,7 +344,7 @@ fn at_start(scene: &Scene) -> Result<(usize, f64), OrbitError> {
     let (mut visible, mut sum_hz) = (0, 0.0);
     for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
         let found = emission(&scene.catalogue, sv, scene.clock.start, &motion)?;
-        let Some(found) = found.filter(|e| e.sight.look.elevation_rad >= scene.mask_rad) else { continue };
+        let Some(found) = found.filter(|e| scene.sees(&e.sight)) else { continue };
         visible += 1;
         for signal in &scene.signals {
             let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];

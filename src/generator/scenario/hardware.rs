@@ -34,7 +34,7 @@ pub(super) fn front_end(table: Option<&Table<'_>>) -> Result<FrontEnd, ScenarioE
         })?;
         return Ok(FrontEnd { rate, if_hz: 0.0, inverted: false, format: Format::Ci8, noise_lsb: None });
     };
-    let rate_hz = table.number("sample_rate_hz", 1.5e6..=60e6, "Hz")?.unwrap_or(2.6e6);
+    let rate_hz = table.number("sample_rate_hz", 1.1e6..=100e6, "Hz")?.unwrap_or(2.6e6);
     let rate = Rate::from_hz(rate_hz).ok_or_else(|| table.bad("sample_rate_hz", "a rate"))?;
     let expected = "one of ci8, cu8, ci16, cf32, ri8, ri16";
     let format = match table.text("format", expected)? {
@@ -42,7 +42,7 @@ pub(super) fn front_end(table: Option<&Table<'_>>) -> Result<FrontEnd, ScenarioE
         None => Format::Ci8,
     };
     let half = 0.5 * rate.hz();
-    let if_hz = table.number("if_hz", -60e6..=60e6, "Hz")?.unwrap_or(0.0);
+    let if_hz = table.number("if_hz", -100e6..=100e6, "Hz")?.unwrap_or(0.0);
     if if_hz.abs() >= half {
         return Err(table.bad("if_hz", format!("less than half of sample_rate_hz in size, {half} Hz")));
     }

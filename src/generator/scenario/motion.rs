@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::ScenarioError;
 use super::read::Table;
+use crate::generator::vehicle::orbit::Orbit;
 use crate::generator::vehicle::rocket::Rocket;
 use crate::generator::vehicle::route::{Limits, Turning, Waypoint};
 use crate::gnss::earth::Geodetic;
@@ -29,6 +30,12 @@ pub(super) const KEYS: &[&str] = &[
     "burn_s",
     "drag_m2pkg",
     "gravity",
+    "semi_major_axis_m",
+    "eccentricity",
+    "inclination_deg",
+    "node_longitude_deg",
+    "argument_of_perigee_deg",
+    "mean_anomaly_deg",
 ];
 pub(super) const PLACE: [&str; 3] = ["latitude_deg", "longitude_deg", "height_m"];
 /// Keys of `[[motion.point]]`.
@@ -48,6 +55,7 @@ pub enum MotionSpec {
     Waypoints { points: Vec<Waypoint>, limits: Limits },
     File { path: PathBuf, kind: FileKind, max_gap_s: f64 },
     Rocket(Rocket),
+    Orbit(Orbit),
 }
 
 #[derive(Clone, Copy)]
@@ -56,6 +64,7 @@ enum Kind {
     Waypoints,
     File,
     Rocket,
+    Orbit,
 }
 
 impl MotionSpec {
@@ -66,14 +75,20 @@ impl MotionSpec {
             Self::Waypoints { .. } => "waypoints",
             Self::File { .. } => "file",
             Self::Rocket(_) => "rocket",
+            Self::Orbit(_) => "orbit",
         }
     }
 
     pub(super) fn read(table: &Table<'_>) -> Result<Self, ScenarioError> {
-        let kinds =
-            [("static", Kind::Static), ("waypoints", Kind::Waypoints), ("file", Kind::File), ("rocket", Kind::Rocket)];
-        let kind =
-            table.choice("kind", &kinds)?.ok_or_else(|| table.bad("kind", "one of static, waypoints, file, rocket"))?;
+        let kinds = [
+            ("static", Kind::Static),
+            ("waypoints", Kind::Waypoints),
+            ("file", Kind::File),
+            ("rocket", Kind::Rocket),
+            ("orbit", Kind::Orbit),
+        ];
+        let expected = "one of static, waypoints, file, rocket, orbit";
+        let kind = table.choice("kind", &kinds)?.ok_or_else(|| table.bad("kind", expected))?;
         match kind {
             Kind::Static => {
                 table.allow(&[&["kind"], PLACE.as_slice()].concat())?;
@@ -82,6 +97,7 @@ impl MotionSpec {
             Kind::Waypoints => waypoints(table),
             Kind::File => file(table),
             Kind::Rocket => Ok(Self::Rocket(rocket(table)?)),
+            Kind::Orbit => Ok(Self::Orbit(orbit(table)?)),
         }
     }
 }
@@ -90,7 +106,7 @@ pub(super) fn place(table: &Table<'_>) -> Result<Geodetic, ScenarioError> {
     Ok(Geodetic::from_degrees(
         table.required("latitude_deg", -90.0..=90.0, "deg")?,
         table.required("longitude_deg", -180.0..=360.0, "deg")?,
-        table.required("height_m", -12_000.0..=3e7, "m")?,
+        table.required("height_m", -12_000.0..=4e7, "m")?,
     ))
 }
 
@@ -165,5 +181,28 @@ fn rocket(table: &Table<'_>) -> Result<Rocket, ScenarioError> {
         jerk_mps3: table.required("jerk_mps3", 0.1..=1e7, "m/s3")?,
         drag_m2pkg: table.number("drag_m2pkg", 0.0..=1.0, "m2/kg")?.unwrap_or(0.0),
         oblate: table.choice("gravity", &[("central", false), ("j2", true)])?.unwrap_or(true),
+    })
+}
+
+fn orbit(table: &Table<'_>) -> Result<Orbit, ScenarioError> {
+    table.allow(&[
+        "kind",
+        "semi_major_axis_m",
+        "eccentricity",
+        "inclination_deg",
+        "node_longitude_deg",
+        "argument_of_perigee_deg",
+        "mean_anomaly_deg",
+    ])?;
+    let angle = |key: &str| -> Result<f64, ScenarioError> {
+        Ok(table.number(key, -360.0..=360.0, "deg")?.unwrap_or(0.0).to_radians())
+    };
+    Ok(Orbit {
+        semi_major_axis_m: table.required("semi_major_axis_m", 6.4e6..=1e9, "m")?,
+        eccentricity: table.number("eccentricity", 0.0..=0.99, "")?.unwrap_or(0.0),
+        inclination_rad: table.required("inclination_deg", 0.0..=180.0, "deg")?.to_radians(),
+        node_longitude_rad: angle("node_longitude_deg")?,
+        argument_of_perigee_rad: angle("argument_of_perigee_deg")?,
+        mean_anomaly_rad: angle("mean_anomaly_deg")?,
     })
 }

@@ -328,7 +328,7 @@ fn numbers_outside_their_range_are_refused_with_range_and_unit() {
         }
     }
     for (key, limits) in
-        [("latitude_deg", "from -90 to 90"), ("longitude_deg", "from -180 to 360"), ("height_m", "3e7")]
+        [("latitude_deg", "from -90 to 90"), ("longitude_deg", "from -180 to 360"), ("height_m", "4e7")]
     {
         let text = replaced(&format!("{MINIMAL}{STATIC}"), "motion", key, "-1e9");
         let message = parse(&text).unwrap_err().to_string();

@@ -193,7 +193,11 @@ impl Transmitter {
     pub fn prepare(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
         let rate = scene.clock.rate;
         let (first, last) = (rate.elapsed(from).0 as u64, rate.elapsed(to.saturating_sub(1)).0 as u64);
+        let sought = self.view.is_empty() && first > 0;
         self.view = self.view.split_off(&first);
+        if sought {
+            self.since = self.rising(scene, first)?;
+        }
         for second in first..=last {
             if !self.view.contains_key(&second) {
                 let sample = rate.first_sample_at(second, 1);
@@ -222,6 +226,20 @@ impl Transmitter {
         }
         self.ripples.prepare(scene, self.from.fading(self.sv), self.signal, from, to);
         self.prepare_messages(scene, from, to)
+    }
+
+    /// The first sample of the stretch of whole seconds in view that lasts until `second`, for a stream that begins there.
+    fn rising(&self, scene: &Scene, mut second: u64) -> Result<Option<u64>, GenerateError> {
+        let sample = |second: u64| scene.clock.rate.first_sample_at(second, 1);
+        let mut since = None;
+        while second > 0 {
+            second -= 1;
+            if !truth::in_view_from(scene, &self.from, self.sv, scene.clock.epoch(sample(second)))? {
+                break;
+            }
+            since = Some(sample(second));
+        }
+        Ok(since)
     }
 
     fn prepare_messages(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {

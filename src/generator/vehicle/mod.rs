@@ -7,6 +7,7 @@
 
 pub mod attitude;
 pub mod file;
+pub mod orbit;
 pub mod ramp;
 pub mod rocket;
 pub mod route;

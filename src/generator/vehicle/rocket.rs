@@ -14,7 +14,7 @@ use super::{Knot, Motion, Trajectory};
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SEMI_MAJOR_AXIS_M};
 
 /// Earth's gravitational parameter with its atmosphere (NGA.STND.0036, table 3.1).
-const MU_M3PS2: f64 = 3.986_004_418e14;
+pub(super) const MU_M3PS2: f64 = 3.986_004_418e14;
 /// Dynamic form factor: −√5 times the EGM's C̄20 = −4.841 653 717 36e-4 (NGA.STND.0036, table 5.1).
 const J2: f64 = 1.082_629_8e-3;
 /// Density at sea level (U.S. Standard Atmosphere 1976) and the scale height that fits it within a fifth to 30 km.

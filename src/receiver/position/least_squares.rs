@@ -24,6 +24,8 @@ const CONVERGED_M: f64 = 1e-4;
 const LARGEST_CONDITION: f64 = 1e4;
 /// Corrections of the atmosphere wait until the estimate is near the Earth's surface or above it.
 const NEAR_EARTH_M: f64 = 6.2e6;
+/// Above this there is no horizon: no mask, and models that are as good in every direction.
+pub const SPACE_M: f64 = 1e5;
 /// Klobuchar's model describes the whole ionosphere, which ends about here.
 const IONOSPHERE_TOP_M: f64 = 1e6;
 /// Standard deviation of an uncorrected ionosphere at the zenith.
@@ -116,7 +118,8 @@ fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Co
         let (delay_m, sigma_m) = atmosphere(range, corrections, user, direction, received, day);
         computed_m += delay_m;
         variance += sigma_m * sigma_m;
-        let model_m = corrections.model_sigma_m / sine.max(0.05);
+        let slant = if user.height_m < SPACE_M { sine.max(0.05) } else { 1.0 };
+        let model_m = corrections.model_sigma_m / slant;
         variance += model_m * model_m;
     }
     Line { computed_m, sight, sigma_m: variance.sqrt(), elevation_rad }

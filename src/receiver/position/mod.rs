@@ -25,7 +25,7 @@ pub mod smooth;
 mod tests;
 pub mod troposphere;
 
-use least_squares::{Corrections, Ionosphere, Range, Solution, UNKNOWNS};
+use least_squares::{Corrections, Ionosphere, Range, SPACE_M, Solution, UNKNOWNS};
 use smooth::Smoother;
 
 /// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
@@ -57,7 +57,7 @@ pub enum TroposphereChoice {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PositionSettings {
-    /// Satellites below this elevation are left out once a position is known.
+    /// Satellites below this elevation are left out once a position below 100 km is known.
     pub mask_deg: f64,
     /// Window of carrier smoothing; 0 for none.
     pub smoothing_s: f64,
@@ -196,7 +196,8 @@ impl Solver {
             (Err(NoFix::Diverged { .. }), Some(_)) => least_squares::position(&ranges, Vector3::zeros(), &corrections)?,
             (other, _) => other?,
         };
-        let mask_rad = self.settings.mask_deg.to_radians();
+        let in_space = Geodetic::from_ecef(&first.position_m).height_m >= SPACE_M;
+        let mask_rad = if in_space { f64::NEG_INFINITY } else { self.settings.mask_deg.to_radians() };
         let visible: Vec<Range> = ranges
             .into_iter()
             .zip(&first.elevations_rad)

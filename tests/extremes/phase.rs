@@ -1,4 +1,4 @@
-//! Laws of the integer phases over hours and weeks, against integers and geometry evaluated here.
+//! Cases 5 to 7: integer phases over hours and weeks, against integers and geometry evaluated here.
 //!
 //! The scene is at 1575.42 MHz = 1540 · 1.023 MHz, so carrier cycles of code time are whole numbers of 2^-48 chip, and
 //! what the local oscillator and the receiver's clock add is a fraction of integers. Only the range needs `f64`.
@@ -11,15 +11,27 @@ use gnss_twin::generator::synth::transmitter::Transmitter;
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::samples::Format;
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::time::Epoch;
 
-use super::scene;
+use crate::figures::case;
+use crate::run;
+
+const CASE: crate::figures::Case = case(5, "a day, and thirty");
 
 /// Centre of the band: the IF is 4.092 MHz.
 const CENTER_HZ: f64 = 1_571.328e6;
 const RUN: u64 = 4096;
+
+/// A static scene with a clock that is 1.3e-4 s ahead and 5e-8 fast.
+fn scene(rate_hz: f64, duration_s: f64) -> Scene {
+    let if_hz = 1_575.42e6 - CENTER_HZ;
+    let tables = format!(
+        "[front_end]\nsample_rate_hz = {rate_hz:e}\nif_hz = {if_hz}\nformat = \"cf32\"\n[receiver_clock]\nbias_s = 1.3e-4\n\
+         drift_sps = 5e-8\n[power]\ncn0_dbhz = 45\n[fidelity]\nknot_tolerance_cycles = 1e-5\n"
+    );
+    run::scene(duration_s, &tables)
+}
 const TURN: f64 = 18_446_744_073_709_551_616.0;
 
 fn transmitter(scene: &Scene, sv: Sv) -> Transmitter {
@@ -38,7 +50,7 @@ fn signed(turns: u64) -> f64 {
 
 #[test]
 fn code_and_carrier_stay_together_for_an_hour_and_the_ionosphere_parts_them_by_twice_its_delay() {
-    let mut scene = scene(25e6, 3600.0, Format::Ci8, CENTER_HZ, false);
+    let mut scene = scene(25e6, 3600.0);
     let all: Vec<Sv> = scene.catalogue.satellites().collect();
     let sv = all.into_iter().find(|sv| truth::in_view(&scene, *sv, scene.clock.start).unwrap()).unwrap();
     for ionosphere in [false, true] {
@@ -65,9 +77,11 @@ fn code_and_carrier_stay_together_for_an_hour_and_the_ionosphere_parts_them_by_t
             worst = worst.max((error - error.round()).abs());
             checked += 1;
         }
+        let figure = if ionosphere { "parted by other than 2I" } else { "code less carrier" };
+        CASE.at_most(figure, worst, 1.1e-5, "cycle");
         // 0.1 mm is 5.3e-4 cycle; what remains is the place of the code, 1e-10 chip or 1.5e-7 cycle, and two knots' errors
         // of 5e-6 cycle at most.
-        assert!(checked > 250 && worst < 1.1e-5, "ionosphere {ionosphere}: {worst} in {checked}");
+        assert!(checked > 250, "{checked}");
     }
 }
 
@@ -95,7 +109,7 @@ fn carrier(scene: &Scene, sv: Sv, n: u64) -> u64 {
 fn after_a_day_and_after_thirty_days_at_50_msps_the_carrier_is_within_a_millionth_of_a_cycle() {
     for days in [1, 30] {
         // Sample 0 lies so many days before the morning of 2010-07-01, of which there are orbits.
-        let mut scene = scene(50e6, 0.0, Format::Cf32Le, CENTER_HZ, false);
+        let mut scene = scene(50e6, 1.0);
         let morning = Epoch::parse("2010-07-01T09:00:00").unwrap();
         scene.clock.start = Epoch::new(morning.seconds() - days * 86_400, 0.0);
         scene.fidelity.code_edge = CodeEdge::Nearest;
@@ -118,19 +132,20 @@ fn after_a_day_and_after_thirty_days_at_50_msps_the_carrier_is_within_a_milliont
         }
         // Half the knots' tolerance, and the floor of `f64`: coordinates of 2.6e7 m resolve 3.7e-9 m or 2e-8 cycle,
         // the sum of a delay and a month's drift, 4e8 cycles, 6e-8, a few of each on both sides.
-        assert!(checked > 200 && worst < 1e-6, "{days} days: {worst} in {checked}");
+        CASE.at_most(&format!("carrier after {days} d at 50 Msps, to integers"), worst, 1e-6, "cycle");
+        assert!(checked > 200, "{checked}");
     }
 }
 
 #[test]
 fn at_sample_two_to_the_fortieth_a_stream_from_nearby_and_a_seek_have_the_same_phases() {
-    let mut scene = scene(50e6, 0.0, Format::Cf32Le, CENTER_HZ, false);
+    let mut scene = scene(50e6, 1.0);
     // 2^40 samples are 6 h 6 min 30 s.
     scene.clock.start = Epoch::parse("2010-07-01T03:00:00").unwrap();
     let first = 1_u64 << 40;
     scene.samples = first + (1 << 32);
     let satellites: Vec<Sv> = scene.catalogue.satellites().collect();
-    let mut checked = 0;
+    let (mut same, mut checked) = (0, 0);
     for sv in satellites {
         let mut streamed = transmitter(&scene, sv);
         // From 21 s before, across a boundary of the grid, in batches of 0.1 s.
@@ -142,11 +157,12 @@ fn at_sample_two_to_the_fortieth_a_stream_from_nearby_and_a_seek_have_the_same_p
         for n in (0..8).map(|k| first + k * RUN) {
             assert_eq!(streamed.in_view(&scene, n), sought.in_view(&scene, n));
             if sought.in_view(&scene, n) {
-                assert_eq!(streamed.phases(&scene, n), sought.phases(&scene, n), "{sv} {n}");
+                same += usize::from(streamed.phases(&scene, n) == sought.phases(&scene, n));
                 assert!(sought.phases(&scene, n).is_some());
                 checked += 1;
             }
         }
     }
     assert!(checked >= 40, "{checked}");
+    case(6, "start at any sample").all("phases at sample 2^40, sought against streamed", same, checked);
 }

@@ -1,0 +1,319 @@
+//! Cases 13 to 22: places and skies in which directions degenerate.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
+use gnss_twin::generator::effect::mapping::Mapping;
+use gnss_twin::generator::effect::mapping::niell;
+use gnss_twin::generator::effect::troposphere::{Air, Troposphere, Weather};
+use gnss_twin::generator::sky;
+use gnss_twin::generator::truth;
+use gnss_twin::generator::vehicle::Motion;
+use gnss_twin::gnss::broadcast::{ClockState, OrbitError, State};
+use gnss_twin::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_earth};
+use gnss_twin::gnss::gps::l1ca::L1_CA;
+use gnss_twin::gnss::rinex;
+use gnss_twin::gnss::satellite::Sv;
+use gnss_twin::gnss::time::Epoch;
+use gnss_twin::receiver::acquire;
+use gnss_twin::receiver::position::least_squares::{Corrections, Ionosphere, Range, position};
+use gnss_twin::receiver::position::{NoFix, consistent};
+use gnss_twin::receiver::source::Block;
+use nalgebra::Vector3;
+
+use crate::figures::case;
+use crate::run;
+
+const L1_HZ: f64 = 1_575.42e6;
+
+#[test]
+fn at_the_poles_every_longitude_is_the_same_place() {
+    let the = case(13, "poles");
+    let (mut worst_m, mut worst_rad, mut finite, mut of) = (0.0_f64, 0.0_f64, 0, 0);
+    for latitude in [-90.0, 90.0, 89.999_999_999, -89.999_999_999] {
+        for longitude in [-180.0, -33.0, 0.0, 77.0, 180.0] {
+            for height_m in [-400.0, 0.0, 9e3, 2e7] {
+                let place = Geodetic::from_degrees(latitude, longitude, height_m);
+                let back = Geodetic::from_ecef(&place.to_ecef());
+                worst_m = worst_m.max((back.to_ecef() - place.to_ecef()).norm()).max((back.height_m - height_m).abs());
+                worst_rad = worst_rad.max((back.latitude_rad - place.latitude_rad).abs());
+                let axes = back.ecef_to_enu();
+                let up = look(back, &place.to_ecef(), &(place.to_ecef() * 4.0));
+                of += 1;
+                finite += usize::from(
+                    axes.iter().all(|x| x.is_finite())
+                        && (axes.determinant() - 1.0).abs() < 1e-12
+                        && up.azimuth_rad.is_finite()
+                        && up.elevation_rad > 1.5,
+                );
+            }
+        }
+    }
+    the.at_most("latitude there and back", worst_rad, 1e-12, "rad");
+    the.at_most("place and height there and back", worst_m, 1e-6, "m");
+    the.all("local axes finite and right-handed", finite, of);
+}
+
+#[test]
+fn the_two_names_of_the_antimeridian_are_one_place() {
+    let the = case(14, "antimeridian");
+    let navigation = rinex::embedded().unwrap();
+    let model = navigation.klobuchar.unwrap();
+    let (mut worst_m, mut worst_range_m) = (0.0_f64, 0.0_f64);
+    for latitude in [-60.0, 0.0, 10.0, 51.0] {
+        for azimuth in [0.1, 1.5, 3.0, 4.7, 6.0] {
+            for tow_s in [0.0, 43_199.0, 50_400.0, 302_400.0, 604_799.0] {
+                let at = Epoch::from_week(1590, tow_s);
+                let towards = Look { azimuth_rad: azimuth, elevation_rad: 0.3 };
+                let delay_m = |longitude: f64| {
+                    let user = Geodetic::from_degrees(latitude, longitude, 100.0);
+                    SPEED_OF_LIGHT_MPS
+                        * [
+                            model.delay_s(user, towards, at, L1_HZ),
+                            KlobucharIonosphere { model }.delay_s(user, towards, at, L1_HZ),
+                        ]
+                        .iter()
+                        .sum::<f64>()
+                };
+                worst_m = worst_m.max((delay_m(180.0) - delay_m(-180.0)).abs());
+            }
+        }
+    }
+    let tables = |longitude: f64| {
+        run::text(
+            60.0,
+            &format!(
+                "[motion]\nkind = \"static\"\nlatitude_deg = 10\nlongitude_deg = {longitude}\nheight_m = 10\n[front_end]\n\
+                 sample_rate_hz = 2.6e6\n[power]\n[ionosphere]\nmodel = \"klobuchar\"\n[troposphere]\nmodel = \"saastamoinen\"\n"
+            ),
+        )
+    };
+    let (east, west) = (run::try_scene(&tables(180.0)).unwrap(), run::try_scene(&tables(-180.0)).unwrap());
+    for sv in run::in_view(&east) {
+        let delay_s = |scene| truth::seen(scene, sv, &L1_CA, east.clock.start).unwrap().unwrap().arrivals[0].delay_s;
+        worst_range_m = worst_range_m.max((delay_s(&east) - delay_s(&west)).abs() * SPEED_OF_LIGHT_MPS);
+    }
+    the.at_most("ionospheric delay, 180° against −180°", worst_m, 1e-9, "m");
+    // Coordinates of 180° and −180° differ by sin π = 1.2e-16 of 6.3e6 m and their rounding.
+    the.at_most("pseudorange with atmosphere, the same", worst_range_m, 1e-7, "m");
+}
+
+#[test]
+fn in_the_earth_s_centre_ranges_are_orbital_radii() {
+    let the = case(15, "geocentre");
+    let centre = Geodetic::from_ecef(&Vector3::zeros());
+    assert!(centre.latitude_rad.is_finite() && centre.longitude_rad.is_finite() && centre.height_m.is_finite());
+    assert!((centre.height_m + 6_356_752.314).abs() < 1e-3);
+    let scene = run::scene(60.0, "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n");
+    let (mut worst_m, mut checked) = (0.0_f64, 0);
+    for sv in scene.catalogue.satellites() {
+        let at = scene.clock.start;
+        let Some(found) = sky::emission(&scene.catalogue, sv, at, &Motion::at_rest(Vector3::zeros())).unwrap() else {
+            continue;
+        };
+        let (state, _) = scene.catalogue.truth(sv, at.plus_s(-found.travel_s)).unwrap().unwrap();
+        worst_m = worst_m.max((found.sight.range_m - state.position_m.norm()).abs());
+        assert!(found.sight.look.elevation_rad.is_finite() && found.sight.off_nadir_rad.is_finite());
+        checked += 1;
+    }
+    assert!(checked > 25);
+    the.at_most("range less orbital radius", worst_m, 1e-7, "m");
+}
+
+#[test]
+fn at_and_below_the_horizon_delays_stand_still_and_keep_their_sign() {
+    let the = case(18, "elevation 0, −1, −5°");
+    let user = Geodetic::from_degrees(26.5, 80.2, 100.0);
+    let at = Epoch::from_week(1590, 374_400.0);
+    let model = rinex::embedded().unwrap().klobuchar.unwrap();
+    let air = Troposphere { air: Air::Weather(Weather::STANDARD), mapping: Mapping::Niell };
+    let (mut held, mut of, mut worst) = (0, 0, 0.0_f64);
+    let level = air.delay_m(user, 0.0, at);
+    for elevation in [0.0_f64, -1.0, -5.0, -19.79, -19.8, -19.81, -45.0, -90.0] {
+        let elevation_rad = elevation.to_radians();
+        let (dry, wet) = niell(user, elevation_rad, 180.0);
+        let towards = Look { azimuth_rad: 2.0, elevation_rad };
+        let slant_m = SPEED_OF_LIGHT_MPS * KlobucharIonosphere { model }.delay_s(user, towards, at, L1_HZ);
+        let printed_m = SPEED_OF_LIGHT_MPS * model.delay_s(user, towards, at, L1_HZ);
+        of += 1;
+        held += usize::from(
+            (10.0..60.0).contains(&dry)
+                && (10.0..60.0).contains(&wet)
+                && (1.0..100.0).contains(&slant_m)
+                && (1.0..100.0).contains(&printed_m),
+        );
+        worst = worst.max((air.delay_m(user, elevation_rad, at) - level).abs());
+    }
+    the.all("mapping and ionosphere positive and bounded", held, of);
+    the.at_most("troposphere below the horizon less that at it", worst, 0.0, "m");
+}
+
+#[test]
+fn overhead_there_is_no_azimuth_and_in_the_antenna_no_direction() {
+    let the = case(19, "satellite at the zenith, and at the antenna");
+    let scene = run::scene(
+        60.0,
+        "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\nmodel = \"klobuchar\"\n",
+    );
+    let (mut finite, mut refused, mut of, mut worst) = (0, 0, 0, 0.0_f64);
+    for sv in scene.catalogue.satellites() {
+        let at = scene.clock.start;
+        let Some((state, _)) = scene.catalogue.truth(sv, at).unwrap() else { continue };
+        // Below the satellite on the ellipsoid, then the same after its signal's flight.
+        let under = |m: &Vector3<f64>, height_m: f64| Geodetic { height_m, ..Geodetic::from_ecef(m) }.to_ecef();
+        let mut place = under(&state.position_m, 0.0);
+        for _ in 0..6 {
+            let seen = sky::emission(&scene.catalogue, sv, at, &Motion::at_rest(place)).unwrap().unwrap();
+            place = under(&seen.sight.satellite.position_m, 0.0);
+        }
+        let mut overhead = run::scene(
+            60.0,
+            "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\nmodel = \"klobuchar\"\n",
+        );
+        overhead.trajectory = gnss_twin::generator::vehicle::Trajectory::fixed(place);
+        let seen = truth::seen(&overhead, sv, &L1_CA, at).unwrap().unwrap();
+        let towards = seen.emission.sight.look;
+        let arrival = seen.arrivals[0];
+        of += 1;
+        finite += usize::from(
+            towards.azimuth_rad.is_finite()
+                && arrival.delay_s.is_finite()
+                && arrival.carrier_cycles.is_finite()
+                && arrival.cn0_hz > 0.0,
+        );
+        worst = worst.max((FRAC_PI_2 - towards.elevation_rad).abs());
+        // In the satellite, to a millimetre.
+        let inside = Motion::at_rest(state.position_m + Vector3::new(1e-3, 0.0, 0.0));
+        refused +=
+            usize::from(matches!(sky::emission(&scene.catalogue, sv, at, &inside), Err(OrbitError::Near { .. })));
+    }
+    the.all("overhead: everything finite", finite, of);
+    the.at_most("overhead: zenith distance", worst, 1e-6, "rad");
+    the.all("at the antenna: refused", refused, of);
+}
+
+const BARE: Corrections = Corrections { ionosphere: Ionosphere::Absent, troposphere: false, model_sigma_m: 1e-6 };
+
+/// Ranges to satellites in these directions (degrees) from 26.5° N, 80.2° E.
+fn ranges(sky: &[(f64, f64)]) -> Vec<Range> {
+    let place = Geodetic::from_degrees(26.5, 80.2, 130.0);
+    let axes = place.ecef_to_enu().transpose();
+    let range = |(&(azimuth, elevation), number): (&(f64, f64), u8)| {
+        let (sin_a, cos_a) = libm::sincos(azimuth * PI / 180.0);
+        let (sin_e, cos_e) = libm::sincos(elevation * PI / 180.0);
+        let distance_m = 2.1e7 + 3e5 * f64::from(number);
+        let there = place.to_ecef() + axes * Vector3::new(cos_e * sin_a, cos_e * cos_a, sin_e) * distance_m;
+        Range {
+            sv: Sv::gps(number),
+            satellite: State {
+                position_m: rotate_earth(&there, -distance_m / SPEED_OF_LIGHT_MPS),
+                velocity_mps: Vector3::zeros(),
+            },
+            clock: ClockState { offset_s: 0.0, drift: 0.0 },
+            emitted: Epoch::from_week(1590, 374_400.0),
+            pseudorange_m: distance_m,
+            doppler_hz: 0.0,
+            carrier_hz: L1_HZ,
+            noise_m: 1.0,
+            cn0_hz: 1e4,
+        }
+    };
+    sky.iter().zip(1..).map(range).collect()
+}
+
+#[test]
+fn satellites_on_a_cone_or_in_a_plane_give_no_position_but_their_condition() {
+    let the = case(20, "satellites on a cone");
+    let cone = |opening: f64| (0..6).map(|k| (60.0 * f64::from(k), opening)).collect::<Vec<_>>();
+    let plane: Vec<(f64, f64)> =
+        (1..7).map(|k| (if k < 4 { 40.0 } else { 220.0 }, 25.0 * f64::from(1 + (k - 1) % 3))).collect();
+    let (mut refused, mut least) = (0, f64::INFINITY);
+    for sky in [cone(10.0), cone(45.0), cone(80.0), plane, vec![(10.0, 40.0); 5]] {
+        if let Err(NoFix::Singular { condition }) = position(&ranges(&sky), Vector3::zeros(), &BARE) {
+            refused += 1;
+            least = least.min(condition);
+        }
+    }
+    the.all("singular, never a position", refused, 5);
+    the.at_least("condition that the refusal names, the least of them", least, 1e4, "");
+    // A cone that is none by a hundredth of a degree: within what f64 can tell, beyond what ranges can.
+    let mut almost = cone(45.0);
+    almost[0].1 += 0.01;
+    let found = position(&ranges(&almost), Vector3::zeros(), &BARE);
+    the.all("0.01° off the cone: singular too", usize::from(matches!(found, Err(NoFix::Singular { .. }))), 1);
+}
+
+#[test]
+fn too_few_satellites_are_said_to_be_and_four_prove_nothing() {
+    let the = case(21, "n = 0, 1, 3, 4");
+    let sky = [(20.0, 75.0), (65.0, 42.0), (190.0, 33.0), (300.0, 25.0)];
+    let few = [0, 1, 3].iter().filter(|n| {
+        matches!(position(&ranges(&sky[..**n]), Vector3::zeros(), &BARE), Err(NoFix::TooFew { have, need: 4 }) if have == **n)
+    });
+    the.all("0, 1, 3: told how many are needed", few.count(), 3);
+    // A fault of 1 km on one of four moves the fix and cannot show: no freedom is left, and none excluded.
+    let mut faulty = ranges(&sky);
+    faulty[2].pseudorange_m += 1000.0;
+    let (kept, solution, excluded) = consistent(faulty, Vector3::zeros(), &BARE, 1e-3).unwrap();
+    the.all("4: a position, nobody excluded", usize::from(kept.len() == 4 && excluded.is_empty()), 1);
+    the.at_most("4: sum of squared residuals with a fault of 1 km", solution.chi_square, 1e-6, "");
+}
+
+#[test]
+fn of_two_signals_of_one_satellite_the_stronger_is_found() {
+    let the = case(22, "one PRN twice");
+    // An echo 8 dB stronger than the direct ray 2 chips behind it, and a spoofer 10 dB above the truth from another place.
+    let front = "[front_end]\nsample_rate_hz = 4e6\nformat = \"ci16\"\n[noise]\n[power]\ncn0_dbhz = 45\n";
+    let sv = Sv::gps(23);
+    let found_m = |tables: &str| {
+        let scene = run::only(run::scene(0.1, &format!("{front}{tables}")), &[sv]);
+        let bytes = run::samples(&scene);
+        let (i, q) = run::planes(&scene, &bytes);
+        let block = Block { first: 0, i: &i, q: &q };
+        let rows = acquire::search(&scene.metadata, &block, &[(&L1_CA, sv)], &Default::default()).unwrap();
+        let hit = rows[0].1.expect("found");
+        run::code_error_m(&scene, sv, 0, hit.code_phase_chips / 1023.0)
+    };
+    let echo = "[[multipath]]\nkind = \"given\"\nexcess_m = 600\namplitude = 0.4\nphase_deg = 90\n";
+    let direct_m = found_m(echo);
+    the.at_most("direct ray 8 dB above its echo: code off the direct ray", direct_m.abs(), 40.0, "m");
+    // The spoofer's clock is 2 µs behind: 600 m.
+    let spoofed_m = found_m("[[spoofer]]\npower_db = 10\nclock_bias_s = 2e-6\n");
+    the.near("spoofer 10 dB above: code off the true signal", spoofed_m.abs(), 599.6, 40.0, "m");
+}
+
+#[test]
+fn a_position_is_as_good_as_its_condition_says_or_refused_with_it() {
+    let the = case(58, "conditioning of the position");
+    let (mut refused, mut least_refused, mut most_solved, mut worst, mut of) = (0, f64::INFINITY, 0.0_f64, 0.0_f64, 0);
+    for step in 0..60 {
+        // From a cone to a fair sky: satellite after satellite leaves the common elevation.
+        let off_deg = libm::pow(10.0, -5.0 + 0.1 * f64::from(step));
+        let sky: Vec<(f64, f64)> =
+            (0..6).map(|k| (60.0 * f64::from(k), 45.0 - off_deg.min(40.0) * f64::from(k % 3) / 2.0)).collect();
+        let mut seen = ranges(&sky);
+        let place = Geodetic::from_degrees(26.5, 80.2, 130.0).to_ecef();
+        // A millimetre on one range.
+        seen[1].pseudorange_m += 1e-3;
+        of += 1;
+        match position(&seen, place, &BARE) {
+            Err(NoFix::Singular { condition }) => {
+                refused += 1;
+                least_refused = least_refused.min(condition);
+            }
+            Err(other) => panic!("{other}"),
+            Ok(solution) => {
+                let values = solution.dilution.symmetric_eigenvalues();
+                most_solved = most_solved.max((values.max() / values.min()).sqrt());
+                // A range moves the solution by no more than the dilution's square root, its largest singular value.
+                let moved_m = ((solution.position_m - place).norm_squared() + solution.clock_m.powi(2)).sqrt();
+                worst = worst.max(moved_m / (1e-3 * values.max().sqrt()));
+            }
+        }
+    }
+    assert!(refused > 5 && refused < of - 5, "{refused} of {of}");
+    the.at_least("condition of those refused", least_refused, 1e4, "");
+    the.at_most("condition of those solved", most_solved, 1e4, "");
+    // One, and the 1e-7 m of the reference in 1e-3 m.
+    the.at_most("error by 1 mm over the largest dilution", worst, 1.001, "");
+}

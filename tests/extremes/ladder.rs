@@ -1,0 +1,220 @@
+//! The levels of fidelity and the accumulators over time, rate and dynamics: no error grows with time. And how near to
+//! singular a position may be.
+
+use std::fmt::Write;
+
+use gnss_twin::analysis::plot::canvas::{Axis, BLUE, Chart, GREEN, Mark, ORANGE, Series, figure};
+use gnss_twin::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
+use gnss_twin::generator::scene::Scene;
+use gnss_twin::generator::synth::band::Filter;
+use gnss_twin::generator::synth::isa::Level;
+use gnss_twin::generator::synth::transmitter::{Scratch, Transmitter};
+use gnss_twin::generator::synth::{Edge, Kernel};
+use gnss_twin::generator::vehicle::{Knot, Motion, Trajectory};
+use gnss_twin::gnss::gps::l1ca::L1_CA;
+use gnss_twin::gnss::satellite::Sv;
+use gnss_twin::gnss::time::Epoch;
+use gnss_twin::receiver::correlate;
+
+use crate::arithmetic::sum_error;
+use crate::figures::{self, case};
+use crate::fuzz::{Period, phase_cycles};
+use crate::run;
+
+const LEVELS: [Grade; 3] = [Grade::Fast, Grade::Balanced, Grade::Reference];
+const RUN: u64 = 4096;
+
+/// Carrier error of a level at `places` code periods from `first` on, `apart_s` seconds from each to the next: rms and worst.
+fn carrier_error(scene: &Scene, grade: Grade, first: u64, places: u64, apart_s: f64) -> (f64, f64) {
+    let sv = Sv::gps(23);
+    let fidelity = Fidelity::of(grade);
+    let filter = Filter::new(0.45);
+    let edge = match fidelity.code_edge {
+        CodeEdge::Nearest => Edge::Nearest,
+        CodeEdge::Area => Edge::Area,
+        CodeEdge::BandLimited => Edge::BandLimited(&filter),
+    };
+    let kernel = Kernel { edge, arithmetic: fidelity.carrier, level: Level::detect() };
+    let mut transmitter = Transmitter::new(scene, sv, &L1_CA, edge).unwrap().unwrap();
+    let (mut sum, mut worst) = (0.0, 0.0_f64);
+    for k in 0..places {
+        let near = first + (k as f64 * apart_s * scene.clock.rate.hz()) as u64;
+        let period = Period::after(scene, sv, near).unwrap();
+        let from = period.first / RUN * RUN;
+        let count = (period.first + period.samples - from) as usize;
+        transmitter.prepare(scene, from, from + count as u64).unwrap();
+        let (mut i, mut q) = (vec![0.0_f32; count], vec![0.0_f32; count]);
+        let mut scratch = Scratch::default();
+        for (run, (i, q)) in (0_u64..).zip(i.chunks_mut(RUN as usize).zip(q.chunks_mut(RUN as usize))) {
+            transmitter.arrange(scene, from + run * RUN, i.len(), &mut scratch);
+            scratch.bank.render(kernel, i, q);
+        }
+        let lead = (period.first - from) as usize;
+        let error = phase_cycles(period.prompt(scene, sv, &i[lead..], &q[lead..]));
+        sum += error * error;
+        worst = worst.max(error.abs());
+    }
+    ((sum / places as f64).sqrt(), worst)
+}
+
+/// The usual scene at a rate and a level, `before_s` seconds after its first sample when it is looked at.
+fn scene(rate_hz: f64, grade: Grade, before_s: i64) -> (Scene, u64) {
+    let tables = format!(
+        "[front_end]\nsample_rate_hz = {rate_hz:e}\nformat = \"cf32\"\n[power]\ncn0_dbhz = 60\n[fidelity]\nlevel = \"{}\"\n\
+         [receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n",
+        grade.name()
+    );
+    let mut scene = run::scene(60.0, &tables);
+    scene.clock.start = Epoch::new(scene.clock.start.seconds() - before_s, 0.0);
+    let first = (before_s as u64) * (rate_hz as u64);
+    scene.samples += first;
+    (scene, first)
+}
+
+/// A motion to and fro towards the north at 1 Hz with a largest acceleration.
+fn shaken(acceleration_mps2: f64) -> Trajectory {
+    let place = gnss_twin::gnss::earth::Geodetic::from_degrees(26.5123, 80.2329, 130.0);
+    let up = place.ecef_to_enu().transpose() * nalgebra::Vector3::z();
+    let w = std::f64::consts::TAU;
+    let knot = |k: u32| {
+        let t_s = f64::from(k) * 0.005 - 0.1;
+        let (sin, cos) = libm::sincos(w * t_s);
+        Knot {
+            t_s,
+            motion: Motion {
+                position_m: place.to_ecef() - up * (acceleration_mps2 / (w * w) * sin),
+                velocity_mps: up * (-acceleration_mps2 / w * cos),
+                acceleration_mps2: up * (acceleration_mps2 * sin),
+            },
+        }
+    };
+    Trajectory::through((0..8000).map(knot).collect(), Vec::new()).unwrap()
+}
+
+/// A curve a level.
+type Curves = Vec<(&'static str, Vec<(f64, f64)>)>;
+
+/// A table of curves over one column.
+fn table(column: &str, curves: &Curves) -> String {
+    let mut text = format!("| {column} |");
+    for (name, _) in curves {
+        let _ = write!(text, " {name} |");
+    }
+    text += "\n| --- |";
+    text += &" --- |".repeat(curves.len());
+    for (row, (x, _)) in curves[0].1.iter().enumerate() {
+        let _ = write!(text, "\n| {x} |");
+        for (_, points) in curves {
+            let _ = write!(text, " {:.1e} |", points[row].1);
+        }
+    }
+    text + "\n\n"
+}
+
+fn chart(title: &str, x_label: &str, y_label: &str, curves: &Curves) -> Chart {
+    let place = |x: f64, y: f64| (libm::log10(x.max(1e-3)), libm::log10(y.max(1e-18)));
+    let points = || curves.iter().flat_map(|(_, points)| points.iter().map(|(x, y)| place(*x, *y)));
+    let x = Axis::around(x_label, points().map(|p| p.0), 1.0);
+    let y = Axis::around(y_label, points().map(|p| p.1), 2.0);
+    let (x_ticks, y_ticks) = (x.log_ticks(&[1.0], |v| format!("{v}")), y.log_ticks(&[1.0], |v| format!("{v:e}")));
+    let colours = [ORANGE, BLUE, GREEN];
+    let series = curves.iter().zip(colours).map(|((name, points), colour)| {
+        Series::new(*name, colour, Mark::Line, points.iter().map(|(x, y)| place(*x, *y)).collect())
+    });
+    let mut chart = Chart::new(title, x, y, series.collect());
+    (chart.x_ticks, chart.y_ticks) = (Some(x_ticks), Some(y_ticks));
+    chart
+}
+
+#[test]
+fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
+    let the = case(57, "precision ladder");
+    let allowed = |grade: Grade| Fidelity::of(grade).knot_tolerance_cycles + 2e-5;
+    let mut over_time: Curves = Vec::new();
+    let mut over_rate: Curves = Vec::new();
+    let mut over_dynamics: Curves = Vec::new();
+    for grade in LEVELS {
+        let mut curve = Vec::new();
+        for before_s in [0, 3600, 6 * 3600, 86_400, 7 * 86_400, 30 * 86_400] {
+            let (scene, first) = scene(2.6e6, grade, before_s);
+            curve.push((before_s as f64, carrier_error(&scene, grade, first + 26_000, 40, 0.37).0));
+        }
+        let (now, later) = (curve[0].1, curve[curve.len() - 1].1);
+        // An hour's places are others than the first second's; what is rounded late is a month's drift, 6e-8 cycle.
+        the.at_most(
+            &format!("{}: carrier after 30 d over that at first", grade.name()),
+            later,
+            1.5 * now + 2e-6,
+            "cycle rms",
+        );
+        over_time.push((grade.name(), curve));
+        let mut curve = Vec::new();
+        for rate_hz in [2.046e6, 2.6e6, 5e6, 10e6, 25e6, 50e6] {
+            let (scene, first) = scene(rate_hz, grade, 0);
+            let (rms, worst) = carrier_error(&scene, grade, first + 26_000, 12, 1.37);
+            curve.push((rate_hz / 1e6, rms));
+            assert!(worst < allowed(grade), "{grade:?} at {rate_hz}: {worst}");
+        }
+        the.at_most(
+            &format!("{}: carrier at any rate", grade.name()),
+            curve.iter().fold(0.0, |w, p| w.max(p.1)),
+            allowed(grade),
+            "cycle rms",
+        );
+        over_rate.push((grade.name(), curve));
+        let mut curve = Vec::new();
+        for g in [0.1, 1.0, 20.0, 100.0] {
+            let (mut scene, first) = scene(2.6e6, grade, 0);
+            scene.trajectory = shaken(g * 9.806_65);
+            let (rms, _) = carrier_error(&scene, grade, first + 26_000, 25, 0.053);
+            curve.push((g, rms));
+        }
+        the.at_most(
+            &format!("{}: carrier shaken by up to 100 g at 1 Hz", grade.name()),
+            curve.iter().fold(0.0, |w, p| w.max(p.1)),
+            allowed(grade),
+            "cycle rms",
+        );
+        over_dynamics.push((grade.name(), curve));
+    }
+    let counts = [1_000, 10_000, 100_000, 1_000_000];
+    let mut over_length: Curves = Vec::new();
+    for (name, arithmetic, dc) in [
+        ("f32", correlate::Arithmetic::F32, 0.0),
+        ("f32, DC 10 σ", correlate::Arithmetic::F32, 10.0),
+        ("f64", correlate::Arithmetic::F64, 0.0),
+    ] {
+        let curve: Vec<_> = counts.iter().map(|count| (*count as f64, sum_error(arithmetic, *count, dc))).collect();
+        the.at_most(
+            &format!("{name} sums: error of 1e6 samples over the noise, against that of 1e4"),
+            curve[3].1,
+            4.0 * curve[1].1 + 1e-12,
+            "",
+        );
+        over_length.push((name, curve));
+    }
+    assert_eq!(Fidelity::of(Grade::Reference).carrier, Arithmetic::F64);
+    if let Some(path) = figures::report() {
+        let charts = [
+            chart("Carrier over time", "seconds since the first sample", "cycles rms", &over_time),
+            chart("Carrier over sample rate", "Msps", "cycles rms", &over_rate),
+            chart("Carrier over dynamics", "g at 1 Hz", "cycles rms", &over_dynamics),
+            chart("Sums over their length (f32, f32 with DC, f64)", "samples", "error over noise", &over_length),
+        ];
+        let legend: Vec<Series> = LEVELS
+            .iter()
+            .zip([ORANGE, BLUE, GREEN])
+            .map(|(grade, c)| Series::new(grade.name(), c, Mark::Line, Vec::new()))
+            .collect();
+        figure(&path.with_extension("png"), (1280, 900), 2, &charts, &legend).unwrap();
+        let name = path.with_extension("png").file_name().unwrap().to_string_lossy().into_owned();
+        let text = format!(
+            "The same scene at every level: carrier in the samples against the truth, over whole code periods.\n\n![Error curves]({name})\n\n{}{}{}{}",
+            table("seconds since the first sample", &over_time),
+            table("Msps", &over_rate),
+            table("g at 1 Hz", &over_dynamics),
+            table("samples in a sum", &over_length)
+        );
+        figures::section("The precision ladder", text);
+    }
+}
