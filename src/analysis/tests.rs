@@ -272,7 +272,7 @@ fn the_summary_finds_exactly_what_was_planted() {
         assert!((value - expected).abs() < tolerance, "{name}: {value}, expected {expected} ± {tolerance}");
     };
     let satellites = &summary.satellites;
-    assert_eq!((satellites.in_view, satellites.acquired, satellites.used, satellites.false_acquired), (8, 10, 8, 1));
+    assert_eq!((satellites.in_view, satellites.acquired, satellites.used, satellites.false_acquired), (9, 10, 8, 1));
     assert_eq!((summary.navigation.parameters_checked, summary.navigation.parameters_wrong), (11, 2));
     assert_eq!((summary.tracking.losses_of_lock, summary.tracking.cycle_slips), (1, 1));
     assert_eq!((summary.position.fixes, summary.position.first_fix_s), (300, Some(30.0)));

@@ -26,6 +26,8 @@ const WAYPOINTS: &str = "[motion]\nkind = \"waypoints\"\nacceleration_mps2 = 2\n
     [[motion.point]]\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\nspeed_mps = 0\nhold_s = 1\n\
     [[motion.point]]\nlatitude_deg = 26.51\nlongitude_deg = 80.2\nheight_m = 130\nspeed_mps = 20\n";
 const FILE: &str = "[motion]\nkind = \"file\"\nfile = \"ride.csv\"\nformat = \"csv\"\nmax_gap_s = 3\n";
+const ORBIT: &str = "[motion]\nkind = \"orbit\"\nsemi_major_axis_m = 6.9e6\neccentricity = 0.01\ninclination_deg = 51\n\
+    node_longitude_deg = 60\nargument_of_perigee_deg = 10\nmean_anomaly_deg = 20\n";
 const RADIUS: &str = "[motion]\nkind = \"waypoints\"\nturn_radius_m = 30\n";
 const REST: &str = "[navigation]\nfile = \"brdc.10n\"\n[satellites]\nmask_deg = 10\nexclude = [\"G01\"]\ninclude_unhealthy = true\n\
     [front_end]\nsample_rate_hz = 4e6\nif_hz = 1e6\nspectrum_inverted = true\nformat = \"ri8\"\nnoise_lsb = 3\n\
@@ -228,7 +230,7 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
         }
     }
     for key in MOTION_KEYS {
-        let texts = [STATIC, WAYPOINTS, FILE, ROCKET, RADIUS];
+        let texts = [STATIC, WAYPOINTS, FILE, ROCKET, ORBIT, RADIUS];
         match texts.iter().find(|text| text.contains(&format!("\n{key} ="))) {
             Some(text) => cases.push((format!("{MINIMAL}{text}"), "motion", key)),
             None => assert_eq!(*key, "point"),
