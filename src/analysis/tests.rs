@@ -307,7 +307,7 @@ fn the_summary_finds_exactly_what_was_planted() {
     let thresholds = summary.details.thresholds;
     assert!((thresholds.dll_chips - 0.05).abs() < 1e-12 && (thresholds.fll_hz - 1.0 / 0.24).abs() < 1e-12);
     let text = summary.to_string();
-    for part in ["8 in view, 10 acquired, 8 used, false: G31", "11 parameters checked, 2 wrong", "G05 issue 17: m_0"] {
+    for part in ["9 in view, 10 acquired, 8 used, false: G31", "11 parameters checked, 2 wrong", "G05 issue 17: m_0"] {
         assert!(text.contains(part), "{part} not in\n{text}");
     }
 }

@@ -71,8 +71,8 @@ fn ten_satellites_of_fifty_five_leave_each_other_fifty() {
 fn what_a_strong_satellite_puts_into_others_is_not_taken_for_them() {
     let the = case(36, "near-far of 25 dB");
     let text = std::fs::read_to_string(run::folder().join("near_far.toml")).unwrap();
-    // 25 dB apart the receiver believes no weak hit; 20 dB apart it finds it after taking the strong one out.
-    for (apart_db, weak) in [(25, "42"), (20, "47")] {
+    // 25 dB apart the receiver believes no weak hit; 12 dB apart it finds it after taking the strong one out.
+    for (apart_db, weak) in [(25, "42"), (20, "47"), (12, "55")] {
         let (mut ghosts, mut wrong, mut found, mut of) = (0, 0_usize, 0_usize, 0);
         let mut scene = run::try_scene(&text.replace("cn0_dbhz = 42", &format!("cn0_dbhz = {weak}"))).unwrap();
         let others: Vec<Sv> = run::in_view(&scene).into_iter().filter(|sv| *sv != Sv::gps(23)).collect();
@@ -98,9 +98,9 @@ fn what_a_strong_satellite_puts_into_others_is_not_taken_for_them() {
         }
         the.at_most(&format!("{apart_db} dB: absent satellites acquired"), f64::from(ghosts), 0.0, "");
         the.at_most(&format!("{apart_db} dB: weak one acquired at a cross-correlation"), wrong as f64, 0.0, "");
-        if apart_db == 20 {
-            // 47 dB-Hz less what the strong one's leftovers are: far above the search's 38.
-            the.at_least("20 dB: weak one found at its place", found as f64 / f64::from(of), 0.9, "of them");
+        if apart_db == 12 {
+            // Code and Doppler between cells take 3 dB, a symbol's edge 2 more: still within the 24 that are believed.
+            the.at_least("12 dB: weak one found at its place", found as f64 / f64::from(of), 0.9, "of them");
         }
     }
 }

@@ -242,6 +242,13 @@ impl Oscillator {
 fn keep(kept: &mut BTreeMap<u64, Arc<Vec<f64>>>, key: u64, value: &Arc<Vec<f64>>) {
     kept.insert(key, Arc::clone(value));
     while kept.len() > KEPT {
-        kept.pop_first();
+        // The end that is farther goes, whichever way the requests move.
+        let ends = kept.first_key_value().zip(kept.last_key_value()).map(|((first, _), (last, _))| (*first, *last));
+        let Some((first, last)) = ends else { return };
+        if key.abs_diff(first) >= key.abs_diff(last) {
+            kept.pop_first()
+        } else {
+            kept.pop_last()
+        };
     }
 }
