@@ -14,6 +14,7 @@ pub mod motion;
 mod normal;
 pub mod proof;
 pub mod report;
+pub mod sweep;
 #[cfg(test)]
 mod tests;
 mod watch;

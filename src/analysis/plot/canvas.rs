@@ -58,6 +58,10 @@ pub enum Mark {
     Balls,
     /// Bars from zero, of that width in data units.
     Bars(f64),
+    /// The area inside the points, pale.
+    Band,
+    /// Filled rectangles about the points, of that width and height in data units.
+    Tile(f64, f64),
 }
 
 /// Points in data units and how they look.
@@ -149,7 +153,8 @@ impl Chart {
     }
 }
 
-/// Draws charts, `columns` a row, with one legend at the right for all of them, into a PNG of that size.
+/// Draws charts, `columns` a row, with one legend at the right for all of them, into a picture of that size: a PNG, or an SVG
+/// where the file is named so.
 pub fn figure(
     path: &Path,
     (width, height): (u32, u32),
@@ -169,7 +174,7 @@ pub fn figure(
     })
 }
 
-/// Draws into an SVG in memory and writes it as a PNG of `width` × `height` pixels.
+/// Draws into an SVG in memory and writes it, as a PNG of `width` × `height` pixels unless the file is named as an SVG.
 pub fn render(
     path: &Path,
     (width, height): (u32, u32),
@@ -185,6 +190,9 @@ pub fn render(
         let area = SVGBackend::with_string(&mut svg, (width * FINE as u32, height * FINE as u32)).into_drawing_area();
         let drawn = area.fill(&WHITE).map_err(Failure::from).and_then(|()| draw(&area));
         drawn.and_then(|()| area.present().map_err(Failure::from)).map_err(|error| failed(error.to_string()))?;
+    }
+    if path.extension().is_some_and(|extension| extension == "svg") {
+        return super::super::write_whole(path, svg.as_bytes());
     }
     let png = rasterise(&svg, width, height).map_err(|error| failed(error.to_string()))?;
     super::super::write_whole(path, &png)
@@ -328,6 +336,17 @@ fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Fai
             };
             context.draw_series(series.points.iter().map(bar))?;
         }
+        Mark::Band if points.len() < 3 => {}
+        Mark::Band => {
+            let inside = Polygon::new(points, series.colour.mix(0.2).filled());
+            context.draw_series(std::iter::once(inside))?;
+        }
+        Mark::Tile(width, height) => {
+            let (w, h) = (width / 2.0, height / 2.0);
+            let tile =
+                |&(x, y): &(f64, f64)| Rectangle::new([(x - w, y - h), (x + w, y + h)], series.colour.filled());
+            context.draw_series(series.points.iter().map(tile))?;
+        }
     }
     Ok(())
 }
@@ -348,7 +367,11 @@ fn draw_legend(area: &Area<'_>, legend: &[Series]) -> Result<(), Failure> {
             Mark::Dots | Mark::Balls => area.draw(&Circle::new(middle, 4 * FINE, series.colour.filled()))?,
             Mark::Rings => area.draw(&Circle::new(middle, 4 * FINE, thick))?,
             Mark::Cross => area.draw(&plotters::element::Cross::new(middle, 5 * FINE, thick))?,
-            Mark::Bars(_) => {
+            Mark::Band => {
+                let pale = series.colour.mix(0.2).filled();
+                area.draw(&Rectangle::new([(x, y - 5 * FINE), (end, y + 5 * FINE)], pale))?;
+            }
+            Mark::Bars(_) | Mark::Tile(..) => {
                 area.draw(&Rectangle::new([(x, y - 5 * FINE), (end, y + 5 * FINE)], series.colour.filled()))?;
             }
         }
