@@ -162,7 +162,7 @@ pub struct StudyPlan {
     /// Directory of the study
     #[arg(long, short, value_name = "DIR")]
     pub out: PathBuf,
-    /// Number of shards [default: of about a minute each, 1000 at most]
+    /// Number of shards [default: 50 to 1000, of a minute at most]
     #[arg(long, value_name = "N", conflicts_with = "shard_minutes", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub shards: Option<u64>,
     /// Length of a shard in minutes of one core, roughly

@@ -28,7 +28,9 @@ pub fn execute(arguments: &args::Study) -> Result<(), CliError> {
         (Some(args::StudyAction::Report(arguments)), _) => report(&load(&arguments.directory)?),
         (Some(args::StudyAction::Export(arguments)), _) => export(arguments),
         (None, Some(study)) => whole(study, arguments),
-        (None, None) => Err(CliError::usage("expected a study, or plan, run, status, merge, report or export; see --help")),
+        (None, None) => {
+            Err(CliError::usage("expected a study, or plan, run, status, merge, report or export; see --help"))
+        }
     }
 }
 
@@ -141,13 +143,12 @@ fn compute(plan: &Plan, shards: &[u32]) -> Result<(), CliError> {
     }
     let ran = ran.map_err(study_error)?;
     scenario::print(&format!(
-        "{}: {} cases in {} shards computed in {:.1} s; {} of {} shards were there\n",
+        "{}: {} cases in {} of {} shards computed in {:.1} s\n",
         plan.study.name,
         ran.cases,
         ran.shards,
+        plan.shards(),
         start.elapsed().as_secs_f64(),
-        plan.shards() - ran.shards,
-        plan.shards()
     ))
 }
 
@@ -198,8 +199,8 @@ fn report(plan: &Plan) -> Result<(), CliError> {
 fn export(arguments: &args::StudyExport) -> Result<(), CliError> {
     let mut plan = load(&arguments.directory)?;
     // Where the script runs is not where it is written.
-    plan.directory = fs::canonicalize(&plan.directory)
-        .map_err(|error| CliError::read(arguments.directory.display(), &error))?;
+    plan.directory =
+        fs::canonicalize(&plan.directory).map_err(|error| CliError::read(arguments.directory.display(), &error))?;
     let program = env::current_exe().map_err(|error| CliError::read("the program's own path", &error))?;
     let program = program.to_str().ok_or_else(|| CliError::input("the program's own path is not UTF-8"))?;
     let missing = engine::status(&plan).map_err(study_error)?.missing;

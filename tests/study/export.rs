@@ -5,8 +5,14 @@ use std::process::Command;
 
 use super::*;
 
-const NAMES: [&str; 6] =
-    ["plain", "two words", "it's \"quoted\"", "$(touch gotcha) `touch gotcha`", "semi;colon & more > x", "new\nline \\ $HOME *"];
+const NAMES: [&str; 6] = [
+    "plain",
+    "two words",
+    "it's \"quoted\"",
+    "$(touch gotcha) `touch gotcha`",
+    "semi;colon & more > x",
+    "new\nline \\ $HOME *",
+];
 
 #[test]
 fn scripts_run_their_shards_whatever_the_directory_is_called() {

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::*;
 
-/// One satellite, a strong code loop so that half a minute holds many independent errors.
+/// One satellite and thermal noise.
 const SCENE: &str = include_str!("../../studies/scenes/one_satellite.toml");
 
 const STUDY: &str = r#"
@@ -44,12 +44,12 @@ fn a_case_is_what_run_would_say_and_agrees_with_theory() {
     let number = |row: &csv::StringRecord, column: usize| row[column].parse::<f64>().unwrap();
     for (row, case) in rows.iter().zip(0..) {
         assert_eq!((number(row, 0), number(row, 9), number(row, 10)), (f64::from(case), 1.0, 0.0), "{row:?}");
-        // Some 20 s past the pull-in: loops of 10 and 18 Hz, read every 50 ms, give at least 350 independent errors, so
-        // their spread is known to 1/√(2·350) = 3.8 %; three of that. The code's 40 (4·0.5 Hz·20 s): 11 %.
+        // Some 15 s past frame and pull-in: loops of 10 and 18 Hz, read every 50 ms, give at least 250 independent errors, so
+        // their spread is known to 1/√(2·250) = 4.5 %; three of that. The code's 30 (4·0.5 Hz·15 s): 13 %.
         let ratio = number(row, 5) / number(row, 6);
         println!("phase {ratio:.3}, code {:.3}: {row:?}", number(row, 7) / number(row, 8));
-        assert!((ratio - 1.0).abs() < 0.115, "{ratio}: {row:?}");
-        assert!((number(row, 7) / number(row, 8) - 1.0).abs() < 0.34, "{row:?}");
+        assert!((ratio - 1.0).abs() < 0.135, "{ratio}: {row:?}");
+        assert!((number(row, 7) / number(row, 8) - 1.0).abs() < 0.39, "{row:?}");
     }
     // Receivers of one signal share a seed; each is the receiver of `run` on that seed's scene.
     assert_eq!(rows[2][1], rows[3][1]);
@@ -59,12 +59,16 @@ fn a_case_is_what_run_would_say_and_agrees_with_theory() {
     let scene = scene.replace("cn0_dbhz = 45", &format!("cn0_dbhz = {}", &row[3]))
         + &format!("[receiver.tracking]\npll_bandwidth_hz = {}\n", &row[4]);
     fs::write(here.join("alone.toml"), scene).unwrap();
-    let run = Command::new(TWIN).args(["run", "alone.toml", "--seed", &row[1], "--out", "alone"]).current_dir(here).output();
+    let run =
+        Command::new(TWIN).args(["run", "alone.toml", "--seed", &row[1], "--out", "alone"]).current_dir(here).output();
     let run = run.unwrap();
     assert!(run.status.success(), "{}", text(&run));
     let summary: Value = serde_json::from_slice(&fs::read(here.join("alone/summary.json")).unwrap()).unwrap();
-    assert_eq!(summary["tracking"]["pll_sigma_deg"].as_f64(), Some(number(row, 5)));
-    assert_eq!(summary["tracking"]["dll_sigma_chips"].as_f64(), Some(number(row, 7)));
+    for (key, column) in [("pll_sigma_deg", 5), ("dll_sigma_chips", 7)] {
+        // JSON's reader rounds to a last place.
+        let ratio = summary["tracking"][key].as_f64().unwrap() / number(row, column);
+        assert!((ratio - 1.0).abs() < 1e-14, "{key}: {ratio}");
+    }
 }
 
 #[test]
@@ -83,7 +87,7 @@ fn a_scene_s_own_refusals_come_with_the_axis_that_caused_them() {
     refused("pll_bandwidth_hz", "pll_bandwith_hz", &["bad.toml:11:7", "pll_bandwidth_hz"]);
     refused("scenes/one.toml", "scenes/none.toml", &["scenes/none.toml"]);
     refused("tracking.pll_sigma_deg", "tracking.pll_sigma", &["did you mean tracking.pll_sigma_deg"]);
-    refused("power.cn0_dbhz", "motion.height.m", &["height is no table"]);
+    refused("power.cn0_dbhz", "power.cn0_dbhz.x", &["cn0_dbhz is no table"]);
 }
 
 #[test]

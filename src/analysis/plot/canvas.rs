@@ -343,8 +343,7 @@ fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Fai
         }
         Mark::Tile(width, height) => {
             let (w, h) = (width / 2.0, height / 2.0);
-            let tile =
-                |&(x, y): &(f64, f64)| Rectangle::new([(x - w, y - h), (x + w, y + h)], series.colour.filled());
+            let tile = |&(x, y): &(f64, f64)| Rectangle::new([(x - w, y - h), (x + w, y + h)], series.colour.filled());
             context.draw_series(series.points.iter().map(tile))?;
         }
     }

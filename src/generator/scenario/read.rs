@@ -183,7 +183,9 @@ impl<'t> Table<'t> {
         let mut whole = toml::Table::new();
         for name in self.names() {
             let value = match self.get(name).map(Spanned::get_ref) {
-                Some(DeValue::Table(_)) => self.table(name)?.map(|table| table.whole()).transpose()?.map(toml::Value::Table),
+                Some(DeValue::Table(_)) => {
+                    self.table(name)?.map(|table| table.whole()).transpose()?.map(toml::Value::Table)
+                }
                 _ => self.value(name),
             };
             let value = value.ok_or_else(|| self.bad(name, "a number, a text, a truth value, or a table of these"))?;

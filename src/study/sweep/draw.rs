@@ -58,8 +58,17 @@ pub fn pictures(results: &Results) -> Vec<Picture> {
         1 => results.study.name.clone(),
         _ => format!("{}_{}_{}", results.study.name, number + 1, plot.figure.replace('.', "_")),
     };
-    results.study.plots.iter().enumerate().filter_map(|(number, plot)| picture(results, plot, name(number, plot))).collect()
+    results
+        .study
+        .plots
+        .iter()
+        .enumerate()
+        .filter_map(|(number, plot)| picture(results, plot, name(number, plot)))
+        .collect()
 }
+
+/// Values of an axis that are written under it at most.
+const MOST_TICKS: usize = 10;
 
 /// What of the results a plot shows.
 struct View<'r> {
@@ -151,8 +160,15 @@ impl View<'_> {
             study_axis.map(|axis| {
                 axis.values.iter().enumerate().map(|(rank, value)| (rank as f64, axis::text_of(value))).collect()
             })
+        } else if self.plot.log_y && !self.plot.log_x {
+            // A grid needs the places of both axes.
+            study_axis.map(|axis| {
+                let every = axis.values.len().div_ceil(MOST_TICKS).max(1);
+                let tick = |value| Some((axis::number_of(value)?, axis::text_of(value)));
+                axis.values.iter().step_by(every).filter_map(tick).collect()
+            })
         } else {
-            self.plot.log_x.then(|| across.log_ticks(&[1.0, 2.0, 5.0], short))
+            self.plot.log_x.then(|| across.log_ticks(&[1.0, 2.0, 5.0], |value| value.to_string()))
         };
         (across, ticks)
     }
@@ -161,7 +177,7 @@ impl View<'_> {
         let unit = unit_of(&self.plot.figure);
         let label = if unit == "1" { self.plot.figure.clone() } else { format!("{} ({unit})", self.plot.figure) };
         let up = Axis::around(&label, values, 1e-9);
-        let ticks = self.plot.log_y.then(|| up.log_ticks(&[1.0, 2.0, 5.0], short));
+        let ticks = self.plot.log_y.then(|| up.log_ticks(&[1.0, 2.0, 5.0], |value| value.to_string()));
         (up, ticks)
     }
 
@@ -174,8 +190,11 @@ impl View<'_> {
         for (rank, chosen) in self.values_of(self.plot.series.as_deref()).into_iter().enumerate() {
             let colour = COLOURS.get(rank % COLOURS.len()).copied().unwrap_or(GREY);
             let own = |cell: &&&Cell| chosen.is_none_or(|(axis, value)| cell.at.get(axis) == Some(&value));
-            let mut points: Vec<(f64, &Cell)> =
-                cells.iter().filter(own).filter_map(|c| Some((self.place(c, &self.plot.x, self.plot.log_x)?, *c))).collect();
+            let mut points: Vec<(f64, &Cell)> = cells
+                .iter()
+                .filter(own)
+                .filter_map(|c| Some((self.place(c, &self.plot.x, self.plot.log_x)?, *c)))
+                .collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let line = |of: &dyn Fn(&Cell) -> Option<f64>| -> Vec<(f64, f64)> {
                 points.iter().filter_map(|(x, cell)| Some((*x, self.height(of(cell)?)?))).collect()
@@ -287,28 +306,35 @@ impl View<'_> {
                         highs.push((place, a.max(b)));
                     }
                 }
-                let named = |chosen: Chosen| chosen.map(|(axis, value)| (axis, value));
+                let both = ends.iter().all(Option::is_some);
                 let mut row: Vec<String> = self.plot.panel.iter().map(|_| title.clone()).collect();
-                row.extend([chosen, x].into_iter().filter_map(named).map(|(axis, value)| {
+                row.extend([chosen, x].into_iter().flatten().map(|(axis, value)| {
                     self.axis(axis).and_then(|axis| axis.values.get(value)).map_or_else(String::new, axis::text_of)
                 }));
                 let number = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), short);
-                row.extend([number(mean), number(least(ends)), number(most(ends))]);
+                row.extend([number(mean), number(least(ends).filter(|_| both)), number(most(ends).filter(|_| both))]);
                 rows.push(row);
             }
             let name = chosen.map_or_else(|| self.plot.figure.clone(), |(axis, value)| self.words(axis, value));
             if first {
                 picture.legend.push(Series::new(name.clone(), colour, Mark::Line, Vec::new()));
             }
-            series.push(Series::new("band", colour, Mark::Band, lows.into_iter().chain(highs.into_iter().rev()).collect()));
+            series.push(Series::new(
+                "band",
+                colour,
+                Mark::Band,
+                lows.into_iter().chain(highs.into_iter().rev()).collect(),
+            ));
             series.push(Series::new("line", colour, Mark::Line, means.clone()));
             series.push(Series::new(name, colour, Mark::Balls, means));
         }
-        let label = |key: &str| self.results.axis(key).and_then(|n| self.axis(n)).map_or(key.to_owned(), |a| a.label().to_owned());
+        let label = |key: &str| {
+            self.results.axis(key).and_then(|n| self.axis(n)).map_or(key.to_owned(), |a| a.label().to_owned())
+        };
         let (x, x_ticks) = self.across(cells);
         let y_values = series.iter().flat_map(|series| series.points.iter().map(|point| point.1));
         let y = Axis::around(&label(along), y_values, 1e-9);
-        let y_ticks = self.plot.log_y.then(|| y.log_ticks(&[1.0, 2.0, 5.0], short));
+        let y_ticks = self.plot.log_y.then(|| y.log_ticks(&[1.0, 2.0, 5.0], |value| value.to_string()));
         let mut chart = Chart::new(title, x, y, series);
         (chart.x_ticks, chart.y_ticks) = (x_ticks, y_ticks);
         picture.charts.push(chart);
@@ -342,7 +368,8 @@ pub(super) fn crossed(points: &[(f64, f64)], level: f64) -> Option<f64> {
 
 /// From pale to dark through blue: dark letters stay readable.
 fn warmth(share: f64) -> RGBColor {
-    const STOPS: [(f64, f64, f64); 4] = [(247.0, 251.0, 255.0), (198.0, 219.0, 239.0), (107.0, 174.0, 214.0), (66.0, 146.0, 198.0)];
+    const STOPS: [(f64, f64, f64); 4] =
+        [(247.0, 251.0, 255.0), (198.0, 219.0, 239.0), (107.0, 174.0, 214.0), (66.0, 146.0, 198.0)];
     let at = share.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
     let index = (at.floor() as usize).min(STOPS.len() - 2);
     let (a, b, u) = (STOPS[index], STOPS[index + 1], at - index as f64);

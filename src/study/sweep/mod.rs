@@ -30,8 +30,8 @@ use thiserror::Error;
 
 use crate::analysis::JudgeError;
 use crate::generator::GenerateError;
-use crate::generator::scenario::ScenarioError;
 use crate::generator::scenario::Place;
+use crate::generator::scenario::ScenarioError;
 use crate::receiver::ReceiveError;
 use crate::receiver::output::OutputError;
 

@@ -141,7 +141,8 @@ impl Model {
     pub fn figures(&self, seed: u64, keep: &[String]) -> Vec<Option<f64>> {
         let case = self.case(seed);
         let outcome = run(&case);
-        let of = |name: &String| FIGURES.iter().find(|figure| figure.name == name).and_then(|f| (f.of)(&case, &outcome));
+        let of =
+            |name: &String| FIGURES.iter().find(|figure| figure.name == name).and_then(|f| (f.of)(&case, &outcome));
         keep.iter().map(of).map(|value| value.filter(|x| x.is_finite())).collect()
     }
 }
@@ -158,7 +159,9 @@ fn law(table: &Table<'_>) -> Result<Option<PowerLaw>, ScenarioError> {
         Some([h2, h1, h0, hm1, hm2]) if h2 == 0.0 && h1 == 0.0 && [h0, hm1, hm2].iter().all(|h| *h >= 0.0) => {
             Ok(Some(PowerLaw::of_frequency(h0, hm1, hm2)))
         }
-        Some(_) => Err(table.bad("power_law", "[0, 0, h0, h-1, h-2], none negative: this level has frequency noise only")),
+        Some(_) => {
+            Err(table.bad("power_law", "[0, 0, h0, h-1, h-2], none negative: this level has frequency noise only"))
+        }
         None => Ok(None),
     }
 }
@@ -196,10 +199,12 @@ fn phase_theory_deg(case: &Case) -> Option<f64> {
     let Some(noise) = &case.oscillator else { return Some(thermal_deg) };
     let update_s = case.update_s();
     let system = expect::carrier_loop(&case.settings, case.mode, update_s).linear();
-    let oscillator_deg =
-        oscillator::jitter_discrete_rad(noise, case.signal.carrier_hz, &system, update_s).to_degrees();
+    let oscillator_deg = oscillator::jitter_discrete_rad(noise, case.signal.carrier_hz, &system, update_s).to_degrees();
     Some(libm::hypot(thermal_deg, oscillator_deg))
 }
+
+/// T·C/N0: what the theory of loops in noise wants at least [`LEAST_SNR`](crate::study::proof::LEAST_SNR) of.
+pub const SNR: &str = "theory.snr";
 
 /// What a study may keep. Spreads are of truth minus oscillator, mean over an integration, about their mean; `raw_…` are
 /// of discriminator values. `theory.…` is what `analysis::theory` predicts for the loop as it is closed.
@@ -226,6 +231,7 @@ pub const FIGURES: &[Figure] = &[
     figure("raw_phase_sigma_deg", |_, outcome| kept(outcome, outcome.raw_phase_cycles.sigma().map(|x| 360.0 * x))),
     figure("raw_code_sigma_chips", |_, outcome| kept(outcome, outcome.raw_code_chips.sigma())),
     figure("raw_frequency_sigma_hz", |_, outcome| kept(outcome, outcome.raw_frequency_hz.sigma())),
+    figure(SNR, |case, _| Some(case.update_s() * libm::pow(10.0, case.cn0_dbhz? / 10.0))),
     figure("pll_bandwidth_exact_hz", |case, _| expect::phase_cycles(case).map(|jitter| jitter.bandwidth_hz)),
     figure("dll_bandwidth_exact_hz", |case, _| expect::code_chips(case).map(|jitter| jitter.bandwidth_hz)),
     figure("phase_threshold_deg", |_, _| Some(pll::THRESHOLD_RAD.to_degrees())),

@@ -24,13 +24,15 @@ const SCHEMA: u32 = 1;
 const TOOL: &str = concat!("gnss-twin ", env!("CARGO_PKG_VERSION"));
 /// Most shards unless told otherwise: clusters take arrays of a thousand tasks by default.
 const MOST_SHARDS: u64 = 1000;
+/// As many at least where there are as many cases, so that a kill costs little.
+const LEAST_SHARDS: u64 = 50;
 /// Length of a shard unless told otherwise.
 const SHARD_MINUTES: f64 = 1.0;
 
 /// How to cut a study into shards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cut {
-    /// About a minute of one core each, a thousand at most.
+    /// About a minute of one core each at most, 50 to 1000.
     Default,
     Shards(u64),
     /// Of one core.
@@ -178,7 +180,9 @@ impl Plan {
         }
         let again = self::manifest(&study, manifest.inputs.clone(), manifest.shard_size, &manifest.build);
         if bytes_of(&again)? != bytes {
-            return Err(refuse("does not follow from its inputs: it has been changed; plan the study again".to_owned()));
+            return Err(refuse(
+                "does not follow from its inputs: it has been changed; plan the study again".to_owned(),
+            ));
         }
         Ok(Self { directory: directory.to_owned(), study, manifest, hash: sha256_hex(&bytes), bases })
     }
@@ -429,7 +433,9 @@ pub(super) fn modelled(study: &Study, values: &[(&Axis, &Value)]) -> Result<Mode
     for (axis, value) in values {
         let table = axis.key.split('.').next().unwrap_or_default();
         if !["signal", "motion", "loop", "measure", "receiver"].contains(&table) {
-            return Err(format!("{table:?} is no table of this level: expected signal, motion, loop, measure or receiver"));
+            return Err(format!(
+                "{table:?} is no table of this level: expected signal, motion, loop, measure or receiver"
+            ));
         }
         axis::put(&mut document, &axis.key, value)?;
     }
@@ -467,7 +473,10 @@ fn shard_size(study: &Study, bases: &[Base], cut: Cut) -> u64 {
     let size = match cut {
         Cut::Shards(count) => grid.cases().div_ceil(count.max(1)),
         Cut::Minutes(minutes) => of_minutes(minutes),
-        Cut::Default => of_minutes(SHARD_MINUTES).max(grid.cases().div_ceil(MOST_SHARDS)),
+        Cut::Default => {
+            let small = of_minutes(SHARD_MINUTES).min(grid.cases().div_ceil(LEAST_SHARDS));
+            small.max(grid.cases().div_ceil(MOST_SHARDS))
+        }
     };
     size.max(1).next_multiple_of(grid.sharing()).min(grid.cases())
 }

@@ -7,9 +7,10 @@ use std::fmt::Write;
 
 use super::draw::{self, Picture};
 use super::plan::Plan;
-use super::result::{self, Agreement, Results, THEORY};
+use super::result::{self, Agreement, Compared, Results, THEORY};
 use super::spec::Level;
 use super::{StudyError, axis, plan};
+use crate::study::proof::LEAST_SNR;
 
 /// Cells that the report lists; the rest stand in `cells.csv`.
 const MOST_LISTED: usize = 60;
@@ -38,19 +39,24 @@ pub fn in_short(results: &Results) -> String {
 
 fn in_words(results: &Results, agreement: &Agreement) -> String {
     let name = results.figures.get(agreement.figure).map_or("", |figure| figure.name.as_str());
-    let ratios = || agreement.cells.iter().map(|cell| cell.ratio);
-    let good = agreement.cells.iter().filter(|cell| cell.holds()).count();
-    if agreement.cells.is_empty() {
-        return format!("{name}: no cell has both a measurement and a theory");
-    }
-    format!(
-        "{name}: {good} of {} cells within {:.0} % of theory or the measurement's 95 % interval; ratios {:.3} to {:.3}, mean {:.3}",
-        agreement.cells.len(),
+    let (region, outside): (Vec<&Compared>, Vec<&Compared>) = agreement.cells.iter().partition(|cell| cell.in_region());
+    let good = |cells: &[&Compared]| cells.iter().filter(|cell| cell.holds()).count();
+    let ratios = || region.iter().map(|cell| cell.ratio);
+    let mut words = format!(
+        "{name}: {} of {} cells with T·C/N0 ≥ {LEAST_SNR} are within {:.0} % of theory or the measurement's 95 % interval",
+        good(&region),
+        region.len(),
         100.0 * result::BAR,
-        ratios().fold(f64::INFINITY, f64::min),
-        ratios().fold(f64::NEG_INFINITY, f64::max),
-        ratios().sum::<f64>() / agreement.cells.len() as f64,
-    )
+    );
+    if !region.is_empty() {
+        let (least, most) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(f64::NEG_INFINITY, f64::max));
+        let _ =
+            write!(words, " (ratios {least:.3} to {most:.3}, mean {:.3})", ratios().sum::<f64>() / region.len() as f64);
+    }
+    if !outside.is_empty() {
+        let _ = write!(words, ", {} of {} below", good(&outside), outside.len());
+    }
+    words
 }
 
 fn text(plan: &Plan, results: &Results, pictures: &[Picture]) -> String {
@@ -106,12 +112,14 @@ fn theory(results: &Results) -> String {
         }
         text += "\nBeyond:\n\n";
         let keys: Vec<String> = results.study.axes.iter().map(|axis| word(axis.label())).collect();
-        let _ = writeln!(text, "| {} | ratio | allowed |", keys.join(" | "));
-        let _ = writeln!(text, "|{}", " --- |".repeat(keys.len() + 2));
+        let _ = writeln!(text, "| {} | T·C/N0 | ratio | allowed |", keys.join(" | "));
+        let _ = writeln!(text, "|{}", " --- |".repeat(keys.len() + 3));
         for compared in beyond {
             let Some(cell) = results.cells.get(compared.cell) else { continue };
             let values: Vec<String> = (0..keys.len()).map(|axis| word(&results.value_text(cell, axis))).collect();
-            let _ = writeln!(text, "| {} | {:.3} | ± {:.3} |", values.join(" | "), compared.ratio, compared.bar);
+            let snr = compared.snr.map_or_else(|| "–".to_owned(), short);
+            let _ =
+                writeln!(text, "| {} | {snr} | {:.3} | ± {:.3} |", values.join(" | "), compared.ratio, compared.bar);
         }
     }
     text

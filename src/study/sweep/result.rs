@@ -4,10 +4,12 @@
 //! from: axes, figures, and an estimate for each figure of each cell.
 
 use super::estimate::Estimate;
+use super::model::SNR;
 use super::plan::{Column, Plan};
 use super::shard::{self, Found};
 use super::spec::Study;
 use super::{StudyError, axis, unit_of};
+use crate::study::proof::LEAST_SNR;
 
 /// Figures of theory stand under this before the name of the figure that they predict.
 pub const THEORY: &str = "theory.";
@@ -77,7 +79,8 @@ impl Results {
         for (case, record) in (0_u64..).zip(reader.records()) {
             let record = record.map_err(|e| StudyError::input(&plan.directory, e.to_string()))?;
             let Some(cell) = values.get_mut(grid.cell_of(case) as usize) else { continue };
-            for (list, field) in cell.iter_mut().zip(record.iter().skip(skipped)).filter(|(_, field)| !field.is_empty()) {
+            for (list, field) in cell.iter_mut().zip(record.iter().skip(skipped)).filter(|(_, field)| !field.is_empty())
+            {
                 let wrong = || StudyError::input(&plan.directory, format!("case {case}: {field:?} is no number"));
                 list.push(field.parse().map_err(|_| wrong())?);
             }
@@ -145,13 +148,15 @@ impl Results {
 
     /// For each figure that theory predicts: how measurement and theory agree.
     pub fn agreement(&self) -> Vec<Agreement> {
+        let snr = self.figure(SNR);
         let pair = |(number, figure): (usize, &Column)| {
             let theory = self.figure(&format!("{THEORY}{}", figure.name))?;
             let cells = self.cells.iter().enumerate().filter_map(|(index, cell)| {
                 let (found, expected) = ((*cell.estimates.get(number)?)?, (*cell.estimates.get(theory)?)?);
                 let ratio = found.mean / expected.mean;
                 let half = found.relative_half().unwrap_or(0.0);
-                Some(Compared { cell: index, ratio, bar: BAR.max(half) })
+                let snr = snr.and_then(|snr| (*cell.estimates.get(snr)?).map(|estimate| estimate.mean));
+                Some(Compared { cell: index, ratio, bar: BAR.max(half), snr })
             });
             Some(Agreement { figure: number, cells: cells.collect() })
         };
@@ -176,9 +181,16 @@ pub struct Compared {
     /// Measured over predicted.
     pub ratio: f64,
     pub bar: f64,
+    /// T·C/N0.
+    pub snr: Option<f64>,
 }
 
 impl Compared {
+    /// Whether theory must hold here.
+    pub fn in_region(&self) -> bool {
+        self.snr.is_none_or(|snr| snr >= LEAST_SNR)
+    }
+
     /// Whether the ratio is one within its bar.
     pub fn holds(&self) -> bool {
         (self.ratio - 1.0).abs() <= self.bar

@@ -11,6 +11,7 @@ use serde_json::Value as Json;
 use toml::Value;
 
 use super::axis::{self, Axis};
+use super::model::SNR;
 use super::spec::{SCENARIO_KEY, Study};
 use super::{StudyError, temporary};
 use crate::analysis::Summary;
@@ -81,6 +82,7 @@ pub const FIGURES: &[&str] = &[
     "theory.tracking.dll_sigma_chips",
     "tracking.pll_sigma_deg",
     "theory.tracking.pll_sigma_deg",
+    SNR,
     "tracking.fll_sigma_hz",
     "navigation.parameters_checked",
     "navigation.parameters_wrong",
@@ -152,8 +154,7 @@ pub fn run(
     };
     let (scenario, _) = of(first)?;
     let overrides = Overrides { seed: Some(study.seed_of(first, &base.name)), ..Overrides::default() };
-    let (scene, _) =
-        scenario.compose(&base.directory, &overrides).map_err(|e| refused(first, e.without_place()))?;
+    let (scene, _) = scenario.compose(&base.directory, &overrides).map_err(|e| refused(first, e.without_place()))?;
     let here = temporary::Directory::new(scratch)?;
     let truth_path = here.path().join("truth");
     let mut truth = truth::Writer::create(&truth_path).map_err(GenerateError::Truth)?;
@@ -202,6 +203,10 @@ fn figures(here: &Path, truth: &Path, ear: &Ear, keep: &[String]) -> Result<Vec<
         "theory.tracking.dll_sigma_chips" => {
             let channel = limits::channel(&ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz);
             expect::code_chips(&channel).map(|jitter| jitter.sigma)
+        }
+        SNR => {
+            let channel = limits::channel(&ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz);
+            channel.cn0_dbhz.map(|dbhz| channel.update_s() * libm::pow(10.0, dbhz / 10.0))
         }
         path => number(&json, path),
     };

@@ -102,9 +102,8 @@ const KEYS: &[&str] = &[
     "plot",
 ];
 const BASE: [&str; 5] = ["signal", "motion", "loop", "measure", "receiver"];
-const PLOT_KEYS: &[&str] = &[
-    "kind", "title", "x", "y", "z", "series", "panel", "along", "level", "log_x", "log_y", "where",
-];
+const PLOT_KEYS: &[&str] =
+    &["kind", "title", "x", "y", "z", "series", "panel", "along", "level", "log_x", "log_y", "where"];
 /// Largest text of a study.
 const MOST_BYTES: usize = 1 << 20;
 /// The key under which an axis names scenes.
@@ -259,7 +258,11 @@ fn scenario(root: &Table<'_>, level: Level, axes: &[Axis]) -> Result<Option<Path
 }
 
 /// The tables of the base, at correlator level.
-fn base(root: &Table<'_>, text: &str, level: Level) -> Result<toml::Table, Result<ScenarioError, Box<toml::de::Error>>> {
+fn base(
+    root: &Table<'_>,
+    text: &str,
+    level: Level,
+) -> Result<toml::Table, Result<ScenarioError, Box<toml::de::Error>>> {
     if level == Level::Samples {
         let written = BASE.iter().find(|name| root.has(name));
         let expected = "nothing at level = \"samples\": the scene's file holds it";
@@ -290,6 +293,9 @@ fn keep(root: &Table<'_>, level: Level) -> Result<Vec<String>, ScenarioError> {
                 keep.push(name);
             }
         }
+    }
+    if keep.iter().any(|name| name.starts_with("theory.")) && !keep.iter().any(|name| name == model::SNR) {
+        keep.push(model::SNR.to_owned());
     }
     if keep.is_empty() { Err(root.bad("keep", "at least one figure")) } else { Ok(keep) }
 }

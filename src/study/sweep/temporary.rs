@@ -60,7 +60,9 @@ pub(super) struct Directory(PathBuf);
 impl Directory {
     pub(super) fn new(parent: &Path) -> Result<Self, StudyError> {
         let path = parent.join(name());
-        fs::create_dir_all(&path).map_err(|source| StudyError::Create { path: path.clone(), source })?;
+        // Again, should another run have taken the empty parent away meanwhile.
+        let made = fs::create_dir_all(&path).or_else(|_| fs::create_dir_all(&path));
+        made.map_err(|source| StudyError::Create { path: path.clone(), source })?;
         Ok(Self(path))
     }
 
