@@ -74,7 +74,7 @@ pub fn judge(run: &Path) -> Result<Summary, JudgeError> {
 }
 
 /// Writes rows as a CSV file.
-fn write_rows<T: Serialize>(path: &Path, rows: impl Iterator<Item = T>) -> Result<(), JudgeError> {
+pub(crate) fn write_rows<T: Serialize>(path: &Path, rows: impl Iterator<Item = T>) -> Result<(), JudgeError> {
     let mut table = csv::Writer::from_writer(Vec::new());
     for row in rows {
         table.serialize(row).map_err(|source| JudgeError::Row { path: path.to_owned(), source })?;

@@ -22,3 +22,5 @@ pub mod signal;
 pub mod time;
 #[cfg(feature = "generator")]
 pub mod vienna;
+#[cfg(feature = "generator")]
+pub mod vmf3;

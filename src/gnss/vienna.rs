@@ -3,7 +3,7 @@
 //!
 //! Source: Landskron & Böhm 2018, "VMF3/GPT3: refined discrete and empirical troposphere mapping functions", and the
 //! columns that head the files. Values are bilinear between nodes; beyond the last row towards a pole that row's
-//! values hold. Limits: gradients are not read; a mapping grid is one epoch's.
+//! values hold. Limits: gradients are not read; a mapping grid is one epoch's. VMF3's b and c are in [`super::vmf3`].
 
 use std::f64::consts::TAU;
 
@@ -28,6 +28,13 @@ pub enum ViennaError {
     Line { name: String, line: usize, found: String, expected: String },
 }
 
+/// The text of a file, plain or gzip.
+fn unpack(bytes: &[u8], name: &str) -> Result<String, ViennaError> {
+    let bytes =
+        inflate(bytes, LARGEST_BYTES).map_err(|source| ViennaError::Packed { name: name.to_owned(), source })?;
+    Ok(String::from_utf8(bytes).unwrap_or_else(|e| String::from_utf8_lossy(e.as_bytes()).into_owned()))
+}
+
 /// Values at the nodes of a regular grid of the globe, from north to south and from west to east.
 #[derive(Clone, Debug, PartialEq)]
 struct Globe<T> {
@@ -42,10 +49,7 @@ struct Globe<T> {
 impl<T> Globe<T> {
     /// Reads rows of `columns` numbers that begin with latitude and longitude in degrees; lines that begin with `!` or
     /// `%` are comments.
-    fn read(bytes: &[u8], name: &str, columns: usize, node: impl Fn(&[f64]) -> T) -> Result<Self, ViennaError> {
-        let bytes =
-            inflate(bytes, LARGEST_BYTES).map_err(|source| ViennaError::Packed { name: name.to_owned(), source })?;
-        let text = String::from_utf8_lossy(&bytes);
+    fn read(text: &str, name: &str, columns: usize, node: impl Fn(&[f64]) -> T) -> Result<Self, ViennaError> {
         let wrong = |line: usize, found: String, expected: &str| ViennaError::Line {
             name: name.to_owned(),
             line,
@@ -122,9 +126,20 @@ pub struct MappingA {
     pub wet: f64,
 }
 
+/// Which mapping functions coefficients a were fitted with: each has b and c of its own.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum Vienna {
+    Vmf1,
+    Vmf3,
+}
+
 /// A file `VMF1_…` or `VMF3_…` of one epoch: latitude, longitude, a_h, a_w, and zenith delays, which are not read.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MappingGrid(Globe<MappingA>);
+pub struct MappingGrid {
+    globe: Globe<MappingA>,
+    /// What its heading's line `Data_types` says, if there is one.
+    pub fitted_with: Option<Vienna>,
+}
 
 impl MappingGrid {
     /// Reads a grid, plain or gzip, whose `name` goes into errors.
@@ -136,13 +151,18 @@ impl MappingGrid {
             hydrostatic: fields.get(2).copied().unwrap_or(f64::NAN),
             wet: fields.get(3).copied().unwrap_or(f64::NAN),
         };
-        Globe::read(bytes, name, 6, node).map(Self)
+        let text = unpack(bytes, name)?;
+        let heading =
+            text.lines().find(|line| line.starts_with('!') && line.contains("Data_types")).unwrap_or_default();
+        let kinds = [("VMF1", Vienna::Vmf1), ("VMF3", Vienna::Vmf3)];
+        let fitted_with = kinds.into_iter().find(|(word, _)| heading.contains(word)).map(|(_, kind)| kind);
+        Ok(Self { globe: Globe::read(&text, name, 6, node)?, fitted_with })
     }
 
     /// The coefficients at a place.
     pub fn at(&self, latitude_rad: f64, longitude_rad: f64) -> MappingA {
         let mut sum = MappingA::default();
-        for (weight, node) in self.0.around(latitude_rad, longitude_rad) {
+        for (weight, node) in self.globe.around(latitude_rad, longitude_rad) {
             let Some(node) = node else { continue };
             sum.hydrostatic += weight * node.hydrostatic;
             sum.wet += weight * node.wet;
@@ -152,7 +172,14 @@ impl MappingGrid {
 }
 
 /// A mean, and the amplitudes of the year's cosine and sine and the half year's.
-type Season = [f64; 5];
+pub(super) type Season = [f64; 5];
+
+/// What a mean and amplitudes are multiplied with on a day of the year that counts from 1.0.
+pub(super) fn season_terms(day_of_year: f64) -> Season {
+    let (sin, cos) = libm::sincos(TAU * day_of_year / YEAR_DAYS);
+    // Double angles are those of the half year.
+    [1.0, cos, sin, cos * cos - sin * sin, 2.0 * sin * cos]
+}
 
 /// One node of GPT3, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -212,14 +239,12 @@ impl Gpt3 {
                 mean_temperature_k: season(39, 1.0),
             }
         };
-        Globe::read(bytes, name, 64, node).map(Self)
+        Globe::read(&unpack(bytes, name)?, name, 64, node).map(Self)
     }
 
     /// Weather at a place and ellipsoidal height, on a day of the year that counts from 1.0.
     pub fn at(&self, latitude_rad: f64, longitude_rad: f64, height_m: f64, day_of_year: f64) -> Gpt3Weather {
-        let (sin, cos) = libm::sincos(TAU * day_of_year / YEAR_DAYS);
-        // Double angles are those of the half year.
-        let terms = [1.0, cos, sin, cos * cos - sin * sin, 2.0 * sin * cos];
+        let terms = season_terms(day_of_year);
         let season = |values: &Season| values.iter().zip(terms).map(|(value, term)| value * term).sum::<f64>();
         let mut sum = Gpt3Weather::default();
         for (weight, node) in self.0.around(latitude_rad, longitude_rad) {

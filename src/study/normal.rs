@@ -12,6 +12,7 @@ pub(super) enum Purpose {
     Thermal = 1,
     Oscillator = 2,
     Symbols = 3,
+    Places = 4,
 }
 
 /// SplitMix64's finaliser (Steele, Lea, Flood 2014).
@@ -63,4 +64,11 @@ impl Normals {
 /// Sign of message symbol `number`.
 pub(super) fn symbol(seed: u64, number: u64) -> f64 {
     if mix(stream(seed, Purpose::Symbols) ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15)) & 1 == 1 { -1.0 } else { 1.0 }
+}
+
+/// Number `index` of a uniform stream on [0, 1).
+pub(super) fn uniform(seed: u64, purpose: Purpose, index: u64) -> f64 {
+    let word = mix(stream(seed, purpose) ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    // The upper 53 bits are a double's.
+    (word >> 11) as f64 * (0.5_f64).powi(53)
 }

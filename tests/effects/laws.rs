@@ -16,6 +16,7 @@ const BASE: &str = "name = \"laws\"\nstart = 2010-07-01T08:05:58\nduration_s = 0
 const TABLES: &[(&str, Option<&str>)] = &[
     ("[ionosphere]\nmodel = \"klobuchar\"", None),
     ("[troposphere]\nmodel = \"saastamoinen\"", None),
+    ("[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf3\"\nvmf_file = \"tests/effects/coarse.vmf3\"", None),
     ("[receiver_clock]\nbias_s = 1e-4\ndrift_sps = 1e-7", Some("[receiver_clock]\nbias_s = 0\ndrift_sps = 0")),
     (
         "[receiver_clock]\nageing_per_day = 1e-7\noscillator = \"tcxo\"",

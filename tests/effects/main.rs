@@ -8,6 +8,7 @@ mod link;
 mod multipath;
 mod oscillator;
 mod propagation;
+mod reaction;
 mod separation;
 mod single;
 mod spoofing;

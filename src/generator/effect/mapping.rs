@@ -1,15 +1,17 @@
 //! Mapping functions of the neutral atmosphere: slant over zenith delay, hydrostatic and wet.
 //!
-//! Sources: Niell 1996 (NMF); Böhm, Werl & Schuh 2006 (VMF1: b and c in closed form, a from a Vienna grid or GPT3, with
-//! Niell's height correction). Limits: elevations below [`LOWEST_RAD`] take its mapping, where the continued fractions
-//! still make sense; the grids' coefficients are held for the whole scene. VMF3 has its own b and c, so its a under
-//! VMF1's closed form departs from it, by 2 cm of delay at 5° and 2 mm at 10°.
+//! Sources: Niell 1996 (NMF); Böhm, Werl & Schuh 2006 (VMF1: b and c in closed form); Landskron & Böhm 2018 (VMF3: b and
+//! c by place and season). VMF1 and VMF3 take a from a Vienna grid or GPT3, at zero height, and add Niell's height
+//! correction to the hydrostatic factor. Limits: elevations below [`LOWEST_RAD`] take its mapping, where the continued
+//! fractions still make sense; a grid's coefficients are held for the whole scene. Those of VMF3's grids and of GPT3 under
+//! VMF1's closed form depart from VMF3, by 2 cm of delay at 5° and 2 mm at 10°.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::gnss::earth::Geodetic;
 use crate::gnss::time::Epoch;
-use crate::gnss::vienna::{Gpt3, MappingA, MappingGrid};
+use crate::gnss::vienna::{Gpt3, MappingA, MappingGrid, Vienna};
+use crate::gnss::vmf3::{MappingBc, Vmf3};
 
 /// Elevation below which the mapping no longer grows: 1°. NMF was fitted from 3° up.
 pub const LOWEST_RAD: f64 = PI / 180.0;
@@ -23,10 +25,25 @@ pub enum Mapping {
     /// A flat atmosphere: 1/sin of the elevation for both parts.
     Cosecant,
     Niell,
-    /// VMF1's form with coefficients a off a grid …
-    ViennaGrid(Box<MappingGrid>),
-    /// … or from the climatology.
-    ViennaGpt3(Box<Gpt3>),
+    Vmf1(Coefficients),
+    Vmf3(Coefficients, Box<Vmf3>),
+}
+
+/// Where VMF's coefficients a come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Coefficients {
+    Grid(Box<MappingGrid>),
+    /// The climatology.
+    Gpt3(Box<Gpt3>),
+}
+
+impl Coefficients {
+    fn at(&self, user: Geodetic, day_of_year: f64) -> MappingA {
+        match self {
+            Self::Grid(grid) => grid.at(user.latitude_rad, user.longitude_rad),
+            Self::Gpt3(gpt3) => gpt3.at(user.latitude_rad, user.longitude_rad, user.height_m, day_of_year).a,
+        }
+    }
 }
 
 impl Mapping {
@@ -39,10 +56,9 @@ impl Mapping {
                 (factor, factor)
             }
             Self::Niell => niell(user, elevation_rad, day),
-            Self::ViennaGrid(grid) => vienna(grid.at(user.latitude_rad, user.longitude_rad), user, elevation_rad, day),
-            Self::ViennaGpt3(gpt3) => {
-                let weather = gpt3.at(user.latitude_rad, user.longitude_rad, user.height_m, day);
-                vienna(weather.a, user, elevation_rad, day)
+            Self::Vmf1(a) => vmf1(a.at(user, day), user, elevation_rad, day),
+            Self::Vmf3(a, bc) => {
+                vmf3(a.at(user, day), bc.at(user.latitude_rad, user.longitude_rad, day), user, elevation_rad)
             }
         }
     }
@@ -52,8 +68,13 @@ impl Mapping {
         match self {
             Self::Cosecant => "cosecant mapping",
             Self::Niell => "Niell's mapping",
-            Self::ViennaGrid(_) => "VMF1 mapping off a grid",
-            Self::ViennaGpt3(_) => "VMF1 mapping with GPT3's coefficients",
+            Self::Vmf1(Coefficients::Grid(grid)) if grid.fitted_with == Some(Vienna::Vmf3) => {
+                "VMF1 mapping off a grid of VMF3"
+            }
+            Self::Vmf1(Coefficients::Grid(_)) => "VMF1 mapping off a grid",
+            Self::Vmf1(Coefficients::Gpt3(_)) => "VMF1 mapping with GPT3's coefficients",
+            Self::Vmf3(Coefficients::Grid(_), _) => "VMF3 mapping off a grid",
+            Self::Vmf3(Coefficients::Gpt3(_), _) => "VMF3 mapping with GPT3's coefficients",
         }
     }
 }
@@ -82,13 +103,22 @@ fn height_correction(sin: f64, height_m: f64) -> f64 {
 /// VMF1's hydrostatic and wet mapping factors with coefficients `a` at zero height, by day of year (from 1.0).
 ///
 /// Böhm et al. 2006, equations 3 to 6 and table 1; the factors hold still below [`LOWEST_RAD`].
-pub fn vienna(a: MappingA, user: Geodetic, elevation_rad: f64, day_of_year: f64) -> (f64, f64) {
+pub fn vmf1(a: MappingA, user: Geodetic, elevation_rad: f64, day_of_year: f64) -> (f64, f64) {
     let sin = libm::sin(elevation_rad.clamp(LOWEST_RAD, FRAC_PI_2));
     let (phase_rad, c10, c11) = if user.latitude_rad < 0.0 { (PI, 0.002, 0.007) } else { (0.0, 0.001, 0.005) };
     let season = libm::cos(TAU * (day_of_year - WINTER_DAY) / YEAR_DAYS + phase_rad);
     let c = 0.062 + ((season + 1.0) * c11 / 2.0 + c10) * (1.0 - libm::cos(user.latitude_rad));
     let dry = herring(sin, [a.hydrostatic, 0.0029, c]) + height_correction(sin, user.height_m);
     (dry, herring(sin, [a.wet, 0.00146, 0.04391]))
+}
+
+/// VMF3's hydrostatic and wet mapping factors with coefficients `a` at zero height, and `bc` of the place and day.
+///
+/// Landskron & Böhm 2018; the factors hold still below [`LOWEST_RAD`].
+pub fn vmf3(a: MappingA, bc: MappingBc, user: Geodetic, elevation_rad: f64) -> (f64, f64) {
+    let sin = libm::sin(elevation_rad.clamp(LOWEST_RAD, FRAC_PI_2));
+    let dry = herring(sin, [a.hydrostatic, bc.b_hydrostatic, bc.c_hydrostatic]);
+    (dry + height_correction(sin, user.height_m), herring(sin, [a.wet, bc.b_wet, bc.c_wet]))
 }
 
 /// Columns are latitudes 15°, 30°, 45°, 60°, 75°; rows a, b, c.
@@ -124,7 +154,7 @@ fn herring(sin: f64, [a, b, c]: [f64; 3]) -> f64 {
 }
 
 /// Days into a mean year, 1.0 on the first of January of 1980. Within 0.8 days of the calendar, and
-/// without its step at the turn of the year.
+/// without its step at the turn of the year; VMF3's factors at 5° change by 1.4e-4 in that time, which is 0.3 mm of delay.
 pub fn season_day(at: Epoch) -> f64 {
     (at.seconds() as f64 / 86_400.0 + 6.0).rem_euclid(YEAR_DAYS)
 }
@@ -154,7 +184,7 @@ mod tests {
         // height 824.17 m, zenith distance 1.278564131; day 1.0 of the formula is MJD 44 239.
         let user = Geodetic { latitude_rad: 0.670_866_576_7, longitude_rad: 0.0, height_m: 824.17 };
         let a = MappingA { hydrostatic: 0.001_276_83, wet: 0.000_609_55 };
-        let (dry, wet) = vienna(a, user, FRAC_PI_2 - 1.278_564_131, 55_055.0 - 44_239.0 + 1.0);
+        let (dry, wet) = vmf1(a, user, FRAC_PI_2 - 1.278_564_131, 55_055.0 - 44_239.0 + 1.0);
         assert!((dry - 3.425_088_087_972_572).abs() < 1e-12, "{dry}");
         assert!((wet - 3.448_299_714_692_572).abs() < 1e-12, "{wet}");
     }
@@ -165,13 +195,13 @@ mod tests {
         // vmf3.m of TU Wien as Orekit's tests quote them. At 38° b and c hardly count: 6e-5 of 2.2 m are 0.1 mm.
         let user = Geodetic::from_degrees(37.5, 277.5, 824.0);
         let a = MappingA { hydrostatic: 0.001_234_62, wet: 0.000_471_01 };
-        let (dry, wet) = vienna(a, user, 38_f64.to_radians(), 329.0);
+        let (dry, wet) = vmf1(a, user, 38_f64.to_radians(), 329.0);
         assert!((dry - 1.621_024).abs() < 6e-5 && (wet - 1.623_023).abs() < 2e-6, "{dry} {wet}");
         // Graz, 2024-01-01: a of the station's file, factors at 10° and 5° printed by vmf3.m to 1e-4.
         let user = Geodetic::from_degrees(47.0671, 15.4935, 0.0);
         let a = MappingA { hydrostatic: 0.001_204_80, wet: 0.000_581_78 };
         for (elevation, dry, wet, off) in [(10.0, 5.5575, 5.6568, 8e-4), (5.0, 10.1579, 10.7460, 9e-3)] {
-            let found = vienna(a, user, f64::to_radians(elevation), 1.0);
+            let found = vmf1(a, user, f64::to_radians(elevation), 1.0);
             assert!((found.0 - dry).abs() < off && (found.1 - wet).abs() < off, "{elevation}: {found:?}");
         }
     }

@@ -1,6 +1,6 @@
 //! What lies between satellites and antenna, as written, and the effects that it becomes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::compose::Files;
 use super::read::Table;
@@ -13,7 +13,8 @@ use crate::generator::ray::Effect;
 use crate::gnss::ionex::{Interpolation, Maps};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::time::Epoch;
-use crate::gnss::vienna::{Gpt3, MappingGrid};
+use crate::gnss::vienna::{Gpt3, MappingGrid, Vienna};
+use crate::gnss::vmf3::Vmf3;
 
 pub(super) const IONOSPHERE_KEYS: &[&str] = &[
     "model",
@@ -171,8 +172,8 @@ pub struct NeutralAtmosphere {
 pub enum MappingKind {
     Cosecant,
     Niell,
-    /// With coefficients from this grid, or from GPT3.
-    Vmf1(Option<PathBuf>),
+    /// With coefficients a from this grid, or from GPT3.
+    Vienna(Vienna, Option<PathBuf>),
 }
 
 pub(super) fn troposphere(table: &Table<'_>) -> Result<NeutralAtmosphere, ScenarioError> {
@@ -192,15 +193,16 @@ pub(super) fn troposphere(table: &Table<'_>) -> Result<NeutralAtmosphere, Scenar
     if gpt3_file.is_some() && weather != standard {
         return Err(table.bad("gpt3_file", "no weather of the scene beside it, because it brings its own"));
     }
-    let kinds = [("niell", MappingKind::Niell), ("cosecant", MappingKind::Cosecant), ("vmf1", MappingKind::Vmf1(None))];
-    let names: Vec<(&str, usize)> = kinds.iter().enumerate().map(|(index, (name, _))| (*name, index)).collect();
-    let index = table.choice("mapping", &names)?.unwrap_or(0);
-    let mapping = match (index, vmf_file) {
-        (2, None) if gpt3_file.is_none() => {
-            return Err(table.bad("mapping", "vmf1 together with vmf_file or gpt3_file, which hold its coefficients"));
+    let names = [("niell", 0), ("cosecant", 1), ("vmf1", 2), ("vmf3", 3)];
+    let mapping = match (table.choice("mapping", &names)?.unwrap_or(0), vmf_file) {
+        (2 | 3, None) if gpt3_file.is_none() => {
+            let expected =
+                "vmf_file or gpt3_file beside it, which hold vmf1's and vmf3's coefficients, or niell or cosecant";
+            return Err(table.bad("mapping", expected));
         }
-        (2, file) => MappingKind::Vmf1(file),
-        (_, Some(_)) => return Err(table.bad("vmf_file", "mapping = \"vmf1\" beside it")),
+        (2, file) => MappingKind::Vienna(Vienna::Vmf1, file),
+        (3, file) => MappingKind::Vienna(Vienna::Vmf3, file),
+        (_, Some(_)) => return Err(table.bad("vmf_file", "mapping = \"vmf1\" or \"vmf3\" beside it")),
         (1, None) => MappingKind::Cosecant,
         (_, None) => MappingKind::Niell,
     };
@@ -219,18 +221,43 @@ impl NeutralAtmosphere {
                 Some(read.map_err(|e| scenario.conflict(key, e.to_string()))?)
             }
         };
-        let mapping = match (&self.mapping, &gpt3) {
-            (MappingKind::Cosecant, _) => mapping::Mapping::Cosecant,
-            (MappingKind::Vmf1(Some(path)), _) => {
-                let key = "troposphere.vmf_file";
-                let bytes = scenario.load(key, files.directory, path, files.overrides)?;
-                let read = MappingGrid::read(&bytes, &path.display().to_string());
-                mapping::Mapping::ViennaGrid(Box::new(read.map_err(|e| scenario.conflict(key, e.to_string()))?))
+        let mapping = match &self.mapping {
+            MappingKind::Cosecant => mapping::Mapping::Cosecant,
+            MappingKind::Niell => mapping::Mapping::Niell,
+            MappingKind::Vienna(kind, file) => {
+                let a = match (file, &gpt3) {
+                    (Some(path), _) => mapping::Coefficients::Grid(Box::new(grid(path, *kind, scenario, files)?)),
+                    (None, Some(gpt3)) => mapping::Coefficients::Gpt3(Box::new(gpt3.clone())),
+                    (None, None) => {
+                        let reason = "vmf1 and vmf3 need vmf_file or gpt3_file, which hold their coefficients";
+                        return Err(scenario.conflict("troposphere.mapping", reason.to_owned()));
+                    }
+                };
+                match kind {
+                    Vienna::Vmf1 => mapping::Mapping::Vmf1(a),
+                    Vienna::Vmf3 => {
+                        let own = Vmf3::embedded();
+                        let own = own.map_err(|e| scenario.conflict("troposphere.mapping", e.to_string()))?;
+                        mapping::Mapping::Vmf3(a, Box::new(own))
+                    }
+                }
             }
-            (MappingKind::Vmf1(None), Some(gpt3)) => mapping::Mapping::ViennaGpt3(Box::new(gpt3.clone())),
-            (MappingKind::Niell | MappingKind::Vmf1(None), _) => mapping::Mapping::Niell,
         };
         let air = gpt3.map_or(Air::Weather(self.weather), |gpt3| Air::Gpt3(Box::new(gpt3)));
         Ok(Box::new(Troposphere { air, mapping }))
     }
+}
+
+/// Coefficients a off a file, which must not be VMF1's if VMF3 is wanted.
+fn grid(path: &Path, wanted: Vienna, scenario: &Scenario, files: &Files<'_>) -> Result<MappingGrid, ScenarioError> {
+    let key = "troposphere.vmf_file";
+    let bytes = scenario.load(key, files.directory, path, files.overrides)?;
+    let read = MappingGrid::read(&bytes, &path.display().to_string());
+    let grid = read.map_err(|e| scenario.conflict(key, e.to_string()))?;
+    if (wanted, grid.fitted_with) == (Vienna::Vmf3, Some(Vienna::Vmf1)) {
+        let reason = "the file's heading says that its coefficients are VMF1's, which do not go with VMF3's others: name a VMF3 \
+                      file, or write mapping = \"vmf1\"";
+        return Err(scenario.conflict(key, reason.to_owned()));
+    }
+    Ok(grid)
 }

@@ -100,6 +100,21 @@ pub fn samples_needed(metadata: &IfMetadata, settings: &AcquisitionSettings) -> 
     Ok(SIGNALS.iter().map(one).max().unwrap_or(0))
 }
 
+/// Chips between neighbouring cells of a search for `signal`.
+///
+/// # Errors
+/// As [`Searcher::search`] for a signal that has no code.
+pub fn cell_chips(
+    metadata: &IfMetadata,
+    signal: &'static Signal,
+    settings: &AcquisitionSettings,
+) -> Result<f64, AcquireError> {
+    settings.validate()?;
+    let grid = Grid::new(signal, metadata, settings);
+    let none = AcquireError::NoCode { signal: signal.name, sv: Sv { system: signal.system, number: 0 } };
+    grid.map(|grid| grid.lag_samples * grid.chips_per_sample).ok_or(none)
+}
+
 /// Searches `block` once for every candidate; rows come in the order of the candidates.
 ///
 /// # Errors

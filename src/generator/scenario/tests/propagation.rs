@@ -66,8 +66,35 @@ fn a_key_of_another_model_is_refused() {
     assert!(error(&horizon("[10, 0]")).contains("ascending"));
     let building = "[[obstruction]]\nkind = \"building\"\neast_m = [20, 10]\nnorth_m = [0, 1]\ntop_m = 3\n";
     assert!(error(building).contains("smaller"));
-    let vmf1 = "[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf1\"\n";
-    assert!(error(vmf1).contains("vmf_file or gpt3_file"));
-    assert!(error(&VIENNA.replace("vmf1", "niell")).contains("vmf_file"));
+    for mapping in ["vmf1", "vmf3"] {
+        let alone = error(&format!("[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"{mapping}\"\n"));
+        assert!(alone.contains("vmf_file or gpt3_file") && alone.contains(mapping), "{alone}");
+    }
+    let needless = error(&VIENNA.replace("vmf1", "niell"));
+    assert!(needless.contains("vmf_file") && needless.contains("\"vmf1\" or \"vmf3\""), "{needless}");
     assert!(error(&format!("{VIENNA}height_m = 3\n")).contains("brings its own"));
+}
+
+#[test]
+fn vmf3_takes_coefficients_of_its_own_kind_only() {
+    let directory = tempfile::tempdir().unwrap();
+    let grid = include_str!("../../../../tests/effects/coarse.vmf3");
+    std::fs::write(directory.path().join("three"), grid).unwrap();
+    std::fs::write(directory.path().join("one"), grid.replace("VMF3 (", "VMF1 (")).unwrap();
+    std::fs::write(directory.path().join("headless"), grid.replace('!', "%")).unwrap();
+    let compose = |mapping: &str, file: &str| {
+        let table =
+            format!("[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"{mapping}\"\nvmf_file = \"{file}\"\n");
+        let composed = parse(&format!("{MINIMAL}{STATIC}{table}"))
+            .unwrap()
+            .compose(directory.path(), &Overrides::default())
+            .map(|(scene, _)| scene.effects[0].describe());
+        composed.map_err(|e| e.to_string())
+    };
+    assert!(compose("vmf3", "three").unwrap().ends_with("; VMF3 mapping off a grid"));
+    assert!(compose("vmf3", "headless").unwrap().ends_with("; VMF3 mapping off a grid"));
+    assert!(compose("vmf1", "one").unwrap().ends_with("; VMF1 mapping off a grid"));
+    assert!(compose("vmf1", "three").unwrap().ends_with("; VMF1 mapping off a grid of VMF3"));
+    let error = compose("vmf3", "one").unwrap_err();
+    assert!(error.contains("troposphere.vmf_file") && error.contains("mapping = \"vmf1\""), "{error}");
 }

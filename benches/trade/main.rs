@@ -3,7 +3,9 @@
 //! Errors are measured without noise and without rounding, one satellite at a time, by correlating its samples with
 //! those of the `reference` level: prompt, and half a chip apart for the code, whose discriminator is calibrated with a
 //! reference moved by 0.02 chip. Costs are medians of interleaved runs of the whole generator on one thread. Run alone:
-//! `cargo bench --bench trade`.
+//! `cargo bench --bench trade`; `-- --widths` measures the widths of samples alone.
+
+mod widths;
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -59,22 +61,25 @@ struct Site {
     time_s: f64,
     /// Replacements in the text.
     change: (&'static str, &'static str),
+    /// What comes after it.
+    tables: &'static str,
 }
 
 const STATIC: Site = Site {
     scene: "static",
-    text: include_str!("../scenarios/static.toml"),
+    text: include_str!("../../scenarios/static.toml"),
     start: "2010-07-01T08:05:58",
     rate_msps: 2.6,
     error_s: 3.0,
     time_s: 6.0,
     change: ("", ""),
+    tables: "",
 };
 
 /// The boost of the rocket, which begins at once and ends with the scene.
 const BOOST: Site = Site {
     scene: "boost",
-    text: include_str!("../scenarios/high_dynamics.toml"),
+    text: include_str!("../../scenarios/high_dynamics.toml"),
     change: ("ignition_s = 40", "ignition_s = 0.3"),
     ..STATIC
 };
@@ -90,6 +95,7 @@ fn scene(site: Site, fidelity: Fidelity, seconds: f64, format: &str, noise: bool
         let line = text.lines().find(|line| line.starts_with(&format!("{key} = "))).unwrap_or("").to_owned();
         text = text.replace(&line, &format!("{key} = {value}"));
     }
+    text.push_str(site.tables);
     let scenario = Scenario::parse(&text, site.scene).unwrap();
     let (mut scene, _) = scenario.compose(Path::new("scenarios"), &Overrides::default()).unwrap();
     (scene.fidelity, scene.noise) = (fidelity, noise);
@@ -343,12 +349,18 @@ fn output_of(program: &str, arguments: &[&str]) -> String {
     found.map_or_else(String::new, |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
 }
 
-fn preface() -> String {
+/// Processor, compiler and date.
+fn machine() -> String {
     let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpu
         .lines()
         .find_map(|line| line.strip_prefix("model name"))
         .map_or("", |x| x.trim_start_matches([' ', '\t', ':']));
+    let (compiler, date) = (output_of("rustc", &["--version"]), output_of("date", &["-u", "+%F"]));
+    format!("{model}, {compiler}, {date}, release profile, instruction set chosen at run time.")
+}
+
+fn preface() -> String {
     format!(
         "Each row is one setting of `[fidelity]`. Errors are against the `reference` level, without noise and rounding, over \
          pieces of 20 ms (carrier: 1 ms) of three satellites: the mean is the largest of a satellite, σ is about the means, \
@@ -356,14 +368,18 @@ fn preface() -> String {
          averages over the seconds in which the code's Doppler moves it along, and sees the mean. Where the rate is a multiple of the chip rate, or over \
          short stretches, it sees one piece. ns are one core's for a sample of a satellite with everything that the generator does (truth, rounding to 8 bits), \
          processor time, medians of interleaved runs. The position is the closed loop's mean over 45 s with noise, against that of \
-         `reference` with the same seed. Settings that no other beats in cost and pseudorange error are on the front.\n\n\
-         {model}, {}, {}, release profile, instruction set chosen at run time. `cargo bench --bench trade` makes this page.",
-        output_of("rustc", &["--version"]),
-        output_of("date", &["-u", "+%F"]),
+         `reference` with the same seed. Settings that no other beats in cost and pseudorange error are on the front. Widths of samples and qualities of noise have [a page of their own](widths.md).\n\n\
+         {} `cargo bench --bench trade` makes this page.",
+        machine()
     )
 }
 
 fn main() {
+    let widths = widths::measure();
+    let reports = Path::new("reports");
+    if std::env::args().any(|argument| argument == "--widths") {
+        return trade::write_widths(reports, &widths, &machine()).unwrap();
+    }
     let mut rows = Vec::new();
     measure(STATIC, &settings(STATIC.rate_msps), 7, 3, &mut rows);
     let places: Vec<[f64; 3]> = Grade::NAMES.iter().map(|(_, grade)| position(Fidelity::of(*grade))).collect();
@@ -376,5 +392,6 @@ fn main() {
         measure(Site { rate_msps, error_s, time_s, ..STATIC }, &settings(rate_msps), 3, 3, &mut rows);
     }
     measure(BOOST, &knots(), 3, 3, &mut rows);
-    trade::write(Path::new("reports"), &rows, &preface()).unwrap();
+    trade::write(reports, &rows, &preface()).unwrap();
+    trade::write_widths(reports, &widths, &machine()).unwrap();
 }

@@ -1,0 +1,185 @@
+//! Probability that a search finds a satellite, from the joint statistics of the cells about its peak.
+//!
+//! A search takes the largest of neighbouring cells, whose noise is alike and of which two or four may share the peak, so its
+//! detection probability exceeds that of one cell (`analysis::theory::detection`) and has no closed form. Here the
+//! correlations of a neighbourhood are drawn: mean from the autocorrelation of chips averaged over a sample, sinc over
+//! frequency and symbols that turn within a sum; noise with the covariance that the same two functions give. Limits: complex
+//! samples, one satellite, random codes beyond the neighbourhood, band of the samples not narrowed.
+
+use std::f64::consts::TAU;
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+use super::normal::{Normals, Purpose, uniform};
+
+/// Cells to either side of the nearest one that are drawn, in code and in Doppler.
+const SIDE_LAGS: i32 = 3;
+const SIDE_BINS: i32 = 2;
+/// Mean square of the code's correlation away from its peak, in units of one over its chips.
+const SIDELOBE: f64 = 2.0 / 3.0;
+/// Steps of an integral over a sum in which symbols turn.
+const STEPS: u32 = 40;
+
+/// A search and the signal that it meets.
+#[derive(Clone, Copy, Debug)]
+pub struct Model {
+    /// Coherent sums whose powers are added, and the length of one.
+    pub sums: u32,
+    pub coherent_s: f64,
+    /// What the largest Σ|S|², in units of the noise of one component, has to exceed.
+    pub threshold: f64,
+    pub lag_chips: f64,
+    pub doppler_step_hz: f64,
+    /// A sample's length.
+    pub sample_chips: f64,
+    pub code_chips: f64,
+    pub symbol_s: f64,
+    /// The code is anywhere within this share of a lag about the nearest one: 1 where nothing is known of it.
+    pub code_spread: f64,
+    pub cn0_dbhz: f64,
+}
+
+/// Autocorrelation at `offset` chips of rectangular chips averaged over `sample` chips on both sides, one at zero.
+pub fn autocorrelation(offset: f64, sample: f64) -> f64 {
+    // Two averages make a triangle: ∫ Λ(offset − u·s)·Λ(u) du by the midpoint rule.
+    const STEPS: i32 = 200;
+    let at = |offset: f64| -> f64 {
+        (0..STEPS)
+            .map(|k| {
+                let u = 2.0 * (f64::from(k) + 0.5) / f64::from(STEPS) - 1.0;
+                (1.0 - u.abs()) * (1.0 - (offset - u * sample).abs()).max(0.0)
+            })
+            .sum()
+    };
+    at(offset) / at(0.0)
+}
+
+fn sinc(x: f64) -> f64 {
+    let x = 0.5 * TAU * x;
+    if x.abs() < 1e-9 { 1.0 } else { libm::sin(x) / x }
+}
+
+impl Model {
+    /// Share of `draws` in which the satellite is found, its Doppler each of `doppler_hz` off the nearest bin in turn, the edges
+    /// of its symbols anywhere.
+    pub fn probability(&self, doppler_hz: &[f64], draws: u32, seed: u64) -> f64 {
+        let lags: Vec<f64> = (-SIDE_LAGS..=SIDE_LAGS).map(f64::from).collect();
+        let bins: Vec<f64> = (-SIDE_BINS..=SIDE_BINS).map(f64::from).collect();
+        let covariance = |places: &[f64], of: &dyn Fn(f64) -> f64| {
+            DMatrix::from_fn(places.len(), places.len(), |a, b| of(places[a] - places[b]))
+        };
+        let across_code = covariance(&lags, &|d| autocorrelation(d * self.lag_chips, self.sample_chips));
+        let across_doppler = covariance(&bins, &|d| sinc(d * self.doppler_step_hz * self.coherent_s));
+        // Neighbours this close are never dependent, so both are positive definite; if not, nothing is found.
+        let (Some(code), Some(doppler)) = (across_code.cholesky(), across_doppler.cholesky()) else { return 0.0 };
+        let (code, doppler) = (code.l(), doppler.l());
+        let cn0_hz = libm::pow(10.0, self.cn0_dbhz / 10.0);
+        // Correlations of unit noise a component; the floor holds the sidelobes of the signal too.
+        let amplitude = (2.0 * self.coherent_s * cn0_hz).sqrt();
+        let floor = 1.0 + self.coherent_s * cn0_hz * SIDELOBE / self.code_chips;
+        let mut noise = Normals::new(seed, Purpose::Thermal);
+        let mut found = 0;
+        for draw in 0..draws {
+            let offset = uniform(seed, Purpose::Places, 2 * u64::from(draw)) - 0.5;
+            let offset = offset * self.code_spread;
+            let edge_s = uniform(seed, Purpose::Places, 2 * u64::from(draw) + 1) * self.symbol_s;
+            let doppler_hz = doppler_hz.get(draw as usize % doppler_hz.len().max(1)).copied().unwrap_or(0.0);
+            let shape: Vec<f64> =
+                (lags.iter()).map(|lag| autocorrelation((lag - offset) * self.lag_chips, self.sample_chips)).collect();
+            let mut powers = DMatrix::<f64>::zeros(lags.len(), bins.len());
+            for sum in 0..self.sums {
+                let begin_s = f64::from(sum) * self.coherent_s;
+                let symbols = Symbols { seed, first: u64::from(draw) << 16, edge_s, symbol_s: self.symbol_s };
+                let across: Vec<Complex64> = (bins.iter())
+                    .map(|bin| symbols.mean(begin_s, self.coherent_s, doppler_hz - bin * self.doppler_step_hz))
+                    .collect();
+                let white = DMatrix::from_fn(lags.len(), bins.len(), |_, _| noise.next());
+                let coloured = code.map(Complex64::from) * white * doppler.transpose().map(Complex64::from);
+                for (column, mean) in across.iter().enumerate() {
+                    for (row, height) in shape.iter().enumerate() {
+                        powers[(row, column)] += (coloured[(row, column)] + mean * height * amplitude).norm_sqr();
+                    }
+                }
+            }
+            found += u32::from(powers.max() / floor > self.threshold);
+        }
+        f64::from(found) / f64::from(draws.max(1))
+    }
+}
+
+/// Message symbols of one draw.
+struct Symbols {
+    seed: u64,
+    first: u64,
+    /// Where the second symbol begins.
+    edge_s: f64,
+    symbol_s: f64,
+}
+
+impl Symbols {
+    /// Mean over a sum of the symbols turning at `offset_hz`, as seen from the middle of the sum.
+    fn mean(&self, begin_s: f64, length_s: f64, offset_hz: f64) -> Complex64 {
+        let number = |t_s: f64| ((t_s - self.edge_s) / self.symbol_s).floor() + 1.0;
+        let sign = |t_s: f64| super::normal::symbol(self.seed, self.first + number(t_s) as u64);
+        if number(begin_s) == number(begin_s + length_s) {
+            return Complex64::from(sinc(offset_hz * length_s));
+        }
+        let step_s = length_s / f64::from(STEPS);
+        (0..STEPS)
+            .map(|k| {
+                let t_s = (f64::from(k) + 0.5) * step_s;
+                let (sin, cos) = libm::sincos(TAU * offset_hz * (t_s - 0.5 * length_s));
+                Complex64::new(cos, sin) * sign(begin_s + t_s) / f64::from(STEPS)
+            })
+            .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::theory::detection;
+
+    #[test]
+    fn the_autocorrelation_is_the_closed_form_of_two_triangles() {
+        // ∫ Λ(τ − u s) Λ(u) du at τ = 0 is 1 − s/3; a sample's share of it is the peak.
+        let s = 0.4;
+        let at_zero = 1.0 - s / 3.0;
+        // From s to 1 − s chips both triangles are straight: (1 − τ) remains.
+        assert!((autocorrelation(0.5, s) - 0.5 / at_zero).abs() < 1e-4);
+        assert!(autocorrelation(1.0 + s, s).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_lonely_cell_is_found_as_often_as_the_closed_form_says() {
+        // Lags five chips apart, bins of whole cycles, a code on its lag and a symbol that never turns leave one cell.
+        const DRAWS: u32 = 20_000;
+        let model = Model {
+            sums: 10,
+            coherent_s: 1e-3,
+            threshold: detection::threshold(1e-7, 10),
+            lag_chips: 5.0,
+            doppler_step_hz: 1e3,
+            sample_chips: 0.4,
+            code_chips: f64::INFINITY,
+            symbol_s: 1e3,
+            code_spread: 0.0,
+            cn0_dbhz: 38.0,
+        };
+        for cn0_dbhz in [35.0, 37.0, 38.0] {
+            let lambda = detection::noncentrality(10, 1e-3, libm::pow(10.0, cn0_dbhz / 10.0), 1.0);
+            let expected = detection::detection(model.threshold, 10, lambda);
+            let found = Model { cn0_dbhz, ..model }.probability(&[0.0], DRAWS, 1);
+            // Four deviations of a count, and the other cells' own alarms: 34 of 1e-7.
+            let scatter = 4.0 * (expected * (1.0 - expected) / f64::from(DRAWS)).sqrt() + 4e-6;
+            assert!((found - expected).abs() < scatter, "{cn0_dbhz} dB-Hz: {found}, expected {expected}");
+        }
+        // Where the peak is shared, a neighbour may stand in: more are found than in the nearest cell alone.
+        let shared = Model { lag_chips: 0.4, doppler_step_hz: 500.0, cn0_dbhz: 36.0, ..model };
+        let lambda = detection::noncentrality(10, 1e-3, libm::pow(10.0, 3.6), detection::frequency_loss(250.0, 1e-3));
+        let alone = detection::detection(model.threshold, 10, lambda);
+        let found = shared.probability(&[250.0], DRAWS, 2);
+        assert!(found > alone + 0.05, "{found}, one cell {alone}");
+    }
+}
