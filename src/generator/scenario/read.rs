@@ -169,36 +169,6 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// An array of plain values: numbers, texts, truth values, times and arrays of them.
-    pub fn values(&self, name: &str) -> Result<Option<Vec<toml::Value>>, ScenarioError> {
-        let Some(value) = self.get(name) else { return Ok(None) };
-        let expected = "an array of at least one number, text or truth value";
-        let DeValue::Array(items) = value.get_ref() else { return Err(self.bad(name, expected)) };
-        let values: Option<Vec<toml::Value>> = items.iter().map(|item| plain(item.get_ref())).collect();
-        values.filter(|values| !values.is_empty()).map(Some).ok_or_else(|| self.bad(name, expected))
-    }
-
-    /// The table without its places.
-    pub fn whole(&self) -> Result<toml::Table, ScenarioError> {
-        let mut whole = toml::Table::new();
-        for name in self.names() {
-            let value = match self.get(name).map(Spanned::get_ref) {
-                Some(DeValue::Table(_)) => {
-                    self.table(name)?.map(|table| table.whole()).transpose()?.map(toml::Value::Table)
-                }
-                _ => self.value(name),
-            };
-            let value = value.ok_or_else(|| self.bad(name, "a number, a text, a truth value, or a table of these"))?;
-            whole.insert(name.to_owned(), value);
-        }
-        Ok(whole)
-    }
-
-    /// A plain value of any type.
-    pub fn value(&self, name: &str) -> Option<toml::Value> {
-        self.get(name).and_then(|value| plain(value.get_ref()))
-    }
-
     pub fn flag(&self, name: &str) -> Result<Option<bool>, ScenarioError> {
         match self.get(name).map(Spanned::get_ref) {
             None => Ok(None),
@@ -260,6 +230,40 @@ impl<'t> Table<'t> {
     }
 }
 
+/// Values of any type, for those who pass them on.
+#[cfg(feature = "study")]
+impl Table<'_> {
+    /// An array of plain values: numbers, texts, truth values, times and arrays of them.
+    pub fn values(&self, name: &str) -> Result<Option<Vec<toml::Value>>, ScenarioError> {
+        let Some(value) = self.get(name) else { return Ok(None) };
+        let expected = "an array of at least one number, text or truth value";
+        let DeValue::Array(items) = value.get_ref() else { return Err(self.bad(name, expected)) };
+        let values: Option<Vec<toml::Value>> = items.iter().map(|item| plain(item.get_ref())).collect();
+        values.filter(|values| !values.is_empty()).map(Some).ok_or_else(|| self.bad(name, expected))
+    }
+
+    /// The table without its places.
+    pub fn whole(&self) -> Result<toml::Table, ScenarioError> {
+        let mut whole = toml::Table::new();
+        for name in self.names() {
+            let value = match self.get(name).map(Spanned::get_ref) {
+                Some(DeValue::Table(_)) => {
+                    self.table(name)?.map(|table| table.whole()).transpose()?.map(toml::Value::Table)
+                }
+                _ => self.value(name),
+            };
+            let value = value.ok_or_else(|| self.bad(name, "a number, a text, a truth value, or a table of these"))?;
+            whole.insert(name.to_owned(), value);
+        }
+        Ok(whole)
+    }
+
+    /// A plain value of any type.
+    pub fn value(&self, name: &str) -> Option<toml::Value> {
+        self.get(name).and_then(|value| plain(value.get_ref()))
+    }
+}
+
 /// A range's end without a tail of zeros.
 struct Short(f64);
 
@@ -279,6 +283,7 @@ fn as_number(value: &DeValue<'_>) -> Option<f64> {
 }
 
 /// A value without its place; `None` for a table or a number that is none.
+#[cfg(feature = "study")]
 pub(crate) fn plain(value: &DeValue<'_>) -> Option<toml::Value> {
     Some(match value {
         DeValue::Integer(i) => toml::Value::Integer(i64::from_str_radix(i.as_str(), i.radix()).ok()?),
