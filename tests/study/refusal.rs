@@ -4,7 +4,7 @@ use super::*;
 
 /// The study with one text for another must be refused with these words and leave nothing behind.
 fn refused(from: &str, to: &str, words: &[&str]) {
-    let changed = MODELLED.replacen(from, to, 1);
+    let changed = MODELLED.replace(from, to);
     assert_ne!(changed, MODELLED, "{from}");
     let here = workplace(&changed);
     let output = study(&["plan", "study.toml", "-o", "out"], here.path());

@@ -11,7 +11,6 @@ const STUDY: &str = r#"
 name = "sampled"
 level = "samples"
 scenario = "scenes/one.toml"
-repetitions = 2
 keep = ["tracking.pll_sigma_deg", "tracking.dll_sigma_chips", "acquisition.detected_share", "acquisition.false"]
 [[axis]]
 key = "power.cn0_dbhz"
@@ -39,7 +38,7 @@ fn a_case_is_what_run_would_say_and_agrees_with_theory() {
     let here = here.path();
     good(&["study.toml", "-o", "out"], here);
     let rows = cases(here, "out");
-    assert_eq!(rows.len(), 8);
+    assert_eq!(rows.len(), 4);
     // Columns: case, seed, repetition, C/N0, bandwidth, phase, its theory, code, its theory, detected, false.
     let number = |row: &csv::StringRecord, column: usize| row[column].parse::<f64>().unwrap();
     for (row, case) in rows.iter().zip(0..) {

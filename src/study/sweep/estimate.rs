@@ -20,10 +20,11 @@ const T95: [f64; 30] = [
 ];
 const NORMAL95: f64 = 1.959_964;
 
-/// Beyond the table z + (z³ + z)/(4ν), the first term of the expansion (Abramowitz and Stegun 26.7.5), is within 1e-3.
+/// Beyond the table the first two terms of the expansion in 1/ν (Abramowitz and Stegun 26.7.5), within 1e-4.
 fn t95(freedom: usize) -> f64 {
-    let z = NORMAL95;
-    let beyond = z + (z * z * z + z) / (4.0 * freedom as f64);
+    let (z, v) = (NORMAL95, freedom as f64);
+    let (z3, z5) = (z * z * z, z * z * z * z * z);
+    let beyond = z + (z3 + z) / (4.0 * v) + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * v * v);
     freedom.checked_sub(1).and_then(|index| T95.get(index)).copied().unwrap_or(beyond)
 }
 
