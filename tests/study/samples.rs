@@ -11,7 +11,14 @@ const STUDY: &str = r#"
 name = "sampled"
 level = "samples"
 scenario = "scenes/one.toml"
-keep = ["tracking.pll_sigma_deg", "tracking.dll_sigma_chips", "acquisition.detected_share", "acquisition.false"]
+keep = [
+    "tracking.pll_sigma_deg",
+    "theory.tracking.pll_sigma_deg",
+    "tracking.dll_sigma_chips",
+    "theory.tracking.dll_sigma_chips",
+    "acquisition.detected_share",
+    "acquisition.false",
+]
 [[axis]]
 key = "power.cn0_dbhz"
 values = [41, 46.0]
@@ -81,11 +88,11 @@ fn a_scene_s_own_refusals_come_with_the_axis_that_caused_them() {
             assert!(text(&output).contains(word), "{word:?} is not in {}", text(&output));
         }
     };
-    refused("power.cn0_dbhz", "power.cn0_dbh", &["bad.toml:8:7", "did you mean 'cn0_dbhz'"]);
+    refused("power.cn0_dbhz", "power.cn0_dbh", &["bad.toml:14:7", "did you mean 'cn0_dbhz'"]);
     refused("[41, 46.0]", "[41, 460]", &["axis power.cn0_dbhz = 460", "expected"]);
-    refused("pll_bandwidth_hz", "pll_bandwith_hz", &["bad.toml:11:7", "pll_bandwidth_hz"]);
+    refused("pll_bandwidth_hz", "pll_bandwith_hz", &["bad.toml:17:7", "pll_bandwidth_hz"]);
     refused("scenes/one.toml", "scenes/none.toml", &["scenes/none.toml"]);
-    refused("tracking.pll_sigma_deg", "tracking.pll_sigma", &["did you mean tracking.pll_sigma_deg"]);
+    refused("\"tracking.pll_sigma_deg", "\"tracking.pll_sigma", &["did you mean tracking.pll_sigma_deg"]);
     refused("power.cn0_dbhz", "power.cn0_dbhz.x", &["cn0_dbhz is no table"]);
 }
 

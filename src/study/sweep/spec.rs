@@ -49,7 +49,7 @@ pub struct Study {
     pub base: toml::Table,
     /// At samples level: the scene's file, as written; absent where an axis names the files.
     pub scenario: Option<PathBuf>,
-    /// Figures to keep; those of theory stand behind the ones that they predict.
+    /// Figures to keep; at correlator level those of theory stand behind the ones that they predict.
     pub keep: Vec<String>,
     pub plots: Vec<Plot>,
 }
@@ -288,7 +288,9 @@ fn keep(root: &Table<'_>, level: Level) -> Result<Vec<String>, ScenarioError> {
             let hint = nearest(word, &known).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
             return Err(root.bad("keep", format!("figures out of {}; {word:?} is none{hint}", known.join(", "))));
         }
-        for name in [word.to_owned(), format!("theory.{word}")] {
+        // On samples theory is for scenes of thermal noise alone, so a study has to ask for it.
+        let theory = (level == Level::Correlator).then(|| format!("theory.{word}"));
+        for name in [Some(word.to_owned()), theory].into_iter().flatten() {
             if known.contains(&name.as_str()) && !keep.contains(&name) {
                 keep.push(name);
             }
