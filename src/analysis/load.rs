@@ -126,8 +126,11 @@ const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RU
 impl Run {
     /// Reads a run's directory. `psd.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json` may be missing.
     pub fn read(run: &Path) -> Result<Self, JudgeError> {
-        let truth = run.join("truth");
-        let rx = run.join("rx");
+        Self::read_parts(run, &run.join("truth"), &run.join("rx"))
+    }
+
+    /// [`Self::read`] where truth and receiver wrote into directories of their own, so that several receivers share a truth.
+    pub fn read_parts(run: &Path, truth: &Path, rx: &Path) -> Result<Self, JudgeError> {
         let psd = run.join("psd.csv");
         let rays = truth.join("rays.csv");
         Ok(Self {

@@ -1,8 +1,9 @@
 //! Arguments as written.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::gnss::samples::Format;
 
@@ -28,6 +29,8 @@ pub enum Command {
     Analyze(Analyze),
     /// Say what a scene will compute, what not, and why
     Plan(Plan),
+    /// Run a study: a base, axes and repetitions become tables, curves and a report
+    Study(Study),
 }
 
 #[derive(Args, Debug, Default)]
@@ -147,4 +150,129 @@ pub struct ReceiverFiles {
 pub struct Plan {
     /// Scene to plan [default: the embedded static scene]
     pub scenario: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "Examples:\n  gnss-twin study studies/pll_jitter.toml\n  gnss-twin study plan studies/pll_jitter.toml -o big && gnss-twin study export slurm big | sbatch"
+)]
+pub struct Study {
+    #[command(subcommand)]
+    pub action: Option<StudyAction>,
+    /// Study to plan, run and report on this machine; after a kill the same command goes on
+    pub study: Option<PathBuf>,
+    /// Directory of the study [default: reports/<name of the study's file>]
+    #[arg(long, short, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Threads to use [default: one a core]
+    #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// Forget what an earlier plan in that directory has computed
+    #[arg(long)]
+    pub fresh: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum StudyAction {
+    /// Write a study's manifest and copies of its inputs into a directory
+    Plan(StudyPlan),
+    /// Compute missing shards: all of them, or one
+    Run(StudyRun),
+    /// Say what is there; exit 3 if something is missing
+    Status(StudyStatus),
+    /// Put all shards together: each case once, in order, or an error
+    Merge(StudyMerge),
+    /// Write tables, pictures and report.md into the study's directory
+    Report(StudyReport),
+    /// Print a script that hands the missing shards to an engine
+    Export(StudyExport),
+}
+
+#[derive(Args, Debug)]
+pub struct StudyPlan {
+    /// Study to plan
+    pub study: PathBuf,
+    /// Directory of the study
+    #[arg(long, short, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Number of shards [default: 50 to 1000, of a minute at most]
+    #[arg(long, value_name = "N", conflicts_with = "shard_minutes", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub shards: Option<u64>,
+    /// Length of a shard in minutes of one core, roughly
+    #[arg(long, value_name = "M")]
+    pub shard_minutes: Option<f64>,
+    /// Forget what an earlier plan in that directory has computed
+    #[arg(long)]
+    pub fresh: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct StudyRun {
+    /// Directory of the study
+    pub directory: PathBuf,
+    /// Number of a shard, or auto: the number that the engine gives to this task [default: all that are missing]
+    #[arg(long, value_name = "K")]
+    pub shard: Option<Shard>,
+    /// Threads to use [default: one a core]
+    #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+}
+
+/// Which shard to run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shard {
+    Auto,
+    Number(u32),
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        if word == "auto" {
+            return Ok(Self::Auto);
+        }
+        word.parse().map(Self::Number).map_err(|_| "expected a number or auto".to_owned())
+    }
+}
+
+#[derive(Args, Debug)]
+pub struct StudyStatus {
+    /// Directory of the study
+    pub directory: PathBuf,
+    /// Print the missing shards alone, as an engine's array takes them
+    #[arg(long)]
+    pub missing: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct StudyMerge {
+    /// Directory of the study
+    pub directory: PathBuf,
+    /// File for the table
+    #[arg(long, short, value_name = "FILE.csv")]
+    pub out: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub struct StudyReport {
+    /// Directory of the study
+    pub directory: PathBuf,
+}
+
+#[derive(Args, Debug)]
+pub struct StudyExport {
+    pub engine: Engine,
+    /// Directory of the study
+    pub directory: PathBuf,
+}
+
+/// What hands out shards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Engine {
+    /// A job array of Slurm
+    Slurm,
+    /// GNU parallel
+    Parallel,
 }

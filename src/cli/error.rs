@@ -25,6 +25,11 @@ impl CliError {
         Self { code: 3, message: message.to_string() }
     }
 
+    /// A result is not complete yet.
+    pub fn incomplete(message: impl Display) -> Self {
+        Self { code: 3, message: message.to_string() }
+    }
+
     /// Input data is bad; trying again will not help.
     pub fn input(message: impl Display) -> Self {
         Self { code: 65, message: message.to_string() }

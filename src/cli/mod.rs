@@ -16,6 +16,7 @@ pub mod run;
 pub mod scenario;
 pub mod speed;
 pub mod staging;
+pub mod study;
 
 use std::process::ExitCode;
 
@@ -54,5 +55,6 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Receive(arguments) => receive::execute(&arguments),
         Command::Analyze(arguments) => analyze::execute(&arguments),
         Command::Plan(arguments) => plan::execute(&arguments),
+        Command::Study(arguments) => study::execute(&arguments),
     }
 }

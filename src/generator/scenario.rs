@@ -16,7 +16,7 @@ mod multipath;
 mod obstruction;
 mod parts;
 mod propagation;
-mod read;
+pub(crate) mod read;
 mod satellite;
 mod scintillation;
 mod stages;
@@ -129,6 +129,18 @@ pub enum ScenarioError {
     Conflict { origin: String, key: &'static str, reason: String },
     #[error("{origin}: {key} = {path:?}: {reason}")]
     File { origin: String, key: &'static str, path: PathBuf, reason: String },
+}
+
+impl ScenarioError {
+    /// The message without its place, for a document that stands nowhere as it was read.
+    pub fn without_place(&self) -> String {
+        let whole = self.to_string();
+        let place = match self {
+            Self::Toml { place, .. } | Self::UnknownKey { place, .. } | Self::Value { place, .. } => place.to_string(),
+            Self::Conflict { origin, .. } | Self::File { origin, .. } => origin.clone(),
+        };
+        whole.strip_prefix(&format!("{place}: ")).map_or(whole.clone(), str::to_owned)
+    }
 }
 
 /// A scenario whose every value is within its range. What is absent is `None` or not in the scene.

@@ -95,6 +95,8 @@ pub struct Outcome {
     pub code_chips: Moments,
     /// From the point of lock nearest in time; empty in [`Mode::Frequency`].
     pub phase_cycles: Moments,
+    /// Largest of those.
+    pub phase_peak_cycles: f64,
     pub frequency_hz: Moments,
     /// Values of the discriminators.
     pub raw_code_chips: Moments,
@@ -128,6 +130,7 @@ pub fn run(case: &Case) -> Outcome {
         outcome.frequency_hz.add(epoch.frequency_hz);
         if follows_phase {
             outcome.phase_cycles.add(epoch.phase_cycles - locked_at);
+            outcome.phase_peak_cycles = outcome.phase_peak_cycles.max((epoch.phase_cycles - locked_at).abs());
         }
         outcome.raw_code_chips.add(epoch.update.dll_chips);
         outcome.raw_phase_cycles.add(epoch.update.pll_cycles);

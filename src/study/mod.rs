@@ -4,7 +4,7 @@
 //! statistics; [`motion`] is the truth that it follows, [`correlation`] the shape of the peak. [`expect`] says what theory
 //! predicts for the same loops, [`proof`] compares both over a grid, [`limits`] holds
 //! them against rules of thumb and [`report`] writes both down. [`search`] draws what an acquisition would find, [`detection`] counts what
-//! the receiver's does find in samples. This is the only module that sees receiver, generator and judge at once; none of them sees it.
+//! the receiver's does find in samples. [`sweep`] runs studies that a file describes, on either. This is the only module that sees receiver, generator and judge at once; none of them sees it.
 
 pub mod correlation;
 pub mod correlator;
@@ -17,6 +17,7 @@ mod normal;
 pub mod proof;
 pub mod report;
 pub mod search;
+pub mod sweep;
 #[cfg(test)]
 mod tests;
 mod watch;

@@ -53,6 +53,10 @@ pub enum Mark {
     Balls,
     /// Bars from zero, of that width in data units.
     Bars(f64),
+    /// The area inside the points, pale.
+    Band,
+    /// Filled rectangles about the points, of that width and height in data units.
+    Tile(f64, f64),
 }
 
 /// Points in data units and how they look.
@@ -144,7 +148,8 @@ impl Chart {
     }
 }
 
-/// Draws charts, `columns` a row, with one legend below all of them, as a PNG of that size.
+/// Draws charts, `columns` a row, with one legend below all of them, into a picture of that size: a PNG, or an SVG where the file
+/// is named so.
 ///
 /// # Errors
 /// [`JudgeError::Plot`] or [`JudgeError::File`] with the path.
@@ -156,7 +161,11 @@ pub fn figure(
     legend: &[Series],
 ) -> Result<(), JudgeError> {
     let failed = |error: Failure| JudgeError::Plot { path: path.to_owned(), reason: error.to_string() };
-    compose(size, columns, charts, legend).map_err(failed)?.write_png(path, 1.0)
+    let drawing = compose(size, columns, charts, legend).map_err(failed)?;
+    if path.extension().is_some_and(|extension| extension == "svg") {
+        return crate::analysis::write_whole(path, drawing.svg.as_bytes());
+    }
+    drawing.write_png(path, 1.0)
 }
 
 /// Draws charts, `columns` a row, with one legend below all of them.
@@ -312,6 +321,16 @@ fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Fai
             };
             context.draw_series(series.points.iter().map(bar))?;
         }
+        Mark::Band if points.len() < 3 => {}
+        Mark::Band => {
+            let inside = Polygon::new(points, series.colour.mix(0.2).filled());
+            context.draw_series(std::iter::once(inside))?;
+        }
+        Mark::Tile(width, height) => {
+            let (w, h) = (width / 2.0, height / 2.0);
+            let tile = |&(x, y): &(f64, f64)| Rectangle::new([(x - w, y - h), (x + w, y + h)], series.colour.filled());
+            context.draw_series(series.points.iter().map(tile))?;
+        }
     }
     Ok(())
 }
@@ -352,8 +371,12 @@ fn draw_entry(area: &Area<'_>, x_px: i32, y_px: i32, series: &Series) -> Result<
         Mark::Dots | Mark::Balls => area.draw(&Circle::new(middle, 4 * FINE, series.colour.filled()))?,
         Mark::Rings => area.draw(&Circle::new(middle, 4 * FINE, thick))?,
         Mark::Cross => area.draw(&plotters::element::Cross::new(middle, 5 * FINE, thick))?,
-        Mark::Bars(_) => {
-            area.draw(&Rectangle::new([(x, y - 5 * FINE), (end, y + 5 * FINE)], series.colour.filled()))?
+        Mark::Band => {
+            let pale = series.colour.mix(0.2).filled();
+            area.draw(&Rectangle::new([(x, y - 5 * FINE), (end, y + 5 * FINE)], pale))?;
+        }
+        Mark::Bars(_) | Mark::Tile(..) => {
+            area.draw(&Rectangle::new([(x, y - 5 * FINE), (end, y + 5 * FINE)], series.colour.filled()))?;
         }
     }
     let style = anchored(12, HPos::Left, VPos::Center);

@@ -264,6 +264,11 @@ impl AssistedLoop {
         self.stepped(|_, rate| rate, |noise| [noise, 0.0])
     }
 
+    /// The same; the error is that of the phase at a `place` from 0, the start of an interval, to 1, its end.
+    pub fn linear_at(&self, place: f64) -> Linear {
+        self.stepped(|phase, rate| phase + (place - 0.5) * rate, |noise| [noise, 0.0])
+    }
+
     fn stepped(&self, error: impl Fn(f64, f64) -> f64, drives: impl Fn(f64) -> [f64; 2]) -> Linear {
         let [k1, k2, k3] = self.gains;
         Linear::of(|[start, rate, acceleration, before]: [f64; 4], noise| {

@@ -13,7 +13,7 @@ use toml::de::{DeTable, DeValue};
 use super::ScenarioError;
 
 /// The text of a scenario and where it came from.
-pub(super) struct Source<'t> {
+pub(crate) struct Source<'t> {
     pub origin: &'t str,
     pub text: &'t str,
 }
@@ -55,7 +55,7 @@ impl Source<'_> {
 }
 
 /// One table of the scenario.
-pub(super) struct Table<'t> {
+pub(crate) struct Table<'t> {
     source: &'t Source<'t>,
     path: String,
     at: usize,
@@ -238,6 +238,40 @@ impl<'t> Table<'t> {
     }
 }
 
+/// Values of any type, for those who pass them on.
+#[cfg(feature = "study")]
+impl Table<'_> {
+    /// An array of plain values: numbers, texts, truth values, times and arrays of them.
+    pub fn values(&self, name: &str) -> Result<Option<Vec<toml::Value>>, ScenarioError> {
+        let Some(value) = self.get(name) else { return Ok(None) };
+        let expected = "an array of at least one number, text or truth value";
+        let DeValue::Array(items) = value.get_ref() else { return Err(self.bad(name, expected)) };
+        let values: Option<Vec<toml::Value>> = items.iter().map(|item| plain(item.get_ref())).collect();
+        values.filter(|values| !values.is_empty()).map(Some).ok_or_else(|| self.bad(name, expected))
+    }
+
+    /// The table without its places.
+    pub fn whole(&self) -> Result<toml::Table, ScenarioError> {
+        let mut whole = toml::Table::new();
+        for name in self.names() {
+            let value = match self.get(name).map(Spanned::get_ref) {
+                Some(DeValue::Table(_)) => {
+                    self.table(name)?.map(|table| table.whole()).transpose()?.map(toml::Value::Table)
+                }
+                _ => self.value(name),
+            };
+            let value = value.ok_or_else(|| self.bad(name, "a number, a text, a truth value, or a table of these"))?;
+            whole.insert(name.to_owned(), value);
+        }
+        Ok(whole)
+    }
+
+    /// A plain value of any type.
+    pub fn value(&self, name: &str) -> Option<toml::Value> {
+        self.get(name).and_then(|value| plain(value.get_ref()))
+    }
+}
+
 /// A range's end without a tail of zeros.
 struct Short(f64);
 
@@ -256,8 +290,24 @@ fn as_number(value: &DeValue<'_>) -> Option<f64> {
     }
 }
 
+/// A value without its place; `None` for a table or a number that is none.
+#[cfg(feature = "study")]
+pub(crate) fn plain(value: &DeValue<'_>) -> Option<toml::Value> {
+    Some(match value {
+        DeValue::Integer(i) => toml::Value::Integer(i64::from_str_radix(i.as_str(), i.radix()).ok()?),
+        DeValue::Float(_) => toml::Value::Float(as_number(value)?),
+        DeValue::String(text) => toml::Value::String(text.to_string()),
+        DeValue::Boolean(flag) => toml::Value::Boolean(*flag),
+        DeValue::Datetime(time) => toml::Value::Datetime(*time),
+        DeValue::Array(items) => {
+            toml::Value::Array(items.iter().map(|item| plain(item.get_ref())).collect::<Option<_>>()?)
+        }
+        DeValue::Table(_) => return None,
+    })
+}
+
 /// The candidate most like `word`, if any is like it at all.
-fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
+pub(crate) fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
     let lower = word.to_lowercase();
     candidates
         .iter()

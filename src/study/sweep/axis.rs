@@ -1,0 +1,292 @@
+//! Axes as written, and the grid of cases that they span.
+//!
+//! Zipped axes step together and count as one. Case i is mixed radix, slowest first: axes that change the signal in the
+//! order written, then repetitions, then axes that only change the receiver; so cases that share a signal are
+//! neighbours. Limits: ten million cases, a hundred thousand values an axis.
+
+use toml::Value;
+
+use crate::generator::scenario::read::Table;
+use crate::generator::scenario::{Place, ScenarioError};
+
+/// Most cases of a study.
+pub const MOST_CASES: u64 = 10_000_000;
+/// Most values of an axis.
+const MOST_VALUES: usize = 100_000;
+
+pub(super) const KEYS: &[&str] = &["key", "values", "from", "to", "step", "count", "spacing", "zip", "label"];
+
+/// One axis: a key of the base and the values that it takes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    pub key: String,
+    pub values: Vec<Value>,
+    /// Axes with the same word step together.
+    pub zip: Option<String>,
+    /// What plots call it in place of the key.
+    pub label: Option<String>,
+    pub place: Place,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Spacing {
+    Linear,
+    Log,
+}
+
+impl Axis {
+    pub(super) fn read(table: &Table<'_>) -> Result<Self, ScenarioError> {
+        table.allow(KEYS)?;
+        let expected = "a key of the base, like \"receiver.tracking.pll_bandwidth_hz\"";
+        let key = table.text("key", expected)?.ok_or_else(|| table.bad("key", expected))?.to_owned();
+        let values = match table.values("values")? {
+            Some(values) => {
+                for other in ["from", "to", "step", "count", "spacing"] {
+                    if table.has(other) {
+                        return Err(table.bad(other, "nothing beside values"));
+                    }
+                }
+                values
+            }
+            None => range(table)?,
+        };
+        let texts: std::collections::BTreeSet<String> = values.iter().map(text_of).collect();
+        if texts.len() < values.len() || values.len() > MOST_VALUES {
+            let name = if table.has("values") { "values" } else { "from" };
+            return Err(table.bad(name, format!("1 to {MOST_VALUES} values, each but once")));
+        }
+        Ok(Self {
+            key,
+            values,
+            zip: table.text("zip", "a word that other axes share")?.map(str::to_owned),
+            label: table.text("label", "words for the plots")?.map(str::to_owned),
+            place: table.place("key"),
+        })
+    }
+
+    /// What plots and tables call it.
+    pub fn label(&self) -> &str {
+        self.label.as_deref().unwrap_or(&self.key)
+    }
+}
+
+/// `from`, `to` and either `step` or `count`; both ends belong to it.
+fn range(table: &Table<'_>) -> Result<Vec<Value>, ScenarioError> {
+    let (from, to) = (table.required("from", -1e18..=1e18, "")?, table.required("to", -1e18..=1e18, "")?);
+    let spacing = table.choice("spacing", &[("linear", Spacing::Linear), ("log", Spacing::Log)])?;
+    let step = table.number("step", -1e18..=1e18, "")?;
+    let count = table.integer("count")?;
+    let numbers: Vec<f64> = match (step, count) {
+        (Some(step), None) if spacing != Some(Spacing::Log) => {
+            let steps = (to - from) / step;
+            if !(0.0..MOST_VALUES as f64).contains(&steps) {
+                return Err(table.bad("step", format!("a step from {from} to {to} in at most {MOST_VALUES} values")));
+            }
+            // What rounding leaves of the last step still belongs to the range.
+            (0..=(steps + 1e-9).floor() as u64).map(|k| from + k as f64 * step).collect()
+        }
+        (None, Some(count)) if (2..=MOST_VALUES as u64).contains(&count) => {
+            let part = |k: u64| k as f64 / (count - 1) as f64;
+            match spacing.unwrap_or(Spacing::Linear) {
+                Spacing::Linear => (0..count).map(|k| from + (to - from) * part(k)).collect(),
+                Spacing::Log if from > 0.0 && to > 0.0 => {
+                    let (low, high) = (libm::log(from), libm::log(to));
+                    (0..count).map(|k| libm::exp(low + (high - low) * part(k))).collect()
+                }
+                Spacing::Log => return Err(table.bad("from", "positive ends for spacing = \"log\"")),
+            }
+        }
+        (None, None) => return Err(table.bad("values", "values = [...], or from and to with step or count")),
+        (Some(_), _) => return Err(table.bad("step", "either step (linear) or count")),
+        (None, Some(_)) => return Err(table.bad("count", format!("2 to {MOST_VALUES}"))),
+    };
+    let whole = numbers.iter().all(|x| x.fract() == 0.0 && x.abs() < 9e15);
+    let value = |x: f64| if whole { Value::Integer(x as i64) } else { Value::Float(rounded(x)) };
+    Ok(numbers.into_iter().map(value).collect())
+}
+
+/// To 12 digits, so that 0.1 + 2 × 0.1 is 0.3.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.11e}").parse().unwrap_or(x)
+}
+
+/// A value in one way of writing, whatever its type in TOML: 45 and 45.0 are the same.
+pub fn text_of(value: &Value) -> String {
+    match value {
+        Value::Integer(x) => x.to_string(),
+        Value::Float(x) => x.to_string(),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
+}
+
+/// A value as a number, if it is one.
+pub fn number_of(value: &Value) -> Option<f64> {
+    match value {
+        Value::Integer(x) => Some(*x as f64),
+        Value::Float(x) => Some(*x),
+        _ => None,
+    }
+}
+
+/// Axes that step together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Digit {
+    /// Numbers of the axes in the study's list.
+    pub axes: Vec<usize>,
+    pub length: usize,
+}
+
+/// All cases of a study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    /// Slowest first.
+    pub signal: Vec<Digit>,
+    pub repetitions: u64,
+    pub receiver: Vec<Digit>,
+}
+
+/// Where a case stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Case {
+    pub number: u64,
+    pub repetition: u64,
+    /// For each axis of the study, the number of its value.
+    pub at: Vec<usize>,
+}
+
+fn product(digits: &[Digit]) -> Option<u64> {
+    digits.iter().try_fold(1_u64, |product, digit| product.checked_mul(digit.length as u64))
+}
+
+impl Grid {
+    /// The grid of `axes`; `changes_signal` tells which keys do more than change the receiver.
+    ///
+    /// # Errors
+    /// Axes that are zipped though they differ in length, too many cases; with the number of the axis.
+    pub fn new(
+        axes: &[Axis],
+        repetitions: u64,
+        changes_signal: impl Fn(&str) -> bool,
+    ) -> Result<Self, (usize, String)> {
+        let mut digits: Vec<Digit> = Vec::new();
+        for (number, axis) in axes.iter().enumerate() {
+            let same = |digit: &&mut Digit| {
+                axis.zip.is_some() && digit.axes.iter().any(|&other| axes.get(other).is_some_and(|a| a.zip == axis.zip))
+            };
+            match digits.iter_mut().find(same) {
+                Some(digit) if digit.length != axis.values.len() => {
+                    let word = axis.zip.as_deref().unwrap_or_default();
+                    let reason = format!(
+                        "{} values: expected {}, as the other axis of zip = {word:?}",
+                        axis.values.len(),
+                        digit.length
+                    );
+                    return Err((number, reason));
+                }
+                Some(digit) => digit.axes.push(number),
+                None => digits.push(Digit { axes: vec![number], length: axis.values.len() }),
+            }
+        }
+        let acts = |digit: &Digit| digit.axes.iter().filter_map(|&n| axes.get(n)).any(|axis| changes_signal(&axis.key));
+        let (signal, receiver): (Vec<Digit>, Vec<Digit>) = digits.into_iter().partition(acts);
+        let grid = Self { signal, repetitions, receiver };
+        let cases = || product(&grid.signal)?.checked_mul(product(&grid.receiver)?)?.checked_mul(repetitions);
+        match cases() {
+            Some(1..=MOST_CASES) => Ok(grid),
+            Some(count) => Err((0, format!("{count} cases: expected 1 to {MOST_CASES}"))),
+            None => Err((0, format!("more than {} cases: expected 1 to {MOST_CASES}", u64::MAX))),
+        }
+    }
+
+    /// Number of cases.
+    pub fn cases(&self) -> u64 {
+        self.groups() * self.sharing()
+    }
+
+    /// Cases that share a signal: neighbours from a multiple of this on.
+    pub fn sharing(&self) -> u64 {
+        product(&self.receiver).unwrap_or(1)
+    }
+
+    /// Different signals, repetitions counted.
+    pub fn groups(&self) -> u64 {
+        product(&self.signal).unwrap_or(1) * self.repetitions
+    }
+
+    /// Cells: cases but for repetitions.
+    pub fn cells(&self) -> u64 {
+        product(&self.signal).unwrap_or(1) * self.sharing()
+    }
+
+    /// The place of a case.
+    pub fn case(&self, number: u64) -> Case {
+        let group = number / self.sharing();
+        let (signal, repetition) = (group / self.repetitions, group % self.repetitions);
+        let count = self.signal.iter().chain(&self.receiver).map(|digit| digit.axes.len()).sum();
+        let mut at = vec![0; count];
+        for (digits, mut rest) in [(&self.signal, signal), (&self.receiver, number % self.sharing())] {
+            for digit in digits.iter().rev() {
+                let index = (rest % digit.length as u64) as usize;
+                rest /= digit.length as u64;
+                for &axis in &digit.axes {
+                    if let Some(slot) = at.get_mut(axis) {
+                        *slot = index;
+                    }
+                }
+            }
+        }
+        Case { number, repetition, at }
+    }
+
+    /// The cell that a case repeats.
+    pub fn cell_of(&self, number: u64) -> u64 {
+        number / self.sharing() / self.repetitions * self.sharing() + number % self.sharing()
+    }
+
+    /// The first case of a cell.
+    pub fn first_of(&self, cell: u64) -> u64 {
+        cell / self.sharing() * self.repetitions * self.sharing() + cell % self.sharing()
+    }
+}
+
+/// Puts a value under a key like `power.cn0_dbhz` or `interference[1].js_db` (counted from 1) of a document.
+///
+/// # Errors
+/// A key that leads through something that is no table, or to an entry that an array does not have.
+pub fn put(document: &mut toml::Table, key: &str, value: &Value) -> Result<(), String> {
+    let mut table = document;
+    let mut segments = key.split('.').peekable();
+    while let Some(segment) = segments.next() {
+        let (name, index) = match segment.strip_suffix(']').and_then(|s| s.split_once('[')) {
+            Some((name, index)) => (name, Some(index.parse::<usize>().map_err(|_| format!("[{index}] is no number"))?)),
+            None => (segment, None),
+        };
+        if name.is_empty() {
+            return Err("expected names between the points".to_owned());
+        }
+        if segments.peek().is_none() && index.is_none() {
+            table.insert(name.to_owned(), value.clone());
+            return Ok(());
+        }
+        let next = table.entry(name).or_insert_with(|| Value::Table(toml::Table::new()));
+        let next = match (next, index) {
+            (Value::Array(items), Some(index)) => {
+                let count = items.len();
+                let item = index.checked_sub(1).and_then(|index| items.get_mut(index));
+                item.ok_or_else(|| format!("{name} has {count} entries, counted from 1"))?
+            }
+            (next, None) => next,
+            (_, Some(_)) => return Err(format!("{name} is no array")),
+        };
+        match next {
+            Value::Table(inner) => table = inner,
+            place if segments.peek().is_none() => {
+                *place = value.clone();
+                return Ok(());
+            }
+            _ => return Err(format!("{name} is no table")),
+        }
+    }
+    Err("expected a key".to_owned())
+}

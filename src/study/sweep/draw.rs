@@ -1,0 +1,378 @@
+//! Curves with bands of confidence, heat maps, and where a figure crosses a level.
+//!
+//! [`pictures`] turns results into charts as data; nothing is drawn before [`Picture::draw`]. A value without a number has its
+//! place by its rank. Limits: a crossing is found by straight lines between neighbouring cells.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use plotters::style::RGBColor;
+
+use super::StudyError;
+use super::axis::{self, Axis as StudyAxis};
+use super::estimate::Estimate;
+use super::publish::short;
+use super::result::{Cell, Results, THEORY};
+use super::spec::{Plot, PlotKind};
+use super::unit_of;
+use crate::analysis::plot::canvas::{Axis, COLOURS, Chart, GREY, Mark, Series, figure};
+
+/// A picture of a study.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// Name of its file, without an ending.
+    pub stem: String,
+    pub title: String,
+    pub charts: Vec<Chart>,
+    pub legend: Vec<Series>,
+    /// For crossings: names of the columns, and rows.
+    pub crossings: Option<(Vec<String>, Vec<Vec<String>>)>,
+}
+
+impl Picture {
+    /// Draws it into a file, a PNG or an SVG by its ending.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn draw(&self, path: &Path) -> Result<(), StudyError> {
+        let columns = self.charts.len().clamp(1, 3);
+        let rows = self.charts.len().div_ceil(columns).max(1);
+        let width = if columns == 1 { 900 } else { 220 + 480 * columns };
+        Ok(figure(path, (width as u32, 440 * rows as u32), columns, &self.charts, &self.legend)?)
+    }
+
+    /// Its crossings as a table in Markdown; nothing for other pictures.
+    pub fn table(&self) -> String {
+        let Some((heads, rows)) = &self.crossings else { return String::new() };
+        let mut text = format!("\n| {} |\n|{}\n", heads.join(" | "), " --- |".repeat(heads.len()));
+        for row in rows {
+            let _ = writeln!(text, "| {} |", row.join(" | "));
+        }
+        text
+    }
+}
+
+/// Every picture that the study asks for.
+pub fn pictures(results: &Results) -> Vec<Picture> {
+    let name = |number: usize, plot: &Plot| match results.study.plots.len() {
+        1 => results.study.name.clone(),
+        _ => format!("{}_{}_{}", results.study.name, number + 1, plot.figure.replace('.', "_")),
+    };
+    results
+        .study
+        .plots
+        .iter()
+        .enumerate()
+        .filter_map(|(number, plot)| picture(results, plot, name(number, plot)))
+        .collect()
+}
+
+/// Values of an axis that are written under it at most.
+const MOST_TICKS: usize = 10;
+
+/// What of the results a plot shows.
+struct View<'r> {
+    results: &'r Results,
+    plot: &'r Plot,
+    figure: usize,
+    theory: Option<usize>,
+}
+
+fn picture(results: &Results, plot: &Plot, stem: String) -> Option<Picture> {
+    let figure = results.figure(&plot.figure)?;
+    let theory = results.figure(&format!("{THEORY}{}", plot.figure));
+    let view = View { results, plot, figure, theory };
+    let panels = view.values_of(plot.panel.as_deref());
+    let mut picture =
+        Picture { stem, title: plot.title.clone(), charts: Vec::new(), legend: Vec::new(), crossings: None };
+    for panel in &panels {
+        let cells = view.cells(*panel);
+        let title = panel.map_or_else(|| plot.title.clone(), |(axis, value)| view.words(axis, value));
+        match &plot.kind {
+            PlotKind::Curve => view.curve(&mut picture, title, &cells),
+            PlotKind::Heat { y } => view.heat(&mut picture, title, &cells, y),
+            PlotKind::Crossing { along, level } => view.crossing(&mut picture, title, &cells, (along, *level)),
+        }
+    }
+    Some(picture)
+}
+
+/// A value of an axis by its numbers.
+type Chosen = Option<(usize, usize)>;
+
+impl View<'_> {
+    /// Every value of an axis; one of none without an axis.
+    fn values_of(&self, key: Option<&str>) -> Vec<Chosen> {
+        let Some(axis) = key.and_then(|key| self.results.axis(key)) else { return vec![None] };
+        let count = self.axis(axis).map_or(0, |axis| axis.values.len());
+        let fixed = |value: &usize| self.allows(axis, *value);
+        (0..count).filter(fixed).map(|value| Some((axis, value))).collect()
+    }
+
+    fn axis(&self, number: usize) -> Option<&StudyAxis> {
+        self.results.study.axes.get(number)
+    }
+
+    /// Whether `where` lets this value of an axis through.
+    fn allows(&self, axis: usize, value: usize) -> bool {
+        let Some(axis) = self.axis(axis) else { return false };
+        let text = axis.values.get(value).map(axis::text_of);
+        self.plot.fixed.iter().all(|(key, wanted)| *key != axis.key || Some(axis::text_of(wanted)) == text)
+    }
+
+    fn cells(&self, panel: Chosen) -> Vec<&Cell> {
+        let chosen = |cell: &&Cell| {
+            cell.at.iter().enumerate().all(|(axis, value)| self.allows(axis, *value))
+                && panel.is_none_or(|(axis, value)| cell.at.get(axis) == Some(&value))
+        };
+        self.results.cells.iter().filter(chosen).collect()
+    }
+
+    fn words(&self, axis: usize, value: usize) -> String {
+        let Some(axis) = self.axis(axis) else { return String::new() };
+        format!("{} = {}", axis.label(), axis.values.get(value).map_or_else(String::new, axis::text_of))
+    }
+
+    fn estimate(&self, cell: &Cell) -> Option<Estimate> {
+        cell.estimates.get(self.figure).copied().flatten()
+    }
+
+    /// Where a cell stands on an axis: its number, or its rank where values are none; logarithms if asked for.
+    fn place(&self, cell: &Cell, key: &str, log: bool) -> Option<f64> {
+        let axis = self.results.axis(key)?;
+        let numbers = self.axis(axis)?.values.iter().all(|value| axis::number_of(value).is_some());
+        let number = match numbers {
+            true => axis::number_of(self.results.value(cell, axis)?)?,
+            false => *cell.at.get(axis)? as f64,
+        };
+        if log { (number > 0.0).then(|| libm::log10(number)) } else { Some(number) }
+    }
+
+    /// The axis across, with words under it where values are no numbers.
+    fn across(&self, cells: &[&Cell]) -> (Axis, Option<Vec<(f64, String)>>) {
+        let key = &self.plot.x;
+        let places = cells.iter().filter_map(|cell| self.place(cell, key, self.plot.log_x));
+        let number = self.results.axis(key);
+        let study_axis = number.and_then(|number| self.axis(number));
+        let numbers = study_axis.is_some_and(|axis| axis.values.iter().all(|v| axis::number_of(v).is_some()));
+        let across = Axis::around(&study_axis.map_or(key.clone(), |axis| axis.label().to_owned()), places, 1e-9);
+        let ticks = if !numbers {
+            study_axis.map(|axis| {
+                axis.values.iter().enumerate().map(|(rank, value)| (rank as f64, axis::text_of(value))).collect()
+            })
+        } else if self.plot.log_y && !self.plot.log_x {
+            // A grid needs the places of both axes.
+            study_axis.map(|axis| {
+                let every = axis.values.len().div_ceil(MOST_TICKS).max(1);
+                let tick = |value| Some((axis::number_of(value)?, axis::text_of(value)));
+                axis.values.iter().step_by(every).filter_map(tick).collect()
+            })
+        } else {
+            self.plot.log_x.then(|| across.log_ticks(&[1.0, 2.0, 5.0], |value| value.to_string()))
+        };
+        (across, ticks)
+    }
+
+    fn up(&self, values: impl Iterator<Item = f64>) -> (Axis, Option<Vec<(f64, String)>>) {
+        let unit = unit_of(&self.plot.figure);
+        let label = if unit == "1" { self.plot.figure.clone() } else { format!("{} ({unit})", self.plot.figure) };
+        let up = Axis::around(&label, values, 1e-9);
+        let ticks = self.plot.log_y.then(|| up.log_ticks(&[1.0, 2.0, 5.0], |value| value.to_string()));
+        (up, ticks)
+    }
+
+    fn height(&self, value: f64) -> Option<f64> {
+        if self.plot.log_y { (value > 0.0).then(|| libm::log10(value)) } else { Some(value) }
+    }
+
+    fn curve(&self, picture: &mut Picture, title: String, cells: &[&Cell]) {
+        let (mut series, mut first) = (Vec::new(), picture.legend.is_empty());
+        for (rank, chosen) in self.values_of(self.plot.series.as_deref()).into_iter().enumerate() {
+            let colour = COLOURS.get(rank % COLOURS.len()).copied().unwrap_or(GREY);
+            let own = |cell: &&&Cell| chosen.is_none_or(|(axis, value)| cell.at.get(axis) == Some(&value));
+            let mut points: Vec<(f64, &Cell)> = cells
+                .iter()
+                .filter(own)
+                .filter_map(|c| Some((self.place(c, &self.plot.x, self.plot.log_x)?, *c)))
+                .collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let line = |of: &dyn Fn(&Cell) -> Option<f64>| -> Vec<(f64, f64)> {
+                points.iter().filter_map(|(x, cell)| Some((*x, self.height(of(cell)?)?))).collect()
+            };
+            let low = line(&|cell| self.estimate(cell)?.interval.map(|(low, _)| low));
+            let high = line(&|cell| self.estimate(cell)?.interval.map(|(_, high)| high));
+            let means = line(&|cell| Some(self.estimate(cell)?.mean));
+            let name = chosen.map_or_else(|| self.plot.figure.clone(), |(axis, value)| self.words(axis, value));
+            let mark = if self.theory.is_some() { Mark::Balls } else { Mark::Line };
+            if first {
+                picture.legend.push(Series::new(name.clone(), colour, mark, Vec::new()));
+            }
+            let band = low.into_iter().chain(high.into_iter().rev()).collect();
+            series.push(Series::new("band", colour, Mark::Band, band));
+            if let Some(theory) = self.theory {
+                let expected = line(&|cell| cell.estimates.get(theory).copied().flatten().map(|e| e.mean));
+                series.push(Series::new("theory", colour, Mark::Line, expected));
+            }
+            series.push(Series::new(name, colour, mark, means));
+        }
+        if std::mem::take(&mut first) {
+            if self.theory.is_some() {
+                picture.legend.push(Series::new("theory", GREY, Mark::Line, Vec::new()));
+            }
+            if self.results.study.grid.repetitions > 1 {
+                picture.legend.push(Series::new("95 % of the mean", GREY, Mark::Band, Vec::new()));
+            }
+        }
+        self.chart(picture, title, cells, series);
+    }
+
+    fn chart(&self, picture: &mut Picture, title: String, cells: &[&Cell], series: Vec<Series>) {
+        let (x, x_ticks) = self.across(cells);
+        let (y, y_ticks) = self.up(series.iter().flat_map(|series| series.points.iter().map(|point| point.1)));
+        let mut chart = Chart::new(title, x, y, series);
+        (chart.x_ticks, chart.y_ticks) = (x_ticks, y_ticks);
+        picture.charts.push(chart);
+    }
+
+    /// Colours by value, the same for all panels, and the value in each tile.
+    fn heat(&self, picture: &mut Picture, title: String, cells: &[&Cell], y: &str) {
+        let all = self.results.cells.iter().filter_map(|cell| self.height(self.estimate(cell)?.mean));
+        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let (Some(x_axis), Some(y_axis)) = (self.results.axis(&self.plot.x), self.results.axis(y)) else { return };
+        let share = |value: f64| if high > low { (value - low) / (high - low) } else { 0.5 };
+        let (mut tiles, mut labels) = (Vec::new(), Vec::new());
+        for cell in cells {
+            let (Some(x), Some(y)) = (cell.at.get(x_axis), cell.at.get(y_axis)) else { continue };
+            let place = (*x as f64, *y as f64);
+            let estimate = self.estimate(cell).and_then(|estimate| Some((estimate.mean, self.height(estimate.mean)?)));
+            let (colour, label) = match estimate {
+                Some((mean, height)) => (warmth(share(height)), short(mean)),
+                None => (RGBColor(255, 255, 255), "–".to_owned()),
+            };
+            tiles.push(Series::new("tile", colour, Mark::Tile(0.98, 0.98), vec![place]));
+            labels.push(((place.0 - 0.3, place.1), label, 0));
+        }
+        if picture.legend.is_empty() && low <= high {
+            let back = |height: f64| if self.plot.log_y { libm::pow(10.0, height) } else { height };
+            picture.legend = (0..=4_u32)
+                .rev()
+                .map(|step| f64::from(step) / 4.0)
+                .map(|at| (warmth(at), short(back(low + at * (high - low)))))
+                .map(|(colour, name)| Series::new(name, colour, Mark::Tile(1.0, 1.0), Vec::new()))
+                .collect();
+        }
+        let ticks = |axis: usize| -> Vec<(f64, String)> {
+            let values = self.axis(axis).map_or(&[][..], |axis| &axis.values);
+            values.iter().enumerate().map(|(rank, value)| (rank as f64, axis::text_of(value))).collect()
+        };
+        let side = |axis: usize| {
+            let (label, count) = self.axis(axis).map_or(("", 0), |axis| (axis.label(), axis.values.len()));
+            Axis::new(label, (-0.5, count as f64 - 0.5))
+        };
+        let mut chart = Chart::new(title, side(x_axis), side(y_axis), tiles);
+        (chart.x_ticks, chart.y_ticks, chart.labels) = (Some(ticks(x_axis)), Some(ticks(y_axis)), labels);
+        picture.charts.push(chart);
+    }
+
+    /// Where along an axis the mean, and the ends of its interval, cross a level, over x.
+    fn crossing(&self, picture: &mut Picture, title: String, cells: &[&Cell], (along, level): (&str, f64)) {
+        let first = picture.legend.is_empty();
+        let (mut series, mut rows) = (Vec::new(), Vec::new());
+        for (rank, chosen) in self.values_of(self.plot.series.as_deref()).into_iter().enumerate() {
+            let colour = COLOURS.get(rank % COLOURS.len()).copied().unwrap_or(GREY);
+            let (mut means, mut lows, mut highs) = (Vec::new(), Vec::new(), Vec::new());
+            for x in self.values_of(Some(&self.plot.x)) {
+                let own = |cell: &&&Cell| {
+                    [chosen, x].iter().all(|c| c.is_none_or(|(axis, value)| cell.at.get(axis) == Some(&value)))
+                };
+                let mut line: Vec<(f64, &Cell)> =
+                    cells.iter().filter(own).filter_map(|c| Some((self.place(c, along, false)?, *c))).collect();
+                line.sort_by(|a, b| a.0.total_cmp(&b.0));
+                let at = |of: &dyn Fn(Estimate) -> f64| {
+                    let points: Vec<(f64, f64)> =
+                        line.iter().filter_map(|(place, cell)| Some((*place, of(self.estimate(cell)?)))).collect();
+                    crossed(&points, level)
+                };
+                let mean = at(&|estimate| estimate.mean);
+                let ends = [
+                    at(&|estimate| estimate.interval.map_or(estimate.mean, |(low, _)| low)),
+                    at(&|estimate| estimate.interval.map_or(estimate.mean, |(_, high)| high)),
+                ];
+                let place = line.first().and_then(|(_, cell)| self.place(cell, &self.plot.x, self.plot.log_x));
+                if let (Some(place), Some(height)) = (place, mean.and_then(|mean| self.height(mean))) {
+                    means.push((place, height));
+                    if let [Some(a), Some(b)] = ends.map(|end| end.and_then(|end| self.height(end))) {
+                        lows.push((place, a.min(b)));
+                        highs.push((place, a.max(b)));
+                    }
+                }
+                let both = ends.iter().all(Option::is_some);
+                let mut row: Vec<String> = self.plot.panel.iter().map(|_| title.clone()).collect();
+                row.extend([chosen, x].into_iter().flatten().map(|(axis, value)| {
+                    self.axis(axis).and_then(|axis| axis.values.get(value)).map_or_else(String::new, axis::text_of)
+                }));
+                let number = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), short);
+                row.extend([number(mean), number(least(ends).filter(|_| both)), number(most(ends).filter(|_| both))]);
+                rows.push(row);
+            }
+            let name = chosen.map_or_else(|| self.plot.figure.clone(), |(axis, value)| self.words(axis, value));
+            if first {
+                picture.legend.push(Series::new(name.clone(), colour, Mark::Line, Vec::new()));
+            }
+            series.push(Series::new(
+                "band",
+                colour,
+                Mark::Band,
+                lows.into_iter().chain(highs.into_iter().rev()).collect(),
+            ));
+            series.push(Series::new("line", colour, Mark::Line, means.clone()));
+            series.push(Series::new(name, colour, Mark::Balls, means));
+        }
+        let label = |key: &str| {
+            self.results.axis(key).and_then(|n| self.axis(n)).map_or(key.to_owned(), |a| a.label().to_owned())
+        };
+        let (x, x_ticks) = self.across(cells);
+        let y_values = series.iter().flat_map(|series| series.points.iter().map(|point| point.1));
+        let y = Axis::around(&label(along), y_values, 1e-9);
+        let y_ticks = self.plot.log_y.then(|| y.log_ticks(&[1.0, 2.0, 5.0], |value| value.to_string()));
+        let mut chart = Chart::new(title, x, y, series);
+        (chart.x_ticks, chart.y_ticks) = (x_ticks, y_ticks);
+        picture.charts.push(chart);
+        let mut heads: Vec<String> = self.plot.panel.iter().chain(&self.plot.series).map(|key| label(key)).collect();
+        heads.push(label(&self.plot.x));
+        heads.push(format!("{} where {} = {level}", label(along), self.plot.figure));
+        heads.extend(["from".to_owned(), "to".to_owned()]);
+        let (_, all) = picture.crossings.get_or_insert_with(|| (heads, Vec::new()));
+        all.extend(rows);
+    }
+}
+
+fn least(ends: [Option<f64>; 2]) -> Option<f64> {
+    ends.into_iter().flatten().reduce(f64::min)
+}
+
+fn most(ends: [Option<f64>; 2]) -> Option<f64> {
+    ends.into_iter().flatten().reduce(f64::max)
+}
+
+/// Where a line through points first meets a level.
+pub(super) fn crossed(points: &[(f64, f64)], level: f64) -> Option<f64> {
+    let pairs = points.windows(2).find_map(|pair| match pair {
+        [(x0, y0), (x1, y1)] if (y0 - level) * (y1 - level) <= 0.0 && y0 != y1 => {
+            Some(x0 + (x1 - x0) * (level - y0) / (y1 - y0))
+        }
+        _ => None,
+    });
+    pairs.filter(|x| x.is_finite())
+}
+
+/// From pale to dark through blue: dark letters stay readable.
+fn warmth(share: f64) -> RGBColor {
+    const STOPS: [(f64, f64, f64); 4] =
+        [(247.0, 251.0, 255.0), (198.0, 219.0, 239.0), (107.0, 174.0, 214.0), (66.0, 146.0, 198.0)];
+    let at = share.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
+    let index = (at.floor() as usize).min(STOPS.len() - 2);
+    let (a, b, u) = (STOPS[index], STOPS[index + 1], at - index as f64);
+    let mix = |a: f64, b: f64| (a + (b - a) * u).round() as u8;
+    RGBColor(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
+}

@@ -1,0 +1,139 @@
+//! Studies: a base scene, axes and repetitions become a table of figures, in shards that survive what kills a run.
+//!
+//! [`spec`] is STUDY.toml as written, [`axis`] its grid: case i follows from mixed radix, so no list of cases exists. A case
+//! is run by [`model`] (the loops on modelled correlations) or [`sampled`] (samples streamed from generator to receiver);
+//! [`engine`] runs what is missing on all cores, [`plan`] and [`shard`] keep manifest and results on disk, [`result`]
+//! condenses repetitions, [`draw`] and [`publish`] show them, [`export`] hands shards to other machines' engines.
+//!
+//! **Exactly once** rests on no engine: a shard's bytes are a function of the manifest and its number alone, a file under
+//! its final name is whole and bound to its manifest, and merging takes each shard once or fails.
+
+pub mod axis;
+pub mod draw;
+pub mod engine;
+pub mod estimate;
+pub mod export;
+pub mod model;
+pub mod plan;
+pub mod publish;
+pub mod result;
+pub mod sampled;
+pub mod shard;
+pub mod spec;
+mod temporary;
+
+use std::io::{self, Read as _};
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+use thiserror::Error;
+
+use crate::analysis::JudgeError;
+use crate::generator::GenerateError;
+use crate::generator::scenario::Place;
+use crate::generator::scenario::ScenarioError;
+use crate::receiver::ReceiveError;
+use crate::receiver::output::OutputError;
+
+/// Why a study cannot be planned, run or merged.
+#[derive(Debug, Error)]
+pub enum StudyError {
+    #[error(transparent)]
+    Text(#[from] ScenarioError),
+    #[error("{place}: axis {key} = {value}: {reason}")]
+    Axis { place: Place, key: String, value: String, reason: String },
+    #[error("{origin}: case {case} ({values}): {reason}")]
+    Case { origin: String, case: u64, values: String, reason: String },
+    /// Data that no repetition will mend.
+    #[error("{}: {reason}", path.display())]
+    Input { path: PathBuf, reason: String },
+    #[error("cannot read {}: {source}", path.display())]
+    Read { path: PathBuf, source: io::Error },
+    #[error("cannot create {}: {source}", path.display())]
+    Create { path: PathBuf, source: io::Error },
+    #[error("cannot write {}: {source}", path.display())]
+    Write { path: PathBuf, source: io::Error },
+    #[error("{} {reason}", path.display())]
+    Occupied { path: PathBuf, reason: String },
+    #[error(
+        "{} is there with other bytes than were computed now: the study is not reproducible on these machines; compare \
+         their builds and remove the wrong file",
+        path.display()
+    )]
+    NotReproducible { path: PathBuf },
+    #[error("{missing} of {shards} shards are missing: {list}")]
+    Incomplete { missing: usize, shards: u32, list: String },
+    #[error("shard {shard}: expected 0 to {last}")]
+    NoSuchShard { shard: u32, last: u32 },
+    /// Asked to stop.
+    #[error("stopped")]
+    Stopped,
+    #[error(transparent)]
+    Generate(#[from] GenerateError),
+    #[error(transparent)]
+    Receive(#[from] ReceiveError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error(transparent)]
+    Judge(#[from] JudgeError),
+    #[error("{0}")]
+    Bug(String),
+}
+
+impl StudyError {
+    fn input(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Input { path: path.to_owned(), reason: reason.into() }
+    }
+}
+
+/// SHA-256 in hexadecimal digits.
+pub fn sha256_hex(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// SHA-256 of a whole file, in hexadecimal digits.
+///
+/// # Errors
+/// Those of reading.
+pub fn sha256_of_file(path: &Path) -> io::Result<String> {
+    let (mut file, mut hash, mut bytes) = (std::fs::File::open(path)?, Sha256::new(), vec![0; 1 << 20]);
+    loop {
+        match file.read(&mut bytes) {
+            Ok(0) => return Ok(hex(&hash.finalize())),
+            Ok(count) => hash.update(bytes.get(..count).unwrap_or_default()),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The unit that the end of a name states; "1" for a pure number.
+pub fn unit_of(name: &str) -> &'static str {
+    const UNITS: [(&str, &str); 18] = [
+        ("_dbhz", "dB-Hz"),
+        ("_db", "dB"),
+        ("_dbw", "dBW"),
+        ("_deg", "deg"),
+        ("_cycles", "cycle"),
+        ("_chips", "chip"),
+        ("_per_hour", "1/h"),
+        ("_g_per_s", "g/s"),
+        ("_mps2", "m/s^2"),
+        ("_mps", "m/s"),
+        ("_hz", "Hz"),
+        ("_msps", "Msps"),
+        ("_ms", "ms"),
+        ("_sps", "s/s"),
+        ("_lsb", "LSB"),
+        ("_g", "g"),
+        ("_m", "m"),
+        ("_s", "s"),
+    ];
+    // "bias_enu_m.0" carries its unit before the index.
+    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
+    UNITS.iter().find(|(end, _)| stem.ends_with(end)).map_or("1", |(_, unit)| unit)
+}

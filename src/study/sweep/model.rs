@@ -1,0 +1,240 @@
+//! A case at correlator level: the receiver's own loops on modelled correlations, thousands of times real time.
+//!
+//! The base is `[signal]`, `[motion]`, `[loop]`, `[measure]` and `[receiver.tracking]`; figures stand in [`FIGURES`], those of
+//! theory under `theory.`. Limits are those of [`crate::study::correlator`]: one satellite in steady tracking,
+//! constant C/N0, no multipath. Where the signal was lost, spreads have no value.
+
+use crate::analysis::theory::clock::PowerLaw;
+use crate::analysis::theory::{dll, fll, oscillator, pll};
+use crate::generator::ripple::oscillator::PowerLaw as Levels;
+use crate::generator::scenario::ScenarioError;
+use crate::generator::scenario::read::{Source, Table};
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::gps::l1ca::L1_CA;
+use crate::gnss::signal::{SIGNALS, Signal};
+use crate::receiver::settings::Settings;
+use crate::receiver::track::TrackingSettings;
+use crate::receiver::track::closed::Mode;
+use crate::study::correlation::Correlation;
+use crate::study::correlator::{Case, Outcome, run};
+use crate::study::expect::{self, Jitter};
+use crate::study::motion::{Motion, Step};
+
+/// Standard gravity (CGPM 1901).
+const GRAVITY_MPS2: f64 = 9.80665;
+
+/// The base of a case, its axes applied.
+#[derive(Clone, Debug)]
+pub struct Model {
+    signal: &'static Signal,
+    cn0_dbhz: Option<f64>,
+    band_hz: Option<f64>,
+    oscillator: Option<PowerLaw>,
+    doppler_hz: f64,
+    acceleration_g: f64,
+    jerk_g_per_s: f64,
+    jerk_s: f64,
+    mode: Mode,
+    watched: bool,
+    settle_s: f64,
+    duration_s: f64,
+    tracking: TrackingSettings,
+}
+
+/// Whether a key changes what arrives, and not only what the receiver makes of it.
+pub fn changes_signal(key: &str) -> bool {
+    !["receiver.", "loop.", "measure."].iter().any(|start| key.starts_with(start))
+}
+
+impl Model {
+    /// Reads the tables that make a base; others are left alone.
+    pub(super) fn read(root: &Table<'_>) -> Result<Self, ScenarioError> {
+        let open = |name: &str, keys: &[&str]| -> Result<Option<Table<'_>>, ScenarioError> {
+            let table = root.table(name)?;
+            table.as_ref().map_or(Ok(()), |table| table.allow(keys))?;
+            Ok(table)
+        };
+        let signal = open("signal", &["name", "cn0_dbhz", "bandwidth_hz", "oscillator", "power_law"])?;
+        let motion = open("motion", &["doppler_hz", "acceleration_g", "jerk_g_per_s", "jerk_s"])?;
+        let closed = open("loop", &["mode", "detectors"])?;
+        let measure = open("measure", &["settle_s", "duration_s"])?;
+        let receiver = open("receiver", &["tracking"])?;
+        let number = |table: &Option<Table<'_>>, name: &str, range, unit| match table {
+            Some(table) => table.number(name, range, unit),
+            None => Ok(None),
+        };
+        let names = SIGNALS.map(|signal| (signal.name, signal));
+        let modes = [("phase", Mode::Phase), ("assisted", Mode::Assisted), ("frequency", Mode::Frequency)];
+        let chosen = |table: &Option<Table<'_>>, name, choices: &[(&str, Mode)]| match table {
+            Some(table) => table.choice(name, choices),
+            None => Ok(None),
+        };
+        let place = root.place("receiver");
+        let settings = receiver.map(|table| table.whole()).transpose()?.unwrap_or_default();
+        let settings = Settings::from_table(settings, "receiver")
+            .map_err(|e| ScenarioError::Toml { place, message: e.to_string() })?;
+        Ok(Self {
+            signal: match &signal {
+                Some(table) => table.choice("name", &names)?.unwrap_or(&L1_CA),
+                None => &L1_CA,
+            },
+            cn0_dbhz: number(&signal, "cn0_dbhz", 0.0..=80.0, "dB-Hz")?,
+            band_hz: number(&signal, "bandwidth_hz", 1e3..=1e9, "Hz")?,
+            oscillator: signal.as_ref().map(law).transpose()?.flatten(),
+            doppler_hz: number(&motion, "doppler_hz", -1e6..=1e6, "Hz")?.unwrap_or(0.0),
+            acceleration_g: number(&motion, "acceleration_g", -1e4..=1e4, "g")?.unwrap_or(0.0),
+            jerk_g_per_s: number(&motion, "jerk_g_per_s", -1e5..=1e5, "g/s")?.unwrap_or(0.0),
+            jerk_s: number(&motion, "jerk_s", 1e-3..=1e6, "s")?.unwrap_or(f64::INFINITY),
+            mode: chosen(&closed, "mode", &modes)?.unwrap_or(Mode::Phase),
+            watched: closed.as_ref().map(|table| table.flag("detectors")).transpose()?.flatten().unwrap_or(false),
+            settle_s: number(&measure, "settle_s", 0.0..=1e6, "s")?.unwrap_or(5.0),
+            duration_s: number(&measure, "duration_s", 0.1..=1e7, "s")?.unwrap_or(60.0),
+            tracking: settings.tracking,
+        })
+    }
+
+    /// Reads a document that stands in no file.
+    pub(super) fn of(document: &toml::Table, origin: &str) -> Result<Self, ScenarioError> {
+        let text = toml::to_string(document).unwrap_or_default();
+        let source = Source { origin, text: &text };
+        let refuse =
+            |e: toml::de::Error| ScenarioError::Toml { place: source.place(0), message: e.message().to_owned() };
+        let document = toml::de::DeTable::parse(&text).map_err(refuse)?;
+        Self::read(&Table::new(&source, "", 0, document.get_ref()))
+    }
+
+    /// Time that a case simulates.
+    pub fn simulated_s(&self) -> f64 {
+        self.settle_s + self.duration_s
+    }
+
+    fn case(&self, seed: u64) -> Case {
+        let per_g = GRAVITY_MPS2 / self.signal.wavelength_m();
+        let (rate_step_hz_s, jerk_hz_s2) = (self.acceleration_g * per_g, self.jerk_g_per_s * per_g);
+        let mut motion = Motion { doppler_hz: self.doppler_hz, ..Motion::default() };
+        if rate_step_hz_s != 0.0 || jerk_hz_s2 != 0.0 {
+            // Into loops that have settled: what they make of it is measured from its first moment on.
+            motion.steps.push(Step { at_s: self.settle_s, rate_step_hz_s, jerk_hz_s2 });
+            let end_s = self.settle_s + self.jerk_s;
+            if end_s.is_finite() {
+                motion.steps.push(Step { at_s: end_s, rate_step_hz_s: 0.0, jerk_hz_s2: 0.0 });
+            }
+        }
+        let chip_rate_hz = self.signal.components.first().map_or(1.0, |c| c.chip_rate_hz);
+        let correlation = |band_hz: f64| Correlation::band_limited(band_hz / chip_rate_hz);
+        Case {
+            signal: self.signal,
+            settings: self.tracking.clone(),
+            mode: self.mode,
+            cn0_dbhz: self.cn0_dbhz,
+            motion,
+            oscillator: self.oscillator,
+            correlation: self.band_hz.map_or(Correlation::Triangle, correlation),
+            watched: self.watched,
+            settle_s: self.settle_s,
+            duration_s: self.duration_s,
+            seed,
+        }
+    }
+
+    /// Runs a case and gives the figures asked for, in their order.
+    pub fn figures(&self, seed: u64, keep: &[String]) -> Vec<Option<f64>> {
+        let case = self.case(seed);
+        let outcome = run(&case);
+        let of =
+            |name: &String| FIGURES.iter().find(|figure| figure.name == name).and_then(|f| (f.of)(&case, &outcome));
+        keep.iter().map(of).map(|value| value.filter(|x| x.is_finite())).collect()
+    }
+}
+
+/// The oscillator as a scene would write it; its phase noises are not modelled here.
+fn law(table: &Table<'_>) -> Result<Option<PowerLaw>, ScenarioError> {
+    let preset = table.choice("oscillator", &Levels::PRESETS)?.map(|law| law.levels());
+    let given = table.numbers::<5>("power_law", 1e-12)?;
+    let levels = match (preset, given) {
+        (Some(_), Some(_)) => return Err(table.bad("power_law", "nothing beside oscillator, which names a power law")),
+        (preset, given) => preset.or(given),
+    };
+    match levels {
+        Some([h2, h1, h0, hm1, hm2]) if h2 == 0.0 && h1 == 0.0 && [h0, hm1, hm2].iter().all(|h| *h >= 0.0) => {
+            Ok(Some(PowerLaw::of_frequency(h0, hm1, hm2)))
+        }
+        Some(_) => {
+            Err(table.bad("power_law", "[0, 0, h0, h-1, h-2], none negative: this level has frequency noise only"))
+        }
+        None => Ok(None),
+    }
+}
+
+/// A figure of a case.
+#[derive(Clone, Copy)]
+pub struct Figure {
+    pub name: &'static str,
+    of: fn(&Case, &Outcome) -> Option<f64>,
+}
+
+const fn figure(name: &'static str, of: fn(&Case, &Outcome) -> Option<f64>) -> Figure {
+    Figure { name, of }
+}
+
+/// A spread, where the signal was not lost.
+fn kept(outcome: &Outcome, value: Option<f64>) -> Option<f64> {
+    value.filter(|_| outcome.lost.is_none())
+}
+
+fn chip_m(case: &Case) -> f64 {
+    case.signal.components.first().map_or(f64::NAN, |c| SPEED_OF_LIGHT_MPS / c.chip_rate_hz)
+}
+
+fn sigma(jitter: Option<Jitter>) -> Option<f64> {
+    jitter.map(|jitter| jitter.sigma)
+}
+
+/// Thermal jitter and the oscillator's, which add in square.
+fn phase_theory_deg(case: &Case) -> Option<f64> {
+    let thermal_deg = match case.cn0_dbhz {
+        Some(_) => 360.0 * sigma(expect::phase_cycles(case))?,
+        None => 0.0,
+    };
+    let Some(noise) = &case.oscillator else { return Some(thermal_deg) };
+    let update_s = case.update_s();
+    let system = expect::carrier_loop(&case.settings, case.mode, update_s).linear();
+    let oscillator_deg = oscillator::jitter_discrete_rad(noise, case.signal.carrier_hz, &system, update_s).to_degrees();
+    Some(libm::hypot(thermal_deg, oscillator_deg))
+}
+
+/// T·C/N0: what the theory of loops in noise wants at least [`LEAST_SNR`](crate::study::proof::LEAST_SNR) of.
+pub const SNR: &str = "theory.snr";
+
+/// What a study may keep. Spreads are of truth minus oscillator, mean over an integration, about their mean; `raw_…` are
+/// of discriminator values. `theory.…` is what `analysis::theory` predicts for the loop as it is closed.
+pub const FIGURES: &[Figure] = &[
+    figure("held", |_, outcome| Some(f64::from(u8::from(outcome.lost.is_none())))),
+    figure("slip_free", |_, outcome| Some(f64::from(u8::from(outcome.lost.is_none() && outcome.slips == 0)))),
+    figure("lost_after_s", |_, outcome| outcome.lost.map(|(at_s, _)| at_s)),
+    figure("interruptions", |_, outcome| Some(outcome.interruptions as f64)),
+    figure("slips_per_hour", |case, outcome| {
+        let hours = outcome.phase_cycles.count as f64 * case.update_s() / 3600.0;
+        kept(outcome, Some(outcome.slips as f64 / hours))
+    }),
+    figure("phase_sigma_deg", |_, outcome| kept(outcome, outcome.phase_cycles.sigma().map(|x| 360.0 * x))),
+    figure("theory.phase_sigma_deg", |case, _| phase_theory_deg(case)),
+    figure("phase_mean_deg", |_, outcome| kept(outcome, outcome.phase_cycles.mean().map(|x| 360.0 * x))),
+    figure("phase_peak_deg", |_, outcome| kept(outcome, Some(360.0 * outcome.phase_peak_cycles))),
+    figure("frequency_sigma_hz", |_, outcome| kept(outcome, outcome.frequency_hz.sigma())),
+    figure("theory.frequency_sigma_hz", |case, _| sigma(expect::frequency_hz(case))),
+    figure("code_sigma_chips", |_, outcome| kept(outcome, outcome.code_chips.sigma())),
+    figure("theory.code_sigma_chips", |case, _| sigma(expect::code_chips(case))),
+    figure("code_sigma_m", |case, outcome| kept(outcome, outcome.code_chips.sigma().map(|x| x * chip_m(case)))),
+    figure("theory.code_sigma_m", |case, _| sigma(expect::code_chips(case)).map(|x| x * chip_m(case))),
+    figure("code_mean_chips", |_, outcome| kept(outcome, outcome.code_chips.mean())),
+    figure("raw_phase_sigma_deg", |_, outcome| kept(outcome, outcome.raw_phase_cycles.sigma().map(|x| 360.0 * x))),
+    figure("raw_code_sigma_chips", |_, outcome| kept(outcome, outcome.raw_code_chips.sigma())),
+    figure("raw_frequency_sigma_hz", |_, outcome| kept(outcome, outcome.raw_frequency_hz.sigma())),
+    figure(SNR, |case, _| Some(case.update_s() * libm::pow(10.0, case.cn0_dbhz? / 10.0))),
+    figure("pll_bandwidth_exact_hz", |case, _| expect::phase_cycles(case).map(|jitter| jitter.bandwidth_hz)),
+    figure("dll_bandwidth_exact_hz", |case, _| expect::code_chips(case).map(|jitter| jitter.bandwidth_hz)),
+    figure("phase_threshold_deg", |_, _| Some(pll::THRESHOLD_RAD.to_degrees())),
+    figure("code_threshold_chips", |case, _| Some(dll::threshold_chips(case.settings.spacing_chips))),
+    figure("frequency_threshold_hz", |case, _| Some(fll::threshold_hz(case.update_s()))),
+];

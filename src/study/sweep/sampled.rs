@@ -1,0 +1,254 @@
+//! Cases at sample level: one stream of samples from the generator feeds every receiver that is to hear it, in memory.
+//!
+//! Cases that differ in `receiver.…` alone share their signal, so it is generated once. Figures are those of
+//! `summary.json` by their path, the first search's detections, and what theory predicts of the loops under thermal
+//! noise. Limits: truth and records pass through files in a scratch directory, samples never do.
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde_json::Value as Json;
+use toml::Value;
+
+use super::axis::{self, Axis};
+use super::model::SNR;
+use super::spec::{SCENARIO_KEY, Study};
+use super::{StudyError, temporary};
+use crate::analysis::Summary;
+use crate::analysis::clock::Clock;
+use crate::analysis::errors::Errors;
+use crate::analysis::load::Run;
+use crate::analysis::statistics::mean;
+use crate::analysis::theory::pll;
+use crate::generator::scenario::{Overrides, Scenario};
+use crate::generator::stream::{Options, Stream};
+use crate::generator::{GenerateError, truth};
+use crate::receiver::output::Output;
+use crate::receiver::settings::Settings;
+use crate::receiver::track::closed::Mode;
+use crate::receiver::{ReceiveError, Reception};
+use crate::study::{expect, limits};
+
+/// A scene that a study is based on.
+#[derive(Clone, Debug)]
+pub struct Base {
+    /// As the study writes it.
+    pub written: PathBuf,
+    /// Where its files are.
+    pub directory: PathBuf,
+    pub name: String,
+    pub document: toml::Table,
+}
+
+/// Whether a key changes what arrives, and not only what the receiver makes of it.
+pub fn changes_signal(key: &str) -> bool {
+    !key.starts_with("receiver.")
+}
+
+/// What a study may keep. `acquisition.…` count the first search alone; `theory.…` predict for thermal noise alone, the
+/// mean C/N0 of the run and the loop as it is closed.
+pub const FIGURES: &[&str] = &[
+    "acquisition.detected_share",
+    "acquisition.false",
+    "satellites.in_view",
+    "satellites.acquired",
+    "satellites.used",
+    "satellites.false_acquired",
+    "position.fixes",
+    "position.first_fix_s",
+    "position.horizontal_mean_m",
+    "position.horizontal_p95_m",
+    "position.vertical_p95_m",
+    "position.error_3d_p95_m",
+    "position.bias_enu_m.0",
+    "position.bias_enu_m.1",
+    "position.bias_enu_m.2",
+    "position.velocity_p95_mps",
+    "clock.bias_mean_s",
+    "clock.bias_sigma_s",
+    "clock.drift",
+    "clock.true_drift",
+    "clock.oadev_1s",
+    "clock.mdev_1s",
+    "clock.true_oadev_1s",
+    "observables.pseudorange_rms_m",
+    "observables.pseudorange_bias_m",
+    "observables.carrier_rms_cycles",
+    "observables.doppler_rms_hz",
+    "observables.cn0_bias_db",
+    "tracking.losses_of_lock",
+    "tracking.cycle_slips",
+    "tracking.dll_sigma_chips",
+    "theory.tracking.dll_sigma_chips",
+    "tracking.pll_sigma_deg",
+    "theory.tracking.pll_sigma_deg",
+    SNR,
+    "tracking.fll_sigma_hz",
+    "navigation.parameters_checked",
+    "navigation.parameters_wrong",
+    "spoofing.displacement_max_m",
+    "spoofing.captured_share",
+    "spoofing.from_claim_p95_m",
+];
+
+/// The scene's document with the values of a case in it.
+///
+/// # Errors
+/// A key that leads nowhere.
+pub fn patched(base: &Base, values: &[(&Axis, &Value)]) -> Result<toml::Table, String> {
+    let mut document = base.document.clone();
+    for (axis, value) in values.iter().filter(|(axis, _)| axis.key != SCENARIO_KEY) {
+        axis::put(&mut document, &axis.key, value).map_err(|reason| format!("{}: {reason}", axis.key))?;
+    }
+    Ok(document)
+}
+
+/// Scene and receiver of a document, each as its own reader understands it.
+///
+/// # Errors
+/// What the reader refuses.
+pub fn read(base: &Base, document: &toml::Table) -> Result<(Scenario, Settings), String> {
+    let text = toml::to_string(document).map_err(|e| e.to_string())?;
+    let scenario = Scenario::parse(&text, "scene").map_err(|e| e.without_place())?;
+    let settings = Settings::from_table(scenario.receiver.clone().unwrap_or_default(), "receiver");
+    let settings = settings.map_err(|e| e.to_string());
+    settings.map(|settings| (scenario, settings)).map_err(|e| format!("{}: {e}", base.written.display()))
+}
+
+/// One receiver at work.
+struct Ear {
+    directory: PathBuf,
+    settings: Settings,
+    output: Output,
+    /// Taken at the end.
+    reception: Option<Reception>,
+}
+
+impl Ear {
+    fn take(&mut self, bytes: &[u8]) -> Result<(), ReceiveError> {
+        self.reception.as_mut().map_or(Ok(()), |reception| reception.take(bytes, &mut self.output))
+    }
+}
+
+/// Runs cases that share their signal; gives the figures asked for, case by case.
+///
+/// # Errors
+/// A case that its readers refuse, files that cannot be written, a request to stop.
+pub fn run(
+    study: &Study,
+    base: &Base,
+    cases: &[axis::Case],
+    scratch: &Path,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<Vec<Option<f64>>>, StudyError> {
+    let Some(first) = cases.first() else { return Ok(Vec::new()) };
+    let refused = |case: &axis::Case, reason: String| StudyError::Case {
+        origin: study.origin.clone(),
+        case: case.number,
+        values: study.values_text(case),
+        reason,
+    };
+    let of = |case: &axis::Case| {
+        let document = patched(base, &study.values(case)).map_err(|reason| refused(case, reason))?;
+        read(base, &document).map_err(|reason| refused(case, reason))
+    };
+    let (scenario, _) = of(first)?;
+    let overrides = Overrides { seed: Some(study.seed_of(first, &base.name)), ..Overrides::default() };
+    let (scene, _) = scenario.compose(&base.directory, &overrides).map_err(|e| refused(first, e.without_place()))?;
+    let here = temporary::Directory::new(scratch)?;
+    let truth_path = here.path().join("truth");
+    let mut truth = truth::Writer::create(&truth_path).map_err(GenerateError::Truth)?;
+    let mut ears = Vec::new();
+    for (number, case) in cases.iter().enumerate() {
+        let (_, settings) = of(case)?;
+        let directory = here.path().join(format!("rx{number}"));
+        let output = Output::create(&directory)?;
+        let reception = Some(Reception::new(&scene.metadata, &settings)?);
+        ears.push(Ear { directory, settings, output, reception });
+    }
+    let mut stream = Stream::new(&scene, &mut truth, &Options::default())?;
+    let (mut made, mut taken) = (Vec::new(), Vec::new());
+    let mut more = true;
+    while more {
+        let (generated, received) = rayon::join(
+            || stream.next(&mut truth, &mut made),
+            || ears.par_iter_mut().try_for_each(|ear| ear.take(&taken)),
+        );
+        received?;
+        more = generated?;
+        std::mem::swap(&mut made, &mut taken);
+        if stop() {
+            return Err(StudyError::Stopped);
+        }
+    }
+    stream.finish(&mut truth)?;
+    drop(truth);
+    for ear in &mut ears {
+        if let Some(reception) = ear.reception.take() {
+            reception.finish(&mut ear.output)?;
+        }
+    }
+    ears.iter().map(|ear| figures(here.path(), &truth_path, ear, &study.keep)).collect()
+}
+
+fn figures(here: &Path, truth: &Path, ear: &Ear, keep: &[String]) -> Result<Vec<Option<f64>>, StudyError> {
+    let run = Run::read_parts(here, truth, &ear.directory)?;
+    let errors = Errors::measure(&run)?;
+    let summary = Summary::new(&run, &errors, &Clock::measure(&run, &errors));
+    let json = serde_json::to_value(&summary).map_err(|e| StudyError::Bug(e.to_string()))?;
+    let of = |name: &String| match name.as_str() {
+        "acquisition.detected_share" => first_search(&run).0,
+        "acquisition.false" => Some(first_search(&run).1),
+        "theory.tracking.pll_sigma_deg" => pll_theory_deg(&run, &ear.settings, &summary),
+        "theory.tracking.dll_sigma_chips" => {
+            let channel = limits::channel(&ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz);
+            expect::code_chips(&channel).map(|jitter| jitter.sigma)
+        }
+        SNR => {
+            let channel = limits::channel(&ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz);
+            channel.cn0_dbhz.map(|dbhz| channel.update_s() * libm::pow(10.0, dbhz / 10.0))
+        }
+        path => number(&json, path),
+    };
+    Ok(keep.iter().map(of).map(|value| value.filter(|x| x.is_finite())).collect())
+}
+
+/// A number of the summary by its path; `None` where the run has none.
+fn number(json: &Json, path: &str) -> Option<f64> {
+    json.pointer(&format!("/{}", path.replace('.', "/"))).and_then(Json::as_f64)
+}
+
+/// Share of the satellites in view at the start that the first search found, and how many it found that were not there.
+fn first_search(run: &Run) -> (Option<f64>, f64) {
+    let start = run.sky.iter().map(|row| row.sample).min();
+    let there: Vec<_> = run.sky.iter().filter(|row| Some(row.sample) == start).map(|row| row.sv).collect();
+    let first = run.acquisition.iter().map(|row| row.sample).min();
+    let hits = || run.acquisition.iter().filter(|row| Some(row.sample) == first && row.acquired);
+    let found = hits().filter(|row| there.contains(&row.sv)).count();
+    let share = first.filter(|_| !there.is_empty()).map(|_| found as f64 / there.len() as f64);
+    (share, (hits().count() - found) as f64)
+}
+
+/// Jitter of the carrier as it is observed: at instants, where the discriminator sees means over an integration. Where in
+/// the running integration an observation falls follows from the time sent, as integrations begin with symbols.
+fn pll_theory_deg(run: &Run, settings: &Settings, summary: &Summary) -> Option<f64> {
+    let cn0_dbhz = summary.details.cn0_effective_dbhz?;
+    let channel = limits::channel(&settings.tracking, Mode::Phase, Some(cn0_dbhz));
+    let update_s = channel.update_s();
+    let closed = expect::carrier_loop(&settings.tracking, Mode::Phase, update_s);
+    let gain = |place: f64| closed.linear_at(place).noise_gain();
+    let (start, middle, end) = (gain(0.0)?, gain(0.5)?, gain(1.0)?);
+    // The variance is a quadratic of the place, here from -1/2 to 1/2.
+    let (slope, curve) = (end - start, 2.0 * (start + end - 2.0 * middle));
+    let gains: Vec<f64> = run
+        .truth
+        .iter()
+        .map(|row| {
+            let integrations = row.sent_fraction_s / update_s;
+            let place = integrations - integrations.floor() - 0.5;
+            middle + place * (slope + place * curve)
+        })
+        .collect();
+    let raw_deg = pll::raw_rad(update_s, libm::pow(10.0, cn0_dbhz / 10.0)).to_degrees();
+    Some(raw_deg * mean(&gains)?.sqrt())
+}

@@ -1,0 +1,375 @@
+//! STUDY.toml as written, every key checked.
+//!
+//! The base is a scene's file (`level = "samples"`) or, at correlator level, the tables `[signal]`, `[motion]`, `[loop]`,
+//! `[measure]` and `[receiver]` of the study itself. Axes put their values under any key of the base.
+
+use std::path::{Path, PathBuf};
+
+use toml::Value;
+use toml::de::DeTable;
+
+use super::axis::{self, Axis, Grid};
+use super::{model, sampled};
+use crate::generator::scenario::ScenarioError;
+use crate::generator::scenario::read::{Source, Table, nearest};
+
+/// What a case is run on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// The receiver's loops on modelled correlations.
+    Correlator,
+    /// Generator and receiver on samples.
+    Samples,
+}
+
+impl Level {
+    /// As a study writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Correlator => "correlator",
+            Self::Samples => "samples",
+        }
+    }
+}
+
+/// A study as written.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// What errors call it.
+    pub origin: String,
+    pub name: String,
+    pub title: String,
+    /// What the report says first.
+    pub about: String,
+    pub level: Level,
+    pub seed: u64,
+    pub axes: Vec<Axis>,
+    pub grid: Grid,
+    /// At correlator level: the tables of the study that make its base.
+    pub base: toml::Table,
+    /// At samples level: the scene's file, as written; absent where an axis names the files.
+    pub scenario: Option<PathBuf>,
+    /// Figures to keep; at correlator level those of theory stand behind the ones that they predict.
+    pub keep: Vec<String>,
+    pub plots: Vec<Plot>,
+}
+
+/// A picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plot {
+    pub kind: PlotKind,
+    pub title: String,
+    /// Axis across.
+    pub x: String,
+    /// Figure that is drawn.
+    pub figure: String,
+    /// Axis that tells curves apart.
+    pub series: Option<String>,
+    /// Axis that tells pictures apart.
+    pub panel: Option<String>,
+    /// Values of other axes.
+    pub fixed: Vec<(String, Value)>,
+    pub log_x: bool,
+    pub log_y: bool,
+}
+
+/// How a figure is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlotKind {
+    /// The figure over x, a band of 95 % about its mean.
+    Curve,
+    /// The figure as colour over x and this axis.
+    Heat { y: String },
+    /// Where along this axis the figure crosses a level, over x.
+    Crossing { along: String, level: f64 },
+}
+
+const KEYS: &[&str] = &[
+    "name",
+    "title",
+    "about",
+    "level",
+    "seed",
+    "repetitions",
+    "scenario",
+    "signal",
+    "motion",
+    "loop",
+    "measure",
+    "receiver",
+    "axis",
+    "keep",
+    "plot",
+];
+const BASE: [&str; 5] = ["signal", "motion", "loop", "measure", "receiver"];
+const PLOT_KEYS: &[&str] =
+    &["kind", "title", "x", "y", "z", "series", "panel", "along", "level", "log_x", "log_y", "where"];
+/// Largest text of a study.
+const MOST_BYTES: usize = 1 << 20;
+/// The key under which an axis names scenes.
+pub const SCENARIO_KEY: &str = "scenario";
+
+impl Study {
+    /// Reads a study; `origin` names it in errors.
+    ///
+    /// # Errors
+    /// The first key or value that is not as expected, with its place.
+    pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
+        let source = Source { origin, text };
+        let refuse = |at: usize, message: String| ScenarioError::Toml { place: source.place(at), message };
+        if text.len() > MOST_BYTES {
+            return Err(refuse(0, format!("{} bytes: expected a study of at most {MOST_BYTES}", text.len())));
+        }
+        let toml = |e: toml::de::Error| refuse(e.span().map_or(0, |span| span.start), e.message().to_owned());
+        let document = DeTable::parse(text).map_err(toml)?;
+        let root = Table::new(&source, "", 0, document.get_ref());
+        root.allow(KEYS)?;
+        let levels = [("correlator", Level::Correlator), ("samples", Level::Samples)];
+        let level = root.choice("level", &levels)?;
+        let level = level.ok_or_else(|| root.bad("level", "\"correlator\" or \"samples\""))?;
+        let axes: Vec<Axis> =
+            root.tables("axis")?.unwrap_or_default().iter().map(Axis::read).collect::<Result<_, _>>()?;
+        unlike(&root, &axes)?;
+        let scenario = scenario(&root, level, &axes)?;
+        let base = base(&root, text, level).map_err(|e| match e {
+            Ok(refused) => refused,
+            Err(e) => toml(*e),
+        })?;
+        let repetitions = root.integer("repetitions")?.unwrap_or(1);
+        if !(1..=1_000_000).contains(&repetitions) {
+            return Err(root.bad("repetitions", "1 to 1000000"));
+        }
+        let signal = |key: &str| match level {
+            Level::Correlator => model::changes_signal(key),
+            Level::Samples => sampled::changes_signal(key),
+        };
+        let grid = Grid::new(&axes, repetitions, signal).map_err(|(number, reason)| ScenarioError::Toml {
+            place: axes.get(number).map_or_else(|| root.place("axis"), |axis| axis.place.clone()),
+            message: reason,
+        })?;
+        let keep = keep(&root, level)?;
+        let plots = root.tables("plot")?.unwrap_or_default();
+        let plots = plots.iter().map(|table| plot(table, &axes, &grid, &keep)).collect::<Result<_, _>>()?;
+        let name = name(&root)?;
+        Ok(Self {
+            origin: origin.to_owned(),
+            title: root.text("title", "a title")?.map_or_else(|| name.clone(), str::to_owned),
+            about: root.text("about", "a text")?.unwrap_or_default().trim().to_owned(),
+            name,
+            level,
+            seed: root.integer("seed")?.unwrap_or(1),
+            axes,
+            grid,
+            base,
+            scenario,
+            keep,
+            plots,
+        })
+    }
+
+    /// The values of a case, axis by axis.
+    pub fn values<'s>(&'s self, case: &axis::Case) -> Vec<(&'s Axis, &'s Value)> {
+        let at = |(axis, index): (&'s Axis, &usize)| axis.values.get(*index).map(|value| (axis, value));
+        self.axes.iter().zip(&case.at).filter_map(at).collect()
+    }
+
+    /// They in words.
+    pub fn values_text(&self, case: &axis::Case) -> String {
+        let words: Vec<String> =
+            self.values(case).iter().map(|(axis, value)| format!("{} = {}", axis.key, axis::text_of(value))).collect();
+        words.join(", ")
+    }
+
+    /// The scene of a case as the study writes it, at samples level.
+    pub fn scenario_of<'s>(&'s self, case: &axis::Case) -> Option<&'s Path> {
+        let named = self.values(case).into_iter().find(|(axis, _)| axis.key == SCENARIO_KEY);
+        match named {
+            Some((_, Value::String(path))) => Some(Path::new(path)),
+            _ => self.scenario.as_deref(),
+        }
+    }
+
+    /// Every scene that the study names.
+    pub fn scenarios(&self) -> Vec<&Path> {
+        let named = self.axes.iter().filter(|axis| axis.key == SCENARIO_KEY).flat_map(|axis| &axis.values);
+        let named = named.filter_map(|value| value.as_str().map(Path::new));
+        self.scenario.as_deref().into_iter().chain(named).collect()
+    }
+
+    /// The seed of a case: a hash of the study's seed, the scene's name, the values that change the signal, by name, and
+    /// the repetition. Cases that differ in the receiver alone have the same noise, and another axis of the receiver or
+    /// other values of an axis change no case's seed.
+    pub fn seed_of(&self, case: &axis::Case, scene: &str) -> u64 {
+        let acts = |key: &str| match self.level {
+            Level::Correlator => model::changes_signal(key),
+            Level::Samples => sampled::changes_signal(key) && key != SCENARIO_KEY,
+        };
+        let mut named: Vec<String> = self
+            .values(case)
+            .iter()
+            .filter(|(axis, _)| acts(&axis.key))
+            .map(|(axis, value)| format!("{}={}", axis.key, axis::text_of(value)))
+            .collect();
+        named.sort();
+        let text = format!("{}|{scene}|{}|{}", self.seed, named.join("|"), case.repetition);
+        let digits = super::sha256_hex(text.as_bytes());
+        // 63 bits: a scene's seed is a TOML integer.
+        digits.get(..16).and_then(|hex| u64::from_str_radix(hex, 16).ok()).unwrap_or(0) >> 1
+    }
+}
+
+fn name(root: &Table<'_>) -> Result<String, ScenarioError> {
+    let expected = "1 to 64 letters, digits, '-' and '_' (it names a directory)";
+    let name = root.text("name", expected)?.ok_or_else(|| root.bad("name", expected))?;
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if name.len() <= 64 && name.chars().all(fits) { Ok(name.to_owned()) } else { Err(root.bad("name", expected)) }
+}
+
+/// Refuses keys that stand twice, or that are the study's own matter.
+fn unlike(root: &Table<'_>, axes: &[Axis]) -> Result<(), ScenarioError> {
+    for (number, axis) in axes.iter().enumerate() {
+        let message = if axes.iter().take(number).any(|other| other.key == axis.key) {
+            format!("axis {}: expected each key but once", axis.key)
+        } else if ["seed", "name"].contains(&axis.key.as_str()) {
+            format!("axis {}: expected a key of the base; repetitions vary the seed", axis.key)
+        } else {
+            continue;
+        };
+        return Err(ScenarioError::Toml { place: axis.place.clone(), message });
+    }
+    if axes.is_empty() && root.has("axis") { Err(root.bad("axis", "an array of tables, [[axis]]")) } else { Ok(()) }
+}
+
+fn scenario(root: &Table<'_>, level: Level, axes: &[Axis]) -> Result<Option<PathBuf>, ScenarioError> {
+    let written = root.text(SCENARIO_KEY, "the path of a scene, relative to the study")?;
+    let axis = axes.iter().find(|axis| axis.key == SCENARIO_KEY);
+    match (level, written, axis) {
+        (Level::Correlator, None, None) => Ok(None),
+        (Level::Correlator, ..) => Err(root.bad(SCENARIO_KEY, "nothing at level = \"correlator\", which has no scene")),
+        (Level::Samples, Some(_), Some(_)) => Err(root.bad(SCENARIO_KEY, "nothing beside the axis \"scenario\"")),
+        (Level::Samples, None, None) => Err(root.bad(SCENARIO_KEY, "the path of a scene, relative to the study")),
+        (Level::Samples, written, None) => Ok(written.map(PathBuf::from)),
+        (Level::Samples, None, Some(axis)) if axis.values.iter().all(Value::is_str) => Ok(None),
+        (Level::Samples, None, Some(axis)) => {
+            let message = "axis scenario: expected paths of scenes, relative to the study".to_owned();
+            Err(ScenarioError::Toml { place: axis.place.clone(), message })
+        }
+    }
+}
+
+/// The tables of the base, at correlator level.
+fn base(
+    root: &Table<'_>,
+    text: &str,
+    level: Level,
+) -> Result<toml::Table, Result<ScenarioError, Box<toml::de::Error>>> {
+    if level == Level::Samples {
+        let written = BASE.iter().find(|name| root.has(name));
+        let expected = "nothing at level = \"samples\": the scene's file holds it";
+        return written.map_or_else(|| Ok(toml::Table::new()), |name| Err(Ok(root.bad(name, expected))));
+    }
+    let mut whole: toml::Table = toml::from_str(text).map_err(|e| Err(Box::new(e)))?;
+    whole.retain(|key, _| BASE.contains(&key));
+    // As written and in its place, so that errors of the base itself carry theirs.
+    model::Model::read(root).map_err(Ok)?;
+    Ok(whole)
+}
+
+fn keep(root: &Table<'_>, level: Level) -> Result<Vec<String>, ScenarioError> {
+    let known: Vec<&str> = match level {
+        Level::Correlator => model::FIGURES.iter().map(|figure| figure.name).collect(),
+        Level::Samples => sampled::FIGURES.to_vec(),
+    };
+    let expected = "an array of figures";
+    let written = root.words("keep", expected)?.ok_or_else(|| root.bad("keep", expected))?;
+    let mut keep: Vec<String> = Vec::new();
+    for word in written {
+        if !known.contains(&word) {
+            let hint = nearest(word, &known).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
+            return Err(root.bad("keep", format!("figures out of {}; {word:?} is none{hint}", known.join(", "))));
+        }
+        // On samples theory is for scenes of thermal noise alone, so a study has to ask for it.
+        let theory = (level == Level::Correlator).then(|| format!("theory.{word}"));
+        for name in [Some(word.to_owned()), theory].into_iter().flatten() {
+            if known.contains(&name.as_str()) && !keep.contains(&name) {
+                keep.push(name);
+            }
+        }
+    }
+    if keep.iter().any(|name| name.starts_with("theory.")) && !keep.iter().any(|name| name == model::SNR) {
+        keep.push(model::SNR.to_owned());
+    }
+    if keep.is_empty() { Err(root.bad("keep", "at least one figure")) } else { Ok(keep) }
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Curve,
+    Heat,
+    Crossing,
+}
+
+fn plot(table: &Table<'_>, axes: &[Axis], grid: &Grid, keep: &[String]) -> Result<Plot, ScenarioError> {
+    table.allow(PLOT_KEYS)?;
+    let kinds = [("curve", Kind::Curve), ("heat", Kind::Heat), ("crossing", Kind::Crossing)];
+    let kind = table.choice("kind", &kinds)?.unwrap_or(Kind::Curve);
+    let keys: Vec<&str> = axes.iter().map(|axis| axis.key.as_str()).collect();
+    let figures: Vec<&str> = keep.iter().map(String::as_str).collect();
+    let one_of = |name: &str, known: &[&str]| -> Result<Option<String>, ScenarioError> {
+        let expected = format!("one of {}", known.join(", "));
+        let Some(word) = table.text(name, &expected)? else { return Ok(None) };
+        let hint = nearest(word, known).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
+        if known.contains(&word) { Ok(Some(word.to_owned())) } else { Err(table.bad(name, expected + &hint)) }
+    };
+    let needed = |name: &str, known: &[&str]| {
+        one_of(name, known)?.ok_or_else(|| table.bad(name, format!("one of {}", known.join(", "))))
+    };
+    let x = needed("x", &keys)?;
+    let (kind, figure) = match kind {
+        Kind::Curve => (PlotKind::Curve, needed("y", &figures)?),
+        Kind::Heat => (PlotKind::Heat { y: needed("y", &keys)? }, needed("z", &figures)?),
+        Kind::Crossing => {
+            let level = table.required("level", -1e18..=1e18, "")?;
+            (PlotKind::Crossing { along: needed("along", &keys)?, level }, needed("z", &figures)?)
+        }
+    };
+    let mut fixed = Vec::new();
+    if let Some(named) = table.table("where")? {
+        named.allow(&keys)?;
+        for key in named.names() {
+            let value = named.value(key).filter(|value| {
+                let axis = axes.iter().find(|axis| axis.key == key);
+                axis.is_some_and(|axis| axis.values.iter().any(|known| axis::text_of(known) == axis::text_of(value)))
+            });
+            fixed.push((key.to_owned(), value.ok_or_else(|| named.bad(key, "one of the axis's values"))?));
+        }
+    }
+    let plot = Plot {
+        title: table.text("title", "a title")?.map_or_else(|| figure.clone(), str::to_owned),
+        kind,
+        x,
+        figure,
+        series: one_of("series", &keys)?,
+        panel: one_of("panel", &keys)?,
+        fixed,
+        log_x: table.flag("log_x")?.unwrap_or(false),
+        log_y: table.flag("log_y")?.unwrap_or(false),
+    };
+    // Each axis, or one that is zipped with it, must have its place: else several cells would fall on one point.
+    let mut placed: Vec<&str> = vec![&plot.x];
+    placed.extend(plot.series.iter().chain(&plot.panel).map(String::as_str));
+    placed.extend(plot.fixed.iter().map(|(key, _)| key.as_str()));
+    match &plot.kind {
+        PlotKind::Heat { y } => placed.push(y),
+        PlotKind::Crossing { along, .. } => placed.push(along),
+        PlotKind::Curve => {}
+    }
+    for digit in grid.signal.iter().chain(&grid.receiver) {
+        let names: Vec<&str> = digit.axes.iter().filter_map(|&n| keys.get(n)).copied().collect();
+        if digit.length > 1 && !names.iter().any(|name| placed.contains(name)) {
+            let expected = format!("a place for axis {} too: in x, series, panel or where", names.join(" and "));
+            return Err(table.bad("x", expected));
+        }
+    }
+    Ok(plot)
+}
