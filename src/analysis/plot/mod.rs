@@ -57,6 +57,7 @@ impl Judged<'_> {
 type Draw = fn(&Judged<'_>) -> Result<Option<Drawing>, Failure>;
 
 /// A picture by its name, what to look at in it, and the files that hold its numbers.
+#[cfg_attr(not(feature = "pdf"), allow(dead_code, reason = "captions are for paper, and a test holds the tables"))]
 pub(crate) struct Picture {
     /// The PNG's, without its ending.
     pub name: &'static str,

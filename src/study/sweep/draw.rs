@@ -15,7 +15,9 @@ use super::publish::short;
 use super::result::{Cell, Results, THEORY};
 use super::spec::{Plot, PlotKind};
 use super::unit_of;
-use crate::analysis::plot::canvas::{Axis, COLOURS, Chart, GREY, Mark, Series, figure};
+use crate::analysis::plot::canvas::{
+    Axis, COLOURS, Chart, Drawing, Failure, GREY, Mark, Series, WIDTH_PX, compose, figure,
+};
 
 /// A picture of a study.
 #[derive(Clone, Debug)]
@@ -39,6 +41,16 @@ impl Picture {
         let rows = self.charts.len().div_ceil(columns).max(1);
         let width = if columns == 1 { 900 } else { 220 + 480 * columns };
         Ok(figure(path, (width as u32, 440 * rows as u32), columns, &self.charts, &self.legend)?)
+    }
+
+    /// The picture as wide as a page's text.
+    ///
+    /// # Errors
+    /// Whatever the drawing library reports.
+    pub fn drawing(&self) -> Result<Drawing, Failure> {
+        let columns = self.charts.len().clamp(1, 2);
+        let rows = self.charts.len().div_ceil(columns).max(1);
+        compose((WIDTH_PX, 300 * rows as u32 + 40), columns, &self.charts, &self.legend)
     }
 
     /// Its crossings as a table in Markdown; nothing for other pictures.

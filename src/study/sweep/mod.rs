@@ -14,6 +14,8 @@ pub mod engine;
 pub mod estimate;
 pub mod export;
 pub mod model;
+#[cfg(feature = "pdf")]
+mod paper;
 pub mod plan;
 pub mod publish;
 pub mod result;

@@ -1,4 +1,4 @@
-//! Writes a finished study down: `cases.csv`, `cells.csv`, pictures and `report.md` in its directory.
+//! Writes a finished study down: `cases.csv`, `cells.csv`, pictures, `report.md` and `report.pdf` in its directory.
 //!
 //! Bytes follow from plan and results alone: how long it took and where stands nowhere. Other forms of report start from
 //! [`Results`] and [`draw::pictures`] as this one does.
@@ -29,6 +29,8 @@ pub fn write(plan: &Plan, lines: &[String], results: &Results) -> Result<(), Stu
             picture.draw(&directory.join(format!("{}.{ending}", picture.stem)))?;
         }
     }
+    #[cfg(feature = "pdf")]
+    plan::write(&directory.join("report.pdf"), &super::paper::pdf(plan, results, &pictures)?)?;
     plan::write(&directory.join("report.md"), text(plan, results, &pictures).as_bytes())
 }
 
@@ -37,7 +39,7 @@ pub fn in_short(results: &Results) -> String {
     results.agreement().iter().map(|agreement| in_words(results, agreement) + "\n").collect()
 }
 
-fn in_words(results: &Results, agreement: &Agreement) -> String {
+pub(super) fn in_words(results: &Results, agreement: &Agreement) -> String {
     let name = results.figures.get(agreement.figure).map_or("", |figure| figure.name.as_str());
     let (region, outside): (Vec<&Compared>, Vec<&Compared>) = agreement.cells.iter().partition(|cell| cell.in_region());
     let good = |cells: &[&Compared]| cells.iter().filter(|cell| cell.holds()).count();
@@ -66,20 +68,15 @@ fn text(plan: &Plan, results: &Results, pictures: &[Picture]) -> String {
     if !study.about.is_empty() {
         let _ = write!(text, "\n{}\n", study.about);
     }
-    let level = match study.level {
-        Level::Correlator => {
-            "**Correlator level**: the receiver's own loops on modelled correlations (means from signal and errors, noise of \
-             the taps' covariance), no samples."
-        }
-        Level::Samples => {
-            "**Sample level**: samples go from the generator to the receiver in memory, from a cold start; cases that differ \
-             in the receiver alone hear the same ones."
-        }
+    let name = match study.level {
+        Level::Correlator => "Correlator level",
+        Level::Samples => "Sample level",
     };
     let _ = write!(
         text,
-        "\n{level} {} cases: {} cells, {} repetitions each with other noise. Intervals hold the mean with 95 % confidence. \
+        "\n**{name}**: {} {} cases: {} cells, {} repetitions each with other noise. Intervals hold the mean with 95 % confidence. \
          Everything: `cases.csv`, `cells.csv`.\n",
+        level(results),
         grid.cases(),
         grid.cells(),
         grid.repetitions
@@ -89,8 +86,18 @@ fn text(plan: &Plan, results: &Results, pictures: &[Picture]) -> String {
         text += &picture.table();
     }
     text += &theory(results);
-    text += &base(plan, results);
-    text += &cells(results);
+    text += "\n## Base and axes\n";
+    text += &markdown(&axes(results));
+    let base = base(plan, results);
+    let _ = match study.level {
+        Level::Correlator => write!(text, "\n```toml\n{base}\n```\n"),
+        Level::Samples => write!(text, "\n{base}\n"),
+    };
+    let _ = write!(text, "\nSeed {}; what is not named is the receiver's default.\n", study.seed);
+    if let Some(rows) = cells(results) {
+        text += "\n## Cells\n";
+        text += &markdown(&rows);
+    }
     text
 }
 
@@ -110,52 +117,56 @@ fn theory(results: &Results) -> String {
         if beyond.is_empty() {
             continue;
         }
-        text += "\nBeyond:\n\n";
-        let keys: Vec<String> = results.study.axes.iter().map(|axis| word(axis.label())).collect();
-        let _ = writeln!(text, "| {} | T·C/N0 | ratio | allowed |", keys.join(" | "));
-        let _ = writeln!(text, "|{}", " --- |".repeat(keys.len() + 3));
-        for compared in beyond {
-            let Some(cell) = results.cells.get(compared.cell) else { continue };
-            let values: Vec<String> = (0..keys.len()).map(|axis| word(&results.value_text(cell, axis))).collect();
-            let snr = compared.snr.map_or_else(|| "–".to_owned(), short);
-            let _ =
-                writeln!(text, "| {} | {snr} | {:.3} | ± {:.3} |", values.join(" | "), compared.ratio, compared.bar);
-        }
+        text += "\nBeyond:\n";
+        text += &markdown(&beyond_theory(results, &beyond));
     }
     text
 }
 
-fn base(plan: &Plan, results: &Results) -> String {
-    let study = &results.study;
-    let mut text = "\n## Base and axes\n\n| axis | values |\n| --- | --- |\n".to_owned();
-    for axis in &study.axes {
+/// Titles of columns, and rows.
+pub(super) type Rows = (Vec<String>, Vec<Vec<String>>);
+
+fn markdown((heads, rows): &Rows) -> String {
+    let line = |cells: &[String]| cells.iter().map(|cell| word(cell)).collect::<Vec<_>>().join(" | ");
+    let mut text = format!("\n| {} |\n|{}\n", line(heads), " --- |".repeat(heads.len()));
+    for row in rows {
+        let _ = writeln!(text, "| {} |", line(row));
+    }
+    text
+}
+
+/// Cells that are not within their bar of theory.
+pub(super) fn beyond_theory(results: &Results, beyond: &[&Compared]) -> Rows {
+    let labels = results.study.axes.iter().map(|axis| axis.label().to_owned());
+    let heads: Vec<String> = labels.chain(["T·C/N0", "ratio", "allowed"].map(str::to_owned)).collect();
+    let row = |compared: &&Compared| {
+        let cell = results.cells.get(compared.cell)?;
+        let values = (0..results.study.axes.len()).map(|axis| results.value_text(cell, axis));
+        let snr = compared.snr.map_or_else(|| "–".to_owned(), short);
+        Some(values.chain([snr, format!("{:.3}", compared.ratio), format!("± {:.3}", compared.bar)]).collect())
+    };
+    (heads, beyond.iter().filter_map(row).collect())
+}
+
+/// Axes and their values.
+pub(super) fn axes(results: &Results) -> Rows {
+    let row = |axis: &axis::Axis| {
         let values: Vec<String> = axis.values.iter().map(axis::text_of).collect();
         let zipped = axis.zip.as_ref().map_or(String::new(), |word| format!(" (steps with others of `{word}`)"));
-        let _ = writeln!(text, "| `{}`{zipped} | {} |", word(&axis.key), word(&values.join(", ")));
-    }
-    match study.level {
-        Level::Correlator => {
-            let base = toml::to_string(&study.base).unwrap_or_default();
-            let _ = write!(text, "\n```toml\n{}\n```\n", base.trim());
-        }
-        Level::Samples => {
-            let names: Vec<String> = plan.bases.iter().map(|base| format!("`{}`", base.written.display())).collect();
-            let _ = write!(text, "\nScenes: {}.\n", names.join(", "));
-        }
-    }
-    let _ = write!(text, "\nSeed {}; what is not named is the receiver's default.\n", study.seed);
-    text
+        vec![format!("`{}`{zipped}", axis.key), values.join(", ")]
+    };
+    (vec!["axis".to_owned(), "values".to_owned()], results.study.axes.iter().map(row).collect())
 }
 
-fn cells(results: &Results) -> String {
+/// Every cell with its figures; none where there are too many to be read.
+pub(super) fn cells(results: &Results) -> Option<Rows> {
     if results.cells.len() > MOST_LISTED {
-        return String::new();
+        return None;
     }
-    let keys = results.study.axes.iter().map(|axis| word(axis.label()));
-    let heads: Vec<String> = keys.chain(results.figures.iter().map(|figure| word(&figure.name))).collect();
-    let mut text = format!("\n## Cells\n\n| {} |\n|{}\n", heads.join(" | "), " --- |".repeat(heads.len()));
-    for cell in &results.cells {
-        let values = (0..results.study.axes.len()).map(|axis| word(&results.value_text(cell, axis)));
+    let labels = results.study.axes.iter().map(|axis| axis.label().to_owned());
+    let heads = labels.chain(results.figures.iter().map(|figure| figure.name.clone())).collect();
+    let row = |cell: &result::Cell| {
+        let values = (0..results.study.axes.len()).map(|axis| results.value_text(cell, axis));
         let figures = results.figures.iter().zip(&cell.estimates).map(|(figure, estimate)| match estimate {
             None => "–".to_owned(),
             Some(estimate) => match estimate.interval {
@@ -165,10 +176,34 @@ fn cells(results: &Results) -> String {
                 _ => short(estimate.mean),
             },
         });
-        let row: Vec<String> = values.chain(figures).collect();
-        let _ = writeln!(text, "| {} |", row.join(" | "));
+        values.chain(figures).collect()
+    };
+    Some((heads, results.cells.iter().map(row).collect()))
+}
+
+/// The level in words.
+pub(super) fn level(results: &Results) -> &'static str {
+    match results.study.level {
+        Level::Correlator => {
+            "the receiver's own loops on modelled correlations (means from signal and errors, noise of the taps' covariance), \
+             no samples."
+        }
+        Level::Samples => {
+            "samples go from the generator to the receiver in memory, from a cold start; cases that differ in the receiver \
+             alone hear the same ones."
+        }
     }
-    text
+}
+
+/// What the axes vary.
+pub(super) fn base(plan: &Plan, results: &Results) -> String {
+    match results.study.level {
+        Level::Correlator => toml::to_string(&results.study.base).unwrap_or_default().trim().to_owned(),
+        Level::Samples => {
+            let names: Vec<String> = plan.bases.iter().map(|base| format!("`{}`", base.written.display())).collect();
+            format!("Scenes: {}.", names.join(", "))
+        }
+    }
 }
 
 /// Four digits.
