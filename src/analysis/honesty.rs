@@ -36,6 +36,17 @@ pub enum Verdict {
     Pessimistic,
 }
 
+impl Verdict {
+    /// Its name in `summary.json`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Honest => "honest",
+            Self::Optimistic => "optimistic",
+            Self::Pessimistic => "pessimistic",
+        }
+    }
+}
+
 /// One fix: a row of `honesty.csv`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Row {

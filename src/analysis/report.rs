@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::analysis::honesty::Verdict;
 use crate::analysis::statistics::Spread;
 use crate::analysis::summary::Summary;
 use crate::analysis::verdict::Status;
@@ -109,9 +110,10 @@ impl Summary {
         }
         if let (Some(mean), Some([low, high])) = (self.position.nees_mean, self.position.nees_band) {
             let fixes = number(self.position.nees_independent, 0);
+            let verdict = self.position.nees_verdict.map_or("unjudged", Verdict::name);
             writeln!(
                 f,
-                "covariance    normalised error squared {mean:.2}, honest within {low:.2} to {high:.2} ({fixes} independent fixes)"
+                "covariance    {verdict}: normalised error squared {mean:.2}, of honest ones {low:.2} to {high:.2} ({fixes} independent fixes)"
             )?;
         }
         Ok(())

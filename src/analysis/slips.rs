@@ -18,7 +18,7 @@ use crate::analysis::jitter::{Settings, motion_error_deg};
 use crate::analysis::load::Run;
 use crate::analysis::statistics::median;
 use crate::analysis::theory::pll;
-use crate::analysis::{JudgeError, write_rows};
+use crate::analysis::{JudgeError, write_rows, write_whole};
 use crate::gnss::record::{Event, Observation};
 
 /// A fall of the true C/N0 against its median over the run that counts as an obstruction or a fade.
@@ -82,6 +82,10 @@ pub struct Slip {
     pub noise_3sigma_deg: Option<f64>,
 }
 
+/// The first line of `slips.csv`, which stands there without slips too.
+const COLUMNS: &str = "sample,time_s,sv,signal,kind,declared,size_cycles,remainder_cycles,cause,cn0_dbhz,interference_db,\
+                       motion_deg,noise_3sigma_deg\n";
+
 /// All slips and losses of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Slips {
@@ -129,7 +133,8 @@ impl Slips {
 
     /// Writes `slips.csv` into a run's directory.
     pub fn write(&self, directory: &Path) -> Result<(), JudgeError> {
-        write_rows(&directory.join("slips.csv"), self.rows.iter())
+        let path = directory.join("slips.csv");
+        if self.rows.is_empty() { write_whole(&path, COLUMNS.as_bytes()) } else { write_rows(&path, self.rows.iter()) }
     }
 }
 
@@ -295,5 +300,31 @@ mod tests {
         assert!((size_across(&all, 1950, &[]).unwrap() - 0.5).abs() < 1e-12);
         assert_eq!(size_across(&all, 1950, &[1950]), None);
         assert_eq!(size_across(&all, 0, &[]), None);
+    }
+
+    #[test]
+    fn the_file_has_its_columns_with_and_without_rows() {
+        let run = tempfile::tempdir().unwrap();
+        let slip = Slip {
+            sample: 1,
+            time_s: 0.1,
+            sv: "G05".to_owned(),
+            signal: "GPS L1 C/A",
+            kind: Kind::LossOfLock,
+            declared: true,
+            size_cycles: None,
+            remainder_cycles: None,
+            cause: Cause::WeakSignal,
+            cn0_dbhz: None,
+            interference_db: None,
+            motion_deg: None,
+            noise_3sigma_deg: None,
+        };
+        for rows in [vec![slip], Vec::new()] {
+            let lines = 1 + rows.len();
+            Slips { rows }.write(run.path()).unwrap();
+            let text = std::fs::read_to_string(run.path().join("slips.csv")).unwrap();
+            assert!(text.starts_with(COLUMNS) && text.lines().count() == lines, "{text}");
+        }
     }
 }
