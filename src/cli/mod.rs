@@ -17,6 +17,7 @@ pub mod scenario;
 pub mod speed;
 pub mod staging;
 
+use std::panic::catch_unwind;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -36,7 +37,9 @@ pub fn main() -> ExitCode {
             };
         }
     };
-    match execute(arguments) {
+    // The panic has been printed by then; what is left of outputs in the making is swept as they are dropped.
+    let ended = catch_unwind(|| execute(arguments)).unwrap_or_else(|_| Err(CliError::bug("see above")));
+    match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             error.print();
