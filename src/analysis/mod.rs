@@ -151,6 +151,10 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), JudgeError> {
     let part = PathBuf::from(part);
     fs::write(&part, bytes)
         .and_then(|()| fs::rename(&part, path))
+        .inspect_err(|_| {
+            // Nothing better can be done with a second failure.
+            let _ = fs::remove_file(&part);
+        })
         .map_err(|source| JudgeError::File { path: path.to_owned(), source })
 }
 

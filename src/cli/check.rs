@@ -1,6 +1,5 @@
 //! `--check`: a user's limits, and the end when one is broken.
 
-use std::fs;
 use std::path::Path;
 
 use crate::analysis::limits::Limits;
@@ -12,10 +11,7 @@ use crate::cli::scenario;
 /// Reads a file of limits.
 pub fn read(path: Option<&Path>) -> Result<Option<Limits>, CliError> {
     let Some(path) = path else { return Ok(None) };
-    let name = path.display().to_string();
-    let bytes = fs::read(path).map_err(|error| CliError::read(&name, &error))?;
-    let text = String::from_utf8(bytes)
-        .map_err(|error| CliError::input(format!("{name}: not UTF-8 at byte {}", error.utf8_error().valid_up_to())))?;
+    let (name, text) = scenario::text(path)?;
     Limits::parse(&text, &name).map(Some).map_err(CliError::input)
 }
 

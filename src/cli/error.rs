@@ -5,6 +5,7 @@
 
 use std::fmt::Display;
 use std::io::{self, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// An end that is not success: one message and its exit code.
@@ -88,13 +89,19 @@ impl CliError {
         if self.message.is_empty() {
             return;
         }
-        let clean: String = self
-            .message
-            .chars()
-            .map(|c| if c.is_control() && c != '\n' { c.escape_default().to_string() } else { c.to_string() })
-            .collect();
-        let _ = writeln!(io::stderr(), "error: {clean}");
+        let _ = writeln!(io::stderr(), "error: {}", escaped(&self.message));
     }
+}
+
+/// A text whose control characters, but for line feeds, cannot reach the terminal.
+pub fn escaped(text: &str) -> String {
+    let escape = |c: char| c.is_control() && c != '\n';
+    text.chars().map(|c| if escape(c) { c.escape_default().to_string() } else { c.to_string() }).collect()
+}
+
+/// A path as messages show it: on one line, its control characters escaped.
+pub fn shown(path: &Path) -> String {
+    escaped(&path.display().to_string()).replace('\n', "\\n")
 }
 
 /// Whether an I/O error may go away by itself or by making room.

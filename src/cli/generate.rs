@@ -2,6 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Write};
+use std::path::Path;
 
 use crate::cli::args;
 use crate::cli::error::CliError;
@@ -60,6 +61,8 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     // What the receiver's clock reads at the first sample of the file.
     let metadata = IfMetadata { start: Some(scene.clock.epoch(first)), ..scene.metadata.clone() };
     fs::write(meta.path(), sigmf::write(&metadata)).map_err(|error| CliError::output(meta_path.display(), &error))?;
+    // Metadata last, and never those of other samples: a run that is killed here leaves none.
+    discard(&meta_path)?;
     truth.commit()?;
     samples.commit()?;
     meta.commit()?;
@@ -70,6 +73,13 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
         meta_path.display(),
         truth_path.display()
     ))
+}
+
+fn discard(path: &Path) -> Result<(), CliError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(CliError::create(path.display(), &error)),
+        _ => Ok(()),
+    }
 }
 
 /// A file whose writes stop when a signal has come.

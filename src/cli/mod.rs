@@ -18,6 +18,7 @@ pub mod speed;
 pub mod staging;
 pub mod study;
 
+use std::panic::catch_unwind;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -37,7 +38,9 @@ pub fn main() -> ExitCode {
             };
         }
     };
-    match execute(arguments) {
+    // The panic has been printed by then; what is left of outputs in the making is swept as they are dropped.
+    let ended = catch_unwind(|| execute(arguments)).unwrap_or_else(|_| Err(CliError::bug("see above")));
+    match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             error.print();

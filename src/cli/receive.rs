@@ -1,11 +1,11 @@
 //! `receive`: a cold start on anyone's recording.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use crate::cli::args;
-use crate::cli::error::CliError;
+use crate::cli::error::{CliError, shown};
 use crate::cli::interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::run::{output_error, receiver_error};
@@ -25,8 +25,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     let settings = match &arguments.receiver {
         None => Settings::default(),
         Some(path) => {
-            let name = path.display().to_string();
-            let text = fs::read_to_string(path).map_err(|error| CliError::read(&name, &error))?;
+            let (name, text) = scenario::text(path)?;
             Settings::parse(&text, &name).map_err(CliError::input)?
         }
     };
@@ -48,7 +47,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     if let Some(diagnosis) = &outcome.diagnosis {
         text += &format!("{diagnosis}\n");
     }
-    text += &format!("results in {}\n", arguments.out.display());
+    text += &format!("results in {}\n", shown(&arguments.out));
     scenario::print(&text)
 }
 
@@ -63,8 +62,7 @@ fn open(arguments: &args::Receive) -> Result<Recording, CliError> {
     let stdin = arguments.file.as_os_str() == "-";
     let (data_path, meta_path) = pair(&arguments.file);
     let described = if !stdin && meta_path.is_file() {
-        let name = meta_path.display().to_string();
-        let text = fs::read_to_string(&meta_path).map_err(|error| CliError::read(&name, &error))?;
+        let (name, text) = scenario::text(&meta_path)?;
         Some(sigmf::parse(&text, &name).map_err(CliError::input)?)
     } else {
         None
@@ -73,7 +71,7 @@ fn open(arguments: &args::Receive) -> Result<Recording, CliError> {
     if stdin {
         return Ok(Recording { metadata, reader: Box::new(io::stdin().lock()), samples: None });
     }
-    let name = data_path.display().to_string();
+    let name = shown(&data_path);
     let file = File::open(&data_path).map_err(|error| CliError::read(&name, &error))?;
     let about = file.metadata().map_err(|error| CliError::read(&name, &error))?;
     if about.is_dir() {

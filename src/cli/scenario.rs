@@ -1,10 +1,10 @@
 //! Finding the scene that the user named.
 
-use std::fs;
-use std::io::Write;
+use std::fs::File;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
-use crate::cli::error::CliError;
+use crate::cli::error::{CliError, escaped, shown};
 use crate::generator::scenario::{Overrides, Scenario};
 use crate::generator::scene::Scene;
 use crate::gnss::samples::Format;
@@ -12,6 +12,9 @@ use crate::receiver::settings::Settings;
 
 /// The scene that runs when none is named.
 const EMBEDDED: &str = include_str!("../../scenarios/static.toml");
+
+/// Largest scenario, limits, settings or metadata that is read.
+const LARGEST_BYTES: u64 = 4 << 20;
 
 /// A scenario as written, and the directory that its paths are relative to.
 pub struct Named {
@@ -30,13 +33,27 @@ pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
         let scenario = Scenario::parse(EMBEDDED, &name).map_err(CliError::bug)?;
         return Ok(Named { scenario, text: EMBEDDED.to_owned(), name, directory: PathBuf::from(".") });
     };
-    let name = path.display().to_string();
-    let bytes = fs::read(path).map_err(|error| CliError::read(&name, &error))?;
-    let text = String::from_utf8(bytes)
-        .map_err(|error| CliError::input(format!("{name}: not UTF-8 at byte {}", error.utf8_error().valid_up_to())))?;
+    let (name, text) = text(path)?;
     let scenario = Scenario::parse(&text, &name).map_err(CliError::input)?;
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Ok(Named { scenario, text, name, directory: directory.to_owned() })
+}
+
+/// The name that messages give a file, and its text: at most `LARGEST_BYTES`, so that a device without end is refused.
+pub fn text(path: &Path) -> Result<(String, String), CliError> {
+    let name = shown(path);
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(LARGEST_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|error| CliError::read(&name, &error))?;
+    if bytes.len() as u64 > LARGEST_BYTES {
+        return Err(CliError::input(format!(
+            "{name}: more than {LARGEST_BYTES} bytes: expected a text of at most that"
+        )));
+    }
+    let text = String::from_utf8(bytes)
+        .map_err(|error| CliError::input(format!("{name}: not UTF-8 at byte {}", error.utf8_error().valid_up_to())))?;
+    Ok((name, text))
 }
 
 /// Limits the threads that the work may use.
@@ -79,5 +96,5 @@ pub fn print(text: &str) -> Result<(), CliError> {
 
 /// Prints a warning on standard error; a failure to do so is silent.
 pub fn warn(text: &str) {
-    let _ = writeln!(std::io::stderr(), "warning: {text}");
+    let _ = writeln!(std::io::stderr(), "warning: {}", escaped(text));
 }

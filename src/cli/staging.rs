@@ -36,11 +36,12 @@ impl Staging {
 
     /// Starts a file that will be `target`; the caller creates [`Staging::path`].
     pub fn file(target: &Path) -> Result<Self, CliError> {
-        if target.is_dir() {
-            return Err(CliError::refused_output(format!(
-                "{} is a directory: name a file with --out",
-                target.display()
-            )));
+        // What is renamed over a device or a pipe takes its place.
+        if let Ok(kind) = fs::metadata(target).map(|metadata| metadata.file_type())
+            && !kind.is_file()
+        {
+            let what = if kind.is_dir() { "is a directory" } else { "is not an ordinary file" };
+            return Err(CliError::refused_output(format!("{} {what}: name a file with --out", target.display())));
         }
         let staging = Self::beside(target)?;
         remove(&staging.part).map_err(|error| CliError::create(staging.part.display(), &error))?;

@@ -3,7 +3,10 @@
 //! Source: RINEX 2.11, table A4; RINEX 3.05, table A6; RINEX 4.02. The crate panics on some damaged files,
 //! refuses non-ASCII bytes and checks no ranges, so here the bytes are filtered, the call is fenced
 //! and every element is held against the range of its LNAV field (IS-GPS-200N, tables 20-I and
-//! 20-III). A record that fails is left out and named in [`Navigation::skipped`].
+//! 20-III). Before that, records that are not in form are taken out (`columns`). A record that fails is left out and named
+//! in [`Navigation::skipped`].
+
+mod columns;
 
 use std::cell::Cell;
 use std::io::BufReader;
@@ -20,6 +23,7 @@ use crate::gnss::inflate::{InflateError, inflate};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
+use columns::Sifted;
 
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
@@ -68,8 +72,9 @@ pub fn embedded() -> Result<Navigation, NavigationError> {
 pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     let text = clean(&unpack(bytes, name)?);
     check_first_line(&text, name)?;
+    let sifted = columns::sift(&text);
     let damaged = |detail: String| NavigationError::Damaged { name: name.to_owned(), detail };
-    let found = quietly(|| extract(&text))
+    let found = quietly(|| extract(&sifted))
         .map_err(|()| damaged("its parser gave up on a malformed line".to_owned()))?
         .map_err(damaged)?;
     if found.navigation.ephemerides.is_empty() {
@@ -147,13 +152,13 @@ struct Found {
     others: usize,
 }
 
-fn extract(text: &[u8]) -> Result<Found, String> {
-    let (file, diagnostics) =
-        Rinex::parse_with_diagnostics(&mut BufReader::new(text)).map_err(|error| error.to_string())?;
+fn extract(sifted: &Sifted) -> Result<Found, String> {
+    let (file, diagnostics) = Rinex::parse_with_diagnostics(&mut BufReader::new(sifted.text.as_slice()))
+        .map_err(|error| error.to_string())?;
     let mut navigation = Navigation {
         klobuchar: klobuchar(&file),
         leap_seconds: file.header.leap.map(|leap| i64::from(leap.leap)),
-        skipped: skipped(text, &diagnostics),
+        skipped: [sifted.reasons.clone(), skipped(sifted, &diagnostics)].concat(),
         ..Navigation::default()
     };
     let mut others = 0;
@@ -172,16 +177,19 @@ fn extract(text: &[u8]) -> Result<Found, String> {
 }
 
 /// What the crate dropped of GPS; records of other systems and faithful repetitions are no loss.
-fn skipped(text: &[u8], diagnostics: &[ParsingDiagnostic]) -> Vec<String> {
+fn skipped(sifted: &Sifted, diagnostics: &[ParsingDiagnostic]) -> Vec<String> {
     if diagnostics.is_empty() {
         return Vec::new();
     }
     // `clean` left nothing but ASCII.
-    let text = String::from_utf8_lossy(text);
-    let body: Vec<&str> = text.lines().skip_while(|line| !line.contains("END OF HEADER")).collect();
+    let text = String::from_utf8_lossy(&sifted.text);
+    let lines: Vec<&str> = text.lines().collect();
+    let head = lines.iter().position(|line| line.contains("END OF HEADER")).unwrap_or(0);
+    // The crate counts from the header's last line.
+    let number = |at: usize| sifted.lines.get(head + at).copied().unwrap_or_default();
     let mut reasons = Vec::new();
     for diagnostic in diagnostics {
-        let line = body.get(diagnostic.record_line).copied().unwrap_or_default();
+        let line = lines.get(head + diagnostic.record_line).copied().unwrap_or_default();
         // Version 4 has a line of its own before the record; version 2 has no letter.
         let named = line.strip_prefix("> EPH ").unwrap_or(line);
         if !named.starts_with(|first: char| first == 'G' || first == ' ' || first.is_ascii_digit()) {
@@ -190,12 +198,12 @@ fn skipped(text: &[u8], diagnostics: &[ParsingDiagnostic]) -> Vec<String> {
         let what = match &diagnostic.kind {
             ParsingDiagnosticKind::NavigationFailure(error) => error.to_string(),
             ParsingDiagnosticKind::DuplicateNavigation { conflicting: true, previous_record_line, .. } => {
-                format!("replaces a different record of the same time at body line {previous_record_line}")
+                format!("replaces a different record of the same time at line {}", number(*previous_record_line))
             }
             _ => continue,
         };
         let label: String = line.chars().take(23).collect();
-        reasons.push(format!("body line {} ({label}): {what}", diagnostic.record_line));
+        reasons.push(format!("line {} ({label}): {what}", number(diagnostic.record_line)));
     }
     reasons
 }

@@ -142,6 +142,10 @@ fn bytes(path: &Path) -> Result<Vec<u8>, JudgeError> {
             path: path.to_owned(),
             what: format!("{size} bytes: expected at most 256 MiB"),
         }),
+        // A pipe or a device has no size, and perhaps no end.
+        _ if path.exists() && !path.is_file() => {
+            Err(JudgeError::NotOfThisTruth { path: path.to_owned(), what: "is not an ordinary file".to_owned() })
+        }
         _ => fs::read(path).map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => JudgeError::Missing { path: path.to_owned(), remedy },
             _ => JudgeError::NotOfThisTruth { path: path.to_owned(), what: format!("cannot be read: {source}") },

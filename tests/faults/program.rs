@@ -1,0 +1,210 @@
+//! The program on a machine that fails: exit codes, and names that only whole files bear.
+
+use std::fs;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use crate::tally::{End, Tally};
+
+const FAMILY: &str = "The program";
+const TWIN: &str = env!("CARGO_BIN_EXE_gnss-twin");
+
+/// A scene of a twentieth of a second.
+const TINY: &str = "name = \"tiny\"\nstart = 2010-07-01T08:05:58\nduration_s = 0.05\nseed = 1\n[motion]\nkind = \"static\"\n\
+                        latitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n[front_end]\nsample_rate_hz = 2.6e6\n\
+                        format = \"ci8\"\n[power]\ncn0_dbhz = 45\n[noise]\n";
+
+fn workplace() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("tiny.toml"), TINY).unwrap();
+    directory
+}
+
+fn twin(arguments: &[&str], directory: &Path) -> Output {
+    Command::new(TWIN).args(arguments).current_dir(directory).stdin(Stdio::null()).output().unwrap()
+}
+
+fn names(directory: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(directory)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Asks for an exit code and a part of the message, one line of text and no panic.
+fn ends(output: &Output, code: i32, part: &str) -> Result<End, String> {
+    let message = String::from_utf8_lossy(&output.stderr);
+    if output.status.code() == Some(code) && message.contains(part) && !message.contains("panicked") {
+        Ok(if code == 0 { End::Accepted } else { End::Refused })
+    } else {
+        Err(format!("{:?}, expected {code} and '{part}': {message}", output.status))
+    }
+}
+
+#[test]
+fn texts_of_any_shape_are_refused_as_bad_data() {
+    let here = workplace();
+    let shapes: [(&str, Vec<u8>); 11] = [
+        ("empty", Vec::new()),
+        ("not UTF-8", vec![0xff, 0xfe, 0]),
+        ("zeros", vec![0; 100]),
+        ("a key twice", format!("seed = 2\n{TINY}").into_bytes()),
+        ("a table twice", format!("{TINY}[noise]\n").into_bytes()),
+        ("arrays 10000 deep", format!("seed = {}{}", "[".repeat(10_000), "]".repeat(10_000)).into_bytes()),
+        ("tables 10000 deep", format!("seed = {}1{}", "{a=".repeat(10_000), "}".repeat(10_000)).into_bytes()),
+        ("a key of 10000 parts", format!("{}a = 1", "a.".repeat(10_000)).into_bytes()),
+        ("a header of 10000 parts", format!("[{}a]", "a.".repeat(10_000)).into_bytes()),
+        ("10 MB of comment", "# a comment\n".repeat(900_000).into_bytes()),
+        ("a line of 900 kB", format!("name = \"{}\"", "x".repeat(900_000)).into_bytes()),
+    ];
+    let mut tally = Tally::of_processes(FAMILY, "12. shapes of texts");
+    for (name, bytes) in shapes {
+        for (role, arguments) in [
+            ("scenario", &["plan", "odd.toml"][..]),
+            ("limits", &["run", "tiny.toml", "--out", "x", "--check", "odd.toml"]),
+            (
+                "settings",
+                &["receive", "raw.bin", "--out", "x", "--format", "ci8", "--rate-hz", "4e6", "--receiver", "odd.toml"],
+            ),
+            ("metadata", &["receive", "odd.sigmf-data", "--out", "x"]),
+        ] {
+            // Comments alone are legal settings, all at their defaults.
+            if role == "settings" && ["empty", "10 MB of comment"].contains(&name) {
+                continue;
+            }
+            fs::write(here.path().join("odd.toml"), &bytes).unwrap();
+            fs::write(here.path().join("odd.sigmf-meta"), &bytes).unwrap();
+            tally.case(|| format!("{role}: {name}"), || ends(&twin(arguments, here.path()), 65, "odd."));
+        }
+    }
+    tally.case(
+        || "nothing may be written".to_owned(),
+        || if here.path().join("x").exists() { Err("x exists".to_owned()) } else { Ok(End::Refused) },
+    );
+    tally.finish();
+}
+
+#[test]
+fn outputs_that_cannot_be_made_and_inputs_that_are_no_files_have_their_exit_codes() {
+    let here = workplace();
+    let at = |name: &str| here.path().join(name);
+    fs::create_dir(at("full")).unwrap();
+    fs::write(at("full/mine.txt"), "mine").unwrap();
+    fs::write(at("file"), "mine").unwrap();
+    symlink("/dev/zero", at("zero")).unwrap();
+    assert!(Command::new("mkfifo").arg(at("pipe")).status().unwrap().success());
+    let mut tally = Tally::of_processes(FAMILY, "19, 21. outputs, devices, sizes");
+    let long = TINY.replace("duration_s = 0.05", "duration_s = 2.6e6").replace("2.6e6\nformat", "5e7\nformat");
+    fs::write(at("huge.toml"), long).unwrap();
+    let rows: [(&[&str], i32, &str); 18] = [
+        (&["generate", "tiny.toml", "--out", "full"], 73, "is a directory"),
+        (&["generate", "tiny.toml", "--out", "pipe"], 73, "not an ordinary file"),
+        (&["generate", "tiny.toml", "--out", "/dev/full"], 73, "not an ordinary file"),
+        (&["generate", "tiny.toml", "--out", "file/x.sigmf-data"], 73, "file"),
+        (&["generate", "tiny.toml", "--out", "/proc/x.sigmf-data"], 73, "/proc"),
+        (&["run", "tiny.toml", "--out", "full"], 73, "not the result of a run"),
+        (&["run", "tiny.toml", "--out", "file"], 73, "file"),
+        (&["run", "tiny.toml", "--out", "/proc/x"], 73, "/proc"),
+        (&["run", "tiny.toml", "--out", ".."], 73, ""),
+        (&["plan", "full"], 65, "full"),
+        (&["plan", "zero"], 65, "at most"),
+        (&["plan", "absent\u{1b}[31m.toml"], 65, "absent\\u{1b}[31m.toml"),
+        (&["plan", "absent\nerror.toml"], 65, "absent\\nerror.toml"),
+        (&["run", "tiny.toml", "--out", "x", "--check", "zero"], 65, "at most"),
+        (&["receive", "full", "--out", "x", "--format", "ci8", "--rate-hz", "4e6"], 65, "directory"),
+        (&["plan", "huge.toml"], 65, "1e14"),
+        (&["generate", "tiny.toml", "--out", "y.sigmf-data", "--samples", "1000000000000"], 2, "0 to 129999"),
+        (
+            &["generate", "tiny.toml", "--out", "y.sigmf-data", "--seek", "18446744073709551615", "--samples", "2"],
+            2,
+            "0 to",
+        ),
+    ];
+    for (arguments, code, part) in rows {
+        tally.case(|| format!("{arguments:?}"), || ends(&twin(arguments, here.path()), code, part));
+    }
+    tally.case(
+        || "what was there is still there".to_owned(),
+        || match (fs::read_to_string(at("full/mine.txt")), fs::read_to_string(at("file")), names(here.path())) {
+            (Ok(one), Ok(two), names)
+                if one == "mine" && two == "mine" && !names.iter().any(|n| n.ends_with(".part") || n == "x") =>
+            {
+                Ok(End::Accepted)
+            }
+            other => Err(format!("{other:?}")),
+        },
+    );
+    tally.case(
+        || "a full standard output".to_owned(),
+        || {
+            let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+            let output = Command::new(TWIN).args(["plan", "tiny.toml"]).current_dir(here.path()).stdout(full).output();
+            ends(&output.unwrap(), 75, "standard output")
+        },
+    );
+    for bytes in [0, 1, 100, 4000] {
+        let script = format!("{{ '{TWIN}' plan tiny.toml; echo $? >status; }} | head -c {bytes} >/dev/null");
+        tally.case(
+            || format!("head -c {bytes}"),
+            || {
+                let output = Command::new("bash").args(["-c", &script]).current_dir(here.path()).output().unwrap();
+                let message = String::from_utf8_lossy(&output.stderr);
+                let status = fs::read_to_string(at("status")).unwrap_or_default();
+                if ["0", "141"].contains(&status.trim()) && !message.contains("panicked") && !message.contains("error")
+                {
+                    Ok(End::Accepted)
+                } else {
+                    Err(format!("{status}: {message}"))
+                }
+            },
+        );
+    }
+    // As another user, whom modes bind; where there is no such user or no right to become it, modes cannot be tested.
+    fs::set_permissions(here.path(), fs::Permissions::from_mode(0o755)).unwrap();
+    let nobody = Command::new("setpriv")
+        .args(["--reuid=65534", "--clear-groups", TWIN, "generate", "tiny.toml", "--out", "z.sigmf-data"])
+        .current_dir(here.path())
+        .output();
+    match nobody {
+        Ok(output)
+            if output.status.code() != Some(127) && !String::from_utf8_lossy(&output.stderr).contains("setpriv") =>
+        {
+            tally.case(|| "a directory that may not be written".to_owned(), || ends(&output, 73, "z"));
+        }
+        _ => println!("no setpriv: modes are not tested"),
+    }
+    tally.finish();
+}
+
+#[test]
+fn samples_that_end_within_a_sample_or_are_none_are_told_or_refused() {
+    let here = workplace();
+    let mut tally = Tally::of_processes(FAMILY, "14. samples and their metadata");
+    let bytes: Vec<u8> = (0..40_001_u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    for (format, size) in [("ci8", 2), ("cu8", 2), ("ci16", 4), ("cf32", 8), ("ri8", 1), ("ri16", 2)] {
+        for length in [0, 1, 3, 7, 40_000, 40_001] {
+            fs::write(here.path().join("raw.bin"), &bytes[..length]).unwrap();
+            let if_hz = if format.starts_with('r') { "1e6" } else { "0" };
+            let arguments =
+                ["receive", "raw.bin", "--out", "x", "--format", format, "--rate-hz", "4e6", "--if-hz", if_hz];
+            tally.case(
+                || format!("{format}, {length} bytes"),
+                || {
+                    let output = twin(&arguments, here.path());
+                    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+                    match output.status.code() {
+                        Some(0) if length % size == 0 => Ok(End::Accepted),
+                        Some(0) if text.contains("cut") || text.contains("byte") => Ok(End::Reported),
+                        Some(65) if !String::from_utf8_lossy(&output.stderr).contains("panicked") => Ok(End::Refused),
+                        _ => Err(format!("{:?}: {text}{}", output.status, String::from_utf8_lossy(&output.stderr))),
+                    }
+                },
+            );
+            let _ = fs::remove_dir_all(here.path().join("x"));
+        }
+    }
+    tally.finish();
+}
