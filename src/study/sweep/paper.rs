@@ -17,7 +17,9 @@ pub(super) fn pdf(plan: &Plan, results: &Results, pictures: &[Picture]) -> Resul
     let failed =
         |reason: String| StudyError::Judge(JudgeError::Plot { path: plan.directory.join("report.pdf"), reason });
     let (study, grid) = (&results.study, &results.study.grid);
-    let mut report = Report::new(&study.title, &study.about, &study.name);
+    // A study's words are broken into lines where it suits their file.
+    let about = study.about.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut report = Report::new(&study.title, about, &study.name);
     let level = match study.level {
         Level::Correlator => "correlator",
         Level::Samples => "samples",
@@ -62,13 +64,45 @@ pub(super) fn pdf(plan: &Plan, results: &Results, pictures: &[Picture]) -> Resul
     report.add(Item::Listing(publish::base(plan, results)));
     if let Some(rows) = publish::cells(results) {
         report.heading("Cells");
-        report.table(table("Figures with their intervals of 95 %", rows));
+        report.table(table("Figures with their intervals of 95 %", narrow(rows, study.axes.len())));
     }
     report.pdf().map_err(|error| failed(error.to_string()))
+}
+
+/// Most columns that a page holds without breaking words.
+const MOST_COLUMNS: usize = 7;
+
+/// The same with a row for each figure, where a column for each would be too narrow; the first `fixed` columns stay.
+fn narrow((heads, rows): Rows, fixed: usize) -> Rows {
+    if heads.len() <= MOST_COLUMNS {
+        return (heads, rows);
+    }
+    let (names, figures) = heads.split_at(fixed);
+    let long = rows.iter().flat_map(|row| {
+        let (place, values) = row.split_at(fixed);
+        let one = |(figure, value): (&String, &String)| [place, &[figure.clone(), value.clone()]].concat();
+        figures.iter().zip(values).map(one).collect::<Vec<_>>()
+    });
+    ([names, &["figure".to_owned(), "value".to_owned()]].concat(), long.collect())
 }
 
 fn table(caption: &str, (heads, rows): Rows) -> Table {
     let mut table = Table::new(caption, heads.iter().map(|head| (head.as_str(), Side::Left)));
     rows.into_iter().for_each(|row| table.row(row));
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::narrow;
+
+    #[test]
+    fn a_wide_table_gets_a_row_for_each_figure_and_loses_none() {
+        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        let wide = (words("a b c d e f g h"), vec![words("1 2 3 4 5 6 7 8"), words("9 2 3 4 5 6 7 0")]);
+        let (heads, rows) = narrow(wide.clone(), 1);
+        assert_eq!((heads, rows.len()), (words("a figure value"), 14));
+        assert_eq!((&rows[0], &rows[13]), (&words("1 b 2"), &words("9 h 0")));
+        assert_eq!(narrow((words("a b"), vec![words("1 2")]), 1), (words("a b"), vec![words("1 2")]));
+    }
 }
