@@ -142,7 +142,7 @@ impl View<'_> {
 
     fn words(&self, axis: usize, value: usize) -> String {
         let Some(axis) = self.axis(axis) else { return String::new() };
-        format!("{} = {}", axis.label(), axis.values.get(value).map_or_else(String::new, axis::text_of))
+        format!("{} = {}", axis.label(), axis.words_of(value))
     }
 
     fn estimate(&self, cell: &Cell) -> Option<Estimate> {
@@ -169,9 +169,7 @@ impl View<'_> {
         let numbers = study_axis.is_some_and(|axis| axis.values.iter().all(|v| axis::number_of(v).is_some()));
         let across = Axis::around(&study_axis.map_or(key.clone(), |axis| axis.label().to_owned()), places, 1e-9);
         let ticks = if !numbers {
-            study_axis.map(|axis| {
-                axis.values.iter().enumerate().map(|(rank, value)| (rank as f64, axis::text_of(value))).collect()
-            })
+            study_axis.map(|axis| (0..axis.values.len()).map(|rank| (rank as f64, axis.words_of(rank))).collect())
         } else if self.plot.log_y && !self.plot.log_x {
             // A grid needs the places of both axes.
             study_axis.map(|axis| {
@@ -274,8 +272,9 @@ impl View<'_> {
                 .collect();
         }
         let ticks = |axis: usize| -> Vec<(f64, String)> {
-            let values = self.axis(axis).map_or(&[][..], |axis| &axis.values);
-            values.iter().enumerate().map(|(rank, value)| (rank as f64, axis::text_of(value))).collect()
+            let of =
+                |axis: &axis::Axis| (0..axis.values.len()).map(|rank| (rank as f64, axis.words_of(rank))).collect();
+            self.axis(axis).map_or_else(Vec::new, of)
         };
         let side = |axis: usize| {
             let (label, count) = self.axis(axis).map_or(("", 0), |axis| (axis.label(), axis.values.len()));
@@ -320,9 +319,12 @@ impl View<'_> {
                 }
                 let both = ends.iter().all(Option::is_some);
                 let mut row: Vec<String> = self.plot.panel.iter().map(|_| title.clone()).collect();
-                row.extend([chosen, x].into_iter().flatten().map(|(axis, value)| {
-                    self.axis(axis).and_then(|axis| axis.values.get(value)).map_or_else(String::new, axis::text_of)
-                }));
+                row.extend(
+                    [chosen, x]
+                        .into_iter()
+                        .flatten()
+                        .map(|(axis, value)| self.axis(axis).map_or_else(String::new, |axis| axis.words_of(value))),
+                );
                 let number = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), short);
                 row.extend([number(mean), number(least(ends).filter(|_| both)), number(most(ends).filter(|_| both))]);
                 rows.push(row);
