@@ -72,6 +72,11 @@ impl Axis {
         self.label.as_deref().unwrap_or(&self.key)
     }
 
+    /// Whether every value is a number.
+    pub fn is_of_numbers(&self) -> bool {
+        self.values.iter().all(|value| number_of(value).is_some())
+    }
+
     /// What plots call its value of this rank: a scene goes by its file's name alone where no other has the same.
     pub fn words_of(&self, rank: usize) -> String {
         let text = self.values.get(rank).map_or_else(String::new, text_of);
