@@ -236,7 +236,7 @@ fn no_command_opens_a_socket_to_a_network() {
     let names: &[&'static str] = if long() {
         &["plan", "generate", "receive", "run", "analyze", "study plan", "study run", "study merge", "study report"]
     } else {
-        &["plan", "generate", "study run"]
+        &["plan", "generate"]
     };
     let bench = Bench::new(names);
     let mut tally = Tally::of_processes(FAMILY, "Security. no network");
