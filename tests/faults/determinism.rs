@@ -127,7 +127,7 @@ fn processor_locale_and_clock_change_no_byte() {
             "study run of samples",
         ]
     } else {
-        &["plan", "generate", "study run"]
+        &["plan", "generate"]
     };
     let bench = Bench::new(names);
     let mut tally = Tally::of_processes(FAMILY, "24. processor, locale, time zone");
@@ -159,7 +159,7 @@ fn two_runs_of_a_study_at_once_lose_nothing_and_double_nothing() {
     let bench = Bench::new(names);
     let mut tally = Tally::of_processes(FAMILY, "25. two runs of a study in one directory");
     for task in &bench.tasks {
-        let races = if task.name == "study run" { cases(3, 80) } else { 20 };
+        let races = if task.name == "study run" { cases(2, 80) } else { 20 };
         for race in 0..races {
             tally.case(
                 || format!("{} {race}", task.name),

@@ -89,6 +89,24 @@ impl Bench {
         let mut whole = None;
         let command = match name {
             "plan" => "plan tiny.toml",
+            "plan a ride" | "plan with maps" => {
+                let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+                let files: &[&str] = if name == "plan a ride" {
+                    &["trajectory_file.toml", "ride.csv"]
+                } else {
+                    &["ionex.toml", "igrg3380.10i.gz"]
+                };
+                for file in files {
+                    fs::copy(scenarios.join(file), at(file)).unwrap();
+                }
+                if name == "plan a ride" { "plan trajectory_file.toml" } else { "plan ionex.toml" }
+            }
+            "generate again" => {
+                // Over another seed's samples.
+                good("generate tiny.toml --out s.sigmf-data --seed 7", &before);
+                whole = Some("s.truth");
+                "generate tiny.toml --out s.sigmf-data --threads 2"
+            }
             "generate" => "generate tiny.toml --out s.sigmf-data --threads 2",
             "receive" => {
                 // Over the results of another recording.
@@ -110,17 +128,18 @@ impl Bench {
                 }
                 "analyze r"
             }
-            "study plan" | "study run" | "study merge" | "study report" => {
+            "study plan" | "study run" | "study merge" | "study report" | "study status" => {
                 fs::write(at("study.toml"), modelled(0.3)).unwrap();
                 if name != "study plan" {
                     good("study plan study.toml -o lab --shards 2", &before);
                 }
-                if name == "study merge" || name == "study report" {
+                if !["study plan", "study run"].contains(&name) {
                     good("study run lab", &before);
                 }
                 match name {
                     "study plan" => "study plan study.toml -o lab --shards 2",
                     "study run" => "study run lab --jobs 2",
+                    "study status" => "study status lab",
                     "study merge" => "study merge lab -o m.csv",
                     _ => "study report lab",
                 }
@@ -137,7 +156,7 @@ impl Bench {
         let arguments = words(command);
         let output = twin(&arguments, &after).output().unwrap();
         assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
-        let printed = (name == "plan").then_some(output.stdout);
+        let printed = (name.starts_with("plan") || name == "study status").then_some(output.stdout);
         Task { name, arguments, old: files(&before), new: files(&after), before, printed, whole }
     }
 }

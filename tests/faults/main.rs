@@ -8,6 +8,7 @@ mod damage;
 mod determinism;
 mod files;
 mod machine;
+mod memory;
 mod mounts;
 mod navigation;
 mod pipes;

@@ -73,7 +73,7 @@ fn a_full_or_read_only_disk_refuses_and_with_room_the_same_command_completes() {
             "study run of samples",
         ]
     } else {
-        &["generate", "study run", "study merge"]
+        &["generate"]
     };
     let bench = Bench::new(names);
     let mut tally = Tally::of_processes(FAMILY, "19. a full or read-only file system");

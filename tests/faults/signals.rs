@@ -93,7 +93,7 @@ fn a_signal_at_any_moment_ends_the_program_at_once_and_the_next_run_is_right() {
             "study run of samples",
         ]
     } else {
-        &["plan", "generate", "receive", "study run"]
+        &["plan", "generate", "receive"]
     };
     let bench = Bench::new(names);
     let mut failures = Vec::new();
