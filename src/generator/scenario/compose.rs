@@ -232,7 +232,10 @@ impl Scenario {
                 let full = self.resolve("motion.file", directory, path, overrides)?;
                 let input = File::open(&full).map_err(|e| self.unreadable("motion.file", path, e))?;
                 let name = path.display().to_string();
-                let refuse = |e: file::FileError| self.conflict("motion.file", e.to_string());
+                let refuse = |e: file::FileError| match e.fault {
+                    file::Fault::Read(error) => self.unreadable("motion.file", path, error),
+                    _ => self.conflict("motion.file", e.to_string()),
+                };
                 match kind {
                     FileKind::Csv => {
                         let (trajectory, ignored) = file::read_csv(input, &name, &options).map_err(refuse)?;

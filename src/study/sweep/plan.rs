@@ -297,6 +297,8 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, StudyError> {
 pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
     let parent = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(parent).map_err(|source| StudyError::Create { path: parent.to_owned(), source })?;
+    // What a run that was killed at this left.
+    temporary::sweep(parent);
     let written = Making::file(parent.join(temporary::name())).and_then(|(making, mut file)| {
         file.write_all(bytes)?;
         file.sync_all()?;
