@@ -10,7 +10,7 @@ use super::{Scenario, ScenarioError, hostile, parts, satellite};
 use crate::generator::random::Stream;
 use crate::generator::ray::Ray;
 use crate::generator::ripple::scintillation::Scintillation;
-use crate::generator::scene::{Scene, is_outside, main_lobe_hz};
+use crate::generator::scene::{Scene, folded_hz, is_outside, main_lobe_hz};
 use crate::generator::sky::emission;
 use crate::generator::stage::playback::Playback;
 use crate::generator::vehicle::attitude::Nose;
@@ -117,6 +117,7 @@ impl Scenario {
             }
             scene.playback = Some(Playback { bits, step_lsb: step_lsb as f32, attenuation_db });
         }
+        warnings.extend(scene.fidelity.warning(scene.clock.rate.hz()));
         if visible < 4 {
             let mask_deg = self.mask_rad.to_degrees();
             warnings.push(format!(
@@ -169,7 +170,21 @@ impl Scenario {
         warnings: &mut Vec<String>,
     ) -> Result<Vec<&'static Signal>, ScenarioError> {
         let half = 0.5 * metadata.rate.hz();
-        let (low, high) = if metadata.format.is_complex() { (-half, half) } else { (0.0, half) };
+        let if_hz = self.front_end.if_hz;
+        // Of real samples the band is the one, half the rate wide, in which the IF lies.
+        let zone = (if_hz / half).floor();
+        let (low, high) = if metadata.format.is_complex() { (-half, half) } else { (zone * half, (zone + 1.0) * half) };
+        if !metadata.format.is_complex() && zone > 0.0 {
+            let folded = folded_hz(if_hz, metadata.rate.hz());
+            let mirrored = if folded < 0.0 { ", mirrored" } else { "" };
+            warnings.push(format!(
+                "front_end.if_hz = {if_hz} lies above half of sample_rate_hz: the samples hold the band from {:.3} to {:.3} MHz, \
+                 the carrier at {:.6} MHz{mirrored}",
+                low / 1e6,
+                high / 1e6,
+                folded.abs() / 1e6
+            ));
+        }
         let mut inside = Vec::new();
         for &signal in &self.signals {
             let (from, to) = main_lobe_hz(metadata, signal);

@@ -243,7 +243,7 @@ mod tests {
     use crate::generator::synth::isa::Level;
 
     fn acted(filter: &Filter, mut i: Vec<f32>, mut q: Vec<f32>) -> (Vec<f32>, Vec<f32>) {
-        let mut block = Block { start: 0, i: &mut i, q: &mut q, lead: 0, clipped: 0, level: Level::detect() };
+        let mut block = Block { start: 0, i: &mut i, q: &mut q, lead: 0, tail: 0, clipped: 0, level: Level::detect() };
         filter.act(&mut block);
         (i, q)
     }
