@@ -85,29 +85,34 @@ fn a_signal_at_any_moment_ends_the_program_at_once_and_the_next_run_is_right() {
         &[
             "plan",
             "generate",
-            "receive",
-            "run",
-            "analyze",
+            "receive with a search",
             "study run",
             "study plan",
             "study report",
             "study run of samples",
+            "run",
+            "analyze",
         ]
     } else {
-        &["plan", "generate", "receive"]
+        &["plan", "generate", "receive with a search"]
     };
     let bench = Bench::new(names);
     let mut failures = Vec::new();
     for task in &bench.tasks {
-        let begun = Instant::now();
+        // The quickest of three, so that most signals come before the end.
         let place = task.workplace();
-        task.run(place.path());
-        let whole = begun.elapsed();
+        let timed = || {
+            let begun = Instant::now();
+            task.run(place.path());
+            begun.elapsed()
+        };
+        let whole = (0..3).map(|_| timed()).min().unwrap_or_default();
         let mut jobs: Vec<(usize, Duration, bool)> = Vec::new();
         let mut random = Random::new(task.name.len() as u64);
-        // Those that draw take seconds.
+        // Those that draw take seconds, and a search half of one.
         let all = if ["run", "analyze", "study run of samples"].contains(&task.name) { 34 } else { 100 };
-        for number in 0..cases(6, all) {
+        let few = if task.name.starts_with("receive") { 3 } else { 6 };
+        for number in 0..cases(few, all) {
             let share = random.below(1000) as f64 / 1000.0;
             jobs.push((number, whole.mul_f64(share), number % 10 == 9));
         }
