@@ -16,8 +16,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use crate::analysis::making;
 use crate::cli::error::CliError;
 
-/// How long that thread may take to end the process, and how often it looks where it cannot be woken.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// How often that thread looks where it cannot be woken.
 const LOOK: Duration = Duration::from_millis(50);
 /// Its stack.
 const STACK_BYTES: usize = 1 << 18;
@@ -56,7 +55,7 @@ fn received() -> Option<i32> {
 fn wait(mut reader: UnixStream) {
     let signal = loop {
         // What is read says nothing; a wait that fails becomes a look now and then.
-        if reader.read(&mut [0]).is_err() {
+        if !matches!(reader.read(&mut [0]), Ok(1)) {
             thread::sleep(LOOK);
         }
         if let Some(signal) = received() {
@@ -67,9 +66,9 @@ fn wait(mut reader: UnixStream) {
     signal_hook::low_level::exit(128 + signal);
 }
 
-/// Does nothing unless a signal has come: an error may then be its consequence, and the process ends as the signal asks.
+/// Does nothing unless a signal has come: an error may then be its consequence, so that the end is left to that thread.
 pub fn give_way() {
-    if received().is_some() {
-        thread::sleep(PATIENCE);
+    while received().is_some() {
+        thread::sleep(LOOK);
     }
 }

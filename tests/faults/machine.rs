@@ -108,7 +108,10 @@ impl Bench {
                 "generate tiny.toml --out s.sigmf-data --threads 2"
             }
             "generate" => "generate tiny.toml --out s.sigmf-data --threads 2",
-            "receive" => {
+            "receive" | "receive with a search" => {
+                if name != "receive" {
+                    fs::write(at("tiny.toml"), scene(0.06, 1)).unwrap();
+                }
                 // Over the results of another recording.
                 fs::write(at("other.toml"), scene(0.03, 2)).unwrap();
                 good("generate other.toml --out rec.sigmf-data", &before);
