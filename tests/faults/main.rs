@@ -4,9 +4,13 @@
 //! `reports/robustness.md` where `GNSS_TWIN_WRITE_ROBUSTNESS` names a file. Damage is drawn from a seeded generator: a
 //! case that fails is the same in the next run.
 
+mod bounds;
 mod damage;
 mod files;
+mod legal;
 mod navigation;
 mod program;
 mod scenario;
+mod scenes;
+mod sizes;
 mod tally;
