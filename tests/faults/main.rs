@@ -7,6 +7,7 @@
 mod bounds;
 mod damage;
 mod files;
+mod fuzz;
 mod legal;
 mod navigation;
 mod program;
