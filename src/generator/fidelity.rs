@@ -172,6 +172,21 @@ impl Fidelity {
     }
 }
 
+impl Fidelity {
+    /// What to tell of edges that leave the code metres off at a rate where chips meet the same places of every sample.
+    pub fn warning(&self, rate_hz: f64) -> Option<String> {
+        let bias_m = standing_bias_m(self.code_edge, rate_hz);
+        (bias_m > self.allowed_m).then(|| {
+            format!(
+                "fidelity.code_edge = {} at {:.3} Msps: chips meet the same places between samples, and the code of a satellite \
+                 without Doppler is {bias_m:.1} m off, rms; \"band_limited\" or another rate avoids it",
+                self.code_edge.name(),
+                1e-6 * rate_hz
+            )
+        })
+    }
+}
+
 /// Largest error of the code that `balanced` leaves, whatever the noise.
 const LARGEST_BIAS_M: f64 = 0.1;
 

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::generator::plan::Machinery;
-use crate::generator::scene::{CodeEdge, Scene};
+use crate::generator::scene::{CodeEdge, Scene, folded_hz};
 use crate::generator::spoof::Constellation;
 use crate::generator::stage::Block;
 use crate::generator::synth::band::Filter;
@@ -76,11 +76,14 @@ impl fmt::Display for Generated {
             let share = self.clipped as f64 / (2.0 * self.samples as f64);
             write!(f, "; {} components clipped ({:.1e} of them)", self.clipped, share)?;
         }
-        if self.worst_knot_cycles > self.knot_tolerance_cycles {
-            let (worst, allowed) = (self.worst_knot_cycles, self.knot_tolerance_cycles);
-            write!(f, "; the carrier is up to {worst:.1e} cycles off between knots, the scene allows {allowed:e}")?;
+        let (worst, allowed) = (self.worst_knot_cycles, self.knot_tolerance_cycles);
+        write!(f, "; the carrier is up to {worst:.1e} cycles off between {} knots, ", self.knots)?;
+        let left = 100.0 * (1.0 - worst / allowed);
+        if worst > allowed {
+            write!(f, "beyond the {allowed:e} that the scene allows: knots stand no closer")
+        } else {
+            write!(f, "{left:.0} % below what the scene allows, {allowed:e}")
         }
-        Ok(())
     }
 }
 
@@ -110,7 +113,7 @@ pub enum GenerateError {
 pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
     let transmitters = transmitters(scene, Edge::Nearest)?;
     let rate = scene.clock.rate;
-    let (mut shortest, mut longest) = (u64::MAX, 0);
+    let (mut shortest, mut longest, mut worst_cycles) = (u64::MAX, 0, 0.0_f64);
     for transmitter in &transmitters {
         if !truth::in_view_from(scene, &transmitter.from, transmitter.sv, scene.clock.start)? {
             continue;
@@ -121,6 +124,7 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
             for part in transmitter.root(scene, root)? {
                 shortest = shortest.min(part.end - part.start);
                 longest = longest.max(part.end - part.start);
+                worst_cycles = worst_cycles.max(part.error_cycles);
             }
         }
     }
@@ -131,7 +135,7 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
         knot_spacing_s: rate.elapsed_s(shortest),
         longest_knot_spacing_s: rate.elapsed_s(longest),
         knot_reason: format!(
-            "the longest on which a cubic stays within {:e} cycles of the motion",
+            "the longest on which a cubic stays within {:e} cycles of the motion; {worst_cycles:.1e} met",
             scene.fidelity.knot_tolerance_cycles
         ),
         block_bytes: batch.min(scene.samples) * scene.metadata.format.bytes() as u64,
@@ -167,7 +171,6 @@ pub fn generate_with(
 }
 
 /// The samples of `part` of the scene, the same bits as those of the whole; the truth counts from the part's first sample.
-/// Limit: a gain control measures its first run of 4096 samples itself, so a part that ends within that run has another gain.
 ///
 /// # Errors
 /// As [`generate`], and [`GenerateError::Part`] for a part that the scene does not have.
@@ -262,7 +265,8 @@ impl<'a> Stream<'a> {
         }
         // Runs are made from their beginning on.
         let needed = run_begin(from).saturating_sub(self.lead);
-        self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, to))?;
+        let made = to.max(first_run(scene, needed, self.lead));
+        self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, made))?;
         self.ticks.write(scene, &self.transmitters, to, truth)?;
         let kernel =
             Kernel { edge: edge(scene, self.filter.as_ref()), arithmetic: scene.fidelity.carrier, level: self.level };
@@ -305,6 +309,11 @@ fn run_begin(sample: u64) -> u64 {
     sample / RUN_SAMPLES as u64 * RUN_SAMPLES as u64
 }
 
+/// Samples that are made at least from `from` on where stages look back: gain control measures the scene's first run whole.
+fn first_run(scene: &Scene, from: u64, memory: u64) -> u64 {
+    if from == 0 && memory > 0 { scene.samples.min(RUN_SAMPLES as u64) } else { 0 }
+}
+
 /// The scene's edges; band-limited where there is a `filter`.
 fn edge<'a>(scene: &Scene, filter: Option<&'a Filter>) -> Edge<'a> {
     match filter {
@@ -321,7 +330,7 @@ pub(crate) fn cutoff_cps(scene: &Scene) -> f64 {
     }
     let rate_hz = scene.clock.rate.hz();
     scene.signals.iter().fold(CUTOFF_CPS, |least, signal| {
-        let place = (scene.metadata.if_hz(signal) / rate_hz).abs();
+        let place = (folded_hz(scene.metadata.if_hz(signal), rate_hz) / rate_hz).abs();
         let room = place.min(0.5 - place);
         if room > 0.05 { least.min(2.0 * CUTOFF_CPS * room) } else { least }
     })
@@ -370,10 +379,11 @@ fn render(
         let from = run_begin(run_begin(first).saturating_sub(memory as u64));
         let lead = (first - from) as usize;
         let length = lead + bytes.len() / format.bytes();
+        let tail = (first_run(scene, from, memory as u64) as usize).saturating_sub(length);
         let Worker { scratch, i, q } = &mut *worker;
         for plane in [&mut *i, &mut *q] {
             plane.clear();
-            plane.resize(length, 0.0);
+            plane.resize(length + tail, 0.0);
         }
         for (run, (i, q)) in (0_u64..).zip(i.chunks_mut(RUN_SAMPLES).zip(q.chunks_mut(RUN_SAMPLES))) {
             for transmitter in transmitters {
@@ -381,9 +391,9 @@ fn render(
             }
             scratch.bank.render(kernel, i, q);
         }
-        let mut block = Block { start: from, i, q, lead, clipped: 0, level: kernel.level };
+        let mut block = Block { start: from, i, q, lead, tail, clipped: 0, level: kernel.level };
         scene.stages(|stage| stage.act(&mut block));
-        let (Some(i), Some(q)) = (block.i.get(lead..), block.q.get(lead..)) else { continue };
+        let (Some(i), Some(q)) = (block.i.get(lead..length), block.q.get(lead..length)) else { continue };
         clipped += block.clipped + isa::pack(kernel.level, format, i, q, bytes);
         first = from + length as u64;
     }

@@ -33,7 +33,15 @@ fn a_wall_loses_the_power_that_lies_outside() {
             let period = 1023 * PER_CHIP;
             let sharp: Vec<f32> = (0..2 * period).map(|n| chips[n / PER_CHIP % 1023]).collect();
             let (mut i, mut q) = (sharp.clone(), vec![0.0; sharp.len()]);
-            filter.act(&mut Block { start: 0, i: &mut i, q: &mut q, lead: 0, clipped: 0, level: Level::detect() });
+            filter.act(&mut Block {
+                start: 0,
+                i: &mut i,
+                q: &mut q,
+                lead: 0,
+                tail: 0,
+                clipped: 0,
+                level: Level::detect(),
+            });
             // A replica without filter meets the signal's share p, and noise of the same share: p² / p.
             let sum: f64 = i[period..].iter().zip(&sharp[period - delay..]).map(|(x, s)| f64::from(x * s)).sum();
             mean_db -= 10.0 * libm::log10(sum / period as f64) / 8.0;

@@ -33,7 +33,7 @@ pub(super) fn scene(rate_hz: f64, interference: &str) -> Scene {
 pub(super) fn alone(scene: &Scene, start: u64, samples: usize) -> Vec<(f64, f64)> {
     let (mut i, mut q) = (vec![0.0_f32; samples], vec![0.0_f32; samples]);
     for (k, (i, q)) in (0_u64..).zip(i.chunks_mut(1 << 15).zip(q.chunks_mut(1 << 15))) {
-        let mut block = Block { start: start + (k << 15), i, q, lead: 0, clipped: 0, level: Level::detect() };
+        let mut block = Block { start: start + (k << 15), i, q, lead: 0, tail: 0, clipped: 0, level: Level::detect() };
         scene.interference[0].act(&mut block);
     }
     let source = &scene.interference[0];

@@ -6,12 +6,19 @@
 
 mod bounds;
 mod damage;
+mod determinism;
 mod files;
 mod fuzz;
 mod legal;
+mod machine;
+mod memory;
+mod mounts;
 mod navigation;
+mod pipes;
 mod program;
 mod scenario;
 mod scenes;
+mod signals;
 mod sizes;
+mod sweep;
 mod tally;

@@ -10,7 +10,7 @@ use super::{Scenario, ScenarioError, hostile, parts, satellite};
 use crate::generator::random::Stream;
 use crate::generator::ray::Ray;
 use crate::generator::ripple::scintillation::Scintillation;
-use crate::generator::scene::{Scene, is_outside, main_lobe_hz};
+use crate::generator::scene::{Scene, folded_hz, is_outside, main_lobe_hz};
 use crate::generator::sky::emission;
 use crate::generator::stage::playback::Playback;
 use crate::generator::vehicle::attitude::Nose;
@@ -117,6 +117,7 @@ impl Scenario {
             }
             scene.playback = Some(Playback { bits, step_lsb: step_lsb as f32, attenuation_db });
         }
+        warnings.extend(scene.fidelity.warning(scene.clock.rate.hz()));
         if visible < 4 {
             let mask_deg = self.mask_rad.to_degrees();
             warnings.push(format!(
@@ -169,7 +170,21 @@ impl Scenario {
         warnings: &mut Vec<String>,
     ) -> Result<Vec<&'static Signal>, ScenarioError> {
         let half = 0.5 * metadata.rate.hz();
-        let (low, high) = if metadata.format.is_complex() { (-half, half) } else { (0.0, half) };
+        let if_hz = self.front_end.if_hz;
+        // Of real samples the band is the one, half the rate wide, in which the IF lies.
+        let zone = (if_hz / half).floor();
+        let (low, high) = if metadata.format.is_complex() { (-half, half) } else { (zone * half, (zone + 1.0) * half) };
+        if !metadata.format.is_complex() && zone > 0.0 {
+            let folded = folded_hz(if_hz, metadata.rate.hz());
+            let mirrored = if folded < 0.0 { ", mirrored" } else { "" };
+            warnings.push(format!(
+                "front_end.if_hz = {if_hz} lies above half of sample_rate_hz: the samples hold the band from {:.3} to {:.3} MHz, \
+                 the carrier at {:.6} MHz{mirrored}",
+                low / 1e6,
+                high / 1e6,
+                folded.abs() / 1e6
+            ));
+        }
         let mut inside = Vec::new();
         for &signal in &self.signals {
             let (from, to) = main_lobe_hz(metadata, signal);
@@ -230,9 +245,12 @@ impl Scenario {
             MotionSpec::File { path, kind, max_gap_s } => {
                 let options = file::Options { start: self.start, max_gap_s: *max_gap_s };
                 let full = self.resolve("motion.file", directory, path, overrides)?;
-                let input = File::open(&full).map_err(|e| self.unreadable("motion.file", path, &e))?;
+                let input = File::open(&full).map_err(|e| self.unreadable("motion.file", path, e))?;
                 let name = path.display().to_string();
-                let refuse = |e: file::FileError| self.conflict("motion.file", e.to_string());
+                let refuse = |e: file::FileError| match e.fault {
+                    file::Fault::Read(error) => self.unreadable("motion.file", path, error),
+                    _ => self.conflict("motion.file", e.to_string()),
+                };
                 match kind {
                     FileKind::Csv => {
                         let (trajectory, ignored) = file::read_csv(input, &name, &options).map_err(refuse)?;
@@ -285,8 +303,8 @@ impl Scenario {
         Ok(())
     }
 
-    fn unreadable(&self, key: &'static str, path: &Path, error: &std::io::Error) -> ScenarioError {
-        ScenarioError::File { origin: self.origin.clone(), key, path: path.to_owned(), reason: error.to_string() }
+    fn unreadable(&self, key: &'static str, path: &Path, error: std::io::Error) -> ScenarioError {
+        ScenarioError::Read { origin: self.origin.clone(), key, path: path.to_owned(), error }
     }
 
     /// The full path of a file that the scenario names; it must be a file below the scenario's directory.
@@ -303,14 +321,14 @@ impl Scenario {
             path: path.to_owned(),
             reason: reason.to_owned(),
         };
-        let io = |e: std::io::Error| self.unreadable(key, path, &e);
+        let io = |e: std::io::Error| self.unreadable(key, path, e);
         // An empty directory is that of a scenario named without one.
         let directory = if directory.as_os_str().is_empty() { Path::new(".") } else { directory };
         let full = directory.join(path).canonicalize().map_err(io)?;
         if !overrides.allow_outside && !full.starts_with(directory.canonicalize().map_err(io)?) {
             return Err(refuse("lies outside the scenario's directory (--allow-outside permits it)"));
         }
-        if !full.is_file() {
+        if !full.metadata().map_err(io)?.is_file() {
             return Err(refuse("is not a file"));
         }
         Ok(full)
@@ -325,7 +343,7 @@ impl Scenario {
         overrides: &Overrides,
     ) -> Result<Vec<u8>, ScenarioError> {
         let full = self.resolve(key, directory, path, overrides)?;
-        let bytes = full.metadata().map_err(|e| self.unreadable(key, path, &e))?.len();
+        let bytes = full.metadata().map_err(|e| self.unreadable(key, path, e))?.len();
         if bytes > MAX_NAVIGATION_BYTES {
             return Err(ScenarioError::File {
                 origin: self.origin.clone(),
@@ -334,7 +352,7 @@ impl Scenario {
                 reason: format!("{bytes} bytes: expected at most {MAX_NAVIGATION_BYTES}"),
             });
         }
-        std::fs::read(full).map_err(|e| self.unreadable(key, path, &e))
+        std::fs::read(full).map_err(|e| self.unreadable(key, path, e))
     }
 }
 

@@ -43,13 +43,17 @@ pub(super) fn front_end(table: Option<&Table<'_>>) -> Result<FrontEnd, ScenarioE
     };
     let half = 0.5 * rate.hz();
     let if_hz = table.number("if_hz", -100e6..=100e6, "Hz")?.unwrap_or(0.0);
-    if if_hz.abs() >= half {
+    if format.is_complex() && if_hz.abs() >= half {
         return Err(table.bad("if_hz", format!("less than half of sample_rate_hz in size, {half} Hz")));
     }
-    if !format.is_complex() && if_hz <= 0.0 {
-        return Err(
-            table.bad("if_hz", format!("more than 0 and less than {half} Hz, because format = {format} is real"))
-        );
+    // Above half the rate real samples hold a band folded, as bandpass sampling does; on a multiple of it, one over itself.
+    if !format.is_complex() && (if_hz <= 0.0 || (if_hz / half).fract() == 0.0) {
+        return Err(table.bad(
+            "if_hz",
+            format!(
+                "more than 0 and no multiple of half of sample_rate_hz, {half} Hz, because format = {format} is real"
+            ),
+        ));
     }
     Ok(FrontEnd {
         rate,

@@ -55,9 +55,11 @@ fn echo(table: &Table<'_>) -> Result<Echo, ScenarioError> {
     }
     // A surface turns the field round unless it is told otherwise.
     let usual_deg = if matches!(kind, Kind::Given) { 0.0 } else { 180.0 };
+    // Where the direct ray goes through a wall or leaves, its echo may be the stronger; planes reflect no more than they get.
+    let most = if matches!(kind, Kind::Given) { 10.0 } else { 1.0 };
     Ok(Echo {
         detour,
-        amplitude: table.required("amplitude", 0.0..=1.0, "(of the direct ray's)")?,
+        amplitude: table.required("amplitude", 0.0..=most, "(of the direct ray's)")?,
         phase_cycles: table.number("phase_deg", -360.0..=360.0, "deg")?.unwrap_or(usual_deg) / 360.0,
         satellites,
     })

@@ -4,6 +4,7 @@ use super::ScenarioError;
 use super::hardware::FrontEnd;
 use super::read::Table;
 use crate::generator::random::Stream;
+use crate::generator::scene::folded_hz;
 use crate::generator::stage::Stage;
 use crate::generator::stage::converter::Converter;
 use crate::generator::stage::filter::{Filter, Shape};
@@ -151,7 +152,8 @@ impl Stages {
             stages.push(Box::new(Oscillator::new(spec.offset_hz, noise, rate)));
         }
         if let Some(FilterSpec { shape, bandwidth_hz }) = self.filter {
-            let filter = Filter::new(shape, bandwidth_hz, rate.hz(), front_end.if_hz, !format.is_complex());
+            let if_hz = folded_hz(front_end.if_hz, rate.hz());
+            let filter = Filter::new(shape, bandwidth_hz, rate.hz(), if_hz, !format.is_complex());
             stages.push(Box::new(filter.map_err(|e| e.to_string())?));
         }
         if let Some(balance) = self.balance {

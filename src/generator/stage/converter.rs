@@ -4,7 +4,8 @@
 //! the format has it rounds to the format's own integers. Its step against the standard deviation of what comes in is
 //! that of least loss (Max 1960; losses in Hegarty 2011): 1.96 dB with one bit, 0.55 with two. With gain control the
 //! deviation is measured over the window before each run of 4096 samples; without, it is the thermal noise's as the
-//! scene sets it. Limits: the gain of a run is constant.
+//! scene sets it. The scene's first run has nothing before it and is measured itself, whole, whatever part of it is asked
+//! for. Limits: the gain of a run is constant.
 
 use crate::generator::stage::{Block, Fact, Stage};
 use crate::generator::synth::RUN_SAMPLES;
@@ -83,16 +84,19 @@ impl Stage for Converter {
         let deviations_lsb = self.deviations_lsb(block);
         let half = (1_i64 << (self.bits - 1)) as f32;
         let mut clipped = 0;
+        let end = block.i.len() - block.tail.min(block.i.len());
         let runs = block.i.chunks_mut(RUN_SAMPLES).zip(block.q.chunks_mut(RUN_SAMPLES));
         for (run, ((i, q), deviation_lsb)) in runs.zip(deviations_lsb).enumerate() {
             let step = self.step_sigma as f32 * deviation_lsb;
-            let sent = (run + 1) * RUN_SAMPLES > block.lead;
             // Silence has no deviation: it comes out as the level next to zero.
             let scale = if step > 0.0 { 1.0 / step } else { 0.0 };
-            for x in i.iter_mut().chain(q) {
-                let y = *x * scale;
-                clipped += u64::from(sent && self.bits > 1 && y.abs() > half);
-                *x = if self.whole { y } else { 2.0 * level(y, half) + 1.0 };
+            let sent = block.lead.saturating_sub(run * RUN_SAMPLES)..end.saturating_sub(run * RUN_SAMPLES);
+            for plane in [i, q] {
+                for (n, x) in plane.iter_mut().enumerate() {
+                    let y = *x * scale;
+                    clipped += u64::from(self.bits > 1 && y.abs() > half && sent.contains(&n));
+                    *x = if self.whole { y } else { 2.0 * level(y, half) + 1.0 };
+                }
             }
         }
         block.clipped += clipped;
@@ -120,7 +124,8 @@ mod tests {
             let (mut i, mut q) = (vec![0.0; RUN_SAMPLES], vec![0.0; RUN_SAMPLES]);
             add_block(5, number, sigma, &mut i, &mut q);
             let before = i.clone();
-            let mut block = Block { start: 0, i: &mut i, q: &mut q, lead: 0, clipped: 0, level: Level::detect() };
+            let mut block =
+                Block { start: 0, i: &mut i, q: &mut q, lead: 0, tail: 0, clipped: 0, level: Level::detect() };
             converter.act(&mut block);
             for (x, y) in before.iter().zip(&i) {
                 let (x, y) = (f64::from(*x), f64::from(*y));
@@ -172,12 +177,21 @@ mod tests {
             let (mut i, mut q) = (vec![value; 100], vec![0.0; 100]);
             i[0] = 1.0;
             let fixed = Converter { window_runs: None, ..converter };
-            let mut block = Block { start: 0, i: &mut i, q: &mut q, lead: 0, clipped: 0, level: Level::detect() };
+            let mut block =
+                Block { start: 0, i: &mut i, q: &mut q, lead: 0, tail: 0, clipped: 0, level: Level::detect() };
             fixed.act(&mut block);
             assert!(i[1..].iter().all(|x| *x == expected) && q.iter().all(|x| *x == 1.0));
         }
         let (mut i, mut q) = (vec![0.0; 100], vec![0.0; 100]);
-        converter.act(&mut Block { start: 0, i: &mut i, q: &mut q, lead: 0, clipped: 0, level: Level::detect() });
+        converter.act(&mut Block {
+            start: 0,
+            i: &mut i,
+            q: &mut q,
+            lead: 0,
+            tail: 0,
+            clipped: 0,
+            level: Level::detect(),
+        });
         assert!(i.iter().all(|x| *x == 1.0));
     }
 }

@@ -24,7 +24,9 @@ pub struct Block<'a> {
     pub q: &'a mut [f32],
     /// Samples at the front that only serve the memory of stages and are not sent on.
     pub lead: usize,
-    /// Components after the lead that a stage could not hold.
+    /// Samples at the end that are not sent on: the rest of the scene's first run, which gain control measures whole.
+    pub tail: usize,
+    /// Components between lead and tail that a stage could not hold.
     pub clipped: u64,
     /// Instruction set of the kernels.
     pub level: Level,

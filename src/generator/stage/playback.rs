@@ -32,10 +32,11 @@ impl Stage for Playback {
         let gain = libm::pow(10.0, -self.attenuation_db / 20.0) as f32;
         let (scale, height) = (1.0 / self.step_lsb, self.step_lsb * gain);
         let mut clipped = 0;
+        let end = block.i.len() - block.tail.min(block.i.len());
         for plane in [&mut *block.i, &mut *block.q] {
             for (n, x) in plane.iter_mut().enumerate() {
                 let y = *x * scale;
-                clipped += u64::from(n >= block.lead && y.abs() > half);
+                clipped += u64::from((block.lead..end).contains(&n) && y.abs() > half);
                 *x = (level(y, half) + 0.5) * height;
             }
         }

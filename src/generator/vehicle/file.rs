@@ -54,6 +54,8 @@ pub enum Fault {
     Read(std::io::Error),
     #[error("not UTF-8 text")]
     NotText,
+    #[error("a row of more than {MAX_ROW_BYTES} bytes: expected numbers")]
+    LongRow,
     #[error("{fields} fields, but the header names {columns}: expected ',' between fields and '.' in numbers")]
     Fields { fields: u64, columns: u64 },
     #[error("fields are separated by {separator:?}: expected ','")]
@@ -295,7 +297,8 @@ impl Columns {
     }
 }
 
-/// Bytes that end in an error where a row is too long: one that nothing ends, or whose quotes nothing closes.
+/// Bytes that end in an error where a row is too long: one that nothing ends, or whose quotes nothing closes. What a signal has
+/// interrupted is read again, as the table's reader does not.
 struct ShortRows<R> {
     inner: R,
     since_end: usize,
@@ -312,7 +315,13 @@ impl<R: Read> ShortRows<R> {
 impl<R: Read> Read for ShortRows<R> {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
         let room = buffer.len().min(MAX_ROW_BYTES);
-        let count = self.inner.read(buffer.get_mut(..room).unwrap_or_default())?;
+        let buffer = buffer.get_mut(..room).unwrap_or_default();
+        let count = loop {
+            match self.inner.read(buffer) {
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                other => break other?,
+            }
+        };
         for byte in buffer.get(..count).unwrap_or_default() {
             match byte {
                 b'\n' if !self.quoted => {
@@ -326,7 +335,7 @@ impl<R: Read> Read for ShortRows<R> {
             self.since_end += 1;
         }
         if self.since_end > MAX_ROW_BYTES {
-            return Err(std::io::Error::other(format!("a row of more than {MAX_ROW_BYTES} bytes: expected numbers")));
+            return Err(std::io::ErrorKind::InvalidData.into());
         }
         Ok(count)
     }
@@ -344,6 +353,7 @@ pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<(Traj
             csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
                 Fault::Fields { fields: len, columns: expected_len }
             }
+            csv::ErrorKind::Io(e) if e.kind() == std::io::ErrorKind::InvalidData => Fault::LongRow,
             csv::ErrorKind::Io(e) => Fault::Read(e),
             other => Fault::Read(std::io::Error::other(format!("{other:?}"))),
         };

@@ -22,6 +22,8 @@ pub struct Tuning {
     pub inverted: bool,
     /// Whether only the I plane is sent on.
     pub real: bool,
+    /// Where the band of real samples begins: 0, or beyond half the rate a multiple of it.
+    pub low_hz: f64,
     /// Standard deviation of the thermal noise per component, in LSB: the gain.
     pub noise_lsb: f64,
 }
@@ -29,12 +31,17 @@ pub struct Tuning {
 impl Tuning {
     /// That of a scene.
     pub fn of(scene: &Scene) -> Self {
+        let half_hz = 0.5 * scene.clock.rate.hz();
         Self {
             clock: scene.clock,
             receiver_clock: scene.receiver_clock.clone(),
             center_hz: scene.metadata.center_hz,
             inverted: scene.metadata.inverted,
             real: !scene.metadata.format.is_complex(),
+            low_hz: scene
+                .signals
+                .first()
+                .map_or(0.0, |signal| (scene.metadata.if_hz(signal) / half_hz).floor() * half_hz),
             noise_lsb: f64::from(scene.noise_lsb),
         }
     }
@@ -52,7 +59,7 @@ impl Tuning {
     /// The frequencies that samples can hold.
     pub fn band_hz(&self) -> (f64, f64) {
         let half_hz = 0.5 * self.clock.rate.hz();
-        if self.real { (0.0, half_hz) } else { (-half_hz, half_hz) }
+        if self.real { (self.low_hz, self.low_hz + half_hz) } else { (-half_hz, half_hz) }
     }
 
     /// Peak amplitude, in LSB, of a carrier of that power over noise density.
@@ -168,6 +175,7 @@ mod tests {
             center_hz: 1_575.42e6,
             inverted: false,
             real: false,
+            low_hz: 0.0,
             noise_lsb: 1.0,
         };
         // 1 MHz above the centre: a quarter turn a sample; half a period late: half a turn less at RF 1576.42 MHz.
