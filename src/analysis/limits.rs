@@ -16,20 +16,35 @@ use toml::{Table, Value as Toml};
 
 use crate::analysis::schema;
 use crate::analysis::verdict::{Bound, Judgement, MARGINAL_SHARE};
+use crate::gnss::place::Keys;
 
-/// Why a file of limits cannot be used.
+/// Why a file of limits cannot be used. `name` is the file's, with line and column where they are known.
 #[derive(Debug, Error, PartialEq)]
 pub enum LimitsError {
     #[error("{name}: {message}")]
     Toml { name: String, message: String },
-    #[error("{name}: {path} is not in summary.json; the nearest path is {nearest} (all: assets/summary.schema.json)")]
+    #[error("{name}: {} is not in summary.json; the nearest path is {nearest} (all: assets/summary.schema.json)", path.escape_debug())]
     Path { name: String, path: String, nearest: String },
-    #[error("{name}: {path}.{key} = {value}, expected {expected}")]
+    #[error("{name}: {path}.{} = {value}, expected {expected}", key.escape_debug())]
     Value { name: String, path: String, key: String, value: String, expected: &'static str },
     #[error("{name}: {path} has no limit; expected {{ min = … }}, {{ max = … }}, both, or {{ equals = … }}")]
     Empty { name: String, path: String },
     #[error("{name} sets no limit at all")]
     Nothing { name: String },
+}
+
+impl LimitsError {
+    /// The error with the place of its key in place of the file's name alone.
+    fn at(mut self, keys: &Keys<'_>) -> Self {
+        let (name, key) = match &mut self {
+            Self::Toml { .. } | Self::Nothing { .. } => return self,
+            Self::Path { name, path, .. } | Self::Empty { name, path } => (name, path.clone()),
+            Self::Value { name, key, .. } if key == "marginal_share" => (name, key.clone()),
+            Self::Value { name, path, key, .. } => (name, format!("{path}.{key}")),
+        };
+        *name = keys.place_of(&key);
+        self
+    }
 }
 
 /// The limits as read.
@@ -49,10 +64,15 @@ impl Limits {
     /// # Errors
     /// [`LimitsError`] with the path in question.
     pub fn parse(text: &str, name: &str) -> Result<Self, LimitsError> {
+        let table: Table = text.parse().map_err(|error: toml::de::Error| LimitsError::Toml {
+            name: Keys::new(name, text).place(error.span().map_or(0, |span| span.start)),
+            message: error.message().to_owned(),
+        })?;
+        Self::of(table, name).map_err(|error| error.at(&Keys::new(name, text)))
+    }
+
+    fn of(mut table: Table, name: &str) -> Result<Self, LimitsError> {
         let name = name.to_owned();
-        let mut table: Table = text
-            .parse()
-            .map_err(|error: toml::de::Error| LimitsError::Toml { name: name.clone(), message: error.to_string() })?;
         let marginal_share = match table.remove("marginal_share") {
             None => MARGINAL_SHARE,
             Some(value) => {
@@ -87,7 +107,8 @@ impl Limits {
                 }
                 _ => {
                     let path = whole(path, value);
-                    let nearest = schema::nearest(&path);
+                    let own = strsim::jaro_winkler(&path, "marginal_share") > 0.9;
+                    let nearest = if own { "marginal_share".to_owned() } else { schema::nearest(&path) };
                     return Err(LimitsError::Path { name: self.name.clone(), path, nearest });
                 }
             }

@@ -137,15 +137,15 @@ impl Run {
             scene: json(&truth.join("scene.json"))?.ok_or_else(|| missing(&truth.join("scene.json"), TRUTH))?,
             scene_json: json(&truth.join("scene.json"))?.unwrap_or(Value::Null),
             scenario: text(&run.join("scenario.toml"))?,
-            truth: rows(&truth.join("observations.csv"), TRUTH)?,
+            truth: dated(&truth.join("observations.csv"), TRUTH, |row: &Observation| row.sent_s)?,
             sky: rows(&truth.join("sky.csv"), TRUTH)?,
             rays: optional(&rays)?,
-            trajectory: rows(&truth.join("trajectory.csv"), TRUTH)?,
+            trajectory: dated(&truth.join("trajectory.csv"), TRUTH, |row: &TrajectoryRow| row.gps_s)?,
             truth_navigation: rows(&truth.join("navigation.csv"), TRUTH)?,
             interference: optional(&truth.join("interference.csv"))?,
             claimed: optional(&truth.join("claimed.csv"))?,
-            observations: rows(&rx.join("observations.csv"), RECEIVER)?,
-            fixes: rows(&rx.join("fixes.csv"), RECEIVER)?,
+            observations: dated(&rx.join("observations.csv"), RECEIVER, |row: &Observation| row.sent_s)?,
+            fixes: dated(&rx.join("fixes.csv"), RECEIVER, |row: &Fix| row.gps_s)?,
             acquisition: rows(&rx.join("acquisition.csv"), RECEIVER)?,
             tracking: rows(&rx.join("tracking.csv"), RECEIVER)?,
             navigation: rows(&rx.join("navigation.csv"), RECEIVER)?,
@@ -163,10 +163,10 @@ impl Run {
             scene: json(&scene)?.ok_or_else(|| missing(&scene, TRUTH))?,
             scene_json: Value::Null,
             scenario: None,
-            truth: rows(&truth.join("observations.csv"), TRUTH)?,
+            truth: dated(&truth.join("observations.csv"), TRUTH, |row: &Observation| row.sent_s)?,
             sky: rows(&truth.join("sky.csv"), TRUTH)?,
             rays: Vec::new(),
-            trajectory: rows(&truth.join("trajectory.csv"), TRUTH)?,
+            trajectory: dated(&truth.join("trajectory.csv"), TRUTH, |row: &TrajectoryRow| row.gps_s)?,
             truth_navigation: Vec::new(),
             interference: optional(&truth.join("interference.csv"))?,
             claimed: Vec::new(),
@@ -213,6 +213,26 @@ fn rows<T: DeserializeOwned>(path: &Path, remedy: &'static str) -> Result<Vec<T>
             }
         },
     )
+}
+
+/// Whole GPS seconds that a row may bear: 1980 to 2296, far from where arithmetic on them ends.
+const SECONDS: std::ops::RangeInclusive<i64> = 0..=10_000_000_000;
+
+/// All rows of a CSV file whose times are believable.
+fn dated<T: DeserializeOwned>(
+    path: &Path,
+    remedy: &'static str,
+    seconds: impl Fn(&T) -> i64,
+) -> Result<Vec<T>, JudgeError> {
+    let rows: Vec<T> = rows(path, remedy)?;
+    match rows.iter().map(seconds).position(|s| !SECONDS.contains(&s)) {
+        None => Ok(rows),
+        Some(at) => {
+            let what = format!("its GPS time is not within {} to {} s", SECONDS.start(), SECONDS.end());
+            // The header is line 1.
+            Err(JudgeError::Line { path: path.to_owned(), line: at as u64 + 2, what })
+        }
+    }
 }
 
 /// All rows of a CSV file that a run may lack.

@@ -39,6 +39,9 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     let outcome = outcome.map_err(receiver_error)?;
     drop(output);
     staging.commit()?;
+    if let Some(warning) = &outcome.format_warning {
+        scenario::warn(&format!("{}: {warning}: check --format or the metadata", shown(&arguments.file)));
+    }
     let mut text = format!("{outcome}\n");
     if let Some(diagnosis) = &outcome.diagnosis {
         text += &format!("{diagnosis}\n");

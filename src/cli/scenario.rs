@@ -83,12 +83,7 @@ pub fn scenario_error(error: ScenarioError) -> CliError {
 
 /// The receiver's settings that the scenario carries for it.
 pub fn receiver_settings(named: &Named) -> Result<Settings, CliError> {
-    match &named.scenario.receiver {
-        None => Ok(Settings::default()),
-        Some(table) => {
-            Settings::from_table(table.clone(), &format!("{}: [receiver]", named.name)).map_err(CliError::input)
-        }
-    }
+    Settings::of_scenario(&named.text, &named.name).map_err(CliError::input)
 }
 
 /// A directory's name made of a scene's name.

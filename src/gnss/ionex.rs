@@ -279,8 +279,12 @@ impl<'t> Reader<'t> {
             if value == NO_VALUE {
                 return Err(self.wrong("a value at every node (9999 means none)"));
             }
+            let value_tecu = value * scale_tecu;
+            if !(-10.0..=1000.0).contains(&value_tecu) {
+                return Err(self.wrong("electrons from -10 to 1000 TECU (maps are smooth to a few below 0)"));
+            }
             if column < maps.longitudes.count {
-                maps.values_tecu.push(value * scale_tecu);
+                maps.values_tecu.push(value_tecu);
             }
         }
         Ok(())

@@ -12,6 +12,8 @@ pub mod inflate;
 #[cfg(feature = "generator")]
 pub mod ionex;
 pub mod klobuchar;
+#[cfg(any(feature = "receiver", feature = "analysis"))]
+pub mod place;
 pub mod record;
 #[cfg(feature = "generator")]
 pub mod rinex;

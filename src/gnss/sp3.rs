@@ -77,8 +77,17 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Precise, Sp3Error> {
     for (key, entry) in &file.data {
         let (x_km, y_km, z_km) = entry.position_km;
         let position_m = Vector3::new(x_km, y_km, z_km) * 1e3;
-        if key.sv.constellation != Constellation::GPS || !position_m.norm().is_finite() {
+        if key.sv.constellation != Constellation::GPS {
             continue;
+        }
+        // A GPS orbit of any age: 26 560 km and an eccentricity below 0.1.
+        let radius_m = position_m.norm();
+        if !(2.3e7..=3.0e7).contains(&radius_m) {
+            let what = format!(
+                "G{:02} at {}: {radius_m:e} m from the Earth's centre, expected 2.3e7 to 3e7",
+                key.sv.prn, key.epoch
+            );
+            return Err(damaged(what));
         }
         let nanoseconds = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();
         let seconds = i64::try_from(nanoseconds / 1_000_000_000).map_err(|e| damaged(e.to_string()))?;

@@ -37,9 +37,9 @@ impl Epoch {
         let rest = fraction - carry;
         // A tiny negative fraction rounds to exactly 1.0 here.
         if rest >= 1.0 {
-            Self { seconds: seconds + carry as i64 + 1, fraction: 0.0 }
+            Self { seconds: seconds.saturating_add(carry as i64).saturating_add(1), fraction: 0.0 }
         } else {
-            Self { seconds: seconds + carry as i64, fraction: rest }
+            Self { seconds: seconds.saturating_add(carry as i64), fraction: rest }
         }
     }
 
@@ -69,18 +69,21 @@ impl Epoch {
         }
         let fraction: f64 =
             if fraction.is_empty() { 0.0 } else { format!("0.{fraction}").parse().map_err(|_| error())? };
-        if !(1980..=2180).contains(&year) {
+        // The sixtieth second is UTC's alone, and there only where one was inserted: it comes after the fifty-ninth.
+        let inserted = second == 60;
+        if !(1980..=2180).contains(&year) || hour > 23 || minute > 59 || second > 60 || (inserted && !utc) {
             return Err(error());
         }
+        let second = if inserted { 59 } else { second };
         let gps = hifitime::TimeScale::GPST;
         let epoch = hifitime::Epoch::maybe_from_gregorian(year, month, day, hour, minute, second, 0, gps)
             .map_err(|_| error())?;
         let label = i64::try_from(epoch.duration.total_nanoseconds() / 1_000_000_000).map_err(|_| error())?;
         let leap = if utc { Self::leap_seconds_of_label(label) } else { 0 };
-        if epoch.duration.total_nanoseconds() < 0 {
+        if epoch.duration.total_nanoseconds() < 0 || (inserted && Self::leap_seconds_of_label(label + 1) != leap + 1) {
             return Err(error());
         }
-        Ok(Self::new(label + leap, fraction))
+        Ok(Self::new(label + leap + i64::from(inserted), fraction))
     }
 
     /// GPS time minus UTC where UTC's calendar reads `label` seconds after 1980-01-06.
@@ -118,12 +121,12 @@ impl Epoch {
     /// The instant `dt_s` later (or earlier, if negative).
     pub fn plus_s(self, dt_s: f64) -> Self {
         let whole = dt_s.floor();
-        Self::new(self.seconds + whole as i64, self.fraction + (dt_s - whole))
+        Self::new(self.seconds.saturating_add(whole as i64), self.fraction + (dt_s - whole))
     }
 
     /// Seconds from `earlier` to `self`; exact to 1e-16 s while they are within a second.
     pub fn since(self, earlier: Self) -> f64 {
-        (self.seconds - earlier.seconds) as f64 + (self.fraction - earlier.fraction)
+        self.seconds.saturating_sub(earlier.seconds) as f64 + (self.fraction - earlier.fraction)
     }
 
     fn hifitime(self, scale: hifitime::TimeScale) -> hifitime::Epoch {

@@ -49,7 +49,14 @@ struct Globe<T> {
 impl<T> Globe<T> {
     /// Reads rows of `columns` numbers that begin with latitude and longitude in degrees; lines that begin with `!` or
     /// `%` are comments.
-    fn read(text: &str, name: &str, columns: usize, node: impl Fn(&[f64]) -> T) -> Result<Self, ViennaError> {
+    /// `ranges` are columns with the least and the largest value that they may hold.
+    fn read(
+        text: &str,
+        name: &str,
+        columns: usize,
+        ranges: &[(usize, f64, f64)],
+        node: impl Fn(&[f64]) -> T,
+    ) -> Result<Self, ViennaError> {
         let wrong = |line: usize, found: String, expected: &str| ViennaError::Line {
             name: name.to_owned(),
             line,
@@ -66,6 +73,13 @@ impl<T> Globe<T> {
                 Ok(fields) if fields.len() == columns && fields.iter().all(|x| x.is_finite()) => {
                     let [latitude_deg, longitude_deg] =
                         [fields.first(), fields.get(1)].map(|x| x.copied().unwrap_or(0.0));
+                    for &(column, low, high) in ranges {
+                        let value = fields.get(column).copied().unwrap_or(f64::NAN);
+                        if !(low..=high).contains(&value) {
+                            let found = format!("number {} of the line is {value}", column + 1);
+                            return Err(wrong(index + 1, found, &format!("{low} to {high}")));
+                        }
+                    }
                     places.push((index + 1, latitude_deg, longitude_deg));
                     nodes.push(node(&fields));
                 }
@@ -156,7 +170,7 @@ impl MappingGrid {
             text.lines().find(|line| line.starts_with('!') && line.contains("Data_types")).unwrap_or_default();
         let kinds = [("VMF1", Vienna::Vmf1), ("VMF3", Vienna::Vmf3)];
         let fitted_with = kinds.into_iter().find(|(word, _)| heading.contains(word)).map(|(_, kind)| kind);
-        Ok(Self { globe: Globe::read(&text, name, 6, node)?, fitted_with })
+        Ok(Self { globe: Globe::read(&text, name, 6, &[(2, 1e-5, 1e-2), (3, 1e-5, 1e-2)], node)?, fitted_with })
     }
 
     /// The coefficients at a place.
@@ -239,7 +253,9 @@ impl Gpt3 {
                 mean_temperature_k: season(39, 1.0),
             }
         };
-        Globe::read(&unpack(bytes, name)?, name, 64, node).map(Self)
+        // Mean pressure (Pa), temperature (K) and thousands of both coefficients.
+        let ranges = [(2, 3e4, 1.1e5), (7, 200.0, 320.0), (24, 0.1, 10.0), (29, 0.01, 10.0)];
+        Globe::read(&unpack(bytes, name)?, name, 64, &ranges, node).map(Self)
     }
 
     /// Weather at a place and ellipsoidal height, on a day of the year that counts from 1.0.

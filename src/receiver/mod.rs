@@ -8,6 +8,7 @@ pub mod acquire;
 pub mod correlate;
 pub mod decode;
 pub mod diagnosis;
+pub mod format;
 pub mod observe;
 pub mod output;
 pub mod position;

@@ -15,6 +15,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{SIGNALS, Signal};
 use crate::receiver::acquire::{self, AcquireError};
 use crate::receiver::diagnosis::{Diagnosis, Stage};
+use crate::receiver::format::Check;
 use crate::receiver::output::{Output, OutputError};
 use crate::receiver::session::Session;
 use crate::receiver::settings::{Settings, SettingsError};
@@ -56,6 +57,8 @@ pub struct Outcome {
     pub losses: u64,
     /// Bytes of a sample that the end cut off.
     pub cut_bytes: usize,
+    /// What the bytes look like, if not like the format that was taken.
+    pub format_warning: Option<String>,
     /// Why there was no fix, when there was none.
     pub diagnosis: Option<Diagnosis>,
 }
@@ -93,6 +96,7 @@ pub(super) fn candidates(metadata: &IfMetadata) -> Vec<(&'static Signal, Sv)> {
 pub struct Reception {
     metadata: IfMetadata,
     settings: Settings,
+    check: Check,
     source: Source,
     session: Session,
 }
@@ -109,6 +113,7 @@ impl Reception {
         Ok(Self {
             metadata: metadata.clone(),
             settings: settings.clone(),
+            check: Check::new(metadata.format),
             source: Source::new(metadata.format, block as usize),
             session: Session::new(metadata, settings)?,
         })
@@ -119,6 +124,7 @@ impl Reception {
     /// # Errors
     /// Records that cannot be written.
     pub fn take(&mut self, mut bytes: &[u8], output: &mut Output) -> Result<(), ReceiveError> {
+        self.check.take(bytes);
         while let Some(block) = self.source.next(&mut bytes) {
             self.session.process(&block, output)?;
         }
@@ -146,6 +152,7 @@ impl Reception {
         outcome.samples = count;
         outcome.seconds = seconds;
         outcome.cut_bytes = cut_bytes;
+        outcome.format_warning = self.check.warning();
         if outcome.fixes == 0 {
             let needed = acquire::samples_needed(metadata, &settings.acquisition)?;
             let stage = if count < needed {
@@ -203,6 +210,7 @@ fn summary(metadata: &IfMetadata, settings: &Settings, outcome: &Outcome) -> ser
         "samples": outcome.samples,
         "seconds": outcome.seconds,
         "cut_bytes": outcome.cut_bytes,
+        "format_warning": outcome.format_warning,
         "acquired": names(&outcome.acquired),
         "used": names(&outcome.used),
         "fixes": outcome.fixes,

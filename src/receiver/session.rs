@@ -476,6 +476,7 @@ impl Session {
             first_fix_s: self.first_fix_s,
             losses: self.losses,
             cut_bytes: 0,
+            format_warning: None,
             diagnosis: None,
         }
     }

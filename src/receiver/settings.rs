@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 use toml::{Table, Value};
 
+use crate::gnss::place::Keys;
 use crate::gnss::signal::SIGNALS;
 use crate::gnss::time::{Epoch, TimeError};
 use crate::receiver::acquire::{AcquireError, AcquisitionSettings};
@@ -57,12 +58,12 @@ impl Default for OperationSettings {
     }
 }
 
-/// Why settings are refused. `origin` is the file's name.
+/// Why settings are refused. `origin` is the file's name, with line and column where they are known.
 #[derive(Debug, Error)]
 pub enum SettingsError {
-    #[error("{origin}: {source}")]
-    Toml { origin: String, source: Box<toml::de::Error> },
-    #[error("{origin}: unknown key '{key}': expected {expected}")]
+    #[error("{origin}: {message}")]
+    Toml { origin: String, message: String },
+    #[error("{origin}: unknown key '{}': expected {expected}", key.escape_debug())]
     UnknownKey { origin: String, key: String, expected: String },
     #[error("{origin}: {key} = {value}: expected {expected}")]
     Range { origin: String, key: &'static str, value: String, expected: String },
@@ -78,23 +79,63 @@ impl Settings {
     /// Reads a TOML text; `origin` names it in errors.
     ///
     /// # Errors
-    /// Text that is no TOML, an unknown key, a value of the wrong type or out of its range.
+    /// Text that is no TOML, an unknown key, a value of the wrong type or out of its range, each with its place.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SettingsError> {
-        let table = text
-            .parse::<Table>()
-            .map_err(|source| SettingsError::Toml { origin: origin.to_owned(), source: Box::new(source) })?;
-        Self::from_table(table, origin)
+        Self::read(text, origin, "", |text| toml::from_str(text))
     }
 
-    /// Reads a TOML table.
+    /// Reads the table `[receiver]` of a scenario's text; defaults if it has none.
     ///
     /// # Errors
     /// As [`Self::parse`].
+    pub fn of_scenario(text: &str, origin: &str) -> Result<Self, SettingsError> {
+        #[derive(Deserialize)]
+        struct Scenario {
+            #[serde(default)]
+            receiver: Settings,
+        }
+        Self::read(text, origin, "receiver", |text| toml::from_str::<Scenario>(text).map(|scenario| scenario.receiver))
+    }
+
+    /// Reads the table `above` of a text by `typed`, and gives errors their places.
+    fn read(
+        text: &str,
+        origin: &str,
+        above: &str,
+        typed: impl Fn(&str) -> Result<Self, toml::de::Error>,
+    ) -> Result<Self, SettingsError> {
+        let syntax = |error: toml::de::Error| {
+            let keys = Keys::new(origin, text);
+            let byte = error.span().map_or(0, |span| span.start);
+            let key = keys.holding(byte).map_or(String::new(), |key| format!("{key}: "));
+            SettingsError::Toml {
+                origin: keys.place(byte),
+                message: format!("{key}{}", error.message().replace("wanted ", "expected ")),
+            }
+        };
+        let table = text.parse::<Table>().map_err(syntax)?;
+        let table = if above.is_empty() { Some(&table) } else { table.get(above).and_then(Value::as_table) };
+        let checked = match table {
+            Some(table) => check_keys(table, &known(), above, origin),
+            None => Ok(()),
+        };
+        let checked = checked.and_then(|()| {
+            let settings = typed(text).map_err(syntax)?;
+            settings.validate(origin).map(|()| settings)
+        });
+        checked.map_err(|error| error.at(&Keys::new(origin, text), above))
+    }
+
+    /// Reads a TOML table that stands in no text.
+    ///
+    /// # Errors
+    /// As [`Self::parse`], without places.
     pub fn from_table(table: Table, origin: &str) -> Result<Self, SettingsError> {
-        let toml = |source| SettingsError::Toml { origin: origin.to_owned(), source: Box::new(source) };
-        let known = Table::try_from(Self::default()).unwrap_or_default();
-        check_keys(&table, &known, "", origin)?;
-        let settings: Self = table.try_into().map_err(toml)?;
+        check_keys(&table, &known(), "", origin)?;
+        let settings: Self = table.try_into().map_err(|error: toml::de::Error| {
+            let message = error.to_string().trim_end().replace('\n', ", ");
+            SettingsError::Toml { origin: origin.to_owned(), message }
+        })?;
         settings.validate(origin)?;
         Ok(settings)
     }
@@ -159,6 +200,49 @@ impl Settings {
     }
 }
 
+impl SettingsError {
+    /// The file's name, with line and column where they are known: what the message begins with.
+    pub fn place(&self) -> &str {
+        match self {
+            Self::Toml { origin, .. }
+            | Self::UnknownKey { origin, .. }
+            | Self::Range { origin, .. }
+            | Self::Acquisition { origin, .. }
+            | Self::Tracking { origin, .. }
+            | Self::Week { origin, .. } => origin,
+        }
+    }
+
+    /// The error with the place of its key in place of the file's name alone; settings stand below `above`.
+    fn at(mut self, keys: &Keys<'_>, above: &str) -> Self {
+        let below = |key: String| if above.is_empty() { key } else { format!("{above}.{key}") };
+        let (origin, key) = match &mut self {
+            Self::Toml { .. } => return self,
+            Self::UnknownKey { origin, key, .. } => {
+                let key = key.clone();
+                (origin, key)
+            }
+            Self::Range { origin, key, .. } => (origin, below((*key).to_owned())),
+            Self::Acquisition { origin, source } => {
+                let AcquireError::Setting { key, .. } = source else { return self };
+                (origin, below(format!("acquisition.{key}")))
+            }
+            Self::Tracking { origin, source } => {
+                let (TrackingSettingsError::Range { key, .. } | TrackingSettingsError::Bandwidth { key, .. }) = source;
+                (origin, below(format!("tracking.{key}")))
+            }
+            Self::Week { origin, .. } => (origin, below("operation.week_reference".to_owned())),
+        };
+        *origin = keys.place_of(&key);
+        self
+    }
+}
+
+/// The keys of the defaults, with their defaults.
+fn known() -> Table {
+    Table::try_from(Settings::default()).unwrap_or_default()
+}
+
 /// Refuses the first key of `table` that `known` does not have, by walking both.
 fn check_keys(table: &Table, known: &Table, path: &str, origin: &str) -> Result<(), SettingsError> {
     for (key, value) in table {
@@ -193,13 +277,31 @@ mod tests {
     #[test]
     fn an_unknown_key_is_refused_with_the_nearest_right_one() {
         for (text, key, near) in [
-            ("[tracking]\npll_bandwith_hz = 15.0", "tracking.pll_bandwith_hz", "pll_bandwidth_hz"),
-            ("[positon]", "positon", "position"),
-            ("[position]\nsmoothing = 3.0", "position.smoothing", "smoothing_s"),
+            (
+                "[tracking]\npll_bandwith_hz = 15.0",
+                "rx.toml:2:1: unknown key 'tracking.pll_bandwith_hz'",
+                "pll_bandwidth_hz",
+            ),
+            ("[positon]", "rx.toml:1:2: unknown key 'positon'", "position"),
+            ("[position]\nsmoothing = 3.0", "rx.toml:2:1: unknown key 'position.smoothing'", "smoothing_s"),
         ] {
             let error = Settings::parse(text, "rx.toml").unwrap_err().to_string();
             assert!(error.contains("rx.toml") && error.contains(key) && error.contains(near), "{error}");
         }
+    }
+
+    #[test]
+    fn settings_in_a_scenario_are_refused_at_their_line_there() {
+        let text = |line: &str| format!("name = \"x\"\n[receiver.tracking]\n{line}\n");
+        for (line, expected) in [
+            ("pll_order = 7", "s.toml:3:1: tracking.pll_order = 7: expected 2 or 3"),
+            ("pll_order = \"x\"", "s.toml:3:13: receiver.tracking.pll_order: invalid type"),
+            ("pll_ordr = 3", "s.toml:3:1: unknown key 'receiver.tracking.pll_ordr'"),
+        ] {
+            let error = Settings::of_scenario(&text(line), "s.toml").unwrap_err().to_string();
+            assert!(error.starts_with(expected), "{error}");
+        }
+        assert_eq!(Settings::of_scenario("name = 1", "s.toml").unwrap(), Settings::default());
     }
 
     #[test]

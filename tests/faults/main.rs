@@ -4,9 +4,12 @@
 //! `reports/robustness.md` where `GNSS_TWIN_WRITE_ROBUSTNESS` names a file. Damage is drawn from a seeded generator: a
 //! case that fails is the same in the next run.
 
+mod bounds;
 mod damage;
 mod determinism;
 mod files;
+mod fuzz;
+mod legal;
 mod machine;
 mod memory;
 mod mounts;
@@ -14,6 +17,8 @@ mod navigation;
 mod pipes;
 mod program;
 mod scenario;
+mod scenes;
 mod signals;
+mod sizes;
 mod sweep;
 mod tally;

@@ -5,6 +5,10 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use gnss_twin::gnss::samples::Format;
+use gnss_twin::receiver::format::Check;
+
+use crate::damage::Random;
 use crate::tally::{End, Tally};
 
 const FAMILY: &str = "The program";
@@ -47,7 +51,7 @@ fn ends(output: &Output, code: i32, part: &str) -> Result<End, String> {
 #[test]
 fn texts_of_any_shape_are_refused_as_bad_data() {
     let here = workplace();
-    let shapes: [(&str, Vec<u8>); 11] = [
+    let shapes: [(&str, Vec<u8>); 12] = [
         ("empty", Vec::new()),
         ("not UTF-8", vec![0xff, 0xfe, 0]),
         ("zeros", vec![0; 100]),
@@ -58,6 +62,7 @@ fn texts_of_any_shape_are_refused_as_bad_data() {
         ("a key of 10000 parts", format!("{}a = 1", "a.".repeat(10_000)).into_bytes()),
         ("a header of 10000 parts", format!("[{}a]", "a.".repeat(10_000)).into_bytes()),
         ("10 MB of comment", "# a comment\n".repeat(900_000).into_bytes()),
+        ("a text without end", format!("name = \"\"\"{TINY}").into_bytes()),
         ("a line of 900 kB", format!("name = \"{}\"", "x".repeat(900_000)).into_bytes()),
     ];
     let mut tally = Tally::of_processes(FAMILY, "12. shapes of texts");
@@ -180,6 +185,72 @@ fn outputs_that_cannot_be_made_and_inputs_that_are_no_files_have_their_exit_code
 }
 
 #[test]
+fn what_a_terminal_would_obey_is_escaped_in_every_message() {
+    let here = workplace();
+    let forged = "\u{1b}[31m\nforged: all is well\r";
+    let toml = forged.escape_debug().to_string().replace("\\u{1b}", "\\u001b");
+    let write = |name: &str, text: &str| fs::write(here.path().join(name), text).unwrap();
+    let moving = |file: &str| {
+        TINY.replace(
+            "kind = \"static\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n",
+            &format!("kind = \"file\"\nfile = \"{file}\"\n"),
+        )
+    };
+    write("key.toml", &format!("\"{toml}\" = 1\n{TINY}"));
+    write("value.toml", &TINY.replace("\"tiny\"", &format!("\"{toml}\"")));
+    write("path.toml", &moving(&toml));
+    write("settings.toml", &format!("[tracking]\n\"{toml}\" = 1\n"));
+    write("limits.toml", &format!("[position.\"{toml}\"]\nmax = 1\n"));
+    write("word.toml", &format!("[position.fixes]\n\"{toml}\" = 1\n"));
+    write("column.csv", &format!("time_s,\"{forged}\",longitude_deg,height_m\n0,1,2,3\n1,1,2,3\n"));
+    write("column.toml", &moving("column.csv"));
+    write("field.csv", &format!("time_s,latitude_deg,longitude_deg,height_m\n0,\"{forged}\",2,3\n"));
+    write("field.toml", &moving("field.csv"));
+    write("more.csv", &format!("time_s,latitude_deg,longitude_deg,height_m,\"{forged}\"\n0,1,2,3,4\n1,1,2,3,4\n"));
+    write("more.toml", &moving("more.csv"));
+    write("ride.nmea", &format!("$GPGGA,{},*00\n", forged.replace('\n', "")));
+    write("nmea.toml", &moving("ride.nmea"));
+    write("nav.rnx", &format!("{forged}{:>80}\n", "RINEX VERSION / TYPE"));
+    write("nav.toml", &format!("{TINY}[navigation]\nfile = \"nav.rnx\"\n"));
+    let meta = serde_json::json!({"global": {"core:datatype": forged, "core:sample_rate": 4e6}, "captures": [{}]});
+    write("meta.sigmf-meta", &meta.to_string());
+    write("meta.sigmf-data", "0000");
+    let receive =
+        ["receive", "raw.bin", "--out", "x", "--format", "ci8", "--rate-hz", "4e6", "--receiver", "settings.toml"];
+    let rows: [(&[&str], i32); 12] = [
+        (&["plan", "key.toml"], 65),
+        (&["plan", "value.toml"], 65),
+        (&["plan", "path.toml"], 65),
+        (&receive, 65),
+        (&["run", "tiny.toml", "--out", "x", "--check", "limits.toml"], 65),
+        (&["run", "tiny.toml", "--out", "x", "--check", "word.toml"], 65),
+        (&["plan", "column.toml"], 65),
+        (&["plan", "field.toml"], 65),
+        (&["plan", "more.toml"], 0),
+        (&["plan", "nmea.toml"], 65),
+        (&["plan", "nav.toml"], 65),
+        (&["receive", "meta.sigmf-data", "--out", "x"], 65),
+    ];
+    let mut tally = Tally::of_processes(FAMILY, "Security. terminal escapes and line feeds in names and fields");
+    for (arguments, code) in rows {
+        tally.case(
+            || format!("{arguments:?}"),
+            || {
+                let output = twin(arguments, here.path());
+                let text = [output.stdout.as_slice(), &output.stderr].concat();
+                let obeyed = text.iter().any(|byte| *byte < b' ' && *byte != b'\n' || *byte == 0x7f);
+                let lines = String::from_utf8_lossy(&text).lines().any(|line| line.trim_start().starts_with("forged"));
+                if obeyed || lines {
+                    return Err(format!("{:?}", String::from_utf8_lossy(&text)));
+                }
+                ends(&output, code, "")
+            },
+        );
+    }
+    tally.finish();
+}
+
+#[test]
 fn samples_that_end_within_a_sample_or_are_none_are_told_or_refused() {
     let here = workplace();
     let mut tally = Tally::of_processes(FAMILY, "14. samples and their metadata");
@@ -204,6 +275,101 @@ fn samples_that_end_within_a_sample_or_are_none_are_told_or_refused() {
                 },
             );
             let _ = fs::remove_dir_all(here.path().join("x"));
+        }
+    }
+    // Noise in one format beside metadata that say another.
+    for (real, declared, look) in [
+        ("ci8", "ci16_le", Some("ci8 or ri8")),
+        ("ci8", "cu8", Some("ci8 or ri8")),
+        ("ci8", "cf32_le", Some("ci8 or ri8")),
+        ("ci16_le", "ci8", Some("ci16_le or ri16_le")),
+        ("cu8", "ci8", Some("cu8")),
+        ("cf32_le", "ci16_le", Some("cf32_le")),
+        ("ci16_be", "ci16_le", Some("high byte first")),
+        ("ci8", "ri8", None),
+        ("ci16_le", "ci16_le", None),
+    ] {
+        let meta = format!(
+            "{{\"global\": {{\"core:datatype\": \"{declared}\", \"core:sample_rate\": 4000000}}, \"captures\": \
+             [{{\"core:frequency\": {}}}]}}",
+            if declared.starts_with('r') { 1_574_420_000 } else { 1_575_420_000 }
+        );
+        fs::write(here.path().join("odd.sigmf-meta"), meta).unwrap();
+        fs::write(here.path().join("odd.sigmf-data"), noise(real, 20_000, 1.0)).unwrap();
+        tally.case(
+            || format!("{real} declared as {declared}"),
+            || {
+                let output = twin(&["receive", "odd.sigmf-data", "--out", "x"], here.path());
+                let message = String::from_utf8_lossy(&output.stderr).into_owned();
+                match look {
+                    Some(look) if message.contains(look) && message.contains("warning") => {
+                        ends(&output, 0, "").map(|_| End::Reported)
+                    }
+                    None if !message.contains("look like") => ends(&output, 0, ""),
+                    _ => Err(message),
+                }
+            },
+        );
+        let _ = fs::remove_dir_all(here.path().join("x"));
+    }
+    tally.finish();
+}
+
+/// Noise of the usual gain of a format, times `gain`, written without the program's help.
+fn noise(format: &str, count: usize, gain: f64) -> Vec<u8> {
+    let mut random = Random::new(14);
+    let mut normal = move || (0..12).map(|_| random.below(1 << 20) as f64 / f64::from(1 << 20)).sum::<f64>() - 6.0;
+    let mut bytes = Vec::new();
+    for _ in 0..count {
+        let x = normal() * gain;
+        match format {
+            "ci8" | "ri8" => bytes.push((28.0 * x).round().clamp(-127.0, 127.0) as i8 as u8),
+            "cu8" => bytes.push((127.5 + 28.0 * x).round().clamp(0.0, 255.0) as u8),
+            "ci16_le" | "ri16_le" => bytes.extend(((512.0 * x).round() as i16).to_le_bytes()),
+            "ci16_be" => bytes.extend(((512.0 * x).round() as i16).to_be_bytes()),
+            "cf32_le" => bytes.extend((x as f32).to_le_bytes()),
+            "cf32_be" => bytes.extend((x as f32).to_be_bytes()),
+            other => panic!("{other}"),
+        }
+    }
+    bytes
+}
+
+#[test]
+fn samples_that_look_like_another_format_are_named_and_those_that_cannot_be_told_are_not() {
+    // Formats on disk, and as which of them each is recognised.
+    let real = [
+        ("ci8", "ci8 or ri8"),
+        ("ri8", "ci8 or ri8"),
+        ("cu8", "cu8"),
+        ("ci16_le", "ci16_le or ri16_le"),
+        ("ri16_le", "ci16_le or ri16_le"),
+        ("cf32_le", "cf32_le"),
+        ("ci16_be", "16-bit integers with the high byte first"),
+        ("cf32_be", "floats with the high byte first"),
+    ];
+    let mut tally = Tally::new(FAMILY, "14. declared formats against the samples' histograms");
+    for (format, look) in real {
+        // A twentieth: 1.4 LSB of eight bits, 26 of sixteen.
+        for gain in [0.05, 0.2, 1.0] {
+            let bytes = noise(format, 40_000, gain);
+            for (declared, name) in Format::NAMES {
+                tally.case(
+                    || format!("{format} at {gain} declared as {name}"),
+                    || {
+                        let mut check = Check::new(declared);
+                        bytes.chunks(997).for_each(|piece| check.take(piece));
+                        match check.warning() {
+                            // Real and complex samples of one width have the same histogram.
+                            None if look.contains(name) => Ok(End::Accepted),
+                            Some(text) if !look.contains(name) && text.contains(look) && text.contains(name) => {
+                                Ok(End::Reported)
+                            }
+                            other => Err(format!("{other:?}")),
+                        }
+                    },
+                );
+            }
         }
     }
     tally.finish();

@@ -71,6 +71,25 @@ impl Tally {
         }
     }
 
+    /// Runs many short cases, numbered from `first`, timed together: each is one of the row's.
+    pub fn batch(&mut self, count: usize, name: &str, first: usize, run: impl Fn(usize) -> Result<End, String>) {
+        let worked = work();
+        for number in first..first + count {
+            self.cases += 1;
+            match catch_unwind(AssertUnwindSafe(|| run(number))) {
+                Err(_) => self.failures.push(format!("{name} {number}: panicked")),
+                Ok(Err(what)) => self.failures.push(format!("{name} {number}: {what}")),
+                Ok(Ok(End::Refused)) => self.refused += 1,
+                Ok(Ok(End::Reported)) => self.reported += 1,
+                Ok(Ok(End::Accepted)) => self.accepted += 1,
+            }
+        }
+        let taken = work().saturating_sub(worked);
+        if taken > self.patience {
+            self.failures.push(format!("{name} {first} and the {count} after it: {taken:?}"));
+        }
+    }
+
     /// Adds the row to the report, and fails if a case failed.
     pub fn finish(self) {
         if let Err(message) = self.close() {

@@ -19,10 +19,17 @@ use crate::gnss::time::Epoch;
 pub const MAX_ROWS: usize = 1_000_000;
 /// Bytes read at most.
 pub const MAX_BYTES: u64 = 256 << 20;
+/// Bytes of a row at most, so that a text without ends of lines takes no memory.
+const MAX_ROW_BYTES: usize = 1 << 16;
 /// Fastest motion between rows.
 const MAX_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;
 /// Hardest motion: a hundred thousand g, beyond any gun.
 const MAX_ACCELERATION_MPS2: f64 = 1e6;
+
+/// Rows before and after the first bent knot among which the wrong one is looked for. From the hardest bend that the
+/// largest speed allows, 1e11 m/s2 between rows 1 ms apart, to the limit is a factor 1e5 = 3.7^9: nine rows.
+const BEFORE: usize = 2;
+const AFTER: usize = 14;
 
 /// Where a file's times lie and how far apart its rows may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +54,8 @@ pub enum Fault {
     Read(std::io::Error),
     #[error("not UTF-8 text")]
     NotText,
+    #[error("a row of more than {MAX_ROW_BYTES} bytes: expected numbers")]
+    LongRow,
     #[error("{fields} fields, but the header names {columns}: expected ',' between fields and '.' in numbers")]
     Fields { fields: u64, columns: u64 },
     #[error("fields are separated by {separator:?}: expected ','")]
@@ -88,6 +97,7 @@ impl Rows {
     }
 
     fn push(&mut self, line: u64, row: Row) -> Result<(), Fault> {
+        let mut speed_mps = row.velocity_mps.map_or(0.0, |v| v.norm());
         if let Some(before) = self.rows.last() {
             let gap_s = row.t_s - before.t_s;
             if gap_s == 0.0 {
@@ -97,11 +107,10 @@ impl Rows {
             } else if gap_s > self.max_gap_s {
                 return Err(Fault::Gap { gap_s, max_gap_s: self.max_gap_s });
             }
-            let speed_mps = (row.position_m - before.position_m).norm() / gap_s;
-            let speed_mps = speed_mps.max(row.velocity_mps.map_or(0.0, |v| v.norm()));
-            if speed_mps > MAX_SPEED_MPS {
-                return Err(Fault::Speed { speed_mps });
-            }
+            speed_mps = speed_mps.max((row.position_m - before.position_m).norm() / gap_s);
+        }
+        if speed_mps > MAX_SPEED_MPS {
+            return Err(Fault::Speed { speed_mps });
         }
         if self.rows.len() >= MAX_ROWS {
             return Err(Fault::TooLong);
@@ -120,15 +129,52 @@ impl Rows {
             return Err(too_few());
         }
         let knots = spline::knots(&self.rows);
-        for (knot, line) in knots.iter().zip(&self.lines) {
-            let acceleration_mps2 = knot.motion.acceleration_mps2.norm();
-            if acceleration_mps2 > MAX_ACCELERATION_MPS2 {
-                return Err(error(u64::from(*line), Fault::Acceleration { acceleration_mps2 }));
-            }
+        if let Some(bent) = knots.iter().position(|knot| knot.motion.acceleration_mps2.norm() > MAX_ACCELERATION_MPS2) {
+            let (row, acceleration_mps2) = self.culprit(bent);
+            let line = self.lines.get(row).map_or(last, |line| u64::from(*line));
+            return Err(error(line, Fault::Acceleration { acceleration_mps2 }));
         }
         let breaks_s = self.rows.iter().map(|row| row.t_s).collect();
         Trajectory::through(knots, breaks_s).ok_or_else(too_few)
     }
+}
+
+impl Rows {
+    /// The row that makes the spline bend too hard from knot `bent` on, and how hard.
+    ///
+    /// One wrong row bends the spline at its neighbours too, each a quarter as hard as the one before: it is the row without
+    /// which the rows about it are smooth. Where the motion jumps for good, leaving out a row beside the jump takes no more
+    /// than a third of the bend away: then it is the row after the fastest interval. Of fewer than five rows any could be
+    /// the wrong one.
+    fn culprit(&self, bent: usize) -> (usize, f64) {
+        let first = bent.saturating_sub(BEFORE);
+        let rows = self.rows.get(first..(bent + AFTER).min(self.rows.len())).unwrap_or_default();
+        let worst_mps2 = hardest(rows);
+        if rows.len() < 5 {
+            return (bent, worst_mps2);
+        }
+        let without = |left_out: usize| {
+            let rest = rows.iter().enumerate().filter(|(row, _)| *row != left_out);
+            hardest(&rest.map(|(_, row)| *row).collect::<Vec<_>>())
+        };
+        let smoothest = (0..rows.len()).map(|row| (row, without(row))).min_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((row, left_mps2)) = smoothest
+            && left_mps2 < 0.25 * worst_mps2
+        {
+            return (first + row, worst_mps2);
+        }
+        let speed = |(row, pair): (usize, &[Row])| match pair {
+            [a, b] => (row + 1, (b.position_m - a.position_m).norm() / (b.t_s - a.t_s)),
+            _ => (row, 0.0),
+        };
+        let fastest = rows.windows(2).enumerate().map(speed).max_by(|a, b| a.1.total_cmp(&b.1));
+        (first + fastest.map_or(0, |(row, _)| row), worst_mps2)
+    }
+}
+
+/// Hardest acceleration at the knots of the spline through some rows.
+fn hardest(rows: &[Row]) -> f64 {
+    spline::knots(rows).iter().map(|knot| knot.motion.acceleration_mps2.norm()).fold(0.0, f64::max)
 }
 
 /// Reads a number within a range.
@@ -251,24 +297,55 @@ impl Columns {
     }
 }
 
-/// Reads again what a signal has interrupted, as the table's reader does not.
-struct Patient<R>(R);
+/// Bytes that end in an error where a row is too long: one that nothing ends, or whose quotes nothing closes. What a signal has
+/// interrupted is read again, as the table's reader does not.
+struct ShortRows<R> {
+    inner: R,
+    since_end: usize,
+    quoted: bool,
+    comment: bool,
+}
 
-impl<R: Read> Read for Patient<R> {
+impl<R: Read> ShortRows<R> {
+    fn of(inner: R) -> Self {
+        Self { inner, since_end: 0, quoted: false, comment: false }
+    }
+}
+
+impl<R: Read> Read for ShortRows<R> {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        loop {
-            match self.0.read(buffer) {
+        let room = buffer.len().min(MAX_ROW_BYTES);
+        let buffer = buffer.get_mut(..room).unwrap_or_default();
+        let count = loop {
+            match self.inner.read(buffer) {
                 Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-                other => return other,
+                other => break other?,
             }
+        };
+        for byte in buffer.get(..count).unwrap_or_default() {
+            match byte {
+                b'\n' if !self.quoted => {
+                    (self.since_end, self.comment) = (0, false);
+                    continue;
+                }
+                b'"' if !self.comment => self.quoted = !self.quoted,
+                b'#' if self.since_end == 0 => self.comment = true,
+                _ => {}
+            }
+            self.since_end += 1;
         }
+        if self.since_end > MAX_ROW_BYTES {
+            return Err(std::io::ErrorKind::InvalidData.into());
+        }
+        Ok(count)
     }
 }
 
 /// Reads a CSV trajectory; also returns the names of columns that it did not use. `file` names it in errors.
 pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<(Trajectory, Vec<String>), FileError> {
     let error = |line, fault| FileError { file: file.to_owned(), line, fault };
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(Patient(input.take(MAX_BYTES + 1)));
+    let mut reader =
+        csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(ShortRows::of(input.take(MAX_BYTES + 1)));
     let fault = |e: csv::Error, line: u64| {
         let line = e.position().map_or(line, csv::Position::line);
         let fault = match e.into_kind() {
@@ -276,6 +353,7 @@ pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<(Traj
             csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
                 Fault::Fields { fields: len, columns: expected_len }
             }
+            csv::ErrorKind::Io(e) if e.kind() == std::io::ErrorKind::InvalidData => Fault::LongRow,
             csv::ErrorKind::Io(e) => Fault::Read(e),
             other => Fault::Read(std::io::Error::other(format!("{other:?}"))),
         };
@@ -446,6 +524,38 @@ mod tests {
         }
         let error = read_csv(&b"time_s,x_m,y_m,z_m\n0,\xff,0,0\n"[..], "ride.csv", &options()).unwrap_err();
         assert!(matches!(error.fault, Fault::NotText), "{error}");
+    }
+
+    #[test]
+    fn a_row_that_jumps_is_named_and_not_its_neighbours() {
+        // A walk at 1 m/s and 10 Hz, with and without velocities.
+        let walk = |velocities: bool, wrong: &dyn Fn(i32) -> (f64, f64)| {
+            let mut text =
+                if velocities { "time_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps\n".to_owned() } else { HEADER.to_owned() };
+            for k in 0..60 {
+                let (jump_m, jump_mps) = wrong(k);
+                let t_s = 0.1 * f64::from(k);
+                text += &format!("{t_s},6400000,{},0", t_s + jump_m);
+                text += &if velocities { format!(",0,{},0\n", 1.0 + jump_mps) } else { "\n".to_owned() };
+            }
+            csv(&text).map(|_| ()).map_err(|error| (error.line, matches!(error.fault, Fault::Acceleration { .. })))
+        };
+        for row in 0..60 {
+            // The header is line 1.
+            let line = row as u64 + 2;
+            for jump_m in [2e4, 1e5, 1e6, 2.9e6] {
+                let one = walk(false, &|k| (if k == row { jump_m } else { 0.0 }, 0.0));
+                assert_eq!(one, Err((line, true)), "row {row} alone by {jump_m} m");
+                let one = walk(true, &|k| (if k == row { jump_m } else { 0.0 }, 0.0));
+                assert_eq!(one, Err((line, true)), "row {row} alone by {jump_m} m, with velocities");
+                if (2..58).contains(&row) {
+                    let rest = walk(false, &|k| (if k >= row { jump_m } else { 0.0 }, 0.0));
+                    assert_eq!(rest, Err((line, true)), "from row {row} on by {jump_m} m");
+                }
+            }
+            let velocity = walk(true, &|k| (0.0, if k == row { 1e6 } else { 0.0 }));
+            assert_eq!(velocity, Err((line, true)), "the velocity of row {row}");
+        }
     }
 
     #[test]

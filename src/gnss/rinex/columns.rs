@@ -128,8 +128,10 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     Ok(contents)
 }
 
+/// What a header's line is. A foreign letter before it, of two bytes or more, moves a comment's label to the right.
 fn label(line: &str) -> &str {
-    line.get(LABEL..).unwrap_or("").trim_end()
+    let label = line.get(LABEL..).unwrap_or("").trim();
+    if label.ends_with("COMMENT") { "COMMENT" } else { label }
 }
 
 /// Lines that belong together.

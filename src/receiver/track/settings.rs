@@ -90,8 +90,8 @@ pub enum TrackingSettingsError {
     #[error("tracking.{key} = {value}: expected {expected}")]
     Range { key: &'static str, value: f64, expected: &'static str },
     #[error(
-        "tracking.{key} = {value_hz} Hz with updates every {update_s} s: bandwidth times update time is {product}, \
-         above the limit {limit} (at most {largest_hz} Hz here)"
+        "tracking.{key} = {value_hz:?} Hz, expected less: with updates every {update_s} s bandwidth times update time is \
+         {product:?}, above the limit {limit} (at most {largest_hz} Hz here)"
     )]
     Bandwidth { key: &'static str, value_hz: f64, update_s: f64, product: f64, limit: f64, largest_hz: f64 },
 }

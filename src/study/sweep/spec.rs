@@ -12,6 +12,7 @@ use super::axis::{self, Axis, Grid};
 use super::{model, sampled};
 use crate::generator::scenario::ScenarioError;
 use crate::generator::scenario::read::{Source, Table, nearest};
+use crate::receiver::settings::Settings;
 
 /// What a case is run on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,7 +132,7 @@ impl Study {
             root.tables("axis")?.unwrap_or_default().iter().map(Axis::read).collect::<Result<_, _>>()?;
         unlike(&root, &axes)?;
         let scenario = scenario(&root, level, &axes)?;
-        let base = base(&root, text, level).map_err(|e| match e {
+        let base = base(&root, (text, origin), level).map_err(|e| match e {
             Ok(refused) => refused,
             Err(e) => toml(*e),
         })?;
@@ -260,7 +261,7 @@ fn scenario(root: &Table<'_>, level: Level, axes: &[Axis]) -> Result<Option<Path
 /// The tables of the base, at correlator level.
 fn base(
     root: &Table<'_>,
-    text: &str,
+    (text, origin): (&str, &str),
     level: Level,
 ) -> Result<toml::Table, Result<ScenarioError, Box<toml::de::Error>>> {
     if level == Level::Samples {
@@ -269,6 +270,11 @@ fn base(
         return written.map_or_else(|| Ok(toml::Table::new()), |name| Err(Ok(root.bad(name, expected))));
     }
     let mut whole: toml::Table = toml::from_str(text).map_err(|e| Err(Box::new(e)))?;
+    Settings::of_scenario(text, origin).map_err(|e| {
+        let reason = e.to_string();
+        let reason = reason.strip_prefix(&format!("{}: ", e.place())).unwrap_or(&reason).to_owned();
+        Ok(ScenarioError::Conflict { origin: e.place().to_owned(), key: "receiver", reason })
+    })?;
     whole.retain(|key, _| BASE.contains(&key));
     // As written and in its place, so that errors of the base itself carry theirs.
     model::Model::read(root).map_err(Ok)?;

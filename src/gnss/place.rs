@@ -1,0 +1,80 @@
+//! Where keys and values stand in a TOML text, so that errors can name line and column.
+//!
+//! Source: TOML 1.0, through the spans of the `toml` crate. Keys are named from the top, with dots between: a quoted key that
+//! has dots of its own is one with the tables that it abbreviates. Arrays are not looked into.
+
+use std::ops::Range;
+
+use toml::de::{DeTable, DeValue};
+
+/// The keys of a text.
+pub struct Keys<'t> {
+    origin: &'t str,
+    text: &'t str,
+    entries: Vec<(String, Range<usize>, Range<usize>)>,
+}
+
+impl<'t> Keys<'t> {
+    /// Those of `text`, which errors call `origin`; none if it is no TOML.
+    pub fn new(origin: &'t str, text: &'t str) -> Self {
+        let mut keys = Self { origin, text, entries: Vec::new() };
+        if let Ok(document) = DeTable::parse(text) {
+            keys.walk("", document.get_ref());
+        }
+        keys
+    }
+
+    fn walk(&mut self, above: &str, table: &DeTable<'_>) {
+        for (key, value) in table {
+            let path = if above.is_empty() { key.get_ref().to_string() } else { format!("{above}.{}", key.get_ref()) };
+            self.entries.push((path.clone(), key.span(), value.span()));
+            if let DeValue::Table(below) = value.get_ref() {
+                self.walk(&path, below);
+            }
+        }
+    }
+
+    /// `origin:line:column` of a byte of the text.
+    pub fn place(&self, byte: usize) -> String {
+        let before = self.text.get(..byte).unwrap_or(self.text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
+        format!("{}:{line}:{column}", self.origin)
+    }
+
+    /// The place of a key, or of what is above it, if that is there; else the name of the text alone.
+    pub fn place_of(&self, path: &str) -> String {
+        let mut path = path;
+        loop {
+            if let Some((_, key, _)) = self.entries.iter().find(|(name, ..)| name == path) {
+                return self.place(key.start);
+            }
+            let Some((above, _)) = path.rsplit_once('.') else { return self.origin.to_owned() };
+            path = above;
+        }
+    }
+
+    /// The key whose value holds a byte, the innermost one.
+    pub fn holding(&self, byte: usize) -> Option<&str> {
+        let inside =
+            self.entries.iter().filter(|(_, _, value)| value.start <= byte && byte < value.end.max(value.start + 1));
+        inside.max_by_key(|(name, ..)| name.len()).map(|(name, ..)| name.as_str())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_found_in_tables_of_every_form() {
+        let text = "a = 1\n[b]\nc = 2\n  d.e = 3\n\"f.g\" = { h = 4 }\n";
+        let keys = Keys::new("x", text);
+        let of = |path| keys.place_of(path);
+        assert_eq!([of("a"), of("b.c"), of("b.d.e")], ["x:1:1", "x:3:1", "x:4:5"].map(str::to_owned));
+        assert_eq!([of("b.f.g.h"), of("b.f.g.other"), of("nothing")], ["x:5:11", "x:5:1", "x"].map(str::to_owned));
+        assert_eq!(keys.holding(text.find('4').unwrap()), Some("b.f.g.h"));
+        assert_eq!(keys.holding(text.find('3').unwrap()), Some("b.d.e"));
+        assert_eq!(Keys::new("x", "= 1").place_of("a"), "x");
+    }
+}

@@ -1,0 +1,183 @@
+//! Whether the bytes of a recording look like the format that was declared.
+//!
+//! Noise from an antenna is nearly Gaussian about zero, so the bytes of each format have a shape of their own: one peak about
+//! 0 or about 127.5 for single bytes; bytes of all values in turn with few about 0 for 16 bits; and for floats, exponents
+//! near that of one. Limits: real samples cannot be told from complex ones of the same width, nor anything from
+//! samples that are silent, or that saturate or are jammed until all bytes are alike; then nothing is said.
+
+use std::fmt;
+
+use crate::gnss::samples::Format;
+
+/// Bytes that are looked at, from the start of the recording.
+pub const LOOKED_AT_BYTES: usize = 1 << 16;
+/// Fewer bytes than these say nothing.
+const LEAST_BYTES: usize = 1 << 12;
+/// Root mean square of a byte of evenly spread values, about 0 and about 127.5 alike, is 73.9; below this it has a peak there.
+const PEAKED: f64 = 60.0;
+/// And above this it is spread as evenly as the low byte of 16-bit samples with a deviation of a hundred or more.
+const SPREAD: f64 = 68.0;
+/// Part of the samples that must be as the format has them: the rest may be damaged.
+const MOST: f64 = 0.95;
+
+/// How components are written, whether there are one or two of them in a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    Signed8,
+    Offset8,
+    Signed16,
+    Float32,
+    /// Most significant byte first, which cannot be received.
+    Signed16BigEndian,
+    Float32BigEndian,
+}
+
+impl Look {
+    /// That of a declared format.
+    pub fn of(format: Format) -> Self {
+        match format {
+            Format::Ci8 | Format::Ri8 => Self::Signed8,
+            Format::Cu8 => Self::Offset8,
+            Format::Ci16Le | Format::Ri16Le => Self::Signed16,
+            Format::Cf32Le => Self::Float32,
+        }
+    }
+
+    /// What the first bytes of a recording look like; `None` where they do not tell.
+    pub fn judge(bytes: &[u8]) -> Option<Self> {
+        let bytes = bytes.get(..bytes.len().min(LOOKED_AT_BYTES))?;
+        if bytes.len() < LEAST_BYTES || bytes.iter().all(|byte| Some(byte) == bytes.first()) {
+            return None;
+        }
+        let [four_le, four_be] = [false, true].map(|swapped| {
+            share(bytes.as_chunks::<4>().0, |four| {
+                let value = if swapped { f32::from_be_bytes(*four) } else { f32::from_le_bytes(*four) };
+                (1e-8..1e8).contains(&value.abs())
+            })
+        });
+        // Bytes of all values have such exponents in one of five cases.
+        match (four_le > MOST, four_be > MOST) {
+            (true, false) => return Some(Self::Float32),
+            (false, true) => return Some(Self::Float32BigEndian),
+            _ => {}
+        }
+        let (pairs, _) = bytes.as_chunks::<2>();
+        let signs = |high: usize| share(pairs, |pair| pair[high] == if pair[1 - high] < 128 { 0 } else { 255 });
+        let about = |zero: f64, byte: usize| {
+            let sum: f64 = pairs.iter().map(|pair| shifted(pair[byte], zero).powi(2)).sum();
+            (sum / pairs.len() as f64).sqrt()
+        };
+        let (first, second) = (about(0.0, 0), about(0.0, 1));
+        // A sample below 128 has a high byte that only repeats its sign; a larger one has low bytes of all values.
+        if signs(1) > MOST || (first > SPREAD && second < 0.5 * first) {
+            return Some(Self::Signed16);
+        }
+        if signs(0) > MOST || (second > SPREAD && first < 0.5 * second) {
+            return Some(Self::Signed16BigEndian);
+        }
+        let offset = about(127.5, 0).max(about(127.5, 1));
+        match (first.max(second) < PEAKED, offset < PEAKED) {
+            (true, false) => Some(Self::Signed8),
+            (false, true) => Some(Self::Offset8),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Look {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Signed8 => "ci8 or ri8",
+            Self::Offset8 => "cu8",
+            Self::Signed16 => "ci16_le or ri16_le",
+            Self::Float32 => "cf32_le",
+            Self::Signed16BigEndian => "16-bit integers with the high byte first, which must be swapped",
+            Self::Float32BigEndian => "floats with the high byte first, which must be swapped",
+        })
+    }
+}
+
+/// A byte as a number about 0: two's complement, or offset binary about `zero`.
+fn shifted(byte: u8, zero: f64) -> f64 {
+    if zero == 0.0 { f64::from(byte as i8) } else { f64::from(byte) - zero }
+}
+
+/// The part of the items that are not all zeros, which are so in every format, of which something holds.
+fn share<const N: usize>(items: &[[u8; N]], holds: impl Fn(&[u8; N]) -> bool) -> f64 {
+    let (mut count, mut held) = (0_u32, 0_u32);
+    for item in items.iter().filter(|item| **item != [0; N]) {
+        count += 1;
+        held += u32::from(holds(item));
+    }
+    f64::from(held) / f64::from(count.max(1))
+}
+
+/// The beginning of a recording, until there is enough of it to judge.
+#[derive(Clone, Debug)]
+pub struct Check {
+    format: Format,
+    bytes: Vec<u8>,
+}
+
+impl Check {
+    /// Of a recording that is declared to have this format.
+    pub fn new(format: Format) -> Self {
+        Self { format, bytes: Vec::new() }
+    }
+
+    /// Takes the next bytes, however they arrive.
+    pub fn take(&mut self, bytes: &[u8]) {
+        let room = LOOKED_AT_BYTES.saturating_sub(self.bytes.len()).min(bytes.len());
+        self.bytes.extend_from_slice(bytes.get(..room).unwrap_or_default());
+    }
+
+    /// A warning, if the bytes look like another format.
+    pub fn warning(&self) -> Option<String> {
+        let look = Look::judge(&self.bytes).filter(|look| *look != Look::of(self.format))?;
+        Some(format!("the format {} was taken, but the first {} bytes look like {look}", self.format, self.bytes.len()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gaussian enough: the sum of twelve even numbers.
+    fn noise(count: usize, sigma: f32) -> Vec<f32> {
+        let mut state = 7_u64;
+        let mut even = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 40) as f32 / (1 << 24) as f32
+        };
+        (0..count).map(|_| ((0..12).map(|_| even()).sum::<f32>() - 6.0) * sigma).collect()
+    }
+
+    #[test]
+    fn every_format_looks_like_itself_from_weak_to_strong() {
+        for (format, _) in Format::NAMES {
+            let sigmas: &[f32] = match format {
+                Format::Ci8 | Format::Cu8 | Format::Ri8 => &[0.6, 1.0, 3.0, 14.0, 28.0, 42.0],
+                Format::Ci16Le | Format::Ri16Le => &[1.0, 10.0, 28.0, 100.0, 512.0, 2000.0, 7000.0],
+                Format::Cf32Le => &[1e-4, 1.0, 100.0, 1e5],
+            };
+            for sigma in sigmas {
+                let (i, q) = (noise(40_000, *sigma), noise(80_000, *sigma));
+                let mut bytes = Vec::new();
+                format.pack(&i, &q[40_000..], &mut bytes);
+                let look = Look::judge(&bytes);
+                assert_eq!(look, Some(Look::of(format)), "{format} {sigma}");
+                let mut check = Check::new(format);
+                bytes.chunks(1001).for_each(|piece| check.take(piece));
+                assert_eq!(check.warning(), None);
+            }
+        }
+    }
+
+    #[test]
+    fn silence_and_evenly_spread_bytes_say_nothing() {
+        assert_eq!(Look::judge(&[0; 10_000]), None);
+        assert_eq!(Look::judge(b"short"), None);
+        let even: Vec<u8> = noise(20_000, 1e4).iter().map(|x| *x as i32 as u8).collect();
+        assert_eq!(Look::judge(&even), None);
+    }
+}
