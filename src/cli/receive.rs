@@ -43,7 +43,10 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     let outcome = outcome.map_err(receiver_error)?;
     drop(output);
     staging.commit()?;
-    let mut text = format!("{outcome}\n");
+    for warning in &outcome.warnings {
+        scenario::warn(warning);
+    }
+    let mut text = format!("{outcome}\n{}\n", outcome.conditioning);
     if let Some(diagnosis) = &outcome.diagnosis {
         text += &format!("{diagnosis}\n");
     }
