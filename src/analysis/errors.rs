@@ -222,10 +222,11 @@ fn remove_constant(arc: &mut [SignalError]) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn arc(carrier: &[f64]) -> Vec<SignalError> {
+    /// Ten observations a second, locked for five seconds at the first.
+    pub fn arc(carrier: &[f64]) -> Vec<SignalError> {
         let row = |(index, &carrier_cycles): (usize, &f64)| SignalError {
             sample: index as u64 * 100,
             time_s: index as f64 * 0.1,

@@ -145,7 +145,7 @@ impl Run {
             scenario: text(&run.join("scenario.toml"))?,
             truth: rows(&truth.join("observations.csv"), TRUTH)?,
             sky: rows(&truth.join("sky.csv"), TRUTH)?,
-            rays: if rays.exists() { rows(&rays, TRUTH)? } else { Vec::new() },
+            rays: optional(&rays)?,
             trajectory: rows(&truth.join("trajectory.csv"), TRUTH)?,
             truth_navigation: rows(&truth.join("navigation.csv"), TRUTH)?,
             interference: optional(&truth.join("interference.csv"))?,
@@ -222,21 +222,32 @@ fn missing(path: &Path, remedy: &'static str) -> JudgeError {
 /// All rows of a CSV file; a file without even a header has none.
 fn rows<T: DeserializeOwned>(path: &Path, remedy: &'static str) -> Result<Vec<T>, JudgeError> {
     let file = fs::File::open(path).map_err(|source| open_error(path, remedy, source))?;
-    csv::Reader::from_reader(io::BufReader::new(file))
-        .deserialize()
-        .collect::<Result<_, _>>()
-        .map_err(|source| JudgeError::Row { path: path.to_owned(), source })
+    csv::Reader::from_reader(io::BufReader::new(file)).deserialize().collect::<Result<_, _>>().map_err(
+        |error: csv::Error| {
+            let path = path.to_owned();
+            if !error.is_io_error() {
+                return JudgeError::Row { path, source: error };
+            }
+            match error.into_kind() {
+                csv::ErrorKind::Io(source) => JudgeError::Read { path, source },
+                other => JudgeError::Read { path, source: io::Error::other(format!("{other:?}")) },
+            }
+        },
+    )
 }
 
 /// All rows of a CSV file that a run may lack.
 fn optional<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, JudgeError> {
-    if path.exists() { rows(path, "") } else { Ok(Vec::new()) }
+    match rows(path, "") {
+        Err(JudgeError::Missing { .. }) => Ok(Vec::new()),
+        other => other,
+    }
 }
 
 fn open_error(path: &Path, remedy: &'static str, source: io::Error) -> JudgeError {
     match source.kind() {
         io::ErrorKind::NotFound => missing(path, remedy),
-        _ => JudgeError::File { path: path.to_owned(), source },
+        _ => JudgeError::Read { path: path.to_owned(), source },
     }
 }
 
@@ -247,7 +258,7 @@ fn json<T: DeserializeOwned>(path: &PathBuf) -> Result<Option<T>, JudgeError> {
             serde_json::from_slice(&bytes).map(Some).map_err(|source| JudgeError::Json { path: path.clone(), source })
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(JudgeError::File { path: path.clone(), source }),
+        Err(source) => Err(JudgeError::Read { path: path.clone(), source }),
     }
 }
 
@@ -256,6 +267,6 @@ fn text(path: &Path) -> Result<Option<String>, JudgeError> {
     match fs::read(path) {
         Ok(bytes) => Ok(Some(String::from_utf8_lossy(&bytes).into_owned())),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(JudgeError::File { path: path.to_owned(), source }),
+        Err(source) => Err(JudgeError::Read { path: path.to_owned(), source }),
     }
 }

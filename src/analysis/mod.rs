@@ -7,7 +7,7 @@
 //! condenses, [`access`] and [`jamming`] expect C/N0 under other codes and interference, [`lines`] holds the receiver's word of
 //! continuous waves against them, [`spoofing`] tells what a
 //! spoofer did, [`summary`] is what scripts gate on with its [`schema`], [`verdict`] holds it against theory and a user's
-//! [`limits`], [`plot`] draws, [`report`] prints on a terminal and `pdf` on paper, [`psd`] estimates the spectrum of
+//! [`limits`], [`making`] keeps unfinished files from sight, [`plot`] draws, [`report`] prints on a terminal and `pdf` on paper, [`psd`] estimates the spectrum of
 //! the samples, [`spectrum`] says what it should be, [`foreign`] judges receivers that this project did not write, [`trade`]
 //! weighs speed against accuracy, [`theory`] says what errors to expect.
 
@@ -24,6 +24,7 @@ pub mod jitter;
 pub mod limits;
 pub mod lines;
 pub mod load;
+pub mod making;
 #[cfg(feature = "pdf")]
 pub mod pdf;
 pub mod plot;
@@ -42,13 +43,14 @@ pub mod theory;
 pub mod trade;
 pub mod verdict;
 
-use std::fs;
-use std::io;
+use std::ffi::OsString;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use thiserror::Error;
 
+use making::Making;
 pub use summary::Summary;
 
 /// Why a run cannot be judged.
@@ -58,6 +60,8 @@ pub enum JudgeError {
     Missing { path: PathBuf, remedy: &'static str },
     #[error("{}: {source}", path.display())]
     File { path: PathBuf, source: io::Error },
+    #[error("cannot read {}: {source}", path.display())]
+    Read { path: PathBuf, source: io::Error },
     #[error("{} holds a row that is not as expected: {source}", path.display())]
     Row { path: PathBuf, source: csv::Error },
     #[error("{} is not the JSON expected: {source}", path.display())]
@@ -148,14 +152,13 @@ pub(crate) fn write_rows<T: Serialize>(path: &Path, rows: impl Iterator<Item = T
 
 /// Writes a file so that a reader sees the old one or the new one, never a part.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), JudgeError> {
-    let mut part = path.as_os_str().to_owned();
+    let mut part = OsString::from(".");
+    part.push(path.file_name().unwrap_or_default());
     part.push(".part");
-    let part = PathBuf::from(part);
-    fs::write(&part, bytes)
-        .and_then(|()| fs::rename(&part, path))
-        .inspect_err(|_| {
-            // Nothing better can be done with a second failure.
-            let _ = fs::remove_file(&part);
+    Making::file(path.with_file_name(part))
+        .and_then(|(making, mut file)| {
+            file.write_all(bytes)?;
+            making.finish(path)
         })
         .map_err(|source| JudgeError::File { path: path.to_owned(), source })
 }

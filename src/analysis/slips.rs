@@ -272,27 +272,13 @@ impl<'r> Evidence<'r> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn rows(carrier: &[f64]) -> Vec<SignalError> {
-        let row = |(index, &carrier_cycles): (usize, &f64)| SignalError {
-            sample: index as u64 * 100,
-            time_s: index as f64 * 0.1,
-            code_m: 0.0,
-            carrier_cycles,
-            doppler_hz: 0.0,
-            cn0_dbhz: 45.0,
-            cn0_true_dbhz: 45.0,
-            cn0_effective_dbhz: 45.0,
-            locked_s: 5.0 + index as f64 * 0.1,
-        };
-        carrier.iter().enumerate().map(row).collect()
-    }
+    use crate::analysis::errors::tests::arc;
 
     #[test]
     fn sizes_are_those_of_the_steps_and_what_is_declared_is_found_once() {
         let carrier: Vec<f64> =
             (0..60).map(|k| 7.3 + if k >= 20 { 0.5 } else { 0.0 } + if k >= 40 { -1.0 } else { 0.0 }).collect();
-        let all = rows(&carrier);
+        let all = arc(&carrier);
         let found = undeclared(&all, &[]);
         assert_eq!(found.iter().map(|slip| slip.0).collect::<Vec<_>>(), vec![2000, 4000]);
         assert!((found[0].1 - 0.5).abs() < 1e-12 && (found[1].1 + 1.0).abs() < 1e-12, "{found:?}");

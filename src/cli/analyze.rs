@@ -12,6 +12,7 @@ use crate::cli::scenario;
 
 /// Judges the run in a directory, against a user's limits if there are any, or a receiver against a truth.
 pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
+    scenario::use_threads(None)?;
     if let Some(truth) = &arguments.truth {
         return another_receiver(truth, arguments);
     }

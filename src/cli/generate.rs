@@ -1,12 +1,11 @@
 //! `generate`: samples, metadata and truth of a scene, without a receiver.
 
-use std::fs::{self, File};
-use std::io::{self, Write};
+use std::fs;
+use std::io;
 use std::path::Path;
 
 use crate::cli::args;
 use crate::cli::error::CliError;
-use crate::cli::interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, truth_error};
 use crate::cli::scenario;
@@ -45,22 +44,23 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     let meta = Staging::file(&meta_path)?;
     let truth = Staging::directory(&truth_path)?;
 
-    let file = File::create(samples.path()).map_err(|error| CliError::create(arguments.out.display(), &error))?;
-    let mut file = Interruptible(file);
     let mut writer = truth::Writer::create(truth.path()).map_err(truth_error)?;
     let progress = Progress::new(&format!("generate {}", scene.name), Some(end - first));
     let options = Options::default();
-    let generated =
-        generator::generate_part(&scene, first..end, &mut file, &mut writer, &mut |done| progress.set(done), &options);
+    let generated = generator::generate_part(
+        &scene,
+        first..end,
+        &mut samples.writer(),
+        &mut writer,
+        &mut |done| progress.set(done),
+        &options,
+    );
     drop(progress);
-    if let Some(signal) = interrupt::pending() {
-        return Err(signal);
-    }
     let generated = generated.map_err(generator_error)?;
     drop(writer);
     // What the receiver's clock reads at the first sample of the file.
     let metadata = IfMetadata { start: Some(scene.clock.epoch(first)), ..scene.metadata.clone() };
-    fs::write(meta.path(), sigmf::write(&metadata)).map_err(|error| CliError::output(meta_path.display(), &error))?;
+    meta.write(sigmf::write(&metadata).as_bytes())?;
     // Metadata last, and never those of other samples: a run that is killed here leaves none.
     discard(&meta_path)?;
     truth.commit()?;
@@ -79,21 +79,5 @@ fn discard(path: &Path) -> Result<(), CliError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(CliError::create(path.display(), &error)),
         _ => Ok(()),
-    }
-}
-
-/// A file whose writes stop when a signal has come.
-struct Interruptible(File);
-
-impl Write for Interruptible {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if interrupt::pending().is_some() {
-            return Err(io::ErrorKind::BrokenPipe.into());
-        }
-        self.0.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.0.flush()
     }
 }

@@ -1,34 +1,75 @@
-//! Signals: the first asks the work to stop and clean up, the second ends the process at once.
+//! Signals: the first takes outputs in the making away and ends the process, the second ends it at once.
+//!
+//! A thread of its own waits for them, so that they are heard whatever the others are at: computing, reading a pipe that
+//! stays silent, or drawing.
 
+use std::io::Read;
+use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
+use crate::analysis::making;
 use crate::cli::error::CliError;
+
+/// How long that thread may take to end the process, and how often it looks where it cannot be woken.
+const PATIENCE: Duration = Duration::from_secs(5);
+const LOOK: Duration = Duration::from_millis(50);
+/// Its stack.
+const STACK_BYTES: usize = 1 << 18;
 
 // A signal handler has no other place to write to.
 static RECEIVED: OnceLock<Arc<AtomicUsize>> = OnceLock::new();
 
-/// Installs the handlers.
+/// Installs the handlers, and the thread that hears of them.
 pub fn install() -> Result<(), CliError> {
+    handle().map_err(|error| CliError::passing(format!("cannot handle signals: {error}")))
+}
+
+fn handle() -> std::io::Result<()> {
     let received = RECEIVED.get_or_init(Default::default);
     let second = Arc::new(AtomicBool::new(false));
+    let (reader, writer) = UnixStream::pair()?;
+    thread::Builder::new().name("signals".to_owned()).stack_size(STACK_BYTES).spawn(move || wait(reader))?;
     for signal in [SIGINT, SIGTERM, SIGHUP] {
-        // Order matters: the shutdown sees the flag that an earlier signal has set.
-        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&second))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&second)))
-            .and_then(|_| signal_hook::flag::register_usize(signal, Arc::clone(received), signal as usize))
-            .map_err(|error| CliError::passing(format!("cannot handle signals: {error}")))?;
+        // Order matters: the shutdown sees the flag that an earlier signal has set, and who is woken finds its number.
+        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&second))?;
+        signal_hook::flag::register(signal, Arc::clone(&second))?;
+        signal_hook::flag::register_usize(signal, Arc::clone(received), signal as usize)?;
+        signal_hook::low_level::pipe::register(signal, writer.try_clone()?)?;
     }
     Ok(())
 }
 
-/// The error of the signal that came, if one did.
-pub fn pending() -> Option<CliError> {
+/// The signal that came, if one did.
+fn received() -> Option<i32> {
     match RECEIVED.get().map_or(0, |received| received.load(Ordering::Relaxed)) {
         0 => None,
-        signal => Some(CliError::signal(signal as i32)),
+        signal => Some(signal as i32),
+    }
+}
+
+fn wait(mut reader: UnixStream) {
+    let signal = loop {
+        // What is read says nothing; a wait that fails becomes a look now and then.
+        if reader.read(&mut [0]).is_err() {
+            thread::sleep(LOOK);
+        }
+        if let Some(signal) = received() {
+            break signal;
+        }
+    };
+    making::abandon();
+    signal_hook::low_level::exit(128 + signal);
+}
+
+/// Does nothing unless a signal has come: an error may then be its consequence, and the process ends as the signal asks.
+pub fn give_way() {
+    if received().is_some() {
+        thread::sleep(PATIENCE);
     }
 }

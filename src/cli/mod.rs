@@ -43,6 +43,7 @@ pub fn main() -> ExitCode {
     match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
+            interrupt::give_way();
             error.print();
             error.exit_code()
         }

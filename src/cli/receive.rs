@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use crate::analysis::making::present;
 use crate::cli::args;
 use crate::cli::error::{CliError, shown};
-use crate::cli::interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::run::{output_error, receiver_error};
 use crate::cli::scenario;
@@ -33,13 +33,9 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     let staging = Staging::directory(&arguments.out)?;
     let mut output = Output::create(staging.path()).map_err(output_error)?;
     let progress = Progress::new("receive", recording.samples);
-    let mut samples = Interruptible(recording.reader);
-    let outcome =
-        receiver::receive(&recording.metadata, &mut samples, &settings, &mut output, &mut |done| progress.set(done));
+    let (metadata, samples) = (&recording.metadata, recording.reader);
+    let outcome = receiver::receive(metadata, samples, &settings, &mut output, &mut |done| progress.set(done));
     drop(progress);
-    if let Some(signal) = interrupt::pending() {
-        return Err(signal);
-    }
     let outcome = outcome.map_err(receiver_error)?;
     drop(output);
     staging.commit()?;
@@ -64,7 +60,8 @@ struct Recording {
 fn open(arguments: &args::Receive) -> Result<Recording, CliError> {
     let stdin = arguments.file.as_os_str() == "-";
     let (data_path, meta_path) = pair(&arguments.file);
-    let described = if !stdin && meta_path.is_file() {
+    let there = !stdin && present(&meta_path).map_err(|error| CliError::read(shown(&meta_path), &error))?;
+    let described = if there {
         let (name, text) = scenario::text(&meta_path)?;
         Some(sigmf::parse(&text, &name).map_err(CliError::input)?)
     } else {
@@ -125,16 +122,4 @@ fn metadata(arguments: &args::Receive, described: Option<IfMetadata>) -> Result<
         metadata.center_hz = L1_CA.carrier_hz - if metadata.inverted { -if_hz } else { if_hz };
     }
     Ok(metadata)
-}
-
-/// A reader that ends in an error when a signal has come.
-struct Interruptible(Box<dyn Read>);
-
-impl Read for Interruptible {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        if interrupt::pending().is_some() {
-            return Err(io::Error::other("stopped by a signal"));
-        }
-        self.0.read(buffer)
-    }
 }

@@ -13,7 +13,6 @@ use crate::analysis::{self, JudgeError};
 use crate::cli::args;
 use crate::cli::check;
 use crate::cli::error::CliError;
-use crate::cli::interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::scenario;
 use crate::cli::speed::Speed;
@@ -116,9 +115,6 @@ fn both(
             more = generated.map_err(generator_error)?;
             std::mem::swap(&mut made, &mut taken);
             progress.set(reception.samples());
-            if let Some(signal) = interrupt::pending() {
-                return Err(signal);
-            }
         }
         let generated = stream.finish(truth).map_err(generator_error)?;
         Ok::<_, CliError>((generated, reception.finish(output).map_err(receiver_error)?))
@@ -219,7 +215,14 @@ pub fn generator_error(error: GenerateError) -> CliError {
 pub fn truth_error(error: truth::TruthError) -> CliError {
     match error {
         truth::TruthError::File { path, source } => CliError::output(path.display(), &source),
-        truth::TruthError::Row { path, source } => CliError::output(path.display(), &source.into()),
+        truth::TruthError::Row { path, source } => {
+            // What the conversion to an I/O error would lose: which one it was.
+            let source = match source.into_kind() {
+                csv::ErrorKind::Io(source) => source,
+                other => return CliError::bug(format!("{}: {other:?}", path.display())),
+            };
+            CliError::output(path.display(), &source)
+        }
     }
 }
 
@@ -244,6 +247,7 @@ pub fn output_error(error: OutputError) -> CliError {
 pub fn judge_error(error: JudgeError) -> CliError {
     match &error {
         JudgeError::File { path, source } => CliError::output(path.display(), source),
+        JudgeError::Read { path, source } => CliError::read(path.display(), source),
         JudgeError::Plot { .. } => CliError::bug(error),
         _ => CliError::input(error),
     }

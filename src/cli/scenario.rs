@@ -5,7 +5,7 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use crate::cli::error::{CliError, escaped, shown};
-use crate::generator::scenario::{Overrides, Scenario};
+use crate::generator::scenario::{Overrides, Scenario, ScenarioError};
 use crate::generator::scene::Scene;
 use crate::gnss::samples::Format;
 use crate::receiver::settings::Settings;
@@ -67,7 +67,18 @@ pub fn use_threads(threads: Option<u16>) -> Result<(), CliError> {
 
 /// The scene that the scenario means, with what the command line puts in its place.
 pub fn compose(named: &Named, seed: Option<u64>, format: Option<Format>) -> Result<(Scene, Vec<String>), CliError> {
-    named.scenario.compose(&named.directory, &Overrides { seed, format, allow_outside: false }).map_err(CliError::input)
+    let overrides = Overrides { seed, format, allow_outside: false };
+    named.scenario.compose(&named.directory, &overrides).map_err(scenario_error)
+}
+
+/// The exit that a refused scenario means.
+pub fn scenario_error(error: ScenarioError) -> CliError {
+    match error {
+        ScenarioError::Read { origin, key, path, error } => {
+            CliError::read(format!("{origin}: {key} = {path:?}"), &error)
+        }
+        other => CliError::input(other),
+    }
 }
 
 /// The receiver's settings that the scenario carries for it.

@@ -3,10 +3,11 @@
 //! A directory is written as `.<name>.part` beside its final place and renamed at the end. What
 //! a killed run left behind is swept by the next one.
 
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use crate::analysis::making::{Making, present};
 use crate::cli::error::CliError;
 
 /// Files that mark a directory as one of ours, which may be replaced.
@@ -14,94 +15,108 @@ const MARKERS: [&str; 4] = ["truth/scene.json", "rx/receiver.json", "receiver.js
 
 /// A directory or file in the making; dropped without [`Staging::commit`], it vanishes.
 pub struct Staging {
-    part: PathBuf,
+    making: Making,
+    file: Option<File>,
     target: PathBuf,
-    committed: bool,
 }
 
 impl Staging {
     /// Starts a directory that will be `target`. An existing target is replaced only if it is empty or one of ours.
     pub fn directory(target: &Path) -> Result<Self, CliError> {
-        if target.exists() && !replaceable(target) {
+        let error = |error: io::Error| CliError::create(target.display(), &error);
+        if present(target).map_err(error)? && !replaceable(target).map_err(error)? {
             return Err(CliError::refused_output(format!(
                 "{} exists and is not the result of a run: name another directory with --out, or remove it",
                 target.display()
             )));
         }
-        let staging = Self::beside(target)?;
-        remove(&staging.part).map_err(|error| CliError::create(staging.part.display(), &error))?;
-        fs::create_dir(&staging.part).map_err(|error| CliError::create(staging.part.display(), &error))?;
-        Ok(staging)
+        let making = Making::directory(part(target)?).map_err(error)?;
+        Ok(Self { making, file: None, target: target.to_owned() })
     }
 
-    /// Starts a file that will be `target`; the caller creates [`Staging::path`].
+    /// Starts a file that will be `target`.
     pub fn file(target: &Path) -> Result<Self, CliError> {
+        let error = |error: io::Error| CliError::create(target.display(), &error);
         // What is renamed over a device or a pipe takes its place.
-        if let Ok(kind) = fs::metadata(target).map(|metadata| metadata.file_type())
+        let about = match fs::metadata(target) {
+            Err(missing) if missing.kind() == io::ErrorKind::NotFound => None,
+            other => Some(other.map_err(error)?),
+        };
+        if let Some(kind) = about.map(|metadata| metadata.file_type())
             && !kind.is_file()
         {
             let what = if kind.is_dir() { "is a directory" } else { "is not an ordinary file" };
             return Err(CliError::refused_output(format!("{} {what}: name a file with --out", target.display())));
         }
-        let staging = Self::beside(target)?;
-        remove(&staging.part).map_err(|error| CliError::create(staging.part.display(), &error))?;
-        Ok(staging)
+        let (making, file) = Making::file(part(target)?).map_err(error)?;
+        Ok(Self { making, file: Some(file), target: target.to_owned() })
     }
 
-    fn beside(target: &Path) -> Result<Self, CliError> {
-        let name = target
-            .file_name()
-            .ok_or_else(|| CliError::usage(format!("--out {}: expected a name to write to", target.display())))?;
-        let parent = match target.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-            _ => PathBuf::from("."),
-        };
-        fs::create_dir_all(&parent).map_err(|error| CliError::create(parent.display(), &error))?;
-        let mut part = std::ffi::OsString::from(".");
-        part.push(name);
-        part.push(".part");
-        Ok(Self { part: parent.join(part), target: target.to_owned(), committed: false })
-    }
-
-    /// Where to write.
+    /// The directory to write in.
     pub fn path(&self) -> &Path {
-        &self.part
+        self.making.path()
+    }
+
+    /// What takes the contents of a file.
+    pub fn writer(&self) -> impl Write + '_ {
+        Writer(self.file.as_ref())
+    }
+
+    /// Writes all contents of a file.
+    pub fn write(&self, bytes: &[u8]) -> Result<(), CliError> {
+        self.writer().write_all(bytes).map_err(|error| CliError::output(self.target.display(), &error))
     }
 
     /// Gives the finished work its name.
-    pub fn commit(mut self) -> Result<(), CliError> {
-        let error = |error: io::Error| CliError::create(self.target.display(), &error);
-        if self.part.is_file() {
-            fs::File::open(&self.part).and_then(|file| file.sync_all()).map_err(error)?;
-        } else if self.target.exists() {
-            // A directory cannot be renamed over a full one.
-            fs::remove_dir_all(&self.target).map_err(error)?;
+    pub fn commit(self) -> Result<(), CliError> {
+        if let Some(file) = &self.file {
+            file.sync_all().map_err(|error| CliError::output(self.target.display(), &error))?;
         }
-        fs::rename(&self.part, &self.target).map_err(error)?;
-        self.committed = true;
+        self.making.finish(&self.target).map_err(|error| CliError::create(self.target.display(), &error))
+    }
+}
+
+/// A file's contents; a directory takes none.
+struct Writer<'a>(Option<&'a File>);
+
+impl Write for Writer<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.map_or(Err(io::ErrorKind::IsADirectory.into()), |mut file| file.write(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
 }
 
-impl Drop for Staging {
-    fn drop(&mut self) {
-        if !self.committed {
-            // Nothing better can be done with a failure here; the next run sweeps.
-            let _ = remove(&self.part);
+/// Where it is made: beside its place, which is created.
+fn part(target: &Path) -> Result<PathBuf, CliError> {
+    let name = target
+        .file_name()
+        .ok_or_else(|| CliError::usage(format!("--out {}: expected a name to write to", target.display())))?;
+    let parent = match target.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    };
+    fs::create_dir_all(&parent).map_err(|error| CliError::create(parent.display(), &error))?;
+    let mut part = std::ffi::OsString::from(".");
+    part.push(name);
+    part.push(".part");
+    Ok(parent.join(part))
+}
+
+/// Whether a directory is there that is empty or one of ours.
+fn replaceable(target: &Path) -> io::Result<bool> {
+    if !fs::metadata(target)?.is_dir() {
+        return Ok(false);
+    }
+    if fs::read_dir(target)?.next().transpose()?.is_none() {
+        return Ok(true);
+    }
+    for marker in MARKERS {
+        if present(&target.join(marker))? {
+            return Ok(true);
         }
     }
-}
-
-fn replaceable(target: &Path) -> bool {
-    let empty = fs::read_dir(target).is_ok_and(|mut entries| entries.next().is_none());
-    target.is_dir() && (empty || MARKERS.iter().any(|marker| target.join(marker).is_file()))
-}
-
-fn remove(path: &Path) -> io::Result<()> {
-    match fs::symlink_metadata(path) {
-        Ok(metadata) if metadata.is_dir() => fs::remove_dir_all(path),
-        Ok(_) => fs::remove_file(path),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(error),
-    }
+    Ok(false)
 }

@@ -7,7 +7,6 @@ use std::time::Instant;
 
 use crate::cli::args;
 use crate::cli::error::CliError;
-use crate::cli::interrupt;
 use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, judge_error, output_error, receiver_error};
 use crate::cli::scenario;
@@ -136,11 +135,8 @@ fn compute(plan: &Plan, shards: &[u32]) -> Result<(), CliError> {
     let cases = shards.iter().map(|&number| plan.cases(number)).map(|cases| cases.end - cases.start).sum();
     let start = Instant::now();
     let progress = Progress::new(&format!("study {}", plan.study.name), Some(cases));
-    let ran = engine::run(plan, shards, &|done| progress.set(done), &|| interrupt::pending().is_some());
+    let ran = engine::run(plan, shards, &|done| progress.set(done));
     drop(progress);
-    if let Some(signal) = interrupt::pending() {
-        return Err(signal);
-    }
     let ran = ran.map_err(study_error)?;
     scenario::print(&format!(
         "{}: {} cases in {} of {} shards computed in {:.1} s\n",
@@ -182,8 +178,7 @@ fn merge(arguments: &args::StudyMerge) -> Result<(), CliError> {
     let plan = load(&arguments.directory)?;
     let lines = result::merge(&plan).map_err(study_error)?;
     let staging = Staging::file(&arguments.out)?;
-    fs::write(staging.path(), result::table(&plan, &lines))
-        .map_err(|error| CliError::output(arguments.out.display(), &error))?;
+    staging.write(&result::table(&plan, &lines))?;
     staging.commit()?;
     scenario::print(&format!("{} cases in {}\n", lines.len(), arguments.out.display()))
 }
@@ -246,9 +241,9 @@ fn study_error(error: StudyError) -> CliError {
         StudyError::Output(error) => output_error(error),
         StudyError::Judge(error) => judge_error(error),
         StudyError::Bug(message) => CliError::bug(message),
-        StudyError::Stopped => CliError::bug("stopped without a signal"),
-        StudyError::Text(_)
-        | StudyError::Axis { .. }
+        StudyError::Stopped => CliError::bug("stopped without a reason"),
+        StudyError::Text(error) => scenario::scenario_error(error),
+        StudyError::Axis { .. }
         | StudyError::Case { .. }
         | StudyError::Input { .. }
         | StudyError::NotReproducible { .. } => CliError::input(error),

@@ -129,6 +129,8 @@ pub enum ScenarioError {
     Conflict { origin: String, key: &'static str, reason: String },
     #[error("{origin}: {key} = {path:?}: {reason}")]
     File { origin: String, key: &'static str, path: PathBuf, reason: String },
+    #[error("{origin}: {key} = {path:?}: cannot be read: {error}")]
+    Read { origin: String, key: &'static str, path: PathBuf, error: std::io::Error },
 }
 
 impl ScenarioError {
@@ -137,7 +139,7 @@ impl ScenarioError {
         let whole = self.to_string();
         let place = match self {
             Self::Toml { place, .. } | Self::UnknownKey { place, .. } | Self::Value { place, .. } => place.to_string(),
-            Self::Conflict { origin, .. } | Self::File { origin, .. } => origin.clone(),
+            Self::Conflict { origin, .. } | Self::File { origin, .. } | Self::Read { origin, .. } => origin.clone(),
         };
         whole.strip_prefix(&format!("{place}: ")).map_or(whole.clone(), str::to_owned)
     }

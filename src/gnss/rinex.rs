@@ -1,21 +1,11 @@
-//! RINEX navigation files, versions 2 to 4: an adapter over the `rinex` crate that yields GPS LNAV ephemerides.
+//! RINEX navigation files, versions 2 to 4: GPS LNAV ephemerides, the ionosphere's coefficients and the leap seconds.
 //!
-//! Source: RINEX 2.11, table A4; RINEX 3.05, table A6; RINEX 4.02. The crate panics on some damaged files,
-//! refuses non-ASCII bytes and checks no ranges, so here the bytes are filtered, the call is fenced
-//! and every element is held against the range of its LNAV field (IS-GPS-200N, tables 20-I and
-//! 20-III). Before that, records that are not in form are taken out (`columns`). A record that fails is left out and named
-//! in [`Navigation::skipped`].
+//! Source: RINEX 2.11, table A4; RINEX 3.05, table A6; RINEX 4.02. Lines and columns are `columns`'s matter; here every
+//! element is held against the range of its LNAV field (IS-GPS-200N, tables 20-I and 20-III). A record that fails is left
+//! out and named in [`Navigation::skipped`].
 
 mod columns;
 
-use std::cell::Cell;
-use std::io::BufReader;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Once;
-
-use ::rinex::navigation::{Ephemeris as Frame, NavKey, NavMessageType};
-use ::rinex::prelude::{Constellation, Rinex, TimeScale};
-use ::rinex::record::{ParsingDiagnostic, ParsingDiagnosticKind};
 use thiserror::Error;
 
 use crate::gnss::broadcast::Ephemeris;
@@ -23,7 +13,7 @@ use crate::gnss::inflate::{InflateError, inflate};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
-use columns::Sifted;
+use columns::Record;
 
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
@@ -72,22 +62,46 @@ pub fn embedded() -> Result<Navigation, NavigationError> {
 pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     let text = clean(&unpack(bytes, name)?);
     check_first_line(&text, name)?;
-    let sifted = columns::sift(&text);
-    let damaged = |detail: String| NavigationError::Damaged { name: name.to_owned(), detail };
-    let found = quietly(|| extract(&sifted))
-        .map_err(|()| damaged("its parser gave up on a malformed line".to_owned()))?
-        .map_err(damaged)?;
-    if found.navigation.ephemerides.is_empty() {
-        let reasons = found.navigation.skipped.iter().take(3).cloned().collect::<Vec<_>>().join("; ");
+    let contents = columns::read(&text).map_err(|detail| NavigationError::Damaged { name: name.to_owned(), detail })?;
+    let columns::Contents { records, klobuchar, leap_seconds, others, reasons } = contents;
+    let mut navigation = Navigation { klobuchar, leap_seconds, skipped: reasons, ..Navigation::default() };
+    let mut found: Vec<(usize, Ephemeris)> = Vec::new();
+    for record in &records {
+        match ephemeris(record) {
+            Ok(set) => found.push((record.line, set)),
+            Err(reason) => {
+                let skipped = format!("line {} (G{:02} {}): {reason}", record.line, record.number, record.toc);
+                navigation.skipped.push(skipped);
+            }
+        }
+    }
+    // Of sets of one time the one that was sent last goes first, and stays.
+    found.sort_by(|(line, a), (other, b)| {
+        let of_time = (a.sv, a.toc.seconds()).cmp(&(b.sv, b.toc.seconds()));
+        let newer = b.transmitted.since(a.transmitted).total_cmp(&0.0);
+        of_time.then(a.toc.fraction().total_cmp(&b.toc.fraction())).then(newer).then(other.cmp(line))
+    });
+    for (line, set) in found {
+        match navigation.ephemerides.last() {
+            Some(kept) if (kept.sv, kept.toc) == (set.sv, set.toc) => {
+                if *kept != set {
+                    let what = "another record of the same time, sent later or further down, replaces it";
+                    navigation.skipped.push(format!("line {line} ({} {}): {what}", set.sv, set.toc));
+                }
+            }
+            _ => navigation.ephemerides.push(set),
+        }
+    }
+    if navigation.ephemerides.is_empty() {
+        let reasons = navigation.skipped.iter().take(3).cloned().collect::<Vec<_>>().join("; ");
         let found = format!(
-            "{} records of other systems or messages, {} GPS records left out{}{reasons}",
-            found.others,
-            found.navigation.skipped.len(),
+            "{others} records of other systems or messages, {} things left out{}{reasons}",
+            navigation.skipped.len(),
             if reasons.is_empty() { "" } else { ": " },
         );
         return Err(NavigationError::Nothing { name: name.to_owned(), found });
     }
-    Ok(found.navigation)
+    Ok(navigation)
 }
 
 fn unpack(bytes: &[u8], name: &str) -> Result<Vec<u8>, NavigationError> {
@@ -126,108 +140,9 @@ fn check_first_line(text: &[u8], name: &str) -> Result<(), NavigationError> {
     }
 }
 
-thread_local! {
-    static QUIET: Cell<bool> = const { Cell::new(false) };
-}
-
-/// Runs what may panic; its panic becomes `Err` and prints nothing. Panics elsewhere print as before.
-pub(super) fn quietly<T>(run: impl FnOnce() -> T) -> Result<T, ()> {
-    static HOOK: Once = Once::new();
-    HOOK.call_once(|| {
-        let previous = std::panic::take_hook();
-        std::panic::set_hook(Box::new(move |info| {
-            if !QUIET.with(Cell::get) {
-                previous(info);
-            }
-        }));
-    });
-    let before = QUIET.with(|quiet| quiet.replace(true));
-    let outcome = catch_unwind(AssertUnwindSafe(run));
-    QUIET.with(|quiet| quiet.set(before));
-    outcome.map_err(|_| ())
-}
-
-struct Found {
-    navigation: Navigation,
-    others: usize,
-}
-
-fn extract(sifted: &Sifted) -> Result<Found, String> {
-    let (file, diagnostics) = Rinex::parse_with_diagnostics(&mut BufReader::new(sifted.text.as_slice()))
-        .map_err(|error| error.to_string())?;
-    let mut navigation = Navigation {
-        klobuchar: klobuchar(&file),
-        leap_seconds: file.header.leap.map(|leap| i64::from(leap.leap)),
-        skipped: [sifted.reasons.clone(), skipped(sifted, &diagnostics)].concat(),
-        ..Navigation::default()
-    };
-    let mut others = 0;
-    for (key, frame) in file.nav_ephemeris_frames_iter() {
-        if key.sv.constellation != Constellation::GPS || key.msgtype != NavMessageType::LNAV {
-            others += 1;
-            continue;
-        }
-        match ephemeris(key, frame) {
-            Ok(set) => navigation.ephemerides.push(set),
-            Err(reason) => navigation.skipped.push(format!("G{:02} at {}: {reason}", key.sv.prn, key.epoch)),
-        }
-    }
-    navigation.ephemerides.sort_by_key(|set| (set.sv, set.toc.seconds()));
-    Ok(Found { navigation, others })
-}
-
-/// What the crate dropped of GPS; records of other systems and faithful repetitions are no loss.
-fn skipped(sifted: &Sifted, diagnostics: &[ParsingDiagnostic]) -> Vec<String> {
-    if diagnostics.is_empty() {
-        return Vec::new();
-    }
-    // `clean` left nothing but ASCII.
-    let text = String::from_utf8_lossy(&sifted.text);
-    let lines: Vec<&str> = text.lines().collect();
-    let head = lines.iter().position(|line| line.contains("END OF HEADER")).unwrap_or(0);
-    // The crate counts from the header's last line.
-    let number = |at: usize| sifted.lines.get(head + at).copied().unwrap_or_default();
-    let mut reasons = Vec::new();
-    for diagnostic in diagnostics {
-        let line = lines.get(head + diagnostic.record_line).copied().unwrap_or_default();
-        // Version 4 has a line of its own before the record; version 2 has no letter.
-        let named = line.strip_prefix("> EPH ").unwrap_or(line);
-        if !named.starts_with(|first: char| first == 'G' || first == ' ' || first.is_ascii_digit()) {
-            continue;
-        }
-        let what = match &diagnostic.kind {
-            ParsingDiagnosticKind::NavigationFailure(error) => error.to_string(),
-            ParsingDiagnosticKind::DuplicateNavigation { conflicting: true, previous_record_line, .. } => {
-                format!("replaces a different record of the same time at line {}", number(*previous_record_line))
-            }
-            _ => continue,
-        };
-        let label: String = line.chars().take(23).collect();
-        reasons.push(format!("line {} ({label}): {what}", number(diagnostic.record_line)));
-    }
-    reasons
-}
-
-fn klobuchar(file: &Rinex) -> Option<Klobuchar> {
-    let header = file.header.ionod_corrections.get(&Constellation::GPS).and_then(|model| model.as_klobuchar());
-    let body = || {
-        file.nav_ionosphere_models_iter()
-            .filter(|(key, _)| key.sv.constellation == Constellation::GPS)
-            .find_map(|(_, model)| model.as_klobuchar())
-    };
-    let model = header.or_else(body)?;
-    let array = |t: (f64, f64, f64, f64)| [t.0, t.1, t.2, t.3];
-    let found = Klobuchar { alpha: array(model.alpha), beta: array(model.beta) };
-    found.alpha.iter().chain(&found.beta).all(|value| value.is_finite()).then_some(found)
-}
-
-/// Elements with the crate's key and the largest magnitude that their LNAV field can hold, in SI units.
-fn field(frame: &Frame, key: &'static str, least: f64, most: f64) -> Result<f64, String> {
-    let value = frame.get_orbit_f64(key).ok_or_else(|| format!("{key} is blank"))?;
-    within(key, value, least, most)
-}
-
-fn within(key: &str, value: f64, least: f64, most: f64) -> Result<f64, String> {
+/// An element that must stand there and lie within its range, in SI units.
+fn field(record: &Record, key: &'static str, least: f64, most: f64) -> Result<f64, String> {
+    let value = record.get(key).ok_or_else(|| format!("{key} is blank"))?;
     if (least..=most).contains(&value) {
         Ok(value)
     } else {
@@ -235,57 +150,53 @@ fn within(key: &str, value: f64, least: f64, most: f64) -> Result<f64, String> {
     }
 }
 
-fn whole(frame: &Frame, key: &'static str, most: u32) -> Result<u32, String> {
-    let value = field(frame, key, 0.0, f64::from(most))?;
+fn whole(record: &Record, key: &'static str, most: u32) -> Result<u32, String> {
+    let value = field(record, key, 0.0, f64::from(most))?;
     if value == value.floor() { Ok(value as u32) } else { Err(format!("{key} = {value}: expected a whole number")) }
 }
 
-fn ephemeris(key: &NavKey, frame: &Frame) -> Result<Ephemeris, String> {
+fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
     // Field ranges of IS-GPS-200N, tables 20-I and 20-III; RINEX rounds to twelve digits.
     const ANGLE_RAD: f64 = 2.0 * std::f64::consts::TAU;
     const HARMONIC_RAD: f64 = 6.104e-5;
     const HARMONIC_M: f64 = 1024.001;
-    let both = |name, most: f64| field(frame, name, -most, most);
+    let both = |name, most: f64| field(record, name, -most, most);
+    let optional = |name, most| if record.get(name).is_some() { whole(record, name, most).map(Some) } else { Ok(None) };
 
-    let number = key.sv.prn;
-    if !(1..=32).contains(&number) {
-        return Err(format!("PRN {number}: expected 1 to 32"));
-    }
-    let toc = epoch(key)?;
-    let toe = near(toc, field(frame, "toe", 0.0, 604_800.0)?);
-    let week = f64::from(whole(frame, "week", 9999)?);
+    let toc = record.toc;
+    let toe = near(toc, field(record, "toe", 0.0, 604_800.0)?);
+    let week = f64::from(whole(record, "week", 9999)?);
     let astray = (week - toe.week() as f64).abs() % 1024.0;
     if astray > 1.0 && astray < 1023.0 {
         return Err(format!("week = {week}: expected that of its epoch, {}", toe.week()));
     }
     // The last line of a record begins with it: without it the file was cut, perhaps inside a number.
-    if frame.get_orbit_f64("t_tm").is_none() {
+    if record.get("t_tm").is_none() {
         return Err("no transmission time: the record is cut short".to_owned());
     }
-    let iode = whole(frame, "iode", 255)?;
-    let iodc = if frame.get_orbit_f64("iodc").is_some() { whole(frame, "iodc", 1023)? } else { iode };
+    let iode = whole(record, "iode", 255)?;
     Ok(Ephemeris {
-        sv: Sv::gps(number),
+        sv: Sv::gps(record.number),
         toe,
         toc,
-        transmitted: transmitted(frame, toe),
+        transmitted: transmitted(record, toe),
         iode: iode as u8,
-        iodc: iodc as u16,
-        ura_index: ura_index(frame.get_orbit_f64("accuracy")),
-        health: whole(frame, "health", 63)? as u8,
-        l2_codes: if frame.get_orbit_f64("l2Codes").is_some() { whole(frame, "l2Codes", 3)? as u8 } else { 0 },
-        l2_p_data_off: frame.get_orbit_f64("l2p").is_some_and(|flag| flag != 0.0),
+        iodc: optional("iodc", 1023)?.unwrap_or(iode) as u16,
+        ura_index: ura_index(optional_accuracy(record)?),
+        health: whole(record, "health", 63)? as u8,
+        l2_codes: optional("l2Codes", 3)?.unwrap_or(0) as u8,
+        l2_p_data_off: optional("l2p", 1)? == Some(1),
         // Hours or the flag itself, as the file's producer meant it; blank is the usual four hours.
-        long_fit: frame.get_orbit_f64("fitInt").is_some_and(|fit| fit == 1.0 || fit > 4.0),
+        long_fit: record.get("fitInt").is_some_and(|fit| fit == 1.0 || fit > 4.0),
         aodo: 0,
-        sqrt_a_sqrtm: field(frame, "sqrta", 5000.0, 5300.0)?,
-        eccentricity: field(frame, "e", 0.0, 0.1)?,
+        sqrt_a_sqrtm: field(record, "sqrta", 5000.0, 5300.0)?,
+        eccentricity: field(record, "e", 0.0, 0.1)?,
         m0_rad: both("m0", ANGLE_RAD)?,
         delta_n_radps: both("deltaN", 1.171e-8)?,
         omega0_rad: both("omega0", ANGLE_RAD)?,
         omega_dot_radps: both("omegaDot", 2.997e-6)?,
         omega_rad: both("omega", ANGLE_RAD)?,
-        i0_rad: field(frame, "i0", 0.0, std::f64::consts::PI)?,
+        i0_rad: field(record, "i0", 0.0, std::f64::consts::PI)?,
         idot_radps: both("idot", 2.927e-9)?,
         cuc_rad: both("cuc", HARMONIC_RAD)?,
         cus_rad: both("cus", HARMONIC_RAD)?,
@@ -293,21 +204,16 @@ fn ephemeris(key: &NavKey, frame: &Frame) -> Result<Ephemeris, String> {
         crs_m: both("crs", HARMONIC_M)?,
         cic_rad: both("cic", HARMONIC_RAD)?,
         cis_rad: both("cis", HARMONIC_RAD)?,
-        af0_s: within("af0", frame.clock_bias, -9.766e-4, 9.766e-4)?,
-        af1_sps: within("af1", frame.clock_drift, -3.726e-9, 3.726e-9)?,
-        af2_sps2: within("af2", frame.clock_drift_rate, -3.553e-15, 3.553e-15)?,
+        af0_s: both("af0", 9.766e-4)?,
+        af1_sps: both("af1", 3.726e-9)?,
+        af2_sps2: both("af2", 3.553e-15)?,
         tgd_s: both("tgd", 5.961e-8)?,
     })
 }
 
-fn epoch(key: &NavKey) -> Result<Epoch, String> {
-    let nanoseconds = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();
-    let seconds = i64::try_from(nanoseconds.div_euclid(1_000_000_000)).map_err(|e| e.to_string())?;
-    // 1980 to 2180, so that whole seconds and calendar dates are safe to handle.
-    if !(0..=6_400_000_000).contains(&seconds) {
-        return Err(format!("epoch {}: expected 1980 to 2180", key.epoch));
-    }
-    Ok(Epoch::new(seconds, nanoseconds.rem_euclid(1_000_000_000) as f64 * 1e-9))
+/// Metres of accuracy, where they are given; a negative one says nothing.
+fn optional_accuracy(record: &Record) -> Result<Option<f64>, String> {
+    if record.get("accuracy").is_some() { field(record, "accuracy", 0.0, 1e6).map(Some) } else { Ok(None) }
 }
 
 /// The instant nearest to `anchor` with that time of week.
@@ -319,9 +225,9 @@ fn near(anchor: Epoch, tow_s: f64) -> Epoch {
 }
 
 /// Time of transmission, or two hours before the reference time where the file leaves it out or fills it.
-fn transmitted(frame: &Frame, toe: Epoch) -> Epoch {
+fn transmitted(record: &Record, toe: Epoch) -> Epoch {
     let assumed = toe.plus_s(-7200.0);
-    match frame.get_orbit_f64("t_tm") {
+    match record.get("t_tm") {
         Some(tow_s) if tow_s.abs() <= 2.0 * WEEK_S as f64 => {
             let said = near(toe, tow_s.rem_euclid(WEEK_S as f64));
             if said.since(toe).abs() <= 86_400.0 { said } else { assumed }
@@ -334,7 +240,7 @@ fn transmitted(frame: &Frame, toe: Epoch) -> Epoch {
 fn ura_index(accuracy_m: Option<f64>) -> u8 {
     const UPPER_M: [f64; 15] =
         [2.4, 3.4, 4.85, 6.85, 9.65, 13.65, 24.0, 48.0, 96.0, 192.0, 384.0, 768.0, 1536.0, 3072.0, 6144.0];
-    let Some(accuracy_m) = accuracy_m.filter(|value| *value >= 0.0) else { return 15 };
+    let Some(accuracy_m) = accuracy_m else { return 15 };
     UPPER_M.iter().take_while(|upper| accuracy_m > **upper).count() as u8
 }
 

@@ -6,15 +6,18 @@
 //! 999999 µs, drops fractions of seconds, reads a version a in the wrong time and writes y into the x of velocities, so
 //! here the call is fenced, the first three are looked after and versions a and b refused; velocities are not used.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::io::BufReader;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Once;
 
 use ::sp3::prelude::{Constellation, SP3, TimeScale, Version};
 use nalgebra::Vector3;
 use thiserror::Error;
 
 use crate::gnss::inflate::{InflateError, inflate};
-use crate::gnss::rinex::{clean, quietly};
+use crate::gnss::rinex::clean;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
 
@@ -84,6 +87,27 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Precise, Sp3Error> {
         precise.satellites.entry(Sv::gps(key.sv.prn)).or_default().insert(seconds, sample);
     }
     if precise.satellites.is_empty() { Err(Sp3Error::Nothing { name: name.to_owned() }) } else { Ok(precise) }
+}
+
+thread_local! {
+    static QUIET: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs what may panic; its panic becomes `Err` and prints nothing. Panics elsewhere print as before.
+fn quietly<T>(run: impl FnOnce() -> T) -> Result<T, ()> {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let previous = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| {
+            if !QUIET.with(Cell::get) {
+                previous(info);
+            }
+        }));
+    });
+    let before = QUIET.with(|quiet| quiet.replace(true));
+    let outcome = catch_unwind(AssertUnwindSafe(run));
+    QUIET.with(|quiet| quiet.set(before));
+    outcome.map_err(|_| ())
 }
 
 /// The first line's version, and that epochs are at whole seconds.

@@ -247,6 +247,25 @@ mod tests {
         Replica::new(crate::gnss::gps::l1ca::code(7).unwrap(), edge).unwrap()
     }
 
+    /// What every level of this processor gives, which has to be the same.
+    fn same_at_every_level<const T: usize>(
+        fast: kernel::Fast,
+        replica: &Replica,
+        samples: (&[f32], &[f32]),
+        nco: &Nco,
+        taps: &[i64; T],
+    ) -> [Complex64; T] {
+        let of = |level| {
+            let power = kernel::power(level, samples.0, samples.1);
+            (kernel::correlate(level, fast, replica, samples, nco, taps), power)
+        };
+        let (levels, baseline) = (kernel::Level::all(), of(kernel::Level::Baseline));
+        for level in levels {
+            assert_eq!(of(level), baseline, "{level:?}, {} samples", samples.0.len());
+        }
+        baseline.0
+    }
+
     #[test]
     fn the_kernel_agrees_with_its_slow_twin_for_every_short_length_and_offset() {
         let (i, q) = (noise(200, 1), noise(200, 2));
@@ -262,7 +281,7 @@ mod tests {
                         code_step: chips_to_units(1.023 / 2.6) as u64,
                     };
                     let (i, q) = (&i[offset..offset + length], &q[offset..offset + length]);
-                    let fast = replica.correlate(i, q, &nco, &taps);
+                    let fast = same_at_every_level(kernel::Fast::Single, &replica, (i, q), &nco, &taps);
                     let slow = replica.slow(i, q, &nco, &taps);
                     // f32 rounding: 130 terms of size 0.7, each 6e-8, and the phasor 1e-6 after 9 turns.
                     for (a, b) in fast.iter().zip(&slow) {
@@ -297,7 +316,7 @@ mod tests {
                         code_step: step as u64,
                     };
                     let (i, q) = (&i[offset..offset + length], &q[offset..offset + length]);
-                    let fast = replica.correlate_short(i, q, &nco, &taps);
+                    let fast = same_at_every_level(kernel::Fast::Short, &replica, (i, q), &nco, &taps);
                     let slow = replica.slow(i, q, &nco, &taps);
                     for ((a, b), tap) in fast.iter().zip(&slow).zip(taps) {
                         // A sample of at most 90 LSB: its replica errs by half of 2⁻⁸ and, at an edge, by two halves of the

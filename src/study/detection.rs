@@ -320,7 +320,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let writer = |n: u32| truth::Writer::create(&directory.path().join(n.to_string())).unwrap();
         for (n, cn0_dbhz) in (0..).zip([32.5, 34.0]) {
-            let row = detections(&settings(1e-6), cn0_dbhz, 400, 5, &mut writer(n)).unwrap();
+            let row = detections(&settings(1e-6), cn0_dbhz, 200, 5, &mut writer(n)).unwrap();
             // Four deviations of the count, and of the expectation's own draws.
             let variance = row.expected * (1.0 - row.expected);
             let scatter = 4.0 * (variance / f64::from(row.trials) + variance / f64::from(DRAWS)).sqrt();

@@ -5,8 +5,15 @@
 //! case that fails is the same in the next run.
 
 mod damage;
+mod determinism;
 mod files;
+mod machine;
+mod memory;
+mod mounts;
 mod navigation;
+mod pipes;
 mod program;
 mod scenario;
+mod signals;
+mod sweep;
 mod tally;

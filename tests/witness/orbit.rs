@@ -1,9 +1,11 @@
 //! Broadcast orbits and clocks against precise ones, and the reading of navigation files of every version.
 
 use std::collections::BTreeMap;
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
+use ::rinex::navigation::NavMessageType;
+use ::rinex::prelude::{Constellation, Rinex, TimeScale};
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss_twin::gnss::rinex::{self, Navigation};
@@ -215,5 +217,64 @@ fn damaged_files_of_every_version_never_panic() {
             hurt.remove(cut);
             let _ = rinex::read(&hurt, name);
         }
+    }
+}
+
+#[test]
+fn the_rinex_crate_reads_the_same_elements() {
+    let day = include_bytes!("../../data/brdc1820-2010.n.gz").to_vec();
+    let mut files = vec![("brdc1820", day)];
+    for name in ["gps-sdr-sim/brdc0010.22n", "nav/BRD400DLR_S_20230710000_01D_MN.rnx.gz"] {
+        files.extend(external(name).map(|path| (name, std::fs::read(path).unwrap())));
+    }
+    for (name, bytes) in files {
+        let found = rinex::read(&bytes, name).unwrap();
+        let mut text = Vec::new();
+        if flate2::read::GzDecoder::new(bytes.as_slice()).read_to_end(&mut text).is_err() {
+            text = bytes;
+        }
+        let (file, _) = Rinex::parse_with_diagnostics(&mut BufReader::new(text.as_slice())).unwrap();
+        let mut compared = 0;
+        for (key, frame) in file.nav_ephemeris_frames_iter() {
+            if key.sv.constellation != Constellation::GPS || key.msgtype != NavMessageType::LNAV {
+                continue;
+            }
+            let seconds =
+                (key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds() / 1_000_000_000) as i64;
+            let set = found.ephemerides.iter().find(|set| set.sv.number == key.sv.prn && set.toc.seconds() == seconds);
+            let Some(set) = set else {
+                assert!(found.skipped.iter().any(|reason| reason.contains(&format!("G{:02}", key.sv.prn))), "{name}");
+                continue;
+            };
+            compared += 1;
+            for (field, value) in [
+                ("crs", set.crs_m),
+                ("deltaN", set.delta_n_radps),
+                ("m0", set.m0_rad),
+                ("cuc", set.cuc_rad),
+                ("e", set.eccentricity),
+                ("cus", set.cus_rad),
+                ("sqrta", set.sqrt_a_sqrtm),
+                ("cic", set.cic_rad),
+                ("omega0", set.omega0_rad),
+                ("cis", set.cis_rad),
+                ("i0", set.i0_rad),
+                ("crc", set.crc_m),
+                ("omega", set.omega_rad),
+                ("omegaDot", set.omega_dot_radps),
+                ("idot", set.idot_radps),
+                ("tgd", set.tgd_s),
+                ("iode", f64::from(set.iode)),
+                ("iodc", f64::from(set.iodc)),
+                ("health", f64::from(set.health)),
+            ] {
+                assert_eq!(frame.get_orbit_f64(field), Some(value), "{name} {} {field}", set.sv);
+            }
+            assert_eq!(
+                (frame.clock_bias, frame.clock_drift, frame.clock_drift_rate),
+                (set.af0_s, set.af1_sps, set.af2_sps2)
+            );
+        }
+        assert_eq!(compared, found.ephemerides.len(), "{name}");
     }
 }

@@ -136,21 +136,20 @@ impl Judgement {
 
 fn bytes(path: &Path) -> Result<Vec<u8>, JudgeError> {
     let remedy = "it is the file of the receiver under test that the command names";
-    let size = fs::metadata(path).map(|data| data.len());
-    match size {
-        Ok(size) if size > rinex_obs::LARGEST_BYTES => Err(JudgeError::NotOfThisTruth {
-            path: path.to_owned(),
-            what: format!("{size} bytes: expected at most 256 MiB"),
-        }),
-        // A pipe or a device has no size, and perhaps no end.
-        _ if path.exists() && !path.is_file() => {
-            Err(JudgeError::NotOfThisTruth { path: path.to_owned(), what: "is not an ordinary file".to_owned() })
-        }
-        _ => fs::read(path).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => JudgeError::Missing { path: path.to_owned(), remedy },
-            _ => JudgeError::NotOfThisTruth { path: path.to_owned(), what: format!("cannot be read: {source}") },
-        }),
+    let failed = |source: io::Error| match source.kind() {
+        io::ErrorKind::NotFound => JudgeError::Missing { path: path.to_owned(), remedy },
+        _ => JudgeError::Read { path: path.to_owned(), source },
+    };
+    let refuse = |what: String| Err(JudgeError::NotOfThisTruth { path: path.to_owned(), what });
+    let about = fs::metadata(path).map_err(failed)?;
+    // A pipe or a device has no size, and perhaps no end.
+    if !about.is_file() {
+        return refuse("is not an ordinary file".to_owned());
     }
+    if about.len() > rinex_obs::LARGEST_BYTES {
+        return refuse(format!("{} bytes: expected at most 256 MiB", about.len()));
+    }
+    fs::read(path).map_err(failed)
 }
 
 fn line(path: &Path, fault: Fault) -> JudgeError {

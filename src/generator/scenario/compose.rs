@@ -245,9 +245,12 @@ impl Scenario {
             MotionSpec::File { path, kind, max_gap_s } => {
                 let options = file::Options { start: self.start, max_gap_s: *max_gap_s };
                 let full = self.resolve("motion.file", directory, path, overrides)?;
-                let input = File::open(&full).map_err(|e| self.unreadable("motion.file", path, &e))?;
+                let input = File::open(&full).map_err(|e| self.unreadable("motion.file", path, e))?;
                 let name = path.display().to_string();
-                let refuse = |e: file::FileError| self.conflict("motion.file", e.to_string());
+                let refuse = |e: file::FileError| match e.fault {
+                    file::Fault::Read(error) => self.unreadable("motion.file", path, error),
+                    _ => self.conflict("motion.file", e.to_string()),
+                };
                 match kind {
                     FileKind::Csv => {
                         let (trajectory, ignored) = file::read_csv(input, &name, &options).map_err(refuse)?;
@@ -300,8 +303,8 @@ impl Scenario {
         Ok(())
     }
 
-    fn unreadable(&self, key: &'static str, path: &Path, error: &std::io::Error) -> ScenarioError {
-        ScenarioError::File { origin: self.origin.clone(), key, path: path.to_owned(), reason: error.to_string() }
+    fn unreadable(&self, key: &'static str, path: &Path, error: std::io::Error) -> ScenarioError {
+        ScenarioError::Read { origin: self.origin.clone(), key, path: path.to_owned(), error }
     }
 
     /// The full path of a file that the scenario names; it must be a file below the scenario's directory.
@@ -318,14 +321,14 @@ impl Scenario {
             path: path.to_owned(),
             reason: reason.to_owned(),
         };
-        let io = |e: std::io::Error| self.unreadable(key, path, &e);
+        let io = |e: std::io::Error| self.unreadable(key, path, e);
         // An empty directory is that of a scenario named without one.
         let directory = if directory.as_os_str().is_empty() { Path::new(".") } else { directory };
         let full = directory.join(path).canonicalize().map_err(io)?;
         if !overrides.allow_outside && !full.starts_with(directory.canonicalize().map_err(io)?) {
             return Err(refuse("lies outside the scenario's directory (--allow-outside permits it)"));
         }
-        if !full.is_file() {
+        if !full.metadata().map_err(io)?.is_file() {
             return Err(refuse("is not a file"));
         }
         Ok(full)
@@ -340,7 +343,7 @@ impl Scenario {
         overrides: &Overrides,
     ) -> Result<Vec<u8>, ScenarioError> {
         let full = self.resolve(key, directory, path, overrides)?;
-        let bytes = full.metadata().map_err(|e| self.unreadable(key, path, &e))?.len();
+        let bytes = full.metadata().map_err(|e| self.unreadable(key, path, e))?.len();
         if bytes > MAX_NAVIGATION_BYTES {
             return Err(ScenarioError::File {
                 origin: self.origin.clone(),
@@ -349,7 +352,7 @@ impl Scenario {
                 reason: format!("{bytes} bytes: expected at most {MAX_NAVIGATION_BYTES}"),
             });
         }
-        std::fs::read(full).map_err(|e| self.unreadable(key, path, &e))
+        std::fs::read(full).map_err(|e| self.unreadable(key, path, e))
     }
 }
 

@@ -63,13 +63,18 @@ impl Filter {
             return Err(FilterError::Wide { bandwidth_hz, rate_hz, limit_hz });
         }
         let width = bandwidth_hz / rate_hz;
-        let (low_pass, delay) = match shape {
-            Shape::BrickWall => brick_wall(width),
-            Shape::Butterworth { order } => butterworth(order, width),
+        // Before the response is made: that of a hertz in a wide band would have millions of taps.
+        let taps = match shape {
+            Shape::BrickWall => wall_taps(width),
+            Shape::Butterworth { order } => butterworth_taps(order, width),
         };
-        if low_pass.len() > MAX_TAPS {
-            return Err(FilterError::Narrow { bandwidth_hz, rate_hz, taps: low_pass.len() });
+        if taps > MAX_TAPS {
+            return Err(FilterError::Narrow { bandwidth_hz, rate_hz, taps });
         }
+        let (low_pass, delay) = match shape {
+            Shape::BrickWall => brick_wall(width, taps),
+            Shape::Butterworth { order } => butterworth(order, width, taps),
+        };
         // Around the IF; a real filter keeps both sides, each at full strength.
         let turn = std::f64::consts::TAU * if_hz / rate_hz;
         let phase = |k: usize| libm::sincos(turn * (k as f64 - delay));
@@ -95,10 +100,13 @@ impl Filter {
     }
 }
 
+/// Kaiser's length for this attenuation and an edge of EDGE · `width`; odd.
+fn wall_taps(width: f64) -> usize {
+    ((KAISER_DB - 7.95) / (14.36 * EDGE * width)).ceil() as usize | 1
+}
+
 /// A sinc of `width` cycles a sample under a Kaiser window, of unit gain in the middle, and its delay in samples.
-fn brick_wall(width: f64) -> (Vec<f64>, f64) {
-    // Kaiser's length for this attenuation and an edge of EDGE · width.
-    let length = ((KAISER_DB - 7.95) / (14.36 * EDGE * width)).ceil() as usize | 1;
+fn brick_wall(width: f64, length: usize) -> (Vec<f64>, f64) {
     let beta = 0.1102 * (KAISER_DB - 8.7);
     let middle = 0.5 * (length - 1) as f64;
     let taps: Vec<f64> = (0..length)
@@ -112,14 +120,23 @@ fn brick_wall(width: f64) -> (Vec<f64>, f64) {
     (normal(taps), middle)
 }
 
-/// The response of an analogue Butterworth low-pass with half-power points at ±`width`/2 cycles a sample, as a sum of
-/// its poles' exponentials, and its delay in samples at zero frequency.
-fn butterworth(order: u32, width: f64) -> (Vec<f64>, f64) {
+/// Poles of an analogue Butterworth low-pass with half-power points at ±`width`/2 cycles a sample.
+fn butterworth_poles(order: u32, width: f64) -> impl Iterator<Item = Complex64> {
+    (0..order)
+        .map(move |k| PI * (2.0 * f64::from(k) + f64::from(order) + 1.0) / (2.0 * f64::from(order)))
+        .map(move |angle| PI * width * Complex64::new(libm::cos(angle), libm::sin(angle)))
+}
+
+/// Until its slowest pole has died out.
+fn butterworth_taps(order: u32, width: f64) -> usize {
+    let slowest = butterworth_poles(order, width).fold(f64::MAX, |least, pole| least.min(-pole.re));
+    (-libm::log(CUT) / slowest).ceil() as usize + 1
+}
+
+/// The response of that low-pass as a sum of its poles' exponentials, and its delay in samples at zero frequency.
+fn butterworth(order: u32, width: f64, length: usize) -> (Vec<f64>, f64) {
     let omega = PI * width;
-    let poles: Vec<Complex64> = (0..order)
-        .map(|k| PI * (2.0 * f64::from(k) + f64::from(order) + 1.0) / (2.0 * f64::from(order)))
-        .map(|angle| Complex64::new(omega * libm::cos(angle), omega * libm::sin(angle)))
-        .collect();
+    let poles: Vec<Complex64> = butterworth_poles(order, width).collect();
     let residues: Vec<Complex64> = poles
         .iter()
         .enumerate()
@@ -134,9 +151,7 @@ fn butterworth(order: u32, width: f64) -> (Vec<f64>, f64) {
             sum + (residue * Complex64::new(cos, sin) * libm::exp(pole.re * t)).re
         })
     };
-    let slowest = poles.iter().fold(f64::MAX, |least, pole| least.min(-pole.re));
     // Sampled at the middles of intervals, so that a first-order filter's step at zero counts half on each side.
-    let length = (-libm::log(CUT) / slowest).ceil() as usize + 1;
     let taps = normal((0..length).map(|k| at(k as f64 + 0.5)).collect());
     let delay = taps.iter().enumerate().fold(0.0, |sum, (k, h)| sum + k as f64 * h);
     (taps, delay)
@@ -282,7 +297,13 @@ mod tests {
     fn a_band_that_does_not_fit_is_refused_with_the_one_that_does() {
         let wide = Filter::new(Shape::BrickWall, 11e6, 10e6, 0.0, false).unwrap_err();
         assert!(wide.to_string().contains("9523809"), "{wide}");
-        assert!(matches!(Filter::new(Shape::BrickWall, 10.0, 10e6, 0.0, false), Err(FilterError::Narrow { .. })));
+        // No memory for what is refused: the second response alone would have 10¹⁵ taps.
+        for width_hz in [10.0, 1e-7] {
+            for shape in [Shape::BrickWall, Shape::Butterworth { order: 4 }] {
+                let narrow = Filter::new(shape, width_hz, 10e6, 0.0, false);
+                assert!(matches!(narrow, Err(FilterError::Narrow { .. })));
+            }
+        }
         assert!(matches!(Filter::new(Shape::BrickWall, 3e6, 10e6, 1e6, true), Err(FilterError::Wide { .. })));
     }
 }

@@ -248,3 +248,6 @@ fn interpolate_avx2(by: &Interpolator, position: Position, source: Planes<'_>, o
 fn turn_avx2(wave: Planes<'_>, carrier: (u64, u64), amplitude: f32, i: &mut [f32], q: &mut [f32]) {
     resample::turn(wave, carrier, amplitude, i, q);
 }
+
+#[cfg(test)]
+mod tests;

@@ -251,10 +251,24 @@ impl Columns {
     }
 }
 
+/// Reads again what a signal has interrupted, as the table's reader does not.
+struct Patient<R>(R);
+
+impl<R: Read> Read for Patient<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        loop {
+            match self.0.read(buffer) {
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                other => return other,
+            }
+        }
+    }
+}
+
 /// Reads a CSV trajectory; also returns the names of columns that it did not use. `file` names it in errors.
 pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<(Trajectory, Vec<String>), FileError> {
     let error = |line, fault| FileError { file: file.to_owned(), line, fault };
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(input.take(MAX_BYTES + 1));
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(Patient(input.take(MAX_BYTES + 1)));
     let fault = |e: csv::Error, line: u64| {
         let line = e.position().map_or(line, csv::Position::line);
         let fault = match e.into_kind() {

@@ -1,53 +1,149 @@
-//! The form of GPS LNAV records, before their values are read: each has its number of lines, and in each field of 19 columns
-//! stands a number or nothing.
+//! A navigation file as lines and columns: the header's lines that are used, and GPS LNAV records of eight lines with a number
+//! or nothing in each field of 19 columns.
 //!
-//! Source: RINEX 2.11, table A4; RINEX 3.05, table A6; RINEX 4.02, table A9. Where a line is missing, doubled or cut, the rest of a
-//! record would be read into the wrong elements, or another record lost; so such a record is taken out and named with its
-//! line and column. Records of other systems and messages pass as they are.
+//! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5 and A6; RINEX 4.02, tables A9 and A33. Where a line is missing,
+//! doubled or cut, or text stands beside the fields, what follows would be read into the wrong elements; so such a record is
+//! left out and named with its line and column, and so is whatever cannot be told to be of another system. Records of
+//! other systems and messages are counted and not read.
+
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::time::Epoch;
 
 /// Lines of a record: satellite, epoch and clock, then seven lines of the orbit.
 const LINES: usize = 8;
 const FIELD: usize = 19;
+/// Width of a coefficient in the header, whose lines end in a label from this column on.
+const HEADER_FIELD: usize = 12;
+const LABEL: usize = 60;
 
-/// A file's text without what is not in form.
-pub(super) struct Sifted {
-    pub text: Vec<u8>,
-    /// The number, in the file, of each line of `text`.
-    pub lines: Vec<usize>,
-    /// Why records were taken out.
+/// The fields of a record in their order; spare ones have no name.
+const FIELDS: [&str; 31] = [
+    "af0", "af1", "af2", "iode", "crs", "deltaN", "m0", "cuc", "e", "cus", "sqrta", "toe", "cic", "omega0", "cis",
+    "i0", "crc", "omega", "omegaDot", "idot", "l2Codes", "week", "l2p", "accuracy", "health", "tgd", "iodc", "t_tm",
+    "fitInt", "", "",
+];
+
+/// Labels that a header of any version may have.
+const LABELS: [&str; 21] = [
+    "RINEX VERSION / TYPE",
+    "PGM / RUN BY / DATE",
+    "COMMENT",
+    "ION ALPHA",
+    "ION BETA",
+    "DELTA-UTC: A0,A1,T,W",
+    "DELTA UTC: A0,A1,T,W",
+    "D-UTC A0,A1,T,W,S,U",
+    "CORR TO SYSTEM TIME",
+    "IONOSPHERIC CORR",
+    "TIME SYSTEM CORR",
+    "LEAP SECONDS",
+    "REC # / TYPE / VERS",
+    "ANT # / TYPE",
+    "MERGED FILE",
+    "DOI",
+    "LICENSE OF USE",
+    "STATION INFORMATION",
+    "MARKER NAME",
+    "MARKER NUMBER",
+    "END OF HEADER",
+];
+
+/// Systems and the messages with ephemerides that each has in version 4.
+const MESSAGES: [(char, &[&str]); 7] = [
+    ('G', &["LNAV", "CNAV", "CNV2"]),
+    ('R', &["FDMA", "L1OC", "L3OC"]),
+    ('E', &["INAV", "FNAV"]),
+    ('J', &["LNAV", "CNAV", "CNV2"]),
+    ('C', &["D1", "D2", "CNV1", "CNV2", "CNV3"]),
+    ('I', &["LNAV", "L1NV"]),
+    ('S', &["SBAS"]),
+];
+
+/// A GPS LNAV record in form.
+pub(super) struct Record {
+    /// Number of its first line.
+    pub line: usize,
+    pub number: u8,
+    pub toc: Epoch,
+    values: [Option<f64>; FIELDS.len()],
+}
+
+impl Record {
+    /// A field by its name; `None` if it is blank.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        FIELDS.iter().position(|field| *field == name).and_then(|at| self.values[at])
+    }
+}
+
+/// What stands in a file.
+#[derive(Default)]
+pub(super) struct Contents {
+    pub records: Vec<Record>,
+    pub klobuchar: Option<Klobuchar>,
+    pub leap_seconds: Option<i64>,
+    /// Records of other systems and messages.
+    pub others: usize,
+    /// What was left out, and why.
     pub reasons: Vec<String>,
 }
 
-/// Takes out GPS LNAV records that are not in form, and blank lines, from an ASCII text.
-pub(super) fn sift(text: &[u8]) -> Sifted {
+type Line<'t> = (usize, &'t str);
+
+/// Reads an ASCII text.
+///
+/// # Errors
+/// No header that says how to read the rest.
+pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     let whole = String::from_utf8_lossy(text);
-    let ended = text.ends_with(b"\n");
-    let all: Vec<(usize, &str)> = (1..).zip(whole.lines()).collect();
-    let head = all.iter().position(|(_, line)| line.contains("END OF HEADER")).map_or(all.len(), |at| at + 1);
+    let all: Vec<Line<'_>> = (1..).zip(whole.lines()).collect();
+    let head = all.iter().position(|(_, line)| label(line) == "END OF HEADER").ok_or("no line END OF HEADER")? + 1;
     let (header, body) = all.split_at(head);
-    let version = header.first().and_then(|(_, line)| line.get(..9)?.trim().parse::<f64>().ok()).unwrap_or(0.0);
-    let form = Form { version: version as u8, cut: (!ended).then_some(all.len()) };
-    let mut sifted = Sifted { text: Vec::new(), lines: Vec::new(), reasons: Vec::new() };
-    let mut keep = |lines: &[(usize, &str)]| {
-        for (number, line) in lines {
-            sifted.text.extend_from_slice(line.as_bytes());
-            sifted.text.push(b'\n');
-            sifted.lines.push(*number);
-        }
+    let first = header.first().map_or("", |(_, line)| *line);
+    let written = first.get(..9).unwrap_or("").trim();
+    let version = written.parse::<f64>().ok().filter(|version| (2.0..5.0).contains(version));
+    let version = version.ok_or_else(|| format!("line 1, column 1: version '{written}'"))?;
+    let form = Form {
+        version: version as u8,
+        system: first.get(40..41).and_then(|letter| letter.chars().next()).unwrap_or(' '),
+        cut: (!text.ends_with(b"\n")).then_some(all.len()),
     };
-    keep(header);
-    let body: Vec<(usize, &str)> = body.iter().filter(|(_, line)| !line.trim().is_empty()).copied().collect();
+    let mut contents = Contents::default();
+    form.header(header, &mut contents);
+    let mut ionosphere: Option<(String, Klobuchar)> = None;
+    let body: Vec<Line<'_>> = body.iter().filter(|(_, line)| !line.trim().is_empty()).copied().collect();
     for group in body.chunk_by(|_, next| !form.begins(next.1)) {
-        match form.fault(group) {
-            None => keep(group),
-            Some(reason) => sifted.reasons.push(reason),
+        match form.group(group) {
+            Ok(Group::Record(record)) => contents.records.push(*record),
+            Ok(Group::Ionosphere(age, found)) => {
+                // The first of the day, whatever the order in the file.
+                if ionosphere.as_ref().is_none_or(|(before, _)| age < *before) {
+                    ionosphere = Some((age, found));
+                }
+            }
+            Ok(Group::Other) => contents.others += 1,
+            Err(reason) => contents.reasons.push(reason),
         }
     }
-    sifted
+    contents.klobuchar = contents.klobuchar.or(ionosphere.map(|(_, found)| found));
+    Ok(contents)
+}
+
+fn label(line: &str) -> &str {
+    line.get(LABEL..).unwrap_or("").trim_end()
+}
+
+/// Lines that belong together.
+enum Group {
+    Record(Box<Record>),
+    /// When and by which satellite, in an order that sorts, and what it said.
+    Ionosphere(String, Klobuchar),
+    Other,
 }
 
 struct Form {
     version: u8,
+    /// Of version 3 and later: the only one in the file, or `M` for several.
+    system: char,
     /// The number of a last line that has no end, and may be cut inside a number.
     cut: Option<usize>,
 }
@@ -66,49 +162,235 @@ impl Form {
         }
     }
 
-    fn fault(&self, group: &[(usize, &str)]) -> Option<String> {
-        let (first, title) = group.first()?;
-        let (record, letter) = match self.version {
-            4.. if title.starts_with("> EPH G") && title.contains("LNAV") => (group.get(1..)?, true),
-            4.. => return None,
-            3 if title.starts_with('G') => (group, true),
-            3 => return None,
-            _ => (group, false),
-        };
-        let label: String = record.first().map_or(*title, |(_, line)| line).chars().take(23).collect();
-        let refuse = |line: usize, what: String| Some(format!("line {line} ({}): {what}", label.trim_end()));
-        if letter && record.first().is_some_and(|(_, line)| !line.starts_with('G')) {
-            return refuse(*first, "expected the satellite and its epoch in the line after this one".to_owned());
-        }
-        if record.len() != LINES {
-            return refuse(*first, format!("a record of {} lines: expected {LINES}", record.len()));
-        }
-        for (row, (number, line)) in record.iter().enumerate() {
-            // Satellite and epoch are as wide as one field.
-            let (start, fields) = if row == 0 { (self.margin() + FIELD, 3) } else { (self.margin(), 4) };
-            if row > 0 && line.get(..start).is_some_and(|margin| !margin.trim().is_empty()) {
-                return refuse(*number, format!("column 1: expected {start} blanks"));
-            }
-            if self.cut == Some(*number) && (line.trim_end().len().saturating_sub(start)) % FIELD != 0 {
-                return refuse(*number, "the file ends within a number".to_owned());
-            }
-            for field in 0..fields {
-                let from = start + FIELD * field;
-                let text = line.get(from..line.len().min(from + FIELD)).unwrap_or("");
-                if !text.trim().is_empty() && !is_number(text.trim()) {
-                    let column = from + 1;
-                    return refuse(*number, format!("column {column}: '{}': expected a number or blanks", text.trim()));
+    fn header(&self, lines: &[Line<'_>], contents: &mut Contents) {
+        let (mut alpha, mut beta) = (None, None);
+        for (number, line) in lines {
+            let mut four = |start: usize, into: &mut Option<[f64; 4]>| match numbers::<4>(line, start, HEADER_FIELD) {
+                Ok(found) => *into = Some(found),
+                Err(reason) => contents.reasons.push(format!("line {number} ({}): {reason}", label(line))),
+            };
+            match label(line) {
+                "ION ALPHA" if self.version < 3 => four(2, &mut alpha),
+                "ION BETA" if self.version < 3 => four(2, &mut beta),
+                "IONOSPHERIC CORR" if line.starts_with("GPSA") => four(5, &mut alpha),
+                "IONOSPHERIC CORR" if line.starts_with("GPSB") => four(5, &mut beta),
+                "IONOSPHERIC CORR" => {
+                    let known =
+                        ["GAL ", "QZSA", "QZSB", "BDSA", "BDSB", "BDS1", "BDS2", "BDS3", "IRNA", "IRNB", "BDS "];
+                    let name: String = line.chars().take(4).collect();
+                    if !known.contains(&name.as_str()) {
+                        contents
+                            .reasons
+                            .push(format!("line {number}, column 1: ionosphere of '{name}': expected GPSA or GPSB"));
+                    }
                 }
+                "LEAP SECONDS" => match line.get(..6).unwrap_or("").trim().parse() {
+                    Ok(seconds) => contents.leap_seconds = Some(seconds),
+                    Err(_) => contents
+                        .reasons
+                        .push(format!("line {number} (LEAP SECONDS): column 1: expected a whole number")),
+                },
+                known if LABELS.contains(&known) => {}
+                _ if line.trim().is_empty() => {}
+                unknown => contents
+                    .reasons
+                    .push(format!("line {number}: '{unknown}': expected a label of a navigation header")),
             }
         }
-        None
+        match (alpha, beta) {
+            (Some(alpha), Some(beta)) => contents.klobuchar = Some(Klobuchar { alpha, beta }),
+            (None, None) => {}
+            _ => contents.reasons.push("the header has only one of the ionosphere's lists, alpha and beta".to_owned()),
+        }
+    }
+
+    fn group(&self, group: &[Line<'_>]) -> Result<Group, String> {
+        let Some((first, title)) = group.first() else { return Ok(Group::Other) };
+        let refuse = |what: &str| {
+            Err(format!("line {first} ({}): {what}", title.chars().take(23).collect::<String>().trim_end()))
+        };
+        if !self.begins(title) {
+            return refuse("expected the first line of a record");
+        }
+        if self.version < 3 {
+            return self.record(group).map(|record| Group::Record(Box::new(record)));
+        }
+        let words: Vec<&str> = title.split_ascii_whitespace().collect();
+        let satellite =
+            if self.version == 3 { title.get(..3).unwrap_or("") } else { words.get(2).copied().unwrap_or("") };
+        let letter = satellite.chars().next().unwrap_or(' ');
+        let Some((_, messages)) = MESSAGES.iter().find(|(system, _)| *system == letter) else {
+            return refuse(&format!(
+                "'{satellite}': expected a satellite like G05, of one of the systems G, R, E, J, C, I and S"
+            ));
+        };
+        if MESSAGES.iter().any(|(system, _)| *system == self.system) && letter != self.system {
+            return refuse(&format!(
+                "'{satellite}': expected satellites of the system {} alone, as the first line says",
+                self.system
+            ));
+        }
+        if self.version == 3 {
+            if letter != 'G' {
+                return Ok(Group::Other);
+            }
+            return self.record(group).map(|record| Group::Record(Box::new(record)));
+        }
+        match (words.get(1).copied().unwrap_or(""), words.get(3).copied().unwrap_or("")) {
+            ("EPH", message) if !messages.contains(&message) => {
+                refuse(&format!("message '{message}': expected {}", messages.join(" or ")))
+            }
+            ("EPH", "LNAV") if letter == 'G' => {
+                let rest = group.get(1..).unwrap_or_default();
+                if rest.first().is_none_or(|(_, line)| line.get(..3) != Some(satellite)) {
+                    return refuse("expected the same satellite and its epoch in the line after this one");
+                }
+                self.record(rest).map(|record| Group::Record(Box::new(record)))
+            }
+            ("ION", "LNAV") if letter == 'G' => self.ionosphere(group, satellite),
+            ("EPH" | "STO" | "EOP" | "ION", _) => Ok(Group::Other),
+            (kind, _) => refuse(&format!("'{kind}': expected EPH, STO, EOP or ION")),
+        }
+    }
+
+    fn record(&self, record: &[Line<'_>]) -> Result<Record, String> {
+        let margin = self.margin();
+        let (first, title) = record.first().copied().unwrap_or_default();
+        let label: String = title.chars().take(23).collect();
+        let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", label.trim_end()));
+        if record.len() != LINES {
+            return refuse(first, format!("a record of {} lines: expected {LINES}", record.len()));
+        }
+        let mut values = Vec::with_capacity(FIELDS.len());
+        for (row, &(number, line)) in record.iter().enumerate() {
+            // Satellite and epoch are as wide as one field.
+            let (start, count) = if row == 0 { (margin + FIELD, 3) } else { (margin, 4) };
+            if row > 0 && line.get(..start).is_some_and(|margin| !margin.trim().is_empty()) {
+                return refuse(number, format!("column 1: expected {start} blanks"));
+            }
+            if self.cut == Some(number) && !line.trim_end().len().saturating_sub(start).is_multiple_of(FIELD) {
+                return refuse(number, "the file ends within a number".to_owned());
+            }
+            match fields(line, start, FIELD, count) {
+                Ok(found) => values.extend(found),
+                Err(reason) => return refuse(number, reason),
+            }
+        }
+        // Version 2 leaves the letter of the only system out.
+        let letter = usize::from(self.version > 2 || title.starts_with('G'));
+        let number = title.get(letter..margin - usize::from(letter == 0 || self.version > 2)).unwrap_or("");
+        let Some(number) = digits::<u8>(number.trim()).filter(|number| (1..=32).contains(number)) else {
+            return refuse(first, format!("column {}: PRN '{}': expected 1 to 32", letter + 1, number.trim()));
+        };
+        if title.get(margin - 1..margin) != Some(" ") && !(self.version < 3 && letter == 1) {
+            return refuse(first, format!("column {margin}: expected a blank after the satellite"));
+        }
+        let date = title.get(margin..margin + FIELD).unwrap_or("");
+        let Some(toc) = self.epoch(date) else {
+            return refuse(
+                first,
+                format!("column {}: '{}': expected an epoch from 1980 to 2180", margin + 1, date.trim()),
+            );
+        };
+        let Ok(values) = values.try_into() else { return refuse(first, "expected 31 fields".to_owned()) };
+        Ok(Record { line: first, number, toc, values })
+    }
+
+    /// Year, month, day, hour, minute and second, of GPS time.
+    fn epoch(&self, text: &str) -> Option<Epoch> {
+        let words: Vec<&str> = text.split_ascii_whitespace().collect();
+        let [year, month, day, hour, minute, second] = words.as_slice() else { return None };
+        let written: u16 = digits(year)?;
+        // Two digits in version 2: 80 to 99 are of the last century.
+        let year = match (self.version, written) {
+            (2, 80..=99) => 1900 + written,
+            (2, 0..=79) => 2000 + written,
+            _ => written,
+        };
+        let [month, day, hour, minute] = [month, day, hour, minute].map(|word| digits::<u8>(word));
+        let (whole, fraction) = second.split_once('.').unwrap_or((second, ""));
+        let second = digits::<u8>(whole).filter(|second| *second < 60)?;
+        if !fraction.bytes().all(|digit| digit.is_ascii_digit()) {
+            return None;
+        }
+        let (month, day, hour, minute) = (month?, day?, hour?, minute?);
+        Epoch::parse(&format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{fraction}")).ok()
+    }
+
+    /// Klobuchar's coefficients in a record of version 4.
+    fn ionosphere(&self, group: &[Line<'_>], satellite: &str) -> Result<Group, String> {
+        let (first, title) = group.first().copied().unwrap_or_default();
+        let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", title.trim_end()));
+        let [_, one, two, three] = group else {
+            return refuse(first, format!("a record of {} lines: expected 4", group.len()));
+        };
+        let mut coefficients = Vec::with_capacity(8);
+        // The field after the last coefficient is the region, and may be blank.
+        for (&(number, line), start, count) in
+            [(one, self.margin() + FIELD, 3), (two, self.margin(), 4), (three, self.margin(), 2)]
+        {
+            if self.cut == Some(number) && !line.trim_end().len().saturating_sub(start).is_multiple_of(FIELD) {
+                return refuse(number, "the file ends within a number".to_owned());
+            }
+            match fields(line, start, FIELD, count) {
+                Ok(found) => coefficients.extend(found),
+                Err(reason) => return refuse(number, reason),
+            }
+        }
+        let Some(epoch) = self.epoch(one.1.get(self.margin()..self.margin() + FIELD).unwrap_or("")) else {
+            return refuse(one.0, "column 5: expected an epoch".to_owned());
+        };
+        let coefficients: Option<Vec<f64>> = coefficients.into_iter().take(8).collect();
+        match coefficients.as_deref() {
+            Some(&[a0, a1, a2, a3, b0, b1, b2, b3]) => {
+                let found = Klobuchar { alpha: [a0, a1, a2, a3], beta: [b0, b1, b2, b3] };
+                Ok(Group::Ionosphere(format!("{epoch} {satellite}"), found))
+            }
+            _ => refuse(one.0, "expected eight coefficients".to_owned()),
+        }
     }
 }
 
+/// Fields of `width` columns from `start` on, after which nothing may stand; a blank one is `None`.
+fn fields(line: &str, start: usize, width: usize, count: usize) -> Result<Vec<Option<f64>>, String> {
+    let end = start + width * count;
+    if let Some(at) = line.bytes().skip(end).position(|byte| byte != b' ') {
+        return Err(format!("column {}: expected nothing after {count} fields", end + at + 1));
+    }
+    let field = |number: usize| {
+        let from = (start + width * number).min(line.len());
+        let text = line.get(from..line.len().min(from + width)).unwrap_or("").trim();
+        match (text.is_empty(), number_of(text)) {
+            (true, _) => Ok(None),
+            (false, Some(value)) => Ok(Some(value)),
+            (false, None) => Err(format!("column {}: '{text}': expected a number or blanks", from + 1)),
+        }
+    };
+    (0..count).map(field).collect()
+}
+
+/// As many numbers of a header's line, none of them blank.
+fn numbers<const N: usize>(line: &str, start: usize, width: usize) -> Result<[f64; N], String> {
+    // A time mark and a satellite may follow in version 3.
+    let found = fields(line.get(..start + width * N).unwrap_or(line), start, width, N)?;
+    let found: Option<Vec<f64>> = found.into_iter().collect();
+    found
+        .and_then(|found| found.try_into().ok())
+        .ok_or_else(|| format!("expected {N} numbers from column {} on", start + 1))
+}
+
+/// A whole number of digits alone.
+fn digits<T: std::str::FromStr>(text: &str) -> Option<T> {
+    if text.bytes().all(|byte| byte.is_ascii_digit()) { text.parse().ok() } else { None }
+}
+
 /// A number as FORTRAN's D19.12 writes it, or E, or without an exponent: finite as a double.
-fn is_number(text: &str) -> bool {
+fn number_of(text: &str) -> Option<f64> {
     let plain = |c: char| c.is_ascii_digit() || "+-.eEdD".contains(c);
-    text.chars().all(plain) && text.replace(['d', 'D'], "e").parse::<f64>().is_ok_and(f64::is_finite)
+    if !text.chars().all(plain) {
+        return None;
+    }
+    text.replace(['d', 'D'], "e").parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 #[cfg(test)]
@@ -118,10 +400,30 @@ mod tests {
     #[test]
     fn numbers_are_those_of_fortran() {
         for good in ["0.1D-05", "-.5e+3", "1.E2", "12", "+7", "0.483528291807D-02"] {
-            assert!(is_number(good), "{good}");
+            assert!(number_of(good).is_some(), "{good}");
         }
         for bad in ["nan", "inf", "0.1D+999", "0x10", "1,5", "0.1D", "--1", "1 2", "?"] {
-            assert!(!is_number(bad), "{bad}");
+            assert!(number_of(bad).is_none(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn an_epoch_is_read_to_its_fraction_and_in_its_century() {
+        let form = |version| Form { version, system: 'G', cut: None };
+        let parse = |text| Epoch::parse(text).ok();
+        assert_eq!(form(2).epoch("10  7  1  0  0  0.5"), parse("2010-07-01T00:00:00.5"));
+        assert_eq!(form(2).epoch("10  7  1  0  0 0.05"), parse("2010-07-01T00:00:00.05"));
+        assert_eq!(form(2).epoch("80  7  1  0  0  0.0"), parse("1980-07-01T00:00:00"));
+        assert_eq!(form(2).epoch("79  7  1  0  0  0.0"), parse("2079-07-01T00:00:00"));
+        assert_eq!(form(3).epoch("2010 07 01 00 00 00"), parse("2010-07-01T00:00:00"));
+        for bad in [
+            "2010 07 01 00 00 60",
+            "2010 13 01 00 00 00",
+            "0010 07 01 00 00 00",
+            "2010 07 01 00 00",
+            "2010 02 29 0 0 0",
+        ] {
+            assert_eq!(form(3).epoch(bad), None, "{bad}");
         }
     }
 }

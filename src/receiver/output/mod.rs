@@ -30,6 +30,14 @@ fn write_error(path: &Path, error: std::io::Error) -> OutputError {
     OutputError::Write { path: path.to_owned(), error }
 }
 
+/// The I/O error itself, which tells whether another try is worth it.
+fn io_error(error: csv::Error) -> std::io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => std::io::Error::other(format!("{other:?}")),
+    }
+}
+
 /// One CSV file.
 struct Sheet {
     path: PathBuf,
@@ -41,12 +49,12 @@ impl Sheet {
         let path = directory.join(name);
         let file = File::create(&path).map_err(|error| create_error(&path, error))?;
         let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(BufWriter::new(file));
-        writer.write_record(header).map_err(|error| write_error(&path, error.into()))?;
+        writer.write_record(header).map_err(|error| write_error(&path, io_error(error)))?;
         Ok(Self { path, writer })
     }
 
     fn write<T: Serialize>(&mut self, row: &T) -> Result<(), OutputError> {
-        self.writer.serialize(row).map_err(|error| write_error(&self.path, error.into()))
+        self.writer.serialize(row).map_err(|error| write_error(&self.path, io_error(error)))
     }
 
     fn flush(&mut self) -> Result<(), OutputError> {

@@ -4,8 +4,11 @@
 //! order written, then repetitions, then axes that only change the receiver; so cases that share a signal are
 //! neighbours. Limits: ten million cases, a hundred thousand values an axis.
 
+use std::path::Path;
+
 use toml::Value;
 
+use super::spec::SCENARIO_KEY;
 use crate::generator::scenario::read::Table;
 use crate::generator::scenario::{Place, ScenarioError};
 
@@ -67,6 +70,20 @@ impl Axis {
     /// What plots and tables call it.
     pub fn label(&self) -> &str {
         self.label.as_deref().unwrap_or(&self.key)
+    }
+
+    /// Whether every value is a number.
+    pub fn is_of_numbers(&self) -> bool {
+        self.values.iter().all(|value| number_of(value).is_some())
+    }
+
+    /// What plots call its value of this rank: a scene goes by its file's name alone where no other has the same.
+    pub fn words_of(&self, rank: usize) -> String {
+        let text = self.values.get(rank).map_or_else(String::new, text_of);
+        let stem = |text: &str| Path::new(text).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let mine = stem(&text).filter(|_| self.key == SCENARIO_KEY);
+        let namesakes = self.values.iter().filter(|other| stem(&text_of(other)) == mine).count();
+        mine.filter(|_| namesakes == 1).unwrap_or(text)
     }
 }
 
@@ -289,4 +306,24 @@ pub fn put(document: &mut toml::Table, key: &str, value: &Value) -> Result<(), S
         }
     }
     Err("expected a key".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scenes_go_by_their_names_unless_two_have_the_same() {
+        let axis = |key: &str, values: &[&str]| Axis {
+            key: key.to_owned(),
+            values: values.iter().map(|text| Value::String((*text).to_owned())).collect(),
+            zip: None,
+            label: None,
+            place: Place { origin: "study.toml".to_owned(), line: 1, column: 1 },
+        };
+        let words = |axis: &Axis| (0..axis.values.len()).map(|rank| axis.words_of(rank)).collect::<Vec<_>>();
+        let scenes = axis(SCENARIO_KEY, &["../scenarios/static.toml", "a/ride.toml", "b/ride.toml"]);
+        assert_eq!(words(&scenes), ["static", "a/ride.toml", "b/ride.toml"]);
+        assert_eq!(words(&axis("receiver.tracking.arithmetic", &["f32.x", "f64"])), ["f32.x", "f64"]);
+    }
 }

@@ -81,6 +81,8 @@ pub fn pictures(results: &Results) -> Vec<Picture> {
 
 /// Values of an axis that are written under it at most.
 const MOST_TICKS: usize = 10;
+/// From one series to the next where names stand on the axis, in steps of the names.
+const NAMED_STEP: f64 = 0.12;
 
 /// What of the results a plot shows.
 struct View<'r> {
@@ -142,7 +144,7 @@ impl View<'_> {
 
     fn words(&self, axis: usize, value: usize) -> String {
         let Some(axis) = self.axis(axis) else { return String::new() };
-        format!("{} = {}", axis.label(), axis.values.get(value).map_or_else(String::new, axis::text_of))
+        format!("{} = {}", axis.label(), axis.words_of(value))
     }
 
     fn estimate(&self, cell: &Cell) -> Option<Estimate> {
@@ -152,7 +154,7 @@ impl View<'_> {
     /// Where a cell stands on an axis: its number, or its rank where values are none; logarithms if asked for.
     fn place(&self, cell: &Cell, key: &str, log: bool) -> Option<f64> {
         let axis = self.results.axis(key)?;
-        let numbers = self.axis(axis)?.values.iter().all(|value| axis::number_of(value).is_some());
+        let numbers = self.axis(axis)?.is_of_numbers();
         let number = match numbers {
             true => axis::number_of(self.results.value(cell, axis)?)?,
             false => *cell.at.get(axis)? as f64,
@@ -166,12 +168,14 @@ impl View<'_> {
         let places = cells.iter().filter_map(|cell| self.place(cell, key, self.plot.log_x));
         let number = self.results.axis(key);
         let study_axis = number.and_then(|number| self.axis(number));
-        let numbers = study_axis.is_some_and(|axis| axis.values.iter().all(|v| axis::number_of(v).is_some()));
-        let across = Axis::around(&study_axis.map_or(key.clone(), |axis| axis.label().to_owned()), places, 1e-9);
+        let numbers = study_axis.is_some_and(axis::Axis::is_of_numbers);
+        // Names have half a step on either side of them.
+        let named = study_axis.filter(|_| !numbers).map_or(0.0, |axis| axis.values.len() as f64);
+        let room = [-0.5, named - 0.5].into_iter().filter(|_| !numbers);
+        let label = study_axis.map_or(key.clone(), |axis| axis.label().to_owned());
+        let across = Axis::around(&label, places.chain(room), 1e-9);
         let ticks = if !numbers {
-            study_axis.map(|axis| {
-                axis.values.iter().enumerate().map(|(rank, value)| (rank as f64, axis::text_of(value))).collect()
-            })
+            study_axis.map(|axis| (0..axis.values.len()).map(|rank| (rank as f64, axis.words_of(rank))).collect())
         } else if self.plot.log_y && !self.plot.log_x {
             // A grid needs the places of both axes.
             study_axis.map(|axis| {
@@ -199,13 +203,19 @@ impl View<'_> {
 
     fn curve(&self, picture: &mut Picture, title: String, cells: &[&Cell]) {
         let (mut series, mut first) = (Vec::new(), picture.legend.is_empty());
-        for (rank, chosen) in self.values_of(self.plot.series.as_deref()).into_iter().enumerate() {
+        let across = self.results.axis(&self.plot.x).and_then(|axis| self.axis(axis));
+        let named = across.is_some_and(|axis| !axis.is_of_numbers());
+        let every = self.values_of(self.plot.series.as_deref());
+        let theory_mark = if named { Mark::Rings } else { Mark::Line };
+        let middle = 0.5 * every.len().saturating_sub(1) as f64;
+        for (rank, chosen) in every.into_iter().enumerate() {
+            let aside = if named { NAMED_STEP * (rank as f64 - middle) } else { 0.0 };
             let colour = COLOURS.get(rank % COLOURS.len()).copied().unwrap_or(GREY);
             let own = |cell: &&&Cell| chosen.is_none_or(|(axis, value)| cell.at.get(axis) == Some(&value));
             let mut points: Vec<(f64, &Cell)> = cells
                 .iter()
                 .filter(own)
-                .filter_map(|c| Some((self.place(c, &self.plot.x, self.plot.log_x)?, *c)))
+                .filter_map(|c| Some((self.place(c, &self.plot.x, self.plot.log_x)? + aside, *c)))
                 .collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let line = |of: &dyn Fn(&Cell) -> Option<f64>| -> Vec<(f64, f64)> {
@@ -215,21 +225,31 @@ impl View<'_> {
             let high = line(&|cell| self.estimate(cell)?.interval.map(|(_, high)| high));
             let means = line(&|cell| Some(self.estimate(cell)?.mean));
             let name = chosen.map_or_else(|| self.plot.figure.clone(), |(axis, value)| self.words(axis, value));
-            let mark = if self.theory.is_some() { Mark::Balls } else { Mark::Line };
+            // Nothing lies between names: each has its own interval, and no line leads to the next.
+            let mark = if self.theory.is_some() || named { Mark::Balls } else { Mark::Line };
             if first {
                 picture.legend.push(Series::new(name.clone(), colour, mark, Vec::new()));
             }
-            let band = low.into_iter().chain(high.into_iter().rev()).collect();
-            series.push(Series::new("band", colour, Mark::Band, band));
+            if named {
+                let box_of = |((x, low), (_, high)): (&(f64, f64), &(f64, f64))| {
+                    let (left, right) = (x - 0.3 * NAMED_STEP, x + 0.3 * NAMED_STEP);
+                    let corners = vec![(left, *low), (right, *low), (right, *high), (left, *high)];
+                    Series::new("band", colour, Mark::Band, corners)
+                };
+                series.extend(low.iter().zip(&high).map(box_of));
+            } else {
+                let band = low.into_iter().chain(high.into_iter().rev()).collect();
+                series.push(Series::new("band", colour, Mark::Band, band));
+            }
             if let Some(theory) = self.theory {
                 let expected = line(&|cell| cell.estimates.get(theory).copied().flatten().map(|e| e.mean));
-                series.push(Series::new("theory", colour, Mark::Line, expected));
+                series.push(Series::new("theory", colour, theory_mark, expected));
             }
             series.push(Series::new(name, colour, mark, means));
         }
         if std::mem::take(&mut first) {
             if self.theory.is_some() {
-                picture.legend.push(Series::new("theory", GREY, Mark::Line, Vec::new()));
+                picture.legend.push(Series::new("theory", GREY, theory_mark, Vec::new()));
             }
             if self.results.study.grid.repetitions > 1 {
                 picture.legend.push(Series::new("95 % of the mean", GREY, Mark::Band, Vec::new()));
@@ -274,8 +294,9 @@ impl View<'_> {
                 .collect();
         }
         let ticks = |axis: usize| -> Vec<(f64, String)> {
-            let values = self.axis(axis).map_or(&[][..], |axis| &axis.values);
-            values.iter().enumerate().map(|(rank, value)| (rank as f64, axis::text_of(value))).collect()
+            let of =
+                |axis: &axis::Axis| (0..axis.values.len()).map(|rank| (rank as f64, axis.words_of(rank))).collect();
+            self.axis(axis).map_or_else(Vec::new, of)
         };
         let side = |axis: usize| {
             let (label, count) = self.axis(axis).map_or(("", 0), |axis| (axis.label(), axis.values.len()));
@@ -320,9 +341,12 @@ impl View<'_> {
                 }
                 let both = ends.iter().all(Option::is_some);
                 let mut row: Vec<String> = self.plot.panel.iter().map(|_| title.clone()).collect();
-                row.extend([chosen, x].into_iter().flatten().map(|(axis, value)| {
-                    self.axis(axis).and_then(|axis| axis.values.get(value)).map_or_else(String::new, axis::text_of)
-                }));
+                row.extend(
+                    [chosen, x]
+                        .into_iter()
+                        .flatten()
+                        .map(|(axis, value)| self.axis(axis).map_or_else(String::new, |axis| axis.words_of(value))),
+                );
                 let number = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), short);
                 row.extend([number(mean), number(least(ends).filter(|_| both)), number(most(ends).filter(|_| both))]);
                 rows.push(row);

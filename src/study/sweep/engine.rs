@@ -57,20 +57,12 @@ struct Making {
     state: Mutex<(Vec<Option<Row>>, u64)>,
 }
 
-/// Runs these shards; `progress` hears how many of their cases are done, `stop` is asked whether to.
+/// Runs these shards; `progress` hears how many of their cases are done.
 ///
 /// # Errors
-/// The first case or file that fails; [`StudyError::Stopped`]. What was committed stays.
-pub fn run(
-    plan: &Plan,
-    shards: &[u32],
-    progress: &(dyn Fn(u64) + Sync),
-    stop: &(dyn Fn() -> bool + Sync),
-) -> Result<Ran, StudyError> {
-    let (directory, scratch) = (plan.shard_directory(), plan.directory.join("scratch"));
-    for place in [&directory, &scratch] {
-        temporary::sweep(place);
-    }
+/// The first case or file that fails. What was committed stays.
+pub fn run(plan: &Plan, shards: &[u32], progress: &(dyn Fn(u64) + Sync)) -> Result<Ran, StudyError> {
+    temporary::sweep(&plan.shard_directory());
     let sharing = plan.study.grid.sharing();
     let makings: Vec<Making> = shards
         .iter()
@@ -87,9 +79,9 @@ pub fn run(
     });
     let (done, failed) = (AtomicU64::new(0), AtomicBool::new(false));
     let reason: Mutex<Option<StudyError>> = Mutex::new(None);
-    let halt = || failed.load(Ordering::Relaxed) || stop();
+    let halt = || failed.load(Ordering::Relaxed);
     groups.par_bridge().for_each(|(making, cases)| {
-        let worked = if halt() { Err(StudyError::Stopped) } else { work(plan, making, cases.clone(), &scratch, &halt) };
+        let worked = if halt() { Err(StudyError::Stopped) } else { work(plan, making, cases.clone(), &halt) };
         match worked {
             Ok(()) => {
                 let count = cases.end - cases.start;
@@ -104,8 +96,6 @@ pub fn run(
             }
         }
     });
-    // Not empty while another run works there.
-    let _ = std::fs::remove_dir(&scratch);
     match reason.into_inner() {
         Ok(None) => Ok(Ran { shards: shards.len() as u32, cases: done.into_inner() }),
         Ok(Some(error)) => Err(error),
@@ -118,10 +108,9 @@ fn work(
     plan: &Plan,
     making: &Making,
     cases: std::ops::Range<u64>,
-    scratch: &std::path::Path,
-    stop: &(dyn Fn() -> bool + Sync),
+    halt: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), StudyError> {
-    let rows = rows(plan, cases.clone(), scratch, stop)?;
+    let rows = rows(plan, cases.clone(), halt)?;
     // A poisoned lock means that a thread has panicked; the run ends with it anyway.
     let mut state = making.state.lock().map_err(|_| StudyError::Bug("a worker panicked".to_owned()))?;
     let (slots, left) = &mut *state;
@@ -147,12 +136,7 @@ fn work(
 }
 
 /// Figures of cases that share a signal.
-fn rows(
-    plan: &Plan,
-    cases: std::ops::Range<u64>,
-    scratch: &std::path::Path,
-    stop: &(dyn Fn() -> bool + Sync),
-) -> Result<Vec<Row>, StudyError> {
+fn rows(plan: &Plan, cases: std::ops::Range<u64>, halt: &(dyn Fn() -> bool + Sync)) -> Result<Vec<Row>, StudyError> {
     let study = &plan.study;
     let cases: Vec<_> = cases.map(|number| study.grid.case(number)).collect();
     match study.level {
@@ -165,7 +149,7 @@ fn rows(
                     values: study.values_text(case),
                     reason,
                 })?;
-                if stop() {
+                if halt() {
                     return Err(StudyError::Stopped);
                 }
                 Ok(model.figures(study.seed_of(case, ""), &study.keep))
@@ -174,7 +158,7 @@ fn rows(
         Level::Samples => {
             let base = cases.first().and_then(|case| plan.base(case));
             let base = base.ok_or_else(|| StudyError::Bug("a case without a scene".to_owned()))?;
-            sampled::run(study, base, &cases, scratch, stop)
+            sampled::run(study, base, &cases, &plan.shard_directory(), halt)
         }
     }
 }

@@ -67,7 +67,7 @@ pub enum StudyError {
     Incomplete { missing: usize, shards: u32, list: String },
     #[error("shard {shard}: expected 0 to {last}")]
     NoSuchShard { shard: u32, last: u32 },
-    /// Asked to stop.
+    /// As another case had failed.
     #[error("stopped")]
     Stopped,
     #[error(transparent)]

@@ -5,7 +5,7 @@
 //! inputs and must come out the same, byte by byte: what a manifest says is checked, never believed.
 
 use std::fs;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -17,6 +17,7 @@ use super::model::Model;
 use super::sampled::{self, Base};
 use super::spec::{Level, Study};
 use super::{StudyError, axis, sha256_hex, temporary, unit_of};
+use crate::analysis::making::Making;
 use crate::generator::scenario::{Overrides, Scenario};
 
 /// Version of manifest and shards.
@@ -120,6 +121,9 @@ impl Plan {
         match fs::read(&target) {
             Ok(there) if there == bytes => {}
             Ok(there) => return Err(occupied(directory, &there, &manifest)),
+            Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                return Err(StudyError::Read { path: target, source });
+            }
             Err(_) if holds_something(directory) => {
                 let reason = "is not empty and holds no plan: name another directory".to_owned();
                 return Err(StudyError::Occupied { path: directory.to_owned(), reason });
@@ -293,16 +297,14 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, StudyError> {
 pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
     let parent = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(parent).map_err(|source| StudyError::Create { path: parent.to_owned(), source })?;
-    let part = parent.join(temporary::name());
-    let written = fs::File::create(&part).and_then(|mut file| {
+    // What a run that was killed at this left.
+    temporary::sweep(parent);
+    let written = Making::file(parent.join(temporary::name())).and_then(|(making, mut file)| {
         file.write_all(bytes)?;
         file.sync_all()?;
-        fs::rename(&part, path)
+        making.finish(path)
     });
-    written.map_err(|source| {
-        let _ = fs::remove_file(&part);
-        StudyError::Write { path: path.to_owned(), source }
-    })
+    written.map_err(|source| StudyError::Write { path: path.to_owned(), source })
 }
 
 fn parse(path: &Path) -> Result<Study, StudyError> {

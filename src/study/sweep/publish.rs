@@ -141,7 +141,7 @@ pub(super) fn beyond_theory(results: &Results, beyond: &[&Compared]) -> Rows {
     let heads: Vec<String> = labels.chain(["T·C/N0", "ratio", "allowed"].map(str::to_owned)).collect();
     let row = |compared: &&Compared| {
         let cell = results.cells.get(compared.cell)?;
-        let values = (0..results.study.axes.len()).map(|axis| results.value_text(cell, axis));
+        let values = (0..results.study.axes.len()).map(|axis| results.words(cell, axis));
         let snr = compared.snr.map_or_else(|| "–".to_owned(), short);
         Some(values.chain([snr, format!("{:.3}", compared.ratio), format!("± {:.3}", compared.bar)]).collect())
     };
@@ -166,7 +166,7 @@ pub(super) fn cells(results: &Results) -> Option<Rows> {
     let labels = results.study.axes.iter().map(|axis| axis.label().to_owned());
     let heads = labels.chain(results.figures.iter().map(|figure| figure.name.clone())).collect();
     let row = |cell: &result::Cell| {
-        let values = (0..results.study.axes.len()).map(|axis| results.value_text(cell, axis));
+        let values = (0..results.study.axes.len()).map(|axis| results.words(cell, axis));
         let figures = results.figures.iter().zip(&cell.estimates).map(|(figure, estimate)| match estimate {
             None => "–".to_owned(),
             Some(estimate) => match estimate.interval {

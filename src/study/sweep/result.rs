@@ -112,6 +112,12 @@ impl Results {
         self.value(cell, axis).map_or_else(String::new, axis::text_of)
     }
 
+    /// The same as plots and reports call it.
+    pub fn words(&self, cell: &Cell, axis: usize) -> String {
+        let rank = cell.at.get(axis).copied();
+        rank.zip(self.study.axes.get(axis)).map_or_else(String::new, |(rank, axis)| axis.words_of(rank))
+    }
+
     /// A cell's value on an axis.
     pub fn value(&self, cell: &Cell, axis: usize) -> Option<&toml::Value> {
         self.study.axes.get(axis)?.values.get(*cell.at.get(axis)?)

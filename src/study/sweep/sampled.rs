@@ -133,13 +133,13 @@ impl Ear {
 /// Runs cases that share their signal; gives the figures asked for, case by case.
 ///
 /// # Errors
-/// A case that its readers refuse, files that cannot be written, a request to stop.
+/// A case that its readers refuse, files that cannot be written; [`StudyError::Stopped`] once `halt` says so.
 pub fn run(
     study: &Study,
     base: &Base,
     cases: &[axis::Case],
     scratch: &Path,
-    stop: &(dyn Fn() -> bool + Sync),
+    halt: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Vec<Option<f64>>>, StudyError> {
     let Some(first) = cases.first() else { return Ok(Vec::new()) };
     let refused = |case: &axis::Case, reason: String| StudyError::Case {
@@ -155,7 +155,7 @@ pub fn run(
     let (scenario, _) = of(first)?;
     let overrides = Overrides { seed: Some(study.seed_of(first, &base.name)), ..Overrides::default() };
     let (scene, _) = scenario.compose(&base.directory, &overrides).map_err(|e| refused(first, e.without_place()))?;
-    let here = temporary::Directory::new(scratch)?;
+    let here = temporary::directory(scratch)?;
     let truth_path = here.path().join("truth");
     let mut truth = truth::Writer::create(&truth_path).map_err(GenerateError::Truth)?;
     let mut ears = Vec::new();
@@ -177,7 +177,7 @@ pub fn run(
         received?;
         more = generated?;
         std::mem::swap(&mut made, &mut taken);
-        if stop() {
+        if halt() {
             return Err(StudyError::Stopped);
         }
     }

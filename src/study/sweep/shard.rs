@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 use super::plan::Plan;
 use super::{StudyError, axis, sha256_hex, temporary};
+use crate::analysis::making::{Making, present};
 
 /// Figures of one case.
 pub type Row = Vec<Option<f64>>;
@@ -154,10 +155,7 @@ pub fn commit(plan: &Plan, shard: u32, bytes: &[u8]) -> Result<(), StudyError> {
 }
 
 fn attempt(directory: &Path, target: &Path, bytes: &[u8]) -> Result<(), StudyError> {
-    let part = directory.join(temporary::name());
-    let done = publish(&part, target, bytes);
-    // The name is no longer needed; a failure leaves it for the next run to sweep.
-    let _ = fs::remove_file(&part);
+    let done = publish(directory.join(temporary::name()), target, bytes);
     let failed = |source| StudyError::Write { path: target.to_owned(), source };
     match done {
         Ok(()) => {}
@@ -173,16 +171,16 @@ fn attempt(directory: &Path, target: &Path, bytes: &[u8]) -> Result<(), StudyErr
 }
 
 /// Writes the temporary and links it to its final name, which must not be there.
-fn publish(part: &Path, target: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = File::options().write(true).create_new(true).open(part)?;
+fn publish(part: PathBuf, target: &Path, bytes: &[u8]) -> io::Result<()> {
+    let (making, mut file) = Making::file(part)?;
     file.write_all(bytes)?;
     file.sync_all()?;
-    match fs::hard_link(part, target) {
+    match fs::hard_link(making.path(), target) {
         Err(error) if matches!(error.kind(), io::ErrorKind::Unsupported | io::ErrorKind::PermissionDenied) => {
-            if target.exists() {
+            if present(target)? {
                 return Err(io::ErrorKind::AlreadyExists.into());
             }
-            fs::rename(part, target)
+            making.finish(target)
         }
         other => other,
     }

@@ -1,12 +1,12 @@
 //! Names for work in progress: they tell whose it is, so that what a dead run left behind can be swept and nothing else.
 
 use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
 use super::StudyError;
+use crate::analysis::making::{Making, remove};
 
 pub(super) const PREFIX: &str = ".tmp";
 /// Work of another machine whose processes cannot be seen is dead after so long.
@@ -35,7 +35,9 @@ pub(super) fn sweep(directory: &Path) {
             continue;
         }
         let dead = match (parts.next(), parts.next()) {
-            (Some(other), Some(process)) if other == host() => !Path::new("/proc").join(process).exists(),
+            (Some(other), Some(process)) if other == host() => {
+                matches!(Path::new("/proc").join(process).try_exists(), Ok(false))
+            }
             _ => old(&entry),
         };
         if dead {
@@ -50,30 +52,8 @@ fn old(entry: &fs::DirEntry) -> bool {
     modified.is_ok_and(|then| SystemTime::now().duration_since(then).is_ok_and(|age| age > FOREIGN_AGE))
 }
 
-pub(super) fn remove(path: &Path) -> io::Result<()> {
-    if fs::symlink_metadata(path)?.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) }
-}
-
 /// A directory that vanishes with its owner.
-pub(super) struct Directory(PathBuf);
-
-impl Directory {
-    pub(super) fn new(parent: &Path) -> Result<Self, StudyError> {
-        let path = parent.join(name());
-        // Again, should another run have taken the empty parent away meanwhile.
-        let made = fs::create_dir_all(&path).or_else(|_| fs::create_dir_all(&path));
-        made.map_err(|source| StudyError::Create { path: path.clone(), source })?;
-        Ok(Self(path))
-    }
-
-    pub(super) fn path(&self) -> &Path {
-        &self.0
-    }
-}
-
-impl Drop for Directory {
-    fn drop(&mut self) {
-        // What stays behind is swept by a later run.
-        let _ = remove(&self.0);
-    }
+pub(super) fn directory(parent: &Path) -> Result<Making, StudyError> {
+    let path = parent.join(name());
+    Making::directory(path.clone()).map_err(|source| StudyError::Create { path, source })
 }

@@ -1,0 +1,350 @@
+//! The three loops of a receiver as theory sees them: linear, with the exact bandwidth that the settings ask for.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use super::Loop;
+use crate::analysis::errors::Link;
+use crate::analysis::foreign::truth::Timeline;
+use crate::analysis::load::Run;
+use crate::analysis::theory::clock::PowerLaw;
+use crate::analysis::theory::linear::{Feedback, PhaseLoop, controlled_root_gains};
+use crate::analysis::theory::{dll, fll, oscillator, pll};
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+
+/// Receiver's settings that the theory needs; the defaults are the receiver's where its file does not name them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    pub pll_order: u32,
+    pub pll_bandwidth_hz: f64,
+    pub dll_order: u32,
+    pub dll_bandwidth_hz: f64,
+    pub spacing_chips: f64,
+    pub averaged_replica: bool,
+}
+
+impl Settings {
+    /// As `receiver.json` has them; `None` where it names no bandwidths.
+    pub fn of(run: &Run) -> Option<Self> {
+        let number = |key| run.tracking_setting(key);
+        let settings = run.receiver.get("settings").unwrap_or(&run.receiver);
+        Some(Self {
+            pll_order: number("pll_order")? as u32,
+            pll_bandwidth_hz: number("pll_bandwidth_hz")?,
+            dll_order: number("dll_order")? as u32,
+            dll_bandwidth_hz: number("dll_bandwidth_hz")?,
+            spacing_chips: number("spacing_chips")?,
+            averaged_replica: settings.get("tracking").and_then(|t| t.get("replica")?.as_str()) == Some("area"),
+        })
+    }
+}
+
+/// A loop of exact bandwidth whose roots all lie at one place; `None` where no such place is.
+pub fn exact_loop(order: u32, bandwidth_time: f64) -> Option<PhaseLoop> {
+    let of = |root: f64| PhaseLoop { gains: controlled_root_gains(order, root), feedback: Feedback::PhaseAndRate };
+    let (mut low, mut high) = (1e-6_f64, 1.0 - 1e-6);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        // The bandwidth falls as the root nears one.
+        if of(middle).bandwidth_time()? > bandwidth_time { low = middle } else { high = middle }
+    }
+    Some(of(0.5 * (low + high)))
+}
+
+/// What a loop makes of unit noise of its discriminator, from its response to one value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Response {
+    /// Variances of the estimate of an interval's mean phase, of what the discriminator puts out, of that one's difference from
+    /// one interval to the next, and of the rate in phase an interval.
+    phase: f64,
+    put_out: f64,
+    difference: f64,
+    rate: f64,
+}
+
+/// Intervals after which nothing is left of a value in any loop that can be set: bandwidth times time is 1e-4 or more.
+const LONGEST: usize = 200_000;
+
+impl Response {
+    fn of(closed: &PhaseLoop) -> Self {
+        let mut state = [0.0; 3];
+        let mut found = Self { phase: 0.0, put_out: 0.0, difference: 0.0, rate: 0.0 };
+        let mut before = 0.0;
+        for k in 0..LONGEST {
+            let noise = if k == 0 { 1.0 } else { 0.0 };
+            found.phase += state[0] * state[0];
+            // What the oscillator runs at in this interval, the mean of its rate.
+            let ran = state[1] + 0.5 * state[2];
+            found.rate += ran * ran;
+            let put_out = noise - state[0];
+            found.put_out += put_out * put_out;
+            found.difference += (put_out - before) * (put_out - before);
+            before = put_out;
+            state = step(&closed.gains, state, put_out);
+            if k > 10 && state.iter().all(|x| x.abs() < 1e-9) {
+                break;
+            }
+        }
+        found
+    }
+}
+
+/// One update of (mean phase of the coming interval, rate, acceleration) by an error.
+fn step([k1, k2, k3]: &[f64; 3], [phase, rate, acceleration]: [f64; 3], error: f64) -> [f64; 3] {
+    let acceleration = acceleration + k3 * error;
+    let rate = rate + k2 * error + acceleration;
+    [phase + k1 * error + rate, rate, acceleration]
+}
+
+/// Error of a noise-free loop on the phases of successive intervals; the first second, in which it runs in, is left out.
+fn stress(closed: &PhaseLoop, phases: &[f64], update_s: f64) -> Vec<f64> {
+    let (Some(first), Some(second)) = (phases.first(), phases.get(1)) else { return Vec::new() };
+    let mut state = [*first, second - first, 0.0];
+    let skip = (1.0 / update_s) as usize;
+    let errors = phases.iter().map(|phase| {
+        let error = phase - state[0];
+        state = step(&closed.gains, state, error);
+        error
+    });
+    errors.collect::<Vec<_>>().split_off(skip.min(phases.len()))
+}
+
+/// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for early minus late.
+///
+/// The triangle is the second difference of |x|/2; each average over w adds an integral and a difference of 1/w.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Peak {
+    width_chips: f64,
+    averages: u32,
+}
+
+impl Peak {
+    /// Value at a delay in chips.
+    fn value(&self, x: f64) -> f64 {
+        let w = self.width_chips;
+        match self.averages {
+            0 => (1.0 - x.abs()).max(0.0),
+            // Integrals of |x|/2: x|x|/4 and |x|³/12.
+            1 => {
+                second(|y| (y + 0.5 * w) * (y + 0.5 * w).abs() / 4.0 - (y - 0.5 * w) * (y - 0.5 * w).abs() / 4.0, x) / w
+            }
+            _ => {
+                let cube = |y: f64| y.abs() * y * y / 12.0;
+                second(|y| cube(y + w) - 2.0 * cube(y) + cube(y - w), x) / (w * w)
+            }
+        }
+    }
+
+    /// Minus its slope at a delay, by a difference that errs by 1e-9.
+    fn slope(&self, x: f64) -> f64 {
+        let h = 1e-4;
+        (self.value(x - h) - self.value(x + h)) / (2.0 * h)
+    }
+}
+
+/// Second difference over a chip.
+fn second(of: impl Fn(f64) -> f64, x: f64) -> f64 {
+    of(x + 1.0) - 2.0 * of(x) + of(x - 1.0)
+}
+
+/// Standard deviation of one early-minus-late value, in chips, for the shapes of signal and noise: with a and a′ the relative height
+/// and slope at d/2 and ρ the noise's correlation over d, (1−ρ)/(4·snr·a′²)·(1 + (1+ρ)/(2·snr·a²)).
+fn raw_chips(signal: Peak, noise: Peak, d: f64, snr: f64) -> f64 {
+    let height = signal.value(0.5 * d) / signal.value(0.0);
+    let slope = signal.slope(0.5 * d) / signal.value(0.0);
+    let rho = noise.value(d) / noise.value(0.0);
+    ((1.0 - rho) / (4.0 * snr * slope * slope) * (1.0 + (1.0 + rho) / (2.0 * snr * height * height))).sqrt()
+}
+
+/// The three loops of a receiver as theory sees them at one integration time.
+pub(super) struct Theory {
+    settings: Settings,
+    pub update_s: f64,
+    pub chip_m: f64,
+    carrier_hz: f64,
+    pll: (PhaseLoop, Response),
+    dll: (PhaseLoop, Response),
+    peaks: (Peak, Peak),
+    oscillator: Option<PowerLaw>,
+}
+
+impl Theory {
+    pub fn new(run: &Run, settings: Settings, link: &Link, update_s: f64) -> Option<Self> {
+        let chip_rate_hz = link.1.components.first()?.chip_rate_hz;
+        let pll = exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s)?;
+        let dll = exact_loop(settings.dll_order, settings.dll_bandwidth_hz * update_s)?;
+        let width_chips = chip_rate_hz / run.scene.sample_rate_hz;
+        let of_replica = u32::from(settings.averaged_replica);
+        let of_signal = u32::from(run.scene.code_edge == "area");
+        Some(Self {
+            settings,
+            update_s,
+            chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
+            carrier_hz: link.1.carrier_hz,
+            pll: (pll, Response::of(&pll)),
+            dll: (dll, Response::of(&dll)),
+            peaks: (
+                Peak { width_chips, averages: of_replica + of_signal },
+                Peak { width_chips, averages: 2 * of_replica },
+            ),
+            oscillator: run.scene.oscillator.map(|noise| PowerLaw { h: noise.h }),
+        })
+    }
+
+    /// Raw and thermal sigma, in the loop's unit.
+    pub fn noise(&self, which: Loop, cn0_hz: f64) -> (f64, f64) {
+        let update_s = self.update_s;
+        let phase_rad = pll::raw_rad(update_s, cn0_hz);
+        let (loop_, code) = (&self.pll.1, &self.dll.1);
+        match which {
+            Loop::Dll => {
+                let raw = raw_chips(self.peaks.0, self.peaks.1, self.settings.spacing_chips, update_s * cn0_hz);
+                (raw * code.put_out.sqrt(), raw * code.phase.sqrt())
+            }
+            // Observations fall anywhere in an interval, in which the phase runs at the loop's rate: x²·rate² more, 1/12 in the mean.
+            Loop::Pll => (
+                (phase_rad * loop_.put_out.sqrt()).to_degrees(),
+                (phase_rad * (loop_.phase + loop_.rate / 12.0).sqrt()).to_degrees(),
+            ),
+            Loop::Fll => {
+                let hertz = phase_rad / (TAU * update_s);
+                (hertz * loop_.difference.sqrt(), hertz * loop_.rate.sqrt())
+            }
+        }
+    }
+
+    /// Sigma that the scene's oscillator leaves, in the loop's unit.
+    pub fn oscillator(&self, which: Loop) -> f64 {
+        match (which, &self.oscillator) {
+            (Loop::Pll, Some(law)) => {
+                oscillator::jitter_discrete_rad(law, self.carrier_hz, &self.pll.0.linear(), self.update_s).to_degrees()
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Threshold of jitter alone, and limit of 3σ and stress.
+    pub fn limits(&self, which: Loop) -> (f64, f64) {
+        let d = self.settings.spacing_chips;
+        match which {
+            Loop::Dll => (dll::threshold_chips(d), 0.5 * d),
+            Loop::Pll => (pll::THRESHOLD_RAD.to_degrees(), pll::LIMIT_RAD.to_degrees()),
+            Loop::Fll => (fll::threshold_hz(self.update_s), 0.25 / self.update_s),
+        }
+    }
+}
+
+/// Stresses of a satellite's three loops over the times from `from_s` to `to_s`, in their units.
+pub(super) struct Stresses {
+    pub of: BTreeMap<Loop, Vec<f64>>,
+}
+
+/// Longest stretch that is followed interval by interval.
+const MOST_UPDATES: usize = 4_000_000;
+
+impl Stresses {
+    pub fn new(theory: &Theory, timeline: &Timeline, link: &Link, (from_s, to_s): (f64, f64)) -> Self {
+        let mut found = Self { of: [Loop::Dll, Loop::Pll, Loop::Fll].map(|which| (which, Vec::new())).into() };
+        let t_s = theory.update_s;
+        let count = (((to_s - from_s) / t_s).max(0.0) as usize).min(MOST_UPDATES);
+        let (mut phases, mut delays) = (Vec::new(), Vec::new());
+        let origin = timeline.state(link, from_s);
+        for k in 0..=count {
+            // The middle of an interval stands for its mean.
+            let state = (k < count).then(|| timeline.state(link, from_s + (k as f64 + 0.5) * t_s)).flatten();
+            match (state, origin) {
+                (Some(state), Some(origin)) => {
+                    let range_m = state.range_m - origin.range_m;
+                    let carrier_cycles = state.carrier_cycles - origin.carrier_cycles;
+                    phases.push(carrier_cycles);
+                    // The carrier aids the code: only what parts them is left.
+                    delays.push((range_m - carrier_cycles * link.1.wavelength_m()) / theory.chip_m);
+                }
+                _ => {
+                    found.add(theory, &std::mem::take(&mut phases), &std::mem::take(&mut delays));
+                }
+            }
+        }
+        found
+    }
+
+    fn add(&mut self, theory: &Theory, phases: &[f64], delays: &[f64]) {
+        let t_s = theory.update_s;
+        let phase = stress(&theory.pll.0, phases, t_s);
+        let rate: Vec<f64> = phase.windows(2).map(|two| (two[1] - two[0]) / t_s).collect();
+        let code = stress(&theory.dll.0, delays, t_s);
+        let turns = phase.into_iter().map(|cycles| 360.0 * cycles).collect();
+        for (which, values) in [(Loop::Dll, code), (Loop::Pll, turns), (Loop::Fll, rate)] {
+            self.of.entry(which).or_default().extend(values);
+        }
+    }
+}
+
+/// Errors in degrees that the true motion leaves in the phase loop of each satellite, with their times since sample 0.
+pub fn motion_error_deg(run: &Run, settings: Settings, update_s: f64) -> BTreeMap<Link, Vec<(f64, f64)>> {
+    let (Some(timeline), Some(closed)) =
+        (Timeline::new(run), exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s))
+    else {
+        return BTreeMap::new();
+    };
+    let origin_s = run.trajectory.first().map_or(0.0, |row| row.time().since(timeline.origin) - run.time_s(row.sample));
+    let skip_s = (1.0 / update_s).trunc() * update_s;
+    let mut found = BTreeMap::new();
+    for (link, stretches) in timeline.stretches_s() {
+        let mut series = Vec::new();
+        for (from_s, to_s) in stretches {
+            let count = (((to_s - from_s) / update_s).max(0.0) as usize).min(MOST_UPDATES);
+            let start = timeline.state(&link, from_s).map_or(0.0, |state| state.carrier_cycles);
+            let at = |k: usize| from_s + (k as f64 + 0.5) * update_s;
+            let phases: Vec<f64> =
+                (0..count).map_while(|k| Some(timeline.state(&link, at(k))?.carrier_cycles - start)).collect();
+            let errors = stress(&closed, &phases, update_s).into_iter().enumerate();
+            series.extend(errors.map(|(k, error)| (at(k) + skip_s - origin_s, 360.0 * error)));
+        }
+        found.insert(link, series);
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::theory::dll::Discriminator;
+
+    #[test]
+    fn a_loop_has_the_bandwidth_that_it_is_given() {
+        // Root of order 3 from the literature's table: 0.954395 at 0.05.
+        let found = exact_loop(3, 0.05).unwrap();
+        let root = 1.0 - libm::cbrt(found.gains[2]);
+        assert!((root - 0.954_395).abs() < 1e-6, "{root}");
+        let response = Response::of(&found);
+        assert!((0.5 * response.phase - 0.05).abs() < 1e-6, "{response:?}");
+        // A value is white: what is put out is its own variance and the estimate's, which knows it not yet.
+        assert!((response.put_out - 1.0 - response.phase).abs() < 1e-9, "{response:?}");
+    }
+
+    #[test]
+    fn a_jerk_leaves_the_error_that_theory_says() {
+        let closed = exact_loop(3, 0.072).unwrap();
+        let t_s: f64 = 4e-3;
+        let phases: Vec<f64> = (0..2000).map(|k| 50.0 / 6.0 * (f64::from(k) * t_s).powi(3)).collect();
+        let last = *stress(&closed, &phases, t_s).last().unwrap();
+        let expected = pll::stress_discrete(3, closed.gains[2], t_s, 50.0);
+        assert!((last / expected - 1.0).abs() < 1e-3, "{last} {expected}");
+    }
+
+    #[test]
+    fn peaks_are_the_triangle_without_averages_and_rounded_with_them() {
+        let plain = Peak { width_chips: 0.4, averages: 0 };
+        for cn0_hz in [1e3, 1e4, 1e5] {
+            let known = dll::raw_chips(Discriminator::EarlyMinusLate, 0.5, 4e-3, cn0_hz);
+            assert!((raw_chips(plain, plain, 0.5, 4e-3 * cn0_hz) / known - 1.0).abs() < 1e-9);
+        }
+        // The mean of a triangle over ±w/2 is 1 − w/4, over a triangle of ±w it is 1 − w/3; far from corners nothing changes.
+        for (averages, peak) in [(1, 1.0 - 0.1), (2, 1.0 - 0.4 / 3.0)] {
+            let round = Peak { width_chips: 0.4, averages };
+            assert!((round.value(0.0) - peak).abs() < 1e-12, "{}", round.value(0.0));
+            assert!((round.value(0.5) - 0.5).abs() < 1e-12 && (round.slope(0.5) - 1.0).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! The truth's files: tables that grow with the scene, and `scene.json`.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, BufWriter};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use thiserror::Error;
+
+use super::Truth;
+use crate::generator::effect::obstruction;
+use crate::generator::scene::Scene;
+use crate::generator::spoof::Constellation;
+use crate::generator::stage::Fact;
+use crate::generator::stage::interference::{Interferer, Spectrum};
+use crate::gnss::record::{InterferenceRow, NavigationRow, TrajectoryRow};
+
+/// Why the truth could not be written.
+#[derive(Debug, Error)]
+pub enum TruthError {
+    #[error("{path}: {source}")]
+    File { path: PathBuf, source: io::Error },
+    #[error("{path}: {source}")]
+    Row { path: PathBuf, source: csv::Error },
+}
+
+struct Table {
+    path: PathBuf,
+    rows: csv::Writer<BufWriter<File>>,
+}
+
+impl Table {
+    fn create(directory: &Path, name: &str) -> Result<Self, TruthError> {
+        let path = directory.join(name);
+        let file = File::create(&path).map_err(|source| TruthError::File { path: path.clone(), source })?;
+        Ok(Self { path, rows: csv::Writer::from_writer(BufWriter::new(file)) })
+    }
+
+    fn write(&mut self, row: impl Serialize) -> Result<(), TruthError> {
+        self.rows.serialize(row).map_err(|source| TruthError::Row { path: self.path.clone(), source })
+    }
+
+    fn flush(&mut self) -> Result<(), TruthError> {
+        self.rows.flush().map_err(|source| TruthError::File { path: self.path.clone(), source })
+    }
+}
+
+/// What a spoofer claims: observables like `observations.csv`, places like `trajectory.csv`.
+struct Claims {
+    observations: Table,
+    trajectory: Table,
+}
+
+/// Writes `observations.csv`, `sky.csv`, `trajectory.csv`, `navigation.csv` and `scene.json`; `rays.csv` where a satellite
+/// has more than one ray, with interference `interference.csv`, with spoofers `spoofed.csv` and `claimed.csv`
+/// (`spoofed_2.csv`, … from the second one on).
+pub struct Writer {
+    directory: PathBuf,
+    observations: Table,
+    sky: Table,
+    rays: Option<Table>,
+    trajectory: Table,
+    interference: Option<Table>,
+    claims: Vec<Claims>,
+}
+
+#[derive(Serialize)]
+struct SceneFile<'a> {
+    name: &'a str,
+    seed: u64,
+    start: String,
+    /// Of the scene, where only a part of it was made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    first_sample: Option<u64>,
+    duration_s: f64,
+    samples: u64,
+    sample_rate_hz: f64,
+    center_hz: f64,
+    inverted: bool,
+    format: &'a str,
+    fidelity: &'a str,
+    code_edge: &'a str,
+    carrier: &'a str,
+    knot_tolerance_cycles: f64,
+    mask_deg: f64,
+    truth_interval_s: f64,
+    signals: Vec<&'a str>,
+    noise: bool,
+    noise_arithmetic: &'a str,
+    noise_lsb: f32,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    front_end: Vec<Fact>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    skyline_deg: Option<Vec<[f64; 2]>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    oscillator: Option<OscillatorFile>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    interference: Vec<Spectrum>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    spoofers: Vec<String>,
+    /// What is true of the satellites that they do not broadcast.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    orbits: Option<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    satellite_faults: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    message_faults: Vec<String>,
+}
+
+/// Power law of the receiver's oscillator, from white phase noise to random-walk frequency noise.
+#[derive(Serialize)]
+struct OscillatorFile {
+    h: [f64; 5],
+}
+
+impl Writer {
+    /// Creates the directory, if need be, and the files in it.
+    ///
+    /// # Errors
+    /// [`TruthError`] with the path that failed.
+    pub fn create(directory: &Path) -> Result<Self, TruthError> {
+        fs::create_dir_all(directory).map_err(|source| TruthError::File { path: directory.to_owned(), source })?;
+        let rays = directory.join("rays.csv");
+        if rays.exists() {
+            fs::remove_file(&rays).map_err(|source| TruthError::File { path: rays, source })?;
+        }
+        Ok(Self {
+            directory: directory.to_owned(),
+            observations: Table::create(directory, "observations.csv")?,
+            sky: Table::create(directory, "sky.csv")?,
+            rays: None,
+            trajectory: Table::create(directory, "trajectory.csv")?,
+            interference: None,
+            claims: Vec::new(),
+        })
+    }
+
+    /// Writes `scene.json` for a part of the scene, and creates the files that only this scene has.
+    pub fn scene(&mut self, scene: &Scene, part: &Range<u64>) -> Result<(), TruthError> {
+        if !scene.interference.is_empty() {
+            self.interference = Some(Table::create(&self.directory, "interference.csv")?);
+        }
+        for spoofer in &scene.spoofers {
+            let suffix = if spoofer.number > 1 { format!("_{}", spoofer.number) } else { String::new() };
+            self.claims.push(Claims {
+                observations: Table::create(&self.directory, &format!("spoofed{suffix}.csv"))?,
+                trajectory: Table::create(&self.directory, &format!("claimed{suffix}.csv"))?,
+            });
+        }
+        let (orbits, departures) = scene.catalogue.describe();
+        let file = SceneFile {
+            name: &scene.name,
+            seed: scene.seed,
+            start: scene.clock.epoch(part.start).to_string(),
+            first_sample: (part.start > 0).then_some(part.start),
+            duration_s: scene.clock.rate.elapsed_s(part.end - part.start),
+            samples: part.end - part.start,
+            sample_rate_hz: scene.clock.rate.hz(),
+            center_hz: scene.metadata.center_hz,
+            inverted: scene.metadata.inverted,
+            format: scene.metadata.format.name(),
+            fidelity: scene.fidelity.grade.name(),
+            code_edge: scene.fidelity.code_edge.name(),
+            carrier: scene.fidelity.carrier.name(),
+            knot_tolerance_cycles: scene.fidelity.knot_tolerance_cycles,
+            mask_deg: scene.mask_rad.to_degrees(),
+            truth_interval_s: scene.truth_interval_s,
+            signals: scene.signals.iter().map(|signal| signal.name).collect(),
+            noise: scene.noise,
+            noise_arithmetic: scene.fidelity.noise.name(),
+            noise_lsb: scene.noise_lsb,
+            front_end: scene.front_end.iter().filter_map(|stage| stage.fact()).collect(),
+            skyline_deg: obstruction::skyline_deg(scene),
+            oscillator: (scene.receiver_clock.oscillator.as_ref())
+                .map(|oscillator| OscillatorFile { h: oscillator.law.levels() }),
+            interference: scene.interference.iter().map(Interferer::spectrum).collect(),
+            spoofers: scene.spoofers.iter().map(|spoofer| spoofer.describe()).collect(),
+            orbits,
+            satellite_faults: [departures, scene.satellite_clocks.descriptions.clone()].concat(),
+            message_faults: scene.message_faults.iter().map(|fault| fault.describe(scene.clock.start)).collect(),
+        };
+        let path = self.directory.join("scene.json");
+        serde_json::to_string_pretty(&file)
+            .map_err(io::Error::from)
+            .and_then(|text| fs::write(&path, text + "\n"))
+            .map_err(|source| TruthError::File { path, source })
+    }
+
+    /// Appends what is true at one sample.
+    pub fn epoch(&mut self, trajectory: &TrajectoryRow, satellites: &[Truth]) -> Result<(), TruthError> {
+        self.trajectory.write(trajectory)?;
+        for (observation, sky, rays) in satellites {
+            self.observations.write(observation)?;
+            self.sky.write(sky)?;
+            for ray in rays {
+                if self.rays.is_none() {
+                    self.rays = Some(Table::create(&self.directory, "rays.csv")?);
+                }
+                self.rays.as_mut().map_or(Ok(()), |table| table.write(ray))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends what interference there is at one sample of the scene, counted from `origin`.
+    pub fn interference(&mut self, scene: &Scene, sample: u64, origin: u64) -> Result<(), TruthError> {
+        let Some(table) = &mut self.interference else { return Ok(()) };
+        let mut rows = (1..).zip(&scene.interference).filter_map(|(number, source)| source.row(number, sample));
+        rows.try_for_each(|row| table.write(InterferenceRow { sample: sample - origin, ..row }))
+    }
+
+    /// Appends what a spoofer claims at one sample.
+    pub fn claim(
+        &mut self,
+        spoofer: &Constellation,
+        claimed: &TrajectoryRow,
+        satellites: &[Truth],
+    ) -> Result<(), TruthError> {
+        let Some(claims) = spoofer.number.checked_sub(1).and_then(|index| self.claims.get_mut(index)) else {
+            return Ok(());
+        };
+        claims.trajectory.write(claimed)?;
+        satellites.iter().try_for_each(|(observation, ..)| claims.observations.write(observation))
+    }
+
+    /// Writes `navigation.csv` and everything that is still buffered.
+    pub fn finish(&mut self, navigation: &BTreeSet<NavigationRow>) -> Result<(), TruthError> {
+        let mut table = Table::create(&self.directory, "navigation.csv")?;
+        for row in navigation {
+            table.write(row)?;
+        }
+        table.flush()?;
+        self.observations.flush()?;
+        self.sky.flush()?;
+        self.rays.iter_mut().chain(&mut self.interference).try_for_each(Table::flush)?;
+        for claims in &mut self.claims {
+            claims.observations.flush()?;
+            claims.trajectory.flush()?;
+        }
+        self.trajectory.flush()
+    }
+}
