@@ -15,9 +15,10 @@ use crate::analysis::JudgeError;
 use crate::analysis::jamming::Shape;
 use crate::analysis::spectrum::Stage;
 use crate::gnss::record::{
-    AcquisitionRow, EventRow, Fix, InterferenceRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
+    AcquisitionRow, EventRow, Fix, InterferenceRow, LineRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
     TrajectoryRow,
 };
+use crate::gnss::signal::SIGNALS;
 
 /// What `truth/scene.json` says of the scene; other keys are left alone.
 #[derive(Clone, Debug, Deserialize)]
@@ -114,6 +115,8 @@ pub struct Run {
     pub tracking: Vec<TrackingRow>,
     pub navigation: Vec<NavigationRow>,
     pub events: Vec<EventRow>,
+    /// What the receiver told of lines in the spectrum; `None` of one that does not look.
+    pub lines: Option<Vec<LineRow>>,
     /// `rx/receiver.json`, or null when there is none.
     pub receiver: Value,
     pub psd: Vec<PsdRow>,
@@ -133,8 +136,11 @@ impl Run {
     pub fn read_parts(run: &Path, truth: &Path, rx: &Path) -> Result<Self, JudgeError> {
         let psd = run.join("psd.csv");
         let rays = truth.join("rays.csv");
+        let lines = rx.join("interference.csv");
         Ok(Self {
-            scene: json(&truth.join("scene.json"))?.ok_or_else(|| missing(&truth.join("scene.json"), TRUTH))?,
+            scene: json(&truth.join("scene.json"))?
+                .map(Self::folded)
+                .ok_or_else(|| missing(&truth.join("scene.json"), TRUTH))?,
             scene_json: json(&truth.join("scene.json"))?.unwrap_or(Value::Null),
             scenario: text(&run.join("scenario.toml"))?,
             truth: dated(&truth.join("observations.csv"), TRUTH, |row: &Observation| row.sent_s)?,
@@ -150,6 +156,7 @@ impl Run {
             tracking: rows(&rx.join("tracking.csv"), RECEIVER)?,
             navigation: rows(&rx.join("navigation.csv"), RECEIVER)?,
             events: rows(&rx.join("events.csv"), RECEIVER)?,
+            lines: if lines.exists() { Some(rows(&lines, RECEIVER)?) } else { None },
             receiver: json(&rx.join("receiver.json"))?.unwrap_or(Value::Null),
             psd: optional(&psd)?,
             speed: json(&run.join("speed.json"))?.unwrap_or_default(),
@@ -160,7 +167,7 @@ impl Run {
     pub fn read_truth(truth: &Path) -> Result<Self, JudgeError> {
         let scene = truth.join("scene.json");
         Ok(Self {
-            scene: json(&scene)?.ok_or_else(|| missing(&scene, TRUTH))?,
+            scene: json(&scene)?.map(Self::folded).ok_or_else(|| missing(&scene, TRUTH))?,
             scene_json: Value::Null,
             scenario: None,
             truth: dated(&truth.join("observations.csv"), TRUTH, |row: &Observation| row.sent_s)?,
@@ -176,6 +183,7 @@ impl Run {
             tracking: Vec::new(),
             navigation: Vec::new(),
             events: Vec::new(),
+            lines: None,
             receiver: Value::Null,
             psd: Vec::new(),
             speed: Speed::default(),
@@ -185,6 +193,19 @@ impl Run {
     /// Seconds from sample 0 by the receiver's clock.
     pub fn time_s(&self, sample: u64) -> f64 {
         sample as f64 / self.scene.sample_rate_hz
+    }
+
+    /// What [`Self::read`] does to the scene's facts: an IF above half the rate of real samples becomes the one at which they hold it.
+    fn folded(mut scene: SceneFacts) -> SceneFacts {
+        let (Some(center_hz), Some(signal)) = (scene.center_hz, SIGNALS.first()) else { return scene };
+        let sign = |inverted: bool| if inverted { -1.0 } else { 1.0 };
+        let if_hz = sign(scene.inverted) * (signal.carrier_hz - center_hz);
+        let folded_hz = if_hz - scene.sample_rate_hz * (if_hz / scene.sample_rate_hz).round();
+        if scene.format.starts_with('r') && if_hz.abs() > 0.5 * scene.sample_rate_hz {
+            scene.inverted ^= folded_hz < 0.0;
+            scene.center_hz = Some(signal.carrier_hz - sign(scene.inverted) * folded_hz.abs());
+        }
+        scene
     }
 
     /// A number among the receiver's tracking settings, if they name it.

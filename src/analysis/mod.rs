@@ -4,7 +4,8 @@
 //! (sample number, satellite, signal) and writes `summary.json` and pictures beside them.
 //! [`errors`] measures, [`slips`] finds breaks and their causes, [`elevation`] sorts errors by satellite and elevation, [`jitter`] holds each loop against theory, [`honesty`] the fixes against
 //! their own covariance, [`clock`] does so for the receiver's clock with the deviations of [`allan`], [`statistics`]
-//! condenses, [`access`] and [`jamming`] expect C/N0 under other codes and interference, [`spoofing`] tells what a
+//! condenses, [`access`] and [`jamming`] expect C/N0 under other codes and interference, [`lines`] holds the receiver's word of
+//! continuous waves against them, [`spoofing`] tells what a
 //! spoofer did, [`summary`] is what scripts gate on with its [`schema`], [`verdict`] holds it against theory and a user's
 //! [`limits`], [`making`] keeps unfinished files from sight, [`plot`] draws, [`report`] prints on a terminal and `pdf` on paper, [`psd`] estimates the spectrum of
 //! the samples, [`spectrum`] says what it should be, [`foreign`] judges receivers that this project did not write, [`trade`]
@@ -21,6 +22,7 @@ pub mod independent;
 pub mod jamming;
 pub mod jitter;
 pub mod limits;
+pub mod lines;
 pub mod load;
 pub mod making;
 #[cfg(feature = "pdf")]

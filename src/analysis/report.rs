@@ -69,6 +69,17 @@ impl Summary {
         if self.details.unmatched_observations > 0 {
             writeln!(f, "observations  {} have no truth", self.details.unmatched_observations)?;
         }
+        if let Some(lines) = &self.interference {
+            write!(
+                f,
+                "interference  {} of {} s with a continuous wave told, {} told in error",
+                lines.wave_seconds_told, lines.wave_seconds, lines.false_told
+            )?;
+            if let (Some(error_hz), Some(error_db)) = (lines.frequency_error_max_hz, lines.jn0_error_max_db) {
+                write!(f, "; frequency within {error_hz:.1} Hz, J/N0 within {error_db:.1} dB")?;
+            }
+            writeln!(f)?;
+        }
         if let Some(spoofing) = &self.spoofing {
             let metres = |value: Option<f64>| number(value, 1);
             writeln!(

@@ -13,6 +13,7 @@ use crate::analysis::clock::{Of, Series};
 use crate::analysis::errors::Errors;
 use crate::analysis::honesty::{self, Honesty};
 use crate::analysis::jitter::{Jitter as LoopJitter, Loop, Pooled};
+use crate::analysis::lines::Lines;
 use crate::analysis::load::{Run, Speed};
 use crate::analysis::slips::{Cause, Slips};
 use crate::analysis::spectrum::{self, Spectrum};
@@ -41,6 +42,8 @@ pub struct Summary {
     pub tracking: Tracking,
     pub navigation: Navigation,
     pub psd: Spectrum,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interference: Option<Lines>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spoofing: Option<Spoofing>,
     pub speed: Speed,
@@ -240,6 +243,7 @@ impl Summary {
             tracking,
             navigation,
             psd,
+            interference: Lines::of(run),
             spoofing: Spoofing::of(run),
             jammed: !run.scene.interference.is_empty(),
             speed: run.speed,

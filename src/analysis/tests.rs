@@ -12,7 +12,8 @@ use super::*;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::record::{
-    AcquisitionRow, Event, EventRow, Fix, NavigationRow, Observation, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, Event, EventRow, Fix, InterferenceRow, LineRow, NavigationRow, Observation, SkyRow, TrackingRow,
+    TrajectoryRow,
 };
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
@@ -197,6 +198,7 @@ fn write_estimate(run: &Path, planted: &Planted) {
             hdop: 1.0,
             vdop: 1.5,
             tdop: 1.0,
+            condition: 4.0,
             satellites: 8,
             chi_square: 4.0,
             excluded: String::new(),
@@ -441,6 +443,7 @@ fn every_key_of_the_summary_is_in_the_schema_with_unit_and_meaning_and_no_other(
     }
     let run = planted_run(&PLANTED);
     fs::copy(run.path().join("truth/trajectory.csv"), run.path().join("truth/claimed.csv")).unwrap();
+    write(&run.path().join("rx/interference.csv"), &[told(3, 1e5)]);
     let summary = judge(run.path()).unwrap();
     let mut written = Vec::new();
     paths("", &serde_json::to_value(&summary).unwrap(), &mut written);
@@ -461,6 +464,49 @@ fn every_key_of_the_summary_is_in_the_schema_with_unit_and_meaning_and_no_other(
             assert_eq!(leaf.unit, unit, "{} ends with {ending}", leaf.path);
         }
     }
+}
+
+/// What a receiver tells of a wave in a second.
+fn told(second: u64, frequency_hz: f64) -> LineRow {
+    LineRow {
+        sample: second * RATE_HZ,
+        frequency_hz,
+        jn0_dbhz: 60.5,
+        js_db: None,
+        statistic: 40.0,
+        threshold: 4.7,
+        lines: 1,
+        resolution_hz: 635.0,
+    }
+}
+
+#[test]
+fn what_is_told_of_waves_is_held_against_those_that_there_were() {
+    let run = planted_run(&PLANTED);
+    let scene = run.path().join("truth/scene.json");
+    let text =
+        fs::read_to_string(&scene).unwrap().replace("\"seed\"", "\"interference\": [{\"kind\": \"cw\"}], \"seed\"");
+    fs::write(&scene, text).unwrap();
+    // On from 20 s to 30 s; the receiver misses 25 s, is 40 Hz off at 26 s and tells of something at 50 s.
+    let wave =
+        |tick: u64| InterferenceRow { sample: tick * RATE_HZ / 10, source: 1, jn0_dbhz: 60.0, frequency_hz: 311_500.0 };
+    write(&run.path().join("truth/interference.csv"), &(200..300).map(wave).collect::<Vec<_>>());
+    let mut rows: Vec<_> = (20..30).filter(|s| *s != 25).map(|s| told(s, 311_500.0)).collect();
+    rows[5].frequency_hz -= 40.0;
+    rows.push(told(50, -1e5));
+    write(&run.path().join("rx/interference.csv"), &rows);
+    let summary = judge(run.path()).unwrap();
+    let lines = summary.interference.unwrap();
+    assert_eq!((lines.told, lines.false_told, lines.wave_seconds, lines.wave_seconds_told), (10, 1, 10, 9));
+    assert!((lines.frequency_error_max_hz.unwrap() - 40.0).abs() < 1e-9, "{lines:?}");
+    assert!((lines.jn0_error_max_db.unwrap() - 0.5).abs() < 1e-9 && lines.resolution_hz == Some(635.0), "{lines:?}");
+    let text = summary.to_string();
+    assert!(text.contains("9 of 10 s with a continuous wave told, 1 told in error"), "{text}");
+    let failed = |figure: &str| {
+        let row = summary.details.verdict.rows.iter().find(|row| row.figure.starts_with(figure)).unwrap();
+        row.status == super::verdict::Status::Fail
+    };
+    assert!(failed("interference told while") && failed("seconds of a continuous") && !failed("frequency of the"));
 }
 
 #[test]

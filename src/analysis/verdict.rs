@@ -194,6 +194,7 @@ impl Verdict {
         verdict.position(run, summary);
         verdict.tracking(run, errors, summary);
         verdict.reception(run, summary);
+        verdict.interference(summary);
         verdict.spoofing(summary);
         verdict
     }
@@ -310,6 +311,41 @@ impl Verdict {
                 "dB",
                 Bound::Max(ONE_BIT_LOSS_DB),
                 "loss of a one-bit quantiser, 10 lg(π/2): more is unexplained",
+            );
+        }
+    }
+
+    fn interference(&mut self, summary: &Summary) {
+        let Some(lines) = summary.interference else { return };
+        self.judge(
+            "interference told while there was none",
+            "interference.false_told",
+            lines.false_told,
+            "",
+            Bound::Max(0.0),
+            "the detector's false alarms come once in a million seconds",
+        );
+        if lines.wave_seconds == 0 {
+            return;
+        }
+        self.judge(
+            "seconds of a continuous wave that were told",
+            "interference.wave_seconds_told",
+            lines.wave_seconds_told,
+            "",
+            Bound::Min(lines.wave_seconds as f64),
+            "those with a wave of J/N0 ≥ 45 dB-Hz all through",
+        );
+        if let Some(bin_hz) = lines.resolution_hz {
+            let source = "half a bin of the receiver's spectrum";
+            let (path, error_hz) = ("interference.frequency_error_max_hz", lines.frequency_error_max_hz);
+            self.judge(
+                "frequency of the continuous wave, largest error",
+                path,
+                error_hz,
+                "Hz",
+                Bound::Max(0.5 * bin_hz),
+                source,
             );
         }
     }

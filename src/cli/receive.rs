@@ -42,7 +42,10 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     if let Some(warning) = &outcome.format_warning {
         scenario::warn(&format!("{}: {warning}: check --format or the metadata", shown(&arguments.file)));
     }
-    let mut text = format!("{outcome}\n");
+    for warning in &outcome.warnings {
+        scenario::warn(warning);
+    }
+    let mut text = format!("{outcome}\n{}\n", outcome.conditioning);
     if let Some(diagnosis) = &outcome.diagnosis {
         text += &format!("{diagnosis}\n");
     }

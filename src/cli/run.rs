@@ -18,7 +18,7 @@ use crate::cli::scenario;
 use crate::cli::speed::Speed;
 use crate::cli::staging::Staging;
 use crate::generator::scene::Scene;
-use crate::generator::stream::{Options, Stream};
+use crate::generator::stream::{Generated, Options, Stream};
 use crate::generator::{GenerateError, truth};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::sigmf;
@@ -63,16 +63,22 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     let summary = analysis::judge_against(run, limits.as_ref()).map_err(judge_error)?;
     staging.commit()?;
 
+    for warning in &both.outcome.warnings {
+        scenario::warn(warning);
+    }
     let mut text = format!("{summary}\n");
     if let Some(diagnosis) = &both.outcome.diagnosis {
         text += &format!("{diagnosis}\n");
     }
+    text += &format!("margins       {}\n", both.outcome.conditioning);
+    text += &format!("made          {}\n", both.generated);
     text += &format!("results in {}\n", target.display());
     scenario::print(&text)?;
     check::enforce(limits.as_ref(), &summary)
 }
 
 struct Both {
+    generated: Generated,
     outcome: Outcome,
     generator_busy: Duration,
     receiver_busy: Duration,
@@ -92,7 +98,7 @@ fn both(
     let start = Instant::now();
     let (mut generator_busy, mut receiver_busy) = (Duration::ZERO, Duration::ZERO);
     // Inside the pool, so that no batch has to wake its threads up.
-    let outcome = rayon::scope(|_| {
+    let (generated, outcome) = rayon::scope(|_| {
         let mut stream = Stream::new(scene, truth, &Options::default()).map_err(generator_error)?;
         let mut reception = Reception::new(&scene.metadata, settings).map_err(receiver_error)?;
         let (mut made, mut taken) = (Vec::new(), Vec::new());
@@ -110,10 +116,10 @@ fn both(
             std::mem::swap(&mut made, &mut taken);
             progress.set(reception.samples());
         }
-        stream.finish(truth).map_err(generator_error)?;
-        reception.finish(output).map_err(receiver_error)
+        let generated = stream.finish(truth).map_err(generator_error)?;
+        Ok::<_, CliError>((generated, reception.finish(output).map_err(receiver_error)?))
     })?;
-    Ok(Both { outcome, generator_busy, receiver_busy, whole: start.elapsed() })
+    Ok(Both { generated, outcome, generator_busy, receiver_busy, whole: start.elapsed() })
 }
 
 /// Does `work` and adds the time that it took to `busy`.

@@ -152,6 +152,8 @@ pub struct Fix {
     pub hdop: f64,
     pub vdop: f64,
     pub tdop: f64,
+    /// Ratio of the extreme singular values of the geometry: 1 would be perfect, 10 000 and more is refused.
+    pub condition: f64,
     /// Satellites in the solution.
     pub satellites: u32,
     /// Weighted sum of squared residuals; its degrees of freedom are `satellites` − 4.
@@ -195,6 +197,26 @@ pub struct AcquisitionRow {
     /// Code phase at `sample`.
     pub code_phase_chips: f64,
     pub cn0_dbhz: f64,
+}
+
+/// A line in the spectrum of the samples that no satellite sends: `rx/interference.csv`, a row for each second that has one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LineRow {
+    /// First sample looked at.
+    pub sample: u64,
+    /// Where the strongest line appears in the samples.
+    pub frequency_hz: f64,
+    /// Its power over the density of what lies beside it …
+    pub jn0_dbhz: f64,
+    /// … and over the satellites' median C/N0 while there was no line; empty if there never was such a time.
+    pub js_db: Option<f64>,
+    /// Its bin over those beside it, and what that had to pass.
+    pub statistic: f64,
+    pub threshold: f64,
+    /// Lines above the threshold: one of a continuous wave, many of a sweep or of pulses.
+    pub lines: u32,
+    /// Width of a bin: frequencies are known to a part of it.
+    pub resolution_hz: f64,
 }
 
 /// A tracking loop at work: `rx/tracking.csv`, thinned.

@@ -2,13 +2,15 @@
 //!
 //! It sees IF metadata, samples and settings; no argument can carry truth. [`acquire`] finds
 //! satellites, [`track`] follows them with [`correlate`], [`decode`] reads their messages,
-//! [`observe`] makes observables at common epochs and [`position`] solves for place and time.
+//! [`observe`] makes observables at common epochs and [`position`] solves for place and time. [`interference`] watches
+//! the spectrum.
 
 pub mod acquire;
 pub mod correlate;
 pub mod decode;
 pub mod diagnosis;
 pub mod format;
+pub mod interference;
 pub mod observe;
 pub mod output;
 pub mod position;
@@ -18,4 +20,4 @@ pub mod settings;
 pub mod source;
 pub mod track;
 
-pub use run::{Outcome, ReceiveError, Reception, receive};
+pub use run::{Conditioning, Interfered, Outcome, ReceiveError, Reception, receive};

@@ -7,19 +7,23 @@
 use std::fmt;
 use std::io::{ErrorKind, Read};
 
+use serde::Serialize;
 use serde_json::json;
 use thiserror::Error;
 
+use crate::gnss::record::LineRow;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{SIGNALS, Signal};
+use crate::gnss::signal::{Component, SIGNALS, Signal};
 use crate::receiver::acquire::{self, AcquireError};
+use crate::receiver::correlate::standing_bias_m;
 use crate::receiver::diagnosis::{Diagnosis, Stage};
 use crate::receiver::format::Check;
 use crate::receiver::output::{Output, OutputError};
 use crate::receiver::session::Session;
 use crate::receiver::settings::{Settings, SettingsError};
 use crate::receiver::source::Source;
+use crate::receiver::track::LoopMargin;
 
 /// Length of the blocks that channels work on.
 const BLOCK_MS: u64 = 50;
@@ -61,6 +65,55 @@ pub struct Outcome {
     pub format_warning: Option<String>,
     /// Why there was no fix, when there was none.
     pub diagnosis: Option<Diagnosis>,
+    /// Continuous waves that were met; the rows are in `interference.csv`.
+    pub interfered: Option<Interfered>,
+    pub conditioning: Conditioning,
+    /// What makes the results worse than need be, and the remedy.
+    pub warnings: Vec<String>,
+}
+
+/// How near the reception was to what is refused as ill-conditioned.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Conditioning {
+    /// Largest ratio of the geometry's singular values that a fix had, and from which on there is none.
+    pub geometry_worst: Option<f64>,
+    pub geometry_limit: f64,
+    /// Bandwidth times update time of every loop.
+    pub loops: Vec<LoopMargin>,
+}
+
+impl fmt::Display for Conditioning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(worst) = self.geometry_worst {
+            write!(f, "condition of the geometry up to {worst:.1}, refused from {:e}; ", self.geometry_limit)?;
+        }
+        let least = self.loops.iter().min_by(|a, b| a.margin_share.total_cmp(&b.margin_share));
+        let Some(LoopMargin { key, bandwidth_time, limit, margin_share, .. }) = least else { return Ok(()) };
+        write!(
+            f,
+            "largest bandwidth times update time {bandwidth_time:.3} ({key}), refused above {limit}: {:.0} % left",
+            100.0 * margin_share
+        )
+    }
+}
+
+/// What there was of continuous waves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Interfered {
+    /// Spectra of a second that had a line.
+    pub spectra: u64,
+    /// The strongest line.
+    pub strongest: LineRow,
+}
+
+impl fmt::Display for Interfered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let LineRow { frequency_hz, jn0_dbhz, js_db, lines, .. } = &self.strongest;
+        let what = if *lines > 1 { "lines of interference, the strongest" } else { "a continuous wave" };
+        write!(f, "{what} at {:+.1} kHz in the samples, J/N0 {jn0_dbhz:.1} dB-Hz", 1e-3 * frequency_hz)?;
+        js_db.map_or(Ok(()), |js_db| write!(f, ", J/S {js_db:.1} dB"))?;
+        write!(f, ", in {} s", self.spectra)
+    }
 }
 
 impl fmt::Display for Outcome {
@@ -77,8 +130,31 @@ impl fmt::Display for Outcome {
         if self.cut_bytes > 0 {
             write!(f, " ({} bytes of a cut sample left out)", self.cut_bytes)?;
         }
-        Ok(())
+        self.interfered.as_ref().map_or(Ok(()), |seen| write!(f, "; {seen}"))
     }
+}
+
+/// Errors of the code from which on a rate is warned of.
+const STANDING_BIAS_M: f64 = 0.5;
+
+/// What of samples and settings makes the results worse than need be.
+pub(super) fn warnings(metadata: &IfMetadata, settings: &Settings) -> Vec<String> {
+    let rate_hz = metadata.rate.hz();
+    let one = |signal: &Signal, component: &Component| {
+        let bias_m = standing_bias_m(settings.tracking.replica, rate_hz, component);
+        let samples_per_chip = rate_hz / component.chip_rate_hz;
+        // The code's error turns once while the code passes a sample; what is quicker than the loop averages.
+        let cycles_per_chip = signal.carrier_hz / component.chip_rate_hz;
+        let slow_hz = cycles_per_chip * settings.tracking.dll_bandwidth_hz / samples_per_chip;
+        (bias_m > STANDING_BIAS_M).then(|| {
+            format!(
+                "{:.3} Msps are {samples_per_chip:.3} samples a chip: while a satellite's Doppler stays below {slow_hz:.0} Hz, \
+                 its pseudorange errs by {bias_m:.1} m rms (tracking.replica = {:?}); another rate, like 2.6 Msps, avoids it",
+                1e-6 * rate_hz, settings.tracking.replica
+            )
+        })
+    };
+    SIGNALS.iter().filter_map(|signal| one(signal, signal.components.first()?)).collect()
 }
 
 /// Signals and satellites that the samples can hold.
@@ -162,7 +238,11 @@ impl Reception {
             };
             let if_hz = SIGNALS.first().map_or(0.0, |signal| metadata.if_hz(signal));
             let format = metadata.format.name();
-            outcome.diagnosis = Some(Diagnosis::new(stage, seconds, metadata.rate.hz(), format, if_hz, cut_bytes));
+            let mut diagnosis = Diagnosis::new(stage, seconds, metadata.rate.hz(), format, if_hz, cut_bytes);
+            if let Some(seen) = &outcome.interfered {
+                diagnosis.advice.insert(0, format!("the spectrum: {seen}"));
+            }
+            outcome.diagnosis = Some(diagnosis);
         }
         output.finish(&summary(metadata, settings, &outcome))?;
         Ok(outcome)
@@ -216,6 +296,12 @@ fn summary(metadata: &IfMetadata, settings: &Settings, outcome: &Outcome) -> ser
         "fixes": outcome.fixes,
         "first_fix_s": outcome.first_fix_s,
         "losses": outcome.losses,
+        "interference": outcome.interfered.as_ref().map(|seen| json!({
+            "seconds": seen.spectra,
+            "strongest": seen.strongest,
+        })),
+        "conditioning": outcome.conditioning,
+        "warnings": outcome.warnings,
         "diagnosis": outcome.diagnosis.as_ref().map(ToString::to_string),
     })
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::record::{Event, EventRow, Observation};
+use crate::gnss::record::{Event, EventRow, LineRow, Observation};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{SIGNALS, Signal};
@@ -15,14 +15,15 @@ use crate::gnss::time::Epoch;
 use crate::receiver::acquire::{self, Searcher};
 use crate::receiver::decode::{Decoder, News};
 use crate::receiver::diagnosis::Stage;
+use crate::receiver::interference::Watch;
 use crate::receiver::observe::{Reading, Timebase};
 use crate::receiver::output::Output;
-use crate::receiver::position::least_squares::UNKNOWNS;
+use crate::receiver::position::least_squares::{LARGEST_CONDITION, UNKNOWNS};
 use crate::receiver::position::{CodeNoise, NoFix, Solver};
-use crate::receiver::run::{Outcome, ReceiveError, candidates};
+use crate::receiver::run::{Conditioning, Interfered, Outcome, ReceiveError, candidates, warnings};
 use crate::receiver::settings::Settings;
 use crate::receiver::source::{Block, Packed, Planes};
-use crate::receiver::track::{Channel, Report, code_shape};
+use crate::receiver::track::{Channel, LoopMargin, Report, code_shape};
 
 /// A satellite that was lost is searched for eagerly so long.
 const EAGER_S: f64 = 30.0;
@@ -96,6 +97,12 @@ pub(super) struct Session {
     first_fix_s: Option<f64>,
     losses: u64,
     reason: Option<NoFix>,
+    watch: Watch,
+    /// Median C/N0 of the satellites when the spectrum last had no line.
+    quiet_dbhz: Option<f64>,
+    interfered: Option<Interfered>,
+    worst_condition: Option<f64>,
+    loops: [LoopMargin; 5],
 }
 
 impl Session {
@@ -142,6 +149,11 @@ impl Session {
             first_fix_s: None,
             losses: 0,
             reason: None,
+            watch: Watch::new(metadata),
+            quiet_dbhz: None,
+            interfered: None,
+            worst_condition: None,
+            loops: settings.tracking.margins(period_s),
         })
     }
 
@@ -159,6 +171,7 @@ impl Session {
         for tick in measured {
             self.measure(tick, output)?;
         }
+        self.watch(block, output)?;
         self.retire(block.end(), output)
     }
 
@@ -180,6 +193,29 @@ impl Session {
                 }
             }
         });
+    }
+
+    /// Looks for continuous waves, and tells of those that are none of the satellites' own lines.
+    fn watch(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
+        let mut followed: Vec<f64> = self.tracks.iter().map(|track| track.cn0_dbhz).collect();
+        followed.sort_by(f64::total_cmp);
+        let strongest_hz = followed.last().map_or(0.0, |dbhz| libm::pow(10.0, dbhz / 10.0));
+        let mut told = Vec::new();
+        self.watch.take(block, strongest_hz, |_, row| told.push(row));
+        for row in told {
+            let Some(row) = row else {
+                self.quiet_dbhz = followed.get(followed.len() / 2).copied().or(self.quiet_dbhz);
+                continue;
+            };
+            let row = LineRow { js_db: self.quiet_dbhz.map(|dbhz| row.jn0_dbhz - dbhz), ..row };
+            output.interference(&row)?;
+            let seen = self.interfered.get_or_insert_with(|| Interfered { spectra: 0, strongest: row.clone() });
+            seen.spectra += 1;
+            if row.jn0_dbhz > seen.strongest.jn0_dbhz {
+                seen.strongest = row;
+            }
+        }
+        Ok(())
     }
 
     /// Samples of this block at which channels report, and those of them at which the receiver measures.
@@ -414,6 +450,8 @@ impl Session {
         match self.solver.solve(tick, clock, &observations, &self.ephemerides, self.klobuchar) {
             Ok(solved) => {
                 output.fix(&solved.fix)?;
+                let condition = solved.fix.condition;
+                self.worst_condition = Some(self.worst_condition.map_or(condition, |worst| worst.max(condition)));
                 self.fixes += 1;
                 let at_s = self.metadata.rate.elapsed_s(tick);
                 self.first_fix_s.get_or_insert(at_s);
@@ -478,6 +516,13 @@ impl Session {
             cut_bytes: 0,
             format_warning: None,
             diagnosis: None,
+            interfered: self.interfered.clone(),
+            warnings: warnings(&self.metadata, &self.settings),
+            conditioning: Conditioning {
+                geometry_worst: self.worst_condition,
+                geometry_limit: LARGEST_CONDITION,
+                loops: self.loops.to_vec(),
+            },
         }
     }
 

@@ -85,9 +85,14 @@ pub fn report() -> Option<PathBuf> {
     std::env::var_os("GNSS_TWIN_WRITE_STABILITY").map(PathBuf::from)
 }
 
+/// Whether the run may take minutes.
+pub fn long() -> bool {
+    std::env::var_os("GNSS_TWIN_LONG").is_some()
+}
+
 /// How many random cases a run draws.
-pub fn cases(short: u32, long: u32) -> u32 {
-    if std::env::var_os("GNSS_TWIN_LONG").is_some() { long } else { short }
+pub fn cases(short: u32, long_run: u32) -> u32 {
+    if long() { long_run } else { short }
 }
 
 fn short(value: f64) -> String {
@@ -114,8 +119,8 @@ fn write(rows: &BTreeMap<(u32, usize), (Case, [String; 3])>) {
     let Some(path) = report() else { return };
     let mut text = String::from(
         "# Stability at the edges\n\nEach case with the figure that its test measured beside its bar. Filled by\n\n\
-         ```\nGNSS_TWIN_WRITE_STABILITY=reports/stability.md cargo test --test extremes\n```\n\n\
-         `bash .ci/long` does the same with a thousand random scenes. A figure that misses its bar fails its test.\n",
+         ```\nGNSS_TWIN_WRITE_STABILITY=$PWD/reports/stability.md cargo test --test extremes\n```\n\n\
+         in one run; `bash .ci/long` does the same with a thousand random scenes (`GNSS_TWIN_LONG=1`). A figure that misses its bar fails its test.\n",
     );
     let mut family = "";
     let mut last = 0;

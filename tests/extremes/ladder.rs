@@ -16,7 +16,7 @@ use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::time::Epoch;
 use gnss_twin::receiver::correlate;
 
-use crate::arithmetic::sum_error;
+use crate::arithmetic::{sum_error, twin_error};
 use crate::figures::{self, case};
 use crate::fuzz::{Period, phase_cycles};
 use crate::run;
@@ -179,12 +179,9 @@ fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
     }
     let counts = [1_000, 10_000, 100_000, 1_000_000];
     let mut over_length: Curves = Vec::new();
-    for (name, arithmetic, dc) in [
-        ("f32", correlate::Arithmetic::F32, 0.0),
-        ("f32, DC 10 σ", correlate::Arithmetic::F32, 10.0),
-        ("f64", correlate::Arithmetic::F64, 0.0),
-    ] {
-        let curve: Vec<_> = counts.iter().map(|count| (*count as f64, sum_error(arithmetic, *count, dc))).collect();
+    for (name, dc) in [("f32", 0.0), ("f32, DC 10 σ", 10.0)] {
+        let error = |count: usize| sum_error(correlate::Arithmetic::F32, count, dc);
+        let curve: Vec<_> = counts.iter().map(|count| (*count as f64, error(*count))).collect();
         the.at_most(
             &format!("{name} sums: error of 1e6 samples over the noise, against that of 1e4"),
             curve[3].1,
@@ -193,6 +190,15 @@ fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
         );
         over_length.push((name, curve));
     }
+    let curve: Vec<_> = counts.iter().map(|count| (*count as f64, twin_error(*count))).collect();
+    // A partial sum of √n is rounded n times to 1.1e-16 of itself: √(n/6) of that over the noise, and four sigma.
+    the.at_most(
+        "f64 sums: error of 1e6 samples over the noise, against pairs of doubles",
+        curve[3].1,
+        4.0 * 1.1e-16 * (1e6_f64 / 6.0).sqrt(),
+        "",
+    );
+    over_length.push(("f64", curve));
     assert_eq!(Fidelity::of(Grade::Reference).carrier, Arithmetic::F64);
     if let Some(path) = figures::report() {
         let charts = [

@@ -7,7 +7,7 @@ use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::stream::{Options, generate_part};
 use gnss_twin::generator::truth;
-use gnss_twin::gnss::record::{EventRow, Fix, Observation};
+use gnss_twin::gnss::record::{EventRow, Fix, LineRow, Observation, TrackingRow};
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::time::Epoch;
 use gnss_twin::receiver::acquire::Acquired;
@@ -119,6 +119,15 @@ impl Received {
 
     pub fn events(&self) -> Vec<EventRow> {
         rows(&self.directory.path().join("rx"), "events.csv")
+    }
+
+    pub fn tracking(&self) -> Vec<TrackingRow> {
+        rows(&self.directory.path().join("rx"), "tracking.csv")
+    }
+
+    /// Lines in the spectrum that the receiver told of.
+    pub fn lines(&self) -> Vec<LineRow> {
+        rows(&self.directory.path().join("rx"), "interference.csv")
     }
 
     pub fn truth(&self) -> Vec<Observation> {

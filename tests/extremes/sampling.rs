@@ -3,6 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use gnss_twin::generator::fidelity::Arithmetic;
+use gnss_twin::generator::scenario::{Overrides, Scenario};
+use gnss_twin::generator::scene::CodeEdge;
 use gnss_twin::generator::synth::band::Filter;
 use gnss_twin::generator::synth::bank::Bank;
 use gnss_twin::generator::synth::chips::{CodeTime, Spreading};
@@ -13,43 +15,89 @@ use gnss_twin::generator::truth;
 use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::time::{Epoch, Rate, tone_turns};
+use gnss_twin::receiver::acquire::search;
+use gnss_twin::receiver::correlate;
+use gnss_twin::receiver::settings::Settings;
+use gnss_twin::receiver::source::Block;
 use gnss_twin::receiver::track::TrackingSettings;
 use num_complex::Complex64;
 
 use crate::figures::case;
-use crate::run;
+use crate::run::{self, Received};
 
 const CHIP_M: f64 = 299_792_458.0 / 1.023e6;
+
+/// Samples of one code period of PRN 7 from `start` chips on.
+fn period(rate_khz: usize, edge: Edge<'_>, start: f64) -> Vec<f32> {
+    let spreading = Spreading::new(&L1_CA.components[0], 7).unwrap();
+    let one = 281_474_976_710_656.0;
+    let step = (1023.0 / rate_khz as f64 * one) as u64;
+    let mut wave = vec![0.0_f32; rate_khz];
+    for (number, i) in wave.chunks_mut(4096).enumerate() {
+        let from = start + number as f64 * 4096.0 * 1023.0 / rate_khz as f64;
+        let at = CodeTime { period: 0, phase: ((from % 1023.0) * one) as u64 };
+        let mut q = vec![0.0_f32; i.len()];
+        let mut bank = Bank::default();
+        bank.push((0, 4096), 0..i.len(), |bits| {
+            let position = spreading.strip(at, step, 4096, |_| false, bits);
+            Run { bits: &[], position, step, turns: 0, turns_step: 0, amplitude: 1.0 }
+        });
+        bank.render(Kernel { edge, arithmetic: Arithmetic::F64, level: Level::detect() }, i, &mut q);
+    }
+    wave
+}
+
+/// The zero of early minus late of a function of the delay in chips that falls there, in metres.
+fn zero_m(early_minus_late: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (-0.4, 0.4);
+    for _ in 0..24 {
+        let middle = 0.5 * (low + high);
+        if early_minus_late(middle) > 0.0 { low = middle } else { high = middle }
+    }
+    0.5 * (low + high) * CHIP_M
+}
+
+/// Edges meet samples at the same fraction all along the code: these are the fractions, from 11 chips on.
+fn places() -> impl Iterator<Item = f64> {
+    (0..24).map(|place| 11.0 + (f64::from(place) + 0.5) / 24.0)
+}
+
+/// Where the receiver's own correlators, half a chip apart, see one period of samples of `edge` that stand still on the grid,
+/// in metres off the true place, rms over places.
+fn received_bias_m(rate_khz: usize, edge: Edge<'_>, replica: correlate::Edge) -> f64 {
+    let replica = correlate::Replica::new(l1ca::code(7).unwrap(), replica).unwrap();
+    let of = |start: f64| {
+        let i = period(rate_khz, edge, start);
+        let q = vec![0.0_f32; i.len()];
+        let error_m = zero_m(|delay| {
+            let nco = correlate::Nco {
+                carrier: 0,
+                carrier_step: 0,
+                code: correlate::chips_to_units(start - delay),
+                code_step: (1023.0 / rate_khz as f64 * 281_474_976_710_656.0) as u64,
+            };
+            let taps = [0.25, -0.25].map(correlate::chips_to_units);
+            // A replica ahead is early: too late a replica has more of it.
+            let [early, late] = replica.slow(&i, &q, &nco, &taps);
+            late.norm() - early.norm()
+        });
+        error_m * error_m
+    };
+    (places().map(of).sum::<f64>() / 24.0).sqrt()
+}
 
 /// Where the code best matches one period of samples of `edge`, in metres behind the true place, rms over places: the zero
 /// of early minus late, half a chip apart, of the continuous correlation below half the rate, by Fourier series.
 fn bias_m(rate_khz: usize, edge: Edge<'_>) -> f64 {
-    let spreading = Spreading::new(&L1_CA.components[0], 7).unwrap();
     let transform = |x: Vec<f64>| {
         let mut x: Vec<Complex64> = x.into_iter().map(Complex64::from).collect();
         rustfft::FftPlanner::new().plan_fft_forward(x.len()).process(&mut x);
         x
     };
     let chips = transform(l1ca::code(7).unwrap().iter().map(|chip| if *chip { -1.0 } else { 1.0 }).collect());
-    let one = 281_474_976_710_656.0;
-    let step = (1023.0 / rate_khz as f64 * one) as u64;
-    let places = 24;
     let mut sum = 0.0;
-    for place in 0..places {
-        // Edges meet samples at the same fraction all along the code.
-        let start = 11.0 + (f64::from(place) + 0.5) / f64::from(places);
-        let mut wave = vec![0.0_f32; rate_khz];
-        for (number, i) in wave.chunks_mut(4096).enumerate() {
-            let from = start + number as f64 * 4096.0 * 1023.0 / rate_khz as f64;
-            let at = CodeTime { period: 0, phase: ((from % 1023.0) * one) as u64 };
-            let mut q = vec![0.0_f32; i.len()];
-            let mut bank = Bank::default();
-            bank.push((0, 4096), 0..i.len(), |bits| {
-                let position = spreading.strip(at, step, 4096, |_| false, bits);
-                Run { bits: &[], position, step, turns: 0, turns_step: 0, amplitude: 1.0 }
-            });
-            bank.render(Kernel { edge, arithmetic: Arithmetic::F64, level: Level::detect() }, i, &mut q);
-        }
+    for start in places() {
+        let wave = period(rate_khz, edge, start);
         let wave = transform(wave.into_iter().map(f64::from).collect());
         let cross: Vec<Complex64> = (1..rate_khz.div_ceil(2))
             .map(|k| {
@@ -68,14 +116,9 @@ fn bias_m(rate_khz: usize, edge: Edge<'_>) -> f64 {
             };
             cross.iter().enumerate().map(turned).sum::<f64>()
         };
-        let (mut low, mut high) = (-0.4, 0.4);
-        for _ in 0..24 {
-            let middle = 0.5 * (low + high);
-            if correlation(middle + 0.25) > correlation(middle - 0.25) { low = middle } else { high = middle }
-        }
-        sum += (0.5 * (low + high) * CHIP_M).powi(2);
+        sum += zero_m(|delay| correlation(delay + 0.25) - correlation(delay - 0.25)).powi(2);
     }
-    (sum / f64::from(places)).sqrt()
+    (sum / 24.0).sqrt()
 }
 
 #[test]
@@ -89,15 +132,47 @@ fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_
         the.near(&name("nearest"), bias_m(rate_khz, Edge::Nearest), sample_m / 12.0_f64.sqrt(), 0.05 * sample_m, "m");
         the.at_most(&name("band-limited"), bias_m(rate_khz, Edge::BandLimited(&filter)), 0.1, "m");
     }
+    // What users get: the level's own edges in the samples, the receiver's own in the replica; it warns where it is half a metre.
+    let mut warned = 0;
+    for (rate_khz, expected) in [(2046, true), (4092, true), (10_230, false), (2600, false)] {
+        let scene = run::scene(0.01, &format!("[front_end]\nsample_rate_hz = {rate_khz}e3\n[power]\ncn0_dbhz = 45\n"));
+        let edge = match scene.fidelity.code_edge {
+            CodeEdge::Nearest => Edge::Nearest,
+            CodeEdge::Area => Edge::Area,
+            CodeEdge::BandLimited => Edge::BandLimited(&filter),
+        };
+        let settings = Settings::default();
+        let replica = settings.tracking.replica;
+        let bias_m = received_bias_m(rate_khz, edge, replica);
+        let told_m = correlate::standing_bias_m(replica, 1e3 * rate_khz as f64, &L1_CA.components[0]);
+        let name = format!("{:.3} Msps, generated and received by default: rms over places", rate_khz as f64 / 1e3);
+        // The law that warns errs to the safe side; where places drift apart nothing stands still, and a decimetre and a
+        // half is what one of them has.
+        the.at_most(&name, bias_m, told_m.max(0.15), "m");
+        let outcome = Received::from_bytes(&scene, &[], &settings, tempfile::tempdir().unwrap()).outcome;
+        warned += usize::from(outcome.warnings.iter().any(|text| text.contains("samples a chip")) == expected);
+    }
+    the.all("2.046 and 4.092 Msps: warned of, 10.23 and 2.6 not", warned, 4);
     let told = |edge: &str| {
         let text = run::text(
             10.0,
             &format!("{}[front_end]\nsample_rate_hz = 4.092e6\n[power]\ncn0_dbhz = 45\n{edge}", run::PLACE),
         );
-        run::try_scene(&text).unwrap().fidelity.code_edge
+        Scenario::parse(&text, "rate").unwrap().compose(&run::folder(), &Overrides::default()).unwrap()
     };
-    use gnss_twin::generator::scene::CodeEdge;
-    the.all("balanced chooses edges for it by itself", usize::from(told("") != CodeEdge::Nearest), 1);
+    the.all(
+        "4.092 Msps: balanced chooses band-limited edges and does not warn",
+        usize::from(
+            told("").0.fidelity.code_edge == CodeEdge::BandLimited && !told("").1.join("").contains("off, rms"),
+        ),
+        1,
+    );
+    let warned = told("[fidelity]\ncode_edge = \"nearest\"\n").1;
+    the.all(
+        "4.092 Msps with nearest edges: warned of with the bias",
+        usize::from(warned.join("").contains("21.1 m off")),
+        1,
+    );
 }
 
 #[test]
@@ -160,55 +235,80 @@ fn rates_that_do_not_fit_the_code_keep_its_phase() {
 #[test]
 fn folded_and_mirrored_bands_give_the_doppler_its_sign() {
     let the = case(32, "real IF, folded, mirrored");
-    let sv = Sv::gps(23);
+    // Of the fastest satellite, so that a wrong sense shows.
+    let any = run::scene(1.0, "[front_end]\nsample_rate_hz = 2.6e6\n[power]\ncn0_dbhz = 50\n");
+    let speed_hz = |sv: &Sv| run::hit(&any, *sv, 0.0, 0.0).doppler_hz.abs();
+    let sv = run::in_view(&any).into_iter().max_by(|a, b| speed_hz(a).total_cmp(&speed_hz(b))).unwrap();
     let settings = TrackingSettings::default();
     let (mut held, mut of) = (0, 0);
-    // IF within the band, and upside down there; what the samples of a carrier above half the rate, or above all of it, hold.
-    for (made_hz, inverted, told_hz, told_inverted) in [
-        (1.3e6, false, 1.3e6, false),
-        (1.3e6, true, 1.3e6, true),
-        (1.3e6, false, 6.5e6, false),
-        (1.3e6, true, 3.9e6, false),
-        (1.3e6, false, 3.9e6, true),
-    ] {
+    // IF within the band, and upside down there; above half the rate, where the samples hold it mirrored, and above all of it, in both
+    // senses: made so by the generator, and received by what its metadata say.
+    let text_of = |tables: &str| run::text(2.0, &format!("{}{tables}", run::PLACE));
+    let mut made = Vec::new();
+    for (if_hz, inverted) in
+        [(1.3e6, false), (1.3e6, true), (3.9e6, false), (3.9e6, true), (6.5e6, false), (6.5e6, true), (9.1e6, false)]
+    {
         let tables = format!(
-            "[front_end]\nsample_rate_hz = 5.2e6\nif_hz = {made_hz}\nspectrum_inverted = {inverted}\nformat = \"ri8\"\n[noise]\n\
+            "[front_end]\nsample_rate_hz = 5.2e6\nif_hz = {if_hz}\nspectrum_inverted = {inverted}\nformat = \"ri8\"\n[noise]\n\
              [power]\ncn0_dbhz = 50\n"
         );
-        let mut scene = run::only(run::scene(2.0, &tables), &[sv]);
+        let scene = run::only(run::try_scene(&text_of(&tables)).unwrap(), &[sv]);
         let bytes = run::samples(&scene);
+        let (i, q) = run::planes(&scene, &bytes);
+        let row =
+            search(&scene.metadata, &Block { first: 0, i: &i, q: &q }, &[(&L1_CA, sv)], &Default::default()).unwrap();
         let truth_hz = run::hit(&scene, sv, 0.0, 0.0).doppler_hz;
-        let hit = run::hit(&scene, sv, 0.2, 20.0);
-        let sense = if told_inverted { -1.0 } else { 1.0 };
-        scene.metadata.center_hz = L1_CA.carrier_hz - sense * told_hz;
-        scene.metadata.inverted = told_inverted;
-        assert!((scene.metadata.if_hz(&L1_CA).abs() - told_hz).abs() < 1e-3);
+        of += 1;
+        let Some(hit) = row[0].1 else { continue };
         let (channel, report) = run::track(&scene, &bytes, &hit, &settings, 520_000);
         let last = report.measurements.last().unwrap();
-        of += 1;
+        assert!(truth_hz.abs() > 2000.0, "{truth_hz}");
         held += usize::from(
             !channel.is_lost()
                 && last.locked
                 && (last.doppler_hz - truth_hz).abs() < 5.0
                 && run::code_error_m(&scene, sv, last.sample, last.code_fraction).abs() < 10.0,
         );
+        made.push((if_hz, inverted, bytes));
     }
-    the.all("locked with Doppler, its sign and code right", held, of);
-    let text =
-        run::text(10.0, &format!("{}[front_end]\nsample_rate_hz = 5.2e6\nformat = \"ri8\"\n[power]\n", run::PLACE));
-    let beyond = run::text(
-        10.0,
-        &format!("{}[front_end]\nsample_rate_hz = 5.2e6\nif_hz = 6.5e6\nformat = \"ri8\"\n[power]\n", run::PLACE),
-    );
+    the.all("acquired, locked, Doppler with its sign and code right", held, of);
+    // Folded samples are those of the IF at which they hold the carrier, mirrored where the band is. A carrier that turns the
+    // other way is rounded otherwise in f32, 1e-6 of an LSB, and so are as many of the integers.
+    let bytes = |hz: f64, inverted: bool| {
+        made.iter().find(|(if_hz, sense, _)| *if_hz == hz && *sense == inverted).map_or(&[][..], |(.., bytes)| bytes)
+    };
+    let differ = [
+        (bytes(3.9e6, true), bytes(1.3e6, false)),
+        (bytes(3.9e6, false), bytes(1.3e6, true)),
+        (bytes(6.5e6, false), bytes(1.3e6, false)),
+        (bytes(6.5e6, true), bytes(1.3e6, true)),
+        (bytes(9.1e6, false), bytes(1.3e6, true)),
+    ]
+    .map(|(a, b)| a.iter().zip(b).filter(|(a, b)| a != b).count() as f64 / a.len().min(b.len()) as f64);
+    let most = differ.into_iter().fold(0.0, |most, share| if share <= most { most } else { share });
+    the.at_most("folded: samples other than of the IF that they hold", most, 1e-5, "of them");
+    let told = Scenario::parse(
+        &text_of("[front_end]\nsample_rate_hz = 5.2e6\nif_hz = 3.9e6\nformat = \"ri8\"\n[power]\n"),
+        "folded",
+    )
+    .unwrap()
+    .compose(&run::folder(), &Overrides::default())
+    .unwrap()
+    .1;
     the.all(
-        "scene that would fold: refused with the limit",
-        usize::from(run::try_scene(&beyond).is_err_and(|e| e.contains("2600000 Hz"))),
+        "told that it folds, and where the carrier is",
+        usize::from(told.join("").contains("2.600 to 5.200 MHz, the carrier at 1.300000 MHz, mirrored")),
         1,
     );
+    let refused = |if_hz: &str, format: &str| {
+        let tables = format!("[front_end]\nsample_rate_hz = 5.2e6\nif_hz = {if_hz}\nformat = \"{format}\"\n[power]\n");
+        run::try_scene(&text_of(&tables)).is_err_and(|e| e.contains("front_end.if_hz") && e.contains("2600000 Hz"))
+    };
+    let bad = [("0", "ri8"), ("2.6e6", "ri8"), ("5.2e6", "ri8"), ("6.5e6", "ci8")];
     the.all(
-        "real samples at no IF: refused",
-        usize::from(run::try_scene(&text).is_err_and(|e| e.contains("front_end.if_hz"))),
-        1,
+        "real at no IF or on an edge, complex beyond half the rate: refused with the limit",
+        bad.iter().filter(|(if_hz, format)| refused(if_hz, format)).count(),
+        4,
     );
 }
 

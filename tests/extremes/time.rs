@@ -14,7 +14,7 @@ use gnss_twin::gnss::gps::lnav::{self, Broadcast, Subframe};
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::time::{Epoch, WEEK_S};
 
-use crate::figures::case;
+use crate::figures::{self, case};
 use crate::run::{self, Received};
 
 /// A set `delta_s` later on the same Earth-fixed path: the node at the week's begin turns with it.
@@ -83,6 +83,16 @@ fn the_week_ends_without_a_step_in_range_and_without_a_lost_fix() {
     // 45 dB-Hz, code loop of 0.5 Hz: 0.6 m on a range; PDOP 2, smoothed, three sigma.
     the.at_most("fixes after the rollover, 3-D", worst_m, 3.6, "m");
     the.at_least("fixes in the 12 s after it", after as f64, 115.0, "");
+    // What a user sees of the conditioning: a column of the fixes, and the receiver's own words.
+    let told = received.outcome.conditioning.clone();
+    let worst = received.fixes().iter().map(|fix| fix.condition).fold(0.0, f64::max);
+    let of = case(58, "conditioning told");
+    of.at_most("condition of the geometry of an open sky, from the table of fixes", worst, 20.0, "");
+    let words = told.to_string();
+    let whole = told.geometry_worst == Some(worst)
+        && words.contains(&format!("up to {worst:.1}, refused from 1e4"))
+        && words.contains("0.072 (pll_bandwidth_hz), refused above 0.4: 82 % left");
+    of.all("the receiver's words on geometry and loops", usize::from(whole), 1);
 }
 
 #[test]
@@ -184,8 +194,17 @@ fn a_part_of_a_scene_has_the_bits_that_the_whole_has_there() {
     let whole_truth = tempfile::tempdir().unwrap();
     let whole = run::part(&scene, 0..scene.samples, whole_truth.path());
     let all: Vec<csv::StringRecord> = run_records(whole_truth.path(), "observations.csv");
-    // Without a past the gain control measures its first run itself, so that run is asked for whole.
-    let parts = [0..4096, 1..4097, 4095..4098, 777_777..1_000_003, 4096 * 150..4096 * 200, 2_599_999..2_600_000];
+    // Gain control measures the scene's first run whole, also where a part ends within it.
+    let parts = [
+        0..1,
+        100..200,
+        0..4096,
+        1..4097,
+        4095..4098,
+        777_777..1_000_003,
+        4096 * 150..4096 * 200,
+        2_599_999..2_600_000,
+    ];
     let mut held = 0;
     for part in parts.clone() {
         let directory = tempfile::tempdir().unwrap();
@@ -207,8 +226,13 @@ fn a_part_of_a_scene_has_the_bits_that_the_whole_has_there() {
         held += usize::from(same);
     }
     the.all("parts equal to the whole, bit for bit, and their truth", held, parts.len());
-    // Six hours in: a part, and one that begins 20 000 samples before it.
-    let late = run::scene(25_200.0, &tables.replace("2.6e6", "50e6").replace("2e6", "20e6"));
+    // Six hours in: a part, and one that begins 20 000 samples before it. A fading's phase is followed from the scene's start,
+    // 50 s of arithmetic: the long run has it.
+    let mut tables = tables.replace("2.6e6", "50e6").replace("2e6", "20e6");
+    if !figures::long() {
+        tables = tables.replace("[scintillation]\ns4 = 0.6\nsigma_phi_rad = 0.4\ndecorrelation_s = 0.5\n", "");
+    }
+    let late = run::scene(25_200.0, &tables);
     let first = 1_u64 << 40;
     let near = run::part(&late, first - 20_001..first + 10_000, whole_truth.path());
     let sought = run::part(&late, first..first + 10_000, whole_truth.path());

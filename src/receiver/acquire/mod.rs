@@ -4,7 +4,8 @@
 //! are added (sources: Kaplan and Hegarty, chapter 8; Borre et al., chapter 6). The threshold follows from a
 //! stated false-alarm probability and the noise floor of the satellite's own map. Found satellites
 //! are refined for tracking. Cross-correlation with strong satellites passes for weak ones, so these are searched for
-//! again after the strong ones are subtracted from the samples.
+//! again after the strong ones are subtracted from the samples; where that takes a good part of all power, and with it of
+//! the noise that the others meet, so are those that were not found.
 //! Cross-correlation with satellites that are not candidates, and narrow-band interference, are not
 //! recognised: they look like weak satellites. Dopplers that change by more than the step within the search,
 //! and data symbols shorter than the coherent sum, are not searched for.
@@ -26,7 +27,7 @@ mod kernel;
 mod refine;
 mod replica;
 mod settings;
-mod threshold;
+pub(in crate::receiver) mod threshold;
 
 use std::collections::BTreeMap;
 
@@ -51,6 +52,8 @@ const WEAK_SHARE: f64 = 0.1;
 /// A hit this much weaker than the strongest (24 dB) is not believed even then: subtraction leaves something over, and
 /// without noise to cover it that something has the cross-correlation's peaks.
 const LEAST_SHARE: f64 = 4e-3;
+/// Subtraction that leaves less than this of the samples' power takes a decibel of noise from those that were not found.
+const MASKED_SHARE: f64 = 0.8;
 
 /// A satellite that was found.
 #[derive(Clone, Copy, Debug)]
@@ -240,29 +243,28 @@ impl Searcher {
         let threshold = grid.threshold;
         let mut findings = self.detect(grid, component, &window.block(), codes, threshold);
 
-        let strongest_hz = findings.iter().filter_map(|f| f.hit.map(|hit| hit.cn0_hz)).fold(0.0, f64::max);
-        let (mut strong, mut weak) = (Vec::new(), Vec::new());
-        for (index, (finding, (_, code))) in findings.iter().zip(codes).enumerate() {
-            match finding.hit {
-                Some(hit) if hit.cn0_hz < WEAK_SHARE * strongest_hz => weak.push((index, codes[index])),
-                Some(hit) => strong.push((hit, *code)),
-                None => {}
-            }
-        }
-        if !weak.is_empty() {
-            strong.sort_by(|a, b| b.0.cn0_hz.total_cmp(&a.0.cn0_hz));
-            let power_before = window.power();
+        let strongest = findings.iter().filter_map(|f| f.hit.map(|hit| hit.power)).fold(0.0, f64::max);
+        let is_weak = |finding: &Finding| finding.hit.is_some_and(|hit| hit.power < WEAK_SHARE * strongest);
+        if findings.iter().any(is_weak) {
+            let mut strong: Vec<(Refined, &Code)> = (findings.iter().zip(codes))
+                .filter(|(finding, _)| !is_weak(finding))
+                .filter_map(|(finding, (_, code))| Some((finding.hit?, *code)))
+                .collect();
+            strong.sort_by(|a, b| b.0.power.total_cmp(&a.0.power));
+            let before = window.power();
             for (hit, code) in strong {
                 let complex = self.metadata.format.is_complex();
                 let samples = (&mut window.i[..], &mut window.q[..]);
                 refine::subtract(grid, code_chips, &code.replica, &hit, complex, samples);
             }
-            let (indices, weak_codes): (Vec<usize>, Vec<(Sv, &Code)>) = weak.into_iter().unzip();
-            // C/N0 is against all that is there, so powers compare after scaling with it.
-            let least_hz = LEAST_SHARE * strongest_hz * power_before / window.power().max(f64::MIN_POSITIVE);
-            let again = self.detect(grid, component, &window.block(), &weak_codes, threshold);
-            for (index, mut finding) in indices.into_iter().zip(again) {
-                finding.hit = finding.hit.filter(|hit| hit.cn0_hz >= least_hz);
+            let masked = window.power() < MASKED_SHARE * before;
+            let (indices, again): (Vec<usize>, Vec<(Sv, &Code)>) = (0..codes.len())
+                .filter(|&index| is_weak(&findings[index]) || masked && findings[index].hit.is_none())
+                .map(|index| (index, codes[index]))
+                .unzip();
+            let found = self.detect(grid, component, &window.block(), &again, threshold);
+            for (index, mut finding) in indices.into_iter().zip(found) {
+                finding.hit = finding.hit.filter(|hit| hit.power >= LEAST_SHARE * strongest);
                 findings[index] = finding;
             }
         }
@@ -298,6 +300,7 @@ impl Searcher {
                     code_phase_chips: grid.code_phase_chips(peak.lag, peak.doppler_hz),
                     doppler_hz: peak.doppler_hz,
                     cn0_hz: excess.max(f64::MIN_POSITIVE) / coherent_s,
+                    power: 0.0,
                 };
                 let hit = (peak.statistic > threshold)
                     .then(|| refine::refine(grid, block, component, &code.replica, coarse, (sums * coherent) as usize));

@@ -26,6 +26,8 @@ pub(super) struct Refined {
     pub code_phase_chips: f64,
     pub doppler_hz: f64,
     pub cn0_hz: f64,
+    /// Power of a code period's sum less that of its noise, in the samples' own units: compares hits whatever noise each met.
+    pub power: f64,
 }
 
 /// One satellite's correlators over the samples that the search saw.
@@ -69,6 +71,7 @@ pub(super) fn refine(
         code_phase_chips: phase.rem_euclid(code_chips),
         doppler_hz,
         cn0_hz: if measured > 0.0 { measured } else { coarse.cn0_hz },
+        power: (power - noise).max(0.0),
     }
 }
 

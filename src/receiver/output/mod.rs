@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::gnss::record::{AcquisitionRow, EventRow, Fix, NavigationRow, Observation, TrackingRow};
+use crate::gnss::record::{AcquisitionRow, EventRow, Fix, LineRow, NavigationRow, Observation, TrackingRow};
 
 /// A file that could not be made or written.
 #[derive(Debug, Error)]
@@ -71,6 +71,7 @@ pub struct Output {
     tracking: Sheet,
     navigation: Sheet,
     events: Sheet,
+    interference: Sheet,
     /// Parameters written so far: those of one issue are written once.
     parameters: BTreeSet<NavigationRow>,
 }
@@ -87,7 +88,7 @@ const OBSERVATIONS: [&str; 10] = [
     "cn0_dbhz",
     "locked_s",
 ];
-const FIXES: [&str; 27] = [
+const FIXES: [&str; 28] = [
     "sample",
     "gps_s",
     "gps_fraction_s",
@@ -111,6 +112,7 @@ const FIXES: [&str; 27] = [
     "hdop",
     "vdop",
     "tdop",
+    "condition",
     "satellites",
     "chi_square",
     "excluded",
@@ -133,6 +135,8 @@ const TRACKING: [&str; 11] = [
 ];
 const NAVIGATION: [&str; 4] = ["sv", "issue", "parameter", "raw"];
 const EVENTS: [&str; 4] = ["sample", "sv", "signal", "event"];
+const INTERFERENCE: [&str; 8] =
+    ["sample", "frequency_hz", "jn0_dbhz", "js_db", "statistic", "threshold", "lines", "resolution_hz"];
 
 impl Output {
     /// Creates the directory, if it is not there, and the files in it.
@@ -149,6 +153,7 @@ impl Output {
             tracking: Sheet::create(directory, "tracking.csv", &TRACKING)?,
             navigation: Sheet::create(directory, "navigation.csv", &NAVIGATION)?,
             events: Sheet::create(directory, "events.csv", &EVENTS)?,
+            interference: Sheet::create(directory, "interference.csv", &INTERFERENCE)?,
             parameters: BTreeSet::new(),
         })
     }
@@ -178,6 +183,11 @@ impl Output {
         self.events.write(row)
     }
 
+    /// Writes a line in the samples' spectrum.
+    pub fn interference(&mut self, row: &LineRow) -> Result<(), OutputError> {
+        self.interference.write(row)
+    }
+
     /// Writes decoded parameters, each but once.
     pub fn navigation(&mut self, rows: &[NavigationRow]) -> Result<(), OutputError> {
         for row in rows {
@@ -197,6 +207,7 @@ impl Output {
             &mut self.tracking,
             &mut self.navigation,
             &mut self.events,
+            &mut self.interference,
         ] {
             sheet.flush()?;
         }
@@ -227,7 +238,7 @@ mod tests {
         let zero = |n: usize| vec!["0"; n].join(",");
         let observation: Observation = from_csv(&OBSERVATIONS, &format!("0,G03,{},{}", L1_CA.name, zero(7)));
         assert_eq!(header(&observation), OBSERVATIONS.join(","));
-        let fix: Fix = from_csv(&FIXES, &format!("{},,true", zero(25)));
+        let fix: Fix = from_csv(&FIXES, &format!("{},,true", zero(26)));
         assert_eq!(header(&fix), FIXES.join(","));
         let row: AcquisitionRow = from_csv(&ACQUISITION, &format!("0,G03,{},true,{}", L1_CA.name, zero(5)));
         assert_eq!(header(&row), ACQUISITION.join(","));
@@ -237,6 +248,8 @@ mod tests {
         assert_eq!(header(&row), NAVIGATION.join(","));
         let row = EventRow { sample: 0, sv, signal: &L1_CA, event: Event::Acquired };
         assert_eq!(header(&row), EVENTS.join(","));
+        let row: LineRow = from_csv(&INTERFERENCE, &zero(8));
+        assert_eq!(header(&row), INTERFERENCE.join(","));
     }
 
     fn from_csv<T: serde::de::DeserializeOwned>(names: &[&str], row: &str) -> T {

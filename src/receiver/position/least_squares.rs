@@ -21,7 +21,7 @@ const LARGEST_ITERATIONS: u32 = 8;
 /// A step below this ends the iteration.
 const CONVERGED_M: f64 = 1e-4;
 /// Largest ratio of singular values of the geometry: position errors would be thousands of times range errors.
-const LARGEST_CONDITION: f64 = 1e4;
+pub const LARGEST_CONDITION: f64 = 1e4;
 /// Corrections of the atmosphere wait until the estimate is near the Earth's surface or above it.
 const NEAR_EARTH_M: f64 = 6.2e6;
 /// Above this there is no horizon: no mask, and models that are as good in every direction.
@@ -85,6 +85,8 @@ pub struct Solution {
     pub covariance: Matrix4<f64>,
     /// The same for unit variances: squares of the dilutions of precision.
     pub dilution: Matrix4<f64>,
+    /// Ratio of the extreme singular values of the geometry.
+    pub condition: f64,
     /// Weighted sum of squared residuals.
     pub chi_square: f64,
     pub iterations: u32,
@@ -176,7 +178,7 @@ pub fn position(ranges: &[Range], start_m: Vector3<f64>, corrections: &Correctio
             normal += weight * row * row.transpose();
             right += weight * (range.pseudorange_m - line.computed_m) * row;
         }
-        check_condition(&plain)?;
+        let condition = condition(&plain)?;
         let solver = Cholesky::new(normal).ok_or(NoFix::Singular { condition: f64::INFINITY })?;
         let step = solver.solve(&right);
         position_m += Vector3::new(step.x, step.y, step.z);
@@ -187,21 +189,22 @@ pub fn position(ranges: &[Range], start_m: Vector3<f64>, corrections: &Correctio
         }
         if step_m < CONVERGED_M {
             let dilution = Cholesky::new(plain).ok_or(NoFix::Singular { condition: f64::INFINITY })?.inverse();
-            return Ok(finish(ranges, position_m, clock_m, corrections, day, solver.inverse(), dilution, iteration));
+            let mut solution = finish(ranges, position_m, clock_m, corrections, day, solver.inverse(), dilution);
+            (solution.condition, solution.iterations) = (condition, iteration);
+            return Ok(solution);
         }
     }
     Err(NoFix::Diverged { iterations: LARGEST_ITERATIONS, step_m })
 }
 
-/// Ratio of the extreme singular values of the geometry.
-fn check_condition(plain: &Matrix4<f64>) -> Result<(), NoFix> {
+/// Ratio of the extreme singular values of the geometry, refused from [`LARGEST_CONDITION`] on.
+fn condition(plain: &Matrix4<f64>) -> Result<f64, NoFix> {
     let values = plain.symmetric_eigenvalues();
     let (low, high) = (values.min(), values.max());
     let condition = if low > 0.0 { (high / low).sqrt() } else { f64::INFINITY };
-    if condition < LARGEST_CONDITION { Ok(()) } else { Err(NoFix::Singular { condition }) }
+    if condition < LARGEST_CONDITION { Ok(condition) } else { Err(NoFix::Singular { condition }) }
 }
 
-#[expect(clippy::too_many_arguments, reason = "the last step of one function, split so that it fits a screen")]
 fn finish(
     ranges: &[Range],
     position_m: Vector3<f64>,
@@ -210,7 +213,6 @@ fn finish(
     day: f64,
     covariance: Matrix4<f64>,
     dilution: Matrix4<f64>,
-    iterations: u32,
 ) -> Solution {
     let lines: Vec<Line> = ranges.iter().map(|range| line(range, &position_m, clock_m, corrections, day)).collect();
     let residuals_m: Vec<f64> =
@@ -225,8 +227,9 @@ fn finish(
         elevations_rad: lines.iter().map(|line| line.elevation_rad).collect(),
         covariance,
         dilution,
+        condition: f64::INFINITY,
         chi_square,
-        iterations,
+        iterations: 0,
     }
 }
 

@@ -25,7 +25,7 @@ pub mod smooth;
 mod tests;
 pub mod troposphere;
 
-use least_squares::{Corrections, Ionosphere, Range, SPACE_M, Solution, UNKNOWNS};
+use least_squares::{Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, Solution, UNKNOWNS};
 use smooth::Smoother;
 
 /// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
@@ -116,7 +116,11 @@ impl CodeNoise {
 pub enum NoFix {
     #[error("{have} satellites with ephemeris: at least {need} are needed")]
     TooFew { have: usize, need: usize },
-    #[error("the satellites' directions give no position: condition {condition:.3e}")]
+    #[error(
+        "the satellites' directions give no position: condition {condition:.3e}, {} times the largest that is solved, {:e}",
+        (condition / LARGEST_CONDITION).ceil(),
+        LARGEST_CONDITION
+    )]
     Singular { condition: f64 },
     #[error("the solution does not converge: the step is {step_m} m after {iterations} iterations")]
     Diverged { iterations: u32, step_m: f64 },
@@ -361,6 +365,7 @@ fn fix(
         hdop: (de + dn).sqrt(),
         vdop: du.sqrt(),
         tdop: dt.sqrt(),
+        condition: solution.condition,
         satellites: satellites as u32,
         chi_square: solution.chi_square,
         excluded: names.join(" "),

@@ -15,7 +15,7 @@ pub mod settings;
 mod tests;
 
 pub use channel::{Channel, code_shape};
-pub use settings::{CodeDiscriminator, TrackingSettings, TrackingSettingsError};
+pub use settings::{CodeDiscriminator, LoopMargin, TrackingSettings, TrackingSettingsError};
 
 /// What a channel found in a block.
 #[derive(Clone, Debug, Default)]

@@ -100,7 +100,44 @@ pub enum TrackingSettingsError {
 /// (theory: order 1 below 0.5); beyond this their noise per update is no longer small against the discriminator's range.
 pub const LARGEST_BANDWIDTH_TIME: f64 = 0.4;
 
+/// How near a loop is to what [`TrackingSettings::validate`] refuses.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LoopMargin {
+    /// The bandwidth's key.
+    pub key: &'static str,
+    pub bandwidth_hz: f64,
+    pub update_s: f64,
+    /// Bandwidth times update time, and its largest.
+    pub bandwidth_time: f64,
+    pub limit: f64,
+    /// What is left of the limit, as a share of it.
+    pub margin_share: f64,
+}
+
 impl TrackingSettings {
+    /// Every loop's bandwidth times update time and its margin, for a code whose period is `period_s`.
+    pub fn margins(&self, period_s: f64) -> [LoopMargin; 5] {
+        let update_s = period_s * f64::from(self.integration);
+        let margin = |key, bandwidth_hz: f64, update_s: f64| {
+            let (bandwidth_time, limit) = (bandwidth_hz * update_s, LARGEST_BANDWIDTH_TIME);
+            LoopMargin {
+                key,
+                bandwidth_hz,
+                update_s,
+                bandwidth_time,
+                limit,
+                margin_share: 1.0 - bandwidth_time / limit,
+            }
+        };
+        [
+            margin("pll_bandwidth_hz", self.pll_bandwidth_hz, update_s),
+            margin("dll_bandwidth_hz", self.dll_bandwidth_hz, update_s),
+            margin("dll_pull_in_bandwidth_hz", self.dll_pull_in_bandwidth_hz, update_s),
+            margin("fll_bandwidth_hz", self.fll_bandwidth_hz, period_s),
+            margin("fll_assist_bandwidth_hz", self.fll_assist_bandwidth_hz, period_s),
+        ]
+    }
+
     /// Checks every value and its range, for a code whose period is `period_s`.
     ///
     /// # Errors
@@ -133,20 +170,10 @@ impl TrackingSettings {
         if let Some(&(key, value, _, expected)) = checks.iter().find(|check| !check.2) {
             return Err(TrackingSettingsError::Range { key, value, expected });
         }
-        let update_s = period_s * f64::from(self.integration);
-        let bandwidths = [
-            ("pll_bandwidth_hz", self.pll_bandwidth_hz, update_s),
-            ("dll_bandwidth_hz", self.dll_bandwidth_hz, update_s),
-            ("dll_pull_in_bandwidth_hz", self.dll_pull_in_bandwidth_hz, update_s),
-            ("fll_bandwidth_hz", self.fll_bandwidth_hz, period_s),
-            ("fll_assist_bandwidth_hz", self.fll_assist_bandwidth_hz, period_s),
-        ];
-        for (key, value_hz, update_s) in bandwidths {
-            let product = value_hz * update_s;
-            if product > LARGEST_BANDWIDTH_TIME {
-                let (limit, largest_hz) = (LARGEST_BANDWIDTH_TIME, LARGEST_BANDWIDTH_TIME / update_s);
-                return Err(TrackingSettingsError::Bandwidth { key, value_hz, update_s, product, limit, largest_hz });
-            }
+        let beyond = self.margins(period_s).into_iter().find(|margin| margin.bandwidth_time > margin.limit);
+        if let Some(LoopMargin { key, bandwidth_hz, update_s, bandwidth_time, limit, .. }) = beyond {
+            let (value_hz, product, largest_hz) = (bandwidth_hz, bandwidth_time, limit / update_s);
+            return Err(TrackingSettingsError::Bandwidth { key, value_hz, update_s, product, limit, largest_hz });
         }
         Ok(())
     }
