@@ -329,12 +329,12 @@ impl Verdict {
             return;
         }
         self.judge(
-            "seconds of a continuous wave that were told",
-            "interference.wave_seconds_told",
-            lines.wave_seconds_told,
+            "seconds of a continuous wave that were not told",
             "",
-            Bound::Min(lines.wave_seconds as f64),
-            "those with a wave of J/N0 ≥ 45 dB-Hz all through",
+            lines.wave_seconds - lines.wave_seconds_told,
+            "",
+            Bound::Max(0.0),
+            "none of those with a wave of J/N0 ≥ 45 dB-Hz all through",
         );
         if let Some(bin_hz) = lines.resolution_hz {
             let source = "half a bin of the receiver's spectrum";
