@@ -156,7 +156,10 @@ impl Run {
             tracking: rows(&rx.join("tracking.csv"), RECEIVER)?,
             navigation: rows(&rx.join("navigation.csv"), RECEIVER)?,
             events: rows(&rx.join("events.csv"), RECEIVER)?,
-            lines: if lines.exists() { Some(rows(&lines, RECEIVER)?) } else { None },
+            lines: match rows(&lines, RECEIVER) {
+                Err(JudgeError::Missing { .. }) => None,
+                other => Some(other?),
+            },
             receiver: json(&rx.join("receiver.json"))?.unwrap_or(Value::Null),
             psd: optional(&psd)?,
             speed: json(&run.join("speed.json"))?.unwrap_or_default(),
