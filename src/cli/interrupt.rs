@@ -34,7 +34,8 @@ fn handle() -> std::io::Result<()> {
     let second = Arc::new(AtomicBool::new(false));
     let (reader, writer) = UnixStream::pair()?;
     thread::Builder::new().name("signals".to_owned()).stack_size(STACK_BYTES).spawn(move || wait(reader))?;
-    for signal in [SIGINT, SIGTERM, SIGHUP] {
+    let (handled, detached) = ([SIGINT, SIGTERM, SIGHUP], is_detached());
+    for signal in handled.into_iter().filter(|signal| !(detached && *signal == SIGHUP)) {
         // Order matters: the shutdown sees the flag that an earlier signal has set, and who is woken finds its number.
         signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&second))?;
         signal_hook::flag::register(signal, Arc::clone(&second))?;
@@ -42,6 +43,14 @@ fn handle() -> std::io::Result<()> {
         signal_hook::low_level::pipe::register(signal, writer.try_clone()?)?;
     }
     Ok(())
+}
+
+/// Whether whoever started the program wants it to outlive the terminal (`nohup`): hang-ups are ignored then, and stay so.
+fn is_detached() -> bool {
+    // Linux tells it there (proc(5)), bit 0 for signal 1; elsewhere it is taken not to be.
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
 }
 
 /// The signal that came, if one did.

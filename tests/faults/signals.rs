@@ -11,7 +11,22 @@ use crate::machine::{Bench, Ended, TWIN, Task, files, left_over, twin};
 use crate::tally::{End, Tally, cases, long};
 
 const FAMILY: &str = "A machine that fails";
-const SIGNALS: [(&str, i32); 3] = [("INT", 130), ("TERM", 143), ("HUP", 129)];
+
+/// Signals and the exit codes they lead to; under `nohup`, which the program heeds, hang-ups lead to none.
+fn signals() -> Vec<(&'static str, i32)> {
+    let mut signals = vec![("INT", 130), ("TERM", 143)];
+    if !detached() {
+        signals.push(("HUP", 129));
+    }
+    signals
+}
+
+fn detached() -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap();
+    u64::from_str_radix(mask.trim(), 16).unwrap() & 1 == 1
+}
+
 /// The promise; where many programs share the machine in the short run, it may keep this one from the processor.
 const PROMISED: Duration = Duration::from_secs(1);
 
@@ -96,7 +111,7 @@ fn a_signal_at_any_moment_ends_the_program_at_once_and_the_next_run_is_right() {
     } else {
         &["plan", "generate", "receive with a search"]
     };
-    let bench = Bench::new(names);
+    let (bench, signals) = (Bench::new(names), signals());
     let mut failures = Vec::new();
     for task in &bench.tasks {
         // The quickest of three, so that most signals come before the end.
@@ -122,7 +137,7 @@ fn a_signal_at_any_moment_ends_the_program_at_once_and_the_next_run_is_right() {
                 scope.spawn(|| {
                     loop {
                         let Some((number, after, twice)) = next.lock().unwrap().next() else { break };
-                        let signal = SIGNALS[number % 3];
+                        let signal = signals[number % signals.len()];
                         let ended = interrupt(task, signal, after, twice);
                         ends.lock().unwrap().push((format!("{} after {after:?}", signal.0), ended));
                     }
@@ -154,7 +169,7 @@ fn a_signal_ends_a_wait_for_samples_that_never_come() {
     let fifo = place.path().join("fifo");
     assert!(Command::new("mkfifo").arg(&fifo).status().unwrap().success());
     let mut tally = Tally::of_processes(FAMILY, "18. a signal: waiting for samples");
-    for (signal, code) in SIGNALS {
+    for (signal, code) in signals() {
         for source in ["-", "fifo"] {
             tally.case(
                 || format!("{signal}, {source}"),
@@ -189,5 +204,41 @@ fn a_signal_ends_a_wait_for_samples_that_never_come() {
             );
         }
     }
+    tally.finish();
+}
+
+#[test]
+fn a_hang_up_is_ignored_under_nohup_and_ends_the_program_without() {
+    if detached() {
+        println!("hang-ups are ignored here: what ends the program without is not tested");
+        return;
+    }
+    let mut tally = Tally::of_processes(FAMILY, "18. a signal: hang-ups under nohup");
+    tally.case(
+        || "nohup".to_owned(),
+        || {
+            let place = tempfile::tempdir().unwrap();
+            let mut child = Command::new("nohup")
+                .args([TWIN, "receive", "-", "--out", "rx", "--format", "ci8", "--rate-hz", "4e6"])
+                .current_dir(place.path())
+                .stdin(Stdio::piped())
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap();
+            let silent = child.stdin.take();
+            let begun = Instant::now();
+            while begun.elapsed() < Duration::from_secs(20) && !place.path().join(".rx.part").exists() {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            send("HUP", &child);
+            std::thread::sleep(Duration::from_millis(200));
+            let alive = child.try_wait().unwrap().is_none();
+            send("TERM", &child);
+            let (ended, _) = end(child);
+            drop(silent);
+            if alive && ended.code == 143 { Ok(End::Accepted) } else { Err(format!("{alive}, exit {}", ended.code)) }
+        },
+    );
     tally.finish();
 }
