@@ -336,12 +336,12 @@ impl Verdict {
             Bound::Max(0.0),
             "none of those with a wave of J/N0 ≥ 45 dB-Hz all through",
         );
-        if let Some(bin_hz) = lines.resolution_hz {
+        // Where a wave is never alone, what is told may be another source's line.
+        if let (Some(bin_hz), Some(error_hz)) = (lines.resolution_hz, lines.frequency_error_max_hz) {
             let source = "half a bin of the receiver's spectrum";
-            let (path, error_hz) = ("interference.frequency_error_max_hz", lines.frequency_error_max_hz);
             self.judge(
                 "frequency of the continuous wave, largest error",
-                path,
+                "interference.frequency_error_max_hz",
                 error_hz,
                 "Hz",
                 Bound::Max(0.5 * bin_hz),
