@@ -11,7 +11,10 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// A process that takes so long hangs: many may run beside it.
 const PROCESS_PATIENCE: Duration = Duration::from_secs(30);
 
-static ROWS: Mutex<BTreeMap<(&'static str, String), String>> = Mutex::new(BTreeMap::new());
+/// Rows by family and fault.
+type Rows = BTreeMap<(String, String), String>;
+
+static ROWS: Mutex<Rows> = Mutex::new(Rows::new());
 
 /// Whether all cases are asked for.
 pub fn long() -> bool {
@@ -104,7 +107,7 @@ impl Tally {
         let failed = failures.len();
         let row = format!("| {fault} | {cases} | {refused} | {reported} | {accepted} | {failed} | {seconds:.1} |");
         let mut rows = ROWS.lock().unwrap_or_else(|broken| broken.into_inner());
-        rows.insert((family, fault.clone()), row);
+        rows.insert((family.to_owned(), fault.clone()), row);
         write(&rows);
         drop(rows);
         let shown = failures.iter().take(12).cloned().collect::<Vec<_>>().join("\n  ");
@@ -121,8 +124,27 @@ fn work() -> Duration {
     Duration::from_nanos(text.split(' ').next().and_then(|word| word.parse().ok()).unwrap_or(0))
 }
 
-fn write(rows: &BTreeMap<(&'static str, String), String>) {
+/// Rows of a report as [`write`] leaves it.
+fn read(text: &str) -> Rows {
+    let (mut family, mut rows) = (String::new(), Rows::new());
+    for line in text.lines() {
+        if let Some(name) = line.strip_prefix("## ") {
+            family = name.to_owned();
+        } else if let Some((fault, _)) = line.strip_prefix("| ").and_then(|row| row.split_once(" |"))
+            && fault != "fault"
+            && fault != "---"
+        {
+            rows.insert((family.clone(), fault.to_owned()), line.to_owned());
+        }
+    }
+    rows
+}
+
+/// Writes the report. Rows of faults that this run does not look at stay as they are, so that it can be made in parts.
+fn write(rows: &Rows) {
     let Some(path) = std::env::var_os("GNSS_TWIN_WRITE_ROBUSTNESS") else { return };
+    let mut all = read(&std::fs::read_to_string(&path).unwrap_or_default());
+    all.extend(rows.clone());
     let mut text = String::from(
         "# Robustness\n\nCases of damaged input and of a failing machine, and what became of them: refused with the place and the \
          reason; accepted with a part left out and named; accepted as it legally stands. A failure is a panic, an end after \
@@ -130,8 +152,8 @@ fn write(rows: &BTreeMap<(&'static str, String), String>) {
          table.\n",
     );
     let mut family = "";
-    for ((now, _), row) in rows {
-        if *now != family {
+    for ((now, _), row) in &all {
+        if now != family {
             let head = "| fault | cases | refused | reported | accepted | failures | time (s) |";
             let _ = write!(text, "\n## {now}\n\n{head}\n| --- | ---: | ---: | ---: | ---: | ---: | ---: |\n");
             family = now;
