@@ -23,6 +23,8 @@ pub const MAX_BYTES: u64 = 256 << 20;
 const MAX_ROW_BYTES: usize = 1 << 16;
 /// Fastest motion between rows.
 const MAX_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;
+/// Nearest to the Earth's centre: 50 km below the poles.
+const LEAST_RADIUS_M: f64 = 6.3e6;
 /// Hardest motion: a hundred thousand g, beyond any gun.
 const MAX_ACCELERATION_MPS2: f64 = 1e6;
 
@@ -74,6 +76,8 @@ pub enum Fault {
     Gap { gap_s: f64, max_gap_s: f64 },
     #[error("{speed_mps:.6e} m/s since the row before: expected at most 0.1 c = 2.998e7 m/s")]
     Speed { speed_mps: f64 },
+    #[error("the way from the row before passes {:.0} km from the Earth's centre: expected at least 6300 km", radius_m / 1e3)]
+    Depth { radius_m: f64 },
     #[error("acceleration of {acceleration_mps2:.3e} m/s2: expected at most 1e6 m/s2")]
     Acceleration { acceleration_mps2: f64 },
     #[error("{have} rows: expected at least 2")]
@@ -108,6 +112,10 @@ impl Rows {
                 return Err(Fault::Gap { gap_s, max_gap_s: self.max_gap_s });
             }
             speed_mps = speed_mps.max((row.position_m - before.position_m).norm() / gap_s);
+            let radius_m = nearest_m(&before.position_m, &row.position_m);
+            if speed_mps <= MAX_SPEED_MPS && radius_m < LEAST_RADIUS_M {
+                return Err(Fault::Depth { radius_m });
+            }
         }
         if speed_mps > MAX_SPEED_MPS {
             return Err(Fault::Speed { speed_mps });
@@ -174,6 +182,14 @@ impl Rows {
     }
 }
 
+/// Least distance of the straight way between two places from the Earth's centre.
+fn nearest_m(from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
+    let way = to - from;
+    let square = way.norm_squared();
+    let share = if square > 0.0 { (-from.dot(&way) / square).clamp(0.0, 1.0) } else { 0.0 };
+    (from + way * share).norm()
+}
+
 /// Hardest acceleration at the knots of the spline through some rows.
 fn hardest(rows: &[Row]) -> f64 {
     spline::knots(rows).iter().map(|knot| knot.motion.acceleration_mps2.norm()).fold(0.0, f64::max)
@@ -195,7 +211,7 @@ fn place(geodetic: bool, [a, b, c]: [(&str, &str); 3]) -> Result<Vector3<f64>, F
     } else {
         let read = |(column, text)| number(column, text, -1e9, 1e9, "a number from -1e9 to 1e9");
         let position_m = Vector3::new(read(a)?, read(b)?, read(c)?);
-        if position_m.norm() < 6.3e6 {
+        if position_m.norm() < LEAST_RADIUS_M {
             let value = format!("{}, {}, {}", a.1, b.1, c.1);
             let expected = "a place at least 6300 km from the Earth's centre";
             return Err(Fault::Number { column: "x_m, y_m, z_m".to_owned(), value, expected });
@@ -529,6 +545,13 @@ mod tests {
     }
 
     #[test]
+    fn a_way_through_the_earth_is_refused_at_the_row_where_it_ends() {
+        let error = csv(&format!("{HEADER}0,6400000,0,0\n1,6400000,10,0\n3,-6400000,10,0\n")).unwrap_err();
+        assert!(error.line == 4 && matches!(error.fault, Fault::Depth { radius_m } if radius_m < 11.0), "{error}");
+        assert!(csv(&format!("{HEADER}0,6400000,0,0\n1,6400000,900000,0\n")).is_ok());
+    }
+
+    #[test]
     fn a_row_that_jumps_is_named_and_not_its_neighbours() {
         // A walk at 1 m/s and 10 Hz, with and without velocities.
         let walk = |velocities: bool, wrong: &dyn Fn(i32) -> (f64, f64)| {
@@ -622,17 +645,17 @@ mod tests {
         let rmc = sentence("GPRMC,235958.50,A,2630.0,N,08012.0,E,0,0,010710,,");
         let text = [
             rmc,
-            sentence("GPGGA,235959.50,2630.0000,N,08012.0000,E,1,08,0.9,100.0,M,-30.0,M,,"),
+            sentence("GPGGA,235959.50,0030.0000,N,00012.0000,E,1,08,0.9,100.0,M,-30.0,M,,"),
             sentence("GPGGA,000000.00,,,,,0,00,,,M,,M,,"),
-            sentence("GNGGA,000000.50,2630.0000,S,08012.0000,W,1,08,0.9,100.0,M,-30.0,M,,"),
+            sentence("GNGGA,000000.50,0030.0000,S,00012.0000,W,1,08,0.9,100.0,M,-30.0,M,,"),
         ];
         let text = text.concat();
-        // From one hemisphere to the other in 1 s is 1.3e7 m/s, below 0.1 c, and two rows make no acceleration.
+        // Over equator and meridian in 1 s: 1.2e5 m/s, and two rows make no acceleration.
         let (trajectory, without_fix) = read_nmea(text.as_bytes(), "ride.nmea", &options).unwrap();
         assert_eq!((trajectory.span_s(), without_fix), ((0.5, 1.5), 1));
         let (first, last) = (trajectory.at(0.5).position_m, trajectory.at(1.5).position_m);
-        assert!((first - Geodetic::from_degrees(26.5, 80.2, 70.0).to_ecef()).norm() < 1e-8);
-        assert!((last - Geodetic::from_degrees(-26.5, -80.2, 70.0).to_ecef()).norm() < 1e-8);
+        assert!((first - Geodetic::from_degrees(0.5, 0.2, 70.0).to_ecef()).norm() < 1e-8);
+        assert!((last - Geodetic::from_degrees(-0.5, -0.2, 70.0).to_ecef()).norm() < 1e-8);
     }
 
     #[test]
