@@ -391,7 +391,7 @@ fn render(
             }
             scratch.bank.render(kernel, i, q);
         }
-        let mut block = Block { start: from, i, q, lead, tail, clipped: 0, level: kernel.level };
+        let mut block = Block { lead, tail, level: kernel.level, ..Block::whole(from, i, q) };
         scene.stages(|stage| stage.act(&mut block));
         let (Some(i), Some(q)) = (block.i.get(lead..length), block.q.get(lead..length)) else { continue };
         clipped += block.clipped + isa::pack(kernel.level, format, i, q, bytes);

@@ -4,7 +4,6 @@ use std::f64::consts::PI;
 
 use gnss_twin::generator::stage::filter::{Filter, Shape};
 use gnss_twin::generator::stage::{Block, Stage};
-use gnss_twin::generator::synth::isa::Level;
 use gnss_twin::gnss::gps::l1ca;
 
 /// Share of a BPSK(1) signal's power within ±`half_hz`: ∫ sinc²(f / R) / R df, by the midpoint rule.
@@ -33,15 +32,7 @@ fn a_wall_loses_the_power_that_lies_outside() {
             let period = 1023 * PER_CHIP;
             let sharp: Vec<f32> = (0..2 * period).map(|n| chips[n / PER_CHIP % 1023]).collect();
             let (mut i, mut q) = (sharp.clone(), vec![0.0; sharp.len()]);
-            filter.act(&mut Block {
-                start: 0,
-                i: &mut i,
-                q: &mut q,
-                lead: 0,
-                tail: 0,
-                clipped: 0,
-                level: Level::detect(),
-            });
+            filter.act(&mut Block::whole(0, &mut i, &mut q));
             // A replica without filter meets the signal's share p, and noise of the same share: p² / p.
             let sum: f64 = i[period..].iter().zip(&sharp[period - delay..]).map(|(x, s)| f64::from(x * s)).sum();
             mean_db -= 10.0 * libm::log10(sum / period as f64) / 8.0;

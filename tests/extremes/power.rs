@@ -212,15 +212,7 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
     );
     let (mut i, mut q) = (vec![0.0_f32; 1_003_520], vec![0.0_f32; 1_003_520]);
     let source = &scene.interference[0];
-    let mut block = gnss_twin::generator::stage::Block {
-        start: 0,
-        i: &mut i,
-        q: &mut q,
-        lead: 0,
-        tail: 0,
-        clipped: 0,
-        level: gnss_twin::generator::synth::isa::Level::detect(),
-    };
+    let mut block = gnss_twin::generator::stage::Block::whole(0, &mut i, &mut q);
     gnss_twin::generator::stage::Stage::act(source, &mut block);
     let replica = Replica::new(l1ca::code(6).unwrap(), Edge::Area).unwrap();
     let step = (1.023e6 / 5e6 * 281_474_976_710_656.0) as u64;
@@ -350,15 +342,7 @@ fn pulses_without_length_and_sweeps_within_a_sample_are_refused() {
     the.all("refused by name", told.count(), bad.len());
     let whole = scene("kind = \"pulse\"\nwidth_s = 1e-3\nrate_hz = 1000\n").unwrap();
     let (mut i, mut q) = (vec![0.0_f32; 8192], vec![0.0_f32; 8192]);
-    let mut block = gnss_twin::generator::stage::Block {
-        start: 0,
-        i: &mut i,
-        q: &mut q,
-        lead: 0,
-        tail: 0,
-        clipped: 0,
-        level: gnss_twin::generator::synth::isa::Level::detect(),
-    };
+    let mut block = gnss_twin::generator::stage::Block::whole(0, &mut i, &mut q);
     gnss_twin::generator::stage::Stage::act(&whole.interference[0], &mut block);
     the.all("duty 1: on at every sample", i.iter().zip(&q).filter(|(i, q)| i.hypot(**q) > 0.0).count(), 8192);
 }

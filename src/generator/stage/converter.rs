@@ -115,7 +115,6 @@ pub(super) fn level(y: f32, half: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::generator::stage::noise::add_block;
-    use crate::generator::synth::isa::Level;
 
     /// Correlation loss of a weak signal: 10 lg of (E[x Q(x)])² / E[Q(x)²], for Gaussian x.
     fn loss_db(converter: &Converter, sigma: f32) -> f64 {
@@ -124,8 +123,7 @@ mod tests {
             let (mut i, mut q) = (vec![0.0; RUN_SAMPLES], vec![0.0; RUN_SAMPLES]);
             add_block(5, number, sigma, &mut i, &mut q);
             let before = i.clone();
-            let mut block =
-                Block { start: 0, i: &mut i, q: &mut q, lead: 0, tail: 0, clipped: 0, level: Level::detect() };
+            let mut block = Block::whole(0, &mut i, &mut q);
             converter.act(&mut block);
             for (x, y) in before.iter().zip(&i) {
                 let (x, y) = (f64::from(*x), f64::from(*y));
@@ -177,21 +175,12 @@ mod tests {
             let (mut i, mut q) = (vec![value; 100], vec![0.0; 100]);
             i[0] = 1.0;
             let fixed = Converter { window_runs: None, ..converter };
-            let mut block =
-                Block { start: 0, i: &mut i, q: &mut q, lead: 0, tail: 0, clipped: 0, level: Level::detect() };
+            let mut block = Block::whole(0, &mut i, &mut q);
             fixed.act(&mut block);
             assert!(i[1..].iter().all(|x| *x == expected) && q.iter().all(|x| *x == 1.0));
         }
         let (mut i, mut q) = (vec![0.0; 100], vec![0.0; 100]);
-        converter.act(&mut Block {
-            start: 0,
-            i: &mut i,
-            q: &mut q,
-            lead: 0,
-            tail: 0,
-            clipped: 0,
-            level: Level::detect(),
-        });
+        converter.act(&mut Block::whole(0, &mut i, &mut q));
         assert!(i.iter().all(|x| *x == 1.0));
     }
 }

@@ -240,10 +240,9 @@ fn add(output: &mut [f32], input: &[f32], taps: &[f32], sign: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::synth::isa::Level;
 
     fn acted(filter: &Filter, mut i: Vec<f32>, mut q: Vec<f32>) -> (Vec<f32>, Vec<f32>) {
-        let mut block = Block { start: 0, i: &mut i, q: &mut q, lead: 0, tail: 0, clipped: 0, level: Level::detect() };
+        let mut block = Block::whole(0, &mut i, &mut q);
         filter.act(&mut block);
         (i, q)
     }

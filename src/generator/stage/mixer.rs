@@ -170,7 +170,6 @@ mod tests {
     use num_complex::Complex64;
 
     use super::*;
-    use crate::generator::synth::isa::Level;
 
     fn tone(cycles: f64, length: usize) -> (Vec<f32>, Vec<f32>) {
         (0..length)
@@ -191,15 +190,7 @@ mod tests {
     fn an_imbalance_leaves_the_image_that_its_formula_says() {
         let balance = Balance { gain: 0.06, phase_rad: 0.05, dc_i_lsb: 0.25, dc_q_lsb: -0.5 };
         let (mut i, mut q) = tone(0.125, 4096);
-        balance.act(&mut Block {
-            start: 0,
-            i: &mut i,
-            q: &mut q,
-            lead: 0,
-            tail: 0,
-            clipped: 0,
-            level: Level::detect(),
-        });
+        balance.act(&mut Block::whole(0, &mut i, &mut q));
         let found = 20.0 * libm::log10(line(&i, &q, -0.125).norm() / line(&i, &q, 0.125).norm());
         // Whole periods in the sum: only rounding, 6e-8 of the tone against an image of 0.04.
         assert!((found - balance.image_db()).abs() < 1e-3, "{found} {}", balance.image_db());
@@ -227,28 +218,12 @@ mod tests {
         let oscillator = Oscillator::new(1234.5, Some(noise), rate);
         let (mut i, mut q) = (vec![1.0; 8192], vec![0.0; 8192]);
         let (mut late_i, mut late_q) = (vec![1.0; 4096], vec![0.0; 4096]);
-        oscillator.act(&mut Block {
-            start: 0,
-            i: &mut i,
-            q: &mut q,
-            lead: 0,
-            tail: 0,
-            clipped: 0,
-            level: Level::detect(),
-        });
-        oscillator.act(&mut Block {
-            start: 4096,
-            i: &mut late_i,
-            q: &mut late_q,
-            lead: 0,
-            tail: 0,
-            clipped: 0,
-            level: Level::detect(),
-        });
+        oscillator.act(&mut Block::whole(0, &mut i, &mut q));
+        oscillator.act(&mut Block::whole(4096, &mut late_i, &mut late_q));
         assert_eq!((&i[4096..], &q[4096..]), (late_i.as_slice(), late_q.as_slice()));
         let clean = Oscillator::new(1234.5, None, rate);
         let (mut i, mut q) = (vec![1.0; 4096], vec![0.0; 4096]);
-        clean.act(&mut Block { start: 0, i: &mut i, q: &mut q, lead: 0, tail: 0, clipped: 0, level: Level::detect() });
+        clean.act(&mut Block::whole(0, &mut i, &mut q));
         let expected = libm::sincos(std::f64::consts::TAU * 1234.5 * 4000.0 / 2.6e6);
         // A phase below π in single precision: 2e-7.
         assert!((f64::from(i[4000]) - expected.1).abs() < 5e-7 && (f64::from(q[4000]) - expected.0).abs() < 5e-7);

@@ -32,6 +32,13 @@ pub struct Block<'a> {
     pub level: Level,
 }
 
+impl<'a> Block<'a> {
+    /// Samples that are all sent on, for the widest instruction set of this processor.
+    pub fn whole(start: u64, i: &'a mut [f32], q: &'a mut [f32]) -> Self {
+        Self { start, i, q, lead: 0, tail: 0, clipped: 0, level: Level::detect() }
+    }
+}
+
 /// A stage as `scene.json` states it.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Fact {
