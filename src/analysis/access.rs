@@ -15,35 +15,29 @@ use crate::gnss::record::Observation;
 use crate::gnss::signal::Signal;
 
 /// C/N0 that a receiver can measure, per true observation.
-pub struct Access {
-    /// Sum of C/N0 of a signal's satellites at a sample.
-    sums_hz: HashMap<(u64, &'static str), f64>,
+pub struct Access<'r> {
+    run: &'r Run,
     kappa_s: HashMap<&'static str, f64>,
     /// What interference adds to the noise density at a sample, in units of the thermal one.
     jammed: HashMap<(u64, &'static str), f64>,
-    noise: bool,
 }
 
-impl Access {
+impl<'r> Access<'r> {
     /// From the truth of a run.
-    pub fn new(run: &Run) -> Self {
-        let mut sums_hz = HashMap::new();
+    pub fn new(run: &'r Run) -> Self {
         let mut kappa_s = HashMap::new();
-        for row in &run.truth {
-            *sums_hz.entry((row.sample, row.signal.name)).or_insert(0.0) += linear(row.cn0_dbhz);
-            kappa_s
-                .entry(row.signal.name)
-                .or_insert_with(|| kappa(row.signal, &run.scene.code_edge, run.scene.sample_rate_hz));
+        for (_, signal) in run.truth.keys() {
+            kappa_s.entry(signal.name).or_insert_with(|| kappa(signal, &run.scene.code_edge, run.scene.sample_rate_hz));
         }
-        Self { sums_hz, jammed: jammed(run, kappa_s.keys().copied()), kappa_s, noise: run.scene.noise }
+        Self { run, jammed: jammed(run, kappa_s.keys().copied()), kappa_s }
     }
 
     /// C/N0 of a true observation with the other satellites and interference counted as noise; infinite without any.
     pub fn effective_dbhz(&self, row: &Observation) -> f64 {
         let own_hz = linear(row.cn0_dbhz);
-        let sum_hz = self.sums_hz.get(&(row.sample, row.signal.name)).copied().unwrap_or(own_hz);
+        let sum_hz = self.run.cn0_sums_hz.get(&(row.sample, row.signal.name)).copied().unwrap_or(own_hz);
         let kappa_s = self.kappa_s.get(row.signal.name).copied().unwrap_or(0.0);
-        let thermal = if self.noise { 1.0 } else { 0.0 };
+        let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
         let jammed = self.jammed.get(&(row.sample, row.signal.name)).copied().unwrap_or(0.0);
         10.0 * libm::log10(own_hz / (thermal + kappa_s * (sum_hz - own_hz) + jammed))
     }

@@ -147,7 +147,10 @@ pub struct Clock {
 
 impl Clock {
     /// Measures it.
-    pub fn measure(run: &Run, errors: &Errors) -> Self {
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
         let samples: Vec<u64> = errors.positions.iter().map(|error| error.sample).collect();
         let stretch = longest_even(&samples);
         let mut rows: Vec<ClockRow> = errors.positions[stretch.clone()]
@@ -172,9 +175,9 @@ impl Clock {
         }
         series.extend(truth(run));
         let sigma_s = |sigma_m: Option<f64>| Some(tdop(run, &rows)? * sigma_m? / SPEED_OF_LIGHT_MPS);
-        let code = errors.settled(|_, row| row.code_m);
-        let carrier = errors.settled(|(_, signal), row| row.carrier_cycles * signal.wavelength_m());
-        Self {
+        let code = errors.settled(|_, row| row.code_m)?;
+        let carrier = errors.settled(|(_, signal), row| row.carrier_cycles * signal.wavelength_m())?;
+        Ok(Self {
             estimate_line,
             truth_line,
             error_line,
@@ -183,7 +186,7 @@ impl Clock {
             carrier_sigma_s: sigma_s(pooled_std(carrier.iter().map(Vec::as_slice))),
             oscillator: run.scene.oscillator.map(|oscillator| PowerLaw { h: oscillator.h }),
             rows,
-        }
+        })
     }
 
     /// One of its series.

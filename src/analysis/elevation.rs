@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::analysis::errors::{Errors, Link, SignalError};
 use crate::analysis::load::Run;
-use crate::analysis::statistics::{mean, percentile, rms, std};
+use crate::analysis::statistics::{Sum, mean, percentile, rms, std};
 use crate::analysis::{JudgeError, write_rows};
 use crate::gnss::satellite::Sv;
 
@@ -65,92 +65,116 @@ pub struct Band {
     pub multipath_rms_m: Option<f64>,
 }
 
-/// Points of every satellite.
+/// What all points come to.
 #[derive(Clone, Debug, Default)]
 pub struct Elevations {
-    pub points: BTreeMap<Link, Vec<Point>>,
+    pub satellites: Vec<Satellite>,
+    /// Those that have observations, from the horizon up.
+    pub bands: Vec<Band>,
+}
+
+/// The points of a satellite.
+///
+/// # Errors
+/// [`JudgeError::Read`] where rows that were put by cannot be read.
+pub fn points(run: &Run, errors: &Errors, link: Link) -> Result<Vec<Point>, JudgeError> {
+    let elevations: HashMap<u64, f64> =
+        run.sky.map(link.0, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
+    let rows = errors.signals.rows(link)?;
+    let one = |(row, multipath_m): (&SignalError, f64)| {
+        Some(Point {
+            time_s: row.time_s,
+            elevation_deg: *elevations.get(&row.sample)?,
+            code_m: row.code_m - errors.common_m(row.sample)?.0,
+            carrier_cycles: row.carrier_cycles,
+            doppler_hz: row.doppler_hz,
+            cn0_db: row.cn0_dbhz - row.cn0_effective_dbhz,
+            multipath_m,
+        })
+    };
+    Ok(rows.iter().zip(multipath_m(&link, &rows)).filter_map(one).collect())
 }
 
 impl Elevations {
     /// Measures them.
-    pub fn measure(run: &Run, errors: &Errors) -> Self {
-        let elevations: HashMap<(u64, Sv), f64> =
-            run.sky.iter().map(|row| ((row.sample, row.sv), row.elevation_deg)).collect();
-        let mut common: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
-        for row in errors.signals.values().flatten() {
-            let sum = common.entry(row.sample).or_default();
-            *sum = (sum.0 + row.code_m, sum.1 + 1.0);
-        }
-        let mut points = BTreeMap::new();
-        for (link, rows) in &errors.signals {
-            let multipath = multipath_m(link, rows);
-            let one = |(row, multipath_m): (&SignalError, f64)| {
-                let (sum, count) = common.get(&row.sample)?;
-                Some(Point {
-                    time_s: row.time_s,
-                    elevation_deg: *elevations.get(&(row.sample, link.0))?,
-                    code_m: row.code_m - sum / count,
-                    carrier_cycles: row.carrier_cycles,
-                    doppler_hz: row.doppler_hz,
-                    cn0_db: row.cn0_dbhz - row.cn0_effective_dbhz,
-                    multipath_m,
-                })
-            };
-            points.insert(*link, rows.iter().zip(multipath).filter_map(one).collect());
-        }
-        Self { points }
-    }
-
-    /// Each satellite.
-    pub fn satellites(&self) -> Vec<Satellite> {
-        let one = |(link, points): (&Link, &Vec<Point>)| {
-            let of = |of: fn(&Point) -> f64| points.iter().map(of).collect::<Vec<f64>>();
-            let (code, doppler, cn0) = (of(|p| p.code_m), of(|p| p.doppler_hz), of(|p| p.cn0_db));
-            Satellite {
-                sv: link.0,
-                signal: link.1.name,
-                observations: points.len(),
-                elevation_mean_deg: mean(&of(|p| p.elevation_deg)),
-                code_mean_m: mean(&code),
-                code_sigma_m: std(&code),
-                carrier_sigma_cycles: std(&of(|p| p.carrier_cycles)),
-                doppler_mean_hz: mean(&doppler),
-                doppler_sigma_hz: std(&doppler),
-                cn0_bias_db: mean(&cn0),
-                cn0_sigma_db: std(&cn0),
-                multipath_rms_m: rms(&of(|p| p.multipath_m)),
+    ///
+    /// # Errors
+    /// As [`points`].
+    pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
+        let mut satellites = Vec::new();
+        let mut layers: BTreeMap<i64, Layer> = BTreeMap::new();
+        for link in errors.signals.keys() {
+            let points = points(run, errors, link)?;
+            for point in &points {
+                layers.entry((point.elevation_deg / BAND_DEG).floor() as i64).or_default().add(point);
             }
-        };
-        self.points.iter().map(one).collect()
-    }
-
-    /// Each band that has observations.
-    pub fn bands(&self) -> Vec<Band> {
-        let mut found: BTreeMap<i64, Vec<&Point>> = BTreeMap::new();
-        for point in self.points.values().flatten() {
-            found.entry((point.elevation_deg / BAND_DEG).floor() as i64).or_default().push(point);
+            satellites.push(Satellite::of(link, &points));
         }
-        let one = |(number, points): (i64, Vec<&Point>)| {
-            let of = |of: fn(&Point) -> f64| points.iter().map(|point| of(point)).collect::<Vec<f64>>();
-            Band {
-                from_deg: number as f64 * BAND_DEG,
-                to_deg: (number + 1) as f64 * BAND_DEG,
-                observations: points.len(),
-                code_rms_m: rms(&of(|p| p.code_m)),
-                code_p95_m: percentile(&of(|p| p.code_m.abs()), 0.95),
-                carrier_rms_cycles: rms(&of(|p| p.carrier_cycles)),
-                doppler_rms_hz: rms(&of(|p| p.doppler_hz)),
-                cn0_bias_db: mean(&of(|p| p.cn0_db)),
-                multipath_rms_m: rms(&of(|p| p.multipath_m)),
-            }
-        };
-        found.into_iter().map(one).collect()
+        Ok(Self { satellites, bands: layers.into_iter().map(|(number, layer)| layer.band(number)).collect() })
     }
 
     /// Writes `satellites.csv` and `elevation.csv` into a run's directory.
     pub fn write(&self, directory: &Path) -> Result<(), JudgeError> {
-        write_rows(&directory.join("satellites.csv"), self.satellites().iter())?;
-        write_rows(&directory.join("elevation.csv"), self.bands().iter())
+        write_rows(&directory.join("satellites.csv"), self.satellites.iter())?;
+        write_rows(&directory.join("elevation.csv"), self.bands.iter())
+    }
+}
+
+impl Satellite {
+    fn of((sv, signal): Link, points: &[Point]) -> Self {
+        let of = |of: fn(&Point) -> f64| points.iter().map(of).collect::<Vec<f64>>();
+        let (code, doppler, cn0) = (of(|p| p.code_m), of(|p| p.doppler_hz), of(|p| p.cn0_db));
+        Self {
+            sv,
+            signal: signal.name,
+            observations: points.len(),
+            elevation_mean_deg: mean(&of(|p| p.elevation_deg)),
+            code_mean_m: mean(&code),
+            code_sigma_m: std(&code),
+            carrier_sigma_cycles: std(&of(|p| p.carrier_cycles)),
+            doppler_mean_hz: mean(&doppler),
+            doppler_sigma_hz: std(&doppler),
+            cn0_bias_db: mean(&cn0),
+            cn0_sigma_db: std(&cn0),
+            multipath_rms_m: rms(&of(|p| p.multipath_m)),
+        }
+    }
+}
+
+/// A band in the making.
+#[derive(Default)]
+struct Layer {
+    /// For the one figure that needs all values.
+    code_m: Vec<f64>,
+    carrier_cycles: Sum,
+    doppler_hz: Sum,
+    cn0_db: Sum,
+    multipath_m: Sum,
+}
+
+impl Layer {
+    fn add(&mut self, point: &Point) {
+        self.code_m.push(point.code_m);
+        self.carrier_cycles.add(point.carrier_cycles);
+        self.doppler_hz.add(point.doppler_hz);
+        self.cn0_db.add(point.cn0_db);
+        self.multipath_m.add(point.multipath_m);
+    }
+
+    fn band(self, number: i64) -> Band {
+        let magnitudes: Vec<f64> = self.code_m.iter().map(|code_m| code_m.abs()).collect();
+        Band {
+            from_deg: number as f64 * BAND_DEG,
+            // A table may hold any elevation.
+            to_deg: (number as f64 + 1.0) * BAND_DEG,
+            observations: self.code_m.len(),
+            code_rms_m: rms(&self.code_m),
+            code_p95_m: percentile(&magnitudes, 0.95),
+            carrier_rms_cycles: self.carrier_cycles.rms(),
+            doppler_rms_hz: self.doppler_hz.rms(),
+            cn0_bias_db: self.cn0_db.mean(),
+            multipath_rms_m: self.multipath_m.rms(),
+        }
     }
 }
 
@@ -179,6 +203,7 @@ mod tests {
             time_s: sample as f64,
             code_m,
             carrier_cycles,
+            raw_cycles: carrier_cycles,
             doppler_hz: 0.5,
             cn0_dbhz: 44.0,
             cn0_true_dbhz: 45.0,
@@ -197,10 +222,13 @@ mod tests {
             cn0_db: -0.5,
             multipath_m: code_m,
         };
-        let found = Elevations { points: [(link, vec![point(5.0, 3.0), point(8.0, -3.0), point(42.0, 1.0)])].into() };
-        let bands = found.bands();
-        assert_eq!(bands.iter().map(|b| (b.from_deg, b.observations)).collect::<Vec<_>>(), vec![(0.0, 2), (40.0, 1)]);
+        let points = [point(5.0, 3.0), point(8.0, -3.0), point(42.0, 1.0)];
+        let (mut low, mut high) = (Layer::default(), Layer::default());
+        points[..2].iter().for_each(|point| low.add(point));
+        high.add(&points[2]);
+        let bands = [low.band(0), high.band(4)];
+        assert_eq!((bands[0].from_deg, bands[0].observations, bands[1].to_deg), (0.0, 2, 50.0));
         assert_eq!((bands[0].code_rms_m, bands[1].cn0_bias_db), (Some(3.0), Some(-0.5)));
-        assert!((found.satellites()[0].code_mean_m.unwrap() - 1.0 / 3.0).abs() < 1e-12);
+        assert!((Satellite::of(link, &points).code_mean_m.unwrap() - 1.0 / 3.0).abs() < 1e-12);
     }
 }

@@ -12,9 +12,10 @@ use nalgebra::Vector3;
 use crate::analysis::JudgeError;
 use crate::analysis::access::Access;
 use crate::analysis::load::Run;
+use crate::analysis::shelf::{Row, Shelf, Words};
 use crate::analysis::statistics::median;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use crate::gnss::record::{Event, Observation};
+use crate::gnss::record::{Event, EventRow, Observation};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 
@@ -28,8 +29,9 @@ pub struct SignalError {
     pub time_s: f64,
     /// Positive when the code is measured late: −c × (time sent as measured − as it was).
     pub code_m: f64,
-    /// After the arc's constant is removed.
+    /// After the arc's constant is removed, and with it.
     pub carrier_cycles: f64,
+    pub raw_cycles: f64,
     pub doppler_hz: f64,
     pub cn0_dbhz: f64,
     pub cn0_true_dbhz: f64,
@@ -53,12 +55,39 @@ pub struct PositionError {
     pub velocity_enu_mps: Vector3<f64>,
 }
 
+impl Row<Link> for SignalError {
+    const WORDS: usize = 10;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.push(self.sample);
+        let errors = [self.time_s, self.code_m, self.carrier_cycles, self.raw_cycles, self.doppler_hz];
+        words.extend(errors.map(f64::to_bits));
+        words.extend([self.cn0_dbhz, self.cn0_true_dbhz, self.cn0_effective_dbhz, self.locked_s].map(f64::to_bits));
+    }
+
+    fn take(_: Link, words: &mut Words<'_>) -> Self {
+        Self {
+            sample: words.word(),
+            time_s: words.number(),
+            code_m: words.number(),
+            carrier_cycles: words.number(),
+            raw_cycles: words.number(),
+            doppler_hz: words.number(),
+            cn0_dbhz: words.number(),
+            cn0_true_dbhz: words.number(),
+            cn0_effective_dbhz: words.number(),
+            locked_s: words.number(),
+        }
+    }
+}
+
 /// Every error of a run.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug)]
 pub struct Errors {
-    pub signals: BTreeMap<Link, Vec<SignalError>>,
-    /// The same with the carriers' constants still in.
-    pub raw: BTreeMap<Link, Vec<SignalError>>,
+    /// In the order of their samples.
+    pub signals: Shelf<Link, SignalError>,
+    /// Sum and number of the code errors of each epoch.
+    pub epochs: BTreeMap<u64, (f64, usize)>,
     pub positions: Vec<PositionError>,
     /// Changes of the carrier's constant: those declared by the receiver's events after a satellite's first observation, and jumps of at
     /// least [`SLIP_CYCLES`] that stay and that it did not declare.
@@ -75,28 +104,41 @@ pub const SLIP_CYCLES: f64 = 0.4;
 const SIDE: usize = 5;
 
 impl Errors {
-    /// Joins and measures.
+    /// Joins and measures; what is too long for memory is put by beside what the run put by.
     pub fn measure(run: &Run) -> Result<Self, JudgeError> {
-        let mut errors = Self::default();
-        errors.measure_signals(run)?;
+        let mut errors = Self {
+            signals: Shelf::new(run.observations.directory()),
+            epochs: BTreeMap::new(),
+            positions: Vec::new(),
+            cycle_slips: 0,
+            unmatched: 0,
+        };
+        let access = Access::new(run);
+        for link in run.observations.keys() {
+            errors.measure_signal(run, &access, link)?;
+        }
+        if errors.signals.is_empty() && !run.observations.is_empty() {
+            return Err(JudgeError::NothingJoins { what: "observations", count: run.observations.len() });
+        }
         errors.measure_positions(run)?;
         Ok(errors)
     }
 
-    fn measure_signals(&mut self, run: &Run) -> Result<(), JudgeError> {
-        let truth: HashMap<(u64, Sv, &str), &Observation> =
-            run.truth.iter().map(|row| ((row.sample, row.sv, row.signal.name), row)).collect();
-        let access = Access::new(run);
-        for estimate in &run.observations {
-            let Some(true_row) = truth.get(&(estimate.sample, estimate.sv, estimate.signal.name)) else {
+    fn measure_signal(&mut self, run: &Run, access: &Access<'_>, link: Link) -> Result<(), JudgeError> {
+        let truth: HashMap<u64, Observation> = run.truth.map(link, |row| (row.sample, row))?.into_iter().collect();
+        let mut rows = Vec::new();
+        for estimate in run.observations.rows(link)? {
+            let Some(true_row) = truth.get(&estimate.sample) else {
                 self.unmatched += 1;
                 continue;
             };
-            self.signals.entry((estimate.sv, estimate.signal)).or_default().push(SignalError {
+            let raw_cycles = estimate.carrier_cycles - true_row.carrier_cycles;
+            rows.push(SignalError {
                 sample: estimate.sample,
                 time_s: run.time_s(estimate.sample),
                 code_m: -SPEED_OF_LIGHT_MPS * estimate.sent().since(true_row.sent()),
-                carrier_cycles: estimate.carrier_cycles - true_row.carrier_cycles,
+                carrier_cycles: raw_cycles,
+                raw_cycles,
                 doppler_hz: estimate.doppler_hz - true_row.doppler_hz,
                 cn0_dbhz: estimate.cn0_dbhz,
                 cn0_true_dbhz: true_row.cn0_dbhz,
@@ -104,21 +146,17 @@ impl Errors {
                 locked_s: estimate.locked_s,
             });
         }
-        if self.signals.is_empty() && !run.observations.is_empty() {
-            return Err(JudgeError::NothingJoins { what: "observations", count: run.observations.len() });
+        rows.sort_by_key(|row| row.sample);
+        let first = rows.first().map_or(0, |row| row.sample);
+        let of = |row: &&EventRow| (row.sv, row.signal) == link && row.event == Event::CycleSlip && row.sample > first;
+        let declared: Vec<u64> = run.events.iter().filter(of).map(|row| row.sample).collect();
+        if !rows.is_empty() {
+            self.cycle_slips += declared.len() + level_carrier(&mut rows, &declared);
         }
-        self.signals.values_mut().for_each(|rows| rows.sort_by_key(|row| row.sample));
-        self.raw = self.signals.clone();
-        for (&(sv, signal), rows) in &mut self.signals {
-            let first = rows.first().map_or(0, |row| row.sample);
-            let declared: Vec<u64> = run
-                .events
-                .iter()
-                .filter(|row| row.sv == sv && row.signal == signal && row.event == Event::CycleSlip)
-                .filter(|row| row.sample > first)
-                .map(|row| row.sample)
-                .collect();
-            self.cycle_slips += declared.len() + level_carrier(rows, &declared);
+        for row in &rows {
+            let (sum_m, count) = self.epochs.entry(row.sample).or_default();
+            (*sum_m, *count) = (*sum_m + row.code_m, *count + 1);
+            self.signals.push(link, row)?;
         }
         Ok(())
     }
@@ -144,32 +182,38 @@ impl Errors {
     }
 
     /// One number of every observation.
-    pub fn pooled(&self, of: impl Fn(&SignalError) -> f64) -> Vec<f64> {
-        self.signals.values().flatten().map(of).collect()
+    pub fn pooled(&self, of: impl Fn(&SignalError) -> f64) -> Result<Vec<f64>, JudgeError> {
+        let mut all = Vec::with_capacity(self.signals.len());
+        for link in self.signals.keys() {
+            self.signals.each(link, |row| all.push(of(&row)))?;
+        }
+        Ok(all)
     }
 
     /// One number of every observation that is past its pull-in, a list a satellite.
-    pub fn settled(&self, of: impl Fn(&Link, &SignalError) -> f64) -> Vec<Vec<f64>> {
-        let one = |(link, rows): (&Link, &Vec<SignalError>)| {
-            rows.iter().filter(|row| row.locked_s >= PULL_IN_S).map(|row| of(link, row)).collect()
+    pub fn settled(&self, of: impl Fn(&Link, &SignalError) -> f64) -> Result<Vec<Vec<f64>>, JudgeError> {
+        let one = |link: Link| {
+            let mut found = Vec::with_capacity(self.signals.count(&link));
+            self.signals.each(link, |row| found.extend((row.locked_s >= PULL_IN_S).then(|| of(&link, &row))))?;
+            Ok(found)
         };
-        self.signals.iter().map(one).collect()
+        self.signals.keys().map(one).collect()
     }
 
     /// Code errors after the mean over the satellites of each epoch is removed; epochs of one satellite are
     /// left out. With n satellites the mean takes 1/n of the variance with it.
-    pub fn code_without_clock_m(&self) -> Vec<f64> {
-        let mut epochs: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
-        for row in self.signals.values().flatten() {
-            epochs.entry(row.sample).or_default().push(row.code_m);
+    pub fn code_without_clock_m(&self) -> Result<Vec<f64>, JudgeError> {
+        let mut all = Vec::with_capacity(self.signals.len());
+        for link in self.signals.keys() {
+            let several = |row: &SignalError| self.common_m(row.sample).filter(|(_, count)| *count > 1);
+            self.signals.each(link, |row| all.extend(several(&row).map(|(common_m, _)| row.code_m - common_m)))?;
         }
-        let several = epochs.into_values().filter(|epoch| epoch.len() > 1);
-        several
-            .flat_map(|epoch| {
-                let clock = epoch.iter().sum::<f64>() / epoch.len() as f64;
-                epoch.into_iter().map(move |code| code - clock)
-            })
-            .collect()
+        Ok(all)
+    }
+
+    /// Mean of the code errors of an epoch, and how many they are.
+    pub fn common_m(&self, sample: u64) -> Option<(f64, usize)> {
+        self.epochs.get(&sample).map(|(sum_m, count)| (sum_m / *count as f64, *count))
     }
 }
 
@@ -232,6 +276,7 @@ pub(super) mod tests {
             time_s: index as f64 * 0.1,
             code_m: 0.0,
             carrier_cycles,
+            raw_cycles: carrier_cycles,
             doppler_hz: 0.0,
             cn0_dbhz: 45.0,
             cn0_true_dbhz: 45.0,

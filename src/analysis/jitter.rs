@@ -19,7 +19,6 @@ use crate::analysis::independent::Correlated;
 use crate::analysis::load::Run;
 use crate::analysis::statistics::{mean, median};
 use crate::analysis::{JudgeError, write_rows};
-use crate::gnss::record::TrackingRow;
 pub use theory::{Settings, motion_error_deg};
 use theory::{Stresses, Theory};
 
@@ -96,27 +95,32 @@ pub struct Pooled {
 
 impl Jitter {
     /// Measures every satellite that was past its pull-in for ten observations.
-    pub fn measure(run: &Run, errors: &Errors) -> Self {
-        let (Some(settings), Some(timeline)) = (Settings::of(run), Timeline::new(run)) else { return Self::default() };
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
+        let Some(settings) = Settings::of(run) else { return Ok(Self::default()) };
         let mut rows = Vec::new();
-        for (link, all) in &errors.signals {
-            let stretches = settled(all);
+        for link in &errors.signals.keys().collect::<Vec<_>>() {
+            let all = errors.signals.rows(*link)?;
+            let stretches = settled(&all);
             if stretches.iter().map(Vec::len).sum::<usize>() < 10 {
                 continue;
             }
-            let tracked = tracked(run, link, &stretches);
-            let times: Vec<f64> = tracked.iter().map(|row| row.integration_s).collect();
+            let updates = updates(run, *link, &stretches)?;
+            let times: Vec<f64> = updates.iter().map(|row| row.integration_s).collect();
             let Some(update_s) = median(&times) else { continue };
             let Some(theory) = Theory::new(run, settings, link, update_s) else { continue };
             // Times of samples by the sampler's clock are near enough to GPS time here.
             let span = (all.first(), all.last());
             let (Some(first), Some(last)) = span else { continue };
+            let Some(timeline) = Timeline::of(run, *link)? else { continue };
             let stresses = Stresses::new(&theory, &timeline, link, (first.time_s, last.time_s));
             for which in [Loop::Dll, Loop::Pll, Loop::Fll] {
-                rows.extend(row(link, which, &stretches, &tracked, &theory, &stresses));
+                rows.extend(row(link, which, &stretches, &updates, &theory, &stresses));
             }
         }
-        Self { rows }
+        Ok(Self { rows })
     }
 
     /// Writes `jitter.csv` into a run's directory.
@@ -150,22 +154,36 @@ fn settled(all: &[SignalError]) -> Vec<Vec<SignalError>> {
     past.chunk_by(|a, b| b.locked_s > a.locked_s && b.time_s - a.time_s < 1.5 * usual_s).map(<[_]>::to_vec).collect()
 }
 
+/// What a loop update put out.
+struct Update {
+    integration_s: f64,
+    dll_chips: f64,
+    pll_cycles: f64,
+    fll_hz: f64,
+}
+
 /// Loop updates within those stretches, pull-in left out.
-fn tracked<'r>(run: &'r Run, link: &Link, stretches: &[Vec<SignalError>]) -> Vec<&'r TrackingRow> {
+fn updates(run: &Run, link: Link, stretches: &[Vec<SignalError>]) -> Result<Vec<Update>, JudgeError> {
     let spans: Vec<(u64, u64)> =
         stretches.iter().filter_map(|rows| Some((rows.first()?.sample, rows.last()?.sample))).collect();
-    run.tracking
-        .iter()
-        .filter(|row| (row.sv, row.signal) == *link)
-        .filter(|row| spans.iter().any(|(from, to)| (*from..=*to).contains(&row.sample)))
-        .collect()
+    let mut found = Vec::new();
+    run.tracking.each(link, |row| {
+        let update = Update {
+            integration_s: row.integration_s,
+            dll_chips: row.dll_discriminator_chips,
+            pll_cycles: row.pll_discriminator_cycles,
+            fll_hz: row.fll_discriminator_hz,
+        };
+        found.extend(spans.iter().any(|(from, to)| (*from..=*to).contains(&row.sample)).then_some(update));
+    })?;
+    Ok(found)
 }
 
 fn row(
     link: &Link,
     which: Loop,
     stretches: &[Vec<SignalError>],
-    tracked: &[&TrackingRow],
+    updates: &[Update],
     theory: &Theory,
     stresses: &Stresses,
 ) -> Option<Row> {
@@ -181,21 +199,19 @@ fn row(
         groups.iter().map(|group| group.iter().map(|value| value - middle).collect()).collect();
     let found = Correlated::about_zero(&centred)?;
     let sigma = found.variance().sqrt();
-    let put_out: Vec<f64> = tracked
+    let put_out: Vec<f64> = updates
         .iter()
         .filter(|row| (row.integration_s - theory.update_s).abs() < 1e-9)
         .map(|row| match which {
-            Loop::Dll => row.dll_discriminator_chips,
-            Loop::Pll => 360.0 * row.pll_discriminator_cycles,
-            Loop::Fll => row.fll_discriminator_hz,
+            Loop::Dll => row.dll_chips,
+            Loop::Pll => 360.0 * row.pll_cycles,
+            Loop::Fll => row.fll_hz,
         })
         .collect();
     let cn0_dbhz = mean(&stretches.iter().flatten().map(|row| row.cn0_dbhz).collect::<Vec<_>>())?;
     let (raw_theory, thermal) = theory.noise(which, libm::pow(10.0, cn0_dbhz / 10.0));
     let oscillator_theory = theory.oscillator(which);
-    let stressed = stresses.of.get(&which).map_or(&[][..], Vec::as_slice);
-    let stress_rms = mean(&stressed.iter().map(|e| e * e).collect::<Vec<_>>()).unwrap_or(0.0).sqrt();
-    let stress_max = stressed.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
+    let (stress_rms, stress_max) = (stresses.of(which).rms(), stresses.of(which).max);
     let theory_sigma = (thermal * thermal + oscillator_theory * oscillator_theory + stress_rms * stress_rms).sqrt();
     let (threshold, rule_limit) = theory.limits(which);
     let rule = 3.0 * sigma + stress_max;

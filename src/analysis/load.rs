@@ -1,24 +1,31 @@
-//! Everything that a run wrote, read into memory.
+//! Everything that a run wrote, read once.
 //!
 //! Truth and estimate are CSV files of the rows in [`crate::gnss::record`]; the scene and the
-//! receiver's settings are JSON. A file that is missing is named together with what would write it.
+//! receiver's settings are JSON. Tables with a row for every satellite of every epoch lie on shelves, satellite by satellite;
+//! those with a row an epoch, and shorter ones, are held.
 
-use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+mod files;
+mod rows;
 
-use serde::de::DeserializeOwned;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::analysis::JudgeError;
+use crate::analysis::errors::Link;
 use crate::analysis::jamming::Shape;
+use crate::analysis::psd::{Expected, expected};
+use crate::analysis::shelf::Shelf;
 use crate::analysis::spectrum::Stage;
 use crate::gnss::record::{
     AcquisitionRow, EventRow, Fix, InterferenceRow, LineRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
     TrajectoryRow,
 };
+use crate::gnss::satellite::Sv;
 use crate::gnss::signal::SIGNALS;
+use files::{believable, dated, each, json, missing, optional, rows, text};
 
 /// What `truth/scene.json` says of the scene; other keys are left alone.
 #[derive(Clone, Debug, Deserialize)]
@@ -99,20 +106,28 @@ pub struct Run {
     pub scene_json: Value,
     /// The scene as it was written, where the run kept it.
     pub scenario: Option<String>,
-    pub truth: Vec<Observation>,
-    pub sky: Vec<SkyRow>,
+    pub truth: Shelf<Link, Observation>,
+    pub sky: Shelf<Sv, SkyRow>,
+    /// Satellites in the truth's first epoch.
+    pub in_view_at_start: BTreeSet<Sv>,
+    /// Sum of C/N0 of a signal's satellites at a sample.
+    pub cn0_sums_hz: HashMap<(u64, &'static str), f64>,
+    /// The mean of each satellite's true signal.
+    pub expected: Vec<Expected>,
     /// Reflected rays; none in a scene without multipath.
-    pub rays: Vec<RayRow>,
+    pub rays: Shelf<Link, RayRow>,
     pub trajectory: Vec<TrajectoryRow>,
     pub truth_navigation: Vec<NavigationRow>,
     /// Empty without interference.
     pub interference: Vec<InterferenceRow>,
     /// What the first spoofer claims; empty without one.
     pub claimed: Vec<TrajectoryRow>,
-    pub observations: Vec<Observation>,
+    pub observations: Shelf<Link, Observation>,
     pub fixes: Vec<Fix>,
     pub acquisition: Vec<AcquisitionRow>,
-    pub tracking: Vec<TrackingRow>,
+    pub tracking: Shelf<Link, TrackingRow>,
+    /// Median time of the loops' updates.
+    pub update_s: Option<f64>,
     pub navigation: Vec<NavigationRow>,
     pub events: Vec<EventRow>,
     /// What the receiver told of lines in the spectrum; `None` of one that does not look.
@@ -127,63 +142,87 @@ const TRUTH: &str = "the generator writes it: make the run again with `gnss-twin
 const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
 
 impl Run {
-    /// Reads a run's directory. `psd.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json` may be missing.
+    /// Reads a run's directory. `psd.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json` may be missing. What is too
+    /// long for memory is put by in a file without a name there.
     pub fn read(run: &Path) -> Result<Self, JudgeError> {
         Self::read_parts(run, &run.join("truth"), &run.join("rx"))
     }
 
     /// [`Self::read`] where truth and receiver wrote into directories of their own, so that several receivers share a truth.
     pub fn read_parts(run: &Path, truth: &Path, rx: &Path) -> Result<Self, JudgeError> {
-        let psd = run.join("psd.csv");
-        let rays = truth.join("rays.csv");
-        let lines = rx.join("interference.csv");
-        Ok(Self {
-            scene: json(&truth.join("scene.json"))?
-                .map(Self::folded)
-                .ok_or_else(|| missing(&truth.join("scene.json"), TRUTH))?,
-            scene_json: json(&truth.join("scene.json"))?.unwrap_or(Value::Null),
-            scenario: text(&run.join("scenario.toml"))?,
-            truth: dated(&truth.join("observations.csv"), TRUTH, |row: &Observation| row.sent_s)?,
-            sky: rows(&truth.join("sky.csv"), TRUTH)?,
-            rays: optional(&rays)?,
-            trajectory: dated(&truth.join("trajectory.csv"), TRUTH, |row: &TrajectoryRow| row.gps_s)?,
-            truth_navigation: rows(&truth.join("navigation.csv"), TRUTH)?,
-            interference: optional(&truth.join("interference.csv"))?,
-            claimed: optional(&truth.join("claimed.csv"))?,
-            observations: dated(&rx.join("observations.csv"), RECEIVER, |row: &Observation| row.sent_s)?,
-            fixes: dated(&rx.join("fixes.csv"), RECEIVER, |row: &Fix| row.gps_s)?,
-            acquisition: rows(&rx.join("acquisition.csv"), RECEIVER)?,
-            tracking: rows(&rx.join("tracking.csv"), RECEIVER)?,
-            navigation: rows(&rx.join("navigation.csv"), RECEIVER)?,
-            events: rows(&rx.join("events.csv"), RECEIVER)?,
-            lines: match rows(&lines, RECEIVER) {
-                Err(JudgeError::Missing { .. }) => None,
-                other => Some(other?),
-            },
-            receiver: json(&rx.join("receiver.json"))?.unwrap_or(Value::Null),
-            psd: optional(&psd)?,
-            speed: json(&run.join("speed.json"))?.unwrap_or_default(),
-        })
+        let mut read = Self::read_truth_by(truth, run)?;
+        read.scene_json = json(&truth.join("scene.json"))?.unwrap_or(Value::Null);
+        read.scenario = text(&run.join("scenario.toml"))?;
+        match each(&truth.join("rays.csv"), "", |_, row: RayRow| read.rays.push((row.sv, row.signal), &row)) {
+            Ok(()) | Err(JudgeError::Missing { .. }) => {}
+            Err(error) => return Err(error),
+        }
+        read.truth_navigation = rows(&truth.join("navigation.csv"), TRUTH)?;
+        read.claimed = optional(&truth.join("claimed.csv"))?;
+        read.observations = observations(&rx.join("observations.csv"), RECEIVER, run, |_| ())?;
+        read.fixes = dated(&rx.join("fixes.csv"), RECEIVER, |row: &Fix| row.gps_s)?;
+        read.acquisition = rows(&rx.join("acquisition.csv"), RECEIVER)?;
+        let mut updates = Counts::default();
+        each(&rx.join("tracking.csv"), RECEIVER, |_, row: TrackingRow| {
+            updates.add(row.integration_s);
+            read.tracking.push((row.sv, row.signal), &row)
+        })?;
+        read.update_s = updates.median();
+        read.navigation = rows(&rx.join("navigation.csv"), RECEIVER)?;
+        read.events = rows(&rx.join("events.csv"), RECEIVER)?;
+        read.lines = match rows(&rx.join("interference.csv"), RECEIVER) {
+            Err(JudgeError::Missing { .. }) => None,
+            other => Some(other?),
+        };
+        read.receiver = json(&rx.join("receiver.json"))?.unwrap_or(Value::Null);
+        read.psd = optional(&run.join("psd.csv"))?;
+        read.speed = json(&run.join("speed.json"))?.unwrap_or_default();
+        Ok(read)
     }
 
     /// Reads a truth alone, for a receiver that writes files of its own.
     pub fn read_truth(truth: &Path) -> Result<Self, JudgeError> {
+        // A truth may lie where nothing can be written.
+        Self::read_truth_by(truth, &std::env::temp_dir())
+    }
+
+    fn read_truth_by(truth: &Path, shelves: &Path) -> Result<Self, JudgeError> {
         let scene = truth.join("scene.json");
+        let scene = json(&scene)?.map(Self::folded).ok_or_else(|| missing(&scene, TRUTH))?;
+        let mut cn0_sums_hz = HashMap::new();
+        let observed = observations(&truth.join("observations.csv"), TRUTH, shelves, |row| {
+            *cn0_sums_hz.entry((row.sample, row.signal.name)).or_insert(0.0) += libm::pow(10.0, row.cn0_dbhz / 10.0);
+        })?;
+        let (mut first, mut in_view_at_start) = (u64::MAX, BTreeSet::new());
+        let mut sky = Shelf::new(shelves);
+        each(&truth.join("sky.csv"), TRUTH, |_, row: SkyRow| {
+            if row.sample < first {
+                (first, in_view_at_start) = (row.sample, BTreeSet::new());
+            }
+            if row.sample == first {
+                in_view_at_start.insert(row.sv);
+            }
+            sky.push(row.sv, &row)
+        })?;
         Ok(Self {
-            scene: json(&scene)?.map(Self::folded).ok_or_else(|| missing(&scene, TRUTH))?,
+            scene,
             scene_json: Value::Null,
             scenario: None,
-            truth: dated(&truth.join("observations.csv"), TRUTH, |row: &Observation| row.sent_s)?,
-            sky: rows(&truth.join("sky.csv"), TRUTH)?,
-            rays: Vec::new(),
+            expected: expected(&observed)?,
+            truth: observed,
+            sky,
+            in_view_at_start,
+            cn0_sums_hz,
+            rays: Shelf::new(shelves),
             trajectory: dated(&truth.join("trajectory.csv"), TRUTH, |row: &TrajectoryRow| row.gps_s)?,
             truth_navigation: Vec::new(),
             interference: optional(&truth.join("interference.csv"))?,
             claimed: Vec::new(),
-            observations: Vec::new(),
+            observations: Shelf::new(shelves),
             fixes: Vec::new(),
             acquisition: Vec::new(),
-            tracking: Vec::new(),
+            tracking: Shelf::new(shelves),
+            update_s: None,
             navigation: Vec::new(),
             events: Vec::new(),
             lines: None,
@@ -218,78 +257,63 @@ impl Run {
     }
 }
 
-fn missing(path: &Path, remedy: &'static str) -> JudgeError {
-    JudgeError::Missing { path: path.to_owned(), remedy }
-}
-
-/// All rows of a CSV file; a file without even a header has none.
-fn rows<T: DeserializeOwned>(path: &Path, remedy: &'static str) -> Result<Vec<T>, JudgeError> {
-    let file = fs::File::open(path).map_err(|source| open_error(path, remedy, source))?;
-    csv::Reader::from_reader(io::BufReader::new(file)).deserialize().collect::<Result<_, _>>().map_err(
-        |error: csv::Error| {
-            let path = path.to_owned();
-            if !error.is_io_error() {
-                return JudgeError::Row { path, source: error };
-            }
-            match error.into_kind() {
-                csv::ErrorKind::Io(source) => JudgeError::Read { path, source },
-                other => JudgeError::Read { path, source: io::Error::other(format!("{other:?}")) },
-            }
-        },
-    )
-}
-
-/// Whole GPS seconds that a row may bear: 1980 to 2296, far from where arithmetic on them ends.
-const SECONDS: std::ops::RangeInclusive<i64> = 0..=10_000_000_000;
-
-/// All rows of a CSV file whose times are believable.
-fn dated<T: DeserializeOwned>(
+/// Observations on a shelf, each shown to `see`.
+fn observations(
     path: &Path,
     remedy: &'static str,
-    seconds: impl Fn(&T) -> i64,
-) -> Result<Vec<T>, JudgeError> {
-    let rows: Vec<T> = rows(path, remedy)?;
-    match rows.iter().map(seconds).position(|s| !SECONDS.contains(&s)) {
-        None => Ok(rows),
-        Some(at) => {
-            let what = format!("its GPS time is not within {} to {} s", SECONDS.start(), SECONDS.end());
-            // The header is line 1.
-            Err(JudgeError::Line { path: path.to_owned(), line: at as u64 + 2, what })
+    shelves: &Path,
+    mut see: impl FnMut(&Observation),
+) -> Result<Shelf<Link, Observation>, JudgeError> {
+    let mut shelf = Shelf::new(shelves);
+    each(path, remedy, |line, row: Observation| {
+        believable(path, line, row.sent_s)?;
+        see(&row);
+        shelf.push((row.sv, row.signal), &row)
+    })?;
+    Ok(shelf)
+}
+
+/// How often each of a few different numbers came.
+#[derive(Default)]
+struct Counts(BTreeMap<u64, usize>);
+
+impl Counts {
+    fn add(&mut self, value: f64) {
+        if value.is_finite() {
+            // The order of bits is that of numbers that are not negative; others are turned about.
+            let bits = value.to_bits();
+            let turned = if value.is_sign_negative() { !bits } else { bits | 1 << 63 };
+            *self.0.entry(turned).or_default() += 1;
         }
     }
-}
 
-/// All rows of a CSV file that a run may lack.
-fn optional<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, JudgeError> {
-    match rows(path, "") {
-        Err(JudgeError::Missing { .. }) => Ok(Vec::new()),
-        other => other,
+    /// As [`crate::analysis::statistics::median`] has it.
+    fn median(&self) -> Option<f64> {
+        let last = self.0.values().sum::<usize>().checked_sub(1)?;
+        let at = |rank: usize| {
+            let mut below = 0;
+            let found = self.0.iter().find(|(_, count)| {
+                below += **count;
+                below > rank
+            });
+            found.map(|(turned, _)| f64::from_bits(if turned >> 63 == 0 { !turned } else { turned & !(1 << 63) }))
+        };
+        let (low, high) = (at(last / 2)?, at(last.div_ceil(2))?);
+        Some(low + (high - low) * 0.5)
     }
 }
 
-fn open_error(path: &Path, remedy: &'static str, source: io::Error) -> JudgeError {
-    match source.kind() {
-        io::ErrorKind::NotFound => missing(path, remedy),
-        _ => JudgeError::Read { path: path.to_owned(), source },
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::statistics::median;
 
-/// A JSON file, or `None` if there is none.
-fn json<T: DeserializeOwned>(path: &PathBuf) -> Result<Option<T>, JudgeError> {
-    match fs::read(path) {
-        Ok(bytes) => {
-            serde_json::from_slice(&bytes).map(Some).map_err(|source| JudgeError::Json { path: path.clone(), source })
+    #[test]
+    fn counts_have_the_median_of_the_list() {
+        for list in [&[][..], &[4e-3], &[1.0, -2.0, 3.0, -2.0], &[0.0, -0.5, 1e-3, 4e-3, 4e-3], &[1.0, 2.0]] {
+            let mut counts = Counts::default();
+            list.iter().for_each(|value| counts.add(*value));
+            assert_eq!(counts.median(), median(list), "{list:?}");
         }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(JudgeError::Read { path: path.clone(), source }),
-    }
-}
-
-/// A text file, or `None` if there is none.
-fn text(path: &Path) -> Result<Option<String>, JudgeError> {
-    match fs::read(path) {
-        Ok(bytes) => Ok(Some(String::from_utf8_lossy(&bytes).into_owned())),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        Err(source) => Err(JudgeError::Read { path: path.to_owned(), source }),
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! It reads only what generator and receiver wrote into a run's directory, joins the rows on
 //! (sample number, satellite, signal) and writes `summary.json` and pictures beside them.
-//! [`errors`] measures, [`slips`] finds breaks and their causes, [`elevation`] sorts errors by satellite and elevation, [`jitter`] holds each loop against theory, [`honesty`] the fixes against
+//! [`load`] reads it once and puts what is long on a [`shelf`], satellite by satellite, so that a long run takes little more memory than a short one; [`errors`] measures, [`slips`] finds breaks and their causes, [`elevation`] sorts errors by satellite and elevation, [`jitter`] holds each loop against theory, [`honesty`] the fixes against
 //! their own covariance, [`clock`] does so for the receiver's clock with the deviations of [`allan`], [`statistics`]
 //! condenses, [`access`] and [`jamming`] expect C/N0 under other codes and interference, [`lines`] holds the receiver's word of
 //! continuous waves against them, [`spoofing`] tells what a
@@ -33,6 +33,7 @@ pub mod report;
 #[cfg(feature = "pdf")]
 mod run_report;
 pub mod schema;
+pub mod shelf;
 pub mod slips;
 pub mod spectrum;
 pub mod spoofing;
@@ -42,16 +43,15 @@ mod tables;
 pub mod theory;
 pub mod trade;
 pub mod verdict;
+mod write;
 
-use std::ffi::OsString;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
 use thiserror::Error;
 
-use making::Making;
 pub use summary::Summary;
+pub(crate) use write::{Table, write_rows, write_whole};
 
 /// Why a run cannot be judged.
 #[derive(Debug, Error)]
@@ -98,69 +98,66 @@ pub fn judge(run: &Path) -> Result<Summary, JudgeError> {
 /// # Errors
 /// As [`judge`].
 pub fn judge_against(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
+    // On one of the threads that draw: what it needed before serves again.
+    rayon::scope(|_| judged(run, limits))
+}
+
+fn judged(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
+    let Found { summary, sketches, report } = find(run, limits)?;
+    // What was read is gone by now: drawing takes memory of its own.
+    let pictures = plot::draw(run, &sketches)?;
+    drop(sketches);
+    #[cfg(feature = "pdf")]
+    report.write(run, pictures)?;
+    #[cfg(not(feature = "pdf"))]
+    drop((pictures, report));
+    let path = run.join("summary.json");
+    let mut json =
+        serde_json::to_vec_pretty(&summary).map_err(|source| JudgeError::Json { path: path.clone(), source })?;
+    json.push(b'\n');
+    write_whole(&path, &json)?;
+    Ok(summary)
+}
+
+/// What came of a run, its tables written and its pictures not drawn yet.
+struct Found {
+    summary: Summary,
+    sketches: Vec<(&'static plot::Picture, plot::Sketch)>,
+    #[cfg(feature = "pdf")]
+    report: run_report::RunReport,
+    #[cfg(not(feature = "pdf"))]
+    report: (),
+}
+
+fn find(run: &Path, limits: Option<&limits::Limits>) -> Result<Found, JudgeError> {
     let read = load::Run::read(run)?;
     let errors = errors::Errors::measure(&read)?;
-    let clock = clock::Clock::measure(&read, &errors);
+    let clock = clock::Clock::measure(&read, &errors)?;
     let honesty = honesty::Honesty::measure(&read, &errors);
-    let slips = slips::Slips::find(&read, &errors.raw);
-    let jitter = jitter::Jitter::measure(&read, &errors);
-    let elevations = elevation::Elevations::measure(&read, &errors);
-    let mut summary = Summary::new(&read, &errors, &clock);
+    let slips = slips::Slips::find(&read, &errors)?;
+    let jitter = jitter::Jitter::measure(&read, &errors)?;
+    let elevations = elevation::Elevations::measure(&read, &errors)?;
+    let mut summary = Summary::new(&read, &errors, &clock)?;
     summary.add(&honesty, &slips, &jitter);
-    let path = run.join("summary.json");
-    let not_json = |source| JudgeError::Json { path: path.clone(), source };
-    let verdict = verdict::Verdict::of(&read, &errors, &summary);
+    let not_json = |source| JudgeError::Json { path: run.join("summary.json"), source };
+    let verdict = verdict::Verdict::of(&read, &errors, &summary)?;
     summary.details.verdict = match limits {
         Some(limits) => verdict.with_user(limits.judge(&serde_json::to_value(&summary).map_err(not_json)?)),
         None => verdict,
     };
-    let judged = plot::Judged {
-        run: &read,
-        errors: &errors,
-        clock: &clock,
-        honesty: &honesty,
-        elevations: &elevations,
-        summary: &summary,
-    };
-    let pictures = plot::all(run, &judged)?;
+    let judged = plot::Judged { run: &read, errors: &errors, clock: &clock, honesty: &honesty, summary: &summary };
     clock.write(run)?;
     honesty.write(run)?;
     elevations.write(run)?;
     slips.write(run)?;
     jitter.write(run)?;
     tables::write(run, &judged)?;
+    let sketches = plot::sketches(&judged)?;
     #[cfg(feature = "pdf")]
-    run_report::write(run, &judged, pictures)?;
+    let report = run_report::RunReport::new(&judged)?;
     #[cfg(not(feature = "pdf"))]
-    drop(pictures);
-    let mut json = serde_json::to_vec_pretty(&summary).map_err(not_json)?;
-    json.push(b'\n');
-    write_whole(&path, &json)?;
-    Ok(summary)
-}
-
-/// Writes rows as a CSV file.
-pub(crate) fn write_rows<T: Serialize>(path: &Path, rows: impl Iterator<Item = T>) -> Result<(), JudgeError> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        table.serialize(row).map_err(|source| JudgeError::Row { path: path.to_owned(), source })?;
-    }
-    let bytes =
-        table.into_inner().map_err(|error| JudgeError::File { path: path.to_owned(), source: error.into_error() })?;
-    write_whole(path, &bytes)
-}
-
-/// Writes a file so that a reader sees the old one or the new one, never a part.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), JudgeError> {
-    let mut part = OsString::from(".");
-    part.push(path.file_name().unwrap_or_default());
-    part.push(".part");
-    Making::file(path.with_file_name(part))
-        .and_then(|(making, mut file)| {
-            file.write_all(bytes)?;
-            making.finish(path)
-        })
-        .map_err(|source| JudgeError::File { path: path.to_owned(), source })
+    let report = ();
+    Ok(Found { summary, sketches, report })
 }
 
 #[cfg(test)]

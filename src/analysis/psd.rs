@@ -11,8 +11,12 @@ use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
 use crate::analysis::JudgeError;
-use crate::analysis::load::{PsdRow, Run};
+use crate::analysis::errors::Link;
+use crate::analysis::load::PsdRow;
+use crate::analysis::shelf::Shelf;
 use crate::analysis::statistics::mean;
+use crate::gnss::record::Observation;
+use crate::gnss::satellite::Sv;
 
 /// A spectrum being accumulated from blocks of planar samples.
 pub struct Psd {
@@ -120,31 +124,38 @@ fn decibels(power: f64) -> f64 {
 }
 
 /// A satellite's signal on average over the run.
-pub(super) struct Expected {
+#[derive(Clone, Copy, Debug)]
+pub struct Expected {
+    pub sv: Sv,
     /// Carrier as received, and as sent.
     pub carrier_hz: f64,
     pub nominal_hz: f64,
     pub chip_rate_hz: f64,
     pub cn0_hz: f64,
+    pub cn0_mean_dbhz: f64,
 }
 
-/// The mean of each satellite's signal over the run.
-pub(super) fn expected(run: &Run) -> Vec<Expected> {
-    let mut links: Vec<_> = run.truth.iter().map(|row| (row.sv, row.signal)).collect();
-    links.sort_unstable();
-    links.dedup();
-    let one = |&(sv, signal): &super::errors::Link| {
-        let rows = || run.truth.iter().filter(move |row| row.sv == sv && row.signal == signal);
-        let cn0: Vec<f64> = rows().map(|row| libm::pow(10.0, row.cn0_dbhz / 10.0)).collect();
-        let doppler: Vec<f64> = rows().map(|row| row.doppler_hz).collect();
-        Some(Expected {
-            carrier_hz: signal.carrier_hz + mean(&doppler)?,
+/// The mean of each satellite's true signal over the run.
+pub(super) fn expected(truth: &Shelf<Link, Observation>) -> Result<Vec<Expected>, JudgeError> {
+    let mut all = Vec::new();
+    for (sv, signal) in truth.keys() {
+        let rows = truth.rows((sv, signal))?;
+        let of = |of: fn(&Observation) -> f64| mean(&rows.iter().map(of).collect::<Vec<_>>());
+        let means = (of(|row| row.doppler_hz), of(|row| libm::pow(10.0, row.cn0_dbhz / 10.0)), of(|row| row.cn0_dbhz));
+        let ((Some(doppler_hz), Some(cn0_hz), Some(cn0_mean_dbhz)), Some(code)) = (means, signal.components.first())
+        else {
+            continue;
+        };
+        all.push(Expected {
+            sv,
+            carrier_hz: signal.carrier_hz + doppler_hz,
             nominal_hz: signal.carrier_hz,
-            chip_rate_hz: signal.components.first()?.chip_rate_hz,
-            cn0_hz: mean(&cn0)?,
-        })
-    };
-    links.iter().filter_map(one).collect()
+            chip_rate_hz: code.chip_rate_hz,
+            cn0_hz,
+            cn0_mean_dbhz,
+        });
+    }
+    Ok(all)
 }
 
 /// Density of a rectangular-chip code at `f_hz` from its carrier as the sampler meets it, before anything aliases, per hertz.

@@ -7,13 +7,13 @@
 //! leaves a phase error of which 3σ + θ > 45° (the loop of the receiver's settings, [`super::jitter`]); noise alone breaks that
 //! rule. What is left is unexplained. Limits: causes are those that the truth's rows, a tenth of a second apart, can show.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use serde::Serialize;
 
 use crate::analysis::access::Access;
-use crate::analysis::errors::{Link, SLIP_CYCLES, SignalError, first_jump_of};
+use crate::analysis::errors::{Errors, Link, SLIP_CYCLES, SignalError, first_jump_of};
 use crate::analysis::jitter::{Settings, motion_error_deg};
 use crate::analysis::load::Run;
 use crate::analysis::statistics::median;
@@ -92,34 +92,26 @@ pub struct Slips {
     pub rows: Vec<Slip>,
 }
 
-/// Observations of one satellite with their carrier errors as they were before any constant was removed.
-pub type Raw = BTreeMap<Link, Vec<SignalError>>;
-
 impl Slips {
-    /// Finds them; `raw` are carrier errors with their constants.
-    pub fn find(run: &Run, raw: &Raw) -> Self {
+    /// Finds them.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn find(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
         let evidence = Evidence::new(run);
+        let lost = run.events.iter().filter(|row| row.event == Event::LossOfLock);
+        let links: BTreeSet<Link> = errors.signals.keys().chain(lost.map(|row| (row.sv, row.signal))).collect();
         let mut rows = Vec::new();
-        for row in run.events.iter().filter(|row| row.event == Event::LossOfLock) {
-            rows.push(evidence.slip(run, (row.sv, row.signal), row.sample, Kind::LossOfLock, true, None));
-        }
-        for (link, all) in raw {
-            let first = all.first().map_or(0, |row| row.sample);
-            let of = |event: Event| {
-                let own = run.events.iter().filter(move |row| (row.sv, row.signal) == *link && row.event == event);
-                own.map(|row| row.sample).filter(|sample| *sample > first).collect::<Vec<u64>>()
-            };
-            let (declared, lost) = (of(Event::CycleSlip), of(Event::LossOfLock));
-            for &sample in &declared {
-                let size = size_across(all, sample, &lost);
-                rows.push(evidence.slip(run, *link, sample, Kind::CycleSlip, true, size));
+        for link in links {
+            let found = breaks(run, link, &errors.signals.rows(link)?);
+            if found.is_empty() {
+                continue;
             }
-            for (sample, size) in undeclared(all, &declared) {
-                rows.push(evidence.slip(run, *link, sample, Kind::CycleSlip, false, Some(size)));
-            }
+            let known = Known::of(&evidence, link)?;
+            rows.extend(found.iter().map(|one| evidence.slip(link, one, known.as_ref())));
         }
         rows.sort_by(|a, b| (a.sample, &a.sv).cmp(&(b.sample, &b.sv)));
-        Self { rows }
+        Ok(Self { rows })
     }
 
     /// How many have each cause.
@@ -138,6 +130,32 @@ impl Slips {
     }
 }
 
+/// A slip or a loss whose cause is not known yet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Break {
+    sample: u64,
+    kind: Kind,
+    declared: bool,
+    size_cycles: Option<f64>,
+}
+
+/// Losses of lock, then slips: those of the events, and those that the errors show.
+fn breaks(run: &Run, link: Link, all: &[SignalError]) -> Vec<Break> {
+    let of = |event: Event| {
+        let own = run.events.iter().filter(move |row| (row.sv, row.signal) == link && row.event == event);
+        own.map(|row| row.sample)
+    };
+    let loss = |sample| Break { sample, kind: Kind::LossOfLock, declared: true, size_cycles: None };
+    let mut found: Vec<Break> = of(Event::LossOfLock).map(loss).collect();
+    let Some(first) = all.first().map(|row| row.sample) else { return found };
+    let lost: Vec<u64> = of(Event::LossOfLock).filter(|sample| *sample > first).collect();
+    let declared: Vec<u64> = of(Event::CycleSlip).filter(|sample| *sample > first).collect();
+    let slip = |sample, declared, size_cycles| Break { sample, kind: Kind::CycleSlip, declared, size_cycles };
+    found.extend(declared.iter().map(|&sample| slip(sample, true, size_across(all, sample, &lost))));
+    found.extend(undeclared(all, &declared).into_iter().map(|(sample, size)| slip(sample, false, Some(size))));
+    found
+}
+
 /// Difference of the carrier's constants on either side of a declared slip; `None` where a lock was lost in between or a side has
 /// no rows.
 fn size_across(all: &[SignalError], sample: u64, lost: &[u64]) -> Option<f64> {
@@ -148,7 +166,7 @@ fn size_across(all: &[SignalError], sample: u64, lost: &[u64]) -> Option<f64> {
     if lost.iter().any(|lost| (last.sample..=next.sample).contains(lost)) {
         return None;
     }
-    let carriers = |rows: &[SignalError]| median(&rows.iter().map(|row| row.carrier_cycles).collect::<Vec<_>>());
+    let carriers = |rows: &[SignalError]| median(&rows.iter().map(|row| row.raw_cycles).collect::<Vec<_>>());
     let before = carriers(&before[before.len().saturating_sub(SIDE)..])?;
     let after = carriers(&after[..after.len().min(SIDE)])?;
     Some(after - before)
@@ -163,7 +181,7 @@ fn undeclared(all: &[SignalError], declared: &[u64]) -> Vec<(u64, f64)> {
     for arc in all.chunk_by(|a, b| !broken(a, b)) {
         let mut rest = arc;
         loop {
-            let carrier: Vec<f64> = rest.iter().map(|row| row.carrier_cycles).collect();
+            let carrier: Vec<f64> = rest.iter().map(|row| row.raw_cycles).collect();
             let Some(jump) = first_jump_of(&carrier) else { break };
             let (before, after) = carrier.split_at(jump);
             let side =
@@ -178,79 +196,93 @@ fn undeclared(all: &[SignalError], declared: &[u64]) -> Vec<(u64, f64)> {
     found
 }
 
-/// What the truth knows of each satellite.
+/// What the truth knows of a run.
 struct Evidence<'r> {
-    truth: BTreeMap<Link, Vec<&'r Observation>>,
-    effective_dbhz: BTreeMap<Link, Vec<f64>>,
-    usual_dbhz: BTreeMap<Link, f64>,
-    motion_deg: BTreeMap<Link, Vec<(f64, f64)>>,
+    run: &'r Run,
+    access: Access<'r>,
     loop_: Option<(Settings, f64)>,
     least_dbhz: f64,
     last: u64,
 }
 
+/// What it knows of one satellite.
+struct Known {
+    rows: Vec<Observation>,
+    effective_dbhz: Vec<f64>,
+    usual_dbhz: f64,
+    motion_deg: Vec<(f64, f64)>,
+}
+
+impl Known {
+    /// `None` of a satellite that the truth does not have.
+    fn of(evidence: &Evidence<'_>, link: Link) -> Result<Option<Self>, JudgeError> {
+        let run = evidence.run;
+        let rows = run.truth.rows(link)?;
+        let Some(usual_dbhz) = median(&rows.iter().map(|row| row.cn0_dbhz).collect::<Vec<_>>()) else {
+            return Ok(None);
+        };
+        let motion_deg = match evidence.loop_ {
+            Some((settings, update_s)) => motion_error_deg(run, link, settings, update_s)?,
+            None => Vec::new(),
+        };
+        let effective_dbhz = rows.iter().map(|row| evidence.access.effective_dbhz(row)).collect();
+        Ok(Some(Self { rows, effective_dbhz, usual_dbhz, motion_deg }))
+    }
+}
+
 impl<'r> Evidence<'r> {
     fn new(run: &'r Run) -> Self {
-        let access = Access::new(run);
-        let mut truth: BTreeMap<Link, Vec<&Observation>> = BTreeMap::new();
-        for row in &run.truth {
-            truth.entry((row.sv, row.signal)).or_default().push(row);
-        }
-        let effective = |rows: &Vec<&Observation>| rows.iter().map(|row| access.effective_dbhz(row)).collect();
-        let usual = |rows: &Vec<&Observation>| median(&rows.iter().map(|row| row.cn0_dbhz).collect::<Vec<_>>());
-        let times: Vec<f64> = run.tracking.iter().map(|row| row.integration_s).collect();
-        let loop_ = Settings::of(run).zip(median(&times));
         Self {
-            effective_dbhz: truth.iter().map(|(link, rows)| (*link, effective(rows))).collect(),
-            usual_dbhz: truth.iter().filter_map(|(link, rows)| Some((*link, usual(rows)?))).collect(),
-            motion_deg: loop_.map(|(settings, update_s)| motion_error_deg(run, settings, update_s)).unwrap_or_default(),
-            truth,
-            loop_,
+            run,
+            access: Access::new(run),
+            loop_: Settings::of(run).zip(run.update_s),
             least_dbhz: run.tracking_setting("cn0_threshold_dbhz").unwrap_or(f64::NEG_INFINITY),
             last: run.trajectory.last().map_or(0, |row| row.sample),
         }
     }
 
-    fn slip(&self, run: &Run, link: Link, sample: u64, kind: Kind, declared: bool, size: Option<f64>) -> Slip {
+    fn slip(&self, link: Link, found: &Break, known: Option<&Known>) -> Slip {
+        let (run, sample) = (self.run, found.sample);
         let time_s = run.time_s(sample);
-        let rounded = size.map(|size| (2.0 * size).round() / 2.0);
+        let rounded = found.size_cycles.map(|size| (2.0 * size).round() / 2.0);
         let mut slip = Slip {
             sample,
             time_s,
             sv: link.0.to_string(),
             signal: link.1.name,
-            kind,
-            declared,
+            kind: found.kind,
+            declared: found.declared,
             size_cycles: rounded,
-            remainder_cycles: size.zip(rounded).map(|(size, rounded)| size - rounded),
+            remainder_cycles: found.size_cycles.zip(rounded).map(|(size, rounded)| size - rounded),
             cause: Cause::Unexplained,
             cn0_dbhz: None,
             interference_db: None,
             motion_deg: None,
             noise_3sigma_deg: None,
         };
-        let (Some(rows), Some(effective)) = (self.truth.get(&link), self.effective_dbhz.get(&link)) else {
+        let Some(Known { rows, effective_dbhz, usual_dbhz, motion_deg }) = known else {
             slip.cause = Cause::NotThere;
             return slip;
         };
         // The channel notices after its own loss time.
         let back_s = BEFORE_S + run.tracking_setting("loss_s").unwrap_or(0.0);
         let within = |at: u64| (time_s - back_s..=time_s).contains(&run.time_s(at));
-        let near: Vec<usize> = (0..rows.len()).filter(|index| within(rows[*index].sample)).collect();
-        let least = |of: &dyn Fn(usize) -> f64| near.iter().map(|index| of(*index)).reduce(f64::min);
-        slip.cn0_dbhz = least(&|index| effective[index]);
-        let set_dbhz = least(&|index| rows[index].cn0_dbhz);
-        slip.interference_db = near.iter().map(|index| rows[*index].cn0_dbhz - effective[*index]).reduce(f64::max);
-        slip.motion_deg = self.motion_deg.get(&link).and_then(|series| {
-            let inside = series.iter().filter(|(t_s, _)| (time_s - back_s..=time_s).contains(t_s));
-            inside.map(|(_, error)| error.abs()).reduce(f64::max)
-        });
+        let near: Vec<(f64, f64)> = rows
+            .iter()
+            .zip(effective_dbhz)
+            .filter(|(row, _)| within(row.sample))
+            .map(|(row, effective_dbhz)| (row.cn0_dbhz, *effective_dbhz))
+            .collect();
+        slip.cn0_dbhz = near.iter().map(|(_, effective_dbhz)| *effective_dbhz).reduce(f64::min);
+        let set_dbhz = near.iter().map(|(cn0_dbhz, _)| *cn0_dbhz).reduce(f64::min);
+        slip.interference_db = near.iter().map(|(cn0_dbhz, effective_dbhz)| cn0_dbhz - effective_dbhz).reduce(f64::max);
+        let inside = motion_deg.iter().filter(|(t_s, _)| (time_s - back_s..=time_s).contains(t_s));
+        slip.motion_deg = inside.map(|(_, error)| error.abs()).reduce(f64::max);
         slip.noise_3sigma_deg = slip.cn0_dbhz.zip(self.loop_).map(|(dbhz, (settings, update_s))| {
             let cn0_hz = libm::pow(10.0, dbhz / 10.0);
             3.0 * pll::jitter_rad(settings.pll_bandwidth_hz, update_s, cn0_hz).to_degrees()
         });
         let gone = near.len() < 2 && sample < self.last;
-        let usual_dbhz = self.usual_dbhz.get(&link).copied().unwrap_or(f64::INFINITY);
         let limit_deg = pll::LIMIT_RAD.to_degrees();
         let noise_deg = slip.noise_3sigma_deg.unwrap_or(0.0);
         let weak = noise_deg > limit_deg || slip.cn0_dbhz.is_some_and(|dbhz| dbhz < self.least_dbhz);

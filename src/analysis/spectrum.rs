@@ -11,7 +11,7 @@ use statrs::function::erf::{erf, erfc};
 
 use crate::analysis::jamming;
 use crate::analysis::load::Run;
-use crate::analysis::psd::{code_density, expected};
+use crate::analysis::psd::code_density;
 use crate::analysis::statistics::median;
 
 /// A stage of the front end as `scene.json` states it.
@@ -87,7 +87,7 @@ pub fn judge(run: &Run) -> Spectrum {
 /// Expected density at the frequencies of `psd.csv`, in the same decibels. Where the truth does not state the level (no `noise_lsb`), it
 /// is fitted. Empty without a spectrum or without signals.
 pub fn theory_db(run: &Run) -> Vec<f64> {
-    let signals = expected(run);
+    let signals = &run.expected;
     let sources = jamming::sources(run);
     let Some(center_hz) = run.scene.center_hz.filter(|_| !signals.is_empty() && !run.psd.is_empty()) else {
         return Vec::new();
@@ -199,7 +199,7 @@ type Null = (f64, f64);
 
 /// Both first nulls of the first signal's code.
 fn nulls(run: &Run, theory_db: &[f64]) -> Result<[Null; 2], &'static str> {
-    let signal = run.truth.first().map(|row| row.signal).ok_or("there is no signal")?;
+    let signal = run.truth.keys().next().map(|(_, signal)| signal).ok_or("there is no signal")?;
     let chip_rate_hz = signal.components.first().map(|c| c.chip_rate_hz).ok_or("the signal has no code")?;
     let center_hz = run.scene.center_hz.ok_or("the samples' frequency is unknown")?;
     let sign = if run.scene.inverted { -1.0 } else { 1.0 };

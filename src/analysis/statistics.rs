@@ -16,6 +16,33 @@ pub struct Spread {
     pub p95: f64,
 }
 
+/// A mean in the making, of numbers that need not be held.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sum {
+    count: usize,
+    sum: f64,
+    squares: f64,
+}
+
+impl Sum {
+    /// Counts one in.
+    pub fn add(&mut self, value: f64) {
+        if value.is_finite() {
+            *self = Self { count: self.count + 1, sum: self.sum + value, squares: self.squares + value * value };
+        }
+    }
+
+    /// As [`mean`].
+    pub fn mean(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum / self.count as f64)
+    }
+
+    /// As [`rms`].
+    pub fn rms(&self) -> Option<f64> {
+        (self.count > 0).then(|| (self.squares / self.count as f64).sqrt())
+    }
+}
+
 fn finite(values: &[f64]) -> impl Iterator<Item = f64> + '_ {
     values.iter().copied().filter(|value| value.is_finite())
 }
@@ -44,6 +71,11 @@ pub fn std(values: &[f64]) -> Option<f64> {
 pub fn percentile(values: &[f64], p: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = finite(values).collect();
     sorted.sort_by(f64::total_cmp);
+    ranked(&sorted, p)
+}
+
+/// [`percentile`] of a list that is finite and sorted already.
+pub fn ranked(sorted: &[f64], p: f64) -> Option<f64> {
     let rank = p.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
     let below = *sorted.get(rank.floor() as usize)?;
     let above = *sorted.get(rank.ceil() as usize)?;
@@ -93,6 +125,10 @@ mod tests {
         assert!((percentile(&values, 0.95).unwrap() - 8.3).abs() < 1e-12);
         assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(percentile(&[1.0, 2.0], 1.0), Some(2.0));
+        let mut sum = Sum::default();
+        assert_eq!((sum.mean(), sum.rms()), (None, None));
+        values.iter().chain(&[f64::NAN]).for_each(|value| sum.add(*value));
+        assert_eq!((sum.mean(), sum.rms()), (mean(&values), rms(&values)));
         let spread = spread(&[-3.0, 1.0]).unwrap();
         assert_eq!((spread.count, spread.mean), (2, -1.0));
         assert!((spread.p95 - 2.9).abs() < 1e-12);

@@ -7,10 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
+use crate::analysis::JudgeError;
 use crate::analysis::allan::{Deviation, Point};
 use crate::analysis::clock;
 use crate::analysis::clock::{Of, Series};
-use crate::analysis::errors::Errors;
+use crate::analysis::errors::{Errors, Link, SignalError};
 use crate::analysis::honesty::{self, Honesty};
 use crate::analysis::jitter::{Jitter as LoopJitter, Loop, Pooled};
 use crate::analysis::lines::Lines;
@@ -18,9 +19,10 @@ use crate::analysis::load::{Run, Speed};
 use crate::analysis::slips::{Cause, Slips};
 use crate::analysis::spectrum::{self, Spectrum};
 use crate::analysis::spoofing::Spoofing;
-use crate::analysis::statistics::{Spread, mean, median, percentile, pooled_std, rms, spread, std};
+use crate::analysis::statistics::{Spread, mean, percentile, pooled_std, rms, spread, std};
 use crate::analysis::theory::clock::white_phase;
 use crate::analysis::verdict::Verdict;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{Event, NavigationRow};
 use crate::gnss::satellite::Sv;
 
@@ -175,8 +177,6 @@ pub struct Details {
     /// Overlapping Allan deviation of the clock's estimate at 1 s.
     pub clock_oadev_1s: Option<Point>,
     pub thresholds: Thresholds,
-    /// Loop errors that went into the jitter, each satellite's mean removed.
-    pub jitter: Jitter,
     /// Lowest point of the spectrum near each first null of the code, noise-free scenes only.
     pub psd_nulls_hz: Vec<f64>,
     /// Observations that the truth has no row for.
@@ -209,28 +209,23 @@ impl Thresholds {
     }
 }
 
-/// Loop errors, one value an observation.
-#[derive(Clone, Debug, Default)]
-pub struct Jitter {
-    pub dll_chips: Vec<f64>,
-    pub pll_deg: Vec<f64>,
-    pub fll_hz: Vec<f64>,
-}
-
 impl Summary {
     /// Condenses the errors of a run.
-    pub fn new(run: &Run, errors: &Errors, clock: &clock::Clock) -> Self {
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn new(run: &Run, errors: &Errors, clock: &clock::Clock) -> Result<Self, JudgeError> {
         let mut details = Details::default();
         let satellites = satellites(run, &mut details);
         let position = position(run, errors, &mut details);
         let clock = clock_section(clock, &mut details);
-        let observables = observables(errors, &mut details);
-        let tracking = tracking(run, errors, &mut details);
+        let observables = observables(errors, &mut details)?;
+        let tracking = tracking(run, errors, &mut details)?;
         let navigation = navigation(run, &mut details);
         let psd = spectrum::judge(run);
         details.psd_nulls_hz = psd.null_low_hz.into_iter().chain(psd.null_high_hz).collect();
         details.unmatched_observations = errors.unmatched;
-        Self {
+        Ok(Self {
             scene: run.scene.name.clone(),
             seed: run.scene.seed,
             duration_s: run.scene.duration_s,
@@ -248,7 +243,7 @@ impl Summary {
             jammed: !run.scene.interference.is_empty(),
             speed: run.speed,
             details,
-        }
+        })
     }
 
     /// Adds what covariance, slips and loops come to.
@@ -268,14 +263,12 @@ impl Summary {
 }
 
 fn satellites(run: &Run, details: &mut Details) -> Satellites {
-    let first = run.sky.iter().map(|row| row.sample).min();
-    // The truth's sky holds what is in view and nothing else; from space the mask does not bound it.
-    let in_view: BTreeSet<Sv> = run.sky.iter().filter(|row| Some(row.sample) == first).map(|row| row.sv).collect();
-    let ever: BTreeSet<Sv> = run.sky.iter().map(|row| row.sv).chain(run.truth.iter().map(|row| row.sv)).collect();
+    let ever: BTreeSet<Sv> = run.sky.keys().chain(run.truth.keys().map(|(sv, _)| sv)).collect();
     let acquired: BTreeSet<Sv> = run.acquisition.iter().filter(|row| row.acquired).map(|row| row.sv).collect();
     details.false_satellites = acquired.difference(&ever).copied().collect();
     Satellites {
-        in_view: in_view.len(),
+        // The truth's sky holds what is in view and nothing else; from space the mask does not bound it.
+        in_view: run.in_view_at_start.len(),
         acquired: acquired.len(),
         used: run.fixes.iter().map(|fix| fix.satellites as usize).max().unwrap_or(0),
         false_acquired: details.false_satellites.len(),
@@ -339,67 +332,57 @@ fn clock_section(clock: &clock::Clock, details: &mut Details) -> Clock {
     }
 }
 
-fn observables(errors: &Errors, details: &mut Details) -> Observables {
-    let code = errors.code_without_clock_m();
-    let carrier = errors.pooled(|error| error.carrier_cycles);
-    let doppler = errors.pooled(|error| error.doppler_hz);
-    let cn0 = errors.pooled(|error| error.cn0_dbhz - error.cn0_effective_dbhz);
-    let means: Vec<f64> = errors
-        .signals
-        .values()
-        .filter_map(|rows| mean(&rows.iter().map(|row| row.code_m).collect::<Vec<_>>()))
-        .collect();
+fn observables(errors: &Errors, details: &mut Details) -> Result<Observables, JudgeError> {
+    let code = errors.code_without_clock_m()?;
+    let carrier = errors.pooled(|error| error.carrier_cycles)?;
+    let doppler = errors.pooled(|error| error.doppler_hz)?;
+    let cn0 = errors.pooled(|error| error.cn0_dbhz - error.cn0_effective_dbhz)?;
+    let mut means = Vec::new();
+    for link in errors.signals.keys() {
+        means.extend(mean(&errors.signals.map(link, |row| row.code_m)?));
+    }
     details.pseudorange_m = spread(&code);
     details.carrier_cycles = spread(&carrier);
     details.doppler_hz = spread(&doppler);
     details.cn0_db = spread(&cn0);
-    details.cn0_true_dbhz = mean(&errors.pooled(|error| error.cn0_true_dbhz));
-    details.cn0_effective_dbhz = mean(&errors.pooled(|error| error.cn0_effective_dbhz));
-    details.cn0_measured_dbhz = mean(&errors.pooled(|error| error.cn0_dbhz));
-    Observables {
+    details.cn0_true_dbhz = mean(&errors.pooled(|error| error.cn0_true_dbhz)?);
+    details.cn0_effective_dbhz = mean(&errors.pooled(|error| error.cn0_effective_dbhz)?);
+    details.cn0_measured_dbhz = mean(&errors.pooled(|error| error.cn0_dbhz)?);
+    Ok(Observables {
         pseudorange_rms_m: rms(&code),
         pseudorange_bias_m: mean(&means),
         carrier_rms_cycles: rms(&carrier),
         doppler_rms_hz: rms(&doppler),
         cn0_bias_db: mean(&cn0),
-    }
+    })
 }
 
-fn tracking(run: &Run, errors: &Errors, details: &mut Details) -> Tracking {
-    let chip_m = |signal: &crate::gnss::signal::Signal| {
-        signal.components.first().map_or(f64::NAN, |c| crate::gnss::earth::SPEED_OF_LIGHT_MPS / c.chip_rate_hz)
-    };
-    let dll = errors.settled(|(_, signal), row| row.code_m / chip_m(signal));
-    let pll = errors.settled(|_, row| row.carrier_cycles * 360.0);
-    let fll = errors.settled(|_, row| row.doppler_hz);
-    let sigma = |groups: &[Vec<f64>]| pooled_std(groups.iter().map(Vec::as_slice));
+/// The error of one loop in an observation, in its unit.
+pub(crate) type LoopError = fn(&Link, &SignalError) -> f64;
+pub(crate) const DLL_CHIPS: LoopError = |(_, signal), row| {
+    let code = signal.components.first();
+    row.code_m * code.map_or(f64::NAN, |code| code.chip_rate_hz) / SPEED_OF_LIGHT_MPS
+};
+pub(crate) const PLL_DEG: LoopError = |_, row| row.carrier_cycles * 360.0;
+pub(crate) const FLL_HZ: LoopError = |_, row| row.doppler_hz;
 
-    let integrations: Vec<f64> = run.tracking.iter().map(|row| row.integration_s).collect();
-    let integration_s = median(&integrations).or(run.tracking_setting("integration_s")).unwrap_or(1e-3);
+fn tracking(run: &Run, errors: &Errors, details: &mut Details) -> Result<Tracking, JudgeError> {
+    let sigma = |of: LoopError| Ok::<_, JudgeError>(pooled_std(errors.settled(of)?.iter().map(Vec::as_slice)));
+
+    let integration_s = run.update_s.or(run.tracking_setting("integration_s")).unwrap_or(1e-3);
     details.thresholds = Thresholds::new(run.tracking_setting("spacing_chips").unwrap_or(0.5), integration_s);
-    let result = Tracking {
+    Ok(Tracking {
         losses_of_lock: run.events.iter().filter(|row| row.event == Event::LossOfLock).count(),
         cycle_slips: errors.cycle_slips,
-        dll_sigma_chips: sigma(&dll),
-        pll_sigma_deg: sigma(&pll),
-        fll_sigma_hz: sigma(&fll),
+        dll_sigma_chips: sigma(DLL_CHIPS)?,
+        pll_sigma_deg: sigma(PLL_DEG)?,
+        fll_sigma_hz: sigma(FLL_HZ)?,
         slips_undeclared: 0,
         slip_causes: BTreeMap::new(),
         dll_chips: None,
         pll_deg: None,
         fll_hz: None,
-    };
-    details.jitter = Jitter { dll_chips: centred(dll), pll_deg: centred(pll), fll_hz: centred(fll) };
-    result
-}
-
-/// Each group about its own mean, in one list.
-fn centred(groups: Vec<Vec<f64>>) -> Vec<f64> {
-    let centre = |group: Vec<f64>| {
-        let middle = mean(&group).unwrap_or(0.0);
-        group.into_iter().map(move |value| value - middle)
-    };
-    groups.into_iter().flat_map(centre).collect()
+    })
 }
 
 fn navigation(run: &Run, details: &mut Details) -> Navigation {

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::analysis::plot::Judged;
 use crate::analysis::plot::jitter::{Histogram, loops};
-use crate::analysis::{JudgeError, spectrum, write_rows};
+use crate::analysis::{JudgeError, Table, spectrum, write_rows};
 use crate::gnss::record::Fix;
 use crate::gnss::satellite::Sv;
 
@@ -76,39 +76,50 @@ struct TheoryRow {
 
 /// Writes them all into a run's directory.
 pub(crate) fn write(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
-    let errors = judged.errors.signals.iter().flat_map(|((sv, signal), rows)| {
-        rows.iter().map(|row| ErrorRow {
-            sample: row.sample,
-            time_s: row.time_s,
-            sv: *sv,
-            signal: signal.name,
-            code_m: row.code_m,
-            carrier_cycles: row.carrier_cycles,
-            doppler_hz: row.doppler_hz,
-            cn0_dbhz: row.cn0_dbhz,
-            cn0_true_dbhz: row.cn0_true_dbhz,
-            cn0_effective_dbhz: row.cn0_effective_dbhz,
-            locked_s: row.locked_s,
-        })
-    });
-    write_rows(&directory.join("errors.csv"), errors)?;
+    let mut errors = Table::create(&directory.join("errors.csv"))?;
+    for (sv, signal) in judged.errors.signals.keys() {
+        let mut written = Ok(());
+        judged.errors.signals.each((sv, signal), |row| {
+            let row = ErrorRow {
+                sample: row.sample,
+                time_s: row.time_s,
+                sv,
+                signal: signal.name,
+                code_m: row.code_m,
+                carrier_cycles: row.carrier_cycles,
+                doppler_hz: row.doppler_hz,
+                cn0_dbhz: row.cn0_dbhz,
+                cn0_true_dbhz: row.cn0_true_dbhz,
+                cn0_effective_dbhz: row.cn0_effective_dbhz,
+                locked_s: row.locked_s,
+            };
+            if written.is_ok() {
+                written = errors.row(&row);
+            }
+        })?;
+        written?;
+    }
+    errors.finish()?;
     write_rows(&directory.join("position.csv"), positions(judged).into_iter())?;
-    let jitter = loops(&judged.summary.details).into_iter().flat_map(|one| {
+    let mut histograms = Table::create(&directory.join("histograms.csv"))?;
+    for one in loops(judged) {
+        let one = one?;
         let histogram = Histogram::new(&one);
-        let row = |bin: usize| HistogramRow {
-            r#loop: one.name,
-            unit: one.unit,
-            middle: histogram.middle(bin),
-            width: histogram.width,
-            observations: histogram.counts[bin],
-            share_percent: histogram.share(bin),
-            normal_percent: histogram.normal(histogram.middle(bin)),
-            sigma: histogram.sigma,
-            threshold: one.threshold,
-        };
-        (0..histogram.counts.len()).map(row).collect::<Vec<_>>()
-    });
-    write_rows(&directory.join("histograms.csv"), jitter)?;
+        for (bin, observations) in histogram.counts.iter().enumerate() {
+            histograms.row(&HistogramRow {
+                r#loop: one.name,
+                unit: one.unit,
+                middle: histogram.middle(bin),
+                width: histogram.width,
+                observations: *observations,
+                share_percent: histogram.share(bin),
+                normal_percent: histogram.normal(histogram.middle(bin)),
+                sigma: histogram.sigma,
+                threshold: one.threshold,
+            })?;
+        }
+    }
+    histograms.finish()?;
     let theory = spectrum::theory_db(judged.run);
     if !theory.is_empty() {
         let rows = judged.run.psd.iter().zip(theory);

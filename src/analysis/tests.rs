@@ -575,7 +575,7 @@ fn the_pull_in_after_a_lock_is_an_error_but_no_jitter() {
 fn the_spectrum_of_random_chips_is_the_theory_s_and_has_its_nulls() {
     let directory = planted_run(&PLANTED);
     let mut run = load::Run::read(directory.path()).unwrap();
-    run.truth.iter_mut().for_each(|row| row.doppler_hz = 0.0);
+    run.expected.iter_mut().for_each(|signal| signal.carrier_hz = signal.nominal_hz);
     (run.scene.noise, run.scene.code_edge, run.scene.sample_rate_hz) = (false, "nearest".to_owned(), 10.23e6);
     let mut draw = Draw(3);
     let chips = (0..400_000).map(|_| if draw.normal() < 0.0 { -30.0_f32 } else { 30.0 });

@@ -8,11 +8,12 @@
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::analysis::JudgeError;
 use crate::analysis::errors::Errors;
 use crate::analysis::load::Run;
 use crate::analysis::summary::Summary;
 use crate::analysis::theory::pll;
-use crate::gnss::record::{Event, EventRow, Fix};
+use crate::gnss::record::{Event, Fix};
 
 /// Share of a limit below which what is left of it is marginal.
 pub const MARGINAL_SHARE: f64 = 0.1;
@@ -189,14 +190,17 @@ impl Verdict {
     }
 
     /// A run against the limits that need no user: those of theory and of the receiver's own covariance.
-    pub fn of(run: &Run, errors: &Errors, summary: &Summary) -> Self {
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn of(run: &Run, errors: &Errors, summary: &Summary) -> Result<Self, JudgeError> {
         let mut verdict = Self::default();
         verdict.position(run, summary);
-        verdict.tracking(run, errors, summary);
+        verdict.tracking(run, errors, summary)?;
         verdict.reception(run, summary);
         verdict.interference(summary);
         verdict.spoofing(summary);
-        verdict
+        Ok(verdict)
     }
 
     /// Puts a user's judgements first; they replace what is otherwise judged of the same figures.
@@ -252,7 +256,7 @@ impl Verdict {
         }
     }
 
-    fn tracking(&mut self, run: &Run, errors: &Errors, summary: &Summary) {
+    fn tracking(&mut self, run: &Run, errors: &Errors, summary: &Summary) -> Result<(), JudgeError> {
         let (tracking, limits) = (&summary.tracking, &summary.details.thresholds);
         let rows = [
             ("DLL jitter, 1σ", "tracking.dll_sigma_chips", tracking.dll_sigma_chips, "chips", limits.dll_chips, "d/6"),
@@ -267,7 +271,7 @@ impl Verdict {
             let source = format!("rule of thumb {rule} (Kaplan and Hegarty, 5.6)");
             self.judge(figure, path, value, unit, Bound::Max(limit), &source);
         }
-        let (unexpected, weak) = losses(run, errors);
+        let (unexpected, weak) = losses(run, errors)?;
         let source = match weak {
             0 => "none where thermal jitter stays below 15°".to_owned(),
             _ => format!("none where thermal jitter stays below 15°; {weak} more below that C/N0"),
@@ -279,6 +283,7 @@ impl Verdict {
         } else {
             self.not_judged.push(format!("cycle slips ({}): signals were too weak to hold", tracking.cycle_slips));
         }
+        Ok(())
     }
 
     fn reception(&mut self, run: &Run, summary: &Summary) {
@@ -402,23 +407,25 @@ const ONE_BIT_LOSS_DB: f64 = 1.961;
 /// Losses of lock at which the signal was strong enough to hold, and the others: by the C/N0 that the receiver could have, other
 /// codes and interference counted as noise, at the last observation before, against that at which the phase loop's thermal
 /// jitter reaches its threshold.
-fn losses(run: &Run, errors: &Errors) -> (usize, usize) {
+fn losses(run: &Run, errors: &Errors) -> Result<(usize, usize), JudgeError> {
     let setting = |key: &str, default: f64| run.tracking_setting(key).unwrap_or(default);
     let update_s = 1e-3 * setting("integration", 4.0);
     let least_dbhz = pll::cn0_dbhz(pll::THRESHOLD_RAD, setting("pll_bandwidth_hz", 18.0), update_s);
-    let lost: Vec<&EventRow> = run.events.iter().filter(|row| row.event == Event::LossOfLock).collect();
-    let weak = |loss: &&&EventRow| {
-        let window = (LOOK_BACK_S * run.scene.sample_rate_hz) as u64;
+    let window = (LOOK_BACK_S * run.scene.sample_rate_hz) as u64;
+    let (mut strong, mut weak) = (0, 0);
+    for loss in run.events.iter().filter(|row| row.event == Event::LossOfLock) {
+        let link = (loss.sv, loss.signal);
         // What the truth says around the loss; a satellite that it does not have is no signal at all.
-        let rows = run.truth.iter().filter(|row| row.sv == loss.sv && row.signal == loss.signal);
-        let near = rows.filter(|row| row.sample <= loss.sample && loss.sample - row.sample <= window);
-        let own = errors.signals.get(&(loss.sv, loss.signal));
-        let jammed = own.and_then(|rows| rows.iter().rev().find(|row| row.sample <= loss.sample));
+        let rows = run.truth.rows(link)?;
+        let near = rows.iter().filter(|row| row.sample <= loss.sample && loss.sample - row.sample <= window);
+        let own = errors.signals.rows(link)?;
+        let jammed = own.iter().rev().find(|row| row.sample <= loss.sample);
         let cost_db = jammed.map_or(0.0, |row| row.cn0_true_dbhz - row.cn0_effective_dbhz);
-        near.map(|row| row.cn0_dbhz - cost_db).min_by(f64::total_cmp).is_none_or(|lowest_dbhz| lowest_dbhz < least_dbhz)
-    };
-    let weak = lost.iter().filter(weak).count();
-    (lost.len() - weak, weak)
+        let lowest_dbhz = near.map(|row| row.cn0_dbhz - cost_db).min_by(f64::total_cmp);
+        let held = lowest_dbhz.is_some_and(|dbhz| dbhz >= least_dbhz);
+        (strong, weak) = if held { (strong + 1, weak) } else { (strong, weak + 1) };
+    }
+    Ok((strong, weak))
 }
 
 /// The lock detectors' memory: how long before a declared loss the signal may have failed.

@@ -182,9 +182,10 @@ fn text(error: impl ToString) -> String {
 
 /// Whether a motion is where bodies are, all along.
 fn moves(trajectory: &Trajectory) -> Result<u64, String> {
-    // A motion that rests at an end is known for ever there.
+    // A motion that rests at an end is known for ever there; another one only within its span, wherever that lies.
     let (from_s, to_s) = trajectory.span_s();
-    let (from_s, to_s) = (from_s.max(-1e3), to_s.min(1e5));
+    let from_s = if from_s.is_finite() { from_s } else { to_s.min(0.0) - 1e3 };
+    let to_s = if to_s.is_finite() { to_s } else { from_s + 1e5 };
     for part in [0.0, 0.3, 0.7, 1.0] {
         let motion = trajectory.at(from_s + part * (to_s - from_s));
         let radius_m = motion.position_m.norm();
@@ -402,7 +403,14 @@ fn whatever_stands_in_a_study_s_directory_or_a_run_s_tables_is_read_or_refused()
                     {
                         Ok(1)
                     }
-                    Ok(_) => Err("another manifest passes".to_owned()),
+                    Ok(_) => {
+                        let at = bytes.iter().zip(&manifest).take_while(|(new, old)| new == old).count();
+                        let near = |text: &[u8]| {
+                            let end = text.len().min(at + 30);
+                            String::from_utf8_lossy(&text[at.saturating_sub(30).min(end)..end]).into_owned()
+                        };
+                        Err(format!("another manifest passes: {:?} for {:?}", near(bytes), near(&manifest)))
+                    }
                     Err(error) => Err(text(error).trim_start_matches("cannot read ").to_owned()),
                 }
             }),
@@ -459,11 +467,11 @@ fn judge(run: &Path) -> Result<u64, String> {
     let refused = |error: gnss_twin::analysis::JudgeError| format!("refused: {error}");
     let read = Run::read(run).map_err(refused)?;
     let errors = Errors::measure(&read).map_err(refused)?;
-    let clock = Clock::measure(&read, &errors);
+    let clock = Clock::measure(&read, &errors).map_err(refused)?;
     let honesty = Honesty::measure(&read, &errors);
-    let slips = Slips::find(&read, &errors.raw);
-    let jitter = Jitter::measure(&read, &errors);
-    let _ = (clock, honesty, jitter, Elevations::measure(&read, &errors));
+    let slips = Slips::find(&read, &errors).map_err(refused)?;
+    let jitter = Jitter::measure(&read, &errors).map_err(refused)?;
+    let _ = (clock, honesty, jitter, Elevations::measure(&read, &errors).map_err(refused)?);
     Ok(hashed(slips.causes()))
 }
 

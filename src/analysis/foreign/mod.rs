@@ -63,7 +63,7 @@ const NEAR_S: f64 = 86_400.0;
 /// files of another time.
 pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
     let run = Run::read_truth(truth)?;
-    let timeline = truth::Timeline::new(&run).ok_or_else(|| JudgeError::NotOfThisTruth {
+    let timeline = truth::Timeline::new(&run)?.ok_or_else(|| JudgeError::NotOfThisTruth {
         path: truth.join("trajectory.csv"),
         what: "no rows: expected the antenna's motion".to_owned(),
     })?;

@@ -10,12 +10,13 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
 
+use crate::analysis::JudgeError;
 use crate::analysis::access::Access;
 use crate::analysis::errors::Link;
 use crate::analysis::load::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::satellite::Sv;
+use crate::gnss::record::Observation;
 use crate::gnss::time::Epoch;
 
 /// A satellite's signal at an instant, by a perfect clock.
@@ -70,8 +71,25 @@ const GAP: f64 = 1.5;
 
 impl Timeline {
     /// From a run's truth; `None` without a trajectory.
-    pub fn new(run: &Run) -> Option<Self> {
-        let first = run.trajectory.first()?;
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn new(run: &Run) -> Result<Option<Self>, JudgeError> {
+        let Some(mut timeline) = Self::of_links(run, run.truth.keys())? else { return Ok(None) };
+        timeline.interpolation = timeline.missed();
+        Ok(Some(timeline))
+    }
+
+    /// That of one satellite; how well it is interpolated is not looked at.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of(run: &Run, link: Link) -> Result<Option<Self>, JudgeError> {
+        Self::of_links(run, std::iter::once(link))
+    }
+
+    fn of_links(run: &Run, links: impl Iterator<Item = Link>) -> Result<Option<Self>, JudgeError> {
+        let Some(first) = run.trajectory.first() else { return Ok(None) };
         // The nearest second: a clock that is a little ahead does not begin a second earlier.
         let origin = Epoch::new(first.gps_s, first.gps_fraction_s.round());
         let places: Vec<(f64, Place)> = run
@@ -88,30 +106,30 @@ impl Timeline {
             })
             .collect();
         let steps: Vec<f64> = places.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
-        let at: HashMap<u64, (f64, Place)> =
-            run.trajectory.iter().zip(&places).map(|(row, place)| (row.sample, *place)).collect();
-        let elevations: HashMap<(u64, Sv), f64> =
-            run.sky.iter().map(|row| ((row.sample, row.sv), row.elevation_deg)).collect();
+        let at: HashMap<u64, usize> = run.trajectory.iter().map(|row| row.sample).zip(0..).collect();
         let access = Access::new(run);
-        let mut tracks: BTreeMap<Link, Track> = BTreeMap::new();
-        for row in &run.truth {
-            let Some((t_s, place)) = at.get(&row.sample) else { continue };
-            let carrier_hz = row.signal.carrier_hz;
-            let state = State {
-                range_m: row.pseudorange_m - SPEED_OF_LIGHT_MPS * place.clock_bias_s,
-                carrier_cycles: row.carrier_cycles - carrier_hz * place.clock_bias_s,
-                // Rates by the sampler's clock become rates by GPS time.
-                doppler_hz: (row.doppler_hz + carrier_hz * place.clock_drift) / (1.0 - place.clock_drift),
-                cn0_dbhz: row.cn0_dbhz,
-                effective_dbhz: access.effective_dbhz(row),
-                elevation_deg: elevations.get(&(row.sample, row.sv)).copied().unwrap_or(f64::NAN),
+        let mut tracks = BTreeMap::new();
+        for link in links {
+            let elevations: HashMap<u64, f64> =
+                run.sky.map(link.0, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
+            let node = |row: Observation| {
+                let (t_s, place) = places.get(*at.get(&row.sample)?)?;
+                let carrier_hz = row.signal.carrier_hz;
+                let state = State {
+                    range_m: row.pseudorange_m - SPEED_OF_LIGHT_MPS * place.clock_bias_s,
+                    carrier_cycles: row.carrier_cycles - carrier_hz * place.clock_bias_s,
+                    // Rates by the sampler's clock become rates by GPS time.
+                    doppler_hz: (row.doppler_hz + carrier_hz * place.clock_drift) / (1.0 - place.clock_drift),
+                    cn0_dbhz: row.cn0_dbhz,
+                    effective_dbhz: access.effective_dbhz(&row),
+                    elevation_deg: elevations.get(&row.sample).copied().unwrap_or(f64::NAN),
+                };
+                Some((*t_s, state))
             };
-            tracks.entry((row.sv, row.signal)).or_default().nodes.push((*t_s, state));
+            tracks.insert(link, Track { nodes: run.truth.map(link, node)?.into_iter().flatten().collect() });
         }
         let interval_s = median(&steps).unwrap_or(1.0);
-        let mut timeline = Self { origin, interval_s, tracks, places, interpolation: Interpolation::default() };
-        timeline.interpolation = timeline.missed();
-        Some(timeline)
+        Ok(Some(Self { origin, interval_s, tracks, places, interpolation: Interpolation::default() }))
     }
 
     /// First and last time.

@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use super::Loop;
+use crate::analysis::JudgeError;
 use crate::analysis::errors::Link;
 use crate::analysis::foreign::truth::Timeline;
 use crate::analysis::load::Run;
+use crate::analysis::statistics::Sum;
 use crate::analysis::theory::clock::PowerLaw;
 use crate::analysis::theory::linear::{Feedback, PhaseLoop, controlled_root_gains};
 use crate::analysis::theory::{dll, fll, oscillator, pll};
@@ -96,17 +98,31 @@ fn step([k1, k2, k3]: &[f64; 3], [phase, rate, acceleration]: [f64; 3], error: f
     [phase + k1 * error + rate, rate, acceleration]
 }
 
-/// Error of a noise-free loop on the phases of successive intervals; the first second, in which it runs in, is left out.
-fn stress(closed: &PhaseLoop, phases: &[f64], update_s: f64) -> Vec<f64> {
-    let (Some(first), Some(second)) = (phases.first(), phases.get(1)) else { return Vec::new() };
-    let mut state = [*first, second - first, 0.0];
-    let skip = (1.0 / update_s) as usize;
-    let errors = phases.iter().map(|phase| {
-        let error = phase - state[0];
-        state = step(&closed.gains, state, error);
-        error
-    });
-    errors.collect::<Vec<_>>().split_off(skip.min(phases.len()))
+/// A noise-free loop on the phases of successive intervals.
+struct Follower<'a> {
+    closed: &'a PhaseLoop,
+    first: Option<f64>,
+    state: Option<[f64; 3]>,
+    /// Intervals of the first second, in which it runs in.
+    running_in: usize,
+}
+
+impl<'a> Follower<'a> {
+    fn new(closed: &'a PhaseLoop, update_s: f64) -> Self {
+        Self { closed, first: None, state: None, running_in: (1.0 / update_s) as usize }
+    }
+
+    /// Its error on the next phase; `None` while it runs in. It begins with the rate of the first two.
+    fn error(&mut self, phase: f64) -> Option<f64> {
+        let begun = self.first.map(|first| step(&self.closed.gains, [first, phase - first, 0.0], 0.0));
+        self.first = self.first.or(Some(phase));
+        let state = self.state.or(begun);
+        let error = state.map_or(0.0, |state| phase - state[0]);
+        self.state = state.map(|state| step(&self.closed.gains, state, error));
+        let counts = self.running_in == 0;
+        self.running_in = self.running_in.saturating_sub(1);
+        counts.then_some(error)
+    }
 }
 
 /// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for early minus late.
@@ -234,9 +250,29 @@ impl Theory {
     }
 }
 
-/// Stresses of a satellite's three loops over the times from `from_s` to `to_s`, in their units.
+/// What a loop's error without noise comes to, in its unit.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Stress {
+    sum: Sum,
+    pub max: f64,
+}
+
+impl Stress {
+    fn add(&mut self, error: f64) {
+        self.sum.add(error);
+        self.max = self.max.max(error.abs());
+    }
+
+    /// Root mean square.
+    pub fn rms(&self) -> f64 {
+        self.sum.rms().unwrap_or(0.0)
+    }
+}
+
+/// Stresses of a satellite's three loops over the times from `from_s` to `to_s`.
+#[derive(Default)]
 pub(super) struct Stresses {
-    pub of: BTreeMap<Loop, Vec<f64>>,
+    of: BTreeMap<Loop, Stress>,
 }
 
 /// Longest stretch that is followed interval by interval.
@@ -244,66 +280,70 @@ const MOST_UPDATES: usize = 4_000_000;
 
 impl Stresses {
     pub fn new(theory: &Theory, timeline: &Timeline, link: &Link, (from_s, to_s): (f64, f64)) -> Self {
-        let mut found = Self { of: [Loop::Dll, Loop::Pll, Loop::Fll].map(|which| (which, Vec::new())).into() };
+        let mut found = Self::default();
         let t_s = theory.update_s;
         let count = (((to_s - from_s) / t_s).max(0.0) as usize).min(MOST_UPDATES);
-        let (mut phases, mut delays) = (Vec::new(), Vec::new());
-        let origin = timeline.state(link, from_s);
-        for k in 0..=count {
+        let Some(origin) = timeline.state(link, from_s) else { return found };
+        let begin = || (Follower::new(&theory.pll.0, t_s), Follower::new(&theory.dll.0, t_s), None);
+        let (mut pll, mut dll, mut last_cycles) = begin();
+        for k in 0..count {
             // The middle of an interval stands for its mean.
-            let state = (k < count).then(|| timeline.state(link, from_s + (k as f64 + 0.5) * t_s)).flatten();
-            match (state, origin) {
-                (Some(state), Some(origin)) => {
-                    let range_m = state.range_m - origin.range_m;
-                    let carrier_cycles = state.carrier_cycles - origin.carrier_cycles;
-                    phases.push(carrier_cycles);
-                    // The carrier aids the code: only what parts them is left.
-                    delays.push((range_m - carrier_cycles * link.1.wavelength_m()) / theory.chip_m);
-                }
-                _ => {
-                    found.add(theory, &std::mem::take(&mut phases), &std::mem::take(&mut delays));
-                }
-            }
+            let Some(state) = timeline.state(link, from_s + (k as f64 + 0.5) * t_s) else {
+                (pll, dll, last_cycles) = begin();
+                continue;
+            };
+            let range_m = state.range_m - origin.range_m;
+            let carrier_cycles = state.carrier_cycles - origin.carrier_cycles;
+            let cycles = pll.error(carrier_cycles);
+            found.add(Loop::Pll, cycles.map(|cycles| 360.0 * cycles));
+            found.add(Loop::Fll, cycles.zip(last_cycles).map(|(cycles, last)| (cycles - last) / t_s));
+            last_cycles = cycles;
+            // The carrier aids the code: only what parts them is left.
+            found.add(Loop::Dll, dll.error((range_m - carrier_cycles * link.1.wavelength_m()) / theory.chip_m));
         }
         found
     }
 
-    fn add(&mut self, theory: &Theory, phases: &[f64], delays: &[f64]) {
-        let t_s = theory.update_s;
-        let phase = stress(&theory.pll.0, phases, t_s);
-        let rate: Vec<f64> = phase.windows(2).map(|two| (two[1] - two[0]) / t_s).collect();
-        let code = stress(&theory.dll.0, delays, t_s);
-        let turns = phase.into_iter().map(|cycles| 360.0 * cycles).collect();
-        for (which, values) in [(Loop::Dll, code), (Loop::Pll, turns), (Loop::Fll, rate)] {
-            self.of.entry(which).or_default().extend(values);
+    fn add(&mut self, which: Loop, error: Option<f64>) {
+        if let Some(error) = error {
+            self.of.entry(which).or_default().add(error);
         }
+    }
+
+    /// That of one loop.
+    pub fn of(&self, which: Loop) -> Stress {
+        self.of.get(&which).copied().unwrap_or_default()
     }
 }
 
-/// Errors in degrees that the true motion leaves in the phase loop of each satellite, with their times since sample 0.
-pub fn motion_error_deg(run: &Run, settings: Settings, update_s: f64) -> BTreeMap<Link, Vec<(f64, f64)>> {
+/// Errors in degrees that the true motion leaves in the phase loop of a satellite, with their times since sample 0.
+///
+/// # Errors
+/// [`JudgeError::Read`] where rows that were put by cannot be read.
+pub fn motion_error_deg(
+    run: &Run,
+    link: Link,
+    settings: Settings,
+    update_s: f64,
+) -> Result<Vec<(f64, f64)>, JudgeError> {
     let (Some(timeline), Some(closed)) =
-        (Timeline::new(run), exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s))
+        (Timeline::of(run, link)?, exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s))
     else {
-        return BTreeMap::new();
+        return Ok(Vec::new());
     };
     let origin_s = run.trajectory.first().map_or(0.0, |row| row.time().since(timeline.origin) - run.time_s(row.sample));
     let skip_s = (1.0 / update_s).trunc() * update_s;
-    let mut found = BTreeMap::new();
-    for (link, stretches) in timeline.stretches_s() {
-        let mut series = Vec::new();
-        for (from_s, to_s) in stretches {
-            let count = (((to_s - from_s) / update_s).max(0.0) as usize).min(MOST_UPDATES);
-            let start = timeline.state(&link, from_s).map_or(0.0, |state| state.carrier_cycles);
-            let at = |k: usize| from_s + (k as f64 + 0.5) * update_s;
-            let phases: Vec<f64> =
-                (0..count).map_while(|k| Some(timeline.state(&link, at(k))?.carrier_cycles - start)).collect();
-            let errors = stress(&closed, &phases, update_s).into_iter().enumerate();
-            series.extend(errors.map(|(k, error)| (at(k) + skip_s - origin_s, 360.0 * error)));
-        }
-        found.insert(link, series);
+    let mut series = Vec::new();
+    for (from_s, to_s) in timeline.stretches_s().remove(&link).unwrap_or_default() {
+        let count = (((to_s - from_s) / update_s).max(0.0) as usize).min(MOST_UPDATES);
+        let start = timeline.state(&link, from_s).map_or(0.0, |state| state.carrier_cycles);
+        let at = |k: usize| from_s + (k as f64 + 0.5) * update_s;
+        let mut follower = Follower::new(&closed, update_s);
+        let phases = (0..count).map_while(|k| Some(timeline.state(&link, at(k))?.carrier_cycles - start));
+        let errors = phases.filter_map(|phase| follower.error(phase)).enumerate();
+        series.extend(errors.map(|(k, error)| (at(k) + skip_s - origin_s, 360.0 * error)));
     }
-    found
+    Ok(series)
 }
 
 #[cfg(test)]
@@ -327,8 +367,11 @@ mod tests {
     fn a_jerk_leaves_the_error_that_theory_says() {
         let closed = exact_loop(3, 0.072).unwrap();
         let t_s: f64 = 4e-3;
-        let phases: Vec<f64> = (0..2000).map(|k| 50.0 / 6.0 * (f64::from(k) * t_s).powi(3)).collect();
-        let last = *stress(&closed, &phases, t_s).last().unwrap();
+        let mut follower = Follower::new(&closed, t_s);
+        let errors: Vec<f64> =
+            (0..2000).filter_map(|k| follower.error(50.0 / 6.0 * (f64::from(k) * t_s).powi(3))).collect();
+        assert_eq!(errors.len(), 2000 - 250, "the first second is left out");
+        let last = *errors.last().unwrap();
         let expected = pll::stress_discrete(3, closed.gains[2], t_s, 50.0);
         assert!((last / expected - 1.0).abs() < 1e-3, "{last} {expected}");
     }

@@ -14,6 +14,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::analysis::JudgeError;
 pub use crate::analysis::plot::drawing::{Drawing, FINE};
+use crate::analysis::plot::sketch::drawn;
 
 /// Width of a picture that fills a page's text width.
 pub const WIDTH_PX: u32 = 680;
@@ -289,7 +290,7 @@ type Context<'a, 'b> = ChartContext<
 >;
 
 fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Failure> {
-    let points = thinned(&series.points, series.mark);
+    let points = drawn(series);
     let line = series.colour.stroke_width(3 * FINE as u32 / 2);
     match series.mark {
         Mark::Line => {
@@ -400,47 +401,9 @@ fn tick(value: f64, decimals: usize) -> String {
     if text.trim_start_matches('-').bytes().all(|b| matches!(b, b'0' | b'.')) { text.replace('-', "") } else { text }
 }
 
-/// Most points that a series is drawn with.
-const MOST_POINTS: usize = 1000;
-
-/// Few enough points to draw. Of a line, the lowest and the highest of each run of neighbours, so that no spike is lost; of
-/// marks that stand alone, every so many, so that their density stays true.
-fn thinned(points: &[(f64, f64)], mark: Mark) -> Vec<(f64, f64)> {
-    let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
-    if finite.len() <= MOST_POINTS {
-        return finite;
-    }
-    if !matches!(mark, Mark::Line | Mark::Dash) {
-        return finite.iter().copied().step_by(finite.len().div_ceil(MOST_POINTS)).collect();
-    }
-    let extremes = |run: &[(f64, f64)]| {
-        let numbered = || run.iter().enumerate();
-        let low = numbered().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
-        let high = numbered().max_by(|a, b| a.1.1.total_cmp(&b.1.1));
-        let mut pair: Vec<(usize, (f64, f64))> =
-            low.into_iter().chain(high).map(|(index, point)| (index, *point)).collect();
-        pair.sort_by_key(|(index, _)| *index);
-        pair.into_iter().map(|(_, point)| point)
-    };
-    finite.chunks(finite.len().div_ceil(MOST_POINTS / 2)).flat_map(extremes).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn thinning_keeps_a_line_s_spikes_and_the_density_of_marks() {
-        let mut points: Vec<(f64, f64)> = (0..100_000).map(|n| (f64::from(n), 0.0)).collect();
-        points[54_321].1 = 9.0;
-        points[54_400].1 = -9.0;
-        let dots = thinned(&points, Mark::Dots);
-        assert!(dots.len() <= MOST_POINTS && dots.iter().filter(|point| point.1 != 0.0).count() <= 1);
-        let few = thinned(&points, Mark::Line);
-        assert!(few.len() <= MOST_POINTS + 2);
-        assert!(few.contains(&(54_321.0, 9.0)) && few.contains(&(54_400.0, -9.0)));
-        assert!(few.windows(2).all(|pair| pair[0].0 <= pair[1].0));
-    }
 
     #[test]
     fn ticks_have_as_many_decimals_as_tell_them_apart() {

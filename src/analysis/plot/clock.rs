@@ -2,18 +2,17 @@
 
 use plotters::style::RGBColor;
 
+use crate::analysis::JudgeError;
 use crate::analysis::allan::{Deviation, Point};
 use crate::analysis::clock::{ClockRow, Line, Of};
-use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{
-    Axis, BLUE, COLOURS, Chart, Drawing, Failure, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX, compose,
-};
+use crate::analysis::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::plot::{Judged, Sketch};
 use crate::analysis::theory::clock::white_phase;
 
 type Points = Vec<(f64, f64)>;
 
 /// Bias as estimated and as it was with the straight line through it, the error, and both without their lines.
-pub fn bias(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
+pub fn bias(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let clock = judged.clock;
     let points = |scale: f64, of: &dyn Fn(&ClockRow) -> f64| -> Points {
         clock.rows.iter().map(|row| (row.time_s, scale * of(row))).collect()
@@ -46,7 +45,7 @@ pub fn bias(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         chart("Estimate minus truth".to_owned(), "error (ns)", 0.1, error),
         chart("Estimate and truth, each without its straight line".to_owned(), "bias (ns)", 0.1, rest),
     ];
-    compose((WIDTH_PX, 540), 1, &charts, &legend).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 540), 1, charts, legend)))
 }
 
 /// Points and lines of one chart of deviations, in common logarithms.
@@ -56,7 +55,7 @@ struct Curves<'a> {
 }
 
 /// Four deviations over averaging time, with intervals of 95 %, what independent measurements would give, and theory.
-pub fn stability(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
+pub fn stability(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let charts = [
         (Deviation::Oadev, "Allan deviation, overlapping", "deviation of relative frequency"),
         (Deviation::Mdev, "Modified Allan deviation", "deviation of relative frequency"),
@@ -72,7 +71,7 @@ pub fn stability(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
             legend.push(series.clone());
         }
     }
-    compose((WIDTH_PX, 540), 2, &charts, &legend).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 540), 2, charts, legend)))
 }
 
 impl Curves<'_> {

@@ -1,33 +1,34 @@
 //! What the atmosphere truly adds to each satellite's code.
 
-use std::collections::BTreeMap;
-
-use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Axis, COLOURS, Chart, Drawing, Failure, Mark, Series, WIDTH_PX, compose};
+use crate::analysis::JudgeError;
+use crate::analysis::plot::canvas::{Axis, COLOURS, Chart, Mark, Series, WIDTH_PX};
+use crate::analysis::plot::{Judged, Sketch};
 use crate::gnss::record::SkyRow;
 use crate::gnss::satellite::Sv;
 
 /// Slant delays over time, satellite by satellite: ionosphere above, troposphere below.
-pub fn delays(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
-    let mut tracks: BTreeMap<Sv, Vec<&SkyRow>> = BTreeMap::new();
-    for row in &judged.run.sky {
-        tracks.entry(row.sv).or_default().push(row);
-    }
+pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let run = judged.run;
     let chart = |title: &str, of: fn(&SkyRow) -> f64| {
-        let values = judged.run.sky.iter().map(of).chain([0.0]);
-        let series = tracks.iter().enumerate().map(|(index, (sv, rows))| {
-            let points = rows.iter().map(|row| (judged.run.time_s(row.sample), of(row))).collect();
-            line(*sv, index, points)
-        });
-        let x = judged.time_axis(judged.run.sky.iter().map(|row| judged.run.time_s(row.sample)));
-        Chart::new(title, x, Axis::around("slant delay (m)", values, 1.0), series.collect())
+        let (mut series, mut ends, mut first_s) = (Vec::new(), vec![0.0], f64::INFINITY);
+        for (index, sv) in run.sky.keys().enumerate() {
+            let points: Vec<(f64, f64)> = run.sky.map(sv, |row| (run.time_s(row.sample), of(&row)))?;
+            first_s = points.iter().map(|point| point.0).fold(first_s, f64::min);
+            let values = || points.iter().map(|point| point.1).filter(|value| value.is_finite());
+            ends.extend(values().reduce(f64::min).into_iter().chain(values().reduce(f64::max)));
+            let mut one = line(sv, index, points);
+            one.thin(1);
+            series.push(one);
+        }
+        let x = judged.time_axis(std::iter::once(first_s));
+        Ok::<_, JudgeError>(Chart::new(title, x, Axis::around("slant delay (m)", ends.into_iter(), 1.0), series))
     };
     let charts = [
-        chart("Ionosphere on L1, as it is", |row| row.ionosphere_m),
-        chart("Troposphere, as it is", |row| row.troposphere_m),
+        chart("Ionosphere on L1, as it is", |row| row.ionosphere_m)?,
+        chart("Troposphere, as it is", |row| row.troposphere_m)?,
     ];
-    let names: Vec<Series> = tracks.keys().enumerate().map(|(index, sv)| line(*sv, index, Vec::new())).collect();
-    compose((WIDTH_PX, 340), 2, &charts, &names).map(Some)
+    let names: Vec<Series> = run.sky.keys().enumerate().map(|(index, sv)| line(sv, index, Vec::new())).collect();
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, charts, names)))
 }
 
 /// A satellite's line, dashed once the colours begin again.

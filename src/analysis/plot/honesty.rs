@@ -1,15 +1,14 @@
 //! Errors of the fixes within twice the sigma that the receiver states, and the normalised error squared.
 
+use crate::analysis::JudgeError;
 use crate::analysis::honesty::{FREEDOM, Row};
-use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{
-    Axis, BLUE, Chart, Drawing, Failure, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX, compose,
-};
+use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::plot::{Judged, Sketch};
 
 type Points = Vec<(f64, f64)>;
 
 /// Draws them.
-pub fn honesty(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
+pub fn honesty(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let found = judged.honesty;
     let x = judged.time_axis(found.rows.iter().map(|row| row.time_s));
     let over = |of: &dyn Fn(&Row) -> f64| -> Points { found.rows.iter().map(|row| (row.time_s, of(row))).collect() };
@@ -55,5 +54,5 @@ pub fn honesty(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         Series::new("expected", GREEN, Mark::Dash, Vec::new()),
         Series::new("95 % band", GREY, Mark::Dash, Vec::new()),
     ];
-    compose((WIDTH_PX, 700), 1, &charts, &legend).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 700), 1, charts, legend)))
 }

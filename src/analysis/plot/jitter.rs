@@ -2,30 +2,37 @@
 
 use std::f64::consts::TAU;
 
-use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{
-    Axis, BLUE, COLOURS, Chart, Drawing, Failure, GREY, Mark, ORANGE, Series, WIDTH_PX, compose,
-};
-use crate::analysis::statistics::std;
-use crate::analysis::summary::Details;
+use crate::analysis::JudgeError;
+use crate::analysis::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::plot::{Judged, Sketch};
+use crate::analysis::statistics::{mean, std};
+use crate::analysis::summary::{DLL_CHIPS, FLL_HZ, PLL_DEG};
 use crate::analysis::verdict::digits;
 
-/// The errors of one loop and the rule for their σ.
-pub(crate) struct Loop<'a> {
+/// The errors of one loop, each satellite about its own mean, and the rule for their σ.
+pub(crate) struct Loop {
     pub name: &'static str,
     pub unit: &'static str,
-    pub errors: &'a [f64],
+    pub errors: Vec<f64>,
     pub threshold: f64,
 }
 
-/// DLL, PLL and FLL.
-pub(crate) fn loops(details: &Details) -> [Loop<'_>; 3] {
-    let (limits, jitter) = (&details.thresholds, &details.jitter);
-    [
-        Loop { name: "DLL", unit: "chips", errors: &jitter.dll_chips, threshold: limits.dll_chips },
-        Loop { name: "PLL", unit: "degrees", errors: &jitter.pll_deg, threshold: limits.pll_deg },
-        Loop { name: "FLL", unit: "Hz", errors: &jitter.fll_hz, threshold: limits.fll_hz },
-    ]
+/// DLL, PLL and FLL, made one after the other.
+pub(crate) fn loops<'a>(judged: &'a Judged<'_>) -> impl Iterator<Item = Result<Loop, JudgeError>> + 'a {
+    let limits = &judged.summary.details.thresholds;
+    let all = [
+        ("DLL", "chips", DLL_CHIPS, limits.dll_chips),
+        ("PLL", "degrees", PLL_DEG, limits.pll_deg),
+        ("FLL", "Hz", FLL_HZ, limits.fll_hz),
+    ];
+    all.into_iter().map(|(name, unit, of, threshold)| {
+        let mut errors = Vec::with_capacity(judged.errors.signals.len());
+        for group in judged.errors.settled(of)? {
+            let middle = mean(&group).unwrap_or(0.0);
+            errors.extend(group.into_iter().map(|value| value - middle));
+        }
+        Ok(Loop { name, unit, errors, threshold })
+    })
 }
 
 const BINS: usize = 41;
@@ -40,14 +47,14 @@ pub(crate) struct Histogram {
 }
 
 impl Histogram {
-    pub fn new(of: &Loop<'_>) -> Self {
-        let sigma = std(of.errors).unwrap_or(0.0);
+    pub fn new(of: &Loop) -> Self {
+        let sigma = std(&of.errors).unwrap_or(0.0);
         let tails = (5.0 * sigma).max(1e-9);
         // The threshold is drawn if it is not so far that the histogram would vanish.
         let half = if of.threshold < 2.0 * tails { tails.max(1.15 * of.threshold) } else { tails };
         let width = 2.0 * half / BINS as f64;
         let mut counts = [0; BINS];
-        for value in of.errors {
+        for value in &of.errors {
             let bin = ((value + half) / width).floor();
             if let Some(count) = (bin >= 0.0).then(|| counts.get_mut(bin as usize)).flatten() {
                 *count += 1;
@@ -74,18 +81,18 @@ impl Histogram {
 }
 
 /// Histograms with the fitted normal curve, ±σ and the threshold.
-pub fn jitter(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
-    let charts = loops(&judged.summary.details).map(|one| histogram(&one));
+pub fn jitter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let charts = loops(judged).map(|one| Ok(histogram(&one?))).collect::<Result<Vec<Chart>, JudgeError>>()?;
     let legend = [
         Series::new("replica − truth", BLUE, Mark::Bars(1.0), Vec::new()),
         Series::new("normal", COLOURS[6], Mark::Line, Vec::new()),
         Series::new("±1σ", GREY, Mark::Dash, Vec::new()),
         Series::new("threshold for 1σ", ORANGE, Mark::Line, Vec::new()),
     ];
-    compose((WIDTH_PX, 270), 3, &charts, &legend).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 270), 3, charts, legend)))
 }
 
-fn histogram(of: &Loop<'_>) -> Chart {
+fn histogram(of: &Loop) -> Chart {
     let Loop { name, unit, threshold, .. } = of;
     let histogram = Histogram::new(of);
     let Histogram { sigma, half, width, .. } = histogram;

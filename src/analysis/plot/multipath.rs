@@ -3,38 +3,34 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Drawing, Failure, WIDTH_PX, compose};
-use crate::analysis::plot::signals::{Points, legend, over_time, per_satellite};
-use crate::gnss::satellite::Sv;
+use crate::analysis::JudgeError;
+use crate::analysis::plot::canvas::WIDTH_PX;
+use crate::analysis::plot::signals::{Frame, legend, observed, of_observations, over_time};
+use crate::analysis::plot::{Judged, Sketch};
 
 /// Code errors over time, and the amplitude of all rays against the direct one.
-pub fn multipath(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
-    if judged.run.rays.is_empty() {
+pub fn multipath(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let run = judged.run;
+    if run.rays.is_empty() {
         return Ok(None);
     }
-    // Phasors of the echoes, summed at each instant.
-    let mut sums: BTreeMap<Sv, BTreeMap<u64, (f64, f64)>> = BTreeMap::new();
-    for ray in &judged.run.rays {
-        let sum = sums.entry(ray.sv).or_default().entry(ray.sample).or_insert((1.0, 0.0));
-        let (sin, cos) = libm::sincos(TAU * ray.phase_cycles);
-        sum.0 += ray.amplitude_ratio * cos;
-        sum.1 += ray.amplitude_ratio * sin;
-    }
-    let errors = per_satellite(judged, |row| row.code_m);
-    let fading: Vec<(String, Points)> = errors
-        .iter()
-        .map(|(name, _)| {
-            let own = sums.iter().filter(|(sv, _)| sv.to_string() == *name).flat_map(|(_, of)| of);
-            let points =
-                own.map(|(sample, (re, im))| (judged.run.time_s(*sample), 20.0 * libm::log10(libm::hypot(*re, *im))));
-            (name.clone(), points.collect())
-        })
-        .collect();
+    let links = observed(judged);
+    let errors = Frame { title: "Code error", y_label: "error (m)", least: 0.1 };
+    let fading = Frame { title: "All rays against the direct one", y_label: "amplitude (dB)", least: 1.0 };
     let charts = [
-        over_time(judged, "Code error", "error (m)", 0.1, &errors),
-        over_time(judged, "All rays against the direct one", "amplitude (dB)", 1.0, &fading),
+        over_time(judged, &links, &errors, |link| of_observations(judged, link, |row| row.code_m))?,
+        over_time(judged, &links, &fading, |link| {
+            // Phasors of the echoes, summed at each instant.
+            let mut sums: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
+            for ray in run.rays.rows(link)? {
+                let sum = sums.entry(ray.sample).or_insert((1.0, 0.0));
+                let (sin, cos) = libm::sincos(TAU * ray.phase_cycles);
+                sum.0 += ray.amplitude_ratio * cos;
+                sum.1 += ray.amplitude_ratio * sin;
+            }
+            let decibels = |(re, im): (f64, f64)| 20.0 * libm::log10(libm::hypot(re, im));
+            Ok(sums.into_iter().map(|(sample, sum)| (run.time_s(sample), decibels(sum))).collect())
+        })?,
     ];
-    let names = legend(errors.iter().map(|(name, _)| name.clone()));
-    compose((WIDTH_PX, 340), 2, &charts, &names).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, charts, legend(&links))))
 }

@@ -4,11 +4,10 @@ use std::collections::HashMap;
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
+use crate::analysis::JudgeError;
 use crate::analysis::errors::PositionError;
-use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{
-    Axis, BLUE, COLOURS, Chart, Drawing, Failure, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX, compose,
-};
+use crate::analysis::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::plot::{Judged, Sketch};
 use crate::analysis::spoofing;
 use crate::analysis::statistics::percentile;
 use crate::gnss::earth::Geodetic;
@@ -17,7 +16,7 @@ use crate::gnss::record::Fix;
 type Points = Vec<(f64, f64)>;
 
 /// East and north errors with the ellipses of 50 % and 95 %, and the distribution of horizontal and vertical errors.
-pub fn scatter(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
+pub fn scatter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let errors = &judged.errors.positions;
     let flat: Vec<Vector2<f64>> = errors.iter().map(|error| error.enu_m.xy()).collect();
     let fixes = flat.iter().map(|at| (at.x, at.y)).collect();
@@ -52,7 +51,7 @@ pub fn scatter(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     };
     let curves = marks.into_iter().chain(distributions).collect();
     let share = Chart::new(title, x, Axis::new("fixes below (%)", (0.0, 100.0)), curves);
-    compose((WIDTH_PX, 340), 2, &[cloud, share], &legend).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, [cloud, share], legend)))
 }
 
 /// Mean and covariance of a cloud.
@@ -100,7 +99,7 @@ fn distribution(values: &[f64]) -> Points {
 }
 
 /// Errors east, north, up and of the clock, between the bounds of the receiver's own covariance.
-pub fn time(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
+pub fn time(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let formal: HashMap<u64, &Fix> = judged.run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
     type Of<T> = fn(&T) -> f64;
     let chart = |title: &str, of: Of<PositionError>, sigma: Of<Fix>| {
@@ -132,14 +131,14 @@ pub fn time(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
         Series::new("fixes", BLUE, Mark::Dots, Vec::new()),
         Series::new("±1.96 σ of the receiver's covariance", ORANGE, Mark::Line, Vec::new()),
     ];
-    compose((WIDTH_PX, 430), 2, &charts, &legend).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 430), 2, charts, legend)))
 }
 
 /// Quantile of the normal distribution that leaves 2.5 % above.
 const NORMAL_95: f64 = 1.959_964;
 
 /// Where the fixes went between the truth and what a spoofer claims; nothing without one.
-pub fn spoofing(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
+pub fn spoofing(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let run = judged.run;
     let (Some(origin), false) = (run.trajectory.first(), run.claimed.is_empty()) else { return Ok(None) };
     let origin_m = origin.position_m();
@@ -176,11 +175,11 @@ pub fn spoofing(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let legend = [series.clone(), distances.clone()].concat();
     let mut plan = Chart::new("Plan view", east, north, series);
     plan.equal = true;
-    compose((WIDTH_PX, 340), 2, &[plan, Chart::new("While the spoofer is on", x, y, distances)], &legend).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, [plan, Chart::new("While the spoofer is on", x, y, distances)], legend)))
 }
 
 /// The way in plan and its height over time, as it was and as found.
-pub fn trajectory(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
+pub fn trajectory(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let run = judged.run;
     let origin_m = run.trajectory.first().map_or_else(Vector3::zeros, |row| row.position_m());
     let to_enu = Geodetic::from_ecef(&origin_m).ecef_to_enu();
@@ -211,7 +210,7 @@ pub fn trajectory(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let mut plan = Chart::new("Plan view", east, north, legend.clone());
     plan.equal = true;
     let time = Axis::new("time (s)", (0.0, run.scene.duration_s));
-    compose((WIDTH_PX, 340), 2, &[plan, Chart::new("Height", time, up, heights)], &legend).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, [plan, Chart::new("Height", time, up, heights)], legend)))
 }
 
 #[cfg(test)]

@@ -1,69 +1,74 @@
 //! Where the satellites stood and how strong they were received.
 
-use std::collections::BTreeMap;
-
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{Area, Drawing, FINE, Failure, GREY, WIDTH_PX, anchored};
+use crate::analysis::JudgeError;
+use crate::analysis::plot::canvas::{Area, FINE, Failure, GREY, WIDTH_PX, anchored};
+use crate::analysis::plot::{Judged, Sketch};
 use crate::analysis::statistics::mean;
-use crate::gnss::record::SkyRow;
 use crate::gnss::satellite::Sv;
 
 const HEIGHT_PX: i32 = 490;
 const CENTRE: (i32, i32) = (290 * FINE, 255 * FINE);
 const RADIUS: f64 = (195 * FINE) as f64;
 
+/// A satellite's way over the sky.
+struct Track {
+    sv: Sv,
+    /// Where it stood, in virtual pixels; places that follow each other differ.
+    places: Vec<(i32, i32)>,
+    cn0_dbhz: Option<f64>,
+    observed: bool,
+}
+
 /// Polar plot: north up, zenith in the middle, tracks ending in a labelled dot whose colour is the mean C/N0 as
 /// set; a satellite that the receiver did not observe is hollow.
-pub fn sky(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
-    let mut tracks: BTreeMap<Sv, Vec<&SkyRow>> = BTreeMap::new();
-    for row in &judged.run.sky {
-        tracks.entry(row.sv).or_default().push(row);
+pub fn sky(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let run = judged.run;
+    let mut tracks = Vec::new();
+    for sv in run.sky.keys() {
+        let mut places: Vec<(i32, i32)> = run.sky.map(sv, |row| place(row.azimuth_deg, row.elevation_deg))?;
+        places.dedup();
+        let cn0: Vec<f64> = run.expected.iter().filter(|one| one.sv == sv).map(|one| one.cn0_mean_dbhz).collect();
+        let observed = judged.errors.signals.keys().any(|(seen, _)| seen == sv);
+        tracks.push(Track { sv, places, cn0_dbhz: mean(&cn0), observed });
     }
-    let strengths: BTreeMap<Sv, f64> = tracks
-        .keys()
-        .filter_map(|&sv| {
-            let rows = judged.run.truth.iter().filter(|row| row.sv == sv);
-            mean(&rows.map(|row| row.cn0_dbhz).collect::<Vec<_>>()).map(|cn0| (sv, cn0))
-        })
-        .collect();
-    let low = strengths.values().copied().fold(f64::INFINITY, f64::min).floor();
-    let high = strengths.values().copied().fold(f64::NEG_INFINITY, f64::max).ceil();
+    let skyline_deg = run.scene.skyline_deg.clone();
+    let draw = Box::new(move |area: &Area<'_>| tracked(area, &tracks, &skyline_deg));
+    Ok(Some(Sketch::Free { size: (WIDTH_PX, HEIGHT_PX as u32), draw }))
+}
+
+fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Result<(), Failure> {
+    let strengths = || tracks.iter().filter_map(|track| track.cn0_dbhz);
+    let low = strengths().fold(f64::INFINITY, f64::min).floor();
+    let high = strengths().fold(f64::NEG_INFINITY, f64::max).ceil();
     let (low, high) = if low < high { (low, high) } else { (30.0, 50.0) };
-    Drawing::new((WIDTH_PX, HEIGHT_PX as u32), |area| {
-        obstructed(area, &judged.run.scene.skyline_deg)?;
-        frame(area)?;
-        scale(area, low, high)?;
-        // Names keep clear of the dots, the tracks and each other.
-        let mut taken: Vec<(i32, i32)> =
-            tracks.values().flat_map(|rows| rows.iter().map(|row| place(row.azimuth_deg, row.elevation_deg))).collect();
-        taken.dedup();
-        let mut ends = Vec::new();
-        for (sv, rows) in &tracks {
-            let colour = strengths.get(sv).map_or(GREY, |cn0| shade(*cn0, low, high));
-            let observed = judged.errors.signals.keys().any(|(seen, _)| seen == sv);
-            let points: Vec<(i32, i32)> = rows.iter().map(|row| place(row.azimuth_deg, row.elevation_deg)).collect();
-            let Some(&end) = points.last() else { continue };
-            area.draw(&PathElement::new(points, colour.stroke_width(3 * FINE as u32)))?;
-            area.draw(&Circle::new(end, 8 * FINE, if observed { colour.filled() } else { WHITE.filled() }))?;
-            area.draw(&Circle::new(end, 8 * FINE, colour.stroke_width(2 * FINE as u32)))?;
-            ends.push((*sv, end));
-        }
-        for (sv, end) in ends {
-            label(area, sv, end, &mut taken)?;
-        }
-        let note = anchored(12, HPos::Left, VPos::Center);
-        let shaded = if judged.run.scene.skyline_deg.is_empty() { "" } else { "; shaded: obstructed at the start" };
-        area.draw(&Text::new(
-            format!("filled: observed by the receiver{shaded}"),
-            (14 * FINE, (HEIGHT_PX - 16) * FINE),
-            note,
-        ))?;
-        Ok(())
-    })
-    .map(Some)
+    obstructed(area, skyline_deg)?;
+    frame(area)?;
+    scale(area, low, high)?;
+    // Names keep clear of the dots, the tracks and each other.
+    let mut taken: Vec<(i32, i32)> = tracks.iter().flat_map(|track| track.places.iter().copied()).collect();
+    let mut ends = Vec::new();
+    for Track { sv, places, cn0_dbhz, observed } in tracks {
+        let colour = cn0_dbhz.map_or(GREY, |cn0| shade(cn0, low, high));
+        let Some(&end) = places.last() else { continue };
+        area.draw(&PathElement::new(places.clone(), colour.stroke_width(3 * FINE as u32)))?;
+        area.draw(&Circle::new(end, 8 * FINE, if *observed { colour.filled() } else { WHITE.filled() }))?;
+        area.draw(&Circle::new(end, 8 * FINE, colour.stroke_width(2 * FINE as u32)))?;
+        ends.push((*sv, end));
+    }
+    for (sv, end) in ends {
+        label(area, sv, end, &mut taken)?;
+    }
+    let note = anchored(12, HPos::Left, VPos::Center);
+    let shaded = if skyline_deg.is_empty() { "" } else { "; shaded: obstructed at the start" };
+    area.draw(&Text::new(
+        format!("filled: observed by the receiver{shaded}"),
+        (14 * FINE, (HEIGHT_PX - 16) * FINE),
+        note,
+    ))?;
+    Ok(())
 }
 
 /// Shades what lies between the horizon and the skyline.

@@ -2,16 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::plot::Judged;
-use crate::analysis::plot::canvas::{
-    Axis, BLUE, Chart, Drawing, Failure, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX, compose,
-};
+use crate::analysis::JudgeError;
+use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::plot::{Judged, Sketch};
 use crate::analysis::spectrum;
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::satellite::Sv;
 
 /// Measured density and the theory's; nothing without `psd.csv`.
-pub fn psd(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
+pub fn psd(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let rows = &judged.run.psd;
     if rows.is_empty() {
         return Ok(None);
@@ -31,11 +30,11 @@ pub fn psd(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     let legend = series.clone();
     let noise = if judged.run.scene.noise { "with noise" } else { "without noise" };
     let chart = Chart::new(format!("Power spectral density of the samples, {noise}"), x, y, series);
-    compose((WIDTH_PX, 340), 1, &[chart], &legend).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 1, [chart], legend)))
 }
 
 /// The largest statistic of each satellite that was searched, with the threshold.
-pub fn acquisition(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
+pub fn acquisition(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let mut best: BTreeMap<Sv, &AcquisitionRow> = BTreeMap::new();
     for row in &judged.run.acquisition {
         let kept = best.entry(row.sv).or_insert(row);
@@ -65,13 +64,13 @@ pub fn acquisition(judged: &Judged<'_>) -> Result<Option<Drawing>, Failure> {
     chart.x_ticks = Some((0..).zip(best.keys()).map(|(place, sv)| (f64::from(place), tick(*sv))).collect());
     let truly: Vec<(f64, f64)> = (0..)
         .zip(best.values())
-        .filter(|(_, best)| judged.run.truth.iter().any(|row| row.sv == best.sv))
+        .filter(|(_, best)| judged.run.truth.keys().any(|(sv, _)| sv == best.sv))
         .map(|(place, best)| (f64::from(place), best.statistic + 0.03 * top))
         .collect();
     let in_truth = Series::new("in the truth", GREEN, Mark::Cross, truly);
     legend.push(in_truth.clone());
     chart.series.push(in_truth);
-    compose((WIDTH_PX, 330), 1, &[chart], &legend).map(Some)
+    Ok(Some(Sketch::charts((WIDTH_PX, 330), 1, [chart], legend)))
 }
 
 /// GPS satellites by number alone, to fit side by side.

@@ -13,35 +13,43 @@ use crate::analysis::plot::{Judged, Picture};
 use crate::analysis::verdict::{Status, Verdict, number};
 use crate::analysis::{JudgeError, write_whole};
 
-/// Writes `report.pdf` into a run's directory.
-pub(crate) fn write(
-    directory: &Path,
-    judged: &Judged<'_>,
-    pictures: Vec<(&'static Picture, Drawing)>,
-) -> Result<(), JudgeError> {
-    let path = directory.join("report.pdf");
-    let pdf = report(judged, pictures).pdf();
-    let pdf = pdf.map_err(|error| JudgeError::Plot { path: path.clone(), reason: error.to_string() })?;
-    write_whole(&path, &pdf)
+/// A run's report, complete but for its pictures.
+pub(crate) struct RunReport {
+    report: Report,
+    /// Where among its items they come.
+    figures: usize,
 }
 
-fn report(judged: &Judged<'_>, pictures: Vec<(&'static Picture, Drawing)>) -> Report {
-    let summary = judged.summary;
-    let head = format!("receiver against truth · seed {}", summary.seed);
-    let subtitle = "Receiver against truth: what a run of this scene came to.";
-    let mut report = Report::new(summary.scene.clone(), subtitle, head);
-    verdict(&mut report, &summary.details.verdict);
-    report.subheading("The run").add(Item::Facts(facts(judged)));
-    report.add(Item::NewPage);
-    tables::add(&mut report, judged);
-    report.add(Item::NewPage).heading("Figures");
-    for (picture, drawing) in pictures {
-        report.figure(drawing, format!("{} Numbers: {}.", picture.caption, picture.numbers.join(", ")));
+impl RunReport {
+    /// What a run's report says.
+    pub fn new(judged: &Judged<'_>) -> Result<Self, JudgeError> {
+        let summary = judged.summary;
+        let head = format!("receiver against truth · seed {}", summary.seed);
+        let subtitle = "Receiver against truth: what a run of this scene came to.";
+        let mut report = Report::new(summary.scene.clone(), subtitle, head);
+        verdict(&mut report, &summary.details.verdict);
+        report.subheading("The run").add(Item::Facts(facts(judged)));
+        report.add(Item::NewPage);
+        tables::add(&mut report, judged)?;
+        report.add(Item::NewPage).heading("Figures");
+        let figures = report.items.len();
+        report.add(Item::NewPage);
+        settings(&mut report, judged);
+        method::add(&mut report, judged);
+        Ok(Self { report, figures })
     }
-    report.add(Item::NewPage);
-    settings(&mut report, judged);
-    method::add(&mut report, judged);
-    report
+
+    /// Writes `report.pdf` with its pictures into a run's directory.
+    pub fn write(mut self, directory: &Path, pictures: Vec<(&'static Picture, Drawing)>) -> Result<(), JudgeError> {
+        let path = directory.join("report.pdf");
+        let item = |(picture, drawing): (&Picture, Drawing)| {
+            Item::Figure(drawing, format!("{} Numbers: {}.", picture.caption, picture.numbers.join(", ")))
+        };
+        self.report.items.splice(self.figures..self.figures, pictures.into_iter().map(item));
+        let pdf = self.report.pdf();
+        let pdf = pdf.map_err(|error| JudgeError::Plot { path: path.clone(), reason: error.to_string() })?;
+        write_whole(&path, &pdf)
+    }
 }
 
 fn tone(status: Status) -> Tone {

@@ -1,5 +1,6 @@
 //! The tables of a run's report.
 
+use crate::analysis::JudgeError;
 use crate::analysis::errors::{Link, SignalError};
 use crate::analysis::pdf::{Report, Side, Table};
 use crate::analysis::plot::Judged;
@@ -11,13 +12,14 @@ use crate::gnss::record::{Event, EventRow};
 const MOST_EVENTS: usize = 30;
 
 /// Adds accuracy, loops, satellites, clock and events.
-pub(super) fn add(report: &mut Report, judged: &Judged<'_>) {
+pub(super) fn add(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError> {
     report.heading("Accuracy");
     accuracy(report, judged);
     loops(report, judged);
-    satellites(report, judged);
+    satellites(report, judged)?;
     clock(report, judged);
     events(report, judged);
+    Ok(())
 }
 
 fn shown(value: Option<f64>) -> String {
@@ -85,7 +87,7 @@ fn loops(report: &mut Report, judged: &Judged<'_>) {
     report.table(table);
 }
 
-fn satellites(report: &mut Report, judged: &Judged<'_>) {
+fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let columns = [
         ("satellite", Side::Left),
         ("elevation (°)", Side::Right),
@@ -98,10 +100,10 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) {
     ];
     let mut table =
         Table::new("By satellite: mean elevation and C/N0; errors of its observations, the clock's included.", columns);
-    for (link, rows) in &judged.errors.signals {
+    for link in judged.errors.signals.keys() {
+        let rows = judged.errors.signals.rows(link)?;
         let of = |value: fn(&SignalError) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
-        let elevation: Vec<f64> =
-            judged.run.sky.iter().filter(|row| row.sv == link.0).map(|row| row.elevation_deg).collect();
+        let elevation = judged.run.sky.map(link.0, |row| row.elevation_deg)?;
         let cn0 = [of(|row| row.cn0_true_dbhz), of(|row| row.cn0_effective_dbhz), of(|row| row.cn0_dbhz)];
         table.row([
             link.0.to_string(),
@@ -110,11 +112,12 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) {
             format!("{} / {}", fixed(mean(&of(|row| row.code_m)), 2), fixed(std(&of(|row| row.code_m)), 2)),
             fixed(std(&of(|row| row.carrier_cycles)), 4),
             fixed(std(&of(|row| row.doppler_hz)), 3),
-            losses(judged, link).to_string(),
+            losses(judged, &link).to_string(),
             rows.len().to_string(),
         ]);
     }
     report.table(table);
+    Ok(())
 }
 
 fn losses(judged: &Judged<'_>, (sv, signal): &Link) -> usize {

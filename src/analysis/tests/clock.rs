@@ -59,7 +59,7 @@ fn the_clock_that_was_planted_is_found_and_told_from_the_receiver_s_error() {
     assert!((drift - true_drift).abs() < 5.0 * 2.5e-14, "{drift:e} {true_drift:e}");
     // The oscillator's theory lies within the interval of what the truth shows: 95 %, and this seed's six points are in.
     let read = load::Run::read(directory.path()).unwrap();
-    let measured = crate::analysis::clock::Clock::measure(&read, &errors::Errors::measure(&read).unwrap());
+    let measured = crate::analysis::clock::Clock::measure(&read, &errors::Errors::measure(&read).unwrap()).unwrap();
     let law = measured.oscillator.unwrap();
     assert_eq!(law, PowerLaw { h: [0.0, 0.0, H0, 0.0, 0.0] });
     let truth = measured.series(Of::Truth).unwrap();

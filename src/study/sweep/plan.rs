@@ -171,8 +171,8 @@ impl Plan {
             }
         }
         let study_input = manifest.inputs.iter().find(|input| input.written.is_empty());
-        let study_path = study_input.map_or_else(|| "inputs/study.toml".to_owned(), |input| input.path.clone());
-        let study = parse(&directory.join(study_path))?;
+        let study_input = study_input.ok_or_else(|| refuse("the study itself is not among the inputs".to_owned()))?;
+        let study = parse(&directory.join(&study_input.path))?;
         let mut bases = Vec::new();
         for written in study.scenarios() {
             let named = written.to_string_lossy();

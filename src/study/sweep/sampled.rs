@@ -14,6 +14,7 @@ use super::axis::{self, Axis};
 use super::model::SNR;
 use super::spec::{SCENARIO_KEY, Study};
 use super::{StudyError, temporary};
+use crate::analysis::JudgeError;
 use crate::analysis::Summary;
 use crate::analysis::clock::Clock;
 use crate::analysis::errors::Errors;
@@ -194,12 +195,13 @@ pub fn run(
 fn figures(here: &Path, truth: &Path, ear: &Ear, keep: &[String]) -> Result<Vec<Option<f64>>, StudyError> {
     let run = Run::read_parts(here, truth, &ear.directory)?;
     let errors = Errors::measure(&run)?;
-    let summary = Summary::new(&run, &errors, &Clock::measure(&run, &errors));
+    let summary = Summary::new(&run, &errors, &Clock::measure(&run, &errors)?)?;
     let json = serde_json::to_value(&summary).map_err(|e| StudyError::Bug(e.to_string()))?;
+    let places = places_s(&run)?;
     let of = |name: &String| match name.as_str() {
         "acquisition.detected_share" => first_search(&run).0,
         "acquisition.false" => Some(first_search(&run).1),
-        "theory.tracking.pll_sigma_deg" => pll_theory_deg(&run, &ear.settings, &summary),
+        "theory.tracking.pll_sigma_deg" => pll_theory_deg(&places, &ear.settings, &summary),
         "theory.tracking.dll_sigma_chips" => {
             let channel = limits::channel(&ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz);
             expect::code_chips(&channel).map(|jitter| jitter.sigma)
@@ -220,8 +222,7 @@ fn number(json: &Json, path: &str) -> Option<f64> {
 
 /// Share of the satellites in view at the start that the first search found, and how many it found that were not there.
 fn first_search(run: &Run) -> (Option<f64>, f64) {
-    let start = run.sky.iter().map(|row| row.sample).min();
-    let there: Vec<_> = run.sky.iter().filter(|row| Some(row.sample) == start).map(|row| row.sv).collect();
+    let there = &run.in_view_at_start;
     let first = run.acquisition.iter().map(|row| row.sample).min();
     let hits = || run.acquisition.iter().filter(|row| Some(row.sample) == first && row.acquired);
     let found = hits().filter(|row| there.contains(&row.sv)).count();
@@ -229,9 +230,18 @@ fn first_search(run: &Run) -> (Option<f64>, f64) {
     (share, (hits().count() - found) as f64)
 }
 
+/// When within its second the signal of each true observation was sent.
+fn places_s(run: &Run) -> Result<Vec<f64>, JudgeError> {
+    let mut places = Vec::with_capacity(run.truth.len());
+    for link in run.truth.keys() {
+        places.extend(run.truth.map(link, |row| row.sent_fraction_s)?);
+    }
+    Ok(places)
+}
+
 /// Jitter of the carrier as it is observed: at instants, where the discriminator sees means over an integration. Where in
 /// the running integration an observation falls follows from the time sent, as integrations begin with symbols.
-fn pll_theory_deg(run: &Run, settings: &Settings, summary: &Summary) -> Option<f64> {
+fn pll_theory_deg(places_s: &[f64], settings: &Settings, summary: &Summary) -> Option<f64> {
     let cn0_dbhz = summary.details.cn0_effective_dbhz?;
     let channel = limits::channel(&settings.tracking, Mode::Phase, Some(cn0_dbhz));
     let update_s = channel.update_s();
@@ -240,11 +250,10 @@ fn pll_theory_deg(run: &Run, settings: &Settings, summary: &Summary) -> Option<f
     let (start, middle, end) = (gain(0.0)?, gain(0.5)?, gain(1.0)?);
     // The variance is a quadratic of the place, here from -1/2 to 1/2.
     let (slope, curve) = (end - start, 2.0 * (start + end - 2.0 * middle));
-    let gains: Vec<f64> = run
-        .truth
+    let gains: Vec<f64> = places_s
         .iter()
-        .map(|row| {
-            let integrations = row.sent_fraction_s / update_s;
+        .map(|sent_s| {
+            let integrations = sent_s / update_s;
             let place = integrations - integrations.floor() - 0.5;
             middle + place * (slope + place * curve)
         })

@@ -1,0 +1,108 @@
+//! The files of a run: tables row by row, and JSON; a file that is missing is named together with what would write it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+
+use crate::analysis::JudgeError;
+
+pub(super) fn missing(path: &Path, remedy: &'static str) -> JudgeError {
+    JudgeError::Missing { path: path.to_owned(), remedy }
+}
+
+/// Gives every row of a CSV file to `take`, with the number of its line; a file without even a header has none.
+pub(super) fn each<T: DeserializeOwned>(
+    path: &Path,
+    remedy: &'static str,
+    mut take: impl FnMut(u64, T) -> Result<(), JudgeError>,
+) -> Result<(), JudgeError> {
+    let file = fs::File::open(path).map_err(|source| open_error(path, remedy, source))?;
+    let failed = |error: csv::Error| {
+        let path = path.to_owned();
+        if !error.is_io_error() {
+            return JudgeError::Row { path, source: error };
+        }
+        match error.into_kind() {
+            csv::ErrorKind::Io(source) => JudgeError::Read { path, source },
+            other => JudgeError::Read { path, source: io::Error::other(format!("{other:?}")) },
+        }
+    };
+    // The header is line 1.
+    (2..)
+        .zip(csv::Reader::from_reader(io::BufReader::new(file)).deserialize())
+        .try_for_each(|(line, row)| take(line, row.map_err(failed)?))
+}
+
+/// All rows of a CSV file.
+pub(super) fn rows<T: DeserializeOwned>(path: &Path, remedy: &'static str) -> Result<Vec<T>, JudgeError> {
+    let mut rows = Vec::new();
+    each(path, remedy, |_, row| {
+        rows.push(row);
+        Ok(())
+    })?;
+    Ok(rows)
+}
+
+/// Whole GPS seconds that a row may bear: 1980 to 2296, far from where arithmetic on them ends.
+const SECONDS: std::ops::RangeInclusive<i64> = 0..=10_000_000_000;
+
+/// Refuses a row whose GPS time is not believable.
+pub(super) fn believable(path: &Path, line: u64, seconds: i64) -> Result<(), JudgeError> {
+    if SECONDS.contains(&seconds) {
+        return Ok(());
+    }
+    let what = format!("its GPS time is not within {} to {} s", SECONDS.start(), SECONDS.end());
+    Err(JudgeError::Line { path: path.to_owned(), line, what })
+}
+
+/// All rows of a CSV file whose times are believable.
+pub(super) fn dated<T: DeserializeOwned>(
+    path: &Path,
+    remedy: &'static str,
+    seconds: impl Fn(&T) -> i64,
+) -> Result<Vec<T>, JudgeError> {
+    let mut rows = Vec::new();
+    each(path, remedy, |line, row| {
+        believable(path, line, seconds(&row))?;
+        rows.push(row);
+        Ok(())
+    })?;
+    Ok(rows)
+}
+
+/// All rows of a CSV file that a run may lack.
+pub(super) fn optional<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, JudgeError> {
+    match rows(path, "") {
+        Err(JudgeError::Missing { .. }) => Ok(Vec::new()),
+        other => other,
+    }
+}
+
+fn open_error(path: &Path, remedy: &'static str, source: io::Error) -> JudgeError {
+    match source.kind() {
+        io::ErrorKind::NotFound => missing(path, remedy),
+        _ => JudgeError::Read { path: path.to_owned(), source },
+    }
+}
+
+/// A JSON file, or `None` if there is none.
+pub(super) fn json<T: DeserializeOwned>(path: &PathBuf) -> Result<Option<T>, JudgeError> {
+    match fs::read(path) {
+        Ok(bytes) => {
+            serde_json::from_slice(&bytes).map(Some).map_err(|source| JudgeError::Json { path: path.clone(), source })
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(JudgeError::Read { path: path.clone(), source }),
+    }
+}
+
+/// A text file, or `None` if there is none.
+pub(super) fn text(path: &Path) -> Result<Option<String>, JudgeError> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(String::from_utf8_lossy(&bytes).into_owned())),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(JudgeError::Read { path: path.to_owned(), source }),
+    }
+}
