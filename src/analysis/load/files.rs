@@ -16,9 +16,16 @@ pub(super) fn missing(path: &Path, remedy: &'static str) -> JudgeError {
 pub(super) fn each<T: DeserializeOwned>(
     path: &Path,
     remedy: &'static str,
+    take: impl FnMut(u64, T) -> Result<(), JudgeError>,
+) -> Result<(), JudgeError> {
+    each_of(fs::File::open(path).map_err(|source| open_error(path, remedy, source))?, path, take)
+}
+
+fn each_of<T: DeserializeOwned>(
+    input: impl io::Read,
+    path: &Path,
     mut take: impl FnMut(u64, T) -> Result<(), JudgeError>,
 ) -> Result<(), JudgeError> {
-    let file = fs::File::open(path).map_err(|source| open_error(path, remedy, source))?;
     let failed = |error: csv::Error| {
         let path = path.to_owned();
         if !error.is_io_error() {
@@ -29,10 +36,11 @@ pub(super) fn each<T: DeserializeOwned>(
             other => JudgeError::Read { path, source: io::Error::other(format!("{other:?}")) },
         }
     };
+    let mut reader = csv::ReaderBuilder::new().buffer_capacity(1 << 16).from_reader(input);
+    // Rows alone would take a header that cannot be read for one that is not there.
+    reader.headers().map_err(failed)?;
     // The header is line 1.
-    (2..)
-        .zip(csv::Reader::from_reader(io::BufReader::new(file)).deserialize())
-        .try_for_each(|(line, row)| take(line, row.map_err(failed)?))
+    (2..).zip(reader.into_deserialize()).try_for_each(|(line, row)| take(line, row.map_err(failed)?))
 }
 
 /// All rows of a CSV file.
@@ -104,5 +112,50 @@ pub(super) fn text(path: &Path) -> Result<Option<String>, JudgeError> {
         Ok(bytes) => Ok(Some(String::from_utf8_lossy(&bytes).into_owned())),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(source) => Err(JudgeError::Read { path: path.to_owned(), source }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fails at one of its calls, and goes on as if nothing had been.
+    struct Flaky<'a> {
+        text: &'a [u8],
+        calls: usize,
+        fails: usize,
+    }
+
+    impl io::Read for Flaky<'_> {
+        fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+            self.calls += 1;
+            if self.calls == self.fails {
+                return Err(io::ErrorKind::OutOfMemory.into());
+            }
+            let most = to.len().min(3);
+            self.text.read(&mut to[..most])
+        }
+    }
+
+    #[test]
+    fn a_read_that_fails_is_told_wherever_it_is() {
+        let text = b"frequency_hz,density_db\n1,2\n3,4\n";
+        let mut refused = 0;
+        for fails in 1..20 {
+            let mut rows = Vec::new();
+            let read = each_of(Flaky { text, calls: 0, fails }, Path::new("psd.csv"), |line, row: (f64, f64)| {
+                rows.push((line, row));
+                Ok(())
+            });
+            match read {
+                Ok(()) => assert_eq!(rows, [(2, (1.0, 2.0)), (3, (3.0, 4.0))], "at call {fails}"),
+                Err(error) => {
+                    assert!(matches!(error, JudgeError::Read { .. }), "{error}");
+                    refused += 1;
+                }
+            }
+        }
+        // Twelve pieces of three bytes, and the end.
+        assert!(refused >= 12, "{refused}");
     }
 }

@@ -167,8 +167,12 @@ impl Table {
     /// [`PatternError`] with row and column.
     pub fn read(input: impl Read, name: &str) -> Result<Self, PatternError> {
         let mut rows = Vec::new();
-        for row in csv::Reader::from_reader(input).deserialize::<Row>() {
-            let row = row.map_err(|source| PatternError::Csv { name: name.to_owned(), source })?;
+        let failed = |source| PatternError::Csv { name: name.to_owned(), source };
+        let mut reader = csv::Reader::from_reader(input);
+        // Rows alone would take a header that cannot be read for one that is not there.
+        reader.headers().map_err(failed)?;
+        for row in reader.into_deserialize::<Row>() {
+            let row = row.map_err(failed)?;
             let checks = [
                 ("azimuth_deg", row.azimuth_deg, 0.0, 359.999, "0 to less than 360"),
                 ("elevation_deg", row.elevation_deg, -90.0, 90.0, "-90 to 90"),
