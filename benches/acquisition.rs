@@ -14,7 +14,9 @@ fn main() {
     let mut number = 0;
     let mut writer = || {
         number += 1;
-        Writer::create(&directory.path().join(number.to_string())).unwrap()
+        let place = directory.path().join(number.to_string());
+        std::fs::create_dir(&place).unwrap();
+        Writer::create(&place).unwrap()
     };
     let search = settings(1e-6);
     let mut rows = Vec::new();

@@ -262,6 +262,9 @@ fn position(fidelity: Fidelity) -> [f64; 3] {
     let scene = scene(STATIC, fidelity, 45.0, "ci8", true);
     let run = tempfile::tempdir().unwrap();
     let mut samples = Vec::new();
+    for name in ["truth", "rx"] {
+        std::fs::create_dir(run.path().join(name)).unwrap();
+    }
     let mut writer = truth::Writer::create(&run.path().join("truth")).unwrap();
     generate_with(&scene, &mut samples, &mut writer, &mut |_| (), &Options::default()).unwrap();
     drop(writer);

@@ -48,8 +48,12 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     let staging = Staging::directory(&target)?;
     let run = staging.path();
 
-    let mut truth = truth::Writer::create(&run.join("truth")).map_err(truth_error)?;
-    let mut output = Output::create(&run.join("rx")).map_err(output_error)?;
+    let below = |name| {
+        let path = run.join(name);
+        fs::create_dir(&path).map_err(|error| CliError::create(path.display(), &error)).map(|()| path)
+    };
+    let mut truth = truth::Writer::create(&below("truth")?).map_err(truth_error)?;
+    let mut output = Output::create(&below("rx")?).map_err(output_error)?;
     let mut tap = Tap::new(&scene, run, arguments.keep_if)?;
     let both = both(&scene, &settings, &mut truth, &mut output, &mut tap)?;
     tap.finish(run)?;

@@ -318,7 +318,11 @@ mod tests {
     #[test]
     fn searches_find_what_their_statistics_say() {
         let directory = tempfile::tempdir().unwrap();
-        let writer = |n: u32| truth::Writer::create(&directory.path().join(n.to_string())).unwrap();
+        let writer = |n: u32| {
+            let place = directory.path().join(n.to_string());
+            std::fs::create_dir(&place).unwrap();
+            truth::Writer::create(&place).unwrap()
+        };
         for (n, cn0_dbhz) in (0..).zip([32.5, 34.0]) {
             let row = detections(&settings(1e-6), cn0_dbhz, 200, 5, &mut writer(n)).unwrap();
             // Four deviations of the count, and of the expectation's own draws.

@@ -153,15 +153,17 @@ fn inject(task: &Task, fault: &Fault) -> Became {
         70 if ended.message.contains("unexpected error during closedir") => Some(NOT_CLOSED),
         _ => None,
     };
-    match (judge(task, place, &ended, fault, library.is_some()), library) {
+    // Counted a thread, a signal may come to two of them, and the second ends the program at once.
+    let at_once = killed || library.is_some() || trace.matches("--- SIGTERM").count() > 1;
+    match (judge(task, place, &ended, fault, library.is_some(), at_once), library) {
         (Ok(_), Some(why)) => Became::Library(why),
         (Ok(end), None) => Became::Held(end),
         (Err(what), _) => Became::Failed(format!("{what}: {}", ended.message.trim())),
     }
 }
 
-fn judge(task: &Task, place: &Path, ended: &Ended, fault: &Fault, library: bool) -> Result<End, String> {
-    let killed = library || fault.what == "signal=KILL";
+/// `at_once`: it had no time to take away what was in the making, which the next run must sweep.
+fn judge(task: &Task, place: &Path, ended: &Ended, fault: &Fault, library: bool, at_once: bool) -> Result<End, String> {
     let allowed: &[i32] = match fault.what.as_str() {
         _ if library => &[70, 134],
         "signal=KILL" => &[137],
@@ -182,10 +184,10 @@ fn judge(task: &Task, place: &Path, ended: &Ended, fault: &Fault, library: bool)
         return Err(format!("exit {code} without a word"));
     }
     let left = left_over(&found);
-    if !left.is_empty() && !killed && !SWEEPING.contains(&fault.call) {
+    if !left.is_empty() && !at_once && !SWEEPING.contains(&fault.call) {
         return Err(format!("exit {code} leaves {left:?}"));
     }
-    if let Some(whole) = task.whole.filter(|_| !killed)
+    if let Some(whole) = task.whole.filter(|_| !at_once)
         && !found.keys().any(|name| name.starts_with(&format!("{whole}/")))
     {
         return Err(format!("exit {code}: neither the old nor the new {whole} is left"));

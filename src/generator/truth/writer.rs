@@ -116,14 +116,11 @@ struct OscillatorFile {
 }
 
 impl Writer {
-    /// Creates the directory, if need be, and the files in it. Not its parents: what a signal takes away must not come back.
+    /// Creates the files in a directory that is there: were it made here, one that a signal has taken away would come back.
     ///
     /// # Errors
     /// [`TruthError`] with the path that failed.
     pub fn create(directory: &Path) -> Result<Self, TruthError> {
-        fs::create_dir(directory)
-            .or_else(|error| if directory.is_dir() { Ok(()) } else { Err(error) })
-            .map_err(|source| TruthError::File { path: directory.to_owned(), source })?;
         let rays = directory.join("rays.csv");
         if rays.exists() {
             fs::remove_file(&rays).map_err(|source| TruthError::File { path: rays, source })?;

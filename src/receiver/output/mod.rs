@@ -139,15 +139,11 @@ const INTERFERENCE: [&str; 8] =
     ["sample", "frequency_hz", "jn0_dbhz", "js_db", "statistic", "threshold", "lines", "resolution_hz"];
 
 impl Output {
-    /// Creates the directory, if it is not there, and the files in it. Not its parents: what a signal takes away must not
-    /// come back.
+    /// Creates the files in a directory that is there: were it made here, one that a signal has taken away would come back.
     ///
     /// # Errors
     /// [`OutputError::Create`] with the path that cannot be made.
     pub fn create(directory: &Path) -> Result<Self, OutputError> {
-        fs::create_dir(directory)
-            .or_else(|error| if directory.is_dir() { Ok(()) } else { Err(error) })
-            .map_err(|error| create_error(directory, error))?;
         Ok(Self {
             directory: directory.to_owned(),
             observations: Sheet::create(directory, "observations.csv", &OBSERVATIONS)?,

@@ -4,6 +4,7 @@
 //! `summary.json` by their path, the first search's detections, and what theory predicts of the loops under thermal
 //! noise. Limits: truth and records pass through files in a scratch directory, samples never do.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -157,12 +158,19 @@ pub fn run(
     let overrides = Overrides { seed: Some(study.seed_of(first, &base.name)), ..Overrides::default() };
     let (scene, _) = scenario.compose(&base.directory, &overrides).map_err(|e| refused(first, e.without_place()))?;
     let here = temporary::directory(scratch)?;
-    let truth_path = here.path().join("truth");
+    let below = |name: &str| {
+        let path = here.path().join(name);
+        match fs::create_dir(&path) {
+            Ok(()) => Ok(path),
+            Err(source) => Err(StudyError::Create { path, source }),
+        }
+    };
+    let truth_path = below("truth")?;
     let mut truth = truth::Writer::create(&truth_path).map_err(GenerateError::Truth)?;
     let mut ears = Vec::new();
     for (number, case) in cases.iter().enumerate() {
         let (_, settings) = of(case)?;
-        let directory = here.path().join(format!("rx{number}"));
+        let directory = below(&format!("rx{number}"))?;
         let output = Output::create(&directory)?;
         let reception = Some(Reception::new(&scene.metadata, &settings)?);
         ears.push(Ear { directory, settings, output, reception });
