@@ -198,8 +198,6 @@ fn moves(trajectory: &Trajectory) -> Result<u64, String> {
 
 fn targets() -> Vec<Target<'static>> {
     const MANY: (usize, usize) = (1_000_000, 300);
-    // A text of TOML takes several times as long as any other file.
-    const SOME: (usize, usize) = (300_000, 300);
     let options = || Options { start: Epoch::parse("2010-07-01T08:05:58").unwrap(), max_gap_s: 2.0 };
     let navigation = |bytes: &[u8]| {
         let found = rinex::read(bytes, "file").map_err(text)?;
@@ -208,8 +206,6 @@ fn targets() -> Vec<Target<'static>> {
     };
     let simple =
         |name, corpus, read: Read<'static>| Target { name, corpus, prefix: "file".to_owned(), runs: MANY, read };
-    let slower =
-        |name, corpus, read: Read<'static>| Target { name, corpus, prefix: "file".to_owned(), runs: SOME, read };
     let scenes = SCENES.iter().map(|(_, text)| text.as_bytes().to_vec()).collect();
     let packed_corpus = kept(&["v2.10n"]).iter().map(|text| packed(text)).collect();
     vec![
@@ -282,22 +278,22 @@ fn targets() -> Vec<Target<'static>> {
             kept(&["antenna.csv"]),
             Box::new(|bytes| antenna::Table::read(bytes, "file").map(hashed).map_err(text)),
         ),
-        slower(
+        simple(
             "scenario, TOML",
             scenes,
             Box::new(|bytes| Scenario::parse(&String::from_utf8_lossy(bytes), "file").map(hashed).map_err(text)),
         ),
-        slower(
+        simple(
             "receiver's settings, TOML",
             vec![SETTINGS.into()],
             Box::new(|bytes| Settings::parse(&String::from_utf8_lossy(bytes), "file").map(hashed).map_err(text)),
         ),
-        slower(
+        simple(
             "limits, TOML",
             vec![LIMITS.into()],
             Box::new(|bytes| Limits::parse(&String::from_utf8_lossy(bytes), "file").map(hashed).map_err(text)),
         ),
-        slower(
+        simple(
             "study, TOML",
             vec![STUDY.into()],
             Box::new(|bytes| Study::parse(&String::from_utf8_lossy(bytes), "file").map(hashed).map_err(text)),
@@ -391,7 +387,7 @@ fn whatever_stands_in_a_study_s_directory_or_a_run_s_tables_is_read_or_refused()
             name: "manifest of a study",
             corpus: vec![manifest.clone()],
             prefix: planned.display().to_string(),
-            runs: (100_000, 200),
+            runs: (1_000_000, 200),
             read: Box::new(|bytes| {
                 fs::write(planned.join("manifest.json"), bytes).unwrap();
                 match Plan::load(&planned) {
