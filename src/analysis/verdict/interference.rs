@@ -1,0 +1,56 @@
+//! What the receiver reported of continuous waves, and whether it followed a spoofer.
+
+use super::{Bound, Verdict};
+use crate::analysis::summary::Summary;
+
+impl Verdict {
+    pub(super) fn interference(&mut self, summary: &Summary) {
+        let Some(lines) = summary.interference else { return };
+        self.judge(
+            "interference told while there was none",
+            "interference.false_told",
+            lines.false_told,
+            "",
+            Bound::Max(0.0),
+            "the detector's false alarms come once in a million seconds",
+        );
+        if lines.wave_seconds == 0 {
+            return;
+        }
+        self.judge(
+            "seconds of a continuous wave that were not told",
+            "",
+            lines.wave_seconds - lines.wave_seconds_told,
+            "",
+            Bound::Max(0.0),
+            "none of those with a wave of J/N0 ≥ 45 dB-Hz all through",
+        );
+        // Where a wave is never alone, what is told may be another source's line.
+        if let (Some(bin_hz), Some(error_hz)) = (lines.resolution_hz, lines.frequency_error_max_hz) {
+            let source = "half a bin of the receiver's spectrum";
+            self.judge(
+                "frequency of the continuous wave, largest error",
+                "interference.frequency_error_max_hz",
+                error_hz,
+                "Hz",
+                Bound::Max(0.5 * bin_hz),
+                source,
+            );
+        }
+    }
+
+    pub(super) fn spoofing(&mut self, summary: &Summary) {
+        let Some(spoofing) = &summary.spoofing else { return };
+        if let Some(share) = spoofing.captured_share {
+            let source = "no fix should follow a spoofer";
+            self.judge(
+                "fixes captured by the spoofer",
+                "spoofing.captured_share",
+                share,
+                "of 1",
+                Bound::Max(0.0),
+                source,
+            );
+        }
+    }
+}
