@@ -1,0 +1,319 @@
+//! The state of a reception between blocks: channels, what they decoded, the receiver's clock, the solver.
+//!
+//! [`search`] starts and ends channels, [`decode`] takes in messages, [`measure`] observes and solves.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::record::{EventRow, LineRow};
+use crate::gnss::samples::IfMetadata;
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{SIGNALS, Signal};
+use crate::gnss::time::Epoch;
+use crate::receiver::acquire::{self, Searcher};
+use crate::receiver::decode::Decoder;
+use crate::receiver::diagnosis::Stage;
+use crate::receiver::interference::Watch;
+use crate::receiver::observe::Timebase;
+use crate::receiver::output::Output;
+use crate::receiver::position::least_squares::{LARGEST_CONDITION, UNKNOWNS};
+use crate::receiver::position::{CodeNoise, NoFix, Solver};
+use crate::receiver::run::{Conditioning, Interfered, Outcome, ReceiveError, candidates, warnings};
+use crate::receiver::settings::Settings;
+use crate::receiver::source::{Packed, Planes};
+use crate::receiver::track::{Channel, LoopMargin, Report, code_shape};
+
+mod decode;
+mod measure;
+mod search;
+
+/// So many fixes in a row have to show a channel's wrong time.
+const WRONG_TIME_FIXES: u32 = 10;
+
+/// Channels go over a block in parts of so many samples at least: 512 KiB in planar `f32`, a core's own cache …
+const PART_SAMPLES: usize = 1 << 16;
+/// … and so long at least, as a code period that a part's end cuts is copied.
+const PART_S: f64 = 0.01;
+
+/// One channel and its decoder.
+struct Track {
+    channel: Channel,
+    decoder: Option<Decoder>,
+    report: Report,
+    since: u64,
+    cn0_dbhz: f64,
+    symbols: u64,
+    wrong_time: u32,
+    dropped: bool,
+}
+
+/// Samples collected for a search.
+struct Window {
+    first: u64,
+    samples: Planes,
+}
+
+/// What became of a satellite, for the diagnosis.
+#[derive(Clone, Default)]
+struct Progress {
+    symbols: bool,
+    frame: bool,
+    missing: Vec<u8>,
+}
+
+pub(super) struct Session {
+    metadata: IfMetadata,
+    settings: Settings,
+    week_reference: Epoch,
+    candidates: Vec<(&'static Signal, Sv)>,
+    first_search: Searcher,
+    later_searches: Searcher,
+    needed: u64,
+    searched: bool,
+    next_search: u64,
+    window: Option<Window>,
+    tracks: Vec<Track>,
+    /// Of each share of the tracks.
+    planes: Vec<Planes>,
+    lost: BTreeMap<(&'static Signal, Sv), u64>,
+    refused: BTreeMap<(&'static Signal, Sv), u64>,
+    timebase: Timebase,
+    solver: Solver,
+    ephemerides: BTreeMap<Sv, Ephemeris>,
+    klobuchar: Option<Klobuchar>,
+    next_tick: u64,
+    strongest: Option<(Sv, f64, f64)>,
+    progress: BTreeMap<Sv, Progress>,
+    acquired: BTreeSet<Sv>,
+    used: BTreeSet<Sv>,
+    fixes: u64,
+    first_fix_s: Option<f64>,
+    losses: u64,
+    reason: Option<NoFix>,
+    watch: Watch,
+    /// Median C/N0 of the satellites when the spectrum last had no line.
+    quiet_dbhz: Option<f64>,
+    interfered: Option<Interfered>,
+    worst_condition: Option<f64>,
+    loops: [LoopMargin; 5],
+}
+
+impl Session {
+    pub(super) fn new(metadata: &IfMetadata, settings: &Settings) -> Result<Self, ReceiveError> {
+        let mut later = settings.acquisition.clone();
+        later.false_alarm_probability =
+            (later.false_alarm_probability * settings.operation.repeated_false_alarm_share).max(1e-12);
+        let week_reference = settings.week_reference().map_err(|source| {
+            crate::receiver::settings::SettingsError::Week { origin: "settings".to_owned(), source }
+        })?;
+        let component = SIGNALS.first().and_then(|signal| signal.components.first());
+        let (chip_rate_hz, period_s) = component.map_or((1.0, 1.0), |c| (c.chip_rate_hz, c.period_s()));
+        let noise = CodeNoise {
+            chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
+            shape: code_shape(&settings.tracking, chip_rate_hz / metadata.rate.hz()),
+            bandwidth_hz: settings.tracking.dll_bandwidth_hz,
+            integration_s: period_s * f64::from(settings.tracking.integration),
+        };
+        Ok(Self {
+            metadata: metadata.clone(),
+            settings: settings.clone(),
+            week_reference,
+            candidates: candidates(metadata),
+            first_search: Searcher::new(metadata, &settings.acquisition)?,
+            later_searches: Searcher::new(metadata, &later)?,
+            needed: acquire::samples_needed(metadata, &settings.acquisition)?,
+            searched: false,
+            next_search: 0,
+            window: None,
+            tracks: Vec::new(),
+            planes: Vec::new(),
+            lost: BTreeMap::new(),
+            refused: BTreeMap::new(),
+            timebase: Timebase::new(metadata.rate, metadata.start),
+            solver: Solver::new(&settings.position, noise, metadata.rate),
+            ephemerides: BTreeMap::new(),
+            klobuchar: None,
+            next_tick: 0,
+            strongest: None,
+            progress: BTreeMap::new(),
+            acquired: BTreeSet::new(),
+            used: BTreeSet::new(),
+            fixes: 0,
+            first_fix_s: None,
+            losses: 0,
+            reason: None,
+            watch: Watch::new(metadata),
+            quiet_dbhz: None,
+            interfered: None,
+            worst_condition: None,
+            loops: settings.tracking.margins(period_s),
+        })
+    }
+
+    fn samples(&self, seconds: f64) -> u64 {
+        (seconds * self.metadata.rate.hz()) as u64
+    }
+
+    /// Takes the next block through the whole chain.
+    pub(super) fn process(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
+        self.search(block, output)?;
+        let (ticks, measured) = self.ticks(block);
+        self.follow(block, &ticks);
+        self.record(output)?;
+        self.decode(output)?;
+        for tick in measured {
+            self.measure(tick, output)?;
+        }
+        self.watch(block, output)?;
+        self.retire(block.end(), output)
+    }
+
+    /// Takes every channel through the block, on every core its share of them.
+    ///
+    /// Each share unpacks the samples for itself, in parts that stay in its core's cache: to read what another core has
+    /// written takes longer than to unpack it again.
+    fn follow(&mut self, block: &Packed, ticks: &[u64]) {
+        let share = self.tracks.len().div_ceil(rayon::current_num_threads()).max(1);
+        self.planes.resize_with(self.tracks.len().div_ceil(share), Planes::default);
+        let part = PART_SAMPLES.max(self.samples(PART_S) as usize);
+        self.tracks.par_chunks_mut(share).zip(&mut self.planes).for_each(|(tracks, planes)| {
+            tracks.iter_mut().for_each(|track| clear(&mut track.report));
+            for start in (0..block.samples()).step_by(part) {
+                let samples = block.unpack(start..start + part, planes);
+                let ticks = within(ticks, samples.first, samples.first + samples.i.len() as u64);
+                for track in tracks.iter_mut() {
+                    track.channel.advance(&samples, ticks, &mut track.report);
+                }
+            }
+        });
+    }
+
+    /// Looks for continuous waves, and tells of those that are none of the satellites' own lines.
+    fn watch(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
+        let mut followed: Vec<f64> = self.tracks.iter().map(|track| track.cn0_dbhz).collect();
+        followed.sort_by(f64::total_cmp);
+        let strongest_hz = followed.last().map_or(0.0, |dbhz| libm::pow(10.0, dbhz / 10.0));
+        let mut told = Vec::new();
+        self.watch.take(block, strongest_hz, |_, row| told.push(row));
+        for row in told {
+            let Some(row) = row else {
+                self.quiet_dbhz = followed.get(followed.len() / 2).copied().or(self.quiet_dbhz);
+                continue;
+            };
+            let row = LineRow { js_db: self.quiet_dbhz.map(|dbhz| row.jn0_dbhz - dbhz), ..row };
+            output.interference(&row)?;
+            let seen = self.interfered.get_or_insert_with(|| Interfered { spectra: 0, strongest: row.clone() });
+            seen.spectra += 1;
+            if row.jn0_dbhz > seen.strongest.jn0_dbhz {
+                seen.strongest = row;
+            }
+        }
+        Ok(())
+    }
+
+    /// Samples of this block at which channels report, and those of them at which the receiver measures.
+    fn ticks(&mut self, block: &Packed) -> (Vec<u64>, Vec<u64>) {
+        let operation = &self.settings.operation;
+        let step_ms = u64::from(operation.tracking_interval_ms);
+        let each = u64::from(operation.measurement_interval_ms / operation.tracking_interval_ms).max(1);
+        let end = block.end();
+        let (mut ticks, mut measured) = (Vec::new(), Vec::new());
+        loop {
+            let sample = self.metadata.rate.first_sample_at(self.next_tick * step_ms, 1000);
+            if sample >= end {
+                return (ticks, measured);
+            }
+            // Below 1000 samples a second several ticks would meet in one sample.
+            if ticks.last() != Some(&sample) {
+                ticks.push(sample);
+            }
+            if self.next_tick.is_multiple_of(each) && measured.last() != Some(&sample) {
+                measured.push(sample);
+            }
+            self.next_tick += 1;
+        }
+    }
+
+    /// Writes rows and events of all channels.
+    fn record(&mut self, output: &mut Output) -> Result<(), ReceiveError> {
+        for track in &mut self.tracks {
+            for row in &track.report.rows {
+                output.tracking(row)?;
+            }
+            for &(sample, event) in &track.report.events {
+                let (sv, signal) = (track.channel.sv(), track.channel.signal());
+                output.event(&EventRow { sample, sv, signal, event })?;
+            }
+            if let Some(last) = track.report.measurements.last() {
+                track.cn0_dbhz = last.cn0_dbhz;
+            }
+        }
+        Ok(())
+    }
+
+    /// What came of it; the caller adds what it knows of the samples.
+    pub(super) fn outcome(&self) -> Outcome {
+        Outcome {
+            samples: 0,
+            seconds: 0.0,
+            acquired: self.acquired.iter().copied().collect(),
+            used: self.used.iter().copied().collect(),
+            fixes: self.fixes,
+            first_fix_s: self.first_fix_s,
+            losses: self.losses,
+            cut_bytes: 0,
+            format_warning: None,
+            diagnosis: None,
+            interfered: self.interfered.clone(),
+            warnings: warnings(&self.metadata, &self.settings),
+            conditioning: Conditioning {
+                geometry_worst: self.worst_condition,
+                geometry_limit: LARGEST_CONDITION,
+                loops: self.loops.to_vec(),
+            },
+        }
+    }
+
+    /// The first stage that failed, where there was no fix.
+    pub(super) fn failed_stage(&self) -> Stage {
+        if self.acquired.is_empty() {
+            return Stage::NothingAcquired { strongest: self.strongest };
+        }
+        let of = |test: fn(&Progress) -> bool| -> Vec<Sv> {
+            self.progress.iter().filter(|(_, progress)| test(progress)).map(|(sv, _)| *sv).collect()
+        };
+        let with_symbols = of(|progress| progress.symbols);
+        if with_symbols.is_empty() {
+            return Stage::NoSymbols { acquired: self.acquired.iter().copied().collect() };
+        }
+        if of(|progress| progress.frame).is_empty() {
+            return Stage::NoFrame { with_symbols };
+        }
+        let complete: Vec<Sv> = self.ephemerides.keys().copied().collect();
+        if complete.len() < UNKNOWNS {
+            let lacking = |(sv, progress): (&Sv, &Progress)| {
+                (progress.frame && !progress.missing.is_empty()).then(|| (*sv, progress.missing.clone()))
+            };
+            return Stage::NoEphemeris { complete, missing: self.progress.iter().filter_map(lacking).collect() };
+        }
+        Stage::NoPosition { with_ephemeris: complete, reason: self.reason.clone() }
+    }
+}
+
+/// Empties a report and keeps its room.
+fn clear(report: &mut Report) {
+    report.measurements.clear();
+    report.symbols.clear();
+    report.rows.clear();
+    report.events.clear();
+}
+
+/// Those of the ascending `ticks` that lie in `first..end`.
+fn within(ticks: &[u64], first: u64, end: u64) -> &[u64] {
+    let of = |sample: u64| ticks.partition_point(|tick| *tick < sample);
+    ticks.get(of(first)..of(end)).unwrap_or_default()
+}
