@@ -12,8 +12,8 @@ use super::*;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::record::{
-    AcquisitionRow, Event, EventRow, Fix, InterferenceRow, LineRow, NavigationRow, Observation, SkyRow, TrackingRow,
-    TrajectoryRow,
+    AcquisitionRow, Event, EventRow, Fix, InterferenceRow, IonosphereModel, LineRow, NavigationRow, Observation,
+    SkyRow, TrackingRow, TrajectoryRow,
 };
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
@@ -202,7 +202,7 @@ fn write_estimate(run: &Path, planted: &Planted) {
             satellites: 8,
             chi_square: 4.0,
             excluded: String::new(),
-            ionosphere: true,
+            ionosphere: IonosphereModel::Broadcast,
         }
     };
     let fixes: Vec<Fix> =

@@ -160,8 +160,20 @@ pub struct Fix {
     pub chi_square: f64,
     /// Satellites left out by the residual test, separated by blanks.
     pub excluded: String,
-    /// Whether the ionosphere was corrected with decoded parameters.
-    pub ionosphere: bool,
+    /// How the ionosphere was corrected.
+    pub ionosphere: IonosphereModel,
+}
+
+/// What a fix was corrected by for the ionosphere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum IonosphereModel {
+    /// Nothing: the settings say that there is none.
+    None,
+    /// A typical ionosphere, whose error is in the covariance: no satellite's parameters have been decoded yet.
+    Nominal,
+    /// The parameters that the satellites send.
+    Broadcast,
 }
 
 impl Fix {
@@ -269,6 +281,8 @@ pub enum Event {
     BitSynchronised,
     FrameSynchronised,
     EphemerisComplete,
+    /// The ionosphere's parameters came, for the first time or other than before: fixes are corrected by them from here on.
+    IonosphereDecoded,
     /// The satellite says that it is unhealthy: it is not used from here on.
     Unhealthy,
     /// It says that it is healthy again.

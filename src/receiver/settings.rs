@@ -160,6 +160,7 @@ impl Settings {
             ("position.smoothing_s", position.smoothing_s, 0.0, 3600.0),
             ("position.false_alarm", position.false_alarm, 1e-12, 0.5),
             ("position.model_sigma_m", position.model_sigma_m, 1e-3, 100.0),
+            ("position.ionosphere_error_share", position.ionosphere_error_share, 0.0, 10.0),
             ("position.ionosphere_wait_s", position.ionosphere_wait_s, 0.0, 1500.0),
             ("operation.measurement_interval_ms", f64::from(operation.measurement_interval_ms), 10.0, 60_000.0),
             ("operation.tracking_interval_ms", f64::from(operation.tracking_interval_ms), 1.0, f64::from(operation.measurement_interval_ms)),

@@ -237,7 +237,7 @@ mod tests {
         let zero = |n: usize| vec!["0"; n].join(",");
         let observation: Observation = from_csv(&OBSERVATIONS, &format!("0,G03,{},{}", L1_CA.name, zero(7)));
         assert_eq!(header(&observation), OBSERVATIONS.join(","));
-        let fix: Fix = from_csv(&FIXES, &format!("{},,true", zero(26)));
+        let fix: Fix = from_csv(&FIXES, &format!("{},,broadcast", zero(26)));
         assert_eq!(header(&fix), FIXES.join(","));
         let row: AcquisitionRow = from_csv(&ACQUISITION, &format!("0,G03,{},true,{}", L1_CA.name, zero(5)));
         assert_eq!(header(&row), ACQUISITION.join(","));

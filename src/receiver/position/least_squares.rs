@@ -3,7 +3,8 @@
 //! Model: ρ = |R(Ωτ) r_s(t_e) − r| + b − c Δt_s + I + T with τ the geometric light time (the raw pseudorange would let a
 //! clock bias of 11 ms shift the fix by metres). Source: IS-GPS-200N, 20.3.3.4.3.4 and any
 //! textbook of estimation. Normal equations of four unknowns with lines of sight of unit length: their condition is that of
-//! the geometry, and is checked before they are solved.
+//! the geometry, and is checked before they are solved. Where the ionosphere's model has an error ([`Ionosphere::Uncertain`]) that
+//! error is a fifth unknown with a prior; it is eliminated, so that the covariance of the four contains it.
 
 use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
 
@@ -12,6 +13,7 @@ use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, Look, SPEED_OF_LIGHT_MP
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
+use crate::receiver::position::ionosphere::DelayError;
 use crate::receiver::position::{NoFix, troposphere};
 
 /// Unknowns: three coordinates and the clock.
@@ -28,8 +30,6 @@ const NEAR_EARTH_M: f64 = 6.2e6;
 pub const SPACE_M: f64 = 1e5;
 /// Klobuchar's model describes the whole ionosphere, which ends about here.
 const IONOSPHERE_TOP_M: f64 = 1e6;
-/// Standard deviation of an uncorrected ionosphere at the zenith.
-const IONOSPHERE_SIGMA_M: f64 = 5.0;
 
 /// A pseudorange and where its satellite was.
 #[derive(Clone, Debug)]
@@ -55,9 +55,10 @@ pub struct Range {
 pub enum Ionosphere {
     /// There is none.
     Absent,
-    /// There is one, uncorrected: ranges weigh less by its size.
-    Unknown,
+    /// The model is right but for what [`Corrections::model_sigma_m`] covers.
     Known(Klobuchar),
+    /// The model has an error that is common to all satellites: it is estimated with the position.
+    Uncertain(Klobuchar, DelayError),
 }
 
 /// What corrects and weights ranges.
@@ -87,8 +88,11 @@ pub struct Solution {
     pub dilution: Matrix4<f64>,
     /// Ratio of the extreme singular values of the geometry.
     pub condition: f64,
-    /// Weighted sum of squared residuals.
+    /// Weighted sum of squared residuals, the ionosphere's estimated error over its prior deviation among them: its degrees of
+    /// freedom are the number of ranges less four either way.
     pub chi_square: f64,
+    /// Estimated error of the ionosphere's model in its prior deviations; 0 where the model is right.
+    pub ionosphere_error: f64,
     pub iterations: u32,
 }
 
@@ -98,6 +102,39 @@ struct Line {
     sight: Vector3<f64>,
     sigma_m: f64,
     elevation_rad: f64,
+    /// What one prior deviation of the ionosphere's common error adds to the range.
+    common_m: f64,
+}
+
+/// The error of the ionosphere's model: z of prior mean 0 and variance 1.
+#[derive(Default)]
+struct Common {
+    /// Σ w f a over the ranges: a the four derivatives of a range, f its derivative by z.
+    coupling: Vector4<f64>,
+    /// Σ w f² and the prior's weight, 1.
+    weight: f64,
+    /// Σ w f v.
+    right: f64,
+}
+
+impl Common {
+    fn of(ranges: &[Range], lines: &[Line]) -> Self {
+        let mut common = Self { weight: 1.0, ..Self::default() };
+        for (range, line) in ranges.iter().zip(lines) {
+            let weighted = line.common_m / (line.sigma_m * line.sigma_m);
+            common.coupling += weighted * line.row();
+            common.weight += weighted * line.common_m;
+            common.right += weighted * (range.pseudorange_m - line.computed_m);
+        }
+        common
+    }
+}
+
+impl Line {
+    /// Derivatives of the range by position and clock.
+    fn row(&self) -> Vector4<f64> {
+        Vector4::new(-self.sight.x, -self.sight.y, -self.sight.z, 1.0)
+    }
 }
 
 fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Corrections, day: f64) -> Line {
@@ -111,23 +148,32 @@ fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Co
     let mut computed_m = distance_m + clock_m - SPEED_OF_LIGHT_MPS * range.clock.offset_s;
     let mut variance = range.noise_m * range.noise_m;
     let mut elevation_rad = std::f64::consts::FRAC_PI_2;
+    let mut common_m = 0.0;
     if position_m.norm() > NEAR_EARTH_M {
         let user = Geodetic::from_ecef(position_m);
         let direction = look(user, position_m, &seen_m);
         elevation_rad = direction.elevation_rad;
         let sine = libm::sin(elevation_rad);
         let received = range.emitted.plus_s(distance_m / SPEED_OF_LIGHT_MPS);
-        let (delay_m, sigma_m) = atmosphere(range, corrections, user, direction, received, day);
-        computed_m += delay_m;
-        variance += sigma_m * sigma_m;
+        let air = atmosphere(range, corrections, user, direction, received, day);
+        computed_m += air.delay_m;
+        variance += air.own_m * air.own_m;
+        common_m = air.common_m;
         let slant = if user.height_m < SPACE_M { sine.max(0.05) } else { 1.0 };
         let model_m = corrections.model_sigma_m / slant;
         variance += model_m * model_m;
     }
-    Line { computed_m, sight, sigma_m: variance.sqrt(), elevation_rad }
+    Line { computed_m, sight, sigma_m: variance.sqrt(), elevation_rad, common_m }
 }
 
-/// Delay by the atmosphere, and its standard deviation where the ionosphere is not corrected.
+/// Delay by the atmosphere, and deviations of the ionosphere's part: common to all satellites, and this one's own.
+#[derive(Default)]
+struct Air {
+    delay_m: f64,
+    common_m: f64,
+    own_m: f64,
+}
+
 fn atmosphere(
     range: &Range,
     corrections: &Corrections,
@@ -135,22 +181,24 @@ fn atmosphere(
     direction: Look,
     received: Epoch,
     day: f64,
-) -> (f64, f64) {
+) -> Air {
     let sine = libm::sin(direction.elevation_rad);
-    let troposphere_m = if corrections.troposphere { troposphere::delay_m(user, sine, day) } else { 0.0 };
+    let delay_m = if corrections.troposphere { troposphere::delay_m(user, sine, day) } else { 0.0 };
+    let alone = Air { delay_m, ..Air::default() };
     if user.height_m > IONOSPHERE_TOP_M {
-        return (troposphere_m, 0.0);
+        return alone;
     }
     match corrections.ionosphere {
-        Ionosphere::Absent => (troposphere_m, 0.0),
-        Ionosphere::Known(klobuchar) => {
-            let delay_s = klobuchar.delay_s(user, direction, received, range.carrier_hz);
-            (troposphere_m + SPEED_OF_LIGHT_MPS * delay_s, 0.0)
+        Ionosphere::Absent => alone,
+        Ionosphere::Known(model) => {
+            let delay_s = model.delay_s(user, direction, received, range.carrier_hz);
+            Air { delay_m: delay_m + SPEED_OF_LIGHT_MPS * delay_s, ..alone }
         }
-        Ionosphere::Unknown => {
-            // Thin shell at 350 km.
-            let cosine = 0.948 * libm::cos(direction.elevation_rad);
-            (troposphere_m, IONOSPHERE_SIGMA_M / (1.0 - cosine * cosine).sqrt())
+        Ionosphere::Uncertain(model, error) => {
+            let delay_s = model.delay_s(user, direction, received, range.carrier_hz);
+            let obliquity = model.bulge(user, direction, received).obliquity;
+            let (common_m, own_m) = error.slant_m(delay_s, obliquity);
+            Air { delay_m: delay_m + SPEED_OF_LIGHT_MPS * delay_s, common_m, own_m }
         }
     }
 }
@@ -172,13 +220,16 @@ pub fn position(ranges: &[Range], start_m: Vector3<f64>, corrections: &Correctio
         let lines: Vec<Line> = ranges.iter().map(|range| line(range, &position_m, clock_m, corrections, day)).collect();
         let (mut plain, mut normal, mut right) = (Matrix4::zeros(), Matrix4::zeros(), Vector4::zeros());
         for (range, line) in ranges.iter().zip(&lines) {
-            let row = Vector4::new(-line.sight.x, -line.sight.y, -line.sight.z, 1.0);
+            let row = line.row();
             let weight = 1.0 / (line.sigma_m * line.sigma_m);
             plain += row * row.transpose();
             normal += weight * row * row.transpose();
             right += weight * (range.pseudorange_m - line.computed_m) * row;
         }
         let condition = condition(&plain)?;
+        let common = Common::of(ranges, &lines);
+        normal -= common.coupling * common.coupling.transpose() / common.weight;
+        right -= common.right / common.weight * common.coupling;
         let solver = Cholesky::new(normal).ok_or(NoFix::Singular { condition: f64::INFINITY })?;
         let step = solver.solve(&right);
         position_m += Vector3::new(step.x, step.y, step.z);
@@ -215,9 +266,13 @@ fn finish(
     dilution: Matrix4<f64>,
 ) -> Solution {
     let lines: Vec<Line> = ranges.iter().map(|range| line(range, &position_m, clock_m, corrections, day)).collect();
-    let residuals_m: Vec<f64> =
-        ranges.iter().zip(&lines).map(|(range, line)| range.pseudorange_m - line.computed_m).collect();
-    let chi_square = residuals_m.iter().zip(&lines).map(|(v, line)| (v / line.sigma_m) * (v / line.sigma_m)).sum();
+    let common = Common::of(ranges, &lines);
+    let ionosphere_error = common.right / common.weight;
+    let residual =
+        |(range, line): (&Range, &Line)| range.pseudorange_m - line.computed_m - ionosphere_error * line.common_m;
+    let residuals_m: Vec<f64> = ranges.iter().zip(&lines).map(residual).collect();
+    let squares = residuals_m.iter().zip(&lines).map(|(v, line)| (v / line.sigma_m) * (v / line.sigma_m));
+    let chi_square = squares.sum::<f64>() + ionosphere_error * ionosphere_error;
     Solution {
         position_m,
         clock_m,
@@ -229,6 +284,7 @@ fn finish(
         dilution,
         condition: f64::INFINITY,
         chi_square,
+        ionosphere_error,
         iterations: 0,
     }
 }

@@ -1,8 +1,8 @@
 //! Place, velocity and time from observations and decoded ephemerides.
 //!
 //! A [`Solver`] smooths code with carrier ([`smooth`]), finds where satellites were, corrects the atmosphere by the decoded
-//! ionosphere and its own [`troposphere`], solves ([`least_squares`]) and tests the residuals, leaving out satellites
-//! that contradict the others. Limits: one clock for all signals; one contradicting satellite at a time is searched for.
+//! ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`troposphere`], solves ([`least_squares`]) and tests
+//! the residuals, leaving out satellites that contradict the others. Limits: one clock for all signals; one contradicting satellite at a time is searched for.
 
 use std::collections::BTreeMap;
 
@@ -14,17 +14,19 @@ use thiserror::Error;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::record::{Fix, Observation};
+use crate::gnss::record::{Fix, IonosphereModel, Observation};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, Rate, SampleClock};
 use crate::receiver::track::loops::CodeShape;
 
+pub mod ionosphere;
 pub mod least_squares;
 pub mod smooth;
 #[cfg(test)]
 mod tests;
 pub mod troposphere;
 
+use ionosphere::{DelayError, NOMINAL, NOMINAL_ERROR};
 use least_squares::{Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, Solution, UNKNOWNS};
 use smooth::Smoother;
 
@@ -38,7 +40,7 @@ const FIT_GRACE_S: f64 = 600.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IonosphereChoice {
-    /// Klobuchar's model with the parameters that satellites send.
+    /// Klobuchar's model with the parameters that satellites send; until they are decoded, a nominal ionosphere and its error.
     Broadcast,
     /// Not at all: recordings made without an ionosphere.
     None,
@@ -66,10 +68,13 @@ pub struct PositionSettings {
     /// Standard deviation of the models at the zenith, for weights; it grows with one over the elevation's sine.
     pub model_sigma_m: f64,
     pub ionosphere: IonosphereChoice,
+    /// Standard deviation of the broadcast ionosphere's error as a share of its delay, common to all satellites: about 0.5 under a
+    /// real sky, of whose ionosphere the model removes half; 0 where satellites broadcast what is true, as in most scenes.
+    pub ionosphere_error_share: f64,
     pub troposphere: TroposphereChoice,
     /// Whether there is no fix until the ionosphere's parameters are decoded.
     pub require_ionosphere: bool,
-    /// Else the first fix waits for them this long: in the best case they come six seconds after the ephemerides.
+    /// Else the first fix waits for them this long, counted from the fourth ephemeris; 0 for a fix at once.
     pub ionosphere_wait_s: f64,
 }
 
@@ -81,9 +86,10 @@ impl Default for PositionSettings {
             false_alarm: 1e-3,
             model_sigma_m: 0.1,
             ionosphere: IonosphereChoice::Broadcast,
+            ionosphere_error_share: 0.0,
             troposphere: TroposphereChoice::Standard,
             require_ionosphere: false,
-            ionosphere_wait_s: 8.0,
+            ionosphere_wait_s: 0.0,
         }
     }
 }
@@ -184,12 +190,9 @@ impl Solver {
             return Err(NoFix::TooFew { have: ranges.len(), need: UNKNOWNS });
         }
         self.await_ionosphere(sample, klobuchar)?;
+        let (ionosphere, model) = self.ionosphere(klobuchar);
         let corrections = Corrections {
-            ionosphere: match (self.settings.ionosphere, klobuchar) {
-                (IonosphereChoice::None, _) => Ionosphere::Absent,
-                (IonosphereChoice::Broadcast, Some(model)) => Ionosphere::Known(model),
-                (IonosphereChoice::Broadcast, None) => Ionosphere::Unknown,
-            },
+            ionosphere,
             troposphere: self.settings.troposphere == TroposphereChoice::Standard,
             model_sigma_m: self.settings.model_sigma_m,
         };
@@ -212,9 +215,23 @@ impl Solver {
             consistent(visible, first.position_m, &corrections, self.settings.false_alarm)?;
         let (velocity_mps, drift) = least_squares::velocity(&kept, &solution)?;
         self.last_m = Some(solution.position_m);
-        let known = matches!(corrections.ionosphere, Ionosphere::Known(_));
-        let fix = fix(sample, clock, &solution, velocity_mps, drift, kept.len(), &excluded, known);
+        let fix = fix(sample, clock, &solution, velocity_mps, drift, kept.len(), &excluded, model);
         Ok(Solved { fix, used: kept.iter().map(|range| range.sv).collect(), excluded })
+    }
+
+    /// What corrects for the ionosphere, and its name in a fix.
+    fn ionosphere(&self, klobuchar: Option<Klobuchar>) -> (Ionosphere, IonosphereModel) {
+        let share = self.settings.ionosphere_error_share;
+        match (self.settings.ionosphere, klobuchar) {
+            (IonosphereChoice::None, _) => (Ionosphere::Absent, IonosphereModel::None),
+            (IonosphereChoice::Broadcast, None) => {
+                (Ionosphere::Uncertain(NOMINAL, NOMINAL_ERROR), IonosphereModel::Nominal)
+            }
+            (IonosphereChoice::Broadcast, Some(model)) if share > 0.0 => {
+                (Ionosphere::Uncertain(model, DelayError { share, least_m: 0.0 }), IonosphereModel::Broadcast)
+            }
+            (IonosphereChoice::Broadcast, Some(model)) => (Ionosphere::Known(model), IonosphereModel::Broadcast),
+        }
     }
 
     fn await_ionosphere(&mut self, sample: u64, klobuchar: Option<Klobuchar>) -> Result<(), NoFix> {
@@ -329,7 +346,7 @@ fn fix(
     drift: f64,
     satellites: usize,
     excluded: &[(Sv, f64)],
-    ionosphere: bool,
+    ionosphere: IonosphereModel,
 ) -> Fix {
     let bias_s = solution.clock_m / SPEED_OF_LIGHT_MPS;
     let time: Epoch = clock.epoch(sample).plus_s(-bias_s);

@@ -43,8 +43,8 @@ impl Session {
                         None
                     }
                     News::Klobuchar(klobuchar) => {
-                        self.klobuchar = Some(klobuchar);
-                        None
+                        let before = self.klobuchar.replace(klobuchar);
+                        (before != Some(klobuchar)).then_some(Event::IonosphereDecoded)
                     }
                     News::Parameters(rows) => {
                         output.navigation(&rows)?;
