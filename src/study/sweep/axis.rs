@@ -54,14 +54,16 @@ impl Axis {
             None => range(table)?,
         };
         let texts: std::collections::BTreeSet<String> = values.iter().map(text_of).collect();
-        if texts.len() < values.len() || values.len() > MOST_VALUES {
+        // Axes that step together may repeat a value where another one changes: the grid checks them as one.
+        let zip = table.text("zip", "a word that other axes share")?.map(str::to_owned);
+        if (texts.len() < values.len() && zip.is_none()) || values.len() > MOST_VALUES {
             let name = if table.has("values") { "values" } else { "from" };
             return Err(table.bad(name, format!("1 to {MOST_VALUES} values, each but once")));
         }
         Ok(Self {
             key,
             values,
-            zip: table.text("zip", "a word that other axes share")?.map(str::to_owned),
+            zip,
             label: table.text("label", "words for the plots")?.map(str::to_owned),
             place: table.place("key"),
         })
@@ -203,6 +205,18 @@ impl Grid {
                 }
                 Some(digit) => digit.axes.push(number),
                 None => digits.push(Digit { axes: vec![number], length: axis.values.len() }),
+            }
+        }
+        for digit in &digits {
+            let members = || digit.axes.iter().filter_map(|&number| axes.get(number));
+            let step =
+                |index: usize| members().filter_map(|axis| axis.values.get(index)).map(text_of).collect::<Vec<_>>();
+            let steps: std::collections::BTreeSet<Vec<String>> = (0..digit.length).map(step).collect();
+            if let (true, Some(&number)) = (steps.len() < digit.length, digit.axes.first()) {
+                return Err((
+                    number,
+                    "two steps with the same values on all zipped axes: expected each but once".to_owned(),
+                ));
             }
         }
         let acts = |digit: &Digit| digit.axes.iter().filter_map(|&n| axes.get(n)).any(|axis| changes_signal(&axis.key));

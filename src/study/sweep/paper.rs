@@ -52,6 +52,10 @@ pub(super) fn pdf(plan: &Plan, results: &Results, pictures: &[Picture]) -> Resul
             report.table(table("Cells beyond their bar of theory", publish::beyond_theory(results, &beyond)));
         }
     }
+    if let Some(rows) = results.ensembles_in_short() {
+        report.heading("All cases together");
+        report.table(table("Distribution over the cases", narrow(rows, study.ensemble.iter().flatten().count() + 1)));
+    }
     report.heading("Pictures");
     for picture in pictures {
         report.figure(picture.drawing().map_err(|error| failed(error.to_string()))?, &picture.title);

@@ -15,6 +15,9 @@ use crate::study::proof::LEAST_SNR;
 /// Cells that the report lists; the rest stand in `cells.csv`.
 const MOST_LISTED: usize = 60;
 
+/// Values of an axis that the report lists; all stand in `cells.csv`.
+const MOST_VALUES: usize = 40;
+
 /// Writes everything.
 ///
 /// # Errors
@@ -23,6 +26,9 @@ pub fn write(plan: &Plan, lines: &[String], results: &Results) -> Result<(), Stu
     let directory = &plan.directory;
     plan::write(&directory.join("cases.csv"), &result::table(plan, lines))?;
     plan::write(&directory.join("cells.csv"), &results.table()?)?;
+    if let Some(table) = results.ensemble_table()? {
+        plan::write(&directory.join("ensemble.csv"), &table)?;
+    }
     let pictures = draw::pictures(results);
     for picture in &pictures {
         for ending in ["png", "svg"] {
@@ -81,6 +87,10 @@ fn text(plan: &Plan, results: &Results, pictures: &[Picture]) -> String {
         grid.cells(),
         grid.repetitions
     );
+    if let Some(rows) = results.ensembles_in_short() {
+        text += "\n## All cases together\n";
+        text += &markdown(&rows);
+    }
     for picture in pictures {
         let _ = write!(text, "\n## {}\n\n![{}]({}.png)\n", picture.title, picture.title, picture.stem);
         text += &picture.table();
@@ -151,9 +161,13 @@ pub(super) fn beyond_theory(results: &Results, beyond: &[&Compared]) -> Rows {
 /// Axes and their values.
 pub(super) fn axes(results: &Results) -> Rows {
     let row = |axis: &axis::Axis| {
-        let values: Vec<String> = axis.values.iter().map(axis::text_of).collect();
+        let (shown, more) = match axis.values.len() {
+            count if count > MOST_VALUES => (MOST_VALUES, format!(", … ({count} values)")),
+            count => (count, String::new()),
+        };
+        let values: Vec<String> = axis.values.iter().take(shown).map(axis::text_of).collect();
         let zipped = axis.zip.as_ref().map_or(String::new(), |word| format!(" (steps with others of `{word}`)"));
-        vec![format!("`{}`{zipped}", axis.key), values.join(", ")]
+        vec![format!("`{}`{zipped}", axis.key), values.join(", ") + &more]
     };
     (vec!["axis".to_owned(), "values".to_owned()], results.study.axes.iter().map(row).collect())
 }

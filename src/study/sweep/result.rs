@@ -3,6 +3,7 @@
 //! [`merge`] takes each shard once, in order, and fails if one is missing. [`Results`] is what pictures and reports are made
 //! from: axes, figures, and an estimate for each figure of each cell.
 
+use super::ensemble::{Collector, Ensemble};
 use super::estimate::Estimate;
 use super::model::SNR;
 use super::plan::{Column, Plan};
@@ -55,6 +56,8 @@ pub struct Results {
     pub figures: Vec<Column>,
     /// Slowest axis first.
     pub cells: Vec<Cell>,
+    /// All cases together, by the axes of [`Study::ensemble`]; empty where the study asks for none.
+    pub ensembles: Vec<Ensemble>,
 }
 
 /// All repetitions of one combination of the axes' values.
@@ -74,15 +77,20 @@ impl Results {
         let study = plan.study.clone();
         let (grid, skipped) = (&study.grid, 3 + study.axes.len());
         let mut values: Vec<Vec<Vec<f64>>> = vec![vec![Vec::new(); study.keep.len()]; grid.cells() as usize];
+        let mut together = study.ensemble.as_ref().map(|axes| Collector::new(axes, study.keep.len()));
         let text = lines.join("\n");
         let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(text.as_bytes());
         for (case, record) in (0_u64..).zip(reader.records()) {
             let record = record.map_err(|e| StudyError::input(&plan.directory, e.to_string()))?;
             let Some(cell) = values.get_mut(grid.cell_of(case) as usize) else { continue };
-            for (list, field) in cell.iter_mut().zip(record.iter().skip(skipped)).filter(|(_, field)| !field.is_empty())
-            {
+            let number = |field: &str| {
                 let wrong = || StudyError::input(&plan.directory, format!("case {case}: {field:?} is no number"));
-                list.push(field.parse().map_err(|_| wrong())?);
+                if field.is_empty() { Ok(None) } else { field.parse::<f64>().map(Some).map_err(|_| wrong()) }
+            };
+            let row: Vec<Option<f64>> = record.iter().skip(skipped).map(number).collect::<Result<_, _>>()?;
+            cell.iter_mut().zip(&row).for_each(|(list, value)| list.extend(value));
+            if let Some(together) = &mut together {
+                together.take(&grid.case(case).at, &row);
             }
         }
         let figure = |name: &String| Column { name: name.clone(), unit: unit_of(name).to_owned() };
@@ -94,7 +102,8 @@ impl Results {
                 estimates: lists.iter().map(|list| Estimate::of(list)).collect(),
             })
             .collect();
-        Ok(Self { study, figures, cells })
+        let ensembles = together.map(Collector::finish).unwrap_or_default();
+        Ok(Self { study, figures, cells, ensembles })
     }
 
     /// The number of a figure.

@@ -1,8 +1,8 @@
 //! Cases at sample level: one stream of samples from the generator feeds every receiver that is to hear it, in memory.
 //!
 //! Cases that differ in `receiver.…` alone share their signal, so it is generated once. Figures are those of
-//! `summary.json` by their path, the first search's detections, and what theory predicts of the loops under thermal
-//! noise. Limits: truth and records pass through files in a scratch directory, samples never do.
+//! `summary.json` by their path, the first search's detections, those of single fixes ([`super::fixes`]), and what theory
+//! predicts of the loops under thermal noise. Limits: truth and records pass through files in a scratch directory, samples never do.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,6 +12,7 @@ use serde_json::Value as Json;
 use toml::Value;
 
 use super::axis::{self, Axis};
+use super::fixes::{self, Fixes};
 use super::model::SNR;
 use super::spec::{SCENARIO_KEY, Study};
 use super::{StudyError, temporary};
@@ -206,6 +207,7 @@ fn figures(here: &Path, truth: &Path, ear: &Ear, keep: &[String]) -> Result<Vec<
     let summary = Summary::new(&run, &errors, &Clock::measure(&run, &errors)?)?;
     let json = serde_json::to_value(&summary).map_err(|e| StudyError::Bug(e.to_string()))?;
     let places = places_s(&run)?;
+    let fixes = Fixes::of(&run, &errors);
     let of = |name: &String| match name.as_str() {
         "acquisition.detected_share" => first_search(&run).0,
         "acquisition.false" => Some(first_search(&run).1),
@@ -218,6 +220,7 @@ fn figures(here: &Path, truth: &Path, ear: &Ear, keep: &[String]) -> Result<Vec<
             let channel = limits::channel(&ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz);
             channel.cn0_dbhz.map(|dbhz| channel.update_s() * libm::pow(10.0, dbhz / 10.0))
         }
+        own if fixes::FIGURES.contains(&own) => fixes.figure(own),
         path => number(&json, path),
     };
     Ok(keep.iter().map(of).map(|value| value.filter(|x| x.is_finite())).collect())

@@ -9,7 +9,7 @@ use toml::Value;
 use toml::de::DeTable;
 
 use super::axis::{self, Axis, Grid};
-use super::{model, sampled};
+use super::{fixes, model, sampled};
 use crate::generator::scenario::ScenarioError;
 use crate::generator::scenario::read::{Source, Table, nearest};
 use crate::receiver::settings::Settings;
@@ -52,6 +52,8 @@ pub struct Study {
     pub scenario: Option<PathBuf>,
     /// Figures to keep; at correlator level those of theory stand behind the ones that they predict.
     pub keep: Vec<String>,
+    /// Numbers of the axes that keep ensembles apart; `None` where the study asks for no ensemble.
+    pub ensemble: Option<Vec<usize>>,
     pub plots: Vec<Plot>,
 }
 
@@ -100,6 +102,7 @@ const KEYS: &[&str] = &[
     "receiver",
     "axis",
     "keep",
+    "ensemble",
     "plot",
 ];
 const BASE: [&str; 5] = ["signal", "motion", "loop", "measure", "receiver"];
@@ -149,6 +152,7 @@ impl Study {
             message: reason,
         })?;
         let keep = keep(&root, level)?;
+        let ensemble = ensemble(&root, &axes)?;
         let plots = root.tables("plot")?.unwrap_or_default();
         let plots = plots.iter().map(|table| plot(table, &axes, &grid, &keep)).collect::<Result<_, _>>()?;
         let name = name(&root)?;
@@ -164,6 +168,7 @@ impl Study {
             base,
             scenario,
             keep,
+            ensemble,
             plots,
         })
     }
@@ -284,7 +289,7 @@ fn base(
 fn keep(root: &Table<'_>, level: Level) -> Result<Vec<String>, ScenarioError> {
     let known: Vec<&str> = match level {
         Level::Correlator => model::FIGURES.iter().map(|figure| figure.name).collect(),
-        Level::Samples => sampled::FIGURES.to_vec(),
+        Level::Samples => [sampled::FIGURES, fixes::FIGURES].concat(),
     };
     let expected = "an array of figures";
     let written = root.words("keep", expected)?.ok_or_else(|| root.bad("keep", expected))?;
@@ -306,6 +311,17 @@ fn keep(root: &Table<'_>, level: Level) -> Result<Vec<String>, ScenarioError> {
         keep.push(model::SNR.to_owned());
     }
     if keep.is_empty() { Err(root.bad("keep", "at least one figure")) } else { Ok(keep) }
+}
+
+/// The axes that keep ensembles apart.
+fn ensemble(root: &Table<'_>, axes: &[Axis]) -> Result<Option<Vec<usize>>, ScenarioError> {
+    let expected = "an array of axes by their keys; [] pools all cases";
+    let Some(words) = root.words("ensemble", expected)? else { return Ok(None) };
+    let number = |word: &&str| {
+        let found = axes.iter().position(|axis| axis.key == **word);
+        found.ok_or_else(|| root.bad("ensemble", format!("{expected}; {word:?} is none")))
+    };
+    words.iter().map(number).collect::<Result<_, _>>().map(Some)
 }
 
 #[derive(Clone, Copy)]
