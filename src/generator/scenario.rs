@@ -7,6 +7,7 @@
 
 mod attitude;
 mod compose;
+mod expect;
 mod hardware;
 mod hostile;
 pub mod interference;
@@ -45,6 +46,7 @@ use crate::generator::fidelity::allowed_m;
 use crate::generator::ripple::scintillation::Strength;
 use crate::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::generator::vehicle::attitude::Attitude;
+use crate::gnss::facts::Expect;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{SIGNALS, Signal};
 use crate::gnss::time::{Epoch, Rate};
@@ -85,6 +87,7 @@ pub const KEYS: &[(&str, &[&str])] = &[
             "spoofer",
             "fidelity",
             "truth",
+            "expect",
             "receiver",
         ],
     ),
@@ -111,6 +114,7 @@ pub const KEYS: &[(&str, &[&str])] = &[
     ("spoofer", interference::SPOOFER_KEYS),
     ("fidelity", &["level", "code_edge", "carrier", "noise", "knot_tolerance_cycles"]),
     ("truth", &["interval_s"]),
+    ("expect", expect::KEYS),
 ];
 
 /// Largest scenario text that is read.
@@ -182,6 +186,8 @@ pub struct Scenario {
     pub spoofers: Vec<SpooferSpec>,
     pub fidelity: Fidelity,
     pub truth_interval_s: f64,
+    /// What the judge is to expect of a receiver.
+    pub expect: Expect,
     /// For the receiver's own parser.
     pub receiver: Option<toml::Table>,
 }
@@ -211,6 +217,7 @@ impl Scenario {
         let motion = open("motion")?.ok_or_else(|| root.bad("motion", "a table with kind = \"static\", …"))?;
         let start = root.instant("start")?.ok_or_else(|| root.bad("start", "GPS time like \"2010-07-01T08:12:30\""))?;
         let file = open("navigation")?.map(|t| t.text("file", "a path")).transpose()?.flatten();
+        let duration_s = root.required("duration_s", 0.01..=2_678_400.0, "s")?;
         let noise = open("noise")?.is_some();
         let power = link::power(open("power")?.as_ref())?;
         let allowed_m = allowed_m(noise.then(|| power.strongest_dbhz()));
@@ -218,7 +225,7 @@ impl Scenario {
             origin: origin.to_owned(),
             name: name(&root)?,
             start: Epoch::parse(&start).map_err(|e| root.bad("start", e))?,
-            duration_s: root.required("duration_s", 0.01..=2_678_400.0, "s")?,
+            duration_s,
             seed: root.integer("seed")?.unwrap_or(1),
             signals: signals(&root)?,
             navigation: file.map(PathBuf::from),
@@ -252,6 +259,10 @@ impl Scenario {
             truth_interval_s: match open("truth")? {
                 Some(table) => table.number("interval_s", 0.001..=3600.0, "s")?.unwrap_or(0.1),
                 None => 0.1,
+            },
+            expect: match open("expect")? {
+                Some(table) => expect::expect(&table, duration_s)?,
+                None => Expect::default(),
             },
             receiver: receiver(&root, text).map_err(|e| refuse(&e))?,
         })

@@ -18,6 +18,7 @@ use crate::generator::stage::noise::Thermal;
 use crate::generator::stage::playback::Playback;
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::earth::{FLATTENING, SEMI_MAJOR_AXIS_M};
+use crate::gnss::facts::{Expect, Fault};
 use crate::gnss::gps::lnav::Broadcast;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
@@ -75,6 +76,9 @@ pub struct Scene {
     pub fidelity: Fidelity,
     /// Spacing of truth records.
     pub truth_interval_s: f64,
+    /// What the judge is to expect of a receiver, and what it must know of satellites.
+    pub expect: Expect,
+    pub faults: Vec<Fault>,
 }
 
 impl Scene {

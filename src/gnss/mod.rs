@@ -6,6 +6,8 @@
 
 pub mod broadcast;
 pub mod earth;
+#[cfg(any(feature = "generator", feature = "analysis"))]
+pub mod facts;
 pub mod gps;
 #[cfg(feature = "generator")]
 pub mod inflate;

@@ -101,6 +101,8 @@ impl Scenario {
             noise_lsb,
             fidelity: self.fidelity,
             truth_interval_s: self.truth_interval_s,
+            expect: self.expect.clone(),
+            faults: self.faults(),
             metadata,
         };
         scene.interference = hostile::interferers(self, &scene, directory, overrides, &mut warnings)?;

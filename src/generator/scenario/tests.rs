@@ -7,6 +7,7 @@ use std::path::Path;
 use propagation::{IONEX, TEC, VIENNA};
 use satellite::FAULTS;
 
+use super::expect::INTERVAL_KEYS;
 use super::interference::DRAG_KEYS;
 use super::motion::{KEYS as MOTION_KEYS, POINT_KEYS};
 use super::multipath::KEYS as MULTIPATH_KEYS;
@@ -48,6 +49,7 @@ const REST: &str = "[navigation]\nfile = \"brdc.10n\"\n[satellites]\nmask_deg = 
     [filter]\nkind = \"butterworth\"\norder = 4\nbandwidth_hz = 1.8e6\n[iq]\ndc_i_lsb = 0.5\n\
     [adc]\nbits = 2\nstep_sigma = 1\nagc_window_s = 0.001\n\
     [fidelity]\nlevel = \"balanced\"\ncarrier = \"f64\"\nnoise = \"f32\"\ncode_edge = \"nearest\"\nknot_tolerance_cycles = 1e-3\n[truth]\ninterval_s = 0.5\n\
+    [expect]\nfix = \"none\"\nlosses = \"any\"\nsatellites = [\"G02\"]\nerrors = \"any\"\nreason = \"why\"\n\
     [receiver.tracking]\nwhatever = 1\n";
 const ECHOES: &str = "[[multipath]]\nkind = \"given\"\namplitude = 0.5\nphase_deg = 90\nsatellites = [\"G13\"]\nexcess_m = 30\nrate_mps = -0.5\n\
     [[multipath]]\nkind = \"ground\"\namplitude = 0.3\nheight_m = 2\n\
@@ -135,6 +137,7 @@ fn with(table: &str, line: &str) -> String {
         }
         "spoofer.drag" => format!("{MINIMAL}{STATIC}[[spoofer]]\npower_db = 6\n[spoofer.drag]\n{line}\n"),
         "motion.point" => format!("{MINIMAL}{WAYPOINTS}{line}\n"),
+        "expect.interval" => format!("{MINIMAL}{STATIC}[[expect.interval]]\n{line}\n"),
         "obstruction" => format!("{MINIMAL}{STATIC}[[obstruction]]\n{line}\n"),
         "multipath" => format!("{MINIMAL}{STATIC}[[multipath]]\n{line}\n"),
         table => format!("{MINIMAL}{STATIC}[{table}]\n{line}\n"),
@@ -148,6 +151,7 @@ fn every_mistyped_key_is_refused_at_its_place_with_the_right_one() {
         ("spoofer.drag", DRAG_KEYS),
         ("obstruction", OBSTRUCTION_KEYS),
         ("multipath", MULTIPATH_KEYS),
+        ("expect.interval", INTERVAL_KEYS),
     ];
     for (table, keys) in KEYS.iter().copied().chain(inner) {
         for key in keys {
@@ -213,6 +217,7 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                     cases.push((text, table, key));
                 }
                 ("power", "satellites") => cases.push((format!("{MINIMAL}{STATIC}{fixed}satellites = 1"), table, key)),
+                ("expect", "interval") => cases.push((with("expect", "interval = 1"), table, key)),
                 ("spoofer", "motion" | "drag") => {
                     cases.push((with("spoofer", &format!("power_db = 6\n{key} = 1")), table, key));
                 }

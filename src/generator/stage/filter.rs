@@ -196,7 +196,8 @@ impl Stage for Filter {
             Shape::Butterworth { order } => ("butterworth", Some(order)),
         };
         let bandwidth_hz = Some(self.bandwidth_hz);
-        Some(Fact { stage: self.name(), shape: Some(shape), order, bandwidth_hz, ..Fact::default() })
+        let group_delay_s = Some(self.group_delay_s);
+        Some(Fact { stage: self.name(), shape: Some(shape), order, bandwidth_hz, group_delay_s, ..Fact::default() })
     }
 
     fn memory_samples(&self) -> usize {

@@ -84,6 +84,10 @@ impl Stage for Oscillator {
         "local_oscillator"
     }
 
+    fn fact(&self) -> Option<Fact> {
+        Some(Fact { stage: self.name(), offset_hz: Some(self.offset_hz), ..Fact::default() })
+    }
+
     fn describe(&self) -> String {
         let noise = self.noise.as_ref().map(|n| format!(", noise {} rad within {} Hz", n.rms_rad, n.bandwidth_hz));
         format!("{} Hz off{}", self.offset_hz, noise.unwrap_or_default())

@@ -49,6 +49,12 @@ pub struct Fact {
     pub order: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bandwidth_hz: Option<f64>,
+    /// Delay that every satellite's code has in common.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub group_delay_s: Option<f64>,
+    /// By how much carriers lie higher in the samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset_hz: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image_db: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]

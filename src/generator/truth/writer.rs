@@ -15,6 +15,7 @@ use crate::generator::scene::Scene;
 use crate::generator::spoof::Constellation;
 use crate::generator::stage::Fact;
 use crate::generator::stage::interference::{Interferer, Spectrum};
+use crate::gnss::facts::{Expect, Fault};
 use crate::gnss::record::{InterferenceRow, NavigationRow, TrajectoryRow};
 
 /// Why the truth could not be written.
@@ -107,6 +108,11 @@ struct SceneFile<'a> {
     satellite_faults: Vec<String>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     message_faults: Vec<String>,
+    /// Both kinds again, for the judge.
+    #[serde(skip_serializing_if = "<[Fault]>::is_empty")]
+    faults: &'a [Fault],
+    #[serde(skip_serializing_if = "Expect::is_empty")]
+    expect: &'a Expect,
 }
 
 /// Power law of the receiver's oscillator, from white phase noise to random-walk frequency noise.
@@ -179,6 +185,8 @@ impl Writer {
             orbits,
             satellite_faults: [departures, scene.satellite_clocks.descriptions.clone()].concat(),
             message_faults: scene.message_faults.iter().map(|fault| fault.describe(scene.clock.start)).collect(),
+            faults: &scene.faults,
+            expect: &scene.expect,
         };
         let path = self.directory.join("scene.json");
         serde_json::to_string_pretty(&file)

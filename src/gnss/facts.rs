@@ -1,0 +1,158 @@
+//! Facts of a scene that generator and judge share: what it expects of a receiver, and what is wrong with its satellites.
+//!
+//! They lie in `truth/scene.json`, so that a run can be judged wherever it is. No receiver reads them. Times are seconds from
+//! the scene's first sample.
+
+use serde::{Deserialize, Serialize};
+
+use crate::gnss::satellite::Sv;
+
+/// What is expected of fixes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fixes {
+    /// They must come, whatever the judge computes from satellites and message.
+    Required,
+    /// There must be none.
+    None,
+    /// Nothing is judged.
+    Any,
+}
+
+impl Fixes {
+    /// By the word that a scenario uses.
+    pub const NAMES: [(&'static str, Self); 3] =
+        [("required", Self::Required), ("none", Self::None), ("any", Self::Any)];
+}
+
+/// What is expected of satellites: acquisition, lock and use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Losses {
+    /// Losses, slips and absences are not judged.
+    Any,
+    /// None is excused, however weak the signal.
+    None,
+}
+
+impl Losses {
+    /// By the word that a scenario uses.
+    pub const NAMES: [(&'static str, Self); 2] = [("any", Self::Any), ("none", Self::None)];
+}
+
+/// What is expected of the errors of fixes and observations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sizes {
+    /// Within the judge's limits.
+    Bounded,
+    /// Not judged.
+    Any,
+}
+
+impl Sizes {
+    /// By the word that a scenario uses.
+    pub const NAMES: [(&'static str, Self); 2] = [("bounded", Self::Bounded), ("any", Self::Any)];
+}
+
+/// Expectations over a time. What is absent follows from the scene's physics.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Terms {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fix: Option<Fixes>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub losses: Option<Losses>,
+    /// Satellites that `losses` is about; absent means all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub satellites: Option<Vec<Sv>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub errors: Option<Sizes>,
+    /// Why, in the scene's words.
+    pub reason: String,
+}
+
+/// Expectations from one time to another.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    pub from_s: f64,
+    pub to_s: f64,
+    #[serde(flatten)]
+    pub terms: Terms,
+}
+
+/// `[expect]`: of the whole scene, and over intervals, which replace what is said of the whole.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Expect {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub whole: Option<Terms>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub intervals: Vec<Interval>,
+}
+
+impl Expect {
+    /// Whether the scene expects nothing of its own.
+    pub fn is_empty(&self) -> bool {
+        self.whole.is_none() && self.intervals.is_empty()
+    }
+
+    /// The terms that say something at a time, the last of the intervals first and the whole scene's last.
+    pub fn at(&self, time_s: f64) -> impl Iterator<Item = &Terms> {
+        let within = move |interval: &&Interval| (interval.from_s..interval.to_s).contains(&time_s);
+        self.intervals.iter().rev().filter(within).map(|interval| &interval.terms).chain(&self.whole)
+    }
+
+    /// What is said of fixes at a time.
+    pub fn fix(&self, time_s: f64) -> Option<Fixes> {
+        self.at(time_s).find_map(|terms| terms.fix)
+    }
+
+    /// What is said of a satellite's losses at a time.
+    pub fn losses(&self, sv: Sv, time_s: f64) -> Option<Losses> {
+        let concerns = |terms: &&Terms| terms.satellites.as_ref().is_none_or(|list| list.contains(&sv));
+        self.at(time_s).filter(concerns).find_map(|terms| terms.losses)
+    }
+
+    /// Whether errors at a time are to be judged.
+    pub fn bounded(&self, time_s: f64) -> bool {
+        self.at(time_s).find_map(|terms| terms.errors) != Some(Sizes::Any)
+    }
+}
+
+/// Something wrong with satellites or their messages.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fault {
+    /// As the scenario calls it: `clock_step`, `bit_errors`, `health`, …
+    pub kind: String,
+    /// Absent means all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub satellites: Option<Vec<Sv>>,
+    pub from_s: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to_s: Option<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_replaces_what_the_whole_scene_says_and_the_last_one_counts() {
+        let terms = |fix, losses, satellites| Terms { fix, losses, satellites, ..Terms::default() };
+        let interval = |from_s, to_s, terms| Interval { from_s, to_s, terms };
+        let expect = Expect {
+            whole: Some(terms(Some(Fixes::Required), None, None)),
+            intervals: vec![
+                interval(10.0, 20.0, terms(Some(Fixes::None), Some(Losses::Any), None)),
+                interval(15.0, 18.0, terms(None, Some(Losses::None), Some(vec![Sv::gps(3)]))),
+            ],
+        };
+        let fixes = [9.9, 10.0, 19.9, 20.0].map(|t_s| expect.fix(t_s));
+        assert_eq!(fixes, [Fixes::Required, Fixes::None, Fixes::None, Fixes::Required].map(Some));
+        assert_eq!(expect.losses(Sv::gps(3), 16.0), Some(Losses::None));
+        assert_eq!(expect.losses(Sv::gps(4), 16.0), Some(Losses::Any));
+        assert_eq!(expect.losses(Sv::gps(4), 25.0), None);
+        assert!(expect.bounded(12.0) && !expect.is_empty() && Expect::default().is_empty());
+        let json = serde_json::to_string(&expect).unwrap();
+        assert_eq!(serde_json::from_str::<Expect>(&json).unwrap(), expect);
+    }
+}
