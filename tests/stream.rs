@@ -57,6 +57,8 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         noise_lsb: 20.0,
         fidelity: Fidelity { knot_tolerance_cycles: 1e-5, ..Fidelity::of(Grade::Balanced) },
         truth_interval_s: 0.1,
+        expect: Default::default(),
+        faults: Vec::new(),
     }
 }
 

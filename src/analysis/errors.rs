@@ -132,14 +132,16 @@ impl Errors {
                 self.unmatched += 1;
                 continue;
             };
-            let raw_cycles = estimate.carrier_cycles - true_row.carrier_cycles;
+            let common = &run.common;
+            let true_cycles = true_row.carrier_cycles + common.carrier_cycles(estimate.sample);
+            let raw_cycles = estimate.carrier_cycles - true_cycles;
             rows.push(SignalError {
                 sample: estimate.sample,
                 time_s: run.time_s(estimate.sample),
-                code_m: -SPEED_OF_LIGHT_MPS * estimate.sent().since(true_row.sent()),
+                code_m: -SPEED_OF_LIGHT_MPS * (estimate.sent().since(true_row.sent()) + common.code_delay_s),
                 carrier_cycles: raw_cycles,
                 raw_cycles,
-                doppler_hz: estimate.doppler_hz - true_row.doppler_hz,
+                doppler_hz: estimate.doppler_hz - true_row.doppler_hz - common.doppler_hz,
                 cn0_dbhz: estimate.cn0_dbhz,
                 cn0_true_dbhz: true_row.cn0_dbhz,
                 cn0_effective_dbhz: access.effective_dbhz(true_row),
@@ -170,7 +172,8 @@ impl Errors {
                 sample: fix.sample,
                 time_s: run.time_s(fix.sample),
                 enu_m: to_enu * (fix.position_m() - true_row.position_m()),
-                clock_m: SPEED_OF_LIGHT_MPS * fix.time().since(true_row.time()),
+                // What the front end delays arrives late: the receiver takes the time for an earlier one.
+                clock_m: SPEED_OF_LIGHT_MPS * (fix.time().since(true_row.time()) + run.common.code_delay_s),
                 true_clock_s: true_row.clock_bias_s,
                 velocity_enu_mps: to_enu * (fix.velocity_mps() - true_row.velocity_mps()),
             });

@@ -4,6 +4,7 @@
 //! receiver's settings are JSON. Tables with a row for every satellite of every epoch lie on shelves, satellite by satellite;
 //! those with a row an epoch, and shorter ones, are held.
 
+mod common;
 mod files;
 mod rows;
 
@@ -19,12 +20,15 @@ use crate::analysis::jamming::Shape;
 use crate::analysis::psd::{Expected, expected};
 use crate::analysis::shelf::Shelf;
 use crate::analysis::spectrum::Stage;
+use crate::analysis::statistics::median;
+use crate::gnss::facts::{Expect, Fault};
 use crate::gnss::record::{
     AcquisitionRow, EventRow, Fix, InterferenceRow, LineRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
     TrajectoryRow,
 };
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::SIGNALS;
+use crate::gnss::signal::{SIGNALS, Signal};
+pub use common::Common;
 use files::{believable, dated, each, json, missing, optional, rows, text};
 
 /// What `truth/scene.json` says of the scene; other keys are left alone.
@@ -66,6 +70,11 @@ pub struct SceneFacts {
     /// The receiver's oscillator, if the scene has one.
     #[serde(default)]
     pub oscillator: Option<Oscillator>,
+    /// What the scene expects of a receiver, and what is wrong with its satellites.
+    #[serde(default)]
+    pub expect: Expect,
+    #[serde(default)]
+    pub faults: Vec<Fault>,
 }
 
 /// Noise of an oscillator; other keys are left alone.
@@ -112,6 +121,13 @@ pub struct Run {
     pub in_view_at_start: BTreeSet<Sv>,
     /// Sum of C/N0 of a signal's satellites at a sample.
     pub cn0_sums_hz: HashMap<(u64, &'static str), f64>,
+    /// That of the strongest one.
+    pub cn0_most_hz: HashMap<(u64, &'static str), f64>,
+    /// What satellites' carriers and front end have in common beside the clock.
+    pub common: Common,
+    /// Largest delays of the atmosphere.
+    pub ionosphere_m: f64,
+    pub troposphere_m: f64,
     /// The mean of each satellite's true signal.
     pub expected: Vec<Expected>,
     /// Reflected rays; none in a scene without multipath.
@@ -189,16 +205,24 @@ impl Run {
     fn read_truth_by(truth: &Path, shelves: &Path) -> Result<Self, JudgeError> {
         let scene = truth.join("scene.json");
         let scene = json(&scene)?.map(Self::folded).ok_or_else(|| missing(&scene, TRUTH))?;
-        let mut cn0_sums_hz = HashMap::new();
+        let (mut cn0_sums_hz, mut cn0_most_hz) = (HashMap::new(), HashMap::new());
+        let mut common = Common::of(&scene);
         let observed = observations(&truth.join("observations.csv"), TRUTH, shelves, |row| {
-            *cn0_sums_hz.entry((row.sample, row.signal.name)).or_insert(0.0) += libm::pow(10.0, row.cn0_dbhz / 10.0);
+            let cn0_hz = libm::pow(10.0, row.cn0_dbhz / 10.0);
+            *cn0_sums_hz.entry((row.sample, row.signal.name)).or_insert(0.0) += cn0_hz;
+            let most_hz: &mut f64 = cn0_most_hz.entry((row.sample, row.signal.name)).or_insert(0.0);
+            *most_hz = most_hz.max(cn0_hz);
+            common.add(row);
         })?;
+        let (mut ionosphere_m, mut troposphere_m) = (0.0_f64, 0.0_f64);
         let (mut first, mut in_view_at_start) = (u64::MAX, BTreeSet::new());
         let mut sky = Shelf::new(shelves);
         each(&truth.join("sky.csv"), TRUTH, |_, row: SkyRow| {
             if row.sample < first {
                 (first, in_view_at_start) = (row.sample, BTreeSet::new());
             }
+            ionosphere_m = ionosphere_m.max(row.ionosphere_m.abs());
+            troposphere_m = troposphere_m.max(row.troposphere_m.abs());
             if row.sample == first {
                 in_view_at_start.insert(row.sv);
             }
@@ -213,6 +237,10 @@ impl Run {
             sky,
             in_view_at_start,
             cn0_sums_hz,
+            cn0_most_hz,
+            common,
+            ionosphere_m,
+            troposphere_m,
             rays: Shelf::new(shelves),
             trajectory: dated(&truth.join("trajectory.csv"), TRUTH, |row: &TrajectoryRow| row.gps_s)?,
             truth_navigation: Vec::new(),
@@ -235,6 +263,17 @@ impl Run {
     /// Seconds from sample 0 by the receiver's clock.
     pub fn time_s(&self, sample: u64) -> f64 {
         sample as f64 / self.scene.sample_rate_hz
+    }
+
+    /// C/N0 of the strongest satellite at a sample.
+    pub fn strongest_dbhz(&self, sample: u64, signal: &Signal) -> f64 {
+        10.0 * libm::log10(self.cn0_most_hz.get(&(sample, signal.name)).copied().unwrap_or(1.0))
+    }
+
+    /// Usual time between the truth's rows.
+    pub fn truth_interval_s(&self) -> f64 {
+        let steps = self.trajectory.windows(2).map(|two| self.time_s(two[1].sample) - self.time_s(two[0].sample));
+        median(&steps.collect::<Vec<_>>()).unwrap_or(0.0)
     }
 
     /// What [`Self::read`] does to the scene's facts: an IF above half the rate of real samples becomes the one at which they hold it.
@@ -306,7 +345,6 @@ impl Counts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::statistics::median;
 
     #[test]
     fn counts_have_the_median_of_the_list() {

@@ -14,8 +14,10 @@
 pub mod access;
 pub mod allan;
 pub mod clock;
+pub mod due;
 pub mod elevation;
 pub mod errors;
+
 pub mod foreign;
 pub mod honesty;
 pub mod independent;
@@ -140,7 +142,7 @@ fn find(run: &Path, limits: Option<&limits::Limits>) -> Result<Found, JudgeError
     let mut summary = Summary::new(&read, &errors, &clock)?;
     summary.add(&honesty, &slips, &jitter);
     let not_json = |source| JudgeError::Json { path: run.join("summary.json"), source };
-    let verdict = verdict::Verdict::of(&read, &errors, &summary)?;
+    let verdict = verdict::Verdict::of(&read, &slips, &summary)?;
     summary.details.verdict = match limits {
         Some(limits) => verdict.with_user(limits.judge(&serde_json::to_value(&summary).map_err(not_json)?)),
         None => verdict,

@@ -156,6 +156,7 @@ impl Summary {
         for row in verdict.rows.iter().filter(|row| row.status != Status::Pass) {
             let (value, word, margin) = (row.value_text(), row.status.word(), row.margin_text());
             writeln!(f, "{word:<14}{} {value} {}, limit {}: {margin}", row.figure, row.unit, row.bound)?;
+            row.why.iter().try_for_each(|line| writeln!(f, "{:<14}  {line}", ""))?;
         }
         Ok(())
     }

@@ -202,6 +202,7 @@ struct Evidence<'r> {
     access: Access<'r>,
     loop_: Option<(Settings, f64)>,
     least_dbhz: f64,
+    interval_s: f64,
     last: u64,
 }
 
@@ -237,6 +238,7 @@ impl<'r> Evidence<'r> {
             access: Access::new(run),
             loop_: Settings::of(run).zip(run.update_s),
             least_dbhz: run.tracking_setting("cn0_threshold_dbhz").unwrap_or(f64::NEG_INFINITY),
+            interval_s: run.truth_interval_s(),
             last: run.trajectory.last().map_or(0, |row| row.sample),
         }
     }
@@ -282,7 +284,10 @@ impl<'r> Evidence<'r> {
             let cn0_hz = libm::pow(10.0, dbhz / 10.0);
             3.0 * pll::jitter_rad(settings.pll_bandwidth_hz, update_s, cn0_hz).to_degrees()
         });
-        let gone = near.len() < 2 && sample < self.last;
+        // No row within an interval and a half before: it has set, or something stands before it.
+        let before = rows.iter().rev().find(|row| row.sample <= sample);
+        let absent = before.is_none_or(|row| time_s - run.time_s(row.sample) > 1.5 * self.interval_s);
+        let gone = (near.len() < 2 || absent) && sample < self.last;
         let limit_deg = pll::LIMIT_RAD.to_degrees();
         let noise_deg = slip.noise_3sigma_deg.unwrap_or(0.0);
         let weak = noise_deg > limit_deg || slip.cn0_dbhz.is_some_and(|dbhz| dbhz < self.least_dbhz);

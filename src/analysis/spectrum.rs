@@ -22,6 +22,10 @@ pub struct Stage {
     pub shape: Option<String>,
     pub order: Option<u32>,
     pub bandwidth_hz: Option<f64>,
+    /// Delay that every satellite's code has in common.
+    pub group_delay_s: Option<f64>,
+    /// By how much carriers lie higher in the samples.
+    pub offset_hz: Option<f64>,
     pub image_db: Option<f64>,
     pub dc_power_lsb2: Option<f64>,
     pub bits: Option<u32>,

@@ -257,6 +257,11 @@ fn write_channels(rx: &Path, draw: &mut Draw) {
     fs::write(rx.join("receiver.json"), r#"{"settings": {"tracking": {"spacing_chips": 0.3}}}"#).unwrap();
 }
 
+/// The run as it is planted.
+pub(super) fn planted() -> tempfile::TempDir {
+    planted_run(&PLANTED)
+}
+
 fn planted_run(planted: &Planted) -> tempfile::TempDir {
     let run = tempfile::tempdir().unwrap();
     write_truth(run.path());

@@ -97,6 +97,9 @@ fn verdict(report: &mut Report, verdict: &Verdict) {
     }
     report.table(table);
     let mut notes = "Marginal: less than a tenth of the limit is left, or what the file of limits sets. ".to_owned();
+    for row in verdict.rows.iter().filter(|row| row.status != Status::Pass && !row.why.is_empty()) {
+        notes += &format!("{}: {}. ", row.figure, row.why.join("; "));
+    }
     if !verdict.not_judged.is_empty() {
         notes += &format!("Not judged: {}.", verdict.not_judged.join("; "));
     }

@@ -1,6 +1,7 @@
 //! What the receiver reported of continuous waves, and whether it followed a spoofer.
 
 use super::{Bound, Verdict};
+use crate::analysis::load::Run;
 use crate::analysis::summary::Summary;
 
 impl Verdict {
@@ -39,9 +40,20 @@ impl Verdict {
         }
     }
 
-    pub(super) fn spoofing(&mut self, summary: &Summary) {
+    pub(super) fn spoofing(&mut self, run: &Run, summary: &Summary) {
         let Some(spoofing) = &summary.spoofing else { return };
+        let claimed = run.claimed.iter().map(|row| run.time_s(row.sample));
+        let expected = run.scene.expect.whole.iter().chain(run.scene.expect.intervals.iter().map(|one| &one.terms));
+        let reasons: Vec<&str> = expected.map(|terms| terms.reason.as_str()).collect();
         if let Some(share) = spoofing.captured_share {
+            if claimed.clone().count() > 0 && !claimed.clone().any(|time_s| run.scene.expect.bounded(time_s)) {
+                let percent = 100.0 * share;
+                self.not_judged.push(format!(
+                    "fixes captured by the spoofer ({percent:.0} %): the scene expects it: {}",
+                    reasons.join("; ")
+                ));
+                return;
+            }
             let source = "no fix should follow a spoofer";
             self.judge(
                 "fixes captured by the spoofer",

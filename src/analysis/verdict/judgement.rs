@@ -60,6 +60,8 @@ pub struct Judgement {
     pub status: Status,
     /// Where the limit comes from.
     pub source: String,
+    /// What is behind it: satellites and times, hints.
+    pub why: Vec<String>,
 }
 
 impl Judgement {
@@ -80,7 +82,7 @@ impl Judgement {
             (true, false) => Status::Pass,
         };
         let (figure, unit, source) = (figure.to_owned(), unit.to_owned(), source.to_owned());
-        Self { figure, path: None, value, unit, bound, margin, status, source }
+        Self { figure, path: None, value, unit, bound, margin, status, source, why: Vec::new() }
     }
 
     pub(super) fn at(mut self, path: &str) -> Self {

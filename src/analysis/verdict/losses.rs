@@ -1,55 +1,134 @@
-//! Losses of lock and cycle slips, those apart that a signal too weak to hold explains.
+//! Losses of lock and cycle slips: each is excused for its own satellite in its own moment, or counted.
 
 use super::{Bound, Verdict};
 use crate::analysis::JudgeError;
-use crate::analysis::errors::Errors;
+use crate::analysis::access::Access;
+use crate::analysis::due::receiver::Receiver;
+use crate::analysis::due::satellite::{Excuse, Row, Scene};
+use crate::analysis::due::timetable::Timetable;
+use crate::analysis::errors::Link;
 use crate::analysis::load::Run;
-use crate::analysis::summary::Summary;
-use crate::analysis::theory::pll;
-use crate::gnss::record::Event;
+use crate::analysis::slips::{Kind, Slip, Slips};
+use crate::analysis::statistics::median;
+use crate::gnss::facts::Losses;
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+
+/// The lock detectors' memory: how long before a declared loss or slip the signal may have failed.
+const LOOK_BACK_S: f64 = 2.0;
+/// Losses that are named; the rest is in `slips.csv`.
+const NAMED: usize = 12;
 
 impl Verdict {
-    pub(super) fn losses(&mut self, run: &Run, errors: &Errors, summary: &Summary) -> Result<(), JudgeError> {
-        let tracking = &summary.tracking;
-        let (unexpected, weak) = losses(run, errors)?;
-        let source = match weak {
-            0 => "none where thermal jitter stays below 15°".to_owned(),
-            _ => format!("none where thermal jitter stays below 15°; {weak} more below that C/N0"),
-        };
-        self.judge("unexpected losses of lock", "", unexpected, "", Bound::Max(0.0), &source);
-        if weak == 0 {
-            let source = "none while every signal is strong enough to hold";
-            self.judge("cycle slips", "tracking.cycle_slips", tracking.cycle_slips, "", Bound::Max(0.0), source);
-        } else {
-            self.not_judged.push(format!("cycle slips ({}): signals were too weak to hold", tracking.cycle_slips));
+    /// Judges what [`Slips`] found.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub(super) fn losses(&mut self, run: &Run, receiver: &Receiver, slips: &Slips) -> Result<(), JudgeError> {
+        let mut links: Vec<(String, &'static str)> =
+            slips.rows.iter().map(|row| (row.sv.clone(), row.signal)).collect();
+        links.sort();
+        links.dedup();
+        let mut judged: Vec<(&Slip, Option<Excuse>)> = Vec::new();
+        for (sv, signal) in links {
+            let (Ok(number), Some(known)) = (sv.parse::<Sv>(), Signal::find(signal)) else { continue };
+            let witness = Witness::new(run, receiver, (number, known))?;
+            let own = slips.rows.iter().filter(|row| row.sv == sv && row.signal == signal);
+            judged.extend(own.map(|row| (row, witness.excuse(run, receiver, number, row))));
+        }
+        judged.sort_by_key(|(row, _)| row.sample);
+        let rows = [
+            ("unexpected losses of lock", "", Kind::LossOfLock),
+            ("unexpected cycle slips", "tracking.cycle_slips", Kind::CycleSlip),
+        ];
+        for (figure, path, kind) in rows {
+            let own: Vec<&(&Slip, Option<Excuse>)> = judged.iter().filter(|(row, _)| row.kind == kind).collect();
+            let wrong: Vec<&Slip> = own.iter().filter(|(_, excuse)| excuse.is_none()).map(|(row, _)| *row).collect();
+            let excused = own.len() - wrong.len();
+            let more =
+                if excused > 0 { format!("; {excused} more have one: {}", reasons(&own)) } else { String::new() };
+            let source = format!("none without a reason of the satellite's own at that moment{more}");
+            let line = |row: &&Slip| {
+                let cn0 = row.cn0_dbhz.map_or(String::new(), |dbhz| format!(", {dbhz:.1} dB-Hz"));
+                let size = row.size_cycles.map_or(String::new(), |size| format!(", {size:+.1} cycles"));
+                format!("{} at {:.1} s{size}{cn0}", row.sv, row.time_s)
+            };
+            let mut lines: Vec<String> = wrong.iter().take(NAMED).map(line).collect();
+            if wrong.len() > NAMED {
+                lines.push(format!("and {} more (slips.csv)", wrong.len() - NAMED));
+            }
+            self.judge(figure, path, wrong.len(), "", Bound::Max(0.0), &source);
+            self.explain(lines);
         }
         Ok(())
     }
 }
 
-/// Losses of lock at which the signal was strong enough to hold, and the others: by the C/N0 that the receiver could have, other
-/// codes and interference counted as noise, at the last observation before, against that at which the phase loop's thermal
-/// jitter reaches its threshold.
-fn losses(run: &Run, errors: &Errors) -> Result<(usize, usize), JudgeError> {
-    let setting = |key: &str, default: f64| run.tracking_setting(key).unwrap_or(default);
-    let update_s = 1e-3 * setting("integration", 4.0);
-    let least_dbhz = pll::cn0_dbhz(pll::THRESHOLD_RAD, setting("pll_bandwidth_hz", 18.0), update_s);
-    let window = (LOOK_BACK_S * run.scene.sample_rate_hz) as u64;
-    let (mut strong, mut weak) = (0, 0);
-    for loss in run.events.iter().filter(|row| row.event == Event::LossOfLock) {
-        let link = (loss.sv, loss.signal);
-        // What the truth says around the loss; a satellite that it does not have is no signal at all.
-        let rows = run.truth.rows(link)?;
-        let near = rows.iter().filter(|row| row.sample <= loss.sample && loss.sample - row.sample <= window);
-        let own = errors.signals.rows(link)?;
-        let jammed = own.iter().rev().find(|row| row.sample <= loss.sample);
-        let cost_db = jammed.map_or(0.0, |row| row.cn0_true_dbhz - row.cn0_effective_dbhz);
-        let lowest_dbhz = near.map(|row| row.cn0_dbhz - cost_db).min_by(f64::total_cmp);
-        let held = lowest_dbhz.is_some_and(|dbhz| dbhz >= least_dbhz);
-        (strong, weak) = if held { (strong + 1, weak) } else { (strong, weak + 1) };
-    }
-    Ok((strong, weak))
+fn reasons(own: &[&(&Slip, Option<Excuse>)]) -> String {
+    let mut found: Vec<Excuse> = own.iter().filter_map(|(_, excuse)| *excuse).collect();
+    found.sort_unstable();
+    let counts =
+        found.chunk_by(|a, b| a == b).filter_map(|same| Some(format!("{} {}", same.len(), same.first()?.word())));
+    counts.collect::<Vec<_>>().join(", ")
 }
 
-/// The lock detectors' memory: how long before a declared loss the signal may have failed.
-const LOOK_BACK_S: f64 = 2.0;
+/// What the truth says of one satellite.
+struct Witness {
+    rows: Vec<Row>,
+    usual_dbhz: f64,
+    interval_s: f64,
+}
+
+impl Witness {
+    fn new(run: &Run, receiver: &Receiver, link: Link) -> Result<Self, JudgeError> {
+        let access = Access::new(run);
+        let rows = run.truth.map(link, |row| Row {
+            time_s: run.time_s(row.sample),
+            cn0_dbhz: row.cn0_dbhz,
+            effective_dbhz: access.effective_dbhz(&row) - receiver.cost_db,
+            strongest_dbhz: run.strongest_dbhz(row.sample, link.1),
+            doppler_hz: row.doppler_hz,
+            above_mask: true,
+        })?;
+        let usual_dbhz = median(&rows.iter().map(|row| row.cn0_dbhz).collect::<Vec<_>>()).unwrap_or(0.0);
+        Ok(Self { rows, usual_dbhz, interval_s: run.truth_interval_s() })
+    }
+
+    /// Why a loss or a slip at a time is none of the receiver's, if it is not.
+    fn excuse(&self, run: &Run, receiver: &Receiver, sv: Sv, slip: &Slip) -> Option<Excuse> {
+        let scene = Scene {
+            receiver,
+            timetable: Timetable::default(),
+            expect: &run.scene.expect,
+            faults: &run.scene.faults,
+            interval_s: self.interval_s,
+        };
+        if run.scene.expect.losses(sv, slip.time_s) == Some(Losses::None) {
+            return None;
+        }
+        let from_s = slip.time_s - LOOK_BACK_S;
+        let near: Vec<&Row> = self.rows.iter().filter(|row| (from_s..=slip.time_s).contains(&row.time_s)).collect();
+        if let Some(found) = near.iter().find_map(|row| scene.excuse(sv, row, self.usual_dbhz)) {
+            return Some(found);
+        }
+        // A row that is missing at the end, in the middle, or before: the satellite was not there for a while.
+        let step_s = 1.5 * self.interval_s;
+        let gone = near.windows(2).any(|two| two[1].time_s - two[0].time_s > step_s);
+        // The row after counts too: a loss may be declared within an interval of the last one.
+        let next_s = self.rows.iter().map(|row| row.time_s).find(|at_s| *at_s > slip.time_s).unwrap_or(f64::INFINITY);
+        let until_s = next_s.min(run.trajectory.last().map_or(0.0, |row| run.time_s(row.sample)));
+        let last_s = near.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
+        let ends = next_s - last_s > step_s && until_s - last_s > step_s;
+        let begins = near.first().is_none_or(|first| first.time_s - from_s.max(0.0) > step_s);
+        if gone || ends || begins {
+            return Some(Excuse::NotThere);
+        }
+        // Without a frame for so long, a channel gives up what it cannot read.
+        let garbled = run.scene.faults.iter().any(|fault| {
+            matches!(fault.kind.as_str(), "bit_errors" | "bit")
+                && fault.satellites.as_ref().is_none_or(|list| list.contains(&sv))
+                && slip.time_s >= fault.from_s
+        });
+        (garbled && slip.kind == Kind::LossOfLock).then_some(Excuse::Fault)
+    }
+}

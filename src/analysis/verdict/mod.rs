@@ -5,6 +5,8 @@
 //! is named with the reason why it is not judged. Limits: the thresholds are rules of thumb, not the points at which a
 //! receiver fails; several figures of one run share their causes.
 
+mod availability;
+mod hints;
 mod interference;
 mod judgement;
 mod losses;
@@ -16,9 +18,12 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::analysis::JudgeError;
-use crate::analysis::errors::Errors;
+use crate::analysis::due::Expectations;
+use crate::analysis::due::receiver::Receiver;
 use crate::analysis::load::Run;
+use crate::analysis::slips::Slips;
 use crate::analysis::summary::Summary;
+pub(crate) use availability::Came;
 pub use judgement::{Bound, Judgement, MARGINAL_SHARE, Status};
 pub(crate) use judgement::{digits, number};
 
@@ -58,15 +63,19 @@ impl Verdict {
     ///
     /// # Errors
     /// [`JudgeError::Read`] where rows that were put by cannot be read.
-    pub fn of(run: &Run, errors: &Errors, summary: &Summary) -> Result<Self, JudgeError> {
+    pub fn of(run: &Run, slips: &Slips, summary: &Summary) -> Result<Self, JudgeError> {
         let mut verdict = Self::default();
+        let expected = Expectations::of(run, Receiver::of(run), run)?;
+        verdict.satellites(run, &expected);
+        verdict.availability(run.scene.duration_s, &run.scene.expect, &expected, &Came::of(run));
         verdict.position(run, summary);
         verdict.tracking(summary);
-        verdict.losses(run, errors, summary)?;
+        verdict.losses(run, &expected.receiver, slips)?;
         verdict.reception(summary);
         verdict.cn0(run, summary);
         verdict.interference(summary);
-        verdict.spoofing(summary);
+        verdict.spoofing(run, summary);
+        verdict.hint(run);
         Ok(verdict)
     }
 
@@ -83,6 +92,13 @@ impl Verdict {
         self.rows.push(if path.is_empty() { row } else { row.at(path) });
     }
 
+    /// Says what is behind the row that was judged last.
+    fn explain(&mut self, why: Vec<String>) {
+        if let Some(row) = self.rows.last_mut() {
+            row.why = why;
+        }
+    }
+
     /// Rows of `verdict.csv`.
     pub(crate) fn csv_rows(&self) -> impl Iterator<Item = Row<'_>> {
         self.rows.iter().map(|row| Row {
@@ -94,6 +110,7 @@ impl Verdict {
             margin_share: row.margin,
             status: row.status,
             source: &row.source,
+            why: row.why.join("; "),
         })
     }
 }
@@ -109,4 +126,5 @@ pub(crate) struct Row<'a> {
     margin_share: Option<f64>,
     status: Status,
     source: &'a str,
+    why: String,
 }

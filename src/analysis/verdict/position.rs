@@ -1,32 +1,16 @@
-//! First fix and errors of the fixes, against the message's timetable and the receiver's own covariance.
+//! Errors of the fixes, against the receiver's own covariance.
 
 use super::{Bound, Verdict};
 use crate::analysis::load::Run;
 use crate::analysis::summary::Summary;
 use crate::gnss::record::Fix;
 
-/// Longest wait for a fix from a cold start that is not the receiver's fault: a subframe begun just before lock, five more
-/// of 6 s until 1 to 3 are whole, and 4 s to acquire, lock and synchronise.
-const FIRST_FIX_S: f64 = 40.0;
-
 impl Verdict {
     pub(super) fn position(&mut self, run: &Run, summary: &Summary) {
         let position = &summary.position;
-        if run.scene.duration_s < FIRST_FIX_S && position.first_fix_s.is_none() {
-            self.not_judged.push(format!(
-                "position: {} s are too short for a first fix from a cold start, which may take {FIRST_FIX_S} s",
-                run.scene.duration_s
-            ));
+        if run.fixes.is_empty() || !run.scene.expect.bounded(0.0) {
             return;
         }
-        self.judge(
-            "time to first fix",
-            "position.first_fix_s",
-            position.first_fix_s,
-            "s",
-            Bound::Max(FIRST_FIX_S),
-            "IS-GPS-200, 20.3.3: subframes 1 to 3 are whole after 36 s at the latest; 4 s to acquire and lock",
-        );
         let expected = |factor: f64, of: fn(&Fix) -> f64| {
             let variance = run.fixes.iter().map(of).sum::<f64>() / run.fixes.len().max(1) as f64;
             (variance > 0.0).then(|| factor * variance.sqrt())

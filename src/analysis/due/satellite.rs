@@ -1,0 +1,310 @@
+//! When one satellite must be found, observed and used, from the truth's rows alone.
+//!
+//! A satellite must be acquired once its searches, counted at the worst phase of their interval, have missed it with a probability
+//! below one in a million; observed once lock and two headers of the message had time; used once its ephemeris had. What ends a
+//! lock for a good reason starts all of that anew: the satellite is not there, too weak, faded, or the scene expects it.
+
+use super::receiver::Receiver;
+use super::timetable::Timetable;
+use crate::gnss::facts::{Expect, Fault, Losses};
+use crate::gnss::satellite::Sv;
+
+/// Chance of never being found, in that many nepers, below which absence is no bad luck.
+const BAD_LUCK_NP: f64 = 13.815_510_557_964_274;
+/// Time to acquire, lock and synchronise to symbols.
+pub const LOCK_S: f64 = 4.0;
+/// C/A codes are 21.1 dB apart; a satellite that much weaker than another hides below its cross-correlation.
+pub const ISOLATION_DB: f64 = 20.0;
+/// A fall of the signal below its usual strength by this much is a fade in which phase turns quicker than the truth's rows show.
+pub const FADE_DB: f64 = 10.0;
+/// Time that a receiver may take to use what it observes.
+const USE_S: f64 = 1.0;
+/// An ephemeris is good for so long.
+const EPHEMERIS_S: f64 = 7200.0;
+/// A change of health reaches the user with the next subframe 1.
+const HEALTH_S: f64 = 36.0;
+
+/// One row of the truth as expectation needs it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    pub time_s: f64,
+    pub cn0_dbhz: f64,
+    /// With other satellites, interference and the front end's cost counted.
+    pub effective_dbhz: f64,
+    /// The strongest satellite's.
+    pub strongest_dbhz: f64,
+    pub doppler_hz: f64,
+    /// Whether the receiver's mask lets it into fixes.
+    pub above_mask: bool,
+}
+
+/// Why a satellite is not expected at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Excuse {
+    NotThere,
+    Weak,
+    Faded,
+    /// Below another's cross-correlation.
+    Hidden,
+    Fault,
+    /// The scene says so.
+    Scene,
+}
+
+impl Excuse {
+    /// In words.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::NotThere => "set or obstructed",
+            Self::Weak => "too weak to hold",
+            Self::Faded => "faded",
+            Self::Hidden => "hidden by a stronger satellite",
+            Self::Fault => "faulty",
+            Self::Scene => "expected by the scene",
+        }
+    }
+}
+
+/// What is required of a satellite at one row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Required {
+    /// The signal can be held here, so that fixes that have begun can go on.
+    pub held: bool,
+    pub acquired: bool,
+    pub observed: bool,
+    pub used: bool,
+}
+
+/// Everything about the scene that is not in the rows.
+#[derive(Clone, Copy)]
+pub struct Scene<'s> {
+    pub receiver: &'s Receiver,
+    pub timetable: Timetable,
+    pub expect: &'s Expect,
+    pub faults: &'s [Fault],
+    /// Interval of the truth's rows.
+    pub interval_s: f64,
+}
+
+impl Scene<'_> {
+    fn of(&self, sv: Sv, kinds: &[&str]) -> impl Iterator<Item = &Fault> {
+        let kinds = kinds.iter().map(|kind| (*kind).to_owned()).collect::<Vec<_>>();
+        let concerns = move |fault: &&Fault| fault.satellites.as_ref().is_none_or(|list| list.contains(&sv));
+        self.faults.iter().filter(concerns).filter(move |fault| kinds.contains(&fault.kind))
+    }
+
+    /// Whether the message cannot be read without errors.
+    fn garbled(&self, sv: Sv, time_s: f64) -> bool {
+        self.of(sv, &["bit_errors", "bit"]).any(|fault| during(fault, time_s, HEALTH_S))
+    }
+
+    /// Whether the satellite must not, or need not, be used.
+    fn unfit(&self, sv: Sv, time_s: f64) -> bool {
+        let wrong = ["clock_step", "clock_ramp", "clock_noise", "orbit", "parameter"];
+        // What is wrong leaves smoothed ranges and decoded sets wrong for a while after.
+        let wrong = self.of(sv, &wrong).any(|fault| time_s >= fault.from_s);
+        wrong || self.of(sv, &["health"]).any(|fault| during(fault, time_s, HEALTH_S))
+    }
+
+    /// Why a lock may end at a row, if it may.
+    pub fn excuse(&self, sv: Sv, row: &Row, usual_dbhz: f64) -> Option<Excuse> {
+        let steps = || self.of(sv, &["clock_step"]).flat_map(|fault| [Some(fault.from_s), fault.to_s]).flatten();
+        match self.expect.losses(sv, row.time_s) {
+            Some(Losses::Any) => return Some(Excuse::Scene),
+            Some(Losses::None) => return None,
+            None => {}
+        }
+        if row.effective_dbhz < self.receiver.hold_dbhz {
+            Some(Excuse::Weak)
+        } else if row.cn0_dbhz < usual_dbhz - FADE_DB {
+            Some(Excuse::Faded)
+        } else if row.cn0_dbhz < row.strongest_dbhz - ISOLATION_DB {
+            Some(Excuse::Hidden)
+        } else if steps().any(|at_s| (at_s - 0.5..at_s + 5.0).contains(&row.time_s)) {
+            Some(Excuse::Fault)
+        } else {
+            None
+        }
+    }
+
+    /// What is required at each row; `healthy` is what the message says without faults.
+    pub fn required(&self, sv: Sv, rows: &[Row], usual_dbhz: f64, healthy: bool) -> Vec<Required> {
+        let mut state = State::default();
+        let mut last_s = f64::NEG_INFINITY;
+        let mut found = Vec::with_capacity(rows.len());
+        for row in rows {
+            if row.time_s - last_s > 1.5 * self.interval_s || self.excuse(sv, row, usual_dbhz).is_some() {
+                state = State { ephemeris_s: state.ephemeris_s, ..State::default() };
+            }
+            last_s = row.time_s;
+            if self.excuse(sv, row, usual_dbhz).is_some() {
+                found.push(Required::default());
+                continue;
+            }
+            state.search(self.receiver, row);
+            let (garbled, fit) = (self.garbled(sv, row.time_s), healthy && !self.unfit(sv, row.time_s));
+            if let Some(acquired_s) = state.acquired_s.filter(|_| !garbled) {
+                let locked_s = acquired_s + LOCK_S;
+                state.observed_s.get_or_insert(self.timetable.frame_by_s(locked_s));
+                let known = state.ephemeris_s.is_some_and(|at_s| row.time_s < at_s + EPHEMERIS_S);
+                let ready_s = if known { locked_s } else { self.timetable.ephemeris_by_s(locked_s) };
+                state.used_s.get_or_insert(ready_s.max(state.observed_s.unwrap_or(ready_s)) + USE_S);
+            }
+            let reached = |at_s: Option<f64>| at_s.is_some_and(|at_s| row.time_s >= at_s);
+            let used = reached(state.used_s) && fit && row.above_mask;
+            if reached(state.used_s) && fit {
+                state.ephemeris_s = Some(row.time_s);
+            }
+            found.push(Required {
+                held: fit && row.above_mask,
+                acquired: state.acquired_s.is_some(),
+                observed: reached(state.observed_s),
+                used,
+            });
+        }
+        found
+    }
+}
+
+/// Whether a fault is on, or was until `after_s` before.
+fn during(fault: &Fault, time_s: f64, after_s: f64) -> bool {
+    time_s >= fault.from_s && fault.to_s.is_none_or(|to_s| time_s < to_s + after_s)
+}
+
+/// How far a lock has come.
+#[derive(Clone, Copy, Debug, Default)]
+struct State {
+    /// Since when it could be found.
+    since_s: Option<f64>,
+    searches: u32,
+    luck_np: f64,
+    acquired_s: Option<f64>,
+    observed_s: Option<f64>,
+    used_s: Option<f64>,
+    /// When its ephemeris was last good.
+    ephemeris_s: Option<f64>,
+}
+
+impl State {
+    /// Counts the searches that must have been made.
+    fn search(&mut self, receiver: &Receiver, row: &Row) {
+        if self.acquired_s.is_some() {
+            return;
+        }
+        let since_s = *self.since_s.get_or_insert(row.time_s);
+        // At the scene's start the first search comes at once; later ones come when they come.
+        let at_start = since_s <= 0.0;
+        let due = f64::from(self.searches) + if at_start { 0.0 } else { 1.0 };
+        if row.time_s - since_s >= due * receiver.search_interval_s {
+            let miss = receiver.miss(row.effective_dbhz, at_start && self.searches == 0);
+            self.luck_np -= libm::log(miss.max(f64::MIN_POSITIVE));
+            self.searches += 1;
+        }
+        if self.luck_np >= BAD_LUCK_NP {
+            self.acquired_s = Some(row.time_s);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use super::*;
+    use crate::gnss::facts::{Interval, Terms};
+    use crate::gnss::time::Epoch;
+
+    /// A second a row, all strong but where `weak` says.
+    fn rows(seconds: u32, dbhz: impl Fn(f64) -> Option<f64>) -> Vec<Row> {
+        let row = |second: u32| {
+            let time_s = f64::from(second);
+            let cn0_dbhz = dbhz(time_s)?;
+            let (effective_dbhz, strongest_dbhz) = (cn0_dbhz, cn0_dbhz.max(45.0));
+            Some(Row { time_s, cn0_dbhz, effective_dbhz, strongest_dbhz, doppler_hz: 0.0, above_mask: true })
+        };
+        (0..seconds).filter_map(row).collect()
+    }
+
+    /// First seconds of acquired, observed, used, with times after `from_s` alone.
+    fn first(scene: &Scene<'_>, rows: &[Row], from_s: f64) -> [Option<f64>; 3] {
+        let required = scene.required(Sv::gps(5), rows, 45.0, true);
+        let of = |of: fn(&Required) -> bool| {
+            let later = rows.iter().zip(&required).filter(|(row, _)| row.time_s >= from_s);
+            later.filter(|(_, required)| of(required)).map(|(row, _)| row.time_s).next()
+        };
+        [of(|r| r.acquired), of(|r| r.observed), of(|r| r.used)]
+    }
+
+    fn with<T>(expect: Expect, faults: &[Fault], judge: impl FnOnce(&Scene<'_>) -> T) -> T {
+        let receiver = Receiver::for_tests(&Value::Null);
+        let timetable = Timetable::new(Epoch::parse("2010-07-01T08:05:58").unwrap());
+        judge(&Scene { receiver: &receiver, timetable, expect: &expect, faults, interval_s: 1.0 })
+    }
+
+    #[test]
+    fn a_strong_satellite_must_be_found_at_once_observed_after_two_headers_and_used_with_its_ephemeris() {
+        with(Expect::default(), &[], |scene| {
+            let found = first(scene, &rows(90, |_| Some(45.0)), 0.0);
+            // Locked by 4 s, between subframes at 2 and 8 s; headers at 8 and 14 s; subframe 1 is whole at 38 s.
+            assert_eq!(found, [Some(0.0), Some(16.0), Some(40.0)]);
+        });
+    }
+
+    #[test]
+    fn one_that_rises_waits_for_the_next_search_and_one_too_weak_for_the_search_is_not_expected() {
+        with(Expect::default(), &[], |scene| {
+            let rising = rows(120, |t_s| (t_s >= 20.0).then_some(45.0));
+            assert_eq!(first(scene, &rising, 0.0)[0], Some(35.0), "a search every 15 s, at the worst phase");
+            assert_eq!(first(scene, &rows(900, |_| Some(29.0)), 0.0)[1], None, "held perhaps, but hardly found");
+            assert_eq!(first(scene, &rows(90, |_| Some(24.0)), 0.0), [None; 3], "too weak to hold");
+            let strong = rows(90, |_| Some(45.0)).into_iter().map(|row| Row { strongest_dbhz: 66.0, ..row });
+            assert_eq!(first(scene, &strong.collect::<Vec<_>>(), 0.0), [None; 3], "hidden");
+        });
+    }
+
+    #[test]
+    fn what_ends_a_lock_for_a_good_reason_starts_the_wait_anew() {
+        with(Expect::default(), &[], |scene| {
+            let gap = rows(120, |t_s| (!(50.0..55.0).contains(&t_s)).then_some(45.0));
+            let after = first(scene, &gap, 50.0);
+            assert_eq!(after[0], Some(70.0));
+            // Locked by 74 s: headers at 74 and 80 s; the ephemeris is known from before.
+            assert_eq!((after[1], after[2]), (Some(82.0), Some(83.0)));
+            let fade = rows(120, |t_s| Some(if t_s == 60.0 { 34.0 } else { 45.0 }));
+            let required = scene.required(Sv::gps(5), &fade, 45.0, true);
+            assert!(required[59].used && !required[60].observed && !required[61].observed && required[119].observed);
+        });
+    }
+
+    #[test]
+    fn a_scene_excuses_by_satellite_and_interval_and_faults_excuse_their_satellite() {
+        let terms = Terms {
+            losses: Some(Losses::Any),
+            satellites: Some(vec![Sv::gps(5)]),
+            reason: "jammer".to_owned(),
+            ..Terms::default()
+        };
+        let expect = Expect { whole: None, intervals: vec![Interval { from_s: 60.0, to_s: 70.0, terms }] };
+        with(expect, &[], |scene| {
+            let all = rows(120, |_| Some(45.0));
+            let own = scene.required(Sv::gps(5), &all, 45.0, true);
+            let other = scene.required(Sv::gps(6), &all, 45.0, true);
+            assert!(own[59].used && !own[65].observed && other[65].used);
+        });
+        let fault = |kind: &str, from_s, to_s| Fault {
+            kind: kind.to_owned(),
+            satellites: Some(vec![Sv::gps(5)]),
+            from_s,
+            to_s,
+        };
+        with(Expect::default(), &[fault("health", 60.0, Some(62.0)), fault("bit_errors", 100.0, None)], |scene| {
+            let all = rows(120, |_| Some(45.0));
+            let own = scene.required(Sv::gps(5), &all, 45.0, true);
+            assert!(own[59].used && own[65].observed && !own[65].used && own[98].used);
+            assert!(scene.required(Sv::gps(5), &all, 45.0, false).iter().all(|r| !r.used), "unhealthy all along");
+        });
+        with(Expect::default(), &[fault("bit_errors", 0.0, None)], |scene| {
+            assert_eq!(first(scene, &rows(90, |_| Some(45.0)), 0.0), [Some(0.0), None, None]);
+        });
+    }
+}
