@@ -82,6 +82,8 @@ pub struct Solution {
     pub sigmas_m: Vec<f64>,
     pub sights: Vec<Vector3<f64>>,
     pub elevations_rad: Vec<f64>,
+    /// What one prior deviation of the ionosphere's model adds to each range.
+    pub commons_m: Vec<f64>,
     /// Covariance of ECEF coordinates and clock, in m².
     pub covariance: Matrix4<f64>,
     /// The same for unit variances: squares of the dilutions of precision.
@@ -280,6 +282,7 @@ fn finish(
         sigmas_m: lines.iter().map(|line| line.sigma_m).collect(),
         sights: lines.iter().map(|line| line.sight).collect(),
         elevations_rad: lines.iter().map(|line| line.elevation_rad).collect(),
+        commons_m: lines.iter().map(|line| line.common_m).collect(),
         covariance,
         dilution,
         condition: f64::INFINITY,

@@ -2,13 +2,12 @@
 //!
 //! A [`Solver`] smooths code with carrier ([`smooth`]), finds where satellites were, corrects the atmosphere by the decoded
 //! ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`troposphere`], solves ([`least_squares`]) and tests
-//! the residuals, leaving out satellites that contradict the others. Limits: one clock for all signals; one contradicting satellite at a time is searched for.
+//! the residuals, leaving out the fewest satellites that contradict the others ([`exclusion`]). Limits: one clock for all signals.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
 
 use crate::gnss::broadcast::Ephemeris;
@@ -19,6 +18,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, Rate, SampleClock};
 use crate::receiver::track::loops::CodeShape;
 
+pub mod exclusion;
 pub mod ionosphere;
 pub mod least_squares;
 pub mod smooth;
@@ -26,6 +26,7 @@ pub mod smooth;
 mod tests;
 pub mod troposphere;
 
+pub use exclusion::{Consistent, chi_square_threshold, consistent};
 use ionosphere::{DelayError, NOMINAL, NOMINAL_ERROR};
 use least_squares::{Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, Solution, UNKNOWNS};
 use smooth::Smoother;
@@ -134,8 +135,18 @@ pub enum NoFix {
         "the ranges contradict each other and no satellite stands out: chi-square {chi_square:.1} above {threshold:.1}"
     )]
     Inconsistent { chi_square: f64, threshold: f64 },
+    #[error(
+        "the ranges contradict each other, and without {} they agree as well as without {}, on places {separation_m:.1} m apart",
+        names(one),
+        names(other)
+    )]
+    Ambiguous { one: Vec<Sv>, other: Vec<Sv>, separation_m: f64 },
     #[error("the ionosphere's parameters have not been decoded")]
     AwaitingIonosphere,
+}
+
+fn names(svs: &[Sv]) -> String {
+    svs.iter().map(Sv::to_string).collect::<Vec<_>>().join(" ")
 }
 
 /// A fix and what the records do not hold.
@@ -277,64 +288,6 @@ fn range(
         noise_m,
         cn0_hz,
     })
-}
-
-/// The value that chi-square with so many degrees of freedom exceeds with the probability `false_alarm`.
-pub fn chi_square_threshold(freedom: usize, false_alarm: f64) -> f64 {
-    ChiSquared::new(freedom as f64).map_or(f64::INFINITY, |law| law.inverse_cdf(1.0 - false_alarm))
-}
-
-/// Ranges that agree, their solution, and satellites left out with their residuals before.
-pub type Consistent = (Vec<Range>, Solution, Vec<(Sv, f64)>);
-
-/// Solves, and leaves out one satellite after another until the residuals fit.
-///
-/// # Errors
-/// As [`least_squares::position`], and [`NoFix::Inconsistent`] when a fault shows but cannot be located.
-pub fn consistent(
-    mut ranges: Vec<Range>,
-    start_m: Vector3<f64>,
-    corrections: &Corrections,
-    false_alarm: f64,
-) -> Result<Consistent, NoFix> {
-    let mut excluded: Vec<(Sv, f64)> = Vec::new();
-    let mut solution = least_squares::position(&ranges, start_m, corrections)?;
-    loop {
-        let freedom = ranges.len() - UNKNOWNS;
-        let threshold = chi_square_threshold(freedom.max(1), false_alarm);
-        if freedom == 0 {
-            // Four ranges always fit. After an exclusion that proves nothing.
-            let chi_square = solution.chi_square;
-            return if excluded.is_empty() {
-                Ok((ranges, solution, excluded))
-            } else {
-                Err(NoFix::Inconsistent { chi_square, threshold })
-            };
-        }
-        if solution.chi_square <= threshold {
-            return Ok((ranges, solution, excluded));
-        }
-        if freedom == 1 {
-            return Err(NoFix::Inconsistent { chi_square: solution.chi_square, threshold });
-        }
-        let mut best: Option<(usize, Solution)> = None;
-        for index in 0..ranges.len() {
-            let mut others = ranges.clone();
-            others.remove(index);
-            if let Ok(without) = least_squares::position(&others, solution.position_m, corrections)
-                && best.as_ref().is_none_or(|(_, found)| without.chi_square < found.chi_square)
-            {
-                best = Some((index, without));
-            }
-        }
-        let Some((index, without)) = best else {
-            return Err(NoFix::Inconsistent { chi_square: solution.chi_square, threshold });
-        };
-        let out = ranges.remove(index);
-        let sight_m = solution.residuals_m.get(index).copied().unwrap_or(0.0);
-        excluded.push((out.sv, sight_m));
-        solution = without;
-    }
 }
 
 #[expect(clippy::too_many_arguments, reason = "a record with as many sources")]
