@@ -10,7 +10,7 @@
 //! there is no position ([`NoFix::Ambiguous`]). Limits: faults on so many satellites that good ones are the minority,
 //! and faults that happen to fit another position: n − 4 directions are all that residuals see.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix5, Vector3, Vector5};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::NoFix;
@@ -80,11 +80,14 @@ fn without(ranges: &[Range], set: &[usize]) -> Vec<Range> {
 /// All sets of `size` ranges, those first whose removal leaves the smallest sum of squares; `None` if there are too many.
 fn ranked(solution: &Solution, size: usize) -> Option<Vec<Vec<usize>>> {
     let sets = sets(solution.residuals_m.len(), size)?;
-    // The fifth unknown is the ionosphere's common error, of unit prior deviation.
-    let rows: Vec<Vector5<f64>> = (solution.sights.iter().zip(&solution.sigmas_m).zip(&solution.commons_m))
-        .map(|((sight, sigma_m), common_m)| Vector5::new(-sight.x, -sight.y, -sight.z, 1.0, *common_m) / *sigma_m)
+    // Behind position and clock: the ionosphere's three common errors, of unit prior deviation.
+    let rows: Vec<SVector<f64, 7>> = (solution.sights.iter().zip(&solution.sigmas_m).zip(&solution.commons_m))
+        .map(|((sight, sigma_m), common_m)| {
+            let row = [-sight.x, -sight.y, -sight.z, 1.0, common_m.x, common_m.y, common_m.z];
+            SVector::<f64, 7>::from(row) / *sigma_m
+        })
         .collect();
-    let prior = Matrix5::from_diagonal(&Vector5::new(0.0, 0.0, 0.0, 0.0, 1.0));
+    let prior = SMatrix::<f64, 7, 7>::from_diagonal(&SVector::from([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]));
     let normal = rows.iter().fold(prior, |sum, row| sum + row * row.transpose());
     let covariance = normal.cholesky()?.inverse();
     let normalised: Vec<f64> =

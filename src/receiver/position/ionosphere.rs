@@ -1,12 +1,17 @@
 //! The ionosphere before its parameters are decoded, and the error of a model that is not exact.
 //!
 //! Page 18 of subframe 4 comes once in 12.5 minutes (IS-GPS-200N, 20.3.3.5.1.2). Until then delays are those of a nominal
-//! ionosphere, half way between the quiet and the active Sun, and their error is common to all satellites: one number z
-//! of zero mean and unit variance scales a stated deviation along every line of sight. The solution estimates z with the
-//! position, so that its covariance contains what the ionosphere may do to height, clock and plan. Limits: a part of the
-//! error differs by direction and counts as independent noise; nothing is known of storms and of the night at solar maximum.
+//! ionosphere, half way between the quiet and the active Sun, and their error is common to all satellites: three numbers
+//! of zero mean and unit variance scale a stated deviation along every line of sight, one for the whole sky and one each for
+//! what it gains northwards and eastwards. The solution estimates them with the position, so that its covariance
+//! contains what the ionosphere may do to height, clock and plan. Limits: what is left after these three counts as
+//! independent noise; nothing is known of storms and of the night at solar maximum.
 
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use std::f64::consts::PI;
+
+use nalgebra::Vector3;
+
+use crate::gnss::earth::{Look, SPEED_OF_LIGHT_MPS};
 use crate::gnss::klobuchar::Klobuchar;
 
 /// Coefficients of the nominal ionosphere: even in magnetic latitude, with a period of 100 000 s.
@@ -22,9 +27,12 @@ pub const NOMINAL: Klobuchar = Klobuchar { alpha: [1.6e-8, 0.0, -6.0e-8, 0.0], b
 /// the IGS map of 2010-12-04 of 0.63.
 pub const NOMINAL_ERROR: DelayError = DelayError { share: 0.6, least_m: 0.5 };
 
-/// The part of the common error that differs by direction, and counts as independent: the days' odd coefficients
-/// change the ratio to the nominal model by 10 to 20 % within the sky of one place.
+/// The error that those three do not describe, as a share of the common one: the days' odd coefficients change the ratio to
+/// the nominal model by 10 to 20 % within the sky of one place.
 const INDEPENDENT_SHARE: f64 = 0.25;
+/// Angles at the Earth's centre, northwards and eastwards, over which the error changes by its own deviation: the crests of the
+/// equatorial anomaly are 10° wide, and an hour of local time is 15°.
+const GRADIENT_RAD: [f64; 2] = [10.0 / 180.0 * PI, 20.0 / 180.0 * PI];
 
 /// Standard deviation of a modelled vertical delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,10 +44,15 @@ pub struct DelayError {
 }
 
 impl DelayError {
-    /// Deviations along a line of sight whose modelled delay is `delay_s` and whose slant factor is `obliquity`: of the error
-    /// common to all satellites, and of the satellite's own.
-    pub fn slant_m(self, delay_s: f64, obliquity: f64) -> (f64, f64) {
-        let common_m = libm::hypot(self.share * SPEED_OF_LIGHT_MPS * delay_s, self.least_m * obliquity);
-        (common_m, INDEPENDENT_SHARE * common_m)
+    /// Deviations along the line of sight `look` whose modelled delay is `delay_s` and whose slant factor is `obliquity`: of the three
+    /// errors common to all satellites, and of the satellite's own.
+    pub fn slant_m(self, delay_s: f64, obliquity: f64, look: Look) -> (Vector3<f64>, f64) {
+        let level_m = libm::hypot(self.share * SPEED_OF_LIGHT_MPS * delay_s, self.least_m * obliquity);
+        // From the receiver to the ionospheric point (IS-GPS-200N, 20.3.3.5.2.5), in semicircles.
+        let apart_rad = (0.0137 / (look.elevation_rad.max(0.0) / PI + 0.11) - 0.022) * PI;
+        let (sine, cosine) = libm::sincos(look.azimuth_rad);
+        let [north_rad, east_rad] = GRADIENT_RAD;
+        let gain = Vector3::new(1.0, apart_rad * cosine / north_rad, apart_rad * sine / east_rad);
+        (level_m * gain, INDEPENDENT_SHARE * level_m)
     }
 }

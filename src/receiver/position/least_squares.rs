@@ -4,9 +4,9 @@
 //! clock bias of 11 ms shift the fix by metres). Source: IS-GPS-200N, 20.3.3.4.3.4 and any
 //! textbook of estimation. Normal equations of four unknowns with lines of sight of unit length: their condition is that of
 //! the geometry, and is checked before they are solved. Where the ionosphere's model has an error ([`Ionosphere::Uncertain`]) that
-//! error is a fifth unknown with a prior; it is eliminated, so that the covariance of the four contains it.
+//! error is three more unknowns with a prior; they are eliminated, so that the covariance of the four contains them.
 
-use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
+use nalgebra::{Cholesky, Matrix3, Matrix4, Matrix4x3, Vector3, Vector4};
 
 use crate::gnss::broadcast::{ClockState, State};
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_earth};
@@ -82,8 +82,8 @@ pub struct Solution {
     pub sigmas_m: Vec<f64>,
     pub sights: Vec<Vector3<f64>>,
     pub elevations_rad: Vec<f64>,
-    /// What one prior deviation of the ionosphere's model adds to each range.
-    pub commons_m: Vec<f64>,
+    /// What one prior deviation of each of the ionosphere's common errors adds to each range.
+    pub commons_m: Vec<Vector3<f64>>,
     /// Covariance of ECEF coordinates and clock, in m².
     pub covariance: Matrix4<f64>,
     /// The same for unit variances: squares of the dilutions of precision.
@@ -93,8 +93,9 @@ pub struct Solution {
     /// Weighted sum of squared residuals, the ionosphere's estimated error over its prior deviation among them: its degrees of
     /// freedom are the number of ranges less four either way.
     pub chi_square: f64,
-    /// Estimated error of the ionosphere's model in its prior deviations; 0 where the model is right.
-    pub ionosphere_error: f64,
+    /// Estimated errors of the ionosphere's model in their prior deviations (level, gain northwards, eastwards); 0 where the
+    /// model is right.
+    pub ionosphere_error: Vector3<f64>,
     pub iterations: u32,
 }
 
@@ -104,31 +105,32 @@ struct Line {
     sight: Vector3<f64>,
     sigma_m: f64,
     elevation_rad: f64,
-    /// What one prior deviation of the ionosphere's common error adds to the range.
-    common_m: f64,
+    /// What one prior deviation of each of the ionosphere's common errors adds to the range.
+    common_m: Vector3<f64>,
 }
 
-/// The error of the ionosphere's model: z of prior mean 0 and variance 1.
-#[derive(Default)]
+/// The errors of the ionosphere's model: z of prior mean 0 and unit variance.
 struct Common {
-    /// Σ w f a over the ranges: a the four derivatives of a range, f its derivative by z.
-    coupling: Vector4<f64>,
-    /// Σ w f² and the prior's weight, 1.
-    weight: f64,
+    /// Σ w a fᵀ over the ranges: a the four derivatives of a range, f its derivatives by z.
+    coupling: Matrix4x3<f64>,
+    /// Inverse of Σ w f fᵀ and the prior's weight, 1.
+    inverse: Matrix3<f64>,
     /// Σ w f v.
-    right: f64,
+    right: Vector3<f64>,
 }
 
 impl Common {
     fn of(ranges: &[Range], lines: &[Line]) -> Self {
-        let mut common = Self { weight: 1.0, ..Self::default() };
+        let (mut coupling, mut weight, mut right) = (Matrix4x3::zeros(), Matrix3::identity(), Vector3::zeros());
         for (range, line) in ranges.iter().zip(lines) {
             let weighted = line.common_m / (line.sigma_m * line.sigma_m);
-            common.coupling += weighted * line.row();
-            common.weight += weighted * line.common_m;
-            common.right += weighted * (range.pseudorange_m - line.computed_m);
+            coupling += line.row() * weighted.transpose();
+            weight += weighted * line.common_m.transpose();
+            right += (range.pseudorange_m - line.computed_m) * weighted;
         }
-        common
+        // The prior alone makes it positive.
+        let inverse = Cholesky::new(weight).map_or_else(Matrix3::identity, |factor| factor.inverse());
+        Self { coupling, inverse, right }
     }
 }
 
@@ -150,7 +152,7 @@ fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Co
     let mut computed_m = distance_m + clock_m - SPEED_OF_LIGHT_MPS * range.clock.offset_s;
     let mut variance = range.noise_m * range.noise_m;
     let mut elevation_rad = std::f64::consts::FRAC_PI_2;
-    let mut common_m = 0.0;
+    let mut common_m = Vector3::zeros();
     if position_m.norm() > NEAR_EARTH_M {
         let user = Geodetic::from_ecef(position_m);
         let direction = look(user, position_m, &seen_m);
@@ -172,7 +174,7 @@ fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Co
 #[derive(Default)]
 struct Air {
     delay_m: f64,
-    common_m: f64,
+    common_m: Vector3<f64>,
     own_m: f64,
 }
 
@@ -199,7 +201,7 @@ fn atmosphere(
         Ionosphere::Uncertain(model, error) => {
             let delay_s = model.delay_s(user, direction, received, range.carrier_hz);
             let obliquity = model.bulge(user, direction, received).obliquity;
-            let (common_m, own_m) = error.slant_m(delay_s, obliquity);
+            let (common_m, own_m) = error.slant_m(delay_s, obliquity, direction);
             Air { delay_m: delay_m + SPEED_OF_LIGHT_MPS * delay_s, common_m, own_m }
         }
     }
@@ -230,8 +232,9 @@ pub fn position(ranges: &[Range], start_m: Vector3<f64>, corrections: &Correctio
         }
         let condition = condition(&plain)?;
         let common = Common::of(ranges, &lines);
-        normal -= common.coupling * common.coupling.transpose() / common.weight;
-        right -= common.right / common.weight * common.coupling;
+        let eliminated = common.coupling * common.inverse;
+        normal -= eliminated * common.coupling.transpose();
+        right -= eliminated * common.right;
         let solver = Cholesky::new(normal).ok_or(NoFix::Singular { condition: f64::INFINITY })?;
         let step = solver.solve(&right);
         position_m += Vector3::new(step.x, step.y, step.z);
@@ -269,12 +272,12 @@ fn finish(
 ) -> Solution {
     let lines: Vec<Line> = ranges.iter().map(|range| line(range, &position_m, clock_m, corrections, day)).collect();
     let common = Common::of(ranges, &lines);
-    let ionosphere_error = common.right / common.weight;
+    let ionosphere_error = common.inverse * common.right;
     let residual =
-        |(range, line): (&Range, &Line)| range.pseudorange_m - line.computed_m - ionosphere_error * line.common_m;
+        |(range, line): (&Range, &Line)| range.pseudorange_m - line.computed_m - ionosphere_error.dot(&line.common_m);
     let residuals_m: Vec<f64> = ranges.iter().zip(&lines).map(residual).collect();
     let squares = residuals_m.iter().zip(&lines).map(|(v, line)| (v / line.sigma_m) * (v / line.sigma_m));
-    let chi_square = squares.sum::<f64>() + ionosphere_error * ionosphere_error;
+    let chi_square = squares.sum::<f64>() + ionosphere_error.norm_squared();
     Solution {
         position_m,
         clock_m,

@@ -165,12 +165,12 @@ fn residuals_and_positions_have_the_stated_statistics() {
     assert!((15..=65).contains(&above), "{above}");
 }
 
-/// Delay of the nominal ionosphere towards a direction of [`SKY`], and the two deviations of its error.
-fn nominal(&(azimuth_deg, elevation_deg): &(f64, f64), error: DelayError) -> (f64, f64, f64) {
+/// Delay of the nominal ionosphere towards a direction of [`SKY`], and the deviations of its errors, common and own.
+fn nominal(&(azimuth_deg, elevation_deg): &(f64, f64), error: DelayError) -> (f64, Vector3<f64>, f64) {
     let look = Look { azimuth_rad: azimuth_deg.to_radians(), elevation_rad: elevation_deg.to_radians() };
     let received = Epoch::from_week(1590, 374_400.0).plus_s(0.075);
     let delay_s = NOMINAL.delay_s(place(), look, received, 1_575.42e6);
-    let (common_m, own_m) = error.slant_m(delay_s, NOMINAL.bulge(place(), look, received).obliquity);
+    let (common_m, own_m) = error.slant_m(delay_s, NOMINAL.bulge(place(), look, received).obliquity, look);
     (SPEED_OF_LIGHT_MPS * delay_s, common_m, own_m)
 }
 
@@ -180,13 +180,14 @@ fn the_covariance_holds_an_ionospheric_error_that_all_satellites_share() {
     let up = place().ecef_to_enu().row(2).transpose();
     let corrections = Corrections { ionosphere: Ionosphere::Uncertain(NOMINAL, NOMINAL_ERROR), ..BARE };
     let (mut state, runs) = (5, 4000);
-    let (mut nees, mut chi_square, mut squares, mut stated) = (0.0, 0.0, 0.0, 0.0);
+    let axes = place().ecef_to_enu();
+    let (mut nees, mut chi_square, mut squares, mut stated, mut north) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for _ in 0..runs {
-        let z = noise(&mut state);
+        let z = Vector3::from_fn(|_, _| noise(&mut state));
         let mut noisy = ranges(&SKY, 0.0);
         for (range, direction) in noisy.iter_mut().zip(&SKY) {
             let (delay_m, common_m, own_m) = nominal(direction, NOMINAL_ERROR);
-            range.pseudorange_m += delay_m + z * common_m + own_m * noise(&mut state) + noise(&mut state);
+            range.pseudorange_m += delay_m + z.dot(&common_m) + own_m * noise(&mut state) + noise(&mut state);
         }
         let found = position(&noisy, truth_m, &corrections).unwrap();
         let miss = found.position_m - truth_m;
@@ -194,16 +195,19 @@ fn the_covariance_holds_an_ionospheric_error_that_all_satellites_share() {
         nees += (error.transpose() * found.covariance.try_inverse().unwrap() * error)[(0, 0)];
         chi_square += found.chi_square;
         squares += miss.dot(&up) * miss.dot(&up);
+        north += (axes * found.covariance.fixed_view::<3, 3>(0, 0) * axes.transpose())[(1, 1)];
         stated += (up.transpose() * found.covariance.fixed_view::<3, 3>(0, 0) * up)[(0, 0)];
     }
     let runs = f64::from(runs);
-    // As without an ionosphere: 4 ± four deviations of the mean, and six degrees of freedom, for z comes with its own observation.
+    // As without an ionosphere: 4 ± four deviations of the mean, and six degrees of freedom, for each z comes with its own observation.
     assert!((nees / runs - 4.0).abs() < 4.0 * (8.0 / runs).sqrt(), "{}", nees / runs);
     assert!((chi_square / runs - 6.0).abs() < 4.0 * (12.0 / runs).sqrt(), "{}", chi_square / runs);
     // The relative deviation of a variance is √(2/runs); four of them.
     assert!((squares / stated - 1.0).abs() < 4.0 * (2.0 / runs).sqrt(), "{squares} {stated}");
     // Metres of height that independent weights alone would not state: unit noise gives 1.15 m here.
     assert!(stated / runs > 2.0 * 2.0, "{}", stated / runs);
+    // And of plan: gains northwards turn into it; unit noise gives less than the HDOP of 0.82 m.
+    assert!(north / runs > 1.0, "{}", north / runs);
 }
 
 #[test]
@@ -216,7 +220,7 @@ fn a_model_without_error_is_solved_as_a_known_one() {
     let at = |ionosphere| position(&all, Vector3::zeros(), &Corrections { ionosphere, ..BARE }).unwrap();
     let (known, uncertain) = (at(Ionosphere::Known(NOMINAL)), at(Ionosphere::Uncertain(NOMINAL, none)));
     assert_eq!((known.position_m, known.covariance), (uncertain.position_m, uncertain.covariance));
-    assert_eq!(uncertain.ionosphere_error, 0.0);
+    assert_eq!(uncertain.ionosphere_error, Vector3::zeros());
 }
 
 #[cfg(feature = "generator")]
