@@ -166,3 +166,28 @@ fn after_a_second_of_silence_every_satellite_is_lost_found_again_and_used_again(
         assert!(error < 5.0, "{error} m at {} s", second(row));
     }
 }
+
+#[test]
+fn a_mixer_and_a_clock_that_are_off_cost_neither_accuracy_nor_satellites() {
+    // A clock of 2.5 ppm takes three of twelve satellites out of the first search's ±5 kHz, and the mixer parts carrier
+    // and code by 2 kHz.
+    let scene = include_str!("../scenarios/static.toml")
+        .replace("drift_sps = 5e-8", "drift_sps = 2.5e-6")
+        .replace("duration_s = 60", "duration_s = 40")
+        .replace("[noise]", "[noise]\n\n[local_oscillator]\noffset_hz = 2000");
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("off.toml");
+    std::fs::write(&path, scene).unwrap();
+    let out = directory.path().join("run");
+    let run =
+        Command::new(env!("CARGO_BIN_EXE_gnss-twin")).arg("run").arg(&path).arg("--out").arg(&out).output().unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let read =
+        |name: &str| -> Value { serde_json::from_str(&std::fs::read_to_string(out.join(name)).unwrap()).unwrap() };
+    let (summary, receiver) = (read("summary.json"), read("rx/receiver.json"));
+    found_and_decoded_what_is_there(&summary);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    // 0.02 Hz of deviation after 30 s; 0.1 Hz are five of them.
+    assert!((number(&receiver, "/carrier_offset/offset_hz") - 2000.0).abs() < 0.1, "{receiver}");
+    assert!((number(&receiver, "/carrier_offset/code_drift") - 2.5e-6).abs() < 1e-9, "{receiver}");
+}

@@ -3,7 +3,7 @@
 //! It sees IF metadata, samples and settings; no argument can carry truth. [`acquire`] finds
 //! satellites, [`track`] follows them with [`correlate`], [`decode`] reads their messages,
 //! [`observe`] makes observables at common epochs and [`position`] solves for place and time. [`interference`] watches
-//! the spectrum.
+//! the spectrum, [`parting`] how code and carrier part.
 
 pub mod acquire;
 pub mod correlate;
@@ -11,8 +11,10 @@ pub mod decode;
 pub mod diagnosis;
 pub mod format;
 pub mod interference;
+pub mod looks;
 pub mod observe;
 pub mod output;
+pub mod parting;
 pub mod position;
 mod run;
 mod session;

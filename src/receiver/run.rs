@@ -20,6 +20,7 @@ use crate::receiver::correlate::standing_bias_m;
 use crate::receiver::diagnosis::{Diagnosis, Stage};
 use crate::receiver::format::Check;
 use crate::receiver::output::{Output, OutputError};
+use crate::receiver::parting::Parted;
 use crate::receiver::session::Session;
 use crate::receiver::settings::{Settings, SettingsError};
 use crate::receiver::source::Source;
@@ -67,6 +68,8 @@ pub struct Outcome {
     pub diagnosis: Option<Diagnosis>,
     /// Continuous waves that were met; the rows are in `interference.csv`.
     pub interfered: Option<Interfered>,
+    /// How far carrier and code part on all satellites alike, where they do.
+    pub parted: Option<Parted>,
     pub conditioning: Conditioning,
     /// What makes the results worse than need be, and the remedy.
     pub warnings: Vec<String>,
@@ -130,7 +133,8 @@ impl fmt::Display for Outcome {
         if self.cut_bytes > 0 {
             write!(f, " ({} bytes of a cut sample left out)", self.cut_bytes)?;
         }
-        self.interfered.as_ref().map_or(Ok(()), |seen| write!(f, "; {seen}"))
+        self.interfered.as_ref().map_or(Ok(()), |seen| write!(f, "; {seen}"))?;
+        self.parted.as_ref().map_or(Ok(()), |parted| write!(f, "; {parted}"))
     }
 }
 
@@ -154,7 +158,29 @@ pub(super) fn warnings(metadata: &IfMetadata, settings: &Settings) -> Vec<String
             )
         })
     };
-    SIGNALS.iter().filter_map(|signal| one(signal, signal.components.first()?)).collect()
+    let mut found: Vec<String> = SIGNALS.iter().filter_map(|signal| one(signal, signal.components.first()?)).collect();
+    found.extend(SIGNALS.iter().filter_map(|signal| image(metadata, signal, settings.acquisition.doppler_max_hz)));
+    found
+}
+
+/// Real samples whose carriers meet their own image: at 0 Hz or half the rate a carrier above and one below look alike.
+fn image(metadata: &IfMetadata, signal: &Signal, doppler_max_hz: f64) -> Option<String> {
+    let half_hz = 0.5 * metadata.rate.hz();
+    let if_hz = metadata.if_hz(signal);
+    let image_hz = half_hz * (if_hz / half_hz).round();
+    let near = !metadata.format.is_complex() && (if_hz - image_hz).abs() < doppler_max_hz;
+    near.then(|| {
+        format!(
+            "{} real samples with {} at {:.4} MHz, {:.1} kHz from {} of the rate: a carrier and its image are less than two Dopplers \
+             of {doppler_max_hz:.0} Hz apart, and Dopplers get the wrong sign; another intermediate frequency or complex \
+             samples avoid it",
+            metadata.format.name(),
+            signal.name,
+            1e-6 * if_hz,
+            1e-3 * (if_hz - image_hz).abs(),
+            if (image_hz / half_hz) as i64 % 2 == 0 { "a multiple" } else { "an odd half" },
+        )
+    })
 }
 
 /// Signals and satellites that the samples can hold.
@@ -225,6 +251,7 @@ impl Reception {
         let count = self.source.samples();
         let seconds = metadata.rate.elapsed_s(count);
         let mut outcome = self.session.outcome();
+        let findings = self.session.findings();
         outcome.samples = count;
         outcome.seconds = seconds;
         outcome.cut_bytes = cut_bytes;
@@ -242,7 +269,10 @@ impl Reception {
             if let Some(seen) = &outcome.interfered {
                 diagnosis.advice.insert(0, format!("the spectrum: {seen}"));
             }
+            diagnosis.advice.splice(0..0, findings);
             outcome.diagnosis = Some(diagnosis);
+        } else {
+            outcome.warnings.extend(findings);
         }
         output.finish(&summary(metadata, settings, &outcome))?;
         Ok(outcome)
@@ -300,6 +330,7 @@ fn summary(metadata: &IfMetadata, settings: &Settings, outcome: &Outcome) -> ser
             "seconds": seen.spectra,
             "strongest": seen.strongest,
         })),
+        "carrier_offset": outcome.parted,
         "conditioning": outcome.conditioning,
         "warnings": outcome.warnings,
         "diagnosis": outcome.diagnosis.as_ref().map(ToString::to_string),

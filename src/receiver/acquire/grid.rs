@@ -78,7 +78,7 @@ pub(super) fn samples_needed(period_samples: f64, coherent_periods: f64, sums: u
 }
 
 impl Grid {
-    pub fn new(signal: &Signal, metadata: &IfMetadata, settings: &AcquisitionSettings) -> Option<Self> {
+    pub fn new(signal: &Signal, metadata: &IfMetadata, settings: &AcquisitionSettings, centre_hz: f64) -> Option<Self> {
         let component = signal.components.first()?;
         let rate_hz = metadata.rate.hz();
         let period_samples = component.period_s() * rate_hz;
@@ -90,7 +90,8 @@ impl Grid {
         let lag_samples = length as f64 / band as f64;
         let step_hz = settings.doppler_step_cycles / (periods * component.period_s());
         let side = (settings.doppler_max_hz / step_hz).ceil() as i64;
-        let dopplers_hz: Vec<f64> = (-side..=side).map(|bin| bin as f64 * step_hz).collect();
+        let centre = (centre_hz / step_hz).round() as i64;
+        let dopplers_hz: Vec<f64> = (centre - side..=centre + side).map(|bin| bin as f64 * step_hz).collect();
         let lags = (period_samples / lag_samples).ceil() as usize;
         let per_cell = of_one_cell(settings.false_alarm_probability, (lags * dopplers_hz.len()) as f64);
         let sums = settings.noncoherent_sums;

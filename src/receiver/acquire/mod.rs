@@ -113,7 +113,7 @@ pub fn cell_chips(
     settings: &AcquisitionSettings,
 ) -> Result<f64, AcquireError> {
     settings.validate()?;
-    let grid = Grid::new(signal, metadata, settings);
+    let grid = Grid::new(signal, metadata, settings, 0.0);
     let none = AcquireError::NoCode { signal: signal.name, sv: Sv { system: signal.system, number: 0 } };
     grid.map(|grid| grid.lag_samples * grid.chips_per_sample).ok_or(none)
 }
@@ -135,6 +135,7 @@ pub fn search(
 pub struct Searcher {
     metadata: IfMetadata,
     settings: AcquisitionSettings,
+    centre_hz: f64,
     grids: BTreeMap<&'static Signal, Grid>,
     codes: BTreeMap<(&'static Signal, Sv), Code>,
 }
@@ -150,10 +151,19 @@ impl Searcher {
     /// # Errors
     /// As [`AcquisitionSettings::validate`].
     pub fn new(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Result<Self, AcquireError> {
+        Self::around(metadata, settings, 0.0)
+    }
+
+    /// The same with Dopplers around `centre_hz`, to a step of the grid, in place of zero.
+    ///
+    /// # Errors
+    /// As [`AcquisitionSettings::validate`].
+    pub fn around(metadata: &IfMetadata, settings: &AcquisitionSettings, centre_hz: f64) -> Result<Self, AcquireError> {
         settings.validate()?;
         Ok(Self {
             metadata: metadata.clone(),
             settings: settings.clone(),
+            centre_hz,
             grids: BTreeMap::new(),
             codes: BTreeMap::new(),
         })
@@ -218,7 +228,9 @@ impl Searcher {
             return Err(no_code);
         }
         if !self.grids.contains_key(signal) {
-            let Some(grid) = Grid::new(signal, &self.metadata, &self.settings) else { return Err(no_code) };
+            let Some(grid) = Grid::new(signal, &self.metadata, &self.settings, self.centre_hz) else {
+                return Err(no_code);
+            };
             self.grids.insert(signal, grid);
         }
         if let Some(grid) = self.grids.get(signal)

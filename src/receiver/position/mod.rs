@@ -165,6 +165,8 @@ pub struct Solver {
     noise: CodeNoise,
     smoother: Smoother,
     rate: Rate,
+    /// What the carrier's Doppler exceeds the code's by.
+    offset_hz: f64,
     last_m: Option<Vector3<f64>>,
     ready_since: Option<u64>,
 }
@@ -173,7 +175,14 @@ impl Solver {
     /// A solver for loops with such noise.
     pub fn new(settings: &PositionSettings, noise: CodeNoise, rate: Rate) -> Self {
         let smoother = Smoother::new(settings.smoothing_s, noise.bandwidth_hz, rate);
-        Self { settings: settings.clone(), noise, smoother, rate, last_m: None, ready_since: None }
+        Self { settings: settings.clone(), noise, smoother, rate, offset_hz: 0.0, last_m: None, ready_since: None }
+    }
+
+    /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: smoothing and velocity leave it out,
+    /// so that the clock's drift is that of the code, whose bias the position has.
+    pub fn set_carrier_offset(&mut self, hz: f64) {
+        self.offset_hz = hz;
+        self.smoother.set_carrier_offset(hz);
     }
 
     /// Solves from the observations of one sample.
@@ -194,7 +203,9 @@ impl Solver {
                 let smoothed = self.smoother.smooth(observation);
                 let cn0_hz = libm::pow(10.0, observation.cn0_dbhz / 10.0);
                 let noise_m = self.noise.sigma_m(cn0_hz) * smoothed.variance_ratio.sqrt();
-                range(observation, ephemerides.get(&observation.sv)?, smoothed.pseudorange_m, noise_m, cn0_hz)
+                let ephemeris = ephemerides.get(&observation.sv)?;
+                let range = range(observation, ephemeris, smoothed.pseudorange_m, noise_m, cn0_hz)?;
+                Some(Range { doppler_hz: range.doppler_hz - self.offset_hz, ..range })
             })
             .collect();
         if ranges.len() < UNKNOWNS {

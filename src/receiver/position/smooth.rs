@@ -4,6 +4,9 @@
 //! correlated over its own time constant, so the variance is carried along for correlated noise (first-order
 //! loop: correlation exp(−4 B t)) and not assumed to fall with the count. A diverging ionosphere biases the
 //! result by twice its rate times the window.
+//!
+//! Where code and carrier part at a known rate ([`parting`](crate::receiver::parting)), that rate is taken off. How much of it the
+//! filter has taken in is carried beside its value, so that a better rate corrects the past as well.
 
 use std::collections::BTreeMap;
 
@@ -32,6 +35,8 @@ struct State {
     carrier_m: f64,
     locked_s: f64,
     age_s: f64,
+    /// What a hertz between carrier and code has brought in.
+    parted_m_per_hz: f64,
     /// Variance, and covariance with the latest code error, over the code's variance.
     variance: f64,
     covariance: f64,
@@ -43,13 +48,19 @@ pub struct Smoother {
     window_s: f64,
     bandwidth_hz: f64,
     rate: Rate,
+    offset_hz: f64,
     states: BTreeMap<(Sv, &'static Signal), State>,
 }
 
 impl Smoother {
     /// Filters of `window_s` (0 for none) over code loops of `bandwidth_hz`.
     pub fn new(window_s: f64, bandwidth_hz: f64, rate: Rate) -> Self {
-        Self { window_s, bandwidth_hz, rate, states: BTreeMap::new() }
+        Self { window_s, bandwidth_hz, rate, offset_hz: 0.0, states: BTreeMap::new() }
+    }
+
+    /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier.
+    pub fn set_carrier_offset(&mut self, hz: f64) {
+        self.offset_hz = hz;
     }
 
     /// Forgets a satellite.
@@ -67,21 +78,28 @@ impl Smoother {
             carrier_m,
             locked_s: observation.locked_s,
             age_s: 0.0,
+            parted_m_per_hz: 0.0,
             variance: 1.0,
             covariance: 1.0,
         };
-        let next = self.states.get(&key).and_then(|old| self.step(old, &fresh)).unwrap_or(fresh);
+        let next = self
+            .states
+            .get(&key)
+            .and_then(|old| self.step(old, &fresh, observation.signal.wavelength_m()))
+            .unwrap_or(fresh);
         self.states.insert(key, next);
-        Smoothed { pseudorange_m: next.pseudorange_m, variance_ratio: next.variance }
+        let pseudorange_m = next.pseudorange_m + self.offset_hz * next.parted_m_per_hz;
+        Smoothed { pseudorange_m, variance_ratio: next.variance }
     }
 
-    fn step(&self, old: &State, new: &State) -> Option<State> {
+    fn step(&self, old: &State, new: &State, wavelength_m: f64) -> Option<State> {
         let passed_s = self.rate.elapsed_s(new.sample.checked_sub(old.sample)?);
         let predicted_m = old.pseudorange_m + new.carrier_m - old.carrier_m;
+        let parted_m_per_hz = old.parted_m_per_hz + wavelength_m * passed_s;
         let whole = passed_s > 0.0
             && passed_s <= LONGEST_GAP_S
             && new.locked_s > old.locked_s
-            && (new.pseudorange_m - predicted_m).abs() < LARGEST_JUMP_M;
+            && (new.pseudorange_m - predicted_m - self.offset_hz * parted_m_per_hz).abs() < LARGEST_JUMP_M;
         if !whole || self.window_s <= 0.0 {
             return None;
         }
@@ -93,6 +111,7 @@ impl Smoother {
         Some(State {
             pseudorange_m: predicted_m + weight * (new.pseudorange_m - predicted_m),
             age_s,
+            parted_m_per_hz: rest * parted_m_per_hz,
             variance: weight * weight + rest * rest * old.variance + 2.0 * weight * rest * carried,
             covariance: weight + rest * carried,
             ..*new

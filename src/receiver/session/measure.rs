@@ -33,6 +33,7 @@ impl Session {
                 let condition = solved.fix.condition;
                 self.worst_condition = Some(self.worst_condition.map_or(condition, |worst| worst.max(condition)));
                 self.fixes += 1;
+                self.clock_drift = Some(solved.fix.clock_drift);
                 let at_s = self.metadata.rate.elapsed_s(tick);
                 self.first_fix_s.get_or_insert(at_s);
                 self.used.extend(solved.used);

@@ -18,8 +18,10 @@ use crate::receiver::acquire::{self, Searcher};
 use crate::receiver::decode::Decoder;
 use crate::receiver::diagnosis::Stage;
 use crate::receiver::interference::Watch;
+use crate::receiver::looks::Looks;
 use crate::receiver::observe::Timebase;
 use crate::receiver::output::Output;
+use crate::receiver::parting::{Estimate, Line, Offset};
 use crate::receiver::position::least_squares::{LARGEST_CONDITION, UNKNOWNS};
 use crate::receiver::position::{CodeNoise, NoFix, Solver};
 use crate::receiver::run::{Conditioning, Interfered, Outcome, ReceiveError, candidates, warnings};
@@ -29,6 +31,8 @@ use crate::receiver::track::{Channel, LoopMargin, Report, code_shape};
 
 mod decode;
 mod measure;
+mod part;
+mod plan;
 mod search;
 
 /// So many fixes in a row have to show a channel's wrong time.
@@ -42,6 +46,7 @@ const PART_S: f64 = 0.01;
 /// One channel and its decoder.
 struct Track {
     channel: Channel,
+    line: Line,
     decoder: Option<Decoder>,
     report: Report,
     since: u64,
@@ -70,8 +75,14 @@ pub(super) struct Session {
     settings: Settings,
     week_reference: Epoch,
     candidates: Vec<(&'static Signal, Sv)>,
-    first_search: Searcher,
-    later_searches: Searcher,
+    searcher: Searcher,
+    /// Where it looks, and whether as after the first search.
+    aimed: Option<(plan::Sweep, bool)>,
+    widenings: usize,
+    looks: Looks,
+    mirrored: Option<Estimate>,
+    /// Median Doppler of the search that found most, with how many it found.
+    found: (usize, f64),
     needed: u64,
     searched: bool,
     next_search: u64,
@@ -83,6 +94,12 @@ pub(super) struct Session {
     refused: BTreeMap<(&'static Signal, Sv), u64>,
     timebase: Timebase,
     solver: Solver,
+    code_noise: CodeNoise,
+    offset: Offset,
+    /// Channels that measure it.
+    lines: usize,
+    /// Code loops are on their way to a new offset until this sample.
+    offset_moved: u64,
     ephemerides: BTreeMap<Sv, Ephemeris>,
     klobuchar: Option<Klobuchar>,
     next_tick: u64,
@@ -92,6 +109,7 @@ pub(super) struct Session {
     used: BTreeSet<Sv>,
     fixes: u64,
     first_fix_s: Option<f64>,
+    clock_drift: Option<f64>,
     losses: u64,
     reason: Option<NoFix>,
     watch: Watch,
@@ -104,9 +122,6 @@ pub(super) struct Session {
 
 impl Session {
     pub(super) fn new(metadata: &IfMetadata, settings: &Settings) -> Result<Self, ReceiveError> {
-        let mut later = settings.acquisition.clone();
-        later.false_alarm_probability =
-            (later.false_alarm_probability * settings.operation.repeated_false_alarm_share).max(1e-12);
         let week_reference = settings.week_reference().map_err(|source| {
             crate::receiver::settings::SettingsError::Week { origin: "settings".to_owned(), source }
         })?;
@@ -123,8 +138,12 @@ impl Session {
             settings: settings.clone(),
             week_reference,
             candidates: candidates(metadata),
-            first_search: Searcher::new(metadata, &settings.acquisition)?,
-            later_searches: Searcher::new(metadata, &later)?,
+            searcher: Searcher::new(metadata, &settings.acquisition)?,
+            aimed: None,
+            widenings: 0,
+            looks: Looks::default(),
+            mirrored: None,
+            found: (0, 0.0),
             needed: acquire::samples_needed(metadata, &settings.acquisition)?,
             searched: false,
             next_search: 0,
@@ -135,6 +154,10 @@ impl Session {
             refused: BTreeMap::new(),
             timebase: Timebase::new(metadata.rate, metadata.start),
             solver: Solver::new(&settings.position, noise, metadata.rate),
+            code_noise: noise,
+            offset: Offset::default(),
+            lines: 0,
+            offset_moved: 0,
             ephemerides: BTreeMap::new(),
             klobuchar: None,
             next_tick: 0,
@@ -144,6 +167,7 @@ impl Session {
             used: BTreeSet::new(),
             fixes: 0,
             first_fix_s: None,
+            clock_drift: None,
             losses: 0,
             reason: None,
             watch: Watch::new(metadata),
@@ -164,12 +188,15 @@ impl Session {
         let (ticks, measured) = self.ticks(block);
         self.follow(block, &ticks);
         self.record(output)?;
+        self.part(block.end());
         self.decode(output)?;
         for tick in measured {
             self.measure(tick, output)?;
         }
         self.watch(block, output)?;
-        self.retire(block.end(), output)
+        self.retire(block.end(), output)?;
+        self.hasten(block.end());
+        Ok(())
     }
 
     /// Takes every channel through the block, on every core its share of them.
@@ -269,6 +296,7 @@ impl Session {
             format_warning: None,
             diagnosis: None,
             interfered: self.interfered.clone(),
+            parted: self.parted(),
             warnings: warnings(&self.metadata, &self.settings),
             conditioning: Conditioning {
                 geometry_worst: self.worst_condition,

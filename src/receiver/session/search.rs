@@ -8,6 +8,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::receiver::decode::Decoder;
 use crate::receiver::output::Output;
+use crate::receiver::parting::Line;
 use crate::receiver::run::ReceiveError;
 use crate::receiver::source::{Block, Packed, Planes};
 use crate::receiver::track::{Channel, Report};
@@ -28,6 +29,7 @@ impl Session {
             if end <= self.next_search {
                 return Ok(());
             }
+            self.aim(self.sweep())?;
             self.window = Some(Window { first: block.first, samples: Planes::default() });
         }
         let Some(window) = &mut self.window else { return Ok(()) };
@@ -47,10 +49,10 @@ impl Session {
         // would pass for others.
         let all_found = self.candidates.iter().all(|candidate| followed.contains(candidate));
         if !all_found {
-            let searcher = if self.searched { &mut self.later_searches } else { &mut self.first_search };
             let strongest_dbhz = self.tracks.iter().map(|track| track.cn0_dbhz).fold(f64::NEG_INFINITY, f64::max);
             let searched = Block { first: window.first, i: &window.samples.i, q: &window.samples.q };
-            let results = searcher.search(&searched, &self.candidates)?;
+            let results = self.searcher.search(&searched, &self.candidates)?;
+            self.look(&results, end);
             for (mut row, hit) in results {
                 row.acquired &= hit.is_some_and(|hit| hit.cn0_dbhz > strongest_dbhz - ECHO_DB);
                 let key = (row.signal, row.sv);
@@ -74,8 +76,11 @@ impl Session {
                     signal: hit.signal,
                     event: Event::Acquired,
                 })?;
+                let mut channel = Channel::start(&hit, &self.metadata, &self.settings.tracking);
+                channel.set_carrier_offset(self.offset.hz());
                 self.tracks.push(Track {
-                    channel: Channel::start(&hit, &self.metadata, &self.settings.tracking),
+                    channel,
+                    line: Line::default(),
                     decoder: Decoder::new(hit.signal, hit.sv),
                     report: Report::default(),
                     since: block.first,
@@ -88,6 +93,7 @@ impl Session {
             self.tracks.sort_by_key(|track| (track.channel.signal(), track.channel.sv()));
         }
         self.searched = true;
+        self.widen();
         self.plan_search(end);
         Ok(())
     }

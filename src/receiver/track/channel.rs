@@ -17,6 +17,7 @@ use crate::gnss::signal::Signal;
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
 use crate::receiver::correlate::{self, Arithmetic, Nco, Replica, TURN, chips_to_units, correlation, units_to_chips};
+use crate::receiver::parting::Phases;
 use crate::receiver::source::Block;
 
 mod supervise;
@@ -27,6 +28,8 @@ const LOCK_PERIODS: f64 = 100.0;
 const POWER_PERIODS: f64 = 100.0;
 /// The power is measured in one of this many periods.
 const POWER_EVERY: u64 = 8;
+/// Time constants 1/(4B) of the code's pull-in, times four, until its first error has decayed to 2 %.
+const SETTLED: f64 = 1.0;
 /// Group of prompts and verification for signals without symbols.
 const PILOT_GROUP: u32 = 20;
 
@@ -63,6 +66,9 @@ pub struct Channel {
     /// +1, or −1 where the spectrum is inverted: sense of Doppler in the samples.
     sense: f64,
     chip_rate_hz: f64,
+    /// What the carrier's Doppler exceeds the code's by: now, and from the next code period on.
+    carrier_offset_hz: f64,
+    next_offset_hz: f64,
     period_s: f64,
     group: u32,
     has_symbols: bool,
@@ -144,6 +150,8 @@ impl Channel {
             if_step: tone_turns(metadata.if_hz(hit.signal), metadata.rate, 1),
             sense,
             chip_rate_hz,
+            carrier_offset_hz: 0.0,
+            next_offset_hz: 0.0,
             period_s,
             group,
             has_symbols: message.is_some(),
@@ -212,6 +220,28 @@ impl Channel {
         self.polarity = Some(inverted);
     }
 
+    /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: the aid of the code leaves it out
+    /// from the next code period on.
+    pub fn set_carrier_offset(&mut self, hz: f64) {
+        self.next_offset_hz = hz;
+        if self.start.is_none() {
+            self.carrier_offset_hz = hz;
+            self.set_steps();
+        }
+    }
+
+    /// What the replica has counted where the running code period begins.
+    pub fn phases(&self) -> Phases {
+        let carrier = if self.sense < 0.0 { -self.carrier } else { self.carrier };
+        Phases { sample: self.first, periods: self.period, chips: units_to_chips(self.code), carrier }
+    }
+
+    /// Whether the carrier is locked, and the code no longer on its way from where the search left it.
+    pub fn is_settled(&self) -> bool {
+        let passed_s = self.start.map_or(0.0, |start| self.since_s(start));
+        !self.lost && self.locked_since.is_some() && passed_s >= SETTLED / self.settings.dll_pull_in_bandwidth_hz
+    }
+
     /// Follows the signal through the next block. `ticks` are samples inside the block, ascending, at which to measure.
     pub fn advance(&mut self, block: &Block, ticks: &[u64], report: &mut Report) {
         if self.lost {
@@ -262,8 +292,20 @@ impl Channel {
         let update_s = self.period_s * f64::from(self.periods_per_update());
         let offset_hz = self.loops.carrier.mean(update_s);
         self.carrier_step = (offset_hz / rate_hz * TURN) as i128;
-        let aid_hz = self.sense * offset_hz * self.chip_rate_hz / self.signal.carrier_hz;
+        let aid_hz = (self.sense * offset_hz - self.carrier_offset_hz) * self.chip_rate_hz / self.signal.carrier_hz;
         self.code_step = chips_to_units((self.chip_rate_hz + aid_hz + self.loops.code.mean(update_s)) / rate_hz).max(1);
+    }
+
+    /// Takes over a new offset, and moves the code to where the loop would settle with it.
+    fn take_offset(&mut self) {
+        let less_hz = self.carrier_offset_hz - self.next_offset_hz;
+        if less_hz == 0.0 {
+            return;
+        }
+        self.carrier_offset_hz = self.next_offset_hz;
+        let update_s = self.period_s * f64::from(self.periods_per_update());
+        let jump_chips = self.loops.aid_code(less_hz * self.chip_rate_hz / self.signal.carrier_hz, update_s);
+        self.code += chips_to_units(jump_chips);
     }
 
     fn periods_per_update(&self) -> u32 {
@@ -341,6 +383,7 @@ impl Channel {
         }
         self.previous = Some(prompt);
         self.supervise(number, prompt, report);
+        self.take_offset();
         self.set_steps();
     }
 
