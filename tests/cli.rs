@@ -183,6 +183,19 @@ fn broken_limits_exit_with_three_and_say_by_how_much_and_unusable_ones_stop_befo
         assert!(text.contains(part), "{part} not in\n{text}");
     }
     assert!(message.contains("2 of 2 limits of broken.toml are broken"), "{message}");
+
+    // Alone, it holds the verdict's own limits: this scene's codes are sound; a satellite that is taken away is missed.
+    let sound = twin(&["analyze", "run", "--check"], here.path());
+    assert_eq!(code(&sound), 0, "{}", String::from_utf8_lossy(&sound.stdout));
+    assert!(String::from_utf8_lossy(&sound.stdout).contains("limits of the verdict hold"));
+    let found = here.path().join("run/rx/acquisition.csv");
+    let kept: Vec<String> =
+        fs::read_to_string(&found).unwrap().lines().filter(|row| !row.contains(",G23,")).map(str::to_owned).collect();
+    fs::write(&found, kept.join("\n") + "\n").unwrap();
+    let damaged = twin(&["analyze", "run", "--check"], here.path());
+    assert_eq!(code(&damaged), 3);
+    let text = String::from_utf8_lossy(&damaged.stdout).into_owned();
+    assert!(text.contains("satellites in view never acquired") && text.contains("G23: 45.0 dB-Hz"), "{text}");
     assert!(fs::read(here.path().join("run/report.pdf")).unwrap() != report, "the limits are in the report");
 }
 

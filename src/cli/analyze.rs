@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::analysis;
 use crate::analysis::foreign::{self, Files};
 use crate::cli::args;
-use crate::cli::check;
+use crate::cli::check::Gate;
 use crate::cli::error::CliError;
 use crate::cli::run::judge_error;
 use crate::cli::scenario;
@@ -19,10 +19,10 @@ pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
     let Some(run) = &arguments.run else {
         return Err(CliError::usage("analyze: expected a run's directory, or --truth"));
     };
-    let limits = check::read(arguments.check.as_deref())?;
-    let summary = analysis::judge_against(run, limits.as_ref()).map_err(judge_error)?;
+    let gate = Gate::read(arguments.check.as_ref())?;
+    let summary = analysis::judge_against(run, gate.limits()).map_err(judge_error)?;
     scenario::print(&format!("{summary}\nresults in {}\n", run.display()))?;
-    check::enforce(limits.as_ref(), &summary)
+    gate.enforce(&summary)
 }
 
 fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliError> {

@@ -50,9 +50,9 @@ pub struct Run {
     /// Also keep the samples: if.sigmf-data and if.sigmf-meta
     #[arg(long)]
     pub keep_if: bool,
-    /// Hold the figures of summary.json against these limits; exit with 3 if one is broken
-    #[arg(long, value_name = "LIMITS.toml")]
-    pub check: Option<PathBuf>,
+    /// Exit with 3 if a limit is broken: one of this file's for summary.json, or of the verdict's own without a file
+    #[arg(long, value_name = "LIMITS.toml", num_args = 0..=1)]
+    pub check: Option<Option<PathBuf>>,
 }
 
 #[derive(Args, Debug)]
@@ -121,9 +121,9 @@ pub struct Analyze {
     /// Directory of a run, with truth/ and rx/
     #[arg(required_unless_present = "truth", conflicts_with = "truth")]
     pub run: Option<PathBuf>,
-    /// Hold the figures of summary.json against these limits; exit with 3 if one is broken
-    #[arg(long, value_name = "LIMITS.toml", conflicts_with = "truth")]
-    pub check: Option<PathBuf>,
+    /// Exit with 3 if a limit is broken: one of this file's for summary.json, or of the verdict's own without a file
+    #[arg(long, value_name = "LIMITS.toml", num_args = 0..=1, conflicts_with = "truth")]
+    pub check: Option<Option<PathBuf>>,
     /// Judge another receiver, which was fed a scene's samples, against that scene's truth/ directory
     #[arg(long, value_name = "DIR", requires = "files")]
     pub truth: Option<PathBuf>,

@@ -1,35 +1,65 @@
-//! `--check`: a user's limits, and the end when one is broken.
+//! `--check`: a user's limits or the verdict's own, and the end when one is broken.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use crate::analysis::limits::Limits;
 use crate::analysis::summary::Summary;
-use crate::analysis::verdict::Judgement;
+use crate::analysis::verdict::{Judgement, Status};
 use crate::cli::error::CliError;
 use crate::cli::scenario;
 
-/// Reads a file of limits.
-pub fn read(path: Option<&Path>) -> Result<Option<Limits>, CliError> {
-    let Some(path) = path else { return Ok(None) };
-    let (name, text) = scenario::text(path)?;
-    Limits::parse(&text, &name).map(Some).map_err(CliError::input)
+/// What a run must keep for the program to end with 0.
+pub enum Gate {
+    /// Nothing: the verdict is printed.
+    Open,
+    /// Every limit of the verdict itself.
+    Verdict,
+    /// A user's limits.
+    Limits(Limits),
 }
 
-/// Prints what broke a limit and by how much; exit code 3 if anything did.
-pub fn enforce(limits: Option<&Limits>, summary: &Summary) -> Result<(), CliError> {
-    let Some(limits) = limits else { return Ok(()) };
-    let verdict = &summary.details.verdict;
-    let broken: Vec<&Judgement> = verdict.broken().collect();
-    let all = verdict.of_user;
-    if broken.is_empty() {
-        return scenario::print(&format!("all {all} limits of {} hold\n", limits.name));
+impl Gate {
+    /// From `--check` as written: absent, alone, or with a file.
+    pub fn read(argument: Option<&Option<PathBuf>>) -> Result<Self, CliError> {
+        let path = match argument {
+            None => return Ok(Self::Open),
+            Some(None) => return Ok(Self::Verdict),
+            Some(Some(path)) => path,
+        };
+        let (name, text) = scenario::text(path)?;
+        Limits::parse(&text, &name).map(Self::Limits).map_err(CliError::input)
     }
-    let path_width = broken.iter().map(|row| row.figure.len()).max().unwrap_or(0).max("figure".len());
-    let mut table = format!("{:<path_width$}  {:>12}  {:>12}  {}\n", "figure", "value", "limit", "by how much");
-    for row in &broken {
+
+    /// The user's limits, if there are any.
+    pub fn limits(&self) -> Option<&Limits> {
+        if let Self::Limits(limits) = self { Some(limits) } else { None }
+    }
+
+    /// Prints what broke a limit and by how much; exit code 3 if anything did.
+    pub fn enforce(&self, summary: &Summary) -> Result<(), CliError> {
+        let verdict = &summary.details.verdict;
+        let (broken, all, whose): (Vec<&Judgement>, usize, String) = match self {
+            Self::Open => return Ok(()),
+            Self::Verdict => {
+                let failed = verdict.rows.iter().filter(|row| row.status == Status::Fail).collect();
+                (failed, verdict.rows.len(), "the verdict".to_owned())
+            }
+            Self::Limits(limits) => (verdict.broken().collect(), verdict.of_user, limits.name.clone()),
+        };
+        if broken.is_empty() {
+            return scenario::print(&format!("all {all} limits of {whose} hold\n"));
+        }
+        scenario::print(&table(&broken))?;
+        Err(CliError::check(format!("{} of {all} limits of {whose} are broken", broken.len())))
+    }
+}
+
+fn table(broken: &[&Judgement]) -> String {
+    let width = broken.iter().map(|row| row.figure.chars().count()).max().unwrap_or(0).max("figure".len());
+    let mut table = format!("{:<width$}  {:>12}  {:>12}  {}\n", "figure", "value", "limit", "by how much");
+    for row in broken {
         let (value, limit, margin) = (row.value_text(), row.bound.to_string(), row.margin_text());
-        table += &format!("{:<path_width$}  {value:>12}  {limit:>12}  {margin}\n", row.figure);
+        table += &format!("{:<width$}  {value:>12}  {limit:>12}  {margin}\n", row.figure);
     }
-    scenario::print(&table)?;
-    Err(CliError::check(format!("{} of {all} limits of {} are broken", broken.len(), limits.name)))
+    table
 }

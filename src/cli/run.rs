@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use crate::analysis::psd::Psd;
 use crate::analysis::{self, JudgeError};
 use crate::cli::args;
-use crate::cli::check;
+use crate::cli::check::Gate;
 use crate::cli::error::CliError;
 use crate::cli::progress::Progress;
 use crate::cli::scenario;
@@ -37,7 +37,7 @@ const SPECTRUM_BINS: usize = 2048;
 pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
     let named = scenario::read(arguments.scenario.as_deref())?;
-    let limits = check::read(arguments.check.as_deref())?;
+    let gate = Gate::read(arguments.check.as_ref())?;
     let (scene, warnings) = scenario::compose(&named, arguments.seed, None)?;
     let settings = scenario::receiver_settings(&named)?;
     for warning in warnings {
@@ -64,7 +64,7 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     write_json(&run.join("speed.json"), &speed)?;
     let path = run.join("scenario.toml");
     fs::write(&path, &named.text).map_err(|error| CliError::output(path.display(), &error))?;
-    let summary = analysis::judge_against(run, limits.as_ref()).map_err(judge_error)?;
+    let summary = analysis::judge_against(run, gate.limits()).map_err(judge_error)?;
     staging.commit()?;
 
     for warning in &both.outcome.warnings {
@@ -78,7 +78,7 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     text += &format!("made          {}\n", both.generated);
     text += &format!("results in {}\n", target.display());
     scenario::print(&text)?;
-    check::enforce(limits.as_ref(), &summary)
+    gate.enforce(&summary)
 }
 
 struct Both {

@@ -12,6 +12,8 @@ mod judgement;
 mod losses;
 mod position;
 mod reception;
+#[cfg(test)]
+mod tests;
 mod tracking;
 
 use serde::Serialize;
