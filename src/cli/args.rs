@@ -31,6 +31,15 @@ pub enum Command {
     Plan(Plan),
     /// Run a study: a base, axes and repetitions become tables, curves and a report
     Study(Study),
+    /// List every key of scenarios, receiver settings, studies and limits: default, unit, range, meaning
+    Reference(Reference),
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "Example: gnss-twin reference front_end")]
+pub struct Reference {
+    /// One table by its name: motion, receiver.tracking, study.axis, limits [default: all]
+    pub table: Option<String>,
 }
 
 #[derive(Args, Debug, Default)]

@@ -12,6 +12,7 @@ pub mod interrupt;
 pub mod plan;
 pub mod progress;
 pub mod receive;
+pub mod reference;
 pub mod run;
 pub mod scenario;
 pub mod speed;
@@ -60,5 +61,6 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Analyze(arguments) => analyze::execute(&arguments),
         Command::Plan(arguments) => plan::execute(&arguments),
         Command::Study(arguments) => study::execute(&arguments),
+        Command::Reference(arguments) => reference::execute(&arguments),
     }
 }

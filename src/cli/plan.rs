@@ -11,6 +11,7 @@ use crate::generator::plan::Plan;
 pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
     let named = scenario::read(arguments.scenario.as_deref())?;
     let (scene, warnings) = scenario::compose(&named, None, None)?;
+    scenario::receiver_settings(&named)?;
     for warning in warnings {
         scenario::warn(&warning);
     }

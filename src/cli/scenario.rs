@@ -34,7 +34,13 @@ pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
         return Ok(Named { scenario, text: EMBEDDED.to_owned(), name, directory: PathBuf::from(".") });
     };
     let (name, text) = text(path)?;
-    let scenario = Scenario::parse(&text, &name).map_err(CliError::input)?;
+    let scenario = Scenario::parse(&text, &name).map_err(|error| {
+        // What is wrong with the receiver's own table is said with the rest.
+        let syntax = matches!(error, ScenarioError::Toml { .. });
+        let settings = if syntax { None } else { Settings::of_scenario(&text, &name).err() };
+        let all = error.each().iter().map(ToString::to_string).chain(settings.map(|error| error.to_string()));
+        CliError::input(all.collect::<Vec<_>>().join("\nerror: "))
+    })?;
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Ok(Named { scenario, text, name, directory: directory.to_owned() })
 }

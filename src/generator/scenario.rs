@@ -1,6 +1,6 @@
 //! A scenario as written: TOML in which a table is present only when the scene has the thing.
 //!
-//! [`Scenario::parse`] checks each key against the list of its table ([`KEYS`]) and each value against its range;
+//! [`Scenario::parse`] holds each key and each value against its declaration ([`keys::SCENARIO`]) and collects what is wrong;
 //! [`Scenario::compose`] checks what concerns several of them, loads files and makes a
 //! [`Scene`](crate::generator::scene::Scene). Units stand in the names of the keys: degrees and dB here, radians and
 //! ratios from here on. `[receiver]` is kept as written for the receiver's own settings.
@@ -11,6 +11,7 @@ mod expect;
 mod hardware;
 mod hostile;
 pub mod interference;
+pub mod keys;
 mod link;
 mod motion;
 mod multipath;
@@ -19,6 +20,7 @@ mod parts;
 mod propagation;
 pub(crate) mod read;
 mod satellite;
+pub mod schema;
 mod scintillation;
 mod stages;
 #[cfg(test)]
@@ -36,7 +38,7 @@ pub use link::{AntennaSpec, Power, Transmit};
 pub use motion::{FileKind, MotionSpec};
 pub use propagation::{Electrons, Ionosphere, MappingKind, NeutralAtmosphere};
 pub use read::Place;
-use read::{Source, Table};
+use read::{Refusals, Source, Table};
 pub use satellite::{MessageKind, MessageSpec, OrbitsSpec, SatelliteFault};
 use stages::Stages;
 
@@ -48,75 +50,12 @@ use crate::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::generator::vehicle::attitude::Attitude;
 use crate::gnss::facts::Expect;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{SIGNALS, Signal};
+use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, Rate};
 
-/// Every table and the keys that it may hold. `[power.satellites]`, `[power.blocks]` and `[orbits.antenna_offsets_m]` hold
-/// satellites, `[receiver]` anything; the keys of lists of tables are in their families' files.
-pub const KEYS: &[(&str, &[&str])] = &[
-    (
-        "",
-        &[
-            "name",
-            "start",
-            "duration_s",
-            "seed",
-            "signals",
-            "navigation",
-            "satellites",
-            "orbits",
-            "satellite_fault",
-            "message_fault",
-            "motion",
-            "attitude",
-            "front_end",
-            "power",
-            "multipath",
-            "ionosphere",
-            "troposphere",
-            "obstruction",
-            "scintillation",
-            "receiver_clock",
-            "noise",
-            "playback",
-            "local_oscillator",
-            "filter",
-            "iq",
-            "adc",
-            "interference",
-            "spoofer",
-            "fidelity",
-            "truth",
-            "expect",
-            "receiver",
-        ],
-    ),
-    ("navigation", &["file"]),
-    ("satellites", &["mask_deg", "exclude", "include_unhealthy"]),
-    ("orbits", satellite::ORBITS_KEYS),
-    ("satellite_fault", satellite::FAULT_KEYS),
-    ("message_fault", satellite::MESSAGE_KEYS),
-    ("motion", motion::KEYS),
-    ("attitude", attitude::KEYS),
-    ("front_end", &["sample_rate_hz", "if_hz", "spectrum_inverted", "format", "noise_lsb"]),
-    ("power", link::KEYS),
-    ("ionosphere", propagation::IONOSPHERE_KEYS),
-    ("troposphere", propagation::TROPOSPHERE_KEYS),
-    ("scintillation", &["s4", "sigma_phi_rad", "decorrelation_s", "satellites"]),
-    ("receiver_clock", &["bias_s", "drift_sps", "ageing_per_day", "sensitivity_per_g", "oscillator", "power_law"]),
-    ("noise", &[]),
-    ("playback", &["bits", "load_sigma", "attenuation_db"]),
-    ("local_oscillator", &["offset_hz", "phase_noise_rad", "phase_noise_bandwidth_hz"]),
-    ("filter", &["kind", "order", "bandwidth_hz"]),
-    ("iq", &["gain_db", "phase_deg", "dc_i_lsb", "dc_q_lsb"]),
-    ("adc", &["bits", "step_sigma", "agc_window_s"]),
-    ("interference", interference::KEYS),
-    ("spoofer", interference::SPOOFER_KEYS),
-    ("fidelity", &["level", "code_edge", "carrier", "noise", "knot_tolerance_cycles"]),
-    ("truth", &["interval_s"]),
-    ("expect", expect::KEYS),
-];
-
+/// What an absent table comes to; a test holds these against the declared defaults.
+const MASK_DEG: f64 = 5.0;
+const TRUTH_INTERVAL_S: f64 = 0.1;
 /// Largest scenario text that is read.
 const MAX_BYTES: usize = 1 << 20;
 
@@ -135,6 +74,9 @@ pub enum ScenarioError {
     File { origin: String, key: &'static str, path: PathBuf, reason: String },
     #[error("{origin}: {key} = {path:?}: cannot be read: {error}")]
     Read { origin: String, key: &'static str, path: PathBuf, error: std::io::Error },
+    /// All that is wrong, in the order of the text: two at least.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Several(Vec<ScenarioError>),
 }
 
 impl ScenarioError {
@@ -144,8 +86,33 @@ impl ScenarioError {
         let place = match self {
             Self::Toml { place, .. } | Self::UnknownKey { place, .. } | Self::Value { place, .. } => place.to_string(),
             Self::Conflict { origin, .. } | Self::File { origin, .. } | Self::Read { origin, .. } => origin.clone(),
+            Self::Several(errors) => return errors.iter().map(Self::without_place).collect::<Vec<_>>().join("; "),
         };
         whole.strip_prefix(&format!("{place}: ")).map_or(whole.clone(), str::to_owned)
+    }
+
+    /// Where it is in the text, if at a place there.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Self::Toml { place, .. } | Self::UnknownKey { place, .. } | Self::Value { place, .. } => Some(place),
+            _ => None,
+        }
+    }
+
+    /// The key and its place, if it is about one.
+    fn key_at(&self) -> Option<(&Place, &str)> {
+        match self {
+            Self::UnknownKey { place, key, .. } | Self::Value { place, key, .. } => Some((place, key)),
+            _ => None,
+        }
+    }
+
+    /// Each thing that is wrong.
+    pub fn each(&self) -> &[Self] {
+        match self {
+            Self::Several(errors) => errors,
+            one => std::slice::from_ref(one),
+        }
     }
 }
 
@@ -160,8 +127,8 @@ pub struct Scenario {
     pub duration_s: f64,
     pub seed: u64,
     pub signals: Vec<&'static Signal>,
-    /// Relative to the scenario's directory; absent means the embedded file.
-    pub navigation: Option<PathBuf>,
+    /// Relative to the scenario's directory; none means the embedded file.
+    pub navigation: Vec<PathBuf>,
     pub mask_rad: f64,
     pub excluded: Vec<Sv>,
     pub include_unhealthy: bool,
@@ -194,6 +161,9 @@ pub struct Scenario {
 
 impl Scenario {
     /// Reads a scenario; `origin` names it in errors.
+    ///
+    /// # Errors
+    /// All that is wrong with the text, as [`ScenarioError::Several`] where that is more than one thing.
     pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
         let source = Source { origin, text };
         let refuse = |error: &toml::de::Error| ScenarioError::Toml {
@@ -205,94 +175,131 @@ impl Scenario {
             return Err(ScenarioError::Toml { place: source.place(0), message });
         }
         let document = DeTable::parse(text).map_err(|e| refuse(&e))?;
-        let root = Table::new(&source, "", 0, document.get_ref());
-        root.allow(keys_of(""))?;
-        let open = |name: &'static str| -> Result<Option<Table<'_>>, ScenarioError> {
-            let table = root.table(name)?;
-            table.as_ref().map_or(Ok(()), |table| table.allow(keys_of(name)))?;
-            Ok(table)
+        let root = Table::new(&source, "", 0, document.get_ref(), keys::SCENARIO);
+        let mut refusals = Refusals::default();
+        root.check(&mut refusals);
+        let receiver = refusals.take(receiver(&root, text).map_err(|e| refuse(&e))).flatten();
+        let scenario = Self::read(&root, &mut refusals);
+        refusals.finish()?;
+        scenario
+            .map(|scenario| Self { origin: origin.to_owned(), receiver, ..scenario })
+            .ok_or_else(|| ScenarioError::Toml { place: source.place(0), message: "cannot be read".to_owned() })
+    }
+
+    /// Reads every table, and goes on where one is refused; `None` where a scene has no sense without it.
+    fn read(root: &Table<'_>, refusals: &mut Refusals) -> Option<Self> {
+        let mut open = |name: &'static str| refusals.take(root.table(name)).flatten();
+        let [navigation, of_satellites, orbits, motion, attitude, front_end, power] =
+            ["navigation", "satellites", "orbits", "motion", "attitude", "front_end", "power"].map(&mut open);
+        let [ionosphere, troposphere, scintillation, receiver_clock, noise, fidelity, truth] =
+            ["ionosphere", "troposphere", "scintillation", "receiver_clock", "noise", "fidelity", "truth"]
+                .map(&mut open);
+        let [playback, oscillator, filter, iq, adc, expect] =
+            ["playback", "local_oscillator", "filter", "iq", "adc", "expect"].map(&mut open);
+
+        let name = refusals.take(name(root));
+        let start = refusals.take(start(root));
+        let duration_s = refusals.take(root.need("duration_s"));
+        let seed = refusals.take(root.need_integer("seed"));
+        let signals = refusals.take(signals(root));
+        let files = navigation.map(|t| t.texts("file")).transpose();
+        let files = refusals.take(files).flatten().flatten().unwrap_or_default();
+        let chosen = refusals.take(satellites(of_satellites.as_ref()));
+        // Its absence is refused by now.
+        let motion = motion.and_then(|t| refusals.take(MotionSpec::read(&t)));
+        let front_end = refusals.take(hardware::front_end(front_end.as_ref()));
+        let power = refusals.take(link::power(power.as_ref()));
+        let clock = refusals.take(hardware::receiver_clock(receiver_clock.as_ref()));
+        let orbits = refusals.take(orbits.map(|t| satellite::orbits(&t)).transpose());
+        let attitude = refusals.take(attitude.map(|t| attitude::attitude(&t)).transpose());
+        let ionosphere = refusals.take(ionosphere.map(|t| propagation::ionosphere(&t)).transpose());
+        let troposphere = refusals.take(troposphere.map(|t| propagation::troposphere(&t)).transpose());
+        let scintillation = refusals.take(scintillation.map(|t| scintillation::scintillation(&t)).transpose());
+        let interval_s = truth.map_or(Ok(TRUTH_INTERVAL_S), |t| t.need("interval_s"));
+        let truth_interval_s = refusals.take(interval_s);
+        let satellite_faults = each(root, "satellite_fault", satellite::satellite_fault, refusals);
+        let message_faults = each(root, "message_fault", satellite::message_fault, refusals);
+        let multipath = each(root, "multipath", multipath::echo, refusals);
+        refusals.take(multipath::count(root, &multipath));
+        let obstacles = each(root, "obstruction", obstruction::obstacle, refusals);
+        let interference = each(root, "interference", interference::interference, refusals);
+        let spoofers = each(root, "spoofer", interference::spoofer, refusals);
+        let expect = expect.map(|t| expect::expect(&t, duration_s.unwrap_or(f64::INFINITY))).transpose();
+        let expect = refusals.take(expect);
+        let (front_end, power) = (front_end?, power?);
+        let format = front_end.format;
+        let stages = Stages {
+            playback: refusals.take(playback.map(|t| stages::playback(&t)).transpose()).flatten(),
+            oscillator: refusals.take(oscillator.map(|t| stages::local_oscillator(&t)).transpose()).flatten(),
+            filter: refusals.take(filter.map(|t| stages::filter(&t)).transpose()).flatten(),
+            balance: refusals.take(iq.map(|t| stages::balance(&t, format)).transpose()).flatten(),
+            converter: refusals.take(adc.map(|t| stages::converter(&t, format)).transpose()).flatten(),
         };
-        let (mask_rad, excluded, include_unhealthy) = satellites(open("satellites")?.as_ref())?;
-        let front_end = hardware::front_end(open("front_end")?.as_ref())?;
-        let motion = open("motion")?.ok_or_else(|| root.bad("motion", "a table with kind = \"static\", …"))?;
-        let start = root.instant("start")?.ok_or_else(|| root.bad("start", "GPS time like \"2010-07-01T08:12:30\""))?;
-        let file = open("navigation")?.map(|t| t.text("file", "a path")).transpose()?.flatten();
-        let duration_s = root.required("duration_s", 0.01..=2_678_400.0, "s")?;
-        let noise = open("noise")?.is_some();
-        let power = link::power(open("power")?.as_ref())?;
+        let noise = noise.is_some();
         let allowed_m = allowed_m(noise.then(|| power.strongest_dbhz()));
-        Ok(Self {
-            origin: origin.to_owned(),
-            name: name(&root)?,
-            start: Epoch::parse(&start).map_err(|e| root.bad("start", e))?,
-            duration_s,
-            seed: root.integer("seed")?.unwrap_or(1),
-            signals: signals(&root)?,
-            navigation: file.map(PathBuf::from),
+        let fidelity = refusals.take(fidelity_of(fidelity.as_ref(), front_end.rate, allowed_m));
+        let (mask_rad, excluded, include_unhealthy) = chosen?;
+        Some(Self {
+            origin: String::new(),
+            name: name?,
+            start: start?,
+            duration_s: duration_s?,
+            seed: seed?,
+            signals: signals?,
+            navigation: files.iter().map(PathBuf::from).collect(),
             mask_rad,
             excluded,
             include_unhealthy,
-            orbits: open("orbits")?.map(|t| satellite::orbits(&t)).transpose()?,
-            satellite_faults: each(&root, "satellite_fault", satellite::satellite_fault)?,
-            message_faults: each(&root, "message_fault", satellite::message_fault)?,
-            motion: MotionSpec::read(&motion)?,
-            attitude: open("attitude")?.map(|t| attitude::attitude(&t)).transpose()?,
+            orbits: orbits?,
+            satellite_faults,
+            message_faults,
+            motion: motion?,
+            attitude: attitude?,
             front_end,
             power,
-            multipath: multipath::echoes(&root.tables("multipath")?.unwrap_or_default())?,
-            ionosphere: open("ionosphere")?.map(|t| propagation::ionosphere(&t)).transpose()?,
-            troposphere: open("troposphere")?.map(|t| propagation::troposphere(&t)).transpose()?,
-            obstacles: obstruction::obstacles(&root.tables("obstruction")?.unwrap_or_default())?,
-            scintillation: open("scintillation")?.map(|t| scintillation::scintillation(&t)).transpose()?,
-            receiver_clock: hardware::receiver_clock(open("receiver_clock")?.as_ref())?,
+            multipath,
+            ionosphere: ionosphere?,
+            troposphere: troposphere?,
+            obstacles,
+            scintillation: scintillation?,
+            receiver_clock: clock?,
             noise,
-            stages: Stages {
-                playback: open("playback")?.map(|t| stages::playback(&t)).transpose()?,
-                oscillator: open("local_oscillator")?.map(|t| stages::local_oscillator(&t)).transpose()?,
-                filter: open("filter")?.map(|t| stages::filter(&t)).transpose()?,
-                balance: open("iq")?.map(|t| stages::balance(&t, front_end.format)).transpose()?,
-                converter: open("adc")?.map(|t| stages::converter(&t, front_end.format)).transpose()?,
-            },
-            interference: each(&root, "interference", interference::interference)?,
-            spoofers: each(&root, "spoofer", interference::spoofer)?,
-            fidelity: fidelity(open("fidelity")?.as_ref(), front_end.rate, allowed_m)?,
-            truth_interval_s: match open("truth")? {
-                Some(table) => table.number("interval_s", 0.001..=3600.0, "s")?.unwrap_or(0.1),
-                None => 0.1,
-            },
-            expect: match open("expect")? {
-                Some(table) => expect::expect(&table, duration_s)?,
-                None => Expect::default(),
-            },
-            receiver: receiver(&root, text).map_err(|e| refuse(&e))?,
+            stages,
+            interference,
+            spoofers,
+            fidelity: fidelity?,
+            truth_interval_s: truth_interval_s?,
+            expect: expect?.unwrap_or_default(),
+            receiver: None,
         })
     }
 }
 
-/// Every table of an array of tables.
+/// Every table of an array of tables that is not refused.
 fn each<T>(
     root: &Table<'_>,
     name: &str,
     read: impl Fn(&Table<'_>) -> Result<T, ScenarioError>,
-) -> Result<Vec<T>, ScenarioError> {
-    root.tables(name)?.unwrap_or_default().iter().map(read).collect()
+    refusals: &mut Refusals,
+) -> Vec<T> {
+    let tables = refusals.take(root.tables(name)).flatten().unwrap_or_default();
+    tables.iter().filter_map(|table| refusals.take(read(table))).collect()
 }
 
-/// The keys of a table.
-fn keys_of(table: &str) -> &'static [&'static str] {
-    KEYS.iter().find(|(name, _)| *name == table).map_or(&[], |(_, keys)| *keys)
+fn start(root: &Table<'_>) -> Result<Epoch, ScenarioError> {
+    let text = root.instant("start")?.ok_or_else(|| root.bad("start", "GPS time like \"2010-07-01T08:12:30\""))?;
+    Epoch::parse(&text).map_err(|e| root.bad("start", e))
 }
 
 fn name(root: &Table<'_>) -> Result<String, ScenarioError> {
     let expected = "1 to 64 letters, digits, '-' and '_' (it names a directory)";
-    let name = root.text("name", expected)?.ok_or_else(|| root.bad("name", expected))?;
+    let name = root.need_text("name")?;
     let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if name.len() <= 64 && name.chars().all(fits) { Ok(name.to_owned()) } else { Err(root.bad("name", expected)) }
 }
 
 fn signals(root: &Table<'_>) -> Result<Vec<&'static Signal>, ScenarioError> {
-    let known: Vec<String> = SIGNALS.iter().map(|signal| format!("{:?}", signal.name)).collect();
-    let expected = format!("an array of different signals out of {}", known.join(", "));
+    let expected = keys::signals_expected();
     let Some(words) = root.words("signals", &expected)? else { return Ok(vec![&crate::gnss::gps::l1ca::L1_CA]) };
     let mut signals: Vec<&'static Signal> = Vec::new();
     for word in words {
@@ -305,8 +312,8 @@ fn signals(root: &Table<'_>) -> Result<Vec<&'static Signal>, ScenarioError> {
 }
 
 fn satellites(table: Option<&Table<'_>>) -> Result<(f64, Vec<Sv>, bool), ScenarioError> {
-    let Some(table) = table else { return Ok((5_f64.to_radians(), Vec::new(), false)) };
-    let mask_deg = table.number("mask_deg", -10.0..=89.0, "deg")?.unwrap_or(5.0);
+    let Some(table) = table else { return Ok((MASK_DEG.to_radians(), Vec::new(), false)) };
+    let mask_deg = table.need("mask_deg")?;
     let excluded = satellite_list(table, "exclude")?.unwrap_or_default();
     Ok((mask_deg.to_radians(), excluded, table.flag("include_unhealthy")?.unwrap_or(false)))
 }
@@ -320,7 +327,7 @@ fn satellite_list(table: &Table<'_>, key: &str) -> Result<Option<Vec<Sv>>, Scena
 }
 
 /// A level's knobs, each overridden where the table names it.
-fn fidelity(table: Option<&Table<'_>>, rate: Rate, allowed_m: f64) -> Result<Fidelity, ScenarioError> {
+fn fidelity_of(table: Option<&Table<'_>>, rate: Rate, allowed_m: f64) -> Result<Fidelity, ScenarioError> {
     let Some(table) = table else { return Ok(Fidelity::suited(Grade::Balanced, rate.hz(), allowed_m)) };
     let grade = table.choice("level", &Grade::NAMES)?.unwrap_or(Grade::Balanced);
     let level = Fidelity::suited(grade, rate.hz(), allowed_m);
@@ -329,9 +336,7 @@ fn fidelity(table: Option<&Table<'_>>, rate: Rate, allowed_m: f64) -> Result<Fid
         code_edge: table.choice("code_edge", &CodeEdge::NAMES)?.unwrap_or(level.code_edge),
         carrier: table.choice("carrier", &Arithmetic::NAMES)?.unwrap_or(level.carrier),
         noise: table.choice("noise", &Arithmetic::NAMES)?.unwrap_or(level.noise),
-        knot_tolerance_cycles: table
-            .number("knot_tolerance_cycles", 1e-7..=0.1, "cycles")?
-            .unwrap_or(level.knot_tolerance_cycles),
+        knot_tolerance_cycles: table.number("knot_tolerance_cycles")?.unwrap_or(level.knot_tolerance_cycles),
         allowed_m,
     })
 }

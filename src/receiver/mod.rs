@@ -8,6 +8,7 @@
 pub mod acquire;
 pub mod correlate;
 pub mod decode;
+mod described;
 pub mod diagnosis;
 pub mod format;
 pub mod interference;

@@ -3,6 +3,8 @@
 //! Every key has a default, an unknown key is refused with the nearest right one, every value has a range.
 //! The known keys are those of the defaults themselves, so the list cannot go stale.
 
+pub mod reference;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 use toml::{Table, Value};
@@ -11,6 +13,7 @@ use crate::gnss::place::Keys;
 use crate::gnss::signal::SIGNALS;
 use crate::gnss::time::{Epoch, TimeError};
 use crate::receiver::acquire::{AcquireError, AcquisitionSettings};
+use crate::receiver::described::described;
 use crate::receiver::position::PositionSettings;
 use crate::receiver::track::{TrackingSettings, TrackingSettingsError};
 
@@ -24,6 +27,7 @@ pub struct Settings {
     pub operation: OperationSettings,
 }
 
+described! {
 /// What the main loop does when.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -42,6 +46,7 @@ pub struct OperationSettings {
     pub frame_limit_s: f64,
     /// GPS time near which the 10-bit week is resolved when the recording has no start time.
     pub week_reference: String,
+}
 }
 
 impl Default for OperationSettings {

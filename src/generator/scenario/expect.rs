@@ -5,14 +5,6 @@ use super::{Scenario, ScenarioError, satellite_list};
 use crate::generator::scenario::{MessageKind, SatelliteFault};
 use crate::gnss::facts::{Expect, Fault, Fixes, Interval, Losses, Sizes, Terms};
 
-/// Keys of `[expect]`.
-pub(super) const KEYS: &[&str] = &["fix", "losses", "satellites", "errors", "reason", "interval"];
-/// Keys of `[[expect.interval]]`.
-pub(super) const INTERVAL_KEYS: &[&str] = &["from_s", "to_s", "fix", "losses", "satellites", "errors", "reason"];
-
-/// Latest second of any scene.
-const LATEST_S: f64 = 2_678_400.0;
-
 pub(super) fn expect(table: &Table<'_>, duration_s: f64) -> Result<Expect, ScenarioError> {
     let intervals = table.tables("interval")?.unwrap_or_default();
     let intervals = intervals.iter().map(|table| interval(table, duration_s)).collect::<Result<Vec<_>, _>>()?;
@@ -26,9 +18,8 @@ pub(super) fn expect(table: &Table<'_>, duration_s: f64) -> Result<Expect, Scena
 const NOTHING: &str = "at least one of fix, losses and errors";
 
 fn interval(table: &Table<'_>, duration_s: f64) -> Result<Interval, ScenarioError> {
-    table.allow(INTERVAL_KEYS)?;
-    let from_s = table.required("from_s", 0.0..=LATEST_S, "s")?;
-    let to_s = table.required("to_s", 0.0..=LATEST_S, "s")?;
+    let from_s = table.need("from_s")?;
+    let to_s = table.need("to_s")?;
     if from_s >= duration_s {
         return Err(table.bad("from_s", format!("less than duration_s = {duration_s}")));
     }
@@ -42,13 +33,12 @@ fn interval(table: &Table<'_>, duration_s: f64) -> Result<Interval, ScenarioErro
 }
 
 fn terms(table: &Table<'_>) -> Result<Terms, ScenarioError> {
-    let reason = "a sentence that says why";
     let terms = Terms {
         fix: table.choice("fix", &Fixes::NAMES)?,
         losses: table.choice("losses", &Losses::NAMES)?,
         satellites: satellite_list(table, "satellites")?,
         errors: table.choice("errors", &Sizes::NAMES)?,
-        reason: table.text("reason", reason)?.ok_or_else(|| table.bad("reason", reason))?.to_owned(),
+        reason: table.need_text("reason")?.to_owned(),
     };
     if terms.satellites.is_some() && terms.losses.is_none() {
         return Err(table.bad("satellites", "losses beside it: it names the satellites that losses is about"));

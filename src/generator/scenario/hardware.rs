@@ -34,15 +34,14 @@ pub(super) fn front_end(table: Option<&Table<'_>>) -> Result<FrontEnd, ScenarioE
         })?;
         return Ok(FrontEnd { rate, if_hz: 0.0, inverted: false, format: Format::Ci8, noise_lsb: None });
     };
-    let rate_hz = table.number("sample_rate_hz", 1.1e6..=100e6, "Hz")?.unwrap_or(2.6e6);
+    let rate_hz = table.need("sample_rate_hz")?;
     let rate = Rate::from_hz(rate_hz).ok_or_else(|| table.bad("sample_rate_hz", "a rate"))?;
-    let expected = "one of ci8, cu8, ci16, cf32, ri8, ri16";
-    let format = match table.text("format", expected)? {
-        Some(text) => text.parse().map_err(|_| table.bad("format", expected))?,
+    let format = match table.text("format")? {
+        Some(text) => text.parse().map_err(|_| table.bad("format", "one of ci8, cu8, ci16, cf32, ri8, ri16"))?,
         None => Format::Ci8,
     };
     let half = 0.5 * rate.hz();
-    let if_hz = table.number("if_hz", -100e6..=100e6, "Hz")?.unwrap_or(0.0);
+    let if_hz = table.need("if_hz")?;
     if format.is_complex() && if_hz.abs() >= half {
         return Err(table.bad("if_hz", format!("less than half of sample_rate_hz in size, {half} Hz")));
     }
@@ -60,7 +59,7 @@ pub(super) fn front_end(table: Option<&Table<'_>>) -> Result<FrontEnd, ScenarioE
         if_hz,
         inverted: table.flag("spectrum_inverted")?.unwrap_or(false),
         format,
-        noise_lsb: table.number("noise_lsb", 0.01..=32_767.0, "LSB")?.map(|x| x as f32),
+        noise_lsb: table.number("noise_lsb")?.map(|x| x as f32),
     })
 }
 
@@ -93,8 +92,7 @@ impl ClockSpec {
 /// An oscillator's noise by `oscillator` or `power_law`.
 pub(super) fn power_law(table: &Table<'_>) -> Result<Option<PowerLaw>, ScenarioError> {
     let preset = table.choice("oscillator", &PowerLaw::PRESETS)?;
-    // Far above any oscillator: white frequency noise of 1e-12 is a microsecond in a second.
-    match (preset, table.numbers("power_law", 1e-12)?) {
+    match (preset, table.numbers("power_law")?) {
         (Some(_), Some(_)) => Err(table.bad("power_law", "nothing beside oscillator, which names a power law")),
         (preset, None) => Ok(preset),
         (None, Some(h)) if h.iter().all(|level| *level >= 0.0) && h.iter().any(|level| *level > 0.0) => {
@@ -111,10 +109,10 @@ pub(super) fn receiver_clock(table: Option<&Table<'_>>) -> Result<ClockSpec, Sce
     let Some(table) = table else { return Ok(ClockSpec::default()) };
     let noise = power_law(table)?;
     Ok(ClockSpec {
-        bias_s: table.number("bias_s", -1.0..=1.0, "s")?.unwrap_or(0.0),
-        drift: table.number("drift_sps", -1e-4..=1e-4, "s/s")?.unwrap_or(0.0),
-        ageing_per_s: table.number("ageing_per_day", -1e-5..=1e-5, "a day")?.unwrap_or(0.0) / DAY_S,
-        per_g: table.number("sensitivity_per_g", -1e-7..=1e-7, "a g")?.unwrap_or(0.0),
+        bias_s: table.need("bias_s")?,
+        drift: table.need("drift_sps")?,
+        ageing_per_s: table.need("ageing_per_day")? / DAY_S,
+        per_g: table.need("sensitivity_per_g")?,
         noise,
     })
 }

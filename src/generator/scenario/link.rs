@@ -14,19 +14,6 @@ use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 
-pub(super) const KEYS: &[&str] = &[
-    "kind",
-    "cn0_dbhz",
-    "satellites",
-    "transmit",
-    "transmit_dbw",
-    "blocks",
-    "antenna",
-    "antenna_file",
-    "noise_figure_db",
-    "loss_db",
-];
-
 /// How strong the satellites are.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Power {
@@ -172,19 +159,20 @@ pub(super) fn power(table: Option<&Table<'_>>) -> Result<Power, ScenarioError> {
         None => table.has("cn0_dbhz"),
     };
     if fixed {
-        table.allow(&["kind", "cn0_dbhz", "satellites"])?;
-        let cn0_dbhz = table.required("cn0_dbhz", 0.0..=100.0, "dB-Hz")?;
+        let table = table.of_kind("fixed");
+        table.allow_own()?;
+        let cn0_dbhz = table.need("cn0_dbhz")?;
         let mut satellites = Vec::new();
         if let Some(each) = table.table("satellites")? {
             for name in each.names() {
                 let sv = name.parse().map_err(|e| each.bad(name, e))?;
-                satellites.push((sv, each.required(name, 0.0..=100.0, "dB-Hz")?));
+                satellites.push((sv, each.need(name)?));
             }
         }
         return Ok(Power::Fixed { cn0_dbhz, satellites });
     }
-    let own: Vec<&str> = KEYS.iter().copied().filter(|key| !["cn0_dbhz", "satellites"].contains(key)).collect();
-    table.allow(&own)?;
+    let table = &table.of_kind("link_budget");
+    table.allow_own()?;
     let mut blocks = Vec::new();
     if let Some(each) = table.table("blocks")? {
         for name in each.names() {
@@ -196,11 +184,11 @@ pub(super) fn power(table: Option<&Table<'_>>) -> Result<Power, ScenarioError> {
     let transmits = [typical, iia, iir, iirm, ("constellation", Transmit::Constellation)];
     Ok(Power::LinkBudget {
         transmit: table.choice("transmit", &transmits)?.unwrap_or(Transmit::Block(ordinary.block)),
-        transmit_dbw: table.number("transmit_dbw", -10.0..=40.0, "dBW")?.unwrap_or(ordinary.transmit_dbw),
+        transmit_dbw: table.need("transmit_dbw")?,
         blocks,
         antenna: antenna_spec(table)?,
-        noise_figure_db: table.number("noise_figure_db", 0.0..=30.0, "dB")?.unwrap_or(ordinary.noise_figure_db),
-        loss_db: table.number("loss_db", -20.0..=60.0, "dB")?.unwrap_or(ordinary.extra_loss_db),
+        noise_figure_db: table.need("noise_figure_db")?,
+        loss_db: table.need("loss_db")?,
     })
 }
 
@@ -219,7 +207,7 @@ fn antenna_spec(table: &Table<'_>) -> Result<AntennaSpec, ScenarioError> {
         ("table", Kind::Table),
     ];
     let kind = table.choice("antenna", &kinds)?.unwrap_or(Kind::Patch);
-    let file = table.text("antenna_file", "a path")?;
+    let file = table.text("antenna_file")?;
     Ok(match (kind, file) {
         (Kind::Table, Some(file)) => AntennaSpec::Table(PathBuf::from(file)),
         (Kind::Table, None) => return Err(table.bad("antenna_file", "a path, because antenna = \"table\"")),

@@ -5,9 +5,6 @@ use super::{Scenario, ScenarioError};
 use crate::generator::effect::multipath::{Detour, Echo, Multipath};
 use crate::generator::vehicle::Trajectory;
 
-pub(super) const KEYS: &[&str] =
-    &["kind", "amplitude", "phase_deg", "satellites", "excess_m", "rate_mps", "height_m", "azimuth_deg", "distance_m"];
-
 #[derive(Clone, Copy)]
 enum Kind {
     Given,
@@ -18,33 +15,24 @@ enum Kind {
 /// Most rays that a scene adds to each satellite.
 const MOST: usize = 64;
 
-pub(super) fn echoes(tables: &[Table<'_>]) -> Result<Vec<Echo>, ScenarioError> {
-    if let Some(table) = tables.get(MOST) {
-        return Err(table.bad("kind", format!("at most {MOST} tables [[multipath]]")));
+/// Refuses more rays than a scene may have.
+pub(super) fn count(root: &Table<'_>, echoes: &[Echo]) -> Result<(), ScenarioError> {
+    if echoes.len() <= MOST {
+        Ok(())
+    } else {
+        Err(root.bad("multipath", format!("at most {MOST} tables [[multipath]]")))
     }
-    tables.iter().map(echo).collect()
 }
 
-fn echo(table: &Table<'_>) -> Result<Echo, ScenarioError> {
-    table.allow(KEYS)?;
+pub(super) fn echo(table: &Table<'_>) -> Result<Echo, ScenarioError> {
     let kinds = [("given", Kind::Given), ("ground", Kind::Ground), ("wall", Kind::Wall)];
-    let kind = table.choice("kind", &kinds)?.ok_or_else(|| table.bad("kind", "one of given, ground, wall"))?;
-    let own: &[&str] = match kind {
-        Kind::Given => &["excess_m", "rate_mps"],
-        Kind::Ground => &["height_m"],
-        Kind::Wall => &["azimuth_deg", "distance_m"],
-    };
-    table.allow(&[&["kind", "amplitude", "phase_deg", "satellites"], own].concat())?;
+    let kind = table.need_choice("kind", &kinds)?;
     let detour = match kind {
-        Kind::Given => Detour::Given {
-            excess_m: table.required("excess_m", 0.0..=1e5, "m")?,
-            rate_mps: table.number("rate_mps", -1e3..=1e3, "m/s")?.unwrap_or(0.0),
-        },
-        Kind::Ground => Detour::Ground { height_m: table.required("height_m", 0.0..=1e4, "m")? },
-        Kind::Wall => Detour::Wall {
-            azimuth_rad: table.required("azimuth_deg", -360.0..=360.0, "deg")?.to_radians(),
-            distance_m: table.required("distance_m", 0.01..=1e4, "m")?,
-        },
+        Kind::Given => Detour::Given { excess_m: table.need("excess_m")?, rate_mps: table.need("rate_mps")? },
+        Kind::Ground => Detour::Ground { height_m: table.need("height_m")? },
+        Kind::Wall => {
+            Detour::Wall { azimuth_rad: table.need("azimuth_deg")?.to_radians(), distance_m: table.need("distance_m")? }
+        }
     };
     let expected = "an array of satellites like [\"G01\", \"G12\"], or absent for all";
     let words = table.words("satellites", expected)?;
@@ -53,16 +41,7 @@ fn echo(table: &Table<'_>) -> Result<Echo, ScenarioError> {
     if words.is_some() && satellites.is_empty() {
         return Err(table.bad("satellites", expected));
     }
-    // A surface turns the field round unless it is told otherwise.
-    let usual_deg = if matches!(kind, Kind::Given) { 0.0 } else { 180.0 };
-    // Where the direct ray goes through a wall or leaves, its echo may be the stronger; planes reflect no more than they get.
-    let most = if matches!(kind, Kind::Given) { 10.0 } else { 1.0 };
-    Ok(Echo {
-        detour,
-        amplitude: table.required("amplitude", 0.0..=most, "(of the direct ray's)")?,
-        phase_cycles: table.number("phase_deg", -360.0..=360.0, "deg")?.unwrap_or(usual_deg) / 360.0,
-        satellites,
-    })
+    Ok(Echo { detour, amplitude: table.need("amplitude")?, phase_cycles: table.need("phase_deg")? / 360.0, satellites })
 }
 
 /// The effect, after checking that no ray comes before the direct one while the antenna moves.

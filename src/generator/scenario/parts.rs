@@ -24,21 +24,26 @@ pub(super) struct Sky {
     pub excluded: Vec<Sv>,
 }
 
-/// The navigation file that the scenario names, or the embedded one.
+/// The navigation files that the scenario names, or the embedded one. What is not an ephemeris is taken from the first file
+/// that has it.
 pub(super) fn navigation(
     scenario: &Scenario,
     directory: &Path,
     overrides: &Overrides,
     warnings: &mut Vec<String>,
 ) -> Result<Navigation, ScenarioError> {
-    let found = match &scenario.navigation {
-        None => rinex::embedded(),
-        Some(path) => {
-            let bytes = scenario.load("navigation.file", directory, path, overrides)?;
-            rinex::read(&bytes, &path.display().to_string())
-        }
-    };
-    let navigation = found.map_err(|e| scenario.conflict("navigation.file", e.to_string()))?;
+    let refuse = |e: rinex::NavigationError| scenario.conflict("navigation.file", e.to_string());
+    let mut navigation =
+        if scenario.navigation.is_empty() { rinex::embedded().map_err(refuse)? } else { Navigation::default() };
+    for path in &scenario.navigation {
+        let bytes = scenario.load("navigation.file", directory, path, overrides)?;
+        let Navigation { ephemerides, klobuchar, leap_seconds, skipped } =
+            rinex::read(&bytes, &path.display().to_string()).map_err(refuse)?;
+        navigation.ephemerides.extend(ephemerides);
+        navigation.klobuchar = navigation.klobuchar.or(klobuchar);
+        navigation.leap_seconds = navigation.leap_seconds.or(leap_seconds);
+        navigation.skipped.extend(skipped);
+    }
     tell(warnings, &navigation.skipped, "records of the navigation file left out");
     Ok(navigation)
 }

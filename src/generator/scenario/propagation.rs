@@ -16,24 +16,6 @@ use crate::gnss::time::Epoch;
 use crate::gnss::vienna::{Gpt3, MappingGrid, Vienna};
 use crate::gnss::vmf3::Vmf3;
 
-pub(super) const IONOSPHERE_KEYS: &[&str] = &[
-    "model",
-    "alpha",
-    "beta",
-    "vtec_tecu",
-    "shell_km",
-    "file",
-    "map_start",
-    "interpolation",
-    "mapping",
-    "broadcast_alpha",
-    "broadcast_beta",
-];
-pub(super) const TROPOSPHERE_KEYS: &[&str] =
-    &["model", "height_m", "pressure_hpa", "temperature_c", "relative_humidity", "gpt3_file", "mapping", "vmf_file"];
-/// Height of the shell unless the scene says otherwise: that of the IGS's maps.
-const SHELL_KM: f64 = 450.0;
-
 /// What the ionosphere truly is, and what the satellites say that it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ionosphere {
@@ -55,33 +37,19 @@ pub enum Electrons {
 
 pub(super) fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError> {
     let models = [("klobuchar", 0), ("constant_tec", 1), ("ionex", 2)];
-    let model =
-        table.choice("model", &models)?.ok_or_else(|| table.bad("model", "klobuchar, constant_tec or ionex"))?;
+    let model = table.need_choice("model", &models)?;
     let broadcast = coefficients(table, "broadcast_alpha", "broadcast_beta")?;
     let mappings = [("single_layer", Mapping::SingleLayer), ("modified_single_layer", Mapping::ModifiedSingleLayer)];
     let mapping = |table: &Table<'_>| Ok(table.choice("mapping", &mappings)?.unwrap_or(Mapping::SingleLayer));
     let truth = match model {
-        0 => {
-            table.allow(&["model", "alpha", "beta", "broadcast_alpha", "broadcast_beta"])?;
-            Electrons::Klobuchar(coefficients(table, "alpha", "beta")?)
-        }
+        0 => Electrons::Klobuchar(coefficients(table, "alpha", "beta")?),
         1 => {
-            table.allow(&["model", "vtec_tecu", "shell_km", "mapping", "broadcast_alpha", "broadcast_beta"])?;
-            let height_m = table.number("shell_km", 100.0..=1000.0, "km")?.unwrap_or(SHELL_KM) * 1e3;
+            let height_m = table.need("shell_km")? * 1e3;
             let shell = Shell { radius_m: EARTH_RADIUS_M, height_m, mapping: mapping(table)? };
-            Electrons::Constant { vtec_tecu: table.required("vtec_tecu", 0.0..=1000.0, "TECU")?, shell }
+            Electrons::Constant { vtec_tecu: table.need("vtec_tecu")?, shell }
         }
         _ => {
-            table.allow(&[
-                "model",
-                "file",
-                "map_start",
-                "interpolation",
-                "mapping",
-                "broadcast_alpha",
-                "broadcast_beta",
-            ])?;
-            let file = table.text("file", "a path")?.ok_or_else(|| table.bad("file", "the path of an IONEX file"))?;
+            let file = table.need_text("file")?;
             let start = table.instant("map_start")?;
             let ways = [("bilinear", Interpolation::Bilinear), ("bicubic", Interpolation::Bicubic)];
             Electrons::Ionex {
@@ -97,8 +65,7 @@ pub(super) fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError>
 
 /// Klobuchar's coefficients, both lists or none.
 fn coefficients(table: &Table<'_>, alpha: &str, beta: &str) -> Result<Option<Klobuchar>, ScenarioError> {
-    // Eight-bit integers times 2^-24 and 2^16 at most (IS-GPS-200N, table 20-X).
-    match (table.numbers(alpha, 1e-4)?, table.numbers(beta, 1e7)?) {
+    match (table.numbers(alpha)?, table.numbers(beta)?) {
         (None, None) => Ok(None),
         (Some(alpha), Some(beta)) => Ok(Some(Klobuchar { alpha, beta })),
         (None, _) => Err(table.bad(alpha, format!("four numbers, because {beta} is given"))),
@@ -177,18 +144,16 @@ pub enum MappingKind {
 }
 
 pub(super) fn troposphere(table: &Table<'_>) -> Result<NeutralAtmosphere, ScenarioError> {
-    table.choice("model", &[("saastamoinen", ())])?.ok_or_else(|| table.bad("model", "one of saastamoinen"))?;
-    let path = |key: &str| Ok(table.text(key, "a path")?.map(PathBuf::from));
+    table.need_choice("model", &[("saastamoinen", ())])?;
+    let path = |key: &str| Ok(table.text(key)?.map(PathBuf::from));
     let (gpt3_file, vmf_file) = (path("gpt3_file")?, path("vmf_file")?);
     let standard = Weather::STANDARD;
-    let celsius = table.number("temperature_c", -90.0..=60.0, "C")?;
+    let celsius = table.number("temperature_c")?;
     let weather = Weather {
-        height_m: table.number("height_m", -500.0..=9_000.0, "m")?.unwrap_or(standard.height_m),
-        pressure_hpa: table.number("pressure_hpa", 1.0..=1100.0, "hPa")?.unwrap_or(standard.pressure_hpa),
+        height_m: table.need("height_m")?,
+        pressure_hpa: table.need("pressure_hpa")?,
         temperature_k: celsius.map_or(standard.temperature_k, |c| c + 273.15),
-        relative_humidity: table
-            .number("relative_humidity", 0.0..=1.0, "(a fraction)")?
-            .unwrap_or(standard.relative_humidity),
+        relative_humidity: table.need("relative_humidity")?,
     };
     if gpt3_file.is_some() && weather != standard {
         return Err(table.bad("gpt3_file", "no weather of the scene beside it, because it brings its own"));

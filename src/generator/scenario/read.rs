@@ -1,16 +1,18 @@
 //! Typed access to TOML tables: one place where a key's name, type, range and unit are checked.
 //!
-//! A key that a table does not know is refused before anything else, with the nearest one that it does know. Every
-//! refusal carries the file, the line and the column, because values are read off the spanned document; serde's
-//! derived structures lose the place of a value behind `kind = …`.
+//! Values are read by the declarations of [`super::schema`]: a reader names a key, and its type, range and default are
+//! there. [`Table::check`] holds a whole document against them and collects every refusal. Each carries the file, the
+//! line and the column, because values are read off the spanned document; serde's derived structures lose the place of
+//! a value behind `kind = …`.
 
 use std::fmt::Display;
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::ScenarioError;
+use super::schema::{Absent, Key, Value};
 
 /// The text of a scenario and where it came from.
 pub(crate) struct Source<'t> {
@@ -54,33 +56,182 @@ impl Source<'_> {
     }
 }
 
+/// Refusals as they are met, each once.
+#[derive(Debug, Default)]
+pub(crate) struct Refusals(Vec<ScenarioError>);
+
+impl Refusals {
+    pub fn add(&mut self, error: ScenarioError) {
+        match error {
+            ScenarioError::Several(errors) => errors.into_iter().for_each(|error| self.add(error)),
+            error => {
+                // One refusal of a key is enough; of an absent one the place is its table's.
+                let same = |known: &ScenarioError| match (known.key_at(), error.key_at()) {
+                    (Some(one), Some(other)) => one == other,
+                    _ => known.to_string() == error.to_string(),
+                };
+                if !self.0.iter().any(same) {
+                    self.0.push(error);
+                }
+            }
+        }
+    }
+
+    /// The value, or `None` and one refusal more.
+    pub fn take<T>(&mut self, result: Result<T, ScenarioError>) -> Option<T> {
+        result.map_err(|error| self.add(error)).ok()
+    }
+
+    /// # Errors
+    /// What was refused, in the order of the text.
+    pub fn finish(mut self) -> Result<(), ScenarioError> {
+        self.0.sort_by_key(|error| error.place().map_or((usize::MAX, 0), |place| (place.line, place.column)));
+        match (self.0.pop(), self.0.is_empty()) {
+            (None, _) => Ok(()),
+            (Some(only), true) => Err(only),
+            (Some(last), false) => {
+                self.0.push(last);
+                Err(ScenarioError::Several(self.0))
+            }
+        }
+    }
+}
+
 /// One table of the scenario.
+#[derive(Clone)]
 pub(crate) struct Table<'t> {
     source: &'t Source<'t>,
     path: String,
     at: usize,
     table: &'t DeTable<'t>,
+    keys: &'static [Key],
+    /// What every key is, where keys are satellites.
+    each: Option<&'static Key>,
+    /// The word that says which kind of its tables it is.
+    kind: Option<&'t str>,
 }
 
 impl<'t> Table<'t> {
-    pub fn new(source: &'t Source<'t>, path: &str, at: usize, table: &'t DeTable<'t>) -> Self {
-        Self { source, path: path.to_owned(), at, table }
+    /// A table with the keys that it may hold.
+    pub fn new(source: &'t Source<'t>, path: &str, at: usize, table: &'t DeTable<'t>, keys: &'static [Key]) -> Self {
+        let tells = |key: &&Key| ["kind", "model"].contains(&key.name) && matches!(key.value, Value::Word(_));
+        let kind =
+            keys.iter().find(tells).and_then(|key| match (table.get(key.name).map(Spanned::get_ref), key.value) {
+                (Some(DeValue::String(word)), Value::Word(words)) => {
+                    Some(word.as_ref()).filter(|word| words().contains(word))
+                }
+                _ => None,
+            });
+        Self { source, path: path.to_owned(), at, table, keys, each: None, kind }
+    }
+
+    /// The same table, known to be of this kind though it may not say so.
+    pub fn of_kind(&self, kind: &'static str) -> Self {
+        Self { kind: Some(kind), ..self.clone() }
+    }
+
+    /// The declaration of a key.
+    fn declared(&self, name: &str) -> Option<&'static Key> {
+        let mut named = self.keys.iter().filter(|key| key.name == name);
+        let first = named.clone().next();
+        let own = named.find(|key| self.kind.is_none_or(|kind| key.is_of(kind)));
+        self.each.or(own).or(first)
+    }
+
+    fn expected(&self, name: &str) -> String {
+        self.declared(name).map_or_else(|| "a key of the reference".to_owned(), Key::expected)
+    }
+
+    /// The names of the keys that a table of this kind may hold; of all if its kind is not known.
+    fn known(&self) -> Vec<&'static str> {
+        let mut names: Vec<&str> = Vec::new();
+        for key in self.keys.iter().filter(|key| self.kind.is_none_or(|kind| key.is_of(kind))) {
+            if !names.contains(&key.name) {
+                names.push(key.name);
+            }
+        }
+        names
+    }
+
+    /// Refuses keys that are not declared for a table of this kind.
+    pub fn allow_own(&self) -> Result<(), ScenarioError> {
+        if self.each.is_some() { Ok(()) } else { self.allow(&self.known()) }
     }
 
     /// Refuses keys that are not among `keys`.
     pub fn allow(&self, keys: &[&str]) -> Result<(), ScenarioError> {
-        for key in self.table.keys() {
+        self.unknown(keys).next().map_or(Ok(()), Err)
+    }
+
+    fn unknown(&self, keys: &[&str]) -> impl Iterator<Item = ScenarioError> {
+        let strangers = self.table.keys().filter(|key| !keys.contains(&key.get_ref().as_ref()));
+        strangers.map(|key| {
             let name: &str = key.get_ref();
-            if !keys.contains(&name) {
-                return Err(ScenarioError::UnknownKey {
-                    place: self.source.place(key.span().start),
-                    key: self.key(&name.escape_debug().to_string()),
-                    nearest: nearest(name, keys),
-                    known: if keys.is_empty() { "none".to_owned() } else { keys.join(", ") },
-                });
+            // A word that some kind knows is none misspelt.
+            let all: Vec<&str> = self.keys.iter().map(|key| key.name).chain(keys.iter().copied()).collect();
+            let nearest = if all.contains(&name) { None } else { nearest(name, &all) };
+            ScenarioError::UnknownKey {
+                place: self.source.place(key.span().start),
+                key: self.key(&name.escape_debug().to_string()),
+                nearest,
+                known: if keys.is_empty() { "none".to_owned() } else { keys.join(", ") },
+            }
+        })
+    }
+
+    /// Holds the table and those in it against their declarations: unknown keys, values of a wrong type or out of their
+    /// range, required keys that are absent.
+    pub fn check(&self, refusals: &mut Refusals) {
+        let known = self.known();
+        let mut misspelt: Vec<String> = Vec::new();
+        if self.each.is_none() {
+            for error in self.unknown(&known) {
+                if let ScenarioError::UnknownKey { nearest: Some(nearest), .. } = &error {
+                    misspelt.push(nearest.clone());
+                }
+                refusals.add(error);
             }
         }
-        Ok(())
+        for name in self.names() {
+            if let Some(key) = self.declared(name) {
+                self.check_value(name, key, refusals);
+            }
+        }
+        let missing = |key: &&&str| {
+            let required = self.declared(key).is_some_and(|key| matches!(key.absent, Absent::Required));
+            // A key of some kinds is required where the kind is known.
+            let sure = self.declared(key).is_some_and(|key| key.kinds.is_empty() || self.kind.is_some());
+            required && sure && !self.has(key) && !misspelt.iter().any(|name| name == **key)
+        };
+        for name in known.iter().filter(missing) {
+            refusals.add(self.bad(name, self.expected(name)));
+        }
+    }
+
+    fn check_value(&self, name: &str, key: &'static Key, refusals: &mut Refusals) {
+        let expected = key.expected();
+        let held = match key.value {
+            Value::Number { .. } => self.number(name).map(|_| ()),
+            Value::Numbers { .. } | Value::List { .. } => self.list(name).map(|_| ()),
+            Value::Integer { .. } => self.integer(name).map(|_| ()),
+            Value::Flag => self.flag(name).map(|_| ()),
+            Value::Text(_) => self.text(name).map(|_| ()),
+            Value::Time => self.instant(name).map(|_| ()),
+            Value::Word(words) => {
+                let words: Vec<(&str, ())> = words().into_iter().map(|word| (word, ())).collect();
+                self.choice(name, &words).map(|_| ())
+            }
+            Value::Words(_) => self.words(name, &expected).map(|_| ()),
+            Value::Texts(_) => self.texts(name).map(|_| ()),
+            Value::Values | Value::Foreign(_) => Ok(()),
+            Value::Table(_) | Value::BySatellite(_) => {
+                self.table(name).map(|table| table.iter().for_each(|table| table.check(refusals)))
+            }
+            Value::Tables(_) => {
+                self.tables(name).map(|tables| tables.iter().flatten().for_each(|table| table.check(refusals)))
+            }
+        };
+        refusals.take(held);
     }
 
     /// The full name of a key.
@@ -94,6 +245,8 @@ impl<'t> Table<'t> {
     }
 
     fn get(&self, name: &str) -> Option<&'t Spanned<DeValue<'t>>> {
+        let foreign = self.keys.is_empty();
+        debug_assert!(foreign || self.declared(name).is_some(), "{} is not declared", self.key(name));
         self.table.get(name)
     }
 
@@ -111,61 +264,83 @@ impl<'t> Table<'t> {
         self.get(name).is_some()
     }
 
-    pub fn number(&self, name: &str, range: RangeInclusive<f64>, unit: &str) -> Result<Option<f64>, ScenarioError> {
+    /// A number within its range.
+    pub fn number(&self, name: &str) -> Result<Option<f64>, ScenarioError> {
         let Some(value) = self.get(name) else { return Ok(None) };
-        let number = as_number(value.get_ref()).filter(|x| range.contains(x));
-        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-        let expected = || format!("a number from {} to {}{unit}", Short(*range.start()), Short(*range.end()));
-        number.map(Some).ok_or_else(|| self.bad(name, expected()))
+        let bad = || self.bad(name, self.expected(name));
+        let Some(Key { value: Value::Number { least, most, .. }, .. }) = self.declared(name) else { return Err(bad()) };
+        let number = as_number(value.get_ref()).filter(|x| (*least..=*most).contains(x));
+        number.map(Some).ok_or_else(bad)
     }
 
-    pub fn required(&self, name: &str, range: RangeInclusive<f64>, unit: &str) -> Result<f64, ScenarioError> {
-        let expected = format!("a number from {} to {} {unit}", Short(*range.start()), Short(*range.end()));
-        self.number(name, range, unit)?.ok_or_else(|| self.bad(name, expected.trim_end()))
-    }
-
-    pub fn numbers<const N: usize>(&self, name: &str, limit: f64) -> Result<Option<[f64; N]>, ScenarioError> {
-        let Some(value) = self.get(name) else { return Ok(None) };
-        let bad = || self.bad(name, format!("an array of {N} numbers from {} to {}", Short(-limit), Short(limit)));
-        let DeValue::Array(items) = value.get_ref() else { return Err(bad()) };
-        let numbers: Vec<f64> =
-            items.iter().filter_map(|v| as_number(v.get_ref())).filter(|x| x.abs() <= limit).collect();
-        if items.len() != N { Err(bad()) } else { numbers.try_into().map(Some).map_err(|_| bad()) }
-    }
-
-    /// An array of numbers of any length.
-    pub fn list(&self, name: &str, range: RangeInclusive<f64>, unit: &str) -> Result<Option<Vec<f64>>, ScenarioError> {
-        let Some(value) = self.get(name) else { return Ok(None) };
-        let expected =
-            || format!("an array of numbers from {} to {} {unit}", Short(*range.start()), Short(*range.end()));
-        let DeValue::Array(items) = value.get_ref() else { return Err(self.bad(name, expected())) };
-        let number = |item: &Spanned<DeValue<'_>>| as_number(item.get_ref()).filter(|x| range.contains(x));
-        let numbers: Option<Vec<f64>> = items.iter().map(number).collect();
-        numbers.map(Some).ok_or_else(|| self.bad(name, expected()))
-    }
-
-    pub fn integer(&self, name: &str) -> Result<Option<u64>, ScenarioError> {
-        let Some(value) = self.get(name) else { return Ok(None) };
-        let number = match value.get_ref() {
-            DeValue::Integer(i) => u64::from_str_radix(i.as_str(), i.radix()).ok().filter(|x| *x <= i64::MAX as u64),
+    /// A number within its range, its default, or a refusal where it has none.
+    pub fn need(&self, name: &str) -> Result<f64, ScenarioError> {
+        let default = match self.declared(name).map(|key| key.absent) {
+            Some(Absent::Number(number)) => Some(number),
             _ => None,
         };
-        number.map(Some).ok_or_else(|| self.bad(name, "an integer from 0 to 9223372036854775807"))
+        self.number(name)?.or(default).ok_or_else(|| self.bad(name, self.expected(name)))
     }
 
-    pub fn text(&self, name: &str, expected: &str) -> Result<Option<&'t str>, ScenarioError> {
+    pub fn numbers<const N: usize>(&self, name: &str) -> Result<Option<[f64; N]>, ScenarioError> {
+        let Some(numbers) = self.list(name)? else { return Ok(None) };
+        numbers.try_into().map(Some).map_err(|_| self.bad(name, self.expected(name)))
+    }
+
+    /// An array of numbers, of any length unless one is declared.
+    pub fn list(&self, name: &str) -> Result<Option<Vec<f64>>, ScenarioError> {
+        let Some(value) = self.get(name) else { return Ok(None) };
+        let bad = || self.bad(name, self.expected(name));
+        let (length, range) = match self.declared(name).map(|key| key.value) {
+            Some(Value::Numbers { count, least, most, .. }) => (Some(count), least..=most),
+            Some(Value::List { least, most, .. }) => (None, least..=most),
+            _ => return Err(bad()),
+        };
+        let DeValue::Array(items) = value.get_ref() else { return Err(bad()) };
+        let number = |item: &Spanned<DeValue<'_>>| as_number(item.get_ref()).filter(|x| range.contains(x));
+        let numbers: Option<Vec<f64>> = items.iter().map(number).collect();
+        numbers.filter(|list| length.is_none_or(|length| list.len() == length)).map(Some).ok_or_else(bad)
+    }
+
+    /// An integer within its range.
+    pub fn integer(&self, name: &str) -> Result<Option<u64>, ScenarioError> {
+        let Some(value) = self.get(name) else { return Ok(None) };
+        let bad = || self.bad(name, self.expected(name));
+        let Some(Key { value: Value::Integer { least, most }, .. }) = self.declared(name) else { return Err(bad()) };
+        let number = match value.get_ref() {
+            DeValue::Integer(i) => u64::from_str_radix(i.as_str(), i.radix()).ok(),
+            _ => None,
+        };
+        number.filter(|x| (*least..=*most).contains(x)).map(Some).ok_or_else(bad)
+    }
+
+    /// An integer, its default, or a refusal where it has none.
+    pub fn need_integer(&self, name: &str) -> Result<u64, ScenarioError> {
+        let default = match self.declared(name).map(|key| key.absent) {
+            Some(Absent::Number(number)) => Some(number as u64),
+            _ => None,
+        };
+        self.integer(name)?.or(default).ok_or_else(|| self.bad(name, self.expected(name)))
+    }
+
+    pub fn text(&self, name: &str) -> Result<Option<&'t str>, ScenarioError> {
         match self.get(name).map(Spanned::get_ref) {
             None => Ok(None),
             Some(DeValue::String(text)) if !text.trim().is_empty() => Ok(Some(text.as_ref())),
-            Some(_) => Err(self.bad(name, expected)),
+            Some(_) => Err(self.bad(name, self.expected(name))),
         }
+    }
+
+    /// A text that must be there.
+    pub fn need_text(&self, name: &str) -> Result<&'t str, ScenarioError> {
+        self.text(name)?.ok_or_else(|| self.bad(name, self.expected(name)))
     }
 
     /// A time: a string, or TOML's own date and time.
     pub fn instant(&self, name: &str) -> Result<Option<String>, ScenarioError> {
         match self.get(name).map(Spanned::get_ref) {
             Some(DeValue::Datetime(time)) => Ok(Some(time.to_string())),
-            _ => Ok(self.text(name, "GPS time like \"2010-07-01T08:12:30\"")?.map(str::to_owned)),
+            _ => Ok(self.text(name)?.map(str::to_owned)),
         }
     }
 
@@ -177,14 +352,23 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// One word out of a list.
+    /// One word out of a list, which is the declared one.
     pub fn choice<T: Copy>(&self, name: &str, choices: &[(&str, T)]) -> Result<Option<T>, ScenarioError> {
         let names: Vec<&str> = choices.iter().map(|(word, _)| *word).collect();
-        let expected = format!("one of {}", names.join(", "));
-        let Some(word) = self.text(name, &expected)? else { return Ok(None) };
+        debug_assert!(
+            matches!(self.declared(name), Some(Key { value: Value::Word(words), .. }) if words() == names),
+            "{}: {names:?} is not what is declared",
+            self.key(name)
+        );
+        let Some(word) = self.text(name)? else { return Ok(None) };
         let found = choices.iter().find(|(w, _)| *w == word).map(|(_, choice)| *choice);
         let hint = nearest(word, &names).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
-        found.map(Some).ok_or_else(|| self.bad(name, format!("{expected}{hint}")))
+        found.map(Some).ok_or_else(|| self.bad(name, self.expected(name) + &hint))
+    }
+
+    /// One word out of a list, which must be there.
+    pub fn need_choice<T: Copy>(&self, name: &str, choices: &[(&str, T)]) -> Result<T, ScenarioError> {
+        self.choice(name, choices)?.ok_or_else(|| self.bad(name, self.expected(name)))
     }
 
     /// An array of strings.
@@ -202,32 +386,38 @@ impl<'t> Table<'t> {
     }
 
     /// A string, or an array of them.
-    pub fn texts(&self, name: &str, expected: &str) -> Result<Option<Vec<&'t str>>, ScenarioError> {
+    pub fn texts(&self, name: &str) -> Result<Option<Vec<&'t str>>, ScenarioError> {
         match self.get(name).map(Spanned::get_ref) {
-            Some(DeValue::Array(_)) => self.words(name, expected),
-            _ => Ok(self.text(name, expected)?.map(|text| vec![text])),
+            Some(DeValue::Array(_)) => self.words(name, &self.expected(name)),
+            _ => Ok(self.text(name)?.map(|text| vec![text])),
         }
     }
 
+    /// A table with the keys that are declared for it.
     pub fn table(&self, name: &str) -> Result<Option<Table<'t>>, ScenarioError> {
-        match self.get(name) {
-            None => Ok(None),
-            Some(value) => match value.get_ref() {
-                DeValue::Table(table) => Ok(Some(Table::new(self.source, &self.key(name), value.span().start, table))),
-                _ => Err(self.bad(name, "a table")),
-            },
-        }
+        let Some(value) = self.get(name) else { return Ok(None) };
+        let DeValue::Table(table) = value.get_ref() else { return Err(self.bad(name, "a table")) };
+        let (keys, each): (&'static [Key], _) = match self.declared(name).map(|key| key.value) {
+            Some(Value::Table(keys)) => (keys, None),
+            Some(Value::BySatellite(each)) => (&[], Some(each)),
+            _ => (&[], None),
+        };
+        Ok(Some(Self { each, ..Self::new(self.source, &self.key(name), value.span().start, table, keys) }))
     }
 
     pub fn tables(&self, name: &str) -> Result<Option<Vec<Table<'t>>>, ScenarioError> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let expected = "an array of tables";
         let DeValue::Array(items) = value.get_ref() else { return Err(self.bad(name, expected)) };
+        let keys: &'static [Key] = match self.declared(name).map(|key| key.value) {
+            Some(Value::Tables(keys)) => keys,
+            _ => &[],
+        };
         let mut tables = Vec::with_capacity(items.len());
         for (i, item) in items.iter().enumerate() {
             let DeValue::Table(table) = item.get_ref() else { return Err(self.bad(name, expected)) };
             let path = format!("{}[{}]", self.key(name), i + 1);
-            tables.push(Table::new(self.source, &path, item.span().start, table));
+            tables.push(Table::new(self.source, &path, item.span().start, table, keys));
         }
         Ok(Some(tables))
     }
@@ -269,16 +459,6 @@ impl Table<'_> {
     /// A plain value of any type.
     pub fn value(&self, name: &str) -> Option<toml::Value> {
         self.get(name).and_then(|value| plain(value.get_ref()))
-    }
-}
-
-/// A range's end without a tail of zeros.
-struct Short(f64);
-
-impl Display for Short {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let size = self.0.abs();
-        if size != 0.0 && !(1e-3..1e6).contains(&size) { write!(f, "{:e}", self.0) } else { write!(f, "{}", self.0) }
     }
 }
 

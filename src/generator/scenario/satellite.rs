@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use super::compose::Files;
 use super::hardware::power_law;
-use super::interference::{SECONDS, times};
+use super::interference::times;
+use super::keys::satellites::parameters;
 use super::read::Table;
 use super::{Scenario, ScenarioError, satellite_list};
 use crate::generator::catalogue::Catalogue;
@@ -22,27 +23,6 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::sp3::{self, Precise};
 use crate::gnss::time::Rate;
 
-pub(super) const ORBITS_KEYS: &[&str] = &["sp3", "antenna_offset_m", "antenna_offsets_m"];
-/// Every key of `[[satellite_fault]]`; each kind knows some of them.
-pub(super) const FAULT_KEYS: &[&str] = &[
-    "kind",
-    "satellites",
-    "on_s",
-    "off_s",
-    "step_s",
-    "drift_sps",
-    "oscillator",
-    "power_law",
-    "radial_m",
-    "along_m",
-    "cross_m",
-    "ramp_s",
-];
-/// Every key of `[[message_fault]]`.
-pub(super) const MESSAGE_KEYS: &[&str] =
-    &["kind", "satellites", "on_s", "off_s", "rate", "subframe", "word", "bit", "health", "parameter", "add"];
-/// Parameters that a fault cannot change: sets are told apart by them.
-const FIXED_PARAMETERS: [&str; 4] = ["week", "iodc", "iode", "health"];
 /// True time beyond both ends of the scene for which there must be orbits: light times and the receiver's clock.
 const MARGIN_S: f64 = 2.0;
 
@@ -83,17 +63,17 @@ pub enum MessageKind {
 
 pub(super) fn orbits(table: &Table<'_>) -> Result<OrbitsSpec, ScenarioError> {
     let expected = "the path of an SP3 file, or an array of such paths";
-    let files = table.texts("sp3", expected)?.filter(|files| !files.is_empty());
+    let files = table.texts("sp3")?.filter(|files| !files.is_empty());
     let mut antennas_m = Vec::new();
     if let Some(each) = table.table("antenna_offsets_m")? {
         for name in each.names() {
             let sv = name.parse().map_err(|e| each.bad(name, e))?;
-            antennas_m.push((sv, each.required(name, -5.0..=5.0, "m")?));
+            antennas_m.push((sv, each.need(name)?));
         }
     }
     Ok(OrbitsSpec {
         files: files.ok_or_else(|| table.bad("sp3", expected))?.iter().map(PathBuf::from).collect(),
-        antenna_m: table.number("antenna_offset_m", -5.0..=5.0, "m")?.unwrap_or(0.0),
+        antenna_m: table.need("antenna_offset_m")?,
         antennas_m,
     })
 }
@@ -111,33 +91,27 @@ fn some(table: &Table<'_>) -> Result<Option<Vec<Sv>>, ScenarioError> {
 }
 
 pub(super) fn satellite_fault(table: &Table<'_>) -> Result<SatelliteFault, ScenarioError> {
-    table.allow(FAULT_KEYS)?;
     let kinds = [("clock_step", 0), ("clock_ramp", 1), ("clock_noise", 2), ("orbit", 3)];
-    let kind = table.choice("kind", &kinds)?;
-    match kind.ok_or_else(|| table.bad("kind", "clock_step, clock_ramp, clock_noise or orbit"))? {
+    match table.need_choice("kind", &kinds)? {
         0 => {
-            table.allow(&["kind", "satellites", "on_s", "off_s", "step_s"])?;
             let (on_s, off_s) = times(table)?;
-            let step_s = table.required("step_s", -1e-3..=1e-3, "s")?;
+            let step_s = table.need("step_s")?;
             Ok(SatelliteFault::Step { satellites: named(table)?, step_s, on_s, off_s })
         }
         1 => {
-            table.allow(&["kind", "satellites", "on_s", "off_s", "drift_sps"])?;
             let (on_s, off_s) = times(table)?;
-            let drift = table.required("drift_sps", -1e-6..=1e-6, "s/s")?;
+            let drift = table.need("drift_sps")?;
             Ok(SatelliteFault::Ramp { satellites: named(table)?, drift, on_s, off_s })
         }
         2 => {
-            table.allow(&["kind", "satellites", "oscillator", "power_law"])?;
             let law = power_law(table)?;
             let expected = "the oscillator by name, or power_law = [h2, h1, h0, h-1, h-2]";
             let law = law.ok_or_else(|| table.bad("oscillator", expected))?;
             Ok(SatelliteFault::Noise { satellites: some(table)?, law })
         }
         _ => {
-            table.allow(&["kind", "satellites", "on_s", "ramp_s", "radial_m", "along_m", "cross_m"])?;
-            let axis = |key: &str| Ok(table.number(key, -1e5..=1e5, "m")?.unwrap_or(0.0));
-            let times = (table.number("on_s", SECONDS, "s")?, table.number("ramp_s", 1.0..=1e6, "s")?);
+            let axis = |key: &str| table.need(key);
+            let times = (table.number("on_s")?, table.number("ramp_s")?);
             let growth_s = match times {
                 (None, None) => None,
                 (Some(on_s), Some(ramp_s)) => Some((on_s, ramp_s)),
@@ -162,45 +136,26 @@ pub(super) fn satellite_fault(table: &Table<'_>) -> Result<SatelliteFault, Scena
 }
 
 pub(super) fn message_fault(table: &Table<'_>) -> Result<MessageSpec, ScenarioError> {
-    table.allow(MESSAGE_KEYS)?;
     let kinds = [("bit_errors", 0), ("bit", 1), ("health", 2), ("parameter", 3)];
-    let kind = table.choice("kind", &kinds)?;
-    let kind = kind.ok_or_else(|| table.bad("kind", "bit_errors, bit, health or parameter"))?;
-    let common = ["kind", "satellites", "on_s", "off_s"];
-    let allow = |own: &[&str]| table.allow(&[&common, own].concat());
-    let count = |key: &str, least: u64, most: u64| {
-        let value = table.integer(key)?.filter(|value| (least..=most).contains(value));
-        value.map(|value| value as u8).ok_or_else(|| table.bad(key, format!("an integer from {least} to {most}")))
-    };
+    let kind = table.need_choice("kind", &kinds)?;
+    let count = |key: &str| table.need_integer(key).map(|value| value as u8);
     let (on_s, off_s) = times(table)?;
     let satellites = some(table)?;
     let kind = match kind {
-        0 => {
-            allow(&["rate"])?;
-            MessageKind::BitErrors { rate: table.required("rate", 0.0..=0.5, "(a probability)")? }
-        }
+        0 => MessageKind::BitErrors { rate: table.need("rate")? },
         1 => {
-            allow(&["subframe", "word", "bit"])?;
-            let (subframe, word) = (count("subframe", 1, 5)?, count("word", 1, 10)?);
-            MessageKind::Bit { subframe, word, bit: count("bit", 1, 30)? }
+            let (subframe, word) = (count("subframe")?, count("word")?);
+            MessageKind::Bit { subframe, word, bit: count("bit")? }
         }
         2 => {
-            allow(&["health"])?;
             named(table)?;
-            MessageKind::Health(count("health", 0, 63)?)
+            MessageKind::Health(count("health")?)
         }
         _ => {
-            allow(&["parameter", "add"])?;
             named(table)?;
-            let tables = lnav::tables();
-            let ephemeris = tables.iter().filter(|(name, _)| name.starts_with("subframe "));
-            let names: Vec<(&str, &'static str)> = ephemeris
-                .flat_map(|(_, fields)| fields.iter().map(|field| (field.name, field.name)))
-                .filter(|(name, _)| !FIXED_PARAMETERS.contains(name))
-                .collect();
-            let name =
-                table.choice("parameter", &names)?.ok_or_else(|| table.bad("parameter", "a parameter's name"))?;
-            MessageKind::Parameter { name, add: table.required("add", -1e6..=1e6, "in the parameter's unit")? }
+            let names: Vec<(&str, &'static str)> = parameters().into_iter().map(|name| (name, name)).collect();
+            let name = table.need_choice("parameter", &names)?;
+            MessageKind::Parameter { name, add: table.need("add")? }
         }
     };
     Ok(MessageSpec { satellites, on_s, off_s, kind })

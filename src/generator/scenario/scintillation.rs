@@ -6,9 +6,9 @@ use crate::generator::ripple::scintillation::Strength;
 
 pub(super) fn scintillation(table: &Table<'_>) -> Result<Strength, ScenarioError> {
     let strength = Strength {
-        s4: table.required("s4", 0.0..=1.0, "")?,
-        sigma_phi_rad: table.number("sigma_phi_rad", 0.0..=3.0, "rad")?,
-        decorrelation_s: table.required("decorrelation_s", 0.05..=30.0, "s")?,
+        s4: table.need("s4")?,
+        sigma_phi_rad: table.number("sigma_phi_rad")?,
+        decorrelation_s: table.need("decorrelation_s")?,
         satellites: satellite_list(table, "satellites")?,
     };
     let least_rad = strength.intrinsic_phase_rad();

@@ -56,20 +56,19 @@ pub struct Stages {
 
 pub(super) fn filter(table: &Table<'_>) -> Result<FilterSpec, ScenarioError> {
     let order = table.integer("order")?;
-    let butterworth = table.choice("kind", &[("brick_wall", false), ("butterworth", true)])?;
+    let butterworth = table.need_choice("kind", &[("brick_wall", false), ("butterworth", true)])?;
     let shape = match (butterworth, order) {
-        (Some(false), None) => Shape::BrickWall,
-        (Some(true), Some(order @ 1..=10)) => Shape::Butterworth { order: order as u32 },
-        (Some(true), _) => return Err(table.bad("order", "an integer from 1 to 10 for kind = \"butterworth\"")),
-        (Some(false), Some(_)) => return Err(table.bad("order", "no order for kind = \"brick_wall\"")),
-        (None, _) => return Err(table.bad("kind", "one of brick_wall, butterworth")),
+        (false, None) => Shape::BrickWall,
+        (true, Some(order)) => Shape::Butterworth { order: order as u32 },
+        (true, None) => return Err(table.bad("order", "an integer from 1 to 10 for kind = \"butterworth\"")),
+        (false, Some(_)) => return Err(table.bad("order", "no order for kind = \"brick_wall\"")),
     };
-    Ok(FilterSpec { shape, bandwidth_hz: table.required("bandwidth_hz", 1e5..=60e6, "Hz")? })
+    Ok(FilterSpec { shape, bandwidth_hz: table.need("bandwidth_hz")? })
 }
 
 pub(super) fn local_oscillator(table: &Table<'_>) -> Result<OscillatorSpec, ScenarioError> {
-    let rms = table.number("phase_noise_rad", 0.0..=3.0, "rad")?;
-    let bandwidth = table.number("phase_noise_bandwidth_hz", 1.0..=1e6, "Hz")?;
+    let rms = table.number("phase_noise_rad")?;
+    let bandwidth = table.number("phase_noise_bandwidth_hz")?;
     let noise = match (rms, bandwidth) {
         (None, None) => None,
         (Some(rms), Some(bandwidth)) => Some((rms, bandwidth)),
@@ -80,7 +79,7 @@ pub(super) fn local_oscillator(table: &Table<'_>) -> Result<OscillatorSpec, Scen
             return Err(table.bad("phase_noise_rad", "a number, because phase_noise_bandwidth_hz is given"));
         }
     };
-    Ok(OscillatorSpec { offset_hz: table.number("offset_hz", -1e6..=1e6, "Hz")?.unwrap_or(0.0), noise })
+    Ok(OscillatorSpec { offset_hz: table.need("offset_hz")?, noise })
 }
 
 pub(super) fn balance(table: &Table<'_>, format: Format) -> Result<Balance, ScenarioError> {
@@ -89,12 +88,12 @@ pub(super) fn balance(table: &Table<'_>, format: Format) -> Result<Balance, Scen
             return Err(table.bad(key, format!("nothing, because front_end.format = {format} has no Q")));
         }
     }
-    let gain_db = table.number("gain_db", -6.0..=6.0, "dB")?.unwrap_or(0.0);
+    let gain_db = table.need("gain_db")?;
     Ok(Balance {
         gain: libm::expm1(gain_db * std::f64::consts::LN_10 / 20.0),
-        phase_rad: table.number("phase_deg", -30.0..=30.0, "deg")?.unwrap_or(0.0).to_radians(),
-        dc_i_lsb: table.number("dc_i_lsb", -32_768.0..=32_767.0, "LSB")?.unwrap_or(0.0) as f32,
-        dc_q_lsb: table.number("dc_q_lsb", -32_768.0..=32_767.0, "LSB")?.unwrap_or(0.0) as f32,
+        phase_rad: table.need("phase_deg")?.to_radians(),
+        dc_i_lsb: table.need("dc_i_lsb")? as f32,
+        dc_q_lsb: table.need("dc_q_lsb")? as f32,
     })
 }
 
@@ -119,16 +118,16 @@ pub(super) fn converter(table: &Table<'_>, format: Format) -> Result<ConverterSp
     let bits = bits(table, "bits", format)?;
     Ok(ConverterSpec {
         bits,
-        step_sigma: table.number("step_sigma", 1e-4..=10.0, "")?.unwrap_or_else(|| Converter::best_step_sigma(bits)),
-        agc_window_s: table.number("agc_window_s", 1e-5..=0.1, "s")?,
+        step_sigma: table.number("step_sigma")?.unwrap_or_else(|| Converter::best_step_sigma(bits)),
+        agc_window_s: table.number("agc_window_s")?,
     })
 }
 
 pub(super) fn playback(table: &Table<'_>) -> Result<PlaybackSpec, ScenarioError> {
     Ok(PlaybackSpec {
         bits: bits(table, "bits", Format::Ci16Le)?,
-        load_sigma: table.number("load_sigma", 0.1..=100.0, "")?.unwrap_or(4.0),
-        attenuation_db: table.number("attenuation_db", 0.0..=100.0, "dB")?.unwrap_or(0.0),
+        load_sigma: table.need("load_sigma")?,
+        attenuation_db: table.need("attenuation_db")?,
     })
 }
 

@@ -7,11 +7,7 @@ use std::path::Path;
 use propagation::{IONEX, TEC, VIENNA};
 use satellite::FAULTS;
 
-use super::expect::INTERVAL_KEYS;
-use super::interference::DRAG_KEYS;
-use super::motion::{KEYS as MOTION_KEYS, POINT_KEYS};
-use super::multipath::KEYS as MULTIPATH_KEYS;
-use super::obstruction::KEYS as OBSTRUCTION_KEYS;
+use super::schema::{Absent, Value, tables_of};
 use super::*;
 use crate::generator::effect::multipath::Detour;
 use crate::generator::effect::transmit::Block;
@@ -124,7 +120,7 @@ fn absence_is_the_switch() {
     assert!(!scenario.noise && scenario.ionosphere.is_none() && scenario.troposphere.is_none());
     assert!(scenario.obstacles.is_empty());
     assert_eq!(scenario.receiver_clock, ClockSpec::default());
-    assert!(scenario.receiver.is_none() && scenario.navigation.is_none());
+    assert!(scenario.receiver.is_none() && scenario.navigation.is_empty());
 }
 
 /// A scene in which the line `line` stands in `table`.
@@ -144,29 +140,124 @@ fn with(table: &str, line: &str) -> String {
     }
 }
 
+/// Every table with names of its own, and these names.
+fn declared() -> Vec<(String, Vec<&'static str>)> {
+    let own = |keys: &[&'static schema::Key]| {
+        let mut names: Vec<&'static str> = keys.iter().map(|key| key.name).collect();
+        names.dedup();
+        names
+    };
+    let tables = tables_of(keys::SCENARIO, "", "").into_iter();
+    tables.map(|table| (table.path, own(&table.keys))).filter(|(_, names)| names != &["G01"]).collect()
+}
+
 #[test]
 fn every_mistyped_key_is_refused_at_its_place_with_the_right_one() {
-    let inner = [
-        ("motion.point", POINT_KEYS),
-        ("spoofer.drag", DRAG_KEYS),
-        ("obstruction", OBSTRUCTION_KEYS),
-        ("multipath", MULTIPATH_KEYS),
-        ("expect.interval", INTERVAL_KEYS),
-    ];
-    for (table, keys) in KEYS.iter().copied().chain(inner) {
+    for (table, keys) in declared() {
         for key in keys {
             let dropped = &key[..key.len() - 1];
             let doubled = format!("{}{}", &key[..2], &key[1..]);
             for typo in [dropped, doubled.as_str()] {
-                let text = with(table, &format!("{typo} = 1"));
+                let text = with(&table, &format!("{typo} = 1"));
                 let error = parse(&text).unwrap_err();
-                let ScenarioError::UnknownKey { place, nearest, .. } = &error else { panic!("{typo}: {error}") };
-                assert_eq!(nearest.as_deref(), Some(*key), "{typo}");
+                let unknown = error.each().iter().filter_map(|error| match error {
+                    ScenarioError::UnknownKey { place, nearest, .. } => Some((error, place, nearest)),
+                    _ => None,
+                });
+                let [(error, place, nearest)] = unknown.collect::<Vec<_>>()[..] else { panic!("{typo}: {error}") };
+                assert_eq!(nearest.as_deref(), Some(key), "{typo}");
                 let line = text.lines().nth(place.line - 1).unwrap();
                 assert!(line.starts_with(typo) && place.column == 1, "{typo}: {error}");
                 assert!(error.to_string().starts_with("scene.toml:"), "{error}");
             }
         }
+    }
+}
+
+#[test]
+fn every_declared_key_is_read_by_a_reader() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/generator/scenario");
+    let sources = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+    let sources: Vec<String> = sources
+        .filter(|path| path.extension().is_some_and(|e| e == "rs") && !path.ends_with("tests.rs"))
+        .map(|path| std::fs::read_to_string(path).unwrap())
+        .chain([std::fs::read_to_string(folder.with_extension("rs")).unwrap()])
+        .collect();
+    for (table, keys) in declared() {
+        for key in keys {
+            let word = format!("\"{key}\"");
+            assert!(sources.iter().any(|source| source.contains(&word)), "{table}.{key}");
+        }
+    }
+}
+
+#[test]
+fn an_empty_table_means_what_an_absent_one_means() {
+    let absent = parse(&format!("{MINIMAL}{STATIC}")).unwrap();
+    for table in ["navigation", "satellites", "front_end", "power", "receiver_clock", "fidelity", "truth"] {
+        let empty = parse(&format!("{MINIMAL}{STATIC}[{table}]\n")).unwrap();
+        assert_eq!(empty, absent, "{table}");
+    }
+    let weather = parse(&format!("{MINIMAL}{STATIC}[troposphere]\nmodel = \"saastamoinen\"\n")).unwrap().troposphere;
+    assert_eq!(weather.unwrap().weather, crate::generator::effect::troposphere::Weather::STANDARD);
+}
+
+#[test]
+fn a_declared_default_is_the_value_that_an_absent_key_gets() {
+    // Written out, every default of the tables that a scene may hold leaves the scene as it is.
+    let bases = [
+        ("satellites", STATIC.to_owned()),
+        ("front_end", STATIC.to_owned()),
+        ("receiver_clock", STATIC.to_owned()),
+        ("truth", STATIC.to_owned()),
+        ("local_oscillator", STATIC.to_owned()),
+        ("iq", STATIC.to_owned()),
+        ("motion", WAYPOINTS.to_owned()),
+        ("motion", FILE.to_owned()),
+        ("motion", ROCKET.to_owned()),
+        ("motion", ORBIT.to_owned()),
+    ];
+    for (table, motion) in bases {
+        let listed = tables_of(keys::SCENARIO, "", "").into_iter().find(|listed| listed.path == table).unwrap();
+        let kind = parse(&format!("{MINIMAL}{motion}")).unwrap().motion.kind();
+        for key in listed.keys.iter().filter(|key| table != "motion" || key.is_of(kind)) {
+            let Absent::Number(default) = key.absent else { continue };
+            let header = format!("[{table}]");
+            let text = if table == "motion" { motion.clone() } else { format!("{motion}{header}\n") };
+            let lines = text.lines().filter(|line| line.split('=').next().unwrap().trim() != key.name);
+            let absent = lines.collect::<Vec<_>>().join("\n");
+            if key.name == "turn_acceleration_mps2" || matches!(key.value, Value::Integer { .. }) {
+                continue;
+            }
+            let given = absent.replacen(&header, &format!("{header}\n{} = {default:e}", key.name), 1);
+            let parsed = |text: &str| parse(&format!("{MINIMAL}{text}\n")).unwrap();
+            assert_eq!(parsed(&given), parsed(&absent), "{table}.{}", key.name);
+        }
+    }
+}
+
+#[test]
+fn everything_that_is_wrong_is_said_at_once_in_the_order_of_the_text() {
+    let text = format!(
+        "{MINIMAL}seed = -1\n[motion]\nkind = \"static\"\nlatitude_deg = 126\nlongitude_deg = 80.2\nheigth_m = 1\n\
+         [front_end]\nsample_rate_hz = 4e6\nif_hz = 3e6\nformt = \"ci8\"\n[satellites]\nexclude = [\"X1\"]\n\
+         [[interference]]\nkind = \"pulse\"\njs_db = 1\nwidth_s = 1\nrate_hz = 100\n[[interference]]\nkind = \"cv\"\n"
+    );
+    let error = parse(&text).unwrap_err().to_string();
+    let lines: Vec<&str> = error.lines().collect();
+    let expected = [
+        "seed = -1",
+        "motion.latitude_deg = 126",
+        "unknown key 'motion.heigth_m': did you mean 'height_m'?",
+        "front_end.if_hz = 3e6",
+        "unknown key 'front_end.formt'",
+        "satellites.exclude",
+        "interference[1].width_s = 1",
+        "interference[2].kind = \"cv\"",
+    ];
+    assert_eq!(lines.len(), expected.len(), "{error}");
+    for (line, expected) in lines.iter().zip(expected) {
+        assert!(line.contains(expected), "{line}: {expected}");
     }
 }
 
@@ -202,11 +293,14 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
     let full = full() + HOSTILE + FAULTS;
     let fixed = "[power]\nkind = \"fixed\"\ncn0_dbhz = 45\n";
     let mut cases: Vec<(String, &str, &str)> = Vec::new();
-    for (table, keys) in KEYS.iter().filter(|(table, _)| *table != "motion") {
-        for key in *keys {
+    let tables = declared();
+    let keys_of = |table: &str| &tables.iter().find(|(path, _)| path == table).unwrap().1;
+    let inner = ["motion", "motion.point", "spoofer.drag", "obstruction", "multipath"];
+    for (table, keys) in tables.iter().filter(|(table, _)| !inner.contains(&table.as_str())) {
+        for key in keys {
             let header = format!("[{key}]");
             let is_table = table.is_empty() && (full.contains(&header) || *key == "receiver");
-            match (*table, *key) {
+            match (table.as_str(), *key) {
                 ("power", "cn0_dbhz") => cases.push((format!("{MINIMAL}{STATIC}{fixed}"), table, key)),
                 ("iq", "gain_db" | "phase_deg" | "dc_q_lsb") => {
                     let text = format!("{MINIMAL}{STATIC}[iq]\ngain_db = 1\nphase_deg = 2\ndc_q_lsb = 1\n");
@@ -234,23 +328,23 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
             }
         }
     }
-    for key in MOTION_KEYS {
+    for key in keys_of("motion") {
         let texts = [STATIC, WAYPOINTS, FILE, ROCKET, ORBIT, RADIUS];
         match texts.iter().find(|text| text.contains(&format!("\n{key} ="))) {
             Some(text) => cases.push((format!("{MINIMAL}{text}"), "motion", key)),
             None => assert_eq!(*key, "point"),
         }
     }
-    for key in DRAG_KEYS {
+    for key in keys_of("spoofer.drag") {
         cases.push((full.clone(), "spoofer.drag", key));
     }
-    for key in OBSTRUCTION_KEYS {
+    for key in keys_of("obstruction") {
         cases.push((full.clone(), "obstruction", key));
     }
-    for key in POINT_KEYS {
+    for key in keys_of("motion.point") {
         cases.push((format!("{MINIMAL}{WAYPOINTS}"), "motion.point", key));
     }
-    for key in MULTIPATH_KEYS {
+    for key in keys_of("multipath") {
         let own = ECHOES.split("[[").find(|echo| echo.contains(&format!("\n{key} ="))).unwrap();
         cases.push((format!("{MINIMAL}{STATIC}[[{own}"), "multipath", key));
     }
@@ -259,12 +353,14 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
         let wrong = if key == "start" { "[1979-05-27]" } else { "[1979-05-27, 1]" };
         let text = replaced(&text, table, key, wrong);
         let error = parse(&text).unwrap_err();
-        let ScenarioError::Value { key: named, expected, value, .. } = &error else {
+        let says = |error: &ScenarioError| match error {
+            ScenarioError::Value { key: named, expected, value, .. } => {
+                named.ends_with(key) && !expected.is_empty() && value.contains("1979")
+            }
             // `[receiver]` goes through the ordinary parser.
-            assert!(key == "receiver" && error.to_string().contains("receiver"), "{table}.{key}: {error}");
-            continue;
+            _ => key == "receiver" && error.to_string().contains("receiver"),
         };
-        assert!(named.ends_with(key) && !expected.is_empty() && value.contains("1979"), "{table}.{key}: {error}");
+        assert!(error.each().iter().any(says), "{table}.{key}: {error}");
     }
 }
 
@@ -329,9 +425,12 @@ fn numbers_outside_their_range_are_refused_with_range_and_unit() {
         for value in ["-1e308", "1e308", "nan", "inf", "-inf", "\"5 m\"", "true", "9223372036854775807", "''"] {
             let text = replaced(&(full() + HOSTILE + FAULTS), table, key, value);
             let error = parse(&text).unwrap_err();
-            let message = error.to_string();
-            assert!(matches!(error, ScenarioError::Value { .. }), "{message}");
-            assert!(message.contains(key) && message.contains(value) && message.contains(unit), "{message}");
+            let says = |error: &ScenarioError| {
+                let message = error.to_string();
+                let whole = message.contains(key) && message.contains(value) && message.contains(unit);
+                matches!(error, ScenarioError::Value { .. }) && whole
+            };
+            assert!(error.each().iter().any(says), "{error}");
         }
     }
     for (key, limits) in

@@ -2,8 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::receiver::described::described;
+
 use super::AcquireError;
 
+described! {
 /// Settings of the search. The defaults find 38 dB-Hz with a probability above 0.99 (see [`super`]).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -21,6 +24,7 @@ pub struct AcquisitionSettings {
     /// Probability that the search for one absent satellite, over all its cells, finds it in noise alone. The others' cross-
     /// correlations make the tail heavier, so the default leaves room: it costs 0.7 dB against 1e-3.
     pub false_alarm_probability: f64,
+}
 }
 
 impl Default for AcquisitionSettings {

@@ -16,6 +16,7 @@ use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::{Fix, IonosphereModel, Observation};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, Rate, SampleClock};
+use crate::receiver::described::described;
 use crate::receiver::track::loops::CodeShape;
 
 pub mod exclusion;
@@ -56,6 +57,7 @@ pub enum TroposphereChoice {
     None,
 }
 
+described! {
 /// Choices of the position solution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -68,15 +70,18 @@ pub struct PositionSettings {
     pub false_alarm: f64,
     /// Standard deviation of the models at the zenith, for weights; it grows with one over the elevation's sine.
     pub model_sigma_m: f64,
+    /// How the ionosphere is corrected.
     pub ionosphere: IonosphereChoice,
     /// Standard deviation of the broadcast ionosphere's error as a share of its delay, common to all satellites: about 0.5 under a
     /// real sky, of whose ionosphere the model removes half; 0 where satellites broadcast what is true, as in most scenes.
     pub ionosphere_error_share: f64,
+    /// How the troposphere is corrected.
     pub troposphere: TroposphereChoice,
     /// Whether there is no fix until the ionosphere's parameters are decoded.
     pub require_ionosphere: bool,
     /// Else the first fix waits for them this long, counted from the fourth ephemeris; 0 for a fix at once.
     pub ionosphere_wait_s: f64,
+}
 }
 
 impl Default for PositionSettings {

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::receiver::correlate::{Arithmetic, Edge};
+use crate::receiver::described::described;
 
 /// How the code error is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,15 +16,18 @@ pub enum CodeDiscriminator {
     DotProduct,
 }
 
+described! {
 /// Settings of every tracking channel. Bandwidths are one-sided noise bandwidths of the discrete loop, exact.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrackingSettings {
     /// Order of the carrier phase loop: 2 or 3. Order 3 follows a constant Doppler rate without error.
     pub pll_order: u32,
+    /// Bandwidth of the carrier phase loop.
     pub pll_bandwidth_hz: f64,
     /// Order of the frequency loop of the pull-in: 1 or 2.
     pub fll_order: u32,
+    /// Bandwidth of the frequency loop of the pull-in.
     pub fll_bandwidth_hz: f64,
     /// Bandwidth of the frequency loop while it assists the phase loop until that has locked; 0 for none.
     pub fll_assist_bandwidth_hz: f64,
@@ -31,15 +35,19 @@ pub struct TrackingSettings {
     pub fll_pull_in_s: f64,
     /// Order of the code loop: 1 or 2. It is always aided by the carrier.
     pub dll_order: u32,
+    /// Bandwidth of the code loop.
     pub dll_bandwidth_hz: f64,
     /// Bandwidth of the code loop during the first `dll_pull_in_s`.
     pub dll_pull_in_bandwidth_hz: f64,
+    /// How long the code loop pulls in.
     pub dll_pull_in_s: f64,
+    /// How the code error is measured.
     pub dll_discriminator: CodeDiscriminator,
     /// Distance from early to late.
     pub spacing_chips: f64,
     /// Code periods a loop update once symbols are known: a divisor of 20.
     pub integration: u32,
+    /// How the replica's chips fall on the samples.
     pub replica: Edge,
     /// What correlations are computed in.
     pub arithmetic: Arithmetic,
@@ -49,11 +57,13 @@ pub struct TrackingSettings {
     pub phase_unlock_threshold: f64,
     /// The signal is lost when the phase stays unlocked or C/N0 stays below `cn0_threshold_dbhz` so long.
     pub loss_s: f64,
+    /// C/N0 below which the signal is taken for lost.
     pub cn0_threshold_dbhz: f64,
     /// A channel that has not reached symbol lock after so long gives up.
     pub pull_in_limit_s: f64,
     /// Time constant of the C/N0 estimate.
     pub cn0_average_s: f64,
+}
 }
 
 impl Default for TrackingSettings {

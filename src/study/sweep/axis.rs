@@ -17,8 +17,6 @@ pub const MOST_CASES: u64 = 10_000_000;
 /// Most values of an axis.
 const MOST_VALUES: usize = 100_000;
 
-pub(super) const KEYS: &[&str] = &["key", "values", "from", "to", "step", "count", "spacing", "zip", "label"];
-
 /// One axis: a key of the base and the values that it takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
@@ -39,9 +37,8 @@ enum Spacing {
 
 impl Axis {
     pub(super) fn read(table: &Table<'_>) -> Result<Self, ScenarioError> {
-        table.allow(KEYS)?;
-        let expected = "a key of the base, like \"receiver.tracking.pll_bandwidth_hz\"";
-        let key = table.text("key", expected)?.ok_or_else(|| table.bad("key", expected))?.to_owned();
+        table.allow_own()?;
+        let key = table.need_text("key")?.to_owned();
         let values = match table.values("values")? {
             Some(values) => {
                 for other in ["from", "to", "step", "count", "spacing"] {
@@ -55,18 +52,12 @@ impl Axis {
         };
         let texts: std::collections::BTreeSet<String> = values.iter().map(text_of).collect();
         // Axes that step together may repeat a value where another one changes: the grid checks them as one.
-        let zip = table.text("zip", "a word that other axes share")?.map(str::to_owned);
+        let zip = table.text("zip")?.map(str::to_owned);
         if (texts.len() < values.len() && zip.is_none()) || values.len() > MOST_VALUES {
             let name = if table.has("values") { "values" } else { "from" };
             return Err(table.bad(name, format!("1 to {MOST_VALUES} values, each but once")));
         }
-        Ok(Self {
-            key,
-            values,
-            zip,
-            label: table.text("label", "words for the plots")?.map(str::to_owned),
-            place: table.place("key"),
-        })
+        Ok(Self { key, values, zip, label: table.text("label")?.map(str::to_owned), place: table.place("key") })
     }
 
     /// What plots and tables call it.
@@ -91,9 +82,9 @@ impl Axis {
 
 /// `from`, `to` and either `step` or `count`; both ends belong to it.
 fn range(table: &Table<'_>) -> Result<Vec<Value>, ScenarioError> {
-    let (from, to) = (table.required("from", -1e18..=1e18, "")?, table.required("to", -1e18..=1e18, "")?);
+    let (from, to) = (table.need("from")?, table.need("to")?);
     let spacing = table.choice("spacing", &[("linear", Spacing::Linear), ("log", Spacing::Log)])?;
-    let step = table.number("step", -1e18..=1e18, "")?;
+    let step = table.number("step")?;
     let count = table.integer("count")?;
     let numbers: Vec<f64> = match (step, count) {
         (Some(step), None) if spacing != Some(Spacing::Log) => {

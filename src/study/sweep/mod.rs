@@ -16,6 +16,7 @@ pub mod ensemble;
 pub mod estimate;
 pub mod export;
 pub mod fixes;
+pub mod keys;
 pub mod model;
 #[cfg(feature = "pdf")]
 mod paper;

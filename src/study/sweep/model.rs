@@ -4,6 +4,7 @@
 //! theory under `theory.`. Limits are those of [`crate::study::correlator`]: one satellite in steady tracking,
 //! constant C/N0, no multipath. Where the signal was lost, spreads have no value.
 
+use super::keys;
 use crate::analysis::theory::clock::PowerLaw;
 use crate::analysis::theory::{dll, fll, oscillator, pll};
 use crate::generator::ripple::oscillator::PowerLaw as Levels;
@@ -49,18 +50,17 @@ pub fn changes_signal(key: &str) -> bool {
 impl Model {
     /// Reads the tables that make a base; others are left alone.
     pub(super) fn read(root: &Table<'_>) -> Result<Self, ScenarioError> {
-        let open = |name: &str, keys: &[&str]| -> Result<Option<Table<'_>>, ScenarioError> {
+        let open = |name: &str| -> Result<Option<Table<'_>>, ScenarioError> {
             let table = root.table(name)?;
-            table.as_ref().map_or(Ok(()), |table| table.allow(keys))?;
+            table.as_ref().map_or(Ok(()), Table::allow_own)?;
             Ok(table)
         };
-        let signal = open("signal", &["name", "cn0_dbhz", "bandwidth_hz", "oscillator", "power_law"])?;
-        let motion = open("motion", &["doppler_hz", "acceleration_g", "jerk_g_per_s", "jerk_s"])?;
-        let closed = open("loop", &["mode", "detectors"])?;
-        let measure = open("measure", &["settle_s", "duration_s"])?;
-        let receiver = open("receiver", &["tracking"])?;
-        let number = |table: &Option<Table<'_>>, name: &str, range, unit| match table {
-            Some(table) => table.number(name, range, unit),
+        let (signal, motion) = (open("signal")?, open("motion")?);
+        let (closed, measure) = (open("loop")?, open("measure")?);
+        let receiver = root.table("receiver")?;
+        receiver.as_ref().map_or(Ok(()), |table| table.allow(&["tracking"]))?;
+        let number = |table: &Option<Table<'_>>, name: &str| match table {
+            Some(table) => table.number(name),
             None => Ok(None),
         };
         let names = SIGNALS.map(|signal| (signal.name, signal));
@@ -78,17 +78,17 @@ impl Model {
                 Some(table) => table.choice("name", &names)?.unwrap_or(&L1_CA),
                 None => &L1_CA,
             },
-            cn0_dbhz: number(&signal, "cn0_dbhz", 0.0..=80.0, "dB-Hz")?,
-            band_hz: number(&signal, "bandwidth_hz", 1e3..=1e9, "Hz")?,
+            cn0_dbhz: number(&signal, "cn0_dbhz")?,
+            band_hz: number(&signal, "bandwidth_hz")?,
             oscillator: signal.as_ref().map(law).transpose()?.flatten(),
-            doppler_hz: number(&motion, "doppler_hz", -1e6..=1e6, "Hz")?.unwrap_or(0.0),
-            acceleration_g: number(&motion, "acceleration_g", -1e4..=1e4, "g")?.unwrap_or(0.0),
-            jerk_g_per_s: number(&motion, "jerk_g_per_s", -1e5..=1e5, "g/s")?.unwrap_or(0.0),
-            jerk_s: number(&motion, "jerk_s", 1e-3..=1e6, "s")?.unwrap_or(f64::INFINITY),
+            doppler_hz: number(&motion, "doppler_hz")?.unwrap_or(0.0),
+            acceleration_g: number(&motion, "acceleration_g")?.unwrap_or(0.0),
+            jerk_g_per_s: number(&motion, "jerk_g_per_s")?.unwrap_or(0.0),
+            jerk_s: number(&motion, "jerk_s")?.unwrap_or(f64::INFINITY),
             mode: chosen(&closed, "mode", &modes)?.unwrap_or(Mode::Phase),
             watched: closed.as_ref().map(|table| table.flag("detectors")).transpose()?.flatten().unwrap_or(false),
-            settle_s: number(&measure, "settle_s", 0.0..=1e6, "s")?.unwrap_or(5.0),
-            duration_s: number(&measure, "duration_s", 0.1..=1e7, "s")?.unwrap_or(60.0),
+            settle_s: number(&measure, "settle_s")?.unwrap_or(5.0),
+            duration_s: number(&measure, "duration_s")?.unwrap_or(60.0),
             tracking: settings.tracking,
         })
     }
@@ -100,7 +100,7 @@ impl Model {
         let refuse =
             |e: toml::de::Error| ScenarioError::Toml { place: source.place(0), message: e.message().to_owned() };
         let document = toml::de::DeTable::parse(&text).map_err(refuse)?;
-        Self::read(&Table::new(&source, "", 0, document.get_ref()))
+        Self::read(&Table::new(&source, "", 0, document.get_ref(), keys::STUDY))
     }
 
     /// Time that a case simulates.
@@ -150,7 +150,7 @@ impl Model {
 /// The oscillator as a scene would write it; its phase noises are not modelled here.
 fn law(table: &Table<'_>) -> Result<Option<PowerLaw>, ScenarioError> {
     let preset = table.choice("oscillator", &Levels::PRESETS)?.map(|law| law.levels());
-    let given = table.numbers::<5>("power_law", 1e-12)?;
+    let given = table.numbers::<5>("power_law")?;
     let levels = match (preset, given) {
         (Some(_), Some(_)) => return Err(table.bad("power_law", "nothing beside oscillator, which names a power law")),
         (preset, given) => preset.or(given),

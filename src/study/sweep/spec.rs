@@ -9,7 +9,7 @@ use toml::Value;
 use toml::de::DeTable;
 
 use super::axis::{self, Axis, Grid};
-use super::{fixes, model, sampled};
+use super::{fixes, keys, model, sampled};
 use crate::generator::scenario::ScenarioError;
 use crate::generator::scenario::read::{Source, Table, nearest};
 use crate::receiver::settings::Settings;
@@ -87,27 +87,7 @@ pub enum PlotKind {
     Crossing { along: String, level: f64 },
 }
 
-const KEYS: &[&str] = &[
-    "name",
-    "title",
-    "about",
-    "level",
-    "seed",
-    "repetitions",
-    "scenario",
-    "signal",
-    "motion",
-    "loop",
-    "measure",
-    "receiver",
-    "axis",
-    "keep",
-    "ensemble",
-    "plot",
-];
 const BASE: [&str; 5] = ["signal", "motion", "loop", "measure", "receiver"];
-const PLOT_KEYS: &[&str] =
-    &["kind", "title", "x", "y", "z", "series", "panel", "along", "level", "log_x", "log_y", "where"];
 /// Largest text of a study.
 const MOST_BYTES: usize = 1 << 20;
 /// The key under which an axis names scenes.
@@ -126,11 +106,10 @@ impl Study {
         }
         let toml = |e: toml::de::Error| refuse(e.span().map_or(0, |span| span.start), e.message().to_owned());
         let document = DeTable::parse(text).map_err(toml)?;
-        let root = Table::new(&source, "", 0, document.get_ref());
-        root.allow(KEYS)?;
+        let root = Table::new(&source, "", 0, document.get_ref(), keys::STUDY);
+        root.allow_own()?;
         let levels = [("correlator", Level::Correlator), ("samples", Level::Samples)];
-        let level = root.choice("level", &levels)?;
-        let level = level.ok_or_else(|| root.bad("level", "\"correlator\" or \"samples\""))?;
+        let level = root.need_choice("level", &levels)?;
         let axes: Vec<Axis> =
             root.tables("axis")?.unwrap_or_default().iter().map(Axis::read).collect::<Result<_, _>>()?;
         unlike(&root, &axes)?;
@@ -139,10 +118,7 @@ impl Study {
             Ok(refused) => refused,
             Err(e) => toml(*e),
         })?;
-        let repetitions = root.integer("repetitions")?.unwrap_or(1);
-        if !(1..=1_000_000).contains(&repetitions) {
-            return Err(root.bad("repetitions", "1 to 1000000"));
-        }
+        let repetitions = root.need_integer("repetitions")?;
         let signal = |key: &str| match level {
             Level::Correlator => model::changes_signal(key),
             Level::Samples => sampled::changes_signal(key),
@@ -158,11 +134,11 @@ impl Study {
         let name = name(&root)?;
         Ok(Self {
             origin: origin.to_owned(),
-            title: root.text("title", "a title")?.map_or_else(|| name.clone(), str::to_owned),
-            about: root.text("about", "a text")?.unwrap_or_default().trim().to_owned(),
+            title: root.text("title")?.map_or_else(|| name.clone(), str::to_owned),
+            about: root.text("about")?.unwrap_or_default().trim().to_owned(),
             name,
             level,
-            seed: root.integer("seed")?.unwrap_or(1),
+            seed: root.need_integer("seed")?,
             axes,
             grid,
             base,
@@ -226,7 +202,7 @@ impl Study {
 
 fn name(root: &Table<'_>) -> Result<String, ScenarioError> {
     let expected = "1 to 64 letters, digits, '-' and '_' (it names a directory)";
-    let name = root.text("name", expected)?.ok_or_else(|| root.bad("name", expected))?;
+    let name = root.need_text("name")?;
     let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if name.len() <= 64 && name.chars().all(fits) { Ok(name.to_owned()) } else { Err(root.bad("name", expected)) }
 }
@@ -247,7 +223,7 @@ fn unlike(root: &Table<'_>, axes: &[Axis]) -> Result<(), ScenarioError> {
 }
 
 fn scenario(root: &Table<'_>, level: Level, axes: &[Axis]) -> Result<Option<PathBuf>, ScenarioError> {
-    let written = root.text(SCENARIO_KEY, "the path of a scene, relative to the study")?;
+    let written = root.text(SCENARIO_KEY)?;
     let axis = axes.iter().find(|axis| axis.key == SCENARIO_KEY);
     match (level, written, axis) {
         (Level::Correlator, None, None) => Ok(None),
@@ -332,14 +308,14 @@ enum Kind {
 }
 
 fn plot(table: &Table<'_>, axes: &[Axis], grid: &Grid, keep: &[String]) -> Result<Plot, ScenarioError> {
-    table.allow(PLOT_KEYS)?;
+    table.allow_own()?;
     let kinds = [("curve", Kind::Curve), ("heat", Kind::Heat), ("crossing", Kind::Crossing)];
     let kind = table.choice("kind", &kinds)?.unwrap_or(Kind::Curve);
     let keys: Vec<&str> = axes.iter().map(|axis| axis.key.as_str()).collect();
     let figures: Vec<&str> = keep.iter().map(String::as_str).collect();
     let one_of = |name: &str, known: &[&str]| -> Result<Option<String>, ScenarioError> {
         let expected = format!("one of {}", known.join(", "));
-        let Some(word) = table.text(name, &expected)? else { return Ok(None) };
+        let Some(word) = table.text(name)? else { return Ok(None) };
         let hint = nearest(word, known).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
         if known.contains(&word) { Ok(Some(word.to_owned())) } else { Err(table.bad(name, expected + &hint)) }
     };
@@ -351,7 +327,7 @@ fn plot(table: &Table<'_>, axes: &[Axis], grid: &Grid, keep: &[String]) -> Resul
         Kind::Curve => (PlotKind::Curve, needed("y", &figures)?),
         Kind::Heat => (PlotKind::Heat { y: needed("y", &keys)? }, needed("z", &figures)?),
         Kind::Crossing => {
-            let level = table.required("level", -1e18..=1e18, "")?;
+            let level = table.need("level")?;
             (PlotKind::Crossing { along: needed("along", &keys)?, level }, needed("z", &figures)?)
         }
     };
@@ -367,7 +343,7 @@ fn plot(table: &Table<'_>, axes: &[Axis], grid: &Grid, keep: &[String]) -> Resul
         }
     }
     let plot = Plot {
-        title: table.text("title", "a title")?.map_or_else(|| figure.clone(), str::to_owned),
+        title: table.text("title")?.map_or_else(|| figure.clone(), str::to_owned),
         kind,
         x,
         figure,

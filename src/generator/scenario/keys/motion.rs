@@ -1,0 +1,87 @@
+//! Keys of `[motion]` and `[attitude]`.
+
+use super::A_PATH;
+use crate::generator::scenario::schema::{Key, number, numbers, tables, text, word};
+
+const fn latitude() -> Key {
+    number("latitude_deg", -90.0, 90.0, "deg", "geodetic latitude, WGS 84")
+}
+
+const fn longitude() -> Key {
+    number("longitude_deg", -180.0, 360.0, "deg", "longitude, east positive")
+}
+
+const fn height() -> Key {
+    number("height_m", -12_000.0, 4e7, "m", "height above the ellipsoid")
+}
+
+/// A place that must be given.
+pub(crate) const PLACE: [Key; 3] = [latitude().required(), longitude().required(), height().required()];
+/// A place that may be absent as a whole.
+pub(crate) const PLACE_IF_ANY: [Key; 3] = [latitude(), longitude(), height()];
+
+const GROUND: &[&str] = &["static", "rocket"];
+const ROUTE: &[&str] = &["waypoints"];
+const FROM_FILE: &[&str] = &["file"];
+const ROCKET: &[&str] = &["rocket"];
+const ORBIT: &[&str] = &["orbit"];
+
+pub(crate) const MOTION: &[Key] = &[
+    word("kind", || vec!["static", "waypoints", "file", "rocket", "orbit"], "which motion").required(),
+    PLACE[0].of(GROUND),
+    PLACE[1].of(GROUND),
+    PLACE[2].of(GROUND),
+    tables("point", POINT, "A point of the route, two at least.").required().of(ROUTE),
+    number(
+        "turn_acceleration_mps2",
+        1e-3,
+        1e5,
+        "m/s2",
+        "acceleration across the path in turns; not beside turn_radius_m",
+    )
+    .or(2.0)
+    .of(ROUTE),
+    number("turn_radius_m", 0.1, 1e6, "m", "radius of turns").of(ROUTE),
+    number("acceleration_mps2", 1e-3, 1e5, "m/s2", "largest acceleration along the path").or(2.0).of(ROUTE),
+    number("jerk_mps3", 1e-3, 1e6, "m/s3", "largest jerk").or(2.0).of(ROUTE),
+    text("file", A_PATH, "a trajectory, CSV (`t_s` and a place a row) or NMEA GGA").required().of(FROM_FILE),
+    word("format", || vec!["csv", "nmea"], "of the file").or_else("by the file's name").of(FROM_FILE),
+    number("max_gap_s", 0.001, 3600.0, "s", "longest time between rows that is interpolated").or(2.0).of(FROM_FILE),
+    number("azimuth_deg", -360.0, 360.0, "deg", "direction of flight from north over east").required().of(ROCKET),
+    number("elevation_deg", 0.0, 90.0, "deg", "of the direction of thrust").required().of(ROCKET),
+    number("ignition_s", 0.0, 86_400.0, "s", "time of ignition").required().of(ROCKET),
+    number("thrust_mps2", 0.1, 1e5, "m/s2", "thrust for the mass").required().of(ROCKET),
+    number("burn_s", 0.001, 3600.0, "s", "how long it burns").required().of(ROCKET),
+    number("jerk_mps3", 0.1, 1e7, "m/s3", "growth of the thrust at ignition, and its fall at burn-out")
+        .required()
+        .of(ROCKET),
+    number("drag_m2pkg", 0.0, 1.0, "m2/kg", "drag coefficient times area for the mass").or(0.0).of(ROCKET),
+    word("gravity", || vec!["central", "j2"], "field of gravity").or_else("j2").of(ROCKET),
+    number("semi_major_axis_m", 6.4e6, 1e9, "m", "of the orbit").required().of(ORBIT),
+    number("eccentricity", 0.0, 0.99, "", "of the orbit").or(0.0).of(ORBIT),
+    number("inclination_deg", 0.0, 180.0, "deg", "against the equator").required().of(ORBIT),
+    number("node_longitude_deg", -360.0, 360.0, "deg", "longitude of the ascending node at the scene's start")
+        .or(0.0)
+        .of(ORBIT),
+    number("argument_of_perigee_deg", -360.0, 360.0, "deg", "of the orbit").or(0.0).of(ORBIT),
+    number("mean_anomaly_deg", -360.0, 360.0, "deg", "at the scene's start").or(0.0).of(ORBIT),
+];
+
+pub(crate) const POINT: &[Key] = &[
+    PLACE[0],
+    PLACE[1],
+    PLACE[2],
+    number("speed_mps", 0.0, 1e5, "m/s", "speed there; 0 stops").required(),
+    number("hold_s", 0.0, 86_400.0, "s", "how long it stays; only where speed_mps = 0").or(0.0),
+];
+
+pub(crate) const ATTITUDE: &[Key] = &[
+    word("kind", || vec!["fixed", "velocity"], "fixed against north, or nose along the velocity").required(),
+    number("yaw_deg", -360.0, 360.0, "deg", "heading, or turn against the velocity").or(0.0),
+    number("pitch_deg", -90.0, 90.0, "deg", "nose up").or(0.0),
+    number("roll_deg", -360.0, 360.0, "deg", "right side down; only with kind = \"fixed\"").or(0.0),
+    number("spin_hz", -1000.0, 1000.0, "Hz", "turns a second about the nose").or(0.0),
+    numbers("lever_arm_m", 3, (-1e3, 1e3), "m", "antenna from the moved point: forward, right, down")
+        .or_else("[0, 0, 0]"),
+    numbers("boresight", 3, (-1e3, 1e3), "", "where the antenna looks: forward, right, down").or_else("[0, 0, -1]"),
+];

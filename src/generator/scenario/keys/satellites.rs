@@ -1,0 +1,109 @@
+//! Keys of `[orbits]`, `[[satellite_fault]]`, `[[message_fault]]` and `[power]`.
+
+use super::{A_PATH, LONGEST_S, SATELLITES};
+use crate::generator::effect::transmit::Block;
+use crate::generator::ripple::oscillator::PowerLaw;
+use crate::generator::scenario::schema::{Key, by_satellite, integer, number, numbers, text, texts, word, words};
+use crate::gnss::gps::lnav;
+
+const OFFSET: Key = number("G01", -5.0, 5.0, "m", "of one satellite, by its name");
+const CN0: Key = number("G01", 0.0, 100.0, "dB-Hz", "C/N0 of one satellite, by its name");
+const BLOCK: Key = word("G01", blocks, "block of one satellite, by its name");
+
+pub(crate) const ORBITS: &[Key] = &[
+    texts("sp3", "the path of an SP3 file, or an array of such paths", "precise orbits and clocks over the scene")
+        .required(),
+    number("antenna_offset_m", -5.0, 5.0, "m", "antennas below the centre of mass, towards the Earth").or(0.0),
+    by_satellite("antenna_offsets_m", &OFFSET, "Antenna offsets by satellite."),
+];
+
+const fn on() -> Key {
+    number("on_s", 0.0, LONGEST_S, "s", "true time since the scene's start at which it begins").or(0.0)
+}
+
+const fn off() -> Key {
+    number("off_s", 0.0, LONGEST_S, "s", "when it ends").or_else("never")
+}
+
+const CLOCK: &[&str] = &["clock_step", "clock_ramp"];
+const ORBIT: &[&str] = &["orbit"];
+
+pub(crate) const SATELLITE_FAULT: &[Key] = &[
+    word("kind", || vec!["clock_step", "clock_ramp", "clock_noise", "orbit"], "what goes wrong").required(),
+    words("satellites", SATELLITES, "which satellites").required().of(&["clock_step", "clock_ramp", "orbit"]),
+    words("satellites", SATELLITES, "which satellites").or_else("all").of(&["clock_noise"]),
+    on().of(CLOCK),
+    off().of(CLOCK),
+    number("on_s", 0.0, LONGEST_S, "s", "when the offset begins to grow; with ramp_s")
+        .or_else("there from the beginning")
+        .of(ORBIT),
+    number("step_s", -1e-3, 1e-3, "s", "by which the clock is off").required().of(&["clock_step"]),
+    number("drift_sps", -1e-6, 1e-6, "s/s", "by which the clock drifts").required().of(&["clock_ramp"]),
+    word("oscillator", presets, "noise of the clock, by name").of(&["clock_noise"]),
+    numbers("power_law", 5, (-1e-12, 1e-12), "", "noise of the clock: h2, h1, h0, h-1, h-2").of(&["clock_noise"]),
+    number("radial_m", -1e5, 1e5, "m", "true orbit off the broadcast one, outwards").or(0.0).of(ORBIT),
+    number("along_m", -1e5, 1e5, "m", "along the motion").or(0.0).of(ORBIT),
+    number("cross_m", -1e5, 1e5, "m", "across it").or(0.0).of(ORBIT),
+    number("ramp_s", 1.0, 1e6, "s", "how long the offset takes to grow; with on_s")
+        .or_else("there from the beginning")
+        .of(ORBIT),
+];
+
+/// Parameters that a fault cannot change: sets are distinguished by them.
+const FIXED_PARAMETERS: [&str; 4] = ["week", "iodc", "iode", "health"];
+
+/// The parameters of subframes 1 to 3 that a fault can change.
+pub(crate) fn parameters() -> Vec<&'static str> {
+    let tables = lnav::tables();
+    let ephemeris = tables.iter().filter(|(name, _)| name.starts_with("subframe "));
+    let names = ephemeris.flat_map(|(_, fields)| fields.iter().map(|field| field.name));
+    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
+}
+
+fn presets() -> Vec<&'static str> {
+    PowerLaw::PRESETS.map(|(name, _)| name).to_vec()
+}
+
+pub(crate) const MESSAGE_FAULT: &[Key] = &[
+    word("kind", || vec!["bit_errors", "bit", "health", "parameter"], "what goes wrong").required(),
+    words("satellites", SATELLITES, "which satellites").or_else("all").of(&["bit_errors", "bit"]),
+    words("satellites", SATELLITES, "which satellites").required().of(&["health", "parameter"]),
+    on(),
+    off(),
+    number("rate", 0.0, 0.5, "(a probability)", "probability of each bit to be wrong").required().of(&["bit_errors"]),
+    integer("subframe", 1, 5, "number of the subframe").required().of(&["bit"]),
+    integer("word", 1, 10, "word in it").required().of(&["bit"]),
+    integer("bit", 1, 30, "bit of the word that is flipped").required().of(&["bit"]),
+    integer("health", 0, 63, "the six bits of health").required().of(&["health"]),
+    word("parameter", parameters, "which parameter is wrong").required().of(&["parameter"]),
+    number("add", -1e6, 1e6, "in the parameter's unit", "by how much").required().of(&["parameter"]),
+];
+
+const FIXED: &[&str] = &["fixed"];
+const BUDGET: &[&str] = &["link_budget"];
+
+pub(crate) const POWER: &[Key] = &[
+    word("kind", || vec!["fixed", "link_budget"], "the same for all, or by range, elevation and antennas")
+        .or_else("fixed if cn0_dbhz is there, else link_budget"),
+    number("cn0_dbhz", 0.0, 100.0, "dB-Hz", "of all satellites").required().of(FIXED),
+    by_satellite("satellites", &CN0, "C/N0 by satellite, with kind = \"fixed\".").of(FIXED),
+    word("transmit", transmits, "antennas of the satellites: a block's for all, or of those that flew then")
+        .or_else("typical")
+        .of(BUDGET),
+    number("transmit_dbw", -10.0, 40.0, "dBW", "power into the satellites' antennas").or(14.3).of(BUDGET),
+    by_satellite("blocks", &BLOCK, "Blocks by satellite, with kind = \"link_budget\".").of(BUDGET),
+    word("antenna", || vec!["isotropic", "patch", "turnstile", "table"], "the receiving antenna")
+        .or_else("patch")
+        .of(BUDGET),
+    text("antenna_file", A_PATH, "gain and phase by direction, for antenna = \"table\"").of(BUDGET),
+    number("noise_figure_db", 0.0, 30.0, "dB", "of the receiver").or(2.5).of(BUDGET),
+    number("loss_db", -20.0, 60.0, "dB", "any loss besides").or(0.0).of(BUDGET),
+];
+
+fn blocks() -> Vec<&'static str> {
+    Block::NAMES.map(|(name, _)| name).to_vec()
+}
+
+fn transmits() -> Vec<&'static str> {
+    [blocks(), vec!["constellation"]].concat()
+}

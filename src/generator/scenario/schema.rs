@@ -1,0 +1,311 @@
+//! Keys as data: name, type, range, unit, default and meaning, in one place for the readers, their refusals and the
+//! reference.
+//!
+//! A table is a list of [`Key`]s; tables in tables make a tree. [`super::read::Table`] reads a value by its key's
+//! declaration alone, so that no range and no default is written twice. Of a table with kinds (`kind`, or `model`) a key
+//! may belong to some of them.
+
+use std::fmt::Write as _;
+
+/// What a key's value may be.
+#[derive(Clone, Copy, Debug)]
+pub enum Value {
+    Number {
+        least: f64,
+        most: f64,
+        unit: &'static str,
+    },
+    /// An array of so many numbers.
+    Numbers {
+        count: usize,
+        least: f64,
+        most: f64,
+        unit: &'static str,
+    },
+    /// An array of any number of numbers.
+    List {
+        least: f64,
+        most: f64,
+        unit: &'static str,
+    },
+    Integer {
+        least: u64,
+        most: u64,
+    },
+    Flag,
+    /// A text; how to describe it.
+    Text(&'static str),
+    /// A time: TOML's own, or a text.
+    Time,
+    /// One word of a list.
+    Word(fn() -> Vec<&'static str>),
+    /// An array of texts; how to describe it.
+    Words(&'static str),
+    /// A text or an array of texts; how to describe it.
+    Texts(&'static str),
+    /// An array of plain values.
+    Values,
+    /// A table whose keys are satellites, and their values.
+    BySatellite(&'static Key),
+    Table(&'static [Key]),
+    /// An array of tables, `[[…]]`.
+    Tables(&'static [Key]),
+    /// A table that another part of the program reads; where its keys are found.
+    Foreign(&'static str),
+}
+
+/// What holds if a key is absent.
+#[derive(Clone, Copy, Debug)]
+pub enum Absent {
+    Required,
+    /// Nothing of the kind.
+    Optional,
+    Number(f64),
+    /// Something else, in words.
+    Means(&'static str),
+}
+
+/// One key of a table.
+#[derive(Clone, Copy, Debug)]
+pub struct Key {
+    pub name: &'static str,
+    pub value: Value,
+    pub absent: Absent,
+    /// Kinds of the table that know it; empty for all.
+    pub kinds: &'static [&'static str],
+    pub meaning: &'static str,
+}
+
+const fn key(name: &'static str, value: Value, meaning: &'static str) -> Key {
+    Key { name, value, absent: Absent::Optional, kinds: &[], meaning }
+}
+
+pub(crate) const fn number(
+    name: &'static str,
+    least: f64,
+    most: f64,
+    unit: &'static str,
+    meaning: &'static str,
+) -> Key {
+    key(name, Value::Number { least, most, unit }, meaning)
+}
+
+pub(crate) const fn numbers(
+    name: &'static str,
+    count: usize,
+    (least, most): (f64, f64),
+    unit: &'static str,
+    meaning: &'static str,
+) -> Key {
+    key(name, Value::Numbers { count, least, most, unit }, meaning)
+}
+
+pub(crate) const fn list(name: &'static str, least: f64, most: f64, unit: &'static str, meaning: &'static str) -> Key {
+    key(name, Value::List { least, most, unit }, meaning)
+}
+
+pub(crate) const fn integer(name: &'static str, least: u64, most: u64, meaning: &'static str) -> Key {
+    key(name, Value::Integer { least, most }, meaning)
+}
+
+pub(crate) const fn flag(name: &'static str, meaning: &'static str) -> Key {
+    key(name, Value::Flag, meaning)
+}
+
+pub(crate) const fn text(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
+    key(name, Value::Text(expected), meaning)
+}
+
+pub(crate) const fn time(name: &'static str, meaning: &'static str) -> Key {
+    key(name, Value::Time, meaning)
+}
+
+pub(crate) const fn word(name: &'static str, words: fn() -> Vec<&'static str>, meaning: &'static str) -> Key {
+    key(name, Value::Word(words), meaning)
+}
+
+pub(crate) const fn words(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
+    key(name, Value::Words(expected), meaning)
+}
+
+pub(crate) const fn texts(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
+    key(name, Value::Texts(expected), meaning)
+}
+
+#[cfg(feature = "study")]
+pub(crate) const fn values(name: &'static str, meaning: &'static str) -> Key {
+    key(name, Value::Values, meaning)
+}
+
+pub(crate) const fn by_satellite(name: &'static str, each: &'static Key, meaning: &'static str) -> Key {
+    key(name, Value::BySatellite(each), meaning)
+}
+
+pub(crate) const fn table(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
+    key(name, Value::Table(keys), meaning)
+}
+
+pub(crate) const fn tables(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
+    key(name, Value::Tables(keys), meaning)
+}
+
+pub(crate) const fn foreign(name: &'static str, found: &'static str, meaning: &'static str) -> Key {
+    key(name, Value::Foreign(found), meaning)
+}
+
+impl Key {
+    pub(crate) const fn required(self) -> Self {
+        Self { absent: Absent::Required, ..self }
+    }
+
+    /// The number that holds if the key is absent.
+    pub(crate) const fn or(self, number: f64) -> Self {
+        Self { absent: Absent::Number(number), ..self }
+    }
+
+    /// What holds if the key is absent, in words.
+    pub(crate) const fn or_else(self, words: &'static str) -> Self {
+        Self { absent: Absent::Means(words), ..self }
+    }
+
+    pub(crate) const fn of(self, kinds: &'static [&'static str]) -> Self {
+        Self { kinds, ..self }
+    }
+
+    /// Whether a table of this kind knows it.
+    pub fn is_of(&self, kind: &str) -> bool {
+        self.kinds.is_empty() || self.kinds.contains(&kind)
+    }
+
+    /// What the value is expected to be, for refusals and the reference.
+    pub fn expected(&self) -> String {
+        let with = |unit: &str| if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        match self.value {
+            Value::Number { least, most, unit } => {
+                format!("a number from {} to {}{}", short(least), short(most), with(unit))
+            }
+            Value::Numbers { count, least, most, unit } => {
+                format!("an array of {count} numbers from {} to {}{}", short(least), short(most), with(unit))
+            }
+            Value::List { least, most, unit } => {
+                format!("an array of numbers from {} to {}{}", short(least), short(most), with(unit))
+            }
+            Value::Integer { least, most } => format!("an integer from {least} to {most}"),
+            Value::Flag => "true or false".to_owned(),
+            Value::Text(expected) | Value::Words(expected) | Value::Texts(expected) => expected.to_owned(),
+            Value::Time => "GPS time like \"2010-07-01T08:12:30\"".to_owned(),
+            Value::Word(words) => format!("one of {}", words().join(", ")),
+            Value::Values => "an array of at least one number, text or truth value".to_owned(),
+            Value::Table(keys) => {
+                let kinds = keys.iter().find_map(|key| match key.value {
+                    Value::Word(words) if matches!(key.absent, Absent::Required) => Some((key.name, words())),
+                    _ => None,
+                });
+                match kinds.as_ref().and_then(|(name, words)| words.first().map(|word| (name, word))) {
+                    Some((name, word)) => format!("a table with {name} = {word:?}, …"),
+                    None => "a table".to_owned(),
+                }
+            }
+            Value::BySatellite(_) | Value::Foreign(_) => "a table".to_owned(),
+            Value::Tables(_) => "an array of tables".to_owned(),
+        }
+    }
+
+    /// What holds if it is absent, for the reference.
+    pub fn default_text(&self) -> String {
+        match self.absent {
+            Absent::Required => "required".to_owned(),
+            Absent::Optional => match self.value {
+                Value::Flag => "false".to_owned(),
+                _ => "none".to_owned(),
+            },
+            Absent::Number(number) => short(number),
+            Absent::Means(words) => words.to_owned(),
+        }
+    }
+}
+
+/// A number without a tail of zeros.
+pub fn short(number: f64) -> String {
+    let size = number.abs();
+    if size != 0.0 && !(1e-3..1e6).contains(&size) { format!("{number:e}") } else { format!("{number}") }
+}
+
+/// One table of the reference, without the tables in it.
+#[derive(Clone, Debug)]
+pub struct Listed {
+    /// As a file writes it: `[front_end]`, `[[interference]]`; empty at the top.
+    pub heading: String,
+    /// Its full name: `front_end`.
+    pub path: String,
+    pub meaning: String,
+    pub keys: Vec<&'static Key>,
+}
+
+/// A tree of tables, the top first, each table once.
+pub fn tables_of(top: &'static [Key], above: &str, meaning: &str) -> Vec<Listed> {
+    let mut found = Vec::new();
+    walk(&mut found, top, (above, false), meaning);
+    found
+}
+
+fn walk(found: &mut Vec<Listed>, keys: &'static [Key], (path, many): (&str, bool), meaning: &str) {
+    let heading = match (path, many) {
+        ("", _) => String::new(),
+        (path, true) => format!("[[{path}]]"),
+        (path, false) => format!("[{path}]"),
+    };
+    found.push(Listed { heading, path: path.to_owned(), meaning: meaning.to_owned(), keys: keys.iter().collect() });
+    for key in keys {
+        let below = if path.is_empty() { key.name.to_owned() } else { format!("{path}.{}", key.name) };
+        match key.value {
+            Value::Table(inner) if !found.iter().any(|listed| same(&listed.keys, inner)) => {
+                walk(found, inner, (&below, false), key.meaning);
+            }
+            Value::Tables(inner) => walk(found, inner, (&below, true), key.meaning),
+            Value::BySatellite(each) => found.push(Listed {
+                heading: format!("[{below}]"),
+                path: below,
+                meaning: key.meaning.to_owned(),
+                keys: vec![each],
+            }),
+            _ => {}
+        }
+    }
+}
+
+/// Whether a table with keys is the one that is listed: `[spoofer.motion]` is `[motion]` again.
+fn same(listed: &[&'static Key], keys: &'static [Key]) -> bool {
+    !keys.is_empty() && listed.len() == keys.len() && listed.iter().zip(keys).all(|(a, b)| a.name == b.name)
+}
+
+impl Listed {
+    /// The table as Markdown, its heading one of `level` signs.
+    pub fn markdown(&self, level: usize) -> String {
+        let mut out = String::new();
+        if !self.heading.is_empty() {
+            let _ = write!(out, "{} `{}`\n\n", "#".repeat(level), self.heading);
+        }
+        if !self.meaning.is_empty() {
+            let _ = write!(out, "{}\n\n", self.meaning);
+        }
+        if self.keys.is_empty() {
+            out += "No keys: the table's presence is the switch.\n\n";
+            return out;
+        }
+        let kinds = self.keys.iter().any(|key| !key.kinds.is_empty());
+        out += if kinds {
+            "| key | of | value | if absent | meaning |\n| --- | --- | --- | --- | --- |\n"
+        } else {
+            "| key | value | if absent | meaning |\n| --- | --- | --- | --- |\n"
+        };
+        for key in &self.keys {
+            let of = if key.kinds.is_empty() { "all".to_owned() } else { key.kinds.join(", ") };
+            let of = if kinds { format!(" {of} |") } else { String::new() };
+            let (value, absent) = (key.expected(), key.default_text());
+            let _ = writeln!(out, "| `{}` |{of} {value} | {absent} | {} |", key.name, key.meaning);
+        }
+        out.push('\n');
+        out
+    }
+}

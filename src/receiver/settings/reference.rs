@@ -1,0 +1,64 @@
+//! The receiver's keys with default, range and meaning, from the settings themselves.
+//!
+//! Defaults are those of [`Settings::default`], meanings the doc comments of the fields, and a range is what the validation
+//! says when a value that no key can have is refused.
+
+use toml::{Table, Value};
+
+use super::{OperationSettings, Settings};
+use crate::receiver::acquire::AcquisitionSettings;
+use crate::receiver::position::PositionSettings;
+use crate::receiver::track::TrackingSettings;
+
+/// One key of the receiver's settings.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Described {
+    pub name: String,
+    pub default: String,
+    /// What a value is expected to be.
+    pub expected: String,
+    pub meaning: String,
+}
+
+/// Every table of the settings with its keys.
+pub fn tables() -> Vec<(String, Vec<Described>)> {
+    let meanings = [
+        ("acquisition", AcquisitionSettings::MEANINGS),
+        ("tracking", TrackingSettings::MEANINGS),
+        ("position", PositionSettings::MEANINGS),
+        ("operation", OperationSettings::MEANINGS),
+    ];
+    // A structure of numbers, words and truth values is a table.
+    let defaults = Table::try_from(Settings::default()).unwrap_or_default();
+    let described = |section: &str, name: &str, default: &Value| {
+        let meaning = meanings.iter().find(|(table, _)| *table == section).and_then(|(_, keys)| {
+            keys.iter().find(|(key, _)| *key == name).map(|(_, lines)| lines.iter().map(|line| line.trim()))
+        });
+        Described {
+            name: name.to_owned(),
+            default: default.to_string(),
+            expected: expected(section, name, default),
+            meaning: meaning.map(|lines| lines.collect::<Vec<_>>().join(" ")).unwrap_or_default(),
+        }
+    };
+    let of = |(section, keys): (&String, &Value)| {
+        let keys = keys.as_table().into_iter().flatten();
+        (section.clone(), keys.map(|(name, default)| described(section, name, default)).collect())
+    };
+    defaults.iter().map(of).collect()
+}
+
+/// What is expected of a key, by what its refusal says.
+fn expected(section: &str, name: &str, default: &Value) -> String {
+    // What no key can be.
+    let bad = match default {
+        Value::Float(_) => "nan",
+        Value::Integer(_) => "4294967295",
+        Value::Boolean(_) => return "true or false".to_owned(),
+        Value::Array(_) => return "an array".to_owned(),
+        _ => "'?'",
+    };
+    let refused = Settings::parse(&format!("[{section}]\n{name} = {bad}"), "").err().map(|error| error.to_string());
+    let tail = refused.and_then(|text| text.split_once("expected ").map(|(_, tail)| tail.trim().to_owned()));
+    tail.unwrap_or_else(|| default.type_str().to_owned())
+}
