@@ -41,6 +41,14 @@ struct Timeline {
     spans: Vec<Span>,
 }
 
+/// A time in which a satellite has nothing to send: from the end of one set's fit interval to the first sending of the next
+/// one. Open where no set comes before or after.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Silence {
+    pub from: Option<Epoch>,
+    pub until: Option<Epoch>,
+}
+
 /// The broadcast sets of every satellite, arranged by when they are sent, and what is true besides.
 #[derive(Clone, Debug)]
 pub struct Catalogue {
@@ -107,6 +115,27 @@ impl Catalogue {
         let count = timeline.spans.partition_point(|span| span.from <= at);
         let span = timeline.spans.get(count.checked_sub(1)?)?;
         timeline.sets.get(span.set?)
+    }
+
+    /// When `sv` has nothing to send, as far as it concerns `from..=to`, in order of time.
+    pub fn silences(&self, sv: Sv, from: Epoch, to: Epoch) -> Vec<Silence> {
+        let Some(timeline) = self.satellites.get(&sv) else { return vec![Silence { from: None, until: None }] };
+        let before = Silence { from: None, until: timeline.spans.first().map(|span| span.from) };
+        let gaps = timeline.spans.iter().enumerate().filter(|(_, span)| span.set.is_none());
+        let gaps = gaps.map(|(index, span)| Silence {
+            from: Some(span.from),
+            until: timeline.spans.get(index + 1).map(|next| next.from),
+        });
+        let concerns = |silence: &Silence| {
+            silence.from.is_none_or(|begin| begin <= to) && silence.until.is_none_or(|end| end > from)
+        };
+        std::iter::once(before).chain(gaps).filter(concerns).collect()
+    }
+
+    /// The set of `sv` whose reference time is nearest to `at`.
+    pub fn nearest_set(&self, sv: Sv, at: Epoch) -> Option<&Ephemeris> {
+        let sets = &self.satellites.get(&sv)?.sets;
+        sets.iter().min_by(|a, b| a.toe.since(at).abs().total_cmp(&b.toe.since(at).abs()))
     }
 
     /// Whether `sv` sends a set at `at` that says it is healthy.

@@ -13,6 +13,7 @@ pub mod knots;
 pub mod message;
 pub mod plan;
 pub mod precise;
+pub mod presence;
 pub mod random;
 pub mod ray;
 pub mod ripple;

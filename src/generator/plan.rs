@@ -5,14 +5,17 @@
 
 use std::fmt;
 
+use crate::generator::catalogue::Silence;
 use crate::generator::fidelity::{self, Choice};
+use crate::generator::presence::{Presence, presence};
 use crate::generator::ray::Ray;
 use crate::generator::scene::{CodeEdge, SPACE_M, Scene, is_outside};
-use crate::generator::sky::emission;
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::earth::Geodetic;
+use crate::gnss::record::PassEnd;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::SIGNALS;
+use crate::gnss::time::Epoch;
 
 /// Instants between start and end at which the sky is looked at.
 const INSTANTS: u32 = 240;
@@ -39,10 +42,11 @@ pub struct InView {
     pub elevation_deg: f64,
     /// Of the first signal; `None` when nothing in the scene says how strong it is.
     pub cn0_dbhz: Option<f64>,
-    /// Time since the start when it rises above the mask, if not in view from the beginning …
-    pub rises_s: Option<f64>,
-    /// … and when it sets, if not in view to the end; both to the step of the search.
-    pub sets_s: Option<f64>,
+    /// Time since the start when it comes into view, if not in view from the beginning, and by what …
+    pub appears: Option<(f64, PassEnd)>,
+    /// … and when it leaves, if not in view to the end. To the step of the search, but exact where an ephemeris begins or
+    /// ends.
+    pub leaves: Option<(f64, PassEnd)>,
 }
 
 /// A thing that the scene has, or has not.
@@ -123,14 +127,16 @@ impl Plan {
 fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
     let mut rows = Vec::new();
     for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
-        let mut row: Option<InView> = None;
+        let (mut row, mut absent): (Option<InView>, Option<PassEnd>) = (None, None);
         for k in 0..=INSTANTS {
             let t_s = duration_s * f64::from(k) / f64::from(INSTANTS);
             let received = scene.clock.start.plus_s(t_s);
             let motion = scene.trajectory.at(t_s);
-            let found = emission(&scene.catalogue, sv, received, &motion)?.map(|e| e.sight);
-            match (found.filter(|sight| scene.sees(sight)), &mut row) {
-                (Some(sight), None) => {
+            let presence = presence(scene, sv, received, &motion)?;
+            let end = presence.end();
+            match (presence, &mut row) {
+                (Presence::InView(emission), None) => {
+                    let sight = &emission.sight;
                     row = Some(InView {
                         sv,
                         azimuth_deg: sight.look.azimuth_rad.to_degrees(),
@@ -138,23 +144,35 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
                         cn0_dbhz: scene.signals.first().and_then(|signal| {
                             let mut rays =
                                 vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
-                            scene.effects.iter().for_each(|effect| effect.act(&sight, signal, &mut rays));
+                            scene.effects.iter().for_each(|effect| effect.act(sight, signal, &mut rays));
                             rays.first().filter(|ray| ray.cn0_hz > 0.0).map(|ray| 10.0 * libm::log10(ray.cn0_hz))
                         }),
-                        rises_s: (k > 0).then_some(t_s),
-                        sets_s: None,
+                        appears: absent.map(|by| (change_s(scene, sv, t_s, by, |silence| silence.until), by)),
+                        leaves: None,
                     });
                 }
-                (None, Some(row)) if row.sets_s.is_none() => row.sets_s = Some(t_s),
-                // It rose again (a vehicle that goes round the Earth): in view to the end, as far as this table tells.
-                (Some(_), Some(row)) => row.sets_s = None,
+                // It came back (a vehicle that goes round the Earth): in view to the end, as far as this table tells.
+                (Presence::InView(_), Some(row)) => row.leaves = None,
+                (_, Some(row)) if row.leaves.is_none() => {
+                    row.leaves = end.map(|by| (change_s(scene, sv, t_s, by, |silence| silence.from), by));
+                }
                 _ => {}
             }
+            absent = end;
         }
         rows.extend(row);
     }
     rows.sort_by(|a, b| b.elevation_deg.total_cmp(&a.elevation_deg).then(a.sv.cmp(&b.sv)));
     Ok(rows)
+}
+
+/// When a satellite came or went by the step at `t_s`; where an ephemeris did it, the instant that `edge` takes of its absence.
+fn change_s(scene: &Scene, sv: Sv, t_s: f64, by: PassEnd, edge: impl Fn(&Silence) -> Option<Epoch>) -> f64 {
+    let start = scene.clock.start;
+    let silences = scene.catalogue.silences(sv, start, start.plus_s(t_s));
+    let edges = silences.iter().filter_map(edge).map(|at| at.since(start)).filter(|edge_s| *edge_s <= t_s);
+    let exact_s = edges.fold(None, |latest: Option<f64>, edge_s| Some(latest.map_or(edge_s, |l| l.max(edge_s))));
+    if by == PassEnd::Ephemeris { exact_s.unwrap_or(t_s) } else { t_s }
 }
 
 /// Everything that a scenario can switch on, and whether this one does.
@@ -290,11 +308,19 @@ impl fmt::Display for Plan {
         for row in &self.satellites {
             let cn0 = row.cn0_dbhz.map_or_else(|| "-".to_owned(), |x| format!("{x:.1}"));
             write!(f, "  {}  {:7.1}  {:9.1}  {cn0:>10}", row.sv, row.azimuth_deg, row.elevation_deg)?;
-            if let Some(t_s) = row.rises_s {
-                write!(f, "  rises by {t_s:.1} s")?;
+            if let Some((t_s, by)) = row.appears {
+                match by {
+                    PassEnd::Ephemeris => write!(f, "  first ephemeris from {t_s:.1} s")?,
+                    PassEnd::Earth => write!(f, "  comes out from behind the Earth by {t_s:.1} s")?,
+                    PassEnd::Mask | PassEnd::Scene => write!(f, "  rises by {t_s:.1} s")?,
+                }
             }
-            if let Some(t_s) = row.sets_s {
-                write!(f, "  sets by {t_s:.1} s")?;
+            if let Some((t_s, by)) = row.leaves {
+                match by {
+                    PassEnd::Ephemeris => write!(f, "  last ephemeris ends at {t_s:.1} s, not sent from then on")?,
+                    PassEnd::Earth => write!(f, "  goes behind the Earth by {t_s:.1} s")?,
+                    PassEnd::Mask | PassEnd::Scene => write!(f, "  sets by {t_s:.1} s")?,
+                }
             }
             writeln!(f)?;
         }
@@ -350,7 +376,7 @@ mod tests {
         let (highest, lowest) = (&plan.satellites[0], &plan.satellites[11]);
         assert!((highest.elevation_deg - 82.0).abs() < 0.6 && highest.sv == Sv::gps(23), "{plan}");
         assert!((6.5..7.5).contains(&lowest.elevation_deg), "{plan}");
-        assert!(plan.satellites.iter().all(|s| s.rises_s.is_none() && s.sets_s.is_none()), "{plan}");
+        assert!(plan.satellites.iter().all(|s| s.appears.is_none() && s.leaves.is_none()), "{plan}");
         assert_eq!((plan.samples, plan.bytes), (156_000_000, 312_000_000));
         // 156e6 samples of 12 satellites at 1e8 a second.
         assert!((plan.time_s - 18.72).abs() < 1e-9 && plan.speed_mps == 0.0);
@@ -390,7 +416,8 @@ mod tests {
         let day = include_str!("../../scenarios/noise_free.toml").replace("duration_s = 60", "duration_s = 14400");
         let plan = plan(&day);
         assert!(
-            plan.satellites.iter().any(|s| s.rises_s.is_some()) && plan.satellites.iter().any(|s| s.sets_s.is_some())
+            plan.satellites.iter().any(|s| matches!(s.appears, Some((_, PassEnd::Mask))))
+                && plan.satellites.iter().any(|s| matches!(s.leaves, Some((_, PassEnd::Mask))))
         );
         // 11 satellites on average in view, each for some five hours: more than 12 and fewer than all in four hours.
         assert!((13..=28).contains(&plan.satellites.len()), "{plan}");

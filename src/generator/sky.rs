@@ -10,7 +10,7 @@ use nalgebra::{SVector, Vector3};
 use crate::generator::catalogue::Catalogue;
 use crate::generator::ray::Sight;
 use crate::generator::vehicle::Motion;
-use crate::gnss::broadcast::{ClockState, OrbitError, State};
+use crate::gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SPEED_OF_LIGHT_MPS, look, rotate_earth};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
@@ -67,6 +67,14 @@ pub fn emission_near(
     guess_s: f64,
 ) -> Result<Option<Emission>, OrbitError> {
     emission_of(|at| catalogue.truth(sv, at), sv, received, motion, guess_s)
+}
+
+/// [`emission`] by one set, whether it is sent then or not.
+///
+/// # Errors
+/// As [`emission`].
+pub fn emission_of_set(set: &Ephemeris, received: Epoch, motion: &Motion) -> Result<Option<Emission>, OrbitError> {
+    emission_of(|at| set.state_and_clock_l1(at).map(Some), set.sv, received, motion, LIGHT_TIME_S)
 }
 
 /// [`emission_near`] of a satellite whose orbit and clock `truth` tells.

@@ -24,7 +24,7 @@ use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
 use crate::generator::truth::{self, TruthError};
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::gps::lnav::FieldError;
-use crate::gnss::record::TrajectoryRow;
+use crate::gnss::record::{PassRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 
 /// Cut-off of band-limited edges, in cycles a sample.
@@ -295,11 +295,13 @@ impl<'a> Stream<'a> {
             self.done.knots += transmitter.knots;
             self.done.worst_knot_cycles = self.done.worst_knot_cycles.max(transmitter.worst_knot_cycles);
         }
+        let authentic = self.transmitters.iter().filter(|t| t.from.number == 0);
+        let passes: BTreeSet<PassRow> = authentic.flat_map(|t| t.passes.rows(t.sv, &self.part)).collect();
         self.done.knot_tolerance_cycles = self.scene.fidelity.knot_tolerance_cycles;
         let seen: BTreeSet<Sv> =
             self.transmitters.iter().filter(|t| t.seen && t.from.number == 0).map(|t| t.sv).collect();
         self.done.satellites = seen.into_iter().collect();
-        truth.finish(&navigation)?;
+        truth.finish(&navigation, &passes)?;
         Ok(self.done)
     }
 }

@@ -9,10 +9,11 @@
 mod writer;
 
 use crate::generator::knots::Arrival;
+use crate::generator::presence::{Presence, presence};
 use crate::generator::ray::Ray;
 use crate::generator::ripple;
 use crate::generator::scene::Scene;
-use crate::generator::sky::{Arc, Emission, LIGHT_TIME_S, emission, emission_near};
+use crate::generator::sky::{Arc, Emission, LIGHT_TIME_S, emission_near};
 use crate::generator::spoof::Constellation;
 use crate::generator::vehicle::Motion;
 use crate::gnss::broadcast::OrbitError;
@@ -131,12 +132,16 @@ pub fn in_view(scene: &Scene, sv: Sv, local: Epoch) -> Result<bool, OrbitError> 
 /// # Errors
 /// Those of the orbit.
 pub fn in_view_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -> Result<bool, OrbitError> {
+    Ok(presence_from(scene, from, sv, local)?.end().is_none())
+}
+
+/// Where `sv` is in the sky of the place that a constellation's signals are made for.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn presence_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -> Result<Presence, OrbitError> {
     let (time, _, motion) = received(scene, from, local);
-    if scene.catalogue.sent_at(sv, time).is_none() {
-        return Ok(false);
-    }
-    let found = emission(&scene.catalogue, sv, time, &motion)?;
-    Ok(found.is_some_and(|emission| scene.sees(&emission.sight)))
+    presence(scene, sv, time, &motion)
 }
 
 /// Doppler: minus the derivative of the carrier, by a stencil of five points 10 ms apart that does not straddle a break.

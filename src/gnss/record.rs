@@ -56,6 +56,31 @@ pub struct SkyRow {
     pub troposphere_m: f64,
 }
 
+/// What begins or ends the time in which a satellite is in the scene's sky.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PassEnd {
+    /// The scene itself, or the part of it that was made.
+    Scene,
+    /// The mask's elevation.
+    Mask,
+    /// The Earth, as seen from space.
+    Earth,
+    /// The navigation file: no ephemeris is sent before, or after.
+    Ephemeris,
+}
+
+/// A time in which a satellite is in the scene's sky, whole seconds of the receiver's clock: `truth/passes.csv`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct PassRow {
+    pub sv: Sv,
+    /// First sample in view, and the first one that is not any more.
+    pub sample: u64,
+    pub until_sample: u64,
+    pub begins_by: PassEnd,
+    pub ends_by: PassEnd,
+}
+
 /// A ray that comes beside the direct one: `truth/rays.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RayRow {

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::motion::{FileKind, MotionSpec};
 use super::stages::PlaybackSpec;
 use super::{Scenario, ScenarioError, hostile, parts, satellite};
+use crate::generator::presence;
 use crate::generator::random::Stream;
 use crate::generator::ray::Ray;
 use crate::generator::ripple::scintillation::Scintillation;
@@ -107,10 +108,11 @@ impl Scenario {
         };
         scene.interference = hostile::interferers(self, &scene, directory, overrides, &mut warnings)?;
         scene.spoofers = hostile::spoofers(self, &scene, end_s, directory, overrides, &mut warnings)?;
-        let (visible, signals_lsb) = at_start(&scene).map_err(|e| {
+        let orbit = |e: OrbitError| {
             let key = if matches!(e, OrbitError::Near { .. }) { "motion" } else { "navigation.file" };
             self.conflict(key, e.to_string())
-        })?;
+        };
+        let (visible, signals_lsb) = at_start(&scene).map_err(orbit)?;
         if let Some(PlaybackSpec { bits, load_sigma, attenuation_db }) = self.stages.playback {
             let step_lsb = signals_lsb * 2.0 * load_sigma / libm::exp2(f64::from(bits));
             if signals_lsb == 0.0 {
@@ -119,6 +121,8 @@ impl Scenario {
             }
             scene.playback = Some(Playback { bits, step_lsb: step_lsb as f32, attenuation_db });
         }
+        let missing = presence::missing(&scene, end_s).map_err(orbit)?;
+        warnings.extend(presence::warning(&missing, self.start));
         warnings.extend(scene.fidelity.warning(scene.clock.rate.hz()));
         if visible < 4 {
             let mask_deg = self.mask_rad.to_degrees();

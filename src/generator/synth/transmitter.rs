@@ -12,6 +12,7 @@ use super::bank::Bank;
 use super::{CODE_ONE, Edge, RUN_SAMPLES, Run};
 use crate::generator::knots::{Grid, Part, Path};
 use crate::generator::message::{self, Sent as SentWords};
+use crate::generator::presence::Passes;
 use crate::generator::ripple::Ripples;
 use crate::generator::scene::Scene;
 use crate::generator::sky;
@@ -56,6 +57,8 @@ pub struct Transmitter {
     view: BTreeMap<u64, bool>,
     /// Sample from which the satellite has been in view.
     since: Option<u64>,
+    /// When it has been in view in what was prepared.
+    pub passes: Passes,
     roots: BTreeSet<u64>,
     parts: Vec<Part>,
     ripples: Ripples,
@@ -147,6 +150,7 @@ impl Transmitter {
             grid,
             view: BTreeMap::new(),
             since: None,
+            passes: Passes::default(),
             roots: BTreeSet::new(),
             parts: Vec::new(),
             ripples: Ripples::default(),
@@ -201,7 +205,8 @@ impl Transmitter {
         for second in first..=last {
             if !self.view.contains_key(&second) {
                 let sample = rate.first_sample_at(second, 1);
-                let up = truth::in_view_from(scene, &self.from, self.sv, scene.clock.epoch(sample))?;
+                let presence = truth::presence_from(scene, &self.from, self.sv, scene.clock.epoch(sample))?;
+                let up = self.passes.look(sample, &presence);
                 self.since = if up { self.since.or(Some(sample)) } else { None };
                 self.view.insert(second, up);
             }

@@ -16,7 +16,7 @@ use crate::generator::spoof::Constellation;
 use crate::generator::stage::Fact;
 use crate::generator::stage::interference::{Interferer, Spectrum};
 use crate::gnss::facts::{Expect, Fault};
-use crate::gnss::record::{InterferenceRow, NavigationRow, TrajectoryRow};
+use crate::gnss::record::{InterferenceRow, NavigationRow, PassRow, TrajectoryRow};
 
 /// Why the truth could not be written.
 #[derive(Debug, Error)]
@@ -54,7 +54,7 @@ struct Claims {
     trajectory: Table,
 }
 
-/// Writes `observations.csv`, `sky.csv`, `trajectory.csv`, `navigation.csv` and `scene.json`; `rays.csv` where a satellite
+/// Writes `observations.csv`, `sky.csv`, `trajectory.csv`, `navigation.csv`, `passes.csv` and `scene.json`; `rays.csv` where a satellite
 /// has more than one ray, with interference `interference.csv`, with spoofers `spoofed.csv` and `claimed.csv`
 /// (`spoofed_2.csv`, … from the second one on).
 pub struct Writer {
@@ -232,12 +232,17 @@ impl Writer {
         satellites.iter().try_for_each(|(observation, ..)| claims.observations.write(observation))
     }
 
-    /// Writes `navigation.csv` and everything that is still buffered.
-    pub fn finish(&mut self, navigation: &BTreeSet<NavigationRow>) -> Result<(), TruthError> {
+    /// Writes `navigation.csv`, `passes.csv` and everything that is still buffered.
+    pub fn finish(
+        &mut self,
+        navigation: &BTreeSet<NavigationRow>,
+        passes: &BTreeSet<PassRow>,
+    ) -> Result<(), TruthError> {
         let mut table = Table::create(&self.directory, "navigation.csv")?;
-        for row in navigation {
-            table.write(row)?;
-        }
+        navigation.iter().try_for_each(|row| table.write(row))?;
+        table.flush()?;
+        let mut table = Table::create(&self.directory, "passes.csv")?;
+        passes.iter().try_for_each(|row| table.write(row))?;
         table.flush()?;
         self.observations.flush()?;
         self.sky.flush()?;

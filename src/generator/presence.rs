@@ -1,0 +1,251 @@
+//! Whether a satellite is in the scene's sky, and if not, why not.
+//!
+//! A satellite sets, hides behind the Earth, or has nothing to send because no ephemeris of the navigation file fits. The
+//! last is a limit of the data and not of nature, so it has its own name in the plan, in the warnings and in
+//! `truth/passes.csv`. Limit: while nothing is sent, the sky is that of the nearest set, for half a day at most.
+
+use std::ops::Range;
+
+use crate::generator::catalogue::Silence;
+use crate::generator::scene::{SPACE_M, Scene};
+use crate::generator::sky::{Emission, emission, emission_of_set};
+use crate::generator::vehicle::Motion;
+use crate::gnss::broadcast::OrbitError;
+use crate::gnss::record::{PassEnd, PassRow};
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+/// Farthest from its reference time that a set places a satellite above or below the mask. Half a day on, real sets of
+/// two days are some kilometres off: 1e-4 rad of elevation.
+const EXTRAPOLATED_S: f64 = 43_200.0;
+/// Spacing of the instants at which the sky without an ephemeris is looked at: satellites move 5° in it.
+const LOOK_S: f64 = 600.0;
+
+/// Where a satellite is.
+#[derive(Clone, Debug)]
+pub enum Presence {
+    InView(Box<Emission>),
+    BelowMask,
+    /// As seen from space.
+    BehindEarth,
+    /// Nothing in the navigation file is sent at this time, or precise orbits have none.
+    NoEphemeris,
+}
+
+impl Presence {
+    /// What ends the view, or precedes it, when this follows or comes before; `None` while in view.
+    pub fn end(&self) -> Option<PassEnd> {
+        match self {
+            Self::InView(_) => None,
+            Self::BelowMask => Some(PassEnd::Mask),
+            Self::BehindEarth => Some(PassEnd::Earth),
+            Self::NoEphemeris => Some(PassEnd::Ephemeris),
+        }
+    }
+}
+
+/// Where `sv` is for an antenna with `motion` at true time `time`. A satellite that the scene leaves out is present too.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn presence(scene: &Scene, sv: Sv, time: Epoch, motion: &Motion) -> Result<Presence, OrbitError> {
+    if scene.catalogue.sent_at(sv, time).is_none() {
+        return Ok(Presence::NoEphemeris);
+    }
+    Ok(match emission(&scene.catalogue, sv, time, motion)? {
+        None => Presence::NoEphemeris,
+        Some(emission) if scene.sees(&emission.sight) => Presence::InView(Box::new(emission)),
+        Some(emission) if emission.sight.user.height_m < SPACE_M => Presence::BelowMask,
+        Some(_) => Presence::BehindEarth,
+    })
+}
+
+/// A satellite that would be in view while it has nothing to send.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Missing {
+    pub sv: Sv,
+    /// When the ephemerides leave off and begin again, as far as the navigation file has any there.
+    pub silence: Silence,
+}
+
+/// The satellites that the scene, which lasts `end_s`, misses for want of an ephemeris.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn missing(scene: &Scene, end_s: f64) -> Result<Vec<Missing>, OrbitError> {
+    let (start, end) = (scene.clock.start, scene.clock.start.plus_s(end_s));
+    let mut found = Vec::new();
+    for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
+        for silence in scene.catalogue.silences(sv, start, end) {
+            if would_be_seen(scene, sv, &silence, end_s)? {
+                found.push(Missing { sv, silence });
+            }
+        }
+    }
+    Ok(found)
+}
+
+fn would_be_seen(scene: &Scene, sv: Sv, silence: &Silence, end_s: f64) -> Result<bool, OrbitError> {
+    let start = scene.clock.start;
+    let from_s = silence.from.map_or(0.0, |from| from.since(start).max(0.0));
+    let until_s = silence.until.map_or(end_s, |until| until.since(start).min(end_s));
+    let looks = ((until_s - from_s) / LOOK_S).ceil().max(1.0) as u64;
+    for k in 0..=looks {
+        let t_s = from_s + (until_s - from_s) * k as f64 / looks as f64;
+        let at = start.plus_s(t_s);
+        let Some(set) = scene.catalogue.nearest_set(sv, at) else { continue };
+        if set.health != 0 || at.since(set.toe).abs() > EXTRAPOLATED_S {
+            continue;
+        }
+        let found = emission_of_set(set, at, &scene.trajectory.at(t_s))?;
+        if found.is_some_and(|emission| scene.sees(&emission.sight)) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// The warning that the navigation file does not cover the scene, which begins at `start`.
+pub fn warning(missing: &[Missing], start: Epoch) -> Option<String> {
+    let mut groups: Vec<(Silence, Vec<String>)> = Vec::new();
+    for Missing { sv, silence } in missing {
+        match groups.iter_mut().find(|(known, _)| known == silence) {
+            Some((_, names)) => names.push(sv.to_string()),
+            None => groups.push((*silence, vec![sv.to_string()])),
+        }
+    }
+    let instant = |at: Epoch| format!("{at} GPST ({:.1} s)", at.since(start));
+    let parts: Vec<String> = groups
+        .iter()
+        .map(|(Silence { from, until }, names)| {
+            let names = names.join(", ");
+            match (from, until) {
+                (Some(from), Some(until)) => format!("{names} from {} to {}", instant(*from), instant(*until)),
+                (Some(from), None) => format!("{names} from {} on", instant(*from)),
+                (None, Some(until)) => format!("{names} before {}", instant(*until)),
+                (None, None) => names,
+            }
+        })
+        .collect();
+    (!parts.is_empty()).then(|| {
+        format!(
+            "the navigation file does not cover the scene: in the sky but without an ephemeris, and so not sent: {}; \
+             [navigation] file names files that hold these times, or choose another start or duration_s",
+            parts.join("; ")
+        )
+    })
+}
+
+/// The times in which one satellite was in view, gathered second by second.
+#[derive(Clone, Debug, Default)]
+pub struct Passes {
+    /// First sample in view and what came before, of the pass that lasts; the others are whole.
+    open: Option<(u64, PassEnd)>,
+    /// Why the satellite was not in view when last looked at; `None` before the first look.
+    absent: Option<PassEnd>,
+    whole: Vec<(u64, u64, PassEnd, PassEnd)>,
+}
+
+impl Passes {
+    /// Takes what is found at the next `sample`; whether the satellite is in view.
+    pub fn look(&mut self, sample: u64, presence: &Presence) -> bool {
+        match (presence.end(), self.open) {
+            (None, None) => self.open = Some((sample, self.absent.unwrap_or(PassEnd::Scene))),
+            (Some(end), Some((since, begin))) => {
+                self.whole.push((since, sample, begin, end));
+                self.open = None;
+            }
+            _ => {}
+        }
+        self.absent = presence.end().or(self.absent);
+        presence.end().is_none()
+    }
+
+    /// The rows of `part` of the scene, counted from its first sample.
+    pub fn rows(&self, sv: Sv, part: &Range<u64>) -> impl Iterator<Item = PassRow> {
+        let open = self.open.map(|(since, begin)| (since, u64::MAX, begin, PassEnd::Scene));
+        let all = self.whole.iter().copied().chain(open);
+        let (first, last) = (part.start, part.end);
+        all.filter(move |(since, until, ..)| *since < last && *until > first).map(move |(since, until, begin, end)| {
+            PassRow {
+                sv,
+                sample: since.max(first) - first,
+                until_sample: until.min(last) - first,
+                begins_by: if since <= first { PassEnd::Scene } else { begin },
+                ends_by: if until >= last { PassEnd::Scene } else { end },
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::generator::scenario::{Overrides, Scenario};
+    use crate::generator::{stream, truth};
+
+    /// The embedded day's last sets end at midnight, but for those of two uploads.
+    fn midnight(duration_s: f64) -> (Scene, Vec<String>) {
+        let start_s = 86_400.0 - duration_s / 2.0;
+        let (hour, rest) = ((start_s / 3600.0).floor(), start_s % 3600.0);
+        let text = format!(
+            "name = \"x\"\nstart = 2010-07-01T{hour:02}:{:02}:{:04.1}\nduration_s = {duration_s}\n\
+             [motion]\nkind = \"static\"\nlatitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\n\
+             [front_end]\nsample_rate_hz = 1.1e6\nformat = \"ci8\"\n",
+            (rest / 60.0).floor(),
+            rest % 60.0
+        );
+        Scenario::parse(&text, "midnight").unwrap().compose(Path::new("."), &Overrides::default()).unwrap()
+    }
+
+    #[test]
+    fn a_satellite_whose_ephemeris_ends_is_warned_of_by_name_and_time() {
+        let (scene, warnings) = midnight(1200.0);
+        let warning = warnings.iter().find(|w| w.contains("does not cover the scene")).unwrap();
+        assert!(warning.contains("2010-07-02T00:00:00.000000 GPST (600.0 s) on"), "{warning}");
+        let missing = missing(&scene, 1200.0).unwrap();
+        // Each is named and not sent after midnight; most were in view until then, others would rise later.
+        let mut ended = 0;
+        for Missing { sv, silence } in &missing {
+            assert!(warning.contains(&sv.to_string()), "{warning}");
+            let end = silence.from.unwrap();
+            let at = |t: Epoch| presence(&scene, *sv, t, &scene.trajectory.at(0.0)).unwrap().end();
+            assert_eq!(at(end), Some(PassEnd::Ephemeris), "{sv}");
+            ended += usize::from(at(end.plus_s(-0.001)).is_none());
+        }
+        assert!(ended >= 6, "{missing:?}");
+        // Before midnight the same file says all there is to say.
+        assert!(super::missing(&scene, 599.0).unwrap().is_empty());
+    }
+
+    #[test]
+    fn the_truth_s_passes_say_that_an_ephemeris_ended_and_not_that_a_satellite_set() {
+        let (scene, _) = midnight(4.0);
+        let directory = tempfile::tempdir().unwrap();
+        let rows = |part: Range<u64>| -> Vec<PassRow> {
+            let mut writer = truth::Writer::create(directory.path()).unwrap();
+            let (mut sink, options) = (std::io::sink(), stream::Options::default());
+            stream::generate_part(&scene, part, &mut sink, &mut writer, &mut |_| (), &options).unwrap();
+            let mut file = csv::Reader::from_path(directory.path().join("passes.csv")).unwrap();
+            file.deserialize().map(Result::unwrap).collect()
+        };
+        let whole = rows(0..scene.samples);
+        let ended: Vec<&PassRow> = whole.iter().filter(|row| row.ends_by == PassEnd::Ephemeris).collect();
+        assert_eq!(ended.len(), missing(&scene, 4.0).unwrap().len());
+        for row in &whole {
+            assert_eq!((row.sample, row.begins_by), (0, PassEnd::Scene), "{row:?}");
+            let until = if row.ends_by == PassEnd::Scene { scene.samples } else { 2_200_000 };
+            assert_eq!(row.until_sample, until, "{row:?}");
+        }
+        // A part that begins later says the same of its own samples, and one that ends before says nothing of the end.
+        let part = rows(1_500_000..3_000_000);
+        assert_eq!(part.len(), whole.len());
+        for (row, of) in part.iter().zip(&whole) {
+            let until_sample = of.until_sample.min(3_000_000) - 1_500_000;
+            assert_eq!(*row, PassRow { sample: 0, until_sample, ..*of });
+        }
+        assert!(rows(0..2_000_000).iter().all(|row| row.ends_by == PassEnd::Scene && row.until_sample == 2_000_000));
+    }
+}
