@@ -9,12 +9,16 @@ mod columns;
 use thiserror::Error;
 
 use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::gps::lnav::{LeapEvent, UtcPolynomial};
 use crate::gnss::inflate::{InflateError, inflate};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
 use columns::Record;
 
+/// Step of the reference time of UTC, and the last one inside a week.
+const UTC_STEP_S: f64 = 4096.0;
+const UTC_LAST_S: f64 = 602_112.0;
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
 
@@ -26,6 +30,10 @@ pub struct Navigation {
     pub klobuchar: Option<Klobuchar>,
     /// GPS time minus UTC, in whole seconds.
     pub leap_seconds: Option<i64>,
+    /// A change of these that the file names.
+    pub leap_event: Option<LeapEvent>,
+    /// GPS time minus UTC beyond whole seconds.
+    pub utc: Option<UtcPolynomial>,
     /// Records that were left out, each with its reason.
     pub skipped: Vec<String>,
 }
@@ -63,8 +71,9 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     let text = clean(&unpack(bytes, name)?);
     check_first_line(&text, name)?;
     let contents = columns::read(&text).map_err(|detail| NavigationError::Damaged { name: name.to_owned(), detail })?;
-    let columns::Contents { records, klobuchar, leap_seconds, others, reasons } = contents;
-    let mut navigation = Navigation { klobuchar, leap_seconds, skipped: reasons, ..Navigation::default() };
+    let columns::Contents { records, klobuchar, leap_seconds, leap_event, utc, others, reasons } = contents;
+    let leap_event = leap_event.map(|(after_s, week, day)| LeapEvent { after_s, week, day });
+    let mut navigation = Navigation { klobuchar, leap_seconds, leap_event, skipped: reasons, ..Navigation::default() };
     let mut found: Vec<(usize, Ephemeris)> = Vec::new();
     for record in &records {
         match ephemeris(record) {
@@ -92,6 +101,12 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
             _ => navigation.ephemerides.push(set),
         }
     }
+    if let (Some(line), Some(first)) = (utc, navigation.ephemerides.first()) {
+        match utc_polynomial(line, first.toe) {
+            Ok(found) => navigation.utc = found,
+            Err(reason) => navigation.skipped.push(reason),
+        }
+    }
     if navigation.ephemerides.is_empty() {
         let reasons = navigation.skipped.iter().take(3).cloned().collect::<Vec<_>>().join("; ");
         let found = format!(
@@ -102,6 +117,27 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
         return Err(NavigationError::Nothing { name: name.to_owned(), found });
     }
     Ok(navigation)
+}
+
+/// GPS time against UTC with its week near `anchor`, for files write it counted on or modulo 1024 or 256; none where all is
+/// zero, as files have it that know nothing.
+fn utc_polynomial(line: columns::UtcLine, anchor: Epoch) -> Result<Option<UtcPolynomial>, String> {
+    let columns::UtcLine { a0_s, a1_sps, tow_s, week } = line;
+    if (a0_s, a1_sps) == (0.0, 0.0) && tow_s == 0.0 {
+        return Ok(None);
+    }
+    // The field's step and its largest value inside a week (IS-GPS-200N, table 20-IX).
+    let on_step = tow_s.rem_euclid(UTC_STEP_S) == 0.0 && (0.0..=UTC_LAST_S).contains(&tow_s);
+    if !on_step || a0_s.abs() > 1.0 || a1_sps.abs() > 7.451e-9 {
+        return Err(format!(
+            "UTC: A0 = {a0_s:e}, A1 = {a1_sps:e}, reference time {tow_s} s: expected at most 1 s and 7.451e-9 s/s in size, and a \
+             multiple of {UTC_STEP_S} s up to {UTC_LAST_S}"
+        ));
+    }
+    // Eight bits of the week are in the message.
+    let ahead = (week - anchor.week() + 128).rem_euclid(256) - 128;
+    let reference = Epoch::new((anchor.week() + ahead) * WEEK_S, tow_s);
+    Ok(Some(UtcPolynomial { a0_s, a1_sps, reference }))
 }
 
 fn unpack(bytes: &[u8], name: &str) -> Result<Vec<u8>, NavigationError> {
@@ -260,11 +296,53 @@ mod tests {
             beta: [0.8192e5, 0.8192e5, -0.6554e5, -0.5243e6],
         };
         assert_eq!(day.klobuchar, Some(expected));
+        // The file's week is 1590 modulo 1024.
+        let reference = Epoch::from_week(1590, 503_808.0);
+        let utc = UtcPolynomial { a0_s: -0.838190317154e-8, a1_sps: -0.213162820728e-13, reference };
+        assert_eq!((day.utc, day.leap_event), (Some(utc), None));
         let first = &day.ephemerides[0];
         assert_eq!((first.sv, first.health, first.iode, first.ura_index), (Sv::gps(1), 63, 63, 0));
         assert_eq!(first.toe, Epoch::from_week(1590, 345_600.0));
         assert_eq!(first.transmitted, Epoch::from_week(1590, 341_670.0));
         assert_eq!(first.sqrt_a_sqrtm, 0.515480139732e4);
+    }
+
+    #[test]
+    fn utc_is_read_from_every_version_and_refused_off_its_step() {
+        let whole = unpack(include_bytes!("../../data/brdc1820-2010.n.gz"), "test").unwrap();
+        let text = String::from_utf8(whole[..3000].to_vec()).unwrap();
+        let records = text.split_once("END OF HEADER").unwrap().1.split_once('\n').unwrap().1;
+        let record: Vec<&str> = records.lines().take(8).collect();
+        // A record of version 3: another first column and year, one column more before each line.
+        let three = |body: &[&str]| {
+            let first = body[0].replacen(" 1 10  7  1  0  0  0.0", "G01 2010 07 01 00 00 00", 1);
+            let rest: Vec<String> = body[1..].iter().map(|line| format!(" {line}")).collect();
+            format!("{first}\n{}\n", rest.join("\n"))
+        };
+        let line = |text: &str, label: &str| format!("{text:<60}{label}\n");
+        let head = |version: &str| line(&format!("{version:>9}{:11}N{:19}G", "", ""), "RINEX VERSION / TYPE");
+        let end = line("", "END OF HEADER");
+        let corr = line("GPUT -8.3819031715e-09-2.131628207e-14 503808 1590", "TIME SYSTEM CORR");
+        let leaps = line("    15    16  1694     7", "LEAP SECONDS");
+        let found = read((head("3.04") + &corr + &leaps + &end + &three(&record)).as_bytes(), "three").unwrap();
+        let reference = Epoch::from_week(1590, 503_808.0);
+        let utc = UtcPolynomial { a0_s: -8.3819031715e-9, a1_sps: -2.131628207e-14, reference };
+        assert_eq!((found.utc, &found.skipped), (Some(utc), &Vec::new()));
+        assert_eq!(found.leap_event, Some(LeapEvent { after_s: 16, week: 1694, day: 7 }));
+
+        let sto = "> STO G01 LNAV\n    2010 07 02 19 56 48 GPUT                                  UTC(USNO)\n     \
+                   3.456000000000e+05-8.381903171540e-09-2.131628207280e-14 0.000000000000e+00\n";
+        let eph = format!("> EPH G01 LNAV\n{}", three(&record));
+        let found = read((head("4.00") + &leaps + &end + sto + &eph).as_bytes(), "four").unwrap();
+        let utc = UtcPolynomial { a0_s: -8.38190317154e-9, a1_sps: -2.13162820728e-14, reference };
+        assert_eq!((found.utc, &found.skipped), (Some(utc), &Vec::new()));
+
+        let off = corr.replace("503808", "503809");
+        let found = read((head("3.04") + &off + &end + &three(&record)).as_bytes(), "off").unwrap();
+        assert!(found.utc.is_none() && found.skipped[0].contains("multiple of 4096"), "{:?}", found.skipped);
+        let none = line("GPUT  0.0000000000e+00 0.000000000e+00      0    0", "TIME SYSTEM CORR");
+        let found = read((head("3.04") + &none + &end + &three(&record)).as_bytes(), "none").unwrap();
+        assert_eq!((found.utc, &found.skipped), (None, &Vec::new()));
     }
 
     #[test]

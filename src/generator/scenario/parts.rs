@@ -10,7 +10,7 @@ use crate::generator::effect::wind_up::WindUp;
 use crate::generator::ray::Effect;
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::gps::lnav::Broadcast;
+use crate::gnss::gps::lnav::{Broadcast, UtcData};
 use crate::gnss::rinex::{self, Navigation};
 use crate::gnss::satellite::Sv;
 
@@ -37,11 +37,13 @@ pub(super) fn navigation(
         if scenario.navigation.is_empty() { rinex::embedded().map_err(refuse)? } else { Navigation::default() };
     for path in &scenario.navigation {
         let bytes = scenario.load("navigation.file", directory, path, overrides)?;
-        let Navigation { ephemerides, klobuchar, leap_seconds, skipped } =
+        let Navigation { ephemerides, klobuchar, leap_seconds, leap_event, utc, skipped } =
             rinex::read(&bytes, &path.display().to_string()).map_err(refuse)?;
         navigation.ephemerides.extend(ephemerides);
         navigation.klobuchar = navigation.klobuchar.or(klobuchar);
         navigation.leap_seconds = navigation.leap_seconds.or(leap_seconds);
+        navigation.leap_event = navigation.leap_event.or(leap_event);
+        navigation.utc = navigation.utc.or(utc);
         navigation.skipped.extend(skipped);
     }
     tell(warnings, &navigation.skipped, "records of the navigation file left out");
@@ -107,9 +109,13 @@ pub(super) fn sky(
 /// What the satellites send about the ionosphere is what the scenario gives, or what the file says.
 fn broadcast(scenario: &Scenario, navigation: &Navigation, almanac: &[Ephemeris]) -> Result<Broadcast, ScenarioError> {
     let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent);
-    let leap_seconds = navigation.leap_seconds.unwrap_or_else(|| scenario.start.leap_seconds());
+    let utc = UtcData {
+        leap_s: navigation.leap_seconds.unwrap_or_else(|| scenario.start.leap_seconds()),
+        polynomial: navigation.utc,
+        event: navigation.leap_event,
+    };
     let key = if given.is_some() { "ionosphere" } else { "navigation.file" };
-    Broadcast::new(given.or(navigation.klobuchar), leap_seconds, almanac, scenario.start)
+    Broadcast::with_utc(given.or(navigation.klobuchar), &utc, almanac, scenario.start)
         .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
 }
 

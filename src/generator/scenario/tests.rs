@@ -765,6 +765,11 @@ fn the_static_scene_sends_its_ionosphere_within_thirty_seconds() {
         // RINEX 2 prints five significant digits; half a step of the finest field is 2^-31 (IS-GPS-200N, table 20-X).
         assert!((sent - file).abs() <= 4.7e-10, "{sent} {file}");
     }
+    // GPS time against UTC as the file's header has it, to half a step of its fields (IS-GPS-200N, table 20-IX).
+    let utc = subframe.utc().unwrap();
+    assert!((utc.a0_s - -0.838190317154e-8).abs() <= libm::exp2(-31.0), "{utc:?}");
+    assert!((utc.a1_sps - -0.213162820728e-13).abs() <= libm::exp2(-51.0), "{utc:?}");
+    assert_eq!((utc.tot_s, utc.week, utc.leap_s, utc.leap_after_s), (503_808.0, (566 % 256) as u8, 15, 15));
 }
 
 #[test]

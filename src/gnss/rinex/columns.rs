@@ -81,10 +81,24 @@ pub(super) struct Contents {
     pub records: Vec<Record>,
     pub klobuchar: Option<Klobuchar>,
     pub leap_seconds: Option<i64>,
+    /// Seconds after the last or next change, week and day at whose end it comes.
+    pub leap_event: Option<(i64, i64, u8)>,
+    /// Of GPS against UTC: A0, A1, reference time of week, week as written.
+    pub utc: Option<UtcLine>,
     /// Records of other systems and messages.
     pub others: usize,
     /// What was left out, and why.
     pub reasons: Vec<String>,
+}
+
+/// GPS time against UTC as written: constant, rate, time of week and week.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct UtcLine {
+    pub a0_s: f64,
+    pub a1_sps: f64,
+    pub tow_s: f64,
+    /// Counted on, or modulo 1024 or 256.
+    pub week: i64,
 }
 
 type Line<'t> = (usize, &'t str);
@@ -110,6 +124,7 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     let mut contents = Contents::default();
     form.header(header, &mut contents);
     let mut ionosphere: Option<(String, Klobuchar)> = None;
+    let mut utc: Option<(String, UtcLine)> = None;
     let body: Vec<Line<'_>> = body.iter().filter(|(_, line)| !line.trim().is_empty()).copied().collect();
     for group in body.chunk_by(|_, next| !form.begins(next.1)) {
         match form.group(group) {
@@ -120,11 +135,17 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
                     ionosphere = Some((age, found));
                 }
             }
+            Ok(Group::Utc(age, found)) => {
+                if utc.as_ref().is_none_or(|(before, _)| age < *before) {
+                    utc = Some((age, found));
+                }
+            }
             Ok(Group::Other) => contents.others += 1,
             Err(reason) => contents.reasons.push(reason),
         }
     }
     contents.klobuchar = contents.klobuchar.or(ionosphere.map(|(_, found)| found));
+    contents.utc = contents.utc.or(utc.map(|(_, found)| found));
     Ok(contents)
 }
 
@@ -139,6 +160,8 @@ enum Group {
     Record(Box<Record>),
     /// When and by which satellite, in an order that sorts, and what it said.
     Ionosphere(String, Klobuchar),
+    /// The same of GPS time against UTC.
+    Utc(String, UtcLine),
     Other,
 }
 
@@ -186,8 +209,19 @@ impl Form {
                             .push(format!("line {number}, column 1: ionosphere of '{name}': expected GPSA or GPSB"));
                     }
                 }
+                "DELTA-UTC: A0,A1,T,W" | "DELTA UTC: A0,A1,T,W" if self.version < 3 => match delta_utc(line) {
+                    Ok(found) => contents.utc = Some(found),
+                    Err(reason) => contents.reasons.push(format!("line {number} ({}): {reason}", label(line))),
+                },
+                "TIME SYSTEM CORR" if line.starts_with("GPUT") => match system_time(line) {
+                    Ok(found) => contents.utc = Some(found),
+                    Err(reason) => contents.reasons.push(format!("line {number} (TIME SYSTEM CORR): {reason}")),
+                },
                 "LEAP SECONDS" => match line.get(..6).unwrap_or("").trim().parse() {
-                    Ok(seconds) => contents.leap_seconds = Some(seconds),
+                    Ok(seconds) => {
+                        contents.leap_seconds = Some(seconds);
+                        contents.leap_event = leap_event(line);
+                    }
                     Err(_) => contents
                         .reasons
                         .push(format!("line {number} (LEAP SECONDS): column 1: expected a whole number")),
@@ -250,6 +284,7 @@ impl Form {
                 self.record(rest).map(|record| Group::Record(Box::new(record)))
             }
             ("ION", "LNAV") if letter == 'G' => self.ionosphere(group, satellite),
+            ("STO", "LNAV") if letter == 'G' => self.system_time(group, satellite),
             ("EPH" | "STO" | "EOP" | "ION", _) => Ok(Group::Other),
             (kind, _) => refuse(&format!("'{kind}': expected EPH, STO, EOP or ION")),
         }
@@ -351,6 +386,65 @@ impl Form {
             _ => refuse(one.0, "expected eight coefficients".to_owned()),
         }
     }
+}
+
+impl Form {
+    /// GPS time against another in a record of version 4; that against UTC is wanted.
+    fn system_time(&self, group: &[Line<'_>], satellite: &str) -> Result<Group, String> {
+        let (first, title) = group.first().copied().unwrap_or_default();
+        let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", title.trim_end()));
+        let [_, when, what] = group else {
+            return refuse(first, format!("a record of {} lines: expected 3", group.len()));
+        };
+        let margin = self.margin();
+        let rest = when.1.get(margin + FIELD..).unwrap_or("");
+        if rest.split_ascii_whitespace().next() != Some("GPUT") {
+            return Ok(Group::Other);
+        }
+        if self.cut == Some(what.0) && !what.1.trim_end().len().saturating_sub(margin).is_multiple_of(FIELD) {
+            return refuse(what.0, "the file ends within a number".to_owned());
+        }
+        let Some(epoch) = self.epoch(when.1.get(margin..margin + FIELD).unwrap_or("")) else {
+            return refuse(when.0, "column 5: expected an epoch".to_owned());
+        };
+        // Time of transmission, then the polynomial's coefficients; a quadratic one is CNAV's.
+        match fields(what.1, margin, FIELD, 4) {
+            Ok(found) => match found.as_slice() {
+                &[_, Some(a0_s), Some(a1_sps), _] => {
+                    let found = UtcLine { a0_s, a1_sps, tow_s: epoch.tow_s(), week: epoch.week() };
+                    Ok(Group::Utc(format!("{epoch} {satellite}"), found))
+                }
+                _ => refuse(what.0, "expected two coefficients".to_owned()),
+            },
+            Err(reason) => refuse(what.0, reason),
+        }
+    }
+}
+
+/// `3X, 2D19.12, 2I9` of version 2.
+fn delta_utc(line: &str) -> Result<UtcLine, String> {
+    let [a0_s, a1_sps] = numbers::<2>(line, 3, FIELD)?;
+    let whole = |from: usize| line.get(from..from + 9).unwrap_or("").trim().parse::<i64>();
+    match (whole(41), whole(50)) {
+        (Ok(tow_s), Ok(week)) => Ok(UtcLine { a0_s, a1_sps, tow_s: tow_s as f64, week }),
+        _ => Err("expected two whole numbers from column 42 on".to_owned()),
+    }
+}
+
+/// `A4, 1X, D17.10, D16.9, 1X, I6, 1X, I4` of version 3.
+fn system_time(line: &str) -> Result<UtcLine, String> {
+    let number = |from: usize, to: usize| number_of(line.get(from..to).unwrap_or("").trim());
+    match (number(5, 22), number(22, 38), number(38, 45), number(45, 50)) {
+        (Some(a0_s), Some(a1_sps), Some(tow_s), Some(week)) => Ok(UtcLine { a0_s, a1_sps, tow_s, week: week as i64 }),
+        _ => Err("expected two coefficients, a time of week and a week from column 6 on".to_owned()),
+    }
+}
+
+/// What follows the present number of leap seconds in versions 3 and 4: that after the change, its week and its day.
+fn leap_event(line: &str) -> Option<(i64, i64, u8)> {
+    let whole = |from: usize| line.get(from..from + 6).and_then(|text| text.trim().parse::<i64>().ok());
+    let (after_s, week, day) = (whole(6)?, whole(12)?, whole(18)?);
+    (week > 0 && (1..=7).contains(&day)).then_some((after_s, week, day as u8))
 }
 
 /// Fields of `width` columns from `start` on, after which nothing may stand; a blank one is `None`.

@@ -96,6 +96,36 @@ pub struct Utc {
     pub leap_after_s: i64,
 }
 
+/// What a message says of UTC, as a navigation file gives it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UtcData {
+    /// GPS time minus UTC in whole seconds.
+    pub leap_s: i64,
+    /// What is left of it; absent means none, referred to the almanac's time.
+    pub polynomial: Option<UtcPolynomial>,
+    /// The last change of the whole seconds, or the next one: those after it, and the week and day at whose end it comes.
+    pub event: Option<LeapEvent>,
+}
+
+/// GPS time minus UTC beyond whole seconds: `a0 + a1 (t − reference)` (IS-GPS-200N, 20.3.3.5.2.4).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UtcPolynomial {
+    pub a0_s: f64,
+    pub a1_sps: f64,
+    /// A multiple of 4096 s inside its week.
+    pub reference: Epoch,
+}
+
+/// A change of the whole seconds at the end of a day.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LeapEvent {
+    pub after_s: i64,
+    /// Any count of weeks: 8 bits of it are sent.
+    pub week: i64,
+    /// 1 to 7, Sunday first.
+    pub day: u8,
+}
+
 /// The multiple of 4096 s nearest to `reference` inside its week.
 fn reference_time(reference: Epoch) -> Epoch {
     let tow_s = ((reference.tow_whole_s() + TOA_STEP_S / 2) / TOA_STEP_S * TOA_STEP_S).min(TOA_LAST_S);
@@ -142,7 +172,7 @@ fn health_of(number: u8, ephemerides: &[Ephemeris]) -> u32 {
 /// The data words of all pages, subframe 4 first; words 1 and 2 are the caller's.
 pub(super) fn pages(
     klobuchar: Option<&Klobuchar>,
-    leap_seconds: i64,
+    utc: &UtcData,
     ephemerides: &[Ephemeris],
     reference: Epoch,
 ) -> Result<Vec<[u32; 10]>, FieldError> {
@@ -159,7 +189,7 @@ pub(super) fn pages(
             25..=32 => almanac_page(id, &almanac)?,
             52 => correction_table(),
             55 => special_message(),
-            56 => ionosphere_and_utc(klobuchar, leap_seconds, toa)?,
+            56 => ionosphere_and_utc(klobuchar, utc, toa)?,
             63 => configuration(ephemerides),
             reserved => blank(reserved),
         });
@@ -189,21 +219,26 @@ fn special_message() -> [u32; 10] {
 /// Page 18; a dummy page when there is no ionosphere to tell of, since the page cannot say "none".
 fn ionosphere_and_utc(
     klobuchar: Option<&Klobuchar>,
-    leap_seconds: i64,
-    reference: Epoch,
+    utc: &UtcData,
+    almanac_time: Epoch,
 ) -> Result<[u32; 10], FieldError> {
     let Some(klobuchar) = klobuchar else { return Ok(blank(0)) };
     let mut data = blank(56);
     write_all(&IONOSPHERE_PAGE, klobuchar, &mut data)?;
-    let week = reference.week().rem_euclid(256) as u8;
+    let none = UtcPolynomial { a0_s: 0.0, a1_sps: 0.0, reference: almanac_time };
+    let UtcPolynomial { a0_s, a1_sps, reference } = utc.polynomial.unwrap_or(none);
+    // Without an event the numbers before and after are the same, at the end of this week.
+    let still = LeapEvent { after_s: utc.leap_s, week: almanac_time.week(), day: 7 };
+    let LeapEvent { after_s, week, day } = utc.event.unwrap_or(still);
     let utc = Utc {
+        a0_s,
+        a1_sps,
         tot_s: reference.tow_s(),
-        week,
-        leap_s: leap_seconds,
-        event_week: week,
-        event_day: 7,
-        leap_after_s: leap_seconds,
-        ..Utc::default()
+        week: reference.week().rem_euclid(256) as u8,
+        leap_s: utc.leap_s,
+        event_week: week.rem_euclid(256) as u8,
+        event_day: day,
+        leap_after_s: after_s,
     };
     write_all(&UTC_PAGE, &utc, &mut data)?;
     Ok(data)

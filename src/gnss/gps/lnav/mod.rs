@@ -1,7 +1,7 @@
 //! The GPS legacy navigation message (LNAV): 300-bit subframes of six seconds, encoded and decoded.
 //!
 //! Source: IS-GPS-200N, 20.3. Limits: the telemetry message and the correction table (page 13 of
-//! subframe 4) are empty, reserved bits alternate, no leap second is announced ahead.
+//! subframe 4) are empty, reserved bits alternate; a leap second is announced where the navigation file announces one.
 
 mod almanac;
 mod fields;
@@ -9,7 +9,7 @@ mod parity;
 
 use thiserror::Error;
 
-pub use almanac::{ALMANAC_INCLINATION_SEMICIRCLES, Almanac, Utc};
+pub use almanac::{ALMANAC_INCLINATION_SEMICIRCLES, Almanac, LeapEvent, Utc, UtcData, UtcPolynomial};
 pub use fields::{Field, FieldError, Kind, tables};
 pub use parity::check_parity;
 
@@ -50,7 +50,20 @@ impl Broadcast {
         almanac: &[Ephemeris],
         reference: Epoch,
     ) -> Result<Self, FieldError> {
-        Ok(Self { pages: almanac::pages(klobuchar.as_ref(), leap_seconds, almanac, reference)? })
+        Self::with_utc(klobuchar, &UtcData { leap_s: leap_seconds, ..UtcData::default() }, almanac, reference)
+    }
+
+    /// [`Self::new`] with all that is known of UTC.
+    ///
+    /// # Errors
+    /// A value outside its field, or a reference time off its step.
+    pub fn with_utc(
+        klobuchar: Option<Klobuchar>,
+        utc: &UtcData,
+        almanac: &[Ephemeris],
+        reference: Epoch,
+    ) -> Result<Self, FieldError> {
+        Ok(Self { pages: almanac::pages(klobuchar.as_ref(), utc, almanac, reference)? })
     }
 
     /// The ten 30-bit words (D30 is bit 0) whose first bit leaves at GPS time `start`, a multiple of 6 s.
