@@ -295,7 +295,7 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
     let mut cases: Vec<(String, &str, &str)> = Vec::new();
     let tables = declared();
     let keys_of = |table: &str| &tables.iter().find(|(path, _)| path == table).unwrap().1;
-    let inner = ["motion", "motion.point", "spoofer.drag", "obstruction", "multipath"];
+    let inner = ["motion", "motion.point", "spoofer.drag", "obstruction", "multipath", "expect.interval"];
     for (table, keys) in tables.iter().filter(|(table, _)| !inner.contains(&table.as_str())) {
         for key in keys {
             let header = format!("[{key}]");
@@ -340,6 +340,11 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
     }
     for key in keys_of("obstruction") {
         cases.push((full.clone(), "obstruction", key));
+    }
+    let interval = "[[expect.interval]]\nfrom_s = 1\nto_s = 2\nfix = \"any\"\nlosses = \"any\"\nsatellites = [\"G02\"]\n\
+                    errors = \"any\"\nreason = \"x\"\n";
+    for key in keys_of("expect.interval") {
+        cases.push((format!("{MINIMAL}{STATIC}{interval}"), "expect.interval", key));
     }
     for key in keys_of("motion.point") {
         cases.push((format!("{MINIMAL}{WAYPOINTS}"), "motion.point", key));
