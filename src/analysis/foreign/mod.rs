@@ -49,6 +49,8 @@ pub struct Judged {
     pub rollover_s: [i64; 2],
     pub observables: Option<observables::Measured>,
     pub places: Option<place::Places>,
+    /// Whole seconds that positions' labels must be earlier for more of them to join: GPS time in place of UTC.
+    pub labels_late_s: Option<i64>,
 }
 
 /// 1024 weeks, the period of the week number in GPS's legacy message.
@@ -76,6 +78,7 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         rollover_s: [0; 2],
         observables: None,
         places: None,
+        labels_late_s: None,
     };
     if let Some(path) = &files.rinex_obs {
         let read = rinex_obs::read(&bytes(path)?).map_err(|fault| line(path, fault))?;
@@ -98,6 +101,9 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         if measured.rows.is_empty() {
             return Err(elsewhere(path, &labels, &timeline));
         }
+        let leap_s = timeline.origin.leap_seconds();
+        let joined = |late_s: i64| place::measure(&read.fixes, &timeline, judged.rollover_s[1] + late_s).rows.len();
+        judged.labels_late_s = (leap_s > 0 && joined(leap_s) > measured.rows.len()).then_some(leap_s);
         judged.places = Some(measured);
     }
     let summary = ForeignSummary::new(&judged);

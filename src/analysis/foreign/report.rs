@@ -256,6 +256,14 @@ impl ForeignSummary {
                 ));
             }
         }
+        if let (Some(late_s), Some(places)) = (judged.labels_late_s, &judged.places) {
+            found.push(format!(
+                "{} of {} positions join; more would if their labels were {late_s} s earlier, the leap seconds: GPS time in \
+                 place of NMEA's UTC",
+                places.rows.len(),
+                places.fixes
+            ));
+        }
         if let Some([east, north, up]) = judged.places.as_ref().and_then(|places| places.bias_enu_m) {
             for (axis, estimate) in [("east", east), ("north", north), ("up", up)] {
                 named(&mut found, &format!("position {axis}"), Some(estimate), 0.0, "m");

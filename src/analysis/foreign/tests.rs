@@ -163,10 +163,15 @@ fn rinex(planted: &Planted) -> String {
 
 /// The receiver's positions: 1.5 m north, 2 m down, and as late as its observations.
 fn nmea(late_s: f64) -> String {
+    nmea_from(4.0, late_s)
+}
+
+/// Positions a second apart, the first one's label so long after the start.
+fn nmea_from(first_s: f64, late_s: f64) -> String {
     let mut text = String::new();
     let mut draw = Draw(9);
     for k in 0..50 {
-        let label = start().plus_s(4.0 + f64::from(k));
+        let label = start().plus_s(first_s + f64::from(k));
         let t_s = label.since(start()) - late_s;
         let enu =
             Vector3::new(east(t_s).0 + 0.4 * draw.normal(), 1.5 + 0.4 * draw.normal(), -2.0 + 0.4 * draw.normal());
@@ -290,6 +295,22 @@ fn opposite_signs_and_a_wrong_rollover_are_named() {
     for words in ["+1024 weeks", "carrier phase falls", "receding satellite", "time tags: no bias beyond"] {
         assert!(text.contains(words), "{words} not in\n{text}");
     }
+}
+
+#[test]
+fn positions_in_gps_time_are_named_by_their_leap_seconds() {
+    let place = tempfile::tempdir().unwrap();
+    let (truth, path) = (place.path().join("truth"), place.path().join("rx.nmea"));
+    write_truth(&truth);
+    let leap_s = start().leap_seconds() as f64;
+    let findings = |text: String| {
+        fs::write(&path, text).unwrap();
+        let files = Files { rinex_obs: None, nmea: Some(path.clone()) };
+        judge(&truth, &files).unwrap().summary.findings.join("\n")
+    };
+    let found = findings(nmea_from(4.0 + leap_s, leap_s));
+    assert!(found.contains("GPS time in place of NMEA's UTC") && found.contains("15 s earlier"), "{found}");
+    assert!(!findings(nmea(0.0)).contains("UTC"), "labels that are right");
 }
 
 #[test]
