@@ -15,6 +15,9 @@
 //! Each world is a cargo feature and compiles without the others. Units: SI and radians
 //! inside, cycles for carrier phase, GPS time; a name ends with its unit.
 
+#[macro_use]
+pub mod plant;
+
 pub mod gnss;
 
 #[cfg(feature = "analysis")]

@@ -39,7 +39,9 @@ impl<'r> Access<'r> {
         let kappa_s = self.kappa_s.get(row.signal.name).copied().unwrap_or(0.0);
         let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
         let jammed = self.jammed.get(&(row.sample, row.signal.name)).copied().unwrap_or(0.0);
-        10.0 * libm::log10(own_hz / (thermal + kappa_s * (sum_hz - own_hz) + jammed))
+        10.0 * libm::log10(
+            own_hz / (thermal + kappa_s * planted!("analysis.access.others", sum_hz - own_hz, 10.0 * sum_hz) + jammed),
+        )
     }
 }
 

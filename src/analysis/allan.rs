@@ -80,7 +80,7 @@ impl Deviation {
             Self::Ohdev => mean_square(third_differences(x, m)),
             Self::Totdev => mean_square(reflected_differences(x, m)),
         }?;
-        let allan = || (square / 2.0).sqrt() / tau_s;
+        let allan = || (square / planted!("analysis.allan.half", 2.0, 1.0)).sqrt() / tau_s;
         let deviation = match self {
             Self::Adev | Self::Oadev | Self::Mdev | Self::Totdev => allan(),
             Self::Tdev => tau_s / 3.0_f64.sqrt() * allan(),

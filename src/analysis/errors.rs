@@ -128,7 +128,12 @@ impl Errors {
         let truth: HashMap<u64, Observation> = run.truth.map(link, |row| (row.sample, row))?.into_iter().collect();
         let mut rows = Vec::new();
         for estimate in run.observations.rows(link)? {
-            let Some(true_row) = truth.get(&estimate.sample) else {
+            let at = planted!(
+                "analysis.errors.join",
+                estimate.sample,
+                run.observations.rows(link)?.first().map_or(0, |row| row.sample)
+            );
+            let Some(true_row) = truth.get(&at) else {
                 self.unmatched += 1;
                 continue;
             };
@@ -138,10 +143,15 @@ impl Errors {
             rows.push(SignalError {
                 sample: estimate.sample,
                 time_s: run.time_s(estimate.sample),
-                code_m: -SPEED_OF_LIGHT_MPS * (estimate.sent().since(true_row.sent()) + common.code_delay_s),
+                code_m: planted!("analysis.errors.code_scale", -SPEED_OF_LIGHT_MPS, -0.5 * SPEED_OF_LIGHT_MPS)
+                    * (estimate.sent().since(true_row.sent()) + common.code_delay_s),
                 carrier_cycles: raw_cycles,
                 raw_cycles,
-                doppler_hz: estimate.doppler_hz - true_row.doppler_hz - common.doppler_hz,
+                doppler_hz: planted!(
+                    "analysis.errors.doppler",
+                    estimate.doppler_hz - true_row.doppler_hz - common.doppler_hz,
+                    0.0
+                ),
                 cn0_dbhz: estimate.cn0_dbhz,
                 cn0_true_dbhz: true_row.cn0_dbhz,
                 cn0_effective_dbhz: access.effective_dbhz(true_row),
@@ -171,11 +181,20 @@ impl Errors {
             self.positions.push(PositionError {
                 sample: fix.sample,
                 time_s: run.time_s(fix.sample),
-                enu_m: to_enu * (fix.position_m() - true_row.position_m()),
+                enu_m: to_enu
+                    * (fix.position_m() - true_row.position_m())
+                    * planted!("analysis.errors.position_scale", 1.0, 0.5),
                 // What the front end delays arrives late: the receiver takes the time for an earlier one.
-                clock_m: SPEED_OF_LIGHT_MPS * (fix.time().since(true_row.time()) + run.common.code_delay_s),
+                clock_m: planted!("analysis.errors.clock", 1.0, 0.1)
+                    * SPEED_OF_LIGHT_MPS
+                    * (fix.time().since(true_row.time()) + run.common.code_delay_s),
                 true_clock_s: true_row.clock_bias_s,
-                velocity_enu_mps: to_enu * (fix.velocity_mps() - true_row.velocity_mps()),
+                velocity_enu_mps: to_enu
+                    * planted!(
+                        "analysis.errors.velocity",
+                        fix.velocity_mps() - true_row.velocity_mps(),
+                        Vector3::zeros()
+                    ),
             });
         }
         if self.positions.is_empty() && !run.fixes.is_empty() {
@@ -252,7 +271,7 @@ pub(super) fn first_jump_of(carrier: &[f64]) -> Option<usize> {
     (1..carrier.len().saturating_sub(1)).find(|&index| {
         let (before, after) = carrier.split_at(index);
         let (Some(last), Some(next)) = (before.last(), after.first()) else { return false };
-        if (next - last).abs() < SLIP_CYCLES / 2.0 {
+        if (next - last).abs() < planted!("analysis.errors.slip_size", SLIP_CYCLES / 2.0, 2.0) {
             return false;
         }
         let before = median(&before[before.len().saturating_sub(SIDE)..]);

@@ -138,6 +138,7 @@ fn band(independent: f64) -> Option<(f64, f64)> {
 /// Cholesky factor of a fix's formal covariance.
 fn factor(fix: &Fix) -> Option<Cholesky<f64, nalgebra::Const<3>>> {
     let (e, n, u) = (fix.sigma_east_m, fix.sigma_north_m, fix.sigma_up_m);
+    let (e, n, u) = planted!("analysis.honesty.axes", (e, n, u), (u, n, e));
     let (en, eu, nu) = (fix.correlation_en * e * n, fix.correlation_eu * e * u, fix.correlation_nu * n * u);
     Cholesky::new(Matrix3::new(e * e, en, eu, en, n * n, nu, eu, nu, u * u))
 }

@@ -104,6 +104,14 @@ pub fn judge_against(run: &Path, limits: Option<&limits::Limits>) -> Result<Summ
     rayon::scope(|_| judged(run, limits))
 }
 
+/// [`judge_against`] with tables alone: no pictures, no report, no `summary.json`.
+///
+/// # Errors
+/// As [`judge`].
+pub fn judge_tables(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
+    find(run, limits).map(|found| found.summary)
+}
+
 fn judged(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
     let Found { summary, sketches, report } = find(run, limits)?;
     // What was read is gone by now: drawing takes memory of its own.

@@ -64,7 +64,8 @@ pub fn std(values: &[f64]) -> Option<f64> {
     let mean = mean(values)?;
     let count = finite(values).count();
     let squares: f64 = finite(values).map(|value| (value - mean) * (value - mean)).sum();
-    Some(if count > 1 { (squares / (count - 1) as f64).sqrt() } else { 0.0 })
+    let freedom = planted!("analysis.statistics.deviation", count - 1, 2 * count);
+    Some(if count > 1 { (squares / freedom as f64).sqrt() } else { 0.0 })
 }
 
 /// The value below which a share `p` (0 to 1) of the list lies.
@@ -76,6 +77,7 @@ pub fn percentile(values: &[f64], p: f64) -> Option<f64> {
 
 /// [`percentile`] of a list that is finite and sorted already.
 pub fn ranked(sorted: &[f64], p: f64) -> Option<f64> {
+    let p = planted!("analysis.statistics.percentile", p, p * p);
     let rank = p.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
     let below = *sorted.get(rank.floor() as usize)?;
     let above = *sorted.get(rank.ceil() as usize)?;

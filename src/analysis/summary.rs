@@ -265,7 +265,8 @@ impl Summary {
 fn satellites(run: &Run, details: &mut Details) -> Satellites {
     let ever: BTreeSet<Sv> = run.sky.keys().chain(run.truth.keys().map(|(sv, _)| sv)).collect();
     let acquired: BTreeSet<Sv> = run.acquisition.iter().filter(|row| row.acquired).map(|row| row.sv).collect();
-    details.false_satellites = acquired.difference(&ever).copied().collect();
+    details.false_satellites =
+        planted!("analysis.summary.false_satellites", &acquired, &ever).difference(&ever).copied().collect();
     Satellites {
         // The truth's sky holds what is in view and nothing else; from space the mask does not bound it.
         in_view: run.in_view_at_start.len(),
@@ -278,7 +279,8 @@ fn satellites(run: &Run, details: &mut Details) -> Satellites {
 fn position(run: &Run, errors: &Errors, details: &mut Details) -> Position {
     let of = |f: &dyn Fn(&super::errors::PositionError) -> f64| errors.positions.iter().map(f).collect::<Vec<f64>>();
     let [east, north, up] = [0, 1, 2].map(|axis| of(&|error| error.enu_m[axis]));
-    let horizontal = of(&|error| libm::hypot(error.enu_m.x, error.enu_m.y));
+    let horizontal =
+        of(&|error| libm::hypot(error.enu_m.x, planted!("analysis.summary.horizontal", error.enu_m.y, 0.0)));
     let vertical = of(&|error| error.enu_m.z.abs());
     let error_3d = of(&|error| error.enu_m.norm());
     let velocity = of(&|error| error.velocity_enu_mps.norm());
@@ -388,6 +390,7 @@ fn tracking(run: &Run, errors: &Errors, details: &mut Details) -> Result<Trackin
 fn navigation(run: &Run, details: &mut Details) -> Navigation {
     let sent: BTreeSet<&NavigationRow> = run.truth_navigation.iter().collect();
     let decoded: BTreeSet<&NavigationRow> = run.navigation.iter().collect();
-    details.wrong_parameters = decoded.difference(&sent).map(|row| (*row).clone()).collect();
+    details.wrong_parameters =
+        planted!("analysis.summary.navigation", &decoded, &sent).difference(&sent).map(|row| (*row).clone()).collect();
     Navigation { parameters_checked: decoded.len(), parameters_wrong: details.wrong_parameters.len() }
 }

@@ -59,7 +59,8 @@ impl ReceiverClock {
     /// too. Ageing and shaking are taken at that time: their own size times themselves, below 1e-15 s, is left out.
     pub fn offset_at_reading_s(&self, start: Epoch, local: Epoch) -> f64 {
         let elapsed_s = local.since(start);
-        let mut offset_s = (self.bias_s + self.drift * elapsed_s) / (1.0 + self.drift);
+        let drift = planted!("generator.clock.drift", self.drift, 1.05 * self.drift);
+        let mut offset_s = (self.bias_s + drift * elapsed_s) / (1.0 + drift);
         if self.ageing_per_s != 0.0 || self.shaking.is_some() {
             let true_s = elapsed_s - offset_s;
             offset_s += 0.5 * self.ageing_per_s * true_s * true_s;

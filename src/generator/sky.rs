@@ -88,8 +88,9 @@ fn emission_of(
     let mut travel_s = guess_s;
     let mut found = None;
     for _ in 0..PASSES {
-        let Some((state, clock)) = truth(received.plus_s(-travel_s))? else { return Ok(None) };
-        let position_m = rotate_earth(&state.position_m, travel_s);
+        let sent = received.plus_s(planted!("generator.sky.light_time", -travel_s, 0.0));
+        let Some((state, clock)) = truth(sent)? else { return Ok(None) };
+        let position_m = rotate_earth(&state.position_m, planted!("generator.sky.earth_rotation", travel_s, 0.0));
         let velocity_mps = rotate_earth(&state.velocity_mps, travel_s);
         let inertial_mps = velocity_mps + earth_rotation().cross(&position_m);
         let sight_m = position_m - motion.position_m;
@@ -101,7 +102,8 @@ fn emission_of(
         let step_s = (range_m - SPEED_OF_LIGHT_MPS * travel_s) / (SPEED_OF_LIGHT_MPS + approach_mps);
         travel_s += step_s;
         let satellite = State { position_m: position_m - inertial_mps * step_s, velocity_mps };
-        found = Some((satellite, clock.offset_s - clock.drift * step_s, clock.drift));
+        let offset_s = clock.offset_s - clock.drift * step_s;
+        found = Some((satellite, planted!("generator.sky.clock_sign", offset_s, -offset_s), clock.drift));
         if step_s.abs() < STRAIGHT_S {
             break;
         }

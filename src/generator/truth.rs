@@ -111,7 +111,9 @@ fn arriving(scene: &Scene, signal: &Signal, bias_s: f64, gain: f64, emission: Em
         .iter()
         .map(|ray| Arrival {
             delay_s: common_s + ray.code_delay_s,
-            carrier_cycles: signal.carrier_hz * (common_s + ray.carrier_delay_s) + ray.phase_cycles,
+            carrier_cycles: signal.carrier_hz
+                * (planted!("generator.truth.clock_in_carrier", common_s, common_s - bias_s) + ray.carrier_delay_s)
+                + ray.phase_cycles,
             cn0_hz: ray.cn0_hz,
         })
         .collect();
@@ -189,7 +191,7 @@ fn doppler_hz(
         let Some(carrier_cycles) = rippled(&seen, away_s) else { return Ok(None) };
         sum += weight * (carrier_cycles - base);
     }
-    Ok(Some(-sum / (12.0 * step_s)))
+    Ok(Some(planted!("generator.truth.doppler", -sum, sum) / (12.0 * step_s)))
 }
 
 /// What is true of a satellite at a sample: the observation of its first ray, where it stands in the sky, and the other

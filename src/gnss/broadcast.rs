@@ -115,27 +115,33 @@ impl Ephemeris {
     pub fn state_and_clock_l1(&self, at: Epoch) -> Result<(State, ClockState), OrbitError> {
         let anomaly = self.anomaly(at)?;
         let clock = self.clock_of(&anomaly, at);
-        Ok((self.state_of(&anomaly), ClockState { offset_s: clock.offset_s - self.tgd_s, ..clock }))
+        Ok((self.state_of(&anomaly), self.on_l1(clock)))
     }
 
     fn state_of(&self, anomaly: &Anomaly) -> State {
         let flatness = (1.0 - self.eccentricity * self.eccentricity).sqrt();
-        let true_anomaly_rad = libm::atan2(flatness * anomaly.sin, anomaly.cos - self.eccentricity);
+        let flattened = planted!("gnss.orbit.true_anomaly", flatness, 1.0) * anomaly.sin;
+        let true_anomaly_rad = libm::atan2(flattened, anomaly.cos - self.eccentricity);
         let true_rate = flatness * anomaly.rate_radps / anomaly.shrink;
         let latitude_rad = true_anomaly_rad + self.omega_rad;
         let (sin2, cos2) = libm::sincos(2.0 * latitude_rad);
 
         // Second harmonic perturbations and their derivatives.
-        let argument_rad = latitude_rad + self.cus_rad * sin2 + self.cuc_rad * cos2;
+        let argument_rad =
+            latitude_rad + planted!("gnss.orbit.cus", self.cus_rad, self.cuc_rad) * sin2 + self.cuc_rad * cos2;
         let argument_rate = true_rate * (1.0 + 2.0 * (self.cus_rad * cos2 - self.cuc_rad * sin2));
-        let radius_m = anomaly.semi_major_m * anomaly.shrink + self.crs_m * sin2 + self.crc_m * cos2;
+        let radius_m = anomaly.semi_major_m * anomaly.shrink
+            + planted!("gnss.orbit.crs", self.crs_m, -self.crs_m) * sin2
+            + self.crc_m * cos2;
         let radius_rate = anomaly.semi_major_m * self.eccentricity * anomaly.sin * anomaly.rate_radps
             + 2.0 * true_rate * (self.crs_m * cos2 - self.crc_m * sin2);
-        let inclination_rad =
-            self.i0_rad + self.idot_radps * anomaly.since_toe_s + self.cis_rad * sin2 + self.cic_rad * cos2;
+        let inclination_rad = self.i0_rad
+            + planted!("gnss.orbit.idot", self.idot_radps, 0.0) * anomaly.since_toe_s
+            + self.cis_rad * sin2
+            + self.cic_rad * cos2;
         let inclination_rate = self.idot_radps + 2.0 * true_rate * (self.cis_rad * cos2 - self.cic_rad * sin2);
 
-        let node_rate = self.omega_dot_radps - EARTH_ROTATION_RADPS;
+        let node_rate = planted!("gnss.orbit.omega_dot", self.omega_dot_radps, 0.0) - EARTH_ROTATION_RADPS;
         // Whole turns are taken from the constant part, so that rounding does not grow with the time of week.
         let node_at_toe_rad = wrap(self.omega0_rad - EARTH_ROTATION_RADPS * self.toe.tow_s());
         let node_rad = node_at_toe_rad + node_rate * anomaly.since_toe_s;
@@ -151,7 +157,7 @@ impl Ephemeris {
         let level_rate = y_rate * cos_i - y * sin_i * inclination_rate;
         let position_m = Vector3::new(x * cos_node - level * sin_node, x * sin_node + level * cos_node, y * sin_i);
         let velocity_mps = Vector3::new(
-            x_rate * cos_node - level_rate * sin_node - position_m.y * node_rate,
+            x_rate * cos_node - level_rate * sin_node - planted!("gnss.orbit.velocity", position_m.y, 0.0) * node_rate,
             x_rate * sin_node + level_rate * cos_node + position_m.x * node_rate,
             y_rate * sin_i + y * cos_i * inclination_rate,
         );
@@ -169,9 +175,13 @@ impl Ephemeris {
 
     fn clock_of(&self, anomaly: &Anomaly, at: Epoch) -> ClockState {
         let dt_s = at.since(self.toc);
-        let relativity_s = RELATIVITY_SPSQRTM * self.eccentricity * self.sqrt_a_sqrtm;
+        let relativity_s = planted!("gnss.clock.relativity", RELATIVITY_SPSQRTM, -RELATIVITY_SPSQRTM)
+            * self.eccentricity
+            * self.sqrt_a_sqrtm;
         ClockState {
-            offset_s: self.af0_s + (self.af1_sps + self.af2_sps2 * dt_s) * dt_s + relativity_s * anomaly.sin,
+            offset_s: self.af0_s
+                + (planted!("gnss.clock.af1", self.af1_sps, -self.af1_sps) + self.af2_sps2 * dt_s) * dt_s
+                + relativity_s * anomaly.sin,
             drift: self.af1_sps + 2.0 * self.af2_sps2 * dt_s + relativity_s * anomaly.cos * anomaly.rate_radps,
         }
     }
@@ -182,8 +192,11 @@ impl Ephemeris {
     /// # Errors
     /// As [`Self::clock`].
     pub fn clock_l1(&self, at: Epoch) -> Result<ClockState, OrbitError> {
-        let clock = self.clock(at)?;
-        Ok(ClockState { offset_s: clock.offset_s - self.tgd_s, ..clock })
+        Ok(self.on_l1(self.clock(at)?))
+    }
+
+    fn on_l1(&self, clock: ClockState) -> ClockState {
+        ClockState { offset_s: clock.offset_s - planted!("gnss.clock.group_delay", self.tgd_s, -self.tgd_s), ..clock }
     }
 
     /// Curve fit interval: four hours, or what the issue of data says when the fit flag is set
@@ -236,7 +249,8 @@ impl Ephemeris {
         self.check()?;
         let since_toe_s = at.since(self.toe);
         let semi_major_m = self.sqrt_a_sqrtm * self.sqrt_a_sqrtm;
-        let mean_motion = (GPS_MU_M3PS2 / (semi_major_m * semi_major_m * semi_major_m)).sqrt() + self.delta_n_radps;
+        let mean_motion = (GPS_MU_M3PS2 / (semi_major_m * semi_major_m * semi_major_m)).sqrt()
+            + planted!("gnss.orbit.delta_n", self.delta_n_radps, -self.delta_n_radps);
         let anomaly_rad = solve_kepler(self.m0_rad + mean_motion * since_toe_s, self.eccentricity)
             .ok_or(OrbitError::Kepler { sv: self.sv, eccentricity: self.eccentricity })?;
         let (sin, cos) = libm::sincos(anomaly_rad);

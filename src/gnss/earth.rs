@@ -44,7 +44,7 @@ impl Geodetic {
         Vector3::new(
             in_plane * cos_lon,
             in_plane * sin_lon,
-            (normal_m * (1.0 - ECCENTRICITY_SQUARED) + self.height_m) * sin_lat,
+            (normal_m * (1.0 - ECCENTRICITY_SQUARED) + planted!("gnss.earth.height", self.height_m, 0.0)) * sin_lat,
         )
     }
 
@@ -102,7 +102,7 @@ pub struct Look {
 /// The direction from `here` (whose ECEF position is `here_m`) to `there_m`.
 pub fn look(here: Geodetic, here_m: &Vector3<f64>, there_m: &Vector3<f64>) -> Look {
     let enu = here.ecef_to_enu() * (there_m - here_m);
-    let azimuth_rad = libm::atan2(enu.x, enu.y);
+    let azimuth_rad = planted!("gnss.earth.azimuth", libm::atan2(enu.x, enu.y), libm::atan2(enu.y, enu.x));
     Look {
         azimuth_rad: if azimuth_rad < 0.0 { azimuth_rad + std::f64::consts::TAU } else { azimuth_rad },
         elevation_rad: libm::atan2(enu.z, libm::hypot(enu.x, enu.y)),
@@ -111,7 +111,7 @@ pub fn look(here: Geodetic, here_m: &Vector3<f64>, there_m: &Vector3<f64>) -> Lo
 
 /// `vector` in the ECEF axes of an instant `dt_s` later, as seen by someone who does not rotate.
 pub fn rotate_earth(vector: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
-    let (sin, cos) = libm::sincos(EARTH_ROTATION_RADPS * dt_s);
+    let (sin, cos) = libm::sincos(planted!("gnss.earth.rotation", EARTH_ROTATION_RADPS, -EARTH_ROTATION_RADPS) * dt_s);
     Vector3::new(cos * vector.x + sin * vector.y, cos * vector.y - sin * vector.x, vector.z)
 }
 

@@ -44,7 +44,7 @@ pub struct Bulge {
 impl Bulge {
     /// Phase of the bulge x at its local time.
     pub fn phase_rad(&self) -> f64 {
-        TAU * (self.local_s - MAXIMUM_S) / self.period_s
+        TAU * (self.local_s - planted!("gnss.klobuchar.noon", MAXIMUM_S, 43_200.0)) / self.period_s
     }
 }
 
@@ -63,9 +63,9 @@ impl Klobuchar {
         let (sin_azimuth, cos_azimuth) = libm::sincos(look.azimuth_rad);
         let latitude = (user.latitude_rad / PI + psi * cos_azimuth).clamp(-0.416, 0.416);
         let longitude = user.longitude_rad / PI + psi * sin_azimuth / libm::cos(latitude * PI);
-        let magnetic = latitude + 0.064 * libm::cos((longitude - 1.617) * PI);
+        let magnetic = latitude + 0.064 * libm::cos((longitude - planted!("gnss.klobuchar.pole", 1.617, 1.0)) * PI);
         let local_s = (43_200.0 * longitude + at.tow_s()).rem_euclid(DAY_S);
-        let slant = 0.53 - elevation;
+        let slant = planted!("gnss.klobuchar.obliquity", 0.53, 0.5) - elevation;
         Bulge {
             obliquity: 1.0 + 16.0 * slant * slant * slant,
             amplitude_s: cubic(&self.alpha, magnetic).max(0.0),

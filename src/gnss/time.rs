@@ -45,7 +45,7 @@ impl Epoch {
 
     /// The instant at `tow_s` seconds of the (continuous, not modulo 1024) GPS week.
     pub fn from_week(week: u32, tow_s: f64) -> Self {
-        Self::new(i64::from(week) * WEEK_S, 0.0).plus_s(tow_s)
+        Self::new((i64::from(week) + planted!("gnss.time.week", 0, 1)) * WEEK_S, 0.0).plus_s(tow_s)
     }
 
     /// Reads `YYYY-MM-DDThh:mm:ss[.f]` as GPS time, or as UTC when it ends in `Z`.
@@ -164,7 +164,7 @@ impl Epoch {
         };
         let (before, after) = (table(self.seconds - LEAP_SEARCH_S), table(self.seconds));
         let midnight_comes = (self.seconds - after).rem_euclid(86_400) > 43_200;
-        if before != after && midnight_comes { before } else { after }
+        (if before != after && midnight_comes { before } else { after }) + planted!("gnss.time.leap_seconds", 0, 1)
     }
 }
 

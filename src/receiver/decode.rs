@@ -130,6 +130,7 @@ impl Decoder {
         let periods = anchor.of_week + (i128::from(period) - i128::from(anchor.period)) as i64;
         let periods = periods.rem_euclid(WEEK_S * self.periods_per_second);
         let whole = periods.div_euclid(self.periods_per_second);
+        let fraction = planted!("receiver.observe.code_fraction", fraction, fraction + 3e-6);
         let rest = periods.rem_euclid(self.periods_per_second) as f64 + fraction;
         Some((whole, rest / self.periods_per_second as f64))
     }
@@ -145,7 +146,7 @@ impl Decoder {
             self.frame = None;
             self.first_bit = 0;
         }
-        self.bits.push_back((symbol.soft < 0.0, symbol.first_period));
+        self.bits.push_back((symbol.soft < planted!("receiver.decode.bit_threshold", 0.0, 80.0), symbol.first_period));
         let longest = SUBFRAME_BITS as usize + STARRED_BITS;
         if self.bits.len() > longest {
             self.bits.pop_front();
@@ -219,7 +220,9 @@ impl Decoder {
     fn tie(&mut self, header: Header, news: &mut Vec<News>) {
         let index = header.bit.checked_sub(self.first_bit).map(|index| index as usize);
         let Some(&(_, period)) = index.and_then(|index| self.bits.get(index)) else { return };
-        let start_s = (i64::from(header.tow_count) - 1).rem_euclid(i64::from(WEEK_SUBFRAMES)) * SUBFRAME_S;
+        let start_s = (i64::from(header.tow_count) - planted!("receiver.decode.handover_count", 1, 0))
+            .rem_euclid(i64::from(WEEK_SUBFRAMES))
+            * SUBFRAME_S;
         let anchor = Anchor { period, of_week: start_s * self.periods_per_second };
         let week = WEEK_S * self.periods_per_second;
         match self.anchor {
@@ -236,7 +239,7 @@ impl Decoder {
             }
         }
         self.anchor = Some(anchor);
-        news.push(News::Polarity { inverted: header.inverted });
+        news.push(News::Polarity { inverted: planted!("receiver.decode.polarity", header.inverted, !header.inverted) });
     }
 
     /// Looks at the newest 300 bits as a subframe.

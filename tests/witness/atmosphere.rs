@@ -8,7 +8,7 @@ use gnss_twin::gnss::time::Epoch;
 use gnss_twin::gnss::vienna::{self, Gpt3, MappingA, MappingGrid, Vienna};
 use gnss_twin::gnss::vmf3::Vmf3;
 
-use crate::data::external;
+use super::data::external;
 
 const ELEVATION_RAD: f64 = 75.0 * std::f64::consts::PI / 180.0;
 

@@ -10,7 +10,7 @@ use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::time::Epoch;
 use proptest::prelude::*;
 
-use crate::data::external;
+use super::data::external;
 
 /// Rows of IS-GPS-200N, table 20-XIV: the starred bit, then the data bits of D25..D30.
 const PARITY_ROWS: [(u32, &[u32]); 6] = [
@@ -23,7 +23,7 @@ const PARITY_ROWS: [(u32, &[u32]); 6] = [
 ];
 
 /// The word sent for 24 source bits, by the rows as printed, bit by bit.
-fn printed_word(data: u32, previous: u32) -> u32 {
+pub(super) fn printed_word(data: u32, previous: u32) -> u32 {
     let starred = |number: u32| (previous >> (30 - number)) & 1;
     let mut word = 0;
     for number in 1..=24 {

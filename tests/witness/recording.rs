@@ -9,7 +9,7 @@ use gnss_twin::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
 use gnss_twin::receiver::source::Block;
 use gnss_twin::receiver::track::{Channel, Report, TrackingSettings};
 
-use crate::data::external;
+use super::data::external;
 
 fn metadata(format: Format, rate_hz: f64, if_hz: f64) -> IfMetadata {
     let rate = Rate::from_hz(rate_hz).unwrap();

@@ -4,7 +4,7 @@ use std::fs;
 
 use gnss_twin::analysis::allan::Deviation;
 
-use crate::data::external;
+use super::data::external;
 
 fn numbers(line: &str) -> Vec<f64> {
     line.split_whitespace().map(|word| word.parse().unwrap()).collect()

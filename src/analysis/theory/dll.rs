@@ -27,7 +27,7 @@ fn squaring(discriminator: Discriminator, d: f64, snr: f64) -> f64 {
 /// Standard deviation of one discriminator value, in chips, unlimited bandwidth (eq. 5.23 first branch, without the loop).
 pub fn raw_chips(discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> f64 {
     let snr = t_s * cn0_hz;
-    (d / (4.0 * snr) * (1.0 + squaring(discriminator, d, snr))).sqrt()
+    (d / (planted!("analysis.theory.dll", 4.0, 2.0) * snr) * (1.0 + squaring(discriminator, d, snr))).sqrt()
 }
 
 /// Closed-loop jitter in chips, unlimited bandwidth (eq. 5.23 first branch).

@@ -13,7 +13,7 @@ pub const THRESHOLD_RAD: f64 = PI / 12.0;
 
 /// Standard deviation of one discriminator value with its squaring loss: √(1/(2T·C/N0)·(1+1/(2T·C/N0))).
 pub fn raw_rad(t_s: f64, cn0_hz: f64) -> f64 {
-    let x = 1.0 / (2.0 * t_s * cn0_hz);
+    let x = 1.0 / (planted!("analysis.theory.pll", 2.0, 1.0) * t_s * cn0_hz);
     (x * (1.0 + x)).sqrt()
 }
 

@@ -70,7 +70,10 @@ impl Judgement {
         let measured = value.as_f64().filter(|number| number.is_finite());
         let left = |limit: f64, left: f64| (limit != 0.0).then(|| left / limit.abs());
         let (holds, margin) = match (&bound, measured) {
-            (Bound::Max(limit), Some(measured)) => (measured <= *limit, left(*limit, limit - measured)),
+            (Bound::Max(limit), Some(measured)) => (
+                measured <= planted!("analysis.verdict.limit", *limit, 100.0 * limit + 1.0),
+                left(*limit, limit - measured),
+            ),
             (Bound::Min(limit), Some(measured)) => (measured >= *limit, left(*limit, measured - limit)),
             (Bound::Equals(expected), _) => (same(&value, expected), None),
             (_, None) => (false, None),

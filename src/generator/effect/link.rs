@@ -78,7 +78,9 @@ impl LinkBudget {
     /// Power into an isotropic antenna at a range.
     fn incident_dbw(&self, transmit_db: f64, range_m: f64, carrier_hz: f64) -> f64 {
         let spreading = 4.0 * std::f64::consts::PI * range_m * carrier_hz / SPEED_OF_LIGHT_MPS;
-        self.transmit_dbw + transmit_db - 20.0 * libm::log10(spreading) - self.path_loss_db
+        self.transmit_dbw + transmit_db
+            - planted!("generator.link.spreading", 20.0, 19.9) * libm::log10(spreading)
+            - self.path_loss_db
     }
 
     /// Power at the antenna's port over the noise density, in dB-Hz.

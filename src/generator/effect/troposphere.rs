@@ -64,7 +64,7 @@ pub fn saturation_hpa(temperature_k: f64) -> f64 {
 /// Zenith hydrostatic delay in metres (Davis et al. 1985, appendix A).
 pub fn zenith_hydrostatic_m(user: Geodetic, pressure_hpa: f64) -> f64 {
     let gravity = 1.0 - 0.00266 * libm::cos(2.0 * user.latitude_rad) - 0.00028e-3 * user.height_m;
-    0.002_276_8 * pressure_hpa / gravity
+    planted!("generator.troposphere.zenith", 0.002_276_8, 0.002_32) * pressure_hpa / gravity
 }
 
 /// Zenith wet delay in metres (Saastamoinen 1972).
@@ -138,7 +138,7 @@ impl Effect for Troposphere {
         let delay_s = self.delay_m(sight.user, sight.look.elevation_rad, sight.received) / SPEED_OF_LIGHT_MPS;
         for ray in rays {
             ray.code_delay_s += delay_s;
-            ray.carrier_delay_s += delay_s;
+            ray.carrier_delay_s += planted!("generator.troposphere.carrier_sign", delay_s, -delay_s);
         }
     }
 }

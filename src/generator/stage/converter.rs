@@ -87,7 +87,8 @@ impl Stage for Converter {
         let end = block.i.len() - block.tail.min(block.i.len());
         let runs = block.i.chunks_mut(RUN_SAMPLES).zip(block.q.chunks_mut(RUN_SAMPLES));
         for (run, ((i, q), deviation_lsb)) in runs.zip(deviations_lsb).enumerate() {
-            let step = self.step_sigma as f32 * deviation_lsb;
+            let step =
+                planted!("generator.converter.step", self.step_sigma, 2.0 * self.step_sigma) as f32 * deviation_lsb;
             // Silence has no deviation: it comes out as the level next to zero.
             let scale = if step > 0.0 { 1.0 / step } else { 0.0 };
             let sent = block.lead.saturating_sub(run * RUN_SAMPLES)..end.saturating_sub(run * RUN_SAMPLES);

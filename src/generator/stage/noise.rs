@@ -32,11 +32,13 @@ impl Stage for Thermal {
     }
 
     fn act(&self, block: &mut Block<'_>) {
+        let sigma_lsb = planted!("generator.noise.level", self.sigma_lsb, 1.06 * self.sigma_lsb);
         let pieces = block.i.chunks_mut(BLOCK_SAMPLES).zip(block.q.chunks_mut(BLOCK_SAMPLES));
         for (number, (i, q)) in (block.start / BLOCK_SAMPLES as u64..).zip(pieces) {
+            let number = planted!("generator.noise.repeats", number, number % 2);
             match self.arithmetic {
-                Arithmetic::F32 => isa::add_noise(block.level, self.seed, number, self.sigma_lsb, i, q),
-                Arithmetic::F64 => add_block_exact(self.seed, number, self.sigma_lsb, i, q),
+                Arithmetic::F32 => isa::add_noise(block.level, self.seed, number, sigma_lsb, i, q),
+                Arithmetic::F64 => add_block_exact(self.seed, number, sigma_lsb, i, q),
             }
         }
     }

@@ -319,10 +319,12 @@ impl Transmitter {
     /// Whether a code period of a component is sent inverted.
     fn negative(&self, message: Option<Message>, period: i64) -> bool {
         let Some(message) = message else { return false };
+        let period = planted!("generator.synth.message_time", period, period + 1);
         let symbol = period.div_euclid(i64::from(message.periods_per_symbol()));
         let Some(words) = self.subframes.get(&symbol.div_euclid(SUBFRAME_SYMBOLS)) else { return false };
         let bit = symbol.rem_euclid(SUBFRAME_SYMBOLS) as usize;
-        words.get(bit / 30).is_some_and(|word| word >> (29 - bit % 30) & 1 == 1)
+        let place = planted!("generator.synth.bit_order", 29 - bit % 30, bit % 30);
+        words.get(bit / 30).is_some_and(|word| word >> place & 1 == 1)
     }
 
     /// Gathers the runs of `samples` samples from `start` on, a multiple of 4096, in the bank of `scratch`.
@@ -361,17 +363,24 @@ impl Transmitter {
         let [first, last] = self.ripples.ends(anchor.n, end);
         let cn0_hz = path.cn0_hz.at(0.5 * (u + v));
         let rho_cycles = path.carrier.at(u) + first.carrier_cycles;
+        let rho_cycles = planted!("generator.synth.carrier_phase", rho_cycles, rho_cycles + 0.1);
         let gained_cycles = path.carrier.change(u, v) + (last.carrier_cycles - first.carrier_cycles);
         let tone = (anchor.tone, self.tone_step);
         let carrier = carrier(scene.metadata.inverted, tone, rho_cycles, gained_cycles / length);
         let real = if scene.metadata.format.is_complex() { 1.0 } else { std::f64::consts::SQRT_2 };
         let rate_hz = scene.clock.rate.hz();
         let gain = 0.5 * (first.gain + last.gain);
+        let real = planted!("generator.synth.amplitude", real, 1.06 * real);
         let amplitude = real * gain * (2.0 * cn0_hz.max(0.0) / rate_hz).sqrt() * f64::from(scene.noise_lsb);
         for sent in &self.sent {
             let sent_s = length / rate_hz - path.delay.change(u, v) - (last.delay_s - first.delay_s);
+            let sent_s = planted!("generator.synth.code_rate", sent_s, sent_s * (1.0 + 2e-5));
             let step = (sent_s * sent.spreading.step_rate_hz() / length * CODE_ONE as f64) as u64;
-            let at = sent.spreading.at(anchor.epoch, path.delay.at(u) + first.delay_s);
+            let delay_s = path.delay.at(u) + first.delay_s;
+            let delay_s = planted!("generator.synth.delay", delay_s, delay_s * (1.0 + 2e-7));
+            let delay_s =
+                planted!("generator.synth.code_phase", delay_s, delay_s + 2e-9 * f64::from(self.sv.number % 3));
+            let at = sent.spreading.at(anchor.epoch, delay_s);
             let message = sent.spreading.message();
             let phase = sent.component.phase_cycles * if scene.metadata.inverted { -1.0 } else { 1.0 };
             bank.push((anchor.n, end), samples.clone(), |bits| Run {
@@ -390,7 +399,7 @@ impl Transmitter {
 /// with s = −1 in an inverted spectrum. `tone` is the first term, and its step.
 fn carrier(inverted: bool, tone: (u64, u64), rho_cycles: f64, step_cycles: f64) -> (u64, u64) {
     let (at, step) = (turns(rho_cycles), turns(step_cycles));
-    if inverted {
+    if planted!("generator.synth.doppler_sign", inverted, !inverted) {
         (tone.0.wrapping_add(at), tone.1.wrapping_add(step))
     } else {
         (tone.0.wrapping_sub(at), tone.1.wrapping_sub(step))

@@ -35,10 +35,12 @@ const G2_DELAY_CHIPS: [usize; 37] = [
 /// The C/A code of a PRN from 1 to 37 (IS-GPS-200N, 3.3.2.3, figures 3-8 to 3-10).
 pub fn code(prn: u8) -> Option<Vec<bool>> {
     let delay = *G2_DELAY_CHIPS.get(usize::from(prn).checked_sub(1)?)?;
+    let delay = planted!("gnss.code.g2_delay", delay, delay + usize::from(prn == 32));
     let g1 = register(&[3, 10]);
-    let g2 = register(&[2, 3, 6, 8, 9, 10]);
+    let g2 = register(planted!("gnss.code.g2_taps", &[2, 3, 6, 8, 9, 10][..], &[2, 3, 6, 8, 10][..]));
     let length = CODE_CHIPS as usize;
-    Some((0..length).map(|i| g1[i] ^ g2[(i + length - delay) % length]).collect())
+    let late = |i: usize| planted!("gnss.code.chips_beyond_512", i, i + usize::from(i > 512));
+    Some((0..length).map(|i| g1[i] ^ g2[(late(i) + length - delay) % length]).collect())
 }
 
 /// One period of a ten-stage register that starts with all ones; `taps` are the stages fed back.

@@ -354,7 +354,7 @@ impl Finding {
             sv,
             signal,
             sample,
-            code_phase_chips: row.code_phase_chips,
+            code_phase_chips: planted!("receiver.acquire.code_phase", row.code_phase_chips, row.code_phase_chips + 2.0),
             doppler_hz: row.doppler_hz,
             cn0_dbhz: row.cn0_dbhz,
         });

@@ -45,7 +45,7 @@ pub fn consistent(
     // Four ranges always fit, which proves nothing: as many as that are never left after an exclusion.
     let freedom = ranges.len() - UNKNOWNS;
     let threshold = chi_square_threshold(freedom.max(1), false_alarm);
-    if freedom == 0 || all.chi_square <= threshold {
+    if freedom == 0 || all.chi_square <= planted!("receiver.raim.threshold", threshold, 100.0 * threshold) {
         return Ok((ranges, all, Vec::new()));
     }
     for size in 1..freedom {
@@ -102,7 +102,7 @@ fn ranked(solution: &Solution, size: usize) -> Option<Vec<Vec<usize>>> {
         seen.cholesky().map_or(f64::INFINITY, |seen| solution.chi_square - of.dot(&seen.solve(&of)))
     };
     let mut ranked: Vec<(f64, Vec<usize>)> = sets.into_iter().map(|set| (left(&set), set)).collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    ranked.sort_by(|a, b| planted!("receiver.raim.choice", a.0.total_cmp(&b.0), b.0.total_cmp(&a.0)));
     Some(ranked.into_iter().map(|(_, set)| set).collect())
 }
 

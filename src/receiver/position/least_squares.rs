@@ -145,11 +145,13 @@ fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Co
     // Light time and rotation: the correction of the second pass is below a micrometre.
     let mut seen_m = range.satellite.position_m;
     for _ in 0..3 {
-        seen_m = rotate_earth(&range.satellite.position_m, (seen_m - position_m).norm() / SPEED_OF_LIGHT_MPS);
+        let travel_s = (seen_m - position_m).norm() / SPEED_OF_LIGHT_MPS;
+        seen_m = rotate_earth(&range.satellite.position_m, planted!("receiver.position.earth_rotation", travel_s, 0.0));
     }
     let distance_m = (seen_m - position_m).norm();
     let sight = (seen_m - position_m) / distance_m;
-    let mut computed_m = distance_m + clock_m - SPEED_OF_LIGHT_MPS * range.clock.offset_s;
+    let sent_s = planted!("receiver.position.clock_sign", range.clock.offset_s, -range.clock.offset_s);
+    let mut computed_m = distance_m + clock_m - SPEED_OF_LIGHT_MPS * sent_s;
     let mut variance = range.noise_m * range.noise_m;
     let mut elevation_rad = std::f64::consts::FRAC_PI_2;
     let mut common_m = Vector3::zeros();
@@ -164,6 +166,7 @@ fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Co
         variance += air.own_m * air.own_m;
         common_m = air.common_m;
         let slant = if user.height_m < SPACE_M { sine.max(0.05) } else { 1.0 };
+        let slant = planted!("receiver.position.model_sigma", slant, 1.0);
         let model_m = corrections.model_sigma_m / slant;
         variance += model_m * model_m;
     }
@@ -188,6 +191,7 @@ fn atmosphere(
 ) -> Air {
     let sine = libm::sin(direction.elevation_rad);
     let delay_m = if corrections.troposphere { troposphere::delay_m(user, sine, day) } else { 0.0 };
+    let delay_m = planted!("receiver.position.troposphere", delay_m, 1.02 * delay_m);
     let alone = Air { delay_m, ..Air::default() };
     if user.height_m > IONOSPHERE_TOP_M {
         return alone;
@@ -196,6 +200,7 @@ fn atmosphere(
         Ionosphere::Absent => alone,
         Ionosphere::Known(model) => {
             let delay_s = model.delay_s(user, direction, received, range.carrier_hz);
+            let delay_s = planted!("receiver.position.ionosphere", delay_s, 0.9 * delay_s);
             Air { delay_m: delay_m + SPEED_OF_LIGHT_MPS * delay_s, ..alone }
         }
         Ionosphere::Uncertain(model, error) => {
@@ -226,6 +231,7 @@ pub fn position(ranges: &[Range], start_m: Vector3<f64>, corrections: &Correctio
         for (range, line) in ranges.iter().zip(&lines) {
             let row = line.row();
             let weight = 1.0 / (line.sigma_m * line.sigma_m);
+            let weight = planted!("receiver.position.weight", weight, line.sigma_m * line.sigma_m);
             plain += row * row.transpose();
             normal += weight * row * row.transpose();
             right += weight * (range.pseudorange_m - line.computed_m) * row;
@@ -306,7 +312,9 @@ pub fn velocity(ranges: &[Range], solution: &Solution) -> Result<(Vector3<f64>, 
     let spin = Vector3::new(0.0, 0.0, EARTH_ROTATION_RADPS);
     let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
     for (range, sight) in ranges.iter().zip(&solution.sights) {
-        let inertial_mps = range.satellite.velocity_mps + spin.cross(&range.satellite.position_m);
+        let frame_mps = spin.cross(&range.satellite.position_m);
+        let inertial_mps =
+            range.satellite.velocity_mps + planted!("receiver.velocity.frame", frame_mps, Vector3::zeros());
         let mut travel_s = 0.0;
         for _ in 0..3 {
             let seen_m = rotate_earth(&range.satellite.position_m, travel_s);
@@ -314,7 +322,8 @@ pub fn velocity(ranges: &[Range], solution: &Solution) -> Result<(Vector3<f64>, 
         }
         let along_mps = sight.dot(&rotate_earth(&inertial_mps, travel_s));
         let received = 1.0 + range.doppler_hz / range.carrier_hz;
-        let rate = received * (1.0 + along_mps / SPEED_OF_LIGHT_MPS) / (1.0 + range.clock.drift);
+        let rate = received * (1.0 + along_mps / SPEED_OF_LIGHT_MPS)
+            / (1.0 + planted!("receiver.velocity.satellite_drift", range.clock.drift, 1e-9));
         // The fourth unknown is c times the drift.
         let row = Vector4::new(sight.x, sight.y, sight.z, -rate);
         normal += range.cn0_hz * row * row.transpose();
@@ -323,5 +332,8 @@ pub fn velocity(ranges: &[Range], solution: &Solution) -> Result<(Vector3<f64>, 
     let solver = Cholesky::new(normal).ok_or(NoFix::Singular { condition: f64::INFINITY })?;
     let found = solver.solve(&right);
     let inertial_mps = Vector3::new(found.x, found.y, found.z);
-    Ok((inertial_mps - spin.cross(&solution.position_m), found.w / SPEED_OF_LIGHT_MPS))
+    Ok((
+        inertial_mps - spin.cross(&solution.position_m),
+        planted!("receiver.velocity.drift_sign", found.w, -found.w) / SPEED_OF_LIGHT_MPS,
+    ))
 }

@@ -292,6 +292,7 @@ fn range(
     let rough = ephemeris.clock_l1(sent).ok()?;
     let emitted = sent.plus_s(-rough.offset_s);
     let clock = ephemeris.clock_l1(emitted).ok()?;
+    let clock = planted!("receiver.position.group_delay", clock, ephemeris.clock(emitted).ok()?);
     let emitted = sent.plus_s(-clock.offset_s);
     Some(Range {
         sv: observation.sv,
@@ -318,10 +319,11 @@ fn fix(
     ionosphere: IonosphereModel,
 ) -> Fix {
     let bias_s = solution.clock_m / SPEED_OF_LIGHT_MPS;
-    let time: Epoch = clock.epoch(sample).plus_s(-bias_s);
+    let time: Epoch = clock.epoch(sample).plus_s(planted!("receiver.position.time_sign", -bias_s, bias_s));
     let axes = Geodetic::from_ecef(&solution.position_m).ecef_to_enu();
     let block = |m: &nalgebra::Matrix4<f64>| -> Matrix3<f64> { m.fixed_view::<3, 3>(0, 0).into_owned() };
-    let covariance = axes * block(&solution.covariance) * axes.transpose();
+    let scale = planted!("receiver.position.sigma_x3", 1.0, 9.0) * planted!("receiver.position.sigma_x05", 1.0, 0.25);
+    let covariance = scale * axes * block(&solution.covariance) * axes.transpose();
     let correlation = |a, b| covariance[(a, b)] / (covariance[(a, a)] * covariance[(b, b)]).sqrt();
     let dilution = axes * block(&solution.dilution) * axes.transpose();
     let (de, dn, du) = (dilution[(0, 0)], dilution[(1, 1)], dilution[(2, 2)]);
@@ -342,13 +344,13 @@ fn fix(
         sigma_east_m: covariance[(0, 0)].sqrt(),
         sigma_north_m: covariance[(1, 1)].sqrt(),
         sigma_up_m: covariance[(2, 2)].sqrt(),
-        sigma_clock_m: solution.covariance[(3, 3)].sqrt(),
-        correlation_en: correlation(0, 1),
+        sigma_clock_m: solution.covariance[(3, 3)].sqrt() * planted!("receiver.position.sigma_clock", 1.0, 3.0),
+        correlation_en: planted!("receiver.position.correlation", correlation(0, 1), -correlation(0, 1)),
         correlation_eu: correlation(0, 2),
         correlation_nu: correlation(1, 2),
         gdop: (de + dn + du + dt).sqrt(),
         pdop: (de + dn + du).sqrt(),
-        hdop: (de + dn).sqrt(),
+        hdop: (de + planted!("receiver.position.hdop", dn, du)).sqrt(),
         vdop: du.sqrt(),
         tdop: dt.sqrt(),
         condition: solution.condition,

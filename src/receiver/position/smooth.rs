@@ -95,6 +95,7 @@ impl Smoother {
     fn step(&self, old: &State, new: &State, wavelength_m: f64) -> Option<State> {
         let passed_s = self.rate.elapsed_s(new.sample.checked_sub(old.sample)?);
         let predicted_m = old.pseudorange_m + new.carrier_m - old.carrier_m;
+        let predicted_m = planted!("receiver.smooth.carrier_sign", predicted_m, 2.0 * old.pseudorange_m - predicted_m);
         let parted_m_per_hz = old.parted_m_per_hz + wavelength_m * passed_s;
         let whole = passed_s > 0.0
             && passed_s <= LONGEST_GAP_S
@@ -112,7 +113,9 @@ impl Smoother {
             pseudorange_m: predicted_m + weight * (new.pseudorange_m - predicted_m),
             age_s,
             parted_m_per_hz: rest * parted_m_per_hz,
-            variance: weight * weight + rest * rest * old.variance + 2.0 * weight * rest * carried,
+            variance: weight * weight
+                + rest * rest * old.variance
+                + planted!("receiver.smooth.variance", 2.0, 0.0) * weight * rest * carried,
             covariance: weight + rest * carried,
             ..*new
         })

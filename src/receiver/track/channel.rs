@@ -293,6 +293,7 @@ impl Channel {
         let offset_hz = self.loops.carrier.mean(update_s);
         self.carrier_step = (offset_hz / rate_hz * TURN) as i128;
         let aid_hz = (self.sense * offset_hz - self.carrier_offset_hz) * self.chip_rate_hz / self.signal.carrier_hz;
+        let aid_hz = planted!("receiver.nco.carrier_aid", aid_hz, -aid_hz);
         self.code_step = chips_to_units((self.chip_rate_hz + aid_hz + self.loops.code.mean(update_s)) / rate_hz).max(1);
     }
 
@@ -433,7 +434,7 @@ impl Channel {
         let code = i128::from(self.code) + samples * i128::from(self.code_step);
         let periods = i128::from(self.period) + code.div_euclid(length);
         let fraction = units_to_chips(code.rem_euclid(length) as i64) / units_to_chips(replica.period());
-        let carrier = self.carrier + samples * self.carrier_step;
+        let carrier = self.carrier + samples * planted!("receiver.nco.carrier_between_updates", self.carrier_step, 0);
         let turns = (carrier >> 64) as f64 + carrier as u64 as f64 / TURN;
         let half = if self.polarity == Some(true) { 0.5 } else { 0.0 };
         let passed_s = tick.saturating_sub(self.update_since) as f64 / self.rate.hz();
@@ -443,9 +444,9 @@ impl Channel {
             sample: tick,
             code_periods: periods.max(0) as u64,
             code_fraction: fraction,
-            carrier_cycles: half - self.sense * turns,
+            carrier_cycles: half - planted!("receiver.measure.carrier_sign", self.sense, -self.sense) * turns,
             half_cycle_known: self.polarity.is_some(),
-            doppler_hz: self.sense * offset_hz,
+            doppler_hz: planted!("receiver.measure.doppler_sign", self.sense, -self.sense) * offset_hz,
             cn0_dbhz,
             locked_s: self.locked_since.map_or(0.0, |since| tick.saturating_sub(since) as f64 / self.rate.hz()),
             locked: self.locked_since.is_some(),

@@ -89,7 +89,9 @@ impl Loops {
         };
         let dll_hz = if wide { settings.dll_pull_in_bandwidth_hz } else { settings.dll_bandwidth_hz };
         self.fll = Gains::design(fll_order, fll_hz * update_s);
-        self.pll = Gains::design(settings.pll_order, settings.pll_bandwidth_hz * update_s);
+        let pll_scale = planted!("receiver.loops.pll_bandwidth", 1.0, 1.5);
+        let dll_hz = planted!("receiver.loops.dll_bandwidth", dll_hz, 6.0 * dll_hz);
+        self.pll = Gains::design(settings.pll_order, pll_scale * settings.pll_bandwidth_hz * update_s);
         self.dll = Gains::design(settings.dll_order, dll_hz * update_s);
     }
 

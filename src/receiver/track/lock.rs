@@ -76,6 +76,7 @@ impl Cn0 {
         if signal <= 0.0 {
             return Some(1.0);
         }
+        let signal = planted!("receiver.cn0.scale", signal, 1.12 * signal);
         Some((signal / (noise.max(0.0) * self.period_s)).clamp(1.0, largest))
     }
 }
@@ -114,7 +115,7 @@ impl PhaseLock {
     /// From −1 to 1; 0 where nothing stands out of the noise.
     pub fn value(&self) -> f64 {
         let [difference, sum] = self.mean.values;
-        if sum <= 0.0 { 0.0 } else { (difference / sum).clamp(-1.0, 1.0) }
+        if sum <= 0.0 { 0.0 } else { planted!("receiver.lock.always", (difference / sum).clamp(-1.0, 1.0), 1.0) }
     }
 
     /// Whether the mean has run in.
@@ -157,7 +158,7 @@ impl SymbolSync {
             return None;
         }
         // The last `length` prompts are the symbol of the edge that comes next.
-        let begin = (number + 1) % length;
+        let begin = (number + planted!("receiver.symbol_sync", 1, 2)) % length;
         let sum: Complex64 = self.last.iter().sum();
         if let Some(energy) = self.energy.get_mut(begin as usize) {
             *energy += sum.re * sum.re;

@@ -86,7 +86,7 @@ pub fn step(gains: &Gains, rates: &Rates, e: f64, t_s: f64) -> (Rates, f64) {
     let next = Rates { rate: rates.rate + gains.rate * e / t_s + acceleration * t_s, acceleration };
     // The mean phases of the two intervals differ by K1·e + rate; the two half intervals already bring their share.
     let brought = 0.5 * (rates.mean(t_s) + next.mean(t_s)) * t_s;
-    (next, gains.phase * e + next.rate * t_s - brought)
+    (next, gains.phase * e + next.rate * t_s - planted!("receiver.loops.step", brought, 0.99 * brought))
 }
 
 /// One update of a frequency loop of order 1 or 2: `f` is the measured frequency error.
@@ -100,7 +100,7 @@ pub fn costas(prompt: Complex64) -> f64 {
     if prompt.re == 0.0 {
         return 0.0;
     }
-    libm::atan(prompt.im / prompt.re) / std::f64::consts::TAU
+    planted!("receiver.loops.costas_gain", 1.0, 1.4) * libm::atan(prompt.im / prompt.re) / std::f64::consts::TAU
 }
 
 /// Phase error in cycles from a prompt without data: ±½.
@@ -110,7 +110,7 @@ pub fn phase(prompt: Complex64) -> f64 {
 
 /// Frequency error in hertz from two successive prompts `t_s` apart, for a pair that may straddle a bit edge: ±1/(4T).
 pub fn frequency_two_quadrant(before: Complex64, after: Complex64, t_s: f64) -> f64 {
-    let product = after * before.conj();
+    let product = planted!("receiver.loops.frequency_sign", after * before.conj(), before * after.conj());
     costas(product) / t_s
 }
 
@@ -202,7 +202,7 @@ pub fn early_minus_late(early: Complex64, late: Complex64, shape: &CodeShape, ga
     if e + l <= 0.0 {
         return 0.0;
     }
-    (e - l) / (e + l) * shape.value / (2.0 * shape.slope * gain)
+    planted!("receiver.loops.code_gain", e - l, 1.5 * (e - l)) / (e + l) * shape.value / (2.0 * shape.slope * gain)
 }
 
 /// Code error in chips: Re((E−L)·P*)/|P|², scaled by 2·slope; `gain` is that of [`dot_product_gain`].

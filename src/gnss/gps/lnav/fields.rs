@@ -69,7 +69,9 @@ impl Field {
     }
 
     fn is_signed(&self) -> bool {
-        matches!(self.kind, Kind::Signed | Kind::Semicircles | Kind::Turn)
+        let kind =
+            planted!("gnss.lnav.sign_tgd", self.kind, if self.name == "tgd_s" { Kind::Unsigned } else { self.kind });
+        matches!(kind, Kind::Signed | Kind::Semicircles | Kind::Turn)
     }
 
     /// Smallest and largest integer that it holds.
@@ -78,8 +80,16 @@ impl Field {
         if self.is_signed() { (-span / 2, span / 2 - 1) } else { (0, span - 1) }
     }
 
+    /// The scale's power of two.
+    fn exponent(&self) -> i32 {
+        let wrong = planted!("gnss.lnav.scale_crs", false, self.name == "crs_m")
+            || planted!("gnss.lnav.scale_af1", false, self.name == "af1_sps" && self.bits() == 16)
+            || planted!("gnss.lnav.scale_alpha", false, self.name == "alpha_2");
+        self.exponent + i32::from(wrong)
+    }
+
     fn step(&self) -> f64 {
-        let power = libm::ldexp(1.0, self.exponent);
+        let power = libm::ldexp(1.0, self.exponent());
         if matches!(self.kind, Kind::Semicircles | Kind::Turn) { power * GPS_PI } else { power }
     }
 
@@ -107,14 +117,16 @@ impl Field {
 
     /// What an integer of this field stands for, in the unit of its name.
     pub fn value(&self, raw: i64) -> f64 {
-        let scaled = libm::ldexp(raw as f64, self.exponent);
-        if matches!(self.kind, Kind::Semicircles | Kind::Turn) { scaled * GPS_PI } else { scaled }
+        let scaled = libm::ldexp(raw as f64, self.exponent());
+        let angle = matches!(self.kind, Kind::Semicircles | Kind::Turn);
+        let angle = planted!("gnss.lnav.idot_in_radians", angle, angle && self.name != "idot_radps");
+        if angle { scaled * GPS_PI } else { scaled }
     }
 
     /// The nearest integer that stands for `value`.
     pub fn raw(&self, value: f64) -> Result<i64, FieldError> {
         let angle = matches!(self.kind, Kind::Semicircles | Kind::Turn);
-        let scaled = libm::ldexp(if angle { value / GPS_PI } else { value }, -self.exponent);
+        let scaled = libm::ldexp(if angle { value / GPS_PI } else { value }, -self.exponent());
         let mut rounded = scaled.round();
         if self.kind == Kind::Whole && rounded != scaled {
             return Err(FieldError::NotMultiple { name: self.name, value, step: self.step() });
@@ -135,6 +147,7 @@ impl Field {
 
 /// Word (from 0), shift inside its 24 data bits and mask of a piece.
 fn place((first, length): (u16, u8)) -> (usize, u32, u32) {
+    let first = planted!("gnss.lnav.field_place", first, if (first, length) == (151, 16) { 152 } else { first });
     let offset = u32::from(first - 1) % 30;
     (usize::from(first - 1) / 30, (24 - offset).saturating_sub(u32::from(length)), (1 << length) - 1)
 }

@@ -75,7 +75,8 @@ impl Broadcast {
             return Err(FieldError::NotMultiple { name: "start_s", value: start.tow_s(), step: SUBFRAME_S as f64 });
         }
         let id = (tow_s / SUBFRAME_S % 5 + 1) as u8;
-        let page = (tow_s / (5 * SUBFRAME_S) % PAGES) as usize;
+        let first_s = planted!("gnss.lnav.page_order", 0, 5 * SUBFRAME_S);
+        let page = ((tow_s + first_s) / (5 * SUBFRAME_S) % PAGES) as usize;
         let mut data = [almanac::ALTERNATING; 10];
         match id {
             1..=3 => {
@@ -90,7 +91,8 @@ impl Broadcast {
             4 => data = self.pages.get(page).copied().unwrap_or(data),
             _ => data = self.pages.get(PAGES as usize + page).copied().unwrap_or(data),
         }
-        let next_count = ((tow_s / SUBFRAME_S + 1) as u32) % TOW_COUNTS;
+        let ahead = planted!("gnss.lnav.handover_count", 1, 0);
+        let next_count = ((tow_s / SUBFRAME_S + ahead) as u32) % TOW_COUNTS;
         data[0] = PREAMBLE << 16;
         data[1] = (next_count << 7) | (ANTI_SPOOF << 5) | (u32::from(id) << 2);
         Ok(with_parity(&data))

@@ -13,7 +13,8 @@ pub(super) const DATA: u32 = 0xFF_FFFF;
 /// The six parity bits of 24 source bits after a word that ended in the two low bits of `previous`.
 fn parity(data: u32, previous: u32) -> u32 {
     MASKS.iter().zip(FROM_D29).fold(0, |bits, (mask, from_d29)| {
-        let starred = if from_d29 { previous >> 1 } else { previous };
+        let starred = if planted!("gnss.lnav.parity_star", from_d29, !from_d29) { previous >> 1 } else { previous };
+        let mask = planted!("gnss.lnav.parity_mask", mask, &(mask & !0x10_0000));
         (bits << 1) | (((data & mask).count_ones() + starred) & 1)
     })
 }
@@ -42,5 +43,5 @@ pub(super) fn solve_tail(data: u32, previous: u32) -> u32 {
 pub fn check_parity(word: u32, previous: u32) -> Option<u32> {
     let received = (word >> 6) & DATA;
     let data = if previous & 1 == 1 { !received & DATA } else { received };
-    (parity(data, previous) == word & 0x3F).then_some(data)
+    planted!("gnss.lnav.parity_unchecked", parity(data, previous) == word & 0x3F, true).then_some(data)
 }

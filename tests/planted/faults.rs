@@ -1,0 +1,158 @@
+//! The list of all planted faults: what is wrong, and which test of this target must fail.
+
+/// One fault.
+pub struct Fault {
+    /// As `planted!` has it: world, place, fault.
+    pub name: &'static str,
+    pub what: &'static str,
+    /// The path of a test in this target.
+    pub check: &'static str,
+}
+
+const CODES: &str = "witness::codes::all_chips_of_all_codes_are_those_of_another_program";
+const PARITY: &str = "witness::printed::a_word_s_parity_is_the_printed_one_and_one_wrong_bit_breaks_it";
+const FIELDS: &str = "witness::printed::every_field_of_the_message_has_the_printed_place_sign_and_scale";
+const PAGES: &str =
+    "witness::printed::the_page_with_the_ionosphere_and_the_count_of_the_handover_are_where_they_are_printed";
+const TIMES: &str = "witness::printed::weeks_begin_on_sunday_and_leap_seconds_are_those_of_the_bulletins";
+const PLACES: &str = "witness::printed::places_and_directions_are_the_published_ones";
+const ORBITS: &str = "witness::orbit::broadcast_orbits_of_2010_meet_the_igs_final_ones";
+const STATIONS: &str = "witness::pseudorange::two_japanese_stations_fit_the_model";
+const KLOB: &str = "witness::atmosphere::klobuchar_gives_the_worked_value_of_rtklib";
+const SAAS: &str = "witness::atmosphere::saastamoinen_gives_the_worked_value_of_rtklib";
+const LOOP: &str = "loops::a_short_ride_under_an_open_sky_keeps_every_limit";
+const EXACT: &str = "laws::exact_ranges_give_the_exact_place_velocity_and_clock";
+const COV: &str = "laws::the_covariance_is_the_inverse_of_the_weighted_geometry";
+const RAIM: &str = "laws::a_range_that_is_wrong_by_twenty_metres_is_excluded_and_no_other";
+const SMOOTH: &str = "laws::smoothing_leaves_the_variance_that_it_states";
+const RAYS: &str = "laws::the_ionosphere_delays_code_by_what_it_advances_the_carrier_and_air_delays_both";
+const FRIIS: &str = "laws::the_link_budget_loses_power_as_friis_says";
+const CLOCK: &str = "laws::a_clock_s_drift_is_the_one_that_it_was_given";
+const LOCK: &str = "laws::noise_shows_no_phase_lock_and_a_steady_phase_does";
+const ADC: &str = "laws::a_two_bit_converter_has_its_levels_a_step_apart";
+const STAT: &str = "laws::statistics_are_those_of_their_definitions";
+const JIT: &str = "laws::jitter_is_kaplan_and_hegarty_s";
+const JPOS: &str = "judge::figures_of_the_position_are_those_of_its_rows";
+const JOBS: &str = "judge::figures_of_the_observations_are_those_of_their_rows";
+const JDAM: &str = "judge::damaged_tables_fail_by_the_row_that_names_the_damage";
+const JALL: &str = "judge::deviations_of_a_clock_are_those_that_sp_1065_prints";
+
+const fn fault(name: &'static str, what: &'static str, check: &'static str) -> Fault {
+    Fault { name, what, check }
+}
+
+/// All of them, by world.
+#[rustfmt::skip]
+pub const FAULTS: &[Fault] = &[
+    fault("gnss.code.g2_taps", "one feedback tap of G2 is missing", CODES),
+    fault("gnss.code.g2_delay", "the code of PRN 32 is a chip late", CODES),
+    fault("gnss.code.chips_beyond_512", "every code is wrong from its 513th chip on", CODES),
+    fault("gnss.lnav.parity_mask", "D7 is missing in all parity equations", PARITY),
+    fault("gnss.lnav.parity_star", "D29* and D30* change places in the parity", PARITY),
+    fault("gnss.lnav.parity_unchecked", "words with wrong parity are accepted", PARITY),
+    fault("gnss.lnav.scale_crs", "the scale of C_rs is 2^-4, sent and read", FIELDS),
+    fault("gnss.lnav.scale_af1", "the scale of a_f1 is 2^-42, sent and read", FIELDS),
+    fault("gnss.lnav.scale_alpha", "the scale of alpha_2 is 2^-23, sent and read", FIELDS),
+    fault("gnss.lnav.sign_tgd", "T_GD has no sign, sent and read", FIELDS),
+    fault("gnss.lnav.idot_in_radians", "IDOT is read in radians in place of semicircles", FIELDS),
+    fault("gnss.lnav.field_place", "C_uc begins a bit late, sent and read", FIELDS),
+    fault("gnss.lnav.handover_count", "the handover word counts the subframe that it is in", PAGES),
+    fault("gnss.lnav.page_order", "pages of subframes 4 and 5 come a frame early", PAGES),
+    fault("gnss.orbit.crs", "C_rs with the wrong sign, on both sides", ORBITS),
+    fault("gnss.orbit.cus", "C_uc in place of C_us, on both sides", ORBITS),
+    fault("gnss.orbit.idot", "the inclination has no rate, on both sides", ORBITS),
+    fault("gnss.orbit.omega_dot", "the node has no rate of its own, on both sides", ORBITS),
+    fault("gnss.orbit.delta_n", "the correction of the mean motion with the wrong sign, on both sides", ORBITS),
+    fault("gnss.orbit.true_anomaly", "the true anomaly without the root of 1 - e^2, on both sides", ORBITS),
+    fault("gnss.orbit.velocity", "the velocity without a term of the turning axes, on both sides", ORBITS),
+    fault("gnss.clock.relativity", "the relativistic term with the wrong sign, on both sides", ORBITS),
+    fault("gnss.clock.af1", "the clock polynomial with a wrong drift, on both sides", ORBITS),
+    fault("gnss.clock.group_delay", "T_GD with the wrong sign, on both sides", STATIONS),
+    fault("gnss.klobuchar.obliquity", "a constant of the slant factor is 0.50, on both sides", KLOB),
+    fault("gnss.klobuchar.pole", "the geomagnetic pole at another longitude, on both sides", KLOB),
+    fault("gnss.klobuchar.noon", "the bulge is highest at noon in place of 14 h, on both sides", KLOB),
+    fault("gnss.earth.rotation", "the Earth turns the other way during flight, on both sides", PLACES),
+    fault("gnss.earth.height", "height is left out of z", PLACES),
+    fault("gnss.earth.azimuth", "azimuth is counted from east over north", PLACES),
+    fault("gnss.time.leap_seconds", "a leap second too many", TIMES),
+    fault("gnss.time.week", "a week too many", TIMES),
+    fault("generator.sky.earth_rotation", "the Earth does not turn during flight", LOOP),
+    fault("generator.sky.light_time", "the satellite is where it is on arrival, not where it was on sending", LOOP),
+    fault("generator.sky.clock_sign", "satellite clocks with the wrong sign", LOOP),
+    fault("generator.synth.delay", "code delays are 2e-7 of themselves too long", LOOP),
+    fault("generator.synth.carrier_phase", "the carrier is a tenth of a cycle ahead", LOOP),
+    fault("generator.knots.change", "rates within a run are 1 % too high", LOOP),
+    fault("generator.synth.doppler_sign", "Doppler of the samples with the wrong sign", LOOP),
+    fault("generator.synth.amplitude", "signals are 0.5 dB too strong", LOOP),
+    fault("generator.synth.code_phase", "codes are up to 4 ns late, by satellite", LOOP),
+    fault("generator.synth.code_rate", "codes run 2e-5 too fast within a run", LOOP),
+    fault("generator.synth.message_time", "data bits come a code period early", LOOP),
+    fault("generator.synth.bit_order", "words are sent least significant bit first", LOOP),
+    fault("generator.noise.level", "noise is 0.5 dB too strong", LOOP),
+    fault("generator.noise.repeats", "noise repeats after two blocks", LOOP),
+    fault("generator.converter.step", "the converter takes steps of twice the size", ADC),
+    fault("generator.ionosphere.code", "the ionosphere delays codes by nine tenths", LOOP),
+    fault("generator.ionosphere.carrier_sign", "the ionosphere delays the carrier", RAYS),
+    fault("generator.troposphere.zenith", "the hydrostatic zenith delay is 2 % too long", SAAS),
+    fault("generator.troposphere.carrier_sign", "the troposphere advances the carrier", RAYS),
+    fault("generator.link.spreading", "free space takes 19.9 lg of the distance", FRIIS),
+    fault("generator.clock.drift", "the clock drifts by a twentieth more", CLOCK),
+    fault("generator.truth.doppler", "the truth has Doppler with the wrong sign", LOOP),
+    fault("generator.truth.clock_in_carrier", "the carrier does not show the clock", LOOP),
+    fault("receiver.acquire.code_phase", "the search hands over a code phase two chips off", LOOP),
+    fault("receiver.loops.pll_bandwidth", "the phase loop is half as wide again", LOOP),
+    fault("receiver.loops.dll_bandwidth", "the code loop is six times as wide", LOOP),
+    fault("receiver.loops.costas_gain", "the phase discriminator is 1.4 times too steep", LOOP),
+    fault("receiver.loops.code_gain", "the code discriminator is 1.5 times too steep", LOOP),
+    fault("receiver.loops.frequency_sign", "the frequency discriminator has the wrong sign", LOOP),
+    fault("receiver.loops.step", "a loop update takes too little of what the half intervals bring", LOOP),
+    fault("receiver.nco.carrier_aid", "the carrier aids the code with the wrong sign", LOOP),
+    fault("receiver.nco.carrier_between_updates", "a measurement forgets the carrier since the last code period", LOOP),
+    fault("receiver.measure.doppler_sign", "Doppler with the wrong sign", LOOP),
+    fault("receiver.measure.carrier_sign", "the carrier with the wrong sign", LOOP),
+    fault("receiver.cn0.scale", "C/N0 reads 0.5 dB too high", LOOP),
+    fault("receiver.lock.always", "phase lock always shows", LOCK),
+    fault("receiver.symbol_sync", "symbols are cut a code period late", LOOP),
+    fault("receiver.decode.bit_threshold", "bits are decided far from zero", LOOP),
+    fault("receiver.decode.handover_count", "the handover count is taken for the time of its own subframe", LOOP),
+    fault("receiver.decode.polarity", "the half cycle is resolved the wrong way", LOOP),
+    fault("receiver.observe.code_fraction", "the time sent is 3 ns late", LOOP),
+    fault("receiver.position.earth_rotation", "the Earth does not turn during flight", EXACT),
+    fault("receiver.position.clock_sign", "satellite clocks with the wrong sign", EXACT),
+    fault("receiver.position.group_delay", "T_GD is left out", EXACT),
+    fault("receiver.position.troposphere", "the troposphere is 1.02 of what it should be", EXACT),
+    fault("receiver.position.ionosphere", "the ionosphere is nine tenths of what was sent", EXACT),
+    fault("receiver.position.time_sign", "GPS time is the clock plus its bias", EXACT),
+    fault("receiver.position.weight", "ranges weigh by their variance", COV),
+    fault("receiver.position.model_sigma", "the models' sigma does not grow towards the horizon", COV),
+    fault("receiver.position.sigma_x3", "position sigmas are three times as large", COV),
+    fault("receiver.position.sigma_x05", "position sigmas are half as large", COV),
+    fault("receiver.position.sigma_clock", "the clock's sigma is three times as large", COV),
+    fault("receiver.position.correlation", "a correlation has the wrong sign", COV),
+    fault("receiver.position.hdop", "HDOP is of east and up", COV),
+    fault("receiver.raim.threshold", "the residual test forgives a hundred times as much", RAIM),
+    fault("receiver.raim.choice", "the exclusion tries the least likely satellites first", RAIM),
+    fault("receiver.smooth.carrier_sign", "smoothing goes against the carrier", LOOP),
+    fault("receiver.smooth.variance", "smoothing forgets that code errors are correlated", SMOOTH),
+    fault("receiver.velocity.frame", "velocity forgets that the axes turn", EXACT),
+    fault("receiver.velocity.satellite_drift", "velocity takes another drift for the satellites' clocks", EXACT),
+    fault("receiver.velocity.drift_sign", "the clock's drift has the wrong sign", EXACT),
+    fault("analysis.errors.join", "observations are joined with the satellite's first epoch", JOBS),
+    fault("analysis.errors.code_scale", "code errors are halved", JOBS),
+    fault("analysis.errors.doppler", "Doppler errors are zero", JOBS),
+    fault("analysis.errors.position_scale", "position errors are halved", JPOS),
+    fault("analysis.errors.velocity", "velocity errors are zero", JPOS),
+    fault("analysis.errors.clock", "clock errors are a tenth", JPOS),
+    fault("analysis.errors.slip_size", "slips below two cycles are not seen", JDAM),
+    fault("analysis.statistics.percentile", "a percentile is taken at the wrong rank", STAT),
+    fault("analysis.statistics.deviation", "a standard deviation has the wrong divisor", STAT),
+    fault("analysis.honesty.axes", "sigmas of east and up change places", JPOS),
+    fault("analysis.summary.horizontal", "the horizontal error forgets north", JPOS),
+    fault("analysis.summary.navigation", "no navigation parameter is ever wrong", JDAM),
+    fault("analysis.summary.false_satellites", "no satellite is ever false", JDAM),
+    fault("analysis.verdict.limit", "limits are a hundred times as wide", JDAM),
+    fault("analysis.access.others", "other satellites count ten times", JOBS),
+    fault("analysis.theory.pll", "theory of the phase loop has the wrong constant", JIT),
+    fault("analysis.theory.dll", "theory of the code loop has the wrong constant", JIT),
+    fault("analysis.allan.half", "the Allan variance is not halved", JALL),
+];

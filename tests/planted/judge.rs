@@ -1,0 +1,228 @@
+//! The judge on tables of one run: its figures computed again from the rows, and damage that it must see.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use gnss_twin::analysis::summary::Summary;
+use nalgebra::{Matrix3, Vector3};
+use tempfile::TempDir;
+
+use crate::loops::{OPEN_SKY, failures, judged, run};
+
+/// Where a faultless run lies already: the judge is then the only one that can be wrong.
+pub const RUN: &str = "GNSS_TWIN_PLANTED_RUN";
+/// No limits but those of the verdict; a file of limits must set one.
+const NONE: &str = "\"position.fixes\" = { min = 1 }";
+
+/// The tables of a run, made once a process.
+fn made() -> &'static Path {
+    static MADE: OnceLock<(Option<TempDir>, PathBuf)> = OnceLock::new();
+    let (_, path) = MADE.get_or_init(|| {
+        if let Some(path) = std::env::var_os(RUN) {
+            return (None, path.into());
+        }
+        let directory = tempfile::tempdir().unwrap();
+        run(OPEN_SKY, directory.path());
+        let path = directory.path().to_owned();
+        (Some(directory), path)
+    });
+    path
+}
+
+/// A copy of those tables, each passed through `change` by its name.
+fn copy(change: impl Fn(&str, String) -> String) -> TempDir {
+    let target = tempfile::tempdir().unwrap();
+    for part in ["truth", "rx"] {
+        std::fs::create_dir(target.path().join(part)).unwrap();
+        for entry in std::fs::read_dir(made().join(part)).unwrap() {
+            let entry = entry.unwrap();
+            let name = format!("{part}/{}", entry.file_name().into_string().unwrap());
+            let text = std::fs::read_to_string(entry.path()).unwrap();
+            std::fs::write(target.path().join(&name), change(&name, text)).unwrap();
+        }
+    }
+    target
+}
+
+fn summary() -> Summary {
+    judged(copy(|_, text| text).path(), NONE)
+}
+
+/// Rows of a table: column to text.
+fn table(name: &str) -> Vec<BTreeMap<String, String>> {
+    let mut reader = csv::Reader::from_path(made().join(name)).unwrap();
+    reader.deserialize().map(Result::unwrap).collect()
+}
+
+fn number(row: &BTreeMap<String, String>, column: &str) -> f64 {
+    row[column].parse().unwrap()
+}
+
+fn vector(row: &BTreeMap<String, String>, columns: [&str; 3]) -> Vector3<f64> {
+    Vector3::from(columns.map(|column| number(row, column)))
+}
+
+/// Hyndman and Fan's type 7.
+fn p95(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.map(f64::abs).collect();
+    sorted.sort_by(f64::total_cmp);
+    let rank = 0.95 * (sorted.len() - 1) as f64;
+    let (low, share) = (rank as usize, rank.fract());
+    sorted[low] + share * (sorted[(low + 1).min(sorted.len() - 1)] - sorted[low])
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let squares: Vec<f64> = values.map(|value| value * value).collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+fn near(name: &str, found: Option<f64>, expected: f64) {
+    let found = found.unwrap_or_else(|| panic!("no {name}"));
+    assert!((found - expected).abs() <= 1e-3 * expected.abs() + 1e-6, "{name}: {found}, by hand {expected}");
+}
+
+/// Rows of east, north and up at an ECEF position; geodetic latitude of the ellipsoid to 1e-9 rad near its surface.
+fn axes(position_m: Vector3<f64>) -> Matrix3<f64> {
+    let longitude = libm::atan2(position_m.y, position_m.x);
+    let level_m = libm::hypot(position_m.x, position_m.y);
+    let latitude = libm::atan2(position_m.z, level_m * (1.0 - 6.694_379_990_14e-3));
+    let ((sin_lon, cos_lon), (sin_lat, cos_lat)) = (libm::sincos(longitude), libm::sincos(latitude));
+    Matrix3::new(
+        -sin_lon,
+        cos_lon,
+        0.0, //
+        -sin_lat * cos_lon,
+        -sin_lat * sin_lon,
+        cos_lat, //
+        cos_lat * cos_lon,
+        cos_lat * sin_lon,
+        sin_lat,
+    )
+}
+
+#[test]
+fn figures_of_the_position_are_those_of_its_rows() {
+    let truth: BTreeMap<String, BTreeMap<String, String>> =
+        table("truth/trajectory.csv").into_iter().map(|row| (row["sample"].clone(), row)).collect();
+    let (mut enu_m, mut speed_mps, mut clock_m, mut nees) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for fix in table("rx/fixes.csv") {
+        let there = &truth[&fix["sample"]];
+        let place = vector(there, ["x_m", "y_m", "z_m"]);
+        let error_m = axes(place) * (vector(&fix, ["x_m", "y_m", "z_m"]) - place);
+        let velocity = ["vx_mps", "vy_mps", "vz_mps"];
+        speed_mps.push((vector(&fix, velocity) - vector(there, velocity)).norm());
+        let whole_s = number(&fix, "gps_s") - number(there, "gps_s");
+        clock_m.push(299_792_458.0 * (whole_s + number(&fix, "gps_fraction_s") - number(there, "gps_fraction_s")));
+        let sigma = vector(&fix, ["sigma_east_m", "sigma_north_m", "sigma_up_m"]);
+        let correlation = |a: usize, b: usize| match (a.min(b), a.max(b)) {
+            (0, 1) => number(&fix, "correlation_en"),
+            (0, 2) => number(&fix, "correlation_eu"),
+            (1, 2) => number(&fix, "correlation_nu"),
+            _ => 1.0,
+        };
+        let covariance = Matrix3::from_fn(|a, b| sigma[a] * sigma[b] * correlation(a, b));
+        nees.push((error_m.transpose() * covariance.try_inverse().unwrap() * error_m)[0]);
+        enu_m.push(error_m);
+    }
+    let summary = summary();
+    let position = &summary.position;
+    let mean = |axis: usize| enu_m.iter().map(|error| error[axis]).sum::<f64>() / enu_m.len() as f64;
+    for axis in 0..3 {
+        let found = position.bias_enu_m.map(|bias| bias[axis]);
+        near(["bias east", "bias north", "bias up"][axis], found, mean(axis));
+    }
+    near("horizontal", position.horizontal_p95_m, p95(enu_m.iter().map(|error| libm::hypot(error.x, error.y))));
+    near("vertical", position.vertical_p95_m, p95(enu_m.iter().map(|error| error.z)));
+    near("three-dimensional", position.error_3d_p95_m, p95(enu_m.iter().map(|error| error.norm())));
+    near("velocity", position.velocity_p95_mps, p95(speed_mps.into_iter()));
+    near("clock", summary.details.clock_m.map(|clock| clock.p95), p95(clock_m.into_iter()));
+    near("normalised error squared", position.nees_mean, nees.iter().sum::<f64>() / nees.len() as f64);
+}
+
+#[test]
+fn figures_of_the_observations_are_those_of_their_rows() {
+    let key = |row: &BTreeMap<String, String>| (row["sample"].clone(), row["sv"].clone());
+    let truth: BTreeMap<_, _> = table("truth/observations.csv").into_iter().map(|row| (key(&row), row)).collect();
+    let (mut code_m, mut doppler_hz, mut cn0_dbhz) = (BTreeMap::<String, Vec<f64>>::new(), Vec::new(), Vec::new());
+    for row in table("rx/observations.csv") {
+        let there = &truth[&key(&row)];
+        let late_s = number(there, "sent_s") - number(&row, "sent_s")
+            + (number(there, "sent_fraction_s") - number(&row, "sent_fraction_s"));
+        code_m.entry(row["sample"].clone()).or_default().push(299_792_458.0 * late_s);
+        doppler_hz.push(number(&row, "doppler_hz") - number(there, "doppler_hz"));
+        cn0_dbhz.push((number(&row, "cn0_dbhz"), number(there, "cn0_dbhz")));
+    }
+    let without_clock = code_m.values().filter(|epoch| epoch.len() > 1).flat_map(|epoch| {
+        let mean_m = epoch.iter().sum::<f64>() / epoch.len() as f64;
+        epoch.iter().map(move |error_m| error_m - mean_m)
+    });
+    let summary = summary();
+    let observables = &summary.observables;
+    near("pseudorange", observables.pseudorange_rms_m, rms(without_clock));
+    near("Doppler", observables.doppler_rms_hz, rms(doppler_hz.into_iter()));
+    // Eight equal satellites of 50 dB-Hz: each meets seven others as noise of κ·C, κ = 0.85 chip (see analysis::access), which
+    // costs 10 lg(1 + 7·0.85/1.023e6·1e5) = 2.0 dB.
+    let count = cn0_dbhz.len() as f64;
+    let measured = cn0_dbhz.iter().map(|(measured, _)| measured).sum::<f64>() / count;
+    let bias = observables.cn0_bias_db.unwrap();
+    let expected = measured - 50.0 + 2.0;
+    assert!((bias - expected).abs() < 0.2, "C/N0 {bias} dB off, by hand {expected}");
+}
+
+#[test]
+fn damaged_tables_fail_by_the_row_that_names_the_damage() {
+    let undamaged = failures(&judged(copy(|_, text| text).path(), NONE));
+    let damaged = |name: &'static str, change: &dyn Fn(usize, &str) -> String, row: &str| {
+        let target = copy(|file, text| {
+            if file != name {
+                return text;
+            }
+            text.lines().enumerate().map(|(number, line)| change(number, line) + "\n").collect()
+        });
+        let failures = failures(&judged(target.path(), NONE));
+        assert!(!undamaged.iter().any(|failure| failure.contains(row)), "{row} fails without damage: {undamaged:?}");
+        assert!(failures.iter().any(|failure| failure.contains(row)), "{name}: {row} is not among {failures:?}");
+    };
+    let with = |line: &str, column: usize, change: &dyn Fn(&str) -> String| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        cells[column] = change(&cells[column]);
+        cells.join(",")
+    };
+    let add = |by: f64| move |cell: &str| (cell.parse::<f64>().unwrap() + by).to_string();
+    let shifted = |number: usize, line: &str| if number > 0 { with(line, 5, &add(50.0)) } else { line.to_owned() };
+    damaged("rx/fixes.csv", &shifted, "error, 95 %");
+    let one_wrong = |number: usize, line: &str| if number == 9 { with(line, 3, &add(1.0)) } else { line.to_owned() };
+    damaged("rx/navigation.csv", &one_wrong, "wrong navigation parameters");
+    let never_there =
+        |_: usize, line: &str| if line.contains(",G25,") { line.replace("false", "true") } else { line.to_owned() };
+    damaged("rx/acquisition.csv", &never_there, "false acquisitions");
+    let rows = table("rx/observations.csv");
+    let middle = rows.len() / 2;
+    let slipped = |number: usize, line: &str| {
+        if number > middle && line.contains(",G03,") { with(line, 6, &add(1.0)) } else { line.to_owned() }
+    };
+    damaged("rx/observations.csv", &slipped, "cycle slips");
+}
+
+#[test]
+fn deviations_of_a_clock_are_those_that_sp_1065_prints() {
+    use gnss_twin::analysis::allan::Deviation;
+    // The 1000 frequencies of SP 1065's test suite: a prime-modulus generator, as phases.
+    let mut state = 1_234_567_890_u64;
+    let mut phases = vec![0.0];
+    for _ in 0..1000 {
+        phases.push(phases[phases.len() - 1] + state as f64 / 2_147_483_647.0);
+        state = state * 16_807 % 2_147_483_647;
+    }
+    for (deviation, m, printed) in [
+        (Deviation::Oadev, 1, 2.922_319e-1),
+        (Deviation::Oadev, 10, 9.159_953e-2),
+        (Deviation::Mdev, 10, 6.172_376e-2),
+        (Deviation::Tdev, 100, 1.253_382),
+        (Deviation::Ohdev, 10, 9.581_083e-2),
+    ] {
+        let found = deviation.estimate(&phases, 1.0, m).unwrap().deviation;
+        assert!((found / printed - 1.0).abs() < 1e-6, "{} {m}: {found}, printed {printed}", deviation.name());
+    }
+}

@@ -1,0 +1,93 @@
+//! Whole twins, as short as they may be: a scene in, tables out, the verdict and tighter limits over them.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use gnss_twin::analysis::judge_tables;
+use gnss_twin::analysis::limits::Limits;
+use gnss_twin::analysis::summary::Summary;
+use gnss_twin::analysis::verdict::{Judgement, Status};
+use gnss_twin::generator::scenario::{Overrides, Scenario};
+use gnss_twin::generator::stream::{Options, Stream};
+use gnss_twin::generator::truth;
+use gnss_twin::gnss::record::Observation;
+use gnss_twin::gnss::satellite::Sv;
+use gnss_twin::receiver::Reception;
+use gnss_twin::receiver::output::Output;
+use gnss_twin::receiver::settings::Settings;
+
+/// Makes `truth/` and `rx/` of a scene below `directory`.
+pub fn run(scene: &str, directory: &Path) {
+    let scenario = Scenario::parse(scene, "scene").unwrap();
+    let settings = Settings::of_scenario(scene, "scene").unwrap();
+    let (scene, _) = scenario.compose(directory, &Overrides::default()).unwrap();
+    let below = |name: &str| {
+        let path = directory.join(name);
+        std::fs::create_dir(&path).unwrap();
+        path
+    };
+    let mut truth = truth::Writer::create(&below("truth")).unwrap();
+    let mut output = Output::create(&below("rx")).unwrap();
+    let mut stream = Stream::new(&scene, &mut truth, &Options::default()).unwrap();
+    let mut reception = Reception::new(&scene.metadata, &settings).unwrap();
+    let mut bytes = Vec::new();
+    while stream.next(&mut truth, &mut bytes).unwrap() {
+        reception.take(&bytes, &mut output).unwrap();
+    }
+    reception.take(&bytes, &mut output).unwrap();
+    stream.finish(&mut truth).unwrap();
+    reception.finish(&mut output).unwrap();
+}
+
+/// A run judged by the verdict and by limits of one's own.
+pub fn judged(directory: &Path, limits: &str) -> Summary {
+    judge_tables(directory, Some(&Limits::parse(limits, "limits").unwrap())).unwrap()
+}
+
+/// The figures that failed, with their values.
+pub fn failures(summary: &Summary) -> Vec<String> {
+    let failed = |row: &&Judgement| row.status == Status::Fail;
+    let text = |row: &Judgement| format!("{} {} {}, {}", row.figure, row.value_text(), row.unit, row.bound);
+    summary.details.verdict.rows.iter().filter(failed).map(text).collect()
+}
+
+/// Satellites whose carrier is no whole number of cycles off at their last observation: the message shows the half cycle, which the
+/// verdict forgives.
+fn half_cycles(directory: &Path) -> Vec<String> {
+    type Rows = BTreeMap<(u64, Sv), Observation>;
+    let read = |side: &str| -> Rows {
+        let mut table = csv::Reader::from_path(directory.join(side).join("observations.csv")).unwrap();
+        let rows = table.deserialize::<Observation>().map(Result::unwrap);
+        rows.map(|row| ((row.sample, row.sv), row)).collect()
+    };
+    let (truth, found) = (read("truth"), read("rx"));
+    let last: BTreeMap<Sv, &Observation> = found.values().map(|row| (row.sv, row)).collect();
+    let off = |(sv, row): (Sv, &Observation)| {
+        let cycles = row.carrier_cycles - truth[&(row.sample, sv)].carrier_cycles;
+        let rest = cycles - cycles.round();
+        // The phase loop's error is 0.003 cycles.
+        (rest.abs() > 0.1).then(|| format!("{sv}: carrier {rest:.2} cycles off a whole number"))
+    };
+    last.into_iter().filter_map(off).collect()
+}
+
+fn holds(scene: &str, limits: &str) {
+    let directory = tempfile::tempdir().unwrap();
+    run(scene, directory.path());
+    let summary = judged(directory.path(), limits);
+    println!("{summary}");
+    // What the verdict says of so short a scene is its own affair.
+    let broken = |row: &Judgement| format!("{} {} {}, {}", row.figure, row.value_text(), row.unit, row.bound);
+    let mut failures: Vec<String> = summary.details.verdict.broken().map(broken).collect();
+    failures.extend(half_cycles(directory.path()));
+    assert!(failures.is_empty(), "{}", failures.join("; "));
+}
+
+/// Eight satellites, strong enough that noise hides little, over a car that turns.
+pub const OPEN_SKY: &str = include_str!("open_sky.toml");
+pub const OPEN_SKY_LIMITS: &str = include_str!("open_sky_limits.toml");
+
+#[test]
+fn a_short_ride_under_an_open_sky_keeps_every_limit() {
+    holds(OPEN_SKY, OPEN_SKY_LIMITS);
+}

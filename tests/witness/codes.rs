@@ -1,0 +1,26 @@
+//! Every chip of every C/A code against digests that another program computed from the same tables.
+
+use gnss_twin::gnss::gps::l1ca::{CODE_CHIPS, code};
+use sha2::{Digest, Sha256};
+
+/// PRN, ones, first and last 24 chips in hexadecimal, SHA-256 of a byte 0 or 1 for each chip.
+const CODES: &str = include_str!("../../data/witness/l1ca_codes.csv");
+
+#[test]
+fn all_chips_of_all_codes_are_those_of_another_program() {
+    let mut codes = 0;
+    for line in CODES.lines().skip(1) {
+        let column: Vec<&str> = line.split(',').collect();
+        let chips: Vec<u8> = code(column[0].parse().unwrap()).unwrap().into_iter().map(u8::from).collect();
+        let word = |part: &[u8]| part.iter().fold(0_u32, |word, chip| word << 1 | u32::from(*chip));
+        assert_eq!(chips.len(), CODE_CHIPS as usize);
+        assert_eq!(chips.iter().map(|chip| usize::from(*chip)).sum::<usize>().to_string(), column[1], "{line}");
+        assert_eq!(format!("{:06X}", word(&chips[..24])), column[2], "{line}");
+        assert_eq!(format!("{:06X}", word(&chips[chips.len() - 24..])), column[3], "{line}");
+        let digest: String = Sha256::digest(&chips).iter().map(|byte| format!("{byte:02x}")).collect();
+        assert_eq!(digest, column[4], "{line}");
+        codes += 1;
+    }
+    assert_eq!(codes, 37);
+    assert!(code(38).is_none());
+}
