@@ -7,7 +7,7 @@
 //! that same linear loop. In the tracking stage the frequency is that of the phase loop; its row judges the rate. Limits: discriminators
 //! as of early minus late power and two-quadrant arctangent; a front-end filter's rounding of the correlation is left out.
 
-mod theory;
+pub(in crate::analysis) mod theory;
 
 use std::path::Path;
 

@@ -17,10 +17,11 @@ pub mod clock;
 pub mod due;
 pub mod elevation;
 pub mod errors;
-
+pub mod expect;
 pub mod foreign;
 pub mod honesty;
 pub mod independent;
+pub mod integrity;
 pub mod jamming;
 pub mod jitter;
 pub mod limits;
@@ -104,12 +105,12 @@ pub fn judge_against(run: &Path, limits: Option<&limits::Limits>) -> Result<Summ
     rayon::scope(|_| judged(run, limits))
 }
 
-/// [`judge_against`] with tables alone: no pictures, no report, no `summary.json`.
+/// The verdict alone: what [`judge_against`] finds of the tables as they lie there, with nothing written or drawn.
 ///
 /// # Errors
-/// As [`judge`].
-pub fn judge_tables(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
-    find(run, limits).map(|found| found.summary)
+/// As [`judge`], but for files that cannot be written.
+pub fn assess(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
+    Ok(measure(load::Run::read(run)?, run, limits)?.summary)
 }
 
 fn judged(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
@@ -139,22 +140,38 @@ struct Found {
     report: (),
 }
 
-fn find(run: &Path, limits: Option<&limits::Limits>) -> Result<Found, JudgeError> {
-    let read = load::Run::read(run)?;
+/// What is measured of a run.
+struct Measured {
+    read: load::Run,
+    errors: errors::Errors,
+    clock: clock::Clock,
+    honesty: honesty::Honesty,
+    slips: slips::Slips,
+    jitter: jitter::Jitter,
+    summary: Summary,
+}
+
+fn measure(read: load::Run, run: &Path, limits: Option<&limits::Limits>) -> Result<Measured, JudgeError> {
     let errors = errors::Errors::measure(&read)?;
     let clock = clock::Clock::measure(&read, &errors)?;
     let honesty = honesty::Honesty::measure(&read, &errors);
     let slips = slips::Slips::find(&read, &errors)?;
     let jitter = jitter::Jitter::measure(&read, &errors)?;
-    let elevations = elevation::Elevations::measure(&read, &errors)?;
     let mut summary = Summary::new(&read, &errors, &clock)?;
     summary.add(&honesty, &slips, &jitter);
     let not_json = |source| JudgeError::Json { path: run.join("summary.json"), source };
-    let verdict = verdict::Verdict::of(&read, &slips, &summary)?;
+    let verdict = verdict::Verdict::of(&read, &errors, &slips, &summary)?;
     summary.details.verdict = match limits {
         Some(limits) => verdict.with_user(limits.judge(&serde_json::to_value(&summary).map_err(not_json)?)),
         None => verdict,
     };
+    Ok(Measured { read, errors, clock, honesty, slips, jitter, summary })
+}
+
+fn find(run: &Path, limits: Option<&limits::Limits>) -> Result<Found, JudgeError> {
+    let measured = measure(load::Run::read(run)?, run, limits)?;
+    let Measured { read, errors, clock, honesty, slips, jitter, summary } = measured;
+    let elevations = elevation::Elevations::measure(&read, &errors)?;
     let judged = plot::Judged { run: &read, errors: &errors, clock: &clock, honesty: &honesty, summary: &summary };
     clock.write(run)?;
     honesty.write(run)?;

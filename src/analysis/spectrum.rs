@@ -201,6 +201,36 @@ fn quantiser(adc: Option<&Stage>, sigma_lsb: f64) -> (f64, f64) {
 /// A null as measured and as expected.
 type Null = (f64, f64);
 
+/// Decibels of C/N0 that the front end's filter and converter cost a code, noise alone counted: a filter passes less of the code than of
+/// noise with the code's spectrum, and rounding adds noise.
+pub fn cost_db(run: &Run) -> f64 {
+    let stage = |name: &str| run.scene.front_end.iter().find(|stage| stage.stage == name);
+    let filtered = stage("filter").map_or(1.0, |filter| passed(filter, run));
+    let kept = run.scene.noise_lsb.filter(|_| run.scene.noise).map_or(1.0, |sigma_lsb| {
+        let (gain, added) = quantiser(stage("adc"), sigma_lsb);
+        let power = (gain * sigma_lsb) * (gain * sigma_lsb);
+        power / (power + added)
+    });
+    -10.0 * libm::log10(filtered * kept)
+}
+
+/// What a filter leaves of a code's power over noise: (∫S|H| df)²/(∫S|H|² df · ∫S df).
+fn passed(filter: &Stage, run: &Run) -> f64 {
+    let Some(chip_rate_hz) = run.truth.keys().find_map(|(_, signal)| Some(signal.components.first()?.chip_rate_hz))
+    else {
+        return 1.0;
+    };
+    let rate_hz = run.scene.sample_rate_hz;
+    let (mut all, mut amplitude, mut power) = (0.0, 0.0, 0.0);
+    for k in -1000..1000 {
+        let f_hz = (f64::from(k) + 0.5) * rate_hz / 2000.0;
+        let density = code_density(&run.scene.code_edge, f_hz, chip_rate_hz, rate_hz);
+        let gain = filter_power(filter, f_hz);
+        (all, amplitude, power) = (all + density, amplitude + density * gain.sqrt(), power + density * gain);
+    }
+    amplitude * amplitude / (power * all)
+}
+
 /// Both first nulls of the first signal's code.
 fn nulls(run: &Run, theory_db: &[f64]) -> Result<[Null; 2], &'static str> {
     let signal = run.truth.keys().next().map(|(_, signal)| signal).ok_or("there is no signal")?;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use gnss_twin::analysis::judge_tables;
+use gnss_twin::analysis::assess;
 use gnss_twin::analysis::limits::Limits;
 use gnss_twin::analysis::summary::Summary;
 use gnss_twin::analysis::verdict::{Judgement, Status};
@@ -41,7 +41,7 @@ pub fn run(scene: &str, directory: &Path) {
 
 /// A run judged by the verdict and by limits of one's own.
 pub fn judged(directory: &Path, limits: &str) -> Summary {
-    judge_tables(directory, Some(&Limits::parse(limits, "limits").unwrap())).unwrap()
+    assess(directory, Some(&Limits::parse(limits, "limits").unwrap())).unwrap()
 }
 
 /// The figures that failed, with their values.

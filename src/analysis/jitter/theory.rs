@@ -173,7 +173,7 @@ fn raw_chips(signal: Peak, noise: Peak, d: f64, snr: f64) -> f64 {
 }
 
 /// The three loops of a receiver as theory sees them at one integration time.
-pub(super) struct Theory {
+pub(in crate::analysis) struct Theory {
     settings: Settings,
     pub update_s: f64,
     pub chip_m: f64,
@@ -252,7 +252,7 @@ impl Theory {
 
 /// What a loop's error without noise comes to, in its unit.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Stress {
+pub(in crate::analysis) struct Stress {
     sum: Sum,
     pub max: f64,
 }
@@ -271,7 +271,7 @@ impl Stress {
 
 /// Stresses of a satellite's three loops over the times from `from_s` to `to_s`.
 #[derive(Default)]
-pub(super) struct Stresses {
+pub(in crate::analysis) struct Stresses {
     of: BTreeMap<Loop, Stress>,
 }
 

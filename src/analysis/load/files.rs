@@ -39,8 +39,26 @@ fn each_of<T: DeserializeOwned>(
     let mut reader = csv::ReaderBuilder::new().buffer_capacity(1 << 16).from_reader(input);
     // Rows alone would take a header that cannot be read for one that is not there.
     reader.headers().map_err(failed)?;
+    let header = reader.headers().map_err(failed)?.clone();
     // The header is line 1.
-    (2..).zip(reader.into_deserialize()).try_for_each(|(line, row)| take(line, row.map_err(failed)?))
+    (2..).zip(reader.into_records()).try_for_each(|(line, row)| {
+        let row = row.map_err(failed)?;
+        finite(path, line, &header, &row)?;
+        take(line, row.deserialize(Some(&header)).map_err(failed)?)
+    })
+}
+
+/// Refuses a row with a number that is none or endless: comparisons with it would be silent.
+fn finite(path: &Path, line: u64, header: &csv::StringRecord, row: &csv::StringRecord) -> Result<(), JudgeError> {
+    let odd = |text: &&str| text.parse::<f64>().is_ok_and(|number| !number.is_finite());
+    // Only a letter or an exponent of three digits makes such a number.
+    let suspect = |text: &str| text.len() > 2 && text.bytes().any(|byte| matches!(byte, b'n' | b'N' | b'e' | b'E'));
+    let Some((column, text)) = row.iter().enumerate().find(|(_, text)| suspect(text) && odd(text)) else {
+        return Ok(());
+    };
+    let name = header.get(column).unwrap_or("");
+    let what = format!("{name} = {text}, expected a finite number");
+    Err(JudgeError::Line { path: path.to_owned(), line, what })
 }
 
 /// All rows of a CSV file.

@@ -9,12 +9,16 @@ mod availability;
 mod hints;
 mod interference;
 mod judgement;
+mod links;
 mod losses;
+mod motion;
 mod position;
 mod reception;
+mod tables;
 #[cfg(test)]
 mod tests;
 mod tracking;
+mod values;
 
 use serde::Serialize;
 use serde_json::Value;
@@ -22,6 +26,7 @@ use serde_json::Value;
 use crate::analysis::JudgeError;
 use crate::analysis::due::Expectations;
 use crate::analysis::due::receiver::Receiver;
+use crate::analysis::errors::Errors;
 use crate::analysis::load::Run;
 use crate::analysis::slips::Slips;
 use crate::analysis::summary::Summary;
@@ -65,18 +70,20 @@ impl Verdict {
     ///
     /// # Errors
     /// [`JudgeError::Read`] where rows that were put by cannot be read.
-    pub fn of(run: &Run, slips: &Slips, summary: &Summary) -> Result<Self, JudgeError> {
+    pub fn of(run: &Run, errors: &Errors, slips: &Slips, summary: &Summary) -> Result<Self, JudgeError> {
         let mut verdict = Self::default();
         let expected = Expectations::of(run, Receiver::of(run), run)?;
         verdict.satellites(run, &expected);
         verdict.availability(run.scene.duration_s, &run.scene.expect, &expected, &Came::of(run));
-        verdict.position(run, summary);
+        verdict.values(run, errors, summary)?;
         verdict.tracking(summary);
+        verdict.links(run, errors)?;
         verdict.losses(run, &expected.receiver, slips)?;
         verdict.reception(summary);
         verdict.cn0(run, summary);
         verdict.interference(summary);
         verdict.spoofing(run, summary);
+        verdict.tables(run, errors)?;
         verdict.hint(run);
         Ok(verdict)
     }

@@ -1,0 +1,52 @@
+//! The code error that the truth's reflected rays leave in an early-minus-late loop.
+//!
+//! The loop rests where |E|² = |L|², E and L the sums over the rays of amplitude, phase and correlation (the triangle of the chips) at
+//! half a spacing to either side. Limits: the front end's rounding of the triangle is left out, and rays are taken as steady
+//! over the loop's time constant, so that what moves fast is overrated.
+
+use crate::gnss::record::RayRow;
+
+/// Where the loop rests, in chips late of the direct ray, for rays of (excess in chips, amplitude, phase in cycles).
+pub fn error_chips(rays: &[(f64, f64, f64)], spacing_chips: f64) -> f64 {
+    if rays.iter().all(|ray| ray.1 == 0.0) {
+        return 0.0;
+    }
+    let power = |at: f64| {
+        let triangle = |x: f64| (1.0 - x.abs()).max(0.0);
+        let (mut i, mut q) = (triangle(at), 0.0);
+        for (excess, amplitude, phase) in rays {
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * phase);
+            let value = amplitude * triangle(at - excess);
+            (i, q) = (i + value * cos, q + value * sin);
+        }
+        i * i + q * q
+    };
+    // Falls through zero where the loop rests, between half a spacing before the direct ray and one behind it.
+    let discriminator = |at: f64| power(at + 0.5 * spacing_chips) - power(at - 0.5 * spacing_chips);
+    let (mut low, mut high) = (-0.5 * spacing_chips, spacing_chips);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if discriminator(middle) < 0.0 { high = middle } else { low = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// The three numbers of a ray.
+pub fn ray(row: &RayRow, chip_m: f64) -> (f64, f64, f64) {
+    (row.excess_m / chip_m, row.amplitude_ratio, row.phase_cycles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_ray_errs_as_the_envelope_says() {
+        // In phase the error of an early-minus-late envelope is α·d/2 where the ray is late by d/2(1 + α) or more; out of phase the same early.
+        let error = |phase| error_chips(&[(0.3, 0.25, phase)], 0.2);
+        assert!((error(0.0) - 0.25 * 0.1).abs() < 3e-3, "{}", error(0.0));
+        assert!((error(0.5) + 0.25 * 0.1).abs() < 3e-3, "{}", error(0.5));
+        assert_eq!(error_chips(&[(0.3, 0.0, 0.0)], 0.2), 0.0);
+        assert!(error_chips(&[(2.0, 0.5, 0.0)], 0.5).abs() < 1e-6, "beyond the correlation");
+    }
+}
