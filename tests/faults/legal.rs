@@ -77,6 +77,8 @@ const NUMBERS: &[Row] = &[
     ("spoofer.drag", "azimuth_deg elevation_deg", Yes, Yes),
     ("spoofer.drag", "speed_mps acceleration_mps2", No, No),
     ("fidelity", "knot_tolerance_cycles", No, No),
+    // Intervals do not overlap, and end after they begin.
+    ("expect.interval", "from_s to_s", Perhaps, No),
     ("satellite_fault", "step_s", Yes, Perhaps),
     ("satellite_fault", "drift_sps on_s", Yes, No),
     ("satellite_fault", "radial_m along_m cross_m", Yes, Yes),
@@ -125,7 +127,7 @@ const WHOLE: &[Row] = &[
 
 /// Texts that any words may be: of a path, of a title.
 const PATHS: [&str; 10] =
-    ["file", "sp3", "antenna_file", "gpt3_file", "vmf_file", "scenario", "title", "about", "label", "zip"];
+    ["file", "sp3", "antenna_file", "gpt3_file", "vmf_file", "scenario", "title", "about", "label", "reason"];
 
 /// Where any finite number is a bound.
 const BOUNDS: [&str; 2] = ["min", "max"];
@@ -136,6 +138,10 @@ pub fn legal(table: &str, key: &str, was: &str, bad: &str) -> Option<Legal> {
     let last = key.rsplit('.').next().unwrap_or(key);
     if last == "equals" {
         return Some(if ["inf", "-inf", "nan", "[1979-05-27]"].contains(&bad) { No } else { Yes });
+    }
+    // Another axis by that name may be what the values of this one need.
+    if last == "zip" && bad == "\"5 m\"" {
+        return Some(Perhaps);
     }
     let is_number = was.parse::<f64>().is_ok();
     if !is_number {

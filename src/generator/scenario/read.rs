@@ -85,6 +85,7 @@ impl Refusals {
     /// # Errors
     /// What was refused, in the order of the text.
     pub fn finish(mut self) -> Result<(), ScenarioError> {
+        self.leave_out_misspelt();
         self.0.sort_by_key(|error| error.place().map_or((usize::MAX, 0), |place| (place.line, place.column)));
         match (self.0.pop(), self.0.is_empty()) {
             (None, _) => Ok(()),
@@ -95,7 +96,24 @@ impl Refusals {
             }
         }
     }
+
+    /// A key that is absent because it is misspelt is refused once, where it is written.
+    fn leave_out_misspelt(&mut self) {
+        let meant = |error: &ScenarioError| match error {
+            ScenarioError::UnknownKey { key, nearest: Some(nearest), .. } => {
+                Some(key.rsplit_once('.').map_or(nearest.clone(), |(table, _)| format!("{table}.{nearest}")))
+            }
+            _ => None,
+        };
+        let meant: Vec<String> = self.0.iter().filter_map(meant).collect();
+        self.0.retain(
+            |error| !matches!(error, ScenarioError::Value { key, value, .. } if value == ABSENT && meant.contains(key)),
+        );
+    }
 }
+
+/// What stands for the value of a key that is not there; a text would have quotes.
+const ABSENT: &str = "absent";
 
 /// One table of the scenario.
 #[derive(Clone)]
@@ -183,14 +201,8 @@ impl<'t> Table<'t> {
     /// range, required keys that are absent.
     pub fn check(&self, refusals: &mut Refusals) {
         let known = self.known();
-        let mut misspelt: Vec<String> = Vec::new();
         if self.each.is_none() {
-            for error in self.unknown(&known) {
-                if let ScenarioError::UnknownKey { nearest: Some(nearest), .. } = &error {
-                    misspelt.push(nearest.clone());
-                }
-                refusals.add(error);
-            }
+            self.unknown(&known).for_each(|error| refusals.add(error));
         }
         for name in self.names() {
             if let Some(key) = self.declared(name) {
@@ -201,7 +213,7 @@ impl<'t> Table<'t> {
             let required = self.declared(key).is_some_and(|key| matches!(key.absent, Absent::Required));
             // A key of some kinds is required where the kind is known.
             let sure = self.declared(key).is_some_and(|key| key.kinds.is_empty() || self.kind.is_some());
-            required && sure && !self.has(key) && !misspelt.iter().any(|name| name == **key)
+            required && sure && !self.has(key)
         };
         for name in known.iter().filter(missing) {
             refusals.add(self.bad(name, self.expected(name)));
@@ -255,7 +267,7 @@ impl<'t> Table<'t> {
         ScenarioError::Value {
             place: self.place(name),
             key: self.key(name),
-            value: self.get(name).map_or_else(|| "absent".to_owned(), |v| self.source.excerpt(&v.span())),
+            value: self.get(name).map_or_else(|| ABSENT.to_owned(), |v| self.source.excerpt(&v.span())),
             expected: expected.to_string(),
         }
     }

@@ -7,7 +7,8 @@
 //! problem, wᵀS⁻¹w of the set's own normalised residuals and their covariance; only the best few are solved.
 //!
 //! Where two sets leave ranges that agree within themselves but on different places, nothing tells which is right: then
-//! there is no position ([`NoFix::Ambiguous`]). Limits: faults on so many satellites that good ones are the minority,
+//! there is no position ([`NoFix::Ambiguous`]). Places nearer than what a wrong model of the atmosphere does are no faults told apart:
+//! the best fit serves. Limits: faults on so many satellites that good ones are the minority,
 //! and faults that happen to fit another position: n − 4 directions are all that residuals see.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
@@ -21,6 +22,9 @@ use crate::gnss::satellite::Sv;
 const LARGEST_TRIED: usize = 1000;
 /// Sets of one size that are solved.
 const SOLVED: usize = 8;
+/// How far apart an atmosphere that is modelled wrongly takes two sets: a troposphere of 2.4 m at the zenith is 14 m at 10°, and one
+/// satellite's range moves a position by about as much.
+const ATMOSPHERE_M: f64 = 20.0;
 
 /// The value that chi-square with so many degrees of freedom exceeds with the probability `false_alarm`.
 pub fn chi_square_threshold(freedom: usize, false_alarm: f64) -> f64 {
@@ -128,6 +132,9 @@ fn sets(count: usize, size: usize) -> Option<Vec<Vec<usize>>> {
 fn elsewhere(one: &Solution, other: &Solution, false_alarm: f64) -> bool {
     let block = |solution: &Solution| -> Matrix3<f64> { solution.covariance.fixed_view::<3, 3>(0, 0).into_owned() };
     let apart_m = one.position_m - other.position_m;
+    if apart_m.norm() < ATMOSPHERE_M {
+        return false;
+    }
     (block(one) + block(other))
         .cholesky()
         .is_none_or(|both| apart_m.dot(&both.solve(&apart_m)) > chi_square_threshold(3, false_alarm))
