@@ -97,18 +97,19 @@ impl Refusals {
         }
     }
 
-    /// A key that is absent because it is misspelt is refused once, where it is written.
+    /// An unknown key may be the one that its table lacks: that is refused once, where it is written.
     fn leave_out_misspelt(&mut self) {
-        let meant = |error: &ScenarioError| match error {
-            ScenarioError::UnknownKey { key, nearest: Some(nearest), .. } => {
-                Some(key.rsplit_once('.').map_or(nearest.clone(), |(table, _)| format!("{table}.{nearest}")))
-            }
+        let table = |key: &str| key.rsplit_once('.').map_or(String::new(), |(table, _)| table.to_owned());
+        let unknown = self.0.iter().filter_map(|error| match error {
+            ScenarioError::UnknownKey { key, nearest, .. } => Some((table(key), nearest.clone())),
             _ => None,
+        });
+        let unknown: Vec<(String, Option<String>)> = unknown.collect();
+        let lacking = |key: &str, value: &str| {
+            let (own, name) = (table(key), key.rsplit('.').next());
+            unknown.iter().any(|(at, meant)| *at == own && (value == ABSENT || meant.as_deref() == name))
         };
-        let meant: Vec<String> = self.0.iter().filter_map(meant).collect();
-        self.0.retain(
-            |error| !matches!(error, ScenarioError::Value { key, value, .. } if value == ABSENT && meant.contains(key)),
-        );
+        self.0.retain(|error| !matches!(error, ScenarioError::Value { key, value, .. } if lacking(key, value)));
     }
 }
 
