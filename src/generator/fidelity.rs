@@ -172,7 +172,7 @@ impl Fidelity {
         everywhere.max(standing_bias_m(self.code_edge, rate_hz))
     }
 
-    /// The same where a Doppler moves the code over the grid, behind a code loop of [`LOOP_HZ`]: the error repeats with
+    /// The same where a Doppler moves the code over the grid, behind a code loop of `LOOP_HZ`: the error repeats with
     /// each sample that the code moves by, and a first-order loop of noise bandwidth B passes `1 / √(1 + (2πν / 4B)²)` of it.
     pub fn moving_bias_m(&self, rate_hz: f64, doppler_hz: f64) -> f64 {
         let samples_per_s = doppler_hz / CARRIER_CYCLES_PER_CHIP * rate_hz / CHIP_HZ;

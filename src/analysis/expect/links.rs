@@ -2,8 +2,8 @@
 //!
 //! Every figure of a satellite is put over its own limit, so that the worst satellite speaks for all. Theory is that of
 //! [`crate::analysis::jitter`] at the true C/N0 less what front end and converter cost, with the oscillator's noise and the
-//! motion's stress. Limits: epochs that interference costs more than [`JAMMED_DB`], or whose C/N0 moved by more than
-//! [`STEADY_DB`] within the receiver's averages, are left out.
+//! motion's stress. Limits: epochs that interference costs more than `JAMMED_DB`, or whose C/N0 moved by more than
+//! `STEADY_DB` within the receiver's averages, are left out.
 
 use std::collections::{BTreeMap, HashMap};
 

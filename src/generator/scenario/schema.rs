@@ -1,7 +1,7 @@
 //! Keys as data: name, type, range, unit, default and meaning, in one place for the readers, their refusals and the
 //! reference.
 //!
-//! A table is a list of [`Key`]s; tables in tables make a tree. [`super::read::Table`] reads a value by its key's
+//! A table is a list of [`Key`]s; tables in tables make a tree. `read::Table` reads a value by its key's
 //! declaration alone, so that no range and no default is written twice. Of a table with kinds (`kind`, or `model`) a key
 //! may belong to some of them.
 
