@@ -31,8 +31,10 @@ use crate::analysis::load::Run;
 use crate::analysis::slips::Slips;
 use crate::analysis::summary::Summary;
 pub(crate) use availability::Came;
+pub(crate) use judgement::digits;
+#[cfg(feature = "pdf")]
+pub(crate) use judgement::number;
 pub use judgement::{Bound, Judgement, MARGINAL_SHARE, Status};
-pub(crate) use judgement::{digits, number};
 
 /// Every figure of a run that is judged.
 #[derive(Clone, Debug, Default, PartialEq)]
