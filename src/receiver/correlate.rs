@@ -103,6 +103,25 @@ impl Replica {
         (self.chips.len() as i64) << CODE_BITS
     }
 
+    /// Up to `places` delays at which the code's correlation with itself is smallest, a chip to either side included, spread
+    /// over the period: what a correlator shows there is noise.
+    pub fn quiet_taps(&self, places: usize) -> Vec<i64> {
+        let length = self.chips.len();
+        let correlation = |shift: usize| {
+            let behind = self.chips.iter().cycle().skip(shift % length);
+            let equal = self.chips.iter().zip(behind).filter(|(a, b)| a == b).count();
+            (2 * equal).abs_diff(length)
+        };
+        let candidates = 4 * places;
+        let mut ranked: Vec<(usize, usize)> = (1..=candidates)
+            .map(|n| n * length / (candidates + 1))
+            .filter(|shift| (4..length.saturating_sub(4)).contains(shift))
+            .map(|shift| (correlation(shift - 1).max(correlation(shift)).max(correlation(shift + 1)), shift))
+            .collect();
+        ranked.sort_unstable();
+        ranked.into_iter().take(places).map(|(_, shift)| (shift as i64) << CODE_BITS).collect()
+    }
+
     /// Σ x·conj(replica) with the replica at each of `taps` (code phase units ahead of the prompt), in `f32`. The sums do
     /// not depend on the processor: sixteen fixed lanes, each 1024 samples added in one order.
     pub fn correlate<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {

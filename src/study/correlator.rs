@@ -16,7 +16,7 @@ use crate::analysis::theory::clock::PowerLaw;
 use crate::gnss::signal::Signal;
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::closed::{Loops, Mode, Update};
-use crate::receiver::track::lock::Cn0;
+use crate::receiver::track::cn0::Cn0;
 use crate::receiver::track::loops::Rates;
 
 /// Code periods of a group in which a signal without symbols is integrated.
@@ -218,6 +218,10 @@ impl<'a> Channel<'a> {
         let mut loops = Loops::new(&case.settings, shape, case.has_symbols(), case.motion.doppler_hz);
         loops.design(&case.settings, case.mode, false, update_s);
         loops.carrier = Rates { acceleration: case.motion.rate_hz_s, ..loops.carrier };
+        let mut cn0 = Cn0::new(group, period_s, case.settings.cn0_average_s);
+        if case.mode == Mode::Phase {
+            cn0.know_symbols();
+        }
         let cn0_hz = case.cn0_dbhz.map(|dbhz| libm::pow(10.0, dbhz / 10.0));
         Self {
             case,
@@ -234,9 +238,9 @@ impl<'a> Channel<'a> {
             has_symbols: case.has_symbols(),
             symbol: 1.0,
             loops,
-            cn0: Cn0::new(if case.mode == Mode::Phase { group } else { 2 }, period_s, case.settings.cn0_average_s),
+            cn0,
             before: None,
-            watch: Watch::new(),
+            watch: Watch::new(period_s * f64::from(group)),
             given_up: false,
             symbol_sum: Complex64::ZERO,
             number: 0,
@@ -260,7 +264,8 @@ impl<'a> Channel<'a> {
             let code_gained = gained * self.chips_per_cycle - code_hz * self.period_s;
             let mean_chips = self.code_chips + 0.5 * code_gained;
             let taps = self.correlate(mean_cycles, gained, mean_chips);
-            self.cn0.add(taps[1]);
+            // The model's noise has unit variance a component.
+            self.cn0.add(taps[1], Some(if self.noisy { 2.0 } else { 0.0 }));
             sums.iter_mut().zip(taps).for_each(|(sum, tap)| *sum += tap);
             phase += mean_cycles;
             code += mean_chips;

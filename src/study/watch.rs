@@ -3,12 +3,13 @@
 use num_complex::Complex64;
 
 use crate::receiver::track::TrackingSettings;
-use crate::receiver::track::lock::{LOCK_SYMBOLS, PhaseLock, SLIP_COSINE};
+use crate::receiver::track::lock::SymbolLock;
 
 /// Phase lock and signal strength over time.
 #[derive(Clone, Debug)]
 pub(super) struct Watch {
-    phase_lock: PhaseLock,
+    symbol_lock: SymbolLock,
+    symbol_s: f64,
     locked: bool,
     /// When lock or strength was lost.
     since_s: Option<f64>,
@@ -16,11 +17,9 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    /// Locked, as a channel is that has just found its symbols.
-    pub(super) fn new() -> Self {
-        let mut phase_lock = PhaseLock::new(LOCK_SYMBOLS);
-        phase_lock.add_equal(Complex64::ONE);
-        Self { phase_lock, locked: true, since_s: None, interruptions: 0 }
+    /// Locked, as a channel is that has just found its symbols, of `symbol_s` each.
+    pub(super) fn new(symbol_s: f64) -> Self {
+        Self { symbol_lock: SymbolLock::locked(), symbol_s, locked: true, since_s: None, interruptions: 0 }
     }
 
     /// Takes the prompt of a symbol that ended at `time_s`; says whether the receiver gives the signal up.
@@ -31,14 +30,14 @@ impl Watch {
         time_s: f64,
         settings: &TrackingSettings,
     ) -> bool {
-        let cosine = self.phase_lock.add_equal(symbol);
+        let slipped = self.symbol_lock.add(symbol, cn0_hz.map(|hz| hz * self.symbol_s));
         let weak = cn0_hz.is_some_and(|hz| 10.0 * libm::log10(hz) < settings.cn0_threshold_dbhz);
-        let value = self.phase_lock.value();
-        if self.locked && (cosine < SLIP_COSINE || value < settings.phase_unlock_threshold) {
+        let value = self.symbol_lock.value();
+        if self.locked && (slipped || value < settings.phase_unlock_threshold) {
             self.locked = false;
             self.interruptions += 1;
             self.since_s = Some(time_s);
-        } else if !self.locked && value >= settings.phase_lock_threshold && self.phase_lock.settled() {
+        } else if !self.locked && value >= settings.phase_lock_threshold && self.symbol_lock.settled() {
             self.locked = true;
         }
         if weak {

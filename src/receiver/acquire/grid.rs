@@ -39,6 +39,8 @@ pub(super) struct Grid {
     coherent_periods: f64,
     sums: u32,
     pub dopplers_hz: Vec<f64>,
+    /// From one of them to the next.
+    pub step_hz: f64,
     /// Lags in one code period, and the samples between them.
     pub lags: usize,
     pub lag_samples: f64,
@@ -107,6 +109,7 @@ impl Grid {
             coherent_periods: periods,
             sums,
             dopplers_hz,
+            step_hz,
             lags,
             lag_samples,
             threshold: circular,

@@ -120,13 +120,15 @@ impl Correlators<'_> {
         if prompts.len() < 2 {
             return coarse_hz;
         }
-        let residual_hz = square_frequency_cycles(&prompts) / (2.0 * period_s);
+        // The cell's neighbour may have won over it. Of a weak satellite the squares' largest line beyond that is noise.
+        let reach_hz = self.grid.step_hz;
+        let residual_hz = square_frequency_cycles(&prompts, 2.0 * period_s * reach_hz) / (2.0 * period_s);
         // Squares repeat every 1/(2T), and one period's sum tells such neighbours apart by its own loss.
         let spacing_hz = 0.5 / period_s;
         let mut best = (f64::NEG_INFINITY, coarse_hz);
         for alias in [0.0, -1.0, 1.0] {
             let doppler_hz = coarse_hz + self.grid.doppler_sign() * (residual_hz + alias * spacing_hz);
-            if (doppler_hz - coarse_hz).abs() <= spacing_hz {
+            if (doppler_hz - coarse_hz).abs() <= reach_hz {
                 let [power] = self.powers(phase_chips, doppler_hz, &[0.0]);
                 if power > best.0 {
                     best = (power, doppler_hz);
@@ -137,16 +139,17 @@ impl Correlators<'_> {
     }
 }
 
-/// Frequency of the squared prompts in cycles a period, in [−½, ½).
-fn square_frequency_cycles(prompts: &[Complex<f64>]) -> f64 {
+/// Frequency of the squared prompts in cycles a period, in [−½, ½) and within `reach` of zero.
+fn square_frequency_cycles(prompts: &[Complex<f64>], reach: f64) -> f64 {
     let length = (prompts.len() * PADDING).next_power_of_two();
     let mut spectrum: Vec<Complex<f64>> = prompts.iter().map(|p| p * p).collect();
     spectrum.resize(length, Complex::default());
     FftPlanner::new().plan_fft_forward(length).process(&mut spectrum);
     let power = |n: usize| spectrum[n % length].norm();
+    let within = |n: usize| n.min(length - n) as f64 <= reach * length as f64;
     let mut best = 0;
     for n in 1..length {
-        if power(n) > power(best) {
+        if within(n) && power(n) > power(best) {
             best = n;
         }
     }

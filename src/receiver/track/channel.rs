@@ -1,14 +1,19 @@
 //! One channel: numerically controlled oscillators, the order of its states, and what it reports.
 //!
-//! A frequency loop pulls in, then an assisted phase loop locks and searches for symbol edges, then integrations
-//! and updates keep to the symbols. Every correlation spans one code period of the replica, from the first
+//! A strong signal is pulled in by a frequency loop, then an assisted phase loop locks and searches for symbol edges, then
+//! integrations and updates keep to the symbols. Of a weak one a batch of prompts is collected while the carrier's oscillator
+//! runs free; frequency, phase and the probable edges follow from it ([`super::pull_in`]), integrations keep to these
+//! edges at once, and symbols are given out when the edges are beyond doubt. Every correlation spans one code period of the replica, from the first
 //! sample of the period on; samples of an unfinished period are kept, so that results do not depend on blocks.
 
 use num_complex::Complex64;
 
 use super::closed::{Loops, Mode, Update};
-use super::lock::{Cn0, PhaseLock, SLIP_COSINE, SymbolSync};
+use super::cn0::Cn0;
+use super::lock::{PhaseLock, Rotation, SymbolLock};
 use super::loops::CodeShape;
+use super::pull_in::Batch;
+use super::sync::SymbolSync;
 use super::{Measurement, Report, Symbol, TrackingSettings};
 use crate::gnss::record::TrackingRow;
 use crate::gnss::samples::{Format, IfMetadata};
@@ -32,20 +37,27 @@ const POWER_EVERY: u64 = 8;
 const SETTLED: f64 = 1.0;
 /// Group of prompts and verification for signals without symbols.
 const PILOT_GROUP: u32 = 20;
+/// Signals that the search found weaker than this are pulled in by a batch of prompts: T·C/N0 is then below ten, and a
+/// frequency loop's discriminator, ±250 Hz wide, scatters by more than 40 Hz.
+const WEAK_DBHZ: f64 = 40.0;
+/// Places of the code at which the noise is measured, in turn.
+const NOISE_PLACES: usize = 16;
 
 /// How far a channel is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
+    /// The carrier's oscillator runs free.
+    Open,
     Frequency,
     Assisted,
-    /// Symbols begin at code periods of this residue.
+    /// Symbols begin at code periods of this residue, beyond doubt if `confirmed`.
     Tracking(u64),
 }
 
 impl Stage {
     fn mode(self) -> Mode {
         match self {
-            Self::Frequency => Mode::Frequency,
+            Self::Open | Self::Frequency => Mode::Frequency,
             Self::Assisted => Mode::Assisted,
             Self::Tracking(_) => Mode::Phase,
         }
@@ -77,6 +89,8 @@ pub struct Channel {
     arithmetic: Arithmetic,
     replica_power: f64,
     taps: [i64; 3],
+    /// Delays at which the code does not correlate with itself.
+    noise_taps: Vec<i64>,
 
     /// Number of the sample at which the running period begins, and the NCOs there.
     start: Option<u64>,
@@ -95,6 +109,10 @@ pub struct Channel {
     stage: Stage,
     stage_since: u64,
     update_since: u64,
+    /// When the pull-in began, and its prompts.
+    pull_in_since: u64,
+    batch: Batch,
+    confirmed: bool,
 
     sums: [Complex64; 3],
     summed: u32,
@@ -102,10 +120,11 @@ pub struct Channel {
     /// Prompt sum of the last update.
     previous_sum: Option<Complex64>,
     symbol: (Complex64, u32),
-    rotation: (Complex64, u32),
+    rotation: Rotation,
     power: Option<f64>,
     cn0: Cn0,
     phase_lock: PhaseLock,
+    symbol_lock: SymbolLock,
     sync: SymbolSync,
     pending: Option<u64>,
     locked_since: Option<u64>,
@@ -164,6 +183,7 @@ impl Channel {
             },
             replica_power: peak,
             taps: [chips_to_units(half), 0, -chips_to_units(half)],
+            noise_taps: Vec::new(),
             start: None,
             first: 0,
             code: 0,
@@ -175,18 +195,22 @@ impl Channel {
             whole: false,
             loops,
             wide: true,
-            stage: Stage::Frequency,
+            stage: if hit.cn0_dbhz < WEAK_DBHZ { Stage::Open } else { Stage::Frequency },
             stage_since: 0,
             update_since: 0,
+            pull_in_since: 0,
+            batch: Batch::new(group),
+            confirmed: false,
             sums: [Complex64::ZERO; 3],
             summed: 0,
             previous: None,
             previous_sum: None,
             symbol: (Complex64::ZERO, 0),
-            rotation: (Complex64::ZERO, 0),
+            rotation: Rotation::default(),
             power: None,
-            cn0: Cn0::new(2, period_s, settings.cn0_average_s),
+            cn0: Cn0::new(if message.is_some() { group } else { 1 }, period_s, settings.cn0_average_s),
             phase_lock: PhaseLock::new(LOCK_PERIODS),
+            symbol_lock: SymbolLock::new(),
             sync: SymbolSync::new(group),
             pending: None,
             locked_since: None,
@@ -278,6 +302,8 @@ impl Channel {
         let moved = samples * i128::from(self.code_step) + i128::from(chips_to_units(self.hit.code_phase_chips));
         self.code = moved.rem_euclid(i128::from(replica.period())) as i64;
         (self.start, self.first, self.stage_since, self.update_since) = (Some(first), first, first, first);
+        self.pull_in_since = first;
+        self.noise_taps = replica.quiet_taps(NOISE_PLACES);
     }
 
     /// Samples from the running period's first to the next one's.
@@ -338,6 +364,7 @@ impl Channel {
         }
         let (i, q) = if carried { (&self.carry.0[..], &self.carry.1[..]) } else { (i, q) };
         let sums = replica.correlate_in(self.arithmetic, (i, q), &nco, &self.taps);
+        let noise = self.quiet_tap().map(|tap| replica.correlate_in(self.arithmetic, (i, q), &nco, &[tap])[0]);
         if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
             let power = correlate::power(i, q) / i.len().max(1) as f64;
             self.power =
@@ -363,7 +390,15 @@ impl Channel {
         let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
         let mut taps = [Complex64::ZERO; 3];
         taps.iter_mut().zip(&sums).for_each(|(tap, sum)| *tap = sum * scale);
+        self.cn0.add(taps[1], noise.map(|sum| (sum * scale).norm_sqr()));
         self.take(finished, taps, report);
+    }
+
+    /// Where the noise of the running period is to be measured, if it has to be.
+    fn quiet_tap(&self) -> Option<i64> {
+        let wanted = self.whole && self.cn0.needs_reference();
+        let place = self.period as usize % self.noise_taps.len().max(1);
+        self.noise_taps.get(place).copied().filter(|_| wanted)
     }
 
     /// Takes the early, prompt and late correlations of code period `number`.
@@ -371,9 +406,9 @@ impl Channel {
         let prompt = taps[1];
         self.sums.iter_mut().zip(taps).for_each(|(sum, tap)| *sum += tap);
         self.summed += 1;
-        self.cn0.add(prompt);
         match self.stage {
-            Stage::Frequency | Stage::Assisted => self.phase_lock.add(prompt, 2.0),
+            Stage::Open => self.batch.add(prompt),
+            Stage::Frequency | Stage::Assisted => self.phase_lock.add(prompt, self.noise()),
             Stage::Tracking(begin) => self.take_in_symbol(number, begin, prompt, report),
         }
         if self.summed >= self.periods_per_update() {
@@ -390,23 +425,21 @@ impl Channel {
 
     /// Collects the prompts of a symbol and gives it out at its end.
     fn take_in_symbol(&mut self, number: u64, begin: u64, prompt: Complex64, report: &mut Report) {
-        if let (Some(previous), true) = (self.previous, self.symbol.1 > 0) {
-            self.rotation.0 += prompt * previous.conj();
-        }
         self.symbol.0 += prompt;
         self.symbol.1 += 1;
+        self.rotation.add(prompt, self.symbol.1, self.group);
         let length = u64::from(self.group);
         if (number + 1) % length != begin {
             return;
         }
         if self.symbol.1 == self.group {
-            self.rotation.1 += 1;
-            let cosine = self.phase_lock.add_equal(self.symbol.0);
-            if cosine < SLIP_COSINE && self.locked_since.is_some() {
+            let symbol_s = self.period_s * f64::from(self.group);
+            let slipped = self.symbol_lock.add(self.symbol.0, self.cn0.hz().map(|hz| hz * symbol_s));
+            if slipped && self.locked_since.is_some() {
                 self.interrupt(report);
                 self.unlocked_since = Some(self.first);
             }
-            if self.has_symbols {
+            if self.has_symbols && self.confirmed {
                 let soft = (self.symbol.0.re / f64::from(self.group).sqrt()) as f32;
                 report.symbols.push(Symbol { first_period: number + 1 - length, soft });
             }
@@ -420,11 +453,23 @@ impl Channel {
         let before = match self.stage {
             Stage::Tracking(_) => self.previous_sum,
             Stage::Frequency | Stage::Assisted => self.previous,
+            // Nothing may correct the frequency.
+            Stage::Open => None,
         };
         self.previous_sum = Some(self.sums[1]);
-        self.last = self.loops.close(self.stage.mode(), self.sums, before, self.summed, t_s, self.cn0.hz());
+        self.last = self.loops.close(self.stage.mode(), self.sums, before, self.summed, t_s, Some(self.cn0_hz()));
         self.carrier += (self.last.carrier_jump_cycles * TURN) as i128;
         self.code += chips_to_units(self.last.code_jump_chips);
+    }
+
+    /// The best estimate of C/N0: what the search found until there is one.
+    fn cn0_hz(&self) -> f64 {
+        self.cn0.hz().unwrap_or_else(|| libm::pow(10.0, self.hit.cn0_dbhz / 10.0))
+    }
+
+    /// Power of a prompt's noise: two for white noise.
+    fn noise(&self) -> f64 {
+        self.cn0.noise().unwrap_or(2.0)
     }
 
     /// The replica's state at `tick`, in the running period.
@@ -439,7 +484,7 @@ impl Channel {
         let half = if self.polarity == Some(true) { 0.5 } else { 0.0 };
         let passed_s = tick.saturating_sub(self.update_since) as f64 / self.rate.hz();
         let offset_hz = self.loops.carrier.rate + self.loops.carrier.acceleration * passed_s;
-        let cn0_dbhz = self.cn0.hz().map_or(self.hit.cn0_dbhz, |hz| 10.0 * libm::log10(hz));
+        let cn0_dbhz = 10.0 * libm::log10(self.cn0_hz());
         report.measurements.push(Measurement {
             sample: tick,
             code_periods: periods.max(0) as u64,
@@ -461,7 +506,7 @@ impl Channel {
             pll_discriminator_cycles: self.last.pll_cycles,
             fll_discriminator_hz: self.last.fll_hz,
             cn0_dbhz,
-            phase_lock: self.phase_lock.value(),
+            phase_lock: self.lock_value(),
             integration_s: self.last.integration_s,
         });
     }

@@ -2,18 +2,23 @@
 
 use num_complex::Complex64;
 
-use super::{Channel, LOCK_PERIODS, Stage};
+use super::{Channel, LOCK_PERIODS, Stage, WEAK_DBHZ};
 use crate::gnss::record::Event;
+use crate::receiver::correlate::TURN;
 use crate::receiver::track::Report;
-use crate::receiver::track::lock::{Cn0, LOCK_SYMBOLS, PhaseLock, SymbolSync};
-use crate::receiver::track::loops::{self, Rates};
+use crate::receiver::track::lock::{PhaseLock, Rotation, SymbolLock};
+use crate::receiver::track::loops::Rates;
+use crate::receiver::track::pull_in::Batch;
+use crate::receiver::track::sync::SymbolSync;
 
 /// A frequency error beyond this, in spite of phase lock, is a false lock: between 0 and the nearest one, 1/(2·symbol).
 const FALSE_LOCK_SHARE: f64 = 0.4;
-/// Symbols over which the frequency is verified.
+/// Symbols over which the frequency is verified: at 25 dB-Hz the error that is found scatters by 2 Hz.
 const VERIFY_SYMBOLS: u32 = 25;
 /// Phase lock must come within this share of the limit for symbols.
 const PHASE_LIMIT_SHARE: f64 = 0.5;
+/// Batches of a weak signal's pull-in that may fail.
+const BATCHES: f64 = 4.0;
 
 impl Channel {
     /// Detectors and changes of stage after code period `number`.
@@ -23,8 +28,8 @@ impl Channel {
             self.wide = false;
             self.design();
         }
-        let limit_s = self.settings.pull_in_limit_s;
         match self.stage {
+            Stage::Open => self.search_batch(number, report),
             Stage::Frequency if self.since_s(self.stage_since) >= self.settings.fll_pull_in_s => {
                 if self.settings.pll_order < 3 {
                     // No loop would correct it from here on.
@@ -34,23 +39,92 @@ impl Channel {
             }
             Stage::Frequency => {}
             Stage::Assisted => {
-                let waited_s = self.since_s(self.stage_since);
-                if waited_s > limit_s || (self.locked_since.is_none() && waited_s > PHASE_LIMIT_SHARE * limit_s) {
-                    self.lose(report);
-                } else if self.locked_since.is_some() {
+                self.limit_pull_in(self.stage_since, report);
+                if self.locked_since.is_some() {
                     self.find_symbols(number, prompt, report);
                 }
             }
             Stage::Tracking(begin) => {
-                let moved = self.has_symbols && self.sync.add(number, prompt).is_some_and(|found| found != begin);
-                if moved {
-                    self.interrupt(report);
-                    self.enter(Stage::Assisted);
-                } else if self.rotation.1 >= VERIFY_SYMBOLS {
+                if !self.confirmed {
+                    self.limit_pull_in(self.pull_in_since, report);
+                }
+                if self.locked_since.is_some() {
+                    self.verify_symbols(begin, number, prompt, report);
+                }
+                if self.rotation.symbols() >= VERIFY_SYMBOLS {
                     self.verify_frequency(report);
                 }
             }
         }
+    }
+
+    /// Gives up a channel that has pulled in since `since` and found no phase or no symbols in time.
+    fn limit_pull_in(&mut self, since: u64, report: &mut Report) {
+        let (waited_s, limit_s) = (self.since_s(since), self.settings.pull_in_limit_s);
+        // A lock that was there and broke has a limit of its own.
+        let never_locked = self.locked_since.is_none() && self.unlocked_since.is_none();
+        if waited_s > limit_s || (never_locked && waited_s > PHASE_LIMIT_SHARE * limit_s) {
+            self.lose(report);
+        }
+    }
+
+    /// Looks for the signal in the batch, and begins to track at the first probable edge of a symbol.
+    fn search_batch(&mut self, number: u64, report: &mut Report) {
+        let periods = (self.settings.fll_pull_in_s / self.period_s) as usize;
+        if self.batch.periods() < periods.max(4 * self.group as usize) {
+            return;
+        }
+        let group = u64::from(self.group);
+        let Some(found) = self.batch.search(self.noise()) else {
+            if self.since_s(self.pull_in_since) >= BATCHES * self.settings.fll_pull_in_s {
+                self.lose(report);
+            }
+            self.batch = Batch::new(self.group);
+            return;
+        };
+        // Batches grow until they end where a symbol does.
+        if !(self.batch.periods() - found.offset).is_multiple_of(self.group as usize) {
+            return;
+        }
+        self.loops.carrier = Rates { rate: self.loops.carrier.rate + found.cycles / self.period_s, acceleration: 0.0 };
+        self.carrier += (found.phase_cycles * TURN) as i128;
+        self.enter(Stage::Tracking((number + 1) % group));
+        self.confirmed = !self.has_symbols;
+    }
+
+    /// Confirms the edges of symbols, moves them, or begins anew where they contradict what was beyond doubt.
+    fn verify_symbols(&mut self, begin: u64, number: u64, prompt: Complex64, report: &mut Report) {
+        if !self.has_symbols {
+            return;
+        }
+        match self.sync.add(number, self.whitened(prompt)) {
+            Some(found) if found == begin => self.confirm(report),
+            Some(_) if self.confirmed => {
+                self.interrupt(report);
+                self.enter(Stage::Assisted);
+            }
+            Some(found) => self.pending = Some(found),
+            None => {}
+        }
+        if let Some(begin) = self.pending
+            && (number + 1) % u64::from(self.group) == begin
+        {
+            self.enter(Stage::Tracking(begin));
+            self.confirm(report);
+        }
+    }
+
+    fn confirm(&mut self, report: &mut Report) {
+        if !self.confirmed && self.has_symbols {
+            report.events.push((self.first, Event::BitSynchronised));
+        }
+        self.confirmed = true;
+    }
+
+    /// A prompt with noise of unit variance a component, whatever the front end makes of its spectrum.
+    fn whitened(&self, prompt: Complex64) -> Complex64 {
+        let noise = self.noise();
+        if noise > 0.0 { prompt * (2.0 / noise).sqrt() } else { prompt }
     }
 
     fn enter(&mut self, stage: Stage) {
@@ -58,41 +132,58 @@ impl Channel {
         self.stage_since = self.first;
         self.pending = None;
         self.sync = SymbolSync::new(self.group);
-        self.rotation = (Complex64::ZERO, 0);
+        self.batch = Batch::new(self.group);
+        self.rotation = Rotation::default();
         self.symbol = (Complex64::ZERO, 0);
         self.sums = [Complex64::ZERO; 3];
         self.summed = 0;
         self.update_since = self.first;
-        let tracking = matches!(stage, Stage::Tracking(_));
-        let group = if tracking { self.group } else { 2 };
-        self.cn0 = Cn0::new(group, self.period_s, self.settings.cn0_average_s);
-        if !tracking {
-            self.phase_lock = PhaseLock::new(LOCK_PERIODS);
+        match stage {
+            Stage::Tracking(_) => {
+                self.cn0.know_symbols();
+                self.symbol_lock = if self.locked_since.is_some() { SymbolLock::locked() } else { SymbolLock::new() };
+            }
+            Stage::Open | Stage::Frequency | Stage::Assisted => {
+                self.cn0.forget_symbols();
+                self.phase_lock = PhaseLock::new(LOCK_PERIODS);
+                self.confirmed = false;
+            }
         }
         self.design();
+    }
+
+    /// The stage in which a pull-in begins.
+    fn begin_pull_in(&mut self) {
+        let weak = 10.0 * libm::log10(self.cn0_hz()) < WEAK_DBHZ;
+        self.pull_in_since = self.first;
+        self.enter(if weak { Stage::Open } else { Stage::Frequency });
     }
 
     /// Begins to track at the first symbol after its edge is known.
     fn find_symbols(&mut self, number: u64, prompt: Complex64, report: &mut Report) {
         if self.pending.is_none() {
+            let prompt = self.whitened(prompt);
             self.pending = if self.has_symbols { self.sync.add(number, prompt) } else { Some(0) };
         }
         if let Some(begin) = self.pending
             && (number + 1) % u64::from(self.group) == begin
         {
             self.enter(Stage::Tracking(begin));
-            // The lock just shown stands as the first of the longer means.
-            self.phase_lock = PhaseLock::new(LOCK_SYMBOLS);
-            self.phase_lock.add_equal(Complex64::ONE);
-            if self.has_symbols {
-                report.events.push((self.first, Event::BitSynchronised));
-            }
+            self.confirm(report);
+        }
+    }
+
+    /// Phase lock, from −1 to 1.
+    pub(super) fn lock_value(&self) -> f64 {
+        match self.stage {
+            Stage::Tracking(_) => self.symbol_lock.value(),
+            Stage::Open | Stage::Frequency | Stage::Assisted => self.phase_lock.value(),
         }
     }
 
     /// Follows phase lock; a dip is a slip, a long one the end.
     fn watch_phase(&mut self, report: &mut Report) {
-        let value = self.phase_lock.value();
+        let value = self.lock_value();
         let weak = matches!(self.stage, Stage::Tracking(_))
             && self.cn0.hz().is_some_and(|hz| 10.0 * libm::log10(hz) < self.settings.cn0_threshold_dbhz);
         if self.locked_since.is_some() {
@@ -100,8 +191,12 @@ impl Channel {
                 self.interrupt(report);
                 self.unlocked_since = Some(self.first);
             }
-        } else if value >= self.settings.phase_lock_threshold && self.stage != Stage::Frequency {
-            let settled = self.phase_lock.settled();
+        } else if value >= self.settings.phase_lock_threshold {
+            let settled = match self.stage {
+                Stage::Tracking(_) => self.symbol_lock.settled(),
+                Stage::Assisted => self.phase_lock.settled(),
+                Stage::Open | Stage::Frequency => false,
+            };
             if settled {
                 self.locked_since = Some(self.first);
                 report.events.push((self.first, Event::PhaseLocked));
@@ -126,6 +221,9 @@ impl Channel {
             report.events.push((self.first, Event::CycleSlip));
         }
         self.polarity = None;
+        // Symbols are sought where the phase is right only.
+        self.sync = SymbolSync::new(self.group);
+        self.pending = None;
     }
 
     fn lose(&mut self, report: &mut Report) {
@@ -138,13 +236,13 @@ impl Channel {
 
     /// A Costas loop also locks where the phase turns by half cycles between symbols or updates; within symbols it shows.
     fn verify_frequency(&mut self, report: &mut Report) {
-        let error_hz = loops::phase(self.rotation.0) / self.period_s;
-        self.rotation = (Complex64::ZERO, 0);
+        let error_hz = self.rotation.cycles(self.group) / self.period_s;
+        self.rotation = Rotation::default();
         let nearest_hz = 0.5 / (self.period_s * f64::from(self.group));
         if error_hz.abs() > FALSE_LOCK_SHARE * nearest_hz && self.locked_since.is_some() {
             self.loops.carrier = Rates { rate: self.loops.carrier.rate + error_hz, acceleration: 0.0 };
             self.interrupt(report);
-            self.enter(Stage::Frequency);
+            self.begin_pull_in();
         }
     }
 }
