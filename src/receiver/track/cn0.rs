@@ -61,6 +61,7 @@ impl Cn0 {
 
     /// From now on the next prompt opens a symbol. Of what was seen before, the means stay.
     pub fn know_symbols(&mut self) {
+        (self.seen, self.sum, self.power) = (0, Complex64::ZERO, 0.0);
         if self.known || self.group < 2 {
             return;
         }
@@ -69,7 +70,6 @@ impl Cn0 {
         let signal = self.unknown_signal();
         self.signal = self.signal.with(terms, self.signal.count() / m, [signal, 0.0]);
         self.noise = self.noise.with(terms, self.noise.count() / m, self.noise.values());
-        (self.seen, self.sum, self.power) = (0, Complex64::ZERO, 0.0);
     }
 
     /// Edges of symbols are unknown again.
