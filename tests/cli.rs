@@ -206,7 +206,9 @@ fn generate_and_receive_are_the_same_as_run() {
     let generated = twin(&["generate", "short.toml", "--out", "short.sigmf-data"], here.path());
     assert!(generated.status.success(), "{}", stderr(&generated));
     let received = twin(&["receive", "short.sigmf-meta", "--out", "rx"], here.path());
-    assert!(received.status.success(), "{}", stderr(&received));
+    // Results without a fix are not complete.
+    assert_eq!(code(&received), 3, "{}", stderr(&received));
+    assert!(stderr(&received).contains("no fix in 2.0 s: no frame"), "{}", stderr(&received));
     for (one, two) in [
         ("run/if.sigmf-data", "short.sigmf-data"),
         ("run/truth/sky.csv", "short.truth/sky.csv"),
@@ -255,11 +257,94 @@ fn a_recording_without_satellites_ends_with_the_strongest_peak_and_what_to_check
         .collect();
     fs::write(here.path().join("noise.bin"), noise).unwrap();
     let output = twin(&["receive", "noise.bin", "--out", "rx", "--format", "ci8", "--rate-hz", "4e6"], here.path());
-    assert!(output.status.success(), "{}", stderr(&output));
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     for part in ["threshold", "rate", "format"] {
         assert!(text.contains(part), "{text}");
     }
+}
+
+/// The satellites that `acquisition.csv` below a directory says were acquired.
+fn acquired(results: &Path) -> Vec<String> {
+    let text = fs::read_to_string(results.join("acquisition.csv")).unwrap();
+    let rows = text.lines().filter(|row| row.split(',').nth(3) == Some("true"));
+    rows.map(|row| row.split(',').nth(1).unwrap().to_owned()).collect()
+}
+
+#[test]
+fn a_recording_without_a_sample_is_bad_input_and_leaves_nothing() {
+    let here = workplace();
+    for (bytes, format) in [(0, "ci8"), (1, "ci8"), (7, "cf32")] {
+        fs::write(here.path().join("raw.bin"), vec![1; bytes]).unwrap();
+        let output = twin(&["receive", "raw.bin", "--out", "rx", "--format", format, "--rate-hz", "4e6"], here.path());
+        assert_eq!(code(&output), 65, "{}", stderr(&output));
+        assert!(stderr(&output).contains("raw.bin: no whole sample"), "{}", stderr(&output));
+        assert!(!here.path().join("rx").exists());
+    }
+}
+
+#[test]
+fn ten_milliseconds_are_searched_and_reported_in_milliseconds() {
+    let here = workplace();
+    assert!(
+        twin(&["generate", "short.toml", "--out", "s.sigmf-data", "--samples", "26000"], here.path()).status.success()
+    );
+    let output = twin(&["receive", "s.sigmf-data", "--out", "rx"], here.path());
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("10.0 ms received") && text.contains("there are 10.0 ms"), "{text}");
+    // Four sums of 2 ms find 45 dB-Hz (256 on average against 56) in all but the worst place of code, Doppler and data bit.
+    let sky = fs::read_to_string(here.path().join("s.truth/sky.csv")).unwrap();
+    let found = acquired(&here.path().join("rx"));
+    assert!(found.len() >= 8 && found.iter().all(|sv| sky.contains(sv)), "{found:?}");
+    // Less than two code periods.
+    assert!(
+        twin(&["generate", "short.toml", "--out", "t.sigmf-data", "--samples", "5000"], here.path()).status.success()
+    );
+    let output = twin(&["receive", "t.sigmf-data", "--out", "rx"], here.path());
+    assert_eq!(code(&output), 3, "{}", stderr(&output));
+    assert!(stderr(&output).contains("no fix in 1.9 ms: nothing was searched: 5000 samples"), "{}", stderr(&output));
+}
+
+#[test]
+fn without_a_start_time_the_era_of_the_week_is_said_with_the_flag_that_sets_it() {
+    let here = workplace();
+    // Subframe 1 with the week begins two seconds after this start.
+    let text = SHORT.replace("08:00:00", "08:05:58").replace("duration_s = 2", "duration_s = 18");
+    fs::write(here.path().join("week.toml"), text).unwrap();
+    assert!(twin(&["generate", "week.toml", "--out", "week.sigmf-data"], here.path()).status.success());
+    fs::rename(here.path().join("week.sigmf-data"), here.path().join("raw.bin")).unwrap();
+    let receive = ["receive", "raw.bin", "--out", "rx", "--format", "ci8", "--rate-hz", "2.6e6"];
+    let output = twin(&receive, here.path());
+    for part in ["weeks modulo 1024", "week_reference = \"2024-01-01T00:00:00\"", "--start", "2030-02-14T"] {
+        assert!(stderr(&output).contains(part), "{part}: {}", stderr(&output));
+    }
+    let output = twin(&[&receive[..], &["--start", "2010-07-01T08:05:58"]].concat(), here.path());
+    assert!(!stderr(&output).contains("1024"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_file_outside_the_scenario_s_directory_is_read_when_that_is_allowed() {
+    let here = workplace();
+    fs::create_dir(here.path().join("scenes")).unwrap();
+    let motion = "kind = \"static\"\nlatitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130.0\n";
+    assert!(SHORT.contains(motion));
+    let text = SHORT.replace(motion, "kind = \"file\"\nfile = \"../ride.csv\"\n");
+    fs::write(here.path().join("scenes/ride.toml"), text).unwrap();
+    let row = |t: f64| format!("{t},968890.7,5628546.7,2830022.4\n");
+    let ride = format!("time_s,x_m,y_m,z_m\n{}{}{}", row(0.0), row(2.0), row(4.0));
+    fs::write(here.path().join("ride.csv"), ride).unwrap();
+    let refused = twin(&["plan", "scenes/ride.toml"], here.path());
+    assert_eq!(code(&refused), 65);
+    assert!(stderr(&refused).contains("--allow-outside"), "{}", stderr(&refused));
+    for command in [
+        &["plan", "scenes/ride.toml"][..],
+        &["generate", "scenes/ride.toml", "--out", "s.sigmf-data", "--samples", "10"],
+    ] {
+        let allowed = twin(&[command, &["--allow-outside"]].concat(), here.path());
+        assert!(allowed.status.success(), "{command:?}: {}", stderr(&allowed));
+    }
+    assert!(twin(&["run", "--help"], here.path()).stdout.windows(15).any(|text| text == b"--allow-outside"));
 }
 
 #[test]

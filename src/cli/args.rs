@@ -62,6 +62,9 @@ pub struct Run {
     /// Exit with 3 if a limit is broken: one of this file's for summary.json, or of the verdict's own without a file
     #[arg(long, value_name = "LIMITS.toml", num_args = 0..=1)]
     pub check: Option<Option<PathBuf>>,
+    /// Also read files that lie outside the scenario's directory
+    #[arg(long)]
+    pub allow_outside: bool,
 }
 
 #[derive(Args, Debug)]
@@ -69,6 +72,9 @@ pub struct Run {
 pub struct Generate {
     /// Scene to generate
     pub scenario: PathBuf,
+    /// Also read files that lie outside the scenario's directory
+    #[arg(long)]
+    pub allow_outside: bool,
     /// File for the samples; metadata (.sigmf-meta) and truth (.truth/) are written beside it
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
@@ -91,7 +97,7 @@ pub struct Generate {
 
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Examples:\n  gnss-twin receive if.sigmf-data --out reports/mine\n  gnss-twin receive raw.bin --out reports/raw --format ci8 --rate-hz 4e6"
+    after_help = "Examples:\n  gnss-twin receive if.sigmf-data --out reports/mine\n  gnss-twin receive raw.bin --out reports/raw --format ci8 --rate-hz 4e6\n\nExit code: 0 with a fix, 3 without one (results are written, the reason is printed), 65 when the input is no recording"
 )]
 pub struct Receive {
     /// Recording: a SigMF pair (either file), or a raw file with --format and --rate-hz; - is standard input
@@ -159,6 +165,9 @@ pub struct ReceiverFiles {
 pub struct Plan {
     /// Scene to plan [default: the embedded static scene]
     pub scenario: Option<PathBuf>,
+    /// Also read files that lie outside the scenario's directory
+    #[arg(long)]
+    pub allow_outside: bool,
 }
 
 #[derive(Args, Debug)]

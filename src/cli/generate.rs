@@ -10,6 +10,7 @@ use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, truth_error};
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
+use crate::generator::scenario::Overrides;
 use crate::generator::stream::Options;
 use crate::generator::{self, truth};
 use crate::gnss::samples::IfMetadata;
@@ -19,7 +20,10 @@ use crate::gnss::sigmf;
 pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
     let named = scenario::read(Some(&arguments.scenario))?;
-    let (scene, warnings) = scenario::compose(&named, arguments.seed, arguments.format)?;
+    let (scene, warnings) = scenario::compose(
+        &named,
+        &Overrides { seed: arguments.seed, format: arguments.format, allow_outside: arguments.allow_outside },
+    )?;
     for warning in warnings {
         scenario::warn(&warning);
     }

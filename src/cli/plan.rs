@@ -6,11 +6,13 @@ use crate::cli::run::generator_error;
 use crate::cli::scenario;
 use crate::generator;
 use crate::generator::plan::Plan;
+use crate::generator::scenario::Overrides;
 
 /// Prints the plan of a scene.
 pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
     let named = scenario::read(arguments.scenario.as_deref())?;
-    let (scene, warnings) = scenario::compose(&named, None, None)?;
+    let (scene, warnings) =
+        scenario::compose(&named, &Overrides { allow_outside: arguments.allow_outside, ..Overrides::default() })?;
     scenario::receiver_settings(&named)?;
     for warning in warnings {
         scenario::warn(&warning);

@@ -38,6 +38,14 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     drop(progress);
     let outcome = outcome.map_err(receiver_error)?;
     drop(output);
+    if outcome.samples == 0 {
+        let format = recording.metadata.format;
+        return Err(CliError::input(format!(
+            "{}: no whole sample: expected {} bytes or more of {format}",
+            shown(&arguments.file),
+            format.bytes()
+        )));
+    }
     staging.commit()?;
     if let Some(warning) = &outcome.format_warning {
         scenario::warn(&format!("{}: {warning}: check --format or the metadata", shown(&arguments.file)));
@@ -50,7 +58,8 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
         text += &format!("{diagnosis}\n");
     }
     text += &format!("results in {}\n", shown(&arguments.out));
-    scenario::print(&text)
+    scenario::print(&text)?;
+    outcome.diagnosis.map_or(Ok(()), |diagnosis| Err(CliError::incomplete(diagnosis.headline())))
 }
 
 struct Recording {

@@ -17,6 +17,7 @@ use crate::cli::progress::Progress;
 use crate::cli::scenario;
 use crate::cli::speed::Speed;
 use crate::cli::staging::Staging;
+use crate::generator::scenario::Overrides;
 use crate::generator::scene::Scene;
 use crate::generator::stream::{Generated, Options, Stream};
 use crate::generator::{GenerateError, truth};
@@ -38,7 +39,10 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
     let named = scenario::read(arguments.scenario.as_deref())?;
     let gate = Gate::read(arguments.check.as_ref())?;
-    let (scene, warnings) = scenario::compose(&named, arguments.seed, None)?;
+    let (scene, warnings) = scenario::compose(
+        &named,
+        &Overrides { seed: arguments.seed, format: None, allow_outside: arguments.allow_outside },
+    )?;
     let settings = scenario::receiver_settings(&named)?;
     for warning in warnings {
         scenario::warn(&warning);

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use crate::cli::error::{CliError, escaped, shown};
 use crate::generator::scenario::{Overrides, Scenario, ScenarioError};
 use crate::generator::scene::Scene;
-use crate::gnss::samples::Format;
 use crate::receiver::settings::Settings;
 
 /// The scene that runs when none is named.
@@ -72,9 +71,8 @@ pub fn use_threads(threads: Option<u16>) -> Result<(), CliError> {
 }
 
 /// The scene that the scenario means, with what the command line puts in its place.
-pub fn compose(named: &Named, seed: Option<u64>, format: Option<Format>) -> Result<(Scene, Vec<String>), CliError> {
-    let overrides = Overrides { seed, format, allow_outside: false };
-    named.scenario.compose(&named.directory, &overrides).map_err(scenario_error)
+pub fn compose(named: &Named, overrides: &Overrides) -> Result<(Scene, Vec<String>), CliError> {
+    named.scenario.compose(&named.directory, overrides).map_err(scenario_error)
 }
 
 /// The exit that a refused scenario means.

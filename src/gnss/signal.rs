@@ -20,6 +20,8 @@ pub struct Signal {
     /// RINEX 3 band and attribute, for `C1C`, `L1C`, `D1C`, `S1C`.
     pub rinex: &'static str,
     pub system: System,
+    /// First and last number of the constellation's satellites; codes of others are reserved for other transmitters.
+    pub constellation: [u8; 2],
     /// Carrier frequency.
     pub carrier_hz: f64,
     /// What is sent on that carrier; powers add up to one.

@@ -4,9 +4,12 @@ use std::fmt;
 
 use crate::gnss::satellite::Sv;
 use crate::receiver::position::NoFix;
+use crate::receiver::position::least_squares::UNKNOWNS;
 
 /// A cold start needs this much signal: one whole frame of 30 s and up to one subframe before it.
 pub const SHORTEST_S: f64 = 36.0;
+/// Minutes between transmissions of one page of subframes 4 and 5 (IS-GPS-200N, 20.3.3.5).
+const PAGE_EVERY_MIN: f64 = 12.5;
 
 /// The first stage that failed.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,13 +39,30 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// A diagnosis of a recording of `seconds` at `rate_hz` in `format`, whose carrier appears at `if_hz`.
-    pub fn new(stage: Stage, seconds: f64, rate_hz: f64, format: &str, if_hz: f64, cut_bytes: usize) -> Self {
+    /// A diagnosis of a recording of `seconds` at `rate_hz` in `format`, whose carrier appears at `if_hz`, and in which
+    /// `acquired` satellites were found.
+    pub fn new(
+        stage: Stage,
+        seconds: f64,
+        rate_hz: f64,
+        format: &str,
+        if_hz: f64,
+        cut_bytes: usize,
+        acquired: usize,
+    ) -> Self {
         let mut advice = Vec::new();
         let mut say = |text: String| advice.push(text);
         if cut_bytes > 0 {
             say(format!(
                 "the recording ends within a sample ({cut_bytes} bytes are left over): is the format {format}?"
+            ));
+        }
+        let length = duration(seconds);
+        let few = acquired < UNKNOWNS;
+        if few && matches!(stage, Stage::NoSymbols { .. } | Stage::NoFrame { .. } | Stage::NoEphemeris { .. }) {
+            say(format!(
+                "the number of satellites: a position needs {UNKNOWNS}, there are {acquired}, and one that barely passes the \
+                 threshold may be false: are {rate_hz} Hz, {format}, the carrier at {if_hz} Hz and the sense of the spectrum right?"
             ));
         }
         match &stage {
@@ -57,23 +77,54 @@ impl Diagnosis {
                 say("the antenna: is there any signal?".into());
             }
             Stage::NoSymbols { .. } => {
-                say(format!("the length: symbols need a second or two, there are {seconds:.1} s"));
+                say(format!("the length: symbols need a second or two, there are {length}"));
                 say(format!("the sample rate: {rate_hz} Hz was taken; a small error shows here first"));
                 say("the signal's strength: below 25 dB-Hz symbols are not to be told".into());
             }
             Stage::NoFrame { .. } | Stage::NoEphemeris { .. } => {
                 if seconds < SHORTEST_S {
-                    say(format!("the length: a cold start needs {SHORTEST_S} s, there are {seconds:.1} s"));
+                    say(format!("the length: a cold start needs {SHORTEST_S} s, there are {length}"));
                 }
                 say("the signal's strength: below 27 dB-Hz words are lost to wrong bits".into());
             }
-            Stage::NoPosition { .. } => {
-                say("the sky: at least four healthy satellites above position.mask_deg in different directions".into());
-                say("the satellites' agreement: a spoofed or replayed signal contradicts the others".into());
-            }
+            Stage::NoPosition { reason, .. } => advice.extend(without_position(reason.as_ref(), &length)),
         }
         Self { stage, seconds, advice }
     }
+}
+
+/// What to check where there are ephemerides enough, by what the last attempt failed of.
+fn without_position(reason: Option<&NoFix>, length: &str) -> Vec<String> {
+    let sky = "the sky: at least four healthy satellites above position.mask_deg in different directions".to_owned();
+    match reason {
+        Some(NoFix::AwaitingIonosphere { limit_s, .. }) => vec![
+            format!(
+                "the length: the ionosphere's parameters are on page 18 of subframe 4, sent once in {PAGE_EVERY_MIN} min; \
+                 there are {length}"
+            ),
+            match limit_s {
+                Some(limit_s) => format!("position.ionosphere_wait_s = {limit_s}: 0 fixes without them at once"),
+                None => "position.require_ionosphere = true: false fixes without them, and worse".to_owned(),
+            },
+        ],
+        Some(NoFix::Inconsistent { .. } | NoFix::Ambiguous { .. }) => vec![
+            "the satellites' agreement: a spoofed or replayed signal, or a false satellite, contradicts the others"
+                .to_owned(),
+            "the number of satellites: two more than four locate one that is wrong, four more locate two".to_owned(),
+        ],
+        Some(NoFix::TooFew { .. } | NoFix::Singular { .. } | NoFix::Diverged { .. }) => vec![sky],
+        None => vec![
+            format!(
+                "the length: the message's time is known a subframe of 6 s after the ephemerides; there are {length}"
+            ),
+            sky,
+        ],
+    }
+}
+
+/// A time in seconds, or in milliseconds below one.
+pub(super) fn duration(seconds: f64) -> String {
+    if seconds < 1.0 { format!("{:.1} ms", 1e3 * seconds) } else { format!("{seconds:.1} s") }
 }
 
 fn names(svs: &[Sv]) -> String {
@@ -113,9 +164,16 @@ impl fmt::Display for Stage {
     }
 }
 
+impl Diagnosis {
+    /// The stage that failed, on one line.
+    pub fn headline(&self) -> String {
+        format!("no fix in {}: {}", duration(self.seconds), self.stage)
+    }
+}
+
 impl fmt::Display for Diagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "no fix in {:.1} s: {}", self.seconds, self.stage)?;
+        writeln!(f, "{}", self.headline())?;
         write!(f, "check")?;
         for advice in &self.advice {
             write!(f, "\n  {advice}")?;
@@ -132,12 +190,41 @@ mod tests {
     fn a_diagnosis_names_the_stage_the_numbers_and_what_to_check() {
         let strongest = Some((Sv::gps(7), 41.25, 78.0));
         let stage = Stage::NothingAcquired { strongest };
-        let text = Diagnosis::new(stage, 2.0, 2.6e6, "ci8", 0.0, 1).to_string();
+        let text = Diagnosis::new(stage, 2.0, 2.6e6, "ci8", 0.0, 1, 0).to_string();
         for part in ["G07", "41.2", "78.0", "2600000", "ci8", "intermediate frequency", "within a sample"] {
             assert!(text.contains(part), "{part}: {text}");
         }
         let stage = Stage::NoEphemeris { complete: vec![Sv::gps(1)], missing: vec![(Sv::gps(9), vec![2, 3])] };
-        let text = Diagnosis::new(stage, 20.0, 2.6e6, "ci8", 0.0, 0).to_string();
+        let text = Diagnosis::new(stage, 20.0, 2.6e6, "ci8", 0.0, 0, 7).to_string();
         assert!(text.contains("G09 lacks subframe 2, 3") && text.contains("36"), "{text}");
+        assert!(!text.contains("may be false"), "{text}");
+    }
+
+    #[test]
+    fn one_satellite_that_may_be_false_does_not_hide_a_wrong_description_of_the_samples() {
+        let stage = Stage::NoSymbols { acquired: vec![Sv::gps(7)] };
+        let text = Diagnosis::new(stage, 0.5, 2.6e6, "ci8", 1000.0, 0, 1).to_string();
+        for part in ["no fix in 500.0 ms", "needs 4, there are 1", "may be false", "2600000 Hz, ci8", "1000 Hz"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+    }
+
+    #[test]
+    fn advice_on_a_missing_position_is_about_what_it_failed_of() {
+        let text = |reason| {
+            let stage = Stage::NoPosition { with_ephemeris: vec![Sv::gps(1); 5], reason };
+            Diagnosis::new(stage, 41.0, 2.6e6, "ci8", 0.0, 0, 5).to_string()
+        };
+        let waiting = text(Some(NoFix::AwaitingIonosphere { waited_s: 3.0, limit_s: Some(8.0) }));
+        for part in ["3.0 s so far, of 8.0 s", "page 18", "12.5 min", "ionosphere_wait_s = 8", "41.0 s"] {
+            assert!(waiting.contains(part), "{part}: {waiting}");
+        }
+        assert!(!waiting.contains("spoofed") && !waiting.contains("mask_deg"), "{waiting}");
+        let required = text(Some(NoFix::AwaitingIonosphere { waited_s: 3.0, limit_s: None }));
+        assert!(required.contains("require_ionosphere = true") && !required.contains("spoofed"), "{required}");
+        let contradicting = text(Some(NoFix::Inconsistent { chi_square: 99.0, threshold: 10.8 }));
+        assert!(contradicting.contains("spoofed") && !contradicting.contains("mask_deg"), "{contradicting}");
+        let sky = text(Some(NoFix::Singular { condition: 1e5 }));
+        assert!(sky.contains("mask_deg") && !sky.contains("spoofed"), "{sky}");
     }
 }

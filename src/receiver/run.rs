@@ -17,7 +17,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Component, SIGNALS, Signal};
 use crate::receiver::acquire::{self, AcquireError};
 use crate::receiver::correlate::standing_bias_m;
-use crate::receiver::diagnosis::{Diagnosis, Stage};
+use crate::receiver::diagnosis::{Diagnosis, Stage, duration};
 use crate::receiver::format::Check;
 use crate::receiver::output::{Output, OutputError};
 use crate::receiver::parting::Parted;
@@ -123,8 +123,8 @@ impl fmt::Display for Outcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{:.1} s received: {} satellites acquired, {} used, {} fixes",
-            self.seconds,
+            "{} received: {} satellites acquired, {} used, {} fixes",
+            duration(self.seconds),
             self.acquired.len(),
             self.used.len(),
             self.fixes
@@ -183,14 +183,18 @@ fn image(metadata: &IfMetadata, signal: &Signal, doppler_max_hz: f64) -> Option<
     })
 }
 
-/// Signals and satellites that the samples can hold.
-pub(super) fn candidates(metadata: &IfMetadata) -> Vec<(&'static Signal, Sv)> {
+/// Signals and satellites that the samples can hold; with `reserved` also codes that no satellite of the constellation sends.
+pub(super) fn candidates(metadata: &IfMetadata, reserved: bool) -> Vec<(&'static Signal, Sv)> {
     let half_hz = 0.5 * metadata.rate.hz();
     SIGNALS
         .into_iter()
         // A real recording's IF may lie beyond half the rate on purpose.
         .filter(|signal| !metadata.format.is_complex() || metadata.if_hz(signal).abs() <= half_hz)
         .flat_map(|signal| signal.satellites().map(move |sv| (signal, sv)))
+        .filter(|(signal, sv)| {
+            let [first, last] = signal.constellation;
+            reserved || (first..=last).contains(&sv.number)
+        })
         .collect()
 }
 
@@ -247,6 +251,7 @@ impl Reception {
         if let Some(block) = rest {
             self.session.process(&block, output)?;
         }
+        self.session.search_rest(output)?;
         let (metadata, settings) = (&self.metadata, &self.settings);
         let count = self.source.samples();
         let seconds = metadata.rate.elapsed_s(count);
@@ -257,15 +262,16 @@ impl Reception {
         outcome.cut_bytes = cut_bytes;
         outcome.format_warning = self.check.warning();
         if outcome.fixes == 0 {
-            let needed = acquire::samples_needed(metadata, &settings.acquisition)?;
-            let stage = if count < needed {
-                Stage::NothingSearched { samples: count, needed }
-            } else {
+            let stage = if self.session.has_searched() {
                 self.session.failed_stage()
+            } else {
+                let needed = acquire::least_samples(metadata, &settings.acquisition)?;
+                Stage::NothingSearched { samples: count, needed }
             };
             let if_hz = SIGNALS.first().map_or(0.0, |signal| metadata.if_hz(signal));
             let format = metadata.format.name();
-            let mut diagnosis = Diagnosis::new(stage, seconds, metadata.rate.hz(), format, if_hz, cut_bytes);
+            let (rate_hz, acquired) = (metadata.rate.hz(), outcome.acquired.len());
+            let mut diagnosis = Diagnosis::new(stage, seconds, rate_hz, format, if_hz, cut_bytes, acquired);
             if let Some(seen) = &outcome.interfered {
                 diagnosis.advice.insert(0, format!("the spectrum: {seen}"));
             }

@@ -144,7 +144,7 @@ fn processor_locale_and_clock_change_no_byte() {
                 || format!("{}, {key}={value}", task.name),
                 || {
                     let work = task.workplace();
-                    let ended: Ended = twin(&task.arguments, work.path()).env(key, value).output().unwrap().into();
+                    let ended = task.ended(twin(&task.arguments, work.path()).env(key, value).output().unwrap());
                     task.complete(work.path(), &ended).map(|()| End::Accepted)
                 },
             );
@@ -171,7 +171,7 @@ fn two_runs_of_a_study_at_once_lose_nothing_and_double_nothing() {
                     };
                     let runners = [0, 1].map(start);
                     for runner in runners {
-                        let ended: Ended = runner.wait_with_output().unwrap().into();
+                        let ended = task.ended(runner.wait_with_output().unwrap());
                         if ended.code != 0 {
                             return Err(format!("exit {}: {}", ended.code, ended.message));
                         }

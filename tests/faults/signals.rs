@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -42,9 +42,9 @@ fn send(signal: &str, child: &Child) {
 }
 
 /// How a child ends, and how long that takes from now on.
-fn end(child: Child) -> (Ended, Duration) {
+fn end(child: Child) -> (Output, Duration) {
     let begun = Instant::now();
-    let ended = child.wait_with_output().unwrap().into();
+    let ended = child.wait_with_output().unwrap();
     (ended, begun.elapsed())
 }
 
@@ -67,6 +67,7 @@ fn interrupt(
         send(signal, &child);
     }
     let (ended, taken) = end(child);
+    let ended = task.ended(ended);
     if ended.message.contains("panicked") || ![0, code].contains(&ended.code) {
         return Err(format!("exit {}: {}", ended.code, ended.message));
     }
@@ -193,6 +194,7 @@ fn a_signal_ends_a_wait_for_samples_that_never_come() {
                     }
                     send(signal, &child);
                     let (ended, taken) = end(child);
+                    let ended = Ended::from(ended);
                     drop(silent);
                     let names: Vec<_> = fs::read_dir(place.path()).unwrap().flatten().collect();
                     if ended.code == code && taken < limit() && names.len() == 1 {
@@ -236,6 +238,7 @@ fn a_hang_up_is_ignored_under_nohup_and_ends_the_program_without() {
             let alive = child.try_wait().unwrap().is_none();
             send("TERM", &child);
             let (ended, _) = end(child);
+            let ended = Ended::from(ended);
             drop(silent);
             if alive && ended.code == 143 { Ok(End::Accepted) } else { Err(format!("{alive}, exit {}", ended.code)) }
         },

@@ -69,7 +69,7 @@ enum Became {
 }
 
 fn strace(options: &[&str], log: &Path, task: &Task, place: &Path) -> Ended {
-    Command::new("timeout")
+    let output = Command::new("timeout")
         .args(["-s", "KILL", "60", "strace", "-f", "-o"])
         .arg(log)
         .args(options)
@@ -79,8 +79,8 @@ fn strace(options: &[&str], log: &Path, task: &Task, place: &Path) -> Ended {
         .stdin(Stdio::null())
         .env_remove("RUST_BACKTRACE")
         .output()
-        .unwrap()
-        .into()
+        .unwrap();
+    task.ended(output)
 }
 
 /// How often each call is made: by the first thread before its own code begins, and by the thread that makes most of them.

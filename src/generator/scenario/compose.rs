@@ -332,7 +332,9 @@ impl Scenario {
         let directory = if directory.as_os_str().is_empty() { Path::new(".") } else { directory };
         let full = directory.join(path).canonicalize().map_err(io)?;
         if !overrides.allow_outside && !full.starts_with(directory.canonicalize().map_err(io)?) {
-            return Err(refuse("lies outside the scenario's directory (--allow-outside permits it)"));
+            return Err(refuse(
+                "lies outside the scenario's directory (run, generate and plan permit it with --allow-outside)",
+            ));
         }
         if !full.metadata().map_err(io)?.is_file() {
             return Err(refuse("is not a file"));

@@ -14,6 +14,7 @@ pub static L1_CA: Signal = Signal {
     name: "GPS L1 C/A",
     rinex: "1C",
     system: System::Gps,
+    constellation: [1, 32], // IS-GPS-200N, table 3-Ia, note: 33 to 37 are reserved for other uses
     carrier_hz: 1_575.42e6, // IS-GPS-200N, 3.3.1.1
     components: &[Component {
         power_share: 1.0,

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
 use super::kernel;
+use super::multiple_access::Law;
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
 use super::threshold::{of_one_cell, threshold};
@@ -44,8 +45,8 @@ pub(super) struct Grid {
     /// Lags in one code period, and the samples between them.
     pub lags: usize,
     pub lag_samples: f64,
-    /// What a satellite's statistic has to exceed.
-    pub threshold: f64,
+    /// What a satellite's statistic has to exceed, by Doppler.
+    law: Law,
     /// What the statistic is multiplied by where a real recording's noise is not circular.
     image_scale: f64,
     is_real: bool,
@@ -58,8 +59,17 @@ pub(super) struct Grid {
 pub(super) struct Peak {
     /// In units in which noise alone is chi-square with 2K degrees of freedom.
     pub statistic: f64,
+    /// What it has to exceed at its Doppler.
+    pub threshold: f64,
     pub doppler_hz: f64,
     pub lag: usize,
+}
+
+/// The outcome for all satellites.
+pub(super) struct Peaks {
+    pub of: Vec<Peak>,
+    /// Dopplers at which cross-correlation raises the cells of all codes.
+    pub crowded: usize,
 }
 
 /// One satellite at one Doppler: the largest cell, and sums over all cells and over those near it.
@@ -97,7 +107,9 @@ impl Grid {
         let lags = (period_samples / lag_samples).ceil() as usize;
         let per_cell = of_one_cell(settings.false_alarm_probability, (lags * dopplers_hz.len()) as f64);
         let sums = settings.noncoherent_sums;
-        let circular = threshold(per_cell, 2 * sums);
+        // One degree of freedom a sum, with the same mean.
+        let image_scale = threshold(per_cell, 2 * sums) / (2.0 * threshold(per_cell, sums));
+        let law = Law::new(settings.false_alarm_probability, lags, dopplers_hz.len(), sums, image_scale);
         let mut planner = FftPlanner::new();
         Some(Self {
             period_samples,
@@ -112,9 +124,8 @@ impl Grid {
             step_hz,
             lags,
             lag_samples,
-            threshold: circular,
-            // One degree of freedom a sum, with the same mean.
-            image_scale: circular / (2.0 * threshold(per_cell, sums)),
+            law,
+            image_scale,
             is_real: !metadata.format.is_complex(),
             forward: planner.plan_fft_forward(length),
             inverse: planner.plan_fft_inverse(band),
@@ -164,15 +175,35 @@ impl Grid {
     }
 
     /// The largest cell of every satellite, in their order.
-    pub fn search(&self, block: &Block, spectra: &[&[Complex<f32>]]) -> Vec<Peak> {
+    pub fn search(&self, block: &Block, spectra: &[&[Complex<f32>]]) -> Peaks {
         let power: f64 = block.i.iter().chain(block.q).map(|x| f64::from(x * x)).sum();
         let rms = (power / block.i.len().max(1) as f64).sqrt();
         if rms == 0.0 {
-            return vec![Peak { statistic: 0.0, doppler_hz: 0.0, lag: 0 }; spectra.len()];
+            let none = Peak { statistic: 0.0, threshold: self.law.threshold, doppler_hz: 0.0, lag: 0 };
+            return Peaks { of: vec![none; spectra.len()], crowded: 0 };
         }
         let strips: Vec<Vec<Strip>> =
             self.dopplers_hz.par_iter().map(|&doppler| self.one_doppler(block, 1.0 / rms, doppler, spectra)).collect();
-        (0..spectra.len()).map(|satellite| self.peak(&strips, satellite)).collect()
+        let heights: Vec<Vec<f64>> = (0..spectra.len()).map(|satellite| self.heights(&strips, satellite)).collect();
+        let image = |bin: usize| self.dopplers_hz.get(bin).is_some_and(|doppler_hz| self.meets_image(*doppler_hz));
+        let bar = self.law.bar(&heights, image);
+        let peak = |(satellite, heights): (usize, &Vec<f64>)| {
+            let share = |bin: usize| heights[bin] / bar.thresholds[bin];
+            let bin = (1..heights.len()).fold(0, |best, bin| if share(bin) > share(best) { bin } else { best });
+            Peak {
+                statistic: heights[bin],
+                threshold: bar.thresholds[bin],
+                doppler_hz: self.dopplers_hz[bin],
+                lag: strips[bin][satellite].lag,
+            }
+        };
+        Peaks { of: heights.iter().enumerate().map(peak).collect(), crowded: bar.crowded }
+    }
+
+    /// What a statistic has to exceed in noise.
+    #[cfg(test)]
+    pub fn threshold(&self) -> f64 {
+        self.law.threshold
     }
 
     fn one_doppler(&self, block: &Block, scale: f64, doppler_hz: f64, spectra: &[&[Complex<f32>]]) -> Vec<Strip> {
@@ -265,28 +296,26 @@ impl Grid {
         (PEAK_CHIPS / (self.chips_per_sample * self.lag_samples)).ceil() as usize
     }
 
-    /// The largest cell of a satellite over the noise floor of its map. Of each Doppler whose own largest
+    /// The largest cell of a satellite at every Doppler, over the noise floor of its map. Of each Doppler whose own largest
     /// cell lies at the peak's code phase, the neighbourhood is left out of the floor.
-    fn peak(&self, strips: &[Vec<Strip>], satellite: usize) -> Peak {
+    fn heights(&self, strips: &[Vec<Strip>], satellite: usize) -> Vec<f64> {
         let column = || strips.iter().filter_map(|strip| strip.get(satellite));
-        let (mut best, mut bin) = (Strip { peak: 0.0, lag: 0, total: 0.0, near: 0.0, near_cells: 0 }, 0);
-        let mut height = 0.0;
-        for (n, (strip, &doppler_hz)) in column().zip(&self.dopplers_hz).enumerate() {
-            let scale = if self.meets_image(doppler_hz) { self.image_scale } else { 1.0 };
-            if f64::from(strip.peak) * scale > height {
-                (best, bin, height) = (*strip, n, f64::from(strip.peak) * scale);
-            }
-        }
+        let scaled: Vec<f64> = (column().zip(&self.dopplers_hz))
+            .map(|(strip, &doppler_hz)| {
+                f64::from(strip.peak) * if self.meets_image(doppler_hz) { self.image_scale } else { 1.0 }
+            })
+            .collect();
+        let highest = (0..scaled.len()).fold(0, |best, bin| if scaled[bin] > scaled[best] { bin } else { best });
+        let best_lag = column().nth(highest).map_or(0, |strip| strip.lag);
         let (mut total, mut cells) = (0.0, 0);
         for strip in column() {
-            let apart = strip.lag.abs_diff(best.lag);
+            let apart = strip.lag.abs_diff(best_lag);
             let same = apart.min(self.lags - apart.min(self.lags)) <= self.near_cells();
             total += strip.total - if same { strip.near } else { 0.0 };
             cells += self.lags - if same { strip.near_cells } else { 0 };
         }
         let floor = total / cells.max(1) as f64 / (2.0 * f64::from(self.sums));
-        let statistic = if floor > 0.0 { height / floor } else { 0.0 };
-        Peak { statistic, doppler_hz: self.dopplers_hz.get(bin).copied().unwrap_or(0.0), lag: best.lag }
+        scaled.into_iter().map(|height| if floor > 0.0 { height / floor } else { 0.0 }).collect()
     }
 
     /// Where a carrier of that Doppler appears in the samples.

@@ -3,12 +3,14 @@
 //! Every code phase at once by FFT, Doppler by Doppler, coherent sums over code periods whose powers
 //! are added (sources: Kaplan and Hegarty, chapter 8; Borre et al., chapter 6). The threshold follows from a
 //! stated false-alarm probability and the noise floor of the satellite's own map. Found satellites
-//! are refined for tracking. Cross-correlation with strong satellites passes for weak ones, so these are searched for
-//! again after the strong ones are subtracted from the samples; where that takes a good part of all power, and with it of
-//! the noise that the others meet, so are those that were not found.
-//! Cross-correlation with satellites that are not candidates, and narrow-band interference, are not
-//! recognised: they look like weak satellites. Dopplers that change by more than the step within the search,
+//! are refined for tracking. Dopplers that change by more than the step within the search,
 //! and data symbols shorter than the coherent sum, are not searched for.
+//!
+//! **Multiple access.** Cross-correlation with strong satellites passes for weak ones. So the strong ones are subtracted from
+//! the samples, code period by code period, and weak ones are looked for again; where the strong ones have a good part of all
+//! power, or raise the cells of all codes, so is everything else. What is strong among the rest goes the same way. Signals that are
+//! no candidates are not subtracted: where they raise the cells of all codes, the threshold rises ([`multiple_access`]).
+//! Continuous waves that could pass for satellites are taken out first ([`tone`]).
 //!
 //! **Threshold.** A cell's statistic is Σ|S|² in units of half its noise power: chi-square with 2K degrees
 //! of freedom for K sums. With N cells (lags in one code period times Dopplers), a cell is given
@@ -24,10 +26,13 @@
 
 mod grid;
 mod kernel;
+mod multiple_access;
 mod refine;
 mod replica;
 mod settings;
 pub(in crate::receiver) mod threshold;
+mod tone;
+mod window;
 
 use std::collections::BTreeMap;
 
@@ -44,16 +49,22 @@ use grid::Grid;
 use refine::Refined;
 use replica::Replica;
 pub use settings::AcquisitionSettings;
+use window::Window;
 
 /// Hits this much weaker than the strongest (10 dB) have to show without those that are stronger.
 ///
 /// One C/A code appears in the correlator of another at most 21 dB down, several together seldom above 14 dB down.
 const WEAK_SHARE: f64 = 0.1;
-/// A hit this much weaker than the strongest (24 dB) is not believed even then: subtraction leaves something over, and
+/// A hit this much weaker than the strongest (40 dB) is not believed even then: subtraction leaves something over, and
 /// without noise to cover it that something has the cross-correlation's peaks.
-const LEAST_SHARE: f64 = 4e-3;
-/// Subtraction that leaves less than this of the samples' power takes a decibel of noise from those that were not found.
-const MASKED_SHARE: f64 = 0.8;
+const LEAST_SHARE: f64 = 1e-4;
+/// Satellites with this share of the samples' power take 1.2 dB from those that were not found.
+const MASKING_SHARE: f64 = 0.25;
+/// C/N0 times the time searched from which a satellite can crowd the Dopplers of others: at 21 dB down its cross-correlation
+/// then raises a cell by 4, where noise has 2 a sum.
+const CROWDING: f64 = 250.0;
+/// Looks at the samples, each without what the one before found strong.
+const LARGEST_LOOKS: u32 = 4;
 
 /// A satellite that was found.
 #[derive(Clone, Copy, Debug)]
@@ -101,6 +112,41 @@ pub fn samples_needed(metadata: &IfMetadata, settings: &AcquisitionSettings) -> 
         grid::samples_needed(period_s * metadata.rate.hz(), periods, settings.noncoherent_sums, slowest)
     };
     Ok(SIGNALS.iter().map(one).max().unwrap_or(0))
+}
+
+/// The settings of a search that `have` samples have room for: fewer sums, and sums of fewer code periods where one is too
+/// long; `None` below two code periods.
+///
+/// # Errors
+/// As [`AcquisitionSettings::validate`].
+pub fn shortened(
+    metadata: &IfMetadata,
+    settings: &AcquisitionSettings,
+    have: u64,
+) -> Result<Option<AcquisitionSettings>, AcquireError> {
+    for coherent_periods in (1..=settings.coherent_periods).rev() {
+        let with = |noncoherent_sums| AcquisitionSettings { coherent_periods, noncoherent_sums, ..settings.clone() };
+        if samples_needed(metadata, &with(1))? > have {
+            continue;
+        }
+        // Samples grow with the sums.
+        let (mut fits, mut too_many) = (1, settings.noncoherent_sums + 1);
+        while too_many - fits > 1 {
+            let middle = fits + (too_many - fits) / 2;
+            if samples_needed(metadata, &with(middle))? > have { too_many = middle } else { fits = middle }
+        }
+        return Ok(Some(with(fits)));
+    }
+    Ok(None)
+}
+
+/// Samples below which nothing is searched for: two code periods.
+///
+/// # Errors
+/// As [`AcquisitionSettings::validate`].
+pub fn least_samples(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Result<u64, AcquireError> {
+    let least = AcquisitionSettings { coherent_periods: 1, noncoherent_sums: 1, ..settings.clone() };
+    samples_needed(metadata, &least)
 }
 
 /// Chips between neighbouring cells of a search for `signal`.
@@ -252,30 +298,40 @@ impl Searcher {
     ) -> Vec<(AcquisitionRow, Option<Acquired>)> {
         let Some(component) = signal.components.first() else { return Vec::new() };
         let code_chips = f64::from(component.code_chips);
-        let threshold = grid.threshold;
-        let mut findings = self.detect(grid, component, &window.block(), codes, threshold);
-
-        let strongest = findings.iter().filter_map(|f| f.hit.map(|hit| hit.power)).fold(0.0, f64::max);
-        let is_weak = |finding: &Finding| finding.hit.is_some_and(|hit| hit.power < WEAK_SHARE * strongest);
-        if findings.iter().any(is_weak) {
-            let mut strong: Vec<(Refined, &Code)> = (findings.iter().zip(codes))
-                .filter(|(finding, _)| !is_weak(finding))
-                .filter_map(|(finding, (_, code))| Some((finding.hit?, *code)))
-                .collect();
-            strong.sort_by(|a, b| b.0.power.total_cmp(&a.0.power));
-            let before = window.power();
-            for (hit, code) in strong {
-                let complex = self.metadata.format.is_complex();
-                let samples = (&mut window.i[..], &mut window.q[..]);
-                refine::subtract(grid, code_chips, &code.replica, &hit, complex, samples);
+        let complex = self.metadata.format.is_complex();
+        let sums = f64::from(self.settings.noncoherent_sums) * f64::from(self.settings.coherent_periods);
+        let searched_s = sums * component.period_s();
+        tone::remove(&mut window, grid.rate_hz, complex);
+        let (mut findings, mut crowded) = self.detect(grid, component, &window.block(), codes);
+        let mut strongest = 0.0;
+        // Codes that are not subtracted yet.
+        let mut open: Vec<usize> = (0..codes.len()).collect();
+        for _ in 1..LARGEST_LOOKS {
+            let hits = || open.iter().filter_map(|&index| Some((index, findings[index].hit?)));
+            let here = hits().map(|(_, hit)| hit.power).fold(0.0, f64::max);
+            let mut strong: Vec<(usize, Refined)> = hits().filter(|(_, hit)| hit.power >= WEAK_SHARE * here).collect();
+            let weak = hits().count() > strong.len();
+            let band_hz = if complex { grid.rate_hz } else { 0.5 * grid.rate_hz };
+            let masking_hz: f64 = strong.iter().map(|(_, hit)| hit.cn0_hz).sum();
+            let masked = masking_hz > MASKING_SHARE * (band_hz + masking_hz);
+            let crowding = crowded > 0 && strong.iter().any(|(_, hit)| hit.cn0_hz * searched_s > CROWDING);
+            if !(weak || masked || crowding) {
+                break;
             }
-            let masked = window.power() < MASKED_SHARE * before;
-            let (indices, again): (Vec<usize>, Vec<(Sv, &Code)>) = (0..codes.len())
-                .filter(|&index| is_weak(&findings[index]) || masked && findings[index].hit.is_none())
-                .map(|index| (index, codes[index]))
-                .unzip();
-            let found = self.detect(grid, component, &window.block(), &again, threshold);
-            for (index, mut finding) in indices.into_iter().zip(found) {
+            strongest = f64::max(strongest, here);
+            strong.sort_by(|a, b| b.1.power.total_cmp(&a.1.power));
+            for (index, hit) in &strong {
+                let samples = (&mut window.i[..], &mut window.q[..]);
+                refine::subtract(grid, code_chips, &codes[*index].1.replica, hit, complex, samples);
+            }
+            open.retain(|index| strong.iter().all(|(taken, _)| taken != index));
+            // Weak hits alone need few codes; what the strong ones hid may be any.
+            let again: Vec<usize> =
+                (open.iter().copied()).filter(|&index| findings[index].hit.is_some() || masked || crowding).collect();
+            let chosen: Vec<(Sv, &Code)> = again.iter().map(|&index| codes[index]).collect();
+            let (found, still) = self.detect(grid, component, &window.block(), &chosen);
+            crowded = still;
+            for (index, mut finding) in again.into_iter().zip(found) {
                 finding.hit = finding.hit.filter(|hit| hit.power >= LEAST_SHARE * strongest);
                 findings[index] = finding;
             }
@@ -287,23 +343,22 @@ impl Searcher {
             }
         }
         let rows = findings.iter().zip(codes);
-        rows.map(|(finding, (sv, _))| finding.report(signal, *sv, window.first, threshold, code_chips)).collect()
+        rows.map(|(finding, (sv, _))| finding.report(signal, *sv, window.first, code_chips)).collect()
     }
 
-    /// One search of these samples, and refinement of what passes the threshold.
+    /// One search of these samples, and refinement of what passes the threshold; with the number of crowded Dopplers.
     fn detect(
         &self,
         grid: &Grid,
         component: &Component,
         block: &Block,
         codes: &[(Sv, &Code)],
-        threshold: f64,
-    ) -> Vec<Finding> {
+    ) -> (Vec<Finding>, usize) {
         let (sums, coherent) = (self.settings.noncoherent_sums, self.settings.coherent_periods);
         let spectra: Vec<&[Complex<f32>]> = codes.iter().map(|(_, code)| code.spectrum.as_slice()).collect();
         let coherent_s = component.period_s() * f64::from(coherent);
         let peaks = grid.search(block, &spectra);
-        peaks
+        let findings = (peaks.of)
             .into_par_iter()
             .zip(codes)
             .map(|(peak, (_, code))| {
@@ -314,17 +369,19 @@ impl Searcher {
                     cn0_hz: excess.max(f64::MIN_POSITIVE) / coherent_s,
                     power: 0.0,
                 };
-                let hit = (peak.statistic > threshold)
+                let hit = (peak.statistic > peak.threshold)
                     .then(|| refine::refine(grid, block, component, &code.replica, coarse, (sums * coherent) as usize));
-                Finding { statistic: peak.statistic, coarse, hit }
+                Finding { statistic: peak.statistic, threshold: peak.threshold, coarse, hit }
             })
-            .collect()
+            .collect();
+        (findings, peaks.crowded)
     }
 }
 
 /// What a search found of one satellite.
 struct Finding {
     statistic: f64,
+    threshold: f64,
     coarse: Refined,
     hit: Option<Refined>,
 }
@@ -335,7 +392,6 @@ impl Finding {
         signal: &'static Signal,
         sv: Sv,
         sample: u64,
-        threshold: f64,
         code_chips: f64,
     ) -> (AcquisitionRow, Option<Acquired>) {
         let best = self.hit.unwrap_or(self.coarse);
@@ -345,7 +401,7 @@ impl Finding {
             signal,
             acquired: self.hit.is_some(),
             statistic: self.statistic,
-            threshold,
+            threshold: self.threshold,
             doppler_hz: best.doppler_hz,
             code_phase_chips: best.code_phase_chips.rem_euclid(code_chips),
             cn0_dbhz: 10.0 * libm::log10(best.cn0_hz),
@@ -362,31 +418,7 @@ impl Finding {
     }
 }
 
-/// The samples of one search, with their mean taken out: a front end's constant offset correlates with
-/// the spectral lines of every code, one each kilohertz for C/A, and would pass for satellites there.
-struct Window {
-    first: u64,
-    i: Vec<f32>,
-    q: Vec<f32>,
-}
-
-impl Window {
-    fn centred(block: &Block, samples: usize) -> Self {
-        let centred = |x: &[f32]| -> Vec<f32> {
-            let mean = x.iter().take(samples).map(|x| f64::from(*x)).sum::<f64>() / samples.max(1) as f64;
-            x.iter().take(samples).map(|x| (f64::from(*x) - mean) as f32).collect()
-        };
-        Self { first: block.first, i: centred(block.i), q: centred(block.q) }
-    }
-
-    fn block(&self) -> Block<'_> {
-        Block { first: self.first, i: &self.i, q: &self.q }
-    }
-
-    fn power(&self) -> f64 {
-        self.i.iter().zip(&self.q).map(|(i, q)| f64::from(i * i + q * q)).sum()
-    }
-}
-
+#[cfg(test)]
+mod sky_tests;
 #[cfg(test)]
 mod tests;

@@ -8,10 +8,10 @@ use crate::gnss::samples::Format;
 use crate::gnss::time::Rate;
 
 /// Uniform numbers from a 64-bit mixing function (splitmix64), pairs of Gaussian ones by Box and Muller.
-struct Noise(u64);
+pub(super) struct Noise(pub u64);
 
 impl Noise {
-    fn uniform(&mut self) -> f64 {
+    pub(super) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -27,21 +27,21 @@ impl Noise {
 }
 
 #[derive(Clone, Copy)]
-struct Sent {
-    prn: u8,
-    doppler_hz: f64,
-    phase_chips: f64,
-    cn0_dbhz: f64,
+pub(super) struct Sent {
+    pub prn: u8,
+    pub doppler_hz: f64,
+    pub phase_chips: f64,
+    pub cn0_dbhz: f64,
 }
 
-struct Recording {
-    metadata: IfMetadata,
-    i: Vec<f32>,
-    q: Vec<f32>,
+pub(super) struct Recording {
+    pub metadata: IfMetadata,
+    pub i: Vec<f32>,
+    pub q: Vec<f32>,
 }
 
 /// Samples with noise of variance one (complex E|n|² = 1, real E n² = 1) and chips taken at sample instants.
-fn record(metadata: IfMetadata, samples: usize, sent: &[Sent], seed: u64) -> Recording {
+pub(super) fn record(metadata: IfMetadata, samples: usize, sent: &[Sent], seed: u64) -> Recording {
     let rate_hz = metadata.rate.hz();
     let real = !metadata.format.is_complex();
     let mut noise = Noise(seed);
@@ -74,13 +74,13 @@ fn record(metadata: IfMetadata, samples: usize, sent: &[Sent], seed: u64) -> Rec
     Recording { metadata, i: single(i), q: single(q) }
 }
 
-fn metadata(format: Format, rate_hz: f64, if_hz: f64, inverted: bool) -> IfMetadata {
+pub(super) fn metadata(format: Format, rate_hz: f64, if_hz: f64, inverted: bool) -> IfMetadata {
     let offset_hz = if inverted { if_hz } else { -if_hz };
     let rate = Rate::from_hz(rate_hz).unwrap();
     IfMetadata { format, rate, center_hz: L1_CA.carrier_hz + offset_hz, inverted, start: None }
 }
 
-fn all() -> Vec<(&'static Signal, Sv)> {
+pub(super) fn all() -> Vec<(&'static Signal, Sv)> {
     (1..=32).map(|prn| (&L1_CA, Sv::gps(prn))).collect()
 }
 
@@ -93,7 +93,7 @@ fn run(
     search(&recording.metadata, &block, candidates, settings).unwrap()
 }
 
-fn difference_chips(a: f64, b: f64) -> f64 {
+pub(super) fn difference_chips(a: f64, b: f64) -> f64 {
     (a - b + 511.5).rem_euclid(1023.0) - 511.5
 }
 
@@ -153,7 +153,7 @@ fn a_strong_satellite_does_not_bring_others_by_cross_correlation() {
         let grid = searcher.grids.values().next().unwrap();
         let spectra: Vec<_> = searcher.codes.values().map(|code| code.spectrum.as_slice()).collect();
         let peaks = grid.search(&Block { first: 0, i: &recording.i, q: &recording.q }, &spectra);
-        assert!(peaks.iter().filter(|peak| peak.statistic > grid.threshold).count() > sent.len());
+        assert!(peaks.of.iter().filter(|peak| peak.statistic > grid.threshold()).count() > sent.len());
     }
 }
 

@@ -146,8 +146,11 @@ pub enum NoFix {
         names(other)
     )]
     Ambiguous { one: Vec<Sv>, other: Vec<Sv>, separation_m: f64 },
-    #[error("the ionosphere's parameters have not been decoded")]
-    AwaitingIonosphere,
+    #[error(
+        "the ionosphere's parameters are awaited: {waited_s:.1} s so far, of {}",
+        limit_s.map_or("any time, as position.require_ionosphere is set".to_owned(), |s| format!("{s:.1} s at most"))
+    )]
+    AwaitingIonosphere { waited_s: f64, limit_s: Option<f64> },
 }
 
 fn names(svs: &[Sv]) -> String {
@@ -268,7 +271,8 @@ impl Solver {
         let since = *self.ready_since.get_or_insert(sample);
         let waited_s = self.rate.elapsed_s(sample.saturating_sub(since));
         if self.settings.require_ionosphere || waited_s < self.settings.ionosphere_wait_s {
-            Err(NoFix::AwaitingIonosphere)
+            let limit_s = (!self.settings.require_ionosphere).then_some(self.settings.ionosphere_wait_s);
+            Err(NoFix::AwaitingIonosphere { waited_s, limit_s })
         } else {
             Ok(())
         }

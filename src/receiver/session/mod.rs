@@ -26,7 +26,7 @@ use crate::receiver::position::least_squares::{LARGEST_CONDITION, UNKNOWNS};
 use crate::receiver::position::{CodeNoise, NoFix, Solver};
 use crate::receiver::run::{Conditioning, Interfered, Outcome, ReceiveError, candidates, warnings};
 use crate::receiver::settings::Settings;
-use crate::receiver::source::{Packed, Planes};
+use crate::receiver::source::{Block, Packed, Planes};
 use crate::receiver::track::{Channel, LoopMargin, Report, code_shape};
 
 mod decode;
@@ -37,6 +37,9 @@ mod search;
 
 /// So many fixes in a row have to show a channel's wrong time.
 const WRONG_TIME_FIXES: u32 = 10;
+
+/// Years in 1024 weeks.
+const ERA_YEARS: f64 = 19.6;
 
 /// Channels go over a block in parts of so many samples at least: 512 KiB in planar `f32`, a core's own cache …
 const PART_SAMPLES: usize = 1 << 16;
@@ -51,6 +54,8 @@ struct Track {
     report: Report,
     since: u64,
     cn0_dbhz: f64,
+    /// By the search that found it.
+    found_dbhz: f64,
     symbols: u64,
     wrong_time: u32,
     dropped: bool,
@@ -60,6 +65,12 @@ struct Track {
 struct Window {
     first: u64,
     samples: Planes,
+}
+
+impl Window {
+    fn block(&self) -> Block<'_> {
+        Block { first: self.first, i: &self.samples.i, q: &self.samples.q }
+    }
 }
 
 /// What became of a satellite, for the diagnosis.
@@ -137,7 +148,7 @@ impl Session {
             metadata: metadata.clone(),
             settings: settings.clone(),
             week_reference,
-            candidates: candidates(metadata),
+            candidates: candidates(metadata, settings.acquisition.reserved_codes),
             searcher: Searcher::new(metadata, &settings.acquisition)?,
             aimed: None,
             widenings: 0,
@@ -223,7 +234,12 @@ impl Session {
     fn watch(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
         let mut followed: Vec<f64> = self.tracks.iter().map(|track| track.cn0_dbhz).collect();
         followed.sort_by(f64::total_cmp);
-        let strongest_hz = followed.last().map_or(0.0, |dbhz| libm::pow(10.0, dbhz / 10.0));
+        // A channel's first estimates may be low; the search's is not.
+        let found = self.tracks.iter().map(|track| track.found_dbhz);
+        let strongest_hz = found
+            .chain(followed.last().copied())
+            .max_by(f64::total_cmp)
+            .map_or(0.0, |dbhz| libm::pow(10.0, dbhz / 10.0));
         let mut told = Vec::new();
         self.watch.take(block, strongest_hz, |_, row| told.push(row));
         for row in told {
@@ -297,13 +313,23 @@ impl Session {
             diagnosis: None,
             interfered: self.interfered.clone(),
             parted: self.parted(),
-            warnings: warnings(&self.metadata, &self.settings),
+            warnings: [warnings(&self.metadata, &self.settings), self.assumed_era().into_iter().collect()].concat(),
             conditioning: Conditioning {
                 geometry_worst: self.worst_condition,
                 geometry_limit: LARGEST_CONDITION,
                 loops: self.loops.to_vec(),
             },
         }
+    }
+
+    /// What to say of a week that was resolved without a start time.
+    fn assumed_era(&self) -> Option<String> {
+        let clock = self.timebase.clock().filter(|_| self.metadata.start.is_none())?;
+        Some(format!(
+            "the recording has no start time and the message counts weeks modulo 1024: of times {ERA_YEARS} years apart the one \
+             nearest to operation.week_reference = {:?} was taken, {}; --start TIME or that setting takes another",
+            self.settings.operation.week_reference, clock.start
+        ))
     }
 
     /// The first stage that failed, where there was no fix.

@@ -3,23 +3,21 @@
 use std::collections::BTreeSet;
 
 use super::{Session, Track, WRONG_TIME_FIXES, Window};
-use crate::gnss::record::{Event, EventRow};
+use crate::gnss::record::{AcquisitionRow, Event, EventRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
+use crate::receiver::acquire::{self, Acquired};
 use crate::receiver::decode::Decoder;
 use crate::receiver::output::Output;
 use crate::receiver::parting::Line;
 use crate::receiver::run::ReceiveError;
-use crate::receiver::source::{Block, Packed, Planes};
+use crate::receiver::source::{Packed, Planes};
 use crate::receiver::track::{Channel, Report};
 
 /// A satellite that was lost is searched for eagerly so long.
 const EAGER_S: f64 = 30.0;
 /// A channel that was dropped for what it said is not followed again so long.
 const REFUSED_S: f64 = 120.0;
-/// A C/A code shows 21 dB down in another's correlator; what is this much weaker than the strongest is not followed when
-/// it was found beside tracked satellites. A search cannot tell it from an echo.
-const ECHO_DB: f64 = 20.0;
 
 impl Session {
     /// Collects samples while a search is due, searches when there are enough, starts channels.
@@ -43,58 +41,83 @@ impl Session {
         }
         let Some(window) = self.window.take() else { return Ok(()) };
         self.refused.retain(|_, until| *until > end);
-        let followed: BTreeSet<(&'static Signal, Sv)> =
-            self.tracks.iter().map(|track| (track.channel.signal(), track.channel.sv())).collect();
         // Satellites that are followed are searched for too: without them their cross-correlation
         // would pass for others.
-        let all_found = self.candidates.iter().all(|candidate| followed.contains(candidate));
+        let all_found = self.candidates.iter().all(|(signal, sv)| {
+            self.tracks.iter().any(|track| track.channel.signal() == *signal && track.channel.sv() == *sv)
+        });
         if !all_found {
-            let strongest_dbhz = self.tracks.iter().map(|track| track.cn0_dbhz).fold(f64::NEG_INFINITY, f64::max);
-            let searched = Block { first: window.first, i: &window.samples.i, q: &window.samples.q };
-            let results = self.searcher.search(&searched, &self.candidates)?;
+            let results = self.searcher.search(&window.block(), &self.candidates)?;
             self.look(&results, end);
-            for (mut row, hit) in results {
-                row.acquired &= hit.is_some_and(|hit| hit.cn0_dbhz > strongest_dbhz - ECHO_DB);
-                let key = (row.signal, row.sv);
-                if followed.contains(&key) || self.refused.contains_key(&key) {
-                    continue;
-                }
-                if self.strongest.is_none_or(|(_, best, _)| row.statistic > best) {
-                    self.strongest = Some((row.sv, row.statistic, row.threshold));
-                }
-                // Of later searches only what was found says anything new.
-                if row.acquired || !self.searched {
-                    output.acquisition(&row)?;
-                }
-                let Some(hit) = hit.filter(|hit| hit.cn0_dbhz > strongest_dbhz - ECHO_DB) else { continue };
-                self.acquired.insert(hit.sv);
-                self.lost.remove(&key);
-                self.progress.entry(hit.sv).or_default();
-                output.event(&EventRow {
-                    sample: hit.sample,
-                    sv: hit.sv,
-                    signal: hit.signal,
-                    event: Event::Acquired,
-                })?;
-                let mut channel = Channel::start(&hit, &self.metadata, &self.settings.tracking);
-                channel.set_carrier_offset(self.offset.hz());
-                self.tracks.push(Track {
-                    channel,
-                    line: Line::default(),
-                    decoder: Decoder::new(hit.signal, hit.sv),
-                    report: Report::default(),
-                    since: block.first,
-                    cn0_dbhz: hit.cn0_dbhz,
-                    symbols: 0,
-                    wrong_time: 0,
-                    dropped: false,
-                });
-            }
-            self.tracks.sort_by_key(|track| (track.channel.signal(), track.channel.sv()));
+            self.start_channels(results, block.first, output)?;
         }
         self.searched = true;
         self.widen();
         self.plan_search(end);
+        Ok(())
+    }
+
+    /// Searches a recording that ended before the first search had all the samples that it asks for: by fewer sums, and by
+    /// sums of one code period where there is no room for another.
+    pub(in crate::receiver) fn search_rest(&mut self, output: &mut Output) -> Result<(), ReceiveError> {
+        let Some(window) = self.window.take().filter(|_| !self.searched) else { return Ok(()) };
+        let have = window.samples.i.len() as u64;
+        let Some(settings) = acquire::shortened(&self.metadata, &self.settings.acquisition, have)? else {
+            return Ok(());
+        };
+        let results = acquire::search(&self.metadata, &window.block(), &self.candidates, &settings)?;
+        self.start_channels(results, window.first, output)?;
+        self.searched = true;
+        Ok(())
+    }
+
+    /// Whether there were samples enough for a search.
+    pub(in crate::receiver) fn has_searched(&self) -> bool {
+        self.searched
+    }
+
+    /// Records what a search came to, and starts channels on what it found.
+    fn start_channels(
+        &mut self,
+        results: Vec<(AcquisitionRow, Option<Acquired>)>,
+        since: u64,
+        output: &mut Output,
+    ) -> Result<(), ReceiveError> {
+        let followed: BTreeSet<(&'static Signal, Sv)> =
+            self.tracks.iter().map(|track| (track.channel.signal(), track.channel.sv())).collect();
+        for (row, hit) in results {
+            let key = (row.signal, row.sv);
+            if followed.contains(&key) || self.refused.contains_key(&key) {
+                continue;
+            }
+            if self.strongest.is_none_or(|(_, best, threshold)| row.statistic * threshold > best * row.threshold) {
+                self.strongest = Some((row.sv, row.statistic, row.threshold));
+            }
+            // Of later searches only what was found says anything new.
+            if row.acquired || !self.searched {
+                output.acquisition(&row)?;
+            }
+            let Some(hit) = hit else { continue };
+            self.acquired.insert(hit.sv);
+            self.lost.remove(&key);
+            self.progress.entry(hit.sv).or_default();
+            output.event(&EventRow { sample: hit.sample, sv: hit.sv, signal: hit.signal, event: Event::Acquired })?;
+            let mut channel = Channel::start(&hit, &self.metadata, &self.settings.tracking);
+            channel.set_carrier_offset(self.offset.hz());
+            self.tracks.push(Track {
+                channel,
+                line: Line::default(),
+                decoder: Decoder::new(hit.signal, hit.sv),
+                report: Report::default(),
+                since,
+                cn0_dbhz: hit.cn0_dbhz,
+                found_dbhz: hit.cn0_dbhz,
+                symbols: 0,
+                wrong_time: 0,
+                dropped: false,
+            });
+        }
+        self.tracks.sort_by_key(|track| (track.channel.signal(), track.channel.sv()));
         Ok(())
     }
 

@@ -1,0 +1,179 @@
+//! What a peak has to exceed where other signals' cross-correlation raises the cells around it.
+//!
+//! C/A codes repeat every millisecond, so another satellite shows in every Doppler bin that differs from its own by a multiple
+//! of 1 kHz: in a quarter of the cells at −24 dB, in some up to −21 dB, the same in every sum. Those cells are not chi-square
+//! about the map's noise floor, and their tail reaches much further. Whoever sends: a satellite that was not found yet, one
+//! beyond the searched Dopplers, one of another system with codes of the same family, or what a subtraction left over.
+//!
+//! All codes that are searched for meet those signals alike, and few of the codes are present. So the largest cells of all
+//! codes in one Doppler bin are a sample of that bin's own law. Where their median is above what noise explains, the bin is
+//! *crowded*, and a peak there has to exceed the extrapolation of a Gumbel law, the limit of largest values: its place from
+//! the bin's median, its scale from the upper quartiles of all crowded bins together. Elsewhere the threshold is that of noise.
+//! Limits: fewer codes than [`LEAST_CODES`] say nothing; a bin that is raised by less than 0.7 dB is not noticed.
+
+use super::threshold::{of_one_cell, threshold};
+
+/// Fewer codes are no sample.
+const LEAST_CODES: usize = 12;
+/// A bin is crowded when its median is so many standard deviations above that of noise.
+const CROWDED: f64 = 5.0;
+/// Standard deviation of a Gumbel sample's median over scale, times √n: 1 / (2 × density there, ½ ln 2) = 1/ln 2.
+const MEDIAN_SPREAD: f64 = std::f64::consts::LOG2_E;
+/// The same of the scale that follows from median and upper quartile (covariance of both order statistics included).
+const SCALE_SPREAD: f64 = 1.9;
+
+/// The law of the largest cell of one Doppler bin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Law {
+    /// What a peak has to exceed in noise, and with what probability a bin does.
+    pub threshold: f64,
+    per_bin: f64,
+    /// Of the largest cell of a bin in noise: median and scale, circular and where a carrier meets its image.
+    circular: (f64, f64),
+    image: (f64, f64),
+}
+
+/// What every bin's peak has to exceed.
+pub(super) struct Bar {
+    pub thresholds: Vec<f64>,
+    /// Bins that other signals raise.
+    pub crowded: usize,
+}
+
+/// Standardised quantiles of a Gumbel law: −ln(−ln p).
+fn gumbel(probability: f64) -> f64 {
+    -libm::log(-libm::log(probability))
+}
+
+impl Law {
+    /// Of bins with so many cells of `sums` powers, in a search of `bins` of them with a total of `false_alarm`. `image_scale`
+    /// is what statistics of one degree of freedom a sum were multiplied by.
+    pub fn new(false_alarm: f64, cells: usize, bins: usize, sums: u32, image_scale: f64) -> Self {
+        let per_cell = of_one_cell(false_alarm, (cells * bins) as f64);
+        // A share p of bins stays below the value that a cell exceeds with 1 − p^(1/cells).
+        let below = |p: f64| of_one_cell(1.0 - p, cells as f64);
+        let of = |value: &dyn Fn(f64) -> f64| {
+            let (median, upper) = (value(below(0.5)), value(below(0.75)));
+            (median, (upper - median) / (gumbel(0.75) - gumbel(0.5)))
+        };
+        Self {
+            threshold: threshold(per_cell, 2 * sums),
+            per_bin: of_one_cell(false_alarm, bins as f64),
+            circular: of(&|p| threshold(p, 2 * sums)),
+            image: of(&|p| 2.0 * image_scale * threshold(p, sums)),
+        }
+    }
+
+    /// The bar of every bin, from the largest cells there: `heights[code][bin]`; `image` says where noise is not circular.
+    pub fn bar(&self, heights: &[Vec<f64>], image: impl Fn(usize) -> bool) -> Bar {
+        let bins = heights.first().map_or(0, Vec::len);
+        let mut bar = Bar { thresholds: vec![self.threshold; bins], crowded: 0 };
+        if heights.len() < LEAST_CODES {
+            return bar;
+        }
+        let count = heights.len() as f64;
+        let (mut crowded, mut beyond, mut least_scale) = (Vec::new(), Vec::new(), 0.0_f64);
+        for bin in 0..bins {
+            let (place, scale) = if image(bin) { self.image } else { self.circular };
+            let mut column: Vec<f64> = heights.iter().filter_map(|code| code.get(bin).copied()).collect();
+            let median = quantile(&mut column, 0.5);
+            if median > place + CROWDED * MEDIAN_SPREAD * scale / count.sqrt() {
+                crowded.push((bin, median));
+                beyond.extend(column.iter().map(|height| height - median));
+                least_scale = least_scale.max(scale);
+            }
+        }
+        if crowded.is_empty() {
+            return bar;
+        }
+        let spread = quantile(&mut beyond, 0.75) / (gumbel(0.75) - gumbel(0.5));
+        // One standard deviation above the estimate.
+        let scale = least_scale.max(spread * (1.0 + SCALE_SPREAD / (beyond.len() as f64).sqrt()));
+        let reach = gumbel(1.0 - self.per_bin) - gumbel(0.5);
+        bar.crowded = crowded.len();
+        for (bin, median) in crowded {
+            bar.thresholds[bin] = self.threshold.max(median + scale * reach);
+        }
+        bar
+    }
+}
+
+/// The value below which that share of the values lies; sorts them.
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let place = share * values.len().saturating_sub(1) as f64;
+    let at = |index: usize| values.get(index).copied().unwrap_or(0.0);
+    let (below, part) = (place as usize, place.fract());
+    at(below) + part * (at((below + 1).min(values.len().saturating_sub(1))) - at(below))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Largest of `cells` chi-square values of 20 degrees, by the inverse of its law.
+    fn largest(uniform: f64, cells: f64) -> f64 {
+        threshold(of_one_cell(1.0 - uniform, cells), 20)
+    }
+
+    fn uniforms(count: usize) -> impl FnMut() -> Vec<f64> {
+        let mut state = 3_u64;
+        let mut next = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+        };
+        move || (0..count).map(|_| next()).collect()
+    }
+
+    #[test]
+    fn in_noise_no_bin_is_crowded_and_the_threshold_is_that_of_chi_square() {
+        let law = Law::new(1e-6, 3069, 41, 10, 1.0);
+        let mut draw = uniforms(32);
+        let mut crowded = 0;
+        for _ in 0..40 {
+            let heights: Vec<Vec<f64>> =
+                (0..41).map(|_| draw().into_iter().map(|u| largest(u, 3069.0)).collect()).collect();
+            let heights: Vec<Vec<f64>> = (0..32).map(|code| heights.iter().map(|bin| bin[code]).collect()).collect();
+            let bar = law.bar(&heights, |_| false);
+            crowded += bar.crowded;
+            assert!(bar.crowded > 0 || bar.thresholds.iter().all(|x| *x == law.threshold));
+        }
+        // Five deviations: 3e-7 of 1640 bins, if the median were normal.
+        assert!(crowded <= 1, "{crowded}");
+        // Table of chi-square with 20 degrees: 1e-6/125829 is exceeded above 95.5.
+        assert!((law.threshold - 95.5).abs() < 0.1, "{}", law.threshold);
+    }
+
+    #[test]
+    fn a_raised_bin_has_a_threshold_that_its_own_law_exceeds_as_seldom() {
+        let law = Law::new(1e-6, 3069, 41, 10, 1.0);
+        let mut draw = uniforms(32);
+        let (mut above, mut count) = (0_u32, 0_u32);
+        // Every fourth bin twice as high: the exact threshold there is twice that of one bin in noise.
+        for _ in 0..40 {
+            let bins: Vec<Vec<f64>> = (0..41)
+                .map(|bin| {
+                    let scale = if bin % 4 == 0 { 2.0 } else { 1.0 };
+                    draw().into_iter().map(|u| scale * largest(u, 3069.0)).collect()
+                })
+                .collect();
+            let heights: Vec<Vec<f64>> = (0..32).map(|code| bins.iter().map(|bin| bin[code]).collect()).collect();
+            let bar = law.bar(&heights, |_| false);
+            assert_eq!(bar.crowded, 11);
+            for bin in (0..41).step_by(4) {
+                count += 1;
+                above += u32::from(bar.thresholds[bin] > 2.0 * law.threshold);
+                assert!((1.7..2.6).contains(&(bar.thresholds[bin] / law.threshold)), "{}", bar.thresholds[bin]);
+            }
+        }
+        // The Gumbel law is the limit from above of a tail that steepens: nearly all err to the safe side.
+        assert!(f64::from(above) > 0.8 * f64::from(count), "{above} of {count}");
+    }
+
+    #[test]
+    fn few_codes_are_no_sample() {
+        let law = Law::new(1e-6, 3069, 41, 10, 1.0);
+        let heights = vec![vec![500.0; 41]; LEAST_CODES - 1];
+        assert_eq!(law.bar(&heights, |_| false).crowded, 0);
+    }
+}
