@@ -19,7 +19,7 @@ impl Noise {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn pair(&mut self) -> (f64, f64) {
+    pub(super) fn pair(&mut self) -> (f64, f64) {
         let radius = (-2.0 * libm::log(1.0 - self.uniform())).sqrt();
         let (sin, cos) = libm::sincos(TAU * self.uniform());
         (radius * cos, radius * sin)
