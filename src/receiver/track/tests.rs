@@ -75,7 +75,11 @@ impl Default for Sky {
 }
 
 fn sent_bit(number: u64) -> bool {
-    (number.wrapping_add(3).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) & 1 == 1
+    // SplitMix64: half of all neighbours differ, as in a message.
+    let mut z = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    (z ^ (z >> 31)) & 1 == 1
 }
 
 impl Sky {
