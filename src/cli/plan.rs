@@ -5,6 +5,7 @@ use crate::cli::error::CliError;
 use crate::cli::run::generator_error;
 use crate::cli::scenario;
 use crate::generator;
+use crate::generator::levels::Levels;
 use crate::generator::plan::Plan;
 use crate::generator::scenario::Overrides;
 
@@ -18,6 +19,7 @@ pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
         scenario::warn(&warning);
     }
     let machinery = generator::stream::machinery(&scene).map_err(generator_error)?;
-    let plan = Plan::new(&scene, machinery).map_err(CliError::input)?;
+    let levels = Levels::new(&scene).map_err(generator_error)?;
+    let plan = Plan::new(&scene, machinery, levels).map_err(CliError::input)?;
     scenario::print(&format!("{plan}\n"))
 }

@@ -10,6 +10,7 @@ pub mod departure;
 pub mod effect;
 pub mod fidelity;
 pub mod knots;
+pub mod levels;
 pub mod message;
 pub mod plan;
 pub mod precise;

@@ -1,14 +1,16 @@
 //! What a scene will compute, told before it is computed.
 //!
-//! Nothing is generated: satellites are placed at a few hundred instants, effects act once a satellite, and sizes and
-//! times follow from counts. What concerns the synthesiser (knots, speed, memory) is given to it.
+//! Satellites are placed at a few hundred instants, effects act on them there, and sizes and times follow from counts. What
+//! concerns the synthesiser (knots, speed, memory) is given to it, and so are the levels ([`crate::generator::levels`]), for which a
+//! few stretches of samples are made.
 
 use std::fmt;
 
 use crate::generator::catalogue::Silence;
 use crate::generator::fidelity::{self, Choice};
+use crate::generator::levels::{Levels, Span};
 use crate::generator::presence::{Presence, presence};
-use crate::generator::ray::Ray;
+use crate::generator::ray::{Ray, Sight};
 use crate::generator::scene::{CodeEdge, SPACE_M, Scene, is_outside};
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::earth::Geodetic;
@@ -42,6 +44,8 @@ pub struct InView {
     pub elevation_deg: f64,
     /// Of the first signal; `None` when nothing in the scene says how strong it is.
     pub cn0_dbhz: Option<f64>,
+    /// Power of all its signals and rays over noise density, weakest and strongest of the instants.
+    pub power_dbhz: Option<Span>,
     /// Time since the start when it comes into view, if not in view from the beginning, and by what …
     pub appears: Option<(f64, PassEnd)>,
     /// … and when it leaves, if not in view to the end. To the step of the search, but exact where an ephemeris begins or
@@ -72,6 +76,8 @@ pub struct Plan {
     pub acceleration_mps2: f64,
     pub satellites: Vec<InView>,
     pub models: Vec<Model>,
+    /// The parts of the sum against full scale.
+    pub levels: Levels,
     /// The level of fidelity, its time for a sample of a satellite (ns on one core), and each knob.
     pub level: &'static str,
     pub satellite_sample_ns: f64,
@@ -89,7 +95,7 @@ impl Plan {
     ///
     /// # Errors
     /// [`OrbitError`] from the ephemerides.
-    pub fn new(scene: &Scene, machinery: Machinery) -> Result<Self, OrbitError> {
+    pub fn new(scene: &Scene, machinery: Machinery, levels: Levels) -> Result<Self, OrbitError> {
         let duration_s = scene.clock.rate.elapsed_s(scene.samples);
         let extremes = scene.trajectory.extremes(duration_s);
         let satellites = in_view(scene, duration_s)?;
@@ -109,6 +115,7 @@ impl Plan {
             speed_mps: extremes.speed_mps,
             acceleration_mps2: extremes.acceleration_mps2,
             models: models(scene),
+            levels,
             level: scene.fidelity.grade.name(),
             satellite_sample_ns: scene.fidelity.satellite_sample_ns(scene.clock.rate.hz()),
             knobs: fidelity::choices(scene),
@@ -134,6 +141,10 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
             let motion = scene.trajectory.at(t_s);
             let presence = presence(scene, sv, received, &motion)?;
             let end = presence.end();
+            let (direct_dbhz, power_dbhz) = match &presence {
+                Presence::InView(emission) => strength_dbhz(scene, &emission.sight),
+                _ => (None, None),
+            };
             match (presence, &mut row) {
                 (Presence::InView(emission), None) => {
                     let sight = &emission.sight;
@@ -141,12 +152,8 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
                         sv,
                         azimuth_deg: sight.look.azimuth_rad.to_degrees(),
                         elevation_deg: sight.look.elevation_rad.to_degrees(),
-                        cn0_dbhz: scene.signals.first().and_then(|signal| {
-                            let mut rays =
-                                vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
-                            scene.effects.iter().for_each(|effect| effect.act(sight, signal, &mut rays));
-                            rays.first().filter(|ray| ray.cn0_hz > 0.0).map(|ray| 10.0 * libm::log10(ray.cn0_hz))
-                        }),
+                        cn0_dbhz: direct_dbhz,
+                        power_dbhz: None,
                         appears: absent.map(|by| (change_s(scene, sv, t_s, by, |silence| silence.until), by)),
                         leaves: None,
                     });
@@ -158,12 +165,29 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
                 }
                 _ => {}
             }
+            if let (Some(row), Some(power_dbhz)) = (&mut row, power_dbhz) {
+                Span::widen(&mut row.power_dbhz, power_dbhz);
+            }
             absent = end;
         }
         rows.extend(row);
     }
     rows.sort_by(|a, b| b.elevation_deg.total_cmp(&a.elevation_deg).then(a.sv.cmp(&b.sv)));
     Ok(rows)
+}
+
+/// Power over noise density in dB-Hz of the first signal's direct ray, and of all signals and rays together; `None` when
+/// nothing in the scene says how strong they are.
+fn strength_dbhz(scene: &Scene, sight: &Sight) -> (Option<f64>, Option<f64>) {
+    let (mut direct_hz, mut sum_hz) = (None, 0.0);
+    for signal in &scene.signals {
+        let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
+        scene.effects.iter().for_each(|effect| effect.act(sight, signal, &mut rays));
+        direct_hz = direct_hz.or(rays.first().map(|ray| ray.cn0_hz));
+        sum_hz += rays.iter().map(|ray| ray.cn0_hz).sum::<f64>();
+    }
+    let dbhz = |hz: f64| (hz > 0.0).then(|| 10.0 * libm::log10(hz));
+    (direct_hz.and_then(dbhz), dbhz(sum_hz))
 }
 
 /// When a satellite came or went by the step at `t_s`; where an ephemeris did it, the instant that `edge` takes of its absence.
@@ -304,10 +328,14 @@ impl fmt::Display for Plan {
         } else {
             writeln!(f, "\n{} satellites above {:.1} deg", self.satellites.len(), self.mask_deg)?;
         }
-        writeln!(f, "  sv   azimuth  elevation  C/N0 dB-Hz")?;
+        writeln!(f, "  sv   azimuth  elevation  C/N0 dB-Hz  dBFS")?;
         for row in &self.satellites {
             let cn0 = row.cn0_dbhz.map_or_else(|| "-".to_owned(), |x| format!("{x:.1}"));
             write!(f, "  {}  {:7.1}  {:9.1}  {cn0:>10}", row.sv, row.azimuth_deg, row.elevation_deg)?;
+            if let Some(Span { least, most }) = row.power_dbhz {
+                let [least, most] = [least, most].map(|dbhz| self.levels.satellite_dbfs(dbhz));
+                write!(f, "  {least:.1} to {most:.1}")?;
+            }
             if let Some((t_s, by)) = row.appears {
                 match by {
                     PassEnd::Ephemeris => write!(f, "  first ephemeris from {t_s:.1} s")?,
@@ -324,6 +352,7 @@ impl fmt::Display for Plan {
             }
             writeln!(f)?;
         }
+        write!(f, "\n{}", self.levels)?;
         let ns = self.satellite_sample_ns;
         writeln!(f, "\nfidelity {}: {ns:.2} ns for a sample of a satellite on one core", self.level)?;
         for Choice { knob, value, own, error, cost } in &self.knobs {
@@ -362,7 +391,7 @@ mod tests {
             block_bytes: 1 << 20,
             satellite_samples_per_s: 1e8,
         };
-        Plan::new(&scene, machinery).unwrap()
+        Plan::new(&scene, machinery, Levels::new(&scene).unwrap()).unwrap()
     }
 
     #[test]

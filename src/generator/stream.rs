@@ -25,6 +25,7 @@ use crate::generator::truth::{self, TruthError};
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::gps::lnav::FieldError;
 use crate::gnss::record::{PassRow, TrajectoryRow};
+use crate::gnss::samples::Format;
 use crate::gnss::satellite::Sv;
 
 /// Cut-off of band-limited edges, in cycles a sample.
@@ -378,28 +379,101 @@ fn render(
     let mut clipped = 0;
     let mut first = start;
     for bytes in bytes.chunks_mut(piece_bytes.max(1)) {
-        let from = run_begin(run_begin(first).saturating_sub(memory as u64));
-        let lead = (first - from) as usize;
-        let length = lead + bytes.len() / format.bytes();
-        let tail = (first_run(scene, from, memory as u64) as usize).saturating_sub(length);
-        let Worker { scratch, i, q } = &mut *worker;
-        for plane in [&mut *i, &mut *q] {
-            plane.clear();
-            plane.resize(length + tail, 0.0);
-        }
-        for (run, (i, q)) in (0_u64..).zip(i.chunks_mut(RUN_SAMPLES).zip(q.chunks_mut(RUN_SAMPLES))) {
-            for transmitter in transmitters {
-                transmitter.arrange(scene, from + run * RUN_SAMPLES as u64, i.len(), scratch);
-            }
-            scratch.bank.render(kernel, i, q);
-        }
-        let mut block = Block { lead, tail, level: kernel.level, ..Block::whole(from, i, q) };
+        let samples = bytes.len() / format.bytes();
+        let mut block = satellites(scene, transmitters, kernel, (first, samples, memory), worker);
         scene.stages(|stage| stage.act(&mut block));
-        let (Some(i), Some(q)) = (block.i.get(lead..length), block.q.get(lead..length)) else { continue };
-        clipped += block.clipped + isa::pack(kernel.level, format, i, q, bytes);
-        first = from + length as u64;
+        clipped += block.clipped + pack(&block, samples, format, bytes);
+        first += samples as u64;
     }
     clipped
+}
+
+/// The satellites in `samples` samples from `first` on, with what stages look back at before them.
+fn satellites<'w>(
+    scene: &Scene,
+    transmitters: &[Transmitter],
+    kernel: Kernel<'_>,
+    (first, samples, memory): (u64, usize, usize),
+    worker: &'w mut Worker,
+) -> Block<'w> {
+    let from = run_begin(run_begin(first).saturating_sub(memory as u64));
+    let lead = (first - from) as usize;
+    let length = lead + samples;
+    let tail = (first_run(scene, from, memory as u64) as usize).saturating_sub(length);
+    let Worker { scratch, i, q } = worker;
+    for plane in [&mut *i, &mut *q] {
+        plane.clear();
+        plane.resize(length + tail, 0.0);
+    }
+    for (run, (i, q)) in (0_u64..).zip(i.chunks_mut(RUN_SAMPLES).zip(q.chunks_mut(RUN_SAMPLES))) {
+        for transmitter in transmitters {
+            transmitter.arrange(scene, from + run * RUN_SAMPLES as u64, i.len(), scratch);
+        }
+        scratch.bank.render(kernel, i, q);
+    }
+    Block { lead, tail, level: kernel.level, ..Block::whole(from, i, q) }
+}
+
+/// Packs the samples of a block that are sent on, and returns how many components the format could not hold.
+fn pack(block: &Block<'_>, samples: usize, format: Format, bytes: &mut [u8]) -> u64 {
+    let sent = block.lead..block.lead + samples;
+    let (Some(i), Some(q)) = (block.i.get(sent.clone()), block.q.get(sent)) else { return 0 };
+    isa::pack(block.level, format, i, q, bytes)
+}
+
+/// What a stretch of the scene's samples holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Stretch {
+    /// Components: two a sample, one of real samples.
+    pub components: u64,
+    /// Sum of their squares before a converter or the format rounds them, in LSB of the scene's gain.
+    pub square_lsb2: f64,
+    /// Those that were clipped.
+    pub clipped: u64,
+}
+
+/// Makes the samples of `stretches`, which ascend, as the stream does, and measures them.
+///
+/// # Errors
+/// Those of [`Stream::next`].
+pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<Stretch>, GenerateError> {
+    let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
+    let filter = limited.then(|| Filter::new(cutoff_cps(scene)));
+    let edge = edge(scene, filter.as_ref());
+    let mut transmitters = transmitters(scene, edge)?;
+    let kernel = Kernel { edge, arithmetic: scene.fidelity.carrier, level: Level::detect() };
+    let (memory, format) = (scene.memory_samples(), scene.metadata.format);
+    let lead = memory.next_multiple_of(RUN_SAMPLES) as u64;
+    let (mut worker, mut bytes) = (Worker::default(), Vec::new());
+    let mut found = Vec::new();
+    for stretch in stretches {
+        let needed = run_begin(stretch.start).saturating_sub(lead);
+        let made = stretch.end.max(first_run(scene, needed, lead));
+        transmitters.par_iter_mut().try_for_each(|t| t.prepare_alone(scene, needed, made))?;
+        let samples = (stretch.end - stretch.start) as usize;
+        let mut block = satellites(scene, &transmitters, kernel, (stretch.start, samples, memory), &mut worker);
+        let sent = block.lead..block.lead + samples;
+        let square = |block: &Block<'_>| {
+            let of = |plane: &[f32]| {
+                plane.get(sent.clone()).unwrap_or(&[]).iter().fold(0.0, |sum, x| sum + f64::from(*x) * f64::from(*x))
+            };
+            of(block.i) + if format.is_complex() { of(block.q) } else { 0.0 }
+        };
+        let mut before_lsb2 = None;
+        scene.stages(|stage| {
+            if stage.full_scale_lsb(1.0).is_some() {
+                before_lsb2 = Some(square(&block));
+            }
+            stage.act(&mut block);
+        });
+        bytes.resize(samples * format.bytes(), 0);
+        found.push(Stretch {
+            components: if format.is_complex() { 2 } else { 1 } * samples as u64,
+            square_lsb2: before_lsb2.unwrap_or_else(|| square(&block)),
+            clipped: block.clipped + pack(&block, samples, format, &mut bytes),
+        });
+    }
+    Ok(found)
 }
 
 /// The samples at which truth is written.

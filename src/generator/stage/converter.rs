@@ -75,6 +75,12 @@ impl Stage for Converter {
         })
     }
 
+    fn full_scale_lsb(&self, deviation_lsb: f64) -> Option<f64> {
+        let deviation_lsb = if self.window_runs.is_some() { deviation_lsb } else { f64::from(self.nominal_lsb) };
+        let half = (1_i64 << (self.bits - 1)) as f64;
+        Some(half * self.step_sigma * deviation_lsb)
+    }
+
     fn memory_samples(&self) -> usize {
         // A block begins at a run: the window before its first run is whole.
         self.window_runs.map_or(0, |runs| runs as usize * RUN_SAMPLES)

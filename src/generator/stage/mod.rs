@@ -84,6 +84,10 @@ pub trait Stage: Send + Sync {
     fn fact(&self) -> Option<Fact> {
         None
     }
+    /// Of a converter: its full scale, in LSB before it, when a component of deviation `deviation_lsb` enters.
+    fn full_scale_lsb(&self, _deviation_lsb: f64) -> Option<f64> {
+        None
+    }
     /// Samples before the present one on which its result depends.
     fn memory_samples(&self) -> usize {
         0

@@ -195,13 +195,21 @@ impl Transmitter {
     /// # Errors
     /// Those of orbits and messages.
     pub fn prepare(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
-        let rate = scene.clock.rate;
-        let (first, last) = (rate.elapsed(from).0 as u64, rate.elapsed(to.saturating_sub(1)).0 as u64);
-        let sought = self.view.is_empty() && first > 0;
-        self.view = self.view.split_off(&first);
-        if sought {
+        let first = scene.clock.rate.elapsed(from).0 as u64;
+        if self.view.is_empty() && first > 0 {
             self.since = self.rising(scene, first)?;
         }
+        self.prepare_alone(scene, from, to)
+    }
+
+    /// [`Transmitter::prepare`] for samples alone: how long the satellite has been in view is not sought.
+    ///
+    /// # Errors
+    /// Those of [`Transmitter::prepare`].
+    pub fn prepare_alone(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
+        let rate = scene.clock.rate;
+        let (first, last) = (rate.elapsed(from).0 as u64, rate.elapsed(to.saturating_sub(1)).0 as u64);
+        self.view = self.view.split_off(&first);
         for second in first..=last {
             if !self.view.contains_key(&second) {
                 let sample = rate.first_sample_at(second, 1);

@@ -194,20 +194,24 @@ impl Interferer {
         }
     }
 
+    /// Share of the time in which it sends while it is on: below one of pulses.
+    pub fn duty(&self) -> f64 {
+        match &self.waveform {
+            Waveform::Pulse { width_s, repetition, .. } => width_s * repetition.hz(),
+            _ => 1.0,
+        }
+    }
+
     /// What is true of it at a sample; `None` while it is off. Its power is the mean over a repetition.
     pub fn row(&self, source: usize, sample: u64) -> Option<InterferenceRow> {
         if !self.on.contains(&sample) {
             return None;
         }
-        let duty = match &self.waveform {
-            Waveform::Pulse { width_s, repetition, .. } => width_s * repetition.hz(),
-            _ => 1.0,
-        };
         let step = self.tuning.turns_step(self.carrier_hz, self.behind_s(sample + RUN) - self.behind_s(sample), RUN);
         Some(InterferenceRow {
             sample,
             source,
-            jn0_dbhz: 10.0 * libm::log10(self.jn0_at(sample) * duty),
+            jn0_dbhz: 10.0 * libm::log10(self.jn0_at(sample) * self.duty()),
             frequency_hz: step as i64 as f64 / 18_446_744_073_709_551_616.0 * self.tuning.clock.rate.hz(),
         })
     }
