@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use super::interference::{InterferenceSpec, Kind, SpooferSpec, Strength};
 use super::{Overrides, Power, Scenario, ScenarioError};
 use crate::generator::effect::link::LinkBudget;
+use crate::generator::levels::strongest;
 use crate::generator::scene::{CodeEdge, Scene};
 use crate::generator::spoof::{Constellation, Drag, Place};
 use crate::generator::stage::interference::arrival::{Path as Way, Repetition, Tuning};
@@ -15,7 +16,7 @@ use crate::generator::stage::interference::resample::Interpolator;
 use crate::generator::stage::interference::{ChipEdge, Interferer, Recorded, Waveform};
 use crate::generator::stream::cutoff_cps;
 use crate::generator::synth::band::Filter;
-use crate::gnss::earth::Geodetic;
+use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::samples::Format;
 
@@ -103,25 +104,41 @@ impl Source<'_> {
         }))
     }
 
+    /// Its whole power over noise density at the antenna when the scene starts.
     fn jn0_dbhz(&self, path: Option<&Way>) -> Result<f64, ScenarioError> {
         let budget = match &self.scenario.power {
             Power::Fixed { cn0_dbhz, .. } => match self.spec.strength {
                 Strength::OverSignal { db } => return Ok(cn0_dbhz + db),
-                _ => return Err(self.refuse("power in dBW needs [power] kind = \"link_budget\"; write js_db instead")),
+                Strength::Received { .. } | Strength::Radiated { .. } => {
+                    let key = self.spec.strength.key();
+                    let reason =
+                        format!("{key} is in dBW and needs [power] kind = \"link_budget\"; write js_db instead");
+                    return Err(self.refuse(&reason));
+                }
             },
             Power::LinkBudget { noise_figure_db, loss_db, .. } => {
                 LinkBudget { noise_figure_db: *noise_figure_db, extra_loss_db: *loss_db, ..LinkBudget::default() }
             }
         };
+        let radiated = |dbw: f64, travel_s: f64| {
+            let turns = 2.0 * std::f64::consts::TAU * travel_s * L1_CA.carrier_hz;
+            budget.over_noise_dbhz(dbw - 20.0 * libm::log10(turns))
+        };
         match (self.spec.strength, path) {
             (Strength::Received { dbw }, _) => Ok(budget.over_noise_dbhz(dbw)),
-            (Strength::Radiated { dbw }, Some(path)) => {
-                let turns = 2.0 * std::f64::consts::TAU * path.travel_s(0.0) * L1_CA.carrier_hz;
-                Ok(budget.over_noise_dbhz(dbw - 20.0 * libm::log10(turns)))
+            (Strength::Radiated { dbw, distance_m: Some(distance_m) }, _) => {
+                Ok(radiated(dbw, distance_m / SPEED_OF_LIGHT_MPS))
             }
-            _ => Err(self.refuse(
-                "js_db needs [power] kind = \"fixed\", whose cn0_dbhz it counts from; write power_dbw instead",
-            )),
+            (Strength::Radiated { dbw, distance_m: None }, Some(path)) => Ok(radiated(dbw, path.travel_s(0.0))),
+            (Strength::Radiated { distance_m: None, .. }, None) => {
+                Err(self.refuse("eirp_dbw needs a place, or distance_m"))
+            }
+            (Strength::OverSignal { db }, _) => {
+                let strongest = strongest(self.scene).map_err(|e| self.refuse(&e.to_string()))?;
+                let nothing = "js_db counts from the strongest satellite in view at the scene's start, and there is \
+                               none; write power_dbw instead";
+                strongest.map(|(_, cn0_dbhz)| cn0_dbhz + db).ok_or_else(|| self.refuse(nothing))
+            }
         }
     }
 

@@ -14,12 +14,23 @@ use crate::gnss::satellite::Sv;
 /// How strong an interferer is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Strength {
-    /// Over `power.cn0_dbhz`, at the antenna.
+    /// Over `power.cn0_dbhz`, or behind a link budget over the strongest satellite at the scene's start, at the antenna.
     OverSignal { db: f64 },
     /// At the antenna's port.
     Received { dbw: f64 },
-    /// Radiated towards the antenna, from a place.
-    Radiated { dbw: f64 },
+    /// Radiated towards the antenna, from the source's place, or from a distance that stays.
+    Radiated { dbw: f64, distance_m: Option<f64> },
+}
+
+impl Strength {
+    /// Its key in a scenario.
+    pub fn key(&self) -> &'static str {
+        match self {
+            Self::OverSignal { .. } => "js_db",
+            Self::Received { .. } => "power_dbw",
+            Self::Radiated { .. } => "eirp_dbw",
+        }
+    }
 }
 
 /// What it sends, as written.
@@ -101,18 +112,7 @@ pub(super) fn times(table: &Table<'_>) -> Result<(f64, Option<f64>), ScenarioErr
 pub(super) fn interference(table: &Table<'_>) -> Result<InterferenceSpec, ScenarioError> {
     let kind = kind(table)?;
     let placed = PLACE_IF_ANY.iter().any(|key| table.has(key.name));
-    let strengths = [
-        table.number("js_db")?.map(|db| Strength::OverSignal { db }),
-        table.number("power_dbw")?.map(|dbw| Strength::Received { dbw }),
-        table.number("eirp_dbw")?.map(|dbw| Strength::Radiated { dbw }),
-    ];
-    let mut given = strengths.into_iter().flatten();
-    let (Some(strength), None) = (given.next(), given.next()) else {
-        return Err(table.bad("js_db", "exactly one of js_db, power_dbw and eirp_dbw"));
-    };
-    if matches!(strength, Strength::Radiated { .. }) && !placed {
-        return Err(table.bad("eirp_dbw", "a place with it: latitude_deg, longitude_deg and height_m"));
-    }
+    let strength = strength(table, placed)?;
     let (on_s, off_s) = times(table)?;
     Ok(InterferenceSpec {
         kind,
@@ -122,6 +122,33 @@ pub(super) fn interference(table: &Table<'_>) -> Result<InterferenceSpec, Scenar
         on_s,
         off_s,
     })
+}
+
+/// The one of three keys that says how strong the source is.
+fn strength(table: &Table<'_>, placed: bool) -> Result<Strength, ScenarioError> {
+    const ONE: &str = "exactly one of js_db, power_dbw and eirp_dbw";
+    let distance_m = table.number("distance_m")?;
+    let strengths = [
+        table.number("js_db")?.map(|db| Strength::OverSignal { db }),
+        table.number("power_dbw")?.map(|dbw| Strength::Received { dbw }),
+        table.number("eirp_dbw")?.map(|dbw| Strength::Radiated { dbw, distance_m }),
+    ];
+    let mut given = strengths.into_iter().flatten();
+    let Some(strength) = given.next() else { return Err(table.bad("js_db", ONE)) };
+    let first = strength.key();
+    if let Some(second) = given.next() {
+        return Err(table.bad(second.key(), format!("nothing, because {first} is given: {ONE}")));
+    }
+    match (strength, distance_m, placed) {
+        (Strength::Radiated { distance_m: None, .. }, _, false) => {
+            Err(table.bad("eirp_dbw", "a place with it (latitude_deg, longitude_deg and height_m), or distance_m"))
+        }
+        (_, Some(_), true) => Err(table.bad("distance_m", "nothing, because a place is given")),
+        (Strength::OverSignal { .. } | Strength::Received { .. }, Some(_), _) => {
+            Err(table.bad("distance_m", format!("nothing with {first}: only eirp_dbw needs it")))
+        }
+        _ => Ok(strength),
+    }
 }
 
 fn kind(table: &Table<'_>) -> Result<Kind, ScenarioError> {

@@ -57,6 +57,7 @@ const HOSTILE: &str = "[[interference]]\nkind = \"chirp\"\noffset_hz = 1e5\njs_d
     [[interference]]\nkind = \"pulse\"\neirp_dbw = -20\nwidth_s = 1e-5\nrate_hz = 1e4\njitter = 0.5\n\
     latitude_deg = 26.6\nlongitude_deg = 80.2\nheight_m = 100\n[[interference]]\nkind = \"noise\"\njs_db = 1\nbandwidth_hz = 1e6\n\
     [[interference]]\nkind = \"recording\"\njs_db = 1\nfile = \"iq.bin\"\nformat = \"ci8\"\nsample_rate_hz = 4e6\nrepeat = true\n\
+    [[interference]]\nkind = \"cw\"\neirp_dbw = -20\ndistance_m = 500\n\
     [[spoofer]]\npower_db = 6\npower_start_db = -10\nramp_s = 5\non_s = 1\noff_s = 9\nsatellites = [\"G13\"]\nclock_bias_s = 1e-6\n\
     clock_drift_sps = 1e-9\n[spoofer.drag]\nstart_s = 3\nazimuth_deg = 90\nelevation_deg = 0\nspeed_mps = 5\nacceleration_mps2 = 2\n";
 

@@ -16,9 +16,24 @@ pub(crate) fn kinds() -> Vec<&'static str> {
 pub(crate) const INTERFERENCE: &[Key] = &[
     word("kind", kinds, "what it sends").required(),
     number("offset_hz", -1e8, 1e8, "Hz", "its middle from GPS L1").or(0.0),
-    number("js_db", -100.0, 120.0, "dB", "power over power.cn0_dbhz, at the antenna; needs [power] kind = \"fixed\""),
+    number(
+        "js_db",
+        -100.0,
+        120.0,
+        "dB",
+        "power over the satellites' at the antenna's port, when the scene starts: over power.cn0_dbhz, or with a \
+         link budget over the C/N0 of the satellite that is the strongest in view then (its direct ray; `gnss-twin plan` names it)",
+    ),
     number("power_dbw", -250.0, 0.0, "dBW", "power at the antenna's port; needs a link budget"),
-    number("eirp_dbw", -200.0, 60.0, "dBW", "power that it radiates from its place; needs a link budget"),
+    number(
+        "eirp_dbw",
+        -200.0,
+        60.0,
+        "dBW",
+        "power that it radiates from its place, or from distance_m; needs a link budget",
+    ),
+    number("distance_m", 1.0, 1e9, "m", "how far away it stays, in place of a place: free-space loss without Doppler")
+        .or_else("from its place"),
     number("on_s", 0.0, LONGEST_S, "s", "true time since the scene's start at which it begins").or(0.0),
     number("off_s", 0.0, LONGEST_S, "s", "when it ends").or_else("never"),
     PLACE_IF_ANY[0],
