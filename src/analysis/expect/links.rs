@@ -16,6 +16,7 @@ use crate::analysis::foreign::truth::Timeline;
 use crate::analysis::jitter::theory::{Stresses, Theory};
 use crate::analysis::jitter::{Loop, Settings};
 use crate::analysis::load::Run;
+use crate::analysis::theory::edges;
 use crate::gnss::record::{RayRow, TrackingRow};
 
 /// What interference may cost before thermal theory no longer describes the loops.
@@ -32,10 +33,6 @@ const THEORY_LOW: f64 = 1.35;
 const WORST_PAIR: f64 = 10.0;
 /// A sound estimate of C/N0 is right within this.
 pub const CN0_DB: f64 = 1.0;
-/// Error of chip edges of `area` at 2.6 Msps with a standing code: 0.14 m root mean square, 0.40 m at most; as the square of the rate.
-const EDGE_RMS_M: f64 = 0.14;
-const EDGE_MOST_M: f64 = 0.40;
-const EDGE_RATE_HZ: f64 = 2.6e6;
 /// What rounding, light time and knots leave in a carrier: a hundredth of a cycle, and of a hertz.
 const REST_CYCLES: f64 = 0.01;
 const REST_HZ: f64 = 0.01;
@@ -155,7 +152,8 @@ struct One<'a> {
     code_m: Vec<f64>,
     ray_cycles: f64,
     ray_db: f64,
-    edge_m: (f64, f64),
+    /// Largest error of the code that chip edges leave.
+    edge_m: f64,
     /// σ of the loops in their units, with oscillator and motion, and largest stress.
     sigma: BTreeMap<Loop, (f64, f64)>,
     raw: BTreeMap<Loop, f64>,
@@ -206,8 +204,8 @@ impl<'a> One<'a> {
             .map(|chips| chips * theory.chip_m)
             .collect();
         let strongest = rays.values().map(|r| r.iter().map(|ray| ray.1).sum::<f64>()).fold(0.0, f64::max).min(0.99);
-        let scale = match run.scene.code_edge.as_str() {
-            "area" => (EDGE_RATE_HZ / run.scene.sample_rate_hz) * (EDGE_RATE_HZ / run.scene.sample_rate_hz),
+        let edge_m = match run.scene.code_edge.as_str() {
+            "area" => edges::CREST * edges::averaged_m(run.scene.sample_rate_hz),
             _ => 0.0,
         };
         let span_s = 0.1_f64.max(last.time_s - first.time_s);
@@ -218,7 +216,7 @@ impl<'a> One<'a> {
             // A vector's angle under another of share α beside it, and its length.
             ray_cycles: libm::asin(strongest) / std::f64::consts::TAU,
             ray_db: -20.0 * libm::log10(1.0 - strongest),
-            edge_m: (EDGE_RMS_M * scale, EDGE_MOST_M * scale),
+            edge_m,
             sigma,
             raw,
             span_s,
@@ -252,7 +250,7 @@ impl<'a> One<'a> {
         let ray_m = 0.5 * self.code_m.iter().map(|x| x.abs()).fold(0.0, f64::max);
         let carrier: Vec<f64> = self.rows.iter().map(|row| row.carrier_cycles).collect();
         let doppler: Vec<f64> = self.rows.iter().map(|row| row.doppler_hz).collect();
-        let (code_edge_m, carrier_rest) = (self.edge_m.1 + ray_m, REST_CYCLES + self.ray_cycles);
+        let (code_edge_m, carrier_rest) = (self.edge_m + ray_m, REST_CYCLES + self.ray_cycles);
         let metres = self.theory.chip_m;
         self.one(links, [Figure::CodeBias, Figure::CodeLargest], Loop::Dll, &code, metres, code_edge_m);
         let cycles = 1.0 / 360.0;

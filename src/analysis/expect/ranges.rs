@@ -17,6 +17,7 @@ use crate::analysis::errors::{Errors, Link, SignalError};
 use crate::analysis::jitter::theory::Theory;
 use crate::analysis::jitter::{Loop, Settings};
 use crate::analysis::load::Run;
+use crate::analysis::theory::edges;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
 use crate::gnss::record::{Event, Observation, RayRow, SkyRow, TrajectoryRow};
@@ -64,9 +65,6 @@ pub fn update_s(run: &Run) -> Option<f64> {
 const SPACE_M: f64 = 1e5;
 /// Klobuchar's ionosphere ends here.
 const IONOSPHERE_TOP_M: f64 = 1e6;
-/// Error of the chip edges of `area` at 2.6 Msps with a standing code, root mean square: 0.14 m, and as the square of the rate.
-const EDGE_M: f64 = 0.14;
-const EDGE_RATE_HZ: f64 = 2.6e6;
 /// Share of the rays' computed effect by which it may be wrong: the front end rounds the correlation, the loop lags.
 const MULTIPATH_SHARE: f64 = 0.5;
 /// Satellites this near to the mask may be used or not: true and computed elevation differ.
@@ -113,6 +111,8 @@ pub struct Scene<'r> {
     health: BTreeMap<Sv, Vec<(u64, bool)>>,
     /// Decibels that filter and converter cost.
     pub cost_db: f64,
+    /// Error of chip edges with a standing code, root mean square.
+    edge_m: f64,
 }
 
 impl<'r> Scene<'r> {
@@ -141,6 +141,10 @@ impl<'r> Scene<'r> {
             known,
             health,
             cost_db: crate::analysis::spectrum::cost_db(run),
+            edge_m: match run.scene.code_edge.as_str() {
+                "area" => edges::averaged_m(run.scene.sample_rate_hz),
+                _ => 0.0,
+            },
         })
     }
 
@@ -250,13 +254,9 @@ impl<'r> Scene<'r> {
 
     /// Variance that chip edges between samples leave: a code that moves by whole samples within the smoothing averages it.
     fn edge_m2(&self, doppler_hz: f64, carrier_hz: f64) -> f64 {
-        if self.run.scene.code_edge != "area" {
-            return 0.0;
-        }
         let rate_hz = self.run.scene.sample_rate_hz;
-        let standing_m = EDGE_M * (EDGE_RATE_HZ / rate_hz) * (EDGE_RATE_HZ / rate_hz);
         let patterns = (doppler_hz / carrier_hz * rate_hz).abs() * self.choices.smoothing_s.max(1.0);
-        let left_m = standing_m / (1.0 + 2.0 * patterns);
+        let left_m = self.edge_m / (1.0 + 2.0 * patterns);
         left_m * left_m
     }
 }
