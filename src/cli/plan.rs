@@ -1,25 +1,161 @@
-//! `plan`: what a scene will compute, what not, and why.
+//! `plan`: what a scene will compute, what not, and why; and whether the receiver's carrier loop follows its
+//! motion.
+
+use std::fmt::Write;
 
 use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::run::generator_error;
 use crate::cli::scenario;
 use crate::generator;
+use crate::generator::dynamics::{LineOfSight, lines_of_sight};
 use crate::generator::levels::Levels;
 use crate::generator::plan::Plan;
 use crate::generator::scenario::Overrides;
+use crate::generator::scene::Scene;
+use crate::receiver::track::TrackingSettings;
+use crate::study::demand::{self, Answer, Demand};
+
+/// Standard gravity, for accelerations in g.
+const G_MPS2: f64 = 9.806_65;
 
 /// Prints the plan of a scene.
 pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
     let named = scenario::read(arguments.scenario.as_deref())?;
     let (scene, warnings) =
         scenario::compose(&named, &Overrides { allow_outside: arguments.allow_outside, ..Overrides::default() })?;
-    scenario::receiver_settings(&named)?;
+    let settings = scenario::receiver_settings(&named)?;
     for warning in warnings {
         scenario::warn(&warning);
     }
     let machinery = generator::stream::machinery(&scene).map_err(generator_error)?;
     let levels = Levels::new(&scene).map_err(generator_error)?;
     let plan = Plan::new(&scene, machinery, levels).map_err(CliError::input)?;
-    scenario::print(&format!("{plan}\n"))
+    let loops = Loops::new(&scene, &settings.tracking)?;
+    loops.warning().iter().for_each(|warning| scenario::warn(warning));
+    scenario::print(&format!("{plan}\n{}", loops.text()))
+}
+
+/// The carrier loop of the scene's settings on every line of sight.
+struct Loops<'s> {
+    settings: &'s TrackingSettings,
+    /// Period of the code, and wavelength of the carrier.
+    signal: (f64, f64),
+    rows: Vec<(LineOfSight, Demand, Answer)>,
+}
+
+impl<'s> Loops<'s> {
+    fn new(scene: &Scene, settings: &'s TrackingSettings) -> Result<Self, CliError> {
+        let first = scene.signals.first();
+        let period_s =
+            first.and_then(|signal| signal.components.first()).map_or(1e-3, |component| component.period_s());
+        let signal = (period_s, first.map_or(f64::INFINITY, |signal| signal.wavelength_m()));
+        let row = |line: LineOfSight| {
+            let LineOfSight { acceleration_mps2, jerk_mps3, swing_mps2, cn0_dbhz, .. } = line;
+            let circle = scene.trajectory.circle();
+            let demand = Demand { acceleration_mps2, jerk_mps3, swing_mps2, circle, cn0_dbhz };
+            (line, demand, demand::answer(settings, signal, &demand))
+        };
+        let lines = lines_of_sight(scene).map_err(CliError::input)?;
+        Ok(Self { settings, signal, rows: lines.into_iter().map(row).collect() })
+    }
+
+    /// The one with the least left of its limit, but for those that are too weak at rest.
+    fn tightest(&self) -> Option<&(LineOfSight, Demand, Answer)> {
+        let strong = self.rows.iter().filter(|row| row.2.limit_rad > 0.0 || row.2.breaks());
+        strong.min_by(|a, b| a.2.margin_rad().total_cmp(&b.2.margin_rad()))
+    }
+
+    fn text(&self) -> String {
+        let TrackingSettings { pll_order, pll_bandwidth_hz, .. } = self.settings;
+        let update_ms = 1e3 * self.signal.0 * f64::from(self.settings.integration);
+        let mut out = format!("loops      carrier, order {pll_order}, {pll_bandwidth_hz} Hz, {update_ms} ms: ");
+        let Some((line, _, answer)) = self.tightest() else {
+            return out + "no satellite that it would follow at rest\n";
+        };
+        let (sv, margin_deg) = (line.sv, answer.margin_rad().to_degrees());
+        let _ = writeln!(
+            out,
+            "a margin of {margin_deg:.1} deg on {sv}, stress against what noise leaves of 45 deg and lock"
+        );
+        out += "  sv      m/s2       g      Hz/s      m/s3     g/s     Hz/s2  stress deg  limit deg\n";
+        for (line, _, answer) in &self.rows {
+            let (a, j, wavelength_m) = (line.acceleration_mps2, line.jerk_mps3, self.signal.1);
+            let _ = writeln!(
+                out,
+                "  {}  {a:8.2}  {:6.2}  {:8.1}  {j:8.2}  {:6.2}  {:8.1}  {:10.1}  {:9.1}",
+                line.sv,
+                a / G_MPS2,
+                a / wavelength_m,
+                j / G_MPS2,
+                j / wavelength_m,
+                answer.stress_rad.to_degrees(),
+                answer.limit_rad.to_degrees()
+            );
+        }
+        out
+    }
+
+    /// What the loop does not follow, and settings that would.
+    fn warning(&self) -> Option<String> {
+        let broken = self.rows.iter().filter(|(_, _, answer)| answer.breaks());
+        let count = broken.clone().count();
+        let (line, _, answer) = broken.max_by(|a, b| a.2.stress_rad.total_cmp(&b.2.stress_rad))?;
+        let demands: Vec<Demand> = self.rows.iter().map(|(_, demand, _)| *demand).collect();
+        let remedy = match demand::suggestion(self.settings, self.signal, &demands) {
+            Some(new) => format!("[receiver.tracking] {} would", demand::keys(self.settings, &new)),
+            None => "no bandwidth up to 100 Hz does".to_owned(),
+        };
+        Some(format!(
+            "the carrier loop does not follow the motion on {count} of {} satellites: {} accelerates by up to \
+             {:.1} g, {:.1} g/s (at {:.1} s), a stress of {:.1} deg where {:.1} deg are left: expect cycle slips or a lost lock; {remedy}",
+            self.rows.len(),
+            line.sv,
+            line.acceleration_mps2 / G_MPS2,
+            line.jerk_mps3 / G_MPS2,
+            line.jerk_s,
+            answer.stress_rad.to_degrees(),
+            answer.limit_rad.to_degrees()
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::generator::scenario::Scenario;
+    use crate::receiver::settings::Settings;
+
+    fn warning(text: &str, settings: Option<TrackingSettings>) -> Option<String> {
+        let scenario = Scenario::parse(text, "plan").unwrap();
+        let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+        let (scene, _) = scenario.compose(&directory, &Overrides::default()).unwrap();
+        let own = Settings::of_scenario(text, "plan").unwrap().tracking;
+        let settings = settings.unwrap_or(own);
+        let loops = Loops::new(&scene, &settings).unwrap();
+        assert!(loops.text().starts_with("loops      carrier, order 3, ") && loops.rows.len() > 7, "{}", loops.text());
+        loops.warning()
+    }
+
+    #[test]
+    fn the_rocket_passes_with_its_own_settings_and_is_warned_of_with_the_defaults() {
+        let rocket = include_str!("../../scenarios/high_dynamics.toml");
+        assert_eq!(warning(rocket, None), None);
+        let told = warning(rocket, Some(TrackingSettings::default())).unwrap();
+        assert!(told.contains("[receiver.tracking] pll_bandwidth_hz = 35, integration = 2 would"), "{told}");
+        assert!(told.contains("20.") && told.contains("expect cycle slips"), "{told}");
+    }
+
+    #[test]
+    fn a_place_at_rest_and_a_ride_are_followed_by_the_defaults() {
+        for text in [include_str!("../../scenarios/static.toml"), include_str!("../../scenarios/moderate.toml")] {
+            assert_eq!(warning(text, Some(TrackingSettings::default())), None);
+        }
+        // A spin of 5 mm is no jerk of 1200 g/s, and a street's shadows are no motion.
+        for text in [include_str!("../../scenarios/spinning.toml"), include_str!("../../scenarios/canyon.toml")] {
+            assert_eq!(warning(text, None), None);
+        }
+    }
 }

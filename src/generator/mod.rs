@@ -7,6 +7,7 @@
 pub mod catalogue;
 pub mod clock;
 pub mod departure;
+pub mod dynamics;
 pub mod effect;
 pub mod fidelity;
 pub mod knots;

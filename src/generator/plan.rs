@@ -178,7 +178,7 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
 
 /// Power over noise density in dB-Hz of the first signal's direct ray, and of all signals and rays together; `None` when
 /// nothing in the scene says how strong they are.
-fn strength_dbhz(scene: &Scene, sight: &Sight) -> (Option<f64>, Option<f64>) {
+pub(crate) fn strength_dbhz(scene: &Scene, sight: &Sight) -> (Option<f64>, Option<f64>) {
     let (mut direct_hz, mut sum_hz) = (None, 0.0);
     for signal in &scene.signals {
         let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];

@@ -104,9 +104,16 @@ impl Trajectory {
         self.attitude.map_or(body, |attitude| attitude.antenna(t_s, &body))
     }
 
-    /// The body's motion. Before the first knot and after the last one the acceleration there continues;
+    /// How far from the nose's axis a body that spins carries the antenna, in metres, and its turns a second.
+    pub fn circle(&self) -> Option<(f64, f64)> {
+        let attitude = self.attitude.as_ref().filter(|attitude| attitude.spin_hz != 0.0)?;
+        let radius_m = attitude.lever_arm_m.yz().norm();
+        (radius_m > 0.0).then_some((radius_m, attitude.spin_hz.abs()))
+    }
+
+    /// The motion of the body that carries the antenna. Before the first knot and after the last one the acceleration there continues;
     /// [`Self::span_s`] says where that is.
-    fn body(&self, t_s: f64) -> Motion {
+    pub fn body(&self, t_s: f64) -> Motion {
         let next = self.knots.partition_point(|knot| knot.t_s <= t_s);
         let left = next.checked_sub(1).and_then(|i| self.knots.get(i)).unwrap_or(&self.first);
         match self.knots.get(next) {
