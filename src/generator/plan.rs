@@ -1,8 +1,8 @@
 //! What a scene will compute, told before it is computed.
 //!
-//! Satellites are placed at a few hundred instants, effects act on them there, and sizes and times follow from counts. What
-//! concerns the synthesiser (knots, speed, memory) is given to it, and so are the levels ([`crate::generator::levels`]), for which a
-//! few stretches of samples are made.
+//! Satellites are placed at a few hundred instants, effects act on them there, and sizes and times follow
+//! from counts. What concerns the synthesiser (knots, speed, memory) is given to it, and so are the levels
+//! ([`crate::generator::levels`]), for which a few stretches of samples are made.
 
 use std::fmt;
 
@@ -48,8 +48,8 @@ pub struct InView {
     pub power_dbhz: Option<Span>,
     /// Time since the start when it comes into view, if not in view from the beginning, and by what …
     pub appears: Option<(f64, PassEnd)>,
-    /// … and when it leaves, if not in view to the end. To the step of the search, but exact where an ephemeris begins or
-    /// ends.
+    /// … and when it leaves, if not in view to the end. To the step of the search, but exact where an
+    /// ephemeris begins or ends.
     pub leaves: Option<(f64, PassEnd)>,
 }
 
@@ -158,7 +158,8 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
                         leaves: None,
                     });
                 }
-                // It came back (a vehicle that goes round the Earth): in view to the end, as far as this table tells.
+                // It came back (a vehicle that goes round the Earth): in view to the end, as far as this
+                // table tells.
                 (Presence::InView(_), Some(row)) => row.leaves = None,
                 (_, Some(row)) if row.leaves.is_none() => {
                     row.leaves = end.map(|by| (change_s(scene, sv, t_s, by, |silence| silence.from), by));
@@ -176,8 +177,8 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
     Ok(rows)
 }
 
-/// Power over noise density in dB-Hz of the first signal's direct ray, and of all signals and rays together; `None` when
-/// nothing in the scene says how strong they are.
+/// Power over noise density in dB-Hz of the first signal's direct ray, and of all signals and rays together;
+/// `None` when nothing in the scene says how strong they are.
 pub(crate) fn strength_dbhz(scene: &Scene, sight: &Sight) -> (Option<f64>, Option<f64>) {
     let (mut direct_hz, mut sum_hz) = (None, 0.0);
     for signal in &scene.signals {
@@ -190,7 +191,8 @@ pub(crate) fn strength_dbhz(scene: &Scene, sight: &Sight) -> (Option<f64>, Optio
     (direct_hz.and_then(dbhz), dbhz(sum_hz))
 }
 
-/// When a satellite came or went by the step at `t_s`; where an ephemeris did it, the instant that `edge` takes of its absence.
+/// When a satellite came or went by the step at `t_s`; where an ephemeris did it, the instant that `edge`
+/// takes of its absence.
 fn change_s(scene: &Scene, sv: Sv, t_s: f64, by: PassEnd, edge: impl Fn(&Silence) -> Option<Epoch>) -> f64 {
     let start = scene.clock.start;
     let silences = scene.catalogue.silences(sv, start, start.plus_s(t_s));
@@ -448,7 +450,8 @@ mod tests {
             plan.satellites.iter().any(|s| matches!(s.appears, Some((_, PassEnd::Mask))))
                 && plan.satellites.iter().any(|s| matches!(s.leaves, Some((_, PassEnd::Mask))))
         );
-        // 11 satellites on average in view, each for some five hours: more than 12 and fewer than all in four hours.
+        // 11 satellites on average in view, each for some five hours: more than 12 and fewer than all in four
+        // hours.
         assert!((13..=28).contains(&plan.satellites.len()), "{plan}");
     }
 }

@@ -171,7 +171,8 @@ pub fn generate_with(
     generate_part(scene, 0..scene.samples, samples, truth, progress, options)
 }
 
-/// The samples of `part` of the scene, the same bits as those of the whole; the truth counts from the part's first sample.
+/// The samples of `part` of the scene, the same bits as those of the whole; the truth counts from the part's
+/// first sample.
 ///
 /// # Errors
 /// As [`generate`], and [`GenerateError::Part`] for a part that the scene does not have.
@@ -250,7 +251,8 @@ impl<'a> Stream<'a> {
         self.done.samples
     }
 
-    /// Replaces what `packed` holds by the next batch, and writes the truth as far; `false` after the last sample.
+    /// Replaces what `packed` holds by the next batch, and writes the truth as far; `false` after the last
+    /// sample.
     ///
     /// # Errors
     /// [`GenerateError`] of orbits, messages and truth.
@@ -312,7 +314,8 @@ fn run_begin(sample: u64) -> u64 {
     sample / RUN_SAMPLES as u64 * RUN_SAMPLES as u64
 }
 
-/// Samples that are made at least from `from` on where stages look back: gain control measures the scene's first run whole.
+/// Samples that are made at least from `from` on where stages look back: gain control measures the scene's
+/// first run whole.
 fn first_run(scene: &Scene, from: u64, memory: u64) -> u64 {
     if from == 0 && memory > 0 { scene.samples.min(RUN_SAMPLES as u64) } else { 0 }
 }
@@ -363,8 +366,8 @@ struct Worker {
 
 /// Renders one block into `bytes`, and returns how many of its components were clipped.
 ///
-/// Run by run, so that the planar samples of one stay in the first-level cache; in one piece with what lies before it
-/// if a stage looks back.
+/// Run by run, so that the planar samples of one stay in the first-level cache; in one piece with what lies
+/// before it if a stage looks back.
 fn render(
     scene: &Scene,
     transmitters: &[Transmitter],

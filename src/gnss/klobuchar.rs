@@ -3,8 +3,9 @@
 //! Source: IS-GPS-200N, 20.3.3.5.2.5 and figure 20-4. It removes about half of the true delay. As
 //! printed it steps by 2 % of the bulge where its cosine series ends (see [`SERIES_END_RAD`]), and where
 //! local time wraps at midnight if the period exceeds 40 hours. Below the horizon the document says
-//! nothing: there the elevation counts as zero, which keeps clear of the pole of ψ at −19.8°. Its shell is a sphere that takes
-//! geodetic latitudes: up to 0.13 m of delay against an ellipsoid's. The generator smooths the step (up to 0.16 m).
+//! nothing: there the elevation counts as zero, which keeps clear of the pole of ψ at −19.8°. Its shell is a
+//! sphere that takes geodetic latitudes: up to 0.13 m of delay against an ellipsoid's. The generator smooths
+//! the step (up to 0.16 m).
 
 use std::f64::consts::{PI, TAU};
 
@@ -75,7 +76,8 @@ impl Klobuchar {
         }
     }
 
-    /// Group delay on a carrier of `carrier_hz`, in seconds, seen from `user` towards `look` at GPS time `at`.
+    /// Group delay on a carrier of `carrier_hz`, in seconds, seen from `user` towards `look` at GPS time
+    /// `at`.
     pub fn delay_s(&self, user: Geodetic, look: Look, at: Epoch, carrier_hz: f64) -> f64 {
         let bulge = self.bulge(user, look, at);
         let phase_rad = bulge.phase_rad();

@@ -1,9 +1,10 @@
-//! Each satellite's loops against theory at the C/N0 that the scene gives them: bias, spread, largest error and C/N0.
+//! Each satellite's loops against theory at the C/N0 that the scene gives them: bias, spread, largest error
+//! and C/N0.
 //!
-//! Every figure of a satellite is put over its own limit, so that the worst satellite speaks for all. Theory is that of
-//! [`crate::analysis::jitter`] at the true C/N0 less what front end and converter cost, with the oscillator's noise and the
-//! motion's stress. Limits: epochs that interference costs more than `JAMMED_DB`, or whose C/N0 moved by more than
-//! `STEADY_DB` within the receiver's averages, are left out.
+//! Every figure of a satellite is put over its own limit, so that the worst satellite speaks for all. Theory
+//! is that of [`crate::analysis::jitter`] at the true C/N0 less what front end and converter cost, with the
+//! oscillator's noise and the motion's stress. Limits: epochs that interference costs more than `JAMMED_DB`,
+//! or whose C/N0 moved by more than `STEADY_DB` within the receiver's averages, are left out.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -24,12 +25,14 @@ const JAMMED_DB: f64 = 1.0;
 /// What the true C/N0 may move within [`STEADY_S`] before averages lag.
 const STEADY_DB: f64 = 1.0;
 const STEADY_S: f64 = 3.0;
-/// By how much theory's σ may be too small or too large: 1 dB of C/N0 (1.12), and 7 % between linear loops and real ones; the code's theory
-/// leaves out the rounding of both replicas, which lowers jitter by as much again.
+/// By how much theory's σ may be too small or too large: 1 dB of C/N0 (1.12), and 7 % between linear loops
+/// and real ones; the code's theory leaves out the rounding of both replicas, which lowers jitter by as much
+/// again.
 const THEORY: f64 = 1.2;
 const THEORY_LOW: f64 = 1.35;
-/// By how much the codes of other satellites may disturb one satellite more than on average: two codes whose Dopplers differ by whole
-/// kilohertz are 24 dB below their peak instead of noise of 38 dB below it in 4 ms; most pairs are near the average.
+/// By how much the codes of other satellites may disturb one satellite more than on average: two codes whose
+/// Dopplers differ by whole kilohertz are 24 dB below their peak instead of noise of 38 dB below it in 4 ms;
+/// most pairs are near the average.
 const WORST_PAIR: f64 = 10.0;
 /// A sound estimate of C/N0 is right within this.
 pub const CN0_DB: f64 = 1.0;
@@ -163,7 +166,8 @@ struct One<'a> {
     cost_db: f64,
     /// Factor of σ that the worst pair of codes makes.
     pair: f64,
-    /// Whether samples come as they are received: a filter's noise is not white, and prompts count in units of white noise.
+    /// Whether samples come as they are received: a filter's noise is not white, and prompts count in units
+    /// of white noise.
     white: bool,
 }
 
@@ -259,7 +263,8 @@ impl<'a> One<'a> {
         self.cn0(links, [Figure::Cn0Bias, Figure::Cn0Largest]);
     }
 
-    /// Bias, largest error and spread of one loop's errors, which are in `scale` of the loop's unit; `rest` is what may come on top.
+    /// Bias, largest error and spread of one loop's errors, which are in `scale` of the loop's unit; `rest`
+    /// is what may come on top.
     fn one(&self, links: &mut Links, figures: [Figure; 2], which: Loop, errors: &[f64], scale: f64, rest: f64) {
         let Some((sigma, stress)) = self.sigma.get(&which).map(|(a, b)| (a * scale, b * scale)) else { return };
         let count = errors.len() as f64;

@@ -1,9 +1,10 @@
 //! Bias and noise of each range that a fix may use.
 //!
-//! Bias: the true range, all of the scene's delays in it, less what a receiver computes from the message as sent (orbit, clock,
-//! Klobuchar) and the true troposphere; and what smoothing makes of code and carrier that part. Noise: theory of the code loop
-//! at the true C/N0, other codes and interference counted, through Hatch's filter. Apart from these: chip edges between samples, and
-//! reflected rays. Limits: the difference of the receiver's troposphere from the true one is a stated share of it.
+//! Bias: the true range, all of the scene's delays in it, less what a receiver computes from the message as
+//! sent (orbit, clock, Klobuchar) and the true troposphere; and what smoothing makes of code and carrier that
+//! part. Noise: theory of the code loop at the true C/N0, other codes and interference counted, through
+//! Hatch's filter. Apart from these: chip edges between samples, and reflected rays. Limits: the difference
+//! of the receiver's troposphere from the true one is a stated share of it.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -65,7 +66,8 @@ pub fn update_s(run: &Run) -> Option<f64> {
 const SPACE_M: f64 = 1e5;
 /// Klobuchar's ionosphere ends here.
 const IONOSPHERE_TOP_M: f64 = 1e6;
-/// Share of the rays' computed effect by which it may be wrong: the front end rounds the correlation, the loop lags.
+/// Share of the rays' computed effect by which it may be wrong: the front end rounds the correlation, the
+/// loop lags.
 const MULTIPATH_SHARE: f64 = 0.5;
 /// Satellites this near to the mask may be used or not: true and computed elevation differ.
 const MASK_SLACK_RAD: f64 = 2e-3;
@@ -252,7 +254,8 @@ impl<'r> Scene<'r> {
         })
     }
 
-    /// Variance that chip edges between samples leave: a code that moves by whole samples within the smoothing averages it.
+    /// Variance that chip edges between samples leave: a code that moves by whole samples within the
+    /// smoothing averages it.
     fn edge_m2(&self, doppler_hz: f64, carrier_hz: f64) -> f64 {
         let rate_hz = self.run.scene.sample_rate_hz;
         let patterns = (doppler_hz / carrier_hz * rate_hz).abs() * self.choices.smoothing_s.max(1.0);
@@ -261,7 +264,8 @@ impl<'r> Scene<'r> {
     }
 }
 
-/// What a receiver computes of a range from the message alone: geometry, light time, Earth rotation and satellite clock.
+/// What a receiver computes of a range from the message alone: geometry, light time, Earth rotation and
+/// satellite clock.
 fn computed_m(ephemeris: &Ephemeris, row: &Observation, place: &TrajectoryRow) -> Option<f64> {
     let sent = row.sent();
     let rough = ephemeris.clock_l1(sent).ok()?;

@@ -263,7 +263,8 @@ impl Source<'_> {
         let place_hz = self.tuning.place_hz(L1_CA.carrier_hz + self.spec.offset_hz);
         let room_hz = (place_hz - low_hz).min(high_hz - place_hz);
         let cutoff_cps = (room_hz / file_rate_hz).min(0.5);
-        // Below a sixteenth of the file's rate the interpolator's 64 neighbours hold no two cycles of the cut-off.
+        // Below a sixteenth of the file's rate the interpolator's 64 neighbours hold no two cycles of the
+        // cut-off.
         if cutoff_cps < 1.0 / 16.0 {
             let reason = format!(
                 "the samples' band leaves {room_hz} Hz on a side of it: expected at least a sixteenth of sample_rate_hz, {} Hz",

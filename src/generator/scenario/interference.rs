@@ -14,7 +14,8 @@ use crate::gnss::satellite::Sv;
 /// How strong an interferer is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Strength {
-    /// Over `power.cn0_dbhz`, or behind a link budget over the strongest satellite at the scene's start, at the antenna.
+    /// Over `power.cn0_dbhz`, or behind a link budget over the strongest satellite at the scene's start, at
+    /// the antenna.
     OverSignal { db: f64 },
     /// At the antenna's port.
     Received { dbw: f64 },

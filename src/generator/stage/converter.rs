@@ -1,11 +1,11 @@
 //! Gain control and analogue-to-digital conversion.
 //!
-//! The converter is uniform with odd levels ±1, ±3, … ±(2^b − 1), so that no level stands at zero; with as many bits as
-//! the format has it rounds to the format's own integers. Its step against the standard deviation of what comes in is
-//! that of least loss (Max 1960; losses in Hegarty 2011): 1.96 dB with one bit, 0.55 with two. With gain control the
-//! deviation is measured over the window before each run of 4096 samples; without, it is the thermal noise's as the
-//! scene sets it. The scene's first run has nothing before it and is measured itself, whole, whatever part of it is asked
-//! for. Limits: the gain of a run is constant.
+//! The converter is uniform with odd levels ±1, ±3, … ±(2^b − 1), so that no level stands at zero; with as
+//! many bits as the format has it rounds to the format's own integers. Its step against the standard
+//! deviation of what comes in is that of least loss (Max 1960; losses in Hegarty 2011): 1.96 dB with one bit,
+//! 0.55 with two. With gain control the deviation is measured over the window before each run of 4096
+//! samples; without, it is the thermal noise's as the scene sets it. The scene's first run has nothing before
+//! it and is measured itself, whole, whatever part of it is asked for. Limits: the gain of a run is constant.
 
 use crate::generator::stage::{Block, Fact, Stage};
 use crate::generator::synth::RUN_SAMPLES;
@@ -35,7 +35,8 @@ impl Converter {
         *step
     }
 
-    /// Deviation of a component for each run of the block: over the window before it, or over the first run itself.
+    /// Deviation of a component for each run of the block: over the window before it, or over the first run
+    /// itself.
     fn deviations_lsb(&self, block: &Block<'_>) -> Vec<f32> {
         let runs = block.i.chunks(RUN_SAMPLES).zip(block.q.chunks(RUN_SAMPLES));
         let Some(window) = self.window_runs else { return vec![self.nominal_lsb; runs.len()] };
@@ -142,8 +143,8 @@ mod tests {
 
     #[test]
     fn each_number_of_bits_loses_what_is_published() {
-        // Hegarty 2011 and Max 1960. 819 200 samples: the correlation ρ scatters by (1 − ρ²)/√n, one bit 4e-4 or
-        // 0.004 dB; five sigma.
+        // Hegarty 2011 and Max 1960. 819 200 samples: the correlation ρ scatters by (1 − ρ²)/√n, one bit 4e-4
+        // or 0.004 dB; five sigma.
         for (bits, expected_db) in [(1, 1.961), (2, 0.549), (3, 0.166), (4, 0.050)] {
             for window_runs in [None, Some(1)] {
                 let converter = Converter {

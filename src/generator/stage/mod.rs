@@ -1,8 +1,9 @@
 //! What acts on samples after the satellites are added: noise, and all that a front end does.
 //!
-//! A stage is a function of the absolute sample number and of a bounded number of samples before it, so the stream is
-//! the same however it is cut and wherever it starts. The scene fixes the order, which is that of the hardware: what the
-//! antenna hears, thermal noise, then the front end. Limits: before sample 0 there is silence.
+//! A stage is a function of the absolute sample number and of a bounded number of samples before it, so the
+//! stream is the same however it is cut and wherever it starts. The scene fixes the order, which is that of
+//! the hardware: what the antenna hears, thermal noise, then the front end. Limits: before sample 0 there is
+//! silence.
 
 pub mod converter;
 pub mod filter;
@@ -24,7 +25,8 @@ pub struct Block<'a> {
     pub q: &'a mut [f32],
     /// Samples at the front that only serve the memory of stages and are not sent on.
     pub lead: usize,
-    /// Samples at the end that are not sent on: the rest of the scene's first run, which gain control measures whole.
+    /// Samples at the end that are not sent on: the rest of the scene's first run, which gain control
+    /// measures whole.
     pub tail: usize,
     /// Components between lead and tail that a stage could not hold.
     pub clipped: u64,
@@ -73,8 +75,8 @@ pub struct Fact {
 
 /// Something that acts on all samples of the scene.
 ///
-/// Laws: a stage of zero strength gives the same bits as its absence; sample n depends on n, on the scene and on
-/// samples n − [`Stage::memory_samples`] to n alone.
+/// Laws: a stage of zero strength gives the same bits as its absence; sample n depends on n, on the scene and
+/// on samples n − [`Stage::memory_samples`] to n alone.
 pub trait Stage: Send + Sync {
     /// Name as a scenario writes it.
     fn name(&self) -> &'static str;
@@ -84,7 +86,8 @@ pub trait Stage: Send + Sync {
     fn fact(&self) -> Option<Fact> {
         None
     }
-    /// Of a converter: its full scale, in LSB before it, when a component of deviation `deviation_lsb` enters.
+    /// Of a converter: its full scale, in LSB before it, when a component of deviation `deviation_lsb`
+    /// enters.
     fn full_scale_lsb(&self, _deviation_lsb: f64) -> Option<f64> {
         None
     }
@@ -92,6 +95,7 @@ pub trait Stage: Send + Sync {
     fn memory_samples(&self) -> usize {
         0
     }
-    /// Acts on a block. Unless it begins at sample 0, its first [`Stage::memory_samples`] lack their past and are not used.
+    /// Acts on a block. Unless it begins at sample 0, its first [`Stage::memory_samples`] lack their past and
+    /// are not used.
     fn act(&self, block: &mut Block<'_>);
 }

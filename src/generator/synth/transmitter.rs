@@ -1,8 +1,8 @@
 //! One satellite's signal as the stream needs it: when it is in view, its polynomials, its data.
 //!
-//! [`Transmitter::prepare`] gathers all of that for a stretch of samples; [`Transmitter::arrange`] then lists the
-//! runs of any block of the stretch and changes nothing, so blocks are made side by side.
-//! Everything is decided on absolute grids: view by whole seconds, parts and runs by sample numbers.
+//! [`Transmitter::prepare`] gathers all of that for a stretch of samples; [`Transmitter::arrange`] then lists
+//! the runs of any block of the stretch and changes nothing, so blocks are made side by side. Everything is
+//! decided on absolute grids: view by whole seconds, parts and runs by sample numbers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -167,7 +167,8 @@ impl Transmitter {
     /// # Errors
     /// Those of orbits.
     pub fn root(&self, scene: &Scene, root: u64) -> Result<Vec<Part>, GenerateError> {
-        // A spinning antenna needs thousands of nodes a second, between which the orbit is a short polynomial.
+        // A spinning antenna needs thousands of nodes a second, between which the orbit is a short
+        // polynomial.
         let arc = if scene.trajectory.spins() {
             let (first, last) = (root * self.root_samples(), (root + 1) * self.root_samples());
             sky::Arc::through(&scene.catalogue, self.sv, scene.clock.epoch(first), scene.clock.epoch(last))?
@@ -241,7 +242,8 @@ impl Transmitter {
         self.prepare_messages(scene, from, to)
     }
 
-    /// The first sample of the stretch of whole seconds in view that lasts until `second`, for a stream that begins there.
+    /// The first sample of the stretch of whole seconds in view that lasts until `second`, for a stream that
+    /// begins there.
     fn rising(&self, scene: &Scene, mut second: u64) -> Result<Option<u64>, GenerateError> {
         let sample = |second: u64| scene.clock.rate.first_sample_at(second, 1);
         let mut since = None;
@@ -312,8 +314,8 @@ impl Transmitter {
         self.since.map_or(0.0, |since| scene.clock.rate.elapsed_s(sample.saturating_sub(since)))
     }
 
-    /// Phases that a run beginning at sample `n` of the prepared stretch has there: the carrier of the first ray and
-    /// component in 2^-64 turn, and its code. `None` where the satellite does not arrive.
+    /// Phases that a run beginning at sample `n` of the prepared stretch has there: the carrier of the first
+    /// ray and component in 2^-64 turn, and its code. `None` where the satellite does not arrive.
     pub fn phases(&self, scene: &Scene, n: u64) -> Option<(u64, CodeTime)> {
         let part = self.parts.iter().find(|part| (part.start..part.end).contains(&n))?;
         let (path, sent, u) = (part.paths.first()?, self.sent.first()?, part.fraction(n));

@@ -2,8 +2,8 @@
 //!
 //! A [`Trajectory`] is a row of knots (time, ECEF position, velocity, acceleration) joined by quintic Hermite
 //! pieces, so position, velocity and acceleration are continuous and each is the exact derivative of the one
-//! before. One knot at rest is a static antenna. Where the acceleration's slope jumps, a break is reported, so
-//! that knots of the signal can be put there. With an [`Attitude`] the antenna sits on a body that turns.
+//! before. One knot at rest is a static antenna. Where the acceleration's slope jumps, a break is reported,
+//! so that knots of the signal can be put there. With an [`Attitude`] the antenna sits on a body that turns.
 
 pub mod attitude;
 pub mod file;
@@ -111,8 +111,8 @@ impl Trajectory {
         (radius_m > 0.0).then_some((radius_m, attitude.spin_hz.abs()))
     }
 
-    /// The motion of the body that carries the antenna. Before the first knot and after the last one the acceleration there continues;
-    /// [`Self::span_s`] says where that is.
+    /// The motion of the body that carries the antenna. Before the first knot and after the last one the
+    /// acceleration there continues; [`Self::span_s`] says where that is.
     pub fn body(&self, t_s: f64) -> Motion {
         let next = self.knots.partition_point(|knot| knot.t_s <= t_s);
         let left = next.checked_sub(1).and_then(|i| self.knots.get(i)).unwrap_or(&self.first);
@@ -147,8 +147,8 @@ impl Trajectory {
         (start, end)
     }
 
-    /// Largest acceleration, speed and height-independent distance from the first point up to `until_s`, sampled at
-    /// each knot and at nine instants between neighbours.
+    /// Largest acceleration, speed and height-independent distance from the first point up to `until_s`,
+    /// sampled at each knot and at nine instants between neighbours.
     pub fn extremes(&self, until_s: f64) -> Extremes {
         let mut extremes = Extremes::default();
         let mut take = |motion: &Motion| {

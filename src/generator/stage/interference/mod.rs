@@ -1,9 +1,10 @@
 //! Interference: waveforms that reach the antenna beside the satellites.
 //!
-//! An [`Interferer`] is a waveform on a carrier with a power, a time and perhaps a place. It lives in true time and arrives at
-//! RF, so the receiver's oscillator shifts it as it shifts satellites. Phases are anchored at every run of 4096
-//! samples and linear within it (a Doppler rate of 1000 Hz/s leaves 3e-4 cycle at 2.6 Msps). Power is that at the antenna's
-//! port in the waveform's whole band. Limits: no polarisation, no pattern, one straight path.
+//! An [`Interferer`] is a waveform on a carrier with a power, a time and perhaps a place. It lives in true
+//! time and arrives at RF, so the receiver's oscillator shifts it as it shifts satellites. Phases are
+//! anchored at every run of 4096 samples and linear within it (a Doppler rate of 1000 Hz/s leaves 3e-4 cycle
+//! at 2.6 Msps). Power is that at the antenna's port in the waveform's whole band. Limits: no polarisation,
+//! no pattern, one straight path.
 
 pub mod arrival;
 pub mod resample;
@@ -31,7 +32,8 @@ use crate::gnss::record::InterferenceRow;
 /// Samples of a run, on an absolute grid.
 const RUN: u64 = BLOCK_SAMPLES as u64;
 
-/// Shares of a sample by which a pulse's edge is moved, so that rounding does not decide about a sample on it.
+/// Shares of a sample by which a pulse's edge is moved, so that rounding does not decide about a sample on
+/// it.
 const EDGE_SAMPLES: f64 = 1e-6;
 
 /// How the chips of a matched waveform meet the samples.
