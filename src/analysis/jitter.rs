@@ -103,7 +103,7 @@ impl Jitter {
         let mut rows = Vec::new();
         for link in &errors.signals.keys().collect::<Vec<_>>() {
             let all = errors.signals.rows(*link)?;
-            let stretches = settled(&all);
+            let stretches = settled(&all, |row| run.scene.expect.bounded(row.time_s));
             if stretches.iter().map(Vec::len).sum::<usize>() < 10 {
                 continue;
             }
@@ -146,9 +146,12 @@ impl Jitter {
     }
 }
 
-/// Stretches of observations past their pull-in, without interruption.
-fn settled(all: &[SignalError]) -> Vec<Vec<SignalError>> {
-    let past: Vec<SignalError> = all.iter().filter(|row| row.locked_s >= PULL_IN_S).copied().collect();
+/// Stretches of observations past their pull-in, without interruption, where the scene does not expect any errors.
+fn settled(all: &[SignalError], bounded: impl Fn(&SignalError) -> bool) -> Vec<Vec<SignalError>> {
+    // A scene that expects them throughout is measured all the same.
+    let any = all.iter().any(&bounded);
+    let past: Vec<SignalError> =
+        all.iter().filter(|row| row.locked_s >= PULL_IN_S && (bounded(row) || !any)).copied().collect();
     let steps: Vec<f64> = past.windows(2).map(|two| two[1].time_s - two[0].time_s).collect();
     let usual_s = median(&steps).unwrap_or(0.0);
     past.chunk_by(|a, b| b.locked_s > a.locked_s && b.time_s - a.time_s < 1.5 * usual_s).map(<[_]>::to_vec).collect()

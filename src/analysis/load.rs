@@ -5,6 +5,7 @@
 //! those with a row an epoch, and shorter ones, are held.
 
 mod common;
+mod delay;
 mod files;
 mod rows;
 
@@ -155,6 +156,8 @@ pub struct Run {
 }
 
 const TRUTH: &str = "the generator writes it: make the run again with `gnss-twin run`, or `gnss-twin generate`";
+/// Of a receiver that does not name its own.
+const USUAL_SPACING_CHIPS: f64 = 0.5;
 const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
 
 impl Run {
@@ -191,6 +194,9 @@ impl Run {
             other => Some(other?),
         };
         read.receiver = json(&rx.join("receiver.json"))?.unwrap_or(Value::Null);
+        if let Some(spacing_chips) = read.tracking_setting("spacing_chips") {
+            read.common.set_spacing(&read.scene, spacing_chips);
+        }
         read.psd = optional(&run.join("psd.csv"))?;
         read.speed = json(&run.join("speed.json"))?.unwrap_or_default();
         Ok(read)
@@ -206,7 +212,7 @@ impl Run {
         let scene = truth.join("scene.json");
         let scene = json(&scene)?.map(Self::folded).ok_or_else(|| missing(&scene, TRUTH))?;
         let (mut cn0_sums_hz, mut cn0_most_hz) = (HashMap::new(), HashMap::new());
-        let mut common = Common::of(&scene);
+        let mut common = Common::of(&scene, USUAL_SPACING_CHIPS);
         let observed = observations(&truth.join("observations.csv"), TRUTH, shelves, |row| {
             let cn0_hz = libm::pow(10.0, row.cn0_dbhz / 10.0);
             *cn0_sums_hz.entry((row.sample, row.signal.name)).or_insert(0.0) += cn0_hz;

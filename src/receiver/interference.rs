@@ -177,9 +177,14 @@ impl Watch {
             let near = (0..5).map(|k| (line.bin + bins + k - 2) % bins);
             bin_hz * near.map(|n| self.powers[n] / density[line.bin] - 1.0).sum::<f64>()
         };
+        // A correlator's noise is the density where it is high; beside it the same line stands out further.
+        let mut sorted = density.clone();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(0.0);
+        let share = |line: &Line| if usual > 0.0 { (density[line.bin] / usual).min(1.0) } else { 1.0 };
         let told: Vec<(f64, Line)> = (lines.into_iter())
             .map(|line| (jn0_hz(&line), line))
-            .filter(|(power_hz, _)| *power_hz > OWN_LINE * strongest_cn0_hz)
+            .filter(|(power_hz, line)| *power_hz * share(line) > OWN_LINE * strongest_cn0_hz)
             .collect();
         let (power_hz, line) = told.iter().max_by(|a, b| a.0.total_cmp(&b.0)).copied()?;
         Some(LineRow {

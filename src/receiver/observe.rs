@@ -15,8 +15,12 @@ use crate::receiver::track::Measurement;
 
 /// Travel time to the nearest satellite that is assumed when the clock is set from satellites alone.
 const NEAREST_TRAVEL_S: f64 = 0.070;
-/// From near the Earth, travel times lie between 60 and 95 ms.
-const LARGEST_SPREAD_S: f64 = 0.035;
+/// Departure of a travel time from the median of all. From near the Earth they lie between 60 and 95 ms; from anywhere two
+/// satellites differ by 53 200 km at most, the width of their orbits.
+const NEAR_SPREAD_S: f64 = 0.035;
+const FAR_SPREAD_S: f64 = 0.178;
+/// A receiver is far away where this share of all satellites departs by more than from near the Earth: wrong times are single.
+const FAR_SHARE: f64 = 1.0 / 3.0;
 /// The recording's start time is believed when it is this near.
 const BELIEVED_S: f64 = 1.0;
 
@@ -102,10 +106,14 @@ impl Timebase {
             })
             .collect();
         let typical_s = median(travels.iter().map(|travel| travel.1).collect());
+        let within = |limit_s: f64| move |travel: &&(Epoch, f64)| (travel.1 - typical_s).abs() <= limit_s;
+        let beyond = travels.len() - travels.iter().filter(within(NEAR_SPREAD_S)).count();
+        let is_far = beyond as f64 > FAR_SHARE * travels.len() as f64 && beyond > 1;
+        let limit_s = if is_far { FAR_SPREAD_S } else { NEAR_SPREAD_S };
         readings
             .iter()
             .zip(travels)
-            .filter(|(_, (_, travel_s))| (travel_s - typical_s).abs() <= LARGEST_SPREAD_S)
+            .filter(|(_, (_, travel_s))| (travel_s - typical_s).abs() <= limit_s)
             .map(|(reading, (sent, travel_s))| Observed {
                 observation: Observation {
                     sample,

@@ -9,6 +9,7 @@ use std::io;
 use std::path::Path;
 
 use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
 
 use super::search::Model;
@@ -92,6 +93,43 @@ pub fn interval(probability: f64, trials: u32) -> (f64, f64) {
         }
     }
     (low, high)
+}
+
+/// All rows whose expectation leaves room on both sides, together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    pub rows: u32,
+    /// Sum of squared deviations over their variances, and the probability that it is exceeded by chance.
+    pub chi_square: f64,
+    pub exceeded: f64,
+    /// Sum of all deviations in standard deviations of it: normal if the expectations hold.
+    pub bias_sigma: f64,
+}
+
+impl Joint {
+    /// Of the detections among `rows` of which at least five are expected to be found and five not.
+    pub fn of(rows: &[Row]) -> Self {
+        let mut joint = Self { rows: 0, chi_square: 0.0, exceeded: 1.0, bias_sigma: 0.0 };
+        let (mut sum, mut variances) = (0.0, 0.0);
+        for row in rows.iter().filter(|row| row.cn0_dbhz.is_some()) {
+            let trials = f64::from(row.trials);
+            let expected = trials * row.expected;
+            if expected < 5.0 || trials - expected < 5.0 {
+                continue;
+            }
+            // The expectation is itself drawn.
+            let variance = expected * (1.0 - row.expected) * (1.0 + trials / f64::from(DRAWS));
+            let deviation = f64::from(row.found) - expected;
+            joint.rows += 1;
+            joint.chi_square += deviation * deviation / variance;
+            (sum, variances) = (sum + deviation, variances + variance);
+        }
+        if joint.rows > 0 {
+            joint.exceeded = ChiSquared::new(f64::from(joint.rows)).map_or(0.0, |law| law.sf(joint.chi_square));
+            joint.bias_sigma = sum / variances.sqrt();
+        }
+        joint
+    }
 }
 
 /// Cuts what is written into stretches and hands each to `each` with the number of its first sample.
@@ -263,12 +301,14 @@ fn doppler_step_hz(settings: &AcquisitionSettings) -> f64 {
 pub fn write(directory: &Path, rows: &[Row], settings: &AcquisitionSettings) -> Result<(), JudgeError> {
     write_rows(&directory.join("acquisition.csv"), rows.iter())?;
     let held = rows.iter().filter(|row| row.holds()).count();
+    let joint = Joint::of(rows);
     let mut text = format!(
         "# Acquisition against theory\n\n\
          One satellite in the noise of a scene at 2.6 Msps, 8 bit; each trial is the receiver's search of a stretch of its own \
          ({} sums of {} ms, Doppler steps of {} Hz, Doppler up to half a step off, code and symbol edges anywhere). Detections are \
          expected from the joint statistics of the cells about the peak (`study::search`), false alarms as designed. \
-         {held} of {} counts are within the 95 % of their binomial law. \
+         {held} of {} counts are within the 95 % of their binomial law. The {} detections that leave room on both sides have together \
+         a chi-square of {:.1} (exceeded by chance with {:.2}) and a bias of {:+.1} σ. \
          `cargo bench --bench acquisition` makes this page.\n\n![Probability of detection](acquisition.png)\n\n\
          | what | C/N0 (dB-Hz) | trials | found | measured | expected | 95 % of counts | within |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- |\n",
@@ -276,6 +316,10 @@ pub fn write(directory: &Path, rows: &[Row], settings: &AcquisitionSettings) -> 
         settings.coherent_periods,
         doppler_step_hz(settings),
         rows.len(),
+        joint.rows,
+        joint.chi_square,
+        joint.exceeded,
+        joint.bias_sigma,
     );
     for row in rows {
         let cn0 = row.cn0_dbhz.map_or_else(String::new, |x| format!("{x}"));
@@ -313,6 +357,16 @@ mod tests {
         assert_eq!(interval(0.5, 20), (6.0 / 20.0, 14.0 / 20.0));
         let (low, high) = interval(1.0, 50);
         assert!(low <= 1.0 && high >= 1.0);
+    }
+
+    #[test]
+    fn a_bias_that_no_row_shows_alone_shows_in_all_together() {
+        let row = |found: u32| Row::new("detection", Some(33.0), (found, 2000), 0.43);
+        let honest = Joint::of(&[row(860), row(870), row(850), Row::new("false alarm", None, (10, 2000), 0.1)]);
+        assert!(honest.rows == 3 && honest.bias_sigma.abs() < 0.1 && honest.exceeded > 0.5, "{honest:?}");
+        // Each 1.3 σ low.
+        let low = Joint::of(&[row(830), row(830), row(830), row(830), row(830)]);
+        assert!(low.bias_sigma < -2.5 && low.chi_square < 10.0, "{low:?}");
     }
 
     #[test]

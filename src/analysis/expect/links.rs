@@ -17,6 +17,7 @@ use crate::analysis::foreign::truth::Timeline;
 use crate::analysis::jitter::theory::{Stresses, Theory};
 use crate::analysis::jitter::{Loop, Settings};
 use crate::analysis::load::Run;
+use crate::analysis::statistics::median;
 use crate::analysis::theory::edges;
 use crate::gnss::record::{RayRow, TrackingRow};
 
@@ -92,7 +93,12 @@ impl Links {
         let cost_db = crate::analysis::spectrum::cost_db(run);
         for link in errors.signals.keys() {
             let Some(theory) = Theory::new(run, settings, &link, update_s) else { continue };
-            let rows = settled(&errors.signals.rows(link)?);
+            let mut rows = settled(&errors.signals.rows(link)?);
+            let all = rows.len();
+            rows.retain(|row| run.scene.expect.bounded(row.time_s));
+            if rows.len() < all {
+                level(&mut rows);
+            }
             if rows.len() < LEAST {
                 continue;
             }
@@ -143,6 +149,13 @@ fn settled(all: &[SignalError]) -> Vec<SignalError> {
     kept
 }
 
+/// Takes the whole and half cycles out of a carrier whose level was found with rows that are no longer there.
+fn level(rows: &mut [SignalError]) {
+    let middle = median(&rows.iter().map(|row| row.carrier_cycles).collect::<Vec<_>>()).unwrap_or(0.0);
+    let halves = 0.5 * (2.0 * middle).round();
+    rows.iter_mut().for_each(|row| row.carrier_cycles -= halves);
+}
+
 /// What a loop puts out in an update, in its unit.
 type Output = fn(&TrackingRow) -> f64;
 
@@ -157,8 +170,8 @@ struct One<'a> {
     ray_db: f64,
     /// Largest error of the code that chip edges leave.
     edge_m: f64,
-    /// σ of the loops in their units, with oscillator and motion, and largest stress.
-    sigma: BTreeMap<Loop, (f64, f64)>,
+    /// σ of the loops in their units: with oscillator and motion, without motion; and largest stress.
+    sigma: BTreeMap<Loop, [f64; 3]>,
     raw: BTreeMap<Loop, f64>,
     span_s: f64,
     settings: Settings,
@@ -194,8 +207,8 @@ impl<'a> One<'a> {
         for which in [Loop::Dll, Loop::Pll, Loop::Fll] {
             let (put_out, thermal) = theory.noise(which, cn0_hz);
             let (oscillator, stress) = (theory.oscillator(which), stresses.of(which));
-            let squares = thermal * thermal + oscillator * oscillator + stress.rms() * stress.rms();
-            sigma.insert(which, (squares.sqrt(), stress.max));
+            let noise = libm::hypot(thermal, oscillator);
+            sigma.insert(which, [libm::hypot(noise, stress.rms()), noise, stress.max]);
             raw.insert(which, put_out);
         }
         let mut rays: HashMap<u64, Vec<(f64, f64, f64)>> = HashMap::new();
@@ -266,7 +279,7 @@ impl<'a> One<'a> {
     /// Bias, largest error and spread of one loop's errors, which are in `scale` of the loop's unit; `rest`
     /// is what may come on top.
     fn one(&self, links: &mut Links, figures: [Figure; 2], which: Loop, errors: &[f64], scale: f64, rest: f64) {
-        let Some((sigma, stress)) = self.sigma.get(&which).map(|(a, b)| (a * scale, b * scale)) else { return };
+        let Some([sigma, noise, stress]) = self.sigma.get(&which).map(|all| all.map(|x| x * scale)) else { return };
         let count = errors.len() as f64;
         let middle = errors.iter().sum::<f64>() / count;
         let factor = largest(1, 1) * THEORY * self.pair / self.independent(which, 2.0).sqrt();
@@ -280,7 +293,8 @@ impl<'a> One<'a> {
             .sqrt()
             / sigma;
         links.put(Figure::Above(which), self.link, spread.sqrt() / sigma, top);
-        links.put(Figure::Below(which), self.link, spread.sqrt() / sigma, low.sqrt() / THEORY_LOW);
+        // A receiver may take a stress away that a loop alone would suffer; noise stays.
+        links.put(Figure::Below(which), self.link, spread.sqrt() / noise, low.sqrt() / THEORY_LOW);
     }
 
     fn cn0(&self, links: &mut Links, [bias, most]: [Figure; 2]) {
@@ -310,7 +324,7 @@ impl<'a> One<'a> {
             (Loop::Fll, |row| row.fll_discriminator_hz),
         ];
         for (which, of) in loops {
-            let (Some(raw), Some((_, stress))) = (self.raw.get(&which), self.sigma.get(&which)) else { continue };
+            let (Some(raw), Some([_, _, stress])) = (self.raw.get(&which), self.sigma.get(&which)) else { continue };
             let (middle, square) = (mean(&of), mean(&|row| of(row) * of(row)));
             // Rows are taken every few updates: a loop's memory between them is short.
             let (low, high) = mean_square(0.5 * count);
@@ -332,8 +346,10 @@ impl<'a> One<'a> {
             links.put(Figure::PromptPower, self.link, off_db.abs(), CN0_DB + self.ray_db + random_db);
         }
         // Beside noise of one component, quadrature holds what the phase loop leaves.
-        let (sigma_rad, stress_rad) =
-            self.sigma.get(&Loop::Pll).map_or((0.0, 0.0), |(a, b)| (a.to_radians(), b.to_radians()));
+        let (sigma_rad, stress_rad) = self
+            .sigma
+            .get(&Loop::Pll)
+            .map_or((0.0, 0.0), |[sigma, _, stress]| (sigma.to_radians(), stress.to_radians()));
         let ray_rad = self.ray_cycles * std::f64::consts::TAU;
         let phase2 = THEORY * THEORY * sigma_rad * sigma_rad + stress_rad * stress_rad + ray_rad * ray_rad;
         let (_, high) = mean_square(0.5 * count);

@@ -15,6 +15,7 @@ use super::multipath;
 use super::smoothing::Smoothing;
 use crate::analysis::JudgeError;
 use crate::analysis::errors::{Errors, Link, SignalError};
+use crate::analysis::expect::links::CN0_DB;
 use crate::analysis::jitter::theory::Theory;
 use crate::analysis::jitter::{Loop, Settings};
 use crate::analysis::load::Run;
@@ -91,6 +92,8 @@ pub struct Forecast {
     pub rate_sigma_mps: f64,
     pub rate_bias_mps: f64,
     pub cn0_hz: f64,
+    /// Whether the C/N0 observed is near the true one: in fades and jamming averages lag, which rows of their own judge.
+    pub steady: bool,
     /// Of a model's error at the zenith: one over the elevation's sine.
     pub slant: f64,
     /// Whether it is so near to the mask that it may be used or not.
@@ -248,6 +251,7 @@ impl<'r> Scene<'r> {
             rate_sigma_mps: rate_hz * true_row.signal.wavelength_m(),
             rate_bias_mps: 0.0,
             cn0_hz,
+            steady: (row.cn0_dbhz - row.cn0_effective_dbhz + self.cost_db).abs() <= CN0_DB,
             slant: if in_space { 1.0 } else { 1.0 / sin.max(0.05) },
             near_mask: !in_space && elevation_rad < self.choices.mask_rad + MASK_SLACK_RAD,
             excluded: self.left_out(true_row.sv, row.sample),

@@ -19,6 +19,7 @@ struct Sums {
     /// Left out, and whether any range is so wrong that residuals may show it, in whichever satellite.
     blameless: u32,
     faulty: bool,
+    unsteady: bool,
     normal: Matrix4<f64>,
     /// The same where the ionosphere is not known yet.
     loose: Matrix4<f64>,
@@ -51,6 +52,7 @@ impl Sums {
             self.blameless += 1;
             return;
         }
+        self.unsteady |= !range.steady;
         let weight = 1.0 / variance;
         let cosine2 = SHELL * SHELL * (1.0 - range.sight.z * range.sight.z);
         let shell_m2 = IONOSPHERE_SIGMA_M * IONOSPHERE_SIGMA_M / (1.0 - cosine2);
@@ -88,6 +90,8 @@ pub struct Expected {
     pub dilution: Matrix4<f64>,
     /// Whether the fix says that the message's ionosphere corrects it without an error of its own, or needs none.
     pub corrected: bool,
+    /// Whether every satellite's C/N0 was measured as it is: what is stated follows from it.
+    pub steady: bool,
     pub memory_s: f64,
     /// Covariance of velocity and of c times the drift, and what may come on top by the atmosphere.
     pub rate_noise: Matrix4<f64>,
@@ -148,6 +152,7 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
         stated,
         dilution: inverse(&sums.plain)?,
         corrected,
+        steady: !sums.unsteady,
         memory_s: sums.memory_s,
         rate_noise: rates * sums.rate_noise * rates,
         rate_allowed: 2.0 * (rates * sums.rate_bias).abs(),

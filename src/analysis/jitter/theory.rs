@@ -62,7 +62,19 @@ struct Response {
     put_out: f64,
     difference: f64,
     rate: f64,
+    /// Variance of the same rate for steps of the phase in place of noise.
+    rate_after_steps: f64,
 }
+
+/// Natural frequency of a loop whose roots all lie at exp(−ωT), radians a second.
+pub(in crate::analysis) fn natural_radps(closed: &PhaseLoop, order: u32, update_s: f64) -> f64 {
+    let [_, k2, k3] = closed.gains;
+    let root = if order >= 3 { 1.0 - libm::cbrt(k3) } else { 1.0 - k2.sqrt() };
+    -libm::log(root) / update_s
+}
+
+/// Up to here the truth's drift follows the oscillator: a spline over 0.8 s has 80 % of that rate's variance left.
+const NODES_HZ: f64 = 0.5;
 
 /// Intervals after which nothing is left of a value in any loop that can be set: bandwidth times time is 1e-4 or more.
 const LONGEST: usize = 200_000;
@@ -70,14 +82,16 @@ const LONGEST: usize = 200_000;
 impl Response {
     fn of(closed: &PhaseLoop) -> Self {
         let mut state = [0.0; 3];
-        let mut found = Self { phase: 0.0, put_out: 0.0, difference: 0.0, rate: 0.0 };
-        let mut before = 0.0;
+        let mut found = Self { phase: 0.0, put_out: 0.0, difference: 0.0, rate: 0.0, rate_after_steps: 0.0 };
+        let (mut before, mut summed) = (0.0, 0.0);
         for k in 0..LONGEST {
             let noise = if k == 0 { 1.0 } else { 0.0 };
             found.phase += state[0] * state[0];
             // What the oscillator runs at in this interval, the mean of its rate.
             let ran = state[1] + 0.5 * state[2];
             found.rate += ran * ran;
+            summed += ran;
+            found.rate_after_steps += summed * summed;
             let put_out = noise - state[0];
             found.put_out += put_out * put_out;
             found.difference += (put_out - before) * (put_out - before);
@@ -102,6 +116,7 @@ fn step([k1, k2, k3]: &[f64; 3], [phase, rate, acceleration]: [f64; 3], error: f
 struct Follower<'a> {
     closed: &'a PhaseLoop,
     first: Option<f64>,
+    last: Option<f64>,
     state: Option<[f64; 3]>,
     /// Intervals of the first second, in which it runs in.
     running_in: usize,
@@ -109,19 +124,26 @@ struct Follower<'a> {
 
 impl<'a> Follower<'a> {
     fn new(closed: &'a PhaseLoop, update_s: f64) -> Self {
-        Self { closed, first: None, state: None, running_in: (1.0 / update_s) as usize }
+        Self { closed, first: None, last: None, state: None, running_in: (1.0 / update_s) as usize }
     }
 
     /// Its error on the next phase; `None` while it runs in. It begins with the rate of the first two.
     fn error(&mut self, phase: f64) -> Option<f64> {
+        Some(self.errors(phase)?[0])
+    }
+
+    /// Errors on the next phase, and of the rate at the boundary before it, in phase an interval.
+    fn errors(&mut self, phase: f64) -> Option<[f64; 2]> {
         let begun = self.first.map(|first| step(&self.closed.gains, [first, phase - first, 0.0], 0.0));
         self.first = self.first.or(Some(phase));
         let state = self.state.or(begun);
         let error = state.map_or(0.0, |state| phase - state[0]);
+        let moved = self.last.replace(phase).map_or(0.0, |last| phase - last);
+        let rate_error = state.map_or(0.0, |state| moved - state[1]);
         self.state = state.map(|state| step(&self.closed.gains, state, error));
         let counts = self.running_in == 0;
         self.running_in = self.running_in.saturating_sub(1);
-        counts.then_some(error)
+        counts.then_some([error, rate_error])
     }
 }
 
@@ -239,6 +261,19 @@ impl Theory {
         }
     }
 
+    /// Sigma in hertz of the phase loop's rate against the drift that the truth states, which follows nodes 0.8 s apart.
+    ///
+    /// White frequency noise adds h₀·T/2·f² cycles² to the phase in each interval, which the rate follows as it follows steps: that
+    /// gives the bandwidth of the rate. Flicker and random walk, h₋₁/f + h₋₂/f², count between the nodes and there.
+    pub fn oscillator_rate_hz(&self) -> f64 {
+        let Some(law) = &self.oscillator else { return 0.0 };
+        let [_, _, white, flicker, walk] = law.h;
+        let bandwidth_hz = 0.5 * self.pll.1.rate_after_steps / self.update_s;
+        let band = (bandwidth_hz / NODES_HZ).max(1.0);
+        let variance = white * bandwidth_hz + flicker * libm::log(band) + walk * (1.0 - 1.0 / band) / NODES_HZ;
+        variance.sqrt() * self.carrier_hz
+    }
+
     /// Threshold of jitter alone, and limit of 3σ and stress.
     pub fn limits(&self, which: Loop) -> (f64, f64) {
         let d = self.settings.spacing_chips;
@@ -284,20 +319,20 @@ impl Stresses {
         let t_s = theory.update_s;
         let count = (((to_s - from_s) / t_s).max(0.0) as usize).min(MOST_UPDATES);
         let Some(origin) = timeline.state(link, from_s) else { return found };
-        let begin = || (Follower::new(&theory.pll.0, t_s), Follower::new(&theory.dll.0, t_s), None);
-        let (mut pll, mut dll, mut last_cycles) = begin();
+        let begin = || (Follower::new(&theory.pll.0, t_s), Follower::new(&theory.dll.0, t_s));
+        let (mut pll, mut dll) = begin();
         for k in 0..count {
             // The middle of an interval stands for its mean.
             let Some(state) = timeline.state(link, from_s + (k as f64 + 0.5) * t_s) else {
-                (pll, dll, last_cycles) = begin();
+                (pll, dll) = begin();
                 continue;
             };
             let range_m = state.range_m - origin.range_m;
             let carrier_cycles = state.carrier_cycles - origin.carrier_cycles;
-            let cycles = pll.error(carrier_cycles);
-            found.add(Loop::Pll, cycles.map(|cycles| 360.0 * cycles));
-            found.add(Loop::Fll, cycles.zip(last_cycles).map(|(cycles, last)| (cycles - last) / t_s));
-            last_cycles = cycles;
+            let errors = pll.errors(carrier_cycles);
+            found.add(Loop::Pll, errors.map(|[cycles, _]| 360.0 * cycles));
+            // The Doppler given out is the loop's rate, without the part that only steers the phase.
+            found.add(Loop::Fll, errors.map(|[_, cycles]| cycles / t_s));
             // The carrier aids the code: only what parts them is left.
             found.add(Loop::Dll, dll.error((range_m - carrier_cycles * link.1.wavelength_m()) / theory.chip_m));
         }
@@ -374,6 +409,21 @@ mod tests {
         let last = *errors.last().unwrap();
         let expected = pll::stress_discrete(3, closed.gains[2], t_s, 50.0);
         assert!((last / expected - 1.0).abs() < 1e-3, "{last} {expected}");
+    }
+
+    #[test]
+    fn a_jerk_leaves_a_rate_error_of_three_over_the_square_of_the_natural_frequency() {
+        // Roots at exp(−ωT) are those of (s + ω)³ for small ωT: the rate lacks K₁·e, e = J/ω³ and K₁ = 3ω.
+        let (t_s, jerk) = (1e-3, 50.0);
+        let closed = exact_loop(3, 20.0 * t_s).unwrap();
+        let natural = natural_radps(&closed, 3, t_s);
+        let mut follower = Follower::new(&closed, t_s);
+        let phase = |k: u32| jerk / 6.0 * (f64::from(k) * t_s).powi(3);
+        let errors: Vec<[f64; 2]> = (0..4000).filter_map(|k| follower.errors(phase(k))).collect();
+        let found = errors.last().unwrap()[1] / t_s;
+        let expected = 3.0 * jerk / (natural * natural);
+        // ωT is 0.019: three halves of it is what the difference of two methods comes to.
+        assert!((found / expected - 1.0).abs() < 0.04, "{found} {expected}");
     }
 
     #[test]

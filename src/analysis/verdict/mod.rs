@@ -78,7 +78,7 @@ impl Verdict {
         verdict.satellites(run, &expected);
         verdict.availability(run.scene.duration_s, &run.scene.expect, &expected, &Came::of(run));
         verdict.values(run, errors, summary)?;
-        verdict.tracking(summary);
+        verdict.tracking(run, summary);
         verdict.links(run, errors)?;
         verdict.losses(run, &expected.receiver, slips)?;
         verdict.reception(summary);

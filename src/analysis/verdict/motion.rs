@@ -5,14 +5,15 @@
 use std::collections::HashMap;
 
 use crate::analysis::expect::ranges::Choices;
+use crate::analysis::jitter::theory::{exact_loop, natural_radps};
 use crate::analysis::load::Run;
 
-/// Bandwidth over natural frequency of loops of the second and third order (Kaplan and Hegarty, table 5.6).
-const SECOND_ORDER: f64 = 0.53;
-const THIRD_ORDER: f64 = 0.7845;
-/// The rate's error in a third-order loop under jerk J is b·J/ω0² with b = 2.4 (Kaplan and Hegarty, table 5.6); its transient overshoots by a
-/// quarter.
-const TRANSIENT: f64 = 3.0;
+/// The rate of a loop (s + ω)³ lags by 3J/ω² under jerk J, that of a loop (s + ω)² by 2a/ω under acceleration a; neither overshoots.
+const THIRD_ORDER: f64 = 3.0;
+const SECOND_ORDER: f64 = 2.0;
+/// Share of the rate at which a turning antenna winds up all carriers together by which satellites differ: a tilt of θ makes the rate of
+/// one satellite swing by tan θ times the tangent of its angle from the axis, and a fix averages satellites on all sides.
+const WIND_UP_SHARE: f64 = 0.1;
 /// Rows before an epoch whose motion is still in the loop: half a second at ten a second, several of a loop's time constants.
 const ROWS: usize = 5;
 /// What light time, orbit and rounding leave in a receiver at rest: orbits as sent err by 1 mm/s.
@@ -25,8 +26,12 @@ pub(super) struct Motion {
 
 impl Motion {
     pub fn new(run: &Run, choices: &Choices) -> Self {
-        let ratio = if choices.loops.pll_order >= 3 { THIRD_ORDER } else { SECOND_ORDER };
-        let natural_radps = choices.loops.pll_bandwidth_hz / ratio;
+        let loops = &choices.loops;
+        let closed = exact_loop(loops.pll_order, loops.pll_bandwidth_hz * choices.update_s);
+        let natural_radps =
+            closed.map_or(f64::INFINITY, |closed| natural_radps(&closed, loops.pll_order, choices.update_s));
+        let second = if loops.pll_order < 3 { SECOND_ORDER / natural_radps } else { 0.0 };
+        let wavelength_m = run.truth.keys().next().map_or(0.0, |(_, signal)| signal.wavelength_m());
         let rows = &run.trajectory;
         let accelerations: Vec<_> = rows
             .windows(2)
@@ -39,7 +44,10 @@ impl Motion {
                 let most = around.iter().map(|a| a.norm()).fold(0.0, f64::max);
                 let step_s = rows.get(1).zip(rows.first()).map_or(0.1, |(b, a)| b.time().since(a.time()).max(1e-6));
                 let jerk = around.windows(2).map(|two| (two[1] - two[0]).norm() / step_s).fold(0.0, f64::max);
-                most * choices.update_s + TRANSIENT * jerk / (natural_radps * natural_radps)
+                let wound_mps = rows.get(index).map_or(0.0, |row| run.common.wound_mps(row.sample, wavelength_m));
+                most * (choices.update_s + second)
+                    + THIRD_ORDER * jerk / (natural_radps * natural_radps)
+                    + WIND_UP_SHARE * wound_mps.abs()
             })
             .collect();
         let worst = |index: usize| {

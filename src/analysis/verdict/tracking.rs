@@ -3,12 +3,18 @@
 use super::{Bound, Verdict};
 use crate::analysis::load::Run;
 use crate::analysis::summary::Summary;
+use crate::gnss::facts::Sizes;
 
 /// 10 lg(π/2).
 const ONE_BIT_LOSS_DB: f64 = 1.961;
 
 impl Verdict {
-    pub(super) fn tracking(&mut self, summary: &Summary) {
+    pub(super) fn tracking(&mut self, run: &Run, summary: &Summary) {
+        if run.scene.expect.intervals.iter().any(|interval| interval.terms.errors == Some(Sizes::Any)) {
+            let reason = "the scene expects any errors for a time; satellites are judged one by one outside it";
+            self.not_judged.push(format!("jitter of all loops together: {reason}"));
+            return;
+        }
         let (tracking, limits) = (&summary.tracking, &summary.details.thresholds);
         let rows = [
             ("DLL jitter, 1σ", "tracking.dll_sigma_chips", tracking.dll_sigma_chips, "chips", limits.dll_chips, "d/6"),

@@ -15,10 +15,12 @@ use crate::analysis::errors::{Errors, PositionError};
 use crate::analysis::expect::quantile::{largest, mean_square};
 use crate::analysis::expect::ranges::{Choices, Scene};
 use crate::analysis::expect::solution::{Expected, expected, largest_axis};
+use crate::analysis::jitter::theory::Theory;
 use crate::analysis::load::Run;
 use crate::analysis::statistics::{mean, percentile};
 use crate::analysis::summary::Summary;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::facts::{Interval, Sizes};
 use crate::gnss::record::{Event, Fix, IonosphereModel};
 
 /// By how much theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a real one.
@@ -75,7 +77,7 @@ impl Value {
 impl Verdict {
     /// Rows of position, velocity and clock.
     pub(super) fn values(&mut self, run: &Run, errors: &Errors, summary: &Summary) -> Result<(), JudgeError> {
-        if run.fixes.is_empty() || !run.scene.expect.bounded(0.0) {
+        if run.fixes.is_empty() {
             return Ok(());
         }
         let Some(scene) = Scene::new(run) else {
@@ -83,8 +85,13 @@ impl Verdict {
             self.position(run, summary);
             return Ok(());
         };
-        let cases = cases(&scene, errors)?;
-        self.satellites_of_fixes(run, &cases);
+        let mut cases = cases(&scene, errors)?;
+        let bounded = Bounded::new(run, &cases);
+        if cases.iter().all(|case| !bounded.holds(case.error.time_s)) {
+            return Ok(());
+        }
+        self.satellites_of_fixes(run, &cases, &bounded);
+        cases.retain(|case| bounded.holds(case.error.time_s));
         if cases.is_empty() {
             self.not_judged.push("fixes against theory: no satellite with a message and a truth".to_owned());
             self.position(run, summary);
@@ -128,9 +135,10 @@ impl Verdict {
 
     /// Stated sigmas against those that settings, C/N0 and geometry make.
     fn sigmas(&mut self, cases: &[Case<'_>]) {
-        let known: Vec<&Case<'_>> = cases.iter().filter(|case| case.expected.corrected && case.is_whole()).collect();
+        let comparable = |case: &&Case<'_>| case.expected.corrected && case.expected.steady && case.is_whole();
+        let known: Vec<&Case<'_>> = cases.iter().filter(comparable).collect();
         if known.is_empty() {
-            self.not_judged.push("sigmas: no fix whose ionosphere and satellites are known".to_owned());
+            self.not_judged.push("sigmas: no fix whose ionosphere, satellites and C/N0 are known".to_owned());
             return;
         }
         let flat = |fix: &Fix, e: &Expected| {
@@ -162,7 +170,7 @@ impl Verdict {
             let figure = "dilutions and condition against the true geometry, largest departure";
             self.judge(figure, "", value, "of 1", Bound::Max(GEOMETRY), source);
         }
-        let known = whole().filter(|case| case.expected.corrected);
+        let known = whole().filter(|case| case.expected.corrected && case.expected.steady);
         if let Some(value) = known.map(Case::correlation_departure).max_by(f64::total_cmp) {
             let figure = "formal correlations against the expected ones, largest departure";
             self.judge(figure, "", value, "", Bound::Max(CORRELATION), "weights at the true C/N0");
@@ -170,7 +178,7 @@ impl Verdict {
     }
 
     /// Whether fixes use the satellites that are observed, know their ionosphere, and pass their own test.
-    fn satellites_of_fixes(&mut self, run: &Run, cases: &[Case<'_>]) {
+    fn satellites_of_fixes(&mut self, run: &Run, cases: &[Case<'_>], bounded: &Bounded<'_>) {
         let away = (RETURN_S * run.scene.sample_rate_hz) as u64;
         let breaks: Vec<u64> = run
             .events
@@ -178,15 +186,17 @@ impl Verdict {
             .filter(|row| matches!(row.event, Event::LossOfLock | Event::CycleSlip))
             .map(|row| row.sample)
             .collect();
-        let excused = |sample: u64| breaks.iter().any(|at| (*at..*at + 3 * away).contains(&sample));
+        let excused = |sample: u64| {
+            breaks.iter().any(|at| (*at..*at + 3 * away).contains(&sample)) || !bounded.holds(run.time_s(sample))
+        };
         let expected: HashMap<u64, &Case<'_>> = cases.iter().map(|case| (case.fix.sample, case)).collect();
         let others = run.fixes.iter().filter(|fix| !excused(fix.sample));
         let odd = others.filter(|fix| !expected.get(&fix.sample).is_some_and(|case| case.is_whole())).count();
         let source = "observed, with a message, above the mask, not excluded";
         self.judge("fixes of other satellites than those observed", "", odd, "", Bound::Max(0.0), source);
         if run.claimed.is_empty() {
-            let blamed = cases.iter().filter(|case| case.expected.blameless > 0).count();
-            let share = blamed as f64 / run.fixes.len().max(1) as f64;
+            let blamed = |case: &&Case<'_>| case.expected.blameless > 0 && bounded.holds(case.error.time_s);
+            let share = cases.iter().filter(blamed).count() as f64 / run.fixes.len().max(1) as f64;
             let source = "the residual test's false alarms, which last as smoothed errors do";
             self.judge(
                 "share of fixes that exclude a good satellite",
@@ -267,7 +277,10 @@ fn cases<'a>(scene: &Scene<'a>, errors: &'a Errors) -> Result<Vec<Case<'a>>, Jud
         let place = scene.trajectory.get(&expected.sample)?;
         let common_mps =
             wavelength_m.map_or(0.0, |wavelength_m| scene.run.common.drift_mps(expected.sample, wavelength_m));
-        let drift_mps = SPEED_OF_LIGHT_MPS * (fix.clock_drift - place.clock_drift) - common_mps;
+        let beyond_mps = SPEED_OF_LIGHT_MPS * (fix.clock_drift - place.clock_drift);
+        // What parts code and carrier is the clock's to a receiver, until it has measured it.
+        let (with, without) = (beyond_mps - common_mps, beyond_mps);
+        let drift_mps = if with.abs() < without.abs() { with } else { without };
         Some(Case { fix, error, expected, drift_mps })
     };
     Ok(expected(scene, errors)?.into_iter().filter_map(one).collect())
@@ -336,9 +349,36 @@ impl Weight {
     }
 }
 
+/// When errors of fixes are judged: not while the scene expects any, and not while smoothing remembers that time.
+struct Bounded<'a> {
+    run: &'a Run,
+    memory_s: f64,
+}
+
+impl<'a> Bounded<'a> {
+    fn new(run: &'a Run, cases: &[Case<'_>]) -> Self {
+        Self { run, memory_s: cases.iter().map(|case| case.expected.memory_s).fold(0.0, f64::max) }
+    }
+
+    fn holds(&self, time_s: f64) -> bool {
+        let expect = &self.run.scene.expect;
+        let within = |interval: &&Interval| (interval.from_s..interval.to_s + self.memory_s).contains(&time_s);
+        expect.bounded(time_s)
+            && !expect.intervals.iter().filter(within).any(|interval| interval.terms.errors == Some(Sizes::Any))
+    }
+}
+
+/// What the scene's oscillator leaves between the rate that a phase loop follows and the truth's drift.
+fn oscillator_mps(run: &Run, choices: &Choices) -> f64 {
+    let Some(link) = run.truth.keys().next() else { return 0.0 };
+    let theory = Theory::new(run, choices.loops, &link, choices.update_s);
+    theory.map_or(0.0, |theory| theory.oscillator_rate_hz() * link.1.wavelength_m())
+}
+
 /// The five kinds of error.
 fn kinds(run: &Run, choices: &Choices, cases: &[Case<'_>]) -> Vec<Kind> {
     let motion = Motion::new(run, choices);
+    let oscillator_mps = oscillator_mps(run, choices);
     let steps: Vec<f64> = cases.windows(2).map(|two| two[1].error.time_s - two[0].error.time_s).collect();
     let step_s = crate::analysis::statistics::median(&steps).unwrap_or(1.0);
     let span_s = step_s * cases.len() as f64;
@@ -388,7 +428,7 @@ fn kinds(run: &Run, choices: &Choices, cases: &[Case<'_>]) -> Vec<Kind> {
             let e = &case.expected;
             let error = Vector3::new(case.drift_mps, 0.0, 0.0);
             let allowed = of(&e.rate_allowed, 3) + motion.allowed_mps(case.fix.sample);
-            position(case, error, e.rate_noise.m44.sqrt(), allowed)
+            position(case, error, libm::hypot(e.rate_noise.m44.sqrt(), oscillator_mps), allowed)
         }),
     ]
 }

@@ -1,0 +1,136 @@
+//! The runs that are damaged, made once, and a copy of one whose receiver's tables can be edited.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use tempfile::TempDir;
+
+use crate::table::Table;
+
+/// Which run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scene {
+    AtRest,
+    InMotion,
+}
+
+struct Made {
+    _directory: Option<TempDir>,
+    run: PathBuf,
+}
+
+/// Runs a scenario, or takes the run of that name in the directory `GNSS_TWIN_SABOTAGE_RUNS`, to look at other receivers' runs.
+fn make(slot: &'static OnceLock<Made>, name: &str, scenario: &str) -> &'static Path {
+    let made = slot.get_or_init(|| {
+        if let Some(runs) = std::env::var_os("GNSS_TWIN_SABOTAGE_RUNS") {
+            return Made { _directory: None, run: Path::new(&runs).join(name) };
+        }
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("scene.toml");
+        fs::write(&file, scenario).unwrap();
+        let run = directory.path().join("run");
+        let output = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
+            .args(["run".as_ref(), file.as_os_str(), "--out".as_ref(), run.as_os_str()])
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        Made { _directory: Some(directory), run }
+    });
+    &made.run
+}
+
+const STATIC: &str = include_str!("../../scenarios/static.toml");
+
+/// The shipped static scene.
+pub fn at_rest() -> &'static Path {
+    static RUN: OnceLock<Made> = OnceLock::new();
+    make(&RUN, "rest", STATIC)
+}
+
+/// The first minute of the shipped car ride, so that places and velocities of other epochs differ.
+pub fn in_motion() -> &'static Path {
+    static RUN: OnceLock<Made> = OnceLock::new();
+    let scene = include_str!("../../scenarios/moderate.toml");
+    make(&RUN, "motion", &scene.replace("duration_s = 90", "duration_s = 60"))
+}
+
+/// Another place, seed and start, without page 18 in time.
+pub fn elsewhere() -> &'static Path {
+    static RUN: OnceLock<Made> = OnceLock::new();
+    let scene = STATIC
+        .replace("seed = 1", "seed = 77")
+        .replace("08:05:58", "11:38:17")
+        .replace("latitude_deg = 26.5123", "latitude_deg = -33.9")
+        .replace("longitude_deg = 80.2329", "longitude_deg = 18.4")
+        .replace("require_ionosphere = true", "require_ionosphere = false");
+    make(&RUN, "elsewhere", &scene)
+}
+
+/// A copy of a run, the receiver's tables in memory as they are asked for.
+pub struct Rx {
+    from: PathBuf,
+    to: PathBuf,
+    tables: BTreeMap<&'static str, Table>,
+    receiver: Option<serde_json::Value>,
+}
+
+impl Rx {
+    /// Everything but `rx/` is linked.
+    pub fn copy(scene: Scene, to: &Path) -> Self {
+        let from = match scene {
+            Scene::AtRest => at_rest(),
+            Scene::InMotion => in_motion(),
+        };
+        for name in ["truth", "rx"] {
+            fs::create_dir(to.join(name)).unwrap();
+        }
+        for entry in fs::read_dir(from.join("truth")).unwrap() {
+            let entry = entry.unwrap();
+            link(&entry.path(), &to.join("truth").join(entry.file_name()));
+        }
+        for name in ["psd.csv", "speed.json", "scenario.toml"] {
+            link(&from.join(name), &to.join(name));
+        }
+        Self { from: from.to_owned(), to: to.to_owned(), tables: BTreeMap::new(), receiver: None }
+    }
+
+    /// A table to edit.
+    pub fn table(&mut self, name: &'static str) -> &mut Table {
+        let path = self.from.join(format!("rx/{name}.csv"));
+        self.tables.entry(name).or_insert_with(|| Table::read(&path))
+    }
+
+    /// `receiver.json` to edit.
+    pub fn receiver(&mut self) -> &mut serde_json::Value {
+        let path = self.from.join("rx/receiver.json");
+        self.receiver.get_or_insert_with(|| serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap())
+    }
+
+    /// Samples a second.
+    pub fn rate_hz(&self) -> f64 {
+        2.6e6
+    }
+
+    /// Writes what was edited and links the rest.
+    pub fn write(&self) {
+        for entry in fs::read_dir(self.from.join("rx")).unwrap() {
+            let entry = entry.unwrap();
+            let target = self.to.join("rx").join(entry.file_name());
+            let name = entry.file_name().into_string().unwrap();
+            match (name.strip_suffix(".csv").and_then(|stem| self.tables.get(stem)), &self.receiver) {
+                (Some(table), _) => table.write(&target),
+                (None, Some(receiver)) if name == "receiver.json" => fs::write(&target, receiver.to_string()).unwrap(),
+                _ => link(&entry.path(), &target),
+            }
+        }
+    }
+}
+
+fn link(from: &Path, to: &Path) {
+    if from.exists() {
+        fs::hard_link(from, to).or_else(|_| fs::copy(from, to).map(drop)).unwrap();
+    }
+}
