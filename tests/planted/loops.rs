@@ -1,6 +1,8 @@
 //! Whole twins, as short as they may be: a scene in, tables out, the verdict and tighter limits over them.
 
 use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{Read as _, Write as _};
 use std::path::Path;
 
 use gnss_twin::analysis::assess;
@@ -16,8 +18,48 @@ use gnss_twin::receiver::Reception;
 use gnss_twin::receiver::output::Output;
 use gnss_twin::receiver::settings::Settings;
 
+use crate::judge;
+
+/// The samples of a run that others receive again.
+const SAMPLES: &str = "samples.ci8";
+
 /// Makes `truth/` and `rx/` of a scene below `directory`.
-pub fn run(scene: &str, directory: &Path) {
+fn run(scene: &str, directory: &Path) {
+    make(scene, directory, |_| ());
+}
+
+/// The same, with the samples beside them.
+pub fn run_and_keep(scene: &str, directory: &Path) {
+    let mut file = File::create(directory.join(SAMPLES)).unwrap();
+    make(scene, directory, |bytes| file.write_all(bytes).unwrap());
+}
+
+/// Receives the kept samples of a run; its truth is linked. A fault in the receiver shows as if the samples were made anew.
+fn receive_again(scene: &str, kept: &Path, directory: &Path) {
+    let truth = directory.join("truth");
+    fs::create_dir(&truth).unwrap();
+    for entry in fs::read_dir(kept.join("truth")).unwrap() {
+        let entry = entry.unwrap();
+        fs::copy(entry.path(), truth.join(entry.file_name())).unwrap();
+    }
+    fs::create_dir(directory.join("rx")).unwrap();
+    let settings = Settings::of_scenario(scene, "scene").unwrap();
+    let (scene, _) = Scenario::parse(scene, "scene").unwrap().compose(directory, &Overrides::default()).unwrap();
+    let mut output = Output::create(&directory.join("rx")).unwrap();
+    let mut reception = Reception::new(&scene.metadata, &settings).unwrap();
+    let mut file = File::open(kept.join(SAMPLES)).unwrap();
+    let mut bytes = vec![0; 1 << 18];
+    loop {
+        let count = file.read(&mut bytes).unwrap();
+        if count == 0 {
+            break;
+        }
+        reception.take(&bytes[..count], &mut output).unwrap();
+    }
+    reception.finish(&mut output).unwrap();
+}
+
+fn make(scene: &str, directory: &Path, mut keep: impl FnMut(&[u8])) {
     let scenario = Scenario::parse(scene, "scene").unwrap();
     let settings = Settings::of_scenario(scene, "scene").unwrap();
     let (scene, _) = scenario.compose(directory, &Overrides::default()).unwrap();
@@ -32,8 +74,10 @@ pub fn run(scene: &str, directory: &Path) {
     let mut reception = Reception::new(&scene.metadata, &settings).unwrap();
     let mut bytes = Vec::new();
     while stream.next(&mut truth, &mut bytes).unwrap() {
+        keep(&bytes);
         reception.take(&bytes, &mut output).unwrap();
     }
+    keep(&bytes);
     reception.take(&bytes, &mut output).unwrap();
     stream.finish(&mut truth).unwrap();
     reception.finish(&mut output).unwrap();
@@ -92,7 +136,11 @@ fn carriers_beside_codes(directory: &Path) -> Vec<String> {
 
 fn holds(scene: &str, limits: &str) {
     let directory = tempfile::tempdir().unwrap();
-    run(scene, directory.path());
+    let in_receiver = std::env::var(gnss_twin::plant::VARIABLE).is_ok_and(|fault| fault.starts_with("receiver."));
+    match std::env::var_os(judge::RUN).filter(|_| in_receiver) {
+        Some(kept) => receive_again(scene, Path::new(&kept), directory.path()),
+        None => run(scene, directory.path()),
+    }
     let summary = judged(directory.path(), limits);
     println!("{summary}");
     // What the verdict says of so short a scene is its own affair.

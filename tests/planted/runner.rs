@@ -75,7 +75,7 @@ fn reason(text: &str) -> String {
 #[test]
 fn every_planted_fault_is_noticed() {
     let run = tempfile::tempdir().unwrap();
-    loops::run(loops::OPEN_SKY, run.path());
+    loops::run_and_keep(loops::OPEN_SKY, run.path());
     let only = std::env::var("GNSS_TWIN_PLANTED_ONLY").unwrap_or_default();
     let chosen: Vec<&Fault> = FAULTS.iter().filter(|fault| fault.name.contains(&only)).collect();
     let (queue, outcomes) = (Mutex::new(chosen.iter().rev().copied().collect::<Vec<_>>()), Mutex::new(Vec::new()));

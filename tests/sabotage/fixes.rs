@@ -144,7 +144,7 @@ fn places() -> Vec<Kind> {
         kind!("scattered heights", "m, 1σ", Some(0.08), 1.0, &UP, AtRest, |rx, m| {
             add(rx, PLACE, |row, _| Vector3::z() * (m * normal(row, 3)));
         }),
-        kind!("latitude and longitude rounded", "°", Some(1e-6), 1e-4, &FLAT, AtRest, round),
+        kind!("latitude and longitude rounded", "°", Some(1e-6), 7e-5, &FLAT, AtRest, round),
         kind!(
             "height above the geoid, undulation taken by this share",
             "of −53 m",
@@ -417,13 +417,11 @@ fn rows() -> Vec<Kind> {
                 table.put(row, "sample", sample);
             }
         }),
-        kind!("places frozen, all else alive", "epochs", Some(2.0), 60.0, &FLAT, InMotion, |rx, count| {
+        kind!("places frozen, all else alive", "epochs", None, 60.0, &FLAT, InMotion, |rx, count| {
             let table = rx.table("fixes");
-            // At the start the car stands.
-            let start = if count < 20.0 { 0 } else { 150 };
-            for row in start..start + count as usize {
+            for row in 150..150 + count as usize {
                 PLACE.iter().for_each(|column| {
-                    let old = table.text(start, column).to_owned();
+                    let old = table.text(150, column).to_owned();
                     table.put(row, column, old);
                 });
             }
