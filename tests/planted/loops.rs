@@ -24,7 +24,7 @@ use crate::judge;
 const SAMPLES: &str = "samples.ci8";
 
 /// Makes `truth/` and `rx/` of a scene below `directory`.
-fn run(scene: &str, directory: &Path) {
+pub fn run(scene: &str, directory: &Path) {
     make(scene, directory, |_| ());
 }
 
