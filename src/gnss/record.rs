@@ -315,4 +315,8 @@ pub enum Event {
     LossOfLock,
     /// The half-cycle or whole-cycle count of the carrier was broken and restarted.
     CycleSlip,
+    /// Samples are missing in the recording: the code of this satellite, like all others, was ahead by as many.
+    SamplesLost,
+    /// Samples are in the recording twice.
+    SamplesDoubled,
 }

@@ -166,7 +166,7 @@ impl Replica {
     }
 
     /// The replica's sample when its code phase is `code`.
-    fn value(&self, code: i64, step: u64) -> f64 {
+    pub(crate) fn value(&self, code: i64, step: u64) -> f64 {
         let chip = |units: i64| {
             let index = (units.rem_euclid(self.period()) >> CODE_BITS) as usize;
             if self.chips.get(index).is_some_and(|&one| one) { -1.0 } else { 1.0 }

@@ -3,7 +3,7 @@
 //! It sees IF metadata, samples and settings; no argument can carry truth. [`acquire`] finds
 //! satellites, [`track`] follows them with [`correlate`], [`decode`] reads their messages,
 //! [`observe`] makes observables at common epochs and [`position`] solves for place and time. [`interference`] watches
-//! the spectrum, [`parting`] how code and carrier part.
+//! the spectrum, [`parting`] how code and carrier part, [`gap`] whether samples are missing.
 
 pub mod acquire;
 pub mod correlate;
@@ -11,6 +11,7 @@ pub mod decode;
 mod described;
 pub mod diagnosis;
 pub mod format;
+pub mod gap;
 pub mod interference;
 pub mod looks;
 pub mod observe;

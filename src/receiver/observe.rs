@@ -91,6 +91,17 @@ impl Timebase {
         self.heard.get_or_insert(time);
     }
 
+    /// So many samples are missing before those that come now, or came twice if negative: samples count time no more, and
+    /// what the clock reads at those that come is right with another start.
+    pub fn step(&mut self, samples: i64) {
+        let (whole, fraction) = self.rate.elapsed(samples.unsigned_abs());
+        let sign = samples.signum();
+        let later =
+            |start: Epoch| Epoch::new(start.seconds() + sign * whole, start.fraction() + sign as f64 * fraction);
+        self.stated = self.stated.map(later);
+        self.clock = self.clock.map(|clock| SampleClock { start: later(clock.start), ..clock });
+    }
+
     /// Observations of these readings, which belong to one sample; none while the clock cannot be set.
     pub fn observe(&mut self, sample: u64, readings: &[Reading]) -> Vec<Observed> {
         if self.clock.is_none() {

@@ -19,6 +19,7 @@ use crate::receiver::acquire::{self, AcquireError};
 use crate::receiver::correlate::standing_bias_m;
 use crate::receiver::diagnosis::{Diagnosis, Stage, duration};
 use crate::receiver::format::Check;
+use crate::receiver::gap::Jump;
 use crate::receiver::output::{Output, OutputError};
 use crate::receiver::parting::Parted;
 use crate::receiver::session::Session;
@@ -70,6 +71,8 @@ pub struct Outcome {
     pub interfered: Option<Interfered>,
     /// How far carrier and code part on all satellites alike, where they do.
     pub parted: Option<Parted>,
+    /// Where samples are missing, or came twice.
+    pub jumps: Vec<Jump>,
     pub conditioning: Conditioning,
     /// What makes the results worse than need be, and the remedy.
     pub warnings: Vec<String>,
@@ -134,7 +137,8 @@ impl fmt::Display for Outcome {
             write!(f, " ({} bytes of a cut sample left out)", self.cut_bytes)?;
         }
         self.interfered.as_ref().map_or(Ok(()), |seen| write!(f, "; {seen}"))?;
-        self.parted.as_ref().map_or(Ok(()), |parted| write!(f, "; {parted}"))
+        self.parted.as_ref().map_or(Ok(()), |parted| write!(f, "; {parted}"))?;
+        self.jumps.iter().try_for_each(|jump| write!(f, "; {jump}"))
     }
 }
 
@@ -337,6 +341,7 @@ fn summary(metadata: &IfMetadata, settings: &Settings, outcome: &Outcome) -> ser
             "strongest": seen.strongest,
         })),
         "carrier_offset": outcome.parted,
+        "sample_jumps": outcome.jumps,
         "conditioning": outcome.conditioning,
         "warnings": outcome.warnings,
         "diagnosis": outcome.diagnosis.as_ref().map(ToString::to_string),

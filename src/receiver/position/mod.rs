@@ -193,6 +193,11 @@ impl Solver {
         self.smoother.set_carrier_offset(hz);
     }
 
+    /// Samples were lost or doubled: carriers are whole to a quarter of a cycle, or were lost.
+    pub fn jump(&mut self, carriers_whole: bool) {
+        if carriers_whole { self.smoother.bridge() } else { self.smoother.clear() }
+    }
+
     /// Solves from the observations of one sample.
     ///
     /// # Errors

@@ -68,6 +68,16 @@ impl Smoother {
         self.states.retain(|(other, _), _| *other != sv);
     }
 
+    /// Forgets all satellites.
+    pub fn clear(&mut self) {
+        self.states.clear();
+    }
+
+    /// The carriers' counts go on although lock was broken: the next observation of each satellite may have been locked anew.
+    pub fn bridge(&mut self) {
+        self.states.values_mut().for_each(|state| state.locked_s = f64::NEG_INFINITY);
+    }
+
     /// Takes an observation and gives its smoothed pseudorange.
     pub fn smooth(&mut self, observation: &Observation) -> Smoothed {
         let carrier_m = observation.carrier_cycles * observation.signal.wavelength_m();

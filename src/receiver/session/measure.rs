@@ -29,6 +29,9 @@ impl Session {
         let observations: Vec<Observation> = observed.into_iter().map(|one| one.observation).collect();
         match self.solver.solve(tick, clock, &observations, &self.ephemerides, self.klobuchar) {
             Ok(solved) => {
+                if self.clock_jumped(&solved.fix, output)? {
+                    return Ok(());
+                }
                 output.fix(&solved.fix)?;
                 let condition = solved.fix.condition;
                 self.worst_condition = Some(self.worst_condition.map_or(condition, |worst| worst.max(condition)));

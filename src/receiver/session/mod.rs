@@ -1,6 +1,6 @@
 //! The state of a reception between blocks: channels, what they decoded, the receiver's clock, the solver.
 //!
-//! [`search`] starts and ends channels, [`decode`] takes in messages, [`measure`] observes and solves.
+//! [`search`] starts and ends channels, [`decode`] takes in messages, [`measure`] observes and solves, [`gap`] watches for lost samples.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -30,6 +30,7 @@ use crate::receiver::source::{Block, Packed, Planes};
 use crate::receiver::track::{Channel, LoopMargin, Report, code_shape};
 
 mod decode;
+mod gap;
 mod measure;
 mod part;
 mod plan;
@@ -50,6 +51,7 @@ const PART_S: f64 = 0.01;
 struct Track {
     channel: Channel,
     line: Line,
+    watched: gap::Watched,
     decoder: Option<Decoder>,
     report: Report,
     since: u64,
@@ -111,6 +113,7 @@ pub(super) struct Session {
     lines: usize,
     /// Code loops are on their way to a new offset until this sample.
     offset_moved: u64,
+    gap: gap::Gap,
     ephemerides: BTreeMap<Sv, Ephemeris>,
     klobuchar: Option<Klobuchar>,
     next_tick: u64,
@@ -169,6 +172,7 @@ impl Session {
             offset: Offset::default(),
             lines: 0,
             offset_moved: 0,
+            gap: gap::Gap::default(),
             ephemerides: BTreeMap::new(),
             klobuchar: None,
             next_tick: 0,
@@ -199,10 +203,16 @@ impl Session {
         let (ticks, measured) = self.ticks(block);
         self.follow(block, &ticks);
         self.record(output)?;
-        self.part(block.end());
+        self.leap(block, output)?;
+        if !self.gap.is_busy() {
+            self.part(block.end());
+        }
         self.decode(output)?;
         for tick in measured {
-            self.measure(tick, output)?;
+            // Nothing is right while codes are not where they were to be.
+            if !self.gap.is_busy() {
+                self.measure(tick, output)?;
+            }
         }
         self.watch(block, output)?;
         self.retire(block.end(), output)?;
@@ -313,6 +323,7 @@ impl Session {
             diagnosis: None,
             interfered: self.interfered.clone(),
             parted: self.parted(),
+            jumps: self.gap.jumps.clone(),
             warnings: [warnings(&self.metadata, &self.settings), self.assumed_era().into_iter().collect()].concat(),
             conditioning: Conditioning {
                 geometry_worst: self.worst_condition,

@@ -65,7 +65,10 @@ impl Session {
         self.tracks.iter_mut().for_each(|track| track.channel.set_carrier_offset(hz));
         self.solver.set_carrier_offset(hz);
         if change == Change::Moved {
-            self.tracks.iter_mut().for_each(|track| track.line.clear());
+            for track in &mut self.tracks {
+                track.line.clear();
+                track.watched.forget();
+            }
             self.offset_moved = now + self.samples(MOVING_S);
         }
     }

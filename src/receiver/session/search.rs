@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::gap::Watched;
 use super::{Session, Track, WRONG_TIME_FIXES, Window};
 use crate::gnss::record::{AcquisitionRow, Event, EventRow};
 use crate::gnss::satellite::Sv;
@@ -107,6 +108,7 @@ impl Session {
             self.tracks.push(Track {
                 channel,
                 line: Line::default(),
+                watched: Watched::default(),
                 decoder: Decoder::new(hit.signal, hit.sv),
                 report: Report::default(),
                 since,

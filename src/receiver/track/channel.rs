@@ -25,7 +25,11 @@ use crate::receiver::correlate::{self, Arithmetic, Nco, Replica, TURN, chips_to_
 use crate::receiver::parting::Phases;
 use crate::receiver::source::Block;
 
+mod reseat;
 mod supervise;
+
+pub use reseat::Glance;
+use reseat::Glances;
 
 /// Prompts over which phase lock is averaged before symbols are known.
 const LOCK_PERIODS: f64 = 100.0;
@@ -131,6 +135,11 @@ pub struct Channel {
     unlocked_since: Option<u64>,
     polarity: Option<bool>,
     lost: bool,
+    /// Detectors sleep: the code has jumped, and nobody knows yet by how many periods.
+    held: bool,
+    /// The code was moved: integrations are not in step with symbols.
+    moved: bool,
+    glances: Glances,
     last: Update,
 }
 
@@ -216,6 +225,9 @@ impl Channel {
             locked_since: None,
             unlocked_since: None,
             polarity: None,
+            held: false,
+            moved: false,
+            glances: Glances::new(group),
             last: Update::default(),
         };
         channel.design();
@@ -332,6 +344,7 @@ impl Channel {
         self.carrier_offset_hz = self.next_offset_hz;
         let update_s = self.period_s * f64::from(self.periods_per_update());
         let jump_chips = self.loops.aid_code(less_hz * self.chip_rate_hz / self.signal.carrier_hz, update_s);
+        self.glances.move_by(jump_chips);
         self.code += chips_to_units(jump_chips);
     }
 
@@ -373,9 +386,8 @@ impl Channel {
         self.carry.0.clear();
         self.carry.1.clear();
         let samples = next - self.first;
-        self.carrier += self.carrier_step * i128::from(samples);
-        self.code += (i128::from(self.code_step) * i128::from(samples) - i128::from(replica.period())) as i64;
-        self.first = next;
+        self.pass(next);
+        self.code -= replica.period();
         let finished = self.period;
         self.period += 1;
         if !self.whole {
@@ -390,7 +402,9 @@ impl Channel {
         let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
         let mut taps = [Complex64::ZERO; 3];
         taps.iter_mut().zip(&sums).for_each(|(tap, sum)| *tap = sum * scale);
-        self.cn0.add(taps[1], noise.map(|sum| (sum * scale).norm_sqr()));
+        if !self.held && !self.moved {
+            self.cn0.add(taps[1], noise.map(|sum| (sum * scale).norm_sqr()));
+        }
         self.take(finished, taps, report);
     }
 
@@ -406,6 +420,7 @@ impl Channel {
         let prompt = taps[1];
         self.sums.iter_mut().zip(taps).for_each(|(sum, tap)| *sum += tap);
         self.summed += 1;
+        self.glances.add(number, prompt, self.previous);
         match self.stage {
             Stage::Open => self.batch.add(prompt),
             Stage::Frequency | Stage::Assisted => self.phase_lock.add(prompt, self.noise()),
@@ -417,6 +432,7 @@ impl Channel {
             self.summed = 0;
             self.update_since = self.first;
         }
+        self.keep_to_symbols(number);
         self.previous = Some(prompt);
         self.supervise(number, prompt, report);
         self.take_offset();
@@ -425,6 +441,9 @@ impl Channel {
 
     /// Collects the prompts of a symbol and gives it out at its end.
     fn take_in_symbol(&mut self, number: u64, begin: u64, prompt: Complex64, report: &mut Report) {
+        if self.held {
+            return;
+        }
         self.symbol.0 += prompt;
         self.symbol.1 += 1;
         self.rotation.add(prompt, self.symbol.1, self.group);
@@ -459,6 +478,7 @@ impl Channel {
         self.previous_sum = Some(self.sums[1]);
         self.last = self.loops.close(self.stage.mode(), self.sums, before, self.summed, t_s, Some(self.cn0_hz()));
         self.carrier += (self.last.carrier_jump_cycles * TURN) as i128;
+        self.glances.close(self.last.dll_chips, self.last.code_jump_chips);
         self.code += chips_to_units(self.last.code_jump_chips);
     }
 

@@ -17,7 +17,7 @@ mod sync;
 #[cfg(test)]
 mod tests;
 
-pub use channel::{Channel, code_shape};
+pub use channel::{Channel, Glance, code_shape};
 pub use settings::{CodeDiscriminator, LoopMargin, TrackingSettings, TrackingSettingsError};
 
 /// What a channel found in a block.

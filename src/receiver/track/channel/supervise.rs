@@ -23,6 +23,9 @@ const BATCHES: f64 = 4.0;
 impl Channel {
     /// Detectors and changes of stage after code period `number`.
     pub(super) fn supervise(&mut self, number: u64, prompt: Complex64, report: &mut Report) {
+        if self.held {
+            return;
+        }
         self.watch_phase(report);
         if self.wide && self.start.is_some_and(|start| self.since_s(start) >= self.settings.dll_pull_in_s) {
             self.wide = false;
@@ -127,7 +130,7 @@ impl Channel {
         if noise > 0.0 { prompt * (2.0 / noise).sqrt() } else { prompt }
     }
 
-    fn enter(&mut self, stage: Stage) {
+    pub(super) fn enter(&mut self, stage: Stage) {
         self.stage = stage;
         self.stage_since = self.first;
         self.pending = None;
