@@ -109,7 +109,7 @@ pub fn kinds() -> Vec<Kind> {
             change(rx, "prompt_q", |_, value| value * factor);
         }),
         kind!("prompts turned", "°", Some(0.5), 10.0, &["prompt's share in quadrature"], AtRest, |rx, degrees| {
-            let (sin, cos) = degrees.to_radians().sin_cos();
+            let (sin, cos) = libm::sincos(degrees.to_radians());
             let table = rx.table("tracking");
             for row in 0..table.rows.len() {
                 if settled(table, row) {

@@ -64,7 +64,7 @@ fn codes() -> Vec<Kind> {
             late(rx, |_, other| other == row, |_| m);
         }),
         kind!("code that swings as by a reflection", "m", Some(0.2), 3.0, &CODE, AtRest, |rx, m| {
-            late(rx, one, |row| m * (row as f64 / 600.0).sin());
+            late(rx, one, |row| m * libm::sin(row as f64 / 600.0));
         }),
         kind!("code that lags behind more and more", "m at the end", Some(0.2), 5.0, &CODE, AtRest, |rx, m| {
             late(rx, one, |row| m * row as f64 / 6228.0);

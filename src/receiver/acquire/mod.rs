@@ -9,8 +9,8 @@
 //! **Multiple access.** Cross-correlation with strong satellites passes for weak ones. So the strong ones are subtracted from
 //! the samples, code period by code period, and weak ones are looked for again; where the strong ones have a good part of all
 //! power, or raise the cells of all codes, so is everything else. What is strong among the rest goes the same way. Signals that are
-//! no candidates are not subtracted: where they raise the cells of all codes, the threshold rises ([`multiple_access`]).
-//! Continuous waves that could pass for satellites are taken out first ([`tone`]).
+//! no candidates are not subtracted: where they raise the cells of all codes, the threshold rises (`multiple_access`).
+//! Continuous waves that could pass for satellites are taken out first (`tone`).
 //!
 //! **Threshold.** A cell's statistic is Σ|S|² in units of half its noise power: chi-square with 2K degrees
 //! of freedom for K sums. With N cells (lags in one code period times Dopplers), a cell is given

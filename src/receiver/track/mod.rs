@@ -2,7 +2,7 @@
 //!
 //! A [`Channel`] takes consecutive blocks of samples and gives the state of its replica at requested samples, message
 //! symbols, rows for the judge and events. Its loops ([`loops`]) are designed in the discrete domain and
-//! closed in [`closed`]; detectors are in [`lock`], [`cn0`] and [`sync`], the pull-in of weak signals in [`pull_in`]. Limits: the first component of a signal only, one code period at least as long as a few samples.
+//! closed in [`closed`]; detectors are in [`lock`], [`cn0`] and `sync`, the pull-in of weak signals in `pull_in`. Limits: the first component of a signal only, one code period at least as long as a few samples.
 
 use crate::gnss::record::{Event, TrackingRow};
 
