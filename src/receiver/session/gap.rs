@@ -354,6 +354,8 @@ impl Session {
         if known.is_none() && waited < self.samples(TURNS_LIMIT_S) {
             return Ok(());
         }
+        // Codes that are where they were, on carriers that never broke, have lost no periods as far as anyone can say.
+        let known = known.or((whole && found.samples == 0).then_some(0));
         let periods = known.unwrap_or(0);
         let sample_chips = component.chip_rate_hz / self.metadata.rate.hz();
         let rate_hz = self.metadata.rate.hz();
