@@ -452,7 +452,8 @@ pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<St
     for stretch in stretches {
         let needed = run_begin(stretch.start).saturating_sub(lead);
         let made = stretch.end.max(first_run(scene, needed, lead));
-        transmitters.par_iter_mut().try_for_each(|t| t.prepare_alone(scene, needed, made))?;
+        // On this thread alone: a plan has to work where no other can be started.
+        transmitters.iter_mut().try_for_each(|t| t.prepare_alone(scene, needed, made))?;
         let samples = (stretch.end - stretch.start) as usize;
         let mut block = satellites(scene, &transmitters, kernel, (stretch.start, samples, memory), &mut worker);
         let sent = block.lead..block.lead + samples;

@@ -216,7 +216,7 @@ mod tests {
 
     #[test]
     fn a_lonely_cell_is_found_as_often_as_the_closed_form_says() {
-        // Lags five chips apart, bins of whole cycles, a code on its lag and a symbol that never turns leave one cell.
+        // Lags of five chips, 12.5 samples, apart, bins of whole cycles, a code on its lag and a symbol that never turns leave one cell.
         const DRAWS: u32 = 20_000;
         let model = Model {
             sums: 10,
@@ -233,7 +233,9 @@ mod tests {
         for cn0_dbhz in [35.0, 37.0, 38.0] {
             let lambda = detection::noncentrality(10, 1e-3, libm::pow(10.0, cn0_dbhz / 10.0), 1.0);
             let expected = detection::detection(model.threshold, 10, lambda);
-            let found = Model { cn0_dbhz, ..model }.probability(&[0.0], DRAWS, 1);
+            // Of the signal the lags hold what lies within the band that has as many of them.
+            let share_db = 10.0 * libm::log10(Folded::new(model.sample_chips, 12.5).share);
+            let found = Model { cn0_dbhz: cn0_dbhz - share_db, ..model }.probability(&[0.0], DRAWS, 1);
             // Four deviations of a count, and the other cells' own alarms: 34 of 1e-7.
             let scatter = 4.0 * (expected * (1.0 - expected) / f64::from(DRAWS)).sqrt() + 4e-6;
             assert!((found - expected).abs() < scatter, "{cn0_dbhz} dB-Hz: {found}, expected {expected}");

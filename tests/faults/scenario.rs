@@ -227,7 +227,6 @@ fn values_that_contradict_each_other_are_refused_with_the_number_that_decides() 
         "kind = \"waypoints\"\n[[motion.point]]\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\nspeed_mps = 5\n\
          [[motion.point]]\nlatitude_deg = 26.50001\nlongitude_deg = 80.2\nheight_m = 130\nspeed_mps = 5\n",
     );
-    let budget = base.replace("cn0_dbhz = 45", "kind = \"link_budget\"");
     let power = |line: &str| base.replace("cn0_dbhz = 45", &format!("kind = \"link_budget\"\n{line}"));
     let jam = |line: &str| add(&format!("[[interference]]\non_s = 1\n{line}"));
     let later = base.replace("T08:05:58", "T20:05:58");
@@ -253,7 +252,7 @@ fn values_that_contradict_each_other_are_refused_with_the_number_that_decides() 
         ("two strengths", jam("kind = \"cw\"\njs_db = 9\npower_dbw = -90"), "exactly one of"),
         ("radiated from nowhere", jam("kind = \"cw\"\neirp_dbw = -9"), "a place with it"),
         ("watts against a fixed C/N0", jam("kind = \"cw\"\npower_dbw = -90"), "link_budget"),
-        ("a ratio to a link budget", format!("{budget}[[interference]]\nkind = \"cw\"\njs_db = 9\n"), "js_db needs"),
+        ("a ratio at a distance", jam("kind = \"cw\"\njs_db = 9\ndistance_m = 5"), "only eirp_dbw needs it"),
         ("a line outside the band", jam("kind = \"cw\"\njs_db = 9\noffset_hz = 5e6"), "outside the samples' band"),
         ("a chirp half outside the band", jam("kind = \"chirp\"\njs_db = 9\nsweep_hz = 2e6\nsweep_s = 1e-4\noffset_hz = 1.3e6"), "is silent"),
         ("a ramp from nowhere", add("[[spoofer]]\npower_db = 3\nramp_s = 4"), "both or none"),

@@ -10,8 +10,9 @@
 //!    time to milliseconds, so that whole symbols are known too, and n to the sample.
 //!
 //! **Noise.** At 45 dB-Hz 50 ms of discriminators have 0.010 chip: a sample at 2.6 Msps is 0.39 chip, at 10 Msps 0.10. A suspicion
-//! needs six deviations of at least three satellites' common step, 2e-9 a look, and means nothing by itself: a jump also has
-//! to win the scan by six deviations. With 20 looks a second both together are due to noise once in 1e9 years.
+//! needs six deviations of at least three satellites' common step, 2e-9 a look: with 20 looks a second once in ten months by noise. It
+//! means nothing by itself: where the scan finds no displaced code, the fit has to give a whole number of samples other than
+//! zero. Limits: exact multiples of a symbol's length (20 ms) move codes by their Doppler alone and pass unseen.
 
 use std::collections::VecDeque;
 use std::fmt;
