@@ -60,15 +60,10 @@ fn assert_found(found: &[Acquired], listed: &[(u8, Option<f64>)], tolerance_hz: 
 fn a_complex_recording_holds_the_satellites_that_others_found_in_it() {
     let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
     let metadata = metadata(Format::Ci8, 4e6, 0.0);
-    // The recording holds narrow-band interference (lines at -580 and +-511.5 kHz), of which each window brings up to
-    // six weak false hits and its first 20 ms more. They do not stay where they are; satellites do.
+    // The recording holds strong signals of other systems with codes of the same family near 0 Hz, whose cross-correlation crowds
+    // the bins at whole kilohertz: the threshold of noise alone brought up to six false satellites a window.
     let windows = [400_000, 800_000, 1_200_000, 1_600_000]
         .map(|start| acquire(&metadata, &i[start..], &q[start..], &AcquisitionSettings::default()));
-    let stays = |hit: &Acquired| {
-        let same = |other: &Acquired| other.sv == hit.sv && (other.doppler_hz - hit.doppler_hz).abs() < 30.0;
-        windows.iter().all(|window| window.iter().any(same))
-    };
-    let found: Vec<Acquired> = windows[0].iter().copied().filter(stays).collect();
     let listed = [
         (26, -750.0),
         (31, 250.0),
@@ -79,9 +74,19 @@ fn a_complex_recording_holds_the_satellites_that_others_found_in_it() {
         (4, -3250.0),
         (25, 2750.0),
     ];
-    // The list is on a grid of 250 Hz.
-    assert_found(&found, &listed.map(|(prn, doppler_hz)| (prn, Some(doppler_hz))), 130.0);
-    assert_found(&windows[3], &listed.map(|(prn, doppler_hz)| (prn, Some(doppler_hz))), 130.0);
+    for hit in windows.iter().flatten() {
+        assert!(listed.iter().any(|(prn, _)| *prn == hit.sv.number), "not listed: {hit:?}");
+    }
+    for (prn, doppler_hz) in listed {
+        let hits: Vec<&Acquired> = windows.iter().flatten().filter(|hit| hit.sv.number == prn).collect();
+        // Two of 35 to 37 dB-Hz have a mean statistic of 170 ± 25 there, where crowded bins ask for up to 138: one window in ten.
+        assert!(hits.len() >= 3, "{prn} in {} windows", hits.len());
+        // The list is on a grid of 250 Hz.
+        assert!(
+            hits.iter().all(|hit| (hit.doppler_hz - doppler_hz).abs() <= 130.0),
+            "{hits:?}, listed at {doppler_hz}"
+        );
+    }
 }
 
 #[test]
