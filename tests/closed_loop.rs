@@ -119,17 +119,17 @@ fn real_samples_at_an_if_with_a_mirrored_spectrum_close_the_loop_as_well() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
+/// Runs the program in a directory; it must succeed.
+fn run_in(directory: &Path, arguments: &[&str]) {
+    let program = env!("CARGO_BIN_EXE_gnss-twin");
+    let output = Command::new(program).args(arguments).current_dir(directory).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
 #[test]
 fn after_a_second_of_silence_every_satellite_is_lost_found_again_and_used_again() {
     let directory = tempfile::tempdir().unwrap();
-    let twin = |arguments: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
-            .args(arguments)
-            .current_dir(directory.path())
-            .output()
-            .unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    };
+    let twin = |arguments: &[&str]| run_in(directory.path(), arguments);
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/static.toml");
     twin(&["generate", scenario.to_str().unwrap(), "--out", "gap.sigmf-data"]);
     let samples = directory.path().join("gap.sigmf-data");
@@ -171,14 +171,7 @@ fn after_a_second_of_silence_every_satellite_is_lost_found_again_and_used_again(
 fn lost_and_doubled_samples_are_counted_and_cost_less_than_a_second_of_fixes() {
     let directory = tempfile::tempdir().unwrap();
     let path = |name: &str| directory.path().join(name);
-    let twin = |arguments: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
-            .args(arguments)
-            .current_dir(directory.path())
-            .output()
-            .unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    };
+    let twin = |arguments: &[&str]| run_in(directory.path(), arguments);
     let scene = include_str!("../scenarios/static.toml").replace("duration_s = 60", "duration_s = 36");
     std::fs::write(path("scene.toml"), scene).unwrap();
     twin(&["generate", "scene.toml", "--out", "if.sigmf-data"]);

@@ -96,6 +96,17 @@ pub struct Errors {
     pub unmatched: usize,
 }
 
+/// Phase lock is a mean over six symbols of 20 ms: so long it still stands when a satellite has gone, and a symbol more.
+const DETECTION_S: f64 = 0.14;
+
+/// Whether a sample that the truth has for other satellites follows so closely on this one's last row that no receiver can know yet that
+/// the signal is gone.
+fn has_just_gone(run: &Run, link: Link, sample: u64, truth: &HashMap<u64, Observation>) -> bool {
+    let last = truth.keys().copied().filter(|before| *before < sample).max();
+    run.cn0_most_hz.contains_key(&(sample, link.1.name))
+        && last.is_some_and(|last| run.time_s(sample) - run.time_s(last) <= DETECTION_S)
+}
+
 /// Time after a lock that loop jitter leaves out as pull-in.
 pub const PULL_IN_S: f64 = 3.0;
 /// A lasting jump of the carrier error from here on is a cycle slip: below the half cycle of a Costas loop.
@@ -134,7 +145,7 @@ impl Errors {
                 run.observations.rows(link)?.first().map_or(0, |row| row.sample)
             );
             let Some(true_row) = truth.get(&at) else {
-                self.unmatched += 1;
+                self.unmatched += usize::from(!has_just_gone(run, link, at, &truth));
                 continue;
             };
             let common = &run.common;

@@ -116,6 +116,13 @@ impl Expect {
     pub fn bounded(&self, time_s: f64) -> bool {
         self.at(time_s).find_map(|terms| terms.errors) != Some(Sizes::Any)
     }
+
+    /// The same of what remembers `memory_s` of the past.
+    pub fn bounded_since(&self, time_s: f64, memory_s: f64) -> bool {
+        let within = |interval: &&Interval| (interval.from_s..interval.to_s + memory_s).contains(&time_s);
+        let any = |interval: &Interval| interval.terms.errors == Some(Sizes::Any);
+        self.bounded(time_s) && !self.intervals.iter().filter(within).any(any)
+    }
 }
 
 /// Something wrong with satellites or their messages.
@@ -134,6 +141,15 @@ pub struct Fault {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_interval_of_any_errors_is_remembered_as_long_as_memory_lasts() {
+        let terms = Terms { errors: Some(Sizes::Any), ..Terms::default() };
+        let expect = Expect { whole: None, intervals: vec![Interval { from_s: 10.0, to_s: 20.0, terms }] };
+        let bounded = [9.9, 10.0, 19.9, 20.0, 29.9, 30.0].map(|t_s| expect.bounded_since(t_s, 10.0));
+        assert_eq!(bounded, [true, false, false, false, false, true]);
+        assert!(expect.bounded(20.0));
+    }
 
     #[test]
     fn an_interval_replaces_what_the_whole_scene_says_and_the_last_one_counts() {

@@ -199,17 +199,23 @@ impl Watch {
         })
     }
 
-    /// Where a line peaks, in bins from the middle of the samples' band: of a Hann window two neighbours' amplitudes have
-    /// the ratio (1 + δ)/(2 − δ).
+    /// Where a line peaks, in bins from the middle of the samples' band.
     fn place(&self, bin: usize) -> f64 {
         let bins = self.powers.len();
-        let amplitude = |n: usize| self.powers[n % bins].sqrt();
-        let (before, at, after) = (amplitude(bin + bins - 1), amplitude(bin), amplitude(bin + 1));
-        let beyond = |neighbour: f64| (2.0 * neighbour - at) / (neighbour + at);
-        let off = if after > before { beyond(after) } else { -beyond(before) };
+        let power = |n: usize| self.powers[n % bins];
+        let off = hann_peak(power(bin + bins - 1), power(bin), power(bin + 1));
         let middle = if bin >= bins / 2 { bin as f64 - bins as f64 } else { bin as f64 };
-        middle + off.clamp(-0.5, 0.5)
+        middle + off
     }
+}
+
+/// Where between its neighbours a line peaks whose powers by a Hann window are these, in bins from the middle one: two neighbours'
+/// amplitudes have the ratio (1 + δ)/(2 − δ).
+pub(super) fn hann_peak(before: f64, at: f64, after: f64) -> f64 {
+    let [before, at, after] = [before, at, after].map(f64::sqrt);
+    let beyond = |neighbour: f64| (2.0 * neighbour - at) / (neighbour + at);
+    let off = if after > before { beyond(after) } else { -beyond(before) };
+    off.clamp(-0.5, 0.5)
 }
 
 /// The median of a window that slides.

@@ -8,6 +8,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::analysis::theory::linear::controlled_root;
 use crate::analysis::theory::pll;
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::loops::Gains;
@@ -78,9 +79,14 @@ pub fn answer(settings: &TrackingSettings, (period_s, wavelength_m): (f64, f64),
     }
 }
 
+/// Where all roots of the loop lie.
+fn root(order: u32, gains: &Gains) -> f64 {
+    controlled_root(order, [gains.phase, gains.rate, gains.acceleration])
+}
+
 /// What a loop leaves of a sinusoid that turns `cycles` within an update: |(z−1)/(z−p)|^N on the unit circle.
 fn error_gain(order: u32, gains: &Gains, cycles: f64) -> f64 {
-    let root = if order >= 3 { 1.0 - libm::cbrt(gains.acceleration) } else { 1.0 - gains.rate.sqrt() };
+    let root = root(order, gains);
     let cos = libm::cos(TAU * cycles);
     let once = ((2.0 - 2.0 * cos) / (1.0 + root * root - 2.0 * root * cos)).sqrt();
     (0..order).fold(1.0, |gain, _| gain * once)
@@ -91,7 +97,7 @@ fn error_gain(order: u32, gains: &Gains, cycles: f64) -> f64 {
 /// continuous time it is 2e⁻²/ω². No acceleration within a swing as wide as the step leaves more, because
 /// that of a jerk's impulse has one sign.
 fn step_peak(last_gain: f64) -> f64 {
-    let p = 1.0 - libm::cbrt(last_gain);
+    let p = controlled_root(3, [0.0, 0.0, last_gain]);
     // The peak comes at two time constants.
     let updates = (4.0 / (1.0 - p).max(1e-6)) as u32 + 4;
     let (mut most, mut power) = (0.0_f64, 1.0);

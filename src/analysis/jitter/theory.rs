@@ -10,7 +10,7 @@ use crate::analysis::foreign::truth::Timeline;
 use crate::analysis::load::Run;
 use crate::analysis::statistics::Sum;
 use crate::analysis::theory::clock::PowerLaw;
-use crate::analysis::theory::linear::{Feedback, PhaseLoop, controlled_root_gains};
+use crate::analysis::theory::linear::{Feedback, PhaseLoop, controlled_root, controlled_root_gains};
 use crate::analysis::theory::{dll, fll, oscillator, pll};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 
@@ -68,9 +68,7 @@ struct Response {
 
 /// Natural frequency of a loop whose roots all lie at exp(−ωT), radians a second.
 pub(in crate::analysis) fn natural_radps(closed: &PhaseLoop, order: u32, update_s: f64) -> f64 {
-    let [_, k2, k3] = closed.gains;
-    let root = if order >= 3 { 1.0 - libm::cbrt(k3) } else { 1.0 - k2.sqrt() };
-    -libm::log(root) / update_s
+    -libm::log(controlled_root(order, closed.gains)) / update_s
 }
 
 /// Up to here the truth's drift follows the oscillator: a spline over 0.8 s has 80 % of that rate's variance left.
@@ -390,7 +388,7 @@ mod tests {
     fn a_loop_has_the_bandwidth_that_it_is_given() {
         // Root of order 3 from the literature's table: 0.954395 at 0.05.
         let found = exact_loop(3, 0.05).unwrap();
-        let root = 1.0 - libm::cbrt(found.gains[2]);
+        let root = controlled_root(3, found.gains);
         assert!((root - 0.954_395).abs() < 1e-6, "{root}");
         let response = Response::of(&found);
         assert!((0.5 * response.phase - 0.05).abs() < 1e-6, "{response:?}");

@@ -90,6 +90,15 @@ pub fn controlled_root_gains(order: u32, root: f64) -> [f64; 3] {
     }
 }
 
+/// The root of such gains.
+pub fn controlled_root(order: u32, [phase, rate, acceleration]: [f64; 3]) -> f64 {
+    match order {
+        1 => 1.0 - phase,
+        2 => 1.0 - rate.sqrt(),
+        _ => 1.0 - libm::cbrt(acceleration),
+    }
+}
+
 /// x' = A·x + b·n, y = c·x.
 #[derive(Clone, Debug)]
 pub struct Linear {

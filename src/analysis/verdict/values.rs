@@ -20,7 +20,6 @@ use crate::analysis::load::Run;
 use crate::analysis::statistics::{mean, percentile};
 use crate::analysis::summary::Summary;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::facts::{Interval, Sizes};
 use crate::gnss::record::{Event, Fix, IonosphereModel};
 
 /// By how much theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a real one.
@@ -361,10 +360,7 @@ impl<'a> Bounded<'a> {
     }
 
     fn holds(&self, time_s: f64) -> bool {
-        let expect = &self.run.scene.expect;
-        let within = |interval: &&Interval| (interval.from_s..interval.to_s + self.memory_s).contains(&time_s);
-        expect.bounded(time_s)
-            && !expect.intervals.iter().filter(within).any(|interval| interval.terms.errors == Some(Sizes::Any))
+        self.run.scene.expect.bounded_since(time_s, self.memory_s)
     }
 }
 

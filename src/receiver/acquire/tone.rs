@@ -13,6 +13,7 @@ use num_complex::Complex;
 use rustfft::FftPlanner;
 
 use super::window::Window;
+use crate::receiver::interference::hann_peak;
 
 /// Power over noise density from which a wave is taken out: 50 dB-Hz.
 const STRONG_HZ: f64 = 1e5;
@@ -68,7 +69,8 @@ fn lines(window: &Window, rate_hz: f64, complex: bool) -> Vec<f64> {
         side(n + GUARD).max(side(n + bins - GUARD - BESIDE))
     };
     let strong = highest.into_iter().take(4 * AT_ONCE).filter(|&n| at(n) > ratio * density(n));
-    strong.take(AT_ONCE).map(|n| place(&at, n, bins) / bins as f64).collect()
+    let place = |n: usize| n as f64 + hann_peak(at(n + bins - 1), at(n), at(n + 1));
+    strong.take(AT_ONCE).map(|n| place(n) / bins as f64).collect()
 }
 
 /// Powers of the segments together, by a Hann window.
@@ -90,14 +92,6 @@ fn spectrum(window: &Window, bins: usize) -> Vec<f64> {
         powers.iter_mut().zip(&buffer).for_each(|(power, x)| *power += f64::from(x.norm_sqr()));
     }
     powers
-}
-
-/// Where a line peaks, in bins: of a Hann window two neighbours' amplitudes have the ratio (1 + δ)/(2 − δ).
-fn place(at: &impl Fn(usize) -> f64, bin: usize, bins: usize) -> f64 {
-    let (before, here, after) = (at(bin + bins - 1).sqrt(), at(bin).sqrt(), at(bin + 1).sqrt());
-    let beyond = |neighbour: f64| (2.0 * neighbour - here) / (neighbour + here);
-    let off = if after > before { beyond(after) } else { -beyond(before) };
-    bin as f64 + off.clamp(-0.5, 0.5)
 }
 
 /// Subtracts a wave block by block, its frequency refined by how its phase advances from block to block.

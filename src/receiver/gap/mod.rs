@@ -1,7 +1,8 @@
 //! Samples that are missing in a recording, or are in it twice, recognised from all channels at once.
 //!
-//! n missing samples put the codes of all satellites ahead of where they are expected by n/rate seconds: by the same number of
-//! chips, a whole number of samples. No satellite, antenna or oscillator does that. Four steps find n:
+//! n missing samples put the codes of all satellites ahead of where they are expected by n/rate seconds: by
+//! the same number of chips, a whole number of samples. No satellite, antenna or oscillator does that. Four
+//! steps find n:
 //! 1. A [`Trend`] predicts each code from the last seconds. A common step beyond it, or power that vanishes on most channels at
 //!    once, is a suspicion ([`common_step`]).
 //! 2. A [`scan`] correlates at all delays for all channels together and finds n modulo a code period.
@@ -9,10 +10,11 @@
 //! 4. A satellite's code moves by its own Doppler in the time that is missing: a [`Fit`] of the codes over the Dopplers finds that
 //!    time to milliseconds, so that whole symbols are known too, and n to the sample.
 //!
-//! **Noise.** At 45 dB-Hz 50 ms of discriminators have 0.010 chip: a sample at 2.6 Msps is 0.39 chip, at 10 Msps 0.10. A suspicion
-//! needs six deviations of at least three satellites' common step, 2e-9 a look: with 20 looks a second once in ten months by noise. It
-//! means nothing by itself: where the scan finds no displaced code, the fit has to give a whole number of samples other than
-//! zero. Limits: exact multiples of a symbol's length (20 ms) move codes by their Doppler alone and pass unseen.
+//! **Noise.** At 45 dB-Hz 50 ms of discriminators have 0.010 chip: a sample at 2.6 Msps is 0.39 chip, at 10
+//! Msps 0.10. A suspicion needs six deviations of at least three satellites' common step, 2e-9 a look: with
+//! 20 looks a second once in ten months by noise. It means nothing by itself: where the scan finds no
+//! displaced code, the fit has to give a whole number of samples other than zero. Limits: exact multiples of
+//! a symbol's length (20 ms) move codes by their Doppler alone and pass unseen.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -37,8 +39,8 @@ const SUSPICIOUS_SIGMAS: f64 = 6.0;
 const SUSPICIOUS_SAMPLES: f64 = 0.3;
 /// Seconds of Doppler are suspicious beyond as many deviations and this.
 const SUSPICIOUS_S: f64 = 5e-3;
-/// Signs turn where the mean product of neighbouring prompts falls by so many deviations, and by this share of what turns at
-/// every other symbol take away.
+/// Signs turn where the mean product of neighbouring prompts falls by so many deviations, and by this share
+/// of what turns at every other symbol take away.
 const TURN_SIGMAS: f64 = 6.0;
 const TURN_SHARE: f64 = 0.25;
 
@@ -78,7 +80,7 @@ impl Trend {
     }
 
     /// Where the code is to be at `t_s`.
-    pub fn expect(&self, t_s: f64) -> Option<Expected> {
+    pub fn forecast(&self, t_s: f64) -> Option<Expected> {
         let (n, &(last_s, _)) = (self.looks.len(), self.looks.back()?);
         if n < LEAST_LOOKS {
             return None;
@@ -223,8 +225,8 @@ impl Edges {
     }
 }
 
-/// By how many code periods, modulo a symbol's, the counts of all channels are short: each came with its products since the jump,
-/// and the period in which its symbols began before. `None` while it is in doubt.
+/// By how many code periods, modulo a symbol's, the counts of all channels are short: each came with its
+/// products since the jump, and the period in which its symbols began before. `None` while it is in doubt.
 pub fn turned_by(channels: &[(&Edges, u64)]) -> Option<u64> {
     let length = channels.first()?.0.products.len();
     let mut sums = vec![0.0; length];

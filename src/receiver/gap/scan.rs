@@ -1,8 +1,9 @@
 //! A joint search for all codes at once: by how many samples are they ahead of where they were to be?
 //!
-//! Each channel's replica runs on as it did before. Its correlation with the samples at all delays, in steps of one sample and summed as
-//! power over code periods, peaks at the same delay for all of them. Of long jumps each satellite's Doppler takes its share,
-//! which is tried in steps. The sum over channels has a deviation of the root of channels over periods where only noise is.
+//! Each channel's replica runs on as it did before. Its correlation with the samples at all delays, in steps
+//! of one sample and summed as power over code periods, peaks at the same delay for all of them. Of long
+//! jumps each satellite's Doppler takes its share, which is tried in steps. The sum over channels has a
+//! deviation of the root of channels over periods where only noise is.
 
 use std::sync::Arc;
 
@@ -94,8 +95,8 @@ impl Scan {
         self.inverse.process(samples);
     }
 
-    /// What the profiles show together, each with what its code gains by Doppler in a second, in samples. `None` while they show
-    /// too little.
+    /// What the profiles show together, each with what its code gains by Doppler in a second, in samples.
+    /// `None` while they show too little.
     pub fn decide(&self, profiles: &[(&Profile, f64)]) -> Option<Found> {
         let periods = profiles.iter().map(|(profile, _)| profile.periods).min()?;
         if periods < LEAST_PERIODS {

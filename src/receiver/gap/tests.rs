@@ -14,7 +14,8 @@ fn noise(state: &mut u64) -> f64 {
 
 const DOPPLERS: [f64; 8] = [-2.6, -1.7, -0.8, -0.2, 0.4, 1.1, 1.9, 2.7];
 
-/// Looks of 50 ms of eight channels of 45 and 38 dB-Hz whose codes are ahead of the carriers by a drift, and by `chips` from `since` on.
+/// Looks of 50 ms of eight channels of 45 and 38 dB-Hz whose codes are ahead of the carriers by a drift, and
+/// by `chips` from `since` on.
 fn steps_after(looks: usize, since: usize, chips: f64, state: &mut u64) -> Vec<Vec<Step>> {
     let mut trends = vec![Trend::default(); 8];
     (0..looks)
@@ -25,7 +26,7 @@ fn steps_after(looks: usize, since: usize, chips: f64, state: &mut u64) -> Vec<V
                 let sigma_chips = if number % 2 == 0 { 0.010 } else { 0.024 };
                 let jump = if look >= since { chips } else { 0.0 };
                 let seen = 0.3 * at_s + jump + sigma_chips * noise(state);
-                if let Some(expected) = trend.expect(at_s) {
+                if let Some(expected) = trend.forecast(at_s) {
                     steps.push(Step {
                         chips: seen - expected.chips,
                         sigma_chips: sigma_chips * (1.0 + expected.variance_ratio).sqrt(),
@@ -61,8 +62,8 @@ fn one_to_four_samples_of_either_sign_are_suspected_at_once_and_counted_right() 
 #[test]
 fn noise_is_not_suspected_in_an_hour() {
     let (mut state, mut worst) = (6, 0.0_f64);
-    // An hour has 72 000 looks. Six deviations of a common step are 2e-9 a look, 1.4e-4 an hour; at 10 Msps a step has to be 0.3
-    // sample beyond, that is another six deviations.
+    // An hour has 72 000 looks. Six deviations of a common step are 2e-9 a look, 1.4e-4 an hour; at 10 Msps a
+    // step has to be 0.3 sample beyond, that is another six deviations.
     for steps in steps_after(72_000, 72_000, 0.0, &mut state) {
         assert_eq!(common_step(&steps, 1.023e6 / 50e6), None);
         assert!(!doppler_step(&steps));
@@ -70,7 +71,8 @@ fn noise_is_not_suspected_in_an_hour() {
             worst = worst.max((fit.chips / fit.sigma_chips).abs());
         }
     }
-    // The largest of 72 000 normal draws is 4.3 deviations, beyond 5.5 once in 370 hours; the other bound holds it to be noise at all.
+    // The largest of 72 000 normal draws is 4.3 deviations, beyond 5.5 once in 370 hours; the other bound
+    // holds it to be noise at all.
     assert!((3.3..5.5).contains(&worst), "{worst}");
 }
 
@@ -106,8 +108,8 @@ fn codes_over_dopplers_give_the_time_that_is_missing() {
             stated = fit.sigma_s;
         }
         let deviation = (square / f64::from(draws)).sqrt();
-        // 0.01 chip over the root of 22 (chips/s)², 2.1 ms; the deviation of 400 draws is known to 3.5 %, a mean to 0.11 ms. A satellite
-        // with weight on its side draws the first fit off, hence twice.
+        // 0.01 chip over the root of 22 (chips/s)², 2.1 ms; the deviation of 400 draws is known to 3.5 %, a
+        // mean to 0.11 ms. A satellite with weight on its side draws the first fit off, hence twice.
         assert!(deviation < 2.0 * 2.1e-3 && (sum / f64::from(draws)).abs() < 5e-4, "{seconds} {deviation} {stated}");
     }
 }
@@ -149,7 +151,8 @@ fn a_jump_says_how_many_samples_and_which_way() {
     assert_eq!(of(-5000), "5000 samples doubled near sample 77");
 }
 
-/// What a scan of 20 ms of four satellites finds whose codes are ahead by so many samples, with Dopplers for so many seconds.
+/// What a scan of 20 ms of four satellites finds whose codes are ahead by so many samples, with Dopplers for
+/// so many seconds.
 fn scanned(samples: i64, seconds: f64, dbhz: f64, state: &mut u64) -> Option<Found> {
     let rate_hz = 2.6e6;
     let length = 52_000;

@@ -149,7 +149,7 @@ impl Session {
         let ratio = signal.carrier_hz / component.chip_rate_hz;
         let (mut steps, mut seen, mut gone) = (Vec::new(), 0, 0);
         for (track, glance) in self.tracks.iter().zip(glances) {
-            let (Some(glance), Some(expected)) = (glance, track.watched.trend.expect(at_s)) else { continue };
+            let (Some(glance), Some(expected)) = (glance, track.watched.trend.forecast(at_s)) else { continue };
             let (power, periods) = (track.watched.trend.power(), f64::from(glance.periods));
             if power > SEEN_SIGMAS * ((1.0 + 2.0 * power) / periods).sqrt() {
                 seen += 1;
@@ -219,7 +219,7 @@ impl Session {
         let samples = block.unpack(0..block.samples(), &mut self.gap.planes);
         self.tracks.par_iter_mut().for_each(|track| {
             let Watched { trend, rates: Some(rates), profile, .. } = &mut track.watched else { return };
-            let Some(expected) = trend.expect(middle_s) else { return };
+            let Some(expected) = trend.forecast(middle_s) else { return };
             if let Some((replica, nco)) = track.channel.predicted(block.first, expected.chips, rates) {
                 scan.add(&samples, replica, &nco, profile);
             }
@@ -276,7 +276,7 @@ impl Session {
             };
             let doppler = track.channel.code_doppler_hz(&glanced) / ratio;
             let ahead = found.samples as f64 * sample_chips + found.seconds * doppler;
-            let expected = watched.trend.expect(now_s).map_or(watched.moved_chips, |expected| expected.chips);
+            let expected = watched.trend.forecast(now_s).map_or(watched.moved_chips, |expected| expected.chips);
             let rates = (!whole).then_some(glanced);
             track.channel.reseat(now, ahead, Some(expected), rates, &mut report);
             track.line.clear();
@@ -298,7 +298,7 @@ impl Session {
     /// Takes what a look shows of the codes since they were reseated.
     fn gather(&mut self, glances: &[Option<Glance>], at_s: f64) {
         for (track, glance) in self.tracks.iter_mut().zip(glances) {
-            if let (Some(glance), Some(expected)) = (glance, track.watched.trend.expect(at_s)) {
+            if let (Some(glance), Some(expected)) = (glance, track.watched.trend.forecast(at_s)) {
                 let since = &mut track.watched.since;
                 since.0 += glance.code_chips - expected.chips;
                 since.1 += at_s;
@@ -315,7 +315,7 @@ impl Session {
         let one = |track: &Track| {
             let (chips, seconds, count) = track.watched.since;
             let n = f64::from(count);
-            let expected = track.watched.trend.expect(seconds / n)?;
+            let expected = track.watched.trend.forecast(seconds / n)?;
             let rates = track.watched.rates?;
             Some(Step {
                 chips: chips / n,
@@ -382,7 +382,7 @@ impl Session {
             let doppler = watched.rates.map_or(0.0, |rates| track.channel.code_doppler_hz(&rates) / ratio);
             let (chips, _, looks) = watched.since;
             let seen = if foreseen || looks == 0 { common + rest_s * doppler } else { chips / f64::from(looks) };
-            let expected = watched.trend.expect(now_s).map(|expected| expected.chips);
+            let expected = watched.trend.forecast(now_s).map(|expected| expected.chips);
             let begins = known.is_some() && watched.begin.take().is_some();
             track.channel.resume(now, seen, expected, periods, begins);
             if !foreseen {
@@ -417,8 +417,8 @@ impl Session {
         Ok(())
     }
 
-    /// Compares a fix's clock with that of the fix before: a jump that no channel lived through shows in it. Says whether the fix
-    /// is to be left out, as its clock is to be set first.
+    /// Compares a fix's clock with that of the fix before: a jump that no channel lived through shows in it.
+    /// Says whether the fix is to be left out, as its clock is to be set first.
     pub(super) fn clock_jumped(&mut self, fix: &Fix, output: &mut Output) -> Result<bool, ReceiveError> {
         let rate = self.metadata.rate;
         let sigma_s = fix.sigma_clock_m / crate::gnss::earth::SPEED_OF_LIGHT_MPS;
@@ -443,7 +443,8 @@ impl Session {
     }
 }
 
-/// The whole code periods that are missing beside what the scan found: `turned` modulo `group`, and near what the Dopplers say.
+/// The whole code periods that are missing beside what the scan found: `turned` modulo `group`, and near what
+/// the Dopplers say.
 fn whole_periods(found: Found, turned: u64, group: u64, period_samples: f64, rate_hz: f64, fit: &Fit) -> Option<i64> {
     let seconds = |periods: i64| (found.samples as f64 + periods as f64 * period_samples) / rate_hz;
     let measured_s = found.seconds + fit.seconds;

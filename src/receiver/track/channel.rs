@@ -376,8 +376,15 @@ impl Channel {
             self.carry.1.extend_from_slice(q);
         }
         let (i, q) = if carried { (&self.carry.0[..], &self.carry.1[..]) } else { (i, q) };
-        let sums = replica.correlate_in(self.arithmetic, (i, q), &nco, &self.taps);
-        let noise = self.quiet_tap().map(|tap| replica.correlate_in(self.arithmetic, (i, q), &nco, &[tap])[0]);
+        let [early, prompt, late] = self.taps;
+        let (sums, noise) = match self.quiet_tap() {
+            Some(quiet) => {
+                let taps = [early, prompt, late, quiet];
+                let [early, prompt, late, quiet] = replica.correlate_in(self.arithmetic, (i, q), &nco, &taps);
+                ([early, prompt, late], Some(quiet))
+            }
+            None => (replica.correlate_in(self.arithmetic, (i, q), &nco, &self.taps), None),
+        };
         if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
             let power = correlate::power(i, q) / i.len().max(1) as f64;
             self.power =
