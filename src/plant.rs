@@ -1,8 +1,9 @@
 //! Faults planted on purpose, so that tests can prove that something notices each of them.
 //!
-//! Present only with the feature `planted`, which the package's own tests turn on; without it `planted!` is its first value
-//! and leaves nothing in the program. At most one fault is active in a process: the one named by `VARIABLE`. The list of
-//! faults and of what must notice each is in `tests/planted`. Limits: planted where a value is made, never in a sample loop.
+//! Present only with the feature `planted`, which the package's own tests turn on; without it `planted!` is
+//! its first value and leaves nothing in the program. At most one fault is active in a process: the one named
+//! by `VARIABLE`. The list of faults and of what must notice each is in `tests/planted`. Limits: planted
+//! where a value is made, never in a sample loop.
 
 /// The value of an expression; while the fault of that name is active, a wrong one.
 #[cfg(not(feature = "planted"))]

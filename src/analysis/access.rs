@@ -1,10 +1,11 @@
 //! Multiple access and interference: what other waves take from a satellite's C/N0.
 //!
-//! Codes of the same kind are no more orthogonal than noise: each adds its power times the spectral separation
-//! coefficient κ = ∫S² df / (∫S df)² to the noise density (J. W. Betz, NAVIGATION 48(4), 2001). For rectangular chips of
-//! duration T that is 2T/3. S is the spectrum of the correlation between signal and replica, so a sampler that averages
-//! over its interval, and a replica that does too, narrow it and raise κ. Satellites of other signals are not counted.
-//! Interference adds its own power times its own separation ([`super::jamming`]).
+//! Codes of the same kind are no more orthogonal than noise: each adds its power times the spectral
+//! separation coefficient κ = ∫S² df / (∫S df)² to the noise density (J. W. Betz, NAVIGATION 48(4), 2001).
+//! For rectangular chips of duration T that is 2T/3. S is the spectrum of the correlation between signal and
+//! replica, so a sampler that averages over its interval, and a replica that does too, narrow it and raise κ.
+//! Satellites of other signals are not counted. Interference adds its own power times its own separation
+//! ([`super::jamming`]).
 
 use std::collections::HashMap;
 

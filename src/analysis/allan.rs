@@ -1,9 +1,10 @@
 //! Stability of a clock from its phase: Allan's family of deviations with their confidence.
 //!
-//! Source: W. J. Riley, Handbook of Frequency Stability Analysis, NIST Special Publication 1065 (2008), section 5.2. Input
-//! is phase, the reading minus the true time, in seconds on an even grid without gaps; a constant offset and rate of it
-//! change nothing. Every estimate takes one pass over the data. [`noise`] tells the noise type, [`freedom`] the
-//! confidence, [`fit`] the strengths. Limits: no drift is removed; the total deviation's bias is not corrected.
+//! Source: W. J. Riley, Handbook of Frequency Stability Analysis, NIST Special Publication 1065 (2008),
+//! section 5.2. Input is phase, the reading minus the true time, in seconds on an even grid without gaps; a
+//! constant offset and rate of it change nothing. Every estimate takes one pass over the data. [`noise`]
+//! tells the noise type, [`freedom`] the confidence, [`fit`] the strengths. Limits: no drift is removed; the
+//! total deviation's bias is not corrected.
 
 pub mod fit;
 pub mod freedom;
@@ -178,8 +179,9 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// A deviation over averaging factors, each with the interval that holds the true one with probability `confidence`.
 ///
-/// A factor that leaves fewer than three independent differences, or a deviation that rounding alone would give, is left
-/// out. Where too few phases remain to tell the noise, it is taken to be that of the factor before.
+/// A factor that leaves fewer than three independent differences, or a deviation that rounding alone would
+/// give, is left out. Where too few phases remain to tell the noise, it is taken to be that of the factor
+/// before.
 pub fn curve(
     deviation: Deviation,
     x: &[f64],

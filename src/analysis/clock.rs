@@ -1,10 +1,11 @@
 //! The receiver's clock over a run: its estimate against the truth, and how stable both are.
 //!
-//! Bias is the clock's reading minus GPS time. The receiver's error of it is minus the error of the GPS time that it gives,
-//! so that it does not matter how the receiver set its clock; truth plus error is the estimate. Deviations need an even
-//! grid: the longest stretch of fixes without a gap is taken, and of the truth the whole run. Expected beside them: the
-//! white phase noise of a clock solved from independent code or carrier measurements, TDOP × σ. Limits: the code loop's
-//! bandwidth and carrier smoothing correlate fixes, so the estimate lies below the code's line; its noise is no oscillator's.
+//! Bias is the clock's reading minus GPS time. The receiver's error of it is minus the error of the GPS time
+//! that it gives, so that it does not matter how the receiver set its clock; truth plus error is the
+//! estimate. Deviations need an even grid: the longest stretch of fixes without a gap is taken, and of the
+//! truth the whole run. Expected beside them: the white phase noise of a clock solved from independent code
+//! or carrier measurements, TDOP × σ. Limits: the code loop's bandwidth and carrier smoothing correlate
+//! fixes, so the estimate lies below the code's line; its noise is no oscillator's.
 
 use std::ops::Range;
 use std::path::Path;

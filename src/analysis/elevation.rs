@@ -1,9 +1,10 @@
 //! Errors of observations by satellite and by elevation, and the multipath combination of one frequency.
 //!
-//! Code minus carrier is free of orbits, clocks and the troposphere; it holds code noise, multipath, a constant and twice the
-//! ionosphere, which the truth gives and which is taken out here: M = P − λφ − 2I, each arc about its mean. It is what a user of one
-//! frequency can see of multipath, and beside it stands what only the truth can tell, the code's error. Bands of
-//! elevation are ten degrees wide; errors in them are without the epoch's common part.
+//! Code minus carrier is free of orbits, clocks and the troposphere; it holds code noise, multipath, a
+//! constant and twice the ionosphere, which the truth gives and which is taken out here: M = P − λφ − 2I,
+//! each arc about its mean. It is what a user of one frequency can see of multipath, and beside it stands
+//! what only the truth can tell, the code's error. Bands of elevation are ten degrees wide; errors in them
+//! are without the epoch's common part.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -178,8 +179,8 @@ impl Layer {
     }
 }
 
-/// P − λφ − 2I of each row, about the mean of its arc. Errors are against the truth, whose code minus carrier is 2I and a
-/// constant, so that their difference is the combination already.
+/// P − λφ − 2I of each row, about the mean of its arc. Errors are against the truth, whose code minus carrier
+/// is 2I and a constant, so that their difference is the combination already.
 fn multipath_m(link: &Link, rows: &[SignalError]) -> Vec<f64> {
     let mut found = Vec::with_capacity(rows.len());
     for arc in rows.chunk_by(|a, b| b.locked_s > a.locked_s) {

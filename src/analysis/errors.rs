@@ -89,18 +89,19 @@ pub struct Errors {
     /// Sum and number of the code errors of each epoch.
     pub epochs: BTreeMap<u64, (f64, usize)>,
     pub positions: Vec<PositionError>,
-    /// Changes of the carrier's constant: those declared by the receiver's events after a satellite's first observation, and jumps of at
-    /// least [`SLIP_CYCLES`] that stay and that it did not declare.
+    /// Changes of the carrier's constant: those declared by the receiver's events after a satellite's first
+    /// observation, and jumps of at least [`SLIP_CYCLES`] that stay and that it did not declare.
     pub cycle_slips: usize,
     /// Observations of satellites or samples that the truth does not have.
     pub unmatched: usize,
 }
 
-/// Phase lock is a mean over six symbols of 20 ms: so long it still stands when a satellite has gone, and a symbol more.
+/// Phase lock is a mean over six symbols of 20 ms: so long it still stands when a satellite has gone, and a
+/// symbol more.
 const DETECTION_S: f64 = 0.14;
 
-/// Whether a sample that the truth has for other satellites follows so closely on this one's last row that no receiver can know yet that
-/// the signal is gone.
+/// Whether a sample that the truth has for other satellites follows so closely on this one's last row that no
+/// receiver can know yet that the signal is gone.
 fn has_just_gone(run: &Run, link: Link, sample: u64, truth: &HashMap<u64, Observation>) -> bool {
     let last = truth.keys().copied().filter(|before| *before < sample).max();
     run.cn0_most_hz.contains_key(&(sample, link.1.name))

@@ -168,8 +168,8 @@ mod tests {
                 (low..=high).contains(&nees)
             })
             .count();
-        // 0.95 of 300 is 285 ± 3·3.8; the estimate of the autocorrelation from 50 independent values a series costs some per cent. Without
-        // it (1000 independent fixes) the band would hold 40 %.
+        // 0.95 of 300 is 285 ± 3·3.8; the estimate of the autocorrelation from 50 independent values a series
+        // costs some per cent. Without it (1000 independent fixes) the band would hold 40 %.
         assert!((262..=300).contains(&held), "{held}");
     }
 }

@@ -1,9 +1,10 @@
 //! How much a series of correlated errors says: independent values, intervals of a spread, a test of normality.
 //!
-//! Errors of loops and of smoothed fixes remember the ones before, so that n of them count as fewer. With ρ the
-//! autocorrelation, a mean square of n normal values varies like one of n/(1 + 2Σρ²) independent ones (Bartlett 1946), a mean
-//! like one of n/(1 + 2Σρ). Sums run to the first lag whose ρ is not positive: what comes after is mostly the noise of the
-//! estimate. Limits: even spacing within a group; processes that ring need another cut.
+//! Errors of loops and of smoothed fixes remember the ones before, so that n of them count as fewer. With ρ
+//! the autocorrelation, a mean square of n normal values varies like one of n/(1 + 2Σρ²) independent ones
+//! (Bartlett 1946), a mean like one of n/(1 + 2Σρ). Sums run to the first lag whose ρ is not positive: what
+//! comes after is mostly the noise of the estimate. Limits: even spacing within a group; processes that ring
+//! need another cut.
 
 /// Largest number of lags looked at.
 const MOST_LAGS: usize = 4096;
@@ -75,8 +76,9 @@ impl Correlated {
         TWO_SIDED_95 / (2.0 * self.independent()).sqrt()
     }
 
-    /// Probability of such a skewness and kurtosis, or larger, if these values were normal: the test of Jarque and Bera with the
-    /// variances that correlation gives them (Lobato and Velasco 2004), chi-square of two degrees. `None` of fewer than 20 values.
+    /// Probability of such a skewness and kurtosis, or larger, if these values were normal: the test of
+    /// Jarque and Bera with the variances that correlation gives them (Lobato and Velasco 2004), chi-square
+    /// of two degrees. `None` of fewer than 20 values.
     pub fn normality(&self, values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
         let n = self.count as f64;
         let middle = values.clone().sum::<f64>() / n;

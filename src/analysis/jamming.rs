@@ -1,9 +1,10 @@
 //! The spectra of interference, and what they take from a satellite's C/N0.
 //!
-//! A periodic waveform has lines at the multiples of its repetition rate, powers |c_k|² of its Fourier series, found here
-//! by a transform of one period; noise and random chips have densities. Interference of power J adds J·κ to the noise
-//! density, κ = ∫ G_J·G_S df with the code's spectrum G_S (J. W. Betz, NAVIGATION 48(4), 2001). Limits: a code's own
-//! lines, 1 kHz apart, are left out of κ (a CW on a line is worth up to 9 dB more or nothing); recordings count as flat.
+//! A periodic waveform has lines at the multiples of its repetition rate, powers |c_k|² of its Fourier
+//! series, found here by a transform of one period; noise and random chips have densities. Interference of
+//! power J adds J·κ to the noise density, κ = ∫ G_J·G_S df with the code's spectrum G_S (J. W. Betz,
+//! NAVIGATION 48(4), 2001). Limits: a code's own lines, 1 kHz apart, are left out of κ (a CW on a line is
+//! worth up to 9 dB more or nothing); recordings count as flat.
 
 use std::collections::BTreeMap;
 
@@ -85,7 +86,8 @@ impl Spectrum {
 
     /// The lines of a carrier of unit power whose phase over a period is `cycles`.
     fn series(repetition_hz: f64, reach: f64, cycles: impl Fn(f64) -> f64) -> Self {
-        // Lines beyond the reach fall with the square of their number or faster: eight times it leaves 1e-3 of the power.
+        // Lines beyond the reach fall with the square of their number or faster: eight times it leaves 1e-3
+        // of the power.
         let points = ((8.0 * reach) as usize + 512).next_power_of_two();
         let mut wave: Vec<Complex<f64>> = (0..points)
             .map(|k| {
@@ -176,7 +178,8 @@ pub fn density(source: &Source, f_hz: f64, bin_hz: f64) -> f64 {
     source.jn0_hz * (lines + source.spectrum.density(from_hz))
 }
 
-/// A line's share of density times bin width, `x` bins from it, after a Hann window: its transform squared over its power.
+/// A line's share of density times bin width, `x` bins from it, after a Hann window: its transform squared
+/// over its power.
 pub(super) fn hann(x: f64) -> f64 {
     let edge = 1.0 - x * x;
     // At one bin sinc(x)/(1 − x²) is 1/2.

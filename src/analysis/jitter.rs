@@ -1,11 +1,13 @@
-//! The jitter of each satellite's loops three ways: what discriminators put out, how far oscillators were from the truth, and
-//! what theory says of a loop with these settings at the C/N0 that was measured.
+//! The jitter of each satellite's loops three ways: what discriminators put out, how far oscillators were
+//! from the truth, and what theory says of a loop with these settings at the C/N0 that was measured.
 //!
-//! Raw and closed-loop figures are never mixed: a discriminator's value is noise of one integration, √(1/(2B·T)) times what the
-//! loop lets through. The theory takes the loops as the settings file describes them, controlled roots of exact bandwidth, with
-//! phase and rate fed back ([`crate::analysis::theory::linear`]), and adds the scene's oscillator and the stress that the true motion puts on
-//! that same linear loop. In the tracking stage the frequency is that of the phase loop; its row judges the rate. Limits: discriminators
-//! as of early minus late power and two-quadrant arctangent; a front-end filter's rounding of the correlation is left out.
+//! Raw and closed-loop figures are never mixed: a discriminator's value is noise of one integration,
+//! √(1/(2B·T)) times what the loop lets through. The theory takes the loops as the settings file describes
+//! them, controlled roots of exact bandwidth, with phase and rate fed back
+//! ([`crate::analysis::theory::linear`]), and adds the scene's oscillator and the stress that the true motion
+//! puts on that same linear loop. In the tracking stage the frequency is that of the phase loop; its row
+//! judges the rate. Limits: discriminators as of early minus late power and two-quadrant arctangent; a
+//! front-end filter's rounding of the correlation is left out.
 
 pub(in crate::analysis) mod theory;
 
@@ -42,8 +44,8 @@ pub struct Row {
     /// As the receiver measured it, mean over what is counted here.
     pub cn0_dbhz: f64,
     pub integration_s: f64,
-    /// Standard deviation of the discriminator's values, and what theory says of it: noise of one integration and what the loop
-    /// carries over from those before.
+    /// Standard deviation of the discriminator's values, and what theory says of it: noise of one integration
+    /// and what the loop carries over from those before.
     pub raw_sigma: Option<f64>,
     pub raw_theory_sigma: Option<f64>,
     /// Oscillator minus truth.

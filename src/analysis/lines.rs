@@ -1,8 +1,9 @@
 //! Continuous waves that the receiver told of, against the interference that there was.
 //!
-//! The receiver makes a spectrum a second. A row of it is false where no source was on in that second. A wave is held to be
-//! told where it was on for a whole second with a J/N0 of [`LEAST_DBHZ`], which stands out of any bin of such a spectrum.
-//! Limits: sweeps and pulses have lines too, so rows of them are neither false nor asked for.
+//! The receiver makes a spectrum a second. A row of it is false where no source was on in that second. A wave
+//! is held to be told where it was on for a whole second with a J/N0 of [`LEAST_DBHZ`], which stands out of
+//! any bin of such a spectrum. Limits: sweeps and pulses have lines too, so rows of them are neither false
+//! nor asked for.
 
 use std::collections::BTreeSet;
 
@@ -23,7 +24,8 @@ pub struct Lines {
     /// Seconds all through which a strong continuous wave was on, and those of them that were told.
     pub wave_seconds: usize,
     pub wave_seconds_told: usize,
-    /// Largest distance in frequency of what was told from the nearest wave where nothing else was on, and the width of the spectrum's bins.
+    /// Largest distance in frequency of what was told from the nearest wave where nothing else was on, and
+    /// the width of the spectrum's bins.
     pub frequency_error_max_hz: Option<f64>,
     pub resolution_hz: Option<f64>,
     /// Largest difference of its J/N0 from that wave's.

@@ -1,8 +1,8 @@
 //! Everything that a run wrote, read once.
 //!
-//! Truth and estimate are CSV files of the rows in [`crate::gnss::record`]; the scene and the
-//! receiver's settings are JSON. Tables with a row for every satellite of every epoch lie on shelves, satellite by satellite;
-//! those with a row an epoch, and shorter ones, are held.
+//! Truth and estimate are CSV files of the rows in [`crate::gnss::record`]; the scene and the receiver's
+//! settings are JSON. Tables with a row for every satellite of every epoch lie on shelves, satellite by
+//! satellite; those with a row an epoch, and shorter ones, are held.
 
 mod common;
 mod delay;
@@ -161,13 +161,14 @@ const USUAL_SPACING_CHIPS: f64 = 0.5;
 const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
 
 impl Run {
-    /// Reads a run's directory. `psd.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json` may be missing. What is too
-    /// long for memory is put by in a file without a name there.
+    /// Reads a run's directory. `psd.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json` may be
+    /// missing. What is too long for memory is put by in a file without a name there.
     pub fn read(run: &Path) -> Result<Self, JudgeError> {
         Self::read_parts(run, &run.join("truth"), &run.join("rx"))
     }
 
-    /// [`Self::read`] where truth and receiver wrote into directories of their own, so that several receivers share a truth.
+    /// [`Self::read`] where truth and receiver wrote into directories of their own, so that several receivers
+    /// share a truth.
     pub fn read_parts(run: &Path, truth: &Path, rx: &Path) -> Result<Self, JudgeError> {
         let mut read = Self::read_truth_by(truth, run)?;
         read.scene_json = json(&truth.join("scene.json"))?.unwrap_or(Value::Null);
@@ -282,7 +283,8 @@ impl Run {
         median(&steps.collect::<Vec<_>>()).unwrap_or(0.0)
     }
 
-    /// What [`Self::read`] does to the scene's facts: an IF above half the rate of real samples becomes the one at which they hold it.
+    /// What [`Self::read`] does to the scene's facts: an IF above half the rate of real samples becomes the
+    /// one at which they hold it.
     fn folded(mut scene: SceneFacts) -> SceneFacts {
         let (Some(center_hz), Some(signal)) = (scene.center_hz, SIGNALS.first()) else { return scene };
         let sign = |inverted: bool| if inverted { -1.0 } else { 1.0 };

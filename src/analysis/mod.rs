@@ -1,15 +1,18 @@
 //! The judge: joins truth and estimate, measures every error, draws and reports them.
 //!
-//! It reads only what generator and receiver wrote into a run's directory, joins the rows on
-//! (sample number, satellite, signal) and writes `summary.json` and pictures beside them.
-//! [`load`] reads it once and puts what is long on a [`shelf`], satellite by satellite, so that a long run takes little more memory than a short one; [`errors`] measures, [`slips`] finds breaks and their causes, [`elevation`] sorts errors by satellite and elevation, [`jitter`] holds each loop against theory, [`honesty`] the fixes against
-//! their own covariance, [`clock`] does so for the receiver's clock with the deviations of [`allan`], [`statistics`]
-//! condenses, [`access`] and [`jamming`] expect C/N0 under other codes and interference, [`lines`] holds the receiver's word of
-//! continuous waves against them, [`spoofing`] tells what a
-//! spoofer did, [`summary`] is what scripts gate on with its [`schema`], [`verdict`] holds it against theory and a user's
-//! [`limits`], [`making`] keeps unfinished files from sight, [`plot`] draws, [`report`] prints on a terminal and `pdf` on paper, [`psd`] estimates the spectrum of
-//! the samples, [`spectrum`] says what it should be, [`foreign`] judges receivers that this project did not write, [`trade`]
-//! weighs speed against accuracy, [`theory`] says what errors to expect.
+//! It reads only what generator and receiver wrote into a run's directory, joins the rows on (sample number,
+//! satellite, signal) and writes `summary.json` and pictures beside them. [`load`] reads it once and puts
+//! what is long on a [`shelf`], satellite by satellite, so that a long run takes little more memory than a
+//! short one; [`errors`] measures, [`slips`] finds breaks and their causes, [`elevation`] sorts errors by
+//! satellite and elevation, [`jitter`] holds each loop against theory, [`honesty`] the fixes against their
+//! own covariance, [`clock`] does so for the receiver's clock with the deviations of [`allan`],
+//! [`statistics`] condenses, [`access`] and [`jamming`] expect C/N0 under other codes and interference,
+//! [`lines`] holds the receiver's word of continuous waves against them, [`spoofing`] tells what a spoofer
+//! did, [`summary`] is what scripts gate on with its [`schema`], [`verdict`] holds it against theory and a
+//! user's [`limits`], [`making`] keeps unfinished files from sight, [`plot`] draws, [`report`] prints on a
+//! terminal and `pdf` on paper, [`psd`] estimates the spectrum of the samples, [`spectrum`] says what it
+//! should be, [`foreign`] judges receivers that this project did not write, [`trade`] weighs speed against
+//! accuracy, [`theory`] says what errors to expect.
 
 pub mod access;
 pub mod allan;
@@ -84,7 +87,8 @@ pub enum JudgeError {
     Plot { path: PathBuf, reason: String },
 }
 
-/// Judges the run in a directory: writes `summary.json`, tables, pictures and `report.pdf` there and returns the summary.
+/// Judges the run in a directory: writes `summary.json`, tables, pictures and `report.pdf` there and returns
+/// the summary.
 ///
 /// Reads `truth/{observations,sky,trajectory,navigation}.csv`, `truth/scene.json`,
 /// `rx/{observations,fixes,acquisition,tracking,navigation,events}.csv`, and where they exist

@@ -158,7 +158,8 @@ pub(super) fn expected(truth: &Shelf<Link, Observation>) -> Result<Vec<Expected>
     Ok(all)
 }
 
-/// Density of a rectangular-chip code at `f_hz` from its carrier as the sampler meets it, before anything aliases, per hertz.
+/// Density of a rectangular-chip code at `f_hz` from its carrier as the sampler meets it, before anything
+/// aliases, per hertz.
 pub(super) fn pulse_density(code_edge: &str, f_hz: f64, chip_rate_hz: f64, rate_hz: f64) -> f64 {
     let chip = sinc_squared(f_hz / chip_rate_hz) / chip_rate_hz;
     match edge(code_edge) {

@@ -1,7 +1,7 @@
 //! The schema of `summary.json`: every key with its unit and meaning, and paths into it.
 //!
-//! `assets/summary.schema.json` is a JSON Schema (draft 2020-12) with one annotation more: `unit`, which is `1` for counts,
-//! ratios and names. A test holds it against what a run really writes.
+//! `assets/summary.schema.json` is a JSON Schema (draft 2020-12) with one annotation more: `unit`, which is
+//! `1` for counts, ratios and names. A test holds it against what a run really writes.
 
 use serde_json::{Map, Value};
 use std::sync::OnceLock;

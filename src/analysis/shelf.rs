@@ -1,9 +1,10 @@
 //! Rows of one kind, parted by satellite, most of them in a file: a long run takes no more memory than a short one.
 //!
-//! Tables come epoch by epoch and are wanted satellite by satellite. A [`Shelf`] collects the rows of each key until there
-//! are 256 of them, then moves them as plain words to the end of a file that has no name, so that nothing stays
-//! when the process ends, however it ends. What few rows there are never leave memory. Limits: the rows of one key are
-//! read all at once; rows of a key keep their order, rows of different keys do not.
+//! Tables come epoch by epoch and are wanted satellite by satellite. A [`Shelf`] collects the rows of each
+//! key until there are 256 of them, then moves them as plain words to the end of a file that has no name, so
+//! that nothing stays when the process ends, however it ends. What few rows there are never leave memory.
+//! Limits: the rows of one key are read all at once; rows of a key keep their order, rows of different keys
+//! do not.
 
 use std::collections::BTreeMap;
 use std::fs::File;

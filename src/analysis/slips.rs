@@ -1,11 +1,13 @@
 //! Cycle slips and losses of lock, each with its time, its size and what the truth says of its cause.
 //!
-//! A slip is a change of the constant between measured and true carrier: declared by the receiver's events, or found against the
-//! truth and not declared. Its size is the difference of the medians around it, to the half cycle of a Costas loop; where the
-//! count began anew (another lock) it has none. The cause is the first of these that the half second before it shows: the
-//! signal is not there or fell by [`FADE_DB`]; interference takes [`JAMMED_DB`] and leaves less than the loop needs; the true motion
-//! leaves a phase error of which 3σ + θ > 45° (the loop of the receiver's settings, [`super::jitter`]); noise alone breaks that
-//! rule. What is left is unexplained. Limits: causes are those that the truth's rows, a tenth of a second apart, can show.
+//! A slip is a change of the constant between measured and true carrier: declared by the receiver's events,
+//! or found against the truth and not declared. Its size is the difference of the medians around it, to the
+//! half cycle of a Costas loop; where the count began anew (another lock) it has none. The cause is the first
+//! of these that the half second before it shows: the signal is not there or fell by [`FADE_DB`];
+//! interference takes [`JAMMED_DB`] and leaves less than the loop needs; the true motion leaves a phase error
+//! of which 3σ + θ > 45° (the loop of the receiver's settings, [`super::jitter`]); noise alone breaks that
+//! rule. What is left is unexplained. Limits: causes are those that the truth's rows, a tenth of a second
+//! apart, can show.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -74,8 +76,8 @@ pub struct Slip {
     /// What rounding to the half cycle took away.
     pub remainder_cycles: Option<f64>,
     pub cause: Cause,
-    /// The evidence: least C/N0 that the scene allowed, what interference took of it, largest error that the motion leaves in the
-    /// phase loop, and 3σ of its noise at that C/N0.
+    /// The evidence: least C/N0 that the scene allowed, what interference took of it, largest error that the
+    /// motion leaves in the phase loop, and 3σ of its noise at that C/N0.
     pub cn0_dbhz: Option<f64>,
     pub interference_db: Option<f64>,
     pub motion_deg: Option<f64>,
@@ -156,8 +158,8 @@ fn breaks(run: &Run, link: Link, all: &[SignalError]) -> Vec<Break> {
     found
 }
 
-/// Difference of the carrier's constants on either side of a declared slip; `None` where a lock was lost in between or a side has
-/// no rows.
+/// Difference of the carrier's constants on either side of a declared slip; `None` where a lock was lost in
+/// between or a side has no rows.
 fn size_across(all: &[SignalError], sample: u64, lost: &[u64]) -> Option<f64> {
     let at = all.partition_point(|row| row.sample < sample);
     let (before, after) = all.split_at(at);

@@ -1,10 +1,12 @@
-//! The spectrum that theory expects of the samples, front end and converter in, and the nulls of the code found against it.
+//! The spectrum that theory expects of the samples, front end and converter in, and the nulls of the code
+//! found against it.
 //!
-//! Absolute, in LSB²/Hz: noise of N0 = 2σ²/fs, satellites of C/N0·N0 under the spectra of their chips, interference, all
-//! through the filter and the converter's gain; then quantisation. An integer format rounds with 1/12 a component; a converter of
-//! few levels is g·x + d for Gaussian x (Bussgang 1952), with g and the power of d summed over its cells. d counts as white. Nothing is
-//! fitted: the median of measured over expected is reported. Limits: a Butterworth's response is the analogue one, a
-//! wall's edge an error function between its −80 dB points; a local oscillator's offset and phase noise are left out.
+//! Absolute, in LSB²/Hz: noise of N0 = 2σ²/fs, satellites of C/N0·N0 under the spectra of their chips,
+//! interference, all through the filter and the converter's gain; then quantisation. An integer format rounds
+//! with 1/12 a component; a converter of few levels is g·x + d for Gaussian x (Bussgang 1952), with g and the
+//! power of d summed over its cells. d counts as white. Nothing is fitted: the median of measured over
+//! expected is reported. Limits: a Butterworth's response is the analogue one, a wall's edge an error
+//! function between its −80 dB points; a local oscillator's offset and phase noise are left out.
 
 use serde::{Deserialize, Serialize};
 use statrs::function::erf::{erf, erfc};
@@ -88,8 +90,8 @@ pub fn judge(run: &Run) -> Spectrum {
     found
 }
 
-/// Expected density at the frequencies of `psd.csv`, in the same decibels. Where the truth does not state the level (no `noise_lsb`), it
-/// is fitted. Empty without a spectrum or without signals.
+/// Expected density at the frequencies of `psd.csv`, in the same decibels. Where the truth does not state the
+/// level (no `noise_lsb`), it is fitted. Empty without a spectrum or without signals.
 pub fn theory_db(run: &Run) -> Vec<f64> {
     let signals = &run.expected;
     let sources = jamming::sources(run);
@@ -201,8 +203,8 @@ fn quantiser(adc: Option<&Stage>, sigma_lsb: f64) -> (f64, f64) {
 /// A null as measured and as expected.
 type Null = (f64, f64);
 
-/// Decibels of C/N0 that the front end's filter and converter cost a code, noise alone counted: a filter passes less of the code than of
-/// noise with the code's spectrum, and rounding adds noise.
+/// Decibels of C/N0 that the front end's filter and converter cost a code, noise alone counted: a filter
+/// passes less of the code than of noise with the code's spectrum, and rounding adds noise.
 pub fn cost_db(run: &Run) -> f64 {
     let stage = |name: &str| run.scene.front_end.iter().find(|stage| stage.stage == name);
     let filtered = stage("filter").map_or(1.0, |filter| passed(filter, run));
@@ -290,7 +292,8 @@ mod tests {
 
     #[test]
     fn converters_lose_what_the_literature_says() {
-        // Correlation loss 10 lg(g²σ²/(g²σ² + d)) (Hegarty 2011): 1.96 dB of one bit, 0.549 of two and 0.166 of three at best steps.
+        // Correlation loss 10 lg(g²σ²/(g²σ² + d)) (Hegarty 2011): 1.96 dB of one bit, 0.549 of two and 0.166
+        // of three at best steps.
         for (bits, step_sigma, loss_db) in [(1, 1.0, 1.961), (2, 0.9957, 0.549), (3, 0.586, 0.166)] {
             let adc =
                 Stage { bits: Some(bits), step_sigma: Some(step_sigma), nominal_lsb: Some(28.0), ..Stage::default() };

@@ -1,7 +1,7 @@
 //! What a spoofer did to the fixes: how far from the truth they went, and how near to its claim.
 //!
-//! A fix counts as captured when it lies nearer to what the first spoofer claims than to the truth and the two are further
-//! apart than the fixes' own scatter can tell. Limits: one spoofer; its clock is not judged.
+//! A fix counts as captured when it lies nearer to what the first spoofer claims than to the truth and the
+//! two are further apart than the fixes' own scatter can tell. Limits: one spoofer; its clock is not judged.
 
 use std::collections::HashMap;
 

@@ -81,16 +81,16 @@ pub struct Position {
     pub bias_enu_m: Option<[f64; 3]>,
     /// Of the three-dimensional velocity error.
     pub velocity_p95_mps: Option<f64>,
-    /// Mean normalised error squared with the receiver's own covariance, 3 of an honest one; the 95 % band of that mean for as
-    /// many independent fixes as the errors' autocorrelation leaves.
+    /// Mean normalised error squared with the receiver's own covariance, 3 of an honest one; the 95 % band of
+    /// that mean for as many independent fixes as the errors' autocorrelation leaves.
     pub nees_mean: Option<f64>,
     pub nees_band: Option<[f64; 2]>,
     pub nees_independent: Option<f64>,
     pub nees_verdict: Option<honesty::Verdict>,
 }
 
-/// The receiver's clock, over the longest stretch of fixes without a gap. Deviations at an averaging time of 1 s are null where
-/// the record is too short for them, or the clock is steady to rounding.
+/// The receiver's clock, over the longest stretch of fixes without a gap. Deviations at an averaging time of
+/// 1 s are null where the record is too short for them, or the clock is steady to rounding.
 #[derive(Clone, Debug, Serialize)]
 pub struct Clock {
     /// In that stretch.
@@ -111,8 +111,8 @@ pub struct Clock {
     pub true_oadev_1s: Option<f64>,
     /// That of a clock solved from independent code measurements: √3 × TDOP × σ of the code/(speed of light × 1 s).
     pub code_noise_oadev_1s: Option<f64>,
-    /// Strengths h₂, h₁, h₀, h₋₁, h₋₂ of power-law noises (S_y = Σ h f^α, in Hz^(−α − 1)) fitted to the Allan deviations of the
-    /// estimate and of the true clock.
+    /// Strengths h₂, h₁, h₀, h₋₁, h₋₂ of power-law noises (S_y = Σ h f^α, in Hz^(−α − 1)) fitted to the Allan
+    /// deviations of the estimate and of the true clock.
     pub h: Option<[f64; 5]>,
     pub true_h: Option<[f64; 5]>,
 }
@@ -144,7 +144,8 @@ pub struct Tracking {
     /// Slips that the receiver did not declare, and how many slips and losses have which cause (`slips.csv`).
     pub slips_undeclared: usize,
     pub slip_causes: BTreeMap<Cause, usize>,
-    /// The loops of all satellites three ways (`jitter.csv`): chips, degrees, hertz. Null where the receiver names no settings.
+    /// The loops of all satellites three ways (`jitter.csv`): chips, degrees, hertz. Null where the receiver
+    /// names no settings.
     pub dll_chips: Option<Pooled>,
     pub pll_deg: Option<Pooled>,
     pub fll_hz: Option<Pooled>,

@@ -1,7 +1,8 @@
 //! The numbers behind the pictures that neither generator nor receiver wrote: one CSV file a kind.
 //!
-//! `errors.csv` holds every error of every observation, `position.csv` of every fix beside the receiver's own σ, `histograms.csv` the
-//! histograms of the loops, `psd_theory.csv` the expected spectrum, `verdict.csv` what was judged.
+//! `errors.csv` holds every error of every observation, `position.csv` of every fix beside the receiver's own
+//! σ, `histograms.csv` the histograms of the loops, `psd_theory.csv` the expected spectrum, `verdict.csv`
+//! what was judged.
 
 use std::collections::HashMap;
 use std::path::Path;

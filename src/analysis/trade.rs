@@ -1,8 +1,9 @@
 //! The trade between speed and accuracy: measured rows become a table, a CSV file and a picture.
 //!
-//! A row is one setting of the generator with its cost and its errors against the `reference` level, measured by
-//! `benches/trade`. A row is dominated if another of the same scene and rate costs no more and errs no more; what remains is the
-//! Pareto front. Limits: nothing is measured here, and fronts look at cost and pseudorange error alone.
+//! A row is one setting of the generator with its cost and its errors against the `reference` level, measured
+//! by `benches/trade`. A row is dominated if another of the same scene and rate costs no more and errs no
+//! more; what remains is the Pareto front. Limits: nothing is measured here, and fronts look at cost and
+//! pseudorange error alone.
 
 use std::fmt::{self, Write};
 use std::path::Path;

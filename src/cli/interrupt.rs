@@ -1,7 +1,7 @@
 //! Signals: the first takes outputs in the making away and ends the process, the second ends it at once.
 //!
-//! A thread of its own waits for them, so that they are heard whatever the others are at: computing, reading a pipe that
-//! stays silent, or drawing.
+//! A thread of its own waits for them, so that they are heard whatever the others are at: computing, reading
+//! a pipe that stays silent, or drawing.
 
 use std::io::Read;
 use std::os::unix::net::UnixStream;
@@ -45,7 +45,8 @@ fn handle() -> std::io::Result<()> {
     Ok(())
 }
 
-/// Whether whoever started the program wants it to outlive the terminal (`nohup`): hang-ups are ignored then, and stay so.
+/// Whether whoever started the program wants it to outlive the terminal (`nohup`): hang-ups are ignored then,
+/// and stay so.
 fn is_detached() -> bool {
     // Linux tells it there (proc(5)), bit 0 for signal 1; elsewhere it is taken not to be.
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

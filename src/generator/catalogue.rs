@@ -6,8 +6,9 @@
 //! a metre or two, so the truth passes from one to the next over [`BLEND_S`]: the received phase
 //! stays smooth and the decoded set stays right to that metre.
 //!
-//! Records that their neighbours contradict are left out ([`Catalogue::new`]). Precise orbits may stand in for the true ones
-//! ([`Catalogue::follow`]), and faults add to either ([`Catalogue::depart`]); what is sent stays as it is.
+//! Records that their neighbours contradict are left out ([`Catalogue::new`]). Precise orbits may stand in
+//! for the true ones ([`Catalogue::follow`]), and faults add to either ([`Catalogue::depart`]); what is sent
+//! stays as it is.
 
 use std::collections::BTreeMap;
 
@@ -41,8 +42,8 @@ struct Timeline {
     spans: Vec<Span>,
 }
 
-/// A time in which a satellite has nothing to send: from the end of one set's fit interval to the first sending of the next
-/// one. Open where no set comes before or after.
+/// A time in which a satellite has nothing to send: from the end of one set's fit interval to the first
+/// sending of the next one. Open where no set comes before or after.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Silence {
     pub from: Option<Epoch>,

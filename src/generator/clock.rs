@@ -69,7 +69,8 @@ impl ReceiverClock {
         offset_s + self.oscillator.as_ref().map_or(0.0, |oscillator| oscillator.slow_s(elapsed_s))
     }
 
-    /// Gain of the reading, in seconds a second, when the clock reads `local`: over 20 ms around it, if it is not steady.
+    /// Gain of the reading, in seconds a second, when the clock reads `local`: over 20 ms around it, if it is
+    /// not steady.
     pub fn drift_at_reading(&self, start: Epoch, local: Epoch) -> f64 {
         if self.ageing_per_s == 0.0 && self.shaking.is_none() && self.oscillator.is_none() {
             return self.drift;

@@ -1,8 +1,9 @@
 //! What a true orbit departs by from the one that is taken for true: ephemeris errors and manoeuvres.
 //!
-//! An offset in the satellite's own axes (radially outwards, along the track, across it), from the beginning or grown over
-//! a time by a quintic whose speed and acceleration begin and end at zero, so that phases stay smooth. The message does not
-//! know of it. Limits: velocity leaves out how the orbit's plane turns, 1e-9 rad/s of the offset.
+//! An offset in the satellite's own axes (radially outwards, along the track, across it), from the beginning
+//! or grown over a time by a quintic whose speed and acceleration begin and end at zero, so that phases stay
+//! smooth. The message does not know of it. Limits: velocity leaves out how the orbit's plane turns, 1e-9
+//! rad/s of the offset.
 
 use nalgebra::Vector3;
 

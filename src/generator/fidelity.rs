@@ -158,8 +158,8 @@ impl Fidelity {
             .unwrap_or(Self { code_edge: CodeEdge::BandLimited, ..level })
     }
 
-    /// Error of a code whose phase stands still on the sampling grid, root mean square over phases, in metres: measured, and
-    /// for area edges computed.
+    /// Error of a code whose phase stands still on the sampling grid, root mean square over phases, in
+    /// metres: measured, and for area edges computed.
     pub fn code_bias_m(&self, rate_hz: f64) -> f64 {
         let near = |at: [(f64, f64); 3]| {
             at.into_iter().rev().find(|(from_hz, _)| rate_hz >= *from_hz).map_or(at[0].1, |(_, bias_m)| bias_m)
@@ -172,8 +172,9 @@ impl Fidelity {
         everywhere.max(standing_bias_m(self.code_edge, rate_hz))
     }
 
-    /// The same where a Doppler moves the code over the grid, behind a code loop of `LOOP_HZ`: the error repeats with
-    /// each sample that the code moves by, and a first-order loop of noise bandwidth B passes `1 / √(1 + (2πν / 4B)²)` of it.
+    /// The same where a Doppler moves the code over the grid, behind a code loop of `LOOP_HZ`: the error
+    /// repeats with each sample that the code moves by, and a first-order loop of noise bandwidth B passes `1
+    /// / √(1 + (2πν / 4B)²)` of it.
     pub fn moving_bias_m(&self, rate_hz: f64, doppler_hz: f64) -> f64 {
         let samples_per_s = doppler_hz / CARRIER_CYCLES_PER_CHIP * rate_hz / CHIP_HZ;
         self.code_bias_m(rate_hz) / libm::hypot(1.0, std::f64::consts::TAU * samples_per_s / (4.0 * LOOP_HZ))
@@ -204,12 +205,13 @@ const LOOP_HZ: f64 = 0.5;
 
 /// Error of a standing code with area edges, root mean square over codes and phases, in metres.
 ///
-/// A mean over the sample's interval is a filter sinc(f/fs) before sampling, and what it leaves above half the rate folds back
-/// as a code of its own. An ideal early-minus-late correlator (half a chip) weighs line m of the code, m kHz, by
-/// `w = 2 sin(πmd/1023)`; with lines of power `p(m) = sinc²(m/1023)/1023` and the phases of a random code the folded lines add
-/// up by power: `σ² = Σ 2w² p(m) Σ_k p(m+kN) sinc²(m/N+k)`, against the slope `Σ 2w · 2πm/1023 · sinc(m/N) p(m)`, m below N/2
-/// and N = fs/1 kHz. 0.15 m at 2.6 Msps and 0.02 m at 10; an independent correlator on real codes found 0.14 m at 2.6 and
-/// 0.20 m at 2.048 Msps, where this gives 0.33: near a multiple of the chip rate it is a bound.
+/// A mean over the sample's interval is a filter sinc(f/fs) before sampling, and what it leaves above half
+/// the rate folds back as a code of its own. An ideal early-minus-late correlator (half a chip) weighs line m
+/// of the code, m kHz, by `w = 2 sin(πmd/1023)`; with lines of power `p(m) = sinc²(m/1023)/1023` and the
+/// phases of a random code the folded lines add up by power: `σ² = Σ 2w² p(m) Σ_k p(m+kN) sinc²(m/N+k)`,
+/// against the slope `Σ 2w · 2πm/1023 · sinc(m/N) p(m)`, m below N/2 and N = fs/1 kHz. 0.15 m at 2.6 Msps and
+/// 0.02 m at 10; an independent correlator on real codes found 0.14 m at 2.6 and 0.20 m at 2.048 Msps, where
+/// this gives 0.33: near a multiple of the chip rate it is a bound.
 fn aliased_bias_m(rate_hz: f64) -> f64 {
     const LINES: f64 = 1023.0;
     const SPACING_CHIPS: f64 = 0.5;
@@ -234,7 +236,8 @@ fn aliased_bias_m(rate_hz: f64) -> f64 {
 /// Zones of the rate that fold back; their power falls with the fourth power of their number.
 const FOLDS: i32 = 4;
 
-/// Error of the code that a scene's own noise hides, in metres: that of a delay loop on its strongest signal, 0.2 m at most.
+/// Error of the code that a scene's own noise hides, in metres: that of a delay loop on its strongest signal,
+/// 0.2 m at most.
 ///
 /// Thermal noise of a loop of bandwidth B with correlators d chips apart is √(B·d / (2·C/N0)) chips where T·C/N0 is far
 /// above one (Kaplan & Hegarty, equation 5.23, first branch). With 1 Hz and half a chip it is 0.2 m at 57 dB-Hz: above
@@ -343,8 +346,8 @@ mod tests {
 
     #[test]
     fn area_edges_err_by_what_folds_back_and_less_as_the_code_moves() {
-        // The same sum in another language; and figures of an independent correlator on real codes, 0.14 and 0.02 m, within
-        // what five codes scatter about the mean of all.
+        // The same sum in another language; and figures of an independent correlator on real codes, 0.14 and
+        // 0.02 m, within what five codes scatter about the mean of all.
         for (rate_hz, expected_m) in [(2.048e6, 0.3273), (2.6e6, 0.1515), (5e6, 0.0563), (10e6, 0.0202), (25e6, 0.0038)]
         {
             assert!((aliased_bias_m(rate_hz) - expected_m).abs() < 6e-5, "{rate_hz}: {}", aliased_bias_m(rate_hz));

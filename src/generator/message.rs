@@ -1,8 +1,9 @@
 //! What goes wrong with the navigation message between the uploaded data and the antenna.
 //!
-//! Wrong content (bad health, wrong parameters) is sent with right parity and the old issue of data; wrong bits are flipped
-//! in what was encoded, so that parity tells them. Times are those of sending, to the subframe for content and to the
-//! bit for bits. Limits: GPS LNAV; the almanac's health stays that of the scene's start.
+//! Wrong content (bad health, wrong parameters) is sent with right parity and the old issue of data; wrong
+//! bits are flipped in what was encoded, so that parity tells them. Times are those of sending, to the
+//! subframe for content and to the bit for bits. Limits: GPS LNAV; the almanac's health stays that of the
+//! scene's start.
 
 use std::ops::Range;
 

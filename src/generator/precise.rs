@@ -1,16 +1,18 @@
 //! True orbits and clocks out of precise products: a polynomial through the tabulated positions, a line between clocks.
 //!
-//! A position is the polynomial of degree 11 through the twelve epochs around it, in ECEF. Neighbouring polynomials meet at
-//! an epoch of the table, so the position is continuous; velocity is the polynomial's own. Tables are every 15 minutes and
-//! the quickest term of a GPS orbit in these axes with any size has ω = 2n + Ω = 3.6e-4 rad/s (the eccentricity's, some
-//! 2e5 m), of which twelve nodes 900 s apart miss (ω h)¹² · (1 · 3 · … · 11)² / (2¹² · 12!) or 17 µm; the printed digit, 1 mm, counts
-//! 1.5 times. Of a satellite's clock nothing smooth is known between epochs: a line, which real clocks
-//! of 2010 leave by 0.09 m rms in the middle of half an hour.
+//! A position is the polynomial of degree 11 through the twelve epochs around it, in ECEF. Neighbouring
+//! polynomials meet at an epoch of the table, so the position is continuous; velocity is the polynomial's
+//! own. Tables are every 15 minutes and the quickest term of a GPS orbit in these axes with any size has ω =
+//! 2n + Ω = 3.6e-4 rad/s (the eccentricity's, some 2e5 m), of which twelve nodes 900 s apart miss (ω h)¹² ·
+//! (1 · 3 · … · 11)² / (2¹² · 12!) or 17 µm; the printed digit, 1 mm, counts 1.5 times. Of a satellite's
+//! clock nothing smooth is known between epochs: a line, which real clocks of 2010 leave by 0.09 m rms in the
+//! middle of half an hour.
 //!
-//! Added to what the table has: relativity's periodic term, −2 r·v/c² (IS-GPS-200N, 20.3.3.3.3.1); T_GD as that satellite
-//! broadcasts it at the scene's start, because the products' clocks like the broadcast ones belong to the combination of P1 and
-//! P2; the antenna below the centre of mass. Limits: the antenna is on the line to the Earth's centre; the products' time
-//! scale is a few nanoseconds off GPS time, alike for all satellites; their axes are those of WGS 84 to centimetres.
+//! Added to what the table has: relativity's periodic term, −2 r·v/c² (IS-GPS-200N, 20.3.3.3.3.1); T_GD as
+//! that satellite broadcasts it at the scene's start, because the products' clocks like the broadcast ones
+//! belong to the combination of P1 and P2; the antenna below the centre of mass. Limits: the antenna is on
+//! the line to the Earth's centre; the products' time scale is a few nanoseconds off GPS time, alike for all
+//! satellites; their axes are those of WGS 84 to centimetres.
 
 use std::collections::BTreeMap;
 
@@ -52,8 +54,8 @@ pub struct Orbits {
 }
 
 impl Orbits {
-    /// The orbits of those satellites of `precise` that `hardware` knows; `None` with fewer than twelve epochs between first and
-    /// last, or more than 50 000.
+    /// The orbits of those satellites of `precise` that `hardware` knows; `None` with fewer than twelve
+    /// epochs between first and last, or more than 50 000.
     pub fn new(precise: &Precise, hardware: impl Fn(Sv) -> Option<Hardware>) -> Option<Self> {
         let mut epochs: Vec<i64> = precise.satellites.values().flat_map(BTreeMap::keys).copied().collect();
         epochs.sort_unstable();
@@ -127,7 +129,8 @@ impl Orbits {
     }
 }
 
-/// The nodes around cell `cell` of the table, if they are all there with nothing broken among them, and the cell's clocks.
+/// The nodes around cell `cell` of the table, if they are all there with nothing broken among them, and the
+/// cell's clocks.
 fn window(track: &Track, cell: i64) -> Option<&[Option<Sample>]> {
     let first = usize::try_from(cell).ok()?.checked_sub(HALF - 1)?;
     let nodes = track.nodes.get(first..first + NODES)?;

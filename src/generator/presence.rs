@@ -1,8 +1,9 @@
 //! Whether a satellite is in the scene's sky, and if not, why not.
 //!
-//! A satellite sets, hides behind the Earth, or has nothing to send because no ephemeris of the navigation file fits. The
-//! last is a limit of the data and not of nature, so it has its own name in the plan, in the warnings and in
-//! `truth/passes.csv`. Limit: while nothing is sent, the sky is that of the nearest set, for half a day at most.
+//! A satellite sets, hides behind the Earth, or has nothing to send because no ephemeris of the navigation
+//! file fits. The last is a limit of the data and not of nature, so it has its own name in the plan, in the
+//! warnings and in `truth/passes.csv`. Limit: while nothing is sent, the sky is that of the nearest set, for
+//! half a day at most.
 
 use std::ops::Range;
 
@@ -44,7 +45,8 @@ impl Presence {
     }
 }
 
-/// Where `sv` is for an antenna with `motion` at true time `time`. A satellite that the scene leaves out is present too.
+/// Where `sv` is for an antenna with `motion` at true time `time`. A satellite that the scene leaves out is
+/// present too.
 ///
 /// # Errors
 /// Those of the orbit.

@@ -1,9 +1,9 @@
 //! A scenario as written: TOML in which a table is present only when the scene has the thing.
 //!
-//! [`Scenario::parse`] holds each key and each value against its declaration ([`keys::SCENARIO`]) and collects what is wrong;
-//! [`Scenario::compose`] checks what concerns several of them, loads files and makes a
-//! [`Scene`](crate::generator::scene::Scene). Units stand in the names of the keys: degrees and dB here, radians and
-//! ratios from here on. `[receiver]` is kept as written for the receiver's own settings.
+//! [`Scenario::parse`] holds each key and each value against its declaration ([`keys::SCENARIO`]) and
+//! collects what is wrong; [`Scenario::compose`] checks what concerns several of them, loads files and makes
+//! a [`Scene`](crate::generator::scene::Scene). Units stand in the names of the keys: degrees and dB here,
+//! radians and ratios from here on. `[receiver]` is kept as written for the receiver's own settings.
 
 mod attitude;
 mod compose;

@@ -121,7 +121,8 @@ fn occulted(from_m: &Vector3<f64>, to_m: &Vector3<f64>) -> bool {
     (from + along * share).norm_squared() < 1.0
 }
 
-/// Where a frequency appears in samples at that rate, from minus half of it to half; negative in real samples means mirrored.
+/// Where a frequency appears in samples at that rate, from minus half of it to half; negative in real samples
+/// means mirrored.
 pub fn folded_hz(hz: f64, rate_hz: f64) -> f64 {
     hz - rate_hz * (hz / rate_hz).round()
 }

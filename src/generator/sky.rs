@@ -1,9 +1,10 @@
 //! Where a satellite was, and what its clock said, when it sent what the antenna receives now.
 //!
-//! The light time solves |s(t − τ) − u| = cτ in the axes of reception, taken as inertial. The orbit is evaluated at a guess
-//! of τ and taken as straight from there, so that one Newton step leaves half the curvature of the range (below 2 m/s²
-//! for these orbits) times the step squared; it is evaluated again until that is below a nanometre: twice from a guess for
-//! the Earth's surface, once from a neighbour's light time. The satellite's clock is evaluated at true GPS time of emission.
+//! The light time solves |s(t − τ) − u| = cτ in the axes of reception, taken as inertial. The orbit is
+//! evaluated at a guess of τ and taken as straight from there, so that one Newton step leaves half the
+//! curvature of the range (below 2 m/s² for these orbits) times the step squared; it is evaluated again until
+//! that is below a nanometre: twice from a guess for the Earth's surface, once from a neighbour's light time.
+//! The satellite's clock is evaluated at true GPS time of emission.
 
 use nalgebra::{SVector, Vector3};
 
@@ -141,8 +142,8 @@ type Row = SVector<f64, 8>;
 
 /// A satellite's orbit and clock over some seconds: the polynomial of degree five through six states of the catalogue.
 ///
-/// The remainder is `r (ω h)⁶ / (32 · 6!)` with half a span h and ω below 3e-4 rad/s in ECEF: 1e-12 m over 16 s, so what
-/// is left is rounding; at the edge of a hand-over of Δ metres, whose jerk jumps, 3e-6 Δ.
+/// The remainder is `r (ω h)⁶ / (32 · 6!)` with half a span h and ω below 3e-4 rad/s in ECEF: 1e-12 m over 16
+/// s, so what is left is rounding; at the edge of a hand-over of Δ metres, whose jerk jumps, 3e-6 Δ.
 #[derive(Clone, Debug)]
 pub struct Arc {
     sv: Sv,
@@ -224,9 +225,9 @@ mod tests {
                 assert!(residual.abs() < 3e-8, "{sv} {height_m}: {residual}");
                 // The last step's share of it is far below an ulp, but may tip a rounding.
                 assert!((clock.offset_s - found.satellite_clock_s).abs() <= clock.offset_s.abs() * f64::EPSILON);
-                // From any guess comes the same: 1 nm where the step is straight, and the rounding of another evaluation
-                // of the orbit. Its five angles reach 2π, of which half an ulp is 4.4e-16 rad or 1.2e-8 m: 6e-8 m for each
-                // of the two in the worst case.
+                // From any guess comes the same: 1 nm where the step is straight, and the rounding of another
+                // evaluation of the orbit. Its five angles reach 2π, of which half an ulp is 4.4e-16 rad or
+                // 1.2e-8 m: 6e-8 m for each of the two in the worst case.
                 for guess_s in [found.travel_s, found.travel_s + 2.9e-5, found.travel_s - 2.9e-5, 0.0, 0.3] {
                     let near = emission_near(&catalogue, sv, received, &motion, guess_s).unwrap().unwrap();
                     let moved_m = (near.travel_s - found.travel_s) * SPEED_OF_LIGHT_MPS;

@@ -1,10 +1,11 @@
 //! Whose signals reach the antenna: the true constellation, or that of a spoofer.
 //!
-//! A spoofer sends what the true satellites would be heard to send at a claimed place and by a clock of its own, with the
-//! same messages; every signal of it goes through the machinery of the true ones. It may begin on top of them (claiming the
-//! antenna's true motion) and drag the place off smoothly. Limits: its carriers are those of the claimed geometry (no
-//! phase of its own), its own path's delay is taken as compensated, it knows the victim's motion and the true orbits
-//! without error, and repeats no fault of a satellite's clock or message.
+//! A spoofer sends what the true satellites would be heard to send at a claimed place and by a clock of its
+//! own, with the same messages; every signal of it goes through the machinery of the true ones. It may begin
+//! on top of them (claiming the antenna's true motion) and drag the place off smoothly. Limits: its carriers
+//! are those of the claimed geometry (no phase of its own), its own path's delay is taken as compensated, it
+//! knows the victim's motion and the true orbits without error, and repeats no fault of a satellite's clock
+//! or message.
 
 use std::ops::Range;
 

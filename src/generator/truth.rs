@@ -24,8 +24,8 @@ use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 pub use writer::{TruthError, Writer};
 
-/// Step of the difference quotient behind the Doppler, and its share of a turn where the antenna spins. What five points
-/// leave of a sinusoid of ω is (ω step)⁴/30 of its slope: 3e-6.
+/// Step of the difference quotient behind the Doppler, and its share of a turn where the antenna spins. What
+/// five points leave of a sinusoid of ω is (ω step)⁴/30 of its slope: 3e-6.
 const DOPPLER_STEP_S: f64 = 0.01;
 const DOPPLER_STEP_TURNS: f64 = 1.0 / 64.0;
 
@@ -120,8 +120,9 @@ fn arriving(scene: &Scene, signal: &Signal, bias_s: f64, gain: f64, emission: Em
     Seen { emission, rays, arrivals }
 }
 
-/// Whether `sv` is in the scene's sky when the receiver's clock reads `local`: it has a message to send
-/// and stands above the mask, or from space not behind the Earth. Health is the scene's to judge, through its exclusions.
+/// Whether `sv` is in the scene's sky when the receiver's clock reads `local`: it has a message to send and
+/// stands above the mask, or from space not behind the Earth. Health is the scene's to judge, through its
+/// exclusions.
 ///
 /// # Errors
 /// Those of the orbit.
@@ -146,8 +147,8 @@ pub fn presence_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) 
     presence(scene, sv, time, &motion)
 }
 
-/// Doppler: minus the derivative of the carrier, by a stencil of five points 10 ms apart that does not straddle a break.
-/// `here` is what is seen at the sample, which is one of the five.
+/// Doppler: minus the derivative of the carrier, by a stencil of five points 10 ms apart that does not
+/// straddle a break. `here` is what is seen at the sample, which is one of the five.
 fn doppler_hz(
     scene: &Scene,
     from: &Constellation,

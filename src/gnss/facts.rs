@@ -1,7 +1,8 @@
-//! Facts of a scene that generator and judge share: what it expects of a receiver, and what is wrong with its satellites.
+//! Facts of a scene that generator and judge share: what it expects of a receiver, and what is wrong with its
+//! satellites.
 //!
-//! They lie in `truth/scene.json`, so that a run can be judged wherever it is. No receiver reads them. Times are seconds from
-//! the scene's first sample.
+//! They lie in `truth/scene.json`, so that a run can be judged wherever it is. No receiver reads them. Times
+//! are seconds from the scene's first sample.
 
 use serde::{Deserialize, Serialize};
 

@@ -236,7 +236,8 @@ pub struct AcquisitionRow {
     pub cn0_dbhz: f64,
 }
 
-/// A line in the spectrum of the samples that no satellite sends: `rx/interference.csv`, a row for each second that has one.
+/// A line in the spectrum of the samples that no satellite sends: `rx/interference.csv`, a row for each
+/// second that has one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LineRow {
     /// First sample looked at.
@@ -306,7 +307,8 @@ pub enum Event {
     BitSynchronised,
     FrameSynchronised,
     EphemerisComplete,
-    /// The ionosphere's parameters came, for the first time or other than before: fixes are corrected by them from here on.
+    /// The ionosphere's parameters came, for the first time or other than before: fixes are corrected by them
+    /// from here on.
     IonosphereDecoded,
     /// The satellite says that it is unhealthy: it is not used from here on.
     Unhealthy,

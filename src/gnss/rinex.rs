@@ -1,8 +1,8 @@
 //! RINEX navigation files, versions 2 to 4: GPS LNAV ephemerides, the ionosphere's coefficients and the leap seconds.
 //!
-//! Source: RINEX 2.11, table A4; RINEX 3.05, table A6; RINEX 4.02. Lines and columns are `columns`'s matter; here every
-//! element is held against the range of its LNAV field (IS-GPS-200N, tables 20-I and 20-III). A record that fails is left
-//! out and named in [`Navigation::skipped`].
+//! Source: RINEX 2.11, table A4; RINEX 3.05, table A6; RINEX 4.02. Lines and columns are `columns`'s matter;
+//! here every element is held against the range of its LNAV field (IS-GPS-200N, tables 20-I and 20-III). A
+//! record that fails is left out and named in [`Navigation::skipped`].
 
 mod columns;
 
@@ -119,8 +119,8 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     Ok(navigation)
 }
 
-/// GPS time against UTC with its week near `anchor`, for files write it counted on or modulo 1024 or 256; none where all is
-/// zero, as files have it that know nothing.
+/// GPS time against UTC with its week near `anchor`, for files write it counted on or modulo 1024 or 256;
+/// none where all is zero, as files have it that know nothing.
 fn utc_polynomial(line: columns::UtcLine, anchor: Epoch) -> Result<Option<UtcPolynomial>, String> {
     let columns::UtcLine { a0_s, a1_sps, tow_s, week } = line;
     if (a0_s, a1_sps) == (0.0, 0.0) && tow_s == 0.0 {

@@ -1,10 +1,11 @@
 //! Precise orbits and clocks, SP3 versions c and d: an adapter over the `sp3` crate that yields GPS satellites.
 //!
-//! Source: The Extended Standard Product 3 Orbit Format (SP3-d), S. Hilla, 2016. Positions are of the centre of mass in the
-//! axes of the Earth; clocks belong to the ionosphere-free combination of P1 and P2 and leave out the periodic part of
-//! relativity, as broadcast ones do before theirs is added. The crate panics on damaged lines, gives a missing clock as
-//! 999999 µs, drops fractions of seconds, reads a version a in the wrong time and writes y into the x of velocities, so
-//! here the call is fenced, the first three are looked after and versions a and b refused; velocities are not used.
+//! Source: The Extended Standard Product 3 Orbit Format (SP3-d), S. Hilla, 2016. Positions are of the centre
+//! of mass in the axes of the Earth; clocks belong to the ionosphere-free combination of P1 and P2 and leave
+//! out the periodic part of relativity, as broadcast ones do before theirs is added. The crate panics on
+//! damaged lines, gives a missing clock as 999999 µs, drops fractions of seconds, reads a version a in the
+//! wrong time and writes y into the x of velocities, so here the call is fenced, the first three are looked
+//! after and versions a and b refused; velocities are not used.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;

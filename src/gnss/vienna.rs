@@ -285,7 +285,8 @@ impl Gpt3 {
     }
 }
 
-/// Zenith wet delay in metres (Askne & Nordius 1987, with the refractivities of Bevis et al. 1994 as GPT3's authors use them).
+/// Zenith wet delay in metres (Askne & Nordius 1987, with the refractivities of Bevis et al. 1994 as GPT3's
+/// authors use them).
 pub fn zenith_wet_m(weather: &Gpt3Weather) -> f64 {
     const K1_KPHPA: f64 = 77.604;
     const K2_KPHPA: f64 = 64.79;

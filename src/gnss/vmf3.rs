@@ -1,9 +1,10 @@
 //! VMF3's own coefficients b and c of the mapping functions, by place and season.
 //!
 //! Source: Landskron & Böhm 2018, "VMF3/GPT3: refined discrete and empirical troposphere mapping functions":
-//! each is an expansion in spherical harmonics to degree and order 12, of a mean and of a year's and half a year's cosine
-//! and sine. Legendre's functions are neither normalised nor do they have the phase (-1)^m. Their numbers, as TU Wien
-//! gives them out, are in `data/vmf3.csv`. Limits: b and c fit coefficients a of VMF3 grids or of GPT3, not VMF1's.
+//! each is an expansion in spherical harmonics to degree and order 12, of a mean and of a year's and half a
+//! year's cosine and sine. Legendre's functions are neither normalised nor do they have the phase (-1)^m.
+//! Their numbers, as TU Wien gives them out, are in `data/vmf3.csv`. Limits: b and c fit coefficients a of
+//! VMF3 grids or of GPT3, not VMF1's.
 
 use crate::gnss::vienna::{Season, ViennaError, season_terms};
 
@@ -150,7 +151,8 @@ mod tests {
         let vmf3 = Vmf3::embedded().unwrap();
         let zeros = vmf3.0.iter().flat_map(|t| t.cosine.iter().chain(&t.sine)).flatten().filter(|x| **x == 0.0).count();
         assert_eq!(zeros, 13 * 4 * 5);
-        // b and c of VMF1 are 0.0029 and 0.062 to 0.071, 0.00146 and 0.04391; the globe's spread is a fifth or so of each.
+        // b and c of VMF1 are 0.0029 and 0.062 to 0.071, 0.00146 and 0.04391; the globe's spread is a fifth
+        // or so of each.
         for latitude in [-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0] {
             for longitude in [-180.0, -90.0, 0.0, 45.0, 180.0] {
                 for day in [1.0, 91.0, 182.0, 274.0] {

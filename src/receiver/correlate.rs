@@ -103,8 +103,8 @@ impl Replica {
         (self.chips.len() as i64) << CODE_BITS
     }
 
-    /// Up to `places` delays at which the code's correlation with itself is smallest, a chip to either side included, spread
-    /// over the period: what a correlator shows there is noise.
+    /// Up to `places` delays at which the code's correlation with itself is smallest, a chip to either side
+    /// included, spread over the period: what a correlator shows there is noise.
     pub fn quiet_taps(&self, places: usize) -> Vec<i64> {
         let length = self.chips.len();
         let correlation = |shift: usize| {
@@ -122,14 +122,15 @@ impl Replica {
         ranked.into_iter().take(places).map(|(_, shift)| (shift as i64) << CODE_BITS).collect()
     }
 
-    /// Σ x·conj(replica) with the replica at each of `taps` (code phase units ahead of the prompt), in `f32`. The sums do
-    /// not depend on the processor: sixteen fixed lanes, each 1024 samples added in one order.
+    /// Σ x·conj(replica) with the replica at each of `taps` (code phase units ahead of the prompt), in `f32`.
+    /// The sums do not depend on the processor: sixteen fixed lanes, each 1024 samples added in one order.
     pub fn correlate<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
         kernel::correlate(kernel::Level::best(), kernel::Fast::Single, self, (i, q), nco, taps)
     }
 
-    /// The same in integers of 16 bits, for samples of 8 bits: within ±127.5, in steps of 2⁻⁷ or more. At steps of the code
-    /// that do not suit 16 bits (C/A: below 1.06 and above 65 Msps) it is [`Self::correlate`].
+    /// The same in integers of 16 bits, for samples of 8 bits: within ±127.5, in steps of 2⁻⁷ or more. At
+    /// steps of the code that do not suit 16 bits (C/A: below 1.06 and above 65 Msps) it is
+    /// [`Self::correlate`].
     pub fn correlate_short<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
         kernel::correlate(kernel::Level::best(), kernel::Fast::Short, self, (i, q), nco, taps)
     }
@@ -189,11 +190,13 @@ pub fn power(i: &[f32], q: &[f32]) -> f64 {
     kernel::power(kernel::Level::best(), i, q)
 }
 
-/// Error of the code, root mean square, while every chip meets the same few places between samples: at whole ratios of sample
-/// and chip rate, or ratios of small numbers, and a satellite whose code stands still against the samples. In metres.
+/// Error of the code, root mean square, while every chip meets the same few places between samples: at whole
+/// ratios of sample and chip rate, or ratios of small numbers, and a satellite whose code stands still
+/// against the samples. In metres.
 ///
-/// With `q` places in turn nearest edges know the code to a sample in `q` (uniform: over √12). Area edges against a signal limited to half
-/// the rate err by 5.1, 1.61 and 0.11 m at 2, 4 and 10 samples a chip; the law is the second's, with the square.
+/// With `q` places in turn nearest edges know the code to a sample in `q` (uniform: over √12). Area edges
+/// against a signal limited to half the rate err by 5.1, 1.61 and 0.11 m at 2, 4 and 10 samples a chip; the
+/// law is the second's, with the square.
 pub fn standing_bias_m(edge: Edge, rate_hz: f64, component: &Component) -> f64 {
     let chips = f64::from(component.code_chips);
     // Places drift apart within a code period when the ratio misses by more than this.
@@ -338,8 +341,9 @@ mod tests {
                     let fast = same_at_every_level(kernel::Fast::Short, &replica, (i, q), &nco, &taps);
                     let slow = replica.slow(i, q, &nco, &taps);
                     for ((a, b), tap) in fast.iter().zip(&slow).zip(taps) {
-                        // A sample of at most 90 LSB: its replica errs by half of 2⁻⁸ and, at an edge, by two halves of the
-                        // phase's last bit times the slope of 2 a step; its rotation by 2⁻⁷ LSB and 2⁻¹⁶ of it.
+                        // A sample of at most 90 LSB: its replica errs by half of 2⁻⁸ and, at an edge, by two
+                        // halves of the phase's last bit times the slope of 2 a step; its rotation by 2⁻⁷ LSB
+                        // and 2⁻¹⁶ of it.
                         let unit = 1.0 / f64::from(1_u32 << steps.fine);
                         let sample = 90.0 * (1.0 / 512.0 + 2.0 * unit / units_to_chips(step) + 2e-5) + 0.011;
                         // Errors have any sign: four standard deviations of the sum, were they all this large.
@@ -372,8 +376,9 @@ mod tests {
                 code_step: chips_to_units(1.023 / rate) as u64,
             };
             let taps = [chips_to_units(0.25), 0, chips_to_units(-0.25)];
-            // Noise of the sum: √(30011/6) = 71 times the samples' width. Lanes of 64 terms keep 1e-4 of it in f32; in 16
-            // bits a sample errs by 2⁻⁹ to 2⁻⁸ of itself, and with nearest edges 2 in 10⁴ samples have the other chip.
+            // Noise of the sum: √(30011/6) = 71 times the samples' width. Lanes of 64 terms keep 1e-4 of it
+            // in f32; in 16 bits a sample errs by 2⁻⁹ to 2⁻⁸ of itself, and with nearest edges 2 in 10⁴
+            // samples have the other chip.
             for (fast, (i, q), bar) in
                 [(kernel::Fast::Single, &single, 7e-3), (kernel::Fast::Short, &short, 71.0 * 128.0 * 0.03)]
             {
@@ -419,8 +424,8 @@ mod tests {
                     .map(|c| replica.value(c, step as u64) * replica.value(c + tap, step as u64))
                     .sum();
                 let (model, _) = correlation(edge, chips_per_sample, offset);
-                // The code is not random: its correlation one chip away is up to 65/1023, of which area edges see a sixth
-                // each side at offset 0 and up to half at 0.5.
+                // The code is not random: its correlation one chip away is up to 65/1023, of which area edges
+                // see a sixth each side at offset 0 and up to half at 0.5.
                 assert!(
                     (sum / n as f64 - model).abs() < 0.5 * 65.0 / 1023.0,
                     "{edge:?} {rate} {offset}: {} {model}",

@@ -1,9 +1,10 @@
 //! Whether the bytes of a recording look like the format that was declared.
 //!
-//! Noise from an antenna is nearly Gaussian about zero, so the bytes of each format have a shape of their own: one peak about
-//! 0 or about 127.5 for single bytes; bytes of all values in turn with few about 0 for 16 bits; and for floats, exponents
-//! near that of one. Limits: real samples cannot be told from complex ones of the same width, nor anything from
-//! samples that are silent, or that saturate or are jammed until all bytes are alike; then nothing is said.
+//! Noise from an antenna is nearly Gaussian about zero, so the bytes of each format have a shape of their
+//! own: one peak about 0 or about 127.5 for single bytes; bytes of all values in turn with few about 0 for 16
+//! bits; and for floats, exponents near that of one. Limits: real samples cannot be told from complex ones of
+//! the same width, nor anything from samples that are silent, or that saturate or are jammed until all bytes
+//! are alike; then nothing is said.
 
 use std::fmt;
 
@@ -13,7 +14,8 @@ use crate::gnss::samples::Format;
 pub const LOOKED_AT_BYTES: usize = 1 << 16;
 /// Fewer bytes than these say nothing.
 const LEAST_BYTES: usize = 1 << 12;
-/// Root mean square of a byte of evenly spread values, about 0 and about 127.5 alike, is 73.9; below this it has a peak there.
+/// Root mean square of a byte of evenly spread values, about 0 and about 127.5 alike, is 73.9; below this it
+/// has a peak there.
 const PEAKED: f64 = 60.0;
 /// And above this it is spread as evenly as the low byte of 16-bit samples with a deviation of a hundred or more.
 const SPREAD: f64 = 68.0;

@@ -1,15 +1,18 @@
 //! Continuous waves among the samples: lines that stand out of the averaged spectrum.
 //!
-//! Ten times a second a segment of the samples is transformed (Hann window, bins of 0.5 to 1 kHz); ten powers are averaged and each bin is
-//! held against those beside it. In Gaussian noise, white or coloured, a bin's mean is chi-square with 20 degrees of freedom
-//! about its density, so the threshold over it follows from the probability of a false alarm, [`FALSE_ALARM`] for all bins of
-//! one spectrum. The density is the median of 64 bins on either side, the greater of both, so that the edge of a filter is no line
-//! (a greatest-of CFAR test: Hansen 1973; order statistics: Rohling 1983). Satellites have lines of their own, 1 kHz apart and
-//! at most 21.3 dB below the whole for C/A: what is no stronger than those of the strongest satellite followed is not told.
+//! Ten times a second a segment of the samples is transformed (Hann window, bins of 0.5 to 1 kHz); ten powers
+//! are averaged and each bin is held against those beside it. In Gaussian noise, white or coloured, a bin's
+//! mean is chi-square with 20 degrees of freedom about its density, so the threshold over it follows from the
+//! probability of a false alarm, [`FALSE_ALARM`] for all bins of one spectrum. The density is the median of
+//! 64 bins on either side, the greater of both, so that the edge of a filter is no line (a greatest-of CFAR
+//! test: Hansen 1973; order statistics: Rohling 1983). Satellites have lines of their own, 1 kHz apart and at
+//! most 21.3 dB below the whole for C/A: what is no stronger than those of the strongest satellite followed
+//! is not told.
 //!
-//! Sensitivity: J/N0 of 37 dB-Hz at 2.6 Msps, far below what a loop minds. Limits: nothing is told within three bins of a
-//! constant offset, nor of a real recording's half rate; a wave that comes and goes within a second is averaged; lines of a
-//! strong signal that is not followed pass for interference, and a sweep shows as many lines.
+//! Sensitivity: J/N0 of 37 dB-Hz at 2.6 Msps, far below what a loop minds. Limits: nothing is told within
+//! three bins of a constant offset, nor of a real recording's half rate; a wave that comes and goes within a
+//! second is averaged; lines of a strong signal that is not followed pass for interference, and a sweep shows
+//! as many lines.
 
 use std::sync::Arc;
 
@@ -33,7 +36,8 @@ const BESIDE: usize = 64;
 const GUARD: usize = 4;
 /// Bins about a constant offset that are not looked at.
 const OFFSET_BINS: usize = 3;
-/// Largest line of a C/A code over its power (PRN 24; −21.26 dB), and room for two that meet and for the estimate: 6 dB.
+/// Largest line of a C/A code over its power (PRN 24; −21.26 dB), and room for two that meet and for the
+/// estimate: 6 dB.
 const OWN_LINE: f64 = 0.0075 * 4.0;
 
 /// Spectra of the samples, second after second.
@@ -88,8 +92,8 @@ impl Watch {
         }
     }
 
-    /// Takes the next block and tells `told` of every spectrum that it completes: the number of its first sample, and its
-    /// strongest line if it has one. `strongest_cn0_hz` is that of the satellites followed.
+    /// Takes the next block and tells `told` of every spectrum that it completes: the number of its first
+    /// sample, and its strongest line if it has one. `strongest_cn0_hz` is that of the satellites followed.
     pub fn take(&mut self, block: &Packed, strongest_cn0_hz: f64, mut told: impl FnMut(u64, Option<LineRow>)) {
         let bins = self.window.len();
         loop {
@@ -209,8 +213,8 @@ impl Watch {
     }
 }
 
-/// Where between its neighbours a line peaks whose powers by a Hann window are these, in bins from the middle one: two neighbours'
-/// amplitudes have the ratio (1 + δ)/(2 − δ).
+/// Where between its neighbours a line peaks whose powers by a Hann window are these, in bins from the middle
+/// one: two neighbours' amplitudes have the ratio (1 + δ)/(2 − δ).
 pub(super) fn hann_peak(before: f64, at: f64, after: f64) -> f64 {
     let [before, at, after] = [before, at, after].map(f64::sqrt);
     let beyond = |neighbour: f64| (2.0 * neighbour - at) / (neighbour + at);
@@ -295,7 +299,8 @@ mod tests {
         {
             let metadata = metadata(format, rate_hz);
             let mut noise = Noise(5);
-            // N0 = 2σ²/fs, both of complex samples and, one-sided, of real ones, whose tone has half of its square as power.
+            // N0 = 2σ²/fs, both of complex samples and, one-sided, of real ones, whose tone has half of its
+            // square as power.
             let n0 = 2.0 * 100.0 / rate_hz;
             let power = libm::pow(10.0, 4.5) * n0;
             let height = if format.is_complex() { power.sqrt() } else { (2.0 * power).sqrt() };
@@ -331,9 +336,10 @@ mod tests {
             });
             assert!(rows.len() == 8 && rows.iter().all(Option::is_none), "{coloured} {rows:?}");
         }
-        // At a designed false alarm in two spectra: 400 of them, drawn as what noise makes of them. The greater of two medians lies
-        // 3 % above the density and scatters by 4 %, which leaves 0.79 of the alarms of a bin at this threshold (and makes
-        // 1.15 of them at the real one, where the tail is steeper): 0.42, and three sigma of 0.025.
+        // At a designed false alarm in two spectra: 400 of them, drawn as what noise makes of them. The
+        // greater of two medians lies 3 % above the density and scatters by 4 %, which leaves 0.79 of the
+        // alarms of a bin at this threshold (and makes 1.15 of them at the real one, where the tail is
+        // steeper): 0.42, and three sigma of 0.025.
         let mut watch = Watch::new(&metadata);
         watch.threshold = threshold(libm::log(2.0) / watch.powers.len() as f64, 2 * SEGMENTS) / f64::from(2 * SEGMENTS);
         let mut alarms = 0;

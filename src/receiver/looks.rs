@@ -1,12 +1,14 @@
 //! What two searches of the same satellites show: how fast their codes ran in between.
 //!
-//! Each search gives a code phase and a Doppler. Over the seconds between two of them the code's own Doppler follows
-//! without any lock. Plotted against the carrier's it lies on a line: slope +1 through the origin is sound, slope −1 is a
-//! mirrored spectrum, and what all satellites share beside the slope parts code and carrier ([`parting`](super::parting)).
+//! Each search gives a code phase and a Doppler. Over the seconds between two of them the code's own Doppler
+//! follows without any lock. Plotted against the carrier's it lies on a line: slope +1 through the origin is
+//! sound, slope −1 is a mirrored spectrum, and what all satellites share beside the slope parts code and
+//! carrier ([`parting`](super::parting)).
 //!
-//! Two code phases of a search err by 0.1 chip each at most: 54 Hz of the carrier after four seconds for a satellite.
-//! Whole code periods in between are unknown, so code Dopplers are right modulo carrier/(code rate · time), 394 kHz over 4 s
-//! of C/A code, and are taken near the carrier's. Limits: a break in the samples between both searches looks like a rate.
+//! Two code phases of a search err by 0.1 chip each at most: 54 Hz of the carrier after four seconds for a
+//! satellite. Whole code periods in between are unknown, so code Dopplers are right modulo carrier/(code rate
+//! · time), 394 kHz over 4 s of C/A code, and are taken near the carrier's. Limits: a break in the samples
+//! between both searches looks like a rate.
 
 use std::collections::BTreeMap;
 

@@ -1,9 +1,10 @@
 //! Observables at common epochs: what a channel's replica reads, in metres, cycles and hertz.
 //!
-//! The time sent is an exact count of code periods since the week began and a fraction of one, never one number of seconds.
-//! The receiver labels samples with its own clock: as the recording says if that agrees with the satellites
-//! to a second, otherwise so that the nearest satellite is about 70 ms away. Satellites whose time of sending is out of line
-//! with the others' (a wrong bit edge or code period of another) are left out.
+//! The time sent is an exact count of code periods since the week began and a fraction of one, never one
+//! number of seconds. The receiver labels samples with its own clock: as the recording says if that agrees
+//! with the satellites to a second, otherwise so that the nearest satellite is about 70 ms away. Satellites
+//! whose time of sending is out of line with the others' (a wrong bit edge or code period of another) are
+//! left out.
 
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::Observation;
@@ -15,11 +16,12 @@ use crate::receiver::track::Measurement;
 
 /// Travel time to the nearest satellite that is assumed when the clock is set from satellites alone.
 const NEAREST_TRAVEL_S: f64 = 0.070;
-/// Departure of a travel time from the median of all. From near the Earth they lie between 60 and 95 ms; from anywhere two
-/// satellites differ by 53 200 km at most, the width of their orbits.
+/// Departure of a travel time from the median of all. From near the Earth they lie between 60 and 95 ms; from
+/// anywhere two satellites differ by 53 200 km at most, the width of their orbits.
 const NEAR_SPREAD_S: f64 = 0.035;
 const FAR_SPREAD_S: f64 = 0.178;
-/// A receiver is far away where this share of all satellites departs by more than from near the Earth: wrong times are single.
+/// A receiver is far away where this share of all satellites departs by more than from near the Earth: wrong
+/// times are single.
 const FAR_SHARE: f64 = 1.0 / 3.0;
 /// The recording's start time is believed when it is this near.
 const BELIEVED_S: f64 = 1.0;
@@ -91,8 +93,8 @@ impl Timebase {
         self.heard.get_or_insert(time);
     }
 
-    /// So many samples are missing before those that come now, or came twice if negative: samples count time no more, and
-    /// what the clock reads at those that come is right with another start.
+    /// So many samples are missing before those that come now, or came twice if negative: samples count time
+    /// no more, and what the clock reads at those that come is right with another start.
     pub fn step(&mut self, samples: i64) {
         let (whole, fraction) = self.rate.elapsed(samples.unsigned_abs());
         let sign = samples.signum();

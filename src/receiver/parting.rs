@@ -10,8 +10,9 @@
 //! slope, does not depend on B. At 45 dB-Hz (σ = 0.58 m at 0.5 Hz, 3.1 carrier cycles) that is 11 Hz/T^1.5 for one
 //! satellite and 3.7 Hz/T^1.5 for eight: 4 Hz after a second, 0.12 Hz after ten, 0.02 Hz after thirty.
 //!
-//! Limits: an ionosphere that changes for all satellites alike, or a turning antenna, looks the same; the first is below
-//! [`LEAST_HZ`], the second is removed like an oscillator's offset. Multipath counts by its scatter between satellites.
+//! Limits: an ionosphere that changes for all satellites alike, or a turning antenna, looks the same; the
+//! first is below [`LEAST_HZ`], the second is removed like an oscillator's offset. Multipath counts by its
+//! scatter between satellites.
 
 use std::fmt;
 
@@ -252,7 +253,8 @@ mod tests {
         (0..12).map(|_| uniform(state)).sum::<f64>() - 6.0
     }
 
-    /// A line through `seconds` of a channel whose carrier is `ahead_hz` ahead, with code noise of a loop of `bandwidth_hz`.
+    /// A line through `seconds` of a channel whose carrier is `ahead_hz` ahead, with code noise of a loop of
+    /// `bandwidth_hz`.
     fn line(seconds: f64, ahead_hz: f64, sigma_cycles: f64, bandwidth_hz: f64, state: &mut u64) -> Line {
         let (mut line, mut error, step) = (Line::default(), sigma_cycles * noise(state), 130_000);
         let keep = libm::exp(-4.0 * bandwidth_hz * step as f64 / RATE_HZ);
@@ -291,7 +293,8 @@ mod tests {
                 (0..400).map(|_| line(seconds, 7.0, 3.1, 0.5, &mut state).estimate(3.1, 0.5).unwrap()).collect();
             let variance = lines.iter().map(|l| (l.hz - 7.0) * (l.hz - 7.0)).sum::<f64>() / 400.0;
             let ratio = variance.sqrt() / lines[0].sigma_hz;
-            // 400 draws know a deviation to 3.5 %, four of these are 14 %; the law leaves out terms of τ/T, 10 % at 10 s.
+            // 400 draws know a deviation to 3.5 %, four of these are 14 %; the law leaves out terms of τ/T,
+            // 10 % at 10 s.
             assert!((0.72..1.15).contains(&ratio), "{seconds} s: {ratio}");
         }
     }

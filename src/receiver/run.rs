@@ -187,7 +187,8 @@ fn image(metadata: &IfMetadata, signal: &Signal, doppler_max_hz: f64) -> Option<
     })
 }
 
-/// Signals and satellites that the samples can hold; with `reserved` also codes that no satellite of the constellation sends.
+/// Signals and satellites that the samples can hold; with `reserved` also codes that no satellite of the
+/// constellation sends.
 pub(super) fn candidates(metadata: &IfMetadata, reserved: bool) -> Vec<(&'static Signal, Sv)> {
     let half_hz = 0.5 * metadata.rate.hz();
     SIGNALS

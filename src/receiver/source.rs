@@ -1,7 +1,7 @@
 //! Samples as the receiver meets them: packed bytes, however they arrive, become blocks of a fixed number of samples.
 //!
-//! A [`Source`] keeps at most one unfinished block, so that memory stays flat however long the recording is. A sample cut
-//! off at the end of the stream is left out and its bytes are counted.
+//! A [`Source`] keeps at most one unfinished block, so that memory stays flat however long the recording is.
+//! A sample cut off at the end of the stream is left out and its bytes are counted.
 
 use std::ops::Range;
 

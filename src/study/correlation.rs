@@ -1,7 +1,8 @@
 //! The shape of a correlation peak: the triangle of unlimited bandwidth, or that of a rectangular front end.
 //!
-//! Behind a filter the peak is R(τ) = ∫S(f)·cos(2πfτ) df over the band with S = sinc²(f), and the noise of taps correlates by
-//! R(τ)/R(0); the power outside, 1−R(0), is lost. Tabulated with its slope and interpolated by cubics.
+//! Behind a filter the peak is R(τ) = ∫S(f)·cos(2πfτ) df over the band with S = sinc²(f), and the noise of
+//! taps correlates by R(τ)/R(0); the power outside, 1−R(0), is lost. Tabulated with its slope and
+//! interpolated by cubics.
 
 use crate::receiver::track::loops::CodeShape;
 

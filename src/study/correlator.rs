@@ -1,9 +1,10 @@
 //! The receiver's loops on modelled correlations: one channel in steady tracking, without a sample.
 //!
-//! Every code period early, prompt and late are drawn with means √(2T·C/N0)·R(ε)·sinc(ΔfT)·e^(jφ) and unit noise a component
-//! whose covariance is that of the taps; they go through the loops, discriminators and C/N0 estimate of
-//! `receiver::track`, and what is left between truth and oscillators is measured. Source of the model: Kaplan and
-//! Hegarty, Understanding GPS 2nd ed., 5.3. Limits: one satellite, constant C/N0, no multipath; a period lasts its nominal time.
+//! Every code period early, prompt and late are drawn with means √(2T·C/N0)·R(ε)·sinc(ΔfT)·e^(jφ) and unit
+//! noise a component whose covariance is that of the taps; they go through the loops, discriminators and C/N0
+//! estimate of `receiver::track`, and what is left between truth and oscillators is measured. Source of the
+//! model: Kaplan and Hegarty, Understanding GPS 2nd ed., 5.3. Limits: one satellite, constant C/N0, no
+//! multipath; a period lasts its nominal time.
 
 use num_complex::Complex64;
 
@@ -140,8 +141,8 @@ pub fn run(case: &Case) -> Outcome {
     outcome
 }
 
-/// Runs a case and hands out every loop update; gives the breaks that the receiver's detectors declared, and when and why
-/// the signal was lost.
+/// Runs a case and hands out every loop update; gives the breaks that the receiver's detectors declared, and
+/// when and why the signal was lost.
 pub fn simulate(case: &Case, mut each: impl FnMut(&Epoch)) -> (u64, Option<(f64, Loss)>) {
     let mut channel = Channel::new(case);
     let updates = (case.duration_s + case.settle_s) / channel.update_s;
@@ -302,8 +303,8 @@ impl<'a> Channel<'a> {
         }
     }
 
-    /// Early, prompt and late of one period, of mean phase error `cycles`, which turns by `turned` cycles in it, and mean
-    /// code error `chips`.
+    /// Early, prompt and late of one period, of mean phase error `cycles`, which turns by `turned` cycles in
+    /// it, and mean code error `chips`.
     fn correlate(&mut self, cycles: f64, turned: f64, chips: f64) -> [Complex64; 3] {
         if self.has_symbols && self.number.is_multiple_of(u64::from(self.group)) {
             self.symbol = symbol(self.case.seed, self.number / u64::from(self.group));

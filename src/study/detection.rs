@@ -1,8 +1,9 @@
 //! How often the receiver's search finds a satellite that is there, and one that is not, counted in samples.
 //!
-//! A scene of one satellite is generated once for a C/N0 and cut into stretches, one trial each; the search is told a centre
-//! frequency that puts the satellite's Doppler where the trial wants it between two bins. Expected are [`search`](super::search)
-//! for detections and the designed probability for false alarms. Limits: trials of one C/N0 share a satellite and its message.
+//! A scene of one satellite is generated once for a C/N0 and cut into stretches, one trial each; the search
+//! is told a centre frequency that puts the satellite's Doppler where the trial wants it between two bins.
+//! Expected are [`search`](super::search) for detections and the designed probability for false alarms.
+//! Limits: trials of one C/N0 share a satellite and its message.
 
 use std::fmt::Write as _;
 use std::io;

@@ -1,8 +1,8 @@
 //! What theory predicts for a simulated channel: the plain description of the receiver's loops, and its thermal jitter.
 //!
-//! Gains are those that the receiver's settings lead to; everything else is `analysis::theory`, which does not know the
-//! receiver. Half-cycle wraps of the frequency discriminator count as white noise of their own. Limits: small errors, noise as the
-//! squaring-loss formulas have it, no dynamics and no oscillator.
+//! Gains are those that the receiver's settings lead to; everything else is `analysis::theory`, which does
+//! not know the receiver. Half-cycle wraps of the frequency discriminator count as white noise of their own.
+//! Limits: small errors, noise as the squaring-loss formulas have it, no dynamics and no oscillator.
 
 use std::f64::consts::TAU;
 
@@ -86,7 +86,8 @@ pub fn phase_cycles(case: &Case) -> Option<Jitter> {
     Some(jitter)
 }
 
-/// Jitter of the carrier oscillator's frequency in hertz, whichever loop sets it; wraps only where the frequency loop is alone.
+/// Jitter of the carrier oscillator's frequency in hertz, whichever loop sets it; wraps only where the
+/// frequency loop is alone.
 pub fn frequency_hz(case: &Case) -> Option<Jitter> {
     let update_s = case.update_s();
     let raw_hz = pll::raw_rad(update_s, cn0_hz(case)?) / (TAU * update_s);

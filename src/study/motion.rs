@@ -1,8 +1,10 @@
-//! The truth that modelled loops follow: motion along the line of sight and the receiver's oscillator, in carrier cycles.
+//! The truth that modelled loops follow: motion along the line of sight and the receiver's oscillator, in
+//! carrier cycles.
 //!
-//! Motion is a polynomial of third order between steps and exact. The oscillator's white and random-walk frequency are exact at
-//! the ends of a period (two-state model, Zucca and Tavella 2005) and their mean over it is that of the ends; flicker
-//! is a bank of first-order processes with poles a factor of 4 apart, within 1 % of 1/f inside their span.
+//! Motion is a polynomial of third order between steps and exact. The oscillator's white and random-walk
+//! frequency are exact at the ends of a period (two-state model, Zucca and Tavella 2005) and their mean over
+//! it is that of the ends; flicker is a bank of first-order processes with poles a factor of 4 apart, within
+//! 1 % of 1/f inside their span.
 
 use super::normal::{Normals, Purpose};
 use crate::analysis::theory::clock::PowerLaw;
@@ -54,7 +56,8 @@ struct Oscillator {
 impl Oscillator {
     fn new(noise: &PowerLaw, carrier_hz: f64, period_s: f64, seed: u64) -> Self {
         let mut normals = Normals::new(seed, Purpose::Oscillator);
-        // Spectral intensities of the frequency's white part and of the walk's drive, h₀/2 and 2π²h₋₂ (Zucca and Tavella).
+        // Spectral intensities of the frequency's white part and of the walk's drive, h₀/2 and 2π²h₋₂ (Zucca
+        // and Tavella).
         let (white, drive) = (0.5 * noise.h[2], 2.0 * std::f64::consts::PI.powi(2) * noise.h[4]);
         let walk = (drive * period_s).sqrt();
         let from_walk = 0.5 * period_s * walk;

@@ -1,8 +1,8 @@
 //! The receiver's loops against theory over a grid: measured jitter of truth minus oscillator over the predicted one.
 //!
-//! Where T·C/N0 is at least 10 and B·T at most 0.36 the ratio must be one within 5 % (10 % for the frequency loop) or the
-//! measurement's own uncertainty; outside, the cause of a departure is named. Every cell runs until its spread is known to a
-//! stated precision. Thermal noise alone; unlimited bandwidth.
+//! Where T·C/N0 is at least 10 and B·T at most 0.36 the ratio must be one within 5 % (10 % for the frequency
+//! loop) or the measurement's own uncertainty; outside, the cause of a departure is named. Every cell runs
+//! until its spread is known to a stated precision. Thermal noise alone; unlimited bandwidth.
 
 use serde::Serialize;
 
@@ -218,8 +218,8 @@ impl Cell {
     }
 }
 
-/// Runs a cell until its spread is known to `uncertainty` (relative standard error). `None` where theory has no value for
-/// it or nothing could be measured.
+/// Runs a cell until its spread is known to `uncertainty` (relative standard error). `None` where theory has
+/// no value for it or nothing could be measured.
 pub fn measure(cell: &Cell, uncertainty: f64) -> Option<Row> {
     let jitter = predict(cell)?;
     let update_s = cell.case.update_s();

@@ -1,10 +1,11 @@
 //! Probability that a search finds a satellite, from the joint statistics of the cells about its peak.
 //!
-//! A search takes the largest of neighbouring cells, whose noise is alike and of which two or four may share the peak, so its
-//! detection probability exceeds that of one cell (`analysis::theory::detection`) and has no closed form. Here the
-//! correlations of a neighbourhood are drawn: mean from the folded spectrum of chips averaged over a sample, sinc over
-//! frequency and symbols that turn within a sum; noise with the covariance that the same two functions give. Limits: complex
-//! samples, one satellite, random codes beyond the neighbourhood.
+//! A search takes the largest of neighbouring cells, whose noise is alike and of which two or four may share
+//! the peak, so its detection probability exceeds that of one cell (`analysis::theory::detection`) and has no
+//! closed form. Here the correlations of a neighbourhood are drawn: mean from the folded spectrum of chips
+//! averaged over a sample, sinc over frequency and symbols that turn within a sum; noise with the covariance
+//! that the same two functions give. Limits: complex samples, one satellite, random codes beyond the
+//! neighbourhood.
 
 use std::f64::consts::TAU;
 
@@ -40,9 +41,9 @@ pub struct Model {
     pub cn0_dbhz: f64,
 }
 
-/// Spectrum of rectangular chips averaged over samples, as a search by transforms meets it: folded into the band of the samples, of which a
-/// part goes back to lags. A lag that is no whole number of samples turns what was folded against the rest, so that the
-/// peak loses part of it: up to 0.11 dB at 2.54 samples a chip.
+/// Spectrum of rectangular chips averaged over samples, as a search by transforms meets it: folded into the
+/// band of the samples, of which a part goes back to lags. A lag that is no whole number of samples turns
+/// what was folded against the rest, so that the peak loses part of it: up to 0.11 dB at 2.54 samples a chip.
 struct Folded {
     /// Frequency in turns a sample, and weight, from zero up: what was not folded, one side.
     own: Vec<(f64, f64)>,
@@ -79,7 +80,8 @@ impl Folded {
         Self { own, image, share: within / whole }
     }
 
-    /// Correlation of the signal at `offset` samples from a lag that is `place` samples past a whole one, in units of the noise's.
+    /// Correlation of the signal at `offset` samples from a lag that is `place` samples past a whole one, in
+    /// units of the noise's.
     fn signal(&self, offset: f64, place: f64) -> f64 {
         let sum = |nodes: &[(f64, f64)], turn: f64| -> f64 {
             nodes.iter().map(|(turns, weight)| weight * libm::cos(TAU * (turns * offset + turn))).sum()
@@ -105,8 +107,8 @@ fn sinc(x: f64) -> f64 {
 }
 
 impl Model {
-    /// Share of `draws` in which the satellite is found, its Doppler each of `doppler_hz` off the nearest bin in turn, the edges
-    /// of its symbols anywhere.
+    /// Share of `draws` in which the satellite is found, its Doppler each of `doppler_hz` off the nearest bin
+    /// in turn, the edges of its symbols anywhere.
     pub fn probability(&self, doppler_hz: &[f64], draws: u32, seed: u64) -> f64 {
         let lags: Vec<f64> = (-SIDE_LAGS..=SIDE_LAGS).map(f64::from).collect();
         let bins: Vec<f64> = (-SIDE_BINS..=SIDE_BINS).map(f64::from).collect();
@@ -216,7 +218,8 @@ mod tests {
 
     #[test]
     fn a_lonely_cell_is_found_as_often_as_the_closed_form_says() {
-        // Lags of five chips, 12.5 samples, apart, bins of whole cycles, a code on its lag and a symbol that never turns leave one cell.
+        // Lags of five chips, 12.5 samples, apart, bins of whole cycles, a code on its lag and a symbol that
+        // never turns leave one cell.
         const DRAWS: u32 = 20_000;
         let model = Model {
             sums: 10,

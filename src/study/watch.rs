@@ -1,4 +1,5 @@
-//! The lock detectors of a channel in steady tracking, by the receiver's own rules: `receiver::track::channel::supervise`.
+//! The lock detectors of a channel in steady tracking, by the receiver's own rules:
+//! `receiver::track::channel::supervise`.
 
 use num_complex::Complex64;
 

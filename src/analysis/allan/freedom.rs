@@ -104,12 +104,13 @@ fn differenced(t: f64, order: usize, filter: Filter, alpha: i32) -> f64 {
     (0..).zip(weights).map(pair).sum()
 }
 
-/// Averaging factor from which [`total`] holds; below, total and overlapping Allan deviation hardly differ, and at m = 1
-/// not at all, where the published 1.5 T/τ is more than twice too many.
+/// Averaging factor from which [`total`] holds; below, total and overlapping Allan deviation hardly differ,
+/// and at m = 1 not at all, where the published 1.5 T/τ is more than twice too many.
 pub const TOTAL_FROM: usize = 16;
 
-/// Degrees of freedom of the total deviation over `t_over_tau` averaging times, and its variance's mean in units of
-/// the Allan variance; `None` for phase noises, for which nothing is published: those of the overlapping Allan variance serve.
+/// Degrees of freedom of the total deviation over `t_over_tau` averaging times, and its variance's mean in
+/// units of the Allan variance; `None` for phase noises, for which nothing is published: those of the
+/// overlapping Allan variance serve.
 pub fn total(alpha: i32, t_over_tau: f64) -> Option<(f64, f64)> {
     match alpha {
         0 => Some((1.5 * t_over_tau, 1.0)),

@@ -154,9 +154,9 @@ fn intervals_are_those_of_stable32_on_the_thousand_point_set() {
             let freedom = degrees_of_freedom(deviation.estimator(), 0, m, x.len()).unwrap();
             // The probability within one standard deviation of a normal error.
             let ends = interval(freedom, 0.682_689_492_137).unwrap();
-            // That program too takes readings at instants where it has more than 100 lags, m above 33 or 25. Below, it takes
-            // means over τ₀, which changes the edf by up to 17 % (at m = 1: 782 for 666) and an end by half of that times
-            // its distance of 1/√(2 edf): 2.4e-3, in third differences 2.9e-3.
+            // That program too takes readings at instants where it has more than 100 lags, m above 33 or 25.
+            // Below, it takes means over τ₀, which changes the edf by up to 17 % (at m = 1: 782 for 666) and
+            // an end by half of that times its distance of 1/√(2 edf): 2.4e-3, in third differences 2.9e-3.
             let tolerance = if m >= 64 { 2e-4 } else { 3e-3 };
             for (factor, printed) in [(ends.0, low), (ends.1, high)] {
                 let printed: f64 = printed.parse().unwrap();
@@ -246,8 +246,8 @@ fn degrees_of_freedom_agree_with_the_handbook_s_empirical_formulas() {
             5.0 * n * n / (4.0 * m * (n + 3.0 * m))
         };
         let walk = (n - 2.0) / m * ((n - 1.0).powi(2) - 3.0 * m * (n - 1.0) + 4.0 * m * m) / (n - 3.0).powi(2);
-        // SP 1065, section 5.4, for the overlapping Allan variance, with the worst that its fits are off by here. That of flicker
-        // phase noise is off by 29 %; the next test has it.
+        // SP 1065, section 5.4, for the overlapping Allan variance, with the worst that its fits are off by
+        // here. That of flicker phase noise is off by 29 %; the next test has it.
         let table = [
             (2, (n + 1.0) * (n - 2.0 * m) / (2.0 * (n - m)), 0.03),
             (0, (1.5 * (n - 1.0) / m - 2.0 * (n - 2.0) / n) * 4.0 * m * m / (4.0 * m * m + 5.0), 0.02),
@@ -261,7 +261,8 @@ fn degrees_of_freedom_agree_with_the_handbook_s_empirical_formulas() {
     }
 }
 
-/// Degrees of freedom from the spectrum of sampled phase, 1/f^(2 − α) up to half the rate, and the differences' response.
+/// Degrees of freedom from the spectrum of sampled phase, 1/f^(2 − α) up to half the rate, and the
+/// differences' response.
 fn freedom_by_spectrum(alpha: i32, order: i32, m: usize, terms: usize) -> f64 {
     let length = 1_usize << 20;
     let density = |k: usize| {
@@ -284,8 +285,8 @@ fn degrees_of_freedom_in_flicker_and_walks_are_those_of_their_spectra() {
             let terms = count - order as usize * m;
             let expected = freedom_by_spectrum(alpha, order, m, terms);
             let freedom = degrees_of_freedom(deviation.estimator(), alpha, m, count).unwrap();
-            // Flicker phase noise up to a sharp cutoff against a mean over τ₀; what the walk and flicker of frequency fold
-            // from above half the rate; the transform's own resolution of 1e-6.
+            // Flicker phase noise up to a sharp cutoff against a mean over τ₀; what the walk and flicker of
+            // frequency fold from above half the rate; the transform's own resolution of 1e-6.
             let tolerance = match alpha {
                 1 => 0.09,
                 -1 => 0.25 / m as f64,
@@ -399,8 +400,8 @@ fn ninety_five_percent_intervals_hold_the_truth_ninety_five_times_in_a_hundred()
 #[test]
 fn the_noise_that_was_made_is_the_noise_that_is_found() {
     let mut normal = Normal::new(1065);
-    // White phase of unit variance: h₂ = 8π² τ₀; white frequency: h₀ = 2/τ₀; phase that walks τ₀ y with y of unit variance
-    // a step: 2π² h₋₂ τ₀ = 1/τ₀².
+    // White phase of unit variance: h₂ = 8π² τ₀; white frequency: h₀ = 2/τ₀; phase that walks τ₀ y with y of
+    // unit variance a step: 2π² h₋₂ τ₀ = 1/τ₀².
     let (tau0_s, pi, count) = (0.5_f64, std::f64::consts::PI, 20_000);
     let made = [
         (0, normal.white_phase(count), 8.0 * pi * pi * tau0_s),

@@ -1,9 +1,11 @@
-//! What a scene allows of its receiver, epoch by epoch: which satellites must be found, observed and used, and when there must be fixes.
+//! What a scene allows of its receiver, epoch by epoch: which satellites must be found, observed and used,
+//! and when there must be fixes.
 //!
-//! It follows from the truth (who is in view, how strong, how well placed), the receiver's settings ([`receiver`]), the message's
-//! timetable ([`timetable`]) and what the scene itself expects ([`crate::gnss::facts`]); [`satellite`] holds the rules. Nothing
-//! that nature or the scene took away is the receiver's fault. Limits: searches are those of a cold start with worst losses, so a
-//! receiver may be earlier than required; geometry counts the satellites that must be used, not those that might be.
+//! It follows from the truth (who is in view, how strong, how well placed), the receiver's settings
+//! ([`receiver`]), the message's timetable ([`timetable`]) and what the scene itself expects
+//! ([`crate::gnss::facts`]); [`satellite`] holds the rules. Nothing that nature or the scene took away is the
+//! receiver's fault. Limits: searches are those of a cold start with worst losses, so a receiver may be
+//! earlier than required; geometry counts the satellites that must be used, not those that might be.
 
 pub mod receiver;
 pub mod satellite;

@@ -1,7 +1,8 @@
 //! What a receiver's settings let one expect of it: how weak a signal it finds, how soon, how weak a one it holds.
 //!
-//! Search and loops are those of theory with the settings of `rx/receiver.json`: a receiver that names none is taken to have
-//! the defaults of a common one. Losses of the search are its worst: half a cell of code, half a step of Doppler.
+//! Search and loops are those of theory with the settings of `rx/receiver.json`: a receiver that names none
+//! is taken to have the defaults of a common one. Losses of the search are its worst: half a cell of code,
+//! half a step of Doppler.
 
 use serde_json::Value;
 
@@ -9,13 +10,13 @@ use crate::analysis::load::Run;
 use crate::analysis::theory::{detection, pll};
 use crate::gnss::signal::Signal;
 
-/// Jitter up to which a phase loop is expected to hold for good: 3σ leaves a third of the discriminator's 45° to oscillator and
-/// motion.
+/// Jitter up to which a phase loop is expected to hold for good: 3σ leaves a third of the discriminator's 45°
+/// to oscillator and motion.
 const HOLDING_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 /// Least C/N0 at which the message can be read: at 27 dB-Hz one bit in 4e6 is wrong (Eb/N0 of 10 dB).
 const MESSAGE_DBHZ: f64 = 27.0;
-/// Share of the power that the worst place between cells leaves: 2.0 dB of code at three cells a chip and few samples, and
-/// one sum in ten half lost to a data bit.
+/// Share of the power that the worst place between cells leaves: 2.0 dB of code at three cells a chip and few
+/// samples, and one sum in ten half lost to a data bit.
 const CODE_LOSS: f64 = 0.6 * 0.95;
 /// Detection so sure that one search counts no more.
 const SUREST: f64 = 1.0 - 1e-7;

@@ -1,8 +1,9 @@
 //! When one satellite must be found, observed and used, from the truth's rows alone.
 //!
-//! A satellite must be acquired once its searches, counted at the worst phase of their interval, have missed it with a probability
-//! below one in a million; observed once lock and two headers of the message had time; used once its ephemeris had. What ends a
-//! lock for a good reason starts all of that anew: the satellite is not there, too weak, faded, or the scene expects it.
+//! A satellite must be acquired once its searches, counted at the worst phase of their interval, have missed
+//! it with a probability below one in a million; observed once lock and two headers of the message had time;
+//! used once its ephemeris had. What ends a lock for a good reason starts all of that anew: the satellite is
+//! not there, too weak, faded, or the scene expects it.
 
 use super::receiver::Receiver;
 use super::timetable::Timetable;
@@ -15,7 +16,8 @@ const BAD_LUCK_NP: f64 = 13.815_510_557_964_274;
 pub const LOCK_S: f64 = 4.0;
 /// C/A codes are 21.1 dB apart; a satellite that much weaker than another hides below its cross-correlation.
 pub const ISOLATION_DB: f64 = 20.0;
-/// A fall of the signal below its usual strength by this much is a fade in which phase turns quicker than the truth's rows show.
+/// A fall of the signal below its usual strength by this much is a fade in which phase turns quicker than the
+/// truth's rows show.
 pub const FADE_DB: f64 = 10.0;
 /// Time that a receiver may take to use what it observes.
 const USE_S: f64 = 1.0;

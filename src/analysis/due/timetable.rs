@@ -1,7 +1,8 @@
 //! When the navigation message says what: subframes of 6 s in frames of 30 s, 25 frames in a round of 12.5 minutes.
 //!
-//! All satellites send in step with GPS time (IS-GPS-200N, 20.3.2), so the scene's start alone says how long a receiver must
-//! wait. Times are seconds from the scene's first sample; what is sent at a boundary arrives a light time later.
+//! All satellites send in step with GPS time (IS-GPS-200N, 20.3.2), so the scene's start alone says how long
+//! a receiver must wait. Times are seconds from the scene's first sample; what is sent at a boundary arrives
+//! a light time later.
 
 use crate::gnss::time::Epoch;
 
@@ -32,7 +33,8 @@ impl Timetable {
         Self { phase_s: tow_s - (tow_s / round_s).floor() * round_s }
     }
 
-    /// The first time from `from_s` on at which something that comes every `period_s`, first `first_s` after a round's beginning, begins.
+    /// The first time from `from_s` on at which something that comes every `period_s`, first `first_s` after
+    /// a round's beginning, begins.
     fn next(&self, from_s: f64, first_s: f64, period_s: f64) -> f64 {
         let since = from_s + self.phase_s - first_s;
         from_s + (since / period_s).ceil() * period_s - since

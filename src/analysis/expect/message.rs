@@ -1,7 +1,7 @@
 //! Orbits, clocks and ionosphere as the truth says that they were sent: what a receiver can know at best.
 //!
-//! The raw integers of `truth/navigation.csv` go through the message's own table. Limits: a satellite whose subframes 1 to
-//! 3 are incomplete there has no set; of several sets the one nearest to an epoch counts.
+//! The raw integers of `truth/navigation.csv` go through the message's own table. Limits: a satellite whose
+//! subframes 1 to 3 are incomplete there has no set; of several sets the one nearest to an epoch counts.
 
 use std::collections::{BTreeMap, BTreeSet};
 

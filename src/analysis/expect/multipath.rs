@@ -1,8 +1,9 @@
 //! The code error that the truth's reflected rays leave in an early-minus-late loop.
 //!
-//! The loop rests where |E|² = |L|², E and L the sums over the rays of amplitude, phase and correlation (the triangle of the chips) at
-//! half a spacing to either side. Limits: the front end's rounding of the triangle is left out, and rays are taken as steady
-//! over the loop's time constant, so that what moves fast is overrated.
+//! The loop rests where |E|² = |L|², E and L the sums over the rays of amplitude, phase and correlation (the
+//! triangle of the chips) at half a spacing to either side. Limits: the front end's rounding of the triangle
+//! is left out, and rays are taken as steady over the loop's time constant, so that what moves fast is
+//! overrated.
 
 use crate::gnss::record::RayRow;
 
@@ -42,7 +43,8 @@ mod tests {
 
     #[test]
     fn a_single_ray_errs_as_the_envelope_says() {
-        // In phase the error of an early-minus-late envelope is α·d/2 where the ray is late by d/2(1 + α) or more; out of phase the same early.
+        // In phase the error of an early-minus-late envelope is α·d/2 where the ray is late by d/2(1 + α) or
+        // more; out of phase the same early.
         let error = |phase| error_chips(&[(0.3, 0.25, phase)], 0.2);
         assert!((error(0.0) - 0.25 * 0.1).abs() < 3e-3, "{}", error(0.0));
         assert!((error(0.5) + 0.25 * 0.1).abs() < 3e-3, "{}", error(0.5));

@@ -1,17 +1,18 @@
 //! Limits of random errors for a stated probability of a false alarm.
 //!
-//! A row of the verdict may fail a sound receiver once in [`FALSE_ALARM`] runs⁻¹. For the largest of n values each gets an
-//! nth of it (Bonferroni), which holds whatever their correlation. The 95th percentile of values below their limits is below that
-//! of the limits. A mean of correlated values varies as that of fewer independent ones, which the caller counts.
+//! A row of the verdict may fail a sound receiver once in [`FALSE_ALARM`] runs⁻¹. For the largest of n values
+//! each gets an nth of it (Bonferroni), which holds whatever their correlation. The 95th percentile of values
+//! below their limits is below that of the limits. A mean of correlated values varies as that of fewer
+//! independent ones, which the caller counts.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-/// Probability with which one row of the verdict fails a receiver that is as theory says: 1000 runs of 40 rows make less
-/// than one false failure.
+/// Probability with which one row of the verdict fails a receiver that is as theory says: 1000 runs of 40
+/// rows make less than one false failure.
 pub const FALSE_ALARM: f64 = 1e-5;
 
-/// Factor of σ that the largest of `count` normal values of `axes` dimensions exceeds with that probability. The length of a vector counts in
-/// units of its longest axis.
+/// Factor of σ that the largest of `count` normal values of `axes` dimensions exceeds with that probability.
+/// The length of a vector counts in units of its longest axis.
 pub fn largest(axes: u32, count: usize) -> f64 {
     beyond(axes, FALSE_ALARM / count.max(1) as f64)
 }

@@ -92,7 +92,8 @@ pub struct Forecast {
     pub rate_sigma_mps: f64,
     pub rate_bias_mps: f64,
     pub cn0_hz: f64,
-    /// Whether the C/N0 observed is near the true one: in fades and jamming averages lag, which rows of their own judge.
+    /// Whether the C/N0 observed is near the true one: in fades and jamming averages lag, which rows of their
+    /// own judge.
     pub steady: bool,
     /// Of a model's error at the zenith: one over the elevation's sine.
     pub slant: f64,

@@ -1,8 +1,9 @@
 //! What Hatch's filter makes of a satellite's code: bias of what parts code and carrier, and the noise that is left.
 //!
-//! Written from the settings, not from the receiver's code: the weight of a new code value falls from one to interval over
-//! window, a break of lock or a gap begins anew. Noise of a first-order code loop is correlated as exp(−4Bt); its variance is carried along
-//! with its covariance (`smoothing_s` and `dll_bandwidth_hz`). Limits: loops of other orders have other correlations.
+//! Written from the settings, not from the receiver's code: the weight of a new code value falls from one to
+//! interval over window, a break of lock or a gap begins anew. Noise of a first-order code loop is correlated
+//! as exp(−4Bt); its variance is carried along with its covariance (`smoothing_s` and `dll_bandwidth_hz`).
+//! Limits: loops of other orders have other correlations.
 
 /// A gap longer than this breaks the carrier.
 const LONGEST_GAP_S: f64 = 1.05;
@@ -85,7 +86,8 @@ mod tests {
         }
         // An exponential window of 100 steps lags by 99 of them: 9.9 s of 2 mm/s behind 299.9 s.
         assert!((last.value_m - (0.5998 - 0.0198)).abs() < 1e-5, "{last:?}");
-        // Noise correlated over 1/(4B) = 0.5 s, averaged with an exponential window of 10 s: 0.5/10 of the variance at 10 % or so.
+        // Noise correlated over 1/(4B) = 0.5 s, averaged with an exponential window of 10 s: 0.5/10 of the
+        // variance at 10 % or so.
         assert!((last.variance_ratio - 0.05).abs() < 0.005, "{last:?}");
         let fresh = filter.take(300.0, 0.2, 7.0);
         assert_eq!((fresh.value_m, fresh.variance_ratio), (7.0, 1.0));

@@ -1,8 +1,10 @@
-//! What weighted least squares makes of the expected ranges at each fix: bias, noise, and the covariance that should be stated.
+//! What weighted least squares makes of the expected ranges at each fix: bias, noise, and the covariance that
+//! should be stated.
 //!
-//! With rows h = (−sight, 1), weights W of the receiver's choices at the true C/N0 and N = Σ h W hᵀ: biases b become
-//! N⁻¹ Σ h W b, noise of covariance R becomes N⁻¹ (Σ h W R W hᵀ) N⁻¹, and N⁻¹ is what the receiver ought to state. One set of sums a
-//! fix is kept, whatever the number of satellites. Limits: weights by the measured C/N0 differ from these by its noise.
+//! With rows h = (−sight, 1), weights W of the receiver's choices at the true C/N0 and N = Σ h W hᵀ: biases b
+//! become N⁻¹ Σ h W b, noise of covariance R becomes N⁻¹ (Σ h W R W hᵀ) N⁻¹, and N⁻¹ is what the receiver
+//! ought to state. One set of sums a fix is kept, whatever the number of satellites. Limits: weights by the
+//! measured C/N0 differ from these by its noise.
 
 use nalgebra::{Cholesky, Matrix2, Matrix4, Vector4};
 
@@ -100,8 +102,8 @@ pub struct Expected {
 
 /// Share by which computed biases may be wrong: weights differ with the measured C/N0.
 const BIAS_SHARE: f64 = 0.1;
-/// Share of the true troposphere by which a standard atmosphere errs: 5 % or 12 cm at the zenith, the spread of the wet delay (Saastamoinen
-/// 1972 against weather).
+/// Share of the true troposphere by which a standard atmosphere errs: 5 % or 12 cm at the zenith, the spread
+/// of the wet delay (Saastamoinen 1972 against weather).
 const TROPOSPHERE_SHARE: f64 = 0.05;
 
 /// Expectations of all fixes that have a truth and enough satellites.

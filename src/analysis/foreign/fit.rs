@@ -1,8 +1,10 @@
-//! A slope through the origin of points that come in clusters, with an error that does not believe in their independence.
+//! A slope through the origin of points that come in clusters, with an error that does not believe in their
+//! independence.
 //!
-//! A satellite's errors share multipath, filters and everything else that lasts, so that a thousand epochs of one satellite say little
-//! more than one. The variance sums each cluster's contribution before it is squared (Liang and Zeger 1986), times c/(c−1) for
-//! c clusters. Limits: with few clusters the error is itself uncertain by 1/√(2c).
+//! A satellite's errors share multipath, filters and everything else that lasts, so that a thousand epochs of
+//! one satellite say little more than one. The variance sums each cluster's contribution before it is squared
+//! (Liang and Zeger 1986), times c/(c−1) for c clusters. Limits: with few clusters the error is itself
+//! uncertain by 1/√(2c).
 
 use std::collections::BTreeMap;
 
@@ -70,8 +72,9 @@ mod tests {
                 !slope(&points).unwrap().differs_from(2.0)
             })
             .count();
-        // Of ten clusters, Student's t of nine degrees holds 98.5 % within three, and a cluster's pull on the slope costs another few
-        // per cent; errors that took the 500 points for independent would hold about 35 %.
+        // Of ten clusters, Student's t of nine degrees holds 98.5 % within three, and a cluster's pull on the
+        // slope costs another few per cent; errors that took the 500 points for independent would hold about
+        // 35 %.
         assert!(held > 180, "{held}");
         assert_eq!(slope(&[(1, 1.0, 2.0), (1, 2.0, 4.0)]), None);
         assert_eq!(slope::<u8>(&[]), None);

@@ -1,9 +1,10 @@
 //! Judging a receiver that this project did not write and that was fed this project's samples.
 //!
-//! It is known by its files alone: observations in RINEX 3 ([`rinex_obs`]), positions in NMEA ([`nmea`]). They are joined with the
-//! truth by GPS time ([`truth`]), since a foreign receiver knows nothing of sample numbers. [`observables`] and [`place`] measure;
-//! [`report`] names the biases. A receiver that took its week for one 1024 weeks off is moved back and told so.
-//! Results: `foreign.json`, `foreign_{observations,satellites,clock,slips,fixes}.csv` and pictures.
+//! It is known by its files alone: observations in RINEX 3 ([`rinex_obs`]), positions in NMEA ([`nmea`]).
+//! They are joined with the truth by GPS time ([`truth`]), since a foreign receiver knows nothing of sample
+//! numbers. [`observables`] and [`place`] measure; [`report`] names the biases. A receiver that took its week
+//! for one 1024 weeks off is moved back and told so. Results: `foreign.json`,
+//! `foreign_{observations,satellites,clock,slips,fixes}.csv` and pictures.
 
 mod fit;
 pub mod nmea;

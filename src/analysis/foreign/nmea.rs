@@ -1,9 +1,10 @@
 //! NMEA 0183 position files: GGA for the place, RMC for date and velocity.
 //!
-//! Source: NMEA 0183, 6.3 (GGA, RMC); heights become ellipsoidal by the sentence's own geoid separation. A time of day has
-//! the date of the RMC before or after it that has the same time; without any RMC the caller's day is taken. UTC becomes GPS time
-//! by the leap seconds of that date, which is the right way even for a receiver that mistook its week: it used those too.
-//! Sentences of other kinds are passed over; a wrong checksum refuses the file.
+//! Source: NMEA 0183, 6.3 (GGA, RMC); heights become ellipsoidal by the sentence's own geoid separation. A
+//! time of day has the date of the RMC before or after it that has the same time; without any RMC the
+//! caller's day is taken. UTC becomes GPS time by the leap seconds of that date, which is the right way even
+//! for a receiver that mistook its week: it used those too. Sentences of other kinds are passed over; a wrong
+//! checksum refuses the file.
 
 use nalgebra::Vector3;
 

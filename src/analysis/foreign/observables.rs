@@ -1,10 +1,11 @@
 //! Errors of a foreign receiver's code, carrier, Doppler and C/N0, and the biases that they show.
 //!
-//! The truth is taken at each epoch's label. A receiver's own clock moves all pseudoranges of an epoch alike, so their mean error
-//! is its clock and not an error; the same goes for carriers and Dopplers. A label that is late by δ adds δ·λ·f_D to a
-//! pseudorange, whose slope over Doppler therefore gives δ; where it is significant the truth is looked up again at the
-//! corrected time. Carriers lose one constant an arc. Limits: biases common to all satellites cannot be told from the
-//! clock, and a code bias that happens to go with Doppler not from a late label in a short static scene.
+//! The truth is taken at each epoch's label. A receiver's own clock moves all pseudoranges of an epoch alike,
+//! so their mean error is its clock and not an error; the same goes for carriers and Dopplers. A label that
+//! is late by δ adds δ·λ·f_D to a pseudorange, whose slope over Doppler therefore gives δ; where it is
+//! significant the truth is looked up again at the corrected time. Carriers lose one constant an arc. Limits:
+//! biases common to all satellites cannot be told from the clock, and a code bias that happens to go with
+//! Doppler not from a late label in a short static scene.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,14 +21,15 @@ use crate::gnss::signal::SIGNALS;
 
 /// Times that the truth is looked up at a better time.
 const LOOKS: usize = 6;
-/// Errors of one epoch further from their median than this many deviations, or than the metres below, are of a wrong lock.
+/// Errors of one epoch further from their median than this many deviations, or than the metres below, are of
+/// a wrong lock.
 const OUTLIER_SIGMAS: f64 = 10.0;
 const OUTLIER_M: f64 = 30.0;
 /// Gaps longer than this many intervals break an arc.
 const GAP: f64 = 1.5;
 
-/// One observation against the truth: a row of `foreign_observations.csv`. Errors are measured minus true; what is common to the
-/// satellites of its epoch is taken out, of carriers also an arc's constant.
+/// One observation against the truth: a row of `foreign_observations.csv`. Errors are measured minus true;
+/// what is common to the satellites of its epoch is taken out, of carriers also an arc's constant.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     pub label_s: f64,

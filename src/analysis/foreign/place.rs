@@ -1,8 +1,8 @@
 //! Errors of a foreign receiver's positions.
 //!
-//! Positions are compared with the antenna's at the time on their label. A late label shows as an error along the motion, −δ·v, so that
-//! only a moving scene tells. The sigma of a bias counts errors that remember each other once
-//! ([`crate::analysis::independent`]).
+//! Positions are compared with the antenna's at the time on their label. A late label shows as an error along
+//! the motion, −δ·v, so that only a moving scene tells. The sigma of a bias counts errors that remember each
+//! other once ([`crate::analysis::independent`]).
 
 use nalgebra::Vector3;
 use serde::Serialize;

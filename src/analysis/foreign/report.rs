@@ -1,7 +1,8 @@
 //! What a foreign receiver comes to: `foreign.json`, and the biases by name.
 //!
-//! A bias is named when it differs from nothing (a scale: from one) by more than three of its standard deviations, and said to be
-//! absent otherwise, with the bound that the file allows. The clock is no error: it is named for who builds on the file.
+//! A bias is named when it differs from nothing (a scale: from one) by more than three of its standard
+//! deviations, and said to be absent otherwise, with the bound that the file allows. The clock is no error:
+//! it is named for who builds on the file.
 
 use std::fmt;
 
@@ -59,7 +60,8 @@ pub struct Join {
 pub struct Clock {
     /// Mean over the epochs of the pseudoranges' common error: label minus GPS time, as the file has it.
     pub pseudorange_common_m: Option<f64>,
-    /// The same less the sampler's clock: a bias of all pseudoranges, of a receiver that labels its epochs by counting samples.
+    /// The same less the sampler's clock: a bias of all pseudoranges, of a receiver that labels its epochs by
+    /// counting samples.
     pub pseudorange_common_less_sampler_m: Option<f64>,
     pub bias_mean_s: Option<f64>,
     pub drift_code: Option<f64>,

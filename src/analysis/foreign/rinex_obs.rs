@@ -1,10 +1,11 @@
 //! RINEX 3 observation files, read epoch by epoch.
 //!
-//! Source: RINEX 3.05, tables A2 and A3. Columns are fixed: an epoch line, then a line a satellite with F14.3 values, each
-//! followed by a loss-of-lock indicator and a signal strength digit. A reader of our own because a file under judgement is to be
-//! refused with its line and reason, and the `rinex` crate drops bad records, keeps the whole file and panics on some damage; it is
-//! the oracle of the tests. Limits: versions 3.00 to 4.02, time systems GPS and Galileo; only pseudorange, phase, Doppler
-//! and strength; records of events (flags 2 to 6) are passed over and counted.
+//! Source: RINEX 3.05, tables A2 and A3. Columns are fixed: an epoch line, then a line a satellite with F14.3
+//! values, each followed by a loss-of-lock indicator and a signal strength digit. A reader of our own because
+//! a file under judgement is to be refused with its line and reason, and the `rinex` crate drops bad records,
+//! keeps the whole file and panics on some damage; it is the oracle of the tests. Limits: versions 3.00 to
+//! 4.02, time systems GPS and Galileo; only pseudorange, phase, Doppler and strength; records of events
+//! (flags 2 to 6) are passed over and counted.
 
 use std::collections::BTreeMap;
 

@@ -218,8 +218,9 @@ fn every_planted_bias_is_named_with_its_size() {
     );
     // The motion's sinusoid: 3 m · 0.5⁴/384 · 0.1⁴ = 5e-8 m, and rounding of 2e7 m to 4e-9 m a step.
     assert!(join.interpolation_code_m < 1e-7 && join.interpolation_carrier_cycles < 1e-6, "{join:?}");
-    // Speeds spread by 150 m/s · √(60/9) = 387 m/s: noise alone leaves 0.3/(387·√1800) = 18 µs; the biased satellite, some 2 m/s
-    // from the mean, 2·2/(9·387²) = 3 µs. Five times that. The sigma counts the 2/9 m that the bias takes from all others: 0.19 ms.
+    // Speeds spread by 150 m/s · √(60/9) = 387 m/s: noise alone leaves 0.3/(387·√1800) = 18 µs; the biased
+    // satellite, some 2 m/s from the mean, 2·2/(9·387²) = 3 µs. Five times that. The sigma counts the 2/9 m
+    // that the bias takes from all others: 0.19 ms.
     near("time tag", join.time_tag_offset_s, 3e-3, 1e-4);
     assert!(join.time_tag_applied && join.time_tag_sigma_s.unwrap() < 2.5e-4, "{join:?}");
     // The biased satellite is a ninth of the common part.

@@ -1,10 +1,11 @@
 //! The truth as a function of GPS time, for receivers that label their epochs with a clock of their own.
 //!
-//! Files give it at samples; their true GPS times stand in `trajectory.csv`. The sampler's clock is taken out, so that what is
-//! left is what a receiver with a perfect clock would have seen. Between rows a cubic through values and rates (Hermite): its
-//! error is h⁴/384 of the fourth derivative. It is measured here, not assumed: a row is predicted from its neighbours, 2h apart, and
-//! a sixteenth of what that misses is the error in the middle of an interval. Limits: a step of acceleration between two
-//! rows costs a·h²/62 and shows in that figure.
+//! Files give it at samples; their true GPS times stand in `trajectory.csv`. The sampler's clock is taken
+//! out, so that what is left is what a receiver with a perfect clock would have seen. Between rows a cubic
+//! through values and rates (Hermite): its error is h⁴/384 of the fourth derivative. It is measured here, not
+//! assumed: a row is predicted from its neighbours, 2h apart, and a sixteenth of what that misses is the
+//! error in the middle of an interval. Limits: a step of acceleration between two rows costs a·h²/62 and
+//! shows in that figure.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -181,7 +182,8 @@ impl Timeline {
         })
     }
 
-    /// Each row from its neighbours: what that misses falls with the fourth power of the step, of Doppler with the third.
+    /// Each row from its neighbours: what that misses falls with the fourth power of the step, of Doppler
+    /// with the third.
     fn missed(&self) -> Interpolation {
         let mut worst = Interpolation::default();
         for (link, track) in &self.tracks {

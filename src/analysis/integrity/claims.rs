@@ -1,7 +1,7 @@
 //! Messages, events and `receiver.json` against the tables that they sum up.
 //!
-//! Limits: keys that `receiver.json` lacks are not compared; an incomplete set of a message's parameters counts only where the
-//! receiver says that it is complete.
+//! Limits: keys that `receiver.json` lacks are not compared; an incomplete set of a message's parameters
+//! counts only where the receiver says that it is complete.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 

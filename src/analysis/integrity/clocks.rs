@@ -1,7 +1,9 @@
-//! What several columns say of the same time: lock times, pseudoranges against times sent, a fix's bias against its time.
+//! What several columns say of the same time: lock times, pseudoranges against times sent, a fix's bias
+//! against its time.
 //!
-//! A receiver's clock reads what it reads: its readings may differ from the nominal ones of the truth by any constant. That constant is the same
-//! for every row of every table. Limits: a receiver that sets its clock anew within a run has several.
+//! A receiver's clock reads what it reads: its readings may differ from the nominal ones of the truth by any
+//! constant. That constant is the same for every row of every table. Limits: a receiver that sets its clock
+//! anew within a run has several.
 
 use std::collections::HashMap;
 

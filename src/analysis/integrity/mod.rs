@@ -1,9 +1,9 @@
 //! Whether a receiver's tables are whole and agree with one another.
 //!
-//! A value may be right and its row still not be what a receiver wrote: doubled, out of order, repeated, missing, of another time. `tables` looks
-//! at rows of one table, `clocks` at what several columns say of time, `acquisition` at searches against truth and events,
-//! `claims` at messages, events and `receiver.json` against the tables. Each finding is a count or a measure with its limit and where it was
-//! first found.
+//! A value may be right and its row still not be what a receiver wrote: doubled, out of order, repeated,
+//! missing, of another time. `tables` looks at rows of one table, `clocks` at what several columns say of
+//! time, `acquisition` at searches against truth and events, `claims` at messages, events and `receiver.json`
+//! against the tables. Each finding is a count or a measure with its limit and where it was first found.
 
 mod acquisition;
 mod claims;

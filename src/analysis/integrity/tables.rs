@@ -1,7 +1,7 @@
 //! Rows of one table: doubled, out of order, repeated, missing within a lock, without a truth.
 //!
-//! Limits: two rows of a satellite count as doubled at the same sample, whatever else they say; a row repeats the one before
-//! where every measured value is the same to the last bit.
+//! Limits: two rows of a satellite count as doubled at the same sample, whatever else they say; a row repeats
+//! the one before where every measured value is the same to the last bit.
 
 use std::collections::HashSet;
 

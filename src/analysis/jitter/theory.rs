@@ -56,8 +56,8 @@ pub fn exact_loop(order: u32, bandwidth_time: f64) -> Option<PhaseLoop> {
 /// What a loop makes of unit noise of its discriminator, from its response to one value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Response {
-    /// Variances of the estimate of an interval's mean phase, of what the discriminator puts out, of that one's difference from
-    /// one interval to the next, and of the rate in phase an interval.
+    /// Variances of the estimate of an interval's mean phase, of what the discriminator puts out, of that
+    /// one's difference from one interval to the next, and of the rate in phase an interval.
     phase: f64,
     put_out: f64,
     difference: f64,
@@ -145,7 +145,8 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for early minus late.
+/// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for
+/// early minus late.
 ///
 /// The triangle is the second difference of |x|/2; each average over w adds an integral and a difference of 1/w.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -183,8 +184,9 @@ fn second(of: impl Fn(f64) -> f64, x: f64) -> f64 {
     of(x + 1.0) - 2.0 * of(x) + of(x - 1.0)
 }
 
-/// Standard deviation of one early-minus-late value, in chips, for the shapes of signal and noise: with a and a′ the relative height
-/// and slope at d/2 and ρ the noise's correlation over d, (1−ρ)/(4·snr·a′²)·(1 + (1+ρ)/(2·snr·a²)).
+/// Standard deviation of one early-minus-late value, in chips, for the shapes of signal and noise: with a and
+/// a′ the relative height and slope at d/2 and ρ the noise's correlation over d, (1−ρ)/(4·snr·a′²)·(1 +
+/// (1+ρ)/(2·snr·a²)).
 fn raw_chips(signal: Peak, noise: Peak, d: f64, snr: f64) -> f64 {
     let height = signal.value(0.5 * d) / signal.value(0.0);
     let slope = signal.slope(0.5 * d) / signal.value(0.0);
@@ -237,7 +239,8 @@ impl Theory {
                 let raw = raw_chips(self.peaks.0, self.peaks.1, self.settings.spacing_chips, update_s * cn0_hz);
                 (raw * code.put_out.sqrt(), raw * code.phase.sqrt())
             }
-            // Observations fall anywhere in an interval, in which the phase runs at the loop's rate: x²·rate² more, 1/12 in the mean.
+            // Observations fall anywhere in an interval, in which the phase runs at the loop's rate: x²·rate²
+            // more, 1/12 in the mean.
             Loop::Pll => (
                 (phase_rad * loop_.put_out.sqrt()).to_degrees(),
                 (phase_rad * (loop_.phase + loop_.rate / 12.0).sqrt()).to_degrees(),
@@ -259,10 +262,12 @@ impl Theory {
         }
     }
 
-    /// Sigma in hertz of the phase loop's rate against the drift that the truth states, which follows nodes 0.8 s apart.
+    /// Sigma in hertz of the phase loop's rate against the drift that the truth states, which follows nodes
+    /// 0.8 s apart.
     ///
-    /// White frequency noise adds h₀·T/2·f² cycles² to the phase in each interval, which the rate follows as it follows steps: that
-    /// gives the bandwidth of the rate. Flicker and random walk, h₋₁/f + h₋₂/f², count between the nodes and there.
+    /// White frequency noise adds h₀·T/2·f² cycles² to the phase in each interval, which the rate follows as
+    /// it follows steps: that gives the bandwidth of the rate. Flicker and random walk, h₋₁/f + h₋₂/f², count
+    /// between the nodes and there.
     pub fn oscillator_rate_hz(&self) -> f64 {
         let Some(law) = &self.oscillator else { return 0.0 };
         let [_, _, white, flicker, walk] = law.h;
@@ -431,7 +436,8 @@ mod tests {
             let known = dll::raw_chips(Discriminator::EarlyMinusLate, 0.5, 4e-3, cn0_hz);
             assert!((raw_chips(plain, plain, 0.5, 4e-3 * cn0_hz) / known - 1.0).abs() < 1e-9);
         }
-        // The mean of a triangle over ±w/2 is 1 − w/4, over a triangle of ±w it is 1 − w/3; far from corners nothing changes.
+        // The mean of a triangle over ±w/2 is 1 − w/4, over a triangle of ±w it is 1 − w/3; far from corners
+        // nothing changes.
         for (averages, peak) in [(1, 1.0 - 0.1), (2, 1.0 - 0.4 / 3.0)] {
             let round = Peak { width_chips: 0.4, averages };
             assert!((round.value(0.0) - peak).abs() < 1e-12, "{}", round.value(0.0));

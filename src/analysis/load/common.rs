@@ -1,9 +1,10 @@
 //! What all satellites' signals have in common in the samples beside the receiver's clock, as the truth knows it.
 //!
-//! A front end's filter delays every code by its group delay; a local oscillator off its frequency shifts every carrier; an antenna
-//! that turns winds up every carrier. A receiver that measures them is right: they are part of the truth. The first two are
-//! facts of the scene, the third is what the truth's carriers do beside its pseudoranges on average. Limits: the mean of carrier
-//! less pseudorange holds twice the ionosphere's rate too, millimetres a second.
+//! A front end's filter delays every code by its group delay; a local oscillator off its frequency shifts
+//! every carrier; an antenna that turns winds up every carrier. A receiver that measures them is right: they
+//! are part of the truth. The first two are facts of the scene, the third is what the truth's carriers do
+//! beside its pseudoranges on average. Limits: the mean of carrier less pseudorange holds twice the
+//! ionosphere's rate too, millimetres a second.
 
 use std::collections::HashMap;
 
@@ -31,7 +32,8 @@ pub struct Common {
     /// By how much every Doppler is higher.
     pub doppler_hz: f64,
     last: HashMap<Link, (u64, f64)>,
-    /// Sum and number, by epoch, of what each satellite's carrier gained on its pseudorange since the epoch before, in metres a sample.
+    /// Sum and number, by epoch, of what each satellite's carrier gained on its pseudorange since the epoch
+    /// before, in metres a sample.
     gains: HashMap<u64, (f64, u32)>,
     rate_hz: f64,
 }
@@ -65,13 +67,14 @@ impl Common {
         }
     }
 
-    /// Carrier that an oscillator's offset takes from every satellite until a sample, in cycles (carriers grow with range).
+    /// Carrier that an oscillator's offset takes from every satellite until a sample, in cycles (carriers
+    /// grow with range).
     pub fn carrier_cycles(&self, sample: u64) -> f64 {
         -self.doppler_hz * sample as f64 / self.rate_hz
     }
 
-    /// Rate at which carriers gain on pseudoranges at a sample, wind-up and oscillator together: metres a second that a clock solved
-    /// from Dopplers drifts more than the clock does.
+    /// Rate at which carriers gain on pseudoranges at a sample, wind-up and oscillator together: metres a
+    /// second that a clock solved from Dopplers drifts more than the clock does.
     pub fn drift_mps(&self, sample: u64, wavelength_m: f64) -> f64 {
         let both = self.gains.get(&sample).map_or(0.0, |(sum, count)| sum / f64::from(*count) * self.rate_hz);
         both - self.doppler_hz * wavelength_m

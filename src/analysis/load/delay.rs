@@ -1,15 +1,17 @@
 //! By how much a front end's filter delays a code, as an early-minus-late loop measures it.
 //!
-//! A filter whose phase is not straight spreads the correlation unevenly: the loop rests where early and late are equally strong, R(τ − d/2)²
-//! = R(τ + d/2)², R the transform of the chips' spectrum times the filter's response. For a Butterworth filter just wider than the
-//! main lobe that is metres more than the delay in the middle of its band. The response is sampled at the middles of intervals,
-//! so that it comes half a sample early. Limits: chips are rectangular; sampling does not fold.
+//! A filter whose phase is not straight spreads the correlation unevenly: the loop rests where early and late
+//! are equally strong, R(τ − d/2)² = R(τ + d/2)², R the transform of the chips' spectrum times the filter's
+//! response. For a Butterworth filter just wider than the main lobe that is metres more than the delay in the
+//! middle of its band. The response is sampled at the middles of intervals, so that it comes half a sample
+//! early. Limits: chips are rectangular; sampling does not fold.
 
 use num_complex::Complex64;
 
 use crate::analysis::spectrum::Stage;
 
-/// Steps of the integral over half the band of the samples: 5 kHz at 10 Msps, far below what a response or a lag of a chip turns in.
+/// Steps of the integral over half the band of the samples: 5 kHz at 10 Msps, far below what a response or a
+/// lag of a chip turns in.
 const STEPS: u32 = 1000;
 
 /// Delay of one stage at a loop of that spacing; the one that the stage states where its shape is not known to bend.

@@ -95,8 +95,8 @@ impl Fonts {
         self.glyphs(face, text).iter().map(|glyph| glyph.advance).sum::<f32>() * size
     }
 
-    /// Lines that are no longer than `width`, the first of them shorter by `indent`. Breaks at blanks, and within a word
-    /// only where it is longer than a line.
+    /// Lines that are no longer than `width`, the first of them shorter by `indent`. Breaks at blanks, and
+    /// within a word only where it is longer than a line.
     pub fn wrap(&self, face: Face, size: f32, text: &str, width: f32, indent: f32) -> Vec<String> {
         let mut lines = vec![String::new()];
         let mut room = width - indent;

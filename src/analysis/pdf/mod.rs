@@ -1,9 +1,10 @@
 //! Reports as PDF: text, tables and vector pictures on A4 pages, with nothing but the bundled fonts.
 //!
-//! A [`Report`] is a list of items that flow down the pages: headings, wrapped text, facts, tables whose header is repeated on
-//! every page, pictures with numbered captions, listings. It knows nothing of runs or studies. The same report gives the
-//! same bytes: no clock, no random identifiers. krilla writes the file, krilla-svg the pictures; text stays text, to be searched and
-//! copied. Limits: left to right; no hyphenation; characters that the fonts lack become question marks.
+//! A [`Report`] is a list of items that flow down the pages: headings, wrapped text, facts, tables whose
+//! header is repeated on every page, pictures with numbered captions, listings. It knows nothing of runs or
+//! studies. The same report gives the same bytes: no clock, no random identifiers. krilla writes the file,
+//! krilla-svg the pictures; text stays text, to be searched and copied. Limits: left to right; no
+//! hyphenation; characters that the fonts lack become question marks.
 
 mod fonts;
 mod layout;

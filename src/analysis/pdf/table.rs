@@ -17,7 +17,8 @@ struct Row {
     height: f32,
 }
 
-/// Height of a table's caption, header and first rows, or of all of a short one: what must fit for it to begin on a page.
+/// Height of a table's caption, header and first rows, or of all of a short one: what must fit for it to
+/// begin on a page.
 pub(super) fn least_height(table: &Table, fonts: &Fonts) -> f32 {
     let widths = widths(table, fonts);
     let rows = if table.rows.len() <= SHORT { SHORT } else { 2 };

@@ -1,8 +1,8 @@
 //! Charts as data, drawn by plotters with the bundled font: what every picture is made of.
 //!
-//! Sizes are chosen for print: a picture [`WIDTH_PX`] wide fills the text width of an A4 page and its smallest words are
-//! then above 6 points. Every size that plotters would choose is set here, for [`FINE`] virtual pixels in one. No system
-//! font, no C library: a fresh machine draws the same picture.
+//! Sizes are chosen for print: a picture [`WIDTH_PX`] wide fills the text width of an A4 page and its
+//! smallest words are then above 6 points. Every size that plotters would choose is set here, for [`FINE`]
+//! virtual pixels in one. No system font, no C library: a fresh machine draws the same picture.
 
 use std::error::Error;
 use std::path::Path;
@@ -149,8 +149,8 @@ impl Chart {
     }
 }
 
-/// Draws charts, `columns` a row, with one legend below all of them, into a picture of that size: a PNG, or an SVG where the file
-/// is named so.
+/// Draws charts, `columns` a row, with one legend below all of them, into a picture of that size: a PNG, or
+/// an SVG where the file is named so.
 ///
 /// # Errors
 /// [`JudgeError::Plot`] or [`JudgeError::File`] with the path.

@@ -1,8 +1,8 @@
 //! A finished picture as SVG, and as PNG through resvg with the bundled font.
 //!
-//! plotters places everything on whole pixels, so a picture is drawn at [`FINE`] times its size and scaled down. It writes
-//! one element a dot; dots of a kind that follow each other become one path here, which is an order of magnitude smaller
-//! and what keeps reports with tens of thousands of points printable.
+//! plotters places everything on whole pixels, so a picture is drawn at [`FINE`] times its size and scaled
+//! down. It writes one element a dot; dots of a kind that follow each other become one path here, which is an
+//! order of magnitude smaller and what keeps reports with tens of thousands of points printable.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -93,8 +93,9 @@ fn fonts() -> Arc<fontdb::Database> {
     Arc::clone(FONTS.get_or_init(load))
 }
 
-/// Joins circles of the same look that follow each other into one path: filled ones as strokes without length under round
-/// caps, hollow ones as arcs. Circles at one and the same place stay: a stroke without any extent is not drawn.
+/// Joins circles of the same look that follow each other into one path: filled ones as strokes without length
+/// under round caps, hollow ones as arcs. Circles at one and the same place stay: a stroke without any extent
+/// is not drawn.
 fn with_dots_joined(svg: &str) -> String {
     let mut joined = String::with_capacity(svg.len());
     let mut run: Vec<(Circle<'_>, &str)> = Vec::new();

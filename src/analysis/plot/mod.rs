@@ -1,9 +1,10 @@
 //! The pictures of a run, one a question, with the words that go below them.
 //!
-//! [`canvas`] wraps the drawing library and [`drawing`] what becomes of its SVG; every other file here says what is drawn, as a
-//! sketch that holds all it needs: a run's rows are gone before the first picture is drawn.
-//! A picture with nothing to show is drawn with empty axes, so that a script finds the files it expects; only `psd.png`
-//! depends on `psd.csv` being there, `spoofing.png` on a spoofer and `multipath.png` on `truth/rays.csv`.
+//! [`canvas`] wraps the drawing library and [`drawing`] what becomes of its SVG; every other file here says
+//! what is drawn, as a sketch that holds all it needs: a run's rows are gone before the first picture is
+//! drawn. A picture with nothing to show is drawn with empty axes, so that a script finds the files it
+//! expects; only `psd.png` depends on `psd.csv` being there, `spoofing.png` on a spoofer and `multipath.png`
+//! on `truth/rays.csv`.
 
 pub mod canvas;
 mod clock;

@@ -70,8 +70,8 @@ impl Spread {
         (count > 1).then_some(Self { mean, covariance })
     }
 
-    /// The ellipse that holds a share `p` of a normal distribution: (x − mean)ᵀ C⁻¹ (x − mean) = −2 ln(1 − p), the quantile
-    /// of χ² with two degrees of freedom.
+    /// The ellipse that holds a share `p` of a normal distribution: (x − mean)ᵀ C⁻¹ (x − mean) = −2 ln(1 −
+    /// p), the quantile of χ² with two degrees of freedom.
     fn ellipse(&self, p: f64) -> Points {
         let radius = (-2.0 * libm::log1p(-p)).sqrt();
         // C = R·diag(λ)·Rᵀ in closed form.

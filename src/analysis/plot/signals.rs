@@ -31,7 +31,8 @@ pub(super) struct Cloud {
 }
 
 impl Cloud {
-    /// Asks twice for the points of each satellite, so that only one satellite's are held: for the axis, and to keep some.
+    /// Asks twice for the points of each satellite, so that only one satellite's are held: for the axis, and
+    /// to keep some.
     pub fn new(
         links: &[Link],
         frame: &Frame<'_>,

@@ -58,12 +58,13 @@ impl Series {
     }
 }
 
-/// Most points that a series is drawn with, and most marks that the series of a run's chart have together: they cover it then.
+/// Most points that a series is drawn with, and most marks that the series of a run's chart have together:
+/// they cover it then.
 const MOST_POINTS: usize = 1000;
 const MOST_MARKS: usize = 4000;
 
-/// Few enough points to draw. Of a line, the lowest and the highest of each run of neighbours, so that no spike is lost; of
-/// marks that stand alone, every so many, so that their density stays true.
+/// Few enough points to draw. Of a line, the lowest and the highest of each run of neighbours, so that no
+/// spike is lost; of marks that stand alone, every so many, so that their density stays true.
 fn thinned(points: &[(f64, f64)], mark: Mark, most: usize) -> Vec<(f64, f64)> {
     let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
     if finite.len() <= most {

@@ -49,15 +49,17 @@ fn the_clock_that_was_planted_is_found_and_told_from_the_receiver_s_error() {
     let clock = &summary.clock;
     // Ticks 401 to 599: longer than 300 to 399.
     assert_eq!(clock.fixes, 199);
-    // Five standard deviations of a mean of 199; a time that is 5 ns early is a clock 5 ns fast. Epochs resolve 1.1e-16 s.
+    // Five standard deviations of a mean of 199; a time that is 5 ns early is a clock 5 ns fast. Epochs
+    // resolve 1.1e-16 s.
     assert!((clock.bias_mean_s.unwrap() - 5e-9).abs() < 5.0 * ERROR_S / 199.0_f64.sqrt());
     assert!((clock.bias_sigma_s.unwrap() / ERROR_S - 1.0).abs() < 5.0 / (2.0 * 199.0_f64).sqrt());
-    // The mean frequency of white frequency noise over 20 s is known to √(h₀/2/20 s) = 2.2e-11; a fit's slope is 6/5 of that in
-    // variance. The receiver finds the same walk, to √12 ERROR_S/(20 s √199) = 2.5e-14.
+    // The mean frequency of white frequency noise over 20 s is known to √(h₀/2/20 s) = 2.2e-11; a fit's slope
+    // is 6/5 of that in variance. The receiver finds the same walk, to √12 ERROR_S/(20 s √199) = 2.5e-14.
     let (drift, true_drift) = (clock.drift.unwrap(), clock.true_drift.unwrap());
     assert!((true_drift - DRIFT).abs() < 5.0 * 2.5e-11, "{true_drift:e}");
     assert!((drift - true_drift).abs() < 5.0 * 2.5e-14, "{drift:e} {true_drift:e}");
-    // The oscillator's theory lies within the interval of what the truth shows: 95 %, and this seed's six points are in.
+    // The oscillator's theory lies within the interval of what the truth shows: 95 %, and this seed's six
+    // points are in.
     let read = load::Run::read(directory.path()).unwrap();
     let measured = crate::analysis::clock::Clock::measure(&read, &errors::Errors::measure(&read).unwrap()).unwrap();
     let law = measured.oscillator.unwrap();

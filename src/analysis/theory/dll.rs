@@ -1,8 +1,9 @@
 //! Thermal jitter of code loops, and what a normalised discriminator does to their gain.
 //!
-//! `d` is the full spacing from early to late in chips, C/N0 in hertz, T the coherent integration. Sources: Kaplan and
-//! Hegarty, Understanding GPS 2nd ed., eq. 5.22 and 5.23; Betz and Kolodziejski 2009. B is the one-sided noise bandwidth
-//! of the discrete loop, so the factor (1−½·B·T) of continuous updates is left out. White noise, no multipath.
+//! `d` is the full spacing from early to late in chips, C/N0 in hertz, T the coherent integration. Sources:
+//! Kaplan and Hegarty, Understanding GPS 2nd ed., eq. 5.22 and 5.23; Betz and Kolodziejski 2009. B is the
+//! one-sided noise bandwidth of the discrete loop, so the factor (1−½·B·T) of continuous updates is left out.
+//! White noise, no multipath.
 
 /// A code discriminator, by its noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +25,8 @@ fn squaring(discriminator: Discriminator, d: f64, snr: f64) -> f64 {
     }
 }
 
-/// Standard deviation of one discriminator value, in chips, unlimited bandwidth (eq. 5.23 first branch, without the loop).
+/// Standard deviation of one discriminator value, in chips, unlimited bandwidth (eq. 5.23 first branch,
+/// without the loop).
 pub fn raw_chips(discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> f64 {
     let snr = t_s * cn0_hz;
     (d / (planted!("analysis.theory.dll", 4.0, 2.0) * snr) * (1.0 + squaring(discriminator, d, snr))).sqrt()
@@ -107,9 +109,10 @@ impl BandIntegrals {
 
 /// Mean gain of a self-normalised discriminator on a triangle, noise in its denominator.
 ///
-/// (E−L)·P*/|P|²: 1−e^(−snr). (|E|²−|L|²)/(|E|²+|L|²): about 1−d/((1−d/2)²·snr), exactly x·∫[(1−u)/(1−(1−r)u)]²·e^(−xu)du
-/// from 0 to 1 with x = snr·(1−d/2), r = d/(2−d), for d up to 1. The loop's gains shrink by it where a receiver does not
-/// give it back. The form 1/(1+1/((1−d/2)²·snr)) holds at d = 1 only.
+/// (E−L)·P*/|P|²: 1−e^(−snr). (|E|²−|L|²)/(|E|²+|L|²): about 1−d/((1−d/2)²·snr), exactly
+/// x·∫[(1−u)/(1−(1−r)u)]²·e^(−xu)du from 0 to 1 with x = snr·(1−d/2), r = d/(2−d), for d up to 1. The loop's
+/// gains shrink by it where a receiver does not give it back. The form 1/(1+1/((1−d/2)²·snr)) holds at d = 1
+/// only.
 pub fn normalised_gain(discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> f64 {
     let snr = t_s * cn0_hz;
     match discriminator {

@@ -1,8 +1,9 @@
 //! Thermal jitter and thresholds of frequency loops.
 //!
-//! Hertz throughout; T is the integration of one prompt. Source: Kaplan and Hegarty, Understanding GPS 2nd ed., eq. 5.19 and 5.20.
-//! The printed formula holds for pairs that share no prompt; the noise of overlapping pairs is
-//! anticorrelated and their jitter several times smaller, which the linear system of the loop gives exactly.
+//! Hertz throughout; T is the integration of one prompt. Source: Kaplan and Hegarty, Understanding GPS 2nd
+//! ed., eq. 5.19 and 5.20. The printed formula holds for pairs that share no prompt; the noise of overlapping
+//! pairs is anticorrelated and their jitter several times smaller, which the linear system of the loop gives
+//! exactly.
 
 use std::f64::consts::TAU;
 
@@ -30,8 +31,9 @@ pub fn jitter_overlapping_first_order_hz(k: f64, t_s: f64, cn0_hz: f64) -> f64 {
     (2.0 * k * k / (2.0 - k)).sqrt() * pll::raw_rad(t_s, cn0_hz) / (TAU * t_s)
 }
 
-/// Probability that the phase between two prompts is more than a quarter cycle off, so that a two-quadrant discriminator errs by half a
-/// cycle, 1/(2T): ½·e^(−T·C/N0), the error of differential phase shift keying (Proakis, Digital Communications, 5.2-69).
+/// Probability that the phase between two prompts is more than a quarter cycle off, so that a two-quadrant
+/// discriminator errs by half a cycle, 1/(2T): ½·e^(−T·C/N0), the error of differential phase shift keying
+/// (Proakis, Digital Communications, 5.2-69).
 ///
 /// Such values kick a narrow loop; they rule its jitter where T·C/N0 is below about 10.
 pub fn wrap_probability(t_s: f64, cn0_hz: f64) -> f64 {

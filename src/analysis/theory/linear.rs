@@ -22,11 +22,12 @@ pub enum Integrator {
 /// What a loop does with its corrections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Feedback {
-    /// The oscillator's phase and rate are both set at each update: gains correct the mean phase of the coming interval.
-    /// Stephens and Thomas 1995.
+    /// The oscillator's phase and rate are both set at each update: gains correct the mean phase of the
+    /// coming interval. Stephens and Thomas 1995.
     PhaseAndRate,
-    /// Only the rate is set: the filters of Kaplan and Hegarty, table 8.23. `interval_mean` says whether the discriminator
-    /// sees the mean phase of an interval (a correlator does) or that at its start; `delay` is one more epoch.
+    /// Only the rate is set: the filters of Kaplan and Hegarty, table 8.23. `interval_mean` says whether the
+    /// discriminator sees the mean phase of an interval (a correlator does) or that at its start; `delay` is
+    /// one more epoch.
     Rate { integrator: Integrator, interval_mean: bool, delay: bool },
 }
 
@@ -55,8 +56,8 @@ pub enum Pairs {
     Separate,
 }
 
-/// A phase loop with phase-and-rate feedback whose rate is also corrected by `assist` times the difference of successive
-/// phase errors, as a frequency loop of order 1 on overlapping pairs does.
+/// A phase loop with phase-and-rate feedback whose rate is also corrected by `assist` times the difference of
+/// successive phase errors, as a frequency loop of order 1 on overlapping pairs does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AssistedLoop {
     pub gains: [f64; 3],
@@ -65,7 +66,8 @@ pub struct AssistedLoop {
 
 /// Gains per update of the usual analogue prototypes for a nominal bandwidth times update time.
 ///
-/// Kaplan and Hegarty, Understanding GPS 2nd ed., table 5.6: ω0 = 4B; B/0.53 with a2 = 1.414; B/0.7845 with a3 = 1.1, b3 = 2.4.
+/// Kaplan and Hegarty, Understanding GPS 2nd ed., table 5.6: ω0 = 4B; B/0.53 with a2 = 1.414; B/0.7845 with
+/// a3 = 1.1, b3 = 2.4.
 pub fn analogue_gains(order: u32, bandwidth_time: f64) -> [f64; 3] {
     match order {
         1 => [4.0 * bandwidth_time, 0.0, 0.0],
@@ -168,7 +170,8 @@ impl Linear {
         Some(sum)
     }
 
-    /// Error at z for a unit of discriminator noise: H(z) of a phase loop, whose error for a moving phase is 1−H(z). `None` at a pole.
+    /// Error at z for a unit of discriminator noise: H(z) of a phase loop, whose error for a moving phase is
+    /// 1−H(z). `None` at a pole.
     pub fn response(&self, z: Complex64) -> Option<Complex64> {
         let size = self.a.nrows();
         let matrix = DMatrix::from_fn(size, size, |row, column| {
@@ -185,8 +188,8 @@ impl Linear {
 }
 
 impl PhaseLoop {
-    /// The loop as a linear system; its error is oscillator minus truth, of the mean phase or of that at the start as the
-    /// discriminator sees it.
+    /// The loop as a linear system; its error is oscillator minus truth, of the mean phase or of that at the
+    /// start as the discriminator sees it.
     pub fn linear(&self) -> Linear {
         let [k1, k2, k3] = self.gains;
         match self.feedback {

@@ -1,8 +1,9 @@
 //! Phase jitter that the receiver's oscillator leaves in a phase loop.
 //!
-//! σ² = ∫ (f0/f)²·S_y(f)·|1−H|² df over one-sided S_y = h₀ + h₋₁/f + h₋₂/f² (NIST SP 1065, 3.3); for a discrete loop times
-//! sinc²(fT), the mean over an interval. Coefficients: Winkel 2003, table 2.1. Limits: no white or flicker phase noise,
-//! no vibration. Formulas in use with the prefactor 2π² in place of 4π² belong to a two-sided density.
+//! σ² = ∫ (f0/f)²·S_y(f)·|1−H|² df over one-sided S_y = h₀ + h₋₁/f + h₋₂/f² (NIST SP 1065, 3.3); for a
+//! discrete loop times sinc²(fT), the mean over an interval. Coefficients: Winkel 2003, table 2.1. Limits: no
+//! white or flicker phase noise, no vibration. Formulas in use with the prefactor 2π² in place of 4π² belong
+//! to a two-sided density.
 
 use std::f64::consts::{PI, TAU};
 
@@ -19,8 +20,8 @@ pub const OCXO: PowerLaw = PowerLaw::of_frequency(2.51e-26, 2.51e-23, 2.51e-22);
 /// Points of the integral in an octave; the integrand is smooth there, so that the trapezium rule errs below 1e-4.
 const POINTS_PER_OCTAVE: u32 = 48;
 
-/// Jitter in radians of an oscillator multiplied to `carrier_hz`, `remaining(f)` being |1−H|² at `f` Hz, integrated over
-/// `octaves` from `lowest_hz` up.
+/// Jitter in radians of an oscillator multiplied to `carrier_hz`, `remaining(f)` being |1−H|² at `f` Hz,
+/// integrated over `octaves` from `lowest_hz` up.
 fn jitter_rad(noise: &PowerLaw, carrier_hz: f64, lowest_hz: f64, octaves: u32, remaining: impl Fn(f64) -> f64) -> f64 {
     let points = octaves * POINTS_PER_OCTAVE;
     let step = std::f64::consts::LN_2 / f64::from(POINTS_PER_OCTAVE);

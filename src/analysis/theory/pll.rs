@@ -58,16 +58,16 @@ pub fn least_cn0_dbhz(bandwidth_hz: f64, t_s: f64, stress_rad: f64, other_rad: f
     (total > 0.0 && thermal > 0.0).then(|| cn0_dbhz(thermal.sqrt(), bandwidth_hz, t_s))
 }
 
-/// Phase jitter from vibration, in radians: f0·√∫Sv²(f)·P(f)/f² df, for a density P (g²/Hz) and a sensitivity Sv (1/g), by
-/// the trapezium rule over (frequency, density) points. Kaplan and Hegarty, eq. 5.7.
+/// Phase jitter from vibration, in radians: f0·√∫Sv²(f)·P(f)/f² df, for a density P (g²/Hz) and a sensitivity
+/// Sv (1/g), by the trapezium rule over (frequency, density) points. Kaplan and Hegarty, eq. 5.7.
 pub fn vibration_rad(carrier_hz: f64, sensitivity_per_g: f64, density: &[(f64, f64)]) -> f64 {
     let term = |&(f, p): &(f64, f64)| p / (f * f);
     let area: f64 = density.windows(2).map(|w| 0.5 * (w[1].0 - w[0].0) * (term(&w[0]) + term(&w[1]))).sum();
     carrier_hz * sensitivity_per_g * area.sqrt()
 }
 
-/// Mean time between cycle slips of a first-order Costas loop with jitter σ: π²ρ·I0²(ρ)/(2B), ρ = 1/(4σ²) (Viterbi 1966,
-/// with the doubled angle of a Costas loop). Infinite where it leaves the range of `f64`.
+/// Mean time between cycle slips of a first-order Costas loop with jitter σ: π²ρ·I0²(ρ)/(2B), ρ = 1/(4σ²)
+/// (Viterbi 1966, with the doubled angle of a Costas loop). Infinite where it leaves the range of `f64`.
 ///
 /// An order of magnitude: loops of order 2 and 3 slip sooner (Holmes and Raghavan 2009), an arctangent later.
 pub fn slip_time_s(jitter_rad: f64, bandwidth_hz: f64) -> f64 {

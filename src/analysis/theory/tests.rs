@@ -1,5 +1,6 @@
-//! The closed forms against figures computed elsewhere: SciPy's Lyapunov and quadrature routines, its non-central χ², and
-//! Monte-Carlo simulations of correlators written in Python, none of which shares a line with this project.
+//! The closed forms against figures computed elsewhere: SciPy's Lyapunov and quadrature routines, its
+//! non-central χ², and Monte-Carlo simulations of correlators written in Python, none of which shares a line
+//! with this project.
 
 use super::clock::PowerLaw;
 use super::dll::{BandIntegrals, Discriminator};
@@ -160,8 +161,8 @@ fn band_limited_code_jitter_is_the_tabled_one() {
 
 #[test]
 fn the_branches_of_5_23_meet_the_integral() {
-    // Narrow correlators are a limit of the integral; the two other branches are a fit whose error the book does not print:
-    // 14 % at d = 1 chip in a band of 2 chip rates, 9 % elsewhere, as found here.
+    // Narrow correlators are a limit of the integral; the two other branches are a fit whose error the book
+    // does not print: 14 % at d = 1 chip in a band of 2 chip rates, 9 % elsewhere, as found here.
     for band in [2.0, 4.0, 8.0, 20.0] {
         for d in [0.1, 0.25, 0.5, 1.0] {
             let branch = dll::jitter_banded_chips(d, band, 1.0, 20e-3, hz(45.0));
@@ -175,8 +176,9 @@ fn the_branches_of_5_23_meet_the_integral() {
 
 #[test]
 fn a_normalised_discriminator_loses_the_gain_that_simulation_shows() {
-    // Closed-loop jitter over the formula where the gain is not given back is √gain to first order. Monte-Carlo, T = 1 ms:
-    // 0.960 at d = 0.5 and 0.84 at d = 1 with 40 dB-Hz, 1.003 at d = 0.1; the noise of the quotient adds up to 1.5 %.
+    // Closed-loop jitter over the formula where the gain is not given back is √gain to first order.
+    // Monte-Carlo, T = 1 ms: 0.960 at d = 0.5 and 0.84 at d = 1 with 40 dB-Hz, 1.003 at d = 0.1; the noise of
+    // the quotient adds up to 1.5 %.
     let root = |d, dbhz| dll::normalised_gain(Discriminator::EarlyMinusLate, d, 1e-3, hz(dbhz)).sqrt();
     for (d, simulated) in [(0.1, 1.003), (0.5, 0.960), (1.0, 0.84)] {
         close(root(d, 40.0), simulated, 0.025);
@@ -220,8 +222,8 @@ fn discrete_stress_becomes_the_analogue_one_in_a_narrow_loop() {
 
 #[test]
 fn vibration_of_a_flat_density_is_the_printed_closed_form() {
-    // Kaplan and Hegarty: 90.265·√(0.005·(1/25 − 1/2500)) degrees for 1e-9/g at L1. Trapezia of 1/f² at a ratio q a step are
-    // long by (1+q²)/(2q)−1 of it: 4e-5 for a hundredth of an octave.
+    // Kaplan and Hegarty: 90.265·√(0.005·(1/25 − 1/2500)) degrees for 1e-9/g at L1. Trapezia of 1/f² at a
+    // ratio q a step are long by (1+q²)/(2q)−1 of it: 4e-5 for a hundredth of an octave.
     let points: Vec<(f64, f64)> = (0..=664).map(|k| (25.0 * libm::exp2(f64::from(k) / 100.0), 0.005)).collect();
     let last_hz = 25.0 * libm::exp2(6.64);
     let printed = 90.265 * (0.005 * (1.0 / 25.0 - 1.0 / last_hz)).sqrt();

@@ -1,4 +1,5 @@
-//! Why fixes may be off, from what the judge knows of both sides: the scene's atmosphere and the receiver's corrections.
+//! Why fixes may be off, from what the judge knows of both sides: the scene's atmosphere and the receiver's
+//! corrections.
 
 use serde_json::Value;
 

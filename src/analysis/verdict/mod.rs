@@ -1,9 +1,9 @@
 //! What passed, what is marginal, what failed, and by how much.
 //!
-//! Every figure is held against one limit whose origin is stated: a threshold of theory, the receiver's own covariance, or a
-//! user's file ([`super::limits`]). A figure within a tenth of its limit is marginal. A figure that a scene cannot have
-//! is named with the reason why it is not judged. Limits: the thresholds are rules of thumb, not the points at which a
-//! receiver fails; several figures of one run share their causes.
+//! Every figure is held against one limit whose origin is stated: a threshold of theory, the receiver's own
+//! covariance, or a user's file ([`super::limits`]). A figure within a tenth of its limit is marginal. A
+//! figure that a scene cannot have is named with the reason why it is not judged. Limits: the thresholds are
+//! rules of thumb, not the points at which a receiver fails; several figures of one run share their causes.
 
 mod availability;
 mod hints;

@@ -1,4 +1,5 @@
-//! What the antenna's motion leaves in a velocity: a rate lags by a part of an update, and a change of acceleration leaves a transient.
+//! What the antenna's motion leaves in a velocity: a rate lags by a part of an update, and a change of
+//! acceleration leaves a transient.
 //!
 //! Limits: acceleration and jerk are differences of the truth's velocities, at least a truth's interval wide.
 
@@ -8,13 +9,16 @@ use crate::analysis::expect::ranges::Choices;
 use crate::analysis::jitter::theory::{exact_loop, natural_radps};
 use crate::analysis::load::Run;
 
-/// The rate of a loop (s + ω)³ lags by 3J/ω² under jerk J, that of a loop (s + ω)² by 2a/ω under acceleration a; neither overshoots.
+/// The rate of a loop (s + ω)³ lags by 3J/ω² under jerk J, that of a loop (s + ω)² by 2a/ω under acceleration
+/// a; neither overshoots.
 const THIRD_ORDER: f64 = 3.0;
 const SECOND_ORDER: f64 = 2.0;
-/// Share of the rate at which a turning antenna winds up all carriers together by which satellites differ: a tilt of θ makes the rate of
-/// one satellite swing by tan θ times the tangent of its angle from the axis, and a fix averages satellites on all sides.
+/// Share of the rate at which a turning antenna winds up all carriers together by which satellites differ: a
+/// tilt of θ makes the rate of one satellite swing by tan θ times the tangent of its angle from the axis, and
+/// a fix averages satellites on all sides.
 const WIND_UP_SHARE: f64 = 0.1;
-/// Rows before an epoch whose motion is still in the loop: half a second at ten a second, several of a loop's time constants.
+/// Rows before an epoch whose motion is still in the loop: half a second at ten a second, several of a loop's
+/// time constants.
 const ROWS: usize = 5;
 /// What light time, orbit and rounding leave in a receiver at rest: orbits as sent err by 1 mm/s.
 const REST_MPS: f64 = 2e-3;

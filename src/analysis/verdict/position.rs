@@ -15,8 +15,8 @@ impl Verdict {
             let variance = run.fixes.iter().map(of).sum::<f64>() / run.fixes.len().max(1) as f64;
             (variance > 0.0).then(|| factor * variance.sqrt())
         };
-        // A circle that holds 95 % of two equal normals has a radius of √(−2 ln 0.05) σ; an ellipse of the same mean variance
-        // needs less, so that the bound is not too tight.
+        // A circle that holds 95 % of two equal normals has a radius of √(−2 ln 0.05) σ; an ellipse of the
+        // same mean variance needs less, so that the bound is not too tight.
         let flat =
             expected(2.4477, |fix| 0.5 * (fix.sigma_east_m * fix.sigma_east_m + fix.sigma_north_m * fix.sigma_north_m));
         let up = expected(1.96, |fix| fix.sigma_up_m * fix.sigma_up_m);

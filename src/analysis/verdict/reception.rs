@@ -1,5 +1,5 @@
-//! Satellites: those that are not there, and those that must be found, observed and used but are not, each with its reason; and
-//! decoded navigation parameters.
+//! Satellites: those that are not there, and those that must be found, observed and used but are not, each
+//! with its reason; and decoded navigation parameters.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -11,7 +11,8 @@ use crate::analysis::summary::Summary;
 use crate::gnss::record::{Event, Fix};
 use crate::gnss::satellite::Sv;
 
-/// Share of the time over which a satellite must be observed, of what is required. The rest is for one unlucky search in many.
+/// Share of the time over which a satellite must be observed, of what is required. The rest is for one
+/// unlucky search in many.
 const OBSERVED_SHARE: f64 = 0.95;
 /// Share of required satellites, over all epochs, that fixes may leave out, in percent: a residual test's false alarms.
 const UNUSED_PERCENT: f64 = 5.0;

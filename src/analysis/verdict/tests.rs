@@ -56,8 +56,8 @@ fn a_sound_run_passes_and_its_first_fix_is_due_by_the_message_s_timetable() {
     assert_eq!(failed(&run), Vec::<String>::new());
     let verdict = verdict(&run);
     let first = verdict.rows.iter().find(|row| row.figure == "time to first fix").unwrap();
-    // The scene starts with a frame: locked at 4 s, subframe 1 comes whole at 36 s; a quarter second of light, a second each to
-    // use and to solve.
+    // The scene starts with a frame: locked at 4 s, subframe 1 comes whole at 36 s; a quarter second of
+    // light, a second each to use and to solve.
     assert!(matches!(first.bound, Bound::Max(limit_s) if (38.2..38.5).contains(&limit_s)), "{:?}", first.bound);
     assert!(verdict.rows.len() >= 8, "{:?}", verdict.rows);
 }

@@ -1,8 +1,10 @@
-//! Errors of the fixes and what is stated of them, against what theory expects of a sound receiver ([`crate::analysis::expect`]).
+//! Errors of the fixes and what is stated of them, against what theory expects of a sound receiver
+//! ([`crate::analysis::expect`]).
 //!
-//! Each kind of error has three rows: its mean, its 95th percentile, and the largest against the limit of its own epoch. Limits are
-//! quantiles of theory's σ for a stated probability of a false alarm, widened by what theory itself may err, with known biases
-//! taken out. Stated sigmas lie within a factor of the ones that follow from settings, true C/N0 and geometry, on both sides.
+//! Each kind of error has three rows: its mean, its 95th percentile, and the largest against the limit of its
+//! own epoch. Limits are quantiles of theory's σ for a stated probability of a false alarm, widened by what
+//! theory itself may err, with known biases taken out. Stated sigmas lie within a factor of the ones that
+//! follow from settings, true C/N0 and geometry, on both sides.
 
 use std::collections::HashMap;
 
@@ -24,7 +26,8 @@ use crate::gnss::record::{Event, Fix, IonosphereModel};
 
 /// By how much theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a real one.
 pub(super) const THEORY: f64 = 1.2;
-/// Factor within which a stated sigma lies about the expected one: 1 dB of C/N0 (1.12) and 12 % of theory and smoothing.
+/// Factor within which a stated sigma lies about the expected one: 1 dB of C/N0 (1.12) and 12 % of theory and
+/// smoothing.
 const SIGMA: f64 = 1.25;
 /// How far dilutions and condition may be from the true geometry's: elevations seen from a fix metres away.
 const GEOMETRY: f64 = 2e-3;
@@ -32,9 +35,11 @@ const GEOMETRY: f64 = 2e-3;
 const CORRELATION: f64 = 0.1;
 /// Share of fixes that may leave out a satellite without cause: a residual test of probability 1e-3 whose errors last.
 const BLAMELESS_SHARE: f64 = 0.05;
-/// Independent fixes from which on a mean normalised error squared says something: below, a factor of three of sigma is within its band.
+/// Independent fixes from which on a mean normalised error squared says something: below, a factor of three
+/// of sigma is within its band.
 const ENOUGH: f64 = 5.0;
-/// A satellite found again after a loss is used before its half cycle is known, and observed after: two subframes, and the lock.
+/// A satellite found again after a loss is used before its half cycle is known, and observed after: two
+/// subframes, and the lock.
 const RETURN_S: f64 = 20.0;
 
 /// A stated sigma over the expected one.
@@ -247,7 +252,8 @@ impl Verdict {
             self.not_judged.push(reason);
             return;
         }
-        // A receiver that counts with errors which the scene does not have is no worse for it: what it should state is the measure.
+        // A receiver that counts with errors which the scene does not have is no worse for it: what it should
+        // state is the measure.
         let scaled: Vec<f64> = cases.iter().filter_map(|case| case.expected_square()).collect();
         let least: Vec<f64> = cases.iter().filter_map(|case| case.least_square()).collect();
         let (Some(high), Some(low)) = (mean(&scaled), mean(&least)) else { return };

@@ -59,8 +59,8 @@ impl LinkBudget {
         self.budget(sight, carrier_hz).0
     }
 
-    /// What no C/N0 on the Earth's surface exceeds with a receiving antenna of `peak_dbic`: the best of both patterns at
-    /// once, from a satellite at the zenith.
+    /// What no C/N0 on the Earth's surface exceeds with a receiving antenna of `peak_dbic`: the best of both
+    /// patterns at once, from a satellite at the zenith.
     pub fn strongest_dbhz(&self, peak_dbic: f64, carrier_hz: f64) -> f64 {
         let blocks = self.blocks.iter().map(|(_, block)| block.peak_dbi());
         let transmit_db = blocks.fold(self.block.peak_dbi(), f64::max);

@@ -1,10 +1,11 @@
 //! Mapping functions of the neutral atmosphere: slant over zenith delay, hydrostatic and wet.
 //!
-//! Sources: Niell 1996 (NMF); Böhm, Werl & Schuh 2006 (VMF1: b and c in closed form); Landskron & Böhm 2018 (VMF3: b and
-//! c by place and season). VMF1 and VMF3 take a from a Vienna grid or GPT3, at zero height, and add Niell's height
-//! correction to the hydrostatic factor. Limits: elevations below [`LOWEST_RAD`] take its mapping, where the continued
-//! fractions still make sense; a grid's coefficients are held for the whole scene. Those of VMF3's grids and of GPT3 under
-//! VMF1's closed form depart from VMF3, by 2 cm of delay at 5° and 2 mm at 10°.
+//! Sources: Niell 1996 (NMF); Böhm, Werl & Schuh 2006 (VMF1: b and c in closed form); Landskron & Böhm 2018
+//! (VMF3: b and c by place and season). VMF1 and VMF3 take a from a Vienna grid or GPT3, at zero height, and
+//! add Niell's height correction to the hydrostatic factor. Limits: elevations below [`LOWEST_RAD`] take its
+//! mapping, where the continued fractions still make sense; a grid's coefficients are held for the whole
+//! scene. Those of VMF3's grids and of GPT3 under VMF1's closed form depart from VMF3, by 2 cm of delay at 5°
+//! and 2 mm at 10°.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -153,8 +154,9 @@ fn herring(sin: f64, [a, b, c]: [f64; 3]) -> f64 {
     (1.0 + a / (1.0 + b / (1.0 + c))) / (sin + a / (sin + b / (sin + c)))
 }
 
-/// Days into a mean year, 1.0 on the first of January of 1980. Within 0.8 days of the calendar, and
-/// without its step at the turn of the year; VMF3's factors at 5° change by 1.4e-4 in that time, which is 0.3 mm of delay.
+/// Days into a mean year, 1.0 on the first of January of 1980. Within 0.8 days of the calendar, and without
+/// its step at the turn of the year; VMF3's factors at 5° change by 1.4e-4 in that time, which is 0.3 mm of
+/// delay.
 pub fn season_day(at: Epoch) -> f64 {
     (at.seconds() as f64 / 86_400.0 + 6.0).rem_euclid(YEAR_DAYS)
 }

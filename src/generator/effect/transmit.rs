@@ -1,10 +1,11 @@
 //! Transmit antennas of GPS satellites by block: gain on L1 over the angle off the boresight, mean over azimuth.
 //!
-//! Sources: Block IIA after Czopek and Shollenberger 1993 (ION GPS-93);
-//! Blocks IIR and IIR-M (improved panel) after the manufacturer's measurements (Marquis and Reigh 2015, Navigation 62),
-//! each the mean of a few satellites. Which satellite is of which block: the constellation list of the National
-//! Geospatial-Intelligence Agency of July 2011, which differs from that of July 2010 in PRN 1 alone. Limits: patterns end at
-//! 30°, beyond which their last gain stands: users above the satellites see it too high or too low by a side lobe, some 10 dB.
+//! Sources: Block IIA after Czopek and Shollenberger 1993 (ION GPS-93); Blocks IIR and IIR-M (improved panel)
+//! after the manufacturer's measurements (Marquis and Reigh 2015, Navigation 62), each the mean of a few
+//! satellites. Which satellite is of which block: the constellation list of the National
+//! Geospatial-Intelligence Agency of July 2011, which differs from that of July 2010 in PRN 1 alone. Limits:
+//! patterns end at 30°, beyond which their last gain stands: users above the satellites see it too high or
+//! too low by a side lobe, some 10 dB.
 
 use super::antenna::Curve;
 use crate::gnss::satellite::Sv;

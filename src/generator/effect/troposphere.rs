@@ -1,4 +1,5 @@
-//! The neutral atmosphere: hydrostatic and wet zenith delays, each brought to the line of sight by its mapping function.
+//! The neutral atmosphere: hydrostatic and wet zenith delays, each brought to the line of sight by its
+//! mapping function.
 //!
 //! Sources: Davis et al. 1985 (hydrostatic, with Saastamoinen's gravity term), Saastamoinen 1972 (wet), the Magnus
 //! formula with 237.3 °C; mapping functions are in [`super::mapping`]. Weather is the scene's, which follows the

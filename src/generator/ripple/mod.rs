@@ -1,8 +1,10 @@
-//! What changes too quickly for knots: the noise of the receiver's oscillator, scintillation, faults of satellites' clocks.
+//! What changes too quickly for knots: the noise of the receiver's oscillator, scintillation, faults of
+//! satellites' clocks.
 //!
-//! Such a thing is known at nodes on an absolute grid of samples, less than a millisecond apart, and is linear between
-//! them, but for a clock that steps at one; runs of the synthesiser end at nodes, so samples and truth follow the same line. Limits: a ripple of the clock
-//! moves code and carrier by its own size, not the satellites (1 ns at 1 km/s is a micrometre).
+//! Such a thing is known at nodes on an absolute grid of samples, less than a millisecond apart, and is
+//! linear between them, but for a clock that steps at one; runs of the synthesiser end at nodes, so samples
+//! and truth follow the same line. Limits: a ripple of the clock moves code and carrier by its own size, not
+//! the satellites (1 ns at 1 km/s is a micrometre).
 
 pub mod markov;
 pub mod oscillator;
@@ -83,7 +85,8 @@ fn cell(scene: &Scene, fading: Option<Sv>, signal: &Signal, node: u64, ends: [Ri
     [older(from, from_s), older(to, to_s)]
 }
 
-/// The ripple of a signal, which fades with satellite `fading`, at a place between samples; before the first sample that of the first.
+/// The ripple of a signal, which fades with satellite `fading`, at a place between samples; before the first
+/// sample that of the first.
 pub fn at(scene: &Scene, fading: Option<Sv>, signal: &Signal, sample: f64) -> Ripple {
     if !any(scene, fading) {
         return Ripple::STILL;

@@ -1,8 +1,9 @@
 //! Satellites' clocks as they depart from what they broadcast: steps, ramps and the oscillator's noise.
 //!
-//! A departure reaches the antenna as a change of code and carrier alike. Steps and ramps begin and end at nodes, up to a
-//! millisecond after the time that the scene gives, which is that of arrival; a step takes no time. Limits: the noise is
-//! drawn over the received samples, whose time runs a millionth faster or slower than the satellite's.
+//! A departure reaches the antenna as a change of code and carrier alike. Steps and ramps begin and end at
+//! nodes, up to a millisecond after the time that the scene gives, which is that of arrival; a step takes no
+//! time. Limits: the noise is drawn over the received samples, whose time runs a millionth faster or slower
+//! than the satellite's.
 
 use std::collections::BTreeMap;
 

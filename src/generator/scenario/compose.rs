@@ -24,8 +24,8 @@ use crate::gnss::time::SampleClock;
 
 /// Samples of one scene at most: 19 days at 60 Msps.
 const MAX_SAMPLES: f64 = 1e14;
-/// Beyond this the equations of [`crate::generator::sky`], which keep no square of speed over light's for the user, are no
-/// longer a receiver's world.
+/// Beyond this the equations of [`crate::generator::sky`], which keep no square of speed over light's for the
+/// user, are no longer a receiver's world.
 const LARGEST_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;
 /// Largest navigation file, packed.
 const MAX_NAVIGATION_BYTES: u64 = 64 << 20;

@@ -45,7 +45,8 @@ pub(super) fn front_end(table: Option<&Table<'_>>) -> Result<FrontEnd, ScenarioE
     if format.is_complex() && if_hz.abs() >= half {
         return Err(table.bad("if_hz", format!("less than half of sample_rate_hz in size, {half} Hz")));
     }
-    // Above half the rate real samples hold a band folded, as bandpass sampling does; on a multiple of it, one over itself.
+    // Above half the rate real samples hold a band folded, as bandpass sampling does; on a multiple of it,
+    // one over itself.
     if !format.is_complex() && (if_hz <= 0.0 || (if_hz / half).fract() == 0.0) {
         return Err(table.bad(
             "if_hz",

@@ -24,8 +24,8 @@ pub(super) struct Sky {
     pub excluded: Vec<Sv>,
 }
 
-/// The navigation files that the scenario names, or the embedded one. What is not an ephemeris is taken from the first file
-/// that has it.
+/// The navigation files that the scenario names, or the embedded one. What is not an ephemeris is taken from
+/// the first file that has it.
 pub(super) fn navigation(
     scenario: &Scenario,
     directory: &Path,
@@ -144,8 +144,8 @@ fn tell(warnings: &mut Vec<String>, list: &[String], what: &str) {
     }
 }
 
-/// The effects in the order in which they act: ionosphere, troposphere, wind-up, strength, echoes of all that, then what
-/// stands in the way of the direct ray.
+/// The effects in the order in which they act: ionosphere, troposphere, wind-up, strength, echoes of all
+/// that, then what stands in the way of the direct ray.
 pub(super) fn effects(
     scenario: &Scenario,
     files: &Files<'_>,

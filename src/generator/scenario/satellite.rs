@@ -1,4 +1,5 @@
-//! The satellites' side as written: `[orbits]`, `[[satellite_fault]]` and `[[message_fault]]`, and what becomes of them.
+//! The satellites' side as written: `[orbits]`, `[[satellite_fault]]` and `[[message_fault]]`, and what
+//! becomes of them.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -162,8 +163,8 @@ pub(super) fn message_fault(table: &Table<'_>) -> Result<MessageSpec, ScenarioEr
 }
 
 impl OrbitsSpec {
-    /// Lets `catalogue` follow the files' orbits, and tells which of its satellites they do not hold over the scene, which
-    /// lasts to `end_s`.
+    /// Lets `catalogue` follow the files' orbits, and tells which of its satellites they do not hold over the
+    /// scene, which lasts to `end_s`.
     pub(super) fn follow(
         &self,
         scenario: &Scenario,

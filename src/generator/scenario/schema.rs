@@ -2,8 +2,8 @@
 //! reference.
 //!
 //! A table is a list of [`Key`]s; tables in tables make a tree. `read::Table` reads a value by its key's
-//! declaration alone, so that no range and no default is written twice. Of a table with kinds (`kind`, or `model`) a key
-//! may belong to some of them.
+//! declaration alone, so that no range and no default is written twice. Of a table with kinds (`kind`, or
+//! `model`) a key may belong to some of them.
 
 use std::fmt::Write as _;
 

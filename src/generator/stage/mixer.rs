@@ -1,4 +1,5 @@
-//! The faults of a down-converter: oscillator offset and phase noise, I and Q out of balance, a residue of direct current.
+//! The faults of a down-converter: oscillator offset and phase noise, I and Q out of balance, a residue of
+//! direct current.
 //!
 //! Phase noise is that of a synthesiser locked to its reference: flat up to the loop's bandwidth and falling by 20 dB a
 //! decade above (a first-order process), known at nodes a twentieth of its time constant apart and linear between

@@ -125,7 +125,8 @@ fn impulse(x: f64, cutoff_cps: f64) -> f64 {
     windowed_sinc(x, cutoff_cps, HALF_WIDTH as f64, BETA)
 }
 
-/// The impulse response `x` samples from the middle of a low-pass filter under a Kaiser window of ±`half_width` samples.
+/// The impulse response `x` samples from the middle of a low-pass filter under a Kaiser window of
+/// ±`half_width` samples.
 pub(crate) fn windowed_sinc(x: f64, cutoff_cps: f64, half_width: f64, beta: f64) -> f64 {
     let angle = 2.0 * PI * cutoff_cps * x;
     let sinc = if angle.abs() < 1e-9 { 1.0 } else { libm::sin(angle) / angle };

@@ -1,10 +1,12 @@
-//! The fast kernel: all rays of a stretch at once, 32 samples side by side in plain arrays that the compiler turns into vectors.
+//! The fast kernel: all rays of a stretch at once, 32 samples side by side in plain arrays that the compiler
+//! turns into vectors.
 //!
-//! No fused multiply-add and no intrinsics: each operation is one IEEE rounding, so every instruction set gives the same
-//! bits. Samples come in groups of 32, sixteen before and sixteen behind the group's middle. The carrier at the middle,
-//! times that at half a sample, one and a half … from it, gives both sides with the same four products: the earlier
-//! half stands backwards until all rays are added. Carrier within 1e-6 cycle, no spur above −110 dBc.
-//! Chip signs come from one window of the strip per group, by a shift per lane; code phases resolve 2^-27 chip.
+//! No fused multiply-add and no intrinsics: each operation is one IEEE rounding, so every instruction set
+//! gives the same bits. Samples come in groups of 32, sixteen before and sixteen behind the group's middle.
+//! The carrier at the middle, times that at half a sample, one and a half … from it, gives both sides with
+//! the same four products: the earlier half stands backwards until all rays are added. Carrier within 1e-6
+//! cycle, no spur above −110 dBc. Chip signs come from one window of the strip per group, by a shift per
+//! lane; code phases resolve 2^-27 chip.
 
 use super::angle::{cos_sin, ramp};
 use super::band::{Filter, HALF_WIDTH};

@@ -1,10 +1,11 @@
 //! Rays and waveforms become samples: spreading codes, chip edges, carrier rotation.
 //!
-//! A [`Run`] is up to 4096 samples of one ray with constant carrier and code steps, both phases
-//! as fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
+//! A [`Run`] is up to 4096 samples of one ray with constant carrier and code steps, both phases as
+//! fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
 //! [`mod@reference`] evaluates each sample in `f64`, [`exact`] the same at speed; [`lanes`] is the fast
-//! kernel, for all runs of a stretch at once as [`bank`] gathers them. Both are plain lane-array code that [`isa`] compiles for each instruction set with the same bits on all.
-//! Limits: 15 code steps a sample; lanes fall back to a wave buffer above one step a sample.
+//! kernel, for all runs of a stretch at once as [`bank`] gathers them. Both are plain lane-array code that
+//! [`isa`] compiles for each instruction set with the same bits on all. Limits: 15 code steps a sample; lanes
+//! fall back to a wave buffer above one step a sample.
 
 pub(crate) mod angle;
 pub mod band;

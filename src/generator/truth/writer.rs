@@ -54,9 +54,9 @@ struct Claims {
     trajectory: Table,
 }
 
-/// Writes `observations.csv`, `sky.csv`, `trajectory.csv`, `navigation.csv`, `passes.csv` and `scene.json`; `rays.csv` where a satellite
-/// has more than one ray, with interference `interference.csv`, with spoofers `spoofed.csv` and `claimed.csv`
-/// (`spoofed_2.csv`, … from the second one on).
+/// Writes `observations.csv`, `sky.csv`, `trajectory.csv`, `navigation.csv`, `passes.csv` and `scene.json`;
+/// `rays.csv` where a satellite has more than one ray, with interference `interference.csv`, with spoofers
+/// `spoofed.csv` and `claimed.csv` (`spoofed_2.csv`, … from the second one on).
 pub struct Writer {
     directory: PathBuf,
     observations: Table,
@@ -122,7 +122,8 @@ struct OscillatorFile {
 }
 
 impl Writer {
-    /// Creates the files in a directory that is there: were it made here, one that a signal has taken away would come back.
+    /// Creates the files in a directory that is there: were it made here, one that a signal has taken away
+    /// would come back.
     ///
     /// # Errors
     /// [`TruthError`] with the path that failed.

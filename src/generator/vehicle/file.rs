@@ -202,8 +202,8 @@ impl Columns {
     }
 }
 
-/// Bytes that end in an error where a row is too long: one that nothing ends, or whose quotes nothing closes. What a signal has
-/// interrupted is read again, as the table's reader does not.
+/// Bytes that end in an error where a row is too long: one that nothing ends, or whose quotes nothing closes.
+/// What a signal has interrupted is read again, as the table's reader does not.
 struct ShortRows<R> {
     inner: R,
     since_end: usize,

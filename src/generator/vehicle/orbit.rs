@@ -1,8 +1,9 @@
 //! A satellite as the user: Kepler's ellipse in inertial space, as the rotating Earth sees it.
 //!
-//! The orbital plane is placed by the Earth-fixed longitude that the ascending node has at the scene's start. Closed form
-//! but for Kepler's equation; knots are so close that the quintics between them err by nanometres. Limits: two bodies, no
-//! oblateness (which turns a low orbit's node by some degrees a day), no drag, no Moon.
+//! The orbital plane is placed by the Earth-fixed longitude that the ascending node has at the scene's start.
+//! Closed form but for Kepler's equation; knots are so close that the quintics between them err by
+//! nanometres. Limits: two bodies, no oblateness (which turns a low orbit's node by some degrees a day), no
+//! drag, no Moon.
 
 use nalgebra::Vector3;
 use thiserror::Error;
@@ -12,9 +13,9 @@ use super::{Knot, Motion, Trajectory};
 use crate::gnss::broadcast::solve_kepler;
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, SEMI_MAJOR_AXIS_M, rotate_earth};
 
-/// True anomaly between knots at perigee. A quintic over h misses by h⁶/46080 of the sixth derivative, which is r·ω⁶ on a
-/// circle and below 60 times that at the perigee of an ellipse (found numerically up to e = 0.98): 6.6e6 m · 60 · 1e-12 /
-/// 46080 is 9 nm.
+/// True anomaly between knots at perigee. A quintic over h misses by h⁶/46080 of the sixth derivative, which
+/// is r·ω⁶ on a circle and below 60 times that at the perigee of an ellipse (found numerically up to e =
+/// 0.98): 6.6e6 m · 60 · 1e-12 / 46080 is 9 nm.
 const STEP_RAD: f64 = 0.01;
 /// Knots at most, 80 bytes each: 46 days of a low orbit.
 const MOST_KNOTS: f64 = 5e5;
@@ -136,8 +137,9 @@ mod tests {
             for k in 0..3_000 {
                 let t_s = 1.2 * f64::from(k) + 0.137;
                 let (found, want) = (flight.at(t_s), orbit.at(t_s).unwrap());
-                // The quintic's 9 nm; and half a dozen roundings in both, to 2^-53 of the distance or of an anomaly near one
-                // radian, which moves the place by a·√((1 + e cos E)/(1 − e cos E)), less than 2a here.
+                // The quintic's 9 nm; and half a dozen roundings in both, to 2^-53 of the distance or of an
+                // anomaly near one radian, which moves the place by a·√((1 + e cos E)/(1 − e cos E)), less
+                // than 2a here.
                 let bound_m = 1e-8 + 8.0 * (want.position_m.norm() + 2.0 * a) * (0.5_f64).powi(53);
                 let apart_m = (found.position_m - want.position_m).norm();
                 assert!(apart_m < bound_m, "{e} {t_s}: {apart_m} above {bound_m}");

@@ -241,8 +241,9 @@ mod tests {
 
     #[test]
     fn gravity_at_rest_is_normal_gravity() {
-        // WGS 84 normal gravity (NGA.STND.0036, table 3.6): 9.780 325 335 9 at the equator, 9.832 184 937 9 at the pole;
-        // the normal field's J4 = -2.37e-6, left out here, weighs 5 g J4 = 1.16e-4 at the pole, less at the equator.
+        // WGS 84 normal gravity (NGA.STND.0036, table 3.6): 9.780 325 335 9 at the equator, 9.832 184 937 9
+        // at the pole; the normal field's J4 = -2.37e-6, left out here, weighs 5 g J4 = 1.16e-4 at the pole,
+        // less at the equator.
         for (latitude, want) in [(0.0, 9.780_325), (90.0, 9.832_185)] {
             let pad = Geodetic::from_degrees(latitude, 10.0, 0.0);
             let got = Rocket { pad, ..rocket() }.field(&(pad.to_ecef(), Vector3::zeros())).norm();

@@ -1,10 +1,10 @@
-//! A navigation file as lines and columns: the header's lines that are used, and GPS LNAV records of eight lines with a number
-//! or nothing in each field of 19 columns.
+//! A navigation file as lines and columns: the header's lines that are used, and GPS LNAV records of eight
+//! lines with a number or nothing in each field of 19 columns.
 //!
-//! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5 and A6; RINEX 4.02, tables A9 and A33. Where a line is missing,
-//! doubled or cut, or text stands beside the fields, what follows would be read into the wrong elements; so such a record is
-//! left out and named with its line and column, and so is whatever cannot be told to be of another system. Records of
-//! other systems and messages are counted and not read.
+//! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5 and A6; RINEX 4.02, tables A9 and A33. Where a
+//! line is missing, doubled or cut, or text stands beside the fields, what follows would be read into the
+//! wrong elements; so such a record is left out and named with its line and column, and so is whatever cannot
+//! be told to be of another system. Records of other systems and messages are counted and not read.
 
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::time::Epoch;

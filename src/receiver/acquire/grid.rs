@@ -296,8 +296,8 @@ impl Grid {
         (PEAK_CHIPS / (self.chips_per_sample * self.lag_samples)).ceil() as usize
     }
 
-    /// The largest cell of a satellite at every Doppler, over the noise floor of its map. Of each Doppler whose own largest
-    /// cell lies at the peak's code phase, the neighbourhood is left out of the floor.
+    /// The largest cell of a satellite at every Doppler, over the noise floor of its map. Of each Doppler
+    /// whose own largest cell lies at the peak's code phase, the neighbourhood is left out of the floor.
     fn heights(&self, strips: &[Vec<Strip>], satellite: usize) -> Vec<f64> {
         let column = || strips.iter().filter_map(|strip| strip.get(satellite));
         let scaled: Vec<f64> = (column().zip(&self.dopplers_hz))

@@ -6,11 +6,12 @@
 //! are refined for tracking. Dopplers that change by more than the step within the search,
 //! and data symbols shorter than the coherent sum, are not searched for.
 //!
-//! **Multiple access.** Cross-correlation with strong satellites passes for weak ones. So the strong ones are subtracted from
-//! the samples, code period by code period, and weak ones are looked for again; where the strong ones have a good part of all
-//! power, or raise the cells of all codes, so is everything else. What is strong among the rest goes the same way. Signals that are
-//! no candidates are not subtracted: where they raise the cells of all codes, the threshold rises (`multiple_access`).
-//! Continuous waves that could pass for satellites are taken out first (`tone`).
+//! **Multiple access.** Cross-correlation with strong satellites passes for weak ones. So the strong ones are
+//! subtracted from the samples, code period by code period, and weak ones are looked for again; where the
+//! strong ones have a good part of all power, or raise the cells of all codes, so is everything else. What is
+//! strong among the rest goes the same way. Signals that are no candidates are not subtracted: where they
+//! raise the cells of all codes, the threshold rises (`multiple_access`). Continuous waves that could pass
+//! for satellites are taken out first (`tone`).
 //!
 //! **Threshold.** A cell's statistic is Σ|S|² in units of half its noise power: chi-square with 2K degrees
 //! of freedom for K sums. With N cells (lags in one code period times Dopplers), a cell is given
@@ -60,8 +61,8 @@ const WEAK_SHARE: f64 = 0.1;
 const LEAST_SHARE: f64 = 1e-4;
 /// Satellites with this share of the samples' power take 1.2 dB from those that were not found.
 const MASKING_SHARE: f64 = 0.25;
-/// C/N0 times the time searched from which a satellite can crowd the Dopplers of others: at 21 dB down its cross-correlation
-/// then raises a cell by 4, where noise has 2 a sum.
+/// C/N0 times the time searched from which a satellite can crowd the Dopplers of others: at 21 dB down its
+/// cross-correlation then raises a cell by 4, where noise has 2 a sum.
 const CROWDING: f64 = 250.0;
 /// Looks at the samples, each without what the one before found strong.
 const LARGEST_LOOKS: u32 = 4;
@@ -114,8 +115,8 @@ pub fn samples_needed(metadata: &IfMetadata, settings: &AcquisitionSettings) -> 
     Ok(SIGNALS.iter().map(one).max().unwrap_or(0))
 }
 
-/// The settings of a search that `have` samples have room for: fewer sums, and sums of fewer code periods where one is too
-/// long; `None` below two code periods.
+/// The settings of a search that `have` samples have room for: fewer sums, and sums of fewer code periods
+/// where one is too long; `None` below two code periods.
 ///
 /// # Errors
 /// As [`AcquisitionSettings::validate`].

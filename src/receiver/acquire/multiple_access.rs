@@ -1,18 +1,20 @@
 //! What a peak has to exceed where other signals' cross-correlation raises the cells around it.
 //!
-//! C/A codes repeat every millisecond, so another satellite shows in every Doppler bin that differs from its own by a multiple
-//! of 1 kHz: in a quarter of the cells at −24 dB, in some up to −21 dB, the same in every sum. Those cells are not chi-square
-//! about the map's noise floor, and their tail reaches much further. Whoever sends: a satellite that was not found yet, one
-//! beyond the searched Dopplers, one of another system with codes of the same family, or what a subtraction left over.
+//! C/A codes repeat every millisecond, so another satellite shows in every Doppler bin that differs from its
+//! own by a multiple of 1 kHz: in a quarter of the cells at −24 dB, in some up to −21 dB, the same in every
+//! sum. Those cells are not chi-square about the map's noise floor, and their tail reaches much further.
+//! Whoever sends: a satellite that was not found yet, one beyond the searched Dopplers, one of another system
+//! with codes of the same family, or what a subtraction left over.
 //!
-//! All codes that are searched for meet those signals alike, and few of the codes are present. So the largest cells of all
-//! codes in one Doppler bin are a sample of that bin's own law. Where their median is above what noise explains, the bin is
-//! *crowded*. Cross-correlation of a code family is bounded, so what lies beyond the values that many codes reach is noise
-//! about a cross-correlation, and that adds to the amplitude: the root of a cell is nearly normal with unit deviation,
-//! whatever it stands on. In amplitude the bar is therefore the bin's median, plus the [`REACHED`] quantile of what
-//! the codes exceed the medians of their bins by (all crowded bins together), plus what a normal variable goes on
-//! from that quantile to the false alarm. Elsewhere the threshold is that of noise.
-//! Limits: fewer codes than [`LEAST_CODES`] say nothing; a bin that is raised by less than 0.7 dB is not noticed.
+//! All codes that are searched for meet those signals alike, and few of the codes are present. So the largest
+//! cells of all codes in one Doppler bin are a sample of that bin's own law. Where their median is above what
+//! noise explains, the bin is *crowded*. Cross-correlation of a code family is bounded, so what lies beyond
+//! the values that many codes reach is noise about a cross-correlation, and that adds to the amplitude: the
+//! root of a cell is nearly normal with unit deviation, whatever it stands on. In amplitude the bar is
+//! therefore the bin's median, plus the [`REACHED`] quantile of what the codes exceed the medians of their
+//! bins by (all crowded bins together), plus what a normal variable goes on from that quantile to the false
+//! alarm. Elsewhere the threshold is that of noise. Limits: fewer codes than [`LEAST_CODES`] say nothing; a
+//! bin that is raised by less than 0.7 dB is not noticed.
 
 use super::threshold::{of_one_cell, threshold};
 
@@ -54,8 +56,8 @@ fn gumbel(probability: f64) -> f64 {
 }
 
 impl Law {
-    /// Of bins with so many cells of `sums` powers, in a search of `bins` of them with a total of `false_alarm`. `image_scale`
-    /// is what statistics of one degree of freedom a sum were multiplied by.
+    /// Of bins with so many cells of `sums` powers, in a search of `bins` of them with a total of
+    /// `false_alarm`. `image_scale` is what statistics of one degree of freedom a sum were multiplied by.
     pub fn new(false_alarm: f64, cells: usize, bins: usize, sums: u32, image_scale: f64) -> Self {
         let per_cell = of_one_cell(false_alarm, (cells * bins) as f64);
         // A share p of bins stays below the value that a cell exceeds with 1 − p^(1/cells).
@@ -75,7 +77,8 @@ impl Law {
         }
     }
 
-    /// The bar of every bin, from the largest cells there: `heights[code][bin]`; `image` says where noise is not circular.
+    /// The bar of every bin, from the largest cells there: `heights[code][bin]`; `image` says where noise is
+    /// not circular.
     pub fn bar(&self, heights: &[Vec<f64>], image: impl Fn(usize) -> bool) -> Bar {
         let bins = heights.first().map_or(0, Vec::len);
         let mut bar = Bar { thresholds: vec![self.threshold; bins], crowded: 0 };
@@ -154,8 +157,8 @@ mod tests {
         assert!((law.threshold - 95.5).abs() < 0.1, "{}", law.threshold);
     }
 
-    /// Largest of `cells` sums of ten powers, a quarter of which stands on an amplitude of `raised` over all sums, noise of
-    /// unit variance a component.
+    /// Largest of `cells` sums of ten powers, a quarter of which stands on an amplitude of `raised` over all
+    /// sums, noise of unit variance a component.
     fn largest_of_raised(noise: &mut Noise, cells: usize, raised: f64) -> f64 {
         let mut cell = |k: usize| {
             let (along, others) = noise.pair();

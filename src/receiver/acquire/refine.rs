@@ -1,4 +1,5 @@
-//! From a cell of the search to a start for tracking: Doppler to some hertz, code phase to a few hundredths of a chip, C/N0.
+//! From a cell of the search to a start for tracking: Doppler to some hertz, code phase to a few hundredths
+//! of a chip, C/N0.
 //!
 //! Prompt sums over single code periods are squared, which removes data signs (Costas), and the
 //! frequency of the squares is read from a padded FFT. Then an early-minus-late comparison of
@@ -26,7 +27,8 @@ pub(super) struct Refined {
     pub code_phase_chips: f64,
     pub doppler_hz: f64,
     pub cn0_hz: f64,
-    /// Power of a code period's sum less that of its noise, in the samples' own units: compares hits whatever noise each met.
+    /// Power of a code period's sum less that of its noise, in the samples' own units: compares hits whatever
+    /// noise each met.
     pub power: f64,
 }
 
@@ -120,7 +122,8 @@ impl Correlators<'_> {
         if prompts.len() < 2 {
             return coarse_hz;
         }
-        // The cell's neighbour may have won over it. Of a weak satellite the squares' largest line beyond that is noise.
+        // The cell's neighbour may have won over it. Of a weak satellite the squares' largest line beyond
+        // that is noise.
         let reach_hz = self.grid.step_hz;
         let residual_hz = square_frequency_cycles(&prompts, 2.0 * period_s * reach_hz) / (2.0 * period_s);
         // Squares repeat every 1/(2T), and one period's sum tells such neighbours apart by its own loss.

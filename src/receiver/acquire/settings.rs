@@ -21,8 +21,9 @@ pub struct AcquisitionSettings {
     pub doppler_step_cycles: f64,
     /// Cells a chip at most: faster recordings are band-limited to this many times the chip rate for the search.
     pub cells_per_chip: f64,
-    /// Probability that the search for one absent satellite, over all its cells, finds it in noise alone; where the others'
-    /// cross-correlation is seen to make the tail heavier, in that too. The default costs 0.7 dB against 1e-3.
+    /// Probability that the search for one absent satellite, over all its cells, finds it in noise alone;
+    /// where the others' cross-correlation is seen to make the tail heavier, in that too. The default costs
+    /// 0.7 dB against 1e-3.
     pub false_alarm_probability: f64,
     /// Whether codes are searched for that no satellite of the constellation sends: of GPS, PRN 33 to 37.
     pub reserved_codes: bool,

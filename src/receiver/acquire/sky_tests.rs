@@ -86,7 +86,8 @@ fn an_open_sky_brings_no_false_satellites() {
 
 #[test]
 fn strong_signals_that_are_no_candidates_bring_no_false_satellites() {
-    // Codes of the same family at 52, 51 and 50 dB-Hz, near a Doppler of zero: satellites of QZSS or of SBAS look like this.
+    // Codes of the same family at 52, 51 and 50 dB-Hz, near a Doppler of zero: satellites of QZSS or of SBAS
+    // look like this.
     let (metadata, samples, mut searcher) = searcher(&AcquisitionSettings::default());
     let (mut total, mut noise_alone) = (Count::default(), 0);
     for seed in skies(6) {
@@ -170,8 +171,9 @@ fn a_short_recording_is_searched_by_as_many_sums_as_it_has_room_for() {
     let mut random = Noise(77);
     let sent = satellites(&mut random, &[50.0, 49.0, 48.0, 47.0, 46.0, 45.0]);
     let recording = quantised(record(metadata.clone(), whole, &sent, 4));
-    // 20 ms have room for nine sums of 2 ms, 3.2 ms for one, 2.1 ms for one of 1 ms. One code period's sum of noise exceeds
-    // 2 ln(1 / P) of 64 449 cells, 49.8: it finds 50 dB-Hz (a mean of 200), and half of those of 44 dB-Hz.
+    // 20 ms have room for nine sums of 2 ms, 3.2 ms for one, 2.1 ms for one of 1 ms. One code period's sum of
+    // noise exceeds 2 ln(1 / P) of 64 449 cells, 49.8: it finds 50 dB-Hz (a mean of 200), and half of those
+    // of 44 dB-Hz.
     for (ms, coherent, sums, least) in
         [(20.0, 2, 9, 6), (10.0, 2, 4, 6), (5.2, 2, 2, 5), (3.2, 2, 1, 3), (2.1, 1, 1, 1)]
     {

@@ -119,13 +119,16 @@ fn code_phase_doppler_and_cn0_are_found_at_any_rate_if_and_sense() {
         assert_eq!(found.iter().map(|f| f.sv.number).collect::<Vec<_>>(), [5, 17, 32], "{rate_hz}");
         for (found, sent) in found.iter().zip(&sent) {
             let case = format!("{rate_hz} Hz: {found:?}");
-            // Frequency of a tone in noise over 20 ms: σ = √6/(2π T √(C/N0 T)) = 1.1 Hz at 42 dB-Hz, some more for squaring.
+            // Frequency of a tone in noise over 20 ms: σ = √6/(2π T √(C/N0 T)) = 1.1 Hz at 42 dB-Hz, some
+            // more for squaring.
             assert!((found.doppler_hz - sent.doppler_hz).abs() < 6.0, "{case}");
-            // Early minus late at half a chip over 20 ms: σ = √(1/(4 C/N0 T)) = 0.028 chips at 42 dB-Hz; chips taken
-            // at sample instants shift edges by up to a tenth of a chip more where the rate is near twice the chip rate.
+            // Early minus late at half a chip over 20 ms: σ = √(1/(4 C/N0 T)) = 0.028 chips at 42 dB-Hz;
+            // chips taken at sample instants shift edges by up to a tenth of a chip more where the rate is
+            // near twice the chip rate.
             assert_eq!(found.sample, 1000);
             assert!(difference_chips(found.code_phase_chips, sent.phase_chips).abs() < 0.15, "{case}");
-            // 1/√20 periods + 1/√320 noise sums at 15.8 a period: 0.5 dB; correlation of instants with means: up to 1.2 dB.
+            // 1/√20 periods + 1/√320 noise sums at 15.8 a period: 0.5 dB; correlation of instants with means:
+            // up to 1.2 dB.
             let error_db = found.cn0_dbhz - sent.cn0_dbhz;
             assert!((-2.0..1.2).contains(&error_db), "{case}");
         }
@@ -226,8 +229,8 @@ fn detection_probability(value: f64, degrees: u32, noncentrality: f64) -> f64 {
 
 #[test]
 fn detections_come_as_often_as_theory_says() {
-    // Two samples a chip, Doppler on the grid and code phase on a cell: no loss, for the data bit turns where the seventh
-    // dwell of one period ends but for a quarter of a chip.
+    // Two samples a chip, Doppler on the grid and code phase on a cell: no loss, for the data bit turns where
+    // the seventh dwell of one period ends but for a quarter of a chip.
     let metadata = metadata(Format::Ci8, 2.046e6, 0.0, false);
     let settings = AcquisitionSettings {
         doppler_max_hz: 500.0,

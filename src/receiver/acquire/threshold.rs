@@ -2,8 +2,8 @@
 
 /// Probability that a chi-square variable of `degrees` of freedom exceeds `value`.
 ///
-/// Q(ν + 2) = Q(ν) + xʰ e⁻ˣ / Γ(h + 1) with x = value/2 and h = ν/2, from Q(0) = 0 or Q(1) = erfc √x; summed from the last
-/// term down.
+/// Q(ν + 2) = Q(ν) + xʰ e⁻ˣ / Γ(h + 1) with x = value/2 and h = ν/2, from Q(0) = 0 or Q(1) = erfc √x; summed
+/// from the last term down.
 pub fn exceedance(value: f64, degrees: u32) -> f64 {
     let x = value / 2.0;
     if x <= 0.0 {

@@ -1,11 +1,12 @@
 //! Continuous waves among the samples of a search, and how they are taken out.
 //!
-//! A C/A code is a comb of lines 1 kHz apart, the largest 21.3 dB below the whole (PRN 24). Where a wave meets one, every
-//! code phase of that Doppler shows it: one of J/N0 54 dB-Hz passes for a satellite of 33. A short look at the spectrum costs
-//! a thousandth of a search. What stands out of it by [`STRONG_HZ`] is subtracted, with the amplitude and phase that it has
-//! in each quarter of a millisecond: a notch some kilohertz wide. Weaker waves are left to the threshold
-//! ([`super::multiple_access`]). Satellites' own lines are no stronger than that below 71 dB-Hz.
-//! Limits: pulses shorter than the look's segments, sweeps, and modulation beyond some kilohertz are no lines.
+//! A C/A code is a comb of lines 1 kHz apart, the largest 21.3 dB below the whole (PRN 24). Where a wave
+//! meets one, every code phase of that Doppler shows it: one of J/N0 54 dB-Hz passes for a satellite of 33. A
+//! short look at the spectrum costs a thousandth of a search. What stands out of it by [`STRONG_HZ`] is
+//! subtracted, with the amplitude and phase that it has in each quarter of a millisecond: a notch some
+//! kilohertz wide. Weaker waves are left to the threshold ([`super::multiple_access`]). Satellites' own lines
+//! are no stronger than that below 71 dB-Hz. Limits: pulses shorter than the look's segments, sweeps, and
+//! modulation beyond some kilohertz are no lines.
 
 use std::f64::consts::TAU;
 
@@ -141,7 +142,8 @@ fn phasor(cycles: f64, sample: usize) -> Complex<f64> {
 mod tests {
     use super::*;
 
-    /// A window of noise (unit power) and waves, each with its frequency in cycles a sample and its power over the noise's.
+    /// A window of noise (unit power) and waves, each with its frequency in cycles a sample and its power
+    /// over the noise's.
     fn window(waves: &[(f64, f64)], complex: bool) -> Window {
         let mut state = 9_u64;
         let mut uniform = || {
@@ -173,8 +175,9 @@ mod tests {
                 let mut window = window(&waves, complex);
                 assert!(remove(&mut window, 2.6e6, complex) >= 2, "{complex} {power}");
                 let mean = window.power() / 60_000.0;
-                // A deviation of the noise's own power is 1/√60000 (√2 of that for real samples), the notches take 0.4 %, and
-                // each wave disturbs the other's estimate by 1/(π × 650 samples × 0.25 cycles): 0.6 % at the highest power.
+                // A deviation of the noise's own power is 1/√60000 (√2 of that for real samples), the notches
+                // take 0.4 %, and each wave disturbs the other's estimate by 1/(π × 650 samples × 0.25
+                // cycles): 0.6 % at the highest power.
                 assert!((mean - 1.0).abs() < 0.03, "{complex} {power}: {mean}");
                 assert_eq!(lines(&window, 2.6e6, complex).len(), 0, "{complex} {power}");
             }

@@ -132,7 +132,8 @@ fn at_level<const T: usize>(level: Level, job: &Job, begins: [u64; T]) -> [Compl
     match (level, job.replica.edge) {
         (Level::Baseline, Edge::Area) => plain::<T, true>(job, begins),
         (Level::Baseline, Edge::Nearest) => plain::<T, false>(job, begins),
-        // SAFETY: `Level` values beyond the baseline come from `best` (and `all` in tests), which detected the features.
+        // SAFETY: `Level` values beyond the baseline come from `best` (and `all` in tests), which detected
+        // the features.
         #[cfg(target_arch = "x86_64")]
         (Level::Avx2, Edge::Area) => unsafe { plain_avx2::<T, true>(job, begins) },
         // SAFETY: as above.
@@ -273,7 +274,8 @@ fn fixed_avx512(x: &[f32; GROUP]) -> x86::__m512i {
     x86::_mm512_mask_blend_epi16(0xaaaa_aaaa, first, x86::_mm512_slli_epi32::<16>(second))
 }
 
-/// [`single::lanes`] with chips looked up in tables. The one fused operation has an exact product, so it rounds as [`single::lanes`] does.
+/// [`single::lanes`] with chips looked up in tables. The one fused operation has an exact product, so it
+/// rounds as [`single::lanes`] does.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
 #[inline]

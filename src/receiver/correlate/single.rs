@@ -93,8 +93,8 @@ pub(super) fn lanes<const T: usize, const AREA: bool>(chunk: &Chunk, code: &mut 
     sums
 }
 
-/// Sixteen samples. Every shift and sum of phases wraps on purpose: indices stay below 32 while a chip is not shorter than
-/// a sample.
+/// Sixteen samples. Every shift and sum of phases wraps on purpose: indices stay below 32 while a chip is not
+/// shorter than a sample.
 #[inline(always)]
 fn vector<const T: usize, const AREA: bool>(
     chunk: &Chunk,

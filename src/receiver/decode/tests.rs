@@ -66,8 +66,8 @@ fn from_any_bit_of_the_frame_on_the_ephemeris_is_whole_as_soon_as_its_three_subf
         let mut decoder = Decoder::new(&L1_CA, set.sv).unwrap();
         let news = feed(&mut decoder, &sent[first..], 40, start());
         let (last, _) = news.iter().find(|(_, n)| matches!(n, News::Ephemeris(_))).unwrap();
-        // Subframes 1 to 3 begin 0, 300 and 600 bits into a frame of 1500. Each is read the first time that it and the two bits
-        // before it, which its parity needs, come whole.
+        // Subframes 1 to 3 begin 0, 300 and 600 bits into a frame of 1500. Each is read the first time that
+        // it and the two bits before it, which its parity needs, come whole.
         let end = |begin: usize| (begin..).step_by(1500).find(|begin| *begin >= first + 2).unwrap() + 300;
         let expected = [0, 300, 600].map(end).into_iter().max().unwrap() - first;
         assert_eq!(last + 1, expected, "from bit {first}");

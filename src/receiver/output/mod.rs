@@ -1,7 +1,7 @@
 //! What a receiver writes: one CSV file a kind of record, and `receiver.json` with what it was told.
 //!
-//! Rows go out as they come, so memory stays flat. Headers are written at once: a file without rows says that there were
-//! none, a missing file that nothing ran.
+//! Rows go out as they come, so memory stays flat. Headers are written at once: a file without rows says that
+//! there were none, a missing file that nothing ran.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -139,7 +139,8 @@ const INTERFERENCE: [&str; 8] =
     ["sample", "frequency_hz", "jn0_dbhz", "js_db", "statistic", "threshold", "lines", "resolution_hz"];
 
 impl Output {
-    /// Creates the files in a directory that is there: were it made here, one that a signal has taken away would come back.
+    /// Creates the files in a directory that is there: were it made here, one that a signal has taken away
+    /// would come back.
     ///
     /// # Errors
     /// [`OutputError::Create`] with the path that cannot be made.

@@ -1,15 +1,17 @@
 //! Which ranges contradict the others: the residual test, and the search for the fewest that have to go.
 //!
-//! A weighted sum of squared residuals above its chi-square threshold shows a fault, not where it is. All sets of one satellite
-//! are tried, then all of two, and so on, as far as at least one degree of freedom is left to prove the rest: a set of the
-//! smallest size that leaves ranges which agree is left out. Leaving out one after another instead is deceived by two equal
-//! faults, as the first to go may be a good one. Sets are ranked by the exact change of the sum of squares in the linearised
-//! problem, wᵀS⁻¹w of the set's own normalised residuals and their covariance; only the best few are solved.
+//! A weighted sum of squared residuals above its chi-square threshold shows a fault, not where it is. All
+//! sets of one satellite are tried, then all of two, and so on, as far as at least one degree of freedom is
+//! left to prove the rest: a set of the smallest size that leaves ranges which agree is left out. Leaving out
+//! one after another instead is deceived by two equal faults, as the first to go may be a good one. Sets are
+//! ranked by the exact change of the sum of squares in the linearised problem, wᵀS⁻¹w of the set's own
+//! normalised residuals and their covariance; only the best few are solved.
 //!
-//! Where two sets leave ranges that agree within themselves but on different places, nothing tells which is right: then
-//! there is no position ([`NoFix::Ambiguous`]). Places nearer than what a wrong model of the atmosphere does are no faults told apart:
-//! the best fit serves. Limits: faults on so many satellites that good ones are the minority,
-//! and faults that happen to fit another position: n − 4 directions are all that residuals see.
+//! Where two sets leave ranges that agree within themselves but on different places, nothing tells which is
+//! right: then there is no position ([`NoFix::Ambiguous`]). Places nearer than what a wrong model of the
+//! atmosphere does are no faults told apart: the best fit serves. Limits: faults on so many satellites that
+//! good ones are the minority, and faults that happen to fit another position: n − 4 directions are all that
+//! residuals see.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -22,8 +24,8 @@ use crate::gnss::satellite::Sv;
 const LARGEST_TRIED: usize = 1000;
 /// Sets of one size that are solved.
 const SOLVED: usize = 8;
-/// How far apart an atmosphere that is modelled wrongly takes two sets: a troposphere of 2.4 m at the zenith is 14 m at 10°, and one
-/// satellite's range moves a position by about as much.
+/// How far apart an atmosphere that is modelled wrongly takes two sets: a troposphere of 2.4 m at the zenith
+/// is 14 m at 10°, and one satellite's range moves a position by about as much.
 const ATMOSPHERE_M: f64 = 20.0;
 
 /// The value that chi-square with so many degrees of freedom exceeds with the probability `false_alarm`.
@@ -81,7 +83,8 @@ fn without(ranges: &[Range], set: &[usize]) -> Vec<Range> {
     kept.map(|(_, range)| range.clone()).collect()
 }
 
-/// All sets of `size` ranges, those first whose removal leaves the smallest sum of squares; `None` if there are too many.
+/// All sets of `size` ranges, those first whose removal leaves the smallest sum of squares; `None` if there
+/// are too many.
 fn ranked(solution: &Solution, size: usize) -> Option<Vec<Vec<usize>>> {
     let sets = sets(solution.residuals_m.len(), size)?;
     // Behind position and clock: the ionosphere's three common errors, of unit prior deviation.

@@ -1,11 +1,12 @@
 //! The ionosphere before its parameters are decoded, and the error of a model that is not exact.
 //!
-//! Page 18 of subframe 4 comes once in 12.5 minutes (IS-GPS-200N, 20.3.3.5.1.2). Until then delays are those of a nominal
-//! ionosphere, half way between the quiet and the active Sun, and their error is common to all satellites: three numbers
-//! of zero mean and unit variance scale a stated deviation along every line of sight, one for the whole sky and one each for
-//! what it gains northwards and eastwards. The solution estimates them with the position, so that its covariance
-//! contains what the ionosphere may do to height, clock and plan. Limits: what is left after these three counts as
-//! independent noise; nothing is known of storms and of the night at solar maximum.
+//! Page 18 of subframe 4 comes once in 12.5 minutes (IS-GPS-200N, 20.3.3.5.1.2). Until then delays are those
+//! of a nominal ionosphere, half way between the quiet and the active Sun, and their error is common to all
+//! satellites: three numbers of zero mean and unit variance scale a stated deviation along every line of
+//! sight, one for the whole sky and one each for what it gains northwards and eastwards. The solution
+//! estimates them with the position, so that its covariance contains what the ionosphere may do to height,
+//! clock and plan. Limits: what is left after these three counts as independent noise; nothing is known of
+//! storms and of the night at solar maximum.
 
 use std::f64::consts::PI;
 
@@ -22,16 +23,16 @@ pub const NOMINAL: Klobuchar = Klobuchar { alpha: [1.6e-8, 0.0, -6.0e-8, 0.0], b
 
 /// Error of the nominal ionosphere.
 ///
-/// Over all latitudes to 75°, longitudes and hours, the difference to the seven days' broadcast models has an rms of 0.39,
-/// 0.63, 0.60, 0.50, 0.45, 1.35 and 0.92 of this deviation (all together 0.75, above twice the deviation in 3 %), and to
-/// the IGS map of 2010-12-04 of 0.63.
+/// Over all latitudes to 75°, longitudes and hours, the difference to the seven days' broadcast models has an
+/// rms of 0.39, 0.63, 0.60, 0.50, 0.45, 1.35 and 0.92 of this deviation (all together 0.75, above twice the
+/// deviation in 3 %), and to the IGS map of 2010-12-04 of 0.63.
 pub const NOMINAL_ERROR: DelayError = DelayError { share: 0.6, least_m: 0.5 };
 
-/// The error that those three do not describe, as a share of the common one: the days' odd coefficients change the ratio to
-/// the nominal model by 10 to 20 % within the sky of one place.
+/// The error that those three do not describe, as a share of the common one: the days' odd coefficients
+/// change the ratio to the nominal model by 10 to 20 % within the sky of one place.
 const INDEPENDENT_SHARE: f64 = 0.25;
-/// Angles at the Earth's centre, northwards and eastwards, over which the error changes by its own deviation: the crests of the
-/// equatorial anomaly are 10° wide, and an hour of local time is 15°.
+/// Angles at the Earth's centre, northwards and eastwards, over which the error changes by its own deviation:
+/// the crests of the equatorial anomaly are 10° wide, and an hour of local time is 15°.
 const GRADIENT_RAD: [f64; 2] = [10.0 / 180.0 * PI, 20.0 / 180.0 * PI];
 
 /// Standard deviation of a modelled vertical delay.
@@ -44,8 +45,8 @@ pub struct DelayError {
 }
 
 impl DelayError {
-    /// Deviations along the line of sight `look` whose modelled delay is `delay_s` and whose slant factor is `obliquity`: of the three
-    /// errors common to all satellites, and of the satellite's own.
+    /// Deviations along the line of sight `look` whose modelled delay is `delay_s` and whose slant factor is
+    /// `obliquity`: of the three errors common to all satellites, and of the satellite's own.
     pub fn slant_m(self, delay_s: f64, obliquity: f64, look: Look) -> (Vector3<f64>, f64) {
         let level_m = libm::hypot(self.share * SPEED_OF_LIGHT_MPS * delay_s, self.least_m * obliquity);
         // From the receiver to the ionospheric point (IS-GPS-200N, 20.3.3.5.2.5), in semicircles.

@@ -1,10 +1,11 @@
 //! Position and clock by iterated weighted least squares, velocity and drift by one linear solution.
 //!
-//! Model: ρ = |R(Ωτ) r_s(t_e) − r| + b − c Δt_s + I + T with τ the geometric light time (the raw pseudorange would let a
-//! clock bias of 11 ms shift the fix by metres). Source: IS-GPS-200N, 20.3.3.4.3.4 and any
-//! textbook of estimation. Normal equations of four unknowns with lines of sight of unit length: their condition is that of
-//! the geometry, and is checked before they are solved. Where the ionosphere's model has an error ([`Ionosphere::Uncertain`]) that
-//! error is three more unknowns with a prior; they are eliminated, so that the covariance of the four contains them.
+//! Model: ρ = |R(Ωτ) r_s(t_e) − r| + b − c Δt_s + I + T with τ the geometric light time (the raw pseudorange
+//! would let a clock bias of 11 ms shift the fix by metres). Source: IS-GPS-200N, 20.3.3.4.3.4 and any
+//! textbook of estimation. Normal equations of four unknowns with lines of sight of unit length: their
+//! condition is that of the geometry, and is checked before they are solved. Where the ionosphere's model has
+//! an error ([`Ionosphere::Uncertain`]) that error is three more unknowns with a prior; they are eliminated,
+//! so that the covariance of the four contains them.
 
 use nalgebra::{Cholesky, Matrix3, Matrix4, Matrix4x3, Vector3, Vector4};
 
@@ -90,11 +91,11 @@ pub struct Solution {
     pub dilution: Matrix4<f64>,
     /// Ratio of the extreme singular values of the geometry.
     pub condition: f64,
-    /// Weighted sum of squared residuals, the ionosphere's estimated error over its prior deviation among them: its degrees of
-    /// freedom are the number of ranges less four either way.
+    /// Weighted sum of squared residuals, the ionosphere's estimated error over its prior deviation among
+    /// them: its degrees of freedom are the number of ranges less four either way.
     pub chi_square: f64,
-    /// Estimated errors of the ionosphere's model in their prior deviations (level, gain northwards, eastwards); 0 where the
-    /// model is right.
+    /// Estimated errors of the ionosphere's model in their prior deviations (level, gain northwards,
+    /// eastwards); 0 where the model is right.
     pub ionosphere_error: Vector3<f64>,
     pub iterations: u32,
 }
@@ -303,8 +304,8 @@ fn finish(
 
 /// Velocity in ECEF and clock drift from Dopplers, at a solved position.
 ///
-/// With q = 1 + f_D/f the received rate, g = q (1 + n·v_s/c) / (1 + satellite drift) and inertial
-/// velocities, (1 + drift) g = 1 + n·v_u/c exactly: linear in the unknowns. Rates of the atmosphere are left out (mm/s).
+/// With q = 1 + f_D/f the received rate, g = q (1 + n·v_s/c) / (1 + satellite drift) and inertial velocities,
+/// (1 + drift) g = 1 + n·v_u/c exactly: linear in the unknowns. Rates of the atmosphere are left out (mm/s).
 ///
 /// # Errors
 /// As the position's geometry.

@@ -1,8 +1,9 @@
 //! Place, velocity and time from observations and decoded ephemerides.
 //!
-//! A [`Solver`] smooths code with carrier ([`smooth`]), finds where satellites were, corrects the atmosphere by the decoded
-//! ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`troposphere`], solves ([`least_squares`]) and tests
-//! the residuals, leaving out the fewest satellites that contradict the others ([`exclusion`]). Limits: one clock for all signals.
+//! A [`Solver`] smooths code with carrier ([`smooth`]), finds where satellites were, corrects the atmosphere
+//! by the decoded ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`troposphere`],
+//! solves ([`least_squares`]) and tests the residuals, leaving out the fewest satellites that contradict the
+//! others ([`exclusion`]). Limits: one clock for all signals.
 
 use std::collections::BTreeMap;
 
@@ -42,7 +43,8 @@ const FIT_GRACE_S: f64 = 600.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IonosphereChoice {
-    /// Klobuchar's model with the parameters that satellites send; until they are decoded, a nominal ionosphere and its error.
+    /// Klobuchar's model with the parameters that satellites send; until they are decoded, a nominal
+    /// ionosphere and its error.
     Broadcast,
     /// Not at all: recordings made without an ionosphere.
     None,
@@ -72,8 +74,9 @@ pub struct PositionSettings {
     pub model_sigma_m: f64,
     /// How the ionosphere is corrected.
     pub ionosphere: IonosphereChoice,
-    /// Standard deviation of the broadcast ionosphere's error as a share of its delay, common to all satellites: about 0.5 under a
-    /// real sky, of whose ionosphere the model removes half; 0 where satellites broadcast what is true, as in most scenes.
+    /// Standard deviation of the broadcast ionosphere's error as a share of its delay, common to all
+    /// satellites: about 0.5 under a real sky, of whose ionosphere the model removes half; 0 where satellites
+    /// broadcast what is true, as in most scenes.
     pub ionosphere_error_share: f64,
     /// How the troposphere is corrected.
     pub troposphere: TroposphereChoice,
@@ -113,8 +116,8 @@ pub struct CodeNoise {
 impl CodeNoise {
     /// Standard deviation of a non-coherent early-minus-late loop.
     ///
-    /// B·(1−ρ)/(2·C/N0·a′²)·(1 + (1+ρ)/(2·T·C/N0·a²)) with height a, slope a′ and noise correlation ρ of early and late; on a triangle
-    /// that is Kaplan and Hegarty's equation 5.23 (2nd ed.), first branch.
+    /// B·(1−ρ)/(2·C/N0·a′²)·(1 + (1+ρ)/(2·T·C/N0·a²)) with height a, slope a′ and noise correlation ρ of
+    /// early and late; on a triangle that is Kaplan and Hegarty's equation 5.23 (2nd ed.), first branch.
     pub fn sigma_m(&self, cn0_hz: f64) -> f64 {
         let CodeShape { value, slope, common } = self.shape;
         let squaring = 1.0 + (1.0 + common) / (2.0 * self.integration_s * cn0_hz * value * value);
@@ -186,8 +189,8 @@ impl Solver {
         Self { settings: settings.clone(), noise, smoother, rate, offset_hz: 0.0, last_m: None, ready_since: None }
     }
 
-    /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: smoothing and velocity leave it out,
-    /// so that the clock's drift is that of the code, whose bias the position has.
+    /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: smoothing and
+    /// velocity leave it out, so that the clock's drift is that of the code, whose bias the position has.
     pub fn set_carrier_offset(&mut self, hz: f64) {
         self.offset_hz = hz;
         self.smoother.set_carrier_offset(hz);
@@ -284,7 +287,8 @@ impl Solver {
     }
 }
 
-/// Where the satellite was when it sent what this observation met; `None` when its ephemeris is unhealthy, stale or no orbit.
+/// Where the satellite was when it sent what this observation met; `None` when its ephemeris is unhealthy,
+/// stale or no orbit.
 fn range(
     observation: &Observation,
     ephemeris: &Ephemeris,

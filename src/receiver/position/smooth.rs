@@ -5,8 +5,9 @@
 //! loop: correlation exp(−4 B t)) and not assumed to fall with the count. A diverging ionosphere biases the
 //! result by twice its rate times the window.
 //!
-//! Where code and carrier part at a known rate ([`parting`](crate::receiver::parting)), that rate is taken off. How much of it the
-//! filter has taken in is carried beside its value, so that a better rate corrects the past as well.
+//! Where code and carrier part at a known rate ([`parting`](crate::receiver::parting)), that rate is taken
+//! off. How much of it the filter has taken in is carried beside its value, so that a better rate corrects
+//! the past as well.
 
 use std::collections::BTreeMap;
 
@@ -73,7 +74,8 @@ impl Smoother {
         self.states.clear();
     }
 
-    /// The carriers' counts go on although lock was broken: the next observation of each satellite may have been locked anew.
+    /// The carriers' counts go on although lock was broken: the next observation of each satellite may have
+    /// been locked anew.
     pub fn bridge(&mut self) {
         self.states.values_mut().for_each(|state| state.locked_s = f64::NEG_INFINITY);
     }

@@ -199,7 +199,8 @@ fn the_covariance_holds_an_ionospheric_error_that_all_satellites_share() {
         stated += (up.transpose() * found.covariance.fixed_view::<3, 3>(0, 0) * up)[(0, 0)];
     }
     let runs = f64::from(runs);
-    // As without an ionosphere: 4 ± four deviations of the mean, and six degrees of freedom, for each z comes with its own observation.
+    // As without an ionosphere: 4 ± four deviations of the mean, and six degrees of freedom, for each z comes
+    // with its own observation.
     assert!((nees / runs - 4.0).abs() < 4.0 * (8.0 / runs).sqrt(), "{}", nees / runs);
     assert!((chi_square / runs - 6.0).abs() < 4.0 * (12.0 / runs).sqrt(), "{}", chi_square / runs);
     // The relative deviation of a variance is √(2/runs); four of them.
@@ -230,7 +231,8 @@ mod with_real_orbits {
     use crate::gnss::rinex;
     use crate::receiver::position::least_squares::velocity;
 
-    /// When a satellite sent what arrives at `seconds` after `start` at a place that moves, by its clock, relative to `start`.
+    /// When a satellite sent what arrives at `seconds` after `start` at a place that moves, by its clock,
+    /// relative to `start`.
     fn sent_s(ephemeris: &Ephemeris, start: Epoch, seconds: f64, here_m: Vector3<f64>) -> (f64, f64) {
         let mut travel_s = 0.075;
         for _ in 0..6 {
@@ -288,8 +290,9 @@ mod with_real_orbits {
     }
 }
 
-/// Skies of `n` satellites anywhere above 6 degrees with faults of `size_m` on the first ones and unit noise, 100 of them with a
-/// geometric dilution below 6: how often the faulty ones alone are excluded, how often a fix is more than five deviations off.
+/// Skies of `n` satellites anywhere above 6 degrees with faults of `size_m` on the first ones and unit noise,
+/// 100 of them with a geometric dilution below 6: how often the faulty ones alone are excluded, how often a
+/// fix is more than five deviations off.
 fn exclusions(n: usize, faults: usize, size_m: f64) -> (u32, u32) {
     let mut state = 5_u64;
     let uniform = |state: &mut u64| (noise(state) * 1e6).rem_euclid(1.0);
@@ -319,9 +322,10 @@ fn exclusions(n: usize, faults: usize, size_m: f64) -> (u32, u32) {
 
 #[test]
 fn two_equal_faults_are_found_where_three_satellites_more_than_needed_are_in_view() {
-    // Measured on 300 skies each: of 8 satellites 0.91 and 0.997 right at 60 and 300 m, of 10 satellites 0.997 and 1; three
-    // faults of 300 m among 10 0.997. Excluding one satellite after another: 0.49, 0.52, 0.80, 0.73 and 0.33. Bars are three
-    // deviations of a count of 100 below; 1 fix in 300 was wrong at 8 satellites and 60 m, none at the others.
+    // Measured on 300 skies each: of 8 satellites 0.91 and 0.997 right at 60 and 300 m, of 10 satellites
+    // 0.997 and 1; three faults of 300 m among 10 0.997. Excluding one satellite after another: 0.49, 0.52,
+    // 0.80, 0.73 and 0.33. Bars are three deviations of a count of 100 below; 1 fix in 300 was wrong at 8
+    // satellites and 60 m, none at the others.
     for (n, faults, size_m, least) in
         [(8, 2, 60.0, 82), (8, 2, 300.0, 98), (10, 2, 60.0, 98), (10, 2, 300.0, 98), (10, 3, 300.0, 98)]
     {
@@ -335,8 +339,9 @@ fn two_equal_faults_are_found_where_three_satellites_more_than_needed_are_in_vie
 
 #[test]
 fn faults_that_several_satellites_explain_give_no_position_but_say_which() {
-    // Two satellites more than needed: leaving one out leaves one degree of freedom, which a fault of 20 deviations passes by
-    // chance with wrong ones left out too. Where these lead elsewhere there is no position.
+    // Two satellites more than needed: leaving one out leaves one degree of freedom, which a fault of 20
+    // deviations passes by chance with wrong ones left out too. Where these lead elsewhere there is no
+    // position.
     let (mut ambiguous, mut state) = (0, 3);
     for faulty in 0..6 {
         let mut six = ranges(&SKY[..6], 0.0);

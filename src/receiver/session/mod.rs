@@ -1,6 +1,7 @@
 //! The state of a reception between blocks: channels, what they decoded, the receiver's clock, the solver.
 //!
-//! [`search`] starts and ends channels, [`decode`] takes in messages, [`measure`] observes and solves, [`gap`] watches for lost samples.
+//! [`search`] starts and ends channels, [`decode`] takes in messages, [`measure`] observes and solves,
+//! [`gap`] watches for lost samples.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,9 +1,10 @@
 //! Which Dopplers the next search looks at.
 //!
-//! The first search takes the settings' range around zero. Once a fix knows the clock, searches are centred on its drift: a
-//! satellite's own Doppler stays within ±5 kHz, a clock of 2.5 ppm moves all of them by 3.9 kHz. Before that an offset of
-//! the carrier from the code may be a mixer's or the sample rate's, and the range is stretched to hold both. While too few
-//! satellites are found for a fix, every search is wider than the one before, then the widths begin anew.
+//! The first search takes the settings' range around zero. Once a fix knows the clock, searches are centred
+//! on its drift: a satellite's own Doppler stays within ±5 kHz, a clock of 2.5 ppm moves all of them by 3.9
+//! kHz. Before that an offset of the carrier from the code may be a mixer's or the sample rate's, and the
+//! range is stretched to hold both. While too few satellites are found for a fix, every search is wider than
+//! the one before, then the widths begin anew.
 
 use super::Session;
 use crate::gnss::signal::SIGNALS;

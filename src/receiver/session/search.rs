@@ -58,8 +58,8 @@ impl Session {
         Ok(())
     }
 
-    /// Searches a recording that ended before the first search had all the samples that it asks for: by fewer sums, and by
-    /// sums of one code period where there is no room for another.
+    /// Searches a recording that ended before the first search had all the samples that it asks for: by fewer
+    /// sums, and by sums of one code period where there is no room for another.
     pub(in crate::receiver) fn search_rest(&mut self, output: &mut Output) -> Result<(), ReceiveError> {
         let Some(window) = self.window.take().filter(|_| !self.searched) else { return Ok(()) };
         let have = window.samples.i.len() as u64;

@@ -1,7 +1,7 @@
 //! The receiver's keys with default, range and meaning, from the settings themselves.
 //!
-//! Defaults are those of [`Settings::default`], meanings the doc comments of the fields, and a range is what the validation
-//! says when a value that no key can have is refused.
+//! Defaults are those of [`Settings::default`], meanings the doc comments of the fields, and a range is what
+//! the validation says when a value that no key can have is refused.
 
 use toml::{Table, Value};
 

@@ -1,10 +1,11 @@
 //! One channel: numerically controlled oscillators, the order of its states, and what it reports.
 //!
-//! A strong signal is pulled in by a frequency loop, then an assisted phase loop locks and searches for symbol edges, then
-//! integrations and updates keep to the symbols. Of a weak one a batch of prompts is collected while the carrier's oscillator
-//! runs free; frequency, phase and the probable edges follow from it ([`super::pull_in`]), integrations keep to these
-//! edges at once, and symbols are given out when the edges are beyond doubt. Every correlation spans one code period of the replica, from the first
-//! sample of the period on; samples of an unfinished period are kept, so that results do not depend on blocks.
+//! A strong signal is pulled in by a frequency loop, then an assisted phase loop locks and searches for
+//! symbol edges, then integrations and updates keep to the symbols. Of a weak one a batch of prompts is
+//! collected while the carrier's oscillator runs free; frequency, phase and the probable edges follow from it
+//! ([`super::pull_in`]), integrations keep to these edges at once, and symbols are given out when the edges
+//! are beyond doubt. Every correlation spans one code period of the replica, from the first sample of the
+//! period on; samples of an unfinished period are kept, so that results do not depend on blocks.
 
 use num_complex::Complex64;
 
@@ -152,8 +153,9 @@ pub fn code_shape(settings: &TrackingSettings, chips_per_sample: f64) -> CodeSha
 }
 
 impl Channel {
-    /// A channel that begins at what the search found. The code phase is carried from the hit's sample to the first sample
-    /// of the first block with the code rate that belongs to the hit's Doppler. Settings are taken as validated.
+    /// A channel that begins at what the search found. The code phase is carried from the hit's sample to the
+    /// first sample of the first block with the code rate that belongs to the hit's Doppler. Settings are
+    /// taken as validated.
     pub fn start(hit: &Acquired, metadata: &IfMetadata, settings: &TrackingSettings) -> Self {
         let component = hit.signal.components.first();
         let chip_rate_hz = component.map_or(1.0, |c| c.chip_rate_hz);
@@ -256,8 +258,8 @@ impl Channel {
         self.polarity = Some(inverted);
     }
 
-    /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: the aid of the code leaves it out
-    /// from the next code period on.
+    /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: the aid of the
+    /// code leaves it out from the next code period on.
     pub fn set_carrier_offset(&mut self, hz: f64) {
         self.next_offset_hz = hz;
         if self.start.is_none() {

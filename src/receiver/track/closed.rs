@@ -95,8 +95,9 @@ impl Loops {
         self.dll = Gains::design(settings.dll_order, dll_hz * update_s);
     }
 
-    /// The code's aid brings `chips_per_s` more from now on: the loop need not. Gives the error that it had for that, which is
-    /// the jump of the code's oscillator: a loop of order 1 lags by rate · T / K1, one of order 2 knows the rate.
+    /// The code's aid brings `chips_per_s` more from now on: the loop need not. Gives the error that it had
+    /// for that, which is the jump of the code's oscillator: a loop of order 1 lags by rate · T / K1, one of
+    /// order 2 knows the rate.
     pub fn aid_code(&mut self, chips_per_s: f64, update_s: f64) -> f64 {
         if self.dll.rate > 0.0 {
             self.code.rate -= chips_per_s;

@@ -1,18 +1,20 @@
 //! Carrier-to-noise density from prompts of one code period, before symbols are known and after.
 //!
-//! **Before.** No bit edge may touch the estimate, wherever it lies, and neither may the carrier's residual rotation. The signal is
-//! the modulus of the mean product of neighbouring prompts, whose noise is independent; one pair in a symbol spans an edge
-//! and half of these turn its sign, so the mean is 1 − 1/M of the power for M periods a symbol. The noise is a reference:
-//! the power of a correlator with the same code at a delay where the code's own correlation vanishes. It meets the same
-//! filters, interference and satellites as the prompt does, so multiple access counts as noise.
+//! **Before.** No bit edge may touch the estimate, wherever it lies, and neither may the carrier's residual
+//! rotation. The signal is the modulus of the mean product of neighbouring prompts, whose noise is
+//! independent; one pair in a symbol spans an edge and half of these turn its sign, so the mean is 1 − 1/M of
+//! the power for M periods a symbol. The noise is a reference: the power of a correlator with the same code
+//! at a delay where the code's own correlation vanishes. It meets the same filters, interference and
+//! satellites as the prompt does, so multiple access counts as noise.
 //!
 //! **After.** Power within and between the M prompts of a symbol (narrow against wide band, as moments): all noise is
 //! within. The reference is not needed any more.
 //!
-//! **Spread.** With s = T·C/N0 and N periods averaged (an exponential mean of N periods counts as 2N, one whose weights
-//! grow linearly as 3N/4) the relative variance is that of the signal, (4s + 1)/2s² before and (2s + 1/M)/s² after, and that
-//! of the noise, 1 and M/(M − 1), over N: [`relative_sigma`]. With 0.3 s before, it is 1.0 dB at 25 dB-Hz, 0.5 at 30
-//! and 0.26 from 45 on; with the default second after, 0.27, 0.17 and 0.10.
+//! **Spread.** With s = T·C/N0 and N periods averaged (an exponential mean of N periods counts as 2N, one
+//! whose weights grow linearly as 3N/4) the relative variance is that of the signal, (4s + 1)/2s² before and
+//! (2s + 1/M)/s² after, and that of the noise, 1 and M/(M − 1), over N: [`relative_sigma`]. With 0.3 s
+//! before, it is 1.0 dB at 25 dB-Hz, 0.5 at 30 and 0.26 from 45 on; with the default second after, 0.27, 0.17
+//! and 0.10.
 
 use num_complex::Complex64;
 
@@ -157,8 +159,9 @@ impl Cn0 {
     }
 }
 
-/// Relative standard deviation of the estimate of a steady C/N0 from as many equally weighted periods, those of the signal and
-/// those of the noise; a decibel is 0.23. `symbol` is the length of symbols whose edges are known.
+/// Relative standard deviation of the estimate of a steady C/N0 from as many equally weighted periods, those
+/// of the signal and those of the noise; a decibel is 0.23. `symbol` is the length of symbols whose edges are
+/// known.
 pub fn relative_sigma(cn0_hz: f64, period_s: f64, symbol: Option<u32>, [signal, noise]: [f64; 2]) -> f64 {
     let s = cn0_hz * period_s;
     let [of_signal, of_noise] = match symbol {
@@ -176,8 +179,8 @@ mod tests {
     use super::super::tests::Normal;
     use super::*;
 
-    /// Feeds prompts of 1 ms with random symbols whose edges lie at `offset`, that turn by `hz`, in noise of `noise` times unit
-    /// variance a component.
+    /// Feeds prompts of 1 ms with random symbols whose edges lie at `offset`, that turn by `hz`, in noise of
+    /// `noise` times unit variance a component.
     fn feed(estimate: &mut Cn0, normal: &mut Normal, dbhz: f64, hz: f64, offset: u32, noise: f64, periods: u32) {
         let amplitude = (2.0 * noise * libm::pow(10.0, dbhz / 10.0) * 1e-3).sqrt();
         let mut sign = 1.0;
@@ -213,8 +216,9 @@ mod tests {
                     feed(&mut estimate, &mut Normal::new(100 + run), expected, hz, offset, noise, 300);
                     dbhz(&estimate)
                 });
-                // 300 periods, the later with the greater weight; a decibel is 23 %. Few bits turn or many: another 0.1 dB.
-                // The logarithm of what scatters by a share s is low by s²/2: 0.1 dB at 25 dB-Hz.
+                // 300 periods, the later with the greater weight; a decibel is 23 %. Few bits turn or many:
+                // another 0.1 dB. The logarithm of what scatters by a share s is low by s²/2: 0.1 dB at 25
+                // dB-Hz.
                 let stated =
                     relative_sigma(libm::pow(10.0, expected / 10.0), 1e-3, None, [0.75 * 300.0, 300.0]) / 0.2303;
                 println!("{expected} dB-Hz, edge {offset}: {mean:.2} ± {sigma:.2} dB, stated {stated:.2}");

@@ -1,8 +1,9 @@
 //! Phase lock from prompts: a mean cosine of twice the phase error (threshold 0.85 is 16° rms).
 //!
-//! Before symbols are known it comes from prompts of one code period, whose noise is subtracted. Then it comes from whole symbols,
-//! each with the same weight, so that a vanished signal shows at once; what the noise of a symbol takes from
-//! the mean cosine is given back. A slip is what a few symbols together show, as many as the noise demands.
+//! Before symbols are known it comes from prompts of one code period, whose noise is subtracted. Then it
+//! comes from whole symbols, each with the same weight, so that a vanished signal shows at once; what the
+//! noise of a symbol takes from the mean cosine is given back. A slip is what a few symbols together show, as
+//! many as the noise demands.
 
 use std::collections::VecDeque;
 
@@ -60,7 +61,8 @@ impl Mean {
 const LOCK_SYMBOLS: f64 = 6.0;
 /// Symbols whose mean phase is 60° or more away are taken for a slip.
 const SLIP_COSINE: f64 = -0.5;
-/// Energy over noise density of the symbols that decide on a slip: 6.5° of thermal noise. One symbol has it from 33 dB-Hz on.
+/// Energy over noise density of the symbols that decide on a slip: 6.5° of thermal noise. One symbol has it
+/// from 33 dB-Hz on.
 const SLIP_ENERGY: f64 = 40.0;
 /// Symbols that decide on a slip, at most.
 const SLIP_SYMBOLS: usize = 8;
@@ -124,8 +126,8 @@ impl SymbolLock {
         lock
     }
 
-    /// Takes the sum of a symbol; `energy` is its energy over the noise density, C/N0 times its duration. Says whether the phase
-    /// has slipped.
+    /// Takes the sum of a symbol; `energy` is its energy over the noise density, C/N0 times its duration.
+    /// Says whether the phase has slipped.
     pub fn add(&mut self, symbol: Complex64, energy: Option<f64>) -> bool {
         let (i2, q2) = (symbol.re * symbol.re, symbol.im * symbol.im);
         let [difference, sum] = [i2 - q2, i2 + q2];
@@ -153,7 +155,8 @@ impl SymbolLock {
     }
 }
 
-/// How the carrier turns within symbols, between quarters of one: where a Costas loop rests on a wrong frequency, it shows.
+/// How the carrier turns within symbols, between quarters of one: where a Costas loop rests on a wrong
+/// frequency, it shows.
 #[derive(Clone, Debug, Default)]
 pub struct Rotation {
     sum: Complex64,
@@ -218,7 +221,8 @@ mod tests {
                 sum += lock.value();
             }
             let mean = sum / f64::from(SYMBOLS);
-            // A cosine's deviation is 0.3 at most here: 0.0021 over these symbols, three of them and as much for the clamp at one.
+            // A cosine's deviation is 0.3 at most here: 0.0021 over these symbols, three of them and as much
+            // for the clamp at one.
             assert!((mean - 1.0).abs() < 0.035 && mean <= 1.0 + 1e-12, "{dbhz}: {mean}");
             // Together the symbols that decide have 13° of noise over root two: 60° are more than six deviations.
             assert_eq!(slips, 0, "{dbhz}");
@@ -255,7 +259,8 @@ mod tests {
                 rotation.add(2.0_f64.sqrt() * sign * Complex64::new(cos, sin) + noise, k % 20 + 1, 20);
             }
             assert_eq!(rotation.symbols(), 25);
-            // 75 products of two sums of 5: √(2/75)/(5·A²) rad of noise by noise, √(4/75/(5·A²)) of noise by signal, in 5 ms: 2.5 Hz.
+            // 75 products of two sums of 5: √(2/75)/(5·A²) rad of noise by noise, √(4/75/(5·A²)) of noise by
+            // signal, in 5 ms: 2.5 Hz.
             let found_hz = 1e3 * rotation.cycles(20);
             assert!((found_hz - hz).abs() < 7.5, "{hz}: {found_hz}");
         }
@@ -263,8 +268,9 @@ mod tests {
 
     #[test]
     fn the_cross_correlation_of_other_satellites_is_no_rotation() {
-        // Eleven satellites 10 dB above, each 21 to 24 dB down in this one's correlator, at differences of Doppler that a prompt's 1 ms
-        // does not tell apart. Products of neighbouring prompts would turn by 0.04 rad for each: up to 7 Hz.
+        // Eleven satellites 10 dB above, each 21 to 24 dB down in this one's correlator, at differences of
+        // Doppler that a prompt's 1 ms does not tell apart. Products of neighbouring prompts would turn by
+        // 0.04 rad for each: up to 7 Hz.
         let mut normal = Normal::new(8);
         let mut worst: f64 = 0.0;
         for trial in 0..200 {

@@ -209,8 +209,8 @@ fn the_gain_given_back_is_the_mean_slope_of_the_discriminator() {
             let shape = CodeShape::triangle(d);
             let expected = [shape.early_minus_late_gain(snr), dot_product_gain(snr)];
             println!("d {d} T·C/N0 {snr}: {early_minus_late:.4} {dot:.4}, expected {expected:.4?}");
-            // One slope spreads by about 3 times its mean (the dot product at T·C/N0 = 1, as found): 0.5 % for 400 000; three
-            // of that. The prompt off its peak adds 0.2 % of d.
+            // One slope spreads by about 3 times its mean (the dot product at T·C/N0 = 1, as found): 0.5 %
+            // for 400 000; three of that. The prompt off its peak adds 0.2 % of d.
             assert!((early_minus_late / expected[0] - 1.0).abs() < 0.017, "{d} {snr}");
             assert!((dot / expected[1] - 1.0).abs() < 0.017, "{d} {snr}");
         }

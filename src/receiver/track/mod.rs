@@ -1,8 +1,10 @@
 //! Tracking: one channel follows one signal of one satellite.
 //!
-//! A [`Channel`] takes consecutive blocks of samples and gives the state of its replica at requested samples, message
-//! symbols, rows for the judge and events. Its loops ([`loops`]) are designed in the discrete domain and
-//! closed in [`closed`]; detectors are in [`lock`], [`cn0`] and `sync`, the pull-in of weak signals in `pull_in`. Limits: the first component of a signal only, one code period at least as long as a few samples.
+//! A [`Channel`] takes consecutive blocks of samples and gives the state of its replica at requested samples,
+//! message symbols, rows for the judge and events. Its loops ([`loops`]) are designed in the discrete domain
+//! and closed in [`closed`]; detectors are in [`lock`], [`cn0`] and `sync`, the pull-in of weak signals in
+//! `pull_in`. Limits: the first component of a signal only, one code period at least as long as a few
+//! samples.
 
 use crate::gnss::record::{Event, TrackingRow};
 
@@ -39,7 +41,8 @@ pub struct Measurement {
     pub code_periods: u64,
     pub code_fraction: f64,
     /// Accumulated carrier in the RINEX sense (grows with range, that is, against Doppler), nominal IF
-    /// removed: θ(n)/turns − f_IF·n/fs, negated, and negated once more for an inverted spectrum. Unknown whole number, and half while `half_cycle_known` is false.
+    /// removed: θ(n)/turns − f_IF·n/fs, negated, and negated once more for an inverted spectrum. Unknown
+    /// whole number, and half while `half_cycle_known` is false.
     pub carrier_cycles: f64,
     pub half_cycle_known: bool,
     pub doppler_hz: f64,

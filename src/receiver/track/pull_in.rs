@@ -1,11 +1,12 @@
 //! Pull-in of weak signals: carrier frequency, carrier phase and symbol edges from one batch of prompts.
 //!
-//! While the carrier's oscillator runs free, prompts of one code period are collected. For every place of the symbols' edges and
-//! every frequency on a grid the energies of whole symbols are added (maximum likelihood where symbols are random and phases
-//! unknown); the largest sum gives both. Then the phases of the squared symbols, which know no data, give frequency and phase
-//! exactly enough for a phase loop to begin in lock. Noise alone is recognised by its chi-square distribution.
-//! Limits: the frequency is within 400 Hz for a period of 1 ms and changes by less than some hertz in the batch
-//! (1 m/s² is 5 Hz/s); edges are found to a few periods, which [`super::sync`] has to confirm.
+//! While the carrier's oscillator runs free, prompts of one code period are collected. For every place of the
+//! symbols' edges and every frequency on a grid the energies of whole symbols are added (maximum likelihood
+//! where symbols are random and phases unknown); the largest sum gives both. Then the phases of the squared
+//! symbols, which know no data, give frequency and phase exactly enough for a phase loop to begin in lock.
+//! Noise alone is recognised by its chi-square distribution. Limits: the frequency is within 400 Hz for a
+//! period of 1 ms and changes by less than some hertz in the batch (1 m/s² is 5 Hz/s); edges are found to a
+//! few periods, which [`super::sync`] has to confirm.
 
 use std::f64::consts::TAU;
 
@@ -56,8 +57,8 @@ impl Batch {
         self.prompts.len()
     }
 
-    /// Searches edges and frequency; `noise` is the power of a prompt's noise, both components. `None` where noise alone might
-    /// have given as much.
+    /// Searches edges and frequency; `noise` is the power of a prompt's noise, both components. `None` where
+    /// noise alone might have given as much.
     pub fn search(&self, noise: f64) -> Option<Found> {
         let symbols = (self.prompts.len() + 1).checked_div(self.group)?.saturating_sub(1);
         if symbols < 2 || noise <= 0.0 {
@@ -194,8 +195,9 @@ mod tests {
             }
             let (rms_hz, rms_cycles) = ((errors_hz / runs).sqrt(), (errors_cycles / runs).sqrt());
             println!("{dbhz} dB-Hz: {rms_hz:.3} Hz, {rms_cycles:.4} cycle");
-            // A line through the phases of 11 symbols, each with σ = √(1/(2·x)) rad, x = C/N0·20 ms, more where edges are wrong and the
-            // square of noise by noise counts (x = 6 at 25 dB-Hz): σ√12/(2π·0.22 s·√11) = 0.75 σ Hz, and 2σ/√11 at the end.
+            // A line through the phases of 11 symbols, each with σ = √(1/(2·x)) rad, x = C/N0·20 ms, more
+            // where edges are wrong and the square of noise by noise counts (x = 6 at 25 dB-Hz):
+            // σ√12/(2π·0.22 s·√11) = 0.75 σ Hz, and 2σ/√11 at the end.
             let sigma = (0.5 / (0.02 * libm::pow(10.0, dbhz / 10.0))).sqrt();
             assert!(rms_hz < 2.0 * 0.75 * sigma + 0.03, "{dbhz}: {rms_hz} Hz");
             assert!(rms_cycles < 2.0 * 2.0 * sigma / 11_f64.sqrt() / TAU + 0.01, "{dbhz}: {rms_cycles} cycle");

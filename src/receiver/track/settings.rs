@@ -106,8 +106,9 @@ pub enum TrackingSettingsError {
     Bandwidth { key: &'static str, value_hz: f64, update_s: f64, product: f64, limit: f64, largest_hz: f64 },
 }
 
-/// Largest bandwidth times update time that [`TrackingSettings::validate`] accepts. The loops are stable for every value
-/// (theory: order 1 below 0.5); beyond this their noise per update is no longer small against the discriminator's range.
+/// Largest bandwidth times update time that [`TrackingSettings::validate`] accepts. The loops are stable for
+/// every value (theory: order 1 below 0.5); beyond this their noise per update is no longer small against the
+/// discriminator's range.
 pub const LARGEST_BANDWIDTH_TIME: f64 = 0.4;
 
 /// How near a loop is to what [`TrackingSettings::validate`] refuses.

@@ -13,8 +13,9 @@ pub struct SymbolSync {
 /// Symbols before a decision is tried, and after which a new search begins: those of a pull-in's default limit, 6 s.
 const LEAST_SYMBOLS: u64 = 25;
 const MOST_SYMBOLS: u64 = 300;
-/// Standard deviations by which the best edge must lead every other. Where no symbol turns, noise alone leads a neighbour by as much
-/// with 3e-7, and it has to lead both; where symbols turn, it has to outweigh them first.
+/// Standard deviations by which the best edge must lead every other. Where no symbol turns, noise alone leads
+/// a neighbour by as much with 3e-7, and it has to lead both; where symbols turn, it has to outweigh them
+/// first.
 const LEAD_SIGMAS: f64 = 5.0;
 
 impl SymbolSync {

@@ -1,7 +1,8 @@
 //! Curves with bands of confidence, heat maps, and where a figure crosses a level.
 //!
-//! [`pictures`] turns results into charts as data; nothing is drawn before [`Picture::draw`]. A value without a number has its
-//! place by its rank. Limits: a crossing is found by straight lines between neighbouring cells.
+//! [`pictures`] turns results into charts as data; nothing is drawn before [`Picture::draw`]. A value without
+//! a number has its place by its rank. Limits: a crossing is found by straight lines between neighbouring
+//! cells.
 
 use std::fmt::Write;
 use std::path::Path;

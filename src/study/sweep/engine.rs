@@ -1,8 +1,9 @@
 //! Running a plan: missing shards on all cores of this machine.
 //!
-//! Groups of cases that share a signal are the unit of work; whichever core is free takes the next one, so that shards are
-//! finished one after the other and the last ones fill all cores too. A shard is committed by whoever finishes its last
-//! group. What a killed run had not committed is computed again: at most about as many shards as there are cores.
+//! Groups of cases that share a signal are the unit of work; whichever core is free takes the next one, so
+//! that shards are finished one after the other and the last ones fill all cores too. A shard is committed by
+//! whoever finishes its last group. What a killed run had not committed is computed again: at most about as
+//! many shards as there are cores.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

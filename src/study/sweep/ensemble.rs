@@ -1,8 +1,8 @@
 //! All cases of a study taken together: how its figures are distributed over starts, places and noises.
 //!
-//! `ensemble = [axis, …]` names the axes that keep ensembles apart; all others are pooled. One case counts once, however
-//! long it is, so that the intervals are those of independent runs. Percentiles are of the cases that have the figure, and
-//! how many have it stands beside them.
+//! `ensemble = [axis, …]` names the axes that keep ensembles apart; all others are pooled. One case counts
+//! once, however long it is, so that the intervals are those of independent runs. Percentiles are of the
+//! cases that have the figure, and how many have it stands beside them.
 
 use super::StudyError;
 use super::estimate::Estimate;

@@ -1,7 +1,8 @@
 //! What repetitions say: a mean and the interval that holds the true one with 95 % confidence.
 //!
-//! Numbers: Student's t. Of figures that are 0 or 1 in every repetition (held, detected), Wilson's score interval (1927), whose
-//! coverage does not collapse at 0 and 1 as that of the normal approximation does. Repetitions are independent by their seeds.
+//! Numbers: Student's t. Of figures that are 0 or 1 in every repetition (held, detected), Wilson's score
+//! interval (1927), whose coverage does not collapse at 0 and 1 as that of the normal approximation does.
+//! Repetitions are independent by their seeds.
 
 /// Mean and 95 % interval of a figure over the repetitions of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]

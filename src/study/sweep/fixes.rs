@@ -1,8 +1,9 @@
 //! Figures of a run's fixes that an ensemble of independent runs needs: one number a run.
 //!
-//! Fixes before and after the ionosphere's parameters are judged apart, at the first fix and at the last of each kind:
-//! fixes of one run remember each other, those of different runs do not. The message's timetable says when a receiver that has
-//! locked can have an ephemeris (IS-GPS-200N, 20.3.3: subframes of 6 s, 1 to 3 once in 30 s).
+//! Fixes before and after the ionosphere's parameters are judged apart, at the first fix and at the last of
+//! each kind: fixes of one run remember each other, those of different runs do not. The message's timetable
+//! says when a receiver that has locked can have an ephemeris (IS-GPS-200N, 20.3.3: subframes of 6 s, 1 to 3
+//! once in 30 s).
 
 use std::collections::HashMap;
 
@@ -14,8 +15,8 @@ use crate::analysis::load::Run;
 use crate::analysis::statistics::percentile;
 use crate::gnss::record::{Fix, IonosphereModel};
 
-/// What a study may keep of them. `nees` is of a single fix; of an honest receiver its mean over independent runs is 3 with a
-/// variance of 6 over their number.
+/// What a study may keep of them. `nees` is of a single fix; of an honest receiver its mean over independent
+/// runs is 3 with a variance of 6 over their number.
 pub const FIGURES: &[&str] = &[
     "message.ready_s",
     "message.in_time",

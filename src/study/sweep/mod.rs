@@ -1,13 +1,14 @@
 //! Studies: a base scene, axes and repetitions become a table of figures, in shards that survive what kills a run.
 //!
-//! [`spec`] is STUDY.toml as written, [`axis`] its grid: case i follows from mixed radix, so no list of cases exists. A case
-//! is run by [`model`] (the loops on modelled correlations) or [`sampled`] (samples streamed from generator to receiver);
-//! [`engine`] runs what is missing on all cores, [`plan`] and [`shard`] keep manifest and results on disk, [`result`]
-//! condenses repetitions, [`ensemble`] takes all cases together, [`draw`] and [`publish`] show them, [`export`] hands shards to
-//! other machines' engines.
+//! [`spec`] is STUDY.toml as written, [`axis`] its grid: case i follows from mixed radix, so no list of cases
+//! exists. A case is run by [`model`] (the loops on modelled correlations) or [`sampled`] (samples streamed
+//! from generator to receiver); [`engine`] runs what is missing on all cores, [`plan`] and [`shard`] keep
+//! manifest and results on disk, [`result`] condenses repetitions, [`ensemble`] takes all cases together,
+//! [`draw`] and [`publish`] show them, [`export`] hands shards to other machines' engines.
 //!
-//! **Exactly once** rests on no engine: a shard's bytes are a function of the manifest and its number alone, a file under
-//! its final name is whole and bound to its manifest, and merging takes each shard once or fails.
+//! **Exactly once** rests on no engine: a shard's bytes are a function of the manifest and its number alone,
+//! a file under its final name is whole and bound to its manifest, and merging takes each shard once or
+//! fails.
 
 pub mod axis;
 pub mod draw;

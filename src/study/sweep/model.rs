@@ -1,8 +1,9 @@
 //! A case at correlator level: the receiver's own loops on modelled correlations, thousands of times real time.
 //!
-//! The base is `[signal]`, `[motion]`, `[loop]`, `[measure]` and `[receiver.tracking]`; figures stand in [`FIGURES`], those of
-//! theory under `theory.`. Limits are those of [`crate::study::correlator`]: one satellite in steady tracking,
-//! constant C/N0, no multipath. Where the signal was lost, spreads have no value.
+//! The base is `[signal]`, `[motion]`, `[loop]`, `[measure]` and `[receiver.tracking]`; figures stand in
+//! [`FIGURES`], those of theory under `theory.`. Limits are those of [`crate::study::correlator`]: one
+//! satellite in steady tracking, constant C/N0, no multipath. Where the signal was lost, spreads have no
+//! value.
 
 use super::keys;
 use crate::analysis::theory::clock::PowerLaw;
@@ -206,8 +207,9 @@ fn phase_theory_deg(case: &Case) -> Option<f64> {
 /// T·C/N0: what the theory of loops in noise wants at least [`LEAST_SNR`](crate::study::proof::LEAST_SNR) of.
 pub const SNR: &str = "theory.snr";
 
-/// What a study may keep. Spreads are of truth minus oscillator, mean over an integration, about their mean; `raw_…` are
-/// of discriminator values. `theory.…` is what `analysis::theory` predicts for the loop as it is closed.
+/// What a study may keep. Spreads are of truth minus oscillator, mean over an integration, about their mean;
+/// `raw_…` are of discriminator values. `theory.…` is what `analysis::theory` predicts for the loop as it is
+/// closed.
 pub const FIGURES: &[Figure] = &[
     figure("held", |_, outcome| Some(f64::from(u8::from(outcome.lost.is_none())))),
     figure("slip_free", |_, outcome| Some(f64::from(u8::from(outcome.lost.is_none() && outcome.slips == 0)))),

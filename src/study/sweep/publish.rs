@@ -1,7 +1,7 @@
 //! Writes a finished study down: `cases.csv`, `cells.csv`, pictures, `report.md` and `report.pdf` in its directory.
 //!
-//! Bytes follow from plan and results alone: how long it took and where stands nowhere. Other forms of report start from
-//! [`Results`] and [`draw::pictures`] as this one does.
+//! Bytes follow from plan and results alone: how long it took and where stands nowhere. Other forms of report
+//! start from [`Results`] and [`draw::pictures`] as this one does.
 
 use std::fmt::Write;
 

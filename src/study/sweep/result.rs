@@ -1,7 +1,7 @@
 //! The whole table of a study, and what its repetitions say cell by cell.
 //!
-//! [`merge`] takes each shard once, in order, and fails if one is missing. [`Results`] is what pictures and reports are made
-//! from: axes, figures, and an estimate for each figure of each cell.
+//! [`merge`] takes each shard once, in order, and fails if one is missing. [`Results`] is what pictures and
+//! reports are made from: axes, figures, and an estimate for each figure of each cell.
 
 use super::ensemble::{Collector, Ensemble};
 use super::estimate::Estimate;

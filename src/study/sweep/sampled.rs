@@ -1,8 +1,9 @@
 //! Cases at sample level: one stream of samples from the generator feeds every receiver that is to hear it, in memory.
 //!
 //! Cases that differ in `receiver.…` alone share their signal, so it is generated once. Figures are those of
-//! `summary.json` by their path, the first search's detections, those of single fixes ([`super::fixes`]), and what theory
-//! predicts of the loops under thermal noise. Limits: truth and records pass through files in a scratch directory, samples never do.
+//! `summary.json` by their path, the first search's detections, those of single fixes ([`super::fixes`]), and
+//! what theory predicts of the loops under thermal noise. Limits: truth and records pass through files in a
+//! scratch directory, samples never do.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -250,8 +251,9 @@ fn places_s(run: &Run) -> Result<Vec<f64>, JudgeError> {
     Ok(places)
 }
 
-/// Jitter of the carrier as it is observed: at instants, where the discriminator sees means over an integration. Where in
-/// the running integration an observation falls follows from the time sent, as integrations begin with symbols.
+/// Jitter of the carrier as it is observed: at instants, where the discriminator sees means over an
+/// integration. Where in the running integration an observation falls follows from the time sent, as
+/// integrations begin with symbols.
 fn pll_theory_deg(places_s: &[f64], settings: &Settings, summary: &Summary) -> Option<f64> {
     let cn0_dbhz = summary.details.cn0_effective_dbhz?;
     let channel = limits::channel(&settings.tracking, Mode::Phase, Some(cn0_dbhz));

@@ -1,9 +1,10 @@
 //! Shards: files of whole cases, bound to their manifest, that are there wholly or not at all.
 //!
-//! The first line binds manifest and range, the last one counts rows and hashes what stands before it. A shard is written
-//! under a temporary name, synchronised, linked to its own, and the directory synchronised. What is there already must have the
-//! same bytes: a shard that is computed twice is a check of reproducibility. Limits: a network file system may refuse
-//! links; then a rename is used, and of two writers at once the last one's (equal) bytes stay.
+//! The first line binds manifest and range, the last one counts rows and hashes what stands before it. A
+//! shard is written under a temporary name, synchronised, linked to its own, and the directory synchronised.
+//! What is there already must have the same bytes: a shard that is computed twice is a check of
+//! reproducibility. Limits: a network file system may refuse links; then a rename is used, and of two writers
+//! at once the last one's (equal) bytes stay.
 
 use std::fmt::Write as _;
 use std::fs::{self, File};

@@ -1,7 +1,8 @@
 //! STUDY.toml as written, every key checked.
 //!
-//! The base is a scene's file (`level = "samples"`) or, at correlator level, the tables `[signal]`, `[motion]`, `[loop]`,
-//! `[measure]` and `[receiver]` of the study itself. Axes put their values under any key of the base.
+//! The base is a scene's file (`level = "samples"`) or, at correlator level, the tables `[signal]`,
+//! `[motion]`, `[loop]`, `[measure]` and `[receiver]` of the study itself. Axes put their values under any
+//! key of the base.
 
 use std::path::{Path, PathBuf};
 
@@ -178,9 +179,9 @@ impl Study {
         self.scenario.as_deref().into_iter().chain(named).collect()
     }
 
-    /// The seed of a case: a hash of the study's seed, the scene's name, the values that change the signal, by name, and
-    /// the repetition. Cases that differ in the receiver alone have the same noise, and another axis of the receiver or
-    /// other values of an axis change no case's seed.
+    /// The seed of a case: a hash of the study's seed, the scene's name, the values that change the signal,
+    /// by name, and the repetition. Cases that differ in the receiver alone have the same noise, and another
+    /// axis of the receiver or other values of an axis change no case's seed.
     pub fn seed_of(&self, case: &axis::Case, scene: &str) -> u64 {
         let acts = |key: &str| match self.level {
             Level::Correlator => model::changes_signal(key),

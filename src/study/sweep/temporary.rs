@@ -1,4 +1,5 @@
-//! Names for work in progress: they tell whose it is, so that what a dead run left behind can be swept and nothing else.
+//! Names for work in progress: they tell whose it is, so that what a dead run left behind can be swept and
+//! nothing else.
 
 use std::fs;
 use std::path::Path;

@@ -51,7 +51,8 @@ const PLANES: &[&str] = &["ground", "wall"];
 
 pub(crate) const MULTIPATH: &[Key] = &[
     word("kind", || vec!["given", "ground", "wall"], "where it is reflected").required(),
-    // Where the direct ray goes through a wall or leaves, its echo may be the stronger; planes reflect no more than they get.
+    // Where the direct ray goes through a wall or leaves, its echo may be the stronger; planes reflect no
+    // more than they get.
     number("amplitude", 0.0, 10.0, "(of the direct ray's)", "of the reflected ray").required().of(GIVEN),
     number("amplitude", 0.0, 1.0, "(of the direct ray's)", "of the reflected ray").required().of(PLANES),
     // A surface turns the field round unless it is told otherwise.

@@ -1,8 +1,9 @@
 //! When and how an emitter's wave reaches the samples: clock, path, tuning and repetition.
 //!
-//! Sample n is taken when the receiver's clock reads n/rate after its start; what it holds was sent `behind_s` before
-//! that reading (the clock's error plus the time on the way). Phases are the exact phase of sample n as integers, less
-//! frequency times `behind_s`, so neither a long scene nor a drifting clock loses a digit. Limits: emitters stand still.
+//! Sample n is taken when the receiver's clock reads n/rate after its start; what it holds was sent
+//! `behind_s` before that reading (the clock's error plus the time on the way). Phases are the exact phase of
+//! sample n as integers, less frequency times `behind_s`, so neither a long scene nor a drifting clock loses
+//! a digit. Limits: emitters stand still.
 
 use nalgebra::Vector3;
 

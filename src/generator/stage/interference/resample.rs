@@ -1,8 +1,9 @@
 //! Samples at another rate: band-limited noise from white noise, and recordings.
 //!
-//! A sample is the sum of 64 neighbours weighted with a sinc under a Kaiser window (80 dB in the stop band), from a table
-//! of 256 phases, linear between them (−94 dB). The response falls from 1 to 0 within ±0.04 of the source's rate about the
-//! cut-off. Limits: noise is drawn on the samples' own grid, so a drifting clock moves its band and not its shape.
+//! A sample is the sum of 64 neighbours weighted with a sinc under a Kaiser window (80 dB in the stop band),
+//! from a table of 256 phases, linear between them (−94 dB). The response falls from 1 to 0 within ±0.04 of
+//! the source's rate about the cut-off. Limits: noise is drawn on the samples' own grid, so a drifting clock
+//! moves its band and not its shape.
 
 use crate::generator::stage::noise::{BLOCK_SAMPLES, LANES};
 use crate::generator::synth::angle::cos_sin;

@@ -1,9 +1,10 @@
 //! The kernel of frequency-modulated carriers: 32 samples side by side.
 //!
-//! Carrier and place in the repetition are 64-bit integers of each sample; the modulation's phase is a polynomial of the
-//! place in `f64`, taken modulo one by adding 1.5·2^52, which rounds alike on every instruction set. Errors: sines 3e-7, the
-//! modulation 1e-16 of its cycles (sine FM: 3e-7 of its index). Where the momentary frequency lies outside the samples'
-//! band there is silence, as behind a front end's filter; sidebands of a fast sweep beyond the band still fold.
+//! Carrier and place in the repetition are 64-bit integers of each sample; the modulation's phase is a
+//! polynomial of the place in `f64`, taken modulo one by adding 1.5·2^52, which rounds alike on every
+//! instruction set. Errors: sines 3e-7, the modulation 1e-16 of its cycles (sine FM: 3e-7 of its index).
+//! Where the momentary frequency lies outside the samples' band there is silence, as behind a front end's
+//! filter; sidebands of a fast sweep beyond the band still fold.
 
 use crate::generator::stage::noise::LANES;
 use crate::generator::synth::angle::cos_sin;
@@ -218,7 +219,8 @@ mod tests {
                         (f64::from(*i) - re).abs().max((f64::from(*q) - im).abs())
                     })
                     .fold(0.0, f64::max);
-                // Sines 3e-7 and the angle's last place 2^-32 turn = 1.5e-9; sine FM adds 3e-7 · 5.5 cycles · 2π = 1.04e-5.
+                // Sines 3e-7 and the angle's last place 2^-32 turn = 1.5e-9; sine FM adds 3e-7 · 5.5 cycles ·
+                // 2π = 1.04e-5.
                 let bar = if matches!(modulation, Modulation::Sine { .. }) { 1.1e-5 } else { 4e-7 };
                 assert!(wrong < bar * 1e6, "{modulation:?} {level:?}: {wrong}");
                 match &first {

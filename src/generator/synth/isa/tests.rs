@@ -1,5 +1,6 @@
-//! Every entry on every instruction set against its slow twin, at all lengths to 130 and all offsets of the planes to 31: heads and
-//! tails of vectors, and planes that begin anywhere in one. Written values may not reach beyond the planes.
+//! Every entry on every instruction set against its slow twin, at all lengths to 130 and all offsets of the
+//! planes to 31: heads and tails of vectors, and planes that begin anywhere in one. Written values may not
+//! reach beyond the planes.
 
 use super::*;
 use crate::generator::stage::interference::tone::Modulation;
@@ -15,7 +16,8 @@ const PLANE: usize = OFFSETS + LENGTHS + 40;
 /// Stands where nothing may be written.
 const UNTOUCHED: f32 = 77.0;
 
-/// Runs a kernel on planes of every length and offset on every level; `bits` are the baseline's, `check` compares them with the twin.
+/// Runs a kernel on planes of every length and offset on every level; `bits` are the baseline's, `check`
+/// compares them with the twin.
 fn everywhere(kernel: impl Fn(Level, &mut [f32], &mut [f32]), check: impl Fn(&[f32], &[f32])) {
     for length in 0..=LENGTHS {
         let mut baseline: Option<(Vec<f32>, Vec<f32>)> = None;

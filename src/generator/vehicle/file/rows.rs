@@ -82,11 +82,11 @@ impl Rows {
 
     /// The row that makes the spline bend too hard from knot `bent` on, and how hard.
     ///
-    /// One wrong row bends the spline at its neighbours too, each a quarter as hard as the one before: it is the row without
-    /// which the rows about it are smooth. Where the motion jumps for good, leaving out a row beside the jump takes no more
-    /// than a third of the bend away: then it is the row after the fastest interval (within two rows of an end the two cannot be
-    /// told apart, and the row beside the jump is named). Of fewer than five rows any could be
-    /// the wrong one.
+    /// One wrong row bends the spline at its neighbours too, each a quarter as hard as the one before: it is
+    /// the row without which the rows about it are smooth. Where the motion jumps for good, leaving out a row
+    /// beside the jump takes no more than a third of the bend away: then it is the row after the fastest
+    /// interval (within two rows of an end the two cannot be told apart, and the row beside the jump is
+    /// named). Of fewer than five rows any could be the wrong one.
     fn culprit(&self, bent: usize) -> (usize, f64) {
         // At the end of the file more of those before it, so that there is something to be smooth.
         let first = bent.saturating_sub(BEFORE).min(self.rows.len().saturating_sub(AFTER));

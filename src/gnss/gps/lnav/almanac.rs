@@ -103,7 +103,8 @@ pub struct UtcData {
     pub leap_s: i64,
     /// What is left of it; absent means none, referred to the almanac's time.
     pub polynomial: Option<UtcPolynomial>,
-    /// The last change of the whole seconds, or the next one: those after it, and the week and day at whose end it comes.
+    /// The last change of the whole seconds, or the next one: those after it, and the week and day at whose
+    /// end it comes.
     pub event: Option<LeapEvent>,
 }
 

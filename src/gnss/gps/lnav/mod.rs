@@ -128,7 +128,8 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent)
 }
 
-/// Adds `by` to the parameter of subframes 1 to 3 that the field table calls `parameter`, in its unit; whether there is one.
+/// Adds `by` to the parameter of subframes 1 to 3 that the field table calls `parameter`, in its unit;
+/// whether there is one.
 pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     add_to(&SUBFRAME_1, parameter, ephemeris, by)
         || add_to(&SUBFRAME_2, parameter, ephemeris, by)

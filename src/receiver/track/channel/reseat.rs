@@ -15,8 +15,8 @@ use super::LOCK_PERIODS;
 /// Means over the code periods since the last glance.
 #[derive(Clone, Copy, Debug)]
 pub struct Glance {
-    /// Where the signal's code is, beyond where the carrier's aid alone would have it: what the loop has moved and what the
-    /// discriminator still shows. It does not depend on the loop, and its noise is white.
+    /// Where the signal's code is, beyond where the carrier's aid alone would have it: what the loop has
+    /// moved and what the discriminator still shows. It does not depend on the loop, and its noise is white.
     pub code_chips: f64,
     /// Where the replica's code is, in the same sense.
     pub moved_chips: f64,
@@ -100,8 +100,8 @@ impl Channel {
         self.sense * rates[0].rate - self.carrier_offset_hz
     }
 
-    /// The replica and its oscillators at `sample`, as they would be had the loop moved the code by `moved_chips` and no
-    /// other amount, and at these rates.
+    /// The replica and its oscillators at `sample`, as they would be had the loop moved the code by
+    /// `moved_chips` and no other amount, and at these rates.
     pub fn predicted(&self, sample: u64, moved_chips: f64, rates: &[Rates; 2]) -> Option<(&Replica, Nco)> {
         let replica = self.replica.as_ref()?;
         let samples = i128::from(sample) - i128::from(self.first);
@@ -128,9 +128,9 @@ impl Channel {
         self.first = next;
     }
 
-    /// Moves the replica at sample `now`, up to which the channel has come, to where the code is when it has jumped ahead by
-    /// `ahead_chips` and the loop had moved it by `moved_chips` otherwise, or by what it did if that is `None`. The carrier's count is broken; detectors
-    /// sleep until [`Self::resume`].
+    /// Moves the replica at sample `now`, up to which the channel has come, to where the code is when it has
+    /// jumped ahead by `ahead_chips` and the loop had moved it by `moved_chips` otherwise, or by what it did
+    /// if that is `None`. The carrier's count is broken; detectors sleep until [`Self::resume`].
     pub fn reseat(
         &mut self,
         now: u64,
@@ -151,8 +151,8 @@ impl Channel {
         self.forget_edges();
     }
 
-    /// Detectors wake up: the code is `chips` ahead of where it was taken to be with `moved_chips` of the loop's, and its count is
-    /// short of `periods`. `begins` says whether symbols begin where they did.
+    /// Detectors wake up: the code is `chips` ahead of where it was taken to be with `moved_chips` of the
+    /// loop's, and its count is short of `periods`. `begins` says whether symbols begin where they did.
     pub fn resume(&mut self, now: u64, chips: f64, moved_chips: Option<f64>, periods: i64, begins: bool) {
         let moved_chips = moved_chips.unwrap_or(self.glances.moved_chips);
         self.shift(now, chips + moved_chips - self.glances.moved_chips);

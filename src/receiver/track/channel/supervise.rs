@@ -237,7 +237,8 @@ impl Channel {
         }
     }
 
-    /// A Costas loop also locks where the phase turns by half cycles between symbols or updates; within symbols it shows.
+    /// A Costas loop also locks where the phase turns by half cycles between symbols or updates; within
+    /// symbols it shows.
     fn verify_frequency(&mut self, report: &mut Report) {
         let error_hz = self.rotation.cycles(self.group) / self.period_s;
         self.rotation = Rotation::default();
