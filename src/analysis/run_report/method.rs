@@ -53,9 +53,10 @@ fn paragraphs() -> [String; 6] {
          interference, weighted with their spectral separation from the signal (Betz, NAVIGATION 48(4), 2001). The \
          quantiser's loss is not subtracted."
             .to_owned(),
-        "Position. The bounds of the verdict are the receiver's own: the root of the mean formal variance of its fixes, times \
-         2.45 for 95 % of a circle and 1.96 for 95 % of a line. Errors beyond them have causes that the receiver does \
-         not model, such as multipath or a spoofer. Ellipses in the picture are those of the errors found."
+        "Position. Limits of the verdict follow from truth and settings alone: the C/N0 that the scene gives each \
+         satellite, the geometry, the loops and the smoothing, with known biases taken out. Nothing that the receiver says \
+         of its own quality enters; its stated sigmas are held against the same theory, on both sides. Ellipses in the \
+         picture are those of the errors found."
             .to_owned(),
         "Spectrum and clock. The spectrum is Welch's estimate with a Hann window and half overlap. Deviations of the clock \
          follow NIST Special Publication 1065 (Riley 2008), with intervals of 95 % from equivalent degrees of freedom. Code \
