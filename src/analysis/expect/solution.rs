@@ -86,8 +86,10 @@ pub struct Expected {
     /// Known bias, and what may come on top of it in either direction.
     pub bias: Vector4<f64>,
     pub allowed: Vector4<f64>,
-    /// Covariance of the errors, of what should be stated, and squares of the dilutions.
+    /// Covariance of the errors: of all that may vary, and of what varies within a run; of what should be stated, and squares of
+    /// the dilutions.
     pub noise: Matrix4<f64>,
+    pub thermal: Matrix4<f64>,
     pub stated: Matrix4<f64>,
     pub dilution: Matrix4<f64>,
     /// Whether the fix says that the message's ionosphere corrects it without an error of its own, or needs none.
@@ -134,12 +136,12 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
     }
     let tight = inverse(&sums.normal)?;
     let stated = if corrected { tight } else { inverse(&sums.loose)? };
-    let noise = tight * sums.noise * tight;
+    let thermal = tight * sums.noise * tight;
     let bias = tight * sums.bias;
     let weather = TROPOSPHERE_SHARE * (tight * sums.troposphere).abs();
     // Where the ionosphere is missing its whole effect may be there, or parts of it if it is estimated.
     let (centre, missing, noise) = if corrected {
-        (bias, Vector4::zeros(), noise)
+        (bias, Vector4::zeros(), thermal)
     } else {
         (Vector4::zeros(), bias.abs() + (tight * sums.ionosphere).abs(), stated)
     };
@@ -151,6 +153,7 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
         bias: centre,
         allowed: weather + missing + BIAS_SHARE * centre.abs(),
         noise,
+        thermal,
         stated,
         dilution: inverse(&sums.plain)?,
         corrected,

@@ -8,7 +8,7 @@
 
 use std::collections::HashMap;
 
-use nalgebra::{Matrix3, Vector3, Vector4};
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use super::motion::Motion;
 use super::{Bound, Verdict};
@@ -330,12 +330,17 @@ impl Case<'_> {
     /// A third of the normalised error squared that theory expects, biases at their largest.
     fn expected_square(&self) -> Option<f64> {
         let most = (self.expected.bias.abs() + self.expected.allowed).fixed_rows::<3>(0).into_owned();
-        Some(self.least_square()? + self.weight()?.quadratic(most))
+        Some(self.share(&self.expected.noise)? + self.weight()?.quadratic(most))
     }
 
-    /// The same without any bias.
+    /// The same without any bias, and without what a run draws once: an ionosphere may be as the nominal one.
     fn least_square(&self) -> Option<f64> {
-        let noise: Matrix3<f64> = self.expected.noise.fixed_view::<3, 3>(0, 0).into_owned();
+        self.share(&self.expected.thermal)
+    }
+
+    /// A third of the normalised error squared that errors of this covariance have.
+    fn share(&self, noise: &Matrix4<f64>) -> Option<f64> {
+        let noise: Matrix3<f64> = noise.fixed_view::<3, 3>(0, 0).into_owned();
         Some((self.weight()?.0 * noise).trace() / 3.0)
     }
 

@@ -10,15 +10,16 @@ use crate::receiver::output::Output;
 use crate::receiver::run::ReceiveError;
 
 impl Session {
-    /// Gives every symbol to its decoder and takes in what comes out.
-    pub(super) fn decode(&mut self, output: &mut Output) -> Result<(), ReceiveError> {
+    /// Gives every symbol to its decoder and takes in what comes out; `end` is the sample after those that were followed.
+    pub(super) fn decode(&mut self, end: u64, output: &mut Output) -> Result<(), ReceiveError> {
         for index in 0..self.tracks.len() {
             let near = self.near();
             let Some(track) = self.tracks.get_mut(index) else { continue };
             let (sv, signal) = (track.channel.sv(), track.channel.signal());
             let Some(decoder) = &mut track.decoder else { continue };
             let slipped = track.report.events.iter().any(|(_, event)| *event == Event::CycleSlip);
-            let sample = track.report.measurements.last().map_or(track.since, |last| last.sample);
+            // The last tick, or where the block ends that had none.
+            let sample = track.report.measurements.last().map_or(end.saturating_sub(1), |last| last.sample);
             let mut all = Vec::new();
             for symbol in &track.report.symbols {
                 track.symbols += 1;

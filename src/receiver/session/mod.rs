@@ -208,7 +208,7 @@ impl Session {
         if !self.gap.is_busy() {
             self.part(block.end());
         }
-        self.decode(output)?;
+        self.decode(block.end(), output)?;
         for tick in measured {
             // Nothing is right while codes are not where they were to be.
             if !self.gap.is_busy() {

@@ -210,7 +210,7 @@ impl Channel {
             stage_since: 0,
             update_since: 0,
             pull_in_since: 0,
-            batch: Batch::new(group),
+            batch: supervise::batch(settings, group, period_s),
             confirmed: false,
             sums: [Complex64::ZERO; 3],
             summed: 0,

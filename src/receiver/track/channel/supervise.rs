@@ -5,11 +5,11 @@ use num_complex::Complex64;
 use super::{Channel, LOCK_PERIODS, Stage, WEAK_DBHZ};
 use crate::gnss::record::Event;
 use crate::receiver::correlate::TURN;
-use crate::receiver::track::Report;
 use crate::receiver::track::lock::{PhaseLock, Rotation, SymbolLock};
 use crate::receiver::track::loops::Rates;
 use crate::receiver::track::pull_in::Batch;
 use crate::receiver::track::sync::SymbolSync;
+use crate::receiver::track::{Report, TrackingSettings};
 
 /// A frequency error beyond this, in spite of phase lock, is a false lock: between 0 and the nearest one, 1/(2·symbol).
 const FALSE_LOCK_SHARE: f64 = 0.4;
@@ -19,6 +19,12 @@ const VERIFY_SYMBOLS: u32 = 25;
 const PHASE_LIMIT_SHARE: f64 = 0.5;
 /// Batches of a weak signal's pull-in that may fail.
 const BATCHES: f64 = 4.0;
+
+/// An empty batch for symbols of `group` code periods of `period_s`: as long as the frequency loop's pull-in.
+pub(super) fn batch(settings: &TrackingSettings, group: u32, period_s: f64) -> Batch {
+    let periods = (settings.fll_pull_in_s / period_s) as usize;
+    Batch::new(group, periods.max(4 * group as usize))
+}
 
 impl Channel {
     /// Detectors and changes of stage after code period `number`.
@@ -73,8 +79,7 @@ impl Channel {
 
     /// Looks for the signal in the batch, and begins to track at the first probable edge of a symbol.
     fn search_batch(&mut self, number: u64, report: &mut Report) {
-        let periods = (self.settings.fll_pull_in_s / self.period_s) as usize;
-        if self.batch.periods() < periods.max(4 * self.group as usize) {
+        if !self.batch.is_full() {
             return;
         }
         let group = u64::from(self.group);
@@ -82,9 +87,13 @@ impl Channel {
             if self.since_s(self.pull_in_since) >= BATCHES * self.settings.fll_pull_in_s {
                 self.lose(report);
             }
-            self.batch = Batch::new(self.group);
+            self.batch = self.new_batch();
             return;
         };
+        // Edges that a random message does not show yet are waited for: wrong ones cost the channel.
+        if self.has_symbols && !found.changes && self.batch.extend() {
+            return;
+        }
         // Batches grow until they end where a symbol does.
         if !(self.batch.periods() - found.offset).is_multiple_of(self.group as usize) {
             return;
@@ -93,6 +102,11 @@ impl Channel {
         self.carrier += (found.phase_cycles * TURN) as i128;
         self.enter(Stage::Tracking((number + 1) % group));
         self.confirmed = !self.has_symbols;
+    }
+
+    /// An empty batch of prompts for the pull-in of a weak signal.
+    fn new_batch(&self) -> Batch {
+        batch(&self.settings, self.group, self.period_s)
     }
 
     /// Confirms the edges of symbols, moves them, or begins anew where they contradict what was beyond doubt.
@@ -135,7 +149,7 @@ impl Channel {
         self.stage_since = self.first;
         self.pending = None;
         self.sync = SymbolSync::new(self.group);
-        self.batch = Batch::new(self.group);
+        self.batch = self.new_batch();
         self.rotation = Rotation::default();
         self.symbol = (Complex64::ZERO, 0);
         self.sums = [Complex64::ZERO; 3];
