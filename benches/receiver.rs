@@ -15,7 +15,7 @@ use num_complex::Complex64;
 use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
 use gnss_twin::gnss::samples::{Format, IfMetadata};
 use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::Signal;
+use gnss_twin::gnss::signal::Link;
 use gnss_twin::gnss::time::Rate;
 use gnss_twin::receiver::acquire::{AcquisitionSettings, Searcher, samples_needed};
 use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
@@ -89,7 +89,7 @@ fn tracking(rate_hz: f64, edge: Edge, arithmetic: Arithmetic) -> Box<dyn FnMut()
 fn acquisition(settings: AcquisitionSettings, threads: usize) -> Box<dyn FnMut() -> f64> {
     let rate_hz = 2.6e6;
     let rate = Rate::from_hz(rate_hz).expect("a rate");
-    let metadata = IfMetadata { format: Format::Ci8, rate, center_hz: L1_CA.carrier_hz, inverted: false, start: None };
+    let metadata = IfMetadata { format: Format::Ci8, rate, center_hz: L1_CA.centre_hz(), inverted: false, start: None };
     let samples = samples_needed(&metadata, &settings).expect("settings") as usize;
     let (mut i, mut q) = (Vec::new(), Vec::new());
     Format::Ci8.unpack(&noise(2 * samples), &mut i, &mut q);
@@ -105,7 +105,7 @@ fn acquisition(settings: AcquisitionSettings, threads: usize) -> Box<dyn FnMut()
             q[k] += (sign * libm::sin(angle)) as f32;
         }
     }
-    let candidates: Vec<(&'static Signal, Sv)> = (1..=32).map(|prn| (&L1_CA, Sv::gps(prn))).collect();
+    let candidates: Vec<Link> = (1..=32).map(|prn| L1_CA.link(Sv::gps(prn))).collect();
     let mut searcher = Searcher::new(&metadata, &settings).expect("settings");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     Box::new(move || {
@@ -145,7 +145,7 @@ fn errors(arithmetic: Arithmetic, rate_hz: f64) -> Errors {
     for (prn, doppler_hz) in [(3_u8, -2100.0), (11, 40.0), (22, 1700.0)] {
         let code = l1ca::code(prn).expect("a code");
         let replica = Replica::new(code.clone(), Edge::Area).expect("a replica");
-        let step = chips_to_units(CHIP_HZ * (1.0 + doppler_hz / L1_CA.carrier_hz) / rate_hz);
+        let step = chips_to_units(CHIP_HZ * (1.0 + doppler_hz / L1_CA.centre_hz()) / rate_hz);
         let carrier_step = (doppler_hz / rate_hz * 18_446_744_073_709_551_616.0) as i64 as u64;
         let amplitude = 18.5 * (2.0 * libm::pow(10.0, 4.5) / rate_hz).sqrt();
         let taps = TAPS.map(chips_to_units);

@@ -210,8 +210,7 @@ fn harmonic(x: &[f64], k: usize) -> (f64, f64) {
 fn code_bias_m(edge: Edge<'_>, rate_khz: usize, start_chips: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
-    let chips: Vec<f64> =
-        (L1_CA.components[0].code)(11).unwrap().iter().map(|&chip| if chip { -1.0 } else { 1.0 }).collect();
+    let chips: Vec<f64> = (L1_CA.components[0].code)(11).unwrap().iter().map(|&chip| f64::from(chip)).collect();
     let step = (1023.0 / rate_khz as f64 * CODE_ONE as f64) as u64;
     let mut bits = Vec::new();
     let at = CodeTime { period: 0, phase: (start_chips * CODE_ONE as f64) as u64 };

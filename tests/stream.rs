@@ -184,7 +184,7 @@ fn a_plain_correlation_finds_every_satellite_where_truth_says() {
             let span = from..from + (rate_hz * 1e-3) as usize;
             let chips = chips + skip / rate_hz * chip_hz;
             let sign = if inverted { -1.0 } else { 1.0 };
-            let frequency_hz = scene.metadata.if_hz(row.signal) + sign * row.doppler_hz;
+            let frequency_hz = scene.metadata.if_hz(row.link().carrier_hz()) + sign * row.doppler_hz;
             let at = |dc: f64, df: f64| {
                 correlate(&i[span.clone()], &q[span.clone()], rate_hz, &code, chips + dc, chip_hz, frequency_hz + df)
             };

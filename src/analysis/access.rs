@@ -27,7 +27,7 @@ impl<'r> Access<'r> {
     /// From the truth of a run.
     pub fn new(run: &'r Run) -> Self {
         let mut kappa_s = HashMap::new();
-        for (_, signal) in run.truth.keys() {
+        for signal in run.truth.keys().map(|link| link.signal) {
             kappa_s.entry(signal.name).or_insert_with(|| kappa(signal, &run.scene.code_edge, run.scene.sample_rate_hz));
         }
         Self { run, jammed: jammed(run, kappa_s.keys().copied()), kappa_s }
@@ -51,7 +51,7 @@ fn jammed(run: &Run, signals: impl Iterator<Item = &'static str>) -> HashMap<(u6
     let mut sums = HashMap::new();
     for signal in signals.filter_map(Signal::find) {
         let sign = if run.scene.inverted { -1.0 } else { 1.0 };
-        let signal_hz = sign * (signal.carrier_hz - run.scene.center_hz.unwrap_or(signal.carrier_hz));
+        let signal_hz = sign * (signal.centre_hz() - run.scene.center_hz.unwrap_or(signal.centre_hz()));
         let kappa: HashMap<usize, f64> = sources
             .iter()
             .map(|(number, source)| {

@@ -177,7 +177,7 @@ impl Clock {
         series.extend(truth(run));
         let sigma_s = |sigma_m: Option<f64>| Some(tdop(run, &rows)? * sigma_m? / SPEED_OF_LIGHT_MPS);
         let code = errors.settled(|_, row| row.code_m)?;
-        let carrier = errors.settled(|(_, signal), row| row.carrier_cycles * signal.wavelength_m())?;
+        let carrier = errors.settled(|link, row| row.carrier_cycles * link.wavelength_m())?;
         Ok(Self {
             estimate_line,
             truth_line,

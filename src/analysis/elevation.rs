@@ -80,7 +80,7 @@ pub struct Elevations {
 /// [`JudgeError::Read`] where rows that were put by cannot be read.
 pub fn points(run: &Run, errors: &Errors, link: Link) -> Result<Vec<Point>, JudgeError> {
     let elevations: HashMap<u64, f64> =
-        run.sky.map(link.0, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
+        run.sky.map(link.sv, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
     let rows = errors.signals.rows(link)?;
     let one = |(row, multipath_m): (&SignalError, f64)| {
         Some(Point {
@@ -122,7 +122,7 @@ impl Elevations {
 }
 
 impl Satellite {
-    fn of((sv, signal): Link, points: &[Point]) -> Self {
+    fn of(Link { sv, signal }: Link, points: &[Point]) -> Self {
         let of = |of: fn(&Point) -> f64| points.iter().map(of).collect::<Vec<f64>>();
         let (code, doppler, cn0) = (of(|p| p.code_m), of(|p| p.doppler_hz), of(|p| p.cn0_db));
         Self {
@@ -184,8 +184,7 @@ impl Layer {
 fn multipath_m(link: &Link, rows: &[SignalError]) -> Vec<f64> {
     let mut found = Vec::with_capacity(rows.len());
     for arc in rows.chunk_by(|a, b| b.locked_s > a.locked_s) {
-        let combined: Vec<f64> =
-            arc.iter().map(|row| row.code_m - row.carrier_cycles * link.1.wavelength_m()).collect();
+        let combined: Vec<f64> = arc.iter().map(|row| row.code_m - row.carrier_cycles * link.wavelength_m()).collect();
         let middle = mean(&combined).unwrap_or(0.0);
         found.extend(combined.into_iter().map(|value| value - middle));
     }
@@ -211,7 +210,7 @@ mod tests {
             cn0_effective_dbhz: 44.5,
             locked_s: sample as f64,
         };
-        let link = (Sv::gps(3), &L1_CA);
+        let link = L1_CA.link(Sv::gps(3));
         let rows = vec![row(1, 101.0, 0.0), row(2, 103.0, 0.0)];
         assert_eq!(multipath_m(&link, &rows), vec![-1.0, 1.0]);
         let point = |elevation_deg: f64, code_m: f64| Point {

@@ -16,11 +16,8 @@ use crate::analysis::shelf::{Row, Shelf, Words};
 use crate::analysis::statistics::median;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::record::{Event, EventRow, Observation};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
 
-/// A satellite and its signal.
-pub type Link = (Sv, &'static Signal);
+pub use crate::gnss::signal::Link;
 
 /// Errors of one observation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,7 +101,7 @@ const DETECTION_S: f64 = 0.14;
 /// receiver can know yet that the signal is gone.
 fn has_just_gone(run: &Run, link: Link, sample: u64, truth: &HashMap<u64, Observation>) -> bool {
     let last = truth.keys().copied().filter(|before| *before < sample).max();
-    run.cn0_most_hz.contains_key(&(sample, link.1.name))
+    run.cn0_most_hz.contains_key(&(sample, link.signal.name))
         && last.is_some_and(|last| run.time_s(sample) - run.time_s(last) <= DETECTION_S)
 }
 
@@ -172,7 +169,7 @@ impl Errors {
         }
         rows.sort_by_key(|row| row.sample);
         let first = rows.first().map_or(0, |row| row.sample);
-        let of = |row: &&EventRow| (row.sv, row.signal) == link && row.event == Event::CycleSlip && row.sample > first;
+        let of = |row: &&EventRow| row.link() == link && row.event == Event::CycleSlip && row.sample > first;
         let declared: Vec<u64> = run.events.iter().filter(of).map(|row| row.sample).collect();
         if !rows.is_empty() {
             self.cycle_slips += declared.len() + level_carrier(&mut rows, &declared);

@@ -221,8 +221,8 @@ fn row(
     let (threshold, rule_limit) = theory.limits(which);
     let rule = 3.0 * sigma + stress_max;
     Some(Row {
-        sv: link.0.to_string(),
-        signal: link.1.name,
+        sv: link.sv.to_string(),
+        signal: link.signal.name,
         which,
         unit: match which {
             Loop::Dll => "chips",

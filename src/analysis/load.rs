@@ -173,7 +173,7 @@ impl Run {
         let mut read = Self::read_truth_by(truth, run)?;
         read.scene_json = json(&truth.join("scene.json"))?.unwrap_or(Value::Null);
         read.scenario = text(&run.join("scenario.toml"))?;
-        match each(&truth.join("rays.csv"), "", |_, row: RayRow| read.rays.push((row.sv, row.signal), &row)) {
+        match each(&truth.join("rays.csv"), "", |_, row: RayRow| read.rays.push(row.link(), &row)) {
             Ok(()) | Err(JudgeError::Missing { .. }) => {}
             Err(error) => return Err(error),
         }
@@ -185,7 +185,7 @@ impl Run {
         let mut updates = Counts::default();
         each(&rx.join("tracking.csv"), RECEIVER, |_, row: TrackingRow| {
             updates.add(row.integration_s);
-            read.tracking.push((row.sv, row.signal), &row)
+            read.tracking.push(row.link(), &row)
         })?;
         read.update_s = updates.median();
         read.navigation = rows(&rx.join("navigation.csv"), RECEIVER)?;
@@ -288,11 +288,11 @@ impl Run {
     fn folded(mut scene: SceneFacts) -> SceneFacts {
         let (Some(center_hz), Some(signal)) = (scene.center_hz, SIGNALS.first()) else { return scene };
         let sign = |inverted: bool| if inverted { -1.0 } else { 1.0 };
-        let if_hz = sign(scene.inverted) * (signal.carrier_hz - center_hz);
+        let if_hz = sign(scene.inverted) * (signal.centre_hz() - center_hz);
         let folded_hz = if_hz - scene.sample_rate_hz * (if_hz / scene.sample_rate_hz).round();
         if scene.format.starts_with('r') && if_hz.abs() > 0.5 * scene.sample_rate_hz {
             scene.inverted ^= folded_hz < 0.0;
-            scene.center_hz = Some(signal.carrier_hz - sign(scene.inverted) * folded_hz.abs());
+            scene.center_hz = Some(signal.centre_hz() - sign(scene.inverted) * folded_hz.abs());
         }
         scene
     }
@@ -315,7 +315,7 @@ fn observations(
     each(path, remedy, |line, row: Observation| {
         believable(path, line, row.sent_s)?;
         see(&row);
-        shelf.push((row.sv, row.signal), &row)
+        shelf.push(row.link(), &row)
     })?;
     Ok(shelf)
 }

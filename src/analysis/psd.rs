@@ -138,8 +138,8 @@ pub struct Expected {
 /// The mean of each satellite's true signal over the run.
 pub(super) fn expected(truth: &Shelf<Link, Observation>) -> Result<Vec<Expected>, JudgeError> {
     let mut all = Vec::new();
-    for (sv, signal) in truth.keys() {
-        let rows = truth.rows((sv, signal))?;
+    for Link { sv, signal } in truth.keys() {
+        let rows = truth.rows(Link { sv, signal })?;
         let of = |of: fn(&Observation) -> f64| mean(&rows.iter().map(of).collect::<Vec<_>>());
         let means = (of(|row| row.doppler_hz), of(|row| libm::pow(10.0, row.cn0_dbhz / 10.0)), of(|row| row.cn0_dbhz));
         let ((Some(doppler_hz), Some(cn0_hz), Some(cn0_mean_dbhz)), Some(code)) = (means, signal.components.first())
@@ -148,8 +148,8 @@ pub(super) fn expected(truth: &Shelf<Link, Observation>) -> Result<Vec<Expected>
         };
         all.push(Expected {
             sv,
-            carrier_hz: signal.carrier_hz + doppler_hz,
-            nominal_hz: signal.carrier_hz,
+            carrier_hz: signal.carrier_hz(sv) + doppler_hz,
+            nominal_hz: signal.carrier_hz(sv),
             chip_rate_hz: code.chip_rate_hz,
             cn0_hz,
             cn0_mean_dbhz,

@@ -102,7 +102,7 @@ impl Slips {
     pub fn find(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
         let evidence = Evidence::new(run);
         let lost = run.events.iter().filter(|row| row.event == Event::LossOfLock);
-        let links: BTreeSet<Link> = errors.signals.keys().chain(lost.map(|row| (row.sv, row.signal))).collect();
+        let links: BTreeSet<Link> = errors.signals.keys().chain(lost.map(|row| row.link())).collect();
         let mut rows = Vec::new();
         for link in links {
             let found = breaks(run, link, &errors.signals.rows(link)?);
@@ -144,7 +144,7 @@ struct Break {
 /// Losses of lock, then slips: those of the events, and those that the errors show.
 fn breaks(run: &Run, link: Link, all: &[SignalError]) -> Vec<Break> {
     let of = |event: Event| {
-        let own = run.events.iter().filter(move |row| (row.sv, row.signal) == link && row.event == event);
+        let own = run.events.iter().filter(move |row| row.link() == link && row.event == event);
         own.map(|row| row.sample)
     };
     let loss = |sample| Break { sample, kind: Kind::LossOfLock, declared: true, size_cycles: None };
@@ -252,8 +252,8 @@ impl<'r> Evidence<'r> {
         let mut slip = Slip {
             sample,
             time_s,
-            sv: link.0.to_string(),
-            signal: link.1.name,
+            sv: link.sv.to_string(),
+            signal: link.signal.name,
             kind: found.kind,
             declared: found.declared,
             size_cycles: rounded,

@@ -218,7 +218,7 @@ pub fn cost_db(run: &Run) -> f64 {
 
 /// What a filter leaves of a code's power over noise: (∫S|H| df)²/(∫S|H|² df · ∫S df).
 fn passed(filter: &Stage, run: &Run) -> f64 {
-    let Some(chip_rate_hz) = run.truth.keys().find_map(|(_, signal)| Some(signal.components.first()?.chip_rate_hz))
+    let Some(chip_rate_hz) = run.truth.keys().find_map(|link| Some(link.signal.components.first()?.chip_rate_hz))
     else {
         return 1.0;
     };
@@ -235,11 +235,11 @@ fn passed(filter: &Stage, run: &Run) -> f64 {
 
 /// Both first nulls of the first signal's code.
 fn nulls(run: &Run, theory_db: &[f64]) -> Result<[Null; 2], &'static str> {
-    let signal = run.truth.keys().next().map(|(_, signal)| signal).ok_or("there is no signal")?;
+    let signal = run.truth.keys().next().map(|link| link.signal).ok_or("there is no signal")?;
     let chip_rate_hz = signal.components.first().map(|c| c.chip_rate_hz).ok_or("the signal has no code")?;
     let center_hz = run.scene.center_hz.ok_or("the samples' frequency is unknown")?;
     let sign = if run.scene.inverted { -1.0 } else { 1.0 };
-    let if_hz = sign * (signal.carrier_hz - center_hz);
+    let if_hz = sign * (signal.centre_hz() - center_hz);
     let linear = |db: f64| libm::pow(10.0, db / 10.0);
     let measured: Vec<(f64, f64)> =
         run.psd.iter().map(|row| (row.frequency_hz - if_hz, linear(row.density_db))).collect();

@@ -264,7 +264,7 @@ impl Summary {
 }
 
 fn satellites(run: &Run, details: &mut Details) -> Satellites {
-    let ever: BTreeSet<Sv> = run.sky.keys().chain(run.truth.keys().map(|(sv, _)| sv)).collect();
+    let ever: BTreeSet<Sv> = run.sky.keys().chain(run.truth.keys().map(|Link { sv, .. }| sv)).collect();
     let acquired: BTreeSet<Sv> = run.acquisition.iter().filter(|row| row.acquired).map(|row| row.sv).collect();
     details.false_satellites =
         planted!("analysis.summary.false_satellites", &acquired, &ever).difference(&ever).copied().collect();
@@ -362,8 +362,8 @@ fn observables(errors: &Errors, details: &mut Details) -> Result<Observables, Ju
 
 /// The error of one loop in an observation, in its unit.
 pub(crate) type LoopError = fn(&Link, &SignalError) -> f64;
-pub(crate) const DLL_CHIPS: LoopError = |(_, signal), row| {
-    let code = signal.components.first();
+pub(crate) const DLL_CHIPS: LoopError = |link, row| {
+    let code = link.signal.components.first();
     row.code_m * code.map_or(f64::NAN, |code| code.chip_rate_hz) / SPEED_OF_LIGHT_MPS
 };
 pub(crate) const PLL_DEG: LoopError = |_, row| row.carrier_cycles * 360.0;

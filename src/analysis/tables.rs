@@ -14,6 +14,7 @@ use crate::analysis::plot::jitter::{Histogram, loops};
 use crate::analysis::{JudgeError, Table, spectrum, write_rows};
 use crate::gnss::record::Fix;
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Link;
 
 /// A row of `errors.csv`; estimate minus truth.
 #[derive(Serialize)]
@@ -78,9 +79,10 @@ struct TheoryRow {
 /// Writes them all into a run's directory.
 pub(crate) fn write(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let mut errors = Table::create(&directory.join("errors.csv"))?;
-    for (sv, signal) in judged.errors.signals.keys() {
+    for link in judged.errors.signals.keys() {
+        let Link { sv, signal } = link;
         let mut written = Ok(());
-        judged.errors.signals.each((sv, signal), |row| {
+        judged.errors.signals.each(link, |row| {
             let row = ErrorRow {
                 sample: row.sample,
                 time_s: row.time_s,

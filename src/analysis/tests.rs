@@ -74,7 +74,7 @@ fn start() -> Epoch {
 fn true_observation(index: usize, tick: u64) -> Observation {
     let t_s = tick as f64 * 0.1;
     let doppler_hz = 3500.0 - 800.0 * index as f64 - 0.6 * t_s;
-    let range_m = 21.0e6 + 4.0e5 * index as f64 - doppler_hz * L1_CA.wavelength_m() * t_s;
+    let range_m = 21.0e6 + 4.0e5 * index as f64 - doppler_hz * L1_CA.wavelength_m(Sv::gps(1)) * t_s;
     let received = start().plus_s(t_s);
     let sent = received.plus_s(-range_m / SPEED_OF_LIGHT_MPS);
     Observation {
@@ -84,7 +84,7 @@ fn true_observation(index: usize, tick: u64) -> Observation {
         sent_s: sent.seconds(),
         sent_fraction_s: sent.fraction(),
         pseudorange_m: range_m,
-        carrier_cycles: range_m / L1_CA.wavelength_m(),
+        carrier_cycles: range_m / L1_CA.wavelength_m(Sv::gps(1)),
         doppler_hz,
         cn0_dbhz: 40.0 + 1.1 * index as f64 + 0.005 * t_s,
         locked_s: t_s,

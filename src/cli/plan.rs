@@ -13,6 +13,7 @@ use crate::generator::levels::Levels;
 use crate::generator::plan::Plan;
 use crate::generator::scenario::Overrides;
 use crate::generator::scene::Scene;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::receiver::track::TrackingSettings;
 use crate::study::demand::{self, Answer, Demand};
 
@@ -49,7 +50,7 @@ impl<'s> Loops<'s> {
         let first = scene.signals.first();
         let period_s =
             first.and_then(|signal| signal.components.first()).map_or(1e-3, |component| component.period_s());
-        let signal = (period_s, first.map_or(f64::INFINITY, |signal| signal.wavelength_m()));
+        let signal = (period_s, first.map_or(f64::INFINITY, |signal| SPEED_OF_LIGHT_MPS / signal.centre_hz()));
         let row = |line: LineOfSight| {
             let LineOfSight { acceleration_mps2, jerk_mps3, swing_mps2, cn0_dbhz, .. } = line;
             let circle = scene.trajectory.circle();

@@ -121,7 +121,7 @@ fn metadata(arguments: &args::Receive, described: Option<IfMetadata>) -> Result<
         None => IfMetadata {
             format: arguments.format.ok_or_else(|| missing("--format"))?,
             rate: rate.ok_or_else(|| missing("--rate-hz"))?,
-            center_hz: L1_CA.carrier_hz,
+            center_hz: L1_CA.centre_hz(),
             inverted: false,
             start: None,
         },
@@ -131,7 +131,7 @@ fn metadata(arguments: &args::Receive, described: Option<IfMetadata>) -> Result<
     metadata.start = start.or(metadata.start);
     metadata.inverted |= arguments.inverted;
     if let Some(if_hz) = arguments.if_hz {
-        metadata.center_hz = L1_CA.carrier_hz - if metadata.inverted { -if_hz } else { if_hz };
+        metadata.center_hz = L1_CA.centre_hz() - if metadata.inverted { -if_hz } else { if_hz };
     }
     Ok(metadata)
 }

@@ -129,7 +129,7 @@ pub fn folded_hz(hz: f64, rate_hz: f64) -> f64 {
 
 /// Where the main lobe of a signal without Doppler lies in the samples' spectrum, from and to, in hertz.
 pub fn main_lobe_hz(metadata: &IfMetadata, signal: &Signal) -> (f64, f64) {
-    let if_hz = metadata.if_hz(signal);
+    let if_hz = metadata.if_hz(signal.centre_hz());
     let half_hz = signal.components.iter().fold(0.0_f64, |half, c| half.max(c.chip_rate_hz));
     (if_hz - half_hz, if_hz + half_hz)
 }

@@ -336,7 +336,7 @@ pub(crate) fn cutoff_cps(scene: &Scene) -> f64 {
     }
     let rate_hz = scene.clock.rate.hz();
     scene.signals.iter().fold(CUTOFF_CPS, |least, signal| {
-        let place = (folded_hz(scene.metadata.if_hz(signal), rate_hz) / rate_hz).abs();
+        let place = (folded_hz(scene.metadata.if_hz(signal.centre_hz()), rate_hz) / rate_hz).abs();
         let room = place.min(0.5 - place);
         if room > 0.05 { least.min(2.0 * CUTOFF_CPS * room) } else { least }
     })

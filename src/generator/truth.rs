@@ -111,7 +111,7 @@ fn arriving(scene: &Scene, signal: &Signal, bias_s: f64, gain: f64, emission: Em
         .iter()
         .map(|ray| Arrival {
             delay_s: common_s + ray.code_delay_s,
-            carrier_cycles: signal.carrier_hz
+            carrier_cycles: signal.carrier_hz(emission.sight.sv)
                 * (planted!("generator.truth.clock_in_carrier", common_s, common_s - bias_s) + ray.carrier_delay_s)
                 + ray.phase_cycles,
             cn0_hz: ray.cn0_hz,
@@ -169,7 +169,7 @@ fn doppler_hz(
     }
     let rippled = |seen: &Seen, away_s: f64| {
         let place = sample as f64 + away_s * scene.clock.rate.hz();
-        let ripple = ripple::at(scene, from.fading(sv), signal, place);
+        let ripple = ripple::at(scene, from.fading(sv), signal.carrier_hz(sv), place);
         seen.arrivals.first().map(|arrival| arrival.rippled(ripple).carrier_cycles)
     };
     let near = |b: &&f64| (**b - elapsed_s).abs() < reach_s;
@@ -218,7 +218,7 @@ pub fn observe(
     if ray.cn0_hz <= 0.0 {
         return Ok(None);
     }
-    let arrival = arrival.rippled(ripple::at(scene, from.fading(sv), signal, sample as f64));
+    let arrival = arrival.rippled(ripple::at(scene, from.fading(sv), signal.carrier_hz(sv), sample as f64));
     let Some(doppler_hz) = doppler_hz(scene, from, sv, signal, sample, &seen)? else { return Ok(None) };
     let sent = local.plus_s(-arrival.delay_s);
     let observation = Observation {
@@ -255,7 +255,7 @@ pub fn observe(
         amplitude_ratio: (other.cn0_hz / ray.cn0_hz).sqrt(),
         phase_cycles: {
             let delay_s = ray.carrier_delay_s - other.carrier_delay_s;
-            let cycles = signal.carrier_hz * delay_s + ray.phase_cycles - other.phase_cycles;
+            let cycles = signal.carrier_hz(sv) * delay_s + ray.phase_cycles - other.phase_cycles;
             cycles - cycles.floor()
         },
     });

@@ -7,8 +7,22 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Signal, by_name};
+use crate::gnss::signal::{Link, Signal, by_name};
 use crate::gnss::time::Epoch;
+
+/// Rows that belong to one signal of one satellite.
+macro_rules! linked {
+    ($($row:ty),*) => {$(
+        impl $row {
+            /// The signal that the row is about.
+            pub fn link(&self) -> Link {
+                Link { sv: self.sv, signal: self.signal }
+            }
+        }
+    )*};
+}
+
+linked!(Observation, RayRow, AcquisitionRow, TrackingRow, EventRow);
 
 /// One satellite's signal at one sample: `observations.csv`, on both sides.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -8,7 +8,6 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, Rate};
 
 /// How one sample is written.
@@ -210,9 +209,9 @@ pub struct IfMetadata {
 }
 
 impl IfMetadata {
-    /// The frequency at which a carrier of that signal with no Doppler appears in the samples.
-    pub fn if_hz(&self, signal: &Signal) -> f64 {
-        let offset_hz = signal.carrier_hz - self.center_hz;
+    /// The frequency at which a carrier of that frequency, as received, appears in the samples.
+    pub fn if_hz(&self, carrier_hz: f64) -> f64 {
+        let offset_hz = carrier_hz - self.center_hz;
         if self.inverted { -offset_hz } else { offset_hz }
     }
 }

@@ -12,8 +12,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::Link;
 use crate::gnss::time::Rate;
 use crate::receiver::acquire::Acquired;
 use crate::receiver::parting::{Estimate, common};
@@ -38,7 +37,7 @@ pub enum Pattern {
 /// The latest hit of every satellite.
 #[derive(Clone, Debug, Default)]
 pub struct Looks {
-    last: BTreeMap<(&'static Signal, Sv), Acquired>,
+    last: BTreeMap<Link, Acquired>,
 }
 
 impl Looks {
@@ -47,7 +46,7 @@ impl Looks {
         let pairs: Vec<(f64, f64, f64)> = hits
             .iter()
             .filter_map(|hit| {
-                let before = self.last.insert((hit.signal, hit.sv), *hit)?;
+                let before = self.last.insert(hit.link(), *hit)?;
                 let passed_s = rate.elapsed_s(hit.sample.checked_sub(before.sample)?);
                 (LEAST_S..=MOST_S).contains(&passed_s).then(|| code_doppler(&before, hit, passed_s))?
             })
@@ -68,7 +67,7 @@ impl Looks {
 /// Doppler of the code, scaled to the carrier, that of the carrier, and the first one's deviation.
 fn code_doppler(before: &Acquired, hit: &Acquired, passed_s: f64) -> Option<(f64, f64, f64)> {
     let component = hit.signal.components.first()?;
-    let (length, ratio) = (f64::from(component.code_chips), hit.signal.carrier_hz / component.chip_rate_hz);
+    let (length, ratio) = (f64::from(component.code_chips), hit.signal.carrier_hz(hit.sv) / component.chip_rate_hz);
     let advance = hit.code_phase_chips - before.code_phase_chips - component.chip_rate_hz * passed_s;
     let beyond = advance - length * (advance / length).round();
     let scale = ratio / passed_s;
@@ -79,6 +78,7 @@ fn code_doppler(before: &Acquired, hit: &Acquired, passed_s: f64) -> Option<(f64
 mod tests {
     use super::*;
     use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::satellite::Sv;
 
     const DOPPLERS_HZ: [f64; 6] = [-3900.0, -2500.0, -700.0, 300.0, 2100.0, 4400.0];
 

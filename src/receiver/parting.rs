@@ -18,7 +18,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::Link;
 use crate::gnss::time::Rate;
 use crate::receiver::correlate::TURN;
 
@@ -55,15 +55,15 @@ pub struct Phases {
 
 impl Phases {
     /// Cycles by which the carrier has outrun the code since `earlier`.
-    pub fn parted_cycles(&self, earlier: &Self, signal: &Signal, rate: Rate) -> f64 {
-        let Some(component) = signal.components.first() else { return 0.0 };
+    pub fn parted_cycles(&self, earlier: &Self, link: Link, rate: Rate) -> f64 {
+        let Some(component) = link.signal.components.first() else { return 0.0 };
         let passed_s = rate.elapsed_s(self.sample.saturating_sub(earlier.sample));
         let periods = (i128::from(self.periods) - i128::from(earlier.periods)) as f64;
         let chips = periods * f64::from(component.code_chips) + self.chips - earlier.chips;
         // Code Doppler first, in chips: both products are near 1e5 a second and differ by a few.
         let doppler_chips = chips - component.chip_rate_hz * passed_s;
         let carrier = (self.carrier - earlier.carrier) as f64 / TURN;
-        carrier - doppler_chips * signal.carrier_hz / component.chip_rate_hz
+        carrier - doppler_chips * link.carrier_hz() / component.chip_rate_hz
     }
 }
 
@@ -94,7 +94,7 @@ impl Line {
     }
 
     /// Takes a replica's state, if enough time has passed since the last.
-    pub fn take(&mut self, phases: Phases, signal: &Signal, rate: Rate) {
+    pub fn take(&mut self, phases: Phases, link: Link, rate: Rate) {
         let Some(last) = self.last else {
             (self.last, self.points) = (Some(phases), 1);
             return;
@@ -103,7 +103,7 @@ impl Line {
         if passed_s < STEP_S {
             return;
         }
-        let moved = phases.parted_cycles(&last, signal, rate);
+        let moved = phases.parted_cycles(&last, link, rate);
         self.span_s = (self.span_s + passed_s).min(MEMORY_S);
         if self.span_s < MEMORY_S {
             self.points += 1;
@@ -124,10 +124,10 @@ impl Line {
     }
 
     /// How far the code is ahead of where the line expects it at `phases`, in carrier cycles.
-    pub fn code_ahead_cycles(&self, phases: &Phases, signal: &Signal, rate: Rate) -> Option<f64> {
+    pub fn code_ahead_cycles(&self, phases: &Phases, link: Link, rate: Rate) -> Option<f64> {
         let last = self.last.as_ref()?;
         let passed_s = rate.elapsed_s(phases.sample.checked_sub(last.sample)?);
-        Some(self.ahead_cycles + self.hz * passed_s - phases.parted_cycles(last, signal, rate))
+        Some(self.ahead_cycles + self.hz * passed_s - phases.parted_cycles(last, link, rate))
     }
 }
 
@@ -241,6 +241,7 @@ impl fmt::Display for Parted {
 mod tests {
     use super::*;
     use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::satellite::Sv;
 
     const RATE_HZ: f64 = 2.6e6;
 
@@ -270,7 +271,7 @@ mod tests {
                 chips: chips - 1023.0 * periods,
                 carrier: (turns * TURN) as i128,
             };
-            line.take(phases, &L1_CA, Rate::from_hz(RATE_HZ).unwrap());
+            line.take(phases, L1_CA.link(Sv::gps(1)), Rate::from_hz(RATE_HZ).unwrap());
             error = keep * error + (1.0 - keep * keep).sqrt() * sigma_cycles * noise(state);
         }
         line

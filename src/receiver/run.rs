@@ -14,7 +14,7 @@ use thiserror::Error;
 use crate::gnss::record::LineRow;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, SIGNALS, Signal};
+use crate::gnss::signal::{Component, Link, SIGNALS, Signal};
 use crate::receiver::acquire::{self, AcquireError};
 use crate::receiver::correlate::standing_bias_m;
 use crate::receiver::diagnosis::{Diagnosis, Stage, duration};
@@ -152,7 +152,7 @@ pub(super) fn warnings(metadata: &IfMetadata, settings: &Settings) -> Vec<String
         let bias_m = standing_bias_m(settings.tracking.replica, rate_hz, component);
         let samples_per_chip = rate_hz / component.chip_rate_hz;
         // The code's error turns once while the code passes a sample; what is quicker than the loop averages.
-        let cycles_per_chip = signal.carrier_hz / component.chip_rate_hz;
+        let cycles_per_chip = signal.centre_hz() / component.chip_rate_hz;
         let slow_hz = cycles_per_chip * settings.tracking.dll_bandwidth_hz / samples_per_chip;
         (bias_m > STANDING_BIAS_M).then(|| {
             format!(
@@ -170,7 +170,7 @@ pub(super) fn warnings(metadata: &IfMetadata, settings: &Settings) -> Vec<String
 /// Real samples whose carriers meet their own image: at 0 Hz or half the rate a carrier above and one below look alike.
 fn image(metadata: &IfMetadata, signal: &Signal, doppler_max_hz: f64) -> Option<String> {
     let half_hz = 0.5 * metadata.rate.hz();
-    let if_hz = metadata.if_hz(signal);
+    let if_hz = metadata.if_hz(signal.centre_hz());
     let image_hz = half_hz * (if_hz / half_hz).round();
     let near = !metadata.format.is_complex() && (if_hz - image_hz).abs() < doppler_max_hz;
     near.then(|| {
@@ -189,17 +189,14 @@ fn image(metadata: &IfMetadata, signal: &Signal, doppler_max_hz: f64) -> Option<
 
 /// Signals and satellites that the samples can hold; with `reserved` also codes that no satellite of the
 /// constellation sends.
-pub(super) fn candidates(metadata: &IfMetadata, reserved: bool) -> Vec<(&'static Signal, Sv)> {
+pub(super) fn candidates(metadata: &IfMetadata, reserved: bool) -> Vec<Link> {
     let half_hz = 0.5 * metadata.rate.hz();
     SIGNALS
         .into_iter()
         // A real recording's IF may lie beyond half the rate on purpose.
-        .filter(|signal| !metadata.format.is_complex() || metadata.if_hz(signal).abs() <= half_hz)
-        .flat_map(|signal| signal.satellites().map(move |sv| (signal, sv)))
-        .filter(|(signal, sv)| {
-            let [first, last] = signal.constellation;
-            reserved || (first..=last).contains(&sv.number)
-        })
+        .filter(|signal| !metadata.format.is_complex() || metadata.if_hz(signal.centre_hz()).abs() <= half_hz)
+        .flat_map(|signal| signal.satellites().map(move |sv| signal.link(sv)))
+        .filter(|link| reserved || link.is_of_constellation())
         .collect()
 }
 
@@ -273,7 +270,7 @@ impl Reception {
                 let needed = acquire::least_samples(metadata, &settings.acquisition)?;
                 Stage::NothingSearched { samples: count, needed }
             };
-            let if_hz = SIGNALS.first().map_or(0.0, |signal| metadata.if_hz(signal));
+            let if_hz = SIGNALS.first().map_or(0.0, |signal| metadata.if_hz(signal.centre_hz()));
             let format = metadata.format.name();
             let (rate_hz, acquired) = (metadata.rate.hz(), outcome.acquired.len());
             let mut diagnosis = Diagnosis::new(stage, seconds, rate_hz, format, if_hz, cut_bytes, acquired);

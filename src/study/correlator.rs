@@ -226,12 +226,12 @@ impl<'a> Channel<'a> {
         let cn0_hz = case.cn0_dbhz.map(|dbhz| libm::pow(10.0, dbhz / 10.0));
         Self {
             case,
-            truth: Truth::new(&case.motion, case.oscillator.as_ref(), case.signal.carrier_hz, period_s, case.seed),
+            truth: Truth::new(&case.motion, case.oscillator.as_ref(), case.signal.centre_hz(), period_s, case.seed),
             normals: Normals::new(case.seed, Purpose::Thermal),
             covariance: Covariance::new(&case.correlation, case.settings.spacing_chips),
             amplitude: (2.0 * period_s * cn0_hz.unwrap_or(1.0) / case.correlation.value(0.0)).sqrt(),
             noisy: cn0_hz.is_some(),
-            chips_per_cycle: chip_rate_hz / case.signal.carrier_hz,
+            chips_per_cycle: chip_rate_hz / case.signal.centre_hz(),
             period_s,
             group,
             periods: case.mode.periods_per_update(&case.settings, group),

@@ -24,7 +24,7 @@ use crate::generator::truth;
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::Link;
 use crate::receiver::acquire::{self, AcquireError, AcquisitionSettings, Searcher, samples_needed};
 use crate::receiver::source::Block;
 
@@ -234,7 +234,7 @@ pub fn detections(
         let offset_hz = step_hz * OFFSETS[made as usize % OFFSETS.len()];
         // What appears at 0 Hz is told wrong by the Doppler, but for the offset.
         let told = IfMetadata { center_hz: metadata.center_hz - doppler_hz + offset_hz, ..metadata.clone() };
-        let rows = Searcher::new(&told, settings).and_then(|mut s| s.search(block, &[(&L1_CA, Sv::gps(PRESENT))]));
+        let rows = Searcher::new(&told, settings).and_then(|mut s| s.search(block, &[L1_CA.link(Sv::gps(PRESENT))]));
         match rows {
             Ok(rows) => {
                 made += 1;
@@ -272,8 +272,7 @@ pub fn false_alarms(
     seed: u64,
     writer: &mut truth::Writer,
 ) -> Result<Row, DetectionError> {
-    let absent: Vec<(&'static Signal, Sv)> =
-        (1..=32).filter(|prn| *prn != PRESENT).map(|prn| (&L1_CA as &'static Signal, Sv::gps(prn))).collect();
+    let absent: Vec<Link> = (1..=32).filter(|prn| *prn != PRESENT).map(|prn| L1_CA.link(Sv::gps(prn))).collect();
     let stretches = trials.div_ceil(absent.len() as u32);
     let metadata = scene(ABSENT_DBHZ, seed, 1.0)?.metadata;
     let stretch = samples_needed(&metadata, settings)? as usize;

@@ -61,7 +61,7 @@ pub fn level(settings: &TrackingSettings, noise: &PowerLaw, cn0_dbhz: f64, durat
     let phase_deg = 360.0 * predicted(expect::phase_cycles(&tracking));
     let system = expect::carrier_loop(settings, Mode::Phase, tracking.update_s()).linear();
     let oscillator_deg =
-        oscillator::jitter_discrete_rad(noise, tracking.signal.carrier_hz, &system, tracking.update_s()).to_degrees();
+        oscillator::jitter_discrete_rad(noise, tracking.signal.centre_hz(), &system, tracking.update_s()).to_degrees();
     let hours = thermal.phase_cycles.count as f64 * tracking.update_s() / 3600.0;
     let degrees = |cycles: Option<f64>| cycles.map(|cycles| 360.0 * cycles);
     Level {
@@ -83,7 +83,7 @@ pub fn level(settings: &TrackingSettings, noise: &PowerLaw, cn0_dbhz: f64, durat
 ///
 /// The simulated one is `None` where the loop lets go within four seconds.
 pub fn jerk_stress_deg(settings: &TrackingSettings, jerk_mps3: f64) -> (f64, Option<f64>) {
-    let jerk_hz_s2 = jerk_mps3 / l1ca::L1_CA.wavelength_m();
+    let jerk_hz_s2 = jerk_mps3 / l1ca::L1_CA.wavelength_m(crate::gnss::satellite::Sv::gps(1));
     let mut case = Case { settle_s: 0.0, duration_s: 4.0, ..channel(settings, Mode::Phase, None) };
     case.motion.steps.push(super::motion::Step { at_s: 0.0, rate_step_hz_s: 0.0, jerk_hz_s2 });
     let gains = Gains::design(settings.pll_order, settings.pll_bandwidth_hz * case.update_s());

@@ -145,7 +145,7 @@ fn an_oscillator_adds_the_jitter_of_its_spectrum() {
             ..channel(&TrackingSettings::default(), Mode::Phase, None)
         };
         let system = expect::carrier_loop(&case.settings, case.mode, case.update_s()).linear();
-        let expected = jitter_discrete_rad(&noise, case.signal.carrier_hz, &system, case.update_s());
+        let expected = jitter_discrete_rad(&noise, case.signal.centre_hz(), &system, case.update_s());
         let found = run(&case).phase_cycles.sigma().unwrap() * std::f64::consts::TAU;
         println!("{noise:?}: {:.4} deg, expected {:.4}", found.to_degrees(), expected.to_degrees());
         // About B·t = 18 000 values: 0.5 %; flicker's bank is true to 1 % and its span ends at half the rate

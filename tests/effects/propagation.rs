@@ -79,7 +79,7 @@ fn slopes_that_step_cost_few_knots() {
             scene.clock.rate,
             Vec::new(),
             scene.fidelity.knot_tolerance_cycles,
-            signal.carrier_hz,
+            signal.centre_hz(),
         );
         let until = scene.samples / grid.root_samples();
         for sv in scene.catalogue.satellites() {

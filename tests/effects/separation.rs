@@ -42,8 +42,8 @@ fn periods(scene: &Scene, sv: Sv) -> Vec<Period> {
             samples,
             chip: (sent.fraction() * 1000.0).fract() * 1023.0,
             chip_step: later.since(sent) * 1.023e6 / samples as f64,
-            turns: scene.metadata.if_hz(&L1_CA) * first as f64 / rate_hz - carrier,
-            turns_step: scene.metadata.if_hz(&L1_CA) / rate_hz - (after - carrier) / samples as f64,
+            turns: scene.metadata.if_hz(L1_CA.centre_hz()) * first as f64 / rate_hz - carrier,
+            turns_step: scene.metadata.if_hz(L1_CA.centre_hz()) / rate_hz - (after - carrier) / samples as f64,
         });
         n = first + samples as u64 / 2;
     }

@@ -148,7 +148,7 @@ fn epochs_of_prime_and_odd_lengths_give_the_same_peaks() {
         let scene = run::only(scene, &up);
         let bytes = run::samples(&scene);
         let (i, q) = run::planes(&scene, &bytes);
-        let candidates: Vec<_> = up.iter().map(|sv| (&L1_CA, *sv)).collect();
+        let candidates: Vec<_> = up.iter().map(|sv| L1_CA.link(*sv)).collect();
         let block = Block { first: 0, i: &i, q: &q };
         for (row, hit) in search(&scene.metadata, &block, &candidates, &Default::default()).unwrap() {
             of += 1;
@@ -158,7 +158,7 @@ fn epochs_of_prime_and_odd_lengths_give_the_same_peaks() {
             // The direct correlation, cell by cell of a third of a chip, over the first two code periods.
             let Some(hit) = hit.filter(|_| up[..2].contains(&row.sv)) else { continue };
             let replica = Replica::new(l1ca::code(row.sv.number).unwrap(), Edge::Area).unwrap();
-            let step = 1.023e6 / rate_hz * (1.0 + hit.doppler_hz / L1_CA.carrier_hz);
+            let step = 1.023e6 / rate_hz * (1.0 + hit.doppler_hz / L1_CA.centre_hz());
             let turns = hit.doppler_hz / rate_hz;
             let periods = |k: usize| (k as f64 * rate_hz / 1e3).round() as usize;
             let power = |cell: u32| -> f64 {

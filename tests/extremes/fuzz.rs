@@ -33,7 +33,7 @@ impl Period {
         let rate_hz = scene.clock.rate.hz();
         let seen = |n: u64| {
             let seen = truth::seen(scene, sv, &L1_CA, scene.clock.epoch(n)).unwrap()?;
-            Some(seen.arrivals[0].rippled(ripple::at(scene, Some(sv), &L1_CA, n as f64)))
+            Some(seen.arrivals[0].rippled(ripple::at(scene, Some(sv), L1_CA.centre_hz(), n as f64)))
         };
         let sent = |n: u64, delay_s: f64| scene.clock.epoch(n).plus_s(-delay_s);
         let into_s = (sent(near, seen(near)?.delay_s).fraction() * 1e3).fract() * 1e-3;
@@ -57,7 +57,7 @@ impl Period {
     /// Mean of the samples against a replica of nearest chips, by definition.
     pub fn prompt(&self, scene: &Scene, sv: Sv, i: &[f32], q: &[f32]) -> Complex64 {
         let code = l1ca::code(sv.number).unwrap();
-        let if_hz = scene.metadata.if_hz(&L1_CA);
+        let if_hz = scene.metadata.if_hz(L1_CA.centre_hz());
         let sense = if scene.metadata.inverted { 1.0 } else { -1.0 };
         let mut sum = Complex64::ZERO;
         for k in 0..self.samples {
@@ -78,7 +78,7 @@ impl Period {
     /// at twice the IF, which meets the dips that such edges leave, coherently near a multiple of half the chip rate.
     fn phasor(&self, scene: &Scene, sv: Sv, x: &[f32]) -> Complex64 {
         let code = l1ca::code(sv.number).unwrap();
-        let if_hz = scene.metadata.if_hz(&L1_CA);
+        let if_hz = scene.metadata.if_hz(L1_CA.centre_hz());
         let sense = if scene.metadata.inverted { 1.0 } else { -1.0 };
         let step = (Self::at(self.chips, 1.0) - Self::at(self.chips, 0.0)) / self.samples as f64;
         let chip = |place: f64| if code[place.rem_euclid(1023.0) as usize % 1023] { -1.0 } else { 1.0 };
@@ -216,9 +216,9 @@ fn departures(text: &str, share: f64) -> Result<Option<[f64; 4]>, TestCaseError>
     }
     for one in &seen {
         let (arrival, ray) = (one.arrivals[0], one.rays[0]);
-        let parted = (arrival.delay_s - arrival.carrier_cycles / L1_CA.carrier_hz)
+        let parted = (arrival.delay_s - arrival.carrier_cycles / L1_CA.centre_hz())
             - (ray.code_delay_s - ray.carrier_delay_s)
-            + ray.phase_cycles / L1_CA.carrier_hz;
+            + ray.phase_cycles / L1_CA.centre_hz();
         parted_m = parted_m.max((parted * SPEED_OF_LIGHT_MPS).abs());
     }
     let phasor = if alone.metadata.format.is_complex() { prompt } else { period.phasor(&alone, sv, &i) };

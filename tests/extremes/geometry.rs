@@ -272,7 +272,7 @@ fn of_two_signals_of_one_satellite_the_stronger_is_found() {
         let bytes = run::samples(&scene);
         let (i, q) = run::planes(&scene, &bytes);
         let block = Block { first: 0, i: &i, q: &q };
-        let rows = acquire::search(&scene.metadata, &block, &[(&L1_CA, sv)], &Default::default()).unwrap();
+        let rows = acquire::search(&scene.metadata, &block, &[L1_CA.link(sv)], &Default::default()).unwrap();
         let hit = rows[0].1.expect("found");
         let (channel, report) = run::track(&scene, &bytes, &hit, &TrackingSettings::default(), 400_000);
         let last = report.measurements.last().unwrap();

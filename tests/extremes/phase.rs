@@ -72,7 +72,7 @@ fn code_and_carrier_stay_together_for_an_hour_and_the_ionosphere_parts_them_by_t
             let parted = signed(reading.wrapping_sub(sent).wrapping_sub(tone).wrapping_add(carrier));
             let seen = truth::seen(&scene, sv, &L1_CA, scene.clock.epoch(first)).unwrap().unwrap();
             let ray = seen.rays[0];
-            let expected = (ray.code_delay_s - ray.carrier_delay_s) * L1_CA.carrier_hz;
+            let expected = (ray.code_delay_s - ray.carrier_delay_s) * L1_CA.centre_hz();
             let error = parted - expected;
             worst = worst.max((error - error.round()).abs());
             checked += 1;

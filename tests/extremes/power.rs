@@ -4,6 +4,7 @@ use gnss_twin::generator::scene::Scene;
 use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
 use gnss_twin::gnss::record::Event;
 use gnss_twin::gnss::satellite::Sv;
+use gnss_twin::gnss::signal::Link;
 use gnss_twin::receiver::acquire::{AcquisitionSettings, Searcher, search};
 use gnss_twin::receiver::correlate::{Edge, Nco, Replica, chips_to_units};
 use gnss_twin::receiver::settings::Settings;
@@ -15,8 +16,8 @@ use crate::run::{self, Received};
 
 const FRONT: &str = "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n";
 
-fn all() -> Vec<(&'static gnss_twin::gnss::signal::Signal, Sv)> {
-    L1_CA.satellites().map(|sv| (&L1_CA, sv)).collect()
+fn all() -> Vec<Link> {
+    L1_CA.satellites().map(|sv| L1_CA.link(sv)).collect()
 }
 
 #[test]
@@ -232,7 +233,7 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
     let authentic = gnss_twin::generator::spoof::Constellation::authentic();
     let (row, ..) =
         gnss_twin::generator::truth::observe(&still, &authentic, sv, &L1_CA, 3 * 2_600_000, 0.0).unwrap().unwrap();
-    let wave_hz = -227e3 * (1.0 + row.doppler_hz / L1_CA.carrier_hz) + row.doppler_hz;
+    let wave_hz = -227e3 * (1.0 + row.doppler_hz / L1_CA.centre_hz()) + row.doppler_hz;
     let scene = jammed(&format!("kind = \"cw\"\noffset_hz = {wave_hz:.3}\njs_db = 30\non_s = 3\n"), 6.0, &front);
     let up: Vec<Sv> = [sv].into_iter().chain(run::in_view(&scene).into_iter().filter(|up| *up != sv).take(3)).collect();
     let scene = run::only(scene, &up);

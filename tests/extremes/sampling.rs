@@ -256,7 +256,7 @@ fn folded_and_mirrored_bands_give_the_doppler_its_sign() {
         let bytes = run::samples(&scene);
         let (i, q) = run::planes(&scene, &bytes);
         let row =
-            search(&scene.metadata, &Block { first: 0, i: &i, q: &q }, &[(&L1_CA, sv)], &Default::default()).unwrap();
+            search(&scene.metadata, &Block { first: 0, i: &i, q: &q }, &[L1_CA.link(sv)], &Default::default()).unwrap();
         let truth_hz = run::hit(&scene, sv, 0.0, 0.0).doppler_hz;
         of += 1;
         let Some(hit) = row[0].1 else { continue };

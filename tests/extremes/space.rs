@@ -36,7 +36,7 @@ fn doppler_hz(scene: &Scene, sv: Sv, sample: u64, second_order: bool) -> f64 {
     let (v_user, v_from) = (ahead.dot(&user) / c, ahead.dot(&from) / c);
     let clocks = (1.0 + seen.emission.satellite_clock_drift) / (1.0 + scene.receiver_clock.drift);
     let motion = if second_order { (1.0 + v_user) / (1.0 + v_from) } else { 1.0 + v_user - v_from };
-    L1_CA.carrier_hz * (clocks * motion - 1.0)
+    L1_CA.centre_hz() * (clocks * motion - 1.0)
 }
 
 /// Largest departure of the truth's Doppler from the equation, largest Doppler, largest second-order term, Doppler rate.
@@ -77,7 +77,7 @@ fn found(name: &str, scene: &Scene, least_dbhz: f64) -> (usize, usize, usize) {
     let settings = run::settings(&text(name));
     let bytes = run::part(scene, 0..200_000, tempfile::tempdir().unwrap().path());
     let (i, q) = run::planes(scene, &bytes);
-    let all: Vec<_> = L1_CA.satellites().map(|sv| (&L1_CA, sv)).collect();
+    let all: Vec<_> = L1_CA.satellites().map(|sv| L1_CA.link(sv)).collect();
     let rows = search(&scene.metadata, &Block { first: 0, i: &i, q: &q }, &all, &settings.acquisition).unwrap();
     let up = run::in_view(scene);
     let (mut held, mut of) = (0, 0);

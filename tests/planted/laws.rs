@@ -106,8 +106,8 @@ impl Ideal {
             sent_s: sent.seconds(),
             sent_fraction_s: sent.fraction(),
             pseudorange_m: SPEED_OF_LIGHT_MPS * delay_s,
-            carrier_cycles: delay_s * L1_CA.carrier_hz,
-            doppler_hz: -L1_CA.carrier_hz * rate,
+            carrier_cycles: delay_s * L1_CA.centre_hz(),
+            doppler_hz: -L1_CA.centre_hz() * rate,
             cn0_dbhz: CN0_DBHZ,
             locked_s: 10.0,
         })
@@ -278,7 +278,7 @@ fn smoothing_leaves_the_variance_that_it_states() {
             last = Some(smoother.smooth(&Observation {
                 sample: u64::from(k) * 100_000,
                 pseudorange_m: range_m + error_m,
-                carrier_cycles: range_m / L1_CA.wavelength_m(),
+                carrier_cycles: range_m / L1_CA.wavelength_m(Sv::gps(1)),
                 locked_s: 1.0 + interval_s * f64::from(k),
                 ..base.clone()
             }));
@@ -314,10 +314,10 @@ fn the_link_budget_loses_power_as_friis_says() {
     let sv = ideal.observations(SAMPLE)[0].sv;
     let (found, _) = ideal.arriving(sv, ideal.clock.epoch(SAMPLE)).unwrap();
     let budget = LinkBudget { block: gnss_twin::generator::effect::transmit::Block::Typical, ..LinkBudget::default() };
-    let near = budget.cn0_dbhz(&found.sight, L1_CA.carrier_hz);
+    let near = budget.cn0_dbhz(&found.sight, L1_CA.centre_hz());
     let mut farther = found.sight.clone();
     farther.range_m *= 10.0;
-    let lost_db = near - budget.cn0_dbhz(&farther, L1_CA.carrier_hz);
+    let lost_db = near - budget.cn0_dbhz(&farther, L1_CA.centre_hz());
     assert!((lost_db - 20.0).abs() < 1e-9, "{lost_db} dB over ten times the range");
 }
 

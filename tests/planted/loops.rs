@@ -123,7 +123,7 @@ fn carriers_beside_codes(directory: &Path) -> Vec<String> {
     for row in table.deserialize::<Observation>().map(Result::unwrap) {
         if let Some(last) = before.insert(row.sv, row.clone()) {
             let code_m = row.pseudorange_m - last.pseudorange_m;
-            let carrier_m = (row.carrier_cycles - last.carrier_cycles) * row.signal.wavelength_m();
+            let carrier_m = (row.carrier_cycles - last.carrier_cycles) * row.signal.wavelength_m(row.sv);
             // Twice what a slant ionosphere changes by in 0.1 s: at 0.05 m/s, ten times a steep one.
             if (code_m - carrier_m).abs() > 0.01 {
                 let apart_m = code_m - carrier_m;

@@ -3,7 +3,7 @@
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::samples::{Format, IfMetadata};
 use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::Signal;
+use gnss_twin::gnss::signal::Link;
 use gnss_twin::gnss::time::Rate;
 use gnss_twin::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
 use gnss_twin::receiver::source::Block;
@@ -13,11 +13,11 @@ use super::data::external;
 
 fn metadata(format: Format, rate_hz: f64, if_hz: f64) -> IfMetadata {
     let rate = Rate::from_hz(rate_hz).unwrap();
-    IfMetadata { format, rate, center_hz: L1_CA.carrier_hz - if_hz, inverted: false, start: None }
+    IfMetadata { format, rate, center_hz: L1_CA.centre_hz() - if_hz, inverted: false, start: None }
 }
 
-fn candidates() -> Vec<(&'static Signal, Sv)> {
-    (1..=32).map(|prn| (&L1_CA, Sv::gps(prn))).collect()
+fn candidates() -> Vec<Link> {
+    (1..=32).map(|prn| L1_CA.link(Sv::gps(prn))).collect()
 }
 
 fn acquire(metadata: &IfMetadata, i: &[f32], q: &[f32], settings: &AcquisitionSettings) -> Vec<Acquired> {

@@ -162,14 +162,14 @@ impl Expectations {
         observed: &impl Observed,
     ) -> Result<Satellite, JudgeError> {
         let sky: HashMap<u64, (f64, f64)> =
-            run.sky.map(link.0, |row| (row.sample, (row.azimuth_deg, row.elevation_deg)))?.into_iter().collect();
+            run.sky.map(link.sv, |row| (row.sample, (row.azimuth_deg, row.elevation_deg)))?.into_iter().collect();
         let rows: Vec<(u64, Row)> = run.truth.map(link, |row| {
             let elevation_deg = sky.get(&row.sample).map_or(90.0, |(_, elevation_deg)| *elevation_deg);
             let expected = Row {
                 time_s: run.time_s(row.sample),
                 cn0_dbhz: row.cn0_dbhz,
                 effective_dbhz: access.effective_dbhz(&row) - self.receiver.cost_db,
-                strongest_dbhz: run.strongest_dbhz(row.sample, link.1),
+                strongest_dbhz: run.strongest_dbhz(row.sample, link.signal),
                 doppler_hz: row.doppler_hz,
                 above_mask: in_space || elevation_deg >= self.receiver.mask_deg,
             };
@@ -178,14 +178,14 @@ impl Expectations {
         let strengths: Vec<f64> = rows.iter().map(|(_, row)| row.cn0_dbhz).collect();
         let usual_dbhz = median(&strengths).unwrap_or(0.0);
         let healthy =
-            !run.truth_navigation.iter().any(|row| row.sv == link.0 && row.parameter == "health" && row.raw != 0)
+            !run.truth_navigation.iter().any(|row| row.sv == link.sv && row.parameter == "health" && row.raw != 0)
                 || run.scene.faults.iter().any(|fault| fault.kind == "health");
         let plain: Vec<Row> = rows.iter().map(|(_, row)| *row).collect();
-        let required = scene.required(link.0, &plain, usual_dbhz, healthy);
+        let required = scene.required(link.sv, &plain, usual_dbhz, healthy);
         let seen = observed.samples(link)?;
         let mut one = Satellite { epochs: rows.len(), usual_dbhz, ..Satellite::default() };
         one.doppler_hz = plain.iter().map(|row| row.doppler_hz.abs()).fold(0.0, f64::max);
-        let excuses: Vec<Excuse> = plain.iter().filter_map(|row| scene.excuse(link.0, row, usual_dbhz)).collect();
+        let excuses: Vec<Excuse> = plain.iter().filter_map(|row| scene.excuse(link.sv, row, usual_dbhz)).collect();
         one.excuse = excuses.get(excuses.len() / 2).copied();
         let measured = self.measured();
         for ((sample, row), required) in rows.iter().zip(&required) {

@@ -47,7 +47,7 @@ pub struct Receiver {
 impl Receiver {
     /// Of the receiver whose settings a run kept.
     pub fn of(run: &Run) -> Self {
-        let signal = run.truth.keys().next().map(|(_, signal)| signal);
+        let signal = run.truth.keys().next().map(|link| link.signal);
         let settings = run.receiver.get("settings").unwrap_or(&run.receiver);
         Self { cost_db: front_end_cost_db(run), ..Self::new(settings, signal) }
     }

@@ -119,7 +119,7 @@ impl Links {
     fn put(&mut self, figure: Figure, link: Link, value: f64, limit: f64) {
         let lower = matches!(figure, Figure::Below(_) | Figure::RawBelow(_));
         let over = |value: f64, limit: f64| if lower { limit / value.max(1e-300) } else { value / limit };
-        let new = Worst { sv: link.0.to_string(), value, limit };
+        let new = Worst { sv: link.sv.to_string(), value, limit };
         match self.worst.get(&figure) {
             Some(old) if over(old.value, old.limit) >= over(value, limit) => {}
             _ => {

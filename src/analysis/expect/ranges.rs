@@ -59,7 +59,7 @@ impl Choices {
 /// Time of a loop's update in the tracking stage, by the settings.
 pub fn update_s(run: &Run) -> Option<f64> {
     // Counted in code periods, of a millisecond where a signal names none.
-    let period_s = run.truth.keys().find_map(|(_, signal)| Some(signal.components.first()?.period_s()));
+    let period_s = run.truth.keys().find_map(|Link { signal, .. }| Some(signal.components.first()?.period_s()));
     run.tracking_setting("integration").map(|count| count * period_s.unwrap_or(1e-3)).or(run.update_s)
 }
 
@@ -175,20 +175,20 @@ impl<'r> Scene<'r> {
             return Ok(());
         };
         let truth: HashMap<u64, Observation> = self.run.truth.map(link, |row| (row.sample, row))?.into_iter().collect();
-        let sky: HashMap<u64, SkyRow> = self.run.sky.map(link.0, |row| (row.sample, row))?.into_iter().collect();
+        let sky: HashMap<u64, SkyRow> = self.run.sky.map(link.sv, |row| (row.sample, row))?.into_iter().collect();
         let rays = self.rays(link, &theory)?;
         let smoothing = || Smoothing::new(self.choices.smoothing_s, self.choices.loops.dll_bandwidth_hz);
         let (mut parting, mut reflected) = (smoothing(), smoothing());
         let mut atmosphere = Rate::default();
         errors.signals.each(link, |row| {
             let (Some(true_row), Some(sky)) = (truth.get(&row.sample), sky.get(&row.sample)) else { return };
-            let parted_m = true_row.pseudorange_m - link.1.wavelength_m() * true_row.carrier_cycles;
+            let parted_m = true_row.pseudorange_m - link.wavelength_m() * true_row.carrier_cycles;
             let ray_m = rays.get(&row.sample).copied().unwrap_or(0.0);
             let smooth = parting.take(row.time_s, row.locked_s, parted_m + ray_m);
             let bounced = reflected.take(row.time_s, row.locked_s, ray_m.abs());
             let rate_mps = atmosphere.of(row.time_s, sky.troposphere_m - sky.ionosphere_m);
             let Some(&fix) = self.fixes.get(&row.sample) else { return };
-            if !self.usable(link.0, row.sample) {
+            if !self.usable(link.sv, row.sample) {
                 return;
             }
             let Some(one) = self.one(&theory, &row, true_row, sky) else { return };
@@ -230,7 +230,7 @@ impl<'r> Scene<'r> {
         let ionosphere_m = match self.message.klobuchar.filter(|_| user.height_m <= IONOSPHERE_TOP_M) {
             // A correction of what the scene does not have is an error, not an expectation.
             Some(model) if self.choices.ionosphere && sky.ionosphere_m != 0.0 => {
-                SPEED_OF_LIGHT_MPS * model.delay_s(user, look, place.time(), true_row.signal.carrier_hz)
+                SPEED_OF_LIGHT_MPS * model.delay_s(user, look, place.time(), true_row.link().carrier_hz())
             }
             _ => 0.0,
         };
@@ -247,9 +247,9 @@ impl<'r> Scene<'r> {
             ionosphere_m,
             troposphere_m: sky.troposphere_m,
             noise_m2: (code * theory.chip_m) * (code * theory.chip_m),
-            other_m2: self.edge_m2(true_row.doppler_hz, true_row.signal.carrier_hz),
+            other_m2: self.edge_m2(true_row.doppler_hz, true_row.link().carrier_hz()),
             memory_s: 0.0,
-            rate_sigma_mps: rate_hz * true_row.signal.wavelength_m(),
+            rate_sigma_mps: rate_hz * true_row.link().wavelength_m(),
             rate_bias_mps: 0.0,
             cn0_hz,
             steady: (row.cn0_dbhz - row.cn0_effective_dbhz + self.cost_db).abs() <= CN0_DB,

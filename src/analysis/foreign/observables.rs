@@ -175,7 +175,7 @@ fn join<'a>(
         for ((sv, code), values) in &epoch.values {
             let signal = SIGNALS.iter().find(|signal| signal.system == sv.system && signal.rinex == code);
             let Some(signal) = signal else { continue };
-            let link = (*sv, *signal);
+            let link = Link { sv: *sv, signal };
             if let Some(truth) = timeline.state(&link, label_s - late_s) {
                 pairs.push(Pair { epoch: number, label_s, link, values, truth });
             }
@@ -223,12 +223,12 @@ fn time_tag(pairs: &[Pair<'_>]) -> Option<Estimate> {
         let Some(common_m) = epoch.first().and_then(|first| common_m.get(&first.epoch)) else { continue };
         let with_code: Vec<&Pair<'_>> =
             epoch.iter().filter(|pair| pair.code_m().is_some_and(|error| (error - common_m).abs() < 1e6)).collect();
-        let speed = |pair: &Pair<'_>| pair.link.1.wavelength_m() * pair.truth.doppler_hz;
+        let speed = |pair: &Pair<'_>| pair.link.wavelength_m() * pair.truth.doppler_hz;
         let Some(speed_mean) = mean(&with_code.iter().map(|pair| speed(pair)).collect::<Vec<_>>()) else { continue };
         points.extend(
             with_code
                 .iter()
-                .filter_map(|pair| Some((pair.link.0, speed(pair) - speed_mean, pair.code_m()? - common_m))),
+                .filter_map(|pair| Some((pair.link.sv, speed(pair) - speed_mean, pair.code_m()? - common_m))),
         );
     }
     slope(&points)
@@ -276,13 +276,13 @@ fn doppler_and_strength(measured: &mut Measured, pairs: &[Pair<'_>]) {
         let found = mean(&both.iter().map(|(_, value)| *value).collect::<Vec<_>>());
         let truth = mean(&both.iter().map(|(pair, _)| pair.truth.doppler_hz).collect::<Vec<_>>());
         let Some((found, truth)) = found.zip(truth) else { continue };
-        points.extend(both.iter().map(|(pair, value)| (pair.link.0, pair.truth.doppler_hz - truth, value - found)));
+        points.extend(both.iter().map(|(pair, value)| (pair.link.sv, pair.truth.doppler_hz - truth, value - found)));
     }
     measured.doppler_scale = slope(&points);
     let sign = measured.doppler_sign();
     let offsets: Vec<f64> = pairs
         .iter()
-        .filter_map(|pair| Some((sign * pair.values.doppler_hz? - pair.truth.doppler_hz) / pair.link.1.carrier_hz))
+        .filter_map(|pair| Some((sign * pair.values.doppler_hz? - pair.truth.doppler_hz) / pair.link.carrier_hz()))
         .collect();
     measured.drift_doppler = mean(&offsets).map(|offset| -offset);
     let mut strengths: BTreeMap<Link, Vec<f64>> = BTreeMap::new();
@@ -331,7 +331,7 @@ fn carriers(measured: &mut Measured, pairs: &[Pair<'_>]) -> (Carriers, Arcs) {
     let raw_m = |index: usize| -> f64 {
         let pair = &pairs[index];
         let cycles = sign.unwrap_or(1.0) * pair.values.carrier_cycles.unwrap_or(0.0) - pair.truth.carrier_cycles;
-        cycles * pair.link.1.wavelength_m()
+        cycles * pair.link.wavelength_m()
     };
     // Steps from epoch to epoch of each satellite's carrier; their mean without slips is the clock's.
     let mut steps: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
@@ -349,7 +349,7 @@ fn carriers(measured: &mut Measured, pairs: &[Pair<'_>]) -> (Carriers, Arcs) {
         let Some(first) = epoch.first() else { continue };
         if let Some(found) = steps.get(&first.epoch) {
             let middle = median(found).unwrap_or(0.0);
-            let near = |step: &&f64| (**step - middle).abs() < 0.5 * SLIP_CYCLES * first.link.1.wavelength_m();
+            let near = |step: &&f64| (**step - middle).abs() < 0.5 * SLIP_CYCLES * first.link.wavelength_m();
             let kept: Vec<f64> = found.iter().filter(near).copied().collect();
             let step_m = mean(&kept).unwrap_or(middle);
             level_m += step_m;
@@ -362,7 +362,7 @@ fn carriers(measured: &mut Measured, pairs: &[Pair<'_>]) -> (Carriers, Arcs) {
     measured.drift_carrier = (passed_s > 0.0).then(|| walked_m / passed_s / SPEED_OF_LIGHT_MPS);
     let (mut found, mut arcs): (Carriers, Arcs) = (vec![None; pairs.len()], Vec::new());
     for (link, indices) in &of_link {
-        let wavelength_m = link.1.wavelength_m();
+        let wavelength_m = link.wavelength_m();
         let level =
             |index: usize| (raw_m(index) - clock_m.get(&pairs[index].epoch).copied().unwrap_or(0.0)) / wavelength_m;
         let whole =
@@ -380,7 +380,7 @@ fn carriers(measured: &mut Measured, pairs: &[Pair<'_>]) -> (Carriers, Arcs) {
                     let size = (2.0 * (middle - last)).round() / 2.0;
                     measured.slips.push(Slip {
                         label_s: pairs[*first].label_s,
-                        sv: link.0.to_string(),
+                        sv: link.sv.to_string(),
                         size_cycles: (!declared).then_some(size),
                         declared,
                     });
@@ -472,8 +472,8 @@ fn rows(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BTreeMap<usize, 
         .zip(carriers)
         .map(|(pair, carrier)| Row {
             label_s: pair.label_s,
-            sv: pair.link.0.to_string(),
-            signal: pair.link.1.name,
+            sv: pair.link.sv.to_string(),
+            signal: pair.link.signal.name,
             elevation_deg: pair.truth.elevation_deg,
             code_m: pair.code_m().zip(common_m.get(&pair.epoch)).map(|(error, common)| error - common),
             carrier_cycles: carrier.map(|carrier| carrier.cycles),
@@ -498,9 +498,9 @@ fn satellites(measured: &mut Measured, pairs: &[Pair<'_>], carriers: &Carriers, 
         let own: Vec<&Vec<usize>> =
             arcs.iter().filter(|arc| arc.first().is_some_and(|index| pairs[*index].link == link)).collect();
         let longest = own.iter().max_by_key(|arc| arc.len());
-        let name = link.0.to_string();
+        let name = link.sv.to_string();
         measured.satellites.push(Satellite {
-            signal: link.1.name,
+            signal: link.signal.name,
             epochs: measured.rows.iter().filter(|row| row.link == link).count(),
             elevation_deg: mean(&of(|row| Some(row.elevation_deg))).unwrap_or(f64::NAN),
             code_bias_m: mean(&code),

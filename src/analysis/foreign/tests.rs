@@ -101,8 +101,9 @@ fn write_truth(truth: &Path) {
                 sent_s: sent.seconds(),
                 sent_fraction_s: sent.fraction(),
                 pseudorange_m,
-                carrier_cycles: pseudorange_m / L1_CA.wavelength_m(),
-                doppler_hz: -rate_mps / L1_CA.wavelength_m() * (1.0 - SAMPLER.1) - L1_CA.carrier_hz * SAMPLER.1,
+                carrier_cycles: pseudorange_m / L1_CA.wavelength_m(Sv::gps(1)),
+                doppler_hz: -rate_mps / L1_CA.wavelength_m(Sv::gps(1)) * (1.0 - SAMPLER.1)
+                    - L1_CA.centre_hz() * SAMPLER.1,
                 cn0_dbhz: cn0_dbhz(index),
                 locked_s: reading_s,
             });
@@ -149,9 +150,9 @@ fn rinex(planted: &Planted) -> String {
             let code_m = range_m + SPEED_OF_LIGHT_MPS * clock_s + bias_m + CODE_SIGMA_M * draw.normal();
             // An undeclared half cycle on one satellite, a declared break on another.
             let slip = if index == 3 && k >= 60 { 0.5 } else { 0.0 } + if index == 5 && k >= 90 { 77.25 } else { 0.0 };
-            let carrier = (range_m + SPEED_OF_LIGHT_MPS * clock_s) / L1_CA.wavelength_m() + slip;
+            let carrier = (range_m + SPEED_OF_LIGHT_MPS * clock_s) / L1_CA.wavelength_m(Sv::gps(1)) + slip;
             let carrier = planted.carrier_sign * (carrier + CARRIER_SIGMA * draw.normal()) - 1e8;
-            let doppler = -rate_mps / L1_CA.wavelength_m() - L1_CA.carrier_hz * planted.clock.1;
+            let doppler = -rate_mps / L1_CA.wavelength_m(Sv::gps(1)) - L1_CA.centre_hz() * planted.clock.1;
             let doppler = planted.doppler_sign * (doppler + DOPPLER_SIGMA_HZ * draw.normal());
             let lli = if index == 5 && k == 90 { '1' } else { ' ' };
             let cn0 = cn0_dbhz(index) + planted.cn0_db;

@@ -112,10 +112,10 @@ impl Timeline {
         let mut tracks = BTreeMap::new();
         for link in links {
             let elevations: HashMap<u64, f64> =
-                run.sky.map(link.0, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
+                run.sky.map(link.sv, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
             let node = |row: Observation| {
                 let (t_s, place) = places.get(*at.get(&row.sample)?)?;
-                let carrier_hz = row.signal.carrier_hz;
+                let carrier_hz = row.signal.carrier_hz(row.sv);
                 let state = State {
                     range_m: row.pseudorange_m - SPEED_OF_LIGHT_MPS * place.clock_bias_s,
                     carrier_cycles: row.carrier_cycles - carrier_hz * place.clock_bias_s,
@@ -240,7 +240,7 @@ fn between(link: &Link, a: &(f64, State), b: &(f64, State), t_s: f64) -> State {
     let (near, far) = (&a.1, &b.1);
     let carrier_rise = far.carrier_cycles - near.carrier_cycles;
     let carrier_rates = (-near.doppler_hz, -far.doppler_hz);
-    let wavelength_m = link.1.wavelength_m();
+    let wavelength_m = link.wavelength_m();
     let range_rise = far.range_m - near.range_m;
     let range_rates = (wavelength_m * carrier_rates.0, wavelength_m * carrier_rates.1);
     let line = |x: f64, y: f64| x + (y - x) * u;

@@ -34,16 +34,15 @@ pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
         "nothing is found below the threshold",
     )];
     all.extend(against_truth(run)?);
-    let found: BTreeSet<Link> =
-        run.acquisition.iter().filter(|row| row.acquired).map(|row| (row.sv, row.signal)).collect();
+    let found: BTreeSet<Link> = run.acquisition.iter().filter(|row| row.acquired).map(|row| row.link()).collect();
     let begun: BTreeSet<Link> =
-        run.events.iter().filter(|row| row.event == Event::Acquired).map(|row| (row.sv, row.signal)).collect();
+        run.events.iter().filter(|row| row.event == Event::Acquired).map(|row| row.link()).collect();
     let (mut tracked, mut odd) = (Found::default(), Found::default());
     for link in run.tracking.keys().chain(run.observations.keys()).filter(|link| !found.contains(link)) {
-        tracked.add(|| link.0.to_string());
+        tracked.add(|| link.sv.to_string());
     }
     for link in found.symmetric_difference(&begun) {
-        odd.add(|| link.0.to_string());
+        odd.add(|| link.sv.to_string());
     }
     all.push(Finding::none("satellites tracked that were never found", tracked, "tracking follows a search"));
     all.push(Finding::none(
@@ -64,11 +63,11 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     let mut count = 0;
     for link in run.truth.keys() {
         let searches: Vec<&AcquisitionRow> =
-            run.acquisition.iter().filter(|row| row.acquired && (row.sv, row.signal) == link).collect();
+            run.acquisition.iter().filter(|row| row.acquired && row.link() == link).collect();
         if searches.is_empty() {
             continue;
         }
-        let Some(component) = link.1.components.first() else { continue };
+        let Some(component) = link.signal.components.first() else { continue };
         let truth = run.truth.rows(link)?;
         for row in searches {
             let Some((true_row, after_s)) = near(&truth, row.sample, run.scene.sample_rate_hz) else { continue };
@@ -129,6 +128,6 @@ fn near(truth: &[Observation], sample: u64, rate_hz: f64) -> Option<(&Observatio
 /// Code phase that arrives a little after a row of the truth.
 fn sent_chips(row: &Observation, after_s: f64, chip_rate_hz: f64, code_chips: f64) -> f64 {
     // Periods are whole in a second; the code runs by the Doppler's share faster.
-    let rate = 1.0 + row.doppler_hz * row.signal.wavelength_m() / SPEED_OF_LIGHT_MPS;
+    let rate = 1.0 + row.doppler_hz * row.signal.wavelength_m(row.sv) / SPEED_OF_LIGHT_MPS;
     ((row.sent_fraction_s + after_s * rate) * chip_rate_hz).rem_euclid(code_chips)
 }

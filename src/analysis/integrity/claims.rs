@@ -58,7 +58,7 @@ fn missing(run: &Run) -> Found {
 }
 
 fn strangers(run: &Run) -> Found {
-    let there: BTreeSet<Sv> = run.truth.keys().map(|(sv, _)| sv).chain(run.sky.keys()).collect();
+    let there: BTreeSet<Sv> = run.truth.keys().map(|Link { sv, .. }| sv).chain(run.sky.keys()).collect();
     let senders: BTreeSet<Sv> = run.navigation.iter().map(|row| row.sv).collect();
     let mut found = Found::default();
     for sv in senders.difference(&there) {
@@ -72,7 +72,7 @@ fn order(run: &Run) -> Result<Found, JudgeError> {
     let mut reached: BTreeMap<Link, BTreeMap<u8, u64>> = BTreeMap::new();
     let mut found = Found::default();
     for row in &run.events {
-        let steps = reached.entry((row.sv, row.signal)).or_default();
+        let steps = reached.entry(row.link()).or_default();
         let stage = match row.event {
             Event::Acquired => Some((1, 0)),
             Event::PhaseLocked => Some((2, 1)),
@@ -92,7 +92,7 @@ fn order(run: &Run) -> Result<Found, JudgeError> {
     for link in run.observations.keys() {
         let framed = reached.get(&link).and_then(|steps| steps.get(&4).copied()).unwrap_or(u64::MAX);
         let early = run.observations.map(link, |row| row.sample)?.into_iter().filter(|sample| *sample < framed);
-        early.for_each(|sample| found.add(|| format!("observation of {} at sample {sample}", link.0)));
+        early.for_each(|sample| found.add(|| format!("observation of {} at sample {sample}", link.sv)));
     }
     Ok(found)
 }

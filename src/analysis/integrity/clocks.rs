@@ -54,16 +54,16 @@ fn locks(run: &Run, link: Link, all: &[Observation], breaks: &mut Found, impossi
     let events: Vec<u64> = run
         .events
         .iter()
-        .filter(|row| (row.sv, row.signal) == link)
+        .filter(|row| row.link() == link)
         .filter(|row| matches!(row.event, Event::LossOfLock | Event::CycleSlip | Event::PhaseLocked | Event::Acquired))
         .map(|row| row.sample)
         .collect();
-    let acquired = run.events.iter().find(|row| (row.sv, row.signal) == link).map_or(0, |row| row.sample);
+    let acquired = run.events.iter().find(|row| row.link() == link).map_or(0, |row| row.sample);
     let mut most_s = 0.0_f64;
     for row in all {
         let since_s = row.sample.saturating_sub(acquired) as f64 / run.scene.sample_rate_hz;
         if row.locked_s > since_s + LOCK_S || row.locked_s < 0.0 {
-            impossible.add(|| format!("{} at sample {}", link.0, row.sample));
+            impossible.add(|| format!("{} at sample {}", link.sv, row.sample));
         }
     }
     for two in all.windows(2) {
@@ -78,7 +78,7 @@ fn locks(run: &Run, link: Link, all: &[Observation], breaks: &mut Found, impossi
         let declared =
             events.iter().any(|at| (two[0].sample.saturating_sub(slack)..=two[1].sample + slack).contains(at));
         if !declared {
-            breaks.add(|| format!("{} at sample {}", link.0, two[1].sample));
+            breaks.add(|| format!("{} at sample {}", link.sv, two[1].sample));
         }
     }
     most_s

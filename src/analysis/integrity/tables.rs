@@ -63,7 +63,7 @@ fn observations(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError
     let values = |row: &Observation| {
         [row.sent_fraction_s, row.pseudorange_m, row.carrier_cycles, row.doppler_hz, row.cn0_dbhz].map(f64::to_bits)
     };
-    let key = link.0.to_string();
+    let key = link.sv.to_string();
     let steps: Vec<f64> = all.windows(2).map(|two| two[1].sample as f64 - two[0].sample as f64).collect();
     let usual = median(&steps).unwrap_or(0.0);
     for (two, step) in all.windows(2).zip(steps) {
@@ -85,11 +85,11 @@ fn observations(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError
 fn tracking(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
     let mut before: Option<TrackingRow> = None;
     let mut steps = Vec::new();
-    let key = link.0.to_string();
+    let key = link.sv.to_string();
     let lost: Vec<u64> = run
         .events
         .iter()
-        .filter(|row| (row.sv, row.signal) == link && matches!(row.event, Event::LossOfLock | Event::Acquired))
+        .filter(|row| row.link() == link && matches!(row.event, Event::LossOfLock | Event::Acquired))
         .map(|row| row.sample)
         .collect();
     run.tracking.each(link, |row| {
@@ -152,7 +152,7 @@ fn short(run: &Run, rows: &mut Rows) {
     }
     let mut events = HashSet::new();
     for row in &run.events {
-        let link = (row.sv, row.signal);
+        let link = row.link();
         if !events.insert((row.sample, link, row.event as u8)) {
             rows.doubled.add(|| format!("event of {} at sample {}", row.sv, row.sample));
         }

@@ -208,7 +208,7 @@ pub(in crate::analysis) struct Theory {
 
 impl Theory {
     pub fn new(run: &Run, settings: Settings, link: &Link, update_s: f64) -> Option<Self> {
-        let chip_rate_hz = link.1.components.first()?.chip_rate_hz;
+        let chip_rate_hz = link.signal.components.first()?.chip_rate_hz;
         let pll = exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s)?;
         let dll = exact_loop(settings.dll_order, settings.dll_bandwidth_hz * update_s)?;
         let width_chips = chip_rate_hz / run.scene.sample_rate_hz;
@@ -218,7 +218,7 @@ impl Theory {
             settings,
             update_s,
             chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
-            carrier_hz: link.1.carrier_hz,
+            carrier_hz: link.carrier_hz(),
             pll: (pll, Response::of(&pll)),
             dll: (dll, Response::of(&dll)),
             peaks: (
@@ -337,7 +337,7 @@ impl Stresses {
             // The Doppler given out is the loop's rate, without the part that only steers the phase.
             found.add(Loop::Fll, errors.map(|[_, cycles]| cycles / t_s));
             // The carrier aids the code: only what parts them is left.
-            found.add(Loop::Dll, dll.error((range_m - carrier_cycles * link.1.wavelength_m()) / theory.chip_m));
+            found.add(Loop::Dll, dll.error((range_m - carrier_cycles * link.wavelength_m()) / theory.chip_m));
         }
         found
     }

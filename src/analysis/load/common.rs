@@ -59,8 +59,8 @@ impl Common {
 
     /// Counts a row of the truth in.
     pub(super) fn add(&mut self, row: &Observation) {
-        let apart_m = row.carrier_cycles * row.signal.wavelength_m() - row.pseudorange_m;
-        let before = self.last.insert((row.sv, row.signal), (row.sample, apart_m));
+        let apart_m = row.carrier_cycles * row.signal.wavelength_m(row.sv) - row.pseudorange_m;
+        let before = self.last.insert(row.link(), (row.sample, apart_m));
         if let Some((sample, before_m)) = before.filter(|(sample, _)| row.sample > *sample) {
             let (sum, count) = self.gains.entry(row.sample).or_default();
             (*sum, *count) = (*sum + (apart_m - before_m) / (row.sample - sample) as f64, *count + 1);

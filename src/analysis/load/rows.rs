@@ -15,7 +15,7 @@ impl Row<Link> for Observation {
         words.push(self.locked_s.to_bits());
     }
 
-    fn take((sv, signal): Link, words: &mut Words<'_>) -> Self {
+    fn take(Link { sv, signal }: Link, words: &mut Words<'_>) -> Self {
         Self {
             sv,
             signal,
@@ -41,7 +41,7 @@ impl Row<Link> for TrackingRow {
         words.extend([self.cn0_dbhz, self.phase_lock, self.integration_s].map(f64::to_bits));
     }
 
-    fn take((sv, signal): Link, words: &mut Words<'_>) -> Self {
+    fn take(Link { sv, signal }: Link, words: &mut Words<'_>) -> Self {
         Self {
             sv,
             signal,
@@ -89,7 +89,7 @@ impl Row<Link> for RayRow {
         words.extend([self.excess_m, self.amplitude_ratio, self.phase_cycles].map(f64::to_bits));
     }
 
-    fn take((sv, signal): Link, words: &mut Words<'_>) -> Self {
+    fn take(Link { sv, signal }: Link, words: &mut Words<'_>) -> Self {
         Self {
             sv,
             signal,
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_row_of_each_kind_comes_back_as_it_was() {
-        let (sv, link) = (Sv::gps(7), (Sv::gps(7), &L1_CA));
+        let (sv, link) = (Sv::gps(7), L1_CA.link(Sv::gps(7)));
         let place = std::path::Path::new("nowhere");
         let observation = Observation {
             sample: 1 << 60,

@@ -70,7 +70,7 @@ impl Cloud {
             let mut shown = points(*link)?;
             shown.retain(|point| (y.from..=y.to).contains(&point.1));
             inside += shown.len();
-            let mut one = Series::numbered(link.0.to_string(), index, shown);
+            let mut one = Series::numbered(link.sv.to_string(), index, shown);
             one.thin(links.len());
             series.push(one);
         }
@@ -93,7 +93,7 @@ pub(super) fn over_time(
 
 /// Satellites by their marks.
 pub(super) fn legend(links: &[Link]) -> Vec<Series> {
-    let one = |(index, link): (usize, &Link)| Series::numbered(link.0.to_string(), index, Vec::new());
+    let one = |(index, link): (usize, &Link)| Series::numbered(link.sv.to_string(), index, Vec::new());
     links.iter().enumerate().map(one).collect()
 }
 
@@ -148,7 +148,7 @@ pub fn cn0(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let finite = rows.iter().flat_map(|row| [row.1, row.2]).filter(|value| value.is_finite());
         let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         all.extend([low, high]);
-        let mut line = Series::numbered(link.0.to_string(), index, rows.iter().map(|row| (row.0, row.2)).collect());
+        let mut line = Series::numbered(link.sv.to_string(), index, rows.iter().map(|row| (row.0, row.2)).collect());
         line.mark = Mark::Line;
         line.thin(links.len());
         above.series.push(line);

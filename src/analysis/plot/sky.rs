@@ -31,7 +31,7 @@ pub fn sky(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let mut places: Vec<(i32, i32)> = run.sky.map(sv, |row| place(row.azimuth_deg, row.elevation_deg))?;
         places.dedup();
         let cn0: Vec<f64> = run.expected.iter().filter(|one| one.sv == sv).map(|one| one.cn0_mean_dbhz).collect();
-        let observed = judged.errors.signals.keys().any(|(seen, _)| seen == sv);
+        let observed = judged.errors.signals.keys().any(|link| link.sv == sv);
         tracks.push(Track { sv, places, cn0_dbhz: mean(&cn0), observed });
     }
     let skyline_deg = run.scene.skyline_deg.clone();

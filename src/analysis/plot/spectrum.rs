@@ -64,7 +64,7 @@ pub fn acquisition(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     chart.x_ticks = Some((0..).zip(best.keys()).map(|(place, sv)| (f64::from(place), tick(*sv))).collect());
     let truly: Vec<(f64, f64)> = (0..)
         .zip(best.values())
-        .filter(|(_, best)| judged.run.truth.keys().any(|(sv, _)| sv == best.sv))
+        .filter(|(_, best)| judged.run.truth.keys().any(|link| link.sv == best.sv))
         .map(|(place, best)| (f64::from(place), best.statistic + 0.03 * top))
         .collect();
     let in_truth = Series::new("in the truth", GREEN, Mark::Cross, truly);

@@ -103,10 +103,10 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
     for link in judged.errors.signals.keys() {
         let rows = judged.errors.signals.rows(link)?;
         let of = |value: fn(&SignalError) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
-        let elevation = judged.run.sky.map(link.0, |row| row.elevation_deg)?;
+        let elevation = judged.run.sky.map(link.sv, |row| row.elevation_deg)?;
         let cn0 = [of(|row| row.cn0_true_dbhz), of(|row| row.cn0_effective_dbhz), of(|row| row.cn0_dbhz)];
         table.row([
-            link.0.to_string(),
+            link.sv.to_string(),
             fixed(mean(&elevation), 1),
             cn0.map(|values| fixed(mean(&values), 1)).join(" / "),
             format!("{} / {}", fixed(mean(&of(|row| row.code_m)), 2), fixed(std(&of(|row| row.code_m)), 2)),
@@ -120,7 +120,7 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
     Ok(())
 }
 
-fn losses(judged: &Judged<'_>, (sv, signal): &Link) -> usize {
+fn losses(judged: &Judged<'_>, Link { sv, signal }: &Link) -> usize {
     let of = |row: &&EventRow| row.sv == *sv && row.signal == *signal && row.event == Event::LossOfLock;
     judged.run.events.iter().filter(of).count()
 }

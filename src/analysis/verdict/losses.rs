@@ -32,7 +32,7 @@ impl Verdict {
         let mut judged: Vec<(&Slip, Option<Excuse>)> = Vec::new();
         for (sv, signal) in links {
             let (Ok(number), Some(known)) = (sv.parse::<Sv>(), Signal::find(signal)) else { continue };
-            let witness = Witness::new(run, receiver, (number, known))?;
+            let witness = Witness::new(run, receiver, Link { sv: number, signal: known })?;
             let own = slips.rows.iter().filter(|row| row.sv == sv && row.signal == signal);
             judged.extend(own.map(|row| (row, witness.excuse(run, receiver, number, row))));
         }
@@ -86,7 +86,7 @@ impl Witness {
             time_s: run.time_s(row.sample),
             cn0_dbhz: row.cn0_dbhz,
             effective_dbhz: access.effective_dbhz(&row) - receiver.cost_db,
-            strongest_dbhz: run.strongest_dbhz(row.sample, link.1),
+            strongest_dbhz: run.strongest_dbhz(row.sample, link.signal),
             doppler_hz: row.doppler_hz,
             above_mask: true,
         })?;

@@ -35,7 +35,7 @@ impl Motion {
         let natural_radps =
             closed.map_or(f64::INFINITY, |closed| natural_radps(&closed, loops.pll_order, choices.update_s));
         let second = if loops.pll_order < 3 { SECOND_ORDER / natural_radps } else { 0.0 };
-        let wavelength_m = run.truth.keys().next().map_or(0.0, |(_, signal)| signal.wavelength_m());
+        let wavelength_m = run.truth.keys().next().map_or(0.0, |link| link.wavelength_m());
         let rows = &run.trajectory;
         let accelerations: Vec<_> = rows
             .windows(2)

@@ -48,7 +48,7 @@ impl Verdict {
         let must = |of: fn(&Satellite) -> bool| expected.satellites.iter().filter(move |(_, one)| of(one));
         let found = must(|one| one.acquired_by_s.is_some()).count();
         let missing: Vec<(&Link, &Satellite)> = must(|one| one.acquired_by_s.is_some())
-            .filter(|(link, _)| !seen.acquired_s.contains_key(&link.0))
+            .filter(|(link, _)| !seen.acquired_s.contains_key(&link.sv))
             .collect();
         if found > 0 {
             let source = format!("{found} in view are strong enough to be found with certainty in their time");
@@ -59,7 +59,7 @@ impl Verdict {
         self.observed(expected, |link, one| seen.why_unobserved(link, one));
         self.used(run, expected, &seen);
         let excused: Vec<String> = must(|one| one.acquired_by_s.is_none() && one.excuse.is_some())
-            .filter_map(|(link, one)| Some(format!("{} ({})", link.0, one.excuse?.word())))
+            .filter_map(|(link, one)| Some(format!("{} ({})", link.sv, one.excuse?.word())))
             .collect();
         if !excused.is_empty() {
             self.not_judged.push(format!("satellites not required: {}", excused.join(", ")));
@@ -76,7 +76,7 @@ impl Verdict {
         let little: Vec<&(&Link, &Satellite)> = due.iter().filter(|(_, one)| one.share() < OBSERVED_SHARE).collect();
         let line = |(link, one): &&(&Link, &Satellite)| {
             let percent = 100.0 * one.share();
-            format!("{}: {} of {} epochs ({percent:.0} %): {}", link.0, one.observed, one.due, why(link, one))
+            format!("{}: {} of {} epochs ({percent:.0} %): {}", link.sv, one.observed, one.due, why(link, one))
         };
         let lines = little.iter().map(line).collect();
         let source = format!("{} must be observed over {:.0} % of their time", due.len(), 100.0 * OBSERVED_SHARE);
@@ -103,10 +103,10 @@ impl Verdict {
         let mut lines: Vec<String> =
             left_out.iter().map(|(name, count)| format!("{name}: excluded from {count} fixes")).collect();
         for (link, one) in expected.satellites.iter().filter(|(_, one)| one.used_due > 0) {
-            if !seen.events.contains(&(link.0, EPHEMERIS)) {
+            if !seen.events.contains(&(link.sv, EPHEMERIS)) {
                 lines.push(format!(
                     "{}: no ephemeris in {:.1} s that were due",
-                    link.0,
+                    link.sv,
                     one.used_due as f64 * expected.receiver.interval_s
                 ));
             }
@@ -154,7 +154,7 @@ impl Seen {
     }
 
     fn why_unobserved(&self, link: &Link, one: &Satellite) -> String {
-        let sv = link.0;
+        let sv = link.sv;
         let Some(acquired_s) = self.acquired_s.get(&sv) else { return "never acquired".to_owned() };
         let mut text = format!("acquired at {acquired_s:.1} s");
         if let Some(lost_s) = self.lost_s.get(&sv) {
@@ -175,7 +175,7 @@ impl Seen {
 
 fn never_found(link: &Link, one: &Satellite, expected: &Expectations) -> String {
     let by_s = one.acquired_by_s.unwrap_or(0.0);
-    let mut text = format!("{}: {:.1} dB-Hz, due by {by_s:.1} s", link.0, one.usual_dbhz);
+    let mut text = format!("{}: {:.1} dB-Hz, due by {by_s:.1} s", link.sv, one.usual_dbhz);
     if let Some(most_hz) = expected.receiver.doppler_max_hz.filter(|most_hz| one.doppler_hz > *most_hz) {
         text += &format!(
             "; its Doppler reaches {:.0} Hz, the search {most_hz:.0} Hz: raise acquisition.doppler_max_hz",

@@ -16,7 +16,7 @@ fn sound(directory: &std::path::Path) -> Run {
     let mut run = Run::read(directory).unwrap();
     observe(&mut run, |_, row| row.sample >= OBSERVED * TICK);
     run.fixes.iter_mut().for_each(|fix| fix.satellites = 9);
-    run.acquisition.retain(|row| run.truth.keys().any(|(sv, _)| sv == row.sv));
+    run.acquisition.retain(|row| run.truth.keys().any(|Link { sv, .. }| sv == row.sv));
     run.events.clear();
     run
 }
@@ -25,7 +25,7 @@ fn sound(directory: &std::path::Path) -> Run {
 fn observe(run: &mut Run, keep: impl Fn(Sv, &Observation) -> bool) {
     let mut kept = Shelf::new(run.truth.directory());
     for link in run.truth.keys().collect::<Vec<Link>>() {
-        for row in run.truth.rows(link).unwrap().iter().filter(|row| keep(link.0, row)) {
+        for row in run.truth.rows(link).unwrap().iter().filter(|row| keep(link.sv, row)) {
             kept.push(link, row).unwrap();
         }
     }
@@ -117,13 +117,13 @@ fn a_scene_that_expects_no_fix_is_judged_by_that_before_during_and_after() {
 fn a_loss_is_excused_for_its_own_satellite_when_that_sets_and_for_no_other() {
     let directory = crate::analysis::tests::planted();
     let mut run = sound(directory.path());
-    let signal = run.truth.keys().next().unwrap().1;
+    let signal = run.truth.keys().next().unwrap().signal;
     let lost =
         |number: u8, tick: u64| EventRow { sample: tick * TICK, sv: Sv::gps(number), signal, event: Event::LossOfLock };
     // G05 sets at 50 s; the receiver notices 0.4 s later.
     let mut truth = Shelf::new(run.truth.directory());
     for link in run.truth.keys().collect::<Vec<Link>>() {
-        let there = |row: &&Observation| link.0 != Sv::gps(5) || row.sample < 500 * TICK;
+        let there = |row: &&Observation| link.sv != Sv::gps(5) || row.sample < 500 * TICK;
         run.truth.rows(link).unwrap().iter().filter(there).for_each(|row| truth.push(link, row).unwrap());
     }
     run.truth = truth;

@@ -275,7 +275,7 @@ fn threshold(freedom: u32, alarm: f64) -> Option<f64> {
 fn cases<'a>(scene: &Scene<'a>, errors: &'a Errors) -> Result<Vec<Case<'a>>, JudgeError> {
     let fixes: HashMap<u64, &Fix> = scene.run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
     let errors_at: HashMap<u64, &PositionError> = errors.positions.iter().map(|error| (error.sample, error)).collect();
-    let wavelength_m = scene.run.truth.keys().next().map(|(_, signal)| signal.wavelength_m());
+    let wavelength_m = scene.run.truth.keys().next().map(|link| link.wavelength_m());
     let one = |expected: Expected| {
         let fix = *fixes.get(&expected.sample)?;
         let error = *errors_at.get(&expected.sample)?;
@@ -379,7 +379,7 @@ impl<'a> Bounded<'a> {
 fn oscillator_mps(run: &Run, choices: &Choices) -> f64 {
     let Some(link) = run.truth.keys().next() else { return 0.0 };
     let theory = Theory::new(run, choices.loops, &link, choices.update_s);
-    theory.map_or(0.0, |theory| theory.oscillator_rate_hz() * link.1.wavelength_m())
+    theory.map_or(0.0, |theory| theory.oscillator_rate_hz() * link.wavelength_m())
 }
 
 /// The five kinds of error.

@@ -52,7 +52,7 @@ impl Effect for KlobucharIonosphere {
     }
 
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
-        let delay_s = self.delay_s(sight.user, sight.look, sight.received, signal.carrier_hz);
+        let delay_s = self.delay_s(sight.user, sight.look, sight.received, signal.carrier_hz(sight.sv));
         for ray in rays {
             ray.code_delay_s += planted!("generator.ionosphere.code", delay_s, 0.9 * delay_s);
             ray.carrier_delay_s -= planted!("generator.ionosphere.carrier_sign", delay_s, -delay_s);

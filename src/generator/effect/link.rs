@@ -112,7 +112,7 @@ impl Effect for LinkBudget {
 
     /// Sets the power of every ray to that of the direct one, and adds the antenna's phase.
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
-        let (cn0_dbhz, phase_cycles) = self.budget(sight, signal.carrier_hz);
+        let (cn0_dbhz, phase_cycles) = self.budget(sight, signal.carrier_hz(sight.sv));
         set_all(rays, cn0_dbhz);
         for ray in rays {
             ray.phase_cycles += phase_cycles;
@@ -194,7 +194,7 @@ pub(crate) mod tests {
             (90.0, 47.905),
         ];
         for (elevation, expected) in table {
-            let found = LinkBudget::default().cn0_dbhz(&sight(elevation, 0.0), L1_CA.carrier_hz);
+            let found = LinkBudget::default().cn0_dbhz(&sight(elevation, 0.0), L1_CA.centre_hz());
             assert!((found - expected).abs() < 1e-3, "{elevation}: {found} {expected}");
         }
     }
@@ -204,7 +204,7 @@ pub(crate) mod tests {
         // IS-GPS-200N, table 3-Va: −158.5 dBW into a 3 dBi linearly polarised antenna above 5°, here 0 dBic.
         for elevation in [5.0, 45.0, 90.0] {
             let budget = LinkBudget { antenna: Antenna::level(Pattern::Isotropic), ..LinkBudget::default() };
-            let received_dbw = budget.cn0_dbhz(&sight(elevation, 0.0), L1_CA.carrier_hz) - 204.0 + 2.5 + 2.0;
+            let received_dbw = budget.cn0_dbhz(&sight(elevation, 0.0), L1_CA.centre_hz()) - 204.0 + 2.5 + 2.0;
             assert!((-158.5..-154.0).contains(&received_dbw), "{elevation}: {received_dbw}");
         }
     }

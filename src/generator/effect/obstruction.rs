@@ -192,7 +192,7 @@ impl Effect for Obstruction {
 
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
         if let Some(direct) = rays.first_mut() {
-            direct.cn0_hz *= self.left(&sight.user_m, sight.look, signal.carrier_hz);
+            direct.cn0_hz *= self.left(&sight.user_m, sight.look, signal.carrier_hz(sight.sv));
         }
     }
 }

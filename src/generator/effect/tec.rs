@@ -133,7 +133,8 @@ impl Effect for ShellIonosphere {
 
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
         let slant_tecu = self.slant_tecu(sight.user, sight.look, sight.received) * share_above(sight.user.height_m);
-        let delay_s = METRES_PER_TECU_HZ2 * slant_tecu / (signal.carrier_hz * signal.carrier_hz) / SPEED_OF_LIGHT_MPS;
+        let carrier_hz = signal.carrier_hz(sight.sv);
+        let delay_s = METRES_PER_TECU_HZ2 * slant_tecu / (carrier_hz * carrier_hz) / SPEED_OF_LIGHT_MPS;
         for ray in rays {
             ray.code_delay_s += delay_s;
             ray.carrier_delay_s -= delay_s;
@@ -146,6 +147,7 @@ mod tests {
     use super::*;
     use crate::generator::effect::link::tests::sight;
     use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::Carrier;
 
     const SHELL: Shell = Shell { radius_m: EARTH_RADIUS_M, height_m: 450e3, mapping: Mapping::SingleLayer };
 
@@ -162,7 +164,7 @@ mod tests {
         let delay_m = rays[0].code_delay_s * SPEED_OF_LIGHT_MPS;
         assert!((delay_m - 0.1624).abs() < 5e-5, "{delay_m}");
         assert_eq!(rays[0].carrier_delay_s, -rays[0].code_delay_s);
-        let signal = Signal { carrier_hz: 1_227.6e6, ..L1_CA };
+        let signal = Signal { carrier: Carrier::Common(1_227.6e6), ..L1_CA };
         let mut second = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
         effect.act(&sight(90.0, 0.0), &signal, &mut second);
         let ratio = second[0].code_delay_s / rays[0].code_delay_s;

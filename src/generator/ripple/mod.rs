@@ -13,7 +13,6 @@ pub mod scintillation;
 
 use crate::generator::scene::Scene;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
 use crate::gnss::time::Rate;
 
 /// Samples between nodes: the largest power of two within a millisecond.
@@ -53,13 +52,13 @@ fn any(scene: &Scene, fading: Option<Sv>) -> bool {
         || fading.is_some_and(|sv| scene.satellite_clocks.of(sv).is_some())
 }
 
-/// The ripple of a signal, which fades with satellite `fading`, at node number `node`.
-fn at_node(scene: &Scene, fading: Option<Sv>, signal: &Signal, node: u64) -> Ripple {
+/// The ripple of a signal on `carrier_hz`, which fades with satellite `fading`, at node number `node`.
+fn at_node(scene: &Scene, fading: Option<Sv>, carrier_hz: f64, node: u64) -> Ripple {
     let mut ripple = Ripple::STILL;
     if let Some(oscillator) = &scene.receiver_clock.oscillator {
         let quick_s = oscillator.quick_s(node);
         ripple.delay_s += quick_s;
-        ripple.carrier_cycles += signal.carrier_hz * quick_s;
+        ripple.carrier_cycles += carrier_hz * quick_s;
     }
     let scintillation = scene.scintillation.as_ref().zip(fading);
     if let Some((gain, phase_rad)) = scintillation.and_then(|(scintillation, sv)| scintillation.at(sv, node)) {
@@ -71,30 +70,30 @@ fn at_node(scene: &Scene, fading: Option<Sv>, signal: &Signal, node: u64) -> Rip
 }
 
 /// The ripple between node number `node` and the next: at its beginning and at its end.
-fn cell(scene: &Scene, fading: Option<Sv>, signal: &Signal, node: u64, ends: [Ripple; 2]) -> [Ripple; 2] {
+fn cell(scene: &Scene, fading: Option<Sv>, carrier_hz: f64, node: u64, ends: [Ripple; 2]) -> [Ripple; 2] {
     let clock = fading.and_then(|sv| scene.satellite_clocks.of(sv));
     let Some(clock) = clock else { return ends };
     let [from_s, to_s] = clock.cell_s(scene, node);
     // A satellite's clock that is ahead makes its signal older.
     let older = |ripple: Ripple, offset_s: f64| Ripple {
         delay_s: ripple.delay_s - offset_s,
-        carrier_cycles: ripple.carrier_cycles - signal.carrier_hz * offset_s,
+        carrier_cycles: ripple.carrier_cycles - carrier_hz * offset_s,
         gain: ripple.gain,
     };
     let [from, to] = ends;
     [older(from, from_s), older(to, to_s)]
 }
 
-/// The ripple of a signal, which fades with satellite `fading`, at a place between samples; before the first
+/// The ripple of a signal on `carrier_hz`, which fades with satellite `fading`, at a place between samples; before the first
 /// sample that of the first.
-pub fn at(scene: &Scene, fading: Option<Sv>, signal: &Signal, sample: f64) -> Ripple {
+pub fn at(scene: &Scene, fading: Option<Sv>, carrier_hz: f64, sample: f64) -> Ripple {
     if !any(scene, fading) {
         return Ripple::STILL;
     }
     let place = sample.max(0.0) / node_samples(scene.clock.rate) as f64;
     let node = place.floor();
-    let ends = [node as u64, node as u64 + 1].map(|node| at_node(scene, fading, signal, node));
-    let [from, to] = cell(scene, fading, signal, node as u64, ends);
+    let ends = [node as u64, node as u64 + 1].map(|node| at_node(scene, fading, carrier_hz, node));
+    let [from, to] = cell(scene, fading, carrier_hz, node as u64, ends);
     from.between(to, place - node)
 }
 
@@ -109,17 +108,17 @@ pub struct Ripples {
 
 impl Ripples {
     /// Gathers what samples `from..=to` need; nothing where nothing ripples.
-    pub fn prepare(&mut self, scene: &Scene, fading: Option<Sv>, signal: &Signal, from: u64, to: u64) {
+    pub fn prepare(&mut self, scene: &Scene, fading: Option<Sv>, carrier_hz: f64, from: u64, to: u64) {
         if !any(scene, fading) {
             return;
         }
         self.spacing = node_samples(scene.clock.rate);
         self.first = from / self.spacing;
         self.cells.clear();
-        let mut here = at_node(scene, fading, signal, self.first);
+        let mut here = at_node(scene, fading, carrier_hz, self.first);
         for node in self.first..=to / self.spacing {
-            let next = at_node(scene, fading, signal, node + 1);
-            self.cells.push(cell(scene, fading, signal, node, [here, next]));
+            let next = at_node(scene, fading, carrier_hz, node + 1);
+            self.cells.push(cell(scene, fading, carrier_hz, node, [here, next]));
             here = next;
         }
     }

@@ -69,7 +69,7 @@ impl Power {
                     extra_loss_db: *loss_db,
                     ..LinkBudget::default()
                 };
-                budget.strongest_dbhz(peak_dbic, L1_CA.carrier_hz)
+                budget.strongest_dbhz(peak_dbic, L1_CA.centre_hz())
             }
             Self::Fixed { cn0_dbhz, satellites } => satellites.iter().fold(*cn0_dbhz, |most, (_, x)| most.max(*x)),
         }

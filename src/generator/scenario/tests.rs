@@ -581,7 +581,7 @@ fn a_front_end_puts_l1_where_the_scenario_says() {
         let text = text.replace("antenna = \"table\"\nantenna_file = \"gain.csv\"\n", "antenna = \"patch\"\n");
         let (scene, warnings) = parse(&text).unwrap().compose(Path::new("."), &Overrides::default()).unwrap();
         assert_eq!(scene.metadata.center_hz, center_hz);
-        assert_eq!(scene.metadata.if_hz(scene.signals[0]), 1e6);
+        assert_eq!(scene.metadata.if_hz(scene.signals[0].centre_hz()), 1e6);
         // 1 MHz less 1.023 MHz is below zero in a real signal.
         assert!(warnings.iter().any(|w| w.contains("fold")), "{warnings:?}");
         assert_eq!((scene.samples, scene.noise_lsb), (40_000_000, 3.0));
@@ -661,7 +661,7 @@ fn the_boost_changes_some_satellite_s_doppler_by_about_a_thousand_hertz_a_second
                 found.unwrap().map_or(f64::NAN, |e| e.sight.range_m)
             };
             let bend = (range(t_s + d) - 2.0 * range(t_s) + range(t_s - d)) / (d * d);
-            fastest = fastest.max((bend / crate::gnss::gps::l1ca::L1_CA.wavelength_m()).abs());
+            fastest = fastest.max((bend / crate::gnss::gps::l1ca::L1_CA.wavelength_m(Sv::gps(1))).abs());
         }
     }
     assert!((950.0..1150.0).contains(&fastest), "{fastest}");

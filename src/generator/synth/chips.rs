@@ -36,8 +36,9 @@ impl Spreading {
     /// The code of satellite `number`; `None` if the document assigns none or it has 65 536 steps or more.
     pub fn new(component: &Component, number: u8) -> Option<Self> {
         let chips = (component.code)(number)?;
-        let pulse = component.shape.pulse;
-        let signs: Vec<bool> = chips.iter().flat_map(|&chip| pulse.iter().map(move |&p| chip ^ (p < 0))).collect();
+        let pulse = component.layers.first()?.pulse;
+        let signs: Vec<bool> =
+            chips.iter().flat_map(|&chip| pulse.iter().map(move |&p| (chip < 0) ^ (p < 0))).collect();
         let steps = u32::try_from(signs.len()).ok().filter(|&steps| steps > 0 && steps < 1 << 16)?;
         let mut words = vec![0_u64; (signs.len() + 128).div_ceil(64)];
         for (index, sign) in signs.iter().cycle().take(signs.len() + 128).enumerate() {

@@ -134,11 +134,12 @@ impl Transmitter {
             let gain = component.power_share.sqrt() * edge.gain(spreading.correlation(), step);
             sent.push(Sent { component, spreading, gain });
         }
-        let if_hz = scene.metadata.if_hz(signal);
+        let carrier_hz = signal.carrier_hz(sv);
+        let if_hz = scene.metadata.if_hz(carrier_hz);
         let reading_s = |t_s: &f64| scene.receiver_clock.reading_elapsed_s(scene.clock.start, *t_s);
         let breaks = from.breaks_s(scene);
         let breaks = breaks.iter().map(|t_s| (reading_s(t_s) * rate_hz).ceil().max(0.0) as u64).collect();
-        let grid = Grid::new(scene.clock.rate, breaks, scene.fidelity.knot_tolerance_cycles, signal.carrier_hz);
+        let grid = Grid::new(scene.clock.rate, breaks, scene.fidelity.knot_tolerance_cycles, carrier_hz);
         Ok(Some(Self {
             on: from.on(scene),
             from,
@@ -238,7 +239,7 @@ impl Transmitter {
                 self.parts.extend(parts);
             }
         }
-        self.ripples.prepare(scene, self.from.fading(self.sv), self.signal, from, to);
+        self.ripples.prepare(scene, self.from.fading(self.sv), self.signal.carrier_hz(self.sv), from, to);
         self.prepare_messages(scene, from, to)
     }
 

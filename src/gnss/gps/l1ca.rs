@@ -4,7 +4,7 @@
 //! printed registers and the G2 delays; PRN 34 and 37 share a code, as the table says.
 
 use crate::gnss::satellite::System;
-use crate::gnss::signal::{Component, Message, Shape, Signal};
+use crate::gnss::signal::{Carrier, Component, Layer, Message, Overlay, Signal};
 
 /// Chips in a C/A code period.
 pub const CODE_CHIPS: u32 = 1023;
@@ -15,14 +15,15 @@ pub static L1_CA: Signal = Signal {
     rinex: "1C",
     system: System::Gps,
     constellation: [1, 32], // IS-GPS-200N, table 3-Ia, note: 33 to 37 are reserved for other uses
-    carrier_hz: 1_575.42e6, // IS-GPS-200N, 3.3.1.1
+    carrier: Carrier::Common(1_575.42e6), // IS-GPS-200N, 3.3.1.1
     components: &[Component {
         power_share: 1.0,
         phase_cycles: 0.0,
         chip_rate_hz: 1.023e6, // IS-GPS-200N, 3.3.2.3
         code_chips: CODE_CHIPS,
-        code,
-        shape: Shape { pulse: &[1] },
+        code: |prn| Some(code(prn)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
+        layers: &[Layer::BPSK],
+        overlay: Overlay::None,
         message: Some(Message::GpsLnav),
     }],
 };

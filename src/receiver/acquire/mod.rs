@@ -44,7 +44,7 @@ use thiserror::Error;
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, SIGNALS, Signal};
+use crate::gnss::signal::{Component, Link, SIGNALS, Signal};
 use crate::receiver::source::Block;
 use grid::Grid;
 use refine::Refined;
@@ -80,6 +80,13 @@ pub struct Acquired {
     pub cn0_dbhz: f64,
 }
 
+impl Acquired {
+    /// What was found.
+    pub fn link(&self) -> Link {
+        Link { sv: self.sv, signal: self.signal }
+    }
+}
+
 /// Why a search could not be made.
 #[derive(Debug, Error, PartialEq)]
 pub enum AcquireError {
@@ -109,7 +116,7 @@ pub fn samples_needed(metadata: &IfMetadata, settings: &AcquisitionSettings) -> 
     let one = |signal: &&'static Signal| {
         let period_s = signal.components.first().map_or(0.0, Component::period_s);
         // The grid of Dopplers may reach a step beyond the largest one asked for.
-        let slowest = 1.0 - (settings.doppler_max_hz + 1.0 / period_s) / signal.carrier_hz;
+        let slowest = 1.0 - (settings.doppler_max_hz + 1.0 / period_s) / signal.centre_hz();
         grid::samples_needed(period_s * metadata.rate.hz(), periods, settings.noncoherent_sums, slowest)
     };
     Ok(SIGNALS.iter().map(one).max().unwrap_or(0))
@@ -172,7 +179,7 @@ pub fn cell_chips(
 pub fn search(
     metadata: &IfMetadata,
     block: &Block,
-    candidates: &[(&'static Signal, Sv)],
+    candidates: &[Link],
     settings: &AcquisitionSettings,
 ) -> Result<Vec<(AcquisitionRow, Option<Acquired>)>, AcquireError> {
     Searcher::new(metadata, settings)?.search(block, candidates)
@@ -184,7 +191,7 @@ pub struct Searcher {
     settings: AcquisitionSettings,
     centre_hz: f64,
     grids: BTreeMap<&'static Signal, Grid>,
-    codes: BTreeMap<(&'static Signal, Sv), Code>,
+    codes: BTreeMap<Link, Code>,
 }
 
 struct Code {
@@ -224,21 +231,21 @@ impl Searcher {
     pub fn search(
         &mut self,
         block: &Block,
-        candidates: &[(&'static Signal, Sv)],
+        candidates: &[Link],
     ) -> Result<Vec<(AcquisitionRow, Option<Acquired>)>, AcquireError> {
         if block.i.len() != block.q.len() {
             return Err(AcquireError::Uneven { i: block.i.len(), q: block.q.len() });
         }
-        for &(signal, sv) in candidates {
-            self.prepare(signal, sv)?;
+        for link in candidates {
+            self.prepare(*link)?;
         }
         let mut results: Vec<Option<(AcquisitionRow, Option<Acquired>)>> = vec![None; candidates.len()];
         for (signal, grid) in &self.grids {
             let chosen: Vec<(usize, Sv, &Code)> = candidates
                 .iter()
                 .enumerate()
-                .filter(|(_, (other, _))| other == signal)
-                .filter_map(|(index, (_, sv))| Some((index, *sv, self.codes.get(&(*signal, *sv))?)))
+                .filter(|(_, link)| link.signal == *signal)
+                .filter_map(|(index, link)| Some((index, link.sv, self.codes.get(link)?)))
                 .collect();
             if chosen.is_empty() {
                 continue;
@@ -259,14 +266,15 @@ impl Searcher {
     }
 
     /// Makes sure that plans and spectra are there.
-    fn prepare(&mut self, signal: &'static Signal, sv: Sv) -> Result<(), AcquireError> {
+    fn prepare(&mut self, link: Link) -> Result<(), AcquireError> {
+        let Link { sv, signal } = link;
         let no_code = AcquireError::NoCode { signal: signal.name, sv };
         let Some(component) = signal.components.first() else { return Err(no_code) };
         let rate_hz = self.metadata.rate.hz();
         if rate_hz < component.chip_rate_hz {
             return Err(AcquireError::RateTooLow { signal: signal.name, rate_hz, need_hz: component.chip_rate_hz });
         }
-        let (if_hz, half_hz) = (self.metadata.if_hz(signal), 0.5 * rate_hz);
+        let (if_hz, half_hz) = (self.metadata.if_hz(signal.centre_hz()), 0.5 * rate_hz);
         // Of a real recording the IF may lie beyond half the rate on purpose.
         if self.metadata.format.is_complex() && if_hz.abs() > half_hz {
             return Err(AcquireError::OutOfBand { signal: signal.name, if_hz, half_hz });
@@ -281,11 +289,11 @@ impl Searcher {
             self.grids.insert(signal, grid);
         }
         if let Some(grid) = self.grids.get(signal)
-            && !self.codes.contains_key(&(signal, sv))
+            && !self.codes.contains_key(&link)
         {
             let Some(replica) = Replica::new(component, sv.number) else { return Err(no_code) };
             let spectrum = grid.spectrum(&replica);
-            self.codes.insert((signal, sv), Code { replica, spectrum });
+            self.codes.insert(link, Code { replica, spectrum });
         }
         Ok(())
     }

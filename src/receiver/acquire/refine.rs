@@ -58,7 +58,7 @@ pub(super) fn refine(
     let noise_offsets = quiet_offsets(replica, component.code_chips);
     let noise = mean(noise_offsets.iter().map(|&offset| correlators.powers(phase, doppler_hz, &[offset])[0]));
     // BPSK triangle of one chip to either side: (early - late) / (early + late) is twice the error.
-    let reach = 0.5 / component.shape.pulse.len().max(1) as f64;
+    let reach = 0.5 / component.steps_per_chip() as f64;
     let mut power = 0.0;
     for _ in 0..3 {
         let taps = correlators.powers(phase, doppler_hz, &[reach, 0.0, -reach]);

@@ -27,12 +27,9 @@ impl Replica {
     /// The code of satellite `number`, or `None` if it has none.
     pub fn new(component: &Component, number: u8) -> Option<Self> {
         let chips = (component.code)(number)?;
-        let pulse = component.shape.pulse;
-        // A logical 1 is sent as -1.
-        let levels: Vec<f64> = chips
-            .iter()
-            .flat_map(|&one| pulse.iter().map(move |&level| if one { -f64::from(level) } else { f64::from(level) }))
-            .collect();
+        let pulse = component.layers.first()?.pulse;
+        let levels: Vec<f64> =
+            chips.iter().flat_map(|&chip| pulse.iter().map(move |&level| f64::from(chip * level))).collect();
         let integral = std::iter::once(0.0)
             .chain(levels.iter().scan(0.0, |sum, level| {
                 *sum += level;

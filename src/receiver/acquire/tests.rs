@@ -56,7 +56,7 @@ pub(super) fn record(metadata: IfMetadata, samples: usize, sent: &[Sent], seed: 
         let carrier_to_noise = libm::pow(10.0, s.cn0_dbhz / 10.0) / rate_hz;
         let amplitude = if real { (4.0 * carrier_to_noise).sqrt() } else { carrier_to_noise.sqrt() };
         let sign = if metadata.inverted { -1.0 } else { 1.0 };
-        let frequency = (metadata.if_hz(&L1_CA) + sign * s.doppler_hz) / rate_hz;
+        let frequency = (metadata.if_hz(L1_CA.centre_hz()) + sign * s.doppler_hz) / rate_hz;
         let step = 1.023e6 * (1.0 + s.doppler_hz / 1_575.42e6) / rate_hz;
         for n in 0..samples {
             let phase = s.phase_chips + n as f64 * step;
@@ -77,16 +77,16 @@ pub(super) fn record(metadata: IfMetadata, samples: usize, sent: &[Sent], seed: 
 pub(super) fn metadata(format: Format, rate_hz: f64, if_hz: f64, inverted: bool) -> IfMetadata {
     let offset_hz = if inverted { if_hz } else { -if_hz };
     let rate = Rate::from_hz(rate_hz).unwrap();
-    IfMetadata { format, rate, center_hz: L1_CA.carrier_hz + offset_hz, inverted, start: None }
+    IfMetadata { format, rate, center_hz: L1_CA.centre_hz() + offset_hz, inverted, start: None }
 }
 
-pub(super) fn all() -> Vec<(&'static Signal, Sv)> {
-    (1..=32).map(|prn| (&L1_CA, Sv::gps(prn))).collect()
+pub(super) fn all() -> Vec<Link> {
+    (1..=32).map(|prn| L1_CA.link(Sv::gps(prn))).collect()
 }
 
 fn run(
     recording: &Recording,
-    candidates: &[(&'static Signal, Sv)],
+    candidates: &[Link],
     settings: &AcquisitionSettings,
 ) -> Vec<(AcquisitionRow, Option<Acquired>)> {
     let block = Block { first: 1000, i: &recording.i, q: &recording.q };
@@ -150,8 +150,8 @@ fn a_strong_satellite_does_not_bring_others_by_cross_correlation() {
         assert_eq!(found, expected);
         // Without the second look others pass.
         let mut searcher = Searcher::new(&metadata, &settings).unwrap();
-        for (signal, sv) in all() {
-            searcher.prepare(signal, sv).unwrap();
+        for link in all() {
+            searcher.prepare(link).unwrap();
         }
         let grid = searcher.grids.values().next().unwrap();
         let spectra: Vec<_> = searcher.codes.values().map(|code| code.spectrum.as_slice()).collect();
@@ -166,7 +166,7 @@ fn of_satellites_that_share_a_code_the_first_is_acquired() {
     let settings = AcquisitionSettings { doppler_max_hz: 500.0, ..Default::default() };
     let recording = record(metadata(Format::Ci8, 2.6e6, 0.0, false), 60_000, &sent, 1);
     // IS-GPS-200N, table 3-Ia: PRN 34 and 37 have the same code.
-    let rows = run(&recording, &[(&L1_CA, Sv::gps(34)), (&L1_CA, Sv::gps(37))], &settings);
+    let rows = run(&recording, &[L1_CA.link(Sv::gps(34)), L1_CA.link(Sv::gps(37))], &settings);
     assert_eq!(rows.iter().map(|(row, _)| row.acquired).collect::<Vec<_>>(), [true, false]);
 }
 
@@ -249,7 +249,7 @@ fn detections_come_as_often_as_theory_says() {
             let sent = Sent { prn: 9, doppler_hz: 0.0, phase_chips: 0.25, cn0_dbhz };
             let recording = record(metadata.clone(), samples, &[sent], 5000 + seed);
             let block = Block { first: 0, i: &recording.i, q: &recording.q };
-            let rows = searcher.search(&block, &[(&L1_CA, Sv::gps(9))]).unwrap();
+            let rows = searcher.search(&block, &[L1_CA.link(Sv::gps(9))]).unwrap();
             limit = rows[0].0.threshold;
             let here = rows[0].1.is_some_and(|hit| difference_chips(hit.code_phase_chips, 0.25).abs() < 1.0);
             found += u32::from(here);
@@ -277,7 +277,7 @@ fn the_default_search_finds_38_dbhz_whatever_the_phase_and_doppler() {
         let sent = Sent { prn: 21, doppler_hz, phase_chips, cn0_dbhz: 38.0 };
         let recording = record(metadata.clone(), samples, &[sent], 9000 + seed);
         let block = Block { first: 0, i: &recording.i, q: &recording.q };
-        let hit = searcher.search(&block, &[(&L1_CA, Sv::gps(21))]).unwrap()[0].1;
+        let hit = searcher.search(&block, &[L1_CA.link(Sv::gps(21))]).unwrap()[0].1;
         let right = hit.is_some_and(|hit| difference_chips(hit.code_phase_chips, phase_chips).abs() < 0.5);
         missed += u32::from(!right);
     }
@@ -302,14 +302,14 @@ fn what_cannot_be_searched_is_an_error() {
     let good = metadata(Format::Ci8, 2.6e6, 0.0, false);
     let settings = AcquisitionSettings::default();
     let block = Block { first: 0, i: &[0.0; 100], q: &[0.0; 100] };
-    let one = [(&L1_CA, Sv::gps(1))];
+    let one = [L1_CA.link(Sv::gps(1))];
     let error = search(&good, &block, &one, &settings).unwrap_err();
     assert!(matches!(error, AcquireError::TooFewSamples { have: 100, .. }), "{error}");
     let slow = metadata(Format::Ci8, 1e6, 0.0, false);
     assert!(matches!(search(&slow, &block, &one, &settings), Err(AcquireError::RateTooLow { .. })));
     let far = metadata(Format::Ci8, 2.6e6, 2e6, false);
     assert!(matches!(search(&far, &block, &one, &settings), Err(AcquireError::OutOfBand { .. })));
-    let none = [(&L1_CA, Sv::gps(99))];
+    let none = [L1_CA.link(Sv::gps(99))];
     assert!(matches!(search(&good, &block, &none, &settings), Err(AcquireError::NoCode { .. })));
     let uneven = Block { q: &[0.0; 99], ..block };
     assert!(matches!(search(&good, &uneven, &one, &settings), Err(AcquireError::Uneven { .. })));

@@ -314,7 +314,7 @@ fn range(
         emitted,
         pseudorange_m,
         doppler_hz: observation.doppler_hz,
-        carrier_hz: observation.signal.carrier_hz,
+        carrier_hz: observation.signal.carrier_hz(observation.sv),
         noise_m,
         cn0_hz,
     })

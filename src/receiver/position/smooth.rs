@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 use crate::gnss::record::Observation;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::Link;
 use crate::gnss::time::Rate;
 
 /// A gap longer than this breaks the carrier.
@@ -50,7 +50,7 @@ pub struct Smoother {
     bandwidth_hz: f64,
     rate: Rate,
     offset_hz: f64,
-    states: BTreeMap<(Sv, &'static Signal), State>,
+    states: BTreeMap<Link, State>,
 }
 
 impl Smoother {
@@ -66,7 +66,7 @@ impl Smoother {
 
     /// Forgets a satellite.
     pub fn reset(&mut self, sv: Sv) {
-        self.states.retain(|(other, _), _| *other != sv);
+        self.states.retain(|link, _| link.sv != sv);
     }
 
     /// Forgets all satellites.
@@ -82,8 +82,8 @@ impl Smoother {
 
     /// Takes an observation and gives its smoothed pseudorange.
     pub fn smooth(&mut self, observation: &Observation) -> Smoothed {
-        let carrier_m = observation.carrier_cycles * observation.signal.wavelength_m();
-        let key = (observation.sv, observation.signal);
+        let carrier_m = observation.carrier_cycles * observation.signal.wavelength_m(observation.sv);
+        let key = observation.link();
         let fresh = State {
             sample: observation.sample,
             pseudorange_m: observation.pseudorange_m,
@@ -97,7 +97,7 @@ impl Smoother {
         let next = self
             .states
             .get(&key)
-            .and_then(|old| self.step(old, &fresh, observation.signal.wavelength_m()))
+            .and_then(|old| self.step(old, &fresh, observation.signal.wavelength_m(observation.sv)))
             .unwrap_or(fresh);
         self.states.insert(key, next);
         let pseudorange_m = next.pseudorange_m + self.offset_hz * next.parted_m_per_hz;
@@ -147,7 +147,7 @@ mod tests {
             sent_s: 0,
             sent_fraction_s: 0.0,
             pseudorange_m,
-            carrier_cycles: carrier_m / L1_CA.wavelength_m(),
+            carrier_cycles: carrier_m / L1_CA.wavelength_m(Sv::gps(1)),
             doppler_hz: 0.0,
             cn0_dbhz: 45.0,
             locked_s: 1.0 + k as f64 * 0.1,

@@ -146,7 +146,7 @@ impl Session {
     /// Takes a look into the trends, unless it shows something common.
     fn suspect(&mut self, glances: &[Option<Glance>], at_s: f64, since: u64) {
         let Some((signal, component)) = component() else { return };
-        let ratio = signal.carrier_hz / component.chip_rate_hz;
+        let ratio = signal.centre_hz() / component.chip_rate_hz;
         let (mut steps, mut seen, mut gone) = (Vec::new(), 0, 0);
         for (track, glance) in self.tracks.iter().zip(glances) {
             let (Some(glance), Some(expected)) = (glance, track.watched.trend.forecast(at_s)) else { continue };
@@ -224,7 +224,7 @@ impl Session {
                 scan.add(&samples, replica, &nco, profile);
             }
         });
-        let ratio = signal.carrier_hz / component.chip_rate_hz;
+        let ratio = signal.centre_hz() / component.chip_rate_hz;
         let gain = |channel: &Channel, rates: &[Rates; 2]| {
             channel.code_doppler_hz(rates) / ratio * rate_hz / component.chip_rate_hz
         };
@@ -263,7 +263,7 @@ impl Session {
         output: &mut Output,
     ) -> Result<(), ReceiveError> {
         let Some((signal, component)) = component() else { return Ok(()) };
-        let ratio = signal.carrier_hz / component.chip_rate_hz;
+        let ratio = signal.centre_hz() / component.chip_rate_hz;
         let sample_chips = component.chip_rate_hz / self.metadata.rate.hz();
         let now_s = self.metadata.rate.elapsed_s(now);
         let mut report = Report::default();
@@ -310,7 +310,7 @@ impl Session {
     /// The codes' steps beyond what the scan found.
     fn steps(&self) -> Vec<Step> {
         let Some((signal, component)) = component() else { return Vec::new() };
-        let ratio = signal.carrier_hz / component.chip_rate_hz;
+        let ratio = signal.centre_hz() / component.chip_rate_hz;
         let periods = LOOK_S / component.period_s();
         let one = |track: &Track| {
             let (chips, seconds, count) = track.watched.since;
@@ -376,7 +376,7 @@ impl Session {
         // Beyond this the way that satellites and antenna took in between is not foreseen.
         let foreseen = known.is_some() && (ahead / rate_hz).abs() < FORESEEN_S;
         let now_s = self.metadata.rate.elapsed_s(now);
-        let ratio = signal.carrier_hz / component.chip_rate_hz;
+        let ratio = signal.centre_hz() / component.chip_rate_hz;
         for track in &mut self.tracks {
             let watched = &mut track.watched;
             let doppler = watched.rates.map_or(0.0, |rates| track.channel.code_doppler_hz(&rates) / ratio);

@@ -13,7 +13,7 @@ use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::{EventRow, LineRow};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{SIGNALS, Signal};
+use crate::gnss::signal::{Link, SIGNALS};
 use crate::gnss::time::Epoch;
 use crate::receiver::acquire::{self, Searcher};
 use crate::receiver::decode::Decoder;
@@ -88,7 +88,7 @@ pub(super) struct Session {
     metadata: IfMetadata,
     settings: Settings,
     week_reference: Epoch,
-    candidates: Vec<(&'static Signal, Sv)>,
+    candidates: Vec<Link>,
     searcher: Searcher,
     /// Where it looks, and whether as after the first search.
     aimed: Option<(plan::Sweep, bool)>,
@@ -104,8 +104,8 @@ pub(super) struct Session {
     tracks: Vec<Track>,
     /// Of each share of the tracks.
     planes: Vec<Planes>,
-    lost: BTreeMap<(&'static Signal, Sv), u64>,
-    refused: BTreeMap<(&'static Signal, Sv), u64>,
+    lost: BTreeMap<Link, u64>,
+    refused: BTreeMap<Link, u64>,
     timebase: Timebase,
     solver: Solver,
     code_noise: CodeNoise,

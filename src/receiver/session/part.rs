@@ -28,10 +28,10 @@ impl Session {
                 track.line.clear();
                 continue;
             }
-            let signal = track.channel.signal();
-            track.line.take(track.channel.phases(), signal, self.metadata.rate);
+            let link = track.channel.link();
+            track.line.take(track.channel.phases(), link, self.metadata.rate);
             let sigma_m = self.code_noise.sigma_m(libm::pow(10.0, track.cn0_dbhz / 10.0));
-            lines.extend(track.line.estimate(sigma_m / signal.wavelength_m(), self.code_noise.bandwidth_hz));
+            lines.extend(track.line.estimate(sigma_m / link.wavelength_m(), self.code_noise.bandwidth_hz));
         }
         self.lines = lines.len();
         if let Some(estimate) = common(&lines) {
@@ -83,7 +83,7 @@ impl Session {
                 "the spectrum is mirrored: on every satellite the code drifts against the carrier's Doppler; {cure} cures it"
             );
             if estimate.hz.abs() > RATE_SIGMAS * estimate.sigma_hz {
-                let share = estimate.hz / signal.carrier_hz;
+                let share = estimate.hz / signal.centre_hz();
                 text += &format!(
                     ", and --rate-hz {:.0}, {:+.1} ppm, fits the codes",
                     self.metadata.rate.hz() * (1.0 + share),
@@ -95,7 +95,7 @@ impl Session {
         let (_, median_hz) = self.found;
         if median_hz.abs() > SKY_HZ.max(self.settings.acquisition.doppler_max_hz) && self.clock_drift.is_none() {
             let sense = if self.metadata.inverted { -1.0 } else { 1.0 };
-            let if_hz = self.metadata.if_hz(signal) + sense * median_hz;
+            let if_hz = self.metadata.if_hz(signal.centre_hz()) + sense * median_hz;
             findings.push(format!(
                 "the carriers lie {:+.1} kHz from where they were looked for: --if-hz {if_hz:.0} centres the search",
                 1e-3 * median_hz
@@ -107,13 +107,13 @@ impl Session {
     /// What the outcome says of it.
     pub(super) fn parted(&self) -> Option<Parted> {
         let offset = self.offset.believed()?;
-        let carrier_hz = SIGNALS.first()?.carrier_hz;
+        let carrier_hz = SIGNALS.first()?.centre_hz();
         let sense = if self.metadata.inverted { -1.0 } else { 1.0 };
         Some(Parted {
             offset_hz: offset.hz,
             sigma_hz: offset.sigma_hz,
             rate_error_ppm: 1e6 * offset.hz / carrier_hz,
-            if_hz: SIGNALS.first().map_or(0.0, |signal| self.metadata.if_hz(signal)) + sense * offset.hz,
+            if_hz: SIGNALS.first().map_or(0.0, |signal| self.metadata.if_hz(signal.centre_hz())) + sense * offset.hz,
             rate_hz: self.metadata.rate.hz() * (1.0 + offset.hz / carrier_hz),
             code_drift: self.clock_drift,
         })

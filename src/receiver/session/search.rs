@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 use super::gap::Watched;
 use super::{Session, Track, WRONG_TIME_FIXES, Window};
 use crate::gnss::record::{AcquisitionRow, Event, EventRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::Link;
 use crate::receiver::acquire::{self, Acquired};
 use crate::receiver::decode::Decoder;
 use crate::receiver::output::Output;
@@ -44,9 +43,8 @@ impl Session {
         self.refused.retain(|_, until| *until > end);
         // Satellites that are followed are searched for too: without them their cross-correlation
         // would pass for others.
-        let all_found = self.candidates.iter().all(|(signal, sv)| {
-            self.tracks.iter().any(|track| track.channel.signal() == *signal && track.channel.sv() == *sv)
-        });
+        let all_found =
+            self.candidates.iter().all(|link| self.tracks.iter().any(|track| track.channel.link() == *link));
         if !all_found {
             let results = self.searcher.search(&window.block(), &self.candidates)?;
             self.look(&results, end);
@@ -84,10 +82,9 @@ impl Session {
         since: u64,
         output: &mut Output,
     ) -> Result<(), ReceiveError> {
-        let followed: BTreeSet<(&'static Signal, Sv)> =
-            self.tracks.iter().map(|track| (track.channel.signal(), track.channel.sv())).collect();
+        let followed: BTreeSet<Link> = self.tracks.iter().map(|track| track.channel.link()).collect();
         for (row, hit) in results {
-            let key = (row.signal, row.sv);
+            let key = row.link();
             if followed.contains(&key) || self.refused.contains_key(&key) {
                 continue;
             }
@@ -119,7 +116,7 @@ impl Session {
                 dropped: false,
             });
         }
-        self.tracks.sort_by_key(|track| (track.channel.signal(), track.channel.sv()));
+        self.tracks.sort_by_key(|track| track.channel.link());
         Ok(())
     }
 
@@ -139,19 +136,20 @@ impl Session {
         let mut gone = false;
         let mut kept = Vec::with_capacity(self.tracks.len());
         for track in std::mem::take(&mut self.tracks) {
-            let (sv, signal) = (track.channel.sv(), track.channel.signal());
+            let link = track.channel.link();
+            let Link { sv, signal } = link;
             let synchronised = track.decoder.as_ref().is_some_and(Decoder::is_synchronised);
             let fruitless = !synchronised && now > track.since + limit;
             if track.channel.is_lost() {
-                self.lost.insert((signal, sv), now);
+                self.lost.insert(link, now);
             } else if track.dropped || fruitless {
                 let event = Event::LossOfLock;
                 output.event(&EventRow { sample: now.saturating_sub(1), sv, signal, event })?;
                 // A wrong time may come right when the satellite is acquired anew; an echo does not.
                 if track.wrong_time < WRONG_TIME_FIXES {
-                    self.refused.insert((signal, sv), refused);
+                    self.refused.insert(link, refused);
                 }
-                self.lost.insert((signal, sv), now);
+                self.lost.insert(link, now);
             } else {
                 kept.push(track);
                 continue;

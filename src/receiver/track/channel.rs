@@ -19,7 +19,7 @@ use super::{Measurement, Report, Symbol, TrackingSettings};
 use crate::gnss::record::TrackingRow;
 use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::{Link, Signal};
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
 use crate::receiver::correlate::{self, Arithmetic, Nco, Replica, TURN, chips_to_units, correlation, units_to_chips};
@@ -163,21 +163,22 @@ impl Channel {
         let message = component.and_then(|c| c.message);
         let group = message.map_or(PILOT_GROUP, |m| m.periods_per_symbol());
         let code = component.and_then(|c| (c.code)(hit.sv.number)).unwrap_or_default();
-        let replica = Replica::new(code, settings.replica);
+        let replica = Replica::new(code.iter().map(|&chip| chip < 0).collect(), settings.replica);
         let chips_per_sample = chip_rate_hz / metadata.rate.hz();
         let half = 0.5 * settings.spacing_chips;
         let (peak, _) = correlation(settings.replica, chips_per_sample, 0.0);
         let sense = if metadata.inverted { -1.0 } else { 1.0 };
         let shape = code_shape(settings, chips_per_sample);
         let loops = Loops::new(settings, shape, message.is_some(), sense * hit.doppler_hz);
+        let if_hz = metadata.if_hz(hit.link().carrier_hz());
         let mut channel = Self {
             settings: settings.clone(),
             sv: hit.sv,
             signal: hit.signal,
             hit: *hit,
             rate: metadata.rate,
-            if_hz: metadata.if_hz(hit.signal),
-            if_step: tone_turns(metadata.if_hz(hit.signal), metadata.rate, 1),
+            if_hz,
+            if_step: tone_turns(if_hz, metadata.rate, 1),
             sense,
             chip_rate_hz,
             carrier_offset_hz: 0.0,
@@ -250,6 +251,11 @@ impl Channel {
     /// The signal that is followed.
     pub fn signal(&self) -> &'static Signal {
         self.signal
+    }
+
+    /// What is followed.
+    pub fn link(&self) -> Link {
+        Link { sv: self.sv, signal: self.signal }
     }
 
     /// Tells the channel whether the message showed its symbols to be inverted: from now on, until the carrier is
@@ -332,7 +338,7 @@ impl Channel {
         let update_s = self.period_s * f64::from(self.periods_per_update());
         let offset_hz = self.loops.carrier.mean(update_s);
         self.carrier_step = (offset_hz / rate_hz * TURN) as i128;
-        let aid_hz = (self.sense * offset_hz - self.carrier_offset_hz) * self.chip_rate_hz / self.signal.carrier_hz;
+        let aid_hz = (self.sense * offset_hz - self.carrier_offset_hz) * self.chip_rate_hz / self.link().carrier_hz();
         let aid_hz = planted!("receiver.nco.carrier_aid", aid_hz, -aid_hz);
         self.code_step = chips_to_units((self.chip_rate_hz + aid_hz + self.loops.code.mean(update_s)) / rate_hz).max(1);
     }
@@ -345,7 +351,7 @@ impl Channel {
         }
         self.carrier_offset_hz = self.next_offset_hz;
         let update_s = self.period_s * f64::from(self.periods_per_update());
-        let jump_chips = self.loops.aid_code(less_hz * self.chip_rate_hz / self.signal.carrier_hz, update_s);
+        let jump_chips = self.loops.aid_code(less_hz * self.chip_rate_hz / self.link().carrier_hz(), update_s);
         self.glances.move_by(jump_chips);
         self.code += chips_to_units(jump_chips);
     }

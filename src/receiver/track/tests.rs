@@ -307,7 +307,7 @@ fn an_inverted_spectrum_and_a_real_if_give_the_same_observables() {
     for (if_hz, inverted, real) in [(0.4e6, true, false), (0.65e6, false, true), (0.65e6, true, true)] {
         let sky = Sky { if_hz, inverted, real, duration_s: 2.5, ..Default::default() };
         let metadata = sky.metadata();
-        assert!((metadata.if_hz(&l1ca::L1_CA) - if_hz).abs() < 1e-6);
+        assert!((metadata.if_hz(l1ca::L1_CA.centre_hz()) - if_hz).abs() < 1e-6);
         let (channel, report) = sky.follow(&TrackingSettings::default(), 50_000, &sky.hit(30.0, 0.1));
         assert!(channel.is_tracking(), "{:?}", report.events);
         let late = report.measurements.iter().filter(|m| m.sample > 4_500_000);

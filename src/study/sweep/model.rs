@@ -110,7 +110,7 @@ impl Model {
     }
 
     fn case(&self, seed: u64) -> Case {
-        let per_g = GRAVITY_MPS2 / self.signal.wavelength_m();
+        let per_g = GRAVITY_MPS2 * self.signal.centre_hz() / SPEED_OF_LIGHT_MPS;
         let (rate_step_hz_s, jerk_hz_s2) = (self.acceleration_g * per_g, self.jerk_g_per_s * per_g);
         let mut motion = Motion { doppler_hz: self.doppler_hz, ..Motion::default() };
         if rate_step_hz_s != 0.0 || jerk_hz_s2 != 0.0 {
@@ -200,7 +200,8 @@ fn phase_theory_deg(case: &Case) -> Option<f64> {
     let Some(noise) = &case.oscillator else { return Some(thermal_deg) };
     let update_s = case.update_s();
     let system = expect::carrier_loop(&case.settings, case.mode, update_s).linear();
-    let oscillator_deg = oscillator::jitter_discrete_rad(noise, case.signal.carrier_hz, &system, update_s).to_degrees();
+    let oscillator_deg =
+        oscillator::jitter_discrete_rad(noise, case.signal.centre_hz(), &system, update_s).to_degrees();
     Some(libm::hypot(thermal_deg, oscillator_deg))
 }
 

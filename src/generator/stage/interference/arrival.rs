@@ -42,7 +42,7 @@ impl Tuning {
             low_hz: scene
                 .signals
                 .first()
-                .map_or(0.0, |signal| (scene.metadata.if_hz(signal) / half_hz).floor() * half_hz),
+                .map_or(0.0, |signal| (scene.metadata.if_hz(signal.centre_hz()) / half_hz).floor() * half_hz),
             noise_lsb: f64::from(scene.noise_lsb),
         }
     }

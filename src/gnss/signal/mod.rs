@@ -1,0 +1,334 @@
+//! A signal is data: a carrier and components, each with a code, the pulses that its chips have, and perhaps an overlay
+//! code and a message.
+//!
+//! To add a signal: one file in `gnss/<system>/` with a `static` [`Signal`], one word in [`SIGNALS`]. Law tests walk that
+//! registry. Nothing outside `gnss` may branch on a signal's name. What a component's spectrum and correlation are follows
+//! from its pulses ([`Shape`]).
+
+use std::fmt;
+use std::hash::{Hash, Hasher};
+
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::gps;
+use crate::gnss::satellite::{Sv, System};
+
+mod shape;
+
+pub use shape::Shape;
+
+/// Every signal that this program knows.
+pub static SIGNALS: [&Signal; 1] = [&gps::l1ca::L1_CA];
+
+/// A signal that satellites of one system send.
+#[derive(Debug)]
+pub struct Signal {
+    /// Name as people write it, unique in [`SIGNALS`].
+    pub name: &'static str,
+    /// RINEX 3 band and attribute, for `C1C`, `L1C`, `D1C`, `S1C`.
+    pub rinex: &'static str,
+    pub system: System,
+    /// First and last number of the constellation's satellites; codes of others are reserved for other transmitters.
+    pub constellation: [u8; 2],
+    pub carrier: Carrier,
+    /// What is sent on that carrier; powers add up to one.
+    pub components: &'static [Component],
+}
+
+/// A signal of one satellite. Sorted by satellite, then by signal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Link {
+    pub sv: Sv,
+    pub signal: &'static Signal,
+}
+
+/// Carrier frequencies of a signal.
+#[derive(Clone, Copy, Debug)]
+pub enum Carrier {
+    /// One frequency for all satellites, in hertz.
+    Common(f64),
+    /// Frequency division: satellite `n` sends on `centre_hz + step_hz · channel(n)`.
+    Channels {
+        centre_hz: f64,
+        step_hz: f64,
+        /// Channel of a satellite by its number; `None` where none is assigned.
+        channel: fn(u8) -> Option<i8>,
+    },
+}
+
+/// One spreading code on a carrier.
+#[derive(Debug)]
+pub struct Component {
+    /// Share of the signal's power.
+    pub power_share: f64,
+    /// Carrier phase relative to the signal's reference phase.
+    pub phase_cycles: f64,
+    /// Chips a second, by the satellite's clock.
+    pub chip_rate_hz: f64,
+    /// Chips in one period of the code.
+    pub code_chips: u32,
+    /// The code of a satellite by its number: `code_chips` values. +1 for a logical 0, −1 for a logical 1, and 0 where the
+    /// code of another component has its turn. `None` where the document assigns none.
+    pub code: fn(u8) -> Option<Vec<i8>>,
+    /// What the waveform of a chip is the sum of.
+    pub layers: &'static [Layer],
+    pub overlay: Overlay,
+    /// What modulates it; a pilot has none.
+    pub message: Option<Message>,
+}
+
+/// A pulse that chips have, with its amplitude and phase: BPSK and BOC are one layer, CBOC and QMBOC two on every chip, TMBOC
+/// two on different chips.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer {
+    /// Amplitude. The mean power over all chips of all layers is one.
+    pub weight: f64,
+    /// Carrier phase relative to the component's.
+    pub phase_cycles: f64,
+    /// Signs of equal steps of a chip.
+    pub pulse: &'static [i8],
+    /// The chips that have the pulse, repeated from the beginning of each code period; empty for all chips.
+    pub chips: &'static [bool],
+}
+
+/// A code of one chip for each period of the spreading code, which it multiplies.
+#[derive(Clone, Copy, Debug)]
+pub enum Overlay {
+    None,
+    /// The same for all satellites: values of ±1.
+    Shared(&'static [i8]),
+    /// A satellite's own by its number; `chips` values of ±1.
+    PerSatellite {
+        chips: u32,
+        of: fn(u8) -> Option<Vec<i8>>,
+    },
+}
+
+/// The data that modulate a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Message {
+    /// GPS legacy navigation message, 50 bit/s (IS-GPS-200N, 20.3.2).
+    GpsLnav,
+}
+
+impl Message {
+    /// Code periods that carry one symbol.
+    pub fn periods_per_symbol(self) -> u32 {
+        match self {
+            Self::GpsLnav => 20,
+        }
+    }
+}
+
+impl Signal {
+    /// The signal of that name.
+    pub fn find(name: &str) -> Option<&'static Self> {
+        SIGNALS.into_iter().find(|signal| signal.name == name)
+    }
+
+    /// Carrier frequency of a satellite; the middle of the band for one to which no channel is assigned.
+    pub fn carrier_hz(&self, sv: Sv) -> f64 {
+        match self.carrier {
+            Carrier::Common(hz) => hz,
+            Carrier::Channels { centre_hz, step_hz, channel } => {
+                centre_hz + step_hz * f64::from(channel(sv.number).unwrap_or(0))
+            }
+        }
+    }
+
+    /// This signal of one satellite.
+    pub fn link(&'static self, sv: Sv) -> Link {
+        Link { sv, signal: self }
+    }
+
+    /// Middle of the band: the carrier of all satellites, or that of channel 0.
+    pub fn centre_hz(&self) -> f64 {
+        match self.carrier {
+            Carrier::Common(hz) => hz,
+            Carrier::Channels { centre_hz, .. } => centre_hz,
+        }
+    }
+
+    /// Carrier wavelength of a satellite.
+    pub fn wavelength_m(&self, sv: Sv) -> f64 {
+        SPEED_OF_LIGHT_MPS / self.carrier_hz(sv)
+    }
+
+    /// Satellites of this signal's system to which its documents assign a carrier and codes.
+    pub fn satellites(&'static self) -> impl Iterator<Item = Sv> {
+        (1..=u8::MAX).filter(|&number| self.is_assigned(number)).map(|number| Sv { system: self.system, number })
+    }
+
+    fn is_assigned(&self, number: u8) -> bool {
+        let has_carrier = match self.carrier {
+            Carrier::Common(_) => true,
+            Carrier::Channels { channel, .. } => channel(number).is_some(),
+        };
+        has_carrier && self.components.iter().all(|component| component.has_code(number))
+    }
+}
+
+impl Link {
+    /// Carrier frequency.
+    pub fn carrier_hz(self) -> f64 {
+        self.signal.carrier_hz(self.sv)
+    }
+
+    /// Whether a satellite of the constellation sends it, not another transmitter that borrows its code.
+    pub fn is_of_constellation(self) -> bool {
+        let [first, last] = self.signal.constellation;
+        (first..=last).contains(&self.sv.number)
+    }
+
+    /// Carrier wavelength.
+    pub fn wavelength_m(self) -> f64 {
+        self.signal.wavelength_m(self.sv)
+    }
+}
+
+impl fmt::Display for Link {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&format!("{} {}", self.sv, self.signal))
+    }
+}
+
+impl Layer {
+    /// One rectangular pulse on every chip.
+    pub const BPSK: Self = Self { weight: 1.0, phase_cycles: 0.0, pulse: &[1], chips: &[] };
+    /// BOC(m, n) with m = n: one period of a sine-phased square wave on every chip.
+    pub const BOC11: Self = Self { pulse: &[1, -1], ..Self::BPSK };
+    /// BOC(m, n) with m = 6 n.
+    pub const BOC61: Self = Self { pulse: &[1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1], ..Self::BPSK };
+
+    /// Whether chip `index` of a code period has this pulse.
+    pub fn covers(&self, index: usize) -> bool {
+        self.chips.is_empty() || self.chips.get(index % self.chips.len()).copied().unwrap_or(false)
+    }
+}
+
+impl Overlay {
+    /// Periods of the spreading code in one of the overlay code; 1 without.
+    pub fn periods(&self) -> u32 {
+        match self {
+            Self::None => 1,
+            Self::Shared(chips) => chips.len() as u32,
+            Self::PerSatellite { chips, .. } => *chips,
+        }
+    }
+
+    /// The values of satellite `number`; `[1]` without an overlay, `None` where the document assigns none.
+    pub fn of(&self, number: u8) -> Option<Vec<i8>> {
+        match self {
+            Self::None => Some(vec![1]),
+            Self::Shared(chips) => Some(chips.to_vec()),
+            Self::PerSatellite { of, .. } => of(number),
+        }
+    }
+}
+
+impl Component {
+    /// Duration of one code period by the satellite's clock.
+    pub fn period_s(&self) -> f64 {
+        f64::from(self.code_chips) / self.chip_rate_hz
+    }
+
+    /// Steps into which the pulses of all layers divide a chip.
+    pub fn steps_per_chip(&self) -> usize {
+        self.layers.iter().fold(1, |steps, layer| least_common_multiple(steps, layer.pulse.len().max(1)))
+    }
+
+    /// Correlation and spectrum of the waveform.
+    pub fn shape(&self) -> Shape {
+        Shape::of(self)
+    }
+
+    fn has_code(&self, number: u8) -> bool {
+        (self.code)(number).is_some() && self.overlay.of(number).is_some()
+    }
+}
+
+fn least_common_multiple(a: usize, b: usize) -> usize {
+    let (mut x, mut y) = (a, b);
+    while y > 0 {
+        (x, y) = (y, x % y);
+    }
+    a / x * b
+}
+
+impl PartialEq for Signal {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for Signal {}
+
+impl Hash for Signal {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.name.hash(state);
+    }
+}
+
+impl PartialOrd for Signal {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Signal {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.name.cmp(other.name)
+    }
+}
+
+impl fmt::Display for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name)
+    }
+}
+
+/// Serde of a `&'static Signal` by its name, for `#[serde(with = …)]`.
+pub mod by_name {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    use super::Signal;
+
+    /// Writes the name.
+    pub fn serialize<S: Serializer>(signal: &&'static Signal, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(signal.name)
+    }
+
+    /// Reads a name and looks the signal up.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static Signal, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        Signal::find(&name).ok_or_else(|| D::Error::custom(format!("unknown signal '{name}'")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_registered_signal_is_complete_and_found_by_its_name() {
+        for signal in SIGNALS {
+            assert!(std::ptr::eq(Signal::find(signal.name).unwrap(), signal));
+            let power: f64 = signal.components.iter().map(|c| c.power_share).sum();
+            assert!((power - 1.0).abs() < 1e-12, "{signal}");
+            // One power of a component's layers over all chips that are not another's.
+            for component in signal.components {
+                assert!((component.shape().correlation(0.0) - 1.0).abs() < 1e-12, "{signal}");
+            }
+            for component in signal.components {
+                assert!(signal.satellites().count() > 0);
+                for sv in signal.satellites() {
+                    let code = (component.code)(sv.number).unwrap();
+                    assert_eq!(code.len(), component.code_chips as usize, "{signal} {sv}");
+                    assert!(code.iter().all(|chip| chip.abs() <= 1), "{signal} {sv}");
+                    let overlay = component.overlay.of(sv.number).unwrap();
+                    assert_eq!(overlay.len(), component.overlay.periods() as usize, "{signal} {sv}");
+                    assert!(overlay.iter().all(|chip| chip.abs() == 1), "{signal} {sv}");
+                }
+            }
+        }
+    }
+}

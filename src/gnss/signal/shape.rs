@@ -1,0 +1,189 @@
+//! Correlation function and spectrum of a component, from its pulses.
+//!
+//! Chips count as random and independent, so that only a chip's own waveform correlates. The waveform is constant over the
+//! steps of a chip, so its correlation is a polygon with a corner at each step, and the spectrum is exact too (J. W. Betz,
+//! "Binary offset carrier modulations for radionavigation", Navigation 48(4), 2001, eq. 3 and 4). What lines a short code
+//! has, filters and samplers are left out: an ideal signal of unlimited bandwidth.
+
+use std::f64::consts::{PI, TAU};
+
+use num_complex::Complex64;
+
+use super::{Component, Layer};
+
+/// Correlation and spectrum of a waveform of unit power.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    step_s: f64,
+    /// Correlation at whole steps from 0 on; zero at the last, which is one chip.
+    lags: Vec<f64>,
+}
+
+impl Shape {
+    /// Of a component's waveform where its code is not zero.
+    pub(super) fn of(component: &Component) -> Self {
+        let steps = component.steps_per_chip();
+        let chips = component.layers.iter().map(|layer| layer.chips.len().max(1));
+        let kinds = chips.fold(1, super::least_common_multiple);
+        let mut lags = vec![0.0; steps + 1];
+        for kind in 0..kinds {
+            let wave = chip(component.layers, kind, steps);
+            for (lag, sum) in lags.iter_mut().enumerate() {
+                let ahead = wave.iter().skip(lag);
+                *sum += ahead.zip(&wave).map(|(ahead, behind)| (ahead * behind.conj()).re).sum::<f64>();
+            }
+        }
+        lags.iter_mut().for_each(|sum| *sum /= (kinds * steps) as f64);
+        Self { step_s: 1.0 / (component.chip_rate_hz * steps as f64), lags }
+    }
+
+    /// Correlation of the waveform with itself `delay_s` later, 1 at no delay.
+    pub fn correlation(&self, delay_s: f64) -> f64 {
+        let at = delay_s.abs() / self.step_s;
+        let lag = at as usize;
+        let value = |lag: usize| self.lags.get(lag).copied().unwrap_or(0.0);
+        let share = at - lag as f64;
+        value(lag) + share * (value(lag + 1) - value(lag))
+    }
+
+    /// Power density at `hz` from the carrier, per hertz, for unit power.
+    pub fn density(&self, hz: f64) -> f64 {
+        let (first, rest) = self.lags.split_first().unwrap_or((&0.0, &[]));
+        let turn = TAU * hz * self.step_s;
+        let sum: f64 = (1..).zip(rest).map(|(lag, value)| value * libm::cos(turn * f64::from(lag))).sum();
+        self.step_s * sinc_squared(hz * self.step_s) * (first + 2.0 * sum)
+    }
+
+    /// Duration of a step, the distance of the correlation's corners.
+    pub fn step_s(&self) -> f64 {
+        self.step_s
+    }
+
+    /// Duration of a chip, beyond which nothing correlates.
+    pub fn chip_s(&self) -> f64 {
+        self.step_s * self.lags.len().saturating_sub(1) as f64
+    }
+}
+
+/// The steps of chip `index` with all layers.
+fn chip(layers: &[Layer], index: usize, steps: usize) -> Vec<Complex64> {
+    let mut wave = vec![Complex64::ZERO; steps];
+    for layer in layers.iter().filter(|layer| layer.covers(index)) {
+        let (sin, cos) = libm::sincos(TAU * layer.phase_cycles);
+        let amplitude = Complex64::new(cos, sin) * layer.weight;
+        let each = steps / layer.pulse.len().max(1);
+        let signs = layer.pulse.iter().flat_map(|&sign| std::iter::repeat_n(f64::from(sign), each));
+        wave.iter_mut().zip(signs).for_each(|(step, sign)| *step += amplitude * sign);
+    }
+    wave
+}
+
+/// (sin πx / πx)².
+pub fn sinc_squared(x: f64) -> f64 {
+    let angle = PI * x;
+    if angle.abs() < 1e-9 {
+        return 1.0;
+    }
+    let sinc = libm::sin(angle) / angle;
+    sinc * sinc
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Overlay;
+    use super::*;
+
+    const CHIP_S: f64 = 1.0 / 1.023e6;
+
+    fn shape(layers: &'static [Layer]) -> Shape {
+        let component = Component {
+            power_share: 1.0,
+            phase_cycles: 0.0,
+            chip_rate_hz: 1.023e6,
+            code_chips: 4092,
+            code: |_| None,
+            layers,
+            overlay: Overlay::None,
+            message: None,
+        };
+        component.shape()
+    }
+
+    /// √(10/11) and √(1/11) (Galileo OS SIS ICD 2.1, 2.3.3), √(29/33) and √(4/33) of chips (IS-GPS-800J, 3.3).
+    const A: f64 = 0.953_462_589_245_592_4;
+    const B: f64 = 0.301_511_344_577_763_6;
+    static CBOC_PLUS: [Layer; 2] = [Layer { weight: A, ..Layer::BOC11 }, Layer { weight: B, ..Layer::BOC61 }];
+    static CBOC_MINUS: [Layer; 2] = [Layer { weight: A, ..Layer::BOC11 }, Layer { weight: -B, ..Layer::BOC61 }];
+    static QUADRATURE: [Layer; 2] =
+        [Layer { weight: A, ..Layer::BOC11 }, Layer { weight: B, phase_cycles: 0.25, ..Layer::BOC61 }];
+    const SIX: [bool; 33] = {
+        let mut chips = [false; 33];
+        (chips[0], chips[4], chips[6], chips[29]) = (true, true, true, true);
+        chips
+    };
+    const ONE: [bool; 33] = {
+        let mut chips = [true; 33];
+        (chips[0], chips[4], chips[6], chips[29]) = (false, false, false, false);
+        chips
+    };
+    static TMBOC: [Layer; 2] = [Layer { chips: &ONE, ..Layer::BOC11 }, Layer { chips: &SIX, ..Layer::BOC61 }];
+
+    /// Sine-phased BOC(m, n) with 2m/n even, as printed (Betz 2001, eq. 12).
+    fn boc(hz: f64, m: f64) -> f64 {
+        let half_s = CHIP_S / (2.0 * m);
+        let wave = (PI * hz * half_s).tan() * (PI * hz * CHIP_S).sin() / (PI * hz);
+        wave * wave / CHIP_S
+    }
+
+    #[test]
+    fn spectra_are_the_printed_ones() {
+        let shapes = [
+            shape(&[Layer::BPSK]),
+            shape(&[Layer::BOC11]),
+            shape(&[Layer::BOC61]),
+            shape(&CBOC_PLUS),
+            shape(&CBOC_MINUS),
+            shape(&TMBOC),
+            shape(&QUADRATURE),
+        ];
+        for k in 1..400 {
+            let hz = 17_300.0 * f64::from(k) + 1.0;
+            let [bpsk, one, six, plus, minus, time, quadrature] = shapes.each_ref().map(|shape| shape.density(hz));
+            let near = |found: f64, printed: f64, what: &str| {
+                // Rounding of thirteen cosines, and of a tangent near its poles.
+                assert!((found - printed).abs() < 1e-9 * CHIP_S, "{what} at {hz} Hz: {found} for {printed}");
+            };
+            near(bpsk, CHIP_S * sinc_squared(hz * CHIP_S), "BPSK");
+            near(one, boc(hz, 1.0), "BOC(1,1)");
+            near(six, boc(hz, 6.0), "BOC(6,1)");
+            // MBOC is the mean of both components of E1; TMBOC has 4 of 33 chips, so 29/33 and 4/33; layers at right
+            // angles do not interfere.
+            near(0.5 * (plus + minus), 10.0 / 11.0 * boc(hz, 1.0) + boc(hz, 6.0) / 11.0, "MBOC");
+            near(time, 29.0 / 33.0 * boc(hz, 1.0) + 4.0 / 33.0 * boc(hz, 6.0), "TMBOC");
+            near(quadrature, 10.0 / 11.0 * boc(hz, 1.0) + boc(hz, 6.0) / 11.0, "QMBOC");
+        }
+    }
+
+    #[test]
+    fn correlations_are_the_printed_ones_and_the_spectrum_is_their_transform() {
+        let one = shape(&[Layer::BOC11]);
+        // BOC(1,1): 1 − 3|τ| to half a chip, then −(1 − |τ|).
+        for (delay_chips, expected) in [(0.0, 1.0), (0.25, 0.25), (0.5, -0.5), (0.75, -0.25), (1.0, 0.0), (1.5, 0.0)] {
+            assert!((one.correlation(delay_chips * CHIP_S) - expected).abs() < 1e-12, "{delay_chips}");
+            assert_eq!(one.correlation(-delay_chips * CHIP_S), one.correlation(delay_chips * CHIP_S));
+        }
+        // The slope at the peak is steeper where BOC(6,1) is subtracted: its cross term is 2ab·(R16 + R61).
+        for shape in [shape(&CBOC_PLUS), shape(&CBOC_MINUS), shape(&TMBOC), one] {
+            for hz in [0.3e6, 1.1e6, 5.9e6] {
+                let steps = 40_000;
+                let h = shape.chip_s() / f64::from(steps);
+                let sum: f64 = (0..steps)
+                    .map(|k| (f64::from(k) + 0.5) * h)
+                    .map(|delay_s| 2.0 * h * shape.correlation(delay_s) * (TAU * hz * delay_s).cos())
+                    .sum();
+                // Midpoints of a polygon times a cosine: h²/24 of the second derivative.
+                assert!((sum - shape.density(hz)).abs() < 1e-7 * CHIP_S, "{hz}");
+            }
+        }
+    }
+}
