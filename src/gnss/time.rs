@@ -21,6 +21,20 @@ pub struct Epoch {
     fraction: f64,
 }
 
+/// The time of a satellite system, by which its codes and messages run.
+///
+/// An [`Epoch`] stays GPS time; what a system's clock shows is some whole seconds less by definition, and off by
+/// nanoseconds in truth.
+#[derive(Debug, PartialEq, Eq)]
+pub struct TimeScale {
+    pub name: &'static str,
+    /// Whole seconds by which it is behind GPS time.
+    pub behind_gpst_s: i64,
+}
+
+/// GPS time (IS-GPS-200N, 3.3.4).
+pub static GPST: TimeScale = TimeScale { name: "GPST", behind_gpst_s: 0 };
+
 /// Why a text is not an instant.
 #[derive(Debug, Error, PartialEq)]
 #[error(

@@ -86,8 +86,8 @@ pub struct Expected {
     /// Known bias, and what may come on top of it in either direction.
     pub bias: Vector4<f64>,
     pub allowed: Vector4<f64>,
-    /// Covariance of the errors: of all that may vary, and of what varies within a run; of what should be stated, and squares of
-    /// the dilutions.
+    /// Covariance of the errors: of all that may vary, and of what varies within a run; of what should be
+    /// stated, and squares of the dilutions.
     pub noise: Matrix4<f64>,
     pub thermal: Matrix4<f64>,
     pub stated: Matrix4<f64>,

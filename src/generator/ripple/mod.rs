@@ -84,8 +84,8 @@ fn cell(scene: &Scene, fading: Option<Sv>, carrier_hz: f64, node: u64, ends: [Ri
     [older(from, from_s), older(to, to_s)]
 }
 
-/// The ripple of a signal on `carrier_hz`, which fades with satellite `fading`, at a place between samples; before the first
-/// sample that of the first.
+/// The ripple of a signal on `carrier_hz`, which fades with satellite `fading`, at a place between samples;
+/// before the first sample that of the first.
 pub fn at(scene: &Scene, fading: Option<Sv>, carrier_hz: f64, sample: f64) -> Ripple {
     if !any(scene, fading) {
         return Ripple::STILL;

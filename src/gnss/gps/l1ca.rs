@@ -5,6 +5,7 @@
 
 use crate::gnss::satellite::System;
 use crate::gnss::signal::{Carrier, Component, Layer, Message, Overlay, Signal};
+use crate::gnss::time::GPST;
 
 /// Chips in a C/A code period.
 pub const CODE_CHIPS: u32 = 1023;
@@ -14,6 +15,7 @@ pub static L1_CA: Signal = Signal {
     name: "GPS L1 C/A",
     rinex: "1C",
     system: System::Gps,
+    time: &GPST,
     constellation: [1, 32], // IS-GPS-200N, table 3-Ia, note: 33 to 37 are reserved for other uses
     carrier: Carrier::Common(1_575.42e6), // IS-GPS-200N, 3.3.1.1
     components: &[Component {

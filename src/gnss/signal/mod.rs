@@ -1,32 +1,70 @@
 //! A signal is data: a carrier and components, each with a code, the pulses that its chips have, and perhaps an overlay
 //! code and a message.
 //!
-//! To add a signal: one file in `gnss/<system>/` with a `static` [`Signal`], one word in [`SIGNALS`]. Law tests walk that
-//! registry. Nothing outside `gnss` may branch on a signal's name. What a component's spectrum and correlation are follows
-//! from its pulses ([`Shape`]).
+//! To add a signal: one file in `gnss/<system>/` with a `static` [`Signal`], one word in [`SIGNALS`]. Law
+//! tests walk that registry. A program that has a signal of its own calls [`register`] before it names it
+//! anywhere. Nothing outside `gnss` may branch on a signal's name. A component's spectrum and correlation
+//! follow from its pulses ([`Shape`]).
 
 use std::fmt;
 use std::hash::{Hash, Hasher};
+use std::sync::{PoisonError, RwLock};
+
+use thiserror::Error;
 
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::gps;
 use crate::gnss::satellite::{Sv, System};
+use crate::gnss::time::TimeScale;
 
 mod shape;
+#[cfg(any(test, feature = "planted"))]
+pub mod synthetic;
 
 pub use shape::Shape;
 
-/// Every signal that this program knows.
+/// The built-in signals.
 pub static SIGNALS: [&Signal; 1] = [&gps::l1ca::L1_CA];
+
+/// Signals that [`register`] has added. Names in files have to find them, so they are the program's, not a scene's.
+static ADDED: RwLock<Vec<&'static Signal>> = RwLock::new(Vec::new());
+
+/// Adds a signal to those that names find. The receiver searches for it where its settings name it. Adding the same
+/// signal again changes nothing.
+///
+/// # Errors
+/// Another signal of that name.
+pub fn register(signal: &'static Signal) -> Result<(), NameTaken> {
+    let mut added = ADDED.write().unwrap_or_else(PoisonError::into_inner);
+    match SIGNALS.iter().chain(added.iter()).find(|other| other.name == signal.name) {
+        Some(other) if std::ptr::eq(*other, signal) => {}
+        Some(_) => return Err(NameTaken(signal.name)),
+        None => added.push(signal),
+    }
+    Ok(())
+}
+
+/// All signals that names find: the built-in ones, then those that were added, in that order.
+pub fn all() -> Vec<&'static Signal> {
+    let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
+    SIGNALS.iter().chain(added.iter()).copied().collect()
+}
+
+/// Why a signal cannot be added.
+#[derive(Debug, Error, PartialEq)]
+#[error("there is another signal named '{0}'")]
+pub struct NameTaken(&'static str);
 
 /// A signal that satellites of one system send.
 #[derive(Debug)]
 pub struct Signal {
-    /// Name as people write it, unique in [`SIGNALS`].
+    /// Name as people write it, unique.
     pub name: &'static str,
     /// RINEX 3 band and attribute, for `C1C`, `L1C`, `D1C`, `S1C`.
     pub rinex: &'static str,
     pub system: System,
+    /// By which its codes and messages are timed.
+    pub time: &'static TimeScale,
     /// First and last number of the constellation's satellites; codes of others are reserved for other transmitters.
     pub constellation: [u8; 2],
     pub carrier: Carrier,
@@ -66,8 +104,8 @@ pub struct Component {
     pub chip_rate_hz: f64,
     /// Chips in one period of the code.
     pub code_chips: u32,
-    /// The code of a satellite by its number: `code_chips` values. +1 for a logical 0, −1 for a logical 1, and 0 where the
-    /// code of another component has its turn. `None` where the document assigns none.
+    /// The code of a satellite by its number: `code_chips` values. +1 for a logical 0, −1 for a logical 1,
+    /// and 0 where the code of another component has its turn. `None` where the document assigns none.
     pub code: fn(u8) -> Option<Vec<i8>>,
     /// What the waveform of a chip is the sum of.
     pub layers: &'static [Layer],
@@ -76,8 +114,8 @@ pub struct Component {
     pub message: Option<Message>,
 }
 
-/// A pulse that chips have, with its amplitude and phase: BPSK and BOC are one layer, CBOC and QMBOC two on every chip, TMBOC
-/// two on different chips.
+/// A pulse that chips have, with its amplitude and phase: BPSK and BOC are one layer, CBOC and QMBOC two on
+/// every chip, TMBOC two on different chips.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer {
     /// Amplitude. The mean power over all chips of all layers is one.
@@ -122,7 +160,7 @@ impl Message {
 impl Signal {
     /// The signal of that name.
     pub fn find(name: &str) -> Option<&'static Self> {
-        SIGNALS.into_iter().find(|signal| signal.name == name)
+        all().into_iter().find(|signal| signal.name == name)
     }
 
     /// Carrier frequency of a satellite; the middle of the band for one to which no channel is assigned.
@@ -309,25 +347,54 @@ mod tests {
     use super::*;
 
     #[test]
+    fn an_added_signal_is_found_by_its_name_and_no_other_may_have_it() {
+        static OWN: Signal = Signal { name: "own signal", ..gps::l1ca::L1_CA };
+        static OTHER: Signal = Signal { name: "own signal", rinex: "9X", ..gps::l1ca::L1_CA };
+        assert!(Signal::find("own signal").is_none());
+        register(&OWN).unwrap();
+        register(&OWN).unwrap();
+        assert!(std::ptr::eq(Signal::find("own signal").unwrap(), &OWN));
+        assert_eq!(all().iter().filter(|signal| signal.name == "own signal").count(), 1);
+        assert_eq!(register(&OTHER), Err(NameTaken("own signal")));
+        assert_eq!(&all()[..SIGNALS.len()], &SIGNALS);
+    }
+
+    #[test]
+    fn channels_divide_the_band() {
+        let carrier = Carrier::Channels { centre_hz: 1_602e6, step_hz: 562_500.0, channel: |n| (n < 25).then_some(5) };
+        let signal: &'static Signal =
+            Box::leak(Box::new(Signal { carrier, system: System::Glonass, ..gps::l1ca::L1_CA }));
+        let sv = Sv { system: System::Glonass, number: 3 };
+        // GLONASS ICD L1, L2 (5.1), table 3.1: channel 5 is 1604.8125 MHz.
+        assert_eq!(signal.link(sv).carrier_hz(), 1_604_812_500.0);
+        assert_eq!(signal.centre_hz(), 1_602e6);
+        // Codes are those of 37 numbers, channels of 24.
+        assert_eq!(signal.satellites().count(), 24);
+    }
+
+    #[test]
     fn every_registered_signal_is_complete_and_found_by_its_name() {
         for signal in SIGNALS {
             assert!(std::ptr::eq(Signal::find(signal.name).unwrap(), signal));
-            let power: f64 = signal.components.iter().map(|c| c.power_share).sum();
-            assert!((power - 1.0).abs() < 1e-12, "{signal}");
-            // One power of a component's layers over all chips that are not another's.
-            for component in signal.components {
-                assert!((component.shape().correlation(0.0) - 1.0).abs() < 1e-12, "{signal}");
-            }
-            for component in signal.components {
-                assert!(signal.satellites().count() > 0);
-                for sv in signal.satellites() {
-                    let code = (component.code)(sv.number).unwrap();
-                    assert_eq!(code.len(), component.code_chips as usize, "{signal} {sv}");
-                    assert!(code.iter().all(|chip| chip.abs() <= 1), "{signal} {sv}");
-                    let overlay = component.overlay.of(sv.number).unwrap();
-                    assert_eq!(overlay.len(), component.overlay.periods() as usize, "{signal} {sv}");
-                    assert!(overlay.iter().all(|chip| chip.abs() == 1), "{signal} {sv}");
-                }
+            complete(signal);
+        }
+    }
+
+    /// What holds for every signal.
+    pub(super) fn complete(signal: &'static Signal) {
+        let power: f64 = signal.components.iter().map(|c| c.power_share).sum();
+        assert!((power - 1.0).abs() < 1e-12, "{signal}");
+        assert!(signal.satellites().count() > 0, "{signal}");
+        for component in signal.components {
+            // The layers' power over all chips that are not another component's.
+            assert!((component.shape().correlation(0.0) - 1.0).abs() < 1e-12, "{signal}");
+            for sv in signal.satellites() {
+                let code = (component.code)(sv.number).unwrap();
+                assert_eq!(code.len(), component.code_chips as usize, "{signal} {sv}");
+                assert!(code.iter().all(|chip| chip.abs() <= 1), "{signal} {sv}");
+                let overlay = component.overlay.of(sv.number).unwrap();
+                assert_eq!(overlay.len(), component.overlay.periods() as usize, "{signal} {sv}");
+                assert!(overlay.iter().all(|chip| chip.abs() == 1), "{signal} {sv}");
             }
         }
     }

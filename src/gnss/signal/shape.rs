@@ -1,9 +1,10 @@
 //! Correlation function and spectrum of a component, from its pulses.
 //!
-//! Chips count as random and independent, so that only a chip's own waveform correlates. The waveform is constant over the
-//! steps of a chip, so its correlation is a polygon with a corner at each step, and the spectrum is exact too (J. W. Betz,
-//! "Binary offset carrier modulations for radionavigation", Navigation 48(4), 2001, eq. 3 and 4). What lines a short code
-//! has, filters and samplers are left out: an ideal signal of unlimited bandwidth.
+//! Chips count as random and independent, so that only a chip's own waveform correlates. The waveform is
+//! constant over the steps of a chip, so its correlation is a polygon with a corner at each step, and the
+//! spectrum is exact too (J. W. Betz, "Binary offset carrier modulations for radionavigation", Navigation
+//! 48(4), 2001, eq. 3 and 4). What lines a short code has, filters and samplers are left out: an ideal signal
+//! of unlimited bandwidth.
 
 use std::f64::consts::{PI, TAU};
 
@@ -131,7 +132,7 @@ mod tests {
     /// Sine-phased BOC(m, n) with 2m/n even, as printed (Betz 2001, eq. 12).
     fn boc(hz: f64, m: f64) -> f64 {
         let half_s = CHIP_S / (2.0 * m);
-        let wave = (PI * hz * half_s).tan() * (PI * hz * CHIP_S).sin() / (PI * hz);
+        let wave = libm::tan(PI * hz * half_s) * libm::sin(PI * hz * CHIP_S) / (PI * hz);
         wave * wave / CHIP_S
     }
 
@@ -179,7 +180,7 @@ mod tests {
                 let h = shape.chip_s() / f64::from(steps);
                 let sum: f64 = (0..steps)
                     .map(|k| (f64::from(k) + 0.5) * h)
-                    .map(|delay_s| 2.0 * h * shape.correlation(delay_s) * (TAU * hz * delay_s).cos())
+                    .map(|delay_s| 2.0 * h * shape.correlation(delay_s) * libm::cos(TAU * hz * delay_s))
                     .sum();
                 // Midpoints of a polygon times a cosine: h²/24 of the second derivative.
                 assert!((sum - shape.density(hz)).abs() < 1e-7 * CHIP_S, "{hz}");

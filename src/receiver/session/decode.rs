@@ -10,7 +10,8 @@ use crate::receiver::output::Output;
 use crate::receiver::run::ReceiveError;
 
 impl Session {
-    /// Gives every symbol to its decoder and takes in what comes out; `end` is the sample after those that were followed.
+    /// Gives every symbol to its decoder and takes in what comes out; `end` is the sample after those that
+    /// were followed.
     pub(super) fn decode(&mut self, end: u64, output: &mut Output) -> Result<(), ReceiveError> {
         for index in 0..self.tracks.len() {
             let near = self.near();

@@ -1,0 +1,215 @@
+//! Signals that no satellite sends, for tests alone: together they have every property that signals may have.
+//!
+//! Their codes are random. What assumes one BPSK component of 1 ms, one carrier, a code of ±1 or one time scale goes
+//! wrong with one of them.
+
+use super::{Carrier, Component, Layer, Overlay, Signal};
+use crate::gnss::satellite::System;
+use crate::gnss::time::{GPST, TimeScale};
+
+/// All of them.
+pub static SYNTHETIC: [&Signal; 5] = [&LONG_BOC, &QUADRATURE, &CHANNELS, &MULTIPLEXED, &MIXED];
+
+/// Three seconds behind GPS time.
+pub static OWN_TIME: TimeScale = TimeScale { name: "synthetic", behind_gpst_s: 3 };
+
+/// Two components with codes of 4 ms in BOC(1,1), one of them with an overlay of 25 chips, in a time of its own.
+pub static LONG_BOC: Signal = Signal {
+    name: "synthetic A",
+    rinex: "1X",
+    system: System::Galileo,
+    time: &OWN_TIME,
+    constellation: [1, 36],
+    carrier: Carrier::Common(1_575.42e6),
+    components: &[
+        Component {
+            power_share: 0.5,
+            phase_cycles: 0.0,
+            chip_rate_hz: 1.023e6,
+            code_chips: 4092,
+            code: |number| assigned(number, 36, || random(4092, u64::from(number))),
+            layers: &[Layer::BOC11],
+            overlay: Overlay::None,
+            message: None,
+        },
+        Component {
+            power_share: 0.5,
+            phase_cycles: 0.5,
+            chip_rate_hz: 1.023e6,
+            code_chips: 4092,
+            code: |number| assigned(number, 36, || random(4092, 100 + u64::from(number))),
+            layers: &[Layer::BOC11],
+            overlay: Overlay::Shared(&[
+                1, 1, -1, -1, 1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, -1, 1, -1, -1, 1, -1,
+            ]),
+            message: None,
+        },
+    ],
+};
+
+/// Ten chips in a microsecond, data and pilot at right angles, an overlay on each, on another carrier.
+pub static QUADRATURE: Signal = Signal {
+    name: "synthetic B",
+    rinex: "5X",
+    system: System::Gps,
+    time: &GPST,
+    constellation: [1, 32],
+    carrier: Carrier::Common(1_176.45e6),
+    components: &[
+        Component {
+            power_share: 0.5,
+            phase_cycles: 0.0,
+            chip_rate_hz: 10.23e6,
+            code_chips: 10_230,
+            code: |number| assigned(number, 32, || random(10_230, 200 + u64::from(number))),
+            layers: &[Layer::BPSK],
+            overlay: Overlay::Shared(&[1, 1, 1, 1, -1, -1, 1, -1, 1, -1]),
+            message: None,
+        },
+        Component {
+            power_share: 0.5,
+            phase_cycles: -0.25,
+            chip_rate_hz: 10.23e6,
+            code_chips: 10_230,
+            code: |number| assigned(number, 32, || random(10_230, 300 + u64::from(number))),
+            layers: &[Layer::BPSK],
+            overlay: Overlay::PerSatellite {
+                chips: 20,
+                of: |number| assigned(number, 32, || random(20, 400 + u64::from(number))),
+            },
+            message: None,
+        },
+    ],
+};
+
+/// One code for all satellites, each on its own carrier.
+pub static CHANNELS: Signal = Signal {
+    name: "synthetic C",
+    rinex: "1P",
+    system: System::Glonass,
+    time: &GPST,
+    constellation: [1, 24],
+    carrier: Carrier::Channels {
+        centre_hz: 1_602e6,
+        step_hz: 562_500.0,
+        channel: |number| (1..=24).contains(&number).then(|| (number % 14) as i8 - 7),
+    },
+    components: &[Component {
+        power_share: 1.0,
+        phase_cycles: 0.0,
+        chip_rate_hz: 0.511e6,
+        code_chips: 511,
+        code: |number| assigned(number, 24, || random(511, 500)),
+        layers: &[Layer::BPSK],
+        overlay: Overlay::None,
+        message: None,
+    }],
+};
+
+/// Chips of 10 230 and 767 250 in turn.
+pub static MULTIPLEXED: Signal = Signal {
+    name: "synthetic D",
+    rinex: "2X",
+    system: System::Gps,
+    time: &GPST,
+    constellation: [1, 32],
+    carrier: Carrier::Common(1_227.60e6),
+    components: &[
+        Component {
+            power_share: 0.5,
+            phase_cycles: 0.0,
+            chip_rate_hz: 1.023e6,
+            code_chips: 20_460,
+            code: |number| assigned(number, 32, || in_turn(10_230, 0, 600 + u64::from(number))),
+            layers: &[Layer::BPSK],
+            overlay: Overlay::None,
+            message: None,
+        },
+        Component {
+            power_share: 0.5,
+            phase_cycles: 0.0,
+            chip_rate_hz: 1.023e6,
+            code_chips: 1_534_500,
+            code: |number| assigned(number, 32, || in_turn(767_250, 1, 700 + u64::from(number))),
+            layers: &[Layer::BPSK],
+            overlay: Overlay::None,
+            message: None,
+        },
+    ],
+};
+
+const SIX: [bool; 33] = chips_with_six(true);
+const ONE: [bool; 33] = chips_with_six(false);
+
+/// A pilot with BOC(6,1) on four of 33 chips beside data in BOC(1,1), one to three in power.
+pub static MIXED: Signal = Signal {
+    name: "synthetic E",
+    rinex: "1L",
+    system: System::Qzss,
+    time: &GPST,
+    constellation: [1, 10],
+    carrier: Carrier::Common(1_575.42e6),
+    components: &[
+        Component {
+            power_share: 0.75,
+            phase_cycles: 0.0,
+            chip_rate_hz: 1.023e6,
+            code_chips: 10_230,
+            code: |number| assigned(number, 10, || random(10_230, 800 + u64::from(number))),
+            layers: &[Layer { chips: &ONE, ..Layer::BOC11 }, Layer { chips: &SIX, ..Layer::BOC61 }],
+            overlay: Overlay::PerSatellite {
+                chips: 1800,
+                of: |number| assigned(number, 10, || random(1800, 900 + u64::from(number))),
+            },
+            message: None,
+        },
+        Component {
+            power_share: 0.25,
+            phase_cycles: 0.0,
+            chip_rate_hz: 1.023e6,
+            code_chips: 10_230,
+            code: |number| assigned(number, 10, || random(10_230, 1000 + u64::from(number))),
+            layers: &[Layer::BOC11],
+            overlay: Overlay::None,
+            message: None,
+        },
+    ],
+};
+
+const fn chips_with_six(six: bool) -> [bool; 33] {
+    let mut chips = [!six; 33];
+    (chips[0], chips[4], chips[6], chips[29]) = (six, six, six, six);
+    chips
+}
+
+fn assigned(number: u8, last: u8, code: impl Fn() -> Vec<i8>) -> Option<Vec<i8>> {
+    (1..=last).contains(&number).then(code)
+}
+
+/// Values of ±1 by a congruential generator (Knuth's multiplier).
+fn random(length: usize, seed: u64) -> Vec<i8> {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let next = |_| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        if state >> 63 == 1 { -1 } else { 1 }
+    };
+    (0..length).map(next).collect()
+}
+
+/// `length` random chips at every other place from `first` on, zeros between.
+fn in_turn(length: usize, first: usize, seed: u64) -> Vec<i8> {
+    let mut chips = vec![0; 2 * length];
+    chips.iter_mut().skip(first).step_by(2).zip(random(length, seed)).for_each(|(chip, value)| *chip = value);
+    chips
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::complete;
+    use super::*;
+
+    #[test]
+    fn every_synthetic_signal_is_complete() {
+        SYNTHETIC.into_iter().for_each(complete);
+    }
+}
