@@ -77,7 +77,7 @@ impl MessageFault {
         match self.kind {
             Kind::BitErrors { rate, stream } => {
                 let index = start.seconds().div_euclid(SUBFRAME_S) as u64 * SUBFRAME_BITS + bit;
-                let word = stream.part(u64::from(sv.number)).word(index);
+                let word = stream.satellite(sv).word(index);
                 // 53 bits of it are a number in [0, 1).
                 ((word >> 11) as f64) < rate * 9_007_199_254_740_992.0
             }

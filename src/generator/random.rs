@@ -4,6 +4,8 @@
 //! SplitMix64's finaliser (Steele, Lea, Flood 2014) of the stream's key and the index; normals are Box and Muller's.
 //! Limits: a stream of 2^63 pairs; meant for thousands of numbers a second, not for every sample.
 
+use crate::gnss::satellite::{Sv, System};
+
 /// SplitMix64's increment, the golden ratio in 64 bits.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -34,6 +36,21 @@ impl Stream {
     /// The stream of a part that has a number.
     pub fn part(self, index: u64) -> Self {
         Self { key: mix(self.key ^ mix(index.wrapping_add(GOLDEN))) }
+    }
+
+    /// The stream of a satellite.
+    pub fn satellite(self, sv: Sv) -> Self {
+        // Numbers of GPS satellites stand for themselves; those of other systems follow in blocks of 256.
+        let block = match sv.system {
+            System::Gps => 0,
+            System::Glonass => 1,
+            System::Galileo => 2,
+            System::BeiDou => 3,
+            System::Qzss => 4,
+            System::Navic => 5,
+            System::Sbas => 6,
+        };
+        self.part(block << 8 | u64::from(sv.number))
     }
 
     /// Word number `index`.
@@ -85,5 +102,17 @@ mod tests {
         let all = [word(1, "a", 0), word(2, "a", 0), word(1, "b", 0), word(1, "a", 1), word(1, "aa", 0)];
         assert!((0..all.len()).all(|i| (0..i).all(|j| all[i] != all[j])));
         assert_eq!(word(1, "a", 0), all[0]);
+    }
+
+    #[test]
+    fn satellites_of_all_systems_have_streams_of_their_own() {
+        let stream = Stream::new(1, "a");
+        let mut words: Vec<u64> = System::LETTERS
+            .into_iter()
+            .flat_map(|(system, _)| (0..=u8::MAX).map(move |number| stream.satellite(Sv { system, number }).word(0)))
+            .collect();
+        assert_eq!(stream.satellite(Sv::gps(7)), stream.part(7));
+        words.sort_unstable();
+        assert!(words.windows(2).all(|pair| pair[0] != pair[1]));
     }
 }

@@ -247,7 +247,7 @@ pub(super) fn clocks(
                 let stream = Stream::new(seed, "satellite clock").part(number);
                 let all: Vec<Sv> = satellites.clone().unwrap_or_else(|| catalogue.satellites().collect());
                 for sv in &all {
-                    let oscillator = Oscillator::new(*law, rate, stream.part(u64::from(sv.number)));
+                    let oscillator = Oscillator::new(*law, rate, stream.satellite(*sv));
                     clocks.clocks.entry(*sv).or_default().noise.push(oscillator);
                 }
                 let who = satellites.as_ref().map_or("all satellites".to_owned(), |list| names(list));
