@@ -16,6 +16,7 @@ use crate::generator::departure::{Departure, minimum_jerk};
 use crate::generator::precise::Orbits;
 use crate::gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
 /// Duration of a hand-over, centred on the instant when the broadcast set changes. A step of Δ metres
@@ -161,23 +162,19 @@ impl Catalogue {
         Ok(found.map(|(state, clock)| (departed(state), clock)))
     }
 
+    /// By how much the clock of a satellite is ahead for `signal` of what [`Self::truth`] says for L1 C/A.
+    ///
+    /// From the group delays of the broadcast sets, through hand-overs as smoothly as the clock.
+    pub fn signal_clock_s(&self, sv: Sv, at: Epoch, signal: &Signal) -> f64 {
+        let sets = self.satellites.get(&sv).into_iter().flat_map(|timeline| weights(timeline, at));
+        sets.fold(0.0, |sum, (set, weight, _)| sum + (set.tgd_s - set.group_delay_s(signal)) * weight)
+    }
+
     /// The broadcast sets' orbit and clock; twice continuously differentiable across hand-overs.
     fn broadcast_truth(&self, sv: Sv, at: Epoch) -> Result<Option<(State, ClockState)>, OrbitError> {
         let Some(timeline) = self.satellites.get(&sv) else { return Ok(None) };
-        // Spans that may weigh in: those which begin before the blend's end and end after its begin.
-        let first = timeline.spans.partition_point(|s| s.from <= at.plus_s(-BLEND_S / 2.0)).saturating_sub(1);
-        let last = timeline.spans.partition_point(|s| s.from <= at.plus_s(BLEND_S / 2.0));
         let mut sum: Option<(State, ClockState)> = None;
-        for index in first..last {
-            let Some(set) = timeline.spans.get(index).and_then(|s| s.set).and_then(|i| timeline.sets.get(i)) else {
-                continue;
-            };
-            let (begun, begun_rate) = step(timeline, index, at);
-            let (ended, ended_rate) = step(timeline, index + 1, at);
-            let (weight, rate) = (begun - ended, begun_rate - ended_rate);
-            if weight == 0.0 && rate == 0.0 {
-                continue;
-            }
+        for (set, weight, rate) in weights(timeline, at) {
             let (state, clock) = set.state_and_clock_l1(at)?;
             let (total, total_clock) = sum.get_or_insert((
                 State { position_m: nalgebra::Vector3::zeros(), velocity_mps: nalgebra::Vector3::zeros() },
@@ -190,6 +187,20 @@ impl Catalogue {
         }
         Ok(sum)
     }
+}
+
+/// The sets that weigh in at `at`, each with its weight and the rate of that.
+fn weights(timeline: &Timeline, at: Epoch) -> impl Iterator<Item = (&Ephemeris, f64, f64)> {
+    // Those whose spans begin before the blend's end and end after its begin.
+    let first = timeline.spans.partition_point(|s| s.from <= at.plus_s(-BLEND_S / 2.0)).saturating_sub(1);
+    let last = timeline.spans.partition_point(|s| s.from <= at.plus_s(BLEND_S / 2.0));
+    (first..last).filter_map(move |index| {
+        let set = timeline.spans.get(index).and_then(|s| s.set).and_then(|i| timeline.sets.get(i))?;
+        let (begun, begun_rate) = step(timeline, index, at);
+        let (ended, ended_rate) = step(timeline, index + 1, at);
+        let (weight, rate) = (begun - ended, begun_rate - ended_rate);
+        (weight != 0.0 || rate != 0.0).then_some((set, weight, rate))
+    })
 }
 
 /// How far the change to span `index` is done at `at`, 0 to 1, and the rate of that: a quintic

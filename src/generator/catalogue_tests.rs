@@ -1,6 +1,8 @@
 use super::*;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::rinex;
+use crate::gnss::signal::synthetic::QUADRATURE;
 
 fn day() -> Vec<Ephemeris> {
     rinex::embedded().unwrap().ephemerides
@@ -21,6 +23,28 @@ fn the_rogue_record_of_the_real_day_and_no_other_is_left_out() {
         let sent = catalogue.sent_at(Sv::gps(1), at).unwrap();
         assert_ne!((sent.iode, sent.health), (90, 0));
         assert!(!catalogue.healthy(Sv::gps(1), at));
+    }
+}
+
+#[test]
+fn signals_of_a_satellite_differ_by_their_group_delays_and_pass_on_as_smoothly_as_the_clock() {
+    let (catalogue, _) = Catalogue::new(day());
+    for sv in catalogue.satellites() {
+        let Some(timeline) = catalogue.satellites.get(&sv) else { continue };
+        for pair in timeline.spans.windows(2) {
+            let (Some(before), Some(after)) = (pair[0].set, pair[1].set) else { continue };
+            let from = pair[1].from;
+            // (f_L1/f)² on 1176.45 MHz is (154/115)².
+            let ahead_s = |set: usize| timeline.sets[set].tgd_s * (1.0 - 154.0 * 154.0 / (115.0 * 115.0));
+            let found_s = |after_s: f64| catalogue.signal_clock_s(sv, from.plus_s(after_s), &QUADRATURE);
+            let middle_s = 0.5 * (ahead_s(before) + ahead_s(after));
+            for (found_s, expected_s) in
+                [(found_s(-400.0), ahead_s(before)), (found_s(0.0), middle_s), (found_s(400.0), ahead_s(after))]
+            {
+                assert!((found_s - expected_s).abs() < 1e-20, "{sv} {from}: {found_s} for {expected_s}");
+            }
+            assert_eq!(catalogue.signal_clock_s(sv, from, &L1_CA), 0.0);
+        }
     }
 }
 

@@ -33,6 +33,8 @@ const DOPPLER_STEP_TURNS: f64 = 1.0 / 64.0;
 #[derive(Clone, Debug)]
 pub struct Seen {
     pub emission: Emission,
+    /// The satellite's clock minus GPS time at emission, for this signal.
+    pub satellite_clock_s: f64,
     pub rays: Vec<Ray>,
     pub arrivals: Vec<Arrival>,
 }
@@ -105,7 +107,10 @@ fn arriving(scene: &Scene, signal: &Signal, bias_s: f64, gain: f64, emission: Em
         effect.act(&emission.sight, signal, &mut rays);
     }
     // Small numbers only: no reading of a clock enters a sum of seconds.
-    let common_s = bias_s + emission.travel_s - emission.satellite_clock_s;
+    let sent = emission.sight.received.plus_s(-emission.travel_s);
+    let ahead_s = scene.catalogue.signal_clock_s(emission.sight.sv, sent, signal);
+    let satellite_clock_s = emission.satellite_clock_s + ahead_s;
+    let common_s = bias_s + emission.travel_s - satellite_clock_s;
     rays.iter_mut().for_each(|ray| ray.cn0_hz *= gain);
     let arrivals = rays
         .iter()
@@ -117,7 +122,7 @@ fn arriving(scene: &Scene, signal: &Signal, bias_s: f64, gain: f64, emission: Em
             cn0_hz: ray.cn0_hz,
         })
         .collect();
-    Seen { emission, rays, arrivals }
+    Seen { emission, satellite_clock_s, rays, arrivals }
 }
 
 /// Whether `sv` is in the scene's sky when the receiver's clock reads `local`: it has a message to send and
@@ -242,7 +247,7 @@ pub fn observe(
         azimuth_deg: sight.look.azimuth_rad.to_degrees(),
         elevation_deg: sight.look.elevation_rad.to_degrees(),
         range_m: sight.range_m,
-        satellite_clock_m: SPEED_OF_LIGHT_MPS * (seen.emission.satellite_clock_s + departed_s),
+        satellite_clock_m: SPEED_OF_LIGHT_MPS * (seen.satellite_clock_s + departed_s),
         ionosphere_m: 0.5 * SPEED_OF_LIGHT_MPS * (ray.code_delay_s - ray.carrier_delay_s),
         troposphere_m: 0.5 * SPEED_OF_LIGHT_MPS * (ray.code_delay_s + ray.carrier_delay_s),
     };

@@ -8,7 +8,9 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
+use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
 /// A set of broadcast elements of one satellite, in SI units and radians.
@@ -52,6 +54,8 @@ pub struct Ephemeris {
     pub af1_sps: f64,
     pub af2_sps2: f64,
     pub tgd_s: f64,
+    /// Group delays of signals that have one of their own, by the signal's name; others follow from `tgd_s`.
+    pub signal_delays_s: Vec<(&'static str, f64)>,
 }
 
 /// Position and velocity in ECEF at one instant.
@@ -199,6 +203,25 @@ impl Ephemeris {
         ClockState { offset_s: clock.offset_s - planted!("gnss.clock.group_delay", self.tgd_s, -self.tgd_s), ..clock }
     }
 
+    /// By how much less than [`Self::clock`] the clock reads for a user of `signal` alone.
+    ///
+    /// A signal without a delay of its own has T_GD · (f_L1/f)²: the clock is that of two carriers whose
+    /// combination is free of what goes with 1/f² (IS-GPS-200N, 20.3.3.3.3.2, equation for L2).
+    pub fn group_delay_s(&self, signal: &Signal) -> f64 {
+        let own = self.signal_delays_s.iter().find(|(name, _)| *name == signal.name);
+        let ratio = L1_CA.carrier_hz(self.sv) / signal.carrier_hz(self.sv);
+        own.map_or(self.tgd_s * (ratio * ratio), |(_, delay_s)| *delay_s)
+    }
+
+    /// The clock as a user of `signal` alone meets it.
+    ///
+    /// # Errors
+    /// As [`Self::clock`].
+    pub fn clock_of_signal(&self, at: Epoch, signal: &Signal) -> Result<ClockState, OrbitError> {
+        let clock = self.clock(at)?;
+        Ok(ClockState { offset_s: clock.offset_s - self.group_delay_s(signal), ..clock })
+    }
+
     /// Curve fit interval: four hours, or what the issue of data says when the fit flag is set
     /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).
     pub fn fit_interval_s(&self) -> f64 {
@@ -239,7 +262,8 @@ impl Ephemeris {
             ("af2", self.af2_sps2),
             ("tgd", self.tgd_s),
         ];
-        match elements.into_iter().find(|(_, value)| !value.is_finite()) {
+        let delays = self.signal_delays_s.iter().map(|(_, delay_s)| ("group delay of a signal", *delay_s));
+        match elements.into_iter().chain(delays).find(|(_, value)| !value.is_finite()) {
             Some((element, value)) => error(element, value, "a finite number"),
             None => Ok(()),
         }
@@ -289,6 +313,7 @@ pub fn solve_kepler(mean_rad: f64, eccentricity: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::signal::Carrier;
 
     fn example() -> Ephemeris {
         let toe = Epoch::from_week(1590, 345_600.0);
@@ -324,6 +349,7 @@ mod tests {
             af1_sps: 3.183_231_456_21e-12,
             af2_sps2: 0.0,
             tgd_s: -1.722_946_751_76e-8,
+            signal_delays_s: Vec::new(),
         }
     }
 
@@ -375,6 +401,22 @@ mod tests {
             assert!(matches!(set.state(at), Err(OrbitError::Element { element, .. }) if element == name));
             assert!(set.clock_l1(at).is_err());
         }
+    }
+
+    #[test]
+    fn every_signal_has_the_clock_less_its_own_group_delay() {
+        static L2: Signal = Signal { name: "on L2", carrier: Carrier::Common(1_227.6e6), ..L1_CA };
+        static OWN: Signal = Signal { name: "own", ..L2 };
+        let set = Ephemeris { signal_delays_s: vec![("own", 3.5e-9)], ..example() };
+        let at = set.toe.plus_s(1234.0);
+        let (l1, bare) = (set.clock_l1(at).unwrap(), set.clock(at).unwrap());
+        assert_eq!(set.clock_of_signal(at, &L1_CA).unwrap(), l1);
+        // IS-GPS-200N, 20.3.3.3.3.2: γ = (77/60)² for L2.
+        let (gamma, l2) = (77.0 * 77.0 / 3600.0, set.clock_of_signal(at, &L2).unwrap());
+        assert!((l2.offset_s - (bare.offset_s - gamma * set.tgd_s)).abs() < 1e-19);
+        assert_eq!(set.group_delay_s(&OWN), 3.5e-9);
+        let wrong = Ephemeris { signal_delays_s: vec![("own", f64::NAN)], ..example() };
+        assert!(wrong.state(at).is_err());
     }
 
     #[test]

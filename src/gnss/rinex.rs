@@ -244,6 +244,7 @@ fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
         af1_sps: both("af1", 3.726e-9)?,
         af2_sps2: both("af2", 3.553e-15)?,
         tgd_s: both("tgd", 5.961e-8)?,
+        signal_delays_s: Vec::new(),
     })
 }
 

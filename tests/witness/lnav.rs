@@ -110,6 +110,7 @@ fn rinex_records(text: &str) -> Vec<Ephemeris> {
             af1_sps: cell(head, 2),
             af2_sps2: cell(head, 3),
             tgd_s: v(6, 2),
+            signal_delays_s: Vec::new(),
         });
     }
     records
@@ -275,6 +276,7 @@ fn example() -> Ephemeris {
         af1_sps: -1.0e-12,
         af2_sps2: 0.0,
         tgd_s: -1.07e-8,
+        signal_delays_s: Vec::new(),
     }
 }
 

@@ -317,5 +317,6 @@ fn blank_ephemeris(sv: Sv, at: Epoch) -> Ephemeris {
         af1_sps: 0.0,
         af2_sps2: 0.0,
         tgd_s: 0.0,
+        signal_delays_s: Vec::new(),
     }
 }
