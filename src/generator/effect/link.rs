@@ -9,6 +9,7 @@ use super::antenna::{Antenna, Curve, Pattern, gain_db};
 use super::transmit::Block;
 use crate::generator::ray::{Effect, Ray, Sight};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 
@@ -21,7 +22,8 @@ const ZENITH_RANGE_M: f64 = 1.965e7;
 /// A link budget; [`LinkBudget::default`] is a GPS L1 C/A satellite and an ordinary receiver.
 #[derive(Clone, Debug)]
 pub struct LinkBudget {
-    /// Power into the satellite's antenna, dBW.
+    /// Power of L1 C/A into the satellite's antenna, dBW; other signals' are as much more as their documents'
+    /// minima on the ground.
     pub transmit_dbw: f64,
     /// The satellites' block …
     pub block: Block,
@@ -93,6 +95,14 @@ impl LinkBudget {
     }
 }
 
+/// Power into the satellite's antenna above that of L1 C/A: as much as brings the powers received, range and
+/// patterns alike, as far apart as the documents' minima. Scenarios with signals without one are refused.
+fn over_l1_db(signal: &Signal, sv: Sv) -> f64 {
+    let minima = signal.minimum_power_dbw.zip(L1_CA.minimum_power_dbw);
+    let apart_db = |(own_dbw, l1_dbw): (f64, f64)| own_dbw - l1_dbw;
+    minima.map_or(0.0, apart_db) + 20.0 * libm::log10(signal.carrier_hz(sv) / L1_CA.carrier_hz(sv))
+}
+
 impl Effect for LinkBudget {
     fn name(&self) -> &'static str {
         "link_budget"
@@ -113,7 +123,7 @@ impl Effect for LinkBudget {
     /// Sets the power of every ray to that of the direct one, and adds the antenna's phase.
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
         let (cn0_dbhz, phase_cycles) = self.budget(sight, signal.carrier_hz(sight.sv));
-        set_all(rays, cn0_dbhz);
+        set_all(rays, cn0_dbhz + over_l1_db(signal, sight.sv));
         for ray in rays {
             ray.phase_cycles += phase_cycles;
         }
@@ -155,8 +165,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::gnss::broadcast::State;
     use crate::gnss::earth::{Geodetic, Look};
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::satellite::Sv;
+    use crate::gnss::signal::Carrier;
     use crate::gnss::time::Epoch;
 
     /// A sight line with the spherical geometry of the reference table: radii 6378 and 26 560 km.
@@ -207,6 +216,18 @@ pub(crate) mod tests {
             let received_dbw = budget.cn0_dbhz(&sight(elevation, 0.0), L1_CA.centre_hz()) - 204.0 + 2.5 + 2.0;
             assert!((-158.5..-154.0).contains(&received_dbw), "{elevation}: {received_dbw}");
         }
+    }
+
+    #[test]
+    fn signals_of_other_bands_are_received_as_far_apart_as_their_minima() {
+        let cn0_dbhz = |signal: &Signal| {
+            let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
+            LinkBudget::default().act(&sight(40.0, 0.0), signal, &mut rays);
+            10.0 * libm::log10(rays[0].cn0_hz)
+        };
+        let stronger = Signal { carrier: Carrier::Common(1_176.45e6), minimum_power_dbw: Some(-154.0), ..L1_CA };
+        // Friis' 2.5 dB between the carriers are in the transmitted power, not in the received one.
+        assert!((cn0_dbhz(&stronger) - cn0_dbhz(&L1_CA) - 4.5).abs() < 1e-9);
     }
 
     #[test]

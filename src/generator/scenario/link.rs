@@ -85,6 +85,12 @@ impl Power {
     ) -> Result<Box<dyn Effect>, ScenarioError> {
         match self {
             Self::LinkBudget { transmit, transmit_dbw, blocks, antenna, noise_figure_db, loss_db } => {
+                if let Some(signal) = scenario.signals.iter().find(|signal| signal.minimum_power_dbw.is_none()) {
+                    let reason = format!(
+                        "\"link_budget\" with {signal}: no least power on the ground is known of it; write cn0_dbhz instead"
+                    );
+                    return Err(scenario.conflict("power.kind", reason));
+                }
                 let (block, flying) = match transmit {
                     Transmit::Block(block) => (*block, Vec::new()),
                     Transmit::Constellation => (Block::Typical, constellation(scenario)?),

@@ -449,6 +449,19 @@ fn numbers_outside_their_range_are_refused_with_range_and_unit() {
 }
 
 #[test]
+fn a_link_budget_is_refused_for_a_signal_whose_least_power_is_not_known() {
+    let mut scenario = parse(&format!("{MINIMAL}{STATIC}[power]\nkind = \"link_budget\"\n")).unwrap();
+    let compose = |scenario: &Scenario| scenario.compose(Path::new("scenarios"), &Overrides::default());
+    assert!(compose(&scenario).is_ok());
+    scenario.signals.push(&crate::gnss::signal::synthetic::LONG_BOC);
+    let Err(error) = compose(&scenario) else { panic!("composed") };
+    let error = error.to_string();
+    assert!(error.contains("power.kind") && error.contains("synthetic A"), "{error}");
+    scenario.power = Power::Fixed { cn0_dbhz: 45.0, satellites: Vec::new() };
+    assert_eq!(compose(&scenario).unwrap().0.signals.len(), 2);
+}
+
+#[test]
 fn what_contradicts_itself_is_refused_with_the_computed_number() {
     let front_end = |lines: &str| parse(&format!("{MINIMAL}{STATIC}[front_end]\n{lines}")).unwrap_err().to_string();
     assert!(front_end("sample_rate_hz = 4e6\nif_hz = 2.5e6").contains("2000000 Hz"));

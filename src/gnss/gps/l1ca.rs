@@ -18,6 +18,7 @@ pub static L1_CA: Signal = Signal {
     time: &GPST,
     constellation: [1, 32], // IS-GPS-200N, table 3-Ia, note: 33 to 37 are reserved for other uses
     carrier: Carrier::Common(1_575.42e6), // IS-GPS-200N, 3.3.1.1
+    minimum_power_dbw: Some(-158.5), // IS-GPS-200N, table 3-Va
     components: &[Component {
         power_share: 1.0,
         phase_cycles: 0.0,

@@ -68,6 +68,9 @@ pub struct Signal {
     /// First and last number of the constellation's satellites; codes of others are reserved for other transmitters.
     pub constellation: [u8; 2],
     pub carrier: Carrier,
+    /// Least power received on the ground that its documents promise, of all components together; where none
+    /// is known a link budget is refused.
+    pub minimum_power_dbw: Option<f64>,
     /// What is sent on that carrier; powers add up to one.
     pub components: &'static [Component],
 }

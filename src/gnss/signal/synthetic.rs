@@ -21,6 +21,7 @@ pub static LONG_BOC: Signal = Signal {
     time: &OWN_TIME,
     constellation: [1, 36],
     carrier: Carrier::Common(1_575.42e6),
+    minimum_power_dbw: None,
     components: &[
         Component {
             power_share: 0.5,
@@ -55,6 +56,7 @@ pub static QUADRATURE: Signal = Signal {
     time: &GPST,
     constellation: [1, 32],
     carrier: Carrier::Common(1_176.45e6),
+    minimum_power_dbw: None,
     components: &[
         Component {
             power_share: 0.5,
@@ -94,6 +96,7 @@ pub static CHANNELS: Signal = Signal {
         step_hz: 562_500.0,
         channel: |number| (1..=24).contains(&number).then(|| (number % 14) as i8 - 7),
     },
+    minimum_power_dbw: None,
     components: &[Component {
         power_share: 1.0,
         phase_cycles: 0.0,
@@ -114,6 +117,7 @@ pub static MULTIPLEXED: Signal = Signal {
     time: &GPST,
     constellation: [1, 32],
     carrier: Carrier::Common(1_227.60e6),
+    minimum_power_dbw: None,
     components: &[
         Component {
             power_share: 0.5,
@@ -149,6 +153,7 @@ pub static MIXED: Signal = Signal {
     time: &GPST,
     constellation: [1, 10],
     carrier: Carrier::Common(1_575.42e6),
+    minimum_power_dbw: None,
     components: &[
         Component {
             power_share: 0.75,
