@@ -131,22 +131,25 @@ impl Levels {
     }
 }
 
-/// The strongest satellite in view at the scene's start, and the C/N0 in dB-Hz of its direct ray of the first
-/// signal: the S of a jammer's J/S. `None` where nothing is in view, or nothing says how strong it is.
+/// The strongest satellite in view at the scene's start, and the C/N0 in dB-Hz of the direct ray of its
+/// strongest signal: the S of a jammer's J/S. `None` where nothing is in view, or nothing says how strong it
+/// is.
 ///
 /// # Errors
 /// Those of the orbit.
 pub fn strongest(scene: &Scene) -> Result<Option<(Sv, f64)>, OrbitError> {
-    let (motion, signal) = (scene.trajectory.at(0.0), scene.signals.first());
+    let motion = scene.trajectory.at(0.0);
     let mut found: Option<(Sv, f64)> = None;
     for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
         let seen = emission(&scene.catalogue, sv, scene.clock.start, &motion)?.filter(|e| scene.sees(&e.sight));
-        let (Some(seen), Some(signal)) = (seen, signal) else { continue };
-        let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
-        scene.effects.iter().for_each(|effect| effect.act(&seen.sight, signal, &mut rays));
-        let cn0_hz = rays.first().map_or(0.0, |ray| ray.cn0_hz);
-        if cn0_hz > 0.0 && found.is_none_or(|(_, most_dbhz)| 10.0 * libm::log10(cn0_hz) > most_dbhz) {
-            found = Some((sv, 10.0 * libm::log10(cn0_hz)));
+        let Some(seen) = seen else { continue };
+        for signal in scene.signals_of(sv) {
+            let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
+            scene.effects.iter().for_each(|effect| effect.act(&seen.sight, signal, &mut rays));
+            let cn0_hz = rays.first().map_or(0.0, |ray| ray.cn0_hz);
+            if cn0_hz > 0.0 && found.is_none_or(|(_, most_dbhz)| 10.0 * libm::log10(cn0_hz) > most_dbhz) {
+                found = Some((sv, 10.0 * libm::log10(cn0_hz)));
+            }
         }
     }
     Ok(found)
@@ -211,7 +214,7 @@ fn spoofed(scene: &Scene, from: &Constellation) -> Result<Spoofed, OrbitError> {
                 continue;
             }
             let mut sum_hz = 0.0;
-            for signal in &scene.signals {
+            for signal in scene.signals_of(sv) {
                 let seen = truth::seen_from(scene, from, sv, signal, local)?;
                 sum_hz += seen.map_or(0.0, |seen| seen.rays.iter().map(|ray| ray.cn0_hz).sum::<f64>());
             }

@@ -42,7 +42,7 @@ pub struct InView {
     /// At the first instant at which it is above the mask.
     pub azimuth_deg: f64,
     pub elevation_deg: f64,
-    /// Of the first signal; `None` when nothing in the scene says how strong it is.
+    /// Of its first signal; `None` when nothing in the scene says how strong it is.
     pub cn0_dbhz: Option<f64>,
     /// Power of all its signals and rays over noise density, weakest and strongest of the instants.
     pub power_dbhz: Option<Span>,
@@ -101,7 +101,8 @@ impl Plan {
         let satellites = in_view(scene, duration_s)?;
         // A spoofer sends about as many signals again.
         let sources = (1 + scene.spoofers.len()) as f64;
-        let up = satellites.len() as f64 * scene.signals.len() as f64 * sources + scene.interference.len() as f64;
+        let links: usize = satellites.iter().map(|satellite| scene.signals_of(satellite.sv).count()).sum();
+        let up = links as f64 * sources + scene.interference.len() as f64;
         let bytes = scene.samples.saturating_mul(scene.metadata.format.bytes() as u64);
         let knots =
             scene.trajectory.knots().len() as u64 * std::mem::size_of::<crate::generator::vehicle::Knot>() as u64;
@@ -177,11 +178,11 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
     Ok(rows)
 }
 
-/// Power over noise density in dB-Hz of the first signal's direct ray, and of all signals and rays together;
-/// `None` when nothing in the scene says how strong they are.
+/// Power over noise density in dB-Hz of a satellite's first signal's direct ray, and of all signals and rays
+/// together; `None` when nothing in the scene says how strong they are.
 pub(crate) fn strength_dbhz(scene: &Scene, sight: &Sight) -> (Option<f64>, Option<f64>) {
     let (mut direct_hz, mut sum_hz) = (None, 0.0);
-    for signal in &scene.signals {
+    for signal in scene.signals_of(sight.sv) {
         let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
         scene.effects.iter().for_each(|effect| effect.act(sight, signal, &mut rays));
         direct_hz = direct_hz.or(rays.first().map(|ray| ray.cn0_hz));

@@ -22,7 +22,7 @@ use crate::gnss::facts::{Expect, Fault};
 use crate::gnss::gps::lnav::Broadcast;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::{Link, Signal};
 use crate::gnss::time::SampleClock;
 
 /// Height from which on the Earth hides satellites, and no longer the mask.
@@ -92,6 +92,12 @@ impl Scene {
         self.front_end.iter().for_each(|stage| visit(stage.as_ref()));
     }
 
+    /// The scene's signals that a satellite sends and of which the samples can hold anything.
+    pub fn signals_of(&self, sv: Sv) -> impl Iterator<Item = &'static Signal> {
+        let own = self.signals.iter().copied().filter(move |signal| signal.system == sv.system);
+        own.filter(move |signal| !is_link_outside(&self.metadata, signal.link(sv)))
+    }
+
     /// Whether a satellite is in view: above the mask, or from space not behind the Earth.
     pub fn sees(&self, sight: &Sight) -> bool {
         if sight.user.height_m < SPACE_M {
@@ -127,17 +133,27 @@ pub fn folded_hz(hz: f64, rate_hz: f64) -> f64 {
     hz - rate_hz * (hz / rate_hz).round()
 }
 
-/// Where the main lobe of a signal without Doppler lies in the samples' spectrum, from and to, in hertz.
+/// Where the main lobes of a signal without Doppler lie in the samples' spectrum, from and to, in hertz:
+/// those of all its satellites.
 pub fn main_lobe_hz(metadata: &IfMetadata, signal: &Signal) -> (f64, f64) {
-    let if_hz = metadata.if_hz(signal.centre_hz());
-    let half_hz = signal.components.iter().fold(0.0_f64, |half, c| half.max(c.chip_rate_hz));
-    (if_hz - half_hz, if_hz + half_hz)
+    let (lowest_hz, highest_hz) = signal.carriers_hz();
+    let (one_hz, other_hz) = (metadata.if_hz(lowest_hz), metadata.if_hz(highest_hz));
+    (one_hz.min(other_hz) - signal.lobe_hz(), one_hz.max(other_hz) + signal.lobe_hz())
 }
 
-/// Whether the main lobe lies wholly outside the band of complex samples. Of real samples the band is not known: an IF
-/// beyond half the rate is how bandpass sampling works.
+/// Whether the main lobes lie wholly outside the band of complex samples. Of real samples the band is not
+/// known: an IF beyond half the rate is how bandpass sampling works.
 pub fn is_outside(metadata: &IfMetadata, signal: &Signal) -> bool {
+    is_beyond(metadata, main_lobe_hz(metadata, signal))
+}
+
+/// [`is_outside`] of one satellite's signal.
+pub fn is_link_outside(metadata: &IfMetadata, link: Link) -> bool {
+    let (if_hz, half_hz) = (metadata.if_hz(link.carrier_hz()), link.signal.lobe_hz());
+    is_beyond(metadata, (if_hz - half_hz, if_hz + half_hz))
+}
+
+fn is_beyond(metadata: &IfMetadata, (low_hz, high_hz): (f64, f64)) -> bool {
     let half_hz = 0.5 * metadata.rate.hz();
-    let (low_hz, high_hz) = main_lobe_hz(metadata, signal);
     metadata.format.is_complex() && (low_hz >= half_hz || high_hz <= -half_hz)
 }

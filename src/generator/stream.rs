@@ -336,9 +336,12 @@ pub(crate) fn cutoff_cps(scene: &Scene) -> f64 {
     }
     let rate_hz = scene.clock.rate.hz();
     scene.signals.iter().fold(CUTOFF_CPS, |least, signal| {
-        let place = (folded_hz(scene.metadata.if_hz(signal.centre_hz()), rate_hz) / rate_hz).abs();
-        let room = place.min(0.5 - place);
-        if room > 0.05 { least.min(2.0 * CUTOFF_CPS * room) } else { least }
+        let (lowest_hz, highest_hz) = signal.carriers_hz();
+        [lowest_hz, highest_hz].into_iter().fold(least, |least, carrier_hz| {
+            let place = (folded_hz(scene.metadata.if_hz(carrier_hz), rate_hz) / rate_hz).abs();
+            let room = place.min(0.5 - place);
+            if room > 0.05 { least.min(2.0 * CUTOFF_CPS * room) } else { least }
+        })
     })
 }
 
@@ -348,7 +351,7 @@ fn transmitters(scene: &Scene, edge: Edge<'_>) -> Result<Vec<Transmitter>, Gener
     let authentic = Arc::new(Constellation::authentic());
     for from in std::iter::once(&authentic).chain(&scene.spoofers) {
         for &sv in satellites.iter().filter(|sv| from.sends(**sv)) {
-            for signal in scene.signals.iter().filter(|signal| signal.system == sv.system) {
+            for signal in scene.signals_of(sv) {
                 found.extend(Transmitter::of(scene, Arc::clone(from), sv, signal, edge)?);
             }
         }

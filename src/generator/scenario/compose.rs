@@ -11,7 +11,7 @@ use crate::generator::presence;
 use crate::generator::random::Stream;
 use crate::generator::ray::Ray;
 use crate::generator::ripple::scintillation::Scintillation;
-use crate::generator::scene::{Scene, folded_hz, is_outside, main_lobe_hz};
+use crate::generator::scene::{Scene, folded_hz, is_link_outside, is_outside, main_lobe_hz};
 use crate::generator::sky::emission;
 use crate::generator::stage::playback::Playback;
 use crate::generator::vehicle::attitude::Nose;
@@ -19,7 +19,8 @@ use crate::generator::vehicle::{Trajectory, file, route};
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::samples::{Format, IfMetadata};
-use crate::gnss::signal::Signal;
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Carrier, Signal};
 use crate::gnss::time::SampleClock;
 
 /// Samples of one scene at most: 19 days at 60 Msps.
@@ -208,6 +209,14 @@ impl Scenario {
             if from < low || to > high {
                 warnings.push(format!("{told}: it will fold over"));
             }
+            let outside = |sv: &Sv| is_link_outside(metadata, signal.link(*sv));
+            if matches!(signal.carrier, Carrier::Channels { .. }) {
+                let absent: Vec<String> = signal.satellites().filter(outside).map(|sv| sv.to_string()).collect();
+                if !absent.is_empty() {
+                    let names = absent.join(" ");
+                    warnings.push(format!("{signal}: outside the samples' band, and not computed: {names}"));
+                }
+            }
             inside.push(signal);
         }
         if inside.is_empty() {
@@ -371,8 +380,8 @@ fn at_start(scene: &Scene) -> Result<(usize, f64), OrbitError> {
     for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
         let found = emission(&scene.catalogue, sv, scene.clock.start, &motion)?;
         let Some(found) = found.filter(|e| scene.sees(&e.sight)) else { continue };
-        visible += 1;
-        for signal in &scene.signals {
+        visible += usize::from(scene.signals_of(sv).next().is_some());
+        for signal in scene.signals_of(sv) {
             let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
             scene.effects.iter().for_each(|effect| effect.act(&found.sight, signal, &mut rays));
             sum_hz += rays.iter().fold(0.0, |sum, ray| sum + ray.cn0_hz);

@@ -189,6 +189,25 @@ impl Signal {
         }
     }
 
+    /// Lowest and highest carrier of the satellites to which one is assigned.
+    pub fn carriers_hz(&self) -> (f64, f64) {
+        match self.carrier {
+            Carrier::Common(hz) => (hz, hz),
+            Carrier::Channels { centre_hz, step_hz, channel } => {
+                let carriers = || {
+                    let channels = (1..=u8::MAX).filter_map(channel);
+                    channels.map(|channel| centre_hz + step_hz * f64::from(channel))
+                };
+                (carriers().fold(centre_hz, f64::min), carriers().fold(centre_hz, f64::max))
+            }
+        }
+    }
+
+    /// How far from the carrier the main lobes of its spectrum reach.
+    pub fn lobe_hz(&self) -> f64 {
+        self.components.iter().fold(0.0_f64, |most, component| most.max(component.lobe_hz()))
+    }
+
     /// Carrier wavelength of a satellite.
     pub fn wavelength_m(&self, sv: Sv) -> f64 {
         SPEED_OF_LIGHT_MPS / self.carrier_hz(sv)
@@ -240,6 +259,15 @@ impl Layer {
     /// BOC(m, n) with m = 6 n.
     pub const BOC61: Self = Self { pulse: &[1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1], ..Self::BPSK };
 
+    /// How far from the carrier the main lobes reach, in chip rates: 1 for BPSK, (m + n)/n for BOC(m, n).
+    pub fn lobe_chips(&self) -> f64 {
+        // Half a period of the square wave is its longest run of one sign; a cosine's begin and end in the
+        // middle of one.
+        let longest = self.pulse.chunk_by(|a, b| a == b).map(<[i8]>::len).max().unwrap_or(0);
+        let steps = self.pulse.len();
+        if longest == steps { 1.0 } else { 1.0 + 0.5 * steps as f64 / longest as f64 }
+    }
+
     /// Whether chip `index` of a code period has this pulse.
     pub fn covers(&self, index: usize) -> bool {
         self.chips.is_empty() || self.chips.get(index % self.chips.len()).copied().unwrap_or(false)
@@ -275,6 +303,11 @@ impl Component {
     /// Steps into which the pulses of all layers divide a chip.
     pub fn steps_per_chip(&self) -> usize {
         self.layers.iter().fold(1, |steps, layer| least_common_multiple(steps, layer.pulse.len().max(1)))
+    }
+
+    /// How far from the carrier the main lobes of the spectrum reach.
+    pub fn lobe_hz(&self) -> f64 {
+        self.chip_rate_hz * self.layers.iter().fold(0.0_f64, |most, layer| most.max(layer.lobe_chips()))
     }
 
     /// Correlation and spectrum of the waveform.
@@ -373,6 +406,19 @@ mod tests {
         assert_eq!(signal.centre_hz(), 1_602e6);
         // Codes are those of 37 numbers, channels of 24.
         assert_eq!(signal.satellites().count(), 24);
+    }
+
+    #[test]
+    fn lobes_reach_as_far_as_the_pulses_oscillate() {
+        let pulse = |pulse: &'static [i8]| Layer { pulse, ..Layer::BPSK }.lobe_chips();
+        assert_eq!([Layer::BPSK, Layer::BOC11, Layer::BOC61].map(|layer| layer.lobe_chips()), [1.0, 2.0, 7.0]);
+        // BOC(1.5, 1), BOC(1, 1) with a cosine, BOC(2, 1) with a cosine, and a chip in three equal steps.
+        assert_eq!(pulse(&[1, -1, 1]), 2.5);
+        assert_eq!(pulse(&[1, -1, -1, 1]), 2.0);
+        assert_eq!(pulse(&[1, -1, -1, 1, 1, -1, -1, 1]), 3.0);
+        assert_eq!(pulse(&[1, 1, 1]), 1.0);
+        assert_eq!(synthetic::MIXED.lobe_hz(), 7.0 * 1.023e6);
+        assert_eq!(synthetic::CHANNELS.carriers_hz(), (1_598_062_500.0, 1_605_375_000.0));
     }
 
     #[test]

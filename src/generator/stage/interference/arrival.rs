@@ -39,10 +39,7 @@ impl Tuning {
             center_hz: scene.metadata.center_hz,
             inverted: scene.metadata.inverted,
             real: !scene.metadata.format.is_complex(),
-            low_hz: scene
-                .signals
-                .first()
-                .map_or(0.0, |signal| (scene.metadata.if_hz(signal.centre_hz()) / half_hz).floor() * half_hz),
+            low_hz: zone_of(scene, half_hz) * half_hz,
             noise_lsb: f64::from(scene.noise_lsb),
         }
     }
@@ -93,6 +90,16 @@ impl Tuning {
         let step = tone.wrapping_sub(fraction_turns(carrier_hz * change_s / samples as f64));
         if self.inverted { step.wrapping_neg() } else { step }
     }
+}
+
+/// The stretch of `half_hz` in which most of the scene's carriers lie, counted from 0 Hz; of equals the first
+/// signal's.
+fn zone_of(scene: &Scene, half_hz: f64) -> f64 {
+    let carriers = scene.signals.iter().flat_map(|signal| <[f64; 2]>::from(signal.carriers_hz()));
+    let zones: Vec<f64> = carriers.map(|hz| (scene.metadata.if_hz(hz) / half_hz).floor()).collect();
+    let votes = |zone: &f64| zones.iter().filter(|other| *other == zone).count();
+    // The last of equals is the first in reverse.
+    zones.iter().rev().max_by_key(|zone| votes(zone)).copied().unwrap_or(0.0)
 }
 
 /// Cycles modulo one, in 2^-64 turn.
