@@ -15,10 +15,11 @@ use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::generator::scene::{Arithmetic, Fidelity, Grade, Scene};
 use gnss_twin::generator::stage::noise::{BLOCK_SAMPLES, add_block_exact};
 use gnss_twin::generator::stream::{Options, generate_with};
-use gnss_twin::generator::synth::chips::{CodeTime, Spreading};
+use gnss_twin::generator::synth::chips::CodeTime;
 use gnss_twin::generator::synth::isa::{self, Level, add_noise};
 use gnss_twin::generator::synth::lanes::{Buffers, GROUP};
 use gnss_twin::generator::synth::transmitter::{Scratch, Transmitter};
+use gnss_twin::generator::synth::waveform::plain;
 use gnss_twin::generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run};
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
@@ -241,8 +242,8 @@ fn profile() -> Vec<Line> {
         });
         let mut bits = Vec::new();
         let step = (1.023 / 2.6 * CODE_ONE as f64) as u64;
-        let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
-        let position = spreading.strip(CodeTime { period: 0, phase: 0 }, step, RUN_SAMPLES, |_| false, &mut bits);
+        let spreading = plain(&L1_CA, 11).unwrap();
+        let position = spreading.strip(CodeTime::new(0, 0), step, RUN_SAMPLES, |_| false, &mut bits);
         let run =
             Run { bits: &bits, position, step, turns: 1 << 60, turns_step: 0x0765_4321_0fed_cba9, amplitude: 0.3 };
         let mut buffers = Buffers::default();

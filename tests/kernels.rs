@@ -3,11 +3,13 @@
 
 use gnss_twin::generator::stage::noise::BLOCK_SAMPLES;
 use gnss_twin::generator::synth::band::Filter;
-use gnss_twin::generator::synth::chips::{CodeTime, Spreading};
+use gnss_twin::generator::synth::chips::CodeTime;
 use gnss_twin::generator::synth::isa::{Level, accumulate, add_noise};
 use gnss_twin::generator::synth::lanes::Buffers;
+use gnss_twin::generator::synth::waveform::{Waveform, plain};
 use gnss_twin::generator::synth::{CODE_ONE, Edge, Run, reference};
 use gnss_twin::gnss::gps::l1ca::L1_CA;
+use gnss_twin::gnss::satellite::Sv;
 
 const CHIP_HZ: f64 = 1.023e6;
 
@@ -19,7 +21,7 @@ struct Case {
 
 impl Case {
     fn new(rate_hz: f64, at: CodeTime, samples: usize) -> Self {
-        let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
+        let spreading = plain(&L1_CA, 11).unwrap();
         let step = (CHIP_HZ / rate_hz * CODE_ONE as f64) as u64;
         let mut bits = Vec::new();
         let position = spreading.strip(at, step, samples, |period| period % 2 == 1, &mut bits);
@@ -56,7 +58,7 @@ fn the_fast_kernel_keeps_to_the_reference_at_all_lengths_phases_and_rates() {
             for length in (0..=130).chain([1000, 4096]) {
                 // Chip 1020 puts the wrap of the code, with a change of data sign, into the run.
                 let phase = 1020 * CODE_ONE + length as u64 * (CODE_ONE / 131);
-                let case = Case::new(rate_hz, CodeTime { period: 8, phase }, length);
+                let case = Case::new(rate_hz, CodeTime::new(8, phase), length);
                 let run = case.run(1.0);
                 let (i, q) = fast(Level::Baseline, edge, &run, length);
                 let (mut ri, mut rq) = (vec![0.0; length], vec![0.0; length]);
@@ -91,7 +93,7 @@ fn runs_together_are_the_sum_of_each_by_itself() {
         for length in [1, 31, 32, 33, 1000, 4096] {
             let cases: Vec<Case> = (0..)
                 .zip(rates)
-                .map(|(k, rate_hz)| Case::new(rate_hz, CodeTime { period: k, phase: 777 * CODE_ONE }, length))
+                .map(|(k, rate_hz)| Case::new(rate_hz, CodeTime::new(k, 777 * CODE_ONE), length))
                 .collect();
             let runs: Vec<Run<'_>> = (1..)
                 .zip(&cases)
@@ -154,7 +156,7 @@ fn every_instruction_set_gives_the_same_bits() {
     for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
         for rate_hz in [0.7e6, 1.5e6, 2.6e6, 60e6] {
             for length in [1, 31, 32, 33, 500, 4096] {
-                let case = Case::new(rate_hz, CodeTime { period: 3, phase: 1000 * CODE_ONE + 12345 }, length);
+                let case = Case::new(rate_hz, CodeTime::new(3, 1000 * CODE_ONE + 12345), length);
                 for edge in edges(&filter) {
                     let run = case.run(0.3);
                     assert_eq!(fast(level, edge, &run, length), fast(Level::Baseline, edge, &run, length), "{level:?}");
@@ -173,14 +175,14 @@ fn every_instruction_set_gives_the_same_bits() {
 #[test]
 fn every_code_edge_keeps_the_mean_power_of_the_waveform() {
     let filter = Filter::new(0.45);
-    let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
+    let waveform = Waveform::new(L1_CA.link(Sv::gps(11)), 0).unwrap().unwrap();
     for rate_hz in [0.6e6, 1.5e6, 2.6e6, 10e6] {
         for edge in edges(&filter) {
-            let gain = edge.gain(spreading.correlation(), CHIP_HZ / rate_hz);
+            let gain = 1.0 / waveform.power(edge, rate_hz).sqrt();
             let mut sum = 0.0;
             let mut count = 0;
             for k in 0..40 {
-                let at = CodeTime { period: 0, phase: k * 25 * CODE_ONE + k * (CODE_ONE / 40) };
+                let at = CodeTime::new(0, k * 25 * CODE_ONE + k * (CODE_ONE / 40));
                 let case = Case::new(rate_hz, at, 4096);
                 let run = case.run(gain);
                 let (i, q) = fast(Level::detect(), edge, &run, 4096);
@@ -209,11 +211,11 @@ fn harmonic(x: &[f64], k: usize) -> (f64, f64) {
 /// By Fourier series: the code's harmonics `k` kHz, from its chips and the pulse's sinc, times those of the samples.
 fn code_bias_m(edge: Edge<'_>, rate_khz: usize, start_chips: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
-    let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
+    let spreading = plain(&L1_CA, 11).unwrap();
     let chips: Vec<f64> = (L1_CA.components[0].code)(11).unwrap().iter().map(|&chip| f64::from(chip)).collect();
     let step = (1023.0 / rate_khz as f64 * CODE_ONE as f64) as u64;
     let mut bits = Vec::new();
-    let at = CodeTime { period: 0, phase: (start_chips * CODE_ONE as f64) as u64 };
+    let at = CodeTime::new(0, (start_chips * CODE_ONE as f64) as u64);
     let position = spreading.strip(at, step, rate_khz, |_| false, &mut bits);
     let run = Run { bits: &bits, position, step, turns: 0, turns_step: 0, amplitude: 1.0 };
     let wave: Vec<f64> = fast(Level::detect(), edge, &run, rate_khz).0.into_iter().map(f64::from).collect();

@@ -20,6 +20,7 @@ use crate::generator::stage::Block;
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::isa::{self, Level};
 use crate::generator::synth::transmitter::{Scratch, Transmitter};
+use crate::generator::synth::waveform::WaveformError;
 use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
 use crate::generator::truth::{self, TruthError};
 use crate::gnss::broadcast::OrbitError;
@@ -99,8 +100,8 @@ pub enum GenerateError {
     Truth(#[from] TruthError),
     #[error("samples could not be written: {0}")]
     Write(#[from] std::io::Error),
-    #[error("{signal} at {rate_hz} samples a second: expected at least 1/15 of its code rate")]
-    Rate { rate_hz: f64, signal: &'static str },
+    #[error(transparent)]
+    Waveform(#[from] WaveformError),
     #[error("truth_interval_s = {0}: expected 1e-6 to 1e6 s")]
     TruthInterval(f64),
     #[error("samples {first} to {end} of a scene that has {samples}: expected a first one before the last")]
@@ -294,7 +295,7 @@ impl<'a> Stream<'a> {
     pub fn finish(mut self, truth: &mut truth::Writer) -> Result<Generated, GenerateError> {
         let mut navigation = BTreeSet::new();
         for transmitter in &mut self.transmitters {
-            navigation.append(&mut transmitter.navigation);
+            navigation.append(&mut transmitter.symbols.navigation);
             self.done.knots += transmitter.knots;
             self.done.worst_knot_cycles = self.done.worst_knot_cycles.max(transmitter.worst_knot_cycles);
         }

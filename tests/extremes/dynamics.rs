@@ -57,7 +57,7 @@ fn worst_cycles(scene: &Scene, sv: Sv, (from, to): (u64, u64), count: u64) -> (f
         let error = turns as f64 / TURN + seen.arrivals[0].carrier_cycles;
         carrier = carrier.max((error - error.round()).abs());
         let sent = scene.clock.epoch(n).plus_s(-seen.arrivals[0].delay_s);
-        let chips = sent.fraction() * 1.023e6 - place.phase as f64 / 281_474_976_710_656.0;
+        let chips = sent.fraction() * 1.023e6 - place.steps();
         let periods = chips / 1023.0;
         code = code.max((periods - periods.round()).abs() * 1023.0 * 1540.0);
     }
@@ -254,8 +254,7 @@ fn at_the_zero_of_doppler_nothing_divides() {
     // Code against carrier over a second about the crossing: rates differ by the Doppler over 1540.
     let at = |n: u64| transmitter.phases(&scene, n).unwrap();
     let ((turns_a, code_a), (turns_b, code_b)) = (at(low - 2_046_000), at(low + 2_045_999));
-    let chips = ((code_b.period - code_a.period) * 1023) as f64
-        + (code_b.phase as f64 - code_a.phase as f64) / 281_474_976_710_656.0;
+    let chips = ((code_b.period - code_a.period) * 1023) as f64 + (code_b.steps() - code_a.steps());
     let seconds = 4_091_999.0 / 4.092e6;
     let cycles = turns_b.wrapping_sub(turns_a) as i64 as f64 / TURN;
     the.at_most("Doppler at the crossing", doppler_hz(crossing, low).abs(), 1e-3, "Hz");

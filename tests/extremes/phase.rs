@@ -67,7 +67,7 @@ fn code_and_carrier_stay_together_for_an_hour_and_the_ionosphere_parts_them_by_t
             // Pseudorange of the code in cycles: carrier · (reading − time sent). The start is a whole second, n/25e6
             // readings are n · 1575.42/25 cycles, a code period is 1540 · 1023 of them and a chip 1540.
             let reading = turns(u128::from(first) * 157_542, 2500);
-            let sent = turns(1540 * u128::from(code.phase), 1 << 48);
+            let sent = turns(1540 * code.phase(), 1 << 48);
             let tone = turns(u128::from(first) * 4092, 25_000);
             let parted = signed(reading.wrapping_sub(sent).wrapping_sub(tone).wrapping_add(carrier));
             let seen = truth::seen(&scene, sv, &L1_CA, scene.clock.epoch(first)).unwrap().unwrap();

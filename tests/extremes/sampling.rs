@@ -7,9 +7,10 @@ use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::generator::scene::CodeEdge;
 use gnss_twin::generator::synth::band::Filter;
 use gnss_twin::generator::synth::bank::Bank;
-use gnss_twin::generator::synth::chips::{CodeTime, Spreading};
+use gnss_twin::generator::synth::chips::CodeTime;
 use gnss_twin::generator::synth::isa::Level;
 use gnss_twin::generator::synth::transmitter::Transmitter;
+use gnss_twin::generator::synth::waveform::plain;
 use gnss_twin::generator::synth::{Edge, Kernel, Run};
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
@@ -29,13 +30,13 @@ const CHIP_M: f64 = 299_792_458.0 / 1.023e6;
 
 /// Samples of one code period of PRN 7 from `start` chips on.
 fn period(rate_khz: usize, edge: Edge<'_>, start: f64) -> Vec<f32> {
-    let spreading = Spreading::new(&L1_CA.components[0], 7).unwrap();
+    let spreading = plain(&L1_CA, 7).unwrap();
     let one = 281_474_976_710_656.0;
     let step = (1023.0 / rate_khz as f64 * one) as u64;
     let mut wave = vec![0.0_f32; rate_khz];
     for (number, i) in wave.chunks_mut(4096).enumerate() {
         let from = start + number as f64 * 4096.0 * 1023.0 / rate_khz as f64;
-        let at = CodeTime { period: 0, phase: ((from % 1023.0) * one) as u64 };
+        let at = CodeTime::new(0, ((from % 1023.0) * one) as u64);
         let mut q = vec![0.0_f32; i.len()];
         let mut bank = Bank::default();
         bank.push((0, 4096), 0..i.len(), |bits| {
@@ -178,7 +179,7 @@ fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_
 #[test]
 fn on_a_boundary_of_chips_the_index_is_inside_and_to_the_right() {
     let the = case(30, "code phase on a boundary");
-    let spreading = Spreading::new(&L1_CA.components[0], 1).unwrap();
+    let spreading = plain(&L1_CA, 1).unwrap();
     let (mut held, mut of) = (0, 0);
     for second in [0_i64, 1, 604_799, 604_800, 1_000_000_000, 4_000_000_000] {
         for chip in 0..1023 {
@@ -187,12 +188,12 @@ fn on_a_boundary_of_chips_the_index_is_inside_and_to_the_right() {
                 let at = Epoch::new(second, f64::from(chip) / 1.023e6 + nudge + 0.004);
                 let place = spreading.at(at, 0.0);
                 of += 1;
-                held += usize::from(place.phase < 1023 << 48);
+                held += usize::from(place.phase() < 1023 << 48);
             }
         }
         let exact = spreading.at(Epoch::new(second, 0.0), 0.0);
         of += 1;
-        held += usize::from(exact.phase == 0 && exact.period == second * 1000);
+        held += usize::from(exact.phase() == 0 && exact.period == second * 1000);
     }
     the.all("places in 0 ≤ phase < 1023, whole seconds at 0", held, of);
 }
@@ -220,7 +221,7 @@ fn rates_that_do_not_fit_the_code_keep_its_phase() {
             let sent = scene.clock.epoch(n).plus_s(-seen.arrivals[0].delay_s);
             // Integers where they can be: milliseconds are whole periods.
             let of_period = (sent.fraction() * 1e3).fract() * 1023.0;
-            let apart = (of_period - place.phase as f64 / 281_474_976_710_656.0) / 1023.0;
+            let apart = (of_period - place.steps()) / 1023.0;
             worst = worst.max((apart - apart.round()).abs() * 1023.0);
         }
     }

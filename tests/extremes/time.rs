@@ -268,7 +268,7 @@ fn a_start_a_nanosecond_later_is_a_nanosecond_later() {
         let delay_s =
             |scene: &Scene, at: Epoch| truth::seen(scene, sv, &L1_CA, at).unwrap().unwrap().arrivals[0].delay_s;
         let (a, b) = (phases(&whole), phases(&late));
-        let gained = b.phase as i64 - a.phase as i64 + ((b.period - a.period) * 1023 * (1 << 48));
+        let gained = b.phase() as i64 - a.phase() as i64 + ((b.period - a.period) * 1023 * (1 << 48));
         // A nanosecond is 1.023e-3 chip, and the range moves by 1e-6 m, 3e-9 chip.
         worst_chip = worst_chip.max((gained as f64 / 281_474_976_710_656.0 - 1.023e-3).abs());
         let same = delay_s(&late, late.clock.start) - delay_s(&whole, whole.clock.start.plus_s(1e-9));

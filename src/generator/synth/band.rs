@@ -95,7 +95,7 @@ impl Filter {
         }
     }
 
-    /// Mean power of a code of ±1 steps behind the filter, for its autocorrelation by whole steps.
+    /// Mean power of a stepped waveform behind the filter, for its autocorrelation by whole steps.
     ///
     /// The pulse of one step is `g(x) = H(x) − H(x − 1/step)`; the power is
     /// `step · Σ_lag ρ(lag) ∫ g(x) g(x + lag/step) dx`, with lags as far as pulses overlap.
@@ -117,7 +117,7 @@ impl Filter {
         let sides: f64 = (1..=reach)
             .map(|lag| 2.0 * correlation.get(lag).copied().unwrap_or(0.0) * overlap(lag as f64 * duration))
             .sum();
-        step * (overlap(0.0) + sides)
+        step * (correlation.first().copied().unwrap_or(1.0) * overlap(0.0) + sides)
     }
 }
 

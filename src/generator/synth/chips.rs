@@ -1,59 +1,91 @@
-//! Spreading codes as packed signs, and the strip of signs that a run reads.
+//! Codes as packed signs, and the strip of signs that a run reads.
 //!
-//! A component's chips are expanded into the equal steps of its pulse, so BPSK and BOC look the
-//! same from here on. A strip has code periods and data signs already joined: a wrap of the code
-//! and a change of data bit fall at their exact phase, and kernels know neither.
+//! A [`Spreading`] is one sequence of ±1: the steps of a layer's chips, see [`super::waveform`]. A strip has
+//! code periods, overlay and data signs already joined: a wrap of the code and a change of sign fall at their
+//! exact phase, and kernels know neither. Codes and overlays run by the time of the signal's system, from the
+//! beginning of its weeks.
 
-use crate::gnss::signal::{Component, Message};
+use std::sync::Arc;
+
 use crate::gnss::time::Epoch;
 
-use super::CODE_ONE;
+use super::{CODE_BITS, CODE_ONE};
 
 /// Code steps that a strip keeps before its first sample and after its last.
 pub const MARGIN_STEPS: u64 = 160;
 
-/// One component's code of one satellite, ready to be cut into strips.
-#[derive(Clone, Debug)]
-pub struct Spreading {
-    /// Signs, most significant bit first, continued cyclically for two words.
-    words: Vec<u64>,
-    /// Steps in one period.
-    steps: u32,
+/// Most code steps in a sample: 4096 of them and both margins stay below 2^16, and nine samples within a
+/// margin.
+pub const MAX_STEP: f64 = 15.0;
+
+/// How a sequence runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pace {
+    /// Steps in one code period.
+    pub steps: u32,
     /// Steps a second in thousandths, by the satellite's clock.
     step_rate_mhz: i64,
-    message: Option<Message>,
-    correlation: Vec<f64>,
+    /// The fewest whole seconds that are whole periods, and those periods.
+    cycle_s: i64,
+    cycle_periods: i64,
+    /// Whole seconds by which the system's time is behind GPS time.
+    behind_s: i64,
 }
 
-/// A position in a code: whole periods since 1980-01-06T00:00:00 of satellite time, and Q16.48 steps.
+/// One sequence of ±1 of a satellite, ready to be cut into strips.
+#[derive(Clone, Debug)]
+pub struct Spreading {
+    /// Signs, most significant bit first, continued cyclically for two words; a set bit is −1.
+    words: Vec<u64>,
+    pace: Pace,
+    /// Whether the overlay inverts each of its periods; empty without one.
+    overlay: Arc<[bool]>,
+}
+
+/// A position in a code: whole periods since 1980-01-06T00:00:00 as the satellite's clock shows its system's
+/// time, whole steps, and a fraction of a step in 2^-48.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CodeTime {
     pub period: i64,
-    pub phase: u64,
+    pub step: u32,
+    pub fraction: u64,
 }
 
-impl Spreading {
-    /// The code of satellite `number`; `None` if the document assigns none or it has 65 536 steps or more.
-    pub fn new(component: &Component, number: u8) -> Option<Self> {
-        let chips = (component.code)(number)?;
-        let pulse = component.layers.first()?.pulse;
-        let signs: Vec<bool> =
-            chips.iter().flat_map(|&chip| pulse.iter().map(move |&p| (chip < 0) ^ (p < 0))).collect();
-        let steps = u32::try_from(signs.len()).ok().filter(|&steps| steps > 0 && steps < 1 << 16)?;
-        let mut words = vec![0_u64; (signs.len() + 128).div_ceil(64)];
-        for (index, sign) in signs.iter().cycle().take(signs.len() + 128).enumerate() {
-            if let Some(word) = words.get_mut(index / 64) {
-                *word |= u64::from(*sign) << (63 - index % 64);
-            }
+impl CodeTime {
+    /// `phase` in 2^-48 steps after the beginning of a period.
+    pub fn new(period: i64, phase: u64) -> Self {
+        Self { period, step: (phase / CODE_ONE) as u32, fraction: phase % CODE_ONE }
+    }
+
+    /// Steps since the beginning of the period.
+    pub fn steps(self) -> f64 {
+        f64::from(self.step) + self.fraction as f64 / CODE_ONE as f64
+    }
+
+    /// The same in 2^-48 steps.
+    pub fn phase(self) -> u128 {
+        u128::from(self.step) << CODE_BITS | u128::from(self.fraction)
+    }
+}
+
+impl Pace {
+    /// `steps` in a period at `step_rate_hz`, in a time `behind_s` behind GPS time. `None` for a rate that is
+    /// not of whole thousandths of a hertz, or whose periods fill no whole seconds below 2^63 thousandths of
+    /// a step.
+    pub fn new(steps: usize, step_rate_hz: f64, behind_s: i64) -> Option<Self> {
+        let steps = u32::try_from(steps).ok().filter(|&steps| steps > 0)?;
+        let exact_mhz = step_rate_hz * 1000.0;
+        // Products of printed rates with small integers are rounded by an ulp or two.
+        let is_whole = (exact_mhz - exact_mhz.round()).abs() <= 4.0 * f64::EPSILON * exact_mhz;
+        if !(is_whole && (1.0..1e15).contains(&exact_mhz)) {
+            return None;
         }
-        let correlation = (0..signs.len().min(64))
-            .map(|lag| {
-                let differ = signs.iter().zip(signs.iter().cycle().skip(lag)).filter(|(a, b)| a != b).count();
-                1.0 - 2.0 * differ as f64 / signs.len() as f64
-            })
-            .collect();
-        let step_rate_mhz = (component.chip_rate_hz * pulse.len() as f64 * 1000.0).round() as i64;
-        Some(Self { words, steps, step_rate_mhz, message: component.message, correlation })
+        let step_rate_mhz = exact_mhz.round() as i64;
+        let per_period = i64::from(steps) * 1000;
+        let shared = greatest_common_divisor(per_period, step_rate_mhz);
+        let (cycle_s, cycle_periods) = (per_period / shared, step_rate_mhz / shared);
+        cycle_s.checked_mul(step_rate_mhz)?;
+        Some(Self { steps, step_rate_mhz, cycle_s, cycle_periods, behind_s })
     }
 
     /// Steps a second by the satellite's clock.
@@ -61,40 +93,56 @@ impl Spreading {
         self.step_rate_mhz as f64 / 1000.0
     }
 
-    /// Steps in one code period.
-    pub fn steps(&self) -> u32 {
-        self.steps
-    }
-
-    /// The message on this component, if it has one.
-    pub fn message(&self) -> Option<Message> {
-        self.message
-    }
-
-    /// Cyclic autocorrelation of the code at its first whole-step lags.
-    pub fn correlation(&self) -> &[f64] {
-        &self.correlation
-    }
-
     /// Where the code stands when the satellite's clock reads `received − delay_s`.
     ///
-    /// Whole seconds are turned into steps as integers; the fraction resolves 1e-10 step.
+    /// Whole seconds are turned into steps as integers; the fraction of a second resolves 1e-16 of its steps.
     pub fn at(&self, received: Epoch, delay_s: f64) -> CodeTime {
         let sent = received.plus_s(-delay_s);
-        // A period is `steps` · 1000 thousandths, and a second some whole periods and a rest.
+        let seconds = sent.seconds() - self.behind_s;
+        // A period is `steps` · 1000 thousandths, and a cycle whole periods in whole seconds.
         let per_period = i64::from(self.steps) * 1000;
-        let rest = sent.seconds() * (self.step_rate_mhz % per_period);
-        let whole = sent.seconds() * (self.step_rate_mhz / per_period) + rest.div_euclid(per_period);
-        let steps = rest.rem_euclid(per_period) as f64 / 1000.0 + sent.fraction() * self.step_rate_hz();
+        let rest = seconds.rem_euclid(self.cycle_s) * self.step_rate_mhz;
+        let whole = seconds.div_euclid(self.cycle_s) * self.cycle_periods + rest / per_period;
+        let steps = (rest % per_period) as f64 / 1000.0 + sent.fraction() * self.step_rate_hz();
         let length = f64::from(self.steps);
         let periods = (steps / length).floor();
-        let mut period = whole + periods as i64;
-        let mut phase = ((steps - periods * length) * CODE_ONE as f64) as u64;
-        if phase >= u64::from(self.steps) * CODE_ONE {
-            phase -= u64::from(self.steps) * CODE_ONE;
-            period += 1;
+        let (period, left) = (whole + periods as i64, steps - periods * length);
+        let step = left as u32;
+        let fraction = ((left - f64::from(step)) * CODE_ONE as f64) as u64;
+        if step >= self.steps {
+            return CodeTime { period: period + 1, step: step - self.steps, fraction };
         }
-        CodeTime { period, phase }
+        CodeTime { period, step, fraction }
+    }
+}
+
+fn greatest_common_divisor(a: i64, b: i64) -> i64 {
+    let (mut x, mut y) = (a, b);
+    while y > 0 {
+        (x, y) = (y, x % y);
+    }
+    x
+}
+
+impl Spreading {
+    /// A sequence of signs, −1 where `negative`, and whether the overlay inverts each of its periods.
+    pub fn new(negative: &[bool], pace: Pace, overlay: Arc<[bool]>) -> Self {
+        Self { words: packed(negative, negative.len() + 128), pace, overlay }
+    }
+
+    /// How it runs.
+    pub fn pace(&self) -> &Pace {
+        &self.pace
+    }
+
+    /// [`Pace::at`].
+    pub fn at(&self, received: Epoch, delay_s: f64) -> CodeTime {
+        self.pace.at(received, delay_s)
+    }
+
+    fn is_overlaid(&self, period: i64) -> bool {
+        let length = self.overlay.len();
+        length > 0 && self.overlay.get(period.rem_euclid(length as i64) as usize).is_some_and(|&negative| negative)
     }
 
     /// Appends the signs around `samples` samples that start at `at` and advance by `step`, with the
@@ -108,12 +156,12 @@ impl Spreading {
         negative: impl Fn(i64) -> bool,
         out: &mut Vec<u64>,
     ) -> u64 {
-        let per_period = u64::from(self.steps);
-        let first = at.phase / CODE_ONE;
+        let per_period = u64::from(self.pace.steps);
+        let first = u64::from(at.step);
         let behind = MARGIN_STEPS.saturating_sub(first).div_ceil(per_period);
         let mut period = at.period - behind as i64;
         let mut chip = first + behind * per_period - MARGIN_STEPS;
-        let span = (at.phase % CODE_ONE + step * samples as u64) / CODE_ONE;
+        let span = (at.fraction + step * samples as u64) / CODE_ONE;
         let total = (span + 2 * MARGIN_STEPS + 1) as usize;
         let begin = out.len();
         out.resize(begin + total.div_ceil(64) + 2, 0);
@@ -121,11 +169,11 @@ impl Spreading {
         while filled < total {
             let take = (total - filled).min((per_period - chip) as usize);
             let words = out.get_mut(begin + filled / 64..begin + (filled + take).div_ceil(64)).unwrap_or(&mut []);
-            self.copy(chip as usize, negative(period), filled % 64, words);
+            self.copy(chip as usize, negative(period) ^ self.is_overlaid(period), filled % 64, words);
             filled += take;
             (chip, period) = (0, period + 1);
         }
-        MARGIN_STEPS * CODE_ONE + at.phase % CODE_ONE
+        MARGIN_STEPS * CODE_ONE + at.fraction
     }
 
     /// Writes the signs from `chip` on into `out` from its bit `from` to its end.
@@ -141,6 +189,17 @@ impl Spreading {
             *out = ((pair[0] << shift) | (pair[1] >> 1 >> (63 - shift))) ^ data;
         }
     }
+}
+
+/// The first `length` of `bits`, repeated from the beginning, most significant bit first.
+pub(super) fn packed(bits: &[bool], length: usize) -> Vec<u64> {
+    let mut words = vec![0_u64; length.div_ceil(64)];
+    for (index, bit) in bits.iter().cycle().take(length).enumerate() {
+        if let Some(word) = words.get_mut(index / 64) {
+            *word |= u64::from(*bit) << (63 - index % 64);
+        }
+    }
+    words
 }
 
 /// The 64 signs that begin at bit `offset`; zeros where the word behind is missing.
@@ -159,16 +218,17 @@ pub(crate) fn sign(words: &[u64], offset: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca;
+    use crate::generator::synth::waveform::plain;
+    use crate::gnss::gps::l1ca::{self, L1_CA};
 
     #[test]
     fn a_strip_holds_each_chip_with_the_data_of_its_period() {
-        let spreading = Spreading::new(&l1ca::L1_CA.components[0], 7).unwrap();
+        let spreading = plain(&L1_CA, 7).unwrap();
         let code = l1ca::code(7).unwrap();
         let negative = |period: i64| period.rem_euclid(3) == 1;
         let mut out = Vec::new();
         for (period, chip, step) in [(0, 0, CODE_ONE / 3), (41, 1022, CODE_ONE), (5, 500, CODE_ONE / 25)] {
-            let at = CodeTime { period, phase: chip * CODE_ONE + CODE_ONE / 7 };
+            let at = CodeTime::new(period, chip * CODE_ONE + CODE_ONE / 7);
             out.clear();
             let position = spreading.strip(at, step, 4096, negative, &mut out);
             assert_eq!(position % CODE_ONE, CODE_ONE / 7);
@@ -183,11 +243,33 @@ mod tests {
 
     #[test]
     fn the_code_position_is_that_of_exact_integers_decades_after_1980() {
-        let spreading = Spreading::new(&l1ca::L1_CA.components[0], 7).unwrap();
+        let spreading = plain(&L1_CA, 7).unwrap();
         // 1 461 888 000.25 s: 250 periods into the second, to the chip resolution of the fraction.
         let at = spreading.at(Epoch::new(1_461_888_000, 0.25 + 1e-6), 0.0);
         assert_eq!(at.period, 1_461_888_000_250);
         // Half an ulp of the fraction (2.8e-17 s) times the rate, and that of 255 751 chips (1.5e-11).
-        assert!((at.phase as f64 / CODE_ONE as f64 - 1.023).abs() < 1e-10);
+        assert!((at.steps() - 1.023).abs() < 1e-10);
+    }
+
+    #[test]
+    fn periods_that_do_not_divide_a_second_are_counted_in_the_system_s_time() {
+        // 1 534 500 steps in 1.5 s, in a time three seconds behind.
+        let pace = Pace::new(1_534_500, 1.023e6, 3).unwrap();
+        assert_eq!((pace.cycle_s, pace.cycle_periods), (3, 2));
+        for (seconds, fraction, period, steps) in [
+            (3, 0.0, 0, 0.0),
+            (4, 0.25, 0, 1_278_750.0),
+            (4, 0.75, 1, 255_750.0),
+            (2, 0.0, -1, 511_500.0),
+            (604_803, 0.0, 403_200, 0.0),
+            // 6.3e9 s, the year 2180: 2 100 000 000 cycles.
+            (6_300_000_005, 0.0, 4_200_000_001, 511_500.0),
+        ] {
+            let at = pace.at(Epoch::new(seconds, fraction), 0.0);
+            assert_eq!((at.period, at.steps()), (period, steps), "{seconds} {fraction}");
+        }
+        // A third of a thousandth of a hertz cannot be counted, nor can no steps.
+        assert_eq!(Pace::new(1023, 1.023e6 + 1.0 / 3000.0, 0), None);
+        assert_eq!(Pace::new(0, 1.023e6, 0), None);
     }
 }

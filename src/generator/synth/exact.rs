@@ -156,8 +156,9 @@ const COSINE: [f64; 8] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::synth::chips::{CodeTime, Spreading};
+    use crate::generator::synth::chips::CodeTime;
     use crate::generator::synth::radians;
+    use crate::generator::synth::waveform::plain;
     use crate::gnss::gps::l1ca::L1_CA;
 
     #[test]
@@ -176,12 +177,12 @@ mod tests {
     #[test]
     fn it_is_the_definition_to_the_rounding_of_the_sum() {
         let filter = Filter::new(0.45);
-        let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
+        let spreading = plain(&L1_CA, 11).unwrap();
         for rate_hz in [0.9e6, 2.046e6, 2.6e6, 25e6] {
             for edge in [Edge::Nearest, Edge::Area, Edge::BandLimited(&filter)] {
                 for length in [1, 15, 16, 17, 4096] {
                     let step = (1.023e6 / rate_hz * CODE_ONE as f64) as u64;
-                    let at = CodeTime { period: 8, phase: 1020 * CODE_ONE + length as u64 * (CODE_ONE / 131) };
+                    let at = CodeTime::new(8, 1020 * CODE_ONE + length as u64 * (CODE_ONE / 131));
                     let mut bits = Vec::new();
                     let position = spreading.strip(at, step, length, |period| period % 2 == 1, &mut bits);
                     let turns_step = 0x0765_4321_0fed_cba9;

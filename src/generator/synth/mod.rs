@@ -4,8 +4,9 @@
 //! fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
 //! [`mod@reference`] evaluates each sample in `f64`, [`exact`] the same at speed; [`lanes`] is the fast
 //! kernel, for all runs of a stretch at once as [`bank`] gathers them. Both are plain lane-array code that
-//! [`isa`] compiles for each instruction set with the same bits on all. Limits: 15 code steps a sample; lanes
-//! fall back to a wave buffer above one step a sample.
+//! [`isa`] compiles for each instruction set with the same bits on all. What a component's layers and zeros
+//! come to are several sequences of ±1 ([`waveform`]), a run each. Limits: 15 code steps a sample; lanes fall
+//! back to a wave buffer above one step a sample.
 
 pub(crate) mod angle;
 pub mod band;
@@ -15,7 +16,9 @@ pub mod exact;
 pub mod isa;
 pub mod lanes;
 pub mod reference;
+pub mod symbols;
 pub mod transmitter;
+pub mod waveform;
 
 use band::Filter;
 
@@ -33,8 +36,8 @@ pub const CODE_ONE: u64 = 1 << CODE_BITS;
 /// A stretch of one ray on which carrier and code advance by constant steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Run<'a> {
-    /// Signs of the code steps in order, data applied, most significant bit first; a set bit is −1.
-    /// At least [`chips::MARGIN_STEPS`] steps stand before `position` and after the last sample.
+    /// Signs of the code steps in order, overlay and data applied, most significant bit first; a set bit is
+    /// −1. At least [`chips::MARGIN_STEPS`] steps stand before `position` and after the last sample.
     pub bits: &'a [u64],
     /// Code position of sample 0 in `bits`, Q16.48 steps.
     pub position: u64,
@@ -64,18 +67,32 @@ pub struct Kernel<'a> {
 }
 
 impl Edge<'_> {
-    /// Factor that brings the mean power of the waveform to one, for a code of autocorrelation
-    /// `correlation` (by whole steps, 1 at lag 0) at `step` code steps a sample.
+    /// Factor that brings the mean power of the waveform to one: 1/√[`Edge::power`].
     pub fn gain(&self, correlation: &[f64], step: f64) -> f64 {
+        1.0 / self.power(correlation, step).sqrt()
+    }
+
+    /// Mean power of a waveform of autocorrelation `correlation` (by whole steps, its power at lag 0) at
+    /// `step` code steps a sample.
+    pub fn power(&self, correlation: &[f64], step: f64) -> f64 {
         match self {
-            Edge::Nearest => 1.0,
-            Edge::Area => 1.0 / area_power(correlation, step).sqrt(),
-            Edge::BandLimited(filter) => 1.0 / filter.power(correlation, step).sqrt(),
+            Edge::Nearest => correlation.first().copied().unwrap_or(1.0),
+            Edge::Area => area_power(correlation, step),
+            Edge::BandLimited(filter) => filter.power(correlation, step),
+        }
+    }
+
+    /// Lags of the correlation that [`Edge::power`] reads.
+    pub fn lags(&self, step: f64) -> usize {
+        match self {
+            Edge::Nearest => 1,
+            Edge::Area => step.ceil() as usize + 1,
+            Edge::BandLimited(_) => (2.0 * band::HALF_WIDTH as f64 * step) as usize + 3,
         }
     }
 }
 
-/// Mean power of a ±1 waveform averaged over an interval of `d` code steps.
+/// Mean power of a stepped waveform averaged over an interval of `d` code steps.
 ///
 /// `(2/d²) ∫₀^d (d − u) ρ(u) du` with ρ linear between the values of `correlation`. For `d` ≤ 1 this
 /// is `1 − (d/3)(1 − ρ(1))`, that is `1 − d/3` for a random code, whose neighbours differ half the time.
@@ -98,6 +115,9 @@ fn area_power(correlation: &[f64], d: f64) -> f64 {
 pub(crate) fn radians(turns: u64) -> f64 {
     turns as i64 as f64 * (std::f64::consts::TAU / 18_446_744_073_709_551_616.0)
 }
+
+#[cfg(test)]
+mod signals_tests;
 
 #[cfg(test)]
 mod tests {

@@ -11,33 +11,28 @@ use std::sync::Arc;
 use super::bank::Bank;
 use super::{CODE_ONE, Edge, RUN_SAMPLES, Run};
 use crate::generator::knots::{Grid, Part, Path};
-use crate::generator::message::{self, Sent as SentWords};
 use crate::generator::presence::Passes;
 use crate::generator::ripple::Ripples;
 use crate::generator::scene::Scene;
 use crate::generator::sky;
 use crate::generator::spoof::Constellation;
 use crate::generator::stream::GenerateError;
-use crate::generator::synth::chips::{CodeTime, MARGIN_STEPS, Spreading};
+use crate::generator::synth::chips::{CodeTime, Spreading};
+use crate::generator::synth::symbols::Symbols;
+use crate::generator::synth::waveform::{Voice, Waveform};
 use crate::generator::truth;
-use crate::gnss::gps::lnav::Subframe;
-use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Message, Signal};
+use crate::gnss::signal::{Carrier, Message, Signal};
 use crate::gnss::time::{Epoch, tone_turns};
 
-/// Duration of an LNAV subframe and its symbols (IS-GPS-200N, 20.3.2).
-const SUBFRAME_S: i64 = 6;
-const SUBFRAME_SYMBOLS: i64 = 300;
-
-/// Most code steps in a sample: 4096 of them and both margins fit in Q16.48.
-const MAX_STEP: f64 = 15.0;
-
+/// A sequence of ±1 of a component.
 struct Sent {
-    component: &'static Component,
     spreading: Spreading,
-    /// Of the amplitude, for unit mean power of the waveform and the component's share.
+    message: Option<Message>,
+    /// Of the amplitude, for unit mean power of the component's waveform and its share.
     gain: f64,
+    /// Carrier phase relative to the signal's, in samples: the other way round in an inverted spectrum.
+    turns: u64,
 }
 
 /// A satellite's signal in a scene.
@@ -62,9 +57,8 @@ pub struct Transmitter {
     roots: BTreeSet<u64>,
     parts: Vec<Part>,
     ripples: Ripples,
-    subframes: BTreeMap<i64, [u32; 10]>,
-    /// What has been sent so far.
-    pub navigation: BTreeSet<NavigationRow>,
+    /// What is sent, and has been.
+    pub symbols: Symbols,
     pub seen: bool,
     pub knots: u64,
     pub worst_knot_cycles: f64,
@@ -103,10 +97,10 @@ impl Scratch {
 }
 
 impl Transmitter {
-    /// A true satellite's signal; `None` if the signal's documents assign no code to `sv`.
+    /// A true satellite's signal; `None` if the signal's documents assign `sv` no code or no carrier.
     ///
     /// # Errors
-    /// [`GenerateError::Rate`] if a sample would span more than 15 code steps.
+    /// [`GenerateError::Waveform`] if a sample would span more than 15 code steps, or a code is none.
     pub fn new(scene: &Scene, sv: Sv, signal: &'static Signal, edge: Edge<'_>) -> Result<Option<Self>, GenerateError> {
         Self::of(scene, Arc::new(Constellation::authentic()), sv, signal, edge)
     }
@@ -123,16 +117,21 @@ impl Transmitter {
         edge: Edge<'_>,
     ) -> Result<Option<Self>, GenerateError> {
         let rate_hz = scene.clock.rate.hz();
+        if matches!(signal.carrier, Carrier::Channels { channel, .. } if channel(sv.number).is_none()) {
+            return Ok(None);
+        }
         let mut sent = Vec::new();
-        for component in signal.components {
-            let Some(spreading) = Spreading::new(component, sv.number) else { return Ok(None) };
-            let step = spreading.step_rate_hz() / rate_hz;
-            // A run's strip must stay below 2^16 steps, and nine samples within its margin.
-            if step > MAX_STEP || step * 9.0 + 2.0 > MARGIN_STEPS as f64 {
-                return Err(GenerateError::Rate { rate_hz, signal: signal.name });
+        for (index, component) in signal.components.iter().enumerate() {
+            let Some(waveform) = Waveform::new(signal.link(sv), index)? else { return Ok(None) };
+            for Voice { spreading, amplitude, phase_cycles } in waveform.voices(edge, rate_hz)? {
+                let cycles = component.phase_cycles + phase_cycles;
+                sent.push(Sent {
+                    spreading,
+                    message: component.message,
+                    gain: component.power_share.sqrt() * amplitude,
+                    turns: turns(if scene.metadata.inverted { -cycles } else { cycles }),
+                });
             }
-            let gain = component.power_share.sqrt() * edge.gain(spreading.correlation(), step);
-            sent.push(Sent { component, spreading, gain });
         }
         let carrier_hz = signal.carrier_hz(sv);
         let if_hz = scene.metadata.if_hz(carrier_hz);
@@ -155,8 +154,7 @@ impl Transmitter {
             roots: BTreeSet::new(),
             parts: Vec::new(),
             ripples: Ripples::default(),
-            subframes: BTreeMap::new(),
-            navigation: BTreeSet::new(),
+            symbols: Symbols::default(),
             seen: false,
             knots: 0,
             worst_knot_cycles: 0.0,
@@ -259,7 +257,7 @@ impl Transmitter {
     }
 
     fn prepare_messages(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
-        if !self.sent.iter().any(|sent| sent.spreading.message() == Some(Message::GpsLnav)) {
+        if self.sent.iter().all(|sent| sent.message.is_none()) {
             return Ok(());
         }
         let delays = self
@@ -272,36 +270,9 @@ impl Transmitter {
             return Ok(());
         }
         // Margins of strips are code periods at most; a tenth of a second holds them.
-        let first = scene.clock.epoch(from).plus_s(-most - 0.1).seconds().div_euclid(SUBFRAME_S);
-        let last = scene.clock.epoch(to).plus_s(-least + 0.1).seconds().div_euclid(SUBFRAME_S);
-        self.subframes = self.subframes.split_off(&first);
-        for index in first..=last {
-            if self.subframes.contains_key(&index) {
-                continue;
-            }
-            let start = Epoch::new(index * SUBFRAME_S, 0.0);
-            let fallback = || scene.catalogue.sent_at(self.sv, scene.clock.epoch(from));
-            let Some(ephemeris) = scene.catalogue.sent_at(self.sv, start).or_else(fallback) else { continue };
-            let faults = if self.from.number == 0 { scene.message_faults.as_slice() } else { &[] };
-            let SentWords { encoded, words } = message::subframe(faults, &scene.broadcast, self.sv, ephemeris, start)?;
-            // What was meant and, where wrong bits pass for right ones, what was sent.
-            for subframe in [encoded, words].iter().filter_map(|words| Subframe::decode(words, 0).ok()) {
-                let issue = match subframe.id {
-                    1..=3 => Some(u32::from(ephemeris.iode)),
-                    _ => subframe.klobuchar().map(|_| 0),
-                };
-                if let Some(issue) = issue {
-                    self.navigation.extend(subframe.parameters().into_iter().map(|(parameter, raw)| NavigationRow {
-                        sv: self.sv,
-                        issue,
-                        parameter: parameter.to_owned(),
-                        raw,
-                    }));
-                }
-            }
-            self.subframes.insert(index, words);
-        }
-        Ok(())
+        let (first, last) = (scene.clock.epoch(from).plus_s(-most - 0.1), scene.clock.epoch(to).plus_s(-least + 0.1));
+        let sender = (self.sv, self.signal.time.behind_gpst_s);
+        self.symbols.prepare(scene, &self.from, sender, [first, last], scene.clock.epoch(from))
     }
 
     /// Whether the satellite is sent and in view at a sample of the prepared stretch.
@@ -316,7 +287,7 @@ impl Transmitter {
     }
 
     /// Phases that a run beginning at sample `n` of the prepared stretch has there: the carrier of the first
-    /// ray and component in 2^-64 turn, and its code. `None` where the satellite does not arrive.
+    /// ray and sequence in 2^-64 turn, and its code. `None` where the satellite does not arrive.
     pub fn phases(&self, scene: &Scene, n: u64) -> Option<(u64, CodeTime)> {
         let part = self.parts.iter().find(|part| (part.start..part.end).contains(&n))?;
         let (path, sent, u) = (part.paths.first()?, self.sent.first()?, part.fraction(n));
@@ -324,18 +295,8 @@ impl Transmitter {
         let [ripple, _] = self.ripples.ends(n, n);
         let rho_cycles = path.carrier.at(u) + ripple.carrier_cycles;
         let (turns, _) = carrier(scene.metadata.inverted, tone, rho_cycles, 0.0);
-        Some((turns, sent.spreading.at(scene.clock.epoch(n), path.delay.at(u) + ripple.delay_s)))
-    }
-
-    /// Whether a code period of a component is sent inverted.
-    fn negative(&self, message: Option<Message>, period: i64) -> bool {
-        let Some(message) = message else { return false };
-        let period = planted!("generator.synth.message_time", period, period + 1);
-        let symbol = period.div_euclid(i64::from(message.periods_per_symbol()));
-        let Some(words) = self.subframes.get(&symbol.div_euclid(SUBFRAME_SYMBOLS)) else { return false };
-        let bit = symbol.rem_euclid(SUBFRAME_SYMBOLS) as usize;
-        let place = planted!("generator.synth.bit_order", 29 - bit % 30, bit % 30);
-        words.get(bit / 30).is_some_and(|word| word >> place & 1 == 1)
+        let code = sent.spreading.at(scene.clock.epoch(n), path.delay.at(u) + ripple.delay_s);
+        Some((turns.wrapping_add(sent.turns), code))
     }
 
     /// Gathers the runs of `samples` samples from `start` on, a multiple of 4096, in the bank of `scratch`.
@@ -359,7 +320,7 @@ impl Transmitter {
         }
     }
 
-    /// Gathers one run of every component: from the anchor to `end`, as far as `samples` reach.
+    /// Gathers one run of every sequence: from the anchor to `end`, as far as `samples` reach.
     fn run(
         &self,
         scene: &Scene,
@@ -386,19 +347,18 @@ impl Transmitter {
         for sent in &self.sent {
             let sent_s = length / rate_hz - path.delay.change(u, v) - (last.delay_s - first.delay_s);
             let sent_s = planted!("generator.synth.code_rate", sent_s, sent_s * (1.0 + 2e-5));
-            let step = (sent_s * sent.spreading.step_rate_hz() / length * CODE_ONE as f64) as u64;
+            let step = (sent_s * sent.spreading.pace().step_rate_hz() / length * CODE_ONE as f64) as u64;
             let delay_s = path.delay.at(u) + first.delay_s;
             let delay_s = planted!("generator.synth.delay", delay_s, delay_s * (1.0 + 2e-7));
             let delay_s =
                 planted!("generator.synth.code_phase", delay_s, delay_s + 2e-9 * f64::from(self.sv.number % 3));
             let at = sent.spreading.at(anchor.epoch, delay_s);
-            let message = sent.spreading.message();
-            let phase = sent.component.phase_cycles * if scene.metadata.inverted { -1.0 } else { 1.0 };
+            let negative = |period| self.symbols.negative(sent.message, period);
             bank.push((anchor.n, end), samples.clone(), |bits| Run {
                 bits: &[],
-                position: sent.spreading.strip(at, step, samples.len(), |period| self.negative(message, period), bits),
+                position: sent.spreading.strip(at, step, samples.len(), negative, bits),
                 step,
-                turns: carrier.0.wrapping_add(turns(phase)),
+                turns: carrier.0.wrapping_add(sent.turns),
                 turns_step: carrier.1,
                 amplitude: amplitude * sent.gain,
             });

@@ -5,7 +5,8 @@
 use super::*;
 use crate::generator::stage::interference::tone::Modulation;
 use crate::generator::synth::band::Filter;
-use crate::generator::synth::chips::{CodeTime, Spreading};
+use crate::generator::synth::chips::CodeTime;
+use crate::generator::synth::waveform::plain;
 use crate::generator::synth::{CODE_ONE, reference};
 use crate::gnss::gps::l1ca::L1_CA;
 
@@ -55,11 +56,11 @@ fn difference(a: (&[f32], &[f32]), b: (&[f32], &[f32])) -> f64 {
 #[test]
 fn signals_are_their_twins_at_every_length_and_offset() {
     let filter = Filter::new(0.45);
-    let spreading = Spreading::new(&L1_CA.components[0], 11).unwrap();
+    let spreading = plain(&L1_CA, 11).unwrap();
     for rate_hz in [1.5e6, 2.6e6, 25e6] {
         let step = (1.023e6 / rate_hz * CODE_ONE as f64) as u64;
         let mut bits = Vec::new();
-        let from = CodeTime { period: 8, phase: 1010 * CODE_ONE + 12_345 };
+        let from = CodeTime::new(8, 1010 * CODE_ONE + 12_345);
         let position = spreading.strip(from, step, LENGTHS, |period| period % 2 == 1, &mut bits);
         let run = Run {
             bits: &bits,

@@ -1,0 +1,205 @@
+//! A component of one satellite as kernels read it: sequences of ±1, each with an amplitude and a phase.
+//!
+//! Every layer is expanded into the steps of its own pulse, so a kernel knows neither BPSK nor BOC. Where a
+//! layer has chips of zero it becomes the mean of two sequences, which differ there and are equal elsewhere:
+//! their sum is exact and kernels read one sign a step. The mean power of the whole follows from the code's
+//! own correlation on the steps that all layers share. Limits: that correlation is cyclic, as if neither data
+//! nor overlay changed from one period to the next, which concerns as many steps of a period as an edge
+//! reaches.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use thiserror::Error;
+
+use super::Edge;
+use super::chips::{MAX_STEP, Pace, Spreading, packed, window};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Component, Layer, Link, Signal};
+
+/// A sequence with its part in the component.
+#[derive(Clone, Debug)]
+pub struct Voice {
+    pub spreading: Spreading,
+    /// Factor of the component's amplitude.
+    pub amplitude: f64,
+    /// Carrier phase relative to the component's.
+    pub phase_cycles: f64,
+}
+
+/// A component's code and pulses for one satellite.
+#[derive(Clone, Debug)]
+pub struct Waveform {
+    link: Link,
+    /// Place of the component in its signal.
+    index: usize,
+    component: &'static Component,
+    chips: Vec<i8>,
+    overlay: Arc<[bool]>,
+}
+
+/// Why a component cannot be rendered.
+#[derive(Debug, Error, PartialEq)]
+pub enum WaveformError {
+    #[error(
+        "{signal}, component {component}, layer {layer}: {steps_hz} steps a second at {rate_hz} samples a second: expected at least {least_hz} samples a second"
+    )]
+    Rate { signal: &'static str, component: usize, layer: usize, steps_hz: f64, rate_hz: f64, least_hz: f64 },
+    #[error("{signal}, component {component}, {what} of {sv}: {found}: expected {expected}")]
+    Code { signal: &'static str, component: usize, sv: Sv, what: &'static str, found: String, expected: String },
+}
+
+impl Waveform {
+    /// Component number `index` of a satellite's signal; `None` if the signal's documents assign it no code.
+    ///
+    /// # Errors
+    /// [`WaveformError::Code`] for a code, overlay or pulse that is none.
+    pub fn new(link: Link, index: usize) -> Result<Option<Self>, WaveformError> {
+        let Some(component) = link.signal.components.get(index) else { return Ok(None) };
+        let codes = (component.code)(link.sv.number).zip(component.overlay.of(link.sv.number));
+        let Some((chips, overlay)) = codes else { return Ok(None) };
+        let negative: Vec<bool> = overlay.iter().map(|&chip| chip < 0).collect();
+        let has_overlay = negative.contains(&true);
+        let overlay_chips = overlay.len();
+        let inverts = if has_overlay { negative.into() } else { Arc::default() };
+        let waveform = Self { link, index, component, chips, overlay: inverts };
+        let refuse = |what, found, expected: &str| Err(waveform.refuse(what, found, expected));
+        let (length, periods) = (component.code_chips as usize, component.overlay.periods() as usize);
+        if waveform.chips.len() != length || waveform.chips.iter().all(|&chip| chip == 0) {
+            return refuse("code", format!("{} chips", waveform.chips.len()), &format!("{length}, not all zero"));
+        }
+        if let Some(chip) = waveform.chips.iter().find(|chip| !(-1..=1).contains(*chip)) {
+            return refuse("code", format!("a chip of {chip}"), "-1, 0 or 1");
+        }
+        if overlay_chips != periods || periods == 0 {
+            return refuse("overlay", format!("{overlay_chips} chips"), &format!("{periods}, at least one"));
+        }
+        if let Some(chip) = overlay.iter().find(|chip| chip.abs() != 1) {
+            return refuse("overlay", format!("a chip of {chip}"), "-1 or 1");
+        }
+        let pulses = || component.layers.iter().map(|layer| layer.pulse);
+        let is_none = |pulse: &[i8]| pulse.iter().all(|&step| step == 0);
+        if component.layers.is_empty() || pulses().any(is_none) {
+            return refuse("pulse", "nothing".to_owned(), "a step of -1 or 1 in every layer");
+        }
+        if let Some(step) = pulses().flatten().find(|step| !(-1..=1).contains(*step)) {
+            return refuse("pulse", format!("a step of {step}"), "-1, 0 or 1");
+        }
+        Ok(Some(waveform))
+    }
+
+    fn refuse(&self, what: &'static str, found: String, expected: &str) -> WaveformError {
+        let (signal, component, sv) = (self.link.signal.name, self.index + 1, self.link.sv);
+        WaveformError::Code { signal, component, sv, what, found, expected: expected.to_owned() }
+    }
+
+    /// Its sequences for samples at `rate_hz`, for a mean power of one behind `edge`.
+    ///
+    /// # Errors
+    /// [`WaveformError`] for more than 15 steps a sample, and for a code whose periods cannot be counted.
+    pub fn voices(&self, edge: Edge<'_>, rate_hz: f64) -> Result<Vec<Voice>, WaveformError> {
+        let steps_hz = |layer: &Layer| self.component.chip_rate_hz * layer.pulse.len() as f64;
+        for (number, steps_hz) in (1..).zip(self.component.layers.iter().map(steps_hz)) {
+            if steps_hz > MAX_STEP * rate_hz {
+                let (signal, component, least_hz) = (self.link.signal.name, self.index + 1, steps_hz / MAX_STEP);
+                return Err(WaveformError::Rate { signal, component, layer: number, steps_hz, rate_hz, least_hz });
+            }
+        }
+        let gain = 1.0 / self.power(edge, rate_hz).sqrt();
+        let mut voices = Vec::new();
+        for layer in self.component.layers {
+            let steps_hz = steps_hz(layer);
+            let steps = self.steps(layer, layer.pulse.len());
+            let pace = Pace::new(steps.len(), steps_hz, self.link.signal.time.behind_gpst_s).ok_or_else(|| {
+                let found = format!("{} steps at {steps_hz} Hz", steps.len());
+                self.refuse("code", found, "a rate of whole thousandths of a hertz, whose periods fill whole seconds")
+            })?;
+            let negative: Vec<bool> = steps.iter().map(|&step| step < 0).collect();
+            let voice = |negative: &[bool], share: f64| Voice {
+                spreading: Spreading::new(negative, pace, Arc::clone(&self.overlay)),
+                amplitude: gain * layer.weight * share,
+                phase_cycles: layer.phase_cycles,
+            };
+            if steps.contains(&0) {
+                let other: Vec<bool> = steps.iter().map(|&step| step <= 0).collect();
+                voices.extend([voice(&negative, 0.5), voice(&other, 0.5)]);
+            } else {
+                voices.push(voice(&negative, 1.0));
+            }
+        }
+        Ok(voices)
+    }
+
+    /// Mean power behind `edge`, all layers together.
+    pub fn power(&self, edge: Edge<'_>, rate_hz: f64) -> f64 {
+        let step = self.component.chip_rate_hz * self.component.steps_per_chip() as f64 / rate_hz;
+        edge.power(&self.correlation(edge.lags(step)), step)
+    }
+
+    /// Cyclic correlation of the waveform with itself at its first `lags` lags of whole steps that all layers
+    /// share.
+    fn correlation(&self, lags: usize) -> Vec<f64> {
+        let layers = self.component.layers;
+        let signs: Vec<Ternary> = (layers.iter())
+            .map(|layer| Ternary::new(&self.steps(layer, self.component.steps_per_chip()), lags))
+            .collect();
+        let mut sums = vec![0.0; lags];
+        for (a, one) in layers.iter().zip(&signs) {
+            for (b, other) in layers.iter().zip(&signs) {
+                let weight = a.weight * b.weight * libm::cos(TAU * (a.phase_cycles - b.phase_cycles));
+                (0..lags).zip(&mut sums).for_each(|(lag, sum)| *sum += weight * one.correlation(other, lag));
+            }
+        }
+        sums
+    }
+
+    /// One period of a layer, `per_chip` steps to each chip.
+    fn steps(&self, layer: &Layer, per_chip: usize) -> Vec<i8> {
+        let each = per_chip / layer.pulse.len().max(1);
+        let chip = |(index, &chip): (usize, &i8)| {
+            let chip = if layer.covers(index) { chip } else { 0 };
+            layer.pulse.iter().flat_map(move |&step| std::iter::repeat_n(chip * step, each))
+        };
+        self.chips.iter().enumerate().flat_map(chip).collect()
+    }
+}
+
+/// The one sequence of a satellite's signal, if that is all that it has: one layer without zeros.
+pub fn plain(signal: &'static Signal, number: u8) -> Option<Spreading> {
+    let [_] = signal.components else { return None };
+    let waveform = Waveform::new(signal.link(Sv { system: signal.system, number }), 0).ok().flatten()?;
+    let mut voices = waveform.voices(Edge::Nearest, f64::INFINITY).ok()?;
+    voices.pop().filter(|_| voices.is_empty()).map(|voice| voice.spreading)
+}
+
+/// A sequence of −1, 0 and +1 as two of bits: which are negative, and which are not zero.
+struct Ternary {
+    length: usize,
+    negative: Vec<u64>,
+    sent: Vec<u64>,
+}
+
+impl Ternary {
+    /// `steps`, continued cyclically so that they can be read from the first `lags` on.
+    fn new(steps: &[i8], lags: usize) -> Self {
+        let length = steps.len() + lags + 128;
+        let negative: Vec<bool> = steps.iter().map(|&step| step < 0).collect();
+        let sent: Vec<bool> = steps.iter().map(|&step| step != 0).collect();
+        Self { length: steps.len(), negative: packed(&negative, length), sent: packed(&sent, length) }
+    }
+
+    /// Mean product of each step with that of `other` which is `lag` steps later.
+    fn correlation(&self, other: &Self, lag: usize) -> f64 {
+        let (mut both, mut differ) = (0_u64, 0_u64);
+        for from in (0..self.length).step_by(64) {
+            let left = self.length - from;
+            let valid = if left < 64 { !(u64::MAX >> left) } else { u64::MAX };
+            let sent = window(&self.sent, from) & window(&other.sent, from + lag) & valid;
+            let unlike = window(&self.negative, from) ^ window(&other.negative, from + lag);
+            both += u64::from(sent.count_ones());
+            differ += u64::from((sent & unlike).count_ones());
+        }
+        let length = self.length as f64;
+        both as f64 / length - 2.0 * differ as f64 / length
+    }
+}
