@@ -36,7 +36,7 @@ pub struct Ray {
     pub carrier_delay_s: f64,
     /// Carrier phase that comes from no delay (wind-up, reflection), in cycles.
     pub phase_cycles: f64,
-    /// Carrier power over noise density, linear (Hz).
+    /// Carrier power over noise density of the whole signal, all components together, linear (Hz).
     pub cn0_hz: f64,
 }
 
