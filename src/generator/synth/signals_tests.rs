@@ -75,6 +75,8 @@ struct Definition {
     per_chip: i128,
     code: Vec<i8>,
     overlay: Vec<i8>,
+    /// Weight and phase of each layer.
+    factors: Vec<Complex64>,
     /// Brings the mean power over time to one.
     scale: f64,
 }
@@ -88,6 +90,9 @@ impl Definition {
             per_chip: component.steps_per_chip() as i128,
             code: (component.code)(number).unwrap(),
             overlay: component.overlay.of(number).unwrap(),
+            factors: (component.layers.iter())
+                .map(|layer| Complex64::from_polar(layer.weight, TAU * layer.phase_cycles))
+                .collect(),
             scale: 1.0,
         };
         let steps = i128::from(component.code_chips) * definition.per_chip;
@@ -102,14 +107,10 @@ impl Definition {
         let length = self.code.len() as i128;
         let (period, index) = (chip.div_euclid(length), chip.rem_euclid(length) as usize);
         let sign = self.code[index] * self.overlay[period.rem_euclid(self.overlay.len() as i128) as usize];
-        let layers = self
-            .component
-            .layers
-            .iter()
-            .filter(|layer| layer.chips.is_empty() || layer.chips[index % layer.chips.len()]);
-        let layers = layers.map(|layer| {
-            let step = layer.pulse[(within * layer.pulse.len() as i128 / self.per_chip) as usize];
-            Complex64::from_polar(layer.weight, TAU * layer.phase_cycles) * f64::from(step)
+        let layers = self.component.layers.iter().zip(&self.factors);
+        let layers = layers.filter(|(layer, _)| layer.chips.is_empty() || layer.chips[index % layer.chips.len()]);
+        let layers = layers.map(|(layer, factor)| {
+            factor * f64::from(layer.pulse[(within * layer.pulse.len() as i128 / self.per_chip) as usize])
         });
         layers.sum::<Complex64>() * f64::from(sign) * self.scale
     }
