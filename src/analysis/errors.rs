@@ -153,7 +153,7 @@ impl Errors {
                 sample: estimate.sample,
                 time_s: run.time_s(estimate.sample),
                 code_m: planted!("analysis.errors.code_scale", -SPEED_OF_LIGHT_MPS, -0.5 * SPEED_OF_LIGHT_MPS)
-                    * (estimate.sent().since(true_row.sent()) + common.code_delay_s),
+                    * (estimate.sent().since(true_row.sent()) + common.code_delay_s(link.signal)),
                 carrier_cycles: raw_cycles,
                 raw_cycles,
                 doppler_hz: planted!(
@@ -196,7 +196,7 @@ impl Errors {
                 // What the front end delays arrives late: the receiver takes the time for an earlier one.
                 clock_m: planted!("analysis.errors.clock", 1.0, 0.1)
                     * SPEED_OF_LIGHT_MPS
-                    * (fix.time().since(true_row.time()) + run.common.code_delay_s),
+                    * (fix.time().since(true_row.time()) + run.common.clock_delay_s()),
                 true_clock_s: true_row.clock_bias_s,
                 velocity_enu_mps: to_enu
                     * planted!(

@@ -10,28 +10,11 @@ use std::collections::BTreeMap;
 
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
-use serde::Deserialize;
 
-use super::load::Run;
-use super::psd::{code_density, sinc_squared};
+use super::load::{Interference, Run};
 use super::statistics::mean;
-use crate::gnss::signal::Signal;
-
-/// A waveform's spectrum as `scene.json` states it.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct Shape {
-    pub kind: String,
-    #[serde(default)]
-    pub width_hz: Option<f64>,
-    #[serde(default)]
-    pub deviation_hz: Option<f64>,
-    #[serde(default)]
-    pub repetition_hz: Option<f64>,
-    #[serde(default)]
-    pub duty: Option<f64>,
-    #[serde(default)]
-    pub jitter: Option<f64>,
-}
+use super::waveform::{Edge, Waveform};
+use crate::gnss::signal::sinc_squared;
 
 /// Cycles of a sweep beyond which its lines lie too close to tell from a band.
 const MOST_CYCLES: f64 = 4096.0;
@@ -61,7 +44,7 @@ enum Density {
 
 impl Spectrum {
     /// That of a shape.
-    pub fn of(shape: &Shape) -> Self {
+    pub fn of(shape: &Interference) -> Self {
         let repetition_hz = shape.repetition_hz.unwrap_or(1.0);
         let width_hz = shape.width_hz.unwrap_or(1.0).abs();
         let flat = Self { lines: Vec::new(), density: Some(Density::Flat { width_hz }) };
@@ -142,7 +125,7 @@ pub struct Source {
 /// The sources of a run by their numbers.
 pub fn sources(run: &Run) -> BTreeMap<usize, Source> {
     let ticks = run.trajectory.len().max(1) as f64;
-    let one = |(number, shape): (usize, &Shape)| {
+    let one = |(number, shape): (usize, &Interference)| {
         let rows = || run.interference.iter().filter(move |row| row.source == number);
         let frequency_hz = mean(&rows().map(|row| row.frequency_hz).collect::<Vec<_>>())?;
         let jn0_hz = rows().map(|row| libm::pow(10.0, row.jn0_dbhz / 10.0)).sum::<f64>() / ticks;
@@ -152,9 +135,8 @@ pub fn sources(run: &Run) -> BTreeMap<usize, Source> {
 }
 
 /// κ of a source against a signal at `signal_hz` in the samples, in seconds.
-pub fn separation_s(source: &Source, signal: &Signal, signal_hz: f64, code_edge: &str, rate_hz: f64) -> f64 {
-    let Some(component) = signal.components.first() else { return 0.0 };
-    let code = |f_hz: f64| code_density(code_edge, f_hz - signal_hz, component.chip_rate_hz, rate_hz);
+pub fn separation_s(source: &Source, signal: &Waveform, signal_hz: f64, edge: Edge, rate_hz: f64) -> f64 {
+    let code = |f_hz: f64| signal.sampled(edge, f_hz - signal_hz, rate_hz);
     // The band in 4000 pieces, each looked at in its middle.
     let step_hz = rate_hz / 4000.0;
     let middles = (-2000..2000).map(|k| (f64::from(k) + 0.5) * step_hz);
@@ -192,8 +174,8 @@ mod tests {
     use super::*;
     use crate::gnss::gps::l1ca::L1_CA;
 
-    fn shape(kind: &str) -> Shape {
-        Shape {
+    fn shape(kind: &str) -> Interference {
+        Interference {
             kind: kind.to_owned(),
             width_hz: None,
             deviation_hz: None,
@@ -204,20 +186,20 @@ mod tests {
     }
 
     /// Separation from C/A at the carrier, wide sampling, in dB of seconds.
-    fn separation_db(shape: &Shape, frequency_hz: f64) -> f64 {
+    fn separation_db(shape: &Interference, frequency_hz: f64) -> f64 {
         let source = Source { spectrum: Spectrum::of(shape), frequency_hz, jn0_hz: 1.0 };
-        10.0 * libm::log10(separation_s(&source, &L1_CA, 0.0, "nearest", 60e6))
+        10.0 * libm::log10(separation_s(&source, &Waveform::of(&L1_CA).unwrap(), 0.0, Edge::Nearest, 60e6))
     }
 
     #[test]
     fn separations_are_the_published_ones() {
         // Computed outside this project from the same integral, for smooth spectra; printed to 0.01 dB.
-        let noise = |width_hz: f64| Shape { width_hz: Some(width_hz), ..shape("noise") };
-        let chirp = |width_hz: f64| Shape { repetition_hz: Some(1e5), ..noise(width_hz) };
-        let chirp = |width_hz: f64| Shape { kind: "chirp".to_owned(), ..chirp(width_hz) };
+        let noise = |width_hz: f64| Interference { width_hz: Some(width_hz), ..shape("noise") };
+        let chirp = |width_hz: f64| Interference { repetition_hz: Some(1e5), ..noise(width_hz) };
+        let chirp = |width_hz: f64| Interference { kind: "chirp".to_owned(), ..chirp(width_hz) };
         let cases = [
             (shape("cw"), 0.0, -60.1),
-            (Shape { repetition_hz: Some(1.023e6), ..shape("matched") }, 0.0, -61.86),
+            (Interference { repetition_hz: Some(1.023e6), ..shape("matched") }, 0.0, -61.86),
             (noise(2.046e6), 0.0, -63.55),
             (noise(4.092e6), 0.0, -66.34),
             (noise(20.46e6), 0.0, -73.15),
@@ -236,15 +218,15 @@ mod tests {
 
     #[test]
     fn spectra_of_unit_power_keep_it() {
-        let fm = Shape { deviation_hz: Some(5e4), repetition_hz: Some(1e4), ..shape("sine_fm") };
-        let chirp = Shape { width_hz: Some(1e6), repetition_hz: Some(1e4), ..shape("chirp") };
-        let pulse = Shape { repetition_hz: Some(1e3), duty: Some(0.1), ..shape("pulse") };
+        let fm = Interference { deviation_hz: Some(5e4), repetition_hz: Some(1e4), ..shape("sine_fm") };
+        let chirp = Interference { width_hz: Some(1e6), repetition_hz: Some(1e4), ..shape("chirp") };
+        let pulse = Interference { repetition_hz: Some(1e3), duty: Some(0.1), ..shape("pulse") };
         for shape in [fm, chirp, pulse] {
             let power: f64 = Spectrum::of(&shape).lines.iter().map(|line| line.1).sum();
             // A pulse's lines beyond the 160th hold 1/(π²·16) of the power or 0.6 %.
             assert!((power - 1.0).abs() < 0.007, "{shape:?}: {power}");
         }
-        let jittered = Shape { repetition_hz: Some(1e3), duty: Some(0.1), jitter: Some(0.5), ..shape("pulse") };
+        let jittered = Interference { repetition_hz: Some(1e3), duty: Some(0.1), jitter: Some(0.5), ..shape("pulse") };
         let spectrum = Spectrum::of(&jittered);
         let lines: f64 = spectrum.lines.iter().map(|line| line.1).sum();
         let rest: f64 = (-200_000..200_000).map(|k| spectrum.density(f64::from(k)) * 1.0).sum();

@@ -6,6 +6,8 @@
 
 mod common;
 mod delay;
+mod emission;
+mod facts;
 mod files;
 mod rows;
 
@@ -16,78 +18,18 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::analysis::JudgeError;
-use crate::analysis::errors::Link;
-use crate::analysis::jamming::Shape;
-use crate::analysis::psd::{Expected, expected};
 use crate::analysis::shelf::Shelf;
-use crate::analysis::spectrum::Stage;
-use crate::analysis::statistics::median;
-use crate::gnss::facts::{Expect, Fault};
+use crate::analysis::statistics::{mean, median};
 use crate::gnss::record::{
     AcquisitionRow, EventRow, Fix, InterferenceRow, LineRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
     TrajectoryRow,
 };
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{SIGNALS, Signal};
+use crate::gnss::signal::{Link, Signal};
 pub use common::Common;
+pub use emission::{Emission, MeanSignal};
+pub use facts::{Interference, Oscillator, SceneFacts, Stage};
 use files::{believable, dated, each, json, missing, optional, rows, text};
-
-/// What `truth/scene.json` says of the scene; other keys are left alone.
-#[derive(Clone, Debug, Deserialize)]
-pub struct SceneFacts {
-    pub name: String,
-    pub seed: u64,
-    pub duration_s: f64,
-    pub sample_rate_hz: f64,
-    #[serde(default)]
-    pub center_hz: Option<f64>,
-    /// Whether the samples' spectrum is mirrored about `center_hz`.
-    #[serde(default)]
-    pub inverted: bool,
-    /// SigMF name of the sample format.
-    #[serde(default)]
-    pub format: String,
-    #[serde(default)]
-    pub code_edge: String,
-    #[serde(default)]
-    pub mask_deg: Option<f64>,
-    /// Whether thermal noise was added.
-    #[serde(default = "yes")]
-    pub noise: bool,
-    #[serde(default)]
-    pub fidelity: String,
-    /// Azimuth and elevation in degrees below which the direct path is obstructed at the start.
-    #[serde(default)]
-    pub skyline_deg: Vec<[f64; 2]>,
-    /// Shapes of the sources of interference, in the order of their numbers.
-    #[serde(default)]
-    pub interference: Vec<Shape>,
-    /// Standard deviation of the thermal noise per component, in LSB: the gain, also of a scene without noise.
-    #[serde(default)]
-    pub noise_lsb: Option<f64>,
-    /// Stages of the front end, in order.
-    #[serde(default)]
-    pub front_end: Vec<Stage>,
-    /// The receiver's oscillator, if the scene has one.
-    #[serde(default)]
-    pub oscillator: Option<Oscillator>,
-    /// What the scene expects of a receiver, and what is wrong with its satellites.
-    #[serde(default)]
-    pub expect: Expect,
-    #[serde(default)]
-    pub faults: Vec<Fault>,
-}
-
-/// Noise of an oscillator; other keys are left alone.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-pub struct Oscillator {
-    /// Strengths h₂, h₁, h₀, h₋₁, h₋₂ of S_y = Σ h f^α, in Hz^(−α − 1).
-    pub h: [f64; 5],
-}
-
-fn yes() -> bool {
-    true
-}
 
 /// How fast the stages ran: `speed.json`, and the section of the summary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -118,11 +60,13 @@ pub struct Run {
     pub scenario: Option<String>,
     pub truth: Shelf<Link, Observation>,
     pub sky: Shelf<Sv, SkyRow>,
+    /// The truth's signals.
+    pub signals: BTreeSet<&'static Signal>,
     /// Satellites in the truth's first epoch.
     pub in_view_at_start: BTreeSet<Sv>,
-    /// Sum of C/N0 of a signal's satellites at a sample.
-    pub cn0_sums_hz: HashMap<(u64, &'static str), f64>,
-    /// That of the strongest one.
+    /// Sum of C/N0 at a sample over the satellites that send a signal on the same carrier.
+    pub cn0_sums_hz: HashMap<(u64, Emission), f64>,
+    /// C/N0 of a signal's strongest satellite at a sample.
     pub cn0_most_hz: HashMap<(u64, &'static str), f64>,
     /// What satellites' carriers and front end have in common beside the clock.
     pub common: Common,
@@ -130,7 +74,7 @@ pub struct Run {
     pub ionosphere_m: f64,
     pub troposphere_m: f64,
     /// The mean of each satellite's true signal.
-    pub expected: Vec<Expected>,
+    pub expected: Vec<MeanSignal>,
     /// Reflected rays; none in a scene without multipath.
     pub rays: Shelf<Link, RayRow>,
     pub trajectory: Vec<TrajectoryRow>,
@@ -196,7 +140,7 @@ impl Run {
         };
         read.receiver = json(&rx.join("receiver.json"))?.unwrap_or(Value::Null);
         if let Some(spacing_chips) = read.tracking_setting("spacing_chips") {
-            read.common.set_spacing(&read.scene, spacing_chips);
+            read.common.set_front_end(&read.scene, spacing_chips);
         }
         read.psd = optional(&run.join("psd.csv"))?;
         read.speed = json(&run.join("speed.json"))?.unwrap_or_default();
@@ -211,16 +155,18 @@ impl Run {
 
     fn read_truth_by(truth: &Path, shelves: &Path) -> Result<Self, JudgeError> {
         let scene = truth.join("scene.json");
-        let scene = json(&scene)?.map(Self::folded).ok_or_else(|| missing(&scene, TRUTH))?;
+        let mut scene: SceneFacts = json(&scene)?.ok_or_else(|| missing(&scene, TRUTH))?;
         let (mut cn0_sums_hz, mut cn0_most_hz) = (HashMap::new(), HashMap::new());
-        let mut common = Common::of(&scene, USUAL_SPACING_CHIPS);
+        let mut common = Common::new(scene.sample_rate_hz);
         let observed = observations(&truth.join("observations.csv"), TRUTH, shelves, |row| {
             let cn0_hz = libm::pow(10.0, row.cn0_dbhz / 10.0);
-            *cn0_sums_hz.entry((row.sample, row.signal.name)).or_insert(0.0) += cn0_hz;
+            *cn0_sums_hz.entry((row.sample, Emission::of(row.link()))).or_insert(0.0) += cn0_hz;
             let most_hz: &mut f64 = cn0_most_hz.entry((row.sample, row.signal.name)).or_insert(0.0);
             *most_hz = most_hz.max(cn0_hz);
             common.add(row);
         })?;
+        Self::fold(&mut scene, &Emission::all(observed.keys()))?;
+        common.set_front_end(&scene, USUAL_SPACING_CHIPS);
         let (mut ionosphere_m, mut troposphere_m) = (0.0_f64, 0.0_f64);
         let (mut first, mut in_view_at_start) = (u64::MAX, BTreeSet::new());
         let mut sky = Shelf::new(shelves);
@@ -239,7 +185,8 @@ impl Run {
             scene,
             scene_json: Value::Null,
             scenario: None,
-            expected: expected(&observed)?,
+            expected: emission::means(&observed)?,
+            signals: observed.keys().map(|link| link.signal).collect(),
             truth: observed,
             sky,
             in_view_at_start,
@@ -277,6 +224,16 @@ impl Run {
         10.0 * libm::log10(self.cn0_most_hz.get(&(sample, signal.name)).copied().unwrap_or(1.0))
     }
 
+    /// A satellite's signal in words: the satellite alone where the truth has one signal.
+    pub fn name(&self, link: Link) -> String {
+        if self.signals.iter().all(|signal| *signal == link.signal) { link.sv.to_string() } else { link.to_string() }
+    }
+
+    /// Mean wavelength of the truth's carriers.
+    pub fn mean_wavelength_m(&self) -> Option<f64> {
+        mean(&self.truth.keys().map(Link::wavelength_m).collect::<Vec<_>>())
+    }
+
     /// Usual time between the truth's rows.
     pub fn truth_interval_s(&self) -> f64 {
         let steps = self.trajectory.windows(2).map(|two| self.time_s(two[1].sample) - self.time_s(two[0].sample));
@@ -285,16 +242,28 @@ impl Run {
 
     /// What [`Self::read`] does to the scene's facts: an IF above half the rate of real samples becomes the
     /// one at which they hold it.
-    fn folded(mut scene: SceneFacts) -> SceneFacts {
-        let (Some(center_hz), Some(signal)) = (scene.center_hz, SIGNALS.first()) else { return scene };
+    ///
+    /// # Errors
+    /// Signals that samples hold in different multiples of half the rate.
+    fn fold(scene: &mut SceneFacts, emissions: &BTreeSet<Emission>) -> Result<(), JudgeError> {
+        let Some(center_hz) = scene.center_hz.filter(|_| scene.format.starts_with('r')) else { return Ok(()) };
         let sign = |inverted: bool| if inverted { -1.0 } else { 1.0 };
-        let if_hz = sign(scene.inverted) * (signal.centre_hz() - center_hz);
-        let folded_hz = if_hz - scene.sample_rate_hz * (if_hz / scene.sample_rate_hz).round();
-        if scene.format.starts_with('r') && if_hz.abs() > 0.5 * scene.sample_rate_hz {
-            scene.inverted ^= folded_hz < 0.0;
-            scene.center_hz = Some(signal.centre_hz() - sign(scene.inverted) * folded_hz.abs());
+        let if_hz = |emission: &Emission| sign(scene.inverted) * (emission.carrier_hz() - center_hz);
+        let turns = |if_hz: f64| (if_hz / scene.sample_rate_hz).round();
+        let rest_hz = |if_hz: f64| if_hz - scene.sample_rate_hz * turns(if_hz);
+        let all: Vec<f64> = emissions.iter().map(if_hz).collect();
+        let (Some(first), Some(&first_hz)) = (emissions.first(), all.first()) else { return Ok(()) };
+        if all.iter().all(|if_hz| if_hz.abs() <= 0.5 * scene.sample_rate_hz) {
+            return Ok(());
         }
-        scene
+        let mirrored = rest_hz(first_hz) < 0.0;
+        if all.iter().any(|&hz| turns(hz) != turns(first_hz) || (rest_hz(hz) < 0.0) != mirrored) {
+            let expected = "all signals within the same multiple of half the rate of real samples";
+            return Err(JudgeError::Scene { key: "center_hz", value: center_hz, expected });
+        }
+        let center_hz = first.carrier_hz() - sign(scene.inverted ^ mirrored) * rest_hz(first_hz).abs();
+        (scene.inverted, scene.center_hz) = (scene.inverted ^ mirrored, Some(center_hz));
+        Ok(())
     }
 
     /// A number among the receiver's tracking settings, if they name it.

@@ -49,6 +49,7 @@ mod tables;
 pub mod theory;
 pub mod trade;
 pub mod verdict;
+pub mod waveform;
 mod write;
 
 use std::io;

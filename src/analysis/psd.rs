@@ -1,8 +1,7 @@
-//! Power spectral density of the samples by Welch's method, and the spectra of codes.
+//! Power spectral density of the samples by Welch's method.
 //!
-//! Hann window, half overlap, periodograms averaged in f64 (Welch 1967). A code's spectrum is that of its chips,
-//! sinc²(f/R_c)/R_c, summed over its aliases; [`super::spectrum`] builds what is expected of the samples from it.
-//! The lines 1 kHz apart of a repeating code and the data are below the resolution and left out.
+//! Hann window, half overlap, periodograms averaged in f64 (Welch 1967). [`super::spectrum`] says what is
+//! expected of it.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -11,12 +10,7 @@ use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
 use crate::analysis::JudgeError;
-use crate::analysis::errors::Link;
 use crate::analysis::load::PsdRow;
-use crate::analysis::shelf::Shelf;
-use crate::analysis::statistics::mean;
-use crate::gnss::record::Observation;
-use crate::gnss::satellite::Sv;
 
 /// A spectrum being accumulated from blocks of planar samples.
 pub struct Psd {
@@ -123,92 +117,6 @@ fn decibels(power: f64) -> f64 {
     10.0 * libm::log10(power.max(1e-30))
 }
 
-/// A satellite's signal on average over the run.
-#[derive(Clone, Copy, Debug)]
-pub struct Expected {
-    pub sv: Sv,
-    /// Carrier as received, and as sent.
-    pub carrier_hz: f64,
-    pub nominal_hz: f64,
-    pub chip_rate_hz: f64,
-    pub cn0_hz: f64,
-    pub cn0_mean_dbhz: f64,
-}
-
-/// The mean of each satellite's true signal over the run.
-pub(super) fn expected(truth: &Shelf<Link, Observation>) -> Result<Vec<Expected>, JudgeError> {
-    let mut all = Vec::new();
-    for Link { sv, signal } in truth.keys() {
-        let rows = truth.rows(Link { sv, signal })?;
-        let of = |of: fn(&Observation) -> f64| mean(&rows.iter().map(of).collect::<Vec<_>>());
-        let means = (of(|row| row.doppler_hz), of(|row| libm::pow(10.0, row.cn0_dbhz / 10.0)), of(|row| row.cn0_dbhz));
-        let ((Some(doppler_hz), Some(cn0_hz), Some(cn0_mean_dbhz)), Some(code)) = (means, signal.components.first())
-        else {
-            continue;
-        };
-        all.push(Expected {
-            sv,
-            carrier_hz: signal.carrier_hz(sv) + doppler_hz,
-            nominal_hz: signal.carrier_hz(sv),
-            chip_rate_hz: code.chip_rate_hz,
-            cn0_hz,
-            cn0_mean_dbhz,
-        });
-    }
-    Ok(all)
-}
-
-/// Density of a rectangular-chip code at `f_hz` from its carrier as the sampler meets it, before anything
-/// aliases, per hertz.
-pub(super) fn pulse_density(code_edge: &str, f_hz: f64, chip_rate_hz: f64, rate_hz: f64) -> f64 {
-    let chip = sinc_squared(f_hz / chip_rate_hz) / chip_rate_hz;
-    match edge(code_edge) {
-        Edge::BandLimited if f_hz.abs() > 0.5 * rate_hz => 0.0,
-        Edge::BandLimited | Edge::Nearest => chip,
-        // A mean over the sample's interval has its own sinc².
-        Edge::Area => chip * sinc_squared(f_hz / rate_hz),
-    }
-}
-
-enum Edge {
-    Nearest,
-    Area,
-    BandLimited,
-}
-
-fn edge(code_edge: &str) -> Edge {
-    let name: String = code_edge.chars().filter(char::is_ascii_alphabetic).collect();
-    match name.to_ascii_lowercase().as_str() {
-        "bandlimited" => Edge::BandLimited,
-        "area" => Edge::Area,
-        _ => Edge::Nearest,
-    }
-}
-
-/// Density of a unit-power rectangular-chip code, sampled, at `f_hz` from its carrier, per hertz.
-pub(super) fn code_density(code_edge: &str, f_hz: f64, chip_rate_hz: f64, rate_hz: f64) -> f64 {
-    let density = |f: f64| pulse_density(code_edge, f, chip_rate_hz, rate_hz);
-    match edge(code_edge) {
-        // Filtered to half the sample rate: no alias but the one that the frequency itself may be.
-        Edge::BandLimited => density(f_hz - rate_hz * (f_hz / rate_hz).round()),
-        Edge::Area | Edge::Nearest => aliases(density, f_hz, rate_hz),
-    }
-}
-
-/// Sum over the aliases. The tail after ±50 is below 1 % of a density that is itself 50 dB down.
-fn aliases(density: impl Fn(f64) -> f64, f_hz: f64, rate_hz: f64) -> f64 {
-    (-50..=50).map(|k| density(f_hz + f64::from(k) * rate_hz)).sum()
-}
-
-pub(super) fn sinc_squared(x: f64) -> f64 {
-    let angle = std::f64::consts::PI * x;
-    if angle.abs() < 1e-9 {
-        return 1.0;
-    }
-    let sinc = libm::sin(angle) / angle;
-    sinc * sinc
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -256,20 +164,6 @@ mod tests {
         assert!((decibels(power) - decibels(9.0)).abs() < 0.1, "{}", decibels(power));
         let peak = density.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         assert!((peak.0 - tone_hz).abs() < step_hz);
-    }
-
-    #[test]
-    fn a_sampled_code_keeps_its_power_and_has_its_nulls() {
-        for edge in ["nearest", "band_limited"] {
-            let rate_hz = 10.0e6;
-            let step_hz = 1e3;
-            let power: f64 =
-                (-5000..5000).map(|k| step_hz * code_density(edge, f64::from(k) * step_hz, 1.023e6, rate_hz)).sum();
-            // Outside ±5 MHz lies 1/(pi^2 * 4.9) of the power or 2 %; aliases bring it back.
-            let expected = if edge == "nearest" { 1.0 } else { 0.98 };
-            assert!((power - expected).abs() < 5e-3, "{edge} {power}");
-        }
-        assert!(code_density("band_limited", 1.023e6, 1.023e6, 10e6) < 1e-20);
     }
 
     #[test]

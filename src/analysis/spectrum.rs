@@ -1,43 +1,24 @@
 //! The spectrum that theory expects of the samples, front end and converter in, and the nulls of the code
 //! found against it.
 //!
-//! Absolute, in LSB²/Hz: noise of N0 = 2σ²/fs, satellites of C/N0·N0 under the spectra of their chips,
+//! Absolute, in LSB²/Hz: noise of N0 = 2σ²/fs, satellites of C/N0·N0 under the spectra of their signals,
 //! interference, all through the filter and the converter's gain; then quantisation. An integer format rounds
 //! with 1/12 a component; a converter of few levels is g·x + d for Gaussian x (Bussgang 1952), with g and the
 //! power of d summed over its cells. d counts as white. Nothing is fitted: the median of measured over
 //! expected is reported. Limits: a Butterworth's response is the analogue one, a wall's edge an error
-//! function between its −80 dB points; a local oscillator's offset and phase noise are left out.
+//! function between its −80 dB points, both about the first signal's carrier; a local oscillator's offset and
+//! phase noise are left out.
 
-use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+use serde::Serialize;
 use statrs::function::erf::{erf, erfc};
 
 use crate::analysis::jamming;
-use crate::analysis::load::Run;
-use crate::analysis::psd::code_density;
+use crate::analysis::load::{Emission, MeanSignal, Run, Stage};
 use crate::analysis::statistics::median;
-
-/// A stage of the front end as `scene.json` states it.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(default)]
-pub struct Stage {
-    pub stage: String,
-    pub shape: Option<String>,
-    pub order: Option<u32>,
-    pub bandwidth_hz: Option<f64>,
-    /// Delay that every satellite's code has in common.
-    pub group_delay_s: Option<f64>,
-    /// By how much carriers lie higher in the samples.
-    pub offset_hz: Option<f64>,
-    pub image_db: Option<f64>,
-    pub dc_power_lsb2: Option<f64>,
-    pub bits: Option<u32>,
-    /// Step over the deviation of a component for which the gain is made.
-    pub step_sigma: Option<f64>,
-    pub nominal_lsb: Option<f64>,
-    pub gain_control: Option<bool>,
-    /// Whether levels are the format's integers.
-    pub whole: Option<bool>,
-}
+use crate::analysis::waveform::Waveform;
+use crate::gnss::signal::Signal;
 
 /// The section `psd` of `summary.json`: frequencies from the carrier.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -104,16 +85,18 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
     let bin_hz = run.psd.get(1).zip(run.psd.first()).map_or(1.0, |(b, a)| b.frequency_hz - a.frequency_hz);
     let stage = |name: &str| run.scene.front_end.iter().find(|stage| stage.stage == name);
     let if_hz = signals.first().map_or(0.0, |signal| sign * (signal.nominal_hz - center_hz));
+    let waveforms: Vec<(&MeanSignal, Waveform)> =
+        signals.iter().filter_map(|signal| Some((signal, Waveform::of(signal.signal)?))).collect();
     let mut density: Vec<f64> = run
         .psd
         .iter()
         .map(|row| {
-            let of = |signal: &super::psd::Expected| {
+            let of = |(signal, waveform): &(&MeanSignal, Waveform)| {
                 let from_carrier_hz = row.frequency_hz - sign * (signal.carrier_hz - center_hz);
-                signal.cn0_hz * code_density(&run.scene.code_edge, from_carrier_hz, signal.chip_rate_hz, rate_hz)
+                signal.cn0_hz * waveform.sampled(run.scene.code_edge, from_carrier_hz, rate_hz)
             };
             let jammed: f64 = sources.values().map(|source| jamming::density(source, row.frequency_hz, bin_hz)).sum();
-            floor + signals.iter().map(of).sum::<f64>() + jammed
+            floor + waveforms.iter().map(of).sum::<f64>() + jammed
         })
         .collect();
     let level = run.scene.noise_lsb.map(|sigma| 2.0 * sigma * sigma / rate_hz);
@@ -203,43 +186,47 @@ fn quantiser(adc: Option<&Stage>, sigma_lsb: f64) -> (f64, f64) {
 /// A null as measured and as expected.
 type Null = (f64, f64);
 
-/// Decibels of C/N0 that the front end's filter and converter cost a code, noise alone counted: a filter
-/// passes less of the code than of noise with the code's spectrum, and rounding adds noise.
-pub fn cost_db(run: &Run) -> f64 {
+/// Decibels of C/N0 that the front end's filter and converter cost each signal's code, noise alone counted: a
+/// filter passes less of the code than of noise with the code's spectrum, and rounding adds noise.
+pub fn costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
     let stage = |name: &str| run.scene.front_end.iter().find(|stage| stage.stage == name);
-    let filtered = stage("filter").map_or(1.0, |filter| passed(filter, run));
     let kept = run.scene.noise_lsb.filter(|_| run.scene.noise).map_or(1.0, |sigma_lsb| {
         let (gain, added) = quantiser(stage("adc"), sigma_lsb);
         let power = (gain * sigma_lsb) * (gain * sigma_lsb);
         power / (power + added)
     });
-    -10.0 * libm::log10(filtered * kept)
+    let filtered = |signal: &'static Signal| stage("filter").map_or(1.0, |filter| passed(filter, run, signal));
+    run.signals.iter().map(|&signal| (signal, -10.0 * libm::log10(filtered(signal) * kept))).collect()
 }
 
-/// What a filter leaves of a code's power over noise: (∫S|H| df)²/(∫S|H|² df · ∫S df).
-fn passed(filter: &Stage, run: &Run) -> f64 {
-    let Some(chip_rate_hz) = run.truth.keys().find_map(|link| Some(link.signal.components.first()?.chip_rate_hz))
-    else {
-        return 1.0;
-    };
+/// What a filter about the first signal's carrier leaves of a code's power over noise:
+/// (∫S|H| df)²/(∫S|H|² df · ∫S df).
+fn passed(filter: &Stage, run: &Run, signal: &Signal) -> f64 {
+    let Some(code) = Waveform::of(signal) else { return 1.0 };
     let rate_hz = run.scene.sample_rate_hz;
+    let off_hz = run.expected.first().map_or(0.0, |first| signal.centre_hz() - first.nominal_hz);
     let (mut all, mut amplitude, mut power) = (0.0, 0.0, 0.0);
     for k in -1000..1000 {
         let f_hz = (f64::from(k) + 0.5) * rate_hz / 2000.0;
-        let density = code_density(&run.scene.code_edge, f_hz, chip_rate_hz, rate_hz);
-        let gain = filter_power(filter, f_hz);
+        let density = code.sampled(run.scene.code_edge, f_hz, rate_hz);
+        let gain = filter_power(filter, f_hz + off_hz);
         (all, amplitude, power) = (all + density, amplitude + density * gain.sqrt(), power + density * gain);
     }
     amplitude * amplitude / (power * all)
 }
 
-/// Both first nulls of the first signal's code.
+/// The nulls beside the main lobe of the code, where the samples hold one signal on one carrier.
 fn nulls(run: &Run, theory_db: &[f64]) -> Result<[Null; 2], &'static str> {
-    let signal = run.truth.keys().next().map(|link| link.signal).ok_or("there is no signal")?;
-    let chip_rate_hz = signal.components.first().map(|c| c.chip_rate_hz).ok_or("the signal has no code")?;
+    let mut emissions = Emission::all(run.truth.keys()).into_iter();
+    let emission = emissions.next().ok_or("there is no signal")?;
+    if emissions.next().is_some() {
+        return Err("filled: several signals or carriers share the spectrum");
+    }
+    let waveform = Waveform::of(emission.signal).ok_or("the signal has no code")?;
+    let (chip_rate_hz, null_hz) = (waveform.chip_rate_hz(), waveform.null_hz().ok_or("the code has none")?);
     let center_hz = run.scene.center_hz.ok_or("the samples' frequency is unknown")?;
     let sign = if run.scene.inverted { -1.0 } else { 1.0 };
-    let if_hz = sign * (signal.centre_hz() - center_hz);
+    let if_hz = sign * (emission.carrier_hz() - center_hz);
     let linear = |db: f64| libm::pow(10.0, db / 10.0);
     let measured: Vec<(f64, f64)> =
         run.psd.iter().map(|row| (row.frequency_hz - if_hz, linear(row.density_db))).collect();
@@ -268,7 +255,7 @@ fn nulls(run: &Run, theory_db: &[f64]) -> Result<[Null; 2], &'static str> {
         };
         bottom(&measured).zip(bottom(&theory)).ok_or("the spectrum has no bottom there")
     };
-    Ok([one(-chip_rate_hz)?, one(chip_rate_hz)?])
+    Ok([one(-null_hz)?, one(null_hz)?])
 }
 
 /// Lowest point of the parabola of least squares through points near `middle_hz`.

@@ -9,6 +9,7 @@ use serde::Serialize;
 mod clock;
 
 use super::*;
+use crate::analysis::waveform::Edge;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::record::{
@@ -581,7 +582,7 @@ fn the_spectrum_of_random_chips_is_the_theory_s_and_has_its_nulls() {
     let directory = planted_run(&PLANTED);
     let mut run = load::Run::read(directory.path()).unwrap();
     run.expected.iter_mut().for_each(|signal| signal.carrier_hz = signal.nominal_hz);
-    (run.scene.noise, run.scene.code_edge, run.scene.sample_rate_hz) = (false, "nearest".to_owned(), 10.23e6);
+    (run.scene.noise, run.scene.code_edge, run.scene.sample_rate_hz) = (false, Edge::Nearest, 10.23e6);
     let mut draw = Draw(3);
     let chips = (0..400_000).map(|_| if draw.normal() < 0.0 { -30.0_f32 } else { 30.0 });
     let samples: Vec<f32> = chips.flat_map(|chip| [chip; 10]).collect();

@@ -12,14 +12,16 @@ use super::multipath;
 use super::quantile::{largest, mean_square};
 use super::ranges::update_s;
 use crate::analysis::JudgeError;
-use crate::analysis::errors::{Errors, Link, PULL_IN_S, SignalError};
+use crate::analysis::errors::{Errors, PULL_IN_S, SignalError};
 use crate::analysis::foreign::truth::Timeline;
 use crate::analysis::jitter::theory::{Stresses, Theory};
 use crate::analysis::jitter::{Loop, Settings};
 use crate::analysis::load::Run;
 use crate::analysis::statistics::median;
 use crate::analysis::theory::edges;
+use crate::analysis::waveform::Edge;
 use crate::gnss::record::{RayRow, TrackingRow};
+use crate::gnss::signal::Link;
 
 /// What interference may cost before thermal theory no longer describes the loops.
 const JAMMED_DB: f64 = 1.0;
@@ -46,7 +48,7 @@ const LEAST: usize = 30;
 /// A figure of the satellite that is nearest to its limit, or farthest beyond.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Worst {
-    pub sv: String,
+    pub name: String,
     pub value: f64,
     pub limit: f64,
 }
@@ -76,6 +78,8 @@ pub enum Figure {
 #[derive(Clone, Debug, Default)]
 pub struct Links {
     pub worst: BTreeMap<Figure, Worst>,
+    /// Satellites whose signal no loop of the receiver's settings can hold.
+    pub unheld: Vec<String>,
 }
 
 impl Links {
@@ -85,14 +89,19 @@ impl Links {
     /// [`JudgeError::Read`] where rows that were put by cannot be read.
     pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
         let mut links = Self::default();
-        let (Some(settings), Some(update_s)) = (Settings::of(run), update_s(run)) else { return Ok(links) };
+        let Some(settings) = Settings::of(run) else { return Ok(links) };
         // Without noise other codes alone disturb a loop, and they are no noise.
         if !run.scene.noise {
             return Ok(links);
         }
-        let cost_db = crate::analysis::spectrum::cost_db(run);
+        let costs_db = crate::analysis::spectrum::costs_db(run);
         for link in errors.signals.keys() {
-            let Some(theory) = Theory::new(run, settings, &link, update_s) else { continue };
+            let Some(update_s) = update_s(run, link.signal) else { continue };
+            let Some(theory) = Theory::new(run, settings, &link, update_s) else {
+                links.unheld.push(run.name(link));
+                continue;
+            };
+            let cost_db = costs_db.get(link.signal).copied().unwrap_or(0.0);
             let mut rows = settled(&errors.signals.rows(link)?);
             let all = rows.len();
             rows.retain(|row| run.scene.expect.bounded(row.time_s));
@@ -116,10 +125,10 @@ impl Links {
     }
 
     /// Keeps a value if it is the worst so far; a lower limit is kept as such.
-    fn put(&mut self, figure: Figure, link: Link, value: f64, limit: f64) {
+    fn put(&mut self, figure: Figure, name: &str, value: f64, limit: f64) {
         let lower = matches!(figure, Figure::Below(_) | Figure::RawBelow(_));
         let over = |value: f64, limit: f64| if lower { limit / value.max(1e-300) } else { value / limit };
-        let new = Worst { sv: link.sv.to_string(), value, limit };
+        let new = Worst { name: name.to_owned(), value, limit };
         match self.worst.get(&figure) {
             Some(old) if over(old.value, old.limit) >= over(value, limit) => {}
             _ => {
@@ -161,7 +170,7 @@ type Output = fn(&TrackingRow) -> f64;
 
 /// One satellite.
 struct One<'a> {
-    link: Link,
+    name: String,
     theory: &'a Theory,
     rows: Vec<SignalError>,
     /// Of rays: code error of each row, and what a carrier may be off by.
@@ -217,17 +226,19 @@ impl<'a> One<'a> {
         })?;
         let code_m = rows
             .iter()
-            .map(|row| rays.get(&row.sample).map_or(0.0, |r| multipath::error_chips(r, settings.spacing_chips)))
+            .map(|row| {
+                rays.get(&row.sample).map_or(0.0, |r| multipath::error_chips(&theory.code, r, settings.spacing_chips))
+            })
             .map(|chips| chips * theory.chip_m)
             .collect();
         let strongest = rays.values().map(|r| r.iter().map(|ray| ray.1).sum::<f64>()).fold(0.0, f64::max).min(0.99);
-        let edge_m = match run.scene.code_edge.as_str() {
-            "area" => edges::CREST * edges::averaged_m(run.scene.sample_rate_hz),
+        let edge_m = match run.scene.code_edge {
+            Edge::Area => edges::CREST * edges::averaged_m(run.scene.sample_rate_hz),
             _ => 0.0,
         };
         let span_s = 0.1_f64.max(last.time_s - first.time_s);
         Ok(Some(Self {
-            link,
+            name: run.name(link),
             theory,
             code_m,
             // A vector's angle under another of share α beside it, and its length.
@@ -283,30 +294,30 @@ impl<'a> One<'a> {
         let count = errors.len() as f64;
         let middle = errors.iter().sum::<f64>() / count;
         let factor = largest(1, 1) * THEORY * self.pair / self.independent(which, 2.0).sqrt();
-        links.put(figures[0], self.link, middle.abs(), factor * sigma + stress + rest);
+        links.put(figures[0], &self.name, middle.abs(), factor * sigma + stress + rest);
         let most = errors.iter().map(|e| e.abs()).fold(0.0, f64::max);
-        links.put(figures[1], self.link, most, largest(1, errors.len()) * THEORY * self.pair * sigma + stress + rest);
+        links.put(figures[1], &self.name, most, largest(1, errors.len()) * THEORY * self.pair * sigma + stress + rest);
         let spread = errors.iter().map(|e| (e - middle) * (e - middle)).sum::<f64>() / count;
         let (low, high) = mean_square(self.independent(which, 4.0));
         // What is not noise may come and go.
         let top = (high * (THEORY * self.pair * sigma) * (THEORY * self.pair * sigma) + stress * stress + rest * rest)
             .sqrt()
             / sigma;
-        links.put(Figure::Above(which), self.link, spread.sqrt() / sigma, top);
+        links.put(Figure::Above(which), &self.name, spread.sqrt() / sigma, top);
         // A receiver may take a stress away that a loop alone would suffer; noise stays.
-        links.put(Figure::Below(which), self.link, spread.sqrt() / noise, low.sqrt() / THEORY_LOW);
+        links.put(Figure::Below(which), &self.name, spread.sqrt() / noise, low.sqrt() / THEORY_LOW);
     }
 
     fn cn0(&self, links: &mut Links, [bias, most]: [Figure; 2]) {
         let off = |row: &SignalError| row.cn0_dbhz - row.cn0_effective_dbhz + self.cost_db;
         let middle = self.rows.iter().map(off).sum::<f64>() / self.rows.len() as f64;
-        links.put(bias, self.link, middle.abs(), CN0_DB + self.ray_db);
+        links.put(bias, &self.name, middle.abs(), CN0_DB + self.ray_db);
         // A noise power of n values is known to 4.34·√(2/n) dB; the averages hold a second of updates.
         let updates = (1.0 / self.theory.update_s).max(2.0);
         let weak = 1.0 + 1.0 / (self.cn0_hz * self.theory.update_s);
         let sigma_db = 4.343 * (2.0 / updates).sqrt() * weak;
         let largest_db = self.rows.iter().map(|row| off(row).abs()).fold(0.0, f64::max);
-        links.put(most, self.link, largest_db, CN0_DB + self.ray_db + largest(1, self.rows.len()) * sigma_db);
+        links.put(most, &self.name, largest_db, CN0_DB + self.ray_db + largest(1, self.rows.len()) * sigma_db);
     }
 
     /// What the loops put out, update by update.
@@ -330,20 +341,20 @@ impl<'a> One<'a> {
             let (low, high) = mean_square(0.5 * count);
             let sigma = (square - middle * middle).max(0.0).sqrt();
             let top = (high * (THEORY * self.pair * raw) * (THEORY * self.pair * raw) + stress * stress).sqrt() / raw;
-            links.put(Figure::RawAbove(which), self.link, sigma / raw, top);
-            links.put(Figure::RawBelow(which), self.link, sigma / raw, low.sqrt() / THEORY_LOW);
+            links.put(Figure::RawAbove(which), &self.name, sigma / raw, top);
+            links.put(Figure::RawBelow(which), &self.name, sigma / raw, low.sqrt() / THEORY_LOW);
             let limit = largest(1, 1) * THEORY * self.pair * raw * (2.0 / count).sqrt() + stress;
-            links.put(Figure::RawBias(which), self.link, middle.abs(), limit);
+            links.put(Figure::RawBias(which), &self.name, middle.abs(), limit);
         }
         let cn0_dbhz = 10.0 * libm::log10(self.cn0_hz);
-        links.put(Figure::LoopCn0Bias, self.link, (mean(&|row| row.cn0_dbhz) - cn0_dbhz).abs(), CN0_DB + self.ray_db);
+        links.put(Figure::LoopCn0Bias, &self.name, (mean(&|row| row.cn0_dbhz) - cn0_dbhz).abs(), CN0_DB + self.ray_db);
         // In units of noise per component a prompt has the mean power 2 + 2·T·C/N0.
         let power = mean(&|row| row.prompt_i * row.prompt_i + row.prompt_q * row.prompt_q);
         let snr = self.theory.update_s * self.cn0_hz;
         let off_db = 10.0 * libm::log10((0.5 * power - 1.0).max(1e-3) / snr);
         let random_db = 4.343 * largest(1, 1) * (2.0 / (snr * count)).sqrt();
         if self.white {
-            links.put(Figure::PromptPower, self.link, off_db.abs(), CN0_DB + self.ray_db + random_db);
+            links.put(Figure::PromptPower, &self.name, off_db.abs(), CN0_DB + self.ray_db + random_db);
         }
         // Beside noise of one component, quadrature holds what the phase loop leaves.
         let (sigma_rad, stress_rad) = self
@@ -355,6 +366,6 @@ impl<'a> One<'a> {
         let (_, high) = mean_square(0.5 * count);
         let limit = high * (1.0 + 2.0 * snr * phase2) / (2.0 + 2.0 * snr) * THEORY * THEORY;
         let quadrature = mean(&|row| row.prompt_q * row.prompt_q) / power;
-        links.put(Figure::PromptQuadrature, self.link, quadrature, limit.min(1.0));
+        links.put(Figure::PromptQuadrature, &self.name, quadrature, limit.min(1.0));
     }
 }

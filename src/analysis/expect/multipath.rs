@@ -1,30 +1,30 @@
 //! The code error that the truth's reflected rays leave in an early-minus-late loop.
 //!
-//! The loop rests where |E|² = |L|², E and L the sums over the rays of amplitude, phase and correlation (the
-//! triangle of the chips) at half a spacing to either side. Limits: the front end's rounding of the triangle
-//! is left out, and rays are taken as steady over the loop's time constant, so that what moves fast is
+//! The loop rests where |E|² = |L|², E and L the sums over the rays of amplitude, phase and correlation at
+//! half a spacing to either side. Limits: the front end's rounding of the correlation is left out, and rays are taken as steady over the loop's time constant, so that what moves fast is
 //! overrated.
 
+use crate::analysis::jitter::theory::Code;
 use crate::gnss::record::RayRow;
 
 /// Where the loop rests, in chips late of the direct ray, for rays of (excess in chips, amplitude, phase in cycles).
-pub fn error_chips(rays: &[(f64, f64, f64)], spacing_chips: f64) -> f64 {
+pub fn error_chips(code: &Code, rays: &[(f64, f64, f64)], spacing_chips: f64) -> f64 {
     if rays.iter().all(|ray| ray.1 == 0.0) {
         return 0.0;
     }
     let power = |at: f64| {
-        let triangle = |x: f64| (1.0 - x.abs()).max(0.0);
-        let (mut i, mut q) = (triangle(at), 0.0);
+        let (mut i, mut q) = (code.value(at), 0.0);
         for (excess, amplitude, phase) in rays {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * phase);
-            let value = amplitude * triangle(at - excess);
+            let value = amplitude * code.value(at - excess);
             (i, q) = (i + value * cos, q + value * sin);
         }
         i * i + q * q
     };
-    // Falls through zero where the loop rests, between half a spacing before the direct ray and one behind it.
+    // Falls through zero where the loop rests, between half a spacing before the direct ray and one behind it,
+    // before early leaves the main peak.
     let discriminator = |at: f64| power(at + 0.5 * spacing_chips) - power(at - 0.5 * spacing_chips);
-    let (mut low, mut high) = (-0.5 * spacing_chips, spacing_chips);
+    let (mut low, mut high) = (-0.5 * spacing_chips, spacing_chips.min(code.reach_chips - 0.5 * spacing_chips));
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
         if discriminator(middle) < 0.0 { high = middle } else { low = middle }
@@ -40,15 +40,31 @@ pub fn ray(row: &RayRow, chip_m: f64) -> (f64, f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::waveform::Waveform;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::synthetic::LONG_BOC;
 
     #[test]
     fn a_single_ray_errs_as_the_envelope_says() {
         // In phase the error of an early-minus-late envelope is α·d/2 where the ray is late by d/2(1 + α) or
         // more; out of phase the same early.
-        let error = |phase| error_chips(&[(0.3, 0.25, phase)], 0.2);
+        let code = Code::of(&Waveform::of(&L1_CA).unwrap());
+        let error = |phase| error_chips(&code, &[(0.3, 0.25, phase)], 0.2);
         assert!((error(0.0) - 0.25 * 0.1).abs() < 3e-3, "{}", error(0.0));
         assert!((error(0.5) + 0.25 * 0.1).abs() < 3e-3, "{}", error(0.5));
-        assert_eq!(error_chips(&[(0.3, 0.0, 0.0)], 0.2), 0.0);
-        assert!(error_chips(&[(2.0, 0.5, 0.0)], 0.5).abs() < 1e-6, "beyond the correlation");
+        assert_eq!(error_chips(&code, &[(0.3, 0.0, 0.0)], 0.2), 0.0);
+        assert!(error_chips(&code, &[(2.0, 0.5, 0.0)], 0.5).abs() < 1e-6, "beyond the correlation");
+    }
+
+    #[test]
+    fn a_ray_beyond_the_main_peak_of_boc_errs_the_other_way() {
+        // R falls by 3 a chip and rises by 1 beyond half a chip: late minus early of the direct ray is −6e, of
+        // the other one 3αd on the steep flank and −αd on the gentle one.
+        let code = Code::of(&Waveform::of(&LONG_BOC).unwrap());
+        let error = |excess: f64, phase: f64| error_chips(&code, &[(excess, 0.25, phase)], 0.1);
+        assert!((error(0.2, 0.0) - 0.25 * 0.05).abs() < 1e-4, "{}", error(0.2, 0.0));
+        assert!((error(0.2, 0.5) + 0.25 * 0.05).abs() < 1e-4, "{}", error(0.2, 0.5));
+        let far = error(0.8, 0.0);
+        assert!((far + 0.25 * 0.05 / 3.0).abs() < 5e-4, "{far}");
     }
 }

@@ -14,22 +14,25 @@ use super::message::Message;
 use super::multipath;
 use super::smoothing::Smoothing;
 use crate::analysis::JudgeError;
-use crate::analysis::errors::{Errors, Link, SignalError};
+use crate::analysis::errors::{Errors, SignalError};
 use crate::analysis::expect::links::CN0_DB;
 use crate::analysis::jitter::theory::Theory;
 use crate::analysis::jitter::{Loop, Settings};
 use crate::analysis::load::Run;
 use crate::analysis::theory::edges;
+use crate::analysis::waveform::{Edge, leading};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
 use crate::gnss::record::{Event, Observation, RayRow, SkyRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Link, Signal};
 
 /// The receiver's choices that its accuracy follows from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Choices {
     pub loops: Settings,
-    pub update_s: f64,
+    /// Time of a loop's update, by signal.
+    pub updates_s: BTreeMap<&'static Signal, f64>,
     pub smoothing_s: f64,
     pub mask_rad: f64,
     pub model_sigma_m: f64,
@@ -46,7 +49,7 @@ impl Choices {
         let word = |key: &str| position.get(key)?.as_str();
         Some(Self {
             loops: Settings::of(run)?,
-            update_s: update_s(run)?,
+            updates_s: updates_s(run)?,
             smoothing_s: number("smoothing_s")?,
             mask_rad: number("mask_deg")?.to_radians(),
             model_sigma_m: number("model_sigma_m")?,
@@ -56,11 +59,15 @@ impl Choices {
     }
 }
 
-/// Time of a loop's update in the tracking stage, by the settings.
-pub fn update_s(run: &Run) -> Option<f64> {
-    // Counted in code periods, of a millisecond where a signal names none.
-    let period_s = run.truth.keys().find_map(|Link { signal, .. }| Some(signal.components.first()?.period_s()));
-    run.tracking_setting("integration").map(|count| count * period_s.unwrap_or(1e-3)).or(run.update_s)
+/// Time of a loop's update in the tracking stage, by the settings, which count it in code periods.
+pub fn update_s(run: &Run, signal: &Signal) -> Option<f64> {
+    let counted = || Some(run.tracking_setting("integration")? * leading(signal)?.period_s());
+    counted().or(run.update_s)
+}
+
+/// That of every signal; `None` where one has none.
+fn updates_s(run: &Run) -> Option<BTreeMap<&'static Signal, f64>> {
+    run.truth.keys().map(|link| Some((link.signal, update_s(run, link.signal)?))).collect()
 }
 
 /// Space: no horizon, and models that are as good in every direction.
@@ -115,8 +122,8 @@ pub struct Scene<'r> {
     /// From when on each satellite's message is known, and while it says that it is unhealthy.
     known: BTreeMap<Sv, u64>,
     health: BTreeMap<Sv, Vec<(u64, bool)>>,
-    /// Decibels that filter and converter cost.
-    pub cost_db: f64,
+    /// Decibels that filter and converter cost, by signal.
+    costs_db: BTreeMap<&'static Signal, f64>,
     /// Error of chip edges with a standing code, root mean square.
     edge_m: f64,
 }
@@ -146,9 +153,9 @@ impl<'r> Scene<'r> {
             excluded: left_out.map(|fix| (fix.sample, names(&fix.excluded))).collect(),
             known,
             health,
-            cost_db: crate::analysis::spectrum::cost_db(run),
-            edge_m: match run.scene.code_edge.as_str() {
-                "area" => edges::averaged_m(run.scene.sample_rate_hz),
+            costs_db: crate::analysis::spectrum::costs_db(run),
+            edge_m: match run.scene.code_edge {
+                Edge::Area => edges::averaged_m(run.scene.sample_rate_hz),
                 _ => 0.0,
             },
         })
@@ -171,9 +178,9 @@ impl<'r> Scene<'r> {
     /// # Errors
     /// [`JudgeError::Read`] where rows that were put by cannot be read.
     pub fn ranges(&self, errors: &Errors, link: Link, mut take: impl FnMut(usize, Forecast)) -> Result<(), JudgeError> {
-        let Some(theory) = Theory::new(self.run, self.choices.loops, &link, self.choices.update_s) else {
-            return Ok(());
-        };
+        let update_s = self.choices.updates_s.get(link.signal);
+        let theory = update_s.and_then(|update_s| Theory::new(self.run, self.choices.loops, &link, *update_s));
+        let Some(theory) = theory else { return Ok(()) };
         let truth: HashMap<u64, Observation> = self.run.truth.map(link, |row| (row.sample, row))?.into_iter().collect();
         let sky: HashMap<u64, SkyRow> = self.run.sky.map(link.sv, |row| (row.sample, row))?.into_iter().collect();
         let rays = self.rays(link, &theory)?;
@@ -212,7 +219,10 @@ impl<'r> Scene<'r> {
             groups.entry(row.sample).or_default().push(multipath::ray(&row, theory.chip_m));
         })?;
         let spacing = self.choices.loops.spacing_chips;
-        Ok(groups.into_iter().map(|(at, rays)| (at, theory.chip_m * multipath::error_chips(&rays, spacing))).collect())
+        Ok(groups
+            .into_iter()
+            .map(|(at, rays)| (at, theory.chip_m * multipath::error_chips(&theory.code, &rays, spacing)))
+            .collect())
     }
 
     /// A range without smoothing.
@@ -235,7 +245,8 @@ impl<'r> Scene<'r> {
             _ => 0.0,
         };
         let true_m = true_row.pseudorange_m - SPEED_OF_LIGHT_MPS * place.clock_bias_s;
-        let cn0_hz = libm::pow(10.0, (row.cn0_effective_dbhz - self.cost_db) / 10.0);
+        let cost_db = self.costs_db.get(true_row.signal).copied().unwrap_or(0.0);
+        let cn0_hz = libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
         let (_, code) = theory.noise(Loop::Dll, cn0_hz);
         let (_, rate_hz) = theory.noise(Loop::Fll, cn0_hz);
         let (sin, cos) = libm::sincos(elevation_rad);
@@ -252,7 +263,7 @@ impl<'r> Scene<'r> {
             rate_sigma_mps: rate_hz * true_row.link().wavelength_m(),
             rate_bias_mps: 0.0,
             cn0_hz,
-            steady: (row.cn0_dbhz - row.cn0_effective_dbhz + self.cost_db).abs() <= CN0_DB,
+            steady: (row.cn0_dbhz - row.cn0_effective_dbhz + cost_db).abs() <= CN0_DB,
             slant: if in_space { 1.0 } else { 1.0 / sin.max(0.05) },
             near_mask: !in_space && elevation_rad < self.choices.mask_rad + MASK_SLACK_RAD,
             excluded: self.left_out(true_row.sv, row.sample),

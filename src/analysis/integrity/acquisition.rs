@@ -77,7 +77,7 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
                 .max((row.doppler_hz - true_row.doppler_hz - run.common.doppler_hz).abs() / (DOPPLER_BINS * bin_hz));
             let chips = sent_chips(
                 true_row,
-                after_s - run.common.code_delay_s,
+                after_s - run.common.code_delay_s(link.signal),
                 component.chip_rate_hz,
                 f64::from(component.code_chips),
             );

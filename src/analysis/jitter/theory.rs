@@ -5,14 +5,15 @@ use std::f64::consts::TAU;
 
 use super::Loop;
 use crate::analysis::JudgeError;
-use crate::analysis::errors::Link;
 use crate::analysis::foreign::truth::Timeline;
 use crate::analysis::load::Run;
 use crate::analysis::statistics::Sum;
 use crate::analysis::theory::clock::PowerLaw;
 use crate::analysis::theory::linear::{Feedback, PhaseLoop, controlled_root, controlled_root_gains};
 use crate::analysis::theory::{dll, fll, oscillator, pll};
+use crate::analysis::waveform::{Edge, Waveform};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::signal::Link;
 
 /// Receiver's settings that the theory needs; the defaults are the receiver's where its file does not name them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -148,26 +149,36 @@ impl<'a> Follower<'a> {
 /// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for
 /// early minus late.
 ///
-/// The triangle is the second difference of |x|/2; each average over w adds an integral and a difference of 1/w.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A polygon is a sum of |x|/2 about its corners, each times the bend there; an average over w adds an
+/// integral and a difference of 1/w.
+#[derive(Clone, Debug, PartialEq)]
 struct Peak {
+    /// Places in chips, and by how much the slope grows there.
+    corners: Vec<(f64, f64)>,
     width_chips: f64,
     averages: u32,
 }
 
 impl Peak {
+    /// Of a signal's waveform, averaged so many times over `width_chips`.
+    fn new(waveform: &Waveform, width_chips: f64, averages: u32) -> Self {
+        // Of one step a chip exactly 1.
+        let (_, chip_s) = waveform.scales_s();
+        let corners = waveform.corners().into_iter().map(|(at_s, bend)| (at_s / chip_s, bend * chip_s)).collect();
+        Self { corners, width_chips, averages }
+    }
+
     /// Value at a delay in chips.
     fn value(&self, x: f64) -> f64 {
         let w = self.width_chips;
+        let sum = |of: &dyn Fn(f64) -> f64| self.corners.iter().map(|(at, bend)| bend * of(x - at)).sum::<f64>();
         match self.averages {
-            0 => (1.0 - x.abs()).max(0.0),
+            0 => sum(&|y| 0.5 * y.abs()),
             // Integrals of |x|/2: x|x|/4 and |x|³/12.
-            1 => {
-                second(|y| (y + 0.5 * w) * (y + 0.5 * w).abs() / 4.0 - (y - 0.5 * w) * (y - 0.5 * w).abs() / 4.0, x) / w
-            }
+            1 => sum(&|y| (y + 0.5 * w) * (y + 0.5 * w).abs() / 4.0 - (y - 0.5 * w) * (y - 0.5 * w).abs() / 4.0) / w,
             _ => {
                 let cube = |y: f64| y.abs() * y * y / 12.0;
-                second(|y| cube(y + w) - 2.0 * cube(y) + cube(y - w), x) / (w * w)
+                sum(&|y| cube(y + w) - 2.0 * cube(y) + cube(y - w)) / (w * w)
             }
         }
     }
@@ -179,15 +190,30 @@ impl Peak {
     }
 }
 
-/// Second difference over a chip.
-fn second(of: impl Fn(f64) -> f64, x: f64) -> f64 {
-    of(x + 1.0) - 2.0 * of(x) + of(x - 1.0)
+/// A code's correlation in chips, as sent.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::analysis) struct Code {
+    peak: Peak,
+    /// Up to where it falls without rising again.
+    pub reach_chips: f64,
+}
+
+impl Code {
+    /// That of a signal's waveform.
+    pub fn of(waveform: &Waveform) -> Self {
+        Self { peak: Peak::new(waveform, 0.0, 0), reach_chips: waveform.reach_s() * waveform.chip_rate_hz() }
+    }
+
+    /// Correlation at a delay.
+    pub fn value(&self, chips: f64) -> f64 {
+        self.peak.value(chips)
+    }
 }
 
 /// Standard deviation of one early-minus-late value, in chips, for the shapes of signal and noise: with a and
 /// a′ the relative height and slope at d/2 and ρ the noise's correlation over d, (1−ρ)/(4·snr·a′²)·(1 +
 /// (1+ρ)/(2·snr·a²)).
-fn raw_chips(signal: Peak, noise: Peak, d: f64, snr: f64) -> f64 {
+fn raw_chips(signal: &Peak, noise: &Peak, d: f64, snr: f64) -> f64 {
     let height = signal.value(0.5 * d) / signal.value(0.0);
     let slope = signal.slope(0.5 * d) / signal.value(0.0);
     let rho = noise.value(d) / noise.value(0.0);
@@ -202,18 +228,28 @@ pub(in crate::analysis) struct Theory {
     carrier_hz: f64,
     pll: (PhaseLoop, Response),
     dll: (PhaseLoop, Response),
+    /// Of signal and noise.
     peaks: (Peak, Peak),
+    /// Of the code without any average.
+    pub code: Code,
     oscillator: Option<PowerLaw>,
 }
 
 impl Theory {
+    /// `None` where a loop of these settings cannot hold the signal: no such loop is stable, or early and late lie
+    /// beyond the correlation's main peak.
     pub fn new(run: &Run, settings: Settings, link: &Link, update_s: f64) -> Option<Self> {
-        let chip_rate_hz = link.signal.components.first()?.chip_rate_hz;
+        let waveform = Waveform::of(link.signal)?;
+        let chip_rate_hz = waveform.chip_rate_hz();
+        let code = Code::of(&waveform);
+        if 0.5 * settings.spacing_chips >= code.reach_chips {
+            return None;
+        }
         let pll = exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s)?;
         let dll = exact_loop(settings.dll_order, settings.dll_bandwidth_hz * update_s)?;
         let width_chips = chip_rate_hz / run.scene.sample_rate_hz;
         let of_replica = u32::from(settings.averaged_replica);
-        let of_signal = u32::from(run.scene.code_edge == "area");
+        let of_signal = u32::from(run.scene.code_edge == Edge::Area);
         Some(Self {
             settings,
             update_s,
@@ -222,9 +258,10 @@ impl Theory {
             pll: (pll, Response::of(&pll)),
             dll: (dll, Response::of(&dll)),
             peaks: (
-                Peak { width_chips, averages: of_replica + of_signal },
-                Peak { width_chips, averages: 2 * of_replica },
+                Peak::new(&waveform, width_chips, of_replica + of_signal),
+                Peak::new(&waveform, width_chips, 2 * of_replica),
             ),
+            code,
             oscillator: run.scene.oscillator.map(|noise| PowerLaw { h: noise.h }),
         })
     }
@@ -236,7 +273,7 @@ impl Theory {
         let (loop_, code) = (&self.pll.1, &self.dll.1);
         match which {
             Loop::Dll => {
-                let raw = raw_chips(self.peaks.0, self.peaks.1, self.settings.spacing_chips, update_s * cn0_hz);
+                let raw = raw_chips(&self.peaks.0, &self.peaks.1, self.settings.spacing_chips, update_s * cn0_hz);
                 (raw * code.put_out.sqrt(), raw * code.phase.sqrt())
             }
             // Observations fall anywhere in an interval, in which the phase runs at the loop's rate: x²·rate²
@@ -281,7 +318,11 @@ impl Theory {
     pub fn limits(&self, which: Loop) -> (f64, f64) {
         let d = self.settings.spacing_chips;
         match which {
-            Loop::Dll => (dll::threshold_chips(d), 0.5 * d),
+            Loop::Dll => {
+                // Early or late beyond the main peak ends the discriminator's range before half the spacing does.
+                let range = (0.5 * d).min(self.code.reach_chips - 0.5 * d);
+                (dll::threshold_chips(2.0 * range), range)
+            }
             Loop::Pll => (pll::THRESHOLD_RAD.to_degrees(), pll::LIMIT_RAD.to_degrees()),
             Loop::Fll => (fll::threshold_hz(self.update_s), 0.25 / self.update_s),
         }
@@ -388,6 +429,9 @@ pub fn motion_error_deg(
 mod tests {
     use super::*;
     use crate::analysis::theory::dll::Discriminator;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::Signal;
+    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE};
 
     #[test]
     fn a_loop_has_the_bandwidth_that_it_is_given() {
@@ -431,17 +475,37 @@ mod tests {
 
     #[test]
     fn peaks_are_the_triangle_without_averages_and_rounded_with_them() {
-        let plain = Peak { width_chips: 0.4, averages: 0 };
+        let chips = Waveform::of(&L1_CA).unwrap();
+        let plain = Peak::new(&chips, 0.4, 0);
         for cn0_hz in [1e3, 1e4, 1e5] {
             let known = dll::raw_chips(Discriminator::EarlyMinusLate, 0.5, 4e-3, cn0_hz);
-            assert!((raw_chips(plain, plain, 0.5, 4e-3 * cn0_hz) / known - 1.0).abs() < 1e-9);
+            assert!((raw_chips(&plain, &plain, 0.5, 4e-3 * cn0_hz) / known - 1.0).abs() < 1e-9);
         }
         // The mean of a triangle over ±w/2 is 1 − w/4, over a triangle of ±w it is 1 − w/3; far from corners
         // nothing changes.
         for (averages, peak) in [(1, 1.0 - 0.1), (2, 1.0 - 0.4 / 3.0)] {
-            let round = Peak { width_chips: 0.4, averages };
+            let round = Peak::new(&chips, 0.4, averages);
             assert!((round.value(0.0) - peak).abs() < 1e-12, "{}", round.value(0.0));
             assert!((round.value(0.5) - 0.5).abs() < 1e-12 && (round.slope(0.5) - 1.0).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn a_steeper_peak_has_less_jitter() {
+        let raw = |signal: &Signal, d: f64| {
+            let peak = Peak::new(&Waveform::of(signal).unwrap(), 0.0, 0);
+            raw_chips(&peak, &peak, d, 1e6)
+        };
+        // With slope s and 1 − ρ = s·d the variance is d/(4·s·snr): s is 1 of BPSK and 3 of BOC(1,1). Of MBOC it
+        // is 10/11 · 3 + 1/11 · 23, BOC(6,1) falling by 2·12 − 1 a chip.
+        for (signal, slope) in [(&QUADRATURE, 1.0), (&LONG_BOC, 3.0), (&MIXED, 53.0 / 11.0)] {
+            let ratio = raw(signal, 0.05) / raw(&L1_CA, 0.05);
+            // Squaring at 60 dB, 1e-6; slopes by differences, 1e-9.
+            assert!((ratio * ratio * slope - 1.0).abs() < 1e-5, "{signal}: {ratio}");
+        }
+        // At wide spacings the side peaks cost height: a = 1/4, a' = 3, ρ = −1/2 at half a chip.
+        let found = raw(&LONG_BOC, 0.5);
+        let expected = 1.5_f64 / (4.0 * 9.0 * 1e6) * (1.0 + 0.5 / (2.0 * 1e6 / 16.0));
+        assert!((found / expected.sqrt() - 1.0).abs() < 1e-9, "{found}");
     }
 }

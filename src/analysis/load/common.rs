@@ -6,29 +6,22 @@
 //! beside its pseudoranges on average. Limits: the mean of carrier less pseudorange holds twice the
 //! ionosphere's rate too, millimetres a second.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::{SceneFacts, delay};
-use crate::analysis::errors::Link;
+use crate::analysis::waveform::Waveform;
 use crate::gnss::record::Observation;
-use crate::gnss::signal::SIGNALS;
+use crate::gnss::signal::{Link, Signal};
 
 /// What the ionosphere may make of a carrier less its pseudorange, metres a second.
 const LEAST_WOUND_MPS: f64 = 0.02;
 
-/// Delay of every code in the front end; of the first signal where there are several.
-fn code_delay_s(scene: &SceneFacts, spacing_chips: f64) -> f64 {
-    let component = SIGNALS.first().and_then(|signal| signal.components.first());
-    let chip_rate_hz = component.map_or(1.0, |component| component.chip_rate_hz);
-    let of = |stage| delay::code_delay_s(stage, chip_rate_hz, scene.sample_rate_hz, spacing_chips);
-    scene.front_end.iter().filter_map(of).sum()
-}
-
 /// The common part.
 #[derive(Clone, Debug, Default)]
 pub struct Common {
-    /// Delay of every code.
-    pub code_delay_s: f64,
+    /// Delay of every code in the front end, by its signal, and of how many satellites.
+    code_delays_s: BTreeMap<&'static Signal, f64>,
+    satellites: BTreeMap<&'static Signal, usize>,
     /// By how much every Doppler is higher.
     pub doppler_hz: f64,
     last: HashMap<Link, (u64, f64)>,
@@ -39,22 +32,42 @@ pub struct Common {
 }
 
 impl Common {
-    /// From a scene's facts, for a code loop of that spacing.
-    pub(super) fn of(scene: &SceneFacts, spacing_chips: f64) -> Self {
-        let sum =
-            |of: fn(&crate::analysis::spectrum::Stage) -> Option<f64>| scene.front_end.iter().filter_map(of).sum();
-        let offset_hz: f64 = sum(|stage| stage.offset_hz);
-        Self {
-            code_delay_s: code_delay_s(scene, spacing_chips),
-            doppler_hz: if scene.inverted { -offset_hz } else { offset_hz },
-            rate_hz: scene.sample_rate_hz,
-            ..Self::default()
-        }
+    /// Before any row of the truth.
+    pub(super) fn new(rate_hz: f64) -> Self {
+        Self { rate_hz, ..Self::default() }
     }
 
-    /// The same for a loop of another spacing.
-    pub(super) fn set_spacing(&mut self, scene: &SceneFacts, spacing_chips: f64) {
-        self.code_delay_s = code_delay_s(scene, spacing_chips);
+    /// Takes what a scene's facts say, for the rows counted so far and a code loop of that spacing.
+    pub(super) fn set_front_end(&mut self, scene: &SceneFacts, spacing_chips: f64) {
+        let offset_hz: f64 = scene.front_end.iter().filter_map(|stage| stage.offset_hz).sum();
+        self.doppler_hz = if scene.inverted { -offset_hz } else { offset_hz };
+        self.satellites.clear();
+        for link in self.last.keys() {
+            *self.satellites.entry(link.signal).or_default() += 1;
+        }
+        let delay_s = |signal: &&'static Signal| {
+            let code = Waveform::of(signal)?;
+            let of = |stage| delay::code_delay_s(stage, &code, scene.sample_rate_hz, spacing_chips);
+            Some((*signal, scene.front_end.iter().filter_map(of).sum()))
+        };
+        self.code_delays_s = self.satellites.keys().filter_map(delay_s).collect();
+    }
+
+    /// Delay of a signal's code in the front end.
+    pub fn code_delay_s(&self, signal: &Signal) -> f64 {
+        self.code_delays_s.get(signal).copied().unwrap_or(0.0)
+    }
+
+    /// That of all codes on average, which a clock solved from them has.
+    pub fn clock_delay_s(&self) -> f64 {
+        let mut delays_s = self.code_delays_s.values();
+        let first_s = delays_s.next().copied().unwrap_or(0.0);
+        if delays_s.all(|delay_s| *delay_s == first_s) {
+            return first_s;
+        }
+        let weighted = |(signal, count): (&&'static Signal, &usize)| self.code_delay_s(signal) * *count as f64;
+        let count: usize = self.satellites.values().sum();
+        self.satellites.iter().map(weighted).sum::<f64>() / count.max(1) as f64
     }
 
     /// Counts a row of the truth in.

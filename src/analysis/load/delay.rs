@@ -1,21 +1,22 @@
 //! By how much a front end's filter delays a code, as an early-minus-late loop measures it.
 //!
 //! A filter whose phase is not straight spreads the correlation unevenly: the loop rests where early and late
-//! are equally strong, R(τ − d/2)² = R(τ + d/2)², R the transform of the chips' spectrum times the filter's
+//! are equally strong, R(τ − d/2)² = R(τ + d/2)², R the transform of the code's spectrum times the filter's
 //! response. For a Butterworth filter just wider than the main lobe that is metres more than the delay in the
 //! middle of its band. The response is sampled at the middles of intervals, so that it comes half a sample
-//! early. Limits: chips are rectangular; sampling does not fold.
+//! early. Limits: sampling does not fold.
 
 use num_complex::Complex64;
 
-use crate::analysis::spectrum::Stage;
+use super::Stage;
+use crate::analysis::waveform::Waveform;
 
 /// Steps of the integral over half the band of the samples: 5 kHz at 10 Msps, far below what a response or a
 /// lag of a chip turns in.
 const STEPS: u32 = 1000;
 
 /// Delay of one stage at a loop of that spacing; the one that the stage states where its shape is not known to bend.
-pub fn code_delay_s(stage: &Stage, chip_rate_hz: f64, sample_rate_hz: f64, spacing_chips: f64) -> Option<f64> {
+pub fn code_delay_s(stage: &Stage, code: &Waveform, sample_rate_hz: f64, spacing_chips: f64) -> Option<f64> {
     let middle_s = stage.group_delay_s?;
     let (Some("butterworth"), Some(order), Some(bandwidth_hz)) =
         (stage.shape.as_deref(), stage.order, stage.bandwidth_hz)
@@ -26,18 +27,16 @@ pub fn code_delay_s(stage: &Stage, chip_rate_hz: f64, sample_rate_hz: f64, spaci
     let lines: Vec<(f64, Complex64)> = (0..STEPS)
         .map(|k| {
             let hz = (f64::from(k) + 0.5) * step_hz;
-            let x = std::f64::consts::PI * hz / chip_rate_hz;
-            let sinc = libm::sin(x) / x;
-            (hz, butterworth(order, 2.0 * hz / bandwidth_hz) * (sinc * sinc))
+            (hz, butterworth(order, 2.0 * hz / bandwidth_hz) * (code.density(hz) * code.chip_rate_hz()))
         })
         .collect();
     // The response is that of a real filter about the middle, so one side says all.
     let correlation = |delay_s: f64| -> f64 {
         lines.iter().map(|(hz, line)| (line * phasor(std::f64::consts::TAU * hz * delay_s)).re).sum()
     };
-    let half_s = 0.5 * spacing_chips / chip_rate_hz;
+    let half_s = 0.5 * spacing_chips / code.chip_rate_hz();
     let late_wins = |at_s: f64| libm::fabs(correlation(at_s + half_s)) > libm::fabs(correlation(at_s - half_s));
-    let (mut low_s, mut high_s) = (0.0, middle_s + 1.0 / chip_rate_hz);
+    let (mut low_s, mut high_s) = (0.0, middle_s + code.reach_s().min(1.0 / code.chip_rate_hz()));
     for _ in 0..50 {
         let at_s = 0.5 * (low_s + high_s);
         if late_wins(at_s) { low_s = at_s } else { high_s = at_s }
@@ -62,8 +61,7 @@ fn phasor(radians: f64) -> Complex64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const CHIP_RATE_HZ: f64 = 1.023e6;
+    use crate::gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn a_filter_of_the_first_order_is_a_resistor_and_a_capacitor() {
@@ -88,7 +86,7 @@ mod tests {
                 group_delay_s: Some(2.6131 / (std::f64::consts::PI * bandwidth_hz)),
                 ..Stage::default()
             };
-            299_792_458.0 * code_delay_s(&stage, CHIP_RATE_HZ, rate_hz, 0.5).unwrap()
+            299_792_458.0 * code_delay_s(&stage, &Waveform::of(&L1_CA).unwrap(), rate_hz, 0.5).unwrap()
         };
         // 2.6131/(πB) is 12.47 m, half a sample 3.00 m.
         let wide_m = delay_m(20e6, 50e6);

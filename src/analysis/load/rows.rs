@@ -1,9 +1,9 @@
 //! How the rows of a run's long tables lie on a [`super::Shelf`].
 
-use crate::analysis::errors::Link;
 use crate::analysis::shelf::{Row, Words};
 use crate::gnss::record::{Observation, RayRow, SkyRow, TrackingRow};
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Link;
 
 impl Row<Link> for Observation {
     const WORDS: usize = 8;

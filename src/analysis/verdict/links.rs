@@ -48,6 +48,10 @@ impl Verdict {
             return Ok(());
         }
         let links = Links::measure(run, errors)?;
+        if !links.unheld.is_empty() {
+            let names = links.unheld.join(", ");
+            self.not_judged.push(format!("loops of {names}: the settings make no loop that holds the signal"));
+        }
         if links.worst.is_empty() {
             self.not_judged.push("loops satellite by satellite: no settings, or nothing past its pull-in".to_owned());
         }
@@ -58,7 +62,7 @@ impl Verdict {
                 _ => Bound::Max(worst.limit),
             };
             let source =
-                format!("theory at the true C/N0 of {}, the satellite nearest to its limit or beyond", worst.sv);
+                format!("theory at the true C/N0 of {}, the satellite nearest to its limit or beyond", worst.name);
             self.judge(&words, "", worst.value, unit, bound, &source);
         }
         Ok(())

@@ -31,11 +31,15 @@ pub(super) struct Motion {
 impl Motion {
     pub fn new(run: &Run, choices: &Choices) -> Self {
         let loops = &choices.loops;
-        let closed = exact_loop(loops.pll_order, loops.pll_bandwidth_hz * choices.update_s);
-        let natural_radps =
-            closed.map_or(f64::INFINITY, |closed| natural_radps(&closed, loops.pll_order, choices.update_s));
+        let of = |update_s: &f64| {
+            let closed = exact_loop(loops.pll_order, loops.pll_bandwidth_hz * update_s)?;
+            Some(natural_radps(&closed, loops.pll_order, *update_s))
+        };
+        // Of several signals the slowest loop.
+        let natural_radps = choices.updates_s.values().filter_map(of).fold(f64::INFINITY, f64::min);
+        let update_s = choices.updates_s.values().copied().fold(0.0, f64::max);
         let second = if loops.pll_order < 3 { SECOND_ORDER / natural_radps } else { 0.0 };
-        let wavelength_m = run.truth.keys().next().map_or(0.0, |link| link.wavelength_m());
+        let wavelength_m = run.mean_wavelength_m().unwrap_or(0.0);
         let rows = &run.trajectory;
         let accelerations: Vec<_> = rows
             .windows(2)
@@ -49,7 +53,7 @@ impl Motion {
                 let step_s = rows.get(1).zip(rows.first()).map_or(0.1, |(b, a)| b.time().since(a.time()).max(1e-6));
                 let jerk = around.windows(2).map(|two| (two[1] - two[0]).norm() / step_s).fold(0.0, f64::max);
                 let wound_mps = rows.get(index).map_or(0.0, |row| run.common.wound_mps(row.sample, wavelength_m));
-                most * (choices.update_s + second)
+                most * (update_s + second)
                     + THIRD_ORDER * jerk / (natural_radps * natural_radps)
                     + WIND_UP_SHARE * wound_mps.abs()
             })

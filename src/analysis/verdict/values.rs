@@ -6,7 +6,7 @@
 //! theory itself may err, with known biases taken out. Stated sigmas lie within a factor of the ones that
 //! follow from settings, true C/N0 and geometry, on both sides.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
@@ -18,11 +18,12 @@ use crate::analysis::expect::quantile::{largest, mean_square};
 use crate::analysis::expect::ranges::{Choices, Scene};
 use crate::analysis::expect::solution::{Expected, expected, largest_axis};
 use crate::analysis::jitter::theory::Theory;
-use crate::analysis::load::Run;
+use crate::analysis::load::{Emission, Run};
 use crate::analysis::statistics::{mean, percentile};
 use crate::analysis::summary::Summary;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{Event, Fix, IonosphereModel};
+use crate::gnss::signal::Link;
 
 /// By how much theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a real one.
 pub(super) const THEORY: f64 = 1.2;
@@ -275,7 +276,7 @@ fn threshold(freedom: u32, alarm: f64) -> Option<f64> {
 fn cases<'a>(scene: &Scene<'a>, errors: &'a Errors) -> Result<Vec<Case<'a>>, JudgeError> {
     let fixes: HashMap<u64, &Fix> = scene.run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
     let errors_at: HashMap<u64, &PositionError> = errors.positions.iter().map(|error| (error.sample, error)).collect();
-    let wavelength_m = scene.run.truth.keys().next().map(|link| link.wavelength_m());
+    let wavelength_m = scene.run.mean_wavelength_m();
     let one = |expected: Expected| {
         let fix = *fixes.get(&expected.sample)?;
         let error = *errors_at.get(&expected.sample)?;
@@ -377,9 +378,16 @@ impl<'a> Bounded<'a> {
 
 /// What the scene's oscillator leaves between the rate that a phase loop follows and the truth's drift.
 fn oscillator_mps(run: &Run, choices: &Choices) -> f64 {
-    let Some(link) = run.truth.keys().next() else { return 0.0 };
-    let theory = Theory::new(run, choices.loops, &link, choices.update_s);
-    theory.map_or(0.0, |theory| theory.oscillator_rate_hz() * link.wavelength_m())
+    // Of all carriers the one that it moves most.
+    let mut links: BTreeMap<Emission, Link> = BTreeMap::new();
+    run.truth.keys().for_each(|link| {
+        links.entry(Emission::of(link)).or_insert(link);
+    });
+    let of = |link: &Link| {
+        let theory = Theory::new(run, choices.loops, link, *choices.updates_s.get(link.signal)?)?;
+        Some(theory.oscillator_rate_hz() * link.wavelength_m())
+    };
+    links.values().filter_map(of).fold(0.0, f64::max)
 }
 
 /// The five kinds of error.

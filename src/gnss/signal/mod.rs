@@ -21,7 +21,7 @@ mod shape;
 #[cfg(any(test, feature = "planted"))]
 pub mod synthetic;
 
-pub use shape::Shape;
+pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
 pub static SIGNALS: [&Signal; 1] = [&gps::l1ca::L1_CA];

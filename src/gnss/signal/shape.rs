@@ -51,7 +51,8 @@ impl Shape {
     pub fn density(&self, hz: f64) -> f64 {
         let (first, rest) = self.lags.split_first().unwrap_or((&0.0, &[]));
         let turn = TAU * hz * self.step_s;
-        let sum: f64 = (1..).zip(rest).map(|(lag, value)| value * libm::cos(turn * f64::from(lag))).sum();
+        let correlated = (1..).zip(rest).filter(|(_, value)| **value != 0.0);
+        let sum: f64 = correlated.map(|(lag, value)| value * libm::cos(turn * f64::from(lag))).sum();
         self.step_s * sinc_squared(hz * self.step_s) * (first + 2.0 * sum)
     }
 

@@ -1,0 +1,261 @@
+//! A signal's spectrum as a sampler meets it, and the correlation whose transform that is.
+//!
+//! Both are sums over the signal's components by their shares of power, each from its own pulses
+//! ([`crate::gnss::signal::Shape`]). Samples show a spectrum with its aliases. Limits: codes count as random,
+//! so that the lines of a short code, its overlay and the data are left out; a chip that is another
+//! component's turn counts as any other.
+
+use serde::Deserialize;
+
+use crate::gnss::signal::{Component, Shape, Signal, sinc_squared};
+
+/// How the edges of chips fall between samples, as `scene.json` names it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Edge {
+    /// A sample has the value of its instant.
+    #[default]
+    Nearest,
+    /// A sample is the mean over its interval.
+    Area,
+    /// Filtered to half the sample rate before sampling.
+    BandLimited,
+}
+
+/// The components of a signal that a receiver correlates: all of them, by their shares of power.
+#[derive(Clone, Debug)]
+pub struct Waveform {
+    parts: Vec<(f64, Shape)>,
+    chip_rate_hz: f64,
+}
+
+/// A correlation that rises by less between two corners is level.
+const RISE: f64 = 1e-9;
+/// Share of a spectrum's peak below which there is nothing: 120 dB down.
+const NOTHING: f64 = 1e-12;
+
+/// The component whose chips count where distances are told in chips: the strongest, the first of equals.
+pub fn leading(signal: &Signal) -> Option<&'static Component> {
+    let stronger = |a: &'static Component, b: &'static Component| if b.power_share > a.power_share { b } else { a };
+    signal.components.iter().reduce(stronger)
+}
+
+impl Waveform {
+    /// Of a signal; `None` of one without components.
+    pub fn of(signal: &Signal) -> Option<Self> {
+        let chip_rate_hz = leading(signal)?.chip_rate_hz;
+        let part = |component: &Component| (component.power_share, component.shape());
+        Some(Self { parts: signal.components.iter().map(part).collect(), chip_rate_hz })
+    }
+
+    /// Rate of the chips in which distances are told.
+    pub fn chip_rate_hz(&self) -> f64 {
+        self.chip_rate_hz
+    }
+
+    /// Shortest distance of the correlation's corners, and longest chip.
+    pub fn scales_s(&self) -> (f64, f64) {
+        let shapes = || self.parts.iter().map(|(_, shape)| shape);
+        let step_s = shapes().map(Shape::step_s).fold(f64::INFINITY, f64::min);
+        (step_s, shapes().map(Shape::chip_s).fold(0.0, f64::max))
+    }
+
+    /// Correlation with itself `delay_s` later, 1 at no delay.
+    pub fn correlation(&self, delay_s: f64) -> f64 {
+        self.parts.iter().map(|(share, shape)| share * shape.correlation(delay_s)).sum()
+    }
+
+    /// The corners of that correlation: their delays and by how much its slope, per second, grows there.
+    pub fn corners(&self) -> Vec<(f64, f64)> {
+        let corners = |(share, shape): &(f64, Shape)| {
+            let step_s = shape.step_s();
+            let last = (shape.chip_s() / step_s).round() as i32;
+            let value = |k: i32| shape.correlation(f64::from(k) * step_s);
+            let bend = |k: i32| share * (value(k + 1) - 2.0 * value(k) + value(k - 1)) / step_s;
+            (-last..=last).map(|k| (f64::from(k) * step_s, bend(k))).collect::<Vec<_>>()
+        };
+        self.parts.iter().flat_map(corners).filter(|(_, bend)| *bend != 0.0).collect()
+    }
+
+    /// Delay up to which the correlation falls without rising again; endless where it never rises.
+    pub fn reach_s(&self) -> f64 {
+        let (step_s, chip_s) = self.scales_s();
+        let steps = (chip_s / step_s).round() as i32;
+        let value = |k: i32| self.correlation(f64::from(k) * step_s);
+        let rises = |k: &i32| value(k + 1) > value(*k) + RISE;
+        (0..steps).find(rises).map_or(f64::INFINITY, |k| f64::from(k) * step_s)
+    }
+
+    /// Frequency of the first null beyond the main lobe, if the spectrum has one.
+    pub fn null_hz(&self) -> Option<f64> {
+        let fine = |k: i32| f64::from(k) * self.chip_rate_hz / 200.0;
+        let peak = (0..3000).map(|k| (fine(k), self.density(fine(k)))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let null = |hz: &f64| *hz > peak.0 && self.density(*hz) < NOTHING * peak.1;
+        (1..40).map(|k| f64::from(k) * 0.5 * self.chip_rate_hz).find(null)
+    }
+
+    /// Power density at `hz` from the carrier, per hertz, for unit power.
+    pub fn density(&self, hz: f64) -> f64 {
+        self.parts.iter().map(|(share, shape)| share * shape.density(hz)).sum()
+    }
+
+    /// The same as the sampler meets it, before anything aliases.
+    pub fn met(&self, edge: Edge, hz: f64, rate_hz: f64) -> f64 {
+        match edge {
+            Edge::BandLimited if hz.abs() > 0.5 * rate_hz => 0.0,
+            Edge::BandLimited | Edge::Nearest => self.density(hz),
+            // A mean over the sample's interval has its own sinc².
+            Edge::Area => self.density(hz) * sinc_squared(hz / rate_hz),
+        }
+    }
+
+    /// The same in the samples, aliases in.
+    pub fn sampled(&self, edge: Edge, hz: f64, rate_hz: f64) -> f64 {
+        let met = |hz: f64| self.met(edge, hz, rate_hz);
+        match edge {
+            // No alias but the one that the frequency itself may be.
+            Edge::BandLimited => met(hz - rate_hz * (hz / rate_hz).round()),
+            // The tail after ±50 is below 1 % of a density that is itself 50 dB down.
+            Edge::Area | Edge::Nearest => (-50..=50).map(|k| met(hz + f64::from(k) * rate_hz)).sum(),
+        }
+    }
+
+    /// κ of another signal against this one: what its power adds to the noise density, over that power, in
+    /// seconds. `apart_hz` is by how much the other's carrier is higher.
+    ///
+    /// ∫ S₁·S₂ df/(∫S₁ df · ∫S₂ df) (J. W. Betz, NAVIGATION 48(4), 2001) of the spectra that the sampler meets.
+    pub fn separation_s(&self, other: &Self, apart_hz: f64, edge: Edge, rate_hz: f64) -> f64 {
+        let ((own_step_s, own_chip_s), (step_s, chip_s)) = (self.scales_s(), other.scales_s());
+        // To ±30 step rates, where the tail of S² is below 1e-7 of the whole; midpoints every hundredth of a
+        // chip rate.
+        let step_hz = 1.0 / own_chip_s.max(chip_s) / 100.0;
+        let half = (30.0 / own_step_s.min(step_s) / step_hz).round() as i32;
+        let (mut own, mut others, mut shared) = (0.0, 0.0, 0.0);
+        for k in -half..half {
+            let hz = (f64::from(k) + 0.5) * step_hz;
+            let met = self.met(edge, hz, rate_hz);
+            own += met;
+            others += other.met(edge, hz, rate_hz);
+            shared += met * other.met(edge, hz - apart_hz, rate_hz);
+        }
+        shared / (own * others * step_hz)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE, SYNTHETIC};
+
+    fn of(signal: &Signal) -> Waveform {
+        Waveform::of(signal).unwrap()
+    }
+
+    #[test]
+    fn a_sampled_code_keeps_its_power_and_has_its_nulls() {
+        let code = of(&L1_CA);
+        for edge in [Edge::Nearest, Edge::BandLimited] {
+            let rate_hz = 10.0e6;
+            let step_hz = 1e3;
+            let power: f64 = (-5000..5000).map(|k| step_hz * code.sampled(edge, f64::from(k) * step_hz, rate_hz)).sum();
+            // Outside ±5 MHz lies 1/(pi^2 * 4.9) of the power or 2 %; aliases bring it back.
+            let expected = if edge == Edge::Nearest { 1.0 } else { 0.98 };
+            assert!((power - expected).abs() < 5e-3, "{edge:?} {power}");
+        }
+        assert!(code.sampled(Edge::BandLimited, 1.023e6, 10e6) < 1e-20);
+    }
+
+    #[test]
+    fn separation_is_two_thirds_of_a_chip_and_more_where_samples_are_means() {
+        let code = of(&L1_CA);
+        let chips = |edge, rate_hz: f64| code.separation_s(&code, 0.0, edge, rate_hz) * 1.023e6;
+        // The cut at ±30 chip rates leaves 1/(30 π²) = 0.3 % of the power out, twice that in the square.
+        assert!((chips(Edge::Nearest, 2.6e6) - 2.0 / 3.0).abs() < 0.006);
+        // Computed by another program from the same definition.
+        assert!((chips(Edge::Area, 2.6e6) - 0.8267).abs() < 0.001);
+        assert!((chips(Edge::Area, 10e6) - 0.7110).abs() < 0.005);
+    }
+
+    #[test]
+    fn separations_of_bpsk_and_boc_are_the_printed_ones() {
+        // J. W. Betz, "Binary offset carrier modulations for radionavigation" (2001), within 24 MHz: −61.8 dB of
+        // C/A from itself, −67.9 dB of BOC(1,1) from C/A, −64.8 dB of BOC(1,1) from itself.
+        let db = |a: &Signal, b: &Signal, apart_hz: f64| {
+            10.0 * libm::log10(of(a).separation_s(&of(b), apart_hz, Edge::BandLimited, 24e6))
+        };
+        for (a, b, printed_db) in [
+            (&L1_CA, &L1_CA, -61.8),
+            (&L1_CA, &LONG_BOC, -67.9),
+            (&LONG_BOC, &L1_CA, -67.9),
+            (&LONG_BOC, &LONG_BOC, -64.8),
+        ] {
+            let found_db = db(a, b, 0.0);
+            // Half of the last digit printed, and the power of 1 to 4 % outside of 24 MHz, which some tables count.
+            assert!((found_db - printed_db).abs() < 0.15, "{a} {b}: {found_db}");
+        }
+        // ∫R²: BOC(1,1) is 1 − 3τ to half a chip and τ − 1 after it, 1/8 and 1/24 on either side.
+        let exact = 2.0 * (1.0 / 8.0 + 1.0 / 24.0) / 1.023e6;
+        let wide = of(&LONG_BOC).separation_s(&of(&LONG_BOC), 0.0, Edge::Nearest, 60e6);
+        // The cut leaves 1 % of the power out.
+        assert!((wide / exact - 1.0).abs() < 0.02, "{wide} {exact}");
+        // A carrier a chip rate away meets the other's null: less than half of what one beside it takes.
+        assert!(db(&L1_CA, &L1_CA, 1.023e6) < db(&L1_CA, &L1_CA, 0.0) - 6.0);
+        assert!((db(&L1_CA, &QUADRATURE, 3e6) - db(&QUADRATURE, &L1_CA, -3e6)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_correlation_s_corners_make_it_whole_again() {
+        for signal in SYNTHETIC.into_iter().chain([&L1_CA]) {
+            let waveform = of(signal);
+            let (corners, chip_s) = (waveform.corners(), 1.0 / waveform.chip_rate_hz());
+            for k in -150..150 {
+                let delay_s = 0.01 * f64::from(k) * chip_s;
+                let made: f64 = corners.iter().map(|(at_s, bend)| 0.5 * bend * (delay_s - at_s).abs()).sum();
+                assert!((made - waveform.correlation(delay_s)).abs() < 1e-12, "{signal} {k}");
+            }
+            assert!((waveform.correlation(0.0) - 1.0).abs() < 1e-12, "{signal}");
+        }
+    }
+
+    #[test]
+    fn nulls_and_reach_follow_from_the_pulses() {
+        let chips = |signal: &Signal| {
+            let waveform = of(signal);
+            (waveform.null_hz().unwrap() / waveform.chip_rate_hz(), waveform.reach_s() * waveform.chip_rate_hz())
+        };
+        assert_eq!(chips(&L1_CA), (1.0, f64::INFINITY));
+        assert_eq!(chips(&QUADRATURE), (1.0, f64::INFINITY));
+        // BOC(1,1): lobes about ±1 chip rate end at 2; the correlation's first minimum is half a chip away.
+        for signal in [&LONG_BOC, &MIXED] {
+            let (null, reach) = chips(signal);
+            assert_eq!(null, 2.0, "{signal}");
+            assert!((reach - 0.5).abs() < 1e-12, "{signal}: {reach}");
+        }
+    }
+
+    #[test]
+    fn components_count_by_their_share_of_power() {
+        // Three quarters TMBOC, itself 29/33 BOC(1,1), and a quarter BOC(1,1): 4/33 · 3/4 = 1/11 of BOC(6,1), the
+        // MBOC spectrum that all of them share.
+        let (chip_s, hz) = (1.0 / 1.023e6, 0.7e6);
+        let boc = |m: f64| {
+            let wave = libm::tan(std::f64::consts::PI * hz * chip_s / (2.0 * m))
+                * libm::sin(std::f64::consts::PI * hz * chip_s)
+                / (std::f64::consts::PI * hz);
+            wave * wave / chip_s
+        };
+        let expected = 10.0 / 11.0 * boc(1.0) + boc(6.0) / 11.0;
+        let found = of(&MIXED).density(hz);
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+        // A signal of unit power has it all within its spectrum.
+        for signal in SYNTHETIC {
+            let waveform = of(signal);
+            let step_hz = waveform.chip_rate_hz() / 50.0;
+            let power: f64 =
+                (-20_000..20_000).map(|k| step_hz * waveform.density((f64::from(k) + 0.5) * step_hz)).sum();
+            // To ±400 chip rates, or 33 step rates of BOC(6,1).
+            assert!((power - 1.0).abs() < 0.004, "{signal}: {power}");
+        }
+    }
+}
