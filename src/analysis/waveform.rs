@@ -184,15 +184,17 @@ mod tests {
         let db = |a: &Signal, b: &Signal, apart_hz: f64| {
             10.0 * libm::log10(of(a).separation_s(&of(b), apart_hz, Edge::BandLimited, 24e6))
         };
-        for (a, b, printed_db) in [
-            (&L1_CA, &L1_CA, -61.8),
-            (&L1_CA, &LONG_BOC, -67.9),
-            (&LONG_BOC, &L1_CA, -67.9),
-            (&LONG_BOC, &LONG_BOC, -64.8),
-        ] {
-            let found_db = db(a, b, 0.0);
-            // Half of the last digit printed, and the power of 1 to 4 % outside of 24 MHz, which some tables count.
-            assert!((found_db - printed_db).abs() < 0.15, "{a} {b}: {found_db}");
+        let inside = |signal: &Signal| -> f64 {
+            let code = of(signal);
+            (-12_000..12_000).map(|k| 1e3 * code.density(1e3 * (f64::from(k) + 0.5))).sum()
+        };
+        let signals: [&Signal; 2] = [&L1_CA, &LONG_BOC];
+        for (a, b, printed_db) in [(0, 0, -61.8), (0, 1, -67.9), (1, 0, -67.9), (1, 1, -64.8)] {
+            let (a, b) = (signals[a], signals[b]);
+            // Printed are powers of the whole signals: 0.9 % of C/A and 2.6 % of BOC(1,1) lie beyond 24 MHz.
+            let found_db = db(a, b, 0.0) + 10.0 * libm::log10(inside(a) * inside(b));
+            // The last digit printed.
+            assert!((found_db - printed_db).abs() < 0.1, "{a} {b}: {found_db}");
         }
         // ∫R²: BOC(1,1) is 1 − 3τ to half a chip and τ − 1 after it, 1/8 and 1/24 on either side.
         let exact = 2.0 * (1.0 / 8.0 + 1.0 / 24.0) / 1.023e6;
@@ -226,11 +228,12 @@ mod tests {
         };
         assert_eq!(chips(&L1_CA), (1.0, f64::INFINITY));
         assert_eq!(chips(&QUADRATURE), (1.0, f64::INFINITY));
-        // BOC(1,1): lobes about ±1 chip rate end at 2; the correlation's first minimum is half a chip away.
-        for signal in [&LONG_BOC, &MIXED] {
+        // BOC(1,1): lobes about ±1 chip rate end at 2; the correlation's first minimum is half a chip away, with
+        // 1/11 of BOC(6,1), which falls by 11 a chip there, a step further.
+        for (signal, minimum) in [(&LONG_BOC, 0.5), (&MIXED, 7.0 / 12.0)] {
             let (null, reach) = chips(signal);
             assert_eq!(null, 2.0, "{signal}");
-            assert!((reach - 0.5).abs() < 1e-12, "{signal}: {reach}");
+            assert!((reach - minimum).abs() < 1e-12, "{signal}: {reach}");
         }
     }
 

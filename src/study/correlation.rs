@@ -1,18 +1,23 @@
-//! The shape of a correlation peak: the triangle of unlimited bandwidth, or that of a rectangular front end.
+//! The shape of a correlation peak: that of the code's pulses, or that behind a rectangular front end.
 //!
-//! Behind a filter the peak is R(τ) = ∫S(f)·cos(2πfτ) df over the band with S = sinc²(f), and the noise of
-//! taps correlates by R(τ)/R(0); the power outside, 1−R(0), is lost. Tabulated with its slope and
-//! interpolated by cubics.
+//! Behind a filter the peak is R(τ) = ∫S(f)·cos(2πfτ) df over the band, S the code's spectrum, and the noise
+//! of taps correlates by R(τ)/R(0); the power outside, 1−R(0), is lost. Tabulated with its slope and
+//! interpolated by cubics. Offsets and frequencies count in chips and chip rates.
 
+use crate::analysis::theory::dll::{BandIntegrals, Discriminator, Taps, raw_on_chips};
+use crate::analysis::waveform::Waveform;
+use crate::gnss::signal::sinc_squared;
 use crate::receiver::track::loops::CodeShape;
 
 /// R and R' over positive offsets in chips.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub enum Correlation {
-    /// 1−|τ|.
+    /// 1−|τ|, of rectangular chips without a front end.
     Triangle,
+    /// Of other pulses without a front end.
+    Pulses(Waveform),
     /// Behind a front end of `band` chip rates: values and slopes (times the step) at multiples of the table's step.
-    BandLimited { band: f64, table: Vec<(f64, f64)> },
+    BandLimited { band: f64, table: Vec<(f64, f64)>, code: Option<Waveform> },
 }
 
 /// Steps a chip: a cubic then errs by less than 1e-7 for bands to 20 chip rates.
@@ -23,17 +28,29 @@ const LARGEST_CHIPS: f64 = 3.0;
 const INTERVALS: f64 = 96.0;
 
 impl Correlation {
+    /// Of a signal, behind a front end of so many hertz (two-sided) if there is one.
+    pub fn of(code: Waveform, band_hz: Option<f64>) -> Self {
+        let (step_s, chip_s) = code.scales_s();
+        match band_hz {
+            Some(band_hz) => Self::behind(Some(&code), band_hz / code.chip_rate_hz()),
+            None if step_s == chip_s => Self::Triangle,
+            None => Self::Pulses(code),
+        }
+    }
+
     /// Behind a front end of `band` chip rates (two-sided), rectangular chips.
     pub fn band_limited(band: f64) -> Self {
+        Self::behind(None, band)
+    }
+
+    fn behind(code: Option<&Waveform>, band: f64) -> Self {
         let intervals = 2 * (0.25 * band * INTERVALS).ceil() as u64;
         let step = 0.5 * band / intervals as f64;
         let spectrum: Vec<(f64, f64)> = (0..=intervals)
             .map(|k| {
                 let f = k as f64 * step;
-                let x = std::f64::consts::PI * f;
-                let root = if k == 0 { 1.0 } else { libm::sin(x) / x };
                 let simpson = if k == 0 || k == intervals { 1.0 } else { 2.0 + 2.0 * (k % 2) as f64 };
-                (std::f64::consts::TAU * f, 2.0 * step / 3.0 * simpson * root * root)
+                (std::f64::consts::TAU * f, 2.0 * step / 3.0 * simpson * density(code, f))
             })
             .collect();
         let at = |index: u64| {
@@ -43,7 +60,8 @@ impl Correlation {
                 (value + weight * cos, slope - weight * w * sin / STEPS_PER_CHIP)
             })
         };
-        Self::BandLimited { band, table: (0..=(LARGEST_CHIPS * STEPS_PER_CHIP) as u64).map(at).collect() }
+        let table = (0..=(LARGEST_CHIPS * STEPS_PER_CHIP) as u64).map(at).collect();
+        Self::BandLimited { band, table, code: code.cloned() }
     }
 
     /// R at an offset in chips.
@@ -51,6 +69,7 @@ impl Correlation {
     pub fn value(&self, chips: f64) -> f64 {
         match self {
             Self::Triangle => (1.0 - chips.abs()).max(0.0),
+            Self::Pulses(code) => code.correlation(chips / code.chip_rate_hz()),
             Self::BandLimited { table, .. } => {
                 let x = chips.abs() * STEPS_PER_CHIP;
                 let (index, u) = (x.floor(), x - x.floor());
@@ -68,11 +87,32 @@ impl Correlation {
     pub fn code_shape(&self, d: f64) -> CodeShape {
         match self {
             Self::Triangle => CodeShape::triangle(d),
-            Self::BandLimited { .. } => {
-                let (peak, half, h) = (self.value(0.0), 0.5 * d, 0.5 / STEPS_PER_CHIP);
-                let slope = (self.value(half - h) - self.value(half + h)) / (2.0 * h);
-                CodeShape { value: self.value(half) / peak, slope: slope / peak, common: self.value(d) / peak }
+            Self::Pulses(_) | Self::BandLimited { .. } => {
+                let Taps { height, slope, common } = self.taps(d);
+                CodeShape { value: height, slope, common }
             }
         }
     }
+
+    /// Standard deviation of one discriminator value in chips, for a C/N0 before the front end; `None` for the
+    /// dot product behind one.
+    pub fn raw_chips(&self, discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> Option<f64> {
+        match self {
+            Self::Triangle => Some(crate::analysis::theory::dll::raw_chips(discriminator, d, t_s, cn0_hz)),
+            Self::Pulses(_) => Some(raw_on_chips(discriminator, self.taps(d), t_s * cn0_hz)),
+            Self::BandLimited { band, code, .. } => BandIntegrals::of(|f| density(code.as_ref(), f), d, *band)
+                .jitter_chips(discriminator, 0.5 / t_s, t_s, cn0_hz),
+        }
+    }
+
+    fn taps(&self, d: f64) -> Taps {
+        let (peak, half, h) = (self.value(0.0), 0.5 * d, 0.5 / STEPS_PER_CHIP);
+        let slope = (self.value(half - h) - self.value(half + h)) / (2.0 * h);
+        Taps { height: self.value(half) / peak, slope: slope / peak, common: self.value(d) / peak }
+    }
+}
+
+/// A code's spectrum at a frequency in chip rates, of unit area; that of rectangular chips without a code.
+fn density(code: Option<&Waveform>, f: f64) -> f64 {
+    code.map_or_else(|| sinc_squared(f), |code| code.density(f * code.chip_rate_hz()) * code.chip_rate_hz())
 }

@@ -14,7 +14,7 @@ use super::motion::{Motion, Truth};
 use super::normal::{Normals, Purpose, symbol};
 use super::watch::Watch;
 use crate::analysis::theory::clock::PowerLaw;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::{self, Carrier, Component, Signal};
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::closed::{Loops, Mode, Update};
 use crate::receiver::track::cn0::Cn0;
@@ -43,19 +43,35 @@ pub struct Case {
     pub seed: u64,
 }
 
+/// The signals that a channel of this kind can follow: those of one component, whose carrier is the same for
+/// all satellites.
+pub fn signals() -> Vec<&'static Signal> {
+    let simple =
+        |signal: &&'static Signal| signal.components.len() == 1 && matches!(signal.carrier, Carrier::Common(_));
+    signal::all().into_iter().filter(simple).collect()
+}
+
+/// The component that a channel follows.
+pub(super) fn tracked(signal: &'static Signal) -> Option<&'static Component> {
+    match signal.components {
+        [one] => Some(one),
+        _ => None,
+    }
+}
+
 impl Case {
     /// Code periods that carry a symbol, or that are grouped without one.
     fn group(&self) -> u32 {
-        let message = self.signal.components.first().and_then(|c| c.message);
+        let message = tracked(self.signal).and_then(|c| c.message);
         message.map_or(PILOT_GROUP, |m| m.periods_per_symbol())
     }
 
     fn period_s(&self) -> f64 {
-        self.signal.components.first().map_or(1.0, |c| c.period_s())
+        tracked(self.signal).map_or(1.0, Component::period_s)
     }
 
     pub(super) fn has_symbols(&self) -> bool {
-        self.signal.components.first().is_some_and(|c| c.message.is_some())
+        tracked(self.signal).is_some_and(|c| c.message.is_some())
     }
 
     /// Time between loop updates, which is the coherent integration.
@@ -213,7 +229,7 @@ struct Channel<'a> {
 
 impl<'a> Channel<'a> {
     fn new(case: &'a Case) -> Self {
-        let chip_rate_hz = case.signal.components.first().map_or(1.0, |c| c.chip_rate_hz);
+        let chip_rate_hz = tracked(case.signal).map_or(1.0, |c| c.chip_rate_hz);
         let (period_s, update_s, group) = (case.period_s(), case.update_s(), case.group());
         let shape = case.correlation.code_shape(case.settings.spacing_chips);
         let mut loops = Loops::new(&case.settings, shape, case.has_symbols(), case.motion.doppler_hz);

@@ -15,6 +15,7 @@ use thiserror::Error;
 
 use super::search::Model;
 use crate::analysis::plot::canvas::{Axis, BLUE, Chart, Mark, ORANGE, Series, figure};
+use crate::analysis::waveform::leading;
 use crate::analysis::{JudgeError, write_rows, write_whole};
 use crate::generator::scenario::{Overrides, Scenario};
 use crate::generator::scene::Scene;
@@ -24,7 +25,7 @@ use crate::generator::truth;
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
+use crate::gnss::signal::{Component, Link};
 use crate::receiver::acquire::{self, AcquireError, AcquisitionSettings, Searcher, samples_needed};
 use crate::receiver::source::Block;
 
@@ -245,16 +246,19 @@ pub fn detections(
         }
     })?;
     error.map_or(Ok(()), Err)?;
-    let sample_chips = 1.023e6 / rate_hz;
+    let code = leading(&L1_CA).ok_or_else(|| DetectionError::Scene(format!("{L1_CA} has no code")))?;
+    let symbol_s =
+        code.message.map_or(f64::INFINITY, |message| code.period_s() * f64::from(message.periods_per_symbol()));
     let model = Model {
+        signal: &L1_CA,
         sums: settings.noncoherent_sums,
-        coherent_s: 1e-3 * f64::from(settings.coherent_periods),
+        coherent_s: code.period_s() * f64::from(settings.coherent_periods),
         threshold,
         lag_chips: acquire::cell_chips(&metadata, &L1_CA, settings)?,
         doppler_step_hz: step_hz,
-        sample_chips,
-        code_chips: 1023.0,
-        symbol_s: 0.02,
+        sample_chips: code.chip_rate_hz / rate_hz,
+        code_chips: f64::from(code.code_chips),
+        symbol_s,
         code_spread: 1.0,
         cn0_dbhz,
     };
@@ -291,7 +295,8 @@ pub fn false_alarms(
 }
 
 fn doppler_step_hz(settings: &AcquisitionSettings) -> f64 {
-    settings.doppler_step_cycles / (1e-3 * f64::from(settings.coherent_periods))
+    let period_s = leading(&L1_CA).map_or(f64::INFINITY, Component::period_s);
+    settings.doppler_step_cycles / (period_s * f64::from(settings.coherent_periods))
 }
 
 /// Writes `acquisition.csv`, `acquisition.md` and `acquisition.png` into a directory.

@@ -6,9 +6,8 @@
 
 use std::f64::consts::TAU;
 
-use super::correlation::Correlation;
 use super::correlator::Case;
-use crate::analysis::theory::dll::{self, BandIntegrals, Discriminator};
+use crate::analysis::theory::dll::Discriminator;
 use crate::analysis::theory::linear::{AssistedLoop, Feedback, FrequencyLoop, Linear, Pairs, PhaseLoop};
 use crate::analysis::theory::{fll, pll};
 use crate::receiver::track::closed::Mode;
@@ -109,10 +108,6 @@ pub fn code_chips(case: &Case) -> Option<Jitter> {
         CodeDiscriminator::DotProduct => Discriminator::DotProduct,
     };
     let before_filter_hz = libm::pow(10.0, case.cn0_dbhz? / 10.0);
-    let raw = match &case.correlation {
-        Correlation::Triangle => dll::raw_chips(discriminator, settings.spacing_chips, update_s, before_filter_hz),
-        Correlation::BandLimited { band, .. } => BandIntegrals::rectangular(settings.spacing_chips, *band)
-            .jitter_chips(discriminator, 0.5 / update_s, update_s, before_filter_hz)?,
-    };
+    let raw = case.correlation.raw_chips(discriminator, settings.spacing_chips, update_s, before_filter_hz)?;
     Jitter::of(&code_loop(settings, update_s).linear(), raw, update_s)
 }

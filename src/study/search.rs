@@ -2,7 +2,7 @@
 //!
 //! A search takes the largest of neighbouring cells, whose noise is alike and of which two or four may share
 //! the peak, so its detection probability exceeds that of one cell (`analysis::theory::detection`) and has no
-//! closed form. Here the correlations of a neighbourhood are drawn: mean from the folded spectrum of chips
+//! closed form. Here the correlations of a neighbourhood are drawn: mean from the folded spectrum of the code
 //! averaged over a sample, sinc over frequency and symbols that turn within a sum; noise with the covariance
 //! that the same two functions give. Limits: complex samples, one satellite, random codes beyond the
 //! neighbourhood.
@@ -13,18 +13,20 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::normal::{Normals, Purpose, uniform};
+use crate::analysis::waveform::Waveform;
+use crate::gnss::signal::{Signal, sinc_squared};
 
 /// Cells to either side of the nearest one that are drawn, in code and in Doppler.
 const SIDE_LAGS: i32 = 3;
 const SIDE_BINS: i32 = 2;
-/// Mean square of the code's correlation away from its peak, in units of one over its chips.
-const SIDELOBE: f64 = 2.0 / 3.0;
 /// Steps of an integral over a sum in which symbols turn.
 const STEPS: u32 = 40;
 
 /// A search and the signal that it meets.
 #[derive(Clone, Copy, Debug)]
 pub struct Model {
+    /// Whose code is searched.
+    pub signal: &'static Signal,
     /// Coherent sums whose powers are added, and the length of one.
     pub sums: u32,
     pub coherent_s: f64,
@@ -41,7 +43,7 @@ pub struct Model {
     pub cn0_dbhz: f64,
 }
 
-/// Spectrum of rectangular chips averaged over samples, as a search by transforms meets it: folded into the
+/// Spectrum of a code averaged over samples, as a search by transforms meets it: folded into the
 /// band of the samples, of which a part goes back to lags. A lag that is no whole number of samples turns
 /// what was folded against the rest, so that the peak loses part of it: up to 0.11 dB at 2.54 samples a chip.
 struct Folded {
@@ -60,10 +62,10 @@ const IMAGES: i32 = 8;
 
 impl Folded {
     /// For samples of `sample` chips and lags of `lag` samples.
-    fn new(sample: f64, lag: f64) -> Self {
+    fn new(code: &Waveform, sample: f64, lag: f64) -> Self {
         let density = |turns: f64| {
-            let root = sinc(turns / sample) * sinc(turns);
-            root * root
+            let chips = code.density(turns / sample * code.chip_rate_hz()) * code.chip_rate_hz();
+            chips * sinc_squared(turns)
         };
         let folded = |turns: f64| -> f64 { (-IMAGES..=IMAGES).map(|k| density(turns + f64::from(k))).sum() };
         let half = 0.5 / lag.max(1.0);
@@ -116,7 +118,8 @@ impl Model {
             DMatrix::from_fn(places.len(), places.len(), |a, b| of(places[a] - places[b]))
         };
         let lag = self.lag_chips / self.sample_chips;
-        let chips = Folded::new(self.sample_chips, lag);
+        let Some(waveform) = Waveform::of(self.signal) else { return 0.0 };
+        let chips = Folded::new(&waveform, self.sample_chips, lag);
         let across_code = covariance(&lags, &|d| chips.noise(d * lag));
         let across_doppler = covariance(&bins, &|d| sinc(d * self.doppler_step_hz * self.coherent_s));
         // Neighbours this close are never dependent, so both are positive definite; if not, nothing is found.
@@ -125,7 +128,7 @@ impl Model {
         let cn0_hz = libm::pow(10.0, self.cn0_dbhz / 10.0);
         // Correlations of unit noise a component; the floor holds the sidelobes of the signal too.
         let amplitude = (2.0 * self.coherent_s * cn0_hz * chips.share).sqrt();
-        let floor = 1.0 + self.coherent_s * cn0_hz * SIDELOBE / self.code_chips;
+        let floor = 1.0 + self.coherent_s * cn0_hz * sidelobe(&waveform) / self.code_chips;
         let mut noise = Normals::new(seed, Purpose::Thermal);
         let mut found = 0;
         for draw in 0..draws {
@@ -156,6 +159,16 @@ impl Model {
         }
         f64::from(found) / f64::from(draws.max(1))
     }
+}
+
+/// Mean square of a code's correlation away from its peak, in units of one over its chips: ∫R² over a chip, of a
+/// polygon. Two thirds of rectangular chips.
+fn sidelobe(code: &Waveform) -> f64 {
+    let (step_s, chip_s) = code.scales_s();
+    let steps = (chip_s / step_s).round() as i32;
+    let value = |k: i32| code.correlation(f64::from(k) * step_s);
+    let piece = |k: i32| (value(k) * value(k) + value(k) * value(k + 1) + value(k + 1) * value(k + 1)) / 3.0;
+    2.0 * (0..steps).map(piece).sum::<f64>() / f64::from(steps)
 }
 
 /// Message symbols of one draw.
@@ -190,12 +203,25 @@ impl Symbols {
 mod tests {
     use super::*;
     use crate::analysis::theory::detection;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::synthetic::LONG_BOC;
+
+    fn chips() -> Waveform {
+        Waveform::of(&L1_CA).unwrap()
+    }
+
+    #[test]
+    fn side_lobes_of_boc_are_half_of_those_of_bpsk() {
+        // ∫R² is 2/3 of rectangular chips and 2·(1/8 + 1/24) of BOC(1,1).
+        assert!((sidelobe(&chips()) - 2.0 / 3.0).abs() < 1e-15);
+        assert!((sidelobe(&Waveform::of(&LONG_BOC).unwrap()) - 1.0 / 3.0).abs() < 1e-12);
+    }
 
     #[test]
     fn at_whole_samples_the_correlation_is_that_of_two_triangles() {
         // ∫ Λ(τ − u s) Λ(u) du of chips and sample: 1 − s/3 at zero; from s to 1 − s chips both triangles are straight.
         let s = 0.4;
-        let folded = Folded::new(s, 1.0);
+        let folded = Folded::new(&chips(), s, 1.0);
         let at_zero = 1.0 - s / 3.0;
         // Images beyond the first hold 1e-3 of the power.
         assert!((folded.signal(0.0, 0.0) - 1.0).abs() < 2e-3, "{}", folded.signal(0.0, 0.0));
@@ -207,7 +233,7 @@ mod tests {
 
     #[test]
     fn a_lag_half_way_between_samples_loses_what_was_folded_twice() {
-        let folded = Folded::new(1.023 / 2.6, 1.015_625);
+        let folded = Folded::new(&chips(), 1.023 / 2.6, 1.015_625);
         let (whole, half) = (folded.signal(0.0, 0.0), folded.signal(0.0, 0.5));
         let (mean, image) = (0.5 * (whole + half), 0.5 * (whole - half));
         // Integrated by another program: 0.98654/0.99870 of the power within the band was not folded.
@@ -222,6 +248,7 @@ mod tests {
         // never turns leave one cell.
         const DRAWS: u32 = 20_000;
         let model = Model {
+            signal: &L1_CA,
             sums: 10,
             coherent_s: 1e-3,
             threshold: detection::threshold(1e-7, 10),
@@ -237,7 +264,7 @@ mod tests {
             let lambda = detection::noncentrality(10, 1e-3, libm::pow(10.0, cn0_dbhz / 10.0), 1.0);
             let expected = detection::detection(model.threshold, 10, lambda);
             // Of the signal the lags hold what lies within the band that has as many of them.
-            let share_db = 10.0 * libm::log10(Folded::new(model.sample_chips, 12.5).share);
+            let share_db = 10.0 * libm::log10(Folded::new(&chips(), model.sample_chips, 12.5).share);
             let found = Model { cn0_dbhz: cn0_dbhz - share_db, ..model }.probability(&[0.0], DRAWS, 1);
             // Four deviations of a count, and the other cells' own alarms: 34 of 1e-7.
             let scatter = 4.0 * (expected * (1.0 - expected) / f64::from(DRAWS)).sqrt() + 4e-6;

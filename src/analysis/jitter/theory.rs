@@ -9,6 +9,7 @@ use crate::analysis::foreign::truth::Timeline;
 use crate::analysis::load::Run;
 use crate::analysis::statistics::Sum;
 use crate::analysis::theory::clock::PowerLaw;
+use crate::analysis::theory::dll::{Discriminator, Taps};
 use crate::analysis::theory::linear::{Feedback, PhaseLoop, controlled_root, controlled_root_gains};
 use crate::analysis::theory::{dll, fll, oscillator, pll};
 use crate::analysis::waveform::{Edge, Waveform};
@@ -210,14 +211,12 @@ impl Code {
     }
 }
 
-/// Standard deviation of one early-minus-late value, in chips, for the shapes of signal and noise: with a and
-/// a′ the relative height and slope at d/2 and ρ the noise's correlation over d, (1−ρ)/(4·snr·a′²)·(1 +
-/// (1+ρ)/(2·snr·a²)).
+/// Standard deviation of one early-minus-late value, in chips, for the shapes of signal and noise.
 fn raw_chips(signal: &Peak, noise: &Peak, d: f64, snr: f64) -> f64 {
     let height = signal.value(0.5 * d) / signal.value(0.0);
     let slope = signal.slope(0.5 * d) / signal.value(0.0);
     let rho = noise.value(d) / noise.value(0.0);
-    ((1.0 - rho) / (4.0 * snr * slope * slope) * (1.0 + (1.0 + rho) / (2.0 * snr * height * height))).sqrt()
+    dll::raw_on_chips(Discriminator::EarlyMinusLate, Taps { height, slope, common: rho }, snr)
 }
 
 /// The three loops of a receiver as theory sees them at one integration time.
@@ -428,7 +427,6 @@ pub fn motion_error_deg(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::theory::dll::Discriminator;
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::signal::Signal;
     use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE};

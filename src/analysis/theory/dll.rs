@@ -5,6 +5,8 @@
 //! one-sided noise bandwidth of the discrete loop, so the factor (1−½·B·T) of continuous updates is left out.
 //! White noise, no multipath.
 
+use crate::gnss::signal::sinc_squared;
+
 /// A code discriminator, by its noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Discriminator {
@@ -32,6 +34,31 @@ pub fn raw_chips(discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) ->
     (d / (planted!("analysis.theory.dll", 4.0, 2.0) * snr) * (1.0 + squaring(discriminator, d, snr))).sqrt()
 }
 
+/// What a code's correlation is at early and late, of 1 at the prompt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Taps {
+    /// Its value there, and how much it falls a chip.
+    pub height: f64,
+    pub slope: f64,
+    /// Correlation of the noise of early and late.
+    pub common: f64,
+}
+
+/// Standard deviation of one discriminator value, in chips, on a correlation of any shape.
+///
+/// With a and a′ height and slope and ρ the noise in common, (1−ρ)/(4·snr·a′²) times 1 plus the squaring loss:
+/// (1+ρ)/(2·snr·a²) of early minus late power, 1/snr of the dot product. Betz and Kolodziejski 2009, their
+/// integrals written as the correlations that they are.
+pub fn raw_on_chips(discriminator: Discriminator, taps: Taps, snr: f64) -> f64 {
+    let Taps { height, slope, common } = taps;
+    let squaring = match discriminator {
+        Discriminator::EarlyMinusLate => (1.0 + common) / (2.0 * snr * height * height),
+        Discriminator::DotProduct => 1.0 / snr,
+        Discriminator::Coherent => 0.0,
+    };
+    ((1.0 - common) / (4.0 * snr * slope * slope) * (1.0 + squaring)).sqrt()
+}
+
 /// Closed-loop jitter in chips, unlimited bandwidth (eq. 5.23 first branch).
 pub fn jitter_chips(discriminator: Discriminator, d: f64, bandwidth_hz: f64, t_s: f64, cn0_hz: f64) -> f64 {
     raw_chips(discriminator, d, t_s, cn0_hz) * (2.0 * bandwidth_hz * t_s).sqrt()
@@ -52,7 +79,7 @@ pub fn jitter_banded_chips(d: f64, band: f64, bandwidth_hz: f64, t_s: f64, cn0_h
     (bandwidth_hz / (2.0 * cn0_hz) * spread * (1.0 + squaring)).sqrt()
 }
 
-/// Integrals of a chip's spectrum over a rectangular front end, for eq. 5.22. Frequencies in chip rates.
+/// Integrals of a code's spectrum over a rectangular front end, for eq. 5.22. Frequencies in chip rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BandIntegrals {
     /// ∫S·sin²(πfd), ∫f·S·sin(πfd), ∫S·cos²(πfd), ∫S·cos(πfd), ∫f²·S over ±band/2.
@@ -67,9 +94,14 @@ pub struct BandIntegrals {
 const INTERVALS_PER_LOBE: f64 = 64.0;
 
 impl BandIntegrals {
-    /// For rectangular chips, S = sinc²(f) of unit area over all frequencies (so C/N0 is that before the filter), and
-    /// `band` chip rates of two-sided bandwidth.
+    /// For rectangular chips, S = sinc²(f), as [`Self::of`].
     pub fn rectangular(d: f64, band: f64) -> Self {
+        Self::of(sinc_squared, d, band)
+    }
+
+    /// For a spectrum of unit area over all frequencies (so C/N0 is that before the filter), whose lobes are a
+    /// chip rate wide, and `band` chip rates of two-sided bandwidth.
+    pub fn of(spectrum: impl Fn(f64) -> f64, d: f64, band: f64) -> Self {
         let pi = std::f64::consts::PI;
         let intervals = 2.0 * (0.5 * INTERVALS_PER_LOBE * (0.5 * band + 1.0) * (1.0 + d)).ceil();
         let step = 0.5 * band / intervals;
@@ -77,8 +109,7 @@ impl BandIntegrals {
         for k in 0..=intervals as u64 {
             let f = k as f64 * step;
             let weight = if k == 0 || k == intervals as u64 { 1.0 } else { 2.0 + 2.0 * (k % 2) as f64 };
-            let root = if k == 0 { 1.0 } else { libm::sin(pi * f) / (pi * f) };
-            let (s, (sin, cos)) = (root * root, libm::sincos(pi * f * d));
+            let (s, (sin, cos)) = (spectrum(f), libm::sincos(pi * f * d));
             let terms = [s * sin * sin, f * s * sin, s * cos * cos, s * cos, f * f * s];
             sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += weight * term);
         }

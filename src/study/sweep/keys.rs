@@ -4,7 +4,7 @@ use crate::generator::ripple::oscillator::PowerLaw;
 use crate::generator::scenario::schema::{
     Key, flag, foreign, integer, number, numbers, table, tables, text, values, word, words,
 };
-use crate::gnss::signal::SIGNALS;
+use crate::study::correlator::signals;
 
 /// Room for any number.
 const ANY: f64 = 1e18;
@@ -42,9 +42,10 @@ pub const STUDY: &[Key] = &[
 ];
 
 const SIGNAL: &[Key] = &[
-    word("name", || SIGNALS.map(|signal| signal.name).to_vec(), "which signal").or_else("GPS L1 C/A"),
+    word("name", || signals().into_iter().map(|signal| signal.name).collect(), "which signal, of one component")
+        .or_else("GPS L1 C/A"),
     number("cn0_dbhz", 0.0, 80.0, "dB-Hz", "C/N0").or_else("no noise"),
-    number("bandwidth_hz", 1e3, 1e9, "Hz", "of the front end").or_else("none: the triangle"),
+    number("bandwidth_hz", 1e3, 1e9, "Hz", "of the front end").or_else("none"),
     word(
         "oscillator",
         || PowerLaw::PRESETS.map(|(name, _)| name).to_vec(),

@@ -8,17 +8,18 @@
 use super::keys;
 use crate::analysis::theory::clock::PowerLaw;
 use crate::analysis::theory::{dll, fll, oscillator, pll};
+use crate::analysis::waveform::Waveform;
 use crate::generator::ripple::oscillator::PowerLaw as Levels;
 use crate::generator::scenario::ScenarioError;
 use crate::generator::scenario::read::{Source, Table};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::signal::{SIGNALS, Signal};
+use crate::gnss::signal::Signal;
 use crate::receiver::settings::Settings;
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::closed::Mode;
 use crate::study::correlation::Correlation;
-use crate::study::correlator::{Case, Outcome, run};
+use crate::study::correlator::{Case, Outcome, run, signals, tracked};
 use crate::study::expect::{self, Jitter};
 use crate::study::motion::{Motion, Step};
 
@@ -64,7 +65,7 @@ impl Model {
             Some(table) => table.number(name),
             None => Ok(None),
         };
-        let names = SIGNALS.map(|signal| (signal.name, signal));
+        let names: Vec<(&str, &'static Signal)> = signals().into_iter().map(|signal| (signal.name, signal)).collect();
         let modes = [("phase", Mode::Phase), ("assisted", Mode::Assisted), ("frequency", Mode::Frequency)];
         let chosen = |table: &Option<Table<'_>>, name, choices: &[(&str, Mode)]| match table {
             Some(table) => table.choice(name, choices),
@@ -121,8 +122,6 @@ impl Model {
                 motion.steps.push(Step { at_s: end_s, rate_step_hz_s: 0.0, jerk_hz_s2: 0.0 });
             }
         }
-        let chip_rate_hz = self.signal.components.first().map_or(1.0, |c| c.chip_rate_hz);
-        let correlation = |band_hz: f64| Correlation::band_limited(band_hz / chip_rate_hz);
         Case {
             signal: self.signal,
             settings: self.tracking.clone(),
@@ -130,7 +129,8 @@ impl Model {
             cn0_dbhz: self.cn0_dbhz,
             motion,
             oscillator: self.oscillator,
-            correlation: self.band_hz.map_or(Correlation::Triangle, correlation),
+            correlation: Waveform::of(self.signal)
+                .map_or(Correlation::Triangle, |code| Correlation::of(code, self.band_hz)),
             watched: self.watched,
             settle_s: self.settle_s,
             duration_s: self.duration_s,
@@ -184,7 +184,7 @@ fn kept(outcome: &Outcome, value: Option<f64>) -> Option<f64> {
 }
 
 fn chip_m(case: &Case) -> f64 {
-    case.signal.components.first().map_or(f64::NAN, |c| SPEED_OF_LIGHT_MPS / c.chip_rate_hz)
+    tracked(case.signal).map_or(f64::NAN, |c| SPEED_OF_LIGHT_MPS / c.chip_rate_hz)
 }
 
 fn sigma(jitter: Option<Jitter>) -> Option<f64> {
