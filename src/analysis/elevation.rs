@@ -2,9 +2,9 @@
 //!
 //! Code minus carrier is free of orbits, clocks and the troposphere; it holds code noise, multipath, a
 //! constant and twice the ionosphere, which the truth gives and which is taken out here: M = P − λφ − 2I,
-//! each arc about its mean. It is what a user of one frequency can see of multipath, and beside it stands
+//! each arc about its mean, each signal with its own carrier. It is what a user of one frequency can see of multipath, and beside it stands
 //! what only the truth can tell, the code's error. Bands of elevation are ten degrees wide; errors in them
-//! are without the epoch's common part.
+//! are without the epoch's common part of their signal.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -25,8 +25,8 @@ const BAND_DEG: f64 = 10.0;
 pub struct Point {
     pub time_s: f64,
     pub elevation_deg: f64,
-    /// Without the epoch's common part.
-    pub code_m: f64,
+    /// Without the epoch's common part of its signal; none of the only satellite of an epoch.
+    pub code_m: Option<f64>,
     pub carrier_cycles: f64,
     pub doppler_hz: f64,
     /// Measured minus expected.
@@ -86,7 +86,10 @@ pub fn points(run: &Run, errors: &Errors, link: Link) -> Result<Vec<Point>, Judg
         Some(Point {
             time_s: row.time_s,
             elevation_deg: *elevations.get(&row.sample)?,
-            code_m: row.code_m - errors.common_m(row.sample)?.0,
+            code_m: errors
+                .common_m(link.signal, row.sample)
+                .filter(|(_, count)| *count > 1)
+                .map(|it| row.code_m - it.0),
             carrier_cycles: row.carrier_cycles,
             doppler_hz: row.doppler_hz,
             cn0_db: row.cn0_dbhz - row.cn0_effective_dbhz,
@@ -124,7 +127,8 @@ impl Elevations {
 impl Satellite {
     fn of(Link { sv, signal }: Link, points: &[Point]) -> Self {
         let of = |of: fn(&Point) -> f64| points.iter().map(of).collect::<Vec<f64>>();
-        let (code, doppler, cn0) = (of(|p| p.code_m), of(|p| p.doppler_hz), of(|p| p.cn0_db));
+        let code: Vec<f64> = points.iter().filter_map(|point| point.code_m).collect();
+        let (doppler, cn0) = (of(|p| p.doppler_hz), of(|p| p.cn0_db));
         Self {
             sv,
             signal: signal.name,
@@ -145,6 +149,7 @@ impl Satellite {
 /// A band in the making.
 #[derive(Default)]
 struct Layer {
+    observations: usize,
     /// For the one figure that needs all values.
     code_m: Vec<f64>,
     carrier_cycles: Sum,
@@ -155,7 +160,8 @@ struct Layer {
 
 impl Layer {
     fn add(&mut self, point: &Point) {
-        self.code_m.push(point.code_m);
+        self.observations += 1;
+        self.code_m.extend(point.code_m);
         self.carrier_cycles.add(point.carrier_cycles);
         self.doppler_hz.add(point.doppler_hz);
         self.cn0_db.add(point.cn0_db);
@@ -168,7 +174,7 @@ impl Layer {
             from_deg: number as f64 * BAND_DEG,
             // A table may hold any elevation.
             to_deg: (number as f64 + 1.0) * BAND_DEG,
-            observations: self.code_m.len(),
+            observations: self.observations,
             code_rms_m: rms(&self.code_m),
             code_p95_m: percentile(&magnitudes, 0.95),
             carrier_rms_cycles: self.carrier_cycles.rms(),
@@ -216,7 +222,7 @@ mod tests {
         let point = |elevation_deg: f64, code_m: f64| Point {
             time_s: 0.0,
             elevation_deg,
-            code_m,
+            code_m: Some(code_m),
             carrier_cycles: 0.0,
             doppler_hz: 0.0,
             cn0_db: -0.5,

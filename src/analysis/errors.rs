@@ -17,6 +17,8 @@ use crate::analysis::statistics::median;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::record::{Event, EventRow, Observation};
 
+use crate::gnss::signal::Signal;
+
 pub use crate::gnss::signal::Link;
 
 /// Errors of one observation.
@@ -83,8 +85,9 @@ impl Row<Link> for SignalError {
 pub struct Errors {
     /// In the order of their samples.
     pub signals: Shelf<Link, SignalError>,
-    /// Sum and number of the code errors of each epoch.
-    pub epochs: BTreeMap<u64, (f64, usize)>,
+    /// Sum and number of the code errors of each epoch, signal by signal: what signals differ by is no error of a
+    /// satellite.
+    epochs: BTreeMap<(u64, &'static Signal), (f64, usize)>,
     pub positions: Vec<PositionError>,
     /// Changes of the carrier's constant: those declared by the receiver's events after a satellite's first
     /// observation, and jumps of at least [`SLIP_CYCLES`] that stay and that it did not declare.
@@ -175,7 +178,7 @@ impl Errors {
             self.cycle_slips += declared.len() + level_carrier(&mut rows, &declared);
         }
         for row in &rows {
-            let (sum_m, count) = self.epochs.entry(row.sample).or_default();
+            let (sum_m, count) = self.epochs.entry((row.sample, link.signal)).or_default();
             (*sum_m, *count) = (*sum_m + row.code_m, *count + 1);
             self.signals.push(link, row)?;
         }
@@ -212,10 +215,20 @@ impl Errors {
         Ok(())
     }
 
+    /// Satellites that send a signal, or all.
+    fn of(&self, signal: Option<&Signal>) -> impl Iterator<Item = Link> {
+        self.signals.keys().filter(move |link| signal.is_none_or(|signal| link.signal == signal))
+    }
+
     /// One number of every observation.
     pub fn pooled(&self, of: impl Fn(&SignalError) -> f64) -> Result<Vec<f64>, JudgeError> {
+        self.pooled_of(None, of)
+    }
+
+    /// The same of one signal, or of all.
+    pub fn pooled_of(&self, signal: Option<&Signal>, of: impl Fn(&SignalError) -> f64) -> Result<Vec<f64>, JudgeError> {
         let mut all = Vec::with_capacity(self.signals.len());
-        for link in self.signals.keys() {
+        for link in self.of(signal) {
             self.signals.each(link, |row| all.push(of(&row)))?;
         }
         Ok(all)
@@ -223,28 +236,38 @@ impl Errors {
 
     /// One number of every observation that is past its pull-in, a list a satellite.
     pub fn settled(&self, of: impl Fn(&Link, &SignalError) -> f64) -> Result<Vec<Vec<f64>>, JudgeError> {
+        self.settled_of(None, of)
+    }
+
+    /// The same of one signal, or of all.
+    pub fn settled_of(
+        &self,
+        signal: Option<&Signal>,
+        of: impl Fn(&Link, &SignalError) -> f64,
+    ) -> Result<Vec<Vec<f64>>, JudgeError> {
         let one = |link: Link| {
             let mut found = Vec::with_capacity(self.signals.count(&link));
             self.signals.each(link, |row| found.extend((row.locked_s >= PULL_IN_S).then(|| of(&link, &row))))?;
             Ok(found)
         };
-        self.signals.keys().map(one).collect()
+        self.of(signal).map(one).collect()
     }
 
-    /// Code errors after the mean over the satellites of each epoch is removed; epochs of one satellite are
-    /// left out. With n satellites the mean takes 1/n of the variance with it.
-    pub fn code_without_clock_m(&self) -> Result<Vec<f64>, JudgeError> {
+    /// Code errors after the mean over the satellites of each epoch and signal is removed: receiver clock, time
+    /// scale and the delay of the signal's own path. Epochs of one satellite are left out. With n satellites the
+    /// mean takes 1/n of the variance with it. Of one signal, or of all.
+    pub fn code_without_clock_m(&self, of: Option<&Signal>) -> Result<Vec<f64>, JudgeError> {
         let mut all = Vec::with_capacity(self.signals.len());
-        for link in self.signals.keys() {
-            let several = |row: &SignalError| self.common_m(row.sample).filter(|(_, count)| *count > 1);
+        for link in self.of(of) {
+            let several = |row: &SignalError| self.common_m(link.signal, row.sample).filter(|(_, count)| *count > 1);
             self.signals.each(link, |row| all.extend(several(&row).map(|(common_m, _)| row.code_m - common_m)))?;
         }
         Ok(all)
     }
 
-    /// Mean of the code errors of an epoch, and how many they are.
-    pub fn common_m(&self, sample: u64) -> Option<(f64, usize)> {
-        self.epochs.get(&sample).map(|(sum_m, count)| (sum_m / *count as f64, *count))
+    /// Mean of a signal's code errors at an epoch, and how many they are.
+    pub fn common_m(&self, signal: &'static Signal, sample: u64) -> Option<(f64, usize)> {
+        self.epochs.get(&(sample, signal)).map(|(sum_m, count)| (sum_m / *count as f64, *count))
     }
 }
 

@@ -39,8 +39,7 @@ impl Summary {
         let count = &self.satellites;
         write!(f, "satellites    {} in view, {} acquired, {} used", count.in_view, count.acquired, count.used)?;
         if !self.details.false_satellites.is_empty() {
-            let names: Vec<String> = self.details.false_satellites.iter().map(ToString::to_string).collect();
-            write!(f, ", false: {}", names.join(" "))?;
+            write!(f, ", false: {}", self.details.false_satellites.join(" "))?;
         }
         writeln!(f)?;
         match self.position.first_fix_s {

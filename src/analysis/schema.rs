@@ -38,6 +38,8 @@ fn walk(path: &str, schema: &Value, leaves: &mut Vec<Leaf>) {
         properties.iter().for_each(|(key, schema)| walk(&below(key), schema, leaves));
     } else if let Some(items) = schema.get("prefixItems").and_then(Value::as_array) {
         items.iter().enumerate().for_each(|(index, schema)| walk(&below(&index.to_string()), schema, leaves));
+    } else if let Some(any) = schema.get("additionalProperties").filter(|any| any.is_object()) {
+        walk(&below(ANY), any, leaves);
     } else {
         let text = |key: &str| schema.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
         let of = |kind: &str| match schema.get("type") {
@@ -50,14 +52,32 @@ fn walk(path: &str, schema: &Value, leaves: &mut Vec<Leaf>) {
     }
 }
 
+/// What stands in the schema's paths for any key, such as the name of a signal.
+const ANY: &str = "*";
+
+/// Whether a path is one of those that a path of the schema stands for.
+pub fn covers(pattern: &str, path: &str) -> bool {
+    let (mut keys, mut own) = (pattern.split('.'), path.split('.'));
+    loop {
+        match (keys.next(), own.next()) {
+            (None, None) => return true,
+            (Some(key), Some(own)) if key == ANY || key == own => {}
+            _ => return false,
+        }
+    }
+}
+
 /// The figure at a path.
 pub fn leaf(path: &str) -> Option<Leaf> {
-    leaves().iter().find(|leaf| leaf.path == path).cloned()
+    let found = leaves().iter().find(|leaf| covers(&leaf.path, path))?;
+    Some(Leaf { path: path.to_owned(), ..found.clone() })
 }
 
 /// Whether figures lie below a path.
 pub fn is_branch(path: &str) -> bool {
-    leaves().iter().any(|leaf| leaf.path.strip_prefix(path).is_some_and(|rest| rest.starts_with('.')))
+    let keys = path.split('.').count();
+    let begin = |leaf: &Leaf| leaf.path.split('.').take(keys).collect::<Vec<_>>().join(".");
+    leaves().iter().any(|leaf| leaf.path.split('.').count() > keys && covers(&begin(leaf), path))
 }
 
 /// The path most like another.

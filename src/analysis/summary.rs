@@ -22,9 +22,11 @@ use crate::analysis::spoofing::Spoofing;
 use crate::analysis::statistics::{Spread, mean, percentile, pooled_std, rms, spread, std};
 use crate::analysis::theory::clock::white_phase;
 use crate::analysis::verdict::Verdict;
+use crate::analysis::waveform::leading;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{Event, NavigationRow};
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Component, Signal};
 
 /// Rule-of-thumb bound of a Costas loop's 1σ error (theory: 3σ ≤ 45°).
 pub const PLL_THRESHOLD_DEG: f64 = 15.0;
@@ -42,6 +44,8 @@ pub struct Summary {
     pub clock: Clock,
     pub observables: Observables,
     pub tracking: Tracking,
+    /// Every signal that was observed by its name, also where it is the only one.
+    pub signals: BTreeMap<&'static str, BySignal>,
     pub navigation: Navigation,
     pub psd: Spectrum,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -64,7 +68,7 @@ pub struct Satellites {
     pub acquired: usize,
     /// Most satellites in one fix.
     pub used: usize,
-    /// Acquired though the truth never has them.
+    /// Signals of satellites acquired though the truth never has them.
     pub false_acquired: usize,
 }
 
@@ -151,6 +155,24 @@ pub struct Tracking {
     pub fll_hz: Option<Pooled>,
 }
 
+/// What [`Observables`] and [`Tracking`] say, of one signal.
+#[derive(Clone, Debug, Serialize)]
+pub struct BySignal {
+    /// That were observed.
+    pub satellites: usize,
+    pub observables: Observables,
+    pub tracking: SignalTracking,
+}
+
+/// Standard deviations of a signal's loops.
+#[derive(Clone, Debug, Serialize)]
+pub struct SignalTracking {
+    pub losses_of_lock: usize,
+    pub dll_sigma_chips: Option<f64>,
+    pub pll_sigma_deg: Option<f64>,
+    pub fll_sigma_hz: Option<f64>,
+}
+
 /// Decoded parameters against those sent.
 #[derive(Clone, Debug, Serialize)]
 pub struct Navigation {
@@ -184,24 +206,18 @@ pub struct Details {
     pub unmatched_observations: usize,
     /// Wrong parameters, as decoded.
     pub wrong_parameters: Vec<NavigationRow>,
-    pub false_satellites: Vec<Sv>,
+    pub false_satellites: Vec<String>,
     pub verdict: Verdict,
 }
 
 /// Bounds for loop jitter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Thresholds {
     /// A sixth of the early-late spacing: 3σ stays inside the discriminator's linear zone.
     pub dll_chips: f64,
     pub pll_deg: f64,
     /// A twelfth of the inverse integration time.
     pub fll_hz: f64,
-}
-
-impl Default for Thresholds {
-    fn default() -> Self {
-        Self::new(0.5, 1e-3)
-    }
 }
 
 impl Thresholds {
@@ -220,7 +236,7 @@ impl Summary {
         let satellites = satellites(run, &mut details);
         let position = position(run, errors, &mut details);
         let clock = clock_section(clock, &mut details);
-        let observables = observables(errors, &mut details)?;
+        let observables = observables(errors, None, &mut details)?;
         let tracking = tracking(run, errors, &mut details)?;
         let navigation = navigation(run, &mut details);
         let psd = spectrum::judge(run);
@@ -237,6 +253,7 @@ impl Summary {
             clock,
             observables,
             tracking,
+            signals: by_signal(run, errors)?,
             navigation,
             psd,
             interference: Lines::of(run),
@@ -264,14 +281,19 @@ impl Summary {
 }
 
 fn satellites(run: &Run, details: &mut Details) -> Satellites {
-    let ever: BTreeSet<Sv> = run.sky.keys().chain(run.truth.keys().map(|Link { sv, .. }| sv)).collect();
-    let acquired: BTreeSet<Sv> = run.acquisition.iter().filter(|row| row.acquired).map(|row| row.sv).collect();
-    details.false_satellites =
-        planted!("analysis.summary.false_satellites", &acquired, &ever).difference(&ever).copied().collect();
+    let mut ever: BTreeSet<Link> = run.truth.keys().collect();
+    let heard: BTreeSet<Sv> = ever.iter().map(|link| link.sv).collect();
+    // In the sky, and never in the truth's observations: with any of the scene's signals.
+    for sv in run.sky.keys().filter(|sv| !heard.contains(sv)) {
+        ever.extend(run.signals.iter().filter(|signal| signal.system == sv.system).map(|signal| signal.link(sv)));
+    }
+    let acquired: BTreeSet<Link> = run.acquisition.iter().filter(|row| row.acquired).map(|row| row.link()).collect();
+    let odd = planted!("analysis.summary.false_satellites", &acquired, &ever).difference(&ever);
+    details.false_satellites = odd.map(|link| run.name(*link)).collect();
     Satellites {
         // The truth's sky holds what is in view and nothing else; from space the mask does not bound it.
         in_view: run.in_view_at_start.len(),
-        acquired: acquired.len(),
+        acquired: acquired.iter().map(|link| link.sv).collect::<BTreeSet<_>>().len(),
         used: run.fixes.iter().map(|fix| fix.satellites as usize).max().unwrap_or(0),
         false_acquired: details.false_satellites.len(),
     }
@@ -335,22 +357,45 @@ fn clock_section(clock: &clock::Clock, details: &mut Details) -> Clock {
     }
 }
 
-fn observables(errors: &Errors, details: &mut Details) -> Result<Observables, JudgeError> {
-    let code = errors.code_without_clock_m()?;
-    let carrier = errors.pooled(|error| error.carrier_cycles)?;
-    let doppler = errors.pooled(|error| error.doppler_hz)?;
-    let cn0 = errors.pooled(|error| error.cn0_dbhz - error.cn0_effective_dbhz)?;
+fn by_signal(run: &Run, errors: &Errors) -> Result<BTreeMap<&'static str, BySignal>, JudgeError> {
+    let signals: BTreeSet<&'static Signal> = errors.signals.keys().map(|link| link.signal).collect();
+    let one = |signal: &'static Signal| {
+        let sigma = |of: LoopError| {
+            Ok::<_, JudgeError>(pooled_std(errors.settled_of(Some(signal), of)?.iter().map(Vec::as_slice)))
+        };
+        let lost = run.events.iter().filter(|row| row.event == Event::LossOfLock && row.signal == signal);
+        let figures = BySignal {
+            satellites: errors.signals.keys().filter(|link| link.signal == signal).count(),
+            observables: observables(errors, Some(signal), &mut Details::default())?,
+            tracking: SignalTracking {
+                losses_of_lock: lost.count(),
+                dll_sigma_chips: sigma(DLL_CHIPS)?,
+                pll_sigma_deg: sigma(PLL_DEG)?,
+                fll_sigma_hz: sigma(FLL_HZ)?,
+            },
+        };
+        Ok((signal.name, figures))
+    };
+    signals.into_iter().map(one).collect()
+}
+
+/// Of one signal, or of all.
+fn observables(errors: &Errors, signal: Option<&Signal>, details: &mut Details) -> Result<Observables, JudgeError> {
+    let code = errors.code_without_clock_m(signal)?;
+    let carrier = errors.pooled_of(signal, |error| error.carrier_cycles)?;
+    let doppler = errors.pooled_of(signal, |error| error.doppler_hz)?;
+    let cn0 = errors.pooled_of(signal, |error| error.cn0_dbhz - error.cn0_effective_dbhz)?;
     let mut means = Vec::new();
-    for link in errors.signals.keys() {
+    for link in errors.signals.keys().filter(|link| signal.is_none_or(|signal| link.signal == signal)) {
         means.extend(mean(&errors.signals.map(link, |row| row.code_m)?));
     }
     details.pseudorange_m = spread(&code);
     details.carrier_cycles = spread(&carrier);
     details.doppler_hz = spread(&doppler);
     details.cn0_db = spread(&cn0);
-    details.cn0_true_dbhz = mean(&errors.pooled(|error| error.cn0_true_dbhz)?);
-    details.cn0_effective_dbhz = mean(&errors.pooled(|error| error.cn0_effective_dbhz)?);
-    details.cn0_measured_dbhz = mean(&errors.pooled(|error| error.cn0_dbhz)?);
+    details.cn0_true_dbhz = mean(&errors.pooled_of(signal, |error| error.cn0_true_dbhz)?);
+    details.cn0_effective_dbhz = mean(&errors.pooled_of(signal, |error| error.cn0_effective_dbhz)?);
+    details.cn0_measured_dbhz = mean(&errors.pooled_of(signal, |error| error.cn0_dbhz)?);
     Ok(Observables {
         pseudorange_rms_m: rms(&code),
         pseudorange_bias_m: mean(&means),
@@ -362,17 +407,18 @@ fn observables(errors: &Errors, details: &mut Details) -> Result<Observables, Ju
 
 /// The error of one loop in an observation, in its unit.
 pub(crate) type LoopError = fn(&Link, &SignalError) -> f64;
-pub(crate) const DLL_CHIPS: LoopError = |link, row| {
-    let code = link.signal.components.first();
-    row.code_m * code.map_or(f64::NAN, |code| code.chip_rate_hz) / SPEED_OF_LIGHT_MPS
-};
+pub(crate) const DLL_CHIPS: LoopError =
+    |link, row| row.code_m * leading(link.signal).map_or(f64::NAN, |code| code.chip_rate_hz) / SPEED_OF_LIGHT_MPS;
 pub(crate) const PLL_DEG: LoopError = |_, row| row.carrier_cycles * 360.0;
 pub(crate) const FLL_HZ: LoopError = |_, row| row.doppler_hz;
 
 fn tracking(run: &Run, errors: &Errors, details: &mut Details) -> Result<Tracking, JudgeError> {
     let sigma = |of: LoopError| Ok::<_, JudgeError>(pooled_std(errors.settled(of)?.iter().map(Vec::as_slice)));
 
-    let integration_s = run.update_s.or(run.tracking_setting("integration_s")).unwrap_or(1e-3);
+    // Of a receiver that does not say, the longest code period.
+    let periods = run.signals.iter().filter_map(|signal| leading(signal)).map(Component::period_s);
+    let longest_s = periods.fold(0.0, f64::max);
+    let integration_s = run.update_s.or(run.tracking_setting("integration_s")).unwrap_or(longest_s);
     details.thresholds = Thresholds::new(run.tracking_setting("spacing_chips").unwrap_or(0.5), integration_s);
     Ok(Tracking {
         losses_of_lock: run.events.iter().filter(|row| row.event == Event::LossOfLock).count(),

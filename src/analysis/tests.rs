@@ -9,7 +9,9 @@ use serde::Serialize;
 mod clock;
 
 use super::*;
-use crate::analysis::waveform::Edge;
+use crate::analysis::errors::Errors;
+use crate::analysis::load::{Emission, Run};
+use crate::analysis::waveform::{Edge, Waveform};
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::record::{
@@ -17,6 +19,7 @@ use crate::gnss::record::{
     SkyRow, TrackingRow, TrajectoryRow,
 };
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::synthetic::LONG_BOC;
 use crate::gnss::time::Epoch;
 
 const RATE_HZ: u64 = 2_600_000;
@@ -455,10 +458,11 @@ fn every_key_of_the_summary_is_in_the_schema_with_unit_and_meaning_and_no_other(
     paths("", &serde_json::to_value(&summary).unwrap(), &mut written);
     let documented: Vec<&str> = schema::leaves().iter().map(|leaf| leaf.path.as_str()).collect();
     // A list that this run does not have is one null.
-    let covered = |path: &str| documented.contains(&path) || schema::is_branch(path);
+    let covered = |path: &str| schema::leaf(path).is_some() || schema::is_branch(path);
     let undocumented: Vec<_> = written.iter().filter(|path| !covered(path)).collect();
     assert!(undocumented.is_empty(), "not in assets/summary.schema.json: {undocumented:?}");
-    let there = |path: &str| written.iter().any(|own| own == path || path.starts_with(&format!("{own}.")));
+    let there =
+        |path: &str| written.iter().any(|own| schema::covers(path, own) || path.starts_with(&format!("{own}.")));
     let absent: Vec<_> = documented.iter().filter(|path| !there(path)).collect();
     assert!(absent.is_empty(), "in assets/summary.schema.json, but not written: {absent:?}");
     for leaf in schema::leaves() {
@@ -616,4 +620,50 @@ fn the_spectrum_of_random_chips_is_the_theory_s_and_has_its_nulls() {
     run.scene.noise = true;
     let hidden = spectrum::judge(&run);
     assert!(hidden.null_low_hz.is_none() && hidden.null_reason.unwrap().starts_with("hidden"), "{hidden:?}");
+}
+
+#[test]
+fn what_signals_differ_by_is_no_error_and_each_disturbs_the_other() {
+    let directory = planted();
+    let mut run = Run::read(directory.path()).unwrap();
+    let alone = Errors::measure(&run).unwrap();
+    // The same satellites again with a second signal, whose codes are all 30 m later.
+    for link in run.truth.keys().collect::<Vec<_>>() {
+        let other = LONG_BOC.link(link.sv);
+        for row in run.truth.rows(link).unwrap() {
+            let row = Observation { signal: &LONG_BOC, ..row };
+            *run.cn0_sums_hz.entry((row.sample, Emission::of(other))).or_insert(0.0) += linear_hz(row.cn0_dbhz);
+            run.truth.push(other, &row).unwrap();
+        }
+        for row in run.observations.rows(link).unwrap() {
+            let sent_fraction_s = row.sent_fraction_s - 30.0 / SPEED_OF_LIGHT_MPS;
+            run.observations.push(other, &Observation { signal: &LONG_BOC, sent_fraction_s, ..row }).unwrap();
+        }
+    }
+    run.signals.insert(&LONG_BOC);
+    let both = Errors::measure(&run).unwrap();
+    let rms_m = |errors: &Errors| statistics::rms(&errors.code_without_clock_m(None).unwrap()).unwrap();
+    // A fraction of a second resolves 1e-16 s.
+    assert!((rms_m(&both) - rms_m(&alone)).abs() < 1e-6, "{} {}", rms_m(&both), rms_m(&alone));
+    let summary = Summary::new(&run, &both, &crate::analysis::clock::Clock::measure(&run, &both).unwrap()).unwrap();
+    let names: Vec<&str> = summary.signals.keys().copied().collect();
+    assert_eq!(names, [L1_CA.name, LONG_BOC.name]);
+    let bias_m = |name: &str| summary.signals[name].observables.pseudorange_bias_m.unwrap();
+    assert!((bias_m(LONG_BOC.name) - bias_m(L1_CA.name) - 30.0).abs() < 1e-6);
+    // Spectral separation of both, each from itself and from the other.
+    let [code, boc] = [&L1_CA, &LONG_BOC].map(|signal| Waveform::of(signal).unwrap());
+    let kappa = |a: &Waveform, b: &Waveform| a.separation_s(b, 0.0, Edge::Area, run.scene.sample_rate_hz);
+    for (own, other, signal) in [(&code, &boc, &L1_CA), (&boc, &code, &LONG_BOC)] {
+        let link = run.truth.keys().find(|link| link.signal == signal).unwrap();
+        let row = both.signals.rows(link).unwrap()[0];
+        let sum_hz = run.cn0_sums_hz[&(row.sample, Emission::of(link))];
+        let own_hz = linear_hz(row.cn0_true_dbhz);
+        let lost = 1.0 + kappa(own, own) * (sum_hz - own_hz) + kappa(own, other) * sum_hz;
+        let found = linear_hz(row.cn0_true_dbhz - row.cn0_effective_dbhz);
+        assert!((found / lost - 1.0).abs() < 1e-9, "{signal}: {found} {lost}");
+    }
+}
+
+fn linear_hz(dbhz: f64) -> f64 {
+    libm::pow(10.0, dbhz / 10.0)
 }

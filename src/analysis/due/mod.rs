@@ -21,7 +21,8 @@ use crate::analysis::errors::Link;
 use crate::analysis::load::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::earth::Geodetic;
-use crate::gnss::facts::Fixes;
+use crate::gnss::facts::{Expect, Fixes};
+use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
 use receiver::Receiver;
 use satellite::{Excuse, Required, Row, Scene};
@@ -135,20 +136,22 @@ impl Expectations {
         let (Some(first), Some(interval_s)) = (run.trajectory.first(), median(&steps)) else { return Ok(found) };
         let start = first.time().plus_s(-run.time_s(first.sample));
         let in_space = Geodetic::from_ecef(&first.position_m()).height_m >= SPACE_M;
-        let receiver = found.receiver.clone();
-        let scene = Scene {
-            receiver: &receiver,
-            timetable: Timetable::new(start),
-            expect: &run.scene.expect,
-            faults: &run.scene.faults,
-            interval_s,
-        };
         let access = Access::new(run);
+        let mut counted = Counted::default();
         for link in run.truth.keys() {
-            let one = found.satellite(run, &scene, &access, link, in_space, observed)?;
+            let receiver = found.receiver.of_signal(link.signal);
+            let scene = Scene {
+                receiver: &receiver,
+                timetable: Timetable::new(start),
+                expect: &run.scene.expect,
+                faults: &run.scene.faults,
+                interval_s,
+            };
+            counted.begin(link.sv);
+            let one = found.satellite(run, &scene, (&access, &mut counted), link, in_space, observed)?;
             found.satellites.insert(link, one);
         }
-        found.fixes_due(&scene, start);
+        found.fixes_due(&run.scene.expect, start);
         Ok(found)
     }
 
@@ -156,7 +159,7 @@ impl Expectations {
         &mut self,
         run: &Run,
         scene: &Scene<'_>,
-        access: &Access<'_>,
+        (access, counted): (&Access<'_>, &mut Counted),
         link: Link,
         in_space: bool,
         observed: &impl Observed,
@@ -192,8 +195,9 @@ impl Expectations {
             let Ok(at) = self.epochs.binary_search_by_key(sample, |due| due.sample) else { continue };
             one.take(row, required, measured.contains_at(at, self), seen.contains(sample));
             let Some(due) = self.epochs.get_mut(at) else { continue };
-            due.held += u32::from(required.held);
-            if let (true, Some((azimuth_deg, elevation_deg))) = (required.used, sky.get(sample)) {
+            due.held += u32::from(required.held && counted.held.insert(*sample));
+            let used = required.used && counted.used.insert(*sample);
+            if let (true, Some((azimuth_deg, elevation_deg))) = (used, sky.get(sample)) {
                 due.add(azimuth_deg.to_radians(), elevation_deg.to_radians());
             }
         }
@@ -205,7 +209,7 @@ impl Expectations {
         Measured { interval_s: self.receiver.interval_s }
     }
 
-    fn fixes_due(&mut self, scene: &Scene<'_>, start: Epoch) {
+    fn fixes_due(&mut self, expect: &Expect, start: Epoch) {
         let ready = |due: &&Due| due.pdop() <= LARGEST_PDOP;
         self.four_by_s = self.epochs.iter().find(ready).map(|due| due.time_s);
         let receiver = &self.receiver;
@@ -215,12 +219,12 @@ impl Expectations {
         let waited_s = four_s + receiver.ionosphere_wait_s;
         let due_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
         // Where the scene excuses a time, the clock begins anew after it.
-        let excused = |due: &&Due| due.time_s >= due_s && self.fix_due(scene.expect, due, None);
+        let excused = |due: &&Due| due.time_s >= due_s && self.fix_due(expect, due, None);
         self.first_fix_s = self.epochs.iter().find(excused).map(|due| due.time_s);
     }
 
     /// Whether there must be a fix at an epoch of a receiver whose first one came at `first_s`.
-    pub fn fix_due(&self, expect: &crate::gnss::facts::Expect, due: &Due, first_s: Option<f64>) -> bool {
+    pub fn fix_due(&self, expect: &Expect, due: &Due, first_s: Option<f64>) -> bool {
         match expect.fix(due.time_s) {
             Some(Fixes::None | Fixes::Any) => return false,
             Some(Fixes::Required) | None => {}
@@ -233,6 +237,23 @@ impl Expectations {
     /// Whether the receiver measures at an epoch of the truth.
     pub fn measures(&self, due: &Due) -> bool {
         self.measured().at(due.time_s)
+    }
+}
+
+/// Samples at which a satellite counts already by another of its signals: a second one adds no direction.
+#[derive(Default)]
+struct Counted {
+    sv: Option<Sv>,
+    held: HashSet<u64>,
+    used: HashSet<u64>,
+}
+
+impl Counted {
+    fn begin(&mut self, sv: Sv) {
+        if self.sv.replace(sv) != Some(sv) {
+            self.held.clear();
+            self.used.clear();
+        }
     }
 }
 

@@ -8,7 +8,8 @@ use serde_json::Value;
 
 use crate::analysis::load::Run;
 use crate::analysis::theory::{detection, pll};
-use crate::gnss::signal::Signal;
+use crate::analysis::waveform::leading;
+use crate::gnss::signal::{SIGNALS, Signal};
 
 /// Jitter up to which a phase loop is expected to hold for good: 3σ leaves a third of the discriminator's 45°
 /// to oscillator and motion.
@@ -24,6 +25,8 @@ const SUREST: f64 = 1.0 - 1e-7;
 /// The expectations that settings justify.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Receiver {
+    /// As `rx/receiver.json` has them.
+    settings: Value,
     /// Of the first search and of later ones: threshold of a cell's statistic.
     thresholds: [f64; 2],
     pairs: u32,
@@ -45,19 +48,25 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// Of the receiver whose settings a run kept.
+    /// Of the receiver whose settings a run kept; what depends on the signal is of the truth's first one.
     pub fn of(run: &Run) -> Self {
-        let signal = run.truth.keys().next().map(|link| link.signal);
+        let signal = run.signals.first().copied();
         let settings = run.receiver.get("settings").unwrap_or(&run.receiver);
         Self { cost_db: front_end_cost_db(run), ..Self::new(settings, signal) }
+    }
+
+    /// The same for another signal.
+    pub fn of_signal(&self, signal: &'static Signal) -> Self {
+        Self { cost_db: self.cost_db, ..Self::new(&self.settings, Some(signal)) }
     }
 
     fn new(settings: &Value, signal: Option<&'static Signal>) -> Self {
         let value = |table: &str, key: &str| settings.get(table).and_then(|table| table.get(key));
         let number =
             |table: &str, key: &str, default: f64| value(table, key).and_then(Value::as_f64).unwrap_or(default);
-        let component = signal.and_then(|signal| signal.components.first());
-        let (period_s, chips) = component.map_or((1e-3, 1023.0), |c| (c.period_s(), c.period_s() * c.chip_rate_hz));
+        // Without a signal there is nothing to expect: any will do.
+        let component = signal.and_then(leading).or_else(|| leading(SIGNALS[0]));
+        let (period_s, chips) = component.map_or((1.0, 1.0), |c| (c.period_s(), f64::from(c.code_chips)));
         let coherent_s = period_s * number("acquisition", "coherent_periods", 2.0);
         let pairs = number("acquisition", "noncoherent_sums", 10.0).max(1.0) as u32;
         let step_cycles = number("acquisition", "doppler_step_cycles", 0.5);
@@ -75,6 +84,7 @@ impl Receiver {
         let broadcast = value("position", "ionosphere").and_then(Value::as_str).unwrap_or("none") != "none";
         let required = value("position", "require_ionosphere").and_then(Value::as_bool).unwrap_or(false);
         Self {
+            settings: settings.clone(),
             thresholds: [false_alarm, false_alarm * later].map(threshold),
             pairs,
             coherent_s,

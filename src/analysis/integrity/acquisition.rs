@@ -39,10 +39,10 @@ pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
         run.events.iter().filter(|row| row.event == Event::Acquired).map(|row| row.link()).collect();
     let (mut tracked, mut odd) = (Found::default(), Found::default());
     for link in run.tracking.keys().chain(run.observations.keys()).filter(|link| !found.contains(link)) {
-        tracked.add(|| link.sv.to_string());
+        tracked.add(|| run.name(link));
     }
     for link in found.symmetric_difference(&begun) {
-        odd.add(|| link.sv.to_string());
+        odd.add(|| run.name(*link));
     }
     all.push(Finding::none("satellites tracked that were never found", tracked, "tracking follows a search"));
     all.push(Finding::none(

@@ -63,7 +63,7 @@ fn observations(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError
     let values = |row: &Observation| {
         [row.sent_fraction_s, row.pseudorange_m, row.carrier_cycles, row.doppler_hz, row.cn0_dbhz].map(f64::to_bits)
     };
-    let key = link.sv.to_string();
+    let key = run.name(link);
     let steps: Vec<f64> = all.windows(2).map(|two| two[1].sample as f64 - two[0].sample as f64).collect();
     let usual = median(&steps).unwrap_or(0.0);
     for (two, step) in all.windows(2).zip(steps) {
@@ -85,7 +85,7 @@ fn observations(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError
 fn tracking(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
     let mut before: Option<TrackingRow> = None;
     let mut steps = Vec::new();
-    let key = link.sv.to_string();
+    let key = run.name(link);
     let lost: Vec<u64> = run
         .events
         .iter()

@@ -1,6 +1,7 @@
 //! What the atmosphere truly adds to each satellite's code.
 
 use crate::analysis::JudgeError;
+use crate::analysis::load::Emission;
 use crate::analysis::plot::canvas::{Axis, COLOURS, Chart, Mark, Series, WIDTH_PX};
 use crate::analysis::plot::{Judged, Sketch};
 use crate::gnss::record::SkyRow;
@@ -23,8 +24,12 @@ pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let x = judged.time_axis(std::iter::once(first_s));
         Ok::<_, JudgeError>(Chart::new(title, x, Axis::around("slant delay (m)", ends.into_iter(), 1.0), series))
     };
+    // The sky's rows have a satellite's delay once, whatever it sends.
+    let mut carriers = Emission::all(run.truth.keys()).into_iter();
+    let first = carriers.next().map(|one| one.carrier_hz() / 1e6).filter(|_| carriers.next().is_none());
+    let on = first.map_or(String::new(), |mhz| format!(" at {mhz:.2} MHz"));
     let charts = [
-        chart("Ionosphere on L1, as it is", |row| row.ionosphere_m)?,
+        chart(&format!("Ionosphere{on}, as it is"), |row| row.ionosphere_m)?,
         chart("Troposphere, as it is", |row| row.troposphere_m)?,
     ];
     let names: Vec<Series> = run.sky.keys().enumerate().map(|(index, sv)| line(sv, index, Vec::new())).collect();

@@ -32,5 +32,5 @@ pub fn multipath(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
             Ok(sums.into_iter().map(|(sample, sum)| (run.time_s(sample), decibels(sum))).collect())
         })?,
     ];
-    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, charts, legend(&links))))
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, charts, legend(judged, &links))))
 }

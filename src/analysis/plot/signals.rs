@@ -34,6 +34,7 @@ impl Cloud {
     /// Asks twice for the points of each satellite, so that only one satellite's are held: for the axis, and
     /// to keep some.
     pub fn new(
+        judged: &Judged<'_>,
         links: &[Link],
         frame: &Frame<'_>,
         points: impl Fn(Link) -> Result<Points, JudgeError>,
@@ -70,7 +71,7 @@ impl Cloud {
             let mut shown = points(*link)?;
             shown.retain(|point| (y.from..=y.to).contains(&point.1));
             inside += shown.len();
-            let mut one = Series::numbered(link.sv.to_string(), index, shown);
+            let mut one = Series::numbered(judged.run.name(*link), index, shown);
             one.thin(links.len());
             series.push(one);
         }
@@ -85,15 +86,15 @@ pub(super) fn over_time(
     frame: &Frame<'_>,
     points: impl Fn(Link) -> Result<Points, JudgeError>,
 ) -> Result<Chart, JudgeError> {
-    let Cloud { y, series, first_x, total, outside } = Cloud::new(links, frame, points)?;
+    let Cloud { y, series, first_x, total, outside } = Cloud::new(judged, links, frame, points)?;
     let title = frame.title;
     let title = if outside > 0 { format!("{title} ({outside} of {total} points outside)") } else { title.to_owned() };
     Ok(Chart::new(title, judged.time_axis(std::iter::once(first_x)), y, series))
 }
 
 /// Satellites by their marks.
-pub(super) fn legend(links: &[Link]) -> Vec<Series> {
-    let one = |(index, link): (usize, &Link)| Series::numbered(link.sv.to_string(), index, Vec::new());
+pub(super) fn legend(judged: &Judged<'_>, links: &[Link]) -> Vec<Series> {
+    let one = |(index, link): (usize, &Link)| Series::numbered(judged.run.name(*link), index, Vec::new());
     links.iter().enumerate().map(one).collect()
 }
 
@@ -111,7 +112,7 @@ pub fn discriminators(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError>
         chart("PLL discriminator", "output (degrees)", 2.0, |row| row.pll_discriminator_cycles * 360.0)?,
         chart("FLL discriminator", "output (Hz)", 2.0, |row| row.fll_discriminator_hz)?,
     ];
-    Ok(Some(Sketch::charts((WIDTH_PX, 540), 1, charts, legend(&links))))
+    Ok(Some(Sketch::charts((WIDTH_PX, 540), 1, charts, legend(judged, &links))))
 }
 
 /// Satellites that were observed.
@@ -148,7 +149,7 @@ pub fn cn0(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let finite = rows.iter().flat_map(|row| [row.1, row.2]).filter(|value| value.is_finite());
         let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         all.extend([low, high]);
-        let mut line = Series::numbered(link.sv.to_string(), index, rows.iter().map(|row| (row.0, row.2)).collect());
+        let mut line = Series::numbered(judged.run.name(*link), index, rows.iter().map(|row| (row.0, row.2)).collect());
         line.mark = Mark::Line;
         line.thin(links.len());
         above.series.push(line);
@@ -156,7 +157,7 @@ pub fn cn0(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     above.y = Axis::around("C/N0 (dB-Hz)", all.into_iter(), 4.0);
     let title = format!("C/N0 measured minus {word}");
     let below = chart(&title, "difference (dB)", 1.0, &|row| row.cn0_dbhz - reference(row))?;
-    Ok(Some(Sketch::charts((WIDTH_PX, 430), 1, [above, below], legend(&links))))
+    Ok(Some(Sketch::charts((WIDTH_PX, 430), 1, [above, below], legend(judged, &links))))
 }
 
 /// Errors of code, carrier and Doppler.
@@ -170,5 +171,5 @@ pub fn observables(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         chart("Carrier error, a constant removed from each arc", "error (cycles)", 0.01, |row| row.carrier_cycles)?,
         chart("Doppler error", "error (Hz)", 0.1, |row| row.doppler_hz)?,
     ];
-    Ok(Some(Sketch::charts((WIDTH_PX, 540), 1, charts, legend(&links))))
+    Ok(Some(Sketch::charts((WIDTH_PX, 540), 1, charts, legend(judged, &links))))
 }

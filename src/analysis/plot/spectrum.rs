@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use crate::analysis::JudgeError;
+use crate::analysis::load::Run;
 use crate::analysis::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
 use crate::analysis::plot::{Judged, Sketch};
 use crate::analysis::spectrum;
 use crate::gnss::record::AcquisitionRow;
-use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Link;
 
 /// Measured density and the theory's; nothing without `psd.csv`.
 pub fn psd(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
@@ -33,11 +34,11 @@ pub fn psd(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     Ok(Some(Sketch::charts((WIDTH_PX, 340), 1, [chart], legend)))
 }
 
-/// The largest statistic of each satellite that was searched, with the threshold.
+/// The largest statistic of each satellite's signal that was searched, with the threshold.
 pub fn acquisition(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
-    let mut best: BTreeMap<Sv, &AcquisitionRow> = BTreeMap::new();
+    let mut best: BTreeMap<Link, &AcquisitionRow> = BTreeMap::new();
     for row in &judged.run.acquisition {
-        let kept = best.entry(row.sv).or_insert(row);
+        let kept = best.entry(row.link()).or_insert(row);
         // What was acquired counts before what was only stronger against another threshold.
         if (row.acquired, row.statistic) > (kept.acquired, kept.statistic) {
             *kept = row;
@@ -61,10 +62,11 @@ pub fn acquisition(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let x = Axis::new("satellite", (-0.8, best.len().max(1) as f64 - 0.2));
     let y = Axis::new("largest statistic of the search", (0.0, 1.08 * top));
     let mut chart = Chart::new("Acquisition", x, y, series);
-    chart.x_ticks = Some((0..).zip(best.keys()).map(|(place, sv)| (f64::from(place), tick(*sv))).collect());
+    chart.x_ticks =
+        Some((0..).zip(best.keys()).map(|(place, link)| (f64::from(place), tick(judged.run, *link))).collect());
     let truly: Vec<(f64, f64)> = (0..)
         .zip(best.values())
-        .filter(|(_, best)| judged.run.truth.keys().any(|link| link.sv == best.sv))
+        .filter(|(_, best)| judged.run.truth.contains(&best.link()))
         .map(|(place, best)| (f64::from(place), best.statistic + 0.03 * top))
         .collect();
     let in_truth = Series::new("in the truth", GREEN, Mark::Cross, truly);
@@ -73,7 +75,9 @@ pub fn acquisition(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     Ok(Some(Sketch::charts((WIDTH_PX, 330), 1, [chart], legend)))
 }
 
-/// GPS satellites by number alone, to fit side by side.
-fn tick(sv: Sv) -> String {
-    if sv.system == crate::gnss::satellite::System::Gps { sv.number.to_string() } else { sv.to_string() }
+/// Satellites of the only system by number alone, to fit side by side.
+fn tick(run: &Run, link: Link) -> String {
+    let name = run.name(link);
+    let alone = run.signals.iter().all(|signal| signal.system == link.sv.system) && name == link.sv.to_string();
+    if alone { link.sv.number.to_string() } else { name }
 }

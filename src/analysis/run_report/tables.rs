@@ -106,7 +106,7 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
         let elevation = judged.run.sky.map(link.sv, |row| row.elevation_deg)?;
         let cn0 = [of(|row| row.cn0_true_dbhz), of(|row| row.cn0_effective_dbhz), of(|row| row.cn0_dbhz)];
         table.row([
-            link.sv.to_string(),
+            judged.run.name(link),
             fixed(mean(&elevation), 1),
             cn0.map(|values| fixed(mean(&values), 1)).join(" / "),
             format!("{} / {}", fixed(mean(&of(|row| row.code_m)), 2), fixed(std(&of(|row| row.code_m)), 2)),

@@ -32,6 +32,7 @@ impl Verdict {
         let mut judged: Vec<(&Slip, Option<Excuse>)> = Vec::new();
         for (sv, signal) in links {
             let (Ok(number), Some(known)) = (sv.parse::<Sv>(), Signal::find(signal)) else { continue };
+            let receiver = &receiver.of_signal(known);
             let witness = Witness::new(run, receiver, Link { sv: number, signal: known })?;
             let own = slips.rows.iter().filter(|row| row.sv == sv && row.signal == signal);
             judged.extend(own.map(|row| (row, witness.excuse(run, receiver, number, row))));

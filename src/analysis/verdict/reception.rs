@@ -47,9 +47,8 @@ impl Verdict {
         let seen = Seen::of(run);
         let must = |of: fn(&Satellite) -> bool| expected.satellites.iter().filter(move |(_, one)| of(one));
         let found = must(|one| one.acquired_by_s.is_some()).count();
-        let missing: Vec<(&Link, &Satellite)> = must(|one| one.acquired_by_s.is_some())
-            .filter(|(link, _)| !seen.acquired_s.contains_key(&link.sv))
-            .collect();
+        let missing: Vec<(&Link, &Satellite)> =
+            must(|one| one.acquired_by_s.is_some()).filter(|(link, _)| !seen.acquired_s.contains_key(*link)).collect();
         if found > 0 {
             let source = format!("{found} in view are strong enough to be found with certainty in their time");
             let lines = missing.iter().map(|(link, one)| never_found(link, one, expected)).collect();
@@ -103,7 +102,7 @@ impl Verdict {
         let mut lines: Vec<String> =
             left_out.iter().map(|(name, count)| format!("{name}: excluded from {count} fixes")).collect();
         for (link, one) in expected.satellites.iter().filter(|(_, one)| one.used_due > 0) {
-            if !seen.events.contains(&(link.sv, EPHEMERIS)) {
+            if !seen.ephemerides.contains(&link.sv) {
                 lines.push(format!(
                     "{}: no ephemeris in {:.1} s that were due",
                     link.sv,
@@ -118,33 +117,35 @@ impl Verdict {
     }
 }
 
-/// The one event that use depends on.
-const EPHEMERIS: u8 = 0;
+/// Events that observation depends on.
 const FRAME: u8 = 1;
 const SYMBOLS: u8 = 2;
 
 /// What the receiver's tables say of its satellites.
+#[derive(Default)]
 struct Seen {
-    acquired_s: BTreeMap<Sv, f64>,
-    events: BTreeSet<(Sv, u8)>,
-    lost_s: BTreeMap<Sv, Vec<f64>>,
+    acquired_s: BTreeMap<Link, f64>,
+    /// Ephemerides are a satellite's, whichever of its signals brings them; the rest is of a signal.
+    ephemerides: BTreeSet<Sv>,
+    events: BTreeSet<(Link, u8)>,
+    lost_s: BTreeMap<Link, Vec<f64>>,
 }
 
 impl Seen {
     fn of(run: &Run) -> Self {
-        let mut seen = Self { acquired_s: BTreeMap::new(), events: BTreeSet::new(), lost_s: BTreeMap::new() };
+        let mut seen = Self::default();
         for row in run.acquisition.iter().filter(|row| row.acquired) {
             let at_s = run.time_s(row.sample);
-            let first_s = seen.acquired_s.entry(row.sv).or_insert(at_s);
+            let first_s = seen.acquired_s.entry(row.link()).or_insert(at_s);
             *first_s = first_s.min(at_s);
         }
         for row in &run.events {
             match row.event {
-                Event::EphemerisComplete => seen.events.insert((row.sv, EPHEMERIS)),
-                Event::FrameSynchronised => seen.events.insert((row.sv, FRAME)),
-                Event::BitSynchronised => seen.events.insert((row.sv, SYMBOLS)),
+                Event::EphemerisComplete => seen.ephemerides.insert(row.sv),
+                Event::FrameSynchronised => seen.events.insert((row.link(), FRAME)),
+                Event::BitSynchronised => seen.events.insert((row.link(), SYMBOLS)),
                 Event::LossOfLock => {
-                    seen.lost_s.entry(row.sv).or_default().push(run.time_s(row.sample));
+                    seen.lost_s.entry(row.link()).or_default().push(run.time_s(row.sample));
                     true
                 }
                 _ => true,
@@ -154,16 +155,15 @@ impl Seen {
     }
 
     fn why_unobserved(&self, link: &Link, one: &Satellite) -> String {
-        let sv = link.sv;
-        let Some(acquired_s) = self.acquired_s.get(&sv) else { return "never acquired".to_owned() };
+        let Some(acquired_s) = self.acquired_s.get(link) else { return "never acquired".to_owned() };
         let mut text = format!("acquired at {acquired_s:.1} s");
-        if let Some(lost_s) = self.lost_s.get(&sv) {
+        if let Some(lost_s) = self.lost_s.get(link) {
             let times: Vec<String> = lost_s.iter().take(3).map(|at_s| format!("{at_s:.1}")).collect();
             let more = if lost_s.len() > 3 { ", …" } else { "" };
             text += &format!(", lost at {}{more} s", times.join(", "));
-        } else if one.observed == 0 && !self.events.contains(&(sv, SYMBOLS)) {
+        } else if one.observed == 0 && !self.events.contains(&(*link, SYMBOLS)) {
             text += ", no symbols";
-        } else if one.observed == 0 && !self.events.contains(&(sv, FRAME)) {
+        } else if one.observed == 0 && !self.events.contains(&(*link, FRAME)) {
             text += ", no frame of the message";
         }
         if let Some((from_s, to_s)) = one.missing_s {
