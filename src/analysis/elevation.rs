@@ -2,9 +2,9 @@
 //!
 //! Code minus carrier is free of orbits, clocks and the troposphere; it holds code noise, multipath, a
 //! constant and twice the ionosphere, which the truth gives and which is taken out here: M = P − λφ − 2I,
-//! each arc about its mean, each signal with its own carrier. It is what a user of one frequency can see of multipath, and beside it stands
-//! what only the truth can tell, the code's error. Bands of elevation are ten degrees wide; errors in them
-//! are without the epoch's common part of their signal.
+//! each arc about its mean, each signal with its own carrier. It is what a user of one frequency can see of
+//! multipath, and beside it stands what only the truth can tell, the code's error. Bands of elevation are ten
+//! degrees wide; errors in them are without the epoch's common part of their signal.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;

@@ -15,6 +15,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use crate::analysis::access::Access;
 use crate::analysis::errors::{Errors, Link, PULL_IN_S, SignalError};
 use crate::analysis::foreign::truth::Timeline;
 use crate::analysis::independent::Correlated;
@@ -82,7 +83,7 @@ pub struct Jitter {
     pub rows: Vec<Row>,
 }
 
-/// What all satellites' rows of one loop come to.
+/// What all satellites' rows of one loop come to; of several thresholds the least.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Pooled {
     pub raw_sigma: Option<f64>,
@@ -102,6 +103,7 @@ impl Jitter {
     /// [`JudgeError::Read`] where rows that were put by cannot be read.
     pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
         let Some(settings) = Settings::of(run) else { return Ok(Self::default()) };
+        let access = Access::new(run);
         let mut rows = Vec::new();
         for link in &errors.signals.keys().collect::<Vec<_>>() {
             let all = errors.signals.rows(*link)?;
@@ -116,7 +118,7 @@ impl Jitter {
             // Times of samples by the sampler's clock are near enough to GPS time here.
             let span = (all.first(), all.last());
             let (Some(first), Some(last)) = span else { continue };
-            let Some(timeline) = Timeline::of(run, *link)? else { continue };
+            let Some(timeline) = Timeline::of(run, &access, *link)? else { continue };
             let stresses = Stresses::new(&theory, &timeline, link, (first.time_s, last.time_s));
             for which in [Loop::Dll, Loop::Pll, Loop::Fll] {
                 rows.extend(row(link, which, &stretches, &updates, &theory, &stresses));
@@ -141,7 +143,7 @@ impl Jitter {
             raw_theory_sigma: square(|row| row.raw_theory_sigma),
             sigma: square(|row| Some(row.sigma))?,
             theory_sigma: square(|row| Some(row.theory_sigma))?,
-            threshold: rows.first()?.threshold,
+            threshold: rows.iter().map(|row| row.threshold).fold(f64::INFINITY, f64::min),
             margin_min: rows.iter().map(|row| row.margin).fold(f64::INFINITY, f64::min),
             rules_broken: rows.iter().filter(|row| !row.holds).count(),
         })

@@ -322,6 +322,8 @@ impl Counts {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC};
 
     #[test]
     fn counts_have_the_median_of_the_list() {
@@ -330,5 +332,33 @@ mod tests {
             list.iter().for_each(|value| counts.add(*value));
             assert_eq!(counts.median(), median(list), "{list:?}");
         }
+    }
+
+    #[test]
+    fn real_samples_hold_signals_of_one_zone_at_the_frequency_that_they_fold_to() {
+        let scene = |center_hz: f64| -> SceneFacts {
+            let json = serde_json::json!({
+                "name": "x", "seed": 1, "duration_s": 1.0, "sample_rate_hz": 6e6, "center_hz": center_hz, "format": "ri8"
+            });
+            serde_json::from_value(json).unwrap()
+        };
+        let of = |signals: &[&'static Signal], center_hz: f64| {
+            let mut scene = scene(center_hz);
+            let links = signals.iter().map(|signal| signal.link(Sv { system: signal.system, number: 3 }));
+            Run::fold(&mut scene, &Emission::all(links)).map(|()| (scene.center_hz.unwrap(), scene.inverted))
+        };
+        // 20 MHz is 2 MHz beyond three times the rate, 16 MHz 2 MHz below it: mirrored.
+        assert_eq!(of(&[&L1_CA], 1_575.42e6 - 2e6).unwrap(), (1_575.42e6 - 2e6, false));
+        assert_eq!(of(&[&L1_CA, &LONG_BOC], 1_575.42e6 - 20e6).unwrap(), (1_575.42e6 - 2e6, false));
+        assert_eq!(of(&[&L1_CA], 1_575.42e6 - 16e6).unwrap(), (1_575.42e6 + 2e6, true));
+        let refused = of(&[&L1_CA, &CHANNELS], 1_575.42e6 - 2e6).unwrap_err().to_string();
+        assert!(refused.contains("center_hz") && refused.contains("same multiple"), "{refused}");
+        assert!(of(&[], 1e9).is_ok());
+    }
+
+    #[test]
+    fn an_unknown_kind_of_edge_is_refused_by_name() {
+        let refused = serde_json::from_str::<crate::analysis::waveform::Edge>("\"aera\"").unwrap_err().to_string();
+        assert!(refused.contains("aera") && refused.contains("band_limited"), "{refused}");
     }
 }

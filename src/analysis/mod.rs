@@ -11,8 +11,8 @@
 //! did, [`summary`] is what scripts gate on with its [`schema`], [`verdict`] holds it against theory and a
 //! user's [`limits`], [`making`] keeps unfinished files from sight, [`plot`] draws, [`report`] prints on a
 //! terminal and `pdf` on paper, [`psd`] estimates the spectrum of the samples, [`spectrum`] says what it
-//! should be, [`foreign`] judges receivers that this project did not write, [`trade`] weighs speed against
-//! accuracy, [`theory`] says what errors to expect.
+//! should be from each signal's [`waveform`], [`foreign`] judges receivers that this project did not write,
+//! [`trade`] weighs speed against accuracy, [`theory`] says what errors to expect.
 
 pub mod access;
 pub mod allan;
@@ -93,7 +93,8 @@ pub enum JudgeError {
 ///
 /// Reads `truth/{observations,sky,trajectory,navigation}.csv`, `truth/scene.json`,
 /// `rx/{observations,fixes,acquisition,tracking,navigation,events}.csv`, and where they exist
-/// `rx/receiver.json`, `psd.csv`, `speed.json`, `scenario.toml`, `truth/interference.csv` and `truth/claimed.csv`.
+/// `rx/receiver.json`, `psd.csv`, `speed.json`, `scenario.toml`, `truth/interference.csv` and
+/// `truth/claimed.csv`.
 ///
 /// # Errors
 /// [`JudgeError`] with the file that is missing, is not as expected or cannot be written.
@@ -110,7 +111,8 @@ pub fn judge_against(run: &Path, limits: Option<&limits::Limits>) -> Result<Summ
     rayon::scope(|_| judged(run, limits))
 }
 
-/// The verdict alone: what [`judge_against`] finds of the tables as they lie there, with nothing written or drawn.
+/// The verdict alone: what [`judge_against`] finds of the tables as they lie there, with nothing written or
+/// drawn.
 ///
 /// # Errors
 /// As [`judge`], but for files that cannot be written.

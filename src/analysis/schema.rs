@@ -1,7 +1,8 @@
 //! The schema of `summary.json`: every key with its unit and meaning, and paths into it.
 //!
 //! `assets/summary.schema.json` is a JSON Schema (draft 2020-12) with one annotation more: `unit`, which is
-//! `1` for counts, ratios and names. A test holds it against what a run really writes.
+//! `1` for counts, ratios and names. A key that may be any word, such as a signal's name, is `*` in a path. A
+//! test holds it against what a run really writes.
 
 use serde_json::{Map, Value};
 use std::sync::OnceLock;

@@ -225,7 +225,7 @@ impl Known {
             return Ok(None);
         };
         let motion_deg = match evidence.loop_ {
-            Some((settings, update_s)) => motion_error_deg(run, link, settings, update_s)?,
+            Some((settings, update_s)) => motion_error_deg(run, &evidence.access, link, settings, update_s)?,
             None => Vec::new(),
         };
         let effective_dbhz = rows.iter().map(|row| evidence.access.effective_dbhz(row)).collect();

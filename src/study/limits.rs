@@ -11,7 +11,9 @@ use super::motion::Motion;
 use crate::analysis::theory::clock::PowerLaw;
 use crate::analysis::theory::oscillator;
 use crate::analysis::theory::pll;
+use crate::analysis::waveform::Waveform;
 use crate::gnss::gps::l1ca;
+use crate::gnss::signal::Signal;
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::closed::Mode;
 use crate::receiver::track::loops::Gains;
@@ -36,14 +38,19 @@ pub struct Level {
 
 /// A channel of GPS L1 C/A with these settings.
 pub fn channel(settings: &TrackingSettings, mode: Mode, cn0_dbhz: Option<f64>) -> Case {
+    channel_of(&l1ca::L1_CA, settings, mode, cn0_dbhz)
+}
+
+/// A channel of a signal of one component with these settings, without a front end.
+pub fn channel_of(signal: &'static Signal, settings: &TrackingSettings, mode: Mode, cn0_dbhz: Option<f64>) -> Case {
     Case {
-        signal: &l1ca::L1_CA,
+        signal,
         settings: settings.clone(),
         mode,
         cn0_dbhz,
         motion: Motion::default(),
         oscillator: None,
-        correlation: Correlation::Triangle,
+        correlation: Waveform::of(signal).map_or(Correlation::Triangle, |code| Correlation::of(code, None)),
         watched: false,
         settle_s: 10.0,
         duration_s: 600.0,

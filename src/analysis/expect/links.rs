@@ -12,6 +12,7 @@ use super::multipath;
 use super::quantile::{largest, mean_square};
 use super::ranges::update_s;
 use crate::analysis::JudgeError;
+use crate::analysis::access::Access;
 use crate::analysis::errors::{Errors, PULL_IN_S, SignalError};
 use crate::analysis::foreign::truth::Timeline;
 use crate::analysis::jitter::theory::{Stresses, Theory};
@@ -94,6 +95,7 @@ impl Links {
         if !run.scene.noise {
             return Ok(links);
         }
+        let access = Access::new(run);
         let costs_db = crate::analysis::spectrum::costs_db(run);
         for link in errors.signals.keys() {
             let Some(update_s) = update_s(run, link.signal) else { continue };
@@ -111,7 +113,7 @@ impl Links {
             if rows.len() < LEAST {
                 continue;
             }
-            let Some(one) = One::new(run, link, &theory, settings, rows, cost_db)? else { continue };
+            let Some(one) = One::new((run, &access), link, &theory, settings, rows, cost_db)? else { continue };
             one.observations(&mut links);
             let spans = one.spans();
             let mut updates = Vec::new();
@@ -195,14 +197,14 @@ struct One<'a> {
 
 impl<'a> One<'a> {
     fn new(
-        run: &Run,
+        (run, access): (&Run, &Access<'_>),
         link: Link,
         theory: &'a Theory,
         settings: Settings,
         rows: Vec<SignalError>,
         cost_db: f64,
     ) -> Result<Option<Self>, JudgeError> {
-        let Some(timeline) = Timeline::of(run, link)? else { return Ok(None) };
+        let Some(timeline) = Timeline::of(run, access, link)? else { return Ok(None) };
         let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(None) };
         let stresses = Stresses::new(theory, &timeline, &link, (first.time_s, last.time_s));
         let hz = |row: &SignalError| libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
@@ -233,7 +235,7 @@ impl<'a> One<'a> {
             .collect();
         let strongest = rays.values().map(|r| r.iter().map(|ray| ray.1).sum::<f64>()).fold(0.0, f64::max).min(0.99);
         let edge_m = match run.scene.code_edge {
-            Edge::Area => edges::CREST * edges::averaged_m(run.scene.sample_rate_hz),
+            Edge::Area => edges::CREST * edges::averaged_m(link.signal, run.scene.sample_rate_hz),
             _ => 0.0,
         };
         let span_s = 0.1_f64.max(last.time_s - first.time_s);

@@ -125,7 +125,7 @@ pub struct Scene<'r> {
     /// Decibels that filter and converter cost, by signal.
     costs_db: BTreeMap<&'static Signal, f64>,
     /// Error of chip edges with a standing code, root mean square.
-    edge_m: f64,
+    edges_m: BTreeMap<&'static Signal, f64>,
 }
 
 impl<'r> Scene<'r> {
@@ -154,10 +154,10 @@ impl<'r> Scene<'r> {
             known,
             health,
             costs_db: crate::analysis::spectrum::costs_db(run),
-            edge_m: match run.scene.code_edge {
-                Edge::Area => edges::averaged_m(run.scene.sample_rate_hz),
-                _ => 0.0,
-            },
+            edges_m: (run.signals.iter())
+                .filter(|_| run.scene.code_edge == Edge::Area)
+                .map(|&signal| (signal, edges::averaged_m(signal, run.scene.sample_rate_hz)))
+                .collect(),
         })
     }
 
@@ -258,7 +258,7 @@ impl<'r> Scene<'r> {
             ionosphere_m,
             troposphere_m: sky.troposphere_m,
             noise_m2: (code * theory.chip_m) * (code * theory.chip_m),
-            other_m2: self.edge_m2(true_row.doppler_hz, true_row.link().carrier_hz()),
+            other_m2: self.edge_m2(true_row),
             memory_s: 0.0,
             rate_sigma_mps: rate_hz * true_row.link().wavelength_m(),
             rate_bias_mps: 0.0,
@@ -272,10 +272,10 @@ impl<'r> Scene<'r> {
 
     /// Variance that chip edges between samples leave: a code that moves by whole samples within the
     /// smoothing averages it.
-    fn edge_m2(&self, doppler_hz: f64, carrier_hz: f64) -> f64 {
+    fn edge_m2(&self, row: &Observation) -> f64 {
         let rate_hz = self.run.scene.sample_rate_hz;
-        let patterns = (doppler_hz / carrier_hz * rate_hz).abs() * self.choices.smoothing_s.max(1.0);
-        let left_m = self.edge_m / (1.0 + 2.0 * patterns);
+        let patterns = (row.doppler_hz / row.link().carrier_hz() * rate_hz).abs() * self.choices.smoothing_s.max(1.0);
+        let left_m = self.edges_m.get(row.signal).copied().unwrap_or(0.0) / (1.0 + 2.0 * patterns);
         left_m * left_m
     }
 }

@@ -1,11 +1,11 @@
 //! Errors of a foreign receiver's code, carrier, Doppler and C/N0, and the biases that they show.
 //!
 //! The truth is taken at each epoch's label. A receiver's own clock moves all pseudoranges of an epoch alike,
-//! so their mean error is its clock and not an error; the same goes for carriers and Dopplers. A label that
-//! is late by δ adds δ·λ·f_D to a pseudorange, whose slope over Doppler therefore gives δ; where it is
-//! significant the truth is looked up again at the corrected time. Carriers lose one constant an arc. Limits:
-//! biases common to all satellites cannot be told from the clock, and a code bias that happens to go with
-//! Doppler not from a late label in a short static scene.
+//! so their mean error, signal by signal, is its clock and not an error; the same goes for carriers and
+//! Dopplers. A label that is late by δ adds δ·λ·f_D to a pseudorange, whose slope over Doppler therefore
+//! gives δ; where it is significant the truth is looked up again at the corrected time. Carriers lose one
+//! constant an arc. Limits: biases common to all satellites cannot be told from the clock, and a code bias
+//! that happens to go with Doppler not from a late label in a short static scene.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,7 +17,7 @@ use super::truth::{State, Timeline};
 use crate::analysis::errors::{Link, SLIP_CYCLES, first_jump_of};
 use crate::analysis::statistics::{mean, median, pooled_std, rms, std};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::SIGNALS;
+use crate::gnss::signal::{self, Signal};
 
 /// Times that the truth is looked up at a better time.
 const LOOKS: usize = 6;
@@ -169,11 +169,12 @@ fn join<'a>(
     label: impl Fn(&ObservedEpoch) -> f64,
     late_s: f64,
 ) -> Vec<Pair<'a>> {
+    let signals = signal::all();
     let mut pairs = Vec::new();
     for (number, epoch) in epochs.iter().enumerate() {
         let label_s = label(epoch);
         for ((sv, code), values) in &epoch.values {
-            let signal = SIGNALS.iter().find(|signal| signal.system == sv.system && signal.rinex == code);
+            let signal = signals.iter().find(|signal| signal.system == sv.system && signal.rinex == code);
             let Some(signal) = signal else { continue };
             let link = Link { sv: *sv, signal };
             if let Some(truth) = timeline.state(&link, label_s - late_s) {
@@ -189,11 +190,29 @@ fn by_epoch<'p, 'a>(pairs: &'p [Pair<'a>]) -> impl Iterator<Item = &'p [Pair<'a>
     pairs.chunk_by(|a, b| a.epoch == b.epoch)
 }
 
-/// Mean code error of each epoch without outliers, by epoch number.
-fn common(pairs: &[Pair<'_>], outliers: &mut usize) -> BTreeMap<usize, f64> {
-    let deviations: Vec<f64> = by_epoch(pairs)
+/// Something of each epoch and signal, by epoch number.
+type BySignal = BTreeMap<(usize, &'static Signal), f64>;
+
+/// The same epochs with their signals apart: a receiver's delays differ by signal.
+fn by_signal<'p, 'a>(pairs: &'p [Pair<'a>]) -> impl Iterator<Item = Vec<&'p Pair<'a>>> {
+    by_epoch(pairs).flat_map(|epoch| {
+        let mut groups: BTreeMap<&'static Signal, Vec<&'p Pair<'a>>> = BTreeMap::new();
+        epoch.iter().for_each(|pair| groups.entry(pair.link.signal).or_default().push(pair));
+        groups.into_values()
+    })
+}
+
+impl Pair<'_> {
+    fn group(&self) -> (usize, &'static Signal) {
+        (self.epoch, self.link.signal)
+    }
+}
+
+/// Mean code error of each epoch and signal without outliers.
+fn common(pairs: &[Pair<'_>], outliers: &mut usize) -> BySignal {
+    let deviations: Vec<f64> = by_signal(pairs)
         .flat_map(|epoch| {
-            let errors: Vec<f64> = epoch.iter().filter_map(Pair::code_m).collect();
+            let errors: Vec<f64> = epoch.iter().filter_map(|pair| pair.code_m()).collect();
             let middle = median(&errors).unwrap_or(0.0);
             errors.into_iter().map(move |error| (error - middle).abs())
         })
@@ -202,13 +221,13 @@ fn common(pairs: &[Pair<'_>], outliers: &mut usize) -> BTreeMap<usize, f64> {
     let limit_m = (OUTLIER_SIGMAS * median(&deviations).unwrap_or(0.0) / 0.6745).max(OUTLIER_M);
     *outliers = 0;
     let mut found = BTreeMap::new();
-    for epoch in by_epoch(pairs) {
-        let errors: Vec<f64> = epoch.iter().filter_map(Pair::code_m).collect();
+    for epoch in by_signal(pairs) {
+        let errors: Vec<f64> = epoch.iter().filter_map(|pair| pair.code_m()).collect();
         let Some(middle) = median(&errors) else { continue };
         let kept: Vec<f64> = errors.iter().copied().filter(|error| (error - middle).abs() <= limit_m).collect();
         *outliers += errors.len() - kept.len();
         if let (Some(mean), Some(first)) = (mean(&kept), epoch.first()) {
-            found.insert(first.epoch, mean);
+            found.insert(first.group(), mean);
         }
     }
     found
@@ -219,10 +238,10 @@ fn time_tag(pairs: &[Pair<'_>]) -> Option<Estimate> {
     let mut outliers = 0;
     let common_m = common(pairs, &mut outliers);
     let mut points = Vec::new();
-    for epoch in by_epoch(pairs) {
-        let Some(common_m) = epoch.first().and_then(|first| common_m.get(&first.epoch)) else { continue };
-        let with_code: Vec<&Pair<'_>> =
-            epoch.iter().filter(|pair| pair.code_m().is_some_and(|error| (error - common_m).abs() < 1e6)).collect();
+    for epoch in by_signal(pairs) {
+        let Some(common_m) = epoch.first().and_then(|first| common_m.get(&first.group())) else { continue };
+        let near = |pair: &&&Pair<'_>| pair.code_m().is_some_and(|error| (error - common_m).abs() < 1e6);
+        let with_code: Vec<&Pair<'_>> = epoch.iter().filter(near).copied().collect();
         let speed = |pair: &Pair<'_>| pair.link.wavelength_m() * pair.truth.doppler_hz;
         let Some(speed_mean) = mean(&with_code.iter().map(|pair| speed(pair)).collect::<Vec<_>>()) else { continue };
         points.extend(
@@ -234,16 +253,14 @@ fn time_tag(pairs: &[Pair<'_>]) -> Option<Estimate> {
     slope(&points)
 }
 
-fn clock(
-    measured: &mut Measured,
-    pairs: &[Pair<'_>],
-    common_m: &BTreeMap<usize, f64>,
-    timeline: &Timeline,
-    late_s: f64,
-) {
+fn clock(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, timeline: &Timeline, late_s: f64) {
     for epoch in by_epoch(pairs) {
         let Some(first) = epoch.first() else { continue };
-        let Some(bias_m) = common_m.get(&first.epoch) else { continue };
+        // One clock, whatever the signals differ by: the mean of theirs.
+        let signals: BTreeSet<&'static Signal> = epoch.iter().map(|pair| pair.link.signal).collect();
+        let of_signals: Vec<f64> =
+            signals.iter().filter_map(|signal| common_m.get(&(first.epoch, *signal)).copied()).collect();
+        let Some(bias_m) = mean(&of_signals) else { continue };
         let Some(place) = timeline.place(first.label_s - late_s) else { continue };
         measured.clock.push(ClockRow {
             label_s: first.label_s,
@@ -270,9 +287,9 @@ fn line_slope(points: &[((), f64, f64)]) -> Option<f64> {
 
 fn doppler_and_strength(measured: &mut Measured, pairs: &[Pair<'_>]) {
     let mut points = Vec::new();
-    for epoch in by_epoch(pairs) {
+    for epoch in by_signal(pairs) {
         let both: Vec<(&Pair<'_>, f64)> =
-            epoch.iter().filter_map(|pair| Some((pair, pair.values.doppler_hz?))).collect();
+            epoch.iter().filter_map(|pair| Some((*pair, pair.values.doppler_hz?))).collect();
         let found = mean(&both.iter().map(|(_, value)| *value).collect::<Vec<_>>());
         let truth = mean(&both.iter().map(|(pair, _)| pair.truth.doppler_hz).collect::<Vec<_>>());
         let Some((found, truth)) = found.zip(truth) else { continue };
@@ -349,7 +366,8 @@ fn carriers(measured: &mut Measured, pairs: &[Pair<'_>]) -> (Carriers, Arcs) {
         let Some(first) = epoch.first() else { continue };
         if let Some(found) = steps.get(&first.epoch) {
             let middle = median(found).unwrap_or(0.0);
-            let near = |step: &&f64| (**step - middle).abs() < 0.5 * SLIP_CYCLES * first.link.wavelength_m();
+            let shortest_m = epoch.iter().map(|pair| pair.link.wavelength_m()).fold(f64::INFINITY, f64::min);
+            let near = |step: &&f64| (**step - middle).abs() < 0.5 * SLIP_CYCLES * shortest_m;
             let kept: Vec<f64> = found.iter().filter(near).copied().collect();
             let step_m = mean(&kept).unwrap_or(middle);
             level_m += step_m;
@@ -457,14 +475,14 @@ fn divergence(pairs: &[Pair<'_>], carriers: &Carriers, arc: &[usize]) -> Option<
     line_slope(&centred(points.into_iter()))
 }
 
-fn rows(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BTreeMap<usize, f64>, carriers: &Carriers) {
+fn rows(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, carriers: &Carriers) {
     let sign = measured.doppler_sign();
-    let mut doppler_common: BTreeMap<usize, f64> = BTreeMap::new();
+    let mut doppler_common = BySignal::new();
     let doppler_error = |pair: &Pair<'_>| Some(sign * pair.values.doppler_hz? - pair.truth.doppler_hz);
-    for epoch in by_epoch(pairs) {
-        let errors: Vec<f64> = epoch.iter().filter_map(doppler_error).collect();
+    for epoch in by_signal(pairs) {
+        let errors: Vec<f64> = epoch.iter().filter_map(|pair| doppler_error(pair)).collect();
         if let (Some(first), Some(middle)) = (epoch.first(), mean(&errors)) {
-            doppler_common.insert(first.epoch, middle);
+            doppler_common.insert(first.group(), middle);
         }
     }
     measured.rows = pairs
@@ -475,9 +493,11 @@ fn rows(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BTreeMap<usize, 
             sv: pair.link.sv.to_string(),
             signal: pair.link.signal.name,
             elevation_deg: pair.truth.elevation_deg,
-            code_m: pair.code_m().zip(common_m.get(&pair.epoch)).map(|(error, common)| error - common),
+            code_m: pair.code_m().zip(common_m.get(&pair.group())).map(|(error, common)| error - common),
             carrier_cycles: carrier.map(|carrier| carrier.cycles),
-            doppler_hz: doppler_error(pair).zip(doppler_common.get(&pair.epoch)).map(|(error, common)| error - common),
+            doppler_hz: doppler_error(pair)
+                .zip(doppler_common.get(&pair.group()))
+                .map(|(error, common)| error - common),
             cn0_db: pair.values.cn0_dbhz.map(|value| value - pair.truth.effective_dbhz),
             link: pair.link,
         })

@@ -123,8 +123,9 @@ fn header(lines: &[&str], found: &mut Observations) -> Parsed<(Header, usize)> {
             "SYS / # / OBS TYPES" => types(line, at, &mut header, &mut wanted)?,
             "TIME OF FIRST OBS" => {
                 let system = columns(line, 48, 51);
-                if !["", "GPS", "GAL"].contains(&system) {
-                    return Err(fault(at, format!("time system '{system}': expected GPS or GAL")));
+                // Seconds of these scales are those of GPS time; BDT is 14 s behind, GLO is UTC.
+                if !["", "GPS", "GAL", "QZS", "IRN"].contains(&system) {
+                    return Err(fault(at, format!("time system '{system}': expected GPS, GAL, QZS or IRN")));
                 }
             }
             "SYS / SCALE FACTOR" => scale(line, at, &mut header)?,

@@ -76,7 +76,7 @@ impl Timeline {
     /// # Errors
     /// [`JudgeError::Read`] where rows that were put by cannot be read.
     pub fn new(run: &Run) -> Result<Option<Self>, JudgeError> {
-        let Some(mut timeline) = Self::of_links(run, run.truth.keys())? else { return Ok(None) };
+        let Some(mut timeline) = Self::of_links(run, &Access::new(run), run.truth.keys())? else { return Ok(None) };
         timeline.interpolation = timeline.missed();
         Ok(Some(timeline))
     }
@@ -85,11 +85,11 @@ impl Timeline {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn of(run: &Run, link: Link) -> Result<Option<Self>, JudgeError> {
-        Self::of_links(run, std::iter::once(link))
+    pub fn of(run: &Run, access: &Access<'_>, link: Link) -> Result<Option<Self>, JudgeError> {
+        Self::of_links(run, access, std::iter::once(link))
     }
 
-    fn of_links(run: &Run, links: impl Iterator<Item = Link>) -> Result<Option<Self>, JudgeError> {
+    fn of_links(run: &Run, access: &Access<'_>, links: impl Iterator<Item = Link>) -> Result<Option<Self>, JudgeError> {
         let Some(first) = run.trajectory.first() else { return Ok(None) };
         // The nearest second: a clock that is a little ahead does not begin a second earlier.
         let origin = Epoch::new(first.gps_s, first.gps_fraction_s.round());
@@ -108,7 +108,6 @@ impl Timeline {
             .collect();
         let steps: Vec<f64> = places.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
         let at: HashMap<u64, usize> = run.trajectory.iter().map(|row| row.sample).zip(0..).collect();
-        let access = Access::new(run);
         let mut tracks = BTreeMap::new();
         for link in links {
             let elevations: HashMap<u64, f64> =

@@ -10,6 +10,7 @@ use super::{Finding, Found};
 use crate::analysis::JudgeError;
 use crate::analysis::errors::Link;
 use crate::analysis::load::Run;
+use crate::analysis::waveform::leading;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{AcquisitionRow, Event, Observation};
 
@@ -67,7 +68,7 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
         if searches.is_empty() {
             continue;
         }
-        let Some(component) = link.signal.components.first() else { continue };
+        let Some(component) = leading(link.signal) else { continue };
         let truth = run.truth.rows(link)?;
         for row in searches {
             let Some((true_row, after_s)) = near(&truth, row.sample, run.scene.sample_rate_hz) else { continue };

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use super::Loop;
 use crate::analysis::JudgeError;
+use crate::analysis::access::Access;
 use crate::analysis::foreign::truth::Timeline;
 use crate::analysis::load::Run;
 use crate::analysis::statistics::Sum;
@@ -400,12 +401,13 @@ impl Stresses {
 /// [`JudgeError::Read`] where rows that were put by cannot be read.
 pub fn motion_error_deg(
     run: &Run,
+    access: &Access<'_>,
     link: Link,
     settings: Settings,
     update_s: f64,
 ) -> Result<Vec<(f64, f64)>, JudgeError> {
     let (Some(timeline), Some(closed)) =
-        (Timeline::of(run, link)?, exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s))
+        (Timeline::of(run, access, link)?, exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s))
     else {
         return Ok(Vec::new());
     };

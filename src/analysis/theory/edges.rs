@@ -8,11 +8,14 @@
 
 use std::f64::consts::PI;
 
+use crate::analysis::waveform::{Waveform, leading};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::signal::Signal;
 
-/// Chips of the code whose lines are summed, and their rate: GPS C/A.
-const CHIPS: f64 = 1023.0;
-const CHIP_HZ: f64 = 1.023e6;
+/// Lines a chip rate that are summed. A code of other length has others, whose power is in proportion.
+const LINES: f64 = 1023.0;
+/// Chip rate of the code whose locked error was measured: GPS C/A.
+const MEASURED_HZ: f64 = 1.023e6;
 const SPACING_CHIPS: f64 = 0.5;
 /// Zones of the rate that fold back; their power falls with the fourth power of their number.
 const ZONES: i32 = 4;
@@ -20,20 +23,25 @@ const ZONES: i32 = 4;
 /// 2.6 Msps.
 pub const CREST: f64 = 0.40 / 0.14;
 
-/// Error of a standing code, root mean square over codes and phases, in metres.
-pub fn averaged_m(rate_hz: f64) -> f64 {
-    folded_m(rate_hz).max(locked_m(rate_hz))
+/// Error of a signal's standing code, root mean square over codes and phases, in metres; 0 of one without a code.
+pub fn averaged_m(signal: &Signal, rate_hz: f64) -> f64 {
+    let code = leading(signal).zip(Waveform::of(signal));
+    code.map_or(0.0, |(component, waveform)| {
+        let chips = f64::from(component.code_chips);
+        folded_m(&waveform, chips, rate_hz).max(locked_m(component.chip_rate_hz, chips, rate_hz))
+    })
 }
 
-fn folded_m(rate_hz: f64) -> f64 {
+fn folded_m(waveform: &Waveform, chips: f64, rate_hz: f64) -> f64 {
     let sinc = |x: f64| if x == 0.0 { 1.0 } else { libm::sin(PI * x) / (PI * x) };
-    // Frequencies in chip rates, a line at each chip rate over 1023.
-    let rate = rate_hz / CHIP_HZ;
-    let power = |f: f64| sinc(f) * sinc(f) / CHIPS;
+    // Frequencies in chip rates.
+    let chip_rate_hz = waveform.chip_rate_hz();
+    let rate = rate_hz / chip_rate_hz;
+    let power = |f: f64| waveform.density(f * chip_rate_hz) * chip_rate_hz / LINES;
     let (mut square, mut slope) = (0.0, 0.0);
     // Below half the rate: the line there has no image of its own.
-    for line in 1..(0.5 * rate * CHIPS).ceil() as u32 {
-        let f = f64::from(line) / CHIPS;
+    for line in 1..(0.5 * rate * LINES).ceil() as u32 {
+        let f = f64::from(line) / LINES;
         let weight = 2.0 * libm::sin(PI * f * SPACING_CHIPS);
         let image = |zone: i32| {
             let f = f + f64::from(zone) * rate;
@@ -43,21 +51,23 @@ fn folded_m(rate_hz: f64) -> f64 {
         square += 2.0 * weight * weight * power(f) * images;
         slope += weight * 4.0 * PI * f * sinc(f / rate) * power(f);
     }
-    SPEED_OF_LIGHT_MPS / CHIP_HZ * square.sqrt() / slope
+    SPEED_OF_LIGHT_MPS / chip_rate_hz * (square * LINES / chips).sqrt() / slope
 }
 
 /// Where every chip meets the same few places between samples phases are not random: 1.6 m at four samples a
-/// chip, and as the square of samples times places.
-fn locked_m(rate_hz: f64) -> f64 {
-    let samples = |places: u32| f64::from(places) * rate_hz / CHIP_HZ;
+/// chip of C/A, and as the square of samples times places; longer and shorter chips in proportion.
+fn locked_m(chip_rate_hz: f64, chips: f64, rate_hz: f64) -> f64 {
+    let samples = |places: u32| f64::from(places) * rate_hz / chip_rate_hz;
     // Within a code the places drift apart otherwise.
-    let places = (1..=32).find(|places| (samples(*places) - samples(*places).round()).abs() < 1.0 / CHIPS);
-    places.map_or(0.0, |places| 1.6 * (4.0 / samples(places)) * (4.0 / samples(places)))
+    let places = (1..=32).find(|places| (samples(*places) - samples(*places).round()).abs() < 1.0 / chips);
+    let scale = MEASURED_HZ / chip_rate_hz;
+    places.map_or(0.0, |places| 1.6 * scale * (4.0 / samples(places)) * (4.0 / samples(places)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn averaged_edges_cost_what_folds_back_at_each_rate() {
@@ -65,11 +75,17 @@ mod tests {
         // Msps.
         for (rate_hz, expected_m) in [(2.048e6, 0.3273), (2.6e6, 0.1515), (5e6, 0.0563), (10e6, 0.0202), (25e6, 0.0038)]
         {
-            assert!((averaged_m(rate_hz) - expected_m).abs() < 6e-5, "{rate_hz}: {}", averaged_m(rate_hz));
+            assert!(
+                (averaged_m(&L1_CA, rate_hz) - expected_m).abs() < 6e-5,
+                "{rate_hz}: {}",
+                averaged_m(&L1_CA, rate_hz)
+            );
         }
         // Four samples a chip, and five chips to 8 · 2.5 samples: 1.6 · (4 / 5)² m with two places at 2.5575
         // Msps.
-        assert!((averaged_m(4.092e6) - 1.6).abs() < 1e-9 && (averaged_m(2.5575e6) - 1.024).abs() < 1e-9);
-        assert!((CREST * averaged_m(2.048e6) - 0.935).abs() < 1e-3);
+        assert!(
+            (averaged_m(&L1_CA, 4.092e6) - 1.6).abs() < 1e-9 && (averaged_m(&L1_CA, 2.5575e6) - 1.024).abs() < 1e-9
+        );
+        assert!((CREST * averaged_m(&L1_CA, 2.048e6) - 0.935).abs() < 1e-3);
     }
 }

@@ -3,12 +3,14 @@
 //! with this project.
 
 use super::clock::PowerLaw;
-use super::dll::{BandIntegrals, Discriminator};
+use super::dll::{BandIntegrals, Discriminator, Taps};
 use super::linear::{
     AssistedLoop, Feedback, FrequencyLoop, Integrator, Pairs, PhaseLoop, analogue_gains, controlled_root_gains,
 };
 use super::oscillator::{OCXO, TCXO};
 use super::*;
+use crate::analysis::waveform::Waveform;
+use crate::gnss::signal::synthetic::LONG_BOC;
 
 const CHIP_M: f64 = 293.052_256;
 const L1_HZ: f64 = 1_575.42e6;
@@ -333,4 +335,31 @@ fn least_cn0_of_the_code_loop_gives_back_its_threshold() {
         close(jitter, dll::threshold_chips(d), 1e-9);
         assert!(dll::holds(jitter, 0.0, d * (1.0 + 1e-9)) && !dll::holds(jitter, 0.01, d));
     }
+}
+
+#[test]
+fn jitter_on_any_spectrum_is_that_of_its_correlation() {
+    // BOC(1,1): R is 1 − 3|τ| up to half a chip, so that early and late have 1 − 3d/2, slope 3, and 1 − 3d in
+    // common.
+    let code = Waveform::of(&LONG_BOC).unwrap();
+    let density = |f: f64| code.density(f * code.chip_rate_hz()) * code.chip_rate_hz();
+    let (d, t_s) = (0.2, 1e-3);
+    let taps = Taps { height: 1.0 - 1.5 * d, slope: 3.0, common: 1.0 - 3.0 * d };
+    for discriminator in [Discriminator::Coherent, Discriminator::EarlyMinusLate] {
+        let raw = dll::raw_on_chips(discriminator, taps, t_s * hz(45.0));
+        let wide = BandIntegrals::of(density, d, 400.0);
+        // Beyond the band lies 3/(2π² · 200) of the power, a quarter of a percent of what early and late
+        // differ by.
+        close(wide.jitter_chips(discriminator, 0.5 / t_s, t_s, hz(45.0)).unwrap(), raw, 5e-3);
+    }
+    // At small spacings a third of the variance of C/A.
+    let ratio = |d: f64| {
+        let steep = Taps { height: 1.0 - 1.5 * d, slope: 3.0, common: 1.0 - 3.0 * d };
+        let boc = dll::raw_on_chips(Discriminator::Coherent, steep, 30.0);
+        (boc / dll::raw_chips(Discriminator::Coherent, d, t_s, 30.0 / t_s)).powi(2)
+    };
+    close(ratio(0.05), 1.0 / 3.0, 1e-12);
+    // The bound of any discriminator follows the spectrum too: within 24 chip rates BOC(1,1) has more far out.
+    let bound = |integrals: BandIntegrals| integrals.bound_chips(1.0, hz(45.0));
+    assert!(bound(BandIntegrals::of(density, 0.1, 24.0)) < 0.65 * bound(BandIntegrals::rectangular(0.1, 24.0)));
 }

@@ -29,11 +29,12 @@ impl Verdict {
             slips.rows.iter().map(|row| (row.sv.clone(), row.signal)).collect();
         links.sort();
         links.dedup();
+        let access = Access::new(run);
         let mut judged: Vec<(&Slip, Option<Excuse>)> = Vec::new();
         for (sv, signal) in links {
             let (Ok(number), Some(known)) = (sv.parse::<Sv>(), Signal::find(signal)) else { continue };
             let receiver = &receiver.of_signal(known);
-            let witness = Witness::new(run, receiver, Link { sv: number, signal: known })?;
+            let witness = Witness::new(run, &access, receiver, Link { sv: number, signal: known })?;
             let own = slips.rows.iter().filter(|row| row.sv == sv && row.signal == signal);
             judged.extend(own.map(|row| (row, witness.excuse(run, receiver, number, row))));
         }
@@ -81,8 +82,7 @@ struct Witness {
 }
 
 impl Witness {
-    fn new(run: &Run, receiver: &Receiver, link: Link) -> Result<Self, JudgeError> {
-        let access = Access::new(run);
+    fn new(run: &Run, access: &Access<'_>, receiver: &Receiver, link: Link) -> Result<Self, JudgeError> {
         let rows = run.truth.map(link, |row| Row {
             time_s: run.time_s(row.sample),
             cn0_dbhz: row.cn0_dbhz,

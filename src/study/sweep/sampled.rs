@@ -5,6 +5,7 @@
 //! what theory predicts of the loops under thermal noise. Limits: truth and records pass through files in a
 //! scratch directory, samples never do.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -27,10 +28,12 @@ use crate::analysis::theory::pll;
 use crate::generator::scenario::{Overrides, Scenario};
 use crate::generator::stream::{Options, Stream};
 use crate::generator::{GenerateError, truth};
+use crate::gnss::signal::Signal;
 use crate::receiver::output::Output;
 use crate::receiver::settings::Settings;
 use crate::receiver::track::closed::Mode;
 use crate::receiver::{ReceiveError, Reception};
+use crate::study::correlator::Case;
 use crate::study::{expect, limits};
 
 /// A scene that a study is based on.
@@ -209,16 +212,17 @@ fn figures(here: &Path, truth: &Path, ear: &Ear, keep: &[String]) -> Result<Vec<
     let json = serde_json::to_value(&summary).map_err(|e| StudyError::Bug(e.to_string()))?;
     let places = places_s(&run)?;
     let fixes = Fixes::of(&run, &errors);
+    // Theory is of one channel: where signals or components differ it has nothing to say.
+    let channel = alone(&run).map(|signal| {
+        limits::channel_of(signal, &ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz)
+    });
     let of = |name: &String| match name.as_str() {
         "acquisition.detected_share" => first_search(&run).0,
         "acquisition.false" => Some(first_search(&run).1),
-        "theory.tracking.pll_sigma_deg" => pll_theory_deg(&places, &ear.settings, &summary),
-        "theory.tracking.dll_sigma_chips" => {
-            let channel = limits::channel(&ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz);
-            expect::code_chips(&channel).map(|jitter| jitter.sigma)
-        }
+        "theory.tracking.pll_sigma_deg" => pll_theory_deg(&places, channel.as_ref()?),
+        "theory.tracking.dll_sigma_chips" => expect::code_chips(channel.as_ref()?).map(|jitter| jitter.sigma),
         SNR => {
-            let channel = limits::channel(&ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz);
+            let channel = channel.as_ref()?;
             channel.cn0_dbhz.map(|dbhz| channel.update_s() * libm::pow(10.0, dbhz / 10.0))
         }
         own if fixes::FIGURES.contains(&own) => fixes.figure(own),
@@ -232,14 +236,21 @@ fn number(json: &Json, path: &str) -> Option<f64> {
     json.pointer(&format!("/{}", path.replace('.', "/"))).and_then(Json::as_f64)
 }
 
+/// The truth's only signal, if it has one component.
+fn alone(run: &Run) -> Option<&'static Signal> {
+    let mut signals = run.signals.iter().copied();
+    signals.next().filter(|signal| signals.next().is_none() && signal.components.len() == 1)
+}
+
 /// Share of the satellites in view at the start that the first search found, and how many it found that were not there.
 fn first_search(run: &Run) -> (Option<f64>, f64) {
     let there = &run.in_view_at_start;
     let first = run.acquisition.iter().map(|row| row.sample).min();
     let hits = || run.acquisition.iter().filter(|row| Some(row.sample) == first && row.acquired);
-    let found = hits().filter(|row| there.contains(&row.sv)).count();
+    let found = hits().filter(|row| there.contains(&row.sv)).map(|row| row.sv).collect::<BTreeSet<_>>().len();
+    let strange = hits().filter(|row| !there.contains(&row.sv)).count();
     let share = first.filter(|_| !there.is_empty()).map(|_| found as f64 / there.len() as f64);
-    (share, (hits().count() - found) as f64)
+    (share, strange as f64)
 }
 
 /// When within its second the signal of each true observation was sent.
@@ -254,11 +265,10 @@ fn places_s(run: &Run) -> Result<Vec<f64>, JudgeError> {
 /// Jitter of the carrier as it is observed: at instants, where the discriminator sees means over an
 /// integration. Where in the running integration an observation falls follows from the time sent, as
 /// integrations begin with symbols.
-fn pll_theory_deg(places_s: &[f64], settings: &Settings, summary: &Summary) -> Option<f64> {
-    let cn0_dbhz = summary.details.cn0_effective_dbhz?;
-    let channel = limits::channel(&settings.tracking, Mode::Phase, Some(cn0_dbhz));
+fn pll_theory_deg(places_s: &[f64], channel: &Case) -> Option<f64> {
+    let cn0_dbhz = channel.cn0_dbhz?;
     let update_s = channel.update_s();
-    let closed = expect::carrier_loop(&settings.tracking, Mode::Phase, update_s);
+    let closed = expect::carrier_loop(&channel.settings, Mode::Phase, update_s);
     let gain = |place: f64| closed.linear_at(place).noise_gain();
     let (start, middle, end) = (gain(0.0)?, gain(0.5)?, gain(1.0)?);
     // The variance is a quadratic of the place, here from -1/2 to 1/2.
