@@ -164,8 +164,7 @@ struct Peak {
 impl Peak {
     /// Of a signal's waveform, averaged so many times over `width_chips`.
     fn new(waveform: &Waveform, width_chips: f64, averages: u32) -> Self {
-        // Of one step a chip exactly 1.
-        let (_, chip_s) = waveform.scales_s();
+        let chip_s = 1.0 / waveform.chip_rate_hz();
         let corners = waveform.corners().into_iter().map(|(at_s, bend)| (at_s / chip_s, bend * chip_s)).collect();
         Self { corners, width_chips, averages }
     }
