@@ -92,7 +92,9 @@ impl<K: Copy + Ord, T: Row<K>> Shelf<K, T> {
         }
         if let Some(file) = &mut self.file {
             let bytes: Vec<u8> = stack.words.iter().flat_map(|word| word.to_le_bytes()).collect();
-            file.get_mut().unwrap_or_else(PoisonError::into_inner).write_all(&bytes).map_err(failed)?;
+            let file = file.get_mut().unwrap_or_else(PoisonError::into_inner);
+            // Reading has left the place where it ends.
+            file.seek(SeekFrom::Start(8 * self.filed)).and_then(|_| file.write_all(&bytes)).map_err(failed)?;
         }
         stack.lots.push(self.filed);
         self.filed += stack.words.len() as u64;
@@ -201,7 +203,13 @@ mod tests {
         // Keys 0, 1, 2 get 2000, 1000 and 3 rows: below, at and beyond whole lots.
         let row = |n: u64| Pair(n, -1.0 / n as f64);
         let key = |n: u64| if n >= 3000 { 2 } else { u8::from(n % 3 == 2) };
-        (0..3003).for_each(|n| shelf.push(key(n), &row(n)).unwrap());
+        for n in 0..3003 {
+            shelf.push(key(n), &row(n)).unwrap();
+            // Reading in between moves nothing.
+            if n % 700 == 0 {
+                assert!(!shelf.rows(0).unwrap().is_empty());
+            }
+        }
         for (of, count) in [(0, 2000), (1, 1000), (2, 3)] {
             let expected: Vec<Pair> = (0..3003).filter(|n| key(*n) == of).map(row).collect();
             assert_eq!((shelf.count(&of), expected.len()), (count, count));

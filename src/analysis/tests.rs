@@ -333,7 +333,8 @@ fn the_keys_of_the_summary_are_a_contract() {
     let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>().join(" ");
     assert_eq!(
         keys(&value),
-        "scene seed duration_s sample_rate_hz fidelity satellites position clock observables tracking navigation psd speed"
+        "scene seed duration_s sample_rate_hz fidelity satellites position clock observables tracking signals navigation psd \
+         speed"
     );
     for (section, expected) in [
         ("satellites", "in_view acquired used false_acquired"),

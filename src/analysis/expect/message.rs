@@ -1,7 +1,8 @@
 //! Orbits, clocks and ionosphere as the truth says that they were sent: what a receiver can know at best.
 //!
 //! The raw integers of `truth/navigation.csv` go through the message's own table. Limits: a satellite whose
-//! subframes 1 to 3 are incomplete there has no set; of several sets the one nearest to an epoch counts.
+//! subframes 1 to 3 are incomplete there has no set. Where a satellite sends a new set during the run, the one that the
+//! receiver says that it had read last counts, as all of them are right.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,14 +10,17 @@ use crate::analysis::load::Run;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::{Subframe, ephemeris, tables};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::record::NavigationRow;
+use crate::gnss::record::{Event, NavigationRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
 
 /// What all satellites sent.
 #[derive(Clone, Debug, Default)]
 pub struct Message {
-    sets: BTreeMap<Sv, Vec<Ephemeris>>,
+    /// With their issues.
+    sets: BTreeMap<Sv, Vec<(u32, Ephemeris)>>,
+    /// From which sample on the receiver had which issue, ascending.
+    read: BTreeMap<Sv, Vec<(u64, u32)>>,
     pub klobuchar: Option<Klobuchar>,
 }
 
@@ -32,20 +36,42 @@ impl Message {
             groups.entry((row.sv, row.issue & SHARED_ISSUE)).or_default().push(row);
         }
         let mut message = Self::default();
-        for ((sv, _), rows) in groups {
+        for ((sv, issue), rows) in groups {
             if let Some(set) = set(sv, &rows, near) {
-                message.sets.entry(sv).or_default().push(set);
+                message.sets.entry(sv).or_default().push((issue, set));
             }
             message.klobuchar = message.klobuchar.or_else(|| klobuchar(&rows));
         }
+        message.read = message.sets.keys().map(|sv| (*sv, read(run, *sv))).collect();
         message
     }
 
-    /// The set of a satellite whose reference time is nearest.
-    pub fn ephemeris(&self, sv: Sv, at: Epoch) -> Option<&Ephemeris> {
-        let age_s = |set: &&Ephemeris| at.since(set.toe).abs();
-        self.sets.get(&sv)?.iter().min_by(|a, b| age_s(a).total_cmp(&age_s(b)))
+    /// The set of a satellite that the receiver had read last at `sample`, or else the one whose reference time is nearest
+    /// to `at`.
+    pub fn ephemeris(&self, sv: Sv, (sample, at): (u64, Epoch)) -> Option<&Ephemeris> {
+        let sets = self.sets.get(&sv)?;
+        let last = self.read.get(&sv).and_then(|read| read.iter().rev().find(|(since, _)| *since <= sample));
+        let issued = last.and_then(|(_, issue)| sets.iter().find(|(other, _)| other == issue));
+        let age_s = |(_, set): &&(u32, Ephemeris)| at.since(set.toe).abs();
+        issued.or_else(|| sets.iter().min_by(|a, b| age_s(a).total_cmp(&age_s(b)))).map(|(_, set)| set)
     }
+}
+
+/// When the receiver completed the sets of a satellite, with their issues in the order in which it wrote them down. A
+/// set that it read again after a loss comes before a new one.
+fn read(run: &Run, sv: Sv) -> Vec<(u64, u32)> {
+    let mut issues: Vec<u32> = Vec::new();
+    for row in run.navigation.iter().filter(|row| row.sv == sv && row.parameter == "toe_s") {
+        let issue = row.issue & SHARED_ISSUE;
+        if !issues.contains(&issue) {
+            issues.push(issue);
+        }
+    }
+    let completed = run.events.iter().filter(|row| row.sv == sv && row.event == Event::EphemerisComplete);
+    let completed: Vec<u64> = completed.map(|row| row.sample).collect();
+    let again = completed.len().saturating_sub(issues.len());
+    let issue = |index: usize| issues.get(index.saturating_sub(again)).copied();
+    completed.iter().enumerate().filter_map(|(index, sample)| Some((*sample, issue(index)?))).collect()
 }
 
 /// Ten words that carry those rows' parameters, and whether all of the table's are there.

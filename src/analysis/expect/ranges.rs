@@ -234,7 +234,7 @@ impl<'r> Scene<'r> {
         if !in_space && elevation_rad < self.choices.mask_rad - MASK_SLACK_RAD {
             return None;
         }
-        let ephemeris = self.message.ephemeris(true_row.sv, place.time())?;
+        let ephemeris = self.message.ephemeris(true_row.sv, (row.sample, place.time()))?;
         let look = Look { azimuth_rad: sky.azimuth_deg.to_radians(), elevation_rad };
         let computed_m = computed_m(ephemeris, true_row, place)?;
         let ionosphere_m = match self.message.klobuchar.filter(|_| user.height_m <= IONOSPHERE_TOP_M) {
@@ -284,8 +284,8 @@ impl<'r> Scene<'r> {
 /// satellite clock.
 fn computed_m(ephemeris: &Ephemeris, row: &Observation, place: &TrajectoryRow) -> Option<f64> {
     let sent = row.sent();
-    let rough = ephemeris.clock_l1(sent).ok()?;
-    let clock = ephemeris.clock_l1(sent.plus_s(-rough.offset_s)).ok()?;
+    let rough = ephemeris.clock_of_signal(sent, row.signal).ok()?;
+    let clock = ephemeris.clock_of_signal(sent.plus_s(-rough.offset_s), row.signal).ok()?;
     let satellite_m = ephemeris.state(sent.plus_s(-clock.offset_s)).ok()?.position_m;
     let mut seen_m = satellite_m;
     for _ in 0..3 {
