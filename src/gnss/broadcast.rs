@@ -200,7 +200,7 @@ impl Ephemeris {
     }
 
     fn on_l1(&self, clock: ClockState) -> ClockState {
-        ClockState { offset_s: clock.offset_s - planted!("gnss.clock.group_delay", self.tgd_s, -self.tgd_s), ..clock }
+        ClockState { offset_s: clock.offset_s - self.group_delay_s(&L1_CA), ..clock }
     }
 
     /// By how much less than [`Self::clock`] the clock reads for a user of `signal` alone.
@@ -210,7 +210,8 @@ impl Ephemeris {
     pub fn group_delay_s(&self, signal: &Signal) -> f64 {
         let own = self.signal_delays_s.iter().find(|(name, _)| *name == signal.name);
         let ratio = L1_CA.carrier_hz(self.sv) / signal.carrier_hz(self.sv);
-        own.map_or(self.tgd_s * (ratio * ratio), |(_, delay_s)| *delay_s)
+        let tgd_s = planted!("gnss.clock.group_delay", self.tgd_s, -self.tgd_s);
+        own.map_or(tgd_s * (ratio * ratio), |(_, delay_s)| *delay_s)
     }
 
     /// The clock as a user of `signal` alone meets it.

@@ -4,19 +4,23 @@
 //! chip at the sample's instant ([`Edge::Nearest`]) or the mean of the chips over the interval of one sample
 //! centred on that instant ([`Edge::Area`]). Sums come in three arithmetics: integers of 16 bits for samples of 8
 //! ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin of both in `f64`
-//! ([`Replica::slow`]). Limits: area edges are exact up to one chip a sample (rate ≥ chip rate); beyond one chip a
-//! sample they leave chips out. Only one-step pulses (BPSK) are made.
+//! ([`Replica::slow`]). A chip has the steps of its pulse ([`Wave`]); phases count chips, kernels see steps. Steps of zero
+//! are the mean of +1 and −1, so such a code takes two passes. Limits: area edges are exact up to one step a sample;
+//! beyond that they leave steps out. A period has fewer than 2¹⁵ steps.
 
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::Component;
+use crate::gnss::signal::{Component, Shape};
 
 mod carrier;
 mod kernel;
 mod short;
 mod single;
+pub mod wave;
+
+pub use wave::{Wave, fits};
 
 /// How a replica's chips meet the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,17 +59,22 @@ pub fn units_to_chips(units: i64) -> f64 {
 /// One period of a code, ready to be correlated with.
 #[derive(Clone, Debug)]
 pub struct Replica {
-    chips: Vec<bool>,
-    /// Entry j holds the 64 chips from chip 32 j on, cyclically, first chip in the top bit, 1 for a logical 1.
+    wave: Wave,
+    /// Entry j holds the 64 steps from step 32 j on, cyclically, first step in the top bit, 1 for −1.
     words: Vec<u64>,
-    /// What chips are sent as, and what each is short of the next; a little longer than the period.
+    /// What steps are sent as, and what each is short of the next; a little longer than the period.
     values: Vec<f32>,
     changes: Vec<f32>,
     /// The same in short integers; changes are −1, 0 or 1.
     short_values: Vec<i16>,
     short_changes: Vec<i16>,
     edge: Edge,
+    /// Where steps are zero, here they are +1 and in the other −1.
+    other: Option<Box<Replica>>,
 }
+
+/// Steps from which on a period cannot be counted in 64 bits.
+const MOST_STEPS: usize = 1 << (63 - CODE_BITS);
 
 /// Where the replica stands at the first sample and how it moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,59 +89,107 @@ pub struct Nco {
 }
 
 impl Replica {
-    /// A replica of that code (`true` for a logical 1, sent as −1); `None` below 64 chips.
+    /// A BPSK replica of that code (`true` for a logical 1, sent as −1); `None` below 64 chips.
     pub fn new(chips: Vec<bool>, edge: Edge) -> Option<Self> {
-        if chips.len() < 64 {
-            return None;
-        }
-        let word = |start: usize| {
-            chips.iter().cycle().skip(start).take(64).fold(0_u64, |word, &chip| word << 1 | u64::from(chip))
-        };
-        let words = (0..=chips.len() / 32).map(|j| word(32 * j)).collect();
-        let cyclic = |margin: usize| chips.iter().cycle().take(chips.len() + margin + 1);
-        let values: Vec<f32> = cyclic(kernel::TABLE_MARGIN).map(|&one| if one { -1.0 } else { 1.0 }).collect();
-        let changes = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let signs: Vec<i16> = cyclic(kernel::SHORT_MARGIN).map(|&one| if one { -1 } else { 1 }).collect();
-        let short_values = signs.iter().map(|sign| sign * short::AMPLITUDE).collect();
-        let short_changes = signs.windows(2).map(|pair| (pair[1] - pair[0]) / 2).collect();
-        Some(Self { chips, words, values, changes, short_values, short_changes, edge })
+        let values = chips.into_iter().map(|one| if one { -1 } else { 1 }).collect();
+        Self::of(Wave { values, steps_per_chip: 1, share: 1.0 }, edge)
     }
 
-    /// Length of the period in code phase units.
+    /// A replica of those steps; `None` below 64 of them and from 2¹⁵ on.
+    pub fn of(wave: Wave, edge: Edge) -> Option<Self> {
+        if wave.steps_per_chip == 0 || !(64..MOST_STEPS).contains(&wave.values.len()) {
+            return None;
+        }
+        let signs = |zero: i8| wave.values.iter().map(move |&value| if value == 0 { zero } else { value }).collect();
+        let other = wave.values.contains(&0).then(|| Box::new(Self::of_signs(signs(-1), wave.clone(), edge, None)));
+        Some(Self::of_signs(signs(1), wave.clone(), edge, other))
+    }
+
+    fn of_signs(steps: Vec<i8>, wave: Wave, edge: Edge, other: Option<Box<Self>>) -> Self {
+        let word = |start: usize| {
+            steps.iter().cycle().skip(start).take(64).fold(0_u64, |word, &step| word << 1 | u64::from(step < 0))
+        };
+        let words = (0..=steps.len() / 32).map(|j| word(32 * j)).collect();
+        let cyclic = |margin: usize| steps.iter().cycle().take(steps.len() + margin + 1);
+        let values: Vec<f32> = cyclic(kernel::TABLE_MARGIN).map(|&step| f32::from(step)).collect();
+        let changes = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let signs: Vec<i16> = cyclic(kernel::SHORT_MARGIN).map(|&step| i16::from(step)).collect();
+        let short_values = signs.iter().map(|sign| sign * short::AMPLITUDE).collect();
+        let short_changes = signs.windows(2).map(|pair| (pair[1] - pair[0]) / 2).collect();
+        Self { wave, words, values, changes, short_values, short_changes, edge, other }
+    }
+
+    /// Length of the period in code phase units, of chips …
     pub fn period(&self) -> i64 {
-        (self.chips.len() as i64) << CODE_BITS
+        self.steps_period() / self.wave.steps_per_chip as i64
+    }
+
+    /// … and of steps.
+    fn steps_period(&self) -> i64 {
+        (self.wave.values.len() as i64) << CODE_BITS
+    }
+
+    /// The share of chips that are this code's turn.
+    pub fn share(&self) -> f64 {
+        self.wave.share
     }
 
     /// Up to `places` delays at which the code's correlation with itself is smallest, a chip to either side
     /// included, spread over the period: what a correlator shows there is noise.
     pub fn quiet_taps(&self, places: usize) -> Vec<i64> {
-        let length = self.chips.len();
+        let (steps, each) = (&self.wave.values, self.wave.steps_per_chip);
+        let length = steps.len();
         let correlation = |shift: usize| {
-            let behind = self.chips.iter().cycle().skip(shift % length);
-            let equal = self.chips.iter().zip(behind).filter(|(a, b)| a == b).count();
-            (2 * equal).abs_diff(length)
+            let behind = steps.iter().cycle().skip(shift % length);
+            steps.iter().zip(behind).map(|(a, b)| i64::from(a * b)).sum::<i64>().abs()
         };
         let candidates = 4 * places;
-        let mut ranked: Vec<(usize, usize)> = (1..=candidates)
-            .map(|n| n * length / (candidates + 1))
-            .filter(|shift| (4..length.saturating_sub(4)).contains(shift))
-            .map(|shift| (correlation(shift - 1).max(correlation(shift)).max(correlation(shift + 1)), shift))
+        let chips = length / each;
+        let mut ranked: Vec<(i64, usize)> = (1..=candidates)
+            .map(|n| n * chips / (candidates + 1))
+            .filter(|chip| (4..chips.saturating_sub(4)).contains(chip))
+            .map(|chip| ((each * (chip - 1)..=each * (chip + 1)).map(correlation).max().unwrap_or(0), chip))
             .collect();
         ranked.sort_unstable();
-        ranked.into_iter().take(places).map(|(_, shift)| (shift as i64) << CODE_BITS).collect()
+        ranked.into_iter().take(places).map(|(_, chip)| (chip as i64) << CODE_BITS).collect()
     }
 
     /// Σ x·conj(replica) with the replica at each of `taps` (code phase units ahead of the prompt), in `f32`.
     /// The sums do not depend on the processor: sixteen fixed lanes, each 1024 samples added in one order.
     pub fn correlate<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
-        kernel::correlate(kernel::Level::best(), kernel::Fast::Single, self, (i, q), nco, taps)
+        self.at_speed(kernel::Fast::Single, (i, q), nco, taps)
     }
 
     /// The same in integers of 16 bits, for samples of 8 bits: within ±127.5, in steps of 2⁻⁷ or more. At
     /// steps of the code that do not suit 16 bits (C/A: below 1.06 and above 65 Msps) it is
     /// [`Self::correlate`].
     pub fn correlate_short<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
-        kernel::correlate(kernel::Level::best(), kernel::Fast::Short, self, (i, q), nco, taps)
+        self.at_speed(kernel::Fast::Short, (i, q), nco, taps)
+    }
+
+    fn at_speed<const T: usize>(
+        &self,
+        fast: kernel::Fast,
+        samples: (&[f32], &[f32]),
+        nco: &Nco,
+        taps: &[i64; T],
+    ) -> [Complex64; T] {
+        let (nco, taps) = self.in_steps(nco, taps);
+        let level = kernel::Level::best();
+        let mut sums = kernel::correlate(level, fast, self, samples, &nco, &taps);
+        if let Some(other) = &self.other {
+            let others = kernel::correlate(level, fast, other, samples, &nco, &taps);
+            sums.iter_mut().zip(others).for_each(|(sum, other)| *sum = 0.5 * (*sum + other));
+        }
+        sums
+    }
+
+    /// Phases of chips as those of steps.
+    fn in_steps<const T: usize>(&self, nco: &Nco, taps: &[i64; T]) -> (Nco, [i64; T]) {
+        let each = self.wave.steps_per_chip;
+        let code = if each == 1 { nco.code } else { nco.code.rem_euclid(self.period()) * each as i64 };
+        let nco = Nco { code, code_step: nco.code_step * each as u64, ..*nco };
+        (nco, taps.map(|tap| tap * each as i64))
     }
 
     /// One of the three. [`Arithmetic::I16`] is for samples that [`Self::correlate_short`] can take.
@@ -153,12 +210,13 @@ impl Replica {
     /// The same in the obvious way: `f64`, one sample after the other.
     pub fn slow<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
         let mut sums = [Complex64::ZERO; T];
+        let (nco, taps) = self.in_steps(nco, taps);
         let (mut carrier, mut code) = (nco.carrier, nco.code);
         for (&i, &q) in i.iter().zip(q) {
             let (sin, cos) = libm::sincos(carrier as f64 / TURN * std::f64::consts::TAU);
             let wiped = Complex64::new(f64::from(i), f64::from(q)) * Complex64::new(cos, -sin);
-            for (sum, tap) in sums.iter_mut().zip(taps) {
-                *sum += wiped * self.value(code + tap, nco.code_step);
+            for (sum, tap) in sums.iter_mut().zip(&taps) {
+                *sum += wiped * self.value_at_step(code + tap, nco.code_step);
             }
             carrier = carrier.wrapping_add(nco.carrier_step);
             code += nco.code_step as i64;
@@ -168,18 +226,24 @@ impl Replica {
 
     /// The replica's sample when its code phase is `code`.
     pub(crate) fn value(&self, code: i64, step: u64) -> f64 {
-        let chip = |units: i64| {
-            let index = (units.rem_euclid(self.period()) >> CODE_BITS) as usize;
-            if self.chips.get(index).is_some_and(|&one| one) { -1.0 } else { 1.0 }
+        let each = self.wave.steps_per_chip;
+        self.value_at_step(code.rem_euclid(self.period()) * each as i64, step * each as u64)
+    }
+
+    /// The same with phases of steps.
+    fn value_at_step(&self, code: i64, step: u64) -> f64 {
+        let at = |units: i64| {
+            let index = (units.rem_euclid(self.steps_period()) >> CODE_BITS) as usize;
+            self.wave.values.get(index).map_or(0.0, |&value| f64::from(value))
         };
         match self.edge {
-            Edge::Nearest => chip(code),
+            Edge::Nearest => at(code),
             Edge::Area => {
                 let start = code - (step / 2) as i64;
                 let end = start + step as i64;
                 let fraction = end.rem_euclid(1 << CODE_BITS) as f64 / step as f64;
                 let w = fraction.min(1.0);
-                chip(start) + (chip(end) - chip(start)) * w
+                at(start) + (at(end) - at(start)) * w
             }
         }
     }
@@ -217,10 +281,10 @@ pub fn standing_bias_m(edge: Edge, rate_hz: f64, component: &Component) -> f64 {
 pub(crate) const TURN: f64 = 18_446_744_073_709_551_616.0;
 
 /// The mean correlation of a replica with a signal of the same edges, `offset` chips apart, and its slope for positive
-/// offsets: the triangle of a random ±1 code, seen twice through the mean over `chips_per_sample`.
+/// offsets: that of ideal waveforms (`shape`), seen twice through the mean over `chips_per_sample`.
 ///
 /// At offset 0 it is the power of the replica, below one for area edges.
-pub fn correlation(edge: Edge, chips_per_sample: f64, offset: f64) -> (f64, f64) {
+pub fn correlation(shape: &Shape, edge: Edge, chips_per_sample: f64, offset: f64) -> (f64, f64) {
     let width = match edge {
         Edge::Nearest => 0.0,
         Edge::Area => chips_per_sample,
@@ -239,7 +303,16 @@ pub fn correlation(edge: Edge, chips_per_sample: f64, offset: f64) -> (f64, f64)
         let y = (x / width).clamp(-1.0, 1.0);
         if y < 0.0 { 0.5 * (1.0 + y) * (1.0 + y) } else { 1.0 - 0.5 * (1.0 - y) * (1.0 - y) }
     };
-    let slope = |x: f64| below(x + 1.0) - 2.0 * below(x) + below(x - 1.0);
+    // The ideal correlation is a polygon: its slope is a sum of steps at its corners.
+    let step = shape.step_s() / shape.chip_s();
+    let corners = (shape.chip_s() / shape.step_s()).round() as i32;
+    let value = |corner: i32| shape.correlation(f64::from(corner) * shape.step_s());
+    let bends: Vec<(f64, f64)> = (-corners..=corners)
+        .rev()
+        .map(|k| (f64::from(k) * step, (value(k + 1) - 2.0 * value(k) + value(k - 1)) / step))
+        .filter(|(_, bend)| *bend != 0.0)
+        .collect();
+    let slope = |x: f64| bends.iter().map(|(at, bend)| bend * below(x - at)).sum::<f64>();
     // The slope integrates to the value from the far side, where the correlation is zero.
     let end = 1.0 + width;
     if offset >= end {
@@ -254,6 +327,7 @@ pub fn correlation(edge: Edge, chips_per_sample: f64, offset: f64) -> (f64, f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
 
     fn noise(n: usize, seed: u64) -> Vec<f32> {
         let mut state = seed;
@@ -423,7 +497,8 @@ mod tests {
                     .map(|k| (i128::from(k) * i128::from(step) % i128::from(replica.period())) as i64)
                     .map(|c| replica.value(c, step as u64) * replica.value(c + tap, step as u64))
                     .sum();
-                let (model, _) = correlation(edge, chips_per_sample, offset);
+                let shape = L1_CA.components[0].shape();
+                let (model, _) = correlation(&shape, edge, chips_per_sample, offset);
                 // The code is not random: its correlation one chip away is up to 65/1023, of which area edges
                 // see a sixth each side at offset 0 and up to half at 0.5.
                 assert!(

@@ -84,7 +84,7 @@ pub struct Decoder {
 impl Decoder {
     /// A decoder of the first message of `signal`; `None` for a pilot or a code without whole periods a second.
     pub fn new(signal: &Signal, sv: Sv) -> Option<Self> {
-        let component: &Component = signal.components.first()?;
+        let component: &Component = signal.components.iter().find(|component| component.message.is_some())?;
         let message = component.message?;
         match message {
             Message::GpsLnav => {}

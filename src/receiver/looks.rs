@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use crate::gnss::signal::Link;
 use crate::gnss::time::Rate;
 use crate::receiver::acquire::Acquired;
+use crate::receiver::lead::lead;
 use crate::receiver::parting::{Estimate, common};
 
 /// Deviation of a search's code phase.
@@ -66,7 +67,7 @@ impl Looks {
 
 /// Doppler of the code, scaled to the carrier, that of the carrier, and the first one's deviation.
 fn code_doppler(before: &Acquired, hit: &Acquired, passed_s: f64) -> Option<(f64, f64, f64)> {
-    let component = hit.signal.components.first()?;
+    let component = lead(hit.signal)?;
     let (length, ratio) = (f64::from(component.code_chips), hit.signal.carrier_hz(hit.sv) / component.chip_rate_hz);
     let advance = hit.code_phase_chips - before.code_phase_chips - component.chip_rate_hz * passed_s;
     let beyond = advance - length * (advance / length).round();

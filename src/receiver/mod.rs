@@ -13,6 +13,7 @@ pub mod diagnosis;
 pub mod format;
 pub mod gap;
 pub mod interference;
+pub mod lead;
 pub mod looks;
 pub mod observe;
 pub mod output;

@@ -21,6 +21,7 @@ use serde::Serialize;
 use crate::gnss::signal::Link;
 use crate::gnss::time::Rate;
 use crate::receiver::correlate::TURN;
+use crate::receiver::lead::lead;
 
 /// Seconds of a line's memory, beyond which the past fades.
 const MEMORY_S: f64 = 30.0;
@@ -56,7 +57,7 @@ pub struct Phases {
 impl Phases {
     /// Cycles by which the carrier has outrun the code since `earlier`.
     pub fn parted_cycles(&self, earlier: &Self, link: Link, rate: Rate) -> f64 {
-        let Some(component) = link.signal.components.first() else { return 0.0 };
+        let Some(component) = lead(link.signal) else { return 0.0 };
         let passed_s = rate.elapsed_s(self.sample.saturating_sub(earlier.sample));
         let periods = (i128::from(self.periods) - i128::from(earlier.periods)) as f64;
         let chips = periods * f64::from(component.code_chips) + self.chips - earlier.chips;

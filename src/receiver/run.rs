@@ -14,12 +14,13 @@ use thiserror::Error;
 use crate::gnss::record::LineRow;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Link, SIGNALS, Signal};
-use crate::receiver::acquire::{self, AcquireError};
+use crate::gnss::signal::{Component, Link, Signal};
+use crate::receiver::acquire::{self, AcquireError, AcquisitionSettings};
 use crate::receiver::correlate::standing_bias_m;
 use crate::receiver::diagnosis::{Diagnosis, Stage, duration};
 use crate::receiver::format::Check;
 use crate::receiver::gap::Jump;
+use crate::receiver::lead::lead;
 use crate::receiver::output::{Output, OutputError};
 use crate::receiver::parting::Parted;
 use crate::receiver::session::Session;
@@ -37,6 +38,10 @@ const READ_BYTES: usize = 1 << 18;
 /// Why a reception was broken off.
 #[derive(Debug, Error)]
 pub enum ReceiveError {
+    #[error("acquisition.signals: {signal} cannot be received: {reason}")]
+    Unsupported { signal: &'static str, reason: String },
+    #[error("acquisition.signals: {first} and {second} lie in these samples: expected one signal at a time")]
+    Several { first: &'static str, second: &'static str },
     #[error(transparent)]
     Settings(#[from] SettingsError),
     #[error(transparent)]
@@ -162,8 +167,9 @@ pub(super) fn warnings(metadata: &IfMetadata, settings: &Settings) -> Vec<String
             )
         })
     };
-    let mut found: Vec<String> = SIGNALS.iter().filter_map(|signal| one(signal, signal.components.first()?)).collect();
-    found.extend(SIGNALS.iter().filter_map(|signal| image(metadata, signal, settings.acquisition.doppler_max_hz)));
+    let signals = settings.acquisition.signals();
+    let mut found: Vec<String> = signals.iter().filter_map(|signal| one(signal, lead(signal)?)).collect();
+    found.extend(signals.iter().filter_map(|signal| image(metadata, signal, settings.acquisition.doppler_max_hz)));
     found
 }
 
@@ -187,16 +193,12 @@ fn image(metadata: &IfMetadata, signal: &Signal, doppler_max_hz: f64) -> Option<
     })
 }
 
-/// Signals and satellites that the samples can hold; with `reserved` also codes that no satellite of the
-/// constellation sends.
-pub(super) fn candidates(metadata: &IfMetadata, reserved: bool) -> Vec<Link> {
-    let half_hz = 0.5 * metadata.rate.hz();
-    SIGNALS
-        .into_iter()
-        // A real recording's IF may lie beyond half the rate on purpose.
-        .filter(|signal| !metadata.format.is_complex() || metadata.if_hz(signal.centre_hz()).abs() <= half_hz)
+/// Signals and satellites that are searched for, as far as the samples can hold them.
+pub(super) fn candidates(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Vec<Link> {
+    let signals = settings.signals().into_iter().filter(|signal| acquire::can_hold(metadata, signal));
+    signals
         .flat_map(|signal| signal.satellites().map(move |sv| signal.link(sv)))
-        .filter(|link| reserved || link.is_of_constellation())
+        .filter(|link| settings.reserved_codes || link.is_of_constellation())
         .collect()
 }
 
@@ -270,7 +272,7 @@ impl Reception {
                 let needed = acquire::least_samples(metadata, &settings.acquisition)?;
                 Stage::NothingSearched { samples: count, needed }
             };
-            let if_hz = SIGNALS.first().map_or(0.0, |signal| metadata.if_hz(signal.centre_hz()));
+            let if_hz = settings.acquisition.signals().first().map_or(0.0, |signal| metadata.if_hz(signal.centre_hz()));
             let format = metadata.format.name();
             let (rate_hz, acquired) = (metadata.rate.hz(), outcome.acquired.len());
             let mut diagnosis = Diagnosis::new(stage, seconds, rate_hz, format, if_hz, cut_bytes, acquired);

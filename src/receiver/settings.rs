@@ -10,7 +10,6 @@ use thiserror::Error;
 use toml::{Table, Value};
 
 use crate::gnss::place::Keys;
-use crate::gnss::signal::SIGNALS;
 use crate::gnss::time::{Epoch, TimeError};
 use crate::receiver::acquire::{AcquireError, AcquisitionSettings};
 use crate::receiver::described::described;
@@ -153,11 +152,8 @@ impl Settings {
         self.acquisition
             .validate()
             .map_err(|source| SettingsError::Acquisition { origin: origin.to_owned(), source })?;
-        for component in SIGNALS.iter().filter_map(|signal| signal.components.first()) {
-            self.tracking
-                .validate(component.period_s())
-                .map_err(|source| SettingsError::Tracking { origin: origin.to_owned(), source })?;
-        }
+        // Longer codes have settings that are fitted to them.
+        self.tracking.validate(1e-3).map_err(|source| SettingsError::Tracking { origin: origin.to_owned(), source })?;
         let (position, operation) = (&self.position, &self.operation);
         #[rustfmt::skip]
         let ranges = [

@@ -146,7 +146,8 @@ impl Scenario {
             let reason = format!("{} Hz with the real format {format}: expected more than 0", front_end.if_hz);
             return Err(self.conflict("front_end.if_hz", reason));
         }
-        let carrier_hz = crate::gnss::gps::l1ca::L1_CA.centre_hz();
+        // The intermediate frequency is that of the first signal.
+        let carrier_hz = self.signals.first().map_or(0.0, |signal| signal.centre_hz());
         let offset_hz = if front_end.inverted { -front_end.if_hz } else { front_end.if_hz };
         let center_hz = carrier_hz - offset_hz;
         Ok(IfMetadata {

@@ -23,19 +23,28 @@ pub struct Shape {
 impl Shape {
     /// Of a component's waveform where its code is not zero.
     pub(super) fn of(component: &Component) -> Self {
-        let steps = component.steps_per_chip();
-        let chips = component.layers.iter().map(|layer| layer.chips.len().max(1));
-        let kinds = chips.fold(1, super::least_common_multiple);
+        Self::between(component.layers, component.layers, component.chip_rate_hz)
+    }
+
+    /// Of a waveform of `sent` layers with one of `made` layers, where the code is not zero: the part in phase, and of
+    /// delays of either sign the mean. [`Self::density`] is that of the cross spectrum then.
+    pub fn between(sent: &[Layer], made: &[Layer], chip_rate_hz: f64) -> Self {
+        let both = || sent.iter().chain(made);
+        let steps = both().fold(1, |all, layer| super::least_common_multiple(all, layer.pulse.len().max(1)));
+        let kinds = both().fold(1, |all, layer| super::least_common_multiple(all, layer.chips.len().max(1)));
         let mut lags = vec![0.0; steps + 1];
         for kind in 0..kinds {
-            let wave = chip(component.layers, kind, steps);
+            let (sent, made) = (chip(sent, kind, steps), chip(made, kind, steps));
             for (lag, sum) in lags.iter_mut().enumerate() {
-                let ahead = wave.iter().skip(lag);
-                *sum += ahead.zip(&wave).map(|(ahead, behind)| (ahead * behind.conj()).re).sum::<f64>();
+                let product = |ahead: &[Complex64], behind: &[Complex64]| {
+                    let pairs = ahead.iter().skip(lag).zip(behind);
+                    pairs.map(|(ahead, behind)| (ahead * behind.conj()).re).sum::<f64>()
+                };
+                *sum += 0.5 * (product(&sent, &made) + product(&made, &sent));
             }
         }
         lags.iter_mut().for_each(|sum| *sum /= (kinds * steps) as f64);
-        Self { step_s: 1.0 / (component.chip_rate_hz * steps as f64), lags }
+        Self { step_s: 1.0 / (chip_rate_hz * steps as f64), lags }
     }
 
     /// Correlation of the waveform with itself `delay_s` later, 1 at no delay.

@@ -20,7 +20,8 @@ use super::replica::Replica;
 use super::settings::AcquisitionSettings;
 use super::threshold::{of_one_cell, threshold};
 use crate::gnss::samples::IfMetadata;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::Component;
+use crate::receiver::correlate::wave::strongest;
 use crate::receiver::source::Block;
 
 /// Cells within this of a peak are not noise.
@@ -37,8 +38,9 @@ pub(super) struct Grid {
     if_hz: f64,
     doppler_sign: f64,
     carrier_hz: f64,
-    coherent_periods: f64,
-    sums: u32,
+    /// Code periods in a coherent sum.
+    pub coherent_periods: u32,
+    pub sums: u32,
     pub dopplers_hz: Vec<f64>,
     /// From one of them to the next.
     pub step_hz: f64,
@@ -89,14 +91,24 @@ pub(super) fn samples_needed(period_samples: f64, coherent_periods: f64, sums: u
     last_begins.ceil() as u64 + coherent_samples.round() as u64 + period_samples.ceil() as u64
 }
 
+/// Steps of a replica a second: cells are theirs, as its correlation is as narrow as they are.
+fn step_rate_hz(component: &Component) -> Option<f64> {
+    Some(component.chip_rate_hz * strongest(component)?.pulse.len() as f64)
+}
+
 impl Grid {
-    pub fn new(signal: &Signal, metadata: &IfMetadata, settings: &AcquisitionSettings, centre_hz: f64) -> Option<Self> {
-        let component = signal.components.first()?;
+    pub fn new(
+        (component, carrier_hz): (&Component, f64),
+        metadata: &IfMetadata,
+        settings: &AcquisitionSettings,
+        centre_hz: f64,
+    ) -> Option<Self> {
         let rate_hz = metadata.rate.hz();
         let period_samples = component.period_s() * rate_hz;
-        let periods = f64::from(settings.coherent_periods);
+        let coherent_periods = settings.periods(component);
+        let periods = f64::from(coherent_periods);
         let length = (period_samples.round() as usize).max(2);
-        let narrow = settings.cells_per_chip * component.chip_rate_hz / rate_hz * length as f64;
+        let narrow = settings.cells_per_chip * step_rate_hz(component)? / rate_hz * length as f64;
         // A hair of the band is given for a length that transforms faster.
         let band = fast_length((BAND_SHARE * narrow.min(length as f64)).ceil() as usize);
         let lag_samples = length as f64 / band as f64;
@@ -106,7 +118,7 @@ impl Grid {
         let dopplers_hz: Vec<f64> = (centre - side..=centre + side).map(|bin| bin as f64 * step_hz).collect();
         let lags = (period_samples / lag_samples).ceil() as usize;
         let per_cell = of_one_cell(settings.false_alarm_probability, (lags * dopplers_hz.len()) as f64);
-        let sums = settings.noncoherent_sums;
+        let sums = settings.sums(component);
         // One degree of freedom a sum, with the same mean.
         let image_scale = threshold(per_cell, 2 * sums) / (2.0 * threshold(per_cell, sums));
         let law = Law::new(settings.false_alarm_probability, lags, dopplers_hz.len(), sums, image_scale);
@@ -115,10 +127,10 @@ impl Grid {
             period_samples,
             chips_per_sample: component.chip_rate_hz / rate_hz,
             rate_hz,
-            if_hz: metadata.if_hz(signal.centre_hz()),
+            if_hz: metadata.if_hz(carrier_hz),
             doppler_sign: if metadata.inverted { -1.0 } else { 1.0 },
-            carrier_hz: signal.centre_hz(),
-            coherent_periods: periods,
+            carrier_hz,
+            coherent_periods,
             sums,
             dopplers_hz,
             step_hz,
@@ -135,14 +147,15 @@ impl Grid {
     /// Samples that a search looks at.
     pub fn samples_needed(&self) -> u64 {
         let slowest_hz = self.dopplers_hz.first().copied().unwrap_or(0.0);
-        samples_needed(self.period_samples, self.coherent_periods, self.sums, 1.0 + slowest_hz / self.carrier_hz)
+        let periods = f64::from(self.coherent_periods);
+        samples_needed(self.period_samples, periods, self.sums, 1.0 + slowest_hz / self.carrier_hz)
     }
 
     /// Whether the carrier lies so near its own image (at a multiple of half the rate of a real
     /// recording) that a coherent sum's noise has one degree of freedom instead of two.
     fn meets_image(&self, doppler_hz: f64) -> bool {
         let turns = 2.0 * self.frequency_hz(doppler_hz) / self.rate_hz;
-        let coherent_samples = self.coherent_periods * self.period_samples;
+        let coherent_samples = f64::from(self.coherent_periods) * self.period_samples;
         self.is_real && (turns - turns.round()).abs() * coherent_samples < 0.75
     }
 
@@ -212,7 +225,7 @@ impl Grid {
             self.forward.get_inplace_scratch_len().max(self.inverse.get_inplace_scratch_len())
         ];
         let mut long = vec![Complex::default(); self.forward.len()];
-        let periods = self.coherent_periods as u32;
+        let periods = self.coherent_periods;
         let dwells: Vec<Vec<Complex<f32>>> = (0..self.sums)
             .map(|dwell| {
                 let mut spectrum = vec![Complex::default(); self.inverse.len()];

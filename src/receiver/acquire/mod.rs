@@ -44,8 +44,10 @@ use thiserror::Error;
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Link, SIGNALS, Signal};
+use crate::gnss::signal::{Component, Link, Signal};
+use crate::receiver::lead::lead;
 use crate::receiver::source::Block;
+use crate::receiver::track::model::followed_db;
 use grid::Grid;
 use refine::Refined;
 use replica::Replica;
@@ -102,24 +104,35 @@ pub enum AcquireError {
         "{signal} lies {if_hz} Hz from the centre of the samples: expected within half the sample rate, {half_hz} Hz"
     )]
     OutOfBand { signal: &'static str, if_hz: f64, half_hz: f64 },
+    #[error("acquisition.signals names '{name}': expected some of {known}")]
+    UnknownSignal { name: String, known: String },
+    #[error("no code of {signal} is short enough for this receiver: expected fewer than 32 768 steps a period")]
+    TooLong { signal: &'static str },
     #[error("{sv} has no {signal} code: expected a satellite to which its documents assign one")]
     NoCode { signal: &'static str, sv: Sv },
 }
 
-/// Samples that a search for any known signal looks at, from the first sample of its block.
+/// Whether a signal's carrier lies within the band of the samples. Of a real recording the IF may lie beyond half the rate
+/// on purpose.
+pub fn can_hold(metadata: &IfMetadata, signal: &Signal) -> bool {
+    !metadata.format.is_complex() || metadata.if_hz(signal.centre_hz()).abs() <= 0.5 * metadata.rate.hz()
+}
+
+/// Samples that a search for the signals that are asked for looks at, from the first sample of its block.
 ///
 /// # Errors
 /// As [`AcquisitionSettings::validate`].
 pub fn samples_needed(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Result<u64, AcquireError> {
     settings.validate()?;
-    let periods = f64::from(settings.coherent_periods);
-    let one = |signal: &&'static Signal| {
-        let period_s = signal.components.first().map_or(0.0, Component::period_s);
+    let one = |signal: &'static Signal| {
+        let component = lead(signal)?;
+        let (period_s, periods) = (component.period_s(), f64::from(settings.periods(component)));
         // The grid of Dopplers may reach a step beyond the largest one asked for.
         let slowest = 1.0 - (settings.doppler_max_hz + 1.0 / period_s) / signal.centre_hz();
-        grid::samples_needed(period_s * metadata.rate.hz(), periods, settings.noncoherent_sums, slowest)
+        Some(grid::samples_needed(period_s * metadata.rate.hz(), periods, settings.sums(component), slowest))
     };
-    Ok(SIGNALS.iter().map(one).max().unwrap_or(0))
+    let inside = settings.signals().into_iter().filter(|signal| can_hold(metadata, signal));
+    Ok(inside.filter_map(one).max().unwrap_or(0))
 }
 
 /// The settings of a search that `have` samples have room for: fewer sums, and sums of fewer code periods
@@ -167,7 +180,7 @@ pub fn cell_chips(
     settings: &AcquisitionSettings,
 ) -> Result<f64, AcquireError> {
     settings.validate()?;
-    let grid = Grid::new(signal, metadata, settings, 0.0);
+    let grid = lead(signal).and_then(|component| Grid::new((component, signal.centre_hz()), metadata, settings, 0.0));
     let none = AcquireError::NoCode { signal: signal.name, sv: Sv { system: signal.system, number: 0 } };
     grid.map(|grid| grid.lag_samples * grid.chips_per_sample).ok_or(none)
 }
@@ -190,8 +203,22 @@ pub struct Searcher {
     metadata: IfMetadata,
     settings: AcquisitionSettings,
     centre_hz: f64,
-    grids: BTreeMap<&'static Signal, Grid>,
+    grids: BTreeMap<Band, Grid>,
     codes: BTreeMap<Link, Code>,
+}
+
+/// What candidates share a grid: signal and carrier, in hertz from the middle of the signal's band.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Band {
+    signal: &'static Signal,
+    offset_hz: i64,
+}
+
+impl Band {
+    fn of(link: Link) -> Self {
+        let offset_hz = (link.carrier_hz() - link.signal.centre_hz()).round() as i64;
+        Self { signal: link.signal, offset_hz }
+    }
 }
 
 struct Code {
@@ -223,8 +250,8 @@ impl Searcher {
         })
     }
 
-    /// Searches the beginning of `block` for every candidate, by the first component of its signal; rows
-    /// come in the order of the candidates. Of candidates with the same code only the first is acquired.
+    /// Searches the beginning of `block` for every candidate, by the component of its signal that leads; rows
+    /// come in the order of the candidates. Of candidates with the same code and carrier only the first is acquired.
     ///
     /// # Errors
     /// A block that is too short, or a candidate that these samples cannot hold: see [`AcquireError`].
@@ -240,11 +267,11 @@ impl Searcher {
             self.prepare(*link)?;
         }
         let mut results: Vec<Option<(AcquisitionRow, Option<Acquired>)>> = vec![None; candidates.len()];
-        for (signal, grid) in &self.grids {
+        for (band, grid) in &self.grids {
             let chosen: Vec<(usize, Sv, &Code)> = candidates
                 .iter()
                 .enumerate()
-                .filter(|(_, link)| link.signal == *signal)
+                .filter(|(_, link)| Band::of(**link) == *band)
                 .filter_map(|(index, link)| Some((index, link.sv, self.codes.get(link)?)))
                 .collect();
             if chosen.is_empty() {
@@ -256,7 +283,7 @@ impl Searcher {
             }
             let codes: Vec<(Sv, &Code)> = chosen.iter().map(|&(_, sv, code)| (sv, code)).collect();
             let window = Window::centred(block, need as usize);
-            for ((index, ..), result) in chosen.iter().zip(self.search_signal(signal, grid, window, &codes)) {
+            for ((index, ..), result) in chosen.iter().zip(self.search_signal(band.signal, grid, window, &codes)) {
                 if let Some(slot) = results.get_mut(*index) {
                     *slot = Some(result);
                 }
@@ -269,12 +296,14 @@ impl Searcher {
     fn prepare(&mut self, link: Link) -> Result<(), AcquireError> {
         let Link { sv, signal } = link;
         let no_code = AcquireError::NoCode { signal: signal.name, sv };
-        let Some(component) = signal.components.first() else { return Err(no_code) };
+        let Some(component) = lead(signal) else {
+            return Err(AcquireError::TooLong { signal: signal.name });
+        };
         let rate_hz = self.metadata.rate.hz();
         if rate_hz < component.chip_rate_hz {
             return Err(AcquireError::RateTooLow { signal: signal.name, rate_hz, need_hz: component.chip_rate_hz });
         }
-        let (if_hz, half_hz) = (self.metadata.if_hz(signal.centre_hz()), 0.5 * rate_hz);
+        let (if_hz, half_hz) = (self.metadata.if_hz(link.carrier_hz()), 0.5 * rate_hz);
         // Of a real recording the IF may lie beyond half the rate on purpose.
         if self.metadata.format.is_complex() && if_hz.abs() > half_hz {
             return Err(AcquireError::OutOfBand { signal: signal.name, if_hz, half_hz });
@@ -282,13 +311,15 @@ impl Searcher {
         if sv.system != signal.system {
             return Err(no_code);
         }
-        if !self.grids.contains_key(signal) {
-            let Some(grid) = Grid::new(signal, &self.metadata, &self.settings, self.centre_hz) else {
+        let band = Band::of(link);
+        if !self.grids.contains_key(&band) {
+            let carrier = (component, link.carrier_hz());
+            let Some(grid) = Grid::new(carrier, &self.metadata, &self.settings, self.centre_hz) else {
                 return Err(no_code);
             };
-            self.grids.insert(signal, grid);
+            self.grids.insert(band, grid);
         }
-        if let Some(grid) = self.grids.get(signal)
+        if let Some(grid) = self.grids.get(&band)
             && !self.codes.contains_key(&link)
         {
             let Some(replica) = Replica::new(component, sv.number) else { return Err(no_code) };
@@ -305,10 +336,10 @@ impl Searcher {
         mut window: Window,
         codes: &[(Sv, &Code)],
     ) -> Vec<(AcquisitionRow, Option<Acquired>)> {
-        let Some(component) = signal.components.first() else { return Vec::new() };
+        let Some(component) = lead(signal) else { return Vec::new() };
         let code_chips = f64::from(component.code_chips);
         let complex = self.metadata.format.is_complex();
-        let sums = f64::from(self.settings.noncoherent_sums) * f64::from(self.settings.coherent_periods);
+        let sums = f64::from(grid.sums) * f64::from(grid.coherent_periods);
         let searched_s = sums * component.period_s();
         tone::remove(&mut window, grid.rate_hz, complex);
         let (mut findings, mut crowded) = self.detect(grid, component, &window.block(), codes);
@@ -352,7 +383,8 @@ impl Searcher {
             }
         }
         let rows = findings.iter().zip(codes);
-        rows.map(|(finding, (sv, _))| finding.report(signal, *sv, window.first, code_chips)).collect()
+        let of = (signal, followed_db(component));
+        rows.map(|(finding, (sv, _))| finding.report(of, *sv, window.first, code_chips)).collect()
     }
 
     /// One search of these samples, and refinement of what passes the threshold; with the number of crowded Dopplers.
@@ -363,7 +395,7 @@ impl Searcher {
         block: &Block,
         codes: &[(Sv, &Code)],
     ) -> (Vec<Finding>, usize) {
-        let (sums, coherent) = (self.settings.noncoherent_sums, self.settings.coherent_periods);
+        let (sums, coherent) = (grid.sums, grid.coherent_periods);
         let spectra: Vec<&[Complex<f32>]> = codes.iter().map(|(_, code)| code.spectrum.as_slice()).collect();
         let coherent_s = component.period_s() * f64::from(coherent);
         let peaks = grid.search(block, &spectra);
@@ -398,7 +430,7 @@ struct Finding {
 impl Finding {
     fn report(
         &self,
-        signal: &'static Signal,
+        (signal, followed_db): (&'static Signal, f64),
         sv: Sv,
         sample: u64,
         code_chips: f64,
@@ -413,7 +445,7 @@ impl Finding {
             threshold: self.threshold,
             doppler_hz: best.doppler_hz,
             code_phase_chips: best.code_phase_chips.rem_euclid(code_chips),
-            cn0_dbhz: 10.0 * libm::log10(best.cn0_hz),
+            cn0_dbhz: 10.0 * libm::log10(best.cn0_hz) - followed_db,
         };
         let acquired = self.hit.map(|_| Acquired {
             sv,

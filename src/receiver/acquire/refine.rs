@@ -11,7 +11,8 @@ use rustfft::FftPlanner;
 
 use super::grid::Grid;
 use super::replica::Replica;
-use crate::gnss::signal::Component;
+use crate::gnss::signal::{Component, Shape};
+use crate::receiver::correlate::wave::strongest;
 use crate::receiver::correlate::{Nco, TURN, chips_to_units};
 use crate::receiver::source::Block;
 
@@ -55,17 +56,28 @@ pub(super) fn refine(
     let mut phase = coarse.code_phase_chips.rem_euclid(code_chips);
     let doppler_hz = correlators.fine_doppler_hz(phase, coarse.doppler_hz);
 
+    let shape = strongest(component).map_or_else(
+        || component.shape(),
+        |layer| {
+            let layers = [*layer];
+            Shape::between(&layers, &layers, component.chip_rate_hz)
+        },
+    );
     let noise_offsets = quiet_offsets(replica, component.code_chips);
     let noise = mean(noise_offsets.iter().map(|&offset| correlators.powers(phase, doppler_hz, &[offset])[0]));
-    // BPSK triangle of one chip to either side: (early - late) / (early + late) is twice the error.
-    let reach = 0.5 / component.steps_per_chip() as f64;
+    // Early less late over their sum is the slope there times twice the error over twice the value.
+    let reach = if replica.steps_per_chip() > 1.0 { 0.25 / replica.steps_per_chip() } else { 0.5 };
+    let correlation = |chips: f64| shape.correlation(chips / component.chip_rate_hz);
+    // Beside the peak it falls in a straight line.
+    let slope = (correlation(0.5 * reach) - correlation(reach)) / (0.5 * reach);
+    let scale = correlation(reach) / slope;
     let mut power = 0.0;
     for _ in 0..3 {
         let taps = correlators.powers(phase, doppler_hz, &[reach, 0.0, -reach]);
         let [early, _, late] = taps.map(|power| (power - noise).max(0.0).sqrt());
         power = taps[1];
         if early + late > 0.0 {
-            phase += reach * (early - late) / (early + late);
+            phase += scale * (early - late) / (early + late);
         }
     }
     let measured = if noise > 0.0 { (power / noise - 1.0) / component.period_s() } else { 0.0 };
@@ -92,8 +104,7 @@ impl Correlators<'_> {
     fn sums<const T: usize>(&self, phase_chips: f64, doppler_hz: f64, offsets: &[f64; T]) -> [Vec<Complex<f64>>; T] {
         let step = self.grid.received_chips_per_sample(doppler_hz);
         let turns = self.grid.frequency_hz(doppler_hz) / self.grid.rate_hz;
-        let units = |chips: f64| chips_to_units(chips * self.replica.steps_per_chip());
-        let taps = offsets.map(units);
+        let taps = offsets.map(chips_to_units);
         let mut sums = offsets.map(|_| Vec::with_capacity(self.periods));
         let begin = |period: usize| ((((period + 1) as f64) * self.code_chips - phase_chips) / step).ceil() as usize;
         for period in 0..self.periods {
@@ -103,8 +114,8 @@ impl Correlators<'_> {
                 carrier: fraction_of_turn(turns * from as f64),
                 carrier_step: fraction_of_turn(turns),
                 // Code phase within the period, so that its resolution does not fall with the length of the block.
-                code: units(phase_chips + from as f64 * step - (period + 1) as f64 * self.code_chips),
-                code_step: units(step) as u64,
+                code: chips_to_units(phase_chips + from as f64 * step - (period + 1) as f64 * self.code_chips),
+                code_step: chips_to_units(step) as u64,
             };
             let taps = self.replica.correlator().correlate(i, q, &nco, &taps);
             sums.iter_mut().zip(taps).for_each(|(sum, tap)| sum.push(tap));

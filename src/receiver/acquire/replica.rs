@@ -4,7 +4,7 @@
 //! says and not on the nearest sample; any chip shape made of equal steps works.
 
 use crate::gnss::signal::Component;
-use crate::receiver::correlate::{self, Edge};
+use crate::receiver::correlate::{self, Edge, Wave};
 
 /// The running integral of one code period, in steps of the chip's shape.
 #[derive(Clone, Debug)]
@@ -13,7 +13,7 @@ pub(super) struct Replica {
     integral: Vec<f64>,
     levels: Vec<f64>,
     steps_per_chip: f64,
-    /// The same steps for the tracking correlator.
+    /// The same for the tracking correlator.
     correlator: correlate::Replica,
 }
 
@@ -26,21 +26,20 @@ impl PartialEq for Replica {
 impl Replica {
     /// The code of satellite `number`, or `None` if it has none.
     pub fn new(component: &Component, number: u8) -> Option<Self> {
-        let chips = (component.code)(number)?;
-        let pulse = component.layers.first()?.pulse;
-        let levels: Vec<f64> =
-            chips.iter().flat_map(|&chip| pulse.iter().map(move |&level| f64::from(chip * level))).collect();
+        let wave = Wave::new(component, number)?;
+        let levels: Vec<f64> = wave.values.iter().map(|&value| f64::from(value)).collect();
+        let steps_per_chip = wave.steps_per_chip as f64;
         let integral = std::iter::once(0.0)
             .chain(levels.iter().scan(0.0, |sum, level| {
                 *sum += level;
                 Some(*sum)
             }))
             .collect();
-        let correlator = correlate::Replica::new(levels.iter().map(|&level| level < 0.0).collect(), Edge::Area)?;
-        Some(Self { integral, levels, steps_per_chip: pulse.len() as f64, correlator })
+        let correlator = correlate::Replica::of(wave, Edge::Area)?;
+        Some(Self { integral, levels, steps_per_chip, correlator })
     }
 
-    /// For correlation with phases in steps of the chip's shape.
+    /// For correlation with phases in chips.
     pub fn correlator(&self) -> &correlate::Replica {
         &self.correlator
     }

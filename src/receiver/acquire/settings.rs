@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::gnss::signal::{self, Component, SIGNALS, Signal};
 use crate::receiver::described::described;
 
 use super::AcquireError;
@@ -13,9 +14,11 @@ described! {
 pub struct AcquisitionSettings {
     /// Dopplers from minus to plus this are searched. It has to hold the offset of the local oscillator too.
     pub doppler_max_hz: f64,
-    /// Code periods summed coherently.
+    /// Names of the signals that are searched for; empty for every built-in one that the samples can hold.
+    pub signals: Vec<String>,
+    /// Code periods of 1 ms summed coherently; of longer codes as many as begin in that time, under an overlay code one.
     pub coherent_periods: u32,
-    /// Coherent sums whose powers are added.
+    /// Coherent sums whose powers are added; more where sums are shorter.
     pub noncoherent_sums: u32,
     /// Doppler step times coherent time: 0.5 loses 0.91 dB at worst and 0.29 dB on average, 2/3 1.65 and 0.51 dB.
     pub doppler_step_cycles: f64,
@@ -33,6 +36,7 @@ pub struct AcquisitionSettings {
 impl Default for AcquisitionSettings {
     fn default() -> Self {
         Self {
+            signals: Vec::new(),
             doppler_max_hz: 5000.0,
             coherent_periods: 2,
             noncoherent_sums: 10,
@@ -45,6 +49,33 @@ impl Default for AcquisitionSettings {
 }
 
 impl AcquisitionSettings {
+    /// The signals that are searched for, of names that are known.
+    pub fn signals(&self) -> Vec<&'static Signal> {
+        if self.signals.is_empty() {
+            return SIGNALS.to_vec();
+        }
+        self.signals.iter().filter_map(|name| Signal::find(name)).collect()
+    }
+
+    /// Code periods of a component that are summed coherently: not beyond what keeps its sign.
+    pub fn periods(&self, component: &Component) -> u32 {
+        let whole = 1e-3 * f64::from(self.coherent_periods) / component.period_s();
+        let steady = match component.message {
+            _ if component.overlay.periods() > 1 => 1,
+            Some(message) => message.periods_per_symbol(),
+            None => u32::MAX,
+        };
+        // Beyond rounding of the quotient a period that has begun counts.
+        ((whole - 1e-9).ceil() as u32).clamp(1, steady)
+    }
+
+    /// Coherent sums of a component: more where they had to be shorter.
+    pub fn sums(&self, component: &Component) -> u32 {
+        let asked = 1e-3 * f64::from(self.coherent_periods);
+        let share = asked / (component.period_s() * f64::from(self.periods(component)));
+        (f64::from(self.noncoherent_sums) * share.max(1.0) - 1e-9).ceil() as u32
+    }
+
     /// Checks every range.
     ///
     /// # Errors
@@ -58,6 +89,11 @@ impl AcquisitionSettings {
             ("cells_per_chip", self.cells_per_chip, 2.0, 100.0, "2 to 100"),
             ("false_alarm_probability", self.false_alarm_probability, 1e-12, 0.5, "1e-12 to 0.5"),
         ];
+        if let Some(name) = self.signals.iter().find(|name| Signal::find(name).is_none()) {
+            let known =
+                signal::all().iter().map(|signal| format!("\"{}\"", signal.name)).collect::<Vec<_>>().join(", ");
+            return Err(AcquireError::UnknownSignal { name: name.clone(), known });
+        }
         for (key, value, low, high, expected) in rules {
             if !(low..=high).contains(&value) {
                 return Err(AcquireError::Setting { key, value, expected });

@@ -115,7 +115,7 @@ pub(super) fn correlate<const T: usize>(
         Edge::Area => step - step / 2 - (1 << CODE_BITS),
         Edge::Nearest => 0,
     };
-    let begin = |tap: i64| (nco.code + tap + ahead).rem_euclid(replica.period()) as u64;
+    let begin = |tap: i64| (nco.code + tap + ahead).rem_euclid(replica.steps_period()) as u64;
     let mut sums = [Complex64::ZERO; T];
     let (threes, ones) = taps.as_chunks::<3>();
     let (sums_of_threes, sums_of_ones) = sums.as_chunks_mut::<3>();

@@ -67,7 +67,7 @@ impl Steps {
             slope,
             offset,
             advance: step * GROUP as u64,
-            period: replica.period() as u64,
+            period: replica.steps_period() as u64,
         })
     }
 

@@ -50,7 +50,7 @@ pub(super) fn body<const T: usize>(
     let step = job.nco.code_step;
     let fine = CODE_BITS - FINE;
     let width = (step >> fine) as u32;
-    let period = job.replica.period() as u64;
+    let period = job.replica.steps_period() as u64;
     let steps = Steps {
         lane: std::array::from_fn(|k| (step.wrapping_mul(k as u64) >> fine) as u32),
         inverse_width: 1.0 / width.max(1) as f32,

@@ -302,9 +302,9 @@ fn range(
         return None;
     }
     // The clock's argument is GPS time; one correction leaves drift × offset², far below a picosecond.
-    let rough = ephemeris.clock_l1(sent).ok()?;
+    let rough = ephemeris.clock_of_signal(sent, observation.signal).ok()?;
     let emitted = sent.plus_s(-rough.offset_s);
-    let clock = ephemeris.clock_l1(emitted).ok()?;
+    let clock = ephemeris.clock_of_signal(emitted, observation.signal).ok()?;
     let clock = planted!("receiver.position.group_delay", clock, ephemeris.clock(emitted).ok()?);
     let emitted = sent.plus_s(-clock.offset_s);
     Some(Range {

@@ -4,10 +4,11 @@ use rayon::prelude::*;
 
 use super::{Session, Track};
 use crate::gnss::record::{Event, EventRow, Fix};
-use crate::gnss::signal::{Component, SIGNALS, Signal};
+use crate::gnss::signal::{Component, Signal};
 use crate::receiver::decode::Decoder;
 use crate::receiver::gap::scan::{Found, Profile, Scan};
 use crate::receiver::gap::{Fit, Jump, Step, Trend, common_step, doppler_step, turned_by};
+use crate::receiver::lead::lead;
 use crate::receiver::output::Output;
 use crate::receiver::run::ReceiveError;
 use crate::receiver::source::{Packed, Planes};
@@ -100,13 +101,13 @@ impl Gap {
     }
 }
 
-/// Chips and their length, of the signals' first component.
-fn component() -> Option<(&'static Signal, &'static Component)> {
-    let signal = SIGNALS.first()?;
-    Some((signal, signal.components.first()?))
-}
-
 impl Session {
+    /// The signal that is received, and its component that leads.
+    fn component(&self) -> Option<(&'static Signal, &'static Component)> {
+        let signal = self.signal?;
+        Some((signal, lead(signal)?))
+    }
+
     /// Looks at all codes at the end of a block, and goes on with what it suspects.
     pub(super) fn leap(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
         match self.gap.stage {
@@ -137,7 +138,7 @@ impl Session {
     /// Deviation of a look of so many code periods at a channel's code.
     fn look_chips(&self, track: &Track, periods: f64) -> f64 {
         let noise = &self.code_noise;
-        let t_s = periods * component().map_or(1e-3, |(_, component)| component.period_s());
+        let t_s = periods * self.component().map_or(1e-3, |(_, component)| component.period_s());
         // A loop of bandwidth B averages over 1/(2B).
         let open = 1.0 / (2.0 * noise.bandwidth_hz * t_s).sqrt();
         noise.sigma_m(libm::pow(10.0, track.cn0_dbhz / 10.0)) * open / noise.chip_m
@@ -145,7 +146,7 @@ impl Session {
 
     /// Takes a look into the trends, unless it shows something common.
     fn suspect(&mut self, glances: &[Option<Glance>], at_s: f64, since: u64) {
-        let Some((signal, component)) = component() else { return };
+        let Some((signal, component)) = self.component() else { return };
         let ratio = signal.centre_hz() / component.chip_rate_hz;
         let (mut steps, mut seen, mut gone) = (Vec::new(), 0, 0);
         for (track, glance) in self.tracks.iter().zip(glances) {
@@ -212,7 +213,7 @@ impl Session {
 
     /// Correlates a block at all delays, and moves the replicas when that shows where the codes are.
     fn scan(&mut self, block: &Packed, since: u64, whole: bool, output: &mut Output) -> Result<(), ReceiveError> {
-        let Some((signal, component)) = component() else { return Ok(()) };
+        let Some((signal, component)) = self.component() else { return Ok(()) };
         let rate_hz = self.metadata.rate.hz();
         let middle_s = self.metadata.rate.elapsed_s((block.first + block.end()) / 2);
         let scan = self.gap.scan.get_or_insert_with(|| Scan::new(component.period_s(), rate_hz));
@@ -262,7 +263,7 @@ impl Session {
         whole: bool,
         output: &mut Output,
     ) -> Result<(), ReceiveError> {
-        let Some((signal, component)) = component() else { return Ok(()) };
+        let Some((signal, component)) = self.component() else { return Ok(()) };
         let ratio = signal.centre_hz() / component.chip_rate_hz;
         let sample_chips = component.chip_rate_hz / self.metadata.rate.hz();
         let now_s = self.metadata.rate.elapsed_s(now);
@@ -309,7 +310,7 @@ impl Session {
 
     /// The codes' steps beyond what the scan found.
     fn steps(&self) -> Vec<Step> {
-        let Some((signal, component)) = component() else { return Vec::new() };
+        let Some((signal, component)) = self.component() else { return Vec::new() };
         let ratio = signal.centre_hz() / component.chip_rate_hz;
         let periods = LOOK_S / component.period_s();
         let one = |track: &Track| {
@@ -340,7 +341,7 @@ impl Session {
         if waited < self.samples(TURNS_S) {
             return Ok(());
         }
-        let Some((signal, component)) = component() else { return Ok(()) };
+        let Some((signal, component)) = self.component() else { return Ok(()) };
         let group = component.message.map_or(1, |message| u64::from(message.periods_per_symbol()));
         let edges: Vec<_> =
             self.tracks.iter().filter_map(|track| Some((track.channel.edges(), track.watched.begin?))).collect();

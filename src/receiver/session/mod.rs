@@ -13,12 +13,13 @@ use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::{EventRow, LineRow};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Link, SIGNALS};
+use crate::gnss::signal::{Link, Signal};
 use crate::gnss::time::Epoch;
 use crate::receiver::acquire::{self, Searcher};
 use crate::receiver::decode::Decoder;
 use crate::receiver::diagnosis::Stage;
 use crate::receiver::interference::Watch;
+use crate::receiver::lead::{lead, refusal};
 use crate::receiver::looks::Looks;
 use crate::receiver::observe::Timebase;
 use crate::receiver::output::Output;
@@ -28,7 +29,8 @@ use crate::receiver::position::{CodeNoise, NoFix, Solver};
 use crate::receiver::run::{Conditioning, Interfered, Outcome, ReceiveError, candidates, warnings};
 use crate::receiver::settings::Settings;
 use crate::receiver::source::{Block, Packed, Planes};
-use crate::receiver::track::{Channel, LoopMargin, Report, code_shape};
+use crate::receiver::track::loops::CodeShape;
+use crate::receiver::track::{Channel, LoopMargin, ReplicaModel, Report};
 
 mod decode;
 mod gap;
@@ -88,6 +90,8 @@ pub(super) struct Session {
     metadata: IfMetadata,
     settings: Settings,
     week_reference: Epoch,
+    /// The signal that is received.
+    signal: Option<&'static Signal>,
     candidates: Vec<Link>,
     searcher: Searcher,
     /// Where it looks, and whether as after the first search.
@@ -140,19 +144,31 @@ impl Session {
         let week_reference = settings.week_reference().map_err(|source| {
             crate::receiver::settings::SettingsError::Week { origin: "settings".to_owned(), source }
         })?;
-        let component = SIGNALS.first().and_then(|signal| signal.components.first());
+        let mut signals = settings.acquisition.signals();
+        signals.retain(|signal| acquire::can_hold(metadata, signal));
+        if let [first, second, ..] = signals.as_slice() {
+            return Err(ReceiveError::Several { first: first.name, second: second.name });
+        }
+        let signal = signals.first().or(settings.acquisition.signals().first()).copied();
+        if let Some((signal, reason)) = signal.and_then(|signal| Some((signal, refusal(signal)?))) {
+            return Err(ReceiveError::Unsupported { signal: signal.name, reason });
+        }
+        let component = signal.and_then(lead);
         let (chip_rate_hz, period_s) = component.map_or((1.0, 1.0), |c| (c.chip_rate_hz, c.period_s()));
         let noise = CodeNoise {
             chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
-            shape: code_shape(&settings.tracking, chip_rate_hz / metadata.rate.hz()),
+            shape: component
+                .and_then(|c| ReplicaModel::new(&settings.tracking, c, metadata.rate.hz()))
+                .map_or(CodeShape::triangle(settings.tracking.spacing_chips), |model| model.shape),
             bandwidth_hz: settings.tracking.dll_bandwidth_hz,
             integration_s: period_s * f64::from(settings.tracking.integration),
         };
         Ok(Self {
             metadata: metadata.clone(),
             settings: settings.clone(),
+            signal,
             week_reference,
-            candidates: candidates(metadata, settings.acquisition.reserved_codes),
+            candidates: candidates(metadata, &settings.acquisition),
             searcher: Searcher::new(metadata, &settings.acquisition)?,
             aimed: None,
             widenings: 0,

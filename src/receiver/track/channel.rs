@@ -13,6 +13,8 @@ use super::closed::{Loops, Mode, Update};
 use super::cn0::Cn0;
 use super::lock::{PhaseLock, Rotation, SymbolLock};
 use super::loops::CodeShape;
+use super::model::{ReplicaModel, followed_db};
+use super::overlay::{OverlayPhase, OverlaySync};
 use super::pull_in::Batch;
 use super::sync::SymbolSync;
 use super::{Measurement, Report, Symbol, TrackingSettings};
@@ -22,12 +24,18 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal};
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
-use crate::receiver::correlate::{self, Arithmetic, Nco, Replica, TURN, chips_to_units, correlation, units_to_chips};
+use crate::receiver::correlate::{self, Arithmetic, Nco, Replica, TURN, Wave, chips_to_units, units_to_chips};
+use crate::receiver::lead::lead;
 use crate::receiver::parting::Phases;
 use crate::receiver::source::Block;
 
+mod pilot;
 mod reseat;
 mod supervise;
+
+use pilot::Data;
+pub use pilot::beside;
+use supervise::pilot_group;
 
 pub use reseat::Glance;
 use reseat::Glances;
@@ -40,8 +48,6 @@ const POWER_PERIODS: f64 = 100.0;
 const POWER_EVERY: u64 = 8;
 /// Time constants 1/(4B) of the code's pull-in, times four, until its first error has decayed to 2 %.
 const SETTLED: f64 = 1.0;
-/// Group of prompts and verification for signals without symbols.
-const PILOT_GROUP: u32 = 20;
 /// Signals that the search found weaker than this are pulled in by a batch of prompts: T·C/N0 is then below ten, and a
 /// frequency loop's discriminator, ±250 Hz wide, scatters by more than 40 Hz.
 const WEAK_DBHZ: f64 = 40.0;
@@ -87,8 +93,16 @@ pub struct Channel {
     carrier_offset_hz: f64,
     next_offset_hz: f64,
     period_s: f64,
+    /// Code periods a symbol, or those summed where there are none; 1 while an overlay is unknown.
     group: u32,
     has_symbols: bool,
+    overlay: Option<OverlaySync>,
+    overlay_phase: Option<OverlayPhase>,
+    data: Option<Data>,
+    /// C/N0 of what is followed over that of the whole signal.
+    followed_db: f64,
+    /// Carrier phase of what is followed against the signal's.
+    phase_cycles: f64,
     /// `None` where the documents assign no code: such a channel is lost from the start.
     replica: Option<Replica>,
     arithmetic: Arithmetic,
@@ -144,32 +158,33 @@ pub struct Channel {
     last: Update,
 }
 
-/// The correlation at early and late of a receiver with such settings.
-pub fn code_shape(settings: &TrackingSettings, chips_per_sample: f64) -> CodeShape {
-    let (peak, _) = correlation(settings.replica, chips_per_sample, 0.0);
-    let (side, slope) = correlation(settings.replica, chips_per_sample, 0.5 * settings.spacing_chips);
-    let (common, _) = correlation(settings.replica, chips_per_sample, settings.spacing_chips);
-    CodeShape { value: side / peak, slope: -slope / peak, common: common / peak }
-}
-
 impl Channel {
     /// A channel that begins at what the search found. The code phase is carried from the hit's sample to the
     /// first sample of the first block with the code rate that belongs to the hit's Doppler. Settings are
     /// taken as validated.
     pub fn start(hit: &Acquired, metadata: &IfMetadata, settings: &TrackingSettings) -> Self {
-        let component = hit.signal.components.first();
+        let component = lead(hit.signal);
         let chip_rate_hz = component.map_or(1.0, |c| c.chip_rate_hz);
         let period_s = component.map_or(1.0, |c| c.period_s());
         let message = component.and_then(|c| c.message);
-        let group = message.map_or(PILOT_GROUP, |m| m.periods_per_symbol());
-        let code = component.and_then(|c| (c.code)(hit.sv.number)).unwrap_or_default();
-        let replica = Replica::new(code.iter().map(|&chip| chip < 0).collect(), settings.replica);
-        let chips_per_sample = chip_rate_hz / metadata.rate.hz();
+        let settings = &component.map_or(settings.clone(), |c| settings.fitted(c));
+        let codes = component.filter(|c| c.overlay.periods() > 1).and_then(|c| c.overlay.of(hit.sv.number));
+        let overlay = codes.map(OverlaySync::new);
+        // Signs of prompts are anyone's guess until the overlay's are known.
+        let group = match message {
+            _ if overlay.is_some() => 1,
+            Some(message) => message.periods_per_symbol(),
+            None => pilot_group(period_s),
+        };
+        let has_symbols = message.is_some() || overlay.is_some();
+        let wave = component.and_then(|c| Wave::new(c, hit.sv.number));
+        let replica = wave.and_then(|wave| Replica::of(wave, settings.replica));
+        let model = component.and_then(|c| ReplicaModel::new(settings, c, metadata.rate.hz()));
         let half = 0.5 * settings.spacing_chips;
-        let (peak, _) = correlation(settings.replica, chips_per_sample, 0.0);
         let sense = if metadata.inverted { -1.0 } else { 1.0 };
-        let shape = code_shape(settings, chips_per_sample);
-        let loops = Loops::new(settings, shape, message.is_some(), sense * hit.doppler_hz);
+        let shape = model.map_or(CodeShape::triangle(settings.spacing_chips), |model| model.shape);
+        let share = replica.as_ref().map_or(1.0, Replica::share);
+        let loops = Loops::new(settings, shape, has_symbols, sense * hit.doppler_hz);
         let if_hz = metadata.if_hz(hit.link().carrier_hz());
         let mut channel = Self {
             settings: settings.clone(),
@@ -185,7 +200,14 @@ impl Channel {
             next_offset_hz: 0.0,
             period_s,
             group,
-            has_symbols: message.is_some(),
+            has_symbols,
+            data: component
+                .filter(|_| overlay.is_some())
+                .and_then(|c| Data::beside(c, (hit.signal, hit.sv), settings, (metadata.rate.hz(), sense))),
+            overlay,
+            overlay_phase: None,
+            followed_db: component.map_or(0.0, followed_db),
+            phase_cycles: component.map_or(0.0, |c| c.phase_cycles),
             lost: replica.is_none(),
             replica,
             arithmetic: match (settings.arithmetic, metadata.format) {
@@ -193,7 +215,7 @@ impl Channel {
                 (Arithmetic::I16 | Arithmetic::F32, _) => Arithmetic::F32,
                 (Arithmetic::F64, _) => Arithmetic::F64,
             },
-            replica_power: peak,
+            replica_power: share * model.map_or(1.0, |model| model.power),
             taps: [chips_to_units(half), 0, -chips_to_units(half)],
             noise_taps: Vec::new(),
             start: None,
@@ -207,7 +229,11 @@ impl Channel {
             whole: false,
             loops,
             wide: true,
-            stage: if hit.cn0_dbhz < WEAK_DBHZ { Stage::Open } else { Stage::Frequency },
+            stage: if hit.cn0_dbhz + component.map_or(0.0, followed_db) < WEAK_DBHZ {
+                Stage::Open
+            } else {
+                Stage::Frequency
+            },
             stage_since: 0,
             update_since: 0,
             pull_in_since: 0,
@@ -220,7 +246,11 @@ impl Channel {
             symbol: (Complex64::ZERO, 0),
             rotation: Rotation::default(),
             power: None,
-            cn0: Cn0::new(if message.is_some() { group } else { 1 }, period_s, settings.cn0_average_s),
+            cn0: if has_symbols && group == 1 {
+                Cn0::of_single_periods(period_s, settings.cn0_average_s)
+            } else {
+                Cn0::new(if has_symbols { group } else { 1 }, period_s, settings.cn0_average_s)
+            },
             phase_lock: PhaseLock::new(LOCK_PERIODS),
             symbol_lock: SymbolLock::new(),
             sync: SymbolSync::new(group),
@@ -393,14 +423,23 @@ impl Channel {
             }
             None => (replica.correlate_in(self.arithmetic, (i, q), &nco, &self.taps), None),
         };
+        let read = self.whole && self.confirmed && !self.held && self.overlay_phase.is_some();
         if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
             let power = correlate::power(i, q) / i.len().max(1) as f64;
             self.power =
                 Some(self.power.map_or(power, |mean| mean + (power - mean) * POWER_EVERY as f64 / POWER_PERIODS));
         }
+        let mean = self.power.unwrap_or_default();
+        let samples = next - self.first;
+        // Noise of a correlation, per component: half the samples' power (real samples too) times the replica's energy.
+        let deviation = (0.5 * mean * samples as f64 * self.replica_power).sqrt();
+        let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
+        if read && let Some(data) = &mut self.data {
+            let phase = self.overlay_phase.unwrap_or_default();
+            report.symbols.extend(data.read((i, q), self.arithmetic, &nco, (self.period, phase), scale));
+        }
         self.carry.0.clear();
         self.carry.1.clear();
-        let samples = next - self.first;
         self.pass(next);
         self.code -= replica.period();
         let finished = self.period;
@@ -411,12 +450,9 @@ impl Channel {
             self.update_since = next;
             return;
         }
-        let mean = self.power.unwrap_or_default();
-        // Noise of a correlation, per component: half the samples' power (real samples too) times the replica's energy.
-        let deviation = (0.5 * mean * samples as f64 * self.replica_power).sqrt();
-        let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
+        let signed = scale * self.overlay_chip(finished);
         let mut taps = [Complex64::ZERO; 3];
-        taps.iter_mut().zip(&sums).for_each(|(tap, sum)| *tap = sum * scale);
+        taps.iter_mut().zip(&sums).for_each(|(tap, sum)| *tap = sum * signed);
         if !self.held && !self.moved {
             self.cn0.add(taps[1], noise.map(|sum| (sum * scale).norm_sqr()));
         }
@@ -499,7 +535,7 @@ impl Channel {
 
     /// The best estimate of C/N0: what the search found until there is one.
     fn cn0_hz(&self) -> f64 {
-        self.cn0.hz().unwrap_or_else(|| libm::pow(10.0, self.hit.cn0_dbhz / 10.0))
+        self.cn0.hz().unwrap_or_else(|| libm::pow(10.0, (self.hit.cn0_dbhz + self.followed_db) / 10.0))
     }
 
     /// Power of a prompt's noise: two for white noise.
@@ -516,16 +552,16 @@ impl Channel {
         let fraction = units_to_chips(code.rem_euclid(length) as i64) / units_to_chips(replica.period());
         let carrier = self.carrier + samples * planted!("receiver.nco.carrier_between_updates", self.carrier_step, 0);
         let turns = (carrier >> 64) as f64 + carrier as u64 as f64 / TURN;
-        let half = if self.polarity == Some(true) { 0.5 } else { 0.0 };
+        let half = if self.polarity == Some(true) { 0.5 } else { 0.0 } + self.phase_cycles;
         let passed_s = tick.saturating_sub(self.update_since) as f64 / self.rate.hz();
         let offset_hz = self.loops.carrier.rate + self.loops.carrier.acceleration * passed_s;
-        let cn0_dbhz = 10.0 * libm::log10(self.cn0_hz());
+        let cn0_dbhz = 10.0 * libm::log10(self.cn0_hz()) - self.followed_db;
         report.measurements.push(Measurement {
             sample: tick,
             code_periods: periods.max(0) as u64,
             code_fraction: fraction,
             carrier_cycles: half - planted!("receiver.measure.carrier_sign", self.sense, -self.sense) * turns,
-            half_cycle_known: self.polarity.is_some(),
+            half_cycle_known: self.polarity.is_some() || self.overlay_phase.is_some(),
             doppler_hz: planted!("receiver.measure.doppler_sign", self.sense, -self.sense) * offset_hz,
             cn0_dbhz,
             locked_s: self.locked_since.map_or(0.0, |since| tick.saturating_sub(since) as f64 / self.rate.hz()),

@@ -81,6 +81,11 @@ impl Loops {
         }
     }
 
+    /// Prompts have no signs of symbols from now on.
+    pub fn wipe(&mut self) {
+        self.has_symbols = false;
+    }
+
     /// Sets the gains for updates every `update_s`; `wide` asks for the code loop's pull-in bandwidth.
     pub fn design(&mut self, settings: &TrackingSettings, mode: Mode, wide: bool, update_s: f64) {
         let (fll_order, fll_hz) = match mode {

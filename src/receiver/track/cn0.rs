@@ -7,6 +7,9 @@
 //! at a delay where the code's own correlation vanishes. It meets the same filters, interference and
 //! satellites as the prompt does, so multiple access counts as noise.
 //!
+//! Where each prompt has a sign of its own (symbols of one period, an unknown overlay) the signal is what the power of
+//! prompts exceeds the reference by.
+//!
 //! **After.** Power within and between the M prompts of a symbol (narrow against wide band, as moments): all noise is
 //! within. The reference is not needed any more.
 //!
@@ -27,6 +30,8 @@ pub struct Cn0 {
     average_periods: f64,
     /// Code periods a symbol of this signal.
     group: u32,
+    /// Every prompt has a sign of its own: the signal is what its power exceeds the noise by.
+    single: bool,
     known: bool,
     previous: Option<Complex64>,
     seen: u32,
@@ -51,6 +56,7 @@ impl Cn0 {
             period_s,
             average_periods,
             group: group.max(1),
+            single: false,
             known: false,
             previous: None,
             seen: 0,
@@ -59,6 +65,20 @@ impl Cn0 {
             signal: Mean::leaning(average_periods),
             noise: Mean::new(average_periods),
         }
+    }
+
+    /// For prompts each of which has a sign of its own.
+    pub fn of_single_periods(period_s: f64, average_s: f64) -> Self {
+        Self { single: true, ..Self::new(1, period_s, average_s) }
+    }
+
+    /// Prompts have no signs any more: they are summed in groups.
+    pub fn wiped(&self, group: u32) -> Self {
+        let signal = self.unknown_signal();
+        let mut wiped = Self { group: group.max(1), single: false, previous: None, ..self.clone() };
+        let share = wiped.share();
+        wiped.signal = self.signal.with(self.average_periods, self.signal.count(), [signal * share, 0.0]);
+        wiped
     }
 
     /// From now on the next prompt opens a symbol. Of what was seen before, the means stay.
@@ -106,7 +126,9 @@ impl Cn0 {
         if let Some(power) = reference {
             self.noise.add([power, 0.0]);
         }
-        if let Some(previous) = self.previous.replace(prompt) {
+        if self.single {
+            self.signal.add([prompt.norm_sqr(), 0.0]);
+        } else if let Some(previous) = self.previous.replace(prompt) {
             let product = prompt * previous.conj();
             self.signal.add([product.re, product.im]);
         }
@@ -135,6 +157,9 @@ impl Cn0 {
 
     fn unknown_signal(&self) -> f64 {
         let [re, im] = self.signal.values();
+        if self.single {
+            return re - self.noise.values()[0];
+        }
         Complex64::new(re, im).norm() / self.share()
     }
 

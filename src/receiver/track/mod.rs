@@ -3,8 +3,8 @@
 //! A [`Channel`] takes consecutive blocks of samples and gives the state of its replica at requested samples,
 //! message symbols, rows for the judge and events. Its loops ([`loops`]) are designed in the discrete domain
 //! and closed in [`closed`]; detectors are in [`lock`], [`cn0`] and `sync`, the pull-in of weak signals in
-//! `pull_in`. Limits: the first component of a signal only, one code period at least as long as a few
-//! samples.
+//! `pull_in`, the overlay of pilots in `overlay`. Limits: loops follow the component that leads, a code period is at least
+//! as long as a few samples.
 
 use crate::gnss::record::{Event, TrackingRow};
 
@@ -13,13 +13,18 @@ pub mod closed;
 pub mod cn0;
 pub mod lock;
 pub mod loops;
+pub mod model;
+mod overlay;
 mod pull_in;
 pub mod settings;
+#[cfg(test)]
+mod signals_tests;
 mod sync;
 #[cfg(test)]
 mod tests;
 
-pub use channel::{Channel, Glance, code_shape};
+pub use channel::{Channel, Glance, beside};
+pub use model::ReplicaModel;
 pub use settings::{CodeDiscriminator, LoopMargin, TrackingSettings, TrackingSettingsError};
 
 /// What a channel found in a block.

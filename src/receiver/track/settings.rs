@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::gnss::signal::Component;
+use crate::receiver::correlate::wave::strongest;
 use crate::receiver::correlate::{Arithmetic, Edge};
 use crate::receiver::described::described;
 
@@ -43,9 +45,9 @@ pub struct TrackingSettings {
     pub dll_pull_in_s: f64,
     /// How the code error is measured.
     pub dll_discriminator: CodeDiscriminator,
-    /// Distance from early to late.
+    /// Distance from early to late; of BOC divided by the steps of its pulse.
     pub spacing_chips: f64,
-    /// Code periods a loop update once symbols are known: a divisor of 20.
+    /// Code periods of 1 ms a loop update once symbols are known: a divisor of 20. Of longer codes as many as fit.
     pub integration: u32,
     /// How the replica's chips fall on the samples.
     pub replica: Edge,
@@ -111,6 +113,9 @@ pub enum TrackingSettingsError {
 /// discriminator's range.
 pub const LARGEST_BANDWIDTH_TIME: f64 = 0.4;
 
+/// Code periods that an update may have.
+const INTEGRATIONS: [u32; 6] = [1, 2, 4, 5, 10, 20];
+
 /// How near a loop is to what [`TrackingSettings::validate`] refuses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LoopMargin {
@@ -126,6 +131,29 @@ pub struct LoopMargin {
 }
 
 impl TrackingSettings {
+    /// These settings for a component. Numbers of code periods are those of 1 ms, so an update of longer codes has fewer;
+    /// the spacing is that of BPSK, so pulses of several steps have as much less; bandwidths that an update of one code
+    /// period cannot have are the largest that it can.
+    pub fn fitted(&self, component: &Component) -> Self {
+        let period_s = component.period_s();
+        let most = (1e-3 * f64::from(self.integration) / period_s + 1e-9).floor() as u32;
+        let integration = INTEGRATIONS.into_iter().rev().find(|periods| *periods <= most).unwrap_or(1);
+        let steps = strongest(component).map_or(1, |layer| layer.pulse.len());
+        let fit = |bandwidth_hz: f64, periods: u32| {
+            bandwidth_hz.min(LARGEST_BANDWIDTH_TIME / (period_s * f64::from(periods)))
+        };
+        Self {
+            integration,
+            spacing_chips: self.spacing_chips / steps as f64,
+            pll_bandwidth_hz: fit(self.pll_bandwidth_hz, integration),
+            dll_bandwidth_hz: fit(self.dll_bandwidth_hz, integration),
+            dll_pull_in_bandwidth_hz: fit(self.dll_pull_in_bandwidth_hz, integration),
+            fll_bandwidth_hz: fit(self.fll_bandwidth_hz, 1),
+            fll_assist_bandwidth_hz: fit(self.fll_assist_bandwidth_hz, 1),
+            ..self.clone()
+        }
+    }
+
     /// Every loop's bandwidth times update time and its margin, for a code whose period is `period_s`.
     pub fn margins(&self, period_s: f64) -> [LoopMargin; 5] {
         let update_s = period_s * f64::from(self.integration);
@@ -170,7 +198,7 @@ impl TrackingSettings {
             ("dll_pull_in_bandwidth_hz", self.dll_pull_in_bandwidth_hz, positive(self.dll_pull_in_bandwidth_hz), "above 0"),
             ("dll_pull_in_s", self.dll_pull_in_s, within(self.dll_pull_in_s, 0.0, 60.0), "0 to 60"),
             ("spacing_chips", self.spacing_chips, within(self.spacing_chips, 0.02, 1.5), "0.02 to 1.5"),
-            ("integration", f64::from(self.integration), [1, 2, 4, 5, 10, 20].contains(&self.integration), "1, 2, 4, 5, 10 or 20"),
+            ("integration", f64::from(self.integration), INTEGRATIONS.contains(&self.integration), "1, 2, 4, 5, 10 or 20"),
             ("phase_lock_threshold", self.phase_lock_threshold, within(self.phase_lock_threshold, 0.1, 0.99), "0.1 to 0.99"),
             ("phase_unlock_threshold", self.phase_unlock_threshold, within(self.phase_unlock_threshold, 0.0, self.phase_lock_threshold), "0 to phase_lock_threshold"),
             ("loss_s", self.loss_s, within(self.loss_s, 0.05, 10.0), "0.05 to 10"),

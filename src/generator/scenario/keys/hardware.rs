@@ -5,7 +5,7 @@ use crate::generator::scenario::schema::{Key, flag, integer, number, numbers, te
 
 pub(crate) const FRONT_END: &[Key] = &[
     number("sample_rate_hz", 1.1e6, 100e6, "Hz", "sample rate").or(2.6e6),
-    number("if_hz", -100e6, 100e6, "Hz", "where GPS L1 appears in the samples").or(0.0),
+    number("if_hz", -100e6, 100e6, "Hz", "where the carrier of the first signal appears in the samples").or(0.0),
     flag("spectrum_inverted", "whether frequencies run downwards"),
     text(
         "format",

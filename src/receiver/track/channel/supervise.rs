@@ -20,6 +20,14 @@ const PHASE_LIMIT_SHARE: f64 = 0.5;
 /// Batches of a weak signal's pull-in that may fail.
 const BATCHES: f64 = 4.0;
 
+/// Duration of a pilot's prompts that are summed like a symbol's.
+const PILOT_S: f64 = 0.02;
+
+/// Code periods of a pilot that are summed like a symbol's.
+pub(super) fn pilot_group(period_s: f64) -> u32 {
+    ((PILOT_S / period_s).round() as u32).max(1)
+}
+
 /// An empty batch for symbols of `group` code periods of `period_s`: as long as the frequency loop's pull-in.
 pub(super) fn batch(settings: &TrackingSettings, group: u32, period_s: f64) -> Batch {
     let periods = (settings.fll_pull_in_s / period_s) as usize;
@@ -91,7 +99,7 @@ impl Channel {
             return;
         };
         // Edges that a random message does not show yet are waited for: wrong ones cost the channel.
-        if self.has_symbols && !found.changes && self.batch.extend() {
+        if self.has_symbols && self.group > 1 && !found.changes && self.batch.extend() {
             return;
         }
         // Batches grow until they end where a symbol does.
@@ -100,6 +108,10 @@ impl Channel {
         }
         self.loops.carrier = Rates { rate: self.loops.carrier.rate + found.cycles / self.period_s, acceleration: 0.0 };
         self.carrier += (found.phase_cycles * TURN) as i128;
+        if self.overlay.is_some() && self.overlay_phase.is_none() {
+            self.enter(Stage::Assisted);
+            return;
+        }
         self.enter(Stage::Tracking((number + 1) % group));
         self.confirmed = !self.has_symbols;
     }
@@ -132,7 +144,7 @@ impl Channel {
     }
 
     fn confirm(&mut self, report: &mut Report) {
-        if !self.confirmed && self.has_symbols {
+        if !self.confirmed && (self.has_symbols || self.overlay.is_some()) {
             report.events.push((self.first, Event::BitSynchronised));
         }
         self.confirmed = true;
@@ -178,9 +190,19 @@ impl Channel {
 
     /// Begins to track at the first symbol after its edge is known.
     fn find_symbols(&mut self, number: u64, prompt: Complex64, report: &mut Report) {
+        let prompt = self.whitened(prompt);
+        if self.overlay_phase.is_none()
+            && let Some(overlay) = &mut self.overlay
+        {
+            if let Some(phase) = overlay.add(number, prompt) {
+                self.wipe(phase);
+            }
+            return;
+        }
         if self.pending.is_none() {
-            let prompt = self.whitened(prompt);
-            self.pending = if self.has_symbols { self.sync.add(number, prompt) } else { Some(0) };
+            // A symbol of one period begins with each.
+            let searched = self.has_symbols && self.group > 1;
+            self.pending = if searched { self.sync.add(number, prompt) } else { Some(0) };
         }
         if let Some(begin) = self.pending
             && (number + 1) % u64::from(self.group) == begin

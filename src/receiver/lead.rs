@@ -1,0 +1,84 @@
+//! The component of a signal that a receiver searches and follows.
+
+use crate::gnss::signal::{Component, Signal};
+use crate::receiver::correlate::fits;
+use crate::receiver::track::beside;
+
+/// The strongest component whose code is short enough to be made; of equally strong ones a pilot.
+///
+/// A pilot with an overlay costs the search no more than data do: both change sign from period to period.
+pub fn lead(signal: &'static Signal) -> Option<&'static Component> {
+    let rank = |component: &&Component| {
+        let is_pilot = component.message.is_none();
+        (component.power_share, is_pilot, is_pilot && component.overlay.periods() > 1)
+    };
+    let possible = signal.components.iter().filter(|component| fits(component));
+    possible.rev().max_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(std::cmp::Ordering::Equal))
+}
+
+/// What this receiver cannot do with a signal, if it cannot follow it to a position.
+pub fn refusal(signal: &'static Signal) -> Option<String> {
+    if signal.components.iter().all(|component| component.message.is_none()) {
+        return Some("no message of it is known".to_owned());
+    }
+    let Some(component) = lead(signal) else {
+        return Some("none of its codes has fewer than 32 768 steps a period".to_owned());
+    };
+    if component.message.is_some() && component.overlay.periods() > 1 {
+        return Some("its data have an overlay code, and no pilot beside them shows where it stands".to_owned());
+    }
+    if component.message.is_none() && component.overlay.periods() == 1 {
+        return Some("its pilot has no overlay code that shows where the data beside it begin".to_owned());
+    }
+    if component.message.is_none() && beside(component, signal).is_none() {
+        return Some("its data do not begin where the overlay of its pilot does".to_owned());
+    }
+    (signal.time.behind_gpst_s != 0).then(|| format!("its time is {}, not GPS time", signal.time.name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, OWN_TIME, QUADRATURE};
+    use crate::gnss::signal::{Message, Overlay};
+
+    /// Synthetic signal B with data beside its pilot.
+    static READ: Signal = Signal {
+        name: "read",
+        components: &[
+            Component { message: Some(Message::GpsLnav), ..QUADRATURE.components[0] },
+            Component { ..QUADRATURE.components[1] },
+        ],
+        ..QUADRATURE
+    };
+
+    #[test]
+    fn the_strongest_component_that_can_be_made_leads_and_pilots_go_first() {
+        let index = |signal: &'static Signal| {
+            let lead = lead(signal).unwrap();
+            signal.components.iter().position(|component| std::ptr::eq(component, lead)).unwrap()
+        };
+        // Of D the code of 1 534 500 chips cannot be made; B's components differ by their data alone.
+        let found = [&L1_CA, &LONG_BOC, &QUADRATURE, &READ, &MIXED, &MULTIPLEXED].map(index);
+        assert_eq!(found, [0, 1, 0, 1, 0, 0]);
+    }
+
+    #[test]
+    fn what_cannot_be_followed_to_a_position_is_refused_with_its_reason() {
+        assert_eq!(refusal(&L1_CA), None);
+        for signal in [&LONG_BOC, &QUADRATURE, &MIXED, &MULTIPLEXED] {
+            assert!(refusal(signal).unwrap().contains("no message"), "{signal}");
+        }
+        static LATE: Signal = Signal { name: "late", time: &OWN_TIME, ..L1_CA };
+        assert!(refusal(&LATE).unwrap().contains("its time is synthetic"));
+        // With a message that begins where the overlays do it can be received.
+        assert_eq!(refusal(&READ), None);
+        static OVERLAID: Signal = Signal {
+            name: "overlaid",
+            components: &[Component { overlay: Overlay::Shared(&[1, -1]), ..L1_CA.components[0] }],
+            ..L1_CA
+        };
+        assert!(refusal(&OVERLAID).unwrap().contains("have an overlay"));
+    }
+}

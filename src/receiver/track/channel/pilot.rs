@@ -1,0 +1,111 @@
+//! A pilot that has been recognised: its overlay is taken off the prompts, and the data beside it are read.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use super::supervise::pilot_group;
+use super::{Channel, Symbol};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Component, Signal};
+use crate::receiver::correlate::{Arithmetic, Nco, Replica, TURN, Wave};
+use crate::receiver::track::TrackingSettings;
+use crate::receiver::track::model::ReplicaModel;
+use crate::receiver::track::overlay::{OverlayPhase, OverlaySync};
+
+/// What is read beside a pilot.
+#[derive(Clone, Debug)]
+pub(super) struct Data {
+    replica: Replica,
+    /// Turns its prompts to the phase of the pilot's.
+    turn: Complex64,
+    /// Deviation of the noise in its correlations over that in the pilot's.
+    deviation: f64,
+    periods_per_symbol: u64,
+    overlay: OverlaySync,
+    sum: (Complex64, u64),
+}
+
+impl Data {
+    /// The data of `signal` beside `pilot`, if they are in periods of the same length.
+    pub(super) fn beside(
+        pilot: &'static Component,
+        (signal, sv): (&'static Signal, Sv),
+        settings: &TrackingSettings,
+        (rate_hz, sense): (f64, f64),
+    ) -> Option<Self> {
+        let component = beside(pilot, signal)?;
+        let model = |component| ReplicaModel::new(settings, component, rate_hz);
+        let wave = Wave::new(component, sv.number)?;
+        let share = wave.share * model(component)?.power;
+        let own = Wave::new(pilot, sv.number)?.share * model(pilot)?.power;
+        let (sin, cos) = libm::sincos(TAU * sense * (pilot.phase_cycles - component.phase_cycles));
+        Some(Self {
+            replica: Replica::of(wave, settings.replica)?,
+            turn: Complex64::new(cos, sin),
+            deviation: (share / own).sqrt(),
+            periods_per_symbol: u64::from(component.message?.periods_per_symbol()),
+            overlay: OverlaySync::new(component.overlay.of(sv.number)?),
+            sum: (Complex64::ZERO, 0),
+        })
+    }
+
+    /// Correlates the data of code period `number`, and gives the symbol that ends with it; `scale` brings the pilot's
+    /// noise to unit variance a component.
+    pub(super) fn read(
+        &mut self,
+        samples: (&[f32], &[f32]),
+        arithmetic: Arithmetic,
+        nco: &Nco,
+        (number, phase): (u64, OverlayPhase),
+        scale: f64,
+    ) -> Option<Symbol> {
+        let [sum] = self.replica.correlate_in(arithmetic, samples, nco, &[0]);
+        let chip = self.overlay.chip(phase, number);
+        let at = (number + phase.shift) % self.periods_per_symbol;
+        if at == 0 {
+            self.sum = (Complex64::ZERO, 0);
+        }
+        self.sum.0 += sum * self.turn * (scale * chip / self.deviation);
+        self.sum.1 += 1;
+        let whole = at + 1 == self.periods_per_symbol && self.sum.1 == self.periods_per_symbol;
+        let soft = (self.sum.0.re / (self.periods_per_symbol as f64).sqrt()) as f32;
+        whole.then(|| Symbol { first_period: number + 1 - self.periods_per_symbol, soft })
+    }
+}
+
+/// The component whose data can be read once the overlay of `pilot` stands: their codes have the same length, and
+/// symbols and overlay of the data begin where the pilot's overlay does.
+pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
+    let fits = |component: &&Component| {
+        let periods = component.message.map_or(0, |message| message.periods_per_symbol());
+        let whole = |periods: u32| pilot.overlay.periods().is_multiple_of(periods.max(1));
+        let same = (component.period_s() / pilot.period_s() - 1.0).abs() < 1e-12;
+        periods > 0 && same && whole(periods) && whole(component.overlay.periods())
+    };
+    signal.components.iter().find(|component| !std::ptr::eq(*component, pilot) && fits(component))
+}
+
+impl Channel {
+    /// The sign of the overlay in a code period; one while it is unknown.
+    pub(super) fn overlay_chip(&self, number: u64) -> f64 {
+        match (&self.overlay, self.overlay_phase) {
+            (Some(overlay), Some(phase)) => overlay.chip(phase, number),
+            _ => 1.0,
+        }
+    }
+
+    /// From the next code period on the overlay is taken off. The carrier gets the right half cycle.
+    pub(super) fn wipe(&mut self, phase: OverlayPhase) {
+        if phase.inverted {
+            self.carrier += (0.5 * TURN) as i128;
+        }
+        self.overlay_phase = Some(phase);
+        self.group = pilot_group(self.period_s);
+        self.has_symbols = false;
+        self.loops.wipe();
+        self.cn0 = self.cn0.wiped(self.group);
+        self.previous = None;
+        self.previous_sum = None;
+    }
+}

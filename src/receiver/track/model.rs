@@ -1,0 +1,83 @@
+//! What a component looks like in this receiver's correlators.
+
+use super::TrackingSettings;
+use super::loops::CodeShape;
+use crate::gnss::signal::{Component, Layer, Shape};
+use crate::receiver::correlate::{correlation, wave};
+
+/// The correlation of a component with the replica that is made of it.
+#[derive(Clone, Copy, Debug)]
+pub struct ReplicaModel {
+    /// At early and late.
+    pub shape: CodeShape,
+    /// Mean power of the replica's samples: below one for area edges, and where steps are zero.
+    pub power: f64,
+    /// Power that the replica finds, over that of the component: below one where it has not all layers.
+    pub efficiency: f64,
+}
+
+impl ReplicaModel {
+    /// For samples of `rate_hz`. `None` for a component without layers.
+    pub fn new(settings: &TrackingSettings, component: &Component, rate_hz: f64) -> Option<Self> {
+        let strongest = wave::strongest(component)?;
+        let made = [Layer { weight: 1.0, phase_cycles: 0.0, ..*strongest }];
+        // The replica has the layer's phase and sign.
+        let sign = strongest.weight.signum();
+        let turned: Vec<Layer> = (component.layers.iter())
+            .map(|layer| Layer {
+                weight: sign * layer.weight,
+                phase_cycles: layer.phase_cycles - strongest.phase_cycles,
+                ..*layer
+            })
+            .collect();
+        let (signal, own) = (
+            Shape::between(&turned, &made, component.chip_rate_hz),
+            Shape::between(&made, &made, component.chip_rate_hz),
+        );
+        let chips_per_sample = component.chip_rate_hz / rate_hz;
+        let at = |shape: &Shape, chips: f64| correlation(shape, settings.replica, chips_per_sample, chips);
+        let (half, (peak, _)) = (0.5 * settings.spacing_chips, at(&signal, 0.0));
+        let ((side, slope), (power, _)) = (at(&signal, half), at(&own, 0.0));
+        let (common, _) = at(&own, settings.spacing_chips);
+        let shape = CodeShape { value: side / peak, slope: -slope / peak, common: common / power };
+        let found = signal.correlation(0.0);
+        Some(Self { shape, power, efficiency: found * found / own.correlation(0.0) })
+    }
+}
+
+/// C/N0 of what the receiver follows of a signal over that of the whole signal, in decibels: the component's share of
+/// the power, less what its replica does not have.
+pub fn followed_db(component: &Component) -> f64 {
+    let settings = TrackingSettings::default();
+    let efficiency = ReplicaModel::new(&settings, component, f64::INFINITY).map_or(1.0, |model| model.efficiency);
+    10.0 * libm::log10(component.power_share * efficiency)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED};
+
+    #[test]
+    fn the_shape_at_early_and_late_is_that_of_the_waveform() {
+        let model = |component: &Component, spacing_chips: f64| {
+            let settings = TrackingSettings { spacing_chips, ..Default::default() };
+            ReplicaModel::new(&settings, component, f64::INFINITY).unwrap()
+        };
+        let near = |found: CodeShape, value: f64, slope: f64, common: f64| {
+            // The integral of the slope in 2000 midpoints, whose corners lie anywhere.
+            let worst = (found.value - value).abs().max((found.slope - slope).abs()).max((found.common - common).abs());
+            assert!(worst < 2e-3, "{found:?}");
+        };
+        near(model(&L1_CA.components[0], 0.5).shape, 0.75, 1.0, 0.5);
+        // BOC(1,1): 1 − 3|τ| to half a chip.
+        near(model(&LONG_BOC.components[0], 0.2).shape, 0.7, 3.0, 0.4);
+        // TMBOC by BOC(1,1) alone: 29 of 33 chips, both in what is found and in the replica.
+        let mixed = model(&MIXED.components[0], 0.2);
+        near(mixed.shape, 0.7, 3.0, 0.4);
+        assert!((mixed.power - 29.0 / 33.0).abs() < 2e-3 && (mixed.efficiency - 29.0 / 33.0).abs() < 1e-12);
+        assert!((followed_db(&L1_CA.components[0])).abs() < 1e-12);
+        assert!((followed_db(&LONG_BOC.components[1]) + 10.0 * libm::log10(2.0)).abs() < 1e-12);
+    }
+}

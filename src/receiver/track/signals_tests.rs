@@ -1,0 +1,309 @@
+//! Search and channels on every synthetic signal, made here from its definition: chips, layers, overlays and random data
+//! in `f64`, one satellite.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use super::tests::Normal;
+use super::*;
+use crate::gnss::samples::{Format, IfMetadata};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
+use crate::gnss::signal::{Component, Link, Message, Signal};
+use crate::gnss::time::Rate;
+use crate::receiver::acquire::{Acquired, AcquisitionSettings, search};
+use crate::receiver::lead::lead;
+use crate::receiver::source::Block;
+
+/// One satellite's signal: its code at time zero, and a Doppler that code and carrier share.
+struct Sky {
+    link: Link,
+    rate_hz: f64,
+    doppler_hz: f64,
+    /// What the satellite's clock reads at sample 0, in seconds since an epoch at which all codes begin.
+    sent_s: f64,
+    cn0_dbhz: f64,
+    seed: u64,
+}
+
+/// A component's values, ready to be looked up.
+struct Made {
+    component: &'static Component,
+    code: Vec<i8>,
+    overlay: Vec<i8>,
+    phasors: Vec<Complex64>,
+    /// For a mean power of its share.
+    amplitude: f64,
+}
+
+impl Made {
+    fn new(component: &'static Component, number: u8) -> Self {
+        let code = (component.code)(number).unwrap();
+        let duty = code.iter().filter(|chip| **chip != 0).count() as f64 / code.len() as f64;
+        let phasor = |phase_cycles: f64| {
+            let (sin, cos) = libm::sincos(TAU * phase_cycles);
+            Complex64::new(cos, sin)
+        };
+        let layers = component.layers.iter();
+        let phasors = layers.map(|l| phasor(component.phase_cycles + l.phase_cycles) * l.weight).collect();
+        let overlay = component.overlay.of(number).unwrap();
+        Self { component, code, overlay, phasors, amplitude: (component.power_share / duty).sqrt() }
+    }
+
+    /// Random symbols: those of a message, or one a period where the power is that of data.
+    fn symbol(&self, period: i64) -> f64 {
+        match self.component.message {
+            Some(message) => sign(period.div_euclid(i64::from(message.periods_per_symbol()))),
+            None if self.component.power_share < 0.3 => sign(period),
+            None => 1.0,
+        }
+    }
+
+    /// The component when its code has run for so many chips; `data` gives the sign of a code period.
+    fn at(&self, chips: f64, data: impl Fn(i64) -> f64) -> Complex64 {
+        let whole = chips.floor() as i64;
+        let (length, steps) = (self.code.len() as i64, chips - chips.floor());
+        let period = whole.div_euclid(length);
+        let index = whole.rem_euclid(length) as usize;
+        let layers = self.component.layers.iter().zip(&self.phasors).filter(|(layer, _)| layer.covers(index));
+        let wave: Complex64 = layers
+            .map(|(layer, phasor)| phasor * f64::from(layer.pulse[(steps * layer.pulse.len() as f64) as usize]))
+            .sum();
+        let overlay = f64::from(self.overlay[period.rem_euclid(self.overlay.len() as i64) as usize]);
+        wave * (self.amplitude * f64::from(self.code[index]) * overlay * data(period))
+    }
+}
+
+impl Sky {
+    fn metadata(&self) -> IfMetadata {
+        let (rate, center_hz) = (Rate::from_hz(self.rate_hz).unwrap(), self.link.carrier_hz() - 0.07 * self.rate_hz);
+        IfMetadata { format: Format::Cf32Le, rate, center_hz, inverted: false, start: None }
+    }
+
+    fn sent_s(&self, t_s: f64) -> f64 {
+        self.sent_s + t_s * (1.0 + self.doppler_hz / self.link.carrier_hz())
+    }
+
+    /// Carrier phase by Doppler at a time, and the phase at zero.
+    fn cycles(&self, t_s: f64) -> f64 {
+        0.2 + self.doppler_hz * t_s
+    }
+
+    /// All components over the interval of the sample at a time, without the carrier.
+    fn mean(&self, components: &[Made], t_s: f64) -> Complex64 {
+        let looks = (0..8).map(|look| self.sent_s(t_s + (f64::from(look) - 3.5) / 8.0 / self.rate_hz));
+        let all = looks.flat_map(|sent_s| {
+            components.iter().map(move |made| made.at(sent_s * made.component.chip_rate_hz, |n| made.symbol(n)))
+        });
+        all.sum::<Complex64>() * 0.125
+    }
+
+    /// Calls `each` with blocks of 50 ms until `until_s`. Samples are means of eight looks across their interval.
+    fn play(&self, until_s: f64, mut each: impl FnMut(&Block)) {
+        let components: Vec<Made> =
+            self.link.signal.components.iter().map(|component| Made::new(component, self.link.sv.number)).collect();
+        let mut normal = Normal::new(self.seed);
+        // Means over samples have less power than what they are of: C/N0 is that of the samples.
+        let seen = |n: u64| self.mean(&components, 1.37 * n as f64 / self.rate_hz).norm_sqr();
+        let power = (0..20_000).map(seen).sum::<f64>() / 20_000.0;
+        let amplitude = (libm::pow(10.0, self.cn0_dbhz / 10.0) / self.rate_hz / power).sqrt();
+        let (block, total) = ((0.05 * self.rate_hz) as u64, (until_s * self.rate_hz) as u64);
+        let (mut first, mut i, mut q) = (0, Vec::new(), Vec::new());
+        while first < total {
+            i.clear();
+            q.clear();
+            for n in first..(first + block).min(total) {
+                let t_s = n as f64 / self.rate_hz;
+                let sum = self.mean(&components, t_s);
+                let (sin, cos) = libm::sincos(TAU * (0.07 * n as f64 + self.cycles(t_s)));
+                let sample = sum * Complex64::new(cos, sin) * amplitude;
+                let noise = Complex64::new(normal.next(), normal.next()) * 0.5_f64.sqrt();
+                i.push((sample + noise).re as f32);
+                q.push((sample + noise).im as f32);
+            }
+            each(&Block { first, i: &i, q: &q });
+            first += block;
+        }
+    }
+
+    fn find(&self) -> Option<Acquired> {
+        let settings = AcquisitionSettings { doppler_max_hz: 1500.0, ..Default::default() };
+        let mut samples = (Vec::new(), Vec::new());
+        self.play(0.25, |block| {
+            samples.0.extend_from_slice(block.i);
+            samples.1.extend_from_slice(block.q);
+        });
+        let block = Block { first: 0, i: &samples.0, q: &samples.1 };
+        search(&self.metadata(), &block, &[self.link], &settings).unwrap()[0].1
+    }
+
+    /// Code error of a phase of the leading component at sample 0, in chips.
+    fn code_error_chips(&self, phase_chips: f64) -> f64 {
+        let component = lead(self.link.signal).unwrap();
+        let length = f64::from(component.code_chips);
+        let true_chips = self.sent_s * component.chip_rate_hz;
+        (phase_chips - true_chips + 0.5 * length).rem_euclid(length) - 0.5 * length
+    }
+}
+
+fn sign(number: i64) -> f64 {
+    let mut z = (number as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    if (z ^ (z >> 27)) & 1 == 1 { -1.0 } else { 1.0 }
+}
+
+/// Synthetic signal B with a message whose symbols begin where the overlays do.
+static READ: Signal = Signal {
+    name: "synthetic B with data",
+    components: &[
+        Component { message: Some(Message::GpsLnav), ..QUADRATURE.components[0] },
+        Component { ..QUADRATURE.components[1] },
+    ],
+    ..QUADRATURE
+};
+
+/// Every synthetic signal at a rate that holds it.
+fn skies() -> Vec<Sky> {
+    let of = |signal: &'static Signal, number: u8, rate_hz: f64| Sky {
+        link: signal.link(Sv { system: signal.system, number }),
+        rate_hz,
+        doppler_hz: 731.0,
+        sent_s: 1_234.567_8,
+        cn0_dbhz: 48.0,
+        seed: u64::from(number),
+    };
+    vec![
+        of(&LONG_BOC, 5, 5.3e6),
+        of(&READ, 7, 12.3e6),
+        of(&CHANNELS, 3, 2.6e6),
+        of(&MULTIPLEXED, 9, 2.6e6),
+        of(&MIXED, 2, 5.3e6),
+    ]
+}
+
+#[test]
+fn every_synthetic_signal_is_found() {
+    for sky in skies() {
+        let hit = sky.find().unwrap_or_else(|| panic!("{} is not found", sky.link));
+        let error_chips = sky.code_error_chips(hit.code_phase_chips);
+        println!("{}: {error_chips:+.3} chips, {:.1} Hz, {:.1} dB-Hz", sky.link, hit.doppler_hz, hit.cn0_dbhz);
+        assert!(error_chips.abs() < 0.1, "{}: {error_chips} chips", sky.link);
+        // A twentieth of the search's bin.
+        let bin_hz = 0.5 / lead(sky.link.signal).unwrap().period_s();
+        assert!((hit.doppler_hz - sky.doppler_hz).abs() < 0.05 * bin_hz, "{}: {} Hz", sky.link, hit.doppler_hz);
+        assert!((hit.cn0_dbhz - sky.cn0_dbhz).abs() < 2.0, "{}: {} dB-Hz", sky.link, hit.cn0_dbhz);
+    }
+}
+
+/// Errors of a channel between two times, a tick every 10 ms.
+struct Followed {
+    code_chips: Vec<f64>,
+    carrier_cycles: Vec<f64>,
+    cn0_dbhz: f64,
+    symbols: Vec<Symbol>,
+    half_cycle_known: bool,
+    channel: Channel,
+}
+
+impl Sky {
+    fn follow(&self, until_s: f64, from_s: f64) -> Followed {
+        let hit = self.find().unwrap();
+        let component = lead(self.link.signal).unwrap();
+        let metadata = self.metadata();
+        let mut channel = Channel::start(&hit, &metadata, &TrackingSettings::default());
+        let mut report = Report::default();
+        self.play(until_s, |block| {
+            let step = (0.01 * self.rate_hz) as u64;
+            let ticks: Vec<u64> =
+                (block.first..block.first + block.i.len() as u64).filter(|n| n.is_multiple_of(step)).collect();
+            channel.advance(block, &ticks, &mut report);
+        });
+        let events: Vec<_> = report.events.iter().map(|(n, event)| (*n as f64 / self.rate_hz, *event)).collect();
+        assert!(!channel.is_lost(), "{}: {events:?}", self.link);
+        let late: Vec<&Measurement> =
+            report.measurements.iter().filter(|m| m.sample as f64 >= from_s * self.rate_hz).collect();
+        assert!(late.iter().all(|m| m.locked), "{}: {events:?}", self.link);
+        let code = late.iter().map(|m| {
+            let sent_s = self.sent_s(m.sample as f64 / self.rate_hz);
+            self.wrapped(m.code_fraction * f64::from(component.code_chips) - sent_s * component.chip_rate_hz)
+        });
+        let carrier = late.iter().map(|m| {
+            // In the RINEX sense, against Doppler; the receiver's IF has the phase of the sample count.
+            let error = -m.carrier_cycles - self.cycles(m.sample as f64 / self.rate_hz);
+            error - error.round()
+        });
+        let cn0 = late.iter().map(|m| m.cn0_dbhz).sum::<f64>() / late.len() as f64;
+        Followed {
+            code_chips: code.collect(),
+            carrier_cycles: carrier.collect(),
+            cn0_dbhz: cn0,
+            half_cycle_known: late.iter().all(|m| m.half_cycle_known),
+            symbols: report.symbols,
+            channel,
+        }
+    }
+
+    /// A code phase within half a period of zero.
+    fn wrapped(&self, chips: f64) -> f64 {
+        let length = f64::from(lead(self.link.signal).unwrap().code_chips);
+        (chips + 0.5 * length).rem_euclid(length) - 0.5 * length
+    }
+}
+
+fn moments(values: &[f64]) -> (f64, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let square = values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / values.len() as f64;
+    (mean, square.sqrt())
+}
+
+#[test]
+fn every_synthetic_signal_is_followed_with_the_phase_of_the_whole_signal() {
+    for sky in skies() {
+        let found = sky.follow(4.0, 2.5);
+        let (code, carrier) = (moments(&found.code_chips), moments(&found.carrier_cycles));
+        println!(
+            "{}: code {:+.4} ± {:.4} chips, carrier {:+.4} ± {:.4} cycles, {:.2} dB-Hz, {} symbols",
+            sky.link,
+            code.0,
+            code.1,
+            carrier.0,
+            carrier.1,
+            found.cn0_dbhz,
+            found.symbols.len()
+        );
+        let component = lead(sky.link.signal).unwrap();
+        let followed_hz = libm::pow(10.0, 0.1 * (sky.cn0_dbhz + model::followed_db(component)));
+        // Early minus late of a correlation of slope s at ±d/2: σ² = B·(1 − R(d))/(2 s² C/N0) (squaring loss apart),
+        // and both the mean over a second and a half of a loop of half a hertz and its scatter are within 4 σ.
+        let settings = TrackingSettings::default().fitted(component);
+        let shape = ReplicaModel::new(&settings, component, sky.rate_hz).unwrap().shape;
+        let sigma =
+            (settings.dll_bandwidth_hz * (1.0 - shape.common) / (2.0 * shape.slope * shape.slope * followed_hz)).sqrt();
+        assert!(code.0.abs() < 4.0 * sigma + 0.002, "{}: {} chips for {sigma}", sky.link, code.0);
+        assert!(code.1 < 2.5 * sigma + 0.002, "{}: {} chips for {sigma}", sky.link, code.1);
+        // σ² = B/(C/N0)·(1 + 1/(2T·C/N0)) rad².
+        let t_s = component.period_s();
+        let squaring = 1.0 + 0.5 / (t_s * followed_hz);
+        let sigma = (settings.pll_bandwidth_hz / followed_hz * squaring).sqrt() / TAU;
+        assert!(carrier.1 < 1.5 * sigma, "{}: {} cycles for {sigma}", sky.link, carrier.1);
+        // The whole signal's phase, where the overlay tells half cycles; the mean of 27 independent values.
+        let is_pilot = component.message.is_none() && component.overlay.periods() > 1;
+        assert_eq!(found.half_cycle_known, is_pilot, "{}", sky.link);
+        let off = if is_pilot { carrier.0 } else { carrier.0 - 0.5 * (2.0 * carrier.0).round() };
+        assert!(off.abs() < 0.004 + sigma, "{}: {} cycles", sky.link, carrier.0);
+        assert!((found.cn0_dbhz - sky.cn0_dbhz).abs() < 1.0, "{}: {} dB-Hz", sky.link, found.cn0_dbhz);
+        // Data beside a pilot: the channel's periods are counted from its own first.
+        let data = sky.link.signal.components.iter().find(|c| c.message.is_some());
+        if let Some(message) = data.and_then(|data| data.message).filter(|_| is_pilot) {
+            let length = i64::from(message.periods_per_symbol());
+            let first = (sky.sent_s / component.period_s()).floor() as i64;
+            assert!(found.symbols.len() >= 50, "{}", sky.link);
+            for symbol in &found.symbols {
+                let number = (first + symbol.first_period as i64).div_euclid(length);
+                assert_eq!(f64::from(symbol.soft.signum()), sign(number), "{} symbol {number}", sky.link);
+            }
+        }
+        assert_eq!(found.channel.link(), sky.link);
+    }
+}
