@@ -13,7 +13,7 @@ use super::grid::Grid;
 use super::replica::Replica;
 use crate::gnss::signal::{Component, Shape};
 use crate::receiver::correlate::wave::strongest;
-use crate::receiver::correlate::{Nco, TURN, chips_to_units};
+use crate::receiver::correlate::{Nco, TURN, chips_to_units, units_to_chips};
 use crate::receiver::source::Block;
 
 /// Correlators that measure the noise.
@@ -63,7 +63,7 @@ pub(super) fn refine(
             Shape::between(&layers, &layers, component.chip_rate_hz)
         },
     );
-    let noise_offsets = quiet_offsets(replica, component.code_chips);
+    let noise_offsets = replica.correlator().quiet_taps(NOISE_TAPS).into_iter().map(units_to_chips).collect::<Vec<_>>();
     let noise = mean(noise_offsets.iter().map(|&offset| correlators.powers(phase, doppler_hz, &[offset])[0]));
     // Early less late over their sum is the slope there times twice the error over twice the value.
     let reach = if replica.steps_per_chip() > 1.0 { 0.25 / replica.steps_per_chip() } else { 0.5 };
@@ -172,24 +172,6 @@ fn square_frequency_cycles(prompts: &[Complex<f64>], reach: f64) -> f64 {
     let vertex = if curvature < 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
     let cycles = (best as f64 + vertex) / length as f64;
     if cycles >= 0.5 { cycles - 1.0 } else { cycles }
-}
-
-/// Code offsets at which the code's own autocorrelation is smallest, out of a spread of candidates.
-fn quiet_offsets(replica: &Replica, code_chips: u32) -> Vec<f64> {
-    let length = code_chips as usize;
-    let code: Vec<f64> = replica.means(0.0, 1.0).take(length).collect();
-    let correlation = |shift: usize| {
-        let ahead = code.iter().cycle().skip(shift % length.max(1));
-        code.iter().zip(ahead).map(|(a, b)| a * b).sum::<f64>().abs()
-    };
-    let candidates = 4 * NOISE_TAPS;
-    let mut ranked: Vec<(f64, usize)> = (1..=candidates)
-        .map(|n| n * length / (candidates + 1))
-        .filter(|shift| (4..length.saturating_sub(4)).contains(shift))
-        .map(|shift| (correlation(shift - 1).max(correlation(shift)).max(correlation(shift + 1)), shift))
-        .collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    ranked.into_iter().take(NOISE_TAPS).map(|(_, shift)| shift as f64).collect()
 }
 
 /// Takes a found satellite out of the samples, one code period at a time with the amplitude and phase

@@ -19,37 +19,43 @@ pub struct ReplicaModel {
 impl ReplicaModel {
     /// For samples of `rate_hz`. `None` for a component without layers.
     pub fn new(settings: &TrackingSettings, component: &Component, rate_hz: f64) -> Option<Self> {
-        let strongest = wave::strongest(component)?;
-        let made = [Layer { weight: 1.0, phase_cycles: 0.0, ..*strongest }];
-        // The replica has the layer's phase and sign.
-        let sign = strongest.weight.signum();
-        let turned: Vec<Layer> = (component.layers.iter())
-            .map(|layer| Layer {
-                weight: sign * layer.weight,
-                phase_cycles: layer.phase_cycles - strongest.phase_cycles,
-                ..*layer
-            })
-            .collect();
-        let (signal, own) = (
-            Shape::between(&turned, &made, component.chip_rate_hz),
-            Shape::between(&made, &made, component.chip_rate_hz),
-        );
+        let [signal, own] = shapes(component)?;
         let chips_per_sample = component.chip_rate_hz / rate_hz;
         let at = |shape: &Shape, chips: f64| correlation(shape, settings.replica, chips_per_sample, chips);
         let (half, (peak, _)) = (0.5 * settings.spacing_chips, at(&signal, 0.0));
         let ((side, slope), (power, _)) = (at(&signal, half), at(&own, 0.0));
         let (common, _) = at(&own, settings.spacing_chips);
         let shape = CodeShape { value: side / peak, slope: -slope / peak, common: common / power };
-        let found = signal.correlation(0.0);
-        Some(Self { shape, power, efficiency: found * found / own.correlation(0.0) })
+        Some(Self { shape, power, efficiency: efficiency(&signal, &own) })
     }
+}
+
+/// Correlation of a component with the replica that is made of it, and of the replica with itself.
+fn shapes(component: &Component) -> Option<[Shape; 2]> {
+    let strongest = wave::strongest(component)?;
+    let made = [Layer { weight: 1.0, phase_cycles: 0.0, ..*strongest }];
+    // The replica has the layer's phase and sign.
+    let sign = strongest.weight.signum();
+    let turned: Vec<Layer> = (component.layers.iter())
+        .map(|layer| Layer {
+            weight: sign * layer.weight,
+            phase_cycles: layer.phase_cycles - strongest.phase_cycles,
+            ..*layer
+        })
+        .collect();
+    Some([&turned, &made[..]].map(|sent| Shape::between(sent, &made, component.chip_rate_hz)))
+}
+
+/// Power that the replica finds, over the component's.
+fn efficiency(signal: &Shape, own: &Shape) -> f64 {
+    let found = signal.correlation(0.0);
+    found * found / own.correlation(0.0)
 }
 
 /// C/N0 of what the receiver follows of a signal over that of the whole signal, in decibels: the component's share of
 /// the power, less what its replica does not have.
 pub fn followed_db(component: &Component) -> f64 {
-    let settings = TrackingSettings::default();
-    let efficiency = ReplicaModel::new(&settings, component, f64::INFINITY).map_or(1.0, |model| model.efficiency);
+    let efficiency = shapes(component).map_or(1.0, |[signal, own]| efficiency(&signal, &own));
     10.0 * libm::log10(component.power_share * efficiency)
 }
 
