@@ -1,0 +1,108 @@
+//! Where something is wrong in a scenario's text, and all that is wrong with it.
+
+use std::fmt::Display;
+use std::ops::Range;
+
+use crate::generator::scenario::ScenarioError;
+
+/// What stands for the value of a key that is not there; a text would have quotes.
+pub(super) const ABSENT: &str = "absent";
+
+/// The text of a scenario and where it came from.
+pub(crate) struct Source<'t> {
+    pub origin: &'t str,
+    pub text: &'t str,
+}
+
+/// A place in it, counted from 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    pub origin: String,
+    pub line: usize,
+    pub column: usize,
+}
+
+impl Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}:{}:{}", self.origin, self.line, self.column)
+    }
+}
+
+impl Source<'_> {
+    pub fn place(&self, byte: usize) -> Place {
+        let before = self.text.get(..byte).unwrap_or(self.text);
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        Place {
+            origin: self.origin.to_owned(),
+            line: before.matches('\n').count() + 1,
+            column: before.get(line_start..).unwrap_or("").chars().count() + 1,
+        }
+    }
+
+    /// The text of a value, shortened and without control characters.
+    pub fn excerpt(&self, span: &Range<usize>) -> String {
+        let text = self.text.get(span.clone()).unwrap_or("");
+        let mut short: String = text.chars().take(60).flat_map(char::escape_debug).collect();
+        if text.chars().count() > 60 {
+            short.push('…');
+        }
+        short.replace("\\\"", "\"").replace("\\'", "'")
+    }
+}
+
+/// Refusals as they are met, each once.
+#[derive(Debug, Default)]
+pub(crate) struct Refusals(Vec<ScenarioError>);
+
+impl Refusals {
+    pub fn add(&mut self, error: ScenarioError) {
+        match error {
+            ScenarioError::Several(errors) => errors.into_iter().for_each(|error| self.add(error)),
+            error => {
+                // One refusal of a key is enough; of an absent one the place is its table's.
+                let same = |known: &ScenarioError| match (known.key_at(), error.key_at()) {
+                    (Some(one), Some(other)) => one == other,
+                    _ => known.to_string() == error.to_string(),
+                };
+                if !self.0.iter().any(same) {
+                    self.0.push(error);
+                }
+            }
+        }
+    }
+
+    /// The value, or `None` and one refusal more.
+    pub fn take<T>(&mut self, result: Result<T, ScenarioError>) -> Option<T> {
+        result.map_err(|error| self.add(error)).ok()
+    }
+
+    /// # Errors
+    /// What was refused, in the order of the text.
+    pub fn finish(mut self) -> Result<(), ScenarioError> {
+        self.leave_out_misspelt();
+        self.0.sort_by_key(|error| error.place().map_or((usize::MAX, 0), |place| (place.line, place.column)));
+        match (self.0.pop(), self.0.is_empty()) {
+            (None, _) => Ok(()),
+            (Some(only), true) => Err(only),
+            (Some(last), false) => {
+                self.0.push(last);
+                Err(ScenarioError::Several(self.0))
+            }
+        }
+    }
+
+    /// An unknown key may be the one that its table lacks: that is refused once, where it is written.
+    fn leave_out_misspelt(&mut self) {
+        let table = |key: &str| key.rsplit_once('.').map_or(String::new(), |(table, _)| table.to_owned());
+        let unknown = self.0.iter().filter_map(|error| match error {
+            ScenarioError::UnknownKey { key, nearest, .. } => Some((table(key), nearest.clone())),
+            _ => None,
+        });
+        let unknown: Vec<(String, Option<String>)> = unknown.collect();
+        let lacking = |key: &str, value: &str| {
+            let (own, name) = (table(key), key.rsplit('.').next());
+            unknown.iter().any(|(at, meant)| *at == own && (value == ABSENT || meant.as_deref() == name))
+        };
+        self.0.retain(|error| !matches!(error, ScenarioError::Value { key, value, .. } if lacking(key, value)));
+    }
+}

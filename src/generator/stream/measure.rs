@@ -1,0 +1,109 @@
+//! What a plan asks of the synthesiser: knots met along the scene, and stretches of samples that are measured.
+
+use std::ops::Range;
+
+use super::block::{Worker, cutoff_cps, edge, first_run, pack, run_begin, satellites};
+use super::{GenerateError, Options, transmitters};
+use crate::generator::plan::Machinery;
+use crate::generator::scene::{CodeEdge, Scene};
+use crate::generator::stage::Block;
+use crate::generator::synth::band::Filter;
+use crate::generator::synth::isa::Level;
+use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
+use crate::generator::truth;
+
+/// Roots of each satellite's grid that a plan looks at.
+const PLANNED_ROOTS: u64 = 16;
+
+/// What the plan tells of the synthesiser: knots met along the scene, memory of a batch, and the usual speed.
+///
+/// # Errors
+/// Those of orbits.
+pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
+    let transmitters = transmitters(scene, Edge::Nearest)?;
+    let rate = scene.clock.rate;
+    let (mut shortest, mut longest, mut worst_cycles) = (u64::MAX, 0, 0.0_f64);
+    for transmitter in &transmitters {
+        if !truth::in_view_from(scene, &transmitter.from, transmitter.sv, scene.clock.start)? {
+            continue;
+        }
+        let size = transmitter.root_samples();
+        let roots = scene.samples.div_ceil(size);
+        for root in (0..roots).step_by(roots.div_ceil(PLANNED_ROOTS).max(1) as usize) {
+            for part in transmitter.root(scene, root)? {
+                shortest = shortest.min(part.end - part.start);
+                longest = longest.max(part.end - part.start);
+                worst_cycles = worst_cycles.max(part.error_cycles);
+            }
+        }
+    }
+    let shortest = shortest.min(longest);
+    let options = Options::default();
+    let batch = u64::from(options.block_runs) * u64::from(options.batch_blocks) * RUN_SAMPLES as u64;
+    Ok(Machinery {
+        knot_spacing_s: rate.elapsed_s(shortest),
+        longest_knot_spacing_s: rate.elapsed_s(longest),
+        knot_reason: format!(
+            "the longest on which a cubic stays within {:e} cycles of the motion; {worst_cycles:.1e} met",
+            scene.fidelity.knot_tolerance_cycles
+        ),
+        block_bytes: batch.min(scene.samples) * scene.metadata.format.bytes() as u64,
+        satellite_samples_per_s: 1e9 / scene.fidelity.satellite_sample_ns(rate.hz()),
+    })
+}
+
+/// What a stretch of the scene's samples holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Stretch {
+    /// Components: two a sample, one of real samples.
+    pub components: u64,
+    /// Sum of their squares before a converter or the format rounds them, in LSB of the scene's gain.
+    pub square_lsb2: f64,
+    /// Those that were clipped.
+    pub clipped: u64,
+}
+
+/// Makes the samples of `stretches`, which ascend, as the stream does, and measures them.
+///
+/// # Errors
+/// Those of [`Stream::next`].
+pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<Stretch>, GenerateError> {
+    let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
+    let filter = limited.then(|| Filter::new(cutoff_cps(scene)));
+    let edge = edge(scene, filter.as_ref());
+    let mut transmitters = transmitters(scene, edge)?;
+    let kernel = Kernel { edge, arithmetic: scene.fidelity.carrier, level: Level::detect() };
+    let (memory, format) = (scene.memory_samples(), scene.metadata.format);
+    let lead = memory.next_multiple_of(RUN_SAMPLES) as u64;
+    let (mut worker, mut bytes) = (Worker::default(), Vec::new());
+    let mut found = Vec::new();
+    for stretch in stretches {
+        let needed = run_begin(stretch.start).saturating_sub(lead);
+        let made = stretch.end.max(first_run(scene, needed, lead));
+        // On this thread alone: a plan has to work where no other can be started.
+        transmitters.iter_mut().try_for_each(|t| t.prepare_alone(scene, needed, made))?;
+        let samples = (stretch.end - stretch.start) as usize;
+        let mut block = satellites(scene, &transmitters, kernel, (stretch.start, samples, memory), &mut worker);
+        let sent = block.lead..block.lead + samples;
+        let square = |block: &Block<'_>| {
+            let of = |plane: &[f32]| {
+                plane.get(sent.clone()).unwrap_or(&[]).iter().fold(0.0, |sum, x| sum + f64::from(*x) * f64::from(*x))
+            };
+            of(block.i) + if format.is_complex() { of(block.q) } else { 0.0 }
+        };
+        let mut before_lsb2 = None;
+        scene.stages(|stage| {
+            if stage.full_scale_lsb(1.0).is_some() {
+                before_lsb2 = Some(square(&block));
+            }
+            stage.act(&mut block);
+        });
+        bytes.resize(samples * format.bytes(), 0);
+        found.push(Stretch {
+            components: if format.is_complex() { 2 } else { 1 } * samples as u64,
+            square_lsb2: before_lsb2.unwrap_or_else(|| square(&block)),
+            clipped: block.clipped + pack(&block, samples, format, &mut bytes),
+        });
+    }
+    Ok(found)
+}
