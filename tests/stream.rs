@@ -8,7 +8,7 @@ use std::sync::Arc;
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::clock::ReceiverClock;
 use gnss_twin::generator::effect::link::FixedCn0;
-use gnss_twin::generator::ripple::satellite::SatelliteClocks;
+use gnss_twin::generator::ripple::nodes::Nodes;
 use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade, Scene};
 use gnss_twin::generator::stream::{Generated, Options, generate_with};
 use gnss_twin::generator::synth::isa::Level;
@@ -34,16 +34,18 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
     let rate = Rate::from_hz(rate_hz).unwrap();
     Scene {
         name: "test".to_owned(),
+        front_end_name: None,
         seed: 5,
         samples: (duration_s * rate_hz) as u64,
         clock: SampleClock { start, rate },
         receiver_clock: ReceiverClock::steady(1.3e-4, 5e-8),
+        nodes: Nodes::of(rate),
         metadata: IfMetadata { format, rate, center_hz, inverted, start: Some(start) },
         trajectory: Trajectory::fixed(Geodetic::from_degrees(26.5, 80.2, 120.0).to_ecef()),
         catalogue: Arc::new(catalogue),
         broadcast: Arc::new(Broadcast::new(navigation.klobuchar, 15, &almanac, start).unwrap()),
         message_faults: Vec::new(),
-        satellite_clocks: SatelliteClocks::default(),
+        satellite_clocks: Arc::default(),
         signals: vec![&L1_CA],
         excluded: Vec::new(),
         mask_rad: 5_f64.to_radians(),

@@ -40,6 +40,21 @@ pub struct Ray {
     pub cn0_hz: f64,
 }
 
+/// An effect that several front ends share.
+impl<E: Effect + ?Sized> Effect for std::sync::Arc<E> {
+    fn name(&self) -> &'static str {
+        self.as_ref().name()
+    }
+
+    fn describe(&self) -> String {
+        self.as_ref().describe()
+    }
+
+    fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
+        self.as_ref().act(sight, signal, rays);
+    }
+}
+
 /// Something that nature or hardware does to the rays of a satellite.
 ///
 /// Laws: an effect of zero strength gives the same bits as its absence; the result depends on the

@@ -6,8 +6,11 @@
 //! radians and ratios from here on. `[receiver]` is kept as written for the receiver's own settings.
 
 mod attitude;
+mod band;
 mod compose;
 mod expect;
+mod files;
+mod front_end;
 mod hardware;
 mod hostile;
 pub mod interference;
@@ -25,6 +28,7 @@ mod scintillation;
 mod stages;
 #[cfg(test)]
 mod tests;
+mod trajectory;
 
 use std::path::PathBuf;
 
@@ -32,7 +36,8 @@ use thiserror::Error;
 use toml::de::DeTable;
 
 pub use compose::Overrides;
-pub use hardware::{ClockSpec, FrontEnd};
+pub use front_end::{FrontEnd, Tuned};
+pub use hardware::ClockSpec;
 pub use interference::{InterferenceSpec, SpooferSpec};
 pub use link::{AntennaSpec, Power, Transmit};
 pub use motion::{FileKind, MotionSpec};
@@ -40,7 +45,7 @@ pub use propagation::{Electrons, Ionosphere, MappingKind, NeutralAtmosphere};
 pub use read::Place;
 use read::{Refusals, Source, Table};
 pub use satellite::{MessageKind, MessageSpec, OrbitsSpec, SatelliteFault};
-use stages::Stages;
+use stages::PlaybackSpec;
 
 use crate::generator::effect::multipath::Echo;
 use crate::generator::effect::obstruction::Obstacle;
@@ -138,7 +143,8 @@ pub struct Scenario {
     pub message_faults: Vec<MessageSpec>,
     pub motion: MotionSpec,
     pub attitude: Option<Attitude>,
-    pub front_end: FrontEnd,
+    /// One at least.
+    pub front_ends: Vec<FrontEnd>,
     pub power: Power,
     pub multipath: Vec<Echo>,
     pub ionosphere: Option<Ionosphere>,
@@ -148,10 +154,10 @@ pub struct Scenario {
     pub scintillation: Option<Strength>,
     pub receiver_clock: ClockSpec,
     pub noise: bool,
-    pub stages: Stages,
+    /// Of a scene with one front end.
+    pub playback: Option<PlaybackSpec>,
     pub interference: Vec<InterferenceSpec>,
     pub spoofers: Vec<SpooferSpec>,
-    pub fidelity: Fidelity,
     pub truth_interval_s: f64,
     /// What the judge is to expect of a receiver.
     pub expect: Expect,
@@ -189,13 +195,11 @@ impl Scenario {
     /// Reads every table, and goes on where one is refused; `None` where a scene has no sense without it.
     fn read(root: &Table<'_>, refusals: &mut Refusals) -> Option<Self> {
         let mut open = |name: &'static str| refusals.take(root.table(name)).flatten();
-        let [navigation, of_satellites, orbits, motion, attitude, front_end, power] =
-            ["navigation", "satellites", "orbits", "motion", "attitude", "front_end", "power"].map(&mut open);
-        let [ionosphere, troposphere, scintillation, receiver_clock, noise, fidelity, truth] =
-            ["ionosphere", "troposphere", "scintillation", "receiver_clock", "noise", "fidelity", "truth"]
+        let [navigation, of_satellites, orbits, motion, attitude, power] =
+            ["navigation", "satellites", "orbits", "motion", "attitude", "power"].map(&mut open);
+        let [ionosphere, troposphere, scintillation, receiver_clock, noise, truth, playback, expect] =
+            ["ionosphere", "troposphere", "scintillation", "receiver_clock", "noise", "truth", "playback", "expect"]
                 .map(&mut open);
-        let [playback, oscillator, filter, iq, adc, expect] =
-            ["playback", "local_oscillator", "filter", "iq", "adc", "expect"].map(&mut open);
 
         let name = refusals.take(name(root));
         let start = refusals.take(start(root));
@@ -207,7 +211,6 @@ impl Scenario {
         let chosen = refusals.take(satellites(of_satellites.as_ref()));
         // Its absence is refused by now.
         let motion = motion.and_then(|t| refusals.take(MotionSpec::read(&t)));
-        let front_end = refusals.take(hardware::front_end(front_end.as_ref()));
         let power = refusals.take(link::power(power.as_ref()));
         let clock = refusals.take(hardware::receiver_clock(receiver_clock.as_ref()));
         let orbits = refusals.take(orbits.map(|t| satellite::orbits(&t)).transpose());
@@ -226,18 +229,11 @@ impl Scenario {
         let spoofers = each(root, "spoofer", interference::spoofer, refusals);
         let expect = expect.map(|t| expect::expect(&t, duration_s.unwrap_or(f64::INFINITY))).transpose();
         let expect = refusals.take(expect);
-        let (front_end, power) = (front_end?, power?);
-        let format = front_end.format;
-        let stages = Stages {
-            playback: refusals.take(playback.map(|t| stages::playback(&t)).transpose()).flatten(),
-            oscillator: refusals.take(oscillator.map(|t| stages::local_oscillator(&t)).transpose()).flatten(),
-            filter: refusals.take(filter.map(|t| stages::filter(&t)).transpose()).flatten(),
-            balance: refusals.take(iq.map(|t| stages::balance(&t, format)).transpose()).flatten(),
-            converter: refusals.take(adc.map(|t| stages::converter(&t, format)).transpose()).flatten(),
-        };
+        let power = power?;
         let noise = noise.is_some();
         let allowed_m = allowed_m(noise.then(|| power.strongest_dbhz()));
-        let fidelity = refusals.take(fidelity_of(fidelity.as_ref(), front_end.rate, allowed_m));
+        let front_ends = front_end::front_ends(root, allowed_m, refusals);
+        let playback = refusals.take(playback.map(|t| stages::playback(&t)).transpose()).flatten();
         let (mask_rad, excluded, include_unhealthy) = chosen?;
         Some(Self {
             origin: String::new(),
@@ -255,7 +251,7 @@ impl Scenario {
             message_faults,
             motion: motion?,
             attitude: attitude?,
-            front_end,
+            front_ends: front_ends?,
             power,
             multipath,
             ionosphere: ionosphere?,
@@ -264,10 +260,9 @@ impl Scenario {
             scintillation: scintillation?,
             receiver_clock: clock?,
             noise,
-            stages,
+            playback,
             interference,
             spoofers,
-            fidelity: fidelity?,
             truth_interval_s: truth_interval_s?,
             expect: expect?.unwrap_or_default(),
             receiver: None,
@@ -299,16 +294,21 @@ fn name(root: &Table<'_>) -> Result<String, ScenarioError> {
 }
 
 fn signals(root: &Table<'_>) -> Result<Vec<&'static Signal>, ScenarioError> {
+    Ok(signal_list(root, "signals")?.unwrap_or_else(|| vec![&crate::gnss::gps::l1ca::L1_CA]))
+}
+
+/// An array of different signals.
+fn signal_list(table: &Table<'_>, key: &str) -> Result<Option<Vec<&'static Signal>>, ScenarioError> {
     let expected = keys::signals_expected();
-    let Some(words) = root.words("signals", &expected)? else { return Ok(vec![&crate::gnss::gps::l1ca::L1_CA]) };
+    let Some(words) = table.words(key, &expected)? else { return Ok(None) };
     let mut signals: Vec<&'static Signal> = Vec::new();
     for word in words {
         match Signal::find(word) {
             Some(signal) if !signals.contains(&signal) => signals.push(signal),
-            _ => return Err(root.bad("signals", expected)),
+            _ => return Err(table.bad(key, expected)),
         }
     }
-    if signals.is_empty() { Err(root.bad("signals", expected)) } else { Ok(signals) }
+    if signals.is_empty() { Err(table.bad(key, expected)) } else { Ok(Some(signals)) }
 }
 
 fn satellites(table: Option<&Table<'_>>) -> Result<(f64, Vec<Sv>, bool), ScenarioError> {

@@ -8,7 +8,9 @@ use crate::generator::catalogue::Catalogue;
 use crate::generator::clock::ReceiverClock;
 pub use crate::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::generator::message::MessageFault;
+use crate::generator::random::Stream;
 use crate::generator::ray::{Effect, Sight};
+use crate::generator::ripple::nodes::Nodes;
 use crate::generator::ripple::satellite::SatelliteClocks;
 use crate::generator::ripple::scintillation::Scintillation;
 use crate::generator::spoof::Constellation;
@@ -31,9 +33,11 @@ pub const SPACE_M: f64 = 100e3;
 /// down through it once.
 const LIMB_M: f64 = 50e3;
 
-/// Everything that the generator computes, and nothing that it does not.
+/// Everything that the generator computes for the samples of one front end, and nothing that it does not.
 pub struct Scene {
     pub name: String,
+    /// Name of the front end, where the scenario gives it one.
+    pub front_end_name: Option<String>,
     pub seed: u64,
     /// Number of samples.
     pub samples: u64,
@@ -41,6 +45,8 @@ pub struct Scene {
     pub clock: SampleClock,
     /// How the receiver's clock departs from GPS time.
     pub receiver_clock: ReceiverClock,
+    /// Where what ripples has its nodes.
+    pub nodes: Nodes,
     pub metadata: IfMetadata,
     /// Antenna motion over true time since `clock.start`.
     pub trajectory: Trajectory,
@@ -51,7 +57,7 @@ pub struct Scene {
     /// What goes wrong with what they send.
     pub message_faults: Vec<MessageFault>,
     /// What satellites' clocks do that they do not broadcast.
-    pub satellite_clocks: SatelliteClocks,
+    pub satellite_clocks: Arc<SatelliteClocks>,
     pub signals: Vec<&'static Signal>,
     /// Satellites that the scene leaves out.
     pub excluded: Vec<Sv>,
@@ -59,7 +65,7 @@ pub struct Scene {
     pub mask_rad: f64,
     pub effects: Vec<Box<dyn Effect>>,
     /// Quick fading of satellites.
-    pub scintillation: Option<Scintillation>,
+    pub scintillation: Option<Arc<Scintillation>>,
     /// A transmitter that plays the satellites' signals back, before anything else is added.
     pub playback: Option<Playback>,
     /// What the antenna hears besides satellites, in order.
@@ -87,9 +93,15 @@ impl Scene {
         self.playback.iter().for_each(|stage| visit(stage));
         self.interference.iter().for_each(|stage| visit(stage));
         if self.noise {
-            visit(&Thermal { seed: self.seed, sigma_lsb: self.noise_lsb, arithmetic: self.fidelity.noise });
+            visit(&Thermal { seed: self.noise_seed(), sigma_lsb: self.noise_lsb, arithmetic: self.fidelity.noise });
         }
         self.front_end.iter().for_each(|stage| visit(stage.as_ref()));
+    }
+
+    /// Seed of what is random in one front end alone: a function of the front end's name, and not of its place in a list.
+    pub fn noise_seed(&self) -> u64 {
+        let own = |name: &String| Stream::new(self.seed, "front end").named(name).word(0);
+        self.front_end_name.as_ref().map_or(self.seed, own)
     }
 
     /// The scene's signals that a satellite sends and of which the samples can hold anything.

@@ -273,7 +273,8 @@ pub fn trajectory(scene: &Scene, from: &Constellation, sample: u64) -> Trajector
     let local = scene.clock.epoch(sample);
     let (time, elapsed_s, motion) = received(scene, from, local);
     let clock = &scene.receiver_clock;
-    let quick_s = clock.oscillator.as_ref().map_or(0.0, |oscillator| oscillator.quick_at_s(sample as f64));
+    let place = scene.nodes.place(scene.clock.rate, sample as f64);
+    let quick_s = clock.oscillator.as_ref().map_or(0.0, |oscillator| oscillator.quick_at_s(place));
     let time = time.plus_s(from.clock_s(elapsed_s) - quick_s);
     TrajectoryRow {
         sample,

@@ -199,6 +199,9 @@ pub struct Rate {
 }
 
 impl Rate {
+    /// 1 MHz.
+    pub const MEGAHERTZ: Self = Self { samples: 1_000_000, seconds: 1 };
+
     /// A rate given in hertz, exact to the millihertz; `None` unless it is positive and below 1 THz.
     pub fn from_hz(hz: f64) -> Option<Self> {
         if !(hz.is_finite() && (1e-3..1e12).contains(&hz)) {
@@ -215,6 +218,11 @@ impl Rate {
     /// The rate in hertz.
     pub fn hz(self) -> f64 {
         self.samples as f64 / self.seconds as f64
+    }
+
+    /// The rate as samples in so many seconds.
+    pub fn ratio(self) -> (u64, u64) {
+        (self.samples, self.seconds)
     }
 
     /// Time from sample 0 to sample `n`: whole seconds and a fraction in [0, 1), exact.

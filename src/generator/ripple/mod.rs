@@ -7,9 +7,12 @@
 //! the satellites (1 ns at 1 km/s is a micrometre).
 
 pub mod markov;
+pub mod nodes;
 pub mod oscillator;
 pub mod satellite;
 pub mod scintillation;
+
+use nodes::Nodes;
 
 use crate::generator::scene::Scene;
 use crate::gnss::satellite::Sv;
@@ -90,7 +93,7 @@ pub fn at(scene: &Scene, fading: Option<Sv>, carrier_hz: f64, sample: f64) -> Ri
     if !any(scene, fading) {
         return Ripple::STILL;
     }
-    let place = sample.max(0.0) / node_samples(scene.clock.rate) as f64;
+    let place = scene.nodes.place(scene.clock.rate, sample);
     let node = place.floor();
     let ends = [node as u64, node as u64 + 1].map(|node| at_node(scene, fading, carrier_hz, node));
     let [from, to] = cell(scene, fading, carrier_hz, node as u64, ends);
@@ -100,7 +103,9 @@ pub fn at(scene: &Scene, fading: Option<Sv>, carrier_hz: f64, sample: f64) -> Ri
 /// The ripple of one signal over a stretch of samples.
 #[derive(Clone, Debug, Default)]
 pub struct Ripples {
-    spacing: u64,
+    /// The grid of nodes, and the rate of the samples.
+    grid: Option<(Nodes, Rate)>,
+    /// Number of the first node.
     first: u64,
     /// Beginning and end of the stretch behind each node.
     cells: Vec<[Ripple; 2]>,
@@ -112,29 +117,36 @@ impl Ripples {
         if !any(scene, fading) {
             return;
         }
-        self.spacing = node_samples(scene.clock.rate);
-        self.first = from / self.spacing;
+        let (nodes, rate) = (scene.nodes, scene.clock.rate);
+        self.grid = Some((nodes, rate));
+        self.first = nodes.at(rate, from).0;
         self.cells.clear();
         let mut here = at_node(scene, fading, carrier_hz, self.first);
-        for node in self.first..=to / self.spacing {
+        for node in self.first..=nodes.at(rate, to).0 {
             let next = at_node(scene, fading, carrier_hz, node + 1);
             self.cells.push(cell(scene, fading, carrier_hz, node, [here, next]));
             here = next;
         }
     }
 
-    /// Longest run of samples that ends at nodes, if there are any.
+    /// Longest run of samples that ends at nodes, if there are any and they are samples.
     pub fn run_samples(&self) -> Option<u64> {
-        (!self.cells.is_empty()).then_some(self.spacing)
+        self.grid.and_then(|(nodes, rate)| nodes.run_samples(rate))
+    }
+
+    /// The sample at which a run from `sample` on has to end, where nodes lie between samples.
+    pub fn until(&self, sample: u64) -> Option<u64> {
+        self.grid.and_then(|(nodes, rate)| nodes.until(rate, sample))
     }
 
     /// The ripple at the ends of a run between two nodes.
     pub fn ends(&self, from: u64, to: u64) -> [Ripple; 2] {
-        let Some(spacing) = self.run_samples() else { return [Ripple::STILL; 2] };
-        let node = from / spacing;
+        let Some((nodes, rate)) = self.grid else { return [Ripple::STILL; 2] };
+        let (node, share) = nodes.at(rate, from);
         let cell = self.cells.get((node - self.first) as usize).copied();
         let [left, right] = cell.unwrap_or([Ripple::STILL; 2]);
-        let fraction = |sample: u64| (sample - node * spacing) as f64 / spacing as f64;
-        [left.between(right, fraction(from)), left.between(right, fraction(to))]
+        // The end is the next node, or where nodes lie between samples less than a sample behind it.
+        let (last, rest) = nodes.at(rate, to);
+        [left.between(right, share), left.between(right, (last - node) as f64 + rest)]
     }
 }

@@ -88,7 +88,6 @@ impl PowerLaw {
 #[derive(Debug)]
 pub struct Oscillator {
     pub law: PowerLaw,
-    node_samples: u64,
     cell_s: f64,
     tracks: Vec<Track>,
     /// White phase noise of a node: standard deviation and random numbers.
@@ -125,7 +124,6 @@ impl Oscillator {
         let white_s = (law.h2 / (8.0 * node_s)).sqrt() / std::f64::consts::PI;
         Self {
             law,
-            node_samples,
             cell_s: node_s * CELL_NODES as f64,
             tracks,
             white_s,
@@ -152,9 +150,8 @@ impl Oscillator {
         self.cell(cell).get(index).copied().unwrap_or(0.0)
     }
 
-    /// [`Self::quick_s`] at a place between samples; before the first sample that of the first.
-    pub fn quick_at_s(&self, sample: f64) -> f64 {
-        let place = sample.max(0.0) / self.node_samples as f64;
+    /// [`Self::quick_s`] at a place between nodes.
+    pub fn quick_at_s(&self, place: f64) -> f64 {
         let node = place.floor();
         let (from_s, to_s) = (self.quick_s(node as u64), self.quick_s(node as u64 + 1));
         from_s + (to_s - from_s) * (place - node)

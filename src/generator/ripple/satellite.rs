@@ -51,8 +51,8 @@ impl SatelliteClocks {
 
 /// True seconds since the scene's start at a node.
 fn elapsed_s(scene: &Scene, node: u64) -> f64 {
-    let sample = node.saturating_mul(super::node_samples(scene.clock.rate));
-    scene.receiver_clock.true_elapsed_s(scene.clock.start, scene.clock.epoch(sample))
+    let local = scene.nodes.clock(scene.clock).epoch(scene.nodes.tick(node));
+    scene.receiver_clock.true_elapsed_s(scene.clock.start, local)
 }
 
 impl SatelliteClock {
@@ -60,17 +60,15 @@ impl SatelliteClock {
     pub fn cell_s(&self, scene: &Scene, node: u64) -> [f64; 2] {
         [node, node + 1].map(|at| {
             let changed = self.changes.iter().map(|change| change.offset_s(scene, node, at));
-            let sample = at * super::node_samples(scene.clock.rate);
-            let noise = |oscillator: &Oscillator| {
-                oscillator.slow_s(scene.clock.rate.elapsed_s(sample)) + oscillator.quick_s(at)
-            };
+            let elapsed_s = scene.nodes.elapsed_s(at);
+            let noise = |oscillator: &Oscillator| oscillator.slow_s(elapsed_s) + oscillator.quick_s(at);
             changed.chain(self.noise.iter().map(noise)).sum::<f64>()
         })
     }
 
     /// The same at a place between samples.
     pub fn at_s(&self, scene: &Scene, sample: f64) -> f64 {
-        let place = sample.max(0.0) / super::node_samples(scene.clock.rate) as f64;
+        let place = scene.nodes.place(scene.clock.rate, sample);
         let node = place.floor();
         let [from_s, to_s] = self.cell_s(scene, node as u64);
         from_s + (to_s - from_s) * (place - node)

@@ -1,4 +1,4 @@
-//! The receiver's hardware as written: sampling, and the clock behind it.
+//! The receiver's clock as written, and the noise of oscillators.
 
 use std::sync::Arc;
 
@@ -9,60 +9,7 @@ use crate::generator::random::Stream;
 use crate::generator::ripple::oscillator::{Oscillator, PowerLaw};
 use crate::generator::vehicle::Trajectory;
 use crate::generator::vehicle::shaking::Shaking;
-use crate::gnss::samples::Format;
 use crate::gnss::time::Rate;
-
-/// The sampling of the scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FrontEnd {
-    pub rate: Rate,
-    /// Where GPS L1 appears in the samples.
-    pub if_hz: f64,
-    pub inverted: bool,
-    pub format: Format,
-    /// The gain, if the scenario sets it.
-    pub noise_lsb: Option<f32>,
-}
-
-pub(super) fn front_end(table: Option<&Table<'_>>) -> Result<FrontEnd, ScenarioError> {
-    let default_rate = Rate::from_hz(2.6e6);
-    let Some(table) = table else {
-        let rate = default_rate.ok_or_else(|| ScenarioError::Conflict {
-            origin: String::new(),
-            key: "front_end",
-            reason: "no sample rate".to_owned(),
-        })?;
-        return Ok(FrontEnd { rate, if_hz: 0.0, inverted: false, format: Format::Ci8, noise_lsb: None });
-    };
-    let rate_hz = table.need("sample_rate_hz")?;
-    let rate = Rate::from_hz(rate_hz).ok_or_else(|| table.bad("sample_rate_hz", "a rate"))?;
-    let format = match table.text("format")? {
-        Some(text) => text.parse().map_err(|_| table.bad("format", "one of ci8, cu8, ci16, cf32, ri8, ri16"))?,
-        None => Format::Ci8,
-    };
-    let half = 0.5 * rate.hz();
-    let if_hz = table.need("if_hz")?;
-    if format.is_complex() && if_hz.abs() >= half {
-        return Err(table.bad("if_hz", format!("less than half of sample_rate_hz in size, {half} Hz")));
-    }
-    // Above half the rate real samples hold a band folded, as bandpass sampling does; on a multiple of it,
-    // one over itself.
-    if !format.is_complex() && (if_hz <= 0.0 || (if_hz / half).fract() == 0.0) {
-        return Err(table.bad(
-            "if_hz",
-            format!(
-                "more than 0 and no multiple of half of sample_rate_hz, {half} Hz, because format = {format} is real"
-            ),
-        ));
-    }
-    Ok(FrontEnd {
-        rate,
-        if_hz,
-        inverted: table.flag("spectrum_inverted")?.unwrap_or(false),
-        format,
-        noise_lsb: table.number("noise_lsb")?.map(|x| x as f32),
-    })
-}
 
 /// The receiver's clock as written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,7 +23,7 @@ pub struct ClockSpec {
 }
 
 impl ClockSpec {
-    /// The clock of a scene with samples at `rate` and an antenna on `trajectory`.
+    /// The clock of a scene whose noise is drawn at nodes of `rate`, with an antenna on `trajectory`.
     pub(super) fn clock(&self, seed: u64, rate: Rate, trajectory: &Trajectory) -> ReceiverClock {
         let oscillator = |law| Arc::new(Oscillator::new(law, rate, Stream::new(seed, "receiver clock")));
         let shaken = self.per_g != 0.0 && !trajectory.is_static();

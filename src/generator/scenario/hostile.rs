@@ -26,7 +26,7 @@ const NOISE_RATE: f64 = 1.5;
 /// A part of the sampled band from which on noise is white in all of it.
 const WHOLE: f64 = 0.98;
 
-/// The interference of a scene; what lies wholly outside the samples' band is told and left out.
+/// The interference of a scene. What lies wholly outside the samples' band is left out: [`unheard`].
 pub(super) fn interferers(
     scenario: &Scenario,
     scene: &Scene,
@@ -40,6 +40,16 @@ pub(super) fn interferers(
         found.extend(source.interferer(directory, overrides, warnings)?);
     }
     Ok(found)
+}
+
+/// What is to be told of sources that lie outside the bands of all front ends.
+pub(super) fn unheard<'s>(scenario: &'s Scenario, scenes: &'s [Scene]) -> impl Iterator<Item = String> + 's {
+    let numbered = (1_u64..).zip(&scenario.interference);
+    let heard = |number: u64| scenes.iter().flat_map(|scene| &scene.interference).any(|found| found.source == number);
+    numbered.filter(move |(number, _)| !heard(*number)).map(|(number, spec)| {
+        let kind = spec.kind.name();
+        format!("interference number {number} ({kind}) lies outside the samples' band: it is not computed")
+    })
 }
 
 struct Source<'a> {
@@ -72,13 +82,7 @@ impl Source<'_> {
     ) -> Result<Option<Interferer>, ScenarioError> {
         let spec = self.spec;
         let kind = spec.kind.name();
-        let Some(fitted) = self.waveform(directory, overrides, warnings)? else {
-            warnings.push(format!(
-                "interference number {} ({kind}) lies outside the samples' band: it is not computed",
-                self.number
-            ));
-            return Ok(None);
-        };
+        let Some(fitted) = self.waveform(directory, overrides, warnings)? else { return Ok(None) };
         let path = spec.place.map(|place| Way { emitter_m: place.to_ecef(), antenna: self.scene.trajectory.clone() });
         let jn0_dbhz = self.jn0_dbhz(path.as_ref())? + 10.0 * libm::log10(fitted.share);
         let on = self.tuning.sample_at(spec.on_s)..spec.off_s.map_or(u64::MAX, |t_s| self.tuning.sample_at(t_s));
@@ -90,7 +94,11 @@ impl Source<'_> {
             fitted.text,
             spec.on_s
         );
+        // Noise is drawn at the front end's rate, all else by the time: that is the same for every front end.
+        let own = matches!(fitted.waveform, Waveform::Noise { .. } | Waveform::White);
+        let seed = if own { self.scene.noise_seed() } else { self.scene.seed };
         Ok(Some(Interferer {
+            source: self.number,
             kind,
             waveform: fitted.waveform,
             carrier_hz: fitted.carrier_hz,
@@ -98,7 +106,7 @@ impl Source<'_> {
             path,
             on,
             // Sources of one scene, and the thermal noise, draw from streams of their own.
-            seed: self.scene.seed ^ self.number.wrapping_mul(0xd1b5_4a32_d192_ed03),
+            seed: seed ^ self.number.wrapping_mul(0xd1b5_4a32_d192_ed03),
             tuning: self.tuning.clone(),
             description,
         }))

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::compose::Files;
+use super::files::Files;
 use super::{Ionosphere, Overrides, Scenario, ScenarioError, multipath, satellite};
 use crate::generator::catalogue::Catalogue;
 use crate::generator::effect::obstruction::Obstruction;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::compose::Files;
+use super::files::Files;
 use super::read::Table;
 use super::{Scenario, ScenarioError};
 use crate::generator::effect::ionosphere::KlobucharIonosphere;

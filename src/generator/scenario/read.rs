@@ -142,6 +142,9 @@ impl<'t> Table<'t> {
             Value::Table(_) | Value::BySatellite(_) => {
                 self.table(name).map(|table| table.iter().for_each(|table| table.check(refusals)))
             }
+            Value::OneOrMore(_) => {
+                self.one_or_more(name).map(|tables| tables.iter().flatten().for_each(|table| table.check(refusals)))
+            }
             Value::Tables(_) => {
                 self.tables(name).map(|tables| tables.iter().flatten().for_each(|table| table.check(refusals)))
             }
@@ -313,7 +316,7 @@ impl<'t> Table<'t> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let DeValue::Table(table) = value.get_ref() else { return Err(self.bad(name, "a table")) };
         let (keys, each): (&'static [Key], _) = match self.declared(name).map(|key| key.value) {
-            Some(Value::Table(keys)) => (keys, None),
+            Some(Value::Table(keys) | Value::OneOrMore(keys)) => (keys, None),
             Some(Value::BySatellite(each)) => (&[], Some(each)),
             _ => (&[], None),
         };
@@ -325,7 +328,7 @@ impl<'t> Table<'t> {
         let expected = "an array of tables";
         let DeValue::Array(items) = value.get_ref() else { return Err(self.bad(name, expected)) };
         let keys: &'static [Key] = match self.declared(name).map(|key| key.value) {
-            Some(Value::Tables(keys)) => keys,
+            Some(Value::Tables(keys) | Value::OneOrMore(keys)) => keys,
             _ => &[],
         };
         let mut tables = Vec::with_capacity(items.len());
@@ -335,6 +338,16 @@ impl<'t> Table<'t> {
             tables.push(Table::new(self.source, &path, item.span().start, table, keys));
         }
         Ok(Some(tables))
+    }
+
+    /// A table by itself, or every table of an array.
+    pub fn one_or_more(&self, name: &str) -> Result<Option<Vec<Table<'t>>>, ScenarioError> {
+        match self.get(name).map(Spanned::get_ref) {
+            Some(DeValue::Array(_)) => self.tables(name),
+            Some(DeValue::Table(_)) => Ok(self.table(name)?.map(|table| vec![table])),
+            Some(_) => Err(self.bad(name, self.expected(name))),
+            None => Ok(None),
+        }
     }
 
     /// The names of the keys that are there.

@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use super::compose::Files;
+use super::files::Files;
 use super::hardware::power_law;
 use super::interference::times;
 use super::keys::satellites::parameters;

@@ -50,6 +50,8 @@ pub enum Value {
     Table(&'static [Key]),
     /// An array of tables, `[[…]]`.
     Tables(&'static [Key]),
+    /// A table, or an array of tables.
+    OneOrMore(&'static [Key]),
     /// A table that another part of the program reads; where its keys are found.
     Foreign(&'static str),
 }
@@ -149,6 +151,10 @@ pub(crate) const fn tables(name: &'static str, keys: &'static [Key], meaning: &'
     key(name, Value::Tables(keys), meaning)
 }
 
+pub(crate) const fn one_or_more(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
+    key(name, Value::OneOrMore(keys), meaning)
+}
+
 pub(crate) const fn foreign(name: &'static str, found: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Foreign(found), meaning)
 }
@@ -208,6 +214,7 @@ impl Key {
             }
             Value::BySatellite(_) | Value::Foreign(_) => "a table".to_owned(),
             Value::Tables(_) => "an array of tables".to_owned(),
+            Value::OneOrMore(_) => "a table, or an array of tables".to_owned(),
         }
     }
 
@@ -259,7 +266,7 @@ fn walk(found: &mut Vec<Listed>, keys: &'static [Key], (path, many): (&str, bool
     for key in keys {
         let below = if path.is_empty() { key.name.to_owned() } else { format!("{path}.{}", key.name) };
         match key.value {
-            Value::Table(inner) if !found.iter().any(|listed| same(&listed.keys, inner)) => {
+            Value::Table(inner) | Value::OneOrMore(inner) if !found.iter().any(|listed| same(&listed.keys, inner)) => {
                 walk(found, inner, (&below, false), key.meaning);
             }
             Value::Tables(inner) => walk(found, inner, (&below, true), key.meaning),

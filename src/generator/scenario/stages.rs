@@ -1,7 +1,7 @@
 //! What the front end does to samples, as written: filter, mixer, balance, converter; and the playback before it.
 
 use super::ScenarioError;
-use super::hardware::FrontEnd;
+use super::front_end::{FrontEnd, Tuned};
 use super::read::Table;
 use crate::generator::random::Stream;
 use crate::generator::scene::folded_hz;
@@ -47,7 +47,6 @@ pub struct PlaybackSpec {
 /// Everything between the antenna's connector and the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stages {
-    pub playback: Option<PlaybackSpec>,
     pub oscillator: Option<OscillatorSpec>,
     pub filter: Option<FilterSpec>,
     pub balance: Option<Balance>,
@@ -132,14 +131,15 @@ pub(super) fn playback(table: &Table<'_>) -> Result<PlaybackSpec, ScenarioError>
 }
 
 impl Stages {
-    /// The front end's stages in the order of the hardware. `sigma_lsb` is the thermal noise's deviation.
+    /// The front end's stages in the order of the hardware. `sigma_lsb` is the thermal noise's deviation, and `if_hz` where
+    /// the carrier of its first signal lies.
     ///
     /// # Errors
     /// A filter that cannot be made, in words.
-    pub(super) fn front_end(
+    pub(super) fn in_order(
         &self,
         front_end: &FrontEnd,
-        format: Format,
+        (format, if_hz): (Format, f64),
         seed: u64,
         sigma_lsb: f32,
     ) -> Result<Vec<Box<dyn Stage>>, String> {
@@ -147,11 +147,17 @@ impl Stages {
         let mut stages: Vec<Box<dyn Stage>> = Vec::new();
         if let Some(spec) = self.oscillator {
             let stream = Stream::new(seed, "local oscillator");
+            let stream = front_end.name.as_ref().map_or(stream, |name| stream.named(name));
             let noise = spec.noise.map(|(rms_rad, hz)| PhaseNoise::new(rms_rad, hz, rate, stream));
             stages.push(Box::new(Oscillator::new(spec.offset_hz, noise, rate)));
         }
         if let Some(FilterSpec { shape, bandwidth_hz }) = self.filter {
-            let if_hz = folded_hz(front_end.if_hz, rate.hz());
+            let middle_hz = match front_end.tuned {
+                Tuned::Centre { .. } if format.is_complex() => 0.0,
+                Tuned::Centre { .. } => if_hz,
+                Tuned::If { if_hz } => if_hz,
+            };
+            let if_hz = folded_hz(middle_hz, rate.hz());
             let filter = Filter::new(shape, bandwidth_hz, rate.hz(), if_hz, !format.is_complex());
             stages.push(Box::new(filter.map_err(|e| e.to_string())?));
         }

@@ -76,7 +76,7 @@ fn every_value_arrives_where_it_belongs_in_si_units() {
     assert_eq!(scenario.start, Epoch::parse("2010-07-01T10:00:00").unwrap());
     assert_eq!(scenario.mask_rad, 10_f64.to_radians());
     assert_eq!((scenario.excluded.as_slice(), scenario.include_unhealthy), ([Sv::gps(1)].as_slice(), true));
-    assert_eq!((scenario.front_end.format, scenario.front_end.inverted), (Format::Ri8, true));
+    assert_eq!((scenario.front_ends[0].format, scenario.front_ends[0].inverted), (Format::Ri8, true));
     let power = Power::LinkBudget {
         transmit: Transmit::Block(Block::Iir),
         transmit_dbw: 15.0,
@@ -111,7 +111,11 @@ fn every_value_arrives_where_it_belongs_in_si_units() {
     let clock = ClockSpec { bias_s: 1e-4, drift: 1e-7, ageing_per_s: 1e-9 / 86_400.0, per_g: 1e-9, noise: Some(tcxo) };
     assert_eq!(scenario.receiver_clock, clock);
     assert!(scenario.scintillation.is_some_and(|s| s.s4 == 0.5 && s.satellites == Some(vec![Sv::gps(2)])));
-    assert!(scenario.noise && scenario.fidelity.code_edge == CodeEdge::Nearest && scenario.truth_interval_s == 0.5);
+    assert!(
+        scenario.noise
+            && scenario.front_ends[0].fidelity.code_edge == CodeEdge::Nearest
+            && scenario.truth_interval_s == 0.5
+    );
     assert!(scenario.receiver.unwrap().contains_key("tracking"));
 }
 
@@ -513,8 +517,8 @@ fn what_cannot_be_turned_or_reflected_is_refused_with_the_remedy() {
 
 #[test]
 fn a_level_sets_every_knob_and_a_knob_overrides_its_level() {
-    let fidelity = |lines: &str| parse(&with("fidelity", lines)).unwrap().fidelity;
-    assert_eq!(parse(&format!("{MINIMAL}{STATIC}")).unwrap().fidelity, Fidelity::of(Grade::Balanced));
+    let fidelity = |lines: &str| parse(&with("fidelity", lines)).unwrap().front_ends[0].fidelity;
+    assert_eq!(parse(&format!("{MINIMAL}{STATIC}")).unwrap().front_ends[0].fidelity, Fidelity::of(Grade::Balanced));
     for (name, grade) in Grade::NAMES {
         assert_eq!(fidelity(&format!("level = \"{name}\"")), Fidelity::of(grade));
         let own = fidelity(&format!("level = \"{name}\"\nknot_tolerance_cycles = 3e-5"));
@@ -715,7 +719,8 @@ fn a_signal_outside_the_band_is_refused_where_it_is_the_only_one() {
     let place = |if_hz: f64, format: Format| {
         let mut scenario = parse(&format!("{MINIMAL}{STATIC}[front_end]\nsample_rate_hz = 2.6e6\n")).unwrap();
         // No text comes here: the parser keeps the IF of the one signal that there is below half the rate.
-        (scenario.front_end.if_hz, scenario.front_end.format) = (if_hz, format);
+        let front_end = &mut scenario.front_ends[0];
+        (front_end.tuned, front_end.format) = (Tuned::If { if_hz }, format);
         let (_, warnings) = scenario.compose(Path::new("."), &Overrides::default()).map_err(|e| e.to_string())?;
         Ok::<_, String>(warnings)
     };
@@ -733,7 +738,7 @@ fn a_signal_outside_the_band_is_refused_where_it_is_the_only_one() {
 
 #[test]
 fn noise_and_strong_signals_decide_how_good_balanced_edges_are() {
-    let edge = |tables: &str| parse(&format!("{MINIMAL}{STATIC}{tables}")).unwrap().fidelity.code_edge;
+    let edge = |tables: &str| parse(&format!("{MINIMAL}{STATIC}{tables}")).unwrap().front_ends[0].fidelity.code_edge;
     assert_eq!(edge("[noise]\n"), CodeEdge::Area);
     assert_eq!(edge("[power]\ncn0_dbhz = 80\n"), CodeEdge::Area);
     assert_eq!(edge("[noise]\n[power]\ncn0_dbhz = 80\n"), CodeEdge::BandLimited);

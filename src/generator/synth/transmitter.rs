@@ -309,6 +309,7 @@ impl Transmitter {
                 let mut n = start.max(part.start);
                 while n < end.min(part.end) {
                     let whole = ((n / run_samples + 1) * run_samples).min(part.end);
+                    let whole = self.ripples.until(n).map_or(whole, |node| node.min(whole));
                     let anchor = scratch.anchor(scene, self.if_hz, n);
                     if self.on.contains(&n) && self.view.get(&anchor.second) == Some(&true) {
                         let samples = (n - start) as usize..(whole.min(end) - start) as usize;

@@ -14,6 +14,8 @@ pub mod route;
 pub mod shaking;
 pub mod spline;
 
+use std::sync::Arc;
+
 use attitude::{Attitude, Orientation};
 use nalgebra::Vector3;
 
@@ -51,8 +53,8 @@ pub struct Knot {
 /// Antenna motion over true time since the scene's start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
-    /// At least one; times strictly ascending.
-    knots: Vec<Knot>,
+    /// At least one; times strictly ascending. Who keeps a copy of the trajectory shares them.
+    knots: Arc<[Knot]>,
     breaks_s: Vec<f64>,
     first: Knot,
     attitude: Option<Attitude>,
@@ -62,7 +64,7 @@ impl Trajectory {
     /// An antenna that does not move.
     pub fn fixed(position_m: Vector3<f64>) -> Self {
         let first = Knot { t_s: 0.0, motion: Motion::at_rest(position_m) };
-        Self { knots: vec![first], breaks_s: Vec::new(), first, attitude: None }
+        Self { knots: Arc::new([first]), breaks_s: Vec::new(), first, attitude: None }
     }
 
     /// Motion through `knots`, whose times must ascend; `None` if they do not, or if there are none.
@@ -75,7 +77,7 @@ impl Trajectory {
         }
         breaks_s.sort_by(f64::total_cmp);
         breaks_s.dedup();
-        Some(Self { knots, breaks_s, first, attitude: None })
+        Some(Self { knots: knots.into(), breaks_s, first, attitude: None })
     }
 
     /// The same motion of a body with an attitude.

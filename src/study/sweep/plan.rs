@@ -460,7 +460,8 @@ fn cost_s(study: &Study, bases: &[Base], case: &axis::Case) -> f64 {
             let base = bases.iter().find(|base| Some(base.written.as_path()) == study.scenario_of(case));
             let read = base.and_then(|base| sampled::read(base, &sampled::patched(base, &values).ok()?).ok());
             read.map_or(OVERHEAD_S, |(scenario, _)| {
-                OVERHEAD_S + scenario.duration_s * scenario.front_end.rate.hz() * SATELLITES / SAMPLES_PER_S
+                let rate_hz: f64 = scenario.front_ends.iter().map(|front_end| front_end.rate.hz()).sum();
+                OVERHEAD_S + scenario.duration_s * rate_hz * SATELLITES / SAMPLES_PER_S
             })
         }
     }

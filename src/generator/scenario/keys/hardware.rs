@@ -1,9 +1,28 @@
 //! Keys of the receiver's hardware, and of a transmitter that plays signals back.
 
 use crate::generator::ripple::oscillator::PowerLaw;
-use crate::generator::scenario::schema::{Key, flag, integer, number, numbers, text, word};
+use crate::generator::scenario::schema::{Key, flag, integer, number, numbers, table, text, word, words};
 
 pub(crate) const FRONT_END: &[Key] = &[
+    text(
+        "name",
+        "1 to 64 letters, digits, '-' and '_' (it names files)",
+        "name of the front end: names its files and keys what is random about it; required where there are several",
+    ),
+    number(
+        "center_hz",
+        1e9,
+        3e9,
+        "Hz",
+        "the radio frequency at 0 Hz of the samples; not beside if_hz, required where there are several",
+    )
+    .or_else("that of the first signal, less if_hz"),
+    words(
+        "signals",
+        "an array of different signals out of the scene's",
+        "the signals that it is for; of real samples with center_hz required where the scene has several",
+    )
+    .or_else("those of the scene's that reach into its band"),
     number("sample_rate_hz", 1.1e6, 100e6, "Hz", "sample rate").or(2.6e6),
     number("if_hz", -100e6, 100e6, "Hz", "where the carrier of the first signal appears in the samples").or(0.0),
     flag("spectrum_inverted", "whether frequencies run downwards"),
@@ -15,6 +34,10 @@ pub(crate) const FRONT_END: &[Key] = &[
     .or_else("ci8"),
     number("noise_lsb", 0.01, 32_767.0, "LSB", "deviation of the noise per component: the gain")
         .or_else("28 (8 bits), 512 (16 bits), 1 (cf32)"),
+    table("local_oscillator", LOCAL_OSCILLATOR, "As [local_oscillator], of this front end alone."),
+    table("filter", FILTER, "As [filter], of this front end alone."),
+    table("iq", IQ, "As [iq], of this front end alone."),
+    table("adc", ADC, "As [adc], of this front end alone."),
 ];
 
 pub(crate) const RECEIVER_CLOCK: &[Key] = &[
@@ -47,7 +70,14 @@ pub(crate) const LOCAL_OSCILLATOR: &[Key] = &[
 pub(crate) const FILTER: &[Key] = &[
     word("kind", || vec!["brick_wall", "butterworth"], "shape").required(),
     integer("order", 1, 10, "of the low-pass; required with kind = \"butterworth\""),
-    number("bandwidth_hz", 1e5, 60e6, "Hz", "both sides of the carrier together").required(),
+    number(
+        "bandwidth_hz",
+        1e5,
+        60e6,
+        "Hz",
+        "both sides of the carrier together; of complex samples with center_hz, both sides of that",
+    )
+    .required(),
 ];
 
 pub(crate) const IQ: &[Key] = &[

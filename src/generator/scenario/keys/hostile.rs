@@ -15,7 +15,7 @@ pub(crate) fn kinds() -> Vec<&'static str> {
 
 pub(crate) const INTERFERENCE: &[Key] = &[
     word("kind", kinds, "what it sends").required(),
-    number("offset_hz", -1e8, 1e8, "Hz", "its middle from GPS L1").or(0.0),
+    number("offset_hz", -1e9, 1e9, "Hz", "its middle from GPS L1").or(0.0),
     number(
         "js_db",
         -100.0,

@@ -6,7 +6,7 @@ pub(crate) mod motion;
 pub(crate) mod satellites;
 pub(crate) mod way;
 
-use super::schema::{Key, flag, foreign, integer, number, table, tables, text, texts, time, word, words};
+use super::schema::{Key, flag, foreign, integer, number, one_or_more, table, tables, text, texts, time, word, words};
 use crate::generator::scene::{Arithmetic, CodeEdge, Grade};
 use crate::gnss::facts::{Fixes, Losses, Sizes};
 use crate::gnss::signal::SIGNALS;
@@ -44,7 +44,6 @@ pub const SCENARIO: &[Key] = &[
         motion::ATTITUDE,
         "How the body that carries the antenna is turned. Absent: the antenna looks up, no wind-up.",
     ),
-    table("front_end", hardware::FRONT_END, "Sampling."),
     table("power", satellites::POWER, "How strong the satellites are. Absent: a link budget with its defaults."),
     tables("multipath", way::MULTIPATH, "A ray that is reflected; at most 64."),
     table("ionosphere", way::IONOSPHERE, "The true ionosphere, and what is broadcast of it. Absent: none."),
@@ -62,6 +61,12 @@ pub const SCENARIO: &[Key] = &[
     table("filter", hardware::FILTER, "The front end's filter."),
     table("iq", hardware::IQ, "Imbalance of the two branches, and direct current."),
     table("adc", hardware::ADC, "A converter with fewer bits than the format has."),
+    one_or_more(
+        "front_end",
+        hardware::FRONT_END,
+        "Sampling. Several, each written as [[front_end]], listen to one sky by one clock: one file each. The tables of stages \
+         (local_oscillator, filter, iq, adc) stand below each of them then.",
+    ),
     tables(
         "interference",
         hostile::INTERFERENCE,

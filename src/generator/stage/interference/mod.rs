@@ -119,6 +119,8 @@ pub struct Spectrum {
 /// One source of interference in a scene.
 #[derive(Clone, Debug)]
 pub struct Interferer {
+    /// Its number in the scenario, from 1.
+    pub source: u64,
     /// Its kind as a scenario writes it.
     pub kind: &'static str,
     pub waveform: Waveform,
