@@ -1,6 +1,6 @@
 //! The samples of every shipped scene are the bytes that they have always been: `samples.sha256` has the hashes of three
-//! stretches of each. A change of the signal chain that changes them says so there, and in the changelog why they
-//! were wrong before.
+//! stretches of each, and of each front end where there are several. A change of the signal chain that changes them says
+//! so there, and in the changelog why they were wrong before.
 
 use std::path::Path;
 use std::process::Command;
@@ -13,12 +13,14 @@ fn the_samples_of_every_shipped_scene_are_the_bytes_that_they_were() {
     let place = tempfile::tempdir().unwrap();
     let (mut changed, mut scenes) = (Vec::new(), std::collections::BTreeSet::new());
     for line in include_str!("samples.sha256").lines() {
-        let [hash, scenario, seek, samples] = line.split_whitespace().collect::<Vec<_>>().try_into().unwrap();
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let (&[hash, scenario, seek, samples], front_end) = words.split_first_chunk().unwrap();
         let out = place.path().join("samples.sigmf-data");
         let done = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
             .current_dir(root)
             .args(["generate", scenario, "--seek", seek, "--samples", samples, "--out"])
             .arg(&out)
+            .args(front_end.iter().flat_map(|name| ["--front-end", *name]))
             .output()
             .unwrap();
         assert!(done.status.success(), "{line}: {}", String::from_utf8_lossy(&done.stderr));

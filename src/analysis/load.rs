@@ -156,6 +156,11 @@ impl Run {
     fn read_truth_by(truth: &Path, shelves: &Path) -> Result<Self, JudgeError> {
         let scene = truth.join("scene.json");
         let mut scene: SceneFacts = json(&scene)?.ok_or_else(|| missing(&scene, TRUTH))?;
+        if scene.front_ends.len() > 1 {
+            let expected = "one: a receiver's samples are those of one front end, whose truth `gnss-twin generate \
+                            --front-end NAME` writes";
+            return Err(JudgeError::Scene { key: "front_ends", value: scene.front_ends.len() as f64, expected });
+        }
         let (mut cn0_sums_hz, mut cn0_most_hz) = (HashMap::new(), HashMap::new());
         let mut common = Common::new(scene.sample_rate_hz);
         let observed = observations(&truth.join("observations.csv"), TRUTH, shelves, |row| {

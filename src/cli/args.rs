@@ -47,9 +47,12 @@ pub struct Reference {
 pub struct Run {
     /// Scene to run [default: the embedded static scene]
     pub scenario: Option<PathBuf>,
-    /// Directory for the results [default: reports/<scene's name>]
+    /// Directory for the results [default: reports/<scene's name>, with -<NAME> behind it for a --front-end]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Front end to receive, of a scene that has several
+    #[arg(long, value_name = "NAME")]
+    pub front_end: Option<String>,
     /// Seed of the noise, in place of the scene's
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
@@ -75,9 +78,13 @@ pub struct Generate {
     /// Also read files that lie outside the scenario's directory
     #[arg(long)]
     pub allow_outside: bool,
-    /// File for the samples; metadata (.sigmf-meta) and truth (.truth/) are written beside it
+    /// File for the samples; metadata (.sigmf-meta) and truth (.truth/) are written beside it. Of a scene with several
+    /// front ends a directory, for NAME.sigmf-data and NAME.sigmf-meta of each, a .sigmf-collection and truth/
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
+    /// Front end to generate, of a scene that has several [default: all of them]
+    #[arg(long, value_name = "NAME")]
+    pub front_end: Option<String>,
     /// Sample format, in place of the scene's: ci8, cu8, ci16, cf32, ri8, ri16
     #[arg(long)]
     pub format: Option<Format>,

@@ -1,10 +1,12 @@
-//! `generate`: samples, metadata and truth of a scene, without a receiver.
+//! `generate`: samples, metadata and truth of a scene, without a receiver. Several front ends are in
+//! [`collection`].
 
 use std::fs;
 use std::io;
 use std::path::Path;
 
 use crate::cli::args;
+use crate::cli::collection;
 use crate::cli::error::CliError;
 use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, truth_error};
@@ -19,14 +21,18 @@ use crate::gnss::sigmf;
 /// Writes a scene's samples to a file.
 pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
-    let named = scenario::read(Some(&arguments.scenario))?;
-    let (scene, warnings) = scenario::compose(
+    let named = scenario::read(Some(&arguments.scenario))?.choose(arguments.front_end.as_deref())?;
+    let (mut scenes, warnings) = scenario::compose_all(
         &named,
         &Overrides { seed: arguments.seed, format: arguments.format, allow_outside: arguments.allow_outside },
     )?;
     for warning in warnings {
         scenario::warn(&warning);
     }
+    if scenes.len() > 1 {
+        return collection::generate(arguments, &scenes);
+    }
+    let Some(scene) = scenes.pop() else { return Err(CliError::bug("a scenario without a front end")) };
     let first = arguments.seek;
     let end = arguments.samples.map_or(scene.samples, |count| first.saturating_add(count));
     if first >= scene.samples || end > scene.samples || end == first {

@@ -6,6 +6,7 @@
 pub mod analyze;
 pub mod args;
 pub mod check;
+mod collection;
 pub mod error;
 pub mod generate;
 pub mod interrupt;

@@ -10,7 +10,7 @@ use crate::cli::scenario;
 use crate::generator;
 use crate::generator::dynamics::{LineOfSight, lines_of_sight};
 use crate::generator::levels::Levels;
-use crate::generator::plan::Plan;
+use crate::generator::plan::{Plan, Together};
 use crate::generator::scenario::Overrides;
 use crate::generator::scene::Scene;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
@@ -23,18 +23,26 @@ const G_MPS2: f64 = 9.806_65;
 /// Prints the plan of a scene.
 pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
     let named = scenario::read(arguments.scenario.as_deref())?;
-    let (scene, warnings) =
-        scenario::compose(&named, &Overrides { allow_outside: arguments.allow_outside, ..Overrides::default() })?;
+    let overrides = Overrides { allow_outside: arguments.allow_outside, ..Overrides::default() };
+    let (scenes, warnings) = scenario::compose_all(&named, &overrides)?;
     let settings = scenario::receiver_settings(&named)?;
     for warning in warnings {
         scenario::warn(&warning);
     }
-    let machinery = generator::stream::machinery(&scene).map_err(generator_error)?;
-    let levels = Levels::new(&scene).map_err(generator_error)?;
-    let plan = Plan::new(&scene, machinery, levels).map_err(CliError::input)?;
-    let loops = Loops::new(&scene, &settings.tracking)?;
-    loops.warning().iter().for_each(|warning| scenario::warn(warning));
-    scenario::print(&format!("{plan}\n{}", loops.text()))
+    let (mut plans, mut texts) = (Vec::new(), Vec::new());
+    for scene in &scenes {
+        let machinery = generator::stream::machinery(scene).map_err(generator_error)?;
+        let levels = Levels::new(scene).map_err(generator_error)?;
+        let plan = Plan::new(scene, machinery, levels).map_err(CliError::input)?;
+        let loops = Loops::new(scene, &settings.tracking)?;
+        let of_it = plan.front_end.as_ref().filter(|_| scenes.len() > 1);
+        let of_it = of_it.map_or_else(String::new, |name| format!("front end {name}: "));
+        loops.warning().iter().for_each(|warning| scenario::warn(&format!("{of_it}{warning}")));
+        texts.push(format!("{plan}\n{}", loops.text()));
+        plans.push(plan);
+    }
+    let together = if plans.len() > 1 { format!("{}\n", Together(&plans)) } else { String::new() };
+    scenario::print(&(together + &texts.join("\n")))
 }
 
 /// The carrier loop of the scene's settings on every line of sight.

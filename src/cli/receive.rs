@@ -71,6 +71,9 @@ struct Recording {
 /// Opens the recording and finds out what it is: SigMF metadata if there are any, then flags over them.
 fn open(arguments: &args::Receive) -> Result<Recording, CliError> {
     let stdin = arguments.file.as_os_str() == "-";
+    if arguments.file.extension().is_some_and(|extension| extension == "sigmf-collection") {
+        return Err(of_collection(&arguments.file)?);
+    }
     let (data_path, meta_path) = pair(&arguments.file);
     let there = !stdin && present(&meta_path).map_err(|error| CliError::read(shown(&meta_path), &error))?;
     let described = if there {
@@ -91,6 +94,18 @@ fn open(arguments: &args::Receive) -> Result<Recording, CliError> {
     }
     let samples = about.is_file().then(|| about.len() / metadata.format.bytes() as u64);
     Ok(Recording { metadata, reader: Box::new(file), samples })
+}
+
+/// The refusal of a collection, with the recordings in it that can be received.
+fn of_collection(path: &Path) -> Result<CliError, CliError> {
+    let (name, text) = scenario::text(path)?;
+    let members = sigmf::parse_collection(&text, &name).map_err(CliError::input)?;
+    let files = members.iter().map(|member| shown(&path.with_file_name(format!("{member}.sigmf-meta"))));
+    Ok(CliError::input(format!(
+        "{name}: a collection of {} recordings: receive one of them by its path: {}",
+        members.len(),
+        files.collect::<Vec<_>>().join(", ")
+    )))
 }
 
 /// The data and metadata files of a recording that is named by either.

@@ -37,7 +37,8 @@ const SPECTRUM_BINS: usize = 2048;
 /// Runs a scene end to end.
 pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
-    let named = scenario::read(arguments.scenario.as_deref())?;
+    let named = scenario::read(arguments.scenario.as_deref())?.choose(arguments.front_end.as_deref())?;
+    named.one_front_end("run")?;
     let gate = Gate::read(arguments.check.as_ref())?;
     let (scene, warnings) = scenario::compose(
         &named,
@@ -47,8 +48,9 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     for warning in warnings {
         scenario::warn(&warning);
     }
-    let target =
-        arguments.out.clone().unwrap_or_else(|| PathBuf::from("reports").join(scenario::file_name(&scene.name)));
+    let own = arguments.front_end.as_ref().map_or_else(String::new, |name| format!("-{name}"));
+    let usual = || PathBuf::from("reports").join(scenario::file_name(&scene.name) + &own);
+    let target = arguments.out.clone().unwrap_or_else(usual);
     let staging = Staging::directory(&target)?;
     let run = staging.path();
 

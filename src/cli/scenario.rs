@@ -25,6 +25,33 @@ pub struct Named {
     pub directory: PathBuf,
 }
 
+impl Named {
+    /// The scenario with the front end of that name alone, if there is a name.
+    pub fn choose(self, front_end: Option<&str>) -> Result<Self, CliError> {
+        let Some(name) = front_end else { return Ok(self) };
+        let known = self.scenario.front_end_names();
+        let known = if known.is_empty() { "its one has no name".to_owned() } else { known.join(", ") };
+        let refuse = |_| CliError::usage(format!("--front-end {name}: {}: expected one of {known}", self.name));
+        let scenario = self.scenario.with_front_end(name).map_err(refuse)?;
+        Ok(Self { scenario, ..self })
+    }
+
+    /// Refuses a scenario with several front ends where `what` takes one.
+    pub fn one_front_end(&self, what: &str) -> Result<(), CliError> {
+        let names = self.scenario.front_end_names();
+        if self.scenario.front_ends.len() < 2 {
+            return Ok(());
+        }
+        Err(CliError::usage(format!(
+            "{}: the scene has {} front ends ({}), and {what} takes one: choose it with --front-end NAME, or write all of \
+             them with `gnss-twin generate`",
+            self.name,
+            names.len(),
+            names.join(", ")
+        )))
+    }
+}
+
 /// Reads the scenario at `path`, or the embedded one.
 pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
     let Some(path) = path else {
@@ -73,6 +100,11 @@ pub fn use_threads(threads: Option<u16>) -> Result<(), CliError> {
 /// The scene that the scenario means, with what the command line puts in its place.
 pub fn compose(named: &Named, overrides: &Overrides) -> Result<(Scene, Vec<String>), CliError> {
     named.scenario.compose(&named.directory, overrides).map_err(scenario_error)
+}
+
+/// The scenes of all front ends of the scenario.
+pub fn compose_all(named: &Named, overrides: &Overrides) -> Result<(Vec<Scene>, Vec<String>), CliError> {
+    named.scenario.compose_all(&named.directory, overrides).map_err(scenario_error)
 }
 
 /// The exit that a refused scenario means.

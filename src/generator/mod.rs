@@ -10,6 +10,7 @@ pub mod departure;
 pub mod dynamics;
 pub mod effect;
 pub mod fidelity;
+pub mod geometry;
 pub mod knots;
 pub mod levels;
 pub mod message;

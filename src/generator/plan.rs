@@ -68,6 +68,8 @@ pub struct Model {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     pub name: String,
+    /// Name of the front end, where the scenario gives it one.
+    pub front_end: Option<String>,
     pub start: String,
     pub duration_s: f64,
     pub signals: Vec<&'static str>,
@@ -111,6 +113,7 @@ impl Plan {
             scene.trajectory.knots().len() as u64 * std::mem::size_of::<crate::generator::vehicle::Knot>() as u64;
         Ok(Self {
             name: scene.name.clone(),
+            front_end: scene.front_end_name.clone(),
             start: scene.clock.start.to_string(),
             duration_s,
             signals: scene.signals.iter().map(|signal| signal.name).collect(),
@@ -232,6 +235,9 @@ fn size(bytes: u64) -> String {
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "scene      {} from {} GPST, {:.3} s", self.name, self.start, self.duration_s)?;
+        if let Some(name) = &self.front_end {
+            writeln!(f, "front end  {name}")?;
+        }
         writeln!(f, "signals    {}", self.signals.join(", "))?;
         writeln!(f, "samples    {}: {} samples, {}", self.sampling, self.samples, size(self.bytes))?;
         writeln!(f, "motion     up to {:.2} m/s and {:.2} m/s2", self.speed_mps, self.acceleration_mps2)?;
@@ -289,6 +295,24 @@ impl fmt::Display for Plan {
             }
         }
         Ok(())
+    }
+}
+
+/// Several front ends of a scene at one time, before the plan of each.
+pub struct Together<'p>(pub &'p [Plan]);
+
+impl fmt::Display for Together<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(plans) = self;
+        let bytes = plans.iter().fold(0, |sum: u64, plan| sum.saturating_add(plan.bytes));
+        let memory_bytes: u64 = plans.iter().map(|plan| plan.memory_bytes).sum();
+        let time_s: f64 = plans.iter().map(|plan| plan.time_s).sum();
+        writeln!(f, "{} front ends that share a clock", plans.len())?;
+        for plan in *plans {
+            let name = plan.front_end.as_deref().unwrap_or_default();
+            writeln!(f, "  {name:14}  {}: {}, {}", plan.sampling, size(plan.bytes), plan.signals.join(", "))?;
+        }
+        writeln!(f, "together   {} of samples, {} of memory, about {time_s:.1} s", size(bytes), size(memory_bytes))
     }
 }
 

@@ -229,9 +229,8 @@ impl Scenario {
         let spoofers = each(root, "spoofer", interference::spoofer, refusals);
         let expect = expect.map(|t| expect::expect(&t, duration_s.unwrap_or(f64::INFINITY))).transpose();
         let expect = refusals.take(expect);
-        let power = power?;
         let noise = noise.is_some();
-        let allowed_m = allowed_m(noise.then(|| power.strongest_dbhz()));
+        let allowed_m = allowed_m(power.as_ref().filter(|_| noise).map(Power::strongest_dbhz));
         let front_ends = front_end::front_ends(root, allowed_m, refusals);
         let playback = refusals.take(playback.map(|t| stages::playback(&t)).transpose()).flatten();
         let (mask_rad, excluded, include_unhealthy) = chosen?;
@@ -252,7 +251,7 @@ impl Scenario {
             motion: motion?,
             attitude: attitude?,
             front_ends: front_ends?,
-            power,
+            power: power?,
             multipath,
             ionosphere: ionosphere?,
             troposphere: troposphere?,

@@ -127,6 +127,17 @@ impl Scene {
     }
 }
 
+/// Every source of interference once, with the number of the first of the scenes that hears it: what several front ends
+/// hear is one source.
+pub fn sources<'s>(scenes: impl Iterator<Item = &'s Scene>) -> Vec<(usize, &'s Interferer)> {
+    let mut found: Vec<(usize, &Interferer)> = Vec::new();
+    for (number, scene) in scenes.enumerate() {
+        let known: Vec<u64> = found.iter().map(|(_, known)| known.source).collect();
+        found.extend(scene.interference.iter().filter(|new| !known.contains(&new.source)).map(|new| (number, new)));
+    }
+    found
+}
+
 /// Whether the Earth, with its air up to [`LIMB_M`], lies between two places.
 fn occulted(from_m: &Vector3<f64>, to_m: &Vector3<f64>) -> bool {
     // Axes in which the ellipsoid is the unit sphere.

@@ -5,38 +5,32 @@
 //! are written in order, so bytes depend neither on threads nor on block lengths, and memory stays flat.
 
 mod block;
+mod front;
+mod fronts;
 mod measure;
+#[cfg(test)]
+mod tests;
 mod ticks;
 
-use std::collections::BTreeSet;
 use std::fmt;
 use std::io::Write;
 use std::ops::Range;
-use std::sync::Arc;
 
 pub(crate) use block::cutoff_cps;
-use block::{Worker, edge, first_run, render, run_begin};
+use front::{Front, share_geometry};
+pub use fronts::Fronts;
 pub use measure::machinery;
 pub(crate) use measure::{Stretch, measured};
-use rayon::prelude::*;
 use thiserror::Error;
 use ticks::Ticks;
 
-use crate::generator::scene::{CodeEdge, Scene};
-use crate::generator::spoof::Constellation;
-use crate::generator::synth::band::Filter;
+use crate::generator::scene::Scene;
 use crate::generator::synth::isa::Level;
-use crate::generator::synth::transmitter::Transmitter;
 use crate::generator::synth::waveform::WaveformError;
-use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
 use crate::generator::truth::{self, TruthError};
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::gps::lnav::FieldError;
-use crate::gnss::record::PassRow;
 use crate::gnss::satellite::Sv;
-
-/// Length of a block at least, in units of what its stages look back at.
-const LEADS_PER_BLOCK: u64 = 8;
 
 /// How the work is cut; no choice changes a byte.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,6 +96,8 @@ pub enum GenerateError {
     Write(#[from] std::io::Error),
     #[error(transparent)]
     Waveform(#[from] WaveformError),
+    #[error("no front end: expected one at least")]
+    NoFrontEnd,
     #[error("truth_interval_s = {0}: expected 1e-6 to 1e6 s")]
     TruthInterval(f64),
     #[error("samples {first} to {end} of a scene that has {samples}: expected a first one before the last")]
@@ -159,20 +155,8 @@ pub fn generate_part(
 
 /// A scene on its way to samples, batch by batch.
 pub struct Stream<'a> {
-    scene: &'a Scene,
-    /// Of band-limited edges, where the scene has them.
-    filter: Option<Filter>,
-    level: Level,
-    transmitters: Vec<Transmitter>,
-    /// Samples of the scene that are asked for, and the next of them.
-    part: Range<u64>,
-    next: u64,
+    front: Front<'a>,
     ticks: Ticks,
-    /// Samples that a block's stages look back at, of a block and of a batch.
-    lead: u64,
-    block: u64,
-    batch: u64,
-    done: Generated,
 }
 
 impl<'a> Stream<'a> {
@@ -197,22 +181,15 @@ impl<'a> Stream<'a> {
         if part.start > part.end || part.end > scene.samples {
             return Err(GenerateError::Part { first: part.start, end: part.end, samples: scene.samples });
         }
-        let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
-        let filter = limited.then(|| Filter::new(cutoff_cps(scene)));
-        let transmitters = transmitters(scene, edge(scene, filter.as_ref()))?;
+        let mut front = Front::new(scene, part.clone(), options)?;
+        share_geometry(std::slice::from_mut(&mut front));
         truth.scene(scene, &part)?;
-        // What stages look back at is rendered twice: blocks are long against it.
-        let lead = scene.memory_samples().next_multiple_of(RUN_SAMPLES) as u64;
-        let block = (u64::from(options.block_runs.max(1)) * RUN_SAMPLES as u64).max(LEADS_PER_BLOCK * lead);
-        let batch = block * u64::from(options.batch_blocks.max(1));
-        let (ticks, done, next) = (Ticks::new(scene, part.start)?, Generated::default(), part.start);
-        let level = options.level;
-        Ok(Self { scene, filter, level, transmitters, part, next, ticks, lead, block, batch, done })
+        Ok(Self { front, ticks: Ticks::new(scene, part.start)? })
     }
 
     /// Samples made so far.
     pub fn samples(&self) -> u64 {
-        self.done.samples
+        self.front.samples()
     }
 
     /// Replaces what `packed` holds by the next batch, and writes the truth as far; `false` after the last
@@ -221,33 +198,14 @@ impl<'a> Stream<'a> {
     /// # Errors
     /// [`GenerateError`] of orbits, messages and truth.
     pub fn next(&mut self, truth: &mut truth::Writer, packed: &mut Vec<u8>) -> Result<bool, GenerateError> {
-        let scene = self.scene;
-        // From the second batch on blocks begin with runs.
-        let from = self.next;
-        let to = (run_begin(from) + self.batch).min(self.part.end);
-        let sample_bytes = scene.metadata.format.bytes();
-        packed.resize(to.saturating_sub(from) as usize * sample_bytes, 0);
-        if from >= to {
+        let to = self.front.batch_end();
+        if !self.front.is_before(to) {
+            packed.clear();
             return Ok(false);
         }
-        // Runs are made from their beginning on.
-        let needed = run_begin(from).saturating_sub(self.lead);
-        let made = to.max(first_run(scene, needed, self.lead));
-        self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, made))?;
-        self.ticks.write(scene, &self.transmitters, to, truth)?;
-        let kernel =
-            Kernel { edge: edge(scene, self.filter.as_ref()), arithmetic: scene.fidelity.carrier, level: self.level };
-        let (transmitters, block) = (&self.transmitters, self.block);
-        let clipped: u64 = packed
-            .par_chunks_mut(block as usize * sample_bytes)
-            .enumerate()
-            .map_init(Worker::default, |worker, (index, bytes)| {
-                render(scene, transmitters, kernel, from + index as u64 * block, bytes, worker)
-            })
-            .sum();
-        self.done.clipped += clipped;
-        self.done.samples = to - self.part.start;
-        self.next = to;
+        self.front.prepare(to)?;
+        self.ticks.write(std::slice::from_ref(&self.front), to, truth)?;
+        self.front.render(to, packed);
         Ok(true)
     }
 
@@ -255,34 +213,9 @@ impl<'a> Stream<'a> {
     ///
     /// # Errors
     /// A truth that cannot be written.
-    pub fn finish(mut self, truth: &mut truth::Writer) -> Result<Generated, GenerateError> {
-        let mut navigation = BTreeSet::new();
-        for transmitter in &mut self.transmitters {
-            navigation.append(&mut transmitter.symbols.navigation);
-            self.done.knots += transmitter.knots;
-            self.done.worst_knot_cycles = self.done.worst_knot_cycles.max(transmitter.worst_knot_cycles);
-        }
-        let authentic = self.transmitters.iter().filter(|t| t.from.number == 0);
-        let passes: BTreeSet<PassRow> = authentic.flat_map(|t| t.passes.rows(t.sv, &self.part)).collect();
-        self.done.knot_tolerance_cycles = self.scene.fidelity.knot_tolerance_cycles;
-        let seen: BTreeSet<Sv> =
-            self.transmitters.iter().filter(|t| t.seen && t.from.number == 0).map(|t| t.sv).collect();
-        self.done.satellites = seen.into_iter().collect();
-        truth.finish(&navigation, &passes)?;
-        Ok(self.done)
+    pub fn finish(self, truth: &mut truth::Writer) -> Result<Generated, GenerateError> {
+        let mut front = self.front;
+        truth.finish(&front.navigation(), &front.passes().collect())?;
+        Ok(front.done())
     }
-}
-
-fn transmitters(scene: &Scene, edge: Edge<'_>) -> Result<Vec<Transmitter>, GenerateError> {
-    let satellites: BTreeSet<Sv> = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)).collect();
-    let mut found = Vec::new();
-    let authentic = Arc::new(Constellation::authentic());
-    for from in std::iter::once(&authentic).chain(&scene.spoofers) {
-        for &sv in satellites.iter().filter(|sv| from.sends(**sv)) {
-            for signal in scene.signals_of(sv) {
-                found.extend(Transmitter::of(scene, Arc::clone(from), sv, signal, edge)?);
-            }
-        }
-    }
-    Ok(found)
 }

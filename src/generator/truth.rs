@@ -8,6 +8,7 @@
 
 mod writer;
 
+use crate::generator::geometry::{Arriving, Geometry};
 use crate::generator::knots::Arrival;
 use crate::generator::presence::{Presence, presence};
 use crate::generator::ray::Ray;
@@ -65,22 +66,42 @@ pub fn seen_from(
     signal: &Signal,
     local: Epoch,
 ) -> Result<Option<Seen>, OrbitError> {
-    seen_near(scene, from, sv, signal, local, LIGHT_TIME_S)
+    seen_by(scene, from, (sv, signal), local, None)
 }
 
-/// [`seen_from`] with a guess of the light time.
+/// [`seen_from`] where what all signals of the satellite have in common may be known.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn seen_by(
+    scene: &Scene,
+    from: &Constellation,
+    link: (Sv, &Signal),
+    local: Epoch,
+    known: Option<&Geometry>,
+) -> Result<Option<Seen>, OrbitError> {
+    seen_near(scene, from, link, local, (LIGHT_TIME_S, known))
+}
+
+/// [`seen_by`] with a guess of the light time.
 fn seen_near(
     scene: &Scene,
     from: &Constellation,
-    sv: Sv,
-    signal: &Signal,
+    (sv, signal): (Sv, &Signal),
     local: Epoch,
-    guess_s: f64,
+    (guess_s, known): (f64, Option<&Geometry>),
 ) -> Result<Option<Seen>, OrbitError> {
-    let (time, elapsed_s, motion) = received(scene, from, local);
-    let Some(emission) = emission_near(&scene.catalogue, sv, time, &motion, guess_s)? else { return Ok(None) };
-    let bias_s = local.since(time) - from.clock_s(elapsed_s);
-    Ok(Some(arriving(scene, signal, bias_s, from.gain(elapsed_s), emission)))
+    let find = || {
+        let (time, elapsed_s, motion) = received(scene, from, local);
+        let emission = emission_near(&scene.catalogue, sv, time, &motion, guess_s)?;
+        let bias_s = local.since(time) - from.clock_s(elapsed_s);
+        Ok(emission.map(|emission| Arriving { emission, bias_s, gain: from.gain(elapsed_s) }))
+    };
+    let found = match known {
+        Some(known) => known.at(local, guess_s, find)?,
+        None => find()?,
+    };
+    Ok(found.map(|found| arriving(scene, signal, found)))
 }
 
 /// [`seen_from`] of a satellite on a short arc of its orbit.
@@ -97,11 +118,12 @@ pub fn seen_on(
     let (time, elapsed_s, motion) = received(scene, from, local);
     let bias_s = local.since(time) - from.clock_s(elapsed_s);
     let found = arc.emission(time, &motion)?;
-    Ok(found.map(|emission| arriving(scene, signal, bias_s, from.gain(elapsed_s), emission)))
+    let gain = from.gain(elapsed_s);
+    Ok(found.map(|emission| arriving(scene, signal, Arriving { emission, bias_s, gain })))
 }
 
-/// The rays of what was emitted with `gain` on its power, when the receiver's clock is `bias_s` ahead of the sender's.
-fn arriving(scene: &Scene, signal: &Signal, bias_s: f64, gain: f64, emission: Emission) -> Seen {
+/// The rays of a signal of what arrives.
+fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }: Arriving) -> Seen {
     let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
     for effect in &scene.effects {
         effect.act(&emission.sight, signal, &mut rays);
@@ -157,10 +179,9 @@ pub fn presence_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) 
 fn doppler_hz(
     scene: &Scene,
     from: &Constellation,
-    sv: Sv,
-    signal: &Signal,
+    (sv, signal): (Sv, &Signal),
     sample: u64,
-    here: &Seen,
+    (here, known): (&Seen, Option<&Geometry>),
 ) -> Result<Option<f64>, OrbitError> {
     let local = scene.clock.epoch(sample);
     let elapsed_s = scene.receiver_clock.true_elapsed_s(scene.clock.start, local);
@@ -193,7 +214,8 @@ fn doppler_hz(
         }
         let away_s = f64::from(steps) * step_s;
         let guess_s = here.emission.travel_s;
-        let Some(seen) = seen_near(scene, from, sv, signal, local.plus_s(away_s), guess_s)? else { return Ok(None) };
+        let there = seen_near(scene, from, (sv, signal), local.plus_s(away_s), (guess_s, known))?;
+        let Some(seen) = there else { return Ok(None) };
         let Some(carrier_cycles) = rippled(&seen, away_s) else { return Ok(None) };
         sum += weight * (carrier_cycles - base);
     }
@@ -216,15 +238,30 @@ pub fn observe(
     sample: u64,
     locked_s: f64,
 ) -> Result<Option<Truth>, OrbitError> {
+    observe_by(scene, from, (sv, signal), (sample, locked_s), None)
+}
+
+/// [`observe`] where what all signals of the satellite have in common may be known.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn observe_by(
+    scene: &Scene,
+    from: &Constellation,
+    (sv, signal): (Sv, &'static Signal),
+    (sample, locked_s): (u64, f64),
+    known: Option<&Geometry>,
+) -> Result<Option<Truth>, OrbitError> {
     let local = scene.clock.epoch(sample);
-    let Some(seen) = seen_from(scene, from, sv, signal, local)? else { return Ok(None) };
+    let Some(seen) = seen_by(scene, from, (sv, signal), local, known)? else { return Ok(None) };
     let (Some(&arrival), Some(ray)) = (seen.arrivals.first(), seen.rays.first()) else { return Ok(None) };
     // What is blocked altogether is not there to be observed.
     if ray.cn0_hz <= 0.0 {
         return Ok(None);
     }
     let arrival = arrival.rippled(ripple::at(scene, from.fading(sv), signal.carrier_hz(sv), sample as f64));
-    let Some(doppler_hz) = doppler_hz(scene, from, sv, signal, sample, &seen)? else { return Ok(None) };
+    let doppler_hz = doppler_hz(scene, from, (sv, signal), sample, (&seen, known))?;
+    let Some(doppler_hz) = doppler_hz else { return Ok(None) };
     let sent = local.plus_s(-arrival.delay_s);
     let observation = Observation {
         sample,

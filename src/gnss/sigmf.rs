@@ -2,7 +2,7 @@
 //!
 //! Source: SigMF 1.2.0 (core namespace). One capture is written; of other people's files, unknown
 //! keys are passed over, while whatever would change the meaning of the samples (several channels,
-//! a header, a retuning) is refused. An inverted spectrum has no core key: it is written in an
+//! a header, a retuning) is refused. Recordings of one time are grouped by a collection. An inverted spectrum has no core key: it is written in an
 //! optional extension, `gnss_twin:spectrum_inverted`.
 
 use serde::{Deserialize, Serialize};
@@ -51,6 +51,8 @@ struct Global {
     description: Option<Value>,
     #[serde(rename = "core:num_channels", skip_serializing_if = "Option::is_none")]
     channels: Option<Value>,
+    #[serde(rename = "core:collection", skip_serializing_if = "Option::is_none")]
+    collection: Option<Value>,
     #[serde(rename = "core:extensions", skip_serializing_if = "Option::is_none")]
     extensions: Option<Value>,
     #[serde(rename = "gnss_twin:spectrum_inverted", skip_serializing_if = "Option::is_none")]
@@ -72,6 +74,11 @@ struct Capture {
 
 /// The metadata as the JSON text of a `.sigmf-meta` file.
 pub fn write(metadata: &IfMetadata) -> String {
+    write_in(metadata, None)
+}
+
+/// [`write`] of a recording that belongs to a collection: the base name of its `.sigmf-collection` file.
+pub fn write_in(metadata: &IfMetadata, collection: Option<&str>) -> String {
     let document = Document {
         global: Global {
             datatype: Some(metadata.format.name().into()),
@@ -79,6 +86,7 @@ pub fn write(metadata: &IfMetadata) -> String {
             version: Some(VERSION.into()),
             description: Some("GNSS IF samples".into()),
             channels: None,
+            collection: collection.map(Value::from),
             extensions: Some(serde_json::json!([{ "name": EXTENSION, "version": "0.1.0", "optional": true }])),
             inverted: Some(metadata.inverted.into()),
         },
@@ -92,6 +100,41 @@ pub fn write(metadata: &IfMetadata) -> String {
     };
     // `Value` displays as JSON; these structs have string keys only, so nothing can fail on the way there.
     serde_json::to_value(&document).map_or_else(|_| String::new(), |value| format!("{value:#}\n"))
+}
+
+/// A recording of a collection.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Member {
+    /// Base name of its files.
+    pub name: String,
+    /// SHA-512 of its `.sigmf-meta` file, in hexadecimal digits.
+    pub hash: String,
+}
+
+/// The JSON text of a `.sigmf-collection` file (SigMF 1.2.0, "SigMF Collection Format").
+pub fn write_collection(description: &str, members: &[Member]) -> String {
+    let streams: Vec<Value> =
+        members.iter().map(|member| serde_json::json!({ "name": member.name, "hash": member.hash })).collect();
+    let collection = serde_json::json!({
+        "collection": { "core:version": VERSION, "core:description": description, "core:streams": streams }
+    });
+    format!("{collection:#}\n")
+}
+
+/// The base names of the recordings in the JSON text of a `.sigmf-collection` file; `name` is how errors call it.
+///
+/// # Errors
+/// [`SigmfError`] with the file, the key, its value and what was expected.
+pub fn parse_collection(text: &str, name: &str) -> Result<Vec<String>, SigmfError> {
+    let document: Value =
+        serde_json::from_str(text).map_err(|error| SigmfError::Syntax { name: name.to_owned(), error })?;
+    let (file, key, expected) = (File { name }, "core:streams", "an array of recordings, each with a name");
+    let streams = document.get("collection").and_then(|collection| collection.get(key)).cloned();
+    let streams = file.needed(key, streams, expected)?;
+    // Before 1.0.1 a recording was an array of its name and its hash.
+    let of = |stream: &Value| stream.get("name").or(stream.get(0)).and_then(Value::as_str).map(str::to_owned);
+    let names = streams.as_array().and_then(|streams| streams.iter().map(of).collect::<Option<Vec<String>>>());
+    names.ok_or_else(|| file.bad(key, &streams, expected))
 }
 
 /// A whole number without a fraction, as people write sample rates.
@@ -226,6 +269,30 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_collection_names_its_recordings_and_they_name_it() {
+        let members = ["narrow", "wide"].map(|name| Member { name: name.to_owned(), hash: "0".repeat(128) });
+        let text = write_collection("two bands", &members);
+        assert_eq!(parse_collection(&text, "x").unwrap(), ["narrow", "wide"]);
+        let tuples = r#"{"collection": {"core:streams": [["a", "00"], ["b", "11"]]}}"#;
+        assert_eq!(parse_collection(tuples, "x").unwrap(), ["a", "b"]);
+        let of = |text: &str| parse_collection(text, "there/a.sigmf-collection").unwrap_err().to_string();
+        for (text, word) in [("[", "not SigMF"), ("{}", "missing"), (r#"{"collection":{"core:streams":[1]}}"#, "[1]")] {
+            assert!(of(text).starts_with("there/a.sigmf-collection") && of(text).contains(word), "{}", of(text));
+        }
+        let metadata = IfMetadata {
+            format: Format::Ci8,
+            rate: Rate::from_hz(2.6e6).unwrap(),
+            center_hz: 1_575.42e6,
+            inverted: false,
+            start: None,
+        };
+        let text = write_in(&metadata, Some("both"));
+        assert!(text.contains("\"core:collection\": \"both\""), "{text}");
+        assert_eq!(parse(&text, "x").unwrap(), metadata);
+        assert!(!write(&metadata).contains("core:collection"));
     }
 
     #[test]

@@ -31,7 +31,7 @@ const NUMBERS: &[Row] = &[
     ("motion.point", "latitude_deg longitude_deg height_m", Yes, Yes),
     ("motion.point", "speed_mps hold_s", Yes, No),
     ("attitude", "yaw_deg pitch_deg roll_deg spin_hz", Yes, Yes),
-    ("front_end", "sample_rate_hz noise_lsb", No, No),
+    ("front_end", "sample_rate_hz noise_lsb center_hz", No, No),
     // Real samples have no negative frequencies.
     ("front_end", "if_hz", Perhaps, Perhaps),
     ("power", "cn0_dbhz", Yes, Perhaps),
@@ -134,7 +134,7 @@ const BOUNDS: [&str; 2] = ["min", "max"];
 
 /// Whether `bad` can stand at `table.key`, where `was` stands; `None` if the tables do not know the key.
 pub fn legal(table: &str, key: &str, was: &str, bad: &str) -> Option<Legal> {
-    let table = table.trim_start_matches("receiver.");
+    let table = table.trim_start_matches("receiver.").trim_start_matches("front_end.");
     let last = key.rsplit('.').next().unwrap_or(key);
     if last == "equals" {
         return Some(if ["inf", "-inf", "nan", "[1979-05-27]"].contains(&bad) { No } else { Yes });

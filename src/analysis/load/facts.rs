@@ -1,6 +1,7 @@
 //! What `truth/scene.json` says of a scene; other keys are left alone.
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use crate::analysis::waveform::Edge;
 use crate::gnss::facts::{Expect, Fault};
@@ -41,6 +42,9 @@ pub struct SceneFacts {
     /// Stages of the front end, in order.
     #[serde(default)]
     pub front_end: Vec<Stage>,
+    /// Where there are several front ends, each of them.
+    #[serde(default)]
+    pub front_ends: Vec<IgnoredAny>,
     /// The receiver's oscillator, if the scene has one.
     #[serde(default)]
     pub oscillator: Option<Oscillator>,

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::block::{Worker, cutoff_cps, edge, first_run, pack, run_begin, satellites};
-use super::{GenerateError, Options, transmitters};
+use super::front::transmitters;
+use super::{GenerateError, Options};
 use crate::generator::plan::Machinery;
 use crate::generator::scene::{CodeEdge, Scene};
 use crate::generator::stage::Block;

@@ -1,14 +1,18 @@
 //! When truth is written, and what of it.
 
+use std::collections::BTreeSet;
+
 use rayon::prelude::*;
 
 use super::GenerateError;
-use crate::generator::scene::Scene;
+use super::front::Front;
+use crate::generator::scene::{Scene, sources};
 use crate::generator::spoof::Constellation;
-use crate::generator::synth::transmitter::Transmitter;
+use crate::generator::stage::interference::Interferer;
 use crate::generator::truth;
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::record::TrajectoryRow;
+use crate::gnss::satellite::Sv;
 
 /// The samples at which truth is written.
 pub(super) struct Ticks {
@@ -32,47 +36,78 @@ impl Ticks {
         Ok(Self { next, interval_us, origin })
     }
 
-    /// Writes every tick before sample `to`.
-    pub fn write(
-        &mut self,
-        scene: &Scene,
-        transmitters: &[Transmitter],
-        to: u64,
-        truth: &mut truth::Writer,
-    ) -> Result<(), GenerateError> {
+    /// Writes every tick before sample `to` of the first of `fronts`, all of which have prepared as much.
+    ///
+    /// # Errors
+    /// Those of orbits, and a truth that cannot be written.
+    pub fn write(&mut self, fronts: &[Front<'_>], to: u64, truth: &mut truth::Writer) -> Result<(), GenerateError> {
+        let Some(scene) = fronts.first().map(|front| front.scene) else { return Ok(()) };
         let origin = self.origin;
-        let rows = |from: &Constellation, sample: u64| -> Result<Vec<truth::Truth>, OrbitError> {
-            let found: Result<Vec<_>, _> = transmitters
-                .par_iter()
-                .filter(|t| t.from.number == from.number && t.in_view(scene, sample))
-                .filter_map(|t| {
-                    truth::observe(scene, &t.from, t.sv, t.signal, sample, t.in_view_s(scene, sample)).transpose()
-                })
-                .collect();
-            let mut found = found?;
-            for (observation, sky, rays) in &mut found {
-                observation.sample -= origin;
-                sky.sample -= origin;
-                rays.iter_mut().for_each(|ray| ray.sample -= origin);
-            }
-            Ok(found)
-        };
         let place = |from: &Constellation, sample: u64| {
             let row = truth::trajectory(scene, from, sample);
             TrajectoryRow { sample: sample - origin, ..row }
         };
         loop {
-            let sample = scene.clock.rate.first_sample_at(self.next * self.interval_us, 1_000_000);
+            let at = Tick::new(fronts, self.next * self.interval_us);
+            let sample = at.samples.first().copied().unwrap_or(u64::MAX);
             if sample >= to {
                 return Ok(());
             }
             let authentic = Constellation::authentic();
-            truth.epoch(&place(&authentic, sample), &rows(&authentic, sample)?)?;
-            truth.interference(scene, sample, origin)?;
+            truth.epoch(&place(&authentic, sample), &rows(fronts, &authentic, &at, origin)?)?;
+            let heard: Vec<(&Interferer, u64)> = sources(fronts.iter().map(|front| front.scene))
+                .into_iter()
+                .filter_map(|(number, source)| Some((source, *at.samples.get(number)?)))
+                .collect();
+            truth.interference(&heard, sample - origin)?;
             for spoofer in scene.spoofers.iter().filter(|spoofer| spoofer.on(scene).contains(&sample)) {
-                truth.claim(spoofer, &place(spoofer, sample), &rows(spoofer, sample)?)?;
+                truth.claim(spoofer, &place(spoofer, sample), &rows(fronts, spoofer, &at, origin)?)?;
             }
             self.next += 1;
         }
     }
+}
+
+/// An instant of the truth: the first sample of each front end that is not before it.
+struct Tick {
+    samples: Vec<u64>,
+}
+
+impl Tick {
+    fn new(fronts: &[Front<'_>], time_us: u64) -> Self {
+        let sample = |(number, front): (usize, &Front<'_>)| {
+            let sample = front.scene.clock.rate.first_sample_at(time_us, 1_000_000);
+            // The first front end says where the scene ends.
+            if number == 0 { sample } else { sample.min(front.part.end.saturating_sub(1)) }
+        };
+        Self { samples: fronts.iter().enumerate().map(sample).collect() }
+    }
+}
+
+/// What is true of the signals that a constellation sends: each once, though several front ends hear it.
+fn rows(fronts: &[Front<'_>], from: &Constellation, at: &Tick, origin: u64) -> Result<Vec<truth::Truth>, OrbitError> {
+    let (Some(first), Some(sample)) = (fronts.first(), at.samples.first().copied()) else { return Ok(Vec::new()) };
+    let mut known: BTreeSet<(Sv, &str)> = BTreeSet::new();
+    let mut sent = Vec::new();
+    for (front, own) in fronts.iter().zip(&at.samples) {
+        let of_it = front.transmitters.iter().filter(|t| t.from.number == from.number);
+        sent.extend(of_it.filter(|t| known.insert((t.sv, t.signal.name))).map(|t| (t, front.scene, *own)));
+    }
+    // By satellite, as the signals of one front end are.
+    sent.sort_by_key(|(t, ..)| t.sv);
+    let found: Result<Vec<_>, _> = sent
+        .par_iter()
+        .filter(|(t, scene, own)| t.in_view(scene, *own))
+        .filter_map(|(t, scene, own)| {
+            let (link, at) = ((t.sv, t.signal), (sample, t.in_view_s(scene, *own)));
+            truth::observe_by(first.scene, &t.from, link, at, t.geometry.as_deref()).transpose()
+        })
+        .collect();
+    let mut found = found?;
+    for (observation, sky, rays) in &mut found {
+        observation.sample -= origin;
+        sky.sample -= origin;
+        rays.iter_mut().for_each(|ray| ray.sample -= origin);
+    }
+    Ok(found)
 }

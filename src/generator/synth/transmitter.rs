@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use super::bank::Bank;
 use super::{CODE_ONE, Edge, RUN_SAMPLES, Run};
+use crate::generator::geometry::Geometry;
 use crate::generator::knots::{Grid, Part, Path};
 use crate::generator::presence::Passes;
 use crate::generator::ripple::Ripples;
@@ -43,6 +44,8 @@ pub struct Transmitter {
     on: Range<u64>,
     pub sv: Sv,
     pub signal: &'static Signal,
+    /// What is known of the satellite for its other signals too, where it has any.
+    pub geometry: Option<Arc<Geometry>>,
     if_hz: f64,
     /// Of the IF, in 2^-64 turn a sample.
     tone_step: u64,
@@ -144,6 +147,7 @@ impl Transmitter {
             from,
             sv,
             signal,
+            geometry: None,
             if_hz,
             tone_step: tone_turns(if_hz, scene.clock.rate, 1),
             sent,
@@ -178,7 +182,7 @@ impl Transmitter {
             let local = scene.clock.epoch(n);
             let seen = match &arc {
                 Some(arc) => truth::seen_on(scene, &self.from, arc, self.signal, local),
-                None => truth::seen_from(scene, &self.from, self.sv, self.signal, local),
+                None => truth::seen_by(scene, &self.from, (self.sv, self.signal), local, self.geometry.as_deref()),
             };
             seen.map(|seen| seen.map(|seen| seen.arrivals))
         };

@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use super::Truth;
 use crate::generator::effect::obstruction;
-use crate::generator::scene::Scene;
+use crate::generator::scene::{Scene, sources};
 use crate::generator::spoof::Constellation;
 use crate::generator::stage::Fact;
 use crate::generator::stage::interference::{Interferer, Spectrum};
@@ -70,6 +70,9 @@ pub struct Writer {
 #[derive(Serialize)]
 struct SceneFile<'a> {
     name: &'a str,
+    /// Where it has a name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    front_end_name: Option<&'a str>,
     seed: u64,
     start: String,
     /// Of the scene, where only a part of it was made.
@@ -93,6 +96,9 @@ struct SceneFile<'a> {
     noise_lsb: f32,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     front_end: Vec<Fact>,
+    /// Where there are several: those above belong to the first of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    front_ends: Vec<FrontEndFile<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     skyline_deg: Option<Vec<[f64; 2]>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -113,6 +119,51 @@ struct SceneFile<'a> {
     faults: &'a [Fault],
     #[serde(skip_serializing_if = "Expect::is_empty")]
     expect: &'a Expect,
+}
+
+/// One of several front ends.
+#[derive(Serialize)]
+struct FrontEndFile<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<&'a str>,
+    samples: u64,
+    sample_rate_hz: f64,
+    center_hz: f64,
+    inverted: bool,
+    format: &'a str,
+    code_edge: &'a str,
+    signals: Vec<&'a str>,
+    noise_lsb: f32,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    front_end: Vec<Fact>,
+}
+
+impl<'a> FrontEndFile<'a> {
+    fn of(scene: &'a Scene) -> Self {
+        Self {
+            name: scene.front_end_name.as_deref(),
+            samples: scene.samples,
+            sample_rate_hz: scene.clock.rate.hz(),
+            center_hz: scene.metadata.center_hz,
+            inverted: scene.metadata.inverted,
+            format: scene.metadata.format.name(),
+            code_edge: scene.fidelity.code_edge.name(),
+            signals: signals(std::slice::from_ref(scene)),
+            noise_lsb: scene.noise_lsb,
+            front_end: scene.front_end.iter().filter_map(|stage| stage.fact()).collect(),
+        }
+    }
+}
+
+/// The names of all signals of the scenes, each once.
+fn signals(scenes: &[Scene]) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = Vec::new();
+    for signal in scenes.iter().flat_map(|scene| &scene.signals) {
+        if !names.contains(&signal.name) {
+            names.push(signal.name);
+        }
+    }
+    names
 }
 
 /// Power law of the receiver's oscillator, from white phase noise to random-walk frequency noise.
@@ -144,8 +195,24 @@ impl Writer {
     }
 
     /// Writes `scene.json` for a part of the scene, and creates the files that only this scene has.
+    ///
+    /// # Errors
+    /// [`TruthError`] with the path that failed.
     pub fn scene(&mut self, scene: &Scene, part: &Range<u64>) -> Result<(), TruthError> {
-        if !scene.interference.is_empty() {
+        self.facts(scene, std::slice::from_ref(scene), part)
+    }
+
+    /// [`Writer::scene`] for the whole of several front ends' scenes: what is said once is that of the first.
+    ///
+    /// # Errors
+    /// As [`Writer::scene`].
+    pub fn scenes(&mut self, scenes: &[Scene]) -> Result<(), TruthError> {
+        scenes.first().map_or(Ok(()), |first| self.facts(first, scenes, &(0..first.samples)))
+    }
+
+    fn facts(&mut self, scene: &Scene, scenes: &[Scene], part: &Range<u64>) -> Result<(), TruthError> {
+        let heard = sources(scenes.iter());
+        if !heard.is_empty() {
             self.interference = Some(Table::create(&self.directory, "interference.csv")?);
         }
         for spoofer in &scene.spoofers {
@@ -158,6 +225,7 @@ impl Writer {
         let (orbits, departures) = scene.catalogue.describe();
         let file = SceneFile {
             name: &scene.name,
+            front_end_name: scene.front_end_name.as_deref(),
             seed: scene.seed,
             start: scene.clock.epoch(part.start).to_string(),
             first_sample: (part.start > 0).then_some(part.start),
@@ -173,7 +241,7 @@ impl Writer {
             knot_tolerance_cycles: scene.fidelity.knot_tolerance_cycles,
             mask_deg: scene.mask_rad.to_degrees(),
             truth_interval_s: scene.truth_interval_s,
-            signals: scene.signals.iter().map(|signal| signal.name).collect(),
+            signals: signals(scenes),
             noise: scene.noise,
             noise_arithmetic: scene.fidelity.noise.name(),
             noise_lsb: scene.noise_lsb,
@@ -181,7 +249,8 @@ impl Writer {
             skyline_deg: obstruction::skyline_deg(scene),
             oscillator: (scene.receiver_clock.oscillator.as_ref())
                 .map(|oscillator| OscillatorFile { h: oscillator.law.levels() }),
-            interference: scene.interference.iter().map(Interferer::spectrum).collect(),
+            front_ends: if scenes.len() > 1 { scenes.iter().map(FrontEndFile::of).collect() } else { Vec::new() },
+            interference: heard.iter().map(|(_, source)| source.spectrum()).collect(),
             spoofers: scene.spoofers.iter().map(|spoofer| spoofer.describe()).collect(),
             orbits,
             satellite_faults: [departures, scene.satellite_clocks.descriptions.clone()].concat(),
@@ -212,11 +281,11 @@ impl Writer {
         Ok(())
     }
 
-    /// Appends what interference there is at one sample of the scene, counted from `origin`.
-    pub fn interference(&mut self, scene: &Scene, sample: u64, origin: u64) -> Result<(), TruthError> {
+    /// Appends what interference there is at one sample: of each source, at that sample of the front end that hears it.
+    pub fn interference(&mut self, heard: &[(&Interferer, u64)], sample: u64) -> Result<(), TruthError> {
         let Some(table) = &mut self.interference else { return Ok(()) };
-        let mut rows = (1..).zip(&scene.interference).filter_map(|(number, source)| source.row(number, sample));
-        rows.try_for_each(|row| table.write(InterferenceRow { sample: sample - origin, ..row }))
+        let mut rows = (1..).zip(heard).filter_map(|(number, (source, own))| source.row(number, *own));
+        rows.try_for_each(|row| table.write(InterferenceRow { sample, ..row }))
     }
 
     /// Appends what a spoofer claims at one sample.

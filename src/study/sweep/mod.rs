@@ -32,7 +32,7 @@ mod temporary;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
-use sha2::{Digest, Sha256};
+use sha2::{Digest, Sha256, Sha512};
 use thiserror::Error;
 
 use crate::analysis::JudgeError;
@@ -96,6 +96,11 @@ impl StudyError {
 /// SHA-256 in hexadecimal digits.
 pub fn sha256_hex(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
+}
+
+/// SHA-512 in hexadecimal digits.
+pub fn sha512_hex(bytes: &[u8]) -> String {
+    hex(&Sha512::digest(bytes))
 }
 
 /// SHA-256 of a whole file, in hexadecimal digits.

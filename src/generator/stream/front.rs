@@ -1,0 +1,164 @@
+//! The samples of one front end, batch by batch.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::block::{Worker, cutoff_cps, edge, first_run, render, run_begin};
+use super::{GenerateError, Generated, Options};
+use crate::generator::geometry::Geometry;
+use crate::generator::scene::{CodeEdge, Scene};
+use crate::generator::spoof::Constellation;
+use crate::generator::synth::band::Filter;
+use crate::generator::synth::isa::Level;
+use crate::generator::synth::transmitter::Transmitter;
+use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
+use crate::gnss::record::{NavigationRow, PassRow};
+use crate::gnss::satellite::Sv;
+
+/// Length of a block at least, in units of what its stages look back at.
+const LEADS_PER_BLOCK: u64 = 8;
+
+/// A front end on its way to samples. A batch is prepared, then rendered; truth may be told in between.
+pub(super) struct Front<'a> {
+    pub scene: &'a Scene,
+    /// Of band-limited edges, where the scene has them.
+    filter: Option<Filter>,
+    level: Level,
+    pub transmitters: Vec<Transmitter>,
+    /// Samples of the scene that are asked for, and the next of them.
+    pub part: Range<u64>,
+    next: u64,
+    /// Samples that a block's stages look back at, of a block and of a batch.
+    lead: u64,
+    pub block: u64,
+    pub batch: u64,
+    clipped: u64,
+}
+
+impl<'a> Front<'a> {
+    /// The samples of `part` of `scene`.
+    ///
+    /// # Errors
+    /// A rate that the scene's signals cannot have.
+    pub fn new(scene: &'a Scene, part: Range<u64>, options: &Options) -> Result<Self, GenerateError> {
+        let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
+        let filter = limited.then(|| Filter::new(cutoff_cps(scene)));
+        let transmitters = transmitters(scene, edge(scene, filter.as_ref()))?;
+        // What stages look back at is rendered twice: blocks are long against it.
+        let lead = scene.memory_samples().next_multiple_of(RUN_SAMPLES) as u64;
+        let block = (u64::from(options.block_runs.max(1)) * RUN_SAMPLES as u64).max(LEADS_PER_BLOCK * lead);
+        let batch = block * u64::from(options.batch_blocks.max(1));
+        let (next, level) = (part.start, options.level);
+        Ok(Self { scene, filter, level, transmitters, part, next, lead, block, batch, clipped: 0 })
+    }
+
+    /// Samples made so far.
+    pub fn samples(&self) -> u64 {
+        self.next - self.part.start
+    }
+
+    /// Where a batch from the next sample on ends. From the second batch on blocks begin with runs.
+    pub fn batch_end(&self) -> u64 {
+        self.end_after(self.batch)
+    }
+
+    /// Where so many samples from the run of the next sample on end, a multiple of runs or the end of the part.
+    pub fn end_after(&self, samples: u64) -> u64 {
+        (run_begin(self.next) + samples).min(self.part.end)
+    }
+
+    /// Whether there are samples to make before `to`.
+    pub fn is_before(&self, to: u64) -> bool {
+        self.next < to
+    }
+
+    /// Gathers what the samples up to `to` need.
+    ///
+    /// # Errors
+    /// Those of orbits and messages.
+    pub fn prepare(&mut self, to: u64) -> Result<(), GenerateError> {
+        let scene = self.scene;
+        // Runs are made from their beginning on.
+        let needed = run_begin(self.next).saturating_sub(self.lead);
+        let made = to.max(first_run(scene, needed, self.lead));
+        self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, made))
+    }
+
+    /// Replaces what `packed` holds by the samples up to `to`, which were prepared.
+    pub fn render(&mut self, to: u64, packed: &mut Vec<u8>) {
+        let (scene, from) = (self.scene, self.next);
+        let sample_bytes = scene.metadata.format.bytes();
+        packed.resize(to.saturating_sub(from) as usize * sample_bytes, 0);
+        let kernel =
+            Kernel { edge: edge(scene, self.filter.as_ref()), arithmetic: scene.fidelity.carrier, level: self.level };
+        let (transmitters, block) = (&self.transmitters, self.block);
+        let clipped: u64 = packed
+            .par_chunks_mut(block as usize * sample_bytes)
+            .enumerate()
+            .map_init(Worker::default, |worker, (index, bytes)| {
+                render(scene, transmitters, kernel, from + index as u64 * block, bytes, worker)
+            })
+            .sum();
+        self.clipped += clipped;
+        self.next = to.max(from);
+    }
+
+    /// What was sent.
+    pub fn navigation(&mut self) -> BTreeSet<NavigationRow> {
+        let mut navigation = BTreeSet::new();
+        self.transmitters.iter_mut().for_each(|t| navigation.append(&mut t.symbols.navigation));
+        navigation
+    }
+
+    /// When the true satellites were in view, by the numbers of this front end's samples.
+    pub fn passes(&self) -> impl Iterator<Item = PassRow> {
+        let authentic = self.transmitters.iter().filter(|t| t.from.number == 0);
+        authentic.flat_map(|t| t.passes.rows(t.sv, &self.part))
+    }
+
+    /// What was done.
+    pub fn done(&self) -> Generated {
+        let seen: BTreeSet<Sv> =
+            self.transmitters.iter().filter(|t| t.seen && t.from.number == 0).map(|t| t.sv).collect();
+        Generated {
+            samples: self.samples(),
+            satellites: seen.into_iter().collect(),
+            clipped: self.clipped,
+            knots: self.transmitters.iter().map(|t| t.knots).sum(),
+            worst_knot_cycles: self.transmitters.iter().fold(0.0, |worst, t| worst.max(t.worst_knot_cycles)),
+            knot_tolerance_cycles: self.scene.fidelity.knot_tolerance_cycles,
+        }
+    }
+}
+
+/// Lets all signals that front ends receive from one satellite of one constellation share what is known of it.
+pub(super) fn share_geometry(fronts: &mut [Front<'_>]) {
+    let mut count: BTreeMap<(usize, Sv), u32> = BTreeMap::new();
+    let transmitters = |front: &Front<'_>| front.transmitters.iter().map(|t| (t.from.number, t.sv)).collect::<Vec<_>>();
+    fronts.iter().flat_map(transmitters).for_each(|key| *count.entry(key).or_insert(0) += 1);
+    let mut known: BTreeMap<(usize, Sv), Arc<Geometry>> = BTreeMap::new();
+    for transmitter in fronts.iter_mut().flat_map(|front| &mut front.transmitters) {
+        let key = (transmitter.from.number, transmitter.sv);
+        if count.get(&key).is_some_and(|count| *count > 1) {
+            transmitter.geometry = Some(Arc::clone(known.entry(key).or_default()));
+        }
+    }
+}
+
+/// The signals of a scene, by constellation, satellite and signal.
+pub(super) fn transmitters(scene: &Scene, edge: Edge<'_>) -> Result<Vec<Transmitter>, GenerateError> {
+    let satellites: BTreeSet<Sv> = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)).collect();
+    let mut found = Vec::new();
+    let authentic = Arc::new(Constellation::authentic());
+    for from in std::iter::once(&authentic).chain(&scene.spoofers) {
+        for &sv in satellites.iter().filter(|sv| from.sends(**sv)) {
+            for signal in scene.signals_of(sv) {
+                found.extend(Transmitter::of(scene, Arc::clone(from), sv, signal, edge)?);
+            }
+        }
+    }
+    Ok(found)
+}

@@ -1,0 +1,139 @@
+//! Several front ends at one time: the samples of each, and the truth of all of them once.
+//!
+//! Slices of time are made one after the other, of every front end the samples that lie in them. The bytes of a front end
+//! are those that it has alone, since each keeps to the grid of its own samples. The truth counts samples of the first
+//! front end. Limits: whole scenes, no parts of them.
+
+use std::collections::BTreeSet;
+use std::io;
+
+use super::front::{Front, share_geometry};
+use super::ticks::Ticks;
+use super::{GenerateError, Generated, Options};
+use crate::generator::geometry::is_shared;
+use crate::generator::scene::Scene;
+use crate::generator::synth::RUN_SAMPLES;
+use crate::generator::truth;
+use crate::gnss::record::PassRow;
+
+/// The front ends of a scene on their way to samples.
+pub struct Fronts<'a> {
+    fronts: Vec<Front<'a>>,
+    ticks: Ticks,
+    /// Length of a slice, in samples of the first front end.
+    slice: u64,
+}
+
+/// Samples of one front end at which a slice ends.
+struct Ends {
+    prepared: u64,
+    rendered: u64,
+}
+
+impl<'a> Fronts<'a> {
+    /// The streams of `scenes`, which [`Scenario::compose_all`](crate::generator::scenario::Scenario::compose_all) has
+    /// made; tells `truth` what they are.
+    ///
+    /// # Errors
+    /// A rate that signals cannot have, a truth that cannot be written.
+    pub fn new(scenes: &'a [Scene], truth: &mut truth::Writer, options: &Options) -> Result<Self, GenerateError> {
+        let fronts: Result<Vec<Front<'a>>, _> =
+            scenes.iter().map(|scene| Front::new(scene, 0..scene.samples, options)).collect();
+        let (mut fronts, Some(first)) = (fronts?, scenes.first()) else { return Err(GenerateError::NoFrontEnd) };
+        if scenes.iter().all(|scene| is_shared(first, scene)) {
+            share_geometry(&mut fronts);
+        }
+        truth.scenes(scenes)?;
+        // The shortest batch bounds the memory; a slice with less than a block would render its lead again and again.
+        let seconds = |front: &Front<'_>, samples: u64| samples as f64 / front.scene.clock.rate.hz();
+        let batch_s = fronts.iter().fold(f64::INFINITY, |least, front| least.min(seconds(front, front.batch)));
+        let slice_s = fronts.iter().fold(batch_s, |most, front| most.max(seconds(front, front.block)));
+        let slice = ((slice_s * first.clock.rate.hz()) as u64).next_multiple_of(RUN_SAMPLES as u64);
+        Ok(Self { ticks: Ticks::new(first, 0)?, fronts, slice })
+    }
+
+    /// Samples of the first front end that were made so far.
+    pub fn samples(&self) -> u64 {
+        self.fronts.first().map_or(0, Front::samples)
+    }
+
+    /// Makes the next slice of time: hands the bytes of each front end, by its number, to `sink`, and writes the truth as
+    /// far. `false` after the last sample.
+    ///
+    /// # Errors
+    /// [`GenerateError`] of orbits, messages and truth, and what `sink` meets.
+    pub fn next(
+        &mut self,
+        truth: &mut truth::Writer,
+        packed: &mut Vec<u8>,
+        sink: &mut dyn FnMut(usize, &[u8]) -> io::Result<()>,
+    ) -> Result<bool, GenerateError> {
+        let Some(ends) = self.ends() else { return Ok(false) };
+        for (front, end) in self.fronts.iter_mut().zip(&ends) {
+            front.prepare(end.prepared)?;
+        }
+        if let Some(end) = ends.first() {
+            self.ticks.write(&self.fronts, end.rendered, truth)?;
+        }
+        for (number, (front, Ends { rendered: to, .. })) in self.fronts.iter_mut().zip(ends).enumerate() {
+            while front.is_before(to) {
+                front.render(front.batch_end().min(to), packed);
+                sink(number, packed)?;
+            }
+        }
+        Ok(true)
+    }
+
+    /// Where the next slice ends, for every front end; `None` where nothing is left.
+    fn ends(&self) -> Option<Vec<Ends>> {
+        let first = self.fronts.first()?;
+        let to = first.end_after(self.slice);
+        let (count, seconds) = first.scene.clock.rate.ratio();
+        let end = |(number, front): (usize, &Front<'_>)| {
+            if number == 0 || to >= first.part.end {
+                let to = if number == 0 { to } else { front.part.end };
+                return Ends { prepared: to, rendered: to };
+            }
+            // Rendered are whole runs, so that no front end gets ahead of the truth; prepared is a sample more than the
+            // slice holds, so that every instant of the truth in it has its sample.
+            let at = front.scene.clock.rate.first_sample_at(to * seconds, count).min(front.part.end);
+            let rendered = at / RUN_SAMPLES as u64 * RUN_SAMPLES as u64;
+            Ends { prepared: (at + 1).min(front.part.end), rendered }
+        };
+        let ends: Vec<Ends> = self.fronts.iter().enumerate().map(end).collect();
+        first.is_before(to).then_some(ends)
+    }
+
+    /// Writes the rest of the truth, and tells what was done for each front end.
+    ///
+    /// # Errors
+    /// A truth that cannot be written.
+    pub fn finish(mut self, truth: &mut truth::Writer) -> Result<Vec<Generated>, GenerateError> {
+        let mut navigation = BTreeSet::new();
+        self.fronts.iter_mut().for_each(|front| navigation.append(&mut front.navigation()));
+        truth.finish(&navigation, &self.passes())?;
+        Ok(self.fronts.iter().map(Front::done).collect())
+    }
+
+    /// When satellites were in view, by the numbers of the first front end's samples: each satellite once.
+    fn passes(&self) -> BTreeSet<PassRow> {
+        let (mut rows, mut known) = (BTreeSet::new(), BTreeSet::new());
+        let Some(first) = self.fronts.first() else { return rows };
+        for front in &self.fronts {
+            let rate = front.scene.clock.rate;
+            // Views begin and end with seconds, or with the scene.
+            let counted = |sample: u64| match sample {
+                end if end == front.part.end => first.part.end,
+                sample => first.scene.clock.rate.first_sample_at(rate.elapsed(sample).0 as u64, 1),
+            };
+            let new: Vec<PassRow> = front.passes().filter(|row| !known.contains(&row.sv)).collect();
+            known.extend(new.iter().map(|row| row.sv));
+            rows.extend(new.into_iter().map(|row| PassRow {
+                sample: counted(row.sample),
+                until_sample: counted(row.until_sample),
+                ..row
+            }));
+        }
+        rows
+    }
+}

@@ -1,0 +1,161 @@
+//! Several front ends as a user meets them: what is written, what each command takes, and what it refuses.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use gnss_twin::gnss::sigmf;
+use gnss_twin::study::sweep::sha512_hex;
+
+/// A static scene of two seconds at two rates.
+const TWO: &str = r#"
+name = "two"
+start = "2010-07-01T08:00:00"
+duration_s = 2
+seed = 1
+[motion]
+kind = "static"
+latitude_deg = 26.5123
+longitude_deg = 80.2329
+height_m = 130.0
+[power]
+cn0_dbhz = 45.0
+[noise]
+[[front_end]]
+name = "wide"
+center_hz = 1575.42e6
+sample_rate_hz = 4e6
+[[front_end]]
+name = "narrow"
+center_hz = 1575.32e6
+sample_rate_hz = 2.6e6
+[front_end.adc]
+bits = 2
+agc_window_s = 0.005
+"#;
+
+fn twin(arguments: &[&str], directory: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gnss-twin"));
+    command.args(arguments).current_dir(directory).stdin(Stdio::null()).output().unwrap()
+}
+
+fn workplace() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("two.toml"), TWO).unwrap();
+    directory
+}
+
+/// The standard output of a command that succeeds.
+fn done(arguments: &[&str], directory: &Path) -> String {
+    let output = twin(arguments, directory);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// A refusal with that exit code, which says every one of `words` and writes nothing.
+fn refused(arguments: &[&str], directory: &Path, code: i32, words: &[&str]) {
+    let names = || fs::read_dir(directory).unwrap().count();
+    let before = names();
+    let output = twin(arguments, directory);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {text}");
+    assert!(words.iter().all(|word| text.contains(word)), "{arguments:?}: {text}");
+    assert_eq!(names(), before, "{arguments:?}");
+}
+
+#[test]
+fn every_front_end_has_its_files_which_are_those_that_it_has_alone() {
+    let here = workplace();
+    let text = done(&["generate", "two.toml", "--out", "both", "--threads", "2"], here.path());
+    assert!(text.contains("wide: 8000000 samples") && text.contains("narrow: 5200000 samples"), "{text}");
+    let both = here.path().join("both");
+    let mut names: Vec<String> =
+        fs::read_dir(&both).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    let expected = [
+        "narrow.sigmf-data",
+        "narrow.sigmf-meta",
+        "truth",
+        "two.sigmf-collection",
+        "wide.sigmf-data",
+        "wide.sigmf-meta",
+    ];
+    assert_eq!(names, expected);
+    let collection = fs::read_to_string(both.join("two.sigmf-collection")).unwrap();
+    assert_eq!(sigmf::parse_collection(&collection, "x").unwrap(), ["wide", "narrow"]);
+    for (name, center_hz) in [("wide", 1575.42e6), ("narrow", 1575.32e6)] {
+        let out = format!("{name}.sigmf-data");
+        done(&["generate", "two.toml", "--front-end", name, "--out", &out], here.path());
+        let read = |path: &Path| fs::read(path).unwrap();
+        assert!(read(&here.path().join(&out)) == read(&both.join(&out)), "{name}");
+        let meta = read(&both.join(format!("{name}.sigmf-meta")));
+        assert!(collection.contains(&sha512_hex(&meta)), "{name}");
+        let meta = sigmf::parse(&String::from_utf8(meta).unwrap(), name).unwrap();
+        assert_eq!(meta.center_hz, center_hz);
+    }
+    // Of one signal in two front ends the truth has one row; by the samples of the first, it is that one's own.
+    let rows = |path: &str| fs::read_to_string(here.path().join(path)).unwrap();
+    assert_eq!(rows("both/truth/observations.csv"), rows("wide.truth/observations.csv"));
+
+    refused(
+        &["analyze", "--truth", "both/truth", "--nmea", "none.nmea", "--out", "judged"],
+        here.path(),
+        65,
+        &["front_ends = 2", "--front-end NAME"],
+    );
+    let collection = "both/two.sigmf-collection";
+    refused(
+        &["receive", collection, "--out", "rx"],
+        here.path(),
+        65,
+        &["2 recordings", "both/wide.sigmf-meta, both/narrow.sigmf-meta"],
+    );
+}
+
+#[test]
+fn a_run_receives_the_front_end_that_is_chosen() {
+    let here = workplace();
+    refused(
+        &["run", "two.toml", "--out", "none"],
+        here.path(),
+        2,
+        &["2 front ends (wide, narrow)", "--front-end NAME"],
+    );
+    refused(&["run", "two.toml", "--front-end", "broad"], here.path(), 2, &["broad", "wide, narrow"]);
+    done(&["run", "two.toml", "--front-end", "narrow", "--keep-if", "--out", "run"], here.path());
+    done(&["generate", "two.toml", "--front-end", "narrow", "--out", "narrow.sigmf-data"], here.path());
+    let read = |path: &str| fs::read(here.path().join(path)).unwrap();
+    assert!(read("run/if.sigmf-data") == read("narrow.sigmf-data"));
+    let scene = String::from_utf8(read("run/truth/scene.json")).unwrap();
+    assert!(scene.contains("\"front_end_name\": \"narrow\"") && !scene.contains("front_ends"), "{scene}");
+}
+
+#[test]
+fn what_counts_one_front_ends_samples_or_names_one_file_is_refused_for_several() {
+    let here = workplace();
+    let generate = |more: &[&str], words: &[&str]| {
+        refused(&[&["generate", "two.toml"], more].concat(), here.path(), 2, words);
+    };
+    generate(&["--out", "x", "--seek", "5"], &["--seek", "wide, narrow", "--front-end NAME"]);
+    generate(&["--out", "x", "--samples", "5"], &["--samples", "--front-end NAME"]);
+    generate(&["--out", "x.sigmf-data"], &["x.sigmf-data", "name a directory", "--front-end NAME"]);
+}
+
+#[test]
+fn the_plan_shows_every_front_end() {
+    let here = workplace();
+    let text = done(&["plan", "two.toml"], here.path());
+    assert!(text.starts_with("2 front ends that share a clock\n"), "{text}");
+    for line in [
+        "front end  wide",
+        "front end  narrow",
+        "4.000000 Msps, complex ci8, centred on 1575.420000 MHz: 15.3 MiB, GPS L1 C/A",
+        "2.600000 Msps, complex ci8, centred on 1575.320000 MHz: 9.9 MiB, GPS L1 C/A",
+        "together   25.2 MiB of samples",
+    ] {
+        assert!(text.contains(line), "{line}: {text}");
+    }
+    // The stages of each are in its own part.
+    let (wide, narrow) = text.split_once("front end  narrow").unwrap();
+    assert!(!wide.contains("2 bits, step") && narrow.contains("2 bits, step"), "{text}");
+}
