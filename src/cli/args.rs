@@ -47,7 +47,7 @@ pub struct Reference {
 pub struct Run {
     /// Scene to run [default: the embedded static scene]
     pub scenario: Option<PathBuf>,
-    /// Directory for the results [default: reports/<scene's name>, with -<NAME> behind it for a --front-end]
+    /// Directory for the results [default: reports/<scene's name>, and -NAME with --front-end NAME]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Front end to receive, of a scene that has several

@@ -1,5 +1,5 @@
-//! `generate`: samples, metadata and truth of a scene, without a receiver. Several front ends are in
-//! [`collection`].
+//! `generate`: samples, metadata and truth of a scene, without a receiver. Those of several front ends are
+//! written by `collection`.
 
 use std::fs;
 use std::io;

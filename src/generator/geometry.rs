@@ -2,7 +2,7 @@
 //!
 //! It is computed once for an instant, and kept for the other signals and for other front ends that ask for the same
 //! one: those at one sample rate do. What is kept is what would be computed again, so no bit depends on who asks first.
-//! Limits: instants that are further back than [`KEPT`] others are computed again.
+//! Limits: instants that are further back than 1024 others are computed again.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -77,7 +77,7 @@ pub fn write(metadata: &IfMetadata) -> String {
     write_in(metadata, None)
 }
 
-/// [`write`] of a recording that belongs to a collection: the base name of its `.sigmf-collection` file.
+/// [`write()`] of a recording that belongs to a collection: the base name of its `.sigmf-collection` file.
 pub fn write_in(metadata: &IfMetadata, collection: Option<&str>) -> String {
     let document = Document {
         global: Global {

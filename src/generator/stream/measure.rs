@@ -67,7 +67,7 @@ pub(crate) struct Stretch {
 /// Makes the samples of `stretches`, which ascend, as the stream does, and measures them.
 ///
 /// # Errors
-/// Those of [`Stream::next`].
+/// Those of [`super::Stream::next`].
 pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<Stretch>, GenerateError> {
     let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
     let filter = limited.then(|| Filter::new(cutoff_cps(scene)));

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::*;
+use crate::generator::ripple::{self, Ripple, Ripples};
 use crate::generator::scenario::{Overrides, Scenario};
 use crate::gnss::record::{InterferenceRow, Observation, PassRow};
 use crate::gnss::signal::register;
@@ -193,6 +194,48 @@ fn a_front_end_at_another_rate_is_told_of_at_the_instants_of_the_first() {
     // Views are counted by the first front end's samples too.
     let passes: Vec<PassRow> = rows(&both, "passes.csv");
     assert!(passes.iter().all(|row| row.sample == 0 && row.until_sample == first[0].samples));
+}
+
+#[test]
+fn one_oscillator_moves_every_carrier_in_proportion_to_its_frequency() {
+    let both = scenes(&[UPPER, &lower(7.654_321e6)]);
+    let mut largest_s = 0.0_f64;
+    for k in 0..400 {
+        let t_s = 0.0003 * f64::from(k);
+        let [upper, lower] = [(&both[0], 1575.42e6), (&both[1], 1176.45e6)]
+            .map(|(scene, carrier_hz)| (ripple::at(scene, None, carrier_hz, t_s * scene.clock.rate.hz()), carrier_hz));
+        let moved_s = |(ripple, carrier_hz): (Ripple, f64)| ripple.carrier_cycles / carrier_hz;
+        // Places among nodes are rounded to 2^-53 of them, on slopes of less than a picosecond from node to node.
+        assert!((upper.0.delay_s - lower.0.delay_s).abs() < 1e-24, "{k}");
+        assert!((moved_s(upper) - upper.0.delay_s).abs() < 1e-24 && (moved_s(lower) - lower.0.delay_s).abs() < 1e-24);
+        largest_s = largest_s.max(upper.0.delay_s.abs());
+    }
+    // A TCXO wanders by picoseconds in a tenth of a second.
+    assert!((1e-13..1e-9).contains(&largest_s), "{largest_s}");
+}
+
+#[test]
+fn runs_between_nodes_that_are_no_samples_follow_the_truth() {
+    let both = scenes(&[UPPER, &lower(7.654_321e6)]);
+    for scene in &both {
+        let (rate, last) = (scene.clock.rate, scene.samples - 1);
+        let truth = |n: u64| ripple::at(scene, None, 1575.42e6, n as f64).delay_s;
+        let mut ripples = Ripples::default();
+        ripples.prepare(scene, None, 1575.42e6, 0, last);
+        let (mut n, mut runs) = (0, 0);
+        while let Some(to) = ripples.until(n).filter(|to| *to < last) {
+            let [first, end] = ripples.ends(n, to);
+            assert!((first.delay_s - truth(n)).abs() < 1e-24, "{n}");
+            // The line goes on behind its node for less than a sample: what the slope changes there counts so long.
+            let step = to - n;
+            let bend_s = (truth(to + step / 2) - truth(to)).abs() * 2.0 + (truth(to) - truth(n)).abs();
+            let beyond = scene.nodes.at(rate, to).1;
+            assert!((end.delay_s - truth(to)).abs() <= 2.0 * beyond * bend_s + 1e-24, "{n} {to}");
+            (n, runs) = (to, runs + 1);
+        }
+        // 0.13 s of nodes 0.512 ms apart.
+        assert!((250..=254).contains(&runs), "{runs}");
+    }
 }
 
 #[test]
