@@ -93,7 +93,8 @@ fn every_front_end_has_its_files_which_are_those_that_it_has_alone() {
         let meta = sigmf::parse(&String::from_utf8(meta).unwrap(), name).unwrap();
         assert_eq!(meta.center_hz, center_hz);
     }
-    // Of one signal in two front ends the truth has one row; by the samples of the first, it is that one's own.
+    // Of one signal in two front ends the truth has one row; by the samples of the first, it is that one's
+    // own.
     let rows = |path: &str| fs::read_to_string(here.path().join(path)).unwrap();
     assert_eq!(rows("both/truth/observations.csv"), rows("wide.truth/observations.csv"));
 

@@ -78,8 +78,9 @@ pub struct Generate {
     /// Also read files that lie outside the scenario's directory
     #[arg(long)]
     pub allow_outside: bool,
-    /// File for the samples; metadata (.sigmf-meta) and truth (.truth/) are written beside it. Of a scene with several
-    /// front ends a directory, for NAME.sigmf-data and NAME.sigmf-meta of each, a .sigmf-collection and truth/
+    /// File for the samples; metadata (.sigmf-meta) and truth (.truth/) are written beside it. Of a scene
+    /// with several front ends a directory, for NAME.sigmf-data and NAME.sigmf-meta of each, a
+    /// .sigmf-collection and truth/
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Front end to generate, of a scene that has several [default: all of them]

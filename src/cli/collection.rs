@@ -1,5 +1,5 @@
-//! What `generate` writes of a scene with several front ends: a directory with a SigMF recording of each, a collection
-//! over them, and the truth of all.
+//! What `generate` writes of a scene with several front ends: a directory with a SigMF recording of each, a
+//! collection over them, and the truth of all.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};

@@ -1,8 +1,9 @@
-//! What all signals of a satellite have in common when they arrive: orbit, light time, clocks and place in the sky.
+//! What all signals of a satellite have in common when they arrive: orbit, light time, clocks and place in
+//! the sky.
 //!
-//! It is computed once for an instant, and kept for the other signals and for other front ends that ask for the same
-//! one: those at one sample rate do. What is kept is what would be computed again, so no bit depends on who asks first.
-//! Limits: instants that are further back than 1024 others are computed again.
+//! It is computed once for an instant, and kept for the other signals and for other front ends that ask for
+//! the same one: those at one sample rate do. What is kept is what would be computed again, so no bit depends
+//! on who asks first. Limits: instants that are further back than 1024 others are computed again.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -26,8 +27,8 @@ pub struct Arriving {
     pub gain: f64,
 }
 
-/// Reading of the receiver's clock, whole seconds and the bits of the fraction, and the bits of the guess of the light
-/// time: the last digit of an emission may depend on that.
+/// Reading of the receiver's clock, whole seconds and the bits of the fraction, and the bits of the guess of
+/// the light time: the last digit of an emission may depend on that.
 type Key = (i64, u64, u64);
 
 /// The instants of one satellite that are known.

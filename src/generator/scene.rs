@@ -98,7 +98,8 @@ impl Scene {
         self.front_end.iter().for_each(|stage| visit(stage.as_ref()));
     }
 
-    /// Seed of what is random in one front end alone: a function of the front end's name, and not of its place in a list.
+    /// Seed of what is random in one front end alone: a function of the front end's name, and not of its
+    /// place in a list.
     pub fn noise_seed(&self) -> u64 {
         let own = |name: &String| Stream::new(self.seed, "front end").named(name).word(0);
         self.front_end_name.as_ref().map_or(self.seed, own)
@@ -127,8 +128,8 @@ impl Scene {
     }
 }
 
-/// Every source of interference once, with the number of the first of the scenes that hears it: what several front ends
-/// hear is one source.
+/// Every source of interference once, with the number of the first of the scenes that hears it: what several
+/// front ends hear is one source.
 pub fn sources<'s>(scenes: impl Iterator<Item = &'s Scene>) -> Vec<(usize, &'s Interferer)> {
     let mut found: Vec<(usize, &Interferer)> = Vec::new();
     for (number, scene) in scenes.enumerate() {

@@ -1,9 +1,9 @@
 //! SigMF metadata: what a data sheet says of a recording, as JSON beside the samples.
 //!
-//! Source: SigMF 1.2.0 (core namespace). One capture is written; of other people's files, unknown
-//! keys are passed over, while whatever would change the meaning of the samples (several channels,
-//! a header, a retuning) is refused. Recordings of one time are grouped by a collection. An inverted spectrum has no core key: it is written in an
-//! optional extension, `gnss_twin:spectrum_inverted`.
+//! Source: SigMF 1.2.0 (core namespace). One capture is written; of other people's files, unknown keys are
+//! passed over, while whatever would change the meaning of the samples (several channels, a header, a
+//! retuning) is refused. Recordings of one time are grouped by a collection. An inverted spectrum has no core
+//! key: it is written in an optional extension, `gnss_twin:spectrum_inverted`.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -121,7 +121,8 @@ pub fn write_collection(description: &str, members: &[Member]) -> String {
     format!("{collection:#}\n")
 }
 
-/// The base names of the recordings in the JSON text of a `.sigmf-collection` file; `name` is how errors call it.
+/// The base names of the recordings in the JSON text of a `.sigmf-collection` file; `name` is how errors call
+/// it.
 ///
 /// # Errors
 /// [`SigmfError`] with the file, the key, its value and what was expected.

@@ -1,8 +1,9 @@
 //! Where ripples have their nodes, in the reading of the receiver's clock.
 //!
-//! A scene with one front end has them at its samples. Front ends that share a clock share nodes of a rate of their own,
-//! so that what ripples is the same for each of them, whichever others there are. Limits: where nodes lie between
-//! samples, runs end at the first sample behind a node, and what steps at a node does so there.
+//! A scene with one front end has them at its samples. Front ends that share a clock share nodes of a rate of
+//! their own, so that what ripples is the same for each of them, whichever others there are. Limits: where
+//! nodes lie between samples, runs end at the first sample behind a node, and what steps at a node does so
+//! there.
 
 use crate::generator::ripple::node_samples;
 use crate::gnss::time::{Rate, SampleClock};
@@ -30,7 +31,8 @@ impl Nodes {
         self.rate
     }
 
-    /// Where a sample of a clock stands among them: number of the node before it, and the share of the way to the next.
+    /// Where a sample of a clock stands among them: number of the node before it, and the share of the way to
+    /// the next.
     pub fn at(self, rate: Rate, sample: u64) -> (u64, f64) {
         if rate == self.rate {
             return (sample / self.ticks, (sample % self.ticks) as f64 / self.ticks as f64);
@@ -53,7 +55,8 @@ impl Nodes {
         (rate == self.rate).then_some(self.ticks)
     }
 
-    /// The first sample behind the node before `sample` and at or after the next one, where nodes lie between samples.
+    /// The first sample behind the node before `sample` and at or after the next one, where nodes lie between
+    /// samples.
     pub fn until(self, rate: Rate, sample: u64) -> Option<u64> {
         if rate == self.rate {
             return None;

@@ -1,4 +1,5 @@
-//! What of the spectrum a front end's samples hold: where they are centred, and which signals lie in their band.
+//! What of the spectrum a front end's samples hold: where they are centred, and which signals lie in their
+//! band.
 
 use super::front_end::{FrontEnd, Tuned, is_place_of_real};
 use super::{Overrides, Scenario, ScenarioError};
@@ -64,8 +65,8 @@ impl Scenario {
         Ok(samples as u64)
     }
 
-    /// The signals of a front end whose main lobe reaches into the band of its samples; warns when one does not fit as a
-    /// whole.
+    /// The signals of a front end whose main lobe reaches into the band of its samples; warns when one does
+    /// not fit as a whole.
     pub(super) fn signals_in_band(
         &self,
         front_end: &FrontEnd,

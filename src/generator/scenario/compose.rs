@@ -1,7 +1,7 @@
 //! From a scenario to scenes: files are loaded, effects put in order, and values checked against each other.
 //!
-//! What front ends share (motion, clock, sky, effects) is made once; each front end becomes a scene of its own, the one
-//! that it would be alone.
+//! What front ends share (motion, clock, sky, effects) is made once; each front end becomes a scene of its
+//! own, the one that it would be alone.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -71,11 +71,12 @@ struct Band<'s> {
 }
 
 impl Scenario {
-    /// Makes the scene of a scenario with one front end, reading files relative to `directory`; also returns what the
-    /// user should know of.
+    /// Makes the scene of a scenario with one front end, reading files relative to `directory`; also returns
+    /// what the user should know of.
     ///
     /// # Errors
-    /// What cannot be, or not together; several front ends, of which [`Scenario::with_front_end`] chooses one.
+    /// What cannot be, or not together; several front ends, of which [`Scenario::with_front_end`] chooses
+    /// one.
     pub fn compose(&self, directory: &Path, overrides: &Overrides) -> Result<(Scene, Vec<String>), ScenarioError> {
         if self.front_ends.len() > 1 {
             let names = self.front_end_names();
@@ -153,7 +154,8 @@ impl Scenario {
             return Err(self.conflict("motion", reason));
         }
         let seed = overrides.seed.unwrap_or(self.seed);
-        // Without a name a front end has the nodes of its own samples; with one, those that any front end has.
+        // Without a name a front end has the nodes of its own samples; with one, those that any front end
+        // has.
         let own = bands.iter().find(|band| band.front_end.name.is_none());
         let nodes = own.map_or_else(Nodes::common, |band| Nodes::of(band.metadata.rate));
         let receiver_clock = self.receiver_clock.clock(seed, nodes.rate(), &trajectory);
@@ -237,7 +239,8 @@ impl Scenario {
         Ok(scene)
     }
 
-    /// Looks at the sky over a scene's start: sets the level of its playback, and warns of too few satellites.
+    /// Looks at the sky over a scene's start: sets the level of its playback, and warns of too few
+    /// satellites.
     fn look(&self, scene: &mut Scene, front_end: &FrontEnd, warnings: &mut Vec<String>) -> Result<(), ScenarioError> {
         let (visible, signals_lsb) = at_start(scene).map_err(|e| self.orbit(&e))?;
         if let Some(PlaybackSpec { bits, load_sigma, attenuation_db }) = self.playback {

@@ -1,7 +1,7 @@
 //! `[front_end]` as written: one table, or a list of them that listen to one sky by one clock.
 //!
-//! In a list each has its `name`, and its own centre, rate, format, gain and stages. What is random about it is keyed by
-//! its name alone, never by its place in the list.
+//! In a list each has its `name`, and its own centre, rate, format, gain and stages. What is random about it
+//! is keyed by its name alone, never by its place in the list.
 
 use super::read::{Refusals, Table};
 use super::stages::{self, Stages};
@@ -238,8 +238,8 @@ fn format(table: &Table<'_>) -> Result<Format, ScenarioError> {
     }
 }
 
-/// Whether real samples can hold a carrier there: above half the rate they hold a band folded, as bandpass sampling
-/// does; on a multiple of it, one over itself.
+/// Whether real samples can hold a carrier there: above half the rate they hold a band folded, as bandpass
+/// sampling does; on a multiple of it, one over itself.
 pub(super) fn is_place_of_real(if_hz: f64, rate: Rate) -> bool {
     if_hz > 0.0 && (if_hz / (0.5 * rate.hz())).fract() != 0.0
 }

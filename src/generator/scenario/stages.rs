@@ -131,8 +131,8 @@ pub(super) fn playback(table: &Table<'_>) -> Result<PlaybackSpec, ScenarioError>
 }
 
 impl Stages {
-    /// The front end's stages in the order of the hardware. `sigma_lsb` is the thermal noise's deviation, and `if_hz` where
-    /// the carrier of its first signal lies.
+    /// The front end's stages in the order of the hardware. `sigma_lsb` is the thermal noise's deviation, and
+    /// `if_hz` where the carrier of its first signal lies.
     ///
     /// # Errors
     /// A filter that cannot be made, in words.

@@ -1,4 +1,5 @@
-//! From a motion as written to a trajectory: files are read, a body is given its attitude, and spans are checked.
+//! From a motion as written to a trajectory: files are read, a body is given its attitude, and spans are
+//! checked.
 
 use std::fs::File;
 use std::path::Path;

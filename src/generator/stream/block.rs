@@ -1,7 +1,7 @@
 //! One block of samples: satellites are rendered, stages act on their sum, and the format rounds it.
 //!
-//! A block is a pure function of the scene and of what transmitters have prepared, so blocks are made side by side.
-//! What stages look back at is rendered before it and not sent on.
+//! A block is a pure function of the scene and of what transmitters have prepared, so blocks are made side by
+//! side. What stages look back at is rendered before it and not sent on.
 
 use crate::generator::scene::{CodeEdge, Scene, folded_hz};
 use crate::generator::stage::Block;

@@ -65,7 +65,8 @@ impl<'a> Front<'a> {
         self.end_after(self.batch)
     }
 
-    /// Where so many samples from the run of the next sample on end, a multiple of runs or the end of the part.
+    /// Where so many samples from the run of the next sample on end, a multiple of runs or the end of the
+    /// part.
     pub fn end_after(&self, samples: u64) -> u64 {
         (run_begin(self.next) + samples).min(self.part.end)
     }
@@ -134,7 +135,8 @@ impl<'a> Front<'a> {
     }
 }
 
-/// Lets all signals that front ends receive from one satellite of one constellation share what is known of it.
+/// Lets all signals that front ends receive from one satellite of one constellation share what is known of
+/// it.
 pub(super) fn share_geometry(fronts: &mut [Front<'_>]) {
     let mut count: BTreeMap<(usize, Sv), u32> = BTreeMap::new();
     let transmitters = |front: &Front<'_>| front.transmitters.iter().map(|t| (t.from.number, t.sv)).collect::<Vec<_>>();

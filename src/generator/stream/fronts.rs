@@ -1,8 +1,8 @@
 //! Several front ends at one time: the samples of each, and the truth of all of them once.
 //!
-//! Slices of time are made one after the other, of every front end the samples that lie in them. The bytes of a front end
-//! are those that it has alone, since each keeps to the grid of its own samples. The truth counts samples of the first
-//! front end. Limits: whole scenes, no parts of them.
+//! Slices of time are made one after the other, of every front end the samples that lie in them. The bytes of
+//! a front end are those that it has alone, since each keeps to the grid of its own samples. The truth counts
+//! samples of the first front end. Limits: whole scenes, no parts of them.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -31,8 +31,9 @@ struct Ends {
 }
 
 impl<'a> Fronts<'a> {
-    /// The streams of `scenes`, which [`Scenario::compose_all`](crate::generator::scenario::Scenario::compose_all) has
-    /// made; tells `truth` what they are.
+    /// The streams of `scenes`, which
+    /// [`Scenario::compose_all`](crate::generator::scenario::Scenario::compose_all) has made; tells `truth`
+    /// what they are.
     ///
     /// # Errors
     /// A rate that signals cannot have, a truth that cannot be written.
@@ -44,7 +45,8 @@ impl<'a> Fronts<'a> {
             share_geometry(&mut fronts);
         }
         truth.scenes(scenes)?;
-        // The shortest batch bounds the memory; a slice with less than a block would render its lead again and again.
+        // The shortest batch bounds the memory; a slice with less than a block would render its lead again
+        // and again.
         let seconds = |front: &Front<'_>, samples: u64| samples as f64 / front.scene.clock.rate.hz();
         let batch_s = fronts.iter().fold(f64::INFINITY, |least, front| least.min(seconds(front, front.batch)));
         let slice_s = fronts.iter().fold(batch_s, |most, front| most.max(seconds(front, front.block)));
@@ -57,8 +59,8 @@ impl<'a> Fronts<'a> {
         self.fronts.first().map_or(0, Front::samples)
     }
 
-    /// Makes the next slice of time: hands the bytes of each front end, by its number, to `sink`, and writes the truth as
-    /// far. `false` after the last sample.
+    /// Makes the next slice of time: hands the bytes of each front end, by its number, to `sink`, and writes
+    /// the truth as far. `false` after the last sample.
     ///
     /// # Errors
     /// [`GenerateError`] of orbits, messages and truth, and what `sink` meets.
@@ -94,8 +96,8 @@ impl<'a> Fronts<'a> {
                 let to = if number == 0 { to } else { front.part.end };
                 return Ends { prepared: to, rendered: to };
             }
-            // Rendered are whole runs, so that no front end gets ahead of the truth; prepared is a sample more than the
-            // slice holds, so that every instant of the truth in it has its sample.
+            // Rendered are whole runs, so that no front end gets ahead of the truth; prepared is a sample
+            // more than the slice holds, so that every instant of the truth in it has its sample.
             let at = front.scene.clock.rate.first_sample_at(to * seconds, count).min(front.part.end);
             let rendered = at / RUN_SAMPLES as u64 * RUN_SAMPLES as u64;
             Ends { prepared: (at + 1).min(front.part.end), rendered }

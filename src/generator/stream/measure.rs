@@ -1,4 +1,5 @@
-//! What a plan asks of the synthesiser: knots met along the scene, and stretches of samples that are measured.
+//! What a plan asks of the synthesiser: knots met along the scene, and stretches of samples that are
+//! measured.
 
 use std::ops::Range;
 

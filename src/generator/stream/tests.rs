@@ -205,7 +205,8 @@ fn one_oscillator_moves_every_carrier_in_proportion_to_its_frequency() {
         let [upper, lower] = [(&both[0], 1575.42e6), (&both[1], 1176.45e6)]
             .map(|(scene, carrier_hz)| (ripple::at(scene, None, carrier_hz, t_s * scene.clock.rate.hz()), carrier_hz));
         let moved_s = |(ripple, carrier_hz): (Ripple, f64)| ripple.carrier_cycles / carrier_hz;
-        // Places among nodes are rounded to 2^-53 of them, on slopes of less than a picosecond from node to node.
+        // Places among nodes are rounded to 2^-53 of them, on slopes of less than a picosecond from node to
+        // node.
         assert!((upper.0.delay_s - lower.0.delay_s).abs() < 1e-24, "{k}");
         assert!((moved_s(upper) - upper.0.delay_s).abs() < 1e-24 && (moved_s(lower) - lower.0.delay_s).abs() < 1e-24);
         largest_s = largest_s.max(upper.0.delay_s.abs());
@@ -226,7 +227,8 @@ fn runs_between_nodes_that_are_no_samples_follow_the_truth() {
         while let Some(to) = ripples.until(n).filter(|to| *to < last) {
             let [first, end] = ripples.ends(n, to);
             assert!((first.delay_s - truth(n)).abs() < 1e-24, "{n}");
-            // The line goes on behind its node for less than a sample: what the slope changes there counts so long.
+            // The line goes on behind its node for less than a sample: what the slope changes there counts so
+            // long.
             let step = to - n;
             let bend_s = (truth(to + step / 2) - truth(to)).abs() * 2.0 + (truth(to) - truth(n)).abs();
             let beyond = scene.nodes.at(rate, to).1;

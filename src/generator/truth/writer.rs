@@ -281,7 +281,8 @@ impl Writer {
         Ok(())
     }
 
-    /// Appends what interference there is at one sample: of each source, at that sample of the front end that hears it.
+    /// Appends what interference there is at one sample: of each source, at that sample of the front end that
+    /// hears it.
     pub fn interference(&mut self, heard: &[(&Interferer, u64)], sample: u64) -> Result<(), TruthError> {
         let Some(table) = &mut self.interference else { return Ok(()) };
         let mut rows = (1..).zip(heard).filter_map(|(number, (source, own))| source.row(number, *own));

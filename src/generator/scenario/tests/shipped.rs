@@ -37,7 +37,8 @@ fn shipped_scenarios_begin_two_seconds_before_a_frame_with_the_ionosphere_s_page
         let scenario = Scenario::parse(text, name).unwrap();
         assert_eq!(scenario.name, name);
         let frame = scenario.start.tow_whole_s() + 2;
-        // IS-GPS-200N, 20.3.3.5.1.1 and table 20-V: page 18 of subframe 4, frames counted from the week's start.
+        // IS-GPS-200N, 20.3.3.5.1.1 and table 20-V: page 18 of subframe 4, frames counted from the week's
+        // start.
         assert_eq!((frame % 30, frame / 30 % 25 + 1), (0, 18), "{name}");
     }
 }
@@ -92,10 +93,12 @@ fn the_static_scene_sends_its_ionosphere_within_thirty_seconds() {
     let sent = subframe.klobuchar().unwrap();
     let file = crate::gnss::rinex::embedded().unwrap().klobuchar.unwrap();
     for (sent, file) in sent.alpha.iter().zip(file.alpha) {
-        // RINEX 2 prints five significant digits; half a step of the finest field is 2^-31 (IS-GPS-200N, table 20-X).
+        // RINEX 2 prints five significant digits; half a step of the finest field is 2^-31 (IS-GPS-200N,
+        // table 20-X).
         assert!((sent - file).abs() <= 4.7e-10, "{sent} {file}");
     }
-    // GPS time against UTC as the file's header has it, to half a step of its fields (IS-GPS-200N, table 20-IX).
+    // GPS time against UTC as the file's header has it, to half a step of its fields (IS-GPS-200N, table
+    // 20-IX).
     let utc = subframe.utc().unwrap();
     assert!((utc.a0_s - -0.838190317154e-8).abs() <= libm::exp2(-31.0), "{utc:?}");
     assert!((utc.a1_sps - -0.213162820728e-13).abs() <= libm::exp2(-51.0), "{utc:?}");
