@@ -211,15 +211,19 @@ impl Replica {
     pub fn slow<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
         let mut sums = [Complex64::ZERO; T];
         let (nco, taps) = self.in_steps(nco, taps);
-        let (mut carrier, mut code) = (nco.carrier, nco.code);
+        let period = self.steps_period();
+        let code = nco.code.rem_euclid(period);
+        // A period is taken off first: two phases may not fit into 63 bits together.
+        let mut codes = taps.map(|tap| (code - period + tap.rem_euclid(period)) % period);
+        let mut carrier = nco.carrier;
         for (&i, &q) in i.iter().zip(q) {
             let (sin, cos) = libm::sincos(carrier as f64 / TURN * std::f64::consts::TAU);
             let wiped = Complex64::new(f64::from(i), f64::from(q)) * Complex64::new(cos, -sin);
-            for (sum, tap) in sums.iter_mut().zip(&taps) {
-                *sum += wiped * self.value_at_step(code + tap, nco.code_step);
+            for (sum, code) in sums.iter_mut().zip(&mut codes) {
+                *sum += wiped * self.value_at_step(*code, nco.code_step);
+                *code = (*code + nco.code_step as i64) % period;
             }
             carrier = carrier.wrapping_add(nco.carrier_step);
-            code += nco.code_step as i64;
         }
         sums
     }
@@ -481,6 +485,23 @@ mod tests {
         let [sum] = replica.correlate_short(&i, &i, &nco, &[0]);
         // Within 2⁻¹³ chip of an edge either chip will do: about 5000 · 2⁻¹² samples.
         assert!((sum / (5000.0 * 127.5) - Complex64::new(1.0, 1.0)).norm() < 0.002, "{sum}");
+    }
+
+    #[test]
+    fn taps_stand_anywhere_in_the_longest_code_with_the_code_anywhere_in_it() {
+        let component = &crate::gnss::signal::synthetic::MIXED.components[0];
+        let replica = Replica::of(Wave::new(component, 4).unwrap(), Edge::Area).unwrap();
+        let period = replica.period();
+        let step = chips_to_units(1.023 / 5.3);
+        let samples: Vec<f32> = (0..300).map(|n| ((n * n * 7 + n) % 17) as f32 - 8.0).collect();
+        for code in [-chips_to_units(0.5), 0, period / 2, period - 1] {
+            let nco = Nco { carrier: 1 << 61, carrier_step: 1 << 57, code, code_step: step as u64 };
+            let taps = [chips_to_units(0.125), -chips_to_units(0.5), period - chips_to_units(5.0)];
+            let (fast, slow) =
+                (replica.correlate(&samples, &samples, &nco, &taps), replica.slow(&samples, &samples, &nco, &taps));
+            // Three hundred products in f32 of values up to 8.
+            fast.iter().zip(slow).for_each(|(a, b)| assert!((a - b).norm() < 0.01, "{code}: {a} {b}"));
+        }
     }
 
     #[test]

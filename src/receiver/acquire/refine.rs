@@ -54,7 +54,12 @@ pub(super) fn refine(
     let code_chips = f64::from(component.code_chips);
     let correlators = Correlators { grid, block, replica, code_chips, periods };
     let mut phase = coarse.code_phase_chips.rem_euclid(code_chips);
-    let doppler_hz = correlators.fine_doppler_hz(phase, coarse.doppler_hz);
+    let doppler_hz = if component.overlay.periods() > 1 {
+        correlators.unsplit_doppler_hz(phase, coarse.doppler_hz)
+    } else {
+        coarse.doppler_hz
+    };
+    let doppler_hz = correlators.fine_doppler_hz(phase, doppler_hz);
 
     let shape = strongest(component).map_or_else(
         || component.shape(),
@@ -125,6 +130,22 @@ impl Correlators<'_> {
 
     fn powers<const T: usize>(&self, phase_chips: f64, doppler_hz: f64, offsets: &[f64; T]) -> [f64; T] {
         self.sums(phase_chips, doppler_hz, offsets).map(|sum| mean(sum.iter().map(|s| s.norm_sqr())))
+    }
+
+    /// The search's sums do not begin where code periods do. Where the sign turns in the middle of one its line splits
+    /// in two, 0.74/T to either side, and a cell there may have won. Sums over whole code periods know better.
+    fn unsplit_doppler_hz(&self, phase_chips: f64, coarse_hz: f64) -> f64 {
+        let spacing_hz = 0.5 / (self.grid.period_samples / self.grid.rate_hz);
+        let mut best = (f64::NEG_INFINITY, coarse_hz);
+        // As far as the split and a cell's own half width.
+        for alias in [0.0, -1.0, 1.0, -2.0, 2.0] {
+            let doppler_hz = coarse_hz + alias * spacing_hz;
+            let [power] = self.powers(phase_chips, doppler_hz, &[0.0]);
+            if power > best.0 {
+                best = (power, doppler_hz);
+            }
+        }
+        best.1
     }
 
     fn fine_doppler_hz(&self, phase_chips: f64, coarse_hz: f64) -> f64 {

@@ -94,7 +94,7 @@ pub(super) struct Job<'a> {
     short: Option<short::Steps>,
 }
 
-/// Correlates `taps` in groups of three, then one by one. `level` must be one that this processor has.
+/// Correlates `taps` in groups of three and a rest of two or one. `level` must be one that this processor has.
 pub(super) fn correlate<const T: usize>(
     level: Level,
     fast: Fast,
@@ -115,11 +115,19 @@ pub(super) fn correlate<const T: usize>(
         Edge::Area => step - step / 2 - (1 << CODE_BITS),
         Edge::Nearest => 0,
     };
-    let begin = |tap: i64| (nco.code + tap + ahead).rem_euclid(replica.steps_period()) as u64;
+    let period = replica.steps_period();
+    let code = (nco.code + ahead).rem_euclid(period) as u64;
+    // Both are below 2⁶³.
+    let begin = |tap: i64| wrapped(code + tap.rem_euclid(period) as u64, period as u64);
     let mut sums = [Complex64::ZERO; T];
-    let (threes, ones) = taps.as_chunks::<3>();
-    let (sums_of_threes, sums_of_ones) = sums.as_chunks_mut::<3>();
+    let (threes, rest) = taps.as_chunks::<3>();
+    let (sums_of_threes, sums_of_rest) = sums.as_chunks_mut::<3>();
+    let (twos, ones) = rest.as_chunks::<2>();
+    let (sums_of_twos, sums_of_ones) = sums_of_rest.as_chunks_mut::<2>();
     for (taps, sums) in threes.iter().zip(sums_of_threes) {
+        *sums = at_level(level, &job, taps.map(begin));
+    }
+    for (taps, sums) in twos.iter().zip(sums_of_twos) {
         *sums = at_level(level, &job, taps.map(begin));
     }
     for (tap, sum) in ones.iter().zip(sums_of_ones) {

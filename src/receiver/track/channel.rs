@@ -31,10 +31,12 @@ use crate::receiver::source::Block;
 
 mod pilot;
 mod reseat;
+mod side;
 mod supervise;
 
 use pilot::Data;
 pub use pilot::beside;
+use side::SidePeaks;
 use supervise::pilot_group;
 
 pub use reseat::Glance;
@@ -75,6 +77,17 @@ impl Stage {
     }
 }
 
+/// What a code period correlates to.
+#[derive(Clone, Copy, Debug, Default)]
+struct Correlations {
+    /// Early, prompt and late.
+    sums: [Complex64; 3],
+    /// Where the code does not correlate with itself, if it was asked for.
+    noise: Option<Complex64>,
+    /// On the neighbouring peaks, ahead and behind, of a signal that has them.
+    sides: Option<[Complex64; 2]>,
+}
+
 /// One signal of one satellite being followed.
 #[derive(Clone, Debug)]
 pub struct Channel {
@@ -99,6 +112,7 @@ pub struct Channel {
     overlay: Option<OverlaySync>,
     overlay_phase: Option<OverlayPhase>,
     data: Option<Data>,
+    side_peaks: Option<SidePeaks>,
     /// C/N0 of what is followed over that of the whole signal.
     followed_db: f64,
     /// Carrier phase of what is followed against the signal's.
@@ -206,6 +220,7 @@ impl Channel {
                 .and_then(|c| Data::beside(c, (hit.signal, hit.sv), settings, (metadata.rate.hz(), sense))),
             overlay,
             overlay_phase: None,
+            side_peaks: component.and_then(SidePeaks::new),
             followed_db: component.map_or(0.0, followed_db),
             phase_cycles: component.map_or(0.0, |c| c.phase_cycles),
             lost: replica.is_none(),
@@ -414,15 +429,7 @@ impl Channel {
             self.carry.1.extend_from_slice(q);
         }
         let (i, q) = if carried { (&self.carry.0[..], &self.carry.1[..]) } else { (i, q) };
-        let [early, prompt, late] = self.taps;
-        let (sums, noise) = match self.quiet_tap() {
-            Some(quiet) => {
-                let taps = [early, prompt, late, quiet];
-                let [early, prompt, late, quiet] = replica.correlate_in(self.arithmetic, (i, q), &nco, &taps);
-                ([early, prompt, late], Some(quiet))
-            }
-            None => (replica.correlate_in(self.arithmetic, (i, q), &nco, &self.taps), None),
-        };
+        let Correlations { sums, noise, sides } = self.correlations(replica, (i, q), &nco);
         let read = self.whole && self.confirmed && !self.held && self.overlay_phase.is_some();
         if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
             let power = correlate::power(i, q) / i.len().max(1) as f64;
@@ -456,7 +463,35 @@ impl Channel {
         if !self.held && !self.moved {
             self.cn0.add(taps[1], noise.map(|sum| (sum * scale).norm_sqr()));
         }
+        if let Some(sides) = sides {
+            self.watch_side_peaks(taps[1], sides.map(|sum| sum * scale), report);
+        }
         self.take(finished, taps, report);
+    }
+
+    /// All taps of the running period in one pass.
+    fn correlations(&self, replica: &Replica, samples: (&[f32], &[f32]), nco: &Nco) -> Correlations {
+        let arithmetic = self.arithmetic;
+        let [e, p, l] = self.taps;
+        let sides = self.side_peaks.as_ref().filter(|_| self.whole && !self.held).map(SidePeaks::taps);
+        match (self.quiet_tap(), sides) {
+            (None, None) => Correlations {
+                sums: replica.correlate_in(arithmetic, samples, nco, &self.taps),
+                ..Correlations::default()
+            },
+            (Some(quiet), None) => {
+                let [e, p, l, noise] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, quiet]);
+                Correlations { sums: [e, p, l], noise: Some(noise), sides: None }
+            }
+            (None, Some([a, b])) => {
+                let [e, p, l, a, b] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, a, b]);
+                Correlations { sums: [e, p, l], noise: None, sides: Some([a, b]) }
+            }
+            (Some(quiet), Some([a, b])) => {
+                let [e, p, l, noise, a, b] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, quiet, a, b]);
+                Correlations { sums: [e, p, l], noise: Some(noise), sides: Some([a, b]) }
+            }
+        }
     }
 
     /// Where the noise of the running period is to be measured, if it has to be.

@@ -112,6 +112,14 @@ impl Cn0 {
         self.previous = None;
     }
 
+    /// The signal is `gain` times as strong in power from now on.
+    pub fn raise(&mut self, gain: f64) {
+        let [re, im] = self.signal.values();
+        // Of single periods the noise is in there too.
+        let noise = if self.single && !self.known { self.noise.values()[0] } else { 0.0 };
+        self.signal.set([noise + gain * (re - noise), gain * im]);
+    }
+
     /// Whether [`Self::add`] needs the noise reference.
     pub fn needs_reference(&self) -> bool {
         !self.known

@@ -55,6 +55,11 @@ impl Mean {
     pub(super) fn values(&self) -> [f64; 2] {
         self.values
     }
+
+    /// Other values, of as many terms.
+    pub(super) fn set(&mut self, values: [f64; 2]) {
+        self.values = values;
+    }
 }
 
 /// Symbols over which phase lock is averaged once they are known.

@@ -11,6 +11,8 @@ use crate::gnss::record::{Event, TrackingRow};
 mod channel;
 pub mod closed;
 pub mod cn0;
+#[cfg(test)]
+mod ensemble_tests;
 pub mod lock;
 pub mod loops;
 pub mod model;
@@ -19,6 +21,8 @@ mod pull_in;
 pub mod settings;
 #[cfg(test)]
 mod signals_tests;
+#[cfg(test)]
+mod stream_tests;
 mod sync;
 #[cfg(test)]
 mod tests;

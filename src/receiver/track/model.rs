@@ -46,6 +46,29 @@ fn shapes(component: &Component) -> Option<[Shape; 2]> {
     Some([&turned, &made[..]].map(|sent| Shape::between(sent, &made, component.chip_rate_hz)))
 }
 
+/// A side peak of a replica's correlation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SidePeak {
+    /// Its distance from the main peak.
+    pub chips: f64,
+    /// Correlation there over that of the main peak, with its sign.
+    pub ratio: f64,
+}
+
+/// The side peak nearest to the main one of a component's replica; `None` where there is none.
+pub fn side_peak(component: &Component) -> Option<SidePeak> {
+    let [_, own] = shapes(component)?;
+    let corners = (own.chip_s() / own.step_s()).round() as u32;
+    let at = |corner: u32| own.correlation(f64::from(corner) * own.step_s());
+    // Corners at which the modulus rises before and falls behind.
+    let is_peak = |corner: &u32| {
+        let (before, here, after) = (at(corner - 1), at(*corner), at(corner + 1));
+        here * (here - before) > 0.0 && here * (after - here) < 0.0
+    };
+    let corner = (1..corners).find(is_peak)?;
+    Some(SidePeak { chips: f64::from(corner) / f64::from(corners), ratio: at(corner) / at(0) })
+}
+
 /// Power that the replica finds, over the component's.
 fn efficiency(signal: &Shape, own: &Shape) -> f64 {
     let found = signal.correlation(0.0);
@@ -64,6 +87,24 @@ mod tests {
     use super::*;
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::signal::synthetic::{LONG_BOC, MIXED};
+
+    #[test]
+    fn the_nearest_side_peak_is_that_of_the_printed_correlation() {
+        const fn of(layers: &'static [Layer]) -> Component {
+            Component { layers, ..LONG_BOC.components[0] }
+        }
+        // Sine-phased BOC: (−1)^k (1 − k/n) at k of n steps. Cosine-phased BOC(1,1): −1/4, 1/2 … at quarters of a chip:
+        // R = 1 at 0, −1/4 at 1/4, −1/2 at 1/2, 1/4 at 3/4.
+        const COSINE: [Layer; 1] = [Layer { pulse: &[1, -1, -1, 1], ..Layer::BPSK }];
+        let near = |layers: &'static [Layer], chips: f64, ratio: f64| {
+            let found = side_peak(&of(layers)).unwrap();
+            assert!((found.chips - chips).abs() < 1e-12 && (found.ratio - ratio).abs() < 1e-12, "{found:?}");
+        };
+        near(&[Layer::BOC11], 0.5, -0.5);
+        near(&[Layer::BOC61], 1.0 / 12.0, -11.0 / 12.0);
+        near(&COSINE, 0.5, -0.5);
+        assert_eq!(side_peak(&L1_CA.components[0]), None);
+    }
 
     #[test]
     fn the_shape_at_early_and_late_is_that_of_the_waveform() {

@@ -5,8 +5,9 @@
 //! where symbols are random and phases unknown); the largest sum gives both. Then the phases of the squared
 //! symbols, which know no data, give frequency and phase exactly enough for a phase loop to begin in lock.
 //! Noise alone is recognised by its chi-square distribution. Limits: the frequency is within 400 Hz for a
-//! period of 1 ms and changes by less than some hertz in the batch (1 m/s² is 5 Hz/s); edges are found to a
-//! few periods, which [`super::sync`] has to confirm.
+//! period of 1 ms (of symbols of one period within a quarter of a cycle a period) and changes by less than some
+//! hertz in the batch (1 m/s² is 5 Hz/s); edges are found to a few periods, which [`super::sync`] has to
+//! confirm.
 
 use std::f64::consts::TAU;
 
@@ -89,7 +90,9 @@ impl Batch {
         if symbols < 2 || noise <= 0.0 {
             return None;
         }
-        let steps = (REACH_CYCLES * FINENESS * self.group as f64).floor() as i32;
+        // The energy of a single prompt does not depend on frequency: the squares alone tell it.
+        let reach_cycles = if self.group > 1 { REACH_CYCLES } else { 0.0 };
+        let steps = (reach_cycles * FINENESS * self.group as f64).floor() as i32;
         let step = 1.0 / (FINENESS * self.group as f64);
         let mut best = (0.0, 0, 0);
         let mut energies = Vec::new();
@@ -117,7 +120,7 @@ impl Batch {
         let worst = energies.iter().copied().fold(most, f64::min);
         let changes = most - worst > LEAST_CHANGE * most / symbols as f64;
         let curvature = around[0] - 2.0 * around[1] + around[2];
-        let vertex = if curvature < 0.0 { 0.5 * (around[0] - around[2]) / curvature } else { 0.0 };
+        let vertex = if steps > 0 && curvature < 0.0 { 0.5 * (around[0] - around[2]) / curvature } else { 0.0 };
         Some(Found { changes, ..self.refine(offset, (f64::from(number) + vertex) * step) })
     }
 
@@ -202,6 +205,25 @@ mod tests {
             batch.add(carrier + Complex64::new(normal.next(), normal.next()));
         }
         batch
+    }
+
+    #[test]
+    fn where_every_prompt_has_a_sign_of_its_own_the_frequency_nearest_to_the_oscillator_s_is_found() {
+        let mut normal = Normal::new(22);
+        let amplitude = (2.0 * libm::pow(10.0, 3.2) * 4e-3_f64).sqrt();
+        for cycles in [-0.2, -0.1, 0.0, 0.004, 0.13, 0.2] {
+            for _ in 0..20 {
+                let mut batch = Batch::new(1, 62);
+                for k in 0..62 {
+                    let sign = if normal.next() > 0.0 { 1.0 } else { -1.0 };
+                    let carrier = phasor(cycles * (f64::from(k) + 0.5)) * (sign * amplitude);
+                    batch.add(carrier + Complex64::new(normal.next(), normal.next()));
+                }
+                let found = batch.search(2.0).unwrap();
+                // Of the phase of 62 prompts at 11 dB: 0.06 cycles a prompt, √12/62^1.5 of that a period, five times.
+                assert!((found.cycles - cycles).abs() < 2e-3, "{cycles}: {}", found.cycles);
+            }
+        }
     }
 
     #[test]

@@ -260,8 +260,11 @@ impl Channel {
             report.events.push((self.first, Event::CycleSlip));
         }
         self.polarity = None;
-        // Symbols are sought where the phase is right only.
+        // Symbols and overlay are sought where the phase is right only.
         self.sync = SymbolSync::new(self.group);
+        if let Some(overlay) = &mut self.overlay {
+            overlay.clear();
+        }
         self.pending = None;
     }
 
