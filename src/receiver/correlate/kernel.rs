@@ -117,8 +117,11 @@ pub(super) fn correlate<const T: usize>(
     };
     let period = replica.steps_period();
     let code = (nco.code + ahead).rem_euclid(period) as u64;
-    // Both are below 2⁶³.
-    let begin = |tap: i64| wrapped(code + tap.rem_euclid(period) as u64, period as u64);
+    let begin = |tap: i64| {
+        let tap = if (0..period).contains(&tap) { tap } else { tap.rem_euclid(period) };
+        // Both are below 2⁶³.
+        wrapped(code + tap as u64, period as u64)
+    };
     let mut sums = [Complex64::ZERO; T];
     let (threes, rest) = taps.as_chunks::<3>();
     let (sums_of_threes, sums_of_rest) = sums.as_chunks_mut::<3>();

@@ -17,18 +17,20 @@ use super::model::{ReplicaModel, followed_db};
 use super::overlay::{OverlayPhase, OverlaySync};
 use super::pull_in::Batch;
 use super::sync::SymbolSync;
-use super::{Measurement, Report, Symbol, TrackingSettings};
-use crate::gnss::record::TrackingRow;
+use super::{Report, Symbol, TrackingSettings};
 use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal};
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
-use crate::receiver::correlate::{self, Arithmetic, Nco, Replica, TURN, Wave, chips_to_units, units_to_chips};
+use crate::receiver::correlate::{Arithmetic, Replica, Wave, chips_to_units, units_to_chips};
 use crate::receiver::lead::lead;
 use crate::receiver::parting::Phases;
 use crate::receiver::source::Block;
 
+mod integrate;
+mod measure;
+mod oscillators;
 mod pilot;
 mod reseat;
 mod side;
@@ -44,18 +46,11 @@ use reseat::Glances;
 
 /// Prompts over which phase lock is averaged before symbols are known.
 const LOCK_PERIODS: f64 = 100.0;
-/// Periods over which the power of the samples is averaged.
-const POWER_PERIODS: f64 = 100.0;
-/// The power is measured in one of this many periods.
-const POWER_EVERY: u64 = 8;
 /// Time constants 1/(4B) of the code's pull-in, times four, until its first error has decayed to 2 %.
 const SETTLED: f64 = 1.0;
 /// Signals that the search found weaker than this are pulled in by a batch of prompts: T·C/N0 is then below ten, and a
 /// frequency loop's discriminator, ±250 Hz wide, scatters by more than 40 Hz.
 const WEAK_DBHZ: f64 = 40.0;
-/// Places of the code at which the noise is measured, in turn.
-const NOISE_PLACES: usize = 16;
-
 /// How far a channel is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
@@ -75,17 +70,6 @@ impl Stage {
             Self::Tracking(_) => Mode::Phase,
         }
     }
-}
-
-/// What a code period correlates to.
-#[derive(Clone, Copy, Debug, Default)]
-struct Correlations {
-    /// Early, prompt and late.
-    sums: [Complex64; 3],
-    /// Where the code does not correlate with itself, if it was asked for.
-    noise: Option<Complex64>,
-    /// On the neighbouring peaks, ahead and behind, of a signal that has them.
-    sides: Option<[Complex64; 2]>,
 }
 
 /// One signal of one satellite being followed.
@@ -361,213 +345,6 @@ impl Channel {
         self.replica = Some(replica);
     }
 
-    /// Carries the hit's code phase to the first sample that the channel sees.
-    fn begin(&mut self, first: u64, replica: &Replica) {
-        let samples = i128::from(first) - i128::from(self.hit.sample);
-        let moved = samples * i128::from(self.code_step) + i128::from(chips_to_units(self.hit.code_phase_chips));
-        self.code = moved.rem_euclid(i128::from(replica.period())) as i64;
-        (self.start, self.first, self.stage_since, self.update_since) = (Some(first), first, first, first);
-        self.pull_in_since = first;
-        self.noise_taps = replica.quiet_taps(NOISE_PLACES);
-    }
-
-    /// Samples from the running period's first to the next one's.
-    fn samples_left(&self, replica: &Replica) -> u64 {
-        let left = replica.period() - self.code;
-        (left.max(1) as u64).div_ceil(self.code_step.max(1) as u64)
-    }
-
-    /// Sets the oscillators to what the loops know.
-    fn set_steps(&mut self) {
-        let rate_hz = self.rate.hz();
-        let update_s = self.period_s * f64::from(self.periods_per_update());
-        let offset_hz = self.loops.carrier.mean(update_s);
-        self.carrier_step = (offset_hz / rate_hz * TURN) as i128;
-        let aid_hz = (self.sense * offset_hz - self.carrier_offset_hz) * self.chip_rate_hz / self.link().carrier_hz();
-        let aid_hz = planted!("receiver.nco.carrier_aid", aid_hz, -aid_hz);
-        self.code_step = chips_to_units((self.chip_rate_hz + aid_hz + self.loops.code.mean(update_s)) / rate_hz).max(1);
-    }
-
-    /// Takes over a new offset, and moves the code to where the loop would settle with it.
-    fn take_offset(&mut self) {
-        let less_hz = self.carrier_offset_hz - self.next_offset_hz;
-        if less_hz == 0.0 {
-            return;
-        }
-        self.carrier_offset_hz = self.next_offset_hz;
-        let update_s = self.period_s * f64::from(self.periods_per_update());
-        let jump_chips = self.loops.aid_code(less_hz * self.chip_rate_hz / self.link().carrier_hz(), update_s);
-        self.glances.move_by(jump_chips);
-        self.code += chips_to_units(jump_chips);
-    }
-
-    fn periods_per_update(&self) -> u32 {
-        self.stage.mode().periods_per_update(&self.settings, self.group)
-    }
-
-    /// Gains for the present stage.
-    fn design(&mut self) {
-        let update_s = self.period_s * f64::from(self.periods_per_update());
-        self.loops.design(&self.settings, self.stage.mode(), self.wide, update_s);
-    }
-
-    fn since_s(&self, sample: u64) -> f64 {
-        self.first.saturating_sub(sample) as f64 / self.rate.hz()
-    }
-
-    /// Correlates the running period, whose last samples these are, and moves on to the next, which begins at `next`.
-    fn correlate(&mut self, replica: &Replica, i: &[f32], q: &[f32], next: u64, report: &mut Report) {
-        let nco = Nco {
-            carrier: tone_turns(self.if_hz, self.rate, self.first).wrapping_add(self.carrier as u64),
-            carrier_step: self.if_step.wrapping_add(self.carrier_step as u64),
-            code: self.code,
-            code_step: self.code_step as u64,
-        };
-        let carried = !self.carry.0.is_empty();
-        if carried {
-            self.carry.0.extend_from_slice(i);
-            self.carry.1.extend_from_slice(q);
-        }
-        let (i, q) = if carried { (&self.carry.0[..], &self.carry.1[..]) } else { (i, q) };
-        let Correlations { sums, noise, sides } = self.correlations(replica, (i, q), &nco);
-        let read = self.whole && self.confirmed && !self.held && self.overlay_phase.is_some();
-        if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
-            let power = correlate::power(i, q) / i.len().max(1) as f64;
-            self.power =
-                Some(self.power.map_or(power, |mean| mean + (power - mean) * POWER_EVERY as f64 / POWER_PERIODS));
-        }
-        let mean = self.power.unwrap_or_default();
-        let samples = next - self.first;
-        // Noise of a correlation, per component: half the samples' power (real samples too) times the replica's energy.
-        let deviation = (0.5 * mean * samples as f64 * self.replica_power).sqrt();
-        let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
-        if read && let Some(data) = &mut self.data {
-            let phase = self.overlay_phase.unwrap_or_default();
-            report.symbols.extend(data.read((i, q), self.arithmetic, &nco, (self.period, phase), scale));
-        }
-        self.carry.0.clear();
-        self.carry.1.clear();
-        self.pass(next);
-        self.code -= replica.period();
-        let finished = self.period;
-        self.period += 1;
-        if !self.whole {
-            // The first period was met on its way.
-            self.whole = true;
-            self.update_since = next;
-            return;
-        }
-        let signed = scale * self.overlay_chip(finished);
-        let mut taps = [Complex64::ZERO; 3];
-        taps.iter_mut().zip(&sums).for_each(|(tap, sum)| *tap = sum * signed);
-        if !self.held && !self.moved {
-            self.cn0.add(taps[1], noise.map(|sum| (sum * scale).norm_sqr()));
-        }
-        if let Some(sides) = sides {
-            self.watch_side_peaks(taps[1], sides.map(|sum| sum * scale), report);
-        }
-        self.take(finished, taps, report);
-    }
-
-    /// All taps of the running period in one pass.
-    fn correlations(&self, replica: &Replica, samples: (&[f32], &[f32]), nco: &Nco) -> Correlations {
-        let arithmetic = self.arithmetic;
-        let [e, p, l] = self.taps;
-        let sides = self.side_peaks.as_ref().filter(|_| self.whole && !self.held).map(SidePeaks::taps);
-        match (self.quiet_tap(), sides) {
-            (None, None) => Correlations {
-                sums: replica.correlate_in(arithmetic, samples, nco, &self.taps),
-                ..Correlations::default()
-            },
-            (Some(quiet), None) => {
-                let [e, p, l, noise] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, quiet]);
-                Correlations { sums: [e, p, l], noise: Some(noise), sides: None }
-            }
-            (None, Some([a, b])) => {
-                let [e, p, l, a, b] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, a, b]);
-                Correlations { sums: [e, p, l], noise: None, sides: Some([a, b]) }
-            }
-            (Some(quiet), Some([a, b])) => {
-                let [e, p, l, noise, a, b] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, quiet, a, b]);
-                Correlations { sums: [e, p, l], noise: Some(noise), sides: Some([a, b]) }
-            }
-        }
-    }
-
-    /// Where the noise of the running period is to be measured, if it has to be.
-    fn quiet_tap(&self) -> Option<i64> {
-        let wanted = self.whole && self.cn0.needs_reference();
-        let place = self.period as usize % self.noise_taps.len().max(1);
-        self.noise_taps.get(place).copied().filter(|_| wanted)
-    }
-
-    /// Takes the early, prompt and late correlations of code period `number`.
-    fn take(&mut self, number: u64, taps: [Complex64; 3], report: &mut Report) {
-        let prompt = taps[1];
-        self.sums.iter_mut().zip(taps).for_each(|(sum, tap)| *sum += tap);
-        self.summed += 1;
-        self.glances.add(number, prompt, self.previous);
-        match self.stage {
-            Stage::Open => self.batch.add(prompt),
-            Stage::Frequency | Stage::Assisted => self.phase_lock.add(prompt, self.noise()),
-            Stage::Tracking(begin) => self.take_in_symbol(number, begin, prompt, report),
-        }
-        if self.summed >= self.periods_per_update() {
-            self.update();
-            self.sums = [Complex64::ZERO; 3];
-            self.summed = 0;
-            self.update_since = self.first;
-        }
-        self.keep_to_symbols(number);
-        self.previous = Some(prompt);
-        self.supervise(number, prompt, report);
-        self.take_offset();
-        self.set_steps();
-    }
-
-    /// Collects the prompts of a symbol and gives it out at its end.
-    fn take_in_symbol(&mut self, number: u64, begin: u64, prompt: Complex64, report: &mut Report) {
-        if self.held {
-            return;
-        }
-        self.symbol.0 += prompt;
-        self.symbol.1 += 1;
-        self.rotation.add(prompt, self.symbol.1, self.group);
-        let length = u64::from(self.group);
-        if (number + 1) % length != begin {
-            return;
-        }
-        if self.symbol.1 == self.group {
-            let symbol_s = self.period_s * f64::from(self.group);
-            let slipped = self.symbol_lock.add(self.symbol.0, self.cn0.hz().map(|hz| hz * symbol_s));
-            if slipped && self.locked_since.is_some() {
-                self.interrupt(report);
-                self.unlocked_since = Some(self.first);
-            }
-            if self.has_symbols && self.confirmed {
-                let soft = (self.symbol.0.re / f64::from(self.group).sqrt()) as f32;
-                report.symbols.push(Symbol { first_period: number + 1 - length, soft });
-            }
-        }
-        self.symbol = (Complex64::ZERO, 0);
-    }
-
-    /// Closes the loops with the sums of an integration.
-    fn update(&mut self) {
-        let t_s = self.period_s * f64::from(self.summed);
-        let before = match self.stage {
-            Stage::Tracking(_) => self.previous_sum,
-            Stage::Frequency | Stage::Assisted => self.previous,
-            // Nothing may correct the frequency.
-            Stage::Open => None,
-        };
-        self.previous_sum = Some(self.sums[1]);
-        self.last = self.loops.close(self.stage.mode(), self.sums, before, self.summed, t_s, Some(self.cn0_hz()));
-        self.carrier += (self.last.carrier_jump_cycles * TURN) as i128;
-        self.glances.close(self.last.dll_chips, self.last.code_jump_chips);
-        self.code += chips_to_units(self.last.code_jump_chips);
-    }
-
     /// The best estimate of C/N0: what the search found until there is one.
     fn cn0_hz(&self) -> f64 {
         self.cn0.hz().unwrap_or_else(|| libm::pow(10.0, (self.hit.cn0_dbhz + self.followed_db) / 10.0))
@@ -576,45 +353,6 @@ impl Channel {
     /// Power of a prompt's noise: two for white noise.
     fn noise(&self) -> f64 {
         self.cn0.noise().unwrap_or(2.0)
-    }
-
-    /// The replica's state at `tick`, in the running period.
-    fn measure(&self, tick: u64, replica: &Replica, report: &mut Report) {
-        let samples = i128::from(tick) - i128::from(self.first);
-        let length = i128::from(replica.period());
-        let code = i128::from(self.code) + samples * i128::from(self.code_step);
-        let periods = i128::from(self.period) + code.div_euclid(length);
-        let fraction = units_to_chips(code.rem_euclid(length) as i64) / units_to_chips(replica.period());
-        let carrier = self.carrier + samples * planted!("receiver.nco.carrier_between_updates", self.carrier_step, 0);
-        let turns = (carrier >> 64) as f64 + carrier as u64 as f64 / TURN;
-        let half = if self.polarity == Some(true) { 0.5 } else { 0.0 } + self.phase_cycles;
-        let passed_s = tick.saturating_sub(self.update_since) as f64 / self.rate.hz();
-        let offset_hz = self.loops.carrier.rate + self.loops.carrier.acceleration * passed_s;
-        let cn0_dbhz = 10.0 * libm::log10(self.cn0_hz()) - self.followed_db;
-        report.measurements.push(Measurement {
-            sample: tick,
-            code_periods: periods.max(0) as u64,
-            code_fraction: fraction,
-            carrier_cycles: half - planted!("receiver.measure.carrier_sign", self.sense, -self.sense) * turns,
-            half_cycle_known: self.polarity.is_some() || self.overlay_phase.is_some(),
-            doppler_hz: planted!("receiver.measure.doppler_sign", self.sense, -self.sense) * offset_hz,
-            cn0_dbhz,
-            locked_s: self.locked_since.map_or(0.0, |since| tick.saturating_sub(since) as f64 / self.rate.hz()),
-            locked: self.locked_since.is_some(),
-        });
-        report.rows.push(TrackingRow {
-            sample: tick,
-            sv: self.sv,
-            signal: self.signal,
-            prompt_i: self.last.prompt.re,
-            prompt_q: self.last.prompt.im,
-            dll_discriminator_chips: self.last.dll_chips,
-            pll_discriminator_cycles: self.last.pll_cycles,
-            fll_discriminator_hz: self.last.fll_hz,
-            cn0_dbhz,
-            phase_lock: self.lock_value(),
-            integration_s: self.last.integration_s,
-        });
     }
 
     #[cfg(test)]

@@ -192,6 +192,8 @@ struct Theory {
     code_chips: f64,
     carrier_cycles: f64,
     update_s: f64,
+    /// Over how long code and carrier remember: sums of squares of their autocorrelations.
+    memory_s: [f64; 2],
 }
 
 impl Theory {
@@ -220,25 +222,44 @@ impl Theory {
         // Kaplan and Hegarty, eq. 5.6: thermal noise of an arctangent.
         let raw = 1.0 / (2.0 * snr) * (1.0 + 1.0 / (2.0 * snr));
         let bandwidth_time = settings.pll_bandwidth_hz * update_s;
-        let variance = raw * (2.0 * bandwidth_time + within_updates(settings.pll_order, bandwidth_time));
-        Self { code_chips, carrier_cycles: variance.sqrt() / TAU, update_s }
+        let carrier = Response::of(settings.pll_order, bandwidth_time);
+        let variance = raw * (2.0 * bandwidth_time + carrier.within);
+        let code = Response::of(settings.dll_order, settings.dll_bandwidth_hz * update_s);
+        let memory_s = [code, carrier].map(|response| response.memory * update_s);
+        Self { code_chips, carrier_cycles: variance.sqrt() / TAU, update_s, memory_s }
     }
 }
 
-/// Variance that a phase which runs at the loop's rate adds at any time within updates, for unit noise of the
-/// discriminator: x² of the rate in phase an update, 1/12 in the mean.
-fn within_updates(order: u32, bandwidth_time: f64) -> f64 {
-    let gains = loops::Gains::design(order, bandwidth_time);
-    let [mut phase, mut rate, mut acceleration, mut sum] = [0.0_f64; 4];
-    for k in 0..20_000 {
-        let ran = rate + 0.5 * acceleration;
-        sum += ran * ran;
-        let error = f64::from(u32::from(k == 0)) - phase;
-        acceleration += gains.acceleration * error;
-        rate += gains.rate * error + acceleration;
-        phase += gains.phase * error + rate;
+/// What a loop makes of unit noise of its discriminator.
+struct Response {
+    /// Variance that a phase which runs at the loop's rate adds at any time within updates: x² of the rate in phase an
+    /// update, 1/12 in the mean.
+    within: f64,
+    /// Sum of the squares of the phase's autocorrelation over all lags, in updates.
+    memory: f64,
+}
+
+impl Response {
+    fn of(order: u32, bandwidth_time: f64) -> Self {
+        // Bandwidths times times are 0.01 and more here: nothing is left after so many updates.
+        const UPDATES: usize = 2000;
+        let gains = loops::Gains::design(order, bandwidth_time);
+        let [mut phase, mut rate, mut acceleration, mut ran_squared] = [0.0_f64; 4];
+        let mut phases = Vec::new();
+        for k in 0..UPDATES {
+            let ran = rate + 0.5 * acceleration;
+            ran_squared += ran * ran;
+            phases.push(phase);
+            let error = f64::from(u32::from(k == 0)) - phase;
+            acceleration += gains.acceleration * error;
+            rate += gains.rate * error + acceleration;
+            phase += gains.phase * error + rate;
+        }
+        let at = |lag: usize| phases.iter().zip(&phases[lag..]).map(|(a, b)| a * b).sum::<f64>();
+        let variance = at(0);
+        let memory = 1.0 + 2.0 * (1..UPDATES).map(|lag| (at(lag) / variance) * (at(lag) / variance)).sum::<f64>();
+        Self { within: ran_squared / 12.0, memory }
     }
-    sum / 12.0
 }
 
 /// Squares of deviations from a channel's own mean.
@@ -326,8 +347,8 @@ fn jitter(signal: &'static Signal, rate_hz: f64, channels: u64, duration_s: f64)
     let values: f64 = runs.iter().map(|run| run.values).sum();
     let code_chips = (runs.iter().map(|run| run.code).sum::<f64>() / values).sqrt();
     let carrier_cycles = (runs.iter().map(|run| run.carrier).sum::<f64>() / values).sqrt();
-    // Values of a loop forget each other as exp(−4Bt): the deviation's own is 1/√(8Bt) of it, and the mean of each
-    // channel takes 1/(2Bt) of the variance.
+    // The mean of each channel takes 1/(2Bt) of the variance. A variance that is measured over a time scatters by
+    // √(2·memory/time) of itself, its root by half as much.
     let bandwidths_hz = [fitted.dll_bandwidth_hz, fitted.pll_bandwidth_hz];
     let [left_code, left_carrier] = bandwidths_hz.map(|hz| (1.0 - 0.5 / (hz * duration_s)).sqrt());
     Jitter {
@@ -336,7 +357,7 @@ fn jitter(signal: &'static Signal, rate_hz: f64, channels: u64, duration_s: f64)
         code_m: code_chips * SPEED_OF_LIGHT_MPS / component.chip_rate_hz,
         carrier_cycles,
         ratios: [code_chips / (theory.code_chips * left_code), carrier_cycles / (theory.carrier_cycles * left_carrier)],
-        spreads: bandwidths_hz.map(|hz| 1.0 / (8.0 * hz * channels as f64 * duration_s).sqrt()),
+        spreads: theory.memory_s.map(|memory_s| (0.5 * memory_s / (channels as f64 * duration_s)).sqrt()),
     }
 }
 

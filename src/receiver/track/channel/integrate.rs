@@ -1,0 +1,180 @@
+//! A code period: its correlations, what the detectors and symbols get of them, and the update that ends an integration.
+
+use num_complex::Complex64;
+
+use super::side::SidePeaks;
+use super::{Channel, Stage};
+use crate::gnss::time::tone_turns;
+use crate::receiver::correlate::{self, Nco, Replica, TURN, chips_to_units};
+use crate::receiver::track::{Report, Symbol};
+
+/// Periods over which the power of the samples is averaged.
+const POWER_PERIODS: f64 = 100.0;
+/// The power is measured in one of this many periods.
+const POWER_EVERY: u64 = 8;
+
+/// What a code period correlates to.
+#[derive(Clone, Copy, Debug, Default)]
+struct Correlations {
+    /// Early, prompt and late.
+    sums: [Complex64; 3],
+    /// Where the code does not correlate with itself, if it was asked for.
+    noise: Option<Complex64>,
+    /// On the neighbouring peaks, ahead and behind, of a signal that has them.
+    sides: Option<[Complex64; 2]>,
+}
+
+impl Channel {
+    /// Correlates the running period, whose last samples these are, and moves on to the next, which begins at `next`.
+    pub(super) fn correlate(&mut self, replica: &Replica, i: &[f32], q: &[f32], next: u64, report: &mut Report) {
+        let nco = Nco {
+            carrier: tone_turns(self.if_hz, self.rate, self.first).wrapping_add(self.carrier as u64),
+            carrier_step: self.if_step.wrapping_add(self.carrier_step as u64),
+            code: self.code,
+            code_step: self.code_step as u64,
+        };
+        let carried = !self.carry.0.is_empty();
+        if carried {
+            self.carry.0.extend_from_slice(i);
+            self.carry.1.extend_from_slice(q);
+        }
+        let (i, q) = if carried { (&self.carry.0[..], &self.carry.1[..]) } else { (i, q) };
+        let Correlations { sums, noise, sides } = self.correlations(replica, (i, q), &nco);
+        let read = self.whole && self.confirmed && !self.held && self.overlay_phase.is_some();
+        if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
+            let power = correlate::power(i, q) / i.len().max(1) as f64;
+            self.power =
+                Some(self.power.map_or(power, |mean| mean + (power - mean) * POWER_EVERY as f64 / POWER_PERIODS));
+        }
+        let mean = self.power.unwrap_or_default();
+        let samples = next - self.first;
+        // Noise of a correlation, per component: half the samples' power (real samples too) times the replica's energy.
+        let deviation = (0.5 * mean * samples as f64 * self.replica_power).sqrt();
+        let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
+        if read && let Some(data) = &mut self.data {
+            let phase = self.overlay_phase.unwrap_or_default();
+            report.symbols.extend(data.read((i, q), self.arithmetic, &nco, (self.period, phase), scale));
+        }
+        self.carry.0.clear();
+        self.carry.1.clear();
+        self.pass(next);
+        self.code -= replica.period();
+        let finished = self.period;
+        self.period += 1;
+        if !self.whole {
+            // The first period was met on its way.
+            self.whole = true;
+            self.update_since = next;
+            return;
+        }
+        let signed = scale * self.overlay_chip(finished);
+        let mut taps = [Complex64::ZERO; 3];
+        taps.iter_mut().zip(&sums).for_each(|(tap, sum)| *tap = sum * signed);
+        if !self.held && !self.moved {
+            self.cn0.add(taps[1], noise.map(|sum| (sum * scale).norm_sqr()));
+        }
+        if let Some(sides) = sides {
+            self.watch_side_peaks(taps[1], sides.map(|sum| sum * scale), report);
+        }
+        self.take(finished, taps, report);
+    }
+
+    /// All taps of the running period in one pass.
+    fn correlations(&self, replica: &Replica, samples: (&[f32], &[f32]), nco: &Nco) -> Correlations {
+        let arithmetic = self.arithmetic;
+        let [e, p, l] = self.taps;
+        let sides = self.side_peaks.as_ref().filter(|_| self.whole && !self.held).map(SidePeaks::taps);
+        match (self.quiet_tap(), sides) {
+            (None, None) => Correlations {
+                sums: replica.correlate_in(arithmetic, samples, nco, &self.taps),
+                ..Correlations::default()
+            },
+            (Some(quiet), None) => {
+                let [e, p, l, noise] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, quiet]);
+                Correlations { sums: [e, p, l], noise: Some(noise), sides: None }
+            }
+            (None, Some([a, b])) => {
+                let [e, p, l, a, b] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, a, b]);
+                Correlations { sums: [e, p, l], noise: None, sides: Some([a, b]) }
+            }
+            (Some(quiet), Some([a, b])) => {
+                let [e, p, l, noise, a, b] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, quiet, a, b]);
+                Correlations { sums: [e, p, l], noise: Some(noise), sides: Some([a, b]) }
+            }
+        }
+    }
+
+    /// Where the noise of the running period is to be measured, if it has to be.
+    fn quiet_tap(&self) -> Option<i64> {
+        let wanted = self.whole && self.cn0.needs_reference();
+        let place = self.period as usize % self.noise_taps.len().max(1);
+        self.noise_taps.get(place).copied().filter(|_| wanted)
+    }
+
+    /// Takes the early, prompt and late correlations of code period `number`.
+    fn take(&mut self, number: u64, taps: [Complex64; 3], report: &mut Report) {
+        let prompt = taps[1];
+        self.sums.iter_mut().zip(taps).for_each(|(sum, tap)| *sum += tap);
+        self.summed += 1;
+        self.glances.add(number, prompt, self.previous);
+        match self.stage {
+            Stage::Open => self.batch.add(prompt),
+            Stage::Frequency | Stage::Assisted => self.phase_lock.add(prompt, self.noise()),
+            Stage::Tracking(begin) => self.take_in_symbol(number, begin, prompt, report),
+        }
+        if self.summed >= self.periods_per_update() {
+            self.update();
+            self.sums = [Complex64::ZERO; 3];
+            self.summed = 0;
+            self.update_since = self.first;
+        }
+        self.keep_to_symbols(number);
+        self.previous = Some(prompt);
+        self.supervise(number, prompt, report);
+        self.take_offset();
+        self.set_steps();
+    }
+
+    /// Collects the prompts of a symbol and gives it out at its end.
+    fn take_in_symbol(&mut self, number: u64, begin: u64, prompt: Complex64, report: &mut Report) {
+        if self.held {
+            return;
+        }
+        self.symbol.0 += prompt;
+        self.symbol.1 += 1;
+        self.rotation.add(prompt, self.symbol.1, self.group);
+        let length = u64::from(self.group);
+        if (number + 1) % length != begin {
+            return;
+        }
+        if self.symbol.1 == self.group {
+            let symbol_s = self.period_s * f64::from(self.group);
+            let slipped = self.symbol_lock.add(self.symbol.0, self.cn0.hz().map(|hz| hz * symbol_s));
+            if slipped && self.locked_since.is_some() {
+                self.interrupt(report);
+                self.unlocked_since = Some(self.first);
+            }
+            if self.has_symbols && self.confirmed {
+                let soft = (self.symbol.0.re / f64::from(self.group).sqrt()) as f32;
+                report.symbols.push(Symbol { first_period: number + 1 - length, soft });
+            }
+        }
+        self.symbol = (Complex64::ZERO, 0);
+    }
+
+    /// Closes the loops with the sums of an integration.
+    fn update(&mut self) {
+        let t_s = self.period_s * f64::from(self.summed);
+        let before = match self.stage {
+            Stage::Tracking(_) => self.previous_sum,
+            Stage::Frequency | Stage::Assisted => self.previous,
+            // Nothing may correct the frequency.
+            Stage::Open => None,
+        };
+        self.previous_sum = Some(self.sums[1]);
+        self.last = self.loops.close(self.stage.mode(), self.sums, before, self.summed, t_s, Some(self.cn0_hz()));
+        self.carrier += (self.last.carrier_jump_cycles * TURN) as i128;
+        self.glances.close(self.last.dll_chips, self.last.code_jump_chips);
+        self.code += chips_to_units(self.last.code_jump_chips);
+    }
+}
