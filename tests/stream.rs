@@ -8,6 +8,7 @@ use std::sync::Arc;
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::clock::ReceiverClock;
 use gnss_twin::generator::effect::link::FixedCn0;
+use gnss_twin::generator::message::Senders;
 use gnss_twin::generator::ripple::nodes::Nodes;
 use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade, Scene};
 use gnss_twin::generator::stream::{Generated, Options, generate_with};
@@ -16,7 +17,8 @@ use gnss_twin::generator::truth;
 use gnss_twin::generator::vehicle::Trajectory;
 use gnss_twin::gnss::earth::Geodetic;
 use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
-use gnss_twin::gnss::gps::lnav::Broadcast;
+use gnss_twin::gnss::gps::lnav::UtcData;
+use gnss_twin::gnss::message::Common;
 use gnss_twin::gnss::record::Observation;
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::samples::{Format, IfMetadata};
@@ -32,6 +34,8 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         .filter_map(|sv| catalogue.sent_at(sv, start).cloned())
         .collect();
     let rate = Rate::from_hz(rate_hz).unwrap();
+    let utc = UtcData { leap_s: 15, ..UtcData::default() };
+    let common = Common { klobuchar: navigation.klobuchar, utc, almanac, reference: Some(start), ..Common::default() };
     Scene {
         name: "test".to_owned(),
         front_end_name: None,
@@ -43,7 +47,7 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         metadata: IfMetadata { format, rate, center_hz, inverted, start: Some(start) },
         trajectory: Trajectory::fixed(Geodetic::from_degrees(26.5, 80.2, 120.0).to_ecef()),
         catalogue: Arc::new(catalogue),
-        broadcast: Arc::new(Broadcast::new(navigation.klobuchar, 15, &almanac, start).unwrap()),
+        messages: Arc::new(Senders::new(&common, &[&L1_CA]).unwrap()),
         message_faults: Vec::new(),
         satellite_clocks: Arc::default(),
         signals: vec![&L1_CA],

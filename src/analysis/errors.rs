@@ -200,7 +200,8 @@ impl Errors {
                 // What the front end delays arrives late: the receiver takes the time for an earlier one.
                 clock_m: planted!("analysis.errors.clock", 1.0, 0.1)
                     * SPEED_OF_LIGHT_MPS
-                    * (fix.time().since(true_row.time()) + run.common.clock_delay_s()),
+                    * (fix.time().since(true_row.time()) + run.common.clock_delay_s()
+                        - run.scene.ahead_s(&fix.time_scale)),
                 true_clock_s: true_row.clock_bias_s,
                 velocity_enu_mps: to_enu
                     * planted!(

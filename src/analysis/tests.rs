@@ -207,6 +207,9 @@ fn write_estimate(run: &Path, planted: &Planted) {
             chi_square: 4.0,
             excluded: String::new(),
             ionosphere: IonosphereModel::Broadcast,
+            ranges: None,
+            clocks: None,
+            time_scale: "GPST".to_owned(),
         }
     };
     let fixes: Vec<Fix> =

@@ -250,6 +250,7 @@ pub fn output_error(error: OutputError) -> CliError {
     match error {
         OutputError::Create { path, error } => CliError::create(path.display(), &error),
         OutputError::Write { path, error } => CliError::output(path.display(), &error),
+        OutputError::Refused(error) => CliError::output("results", &std::io::Error::other(error)),
     }
 }
 

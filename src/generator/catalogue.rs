@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use crate::generator::departure::{Departure, minimum_jerk};
 use crate::generator::precise::Orbits;
 use crate::gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
-use crate::gnss::satellite::Sv;
+use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
@@ -57,6 +57,8 @@ pub struct Catalogue {
     satellites: BTreeMap<Sv, Timeline>,
     precise: Option<Orbits>,
     departures: Vec<Departure>,
+    /// By how much a system's time is ahead of GPS time, whole seconds apart; zero for those that are not here.
+    time_offsets_s: BTreeMap<System, f64>,
 }
 
 impl Catalogue {
@@ -87,7 +89,7 @@ impl Catalogue {
                 satellites.insert(sv, Timeline { sets, spans });
             }
         }
-        (Self { satellites, precise: None, departures: Vec::new() }, warnings)
+        (Self { satellites, precise: None, departures: Vec::new(), time_offsets_s: BTreeMap::new() }, warnings)
     }
 
     /// Takes `orbits` for true from here on, instead of the broadcast sets.
@@ -98,6 +100,17 @@ impl Catalogue {
     /// Adds what true orbits depart by.
     pub fn depart(&mut self, departures: Vec<Departure>) {
         self.departures = departures;
+    }
+
+    /// Sets by how much the time of a system, which its satellites' clocks follow, is ahead of GPS time, whole seconds
+    /// apart.
+    pub fn set_time_offset(&mut self, system: System, offset_s: f64) {
+        self.time_offsets_s.insert(system, offset_s);
+    }
+
+    /// By how much a system's time is ahead of GPS time, whole seconds apart.
+    pub fn time_offset_s(&self, system: System) -> f64 {
+        self.time_offsets_s.get(&system).copied().unwrap_or(0.0)
     }
 
     /// What is true besides the broadcast sets, in words: precise orbits, and departures.
@@ -159,7 +172,8 @@ impl Catalogue {
             let own = self.departures.iter().filter(|departure| departure.satellites.contains(&sv));
             own.fold(state, |state, departure| departure.apply(state, at))
         };
-        Ok(found.map(|(state, clock)| (departed(state), clock)))
+        let ahead_s = self.time_offset_s(sv.system);
+        Ok(found.map(|(state, clock)| (departed(state), ClockState { offset_s: clock.offset_s + ahead_s, ..clock })))
     }
 
     /// By how much the clock of a satellite is ahead for `signal` of what [`Self::truth`] says for L1 C/A.

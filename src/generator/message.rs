@@ -1,22 +1,48 @@
-//! What goes wrong with the navigation message between the uploaded data and the antenna.
+//! What satellites send as messages, and what goes wrong between the uploaded data and the antenna.
 //!
-//! Wrong content (bad health, wrong parameters) is sent with right parity and the old issue of data; wrong
-//! bits are flipped in what was encoded, so that parity tells them. Times are those of sending, to the
-//! subframe for content and to the bit for bits. Limits: GPS LNAV; the almanac's health stays that of the
-//! scene's start.
+//! Wrong content (bad health, wrong parameters) is sent with a right check and the old issue of data; wrong symbols are
+//! flipped in what was encoded, so that the check shows them. Times are those of sending, to the unit (subframe, page)
+//! for content and to the symbol for symbols. Limits: the almanac's health stays that of the scene's start.
 
 use std::ops::Range;
 
 use crate::generator::random::Stream;
+use crate::gnss::bits::FieldError;
 use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::gps::lnav::{Broadcast, FieldError, SUBFRAME_S, adjust};
+use crate::gnss::message::{Common, Message, Sender};
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::gnss::signal::Signal;
+use crate::gnss::time::{Epoch, TimeScale};
 
-/// Bits of a subframe and of a word, and the time of one (IS-GPS-200N, 20.3.2).
-const SUBFRAME_BITS: u64 = 300;
+/// Bits of a word by which a fault gives a bit's place (IS-GPS-200N, 20.3.2).
 const WORD_BITS: u64 = 30;
-const BIT_S: f64 = 0.02;
+
+/// What the satellites of a scene send, by form of message.
+pub struct Senders {
+    all: Vec<(&'static Message, Box<dyn Sender>)>,
+}
+
+impl Senders {
+    /// Those of the messages of some signals, which say `common` besides each satellite's own elements.
+    ///
+    /// # Errors
+    /// A value that a message cannot carry.
+    pub fn new(common: &Common, signals: &[&'static Signal]) -> Result<Self, FieldError> {
+        let mut all: Vec<(&'static Message, Box<dyn Sender>)> = Vec::new();
+        let messages = signals.iter().flat_map(|signal| signal.components.iter().filter_map(|c| c.message));
+        for message in messages {
+            if all.iter().all(|(known, _)| *known != message) {
+                all.push((message, (message.sender)(common)?));
+            }
+        }
+        Ok(Self { all })
+    }
+
+    /// Who encodes a message; `None` if no signal of the scene has it.
+    pub fn of(&self, message: &Message) -> Option<&dyn Sender> {
+        self.all.iter().find(|(known, _)| *known == message).map(|(_, sender)| sender.as_ref())
+    }
+}
 
 /// One fault of the messages of some satellites.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,23 +57,38 @@ pub struct MessageFault {
 /// What is wrong.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
-    /// Each bit by itself, with a probability.
+    /// Each symbol by itself, with a probability.
     BitErrors { rate: f64, stream: Stream },
-    /// One bit, counted from 1, of every subframe with this number.
+    /// One symbol of every unit with this number, by a word of 30 of them and its place in it, both counted from 1.
     Bit { subframe: u8, word: u8, bit: u8 },
-    /// The six bits of health (IS-GPS-200N, 20.3.3.3.1.4).
+    /// The bits of health (IS-GPS-200N, 20.3.3.3.1.4).
     Health(u8),
-    /// A parameter of subframes 1 to 3 by its name in the message's table, wrong by `add` in its unit.
+    /// A parameter of a set of elements by its name in the message's table, wrong by `add` in its unit.
     Parameter { name: &'static str, add: f64 },
 }
 
-/// The words of a subframe.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The symbols of a unit.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sent {
-    /// As encoded, every parity right …
-    pub encoded: [u32; 10],
+    /// As encoded, every check right …
+    pub encoded: Vec<bool>,
     /// … and as they left the antenna.
-    pub words: [u32; 10],
+    pub symbols: Vec<bool>,
+}
+
+/// A unit that a satellite sends: its form of message, by whose clock, and its number since that clock's beginning.
+#[derive(Clone, Copy, Debug)]
+pub struct Slot {
+    pub message: &'static Message,
+    pub time: &'static TimeScale,
+    pub unit: i64,
+}
+
+impl Slot {
+    /// When it begins.
+    pub fn start(&self) -> Epoch {
+        self.time.instant(self.message.unit_start(self.unit))
+    }
 }
 
 impl MessageFault {
@@ -56,70 +97,76 @@ impl MessageFault {
     }
 
     /// What it makes of the content of a subframe sent at `start`.
-    fn spoil(&self, ephemeris: &mut Ephemeris, start: Epoch) {
+    fn spoil(&self, message: &Message, ephemeris: &mut Ephemeris, start: Epoch) {
         if !self.on.contains(&start) {
             return;
         }
         match self.kind {
             Kind::Health(health) => ephemeris.health = health,
             Kind::Parameter { name, add } => {
-                adjust(ephemeris, name, add);
+                (message.adjust)(ephemeris, name, add);
             }
             Kind::BitErrors { .. } | Kind::Bit { .. } => {}
         }
     }
 
-    /// Whether it flips bit `bit` (0..300) of the subframe with number `id` sent at `start`.
-    fn flips(&self, sv: Sv, start: Epoch, id: u64, bit: u64) -> bool {
-        if !self.on.contains(&start.plus_s(BIT_S * bit as f64)) {
+    /// Whether it flips a symbol, counted from 0, of a unit.
+    fn flips(&self, sv: Sv, slot: &Slot, symbol: u64) -> bool {
+        let message = slot.message;
+        if !self.on.contains(&slot.start().plus_s(message.symbol_s * symbol as f64)) {
             return false;
         }
         match self.kind {
             Kind::BitErrors { rate, stream } => {
-                let index = start.seconds().div_euclid(SUBFRAME_S) as u64 * SUBFRAME_BITS + bit;
+                let index = slot.unit as u64 * message.unit_symbols() as u64 + symbol;
                 let word = stream.satellite(sv).word(index);
                 // 53 bits of it are a number in [0, 1).
                 ((word >> 11) as f64) < rate * 9_007_199_254_740_992.0
             }
-            Kind::Bit { subframe, word, bit: number } => {
-                let place = u64::from(word - 1) * WORD_BITS + u64::from(number - 1);
-                id == u64::from(subframe) && bit == place
+            Kind::Bit { subframe, word, bit } => {
+                let place = u64::from(word - 1) * WORD_BITS + u64::from(bit - 1);
+                (message.number)(message.unit_start(slot.unit)) == subframe && symbol == place
             }
             Kind::Health(_) | Kind::Parameter { .. } => false,
         }
     }
 }
 
-/// The set that `sv` sends at `start` under `faults`, where they spoil it.
-pub fn spoiled(faults: &[MessageFault], sv: Sv, ephemeris: &Ephemeris, start: Epoch) -> Option<Ephemeris> {
-    let mut changed = ephemeris.clone();
-    faults.iter().filter(|fault| fault.concerns(sv)).for_each(|fault| fault.spoil(&mut changed, start));
-    (changed != *ephemeris).then_some(changed)
-}
-
-/// The subframe that `sv` sends at `start` under `faults`.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn subframe(
+/// The set that `sv` sends as `message` at `start` under `faults`, where they spoil it.
+pub fn spoiled(
     faults: &[MessageFault],
-    broadcast: &Broadcast,
+    message: &Message,
     sv: Sv,
     ephemeris: &Ephemeris,
     start: Epoch,
+) -> Option<Ephemeris> {
+    let mut changed = ephemeris.clone();
+    let own = faults.iter().filter(|fault| fault.concerns(sv));
+    own.for_each(|fault| fault.spoil(message, &mut changed, start));
+    (changed != *ephemeris).then_some(changed)
+}
+
+/// The unit of a slot that the satellite of `ephemeris` sends under `faults`.
+///
+/// # Errors
+/// A value that the message cannot carry.
+pub fn unit(
+    faults: &[MessageFault],
+    sender: &dyn Sender,
+    ephemeris: &Ephemeris,
+    slot: &Slot,
 ) -> Result<Sent, FieldError> {
-    let spoiled = spoiled(faults, sv, ephemeris, start);
-    let encoded = broadcast.subframe(spoiled.as_ref().unwrap_or(ephemeris), start)?;
-    let mut words = encoded;
-    let id = (start.tow_whole_s() / SUBFRAME_S % 5 + 1) as u64;
+    let Slot { message, time, unit } = *slot;
+    let sv = ephemeris.sv;
+    let changed = spoiled(faults, message, sv, ephemeris, slot.start()).unwrap_or_else(|| ephemeris.clone());
+    let encoded = sender.unit(&changed.timed(|at| time.label(at)), message.unit_start(unit))?;
+    let mut symbols = encoded.clone();
     for fault in faults.iter().filter(|fault| fault.concerns(sv)) {
-        for (word, first) in words.iter_mut().zip((0_u64..).step_by(WORD_BITS as usize)) {
-            for bit in (0..WORD_BITS).filter(|bit| fault.flips(sv, start, id, first + bit)) {
-                *word ^= 1 << (WORD_BITS - 1 - bit);
-            }
+        for (number, symbol) in (0..).zip(symbols.iter_mut()) {
+            *symbol ^= fault.flips(sv, slot, number);
         }
     }
-    Ok(Sent { encoded, words })
+    Ok(Sent { encoded, symbols })
 }
 
 impl MessageFault {

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use crate::generator::catalogue::Catalogue;
 use crate::generator::clock::ReceiverClock;
 pub use crate::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
-use crate::generator::message::MessageFault;
+use crate::generator::message::{MessageFault, Senders};
 use crate::generator::random::Stream;
 use crate::generator::ray::{Effect, Sight};
 use crate::generator::ripple::nodes::Nodes;
@@ -21,7 +21,6 @@ use crate::generator::stage::playback::Playback;
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::earth::{FLATTENING, SEMI_MAJOR_AXIS_M};
 use crate::gnss::facts::{Expect, Fault};
-use crate::gnss::gps::lnav::Broadcast;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal};
@@ -53,7 +52,7 @@ pub struct Scene {
     /// What the satellites send of themselves, and orbits and clocks as they are.
     pub catalogue: Arc<Catalogue>,
     /// What the satellites send besides their own ephemeris.
-    pub broadcast: Arc<Broadcast>,
+    pub messages: Arc<Senders>,
     /// What goes wrong with what they send.
     pub message_faults: Vec<MessageFault>,
     /// What satellites' clocks do that they do not broadcast.

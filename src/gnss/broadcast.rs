@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
 use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::satellite::Sv;
+use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
@@ -23,7 +23,8 @@ pub struct Ephemeris {
     pub toc: Epoch,
     /// When this set was first transmitted, as far as known.
     pub transmitted: Epoch,
-    pub iode: u8,
+    /// Issue of data: IODE of GPS, IODnav of Galileo.
+    pub iode: u16,
     pub iodc: u16,
     /// User range accuracy index, 0..=15 (IS-GPS-200N, 20.3.3.3.1.3).
     pub ura_index: u8,
@@ -54,6 +55,8 @@ pub struct Ephemeris {
     pub af1_sps: f64,
     pub af2_sps2: f64,
     pub tgd_s: f64,
+    /// The second group delay of messages that have two: BGD(E1,E5a) of Galileo beside BGD(E1,E5b) in `tgd_s`.
+    pub tgd2_s: f64,
     /// Group delays of signals that have one of their own, by the signal's name; others follow from `tgd_s`.
     pub signal_delays_s: Vec<(&'static str, f64)>,
 }
@@ -83,8 +86,41 @@ pub enum OrbitError {
     Near { sv: Sv, range_m: f64 },
 }
 
-/// Relativistic clock constant F = −2√μ/c² in s/√m (IS-GPS-200N, 20.3.3.3.3.1).
-const RELATIVITY_SPSQRTM: f64 = -4.442_807_633e-10;
+/// What the users of a system's elements compute with.
+struct Constants {
+    /// Gravitational constant of the Earth.
+    mu_m3ps2: f64,
+    /// Rotation of the Earth.
+    rotation_radps: f64,
+    /// Relativistic clock constant F = −2√μ/c².
+    relativity_spsqrtm: f64,
+    /// The week from whose beginning the node counts begins so much after that of GPS.
+    behind_gpst_s: f64,
+}
+
+/// IS-GPS-200N, table 20-IV and 20.3.3.3.3.1.
+const OF_GPS: Constants = Constants {
+    mu_m3ps2: GPS_MU_M3PS2,
+    rotation_radps: EARTH_ROTATION_RADPS,
+    relativity_spsqrtm: -4.442_807_633e-10,
+    behind_gpst_s: 0.0,
+};
+/// Galileo OS SIS ICD 2.1, tables 60 and 66.
+const OF_GALILEO: Constants =
+    Constants { mu_m3ps2: 3.986_004_418e14, relativity_spsqrtm: -4.442_807_309e-10, ..OF_GPS };
+/// BDS-SIS-ICD-B1I-3.0, 5.2.4.10 and table 5-11: CGCS2000, and BDT.
+const OF_BEIDOU: Constants = Constants { rotation_radps: 7.292_115_0e-5, behind_gpst_s: 14.0, ..OF_GALILEO };
+
+impl Constants {
+    const fn of(system: System) -> &'static Self {
+        match system {
+            System::Galileo => &OF_GALILEO,
+            System::BeiDou => &OF_BEIDOU,
+            System::Gps | System::Glonass | System::Qzss | System::Navic | System::Sbas => &OF_GPS,
+        }
+    }
+}
+
 /// Residual of Kepler's equation at which it counts as solved.
 const KEPLER_TOLERANCE_RAD: f64 = 1e-13;
 const KEPLER_STEPS: u32 = 20;
@@ -103,6 +139,50 @@ struct Anomaly {
 }
 
 impl Ephemeris {
+    /// All zero, with every time at `at`.
+    pub fn blank(sv: Sv, at: Epoch) -> Self {
+        Self {
+            sv,
+            toe: at,
+            toc: at,
+            transmitted: at,
+            iode: 0,
+            iodc: 0,
+            ura_index: 0,
+            health: 0,
+            l2_codes: 0,
+            l2_p_data_off: false,
+            long_fit: false,
+            aodo: 0,
+            sqrt_a_sqrtm: 0.0,
+            eccentricity: 0.0,
+            m0_rad: 0.0,
+            delta_n_radps: 0.0,
+            omega0_rad: 0.0,
+            omega_dot_radps: 0.0,
+            omega_rad: 0.0,
+            i0_rad: 0.0,
+            idot_radps: 0.0,
+            cuc_rad: 0.0,
+            cus_rad: 0.0,
+            crc_m: 0.0,
+            crs_m: 0.0,
+            cic_rad: 0.0,
+            cis_rad: 0.0,
+            af0_s: 0.0,
+            af1_sps: 0.0,
+            af2_sps2: 0.0,
+            tgd_s: 0.0,
+            tgd2_s: 0.0,
+            signal_delays_s: Vec::new(),
+        }
+    }
+
+    /// The same set with its times as `change` says.
+    pub fn timed(self, change: impl Fn(Epoch) -> Epoch) -> Self {
+        Self { toe: change(self.toe), toc: change(self.toc), transmitted: change(self.transmitted), ..self }
+    }
+
     /// ECEF state at GPS time `at`, in the ECEF axes of that same instant; the velocity is that of
     /// the rotating frame.
     ///
@@ -123,6 +203,7 @@ impl Ephemeris {
     }
 
     fn state_of(&self, anomaly: &Anomaly) -> State {
+        let Constants { rotation_radps, behind_gpst_s, .. } = *Constants::of(self.sv.system);
         let flatness = (1.0 - self.eccentricity * self.eccentricity).sqrt();
         let flattened = planted!("gnss.orbit.true_anomaly", flatness, 1.0) * anomaly.sin;
         let true_anomaly_rad = libm::atan2(flattened, anomaly.cos - self.eccentricity);
@@ -145,9 +226,9 @@ impl Ephemeris {
             + self.cic_rad * cos2;
         let inclination_rate = self.idot_radps + 2.0 * true_rate * (self.cis_rad * cos2 - self.cic_rad * sin2);
 
-        let node_rate = planted!("gnss.orbit.omega_dot", self.omega_dot_radps, 0.0) - EARTH_ROTATION_RADPS;
+        let node_rate = planted!("gnss.orbit.omega_dot", self.omega_dot_radps, 0.0) - rotation_radps;
         // Whole turns are taken from the constant part, so that rounding does not grow with the time of week.
-        let node_at_toe_rad = wrap(self.omega0_rad - EARTH_ROTATION_RADPS * self.toe.tow_s());
+        let node_at_toe_rad = wrap(self.omega0_rad - rotation_radps * (self.toe.tow_s() - behind_gpst_s));
         let node_rad = node_at_toe_rad + node_rate * anomaly.since_toe_s;
 
         let (sin_u, cos_u) = libm::sincos(argument_rad);
@@ -179,9 +260,8 @@ impl Ephemeris {
 
     fn clock_of(&self, anomaly: &Anomaly, at: Epoch) -> ClockState {
         let dt_s = at.since(self.toc);
-        let relativity_s = planted!("gnss.clock.relativity", RELATIVITY_SPSQRTM, -RELATIVITY_SPSQRTM)
-            * self.eccentricity
-            * self.sqrt_a_sqrtm;
+        let factor = Constants::of(self.sv.system).relativity_spsqrtm;
+        let relativity_s = planted!("gnss.clock.relativity", factor, -factor) * self.eccentricity * self.sqrt_a_sqrtm;
         ClockState {
             offset_s: self.af0_s
                 + (planted!("gnss.clock.af1", self.af1_sps, -self.af1_sps) + self.af2_sps2 * dt_s) * dt_s
@@ -274,7 +354,8 @@ impl Ephemeris {
         self.check()?;
         let since_toe_s = at.since(self.toe);
         let semi_major_m = self.sqrt_a_sqrtm * self.sqrt_a_sqrtm;
-        let mean_motion = (GPS_MU_M3PS2 / (semi_major_m * semi_major_m * semi_major_m)).sqrt()
+        let mean_motion = (Constants::of(self.sv.system).mu_m3ps2 / (semi_major_m * semi_major_m * semi_major_m))
+            .sqrt()
             + planted!("gnss.orbit.delta_n", self.delta_n_radps, -self.delta_n_radps);
         let anomaly_rad = solve_kepler(self.m0_rad + mean_motion * since_toe_s, self.eccentricity)
             .ok_or(OrbitError::Kepler { sv: self.sv, eccentricity: self.eccentricity })?;
@@ -350,6 +431,7 @@ mod tests {
             af1_sps: 3.183_231_456_21e-12,
             af2_sps2: 0.0,
             tgd_s: -1.722_946_751_76e-8,
+            tgd2_s: 0.0,
             signal_delays_s: Vec::new(),
         }
     }

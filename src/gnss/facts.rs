@@ -8,6 +8,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::gnss::satellite::Sv;
 
+/// The time of a system that is not GPS time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TimeOffset {
+    /// Name of the time scale.
+    pub time_scale: String,
+    /// By how much it is ahead of GPS time, whole seconds apart.
+    pub ahead_s: f64,
+}
+
 /// What is expected of fixes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

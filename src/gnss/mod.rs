@@ -4,16 +4,21 @@
 //! error in them would cancel in a closed loop: everything here is tested against something
 //! that this project did not write (`tests/witness.rs`).
 
+pub mod bits;
 pub mod broadcast;
+pub mod crc;
 pub mod earth;
 #[cfg(any(feature = "generator", feature = "analysis"))]
 pub mod facts;
+pub mod fec;
+pub mod galileo;
 pub mod gps;
 #[cfg(feature = "generator")]
 pub mod inflate;
 #[cfg(feature = "generator")]
 pub mod ionex;
 pub mod klobuchar;
+pub mod message;
 #[cfg(any(feature = "receiver", feature = "analysis"))]
 pub mod place;
 pub mod record;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal, by_name};
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{Epoch, GPST};
 
 /// Rows that belong to one signal of one satellite.
 macro_rules! linked {
@@ -195,12 +195,35 @@ pub struct Fix {
     pub condition: f64,
     /// Satellites in the solution.
     pub satellites: u32,
-    /// Weighted sum of squared residuals; its degrees of freedom are `satellites` − 4.
+    /// Weighted sum of squared residuals; its degrees of freedom are [`Fix::freedom`].
     pub chi_square: f64,
     /// Satellites left out by the residual test, separated by blanks.
     pub excluded: String,
     /// How the ionosphere was corrected.
     pub ionosphere: IonosphereModel,
+    /// Ranges in the solution, and clocks that it estimates: one a satellite, and one, where the file does not say.
+    #[serde(default)]
+    pub ranges: Option<u32>,
+    #[serde(default)]
+    pub clocks: Option<u32>,
+    /// What `clock_bias_s` and the time of the fix are counted from: GPS time, or that of the only system.
+    #[serde(default = "gpst")]
+    pub time_scale: String,
+}
+
+fn gpst() -> String {
+    GPST.name.to_owned()
+}
+
+/// The receiver's clock against one time scale: `rx/clocks.csv`, of fixes with another than GPS time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ClockRow {
+    pub sample: u64,
+    pub time_scale: String,
+    /// Reading of the receiver's clock minus that time, whole seconds by which it is behind GPS time apart.
+    pub clock_bias_s: f64,
+    /// Formal standard deviation.
+    pub sigma_clock_m: f64,
 }
 
 /// What a fix was corrected by for the ionosphere.
@@ -216,6 +239,11 @@ pub enum IonosphereModel {
 }
 
 impl Fix {
+    /// Ranges beyond the unknowns.
+    pub fn freedom(&self) -> u32 {
+        self.ranges.unwrap_or(self.satellites).saturating_sub(3 + self.clocks.unwrap_or(1))
+    }
+
     /// GPS time of the sample as the receiver found it.
     pub fn time(&self) -> Epoch {
         Epoch::new(self.gps_s, self.gps_fraction_s)

@@ -216,7 +216,7 @@ fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
         toe,
         toc,
         transmitted: transmitted(record, toe),
-        iode: iode as u8,
+        iode: iode as u16,
         iodc: optional("iodc", 1023)?.unwrap_or(iode) as u16,
         ura_index: ura_index(optional_accuracy(record)?),
         health: whole(record, "health", 63)? as u8,
@@ -244,6 +244,7 @@ fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
         af1_sps: both("af1", 3.726e-9)?,
         af2_sps2: both("af2", 3.553e-15)?,
         tgd_s: both("tgd", 5.961e-8)?,
+        tgd2_s: 0.0,
         signal_delays_s: Vec::new(),
     })
 }

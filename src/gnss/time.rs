@@ -32,6 +32,18 @@ pub struct TimeScale {
     pub behind_gpst_s: i64,
 }
 
+impl TimeScale {
+    /// What this scale's clock shows at an instant, as an [`Epoch`] whose week and seconds are the scale's own.
+    pub fn label(&self, at: Epoch) -> Epoch {
+        Epoch { seconds: at.seconds - self.behind_gpst_s, ..at }
+    }
+
+    /// The instant at which this scale's clock shows `label`.
+    pub fn instant(&self, label: Epoch) -> Epoch {
+        Epoch { seconds: label.seconds + self.behind_gpst_s, ..label }
+    }
+}
+
 /// GPS time (IS-GPS-200N, 3.3.4).
 pub static GPST: TimeScale = TimeScale { name: "GPST", behind_gpst_s: 0 };
 
@@ -130,6 +142,17 @@ impl Epoch {
     /// Whole seconds of the week, 0..604 800.
     pub fn tow_whole_s(self) -> i64 {
         self.seconds.rem_euclid(WEEK_S)
+    }
+
+    /// The whole second of the week `tow_s` that is nearest to this instant.
+    pub fn nearest_tow(self, tow_s: i64) -> Self {
+        let ahead_s = (tow_s - self.tow_whole_s() + WEEK_S / 2).rem_euclid(WEEK_S) - WEEK_S / 2;
+        Self::new(self.seconds + ahead_s, 0.0)
+    }
+
+    /// The week nearest to this instant's that a count modulo `modulus` gives as `count`.
+    pub fn nearest_week(self, count: i64, modulus: i64) -> i64 {
+        self.week() + (count - self.week() + modulus / 2).rem_euclid(modulus) - modulus / 2
     }
 
     /// The instant `dt_s` later (or earlier, if negative).

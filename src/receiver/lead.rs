@@ -30,24 +30,23 @@ pub fn refusal(signal: &'static Signal) -> Option<String> {
     if component.message.is_none() && component.overlay.periods() == 1 {
         return Some("its pilot has no overlay code that shows where the data beside it begin".to_owned());
     }
-    if component.message.is_none() && beside(component, signal).is_none() {
-        return Some("its data do not begin where the overlay of its pilot does".to_owned());
-    }
-    (signal.time.behind_gpst_s != 0).then(|| format!("its time is {}, not GPS time", signal.time.name))
+    let unread = component.message.is_none() && beside(component, signal).is_none();
+    unread.then(|| "its data do not begin where the overlay of its pilot does".to_owned())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, OWN_TIME, QUADRATURE};
-    use crate::gnss::signal::{Message, Overlay};
+    use crate::gnss::gps::lnav::LNAV;
+    use crate::gnss::signal::Overlay;
+    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
 
     /// Synthetic signal B with data beside its pilot.
     static READ: Signal = Signal {
         name: "read",
         components: &[
-            Component { message: Some(Message::GpsLnav), ..QUADRATURE.components[0] },
+            Component { message: Some(&LNAV), ..QUADRATURE.components[0] },
             Component { ..QUADRATURE.components[1] },
         ],
         ..QUADRATURE
@@ -67,11 +66,11 @@ mod tests {
     #[test]
     fn what_cannot_be_followed_to_a_position_is_refused_with_its_reason() {
         assert_eq!(refusal(&L1_CA), None);
-        for signal in [&LONG_BOC, &QUADRATURE, &MIXED, &MULTIPLEXED] {
+        for signal in [&QUADRATURE, &MIXED, &MULTIPLEXED] {
             assert!(refusal(signal).unwrap().contains("no message"), "{signal}");
         }
-        static LATE: Signal = Signal { name: "late", time: &OWN_TIME, ..L1_CA };
-        assert!(refusal(&LATE).unwrap().contains("its time is synthetic"));
+        // In a time of its own, with a message that begins where the overlay does.
+        assert_eq!(refusal(&LONG_BOC), None);
         // With a message that begins where the overlays do it can be received.
         assert_eq!(refusal(&READ), None);
         static OVERLAID: Signal = Signal {

@@ -4,6 +4,9 @@
 //! satellites, [`track`] follows them with [`correlate`], [`decode`] reads their messages,
 //! [`observe`] makes observables at common epochs and [`position`] solves for place and time. [`interference`] watches
 //! the spectrum, [`parting`] how code and carrier part, [`gap`] whether samples are missing.
+//!
+//! A [`Receiver`] takes samples and returns [`output::Record`]s as values; [`receive`] reads a stream to its end and gives them
+//! to any [`output::Sink`], of which the CSV files of [`output::Output`] are one.
 
 pub mod acquire;
 pub mod correlate;
@@ -25,4 +28,4 @@ pub mod settings;
 pub mod source;
 pub mod track;
 
-pub use run::{Conditioning, Interfered, Outcome, ReceiveError, Reception, receive};
+pub use run::{Conditioning, Interfered, Outcome, ReceiveError, Receiver, Reception, receive};

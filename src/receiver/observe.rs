@@ -10,7 +10,7 @@ use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::Observation;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, Rate, SampleClock, WEEK_S};
+use crate::gnss::time::{Epoch, Rate, SampleClock};
 use crate::receiver::decode::Decoder;
 use crate::receiver::track::Measurement;
 
@@ -32,7 +32,7 @@ pub struct Reading {
     pub sv: Sv,
     pub signal: &'static Signal,
     pub measurement: Measurement,
-    /// Time of week sent: whole seconds and a fraction.
+    /// Time of week sent, in the time of the signal's system: whole seconds and a fraction.
     pub sent_of_week: (i64, f64),
 }
 
@@ -49,15 +49,8 @@ impl Reading {
     /// The time sent, in the week that brings it nearest to `near`.
     fn sent(&self, near: Epoch) -> Epoch {
         let (whole, fraction) = self.sent_of_week;
-        let ahead = whole - near.tow_whole_s();
-        let weeks = if ahead > WEEK_S / 2 {
-            -1
-        } else if ahead < -WEEK_S / 2 {
-            1
-        } else {
-            0
-        };
-        Epoch::new((near.week() + weeks) * WEEK_S + whole, fraction)
+        let label = self.signal.time.label(near).nearest_tow(whole);
+        self.signal.time.instant(Epoch::new(label.seconds(), fraction))
     }
 }
 

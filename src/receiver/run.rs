@@ -21,7 +21,7 @@ use crate::receiver::diagnosis::{Diagnosis, Stage, duration};
 use crate::receiver::format::Check;
 use crate::receiver::gap::Jump;
 use crate::receiver::lead::lead;
-use crate::receiver::output::{Output, OutputError};
+use crate::receiver::output::{OutputError, Record, Sink};
 use crate::receiver::parting::Parted;
 use crate::receiver::session::Session;
 use crate::receiver::settings::{Settings, SettingsError};
@@ -40,8 +40,6 @@ const READ_BYTES: usize = 1 << 18;
 pub enum ReceiveError {
     #[error("acquisition.signals: {signal} cannot be received: {reason}")]
     Unsupported { signal: &'static str, reason: String },
-    #[error("acquisition.signals: {first} and {second} lie in these samples: expected one signal at a time")]
-    Several { first: &'static str, second: &'static str },
     #[error(transparent)]
     Settings(#[from] SettingsError),
     #[error(transparent)]
@@ -229,14 +227,14 @@ impl Reception {
         })
     }
 
-    /// Takes the next bytes, cut anywhere, and writes what they bring to `output`.
+    /// Takes the next bytes, cut anywhere, and gives what they bring to `sink`.
     ///
     /// # Errors
     /// Records that cannot be written.
-    pub fn take(&mut self, mut bytes: &[u8], output: &mut Output) -> Result<(), ReceiveError> {
+    pub fn take(&mut self, mut bytes: &[u8], sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         self.check.take(bytes);
         while let Some(block) = self.source.next(&mut bytes) {
-            self.session.process(&block, output)?;
+            self.session.process(&block, sink)?;
         }
         Ok(())
     }
@@ -246,16 +244,16 @@ impl Reception {
         self.source.samples()
     }
 
-    /// Ends the reception: writes what is left to `output` and tells what came of it.
+    /// Ends the reception: gives what is left to `sink` and returns what came of it.
     ///
     /// # Errors
     /// Records that cannot be written.
-    pub fn finish(mut self, output: &mut Output) -> Result<Outcome, ReceiveError> {
+    pub fn finish(mut self, sink: &mut dyn Sink) -> Result<Outcome, ReceiveError> {
         let (rest, cut_bytes) = self.source.rest();
         if let Some(block) = rest {
-            self.session.process(&block, output)?;
+            self.session.process(&block, sink)?;
         }
-        self.session.search_rest(output)?;
+        self.session.search_rest(sink)?;
         let (metadata, settings) = (&self.metadata, &self.settings);
         let count = self.source.samples();
         let seconds = metadata.rate.elapsed_s(count);
@@ -284,12 +282,70 @@ impl Reception {
         } else {
             outcome.warnings.extend(findings);
         }
-        output.finish(&summary(metadata, settings, &outcome))?;
+        sink.finish(&summary(metadata, settings, &outcome))?;
         Ok(outcome)
     }
 }
 
-/// Receives `samples`, packed as `metadata` says, from the first to the last, and writes everything to `output`.
+/// A receiver whose results are values: nothing is written.
+///
+/// ```no_run
+/// use gnss_twin::gnss::samples::{Format, IfMetadata};
+/// use gnss_twin::gnss::time::Rate;
+/// use gnss_twin::receiver::output::Record;
+/// use gnss_twin::receiver::{Receiver, settings::Settings};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let rate = Rate::from_hz(4e6).ok_or("no rate")?;
+/// let metadata = IfMetadata { format: Format::Ci8, rate, center_hz: 1_575.42e6, inverted: false, start: None };
+/// let mut receiver = Receiver::new(&metadata, &Settings::default())?;
+/// for chunk in std::fs::read("recording.ci8")?.chunks(1 << 20) {
+///     for record in receiver.push(chunk)? {
+///         if let Record::Fix(fix) = record {
+///             println!("{} {:?}", fix.time(), fix.position_m());
+///         }
+///     }
+/// }
+/// let (_, outcome) = receiver.finish()?;
+/// println!("{outcome}");
+/// # Ok(())
+/// # }
+/// ```
+pub struct Receiver {
+    reception: Reception,
+}
+
+impl Receiver {
+    /// A cold start on samples that are packed as `metadata` says.
+    ///
+    /// # Errors
+    /// As [`Reception::new`].
+    pub fn new(metadata: &IfMetadata, settings: &Settings) -> Result<Self, ReceiveError> {
+        Reception::new(metadata, settings).map(|reception| Self { reception })
+    }
+
+    /// Takes the next bytes, cut anywhere, and returns what they bring, in the order in which the receiver found it.
+    ///
+    /// # Errors
+    /// Samples that cannot be searched.
+    pub fn push(&mut self, bytes: &[u8]) -> Result<Vec<Record>, ReceiveError> {
+        let mut records = Vec::new();
+        self.reception.take(bytes, &mut records)?;
+        Ok(records)
+    }
+
+    /// Ends the reception: returns what was left, and what came of it.
+    ///
+    /// # Errors
+    /// Samples that cannot be searched.
+    pub fn finish(self) -> Result<(Vec<Record>, Outcome), ReceiveError> {
+        let mut records = Vec::new();
+        let outcome = self.reception.finish(&mut records)?;
+        Ok((records, outcome))
+    }
+}
+
+/// Receives `samples`, packed as `metadata` says, from the first to the last, and gives everything to `sink`.
 /// `progress` is told the number of samples done after every block.
 ///
 /// # Errors
@@ -299,15 +355,15 @@ pub fn receive<R: Read>(
     metadata: &IfMetadata,
     mut samples: R,
     settings: &Settings,
-    output: &mut Output,
+    sink: &mut dyn Sink,
     progress: &mut dyn FnMut(u64),
 ) -> Result<Outcome, ReceiveError> {
     let mut reception = Reception::new(metadata, settings)?;
     let mut bytes = vec![0; READ_BYTES];
     loop {
         match samples.read(&mut bytes) {
-            Ok(0) => return reception.finish(output),
-            Ok(count) => reception.take(bytes.get(..count).unwrap_or_default(), output)?,
+            Ok(0) => return reception.finish(sink),
+            Ok(count) => reception.take(bytes.get(..count).unwrap_or_default(), sink)?,
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(error) => return Err(ReceiveError::Read { sample: reception.samples(), error }),
         }
@@ -370,9 +426,8 @@ mod tests {
         }
         let rate = Rate::from_hz(1e5).unwrap();
         let metadata = IfMetadata { format: Format::Ci8, rate, center_hz: 1_575.42e6, inverted: false, start: None };
-        let directory = tempfile::tempdir().unwrap();
-        let mut output = Output::create(directory.path()).unwrap();
-        let error = receive(&metadata, Broken(0), &Settings::default(), &mut output, &mut |_| ()).unwrap_err();
+        let mut records: Vec<Record> = Vec::new();
+        let error = receive(&metadata, Broken(0), &Settings::default(), &mut records, &mut |_| ()).unwrap_err();
         assert!(error.to_string().contains("sample 0") && error.to_string().contains("unplugged"), "{error}");
     }
 }

@@ -62,8 +62,7 @@ pub(super) fn tracked(signal: &'static Signal) -> Option<&'static Component> {
 impl Case {
     /// Code periods that carry a symbol, or that are grouped without one.
     fn group(&self) -> u32 {
-        let message = tracked(self.signal).and_then(|c| c.message);
-        message.map_or(PILOT_GROUP, |m| m.periods_per_symbol())
+        tracked(self.signal).and_then(Component::periods_per_symbol).unwrap_or(PILOT_GROUP)
     }
 
     fn period_s(&self) -> f64 {

@@ -247,8 +247,7 @@ pub fn detections(
     })?;
     error.map_or(Ok(()), Err)?;
     let code = leading(&L1_CA).ok_or_else(|| DetectionError::Scene(format!("{L1_CA} has no code")))?;
-    let symbol_s =
-        code.message.map_or(f64::INFINITY, |message| code.period_s() * f64::from(message.periods_per_symbol()));
+    let symbol_s = code.message.map_or(f64::INFINITY, |message| message.symbol_s);
     let model = Model {
         signal: &L1_CA,
         sums: settings.noncoherent_sums,

@@ -6,19 +6,20 @@ use std::path::Path;
 use std::process::Command;
 
 use gnss_twin::generator::catalogue::Catalogue;
-use gnss_twin::generator::message::{self, Kind, MessageFault};
+use gnss_twin::generator::message::{self, Kind, MessageFault, Sent, Slot};
 use gnss_twin::generator::precise::{Hardware, Orbits};
 use gnss_twin::generator::random::Stream;
 use gnss_twin::generator::sky::emission;
 use gnss_twin::generator::vehicle::Motion;
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::gps::lnav::{Broadcast, Subframe};
+use gnss_twin::gnss::gps::lnav::{Broadcast, LNAV, Subframe, words};
+use gnss_twin::gnss::message::Sender;
 use gnss_twin::gnss::record::{Event, EventRow, Fix, NavigationRow, Observation, SkyRow, TrajectoryRow};
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::sp3::{self, Precise};
-use gnss_twin::gnss::time::Epoch;
+use gnss_twin::gnss::time::{Epoch, GPST};
 use gnss_twin::receiver::track::TrackingSettings;
 use nalgebra::Vector3;
 use serde_json::Value;
@@ -28,6 +29,12 @@ use crate::single::{code_error_m, follow, rows, samples, scene, track};
 const L1_HZ: f64 = 1_575.42e6;
 const WAVELENGTH_M: f64 = SPEED_OF_LIGHT_MPS / L1_HZ;
 const BARE: Hardware = Hardware { tgd_s: 0.0, antenna_m: 0.0 };
+
+/// The subframe of a set that begins at `start` under faults.
+fn subframe(faults: &[MessageFault], sender: &dyn Sender, set: &Ephemeris, start: Epoch) -> Sent {
+    let slot = Slot { message: &LNAV, time: &GPST, unit: LNAV.unit_at(start.seconds()) };
+    message::unit(faults, sender, set, &slot).unwrap()
+}
 
 fn day() -> Precise {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/witness/igs15904.sp3.gz");
@@ -252,11 +259,9 @@ fn bits_are_wrong_as_often_as_asked_and_where_the_samples_say() {
     };
     let (mut wrong, mut refused) = (0, 0);
     for k in 0..1000 {
-        let sent =
-            message::subframe(std::slice::from_ref(&fault), &broadcast, sv, &set, start.plus_s(6.0 * f64::from(k)))
-                .unwrap();
-        wrong += sent.words.iter().zip(&sent.encoded).map(|(a, b)| (a ^ b).count_ones()).sum::<u32>();
-        refused += u32::from(Subframe::decode(&sent.words, 0).is_err());
+        let sent = subframe(std::slice::from_ref(&fault), &broadcast, &set, start.plus_s(6.0 * f64::from(k)));
+        wrong += sent.symbols.iter().zip(&sent.encoded).filter(|(a, b)| a != b).count();
+        refused += u32::from(Subframe::decode(&words(&sent.symbols), 0).is_err());
     }
     println!("{wrong} of 300000 bits wrong, {refused} of 1000 subframes refused");
     assert!((wrong as f64 - 600.0).abs() < 4.0 * 24.5);
@@ -274,14 +279,13 @@ fn bits_are_wrong_as_often_as_asked_and_where_the_samples_say() {
     let mut sent = BTreeMap::new();
     for symbol in &report.symbols {
         let bit = (symbol.first_period as i64 + periods).div_euclid(20);
-        let words = sent.entry(bit.div_euclid(300)).or_insert_with_key(|index| {
+        let unit = sent.entry(bit.div_euclid(300)).or_insert_with_key(|index| {
             let start = Epoch::new(index * 6, 0.0);
             let set = scene.catalogue.sent_at(sv, start).unwrap();
-            message::subframe(&scene.message_faults, &scene.broadcast, sv, set, start).unwrap()
+            subframe(&scene.message_faults, scene.messages.of(&LNAV).unwrap(), set, start)
         });
         let place = bit.rem_euclid(300) as usize;
-        let of = |words: &[u32; 10]| words[place / 30] >> (29 - place % 30) & 1 == 1;
-        bits.push((symbol.soft < 0.0, of(&words.words), of(&words.encoded)));
+        bits.push((symbol.soft < 0.0, unit.symbols[place], unit.encoded[place]));
     }
     // The loop may have locked upside down.
     let upright = bits.iter().filter(|(found, sent, _)| found == sent).count();
@@ -304,9 +308,10 @@ fn one_bit_given_by_its_place_costs_the_word_that_it_is_in_and_no_other_subframe
     let on = start..start.plus_s(1e6);
     let fault = |kind| [MessageFault { satellites: Some(vec![sv]), on: on.clone(), kind }];
     let bit = fault(Kind::Bit { subframe: 2, word: 4, bit: 7 });
-    let decoded = |faults: &[MessageFault], sv: Sv, subframe: i64| {
-        let sent = message::subframe(faults, &broadcast, sv, set, Epoch::new(start.seconds() + 6 * subframe, 0.0));
-        Subframe::decode(&sent.unwrap().words, 0)
+    let decoded = |faults: &[MessageFault], sv: Sv, number: i64| {
+        let set = Ephemeris { sv, ..set.clone() };
+        let sent = subframe(faults, &broadcast, &set, Epoch::new(start.seconds() + 6 * number, 0.0));
+        Subframe::decode(&words(&sent.symbols), 0)
     };
     assert!(decoded(&bit, sv, 1).unwrap_err().to_string().contains("word 4"));
     assert!([0, 2, 3, 4].iter().all(|k| decoded(&bit, sv, *k).is_ok()) && decoded(&bit, Sv::gps(3), 1).is_ok());

@@ -207,6 +207,7 @@ fn ranges(sky: &[(f64, f64)]) -> Vec<Range> {
         let there = place.to_ecef() + axes * Vector3::new(cos_e * sin_a, cos_e * cos_a, sin_e) * distance_m;
         Range {
             sv: Sv::gps(number),
+            signal: &L1_CA,
             satellite: State {
                 position_m: rotate_earth(&there, -distance_m / SPEED_OF_LIGHT_MPS),
                 velocity_mps: Vector3::zeros(),
@@ -319,7 +320,7 @@ fn a_position_is_as_good_as_its_condition_says_or_refused_with_it() {
                 let values = solution.dilution.symmetric_eigenvalues();
                 most_solved = most_solved.max((values.max() / values.min()).sqrt());
                 // A range moves the solution by no more than the dilution's square root, its largest singular value.
-                let moved_m = ((solution.position_m - place).norm_squared() + solution.clock_m.powi(2)).sqrt();
+                let moved_m = ((solution.position_m - place).norm_squared() + solution.clock_m().powi(2)).sqrt();
                 worst = worst.max(moved_m / (1e-3 * values.max().sqrt()));
             }
         }

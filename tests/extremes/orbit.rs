@@ -149,7 +149,13 @@ fn an_old_set_is_sent_by_no_satellite_and_used_by_no_receiver() {
         let at = toe.plus_s(**age_s);
         let seen = observations(&sets, Geodetic::from_degrees(26.5, 80.2, 130.0), at);
         assert!(seen.len() > 20);
-        let found = Solver::new(&settings, noise, rate).solve(0, SampleClock { start: at, rate }, &seen, &sets, None);
+        let found = Solver::new(&settings, vec![(&L1_CA, noise)], rate).solve(
+            0,
+            SampleClock { start: at, rate },
+            &seen,
+            &sets,
+            None,
+        );
         matches!(found, Err(NoFix::TooFew { have: 0, .. }))
     });
     the.all("fix with sets older than 2 h 10 min: refused", refused.count(), 3);

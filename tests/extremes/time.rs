@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use gnss_twin::generator::catalogue::Catalogue;
+use gnss_twin::generator::message::Senders;
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::synth::Edge;
 use gnss_twin::generator::synth::transmitter::Transmitter;
@@ -10,7 +11,8 @@ use gnss_twin::generator::truth;
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::earth::{EARTH_ROTATION_RADPS, SPEED_OF_LIGHT_MPS};
 use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::gps::lnav::{self, Broadcast, Subframe};
+use gnss_twin::gnss::gps::lnav::{self, Broadcast, Subframe, UtcData};
+use gnss_twin::gnss::message::Common;
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::time::{Epoch, WEEK_S};
 
@@ -42,7 +44,9 @@ fn shifted(mut scene: Scene, delta_s: i64) -> Scene {
     let almanac: Vec<_> = (scene.catalogue.satellites())
         .filter_map(|sv| scene.catalogue.sent_at(sv, scene.clock.start).cloned())
         .collect();
-    scene.broadcast = Arc::new(Broadcast::new(None, 15, &almanac, scene.clock.start).unwrap());
+    let utc = UtcData { leap_s: 15, ..UtcData::default() };
+    let common = Common { utc, almanac, reference: Some(scene.clock.start), ..Common::default() };
+    scene.messages = Arc::new(Senders::new(&common, &scene.signals).unwrap());
     scene
 }
 

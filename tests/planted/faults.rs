@@ -114,7 +114,7 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.lock.always", "phase lock always shows", LOCK),
     fault("receiver.symbol_sync", "symbols are cut a code period late", LOOP),
     fault("receiver.decode.bit_threshold", "bits are decided far from zero", LOOP),
-    fault("receiver.decode.handover_count", "the handover count is taken for the time of its own subframe", LOOP),
+    fault("gnss.lnav.handover_read", "the handover count is taken for the time of its own subframe", LOOP),
     fault("receiver.decode.polarity", "the half cycle is resolved the wrong way", LOOP),
     fault("receiver.observe.code_fraction", "the time sent is 3 ns late", LOOP),
     fault("receiver.position.earth_rotation", "the Earth does not turn during flight", EXACT),

@@ -125,7 +125,7 @@ impl Ideal {
     }
 
     fn solver(&self, settings: &PositionSettings) -> Solver {
-        Solver::new(settings, noise(), self.clock.rate)
+        Solver::new(settings, vec![(&L1_CA, noise())], self.clock.rate)
     }
 }
 

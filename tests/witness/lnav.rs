@@ -83,7 +83,7 @@ fn rinex_records(text: &str) -> Vec<Ephemeris> {
             toe: Epoch::from_week(week, v(3, 0)),
             toc: Epoch::parse(&calendar).unwrap(),
             transmitted: Epoch::from_week(week, v(7, 0)),
-            iode: v(1, 0) as u8,
+            iode: v(1, 0) as u16,
             iodc: v(6, 3) as u16,
             ura_index: ura_index(v(6, 0)),
             health: v(6, 1) as u8,
@@ -110,6 +110,7 @@ fn rinex_records(text: &str) -> Vec<Ephemeris> {
             af1_sps: cell(head, 2),
             af2_sps2: cell(head, 3),
             tgd_s: v(6, 2),
+            tgd2_s: 0.0,
             signal_delays_s: Vec::new(),
         });
     }
@@ -276,6 +277,7 @@ fn example() -> Ephemeris {
         af1_sps: -1.0e-12,
         af2_sps2: 0.0,
         tgd_s: -1.07e-8,
+        tgd2_s: 0.0,
         signal_delays_s: Vec::new(),
     }
 }

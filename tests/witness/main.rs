@@ -6,6 +6,7 @@
 mod atmosphere;
 mod codes;
 mod data;
+mod inav;
 mod lnav;
 mod orbit;
 mod printed;

@@ -11,18 +11,20 @@ pub mod receiver;
 pub mod satellite;
 pub mod timetable;
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use nalgebra::{Matrix4, Vector4};
 
 use crate::analysis::JudgeError;
 use crate::analysis::access::Access;
 use crate::analysis::errors::Link;
+use crate::analysis::expect::message::Message;
 use crate::analysis::load::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::earth::Geodetic;
 use crate::gnss::facts::{Expect, Fixes};
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 use receiver::Receiver;
 use satellite::{Excuse, Required, Row, Scene};
@@ -116,6 +118,8 @@ pub struct Expectations {
     pub first_fix_s: Option<f64>,
     /// When satellites and geometry would have allowed it, the ionosphere left aside.
     pub four_by_s: Option<f64>,
+    /// What the satellites sent.
+    message: Message,
 }
 
 impl Expectations {
@@ -131,6 +135,7 @@ impl Expectations {
             receiver,
             first_fix_s: None,
             four_by_s: None,
+            message: Message::of(run),
         };
         let steps: Vec<f64> = found.epochs.windows(2).map(|two| two[1].time_s - two[0].time_s).collect();
         let (Some(first), Some(interval_s)) = (run.trajectory.first(), median(&steps)) else { return Ok(found) };
@@ -142,7 +147,7 @@ impl Expectations {
             let receiver = found.receiver.of_signal(link.signal);
             let scene = Scene {
                 receiver: &receiver,
-                timetable: Timetable::new(start),
+                timetable: Timetable::new(link.signal, start),
                 expect: &run.scene.expect,
                 faults: &run.scene.faults,
                 interval_s,
@@ -180,9 +185,7 @@ impl Expectations {
         })?;
         let strengths: Vec<f64> = rows.iter().map(|(_, row)| row.cn0_dbhz).collect();
         let usual_dbhz = median(&strengths).unwrap_or(0.0);
-        let healthy =
-            !run.truth_navigation.iter().any(|row| row.sv == link.sv && row.parameter == "health" && row.raw != 0)
-                || run.scene.faults.iter().any(|fault| fault.kind == "health");
+        let healthy = self.message.says_healthy(link.sv) || run.scene.faults.iter().any(|fault| fault.kind == "health");
         let plain: Vec<Row> = rows.iter().map(|(_, row)| *row).collect();
         let required = scene.required(link.sv, &plain, usual_dbhz, healthy);
         let seen = observed.samples(link)?;
@@ -215,7 +218,10 @@ impl Expectations {
         let receiver = &self.receiver;
         let Some(four_s) = self.four_by_s else { return };
         let acquired_s = self.satellites.values().filter_map(|one| one.acquired_by_s).fold(f64::INFINITY, f64::min);
-        let page_s = Timetable::new(start).ionosphere_by_s(acquired_s + satellite::LOCK_S);
+        let signals: BTreeSet<&'static Signal> = self.satellites.keys().map(|link| link.signal).collect();
+        let page_s =
+            |signal: &&'static Signal| Timetable::new(signal, start).ionosphere_by_s(acquired_s + satellite::LOCK_S);
+        let page_s = signals.iter().map(page_s).fold(f64::INFINITY, f64::min);
         let waited_s = four_s + receiver.ionosphere_wait_s;
         let due_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
         // Where the scene excuses a time, the clock begins anew after it.

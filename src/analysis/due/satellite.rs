@@ -214,6 +214,7 @@ mod tests {
 
     use super::*;
     use crate::gnss::facts::{Interval, Terms};
+    use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::time::Epoch;
 
     /// A second a row, all strong but where `weak` says.
@@ -239,7 +240,7 @@ mod tests {
 
     fn with<T>(expect: Expect, faults: &[Fault], judge: impl FnOnce(&Scene<'_>) -> T) -> T {
         let receiver = Receiver::for_tests(&Value::Null);
-        let timetable = Timetable::new(Epoch::parse("2010-07-01T08:05:58").unwrap());
+        let timetable = Timetable::new(&L1_CA, Epoch::parse("2010-07-01T08:05:58").unwrap());
         judge(&Scene { receiver: &receiver, timetable, expect: &expect, faults, interval_s: 1.0 })
     }
 

@@ -1,69 +1,72 @@
-//! When the navigation message says what: subframes of 6 s in frames of 30 s, 25 frames in a round of 12.5 minutes.
+//! When the navigation message says what, unit by unit: subframes of LNAV, pages of I/NAV.
 //!
-//! All satellites send in step with GPS time (IS-GPS-200N, 20.3.2), so the scene's start alone says how long
-//! a receiver must wait. Times are seconds from the scene's first sample; what is sent at a boundary arrives
-//! a light time later.
+//! All satellites of a system send in step with its time, so the scene's start alone says how long a receiver must wait.
+//! Times are seconds from the scene's first sample; what is sent at a boundary arrives a light time later.
 
+use crate::gnss::message::Message;
+use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
-/// Length of a subframe and of a frame.
-const SUBFRAME_S: f64 = 6.0;
-const FRAME_S: f64 = 30.0;
-/// Frames in a round, and the one whose subframe 4 carries the ionosphere (20.3.3.5.1.7), counted from 0.
-const ROUND: i64 = 25;
-const IONOSPHERE_FRAME: i64 = 17;
-/// The first two words of a subframe: preamble and time.
+/// What shows where a unit begins when its time is not known yet: the two words at the beginning of the next subframe.
 const HEADER_S: f64 = 1.2;
 /// Times of arrival of satellites around the Earth, at most: a geostationary user across the Earth.
 const LIGHT_S: f64 = 0.25;
+/// Units that are looked through for one: two rounds of LNAV's pages.
+const LARGEST_UNITS: i64 = 250;
 
 /// The timetable as seen from a scene's first sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timetable {
-    /// Time since the last beginning of a round when the first sample was taken.
-    phase_s: f64,
+    message: Option<&'static Message>,
+    /// The first sample, by the clock of the system that sends.
+    start: Epoch,
 }
 
 impl Timetable {
-    /// Of a scene whose first sample was taken then.
-    pub fn new(start: Epoch) -> Self {
-        let round_s = ROUND as f64 * FRAME_S;
-        let tow_s = start.tow_whole_s() as f64 + start.fraction();
-        // A week is not a whole number of rounds: pages begin anew with it (20.3.3.5.1).
-        Self { phase_s: tow_s - (tow_s / round_s).floor() * round_s }
+    /// Of a signal in a scene whose first sample was taken then.
+    pub fn new(signal: &Signal, start: Epoch) -> Self {
+        let message = signal.components.iter().find_map(|component| component.message);
+        Self { message, start: signal.time.label(start) }
     }
 
-    /// The first time from `from_s` on at which something that comes every `period_s`, first `first_s` after
-    /// a round's beginning, begins.
-    fn next(&self, from_s: f64, first_s: f64, period_s: f64) -> f64 {
-        let since = from_s + self.phase_s - first_s;
-        from_s + (since / period_s).ceil() * period_s - since
+    /// When the first unit of those that `wanted` picks by its start has arrived whole of those that begin from `from_s`
+    /// on; never, if there is none.
+    fn whole_by_s(&self, from_s: f64, wanted: impl Fn(&Message, Epoch) -> bool) -> f64 {
+        let Some(message) = self.message else { return f64::INFINITY };
+        let from = self.start.plus_s(from_s);
+        let first = message.unit_at(from.seconds());
+        let begins = |unit: &i64| message.unit_start(*unit).since(from) >= 0.0;
+        let mut units = (first..first + LARGEST_UNITS).filter(begins).map(|unit| message.unit_start(unit));
+        let found = units.find(|start| wanted(message, *start));
+        found.map_or(f64::INFINITY, |start| start.since(self.start) + message.unit_s as f64 + LIGHT_S)
     }
 
-    /// When two headers in succession have arrived whole for a channel locked since `locked_s`: the frame is known.
+    /// When a channel locked since `locked_s` knows where units begin, and their time.
     pub fn frame_by_s(&self, locked_s: f64) -> f64 {
-        self.next(locked_s, 0.0, SUBFRAME_S) + SUBFRAME_S + HEADER_S + LIGHT_S
+        self.whole_by_s(locked_s, |message, start| message.timed.contains(&(message.number)(start))) + HEADER_S
     }
 
-    /// When subframes 1 to 3 have arrived whole.
+    /// When every unit of a set of elements has arrived whole.
     pub fn ephemeris_by_s(&self, locked_s: f64) -> f64 {
-        let whole = |subframe: u32| self.next(locked_s, f64::from(subframe - 1) * SUBFRAME_S, FRAME_S) + SUBFRAME_S;
-        (1..=3).map(whole).fold(0.0, f64::max) + LIGHT_S
+        let Some(message) = self.message else { return f64::INFINITY };
+        let whole = |number: &u8| self.whole_by_s(locked_s, |message, start| (message.number)(start) == *number);
+        message.set.iter().map(whole).fold(0.0, f64::max)
     }
 
-    /// When the ionosphere's page has arrived whole: page 18 of subframe 4.
+    /// When the ionosphere has arrived whole; never, where the message does not carry it.
     pub fn ionosphere_by_s(&self, locked_s: f64) -> f64 {
-        let first_s = IONOSPHERE_FRAME as f64 * FRAME_S + 3.0 * SUBFRAME_S;
-        self.next(locked_s, first_s, ROUND as f64 * FRAME_S) + SUBFRAME_S + LIGHT_S
+        self.whole_by_s(locked_s, |message, start| (message.ionosphere)(start))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::synthetic::LONG_BOC;
 
     fn at(text: &str) -> Timetable {
-        Timetable::new(Epoch::parse(text).unwrap())
+        Timetable::new(&L1_CA, Epoch::parse(text).unwrap())
     }
 
     #[test]
@@ -81,10 +84,20 @@ mod tests {
     #[test]
     fn no_start_waits_more_than_36_seconds_for_the_ephemeris_nor_12_minutes_and_36_seconds_for_the_page() {
         for second in 0..900 {
-            let timetable = Timetable::new(Epoch::parse("2010-07-01T08:00:00").unwrap().plus_s(f64::from(second)));
+            let start = Epoch::parse("2010-07-01T08:00:00").unwrap().plus_s(f64::from(second));
+            let timetable = Timetable::new(&L1_CA, start);
             let (orbit_s, page_s) = (timetable.ephemeris_by_s(0.0), timetable.ionosphere_by_s(0.0));
             assert!((18.0..=36.0 + LIGHT_S).contains(&orbit_s), "{second}: {orbit_s}");
             assert!((6.0..=756.0 + LIGHT_S).contains(&page_s), "{second}: {page_s}");
         }
+    }
+
+    #[test]
+    fn pages_of_a_system_that_is_three_seconds_behind_come_three_seconds_later() {
+        // GPS time 08:05:58 is 08:05:55 there: word 5 from :55 on, words 2, 4 from 08:06:01, 1 and 3 from :21 and :23.
+        let timetable = Timetable::new(&LONG_BOC, Epoch::parse("2010-07-01T08:05:58").unwrap());
+        assert!((timetable.frame_by_s(0.0) - 2.0 - HEADER_S - LIGHT_S).abs() < 1e-9);
+        assert!((timetable.ephemeris_by_s(0.0) - 30.0 - LIGHT_S).abs() < 1e-9);
+        assert!(timetable.ionosphere_by_s(0.0).is_infinite());
     }
 }

@@ -1,18 +1,19 @@
 //! Orbits, clocks and ionosphere as the truth says that they were sent: what a receiver can know at best.
 //!
-//! The raw integers of `truth/navigation.csv` go through the message's own table. Limits: a satellite whose
-//! subframes 1 to 3 are incomplete there has no set. Where a satellite sends a new set during the run, the one that the
+//! The raw integers of `truth/navigation.csv` go through the message's own tables. Limits: a satellite whose set is
+//! incomplete there has none. Where a satellite sends a new set during the run, the one that the
 //! receiver says that it had read last counts, as all of them are right.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::analysis::load::Run;
 use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::gps::lnav::{Subframe, ephemeris, tables};
+use crate::gnss::gps::lnav::{Subframe, tables};
 use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::message::Message as Form;
 use crate::gnss::record::{Event, NavigationRow};
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{Epoch, TimeScale};
 
 /// What all satellites sent.
 #[derive(Clone, Debug, Default)]
@@ -24,8 +25,8 @@ pub struct Message {
     pub klobuchar: Option<Klobuchar>,
 }
 
-/// Low eight bits of an issue of data: what IODC and IODE share (IS-GPS-200N, 20.3.3.4.1).
-const SHARED_ISSUE: u32 = 0xFF;
+/// A parameter that every set has.
+const OF_EVERY_SET: &str = "sqrt_a_sqrtm";
 
 impl Message {
     /// Of a run's truth.
@@ -33,17 +34,25 @@ impl Message {
         let Some(near) = run.trajectory.first().map(|row| row.time()) else { return Self::default() };
         let mut groups: BTreeMap<(Sv, u32), Vec<&NavigationRow>> = BTreeMap::new();
         for row in &run.truth_navigation {
-            groups.entry((row.sv, row.issue & SHARED_ISSUE)).or_default().push(row);
+            groups.entry((row.sv, row.issue)).or_default().push(row);
         }
         let mut message = Self::default();
-        for ((sv, issue), rows) in groups {
-            if let Some(set) = set(sv, &rows, near) {
-                message.sets.entry(sv).or_default().push((issue, set));
+        for ((sv, issue), rows) in &groups {
+            // What a set has beside its issue is sent for all issues alike.
+            let common = groups.get(&(*sv, 0)).into_iter().flatten();
+            let all: Vec<&NavigationRow> = rows.iter().chain(common).copied().collect();
+            if let Some(set) = set(run, *sv, &all, near).filter(|set| u32::from(set.iode) == *issue) {
+                message.sets.entry(*sv).or_default().push((*issue, set));
             }
-            message.klobuchar = message.klobuchar.or_else(|| klobuchar(&rows));
+            message.klobuchar = message.klobuchar.or_else(|| klobuchar(rows));
         }
         message.read = message.sets.keys().map(|sv| (*sv, read(run, *sv))).collect();
         message
+    }
+
+    /// Whether every set of a satellite says that it is healthy.
+    pub fn says_healthy(&self, sv: Sv) -> bool {
+        self.sets.get(&sv).is_none_or(|sets| sets.iter().all(|(_, set)| set.health == 0))
     }
 
     /// The set of a satellite that the receiver had read last at `sample`, or else the one whose reference time is nearest
@@ -61,10 +70,9 @@ impl Message {
 /// set that it read again after a loss comes before a new one.
 fn read(run: &Run, sv: Sv) -> Vec<(u64, u32)> {
     let mut issues: Vec<u32> = Vec::new();
-    for row in run.navigation.iter().filter(|row| row.sv == sv && row.parameter == "toe_s") {
-        let issue = row.issue & SHARED_ISSUE;
-        if !issues.contains(&issue) {
-            issues.push(issue);
+    for row in run.navigation.iter().filter(|row| row.sv == sv && row.parameter == OF_EVERY_SET) {
+        if !issues.contains(&row.issue) {
+            issues.push(row.issue);
         }
     }
     let completed = run.events.iter().filter(|row| row.sv == sv && row.event == Event::EphemerisComplete);
@@ -84,14 +92,19 @@ fn words(table: &str, rows: &[&NavigationRow]) -> Option<[u32; 10]> {
     Some(data)
 }
 
-fn set(sv: Sv, rows: &[&NavigationRow], near: Epoch) -> Option<Ephemeris> {
-    // The count is that of the subframe after; ten minutes more or less change no reference time.
-    let tow_count = ((near.tow_whole_s() / 6 + 1) % 100_800) as u32;
-    let subframe = |id: u8| {
-        let data = words(&format!("subframe {id}"), rows)?;
-        Some(Subframe { id, tow_count, alert: false, antispoof: false, data })
-    };
-    ephemeris(sv, &subframe(1)?, &subframe(2)?, &subframe(3)?, near).ok()
+/// The set in those rows, by the message of one of the satellite's signals.
+fn set(run: &Run, sv: Sv, rows: &[&NavigationRow], near: Epoch) -> Option<Ephemeris> {
+    let raw = |name: &str| rows.iter().find(|row| row.parameter == name).map(|row| row.raw);
+    messages(run, sv).find_map(|(message, time)| {
+        let set = (message.elements)(sv, &raw, time.label(near))?;
+        Some(set.timed(|label| time.instant(label)))
+    })
+}
+
+/// Messages of a satellite's signals in the truth, and by whose time they are sent.
+fn messages(run: &Run, sv: Sv) -> impl Iterator<Item = (&'static Form, &'static TimeScale)> {
+    let own = run.signals.iter().filter(move |signal| signal.system == sv.system);
+    own.flat_map(|signal| signal.components.iter().filter_map(|c| Some((c.message?, signal.time))))
 }
 
 fn klobuchar(rows: &[&NavigationRow]) -> Option<Klobuchar> {
@@ -104,8 +117,7 @@ fn klobuchar(rows: &[&NavigationRow]) -> Option<Klobuchar> {
     page.klobuchar()
 }
 
-/// Names of the parameters of subframes 1 to 3.
-pub fn orbit_parameters() -> BTreeSet<&'static str> {
-    let orbit = tables().into_iter().filter(|(name, _)| name.starts_with("subframe"));
-    orbit.flat_map(|(_, fields)| fields).map(|field| field.name).collect()
+/// Names of the parameters of a satellite's sets that bear their issue.
+pub fn orbit_parameters(run: &Run, sv: Sv) -> BTreeSet<&'static str> {
+    messages(run, sv).next().map(|(message, _)| (message.set_parameters)().into_iter().collect()).unwrap_or_default()
 }

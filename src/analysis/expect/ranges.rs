@@ -26,6 +26,7 @@ use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
 use crate::gnss::record::{Event, Observation, RayRow, SkyRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal};
+use crate::gnss::time::GPST;
 
 /// The receiver's choices that its accuracy follows from.
 #[derive(Clone, Debug)]
@@ -84,6 +85,8 @@ const MASK_SLACK_RAD: f64 = 2e-3;
 #[derive(Clone, Copy, Debug)]
 pub struct Forecast {
     pub sv: Sv,
+    /// Which of [`Scene::scales`] its clock is counted against.
+    pub clock: usize,
     /// Towards the satellite: east, north, up.
     pub sight: Vector3<f64>,
     /// Expected bias once the ionosphere is corrected, and what not correcting it adds.
@@ -115,6 +118,8 @@ pub struct Scene<'r> {
     pub run: &'r Run,
     pub choices: Choices,
     pub message: Message,
+    /// Names of the time scales of the run's signals, GPS time first.
+    pub scales: Vec<&'static str>,
     pub trajectory: HashMap<u64, &'r TrajectoryRow>,
     /// Samples with a fix, and those of them that leave satellites out.
     pub fixes: HashMap<u64, usize>,
@@ -148,6 +153,7 @@ impl<'r> Scene<'r> {
             run,
             choices: Choices::of(run)?,
             message: Message::of(run),
+            scales: scales(run),
             trajectory: run.trajectory.iter().map(|row| (row.sample, row)).collect(),
             fixes: run.fixes.iter().map(|fix| fix.sample).zip(0..).collect(),
             excluded: left_out.map(|fix| (fix.sample, names(&fix.excluded))).collect(),
@@ -245,6 +251,8 @@ impl<'r> Scene<'r> {
             _ => 0.0,
         };
         let true_m = true_row.pseudorange_m - SPEED_OF_LIGHT_MPS * place.clock_bias_s;
+        // What the system's time is ahead of GPS time goes into its own clock.
+        let ahead_m = SPEED_OF_LIGHT_MPS * self.run.scene.ahead_s(true_row.signal.time.name);
         let cost_db = self.costs_db.get(true_row.signal).copied().unwrap_or(0.0);
         let cn0_hz = libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
         let (_, code) = theory.noise(Loop::Dll, cn0_hz);
@@ -253,8 +261,9 @@ impl<'r> Scene<'r> {
         let (east, north) = libm::sincos(look.azimuth_rad);
         Some(Forecast {
             sv: true_row.sv,
+            clock: self.scales.iter().position(|scale| *scale == true_row.signal.time.name).unwrap_or(0),
             sight: Vector3::new(east * cos, north * cos, sin),
-            bias_m: true_m - computed_m - ionosphere_m - sky.troposphere_m,
+            bias_m: true_m + ahead_m - computed_m - ionosphere_m - sky.troposphere_m,
             ionosphere_m,
             troposphere_m: sky.troposphere_m,
             noise_m2: (code * theory.chip_m) * (code * theory.chip_m),
@@ -278,6 +287,14 @@ impl<'r> Scene<'r> {
         let left_m = self.edges_m.get(row.signal).copied().unwrap_or(0.0) / (1.0 + 2.0 * patterns);
         left_m * left_m
     }
+}
+
+/// Names of the time scales of a run's signals, GPS time first, then by name.
+fn scales(run: &Run) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = run.signals.iter().map(|signal| signal.time.name).collect();
+    names.sort_by_key(|name| (*name != GPST.name, *name));
+    names.dedup();
+    names
 }
 
 /// What a receiver computes of a range from the message alone: geometry, light time, Earth rotation and

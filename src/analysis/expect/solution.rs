@@ -1,20 +1,20 @@
 //! What weighted least squares makes of the expected ranges at each fix: bias, noise, and the covariance that
 //! should be stated.
 //!
-//! With rows h = (−sight, 1), weights W of the receiver's choices at the true C/N0 and N = Σ h W hᵀ: biases b
-//! become N⁻¹ Σ h W b, noise of covariance R becomes N⁻¹ (Σ h W R W hᵀ) N⁻¹, and N⁻¹ is what the receiver
-//! ought to state. One set of sums a fix is kept, whatever the number of satellites. Limits: weights by the
-//! measured C/N0 differ from these by its noise.
+//! With rows h = (−sight, 1 at the place of the range's clock), weights W of the receiver's choices at the true C/N0 and
+//! N = Σ h W hᵀ: biases b become N⁻¹ Σ h W b, noise of covariance R becomes N⁻¹ (Σ h W R W hᵀ) N⁻¹, and N⁻¹ is what the
+//! receiver ought to state. One set of sums a fix is kept, whatever the number of satellites; of several clocks the first
+//! with ranges is the fix's. Limits: weights by the measured C/N0 differ from these by its noise.
 
-use nalgebra::{Cholesky, Matrix2, Matrix4, Vector4};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix4, Vector4};
 
 use super::ranges::{Forecast, Scene};
 use crate::analysis::JudgeError;
 use crate::analysis::errors::Errors;
 use crate::gnss::record::IonosphereModel;
 
-/// Sums over the satellites of a fix.
-#[derive(Clone, Debug, Default)]
+/// Sums over the satellites of a fix. Vectors are east, north, up and the clocks of all time scales.
+#[derive(Clone, Debug)]
 struct Sums {
     least: u32,
     most: u32,
@@ -22,14 +22,14 @@ struct Sums {
     blameless: u32,
     faulty: bool,
     unsteady: bool,
-    normal: Matrix4<f64>,
+    normal: DMatrix<f64>,
     /// The same where the ionosphere is not known yet.
-    loose: Matrix4<f64>,
-    plain: Matrix4<f64>,
-    noise: Matrix4<f64>,
-    bias: Vector4<f64>,
-    ionosphere: Vector4<f64>,
-    troposphere: Vector4<f64>,
+    loose: DMatrix<f64>,
+    plain: DMatrix<f64>,
+    noise: DMatrix<f64>,
+    bias: DVector<f64>,
+    ionosphere: DVector<f64>,
+    troposphere: DVector<f64>,
     rate_normal: Matrix4<f64>,
     rate_noise: Matrix4<f64>,
     rate_bias: Vector4<f64>,
@@ -44,9 +44,35 @@ const FAULT: f64 = 3.0;
 const SHELL: f64 = 0.948;
 
 impl Sums {
+    /// No ranges yet, of as many time scales.
+    fn new(scales: usize) -> Self {
+        let (matrix, vector) = (DMatrix::zeros(3 + scales, 3 + scales), DVector::zeros(3 + scales));
+        Self {
+            least: 0,
+            most: 0,
+            blameless: 0,
+            faulty: false,
+            unsteady: false,
+            normal: matrix.clone(),
+            loose: matrix.clone(),
+            plain: matrix.clone(),
+            noise: matrix,
+            bias: vector.clone(),
+            ionosphere: vector.clone(),
+            troposphere: vector,
+            rate_normal: Matrix4::zeros(),
+            rate_noise: Matrix4::zeros(),
+            rate_bias: Vector4::zeros(),
+            memory_s: 0.0,
+        }
+    }
+
     fn add(&mut self, range: &Forecast, model_sigma_m: f64) {
-        let row = Vector4::new(-range.sight.x, -range.sight.y, -range.sight.z, 1.0);
-        let outer = row * row.transpose();
+        let mut row = DVector::zeros(self.bias.len());
+        row.fixed_rows_mut::<3>(0).copy_from(&-range.sight);
+        if let Some(slot) = row.get_mut(3 + range.clock) {
+            *slot = 1.0;
+        }
         let model_m = model_sigma_m * range.slant;
         let variance = range.noise_m2 + model_m * model_m;
         self.faulty |= range.other_m2 >= variance || range.bias_m.abs() >= FAULT * variance.sqrt();
@@ -60,13 +86,16 @@ impl Sums {
         let shell_m2 = IONOSPHERE_SIGMA_M * IONOSPHERE_SIGMA_M / (1.0 - cosine2);
         self.least += u32::from(!range.near_mask);
         self.most += 1;
-        self.normal += weight * outer;
-        self.loose += 1.0 / (variance + shell_m2) * outer;
-        self.plain += outer;
-        self.noise += weight * weight * (range.noise_m2 + range.other_m2) * outer;
-        self.bias += weight * range.bias_m * row;
-        self.ionosphere += weight * range.ionosphere_m * row;
-        self.troposphere += weight * range.troposphere_m * row;
+        self.normal.ger(weight, &row, &row, 1.0);
+        self.loose.ger(1.0 / (variance + shell_m2), &row, &row, 1.0);
+        self.plain.ger(1.0, &row, &row, 1.0);
+        self.noise.ger(weight * weight * (range.noise_m2 + range.other_m2), &row, &row, 1.0);
+        self.bias.axpy(weight * range.bias_m, &row, 1.0);
+        self.ionosphere.axpy(weight * range.ionosphere_m, &row, 1.0);
+        self.troposphere.axpy(weight * range.troposphere_m, &row, 1.0);
+        // All systems' times run alike: one drift.
+        let row = Vector4::new(-range.sight.x, -range.sight.y, -range.sight.z, 1.0);
+        let outer = row * row.transpose();
         self.rate_normal += range.cn0_hz * outer;
         let spread = range.cn0_hz * range.rate_sigma_mps;
         self.rate_noise += spread * spread * outer;
@@ -92,6 +121,8 @@ pub struct Expected {
     pub thermal: Matrix4<f64>,
     pub stated: Matrix4<f64>,
     pub dilution: Matrix4<f64>,
+    /// Ratio of the extreme singular values of the geometry, all clocks counted.
+    pub condition: f64,
     /// Whether the fix says that the message's ionosphere corrects it without an error of its own, or needs none.
     pub corrected: bool,
     /// Whether every satellite's C/N0 was measured as it is: what is stated follows from it.
@@ -113,7 +144,7 @@ const TROPOSPHERE_SHARE: f64 = 0.05;
 /// # Errors
 /// [`JudgeError::Read`] where rows that were put by cannot be read.
 pub fn expected(scene: &Scene<'_>, errors: &Errors) -> Result<Vec<Expected>, JudgeError> {
-    let mut sums = vec![Sums::default(); scene.run.fixes.len()];
+    let mut sums = vec![Sums::new(scene.scales.len().max(1)); scene.run.fixes.len()];
     for link in errors.signals.keys() {
         scene.ranges(errors, link, |fix, range| {
             if let Some(sums) = sums.get_mut(fix) {
@@ -130,22 +161,29 @@ pub fn expected(scene: &Scene<'_>, errors: &Errors) -> Result<Vec<Expected>, Jud
 }
 
 fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
-    let inverse = |matrix: &Matrix4<f64>| Some(Cholesky::new(*matrix)?.inverse());
     if sums.most < 4 {
         return None;
     }
-    let tight = inverse(&sums.normal)?;
-    let stated = if corrected { tight } else { inverse(&sums.loose)? };
-    let thermal = tight * sums.noise * tight;
-    let bias = tight * sums.bias;
-    let weather = TROPOSPHERE_SHARE * (tight * sums.troposphere).abs();
+    // Clocks without ranges are not estimated.
+    let places: Vec<usize> = (0..sums.bias.len()).filter(|place| sums.plain[(*place, *place)] > 0.0).collect();
+    let inverse =
+        |matrix: &DMatrix<f64>| Some(Cholesky::new(matrix.select_rows(&places).select_columns(&places))?.inverse());
+    // Of all clocks the first is the fix's.
+    let of = |matrix: &DMatrix<f64>| matrix.fixed_view::<4, 4>(0, 0).into_owned();
+    let geometry = sums.plain.select_rows(&places).select_columns(&places).symmetric_eigenvalues();
+    let whole = inverse(&sums.normal)?;
+    let solved = |right: &DVector<f64>| (&whole * right.select_rows(&places)).fixed_rows::<4>(0).into_owned();
+    let stated = if corrected { of(&whole) } else { of(&inverse(&sums.loose)?) };
+    let thermal = of(&(&whole * sums.noise.select_rows(&places).select_columns(&places) * &whole));
+    let bias = solved(&sums.bias);
+    let weather = TROPOSPHERE_SHARE * solved(&sums.troposphere).abs();
     // Where the ionosphere is missing its whole effect may be there, or parts of it if it is estimated.
     let (centre, missing, noise) = if corrected {
         (bias, Vector4::zeros(), thermal)
     } else {
-        (Vector4::zeros(), bias.abs() + (tight * sums.ionosphere).abs(), stated)
+        (Vector4::zeros(), bias.abs() + solved(&sums.ionosphere).abs(), stated)
     };
-    let rates = inverse(&sums.rate_normal)?;
+    let rates = Cholesky::new(sums.rate_normal)?.inverse();
     Some(Expected {
         sample,
         satellites: (sums.least, sums.most),
@@ -155,7 +193,8 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
         noise,
         thermal,
         stated,
-        dilution: inverse(&sums.plain)?,
+        dilution: of(&inverse(&sums.plain)?),
+        condition: (geometry.max() / geometry.min()).sqrt(),
         corrected,
         steady: !sums.unsteady,
         memory_s: sums.memory_s,

@@ -18,7 +18,7 @@ pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
         Finding::none(
             "parameters missing of complete messages",
             missing(run),
-            "subframes 1 to 3 are whole or not there",
+            "a set of elements is whole or not there",
         ),
         Finding::none("messages of unknown satellites", strangers(run), "no such satellite in the scene"),
         Finding::none("events out of their natural order", order(run)?, "found, locked, bits, frame, then observed"),
@@ -32,15 +32,15 @@ pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
 
 /// Parameters that a satellite with a complete message lacks.
 fn missing(run: &Run) -> Found {
-    let expected = orbit_parameters();
     let mut decoded: BTreeMap<Sv, BTreeMap<u32, BTreeSet<&str>>> = BTreeMap::new();
     for row in &run.navigation {
-        decoded.entry(row.sv).or_default().entry(row.issue & 0xFF).or_default().insert(&row.parameter);
+        decoded.entry(row.sv).or_default().entry(row.issue).or_default().insert(&row.parameter);
     }
     let complete: BTreeSet<Sv> =
         run.events.iter().filter(|row| row.event == Event::EphemerisComplete).map(|row| row.sv).collect();
     let mut found = Found::default();
     for sv in complete {
+        let expected = orbit_parameters(run, sv);
         let lacks = |names: &BTreeSet<&str>| expected.iter().filter(|name| !names.contains(*name)).count();
         let least = decoded.get(&sv).and_then(|sets| sets.values().map(lacks).min()).unwrap_or(expected.len());
         (0..least).for_each(|_| found.add(|| sv.to_string()));

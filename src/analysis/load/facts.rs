@@ -4,7 +4,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use crate::analysis::waveform::Edge;
-use crate::gnss::facts::{Expect, Fault};
+use crate::gnss::facts::{Expect, Fault, TimeOffset};
 
 /// The facts of a scene.
 #[derive(Clone, Debug, Deserialize)]
@@ -53,6 +53,16 @@ pub struct SceneFacts {
     pub expect: Expect,
     #[serde(default)]
     pub faults: Vec<Fault>,
+    /// Systems' times that are off GPS time by more than whole seconds.
+    #[serde(default)]
+    pub time_offsets: Vec<TimeOffset>,
+}
+
+impl SceneFacts {
+    /// By how much a system's time is ahead of GPS time, whole seconds apart.
+    pub fn ahead_s(&self, scale: &str) -> f64 {
+        self.time_offsets.iter().find(|offset| offset.time_scale == scale).map_or(0.0, |offset| offset.ahead_s)
+    }
 }
 
 /// Noise of an oscillator; other keys are left alone.

@@ -13,6 +13,7 @@ use crate::analysis::statistics::median;
 use crate::gnss::facts::Losses;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
+use crate::gnss::time::Epoch;
 
 /// The lock detectors' memory: how long before a declared loss or slip the signal may have failed.
 const LOOK_BACK_S: f64 = 2.0;
@@ -79,6 +80,7 @@ struct Witness {
     rows: Vec<Row>,
     usual_dbhz: f64,
     interval_s: f64,
+    timetable: Timetable,
 }
 
 impl Witness {
@@ -92,14 +94,16 @@ impl Witness {
             above_mask: true,
         })?;
         let usual_dbhz = median(&rows.iter().map(|row| row.cn0_dbhz).collect::<Vec<_>>()).unwrap_or(0.0);
-        Ok(Self { rows, usual_dbhz, interval_s: run.truth_interval_s() })
+        let start = run.trajectory.first().map_or(Epoch::new(0, 0.0), |row| row.time().plus_s(-run.time_s(row.sample)));
+        let timetable = Timetable::new(link.signal, start);
+        Ok(Self { rows, usual_dbhz, interval_s: run.truth_interval_s(), timetable })
     }
 
     /// Why a loss or a slip at a time is none of the receiver's, if it is not.
     fn excuse(&self, run: &Run, receiver: &Receiver, sv: Sv, slip: &Slip) -> Option<Excuse> {
         let scene = Scene {
             receiver,
-            timetable: Timetable::default(),
+            timetable: self.timetable,
             expect: &run.scene.expect,
             faults: &run.scene.faults,
             interval_s: self.interval_s,

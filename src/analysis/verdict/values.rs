@@ -215,7 +215,7 @@ impl Verdict {
         self.ionosphere_of_fixes(run);
         let alarm = run.receiver.pointer("/settings/position/false_alarm").and_then(serde_json::Value::as_f64);
         let tested = |fix: &Fix| {
-            let freedom = fix.satellites.checked_sub(4).filter(|freedom| *freedom > 0)?;
+            let freedom = Some(fix.freedom()).filter(|freedom| *freedom > 0)?;
             Some(fix.chi_square / threshold(freedom, alarm?)?)
         };
         if let Some(value) = run.fixes.iter().filter_map(tested).max_by(f64::total_cmp) {
@@ -313,8 +313,7 @@ impl Case<'_> {
         if self.expected.satellites.0 != self.expected.satellites.1 {
             return 0.0;
         }
-        let values = d.symmetric_eigenvalues();
-        let condition = (fix.condition / (values.max() / values.min()).sqrt() - 1.0).abs();
+        let condition = (fix.condition / self.expected.condition - 1.0).abs();
         pairs.iter().map(|(stated, square)| (stated / square.sqrt() - 1.0).abs()).fold(condition, f64::max)
     }
 

@@ -12,7 +12,7 @@ use super::stages::PlaybackSpec;
 use super::{Scenario, ScenarioError, hostile, parts, satellite};
 use crate::generator::catalogue::Catalogue;
 use crate::generator::clock::ReceiverClock;
-use crate::generator::message::MessageFault;
+use crate::generator::message::{MessageFault, Senders};
 use crate::generator::presence;
 use crate::generator::random::Stream;
 use crate::generator::ray::{Effect, Ray};
@@ -25,7 +25,6 @@ use crate::generator::stage::playback::Playback;
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::gps::lnav::Broadcast;
 use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
@@ -54,7 +53,7 @@ struct World {
     /// True time since the start at which the scene ends.
     end_s: f64,
     catalogue: Arc<Catalogue>,
-    broadcast: Arc<Broadcast>,
+    messages: Arc<Senders>,
     excluded: Vec<Sv>,
     message_faults: Vec<MessageFault>,
     satellite_clocks: Arc<SatelliteClocks>,
@@ -179,7 +178,7 @@ impl Scenario {
                 Arc::new(Scintillation::new(strength, nodes.rate(), Stream::new(seed, "scintillation")))
             }),
             catalogue: Arc::new(sky.catalogue),
-            broadcast: Arc::new(sky.broadcast),
+            messages: Arc::new(sky.messages),
             excluded: sky.excluded,
             seed,
             nodes,
@@ -213,7 +212,7 @@ impl Scenario {
             nodes: world.nodes,
             trajectory: world.trajectory.clone(),
             catalogue: Arc::clone(&world.catalogue),
-            broadcast: Arc::clone(&world.broadcast),
+            messages: Arc::clone(&world.messages),
             message_faults: world.message_faults.clone(),
             satellite_clocks: Arc::clone(&world.satellite_clocks),
             signals,

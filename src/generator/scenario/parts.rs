@@ -7,10 +7,12 @@ use super::{Ionosphere, Overrides, Scenario, ScenarioError, multipath, satellite
 use crate::generator::catalogue::Catalogue;
 use crate::generator::effect::obstruction::Obstruction;
 use crate::generator::effect::wind_up::WindUp;
+use crate::generator::message::Senders;
 use crate::generator::ray::Effect;
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::gps::lnav::{Broadcast, UtcData};
+use crate::gnss::gps::lnav::UtcData;
+use crate::gnss::message::Common;
 use crate::gnss::rinex::{self, Navigation};
 use crate::gnss::satellite::Sv;
 
@@ -20,7 +22,7 @@ const TOLD: usize = 4;
 /// Orbits, messages, and who is left out.
 pub(super) struct Sky {
     pub catalogue: Catalogue,
-    pub broadcast: Broadcast,
+    pub messages: Senders,
     pub excluded: Vec<Sv>,
 }
 
@@ -102,12 +104,12 @@ pub(super) fn sky(
         .filter(|sv| catalogue.healthy(*sv, start))
         .filter_map(|sv| catalogue.sent_at(sv, start).cloned())
         .collect();
-    let broadcast = broadcast(scenario, navigation, &almanac)?;
-    Ok(Sky { catalogue, broadcast, excluded })
+    let messages = messages(scenario, navigation, almanac)?;
+    Ok(Sky { catalogue, messages, excluded })
 }
 
 /// What the satellites send about the ionosphere is what the scenario gives, or what the file says.
-fn broadcast(scenario: &Scenario, navigation: &Navigation, almanac: &[Ephemeris]) -> Result<Broadcast, ScenarioError> {
+fn messages(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>) -> Result<Senders, ScenarioError> {
     let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent);
     let utc = UtcData {
         leap_s: navigation.leap_seconds.unwrap_or_else(|| scenario.start.leap_seconds()),
@@ -115,7 +117,9 @@ fn broadcast(scenario: &Scenario, navigation: &Navigation, almanac: &[Ephemeris]
         event: navigation.leap_event,
     };
     let key = if given.is_some() { "ionosphere" } else { "navigation.file" };
-    Broadcast::with_utc(given.or(navigation.klobuchar), &utc, almanac, scenario.start)
+    let klobuchar = given.or(navigation.klobuchar);
+    let common = Common { klobuchar, nequick: None, utc, almanac, reference: Some(scenario.start) };
+    Senders::new(&common, &scenario.signals)
         .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
 }
 

@@ -19,7 +19,6 @@ use crate::generator::random::Stream;
 use crate::generator::ripple::node_samples;
 use crate::generator::ripple::oscillator::{Oscillator, PowerLaw};
 use crate::generator::ripple::satellite::{Change, ChangeKind, SatelliteClocks};
-use crate::gnss::gps::lnav;
 use crate::gnss::satellite::Sv;
 use crate::gnss::sp3::{self, Precise};
 use crate::gnss::time::Rate;
@@ -292,10 +291,14 @@ pub(super) fn message_faults(
         };
         for sv in spec.satellites.iter().flatten() {
             let sent = catalogue.sent_at(*sv, fault.on.start);
-            let wrong = sent.and_then(|set| spoiled(std::slice::from_ref(&fault), *sv, set, fault.on.start));
-            if let Some(Err(error)) = wrong.map(|set| lnav::quantised(&set)) {
-                let reason = format!("number {number}, {sv}: {error}");
-                return Err(scenario.conflict("message_fault", reason));
+            let own = scenario.signals.iter().filter(|signal| signal.system == sv.system);
+            for message in own.flat_map(|signal| signal.components.iter().filter_map(|component| component.message)) {
+                let only = std::slice::from_ref(&fault);
+                let wrong = sent.and_then(|set| spoiled(only, message, *sv, set, fault.on.start));
+                if let Some(Err(error)) = wrong.map(|set| (message.quantised)(&set)) {
+                    let reason = format!("number {number}, {sv}: {error}");
+                    return Err(scenario.conflict("message_fault", reason));
+                }
             }
         }
         faults.push(fault);

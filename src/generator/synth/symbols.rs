@@ -1,35 +1,58 @@
-//! The data of a satellite: which code periods its message inverts.
-//!
-//! Limits: GPS LNAV.
+//! The data of a satellite: which code periods its messages invert.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::generator::message::{self, Sent as SentWords};
+use crate::generator::message::{self, Sent as SentSymbols, Slot};
 use crate::generator::scene::Scene;
 use crate::generator::spoof::Constellation;
 use crate::generator::stream::GenerateError;
-use crate::gnss::gps::lnav::Subframe;
+use crate::gnss::message::Message;
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Message;
+use crate::gnss::signal::{Component, Signal};
 use crate::gnss::time::Epoch;
 
-/// Duration of an LNAV subframe and its symbols (IS-GPS-200N, 20.3.2).
-const SUBFRAME_S: i64 = 6;
-const SUBFRAME_SYMBOLS: i64 = 300;
-
 /// What a satellite sends in a stretch of time.
-#[derive(Default)]
 pub struct Symbols {
-    /// By their number since 1980-01-06T00:00:00 of the system's time.
-    subframes: BTreeMap<i64, [u32; 10]>,
+    /// Units by their number since 1980-01-06T00:00:00 of the system's time, of each form of message.
+    units: Vec<(&'static Message, BTreeMap<i64, Vec<bool>>)>,
     /// What has been sent so far.
     pub navigation: BTreeSet<NavigationRow>,
 }
 
+/// The symbols of a component's message: which of a satellite's, and how many code periods one takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Data {
+    form: usize,
+    periods_per_symbol: i64,
+}
+
 impl Symbols {
-    /// Gathers what `sv` sends from `first` to `last` in a time `behind_s` behind GPS time, and forgets what
-    /// lies before. A subframe for which no set was uploaded carries the one of `heard`.
+    /// Nothing sent yet of the messages of a signal.
+    pub fn new(signal: &Signal) -> Self {
+        let mut units: Vec<(&'static Message, BTreeMap<i64, Vec<bool>>)> = Vec::new();
+        for message in signal.components.iter().filter_map(|component| component.message) {
+            if units.iter().all(|(known, _)| *known != message) {
+                units.push((message, BTreeMap::new()));
+            }
+        }
+        Self { units, navigation: BTreeSet::new() }
+    }
+
+    /// Whether nothing modulates the signal.
+    pub fn is_empty(&self) -> bool {
+        self.units.is_empty()
+    }
+
+    /// The data of a component; `None` for a pilot.
+    pub fn of(&self, component: &Component) -> Option<Data> {
+        let message = component.message?;
+        let form = self.units.iter().position(|(known, _)| *known == message)?;
+        Some(Data { form, periods_per_symbol: i64::from(component.periods_per_symbol()?) })
+    }
+
+    /// Gathers what `sv` sends from `first` to `last`, and forgets what lies before. A unit for which no set was uploaded
+    /// carries the one of `heard`.
     ///
     /// # Errors
     /// Those of messages.
@@ -37,50 +60,54 @@ impl Symbols {
         &mut self,
         scene: &Scene,
         from: &Constellation,
-        (sv, behind_s): (Sv, i64),
+        (sv, signal): (Sv, &Signal),
         [first, last]: [Epoch; 2],
         heard: Epoch,
     ) -> Result<(), GenerateError> {
-        let number = |at: Epoch| (at.seconds() - behind_s).div_euclid(SUBFRAME_S);
-        let (first, last) = (number(first), number(last));
-        self.subframes = self.subframes.split_off(&first);
-        for index in first..=last {
-            if self.subframes.contains_key(&index) {
-                continue;
-            }
-            let start = Epoch::new(index * SUBFRAME_S + behind_s, 0.0);
-            let fallback = || scene.catalogue.sent_at(sv, heard);
-            let Some(ephemeris) = scene.catalogue.sent_at(sv, start).or_else(fallback) else { continue };
-            let faults = if from.number == 0 { scene.message_faults.as_slice() } else { &[] };
-            let SentWords { encoded, words } = message::subframe(faults, &scene.broadcast, sv, ephemeris, start)?;
-            // What was meant and, where wrong bits pass for right ones, what was sent.
-            for subframe in [encoded, words].iter().filter_map(|words| Subframe::decode(words, 0).ok()) {
-                let issue = match subframe.id {
-                    1..=3 => Some(u32::from(ephemeris.iode)),
-                    _ => subframe.klobuchar().map(|_| 0),
-                };
-                if let Some(issue) = issue {
-                    self.navigation.extend(subframe.parameters().into_iter().map(|(parameter, raw)| NavigationRow {
+        let faults = if from.number == 0 { scene.message_faults.as_slice() } else { &[] };
+        for (message, units) in &mut self.units {
+            let Some(sender) = scene.messages.of(message) else { continue };
+            let number = |at: Epoch| message.unit_at(signal.time.label(at).seconds());
+            let (first, last) = (number(first), number(last));
+            *units = units.split_off(&first);
+            for unit in first..=last {
+                if units.contains_key(&unit) {
+                    continue;
+                }
+                let slot = Slot { message, time: signal.time, unit };
+                let fallback = || scene.catalogue.sent_at(sv, heard);
+                let Some(ephemeris) = scene.catalogue.sent_at(sv, slot.start()).or_else(fallback) else { continue };
+                let SentSymbols { encoded, symbols } = message::unit(faults, sender, ephemeris, &slot)?;
+                // What was meant and, where wrong symbols pass for right ones, what was sent.
+                let both = [&encoded, &symbols];
+                let distinct = if symbols == encoded { 1 } else { 2 };
+                for (of_set, parameters) in both.iter().take(distinct).filter_map(|sent| (message.parameters)(sent)) {
+                    let issue = if of_set { u32::from(ephemeris.iode) } else { 0 };
+                    self.navigation.extend(parameters.into_iter().map(|(parameter, raw)| NavigationRow {
                         sv,
                         issue,
                         parameter: parameter.to_owned(),
                         raw,
                     }));
                 }
+                units.insert(unit, symbols);
             }
-            self.subframes.insert(index, words);
         }
         Ok(())
     }
 
     /// Whether a code period of a component is sent inverted.
-    pub fn negative(&self, message: Option<Message>, period: i64) -> bool {
-        let Some(message) = message else { return false };
+    pub fn negative(&self, data: Option<Data>, period: i64) -> bool {
+        let Some(Data { form, periods_per_symbol }) = data else { return false };
+        let Some((message, units)) = self.units.get(form) else { return false };
         let period = planted!("generator.synth.message_time", period, period + 1);
-        let symbol = period.div_euclid(i64::from(message.periods_per_symbol()));
-        let Some(words) = self.subframes.get(&symbol.div_euclid(SUBFRAME_SYMBOLS)) else { return false };
-        let bit = symbol.rem_euclid(SUBFRAME_SYMBOLS) as usize;
-        let place = planted!("generator.synth.bit_order", 29 - bit % 30, bit % 30);
-        words.get(bit / 30).is_some_and(|word| word >> place & 1 == 1)
+        let length = message.unit_symbols() as i64;
+        // Units of a message need not begin where the week does.
+        let before = (message.first_s as f64 / message.symbol_s).round() as i64;
+        let symbol = period.div_euclid(periods_per_symbol) - before;
+        let Some(symbols) = units.get(&symbol.div_euclid(length)) else { return false };
+        let place = symbol.rem_euclid(length) as usize;
+        let place = planted!("generator.synth.bit_order", place, place / 30 * 30 + 29 - place % 30);
+        symbols.get(place).copied().unwrap_or(false)
     }
 }

@@ -19,17 +19,17 @@ use crate::generator::sky;
 use crate::generator::spoof::Constellation;
 use crate::generator::stream::GenerateError;
 use crate::generator::synth::chips::{CodeTime, Spreading};
-use crate::generator::synth::symbols::Symbols;
+use crate::generator::synth::symbols::{Data, Symbols};
 use crate::generator::synth::waveform::{Voice, Waveform};
 use crate::generator::truth;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Carrier, Message, Signal};
+use crate::gnss::signal::{Carrier, Signal};
 use crate::gnss::time::{Epoch, tone_turns};
 
 /// A sequence of ±1 of a component.
 struct Sent {
     spreading: Spreading,
-    message: Option<Message>,
+    data: Option<Data>,
     /// Of the amplitude, for unit mean power of the component's waveform and its share.
     gain: f64,
     /// Carrier phase relative to the signal's, in samples: the other way round in an inverted spectrum.
@@ -123,14 +123,14 @@ impl Transmitter {
         if matches!(signal.carrier, Carrier::Channels { channel, .. } if channel(sv.number).is_none()) {
             return Ok(None);
         }
-        let mut sent = Vec::new();
+        let (mut sent, symbols) = (Vec::new(), Symbols::new(signal));
         for (index, component) in signal.components.iter().enumerate() {
             let Some(waveform) = Waveform::new(signal.link(sv), index)? else { return Ok(None) };
             for Voice { spreading, amplitude, phase_cycles } in waveform.voices(edge, rate_hz)? {
                 let cycles = component.phase_cycles + phase_cycles;
                 sent.push(Sent {
                     spreading,
-                    message: component.message,
+                    data: symbols.of(component),
                     gain: component.power_share.sqrt() * amplitude,
                     turns: turns(if scene.metadata.inverted { -cycles } else { cycles }),
                 });
@@ -158,7 +158,7 @@ impl Transmitter {
             roots: BTreeSet::new(),
             parts: Vec::new(),
             ripples: Ripples::default(),
-            symbols: Symbols::default(),
+            symbols,
             seen: false,
             knots: 0,
             worst_knot_cycles: 0.0,
@@ -261,7 +261,7 @@ impl Transmitter {
     }
 
     fn prepare_messages(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
-        if self.sent.iter().all(|sent| sent.message.is_none()) {
+        if self.symbols.is_empty() {
             return Ok(());
         }
         let delays = self
@@ -275,8 +275,7 @@ impl Transmitter {
         }
         // Margins of strips are code periods at most; a tenth of a second holds them.
         let (first, last) = (scene.clock.epoch(from).plus_s(-most - 0.1), scene.clock.epoch(to).plus_s(-least + 0.1));
-        let sender = (self.sv, self.signal.time.behind_gpst_s);
-        self.symbols.prepare(scene, &self.from, sender, [first, last], scene.clock.epoch(from))
+        self.symbols.prepare(scene, &self.from, (self.sv, self.signal), [first, last], scene.clock.epoch(from))
     }
 
     /// Whether the satellite is sent and in view at a sample of the prepared stretch.
@@ -358,7 +357,7 @@ impl Transmitter {
             let delay_s =
                 planted!("generator.synth.code_phase", delay_s, delay_s + 2e-9 * f64::from(self.sv.number % 3));
             let at = sent.spreading.at(anchor.epoch, delay_s);
-            let negative = |period| self.symbols.negative(sent.message, period);
+            let negative = |period| self.symbols.negative(sent.data, period);
             bank.push((anchor.n, end), samples.clone(), |bits| Run {
                 bits: &[],
                 position: sent.spreading.strip(at, step, samples.len(), negative, bits),

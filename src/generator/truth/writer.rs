@@ -15,7 +15,7 @@ use crate::generator::scene::{Scene, sources};
 use crate::generator::spoof::Constellation;
 use crate::generator::stage::Fact;
 use crate::generator::stage::interference::{Interferer, Spectrum};
-use crate::gnss::facts::{Expect, Fault};
+use crate::gnss::facts::{Expect, Fault, TimeOffset};
 use crate::gnss::record::{InterferenceRow, NavigationRow, PassRow, TrajectoryRow};
 
 /// Why the truth could not be written.
@@ -119,6 +119,20 @@ struct SceneFile<'a> {
     faults: &'a [Fault],
     #[serde(skip_serializing_if = "Expect::is_empty")]
     expect: &'a Expect,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    time_offsets: Vec<TimeOffset>,
+}
+
+/// The time scales of the scene's signals that are ahead of GPS time or behind it, whole seconds apart, each once.
+fn time_offsets(scene: &Scene) -> Vec<TimeOffset> {
+    let mut found: Vec<TimeOffset> = Vec::new();
+    for signal in &scene.signals {
+        let ahead_s = scene.catalogue.time_offset_s(signal.system);
+        if ahead_s != 0.0 && found.iter().all(|offset| offset.time_scale != signal.time.name) {
+            found.push(TimeOffset { time_scale: signal.time.name.to_owned(), ahead_s });
+        }
+    }
+    found
 }
 
 /// One of several front ends.
@@ -257,6 +271,7 @@ impl Writer {
             message_faults: scene.message_faults.iter().map(|fault| fault.describe(scene.clock.start)).collect(),
             faults: &scene.faults,
             expect: &scene.expect,
+            time_offsets: time_offsets(scene),
         };
         let path = self.directory.join("scene.json");
         serde_json::to_string_pretty(&file)

@@ -3,8 +3,9 @@
 //! Source: IS-GPS-200N, 3.3.2.3 and table 3-Ia. The codes of PRN 1 to 37 are made from the two
 //! printed registers and the G2 delays; PRN 34 and 37 share a code, as the table says.
 
+use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Message, Overlay, Signal};
+use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
 use crate::gnss::time::GPST;
 
 /// Chips in a C/A code period.
@@ -27,7 +28,7 @@ pub static L1_CA: Signal = Signal {
         code: |prn| Some(code(prn)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
         layers: &[Layer::BPSK],
         overlay: Overlay::None,
-        message: Some(Message::GpsLnav),
+        message: Some(&LNAV),
     }],
 };
 

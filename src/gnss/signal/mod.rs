@@ -14,6 +14,7 @@ use thiserror::Error;
 
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::gps;
+use crate::gnss::message::Message;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::TimeScale;
 
@@ -114,7 +115,7 @@ pub struct Component {
     pub layers: &'static [Layer],
     pub overlay: Overlay,
     /// What modulates it; a pilot has none.
-    pub message: Option<Message>,
+    pub message: Option<&'static Message>,
 }
 
 /// A pulse that chips have, with its amplitude and phase: BPSK and BOC are one layer, CBOC and QMBOC two on
@@ -142,22 +143,6 @@ pub enum Overlay {
         chips: u32,
         of: fn(u8) -> Option<Vec<i8>>,
     },
-}
-
-/// The data that modulate a component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Message {
-    /// GPS legacy navigation message, 50 bit/s (IS-GPS-200N, 20.3.2).
-    GpsLnav,
-}
-
-impl Message {
-    /// Code periods that carry one symbol.
-    pub fn periods_per_symbol(self) -> u32 {
-        match self {
-            Self::GpsLnav => 20,
-        }
-    }
 }
 
 impl Signal {
@@ -298,6 +283,13 @@ impl Component {
     /// Duration of one code period by the satellite's clock.
     pub fn period_s(&self) -> f64 {
         f64::from(self.code_chips) / self.chip_rate_hz
+    }
+
+    /// Code periods that carry one symbol of the message; `None` for a pilot, and for a symbol that is no whole number
+    /// of periods.
+    pub fn periods_per_symbol(&self) -> Option<u32> {
+        let periods = self.message?.symbol_s / self.period_s();
+        ((periods - periods.round()).abs() < 1e-6 && periods > 0.5).then_some(periods.round() as u32)
     }
 
     /// Steps into which the pulses of all layers divide a chip.

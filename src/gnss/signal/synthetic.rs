@@ -4,6 +4,7 @@
 //! wrong with one of them.
 
 use super::{Carrier, Component, Layer, Overlay, Signal};
+use crate::gnss::galileo::inav::INAV;
 use crate::gnss::satellite::System;
 use crate::gnss::time::{GPST, TimeScale};
 
@@ -13,7 +14,8 @@ pub static SYNTHETIC: [&Signal; 5] = [&LONG_BOC, &QUADRATURE, &CHANNELS, &MULTIP
 /// Three seconds behind GPS time.
 pub static OWN_TIME: TimeScale = TimeScale { name: "synthetic", behind_gpst_s: 3 };
 
-/// Two components with codes of 4 ms in BOC(1,1), one of them with an overlay of 25 chips, in a time of its own.
+/// Two components with codes of 4 ms in BOC(1,1), one with a coded message of a symbol a period and the other with an
+/// overlay of 25 chips, in a time of its own.
 pub static LONG_BOC: Signal = Signal {
     name: "synthetic A",
     rinex: "1X",
@@ -31,7 +33,7 @@ pub static LONG_BOC: Signal = Signal {
             code: |number| assigned(number, 36, || random(4092, u64::from(number))),
             layers: &[Layer::BOC11],
             overlay: Overlay::None,
-            message: None,
+            message: Some(&INAV),
         },
         Component {
             power_share: 0.5,

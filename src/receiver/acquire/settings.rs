@@ -62,7 +62,7 @@ impl AcquisitionSettings {
         let whole = 1e-3 * f64::from(self.coherent_periods) / component.period_s();
         let steady = match component.message {
             _ if component.overlay.periods() > 1 => 1,
-            Some(message) => message.periods_per_symbol(),
+            Some(_) => component.periods_per_symbol().unwrap_or(1),
             None => u32::MAX,
         };
         // Beyond rounding of the quotient a period that has begun counts.

@@ -1,4 +1,5 @@
-//! What a receiver writes: one CSV file a kind of record, and `receiver.json` with what it was told.
+//! What a receiver reports ([`Record`]), who takes it ([`Sink`]), and the sink that writes files: one CSV file a kind of
+//! record, and `receiver.json` with what it was told.
 //!
 //! Rows go out as they come, so memory stays flat. Headers are written at once: a file without rows says that
 //! there were none, a missing file that nothing ran.
@@ -11,7 +12,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::gnss::record::{AcquisitionRow, EventRow, Fix, LineRow, NavigationRow, Observation, TrackingRow};
+use crate::gnss::record::{AcquisitionRow, ClockRow, EventRow, Fix, LineRow, NavigationRow, Observation, TrackingRow};
+use crate::gnss::time::GPST;
 
 /// A file that could not be made or written.
 #[derive(Debug, Error)]
@@ -20,6 +22,52 @@ pub enum OutputError {
     Create { path: PathBuf, error: std::io::Error },
     #[error("cannot write {}: {error}", path.display())]
     Write { path: PathBuf, error: std::io::Error },
+    #[error("the receiver's results are not taken: {0}")]
+    Refused(Box<dyn std::error::Error + Send + Sync>),
+}
+
+/// One thing that a receiver reports.
+#[derive(Clone, Debug)]
+pub enum Record {
+    /// The outcome of a search for a satellite's signal.
+    Acquisition(AcquisitionRow),
+    /// The state of a channel's loops.
+    Tracking(TrackingRow),
+    Event(EventRow),
+    Observation(Observation),
+    /// Parameters as decoded; those of a set that is read again come again.
+    Navigation(Vec<NavigationRow>),
+    Fix(Fix),
+    /// The clocks of the fix before: one a time scale.
+    Clocks(Vec<ClockRow>),
+    /// A line in the samples' spectrum.
+    Interference(LineRow),
+}
+
+/// Takes what a receiver reports, in the order in which it is found.
+pub trait Sink {
+    /// Takes a record.
+    ///
+    /// # Errors
+    /// What keeps the sink from it; the reception ends with it.
+    fn take(&mut self, record: Record) -> Result<(), OutputError>;
+
+    /// The reception is over; `summary` is what `receiver.json` says.
+    ///
+    /// # Errors
+    /// As [`Sink::take`].
+    fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
+        let _ = summary;
+        Ok(())
+    }
+}
+
+/// Keeps every record.
+impl Sink for Vec<Record> {
+    fn take(&mut self, record: Record) -> Result<(), OutputError> {
+        self.push(record);
+        Ok(())
+    }
 }
 
 fn create_error(path: &Path, error: std::io::Error) -> OutputError {
@@ -72,6 +120,8 @@ pub struct Output {
     navigation: Sheet,
     events: Sheet,
     interference: Sheet,
+    /// There once a fix has another time scale than GPS time.
+    clocks: Option<Sheet>,
     /// Parameters written so far: those of one issue are written once.
     parameters: BTreeSet<NavigationRow>,
 }
@@ -88,7 +138,7 @@ const OBSERVATIONS: [&str; 10] = [
     "cn0_dbhz",
     "locked_s",
 ];
-const FIXES: [&str; 28] = [
+const FIXES: [&str; 31] = [
     "sample",
     "gps_s",
     "gps_fraction_s",
@@ -117,7 +167,11 @@ const FIXES: [&str; 28] = [
     "chi_square",
     "excluded",
     "ionosphere",
+    "ranges",
+    "clocks",
+    "time_scale",
 ];
+const CLOCKS: [&str; 4] = ["sample", "time_scale", "clock_bias_s", "sigma_clock_m"];
 const ACQUISITION: [&str; 9] =
     ["sample", "sv", "signal", "acquired", "statistic", "threshold", "doppler_hz", "code_phase_chips", "cn0_dbhz"];
 const TRACKING: [&str; 11] = [
@@ -145,6 +199,10 @@ impl Output {
     /// # Errors
     /// [`OutputError::Create`] with the path that cannot be made.
     pub fn create(directory: &Path) -> Result<Self, OutputError> {
+        let clocks = directory.join("clocks.csv");
+        if clocks.exists() {
+            fs::remove_file(&clocks).map_err(|error| write_error(&clocks, error))?;
+        }
         Ok(Self {
             directory: directory.to_owned(),
             observations: Sheet::create(directory, "observations.csv", &OBSERVATIONS)?,
@@ -154,52 +212,51 @@ impl Output {
             navigation: Sheet::create(directory, "navigation.csv", &NAVIGATION)?,
             events: Sheet::create(directory, "events.csv", &EVENTS)?,
             interference: Sheet::create(directory, "interference.csv", &INTERFERENCE)?,
+            clocks: None,
             parameters: BTreeSet::new(),
         })
     }
 
-    /// Writes an observation.
-    pub fn observation(&mut self, row: &Observation) -> Result<(), OutputError> {
-        self.observations.write(row)
-    }
-
-    /// Writes a fix.
-    pub fn fix(&mut self, row: &Fix) -> Result<(), OutputError> {
-        self.fixes.write(row)
-    }
-
-    /// Writes the outcome of a search.
-    pub fn acquisition(&mut self, row: &AcquisitionRow) -> Result<(), OutputError> {
-        self.acquisition.write(row)
-    }
-
-    /// Writes the state of a loop.
-    pub fn tracking(&mut self, row: &TrackingRow) -> Result<(), OutputError> {
-        self.tracking.write(row)
-    }
-
-    /// Writes an event.
-    pub fn event(&mut self, row: &EventRow) -> Result<(), OutputError> {
-        self.events.write(row)
-    }
-
-    /// Writes a line in the samples' spectrum.
-    pub fn interference(&mut self, row: &LineRow) -> Result<(), OutputError> {
-        self.interference.write(row)
+    /// Writes a fix's clocks, if they are more than that of GPS time.
+    fn clocks(&mut self, rows: &[ClockRow]) -> Result<(), OutputError> {
+        if rows.iter().all(|row| row.time_scale == GPST.name) {
+            return Ok(());
+        }
+        if self.clocks.is_none() {
+            self.clocks = Some(Sheet::create(&self.directory, "clocks.csv", &CLOCKS)?);
+        }
+        let Some(sheet) = &mut self.clocks else { return Ok(()) };
+        rows.iter().try_for_each(|row| sheet.write(row))
     }
 
     /// Writes decoded parameters, each but once.
-    pub fn navigation(&mut self, rows: &[NavigationRow]) -> Result<(), OutputError> {
+    fn navigation(&mut self, rows: Vec<NavigationRow>) -> Result<(), OutputError> {
         for row in rows {
-            if self.parameters.insert(row.clone()) {
-                self.navigation.write(row)?;
+            if !self.parameters.contains(&row) {
+                self.navigation.write(&row)?;
+                self.parameters.insert(row);
             }
         }
         Ok(())
     }
+}
+
+impl Sink for Output {
+    fn take(&mut self, record: Record) -> Result<(), OutputError> {
+        match record {
+            Record::Acquisition(row) => self.acquisition.write(&row),
+            Record::Tracking(row) => self.tracking.write(&row),
+            Record::Event(row) => self.events.write(&row),
+            Record::Observation(row) => self.observations.write(&row),
+            Record::Navigation(rows) => self.navigation(rows),
+            Record::Fix(row) => self.fixes.write(&row),
+            Record::Clocks(rows) => self.clocks(&rows),
+            Record::Interference(row) => self.interference.write(&row),
+        }
+    }
 
     /// Writes what is buffered, and `receiver.json`.
-    pub fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
+    fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
         for sheet in [
             &mut self.observations,
             &mut self.fixes,
@@ -211,6 +268,7 @@ impl Output {
         ] {
             sheet.flush()?;
         }
+        self.clocks.as_mut().map_or(Ok(()), Sheet::flush)?;
         let path = self.directory.join("receiver.json");
         let text = serde_json::to_string_pretty(summary).unwrap_or_default() + "\n";
         fs::write(&path, text).map_err(|error| write_error(&path, error))
@@ -238,7 +296,7 @@ mod tests {
         let zero = |n: usize| vec!["0"; n].join(",");
         let observation: Observation = from_csv(&OBSERVATIONS, &format!("0,G03,{},{}", L1_CA.name, zero(7)));
         assert_eq!(header(&observation), OBSERVATIONS.join(","));
-        let fix: Fix = from_csv(&FIXES, &format!("{},,broadcast", zero(26)));
+        let fix: Fix = from_csv(&FIXES, &format!("{},,broadcast,4,1,GPST", zero(26)));
         assert_eq!(header(&fix), FIXES.join(","));
         let row: AcquisitionRow = from_csv(&ACQUISITION, &format!("0,G03,{},true,{}", L1_CA.name, zero(5)));
         assert_eq!(header(&row), ACQUISITION.join(","));

@@ -10,14 +10,14 @@
 //! Where two sets leave ranges that agree within themselves but on different places, nothing tells which is
 //! right: then there is no position ([`NoFix::Ambiguous`]). Places nearer than what a wrong model of the
 //! atmosphere does are no faults told apart: the best fit serves. Limits: faults on so many satellites that
-//! good ones are the minority, and faults that happen to fit another position: n − 4 directions are all that
-//! residuals see.
+//! good ones are the minority, and faults that happen to fit another position: as many directions as there are degrees
+//! of freedom are all that residuals see.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::NoFix;
-use super::least_squares::{self, Corrections, Range, Solution, UNKNOWNS};
+use super::least_squares::{self, Corrections, Range, Solution, freedom};
 use crate::gnss::satellite::Sv;
 
 /// Sets of one size that are tried: all five of twelve satellites, all four of thirteen.
@@ -49,29 +49,37 @@ pub fn consistent(
 ) -> Result<Consistent, NoFix> {
     let all = least_squares::position(&ranges, start_m, corrections)?;
     // Four ranges always fit, which proves nothing: as many as that are never left after an exclusion.
-    let freedom = ranges.len() - UNKNOWNS;
+    let freedom = freedom(&ranges).max(0) as usize;
     let threshold = chi_square_threshold(freedom.max(1), false_alarm);
     if freedom == 0 || all.chi_square <= planted!("receiver.raim.threshold", threshold, 100.0 * threshold) {
         return Ok((ranges, all, Vec::new()));
     }
+    let satellites = satellites(&ranges);
     for size in 1..freedom {
-        let Some(ranked) = ranked(&all, size) else { break };
-        let limit = chi_square_threshold(freedom - size, false_alarm);
+        let Some(ranked) = ranked(&all, &satellites, size) else { break };
         let mut fitting: Vec<(Vec<usize>, Solution)> = (ranked.into_iter().take(SOLVED))
             .filter_map(|set| {
-                let solution = least_squares::position(&without(&ranges, &set), all.position_m, corrections).ok()?;
-                (solution.chi_square <= limit).then_some((set, solution))
+                let kept = without(&ranges, &set);
+                let left = usize::try_from(least_squares::freedom(&kept)).ok().filter(|left| *left > 0)?;
+                let solution = least_squares::position(&kept, all.position_m, corrections).ok()?;
+                (solution.chi_square <= chi_square_threshold(left, false_alarm)).then_some((set, solution))
             })
             .collect();
         fitting.sort_by(|a, b| a.1.chi_square.total_cmp(&b.1.chi_square));
         let mut fitting = fitting.into_iter();
         let Some((set, solution)) = fitting.next() else { continue };
         if let Some((other, rival)) = fitting.find(|(_, rival)| elsewhere(&solution, rival, false_alarm)) {
-            let names = |set: &[usize]| set.iter().map(|&index| ranges[index].sv).collect();
+            let names = |set: &[usize]| {
+                let mut names: Vec<Sv> = set.iter().map(|&index| ranges[index].sv).collect();
+                names.dedup();
+                names
+            };
             let separation_m = (solution.position_m - rival.position_m).norm();
             return Err(NoFix::Ambiguous { one: names(&set), other: names(&other), separation_m });
         }
-        let excluded = set.iter().map(|&index| (ranges[index].sv, all.residuals_m[index])).collect();
+        let mut excluded: Vec<(Sv, f64)> =
+            set.iter().map(|&index| (ranges[index].sv, all.residuals_m[index])).collect();
+        excluded.dedup_by_key(|(sv, _)| *sv);
         return Ok((without(&ranges, &set), solution, excluded));
     }
     Err(NoFix::Inconsistent { chi_square: all.chi_square, threshold })
@@ -83,32 +91,53 @@ fn without(ranges: &[Range], set: &[usize]) -> Vec<Range> {
     kept.map(|(_, range)| range.clone()).collect()
 }
 
-/// All sets of `size` ranges, those first whose removal leaves the smallest sum of squares; `None` if there
-/// are too many.
-fn ranked(solution: &Solution, size: usize) -> Option<Vec<Vec<usize>>> {
-    let sets = sets(solution.residuals_m.len(), size)?;
-    // Behind position and clock: the ionosphere's three common errors, of unit prior deviation.
-    let rows: Vec<SVector<f64, 7>> = (solution.sights.iter().zip(&solution.sigmas_m).zip(&solution.commons_m))
-        .map(|((sight, sigma_m), common_m)| {
-            let row = [-sight.x, -sight.y, -sight.z, 1.0, common_m.x, common_m.y, common_m.z];
-            SVector::<f64, 7>::from(row) / *sigma_m
+/// Places of the ranges of each satellite: a fault of it is in all of them.
+fn satellites(ranges: &[Range]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<(Sv, Vec<usize>)> = Vec::new();
+    for (index, range) in ranges.iter().enumerate() {
+        match groups.iter_mut().find(|(sv, _)| *sv == range.sv) {
+            Some((_, group)) => group.push(index),
+            None => groups.push((range.sv, vec![index])),
+        }
+    }
+    groups.into_iter().map(|(_, group)| group).collect()
+}
+
+/// The ranges of all sets of `size` satellites, those first whose removal leaves the smallest sum of squares; `None` if
+/// there are too many.
+fn ranked(solution: &Solution, satellites: &[Vec<usize>], size: usize) -> Option<Vec<Vec<usize>>> {
+    let sets = sets(satellites.len(), size)?.into_iter().map(|set| {
+        let mut ranges: Vec<usize> = set.iter().flat_map(|&group| satellites[group].iter().copied()).collect();
+        ranges.sort_unstable();
+        ranges
+    });
+    // Behind position and clocks: the ionosphere's three common errors, of unit prior deviation.
+    let unknowns = solution.covariance.nrows();
+    let rows: Vec<DVector<f64>> = (0..solution.sights.len())
+        .filter_map(|index| {
+            let row = solution.row(index)?;
+            let all = row.iter().chain(solution.commons_m.get(index)?.iter()).copied();
+            Some(DVector::from_iterator(unknowns + 3, all) / *solution.sigmas_m.get(index)?)
         })
         .collect();
-    let prior = SMatrix::<f64, 7, 7>::from_diagonal(&SVector::from([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]));
-    let normal = rows.iter().fold(prior, |sum, row| sum + row * row.transpose());
+    let prior = DMatrix::from_fn(unknowns + 3, unknowns + 3, |a, b| f64::from(u8::from(a == b && a >= unknowns)));
+    let normal = rows.iter().fold(prior, |mut sum, row| {
+        sum.ger(1.0, row, row, 1.0);
+        sum
+    });
     let covariance = normal.cholesky()?.inverse();
     let normalised: Vec<f64> =
         solution.residuals_m.iter().zip(&solution.sigmas_m).map(|(residual, sigma)| residual / sigma).collect();
     let left = |set: &[usize]| {
         let seen = DMatrix::from_fn(set.len(), set.len(), |a, b| {
             let unity = if a == b { 1.0 } else { 0.0 };
-            unity - (rows[set[a]].transpose() * covariance * rows[set[b]])[(0, 0)]
+            unity - rows[set[a]].dot(&(&covariance * &rows[set[b]]))
         });
         let of = DVector::from_fn(set.len(), |a, _| normalised[set[a]]);
         // No inverse: the rest gives no position without the set.
         seen.cholesky().map_or(f64::INFINITY, |seen| solution.chi_square - of.dot(&seen.solve(&of)))
     };
-    let mut ranked: Vec<(f64, Vec<usize>)> = sets.into_iter().map(|set| (left(&set), set)).collect();
+    let mut ranked: Vec<(f64, Vec<usize>)> = sets.map(|set| (left(&set), set)).collect();
     ranked.sort_by(|a, b| planted!("receiver.raim.choice", a.0.total_cmp(&b.0), b.0.total_cmp(&a.0)));
     Some(ranked.into_iter().map(|(_, set)| set).collect())
 }

@@ -2,23 +2,27 @@
 //!
 //! Model: ρ = |R(Ωτ) r_s(t_e) − r| + b − c Δt_s + I + T with τ the geometric light time (the raw pseudorange
 //! would let a clock bias of 11 ms shift the fix by metres). Source: IS-GPS-200N, 20.3.3.4.3.4 and any
-//! textbook of estimation. Normal equations of four unknowns with lines of sight of unit length: their
-//! condition is that of the geometry, and is checked before they are solved. Where the ionosphere's model has
-//! an error ([`Ionosphere::Uncertain`]) that error is three more unknowns with a prior; they are eliminated,
-//! so that the covariance of the four contains them.
+//! textbook of estimation. Three coordinates are unknown and one clock for each time scale of the ranges, as systems'
+//! times differ by nanoseconds that nobody tells. Lines of sight have unit length: the condition of the normal
+//! equations is that of the geometry, and is checked before they are solved. Where the ionosphere's model has an error
+//! ([`Ionosphere::Uncertain`]) that error is three more unknowns with a prior; they are eliminated, so that the
+//! covariance of the others contains them.
 
-use nalgebra::{Cholesky, Matrix3, Matrix4, Matrix4x3, Vector3, Vector4};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Matrix4, MatrixXx3, Vector3, Vector4};
 
 use crate::gnss::broadcast::{ClockState, State};
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_earth};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::gnss::signal::Signal;
+use crate::gnss::time::{Epoch, GPST, TimeScale};
 use crate::receiver::position::ionosphere::DelayError;
 use crate::receiver::position::{NoFix, troposphere};
 
-/// Unknowns: three coordinates and the clock.
-pub const UNKNOWNS: usize = 4;
+/// Unknown coordinates; each time scale adds a clock.
+pub const COORDINATES: usize = 3;
+/// Unknowns of a position by one system.
+pub const UNKNOWNS: usize = COORDINATES + 1;
 /// Iterations of a solution, from the Earth's centre.
 const LARGEST_ITERATIONS: u32 = 8;
 /// A step below this ends the iteration.
@@ -36,6 +40,7 @@ const IONOSPHERE_TOP_M: f64 = 1e6;
 #[derive(Clone, Debug)]
 pub struct Range {
     pub sv: Sv,
+    pub signal: &'static Signal,
     /// Satellite at emission, in the ECEF axes of that instant.
     pub satellite: State,
     /// Satellite clock as this signal carries it.
@@ -76,23 +81,26 @@ pub struct Corrections {
 #[derive(Clone, Debug)]
 pub struct Solution {
     pub position_m: Vector3<f64>,
-    /// Reading of the receiver's clock minus GPS time, in metres.
-    pub clock_m: f64,
-    /// Of each range: measured minus computed, standard deviation, unit vector to the satellite, elevation.
+    /// The time scales of the ranges, GPS time first, with the reading of the receiver's clock minus each but for whole
+    /// seconds, in metres.
+    pub clocks: Vec<(&'static TimeScale, f64)>,
+    /// Of each range: the place of its clock among them …
+    pub clock_of: Vec<usize>,
+    /// … measured minus computed, standard deviation, unit vector to the satellite, elevation.
     pub residuals_m: Vec<f64>,
     pub sigmas_m: Vec<f64>,
     pub sights: Vec<Vector3<f64>>,
     pub elevations_rad: Vec<f64>,
     /// What one prior deviation of each of the ionosphere's common errors adds to each range.
     pub commons_m: Vec<Vector3<f64>>,
-    /// Covariance of ECEF coordinates and clock, in m².
-    pub covariance: Matrix4<f64>,
+    /// Covariance of ECEF coordinates and clocks, in m².
+    pub covariance: DMatrix<f64>,
     /// The same for unit variances: squares of the dilutions of precision.
-    pub dilution: Matrix4<f64>,
+    pub dilution: DMatrix<f64>,
     /// Ratio of the extreme singular values of the geometry.
     pub condition: f64,
     /// Weighted sum of squared residuals, the ionosphere's estimated error over its prior deviation among
-    /// them: its degrees of freedom are the number of ranges less four either way.
+    /// them: its degrees of freedom are [`freedom`] either way.
     pub chi_square: f64,
     /// Estimated errors of the ionosphere's model in their prior deviations (level, gain northwards,
     /// eastwards); 0 where the model is right.
@@ -100,9 +108,54 @@ pub struct Solution {
     pub iterations: u32,
 }
 
+impl Solution {
+    /// Reading of the receiver's clock minus the first time scale, but for whole seconds, in metres.
+    pub fn clock_m(&self) -> f64 {
+        self.clocks.first().map_or(0.0, |clock| clock.1)
+    }
+
+    /// Derivatives of a range by coordinates and clocks.
+    pub fn row(&self, index: usize) -> Option<DVector<f64>> {
+        Some(row(self.sights.get(index)?, *self.clock_of.get(index)?, self.clocks.len()))
+    }
+}
+
+/// Different time scales of some ranges, GPS time first, then by name.
+pub fn scales(ranges: &[Range]) -> Vec<&'static TimeScale> {
+    let mut scales: Vec<&'static TimeScale> = Vec::new();
+    for range in ranges {
+        if !scales.contains(&range.signal.time) {
+            scales.push(range.signal.time);
+        }
+    }
+    scales.sort_by_key(|scale| (**scale != GPST, scale.name));
+    scales
+}
+
+/// Ranges beyond the unknowns that they have to give; negative where they are too few.
+pub fn freedom(ranges: &[Range]) -> isize {
+    ranges.len() as isize - (COORDINATES + scales(ranges).len()) as isize
+}
+
+fn row(sight: &Vector3<f64>, clock: usize, clocks: usize) -> DVector<f64> {
+    let mut row = DVector::zeros(COORDINATES + clocks);
+    row.fixed_rows_mut::<COORDINATES>(0).copy_from(&-sight);
+    if let Some(slot) = row.get_mut(COORDINATES + clock) {
+        *slot = 1.0;
+    }
+    row
+}
+
+/// An estimate on the way to a solution.
+struct Estimate {
+    position_m: Vector3<f64>,
+    clocks_m: DVector<f64>,
+}
+
 /// One range at an estimate: computed value and derivative.
 struct Line {
     computed_m: f64,
+    row: DVector<f64>,
     sight: Vector3<f64>,
     sigma_m: f64,
     elevation_rad: f64,
@@ -112,8 +165,8 @@ struct Line {
 
 /// The errors of the ionosphere's model: z of prior mean 0 and unit variance.
 struct Common {
-    /// Σ w a fᵀ over the ranges: a the four derivatives of a range, f its derivatives by z.
-    coupling: Matrix4x3<f64>,
+    /// Σ w a fᵀ over the ranges: a the derivatives of a range, f its derivatives by z.
+    coupling: MatrixXx3<f64>,
     /// Inverse of Σ w f fᵀ and the prior's weight, 1.
     inverse: Matrix3<f64>,
     /// Σ w f v.
@@ -122,10 +175,11 @@ struct Common {
 
 impl Common {
     fn of(ranges: &[Range], lines: &[Line]) -> Self {
-        let (mut coupling, mut weight, mut right) = (Matrix4x3::zeros(), Matrix3::identity(), Vector3::zeros());
+        let unknowns = lines.first().map_or(0, |line| line.row.len());
+        let (mut coupling, mut weight, mut right) = (MatrixXx3::zeros(unknowns), Matrix3::identity(), Vector3::zeros());
         for (range, line) in ranges.iter().zip(lines) {
             let weighted = line.common_m / (line.sigma_m * line.sigma_m);
-            coupling += line.row() * weighted.transpose();
+            coupling += &line.row * weighted.transpose();
             weight += weighted * line.common_m.transpose();
             right += (range.pseudorange_m - line.computed_m) * weighted;
         }
@@ -135,14 +189,9 @@ impl Common {
     }
 }
 
-impl Line {
-    /// Derivatives of the range by position and clock.
-    fn row(&self) -> Vector4<f64> {
-        Vector4::new(-self.sight.x, -self.sight.y, -self.sight.z, 1.0)
-    }
-}
-
-fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Corrections, day: f64) -> Line {
+fn line(range: &Range, clock: usize, at: &Estimate, corrections: &Corrections, day: f64) -> Line {
+    let position_m = &at.position_m;
+    let clock_m = at.clocks_m.get(clock).copied().unwrap_or(0.0);
     // Light time and rotation: the correction of the second pass is below a micrometre.
     let mut seen_m = range.satellite.position_m;
     for _ in 0..3 {
@@ -171,7 +220,14 @@ fn line(range: &Range, position_m: &Vector3<f64>, clock_m: f64, corrections: &Co
         let model_m = corrections.model_sigma_m / slant;
         variance += model_m * model_m;
     }
-    Line { computed_m, sight, sigma_m: variance.sqrt(), elevation_rad, common_m }
+    Line {
+        computed_m,
+        row: row(&sight, clock, at.clocks_m.len()),
+        sight,
+        sigma_m: variance.sqrt(),
+        elevation_rad,
+        common_m,
+    }
 }
 
 /// Delay by the atmosphere, and deviations of the ionosphere's part: common to all satellites, and this one's own.
@@ -213,93 +269,88 @@ fn atmosphere(
     }
 }
 
-/// Solves for position and clock from a first estimate, which may be the Earth's centre.
+/// Solves for position and clocks from a first estimate, which may be the Earth's centre.
 ///
 /// # Errors
-/// Fewer than four ranges, a geometry that gives no position, or no convergence.
+/// Fewer ranges than unknowns, a geometry that gives no position, or no convergence.
 pub fn position(ranges: &[Range], start_m: Vector3<f64>, corrections: &Corrections) -> Result<Solution, NoFix> {
-    if ranges.len() < UNKNOWNS {
-        return Err(NoFix::TooFew { have: ranges.len(), need: UNKNOWNS });
+    let scales = scales(ranges);
+    let need = (COORDINATES + scales.len()).max(UNKNOWNS);
+    if ranges.len() < need {
+        return Err(NoFix::TooFew { have: ranges.len(), need });
     }
+    let clock_of: Vec<usize> =
+        ranges.iter().map(|range| scales.iter().position(|scale| *scale == range.signal.time).unwrap_or(0)).collect();
     let day = ranges.first().map_or(1.0, |range| range.emitted.day_of_year());
-    let mut position_m = start_m;
-    // The clock enters linearly; starting near it only keeps the first residuals small.
-    let mut clock_m = 0.0;
+    let lines = |at: &Estimate| -> Vec<Line> {
+        ranges.iter().zip(&clock_of).map(|(range, &clock)| line(range, clock, at, corrections, day)).collect()
+    };
+    // Clocks enter linearly; starting near them only keeps the first residuals small.
+    let mut at = Estimate { position_m: start_m, clocks_m: DVector::zeros(scales.len()) };
     let mut step_m = f64::INFINITY;
     for iteration in 1..=LARGEST_ITERATIONS {
-        let lines: Vec<Line> = ranges.iter().map(|range| line(range, &position_m, clock_m, corrections, day)).collect();
-        let (mut plain, mut normal, mut right) = (Matrix4::zeros(), Matrix4::zeros(), Vector4::zeros());
-        for (range, line) in ranges.iter().zip(&lines) {
-            let row = line.row();
+        let lines_here = lines(&at);
+        let mut plain = DMatrix::zeros(need, need);
+        let mut normal = DMatrix::zeros(need, need);
+        let mut right = DVector::zeros(need);
+        for (range, line) in ranges.iter().zip(&lines_here) {
             let weight = 1.0 / (line.sigma_m * line.sigma_m);
             let weight = planted!("receiver.position.weight", weight, line.sigma_m * line.sigma_m);
-            plain += row * row.transpose();
-            normal += weight * row * row.transpose();
-            right += weight * (range.pseudorange_m - line.computed_m) * row;
+            plain.ger(1.0, &line.row, &line.row, 1.0);
+            normal.ger(weight, &line.row, &line.row, 1.0);
+            right.axpy(weight * (range.pseudorange_m - line.computed_m), &line.row, 1.0);
         }
         let condition = condition(&plain)?;
-        let common = Common::of(ranges, &lines);
-        let eliminated = common.coupling * common.inverse;
-        normal -= eliminated * common.coupling.transpose();
-        right -= eliminated * common.right;
+        let common = Common::of(ranges, &lines_here);
+        let eliminated = &common.coupling * common.inverse;
+        normal -= &eliminated * common.coupling.transpose();
+        right -= &eliminated * common.right;
         let solver = Cholesky::new(normal).ok_or(NoFix::Singular { condition: f64::INFINITY })?;
         let step = solver.solve(&right);
-        position_m += Vector3::new(step.x, step.y, step.z);
-        clock_m += step.w;
+        at.position_m += step.fixed_rows::<COORDINATES>(0);
+        at.clocks_m += step.rows(COORDINATES, scales.len());
         step_m = step.norm();
         if !step_m.is_finite() {
             break;
         }
         if step_m < CONVERGED_M {
             let dilution = Cholesky::new(plain).ok_or(NoFix::Singular { condition: f64::INFINITY })?.inverse();
-            let mut solution = finish(ranges, position_m, clock_m, corrections, day, solver.inverse(), dilution);
-            (solution.condition, solution.iterations) = (condition, iteration);
-            return Ok(solution);
+            let lines = lines(&at);
+            let common = Common::of(ranges, &lines);
+            let ionosphere_error = common.inverse * common.right;
+            let residual = |(range, line): (&Range, &Line)| {
+                range.pseudorange_m - line.computed_m - ionosphere_error.dot(&line.common_m)
+            };
+            let residuals_m: Vec<f64> = ranges.iter().zip(&lines).map(residual).collect();
+            let squares = residuals_m.iter().zip(&lines).map(|(v, line)| (v / line.sigma_m) * (v / line.sigma_m));
+            let chi_square = squares.sum::<f64>() + ionosphere_error.norm_squared();
+            return Ok(Solution {
+                position_m: at.position_m,
+                clocks: scales.into_iter().zip(at.clocks_m.iter().copied()).collect(),
+                clock_of,
+                residuals_m,
+                sigmas_m: lines.iter().map(|line| line.sigma_m).collect(),
+                sights: lines.iter().map(|line| line.sight).collect(),
+                elevations_rad: lines.iter().map(|line| line.elevation_rad).collect(),
+                commons_m: lines.iter().map(|line| line.common_m).collect(),
+                covariance: solver.inverse(),
+                dilution,
+                condition,
+                chi_square,
+                ionosphere_error,
+                iterations: iteration,
+            });
         }
     }
     Err(NoFix::Diverged { iterations: LARGEST_ITERATIONS, step_m })
 }
 
 /// Ratio of the extreme singular values of the geometry, refused from [`LARGEST_CONDITION`] on.
-fn condition(plain: &Matrix4<f64>) -> Result<f64, NoFix> {
+fn condition(plain: &DMatrix<f64>) -> Result<f64, NoFix> {
     let values = plain.symmetric_eigenvalues();
     let (low, high) = (values.min(), values.max());
     let condition = if low > 0.0 { (high / low).sqrt() } else { f64::INFINITY };
     if condition < LARGEST_CONDITION { Ok(condition) } else { Err(NoFix::Singular { condition }) }
-}
-
-fn finish(
-    ranges: &[Range],
-    position_m: Vector3<f64>,
-    clock_m: f64,
-    corrections: &Corrections,
-    day: f64,
-    covariance: Matrix4<f64>,
-    dilution: Matrix4<f64>,
-) -> Solution {
-    let lines: Vec<Line> = ranges.iter().map(|range| line(range, &position_m, clock_m, corrections, day)).collect();
-    let common = Common::of(ranges, &lines);
-    let ionosphere_error = common.inverse * common.right;
-    let residual =
-        |(range, line): (&Range, &Line)| range.pseudorange_m - line.computed_m - ionosphere_error.dot(&line.common_m);
-    let residuals_m: Vec<f64> = ranges.iter().zip(&lines).map(residual).collect();
-    let squares = residuals_m.iter().zip(&lines).map(|(v, line)| (v / line.sigma_m) * (v / line.sigma_m));
-    let chi_square = squares.sum::<f64>() + ionosphere_error.norm_squared();
-    Solution {
-        position_m,
-        clock_m,
-        residuals_m,
-        sigmas_m: lines.iter().map(|line| line.sigma_m).collect(),
-        sights: lines.iter().map(|line| line.sight).collect(),
-        elevations_rad: lines.iter().map(|line| line.elevation_rad).collect(),
-        commons_m: lines.iter().map(|line| line.common_m).collect(),
-        covariance,
-        dilution,
-        condition: f64::INFINITY,
-        chi_square,
-        ionosphere_error,
-        iterations: 0,
-    }
 }
 
 /// Velocity in ECEF and clock drift from Dopplers, at a solved position.

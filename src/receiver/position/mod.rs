@@ -2,21 +2,22 @@
 //!
 //! A [`Solver`] smooths code with carrier ([`smooth`]), finds where satellites were, corrects the atmosphere
 //! by the decoded ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`troposphere`],
-//! solves ([`least_squares`]) and tests the residuals, leaving out the fewest satellites that contradict the
-//! others ([`exclusion`]). Limits: one clock for all signals.
+//! solves ([`least_squares`]), with a clock for each time scale, and tests the residuals, leaving out the fewest
+//! satellites that contradict the others ([`exclusion`]). Limits: carriers of one satellite are not combined.
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::record::{Fix, IonosphereModel, Observation};
+use crate::gnss::record::{ClockRow, Fix, IonosphereModel, Observation};
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, Rate, SampleClock};
+use crate::gnss::signal::Signal;
+use crate::gnss::time::{Epoch, GPST, Rate, SampleClock, TimeScale};
 use crate::receiver::described::described;
 use crate::receiver::track::loops::CodeShape;
 
@@ -30,7 +31,9 @@ pub mod troposphere;
 
 pub use exclusion::{Consistent, chi_square_threshold, consistent};
 use ionosphere::{DelayError, NOMINAL, NOMINAL_ERROR};
-use least_squares::{Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, Solution, UNKNOWNS};
+use least_squares::{
+    COORDINATES, Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, Solution, freedom, scales,
+};
 use smooth::Smoother;
 
 /// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
@@ -113,6 +116,9 @@ pub struct CodeNoise {
     pub integration_s: f64,
 }
 
+/// Noise of the code loops by signal.
+pub type Noises = Vec<(&'static Signal, CodeNoise)>;
+
 impl CodeNoise {
     /// Standard deviation of a non-coherent early-minus-late loop.
     ///
@@ -164,6 +170,8 @@ fn names(svs: &[Sv]) -> String {
 #[derive(Clone, Debug)]
 pub struct Solved {
     pub fix: Fix,
+    /// The clock against each time scale.
+    pub clocks: Vec<ClockRow>,
     pub used: Vec<Sv>,
     /// Satellites that the residual test left out, with their distance from the others' solution.
     pub excluded: Vec<(Sv, f64)>,
@@ -173,7 +181,7 @@ pub struct Solved {
 #[derive(Clone, Debug)]
 pub struct Solver {
     settings: PositionSettings,
-    noise: CodeNoise,
+    noises: Noises,
     smoother: Smoother,
     rate: Rate,
     /// What the carrier's Doppler exceeds the code's by.
@@ -184,9 +192,10 @@ pub struct Solver {
 
 impl Solver {
     /// A solver for loops with such noise.
-    pub fn new(settings: &PositionSettings, noise: CodeNoise, rate: Rate) -> Self {
-        let smoother = Smoother::new(settings.smoothing_s, noise.bandwidth_hz, rate);
-        Self { settings: settings.clone(), noise, smoother, rate, offset_hz: 0.0, last_m: None, ready_since: None }
+    pub fn new(settings: &PositionSettings, noises: Noises, rate: Rate) -> Self {
+        let bandwidth_hz = noises.first().map_or(1.0, |(_, noise)| noise.bandwidth_hz);
+        let smoother = Smoother::new(settings.smoothing_s, bandwidth_hz, rate);
+        Self { settings: settings.clone(), noises, smoother, rate, offset_hz: 0.0, last_m: None, ready_since: None }
     }
 
     /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: smoothing and
@@ -218,14 +227,16 @@ impl Solver {
             .filter_map(|observation| {
                 let smoothed = self.smoother.smooth(observation);
                 let cn0_hz = libm::pow(10.0, observation.cn0_dbhz / 10.0);
-                let noise_m = self.noise.sigma_m(cn0_hz) * smoothed.variance_ratio.sqrt();
+                let (_, noise) = self.noises.iter().find(|(signal, _)| *signal == observation.signal)?;
+                let noise_m = noise.sigma_m(cn0_hz) * smoothed.variance_ratio.sqrt();
                 let ephemeris = ephemerides.get(&observation.sv)?;
                 let range = range(observation, ephemeris, smoothed.pseudorange_m, noise_m, cn0_hz)?;
                 Some(Range { doppler_hz: range.doppler_hz - self.offset_hz, ..range })
             })
             .collect();
-        if ranges.len() < UNKNOWNS {
-            return Err(NoFix::TooFew { have: ranges.len(), need: UNKNOWNS });
+        if freedom(&ranges) < 0 || ranges.is_empty() {
+            let need = COORDINATES + scales(&ranges).len().max(1);
+            return Err(NoFix::TooFew { have: ranges.len(), need });
         }
         self.await_ionosphere(sample, klobuchar)?;
         let (ionosphere, model) = self.ionosphere(klobuchar);
@@ -253,8 +264,13 @@ impl Solver {
             consistent(visible, first.position_m, &corrections, self.settings.false_alarm)?;
         let (velocity_mps, drift) = least_squares::velocity(&kept, &solution)?;
         self.last_m = Some(solution.position_m);
-        let fix = fix(sample, clock, &solution, velocity_mps, drift, kept.len(), &excluded, model);
-        Ok(Solved { fix, used: kept.iter().map(|range| range.sv).collect(), excluded })
+        let mut used: Vec<Sv> = kept.iter().map(|range| range.sv).collect();
+        used.sort();
+        used.dedup();
+        let counts = [used.len(), kept.len()];
+        let fix = fix(sample, clock, &solution, velocity_mps, drift, counts, &excluded, model);
+        let clocks = clocks(sample, &solution);
+        Ok(Solved { fix, clocks, used, excluded })
     }
 
     /// What corrects for the ionosphere, and its name in a fix.
@@ -309,6 +325,7 @@ fn range(
     let emitted = sent.plus_s(-clock.offset_s);
     Some(Range {
         sv: observation.sv,
+        signal: observation.signal,
         satellite: ephemeris.state(emitted).ok()?,
         clock,
         emitted,
@@ -327,14 +344,14 @@ fn fix(
     solution: &Solution,
     velocity_mps: Vector3<f64>,
     drift: f64,
-    satellites: usize,
+    [satellites, ranges]: [usize; 2],
     excluded: &[(Sv, f64)],
     ionosphere: IonosphereModel,
 ) -> Fix {
-    let bias_s = solution.clock_m / SPEED_OF_LIGHT_MPS;
+    let bias_s = solution.clock_m() / SPEED_OF_LIGHT_MPS;
     let time: Epoch = clock.epoch(sample).plus_s(planted!("receiver.position.time_sign", -bias_s, bias_s));
     let axes = Geodetic::from_ecef(&solution.position_m).ecef_to_enu();
-    let block = |m: &nalgebra::Matrix4<f64>| -> Matrix3<f64> { m.fixed_view::<3, 3>(0, 0).into_owned() };
+    let block = |m: &DMatrix<f64>| -> Matrix3<f64> { m.fixed_view::<3, 3>(0, 0).into_owned() };
     let scale = planted!("receiver.position.sigma_x3", 1.0, 9.0) * planted!("receiver.position.sigma_x05", 1.0, 0.25);
     let covariance = scale * axes * block(&solution.covariance) * axes.transpose();
     let correlation = |a, b| covariance[(a, b)] / (covariance[(a, a)] * covariance[(b, b)]).sqrt();
@@ -368,8 +385,22 @@ fn fix(
         tdop: dt.sqrt(),
         condition: solution.condition,
         satellites: satellites as u32,
+        ranges: Some(ranges as u32),
+        clocks: Some(solution.clocks.len() as u32),
+        time_scale: solution.clocks.first().map_or(GPST.name, |(scale, _)| scale.name).to_owned(),
         chi_square: solution.chi_square,
         excluded: names.join(" "),
         ionosphere,
     }
+}
+
+/// The clock against each time scale of a solution, one row a scale.
+fn clocks(sample: u64, solution: &Solution) -> Vec<ClockRow> {
+    let row = |(index, (scale, clock_m)): (usize, &(&'static TimeScale, f64))| ClockRow {
+        sample,
+        time_scale: scale.name.to_owned(),
+        clock_bias_s: clock_m / SPEED_OF_LIGHT_MPS,
+        sigma_clock_m: solution.covariance[(COORDINATES + index, COORDINATES + index)].sqrt(),
+    };
+    solution.clocks.iter().enumerate().map(row).collect()
 }

@@ -5,6 +5,7 @@ use super::least_squares::{Corrections, Ionosphere, Range, position};
 use super::{NoFix, chi_square_threshold, consistent};
 use crate::gnss::broadcast::{ClockState, State};
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
+use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
 
@@ -43,6 +44,7 @@ fn ranges(sky: &[(f64, f64)], bias_s: f64) -> Vec<Range> {
             let clock = ClockState { offset_s: 1e-4 * f64::from(prn), drift: 0.0 };
             Range {
                 sv: Sv::gps(prn),
+                signal: &L1_CA,
                 // Back into the axes of the instant of emission.
                 satellite: State {
                     position_m: rotate_earth(&(here_m + distance_m * direction), -travel_s),
@@ -76,7 +78,7 @@ fn from_the_earth_s_centre_a_position_is_found_in_eight_iterations() {
     let found = position(&ranges(&SKY, 1e-3), Vector3::zeros(), &BARE).unwrap();
     assert!(found.iterations <= 8, "{}", found.iterations);
     assert!((found.position_m - place().to_ecef()).norm() < 2e-5);
-    assert!((found.clock_m / SPEED_OF_LIGHT_MPS - 1e-3).abs() < 1e-13);
+    assert!((found.clock_m() / SPEED_OF_LIGHT_MPS - 1e-3).abs() < 1e-13);
 }
 
 #[test]
@@ -154,8 +156,8 @@ fn residuals_and_positions_have_the_stated_statistics() {
         sum += found.chi_square;
         above += usize::from(found.chi_square > chi_square_threshold(6, 1e-2));
         let miss = found.position_m - truth_m;
-        let error = Vector4::new(miss.x, miss.y, miss.z, found.clock_m);
-        nees += (error.transpose() * found.covariance.try_inverse().unwrap() * error)[(0, 0)];
+        let error = Vector4::new(miss.x, miss.y, miss.z, found.clock_m());
+        nees += (error.transpose() * found.covariance.clone().try_inverse().unwrap() * error)[(0, 0)];
     }
     let runs = f64::from(runs);
     // Six degrees of freedom: variance 12 a run; four deviations of the mean. Four for position and clock: variance 8.
@@ -191,8 +193,8 @@ fn the_covariance_holds_an_ionospheric_error_that_all_satellites_share() {
         }
         let found = position(&noisy, truth_m, &corrections).unwrap();
         let miss = found.position_m - truth_m;
-        let error = Vector4::new(miss.x, miss.y, miss.z, found.clock_m);
-        nees += (error.transpose() * found.covariance.try_inverse().unwrap() * error)[(0, 0)];
+        let error = Vector4::new(miss.x, miss.y, miss.z, found.clock_m());
+        nees += (error.transpose() * found.covariance.clone().try_inverse().unwrap() * error)[(0, 0)];
         chi_square += found.chi_square;
         squares += miss.dot(&up) * miss.dot(&up);
         north += (axes * found.covariance.fixed_view::<3, 3>(0, 0) * axes.transpose())[(1, 1)];
@@ -268,6 +270,7 @@ mod with_real_orbits {
             let rate = (8.0 * (at(h).0 - at(-h).0) - (at(2.0 * h).0 - at(-2.0 * h).0)) / (12.0 * h);
             let carrier_hz = 1_575.42e6;
             ranges.push(Range {
+                signal: &L1_CA,
                 sv: set.sv,
                 satellite: state,
                 clock: set.clock_l1(emitted).unwrap(),

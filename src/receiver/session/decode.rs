@@ -6,13 +6,13 @@ use crate::gnss::record::{Event, EventRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
 use crate::receiver::decode::News;
-use crate::receiver::output::Output;
+use crate::receiver::output::{Record, Sink};
 use crate::receiver::run::ReceiveError;
 
 impl Session {
     /// Gives every symbol to its decoder and takes in what comes out; `end` is the sample after those that
     /// were followed.
-    pub(super) fn decode(&mut self, end: u64, output: &mut Output) -> Result<(), ReceiveError> {
+    pub(super) fn decode(&mut self, end: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         for index in 0..self.tracks.len() {
             let near = self.near();
             let Some(track) = self.tracks.get_mut(index) else { continue };
@@ -49,13 +49,13 @@ impl Session {
                         (before != Some(klobuchar)).then_some(Event::IonosphereDecoded)
                     }
                     News::Parameters(rows) => {
-                        output.navigation(&rows)?;
+                        sink.take(Record::Navigation(rows))?;
                         None
                     }
                     News::Ephemeris(ephemeris) => {
                         let sick = ephemeris.health != 0;
                         let before = self.ephemerides.insert(sv, *ephemeris).is_some_and(|set| set.health != 0);
-                        output.event(&EventRow { sample, sv, signal, event: Event::EphemerisComplete })?;
+                        sink.take(Record::Event(EventRow { sample, sv, signal, event: Event::EphemerisComplete }))?;
                         match (before, sick) {
                             (false, true) => Some(Event::Unhealthy),
                             (true, false) => Some(Event::Healthy),
@@ -64,7 +64,7 @@ impl Session {
                     }
                 };
                 if let Some(event) = event {
-                    output.event(&EventRow { sample, sv, signal, event })?;
+                    sink.take(Record::Event(EventRow { sample, sv, signal, event }))?;
                 }
             }
         }

@@ -2,14 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::{Session, Track};
+use super::{Session, Track, WRONG_TIME_FIXES};
 use crate::gnss::record::{Event, EventRow, Fix};
 use crate::gnss::signal::{Component, Signal};
 use crate::receiver::decode::Decoder;
 use crate::receiver::gap::scan::{Found, Profile, Scan};
 use crate::receiver::gap::{Fit, Jump, Step, Trend, common_step, doppler_step, turned_by};
 use crate::receiver::lead::lead;
-use crate::receiver::output::Output;
+use crate::receiver::output::{Record, Sink};
 use crate::receiver::run::ReceiveError;
 use crate::receiver::source::{Packed, Planes};
 use crate::receiver::track::loops::Rates;
@@ -102,16 +102,21 @@ impl Gap {
 }
 
 impl Session {
-    /// The signal that is received, and its component that leads.
+    /// The signal that is watched, the first of those that are received, and its component that leads.
     fn component(&self) -> Option<(&'static Signal, &'static Component)> {
-        let signal = self.signal?;
+        let signal = self.signal()?;
         Some((signal, lead(signal)?))
     }
 
+    /// Whether samples that are lost are sought in this track's code.
+    fn is_watched(&self, track: &Track) -> bool {
+        self.signal() == Some(track.channel.signal())
+    }
+
     /// Looks at all codes at the end of a block, and goes on with what it suspects.
-    pub(super) fn leap(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
+    pub(super) fn leap(&mut self, block: &Packed, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         match self.gap.stage {
-            Stage::Scanning { since, whole } => self.scan(block, since, whole, output)?,
+            Stage::Scanning { since, whole } => self.scan(block, since, whole, sink)?,
             Stage::Quiet | Stage::Settling { .. } => {}
         }
         let now = block.end();
@@ -120,16 +125,19 @@ impl Session {
         }
         let before = std::mem::replace(&mut self.gap.last_look, now);
         let middle_s = 0.5 * (self.metadata.rate.elapsed_s(before) + self.metadata.rate.elapsed_s(now));
-        let glances: Vec<Option<Glance>> = self.tracks.iter_mut().map(|track| track.channel.glance()).collect();
+        let watched = self.signal();
+        let glances: Vec<Option<Glance>> = (self.tracks.iter_mut())
+            .map(|track| track.channel.glance().filter(|_| Some(track.channel.signal()) == watched))
+            .collect();
         match self.gap.stage {
             Stage::Quiet => {
                 self.suspect(&glances, middle_s, before);
-                self.compare_edges(now, output)?;
+                self.compare_edges(now, sink)?;
             }
             Stage::Scanning { .. } => {}
             Stage::Settling { since, moved, found, whole } => {
                 self.gather(&glances, middle_s);
-                self.settle(now, since, moved, found, whole, output)?;
+                self.settle(now, since, moved, found, whole, sink)?;
             }
         }
         Ok(())
@@ -137,7 +145,7 @@ impl Session {
 
     /// Deviation of a look of so many code periods at a channel's code.
     fn look_chips(&self, track: &Track, periods: f64) -> f64 {
-        let noise = &self.code_noise;
+        let Some(noise) = self.noise(track.channel.signal()) else { return 0.0 };
         let t_s = periods * self.component().map_or(1e-3, |(_, component)| component.period_s());
         // A loop of bandwidth B averages over 1/(2B).
         let open = 1.0 / (2.0 * noise.bandwidth_hz * t_s).sqrt();
@@ -187,19 +195,18 @@ impl Session {
     }
 
     /// Whether signs turn elsewhere than where symbols begin: then code periods are missing, and nothing else shows it.
-    fn compare_edges(&mut self, now: u64, output: &mut Output) -> Result<(), ReceiveError> {
+    fn compare_edges(&mut self, now: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         if self.gap.stage != Stage::Quiet || now < self.gap.last_edges + self.samples(EDGES_S) {
             return Ok(());
         }
         let since = std::mem::replace(&mut self.gap.last_edges, now);
         let begins: Vec<Option<u64>> = self.tracks.iter().map(|track| track.channel.symbols_begin()).collect();
-        let edges: Vec<_> = self
-            .tracks
-            .iter()
-            .zip(&begins)
+        let edges: Vec<_> = (self.tracks.iter().zip(&begins))
+            .filter(|(track, _)| self.is_watched(track))
             .filter_map(|(track, begin)| Some((track.channel.edges(), (*begin)?)))
             .collect();
-        let enough = edges.len() >= LEAST_CHANNELS && edges.len() as f64 >= VANISHED_SHARE * self.tracks.len() as f64;
+        let watched = self.tracks.iter().filter(|track| self.is_watched(track)).count();
+        let enough = edges.len() >= LEAST_CHANNELS && edges.len() as f64 >= VANISHED_SHARE * watched as f64;
         let moved = enough && turned_by(&edges).is_some_and(|turned| turned != 0);
         self.tracks.iter_mut().for_each(|track| track.channel.forget_edges());
         if !moved {
@@ -208,11 +215,11 @@ impl Session {
         for (track, begin) in self.tracks.iter_mut().zip(begins) {
             track.watched.begin = begin;
         }
-        self.reseat(now, since, Found { samples: 0, seconds: 0.0 }, true, output)
+        self.reseat(now, since, Found { samples: 0, seconds: 0.0 }, true, sink)
     }
 
     /// Correlates a block at all delays, and moves the replicas when that shows where the codes are.
-    fn scan(&mut self, block: &Packed, since: u64, whole: bool, output: &mut Output) -> Result<(), ReceiveError> {
+    fn scan(&mut self, block: &Packed, since: u64, whole: bool, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let Some((signal, component)) = self.component() else { return Ok(()) };
         let rate_hz = self.metadata.rate.hz();
         let middle_s = self.metadata.rate.elapsed_s((block.first + block.end()) / 2);
@@ -241,7 +248,7 @@ impl Session {
         match scan.decide(&profiles).filter(|_| enough) {
             // A power that vanished without a jump is someone else's matter.
             Some(found) if found.samples == 0 && !whole => self.calm(),
-            Some(found) => self.reseat(block.end(), since, found, whole, output)?,
+            Some(found) => self.reseat(block.end(), since, found, whole, sink)?,
             None if block.end() > since + self.samples(SCAN_S) => self.calm(),
             None => {}
         }
@@ -261,14 +268,20 @@ impl Session {
         since: u64,
         found: Found,
         whole: bool,
-        output: &mut Output,
+        sink: &mut dyn Sink,
     ) -> Result<(), ReceiveError> {
         let Some((signal, component)) = self.component() else { return Ok(()) };
         let ratio = signal.centre_hz() / component.chip_rate_hz;
         let sample_chips = component.chip_rate_hz / self.metadata.rate.hz();
         let now_s = self.metadata.rate.elapsed_s(now);
         let mut report = Report::default();
+        let main = self.signal();
         for track in &mut self.tracks {
+            if Some(track.channel.signal()) != main {
+                // Its periods are others: it is searched for anew.
+                (track.dropped, track.wrong_time) = (true, WRONG_TIME_FIXES);
+                continue;
+            }
             let watched = &mut track.watched;
             watched.since = (0.0, 0.0, 0);
             let Some(glanced) = watched.rates else {
@@ -283,7 +296,7 @@ impl Session {
             track.line.clear();
             let (sv, signal) = (track.channel.sv(), track.channel.signal());
             for (sample, event) in report.events.drain(..) {
-                output.event(&EventRow { sample, sv, signal, event })?;
+                sink.take(Record::Event(EventRow { sample, sv, signal, event }))?;
             }
         }
         self.window = None;
@@ -335,16 +348,17 @@ impl Session {
         moved: u64,
         found: Found,
         whole: bool,
-        output: &mut Output,
+        sink: &mut dyn Sink,
     ) -> Result<(), ReceiveError> {
         let waited = now.saturating_sub(moved);
         if waited < self.samples(TURNS_S) {
             return Ok(());
         }
         let Some((signal, component)) = self.component() else { return Ok(()) };
-        let group = component.message.map_or(1, |message| u64::from(message.periods_per_symbol()));
-        let edges: Vec<_> =
-            self.tracks.iter().filter_map(|track| Some((track.channel.edges(), track.watched.begin?))).collect();
+        let group = u64::from(component.periods_per_symbol().unwrap_or(1));
+        let edges: Vec<_> = (self.tracks.iter().filter(|track| self.is_watched(track)))
+            .filter_map(|track| Some((track.channel.edges(), track.watched.begin?)))
+            .collect();
         let steps = self.steps();
         let turned = turned_by(&edges).filter(|_| edges.len() >= LEAST_CHANNELS);
         let period_samples = component.period_s() * self.metadata.rate.hz();
@@ -378,7 +392,7 @@ impl Session {
         let foreseen = known.is_some() && (ahead / rate_hz).abs() < FORESEEN_S;
         let now_s = self.metadata.rate.elapsed_s(now);
         let ratio = signal.centre_hz() / component.chip_rate_hz;
-        for track in &mut self.tracks {
+        for track in self.tracks.iter_mut().filter(|track| track.channel.signal() == signal) {
             let watched = &mut track.watched;
             let doppler = watched.rates.map_or(0.0, |rates| track.channel.code_doppler_hz(&rates) / ratio);
             let (chips, _, looks) = watched.since;
@@ -400,27 +414,27 @@ impl Session {
         if known.is_none() {
             self.gap.unknown = Some(since);
         } else if samples != 0 {
-            self.report(since, samples, output)?;
+            self.report(since, samples, sink)?;
         }
         Ok(())
     }
 
     /// Writes what happened, and sets the clock.
-    fn report(&mut self, sample: u64, samples: i64, output: &mut Output) -> Result<(), ReceiveError> {
+    fn report(&mut self, sample: u64, samples: i64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         self.timebase.step(samples);
         self.gap.jumps.push(Jump { sample, samples });
         self.gap.unknown = None;
         let event = if samples > 0 { Event::SamplesLost } else { Event::SamplesDoubled };
         for track in self.tracks.iter().filter(|track| !track.channel.is_lost()) {
             let (sv, signal) = (track.channel.sv(), track.channel.signal());
-            output.event(&EventRow { sample, sv, signal, event })?;
+            sink.take(Record::Event(EventRow { sample, sv, signal, event }))?;
         }
         Ok(())
     }
 
     /// Compares a fix's clock with that of the fix before: a jump that no channel lived through shows in it.
     /// Says whether the fix is to be left out, as its clock is to be set first.
-    pub(super) fn clock_jumped(&mut self, fix: &Fix, output: &mut Output) -> Result<bool, ReceiveError> {
+    pub(super) fn clock_jumped(&mut self, fix: &Fix, sink: &mut dyn Sink) -> Result<bool, ReceiveError> {
         let rate = self.metadata.rate;
         let sigma_s = fix.sigma_clock_m / crate::gnss::earth::SPEED_OF_LIGHT_MPS;
         let now = (fix.sample, fix.clock_bias_s, fix.clock_drift, sigma_s);
@@ -437,7 +451,7 @@ impl Session {
             return Ok(false);
         }
         let at = at.unwrap_or(sample);
-        self.report(at, samples.round() as i64, output)?;
+        self.report(at, samples.round() as i64, sink)?;
         self.solver.jump(false);
         self.gap.last_fix = Some((sample, bias_s, drift, before_s));
         Ok(true)

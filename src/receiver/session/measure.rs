@@ -3,7 +3,7 @@
 use super::{Session, WRONG_TIME_FIXES};
 use crate::gnss::record::Observation;
 use crate::receiver::observe::Reading;
-use crate::receiver::output::Output;
+use crate::receiver::output::{Record, Sink};
 use crate::receiver::run::ReceiveError;
 
 /// Residuals beyond this are no noise: the channel has the wrong time.
@@ -11,7 +11,7 @@ const WRONG_TIME_M: f64 = 10_000.0;
 
 impl Session {
     /// Observes and solves at one tick.
-    pub(super) fn measure(&mut self, tick: u64, output: &mut Output) -> Result<(), ReceiveError> {
+    pub(super) fn measure(&mut self, tick: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let readings: Vec<Reading> = self
             .tracks
             .iter()
@@ -23,16 +23,17 @@ impl Session {
             .collect();
         let observed = self.timebase.observe(tick, &readings);
         for one in observed.iter().filter(|one| one.half_cycle_known) {
-            output.observation(&one.observation)?;
+            sink.take(Record::Observation(one.observation.clone()))?;
         }
         let Some(clock) = self.timebase.clock() else { return Ok(()) };
         let observations: Vec<Observation> = observed.into_iter().map(|one| one.observation).collect();
         match self.solver.solve(tick, clock, &observations, &self.ephemerides, self.klobuchar) {
             Ok(solved) => {
-                if self.clock_jumped(&solved.fix, output)? {
+                if self.clock_jumped(&solved.fix, sink)? {
                     return Ok(());
                 }
-                output.fix(&solved.fix)?;
+                sink.take(Record::Fix(solved.fix.clone()))?;
+                sink.take(Record::Clocks(solved.clocks))?;
                 let condition = solved.fix.condition;
                 self.worst_condition = Some(self.worst_condition.map_or(condition, |worst| worst.max(condition)));
                 self.fixes += 1;

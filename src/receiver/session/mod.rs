@@ -13,7 +13,7 @@ use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::{EventRow, LineRow};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Link, Signal};
+use crate::gnss::signal::{Component, Link, Signal};
 use crate::gnss::time::Epoch;
 use crate::receiver::acquire::{self, Searcher};
 use crate::receiver::decode::Decoder;
@@ -22,10 +22,10 @@ use crate::receiver::interference::Watch;
 use crate::receiver::lead::{lead, refusal};
 use crate::receiver::looks::Looks;
 use crate::receiver::observe::Timebase;
-use crate::receiver::output::Output;
+use crate::receiver::output::{Record, Sink};
 use crate::receiver::parting::{Estimate, Line, Offset};
 use crate::receiver::position::least_squares::{LARGEST_CONDITION, UNKNOWNS};
-use crate::receiver::position::{CodeNoise, NoFix, Solver};
+use crate::receiver::position::{CodeNoise, NoFix, Noises, Solver};
 use crate::receiver::run::{Conditioning, Interfered, Outcome, ReceiveError, candidates, warnings};
 use crate::receiver::settings::Settings;
 use crate::receiver::source::{Block, Packed, Planes};
@@ -90,8 +90,8 @@ pub(super) struct Session {
     metadata: IfMetadata,
     settings: Settings,
     week_reference: Epoch,
-    /// The signal that is received.
-    signal: Option<&'static Signal>,
+    /// The signals that are received; of the first one samples are watched for being lost.
+    signals: Vec<&'static Signal>,
     candidates: Vec<Link>,
     searcher: Searcher,
     /// Where it looks, and whether as after the first search.
@@ -112,7 +112,7 @@ pub(super) struct Session {
     refused: BTreeMap<Link, u64>,
     timebase: Timebase,
     solver: Solver,
-    code_noise: CodeNoise,
+    noises: Noises,
     offset: Offset,
     /// Channels that measure it.
     lines: usize,
@@ -144,29 +144,22 @@ impl Session {
         let week_reference = settings.week_reference().map_err(|source| {
             crate::receiver::settings::SettingsError::Week { origin: "settings".to_owned(), source }
         })?;
-        let mut signals = settings.acquisition.signals();
+        let asked = settings.acquisition.signals();
+        let mut signals = asked.clone();
         signals.retain(|signal| acquire::can_hold(metadata, signal));
-        if let [first, second, ..] = signals.as_slice() {
-            return Err(ReceiveError::Several { first: first.name, second: second.name });
+        // Samples that hold none of them are searched all the same: that nothing is found has a diagnosis.
+        if signals.is_empty() {
+            signals.extend(asked.first());
         }
-        let signal = signals.first().or(settings.acquisition.signals().first()).copied();
-        if let Some((signal, reason)) = signal.and_then(|signal| Some((signal, refusal(signal)?))) {
+        if let Some((signal, reason)) = signals.iter().find_map(|signal| Some((signal, refusal(signal)?))) {
             return Err(ReceiveError::Unsupported { signal: signal.name, reason });
         }
-        let component = signal.and_then(lead);
-        let (chip_rate_hz, period_s) = component.map_or((1.0, 1.0), |c| (c.chip_rate_hz, c.period_s()));
-        let noise = CodeNoise {
-            chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
-            shape: component
-                .and_then(|c| ReplicaModel::new(&settings.tracking, c, metadata.rate.hz()))
-                .map_or(CodeShape::triangle(settings.tracking.spacing_chips), |model| model.shape),
-            bandwidth_hz: settings.tracking.dll_bandwidth_hz,
-            integration_s: period_s * f64::from(settings.tracking.integration),
-        };
+        let noises: Noises = signals.iter().map(|signal| (*signal, noise(signal, metadata, settings))).collect();
+        let period_s = signals.first().and_then(|signal| lead(signal)).map_or(1.0, Component::period_s);
         Ok(Self {
             metadata: metadata.clone(),
             settings: settings.clone(),
-            signal,
+            signals,
             week_reference,
             candidates: candidates(metadata, &settings.acquisition),
             searcher: Searcher::new(metadata, &settings.acquisition)?,
@@ -184,8 +177,8 @@ impl Session {
             lost: BTreeMap::new(),
             refused: BTreeMap::new(),
             timebase: Timebase::new(metadata.rate, metadata.start),
-            solver: Solver::new(&settings.position, noise, metadata.rate),
-            code_noise: noise,
+            solver: Solver::new(&settings.position, noises.clone(), metadata.rate),
+            noises,
             offset: Offset::default(),
             lines: 0,
             offset_moved: 0,
@@ -210,29 +203,39 @@ impl Session {
         })
     }
 
+    /// The first signal, by whose band offsets are told.
+    fn signal(&self) -> Option<&'static Signal> {
+        self.signals.first().copied()
+    }
+
+    /// Noise of the code loop of a signal.
+    fn noise(&self, signal: &Signal) -> Option<&CodeNoise> {
+        self.noises.iter().find(|(of, _)| *of == signal).map(|(_, noise)| noise)
+    }
+
     fn samples(&self, seconds: f64) -> u64 {
         (seconds * self.metadata.rate.hz()) as u64
     }
 
     /// Takes the next block through the whole chain.
-    pub(super) fn process(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
-        self.search(block, output)?;
+    pub(super) fn process(&mut self, block: &Packed, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        self.search(block, sink)?;
         let (ticks, measured) = self.ticks(block);
         self.follow(block, &ticks);
-        self.record(output)?;
-        self.leap(block, output)?;
+        self.record(sink)?;
+        self.leap(block, sink)?;
         if !self.gap.is_busy() {
             self.part(block.end());
         }
-        self.decode(block.end(), output)?;
+        self.decode(block.end(), sink)?;
         for tick in measured {
             // Nothing is right while codes are not where they were to be.
             if !self.gap.is_busy() {
-                self.measure(tick, output)?;
+                self.measure(tick, sink)?;
             }
         }
-        self.watch(block, output)?;
-        self.retire(block.end(), output)?;
+        self.watch(block, sink)?;
+        self.retire(block.end(), sink)?;
         self.hasten(block.end());
         Ok(())
     }
@@ -258,7 +261,7 @@ impl Session {
     }
 
     /// Looks for continuous waves, and tells of those that are none of the satellites' own lines.
-    fn watch(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
+    fn watch(&mut self, block: &Packed, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let mut followed: Vec<f64> = self.tracks.iter().map(|track| track.cn0_dbhz).collect();
         followed.sort_by(f64::total_cmp);
         // A channel's first estimates may be low; the search's is not.
@@ -275,7 +278,7 @@ impl Session {
                 continue;
             };
             let row = LineRow { js_db: self.quiet_dbhz.map(|dbhz| row.jn0_dbhz - dbhz), ..row };
-            output.interference(&row)?;
+            sink.take(Record::Interference(row.clone()))?;
             let seen = self.interfered.get_or_insert_with(|| Interfered { spectra: 0, strongest: row.clone() });
             seen.spectra += 1;
             if row.jn0_dbhz > seen.strongest.jn0_dbhz {
@@ -309,14 +312,14 @@ impl Session {
     }
 
     /// Writes rows and events of all channels.
-    fn record(&mut self, output: &mut Output) -> Result<(), ReceiveError> {
+    fn record(&mut self, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         for track in &mut self.tracks {
             for row in &track.report.rows {
-                output.tracking(row)?;
+                sink.take(Record::Tracking(row.clone()))?;
             }
             for &(sample, event) in &track.report.events {
                 let (sv, signal) = (track.channel.sv(), track.channel.signal());
-                output.event(&EventRow { sample, sv, signal, event })?;
+                sink.take(Record::Event(EventRow { sample, sv, signal, event }))?;
             }
             if let Some(last) = track.report.measurements.last() {
                 track.cn0_dbhz = last.cn0_dbhz;
@@ -383,6 +386,21 @@ impl Session {
             return Stage::NoEphemeris { complete, missing: self.progress.iter().filter_map(lacking).collect() };
         }
         Stage::NoPosition { with_ephemeris: complete, reason: self.reason.clone() }
+    }
+}
+
+/// Noise of the code loops that follow a signal.
+fn noise(signal: &'static Signal, metadata: &IfMetadata, settings: &Settings) -> CodeNoise {
+    let component = lead(signal);
+    let tracking = component.map_or(settings.tracking.clone(), |component| settings.tracking.fitted(component));
+    let (chip_rate_hz, period_s) = component.map_or((1.0, 1.0), |c| (c.chip_rate_hz, c.period_s()));
+    CodeNoise {
+        chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
+        shape: component
+            .and_then(|c| ReplicaModel::new(&tracking, c, metadata.rate.hz()))
+            .map_or(CodeShape::triangle(tracking.spacing_chips), |model| model.shape),
+        bandwidth_hz: tracking.dll_bandwidth_hz,
+        integration_s: period_s * f64::from(tracking.integration),
     }
 }
 

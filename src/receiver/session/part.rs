@@ -29,8 +29,9 @@ impl Session {
             }
             let link = track.channel.link();
             track.line.take(track.channel.phases(), link, self.metadata.rate);
-            let sigma_m = self.code_noise.sigma_m(libm::pow(10.0, track.cn0_dbhz / 10.0));
-            lines.extend(track.line.estimate(sigma_m / link.wavelength_m(), self.code_noise.bandwidth_hz));
+            let Some((_, noise)) = self.noises.iter().find(|(of, _)| *of == link.signal) else { continue };
+            let sigma_m = noise.sigma_m(libm::pow(10.0, track.cn0_dbhz / 10.0));
+            lines.extend(track.line.estimate(sigma_m / link.wavelength_m(), noise.bandwidth_hz));
         }
         self.lines = lines.len();
         if let Some(estimate) = common(&lines) {
@@ -74,7 +75,7 @@ impl Session {
 
     /// What flags fit these samples better, in words.
     pub(in crate::receiver) fn findings(&self) -> Vec<String> {
-        let Some(signal) = self.signal else { return Vec::new() };
+        let Some(signal) = self.signal() else { return Vec::new() };
         let mut findings = Vec::new();
         if let Some(estimate) = self.mirrored.filter(|_| self.fixes == 0) {
             let cure = if self.metadata.inverted { "leave --inverted out" } else { "--inverted" };
@@ -106,13 +107,13 @@ impl Session {
     /// What the outcome says of it.
     pub(super) fn parted(&self) -> Option<Parted> {
         let offset = self.offset.believed()?;
-        let carrier_hz = self.signal?.centre_hz();
+        let carrier_hz = self.signal()?.centre_hz();
         let sense = if self.metadata.inverted { -1.0 } else { 1.0 };
         Some(Parted {
             offset_hz: offset.hz,
             sigma_hz: offset.sigma_hz,
             rate_error_ppm: 1e6 * offset.hz / carrier_hz,
-            if_hz: self.signal.map_or(0.0, |signal| self.metadata.if_hz(signal.centre_hz())) + sense * offset.hz,
+            if_hz: self.signal().map_or(0.0, |signal| self.metadata.if_hz(signal.centre_hz())) + sense * offset.hz,
             rate_hz: self.metadata.rate.hz() * (1.0 + offset.hz / carrier_hz),
             code_drift: self.clock_drift,
         })

@@ -30,7 +30,7 @@ impl Session {
     /// Where to look now.
     pub(super) fn sweep(&self) -> Sweep {
         let half_hz = self.settings.acquisition.doppler_max_hz;
-        let carrier_hz = self.signal.map_or(0.0, |signal| signal.centre_hz());
+        let carrier_hz = self.signal().map_or(0.0, |signal| signal.centre_hz());
         let offset_hz = self.offset.hz();
         let grid = |hz: f64| (hz / CENTRE_STEP_HZ).round() * CENTRE_STEP_HZ;
         if let Some(drift) = self.clock_drift {

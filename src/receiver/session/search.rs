@@ -8,7 +8,7 @@ use crate::gnss::record::{AcquisitionRow, Event, EventRow};
 use crate::gnss::signal::Link;
 use crate::receiver::acquire::{self, Acquired};
 use crate::receiver::decode::Decoder;
-use crate::receiver::output::Output;
+use crate::receiver::output::{Record, Sink};
 use crate::receiver::parting::Line;
 use crate::receiver::run::ReceiveError;
 use crate::receiver::source::{Packed, Planes};
@@ -21,7 +21,7 @@ const REFUSED_S: f64 = 120.0;
 
 impl Session {
     /// Collects samples while a search is due, searches when there are enough, starts channels.
-    pub(super) fn search(&mut self, block: &Packed, output: &mut Output) -> Result<(), ReceiveError> {
+    pub(super) fn search(&mut self, block: &Packed, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let end = block.end();
         if self.window.is_none() {
             if end <= self.next_search {
@@ -48,7 +48,7 @@ impl Session {
         if !all_found {
             let results = self.searcher.search(&window.block(), &self.candidates)?;
             self.look(&results, end);
-            self.start_channels(results, block.first, output)?;
+            self.start_channels(results, block.first, sink)?;
         }
         self.searched = true;
         self.widen();
@@ -58,14 +58,14 @@ impl Session {
 
     /// Searches a recording that ended before the first search had all the samples that it asks for: by fewer
     /// sums, and by sums of one code period where there is no room for another.
-    pub(in crate::receiver) fn search_rest(&mut self, output: &mut Output) -> Result<(), ReceiveError> {
+    pub(in crate::receiver) fn search_rest(&mut self, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let Some(window) = self.window.take().filter(|_| !self.searched) else { return Ok(()) };
         let have = window.samples.i.len() as u64;
         let Some(settings) = acquire::shortened(&self.metadata, &self.settings.acquisition, have)? else {
             return Ok(());
         };
         let results = acquire::search(&self.metadata, &window.block(), &self.candidates, &settings)?;
-        self.start_channels(results, window.first, output)?;
+        self.start_channels(results, window.first, sink)?;
         self.searched = true;
         Ok(())
     }
@@ -80,7 +80,7 @@ impl Session {
         &mut self,
         results: Vec<(AcquisitionRow, Option<Acquired>)>,
         since: u64,
-        output: &mut Output,
+        sink: &mut dyn Sink,
     ) -> Result<(), ReceiveError> {
         let followed: BTreeSet<Link> = self.tracks.iter().map(|track| track.channel.link()).collect();
         for (row, hit) in results {
@@ -93,13 +93,18 @@ impl Session {
             }
             // Of later searches only what was found says anything new.
             if row.acquired || !self.searched {
-                output.acquisition(&row)?;
+                sink.take(Record::Acquisition(row.clone()))?;
             }
             let Some(hit) = hit else { continue };
             self.acquired.insert(hit.sv);
             self.lost.remove(&key);
             self.progress.entry(hit.sv).or_default();
-            output.event(&EventRow { sample: hit.sample, sv: hit.sv, signal: hit.signal, event: Event::Acquired })?;
+            sink.take(Record::Event(EventRow {
+                sample: hit.sample,
+                sv: hit.sv,
+                signal: hit.signal,
+                event: Event::Acquired,
+            }))?;
             let mut channel = Channel::start(&hit, &self.metadata, &self.settings.tracking);
             channel.set_carrier_offset(self.offset.hz());
             self.tracks.push(Track {
@@ -130,7 +135,7 @@ impl Session {
     }
 
     /// Takes away channels that lost their signal, say what cannot be, or lead nowhere.
-    pub(super) fn retire(&mut self, now: u64, output: &mut Output) -> Result<(), ReceiveError> {
+    pub(super) fn retire(&mut self, now: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let limit = self.samples(self.settings.operation.frame_limit_s);
         let refused = now + self.samples(REFUSED_S);
         let mut gone = false;
@@ -144,7 +149,7 @@ impl Session {
                 self.lost.insert(link, now);
             } else if track.dropped || fruitless {
                 let event = Event::LossOfLock;
-                output.event(&EventRow { sample: now.saturating_sub(1), sv, signal, event })?;
+                sink.take(Record::Event(EventRow { sample: now.saturating_sub(1), sv, signal, event }))?;
                 // A wrong time may come right when the satellite is acquired anew; an echo does not.
                 if track.wrong_time < WRONG_TIME_FIXES {
                     self.refused.insert(link, refused);

@@ -20,7 +20,7 @@ use super::sync::SymbolSync;
 use super::{Report, Symbol, TrackingSettings};
 use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Link, Signal};
+use crate::gnss::signal::{Component, Link, Signal};
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
 use crate::receiver::correlate::{Arithmetic, Replica, Wave, chips_to_units, units_to_chips};
@@ -171,7 +171,7 @@ impl Channel {
         // Signs of prompts are anyone's guess until the overlay's are known.
         let group = match message {
             _ if overlay.is_some() => 1,
-            Some(message) => message.periods_per_symbol(),
+            Some(_) => component.and_then(Component::periods_per_symbol).unwrap_or(1),
             None => pilot_group(period_s),
         };
         let has_symbols = message.is_some() || overlay.is_some();

@@ -7,10 +7,11 @@ use num_complex::Complex64;
 
 use super::tests::Normal;
 use super::*;
+use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
-use crate::gnss::signal::{Component, Link, Message, Signal};
+use crate::gnss::signal::{Component, Link, Signal};
 use crate::gnss::time::Rate;
 use crate::receiver::acquire::{Acquired, AcquisitionSettings, search};
 use crate::receiver::lead::lead;
@@ -53,8 +54,8 @@ impl Made {
 
     /// Random symbols: those of a message, or one a period where the power is that of data.
     fn symbol(&self, period: i64) -> f64 {
-        match self.component.message {
-            Some(message) => sign(period.div_euclid(i64::from(message.periods_per_symbol()))),
+        match self.component.periods_per_symbol() {
+            Some(periods) => sign(period.div_euclid(i64::from(periods))),
             None if self.component.power_share < 0.3 => sign(period),
             None => 1.0,
         }
@@ -157,7 +158,7 @@ fn sign(number: i64) -> f64 {
 static READ: Signal = Signal {
     name: "synthetic B with data",
     components: &[
-        Component { message: Some(Message::GpsLnav), ..QUADRATURE.components[0] },
+        Component { message: Some(&LNAV), ..QUADRATURE.components[0] },
         Component { ..QUADRATURE.components[1] },
     ],
     ..QUADRATURE
@@ -295,8 +296,8 @@ fn every_synthetic_signal_is_followed_with_the_phase_of_the_whole_signal() {
         assert!((found.cn0_dbhz - sky.cn0_dbhz).abs() < 1.0, "{}: {} dB-Hz", sky.link, found.cn0_dbhz);
         // Data beside a pilot: the channel's periods are counted from its own first.
         let data = sky.link.signal.components.iter().find(|c| c.message.is_some());
-        if let Some(message) = data.and_then(|data| data.message).filter(|_| is_pilot) {
-            let length = i64::from(message.periods_per_symbol());
+        if let Some(periods) = data.and_then(Component::periods_per_symbol).filter(|_| is_pilot) {
+            let length = i64::from(periods);
             let first = (sky.sent_s / component.period_s()).floor() as i64;
             assert!(found.symbols.len() >= 50, "{}", sky.link);
             for symbol in &found.symbols {

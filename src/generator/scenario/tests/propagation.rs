@@ -1,6 +1,7 @@
 //! What lies between satellites and antenna, as a scenario writes it.
 
 use super::*;
+use crate::gnss::gps::lnav;
 
 pub(super) const IONEX: &str = "[ionosphere]\nmodel = \"ionex\"\nfile = \"igrg3380.10i.gz\"\nmap_start = 2010-12-04T10:00:00\n\
     interpolation = \"bicubic\"\nmapping = \"modified_single_layer\"\n";
@@ -20,8 +21,8 @@ fn what_the_satellites_send_stands_apart_from_what_nature_does() {
         // Page 18 of subframe 4 comes within 25 frames of 30 s, the fourth subframe 18 s into a frame.
         let found = (0..26).find_map(|k| {
             let at = Epoch::new(scene.clock.start.seconds() / 30 * 30 + 30 * k + 18, 0.0);
-            let words = scene.broadcast.subframe(ephemeris, at).ok()?;
-            crate::gnss::gps::lnav::Subframe::decode(&words, 0).ok()?.klobuchar()
+            let symbols = scene.messages.of(&lnav::LNAV)?.unit(ephemeris, at).ok()?;
+            lnav::Subframe::decode(&lnav::words(&symbols), 0).ok()?.klobuchar()
         });
         (truth, found)
     };

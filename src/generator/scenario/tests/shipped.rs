@@ -84,12 +84,12 @@ fn the_boost_changes_some_satellite_s_doppler_by_about_a_thousand_hertz_a_second
 
 #[test]
 fn the_static_scene_sends_its_ionosphere_within_thirty_seconds() {
-    use crate::gnss::gps::lnav::Subframe;
+    use crate::gnss::gps::lnav::{self, Subframe};
     let scene = shipped("static");
     let first_bit = scene.clock.start.plus_s(20.0);
     let ephemeris = scene.catalogue.sent_at(Sv::gps(13), first_bit).unwrap();
-    let words = scene.broadcast.subframe(ephemeris, first_bit).unwrap();
-    let subframe = Subframe::decode(&words, 0).unwrap();
+    let symbols = scene.messages.of(&lnav::LNAV).unwrap().unit(ephemeris, first_bit).unwrap();
+    let subframe = Subframe::decode(&lnav::words(&symbols), 0).unwrap();
     let sent = subframe.klobuchar().unwrap();
     let file = crate::gnss::rinex::embedded().unwrap().klobuchar.unwrap();
     for (sent, file) in sent.alpha.iter().zip(file.alpha) {

@@ -3,7 +3,8 @@
 //! Source: IS-GPS-200N, 20.3.3.5 and table 20-V. An almanac is an ephemeris without its
 //! corrections, moved to a common reference time; it is good to a few kilometres for days.
 
-use super::fields::{ALMANAC_PAGE, FieldError, IONOSPHERE_PAGE, UTC_PAGE, write_all};
+use super::fields::{ALMANAC_PAGE, IONOSPHERE_PAGE, UTC_PAGE};
+use crate::gnss::bits::{FieldError, write_all};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2, GPS_PI};
 use crate::gnss::klobuchar::Klobuchar;

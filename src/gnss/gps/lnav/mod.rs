@@ -6,21 +6,23 @@
 mod almanac;
 mod fields;
 mod parity;
+mod reader;
 
 use thiserror::Error;
 
+pub use crate::gnss::bits::{Field, FieldError, Kind};
 pub use almanac::{ALMANAC_INCLINATION_SEMICIRCLES, Almanac, LeapEvent, Utc, UtcData, UtcPolynomial};
-pub use fields::{Field, FieldError, Kind, tables};
+pub use fields::tables;
 pub use parity::check_parity;
+pub use reader::LnavReader;
 
+use crate::gnss::bits::{add_to, integers, quantise_all, read_all, write_all};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::satellite::Sv;
+use crate::gnss::message::{Common, Message, Sender};
+use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::{Epoch, WEEK_S};
-use fields::{
-    ALMANAC_PAGE, IONOSPHERE_PAGE, SUBFRAME_1, SUBFRAME_2, SUBFRAME_3, UTC_PAGE, add_to, integers, quantise_all,
-    read_all, write_all,
-};
+use fields::{ALMANAC_PAGE, IONOSPHERE_PAGE, SUBFRAME_1, SUBFRAME_2, SUBFRAME_3, UTC_PAGE};
 
 /// Seconds of a subframe (IS-GPS-200N, 20.3.2).
 pub const SUBFRAME_S: i64 = 6;
@@ -30,8 +32,74 @@ pub const PREAMBLE: u32 = 0x8B;
 const TOW_COUNTS: u32 = (WEEK_S / SUBFRAME_S) as u32;
 /// Pages of subframes 4 and 5 (IS-GPS-200N, 20.3.2).
 const PAGES: i64 = 25;
+/// Bits of a word.
+const WORD_BITS: usize = 30;
 /// The anti-spoof flag of the HOW, as every operational satellite sets it (IS-GPS-200N, 20.3.3.2).
 const ANTI_SPOOF: u32 = 1;
+
+/// LNAV as signals name it.
+pub static LNAV: Message = Message {
+    name: "LNAV",
+    symbol_s: 0.02,
+    unit_s: SUBFRAME_S,
+    first_s: 0,
+    sender: |common| Ok(Box::new(Broadcast::of(common)?)),
+    number: subframe_at,
+    timed: &[1, 2, 3, 4, 5],
+    set: &[1, 2, 3],
+    ionosphere: |start| subframe_at(start) == 4 && start.tow_whole_s() / (5 * SUBFRAME_S) % PAGES == IONOSPHERE_PAGE_AT,
+    set_parameters: || {
+        let orbit = tables().into_iter().filter(|(name, _)| name.starts_with("subframe"));
+        orbit.flat_map(|(_, fields)| fields).map(|field| field.name).collect()
+    },
+    elements: of_integers,
+    parameters: opened,
+    reader: |sv| Box::new(LnavReader::new(sv)),
+    quantised,
+    adjust,
+};
+
+/// The page of subframe 4 that carries the ionosphere, counted from 0 (IS-GPS-200N, 20.3.3.5.1.7).
+const IONOSPHERE_PAGE_AT: i64 = 17;
+
+/// The elements that raw integers give, as if their subframes had been sent at `near`.
+fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option<Ephemeris> {
+    // The count is that of the subframe after; ten minutes more or less change no reference time.
+    let tow_count = (near.tow_whole_s() / SUBFRAME_S + 1) as u32 % TOW_COUNTS;
+    let subframe = |id: u8| {
+        let mut data = [0; 10];
+        let name = format!("subframe {id}");
+        let (_, fields) = tables().into_iter().find(|(table, _)| *table == name)?;
+        for field in fields {
+            field.write(&mut data, raw(field.name)?);
+        }
+        Some(Subframe { id, tow_count, alert: false, antispoof: false, data })
+    };
+    ephemeris(sv, &subframe(1)?, &subframe(2)?, &subframe(3)?, near).ok()
+}
+
+/// Number of the subframe that begins at a time (IS-GPS-200N, 20.3.2).
+fn subframe_at(start: Epoch) -> u8 {
+    (start.tow_whole_s() / SUBFRAME_S % 5 + 1) as u8
+}
+
+/// The ten 30-bit words of a subframe's symbols.
+pub fn words(symbols: &[bool]) -> [u32; 10] {
+    let mut words = [0; 10];
+    for (word, bits) in words.iter_mut().zip(symbols.chunks(WORD_BITS)) {
+        *word = bits.iter().fold(0, |word, &bit| word << 1 | u32::from(bit));
+    }
+    words
+}
+
+/// The parameters of subframes 1 to 3, and of page 18 of subframe 4.
+fn opened(symbols: &[bool]) -> Option<(bool, Vec<(&'static str, i64)>)> {
+    let subframe = Subframe::decode(&words(symbols), 0).ok()?;
+    match subframe.id {
+        1..=3 => Some((true, subframe.parameters())),
+        _ => subframe.klobuchar().map(|_| (false, subframe.parameters())),
+    }
+}
 
 /// What all satellites say alike: the pages of subframes 4 and 5.
 #[derive(Clone, Debug)]
@@ -66,6 +134,17 @@ impl Broadcast {
         Ok(Self { pages: almanac::pages(klobuchar.as_ref(), utc, almanac, reference)? })
     }
 
+    /// The pages of what a scene says of its satellites.
+    ///
+    /// # Errors
+    /// As [`Self::with_utc`].
+    pub fn of(common: &Common) -> Result<Self, FieldError> {
+        let reference = common.reference.unwrap_or(Epoch::new(0, 0.0));
+        // An almanac is of GPS satellites.
+        let own = common.almanac.iter().filter(|set| set.sv.system == System::Gps);
+        Self::with_utc(common.klobuchar, &common.utc, &own.cloned().collect::<Vec<_>>(), reference)
+    }
+
     /// The ten 30-bit words (D30 is bit 0) whose first bit leaves at GPS time `start`, a multiple of 6 s.
     ///
     /// Subframe 1 carries the week of `start`. A value outside its field is an error.
@@ -74,7 +153,7 @@ impl Broadcast {
         if tow_s % SUBFRAME_S != 0 || start.fraction() != 0.0 {
             return Err(FieldError::NotMultiple { name: "start_s", value: start.tow_s(), step: SUBFRAME_S as f64 });
         }
-        let id = (tow_s / SUBFRAME_S % 5 + 1) as u8;
+        let id = subframe_at(start);
         let first_s = planted!("gnss.lnav.page_order", 0, 5 * SUBFRAME_S);
         let page = ((tow_s + first_s) / (5 * SUBFRAME_S) % PAGES) as usize;
         let mut data = [almanac::ALTERNATING; 10];
@@ -99,6 +178,13 @@ impl Broadcast {
     }
 }
 
+impl Sender for Broadcast {
+    fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        let words = self.subframe(ephemeris, start)?;
+        Ok(words.iter().flat_map(|word| (0..WORD_BITS).rev().map(move |bit| word >> bit & 1 == 1)).collect())
+    }
+}
+
 fn with_parity(data: &[u32; 10]) -> [u32; 10] {
     let mut previous = 0;
     let mut number = 0;
@@ -111,7 +197,7 @@ fn with_parity(data: &[u32; 10]) -> [u32; 10] {
 }
 
 fn check_issue(ephemeris: &Ephemeris) -> Result<(), FieldError> {
-    if ephemeris.iodc & 0xFF == u16::from(ephemeris.iode) {
+    if ephemeris.iodc & 0xFF == ephemeris.iode {
         Ok(())
     } else {
         Err(FieldError::Issue { iode: ephemeris.iode, iodc: ephemeris.iodc })
@@ -273,50 +359,12 @@ pub fn ephemeris(
             return Err(SubframeError::BeyondWeek { name, value_s });
         }
     }
-    let ahead = (one.parameter("week") - near.week() + 512).rem_euclid(1024) - 512;
+    let week = near.nearest_week(one.parameter("week"), 1024);
     let count = i64::from((one.tow_count + TOW_COUNTS - 1) % TOW_COUNTS);
-    let sent = Epoch::new((near.week() + ahead) * WEEK_S + count * SUBFRAME_S, 0.0);
-    let mut ephemeris = blank_ephemeris(sv, sent);
+    let sent = Epoch::new(week * WEEK_S + count * SUBFRAME_S, 0.0);
+    let mut ephemeris = Ephemeris::blank(sv, sent);
     read_all(&SUBFRAME_1, &one.data, &mut ephemeris);
     read_all(&SUBFRAME_2, &two.data, &mut ephemeris);
     read_all(&SUBFRAME_3, &three.data, &mut ephemeris);
     Ok(ephemeris)
-}
-
-/// All zero, with every time at `at`.
-fn blank_ephemeris(sv: Sv, at: Epoch) -> Ephemeris {
-    Ephemeris {
-        sv,
-        toe: at,
-        toc: at,
-        transmitted: at,
-        iode: 0,
-        iodc: 0,
-        ura_index: 0,
-        health: 0,
-        l2_codes: 0,
-        l2_p_data_off: false,
-        long_fit: false,
-        aodo: 0,
-        sqrt_a_sqrtm: 0.0,
-        eccentricity: 0.0,
-        m0_rad: 0.0,
-        delta_n_radps: 0.0,
-        omega0_rad: 0.0,
-        omega_dot_radps: 0.0,
-        omega_rad: 0.0,
-        i0_rad: 0.0,
-        idot_radps: 0.0,
-        cuc_rad: 0.0,
-        cus_rad: 0.0,
-        crc_m: 0.0,
-        crs_m: 0.0,
-        cic_rad: 0.0,
-        cis_rad: 0.0,
-        af0_s: 0.0,
-        af1_sps: 0.0,
-        af2_sps2: 0.0,
-        tgd_s: 0.0,
-        signal_delays_s: Vec::new(),
-    }
 }

@@ -44,7 +44,7 @@ impl Data {
             replica: Replica::of(wave, settings.replica)?,
             turn: Complex64::new(cos, sin),
             deviation: (share / own).sqrt(),
-            periods_per_symbol: u64::from(component.message?.periods_per_symbol()),
+            periods_per_symbol: u64::from(component.periods_per_symbol()?),
             overlay: OverlaySync::new(component.overlay.of(sv.number)?),
             sum: (Complex64::ZERO, 0),
         })
@@ -78,7 +78,7 @@ impl Data {
 /// symbols and overlay of the data begin where the pilot's overlay does.
 pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
     let fits = |component: &&Component| {
-        let periods = component.message.map_or(0, |message| message.periods_per_symbol());
+        let periods = component.periods_per_symbol().unwrap_or(0);
         let whole = |periods: u32| pilot.overlay.periods().is_multiple_of(periods.max(1));
         let same = (component.period_s() / pilot.period_s() - 1.0).abs() < 1e-12;
         periods > 0 && same && whole(periods) && whole(component.overlay.periods())

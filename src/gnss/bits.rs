@@ -1,0 +1,229 @@
+//! Fields of navigation messages: where each parameter stands among the bits, and what its integer means.
+//!
+//! A field is read and written through the same entry of a table, so that encoder and decoder cannot differ. What
+//! holds the bits is a [`Store`]: ten words with parity of GPS LNAV, a word of 128 bits of Galileo I/NAV.
+
+use thiserror::Error;
+
+use crate::gnss::earth::GPS_PI;
+
+/// Bits in which fields stand.
+pub trait Store {
+    /// The bits of a piece of a field: its first bit as the document counts, and its length, 32 at most.
+    fn piece(&self, piece: (u16, u8)) -> u32;
+    /// Puts the low bits of `value` there.
+    fn set_piece(&mut self, piece: (u16, u8), value: u32);
+}
+
+/// 128 bits; the first one sent is the most significant, counted from 0.
+impl Store for u128 {
+    fn piece(&self, (first, length): (u16, u8)) -> u32 {
+        let shift = 128 - u32::from(first) - u32::from(length);
+        ((self >> shift) & ((1 << length) - 1)) as u32
+    }
+
+    fn set_piece(&mut self, (first, length): (u16, u8), value: u32) {
+        let shift = 128 - u32::from(first) - u32::from(length);
+        let mask: Self = (1 << length) - 1;
+        *self = (*self & !(mask << shift)) | ((Self::from(value) & mask) << shift);
+    }
+}
+
+/// Why a value cannot be sent.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum FieldError {
+    #[error("{name} = {value} does not fit the navigation message: expected {minimum} to {maximum}")]
+    OutOfRange { name: &'static str, value: f64, minimum: f64, maximum: f64 },
+    #[error("{name} = {value} cannot be sent exactly: expected a multiple of {step}")]
+    NotMultiple { name: &'static str, value: f64, step: f64 },
+    #[error("iode = {iode} contradicts iodc = {iodc}: expected the low eight bits of it")]
+    Issue { iode: u16, iodc: u16 },
+    #[error("the message of {message} cannot begin {start_s} s after the week's start: expected {expected}")]
+    Start { message: &'static str, start_s: f64, expected: &'static str },
+}
+
+/// What the integer of a field stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Not negative, rounded to the nearest step.
+    Unsigned,
+    /// A count or a time: not negative, and refused when not a whole number of steps.
+    Whole,
+    /// Two's complement.
+    Signed,
+    /// Two's complement of semicircles (or semicircles a second); the value is in radians.
+    Semicircles,
+    /// The same for an angle that is meant modulo a turn: a value outside ±π is brought there first.
+    Turn,
+}
+
+/// One parameter's place and scale.
+#[derive(Clone, Copy, Debug)]
+pub struct Field {
+    /// Unit last, as everywhere.
+    pub name: &'static str,
+    /// First bit, counted as the document does, and length of each piece, most significant first.
+    pub pieces: &'static [(u16, u8)],
+    pub kind: Kind,
+    /// One step is two to this power.
+    pub exponent: i32,
+    /// Where the document defines it.
+    pub clause: &'static str,
+}
+
+impl Field {
+    /// A field of a table.
+    pub const fn new(
+        name: &'static str,
+        pieces: &'static [(u16, u8)],
+        kind: Kind,
+        exponent: i32,
+        clause: &'static str,
+    ) -> Self {
+        Self { name, pieces, kind, exponent, clause }
+    }
+
+    /// Length in bits.
+    pub fn bits(&self) -> u32 {
+        self.pieces.iter().map(|piece| u32::from(piece.1)).sum()
+    }
+
+    fn is_signed(&self) -> bool {
+        let kind =
+            planted!("gnss.lnav.sign_tgd", self.kind, if self.name == "tgd_s" { Kind::Unsigned } else { self.kind });
+        matches!(kind, Kind::Signed | Kind::Semicircles | Kind::Turn)
+    }
+
+    /// Smallest and largest integer that it holds.
+    pub fn range(&self) -> (i64, i64) {
+        let span = 1_i64 << self.bits();
+        if self.is_signed() { (-span / 2, span / 2 - 1) } else { (0, span - 1) }
+    }
+
+    /// The scale's power of two.
+    fn exponent(&self) -> i32 {
+        let wrong = planted!("gnss.lnav.scale_crs", false, self.name == "crs_m")
+            || planted!("gnss.lnav.scale_af1", false, self.name == "af1_sps" && self.bits() == 16)
+            || planted!("gnss.lnav.scale_alpha", false, self.name == "alpha_2");
+        self.exponent + i32::from(wrong)
+    }
+
+    fn step(&self) -> f64 {
+        let power = libm::ldexp(1.0, self.exponent());
+        if matches!(self.kind, Kind::Semicircles | Kind::Turn) { power * GPS_PI } else { power }
+    }
+
+    /// The integer that stands there.
+    pub fn read<S: Store>(&self, data: &S) -> i64 {
+        let raw = self.pieces.iter().fold(0_i64, |raw, piece| (raw << piece.1) | i64::from(data.piece(*piece)));
+        let span = 1_i64 << self.bits();
+        if self.is_signed() && raw >= span / 2 { raw - span } else { raw }
+    }
+
+    /// Puts the low bits of `raw` there.
+    pub fn write<S: Store>(&self, data: &mut S, raw: i64) {
+        let mut left = self.bits();
+        for piece in self.pieces {
+            left -= u32::from(piece.1);
+            data.set_piece(*piece, (raw >> left) as u32);
+        }
+    }
+
+    /// What an integer of this field stands for, in the unit of its name.
+    pub fn value(&self, raw: i64) -> f64 {
+        let scaled = libm::ldexp(raw as f64, self.exponent());
+        let angle = matches!(self.kind, Kind::Semicircles | Kind::Turn);
+        let angle = planted!("gnss.lnav.idot_in_radians", angle, angle && self.name != "idot_radps");
+        if angle { scaled * GPS_PI } else { scaled }
+    }
+
+    /// The nearest integer that stands for `value`.
+    pub fn raw(&self, value: f64) -> Result<i64, FieldError> {
+        let angle = matches!(self.kind, Kind::Semicircles | Kind::Turn);
+        let scaled = libm::ldexp(if angle { value / GPS_PI } else { value }, -self.exponent());
+        let mut rounded = scaled.round();
+        if self.kind == Kind::Whole && rounded != scaled {
+            return Err(FieldError::NotMultiple { name: self.name, value, step: self.step() });
+        }
+        let (minimum, maximum) = self.range();
+        if self.kind == Kind::Turn {
+            let span = libm::ldexp(1.0, self.bits() as i32);
+            rounded -= span * ((rounded + span / 2.0) / span).floor();
+        }
+        if (minimum as f64..=maximum as f64).contains(&rounded) {
+            Ok(rounded as i64)
+        } else {
+            let (minimum, maximum) = (self.value(minimum), self.value(maximum));
+            Err(FieldError::OutOfRange { name: self.name, value, minimum, maximum })
+        }
+    }
+}
+
+/// A field bound to a member of what carries it.
+pub struct Element<T> {
+    /// Place and scale.
+    pub field: Field,
+    get: fn(&T) -> f64,
+    set: fn(&mut T, f64),
+}
+
+/// A field and how it is taken from, and put into, what carries it.
+pub const fn element<T>(field: Field, get: fn(&T) -> f64, set: fn(&mut T, f64)) -> Element<T> {
+    Element { field, get, set }
+}
+
+/// Writes every field of `table` into `data`.
+pub fn write_all<T, S: Store>(table: &[Element<T>], from: &T, data: &mut S) -> Result<(), FieldError> {
+    table.iter().try_for_each(|element| {
+        element.field.write(data, element.field.raw((element.get)(from))?);
+        Ok(())
+    })
+}
+
+/// Reads every field of `table` out of `data`.
+pub fn read_all<T, S: Store>(table: &[Element<T>], data: &S, into: &mut T) {
+    for element in table {
+        (element.set)(into, element.field.value(element.field.read(data)));
+    }
+}
+
+/// Replaces every field of `table` by what it is after being sent.
+pub fn quantise_all<T>(table: &[Element<T>], into: &mut T) -> Result<(), FieldError> {
+    table.iter().try_for_each(|element| {
+        let raw = element.field.raw((element.get)(into))?;
+        (element.set)(into, element.field.value(raw));
+        Ok(())
+    })
+}
+
+/// Adds `by` to the field of `table` called `name`; whether there is one.
+pub fn add_to<T>(table: &[Element<T>], name: &str, into: &mut T, by: f64) -> bool {
+    let Some(element) = table.iter().find(|element| element.field.name == name) else { return false };
+    (element.set)(into, (element.get)(into) + by);
+    true
+}
+
+/// The fields of `table` with their integers in `data`.
+pub fn integers<T, S: Store>(table: &[Element<T>], data: &S) -> Vec<(&'static str, i64)> {
+    table.iter().map(|element| (element.field.name, element.field.read(data))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_put_among_128_bits_stands_there_alone() {
+        for (first, length) in [(0, 1), (6, 10), (16, 32), (95, 32), (96, 32), (127, 1)] {
+            for ground in [0, u128::MAX] {
+                let mut bits = ground;
+                let value = 0xA5C3_96F1_u32 >> (32 - length);
+                bits.set_piece((first, length), value);
+                assert_eq!(bits.piece((first, length)), value, "{first} {length}");
+                // Put back what was there: nothing else had changed.
+                bits.set_piece((first, length), ground as u32);
+                assert_eq!(bits, ground, "{first} {length}");
+            }
+        }
+    }
+}

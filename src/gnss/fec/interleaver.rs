@@ -1,0 +1,41 @@
+//! Block interleavers: written column by column, sent row by row.
+
+/// A rectangle of symbols.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Interleaver {
+    pub columns: usize,
+    pub rows: usize,
+}
+
+impl Interleaver {
+    /// Symbols of a block.
+    pub const fn symbols(self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// The order in which coded symbols are sent. What is beyond a whole block is left out.
+    pub fn interleave<T: Copy>(self, coded: &[T]) -> Vec<T> {
+        let places = (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| column * self.rows + row));
+        places.filter_map(|place| coded.get(place).copied()).collect()
+    }
+
+    /// The coded symbols of those that were sent.
+    pub fn deinterleave<T: Copy>(self, sent: &[T]) -> Vec<T> {
+        let places = (0..self.columns).flat_map(|column| (0..self.rows).map(move |row| row * self.columns + column));
+        places.filter_map(|place| sent.get(place).copied()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_sent_of_what_was_written_in_columns_and_come_back() {
+        let small = Interleaver { columns: 3, rows: 2 };
+        assert_eq!(small.interleave(&[0, 1, 2, 3, 4, 5]), [0, 2, 4, 1, 3, 5]);
+        let page = Interleaver { columns: 30, rows: 8 };
+        let coded: Vec<usize> = (0..page.symbols()).collect();
+        assert_eq!(page.deinterleave(&page.interleave(&coded)), coded);
+    }
+}

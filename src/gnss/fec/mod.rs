@@ -1,0 +1,4 @@
+//! Forward error correction of navigation messages.
+
+pub mod convolutional;
+pub mod interleaver;

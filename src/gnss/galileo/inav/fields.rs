@@ -1,0 +1,171 @@
+//! The field tables of I/NAV: places count from 0, the first bit of a word (Galileo OS SIS ICD 2.1, tables 42 to 54).
+
+use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::gnss::bits::{Element, Field, element};
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::message::Common;
+use crate::gnss::time::{Epoch, WEEK_S};
+
+/// Continuous GPS week of week 0 of Galileo's system time (5.1.2).
+pub const GST_WEEK: i64 = 1024;
+
+/// What words 1 to 5 say.
+#[derive(Clone, Debug)]
+pub(super) struct Orbit {
+    pub ephemeris: Ephemeris,
+    pub nequick: [f64; 3],
+}
+
+/// What word 6 says (5.1.7), and its own time.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Utc {
+    a0_s: f64,
+    a1_sps: f64,
+    leap_s: i64,
+    reference: (i64, i64),
+    event: (i64, i64),
+    leap_after_s: i64,
+    sent_s: i64,
+}
+
+impl Utc {
+    /// UTC as a scene has it: GPS time's offset is taken for that of the system's own time.
+    pub(super) fn of(common: &Common, start: Epoch) -> Self {
+        let utc = &common.utc;
+        let reference = utc.polynomial.map_or(common.reference.unwrap_or(start), |polynomial| polynomial.reference);
+        let event = utc.event.map_or((start.week(), 7, utc.leap_s), |e| (e.week, i64::from(e.day), e.after_s));
+        Self {
+            a0_s: utc.polynomial.map_or(0.0, |polynomial| polynomial.a0_s),
+            a1_sps: utc.polynomial.map_or(0.0, |polynomial| polynomial.a1_sps),
+            leap_s: utc.leap_s,
+            reference: (reference.week(), reference.tow_whole_s() / HOUR_S),
+            event: (event.0, event.1),
+            leap_after_s: event.2,
+            sent_s: start.tow_whole_s(),
+        }
+    }
+}
+
+const HOUR_S: i64 = 3600;
+const MINUTE_S: f64 = 60.0;
+
+const ORBIT: &str = "5.1.1, table 57";
+const CLOCK: &str = "5.1.3, table 62";
+const DELAY: &str = "5.1.5, table 64";
+const IONOSPHERE: &str = "5.1.6, table 65";
+const UTC: &str = "5.1.7, table 68";
+const TIME: &str = "5.1.2, table 59";
+
+type Of = Element<Orbit>;
+
+fn gst_week(at: Epoch) -> f64 {
+    (at.week() - GST_WEEK).rem_euclid(4096) as f64
+}
+
+/// The status of a signal in [`Ephemeris::health`]: one bit of data validity, then two of signal health; those of E1-B
+/// are the lowest three bits, those of E5b the three above.
+fn status(health: u8, low: u32, bits: u32) -> f64 {
+    f64::from(health >> low & ((1 << bits) - 1))
+}
+
+fn set_status(health: &mut u8, low: u32, bits: u32, value: f64) {
+    let mask = ((1 << bits) - 1) << low;
+    *health = *health & !mask | (value as u8) << low & mask;
+}
+
+/// The spare word: week and time of week.
+#[rustfmt::skip]
+pub(super) static WORD_0: [Of; 2] = [
+    element(Field::new("week", &[(96, 12)], Whole, 0, TIME), |o| gst_week(o.ephemeris.transmitted), |_, _| {}),
+    element(Field::new("tow_s", &[(108, 20)], Whole, 0, TIME), |o| o.ephemeris.transmitted.tow_s(), |_, _| {}),
+];
+
+#[rustfmt::skip]
+pub(super) static WORD_1: [Of; 5] = [
+    element(Field::new("iodnav", &[(6, 10)], Whole, 0, "5.1.9.2"), |o| f64::from(o.ephemeris.iode), |o, v| set_issue(&mut o.ephemeris, v)),
+    element(Field::new("toe_min", &[(16, 14)], Whole, 0, ORBIT), |o| o.ephemeris.toe.tow_s() / MINUTE_S, |o, v| o.ephemeris.toe = o.ephemeris.toe.nearest_tow((v * MINUTE_S) as i64)),
+    element(Field::new("m0_rad", &[(30, 32)], Turn, -31, ORBIT), |o| o.ephemeris.m0_rad, |o, v| o.ephemeris.m0_rad = v),
+    element(Field::new("eccentricity", &[(62, 32)], Unsigned, -33, ORBIT), |o| o.ephemeris.eccentricity, |o, v| o.ephemeris.eccentricity = v),
+    element(Field::new("sqrt_a_sqrtm", &[(94, 32)], Unsigned, -19, ORBIT), |o| o.ephemeris.sqrt_a_sqrtm, |o, v| o.ephemeris.sqrt_a_sqrtm = v),
+];
+
+#[rustfmt::skip]
+pub(super) static WORD_2: [Of; 5] = [
+    element(Field::new("iodnav", &[(6, 10)], Whole, 0, "5.1.9.2"), |o| f64::from(o.ephemeris.iode), |o, v| set_issue(&mut o.ephemeris, v)),
+    element(Field::new("omega0_rad", &[(16, 32)], Turn, -31, ORBIT), |o| o.ephemeris.omega0_rad, |o, v| o.ephemeris.omega0_rad = v),
+    element(Field::new("i0_rad", &[(48, 32)], Semicircles, -31, ORBIT), |o| o.ephemeris.i0_rad, |o, v| o.ephemeris.i0_rad = v),
+    element(Field::new("omega_rad", &[(80, 32)], Turn, -31, ORBIT), |o| o.ephemeris.omega_rad, |o, v| o.ephemeris.omega_rad = v),
+    element(Field::new("idot_radps", &[(112, 14)], Semicircles, -43, ORBIT), |o| o.ephemeris.idot_radps, |o, v| o.ephemeris.idot_radps = v),
+];
+
+#[rustfmt::skip]
+pub(super) static WORD_3: [Of; 8] = [
+    element(Field::new("iodnav", &[(6, 10)], Whole, 0, "5.1.9.2"), |o| f64::from(o.ephemeris.iode), |o, v| set_issue(&mut o.ephemeris, v)),
+    element(Field::new("omega_dot_radps", &[(16, 24)], Semicircles, -43, ORBIT), |o| o.ephemeris.omega_dot_radps, |o, v| o.ephemeris.omega_dot_radps = v),
+    element(Field::new("delta_n_radps", &[(40, 16)], Semicircles, -43, ORBIT), |o| o.ephemeris.delta_n_radps, |o, v| o.ephemeris.delta_n_radps = v),
+    element(Field::new("cuc_rad", &[(56, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cuc_rad, |o, v| o.ephemeris.cuc_rad = v),
+    element(Field::new("cus_rad", &[(72, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cus_rad, |o, v| o.ephemeris.cus_rad = v),
+    element(Field::new("crc_m", &[(88, 16)], Signed, -5, ORBIT), |o| o.ephemeris.crc_m, |o, v| o.ephemeris.crc_m = v),
+    element(Field::new("crs_m", &[(104, 16)], Signed, -5, ORBIT), |o| o.ephemeris.crs_m, |o, v| o.ephemeris.crs_m = v),
+    element(Field::new("sisa_index", &[(120, 8)], Whole, 0, "5.1.12, table 90"), |o| f64::from(o.ephemeris.ura_index), |o, v| o.ephemeris.ura_index = v as u8),
+];
+
+#[rustfmt::skip]
+pub(super) static WORD_4: [Of; 8] = [
+    element(Field::new("iodnav", &[(6, 10)], Whole, 0, "5.1.9.2"), |o| f64::from(o.ephemeris.iode), |o, v| set_issue(&mut o.ephemeris, v)),
+    element(Field::new("svid", &[(16, 6)], Whole, 0, "5.1.9.3"), |o| f64::from(o.ephemeris.sv.number), |_, _| {}),
+    element(Field::new("cic_rad", &[(22, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cic_rad, |o, v| o.ephemeris.cic_rad = v),
+    element(Field::new("cis_rad", &[(38, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cis_rad, |o, v| o.ephemeris.cis_rad = v),
+    element(Field::new("toc_min", &[(54, 14)], Whole, 0, CLOCK), |o| o.ephemeris.toc.tow_s() / MINUTE_S, |o, v| o.ephemeris.toc = o.ephemeris.toc.nearest_tow((v * MINUTE_S) as i64)),
+    element(Field::new("af0_s", &[(68, 31)], Signed, -34, CLOCK), |o| o.ephemeris.af0_s, |o, v| o.ephemeris.af0_s = v),
+    element(Field::new("af1_sps", &[(99, 21)], Signed, -46, CLOCK), |o| o.ephemeris.af1_sps, |o, v| o.ephemeris.af1_sps = v),
+    element(Field::new("af2_sps2", &[(120, 6)], Signed, -59, CLOCK), |o| o.ephemeris.af2_sps2, |o, v| o.ephemeris.af2_sps2 = v),
+];
+
+#[rustfmt::skip]
+pub(super) static WORD_5: [Of; 11] = [
+    element(Field::new("ai0_sfu", &[(6, 11)], Unsigned, -2, IONOSPHERE), |o| o.nequick[0], |o, v| o.nequick[0] = v),
+    element(Field::new("ai1_sfupdeg", &[(17, 11)], Signed, -8, IONOSPHERE), |o| o.nequick[1], |o, v| o.nequick[1] = v),
+    element(Field::new("ai2_sfupdeg2", &[(28, 14)], Signed, -15, IONOSPHERE), |o| o.nequick[2], |o, v| o.nequick[2] = v),
+    element(Field::new("bgd_e1_e5a_s", &[(47, 10)], Signed, -32, DELAY), |o| o.ephemeris.tgd2_s, |o, v| o.ephemeris.tgd2_s = v),
+    element(Field::new("bgd_e1_e5b_s", &[(57, 10)], Signed, -32, DELAY), |o| o.ephemeris.tgd_s, |o, v| o.ephemeris.tgd_s = v),
+    element(Field::new("e5b_health", &[(67, 2)], Whole, 0, "5.1.9.7"), |o| status(o.ephemeris.health, 4, 2), |o, v| set_status(&mut o.ephemeris.health, 4, 2, v)),
+    element(Field::new("e1b_health", &[(69, 2)], Whole, 0, "5.1.9.7"), |o| status(o.ephemeris.health, 1, 2), |o, v| set_status(&mut o.ephemeris.health, 1, 2, v)),
+    element(Field::new("e5b_data_validity", &[(71, 1)], Whole, 0, "5.1.9.6"), |o| status(o.ephemeris.health, 3, 1), |o, v| set_status(&mut o.ephemeris.health, 3, 1, v)),
+    element(Field::new("e1b_data_validity", &[(72, 1)], Whole, 0, "5.1.9.6"), |o| status(o.ephemeris.health, 0, 1), |o, v| set_status(&mut o.ephemeris.health, 0, 1, v)),
+    element(Field::new("week", &[(73, 12)], Whole, 0, TIME), |o| gst_week(o.ephemeris.transmitted), |_, _| {}),
+    element(Field::new("tow_s", &[(85, 20)], Whole, 0, TIME), |o| o.ephemeris.transmitted.tow_s(), |_, _| {}),
+];
+
+#[rustfmt::skip]
+pub(super) static WORD_6: [Element<Utc>; 9] = [
+    element(Field::new("utc_a0_s", &[(6, 32)], Signed, -30, UTC), |u| u.a0_s, |u, v| u.a0_s = v),
+    element(Field::new("utc_a1_sps", &[(38, 24)], Signed, -50, UTC), |u| u.a1_sps, |u, v| u.a1_sps = v),
+    element(Field::new("utc_leap_s", &[(62, 8)], Signed, 0, UTC), |u| u.leap_s as f64, |u, v| u.leap_s = v as i64),
+    element(Field::new("utc_t0_h", &[(70, 8)], Whole, 0, UTC), |u| u.reference.1 as f64, |u, v| u.reference.1 = v as i64),
+    element(Field::new("utc_week", &[(78, 8)], Whole, 0, UTC), |u| (u.reference.0 - GST_WEEK).rem_euclid(256) as f64, |u, v| u.reference.0 = v as i64 + GST_WEEK),
+    element(Field::new("utc_event_week", &[(86, 8)], Whole, 0, UTC), |u| (u.event.0 - GST_WEEK).rem_euclid(256) as f64, |u, v| u.event.0 = v as i64 + GST_WEEK),
+    element(Field::new("utc_event_day", &[(94, 3)], Whole, 0, UTC), |u| u.event.1 as f64, |u, v| u.event.1 = v as i64),
+    element(Field::new("utc_leap_after_s", &[(97, 8)], Signed, 0, UTC), |u| u.leap_after_s as f64, |u, v| u.leap_after_s = v as i64),
+    element(Field::new("tow_s", &[(105, 20)], Whole, 0, TIME), |u| (u.sent_s % WEEK_S) as f64, |u, v| u.sent_s = v as i64),
+];
+
+fn set_issue(ephemeris: &mut Ephemeris, value: f64) {
+    (ephemeris.iode, ephemeris.iodc) = (value as u16, value as u16);
+}
+
+/// Every field by the word that carries it.
+pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
+    fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
+        table.iter().map(|element| &element.field).collect()
+    }
+    vec![
+        ("word 0", of(&WORD_0)),
+        ("word 1", of(&WORD_1)),
+        ("word 2", of(&WORD_2)),
+        ("word 3", of(&WORD_3)),
+        ("word 4", of(&WORD_4)),
+        ("word 5", of(&WORD_5)),
+        ("word 6", of(&WORD_6)),
+    ]
+}

@@ -1,0 +1,301 @@
+//! The Galileo integrity navigation message (I/NAV) as E1-B sends it: pages of two seconds, encoded and decoded.
+//!
+//! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is a pattern of
+//! ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both parts carry one word of
+//! 128 bits and a check. Limits: words 0 to 6; where satellites send almanacs, reduced elements or redundancy (words 7
+//! to 10 and 16 to 20) the spare word 0 is sent, and such words are read as pages without parameters. Alert pages are
+//! not read. The bits reserved for authentication and the return link are zero.
+
+mod fields;
+mod reader;
+
+use crate::gnss::bits::{Element, FieldError, Store, add_to, integers, quantise_all, read_all, write_all};
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::crc::crc24q;
+use crate::gnss::fec::convolutional::Convolutional;
+use crate::gnss::fec::interleaver::Interleaver;
+use crate::gnss::message::{Common, Message, Sender};
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+pub use fields::{GST_WEEK, tables};
+use fields::{Orbit, Utc, WORD_1, WORD_2, WORD_3, WORD_4, WORD_5, WORD_6};
+pub use reader::InavReader;
+
+/// I/NAV as signals name it.
+pub static INAV: Message = Message {
+    name: "I/NAV",
+    symbol_s: 0.004,
+    unit_s: PAGE_S,
+    // The even part begins at an odd second on E1-B (4.3.2.2).
+    first_s: 1,
+    sender: |common| Ok(Box::new(Pages { common: common.clone() })),
+    number: word_at,
+    timed: &[SPARE, 5, 6],
+    set: &[1, 2, 3, 4, 5],
+    ionosphere: |_| false,
+    set_parameters: || {
+        let words = tables().into_iter().filter(|(name, _)| ["word 1", "word 2", "word 3", "word 4"].contains(name));
+        words.flat_map(|(_, fields)| fields).map(|field| field.name).collect()
+    },
+    elements: of_integers,
+    parameters: |symbols| {
+        let (bits, _) = decode_page(symbols)?;
+        let word = word_of(&bits);
+        parameters(&word).map(|found| (WORDS_OF_SET.contains(&word_type(&word)), found))
+    },
+    reader: |sv| Box::new(InavReader::new(sv)),
+    quantised,
+    adjust,
+};
+
+/// Seconds of a page.
+const PAGE_S: i64 = 2;
+/// Seconds of a sub-frame, in which the words have their places.
+const SUBFRAME_S: i64 = 30;
+/// Symbols of the pattern with which a page part begins (4.3.2.1), of a part, and of a page.
+const PATTERN: [bool; 10] = [false, true, false, true, true, false, false, false, false, false];
+const PART_SYMBOLS: usize = 250;
+const PAGE_SYMBOLS: usize = 2 * PART_SYMBOLS;
+/// Bits of a part before coding, and of them the tail of zeros.
+const PART_BITS: usize = 120;
+const TAIL_BITS: usize = 6;
+/// Bits of the word in the even part, and the first of them; the odd part has the rest.
+const WORD_BITS: usize = 128;
+const EVEN_WORD_BITS: usize = 112;
+const WORD_BEGIN: usize = 2;
+/// Where the check begins in the odd part, and its length (5.1.9.4); before it, it covers everything.
+const CHECK_BEGIN: usize = 82;
+const CHECK_BITS: usize = 24;
+/// Where the secondary synchronisation pattern begins in the odd part (4.3.2.3).
+const SSP_BEGIN: usize = 106;
+/// The word that has nothing to say (5.1.9.11), and those that make up a set of elements.
+const SPARE: u8 = 0;
+const WORDS_OF_SET: [u8; 4] = [1, 2, 3, 4];
+
+const CODE: Convolutional = Convolutional { second_inverted: true };
+const INTERLEAVER: Interleaver = Interleaver { columns: 30, rows: 8 };
+
+/// Type of the word that begins at a time: the nominal sequence of E1-B (4.3.5, table 38).
+pub fn word_at(start: Epoch) -> u8 {
+    match start.tow_whole_s().rem_euclid(SUBFRAME_S) {
+        1 => 2,
+        3 => 4,
+        5 => 6,
+        21 => 1,
+        23 => 3,
+        25 => 5,
+        _ => SPARE,
+    }
+}
+
+/// The type that a word says it has.
+pub fn word_type(word: &u128) -> u8 {
+    word.piece((0, 6)) as u8
+}
+
+/// Makes the pages of satellites.
+struct Pages {
+    common: Common,
+}
+
+impl Sender for Pages {
+    fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        if start.tow_whole_s() % PAGE_S != INAV.first_s || start.fraction() != 0.0 {
+            let expected = "an odd whole second";
+            return Err(FieldError::Start { message: INAV.name, start_s: start.tow_s(), expected });
+        }
+        let word = self.word(word_at(start), ephemeris, start)?;
+        Ok(encode_page(&page(&word, start)))
+    }
+}
+
+impl Pages {
+    /// A word as it leaves at `start`.
+    fn word(&self, number: u8, ephemeris: &Ephemeris, start: Epoch) -> Result<u128, FieldError> {
+        let mut word = 0;
+        word.set_piece((0, 6), u32::from(number));
+        let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
+        let orbit = Orbit { ephemeris: on_air, nequick: self.common.nequick.unwrap_or_default() };
+        match number {
+            1 => write_all(&WORD_1, &orbit, &mut word)?,
+            2 => write_all(&WORD_2, &orbit, &mut word)?,
+            3 => write_all(&WORD_3, &orbit, &mut word)?,
+            4 => write_all(&WORD_4, &orbit, &mut word)?,
+            5 => {
+                write_all(&WORD_5, &orbit, &mut word)?;
+                alternate(&mut word, 105, WORD_BITS);
+            }
+            6 => write_all(&WORD_6, &Utc::of(&self.common, start), &mut word)?,
+            _ => {
+                // "10": week and time of week are valid (5.1.9.11).
+                word.set_piece((6, 2), 2);
+                alternate(&mut word, 8, 96);
+                write_all(&fields::WORD_0, &orbit, &mut word)?;
+            }
+        }
+        Ok(word)
+    }
+}
+
+/// Fills spare bits with ones and zeros in turn.
+fn alternate(word: &mut u128, from: usize, to: usize) {
+    for place in from..to {
+        word.set_piece((place as u16, 1), u32::from((place - from).is_multiple_of(2)));
+    }
+}
+
+/// The two parts of a nominal page around a word, checked and with their tails.
+fn page(word: &u128, start: Epoch) -> [Vec<bool>; 2] {
+    let bit = |place: usize| word >> (WORD_BITS - 1 - place) & 1 == 1;
+    let mut even = vec![false; PART_BITS];
+    let mut odd = vec![false; PART_BITS];
+    odd[0] = true;
+    even[WORD_BEGIN..].iter_mut().zip((0..EVEN_WORD_BITS).map(bit)).for_each(|(slot, bit)| *slot = bit);
+    odd[WORD_BEGIN..].iter_mut().zip((EVEN_WORD_BITS..WORD_BITS).map(bit)).for_each(|(slot, bit)| *slot = bit);
+    let check = crc24q(covered(&even, &odd));
+    (odd[CHECK_BEGIN..].iter_mut().take(CHECK_BITS).zip((0..CHECK_BITS).rev()))
+        .for_each(|(slot, place)| *slot = check >> place & 1 == 1);
+    // By the time within six seconds (4.3.2.3, table 41).
+    let pattern: u8 = match start.tow_whole_s().rem_euclid(6) {
+        1 => 0x04,
+        3 => 0x2B,
+        _ => 0x2F,
+    };
+    (odd[SSP_BEGIN..].iter_mut().zip((0..8).rev())).for_each(|(slot, place)| *slot = pattern >> place & 1 == 1);
+    [even, odd]
+}
+
+/// What the check covers.
+fn covered<'a>(even: &'a [bool], odd: &'a [bool]) -> impl Iterator<Item = bool> + 'a {
+    even.iter().take(PART_BITS - TAIL_BITS).chain(odd.iter().take(CHECK_BEGIN)).copied()
+}
+
+/// The symbols of a page's two parts of 120 bits.
+pub fn encode_page(parts: &[Vec<bool>; 2]) -> Vec<bool> {
+    let part =
+        |bits: &Vec<bool>| PATTERN.into_iter().chain(INTERLEAVER.interleave(&CODE.encode(bits))).collect::<Vec<bool>>();
+    parts.iter().flat_map(part).collect()
+}
+
+/// The parts of 120 bits in the 500 symbols of a page without errors.
+fn decode_page(symbols: &[bool]) -> Option<([Vec<bool>; 2], bool)> {
+    let soft: Vec<f32> = symbols.iter().map(|&bit| if bit { -1.0 } else { 1.0 }).collect();
+    decode_soft(&soft)
+}
+
+/// The parts of 120 bits in the 500 soft symbols of a page, and whether they came upside down; `None` where they are no
+/// nominal page of a right check.
+pub fn decode_soft(symbols: &[f32]) -> Option<([Vec<bool>; 2], bool)> {
+    if symbols.len() != PAGE_SYMBOLS {
+        return None;
+    }
+    // The sum over both patterns: its sign is the polarity.
+    let sum = |part: &[f32]| part.iter().zip(PATTERN).map(|(soft, bit)| if bit { -soft } else { *soft }).sum::<f32>();
+    let inverted = symbols.chunks(PART_SYMBOLS).map(sum).sum::<f32>() < 0.0;
+    let sense = if inverted { -1.0 } else { 1.0 };
+    let part = |from: usize| {
+        let coded: Vec<f32> = symbols[from + PATTERN.len()..from + PART_SYMBOLS].iter().map(|s| s * sense).collect();
+        CODE.decode(&INTERLEAVER.deinterleave(&coded))
+    };
+    let [even, odd] = [part(0), part(PART_SYMBOLS)];
+    let check = odd[CHECK_BEGIN..CHECK_BEGIN + CHECK_BITS].iter().fold(0, |all, &bit| all << 1 | u32::from(bit));
+    let nominal = !even[0] && odd[0] && !even[1] && !odd[1];
+    (nominal && crc24q(covered(&even, &odd)) == check).then_some(([even, odd], inverted))
+}
+
+/// The word of 128 bits in a page's parts.
+pub fn word_of(parts: &[Vec<bool>; 2]) -> u128 {
+    let [even, odd] = parts;
+    let bits = even[WORD_BEGIN..WORD_BEGIN + EVEN_WORD_BITS].iter();
+    let bits = bits.chain(&odd[WORD_BEGIN..WORD_BEGIN + WORD_BITS - EVEN_WORD_BITS]);
+    bits.fold(0, |all, &bit| all << 1 | u128::from(bit))
+}
+
+/// The raw integers of all parameters of a word but its time; `None` for words without any that are read.
+pub fn parameters(word: &u128) -> Option<Vec<(&'static str, i64)>> {
+    let found = match word_type(word) {
+        1 => Some(integers(&WORD_1, word)),
+        2 => Some(integers(&WORD_2, word)),
+        3 => Some(integers(&WORD_3, word)),
+        4 => Some(integers(&WORD_4, word)),
+        5 => Some(integers(&WORD_5, word)),
+        6 => Some(integers(&WORD_6, word)),
+        _ => None,
+    };
+    found.map(|all| all.into_iter().filter(|(name, _)| *name != "tow_s").collect())
+}
+
+/// The elements that raw integers of words 1 to 5 give, as if they had been sent at `near`.
+fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option<Ephemeris> {
+    let mut orbit = Orbit { ephemeris: Ephemeris::blank(sv, near), nequick: [0.0; 3] };
+    for table in of_set() {
+        let mut word = 0_u128;
+        // The week and time of word 5 are those of its sending, which the set has already.
+        for field in table.iter().map(|element| &element.field).filter(|field| field.name != "tow_s") {
+            field.write(&mut word, raw(field.name)?);
+        }
+        read_all(table, &word, &mut orbit);
+    }
+    Some(orbit.ephemeris)
+}
+
+fn of_set() -> [&'static [Element<Orbit>]; 5] {
+    [&WORD_1, &WORD_2, &WORD_3, &WORD_4, &WORD_5]
+}
+
+/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+///
+/// # Errors
+/// A value that the message cannot carry.
+pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+    let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
+    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut sent))?;
+    Ok(sent.ephemeris)
+}
+
+/// Adds `by` to a parameter of words 1 to 5 in the unit of the tables; whether there is one.
+pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+    let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
+    let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut sent, by));
+    *ephemeris = sent.ephemeris;
+    found
+}
+
+/// The elements in words 1 to 5 with the time at which word 5 was sent; `None` where the issues differ or word 4 is
+/// another satellite's.
+fn elements(sv: Sv, words: [&u128; 5], near: Epoch) -> Option<Ephemeris> {
+    let [one, two, three, four, five] = words;
+    let issue = |word: &u128| word.piece((6, 10));
+    let same = [two, three, four].iter().all(|word| issue(word) == issue(one));
+    if !same || four.piece((16, 6)) != u32::from(sv.number) {
+        return None;
+    }
+    let mut orbit = Orbit { ephemeris: Ephemeris::blank(sv, sent_at(five, near)?), nequick: [0.0; 3] };
+    for (table, word) in of_set().into_iter().zip(words) {
+        read_all(table, word, &mut orbit);
+    }
+    Some(orbit.ephemeris)
+}
+
+/// The start of the page by its own week and time of week, the week near `near`; `None` for words without them.
+fn sent_at(word: &u128, near: Epoch) -> Option<Epoch> {
+    let week = match word_type(word) {
+        0 if word.piece((6, 2)) == 2 => word.piece((96, 12)),
+        5 => word.piece((73, 12)),
+        _ => return None,
+    };
+    let tow_s = i64::from(time_of_week(word)?);
+    let week = near.nearest_week(i64::from(week) + GST_WEEK, 4096);
+    Some(Epoch::new(week * crate::gnss::time::WEEK_S + tow_s, 0.0))
+}
+
+/// Seconds of the week at which the page began, of words that say them.
+fn time_of_week(word: &u128) -> Option<u32> {
+    let tow_s = match word_type(word) {
+        0 if word.piece((6, 2)) == 2 => word.piece((108, 20)),
+        5 => word.piece((85, 20)),
+        6 => word.piece((105, 20)),
+        _ => return None,
+    };
+    (i64::from(tow_s) < crate::gnss::time::WEEK_S).then_some(tow_s)
+}

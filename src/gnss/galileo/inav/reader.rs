@@ -1,0 +1,152 @@
+//! Finds pages in soft symbols, whichever way up they come, and gathers what their words say.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::{
+    PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, WORDS_OF_SET, decode_soft, elements, parameters, sent_at, time_of_week,
+    word_of, word_type,
+};
+use crate::gnss::message::{Read, Reader};
+use crate::gnss::record::NavigationRow;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+/// Pages in a row that fail where they are expected before they are sought elsewhere.
+const FAILURES: u32 = 5;
+
+/// Reads I/NAV.
+#[derive(Clone, Debug)]
+pub struct InavReader {
+    sv: Sv,
+    /// The latest symbols, a page at most; `next` numbers the one to come.
+    symbols: VecDeque<f32>,
+    next: u64,
+    /// Number of the first symbol of some page, and pages that failed since the last one that did not.
+    page: Option<u64>,
+    failures: u32,
+    /// The latest words by their types.
+    words: BTreeMap<u8, u128>,
+    /// Those of the set that was reported last.
+    complete: Option<[u128; 5]>,
+    decoded: u64,
+    failed: u64,
+}
+
+impl InavReader {
+    /// A reader that has read nothing.
+    pub fn new(sv: Sv) -> Self {
+        Self {
+            sv,
+            symbols: VecDeque::with_capacity(PAGE_SYMBOLS),
+            next: 0,
+            page: None,
+            failures: 0,
+            words: BTreeMap::new(),
+            complete: None,
+            decoded: 0,
+            failed: 0,
+        }
+    }
+
+    /// Whether both parts of what may be a page begin with the pattern, the same way up.
+    fn has_patterns(&self) -> bool {
+        let is_one = |place: usize| self.symbols.get(place).is_some_and(|soft| *soft < 0.0);
+        let pattern = |first: usize, flip: bool| {
+            PATTERN.iter().enumerate().all(|(place, bit)| is_one(first + place) == (bit ^ flip))
+        };
+        [false, true].into_iter().any(|flip| pattern(0, flip) && pattern(PART_SYMBOLS, flip))
+    }
+
+    fn read(&mut self, word: u128, inverted: bool, near: Epoch) -> Vec<Read> {
+        let mut news = Vec::new();
+        if let Some(tow_s) = time_of_week(&word) {
+            news.push(Read::Unit { symbols: PAGE_SYMBOLS as u64, of_week_s: i64::from(tow_s), inverted });
+        }
+        news.extend(sent_at(&word, near).map(Read::Time));
+        self.words.insert(word_type(&word), word);
+        match word_type(&word) {
+            1..=5 => self.look_for_set(near, &mut news),
+            6 => news.push(Read::Parameters(self.rows(&word, 0))),
+            _ => {}
+        }
+        news
+    }
+
+    fn look_for_set(&mut self, near: Epoch, news: &mut Vec<Read>) {
+        let words = [1, 2, 3, 4, 5].map(|number| self.words.get(&number));
+        let [Some(one), Some(two), Some(three), Some(four), Some(five)] = words else { return };
+        let set = [*one, *two, *three, *four, *five];
+        // Word 5 ends with its own time.
+        let content = |set: &[u128; 5]| [set[0], set[1], set[2], set[3], set[4] >> 43];
+        if self.complete.is_some_and(|before| content(&before) == content(&set)) {
+            return;
+        }
+        let Some(ephemeris) = elements(self.sv, [one, two, three, four, five], near) else { return };
+        let issue = u32::from(ephemeris.iode);
+        let of_set = WORDS_OF_SET.iter().filter_map(|number| self.words.get(number));
+        let mut rows: Vec<NavigationRow> = of_set.flat_map(|word| self.rows(word, issue)).collect();
+        rows.extend(self.rows(five, 0));
+        news.push(Read::Ephemeris(Box::new(ephemeris)));
+        news.push(Read::Parameters(rows));
+        self.complete = Some(set);
+    }
+
+    fn rows(&self, word: &u128, issue: u32) -> Vec<NavigationRow> {
+        let all = parameters(word).into_iter().flatten();
+        let row =
+            |(parameter, raw): (&str, i64)| NavigationRow { sv: self.sv, issue, parameter: parameter.to_owned(), raw };
+        all.map(row).collect()
+    }
+}
+
+impl Reader for InavReader {
+    fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
+        if self.symbols.len() == PAGE_SYMBOLS {
+            self.symbols.pop_front();
+        }
+        self.symbols.push_back(soft);
+        self.next += 1;
+        let Some(begin) = self.next.checked_sub(PAGE_SYMBOLS as u64).filter(|_| self.symbols.len() == PAGE_SYMBOLS)
+        else {
+            return Vec::new();
+        };
+        let due = self.page.is_some_and(|page| begin.abs_diff(page).is_multiple_of(PAGE_SYMBOLS as u64));
+        if (self.page.is_some() && !due) || (self.page.is_none() && !self.has_patterns()) {
+            return Vec::new();
+        }
+        match decode_soft(self.symbols.make_contiguous()) {
+            Some((parts, inverted)) => {
+                (self.page, self.failures) = (Some(begin), 0);
+                self.decoded += 1;
+                self.read(word_of(&parts), inverted, near)
+            }
+            None => {
+                if due {
+                    self.failed += 1;
+                    self.failures += 1;
+                    if self.failures >= FAILURES {
+                        self.doubt();
+                    }
+                }
+                Vec::new()
+            }
+        }
+    }
+
+    fn skip(&mut self) {
+        self.symbols.clear();
+        self.doubt();
+    }
+
+    fn doubt(&mut self) {
+        (self.page, self.failures) = (None, 0);
+    }
+
+    fn missing(&self) -> Vec<u8> {
+        (1..=5).filter(|number| !self.words.contains_key(number)).collect()
+    }
+
+    fn counts(&self) -> (u64, u64) {
+        (self.decoded, self.failed)
+    }
+}

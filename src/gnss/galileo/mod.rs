@@ -1,0 +1,3 @@
+//! Galileo: its messages.
+
+pub mod inav;

@@ -1,0 +1,137 @@
+//! What a form of navigation message is to those who send and to those who read it.
+//!
+//! A transmitter asks a [`Sender`] for the symbols of a unit (a subframe, a page) that begins at a time; a receiver
+//! gives a [`Reader`] the symbols as they come and takes what they say. Each form is one [`Message`] in the file that
+//! encodes and decodes it. All times here are those of the system that sends ([`TimeScale::label`]); who calls brings
+//! them to GPS time.
+//!
+//! [`TimeScale::label`]: crate::gnss::time::TimeScale::label
+
+use std::fmt;
+
+use crate::gnss::bits::FieldError;
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::gps::lnav::UtcData;
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::record::NavigationRow;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+/// A form of message.
+pub struct Message {
+    /// Name as its document has it.
+    pub name: &'static str,
+    /// Duration of a symbol: whole periods of the code that it modulates.
+    pub symbol_s: f64,
+    /// Duration of a unit, which is encoded in one piece, and when in the week the first one begins.
+    pub unit_s: i64,
+    pub first_s: i64,
+    /// Makes what all satellites of a scene send alike.
+    pub sender: fn(&Common) -> Result<Box<dyn Sender>, FieldError>,
+    /// Number by which faults name the unit that begins then: a subframe's, a word's type.
+    pub number: fn(Epoch) -> u8,
+    /// Numbers of the units that say their time, and of those that make up a set of elements.
+    pub timed: &'static [u8],
+    pub set: &'static [u8],
+    /// Whether the unit that begins then carries the ionosphere that [`Klobuchar`] describes.
+    pub ionosphere: fn(Epoch) -> bool,
+    /// Names of the parameters of a set that bear its issue.
+    pub set_parameters: fn() -> Vec<&'static str>,
+    /// The set of a satellite by the raw integers of its parameters, read near a time; `None` where some are missing or
+    /// contradict each other.
+    pub elements: fn(Sv, Raw<'_>, Epoch) -> Option<Ephemeris>,
+    /// The parameters in the symbols of a unit and whether they belong to a set of elements; `None` where the unit
+    /// fails its checks or has no parameters.
+    pub parameters: fn(&[bool]) -> Option<(bool, Parameters)>,
+    /// A reader of what a satellite sends.
+    pub reader: fn(Sv) -> Box<dyn Reader>,
+    /// The set that a receiver decodes when this one is sent.
+    pub quantised: fn(&Ephemeris) -> Result<Ephemeris, FieldError>,
+    /// Adds to the parameter of a set that the tables call so, in its unit; whether there is one.
+    pub adjust: fn(&mut Ephemeris, &str, f64) -> bool,
+}
+
+/// The raw integers of some parameters, by their names in the tables.
+pub type Parameters = Vec<(&'static str, i64)>;
+/// Gives the raw integer of a parameter by its name.
+pub type Raw<'a> = &'a dyn Fn(&str) -> Option<i64>;
+
+/// What all satellites of a system say alike.
+#[derive(Clone, Debug, Default)]
+pub struct Common {
+    pub klobuchar: Option<Klobuchar>,
+    /// Effective ionisation coefficients of NeQuick-G, in solar flux units, per degree and per degree squared.
+    pub nequick: Option<[f64; 3]>,
+    pub utc: UtcData,
+    /// One set of elements a satellite, for almanacs, and the time near which they hold.
+    pub almanac: Vec<Ephemeris>,
+    pub reference: Option<Epoch>,
+}
+
+/// Encodes the units of one form of message.
+pub trait Sender: Send + Sync {
+    /// The symbols of the unit that a satellite sends from `start` on; `true` is a logical 1, sent as −1.
+    ///
+    /// # Errors
+    /// A value that the message cannot carry, or a start at which no unit begins.
+    fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError>;
+}
+
+/// What a symbol completed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Read {
+    /// A unit that passed its checks began `symbols` before the end of the newest symbol, at a time of week.
+    Unit { symbols: u64, of_week_s: i64, inverted: bool },
+    /// The start of a unit with its week, resolved near what the reader was given.
+    Time(Epoch),
+    /// A whole set of elements.
+    Ephemeris(Box<Ephemeris>),
+    /// The ionosphere's parameters.
+    Klobuchar(Klobuchar),
+    /// Raw parameters as decoded.
+    Parameters(Vec<NavigationRow>),
+}
+
+/// Reads the message of one satellite.
+pub trait Reader: fmt::Debug + Send + Sync {
+    /// Takes the next symbol: positive for a logical 0 if it is not upside down, and as large as it is sure. `near`
+    /// resolves weeks.
+    fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read>;
+    /// Symbols are missing before the next one.
+    fn skip(&mut self);
+    /// The time of a unit contradicts those before: where units begin is sought anew.
+    fn doubt(&mut self);
+    /// Parts of a set of elements that have not been decoded: subframes, words.
+    fn missing(&self) -> Vec<u8>;
+    /// Units decoded, and those that failed their checks where one was expected.
+    fn counts(&self) -> (u64, u64);
+}
+
+impl Message {
+    /// Symbols of a unit.
+    pub fn unit_symbols(&self) -> usize {
+        (self.unit_s as f64 / self.symbol_s).round() as usize
+    }
+
+    /// Number of the unit, since the beginning of the system's time, in which a whole second of it lies.
+    pub fn unit_at(&self, second: i64) -> i64 {
+        (second - self.first_s).div_euclid(self.unit_s)
+    }
+
+    /// When a unit begins.
+    pub fn unit_start(&self, unit: i64) -> Epoch {
+        Epoch::new(unit * self.unit_s + self.first_s, 0.0)
+    }
+}
+
+impl fmt::Debug for Message {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+impl PartialEq for Message {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}

@@ -1,0 +1,170 @@
+//! Several satellite systems in one sky, from ephemerides through samples to positions, by a synthetic second system.
+//!
+//! The system sends synthetic signal A (4 ms, BOC(1,1), coded data beside a pilot with an overlay) with pages of I/NAV in a
+//! time of its own, 3 s and 40 ns off GPS time. Its orbits are those of GPS satellites with turned nodes.
+#![cfg(all(feature = "planted", feature = "generator", feature = "receiver", feature = "analysis"))]
+
+use std::path::Path;
+use std::sync::Arc;
+
+use gnss_twin::analysis::assess;
+use gnss_twin::analysis::verdict::Status;
+use gnss_twin::generator::catalogue::Catalogue;
+use gnss_twin::generator::message::Senders;
+use gnss_twin::generator::scenario::{Overrides, Scenario};
+use gnss_twin::generator::scene::Scene;
+use gnss_twin::generator::stream::{Options, generate_part};
+use gnss_twin::generator::truth;
+use gnss_twin::gnss::broadcast::Ephemeris;
+use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss_twin::gnss::message::Common;
+use gnss_twin::gnss::record::{ClockRow, Event, EventRow, Fix, NavigationRow, PassEnd, PassRow, TrajectoryRow};
+use gnss_twin::gnss::rinex;
+use gnss_twin::gnss::satellite::{Sv, System};
+use gnss_twin::gnss::signal::register;
+use gnss_twin::gnss::signal::synthetic::{LONG_BOC, OWN_TIME};
+use gnss_twin::receiver::output::Output;
+use gnss_twin::receiver::receive;
+use gnss_twin::receiver::settings::Settings;
+
+const TEXT: &str = "name = \"systems\"\nstart = 2010-07-01T08:05:58\nduration_s = 48\nseed = 3\n\
+    signals = [\"GPS L1 C/A\", \"synthetic A\"]\n\
+    [motion]\nkind = \"static\"\nlatitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\n\
+    [front_end]\nsample_rate_hz = 4.3e6\n[power]\ncn0_dbhz = 45\n[noise]\n\
+    [receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n";
+/// What the second system's time is ahead of GPS time, whole seconds apart.
+const AHEAD_S: f64 = 40e-9;
+
+/// A satellite of the second system on a GPS satellite's orbit with its node turned.
+fn second(set: &Ephemeris) -> Ephemeris {
+    Ephemeris {
+        sv: Sv { system: System::Galileo, number: set.sv.number },
+        omega0_rad: libm::remainder(set.omega0_rad + 0.4, std::f64::consts::TAU),
+        iodc: set.iode,
+        ..set.clone().timed(|label| OWN_TIME.instant(label))
+    }
+}
+
+fn scene() -> Scene {
+    register(&LONG_BOC).unwrap();
+    let scenario = Scenario::parse(TEXT, "systems").unwrap();
+    let (mut scene, _) = scenario.compose(Path::new("."), &Overrides::default()).unwrap();
+    let day = rinex::embedded().unwrap();
+    // Reference times of I/NAV are whole minutes.
+    let own = day.ephemerides.iter().filter(|set| set.toe.seconds() % 60 == 0 && set.toc.seconds() % 60 == 0);
+    let sets: Vec<Ephemeris> = own.flat_map(|set| [set.clone(), second(set)]).collect();
+    let (mut catalogue, _) = Catalogue::new(sets);
+    catalogue.set_time_offset(System::Galileo, AHEAD_S);
+    let healthy = catalogue.satellites().filter(|sv| catalogue.healthy(*sv, scene.clock.start));
+    let almanac = healthy.filter_map(|sv| catalogue.sent_at(sv, scene.clock.start).cloned()).collect();
+    let common = Common { almanac, reference: Some(scene.clock.start), ..Common::default() };
+    scene.messages = Arc::new(Senders::new(&common, &scene.signals).unwrap());
+    scene.catalogue = Arc::new(catalogue);
+    scene
+}
+
+fn rows<T: serde::de::DeserializeOwned>(directory: &Path, name: &str) -> Vec<T> {
+    csv::Reader::from_path(directory.join(name)).unwrap().deserialize().map(Result::unwrap).collect()
+}
+
+/// The value that 95 % do not exceed.
+fn p95(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() * 95 / 100]
+}
+
+#[test]
+fn a_second_system_gives_a_position_alone_and_beside_gps_with_two_clocks() {
+    let scene = scene();
+    let directory = tempfile::tempdir().unwrap();
+    let there = directory.path().join("truth");
+    std::fs::create_dir_all(&there).unwrap();
+    let mut writer = truth::Writer::create(&there).unwrap();
+    let mut bytes = Vec::new();
+    let whole = 0..scene.samples;
+    generate_part(&scene, whole, &mut bytes, &mut writer, &mut |_| (), &Options::default()).unwrap();
+    let path: Vec<TrajectoryRow> = rows(&there, "trajectory.csv");
+    let sent: Vec<NavigationRow> = rows(&there, "navigation.csv");
+    let passes: Vec<PassRow> = rows(&there, "passes.csv");
+
+    let mut errors_m: Vec<Vec<(u64, f64)>> = Vec::new();
+    for signals in [&["GPS L1 C/A"][..], &["synthetic A"], &["GPS L1 C/A", "synthetic A"]] {
+        let names: Vec<String> = signals.iter().map(|name| format!("{name:?}")).collect();
+        let text = format!(
+            "[acquisition]\nsignals = [{}]\n[position]\nionosphere = \"none\"\ntroposphere = \"none\"\n",
+            names.join(", ")
+        );
+        let settings = Settings::from_table(text.parse().unwrap(), "systems").unwrap();
+        let name = if signals.len() == 2 { "rx".to_owned() } else { signals.concat().replace([' ', '/'], "") };
+        let rx = directory.path().join(name);
+        std::fs::create_dir_all(&rx).unwrap();
+        let mut output = Output::create(&rx).unwrap();
+        let outcome = receive(&scene.metadata, bytes.as_slice(), &settings, &mut output, &mut |_| ()).unwrap();
+        println!("{signals:?}: {outcome}");
+        let events: Vec<EventRow> = rows(&rx, "events.csv");
+        let bad = |event: &Event| matches!(event, Event::CycleSlip | Event::LossOfLock);
+        // Those that set are lost, and nothing else is.
+        let set = |sv: Sv| passes.iter().any(|pass| pass.sv == sv && pass.ends_by != PassEnd::Scene);
+        let lost = events.iter().filter(|row| bad(&row.event) && !set(row.sv));
+        let lost: Vec<(u64, Sv, Event)> = lost.map(|row| (row.sample, row.sv, row.event)).collect();
+        assert!(lost.is_empty(), "{signals:?}: {lost:?}");
+
+        // Every parameter as it was sent.
+        let read: Vec<NavigationRow> = rows(&rx, "navigation.csv");
+        let wrong: Vec<_> = read.iter().filter(|row| !sent.contains(row)).collect();
+        assert!(!read.is_empty() && wrong.is_empty(), "{signals:?}: {wrong:?}");
+
+        let fixes: Vec<Fix> = rows(&rx, "fixes.csv");
+        let own = if signals == ["synthetic A"] { "synthetic" } else { "GPST" };
+        assert!(fixes.len() > 100, "{signals:?}: {} fixes", fixes.len());
+        let last = fixes.last().unwrap();
+        assert_eq!(last.clocks.unwrap() as usize, signals.len(), "{signals:?}");
+        let to_enu = Geodetic::from_ecef(&path[0].position_m()).ecef_to_enu();
+        let mut flat = Vec::new();
+        for fix in &fixes {
+            assert_eq!(fix.time_scale, own, "{signals:?}");
+            let true_row = path.iter().find(|row| row.sample == fix.sample).unwrap();
+            let error_m = to_enu * (fix.position_m() - true_row.position_m());
+            flat.push((fix.sample, libm::hypot(error_m.x, error_m.y)));
+            // Against the scale that the fix names: what that scale is ahead, the clock is behind it.
+            let ahead_s = if own == "GPST" { 0.0 } else { AHEAD_S };
+            let clock_m = SPEED_OF_LIGHT_MPS * (fix.clock_bias_s - true_row.clock_bias_s + ahead_s);
+            // Five deviations of 300 fixes of which few are independent.
+            assert!(clock_m.abs() < 5.0 * fix.sigma_clock_m, "{signals:?}: {clock_m} m of {}", fix.sigma_clock_m);
+        }
+        errors_m.push(flat);
+        if signals.len() == 2 {
+            let clocks: Vec<ClockRow> = rows(&rx, "clocks.csv");
+            let pairs: Vec<&[ClockRow]> = clocks.chunk_by(|a, b| a.sample == b.sample).collect();
+            // Every fix from the one on that the second system's ephemerides allow.
+            assert_eq!(pairs.len(), fixes.iter().filter(|fix| fix.clocks == Some(2)).count());
+            let mut apart_s = Vec::new();
+            for pair in pairs {
+                assert_eq!([pair[0].time_scale.as_str(), pair[1].time_scale.as_str()], ["GPST", "synthetic"]);
+                let off_s = pair[0].clock_bias_s - pair[1].clock_bias_s - AHEAD_S;
+                let sigma_s = libm::hypot(pair[0].sigma_clock_m, pair[1].sigma_clock_m) / SPEED_OF_LIGHT_MPS;
+                assert!(off_s.abs() < 5.0 * sigma_s, "{off_s} s of {sigma_s}");
+                apart_s.push(off_s);
+            }
+            let mean_s = apart_s.iter().sum::<f64>() / apart_s.len() as f64;
+            println!("times found apart by {:.2} ns more than they are", 1e9 * mean_s);
+            // Two clocks of some 0.3 m each, smoothed over most of the time.
+            assert!(mean_s.abs() < 2e-9, "{mean_s} s");
+        }
+    }
+    // Over the time in which all three have fixes.
+    let from = errors_m.iter().map(|errors| errors[0].0).max().unwrap();
+    let common = |errors: &Vec<(u64, f64)>| {
+        p95(errors.iter().filter(|(sample, _)| *sample >= from).map(|(_, error_m)| *error_m).collect())
+    };
+    let flat_m: Vec<f64> = errors_m.iter().map(common).collect();
+    let summary = assess(directory.path(), None).unwrap();
+    let verdict = &summary.details.verdict;
+    println!("{}", verdict.in_words());
+    let failed = verdict.rows.iter().filter(|row| row.status == Status::Fail);
+    let failed: Vec<String> = failed.map(|row| format!("{} {}, {}", row.figure, row.value_text(), row.bound)).collect();
+    assert!(failed.is_empty(), "{failed:#?}");
+    println!("horizontal, 95 %: GPS {:.3} m, second {:.3} m, both {:.3} m", flat_m[0], flat_m[1], flat_m[2]);
+    assert!(flat_m[1] <= 1.0, "{flat_m:?}");
+    assert!(flat_m[2] <= flat_m[0].max(flat_m[1]), "{flat_m:?}");
+}
