@@ -1,4 +1,5 @@
-//! A scene from a text, its samples in memory, and a receiver whose fixes are compared with the place in the scene.
+//! A scene from a text, its samples in memory, and a receiver whose fixes are compared with the place in the
+//! scene.
 //!
 //! `cargo run --release --example closed_loop`
 

@@ -1,4 +1,5 @@
-//! A signal of one's own: described as data, sent by the scene's satellites, and found by the receiver's search.
+//! A signal of one's own: described as data, sent by the scene's satellites, and found by the receiver's
+//! search.
 //!
 //! `cargo run --release --example own_signal`
 

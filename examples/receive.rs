@@ -1,6 +1,7 @@
 //! Receives a recording and prints fixes and losses as they are found; nothing is written.
 //!
-//! `cargo run --release --example receive -- recording.ci8 2.6e6` for 8-bit complex samples around L1 at 2.6 Msps.
+//! `cargo run --release --example receive -- recording.ci8 2.6e6` for 8-bit complex samples around L1 at 2.6
+//! Msps.
 
 use std::error::Error;
 use std::fs::File;

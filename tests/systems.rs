@@ -1,7 +1,9 @@
-//! Several satellite systems in one sky, from ephemerides through samples to positions, by a synthetic second system.
+//! Several satellite systems in one sky, from ephemerides through samples to positions, by a synthetic second
+//! system.
 //!
-//! The system sends synthetic signal A (4 ms, BOC(1,1), coded data beside a pilot with an overlay) with pages of I/NAV in a
-//! time of its own, 3 s and 40 ns off GPS time. Its orbits are those of GPS satellites with turned nodes.
+//! The system sends synthetic signal A (4 ms, BOC(1,1), coded data beside a pilot with an overlay) with pages
+//! of I/NAV in a time of its own, 3 s and 40 ns off GPS time. Its orbits are those of GPS satellites with
+//! turned nodes.
 #![cfg(all(feature = "planted", feature = "generator", feature = "receiver", feature = "analysis"))]
 
 use std::path::Path;
@@ -27,10 +29,8 @@ use gnss_twin::receiver::output::Output;
 use gnss_twin::receiver::receive;
 use gnss_twin::receiver::settings::Settings;
 
-const TEXT: &str = "name = \"systems\"\nstart = 2010-07-01T08:05:58\nduration_s = 48\nseed = 3\n\
-    signals = [\"GPS L1 C/A\", \"synthetic A\"]\n\
-    [motion]\nkind = \"static\"\nlatitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\n\
-    [front_end]\nsample_rate_hz = 4.3e6\n[power]\ncn0_dbhz = 45\n[noise]\n\
+const SIGNALS: &str = "signals = [\"GPS L1 C/A\", \"synthetic A\"]\n";
+const TABLES: &str = "[front_end]\nsample_rate_hz = 4.3e6\n[power]\ncn0_dbhz = 45\n[noise]\n\
     [receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n";
 /// What the second system's time is ahead of GPS time, whole seconds apart.
 const AHEAD_S: f64 = 40e-9;
@@ -45,9 +45,32 @@ fn second(set: &Ephemeris) -> Ephemeris {
     }
 }
 
-fn scene() -> Scene {
+/// Where, when and with which seed.
+struct Case {
+    start: &'static str,
+    duration_s: u32,
+    place_deg: [f64; 2],
+    seed: u32,
+}
+
+/// The first alone, and all with `GNSS_TWIN_LONG=1`.
+const CASES: [Case; 6] = [
+    Case { start: "2010-07-01T08:05:58", duration_s: 48, place_deg: [26.5123, 80.2329], seed: 3 },
+    Case { start: "2010-07-01T03:41:07", duration_s: 60, place_deg: [-33.9, 151.2], seed: 11 },
+    Case { start: "2010-07-01T11:17:40", duration_s: 60, place_deg: [48.1, 11.6], seed: 12 },
+    Case { start: "2010-07-01T14:02:25", duration_s: 60, place_deg: [64.1, -21.9], seed: 13 },
+    Case { start: "2010-07-01T19:30:13", duration_s: 60, place_deg: [1.3, 103.8], seed: 14 },
+    Case { start: "2010-07-01T21:23:51", duration_s: 60, place_deg: [-54.8, -68.3], seed: 15 },
+];
+
+fn scene(case: &Case) -> Scene {
     register(&LONG_BOC).unwrap();
-    let scenario = Scenario::parse(TEXT, "systems").unwrap();
+    let Case { start, duration_s, place_deg: [latitude_deg, longitude_deg], seed } = case;
+    let text = format!(
+        "name = \"systems\"\nstart = {start}\nduration_s = {duration_s}\nseed = {seed}\n{SIGNALS}[motion]\n\
+         kind = \"static\"\nlatitude_deg = {latitude_deg}\nlongitude_deg = {longitude_deg}\nheight_m = 130\n{TABLES}"
+    );
+    let scenario = Scenario::parse(&text, "systems").unwrap();
     let (mut scene, _) = scenario.compose(Path::new("."), &Overrides::default()).unwrap();
     let day = rinex::embedded().unwrap();
     // Reference times of I/NAV are whole minutes.
@@ -75,7 +98,12 @@ fn p95(mut values: Vec<f64>) -> f64 {
 
 #[test]
 fn a_second_system_gives_a_position_alone_and_beside_gps_with_two_clocks() {
-    let scene = scene();
+    let count = if std::env::var_os("GNSS_TWIN_LONG").is_some() { CASES.len() } else { 1 };
+    CASES.iter().take(count).for_each(holds);
+}
+
+fn holds(case: &Case) {
+    let scene = scene(case);
     let directory = tempfile::tempdir().unwrap();
     let there = directory.path().join("truth");
     std::fs::create_dir_all(&there).unwrap();

@@ -96,9 +96,9 @@ pub struct Errors {
     pub unmatched: usize,
 }
 
-/// Phase lock is a fading mean over six symbols of 20 ms. When a satellite has gone, what it held fades as (5/6)ⁿ and
-/// noise leaves a deviation of 0.21: it falls below 0.4 after five symbols in the mean, and after twenty where noise
-/// holds it up as it does once in a thousand times. A tick of 0.1 s comes on top.
+/// Phase lock is a fading mean over six symbols of 20 ms. When a satellite has gone, what it held fades as
+/// (5/6)ⁿ and noise leaves a deviation of 0.21: it falls below 0.4 after five symbols in the mean, and after
+/// twenty where noise holds it up as it does once in a thousand times. A tick of 0.1 s comes on top.
 const DETECTION_S: f64 = 0.5;
 
 /// Whether a sample that the truth has for other satellites follows so closely on this one's last row that no

@@ -57,7 +57,8 @@ pub struct Catalogue {
     satellites: BTreeMap<Sv, Timeline>,
     precise: Option<Orbits>,
     departures: Vec<Departure>,
-    /// By how much a system's time is ahead of GPS time, whole seconds apart; zero for those that are not here.
+    /// By how much a system's time is ahead of GPS time, whole seconds apart; zero for those that are not
+    /// here.
     time_offsets_s: BTreeMap<System, f64>,
 }
 
@@ -102,8 +103,8 @@ impl Catalogue {
         self.departures = departures;
     }
 
-    /// Sets by how much the time of a system, which its satellites' clocks follow, is ahead of GPS time, whole seconds
-    /// apart.
+    /// Sets by how much the time of a system, which its satellites' clocks follow, is ahead of GPS time,
+    /// whole seconds apart.
     pub fn set_time_offset(&mut self, system: System, offset_s: f64) {
         self.time_offsets_s.insert(system, offset_s);
     }

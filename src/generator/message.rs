@@ -1,8 +1,9 @@
 //! What satellites send as messages, and what goes wrong between the uploaded data and the antenna.
 //!
-//! Wrong content (bad health, wrong parameters) is sent with a right check and the old issue of data; wrong symbols are
-//! flipped in what was encoded, so that the check shows them. Times are those of sending, to the unit (subframe, page)
-//! for content and to the symbol for symbols. Limits: the almanac's health stays that of the scene's start.
+//! Wrong content (bad health, wrong parameters) is sent with a right check and the old issue of data; wrong
+//! symbols are flipped in what was encoded, so that the check shows them. Times are those of sending, to the
+//! unit (subframe, page) for content and to the symbol for symbols. Limits: the almanac's health stays that
+//! of the scene's start.
 
 use std::ops::Range;
 
@@ -59,7 +60,8 @@ pub struct MessageFault {
 pub enum Kind {
     /// Each symbol by itself, with a probability.
     BitErrors { rate: f64, stream: Stream },
-    /// One symbol of every unit with this number, by a word of 30 of them and its place in it, both counted from 1.
+    /// One symbol of every unit with this number, by a word of 30 of them and its place in it, both counted
+    /// from 1.
     Bit { subframe: u8, word: u8, bit: u8 },
     /// The bits of health (IS-GPS-200N, 20.3.3.3.1.4).
     Health(u8),
@@ -76,7 +78,8 @@ pub struct Sent {
     pub symbols: Vec<bool>,
 }
 
-/// A unit that a satellite sends: its form of message, by whose clock, and its number since that clock's beginning.
+/// A unit that a satellite sends: its form of message, by whose clock, and its number since that clock's
+/// beginning.
 #[derive(Clone, Copy, Debug)]
 pub struct Slot {
     pub message: &'static Message,

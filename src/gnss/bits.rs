@@ -1,7 +1,8 @@
 //! Fields of navigation messages: where each parameter stands among the bits, and what its integer means.
 //!
-//! A field is read and written through the same entry of a table, so that encoder and decoder cannot differ. What
-//! holds the bits is a [`Store`]: ten words with parity of GPS LNAV, a word of 128 bits of Galileo I/NAV.
+//! A field is read and written through the same entry of a table, so that encoder and decoder cannot differ.
+//! What holds the bits is a [`Store`]: ten words with parity of GPS LNAV, a word of 128 bits of Galileo
+//! I/NAV.
 
 use thiserror::Error;
 
@@ -57,6 +58,16 @@ pub enum Kind {
     Turn,
 }
 
+/// Bits, the first sent the most significant, as a number.
+pub fn number(bits: &[bool]) -> u128 {
+    bits.iter().fold(0, |all, &bit| all << 1 | u128::from(bit))
+}
+
+/// The lowest `count` bits of a number, the most significant first.
+pub fn bits_of(number: u128, count: usize) -> impl Iterator<Item = bool> {
+    (0..count).rev().map(move |place| number >> place & 1 == 1)
+}
+
 /// One parameter's place and scale.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
@@ -104,7 +115,8 @@ impl Field {
     fn exponent(&self) -> i32 {
         let wrong = planted!("gnss.lnav.scale_crs", false, self.name == "crs_m")
             || planted!("gnss.lnav.scale_af1", false, self.name == "af1_sps" && self.bits() == 16)
-            || planted!("gnss.lnav.scale_alpha", false, self.name == "alpha_2");
+            || planted!("gnss.lnav.scale_alpha", false, self.name == "alpha_2")
+            || planted!("gnss.inav.scale_af0", false, self.name == "af0_s" && self.bits() == 31);
         self.exponent + i32::from(wrong)
     }
 
@@ -211,6 +223,14 @@ pub fn integers<T, S: Store>(table: &[Element<T>], data: &S) -> Vec<(&'static st
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bits_and_numbers_are_each_other() {
+        let bits = [true, false, true, true, false];
+        assert_eq!(number(&bits), 0b10110);
+        assert_eq!(bits_of(0b10110, 5).collect::<Vec<_>>(), bits);
+        assert_eq!(bits_of(0b10110, 3).collect::<Vec<_>>(), bits[2..]);
+    }
 
     #[test]
     fn what_is_put_among_128_bits_stands_there_alone() {

@@ -55,7 +55,8 @@ pub struct Ephemeris {
     pub af1_sps: f64,
     pub af2_sps2: f64,
     pub tgd_s: f64,
-    /// The second group delay of messages that have two: BGD(E1,E5a) of Galileo beside BGD(E1,E5b) in `tgd_s`.
+    /// The second group delay of messages that have two: BGD(E1,E5a) of Galileo beside BGD(E1,E5b) in
+    /// `tgd_s`.
     pub tgd2_s: f64,
     /// Group delays of signals that have one of their own, by the signal's name; others follow from `tgd_s`.
     pub signal_delays_s: Vec<(&'static str, f64)>,

@@ -2,13 +2,13 @@
 
 /// The remainder of CRC-24Q, of the Galileo and modernised GPS messages.
 ///
-/// Generator 0x1864CFB, register from zero, bits in the order in which they are sent (Galileo OS SIS ICD 2.1, 5.1.9.4;
-/// IS-GPS-200N, 20.3.5 in appendix III). Bits followed by their own check leave zero.
+/// Generator 0x1864CFB, register from zero, bits in the order in which they are sent (Galileo OS SIS ICD 2.1,
+/// 5.1.9.4; IS-GPS-200N, 20.3.5 in appendix III). Bits followed by their own check leave zero.
 pub fn crc24q(bits: impl IntoIterator<Item = bool>) -> u32 {
     bits.into_iter().fold(0, |register, bit| {
         let carry = (register >> 23 & 1 == 1) != bit;
         let shifted = register << 1 & 0xFF_FFFF;
-        if carry { shifted ^ 0x86_4CFB } else { shifted }
+        if carry { shifted ^ planted!("gnss.crc.polynomial", 0x86_4CFB, 0x86_4CFA) } else { shifted }
     })
 }
 

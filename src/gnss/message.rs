@@ -1,9 +1,9 @@
 //! What a form of navigation message is to those who send and to those who read it.
 //!
-//! A transmitter asks a [`Sender`] for the symbols of a unit (a subframe, a page) that begins at a time; a receiver
-//! gives a [`Reader`] the symbols as they come and takes what they say. Each form is one [`Message`] in the file that
-//! encodes and decodes it. All times here are those of the system that sends ([`TimeScale::label`]); who calls brings
-//! them to GPS time.
+//! A transmitter asks a [`Sender`] for the symbols of a unit (a subframe, a page) that begins at a time; a
+//! receiver gives a [`Reader`] the symbols as they come and takes what they say. Each form is one [`Message`]
+//! in the file that encodes and decodes it. All times here are those of the system that sends
+//! ([`TimeScale::label`]); who calls brings them to GPS time.
 //!
 //! [`TimeScale::label`]: crate::gnss::time::TimeScale::label
 
@@ -37,11 +37,11 @@ pub struct Message {
     pub ionosphere: fn(Epoch) -> bool,
     /// Names of the parameters of a set that bear its issue.
     pub set_parameters: fn() -> Vec<&'static str>,
-    /// The set of a satellite by the raw integers of its parameters, read near a time; `None` where some are missing or
-    /// contradict each other.
+    /// The set of a satellite by the raw integers of its parameters, read near a time; `None` where some are
+    /// missing or contradict each other.
     pub elements: fn(Sv, Raw<'_>, Epoch) -> Option<Ephemeris>,
-    /// The parameters in the symbols of a unit and whether they belong to a set of elements; `None` where the unit
-    /// fails its checks or has no parameters.
+    /// The parameters in the symbols of a unit and whether they belong to a set of elements; `None` where the
+    /// unit fails its checks or has no parameters.
     pub parameters: fn(&[bool]) -> Option<(bool, Parameters)>,
     /// A reader of what a satellite sends.
     pub reader: fn(Sv) -> Box<dyn Reader>,
@@ -60,7 +60,8 @@ pub type Raw<'a> = &'a dyn Fn(&str) -> Option<i64>;
 #[derive(Clone, Debug, Default)]
 pub struct Common {
     pub klobuchar: Option<Klobuchar>,
-    /// Effective ionisation coefficients of NeQuick-G, in solar flux units, per degree and per degree squared.
+    /// Effective ionisation coefficients of NeQuick-G, in solar flux units, per degree and per degree
+    /// squared.
     pub nequick: Option<[f64; 3]>,
     pub utc: UtcData,
     /// One set of elements a satellite, for almanacs, and the time near which they hold.
@@ -94,8 +95,8 @@ pub enum Read {
 
 /// Reads the message of one satellite.
 pub trait Reader: fmt::Debug + Send + Sync {
-    /// Takes the next symbol: positive for a logical 0 if it is not upside down, and as large as it is sure. `near`
-    /// resolves weeks.
+    /// Takes the next symbol: positive for a logical 0 if it is not upside down, and as large as it is sure.
+    /// `near` resolves weeks.
     fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read>;
     /// Symbols are missing before the next one.
     fn skip(&mut self);
@@ -103,8 +104,6 @@ pub trait Reader: fmt::Debug + Send + Sync {
     fn doubt(&mut self);
     /// Parts of a set of elements that have not been decoded: subframes, words.
     fn missing(&self) -> Vec<u8>;
-    /// Units decoded, and those that failed their checks where one was expected.
-    fn counts(&self) -> (u64, u64);
 }
 
 impl Message {

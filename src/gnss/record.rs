@@ -201,7 +201,8 @@ pub struct Fix {
     pub excluded: String,
     /// How the ionosphere was corrected.
     pub ionosphere: IonosphereModel,
-    /// Ranges in the solution, and clocks that it estimates: one a satellite, and one, where the file does not say.
+    /// Ranges in the solution, and clocks that it estimates: one a satellite, and one, where the file does
+    /// not say.
     #[serde(default)]
     pub ranges: Option<u32>,
     #[serde(default)]
@@ -328,6 +329,13 @@ pub struct NavigationRow {
     /// Name in the message's field table.
     pub parameter: String,
     pub raw: i64,
+}
+
+impl NavigationRow {
+    /// A row for each parameter of a satellite.
+    pub fn each(sv: Sv, issue: u32, parameters: Vec<(&'static str, i64)>) -> impl Iterator<Item = Self> {
+        parameters.into_iter().map(move |(parameter, raw)| Self { sv, issue, parameter: parameter.to_owned(), raw })
+    }
 }
 
 /// Something that happened to a channel: `rx/events.csv`.

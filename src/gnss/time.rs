@@ -33,7 +33,8 @@ pub struct TimeScale {
 }
 
 impl TimeScale {
-    /// What this scale's clock shows at an instant, as an [`Epoch`] whose week and seconds are the scale's own.
+    /// What this scale's clock shows at an instant, as an [`Epoch`] whose week and seconds are the scale's
+    /// own.
     pub fn label(&self, at: Epoch) -> Epoch {
         Epoch { seconds: at.seconds - self.behind_gpst_s, ..at }
     }

@@ -1,8 +1,8 @@
 //! From symbols to messages: the satellite's time in code periods, and what its message says.
 //!
-//! A [`Decoder`] belongs to one channel. It gives the symbols to the reader of the signal's message, ties the channel's
-//! code period number to the satellite's time of week, and brings the times of messages to GPS time. A time that
-//! contradicts the one before drops both.
+//! A [`Decoder`] belongs to one channel. It gives the symbols to the reader of the signal's message, ties the
+//! channel's code period number to the satellite's time of week, and brings the times of messages to GPS
+//! time. A time that contradicts the one before drops both.
 
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::klobuchar::Klobuchar;
@@ -74,18 +74,14 @@ impl Decoder {
         self.anchor.is_some()
     }
 
-    /// Units decoded, and those of a known frame that failed their checks.
-    pub fn unit_counts(&self) -> (u64, u64) {
-        self.reader.counts()
-    }
-
     /// Parts of a set of elements that have not been decoded.
     pub fn missing(&self) -> Vec<u8> {
         self.reader.missing()
     }
 
-    /// Time of week by the satellite's clock, in its system's time, in the code period `period`, at `fraction` of it: whole
-    /// seconds and a fraction. Exact in the periods. `None` before frame synchronisation.
+    /// Time of week by the satellite's clock, in its system's time, in the code period `period`, at
+    /// `fraction` of it: whole seconds and a fraction. Exact in the periods. `None` before frame
+    /// synchronisation.
     pub fn time_of_week(&self, period: u64, fraction: f64) -> Option<(i64, f64)> {
         let anchor = self.anchor?;
         let periods = anchor.of_week + (i128::from(period) - i128::from(anchor.period)) as i64;

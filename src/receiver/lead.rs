@@ -38,19 +38,8 @@ pub fn refusal(signal: &'static Signal) -> Option<String> {
 mod tests {
     use super::*;
     use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::gps::lnav::LNAV;
     use crate::gnss::signal::Overlay;
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
-
-    /// Synthetic signal B with data beside its pilot.
-    static READ: Signal = Signal {
-        name: "read",
-        components: &[
-            Component { message: Some(&LNAV), ..QUADRATURE.components[0] },
-            Component { ..QUADRATURE.components[1] },
-        ],
-        ..QUADRATURE
-    };
+    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE, QUADRATURE_DATA};
 
     #[test]
     fn the_strongest_component_that_can_be_made_leads_and_pilots_go_first() {
@@ -59,7 +48,7 @@ mod tests {
             signal.components.iter().position(|component| std::ptr::eq(component, lead)).unwrap()
         };
         // Of D the code of 1 534 500 chips cannot be made; B's components differ by their data alone.
-        let found = [&L1_CA, &LONG_BOC, &QUADRATURE, &READ, &MIXED, &MULTIPLEXED].map(index);
+        let found = [&L1_CA, &LONG_BOC, &QUADRATURE, &QUADRATURE_DATA, &MIXED, &MULTIPLEXED].map(index);
         assert_eq!(found, [0, 1, 0, 1, 0, 0]);
     }
 
@@ -72,7 +61,7 @@ mod tests {
         // In a time of its own, with a message that begins where the overlay does.
         assert_eq!(refusal(&LONG_BOC), None);
         // With a message that begins where the overlays do it can be received.
-        assert_eq!(refusal(&READ), None);
+        assert_eq!(refusal(&QUADRATURE_DATA), None);
         static OVERLAID: Signal = Signal {
             name: "overlaid",
             components: &[Component { overlay: Overlay::Shared(&[1, -1]), ..L1_CA.components[0] }],

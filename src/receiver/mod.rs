@@ -5,8 +5,8 @@
 //! [`observe`] makes observables at common epochs and [`position`] solves for place and time. [`interference`] watches
 //! the spectrum, [`parting`] how code and carrier part, [`gap`] whether samples are missing.
 //!
-//! A [`Receiver`] takes samples and returns [`output::Record`]s as values; [`receive`] reads a stream to its end and gives them
-//! to any [`output::Sink`], of which the CSV files of [`output::Output`] are one.
+//! A [`Receiver`] takes samples and returns [`output::Record`]s as values; [`receive`] reads a stream to its
+//! end and gives them to any [`output::Sink`], of which the CSV files of [`output::Output`] are one.
 
 pub mod acquire;
 pub mod correlate;

@@ -297,7 +297,8 @@ impl Reception {
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let rate = Rate::from_hz(4e6).ok_or("no rate")?;
-/// let metadata = IfMetadata { format: Format::Ci8, rate, center_hz: 1_575.42e6, inverted: false, start: None };
+/// let (format, center_hz) = (Format::Ci8, 1_575.42e6);
+/// let metadata = IfMetadata { format, rate, center_hz, inverted: false, start: None };
 /// let mut receiver = Receiver::new(&metadata, &Settings::default())?;
 /// for chunk in std::fs::read("recording.ci8")?.chunks(1 << 20) {
 ///     for record in receiver.push(chunk)? {
@@ -324,7 +325,8 @@ impl Receiver {
         Reception::new(metadata, settings).map(|reception| Self { reception })
     }
 
-    /// Takes the next bytes, cut anywhere, and returns what they bring, in the order in which the receiver found it.
+    /// Takes the next bytes, cut anywhere, and returns what they bring, in the order in which the receiver
+    /// found it.
     ///
     /// # Errors
     /// Samples that cannot be searched.

@@ -12,6 +12,9 @@ pub struct Fault {
 const CODES: &str = "witness::codes::all_chips_of_all_codes_are_those_of_another_program";
 const PARITY: &str = "witness::printed::a_word_s_parity_is_the_printed_one_and_one_wrong_bit_breaks_it";
 const FIELDS: &str = "witness::printed::every_field_of_the_message_has_the_printed_place_sign_and_scale";
+const INAV: &str = "witness::printed::every_field_of_i_nav_has_the_printed_place_sign_and_scale";
+const CODED: &str = "witness::printed::pages_of_i_nav_are_checked_coded_interleaved_and_timed_as_printed";
+const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_place_and_a_clock_of_each";
 const PAGES: &str =
     "witness::printed::the_page_with_the_ionosphere_and_the_count_of_the_handover_are_where_they_are_printed";
 const TIMES: &str = "witness::printed::weeks_begin_on_sunday_and_leap_seconds_are_those_of_the_bulletins";
@@ -58,6 +61,11 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.lnav.field_place", "C_uc begins a bit late, sent and read", FIELDS),
     fault("gnss.lnav.handover_count", "the handover word counts the subframe that it is in", PAGES),
     fault("gnss.lnav.page_order", "pages of subframes 4 and 5 come a frame early", PAGES),
+    fault("gnss.inav.scale_af0", "the scale of a_f0 is 2^-33, sent and read", INAV),
+    fault("gnss.inav.second_symbol", "the symbols of G2 are not inverted, sent and read", CODED),
+    fault("gnss.inav.word_order", "words come a page early, sent and read", CODED),
+    fault("gnss.fec.interleaver", "neighbouring symbols change places", CODED),
+    fault("gnss.crc.polynomial", "the check has another polynomial, sent and read", CODED),
     fault("gnss.orbit.crs", "C_rs with the wrong sign, on both sides", ORBITS),
     fault("gnss.orbit.cus", "C_uc in place of C_us, on both sides", ORBITS),
     fault("gnss.orbit.idot", "the inclination has no rate, on both sides", ORBITS),
@@ -118,6 +126,7 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.decode.polarity", "the half cycle is resolved the wrong way", LOOP),
     fault("receiver.observe.code_fraction", "the time sent is 3 ns late", LOOP),
     fault("receiver.position.earth_rotation", "the Earth does not turn during flight", EXACT),
+    fault("receiver.position.own_clock", "all systems' ranges count against one clock", CLOCKS),
     fault("receiver.position.clock_sign", "satellite clocks with the wrong sign", EXACT),
     fault("receiver.position.group_delay", "T_GD is left out", EXACT),
     fault("receiver.position.troposphere", "the troposphere is 1.02 of what it should be", EXACT),

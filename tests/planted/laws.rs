@@ -21,7 +21,8 @@ use gnss_twin::gnss::klobuchar::Klobuchar;
 use gnss_twin::gnss::record::Observation;
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::{Epoch, Rate, SampleClock};
+use gnss_twin::gnss::signal::Signal;
+use gnss_twin::gnss::time::{Epoch, Rate, SampleClock, TimeScale};
 use gnss_twin::receiver::position::smooth::Smoother;
 use gnss_twin::receiver::position::{CodeNoise, PositionSettings, Solver};
 use gnss_twin::receiver::track::loops::CodeShape;
@@ -127,6 +128,38 @@ impl Ideal {
     fn solver(&self, settings: &PositionSettings) -> Solver {
         Solver::new(settings, vec![(&L1_CA, noise())], self.clock.rate)
     }
+}
+
+/// L1 C/A in a time of its own, behind GPS time by no whole second.
+static OTHER: Signal = Signal { name: "other", time: &TimeScale { name: "other", behind_gpst_s: 0 }, ..L1_CA };
+
+#[test]
+fn two_systems_whose_times_differ_give_one_place_and_a_clock_of_each() {
+    const AHEAD_S: f64 = 40e-9;
+    let ideal = Ideal::new();
+    let mut observations = ideal.observations(SAMPLE);
+    // Every other satellite sends by a clock that is ahead.
+    for observation in observations.iter_mut().skip(1).step_by(2) {
+        let sent = observation.sent().plus_s(AHEAD_S);
+        (observation.sent_s, observation.sent_fraction_s) = (sent.seconds(), sent.fraction());
+        (observation.signal, observation.pseudorange_m) =
+            (&OTHER, observation.pseudorange_m - SPEED_OF_LIGHT_MPS * AHEAD_S);
+    }
+    let noises = vec![(&L1_CA, noise()), (&OTHER, noise())];
+    let solved = Solver::new(&PositionSettings::default(), noises, ideal.clock.rate)
+        .solve(SAMPLE, ideal.clock, &observations, &ideal.ephemerides(), Some(ideal.klobuchar))
+        .unwrap();
+    let truth = ideal.motion(ideal.clock.epoch(SAMPLE).plus_s(-BIAS_S));
+    let off_m = (solved.fix.position_m() - truth.position_m).norm();
+    // The atmosphere's millimetre a satellite again; half as many satellites a clock give twice the dilution
+    // at most.
+    assert!(off_m < 8e-3, "{off_m} m");
+    let clocks: Vec<(&str, f64)> =
+        solved.clocks.iter().map(|row| (row.time_scale.as_str(), row.clock_bias_s)).collect();
+    let [("GPST", own_s), ("other", other_s)] = clocks[..] else { panic!("{clocks:?}") };
+    // What is behind a clock that is ahead by so much.
+    assert!((own_s - BIAS_S).abs() < 4e-11 && (other_s - (BIAS_S - AHEAD_S)).abs() < 4e-11, "{clocks:?}");
+    assert_eq!(solved.fix.freedom() as usize, observations.len() - 5);
 }
 
 /// A code loop of 1 Hz with early and late half a chip apart.

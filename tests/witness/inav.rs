@@ -10,7 +10,7 @@ use gnss_twin::gnss::message::{Common, Read, Reader};
 use gnss_twin::gnss::satellite::{Sv, System};
 use gnss_twin::gnss::time::Epoch;
 
-use super::data::external;
+use super::data::{external, keplerian};
 
 /// A page on the air: satellite, whether on E1-B, start, and both parts of 120 bits.
 struct RealPage {
@@ -39,7 +39,8 @@ fn real_pages(name: &str) -> Option<Vec<RealPage>> {
     Some(text.lines().skip(1).map(parse).collect())
 }
 
-/// Galileo I/NAV records of a RINEX 4 file by fixed columns; satellite, reference time and issue, then the rest.
+/// Galileo I/NAV records of a RINEX 4 file by fixed columns; satellite, reference time and issue, then the
+/// rest.
 fn rinex_records(text: &str) -> Vec<Ephemeris> {
     let lines: Vec<&str> = text.lines().collect();
     let mut records = Vec::new();
@@ -47,40 +48,8 @@ fn rinex_records(text: &str) -> Vec<Ephemeris> {
         if !(line.starts_with("> EPH E") && line.contains("INAV")) {
             continue;
         }
-        let cell = |line: &str, i: usize| line[4 + 19 * i..23 + 19 * i].trim().parse::<f64>().unwrap();
-        let v = |row: usize, i: usize| cell(lines[at + 1 + row], i);
-        let head = lines[at + 1];
-        let time: Vec<&str> = head[4..23].split_whitespace().collect();
-        let calendar = format!("{}-{}-{}T{}:{}:{}", time[0], time[1], time[2], time[3], time[4], time[5]);
-        let sv: Sv = head[..3].parse().unwrap();
-        let toe = Epoch::from_week(v(5, 2) as u32, v(3, 0));
-        records.push(Ephemeris {
-            toe,
-            toc: Epoch::parse(&calendar).unwrap(),
-            iode: v(1, 0) as u16,
-            iodc: v(1, 0) as u16,
-            sqrt_a_sqrtm: v(2, 3),
-            eccentricity: v(2, 1),
-            m0_rad: v(1, 3),
-            delta_n_radps: v(1, 2),
-            omega0_rad: v(3, 2),
-            omega_dot_radps: v(4, 3),
-            omega_rad: v(4, 2),
-            i0_rad: v(4, 0),
-            idot_radps: v(5, 0),
-            cuc_rad: v(2, 0),
-            cus_rad: v(2, 2),
-            crc_m: v(4, 1),
-            crs_m: v(1, 1),
-            cic_rad: v(3, 1),
-            cis_rad: v(3, 3),
-            af0_s: cell(head, 1),
-            af1_sps: cell(head, 2),
-            af2_sps2: cell(head, 3),
-            tgd2_s: v(6, 2),
-            tgd_s: v(6, 3),
-            ..Ephemeris::blank(sv, toe)
-        });
+        let (set, v) = keplerian(&lines[at + 1..]);
+        records.push(Ephemeris { iodc: set.iode, tgd2_s: v(6, 2), tgd_s: v(6, 3), ..set });
     }
     records
 }

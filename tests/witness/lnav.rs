@@ -10,7 +10,7 @@ use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::time::Epoch;
 use proptest::prelude::*;
 
-use super::data::external;
+use super::data::{external, keplerian};
 
 /// Rows of IS-GPS-200N, table 20-XIV: the starred bit, then the data bits of D25..D30.
 const PARITY_ROWS: [(u32, &[u32]); 6] = [
@@ -72,46 +72,18 @@ fn rinex_records(text: &str) -> Vec<Ephemeris> {
         if !(line.starts_with("> EPH G") && line.contains("LNAV")) {
             continue;
         }
-        let head = lines[at + 1];
-        let cell = |line: &str, i: usize| line[4 + 19 * i..23 + 19 * i].trim().parse::<f64>().unwrap();
-        let v = |row: usize, i: usize| cell(lines[at + 1 + row], i);
-        let time: Vec<&str> = head[4..23].split_whitespace().collect();
-        let calendar = format!("{}-{}-{}T{}:{}:{}", time[0], time[1], time[2], time[3], time[4], time[5]);
+        let (set, v) = keplerian(&lines[at + 1..]);
         let week = v(5, 2) as u32;
         records.push(Ephemeris {
-            sv: head[..3].parse().unwrap(),
-            toe: Epoch::from_week(week, v(3, 0)),
-            toc: Epoch::parse(&calendar).unwrap(),
             transmitted: Epoch::from_week(week, v(7, 0)),
-            iode: v(1, 0) as u16,
             iodc: v(6, 3) as u16,
             ura_index: ura_index(v(6, 0)),
             health: v(6, 1) as u8,
             l2_codes: v(5, 1) as u8,
             l2_p_data_off: v(5, 3) != 0.0,
             long_fit: v(7, 1) > 4.0 || v(7, 1) == 1.0,
-            aodo: 0,
-            sqrt_a_sqrtm: v(2, 3),
-            eccentricity: v(2, 1),
-            m0_rad: v(1, 3),
-            delta_n_radps: v(1, 2),
-            omega0_rad: v(3, 2),
-            omega_dot_radps: v(4, 3),
-            omega_rad: v(4, 2),
-            i0_rad: v(4, 0),
-            idot_radps: v(5, 0),
-            cuc_rad: v(2, 0),
-            cus_rad: v(2, 2),
-            crc_m: v(4, 1),
-            crs_m: v(1, 1),
-            cic_rad: v(3, 1),
-            cis_rad: v(3, 3),
-            af0_s: cell(head, 1),
-            af1_sps: cell(head, 2),
-            af2_sps2: cell(head, 3),
             tgd_s: v(6, 2),
-            tgd2_s: 0.0,
-            signal_delays_s: Vec::new(),
+            ..set
         });
     }
     records

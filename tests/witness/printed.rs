@@ -1,7 +1,13 @@
-//! What IS-GPS-200N prints, typed again from its tables: places and scales of the message's fields, and times.
+//! What IS-GPS-200N and Galileo's document print, typed again from their tables: places and scales of the
+//! messages' fields, checks, codes, and times.
 
+use std::fmt::Debug;
+
+use gnss_twin::gnss::bits::Store;
+use gnss_twin::gnss::crc::crc24q;
 use gnss_twin::gnss::earth::{Geodetic, Look, look, rotate_earth};
-use gnss_twin::gnss::gps::lnav::{self, Kind};
+use gnss_twin::gnss::galileo::inav;
+use gnss_twin::gnss::gps::lnav::{self, Field, Kind};
 use gnss_twin::gnss::time::Epoch;
 use nalgebra::Vector3;
 
@@ -76,53 +82,149 @@ const FIELDS: [Row; 59] = [
 #[expect(clippy::approx_constant, reason = "the document's own digits")]
 const PRINTED_PI: f64 = 3.141_592_653_589_8;
 
+/// Holds a field to its printed row: `ones` are stores with a single one, by the number of its place.
+fn hold<S: Store + Default + PartialEq + Debug>(page: &str, field: &Field, printed: &Row, ones: &[(u16, S)]) {
+    let &(_, name, pieces, signed, exponent, semicircles) = printed;
+    let bits: u32 = pieces.iter().map(|piece| u32::from(piece.1)).sum();
+    assert_eq!(field.bits(), bits, "{page}: {name}");
+    let least = if signed { -(1_i64 << (bits - 1)) } else { 0 };
+    assert_eq!(field.range().0, least, "{page}: {name}");
+    // A one at each place in turn: that bit's weight in the field, or none.
+    for (number, data) in ones {
+        let mut below = bits;
+        let mut weight = 0;
+        for &(first, length) in pieces {
+            below -= u32::from(length);
+            if (first..first + u16::from(length)).contains(number) {
+                weight = 1_i64 << (below + u32::from(first + u16::from(length) - 1 - number));
+            }
+        }
+        let sign = if signed && weight == 1 << (bits - 1) { -1 } else { 1 };
+        assert_eq!(field.read(data), sign * weight, "{page}: {name}, bit {number}");
+        if weight != 0 {
+            let scale = libm::ldexp(if semicircles { PRINTED_PI } else { 1.0 }, exponent);
+            let (found, printed) = (field.value(sign * weight), (sign * weight) as f64 * scale);
+            assert!((found - printed).abs() <= 1e-15 * printed.abs(), "{page}: {name}, bit {number}: {found}");
+            if field.kind != Kind::Turn || weight != 1 << (bits - 1) {
+                assert_eq!(field.raw(printed), Ok(sign * weight), "{page}: {name}, bit {number}");
+            }
+            let mut written = S::default();
+            field.write(&mut written, weight);
+            assert_eq!(&written, data, "{page}: {name}, bit {number}");
+        }
+    }
+}
+
+fn printed_row<'a>(rows: &'a [Row], page: &str, name: &str) -> &'a Row {
+    rows.iter().find(|row| (row.0, row.1) == (page, name)).unwrap_or_else(|| panic!("{page}: {name} is not printed"))
+}
+
 #[test]
 fn every_field_of_the_message_has_the_printed_place_sign_and_scale() {
     let mut met = 0;
+    let data_bits = (1..=300_u16).filter(|number| (number - 1) % 30 < 24);
+    let ones: Vec<(u16, [u32; 10])> = data_bits
+        .map(|number| {
+            let mut data = [0_u32; 10];
+            data[usize::from(number - 1) / 30] = 1 << (23 - (number - 1) % 30);
+            (number, data)
+        })
+        .collect();
     for (page, fields) in lnav::tables() {
         for field in fields {
-            let row = FIELDS.iter().find(|row| (row.0, row.1) == (page, field.name));
-            let Some(&(_, name, pieces, signed, exponent, semicircles)) = row else {
-                panic!("{page}: {} is not printed", field.name)
-            };
+            hold(page, field, printed_row(&FIELDS, page, field.name), &ones);
             met += 1;
-            let bits: u32 = pieces.iter().map(|piece| u32::from(piece.1)).sum();
-            assert_eq!(field.bits(), bits, "{page}: {name}");
-            let least = if signed { -(1_i64 << (bits - 1)) } else { 0 };
-            assert_eq!(field.range().0, least, "{page}: {name}");
-            // A one at each bit of the subframe in turn: that bit's weight in the field, or none.
-            for number in 1..=300_u16 {
-                let (word, place) = (usize::from(number - 1) / 30, (number - 1) % 30);
-                if place >= 24 {
-                    continue;
-                }
-                let mut data = [0_u32; 10];
-                data[word] = 1 << (23 - place);
-                let mut below = bits;
-                let mut weight = 0;
-                for &(first, length) in pieces {
-                    below -= u32::from(length);
-                    if (first..first + u16::from(length)).contains(&number) {
-                        weight = 1_i64 << (below + u32::from(first + u16::from(length) - 1 - number));
-                    }
-                }
-                let sign = if signed && weight == 1 << (bits - 1) { -1 } else { 1 };
-                assert_eq!(field.read(&data), sign * weight, "{page}: {name}, bit {number}");
-                if weight != 0 {
-                    let scale = libm::ldexp(if semicircles { PRINTED_PI } else { 1.0 }, exponent);
-                    let (found, printed) = (field.value(sign * weight), (sign * weight) as f64 * scale);
-                    assert!((found - printed).abs() <= 1e-15 * printed.abs(), "{page}: {name}, bit {number}: {found}");
-                    if field.kind != Kind::Turn || weight != 1 << (bits - 1) {
-                        assert_eq!(field.raw(printed), Ok(sign * weight), "{page}: {name}, bit {number}");
-                    }
-                    let mut written = [0_u32; 10];
-                    field.write(&mut written, weight);
-                    assert_eq!(written, data, "{page}: {name}, bit {number}");
-                }
-            }
         }
     }
     assert_eq!(met, 59);
+}
+
+/// Galileo OS SIS ICD 2.1, tables 42 to 54 (places, from 0) and 57 to 68 (lengths and scales). Times in words
+/// 1 and 4 count minutes, t0UTC hours.
+#[rustfmt::skip]
+const INAV_FIELDS: [Row; 48] = [
+    ("word 0", "week", &[(96, 12)], false, 0, false),
+    ("word 0", "tow_s", &[(108, 20)], false, 0, false),
+    ("word 1", "iodnav", &[(6, 10)], false, 0, false),
+    ("word 1", "toe_min", &[(16, 14)], false, 0, false),
+    ("word 1", "m0_rad", &[(30, 32)], true, -31, true),
+    ("word 1", "eccentricity", &[(62, 32)], false, -33, false),
+    ("word 1", "sqrt_a_sqrtm", &[(94, 32)], false, -19, false),
+    ("word 2", "iodnav", &[(6, 10)], false, 0, false),
+    ("word 2", "omega0_rad", &[(16, 32)], true, -31, true),
+    ("word 2", "i0_rad", &[(48, 32)], true, -31, true),
+    ("word 2", "omega_rad", &[(80, 32)], true, -31, true),
+    ("word 2", "idot_radps", &[(112, 14)], true, -43, true),
+    ("word 3", "iodnav", &[(6, 10)], false, 0, false),
+    ("word 3", "omega_dot_radps", &[(16, 24)], true, -43, true),
+    ("word 3", "delta_n_radps", &[(40, 16)], true, -43, true),
+    ("word 3", "cuc_rad", &[(56, 16)], true, -29, false),
+    ("word 3", "cus_rad", &[(72, 16)], true, -29, false),
+    ("word 3", "crc_m", &[(88, 16)], true, -5, false),
+    ("word 3", "crs_m", &[(104, 16)], true, -5, false),
+    ("word 3", "sisa_index", &[(120, 8)], false, 0, false),
+    ("word 4", "iodnav", &[(6, 10)], false, 0, false),
+    ("word 4", "svid", &[(16, 6)], false, 0, false),
+    ("word 4", "cic_rad", &[(22, 16)], true, -29, false),
+    ("word 4", "cis_rad", &[(38, 16)], true, -29, false),
+    ("word 4", "toc_min", &[(54, 14)], false, 0, false),
+    ("word 4", "af0_s", &[(68, 31)], true, -34, false),
+    ("word 4", "af1_sps", &[(99, 21)], true, -46, false),
+    ("word 4", "af2_sps2", &[(120, 6)], true, -59, false),
+    ("word 5", "ai0_sfu", &[(6, 11)], false, -2, false),
+    ("word 5", "ai1_sfupdeg", &[(17, 11)], true, -8, false),
+    ("word 5", "ai2_sfupdeg2", &[(28, 14)], true, -15, false),
+    ("word 5", "bgd_e1_e5a_s", &[(47, 10)], true, -32, false),
+    ("word 5", "bgd_e1_e5b_s", &[(57, 10)], true, -32, false),
+    ("word 5", "e5b_health", &[(67, 2)], false, 0, false),
+    ("word 5", "e1b_health", &[(69, 2)], false, 0, false),
+    ("word 5", "e5b_data_validity", &[(71, 1)], false, 0, false),
+    ("word 5", "e1b_data_validity", &[(72, 1)], false, 0, false),
+    ("word 5", "week", &[(73, 12)], false, 0, false),
+    ("word 5", "tow_s", &[(85, 20)], false, 0, false),
+    ("word 6", "utc_a0_s", &[(6, 32)], true, -30, false),
+    ("word 6", "utc_a1_sps", &[(38, 24)], true, -50, false),
+    ("word 6", "utc_leap_s", &[(62, 8)], true, 0, false),
+    ("word 6", "utc_t0_h", &[(70, 8)], false, 0, false),
+    ("word 6", "utc_week", &[(78, 8)], false, 0, false),
+    ("word 6", "utc_event_week", &[(86, 8)], false, 0, false),
+    ("word 6", "utc_event_day", &[(94, 3)], false, 0, false),
+    ("word 6", "utc_leap_after_s", &[(97, 8)], true, 0, false),
+    ("word 6", "tow_s", &[(105, 20)], false, 0, false),
+];
+
+#[test]
+fn every_field_of_i_nav_has_the_printed_place_sign_and_scale() {
+    let ones: Vec<(u16, u128)> = (0..128_u16).map(|number| (number, 1 << (127 - number))).collect();
+    let mut met = 0;
+    for (page, fields) in inav::tables() {
+        for field in fields {
+            hold(page, field, printed_row(&INAV_FIELDS, page, field.name), &ones);
+            met += 1;
+        }
+    }
+    assert_eq!(met, INAV_FIELDS.len());
+}
+
+#[test]
+fn pages_of_i_nav_are_checked_coded_interleaved_and_timed_as_printed() {
+    // The check of CRC-24Q's catalogue entry (polynomial 0x864CFB from zero) for the text 123456789.
+    let text = b"123456789".iter().flat_map(|byte| (0..8).rev().map(move |bit| byte >> bit & 1 == 1));
+    assert_eq!(crc24q(text), 0xCD_E703);
+    // Zeros leave the encoder as zeros and, behind G2's inverter, ones (4.1.4, figure 13). Of the 8 rows of
+    // 30 (4.1.4.2) written by columns, the even ones hold the symbols of G1.
+    let page = inav::encode_page(&[vec![false; 120], vec![false; 120]]);
+    let pattern = [false, true, false, true, true, false, false, false, false, false];
+    for part in page.chunks(250) {
+        assert_eq!(part[..10], pattern, "the pattern of 4.3.2.1");
+        for (row, symbols) in part[10..].chunks(30).enumerate() {
+            assert!(symbols.iter().all(|&symbol| symbol == (row % 2 == 1)), "row {row}");
+        }
+    }
+    // E1-B's nominal sub-frame (table 38): seconds of its 30, and words.
+    let start = Epoch::from_week(2353, 579_600.0);
+    let words = [(1, 2), (3, 4), (5, 6), (21, 1), (23, 3), (25, 5)];
+    assert!(words.iter().all(|&(at_s, word)| inav::word_at(start.plus_s(f64::from(at_s))) == word));
 }
 
 #[test]

@@ -1,13 +1,15 @@
 //! When the navigation message says what, unit by unit: subframes of LNAV, pages of I/NAV.
 //!
-//! All satellites of a system send in step with its time, so the scene's start alone says how long a receiver must wait.
-//! Times are seconds from the scene's first sample; what is sent at a boundary arrives a light time later.
+//! All satellites of a system send in step with its time, so the scene's start alone says how long a receiver
+//! must wait. Times are seconds from the scene's first sample; what is sent at a boundary arrives a light
+//! time later.
 
 use crate::gnss::message::Message;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
-/// What shows where a unit begins when its time is not known yet: the two words at the beginning of the next subframe.
+/// What shows where a unit begins when its time is not known yet: the two words at the beginning of the next
+/// subframe.
 const HEADER_S: f64 = 1.2;
 /// Times of arrival of satellites around the Earth, at most: a geostationary user across the Earth.
 const LIGHT_S: f64 = 0.25;
@@ -29,8 +31,8 @@ impl Timetable {
         Self { message, start: signal.time.label(start) }
     }
 
-    /// When the first unit of those that `wanted` picks by its start has arrived whole of those that begin from `from_s`
-    /// on; never, if there is none.
+    /// When the first unit of those that `wanted` picks by its start has arrived whole of those that begin
+    /// from `from_s` on; never, if there is none.
     fn whole_by_s(&self, from_s: f64, wanted: impl Fn(&Message, Epoch) -> bool) -> f64 {
         let Some(message) = self.message else { return f64::INFINITY };
         let from = self.start.plus_s(from_s);
@@ -94,7 +96,8 @@ mod tests {
 
     #[test]
     fn pages_of_a_system_that_is_three_seconds_behind_come_three_seconds_later() {
-        // GPS time 08:05:58 is 08:05:55 there: word 5 from :55 on, words 2, 4 from 08:06:01, 1 and 3 from :21 and :23.
+        // GPS time 08:05:58 is 08:05:55 there: word 5 from :55 on, words 2, 4 from 08:06:01, 1 and 3 from :21
+        // and :23.
         let timetable = Timetable::new(&LONG_BOC, Epoch::parse("2010-07-01T08:05:58").unwrap());
         assert!((timetable.frame_by_s(0.0) - 2.0 - HEADER_S - LIGHT_S).abs() < 1e-9);
         assert!((timetable.ephemeris_by_s(0.0) - 30.0 - LIGHT_S).abs() < 1e-9);

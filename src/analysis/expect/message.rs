@@ -1,7 +1,7 @@
 //! Orbits, clocks and ionosphere as the truth says that they were sent: what a receiver can know at best.
 //!
-//! The raw integers of `truth/navigation.csv` go through the message's own tables. Limits: a satellite whose set is
-//! incomplete there has none. Where a satellite sends a new set during the run, the one that the
+//! The raw integers of `truth/navigation.csv` go through the message's own tables. Limits: a satellite whose
+//! set is incomplete there has none. Where a satellite sends a new set during the run, the one that the
 //! receiver says that it had read last counts, as all of them are right.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -41,7 +41,7 @@ impl Message {
             // What a set has beside its issue is sent for all issues alike.
             let common = groups.get(&(*sv, 0)).into_iter().flatten();
             let all: Vec<&NavigationRow> = rows.iter().chain(common).copied().collect();
-            if let Some(set) = set(run, *sv, &all, near).filter(|set| u32::from(set.iode) == *issue) {
+            if let Some(set) = set(run, (*sv, *issue), &all, near).filter(|set| u32::from(set.iode) == *issue) {
                 message.sets.entry(*sv).or_default().push((*issue, set));
             }
             message.klobuchar = message.klobuchar.or_else(|| klobuchar(rows));
@@ -93,9 +93,12 @@ fn words(table: &str, rows: &[&NavigationRow]) -> Option<[u32; 10]> {
 }
 
 /// The set in those rows, by the message of one of the satellite's signals.
-fn set(run: &Run, sv: Sv, rows: &[&NavigationRow], near: Epoch) -> Option<Ephemeris> {
-    let raw = |name: &str| rows.iter().find(|row| row.parameter == name).map(|row| row.raw);
+fn set(run: &Run, (sv, issue): (Sv, u32), rows: &[&NavigationRow], near: Epoch) -> Option<Ephemeris> {
     messages(run, sv).find_map(|(message, time)| {
+        // What bears an issue is never taken from another one.
+        let bound = (message.set_parameters)();
+        let own = |row: &&&NavigationRow| row.issue == issue || !bound.contains(&row.parameter.as_str());
+        let raw = |name: &str| rows.iter().filter(own).find(|row| row.parameter == name).map(|row| row.raw);
         let set = (message.elements)(sv, &raw, time.label(near))?;
         Some(set.timed(|label| time.instant(label)))
     })

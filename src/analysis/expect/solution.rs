@@ -1,10 +1,11 @@
 //! What weighted least squares makes of the expected ranges at each fix: bias, noise, and the covariance that
 //! should be stated.
 //!
-//! With rows h = (−sight, 1 at the place of the range's clock), weights W of the receiver's choices at the true C/N0 and
-//! N = Σ h W hᵀ: biases b become N⁻¹ Σ h W b, noise of covariance R becomes N⁻¹ (Σ h W R W hᵀ) N⁻¹, and N⁻¹ is what the
-//! receiver ought to state. One set of sums a fix is kept, whatever the number of satellites; of several clocks the first
-//! with ranges is the fix's. Limits: weights by the measured C/N0 differ from these by its noise.
+//! With rows h = (−sight, 1 at the place of the range's clock), weights W of the receiver's choices at the
+//! true C/N0 and N = Σ h W hᵀ: biases b become N⁻¹ Σ h W b, noise of covariance R becomes N⁻¹ (Σ h W R W hᵀ)
+//! N⁻¹, and N⁻¹ is what the receiver ought to state. One set of sums a fix is kept, whatever the number of
+//! satellites; of several clocks the first with ranges is the fix's. Limits: weights by the measured C/N0
+//! differ from these by its noise.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix4, Vector4};
 

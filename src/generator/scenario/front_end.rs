@@ -103,7 +103,7 @@ pub(super) fn front_ends(root: &Table<'_>, allowed_m: f64, refusals: &mut Refusa
     let reader = Reader { root, many, fidelity: fidelity.as_ref(), allowed_m };
     let found: Vec<Option<FrontEnd>> = tables.iter().map(|table| reader.read(table.as_ref(), refusals)).collect();
     let found: Vec<FrontEnd> = found.into_iter().collect::<Option<_>>()?;
-    // Names of files: some systems do not tell capitals apart.
+    // Names of files: some systems do not distinguish capitals.
     for (index, one) in found.iter().enumerate() {
         let same = |other: &FrontEnd| match (&one.name, &other.name) {
             (Some(one), Some(other)) => one.eq_ignore_ascii_case(other),

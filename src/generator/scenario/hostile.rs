@@ -42,7 +42,7 @@ pub(super) fn interferers(
     Ok(found)
 }
 
-/// What is to be told of sources that lie outside the bands of all front ends.
+/// Warnings about sources that lie outside the bands of all front ends.
 pub(super) fn unheard<'s>(scenario: &'s Scenario, scenes: &'s [Scene]) -> impl Iterator<Item = String> + 's {
     let numbered = (1_u64..).zip(&scenario.interference);
     let heard = |number: u64| scenes.iter().flat_map(|scene| &scene.interference).any(|found| found.source == number);

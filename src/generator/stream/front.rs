@@ -21,7 +21,7 @@ use crate::gnss::satellite::Sv;
 /// Length of a block at least, in units of what its stages look back at.
 const LEADS_PER_BLOCK: u64 = 8;
 
-/// A front end on its way to samples. A batch is prepared, then rendered; truth may be told in between.
+/// A front end on its way to samples. A batch is prepared, then rendered; truth may be written in between.
 pub(super) struct Front<'a> {
     pub scene: &'a Scene,
     /// Of band-limited edges, where the scene has them.

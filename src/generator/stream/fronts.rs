@@ -32,7 +32,7 @@ struct Ends {
 
 impl<'a> Fronts<'a> {
     /// The streams of `scenes`, which
-    /// [`Scenario::compose_all`](crate::generator::scenario::Scenario::compose_all) has made; tells `truth`
+    /// [`Scenario::compose_all`](crate::generator::scenario::Scenario::compose_all) has made; gives `truth`
     /// what they are.
     ///
     /// # Errors
@@ -106,7 +106,7 @@ impl<'a> Fronts<'a> {
         first.is_before(to).then_some(ends)
     }
 
-    /// Writes the rest of the truth, and tells what was done for each front end.
+    /// Writes the rest of the truth, and reports what was done for each front end.
     ///
     /// # Errors
     /// A truth that cannot be written.

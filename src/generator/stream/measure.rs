@@ -17,7 +17,8 @@ use crate::generator::truth;
 /// Roots of each satellite's grid that a plan looks at.
 const PLANNED_ROOTS: u64 = 16;
 
-/// What the plan tells of the synthesiser: knots met along the scene, memory of a batch, and the usual speed.
+/// What the plan reports of the synthesiser: knots met along the scene, memory of a batch, and the usual
+/// speed.
 ///
 /// # Errors
 /// Those of orbits.

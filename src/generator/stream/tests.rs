@@ -1,4 +1,5 @@
-//! Several front ends at one time: the bytes of each are those that it has alone, and the truth is told once.
+//! Several front ends at one time: the bytes of each are those that it has alone, and the truth is written
+//! once.
 
 use std::collections::BTreeSet;
 use std::path::Path;

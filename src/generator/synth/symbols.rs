@@ -51,8 +51,8 @@ impl Symbols {
         Some(Data { form, periods_per_symbol: i64::from(component.periods_per_symbol()?) })
     }
 
-    /// Gathers what `sv` sends from `first` to `last`, and forgets what lies before. A unit for which no set was uploaded
-    /// carries the one of `heard`.
+    /// Gathers what `sv` sends from `first` to `last`, and forgets what lies before. A unit for which no set
+    /// was uploaded carries the one of `heard`.
     ///
     /// # Errors
     /// Those of messages.
@@ -83,12 +83,7 @@ impl Symbols {
                 let distinct = if symbols == encoded { 1 } else { 2 };
                 for (of_set, parameters) in both.iter().take(distinct).filter_map(|sent| (message.parameters)(sent)) {
                     let issue = if of_set { u32::from(ephemeris.iode) } else { 0 };
-                    self.navigation.extend(parameters.into_iter().map(|(parameter, raw)| NavigationRow {
-                        sv,
-                        issue,
-                        parameter: parameter.to_owned(),
-                        raw,
-                    }));
+                    self.navigation.extend(NavigationRow::each(sv, issue, parameters));
                 }
                 units.insert(unit, symbols);
             }

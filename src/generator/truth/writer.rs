@@ -123,7 +123,8 @@ struct SceneFile<'a> {
     time_offsets: Vec<TimeOffset>,
 }
 
-/// The time scales of the scene's signals that are ahead of GPS time or behind it, whole seconds apart, each once.
+/// The time scales of the scene's signals that are ahead of GPS time or behind it, whole seconds apart, each
+/// once.
 fn time_offsets(scene: &Scene) -> Vec<TimeOffset> {
     let mut found: Vec<TimeOffset> = Vec::new();
     for signal in &scene.signals {

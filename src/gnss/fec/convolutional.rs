@@ -1,7 +1,7 @@
 //! The convolutional code of rate 1/2 and constraint length 7, and Viterbi's decoder of soft symbols.
 //!
-//! Polynomials 171 and 133 octal, that of 171 first (Galileo OS SIS ICD 2.1, 4.1.4; IS-GPS-200N, 3.3.3.1.1). Encoder
-//! and decoder begin in the state of zeros; blocks end there by six zero bits.
+//! Polynomials 171 and 133 octal, that of 171 first (Galileo OS SIS ICD 2.1, 4.1.4; IS-GPS-200N, 3.3.3.1.1).
+//! Encoder and decoder begin in the state of zeros; blocks end there by six zero bits.
 
 /// Memory of the encoder in bits.
 const MEMORY: u32 = 6;
@@ -34,8 +34,8 @@ impl Convolutional {
         [first, second ^ self.second_inverted]
     }
 
-    /// The most likely bits of a block that ends in the state of zeros: one for each pair of symbols, which are
-    /// positive for a logical 0 and as large as they are sure.
+    /// The most likely bits of a block that ends in the state of zeros: one for each pair of symbols, which
+    /// are positive for a logical 0 and as large as they are sure.
     pub fn decode(self, symbols: &[f32]) -> Vec<bool> {
         // What a path of each window adds for symbols of one: the sign of either symbol.
         let signs: Vec<[f32; 2]> =
@@ -48,7 +48,8 @@ impl Convolutional {
             let mut next = [f32::NEG_INFINITY; STATES];
             let mut decision = 0_u64;
             for (state, (slot, signs)) in next.iter_mut().zip(signs.chunks_exact(2)).enumerate() {
-                // A state holds the six newest bits, so that its own newest bit is known and the oldest before it is not.
+                // A state holds the six newest bits, so that its own newest bit is known and the oldest
+                // before it is not.
                 let mut paths = [0.0; 2];
                 for (oldest, (path, sign)) in paths.iter_mut().zip(signs).enumerate() {
                     let before = metrics.get((state << 1 | oldest) % STATES).copied().unwrap_or(0.0);
@@ -127,8 +128,9 @@ mod tests {
     }
 
     #[test]
-    fn soft_symbols_are_worth_two_decibels() {
-        // Noise of 0.8 on symbols of 1 (Es/N0 = -1.06 dB): with soft decisions few bits are wrong, with hard ones many.
+    fn soft_symbols_give_far_fewer_wrong_bits_than_their_signs() {
+        // Noise of 0.8 on symbols of 1 (Es/N0 = -1.06 dB): with soft decisions few bits are wrong, with hard
+        // ones many.
         let code = Convolutional { second_inverted: true };
         let (mut soft_wrong, mut hard_wrong) = (0, 0);
         let mut state = 7_u64;
@@ -150,7 +152,8 @@ mod tests {
             soft_wrong += wrong(code.decode(&received));
             hard_wrong += wrong(code.decode(&hard));
         }
-        // Known curves (Heller and Jacobs 1971): at Eb/N0 = 1.9 dB about 8e-3 soft, 5e-2 and more hard; of 24 000 bits.
+        // Known curves (Heller and Jacobs 1971): at Eb/N0 = 1.9 dB about 8e-3 soft, 5e-2 and more hard; of 24
+        // 000 bits.
         assert!(soft_wrong < 400, "{soft_wrong}");
         assert!(hard_wrong > 3 * soft_wrong.max(100), "{hard_wrong} {soft_wrong}");
     }

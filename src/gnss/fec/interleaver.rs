@@ -16,6 +16,7 @@ impl Interleaver {
     /// The order in which coded symbols are sent. What is beyond a whole block is left out.
     pub fn interleave<T: Copy>(self, coded: &[T]) -> Vec<T> {
         let places = (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| column * self.rows + row));
+        let places = places.map(|place| planted!("gnss.fec.interleaver", place, place ^ 1));
         places.filter_map(|place| coded.get(place).copied()).collect()
     }
 

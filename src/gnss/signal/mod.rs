@@ -285,8 +285,8 @@ impl Component {
         f64::from(self.code_chips) / self.chip_rate_hz
     }
 
-    /// Code periods that carry one symbol of the message; `None` for a pilot, and for a symbol that is no whole number
-    /// of periods.
+    /// Code periods that carry one symbol of the message; `None` for a pilot, and for a symbol that is no
+    /// whole number of periods.
     pub fn periods_per_symbol(&self) -> Option<u32> {
         let periods = self.message?.symbol_s / self.period_s();
         ((periods - periods.round()).abs() < 1e-6 && periods > 0.5).then_some(periods.round() as u32)

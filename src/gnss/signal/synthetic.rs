@@ -5,6 +5,7 @@
 
 use super::{Carrier, Component, Layer, Overlay, Signal};
 use crate::gnss::galileo::inav::INAV;
+use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::satellite::System;
 use crate::gnss::time::{GPST, TimeScale};
 
@@ -14,8 +15,8 @@ pub static SYNTHETIC: [&Signal; 5] = [&LONG_BOC, &QUADRATURE, &CHANNELS, &MULTIP
 /// Three seconds behind GPS time.
 pub static OWN_TIME: TimeScale = TimeScale { name: "synthetic", behind_gpst_s: 3 };
 
-/// Two components with codes of 4 ms in BOC(1,1), one with a coded message of a symbol a period and the other with an
-/// overlay of 25 chips, in a time of its own.
+/// Two components with codes of 4 ms in BOC(1,1), one with a coded message of a symbol a period and the other
+/// with an overlay of 25 chips, in a time of its own.
 pub static LONG_BOC: Signal = Signal {
     name: "synthetic A",
     rinex: "1X",
@@ -84,6 +85,16 @@ pub static QUADRATURE: Signal = Signal {
             message: None,
         },
     ],
+};
+
+/// The same with data whose symbols begin where the overlays do.
+pub static QUADRATURE_DATA: Signal = Signal {
+    name: "synthetic B with data",
+    components: &[
+        Component { message: Some(&LNAV), ..QUADRATURE.components[0] },
+        Component { ..QUADRATURE.components[1] },
+    ],
+    ..QUADRATURE
 };
 
 /// One code for all satellites, each on its own carrier.

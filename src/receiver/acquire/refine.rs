@@ -132,8 +132,9 @@ impl Correlators<'_> {
         self.sums(phase_chips, doppler_hz, offsets).map(|sum| mean(sum.iter().map(|s| s.norm_sqr())))
     }
 
-    /// The search's sums do not begin where code periods do. Where the sign turns in the middle of one its line splits
-    /// in two, 0.74/T to either side, and a cell there may have won. Sums over whole code periods know better.
+    /// The search's sums do not begin where code periods do. Where the sign turns in the middle of one its
+    /// line splits in two, 0.74/T to either side, and a cell there may have won. Sums over whole code periods
+    /// know better.
     fn unsplit_doppler_hz(&self, phase_chips: f64, coarse_hz: f64) -> f64 {
         let spacing_hz = 0.5 / (self.grid.period_samples / self.grid.rate_hz);
         let mut best = (f64::NEG_INFINITY, coarse_hz);

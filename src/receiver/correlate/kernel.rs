@@ -94,7 +94,8 @@ pub(super) struct Job<'a> {
     short: Option<short::Steps>,
 }
 
-/// Correlates `taps` in groups of three and a rest of two or one. `level` must be one that this processor has.
+/// Correlates `taps` in groups of three and a rest of two or one. `level` must be one that this processor
+/// has.
 pub(super) fn correlate<const T: usize>(
     level: Level,
     fast: Fast,

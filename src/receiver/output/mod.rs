@@ -1,5 +1,5 @@
-//! What a receiver reports ([`Record`]), who takes it ([`Sink`]), and the sink that writes files: one CSV file a kind of
-//! record, and `receiver.json` with what it was told.
+//! What a receiver reports ([`Record`]), who takes it ([`Sink`]), and the sink that writes files: one CSV
+//! file a kind of record, and `receiver.json` with settings and outcome.
 //!
 //! Rows go out as they come, so memory stays flat. Headers are written at once: a file without rows says that
 //! there were none, a missing file that nothing ran.

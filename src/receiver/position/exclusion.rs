@@ -10,8 +10,8 @@
 //! Where two sets leave ranges that agree within themselves but on different places, nothing tells which is
 //! right: then there is no position ([`NoFix::Ambiguous`]). Places nearer than what a wrong model of the
 //! atmosphere does are no faults told apart: the best fit serves. Limits: faults on so many satellites that
-//! good ones are the minority, and faults that happen to fit another position: as many directions as there are degrees
-//! of freedom are all that residuals see.
+//! good ones are the minority, and faults that happen to fit another position: as many directions as there
+//! are degrees of freedom are all that residuals see.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -103,8 +103,8 @@ fn satellites(ranges: &[Range]) -> Vec<Vec<usize>> {
     groups.into_iter().map(|(_, group)| group).collect()
 }
 
-/// The ranges of all sets of `size` satellites, those first whose removal leaves the smallest sum of squares; `None` if
-/// there are too many.
+/// The ranges of all sets of `size` satellites, those first whose removal leaves the smallest sum of squares;
+/// `None` if there are too many.
 fn ranked(solution: &Solution, satellites: &[Vec<usize>], size: usize) -> Option<Vec<Vec<usize>>> {
     let sets = sets(satellites.len(), size)?.into_iter().map(|set| {
         let mut ranges: Vec<usize> = set.iter().flat_map(|&group| satellites[group].iter().copied()).collect();

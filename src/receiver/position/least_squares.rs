@@ -2,11 +2,11 @@
 //!
 //! Model: ρ = |R(Ωτ) r_s(t_e) − r| + b − c Δt_s + I + T with τ the geometric light time (the raw pseudorange
 //! would let a clock bias of 11 ms shift the fix by metres). Source: IS-GPS-200N, 20.3.3.4.3.4 and any
-//! textbook of estimation. Three coordinates are unknown and one clock for each time scale of the ranges, as systems'
-//! times differ by nanoseconds that nobody tells. Lines of sight have unit length: the condition of the normal
-//! equations is that of the geometry, and is checked before they are solved. Where the ionosphere's model has an error
-//! ([`Ionosphere::Uncertain`]) that error is three more unknowns with a prior; they are eliminated, so that the
-//! covariance of the others contains them.
+//! textbook of estimation. Three coordinates are unknown and one clock for each time scale of the ranges, as
+//! systems' times differ by nanoseconds that no signal shows by itself. Lines of sight have unit length: the
+//! condition of the normal equations is that of the geometry, and is checked before they are solved. Where
+//! the ionosphere's model has an error ([`Ionosphere::Uncertain`]) that error is three more unknowns with a
+//! prior; they are eliminated, so that the covariance of the others contains them.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Matrix4, MatrixXx3, Vector3, Vector4};
 
@@ -81,8 +81,8 @@ pub struct Corrections {
 #[derive(Clone, Debug)]
 pub struct Solution {
     pub position_m: Vector3<f64>,
-    /// The time scales of the ranges, GPS time first, with the reading of the receiver's clock minus each but for whole
-    /// seconds, in metres.
+    /// The time scales of the ranges, GPS time first, with the reading of the receiver's clock minus each but
+    /// for whole seconds, in metres.
     pub clocks: Vec<(&'static TimeScale, f64)>,
     /// Of each range: the place of its clock among them …
     pub clock_of: Vec<usize>,
@@ -279,8 +279,9 @@ pub fn position(ranges: &[Range], start_m: Vector3<f64>, corrections: &Correctio
     if ranges.len() < need {
         return Err(NoFix::TooFew { have: ranges.len(), need });
     }
+    let clock = |range: &Range| scales.iter().position(|scale| *scale == range.signal.time).unwrap_or(0);
     let clock_of: Vec<usize> =
-        ranges.iter().map(|range| scales.iter().position(|scale| *scale == range.signal.time).unwrap_or(0)).collect();
+        ranges.iter().map(|range| planted!("receiver.position.own_clock", clock(range), 0)).collect();
     let day = ranges.first().map_or(1.0, |range| range.emitted.day_of_year());
     let lines = |at: &Estimate| -> Vec<Line> {
         ranges.iter().zip(&clock_of).map(|(range, &clock)| line(range, clock, at, corrections, day)).collect()

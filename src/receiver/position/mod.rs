@@ -2,8 +2,9 @@
 //!
 //! A [`Solver`] smooths code with carrier ([`smooth`]), finds where satellites were, corrects the atmosphere
 //! by the decoded ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`troposphere`],
-//! solves ([`least_squares`]), with a clock for each time scale, and tests the residuals, leaving out the fewest
-//! satellites that contradict the others ([`exclusion`]). Limits: carriers of one satellite are not combined.
+//! solves ([`least_squares`]), with a clock for each time scale, and tests the residuals, leaving out the
+//! fewest satellites that contradict the others ([`exclusion`]). Limits: carriers of one satellite are not
+//! combined.
 
 use std::collections::BTreeMap;
 

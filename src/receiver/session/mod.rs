@@ -203,7 +203,7 @@ impl Session {
         })
     }
 
-    /// The first signal, by whose band offsets are told.
+    /// The first signal, by whose band offsets are reported.
     fn signal(&self) -> Option<&'static Signal> {
         self.signals.first().copied()
     }

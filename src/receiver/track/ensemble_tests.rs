@@ -58,8 +58,8 @@ const MOST_SEARCHES: u32 = 20;
 /// Distance of a side peak of BOC(1,1) from the main one.
 const SIDE_CHIPS: f64 = 0.5;
 
-/// Searches for a satellite anywhere (`None` if it is not found), puts the channel on the peak of this number (0 is what
-/// the search found) and follows it.
+/// Searches for a satellite anywhere (`None` if it is not found), puts the channel on the peak of this number
+/// (0 is what the search found) and follows it.
 fn cold_start(signal: &'static Signal, seed: u64, peak: i32, with_echo: bool, duration_s: f64) -> Option<Start> {
     let mut random = Random(seed);
     let numbers = if std::ptr::eq(signal, &MIXED) { 10.0 } else { 36.0 };
@@ -153,8 +153,8 @@ fn needed_samples(signal: &'static Signal, stream: &Stream) -> usize {
     ((periods + 1.0) * component.period_s() * stream.rate_hz) as usize
 }
 
-/// Runs starts on the main peak and on both side peaks in turn, half of them with an echo. One that the search does not
-/// find is no start: another is drawn in its place.
+/// Runs starts on the main peak and on both side peaks in turn, half of them with an echo. One that the
+/// search does not find is no start: another is drawn in its place.
 fn cold_starts(signal: &'static Signal, starts: u64, duration_s: f64) -> Vec<Start> {
     let one = |run: u64| cold_start(signal, 4000 + run, [0, 1, -1][run as usize % 3], run % 2 == 1, duration_s);
     let mut runs: Vec<Start> = (0..starts).into_par_iter().filter_map(one).collect();
@@ -242,8 +242,8 @@ impl Theory {
 
 /// What a loop makes of unit noise of its discriminator.
 struct Response {
-    /// Variance that a phase which runs at the loop's rate adds at any time within updates: x² of the rate in phase an
-    /// update, 1/12 in the mean.
+    /// Variance that a phase which runs at the loop's rate adds at any time within updates: x² of the rate in
+    /// phase an update, 1/12 in the mean.
     within: f64,
     /// Sum of the squares of the phase's autocorrelation over all lags, in updates.
     memory: f64,
@@ -329,8 +329,8 @@ fn follow(signal: &'static Signal, rate_hz: f64, settings: &TrackingSettings, se
 
 const JITTER_DBHZ: f64 = 45.0;
 
-/// After so long the carrier was locked for its first hundred prompts, symbols and overlay are known, and nothing is left of
-/// the pull-in.
+/// After so long the carrier was locked for its first hundred prompts, symbols and overlay are known, and
+/// nothing is left of the pull-in.
 fn settle_s(component: &Component) -> f64 {
     0.8 + 115.0 * component.period_s()
 }
@@ -357,8 +357,8 @@ fn jitter(signal: &'static Signal, rate_hz: f64, channels: u64, duration_s: f64)
     let values: f64 = runs.iter().map(|run| run.values).sum();
     let code_chips = (runs.iter().map(|run| run.code).sum::<f64>() / values).sqrt();
     let carrier_cycles = (runs.iter().map(|run| run.carrier).sum::<f64>() / values).sqrt();
-    // The mean of each channel takes 1/(2Bt) of the variance. A variance that is measured over a time scatters by
-    // √(2·memory/time) of itself, its root by half as much.
+    // The mean of each channel takes 1/(2Bt) of the variance. A variance that is measured over a time
+    // scatters by √(2·memory/time) of itself, its root by half as much.
     let bandwidths_hz = [fitted.dll_bandwidth_hz, fitted.pll_bandwidth_hz];
     let [left_code, left_carrier] = bandwidths_hz.map(|hz| (1.0 - 0.5 / (hz * duration_s)).sqrt());
     Jitter {

@@ -93,8 +93,8 @@ mod tests {
         const fn of(layers: &'static [Layer]) -> Component {
             Component { layers, ..LONG_BOC.components[0] }
         }
-        // Sine-phased BOC: (−1)^k (1 − k/n) at k of n steps. Cosine-phased BOC(1,1): −1/4, 1/2 … at quarters of a chip:
-        // R = 1 at 0, −1/4 at 1/4, −1/2 at 1/2, 1/4 at 3/4.
+        // Sine-phased BOC: (−1)^k (1 − k/n) at k of n steps. Cosine-phased BOC(1,1): −1/4, 1/2 … at quarters
+        // of a chip: R = 1 at 0, −1/4 at 1/4, −1/2 at 1/2, 1/4 at 3/4.
         const COSINE: [Layer; 1] = [Layer { pulse: &[1, -1, -1, 1], ..Layer::BPSK }];
         let near = |layers: &'static [Layer], chips: f64, ratio: f64| {
             let found = side_peak(&of(layers)).unwrap();

@@ -5,8 +5,8 @@
 //! where symbols are random and phases unknown); the largest sum gives both. Then the phases of the squared
 //! symbols, which know no data, give frequency and phase exactly enough for a phase loop to begin in lock.
 //! Noise alone is recognised by its chi-square distribution. Limits: the frequency is within 400 Hz for a
-//! period of 1 ms (of symbols of one period within a quarter of a cycle a period) and changes by less than some
-//! hertz in the batch (1 m/s² is 5 Hz/s); edges are found to a few periods, which [`super::sync`] has to
+//! period of 1 ms (of symbols of one period within a quarter of a cycle a period) and changes by less than
+//! some hertz in the batch (1 m/s² is 5 Hz/s); edges are found to a few periods, which [`super::sync`] has to
 //! confirm.
 
 use std::f64::consts::TAU;
@@ -90,7 +90,7 @@ impl Batch {
         if symbols < 2 || noise <= 0.0 {
             return None;
         }
-        // The energy of a single prompt does not depend on frequency: the squares alone tell it.
+        // The energy of a single prompt does not depend on frequency: the squares alone show it.
         let reach_cycles = if self.group > 1 { REACH_CYCLES } else { 0.0 };
         let steps = (reach_cycles * FINENESS * self.group as f64).floor() as i32;
         let step = 1.0 / (FINENESS * self.group as f64);
@@ -220,7 +220,8 @@ mod tests {
                     batch.add(carrier + Complex64::new(normal.next(), normal.next()));
                 }
                 let found = batch.search(2.0).unwrap();
-                // Of the phase of 62 prompts at 11 dB: 0.06 cycles a prompt, √12/62^1.5 of that a period, five times.
+                // Of the phase of 62 prompts at 11 dB: 0.06 cycles a prompt, √12/62^1.5 of that a period,
+                // five times.
                 assert!((found.cycles - cycles).abs() < 2e-3, "{cycles}: {}", found.cycles);
             }
         }

@@ -7,10 +7,9 @@ use num_complex::Complex64;
 
 use super::tests::Normal;
 use super::*;
-use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
+use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE_DATA};
 use crate::gnss::signal::{Component, Link, Signal};
 use crate::gnss::time::Rate;
 use crate::receiver::acquire::{Acquired, AcquisitionSettings, search};
@@ -154,16 +153,6 @@ fn sign(number: i64) -> f64 {
     if (z ^ (z >> 27)) & 1 == 1 { -1.0 } else { 1.0 }
 }
 
-/// Synthetic signal B with a message whose symbols begin where the overlays do.
-static READ: Signal = Signal {
-    name: "synthetic B with data",
-    components: &[
-        Component { message: Some(&LNAV), ..QUADRATURE.components[0] },
-        Component { ..QUADRATURE.components[1] },
-    ],
-    ..QUADRATURE
-};
-
 /// Every synthetic signal at a rate that holds it.
 fn skies() -> Vec<Sky> {
     let of = |signal: &'static Signal, number: u8, rate_hz: f64| Sky {
@@ -176,7 +165,7 @@ fn skies() -> Vec<Sky> {
     };
     vec![
         of(&LONG_BOC, 5, 5.3e6),
-        of(&READ, 7, 12.3e6),
+        of(&QUADRATURE_DATA, 7, 12.3e6),
         of(&CHANNELS, 3, 2.6e6),
         of(&MULTIPLEXED, 9, 2.6e6),
         of(&MIXED, 2, 5.3e6),

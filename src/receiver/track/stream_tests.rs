@@ -1,5 +1,5 @@
-//! A satellite's samples at speed, for tests that need hours of them: from integrals of its waveform, so that each sample is
-//! the exact mean over its interval.
+//! A satellite's samples at speed, for tests that need hours of them: from integrals of its waveform, so that
+//! each sample is the exact mean over its interval.
 
 use std::f64::consts::TAU;
 
@@ -34,7 +34,8 @@ impl Random {
     }
 }
 
-/// The normal distribution in 65 536 equally probable values of unit variance: a correlation adds thousands of them.
+/// The normal distribution in 65 536 equally probable values of unit variance: a correlation adds thousands
+/// of them.
 struct Noise {
     values: Vec<f32>,
     random: Random,
@@ -99,7 +100,8 @@ impl Integral {
         if symbol { -chip } else { chip }
     }
 
-    /// Adds the means over samples to `sum`, the first of which begins `begin_chips` after an epoch of the code.
+    /// Adds the means over samples to `sum`, the first of which begins `begin_chips` after an epoch of the
+    /// code.
     fn add(&self, begin_chips: f64, step_chips: f64, gain: Complex64, sum: &mut [Complex64]) {
         let length = f64::from(self.component.code_chips);
         let mut period = (begin_chips / length).floor();

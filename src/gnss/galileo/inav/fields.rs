@@ -1,4 +1,5 @@
-//! The field tables of I/NAV: places count from 0, the first bit of a word (Galileo OS SIS ICD 2.1, tables 42 to 54).
+//! The field tables of I/NAV: places count from 0, the first bit of a word (Galileo OS SIS ICD 2.1, tables 42
+//! to 54).
 
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::gnss::bits::{Element, Field, element};
@@ -62,8 +63,8 @@ fn gst_week(at: Epoch) -> f64 {
     (at.week() - GST_WEEK).rem_euclid(4096) as f64
 }
 
-/// The status of a signal in [`Ephemeris::health`]: one bit of data validity, then two of signal health; those of E1-B
-/// are the lowest three bits, those of E5b the three above.
+/// The status of a signal in [`Ephemeris::health`]: one bit of data validity, then two of signal health;
+/// those of E1-B are the lowest three bits, those of E5b the three above.
 fn status(health: u8, low: u32, bits: u32) -> f64 {
     f64::from(health >> low & ((1 << bits) - 1))
 }
@@ -73,16 +74,33 @@ fn set_status(health: &mut u8, low: u32, bits: u32, value: f64) {
     *health = *health & !mask | (value as u8) << low & mask;
 }
 
+/// The issue of data, alike in words 1 to 4.
+const ISSUE: Of = element(
+    Field::new("iodnav", &[(6, 10)], Whole, 0, "5.1.9.2"),
+    |o| f64::from(o.ephemeris.iode),
+    |o, v| (o.ephemeris.iode, o.ephemeris.iodc) = (v as u16, v as u16),
+);
+
+/// The week of sending; what sets it is the caller.
+const fn week(pieces: &'static [(u16, u8)]) -> Of {
+    element(Field::new("week", pieces, Whole, 0, TIME), |o| gst_week(o.ephemeris.transmitted), |_, _| {})
+}
+
+/// The time of week of sending.
+const fn tow(pieces: &'static [(u16, u8)]) -> Of {
+    element(Field::new("tow_s", pieces, Whole, 0, TIME), |o| o.ephemeris.transmitted.tow_s(), |_, _| {})
+}
+
 /// The spare word: week and time of week.
 #[rustfmt::skip]
 pub(super) static WORD_0: [Of; 2] = [
-    element(Field::new("week", &[(96, 12)], Whole, 0, TIME), |o| gst_week(o.ephemeris.transmitted), |_, _| {}),
-    element(Field::new("tow_s", &[(108, 20)], Whole, 0, TIME), |o| o.ephemeris.transmitted.tow_s(), |_, _| {}),
+    week(&[(96, 12)]),
+    tow(&[(108, 20)]),
 ];
 
 #[rustfmt::skip]
 pub(super) static WORD_1: [Of; 5] = [
-    element(Field::new("iodnav", &[(6, 10)], Whole, 0, "5.1.9.2"), |o| f64::from(o.ephemeris.iode), |o, v| set_issue(&mut o.ephemeris, v)),
+    ISSUE,
     element(Field::new("toe_min", &[(16, 14)], Whole, 0, ORBIT), |o| o.ephemeris.toe.tow_s() / MINUTE_S, |o, v| o.ephemeris.toe = o.ephemeris.toe.nearest_tow((v * MINUTE_S) as i64)),
     element(Field::new("m0_rad", &[(30, 32)], Turn, -31, ORBIT), |o| o.ephemeris.m0_rad, |o, v| o.ephemeris.m0_rad = v),
     element(Field::new("eccentricity", &[(62, 32)], Unsigned, -33, ORBIT), |o| o.ephemeris.eccentricity, |o, v| o.ephemeris.eccentricity = v),
@@ -91,7 +109,7 @@ pub(super) static WORD_1: [Of; 5] = [
 
 #[rustfmt::skip]
 pub(super) static WORD_2: [Of; 5] = [
-    element(Field::new("iodnav", &[(6, 10)], Whole, 0, "5.1.9.2"), |o| f64::from(o.ephemeris.iode), |o, v| set_issue(&mut o.ephemeris, v)),
+    ISSUE,
     element(Field::new("omega0_rad", &[(16, 32)], Turn, -31, ORBIT), |o| o.ephemeris.omega0_rad, |o, v| o.ephemeris.omega0_rad = v),
     element(Field::new("i0_rad", &[(48, 32)], Semicircles, -31, ORBIT), |o| o.ephemeris.i0_rad, |o, v| o.ephemeris.i0_rad = v),
     element(Field::new("omega_rad", &[(80, 32)], Turn, -31, ORBIT), |o| o.ephemeris.omega_rad, |o, v| o.ephemeris.omega_rad = v),
@@ -100,7 +118,7 @@ pub(super) static WORD_2: [Of; 5] = [
 
 #[rustfmt::skip]
 pub(super) static WORD_3: [Of; 8] = [
-    element(Field::new("iodnav", &[(6, 10)], Whole, 0, "5.1.9.2"), |o| f64::from(o.ephemeris.iode), |o, v| set_issue(&mut o.ephemeris, v)),
+    ISSUE,
     element(Field::new("omega_dot_radps", &[(16, 24)], Semicircles, -43, ORBIT), |o| o.ephemeris.omega_dot_radps, |o, v| o.ephemeris.omega_dot_radps = v),
     element(Field::new("delta_n_radps", &[(40, 16)], Semicircles, -43, ORBIT), |o| o.ephemeris.delta_n_radps, |o, v| o.ephemeris.delta_n_radps = v),
     element(Field::new("cuc_rad", &[(56, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cuc_rad, |o, v| o.ephemeris.cuc_rad = v),
@@ -112,7 +130,7 @@ pub(super) static WORD_3: [Of; 8] = [
 
 #[rustfmt::skip]
 pub(super) static WORD_4: [Of; 8] = [
-    element(Field::new("iodnav", &[(6, 10)], Whole, 0, "5.1.9.2"), |o| f64::from(o.ephemeris.iode), |o, v| set_issue(&mut o.ephemeris, v)),
+    ISSUE,
     element(Field::new("svid", &[(16, 6)], Whole, 0, "5.1.9.3"), |o| f64::from(o.ephemeris.sv.number), |_, _| {}),
     element(Field::new("cic_rad", &[(22, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cic_rad, |o, v| o.ephemeris.cic_rad = v),
     element(Field::new("cis_rad", &[(38, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cis_rad, |o, v| o.ephemeris.cis_rad = v),
@@ -133,8 +151,8 @@ pub(super) static WORD_5: [Of; 11] = [
     element(Field::new("e1b_health", &[(69, 2)], Whole, 0, "5.1.9.7"), |o| status(o.ephemeris.health, 1, 2), |o, v| set_status(&mut o.ephemeris.health, 1, 2, v)),
     element(Field::new("e5b_data_validity", &[(71, 1)], Whole, 0, "5.1.9.6"), |o| status(o.ephemeris.health, 3, 1), |o, v| set_status(&mut o.ephemeris.health, 3, 1, v)),
     element(Field::new("e1b_data_validity", &[(72, 1)], Whole, 0, "5.1.9.6"), |o| status(o.ephemeris.health, 0, 1), |o, v| set_status(&mut o.ephemeris.health, 0, 1, v)),
-    element(Field::new("week", &[(73, 12)], Whole, 0, TIME), |o| gst_week(o.ephemeris.transmitted), |_, _| {}),
-    element(Field::new("tow_s", &[(85, 20)], Whole, 0, TIME), |o| o.ephemeris.transmitted.tow_s(), |_, _| {}),
+    week(&[(73, 12)]),
+    tow(&[(85, 20)]),
 ];
 
 #[rustfmt::skip]
@@ -149,10 +167,6 @@ pub(super) static WORD_6: [Element<Utc>; 9] = [
     element(Field::new("utc_leap_after_s", &[(97, 8)], Signed, 0, UTC), |u| u.leap_after_s as f64, |u, v| u.leap_after_s = v as i64),
     element(Field::new("tow_s", &[(105, 20)], Whole, 0, TIME), |u| (u.sent_s % WEEK_S) as f64, |u, v| u.sent_s = v as i64),
 ];
-
-fn set_issue(ephemeris: &mut Ephemeris, value: f64) {
-    (ephemeris.iode, ephemeris.iodc) = (value as u16, value as u16);
-}
 
 /// Every field by the word that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {

@@ -1,22 +1,26 @@
-//! The Galileo integrity navigation message (I/NAV) as E1-B sends it: pages of two seconds, encoded and decoded.
+//! The Galileo integrity navigation message (I/NAV) as E1-B sends it: pages of two seconds, encoded and
+//! decoded.
 //!
-//! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is a pattern of
-//! ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both parts carry one word of
-//! 128 bits and a check. Limits: words 0 to 6; where satellites send almanacs, reduced elements or redundancy (words 7
-//! to 10 and 16 to 20) the spare word 0 is sent, and such words are read as pages without parameters. Alert pages are
-//! not read. The bits reserved for authentication and the return link are zero.
+//! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is
+//! a pattern of ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both
+//! parts carry one word of 128 bits and a check. Limits: words 0 to 6; where satellites send almanacs,
+//! reduced elements or redundancy (words 7 to 10 and 16 to 20) the spare word 0 is sent, and such words are
+//! read as pages without parameters. Alert pages are not read. The bits reserved for authentication and the
+//! return link are zero.
 
 mod fields;
 mod reader;
 
-use crate::gnss::bits::{Element, FieldError, Store, add_to, integers, quantise_all, read_all, write_all};
+use crate::gnss::bits::{
+    Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
+};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::crc::crc24q;
 use crate::gnss::fec::convolutional::Convolutional;
 use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::message::{Common, Message, Sender};
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{Epoch, WEEK_S};
 pub use fields::{GST_WEEK, tables};
 use fields::{Orbit, Utc, WORD_1, WORD_2, WORD_3, WORD_4, WORD_5, WORD_6};
 pub use reader::InavReader;
@@ -68,16 +72,21 @@ const CHECK_BEGIN: usize = 82;
 const CHECK_BITS: usize = 24;
 /// Where the secondary synchronisation pattern begins in the odd part (4.3.2.3).
 const SSP_BEGIN: usize = 106;
+const SSP_BITS: usize = 8;
 /// The word that has nothing to say (5.1.9.11), and those that make up a set of elements.
 const SPARE: u8 = 0;
 const WORDS_OF_SET: [u8; 4] = [1, 2, 3, 4];
 
-const CODE: Convolutional = Convolutional { second_inverted: true };
+/// The code of a part (4.1.4).
+fn code() -> Convolutional {
+    Convolutional { second_inverted: planted!("gnss.inav.second_symbol", true, false) }
+}
+
 const INTERLEAVER: Interleaver = Interleaver { columns: 30, rows: 8 };
 
 /// Type of the word that begins at a time: the nominal sequence of E1-B (4.3.5, table 38).
 pub fn word_at(start: Epoch) -> u8 {
-    match start.tow_whole_s().rem_euclid(SUBFRAME_S) {
+    match start.tow_whole_s().rem_euclid(SUBFRAME_S) + planted!("gnss.inav.word_order", 0, 2) {
         1 => 2,
         3 => 4,
         5 => 6,
@@ -146,22 +155,24 @@ fn alternate(word: &mut u128, from: usize, to: usize) {
 
 /// The two parts of a nominal page around a word, checked and with their tails.
 fn page(word: &u128, start: Epoch) -> [Vec<bool>; 2] {
-    let bit = |place: usize| word >> (WORD_BITS - 1 - place) & 1 == 1;
     let mut even = vec![false; PART_BITS];
     let mut odd = vec![false; PART_BITS];
     odd[0] = true;
-    even[WORD_BEGIN..].iter_mut().zip((0..EVEN_WORD_BITS).map(bit)).for_each(|(slot, bit)| *slot = bit);
-    odd[WORD_BEGIN..].iter_mut().zip((EVEN_WORD_BITS..WORD_BITS).map(bit)).for_each(|(slot, bit)| *slot = bit);
+    let put = |part: &mut [bool], from: usize, bits: &mut dyn Iterator<Item = bool>| {
+        part.iter_mut().skip(from).zip(bits).for_each(|(slot, bit)| *slot = bit);
+    };
+    let mut bits = bits_of(*word, WORD_BITS);
+    put(&mut even, WORD_BEGIN, &mut bits.by_ref().take(EVEN_WORD_BITS));
+    put(&mut odd, WORD_BEGIN, &mut bits);
     let check = crc24q(covered(&even, &odd));
-    (odd[CHECK_BEGIN..].iter_mut().take(CHECK_BITS).zip((0..CHECK_BITS).rev()))
-        .for_each(|(slot, place)| *slot = check >> place & 1 == 1);
+    put(&mut odd, CHECK_BEGIN, &mut bits_of(u128::from(check), CHECK_BITS));
     // By the time within six seconds (4.3.2.3, table 41).
-    let pattern: u8 = match start.tow_whole_s().rem_euclid(6) {
+    let pattern = match start.tow_whole_s().rem_euclid(6) {
         1 => 0x04,
         3 => 0x2B,
         _ => 0x2F,
     };
-    (odd[SSP_BEGIN..].iter_mut().zip((0..8).rev())).for_each(|(slot, place)| *slot = pattern >> place & 1 == 1);
+    put(&mut odd, SSP_BEGIN, &mut bits_of(pattern, SSP_BITS));
     [even, odd]
 }
 
@@ -172,8 +183,9 @@ fn covered<'a>(even: &'a [bool], odd: &'a [bool]) -> impl Iterator<Item = bool> 
 
 /// The symbols of a page's two parts of 120 bits.
 pub fn encode_page(parts: &[Vec<bool>; 2]) -> Vec<bool> {
-    let part =
-        |bits: &Vec<bool>| PATTERN.into_iter().chain(INTERLEAVER.interleave(&CODE.encode(bits))).collect::<Vec<bool>>();
+    let part = |bits: &Vec<bool>| {
+        PATTERN.into_iter().chain(INTERLEAVER.interleave(&code().encode(bits))).collect::<Vec<bool>>()
+    };
     parts.iter().flat_map(part).collect()
 }
 
@@ -183,8 +195,8 @@ fn decode_page(symbols: &[bool]) -> Option<([Vec<bool>; 2], bool)> {
     decode_soft(&soft)
 }
 
-/// The parts of 120 bits in the 500 soft symbols of a page, and whether they came upside down; `None` where they are no
-/// nominal page of a right check.
+/// The parts of 120 bits in the 500 soft symbols of a page, and whether they came upside down; `None` where
+/// they are no nominal page of a right check.
 pub fn decode_soft(symbols: &[f32]) -> Option<([Vec<bool>; 2], bool)> {
     if symbols.len() != PAGE_SYMBOLS {
         return None;
@@ -195,10 +207,10 @@ pub fn decode_soft(symbols: &[f32]) -> Option<([Vec<bool>; 2], bool)> {
     let sense = if inverted { -1.0 } else { 1.0 };
     let part = |from: usize| {
         let coded: Vec<f32> = symbols[from + PATTERN.len()..from + PART_SYMBOLS].iter().map(|s| s * sense).collect();
-        CODE.decode(&INTERLEAVER.deinterleave(&coded))
+        code().decode(&INTERLEAVER.deinterleave(&coded))
     };
     let [even, odd] = [part(0), part(PART_SYMBOLS)];
-    let check = odd[CHECK_BEGIN..CHECK_BEGIN + CHECK_BITS].iter().fold(0, |all, &bit| all << 1 | u32::from(bit));
+    let check = number(&odd[CHECK_BEGIN..CHECK_BEGIN + CHECK_BITS]) as u32;
     let nominal = !even[0] && odd[0] && !even[1] && !odd[1];
     (nominal && crc24q(covered(&even, &odd)) == check).then_some(([even, odd], inverted))
 }
@@ -206,9 +218,8 @@ pub fn decode_soft(symbols: &[f32]) -> Option<([Vec<bool>; 2], bool)> {
 /// The word of 128 bits in a page's parts.
 pub fn word_of(parts: &[Vec<bool>; 2]) -> u128 {
     let [even, odd] = parts;
-    let bits = even[WORD_BEGIN..WORD_BEGIN + EVEN_WORD_BITS].iter();
-    let bits = bits.chain(&odd[WORD_BEGIN..WORD_BEGIN + WORD_BITS - EVEN_WORD_BITS]);
-    bits.fold(0, |all, &bit| all << 1 | u128::from(bit))
+    let rest = WORD_BITS - EVEN_WORD_BITS;
+    number(&even[WORD_BEGIN..WORD_BEGIN + EVEN_WORD_BITS]) << rest | number(&odd[WORD_BEGIN..WORD_BEGIN + rest])
 }
 
 /// The raw integers of all parameters of a word but its time; `None` for words without any that are read.
@@ -261,8 +272,8 @@ pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     found
 }
 
-/// The elements in words 1 to 5 with the time at which word 5 was sent; `None` where the issues differ or word 4 is
-/// another satellite's.
+/// The elements in words 1 to 5 with the time at which word 5 was sent; `None` where the issues differ or
+/// word 4 is another satellite's.
 fn elements(sv: Sv, words: [&u128; 5], near: Epoch) -> Option<Ephemeris> {
     let [one, two, three, four, five] = words;
     let issue = |word: &u128| word.piece((6, 10));
@@ -277,7 +288,8 @@ fn elements(sv: Sv, words: [&u128; 5], near: Epoch) -> Option<Ephemeris> {
     Some(orbit.ephemeris)
 }
 
-/// The start of the page by its own week and time of week, the week near `near`; `None` for words without them.
+/// The start of the page by its own week and time of week, the week near `near`; `None` for words without
+/// them.
 fn sent_at(word: &u128, near: Epoch) -> Option<Epoch> {
     let week = match word_type(word) {
         0 if word.piece((6, 2)) == 2 => word.piece((96, 12)),
@@ -286,7 +298,7 @@ fn sent_at(word: &u128, near: Epoch) -> Option<Epoch> {
     };
     let tow_s = i64::from(time_of_week(word)?);
     let week = near.nearest_week(i64::from(week) + GST_WEEK, 4096);
-    Some(Epoch::new(week * crate::gnss::time::WEEK_S + tow_s, 0.0))
+    Some(Epoch::new(week * WEEK_S + tow_s, 0.0))
 }
 
 /// Seconds of the week at which the page began, of words that say them.
@@ -297,5 +309,5 @@ fn time_of_week(word: &u128) -> Option<u32> {
         6 => word.piece((105, 20)),
         _ => return None,
     };
-    (i64::from(tow_s) < crate::gnss::time::WEEK_S).then_some(tow_s)
+    (i64::from(tow_s) < WEEK_S).then_some(tow_s)
 }

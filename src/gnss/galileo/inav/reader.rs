@@ -28,8 +28,6 @@ pub struct InavReader {
     words: BTreeMap<u8, u128>,
     /// Those of the set that was reported last.
     complete: Option<[u128; 5]>,
-    decoded: u64,
-    failed: u64,
 }
 
 impl InavReader {
@@ -43,8 +41,6 @@ impl InavReader {
             failures: 0,
             words: BTreeMap::new(),
             complete: None,
-            decoded: 0,
-            failed: 0,
         }
     }
 
@@ -92,10 +88,7 @@ impl InavReader {
     }
 
     fn rows(&self, word: &u128, issue: u32) -> Vec<NavigationRow> {
-        let all = parameters(word).into_iter().flatten();
-        let row =
-            |(parameter, raw): (&str, i64)| NavigationRow { sv: self.sv, issue, parameter: parameter.to_owned(), raw };
-        all.map(row).collect()
+        NavigationRow::each(self.sv, issue, parameters(word).unwrap_or_default()).collect()
     }
 }
 
@@ -117,12 +110,10 @@ impl Reader for InavReader {
         match decode_soft(self.symbols.make_contiguous()) {
             Some((parts, inverted)) => {
                 (self.page, self.failures) = (Some(begin), 0);
-                self.decoded += 1;
                 self.read(word_of(&parts), inverted, near)
             }
             None => {
                 if due {
-                    self.failed += 1;
                     self.failures += 1;
                     if self.failures >= FAILURES {
                         self.doubt();
@@ -144,9 +135,5 @@ impl Reader for InavReader {
 
     fn missing(&self) -> Vec<u8> {
         (1..=5).filter(|number| !self.words.contains_key(number)).collect()
-    }
-
-    fn counts(&self) -> (u64, u64) {
-        (self.decoded, self.failed)
     }
 }

@@ -16,7 +16,7 @@ pub use fields::tables;
 pub use parity::check_parity;
 pub use reader::LnavReader;
 
-use crate::gnss::bits::{add_to, integers, quantise_all, read_all, write_all};
+use crate::gnss::bits::{add_to, bits_of, integers, number, quantise_all, read_all, write_all};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::message::{Common, Message, Sender};
@@ -87,7 +87,7 @@ fn subframe_at(start: Epoch) -> u8 {
 pub fn words(symbols: &[bool]) -> [u32; 10] {
     let mut words = [0; 10];
     for (word, bits) in words.iter_mut().zip(symbols.chunks(WORD_BITS)) {
-        *word = bits.iter().fold(0, |word, &bit| word << 1 | u32::from(bit));
+        *word = number(bits) as u32;
     }
     words
 }
@@ -181,7 +181,7 @@ impl Broadcast {
 impl Sender for Broadcast {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
         let words = self.subframe(ephemeris, start)?;
-        Ok(words.iter().flat_map(|word| (0..WORD_BITS).rev().map(move |bit| word >> bit & 1 == 1)).collect())
+        Ok(words.iter().flat_map(|&word| bits_of(u128::from(word), WORD_BITS)).collect())
     }
 }
 

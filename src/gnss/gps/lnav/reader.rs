@@ -1,7 +1,7 @@
 //! Finds subframes in the symbols of a satellite, whichever way up they come, and gathers what they say.
 //!
-//! Two headers a whole number of subframes apart, or one whole subframe with its parity, show where subframes begin.
-//! Source: IS-GPS-200N, 20.3.2 to 20.3.5. Limits: a word with a wrong bit is lost.
+//! Two headers a whole number of subframes apart, or one whole subframe with its parity, show where subframes
+//! begin. Source: IS-GPS-200N, 20.3.2 to 20.3.5. Limits: a word with a wrong bit is lost.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -42,8 +42,6 @@ pub struct LnavReader {
     frame: Option<u64>,
     subframes: BTreeMap<u8, Subframe>,
     complete: Option<[Subframe; 3]>,
-    decoded: u64,
-    failed: u64,
 }
 
 impl LnavReader {
@@ -57,8 +55,6 @@ impl LnavReader {
             frame: None,
             subframes: BTreeMap::new(),
             complete: None,
-            decoded: 0,
-            failed: 0,
         }
     }
 
@@ -150,24 +146,19 @@ impl LnavReader {
         if words[0] >> 22 != PREAMBLE && words[0] >> 22 != PREAMBLE_INVERTED && self.frame.is_none() {
             return;
         }
-        match Subframe::decode(&words, previous) {
-            Ok(subframe) => {
-                // Ten words with parity are beyond chance: they show the frame by themselves.
-                self.frame = Some(begin);
-                let inverted = previous & 1 == 1;
-                news.push(self.begun(Header { bit: begin, tow_count: subframe.tow_count, inverted }));
-                self.decoded += 1;
-                self.read(subframe, near, news);
-            }
-            Err(_) if self.frame.is_some() => self.failed += 1,
-            Err(_) => {}
+        if let Ok(subframe) = Subframe::decode(&words, previous) {
+            // Ten words with parity are beyond chance: they show the frame by themselves.
+            self.frame = Some(begin);
+            let inverted = previous & 1 == 1;
+            news.push(self.begun(Header { bit: begin, tow_count: subframe.tow_count, inverted }));
+            self.read(subframe, near, news);
         }
     }
 
     fn read(&mut self, subframe: Subframe, near: Epoch, news: &mut Vec<Read>) {
         if let Some(klobuchar) = subframe.klobuchar() {
             news.push(Read::Klobuchar(klobuchar));
-            news.push(Read::Parameters(self.rows(&subframe, 0)));
+            news.push(Read::Parameters(NavigationRow::each(self.sv, 0, subframe.parameters()).collect()));
         }
         if !(1..=3).contains(&subframe.id) {
             return;
@@ -193,17 +184,12 @@ impl LnavReader {
         }
         if let Ok(ephemeris) = ephemeris(self.sv, one, two, three, near) {
             let set = [*one, *two, *three];
-            let rows = set.iter().flat_map(|part| self.rows(part, u32::from(ephemeris.iode))).collect();
+            let issue = u32::from(ephemeris.iode);
+            let rows = set.iter().flat_map(|part| NavigationRow::each(self.sv, issue, part.parameters())).collect();
             self.complete = Some(set);
             news.push(Read::Ephemeris(Box::new(ephemeris)));
             news.push(Read::Parameters(rows));
         }
-    }
-
-    fn rows(&self, subframe: &Subframe, issue: u32) -> Vec<NavigationRow> {
-        let row =
-            |(parameter, raw): (&str, i64)| NavigationRow { sv: self.sv, issue, parameter: parameter.to_owned(), raw };
-        subframe.parameters().into_iter().map(row).collect()
     }
 }
 
@@ -234,9 +220,5 @@ impl Reader for LnavReader {
 
     fn missing(&self) -> Vec<u8> {
         (1..=3).filter(|id| !self.subframes.contains_key(id)).collect()
-    }
-
-    fn counts(&self) -> (u64, u64) {
-        (self.decoded, self.failed)
     }
 }

@@ -1,4 +1,5 @@
-//! A code period: its correlations, what the detectors and symbols get of them, and the update that ends an integration.
+//! A code period: its correlations, what the detectors and symbols get of them, and the update that ends an
+//! integration.
 
 use num_complex::Complex64;
 
@@ -25,7 +26,8 @@ struct Correlations {
 }
 
 impl Channel {
-    /// Correlates the running period, whose last samples these are, and moves on to the next, which begins at `next`.
+    /// Correlates the running period, whose last samples these are, and moves on to the next, which begins at
+    /// `next`.
     pub(super) fn correlate(&mut self, replica: &Replica, i: &[f32], q: &[f32], next: u64, report: &mut Report) {
         let nco = Nco {
             carrier: tone_turns(self.if_hz, self.rate, self.first).wrapping_add(self.carrier as u64),
@@ -48,7 +50,8 @@ impl Channel {
         }
         let mean = self.power.unwrap_or_default();
         let samples = next - self.first;
-        // Noise of a correlation, per component: half the samples' power (real samples too) times the replica's energy.
+        // Noise of a correlation, per component: half the samples' power (real samples too) times the
+        // replica's energy.
         let deviation = (0.5 * mean * samples as f64 * self.replica_power).sqrt();
         let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
         if read && let Some(data) = &mut self.data {

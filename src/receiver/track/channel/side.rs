@@ -1,21 +1,24 @@
-//! A code that rests on a side peak of its correlation, as BOC has them: it is seen, and moved to the main one.
+//! A code that rests on a side peak of its correlation, as BOC has them: it is seen, and moved to the main
+//! one.
 //!
-//! **Statistic.** Correlators stand on the two neighbouring peaks. The noise of taps is correlated as the code is, so
-//! where the phase of each period is unknown, how likely the main peak is at a tap depends on that tap's power alone:
-//! what the others show follows from it. Hence D, the power of a neighbour less the prompt's, period by period,
-//! without any help of phase, overlay or symbols; it works from the first period on.
+//! **Statistic.** Correlators stand on the two neighbouring peaks. The noise of taps is correlated as the
+//! code is, so where the phase of each period is unknown, how likely the main peak is at a tap depends on
+//! that tap's power alone: what the others show follows from it. Hence D, the power of a neighbour less the
+//! prompt's, period by period, without any help of phase, overlay or symbols; it works from the first period
+//! on.
 //!
-//! **Decision.** Let noise have unit variance a component, the main peak the amplitude A = √(2·T·C/N0), a side peak c·A,
-//! and s² = 1 − c². On the main peak ln E exp(wD) = −ln(1 − 4s²w²) − w·s²·A²·(1 − 2w)/(1 − 4s²w²). With −ln(1 − x) ≤
-//! x/(1 − x) that is zero or less for w ≤ A²/(2·(2 + A²)), whatever c. So the sum of wD, held above zero, exceeds h in
-//! e^h periods on average or later (E. S. Page, Biometrika 41, 1954; G. Lorden, Ann. Math. Stat. 42, 1971), and h
-//! follows from the time between false moves. On a side peak D is s²·A² on average and the move comes after about
-//! h/(w·s²·A²) periods: a dozen at 32 dB-Hz and 4 ms. Half that w is used: by the same steps it holds while an echo
-//! raises a neighbour to three quarters of the prompt's amplitude (c = 1/2). A C/N0 that is taken too low, as it is on a
-//! side peak, only costs time.
+//! **Decision.** Let noise have unit variance a component, the main peak the amplitude A = √(2·T·C/N0), a
+//! side peak c·A, and s² = 1 − c². On the main peak ln E exp(wD) = −ln(1 − 4s²w²) − w·s²·A²·(1 − 2w)/(1 −
+//! 4s²w²). With −ln(1 − x) ≤ x/(1 − x) that is zero or less for w ≤ A²/(2·(2 + A²)), whatever c. So the sum
+//! of wD, held above zero, exceeds h in e^h periods on average or later (E. S. Page, Biometrika 41, 1954; G.
+//! Lorden, Ann. Math. Stat. 42, 1971), and h follows from the time between false moves. On a side peak D is
+//! s²·A² on average and the move comes after about h/(w·s²·A²) periods: a dozen at 32 dB-Hz and 4 ms. Half
+//! that w is used: by the same steps it holds while an echo raises a neighbour to three quarters of the
+//! prompt's amplitude (c = 1/2). A C/N0 that is taken too low, as it is on a side peak, only costs time.
 //!
-//! **Move.** Code by the distance of the peaks, the carrier by half a cycle where their signs differ: loops, lock and
-//! the search for the overlay go on. Limits: of pulses with more side peaks the code moves from one to the next.
+//! **Move.** Code by the distance of the peaks, the carrier by half a cycle where their signs differ: loops,
+//! lock and the search for the overlay go on. Limits: of pulses with more side peaks the code moves from one
+//! to the next.
 
 use num_complex::Complex64;
 
@@ -56,8 +59,9 @@ impl SidePeaks {
         [self.step, -self.step]
     }
 
-    /// Takes the powers of a code period at the prompt and at its neighbours, of noise of unit variance a component;
-    /// `snr` is T·C/N0 of the prompt. Gives the way of the code to the main peak, in code phase units.
+    /// Takes the powers of a code period at the prompt and at its neighbours, of noise of unit variance a
+    /// component; `snr` is T·C/N0 of the prompt. Gives the way of the code to the main peak, in code phase
+    /// units.
     fn add(&mut self, prompt: f64, neighbours: [f64; 2], snr: f64) -> Option<i64> {
         let square = 2.0 * snr;
         let weight = WEIGHT_SHARE * square / (2.0 * (2.0 + square));
@@ -74,7 +78,8 @@ impl SidePeaks {
 }
 
 impl Channel {
-    /// Takes prompt and neighbours of a code period, and moves code and carrier where one of these is the main peak.
+    /// Takes prompt and neighbours of a code period, and moves code and carrier where one of these is the
+    /// main peak.
     pub(super) fn watch_side_peaks(&mut self, prompt: Complex64, neighbours: [Complex64; 2], report: &mut Report) {
         let snr = self.cn0_hz() * self.period_s;
         // The noise that was measured stands beside the C/N0 that was.
@@ -125,7 +130,8 @@ mod tests {
 
     #[test]
     fn false_moves_are_as_rare_as_the_bound_says_with_an_echo_and_without() {
-        // One in a thousand periods at most: so many periods bring 200 at most on average, three deviations more are 242.
+        // One in a thousand periods at most: so many periods bring 200 at most on average, three deviations
+        // more are 242.
         const PERIODS: u32 = 200_000;
         let mut normal = Normal::new(71);
         for snr in [0.2, 1.0, 4.0, 20.0, 100.0] {
