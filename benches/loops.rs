@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use gnss_twin::analysis::theory::oscillator;
+use gnss_twin::analysis::expect::theory::oscillator;
 use gnss_twin::receiver::track::TrackingSettings;
 use gnss_twin::receiver::track::closed::Mode;
 use gnss_twin::study::correlator::{Case, run};

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use gnss_twin::analysis::assess;
-use gnss_twin::analysis::verdict::Status;
+use gnss_twin::analysis::judge::judgement::Status;
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::message::Senders;
 use gnss_twin::generator::scenario::{Overrides, Scenario};

@@ -13,8 +13,8 @@ use std::process::Command;
 use std::time::Instant;
 
 use gnss_twin::analysis;
+use gnss_twin::analysis::show::trade::{self, Row};
 use gnss_twin::analysis::statistics::{mean, median};
-use gnss_twin::analysis::trade::{self, Row};
 use gnss_twin::generator::fidelity::allowed_m;
 use gnss_twin::generator::ray::{Effect, Ray, Sight};
 use gnss_twin::generator::scenario::{Overrides, Scenario};

@@ -4,8 +4,8 @@
 //! seed: what differs is the rounding. C/N0 is the correlated amplitude's square over the mean power of the samples; the
 //! code is a discriminator over 20 ms.
 
+use gnss_twin::analysis::show::trade::Width;
 use gnss_twin::analysis::statistics::{mean, median};
-use gnss_twin::analysis::trade::Width;
 use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
 use gnss_twin::generator::stream::{Options, generate_with};
 use gnss_twin::generator::truth;

@@ -1,92 +1,43 @@
-//! The judge: joins truth and estimate, measures every error, draws and reports them.
+//! The judge: joins truth and estimate, measures every error, judges it, and shows the result.
 //!
-//! It reads only what generator and receiver wrote into a run's directory, joins the rows on (sample number,
-//! satellite, signal) and writes `summary.json` and pictures beside them. [`load`] reads it once and puts
-//! what is long on a [`shelf`], satellite by satellite, so that a long run takes little more memory than a
-//! short one; [`errors`] measures, [`slips`] finds breaks and their causes, [`elevation`] sorts errors by
-//! satellite and elevation, [`jitter`] holds each loop against theory, [`honesty`] the fixes against their
-//! own covariance, [`clock`] does so for the receiver's clock with the deviations of [`allan`],
-//! [`statistics`] condenses, [`access`] and [`jamming`] expect C/N0 under other codes and interference,
-//! [`lines`] holds the receiver's word of continuous waves against them, [`spoofing`] tells what a spoofer
-//! did, [`summary`] is what scripts gate on with its [`schema`], [`verdict`] holds it against theory and a
-//! user's [`limits`], [`making`] keeps unfinished files from sight, [`plot`] draws, [`report`] prints on a
-//! terminal and `pdf` on paper, [`psd`] estimates the spectrum of the samples, [`spectrum`] says what it
-//! should be from each signal's [`waveform`], [`foreign`] judges receivers that this project did not write,
-//! [`trade`] weighs speed against accuracy, [`theory`] says what errors to expect.
+//! It reads only what generator and receiver wrote into a run's directory, and writes `summary.json`, tables,
+//! pictures and a report beside them. [`judge`](judge()) does all of it, [`assess`] stops at the summary.
+//! Five rooms follow one another, and each uses only those before it:
+//!
+//! 1. [`read`]: a run's files as values.
+//! 2. [`expect`]: what theory and truth let one expect.
+//! 3. [`measure`]: estimate minus truth, and what follows from it.
+//! 4. [`judge`](mod@judge): figures against limits.
+//! 5. [`show`]: tables, pictures, reports.
+//!
+//! Below all of them lie [`error`], [`statistics`] and [`waveform`], the spectrum and the correlation of a signal.
 
-pub mod access;
-pub mod allan;
-pub mod clock;
-pub mod due;
-pub mod elevation;
-pub mod errors;
+pub mod error;
 pub mod expect;
-pub mod foreign;
-pub mod honesty;
-pub mod independent;
-pub mod integrity;
-pub mod jamming;
-pub mod jitter;
-pub mod limits;
-pub mod lines;
-pub mod load;
-pub mod making;
-#[cfg(feature = "pdf")]
-pub mod pdf;
-pub mod plot;
-pub mod psd;
-pub mod report;
-#[cfg(feature = "pdf")]
-mod run_report;
-pub mod schema;
-pub mod shelf;
-pub mod slips;
-pub mod spectrum;
-pub mod spoofing;
+pub mod judge;
+pub mod measure;
+pub mod read;
+pub mod show;
 pub mod statistics;
-pub mod summary;
-mod tables;
-pub mod theory;
-pub mod trade;
-pub mod verdict;
 pub mod waveform;
-mod write;
 
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use thiserror::Error;
-
-pub use summary::Summary;
-pub(crate) use write::{Table, write_rows, write_whole};
-
-/// Why a run cannot be judged.
-#[derive(Debug, Error)]
-pub enum JudgeError {
-    #[error("{} is missing: {remedy}", path.display())]
-    Missing { path: PathBuf, remedy: &'static str },
-    #[error("{}: {source}", path.display())]
-    File { path: PathBuf, source: io::Error },
-    #[error("cannot read {}: {source}", path.display())]
-    Read { path: PathBuf, source: io::Error },
-    #[error("{} holds a row that is not as expected: {source}", path.display())]
-    Row { path: PathBuf, source: csv::Error },
-    #[error("{} is not the JSON expected: {source}", path.display())]
-    Json { path: PathBuf, source: serde_json::Error },
-    #[error("scene.json: {key} = {value}, expected {expected}")]
-    Scene { key: &'static str, value: f64, expected: &'static str },
-    #[error(
-        "none of the receiver's {count} {what} falls on a sample of the truth: do both come from the same run, \
-         with the same measurement interval?"
-    )]
-    NothingJoins { what: &'static str, count: usize },
-    #[error("{}: line {line}: {what}", path.display())]
-    Line { path: PathBuf, line: u64, what: String },
-    #[error("{}: {what}", path.display())]
-    NotOfThisTruth { path: PathBuf, what: String },
-    #[error("{} could not be drawn: {reason}", path.display())]
-    Plot { path: PathBuf, reason: String },
-}
+pub use error::JudgeError;
+use judge::limits::Limits;
+pub use judge::summary::Summary;
+use judge::verdict::Verdict;
+use measure::clock::Clock;
+use measure::consistency::Consistency;
+use measure::elevation::Elevations;
+use measure::errors::Errors;
+use measure::jitter::Jitter;
+use measure::slips::Slips;
+use read::Run;
+use show::plot::{Judged, Picture, Sketch};
+#[cfg(feature = "pdf")]
+use show::run_report::RunReport;
+use show::{plot, tables};
 
 /// Judges the run in a directory: writes `summary.json`, tables, pictures and `report.pdf` there and returns
 /// the summary.
@@ -106,7 +57,7 @@ pub fn judge(run: &Path) -> Result<Summary, JudgeError> {
 ///
 /// # Errors
 /// As [`judge`].
-pub fn judge_against(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
+pub fn judge_against(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
     // On one of the threads that draw: what it needed before serves again.
     rayon::scope(|_| judged(run, limits))
 }
@@ -116,11 +67,11 @@ pub fn judge_against(run: &Path, limits: Option<&limits::Limits>) -> Result<Summ
 ///
 /// # Errors
 /// As [`judge`], but for files that cannot be written.
-pub fn assess(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
-    Ok(measure(load::Run::read(run)?, run, limits)?.summary)
+pub fn assess(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
+    Ok(measure(Run::read(run)?, run, limits)?.summary)
 }
 
-fn judged(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeError> {
+fn judged(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
     let Found { summary, sketches, report } = find(run, limits)?;
     // What was read is gone by now: drawing takes memory of its own.
     let pictures = plot::draw(run, &sketches)?;
@@ -133,66 +84,62 @@ fn judged(run: &Path, limits: Option<&limits::Limits>) -> Result<Summary, JudgeE
     let mut json =
         serde_json::to_vec_pretty(&summary).map_err(|source| JudgeError::Json { path: path.clone(), source })?;
     json.push(b'\n');
-    write_whole(&path, &json)?;
+    show::write::write_whole(&path, &json)?;
     Ok(summary)
 }
 
 /// What came of a run, its tables written and its pictures not drawn yet.
 struct Found {
     summary: Summary,
-    sketches: Vec<(&'static plot::Picture, plot::Sketch)>,
+    sketches: Vec<(&'static Picture, Sketch)>,
     #[cfg(feature = "pdf")]
-    report: run_report::RunReport,
+    report: RunReport,
     #[cfg(not(feature = "pdf"))]
     report: (),
 }
 
 /// What is measured of a run.
 struct Measured {
-    read: load::Run,
-    errors: errors::Errors,
-    clock: clock::Clock,
-    honesty: honesty::Honesty,
-    slips: slips::Slips,
-    jitter: jitter::Jitter,
+    read: Run,
+    errors: Errors,
+    clock: Clock,
+    consistency: Consistency,
+    slips: Slips,
+    jitter: Jitter,
     summary: Summary,
 }
 
-fn measure(read: load::Run, run: &Path, limits: Option<&limits::Limits>) -> Result<Measured, JudgeError> {
-    let errors = errors::Errors::measure(&read)?;
-    let clock = clock::Clock::measure(&read, &errors)?;
-    let honesty = honesty::Honesty::measure(&read, &errors);
-    let slips = slips::Slips::find(&read, &errors)?;
-    let jitter = jitter::Jitter::measure(&read, &errors)?;
+fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, JudgeError> {
+    let errors = Errors::measure(&read)?;
+    let clock = Clock::measure(&read, &errors)?;
+    let consistency = Consistency::measure(&read, &errors);
+    let slips = Slips::find(&read, &errors)?;
+    let jitter = Jitter::measure(&read, &errors)?;
     let mut summary = Summary::new(&read, &errors, &clock)?;
-    summary.add(&honesty, &slips, &jitter);
+    summary.add(&consistency, &slips, &jitter);
     let not_json = |source| JudgeError::Json { path: run.join("summary.json"), source };
-    let verdict = verdict::Verdict::of(&read, &errors, &slips, &summary)?;
+    let verdict = Verdict::of(&read, &errors, &slips, &summary)?;
     summary.details.verdict = match limits {
         Some(limits) => verdict.with_user(limits.judge(&serde_json::to_value(&summary).map_err(not_json)?)),
         None => verdict,
     };
-    Ok(Measured { read, errors, clock, honesty, slips, jitter, summary })
+    Ok(Measured { read, errors, clock, consistency, slips, jitter, summary })
 }
 
-fn find(run: &Path, limits: Option<&limits::Limits>) -> Result<Found, JudgeError> {
-    let measured = measure(load::Run::read(run)?, run, limits)?;
-    let Measured { read, errors, clock, honesty, slips, jitter, summary } = measured;
-    let elevations = elevation::Elevations::measure(&read, &errors)?;
-    let judged = plot::Judged { run: &read, errors: &errors, clock: &clock, honesty: &honesty, summary: &summary };
-    clock.write(run)?;
-    honesty.write(run)?;
-    elevations.write(run)?;
-    slips.write(run)?;
-    jitter.write(run)?;
+fn find(run: &Path, limits: Option<&Limits>) -> Result<Found, JudgeError> {
+    let measured = measure(Run::read(run)?, run, limits)?;
+    let Measured { read, errors, clock, consistency, slips, jitter, summary } = measured;
+    let elevations = Elevations::measure(&read, &errors)?;
+    let judged = Judged { run: &read, errors: &errors, clock: &clock, consistency: &consistency, summary: &summary };
+    tables::write_measured(run, &judged, &elevations, &slips, &jitter)?;
     tables::write(run, &judged)?;
     let sketches = plot::sketches(&judged)?;
     #[cfg(feature = "pdf")]
-    let report = run_report::RunReport::new(&judged)?;
+    let report = RunReport::new(&judged)?;
     #[cfg(not(feature = "pdf"))]
     let report = ();
     Ok(Found { summary, sketches, report })
 }
 
 #[cfg(test)]
-mod tests;
+mod hand_made;

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::analysis;
-use crate::analysis::foreign::{self, Files};
+use crate::analysis::judge::foreign::{self, Files};
+use crate::analysis::show;
 use crate::cli::args;
 use crate::cli::check::Gate;
 use crate::cli::error::CliError;
@@ -33,6 +34,6 @@ fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliEr
         PathBuf::from("reports").join(name)
     });
     std::fs::create_dir_all(&out).map_err(|error| CliError::create(out.display(), &error))?;
-    judgement.write(&out).map_err(judge_error)?;
+    show::foreign::write(&judgement, &out).map_err(judge_error)?;
     scenario::print(&format!("{}\nresults in {}\n", judgement.summary, out.display()))
 }

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::analysis::limits::Limits;
-use crate::analysis::summary::Summary;
-use crate::analysis::verdict::{Judgement, Status};
+use crate::analysis::judge::judgement::{Judgement, Status};
+use crate::analysis::judge::limits::Limits;
+use crate::analysis::judge::summary::Summary;
 use crate::cli::error::CliError;
 use crate::cli::scenario;
 

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use crate::analysis::making;
+use crate::analysis::show::staged;
 use crate::cli::error::CliError;
 
 /// How often that thread looks where it cannot be woken.
@@ -72,7 +72,7 @@ fn wait(mut reader: UnixStream) {
             break signal;
         }
     };
-    making::abandon();
+    staged::abandon();
     signal_hook::low_level::exit(128 + signal);
 }
 

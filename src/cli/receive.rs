@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use crate::analysis::making::present;
+use crate::analysis::show::staged::present;
 use crate::cli::args;
 use crate::cli::error::{CliError, shown};
 use crate::cli::progress::Progress;

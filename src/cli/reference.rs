@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use crate::analysis::schema;
-use crate::analysis::verdict::MARGINAL_SHARE;
+use crate::analysis::judge::judgement::MARGINAL_SHARE;
+use crate::analysis::judge::schema;
 use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::scenario;

@@ -8,7 +8,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::analysis::psd::Psd;
+use crate::analysis::measure::psd::Psd;
+use crate::analysis::show::tables;
 use crate::analysis::{self, JudgeError};
 use crate::cli::args;
 use crate::cli::check::Gate;
@@ -195,7 +196,7 @@ impl Tap {
 
     fn finish(&mut self, run: &Path) -> Result<(), CliError> {
         let path = run.join("psd.csv");
-        self.psd.write(&path).map_err(judge_error)?;
+        tables::write_psd(&path, &self.psd).map_err(judge_error)?;
         if let Some(mut file) = self.kept.take() {
             let path = run.join("if.sigmf-data");
             file.flush().map_err(|error| CliError::output(path.display(), &error))?;

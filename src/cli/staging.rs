@@ -7,7 +7,7 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::analysis::making::{Making, present};
+use crate::analysis::show::staged::{Staged, present};
 use crate::cli::error::CliError;
 
 /// Files that mark a directory as one of ours, which may be replaced.
@@ -15,7 +15,7 @@ const MARKERS: [&str; 4] = ["truth/scene.json", "rx/receiver.json", "receiver.js
 
 /// A directory or file in the making; dropped without [`Staging::commit`], it vanishes.
 pub struct Staging {
-    making: Making,
+    making: Staged,
     file: Option<File>,
     target: PathBuf,
 }
@@ -30,7 +30,7 @@ impl Staging {
                 target.display()
             )));
         }
-        let making = Making::directory(part(target)?).map_err(error)?;
+        let making = Staged::directory(part(target)?).map_err(error)?;
         Ok(Self { making, file: None, target: target.to_owned() })
     }
 
@@ -48,7 +48,7 @@ impl Staging {
             let what = if kind.is_dir() { "is a directory" } else { "is not an ordinary file" };
             return Err(CliError::refused_output(format!("{} {what}: name a file with --out", target.display())));
         }
-        let (making, file) = Making::file(part(target)?).map_err(error)?;
+        let (making, file) = Staged::file(part(target)?).map_err(error)?;
         Ok(Self { making, file: Some(file), target: target.to_owned() })
     }
 

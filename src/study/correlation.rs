@@ -4,7 +4,7 @@
 //! of taps correlates by R(τ)/R(0); the power outside, 1−R(0), is lost. Tabulated with its slope and
 //! interpolated by cubics. Offsets and frequencies count in chips and chip rates.
 
-use crate::analysis::theory::dll::{BandIntegrals, Discriminator, Taps, raw_on_chips};
+use crate::analysis::expect::theory::dll::{BandIntegrals, Discriminator, Taps, raw_on_chips};
 use crate::analysis::waveform::Waveform;
 use crate::gnss::signal::sinc_squared;
 use crate::receiver::track::loops::CodeShape;
@@ -98,7 +98,7 @@ impl Correlation {
     /// dot product behind one.
     pub fn raw_chips(&self, discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> Option<f64> {
         match self {
-            Self::Triangle => Some(crate::analysis::theory::dll::raw_chips(discriminator, d, t_s, cn0_hz)),
+            Self::Triangle => Some(crate::analysis::expect::theory::dll::raw_chips(discriminator, d, t_s, cn0_hz)),
             Self::Pulses(_) => Some(raw_on_chips(discriminator, self.taps(d), t_s * cn0_hz)),
             Self::BandLimited { band, code, .. } => BandIntegrals::of(|f| density(code.as_ref(), f), d, *band)
                 .jitter_chips(discriminator, 0.5 / t_s, t_s, cn0_hz),

@@ -13,7 +13,7 @@ use super::measure::Moments;
 use super::motion::{Motion, Truth};
 use super::normal::{Normals, Purpose, symbol};
 use super::watch::Watch;
-use crate::analysis::theory::clock::PowerLaw;
+use crate::analysis::expect::theory::clock::PowerLaw;
 use crate::gnss::signal::{self, Carrier, Component, Signal};
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::closed::{Loops, Mode, Update};

@@ -8,8 +8,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::analysis::theory::linear::controlled_root;
-use crate::analysis::theory::pll;
+use crate::analysis::expect::theory::linear::controlled_root;
+use crate::analysis::expect::theory::pll;
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::loops::Gains;
 

@@ -14,9 +14,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
 
 use super::search::Model;
-use crate::analysis::plot::canvas::{Axis, BLUE, Chart, Mark, ORANGE, Series, figure};
+use crate::analysis::JudgeError;
+use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, Mark, ORANGE, Series, figure};
+use crate::analysis::show::write::{write_rows, write_whole};
 use crate::analysis::waveform::leading;
-use crate::analysis::{JudgeError, write_rows, write_whole};
 use crate::generator::scenario::{Overrides, Scenario};
 use crate::generator::scene::Scene;
 use crate::generator::spoof::Constellation;

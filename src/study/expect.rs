@@ -1,15 +1,15 @@
 //! What theory predicts for a simulated channel: the plain description of the receiver's loops, and its thermal jitter.
 //!
-//! Gains are those that the receiver's settings lead to; everything else is `analysis::theory`, which does
+//! Gains are those that the receiver's settings lead to; everything else is `analysis::expect::theory`, which does
 //! not know the receiver. Half-cycle wraps of the frequency discriminator count as white noise of their own.
 //! Limits: small errors, noise as the squaring-loss formulas have it, no dynamics and no oscillator.
 
 use std::f64::consts::TAU;
 
 use super::correlator::Case;
-use crate::analysis::theory::dll::Discriminator;
-use crate::analysis::theory::linear::{AssistedLoop, Feedback, FrequencyLoop, Linear, Pairs, PhaseLoop};
-use crate::analysis::theory::{fll, pll};
+use crate::analysis::expect::theory::dll::Discriminator;
+use crate::analysis::expect::theory::linear::{AssistedLoop, Feedback, FrequencyLoop, Linear, Pairs, PhaseLoop};
+use crate::analysis::expect::theory::{fll, pll};
 use crate::receiver::track::closed::Mode;
 use crate::receiver::track::loops::Gains;
 use crate::receiver::track::{CodeDiscriminator, TrackingSettings};

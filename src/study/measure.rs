@@ -36,7 +36,7 @@ impl Moments {
 
 /// Relative standard error of a standard deviation from `freedom` independent values: 1/√(2ν), the normal limit of χ².
 ///
-/// A loop's error has about 4·B·t independent values in a time t; `analysis::theory::linear` counts them exactly.
+/// A loop's error has about 4·B·t independent values in a time t; `analysis::expect::theory::linear` counts them exactly.
 pub fn relative_error(freedom: f64) -> f64 {
     1.0 / (2.0 * freedom).sqrt()
 }

@@ -1,7 +1,7 @@
 //! Probability that a search finds a satellite, from the joint statistics of the cells about its peak.
 //!
 //! A search takes the largest of neighbouring cells, whose noise is alike and of which two or four may share
-//! the peak, so its detection probability exceeds that of one cell (`analysis::theory::detection`) and has no
+//! the peak, so its detection probability exceeds that of one cell (`analysis::expect::theory::detection`) and has no
 //! closed form. Here the correlations of a neighbourhood are drawn: mean from the folded spectrum of the code
 //! averaged over a sample, sinc over frequency and symbols that turn within a sum; noise with the covariance
 //! that the same two functions give. Limits: complex samples, one satellite, random codes beyond the
@@ -202,7 +202,7 @@ impl Symbols {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::theory::detection;
+    use crate::analysis::expect::theory::detection;
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::signal::synthetic::LONG_BOC;
 

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-use gnss_twin::analysis::psd::Psd;
+use gnss_twin::analysis::measure::psd::Psd;
 use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::stage::{Block, Stage};

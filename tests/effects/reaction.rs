@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::io::Write;
 
-use gnss_twin::analysis::theory::oscillator;
+use gnss_twin::analysis::expect::theory::oscillator;
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::stream::{Options, generate_with};
 use gnss_twin::generator::truth;

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use gnss_twin::analysis::plot::canvas::{Axis, BLUE, Chart, GREEN, Mark, ORANGE, Series, figure};
+use gnss_twin::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, Mark, ORANGE, Series, figure};
 use gnss_twin::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::synth::band::Filter;

@@ -9,15 +9,15 @@ use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
-use gnss_twin::analysis::clock::Clock;
-use gnss_twin::analysis::elevation::Elevations;
-use gnss_twin::analysis::errors::Errors;
-use gnss_twin::analysis::foreign::{nmea, rinex_obs};
-use gnss_twin::analysis::honesty::Honesty;
-use gnss_twin::analysis::jitter::Jitter;
-use gnss_twin::analysis::limits::Limits;
-use gnss_twin::analysis::load::Run;
-use gnss_twin::analysis::slips::Slips;
+use gnss_twin::analysis::judge::limits::Limits;
+use gnss_twin::analysis::measure::clock::Clock;
+use gnss_twin::analysis::measure::consistency::Consistency;
+use gnss_twin::analysis::measure::elevation::Elevations;
+use gnss_twin::analysis::measure::errors::Errors;
+use gnss_twin::analysis::measure::jitter::Jitter;
+use gnss_twin::analysis::measure::slips::Slips;
+use gnss_twin::analysis::read::Run;
+use gnss_twin::analysis::read::{nmea, rinex_obs};
 use gnss_twin::generator::effect::antenna;
 use gnss_twin::generator::scenario::Scenario;
 use gnss_twin::generator::vehicle::Trajectory;
@@ -464,10 +464,10 @@ fn judge(run: &Path) -> Result<u64, String> {
     let read = Run::read(run).map_err(refused)?;
     let errors = Errors::measure(&read).map_err(refused)?;
     let clock = Clock::measure(&read, &errors).map_err(refused)?;
-    let honesty = Honesty::measure(&read, &errors);
+    let consistency = Consistency::measure(&read, &errors);
     let slips = Slips::find(&read, &errors).map_err(refused)?;
     let jitter = Jitter::measure(&read, &errors).map_err(refused)?;
-    let _ = (clock, honesty, jitter, Elevations::measure(&read, &errors).map_err(refused)?);
+    let _ = (clock, consistency, jitter, Elevations::measure(&read, &errors).map_err(refused)?);
     Ok(hashed(slips.causes()))
 }
 

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gnss_twin::analysis::limits::Limits;
+use gnss_twin::analysis::judge::limits::Limits;
 use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::receiver::settings::Settings;
 use gnss_twin::study::sweep::spec::Study;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use gnss_twin::analysis::summary::Summary;
+use gnss_twin::analysis::judge::summary::Summary;
 use nalgebra::{Matrix3, Vector3};
 use tempfile::TempDir;
 
@@ -161,7 +161,7 @@ fn figures_of_the_observations_are_those_of_their_rows() {
     let observables = &summary.observables;
     near("pseudorange", observables.pseudorange_rms_m, rms(without_clock));
     near("Doppler", observables.doppler_rms_hz, rms(doppler_hz.into_iter()));
-    // Eight equal satellites of 50 dB-Hz: each meets seven others as noise of κ·C, κ = 0.85 chip (see analysis::access), which
+    // Eight equal satellites of 50 dB-Hz: each meets seven others as noise of κ·C, κ = 0.85 chip (see analysis::expect::multiple_access), which
     // costs 10 lg(1 + 7·0.85/1.023e6·1e5) = 2.0 dB.
     let count = cn0_dbhz.len() as f64;
     let measured = cn0_dbhz.iter().map(|(measured, _)| measured).sum::<f64>() / count;
@@ -207,7 +207,7 @@ fn damaged_tables_fail_by_the_row_that_names_the_damage() {
 
 #[test]
 fn deviations_of_a_clock_are_those_that_sp_1065_prints() {
-    use gnss_twin::analysis::allan::Deviation;
+    use gnss_twin::analysis::measure::allan::Deviation;
     // The 1000 frequencies of SP 1065's test suite: a prime-modulus generator, as phases.
     let mut state = 1_234_567_890_u64;
     let mut phases = vec![0.0];

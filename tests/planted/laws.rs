@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use gnss_twin::analysis::expect::theory::{dll, pll};
 use gnss_twin::analysis::statistics;
-use gnss_twin::analysis::theory::{dll, pll};
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::clock::ReceiverClock;
 use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;

@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::analysis::load::Run;
+use crate::analysis::read::Run;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::{Subframe, tables};
 use crate::gnss::klobuchar::Klobuchar;

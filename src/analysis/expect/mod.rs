@@ -1,15 +1,21 @@
-//! What a sound receiver must reach: errors of fixes and the sigmas that it should state, from truth and
-//! settings alone.
+//! Expecting: what theory and the scene's truth let one expect, before any result of a receiver is looked at.
 //!
-//! [`message`] is what was sent, [`smoothing`] what a carrier makes of the code, `multipath` what rays leave
-//! in it, [`ranges`] bias and noise of every range, [`links`] the loops of every satellite, [`solution`] what
-//! weighted least squares makes of them at each fix, [`quantile`] how far random errors may go. Nothing that
-//! the receiver says of its own quality enters; of its results, only which observations there are.
+//! [`theory`] has the closed forms with their sources. [`spectrum`] is the density that the samples should
+//! have; [`jamming`] and [`multiple_access`] say what interference and other satellites take from C/N0.
+//! [`timeline`] is the truth as a function of time. `loops` are the receiver's three loops as linear systems,
+//! [`multipath`] is the code error that reflected rays leave in them, [`smoothing`] what the carrier makes of the
+//! code, [`quantile`] how far random errors may go. [`message`] is what the satellites sent, and [`due`] when
+//! each satellite must be found, observed and used. Of the receiver only its settings enter, and the
+//! times at which it took its rows.
 
-pub mod links;
+pub mod due;
+pub mod jamming;
+pub(in crate::analysis) mod loops;
 pub mod message;
-mod multipath;
+pub mod multipath;
+pub mod multiple_access;
 pub mod quantile;
-pub mod ranges;
 pub mod smoothing;
-pub mod solution;
+pub mod spectrum;
+pub mod theory;
+pub mod timeline;

@@ -4,12 +4,12 @@
 //! half a spacing to either side. Limits: the front end's rounding of the correlation is left out, and rays
 //! are taken as steady over the loop's time constant, so that what moves fast is overrated.
 
-use crate::analysis::jitter::theory::Code;
+use crate::analysis::expect::loops::Code;
 use crate::gnss::record::RayRow;
 
 /// Where the loop rests, in chips late of the direct ray, for rays of (excess in chips, amplitude, phase in
 /// cycles).
-pub fn error_chips(code: &Code, rays: &[(f64, f64, f64)], spacing_chips: f64) -> f64 {
+pub(in crate::analysis) fn error_chips(code: &Code, rays: &[(f64, f64, f64)], spacing_chips: f64) -> f64 {
     if rays.iter().all(|ray| ray.1 == 0.0) {
         return 0.0;
     }

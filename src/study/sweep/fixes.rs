@@ -9,9 +9,9 @@ use std::collections::HashMap;
 
 use nalgebra::Vector3;
 
-use crate::analysis::errors::Errors;
-use crate::analysis::honesty::Honesty;
-use crate::analysis::load::Run;
+use crate::analysis::measure::consistency::Consistency;
+use crate::analysis::measure::errors::Errors;
+use crate::analysis::read::Run;
 use crate::analysis::statistics::percentile;
 use crate::gnss::record::{Fix, IonosphereModel};
 
@@ -65,9 +65,9 @@ impl<'r> Fixes<'r> {
     /// Joins fixes with their errors.
     pub fn of(run: &'r Run, errors: &Errors) -> Self {
         let fixes: HashMap<u64, &Fix> = run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
-        let honesty = Honesty::measure(run, errors);
-        let nees: HashMap<u64, f64> = honesty.rows.iter().map(|row| (row.sample, row.nees)).collect();
-        let judged = |error: &crate::analysis::errors::PositionError| {
+        let consistency = Consistency::measure(run, errors);
+        let nees: HashMap<u64, f64> = consistency.rows.iter().map(|row| (row.sample, row.nees)).collect();
+        let judged = |error: &crate::analysis::measure::errors::PositionError| {
             Some(Judged {
                 fix: fixes.get(&error.sample)?,
                 enu_m: error.enu_m,

@@ -6,8 +6,8 @@
 //! value.
 
 use super::keys;
-use crate::analysis::theory::clock::PowerLaw;
-use crate::analysis::theory::{dll, fll, oscillator, pll};
+use crate::analysis::expect::theory::clock::PowerLaw;
+use crate::analysis::expect::theory::{dll, fll, oscillator, pll};
 use crate::analysis::waveform::Waveform;
 use crate::generator::ripple::oscillator::PowerLaw as Levels;
 use crate::generator::scenario::ScenarioError;
@@ -209,7 +209,7 @@ fn phase_theory_deg(case: &Case) -> Option<f64> {
 pub const SNR: &str = "theory.snr";
 
 /// What a study may keep. Spreads are of truth minus oscillator, mean over an integration, about their mean;
-/// `raw_…` are of discriminator values. `theory.…` is what `analysis::theory` predicts for the loop as it is
+/// `raw_…` are of discriminator values. `theory.…` is what `analysis::expect::theory` predicts for the loop as it is
 /// closed.
 pub const FIGURES: &[Figure] = &[
     figure("held", |_, outcome| Some(f64::from(u8::from(outcome.lost.is_none())))),

@@ -7,7 +7,7 @@ use super::publish::{self, Rows};
 use super::result::{Compared, Results};
 use super::spec::Level;
 use crate::analysis::JudgeError;
-use crate::analysis::pdf::{Item, Report, Side, Table, Tone};
+use crate::analysis::show::pdf::{Item, Report, Side, Table, Tone};
 
 /// The report's bytes; they follow from plan and results alone.
 ///

@@ -17,7 +17,7 @@ use super::model::Model;
 use super::sampled::{self, Base};
 use super::spec::{Level, Study};
 use super::{StudyError, axis, sha256_hex, temporary, unit_of};
-use crate::analysis::making::Making;
+use crate::analysis::show::staged::Staged;
 use crate::generator::scenario::{Overrides, Scenario};
 
 /// Version of manifest and shards.
@@ -299,7 +299,7 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), StudyError> {
     fs::create_dir_all(parent).map_err(|source| StudyError::Create { path: parent.to_owned(), source })?;
     // What a run that was killed at this left.
     temporary::sweep(parent);
-    let written = Making::file(parent.join(temporary::name())).and_then(|(making, mut file)| {
+    let written = Staged::file(parent.join(temporary::name())).and_then(|(making, mut file)| {
         file.write_all(bytes)?;
         file.sync_all()?;
         making.finish(path)

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use super::plan::Plan;
 use super::{StudyError, axis, sha256_hex, temporary};
-use crate::analysis::making::{Making, present};
+use crate::analysis::show::staged::{Staged, present};
 
 /// Figures of one case.
 pub type Row = Vec<Option<f64>>;
@@ -173,7 +173,7 @@ fn attempt(directory: &Path, target: &Path, bytes: &[u8]) -> Result<(), StudyErr
 
 /// Writes the temporary and links it to its final name, which must not be there.
 fn publish(part: PathBuf, target: &Path, bytes: &[u8]) -> io::Result<()> {
-    let (making, mut file) = Making::file(part)?;
+    let (making, mut file) = Staged::file(part)?;
     file.write_all(bytes)?;
     file.sync_all()?;
     match fs::hard_link(making.path(), target) {

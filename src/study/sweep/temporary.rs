@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
 use super::StudyError;
-use crate::analysis::making::{Making, remove};
+use crate::analysis::show::staged::{Staged, remove};
 
 pub(super) const PREFIX: &str = ".tmp";
 /// Work of another machine whose processes cannot be seen is dead after so long.
@@ -54,7 +54,7 @@ fn old(entry: &fs::DirEntry) -> bool {
 }
 
 /// A directory that vanishes with its owner.
-pub(super) fn directory(parent: &Path) -> Result<Making, StudyError> {
+pub(super) fn directory(parent: &Path) -> Result<Staged, StudyError> {
     let path = parent.join(name());
-    Making::directory(path.clone()).map_err(|source| StudyError::Create { path, source })
+    Staged::directory(path.clone()).map_err(|source| StudyError::Create { path, source })
 }

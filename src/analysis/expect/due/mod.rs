@@ -1,0 +1,307 @@
+//! What a scene allows of its receiver, epoch by epoch: which satellites must be found, observed and used,
+//! and when there must be fixes.
+//!
+//! It follows from the truth (who is in view, how strong, how well placed), the receiver's settings
+//! ([`receiver`]), the message's timetable ([`timetable`]) and what the scene itself expects
+//! ([`crate::gnss::facts`]); [`satellite`] holds the rules. Nothing that nature or the scene took away is the
+//! receiver's fault. Limits: searches are those of a cold start with worst losses, so a receiver may be
+//! earlier than required; geometry counts the satellites that must be used, not those that might be.
+
+pub mod receiver;
+pub mod satellite;
+pub mod timetable;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+use nalgebra::{Matrix4, Vector4};
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::expect::message::Message;
+use crate::analysis::expect::multiple_access::MultipleAccess;
+use crate::analysis::measure::errors::Link;
+use crate::analysis::read::Run;
+use crate::analysis::statistics::median;
+use crate::gnss::earth::Geodetic;
+use crate::gnss::facts::{Expect, Fixes};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+use crate::gnss::time::Epoch;
+use receiver::Receiver;
+use satellite::{Excuse, Required, Row, Scene};
+use timetable::Timetable;
+
+/// Dilution up to which satellites must give a fix.
+const LARGEST_PDOP: f64 = 20.0;
+/// Satellites that carry on a fix before the time at which one is due.
+const ENOUGH: u32 = 5;
+/// Height from which on a receiver's mask does not count.
+const SPACE_M: f64 = 100e3;
+/// Time that a solution may take once all is there.
+const SOLVE_S: f64 = 1.0;
+
+/// What is required at one epoch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Due {
+    pub sample: u64,
+    pub time_s: f64,
+    /// Satellites that must be used, and that could be held.
+    pub used: u32,
+    pub held: u32,
+    /// Normal matrix of the directions of those that must be used, upper triangle.
+    normal: [f32; 10],
+}
+
+impl Due {
+    fn add(&mut self, azimuth_rad: f64, elevation_rad: f64) {
+        let ((sin_a, cos_a), (sin_e, cos_e)) = (libm::sincos(azimuth_rad), libm::sincos(elevation_rad));
+        let h = [cos_e * sin_a, cos_e * cos_a, sin_e, 1.0];
+        let pairs = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));
+        for (sum, (i, j)) in self.normal.iter_mut().zip(pairs) {
+            *sum += (h.get(i).copied().unwrap_or(0.0) * h.get(j).copied().unwrap_or(0.0)) as f32;
+        }
+        self.used += 1;
+    }
+
+    /// Position dilution of those that must be used; infinite where there is no position.
+    pub fn pdop(&self) -> f64 {
+        if self.used < 4 {
+            return f64::INFINITY;
+        }
+        let [a, b, c, d, e, f, g, h, i, j] = self.normal.map(f64::from);
+        let normal = Matrix4::new(a, b, c, d, b, e, f, g, c, f, h, i, d, g, i, j);
+        let variance = |inverse: Matrix4<f64>| Vector4::from(inverse.diagonal()).fixed_rows::<3>(0).sum();
+        normal.try_inverse().map(variance).filter(|v| *v > 0.0).map_or(f64::INFINITY, f64::sqrt)
+    }
+}
+
+/// What is required of one satellite over the run, in epochs of the truth.
+#[derive(Clone, Debug, Default)]
+pub struct Satellite {
+    pub epochs: usize,
+    pub usual_dbhz: f64,
+    /// When it must have been acquired.
+    pub acquired_by_s: Option<f64>,
+    /// Epochs at which it must be observed, and those of them at which it was.
+    pub due: usize,
+    pub observed: usize,
+    /// The latest of those at which it was not, and the first.
+    pub missing_s: Option<(f64, f64)>,
+    pub used_due: usize,
+    /// Most frequent reason for not being required.
+    pub excuse: Option<Excuse>,
+    pub doppler_hz: f64,
+}
+
+/// When things happened to a receiver's channels, however it reports them.
+pub trait Observed {
+    /// Times of a satellite's observations, in the epochs of the truth: samples.
+    ///
+    /// # Errors
+    /// Rows that cannot be read.
+    fn samples(&self, link: Link) -> Result<HashSet<u64>, JudgeError>;
+}
+
+impl Observed for Run {
+    fn samples(&self, link: Link) -> Result<HashSet<u64>, JudgeError> {
+        Ok(self.observations.map(link, |row| row.sample)?.into_iter().collect())
+    }
+}
+
+/// The whole of what a scene allows.
+#[derive(Clone, Debug)]
+pub struct Expectations {
+    pub receiver: Receiver,
+    pub satellites: BTreeMap<Link, Satellite>,
+    /// Epochs of the truth at which the receiver measures.
+    pub epochs: Vec<Due>,
+    /// When the first fix is due, if the scene allows one.
+    pub first_fix_s: Option<f64>,
+    /// When satellites and geometry would have allowed it, the ionosphere left aside.
+    pub four_by_s: Option<f64>,
+    /// What the satellites sent.
+    message: Message,
+}
+
+impl Expectations {
+    /// Finds them.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn of(run: &Run, receiver: Receiver, observed: &impl Observed) -> Result<Self, JudgeError> {
+        let due = |sample: u64| Due { sample, time_s: run.time_s(sample), ..Due::default() };
+        let mut found = Self {
+            satellites: BTreeMap::new(),
+            epochs: run.trajectory.iter().map(|row| due(row.sample)).collect(),
+            receiver,
+            first_fix_s: None,
+            four_by_s: None,
+            message: Message::of(run),
+        };
+        let steps: Vec<f64> = found.epochs.windows(2).map(|two| two[1].time_s - two[0].time_s).collect();
+        let (Some(first), Some(interval_s)) = (run.trajectory.first(), median(&steps)) else { return Ok(found) };
+        let start = first.time().plus_s(-run.time_s(first.sample));
+        let in_space = Geodetic::from_ecef(&first.position_m()).height_m >= SPACE_M;
+        let access = MultipleAccess::new(run);
+        let mut counted = Counted::default();
+        for link in run.truth.keys() {
+            let receiver = found.receiver.of_signal(link.signal);
+            let scene = Scene {
+                receiver: &receiver,
+                timetable: Timetable::new(link.signal, start),
+                expect: &run.scene.expect,
+                faults: &run.scene.faults,
+                interval_s,
+            };
+            counted.begin(link.sv);
+            let one = found.satellite(run, &scene, (&access, &mut counted), link, in_space, observed)?;
+            found.satellites.insert(link, one);
+        }
+        found.fixes_due(&run.scene.expect, start);
+        Ok(found)
+    }
+
+    fn satellite(
+        &mut self,
+        run: &Run,
+        scene: &Scene<'_>,
+        (access, counted): (&MultipleAccess<'_>, &mut Counted),
+        link: Link,
+        in_space: bool,
+        observed: &impl Observed,
+    ) -> Result<Satellite, JudgeError> {
+        let sky: HashMap<u64, (f64, f64)> =
+            run.sky.map(link.sv, |row| (row.sample, (row.azimuth_deg, row.elevation_deg)))?.into_iter().collect();
+        let rows: Vec<(u64, Row)> = run.truth.map(link, |row| {
+            let elevation_deg = sky.get(&row.sample).map_or(90.0, |(_, elevation_deg)| *elevation_deg);
+            let expected = Row {
+                time_s: run.time_s(row.sample),
+                cn0_dbhz: row.cn0_dbhz,
+                effective_dbhz: access.effective_dbhz(&row) - self.receiver.cost_db,
+                strongest_dbhz: run.strongest_dbhz(row.sample, link.signal),
+                doppler_hz: row.doppler_hz,
+                above_mask: in_space || elevation_deg >= self.receiver.mask_deg,
+            };
+            (row.sample, expected)
+        })?;
+        let strengths: Vec<f64> = rows.iter().map(|(_, row)| row.cn0_dbhz).collect();
+        let usual_dbhz = median(&strengths).unwrap_or(0.0);
+        let healthy = self.message.says_healthy(link.sv) || run.scene.faults.iter().any(|fault| fault.kind == "health");
+        let plain: Vec<Row> = rows.iter().map(|(_, row)| *row).collect();
+        let required = scene.required(link.sv, &plain, usual_dbhz, healthy);
+        let seen = observed.samples(link)?;
+        let mut one = Satellite { epochs: rows.len(), usual_dbhz, ..Satellite::default() };
+        one.doppler_hz = plain.iter().map(|row| row.doppler_hz.abs()).fold(0.0, f64::max);
+        let excuses: Vec<Excuse> = plain.iter().filter_map(|row| scene.excuse(link.sv, row, usual_dbhz)).collect();
+        one.excuse = excuses.get(excuses.len() / 2).copied();
+        let measured = self.measured();
+        for ((sample, row), required) in rows.iter().zip(&required) {
+            let Ok(at) = self.epochs.binary_search_by_key(sample, |due| due.sample) else { continue };
+            one.take(row, required, measured.contains_at(at, self), seen.contains(sample));
+            let Some(due) = self.epochs.get_mut(at) else { continue };
+            due.held += u32::from(required.held && counted.held.insert(*sample));
+            let used = required.used && counted.used.insert(*sample);
+            if let (true, Some((azimuth_deg, elevation_deg))) = (used, sky.get(sample)) {
+                due.add(azimuth_deg.to_radians(), elevation_deg.to_radians());
+            }
+        }
+        Ok(one)
+    }
+
+    /// The epochs of the truth at which the receiver measures too.
+    fn measured(&self) -> Measured {
+        Measured { interval_s: self.receiver.interval_s }
+    }
+
+    fn fixes_due(&mut self, expect: &Expect, start: Epoch) {
+        let ready = |due: &&Due| due.pdop() <= LARGEST_PDOP;
+        self.four_by_s = self.epochs.iter().find(ready).map(|due| due.time_s);
+        let receiver = &self.receiver;
+        let Some(four_s) = self.four_by_s else { return };
+        let acquired_s = self.satellites.values().filter_map(|one| one.acquired_by_s).fold(f64::INFINITY, f64::min);
+        let signals: BTreeSet<&'static Signal> = self.satellites.keys().map(|link| link.signal).collect();
+        let page_s =
+            |signal: &&'static Signal| Timetable::new(signal, start).ionosphere_by_s(acquired_s + satellite::LOCK_S);
+        let page_s = signals.iter().map(page_s).fold(f64::INFINITY, f64::min);
+        let waited_s = four_s + receiver.ionosphere_wait_s;
+        let due_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
+        // Where the scene excuses a time, the clock begins anew after it.
+        let excused = |due: &&Due| due.time_s >= due_s && self.fix_due(expect, due, None);
+        self.first_fix_s = self.epochs.iter().find(excused).map(|due| due.time_s);
+    }
+
+    /// Whether there must be a fix at an epoch of a receiver whose first one came at `first_s`.
+    pub fn fix_due(&self, expect: &Expect, due: &Due, first_s: Option<f64>) -> bool {
+        match expect.fix(due.time_s) {
+            Some(Fixes::None | Fixes::Any) => return false,
+            Some(Fixes::Required) | None => {}
+        }
+        let on_time = self.first_fix_s.is_none_or(|limit_s| due.time_s >= limit_s);
+        (on_time && due.pdop() <= LARGEST_PDOP)
+            || (first_s.is_some_and(|first_s| due.time_s > first_s) && !on_time && due.held >= ENOUGH)
+    }
+
+    /// Whether the receiver measures at an epoch of the truth.
+    pub fn measures(&self, due: &Due) -> bool {
+        self.measured().at(due.time_s)
+    }
+}
+
+/// Samples at which a satellite counts already by another of its signals: a second one adds no direction.
+#[derive(Default)]
+struct Counted {
+    sv: Option<Sv>,
+    held: HashSet<u64>,
+    used: HashSet<u64>,
+}
+
+impl Counted {
+    fn begin(&mut self, sv: Sv) {
+        if self.sv.replace(sv) != Some(sv) {
+            self.held.clear();
+            self.used.clear();
+        }
+    }
+}
+
+/// The grid of a receiver's measurements.
+#[derive(Clone, Copy)]
+struct Measured {
+    interval_s: f64,
+}
+
+impl Measured {
+    /// Samples are whole: a tick and its sample differ by less than one, 1e-3 s at the lowest rate that there is.
+    fn at(self, time_s: f64) -> bool {
+        let away = time_s / self.interval_s;
+        (away - away.round()).abs() * self.interval_s < 1e-5
+    }
+
+    fn contains_at(self, at: usize, expectations: &Expectations) -> bool {
+        expectations.epochs.get(at).is_some_and(|due| self.at(due.time_s))
+    }
+}
+
+impl Satellite {
+    fn take(&mut self, row: &Row, required: &Required, measured: bool, seen: bool) {
+        if required.acquired {
+            self.acquired_by_s.get_or_insert(row.time_s);
+        }
+        if !measured {
+            return;
+        }
+        self.used_due += usize::from(required.used);
+        if required.observed {
+            self.due += 1;
+            self.observed += usize::from(seen);
+            if !seen {
+                let first_s = self.missing_s.map_or(row.time_s, |(first_s, _)| first_s);
+                self.missing_s = Some((first_s, row.time_s));
+            }
+        }
+    }
+
+    /// Share of the time that it must be observed over which it was.
+    pub fn share(&self) -> f64 {
+        if self.due == 0 { 1.0 } else { self.observed as f64 / self.due as f64 }
+    }
+}

@@ -1,0 +1,520 @@
+//! The three loops of a receiver as theory sees them: linear, with the exact bandwidth that the settings ask for.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::expect::multiple_access::MultipleAccess;
+use crate::analysis::expect::theory::clock::PowerLaw;
+use crate::analysis::expect::theory::dll::{Discriminator, Taps};
+use crate::analysis::expect::theory::linear::{Feedback, PhaseLoop, controlled_root, controlled_root_gains};
+use crate::analysis::expect::theory::{dll, fll, oscillator, pll};
+use crate::analysis::expect::timeline::Timeline;
+use crate::analysis::read::Run;
+use crate::analysis::statistics::Sum;
+use crate::analysis::waveform::{Edge, Waveform};
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::signal::Link;
+
+/// Which loop a row is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Loop {
+    Dll,
+    Pll,
+    Fll,
+}
+
+/// Receiver's settings that the theory needs; the defaults are the receiver's where its file does not name them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    pub pll_order: u32,
+    pub pll_bandwidth_hz: f64,
+    pub dll_order: u32,
+    pub dll_bandwidth_hz: f64,
+    pub spacing_chips: f64,
+    pub averaged_replica: bool,
+}
+
+impl Settings {
+    /// As `receiver.json` has them; `None` where it names no bandwidths.
+    pub fn of(run: &Run) -> Option<Self> {
+        let number = |key| run.tracking_setting(key);
+        let settings = run.receiver.get("settings").unwrap_or(&run.receiver);
+        Some(Self {
+            pll_order: number("pll_order")? as u32,
+            pll_bandwidth_hz: number("pll_bandwidth_hz")?,
+            dll_order: number("dll_order")? as u32,
+            dll_bandwidth_hz: number("dll_bandwidth_hz")?,
+            spacing_chips: number("spacing_chips")?,
+            averaged_replica: settings.get("tracking").and_then(|t| t.get("replica")?.as_str()) == Some("area"),
+        })
+    }
+}
+
+/// A loop of exact bandwidth whose roots all lie at one place; `None` where no such place is.
+pub fn exact_loop(order: u32, bandwidth_time: f64) -> Option<PhaseLoop> {
+    let of = |root: f64| PhaseLoop { gains: controlled_root_gains(order, root), feedback: Feedback::PhaseAndRate };
+    let (mut low, mut high) = (1e-6_f64, 1.0 - 1e-6);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        // The bandwidth falls as the root nears one.
+        if of(middle).bandwidth_time()? > bandwidth_time { low = middle } else { high = middle }
+    }
+    Some(of(0.5 * (low + high)))
+}
+
+/// What a loop makes of unit noise of its discriminator, from its response to one value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Response {
+    /// Variances of the estimate of an interval's mean phase, of what the discriminator puts out, of that
+    /// one's difference from one interval to the next, and of the rate in phase an interval.
+    phase: f64,
+    put_out: f64,
+    difference: f64,
+    rate: f64,
+    /// Variance of the same rate for steps of the phase in place of noise.
+    rate_after_steps: f64,
+}
+
+/// Natural frequency of a loop whose roots all lie at exp(−ωT), radians a second.
+pub(in crate::analysis) fn natural_radps(closed: &PhaseLoop, order: u32, update_s: f64) -> f64 {
+    -libm::log(controlled_root(order, closed.gains)) / update_s
+}
+
+/// Up to here the truth's drift follows the oscillator: a spline over 0.8 s has 80 % of that rate's variance left.
+const NODES_HZ: f64 = 0.5;
+
+/// Intervals after which nothing is left of a value in any loop that can be set: bandwidth times time is 1e-4 or more.
+const LONGEST: usize = 200_000;
+
+impl Response {
+    fn of(closed: &PhaseLoop) -> Self {
+        let mut state = [0.0; 3];
+        let mut found = Self { phase: 0.0, put_out: 0.0, difference: 0.0, rate: 0.0, rate_after_steps: 0.0 };
+        let (mut before, mut summed) = (0.0, 0.0);
+        for k in 0..LONGEST {
+            let noise = if k == 0 { 1.0 } else { 0.0 };
+            found.phase += state[0] * state[0];
+            // What the oscillator runs at in this interval, the mean of its rate.
+            let ran = state[1] + 0.5 * state[2];
+            found.rate += ran * ran;
+            summed += ran;
+            found.rate_after_steps += summed * summed;
+            let put_out = noise - state[0];
+            found.put_out += put_out * put_out;
+            found.difference += (put_out - before) * (put_out - before);
+            before = put_out;
+            state = step(&closed.gains, state, put_out);
+            if k > 10 && state.iter().all(|x| x.abs() < 1e-9) {
+                break;
+            }
+        }
+        found
+    }
+}
+
+/// One update of (mean phase of the coming interval, rate, acceleration) by an error.
+fn step([k1, k2, k3]: &[f64; 3], [phase, rate, acceleration]: [f64; 3], error: f64) -> [f64; 3] {
+    let acceleration = acceleration + k3 * error;
+    let rate = rate + k2 * error + acceleration;
+    [phase + k1 * error + rate, rate, acceleration]
+}
+
+/// A noise-free loop on the phases of successive intervals.
+struct Follower<'a> {
+    closed: &'a PhaseLoop,
+    first: Option<f64>,
+    last: Option<f64>,
+    state: Option<[f64; 3]>,
+    /// Intervals of the first second, in which it runs in.
+    running_in: usize,
+}
+
+impl<'a> Follower<'a> {
+    fn new(closed: &'a PhaseLoop, update_s: f64) -> Self {
+        Self { closed, first: None, last: None, state: None, running_in: (1.0 / update_s) as usize }
+    }
+
+    /// Its error on the next phase; `None` while it runs in. It begins with the rate of the first two.
+    fn error(&mut self, phase: f64) -> Option<f64> {
+        Some(self.errors(phase)?[0])
+    }
+
+    /// Errors on the next phase, and of the rate at the boundary before it, in phase an interval.
+    fn errors(&mut self, phase: f64) -> Option<[f64; 2]> {
+        let begun = self.first.map(|first| step(&self.closed.gains, [first, phase - first, 0.0], 0.0));
+        self.first = self.first.or(Some(phase));
+        let state = self.state.or(begun);
+        let error = state.map_or(0.0, |state| phase - state[0]);
+        let moved = self.last.replace(phase).map_or(0.0, |last| phase - last);
+        let rate_error = state.map_or(0.0, |state| moved - state[1]);
+        self.state = state.map(|state| step(&self.closed.gains, state, error));
+        let counts = self.running_in == 0;
+        self.running_in = self.running_in.saturating_sub(1);
+        counts.then_some([error, rate_error])
+    }
+}
+
+/// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for
+/// early minus late.
+///
+/// A polygon is a sum of |x|/2 about its corners, each times the bend there; an average over w adds an
+/// integral and a difference of 1/w.
+#[derive(Clone, Debug, PartialEq)]
+struct Peak {
+    /// Places in chips, and by how much the slope grows there.
+    corners: Vec<(f64, f64)>,
+    width_chips: f64,
+    averages: u32,
+}
+
+impl Peak {
+    /// Of a signal's waveform, averaged so many times over `width_chips`.
+    fn new(waveform: &Waveform, width_chips: f64, averages: u32) -> Self {
+        let chip_s = 1.0 / waveform.chip_rate_hz();
+        let corners = waveform.corners().into_iter().map(|(at_s, bend)| (at_s / chip_s, bend * chip_s)).collect();
+        Self { corners, width_chips, averages }
+    }
+
+    /// Value at a delay in chips.
+    fn value(&self, x: f64) -> f64 {
+        let w = self.width_chips;
+        let sum = |of: &dyn Fn(f64) -> f64| self.corners.iter().map(|(at, bend)| bend * of(x - at)).sum::<f64>();
+        match self.averages {
+            0 => sum(&|y| 0.5 * y.abs()),
+            // Integrals of |x|/2: x|x|/4 and |x|³/12.
+            1 => sum(&|y| (y + 0.5 * w) * (y + 0.5 * w).abs() / 4.0 - (y - 0.5 * w) * (y - 0.5 * w).abs() / 4.0) / w,
+            _ => {
+                let cube = |y: f64| y.abs() * y * y / 12.0;
+                sum(&|y| cube(y + w) - 2.0 * cube(y) + cube(y - w)) / (w * w)
+            }
+        }
+    }
+
+    /// Minus its slope at a delay, by a difference that errs by 1e-9.
+    fn slope(&self, x: f64) -> f64 {
+        let h = 1e-4;
+        (self.value(x - h) - self.value(x + h)) / (2.0 * h)
+    }
+}
+
+/// A code's correlation in chips, as sent.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::analysis) struct Code {
+    peak: Peak,
+    /// Up to where it falls without rising again.
+    pub reach_chips: f64,
+}
+
+impl Code {
+    /// That of a signal's waveform.
+    pub fn of(waveform: &Waveform) -> Self {
+        Self { peak: Peak::new(waveform, 0.0, 0), reach_chips: waveform.reach_s() * waveform.chip_rate_hz() }
+    }
+
+    /// Correlation at a delay.
+    pub fn value(&self, chips: f64) -> f64 {
+        self.peak.value(chips)
+    }
+}
+
+/// Standard deviation of one early-minus-late value, in chips, for the shapes of signal and noise.
+fn raw_chips(signal: &Peak, noise: &Peak, d: f64, snr: f64) -> f64 {
+    let height = signal.value(0.5 * d) / signal.value(0.0);
+    let slope = signal.slope(0.5 * d) / signal.value(0.0);
+    let rho = noise.value(d) / noise.value(0.0);
+    dll::raw_on_chips(Discriminator::EarlyMinusLate, Taps { height, slope, common: rho }, snr)
+}
+
+/// The three loops of a receiver as theory sees them at one integration time.
+pub(in crate::analysis) struct Theory {
+    settings: Settings,
+    pub update_s: f64,
+    pub chip_m: f64,
+    carrier_hz: f64,
+    pll: (PhaseLoop, Response),
+    dll: (PhaseLoop, Response),
+    /// Of signal and noise.
+    peaks: (Peak, Peak),
+    /// Of the code without any average.
+    pub code: Code,
+    oscillator: Option<PowerLaw>,
+}
+
+impl Theory {
+    /// `None` where a loop of these settings cannot hold the signal: no such loop is stable, or early and late lie
+    /// beyond the correlation's main peak.
+    pub fn new(run: &Run, settings: Settings, link: &Link, update_s: f64) -> Option<Self> {
+        let waveform = Waveform::of(link.signal)?;
+        let chip_rate_hz = waveform.chip_rate_hz();
+        let code = Code::of(&waveform);
+        if 0.5 * settings.spacing_chips >= code.reach_chips {
+            return None;
+        }
+        let pll = exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s)?;
+        let dll = exact_loop(settings.dll_order, settings.dll_bandwidth_hz * update_s)?;
+        let width_chips = chip_rate_hz / run.scene.sample_rate_hz;
+        let of_replica = u32::from(settings.averaged_replica);
+        let of_signal = u32::from(run.scene.code_edge == Edge::Area);
+        Some(Self {
+            settings,
+            update_s,
+            chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
+            carrier_hz: link.carrier_hz(),
+            pll: (pll, Response::of(&pll)),
+            dll: (dll, Response::of(&dll)),
+            peaks: (
+                Peak::new(&waveform, width_chips, of_replica + of_signal),
+                Peak::new(&waveform, width_chips, 2 * of_replica),
+            ),
+            code,
+            oscillator: run.scene.oscillator.map(|noise| PowerLaw { h: noise.h }),
+        })
+    }
+
+    /// Raw and thermal sigma, in the loop's unit.
+    pub fn noise(&self, which: Loop, cn0_hz: f64) -> (f64, f64) {
+        let update_s = self.update_s;
+        let phase_rad = pll::raw_rad(update_s, cn0_hz);
+        let (loop_, code) = (&self.pll.1, &self.dll.1);
+        match which {
+            Loop::Dll => {
+                let raw = raw_chips(&self.peaks.0, &self.peaks.1, self.settings.spacing_chips, update_s * cn0_hz);
+                (raw * code.put_out.sqrt(), raw * code.phase.sqrt())
+            }
+            // Observations fall anywhere in an interval, in which the phase runs at the loop's rate: x²·rate²
+            // more, 1/12 in the mean.
+            Loop::Pll => (
+                (phase_rad * loop_.put_out.sqrt()).to_degrees(),
+                (phase_rad * (loop_.phase + loop_.rate / 12.0).sqrt()).to_degrees(),
+            ),
+            Loop::Fll => {
+                let hertz = phase_rad / (TAU * update_s);
+                (hertz * loop_.difference.sqrt(), hertz * loop_.rate.sqrt())
+            }
+        }
+    }
+
+    /// Sigma that the scene's oscillator leaves, in the loop's unit.
+    pub fn oscillator(&self, which: Loop) -> f64 {
+        match (which, &self.oscillator) {
+            (Loop::Pll, Some(law)) => {
+                oscillator::jitter_discrete_rad(law, self.carrier_hz, &self.pll.0.linear(), self.update_s).to_degrees()
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Sigma in hertz of the phase loop's rate against the drift that the truth states, which follows nodes
+    /// 0.8 s apart.
+    ///
+    /// White frequency noise adds h₀·T/2·f² cycles² to the phase in each interval, which the rate follows as
+    /// it follows steps: that gives the bandwidth of the rate. Flicker and random walk, h₋₁/f + h₋₂/f², count
+    /// between the nodes and there.
+    pub fn oscillator_rate_hz(&self) -> f64 {
+        let Some(law) = &self.oscillator else { return 0.0 };
+        let [_, _, white, flicker, walk] = law.h;
+        let bandwidth_hz = 0.5 * self.pll.1.rate_after_steps / self.update_s;
+        let band = (bandwidth_hz / NODES_HZ).max(1.0);
+        let variance = white * bandwidth_hz + flicker * libm::log(band) + walk * (1.0 - 1.0 / band) / NODES_HZ;
+        variance.sqrt() * self.carrier_hz
+    }
+
+    /// Threshold of jitter alone, and limit of 3σ and stress.
+    pub fn limits(&self, which: Loop) -> (f64, f64) {
+        let d = self.settings.spacing_chips;
+        match which {
+            Loop::Dll => {
+                // Early or late beyond the main peak ends the discriminator's range before half the spacing does.
+                let range = (0.5 * d).min(self.code.reach_chips - 0.5 * d);
+                (dll::threshold_chips(2.0 * range), range)
+            }
+            Loop::Pll => (pll::THRESHOLD_RAD.to_degrees(), pll::LIMIT_RAD.to_degrees()),
+            Loop::Fll => (fll::threshold_hz(self.update_s), 0.25 / self.update_s),
+        }
+    }
+}
+
+/// What a loop's error without noise comes to, in its unit.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::analysis) struct Stress {
+    sum: Sum,
+    pub max: f64,
+}
+
+impl Stress {
+    fn add(&mut self, error: f64) {
+        self.sum.add(error);
+        self.max = self.max.max(error.abs());
+    }
+
+    /// Root mean square.
+    pub fn rms(&self) -> f64 {
+        self.sum.rms().unwrap_or(0.0)
+    }
+}
+
+/// Stresses of a satellite's three loops over the times from `from_s` to `to_s`.
+#[derive(Default)]
+pub(in crate::analysis) struct Stresses {
+    of: BTreeMap<Loop, Stress>,
+}
+
+/// Longest stretch that is followed interval by interval.
+const MOST_UPDATES: usize = 4_000_000;
+
+impl Stresses {
+    pub fn new(theory: &Theory, timeline: &Timeline, link: &Link, (from_s, to_s): (f64, f64)) -> Self {
+        let mut found = Self::default();
+        let t_s = theory.update_s;
+        let count = (((to_s - from_s) / t_s).max(0.0) as usize).min(MOST_UPDATES);
+        let Some(origin) = timeline.state(link, from_s) else { return found };
+        let begin = || (Follower::new(&theory.pll.0, t_s), Follower::new(&theory.dll.0, t_s));
+        let (mut pll, mut dll) = begin();
+        for k in 0..count {
+            // The middle of an interval stands for its mean.
+            let Some(state) = timeline.state(link, from_s + (k as f64 + 0.5) * t_s) else {
+                (pll, dll) = begin();
+                continue;
+            };
+            let range_m = state.range_m - origin.range_m;
+            let carrier_cycles = state.carrier_cycles - origin.carrier_cycles;
+            let errors = pll.errors(carrier_cycles);
+            found.add(Loop::Pll, errors.map(|[cycles, _]| 360.0 * cycles));
+            // The Doppler given out is the loop's rate, without the part that only steers the phase.
+            found.add(Loop::Fll, errors.map(|[_, cycles]| cycles / t_s));
+            // The carrier aids the code: only what parts them is left.
+            found.add(Loop::Dll, dll.error((range_m - carrier_cycles * link.wavelength_m()) / theory.chip_m));
+        }
+        found
+    }
+
+    fn add(&mut self, which: Loop, error: Option<f64>) {
+        if let Some(error) = error {
+            self.of.entry(which).or_default().add(error);
+        }
+    }
+
+    /// That of one loop.
+    pub fn of(&self, which: Loop) -> Stress {
+        self.of.get(&which).copied().unwrap_or_default()
+    }
+}
+
+/// Errors in degrees that the true motion leaves in the phase loop of a satellite, with their times since sample 0.
+///
+/// # Errors
+/// [`JudgeError::Read`] where rows that were put by cannot be read.
+pub fn motion_error_deg(
+    run: &Run,
+    access: &MultipleAccess<'_>,
+    link: Link,
+    settings: Settings,
+    update_s: f64,
+) -> Result<Vec<(f64, f64)>, JudgeError> {
+    let (Some(timeline), Some(closed)) =
+        (Timeline::of(run, access, link)?, exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s))
+    else {
+        return Ok(Vec::new());
+    };
+    let origin_s = run.trajectory.first().map_or(0.0, |row| row.time().since(timeline.origin) - run.time_s(row.sample));
+    let skip_s = (1.0 / update_s).trunc() * update_s;
+    let mut series = Vec::new();
+    for (from_s, to_s) in timeline.stretches_s().remove(&link).unwrap_or_default() {
+        let count = (((to_s - from_s) / update_s).max(0.0) as usize).min(MOST_UPDATES);
+        let start = timeline.state(&link, from_s).map_or(0.0, |state| state.carrier_cycles);
+        let at = |k: usize| from_s + (k as f64 + 0.5) * update_s;
+        let mut follower = Follower::new(&closed, update_s);
+        let phases = (0..count).map_while(|k| Some(timeline.state(&link, at(k))?.carrier_cycles - start));
+        let errors = phases.filter_map(|phase| follower.error(phase)).enumerate();
+        series.extend(errors.map(|(k, error)| (at(k) + skip_s - origin_s, 360.0 * error)));
+    }
+    Ok(series)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::Signal;
+    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE};
+
+    #[test]
+    fn a_loop_has_the_bandwidth_that_it_is_given() {
+        // Root of order 3 from the literature's table: 0.954395 at 0.05.
+        let found = exact_loop(3, 0.05).unwrap();
+        let root = controlled_root(3, found.gains);
+        assert!((root - 0.954_395).abs() < 1e-6, "{root}");
+        let response = Response::of(&found);
+        assert!((0.5 * response.phase - 0.05).abs() < 1e-6, "{response:?}");
+        // A value is white: what is put out is its own variance and the estimate's, which knows it not yet.
+        assert!((response.put_out - 1.0 - response.phase).abs() < 1e-9, "{response:?}");
+    }
+
+    #[test]
+    fn a_jerk_leaves_the_error_that_theory_says() {
+        let closed = exact_loop(3, 0.072).unwrap();
+        let t_s: f64 = 4e-3;
+        let mut follower = Follower::new(&closed, t_s);
+        let errors: Vec<f64> =
+            (0..2000).filter_map(|k| follower.error(50.0 / 6.0 * (f64::from(k) * t_s).powi(3))).collect();
+        assert_eq!(errors.len(), 2000 - 250, "the first second is left out");
+        let last = *errors.last().unwrap();
+        let expected = pll::stress_discrete(3, closed.gains[2], t_s, 50.0);
+        assert!((last / expected - 1.0).abs() < 1e-3, "{last} {expected}");
+    }
+
+    #[test]
+    fn a_jerk_leaves_a_rate_error_of_three_over_the_square_of_the_natural_frequency() {
+        // Roots at exp(−ωT) are those of (s + ω)³ for small ωT: the rate lacks K₁·e, e = J/ω³ and K₁ = 3ω.
+        let (t_s, jerk) = (1e-3, 50.0);
+        let closed = exact_loop(3, 20.0 * t_s).unwrap();
+        let natural = natural_radps(&closed, 3, t_s);
+        let mut follower = Follower::new(&closed, t_s);
+        let phase = |k: u32| jerk / 6.0 * (f64::from(k) * t_s).powi(3);
+        let errors: Vec<[f64; 2]> = (0..4000).filter_map(|k| follower.errors(phase(k))).collect();
+        let found = errors.last().unwrap()[1] / t_s;
+        let expected = 3.0 * jerk / (natural * natural);
+        // ωT is 0.019: three halves of it is what the difference of two methods comes to.
+        assert!((found / expected - 1.0).abs() < 0.04, "{found} {expected}");
+    }
+
+    #[test]
+    fn peaks_are_the_triangle_without_averages_and_rounded_with_them() {
+        let chips = Waveform::of(&L1_CA).unwrap();
+        let plain = Peak::new(&chips, 0.4, 0);
+        for cn0_hz in [1e3, 1e4, 1e5] {
+            let known = dll::raw_chips(Discriminator::EarlyMinusLate, 0.5, 4e-3, cn0_hz);
+            assert!((raw_chips(&plain, &plain, 0.5, 4e-3 * cn0_hz) / known - 1.0).abs() < 1e-9);
+        }
+        // The mean of a triangle over ±w/2 is 1 − w/4, over a triangle of ±w it is 1 − w/3; far from corners
+        // nothing changes.
+        for (averages, peak) in [(1, 1.0 - 0.1), (2, 1.0 - 0.4 / 3.0)] {
+            let round = Peak::new(&chips, 0.4, averages);
+            assert!((round.value(0.0) - peak).abs() < 1e-12, "{}", round.value(0.0));
+            assert!((round.value(0.5) - 0.5).abs() < 1e-12 && (round.slope(0.5) - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_steeper_peak_has_less_jitter() {
+        let raw = |signal: &Signal, d: f64| {
+            let peak = Peak::new(&Waveform::of(signal).unwrap(), 0.0, 0);
+            raw_chips(&peak, &peak, d, 1e6)
+        };
+        // With slope s and 1 − ρ = s·d the variance is d/(4·s·snr): s is 1 of BPSK and 3 of BOC(1,1). Of MBOC it
+        // is 10/11 · 3 + 1/11 · 23, BOC(6,1) falling by 2·12 − 1 a chip.
+        for (signal, slope) in [(&QUADRATURE, 1.0), (&LONG_BOC, 3.0), (&MIXED, 53.0 / 11.0)] {
+            let ratio = raw(signal, 0.05) / raw(&L1_CA, 0.05);
+            // Squaring at 60 dB, 1e-6; slopes by differences, 1e-9.
+            assert!((ratio * ratio * slope - 1.0).abs() < 1e-5, "{signal}: {ratio}");
+        }
+        // At wide spacings the side peaks cost height: a = 1/4, a' = 3, ρ = −1/2 at half a chip.
+        let found = raw(&LONG_BOC, 0.5);
+        let expected = 1.5_f64 / (4.0 * 9.0 * 1e6) * (1.0 + 0.5 / (2.0 * 1e6 / 16.0));
+        assert!((found / expected.sqrt() - 1.0).abs() < 1e-9, "{found}");
+    }
+}

@@ -1,0 +1,111 @@
+//! Multiple access and interference: what other waves take from a satellite's C/N0.
+//!
+//! Codes of the same band are no more orthogonal than noise: each adds its power times the spectral
+//! separation coefficient κ of its spectrum and the signal's to the noise density (J. W. Betz, NAVIGATION
+//! 48(4), 2001; [`Waveform::separation_s`]). Rectangular chips of duration T have 2T/3 from their own kind. A
+//! sampler that averages over its interval, and a replica that does too, narrow the spectra and raise κ.
+//! Every pair of signals counts whose carriers are within the sample rate, each component by its share of
+//! power. Interference adds its own power times its own separation ([`super::jamming`]). Limits: components
+//! of one signal do not disturb each other; what folds back from beyond the band is left out.
+
+use std::collections::{BTreeSet, HashMap};
+
+use crate::analysis::expect::jamming;
+use crate::analysis::read::{Emission, Run};
+use crate::analysis::waveform::Waveform;
+use crate::gnss::record::Observation;
+use crate::gnss::signal::Signal;
+
+/// C/N0 that a receiver can measure, per true observation.
+pub struct MultipleAccess<'r> {
+    run: &'r Run,
+    /// κ of the emissions that a signal meets, its own among them.
+    kappa_s: HashMap<Emission, Vec<(Emission, f64)>>,
+    /// What interference adds to the noise density at a sample, in units of the thermal one.
+    jammed: HashMap<(u64, Emission), f64>,
+}
+
+impl<'r> MultipleAccess<'r> {
+    /// From the truth of a run.
+    pub fn new(run: &'r Run) -> Self {
+        let emissions = Emission::all(run.truth.keys());
+        let waveforms: HashMap<&Signal, Waveform> =
+            emissions.iter().filter_map(|one| Some((one.signal, Waveform::of(one.signal)?))).collect();
+        Self { run, kappa_s: separations(run, &emissions, &waveforms), jammed: jammed(run, &emissions, &waveforms) }
+    }
+
+    /// C/N0 of a true observation with the other satellites and interference counted as noise; infinite without any.
+    pub fn effective_dbhz(&self, row: &Observation) -> f64 {
+        let (own_hz, own) = (linear(row.cn0_dbhz), Emission::of(row.link()));
+        let sum_hz = |emission: Emission| self.run.cn0_sums_hz.get(&(row.sample, emission)).copied();
+        let others = |(emission, kappa_s): &(Emission, f64)| {
+            let others_hz = if *emission == own {
+                let sum_hz = sum_hz(own).unwrap_or(own_hz);
+                planted!("analysis.multiple_access.others", sum_hz - own_hz, 10.0 * sum_hz)
+            } else {
+                sum_hz(*emission).unwrap_or(0.0)
+            };
+            kappa_s * others_hz
+        };
+        let shared: f64 = self.kappa_s.get(&own).map_or(&[][..], Vec::as_slice).iter().map(others).sum();
+        let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
+        let jammed = self.jammed.get(&(row.sample, own)).copied().unwrap_or(0.0);
+        10.0 * libm::log10(own_hz / (thermal + shared + jammed))
+    }
+}
+
+/// κ of every pair of emissions within the sample rate of each other.
+fn separations(
+    run: &Run,
+    emissions: &BTreeSet<Emission>,
+    waveforms: &HashMap<&Signal, Waveform>,
+) -> HashMap<Emission, Vec<(Emission, f64)>> {
+    let (edge, rate_hz) = (run.scene.code_edge, run.scene.sample_rate_hz);
+    // Spectra are even: κ depends on the size of the distance, and on the pair in either order.
+    let mut known: HashMap<(&str, &str, u64), f64> = HashMap::new();
+    let mut all: HashMap<Emission, Vec<(Emission, f64)>> = HashMap::new();
+    for own in emissions {
+        for other in emissions {
+            let apart_hz = (other.carrier_hz() - own.carrier_hz()).abs();
+            let (Some(one), Some(two)) = (waveforms.get(own.signal), waveforms.get(other.signal)) else { continue };
+            if apart_hz >= rate_hz {
+                continue;
+            }
+            let [a, b] = [own.signal.name, other.signal.name];
+            let key = (a.min(b), a.max(b), apart_hz.to_bits());
+            let kappa_s = *known.entry(key).or_insert_with(|| one.separation_s(two, apart_hz, edge, rate_hz));
+            all.entry(*own).or_default().push((*other, kappa_s));
+        }
+    }
+    all
+}
+
+fn jammed(
+    run: &Run,
+    emissions: &BTreeSet<Emission>,
+    waveforms: &HashMap<&Signal, Waveform>,
+) -> HashMap<(u64, Emission), f64> {
+    let sources = jamming::sources(run);
+    let mut sums = HashMap::new();
+    for emission in emissions {
+        let Some(waveform) = waveforms.get(emission.signal) else { continue };
+        let sign = if run.scene.inverted { -1.0 } else { 1.0 };
+        let signal_hz = sign * (emission.carrier_hz() - run.scene.center_hz.unwrap_or(emission.carrier_hz()));
+        let kappa: HashMap<usize, f64> = sources
+            .iter()
+            .map(|(number, source)| {
+                let (edge, rate_hz) = (run.scene.code_edge, run.scene.sample_rate_hz);
+                (*number, jamming::separation_s(source, waveform, signal_hz, edge, rate_hz))
+            })
+            .collect();
+        for row in &run.interference {
+            let kappa_s = kappa.get(&row.source).copied().unwrap_or(0.0);
+            *sums.entry((row.sample, *emission)).or_insert(0.0) += kappa_s * linear(row.jn0_dbhz);
+        }
+    }
+    sums
+}
+
+fn linear(cn0_dbhz: f64) -> f64 {
+    libm::pow(10.0, cn0_dbhz / 10.0)
+}

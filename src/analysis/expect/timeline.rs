@@ -1,0 +1,262 @@
+//! The truth as a function of GPS time, for receivers that label their epochs with a clock of their own.
+//!
+//! Files give it at samples; their true GPS times stand in `trajectory.csv`. The sampler's clock is taken
+//! out, so that what is left is what a receiver with a perfect clock would have seen. Between rows a cubic
+//! through values and rates (Hermite): its error is h⁴/384 of the fourth derivative. It is measured here, not
+//! assumed: a row is predicted from its neighbours, 2h apart, and a sixteenth of what that misses is the
+//! error in the middle of an interval. Limits: a step of acceleration between two rows costs a·h²/62 and
+//! shows in that figure.
+
+use std::collections::{BTreeMap, HashMap};
+
+use nalgebra::Vector3;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::expect::multiple_access::MultipleAccess;
+use crate::analysis::measure::errors::Link;
+use crate::analysis::read::Run;
+use crate::analysis::statistics::median;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::record::Observation;
+use crate::gnss::time::Epoch;
+
+/// A satellite's signal at an instant, by a perfect clock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    /// Speed of light times (GPS time − time sent).
+    pub range_m: f64,
+    pub carrier_cycles: f64,
+    /// Minus the carrier's rate.
+    pub doppler_hz: f64,
+    pub cn0_dbhz: f64,
+    /// With the other satellites and interference counted as noise.
+    pub effective_dbhz: f64,
+    pub elevation_deg: f64,
+}
+
+/// States of one satellite at ascending times.
+#[derive(Clone, Debug, Default)]
+struct Track {
+    nodes: Vec<(f64, State)>,
+}
+
+/// Antenna and sampler's clock at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    pub position_m: Vector3<f64>,
+    pub velocity_mps: Vector3<f64>,
+    pub clock_bias_s: f64,
+    pub clock_drift: f64,
+}
+
+/// What interpolation leaves, at most.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Interpolation {
+    pub range_m: f64,
+    pub carrier_cycles: f64,
+    pub doppler_hz: f64,
+}
+
+/// The truth of a run over GPS time.
+pub struct Timeline {
+    /// GPS time that all times here count from.
+    pub origin: Epoch,
+    interval_s: f64,
+    tracks: BTreeMap<Link, Track>,
+    places: Vec<(f64, Place)>,
+    pub interpolation: Interpolation,
+}
+
+/// Steps beyond this many usual ones are gaps.
+const GAP: f64 = 1.5;
+
+impl Timeline {
+    /// From a run's truth; `None` without a trajectory.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn new(run: &Run) -> Result<Option<Self>, JudgeError> {
+        let Some(mut timeline) = Self::of_links(run, &MultipleAccess::new(run), run.truth.keys())? else {
+            return Ok(None);
+        };
+        timeline.interpolation = timeline.missed();
+        Ok(Some(timeline))
+    }
+
+    /// That of one satellite; how well it is interpolated is not looked at.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of(run: &Run, access: &MultipleAccess<'_>, link: Link) -> Result<Option<Self>, JudgeError> {
+        Self::of_links(run, access, std::iter::once(link))
+    }
+
+    fn of_links(
+        run: &Run,
+        access: &MultipleAccess<'_>,
+        links: impl Iterator<Item = Link>,
+    ) -> Result<Option<Self>, JudgeError> {
+        let Some(first) = run.trajectory.first() else { return Ok(None) };
+        // The nearest second: a clock that is a little ahead does not begin a second earlier.
+        let origin = Epoch::new(first.gps_s, first.gps_fraction_s.round());
+        let places: Vec<(f64, Place)> = run
+            .trajectory
+            .iter()
+            .map(|row| {
+                let place = Place {
+                    position_m: row.position_m(),
+                    velocity_mps: row.velocity_mps(),
+                    clock_bias_s: row.clock_bias_s,
+                    clock_drift: row.clock_drift,
+                };
+                (row.time().since(origin), place)
+            })
+            .collect();
+        let steps: Vec<f64> = places.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+        let at: HashMap<u64, usize> = run.trajectory.iter().map(|row| row.sample).zip(0..).collect();
+        let mut tracks = BTreeMap::new();
+        for link in links {
+            let elevations: HashMap<u64, f64> =
+                run.sky.map(link.sv, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
+            let node = |row: Observation| {
+                let (t_s, place) = places.get(*at.get(&row.sample)?)?;
+                let carrier_hz = row.signal.carrier_hz(row.sv);
+                let state = State {
+                    range_m: row.pseudorange_m - SPEED_OF_LIGHT_MPS * place.clock_bias_s,
+                    carrier_cycles: row.carrier_cycles - carrier_hz * place.clock_bias_s,
+                    // Rates by the sampler's clock become rates by GPS time.
+                    doppler_hz: (row.doppler_hz + carrier_hz * place.clock_drift) / (1.0 - place.clock_drift),
+                    cn0_dbhz: row.cn0_dbhz,
+                    effective_dbhz: access.effective_dbhz(&row),
+                    elevation_deg: elevations.get(&row.sample).copied().unwrap_or(f64::NAN),
+                };
+                Some((*t_s, state))
+            };
+            tracks.insert(link, Track { nodes: run.truth.map(link, node)?.into_iter().flatten().collect() });
+        }
+        let interval_s = median(&steps).unwrap_or(1.0);
+        Ok(Some(Self { origin, interval_s, tracks, places, interpolation: Interpolation::default() }))
+    }
+
+    /// First and last time.
+    pub fn span_s(&self) -> (f64, f64) {
+        (self.places.first().map_or(0.0, |p| p.0), self.places.last().map_or(0.0, |p| p.0))
+    }
+
+    /// Interval of its rows.
+    pub fn interval_s(&self) -> f64 {
+        self.interval_s
+    }
+
+    /// Times over which each satellite is there without a gap.
+    pub fn stretches_s(&self) -> BTreeMap<Link, Vec<(f64, f64)>> {
+        let whole = |a: &(f64, State), b: &(f64, State)| b.0 - a.0 <= GAP * self.interval_s;
+        let ends = |nodes: &[(f64, State)]| Some((nodes.first()?.0, nodes.last()?.0));
+        let of = |track: &Track| track.nodes.chunk_by(whole).filter_map(ends).collect();
+        self.tracks.iter().map(|(link, track)| (*link, of(track))).collect()
+    }
+
+    /// A satellite at a time; `None` where it is not there on both sides.
+    pub fn state(&self, link: &Link, t_s: f64) -> Option<State> {
+        let nodes = &self.tracks.get(link)?.nodes;
+        let (a, b) = around(nodes, t_s)?;
+        (b.0 - a.0 <= GAP * self.interval_s).then(|| between(link, a, b, t_s))
+    }
+
+    /// Antenna and sampler's clock at a time within the truth.
+    pub fn place(&self, t_s: f64) -> Option<Place> {
+        let (a, b) = around(&self.places, t_s)?;
+        if b.0 - a.0 > GAP * self.interval_s {
+            return None;
+        }
+        let h_s = b.0 - a.0;
+        let cubic = Cubic::at((t_s - a.0) / h_s);
+        let u = (t_s - a.0) / h_s;
+        let line = |x: f64, y: f64| x + (y - x) * u;
+        Some(Place {
+            position_m: a.1.position_m * cubic.value[0]
+                + a.1.velocity_mps * (cubic.value[1] * h_s)
+                + b.1.position_m * cubic.value[2]
+                + b.1.velocity_mps * (cubic.value[3] * h_s),
+            velocity_mps: a.1.position_m * (cubic.rate[0] / h_s)
+                + a.1.velocity_mps * cubic.rate[1]
+                + b.1.position_m * (cubic.rate[2] / h_s)
+                + b.1.velocity_mps * cubic.rate[3],
+            clock_bias_s: line(a.1.clock_bias_s, b.1.clock_bias_s),
+            clock_drift: line(a.1.clock_drift, b.1.clock_drift),
+        })
+    }
+
+    /// Each row from its neighbours: what that misses falls with the fourth power of the step, of Doppler
+    /// with the third.
+    fn missed(&self) -> Interpolation {
+        let mut worst = Interpolation::default();
+        for (link, track) in &self.tracks {
+            for three in track.nodes.windows(3) {
+                let [a, b, c] = three else { continue };
+                if c.0 - a.0 > 2.0 * GAP * self.interval_s {
+                    continue;
+                }
+                let guess = between(link, a, c, b.0);
+                worst.range_m = worst.range_m.max((guess.range_m - b.1.range_m).abs() / 16.0);
+                worst.carrier_cycles =
+                    worst.carrier_cycles.max((guess.carrier_cycles - b.1.carrier_cycles).abs() / 16.0);
+                worst.doppler_hz = worst.doppler_hz.max((guess.doppler_hz - b.1.doppler_hz).abs() / 8.0);
+            }
+        }
+        worst
+    }
+}
+
+/// Something at a time.
+type At<T> = (f64, T);
+
+/// The rows on either side of a time.
+fn around<T>(nodes: &[At<T>], t_s: f64) -> Option<(&At<T>, &At<T>)> {
+    let after = nodes.partition_point(|node| node.0 <= t_s);
+    let after = if after == nodes.len() && nodes.last().is_some_and(|last| last.0 == t_s) { after - 1 } else { after };
+    Some((nodes.get(after.checked_sub(1)?)?, nodes.get(after)?))
+}
+
+/// Weights of value and rate at both ends of an interval of unit length, and those of the derivative.
+struct Cubic {
+    value: [f64; 4],
+    rate: [f64; 4],
+}
+
+impl Cubic {
+    fn at(u: f64) -> Self {
+        let (u2, u3) = (u * u, u * u * u);
+        Self {
+            value: [2.0 * u3 - 3.0 * u2 + 1.0, u3 - 2.0 * u2 + u, 3.0 * u2 - 2.0 * u3, u3 - u2],
+            rate: [6.0 * u2 - 6.0 * u, 3.0 * u2 - 4.0 * u + 1.0, 6.0 * u - 6.0 * u2, 3.0 * u2 - 2.0 * u],
+        }
+    }
+}
+
+fn between(link: &Link, a: &(f64, State), b: &(f64, State), t_s: f64) -> State {
+    let h_s = b.0 - a.0;
+    let u = (t_s - a.0) / h_s;
+    let cubic = Cubic::at(u);
+    // Differences from the first row keep the digits of a carrier of 1e8 cycles.
+    let blend = |weights: &[f64; 4], rise: f64, rates: (f64, f64)| {
+        weights[2] * rise + (weights[1] * rates.0 + weights[3] * rates.1) * h_s
+    };
+    let (near, far) = (&a.1, &b.1);
+    let carrier_rise = far.carrier_cycles - near.carrier_cycles;
+    let carrier_rates = (-near.doppler_hz, -far.doppler_hz);
+    let wavelength_m = link.wavelength_m();
+    let range_rise = far.range_m - near.range_m;
+    let range_rates = (wavelength_m * carrier_rates.0, wavelength_m * carrier_rates.1);
+    let line = |x: f64, y: f64| x + (y - x) * u;
+    State {
+        range_m: near.range_m + blend(&cubic.value, range_rise, range_rates),
+        carrier_cycles: near.carrier_cycles + blend(&cubic.value, carrier_rise, carrier_rates),
+        doppler_hz: -(cubic.rate[2] * carrier_rise / h_s
+            + cubic.rate[1] * carrier_rates.0
+            + cubic.rate[3] * carrier_rates.1),
+        cn0_dbhz: line(near.cn0_dbhz, far.cn0_dbhz),
+        effective_dbhz: line(near.effective_dbhz, far.effective_dbhz),
+        elevation_deg: line(near.elevation_deg, far.elevation_deg),
+    }
+}

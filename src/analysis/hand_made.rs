@@ -1,0 +1,287 @@
+//! A run made by hand for tests: truth, an estimate with known errors planted, and the files of both.
+//!
+//! Nine satellites stand still in number for a minute; the receiver reports from the thirtieth second on. Every
+//! error has a known size ([`PLANTED`]), so that a test can say what the judge must find.
+
+use std::fs;
+use std::path::Path;
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use crate::gnss::gps::l1ca::L1_CA;
+use crate::gnss::record::{
+    AcquisitionRow, Event, EventRow, Fix, IonosphereModel, LineRow, NavigationRow, Observation, SkyRow, TrackingRow,
+    TrajectoryRow,
+};
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+pub(in crate::analysis) const RATE_HZ: u64 = 2_600_000;
+pub(in crate::analysis) const TICKS: u64 = 600;
+pub(in crate::analysis) const FIRST_TICK: u64 = 300;
+pub(in crate::analysis) const PRNS: [u8; 9] = [2, 5, 7, 12, 15, 18, 21, 26, 29];
+pub(in crate::analysis) const CHIP_M: f64 = SPEED_OF_LIGHT_MPS / 1.023e6;
+
+/// Near normal with unit variance: the sum of twelve uniforms minus six, from Knuth's congruential generator.
+pub(in crate::analysis) struct Draw(pub u64);
+
+impl Draw {
+    pub fn normal(&mut self) -> f64 {
+        let mut uniform = || {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// What is planted.
+pub(in crate::analysis) struct Planted {
+    pub code_bias_m: f64,
+    pub code_sigma_m: f64,
+    pub carrier_sigma_cycles: f64,
+    pub doppler_sigma_hz: f64,
+    pub cn0_bias_db: f64,
+    pub enu_bias_m: Vector3<f64>,
+    pub enu_sigma_m: f64,
+    pub fixes: bool,
+}
+
+pub(in crate::analysis) const PLANTED: Planted = Planted {
+    code_bias_m: 0.25,
+    code_sigma_m: 0.7,
+    carrier_sigma_cycles: 0.008,
+    doppler_sigma_hz: 0.4,
+    cn0_bias_db: -0.3,
+    enu_bias_m: Vector3::new(0.2, -0.1, 0.5),
+    enu_sigma_m: 0.4,
+    fixes: true,
+};
+
+pub(in crate::analysis) fn write<T: Serialize>(path: &Path, rows: &[T]) {
+    let mut writer = csv::Writer::from_path(path).unwrap();
+    rows.iter().for_each(|row| writer.serialize(row).unwrap());
+    writer.flush().unwrap();
+}
+
+pub(in crate::analysis) fn start() -> Epoch {
+    Epoch::parse("2010-07-01T08:12:30").unwrap()
+}
+
+/// The true observation of a satellite at a tick of 0.1 s.
+pub(in crate::analysis) fn true_observation(index: usize, tick: u64) -> Observation {
+    let t_s = tick as f64 * 0.1;
+    let doppler_hz = 3500.0 - 800.0 * index as f64 - 0.6 * t_s;
+    let range_m = 21.0e6 + 4.0e5 * index as f64 - doppler_hz * L1_CA.wavelength_m(Sv::gps(1)) * t_s;
+    let received = start().plus_s(t_s);
+    let sent = received.plus_s(-range_m / SPEED_OF_LIGHT_MPS);
+    Observation {
+        sample: tick * RATE_HZ / 10,
+        sv: Sv::gps(PRNS[index]),
+        signal: &L1_CA,
+        sent_s: sent.seconds(),
+        sent_fraction_s: sent.fraction(),
+        pseudorange_m: range_m,
+        carrier_cycles: range_m / L1_CA.wavelength_m(Sv::gps(1)),
+        doppler_hz,
+        cn0_dbhz: 40.0 + 1.1 * index as f64 + 0.005 * t_s,
+        locked_s: t_s,
+    }
+}
+
+pub(in crate::analysis) fn parameter(prn: u8, name: &str, raw: i64) -> NavigationRow {
+    NavigationRow { sv: Sv::gps(prn), issue: 17, parameter: name.to_owned(), raw }
+}
+
+/// Writes the truth's half of a run.
+pub(in crate::analysis) fn write_truth(run: &Path) {
+    let truth = run.join("truth");
+    fs::create_dir_all(&truth).unwrap();
+    let all = || (0..TICKS).flat_map(|tick| (0..PRNS.len()).map(move |index| (tick, index)));
+    write(&truth.join("observations.csv"), &all().map(|(tick, i)| true_observation(i, tick)).collect::<Vec<_>>());
+    let sky = |(tick, index): (u64, usize)| SkyRow {
+        sample: tick * RATE_HZ / 10,
+        sv: Sv::gps(PRNS[index]),
+        azimuth_deg: 40.0 * index as f64 + 0.02 * tick as f64,
+        // The first stands below the mask of 5 degrees.
+        elevation_deg: 4.0 + 9.5 * index as f64 + 0.004 * tick as f64,
+        range_m: 2.1e7,
+        satellite_clock_m: 0.0,
+        ionosphere_m: 3.0,
+        troposphere_m: 4.0,
+    };
+    write(&truth.join("sky.csv"), &all().map(sky).collect::<Vec<_>>());
+    let place = |tick: u64| {
+        let origin = Geodetic::from_degrees(26.5, 80.2, 130.0);
+        let turn = libm::sincos(tick as f64 * 0.01);
+        let enu = Vector3::new(150.0 * turn.0, 90.0 * (1.0 - turn.1), 0.02 * tick as f64);
+        origin.to_ecef() + origin.ecef_to_enu().transpose() * enu
+    };
+    let trajectory = |tick: u64| {
+        let (at, time) = (place(tick), start().plus_s(tick as f64 * 0.1));
+        TrajectoryRow {
+            sample: tick * RATE_HZ / 10,
+            gps_s: time.seconds(),
+            gps_fraction_s: time.fraction(),
+            x_m: at.x,
+            y_m: at.y,
+            z_m: at.z,
+            vx_mps: 1.0,
+            vy_mps: -2.0,
+            vz_mps: 0.5,
+            clock_bias_s: 1e-4,
+            clock_drift: 1e-8,
+        }
+    };
+    write(&truth.join("trajectory.csv"), &(0..TICKS).map(trajectory).collect::<Vec<_>>());
+    let navigation: Vec<_> =
+        PRNS.iter().flat_map(|&prn| [parameter(prn, "sqrt_a", 2_702_000_000), parameter(prn, "m_0", -77)]).collect();
+    write(&truth.join("navigation.csv"), &navigation);
+    let scene = r#"{"name": "planted", "seed": 7, "duration_s": 60.0, "sample_rate_hz": 2600000.0,
+        "center_hz": 1575420000.0, "format": "ci8", "code_edge": "area", "knot_tolerance_cycles": 1e-4,
+        "mask_deg": 5.0, "signals": ["GPS L1 C/A"], "noise": true, "start": "2010-07-01T08:12:30",
+        "fidelity": "area edges"}"#;
+    fs::write(truth.join("scene.json"), scene).unwrap();
+}
+
+/// Writes the receiver's half: the truth with what is planted.
+pub(in crate::analysis) fn write_estimate(run: &Path, planted: &Planted) {
+    let rx = run.join("rx");
+    fs::create_dir_all(&rx).unwrap();
+    let mut draw = Draw(1);
+    let mut observations = Vec::new();
+    for (tick, index) in (FIRST_TICK..TICKS).flat_map(|tick| (0..PRNS.len()).map(move |index| (tick, index))) {
+        let mut row = true_observation(index, tick);
+        let late_m = planted.code_bias_m + planted.code_sigma_m * draw.normal();
+        let sent = row.sent().plus_s(-late_m / SPEED_OF_LIGHT_MPS);
+        (row.sent_s, row.sent_fraction_s) = (sent.seconds(), sent.fraction());
+        // Every satellite has its own whole number; the fourth slips half a cycle at tick 450.
+        let slip = if index == 3 && tick >= 450 { 0.5 } else { 0.0 };
+        row.carrier_cycles += 1000.5 * index as f64 - 3e7 + slip + planted.carrier_sigma_cycles * draw.normal();
+        row.doppler_hz += planted.doppler_sigma_hz * draw.normal();
+        row.cn0_dbhz += planted.cn0_bias_db;
+        row.locked_s -= 1.0;
+        observations.push(row);
+    }
+    write(&rx.join("observations.csv"), &observations);
+
+    let truth: Vec<TrajectoryRow> =
+        csv::Reader::from_path(run.join("truth/trajectory.csv")).unwrap().deserialize().map(Result::unwrap).collect();
+    let fix = |row: &TrajectoryRow| {
+        let to_ecef = Geodetic::from_ecef(&row.position_m()).ecef_to_enu().transpose();
+        let noise = Vector3::new(draw.normal(), draw.normal(), draw.normal()) * planted.enu_sigma_m;
+        let at = row.position_m() + to_ecef * (planted.enu_bias_m + noise);
+        let time = row.time().plus_s(3.0 / SPEED_OF_LIGHT_MPS);
+        Fix {
+            sample: row.sample,
+            gps_s: time.seconds(),
+            gps_fraction_s: time.fraction(),
+            x_m: at.x,
+            y_m: at.y,
+            z_m: at.z,
+            vx_mps: row.vx_mps + 0.03,
+            vy_mps: row.vy_mps,
+            vz_mps: row.vz_mps + 0.04,
+            clock_bias_s: 1e-4,
+            clock_drift: 1e-8,
+            sigma_east_m: 0.4,
+            sigma_north_m: 0.4,
+            sigma_up_m: 0.4,
+            sigma_clock_m: 0.4,
+            correlation_en: 0.0,
+            correlation_eu: 0.0,
+            correlation_nu: 0.0,
+            gdop: 2.0,
+            pdop: 1.8,
+            hdop: 1.0,
+            vdop: 1.5,
+            tdop: 1.0,
+            condition: 4.0,
+            satellites: 8,
+            chi_square: 4.0,
+            excluded: String::new(),
+            ionosphere: IonosphereModel::Broadcast,
+            ranges: None,
+            clocks: None,
+            time_scale: "GPST".to_owned(),
+        }
+    };
+    let fixes: Vec<Fix> =
+        if planted.fixes { truth.iter().skip(FIRST_TICK as usize).map(fix).collect() } else { Vec::new() };
+    write(&rx.join("fixes.csv"), &fixes);
+    write_channels(&rx, &mut Draw(5));
+}
+
+/// Acquisition with one false hit, tracking, navigation with one wrong parameter and one never sent, events.
+pub(in crate::analysis) fn write_channels(rx: &Path, draw: &mut Draw) {
+    let search = |prn: u8| {
+        let real = PRNS.contains(&prn);
+        AcquisitionRow {
+            sample: 0,
+            sv: Sv::gps(prn),
+            signal: &L1_CA,
+            acquired: real || prn == 31,
+            statistic: if real { 90.0 + 4.0 * f64::from(prn) } else { 40.0 } + if prn == 31 { 30.0 } else { 0.0 },
+            threshold: 65.421,
+            doppler_hz: 0.0,
+            code_phase_chips: 0.0,
+            cn0_dbhz: 45.0,
+        }
+    };
+    write(&rx.join("acquisition.csv"), &(1..=37).map(search).collect::<Vec<_>>());
+    let mut tracking = Vec::new();
+    for (tick, prn) in (5..TICKS).flat_map(|tick| PRNS.map(|prn| (tick, prn))) {
+        tracking.push(TrackingRow {
+            sample: tick * RATE_HZ / 10,
+            sv: Sv::gps(prn),
+            signal: &L1_CA,
+            prompt_i: 20.0,
+            prompt_q: draw.normal(),
+            dll_discriminator_chips: 0.03 * draw.normal(),
+            pll_discriminator_cycles: 0.02 * draw.normal(),
+            fll_discriminator_hz: 5.0 * draw.normal(),
+            cn0_dbhz: 45.0,
+            phase_lock: 0.98,
+            integration_s: 0.02,
+        });
+    }
+    write(&rx.join("tracking.csv"), &tracking);
+    let mut navigation: Vec<_> = PRNS.iter().map(|&prn| parameter(prn, "sqrt_a", 2_702_000_000)).collect();
+    navigation.push(parameter(5, "m_0", -78));
+    navigation.push(parameter(7, "omega_dot", 3));
+    write(&rx.join("navigation.csv"), &navigation);
+    let event = |prn: u8, event: Event| EventRow { sample: 700_000, sv: Sv::gps(prn), signal: &L1_CA, event };
+    write(
+        &rx.join("events.csv"),
+        &[event(2, Event::Acquired), event(31, Event::Acquired), event(31, Event::LossOfLock)],
+    );
+    fs::write(rx.join("receiver.json"), r#"{"settings": {"tracking": {"spacing_chips": 0.3}}}"#).unwrap();
+}
+
+/// The run as it is planted.
+pub(in crate::analysis) fn planted() -> tempfile::TempDir {
+    planted_run(&PLANTED)
+}
+
+pub(in crate::analysis) fn planted_run(planted: &Planted) -> tempfile::TempDir {
+    let run = tempfile::tempdir().unwrap();
+    write_truth(run.path());
+    write_estimate(run.path(), planted);
+    run
+}
+
+/// What a receiver reports of a continuous wave in a second.
+pub(in crate::analysis) fn reported(second: u64, frequency_hz: f64) -> LineRow {
+    LineRow {
+        sample: second * RATE_HZ,
+        frequency_hz,
+        jn0_dbhz: 60.5,
+        js_db: None,
+        statistic: 40.0,
+        threshold: 4.7,
+        lines: 1,
+        resolution_hz: 635.0,
+    }
+}

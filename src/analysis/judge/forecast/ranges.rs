@@ -1,0 +1,325 @@
+//! Bias and noise of each range that a fix may use.
+//!
+//! Bias: the true range, all of the scene's delays in it, less what a receiver computes from the message as
+//! sent (orbit, clock, Klobuchar) and the true troposphere; and what smoothing makes of code and carrier that
+//! part. Noise: theory of the code loop at the true C/N0, other codes and interference counted, through
+//! Hatch's filter. Apart from these: chip edges between samples, and reflected rays. Limits: the difference
+//! of the receiver's troposphere from the true one is a stated share of it.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use nalgebra::Vector3;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::expect::loops::Theory;
+use crate::analysis::expect::message::Message;
+use crate::analysis::expect::multipath;
+use crate::analysis::expect::smoothing::Smoothing;
+use crate::analysis::expect::theory::edges;
+use crate::analysis::judge::forecast::links::CN0_DB;
+use crate::analysis::measure::errors::{Errors, SignalError};
+use crate::analysis::measure::jitter::{Loop, Settings};
+use crate::analysis::read::Run;
+use crate::analysis::waveform::{Edge, leading};
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
+use crate::gnss::record::{Event, Observation, RayRow, SkyRow, TrajectoryRow};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Link, Signal};
+use crate::gnss::time::GPST;
+
+/// The receiver's choices that its accuracy follows from.
+#[derive(Clone, Debug)]
+pub struct Choices {
+    pub loops: Settings,
+    /// Time of a loop's update, by signal.
+    pub updates_s: BTreeMap<&'static Signal, f64>,
+    pub smoothing_s: f64,
+    pub mask_rad: f64,
+    pub model_sigma_m: f64,
+    pub ionosphere: bool,
+    /// Of the ionosphere's model, as a share of its delay.
+    pub ionosphere_error_share: f64,
+}
+
+impl Choices {
+    /// As `receiver.json` has them; `None` where it does not.
+    pub fn of(run: &Run) -> Option<Self> {
+        let position = run.receiver.get("settings")?.get("position")?;
+        let number = |key: &str| position.get(key)?.as_f64();
+        let word = |key: &str| position.get(key)?.as_str();
+        Some(Self {
+            loops: Settings::of(run)?,
+            updates_s: updates_s(run)?,
+            smoothing_s: number("smoothing_s")?,
+            mask_rad: number("mask_deg")?.to_radians(),
+            model_sigma_m: number("model_sigma_m")?,
+            ionosphere: word("ionosphere")? == "broadcast",
+            ionosphere_error_share: number("ionosphere_error_share").unwrap_or(0.0),
+        })
+    }
+}
+
+/// Time of a loop's update in the tracking stage, by the settings, which count it in code periods.
+pub fn update_s(run: &Run, signal: &Signal) -> Option<f64> {
+    let counted = || Some(run.tracking_setting("integration")? * leading(signal)?.period_s());
+    counted().or(run.update_s)
+}
+
+/// That of every signal; `None` where one has none.
+fn updates_s(run: &Run) -> Option<BTreeMap<&'static Signal, f64>> {
+    run.truth.keys().map(|link| Some((link.signal, update_s(run, link.signal)?))).collect()
+}
+
+/// Space: no horizon, and models that are as good in every direction.
+const SPACE_M: f64 = 1e5;
+/// Klobuchar's ionosphere ends here.
+const IONOSPHERE_TOP_M: f64 = 1e6;
+/// Share of the rays' computed effect by which it may be wrong: the front end rounds the correlation, the
+/// loop lags.
+const MULTIPATH_SHARE: f64 = 0.5;
+/// Satellites this near to the mask may be used or not: true and computed elevation differ.
+const MASK_SLACK_RAD: f64 = 2e-3;
+
+/// One range as it should be.
+#[derive(Clone, Copy, Debug)]
+pub struct Forecast {
+    pub sv: Sv,
+    /// Which of [`Scene::scales`] its clock is counted against.
+    pub clock: usize,
+    /// Towards the satellite: east, north, up.
+    pub sight: Vector3<f64>,
+    /// Expected bias once the ionosphere is corrected, and what not correcting it adds.
+    pub bias_m: f64,
+    pub ionosphere_m: f64,
+    /// What the true troposphere delays, for the share that a model of it errs by.
+    pub troposphere_m: f64,
+    /// Variances of thermal noise, and of edges and rays.
+    pub noise_m2: f64,
+    pub other_m2: f64,
+    pub memory_s: f64,
+    /// Standard deviation of its Doppler, as a rate, and its bias by the rate of the atmosphere.
+    pub rate_sigma_mps: f64,
+    pub rate_bias_mps: f64,
+    pub cn0_hz: f64,
+    /// Whether the C/N0 observed is near the true one: in fades and jamming averages lag, which rows of their
+    /// own judge.
+    pub steady: bool,
+    /// Of a model's error at the zenith: one over the elevation's sine.
+    pub slant: f64,
+    /// Whether it is so near to the mask that it may be used or not.
+    pub near_mask: bool,
+    /// Whether the fix leaves it out.
+    pub excluded: bool,
+}
+
+/// What is the same for all satellites of a run.
+pub struct Scene<'r> {
+    pub run: &'r Run,
+    pub choices: Choices,
+    pub message: Message,
+    /// Names of the time scales of the run's signals, GPS time first.
+    pub scales: Vec<&'static str>,
+    pub trajectory: HashMap<u64, &'r TrajectoryRow>,
+    /// Samples with a fix, and those of them that leave satellites out.
+    pub fixes: HashMap<u64, usize>,
+    excluded: HashMap<u64, HashSet<String>>,
+    /// From when on each satellite's message is known, and while it says that it is unhealthy.
+    known: BTreeMap<Sv, u64>,
+    health: BTreeMap<Sv, Vec<(u64, bool)>>,
+    /// Decibels that filter and converter cost, by signal.
+    costs_db: BTreeMap<&'static Signal, f64>,
+    /// Error of chip edges with a standing code, root mean square.
+    edges_m: BTreeMap<&'static Signal, f64>,
+}
+
+impl<'r> Scene<'r> {
+    /// `None` without the receiver's settings.
+    pub fn new(run: &'r Run) -> Option<Self> {
+        let (mut known, mut health) = (BTreeMap::new(), BTreeMap::<Sv, Vec<(u64, bool)>>::new());
+        for row in &run.events {
+            match row.event {
+                Event::EphemerisComplete => {
+                    known.entry(row.sv).or_insert(row.sample);
+                }
+                Event::Unhealthy => health.entry(row.sv).or_default().push((row.sample, false)),
+                Event::Healthy => health.entry(row.sv).or_default().push((row.sample, true)),
+                _ => {}
+            }
+        }
+        let names = |text: &str| text.split_whitespace().map(str::to_owned).collect::<HashSet<_>>();
+        let left_out = run.fixes.iter().filter(|fix| !fix.excluded.is_empty());
+        Some(Self {
+            run,
+            choices: Choices::of(run)?,
+            message: Message::of(run),
+            scales: scales(run),
+            trajectory: run.trajectory.iter().map(|row| (row.sample, row)).collect(),
+            fixes: run.fixes.iter().map(|fix| fix.sample).zip(0..).collect(),
+            excluded: left_out.map(|fix| (fix.sample, names(&fix.excluded))).collect(),
+            known,
+            health,
+            costs_db: crate::analysis::expect::spectrum::costs_db(run),
+            edges_m: (run.signals.iter())
+                .filter(|_| run.scene.code_edge == Edge::Area)
+                .map(|&signal| (signal, edges::averaged_m(signal, run.scene.sample_rate_hz)))
+                .collect(),
+        })
+    }
+
+    /// Whether a fix at that sample may use the satellite, by its message.
+    fn usable(&self, sv: Sv, sample: u64) -> bool {
+        let known = self.known.get(&sv).is_some_and(|since| *since <= sample);
+        let last = self.health.get(&sv).and_then(|all| all.iter().rev().find(|(since, _)| *since <= sample));
+        known && last.is_none_or(|(_, healthy)| *healthy)
+    }
+
+    /// Whether a fix leaves the satellite out.
+    fn left_out(&self, sv: Sv, sample: u64) -> bool {
+        self.excluded.get(&sample).is_some_and(|names| names.contains(&sv.to_string()))
+    }
+
+    /// Gives every range of a satellite that a fix may use to `take`, with the number of that fix.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn ranges(&self, errors: &Errors, link: Link, mut take: impl FnMut(usize, Forecast)) -> Result<(), JudgeError> {
+        let update_s = self.choices.updates_s.get(link.signal);
+        let theory = update_s.and_then(|update_s| Theory::new(self.run, self.choices.loops, &link, *update_s));
+        let Some(theory) = theory else { return Ok(()) };
+        let truth: HashMap<u64, Observation> = self.run.truth.map(link, |row| (row.sample, row))?.into_iter().collect();
+        let sky: HashMap<u64, SkyRow> = self.run.sky.map(link.sv, |row| (row.sample, row))?.into_iter().collect();
+        let rays = self.rays(link, &theory)?;
+        let smoothing = || Smoothing::new(self.choices.smoothing_s, self.choices.loops.dll_bandwidth_hz);
+        let (mut parting, mut reflected) = (smoothing(), smoothing());
+        let mut atmosphere = Rate::default();
+        errors.signals.each(link, |row| {
+            let (Some(true_row), Some(sky)) = (truth.get(&row.sample), sky.get(&row.sample)) else { return };
+            let parted_m = true_row.pseudorange_m - link.wavelength_m() * true_row.carrier_cycles;
+            let ray_m = rays.get(&row.sample).copied().unwrap_or(0.0);
+            let smooth = parting.take(row.time_s, row.locked_s, parted_m + ray_m);
+            let bounced = reflected.take(row.time_s, row.locked_s, ray_m.abs());
+            let rate_mps = atmosphere.of(row.time_s, sky.troposphere_m - sky.ionosphere_m);
+            let Some(&fix) = self.fixes.get(&row.sample) else { return };
+            if !self.usable(link.sv, row.sample) {
+                return;
+            }
+            let Some(one) = self.one(&theory, &row, true_row, sky) else { return };
+            let bounced_m = MULTIPATH_SHARE * bounced.value_m;
+            let whole = Forecast {
+                bias_m: one.bias_m + smooth.value_m - parted_m,
+                noise_m2: one.noise_m2 * smooth.variance_ratio,
+                other_m2: one.other_m2 + bounced_m * bounced_m,
+                memory_s: smooth.memory_s,
+                rate_bias_mps: rate_mps,
+                ..one
+            };
+            take(fix, whole);
+        })
+    }
+
+    /// The reflected rays' effect on the code at each sample.
+    fn rays(&self, link: Link, theory: &Theory) -> Result<HashMap<u64, f64>, JudgeError> {
+        let mut groups: HashMap<u64, Vec<(f64, f64, f64)>> = HashMap::new();
+        self.run.rays.each(link, |row: RayRow| {
+            groups.entry(row.sample).or_default().push(multipath::ray(&row, theory.chip_m));
+        })?;
+        let spacing = self.choices.loops.spacing_chips;
+        Ok(groups
+            .into_iter()
+            .map(|(at, rays)| (at, theory.chip_m * multipath::error_chips(&theory.code, &rays, spacing)))
+            .collect())
+    }
+
+    /// A range without smoothing.
+    fn one(&self, theory: &Theory, row: &SignalError, true_row: &Observation, sky: &SkyRow) -> Option<Forecast> {
+        let place = self.trajectory.get(&row.sample)?;
+        let user = Geodetic::from_ecef(&place.position_m());
+        let in_space = user.height_m >= SPACE_M;
+        let elevation_rad = sky.elevation_deg.to_radians();
+        if !in_space && elevation_rad < self.choices.mask_rad - MASK_SLACK_RAD {
+            return None;
+        }
+        let ephemeris = self.message.ephemeris(true_row.sv, (row.sample, place.time()))?;
+        let look = Look { azimuth_rad: sky.azimuth_deg.to_radians(), elevation_rad };
+        let computed_m = computed_m(ephemeris, true_row, place)?;
+        let ionosphere_m = match self.message.klobuchar.filter(|_| user.height_m <= IONOSPHERE_TOP_M) {
+            // A correction of what the scene does not have is an error, not an expectation.
+            Some(model) if self.choices.ionosphere && sky.ionosphere_m != 0.0 => {
+                SPEED_OF_LIGHT_MPS * model.delay_s(user, look, place.time(), true_row.link().carrier_hz())
+            }
+            _ => 0.0,
+        };
+        let true_m = true_row.pseudorange_m - SPEED_OF_LIGHT_MPS * place.clock_bias_s;
+        // What the system's time is ahead of GPS time goes into its own clock.
+        let ahead_m = SPEED_OF_LIGHT_MPS * self.run.scene.ahead_s(true_row.signal.time.name);
+        let cost_db = self.costs_db.get(true_row.signal).copied().unwrap_or(0.0);
+        let cn0_hz = libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
+        let (_, code) = theory.noise(Loop::Dll, cn0_hz);
+        let (_, rate_hz) = theory.noise(Loop::Fll, cn0_hz);
+        let (sin, cos) = libm::sincos(elevation_rad);
+        let (east, north) = libm::sincos(look.azimuth_rad);
+        Some(Forecast {
+            sv: true_row.sv,
+            clock: self.scales.iter().position(|scale| *scale == true_row.signal.time.name).unwrap_or(0),
+            sight: Vector3::new(east * cos, north * cos, sin),
+            bias_m: true_m + ahead_m - computed_m - ionosphere_m - sky.troposphere_m,
+            ionosphere_m,
+            troposphere_m: sky.troposphere_m,
+            noise_m2: (code * theory.chip_m) * (code * theory.chip_m),
+            other_m2: self.edge_m2(true_row),
+            memory_s: 0.0,
+            rate_sigma_mps: rate_hz * true_row.link().wavelength_m(),
+            rate_bias_mps: 0.0,
+            cn0_hz,
+            steady: (row.cn0_dbhz - row.cn0_effective_dbhz + cost_db).abs() <= CN0_DB,
+            slant: if in_space { 1.0 } else { 1.0 / sin.max(0.05) },
+            near_mask: !in_space && elevation_rad < self.choices.mask_rad + MASK_SLACK_RAD,
+            excluded: self.left_out(true_row.sv, row.sample),
+        })
+    }
+
+    /// Variance that chip edges between samples leave: a code that moves by whole samples within the
+    /// smoothing averages it.
+    fn edge_m2(&self, row: &Observation) -> f64 {
+        let rate_hz = self.run.scene.sample_rate_hz;
+        let patterns = (row.doppler_hz / row.link().carrier_hz() * rate_hz).abs() * self.choices.smoothing_s.max(1.0);
+        let left_m = self.edges_m.get(row.signal).copied().unwrap_or(0.0) / (1.0 + 2.0 * patterns);
+        left_m * left_m
+    }
+}
+
+/// Names of the time scales of a run's signals, GPS time first, then by name.
+fn scales(run: &Run) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = run.signals.iter().map(|signal| signal.time.name).collect();
+    names.sort_by_key(|name| (*name != GPST.name, *name));
+    names.dedup();
+    names
+}
+
+/// What a receiver computes of a range from the message alone: geometry, light time, Earth rotation and
+/// satellite clock.
+fn computed_m(ephemeris: &Ephemeris, row: &Observation, place: &TrajectoryRow) -> Option<f64> {
+    let sent = row.sent();
+    let rough = ephemeris.clock_of_signal(sent, row.signal).ok()?;
+    let clock = ephemeris.clock_of_signal(sent.plus_s(-rough.offset_s), row.signal).ok()?;
+    let satellite_m = ephemeris.state(sent.plus_s(-clock.offset_s)).ok()?.position_m;
+    let mut seen_m = satellite_m;
+    for _ in 0..3 {
+        seen_m = rotate_earth(&satellite_m, (seen_m - place.position_m()).norm() / SPEED_OF_LIGHT_MPS);
+    }
+    Some((seen_m - place.position_m()).norm() - SPEED_OF_LIGHT_MPS * clock.offset_s)
+}
+
+/// Rate of a quantity between successive rows.
+#[derive(Default)]
+struct Rate {
+    last: Option<(f64, f64)>,
+}
+
+impl Rate {
+    fn of(&mut self, time_s: f64, value: f64) -> f64 {
+        let before = self.last.replace((time_s, value));
+        before.filter(|(t_s, _)| time_s - t_s > 1e-3).map_or(0.0, |(t_s, old)| (value - old) / (time_s - t_s))
+    }
+}

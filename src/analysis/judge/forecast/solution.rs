@@ -1,0 +1,218 @@
+//! What weighted least squares makes of the expected ranges at each fix: bias, noise, and the covariance that
+//! should be stated.
+//!
+//! With rows h = (−sight, 1 at the place of the range's clock), weights W of the receiver's choices at the
+//! true C/N0 and N = Σ h W hᵀ: biases b become N⁻¹ Σ h W b, noise of covariance R becomes N⁻¹ (Σ h W R W hᵀ)
+//! N⁻¹, and N⁻¹ is what the receiver ought to state. One set of sums a fix is kept, whatever the number of
+//! satellites; of several clocks the first with ranges is the fix's. Limits: weights by the measured C/N0
+//! differ from these by its noise.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix4, Vector4};
+
+use super::ranges::{Forecast, Scene};
+use crate::analysis::error::JudgeError;
+use crate::analysis::measure::errors::Errors;
+use crate::gnss::record::IonosphereModel;
+
+/// Sums over the satellites of a fix. Vectors are east, north, up and the clocks of all time scales.
+#[derive(Clone, Debug)]
+struct Sums {
+    least: u32,
+    most: u32,
+    /// Left out, and whether any range is so wrong that residuals may show it, in whichever satellite.
+    blameless: u32,
+    faulty: bool,
+    unsteady: bool,
+    normal: DMatrix<f64>,
+    /// The same where the ionosphere is not known yet.
+    loose: DMatrix<f64>,
+    plain: DMatrix<f64>,
+    noise: DMatrix<f64>,
+    bias: DVector<f64>,
+    ionosphere: DVector<f64>,
+    troposphere: DVector<f64>,
+    rate_normal: Matrix4<f64>,
+    rate_noise: Matrix4<f64>,
+    rate_bias: Vector4<f64>,
+    memory_s: f64,
+}
+
+/// A zenith's ionosphere before its parameters are known, one sigma: the order of a day's mean at solar maximum.
+const IONOSPHERE_SIGMA_M: f64 = 5.0;
+/// Standard deviations from which on a bias is a fault that the residuals may show.
+const FAULT: f64 = 3.0;
+/// A thin shell's slant is at most 3.2.
+const SHELL: f64 = 0.948;
+
+impl Sums {
+    /// No ranges yet, of as many time scales.
+    fn new(scales: usize) -> Self {
+        let (matrix, vector) = (DMatrix::zeros(3 + scales, 3 + scales), DVector::zeros(3 + scales));
+        Self {
+            least: 0,
+            most: 0,
+            blameless: 0,
+            faulty: false,
+            unsteady: false,
+            normal: matrix.clone(),
+            loose: matrix.clone(),
+            plain: matrix.clone(),
+            noise: matrix,
+            bias: vector.clone(),
+            ionosphere: vector.clone(),
+            troposphere: vector,
+            rate_normal: Matrix4::zeros(),
+            rate_noise: Matrix4::zeros(),
+            rate_bias: Vector4::zeros(),
+            memory_s: 0.0,
+        }
+    }
+
+    fn add(&mut self, range: &Forecast, model_sigma_m: f64) {
+        let mut row = DVector::zeros(self.bias.len());
+        row.fixed_rows_mut::<3>(0).copy_from(&-range.sight);
+        if let Some(slot) = row.get_mut(3 + range.clock) {
+            *slot = 1.0;
+        }
+        let model_m = model_sigma_m * range.slant;
+        let variance = range.noise_m2 + model_m * model_m;
+        self.faulty |= range.other_m2 >= variance || range.bias_m.abs() >= FAULT * variance.sqrt();
+        if range.excluded {
+            self.blameless += 1;
+            return;
+        }
+        self.unsteady |= !range.steady;
+        let weight = 1.0 / variance;
+        let cosine2 = SHELL * SHELL * (1.0 - range.sight.z * range.sight.z);
+        let shell_m2 = IONOSPHERE_SIGMA_M * IONOSPHERE_SIGMA_M / (1.0 - cosine2);
+        self.least += u32::from(!range.near_mask);
+        self.most += 1;
+        self.normal.ger(weight, &row, &row, 1.0);
+        self.loose.ger(1.0 / (variance + shell_m2), &row, &row, 1.0);
+        self.plain.ger(1.0, &row, &row, 1.0);
+        self.noise.ger(weight * weight * (range.noise_m2 + range.other_m2), &row, &row, 1.0);
+        self.bias.axpy(weight * range.bias_m, &row, 1.0);
+        self.ionosphere.axpy(weight * range.ionosphere_m, &row, 1.0);
+        self.troposphere.axpy(weight * range.troposphere_m, &row, 1.0);
+        // All systems' times run alike: one drift.
+        let row = Vector4::new(-range.sight.x, -range.sight.y, -range.sight.z, 1.0);
+        let outer = row * row.transpose();
+        self.rate_normal += range.cn0_hz * outer;
+        let spread = range.cn0_hz * range.rate_sigma_mps;
+        self.rate_noise += spread * spread * outer;
+        self.rate_bias += range.cn0_hz * range.rate_bias_mps * row;
+        self.memory_s = self.memory_s.max(range.memory_s);
+    }
+}
+
+/// What is expected of one fix: east, north, up and clock, the clock's sign as the receiver's bias has it.
+#[derive(Clone, Debug)]
+pub struct Expected {
+    pub sample: u64,
+    /// Least and most satellites that it should use.
+    pub satellites: (u32, u32),
+    /// Satellites that the fix leaves out though nothing is wrong with them.
+    pub blameless: u32,
+    /// Known bias, and what may come on top of it in either direction.
+    pub bias: Vector4<f64>,
+    pub allowed: Vector4<f64>,
+    /// Covariance of the errors: of all that may vary, and of what varies within a run; of what should be
+    /// stated, and squares of the dilutions.
+    pub noise: Matrix4<f64>,
+    pub thermal: Matrix4<f64>,
+    pub stated: Matrix4<f64>,
+    pub dilution: Matrix4<f64>,
+    /// Ratio of the extreme singular values of the geometry, all clocks counted.
+    pub condition: f64,
+    /// Whether the fix says that the message's ionosphere corrects it without an error of its own, or needs none.
+    pub corrected: bool,
+    /// Whether every satellite's C/N0 was measured as it is: what is stated follows from it.
+    pub steady: bool,
+    pub memory_s: f64,
+    /// Covariance of velocity and of c times the drift, and what may come on top by the atmosphere.
+    pub rate_noise: Matrix4<f64>,
+    pub rate_allowed: Vector4<f64>,
+}
+
+/// Share by which computed biases may be wrong: weights differ with the measured C/N0.
+const BIAS_SHARE: f64 = 0.1;
+/// Share of the true troposphere by which a standard atmosphere errs: 5 % or 12 cm at the zenith, the spread
+/// of the wet delay (Saastamoinen 1972 against weather).
+const TROPOSPHERE_SHARE: f64 = 0.05;
+
+/// Expectations of all fixes that have a truth and enough satellites.
+///
+/// # Errors
+/// [`JudgeError::Read`] where rows that were put by cannot be read.
+pub fn expected(scene: &Scene<'_>, errors: &Errors) -> Result<Vec<Expected>, JudgeError> {
+    let mut sums = vec![Sums::new(scene.scales.len().max(1)); scene.run.fixes.len()];
+    for link in errors.signals.keys() {
+        scene.ranges(errors, link, |fix, range| {
+            if let Some(sums) = sums.get_mut(fix) {
+                sums.add(&range, scene.choices.model_sigma_m);
+            }
+        })?;
+    }
+    let of = |(fix, sums): (&crate::gnss::record::Fix, &Sums)| {
+        let exact = scene.choices.ionosphere_error_share == 0.0 && fix.ionosphere == IonosphereModel::Broadcast;
+        let corrected = exact || !scene.choices.ionosphere;
+        one(fix.sample, sums, corrected)
+    };
+    Ok(scene.run.fixes.iter().zip(&sums).filter_map(of).collect())
+}
+
+fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
+    if sums.most < 4 {
+        return None;
+    }
+    // Clocks without ranges are not estimated.
+    let places: Vec<usize> = (0..sums.bias.len()).filter(|place| sums.plain[(*place, *place)] > 0.0).collect();
+    let inverse =
+        |matrix: &DMatrix<f64>| Some(Cholesky::new(matrix.select_rows(&places).select_columns(&places))?.inverse());
+    // Of all clocks the first is the fix's.
+    let of = |matrix: &DMatrix<f64>| matrix.fixed_view::<4, 4>(0, 0).into_owned();
+    let geometry = sums.plain.select_rows(&places).select_columns(&places).symmetric_eigenvalues();
+    let whole = inverse(&sums.normal)?;
+    let solved = |right: &DVector<f64>| (&whole * right.select_rows(&places)).fixed_rows::<4>(0).into_owned();
+    let stated = if corrected { of(&whole) } else { of(&inverse(&sums.loose)?) };
+    let thermal = of(&(&whole * sums.noise.select_rows(&places).select_columns(&places) * &whole));
+    let bias = solved(&sums.bias);
+    let weather = TROPOSPHERE_SHARE * solved(&sums.troposphere).abs();
+    // Where the ionosphere is missing its whole effect may be there, or parts of it if it is estimated.
+    let (centre, missing, noise) = if corrected {
+        (bias, Vector4::zeros(), thermal)
+    } else {
+        (Vector4::zeros(), bias.abs() + solved(&sums.ionosphere).abs(), stated)
+    };
+    let rates = Cholesky::new(sums.rate_normal)?.inverse();
+    Some(Expected {
+        sample,
+        satellites: (sums.least, sums.most),
+        blameless: if sums.faulty || !corrected { 0 } else { sums.blameless },
+        bias: centre,
+        allowed: weather + missing + BIAS_SHARE * centre.abs(),
+        noise,
+        thermal,
+        stated,
+        dilution: of(&inverse(&sums.plain)?),
+        condition: (geometry.max() / geometry.min()).sqrt(),
+        corrected,
+        steady: !sums.unsteady,
+        memory_s: sums.memory_s,
+        rate_noise: rates * sums.rate_noise * rates,
+        rate_allowed: 2.0 * (rates * sums.rate_bias).abs(),
+    })
+}
+
+impl Expected {
+    /// Longest axis of the horizontal noise.
+    pub fn flat_sigma_m(&self) -> f64 {
+        largest_axis(&self.noise)
+    }
+}
+
+/// Standard deviation along the longest axis of the first two coordinates.
+pub fn largest_axis(covariance: &Matrix4<f64>) -> f64 {
+    let flat = Matrix2::new(covariance.m11, covariance.m12, covariance.m21, covariance.m22);
+    flat.symmetric_eigenvalues().max().max(0.0).sqrt()
+}

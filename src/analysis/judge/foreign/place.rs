@@ -1,0 +1,116 @@
+//! Errors of a foreign receiver's positions.
+//!
+//! Positions are compared with the antenna's at the time on their label. A late label shows as an error along
+//! the motion, −δ·v, so that only a moving scene tells. The sigma of a bias counts errors that remember each
+//! other once ([`crate::analysis::measure::independent`]).
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::fit::Estimate;
+use crate::analysis::expect::timeline::Timeline;
+use crate::analysis::measure::independent::Correlated;
+use crate::analysis::read::nmea::PlaceFix;
+use crate::analysis::statistics::{mean, percentile, rms};
+use crate::gnss::earth::Geodetic;
+
+/// One fix against the truth: a row of `foreign_fixes.csv`.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Row {
+    pub label_s: f64,
+    pub satellites: u32,
+    pub east_m: f64,
+    pub north_m: f64,
+    pub up_m: f64,
+    /// Of the velocity over ground.
+    pub velocity_east_mps: Option<f64>,
+    pub velocity_north_mps: Option<f64>,
+    #[serde(skip)]
+    pub true_velocity_enu_mps: Vector3<f64>,
+}
+
+/// What the positions come to.
+#[derive(Clone, Debug, Default)]
+pub struct Places {
+    pub fixes: usize,
+    pub rows: Vec<Row>,
+    /// Mean error east, north, up.
+    pub bias_enu_m: Option<[Estimate; 3]>,
+    pub horizontal_rms_m: Option<f64>,
+    pub horizontal_p95_m: Option<f64>,
+    pub up_rms_m: Option<f64>,
+    pub error_3d_p95_m: Option<f64>,
+    pub ground_speed_rms_mps: Option<f64>,
+    pub time_tag_s: Option<Estimate>,
+}
+
+/// Truth slower than this cannot tell a late label.
+const SLOWEST_MPS: f64 = 1.0;
+
+/// Joins and measures; `shift_s` is taken from every label first.
+pub fn measure(fixes: &[PlaceFix], timeline: &Timeline, shift_s: i64) -> Places {
+    let mut rows = Vec::new();
+    for fix in fixes {
+        let label_s = fix.label.since(timeline.origin) - shift_s as f64;
+        let Some(place) = timeline.place(label_s) else { continue };
+        let to_enu = Geodetic::from_ecef(&place.position_m).ecef_to_enu();
+        let error_m = to_enu * (fix.position_m - place.position_m);
+        let true_enu_mps = to_enu * place.velocity_mps;
+        let ground = fix.ground_mps_rad.map(|(speed_mps, course_rad)| {
+            let (sin, cos) = libm::sincos(course_rad);
+            (speed_mps * sin - true_enu_mps.x, speed_mps * cos - true_enu_mps.y)
+        });
+        rows.push(Row {
+            label_s,
+            satellites: fix.satellites,
+            east_m: error_m.x,
+            north_m: error_m.y,
+            up_m: error_m.z,
+            velocity_east_mps: ground.map(|v| v.0),
+            velocity_north_mps: ground.map(|v| v.1),
+            true_velocity_enu_mps: true_enu_mps,
+        });
+    }
+    let of = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
+    let horizontal = of(&|row| libm::hypot(row.east_m, row.north_m));
+    let axes = [of(&|row| row.east_m), of(&|row| row.north_m), of(&|row| row.up_m)];
+    let ground: Vec<f64> =
+        rows.iter().filter_map(|row| Some(libm::hypot(row.velocity_east_mps?, row.velocity_north_mps?))).collect();
+    let [east, north, up] = axes.each_ref().map(|axis| bias(axis));
+    Places {
+        fixes: fixes.len(),
+        bias_enu_m: east.zip(north).zip(up).map(|((east, north), up)| [east, north, up]),
+        horizontal_rms_m: rms(&horizontal),
+        horizontal_p95_m: percentile(&horizontal, 0.95),
+        up_rms_m: rms(&axes[2]),
+        error_3d_p95_m: percentile(&of(&|row| Vector3::new(row.east_m, row.north_m, row.up_m).norm()), 0.95),
+        ground_speed_rms_mps: rms(&ground),
+        time_tag_s: time_tag(&rows),
+        rows,
+    }
+}
+
+/// Mean of one axis and its sigma.
+fn bias(errors: &[f64]) -> Option<Estimate> {
+    let value = mean(errors)?;
+    let found = Correlated::about_means(&[errors.to_vec()])?;
+    Some(Estimate { value, sigma: (found.variance() / found.independent_of_mean()).sqrt() })
+}
+
+/// Delay of the labels: minus the slope of the error over the velocity, axis by axis in one fit.
+fn time_tag(rows: &[Row]) -> Option<Estimate> {
+    let squares: f64 = rows.iter().map(|row| row.true_velocity_enu_mps.norm_squared()).sum();
+    if squares <= SLOWEST_MPS * SLOWEST_MPS * rows.len() as f64 {
+        return None;
+    }
+    let error = |row: &Row| Vector3::new(row.east_m, row.north_m, row.up_m);
+    let products: f64 = rows.iter().map(|row| error(row).dot(&row.true_velocity_enu_mps)).sum();
+    let value = -products / squares;
+    let rest: Vec<f64> = rows
+        .iter()
+        .map(|row| (error(row) + value * row.true_velocity_enu_mps).dot(&row.true_velocity_enu_mps))
+        .collect();
+    let found = Correlated::about_zero(&[rest])?;
+    let sigma = found.variance().sqrt() * rows.len() as f64 / found.independent_of_mean().sqrt() / squares;
+    Some(Estimate { value, sigma })
+}

@@ -1,0 +1,144 @@
+//! Messages, events and `receiver.json` against the tables that they sum up.
+//!
+//! Limits: keys that `receiver.json` lacks are not compared; an incomplete set of a message's parameters
+//! counts only where the receiver says that it is complete.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use super::{Finding, Found};
+use crate::analysis::error::JudgeError;
+use crate::analysis::expect::message::orbit_parameters;
+use crate::analysis::measure::errors::Link;
+use crate::analysis::read::Run;
+use crate::gnss::record::{Event, IonosphereModel};
+use crate::gnss::satellite::Sv;
+
+pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
+    let mut all = vec![
+        Finding::none(
+            "parameters missing of complete messages",
+            missing(run),
+            "a set of elements is whole or not there",
+        ),
+        Finding::none("messages of unknown satellites", strangers(run), "no such satellite in the scene"),
+        Finding::none("events out of their natural order", order(run)?, "found, locked, bits, frame, then observed"),
+    ];
+    let counts = counts(run)?;
+    if let Some(counts) = counts {
+        all.push(Finding::none("counts of receiver.json that the tables contradict", counts, "one run made both"));
+    }
+    Ok(all)
+}
+
+/// Parameters that a satellite with a complete message lacks.
+fn missing(run: &Run) -> Found {
+    let mut decoded: BTreeMap<Sv, BTreeMap<u32, BTreeSet<&str>>> = BTreeMap::new();
+    for row in &run.navigation {
+        decoded.entry(row.sv).or_default().entry(row.issue).or_default().insert(&row.parameter);
+    }
+    let complete: BTreeSet<Sv> =
+        run.events.iter().filter(|row| row.event == Event::EphemerisComplete).map(|row| row.sv).collect();
+    let mut found = Found::default();
+    for sv in complete {
+        let expected = orbit_parameters(run, sv);
+        let lacks = |names: &BTreeSet<&str>| expected.iter().filter(|name| !names.contains(*name)).count();
+        let least = decoded.get(&sv).and_then(|sets| sets.values().map(lacks).min()).unwrap_or(expected.len());
+        (0..least).for_each(|_| found.add(|| sv.to_string()));
+    }
+    // Whoever says that the ionosphere is known has all of its parameters from one satellite.
+    if run.fixes.iter().any(|fix| fix.ionosphere == IonosphereModel::Broadcast) {
+        let of = |name: &str| run.navigation.iter().any(|row| row.parameter == name);
+        for name in ["alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0", "beta_1", "beta_2", "beta_3"] {
+            if !of(name) {
+                found.add(|| name.to_owned());
+            }
+        }
+    }
+    found
+}
+
+fn strangers(run: &Run) -> Found {
+    let there: BTreeSet<Sv> = run.truth.keys().map(|Link { sv, .. }| sv).chain(run.sky.keys()).collect();
+    let senders: BTreeSet<Sv> = run.navigation.iter().map(|row| row.sv).collect();
+    let mut found = Found::default();
+    for sv in senders.difference(&there) {
+        found.add(|| sv.to_string());
+    }
+    found
+}
+
+/// What a channel has reached at each of its events, and before its first observation.
+fn order(run: &Run) -> Result<Found, JudgeError> {
+    let mut reached: BTreeMap<Link, BTreeMap<u8, u64>> = BTreeMap::new();
+    let mut found = Found::default();
+    for row in &run.events {
+        let steps = reached.entry(row.link()).or_default();
+        let stage = match row.event {
+            Event::Acquired => Some((1, 0)),
+            Event::PhaseLocked => Some((2, 1)),
+            Event::BitSynchronised => Some((3, 2)),
+            Event::FrameSynchronised => Some((4, 3)),
+            Event::EphemerisComplete => Some((5, 4)),
+            _ => None,
+        };
+        let needs = stage.map_or(1, |(_, before)| before);
+        if needs > 0 && !steps.contains_key(&needs) {
+            found.add(|| format!("{} at sample {}", row.sv, row.sample));
+        }
+        if let Some((stage, _)) = stage {
+            steps.entry(stage).or_insert(row.sample);
+        }
+    }
+    for link in run.observations.keys() {
+        let framed = reached.get(&link).and_then(|steps| steps.get(&4).copied()).unwrap_or(u64::MAX);
+        let early = run.observations.map(link, |row| row.sample)?.into_iter().filter(|sample| *sample < framed);
+        early.for_each(|sample| found.add(|| format!("observation of {} at sample {sample}", link.sv)));
+    }
+    Ok(found)
+}
+
+/// What `receiver.json` counts; `None` without it.
+fn counts(run: &Run) -> Result<Option<Found>, JudgeError> {
+    if run.receiver.is_null() {
+        return Ok(None);
+    }
+    let mut found = Found::default();
+    let mut whole = |key: &str, counted: usize| {
+        let stated = run.receiver.get(key).and_then(serde_json::Value::as_u64);
+        if stated.is_some_and(|stated| stated != counted as u64) {
+            found.add(|| format!("{key}: {counted} in the tables"));
+        }
+    };
+    whole("fixes", run.fixes.len());
+    whole("losses", run.events.iter().filter(|row| row.event == Event::LossOfLock).count());
+    let first = run.fixes.first().map(|fix| run.time_s(fix.sample));
+    let stated = run.receiver.get("first_fix_s").and_then(serde_json::Value::as_f64);
+    // Half a sample.
+    if run.receiver.get("first_fix_s").is_some()
+        && first
+            .zip(stated)
+            .map_or(first.is_some() != stated.is_some(), |(a, b)| (a - b).abs() > 0.5 / run.scene.sample_rate_hz)
+    {
+        found.add(|| "first_fix_s".to_owned());
+    }
+    let names = |key: &str| -> Option<BTreeSet<String>> {
+        let list = run.receiver.get(key)?.as_array()?;
+        Some(list.iter().filter_map(|name| Some(name.as_str()?.to_owned())).collect())
+    };
+    let acquired: BTreeSet<String> =
+        run.acquisition.iter().filter(|row| row.acquired).map(|row| row.sv.to_string()).collect();
+    if names("acquired").is_some_and(|stated| stated != acquired) {
+        found.add(|| "acquired".to_owned());
+    }
+    let known: HashMap<String, ()> = (run.events.iter())
+        .filter(|row| row.event == Event::EphemerisComplete)
+        .map(|row| (row.sv.to_string(), ()))
+        .collect();
+    if let Some(used) = names("used") {
+        let most = run.fixes.iter().map(|fix| fix.satellites as usize).max().unwrap_or(0);
+        if used.len() < most || used.iter().any(|sv| !known.contains_key(sv)) {
+            found.add(|| "used".to_owned());
+        }
+    }
+    Ok(Some(found))
+}

@@ -1,0 +1,115 @@
+//! What several columns say of the same time: lock times, pseudoranges against times sent, a fix's bias
+//! against its time.
+//!
+//! A receiver's clock reads what it reads: its readings may differ from the nominal ones of the truth by any
+//! constant. That constant is the same for every row of every table. Limits: a receiver that sets its clock
+//! anew within a run has several.
+
+use std::collections::HashMap;
+
+use super::{Finding, Found};
+use crate::analysis::error::JudgeError;
+use crate::analysis::measure::errors::Link;
+use crate::analysis::read::Run;
+use crate::analysis::statistics::median;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::record::{Event, Observation};
+
+/// What a lock time may err by: it counts whole updates, of which none is longer than a bit.
+const LOCK_S: f64 = 0.02;
+/// Rounding of readings: pseudoranges of 1e8 m in a double are known to 2e-8 m, and GPS time's fraction to 1e-16 s.
+const READING_M: f64 = 1e-4;
+const IDENTITY: f64 = 1e-9;
+
+pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
+    let (mut lock_s, mut breaks, mut impossible) = (0.0_f64, Found::default(), Found::default());
+    let mut readings = Vec::new();
+    for link in run.observations.keys() {
+        let all = run.observations.rows(link)?;
+        lock_s = lock_s.max(locks(run, link, &all, &mut breaks, &mut impossible));
+        let truth: HashMap<u64, Observation> = run.truth.map(link, |row| (row.sample, row))?.into_iter().collect();
+        readings.extend(all.iter().filter_map(|row| {
+            let true_row = truth.get(&row.sample)?;
+            let ahead_s = row.sent().since(true_row.sent());
+            Some(row.pseudorange_m - true_row.pseudorange_m + SPEED_OF_LIGHT_MPS * ahead_s)
+        }));
+    }
+    let reading_m = median(&readings);
+    let mut all = vec![
+        Finding::most("lock time against the samples", lock_s, "s", LOCK_S, "an update's length"),
+        Finding::none("breaks of lock without an event", breaks, "a lock begins anew with an event"),
+        Finding::none("lock times longer than the run", impossible, "no lock is older than its acquisition"),
+    ];
+    if let Some(reading_m) = reading_m {
+        let most = readings.iter().map(|one| (one - reading_m).abs()).fold(0.0, f64::max);
+        let source = "one clock reads both";
+        all.push(Finding::most("pseudorange against time sent, largest", most, "m", READING_M, source));
+    }
+    all.extend(fixes(run, reading_m));
+    Ok(all)
+}
+
+/// Largest difference of lock time and samples passed; a lock that begins anew needs an event.
+fn locks(run: &Run, link: Link, all: &[Observation], breaks: &mut Found, impossible: &mut Found) -> f64 {
+    let events: Vec<u64> = run
+        .events
+        .iter()
+        .filter(|row| row.link() == link)
+        .filter(|row| matches!(row.event, Event::LossOfLock | Event::CycleSlip | Event::PhaseLocked | Event::Acquired))
+        .map(|row| row.sample)
+        .collect();
+    let acquired = run.events.iter().find(|row| row.link() == link).map_or(0, |row| row.sample);
+    let mut most_s = 0.0_f64;
+    for row in all {
+        let since_s = row.sample.saturating_sub(acquired) as f64 / run.scene.sample_rate_hz;
+        if row.locked_s > since_s + LOCK_S || row.locked_s < 0.0 {
+            impossible.add(|| format!("{} at sample {}", link.sv, row.sample));
+        }
+    }
+    for two in all.windows(2) {
+        let passed_s = two[1].sample.saturating_sub(two[0].sample) as f64 / run.scene.sample_rate_hz;
+        let grown_s = two[1].locked_s - two[0].locked_s;
+        if grown_s > -LOCK_S && (grown_s - passed_s).abs() <= LOCK_S {
+            most_s = most_s.max((grown_s - passed_s).abs());
+            continue;
+        }
+        // The event may come an update after the row that shows it.
+        let slack = (LOCK_S * run.scene.sample_rate_hz) as u64;
+        let declared =
+            events.iter().any(|at| (two[0].sample.saturating_sub(slack)..=two[1].sample + slack).contains(at));
+        if !declared {
+            breaks.add(|| format!("{} at sample {}", link.sv, two[1].sample));
+        }
+    }
+    most_s
+}
+
+/// A fix's bias and time make the reading of the clock that pseudoranges have; its dilutions add up.
+fn fixes(run: &Run, reading_m: Option<f64>) -> Vec<Finding> {
+    let truth: HashMap<u64, _> = run.trajectory.iter().map(|row| (row.sample, row)).collect();
+    let readings: Vec<f64> = run
+        .fixes
+        .iter()
+        .filter_map(|fix| {
+            let true_row = truth.get(&fix.sample)?;
+            let bias_m =
+                SPEED_OF_LIGHT_MPS * (fix.clock_bias_s - true_row.clock_bias_s + run.scene.ahead_s(&fix.time_scale));
+            Some(SPEED_OF_LIGHT_MPS * fix.time().since(true_row.time()) + bias_m)
+        })
+        .collect();
+    let mut found = Vec::new();
+    if let (Some(reading_m), false) = (reading_m, readings.is_empty()) {
+        let most = readings.iter().map(|one| (one - reading_m).abs()).fold(0.0, f64::max);
+        let source = "time found and bias make the reading that pseudoranges have";
+        found.push(Finding::most("clock bias of fixes against their time, largest", most, "m", READING_M, source));
+    }
+    let sums = run.fixes.iter().map(|fix| {
+        let off = |whole: f64, a: f64, b: f64| ((a * a + b * b) / (whole * whole) - 1.0).abs();
+        off(fix.gdop, fix.pdop, fix.tdop).max(off(fix.pdop, fix.hdop, fix.vdop))
+    });
+    if let Some(most) = sums.max_by(f64::total_cmp) {
+        let source = "squares of dilutions add up";
+        found.push(Finding::most("dilutions against one another, largest departure", most, "of 1", IDENTITY, source));
+    }
+    found
+}

@@ -1,0 +1,68 @@
+//! Whether a receiver's tables are whole and agree with one another.
+//!
+//! A value may be right and its row still not be what a receiver wrote: doubled, out of order, repeated,
+//! missing, of another time. `tables` looks at rows of one table, `clocks` at what several columns say of
+//! time, `acquisition` at searches against truth and events, `claims` at messages, events and `receiver.json`
+//! against the tables. Each finding is a count or a measure with its limit and where it was first found.
+
+mod acquisition;
+mod claims;
+mod clocks;
+mod tables;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::measure::errors::Errors;
+use crate::analysis::read::Run;
+
+/// One law of the tables and how far it is broken.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    pub figure: &'static str,
+    pub value: f64,
+    pub unit: &'static str,
+    /// Most that a sound receiver has.
+    pub limit: f64,
+    /// Why, and where the first or worst was found.
+    pub source: String,
+}
+
+impl Finding {
+    /// A count that ought to be nothing.
+    fn none(figure: &'static str, found: Found, source: &str) -> Self {
+        let source = found.first.map_or_else(|| source.to_owned(), |first| format!("{source}; first: {first}"));
+        Self { figure, value: found.count as f64, unit: "", limit: 0.0, source }
+    }
+
+    /// A measure.
+    fn most(figure: &'static str, value: f64, unit: &'static str, limit: f64, source: &str) -> Self {
+        Self { figure, value, unit, limit, source: source.to_owned() }
+    }
+}
+
+/// How many there are, and where the first is.
+#[derive(Clone, Debug, Default)]
+struct Found {
+    count: usize,
+    first: Option<String>,
+}
+
+impl Found {
+    fn add(&mut self, at: impl FnOnce() -> String) {
+        self.count += 1;
+        if self.first.is_none() {
+            self.first = Some(at());
+        }
+    }
+}
+
+/// Every law.
+///
+/// # Errors
+/// [`JudgeError::Read`] where rows that were put by cannot be read.
+pub fn findings(run: &Run, errors: &Errors) -> Result<Vec<Finding>, JudgeError> {
+    let mut all = tables::findings(run, errors)?;
+    all.extend(clocks::findings(run)?);
+    all.extend(acquisition::findings(run)?);
+    all.extend(claims::findings(run)?);
+    Ok(all)
+}

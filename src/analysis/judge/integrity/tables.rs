@@ -1,0 +1,160 @@
+//! Rows of one table: doubled, out of order, repeated, missing within a lock, without a truth.
+//!
+//! Limits: two rows of a satellite count as doubled at the same sample, whatever else they say; a row repeats
+//! the one before where every measured value is the same to the last bit.
+
+use std::collections::HashSet;
+
+use super::{Finding, Found};
+use crate::analysis::error::JudgeError;
+use crate::analysis::measure::errors::{Errors, Link};
+use crate::analysis::read::Run;
+use crate::analysis::statistics::median;
+use crate::gnss::record::{Event, Fix, Observation, TrackingRow};
+
+/// Steps beyond this many usual ones are gaps.
+const GAP: f64 = 1.5;
+
+/// What is looked for in every table.
+#[derive(Default)]
+struct Rows {
+    doubled: Found,
+    disordered: Found,
+    repeated: Found,
+    missing: Found,
+}
+
+impl Rows {
+    /// Two successive samples of one key.
+    fn order(&mut self, table: &str, key: &str, before: u64, after: u64) {
+        let at = || format!("{table} {key} at sample {after}");
+        if after == before {
+            self.doubled.add(at);
+        } else if after < before {
+            self.disordered.add(at);
+        }
+    }
+}
+
+pub(super) fn findings(run: &Run, errors: &Errors) -> Result<Vec<Finding>, JudgeError> {
+    let mut rows = Rows::default();
+    for link in run.observations.keys() {
+        observations(run, link, &mut rows)?;
+    }
+    for link in run.tracking.keys() {
+        tracking(run, link, &mut rows)?;
+    }
+    fixes(&run.fixes, &mut rows);
+    short(run, &mut rows);
+    let orphans = Found { count: errors.unmatched, first: None };
+    let lost = run.fixes.len() - errors.positions.len().min(run.fixes.len());
+    Ok(vec![
+        Finding::none("rows doubled", rows.doubled, "one row a satellite and sample"),
+        Finding::none("rows out of time order", rows.disordered, "a receiver writes as time goes"),
+        Finding::none("rows that repeat the values before", rows.repeated, "noise never repeats to the last bit"),
+        Finding::none("rows missing within a lock", rows.missing, "a lock that goes on is measured at every interval"),
+        Finding::none("observations without a truth", orphans, "no such satellite or sample in the scene"),
+        Finding::none("fixes without a truth", Found { count: lost, first: None }, "no such sample in the scene"),
+    ])
+}
+
+fn observations(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
+    let all = run.observations.rows(link)?;
+    let values = |row: &Observation| {
+        [row.sent_fraction_s, row.pseudorange_m, row.carrier_cycles, row.doppler_hz, row.cn0_dbhz].map(f64::to_bits)
+    };
+    let key = run.name(link);
+    let steps: Vec<f64> = all.windows(2).map(|two| two[1].sample as f64 - two[0].sample as f64).collect();
+    let usual = median(&steps).unwrap_or(0.0);
+    for (two, step) in all.windows(2).zip(steps) {
+        rows.order("observation of", &key, two[0].sample, two[1].sample);
+        if values(&two[0]) == values(&two[1]) {
+            rows.repeated.add(|| format!("observation of {key} at sample {}", two[1].sample));
+        }
+        let locked = two[1].locked_s - two[0].locked_s;
+        // The lock is as old as before and the time that passed: it went on.
+        if step > GAP * usual
+            && (locked - step / run.scene.sample_rate_hz).abs() < 0.5 * usual / run.scene.sample_rate_hz
+        {
+            rows.missing.add(|| format!("observation of {key} before sample {}", two[1].sample));
+        }
+    }
+    Ok(())
+}
+
+fn tracking(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
+    let mut before: Option<TrackingRow> = None;
+    let mut steps = Vec::new();
+    let key = run.name(link);
+    let lost: Vec<u64> = run
+        .events
+        .iter()
+        .filter(|row| row.link() == link && matches!(row.event, Event::LossOfLock | Event::Acquired))
+        .map(|row| row.sample)
+        .collect();
+    run.tracking.each(link, |row| {
+        if let Some(old) = &before {
+            rows.order("loop update of", &key, old.sample, row.sample);
+            let values = |row: &TrackingRow| {
+                [row.prompt_i, row.prompt_q, row.dll_discriminator_chips, row.pll_discriminator_cycles]
+                    .map(f64::to_bits)
+            };
+            if row.prompt_i != 0.0 && values(old) == values(&row) {
+                rows.repeated.add(|| format!("loop update of {key} at sample {}", row.sample));
+            }
+            // A channel that ended and began anew has nothing between.
+            if !lost.iter().any(|at| (old.sample..=row.sample).contains(at)) {
+                steps.push((row.sample, row.sample as f64 - old.sample as f64));
+            }
+        }
+        before = Some(row);
+    })?;
+    let usual = median(&steps.iter().map(|step| step.1).collect::<Vec<_>>()).unwrap_or(0.0);
+    for (sample, step) in steps {
+        if step > GAP * usual {
+            rows.missing.add(|| format!("loop update of {key} before sample {sample}"));
+        }
+    }
+    Ok(())
+}
+
+fn fixes(all: &[Fix], rows: &mut Rows) {
+    let values = |fix: &Fix| {
+        [fix.x_m, fix.y_m, fix.z_m, fix.vx_mps, fix.vy_mps, fix.vz_mps, fix.clock_bias_s, fix.clock_drift]
+            .map(f64::to_bits)
+    };
+    for two in all.windows(2) {
+        rows.order("fix", "", two[0].sample, two[1].sample);
+        if values(&two[0]) == values(&two[1]) {
+            rows.repeated.add(|| format!("fix at sample {}", two[1].sample));
+        }
+    }
+}
+
+/// Tables of a few rows.
+fn short(run: &Run, rows: &mut Rows) {
+    let mut seen = HashSet::new();
+    for row in &run.navigation {
+        if !seen.insert((row.sv, row.issue, row.parameter.as_str(), row.raw)) {
+            rows.doubled.add(|| format!("{} of {} in navigation", row.parameter, row.sv));
+        }
+    }
+    let mut searched = HashSet::new();
+    for row in &run.acquisition {
+        if !searched.insert((row.sample, row.sv, row.signal.name)) {
+            rows.doubled.add(|| format!("acquisition of {} at sample {}", row.sv, row.sample));
+        }
+    }
+    for two in run.acquisition.windows(2) {
+        if two[1].sample < two[0].sample {
+            rows.disordered.add(|| format!("acquisition of {} at sample {}", two[1].sv, two[1].sample));
+        }
+    }
+    let mut events = HashSet::new();
+    for row in &run.events {
+        let link = row.link();
+        if !events.insert((row.sample, link, row.event as u8)) {
+            rows.doubled.add(|| format!("event of {} at sample {}", row.sv, row.sample));
+        }
+    }
+}

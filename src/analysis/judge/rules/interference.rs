@@ -1,0 +1,69 @@
+//! What the receiver reported of continuous waves, and whether it followed a spoofer.
+
+use crate::analysis::judge::judgement::Bound;
+use crate::analysis::judge::summary::Summary;
+use crate::analysis::judge::verdict::Verdict;
+use crate::analysis::read::Run;
+
+impl Verdict {
+    pub(super) fn interference(&mut self, summary: &Summary) {
+        let Some(lines) = summary.interference else { return };
+        self.judge(
+            "interference told while there was none",
+            "interference.false_told",
+            lines.false_told,
+            "",
+            Bound::Max(0.0),
+            "the detector's false alarms come once in a million seconds",
+        );
+        if lines.wave_seconds == 0 {
+            return;
+        }
+        self.judge(
+            "seconds of a continuous wave that were not told",
+            "",
+            lines.wave_seconds - lines.wave_seconds_told,
+            "",
+            Bound::Max(0.0),
+            "none of those with a wave of J/N0 ≥ 45 dB-Hz all through",
+        );
+        // Where a wave is never alone, what is told may be another source's line.
+        if let (Some(bin_hz), Some(error_hz)) = (lines.resolution_hz, lines.frequency_error_max_hz) {
+            let source = "half a bin of the receiver's spectrum";
+            self.judge(
+                "frequency of the continuous wave, largest error",
+                "interference.frequency_error_max_hz",
+                error_hz,
+                "Hz",
+                Bound::Max(0.5 * bin_hz),
+                source,
+            );
+        }
+    }
+
+    pub(super) fn spoofing(&mut self, run: &Run, summary: &Summary) {
+        let Some(spoofing) = &summary.spoofing else { return };
+        let claimed = run.claimed.iter().map(|row| run.time_s(row.sample));
+        let expected = run.scene.expect.whole.iter().chain(run.scene.expect.intervals.iter().map(|one| &one.terms));
+        let reasons: Vec<&str> = expected.map(|terms| terms.reason.as_str()).collect();
+        if let Some(share) = spoofing.captured_share {
+            if claimed.clone().count() > 0 && !claimed.clone().any(|time_s| run.scene.expect.bounded(time_s)) {
+                let percent = 100.0 * share;
+                self.not_judged.push(format!(
+                    "fixes captured by the spoofer ({percent:.0} %): the scene expects it: {}",
+                    reasons.join("; ")
+                ));
+                return;
+            }
+            let source = "no fix should follow a spoofer";
+            self.judge(
+                "fixes captured by the spoofer",
+                "spoofing.captured_share",
+                share,
+                "of 1",
+                Bound::Max(0.0),
+                source,
+            );
+        }
+    }
+}

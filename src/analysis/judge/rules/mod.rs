@@ -1,0 +1,54 @@
+//! The limits that need no user, one file a subject.
+//!
+//! Every figure is compared with one limit whose origin is stated: a threshold of theory, the receiver's own
+//! covariance, or a user's file ([`super::limits`]). A figure within a tenth of its limit is marginal. A
+//! figure that a scene cannot have is named with the reason why it is not judged. Limits: the thresholds are
+//! rules of thumb, not the points at which a receiver fails; several figures of one run share their causes.
+
+mod availability;
+mod hints;
+mod interference;
+mod links;
+mod losses;
+mod motion;
+mod position;
+mod reception;
+mod tables;
+#[cfg(test)]
+mod tests;
+mod tracking;
+mod values;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::expect::due::Expectations;
+use crate::analysis::expect::due::receiver::Receiver;
+use crate::analysis::judge::summary::Summary;
+use crate::analysis::judge::verdict::Verdict;
+use crate::analysis::measure::errors::Errors;
+use crate::analysis::measure::slips::Slips;
+use crate::analysis::read::Run;
+use availability::Came;
+
+impl Verdict {
+    /// A run against the limits that need no user: those of theory and of the receiver's own covariance.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn of(run: &Run, errors: &Errors, slips: &Slips, summary: &Summary) -> Result<Self, JudgeError> {
+        let mut verdict = Self::default();
+        let expected = Expectations::of(run, Receiver::of(run), run)?;
+        verdict.satellites(run, &expected);
+        verdict.availability(run.scene.duration_s, &run.scene.expect, &expected, &Came::of(run));
+        verdict.values(run, errors, summary)?;
+        verdict.tracking(run, summary);
+        verdict.links(run, errors)?;
+        verdict.losses(run, &expected.receiver, slips)?;
+        verdict.reception(summary);
+        verdict.cn0(run, summary);
+        verdict.interference(summary);
+        verdict.spoofing(run, summary);
+        verdict.tables(run, errors)?;
+        verdict.hint(run);
+        Ok(verdict)
+    }
+}

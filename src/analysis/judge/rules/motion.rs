@@ -1,0 +1,72 @@
+//! What the antenna's motion leaves in a velocity: a rate lags by a part of an update, and a change of
+//! acceleration leaves a transient.
+//!
+//! Limits: acceleration and jerk are differences of the truth's velocities, at least a truth's interval wide.
+
+use std::collections::HashMap;
+
+use crate::analysis::expect::loops::{exact_loop, natural_radps};
+use crate::analysis::judge::forecast::ranges::Choices;
+use crate::analysis::read::Run;
+
+/// The rate of a loop (s + ω)³ lags by 3J/ω² under jerk J, that of a loop (s + ω)² by 2a/ω under acceleration
+/// a; neither overshoots.
+const THIRD_ORDER: f64 = 3.0;
+const SECOND_ORDER: f64 = 2.0;
+/// Share of the rate at which a turning antenna winds up all carriers together by which satellites differ: a
+/// tilt of θ makes the rate of one satellite swing by tan θ times the tangent of its angle from the axis, and
+/// a fix averages satellites on all sides.
+const WIND_UP_SHARE: f64 = 0.1;
+/// Rows before an epoch whose motion is still in the loop: half a second at ten a second, several of a loop's
+/// time constants.
+const ROWS: usize = 5;
+/// What light time, orbit and rounding leave in a receiver at rest: orbits as sent err by 1 mm/s.
+const REST_MPS: f64 = 2e-3;
+
+/// Bounds of a run's epochs.
+pub(super) struct Motion {
+    at: HashMap<u64, f64>,
+}
+
+impl Motion {
+    pub fn new(run: &Run, choices: &Choices) -> Self {
+        let loops = &choices.loops;
+        let of = |update_s: &f64| {
+            let closed = exact_loop(loops.pll_order, loops.pll_bandwidth_hz * update_s)?;
+            Some(natural_radps(&closed, loops.pll_order, *update_s))
+        };
+        // Of several signals the slowest loop.
+        let natural_radps = choices.updates_s.values().filter_map(of).fold(f64::INFINITY, f64::min);
+        let update_s = choices.updates_s.values().copied().fold(0.0, f64::max);
+        let second = if loops.pll_order < 3 { SECOND_ORDER / natural_radps } else { 0.0 };
+        let wavelength_m = run.mean_wavelength_m().unwrap_or(0.0);
+        let rows = &run.trajectory;
+        let accelerations: Vec<_> = rows
+            .windows(2)
+            .map(|two| (two[1].velocity_mps() - two[0].velocity_mps()) / two[1].time().since(two[0].time()).max(1e-6))
+            .collect();
+        let single: Vec<f64> = (0..rows.len())
+            .map(|index| {
+                let around = accelerations.get(index.saturating_sub(2)..(index + 1).min(accelerations.len()));
+                let around = around.unwrap_or(&[]);
+                let most = around.iter().map(|a| a.norm()).fold(0.0, f64::max);
+                let step_s = rows.get(1).zip(rows.first()).map_or(0.1, |(b, a)| b.time().since(a.time()).max(1e-6));
+                let jerk = around.windows(2).map(|two| (two[1] - two[0]).norm() / step_s).fold(0.0, f64::max);
+                let wound_mps = rows.get(index).map_or(0.0, |row| run.common.wound_mps(row.sample, wavelength_m));
+                most * (update_s + second)
+                    + THIRD_ORDER * jerk / (natural_radps * natural_radps)
+                    + WIND_UP_SHARE * wound_mps.abs()
+            })
+            .collect();
+        let worst = |index: usize| {
+            let around = single.get(index.saturating_sub(ROWS)..(index + 2).min(single.len())).unwrap_or(&[]);
+            around.iter().copied().fold(0.0, f64::max)
+        };
+        Self { at: rows.iter().enumerate().map(|(index, row)| (row.sample, REST_MPS + worst(index))).collect() }
+    }
+
+    /// What may come on top of noise at a sample.
+    pub fn allowed_mps(&self, sample: u64) -> f64 {
+        self.at.get(&sample).copied().unwrap_or(REST_MPS)
+    }
+}

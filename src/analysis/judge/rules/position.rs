@@ -1,0 +1,37 @@
+//! Errors of the fixes, against the receiver's own covariance.
+
+use crate::analysis::judge::judgement::Bound;
+use crate::analysis::judge::summary::Summary;
+use crate::analysis::judge::verdict::Verdict;
+use crate::analysis::read::Run;
+use crate::gnss::record::Fix;
+
+impl Verdict {
+    pub(super) fn position(&mut self, run: &Run, summary: &Summary) {
+        let position = &summary.position;
+        if run.fixes.is_empty() || !run.scene.expect.bounded(0.0) {
+            return;
+        }
+        let expected = |factor: f64, of: fn(&Fix) -> f64| {
+            let variance = run.fixes.iter().map(of).sum::<f64>() / run.fixes.len().max(1) as f64;
+            (variance > 0.0).then(|| factor * variance.sqrt())
+        };
+        // A circle that holds 95 % of two equal normals has a radius of √(−2 ln 0.05) σ; an ellipse of the
+        // same mean variance needs less, so that the bound is not too tight.
+        let flat =
+            expected(2.4477, |fix| 0.5 * (fix.sigma_east_m * fix.sigma_east_m + fix.sigma_north_m * fix.sigma_north_m));
+        let up = expected(1.96, |fix| fix.sigma_up_m * fix.sigma_up_m);
+        let clock = expected(1.96, |fix| fix.sigma_clock_m * fix.sigma_clock_m);
+        let details = &summary.details;
+        let rows = [
+            ("horizontal error, 95 %", "position.horizontal_p95_m", position.horizontal_p95_m, flat, "2.45 σ"),
+            ("vertical error, 95 %", "position.vertical_p95_m", position.vertical_p95_m, up, "1.96 σ"),
+            ("clock error, 95 %", "", details.clock_m.map(|clock| clock.p95), clock, "1.96 σ"),
+        ];
+        for (figure, path, value, bound, factor) in rows {
+            let Some(bound) = bound else { continue };
+            let source = format!("{factor} of the receiver's own covariance");
+            self.judge(figure, path, value, "m", Bound::Max(bound), &source);
+        }
+    }
+}

@@ -1,0 +1,448 @@
+//! What a run comes to: the numbers that scripts gate on, and the finer ones that the report prints.
+//!
+//! The serialised keys and their order are a contract; a number that a scene cannot have is null.
+//! [`Details`] stays in memory.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::expect::spectrum::{self, Spectrum};
+use crate::analysis::expect::theory::clock::white_phase;
+use crate::analysis::judge::verdict::Verdict;
+use crate::analysis::measure::allan::{Deviation, Point};
+use crate::analysis::measure::clock;
+use crate::analysis::measure::clock::{Of, Series};
+use crate::analysis::measure::consistency::{Calibration, Consistency};
+use crate::analysis::measure::errors::{Errors, Link, SignalError};
+use crate::analysis::measure::jitter::{Jitter as LoopJitter, Loop, Pooled};
+use crate::analysis::measure::lines::Lines;
+use crate::analysis::measure::slips::{Cause, Slips};
+use crate::analysis::measure::spoofing::Spoofing;
+use crate::analysis::read::{Run, Speed};
+use crate::analysis::statistics::{Spread, mean, percentile, pooled_std, rms, spread, std};
+use crate::analysis::waveform::leading;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::record::{Event, NavigationRow};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Component, Signal};
+
+/// Rule-of-thumb bound of a Costas loop's 1σ error (theory: 3σ ≤ 45°).
+pub const PLL_THRESHOLD_DEG: f64 = 15.0;
+
+/// `summary.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    pub scene: String,
+    pub seed: u64,
+    pub duration_s: f64,
+    pub sample_rate_hz: f64,
+    pub fidelity: String,
+    pub satellites: Satellites,
+    pub position: Position,
+    pub clock: Clock,
+    pub observables: Observables,
+    pub tracking: Tracking,
+    /// Every signal that was observed by its name, also where it is the only one.
+    pub signals: BTreeMap<&'static str, BySignal>,
+    pub navigation: Navigation,
+    pub psd: Spectrum,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interference: Option<Lines>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spoofing: Option<Spoofing>,
+    pub speed: Speed,
+    /// Whether there was interference.
+    #[serde(skip)]
+    pub jammed: bool,
+    #[serde(skip)]
+    pub details: Details,
+}
+
+/// How many satellites there were and what became of them.
+#[derive(Clone, Debug, Serialize)]
+pub struct Satellites {
+    /// Above the scene's mask at its first sample.
+    pub in_view: usize,
+    pub acquired: usize,
+    /// Most satellites in one fix.
+    pub used: usize,
+    /// Signals of satellites acquired though the truth never has them.
+    pub false_acquired: usize,
+}
+
+/// Errors of the fixes.
+#[derive(Clone, Debug, Serialize)]
+pub struct Position {
+    pub fixes: usize,
+    pub first_fix_s: Option<f64>,
+    pub horizontal_mean_m: Option<f64>,
+    pub horizontal_p95_m: Option<f64>,
+    pub vertical_p95_m: Option<f64>,
+    pub error_3d_p95_m: Option<f64>,
+    /// Mean of the errors east, north, up.
+    pub bias_enu_m: Option<[f64; 3]>,
+    /// Of the three-dimensional velocity error.
+    pub velocity_p95_mps: Option<f64>,
+    /// Mean normalised error squared with the receiver's own covariance, 3 of an honest one; the 95 % band of
+    /// that mean for as many independent fixes as the errors' autocorrelation leaves.
+    pub nees_mean: Option<f64>,
+    pub nees_band: Option<[f64; 2]>,
+    pub nees_independent: Option<f64>,
+    pub nees_verdict: Option<Calibration>,
+}
+
+/// The receiver's clock, over the longest stretch of fixes without a gap. Deviations at an averaging time of
+/// 1 s are null where the record is too short for them, or the clock is steady to rounding.
+#[derive(Clone, Debug, Serialize)]
+pub struct Clock {
+    /// In that stretch.
+    pub fixes: usize,
+    /// Mean of estimated minus true bias.
+    pub bias_mean_s: Option<f64>,
+    /// Standard deviation of the same, its straight line removed.
+    pub bias_sigma_s: Option<f64>,
+    /// Slopes of the straight lines through the bias as estimated and as it was, in seconds a second.
+    pub drift: Option<f64>,
+    pub true_drift: Option<f64>,
+    /// Overlapping Allan, modified Allan, overlapping Hadamard and time deviation of the estimate.
+    pub oadev_1s: Option<f64>,
+    pub mdev_1s: Option<f64>,
+    pub ohdev_1s: Option<f64>,
+    pub tdev_1s_s: Option<f64>,
+    /// The true clock's, over the whole run.
+    pub true_oadev_1s: Option<f64>,
+    /// That of a clock solved from independent code measurements: √3 × TDOP × σ of the code/(speed of light × 1 s).
+    pub code_noise_oadev_1s: Option<f64>,
+    /// Strengths h₂, h₁, h₀, h₋₁, h₋₂ of power-law noises (S_y = Σ h f^α, in Hz^(−α − 1)) fitted to the Allan
+    /// deviations of the estimate and of the true clock.
+    pub h: Option<[f64; 5]>,
+    pub true_h: Option<[f64; 5]>,
+}
+
+/// Errors of the observations, over every satellite and epoch.
+#[derive(Clone, Debug, Serialize)]
+pub struct Observables {
+    /// After the mean over the satellites of each epoch is removed.
+    pub pseudorange_rms_m: Option<f64>,
+    /// Mean of the satellites' mean code errors, nothing removed.
+    pub pseudorange_bias_m: Option<f64>,
+    pub carrier_rms_cycles: Option<f64>,
+    pub doppler_rms_hz: Option<f64>,
+    /// Mean of measured minus expected: the scene's C/N0 with other satellites and interference counted as noise (see
+    /// [`crate::analysis::expect::multiple_access`]). The quantiser's loss is not counted.
+    pub cn0_bias_db: Option<f64>,
+}
+
+/// How well the loops held: the loop's oscillator minus truth, each satellite about its own mean, without the
+/// first [`PULL_IN_S`](crate::analysis::measure::errors::PULL_IN_S) of each lock.
+#[derive(Clone, Debug, Serialize)]
+pub struct Tracking {
+    pub losses_of_lock: usize,
+    /// Declared by the receiver, or found against the truth and not declared.
+    pub cycle_slips: usize,
+    pub dll_sigma_chips: Option<f64>,
+    pub pll_sigma_deg: Option<f64>,
+    pub fll_sigma_hz: Option<f64>,
+    /// Slips that the receiver did not declare, and how many slips and losses have which cause (`slips.csv`).
+    pub slips_undeclared: usize,
+    pub slip_causes: BTreeMap<Cause, usize>,
+    /// The loops of all satellites three ways (`jitter.csv`): chips, degrees, hertz. Null where the receiver
+    /// names no settings.
+    pub dll_chips: Option<Pooled>,
+    pub pll_deg: Option<Pooled>,
+    pub fll_hz: Option<Pooled>,
+}
+
+/// What [`Observables`] and [`Tracking`] say, of one signal.
+#[derive(Clone, Debug, Serialize)]
+pub struct BySignal {
+    /// That were observed.
+    pub satellites: usize,
+    pub observables: Observables,
+    pub tracking: SignalTracking,
+}
+
+/// Standard deviations of a signal's loops.
+#[derive(Clone, Debug, Serialize)]
+pub struct SignalTracking {
+    pub losses_of_lock: usize,
+    pub dll_sigma_chips: Option<f64>,
+    pub pll_sigma_deg: Option<f64>,
+    pub fll_sigma_hz: Option<f64>,
+}
+
+/// Decoded parameters against those sent.
+#[derive(Clone, Debug, Serialize)]
+pub struct Navigation {
+    pub parameters_checked: usize,
+    /// Different from what was sent, or never sent.
+    pub parameters_wrong: usize,
+}
+
+/// What the report adds to the summary.
+#[derive(Clone, Debug, Default)]
+pub struct Details {
+    /// Code error with the epoch's common part removed.
+    pub pseudorange_m: Option<Spread>,
+    pub carrier_cycles: Option<Spread>,
+    pub doppler_hz: Option<Spread>,
+    pub cn0_db: Option<Spread>,
+    pub cn0_true_dbhz: Option<f64>,
+    pub cn0_effective_dbhz: Option<f64>,
+    pub cn0_measured_dbhz: Option<f64>,
+    pub east_m: Option<Spread>,
+    pub north_m: Option<Spread>,
+    pub up_m: Option<Spread>,
+    pub clock_m: Option<Spread>,
+    pub velocity_mps: Option<Spread>,
+    /// Overlapping Allan deviation of the clock's estimate at 1 s.
+    pub clock_oadev_1s: Option<Point>,
+    pub thresholds: Thresholds,
+    /// Lowest point of the spectrum near each first null of the code, noise-free scenes only.
+    pub psd_nulls_hz: Vec<f64>,
+    /// Observations that the truth has no row for.
+    pub unmatched_observations: usize,
+    /// Wrong parameters, as decoded.
+    pub wrong_parameters: Vec<NavigationRow>,
+    pub false_satellites: Vec<String>,
+    pub verdict: Verdict,
+}
+
+/// Bounds for loop jitter.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Thresholds {
+    /// A sixth of the early-late spacing: 3σ stays inside the discriminator's linear zone.
+    pub dll_chips: f64,
+    pub pll_deg: f64,
+    /// A twelfth of the inverse integration time.
+    pub fll_hz: f64,
+}
+
+impl Thresholds {
+    fn new(spacing_chips: f64, integration_s: f64) -> Self {
+        Self { dll_chips: spacing_chips / 6.0, pll_deg: PLL_THRESHOLD_DEG, fll_hz: 1.0 / (12.0 * integration_s) }
+    }
+}
+
+impl Summary {
+    /// Condenses the errors of a run.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn new(run: &Run, errors: &Errors, clock: &clock::Clock) -> Result<Self, JudgeError> {
+        let mut details = Details::default();
+        let satellites = satellites(run, &mut details);
+        let position = position(run, errors, &mut details);
+        let clock = clock_section(clock, &mut details);
+        let observables = observables(errors, None, &mut details)?;
+        let tracking = tracking(run, errors, &mut details)?;
+        let navigation = navigation(run, &mut details);
+        let psd = spectrum::judge(run);
+        details.psd_nulls_hz = psd.null_low_hz.into_iter().chain(psd.null_high_hz).collect();
+        details.unmatched_observations = errors.unmatched;
+        Ok(Self {
+            scene: run.scene.name.clone(),
+            seed: run.scene.seed,
+            duration_s: run.scene.duration_s,
+            sample_rate_hz: run.scene.sample_rate_hz,
+            fidelity: run.scene.fidelity.clone(),
+            satellites,
+            position,
+            clock,
+            observables,
+            tracking,
+            signals: by_signal(run, errors)?,
+            navigation,
+            psd,
+            interference: Lines::of(run),
+            spoofing: Spoofing::of(run),
+            jammed: !run.scene.interference.is_empty(),
+            speed: run.speed,
+            details,
+        })
+    }
+
+    /// Adds what covariance, slips and loops come to.
+    pub fn add(&mut self, consistency: &Consistency, slips: &Slips, jitter: &LoopJitter) {
+        let position = &mut self.position;
+        position.nees_mean = consistency.nees_mean;
+        position.nees_band = consistency.band.map(|(low, high)| [low, high]);
+        position.nees_independent = consistency.independent;
+        position.nees_verdict = consistency.verdict;
+        let tracking = &mut self.tracking;
+        tracking.slips_undeclared = slips.rows.iter().filter(|row| !row.declared).count();
+        tracking.slip_causes = slips.causes();
+        tracking.dll_chips = jitter.pooled(Loop::Dll);
+        tracking.pll_deg = jitter.pooled(Loop::Pll);
+        tracking.fll_hz = jitter.pooled(Loop::Fll);
+    }
+}
+
+fn satellites(run: &Run, details: &mut Details) -> Satellites {
+    let mut ever: BTreeSet<Link> = run.truth.keys().collect();
+    let heard: BTreeSet<Sv> = ever.iter().map(|link| link.sv).collect();
+    // In the sky, and never in the truth's observations: with any of the scene's signals.
+    for sv in run.sky.keys().filter(|sv| !heard.contains(sv)) {
+        ever.extend(run.signals.iter().filter(|signal| signal.system == sv.system).map(|signal| signal.link(sv)));
+    }
+    let acquired: BTreeSet<Link> = run.acquisition.iter().filter(|row| row.acquired).map(|row| row.link()).collect();
+    let odd = planted!("analysis.summary.false_satellites", &acquired, &ever).difference(&ever);
+    details.false_satellites = odd.map(|link| run.name(*link)).collect();
+    Satellites {
+        // The truth's sky holds what is in view and nothing else; from space the mask does not bound it.
+        in_view: run.in_view_at_start.len(),
+        acquired: acquired.iter().map(|link| link.sv).collect::<BTreeSet<_>>().len(),
+        used: run.fixes.iter().map(|fix| fix.satellites as usize).max().unwrap_or(0),
+        false_acquired: details.false_satellites.len(),
+    }
+}
+
+fn position(run: &Run, errors: &Errors, details: &mut Details) -> Position {
+    let of = |f: &dyn Fn(&crate::analysis::measure::errors::PositionError) -> f64| {
+        errors.positions.iter().map(f).collect::<Vec<f64>>()
+    };
+    let [east, north, up] = [0, 1, 2].map(|axis| of(&|error| error.enu_m[axis]));
+    let horizontal =
+        of(&|error| libm::hypot(error.enu_m.x, planted!("analysis.summary.horizontal", error.enu_m.y, 0.0)));
+    let vertical = of(&|error| error.enu_m.z.abs());
+    let error_3d = of(&|error| error.enu_m.norm());
+    let velocity = of(&|error| error.velocity_enu_mps.norm());
+    details.east_m = spread(&east);
+    details.north_m = spread(&north);
+    details.up_m = spread(&up);
+    details.clock_m = spread(&of(&|error| error.clock_m));
+    details.velocity_mps = spread(&velocity);
+    let bias = match (mean(&east), mean(&north), mean(&up)) {
+        (Some(east), Some(north), Some(up)) => Some([east, north, up]),
+        _ => None,
+    };
+    Position {
+        fixes: run.fixes.len(),
+        first_fix_s: run.fixes.iter().map(|fix| fix.sample).min().map(|sample| run.time_s(sample)),
+        horizontal_mean_m: mean(&horizontal),
+        horizontal_p95_m: percentile(&horizontal, 0.95),
+        vertical_p95_m: percentile(&vertical, 0.95),
+        error_3d_p95_m: percentile(&error_3d, 0.95),
+        bias_enu_m: bias,
+        velocity_p95_mps: percentile(&velocity, 0.95),
+        nees_mean: None,
+        nees_band: None,
+        nees_independent: None,
+        nees_verdict: None,
+    }
+}
+
+fn clock_section(clock: &clock::Clock, details: &mut Details) -> Clock {
+    let errors: Vec<f64> = clock.rows.iter().map(|row| row.error_s).collect();
+    let detrended =
+        |line: clock::Line| -> Vec<f64> { clock.rows.iter().map(|row| row.error_s - line.at(row.time_s)).collect() };
+    let (estimate, truth) = (clock.series(Of::Estimate), clock.series(Of::Truth));
+    let at = |series: Option<&Series>, deviation| series?.at(deviation, 1.0);
+    let value = |series, deviation| at(series, deviation).map(|point| point.deviation);
+    details.clock_oadev_1s = at(estimate, Deviation::Oadev);
+    Clock {
+        fixes: clock.rows.len(),
+        bias_mean_s: mean(&errors),
+        bias_sigma_s: clock.error_line.and_then(|line| std(&detrended(line))),
+        drift: clock.estimate_line.map(|line| line.slope),
+        true_drift: clock.truth_line.map(|line| line.slope),
+        oadev_1s: details.clock_oadev_1s.map(|point| point.deviation),
+        mdev_1s: value(estimate, Deviation::Mdev),
+        ohdev_1s: value(estimate, Deviation::Ohdev),
+        tdev_1s_s: value(estimate, Deviation::Tdev),
+        true_oadev_1s: value(truth, Deviation::Oadev),
+        code_noise_oadev_1s: clock.code_sigma_s.map(|sigma_s| white_phase(Deviation::Oadev, sigma_s, 1.0, 1.0)),
+        h: estimate.and_then(Series::power_law).map(|law| law.h),
+        true_h: truth.and_then(Series::power_law).map(|law| law.h),
+    }
+}
+
+fn by_signal(run: &Run, errors: &Errors) -> Result<BTreeMap<&'static str, BySignal>, JudgeError> {
+    let signals: BTreeSet<&'static Signal> = errors.signals.keys().map(|link| link.signal).collect();
+    let one = |signal: &'static Signal| {
+        let sigma = |of: LoopError| {
+            Ok::<_, JudgeError>(pooled_std(errors.settled_of(Some(signal), of)?.iter().map(Vec::as_slice)))
+        };
+        let lost = run.events.iter().filter(|row| row.event == Event::LossOfLock && row.signal == signal);
+        let figures = BySignal {
+            satellites: errors.signals.keys().filter(|link| link.signal == signal).count(),
+            observables: observables(errors, Some(signal), &mut Details::default())?,
+            tracking: SignalTracking {
+                losses_of_lock: lost.count(),
+                dll_sigma_chips: sigma(DLL_CHIPS)?,
+                pll_sigma_deg: sigma(PLL_DEG)?,
+                fll_sigma_hz: sigma(FLL_HZ)?,
+            },
+        };
+        Ok((signal.name, figures))
+    };
+    signals.into_iter().map(one).collect()
+}
+
+/// Of one signal, or of all.
+fn observables(errors: &Errors, signal: Option<&Signal>, details: &mut Details) -> Result<Observables, JudgeError> {
+    let code = errors.code_without_clock_m(signal)?;
+    let carrier = errors.pooled_of(signal, |error| error.carrier_cycles)?;
+    let doppler = errors.pooled_of(signal, |error| error.doppler_hz)?;
+    let cn0 = errors.pooled_of(signal, |error| error.cn0_dbhz - error.cn0_effective_dbhz)?;
+    let mut means = Vec::new();
+    for link in errors.signals.keys().filter(|link| signal.is_none_or(|signal| link.signal == signal)) {
+        means.extend(mean(&errors.signals.map(link, |row| row.code_m)?));
+    }
+    details.pseudorange_m = spread(&code);
+    details.carrier_cycles = spread(&carrier);
+    details.doppler_hz = spread(&doppler);
+    details.cn0_db = spread(&cn0);
+    details.cn0_true_dbhz = mean(&errors.pooled_of(signal, |error| error.cn0_true_dbhz)?);
+    details.cn0_effective_dbhz = mean(&errors.pooled_of(signal, |error| error.cn0_effective_dbhz)?);
+    details.cn0_measured_dbhz = mean(&errors.pooled_of(signal, |error| error.cn0_dbhz)?);
+    Ok(Observables {
+        pseudorange_rms_m: rms(&code),
+        pseudorange_bias_m: mean(&means),
+        carrier_rms_cycles: rms(&carrier),
+        doppler_rms_hz: rms(&doppler),
+        cn0_bias_db: mean(&cn0),
+    })
+}
+
+/// The error of one loop in an observation, in its unit.
+pub(crate) type LoopError = fn(&Link, &SignalError) -> f64;
+pub(crate) const DLL_CHIPS: LoopError =
+    |link, row| row.code_m * leading(link.signal).map_or(f64::NAN, |code| code.chip_rate_hz) / SPEED_OF_LIGHT_MPS;
+pub(crate) const PLL_DEG: LoopError = |_, row| row.carrier_cycles * 360.0;
+pub(crate) const FLL_HZ: LoopError = |_, row| row.doppler_hz;
+
+fn tracking(run: &Run, errors: &Errors, details: &mut Details) -> Result<Tracking, JudgeError> {
+    let sigma = |of: LoopError| Ok::<_, JudgeError>(pooled_std(errors.settled(of)?.iter().map(Vec::as_slice)));
+
+    // Of a receiver that does not say, the longest code period.
+    let periods = run.signals.iter().filter_map(|signal| leading(signal)).map(Component::period_s);
+    let longest_s = periods.fold(0.0, f64::max);
+    let integration_s = run.update_s.or(run.tracking_setting("integration_s")).unwrap_or(longest_s);
+    details.thresholds = Thresholds::new(run.tracking_setting("spacing_chips").unwrap_or(0.5), integration_s);
+    Ok(Tracking {
+        losses_of_lock: run.events.iter().filter(|row| row.event == Event::LossOfLock).count(),
+        cycle_slips: errors.cycle_slips,
+        dll_sigma_chips: sigma(DLL_CHIPS)?,
+        pll_sigma_deg: sigma(PLL_DEG)?,
+        fll_sigma_hz: sigma(FLL_HZ)?,
+        slips_undeclared: 0,
+        slip_causes: BTreeMap::new(),
+        dll_chips: None,
+        pll_deg: None,
+        fll_hz: None,
+    })
+}
+
+fn navigation(run: &Run, details: &mut Details) -> Navigation {
+    let sent: BTreeSet<&NavigationRow> = run.truth_navigation.iter().collect();
+    let decoded: BTreeSet<&NavigationRow> = run.navigation.iter().collect();
+    details.wrong_parameters =
+        planted!("analysis.summary.navigation", &decoded, &sent).difference(&sent).map(|row| (*row).clone()).collect();
+    Navigation { parameters_checked: decoded.len(), parameters_wrong: details.wrong_parameters.len() }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,98 @@
+//! What passed, what is marginal, what failed, and by how much: the list of all judgements of a run.
+//!
+//! The figures and their limits are filled in by the rules, a user's limits by [`super::limits`].
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::analysis::judge::judgement::{Bound, Judgement, MARGINAL_SHARE, Status};
+
+/// Every figure of a run that is judged.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Verdict {
+    pub rows: Vec<Judgement>,
+    /// How many of the first rows hold a user's limits.
+    pub of_user: usize,
+    /// Figures that are not judged, each with the reason.
+    pub not_judged: Vec<String>,
+}
+
+impl Verdict {
+    /// How many have a status.
+    pub fn count(&self, status: Status) -> usize {
+        self.rows.iter().filter(|row| row.status == status).count()
+    }
+
+    /// The worst status.
+    pub fn status(&self) -> Status {
+        self.rows.iter().map(|row| row.status).max().unwrap_or(Status::Pass)
+    }
+
+    /// Its counts in words.
+    pub fn in_words(&self) -> String {
+        let [pass, marginal, fail] = [Status::Pass, Status::Marginal, Status::Fail].map(|status| self.count(status));
+        format!("{pass} passed, {marginal} marginal, {fail} failed")
+    }
+
+    /// The user's limits that are broken.
+    pub fn broken(&self) -> impl Iterator<Item = &Judgement> {
+        self.rows.iter().take(self.of_user).filter(|row| row.status == Status::Fail)
+    }
+
+    /// Puts a user's judgements first; they replace what is otherwise judged of the same figures.
+    pub fn with_user(mut self, rows: Vec<Judgement>) -> Self {
+        self.rows.retain(|row| rows.iter().all(|user| user.path != row.path || row.path.is_none()));
+        self.of_user = rows.len();
+        self.rows.splice(0..0, rows);
+        self
+    }
+
+    pub(super) fn judge(
+        &mut self,
+        figure: &str,
+        path: &str,
+        value: impl Into<Value>,
+        unit: &str,
+        bound: Bound,
+        source: &str,
+    ) {
+        let row = Judgement::new(figure, value.into(), unit, bound, MARGINAL_SHARE, source);
+        self.rows.push(if path.is_empty() { row } else { row.at(path) });
+    }
+
+    /// Says what is behind the row that was judged last.
+    pub(super) fn explain(&mut self, why: Vec<String>) {
+        if let Some(row) = self.rows.last_mut() {
+            row.why = why;
+        }
+    }
+
+    /// Rows of `verdict.csv`.
+    pub(crate) fn csv_rows(&self) -> impl Iterator<Item = Row<'_>> {
+        self.rows.iter().map(|row| Row {
+            figure: &row.figure,
+            path: row.path.as_deref().unwrap_or(""),
+            value: row.value_text(),
+            unit: &row.unit,
+            limit: row.bound.to_string(),
+            margin_share: row.margin,
+            status: row.status,
+            source: &row.source,
+            why: row.why.join("; "),
+        })
+    }
+}
+
+/// One row of `verdict.csv`.
+#[derive(Serialize)]
+pub(crate) struct Row<'a> {
+    figure: &'a str,
+    path: &'a str,
+    value: String,
+    unit: &'a str,
+    limit: String,
+    margin_share: Option<f64>,
+    status: Status,
+    source: &'a str,
+    why: String,
+}

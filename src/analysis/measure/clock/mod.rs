@@ -1,0 +1,282 @@
+//! The receiver's clock over a run: its estimate against the truth, and how stable both are.
+//!
+//! Bias is the clock's reading minus GPS time. The receiver's error of it is minus the error of the GPS time
+//! that it gives, so that it does not matter how the receiver set its clock; truth plus error is the
+//! estimate. Deviations need an even grid: the longest stretch of fixes without a gap is taken, and of the
+//! truth the whole run. Expected beside them: the white phase noise of a clock solved from independent code
+//! or carrier measurements, TDOP × σ. Limits: the code loop's bandwidth and carrier smoothing correlate
+//! fixes, so the estimate lies below the code's line; its noise is no oscillator's.
+
+use std::ops::Range;
+
+use serde::Serialize;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::expect::theory::clock::PowerLaw;
+use crate::analysis::measure::allan::{self, Deviation, Point, decades, fit, octaves};
+use crate::analysis::measure::errors::Errors;
+use crate::analysis::read::Run;
+use crate::analysis::statistics::{mean, median, pooled_std};
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+
+/// Probability with which an interval holds the true deviation.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// The clock at one fix: a row of `clock.csv`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ClockRow {
+    pub sample: u64,
+    pub time_s: f64,
+    /// Reading minus GPS time as the receiver found it.
+    pub estimate_s: f64,
+    pub truth_s: f64,
+    /// Estimate minus truth.
+    pub error_s: f64,
+    /// The estimate without its straight line.
+    pub detrended_s: f64,
+}
+
+/// A straight line through a series, by least squares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// Time and value in the middle.
+    middle: (f64, f64),
+    /// Per second.
+    pub slope: f64,
+}
+
+impl Line {
+    /// `None` without two different times.
+    fn through(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Self> {
+        let [times, values]: [Vec<f64>; 2] = [points.clone().map(|p| p.0).collect(), points.map(|p| p.1).collect()];
+        let middle = (mean(&times)?, mean(&values)?);
+        let about = || times.iter().zip(&values).map(|(time, value)| (time - middle.0, value - middle.1));
+        let square: f64 = about().map(|(time, _)| time * time).sum();
+        let product: f64 = about().map(|(time, value)| time * value).sum();
+        (square > 0.0).then(|| Self { middle, slope: product / square })
+    }
+
+    /// Its value at a time.
+    pub fn at(&self, time_s: f64) -> f64 {
+        self.middle.1 + self.slope * (time_s - self.middle.0)
+    }
+}
+
+/// Whose phase a deviation is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Of {
+    /// The receiver's estimate: clock and noise of position together.
+    Estimate,
+    /// The clock.
+    Truth,
+    /// Their difference: the noise of position alone.
+    Error,
+}
+
+/// Phases on an even grid, with their deviations over decades of τ.
+#[derive(Clone, Debug)]
+pub struct Series {
+    pub of: Of,
+    phases_s: Vec<f64>,
+    tau0_s: f64,
+    pub curves: Vec<(Deviation, Vec<Point>)>,
+}
+
+impl Series {
+    fn new(of: Of, phases_s: Vec<f64>, tau0_s: f64) -> Self {
+        let curve =
+            |deviation| (deviation, allan::curve(deviation, &phases_s, tau0_s, decades(phases_s.len()), CONFIDENCE));
+        let curves = Deviation::ALL.map(curve).to_vec();
+        Self { of, phases_s, tau0_s, curves }
+    }
+
+    /// The curve of one deviation.
+    pub fn curve(&self, deviation: Deviation) -> &[Point] {
+        self.curves.iter().find(|(which, _)| *which == deviation).map_or(&[], |(_, points)| points)
+    }
+
+    /// A deviation at an averaging time that is a multiple of the grid's interval.
+    pub fn at(&self, deviation: Deviation, tau_s: f64) -> Option<Point> {
+        let steps = tau_s / self.tau0_s;
+        let m = steps.round();
+        // A sample more or less in the interval is no other averaging time.
+        if (steps - m).abs() > 1e-3 * m {
+            return None;
+        }
+        allan::curve(deviation, &self.phases_s, self.tau0_s, [m as usize], CONFIDENCE).into_iter().next()
+    }
+
+    /// Strengths of its power-law noises below half its rate, from octaves, so that no stretch of τ counts more.
+    pub fn power_law(&self) -> Option<PowerLaw> {
+        let octaves = octaves(self.phases_s.len());
+        fit::power_law(
+            &allan::curve(Deviation::Oadev, &self.phases_s, self.tau0_s, octaves, CONFIDENCE),
+            self.cutoff_hz(),
+        )
+    }
+
+    /// Half its rate.
+    pub fn cutoff_hz(&self) -> f64 {
+        0.5 / self.tau0_s
+    }
+
+    /// Interval of its grid.
+    pub fn tau0_s(&self) -> f64 {
+        self.tau0_s
+    }
+}
+
+/// The clock over a run.
+#[derive(Clone, Debug, Default)]
+pub struct Clock {
+    /// The longest stretch of fixes without a gap.
+    pub rows: Vec<ClockRow>,
+    pub estimate_line: Option<Line>,
+    pub truth_line: Option<Line>,
+    pub error_line: Option<Line>,
+    /// Those that have an interval.
+    pub series: Vec<Series>,
+    /// Standard deviation of a clock solved from independent code measurements of this run's scatter.
+    pub code_sigma_s: Option<f64>,
+    /// From carrier phases, likewise.
+    pub carrier_sigma_s: Option<f64>,
+    /// The oscillator that the scene names.
+    pub oscillator: Option<PowerLaw>,
+}
+
+impl Clock {
+    /// Measures it.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
+        let samples: Vec<u64> = errors.positions.iter().map(|error| error.sample).collect();
+        let stretch = longest_even(&samples);
+        let mut rows: Vec<ClockRow> = errors.positions[stretch.clone()]
+            .iter()
+            .map(|error| {
+                let error_s = -error.clock_m / SPEED_OF_LIGHT_MPS;
+                let (truth_s, estimate_s) = (error.true_clock_s, error.true_clock_s + error_s);
+                ClockRow { sample: error.sample, time_s: error.time_s, estimate_s, truth_s, error_s, detrended_s: 0.0 }
+            })
+            .collect();
+        let line = |of: fn(&ClockRow) -> f64| Line::through(rows.iter().map(|row| (row.time_s, of(row))));
+        let (estimate_line, truth_line, error_line) =
+            (line(|row| row.estimate_s), line(|row| row.truth_s), line(|row| row.error_s));
+        for row in &mut rows {
+            row.detrended_s = row.estimate_s - estimate_line.map_or(row.estimate_s, |line| line.at(row.time_s));
+        }
+        let of_rows = |of: fn(&ClockRow) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
+        let mut series = Vec::new();
+        if let Some(tau0_s) = interval_s(run, &samples[stretch]) {
+            series.push(Series::new(Of::Estimate, of_rows(|row| row.estimate_s), tau0_s));
+            series.push(Series::new(Of::Error, of_rows(|row| row.error_s), tau0_s));
+        }
+        series.extend(truth(run));
+        let sigma_s = |sigma_m: Option<f64>| Some(tdop(run, &rows)? * sigma_m? / SPEED_OF_LIGHT_MPS);
+        let code = errors.settled(|_, row| row.code_m)?;
+        let carrier = errors.settled(|link, row| row.carrier_cycles * link.wavelength_m())?;
+        Ok(Self {
+            estimate_line,
+            truth_line,
+            error_line,
+            series,
+            code_sigma_s: sigma_s(pooled_std(code.iter().map(Vec::as_slice))),
+            carrier_sigma_s: sigma_s(pooled_std(carrier.iter().map(Vec::as_slice))),
+            oscillator: run.scene.oscillator.map(|oscillator| PowerLaw { h: oscillator.h }),
+            rows,
+        })
+    }
+
+    /// One of its series.
+    pub fn series(&self, of: Of) -> Option<&Series> {
+        self.series.iter().find(|series| series.of == of)
+    }
+
+    /// Every point of every curve.
+    pub(in crate::analysis) fn stability(&self) -> impl Iterator<Item = AllanRow> + '_ {
+        self.series.iter().flat_map(|series| {
+            let of_one = |(deviation, points): &(Deviation, Vec<Point>)| {
+                let name = deviation.name();
+                points.iter().map(|point| AllanRow::new(series.of, name, point)).collect::<Vec<_>>()
+            };
+            series.curves.iter().flat_map(of_one)
+        })
+    }
+}
+
+/// A row of `allan.csv`.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(in crate::analysis) struct AllanRow {
+    series: Of,
+    deviation: &'static str,
+    tau_s: f64,
+    /// Dimensionless; in seconds for the time deviation.
+    value: f64,
+    /// Ends of the interval of [`CONFIDENCE`].
+    low: Option<f64>,
+    high: Option<f64>,
+    /// Differences that went into it.
+    terms: usize,
+    /// Exponent of the noise that dominates.
+    alpha: Option<i32>,
+    /// Equivalent degrees of freedom.
+    freedom: Option<f64>,
+}
+
+impl AllanRow {
+    fn new(series: Of, deviation: &'static str, point: &Point) -> Self {
+        Self {
+            series,
+            deviation,
+            tau_s: point.tau_s,
+            value: point.deviation,
+            low: point.interval.map(|ends| ends.0),
+            high: point.interval.map(|ends| ends.1),
+            terms: point.terms,
+            alpha: point.alpha,
+            freedom: point.freedom,
+        }
+    }
+}
+
+/// The clock as it was, over the whole run.
+fn truth(run: &Run) -> Option<Series> {
+    let samples: Vec<u64> = run.trajectory.iter().map(|row| row.sample).collect();
+    let stretch = longest_even(&samples);
+    let tau0_s = interval_s(run, &samples[stretch.clone()])?;
+    let phases_s = run.trajectory[stretch].iter().map(|row| row.clock_bias_s).collect();
+    Some(Series::new(Of::Truth, phases_s, tau0_s))
+}
+
+/// The longest run of samples at their usual distance, within one: an interval need not be a whole number of samples.
+fn longest_even(samples: &[u64]) -> Range<usize> {
+    let steps: Vec<f64> = samples.windows(2).map(|pair| pair[1].abs_diff(pair[0]) as f64).collect();
+    let Some(usual) = median(&steps) else { return 0..samples.len() };
+    let (mut best, mut start) = (0..1, 0);
+    for (index, step) in steps.iter().enumerate() {
+        if (step - usual).abs() > 1.0 {
+            start = index + 1;
+        } else if index + 2 - start > best.len() {
+            best = start..index + 2;
+        }
+    }
+    best
+}
+
+/// Mean interval of samples on an even grid; `None` of fewer than two.
+fn interval_s(run: &Run, samples: &[u64]) -> Option<f64> {
+    let (first, last) = (samples.first()?, samples.last()?);
+    // One division, so that a tenth of a second is 0.1.
+    (last > first).then(|| (last - first) as f64 / (run.scene.sample_rate_hz * (samples.len() - 1) as f64))
+}
+
+/// Median time dilution of the fixes in a stretch.
+fn tdop(run: &Run, rows: &[ClockRow]) -> Option<f64> {
+    let within = rows.first()?.sample..=rows.last()?.sample;
+    median(&run.fixes.iter().filter(|fix| within.contains(&fix.sample)).map(|fix| fix.tdop).collect::<Vec<_>>())
+}
+
+#[cfg(test)]
+mod tests;

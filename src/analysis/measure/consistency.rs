@@ -1,0 +1,169 @@
+//! Whether the receiver's own covariance is honest: normalised error squared.
+//!
+//! With e the error of a fix east, north, up and P the covariance that the receiver states, eᵀP⁻¹e is chi-square of three
+//! degrees if P is right (Bar-Shalom, Li and Kirubarajan 2001, 5.4), so that its mean is 3. Fixes of smoothed ranges remember
+//! each other: the mean of n of them is held against the band of as many *independent* ones as the autocorrelation of
+//! L⁻¹e says, P = LLᵀ, about zero, so that a lasting error counts once. Limits: with a window of smoothing as long as the
+//! run there are few, and the band is wide; a fix without a formal covariance is left out.
+
+use nalgebra::{Cholesky, Matrix3};
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::collections::HashMap;
+
+use crate::analysis::measure::errors::Errors;
+use crate::analysis::measure::independent::Correlated;
+use crate::analysis::read::Run;
+use crate::analysis::statistics::mean;
+use crate::gnss::record::Fix;
+
+/// Degrees of freedom of one fix.
+pub const FREEDOM: f64 = 3.0;
+/// Probability with which the mean of an honest receiver lies within the band.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// What the comparison says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Calibration {
+    /// The mean lies within the band.
+    #[serde(rename = "honest")]
+    Consistent,
+    /// Above: errors are larger than the receiver says.
+    Optimistic,
+    /// Below: they are smaller.
+    Pessimistic,
+}
+
+impl Calibration {
+    /// Its name in `summary.json`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Consistent => "honest",
+            Self::Optimistic => "optimistic",
+            Self::Pessimistic => "pessimistic",
+        }
+    }
+}
+
+/// One fix: a row of `honesty.csv`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Row {
+    pub sample: u64,
+    pub time_s: f64,
+    pub east_m: f64,
+    pub north_m: f64,
+    pub up_m: f64,
+    pub sigma_east_m: f64,
+    pub sigma_north_m: f64,
+    pub sigma_up_m: f64,
+    /// Normalised error squared.
+    pub nees: f64,
+}
+
+/// A run's covariance against its errors.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Consistency {
+    pub rows: Vec<Row>,
+    pub nees_mean: Option<f64>,
+    /// How many independent fixes the mean is worth.
+    pub independent: Option<f64>,
+    /// Ends of the 95 % band of the mean.
+    pub band: Option<(f64, f64)>,
+    pub verdict: Option<Calibration>,
+    /// Share of east, north and up errors within twice their sigma; 0.954 of normal ones.
+    pub within_two_sigma: Option<f64>,
+}
+
+/// Share of normal errors within two standard deviations.
+pub const TWO_SIGMA_SHARE: f64 = 0.954_499_736;
+
+impl Consistency {
+    /// Measures it.
+    pub fn measure(run: &Run, errors: &Errors) -> Self {
+        let fixes: HashMap<u64, &Fix> = run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
+        let (mut rows, mut white) = (Vec::new(), [Vec::new(), Vec::new(), Vec::new()]);
+        for error in &errors.positions {
+            let Some(fix) = fixes.get(&error.sample) else { continue };
+            let Some(factor) = factor(fix) else { continue };
+            let Some(whitened) = factor.l().solve_lower_triangular(&error.enu_m) else { continue };
+            rows.push(Row {
+                sample: error.sample,
+                time_s: error.time_s,
+                east_m: error.enu_m.x,
+                north_m: error.enu_m.y,
+                up_m: error.enu_m.z,
+                sigma_east_m: fix.sigma_east_m,
+                sigma_north_m: fix.sigma_north_m,
+                sigma_up_m: fix.sigma_up_m,
+                nees: whitened.norm_squared(),
+            });
+            for (axis, value) in white.iter_mut().zip(whitened.iter()) {
+                axis.push(*value);
+            }
+        }
+        let nees_mean = mean(&rows.iter().map(|row| row.nees).collect::<Vec<_>>());
+        // The three axes are three series of one kind; each holds a third of the values.
+        let independent = Correlated::about_zero(&white).map(|found| (found.independent() / FREEDOM).max(1.0));
+        let band = independent.and_then(band);
+        let verdict = nees_mean.zip(band).map(|(mean, (low, high))| match mean {
+            mean if mean > high => Calibration::Optimistic,
+            mean if mean < low => Calibration::Pessimistic,
+            _ => Calibration::Consistent,
+        });
+        let within = rows
+            .iter()
+            .flat_map(|row| {
+                [(row.east_m, row.sigma_east_m), (row.north_m, row.sigma_north_m), (row.up_m, row.sigma_up_m)]
+            })
+            .map(|(error, sigma)| if error.abs() <= 2.0 * sigma { 1.0 } else { 0.0 });
+        let within_two_sigma = mean(&within.collect::<Vec<_>>());
+        Self { rows, nees_mean, independent, band, verdict, within_two_sigma }
+    }
+}
+
+/// Band of the mean of so many independent values of chi-square with three degrees.
+fn band(independent: f64) -> Option<(f64, f64)> {
+    let law = ChiSquared::new(FREEDOM * independent).ok()?;
+    let tail = 0.5 * (1.0 - CONFIDENCE);
+    Some((law.inverse_cdf(tail) / independent, law.inverse_cdf(1.0 - tail) / independent))
+}
+
+/// Cholesky factor of a fix's formal covariance.
+fn factor(fix: &Fix) -> Option<Cholesky<f64, nalgebra::Const<3>>> {
+    let (e, n, u) = (fix.sigma_east_m, fix.sigma_north_m, fix.sigma_up_m);
+    let (e, n, u) = planted!("analysis.consistency.axes", (e, n, u), (u, n, e));
+    let (en, eu, nu) = (fix.correlation_en * e * n, fix.correlation_eu * e * u, fix.correlation_nu * n * u);
+    Cholesky::new(Matrix3::new(e * e, en, eu, en, n * n, nu, eu, nu, u * u))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::measure::independent::tests::Draw;
+
+    #[test]
+    fn bands_are_those_of_the_tables() {
+        // Chi-square, 2.5 and 97.5 %: 3 degrees 0.2158 and 9.3484; 30 degrees 16.791 and 46.979 over ten.
+        let one = band(1.0).unwrap();
+        assert!((one.0 - 0.2158).abs() < 1e-4 && (one.1 - 9.3484).abs() < 1e-4, "{one:?}");
+        let ten = band(10.0).unwrap();
+        assert!((ten.0 - 1.6791).abs() < 1e-4 && (ten.1 - 4.6979).abs() < 1e-4, "{ten:?}");
+    }
+
+    #[test]
+    fn the_band_holds_an_honest_receiver_as_often_as_it_says_though_its_errors_remember() {
+        let mut draw = Draw(2);
+        let held = (0..300)
+            .filter(|_| {
+                let white: [Vec<f64>; 3] = std::array::from_fn(|_| draw.remembering(0.95, 1000));
+                let nees: f64 = white.iter().flatten().map(|x| x * x).sum::<f64>() / 1000.0;
+                let (low, high) = band(Correlated::about_zero(&white).unwrap().independent() / 3.0).unwrap();
+                (low..=high).contains(&nees)
+            })
+            .count();
+        // 0.95 of 300 is 285 ± 3·3.8; the estimate of the autocorrelation from 50 independent values a series
+        // costs some per cent. Without it (1000 independent fixes) the band would hold 40 %.
+        assert!((262..=300).contains(&held), "{held}");
+    }
+}

@@ -1,0 +1,21 @@
+//! Measuring: the receiver's results against the truth, as numbers without a verdict.
+//!
+//! [`errors`] joins estimates with the truth on (sample number, satellite, signal); everything else works on
+//! these errors. [`slips`] finds breaks of the carrier and their causes, [`elevation`] sorts errors by
+//! satellite and elevation, [`jitter`] compares each loop with its theory, [`consistency`] the fixes with
+//! their own covariance, [`clock`] the receiver's clock with the deviations of [`allan`]. [`psd`] estimates
+//! the spectrum of the samples, [`lines`] compares the continuous waves that the receiver reported with those
+//! that there were, [`spoofing`] measures how far a spoofer moved the fixes. [`independent`] says how many
+//! independent values a correlated series is worth.
+
+pub mod allan;
+pub mod clock;
+pub mod consistency;
+pub mod elevation;
+pub mod errors;
+pub mod independent;
+pub mod jitter;
+pub mod lines;
+pub mod psd;
+pub mod slips;
+pub mod spoofing;

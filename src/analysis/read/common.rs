@@ -1,0 +1,102 @@
+//! What all satellites' signals have in common in the samples beside the receiver's clock, as the truth knows it.
+//!
+//! A front end's filter delays every code by its group delay; a local oscillator off its frequency shifts
+//! every carrier; an antenna that turns winds up every carrier. A receiver that measures them is right: they
+//! are part of the truth. The first two are facts of the scene, the third is what the truth's carriers do
+//! beside its pseudoranges on average. Limits: the mean of carrier less pseudorange holds twice the
+//! ionosphere's rate too, millimetres a second.
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::delay;
+use super::facts::SceneFacts;
+use crate::analysis::waveform::Waveform;
+use crate::gnss::record::Observation;
+use crate::gnss::signal::{Link, Signal};
+
+/// What the ionosphere may make of a carrier less its pseudorange, metres a second.
+const LEAST_WOUND_MPS: f64 = 0.02;
+
+/// The common part.
+#[derive(Clone, Debug, Default)]
+pub struct Common {
+    /// Delay of every code in the front end, by its signal, and of how many satellites.
+    code_delays_s: BTreeMap<&'static Signal, f64>,
+    satellites: BTreeMap<&'static Signal, usize>,
+    /// By how much every Doppler is higher.
+    pub doppler_hz: f64,
+    last: HashMap<Link, (u64, f64)>,
+    /// Sum and number, by epoch, of what each satellite's carrier gained on its pseudorange since the epoch
+    /// before, in metres a sample.
+    gains: HashMap<u64, (f64, u32)>,
+    rate_hz: f64,
+}
+
+impl Common {
+    /// Before any row of the truth.
+    pub(super) fn new(rate_hz: f64) -> Self {
+        Self { rate_hz, ..Self::default() }
+    }
+
+    /// Takes what a scene's facts say, for the rows counted so far and a code loop of that spacing.
+    pub(super) fn set_front_end(&mut self, scene: &SceneFacts, spacing_chips: f64) {
+        let offset_hz: f64 = scene.front_end.iter().filter_map(|stage| stage.offset_hz).sum();
+        self.doppler_hz = if scene.inverted { -offset_hz } else { offset_hz };
+        self.satellites.clear();
+        for link in self.last.keys() {
+            *self.satellites.entry(link.signal).or_default() += 1;
+        }
+        let delay_s = |signal: &&'static Signal| {
+            let code = Waveform::of(signal)?;
+            let of = |stage| delay::code_delay_s(stage, &code, scene.sample_rate_hz, spacing_chips);
+            Some((*signal, scene.front_end.iter().filter_map(of).sum()))
+        };
+        self.code_delays_s = self.satellites.keys().filter_map(delay_s).collect();
+    }
+
+    /// Delay of a signal's code in the front end.
+    pub fn code_delay_s(&self, signal: &Signal) -> f64 {
+        self.code_delays_s.get(signal).copied().unwrap_or(0.0)
+    }
+
+    /// That of all codes on average, which a clock solved from them has.
+    pub fn clock_delay_s(&self) -> f64 {
+        let mut delays_s = self.code_delays_s.values();
+        let first_s = delays_s.next().copied().unwrap_or(0.0);
+        if delays_s.all(|delay_s| *delay_s == first_s) {
+            return first_s;
+        }
+        let weighted = |(signal, count): (&&'static Signal, &usize)| self.code_delay_s(signal) * *count as f64;
+        let count: usize = self.satellites.values().sum();
+        self.satellites.iter().map(weighted).sum::<f64>() / count.max(1) as f64
+    }
+
+    /// Counts a row of the truth in.
+    pub(super) fn add(&mut self, row: &Observation) {
+        let apart_m = row.carrier_cycles * row.signal.wavelength_m(row.sv) - row.pseudorange_m;
+        let before = self.last.insert(row.link(), (row.sample, apart_m));
+        if let Some((sample, before_m)) = before.filter(|(sample, _)| row.sample > *sample) {
+            let (sum, count) = self.gains.entry(row.sample).or_default();
+            (*sum, *count) = (*sum + (apart_m - before_m) / (row.sample - sample) as f64, *count + 1);
+        }
+    }
+
+    /// Carrier that an oscillator's offset takes from every satellite until a sample, in cycles (carriers
+    /// grow with range).
+    pub fn carrier_cycles(&self, sample: u64) -> f64 {
+        -self.doppler_hz * sample as f64 / self.rate_hz
+    }
+
+    /// Rate at which carriers gain on pseudoranges at a sample, wind-up and oscillator together: metres a
+    /// second that a clock solved from Dopplers drifts more than the clock does.
+    pub fn drift_mps(&self, sample: u64, wavelength_m: f64) -> f64 {
+        let both = self.gains.get(&sample).map_or(0.0, |(sum, count)| sum / f64::from(*count) * self.rate_hz);
+        both - self.doppler_hz * wavelength_m
+    }
+
+    /// The part of it that an antenna's turning makes: a millimetre a second and less is the ionosphere's.
+    pub fn wound_mps(&self, sample: u64, wavelength_m: f64) -> f64 {
+        let wound = self.drift_mps(sample, wavelength_m) + self.doppler_hz * wavelength_m;
+        if wound.abs() > LEAST_WOUND_MPS { wound } else { 0.0 }
+    }
+}

@@ -1,0 +1,67 @@
+//! The truth's signals over a run: which there are, on which carriers, and each satellite's mean.
+
+use std::collections::BTreeSet;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::read::spill_store::SpillStore;
+use crate::analysis::statistics::mean;
+use crate::gnss::record::Observation;
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Link, Signal};
+
+/// A signal on a carrier: that of all satellites, or of those that share a channel of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Emission {
+    pub signal: &'static Signal,
+    /// Frequencies are positive, so that their bits have their order.
+    carrier: u64,
+}
+
+impl Emission {
+    /// That of a satellite.
+    pub fn of(link: Link) -> Self {
+        Self { signal: link.signal, carrier: link.carrier_hz().to_bits() }
+    }
+
+    /// Carrier as sent.
+    pub fn carrier_hz(self) -> f64 {
+        f64::from_bits(self.carrier)
+    }
+
+    /// All of some satellites.
+    pub fn all(links: impl Iterator<Item = Link>) -> BTreeSet<Self> {
+        links.map(Self::of).collect()
+    }
+}
+
+/// A satellite's signal on average over the run.
+#[derive(Clone, Copy, Debug)]
+pub struct MeanSignal {
+    pub sv: Sv,
+    pub signal: &'static Signal,
+    /// Carrier as received, and as sent.
+    pub carrier_hz: f64,
+    pub nominal_hz: f64,
+    pub cn0_hz: f64,
+    pub cn0_mean_dbhz: f64,
+}
+
+/// The mean of each satellite's true signal over the run.
+pub(super) fn means(truth: &SpillStore<Link, Observation>) -> Result<Vec<MeanSignal>, JudgeError> {
+    let mut all = Vec::new();
+    for Link { sv, signal } in truth.keys() {
+        let rows = truth.rows(Link { sv, signal })?;
+        let of = |of: fn(&Observation) -> f64| mean(&rows.iter().map(of).collect::<Vec<_>>());
+        let means = (of(|row| row.doppler_hz), of(|row| libm::pow(10.0, row.cn0_dbhz / 10.0)), of(|row| row.cn0_dbhz));
+        let (Some(doppler_hz), Some(cn0_hz), Some(cn0_mean_dbhz)) = means else { continue };
+        all.push(MeanSignal {
+            sv,
+            signal,
+            carrier_hz: signal.carrier_hz(sv) + doppler_hz,
+            nominal_hz: signal.carrier_hz(sv),
+            cn0_hz,
+            cn0_mean_dbhz,
+        });
+    }
+    Ok(all)
+}

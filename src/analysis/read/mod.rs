@@ -1,0 +1,31 @@
+//! Reading: everything that a run wrote, and the files of other receivers, as values.
+//!
+//! [`Run`] is a run's directory read once. Tables with a row for every satellite of every epoch go to a
+//! [`spill_store`], so that a long run takes little more memory than a short one. [`rinex_obs`] and [`nmea`]
+//! are the formats in which a receiver that this project did not write hands over its results. This room
+//! decides nothing: it refuses what is not a table, a number or a time, and knows no theory.
+
+mod common;
+mod delay;
+mod emission;
+mod facts;
+mod files;
+pub mod nmea;
+pub mod rinex_obs;
+mod rows;
+mod run;
+pub mod spill_store;
+
+pub use common::Common;
+pub use emission::{Emission, MeanSignal};
+pub use facts::{Interference, Oscillator, SceneFacts, Stage};
+pub use run::{PsdRow, Run, Speed};
+
+/// What is wrong with a file of a foreign receiver, and where.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fault {
+    /// Line of the file, counted from 1.
+    pub line: u64,
+    /// The fault in words, without file name and line.
+    pub what: String,
+}

@@ -1,0 +1,173 @@
+//! How the rows of a run's long tables lie on a [`super::SpillStore`].
+
+use crate::analysis::read::spill_store::{SpillRow, Words};
+use crate::gnss::record::{Observation, RayRow, SkyRow, TrackingRow};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Link;
+
+impl SpillRow<Link> for Observation {
+    const WORDS: usize = 8;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.extend([self.sample, self.sent_s.cast_unsigned()]);
+        let numbers = [self.sent_fraction_s, self.pseudorange_m, self.carrier_cycles, self.doppler_hz, self.cn0_dbhz];
+        words.extend(numbers.map(f64::to_bits));
+        words.push(self.locked_s.to_bits());
+    }
+
+    fn take(Link { sv, signal }: Link, words: &mut Words<'_>) -> Self {
+        Self {
+            sv,
+            signal,
+            sample: words.word(),
+            sent_s: words.word().cast_signed(),
+            sent_fraction_s: words.number(),
+            pseudorange_m: words.number(),
+            carrier_cycles: words.number(),
+            doppler_hz: words.number(),
+            cn0_dbhz: words.number(),
+            locked_s: words.number(),
+        }
+    }
+}
+
+impl SpillRow<Link> for TrackingRow {
+    const WORDS: usize = 9;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.push(self.sample);
+        words.extend([self.prompt_i, self.prompt_q, self.dll_discriminator_chips].map(f64::to_bits));
+        words.extend([self.pll_discriminator_cycles, self.fll_discriminator_hz].map(f64::to_bits));
+        words.extend([self.cn0_dbhz, self.phase_lock, self.integration_s].map(f64::to_bits));
+    }
+
+    fn take(Link { sv, signal }: Link, words: &mut Words<'_>) -> Self {
+        Self {
+            sv,
+            signal,
+            sample: words.word(),
+            prompt_i: words.number(),
+            prompt_q: words.number(),
+            dll_discriminator_chips: words.number(),
+            pll_discriminator_cycles: words.number(),
+            fll_discriminator_hz: words.number(),
+            cn0_dbhz: words.number(),
+            phase_lock: words.number(),
+            integration_s: words.number(),
+        }
+    }
+}
+
+impl SpillRow<Sv> for SkyRow {
+    const WORDS: usize = 7;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.push(self.sample);
+        words.extend([self.azimuth_deg, self.elevation_deg, self.range_m].map(f64::to_bits));
+        words.extend([self.satellite_clock_m, self.ionosphere_m, self.troposphere_m].map(f64::to_bits));
+    }
+
+    fn take(sv: Sv, words: &mut Words<'_>) -> Self {
+        Self {
+            sv,
+            sample: words.word(),
+            azimuth_deg: words.number(),
+            elevation_deg: words.number(),
+            range_m: words.number(),
+            satellite_clock_m: words.number(),
+            ionosphere_m: words.number(),
+            troposphere_m: words.number(),
+        }
+    }
+}
+
+impl SpillRow<Link> for RayRow {
+    const WORDS: usize = 5;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.extend([self.sample, u64::from(self.ray)]);
+        words.extend([self.excess_m, self.amplitude_ratio, self.phase_cycles].map(f64::to_bits));
+    }
+
+    fn take(Link { sv, signal }: Link, words: &mut Words<'_>) -> Self {
+        Self {
+            sv,
+            signal,
+            sample: words.word(),
+            // A number of 32 bits was put.
+            ray: words.word() as u32,
+            excess_m: words.number(),
+            amplitude_ratio: words.number(),
+            phase_cycles: words.number(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::read::spill_store::SpillStore;
+    use crate::gnss::gps::l1ca::L1_CA;
+
+    #[test]
+    fn a_row_of_each_kind_comes_back_as_it_was() {
+        let (sv, link) = (Sv::gps(7), L1_CA.link(Sv::gps(7)));
+        let place = std::path::Path::new("nowhere");
+        let observation = Observation {
+            sample: 1 << 60,
+            sv,
+            signal: &L1_CA,
+            sent_s: -5,
+            sent_fraction_s: 0.25,
+            pseudorange_m: 2e7,
+            carrier_cycles: -1e8,
+            doppler_hz: 3.5,
+            cn0_dbhz: f64::NAN,
+            locked_s: 9.0,
+        };
+        let tracking = TrackingRow {
+            sample: 3,
+            sv,
+            signal: &L1_CA,
+            prompt_i: 1.0,
+            prompt_q: 2.0,
+            dll_discriminator_chips: 3.0,
+            pll_discriminator_cycles: 4.0,
+            fll_discriminator_hz: 5.0,
+            cn0_dbhz: 6.0,
+            phase_lock: 7.0,
+            integration_s: 8.0,
+        };
+        let sky = SkyRow {
+            sample: 4,
+            sv,
+            azimuth_deg: 1.0,
+            elevation_deg: 2.0,
+            range_m: 3.0,
+            satellite_clock_m: 4.0,
+            ionosphere_m: 5.0,
+            troposphere_m: 6.0,
+        };
+        let ray = RayRow {
+            sample: 5,
+            sv,
+            signal: &L1_CA,
+            ray: u32::MAX,
+            excess_m: 1.0,
+            amplitude_ratio: 2.0,
+            phase_cycles: 3.0,
+        };
+        fn back<K: Copy + Ord, T: SpillRow<K> + std::fmt::Debug>(key: K, row: &T, place: &std::path::Path) {
+            let mut store = SpillStore::new(place);
+            store.push(key, row).unwrap();
+            let mut words = Vec::new();
+            row.put(&mut words);
+            assert_eq!(words.len(), T::WORDS);
+            assert_eq!(format!("{:?}", store.rows(key).unwrap()), format!("[{row:?}]"));
+        }
+        back(link, &observation, place);
+        back(link, &tracking, place);
+        back(sv, &sky, place);
+        back(link, &ray, place);
+    }
+}

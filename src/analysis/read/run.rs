@@ -1,0 +1,376 @@
+//! Everything that a run wrote, read once.
+//!
+//! Truth and estimate are CSV files of the rows in [`crate::gnss::record`]; the scene and the receiver's
+//! settings are JSON. Tables with a row for every satellite of every epoch lie on directory, satellite by
+//! satellite; those with a row an epoch, and shorter ones, are held.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::common::Common;
+use super::emission::{self, Emission, MeanSignal};
+use super::facts::SceneFacts;
+use super::files::{believable, dated, each, json, missing, optional, rows, text};
+use crate::analysis::error::JudgeError;
+use crate::analysis::read::spill_store::SpillStore;
+use crate::analysis::statistics::{mean, median};
+use crate::gnss::record::{
+    AcquisitionRow, EventRow, Fix, InterferenceRow, LineRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
+    TrajectoryRow,
+};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Link, Signal};
+
+/// How fast the stages ran: `speed.json`, and the section of the summary.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Speed {
+    pub generate_x_real_time: Option<f64>,
+    pub receive_x_real_time: Option<f64>,
+    pub run_x_real_time: Option<f64>,
+    pub cpu_s: Option<f64>,
+    pub peak_memory_mib: Option<f64>,
+}
+
+/// One point of `psd.csv`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PsdRow {
+    /// Frequency in the samples (0 is `center_hz`).
+    pub frequency_hz: f64,
+    /// Decibels of LSB²/Hz.
+    pub density_db: f64,
+}
+
+/// A run as read.
+pub struct Run {
+    pub scene: SceneFacts,
+    /// The whole of `truth/scene.json`.
+    pub scene_json: Value,
+    /// The scene as it was written, where the run kept it.
+    pub scenario: Option<String>,
+    pub truth: SpillStore<Link, Observation>,
+    pub sky: SpillStore<Sv, SkyRow>,
+    /// The truth's signals.
+    pub signals: BTreeSet<&'static Signal>,
+    /// Satellites in the truth's first epoch.
+    pub in_view_at_start: BTreeSet<Sv>,
+    /// Sum of C/N0 at a sample over the satellites that send a signal on the same carrier.
+    pub cn0_sums_hz: HashMap<(u64, Emission), f64>,
+    /// C/N0 of a signal's strongest satellite at a sample.
+    pub cn0_most_hz: HashMap<(u64, &'static str), f64>,
+    /// What satellites' carriers and front end have in common beside the clock.
+    pub common: Common,
+    /// Largest delays of the atmosphere.
+    pub ionosphere_m: f64,
+    pub troposphere_m: f64,
+    /// The mean of each satellite's true signal.
+    pub expected: Vec<MeanSignal>,
+    /// Reflected rays; none in a scene without multipath.
+    pub rays: SpillStore<Link, RayRow>,
+    pub trajectory: Vec<TrajectoryRow>,
+    pub truth_navigation: Vec<NavigationRow>,
+    /// Empty without interference.
+    pub interference: Vec<InterferenceRow>,
+    /// What the first spoofer claims; empty without one.
+    pub claimed: Vec<TrajectoryRow>,
+    pub observations: SpillStore<Link, Observation>,
+    pub fixes: Vec<Fix>,
+    pub acquisition: Vec<AcquisitionRow>,
+    pub tracking: SpillStore<Link, TrackingRow>,
+    /// Median time of the loops' updates.
+    pub update_s: Option<f64>,
+    pub navigation: Vec<NavigationRow>,
+    pub events: Vec<EventRow>,
+    /// What the receiver told of lines in the spectrum; `None` of one that does not look.
+    pub lines: Option<Vec<LineRow>>,
+    /// `rx/receiver.json`, or null when there is none.
+    pub receiver: Value,
+    pub psd: Vec<PsdRow>,
+    pub speed: Speed,
+}
+
+const TRUTH: &str = "the generator writes it: make the run again with `gnss-twin run`, or `gnss-twin generate`";
+/// Of a receiver that does not name its own.
+const USUAL_SPACING_CHIPS: f64 = 0.5;
+const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
+
+impl Run {
+    /// Reads a run's directory. `psd.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json` may be
+    /// missing. What is too long for memory is put by in a file without a name there.
+    pub fn read(run: &Path) -> Result<Self, JudgeError> {
+        Self::read_parts(run, &run.join("truth"), &run.join("rx"))
+    }
+
+    /// [`Self::read`] where truth and receiver wrote into directories of their own, so that several receivers
+    /// share a truth.
+    pub fn read_parts(run: &Path, truth: &Path, rx: &Path) -> Result<Self, JudgeError> {
+        let mut read = Self::read_truth_by(truth, run)?;
+        read.scene_json = json(&truth.join("scene.json"))?.unwrap_or(Value::Null);
+        read.scenario = text(&run.join("scenario.toml"))?;
+        match each(&truth.join("rays.csv"), "", |_, row: RayRow| read.rays.push(row.link(), &row)) {
+            Ok(()) | Err(JudgeError::Missing { .. }) => {}
+            Err(error) => return Err(error),
+        }
+        read.truth_navigation = rows(&truth.join("navigation.csv"), TRUTH)?;
+        read.claimed = optional(&truth.join("claimed.csv"))?;
+        read.observations = observations(&rx.join("observations.csv"), RECEIVER, run, |_| ())?;
+        read.fixes = dated(&rx.join("fixes.csv"), RECEIVER, |row: &Fix| row.gps_s)?;
+        read.acquisition = rows(&rx.join("acquisition.csv"), RECEIVER)?;
+        let mut updates = Counts::default();
+        each(&rx.join("tracking.csv"), RECEIVER, |_, row: TrackingRow| {
+            updates.add(row.integration_s);
+            read.tracking.push(row.link(), &row)
+        })?;
+        read.update_s = updates.median();
+        read.navigation = rows(&rx.join("navigation.csv"), RECEIVER)?;
+        read.events = rows(&rx.join("events.csv"), RECEIVER)?;
+        read.lines = match rows(&rx.join("interference.csv"), RECEIVER) {
+            Err(JudgeError::Missing { .. }) => None,
+            other => Some(other?),
+        };
+        read.receiver = json(&rx.join("receiver.json"))?.unwrap_or(Value::Null);
+        if let Some(spacing_chips) = read.tracking_setting("spacing_chips") {
+            read.common.set_front_end(&read.scene, spacing_chips);
+        }
+        read.psd = optional(&run.join("psd.csv"))?;
+        read.speed = json(&run.join("speed.json"))?.unwrap_or_default();
+        Ok(read)
+    }
+
+    /// Reads a truth alone, for a receiver that writes files of its own.
+    pub fn read_truth(truth: &Path) -> Result<Self, JudgeError> {
+        // A truth may lie where nothing can be written.
+        Self::read_truth_by(truth, &std::env::temp_dir())
+    }
+
+    fn read_truth_by(truth: &Path, directory: &Path) -> Result<Self, JudgeError> {
+        let scene = truth.join("scene.json");
+        let mut scene: SceneFacts = json(&scene)?.ok_or_else(|| missing(&scene, TRUTH))?;
+        if scene.front_ends.len() > 1 {
+            let expected = "one: a receiver's samples are those of one front end, whose truth `gnss-twin generate \
+                            --front-end NAME` writes";
+            return Err(JudgeError::Scene { key: "front_ends", value: scene.front_ends.len() as f64, expected });
+        }
+        let (mut cn0_sums_hz, mut cn0_most_hz) = (HashMap::new(), HashMap::new());
+        let mut common = Common::new(scene.sample_rate_hz);
+        let observed = observations(&truth.join("observations.csv"), TRUTH, directory, |row| {
+            let cn0_hz = libm::pow(10.0, row.cn0_dbhz / 10.0);
+            *cn0_sums_hz.entry((row.sample, Emission::of(row.link()))).or_insert(0.0) += cn0_hz;
+            let most_hz: &mut f64 = cn0_most_hz.entry((row.sample, row.signal.name)).or_insert(0.0);
+            *most_hz = most_hz.max(cn0_hz);
+            common.add(row);
+        })?;
+        Self::fold(&mut scene, &Emission::all(observed.keys()))?;
+        common.set_front_end(&scene, USUAL_SPACING_CHIPS);
+        let (mut ionosphere_m, mut troposphere_m) = (0.0_f64, 0.0_f64);
+        let (mut first, mut in_view_at_start) = (u64::MAX, BTreeSet::new());
+        let mut sky = SpillStore::new(directory);
+        each(&truth.join("sky.csv"), TRUTH, |_, row: SkyRow| {
+            if row.sample < first {
+                (first, in_view_at_start) = (row.sample, BTreeSet::new());
+            }
+            ionosphere_m = ionosphere_m.max(row.ionosphere_m.abs());
+            troposphere_m = troposphere_m.max(row.troposphere_m.abs());
+            if row.sample == first {
+                in_view_at_start.insert(row.sv);
+            }
+            sky.push(row.sv, &row)
+        })?;
+        Ok(Self {
+            scene,
+            scene_json: Value::Null,
+            scenario: None,
+            expected: emission::means(&observed)?,
+            signals: observed.keys().map(|link| link.signal).collect(),
+            truth: observed,
+            sky,
+            in_view_at_start,
+            cn0_sums_hz,
+            cn0_most_hz,
+            common,
+            ionosphere_m,
+            troposphere_m,
+            rays: SpillStore::new(directory),
+            trajectory: dated(&truth.join("trajectory.csv"), TRUTH, |row: &TrajectoryRow| row.gps_s)?,
+            truth_navigation: Vec::new(),
+            interference: optional(&truth.join("interference.csv"))?,
+            claimed: Vec::new(),
+            observations: SpillStore::new(directory),
+            fixes: Vec::new(),
+            acquisition: Vec::new(),
+            tracking: SpillStore::new(directory),
+            update_s: None,
+            navigation: Vec::new(),
+            events: Vec::new(),
+            lines: None,
+            receiver: Value::Null,
+            psd: Vec::new(),
+            speed: Speed::default(),
+        })
+    }
+
+    /// Seconds from sample 0 by the receiver's clock.
+    pub fn time_s(&self, sample: u64) -> f64 {
+        sample as f64 / self.scene.sample_rate_hz
+    }
+
+    /// C/N0 of the strongest satellite at a sample.
+    pub fn strongest_dbhz(&self, sample: u64, signal: &Signal) -> f64 {
+        10.0 * libm::log10(self.cn0_most_hz.get(&(sample, signal.name)).copied().unwrap_or(1.0))
+    }
+
+    /// A satellite's signal in words: the satellite alone where the truth has one signal.
+    pub fn name(&self, link: Link) -> String {
+        if self.signals.iter().all(|signal| *signal == link.signal) { link.sv.to_string() } else { link.to_string() }
+    }
+
+    /// Mean wavelength of the truth's carriers.
+    pub fn mean_wavelength_m(&self) -> Option<f64> {
+        mean(&self.truth.keys().map(Link::wavelength_m).collect::<Vec<_>>())
+    }
+
+    /// Usual time between the truth's rows.
+    pub fn truth_interval_s(&self) -> f64 {
+        let steps = self.trajectory.windows(2).map(|two| self.time_s(two[1].sample) - self.time_s(two[0].sample));
+        median(&steps.collect::<Vec<_>>()).unwrap_or(0.0)
+    }
+
+    /// What [`Self::read`] does to the scene's facts: an IF above half the rate of real samples becomes the
+    /// one at which they hold it.
+    ///
+    /// # Errors
+    /// Signals that samples hold in different multiples of half the rate.
+    fn fold(scene: &mut SceneFacts, emissions: &BTreeSet<Emission>) -> Result<(), JudgeError> {
+        let Some(center_hz) = scene.center_hz.filter(|_| scene.format.starts_with('r')) else { return Ok(()) };
+        let sign = |inverted: bool| if inverted { -1.0 } else { 1.0 };
+        let if_hz = |emission: &Emission| sign(scene.inverted) * (emission.carrier_hz() - center_hz);
+        let turns = |if_hz: f64| (if_hz / scene.sample_rate_hz).round();
+        let rest_hz = |if_hz: f64| if_hz - scene.sample_rate_hz * turns(if_hz);
+        let all: Vec<f64> = emissions.iter().map(if_hz).collect();
+        let (Some(first), Some(&first_hz)) = (emissions.first(), all.first()) else { return Ok(()) };
+        if all.iter().all(|if_hz| if_hz.abs() <= 0.5 * scene.sample_rate_hz) {
+            return Ok(());
+        }
+        let mirrored = rest_hz(first_hz) < 0.0;
+        if all.iter().any(|&hz| turns(hz) != turns(first_hz) || (rest_hz(hz) < 0.0) != mirrored) {
+            let expected = "all signals within the same multiple of half the rate of real samples";
+            return Err(JudgeError::Scene { key: "center_hz", value: center_hz, expected });
+        }
+        let center_hz = first.carrier_hz() - sign(scene.inverted ^ mirrored) * rest_hz(first_hz).abs();
+        (scene.inverted, scene.center_hz) = (scene.inverted ^ mirrored, Some(center_hz));
+        Ok(())
+    }
+
+    /// A number among the receiver's tracking settings, if they name it.
+    pub fn tracking_setting(&self, key: &str) -> Option<f64> {
+        let settings = self.receiver.get("settings").unwrap_or(&self.receiver);
+        settings.get("tracking")?.get(key)?.as_f64()
+    }
+}
+
+/// Observations on a store, each shown to `see`.
+fn observations(
+    path: &Path,
+    remedy: &'static str,
+    directory: &Path,
+    mut see: impl FnMut(&Observation),
+) -> Result<SpillStore<Link, Observation>, JudgeError> {
+    let mut store = SpillStore::new(directory);
+    each(path, remedy, |line, row: Observation| {
+        believable(path, line, row.sent_s)?;
+        see(&row);
+        store.push(row.link(), &row)
+    })?;
+    Ok(store)
+}
+
+/// How often each of a few different numbers came.
+#[derive(Default)]
+struct Counts(BTreeMap<u64, usize>);
+
+impl Counts {
+    fn add(&mut self, value: f64) {
+        if value.is_finite() {
+            // The order of bits is that of numbers that are not negative; others are turned about.
+            let bits = value.to_bits();
+            let turned = if value.is_sign_negative() { !bits } else { bits | 1 << 63 };
+            *self.0.entry(turned).or_default() += 1;
+        }
+    }
+
+    /// As [`crate::analysis::statistics::median`] has it.
+    fn median(&self) -> Option<f64> {
+        let last = self.0.values().sum::<usize>().checked_sub(1)?;
+        let at = |rank: usize| {
+            let mut below = 0;
+            let found = self.0.iter().find(|(_, count)| {
+                below += **count;
+                below > rank
+            });
+            found.map(|(turned, _)| f64::from_bits(if turned >> 63 == 0 { !turned } else { turned & !(1 << 63) }))
+        };
+        let (low, high) = (at(last / 2)?, at(last.div_ceil(2))?);
+        Some(low + (high - low) * 0.5)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::hand_made::planted;
+    use crate::analysis::judge;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC};
+    use std::fs;
+
+    #[test]
+    fn counts_have_the_median_of_the_list() {
+        for list in [&[][..], &[4e-3], &[1.0, -2.0, 3.0, -2.0], &[0.0, -0.5, 1e-3, 4e-3, 4e-3], &[1.0, 2.0]] {
+            let mut counts = Counts::default();
+            list.iter().for_each(|value| counts.add(*value));
+            assert_eq!(counts.median(), median(list), "{list:?}");
+        }
+    }
+
+    #[test]
+    fn real_samples_hold_signals_of_one_zone_at_the_frequency_that_they_fold_to() {
+        let scene = |center_hz: f64| -> SceneFacts {
+            let json = serde_json::json!({
+                "name": "x", "seed": 1, "duration_s": 1.0, "sample_rate_hz": 6e6, "center_hz": center_hz, "format": "ri8"
+            });
+            serde_json::from_value(json).unwrap()
+        };
+        let of = |signals: &[&'static Signal], center_hz: f64| {
+            let mut scene = scene(center_hz);
+            let links = signals.iter().map(|signal| signal.link(Sv { system: signal.system, number: 3 }));
+            Run::fold(&mut scene, &Emission::all(links)).map(|()| (scene.center_hz.unwrap(), scene.inverted))
+        };
+        // 20 MHz is 2 MHz beyond three times the rate, 16 MHz 2 MHz below it: mirrored.
+        assert_eq!(of(&[&L1_CA], 1_575.42e6 - 2e6).unwrap(), (1_575.42e6 - 2e6, false));
+        assert_eq!(of(&[&L1_CA, &LONG_BOC], 1_575.42e6 - 20e6).unwrap(), (1_575.42e6 - 2e6, false));
+        assert_eq!(of(&[&L1_CA], 1_575.42e6 - 16e6).unwrap(), (1_575.42e6 + 2e6, true));
+        let refused = of(&[&L1_CA, &CHANNELS], 1_575.42e6 - 2e6).unwrap_err().to_string();
+        assert!(refused.contains("center_hz") && refused.contains("same multiple"), "{refused}");
+        assert!(of(&[], 1e9).is_ok());
+    }
+
+    #[test]
+    fn an_unknown_kind_of_edge_is_refused_by_name() {
+        let refused = serde_json::from_str::<crate::analysis::waveform::Edge>("\"aera\"").unwrap_err().to_string();
+        assert!(refused.contains("aera") && refused.contains("band_limited"), "{refused}");
+    }
+
+    #[test]
+    fn what_is_missing_is_named_with_its_remedy() {
+        let run = planted();
+        fs::remove_file(run.path().join("rx/fixes.csv")).unwrap();
+        let error = judge(run.path()).unwrap_err().to_string();
+        assert!(error.contains("fixes.csv is missing") && error.contains("gnss-twin receive"), "{error}");
+        fs::remove_file(run.path().join("truth/scene.json")).unwrap();
+        let error = judge(run.path()).unwrap_err().to_string();
+        assert!(error.contains("scene.json is missing") && error.contains("gnss-twin generate"), "{error}");
+    }
+}

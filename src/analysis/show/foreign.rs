@@ -1,0 +1,31 @@
+//! Files of a foreign receiver's judgement: tables, pictures and `foreign.json`.
+
+use std::path::Path;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::judge::foreign::Judgement;
+use crate::analysis::show::plot;
+use crate::analysis::show::write::{write_rows, write_whole};
+
+/// Writes tables, pictures and `foreign.json` into an existing directory.
+///
+/// # Errors
+/// The file that cannot be written or drawn.
+pub fn write(judgement: &Judgement, out: &Path) -> Result<(), JudgeError> {
+    let judged = &judgement.judged;
+    if let Some(measured) = &judged.observables {
+        write_rows(&out.join("foreign_observations.csv"), measured.rows.iter())?;
+        write_rows(&out.join("foreign_satellites.csv"), measured.satellites.iter())?;
+        write_rows(&out.join("foreign_clock.csv"), measured.clock.iter())?;
+        write_rows(&out.join("foreign_slips.csv"), measured.slips.iter())?;
+    }
+    if let Some(places) = &judged.places {
+        write_rows(&out.join("foreign_fixes.csv"), places.rows.iter())?;
+    }
+    plot::foreign::all(out, judged)?;
+    let path = out.join("foreign.json");
+    let mut json = serde_json::to_vec_pretty(&judgement.summary)
+        .map_err(|source| JudgeError::Json { path: path.clone(), source })?;
+    json.push(b'\n');
+    write_whole(&path, &json)
+}

@@ -1,0 +1,171 @@
+//! Reports as PDF: text, tables and vector pictures on A4 pages, with nothing but the bundled fonts.
+//!
+//! A [`Report`] is a list of items that flow down the pages: headings, wrapped text, facts, tables whose
+//! header is repeated on every page, pictures with numbered captions, listings. It knows nothing of runs or
+//! studies. The same report gives the same bytes: no clock, no random identifiers. krilla writes the file,
+//! krilla-svg the pictures; text stays text, to be searched and copied. Limits: left to right; no
+//! hyphenation; characters that the fonts lack become question marks.
+
+mod fonts;
+mod layout;
+mod table;
+#[cfg(test)]
+mod tests;
+mod write;
+
+use thiserror::Error;
+
+use crate::analysis::show::plot::drawing::Drawing;
+
+/// Why a report could not be made. Each is a fault of the program, not of its data.
+#[derive(Debug, Error)]
+pub enum PdfError {
+    #[error("the bundled font {0} is unreadable")]
+    Font(&'static str),
+    #[error("picture {number}: {reason}")]
+    Picture { number: usize, reason: String },
+    #[error("the PDF could not be written: {0}")]
+    Write(String),
+}
+
+/// How a cell or a banner is to be taken. Colours that colour-blind people tell apart; words say the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tone {
+    #[default]
+    Plain,
+    /// Of less weight.
+    Faint,
+    Strong,
+    Good,
+    Caution,
+    Bad,
+}
+
+/// One cell of a table.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Cell {
+    pub text: String,
+    pub tone: Tone,
+}
+
+impl Cell {
+    /// A cell with a tone.
+    pub fn toned(text: impl Into<String>, tone: Tone) -> Self {
+        Self { text: text.into(), tone }
+    }
+}
+
+impl<T: Into<String>> From<T> for Cell {
+    fn from(text: T) -> Self {
+        Self { text: text.into(), tone: Tone::Plain }
+    }
+}
+
+/// On which side a column's text stands; numbers stand right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    Left,
+    Right,
+}
+
+/// A table; rows shorter than the header end in empty cells.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    pub columns: Vec<(String, Side)>,
+    pub rows: Vec<Vec<Cell>>,
+    /// Above it, with its number; empty for a table without either.
+    pub caption: String,
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new<'a>(caption: impl Into<String>, columns: impl IntoIterator<Item = (&'a str, Side)>) -> Self {
+        let columns = columns.into_iter().map(|(title, side)| (title.to_owned(), side)).collect();
+        Self { columns, rows: Vec::new(), caption: caption.into() }
+    }
+
+    /// Adds a row.
+    pub fn row<C: Into<Cell>>(&mut self, cells: impl IntoIterator<Item = C>) {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
+    }
+}
+
+/// What flows down the pages.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Item {
+    /// Of a chapter: in the outline.
+    Heading(String),
+    /// Within a chapter.
+    Subheading(String),
+    Text(String),
+    /// In small letters.
+    Note(String),
+    /// A bar across the page.
+    Banner(String, Tone),
+    /// Names and values, two pairs a row.
+    Facts(Vec<(String, String)>),
+    Table(Table),
+    /// A picture as wide as the text, and its caption below.
+    Figure(Drawing, String),
+    /// Lines as they are, in a font of equal widths.
+    Listing(String),
+    NewPage,
+}
+
+/// A report to be printed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report {
+    pub title: String,
+    /// Below the title.
+    pub subtitle: String,
+    /// At the right of every page's head; the title stands at its left.
+    pub head: String,
+    pub items: Vec<Item>,
+}
+
+impl Report {
+    /// An empty report.
+    pub fn new(title: impl Into<String>, subtitle: impl Into<String>, head: impl Into<String>) -> Self {
+        Self { title: title.into(), subtitle: subtitle.into(), head: head.into(), items: Vec::new() }
+    }
+
+    /// Adds an item.
+    pub fn add(&mut self, item: Item) -> &mut Self {
+        self.items.push(item);
+        self
+    }
+
+    /// Starts a chapter.
+    pub fn heading(&mut self, text: impl Into<String>) -> &mut Self {
+        self.add(Item::Heading(text.into()))
+    }
+
+    /// Starts a part of a chapter.
+    pub fn subheading(&mut self, text: impl Into<String>) -> &mut Self {
+        self.add(Item::Subheading(text.into()))
+    }
+
+    /// Adds a paragraph.
+    pub fn text(&mut self, text: impl Into<String>) -> &mut Self {
+        self.add(Item::Text(text.into()))
+    }
+
+    /// Adds a table.
+    pub fn table(&mut self, table: Table) -> &mut Self {
+        self.add(Item::Table(table))
+    }
+
+    /// Adds a picture with what to look at in it.
+    pub fn figure(&mut self, drawing: Drawing, caption: impl Into<String>) -> &mut Self {
+        self.add(Item::Figure(drawing, caption.into()))
+    }
+
+    /// The report as a PDF file.
+    ///
+    /// # Errors
+    /// [`PdfError`] where a font, a picture or the file itself cannot be made.
+    pub fn pdf(&self) -> Result<Vec<u8>, PdfError> {
+        let fonts = fonts::Fonts::new()?;
+        write::pdf(self, &layout::lay_out(self, &fonts), &fonts)
+    }
+}

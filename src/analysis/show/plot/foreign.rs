@@ -1,0 +1,100 @@
+//! A foreign receiver's errors: observables and clock, and positions.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::judge::foreign::Judged;
+use crate::analysis::judge::foreign::observables::Row;
+use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
+use crate::analysis::statistics::{mean, percentile};
+
+type Points = Vec<(f64, f64)>;
+
+/// Draws what there is to draw into a directory.
+pub(crate) fn all(directory: &Path, judged: &Judged) -> Result<(), JudgeError> {
+    if judged.observables.is_some() {
+        observables(&directory.join("foreign_observables.png"), judged)?;
+    }
+    if judged.places.is_some() {
+        position(&directory.join("foreign_position.png"), judged)?;
+    }
+    Ok(())
+}
+
+/// A chart over the times of its points.
+fn over_time(title: &str, label: &str, least: f64, series: Vec<Series>) -> Chart {
+    let points = || series.iter().flat_map(|series| series.points.iter());
+    let values: Vec<f64> = points().map(|point| point.1).collect();
+    let [low, high] = [0.002, 0.998].map(|p| percentile(&values, p).unwrap_or(0.0));
+    let y = Axis::around(label, [low, high].into_iter(), least.max(1.3 * (high - low)));
+    let (from, to) = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.0), b.max(p.0)));
+    let x = Axis::new("receiver's time since the truth began (s)", if from <= to { (from, to) } else { (0.0, 1.0) });
+    Chart::new(title, x, y, series)
+}
+
+fn per_satellite(rows: &[Row], of: fn(&Row) -> Option<f64>) -> Vec<Series> {
+    let mut found: BTreeMap<&str, Points> = BTreeMap::new();
+    for row in rows {
+        let points = found.entry(&row.sv).or_default();
+        points.extend(of(row).map(|value| (row.label_s, value)));
+    }
+    found.into_iter().enumerate().map(|(index, (sv, points))| Series::numbered(sv.to_owned(), index, points)).collect()
+}
+
+fn observables(path: &Path, judged: &Judged) -> Result<(), JudgeError> {
+    let Some(measured) = &judged.observables else { return Ok(()) };
+    let rows = &measured.rows;
+    let clock: Points = measured.clock.iter().map(|row| (row.label_s, row.bias_s)).collect();
+    let middle_s = mean(&clock.iter().map(|point| point.1).collect::<Vec<_>>()).unwrap_or(0.0);
+    let clock = clock.into_iter().map(|(time, bias_s)| (time, (bias_s - middle_s) * 1e9)).collect();
+    let charts = [
+        over_time(
+            "Code error, the epoch's common part removed",
+            "error (m)",
+            0.1,
+            per_satellite(rows, |row| row.code_m),
+        ),
+        over_time(
+            "Carrier error, common part and a constant removed",
+            "error (cycles)",
+            0.01,
+            per_satellite(rows, |row| row.carrier_cycles),
+        ),
+        over_time("Doppler error, common part removed", "error (Hz)", 0.1, per_satellite(rows, |row| row.doppler_hz)),
+        over_time("C/N0 measured minus expected", "difference (dB)", 1.0, per_satellite(rows, |row| row.cn0_db)),
+        over_time(
+            &format!("Clock in the pseudoranges about {:+.4} µs", middle_s * 1e6),
+            "clock (ns)",
+            1.0,
+            vec![Series::new("clock", BLUE, Mark::Dots, clock)],
+        ),
+    ];
+    let legend: Vec<Series> = per_satellite(rows, |_| None);
+    figure(path, (1100, 1350), 1, &charts, &legend)
+}
+
+fn position(path: &Path, judged: &Judged) -> Result<(), JudgeError> {
+    let Some(places) = &judged.places else { return Ok(()) };
+    let over = |of: fn(&crate::analysis::judge::foreign::place::Row) -> f64| -> Points {
+        places.rows.iter().map(|row| (row.label_s, of(row))).collect()
+    };
+    let legend = vec![
+        Series::new("east", BLUE, Mark::Dots, over(|row| row.east_m)),
+        Series::new("north", ORANGE, Mark::Dots, over(|row| row.north_m)),
+        Series::new("up", GREEN, Mark::Dots, over(|row| row.up_m)),
+    ];
+    let time = over_time("Position error", "error (m)", 0.5, legend.clone());
+    let points: Points = places.rows.iter().map(|row| (row.east_m, row.north_m)).collect();
+    let bias = places.bias_enu_m.map(|[east, north, _]| (east.value, north.value));
+    let axis = |label, of: fn(&(f64, f64)) -> f64| Axis::around(label, points.iter().map(of).chain([0.0]), 0.5);
+    let (x, y) = (axis("east (m)", |p| p.0), axis("north (m)", |p| p.1));
+    let series = vec![
+        Series::new("fixes", GREY, Mark::Dots, points),
+        Series::new("mean", ORANGE, Mark::Cross, bias.into_iter().collect()),
+        Series::new("truth", GREEN, Mark::Cross, vec![(0.0, 0.0)]),
+    ];
+    let mut scatter = Chart::new("Horizontal error: mean (orange), truth (green)", x, y, series);
+    scatter.equal = true;
+    figure(path, (1300, 520), 2, &[time, scatter], &legend)
+}

@@ -1,0 +1,118 @@
+//! How the closed loops' errors are distributed, with the rules of thumb for their spread.
+
+use std::f64::consts::TAU;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::judge::judgement::digits;
+use crate::analysis::judge::summary::{DLL_CHIPS, FLL_HZ, PLL_DEG};
+use crate::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::statistics::{mean, std};
+
+/// The errors of one loop, each satellite about its own mean, and the rule for their σ.
+pub(crate) struct Loop {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub errors: Vec<f64>,
+    pub threshold: f64,
+}
+
+/// DLL, PLL and FLL, made one after the other.
+pub(crate) fn loops<'a>(judged: &'a Judged<'_>) -> impl Iterator<Item = Result<Loop, JudgeError>> + 'a {
+    let limits = &judged.summary.details.thresholds;
+    let all = [
+        ("DLL", "chips", DLL_CHIPS, limits.dll_chips),
+        ("PLL", "degrees", PLL_DEG, limits.pll_deg),
+        ("FLL", "Hz", FLL_HZ, limits.fll_hz),
+    ];
+    all.into_iter().map(|(name, unit, of, threshold)| {
+        let mut errors = Vec::with_capacity(judged.errors.signals.len());
+        for group in judged.errors.settled(of)? {
+            let middle = mean(&group).unwrap_or(0.0);
+            errors.extend(group.into_iter().map(|value| value - middle));
+        }
+        Ok(Loop { name, unit, errors, threshold })
+    })
+}
+
+const BINS: usize = 41;
+
+/// A histogram of a loop's errors: bins of equal width about zero, wide enough for the tails.
+pub(crate) struct Histogram {
+    pub sigma: f64,
+    pub half: f64,
+    pub width: f64,
+    pub counts: [usize; BINS],
+    total: usize,
+}
+
+impl Histogram {
+    pub fn new(of: &Loop) -> Self {
+        let sigma = std(&of.errors).unwrap_or(0.0);
+        let tails = (5.0 * sigma).max(1e-9);
+        // The threshold is drawn if it is not so far that the histogram would vanish.
+        let half = if of.threshold < 2.0 * tails { tails.max(1.15 * of.threshold) } else { tails };
+        let width = 2.0 * half / BINS as f64;
+        let mut counts = [0; BINS];
+        for value in &of.errors {
+            let bin = ((value + half) / width).floor();
+            if let Some(count) = (bin >= 0.0).then(|| counts.get_mut(bin as usize)).flatten() {
+                *count += 1;
+            }
+        }
+        Self { sigma, half, width, counts, total: of.errors.len() }
+    }
+
+    /// Middle of a bin.
+    pub fn middle(&self, bin: usize) -> f64 {
+        (bin as f64 + 0.5) * self.width - self.half
+    }
+
+    /// Percentage of the errors in a bin.
+    pub fn share(&self, bin: usize) -> f64 {
+        100.0 * self.counts.get(bin).copied().unwrap_or(0) as f64 / self.total.max(1) as f64
+    }
+
+    /// Percentage that a bin about `value` would hold of a normal distribution of the same σ.
+    pub fn normal(&self, value: f64) -> f64 {
+        let z = value / self.sigma;
+        100.0 * self.width / (self.sigma * TAU.sqrt()) * libm::exp(-0.5 * z * z)
+    }
+}
+
+/// Histograms with the fitted normal curve, ±σ and the threshold.
+pub fn jitter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let charts = loops(judged).map(|one| Ok(histogram(&one?))).collect::<Result<Vec<Chart>, JudgeError>>()?;
+    let legend = [
+        Series::new("replica − truth", BLUE, Mark::Bars(1.0), Vec::new()),
+        Series::new("normal", COLOURS[6], Mark::Line, Vec::new()),
+        Series::new("±1σ", GREY, Mark::Dash, Vec::new()),
+        Series::new("threshold for 1σ", ORANGE, Mark::Line, Vec::new()),
+    ];
+    Ok(Some(Sketch::charts((WIDTH_PX, 270), 3, charts, legend)))
+}
+
+fn histogram(of: &Loop) -> Chart {
+    let Loop { name, unit, threshold, .. } = of;
+    let histogram = Histogram::new(of);
+    let Histogram { sigma, half, width, .. } = histogram;
+    let bars: Vec<(f64, f64)> = (0..BINS).map(|bin| (histogram.middle(bin), histogram.share(bin))).collect();
+    let curve: Vec<(f64, f64)> = if sigma > 0.0 {
+        let steps = (0..=200).map(|step| half * (f64::from(step) / 100.0 - 1.0));
+        steps.map(|value| (value, histogram.normal(value))).collect()
+    } else {
+        Vec::new()
+    };
+    let top = 1.1 * bars.iter().chain(&curve).map(|point| point.1).fold(1.0, f64::max);
+    let mut series =
+        vec![Series::new("", BLUE, Mark::Bars(0.92 * width), bars), Series::new("", COLOURS[6], Mark::Line, curve)];
+    for sign in [-1.0, 1.0] {
+        series.push(Series::new("", GREY, Mark::Dash, vec![(sign * sigma, 0.0), (sign * sigma, top)]));
+        if *threshold < half {
+            series.push(Series::new("", ORANGE, Mark::Line, vec![(sign * threshold, 0.0), (sign * threshold, top)]));
+        }
+    }
+    let x = Axis::new(&format!("error ({unit})"), (-half, half));
+    let title = format!("{name}: σ {}, threshold {}", digits(sigma, 3), digits(*threshold, 3));
+    Chart::new(title, x, Axis::new("observations (%)", (0.0, top)), series)
+}

@@ -1,0 +1,219 @@
+//! The pictures of a run, one a question, with the words that go below them.
+//!
+//! [`canvas`] wraps the drawing library and [`drawing`] what becomes of its SVG; every other file here says
+//! what is drawn, as a sketch that holds all it needs: a run's rows are gone before the first picture is
+//! drawn. A picture with nothing to show is drawn with empty axes, so that a script finds the files it
+//! expects; only `psd.png` depends on `psd.csv` being there, `spoofing.png` on a spoofer and `multipath.png`
+//! on `truth/rays.csv`.
+
+pub mod canvas;
+mod clock;
+mod consistency;
+mod delays;
+pub mod drawing;
+mod elevation;
+pub(crate) mod foreign;
+pub(crate) mod jitter;
+mod multipath;
+mod position;
+mod signals;
+mod sketch;
+mod sky;
+mod spectrum;
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::judge::summary::Summary;
+use crate::analysis::measure::clock::Clock;
+use crate::analysis::measure::consistency::Consistency;
+use crate::analysis::measure::errors::Errors;
+use crate::analysis::read::Run;
+use canvas::Failure;
+use drawing::Drawing;
+pub(crate) use sketch::Sketch;
+
+/// Everything that a picture is drawn from.
+pub(crate) struct Judged<'a> {
+    pub run: &'a Run,
+    pub errors: &'a Errors,
+    pub clock: &'a Clock,
+    pub consistency: &'a Consistency,
+    pub summary: &'a Summary,
+}
+
+impl Judged<'_> {
+    /// An axis over the times at which there is something, or the whole run if there is nothing.
+    fn time_axis(&self, times_s: impl Iterator<Item = f64>) -> canvas::Axis {
+        let first_s = times_s.fold(self.run.scene.duration_s, f64::min);
+        let end_s = self.run.scene.duration_s;
+        // Some room before the first point shows that nothing came before it.
+        let from_s = if first_s < end_s { (first_s - 0.05 * (end_s - first_s)).max(0.0) } else { 0.0 };
+        canvas::Axis::new("time (s)", (from_s, end_s))
+    }
+}
+
+/// One picture of a run; `None` where the run has nothing of the kind.
+type Sketcher = fn(&Judged<'_>) -> Result<Option<Sketch>, JudgeError>;
+
+/// A picture by its name, what to look at in it, and the files that hold its numbers.
+#[cfg_attr(not(feature = "pdf"), allow(dead_code, reason = "captions are for paper, and a test holds the tables"))]
+pub(crate) struct Picture {
+    /// The PNG's, without its ending.
+    pub name: &'static str,
+    pub caption: &'static str,
+    /// Relative to the run's directory.
+    pub numbers: &'static [&'static str],
+    sketch: Sketcher,
+}
+
+/// The pictures in the order of the report, where a tall one and a low one share a page.
+pub(crate) const PICTURES: [Picture; 17] = [
+    Picture {
+        name: "sky",
+        caption: "Sky at the antenna. Each track ends in a dot at its last place, coloured by the mean C/N0 that the scene \
+                  sets; a hollow dot was never observed by the receiver.",
+        numbers: &["truth/sky.csv", "truth/observations.csv"],
+        sketch: sky::sky,
+    },
+    Picture {
+        name: "acquisition",
+        caption: "Largest statistic of the search for every code with the threshold of the designed false-alarm \
+                  probability. A cross marks what the scene has: a bar above the threshold without a cross is a false \
+                  acquisition, a cross over a short bar a miss.",
+        numbers: &["rx/acquisition.csv"],
+        sketch: spectrum::acquisition,
+    },
+    Picture {
+        name: "psd",
+        caption: "Power spectral density of the samples (Welch, Hann window, half overlap) with the theory of this scene: \
+                  main spectra of the codes over their aliases, noise floor, interference. Look for lines or slopes \
+                  that theory does not have.",
+        numbers: &["psd.csv", "psd_theory.csv"],
+        sketch: spectrum::psd,
+    },
+    Picture {
+        name: "cn0",
+        caption: "C/N0 as the receiver estimates it against what the scene sets. Below, the difference: the codes of the \
+                  other satellites cost about 1 dB, quantisation up to 1.96 dB with one bit.",
+        numbers: &["errors.csv"],
+        sketch: signals::cn0,
+    },
+    Picture {
+        name: "discriminators",
+        caption: "Raw discriminator outputs of the three loops while they track, before any filter. They scatter more than \
+                  the loops' errors by the root of the loop's bandwidth; a mean off zero shows dynamic stress.",
+        numbers: &["rx/tracking.csv"],
+        sketch: signals::discriminators,
+    },
+    Picture {
+        name: "jitter",
+        caption: "Errors of the closed loops, replica minus truth, each satellite about its mean and without the pull-in, \
+                  with the normal curve of the same mean and σ. The rules of thumb (d/6, 15°, 1/(12T)) are \
+                  bounds for σ, and are drawn where they come near. Satellites of different C/N0 together are more peaked than normal.",
+        numbers: &["histograms.csv", "errors.csv"],
+        sketch: jitter::jitter,
+    },
+    Picture {
+        name: "observables",
+        caption: "Errors of the observables against the truth. Code and carrier share the delays that the receiver cannot \
+                  see; what all satellites share is the clock's and harmless to the position.",
+        numbers: &["errors.csv"],
+        sketch: signals::observables,
+    },
+    Picture {
+        name: "elevation",
+        caption: "Errors of the observables over elevation, and the multipath combination over time: code that errs more low down, \
+                  or a combination that swings, is multipath or atmosphere.",
+        numbers: &["satellites.csv", "elevation.csv"],
+        sketch: elevation::elevation,
+    },
+    Picture {
+        name: "position_scatter",
+        caption: "Horizontal errors of the fixes about the truth with the ellipses that would hold 50 % and 95 % of a normal \
+                  scatter of the same covariance, and how errors are distributed. A cloud off the cross is a bias.",
+        numbers: &["position.csv"],
+        sketch: position::scatter,
+    },
+    Picture {
+        name: "position_time",
+        caption: "Errors of the fixes over time between the bounds that the receiver's own covariance sets (±1.96 σ).",
+        numbers: &["position.csv"],
+        sketch: position::time,
+    },
+    Picture {
+        name: "position_honesty",
+        caption: "Whether the receiver's own σ is honest: errors between ±2σ, and the normalised error squared, whose mean should \
+                  lie in the band that so many independent fixes allow. Above it the receiver is optimistic, below pessimistic.",
+        numbers: &["honesty.csv"],
+        sketch: consistency::consistency,
+    },
+    Picture {
+        name: "trajectory",
+        caption: "The way in plan and the height over time, as it was and as the receiver found it.",
+        numbers: &["truth/trajectory.csv", "rx/fixes.csv"],
+        sketch: position::trajectory,
+    },
+    Picture {
+        name: "clock_bias",
+        caption: "The receiver's clock: its bias as estimated and as it was with the straight line of least squares, the \
+                  difference, and both without their lines.",
+        numbers: &["clock.csv"],
+        sketch: clock::bias,
+    },
+    Picture {
+        name: "delays",
+        caption: "What ionosphere and troposphere truly add to the code of each satellite.",
+        numbers: &["truth/sky.csv"],
+        sketch: delays::delays,
+    },
+    Picture {
+        name: "allan",
+        caption: "Stability of the clock with intervals of 95 %: its estimate, the truth, the error, and what white noise \
+                  of code or carrier alone would give.",
+        numbers: &["allan.csv"],
+        sketch: clock::stability,
+    },
+    Picture {
+        name: "multipath",
+        caption: "Code errors beside the fading that reflected rays cause: a code error that follows the fading is \
+                  multipath.",
+        numbers: &["errors.csv", "truth/rays.csv"],
+        sketch: multipath::multipath,
+    },
+    Picture {
+        name: "spoofing",
+        caption: "Where the fixes went between the truth and what the spoofer claims.",
+        numbers: &["position.csv", "truth/claimed.csv"],
+        sketch: position::spoofing,
+    },
+];
+
+/// Pixels of a PNG in one pixel of a picture.
+const PNG_SCALE: f32 = 2.0;
+
+/// What each picture that a run has will show.
+pub(crate) fn sketches(judged: &Judged<'_>) -> Result<Vec<(&'static Picture, Sketch)>, JudgeError> {
+    let one = |picture: &'static Picture| (picture.sketch)(judged).map(|sketch| Some((picture, sketch?)));
+    PICTURES.iter().filter_map(|picture| one(picture).transpose()).collect()
+}
+
+/// Draws them into the run's directory.
+pub(crate) fn draw(
+    directory: &Path,
+    sketches: &[(&'static Picture, Sketch)],
+) -> Result<Vec<(&'static Picture, Drawing)>, JudgeError> {
+    let one = |(picture, sketch): &(&'static Picture, Sketch)| {
+        let path = directory.join(picture.name).with_extension("png");
+        let failed = |error: Failure| JudgeError::Plot { path: path.clone(), reason: error.to_string() };
+        let drawing = sketch.draw().map_err(failed)?;
+        drawing.write_png(&path, PNG_SCALE)?;
+        Ok((*picture, drawing))
+    };
+    sketches.par_iter().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests;

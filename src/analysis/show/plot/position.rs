@@ -1,0 +1,243 @@
+//! Where the fixes fell: about the truth, over time, and along the way.
+
+use std::collections::HashMap;
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::measure::errors::PositionError;
+use crate::analysis::measure::spoofing;
+use crate::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::statistics::percentile;
+use crate::gnss::earth::Geodetic;
+use crate::gnss::record::Fix;
+
+type Points = Vec<(f64, f64)>;
+
+/// East and north errors with the ellipses of 50 % and 95 %, and the distribution of horizontal and vertical errors.
+pub fn scatter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let errors = &judged.errors.positions;
+    let flat: Vec<Vector2<f64>> = errors.iter().map(|error| error.enu_m.xy()).collect();
+    let fixes = flat.iter().map(|at| (at.x, at.y)).collect();
+    let mut series = vec![Series::new("fixes", BLUE, Mark::Dots, fixes)];
+    if let Some(spread) = Spread::of(&flat) {
+        for (p, colour) in [(0.5, GREEN), (0.95, ORANGE)] {
+            series.push(Series::new(format!("{:.0} % ellipse", 100.0 * p), colour, Mark::Line, spread.ellipse(p)));
+        }
+        series.push(Series::new("mean", COLOURS[3], Mark::Cross, vec![(spread.mean.x, spread.mean.y)]));
+    }
+    series.push(Series::new("truth", COLOURS[6], Mark::Cross, vec![(0.0, 0.0)]));
+    let ends = || series.iter().flat_map(|one| one.points.iter()).flat_map(|&(x, y)| [x.abs(), y.abs()]);
+    let reach = 1.1 * ends().fold(0.05, f64::max);
+    let axis = |label| Axis::new(label, (-reach, reach));
+    let mut legend = series.clone();
+    let mut cloud = Chart::new("Horizontal error", axis("east (m)"), axis("north (m)"), series);
+    cloud.equal = true;
+
+    let horizontal: Vec<f64> = flat.iter().map(|at| at.norm()).collect();
+    let vertical: Vec<f64> = errors.iter().map(|error| error.enu_m.z.abs()).collect();
+    let distributions = vec![
+        Series::new("horizontal", BLUE, Mark::Line, distribution(&horizontal)),
+        Series::new("vertical", COLOURS[3], Mark::Dash, distribution(&vertical)),
+    ];
+    legend.extend(distributions.iter().cloned());
+    let longest = horizontal.iter().chain(&vertical).copied().fold(0.05, f64::max);
+    let x = Axis::new("error (m)", (0.0, 1.02 * longest));
+    let marks = [50.0, 95.0].map(|p| Series::new("", GREY, Mark::Dash, vec![(0.0, p), (1.02 * longest, p)]));
+    let title = match [0.5, 0.95].map(|p| percentile(&horizontal, p)) {
+        [Some(half), Some(most)] => format!("Horizontal: 50 % {half:.2} m, 95 % {most:.2} m"),
+        _ => "No fixes".to_owned(),
+    };
+    let curves = marks.into_iter().chain(distributions).collect();
+    let share = Chart::new(title, x, Axis::new("fixes below (%)", (0.0, 100.0)), curves);
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, [cloud, share], legend)))
+}
+
+/// Mean and covariance of a cloud.
+struct Spread {
+    mean: Vector2<f64>,
+    covariance: Matrix2<f64>,
+}
+
+impl Spread {
+    /// `None` of fewer than two points.
+    fn of(points: &[Vector2<f64>]) -> Option<Self> {
+        let count = points.len();
+        let mean = points.iter().sum::<Vector2<f64>>() / count.max(1) as f64;
+        let square = |point: &Vector2<f64>| (point - mean) * (point - mean).transpose();
+        let covariance = points.iter().map(square).sum::<Matrix2<f64>>() / count.checked_sub(1)? as f64;
+        (count > 1).then_some(Self { mean, covariance })
+    }
+
+    /// The ellipse that holds a share `p` of a normal distribution: (x − mean)ᵀ C⁻¹ (x − mean) = −2 ln(1 −
+    /// p), the quantile of χ² with two degrees of freedom.
+    fn ellipse(&self, p: f64) -> Points {
+        let radius = (-2.0 * libm::log1p(-p)).sqrt();
+        // C = R·diag(λ)·Rᵀ in closed form.
+        let (a, b, c) = (self.covariance.m11, self.covariance.m12, self.covariance.m22);
+        let middle = 0.5 * (a + c);
+        let reach = libm::hypot(0.5 * (a - c), b);
+        let axes = [middle + reach, middle - reach].map(|lambda| radius * lambda.max(0.0).sqrt());
+        let (sin, cos) = libm::sincos(0.5 * libm::atan2(2.0 * b, a - c));
+        let point = |step: i32| {
+            let (up, along) = libm::sincos(f64::from(2 * step).to_radians());
+            let (u, v) = (axes[0] * along, axes[1] * up);
+            (self.mean.x + u * cos - v * sin, self.mean.y + u * sin + v * cos)
+        };
+        (0..=180).map(point).collect()
+    }
+}
+
+/// Percentage of the values at or below each of them.
+fn distribution(values: &[f64]) -> Points {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let count = sorted.len().max(1) as f64;
+    let steps = (1..).zip(&sorted).map(|(rank, value)| (*value, 100.0 * f64::from(rank) / count));
+    std::iter::once((0.0, 0.0)).filter(|_| !values.is_empty()).chain(steps).collect()
+}
+
+/// Errors east, north, up and of the clock, between the bounds of the receiver's own covariance.
+pub fn time(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let formal: HashMap<u64, &Fix> = judged.run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
+    type Of<T> = fn(&T) -> f64;
+    let chart = |title: &str, of: Of<PositionError>, sigma: Of<Fix>| {
+        let errors = &judged.errors.positions;
+        let points: Points = errors.iter().map(|error| (error.time_s, of(error))).collect();
+        let bound = |sign: f64| -> Points {
+            let known = errors.iter().filter_map(|error| Some((error.time_s, formal.get(&error.sample)?)));
+            known.map(|(time_s, fix)| (time_s, sign * NORMAL_95 * sigma(fix))).collect()
+        };
+        let bounds = [bound(-1.0), bound(1.0)];
+        // A bound far outside the errors would hide them.
+        let own = points.iter().map(|p| p.1.abs()).fold(0.05, f64::max);
+        let near = bounds.iter().flatten().map(|p| p.1).filter(|value| value.abs() < 12.0 * own);
+        let y = Axis::around("error (m)", points.iter().map(|p| p.1).chain([0.0]).chain(near), 0.1);
+        let x = judged.time_axis(points.iter().map(|p| p.0));
+        let inside = |points: Points| points.into_iter().filter(|p| (y.from..=y.to).contains(&p.1)).collect();
+        let mut series = vec![Series::new("", GREY, Mark::Line, vec![(x.from, 0.0), (x.to, 0.0)])];
+        series.push(Series::new("", BLUE, Mark::Dots, points));
+        series.extend(bounds.map(|bound| Series::new("", ORANGE, Mark::Line, inside(bound))));
+        Chart::new(title, x, y, series)
+    };
+    let charts = [
+        chart("East", |error| error.enu_m.x, |fix| fix.sigma_east_m),
+        chart("North", |error| error.enu_m.y, |fix| fix.sigma_north_m),
+        chart("Up", |error| error.enu_m.z, |fix| fix.sigma_up_m),
+        chart("Clock, as a distance", |error| error.clock_m, |fix| fix.sigma_clock_m),
+    ];
+    let legend = [
+        Series::new("fixes", BLUE, Mark::Dots, Vec::new()),
+        Series::new("±1.96 σ of the receiver's covariance", ORANGE, Mark::Line, Vec::new()),
+    ];
+    Ok(Some(Sketch::charts((WIDTH_PX, 430), 2, charts, legend)))
+}
+
+/// Quantile of the normal distribution that leaves 2.5 % above.
+const NORMAL_95: f64 = 1.959_964;
+
+/// Where the fixes went between the truth and what a spoofer claims; nothing without one.
+pub fn spoofing(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let run = judged.run;
+    let (Some(origin), false) = (run.trajectory.first(), run.claimed.is_empty()) else { return Ok(None) };
+    let origin_m = origin.position_m();
+    let to_enu = Geodetic::from_ecef(&origin_m).ecef_to_enu();
+    let plan = |position_m: Vector3<f64>| {
+        let enu = to_enu * (position_m - origin_m);
+        (enu.x, enu.y)
+    };
+    let series = vec![
+        Series::new("fixes", ORANGE, Mark::Dots, run.fixes.iter().map(|fix| plan(fix.position_m())).collect()),
+        Series::new("claimed", GREEN, Mark::Dash, run.claimed.iter().map(|row| plan(row.position_m())).collect()),
+        Series::new(
+            "truth",
+            BLUE,
+            Mark::Cross,
+            run.trajectory.iter().step_by(50).map(|row| plan(row.position_m())).collect(),
+        ),
+    ];
+    let values =
+        |of: fn(&(f64, f64)) -> f64| series.iter().flat_map(move |one| one.points.iter().map(of)).collect::<Vec<_>>();
+    let east = Axis::around("east of the start (m)", values(|p| p.0).into_iter(), 2.0);
+    let north = Axis::around("north of the start (m)", values(|p| p.1).into_iter(), 2.0);
+    let moved = spoofing::moved(run);
+    let distance = |name: &str, colour, mark, of: fn(&spoofing::Moved) -> f64| {
+        Series::new(name, colour, mark, moved.iter().map(|fix| (fix.time_s, of(fix))).collect())
+    };
+    let distances = vec![
+        distance("fix from truth", ORANGE, Mark::Dots, |fix| fix.from_truth_m),
+        distance("claim from truth", GREEN, Mark::Dash, |fix| fix.claim_from_truth_m),
+        distance("fix from claim", COLOURS[3], Mark::Line, |fix| fix.from_claim_m),
+    ];
+    let y = Axis::around("distance (m)", distances.iter().flat_map(|one| one.points.iter().map(|p| p.1)), 1.0);
+    let x = judged.time_axis(moved.iter().map(|fix| fix.time_s));
+    let legend = [series.clone(), distances.clone()].concat();
+    let mut plan = Chart::new("Plan view", east, north, series);
+    plan.equal = true;
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, [plan, Chart::new("While the spoofer is on", x, y, distances)], legend)))
+}
+
+/// The way in plan and its height over time, as it was and as found.
+pub fn trajectory(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let run = judged.run;
+    let origin_m = run.trajectory.first().map_or_else(Vector3::zeros, |row| row.position_m());
+    let to_enu = Geodetic::from_ecef(&origin_m).ecef_to_enu();
+    let plan = |position_m: Vector3<f64>| {
+        let enu = to_enu * (position_m - origin_m);
+        (enu.x, enu.y)
+    };
+    let height = |position_m: Vector3<f64>| Geodetic::from_ecef(&position_m).height_m;
+    let pair = |truth: Points, fixes: Points| {
+        vec![Series::new("fixes", ORANGE, Mark::Dots, fixes), Series::new("truth", BLUE, Mark::Line, truth)]
+    };
+    let plans = pair(
+        run.trajectory.iter().map(|row| plan(row.position_m())).collect(),
+        run.fixes.iter().map(|fix| plan(fix.position_m())).collect(),
+    );
+    let heights = pair(
+        run.trajectory.iter().map(|row| (run.time_s(row.sample), height(row.position_m()))).collect(),
+        run.fixes.iter().map(|fix| (run.time_s(fix.sample), height(fix.position_m()))).collect(),
+    );
+    let values = |series: &[Series], of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
+        series.iter().flat_map(|series| series.points.iter().map(of)).collect()
+    };
+    let east = Axis::around("east of the start (m)", values(&plans, |p| p.0).into_iter(), 2.0);
+    let north = Axis::around("north of the start (m)", values(&plans, |p| p.1).into_iter(), 2.0);
+    let up = Axis::around("height above the ellipsoid (m)", values(&heights, |p| p.1).into_iter(), 2.0);
+    let mut legend = plans.clone();
+    legend.push(Series::new("start", COLOURS[6], Mark::Cross, vec![(0.0, 0.0)]));
+    let mut plan = Chart::new("Plan view", east, north, legend.clone());
+    plan.equal = true;
+    let time = Axis::new("time (s)", (0.0, run.scene.duration_s));
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, [plan, Chart::new("Height", time, up, heights)], legend)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ellipse_of_95_percent_holds_95_percent_of_a_normal_cloud() {
+        // A skewed normal cloud from a low-discrepancy square by Box and Muller.
+        let point = |n: u32| {
+            let (u, v) = ((f64::from(n) + 0.5) / 20_000.0, (f64::from(n) * 0.618_033_988_749_894_9).fract());
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * v);
+            let r = (-2.0 * libm::log(u)).sqrt();
+            Vector2::new(3.0 + 2.0 * r * cos + 0.5 * r * sin, -1.0 + 0.7 * r * sin - 0.4 * r * cos)
+        };
+        let cloud: Vec<Vector2<f64>> = (0..20_000).map(point).collect();
+        let spread = Spread::of(&cloud).unwrap();
+        for p in [0.5, 0.95] {
+            let edge = spread.ellipse(p);
+            let inside = |at: &&Vector2<f64>| {
+                // A convex polygon that runs anticlockwise: left of every side.
+                edge.windows(2).all(|w| (w[1].0 - w[0].0) * (at.y - w[0].1) >= (w[1].1 - w[0].1) * (at.x - w[0].0))
+            };
+            let share = cloud.iter().filter(inside).count() as f64 / 20_000.0;
+            // The points are spread more evenly than by chance, whose 3 sigma would be 0.011.
+            assert!((share - p).abs() < 0.005, "{share} instead of {p}");
+        }
+        assert!(Spread::of(&cloud[..1]).is_none());
+    }
+}

@@ -1,0 +1,175 @@
+//! Loops and observations over time, satellite by satellite.
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::measure::errors::{Link, SignalError};
+use crate::analysis::show::plot::canvas::{Axis, Chart, Mark, Series, WIDTH_PX};
+use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::statistics::ranked;
+use crate::gnss::record::TrackingRow;
+
+pub(super) type Points = Vec<(f64, f64)>;
+
+/// What a chart of one kind of value is called, and the least span of its axis.
+pub(super) struct Frame<'a> {
+    pub title: &'a str,
+    pub y_label: &'a str,
+    pub least: f64,
+}
+
+/// Values by which an axis is chosen: enough to tell a thousandth of them.
+const MOST_VALUES: usize = 1 << 16;
+
+/// Points of all satellites, as many as are drawn, in a frame that holds most of them.
+pub(super) struct Cloud {
+    pub y: Axis,
+    pub series: Vec<Series>,
+    /// Least abscissa.
+    pub first_x: f64,
+    pub total: usize,
+    /// Points beyond the axis.
+    pub outside: usize,
+}
+
+impl Cloud {
+    /// Asks twice for the points of each satellite, so that only one satellite's are held: for the axis, and
+    /// to keep some.
+    pub fn new(
+        judged: &Judged<'_>,
+        links: &[Link],
+        frame: &Frame<'_>,
+        points: impl Fn(Link) -> Result<Points, JudgeError>,
+    ) -> Result<Self, JudgeError> {
+        let (mut values, mut total, mut stride, mut first_x) = (Vec::new(), 0, 1, f64::INFINITY);
+        for link in links {
+            for (x, y) in points(*link)? {
+                first_x = first_x.min(x);
+                if !y.is_finite() {
+                    continue;
+                }
+                if total % stride == 0 {
+                    values.push(y);
+                }
+                total += 1;
+                if values.len() == MOST_VALUES {
+                    // Every other one stays, and comes from now on.
+                    let mut place = 0;
+                    values.retain(|_| {
+                        place += 1;
+                        place % 2 == 1
+                    });
+                    stride *= 2;
+                }
+            }
+        }
+        values.sort_by(f64::total_cmp);
+        // Pull-in may be far outside; the axis shows what holds most of the time.
+        let [low, high] = [0.002, 0.998].map(|p| ranked(&values, p).unwrap_or(0.0));
+        drop(values);
+        let y = Axis::around(frame.y_label, [low, high].into_iter(), frame.least.max(1.3 * (high - low)));
+        let (mut series, mut inside) = (Vec::new(), 0);
+        for (index, link) in links.iter().enumerate() {
+            let mut shown = points(*link)?;
+            shown.retain(|point| (y.from..=y.to).contains(&point.1));
+            inside += shown.len();
+            let mut one = Series::numbered(judged.run.name(*link), index, shown);
+            one.thin(links.len());
+            series.push(one);
+        }
+        Ok(Self { y, series, first_x, total, outside: total - inside })
+    }
+}
+
+/// One chart of something over time with a series a satellite.
+pub(super) fn over_time(
+    judged: &Judged<'_>,
+    links: &[Link],
+    frame: &Frame<'_>,
+    points: impl Fn(Link) -> Result<Points, JudgeError>,
+) -> Result<Chart, JudgeError> {
+    let Cloud { y, series, first_x, total, outside } = Cloud::new(judged, links, frame, points)?;
+    let title = frame.title;
+    let title = if outside > 0 { format!("{title} ({outside} of {total} points outside)") } else { title.to_owned() };
+    Ok(Chart::new(title, judged.time_axis(std::iter::once(first_x)), y, series))
+}
+
+/// Satellites by their marks.
+pub(super) fn legend(judged: &Judged<'_>, links: &[Link]) -> Vec<Series> {
+    let one = |(index, link): (usize, &Link)| Series::numbered(judged.run.name(*link), index, Vec::new());
+    links.iter().enumerate().map(one).collect()
+}
+
+/// Raw discriminators of the three loops.
+pub fn discriminators(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let run = judged.run;
+    let links: Vec<Link> = run.tracking.keys().collect();
+    let chart = |title, y_label, least, of: fn(&TrackingRow) -> f64| {
+        over_time(judged, &links, &Frame { title, y_label, least }, |link| {
+            run.tracking.map(link, |row| (run.time_s(row.sample), of(&row)))
+        })
+    };
+    let charts = [
+        chart("DLL discriminator", "output (chips)", 0.02, |row| row.dll_discriminator_chips)?,
+        chart("PLL discriminator", "output (degrees)", 2.0, |row| row.pll_discriminator_cycles * 360.0)?,
+        chart("FLL discriminator", "output (Hz)", 2.0, |row| row.fll_discriminator_hz)?,
+    ];
+    Ok(Some(Sketch::charts((WIDTH_PX, 540), 1, charts, legend(judged, &links))))
+}
+
+/// Satellites that were observed.
+pub(super) fn observed(judged: &Judged<'_>) -> Vec<Link> {
+    judged.errors.signals.keys().collect()
+}
+
+/// One number of a satellite's observations over time.
+pub(super) fn of_observations(
+    judged: &Judged<'_>,
+    link: Link,
+    of: impl Fn(&SignalError) -> f64,
+) -> Result<Points, JudgeError> {
+    judged.errors.signals.map(link, |row| (row.time_s, of(&row)))
+}
+
+/// C/N0 over time as measured and as it was, and the means side by side.
+pub fn cn0(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let links = observed(judged);
+    // Under interference what is expected is far from what is set.
+    let (word, reference): (&str, fn(&SignalError) -> f64) = if judged.summary.jammed {
+        ("expected", |row| row.cn0_effective_dbhz)
+    } else {
+        ("set", |row| row.cn0_true_dbhz)
+    };
+    let chart = |title: &str, y_label, least, of: &dyn Fn(&SignalError) -> f64| {
+        over_time(judged, &links, &Frame { title, y_label, least }, |link| of_observations(judged, link, of))
+    };
+    let title = format!("C/N0 as measured (points) and as {word} (lines)");
+    let mut above = chart(&title, "C/N0 (dB-Hz)", 4.0, &|row| row.cn0_dbhz)?;
+    let mut all = Vec::new();
+    for (index, link) in links.iter().enumerate() {
+        let rows = judged.errors.signals.map(*link, |row| (row.time_s, row.cn0_dbhz, reference(&row)))?;
+        let finite = rows.iter().flat_map(|row| [row.1, row.2]).filter(|value| value.is_finite());
+        let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        all.extend([low, high]);
+        let mut line = Series::numbered(judged.run.name(*link), index, rows.iter().map(|row| (row.0, row.2)).collect());
+        line.mark = Mark::Line;
+        line.thin(links.len());
+        above.series.push(line);
+    }
+    above.y = Axis::around("C/N0 (dB-Hz)", all.into_iter(), 4.0);
+    let title = format!("C/N0 measured minus {word}");
+    let below = chart(&title, "difference (dB)", 1.0, &|row| row.cn0_dbhz - reference(row))?;
+    Ok(Some(Sketch::charts((WIDTH_PX, 430), 1, [above, below], legend(judged, &links))))
+}
+
+/// Errors of code, carrier and Doppler.
+pub fn observables(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let links = observed(judged);
+    let chart = |title, y_label, least, of: fn(&SignalError) -> f64| {
+        over_time(judged, &links, &Frame { title, y_label, least }, |link| of_observations(judged, link, of))
+    };
+    let charts = [
+        chart("Code error", "error (m)", 0.1, |row| row.code_m)?,
+        chart("Carrier error, a constant removed from each arc", "error (cycles)", 0.01, |row| row.carrier_cycles)?,
+        chart("Doppler error", "error (Hz)", 0.1, |row| row.doppler_hz)?,
+    ];
+    Ok(Some(Sketch::charts((WIDTH_PX, 540), 1, charts, legend(judged, &links))))
+}

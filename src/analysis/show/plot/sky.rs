@@ -1,0 +1,153 @@
+//! Where the satellites stood and how strong they were received.
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, VPos};
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::show::plot::canvas::{Area, FINE, Failure, GREY, WIDTH_PX, anchored};
+use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::statistics::mean;
+use crate::gnss::satellite::Sv;
+
+const HEIGHT_PX: i32 = 490;
+const CENTRE: (i32, i32) = (290 * FINE, 255 * FINE);
+const RADIUS: f64 = (195 * FINE) as f64;
+
+/// A satellite's way over the sky.
+struct Track {
+    sv: Sv,
+    /// Where it stood, in virtual pixels; places that follow each other differ.
+    places: Vec<(i32, i32)>,
+    cn0_dbhz: Option<f64>,
+    observed: bool,
+}
+
+/// Polar plot: north up, zenith in the middle, tracks ending in a labelled dot whose colour is the mean C/N0 as
+/// set; a satellite that the receiver did not observe is hollow.
+pub fn sky(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let run = judged.run;
+    let mut tracks = Vec::new();
+    for sv in run.sky.keys() {
+        let mut places: Vec<(i32, i32)> = run.sky.map(sv, |row| place(row.azimuth_deg, row.elevation_deg))?;
+        places.dedup();
+        let cn0: Vec<f64> = run.expected.iter().filter(|one| one.sv == sv).map(|one| one.cn0_mean_dbhz).collect();
+        let observed = judged.errors.signals.keys().any(|link| link.sv == sv);
+        tracks.push(Track { sv, places, cn0_dbhz: mean(&cn0), observed });
+    }
+    let skyline_deg = run.scene.skyline_deg.clone();
+    let draw = Box::new(move |area: &Area<'_>| tracked(area, &tracks, &skyline_deg));
+    Ok(Some(Sketch::Free { size: (WIDTH_PX, HEIGHT_PX as u32), draw }))
+}
+
+fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Result<(), Failure> {
+    let strengths = || tracks.iter().filter_map(|track| track.cn0_dbhz);
+    let low = strengths().fold(f64::INFINITY, f64::min).floor();
+    let high = strengths().fold(f64::NEG_INFINITY, f64::max).ceil();
+    let (low, high) = if low < high { (low, high) } else { (30.0, 50.0) };
+    obstructed(area, skyline_deg)?;
+    frame(area)?;
+    scale(area, low, high)?;
+    // Names keep clear of the dots, the tracks and each other.
+    let mut taken: Vec<(i32, i32)> = tracks.iter().flat_map(|track| track.places.iter().copied()).collect();
+    let mut ends = Vec::new();
+    for Track { sv, places, cn0_dbhz, observed } in tracks {
+        let colour = cn0_dbhz.map_or(GREY, |cn0| shade(cn0, low, high));
+        let Some(&end) = places.last() else { continue };
+        area.draw(&PathElement::new(places.clone(), colour.stroke_width(3 * FINE as u32)))?;
+        area.draw(&Circle::new(end, 8 * FINE, if *observed { colour.filled() } else { WHITE.filled() }))?;
+        area.draw(&Circle::new(end, 8 * FINE, colour.stroke_width(2 * FINE as u32)))?;
+        ends.push((*sv, end));
+    }
+    for (sv, end) in ends {
+        label(area, sv, end, &mut taken)?;
+    }
+    let note = anchored(12, HPos::Left, VPos::Center);
+    let shaded = if skyline_deg.is_empty() { "" } else { "; shaded: obstructed at the start" };
+    area.draw(&Text::new(
+        format!("filled: observed by the receiver{shaded}"),
+        (14 * FINE, (HEIGHT_PX - 16) * FINE),
+        note,
+    ))?;
+    Ok(())
+}
+
+/// Shades what lies between the horizon and the skyline.
+fn obstructed(area: &Area<'_>, skyline_deg: &[[f64; 2]]) -> Result<(), Failure> {
+    let skyline = skyline_deg.iter().map(|[azimuth_deg, elevation_deg]| place(*azimuth_deg, *elevation_deg));
+    let rim = skyline_deg.iter().rev().map(|[azimuth_deg, _]| place(*azimuth_deg, 0.0));
+    area.draw(&Polygon::new(skyline.chain(rim).collect::<Vec<_>>(), RGBColor(226, 222, 214).filled()))?;
+    Ok(())
+}
+
+/// Writes a satellite's name beside its dot, on the first side where nothing else is.
+fn label(area: &Area<'_>, sv: Sv, (x, y): (i32, i32), taken: &mut Vec<(i32, i32)>) -> Result<(), Failure> {
+    let sides = [(28, 0), (-28, 0), (0, -18), (0, 18), (24, -15), (-24, -15), (24, 15), (-24, 15)];
+    let spots = sides.map(|(dx, dy)| (x + dx * FINE, y + dy * FINE));
+    let free = |spot: &(i32, i32)| {
+        taken.iter().all(|other| (spot.0 - other.0).abs() > 24 * FINE || (spot.1 - other.1).abs() > 13 * FINE)
+    };
+    let spot = spots.iter().copied().find(free).unwrap_or(spots[0]);
+    // A name is wider than a dot: its two ends stand for it.
+    taken.extend([(spot.0 - 12 * FINE, spot.1), (spot.0 + 12 * FINE, spot.1)]);
+    area.draw(&Text::new(sv.to_string(), spot, anchored(14, HPos::Center, VPos::Center)))?;
+    Ok(())
+}
+
+fn place(azimuth_deg: f64, elevation_deg: f64) -> (i32, i32) {
+    let (sin, cos) = libm::sincos(azimuth_deg.to_radians());
+    let distance = RADIUS * (90.0 - elevation_deg) / 90.0;
+    (CENTRE.0 + (distance * sin) as i32, CENTRE.1 - (distance * cos) as i32)
+}
+
+fn shade(cn0_dbhz: f64, low: f64, high: f64) -> RGBColor {
+    // The palest yellow end of the map is left out: it vanishes on white.
+    ViridisRGB.get_color_normalized((cn0_dbhz - low) / (high - low) * 0.92, 0.0, 1.0)
+}
+
+fn frame(area: &Area<'_>) -> Result<(), Failure> {
+    let title = anchored(15, HPos::Center, VPos::Center);
+    area.draw(&Text::new("Satellites above the horizon", (CENTRE.0, 20 * FINE), title))?;
+    let line = RGBColor(205, 205, 205).stroke_width(FINE as u32);
+    for elevation_deg in [0.0, 30.0, 60.0_f64] {
+        let (x, y) = place(0.0, elevation_deg);
+        area.draw(&Circle::new(CENTRE, CENTRE.1 - y, line))?;
+        if elevation_deg == 0.0 {
+            continue;
+        }
+        let style = anchored(12, HPos::Left, VPos::Bottom).color(&GREY);
+        area.draw(&Text::new(format!("{elevation_deg:.0}°"), (x + 4 * FINE, y - 2 * FINE), style))?;
+    }
+    for azimuth_deg in (0..360).step_by(30) {
+        let azimuth_deg = f64::from(azimuth_deg);
+        area.draw(&PathElement::new([CENTRE, place(azimuth_deg, 0.0)], line))?;
+        let name = match azimuth_deg as i32 {
+            0 => "N".to_owned(),
+            90 => "E".to_owned(),
+            180 => "S".to_owned(),
+            270 => "W".to_owned(),
+            other => format!("{other}°"),
+        };
+        area.draw(&Text::new(name, place(azimuth_deg, -8.0), anchored(13, HPos::Center, VPos::Center)))?;
+    }
+    Ok(())
+}
+
+/// The colours of C/N0 with their ends.
+fn scale(area: &Area<'_>, low: f64, high: f64) -> Result<(), Failure> {
+    let (left, top, width, height) = (580 * FINE, 80 * FINE, 18 * FINE, 2 * FINE);
+    let steps = 150;
+    for step in 0..steps {
+        let cn0 = high - (high - low) * f64::from(step) / f64::from(steps);
+        let corner = (left, top + step * height);
+        let opposite = (left + width, top + (step + 1) * height + 1);
+        area.draw(&Rectangle::new([corner, opposite], shade(cn0, low, high).filled()))?;
+    }
+    for tick in 0..=4 {
+        let cn0 = high - (high - low) * f64::from(tick) / 4.0;
+        let at = (left + width + 6 * FINE, top + steps * height * tick / 4);
+        area.draw(&Text::new(format!("{cn0:.1}"), at, anchored(12, HPos::Left, VPos::Center)))?;
+    }
+    let style = anchored(12, HPos::Center, VPos::Bottom);
+    area.draw(&Text::new("C/N0 (dB-Hz)", (left + 14 * FINE, top - 10 * FINE), style))?;
+    Ok(())
+}

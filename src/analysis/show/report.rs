@@ -1,0 +1,189 @@
+//! The table that a terminal shows after a run.
+
+use std::fmt;
+
+use crate::analysis::judge::judgement::Status;
+use crate::analysis::judge::summary::Summary;
+use crate::analysis::measure::consistency::Calibration;
+use crate::analysis::statistics::Spread;
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rate_msps = self.sample_rate_hz / 1e6;
+        writeln!(f, "{} · {} s at {rate_msps} Msps · seed {}", self.scene, self.duration_s, self.seed)?;
+        self.satellite_lines(f)?;
+        writeln!(f, "\n{:<26}{:>12}{:>12}{:>12}", "error", "mean", "sigma", "95 %")?;
+        let details = &self.details;
+        line(f, "pseudorange* (m)", details.pseudorange_m)?;
+        line(f, "carrier phase (cycles)", details.carrier_cycles)?;
+        line(f, "Doppler (Hz)", details.doppler_hz)?;
+        line(f, "C/N0 (dB)", details.cn0_db)?;
+        line(f, "position east (m)", details.east_m)?;
+        line(f, "position north (m)", details.north_m)?;
+        line(f, "position up (m)", details.up_m)?;
+        line(f, "clock (m)", details.clock_m)?;
+        line(f, "velocity, magnitude (m/s)", details.velocity_mps)?;
+        if let (Some(mean), Some(p95)) = (self.position.horizontal_mean_m, self.position.horizontal_p95_m) {
+            writeln!(f, "{:<26}{mean:>12.3}{:>12}{p95:>12.3}", "horizontal distance (m)", "")?;
+        }
+        writeln!(f, "* the part common to all satellites of an epoch removed")?;
+        self.loop_lines(f)?;
+        self.clock_lines(f)?;
+        self.verdict_lines(f)?;
+        self.speed_line(f)
+    }
+}
+
+impl Summary {
+    fn satellite_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = &self.satellites;
+        write!(f, "satellites    {} in view, {} acquired, {} used", count.in_view, count.acquired, count.used)?;
+        if !self.details.false_satellites.is_empty() {
+            write!(f, ", false: {}", self.details.false_satellites.join(" "))?;
+        }
+        writeln!(f)?;
+        match self.position.first_fix_s {
+            Some(first_s) => writeln!(f, "first fix     {first_s:.1} s, {} fixes", self.position.fixes)?,
+            None => writeln!(f, "first fix     none")?,
+        }
+        let navigation = &self.navigation;
+        writeln!(
+            f,
+            "navigation    {} parameters checked, {} wrong",
+            navigation.parameters_checked, navigation.parameters_wrong
+        )?;
+        for row in self.details.wrong_parameters.iter().take(5) {
+            writeln!(f, "              {} issue {}: {} decoded as {}", row.sv, row.issue, row.parameter, row.raw)?;
+        }
+        let details = &self.details;
+        if let (Some(measured), Some(effective), Some(set)) =
+            (details.cn0_measured_dbhz, details.cn0_effective_dbhz, details.cn0_true_dbhz)
+        {
+            writeln!(
+                f,
+                "C/N0          {measured:.2} dB-Hz measured, {effective:.2} expected: {set:.2} set, less the other satellites' codes{}",
+                if self.jammed { " and interference" } else { "" }
+            )?;
+        }
+        if self.details.unmatched_observations > 0 {
+            writeln!(f, "observations  {} have no truth", self.details.unmatched_observations)?;
+        }
+        if let Some(lines) = &self.interference {
+            write!(
+                f,
+                "interference  {} of {} s with a continuous wave told, {} told in error",
+                lines.wave_seconds_told, lines.wave_seconds, lines.false_told
+            )?;
+            if let (Some(error_hz), Some(error_db)) = (lines.frequency_error_max_hz, lines.jn0_error_max_db) {
+                write!(f, "; frequency within {error_hz:.1} Hz, J/N0 within {error_db:.1} dB")?;
+            }
+            writeln!(f)?;
+        }
+        if let Some(spoofing) = &self.spoofing {
+            let metres = |value: Option<f64>| number(value, 1);
+            writeln!(
+                f,
+                "spoofing      fixes up to {} m from the truth, claims up to {:.1} m; {} % of the fixes captured, 95 % within {} m of the claim",
+                metres(spoofing.displacement_max_m),
+                spoofing.claimed_displacement_max_m,
+                number(spoofing.captured_share.map(|share| 100.0 * share), 0),
+                metres(spoofing.from_claim_p95_m)
+            )?;
+        }
+        for null_hz in &self.details.psd_nulls_hz {
+            writeln!(f, "spectrum      null at {:+.4} MHz from the carrier", null_hz / 1e6)?;
+        }
+        Ok(())
+    }
+
+    fn loop_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (tracking, limits) = (&self.tracking, &self.details.thresholds);
+        writeln!(f, "\n{:<26}{:>12}{:>12}", "loop (replica - truth)", "sigma", "threshold")?;
+        let rows = [
+            ("DLL (chips)", tracking.dll_sigma_chips, limits.dll_chips),
+            ("PLL (degrees)", tracking.pll_sigma_deg, limits.pll_deg),
+            ("FLL (Hz)", tracking.fll_sigma_hz, limits.fll_hz),
+        ];
+        for (name, sigma, limit) in rows {
+            writeln!(f, "{name:<26}{:>12}{limit:>12.4}", number(sigma, 4))?;
+        }
+        writeln!(f, "{} losses of lock, {} cycle slips", tracking.losses_of_lock, tracking.cycle_slips)?;
+        for (name, pooled) in [("DLL", tracking.dll_chips), ("PLL", tracking.pll_deg), ("FLL", tracking.fll_hz)] {
+            let Some(pooled) = pooled else { continue };
+            let (sigma, theory) = (pooled.sigma, pooled.theory_sigma);
+            writeln!(
+                f,
+                "{name} against theory    closed loop {:.3} of it, {} rules broken",
+                sigma / theory,
+                pooled.rules_broken
+            )?;
+        }
+        if let (Some(mean), Some([low, high])) = (self.position.nees_mean, self.position.nees_band) {
+            let fixes = number(self.position.nees_independent, 0);
+            let verdict = self.position.nees_verdict.map_or("unjudged", Calibration::name);
+            writeln!(
+                f,
+                "covariance    {verdict}: normalised error squared {mean:.2}, of honest ones {low:.2} to {high:.2} ({fixes} independent fixes)"
+            )?;
+        }
+        Ok(())
+    }
+
+    fn clock_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let clock = &self.clock;
+        if let (Some(drift), Some(true_drift)) = (clock.drift, clock.true_drift) {
+            writeln!(f, "\nclock         drift {drift:+.4e} found, {true_drift:+.4e} true")?;
+        }
+        let Some(point) = self.details.clock_oadev_1s else { return Ok(()) };
+        write!(f, "Allan, 1 s    {:.2e} found", point.deviation)?;
+        if let Some((low, high)) = point.interval {
+            write!(f, " (95 % within {low:.2e} to {high:.2e})")?;
+        }
+        match clock.true_oadev_1s {
+            Some(truth) => write!(f, ", {truth:.2e} true")?,
+            None => write!(f, ", a true clock without noise")?,
+        }
+        match clock.code_noise_oadev_1s {
+            Some(code) => writeln!(f, ", {code:.2e} if code noise were white"),
+            None => writeln!(f),
+        }
+    }
+
+    fn verdict_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = &self.details.verdict;
+        writeln!(f, "\nverdict       {}", verdict.in_words())?;
+        for row in verdict.rows.iter().filter(|row| row.status != Status::Pass) {
+            let (value, word, margin) = (row.value_text(), row.status.word(), row.margin_text());
+            writeln!(f, "{word:<14}{} {value} {}, limit {}: {margin}", row.figure, row.unit, row.bound)?;
+            row.why.iter().try_for_each(|line| writeln!(f, "{:<14}  {line}", ""))?;
+        }
+        Ok(())
+    }
+
+    fn speed_line(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let speed = &self.speed;
+        let stages = [
+            ("generate", speed.generate_x_real_time),
+            ("receive", speed.receive_x_real_time),
+            ("run", speed.run_x_real_time),
+        ];
+        let mut parts: Vec<String> =
+            stages.iter().filter_map(|(name, times)| times.map(|times| format!("{name} {times:.1}x"))).collect();
+        if parts.is_empty() {
+            return Ok(());
+        }
+        parts.extend(speed.cpu_s.map(|cpu_s| format!("{cpu_s:.1} s of CPU")));
+        parts.extend(speed.peak_memory_mib.map(|mib| format!("{mib:.0} MiB")));
+        writeln!(f, "\nspeed         {} (x real time)", parts.join(", "))
+    }
+}
+
+fn line(f: &mut fmt::Formatter<'_>, name: &str, spread: Option<Spread>) -> fmt::Result {
+    let [mean, sigma, p95] =
+        [spread.map(|s| s.mean), spread.map(|s| s.sigma), spread.map(|s| s.p95)].map(|value| number(value, 4));
+    writeln!(f, "{name:<26}{mean:>12}{sigma:>12}{p95:>12}")
+}
+
+fn number(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+}

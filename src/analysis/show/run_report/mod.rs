@@ -1,0 +1,193 @@
+//! `report.pdf` of a run: the verdict on one page, then tables, pictures, settings, and how the figures were made.
+
+mod method;
+mod tables;
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::judge::judgement::{Status, number};
+use crate::analysis::judge::verdict::Verdict;
+use crate::analysis::show::pdf::{Cell, Item, Report, Side, Table, Tone};
+use crate::analysis::show::plot::drawing::Drawing;
+use crate::analysis::show::plot::{Judged, Picture};
+use crate::analysis::show::write::write_whole;
+
+/// A run's report, complete but for its pictures.
+pub(crate) struct RunReport {
+    report: Report,
+    /// Where among its items they come.
+    figures: usize,
+}
+
+impl RunReport {
+    /// What a run's report says.
+    pub fn new(judged: &Judged<'_>) -> Result<Self, JudgeError> {
+        let summary = judged.summary;
+        let head = format!("receiver against truth · seed {}", summary.seed);
+        let subtitle = "Receiver against truth: what a run of this scene came to.";
+        let mut report = Report::new(summary.scene.clone(), subtitle, head);
+        verdict(&mut report, &summary.details.verdict);
+        report.subheading("The run").add(Item::Facts(facts(judged)));
+        report.add(Item::NewPage);
+        tables::add(&mut report, judged)?;
+        report.add(Item::NewPage).heading("Figures");
+        let figures = report.items.len();
+        report.add(Item::NewPage);
+        settings(&mut report, judged);
+        method::add(&mut report, judged);
+        Ok(Self { report, figures })
+    }
+
+    /// Writes `report.pdf` with its pictures into a run's directory.
+    pub fn write(mut self, directory: &Path, pictures: Vec<(&'static Picture, Drawing)>) -> Result<(), JudgeError> {
+        let path = directory.join("report.pdf");
+        let item = |(picture, drawing): (&Picture, Drawing)| {
+            Item::Figure(drawing, format!("{} Numbers: {}.", picture.caption, picture.numbers.join(", ")))
+        };
+        self.report.items.splice(self.figures..self.figures, pictures.into_iter().map(item));
+        let pdf = self.report.pdf();
+        let pdf = pdf.map_err(|error| JudgeError::Plot { path: path.clone(), reason: error.to_string() })?;
+        write_whole(&path, &pdf)
+    }
+}
+
+fn tone(status: Status) -> Tone {
+    match status {
+        Status::Pass => Tone::Good,
+        Status::Marginal => Tone::Caution,
+        Status::Fail => Tone::Bad,
+    }
+}
+
+/// Every judged figure, the worst first among equals of their order.
+fn verdict(report: &mut Report, verdict: &Verdict) {
+    let names = |status: Status| -> String {
+        let of = verdict.rows.iter().filter(|row| row.status == status).map(|row| row.figure.as_str());
+        of.collect::<Vec<_>>().join(", ")
+    };
+    let mut words = verdict.in_words();
+    for (status, lead) in [(Status::Fail, "Failed"), (Status::Marginal, "Marginal")] {
+        if verdict.count(status) > 0 {
+            words += &format!("\n{lead}: {}", names(status));
+        }
+    }
+    report.add(Item::Banner(words, tone(verdict.status())));
+    let columns = [
+        ("figure", Side::Left),
+        ("value", Side::Right),
+        ("limit", Side::Right),
+        ("margin", Side::Right),
+        ("verdict", Side::Left),
+        ("origin of the limit", Side::Left),
+    ];
+    let mut table = Table::new("", columns);
+    for row in &verdict.rows {
+        // Blanks that bind keep a number with its unit.
+        let bound = |text: String| Cell::from(text.replace(' ', "\u{a0}"));
+        let with_unit = |text: String| if row.unit.is_empty() { text } else { format!("{text} {}", row.unit) };
+        table.row([
+            Cell::from(row.figure.replace(" %", "\u{a0}%")),
+            bound(with_unit(row.value_text())),
+            bound(row.bound.to_string()),
+            bound(row.margin_text()),
+            Cell::toned(row.status.word(), tone(row.status)),
+            Cell::toned(row.source.clone(), Tone::Faint),
+        ]);
+    }
+    report.table(table);
+    let mut notes = "Marginal: less than a tenth of the limit is left, or what the file of limits sets. ".to_owned();
+    for row in verdict.rows.iter().filter(|row| row.status != Status::Pass && !row.why.is_empty()) {
+        notes += &format!("{}: {}. ", row.figure, row.why.join("; "));
+    }
+    if !verdict.not_judged.is_empty() {
+        notes += &format!("Not judged: {}.", verdict.not_judged.join("; "));
+    }
+    report.add(Item::Note(notes));
+}
+
+fn facts(judged: &Judged<'_>) -> Vec<(String, String)> {
+    let (scene, summary) = (&judged.run.scene, judged.summary);
+    let file = &judged.run.scene_json;
+    let text = |key: &str| match file.get(key) {
+        None | Some(Value::Null) => None,
+        Some(Value::String(text)) => Some(text.clone()),
+        Some(Value::Array(items)) => Some(
+            items
+                .iter()
+                .map(|item| item.as_str().map_or_else(|| item.to_string(), str::to_owned))
+                .collect::<Vec<_>>()
+                .join(", "),
+        ),
+        Some(other) => Some(other.as_f64().map_or_else(|| other.to_string(), number)),
+    };
+    let knobs = [
+        ("edges", "code_edge"),
+        ("carrier", "carrier"),
+        ("tolerance", "knot_tolerance_cycles"),
+        ("noise", "noise_arithmetic"),
+    ];
+    let knobs: Vec<String> = knobs
+        .into_iter()
+        .filter_map(|(name, key)| {
+            Some(format!("{name} {}{}", text(key)?, if name == "tolerance" { " cycles" } else { "" }))
+        })
+        .collect();
+    let satellites = &summary.satellites;
+    let mut facts = vec![
+        ("scene", Some(scene.name.clone())),
+        ("seed", Some(scene.seed.to_string())),
+        ("program", Some(concat!("gnss-twin ", env!("CARGO_PKG_VERSION")).to_owned())),
+        ("start (GPS time)", text("start").map(|start| start.trim_end_matches(".000000").to_owned())),
+        ("duration", Some(format!("{} s", scene.duration_s))),
+        ("samples", Some(format!("{} Msps, {}", number(scene.sample_rate_hz / 1e6), scene.format))),
+        ("centre", scene.center_hz.map(|hz| format!("{} MHz", hz / 1e6))),
+        ("signals", text("signals")),
+        ("fidelity", Some(format!("{} ({})", scene.fidelity, knobs.join(", ")))),
+        ("thermal noise", Some(if scene.noise { "yes" } else { "none" }.to_owned())),
+        ("elevation mask", scene.mask_deg.map(|mask| format!("{mask}°"))),
+        ("interference", (!scene.interference.is_empty()).then(|| format!("{} sources", scene.interference.len()))),
+        ("spoofer", summary.spoofing.map(|_| "yes".to_owned())),
+    ];
+    let found = format!("{} in view, {} acquired, {} used", satellites.in_view, satellites.acquired, satellites.used);
+    facts.push(("satellites", Some(found)));
+    let fixes = summary.position.first_fix_s.map_or_else(
+        || "none".to_owned(),
+        |first_s| format!("{}, the first after {} s", summary.position.fixes, number(first_s)),
+    );
+    facts.push(("fixes", Some(fixes)));
+    facts.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
+}
+
+/// The scene as it was written, or as it was understood, and the receiver's settings.
+fn settings(report: &mut Report, judged: &Judged<'_>) {
+    report.heading("Settings");
+    match &judged.run.scenario {
+        Some(text) => report.subheading("Scene, scenario.toml").add(Item::Listing(text.clone())),
+        None => report.subheading("Scene, truth/scene.json").add(Item::Listing(flat(&judged.run.scene_json))),
+    };
+    let settings = judged.run.receiver.get("settings").unwrap_or(&judged.run.receiver);
+    if !settings.is_null() {
+        report.subheading("Receiver, rx/receiver.json").add(Item::Listing(flat(settings)));
+    }
+}
+
+/// JSON as lines `path = value`.
+fn flat(value: &Value) -> String {
+    fn walk(path: &str, value: &Value, lines: &mut Vec<String>) {
+        match value {
+            Value::Object(map) => map.iter().for_each(|(key, below)| {
+                walk(&if path.is_empty() { key.clone() } else { format!("{path}.{key}") }, below, lines);
+            }),
+            other => lines.push(format!("{path} = {other}")),
+        }
+    }
+    let mut lines = Vec::new();
+    walk("", value, &mut lines);
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,172 @@
+//! The tables of a run's report.
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::judge::judgement::number;
+use crate::analysis::measure::errors::{Link, SignalError};
+use crate::analysis::show::pdf::{Report, Side, Table};
+use crate::analysis::show::plot::Judged;
+use crate::analysis::statistics::{Spread, mean, std};
+use crate::gnss::record::{Event, EventRow};
+
+/// Most rows of the table of events.
+const MOST_EVENTS: usize = 30;
+
+/// Adds accuracy, loops, satellites, clock and events.
+pub(super) fn add(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError> {
+    report.heading("Accuracy");
+    accuracy(report, judged);
+    loops(report, judged);
+    satellites(report, judged)?;
+    clock(report, judged);
+    events(report, judged);
+    Ok(())
+}
+
+fn shown(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), number)
+}
+
+fn fixed(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.decimals$}"))
+}
+
+fn accuracy(report: &mut Report, judged: &Judged<'_>) {
+    let columns = [
+        ("error", Side::Left),
+        ("unit", Side::Left),
+        ("mean", Side::Right),
+        ("σ", Side::Right),
+        ("95 %", Side::Right),
+        ("values", Side::Right),
+    ];
+    let mut table = Table::new(
+        "Errors against the truth: mean, standard deviation, and 95th percentile of the magnitude. Of the pseudorange the part \
+         common to all satellites of an epoch is removed, of the carrier a constant from each arc.",
+        columns,
+    );
+    let details = &judged.summary.details;
+    let mut row = |name: &str, unit: &str, spread: Option<Spread>| {
+        let of = |value: fn(Spread) -> f64| fixed(spread.map(value), 4);
+        let count = spread.map_or_else(|| "0".to_owned(), |spread| spread.count.to_string());
+        table.row([name.to_owned(), unit.to_owned(), of(|s| s.mean), of(|s| s.sigma), of(|s| s.p95), count]);
+    };
+    row("pseudorange", "m", details.pseudorange_m);
+    row("carrier phase", "cycles", details.carrier_cycles);
+    row("Doppler", "Hz", details.doppler_hz);
+    row("C/N0, measured minus expected", "dB", details.cn0_db);
+    row("position east", "m", details.east_m);
+    row("position north", "m", details.north_m);
+    row("position up", "m", details.up_m);
+    row("clock, as a distance", "m", details.clock_m);
+    row("velocity, magnitude", "m/s", details.velocity_mps);
+    report.table(table);
+}
+
+fn loops(report: &mut Report, judged: &Judged<'_>) {
+    let columns = [
+        ("loop", Side::Left),
+        ("unit", Side::Left),
+        ("σ", Side::Right),
+        ("threshold", Side::Right),
+        ("share of it", Side::Right),
+    ];
+    let mut table = Table::new(
+        "Loops: standard deviation of replica minus truth, each satellite about its mean and without the pull-in, against \
+         the rules of thumb d/6, 15° and 1/(12T).",
+        columns,
+    );
+    let (tracking, limits) = (&judged.summary.tracking, &judged.summary.details.thresholds);
+    for (name, unit, sigma, limit) in [
+        ("code (DLL)", "chips", tracking.dll_sigma_chips, limits.dll_chips),
+        ("phase (PLL)", "degrees", tracking.pll_sigma_deg, limits.pll_deg),
+        ("frequency (FLL)", "Hz", tracking.fll_sigma_hz, limits.fll_hz),
+    ] {
+        let share = sigma.map_or_else(|| "–".to_owned(), |sigma| format!("{:.0} %", 100.0 * sigma / limit));
+        table.row([name.to_owned(), unit.to_owned(), shown(sigma), number(limit), share]);
+    }
+    report.table(table);
+}
+
+fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError> {
+    let columns = [
+        ("satellite", Side::Left),
+        ("elevation (°)", Side::Right),
+        ("C/N0 set, expected, measured (dB-Hz)", Side::Right),
+        ("code mean, σ (m)", Side::Right),
+        ("carrier σ (cycles)", Side::Right),
+        ("Doppler σ (Hz)", Side::Right),
+        ("losses", Side::Right),
+        ("values", Side::Right),
+    ];
+    let mut table =
+        Table::new("By satellite: mean elevation and C/N0; errors of its observations, the clock's included.", columns);
+    for link in judged.errors.signals.keys() {
+        let rows = judged.errors.signals.rows(link)?;
+        let of = |value: fn(&SignalError) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
+        let elevation = judged.run.sky.map(link.sv, |row| row.elevation_deg)?;
+        let cn0 = [of(|row| row.cn0_true_dbhz), of(|row| row.cn0_effective_dbhz), of(|row| row.cn0_dbhz)];
+        table.row([
+            judged.run.name(link),
+            fixed(mean(&elevation), 1),
+            cn0.map(|values| fixed(mean(&values), 1)).join(" / "),
+            format!("{} / {}", fixed(mean(&of(|row| row.code_m)), 2), fixed(std(&of(|row| row.code_m)), 2)),
+            fixed(std(&of(|row| row.carrier_cycles)), 4),
+            fixed(std(&of(|row| row.doppler_hz)), 3),
+            losses(judged, &link).to_string(),
+            rows.len().to_string(),
+        ]);
+    }
+    report.table(table);
+    Ok(())
+}
+
+fn losses(judged: &Judged<'_>, Link { sv, signal }: &Link) -> usize {
+    let of = |row: &&EventRow| row.sv == *sv && row.signal == *signal && row.event == Event::LossOfLock;
+    judged.run.events.iter().filter(of).count()
+}
+
+fn clock(report: &mut Report, judged: &Judged<'_>) {
+    let clock = &judged.summary.clock;
+    if clock.fixes == 0 {
+        return;
+    }
+    let columns = [("clock", Side::Left), ("unit", Side::Left), ("found", Side::Right), ("true", Side::Right)];
+    let mut table = Table::new(
+        format!(
+            "The receiver's clock over {} fixes without a gap; deviations at an averaging time of 1 s.",
+            clock.fixes
+        ),
+        columns,
+    );
+    let mut row = |name: &str, unit: &str, found: Option<f64>, truth: Option<f64>| {
+        table.row([name.to_owned(), unit.to_owned(), shown(found), shown(truth)]);
+    };
+    row("error of the bias, mean", "s", clock.bias_mean_s, None);
+    row("error of the bias, σ without its straight line", "s", clock.bias_sigma_s, None);
+    row("drift", "s/s", clock.drift, clock.true_drift);
+    row("Allan deviation", "1", clock.oadev_1s, clock.true_oadev_1s);
+    row("modified Allan deviation", "1", clock.mdev_1s, None);
+    row("Hadamard deviation", "1", clock.ohdev_1s, None);
+    row("time deviation", "s", clock.tdev_1s_s, None);
+    report.table(table);
+}
+
+fn events(report: &mut Report, judged: &Judged<'_>) {
+    let rows: Vec<&EventRow> =
+        judged.run.events.iter().filter(|row| matches!(row.event, Event::LossOfLock | Event::CycleSlip)).collect();
+    if rows.is_empty() {
+        return;
+    }
+    let caption = match rows.len() {
+        all if all > MOST_EVENTS => {
+            format!("Losses of lock and declared cycle slips, the first {MOST_EVENTS} of {all}.")
+        }
+        _ => "Losses of lock and declared cycle slips.".to_owned(),
+    };
+    let mut table = Table::new(caption, [("time (s)", Side::Right), ("satellite", Side::Left), ("event", Side::Left)]);
+    for row in rows.into_iter().take(MOST_EVENTS) {
+        let event = if row.event == Event::LossOfLock { "loss of lock" } else { "cycle slip" };
+        table.row([format!("{:.3}", judged.run.time_s(row.sample)), row.sv.to_string(), event.to_owned()]);
+    }
+    report.table(table);
+}

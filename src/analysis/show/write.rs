@@ -1,0 +1,72 @@
+//! Tables and other files of a judgement: a reader sees the old one or the whole new one, never a part.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::staged::Staged;
+use crate::analysis::error::JudgeError;
+
+/// A CSV file in the making.
+pub(crate) struct Table {
+    path: PathBuf,
+    making: Staged,
+    rows: csv::Writer<File>,
+}
+
+impl Table {
+    /// Begins one, which gets its name when it is finished.
+    pub fn create(path: &Path) -> Result<Self, JudgeError> {
+        let begun = Staged::file(part(path)).map_err(|source| JudgeError::File { path: path.to_owned(), source });
+        let (making, file) = begun?;
+        Ok(Self { path: path.to_owned(), making, rows: csv::Writer::from_writer(file) })
+    }
+
+    /// Adds a row.
+    pub fn row(&mut self, row: &impl Serialize) -> Result<(), JudgeError> {
+        self.rows.serialize(row).map_err(|error| {
+            let path = self.path.clone();
+            if !error.is_io_error() {
+                return JudgeError::Row { path, source: error };
+            }
+            match error.into_kind() {
+                csv::ErrorKind::Io(source) => JudgeError::File { path, source },
+                other => JudgeError::File { path, source: io::Error::other(format!("{other:?}")) },
+            }
+        })
+    }
+
+    /// Gives it its name.
+    pub fn finish(mut self) -> Result<(), JudgeError> {
+        let finished = self.rows.flush().and_then(|()| self.making.finish(&self.path));
+        finished.map_err(|source| JudgeError::File { path: self.path, source })
+    }
+}
+
+/// Writes rows as a CSV file.
+pub(crate) fn write_rows<T: Serialize>(path: &Path, mut rows: impl Iterator<Item = T>) -> Result<(), JudgeError> {
+    let mut table = Table::create(path)?;
+    rows.try_for_each(|row| table.row(&row))?;
+    table.finish()
+}
+
+/// The name under which a file is made.
+fn part(path: &Path) -> PathBuf {
+    let mut part = OsString::from(".");
+    part.push(path.file_name().unwrap_or_default());
+    part.push(".part");
+    path.with_file_name(part)
+}
+
+/// Writes a file so that a reader sees the old one or the new one, never a part.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), JudgeError> {
+    Staged::file(part(path))
+        .and_then(|(making, mut file)| {
+            file.write_all(bytes)?;
+            making.finish(path)
+        })
+        .map_err(|source| JudgeError::File { path: path.to_owned(), source })
+}
