@@ -26,7 +26,8 @@ fn main() {
         assert!(outcome.lost.is_none());
         format!("{:?} {:.0}", mode, case.duration_s / start.elapsed().as_secs_f64())
     });
-    let rows: Vec<proof::Row> = proof::grid().par_iter().filter_map(|cell| proof::measure(cell, UNCERTAINTY)).collect();
+    let rows: Vec<proof::ProofRow> =
+        proof::grid().par_iter().filter_map(|cell| proof::measure(cell, UNCERTAINTY)).collect();
     let dbhz: Vec<u32> = (18..=50).collect();
     let levels: Vec<limits::Level> =
         dbhz.par_iter().map(|&dbhz| limits::level(&settings, &oscillator::TCXO, f64::from(dbhz), LEVEL_S)).collect();

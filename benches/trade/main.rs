@@ -13,7 +13,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use gnss_twin::analysis;
-use gnss_twin::analysis::show::trade::{self, Row};
+use gnss_twin::analysis::show::trade::{self, TradeRow};
 use gnss_twin::analysis::statistics::{mean, median};
 use gnss_twin::generator::fidelity::allowed_m;
 use gnss_twin::generator::ray::{Effect, Ray, Sight};
@@ -306,7 +306,7 @@ fn knots() -> Vec<(String, Fidelity)> {
     found
 }
 
-fn measure(site: Site, settings: &[(String, Fidelity)], rounds: usize, count: usize, rows: &mut Vec<Row>) {
+fn measure(site: Site, settings: &[(String, Fidelity)], rounds: usize, count: usize, rows: &mut Vec<TradeRow>) {
     let mut times = vec![Vec::new(); settings.len()];
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     for _ in 0..rounds {
@@ -325,7 +325,7 @@ fn measure(site: Site, settings: &[(String, Fidelity)], rounds: usize, count: us
         up.iter().step_by((up.len() / count).max(1)).take(count).map(|sv| Replicas::new(site, *sv)).collect();
     for ((name, fidelity), times) in settings.iter().zip(times) {
         let found = errors(site, *fidelity, &replicas);
-        let row = Row {
+        let row = TradeRow {
             scene: site.scene.to_owned(),
             sample_rate_msps: site.rate_msps,
             setting: name.clone(),

@@ -50,7 +50,7 @@ pub enum DetectionError {
 
 /// Counted and expected.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct DetectionRow {
     /// `detection`, or `false alarm` where nothing is there to be found.
     pub what: &'static str,
     pub cn0_dbhz: Option<f64>,
@@ -63,7 +63,7 @@ pub struct Row {
     pub high: f64,
 }
 
-impl Row {
+impl DetectionRow {
     fn new(what: &'static str, cn0_dbhz: Option<f64>, (found, trials): (u32, u32), expected: f64) -> Self {
         let (low, high) = interval(expected, trials);
         let measured = f64::from(found) / f64::from(trials.max(1));
@@ -111,7 +111,7 @@ pub struct Joint {
 
 impl Joint {
     /// Of the detections among `rows` of which at least five are expected to be found and five not.
-    pub fn of(rows: &[Row]) -> Self {
+    pub fn of(rows: &[DetectionRow]) -> Self {
         let mut joint = Self { rows: 0, chi_square: 0.0, exceeded: 1.0, bias_sigma: 0.0 };
         let (mut sum, mut variances) = (0.0, 0.0);
         for row in rows.iter().filter(|row| row.cn0_dbhz.is_some()) {
@@ -221,7 +221,7 @@ pub fn detections(
     trials: u32,
     seed: u64,
     writer: &mut truth::Writer,
-) -> Result<Row, DetectionError> {
+) -> Result<DetectionRow, DetectionError> {
     let metadata = scene(cn0_dbhz, seed, 1.0)?.metadata;
     let rate_hz = metadata.rate.hz();
     // No whole number of symbols or code periods, so that edges and code phases fall everywhere.
@@ -263,7 +263,7 @@ pub fn detections(
         cn0_dbhz,
     };
     let expected = model.probability(&OFFSETS.map(|offset| offset * step_hz), DRAWS, seed);
-    Ok(Row::new("detection", Some(cn0_dbhz), (found, made), expected))
+    Ok(DetectionRow::new("detection", Some(cn0_dbhz), (found, made), expected))
 }
 
 /// Searches for satellites that are not there, at least `trials` times.
@@ -275,7 +275,7 @@ pub fn false_alarms(
     trials: u32,
     seed: u64,
     writer: &mut truth::Writer,
-) -> Result<Row, DetectionError> {
+) -> Result<DetectionRow, DetectionError> {
     let absent: Vec<Link> = (1..=32).filter(|prn| *prn != PRESENT).map(|prn| L1_CA.link(Sv::gps(prn))).collect();
     let stretches = trials.div_ceil(absent.len() as u32);
     let metadata = scene(ABSENT_DBHZ, seed, 1.0)?.metadata;
@@ -291,7 +291,7 @@ pub fn false_alarms(
         Err(failed) => error = Some(failed),
     })?;
     error.map_or(Ok(()), Err)?;
-    Ok(Row::new("false alarm", None, (found, made), settings.false_alarm_probability))
+    Ok(DetectionRow::new("false alarm", None, (found, made), settings.false_alarm_probability))
 }
 
 fn doppler_step_hz(settings: &AcquisitionSettings) -> f64 {
@@ -303,7 +303,7 @@ fn doppler_step_hz(settings: &AcquisitionSettings) -> f64 {
 ///
 /// # Errors
 /// [`JudgeError`] with the file that could not be written.
-pub fn write(directory: &Path, rows: &[Row], settings: &AcquisitionSettings) -> Result<(), JudgeError> {
+pub fn write(directory: &Path, rows: &[DetectionRow], settings: &AcquisitionSettings) -> Result<(), JudgeError> {
     write_rows(&directory.join("acquisition.csv"), rows.iter())?;
     let held = rows.iter().filter(|row| row.holds()).count();
     let joint = Joint::of(rows);
@@ -336,7 +336,7 @@ pub fn write(directory: &Path, rows: &[Row], settings: &AcquisitionSettings) -> 
         );
     }
     write_whole(&directory.join("acquisition.md"), text.as_bytes())?;
-    let of = |value: &dyn Fn(&Row) -> f64| -> Vec<(f64, f64)> {
+    let of = |value: &dyn Fn(&DetectionRow) -> f64| -> Vec<(f64, f64)> {
         rows.iter().filter_map(|row| Some((row.cn0_dbhz?, value(row)))).collect()
     };
     let series = vec![
@@ -366,8 +366,9 @@ mod tests {
 
     #[test]
     fn a_bias_that_no_row_shows_alone_shows_in_all_together() {
-        let row = |found: u32| Row::new("detection", Some(33.0), (found, 2000), 0.43);
-        let honest = Joint::of(&[row(860), row(870), row(850), Row::new("false alarm", None, (10, 2000), 0.1)]);
+        let row = |found: u32| DetectionRow::new("detection", Some(33.0), (found, 2000), 0.43);
+        let honest =
+            Joint::of(&[row(860), row(870), row(850), DetectionRow::new("false alarm", None, (10, 2000), 0.1)]);
         assert!(honest.rows == 3 && honest.bias_sigma.abs() < 0.1 && honest.exceeded > 0.5, "{honest:?}");
         // Each 1.3 σ low.
         let low = Joint::of(&[row(830), row(830), row(830), row(830), row(830)]);

@@ -36,7 +36,7 @@ pub struct Cell {
 
 /// A cell measured; sigmas in the unit of its quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct ProofRow {
     pub quantity: Quantity,
     pub mode: String,
     pub order: u32,
@@ -220,7 +220,7 @@ impl Cell {
 
 /// Runs a cell until its spread is known to `uncertainty` (relative standard error). `None` where theory has
 /// no value for it or nothing could be measured.
-pub fn measure(cell: &Cell, uncertainty: f64) -> Option<Row> {
+pub fn measure(cell: &Cell, uncertainty: f64) -> Option<ProofRow> {
     let jitter = predict(cell)?;
     let update_s = cell.case.update_s();
     let correlated_s = jitter.updates_per_value * update_s;
@@ -234,7 +234,7 @@ pub fn measure(cell: &Cell, uncertainty: f64) -> Option<Row> {
     Some(row(cell, &jitter, &outcome))
 }
 
-fn row(cell: &Cell, jitter: &Jitter, outcome: &Outcome) -> Row {
+fn row(cell: &Cell, jitter: &Jitter, outcome: &Outcome) -> ProofRow {
     let (case, settings) = (&cell.case, &cell.case.settings);
     let update_s = case.update_s();
     let (moments, unit) = cell.quantity.of(outcome);
@@ -248,7 +248,7 @@ fn row(cell: &Cell, jitter: &Jitter, outcome: &Outcome) -> Row {
     let (theory, measured) = (jitter.sigma * unit, moments.sigma().unwrap_or(f64::NAN) * unit);
     let uncertainty = relative_error((moments.count as f64 / jitter.updates_per_value).max(1.0));
     let allowed = if cell.quantity == Quantity::Frequency { FREQUENCY_BAR } else { BAR };
-    let mut row = Row {
+    let mut row = ProofRow {
         quantity: cell.quantity,
         mode: format!("{:?}", case.mode).to_lowercase(),
         order,
@@ -277,7 +277,7 @@ fn row(cell: &Cell, jitter: &Jitter, outcome: &Outcome) -> Row {
     row
 }
 
-impl Row {
+impl ProofRow {
     /// Whether the ratio is within its bar, over the whole run.
     pub fn holds(&self) -> bool {
         !self.lost && (self.ratio - 1.0).abs() <= self.bar
@@ -285,7 +285,7 @@ impl Row {
 }
 
 /// Why a cell departs from linear theory.
-fn cause(row: &Row, lost: Option<Loss>) -> &'static str {
+fn cause(row: &ProofRow, lost: Option<Loss>) -> &'static str {
     match (lost, row.quantity) {
         (Some(Loss::Declared), _) => "given up by the receiver's detectors",
         (Some(Loss::Code), _) => "code left the peak",

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::limits::{Level, jerk_stress_deg};
-use super::proof::{BAR, FREQUENCY_BAR, LARGEST_BANDWIDTH_TIME, LEAST_SNR, Quantity, Row};
+use super::proof::{BAR, FREQUENCY_BAR, LARGEST_BANDWIDTH_TIME, LEAST_SNR, ProofRow, Quantity};
 use crate::analysis::JudgeError;
 use crate::analysis::expect::theory::{dll, fll, oscillator, pll};
 use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
@@ -17,7 +17,7 @@ use crate::receiver::track::TrackingSettings;
 /// [`JudgeError`] with the file that could not be written.
 pub fn write(
     directory: &Path,
-    rows: &[Row],
+    rows: &[ProofRow],
     levels: &[Level],
     settings: &TrackingSettings,
     preface: &str,
@@ -42,7 +42,7 @@ pub fn write(
 }
 
 /// The loop of a row in words.
-fn name(row: &Row) -> String {
+fn name(row: &ProofRow) -> String {
     let what = match row.quantity {
         Quantity::Phase if row.mode == "assisted" => "assisted phase",
         Quantity::Phase => "phase",
@@ -52,8 +52,8 @@ fn name(row: &Row) -> String {
     format!("{what}, {}, order {}", row.discriminator, row.order)
 }
 
-fn families(rows: &[Row]) -> Vec<(String, Vec<&Row>)> {
-    let mut families: Vec<(String, Vec<&Row>)> = Vec::new();
+fn families(rows: &[ProofRow]) -> Vec<(String, Vec<&ProofRow>)> {
+    let mut families: Vec<(String, Vec<&ProofRow>)> = Vec::new();
     for row in rows {
         let name = name(row);
         match families.iter_mut().find(|(known, _)| *known == name) {
@@ -65,8 +65,8 @@ fn families(rows: &[Row]) -> Vec<(String, Vec<&Row>)> {
 }
 
 /// The region in which theory must hold.
-fn inside(rows: &[Row]) -> String {
-    let region: Vec<Row> = rows.iter().filter(|row| row.in_region).cloned().collect();
+fn inside(rows: &[ProofRow]) -> String {
+    let region: Vec<ProofRow> = rows.iter().filter(|row| row.in_region).cloned().collect();
     let good = region.iter().filter(|row| row.holds()).count();
     let mut text = format!(
         "\n## Where T·C/N0 ≥ {LEAST_SNR} and B·T ≤ {LARGEST_BANDWIDTH_TIME}\n\n\
@@ -94,7 +94,7 @@ fn inside(rows: &[Row]) -> String {
     text + &listed("Cells of the region beyond their bar", region.iter().filter(|row| !row.holds()))
 }
 
-fn outside(rows: &[Row]) -> String {
+fn outside(rows: &[ProofRow]) -> String {
     let rest = rows.iter().filter(|row| !row.in_region);
     let departing = rest.clone().filter(|row| !row.holds()).count();
     let mut text = format!(
@@ -107,7 +107,7 @@ fn outside(rows: &[Row]) -> String {
     text
 }
 
-fn listed<'a>(title: &str, rows: impl Iterator<Item = &'a Row>) -> String {
+fn listed<'a>(title: &str, rows: impl Iterator<Item = &'a ProofRow>) -> String {
     let mut text = String::new();
     for row in rows {
         if text.is_empty() {
@@ -205,7 +205,7 @@ fn stress(settings: &TrackingSettings) -> String {
     text
 }
 
-fn draw(path: &Path, rows: &[Row], levels: &[Level], settings: &TrackingSettings) -> Result<(), JudgeError> {
+fn draw(path: &Path, rows: &[ProofRow], levels: &[Level], settings: &TrackingSettings) -> Result<(), JudgeError> {
     let points = |quantity: Quantity| -> Vec<(f64, f64)> {
         let shown = rows.iter().filter(|row| row.quantity == quantity && !row.lost);
         shown.map(|row| (10.0 * libm::log10(row.snr), row.ratio)).collect()

@@ -219,7 +219,7 @@ fn loops_lose_what_cannot_be_followed_and_say_why() {
 fn the_report_is_written() {
     let directory = tempfile::tempdir().unwrap();
     let cells = proof::grid();
-    let rows: Vec<proof::Row> = cells.iter().step_by(60).filter_map(|cell| proof::measure(cell, 0.3)).collect();
+    let rows: Vec<proof::ProofRow> = cells.iter().step_by(60).filter_map(|cell| proof::measure(cell, 0.3)).collect();
     let settings = TrackingSettings::default();
     let levels = [24.0, 45.0].map(|dbhz| super::limits::level(&settings, &TCXO, dbhz, 20.0));
     super::report::write(directory.path(), &rows, &levels, &settings, "Measured nowhere.").unwrap();

@@ -6,8 +6,8 @@ use std::io::{Read as _, Write as _};
 use std::path::Path;
 
 use gnss_twin::analysis::assess;
-use gnss_twin::analysis::judge::limits::Limits;
 use gnss_twin::analysis::judge::judgement::{Judgement, Status};
+use gnss_twin::analysis::judge::limits::Limits;
 use gnss_twin::analysis::judge::summary::Summary;
 use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::generator::stream::{Options, Stream};

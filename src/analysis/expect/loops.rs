@@ -14,9 +14,9 @@ use crate::analysis::expect::theory::{dll, fll, oscillator, pll};
 use crate::analysis::expect::timeline::Timeline;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::Sum;
-use crate::analysis::waveform::{Edge, Waveform};
+use crate::analysis::waveform::{Edge, Waveform, leading};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::Link;
+use crate::gnss::signal::{Link, Signal};
 
 /// Which loop a row is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -52,6 +52,12 @@ impl Settings {
             averaged_replica: settings.get("tracking").and_then(|t| t.get("replica")?.as_str()) == Some("area"),
         })
     }
+}
+
+/// Time of a loop's update in the tracking stage, by the settings, which count it in code periods.
+pub fn update_s(run: &Run, signal: &Signal) -> Option<f64> {
+    let counted = || Some(run.tracking_setting("integration")? * leading(signal)?.period_s());
+    counted().or(run.update_s)
 }
 
 /// A loop of exact bandwidth whose roots all lie at one place; `None` where no such place is.

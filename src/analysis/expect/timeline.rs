@@ -13,11 +13,11 @@ use nalgebra::Vector3;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::multiple_access::MultipleAccess;
-use crate::analysis::measure::errors::Link;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::Observation;
+use crate::gnss::signal::Link;
 use crate::gnss::time::Epoch;
 
 /// A satellite's signal at an instant, by a perfect clock.

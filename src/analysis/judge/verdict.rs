@@ -68,8 +68,8 @@ impl Verdict {
     }
 
     /// Rows of `verdict.csv`.
-    pub(crate) fn csv_rows(&self) -> impl Iterator<Item = Row<'_>> {
-        self.rows.iter().map(|row| Row {
+    pub(crate) fn csv_rows(&self) -> impl Iterator<Item = VerdictRow<'_>> {
+        self.rows.iter().map(|row| VerdictRow {
             figure: &row.figure,
             path: row.path.as_deref().unwrap_or(""),
             value: row.value_text(),
@@ -85,7 +85,7 @@ impl Verdict {
 
 /// One row of `verdict.csv`.
 #[derive(Serialize)]
-pub(crate) struct Row<'a> {
+pub(crate) struct VerdictRow<'a> {
     figure: &'a str,
     path: &'a str,
     value: String,

@@ -48,7 +48,7 @@ impl Calibration {
 
 /// One fix: a row of `honesty.csv`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct NormalisedError {
     pub sample: u64,
     pub time_s: f64,
     pub east_m: f64,
@@ -64,7 +64,7 @@ pub struct Row {
 /// A run's covariance against its errors.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Consistency {
-    pub rows: Vec<Row>,
+    pub rows: Vec<NormalisedError>,
     pub nees_mean: Option<f64>,
     /// How many independent fixes the mean is worth.
     pub independent: Option<f64>,
@@ -87,7 +87,7 @@ impl Consistency {
             let Some(fix) = fixes.get(&error.sample) else { continue };
             let Some(factor) = factor(fix) else { continue };
             let Some(whitened) = factor.l().solve_lower_triangular(&error.enu_m) else { continue };
-            rows.push(Row {
+            rows.push(NormalisedError {
                 sample: error.sample,
                 time_s: error.time_s,
                 east_m: error.enu_m.x,

@@ -23,7 +23,7 @@ use crate::analysis::statistics::{mean, median};
 
 /// One loop of one satellite: a row of `jitter.csv`. Sigmas and limits are in `unit`: chips, degrees or hertz.
 #[derive(Clone, Debug, Serialize)]
-pub struct Row {
+pub struct LinkJitter {
     pub sv: String,
     pub signal: &'static str,
     #[serde(rename = "loop")]
@@ -67,7 +67,7 @@ pub struct Row {
 /// Rows of all satellites.
 #[derive(Clone, Debug, Default)]
 pub struct Jitter {
-    pub rows: Vec<Row>,
+    pub rows: Vec<LinkJitter>,
 }
 
 /// What all satellites' rows of one loop come to; of several thresholds the least.
@@ -116,8 +116,8 @@ impl Jitter {
 
     /// One loop over all satellites, root mean squares.
     pub fn pooled(&self, which: Loop) -> Option<Pooled> {
-        let rows: Vec<&Row> = self.rows.iter().filter(|row| row.which == which).collect();
-        let square = |of: fn(&Row) -> Option<f64>| {
+        let rows: Vec<&LinkJitter> = self.rows.iter().filter(|row| row.which == which).collect();
+        let square = |of: fn(&LinkJitter) -> Option<f64>| {
             mean(&rows.iter().filter_map(|row| of(row)).map(|value| value * value).collect::<Vec<_>>()).map(f64::sqrt)
         };
         Some(Pooled {
@@ -175,7 +175,7 @@ fn row(
     updates: &[Update],
     theory: &Theory,
     stresses: &Stresses,
-) -> Option<Row> {
+) -> Option<LinkJitter> {
     let error = |row: &SignalError| match which {
         Loop::Dll => row.code_m / theory.chip_m,
         Loop::Pll => 360.0 * row.carrier_cycles,
@@ -204,7 +204,7 @@ fn row(
     let theory_sigma = (thermal * thermal + oscillator_theory * oscillator_theory + stress_rms * stress_rms).sqrt();
     let (threshold, rule_limit) = theory.limits(which);
     let rule = 3.0 * sigma + stress_max;
-    Some(Row {
+    Some(LinkJitter {
         sv: link.sv.to_string(),
         signal: link.signal.name,
         which,

@@ -9,6 +9,7 @@ mod common;
 mod delay;
 mod emission;
 mod facts;
+mod fault;
 mod files;
 pub mod nmea;
 pub mod rinex_obs;
@@ -19,13 +20,5 @@ pub mod spill_store;
 pub use common::Common;
 pub use emission::{Emission, MeanSignal};
 pub use facts::{Interference, Oscillator, SceneFacts, Stage};
+pub use fault::Fault;
 pub use run::{PsdRow, Run, Speed};
-
-/// What is wrong with a file of a foreign receiver, and where.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Fault {
-    /// Line of the file, counted from 1.
-    pub line: u64,
-    /// The fault in words, without file name and line.
-    pub what: String,
-}

@@ -8,7 +8,7 @@
 
 use nalgebra::Vector3;
 
-use super::Fault;
+use crate::analysis::read::fault::Fault;
 use crate::gnss::earth::Geodetic;
 use crate::gnss::time::Epoch;
 

@@ -9,7 +9,7 @@
 
 use std::collections::BTreeMap;
 
-use super::Fault;
+use crate::analysis::read::fault::Fault;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
 

@@ -16,7 +16,7 @@ use crate::analysis::show::write::{write_rows, write_whole};
 
 /// One setting and what was measured for it; errors are against the `reference` level.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct TradeRow {
     pub scene: String,
     pub sample_rate_msps: f64,
     /// A level's name, or the knob and its value.
@@ -42,7 +42,7 @@ pub struct Row {
     pub position_m: Option<f64>,
 }
 
-impl Row {
+impl TradeRow {
     /// Root mean square of mean and spread.
     pub fn pseudorange_m(&self) -> f64 {
         (self.pseudorange_mean_m.powi(2) + self.pseudorange_sigma_m.powi(2)).sqrt()
@@ -53,7 +53,7 @@ impl Row {
     }
 }
 
-impl fmt::Display for Row {
+impl fmt::Display for TradeRow {
     /// The setting and its figures as cells of a table, without the position.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
@@ -137,7 +137,7 @@ pub fn write_widths(directory: &Path, rows: &[Width], machine: &str) -> Result<(
 }
 
 /// Whether row `index` is beaten or equalled in cost and error by another of its scene, and beaten in one of them.
-pub fn dominated(rows: &[Row], index: usize) -> bool {
+pub fn dominated(rows: &[TradeRow], index: usize) -> bool {
     let Some(row) = rows.get(index) else { return false };
     let error = row.pseudorange_m();
     rows.iter().filter(|other| row.rivals(other)).any(|other| {
@@ -150,17 +150,17 @@ pub fn dominated(rows: &[Row], index: usize) -> bool {
 ///
 /// # Errors
 /// [`JudgeError`] with the file that could not be written.
-pub fn write(directory: &Path, rows: &[Row], preface: &str) -> Result<(), JudgeError> {
+pub fn write(directory: &Path, rows: &[TradeRow], preface: &str) -> Result<(), JudgeError> {
     write_rows(&directory.join("trade.csv"), rows.iter())?;
     write_whole(&directory.join("trade.md"), markdown(rows, preface).as_bytes())?;
     draw(&directory.join("trade.png"), rows)
 }
 
-fn markdown(rows: &[Row], preface: &str) -> String {
+fn markdown(rows: &[TradeRow], preface: &str) -> String {
     let mut text = format!("# Speed against accuracy\n\n{preface}\n\n![Pareto front](trade.png)\n");
     let mut last = None;
     for (index, row) in rows.iter().enumerate() {
-        if last.is_none_or(|last: &Row| !last.rivals(row)) {
+        if last.is_none_or(|last: &TradeRow| !last.rivals(row)) {
             let _ = write!(
                 text,
                 "\n## Scene {}, {} Msps\n\n\
@@ -182,7 +182,7 @@ fn markdown(rows: &[Row], preface: &str) -> String {
 const FLOOR_M: f64 = 1e-4;
 
 /// One chart for each scene and rate that has more than two settings with different errors.
-fn draw(path: &Path, rows: &[Row]) -> Result<(), JudgeError> {
+fn draw(path: &Path, rows: &[TradeRow]) -> Result<(), JudgeError> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (index, row) in rows.iter().enumerate() {
         match groups.last_mut() {
@@ -191,7 +191,7 @@ fn draw(path: &Path, rows: &[Row]) -> Result<(), JudgeError> {
         }
     }
     let differ = |group: &&Vec<usize>| {
-        let errors = || group.iter().filter_map(|index| rows.get(*index)).map(Row::pseudorange_m);
+        let errors = || group.iter().filter_map(|index| rows.get(*index)).map(TradeRow::pseudorange_m);
         errors().fold(0.0, f64::max) > 100.0 * FLOOR_M && group.len() > 2
     };
     let charts: Vec<Chart> = groups.iter().filter(differ).map(|group| chart(rows, group)).collect();
@@ -205,8 +205,8 @@ fn draw(path: &Path, rows: &[Row]) -> Result<(), JudgeError> {
     figure(path, (1280, height), 2, &charts, &legend)
 }
 
-fn chart(rows: &[Row], group: &[usize]) -> Chart {
-    let place = |row: &Row| (libm::log10(row.ns), libm::log10(row.pseudorange_m().max(FLOOR_M)));
+fn chart(rows: &[TradeRow], group: &[usize]) -> Chart {
+    let place = |row: &TradeRow| (libm::log10(row.ns), libm::log10(row.pseudorange_m().max(FLOOR_M)));
     let mut front = Vec::new();
     let mut beaten = Vec::new();
     let mut labels = Vec::new();
@@ -245,8 +245,8 @@ fn chart(rows: &[Row], group: &[usize]) -> Chart {
 mod tests {
     use super::*;
 
-    fn row(setting: &str, rate: f64, ns: f64, error_m: f64) -> Row {
-        Row {
+    fn row(setting: &str, rate: f64, ns: f64, error_m: f64) -> TradeRow {
+        TradeRow {
             scene: "static".to_owned(),
             sample_rate_msps: rate,
             setting: setting.to_owned(),

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use rayon::prelude::*;
 
 use super::plan::Plan;
-use super::shard::{self, Found, Row};
+use super::shard::{self, CaseFigures, Found};
 use super::spec::Level;
 use super::{StudyError, plan, sampled, temporary};
 
@@ -55,7 +55,7 @@ pub struct Ran {
 struct Making {
     shard: u32,
     first_case: u64,
-    state: Mutex<(Vec<Option<Row>>, u64)>,
+    state: Mutex<(Vec<Option<CaseFigures>>, u64)>,
 }
 
 /// Runs these shards; `progress` hears how many of their cases are done.
@@ -127,7 +127,7 @@ fn work(
     if *left > 0 {
         return Ok(());
     }
-    let rows: Vec<Row> = std::mem::take(slots).into_iter().flatten().collect();
+    let rows: Vec<CaseFigures> = std::mem::take(slots).into_iter().flatten().collect();
     drop(state);
     let bytes = shard::render(plan, making.shard, &rows);
     if let Found::Bad(_) = shard::find(plan, making.shard)? {
@@ -137,7 +137,11 @@ fn work(
 }
 
 /// Figures of cases that share a signal.
-fn rows(plan: &Plan, cases: std::ops::Range<u64>, halt: &(dyn Fn() -> bool + Sync)) -> Result<Vec<Row>, StudyError> {
+fn rows(
+    plan: &Plan,
+    cases: std::ops::Range<u64>,
+    halt: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<CaseFigures>, StudyError> {
     let study = &plan.study;
     let cases: Vec<_> = cases.map(|number| study.grid.case(number)).collect();
     match study.level {

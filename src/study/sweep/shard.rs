@@ -16,7 +16,7 @@ use super::{StudyError, axis, sha256_hex, temporary};
 use crate::analysis::show::staged::{Staged, present};
 
 /// Figures of one case.
-pub type Row = Vec<Option<f64>>;
+pub type CaseFigures = Vec<Option<f64>>;
 
 /// What stands under a shard's name.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +58,7 @@ fn quoted(text: &str) -> String {
 }
 
 /// A line of data.
-fn line(plan: &Plan, number: u64, row: &Row) -> String {
+fn line(plan: &Plan, number: u64, row: &CaseFigures) -> String {
     let case = plan.study.grid.case(number);
     let scene = plan.base(&case).map_or("", |base| base.name.as_str());
     let mut line = format!("{number},{},{}", plan.study.seed_of(&case, scene), case.repetition);
@@ -75,7 +75,7 @@ fn line(plan: &Plan, number: u64, row: &Row) -> String {
 }
 
 /// The bytes of a shard: a function of plan, number and figures.
-pub fn render(plan: &Plan, shard: u32, rows: &[Row]) -> Vec<u8> {
+pub fn render(plan: &Plan, shard: u32, rows: &[CaseFigures]) -> Vec<u8> {
     let mut text = format!("{}\n{}\n", header(plan, shard), columns(plan));
     for (number, row) in plan.cases(shard).zip(rows) {
         text += &line(plan, number, row);

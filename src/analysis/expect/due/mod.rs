@@ -18,16 +18,16 @@ use nalgebra::{Matrix4, Vector4};
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::message::Message;
 use crate::analysis::expect::multiple_access::MultipleAccess;
-use crate::analysis::measure::errors::Link;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::earth::Geodetic;
 use crate::gnss::facts::{Expect, Fixes};
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Link;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 use receiver::Receiver;
-use satellite::{Excuse, Required, Row, Scene};
+use satellite::{Excuse, Required, SatelliteEpoch, Scene};
 use timetable::Timetable;
 
 /// Dilution up to which satellites must give a fix.
@@ -171,9 +171,9 @@ impl Expectations {
     ) -> Result<Satellite, JudgeError> {
         let sky: HashMap<u64, (f64, f64)> =
             run.sky.map(link.sv, |row| (row.sample, (row.azimuth_deg, row.elevation_deg)))?.into_iter().collect();
-        let rows: Vec<(u64, Row)> = run.truth.map(link, |row| {
+        let rows: Vec<(u64, SatelliteEpoch)> = run.truth.map(link, |row| {
             let elevation_deg = sky.get(&row.sample).map_or(90.0, |(_, elevation_deg)| *elevation_deg);
-            let expected = Row {
+            let expected = SatelliteEpoch {
                 time_s: run.time_s(row.sample),
                 cn0_dbhz: row.cn0_dbhz,
                 effective_dbhz: access.effective_dbhz(&row) - self.receiver.cost_db,
@@ -186,7 +186,7 @@ impl Expectations {
         let strengths: Vec<f64> = rows.iter().map(|(_, row)| row.cn0_dbhz).collect();
         let usual_dbhz = median(&strengths).unwrap_or(0.0);
         let healthy = self.message.says_healthy(link.sv) || run.scene.faults.iter().any(|fault| fault.kind == "health");
-        let plain: Vec<Row> = rows.iter().map(|(_, row)| *row).collect();
+        let plain: Vec<SatelliteEpoch> = rows.iter().map(|(_, row)| *row).collect();
         let required = scene.required(link.sv, &plain, usual_dbhz, healthy);
         let seen = observed.samples(link)?;
         let mut one = Satellite { epochs: rows.len(), usual_dbhz, ..Satellite::default() };
@@ -282,7 +282,7 @@ impl Measured {
 }
 
 impl Satellite {
-    fn take(&mut self, row: &Row, required: &Required, measured: bool, seen: bool) {
+    fn take(&mut self, row: &SatelliteEpoch, required: &Required, measured: bool, seen: bool) {
         if required.acquired {
             self.acquired_by_s.get_or_insert(row.time_s);
         }

@@ -28,7 +28,7 @@ const HEALTH_S: f64 = 36.0;
 
 /// One row of the truth as expectation needs it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
+pub struct SatelliteEpoch {
     pub time_s: f64,
     pub cn0_dbhz: f64,
     /// With other satellites, interference and the front end's cost counted.
@@ -109,7 +109,7 @@ impl Scene<'_> {
     }
 
     /// Why a lock may end at a row, if it may.
-    pub fn excuse(&self, sv: Sv, row: &Row, usual_dbhz: f64) -> Option<Excuse> {
+    pub fn excuse(&self, sv: Sv, row: &SatelliteEpoch, usual_dbhz: f64) -> Option<Excuse> {
         let steps = || self.of(sv, &["clock_step"]).flat_map(|fault| [Some(fault.from_s), fault.to_s]).flatten();
         match self.expect.losses(sv, row.time_s) {
             Some(Losses::Any) => return Some(Excuse::Scene),
@@ -130,7 +130,7 @@ impl Scene<'_> {
     }
 
     /// What is required at each row; `healthy` is what the message says without faults.
-    pub fn required(&self, sv: Sv, rows: &[Row], usual_dbhz: f64, healthy: bool) -> Vec<Required> {
+    pub fn required(&self, sv: Sv, rows: &[SatelliteEpoch], usual_dbhz: f64, healthy: bool) -> Vec<Required> {
         let mut state = State::default();
         let mut last_s = f64::NEG_INFINITY;
         let mut found = Vec::with_capacity(rows.len());
@@ -189,7 +189,7 @@ struct State {
 
 impl State {
     /// Counts the searches that must have been made.
-    fn search(&mut self, receiver: &Receiver, row: &Row) {
+    fn search(&mut self, receiver: &Receiver, row: &SatelliteEpoch) {
         if self.acquired_s.is_some() {
             return;
         }
@@ -218,18 +218,18 @@ mod tests {
     use crate::gnss::time::Epoch;
 
     /// A second a row, all strong but where `weak` says.
-    fn rows(seconds: u32, dbhz: impl Fn(f64) -> Option<f64>) -> Vec<Row> {
+    fn rows(seconds: u32, dbhz: impl Fn(f64) -> Option<f64>) -> Vec<SatelliteEpoch> {
         let row = |second: u32| {
             let time_s = f64::from(second);
             let cn0_dbhz = dbhz(time_s)?;
             let (effective_dbhz, strongest_dbhz) = (cn0_dbhz, cn0_dbhz.max(45.0));
-            Some(Row { time_s, cn0_dbhz, effective_dbhz, strongest_dbhz, doppler_hz: 0.0, above_mask: true })
+            Some(SatelliteEpoch { time_s, cn0_dbhz, effective_dbhz, strongest_dbhz, doppler_hz: 0.0, above_mask: true })
         };
         (0..seconds).filter_map(row).collect()
     }
 
     /// First seconds of acquired, observed, used, with times after `from_s` alone.
-    fn first(scene: &Scene<'_>, rows: &[Row], from_s: f64) -> [Option<f64>; 3] {
+    fn first(scene: &Scene<'_>, rows: &[SatelliteEpoch], from_s: f64) -> [Option<f64>; 3] {
         let required = scene.required(Sv::gps(5), rows, 45.0, true);
         let of = |of: fn(&Required) -> bool| {
             let later = rows.iter().zip(&required).filter(|(row, _)| row.time_s >= from_s);
@@ -260,7 +260,7 @@ mod tests {
             assert_eq!(first(scene, &rising, 0.0)[0], Some(35.0), "a search every 15 s, at the worst phase");
             assert_eq!(first(scene, &rows(900, |_| Some(29.0)), 0.0)[1], None, "held perhaps, but hardly found");
             assert_eq!(first(scene, &rows(90, |_| Some(24.0)), 0.0), [None; 3], "too weak to hold");
-            let strong = rows(90, |_| Some(45.0)).into_iter().map(|row| Row { strongest_dbhz: 66.0, ..row });
+            let strong = rows(90, |_| Some(45.0)).into_iter().map(|row| SatelliteEpoch { strongest_dbhz: 66.0, ..row });
             assert_eq!(first(scene, &strong.collect::<Vec<_>>(), 0.0), [None; 3], "hidden");
         });
     }

@@ -8,9 +8,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::ranges::update_s;
 use crate::analysis::error::JudgeError;
-use crate::analysis::expect::loops::{Stresses, Theory};
+use crate::analysis::expect::loops::{Stresses, Theory, update_s};
 use crate::analysis::expect::multipath;
 use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::expect::quantile::{largest, mean_square};

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use nalgebra::Vector3;
 
 use crate::analysis::error::JudgeError;
-use crate::analysis::expect::loops::Theory;
+use crate::analysis::expect::loops::{Theory, update_s};
 use crate::analysis::expect::message::Message;
 use crate::analysis::expect::multipath;
 use crate::analysis::expect::smoothing::Smoothing;
@@ -20,7 +20,7 @@ use crate::analysis::judge::forecast::links::CN0_DB;
 use crate::analysis::measure::errors::{Errors, SignalError};
 use crate::analysis::measure::jitter::{Loop, Settings};
 use crate::analysis::read::Run;
-use crate::analysis::waveform::{Edge, leading};
+use crate::analysis::waveform::Edge;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
 use crate::gnss::record::{Event, Observation, RayRow, SkyRow, TrajectoryRow};
@@ -58,12 +58,6 @@ impl Choices {
             ionosphere_error_share: number("ionosphere_error_share").unwrap_or(0.0),
         })
     }
-}
-
-/// Time of a loop's update in the tracking stage, by the settings, which count it in code periods.
-pub fn update_s(run: &Run, signal: &Signal) -> Option<f64> {
-    let counted = || Some(run.tracking_setting("integration")? * leading(signal)?.period_s());
-    counted().or(run.update_s)
 }
 
 /// That of every signal; `None` where one has none.

@@ -6,8 +6,12 @@
 //! for one 1024 weeks off is moved back and told so. Results: `foreign.json`,
 //! `foreign_{observations,satellites,clock,slips,fixes}.csv` and pictures.
 
+mod carriers;
 mod fit;
+mod judged;
+pub mod measured;
 pub mod observables;
+mod pairs;
 pub mod place;
 pub mod report;
 
@@ -21,6 +25,7 @@ use crate::analysis::read::{Fault, Run, nmea, rinex_obs};
 use crate::gnss::time::{Epoch, WEEK_S};
 
 pub use fit::Estimate;
+pub use judged::Judged;
 pub use report::ForeignSummary;
 
 /// The files of a receiver under test.
@@ -28,21 +33,6 @@ pub use report::ForeignSummary;
 pub struct Files {
     pub rinex_obs: Option<PathBuf>,
     pub nmea: Option<PathBuf>,
-}
-
-/// Everything that a foreign receiver's pictures and summary are made from.
-pub struct Judged {
-    pub scene: String,
-    pub receiver: Option<String>,
-    pub truth_interval_s: f64,
-    pub interpolation: timeline::Interpolation,
-    pub sampler_drift: f64,
-    /// Seconds, a multiple of 1024 weeks, that observations and positions were ahead.
-    pub rollover_s: [i64; 2],
-    pub observables: Option<observables::Measured>,
-    pub places: Option<place::Places>,
-    /// Whole seconds that positions' labels must be earlier for more of them to join: GPS time in place of UTC.
-    pub labels_late_s: Option<i64>,
 }
 
 /// 1024 weeks, the period of the week number in GPS's legacy message.

@@ -9,15 +9,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde::Serialize;
-
+use super::carriers::{Arcs, Carriers, carriers};
 use super::fit::{Estimate, mean_of_means, slope};
-use crate::analysis::expect::timeline::{State, Timeline};
-use crate::analysis::measure::errors::{Link, SLIP_CYCLES, first_jump_of};
-use crate::analysis::read::rinex_obs::{ObservedEpoch, Values};
+use super::measured::{ClockRow, Measured, ObservationError, Satellite};
+use super::pairs::{BySignal, Pair, by_epoch, by_signal, join};
+use crate::analysis::expect::timeline::Timeline;
+use crate::analysis::read::rinex_obs::ObservedEpoch;
 use crate::analysis::statistics::{mean, median, pooled_std, rms, std};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::{self, Signal};
+use crate::gnss::signal::{Link, Signal};
 
 /// Times that the truth is looked up at a better time.
 const LOOKS: usize = 6;
@@ -25,111 +25,6 @@ const LOOKS: usize = 6;
 /// a wrong lock.
 const OUTLIER_SIGMAS: f64 = 10.0;
 const OUTLIER_M: f64 = 30.0;
-/// Gaps longer than this many intervals break an arc.
-const GAP: f64 = 1.5;
-
-/// One observation against the truth: a row of `foreign_observations.csv`. Errors are measured minus true;
-/// what is common to the satellites of its epoch is taken out, of carriers also an arc's constant.
-#[derive(Clone, Debug, Serialize)]
-pub struct Row {
-    pub label_s: f64,
-    pub sv: String,
-    pub signal: &'static str,
-    pub elevation_deg: f64,
-    pub code_m: Option<f64>,
-    pub carrier_cycles: Option<f64>,
-    pub doppler_hz: Option<f64>,
-    pub cn0_db: Option<f64>,
-    #[serde(skip)]
-    pub link: Link,
-}
-
-/// What an epoch's satellites have in common: a row of `foreign_clock.csv`.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct ClockRow {
-    pub label_s: f64,
-    pub satellites: usize,
-    /// Mean error of the pseudoranges over the speed of light: reading of the receiver's clock minus GPS time.
-    pub bias_s: f64,
-    /// The sampler's clock there.
-    pub sampler_bias_s: f64,
-}
-
-/// A break of a carrier's count: a row of `foreign_slips.csv`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Slip {
-    pub label_s: f64,
-    pub sv: String,
-    /// To the half cycle; unknown where the count was interrupted.
-    pub size_cycles: Option<f64>,
-    /// By the file's loss-of-lock indicator.
-    pub declared: bool,
-}
-
-/// What one satellite's errors come to: a row of `foreign_satellites.csv`.
-#[derive(Clone, Debug, Serialize)]
-pub struct Satellite {
-    pub sv: String,
-    pub signal: &'static str,
-    pub epochs: usize,
-    pub elevation_deg: f64,
-    pub code_bias_m: Option<f64>,
-    pub code_sigma_m: Option<f64>,
-    pub carrier_sigma_cycles: Option<f64>,
-    pub doppler_bias_hz: Option<f64>,
-    pub doppler_sigma_hz: Option<f64>,
-    pub cn0_bias_db: Option<f64>,
-    pub cn0_sigma_db: Option<f64>,
-    /// Code minus carrier, against that of the truth.
-    pub code_carrier_drift_mps: Option<f64>,
-    pub slips: usize,
-}
-
-/// Everything measured.
-#[derive(Clone, Debug, Default)]
-pub struct Measured {
-    pub epochs: usize,
-    pub joined: usize,
-    pub observations: usize,
-    /// Of satellites or times that the truth does not have.
-    pub unmatched: usize,
-    pub outliers: usize,
-    pub time_tag_s: Option<Estimate>,
-    /// Whether it was significant, so that the truth was taken at the corrected times.
-    pub time_tag_applied: bool,
-    pub rows: Vec<Row>,
-    pub clock: Vec<ClockRow>,
-    pub slips: Vec<Slip>,
-    pub satellites: Vec<Satellite>,
-    pub code_rms_m: Option<f64>,
-    pub code_sigma_m: Option<f64>,
-    pub carrier_sign: Option<f64>,
-    pub carrier_rms_cycles: Option<f64>,
-    pub doppler_scale: Option<Estimate>,
-    pub doppler_rms_hz: Option<f64>,
-    pub cn0_db: Option<Estimate>,
-    pub drift_code: Option<f64>,
-    pub drift_carrier: Option<f64>,
-    pub drift_doppler: Option<f64>,
-    pub code_carrier_mps: Option<Estimate>,
-    pub doppler_carrier_hz: Option<Estimate>,
-}
-
-/// One observation and the truth at its time.
-#[derive(Clone, Debug)]
-struct Pair<'a> {
-    epoch: usize,
-    label_s: f64,
-    link: Link,
-    values: &'a Values,
-    truth: State,
-}
-
-impl Pair<'_> {
-    fn code_m(&self) -> Option<f64> {
-        Some(self.values.pseudorange_m? - self.truth.range_m)
-    }
-}
 
 /// Joins and measures; `shift_s` is taken from every label first (a week's rollover).
 pub fn measure(epochs: &[ObservedEpoch], timeline: &Timeline, shift_s: i64) -> Measured {
@@ -161,51 +56,6 @@ pub fn measure(epochs: &[ObservedEpoch], timeline: &Timeline, shift_s: i64) -> M
     rows(&mut measured, &pairs, &common_m, &carriers);
     satellites(&mut measured, &pairs, &carriers, &arcs);
     measured
-}
-
-fn join<'a>(
-    epochs: &'a [ObservedEpoch],
-    timeline: &Timeline,
-    label: impl Fn(&ObservedEpoch) -> f64,
-    late_s: f64,
-) -> Vec<Pair<'a>> {
-    let signals = signal::all();
-    let mut pairs = Vec::new();
-    for (number, epoch) in epochs.iter().enumerate() {
-        let label_s = label(epoch);
-        for ((sv, code), values) in &epoch.values {
-            let signal = signals.iter().find(|signal| signal.system == sv.system && signal.rinex == code);
-            let Some(signal) = signal else { continue };
-            let link = Link { sv: *sv, signal };
-            if let Some(truth) = timeline.state(&link, label_s - late_s) {
-                pairs.push(Pair { epoch: number, label_s, link, values, truth });
-            }
-        }
-    }
-    pairs
-}
-
-/// Splits pairs, which ascend by epoch, into epochs.
-fn by_epoch<'p, 'a>(pairs: &'p [Pair<'a>]) -> impl Iterator<Item = &'p [Pair<'a>]> {
-    pairs.chunk_by(|a, b| a.epoch == b.epoch)
-}
-
-/// Something of each epoch and signal, by epoch number.
-type BySignal = BTreeMap<(usize, &'static Signal), f64>;
-
-/// The same epochs with their signals apart: a receiver's delays differ by signal.
-fn by_signal<'p, 'a>(pairs: &'p [Pair<'a>]) -> impl Iterator<Item = Vec<&'p Pair<'a>>> {
-    by_epoch(pairs).flat_map(|epoch| {
-        let mut groups: BTreeMap<&'static Signal, Vec<&'p Pair<'a>>> = BTreeMap::new();
-        epoch.iter().for_each(|pair| groups.entry(pair.link.signal).or_default().push(pair));
-        groups.into_values()
-    })
-}
-
-impl Pair<'_> {
-    fn group(&self) -> (usize, &'static Signal) {
-        (self.epoch, self.link.signal)
-    }
 }
 
 /// Mean code error of each epoch and signal without outliers.
@@ -311,130 +161,6 @@ fn doppler_and_strength(measured: &mut Measured, pairs: &[Pair<'_>]) {
     measured.cn0_db = mean_of_means(&strengths.values().filter_map(|errors| mean(errors)).collect::<Vec<_>>());
 }
 
-impl Measured {
-    fn doppler_sign(&self) -> f64 {
-        if self.doppler_scale.is_some_and(|scale| scale.value < 0.0) { -1.0 } else { 1.0 }
-    }
-}
-
-/// A carrier error.
-#[derive(Clone, Copy, Debug)]
-struct Carrier {
-    /// In metres, the receiver's clock still in.
-    raw_m: f64,
-    /// Without the clock and the arc's constant.
-    cycles: f64,
-}
-
-type Carriers = Vec<Option<Carrier>>;
-/// Indices into the pairs, an arc each.
-type Arcs = Vec<Vec<usize>>;
-
-/// Usual distance of epochs.
-fn usual_step_s(pairs: &[Pair<'_>]) -> f64 {
-    let labels: Vec<f64> = by_epoch(pairs).filter_map(|epoch| Some(epoch.first()?.label_s)).collect();
-    median(&labels.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<_>>()).unwrap_or(1.0)
-}
-
-/// Carrier errors without clock and constants, breaks found. A link's arcs follow one another in `Arcs`.
-fn carriers(measured: &mut Measured, pairs: &[Pair<'_>]) -> (Carriers, Arcs) {
-    let step_s = usual_step_s(pairs);
-    let mut of_link: BTreeMap<Link, Vec<usize>> = BTreeMap::new();
-    for (index, pair) in pairs.iter().enumerate().filter(|(_, pair)| pair.values.carrier_cycles.is_some()) {
-        of_link.entry(pair.link).or_default().push(index);
-    }
-    let sign = carrier_sign(pairs, of_link.values());
-    measured.carrier_sign = sign;
-    let raw_m = |index: usize| -> f64 {
-        let pair = &pairs[index];
-        let cycles = sign.unwrap_or(1.0) * pair.values.carrier_cycles.unwrap_or(0.0) - pair.truth.carrier_cycles;
-        cycles * pair.link.wavelength_m()
-    };
-    // Steps from epoch to epoch of each satellite's carrier; their mean without slips is the clock's.
-    let mut steps: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
-    for indices in of_link.values() {
-        for two in indices.windows(2) {
-            if pairs[two[1]].label_s - pairs[two[0]].label_s <= GAP * step_s && !pairs[two[1]].values.lost_lock {
-                steps.entry(pairs[two[1]].epoch).or_default().push(raw_m(two[1]) - raw_m(two[0]));
-            }
-        }
-    }
-    let mut clock_m: BTreeMap<usize, f64> = BTreeMap::new();
-    let (mut level_m, mut passed_s, mut walked_m) = (0.0, 0.0, 0.0);
-    let mut before: Option<f64> = None;
-    for epoch in by_epoch(pairs) {
-        let Some(first) = epoch.first() else { continue };
-        if let Some(found) = steps.get(&first.epoch) {
-            let middle = median(found).unwrap_or(0.0);
-            let shortest_m = epoch.iter().map(|pair| pair.link.wavelength_m()).fold(f64::INFINITY, f64::min);
-            let near = |step: &&f64| (**step - middle).abs() < 0.5 * SLIP_CYCLES * shortest_m;
-            let kept: Vec<f64> = found.iter().filter(near).copied().collect();
-            let step_m = mean(&kept).unwrap_or(middle);
-            level_m += step_m;
-            walked_m += step_m;
-            passed_s += before.map_or(0.0, |label_s| first.label_s - label_s);
-        }
-        before = Some(first.label_s);
-        clock_m.insert(first.epoch, level_m);
-    }
-    measured.drift_carrier = (passed_s > 0.0).then(|| walked_m / passed_s / SPEED_OF_LIGHT_MPS);
-    let (mut found, mut arcs): (Carriers, Arcs) = (vec![None; pairs.len()], Vec::new());
-    for (link, indices) in &of_link {
-        let wavelength_m = link.wavelength_m();
-        let level =
-            |index: usize| (raw_m(index) - clock_m.get(&pairs[index].epoch).copied().unwrap_or(0.0)) / wavelength_m;
-        let whole =
-            |a: &usize, b: &usize| pairs[*b].label_s - pairs[*a].label_s <= GAP * step_s && !pairs[*b].values.lost_lock;
-        let mut last: Option<f64> = None;
-        for stretch in indices.chunk_by(whole) {
-            let mut rest: Vec<usize> = stretch.to_vec();
-            let mut declared = true;
-            loop {
-                let cycles: Vec<f64> = rest.iter().map(|index| level(*index)).collect();
-                let jump = first_jump_of(&cycles);
-                let arc: Vec<usize> = rest.drain(..jump.unwrap_or(rest.len())).collect();
-                let middle = median(&cycles[..arc.len()]).unwrap_or(0.0);
-                if let (Some(last), Some(first)) = (last, arc.first()) {
-                    let size = (2.0 * (middle - last)).round() / 2.0;
-                    measured.slips.push(Slip {
-                        label_s: pairs[*first].label_s,
-                        sv: link.sv.to_string(),
-                        size_cycles: (!declared).then_some(size),
-                        declared,
-                    });
-                }
-                last = Some(middle);
-                for index in &arc {
-                    let carrier = Carrier { raw_m: raw_m(*index), cycles: level(*index) - middle };
-                    found[*index] = Some(carrier);
-                }
-                arcs.push(arc);
-                declared = false;
-                if jump.is_none() {
-                    break;
-                }
-            }
-        }
-    }
-    measured.slips.sort_by(|a, b| a.label_s.total_cmp(&b.label_s).then_with(|| a.sv.cmp(&b.sv)));
-    let residuals: Vec<f64> = found.iter().flatten().map(|carrier| carrier.cycles).collect();
-    measured.carrier_rms_cycles = rms(&residuals);
-    (found, arcs)
-}
-
-/// +1 where the carrier grows with range, as RINEX has it, −1 where it falls.
-fn carrier_sign<'i>(pairs: &[Pair<'_>], links: impl Iterator<Item = &'i Vec<usize>>) -> Option<f64> {
-    let mut product = 0.0;
-    for indices in links {
-        for two in indices.windows(2) {
-            let [a, b] = [&pairs[two[0]], &pairs[two[1]]];
-            let (Some(from), Some(to)) = (a.values.carrier_cycles, b.values.carrier_cycles) else { continue };
-            product += ((to - from) * (b.truth.carrier_cycles - a.truth.carrier_cycles)).signum();
-        }
-    }
-    (product != 0.0).then(|| product.signum())
-}
-
 /// Whether code, carrier and Doppler of the receiver tell of one clock and one motion.
 fn consistency(measured: &mut Measured, pairs: &[Pair<'_>], carriers: &Carriers, arcs: &Arcs) {
     let mut drifts = Vec::new();
@@ -488,7 +214,7 @@ fn rows(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, carrie
     measured.rows = pairs
         .iter()
         .zip(carriers)
-        .map(|(pair, carrier)| Row {
+        .map(|(pair, carrier)| ObservationError {
             label_s: pair.label_s,
             sv: pair.link.sv.to_string(),
             signal: pair.link.signal.name,
@@ -502,7 +228,7 @@ fn rows(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, carrie
             link: pair.link,
         })
         .collect();
-    let of = |of: fn(&Row) -> Option<f64>| measured.rows.iter().filter_map(of).collect::<Vec<f64>>();
+    let of = |of: fn(&ObservationError) -> Option<f64>| measured.rows.iter().filter_map(of).collect::<Vec<f64>>();
     measured.code_rms_m = rms(&of(|row| row.code_m));
     measured.doppler_rms_hz = rms(&of(|row| row.doppler_hz));
 }
@@ -511,7 +237,7 @@ fn satellites(measured: &mut Measured, pairs: &[Pair<'_>], carriers: &Carriers, 
     let links: BTreeSet<Link> = measured.rows.iter().map(|row| row.link).collect();
     let mut codes = Vec::new();
     for link in links {
-        let of = |of: fn(&Row) -> Option<f64>| -> Vec<f64> {
+        let of = |of: fn(&ObservationError) -> Option<f64>| -> Vec<f64> {
             measured.rows.iter().filter(|row| row.link == link).filter_map(of).collect()
         };
         let (code, doppler, cn0) = (of(|row| row.code_m), of(|row| row.doppler_hz), of(|row| row.cn0_db));

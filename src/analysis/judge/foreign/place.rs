@@ -16,7 +16,7 @@ use crate::gnss::earth::Geodetic;
 
 /// One fix against the truth: a row of `foreign_fixes.csv`.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Row {
+pub struct FixError {
     pub label_s: f64,
     pub satellites: u32,
     pub east_m: f64,
@@ -33,7 +33,7 @@ pub struct Row {
 #[derive(Clone, Debug, Default)]
 pub struct Places {
     pub fixes: usize,
-    pub rows: Vec<Row>,
+    pub rows: Vec<FixError>,
     /// Mean error east, north, up.
     pub bias_enu_m: Option<[Estimate; 3]>,
     pub horizontal_rms_m: Option<f64>,
@@ -60,7 +60,7 @@ pub fn measure(fixes: &[PlaceFix], timeline: &Timeline, shift_s: i64) -> Places 
             let (sin, cos) = libm::sincos(course_rad);
             (speed_mps * sin - true_enu_mps.x, speed_mps * cos - true_enu_mps.y)
         });
-        rows.push(Row {
+        rows.push(FixError {
             label_s,
             satellites: fix.satellites,
             east_m: error_m.x,
@@ -71,7 +71,7 @@ pub fn measure(fixes: &[PlaceFix], timeline: &Timeline, shift_s: i64) -> Places 
             true_velocity_enu_mps: true_enu_mps,
         });
     }
-    let of = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
+    let of = |of: &dyn Fn(&FixError) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
     let horizontal = of(&|row| libm::hypot(row.east_m, row.north_m));
     let axes = [of(&|row| row.east_m), of(&|row| row.north_m), of(&|row| row.up_m)];
     let ground: Vec<f64> =
@@ -98,12 +98,12 @@ fn bias(errors: &[f64]) -> Option<Estimate> {
 }
 
 /// Delay of the labels: minus the slope of the error over the velocity, axis by axis in one fit.
-fn time_tag(rows: &[Row]) -> Option<Estimate> {
+fn time_tag(rows: &[FixError]) -> Option<Estimate> {
     let squares: f64 = rows.iter().map(|row| row.true_velocity_enu_mps.norm_squared()).sum();
     if squares <= SLOWEST_MPS * SLOWEST_MPS * rows.len() as f64 {
         return None;
     }
-    let error = |row: &Row| Vector3::new(row.east_m, row.north_m, row.up_m);
+    let error = |row: &FixError| Vector3::new(row.east_m, row.north_m, row.up_m);
     let products: f64 = rows.iter().map(|row| error(row).dot(&row.true_velocity_enu_mps)).sum();
     let value = -products / squares;
     let rest: Vec<f64> = rows

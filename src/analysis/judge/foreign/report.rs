@@ -8,8 +8,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::observables::Measured;
-use super::{Estimate, Judged};
+use super::fit::Estimate;
+use super::judged::Judged;
+use super::measured::Measured;
 use crate::analysis::statistics::mean;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 

@@ -8,11 +8,11 @@ use std::collections::BTreeSet;
 
 use super::{Finding, Found};
 use crate::analysis::error::JudgeError;
-use crate::analysis::measure::errors::Link;
 use crate::analysis::read::Run;
 use crate::analysis::waveform::leading;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{AcquisitionRow, Event, Observation};
+use crate::gnss::signal::Link;
 
 /// A refined Doppler is right within half a bin of the search: 1/(2·2T) of a coherent time of a few periods.
 const DOPPLER_BINS: f64 = 0.5;

@@ -8,10 +8,10 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::{Finding, Found};
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::message::orbit_parameters;
-use crate::analysis::measure::errors::Link;
 use crate::analysis::read::Run;
 use crate::gnss::record::{Event, IonosphereModel};
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Link;
 
 pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     let mut all = vec![

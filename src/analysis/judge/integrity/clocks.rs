@@ -9,11 +9,11 @@ use std::collections::HashMap;
 
 use super::{Finding, Found};
 use crate::analysis::error::JudgeError;
-use crate::analysis::measure::errors::Link;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{Event, Observation};
+use crate::gnss::signal::Link;
 
 /// What a lock time may err by: it counts whole updates, of which none is longer than a bit.
 const LOCK_S: f64 = 0.02;

@@ -2,17 +2,17 @@
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::due::receiver::Receiver;
-use crate::analysis::expect::due::satellite::{Excuse, Row, Scene};
+use crate::analysis::expect::due::satellite::{Excuse, SatelliteEpoch, Scene};
 use crate::analysis::expect::due::timetable::Timetable;
 use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::judge::judgement::Bound;
 use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::errors::Link;
 use crate::analysis::measure::slips::{Kind, Slip, Slips};
 use crate::analysis::read::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::facts::Losses;
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Link;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
@@ -78,7 +78,7 @@ fn reasons(own: &[&(&Slip, Option<Excuse>)]) -> String {
 
 /// What the truth says of one satellite.
 struct Witness {
-    rows: Vec<Row>,
+    rows: Vec<SatelliteEpoch>,
     usual_dbhz: f64,
     interval_s: f64,
     timetable: Timetable,
@@ -86,7 +86,7 @@ struct Witness {
 
 impl Witness {
     fn new(run: &Run, access: &MultipleAccess<'_>, receiver: &Receiver, link: Link) -> Result<Self, JudgeError> {
-        let rows = run.truth.map(link, |row| Row {
+        let rows = run.truth.map(link, |row| SatelliteEpoch {
             time_s: run.time_s(row.sample),
             cn0_dbhz: row.cn0_dbhz,
             effective_dbhz: access.effective_dbhz(&row) - receiver.cost_db,
@@ -113,7 +113,8 @@ impl Witness {
             return None;
         }
         let from_s = slip.time_s - LOOK_BACK_S;
-        let near: Vec<&Row> = self.rows.iter().filter(|row| (from_s..=slip.time_s).contains(&row.time_s)).collect();
+        let near: Vec<&SatelliteEpoch> =
+            self.rows.iter().filter(|row| (from_s..=slip.time_s).contains(&row.time_s)).collect();
         if let Some(found) = near.iter().find_map(|row| scene.excuse(sv, row, self.usual_dbhz)) {
             return Some(found);
         }

@@ -7,10 +7,10 @@ use crate::analysis::expect::due::{Expectations, Satellite};
 use crate::analysis::judge::judgement::Bound;
 use crate::analysis::judge::summary::Summary;
 use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::errors::Link;
 use crate::analysis::read::Run;
 use crate::gnss::record::{Event, Fix};
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Link;
 
 /// Share of the time over which a satellite must be observed, of what is required. The rest is for one
 /// unlucky search in many.

@@ -12,7 +12,7 @@ const GAP: f32 = 12.0;
 const SHORT: usize = 12;
 
 /// One row with its cells wrapped.
-struct Row {
+struct TableRow {
     cells: Vec<(Vec<String>, Tone)>,
     height: f32,
 }
@@ -51,7 +51,7 @@ pub(super) fn lay_out(sheet: &mut Sheet<'_>, table: &Table) {
     sheet.skip(10.0);
 }
 
-fn header(table: &Table, widths: &[f32], fonts: &Fonts) -> Row {
+fn header(table: &Table, widths: &[f32], fonts: &Fonts) -> TableRow {
     let titles: Vec<Cell> = table.columns.iter().map(|(title, _)| Cell::toned(title.clone(), Tone::Strong)).collect();
     row(&titles, widths, fonts)
 }
@@ -63,15 +63,15 @@ fn face(tone: Tone) -> Face {
     }
 }
 
-fn row(cells: &[Cell], widths: &[f32], fonts: &Fonts) -> Row {
+fn row(cells: &[Cell], widths: &[f32], fonts: &Fonts) -> TableRow {
     let wrapped: Vec<(Vec<String>, Tone)> = (cells.iter().zip(widths))
         .map(|(cell, width)| (fonts.wrap(face(cell.tone), SIZE, &cell.text, *width + 0.01, 0.0), cell.tone))
         .collect();
     let lines = wrapped.iter().map(|(lines, _)| lines.len()).max().unwrap_or(1);
-    Row { cells: wrapped, height: lines as f32 * LEADING + 2.0 * PADDING }
+    TableRow { cells: wrapped, height: lines as f32 * LEADING + 2.0 * PADDING }
 }
 
-fn draw(sheet: &mut Sheet<'_>, table: &Table, row: &Row, widths: &[f32]) {
+fn draw(sheet: &mut Sheet<'_>, table: &Table, row: &TableRow, widths: &[f32]) {
     let mut left = 0.0;
     for (((lines, tone), width), (_, side)) in row.cells.iter().zip(widths).zip(&table.columns) {
         let face = face(*tone);

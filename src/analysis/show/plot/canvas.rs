@@ -1,153 +1,19 @@
-//! Charts as data, drawn by plotters with the bundled font: what every picture is made of.
+//! Charts drawn by plotters with the bundled font: what every picture is made of.
 //!
 //! Sizes are chosen for print: a picture [`WIDTH_PX`] wide fills the text width of an A4 page and its
 //! smallest words are then above 6 points. Every size that plotters would choose is set here, for [`FINE`]
 //! virtual pixels in one. No system font, no C library: a fresh machine draws the same picture.
 
-use std::error::Error;
 use std::path::Path;
 
 use plotters::chart::LabelAreaPosition;
-use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::analysis::error::JudgeError;
-pub use crate::analysis::show::plot::drawing::{Drawing, FINE};
-use crate::analysis::show::plot::sketch::drawn;
-
-/// Width of a picture that fills a page's text width.
-pub const WIDTH_PX: u32 = 680;
-/// The drawing surface, in virtual pixels.
-pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// Why a drawing failed; only its text reaches the user.
-pub type Failure = Box<dyn Error>;
-
-/// Colours that colour-blind people tell apart (Okabe and Ito 2008), without its yellow, too pale on white.
-pub const COLOURS: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(0, 0, 0),
-];
-pub const BLUE: RGBColor = COLOURS[0];
-pub const ORANGE: RGBColor = COLOURS[1];
-pub const GREEN: RGBColor = COLOURS[2];
-pub const GREY: RGBColor = RGBColor(120, 120, 120);
-const LIGHT: RGBColor = RGBColor(225, 225, 225);
-
-/// How a series is drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Mark {
-    Line,
-    /// A thin dashed line.
-    Dash,
-    Dots,
-    /// Hollow dots.
-    Rings,
-    /// A larger cross.
-    Cross,
-    /// Larger dots.
-    Balls,
-    /// Bars from zero, of that width in data units.
-    Bars(f64),
-    /// The area inside the points, pale.
-    Band,
-    /// Filled rectangles about the points, of that width and height in data units.
-    Tile(f64, f64),
-}
-
-/// Points in data units and how they look.
-#[derive(Clone, Debug)]
-pub struct Series {
-    pub name: String,
-    pub colour: RGBColor,
-    pub mark: Mark,
-    pub points: Vec<(f64, f64)>,
-}
-
-impl Series {
-    pub fn new(name: impl Into<String>, colour: RGBColor, mark: Mark, points: Vec<(f64, f64)>) -> Self {
-        Self { name: name.into(), colour, mark, points }
-    }
-
-    /// A series of a satellite: colours first, then the same colours hollow.
-    pub fn numbered(name: String, index: usize, points: Vec<(f64, f64)>) -> Self {
-        let colour = COLOURS[index % COLOURS.len()];
-        let mark = if (index / COLOURS.len()).is_multiple_of(2) { Mark::Dots } else { Mark::Rings };
-        Self { name, colour, mark, points }
-    }
-}
-
-/// An axis in data units.
-#[derive(Clone, Debug)]
-pub struct Axis {
-    pub label: String,
-    pub from: f64,
-    pub to: f64,
-}
-
-impl Axis {
-    pub fn new(label: &str, (from, to): (f64, f64)) -> Self {
-        // plotters needs a range with a length.
-        let (from, to) = if from < to { (from, to) } else { (from - 0.5, from + 0.5) };
-        Self { label: label.to_owned(), from, to }
-    }
-
-    /// An axis around every finite value, with a margin, not shorter than `least`.
-    pub fn around(label: &str, values: impl Iterator<Item = f64>, least: f64) -> Self {
-        let (low, high) = values
-            .filter(|value| value.is_finite())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-        let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
-        let half = ((high - low) * 0.54).max(least / 2.0);
-        let middle = (low + high) / 2.0;
-        Self::new(label, (middle - half, middle + half))
-    }
-
-    /// Marks of an axis of common logarithms: these multiples of every power of ten, as `name` writes them.
-    pub fn log_ticks(&self, multiples: &[f64], name: impl Fn(f64) -> String) -> Vec<(f64, String)> {
-        let decades = self.from.floor() as i32..=self.to.ceil() as i32;
-        let value = |decade: i32, multiple: f64| {
-            // Powers of ten from 1 up are exact, their inverses are not.
-            if decade < 0 { multiple / 10_f64.powi(-decade) } else { multiple * 10_f64.powi(decade) }
-        };
-        let values = decades.flat_map(|decade| multiples.iter().map(move |multiple| value(decade, *multiple)));
-        let placed = values.map(|value| (libm::log10(value), value));
-        let shown = placed.filter(|(place, _)| (self.from..=self.to).contains(place));
-        shown.map(|(place, value)| (place, name(value))).collect()
-    }
-
-    fn span(&self) -> f64 {
-        self.to - self.from
-    }
-}
-
-/// One pair of axes with what is drawn in it.
-#[derive(Clone, Debug)]
-pub struct Chart {
-    pub title: String,
-    pub x: Axis,
-    pub y: Axis,
-    pub series: Vec<Series>,
-    /// One metre is as long up as across.
-    pub equal: bool,
-    /// Labels under the x axis in place of numbers.
-    pub x_ticks: Option<Vec<(f64, String)>>,
-    /// Labels beside the y axis in place of numbers; the grid then follows both lists.
-    pub y_ticks: Option<Vec<(f64, String)>>,
-    /// Words at points, so many pixels above them.
-    pub labels: Vec<((f64, f64), String, i32)>,
-}
-
-impl Chart {
-    pub fn new(title: impl Into<String>, x: Axis, y: Axis, series: Vec<Series>) -> Self {
-        Self { title: title.into(), x, y, series, equal: false, x_ticks: None, y_ticks: None, labels: Vec::new() }
-    }
-}
+pub use crate::analysis::show::plot::chart::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::show::plot::chart::{LIGHT, drawn};
+pub use crate::analysis::show::plot::drawing::{Area, Drawing, FINE, Failure};
 
 /// Draws charts, `columns` a row, with one legend below all of them, into a picture of that size: a PNG, or
 /// an SVG where the file is named so.

@@ -7,7 +7,8 @@ use crate::analysis::expect::theory::clock::white_phase;
 use crate::analysis::measure::allan::{Deviation, Point};
 use crate::analysis::measure::clock::{ClockRow, Line, Of};
 use crate::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::show::plot::judged::Judged;
+use crate::analysis::show::plot::sketch::Sketch;
 
 type Points = Vec<(f64, f64)>;
 

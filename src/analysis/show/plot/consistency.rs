@@ -1,9 +1,10 @@
 //! Errors of the fixes within twice the sigma that the receiver states, and the normalised error squared.
 
 use crate::analysis::error::JudgeError;
-use crate::analysis::measure::consistency::{FREEDOM, Row};
+use crate::analysis::measure::consistency::{FREEDOM, NormalisedError};
 use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::show::plot::judged::Judged;
+use crate::analysis::show::plot::sketch::Sketch;
 
 type Points = Vec<(f64, f64)>;
 
@@ -11,8 +12,10 @@ type Points = Vec<(f64, f64)>;
 pub fn consistency(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let found = judged.consistency;
     let x = judged.time_axis(found.rows.iter().map(|row| row.time_s));
-    let over = |of: &dyn Fn(&Row) -> f64| -> Points { found.rows.iter().map(|row| (row.time_s, of(row))).collect() };
-    type Axis3 = (&'static str, fn(&Row) -> f64, fn(&Row) -> f64);
+    let over = |of: &dyn Fn(&NormalisedError) -> f64| -> Points {
+        found.rows.iter().map(|row| (row.time_s, of(row))).collect()
+    };
+    type Axis3 = (&'static str, fn(&NormalisedError) -> f64, fn(&NormalisedError) -> f64);
     let axes: [Axis3; 3] = [
         ("East", |row| row.east_m, |row| row.sigma_east_m),
         ("North", |row| row.north_m, |row| row.sigma_north_m),

@@ -3,7 +3,8 @@
 use crate::analysis::error::JudgeError;
 use crate::analysis::read::Emission;
 use crate::analysis::show::plot::canvas::{Axis, COLOURS, Chart, Mark, Series, WIDTH_PX};
-use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::show::plot::judged::Judged;
+use crate::analysis::show::plot::sketch::Sketch;
 use crate::gnss::record::SkyRow;
 use crate::gnss::satellite::Sv;
 

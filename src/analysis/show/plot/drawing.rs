@@ -4,20 +4,26 @@
 //! down. It writes one element a dot; dots of a kind that follow each other become one path here, which is an
 //! order of magnitude smaller and what keeps reports with tens of thousands of points printable.
 
+use std::error::Error;
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 use resvg::usvg::fontdb;
 use resvg::{tiny_skia, usvg};
 
-use super::canvas::{Area, Failure};
 use crate::analysis::error::JudgeError;
 
 /// Virtual pixels in one pixel of the picture.
 pub const FINE: i32 = 4;
+
+/// The drawing surface, in virtual pixels.
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// Why a drawing failed; only its text reaches the user.
+pub type Failure = Box<dyn Error>;
 
 /// DejaVu Sans (assets/README.md).
 pub(crate) static FONT: &[u8] = include_bytes!("../../../../assets/DejaVuSans.ttf");

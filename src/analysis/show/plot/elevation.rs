@@ -3,8 +3,9 @@
 use crate::analysis::error::JudgeError;
 use crate::analysis::measure::elevation::{Point, points};
 use crate::analysis::show::plot::canvas::{Axis, Chart, WIDTH_PX};
+use crate::analysis::show::plot::judged::Judged;
 use crate::analysis::show::plot::signals::{Cloud, Frame, legend, observed, over_time};
-use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::show::plot::sketch::Sketch;
 
 /// Draws them.
 pub fn elevation(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {

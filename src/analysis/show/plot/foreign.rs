@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::judge::foreign::Judged;
-use crate::analysis::judge::foreign::observables::Row;
+use crate::analysis::judge::foreign::measured::ObservationError;
 use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
 use crate::analysis::statistics::{mean, percentile};
 
@@ -33,7 +33,7 @@ fn over_time(title: &str, label: &str, least: f64, series: Vec<Series>) -> Chart
     Chart::new(title, x, y, series)
 }
 
-fn per_satellite(rows: &[Row], of: fn(&Row) -> Option<f64>) -> Vec<Series> {
+fn per_satellite(rows: &[ObservationError], of: fn(&ObservationError) -> Option<f64>) -> Vec<Series> {
     let mut found: BTreeMap<&str, Points> = BTreeMap::new();
     for row in rows {
         let points = found.entry(&row.sv).or_default();
@@ -76,7 +76,7 @@ fn observables(path: &Path, judged: &Judged) -> Result<(), JudgeError> {
 
 fn position(path: &Path, judged: &Judged) -> Result<(), JudgeError> {
     let Some(places) = &judged.places else { return Ok(()) };
-    let over = |of: fn(&crate::analysis::judge::foreign::place::Row) -> f64| -> Points {
+    let over = |of: fn(&crate::analysis::judge::foreign::place::FixError) -> f64| -> Points {
         places.rows.iter().map(|row| (row.label_s, of(row))).collect()
     };
     let legend = vec![

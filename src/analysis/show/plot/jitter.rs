@@ -6,7 +6,8 @@ use crate::analysis::error::JudgeError;
 use crate::analysis::judge::judgement::digits;
 use crate::analysis::judge::summary::{DLL_CHIPS, FLL_HZ, PLL_DEG};
 use crate::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::show::plot::judged::Judged;
+use crate::analysis::show::plot::sketch::Sketch;
 use crate::analysis::statistics::{mean, std};
 
 /// The errors of one loop, each satellite about its own mean, and the rule for their σ.

@@ -7,6 +7,7 @@
 //! on `truth/rays.csv`.
 
 pub mod canvas;
+pub mod chart;
 mod clock;
 mod consistency;
 mod delays;
@@ -14,6 +15,7 @@ pub mod drawing;
 mod elevation;
 pub(crate) mod foreign;
 pub(crate) mod jitter;
+mod judged;
 mod multipath;
 mod position;
 mod signals;
@@ -26,34 +28,10 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use crate::analysis::error::JudgeError;
-use crate::analysis::judge::summary::Summary;
-use crate::analysis::measure::clock::Clock;
-use crate::analysis::measure::consistency::Consistency;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::read::Run;
 use canvas::Failure;
 use drawing::Drawing;
+pub(crate) use judged::Judged;
 pub(crate) use sketch::Sketch;
-
-/// Everything that a picture is drawn from.
-pub(crate) struct Judged<'a> {
-    pub run: &'a Run,
-    pub errors: &'a Errors,
-    pub clock: &'a Clock,
-    pub consistency: &'a Consistency,
-    pub summary: &'a Summary,
-}
-
-impl Judged<'_> {
-    /// An axis over the times at which there is something, or the whole run if there is nothing.
-    fn time_axis(&self, times_s: impl Iterator<Item = f64>) -> canvas::Axis {
-        let first_s = times_s.fold(self.run.scene.duration_s, f64::min);
-        let end_s = self.run.scene.duration_s;
-        // Some room before the first point shows that nothing came before it.
-        let from_s = if first_s < end_s { (first_s - 0.05 * (end_s - first_s)).max(0.0) } else { 0.0 };
-        canvas::Axis::new("time (s)", (from_s, end_s))
-    }
-}
 
 /// One picture of a run; `None` where the run has nothing of the kind.
 type Sketcher = fn(&Judged<'_>) -> Result<Option<Sketch>, JudgeError>;

@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::show::plot::canvas::WIDTH_PX;
+use crate::analysis::show::plot::judged::Judged;
 use crate::analysis::show::plot::signals::{Frame, legend, observed, of_observations, over_time};
-use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::show::plot::sketch::Sketch;
 
 /// Code errors over time, and the amplitude of all rays against the direct one.
 pub fn multipath(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {

@@ -3,7 +3,8 @@
 use crate::analysis::error::JudgeError;
 use crate::analysis::measure::errors::{Link, SignalError};
 use crate::analysis::show::plot::canvas::{Axis, Chart, Mark, Series, WIDTH_PX};
-use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::show::plot::judged::Judged;
+use crate::analysis::show::plot::sketch::Sketch;
 use crate::analysis::statistics::ranked;
 use crate::gnss::record::TrackingRow;
 

@@ -5,7 +5,8 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::show::plot::canvas::{Area, FINE, Failure, GREY, WIDTH_PX, anchored};
-use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::show::plot::judged::Judged;
+use crate::analysis::show::plot::sketch::Sketch;
 use crate::analysis::statistics::mean;
 use crate::gnss::satellite::Sv;
 

@@ -6,7 +6,8 @@ use crate::analysis::error::JudgeError;
 use crate::analysis::expect::spectrum;
 use crate::analysis::read::Run;
 use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::analysis::show::plot::{Judged, Sketch};
+use crate::analysis::show::plot::judged::Judged;
+use crate::analysis::show::plot::sketch::Sketch;
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::signal::Link;
 

@@ -1,0 +1,71 @@
+//! A foreign receiver's observations joined with the truth at their labels.
+
+use std::collections::BTreeMap;
+
+use crate::analysis::expect::timeline::{State, Timeline};
+use crate::analysis::read::rinex_obs::{ObservedEpoch, Values};
+use crate::gnss::signal::{self, Link, Signal};
+
+/// One observation and the truth at its time.
+#[derive(Clone, Debug)]
+pub(super) struct Pair<'a> {
+    pub epoch: usize,
+    pub label_s: f64,
+    pub link: Link,
+    pub values: &'a Values,
+    pub truth: State,
+}
+
+impl Pair<'_> {
+    /// Error of the pseudorange, the receiver's clock still in.
+    pub fn code_m(&self) -> Option<f64> {
+        Some(self.values.pseudorange_m? - self.truth.range_m)
+    }
+}
+
+/// Every observation whose satellite and time the truth has; labels are late by `late_s`.
+pub(super) fn join<'a>(
+    epochs: &'a [ObservedEpoch],
+    timeline: &Timeline,
+    label: impl Fn(&ObservedEpoch) -> f64,
+    late_s: f64,
+) -> Vec<Pair<'a>> {
+    let signals = signal::all();
+    let mut pairs = Vec::new();
+    for (number, epoch) in epochs.iter().enumerate() {
+        let label_s = label(epoch);
+        for ((sv, code), values) in &epoch.values {
+            let signal = signals.iter().find(|signal| signal.system == sv.system && signal.rinex == code);
+            let Some(signal) = signal else { continue };
+            let link = Link { sv: *sv, signal };
+            if let Some(truth) = timeline.state(&link, label_s - late_s) {
+                pairs.push(Pair { epoch: number, label_s, link, values, truth });
+            }
+        }
+    }
+    pairs
+}
+
+/// Splits pairs, which ascend by epoch, into epochs.
+pub(super) fn by_epoch<'p, 'a>(pairs: &'p [Pair<'a>]) -> impl Iterator<Item = &'p [Pair<'a>]> {
+    pairs.chunk_by(|a, b| a.epoch == b.epoch)
+}
+
+/// Something of each epoch and signal, by epoch number.
+pub(super) type BySignal = BTreeMap<(usize, &'static Signal), f64>;
+
+/// The same epochs with their signals apart: a receiver's delays differ by signal.
+pub(super) fn by_signal<'p, 'a>(pairs: &'p [Pair<'a>]) -> impl Iterator<Item = Vec<&'p Pair<'a>>> {
+    by_epoch(pairs).flat_map(|epoch| {
+        let mut groups: BTreeMap<&'static Signal, Vec<&'p Pair<'a>>> = BTreeMap::new();
+        epoch.iter().for_each(|pair| groups.entry(pair.link.signal).or_default().push(pair));
+        groups.into_values()
+    })
+}
+
+impl Pair<'_> {
+    /// Its epoch and signal.
+    pub fn group(&self) -> (usize, &'static Signal) {
+        (self.epoch, self.link.signal)
+    }
+}

@@ -1,0 +1,197 @@
+//! Charts as data: points, axes and how they look, with no more points than can be told apart.
+
+use plotters::style::RGBColor;
+
+/// Width of a picture that fills a page's text width.
+pub const WIDTH_PX: u32 = 680;
+
+/// Colours that colour-blind people tell apart (Okabe and Ito 2008), without its yellow, too pale on white.
+pub const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+];
+pub const BLUE: RGBColor = COLOURS[0];
+pub const ORANGE: RGBColor = COLOURS[1];
+pub const GREEN: RGBColor = COLOURS[2];
+pub const GREY: RGBColor = RGBColor(120, 120, 120);
+pub(super) const LIGHT: RGBColor = RGBColor(225, 225, 225);
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mark {
+    Line,
+    /// A thin dashed line.
+    Dash,
+    Dots,
+    /// Hollow dots.
+    Rings,
+    /// A larger cross.
+    Cross,
+    /// Larger dots.
+    Balls,
+    /// Bars from zero, of that width in data units.
+    Bars(f64),
+    /// The area inside the points, pale.
+    Band,
+    /// Filled rectangles about the points, of that width and height in data units.
+    Tile(f64, f64),
+}
+
+/// Points in data units and how they look.
+#[derive(Clone, Debug)]
+pub struct Series {
+    pub name: String,
+    pub colour: RGBColor,
+    pub mark: Mark,
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Series {
+    pub fn new(name: impl Into<String>, colour: RGBColor, mark: Mark, points: Vec<(f64, f64)>) -> Self {
+        Self { name: name.into(), colour, mark, points }
+    }
+
+    /// A series of a satellite: colours first, then the same colours hollow.
+    pub fn numbered(name: String, index: usize, points: Vec<(f64, f64)>) -> Self {
+        let colour = COLOURS[index % COLOURS.len()];
+        let mark = if (index / COLOURS.len()).is_multiple_of(2) { Mark::Dots } else { Mark::Rings };
+        Self { name, colour, mark, points }
+    }
+}
+
+/// An axis in data units.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    pub label: String,
+    pub from: f64,
+    pub to: f64,
+}
+
+impl Axis {
+    pub fn new(label: &str, (from, to): (f64, f64)) -> Self {
+        // plotters needs a range with a length.
+        let (from, to) = if from < to { (from, to) } else { (from - 0.5, from + 0.5) };
+        Self { label: label.to_owned(), from, to }
+    }
+
+    /// An axis around every finite value, with a margin, not shorter than `least`.
+    pub fn around(label: &str, values: impl Iterator<Item = f64>, least: f64) -> Self {
+        let (low, high) = values
+            .filter(|value| value.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
+        let half = ((high - low) * 0.54).max(least / 2.0);
+        let middle = (low + high) / 2.0;
+        Self::new(label, (middle - half, middle + half))
+    }
+
+    /// Marks of an axis of common logarithms: these multiples of every power of ten, as `name` writes them.
+    pub fn log_ticks(&self, multiples: &[f64], name: impl Fn(f64) -> String) -> Vec<(f64, String)> {
+        let decades = self.from.floor() as i32..=self.to.ceil() as i32;
+        let value = |decade: i32, multiple: f64| {
+            // Powers of ten from 1 up are exact, their inverses are not.
+            if decade < 0 { multiple / 10_f64.powi(-decade) } else { multiple * 10_f64.powi(decade) }
+        };
+        let values = decades.flat_map(|decade| multiples.iter().map(move |multiple| value(decade, *multiple)));
+        let placed = values.map(|value| (libm::log10(value), value));
+        let shown = placed.filter(|(place, _)| (self.from..=self.to).contains(place));
+        shown.map(|(place, value)| (place, name(value))).collect()
+    }
+
+    pub(super) fn span(&self) -> f64 {
+        self.to - self.from
+    }
+}
+
+/// One pair of axes with what is drawn in it.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    pub title: String,
+    pub x: Axis,
+    pub y: Axis,
+    pub series: Vec<Series>,
+    /// One metre is as long up as across.
+    pub equal: bool,
+    /// Labels under the x axis in place of numbers.
+    pub x_ticks: Option<Vec<(f64, String)>>,
+    /// Labels beside the y axis in place of numbers; the grid then follows both lists.
+    pub y_ticks: Option<Vec<(f64, String)>>,
+    /// Words at points, so many pixels above them.
+    pub labels: Vec<((f64, f64), String, i32)>,
+}
+
+impl Chart {
+    pub fn new(title: impl Into<String>, x: Axis, y: Axis, series: Vec<Series>) -> Self {
+        Self { title: title.into(), x, y, series, equal: false, x_ticks: None, y_ticks: None, labels: Vec::new() }
+    }
+}
+
+impl Series {
+    /// Leaves as many points as are drawn where so many series of marks share a chart; bars and tiles are all drawn.
+    pub fn thin(&mut self, clouds: usize) {
+        if !matches!(self.mark, Mark::Bars(_) | Mark::Tile(..)) {
+            let most = if self.is_cloud() { (MOST_MARKS / clouds.max(1)).clamp(100, MOST_POINTS) } else { MOST_POINTS };
+            self.points = thinned(&self.points, self.mark, most);
+        }
+    }
+
+    /// Whether its points stand alone.
+    pub(super) fn is_cloud(&self) -> bool {
+        matches!(self.mark, Mark::Dots | Mark::Rings)
+    }
+}
+
+/// Most points that a series is drawn with, and most marks that the series of a run's chart have together:
+/// they cover it then.
+const MOST_POINTS: usize = 1000;
+const MOST_MARKS: usize = 4000;
+
+/// Few enough points to draw. Of a line, the lowest and the highest of each run of neighbours, so that no
+/// spike is lost; of marks that stand alone, every so many, so that their density stays true.
+fn thinned(points: &[(f64, f64)], mark: Mark, most: usize) -> Vec<(f64, f64)> {
+    let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+    if finite.len() <= most {
+        return finite;
+    }
+    if !matches!(mark, Mark::Line | Mark::Dash) {
+        return finite.iter().copied().step_by(finite.len().div_ceil(most)).collect();
+    }
+    let extremes = |run: &[(f64, f64)]| {
+        let numbered = || run.iter().enumerate();
+        let low = numbered().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
+        let high = numbered().max_by(|a, b| a.1.1.total_cmp(&b.1.1));
+        let mut pair: Vec<(usize, (f64, f64))> =
+            low.into_iter().chain(high).map(|(index, point)| (index, *point)).collect();
+        pair.sort_by_key(|(index, _)| *index);
+        pair.into_iter().map(|(_, point)| point)
+    };
+    finite.chunks(finite.len().div_ceil(most / 2)).flat_map(extremes).collect()
+}
+
+/// The points with which a series is drawn, whoever made it.
+pub(super) fn drawn(series: &Series) -> Vec<(f64, f64)> {
+    thinned(&series.points, series.mark, MOST_POINTS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_a_line_s_spikes_and_the_density_of_marks() {
+        let mut points: Vec<(f64, f64)> = (0..100_000).map(|n| (f64::from(n), 0.0)).collect();
+        points[54_321].1 = 9.0;
+        points[54_400].1 = -9.0;
+        let dots = thinned(&points, Mark::Dots, MOST_POINTS);
+        assert!(dots.len() <= MOST_POINTS && dots.iter().filter(|point| point.1 != 0.0).count() <= 1);
+        let few = thinned(&points, Mark::Line, MOST_POINTS);
+        assert!(few.len() <= MOST_POINTS + 2);
+        assert!(few.contains(&(54_321.0, 9.0)) && few.contains(&(54_400.0, -9.0)));
+        assert!(few.windows(2).all(|pair| pair[0].0 <= pair[1].0));
+    }
+}

@@ -1,0 +1,28 @@
+//! What pictures and reports are made from.
+
+use crate::analysis::judge::summary::Summary;
+use crate::analysis::measure::clock::Clock;
+use crate::analysis::measure::consistency::Consistency;
+use crate::analysis::measure::errors::Errors;
+use crate::analysis::read::Run;
+use crate::analysis::show::plot::chart::Axis;
+
+/// Everything that a picture is drawn from.
+pub(crate) struct Judged<'a> {
+    pub run: &'a Run,
+    pub errors: &'a Errors,
+    pub clock: &'a Clock,
+    pub consistency: &'a Consistency,
+    pub summary: &'a Summary,
+}
+
+impl Judged<'_> {
+    /// An axis over the times at which there is something, or the whole run if there is nothing.
+    pub(super) fn time_axis(&self, times_s: impl Iterator<Item = f64>) -> Axis {
+        let first_s = times_s.fold(self.run.scene.duration_s, f64::min);
+        let end_s = self.run.scene.duration_s;
+        // Some room before the first point shows that nothing came before it.
+        let from_s = if first_s < end_s { (first_s - 0.05 * (end_s - first_s)).max(0.0) } else { 0.0 };
+        Axis::new("time (s)", (from_s, end_s))
+    }
+}

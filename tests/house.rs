@@ -1,0 +1,165 @@
+//! The house: the order of rooms, the length of files and comments, and panics, as the sources have them.
+//!
+//! A room is a file or folder of `src`. [`ORDER`] lists the rooms of each folder from the ground up, and a room
+//! imports only rooms before it. The checks read text: comments, strings and test modules are cut away, then
+//! every path that begins with `crate`, `super` or `self` is resolved. Limits: a path that a macro builds is
+//! not seen, and neither is an item that is used through a value.
+
+#[path = "house/order.rs"]
+mod order;
+#[path = "house/source.rs"]
+mod source;
+
+use std::collections::BTreeSet;
+
+use order::{EXCEPTIONS, ORDER, arrows};
+use source::{Source, comments_too_wide, lines_of_code, unwraps};
+
+/// Lines of code that a file may have: comments, blank lines and tests not counted.
+const MOST_LINES: usize = 400;
+/// Files that are longer. The list may only shrink.
+const LONG: &[&str] = &["src/gnss/rinex/columns.rs", "src/receiver/session/gap.rs"];
+/// Columns that a line of comment may have.
+const MOST_COLUMNS: usize = 110;
+
+#[test]
+fn a_room_imports_only_rooms_before_it() {
+    let sources = Source::all("src");
+    assert!(sources.len() > 200, "{} sources found", sources.len());
+    let found: BTreeSet<String> = sources.iter().flat_map(|source| arrows(source, ORDER)).collect();
+    let known: BTreeSet<String> = EXCEPTIONS.iter().map(|line| (*line).to_owned()).collect();
+    let new: Vec<&String> = found.difference(&known).collect();
+    assert!(new.is_empty(), "imports against the order of tests/house/order.rs:\n{new:#?}");
+    let gone: Vec<&String> = known.difference(&found).collect();
+    assert!(gone.is_empty(), "these exceptions are gone; remove them from tests/house/order.rs:\n{gone:#?}");
+}
+
+#[test]
+fn every_room_is_in_the_table_once() {
+    let sources = Source::all("src");
+    for (folder, groups) in ORDER {
+        let rooms: Vec<&str> = groups.iter().flat_map(|group| group.iter().copied()).collect();
+        let once: BTreeSet<&str> = rooms.iter().copied().collect();
+        assert_eq!(once.len(), rooms.len(), "{folder}: a room is listed twice");
+        let there = source::rooms(&sources, folder);
+        let missing: Vec<&String> = there.iter().filter(|room| !once.contains(room.as_str())).collect();
+        assert!(missing.is_empty(), "src/{folder}: not in the table of tests/house/order.rs: {missing:?}");
+    }
+}
+
+#[test]
+fn files_of_logic_are_short() {
+    let all = Source::all("src");
+    let long = |source: &&Source| lines_of_code(&source.code) > MOST_LINES;
+    let long: Vec<&str> = all.iter().filter(long).map(|source| source.path.as_str()).collect();
+    let new: Vec<_> = long.iter().filter(|path| !LONG.contains(path)).collect();
+    assert!(new.is_empty(), "more than {MOST_LINES} lines of code: {new:?}");
+    let gone: Vec<_> = LONG.iter().filter(|path| !long.contains(path)).collect();
+    assert!(gone.is_empty(), "short by now; remove them from LONG: {gone:?}");
+}
+
+#[test]
+fn comments_are_wrapped() {
+    let mut wide = Vec::new();
+    for folder in ["src", "tests", "benches", "examples", "fuzz"] {
+        for (path, text) in source::files(folder) {
+            wide.extend(comments_too_wide(&text, MOST_COLUMNS).into_iter().map(|line| format!("{path}:{line}")));
+        }
+    }
+    assert!(wide.is_empty(), "{} comments beyond {MOST_COLUMNS} columns:\n{}", wide.len(), wide.join("\n"));
+}
+
+#[test]
+fn nothing_is_unwrapped_outside_tests() {
+    let all = Source::all("src");
+    let found: Vec<String> = all
+        .iter()
+        .flat_map(|source| unwraps(&source.code).into_iter().map(|at| format!("{}:{at}", source.path)))
+        .collect();
+    assert!(found.is_empty(), "unwrap() outside tests: {found:?}");
+}
+
+/// The checks themselves, on sources in which the fault is planted.
+mod planted {
+    use super::*;
+
+    const TABLE: &[(&str, &[&[&str]])] =
+        &[("", &[&["gnss"], &["generator", "receiver"], &["study"]]), ("gnss", &[&["time"], &["orbit"], &["record"]])];
+
+    fn arrows_of(path: &str, text: &str) -> Vec<String> {
+        arrows(&Source::new(path, text), TABLE)
+    }
+
+    #[test]
+    fn an_import_upward_is_found_however_it_is_written() {
+        let upward = ["gnss/time: gnss/record"];
+        for text in [
+            "use crate::gnss::record::Fix;",
+            "use super::record::Fix;",
+            "use super::{orbit::{self, Kepler}, record::Fix};",
+            "pub use crate::gnss::{\n    record,\n};",
+            "fn f() -> crate::gnss::record::Fix { super::record::fix(\"}\") }",
+            "mod inner { use super::super::record::Fix; }",
+        ] {
+            let found = arrows_of("src/gnss/time.rs", text);
+            assert!(found.iter().any(|arrow| arrow == upward[0]), "{text}: {found:?}");
+        }
+        assert_eq!(arrows_of("src/gnss/time/leap.rs", "use super::super::record;"), upward);
+        assert_eq!(arrows_of("src/gnss/time.rs", "use crate::study::sweep;"), ["gnss: study"]);
+    }
+
+    #[test]
+    fn an_import_of_a_neighbour_of_the_same_level_or_of_the_root_is_found() {
+        assert_eq!(arrows_of("src/receiver/run.rs", "use crate::generator::scene;"), ["receiver: generator"]);
+        assert_eq!(arrows_of("src/gnss/record.rs", "use crate::gnss::Epoch;"), ["gnss/record: gnss/Epoch"]);
+    }
+
+    #[test]
+    fn an_import_downward_and_words_that_are_no_import_are_none() {
+        for text in [
+            "use crate::gnss::time::Epoch;",
+            "use super::time;",
+            "// use crate::study::sweep;",
+            "/// [`crate::study::sweep`]",
+            "const TEXT: &str = \"crate::study::sweep\";",
+            "const RAW: &str = r#\"\"crate::study::sweep\"#;",
+            "const QUOTE: char = '\"'; // crate::study::sweep",
+            "#[cfg(test)]\nmod tests {\n    use crate::study::sweep;\n}\n",
+            "use std::fmt;",
+        ] {
+            let found = arrows_of("src/gnss/orbit.rs", text);
+            assert!(found.is_empty(), "{text}: {found:?}");
+        }
+        assert!(arrows_of("src/gnss/mod.rs", "pub use record::Fix;\nuse crate::gnss::orbit;").is_empty());
+        assert!(arrows_of("src/study/mod.rs", "use crate::{generator, receiver};").is_empty());
+    }
+
+    #[test]
+    fn code_after_a_test_module_is_still_read() {
+        let text = "#[cfg(test)]\nmod tests {\n    fn f() { let _ = \"}\"; }\n}\nuse super::record;\n";
+        assert_eq!(arrows_of("src/gnss/time.rs", text), ["gnss/time: gnss/record"]);
+    }
+
+    #[test]
+    fn a_wide_comment_is_found_and_a_wide_line_of_code_is_not() {
+        let columns = |count: usize| "é".repeat(count);
+        let text = format!("    // {}\n/// {}\nlet x = \"{}\";\n", columns(103), columns(107), columns(200));
+        assert_eq!(comments_too_wide(&text, 110), [2]);
+        assert_eq!(comments_too_wide(&format!("//! <https://{}>", columns(120)), 110), Vec::<usize>::new());
+    }
+
+    #[test]
+    fn lines_of_code_are_counted_without_comments_blanks_and_tests() {
+        let source = Source::new(
+            "src/a.rs",
+            "//! Doc.\n\nfn f() {}\n// no\nfn g() {}\n#[cfg(test)]\nmod tests {\n fn h() {}\n}\n",
+        );
+        assert_eq!(lines_of_code(&source.code), 2);
+    }
+
+    #[test]
+    fn an_unwrap_is_found_where_it_is_code() {
+        let text = "fn f() { x.unwrap(); }\n// .unwrap()\nfn g() { y\n  .unwrap (); \".unwrap()\"; z.unwrap_or(1) }\n";
+        assert_eq!(unwraps(&Source::new("src/a.rs", text).code), [1, 4]);
+    }
+}

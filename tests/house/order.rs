@@ -1,0 +1,292 @@
+//! The order of rooms, and the imports that run against it.
+
+use crate::source::Source;
+
+/// Rooms of each folder of `src`, the ground first; rooms on one line do not import each other.
+pub type Order<'a> = &'a [(&'a str, &'a [&'a [&'a str]])];
+
+/// The whole. Names that are not there yet, or not any more, cost nothing.
+pub const ORDER: Order<'static> = &[
+    ("", &[&["plant"], &["gnss"], &["generator", "receiver", "analysis"], &["twin"], &["study"], &["live"], &["cli"]]),
+    (
+        "gnss",
+        &[
+            &["time", "earth", "satellite", "crc", "fec", "inflate", "place"],
+            &["bits", "facts", "klobuchar", "ionex", "samples", "vienna"],
+            &["signal", "sigmf", "vmf3"],
+            &["broadcast"],
+            &["record"],
+            &["message"],
+            &["gps", "galileo"],
+            &["rinex"],
+            &["sp3"],
+        ],
+    ),
+    (
+        "generator",
+        &[
+            &["error", "random"],
+            &["vehicle", "orbit_error", "departure", "precise", "transmit"],
+            &["catalogue"],
+            &["ray", "message"],
+            &["sky"],
+            &["fast_phase", "ripple"],
+            &["clock"],
+            &["fidelity"],
+            &["spoof"],
+            &["stage", "arrival"],
+            &["effect"],
+            &["scene"],
+            &["presence"],
+            &["geometry", "dynamics"],
+            &["knots"],
+            &["plan"],
+            &["synth"],
+            &["truth"],
+            &["stream"],
+            &["levels"],
+            &["scenario"],
+        ],
+    ),
+    (
+        "receiver",
+        &[
+            &["source", "described", "format", "outcome", "threshold"],
+            &["correlate"],
+            &["gap", "lead"],
+            &["acquire", "track"],
+            &["parting", "interference", "decode"],
+            &["looks", "observe"],
+            &["position"],
+            &["settings", "diagnosis"],
+            &["output"],
+            &["session"],
+            &["run"],
+        ],
+    ),
+    ("analysis", &[&["error", "statistics", "waveform"], &["read"], &["expect"], &["measure"], &["judge"], &["show"]]),
+    (
+        "analysis/read",
+        &[
+            &["facts", "fault", "files", "spill_store"],
+            &["rinex_obs", "nmea", "delay", "emission", "rows"],
+            &["common"],
+            &["run"],
+        ],
+    ),
+    (
+        "analysis/expect",
+        &[
+            &["theory"],
+            &["jamming", "message", "quantile", "smoothing"],
+            &["multiple_access", "spectrum"],
+            &["due", "timeline"],
+            &["loops"],
+            &["multipath"],
+        ],
+    ),
+    ("analysis/expect/theory", &[&["clock", "detection", "dll", "edges", "linear", "pll"], &["fll", "oscillator"]]),
+    (
+        "analysis/measure",
+        &[
+            &["allan", "errors", "independent", "lines", "psd", "spoofing"],
+            &["clock", "consistency", "elevation", "jitter"],
+            &["slips"],
+        ],
+    ),
+    (
+        "analysis/judge",
+        &[
+            &["forecast", "foreign", "integrity", "judgement", "schema"],
+            &["verdict", "limits"],
+            &["summary"],
+            &["rules"],
+        ],
+    ),
+    ("analysis/judge/forecast", &[&["links"], &["ranges"], &["solution"]]),
+    (
+        "analysis/judge/foreign",
+        &[&["fit", "pairs"], &["measured", "place"], &["carriers", "judged"], &["observables", "report"]],
+    ),
+    (
+        "analysis/show",
+        &[&["report", "staged"], &["write"], &["plot"], &["foreign", "pdf", "tables", "trade"], &["run_report"]],
+    ),
+    (
+        "analysis/show/plot",
+        &[
+            &["chart", "drawing"],
+            &["judged"],
+            &["canvas"],
+            &["sketch"],
+            &["clock", "consistency", "delays", "foreign", "jitter", "position", "signals", "sky", "spectrum"],
+            &["elevation", "multipath"],
+        ],
+    ),
+    (
+        "study",
+        &[
+            &["correlation", "demand", "measure", "normal", "watch"],
+            &["motion", "search"],
+            &["correlator", "detection"],
+            &["expect"],
+            &["limits", "proof"],
+            &["report", "sweep"],
+        ],
+    ),
+];
+
+/// Imports against the order that are still there. The list may only shrink.
+pub const EXCEPTIONS: &[&str] = &[
+    "generator/dynamics: generator/plan",
+    "generator/effect: generator/scene",
+    "generator/fidelity: generator/scene",
+    "generator/knots: generator/synth",
+    "generator/plan: generator/levels",
+    "generator/ripple: generator/scene",
+    "generator/spoof: generator/scene",
+    "generator/stage: generator/scene",
+    "generator/stage: generator/synth",
+    "generator/synth: generator/stream",
+    "generator/synth: generator/truth",
+    // The registry of signals names all of them, and a signal its message.
+    "gnss/broadcast: gnss/gps",
+    "gnss/message: gnss/gps",
+    "gnss/signal: gnss/galileo",
+    "gnss/signal: gnss/gps",
+    "gnss/signal: gnss/message",
+    "receiver/acquire: receiver/interference",
+    "receiver/acquire: receiver/track",
+    "receiver/lead: receiver/track",
+    "receiver/session: receiver/run",
+    "receiver/track: receiver/acquire",
+    "receiver/track: receiver/parting",
+];
+
+/// Imports against the order of a source, as "room: room that it imports".
+pub fn arrows(source: &Source, order: Order<'_>) -> Vec<String> {
+    let mut found = Vec::new();
+    for path in paths(&source.module, &source.code) {
+        for (folder, groups) in order {
+            let folder: Vec<&str> = folder.split('/').filter(|part| !part.is_empty()).collect();
+            let inside = |module: &[String]| {
+                module.len() > folder.len() && module.iter().zip(&folder).all(|(own, part)| own == part)
+            };
+            if !inside(&source.module) || !inside(&path) {
+                continue;
+            }
+            let (own, other) = (&source.module[folder.len()], &path[folder.len()]);
+            let level = |room: &String| groups.iter().position(|group| group.contains(&room.as_str()));
+            // What is not in the table is an item of the folder's root, above all rooms.
+            let below = level(other).is_some_and(|other| level(own).is_none_or(|own| other < own));
+            if own != other && !below {
+                let full = |room: &String| [&folder[..], &[room.as_str()]].concat().join("/");
+                found.push(format!("{}: {}", full(own), full(other)));
+            }
+        }
+    }
+    found.sort();
+    found.dedup();
+    found
+}
+
+/// Every path from the crate's root that a blanked source names.
+fn paths(module: &[String], code: &str) -> Vec<Vec<String>> {
+    let tokens = tokens(code);
+    let mut found = Vec::new();
+    // Modules inside the file, with the depth of braces at which each ends.
+    let (mut inner, mut depth) = (Vec::<(String, usize)>::new(), 0_usize);
+    let mut i = 0;
+    while i < tokens.len() {
+        match tokens[i] {
+            "mod" if tokens.get(i + 2) == Some(&"{") => inner.push((tokens[i + 1].to_owned(), depth)),
+            "{" => depth += 1,
+            "}" => {
+                depth = depth.saturating_sub(1);
+                inner.retain(|(_, end)| *end < depth);
+            }
+            "crate" | "super" | "self" if tokens.get(i + 1) == Some(&"::") && !(i > 0 && tokens[i - 1] == "::") => {
+                let here: Vec<String> =
+                    module.iter().cloned().chain(inner.iter().map(|(name, _)| name.clone())).collect();
+                let mut leaves = Vec::new();
+                i = tree(&tokens, i, &[], &mut leaves);
+                found.extend(leaves.iter().filter_map(|leaf| resolve(&here, leaf)));
+                continue;
+            }
+            _ => {}
+        }
+        i += 1;
+    }
+    found
+}
+
+/// Reads a path or a tree of paths from token `i` on; gives the token behind it.
+fn tree<'a>(tokens: &[&'a str], mut i: usize, before: &[&'a str], leaves: &mut Vec<Vec<&'a str>>) -> usize {
+    let mut path = before.to_vec();
+    loop {
+        match tokens.get(i) {
+            Some(&"{") => {
+                i += 1;
+                while i < tokens.len() && tokens[i] != "}" {
+                    i = if tokens[i] == "," { i + 1 } else { tree(tokens, i, &path, leaves).max(i + 1) };
+                }
+                return i + 1;
+            }
+            Some(word) if word.chars().all(|c| c.is_alphanumeric() || c == '_') => path.push(word),
+            // A star takes all that is there: the folder itself.
+            _ => {
+                leaves.push(path);
+                return i;
+            }
+        }
+        i += 1;
+        if tokens.get(i) == Some(&"::") {
+            i += 1;
+        } else {
+            leaves.push(path);
+            if tokens.get(i) == Some(&"as") {
+                i += 2;
+            }
+            return i;
+        }
+    }
+}
+
+/// A path as written in module `here`, from the crate's root; `None` of one that leaves the crate.
+fn resolve(here: &[String], path: &[&str]) -> Option<Vec<String>> {
+    let mut base = here.to_vec();
+    let mut rest = path;
+    match path.first()? {
+        &"crate" => {
+            base.clear();
+            rest = &path[1..];
+        }
+        &"self" => rest = &path[1..],
+        _ => {}
+    }
+    while let Some((&"super", behind)) = rest.split_first() {
+        base.pop()?;
+        rest = behind;
+    }
+    base.extend(rest.iter().filter(|part| **part != "self").map(|part| (*part).to_owned()));
+    Some(base)
+}
+
+/// Words, `::`, and single signs.
+fn tokens(code: &str) -> Vec<&str> {
+    let mut found = Vec::new();
+    let mut rest = code.trim_start();
+    while let Some(first) = rest.chars().next() {
+        let word = |c: char| c.is_alphanumeric() || c == '_';
+        let end = if word(first) {
+            rest.find(|c| !word(c)).unwrap_or(rest.len())
+        } else if rest.starts_with("::") {
+            2
+        } else {
+            first.len_utf8()
+        };
+        found.push(&rest[..end]);
+        rest = rest[end..].trim_start();
+    }
+    found
+}
