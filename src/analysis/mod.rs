@@ -12,6 +12,8 @@
 //!
 //! Below all of them lie [`error`], [`statistics`] and [`waveform`], the spectrum and the correlation of a signal.
 
+#![warn(missing_docs)]
+
 pub mod error;
 pub mod expect;
 pub mod judge;

@@ -5,22 +5,8 @@
 //! so that the lines of a short code, its overlay and the data are left out; a chip that is another
 //! component's turn counts as any other.
 
-use serde::Deserialize;
-
+pub use crate::gnss::facts::Edge;
 use crate::gnss::signal::{Component, Shape, Signal, sinc_squared};
-
-/// How the edges of chips fall between samples, as `scene.json` names it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Edge {
-    /// A sample has the value of its instant.
-    #[default]
-    Nearest,
-    /// A sample is the mean over its interval.
-    Area,
-    /// Filtered to half the sample rate before sampling.
-    BandLimited,
-}
 
 /// The components of a signal that a receiver correlates: all of them, by their shares of power.
 #[derive(Clone, Debug)]

@@ -6,6 +6,7 @@
 
 use crate::generator::scene::Scene;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::facts::Edge;
 
 /// Rate of the code that the figures were measured with.
 const CHIP_HZ: f64 = 1.023e6;
@@ -75,6 +76,15 @@ impl CodeEdge {
     /// Its name in a scenario.
     pub fn name(self) -> &'static str {
         name_of(&Self::NAMES, self)
+    }
+
+    /// As the scene's facts state it.
+    pub fn fact(self) -> Edge {
+        match self {
+            Self::Nearest => Edge::Nearest,
+            Self::Area => Edge::Area,
+            Self::BandLimited => Edge::BandLimited,
+        }
     }
 }
 

@@ -8,6 +8,8 @@
 //! find in samples. [`sweep`] runs studies that a file describes, on either. This is the only module that
 //! sees receiver, generator and judge at once; none of them sees it.
 
+#![warn(missing_docs)]
+
 pub mod correlation;
 pub mod correlator;
 pub mod demand;

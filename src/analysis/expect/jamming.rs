@@ -11,9 +11,10 @@ use std::collections::BTreeMap;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use crate::analysis::read::{Interference, Run};
+use crate::analysis::read::Run;
 use crate::analysis::statistics::mean;
 use crate::analysis::waveform::{Edge, Waveform};
+use crate::gnss::facts::Interference;
 use crate::gnss::signal::sinc_squared;
 
 /// Cycles of a sweep beyond which its lines lie too close to tell from a band.
@@ -44,26 +45,38 @@ enum Density {
 
 impl Spectrum {
     /// That of a shape.
-    pub fn of(shape: &Interference) -> Self {
-        let repetition_hz = shape.repetition_hz.unwrap_or(1.0);
-        let width_hz = shape.width_hz.unwrap_or(1.0).abs();
-        let flat = Self { lines: Vec::new(), density: Some(Density::Flat { width_hz }) };
-        let reach = width_hz / repetition_hz;
-        match shape.kind.as_str() {
-            "chirp" if reach <= MOST_CYCLES => Self::series(repetition_hz, reach, |x| reach * 0.5 * x * (x - 1.0)),
-            "fmcw" if reach <= MOST_CYCLES => Self::series(repetition_hz, reach, |x| {
-                let (y, sign) = if x < 0.5 { (2.0 * x, 0.5) } else { (2.0 * x - 1.0, -0.5) };
-                sign * reach * 0.5 * y * (y - 1.0)
-            }),
-            "chirp" | "fmcw" | "noise" | "recording" => flat,
-            "sine_fm" => {
-                let index = shape.deviation_hz.unwrap_or(0.0) / repetition_hz;
+    pub fn of(source: &Interference) -> Self {
+        let flat =
+            |width_hz: f64| Self { lines: Vec::new(), density: Some(Density::Flat { width_hz: width_hz.abs() }) };
+        match *source {
+            Interference::Cw => Self { lines: vec![(0.0, 1.0)], density: None },
+            Interference::Chirp { width_hz, repetition_hz } => {
+                let reach = width_hz.abs() / repetition_hz;
+                if reach > MOST_CYCLES {
+                    return flat(width_hz);
+                }
+                Self::series(repetition_hz, reach, |x| reach * 0.5 * x * (x - 1.0))
+            }
+            Interference::Fmcw { width_hz, repetition_hz } => {
+                let reach = width_hz.abs() / repetition_hz;
+                if reach > MOST_CYCLES {
+                    return flat(width_hz);
+                }
+                Self::series(repetition_hz, reach, |x| {
+                    let (y, sign) = if x < 0.5 { (2.0 * x, 0.5) } else { (2.0 * x - 1.0, -0.5) };
+                    sign * reach * 0.5 * y * (y - 1.0)
+                })
+            }
+            Interference::Noise { width_hz } | Interference::Recording { width_hz } => flat(width_hz),
+            Interference::SineFm { deviation_hz, repetition_hz } => {
+                let index = deviation_hz / repetition_hz;
                 let cycles = index / std::f64::consts::TAU;
                 Self::series(repetition_hz, 2.0 * index, |x| cycles * libm::sin(std::f64::consts::TAU * x))
             }
-            "matched" => Self { lines: Vec::new(), density: Some(Density::Chips { rate_hz: repetition_hz }) },
-            "pulse" => Self::pulses(repetition_hz, shape.duty.unwrap_or(1.0), shape.jitter.unwrap_or(0.0)),
-            _ => Self { lines: vec![(0.0, 1.0)], density: None },
+            Interference::Matched { repetition_hz } => {
+                Self { lines: Vec::new(), density: Some(Density::Chips { rate_hz: repetition_hz }) }
+            }
+            Interference::Pulse { repetition_hz, duty, jitter } => Self::pulses(repetition_hz, duty, jitter),
         }
     }
 
@@ -174,17 +187,6 @@ mod tests {
     use super::*;
     use crate::gnss::gps::l1ca::L1_CA;
 
-    fn shape(kind: &str) -> Interference {
-        Interference {
-            kind: kind.to_owned(),
-            width_hz: None,
-            deviation_hz: None,
-            repetition_hz: None,
-            duty: None,
-            jitter: None,
-        }
-    }
-
     /// Separation from C/A at the carrier, wide sampling, in dB of seconds.
     fn separation_db(shape: &Interference, frequency_hz: f64) -> f64 {
         let source = Source { spectrum: Spectrum::of(shape), frequency_hz, jn0_hz: 1.0 };
@@ -194,12 +196,11 @@ mod tests {
     #[test]
     fn separations_are_the_published_ones() {
         // Computed outside this project from the same integral, for smooth spectra; printed to 0.01 dB.
-        let noise = |width_hz: f64| Interference { width_hz: Some(width_hz), ..shape("noise") };
-        let chirp = |width_hz: f64| Interference { repetition_hz: Some(1e5), ..noise(width_hz) };
-        let chirp = |width_hz: f64| Interference { kind: "chirp".to_owned(), ..chirp(width_hz) };
+        let noise = |width_hz: f64| Interference::Noise { width_hz };
+        let chirp = |width_hz: f64| Interference::Chirp { width_hz, repetition_hz: 1e5 };
         let cases = [
-            (shape("cw"), 0.0, -60.1),
-            (Interference { repetition_hz: Some(1.023e6), ..shape("matched") }, 0.0, -61.86),
+            (Interference::Cw, 0.0, -60.1),
+            (Interference::Matched { repetition_hz: 1.023e6 }, 0.0, -61.86),
             (noise(2.046e6), 0.0, -63.55),
             (noise(4.092e6), 0.0, -66.34),
             (noise(20.46e6), 0.0, -73.15),
@@ -212,21 +213,21 @@ mod tests {
             assert!((found - expected).abs() < 0.1, "{shape:?}: {found} {expected}");
         }
         // Q = 2.36 at half a megahertz.
-        let half = separation_db(&shape("cw"), 0.5e6);
+        let half = separation_db(&Interference::Cw, 0.5e6);
         assert!((half + 60.1 + 10.0 * libm::log10(2.36)).abs() < 0.05, "{half}");
     }
 
     #[test]
     fn spectra_of_unit_power_keep_it() {
-        let fm = Interference { deviation_hz: Some(5e4), repetition_hz: Some(1e4), ..shape("sine_fm") };
-        let chirp = Interference { width_hz: Some(1e6), repetition_hz: Some(1e4), ..shape("chirp") };
-        let pulse = Interference { repetition_hz: Some(1e3), duty: Some(0.1), ..shape("pulse") };
+        let fm = Interference::SineFm { deviation_hz: 5e4, repetition_hz: 1e4 };
+        let chirp = Interference::Chirp { width_hz: 1e6, repetition_hz: 1e4 };
+        let pulse = Interference::Pulse { repetition_hz: 1e3, duty: 0.1, jitter: 0.0 };
         for shape in [fm, chirp, pulse] {
             let power: f64 = Spectrum::of(&shape).lines.iter().map(|line| line.1).sum();
             // A pulse's lines beyond the 160th hold 1/(π²·16) of the power or 0.6 %.
             assert!((power - 1.0).abs() < 0.007, "{shape:?}: {power}");
         }
-        let jittered = Interference { repetition_hz: Some(1e3), duty: Some(0.1), jitter: Some(0.5), ..shape("pulse") };
+        let jittered = Interference::Pulse { repetition_hz: 1e3, duty: 0.1, jitter: 0.5 };
         let spectrum = Spectrum::of(&jittered);
         let lines: f64 = spectrum.lines.iter().map(|line| line.1).sum();
         let rest: f64 = (-200_000..200_000).map(|k| spectrum.density(f64::from(k)) * 1.0).sum();

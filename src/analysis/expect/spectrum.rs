@@ -15,9 +15,10 @@ use serde::Serialize;
 use statrs::function::erf::{erf, erfc};
 
 use crate::analysis::expect::jamming;
-use crate::analysis::read::{Emission, MeanSignal, Run, Stage};
+use crate::analysis::read::{Emission, MeanSignal, Run};
 use crate::analysis::statistics::median;
 use crate::analysis::waveform::Waveform;
+use crate::gnss::facts::{BalanceSpec, ConverterSpec, FilterShape, FilterSpec};
 use crate::gnss::signal::Signal;
 
 /// The section `psd` of `summary.json`: frequencies from the carrier.
@@ -83,7 +84,6 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
     let floor = if run.scene.noise { 1.0 } else { 0.0 };
     let sign = if run.scene.inverted { -1.0 } else { 1.0 };
     let bin_hz = run.psd.get(1).zip(run.psd.first()).map_or(1.0, |(b, a)| b.frequency_hz - a.frequency_hz);
-    let stage = |name: &str| run.scene.front_end.iter().find(|stage| stage.stage == name);
     let if_hz = signals.first().map_or(0.0, |signal| sign * (signal.nominal_hz - center_hz));
     let waveforms: Vec<(&MeanSignal, Waveform)> =
         signals.iter().filter_map(|signal| Some((signal, Waveform::of(signal.signal)?))).collect();
@@ -101,19 +101,19 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
         .collect();
     let level = run.scene.noise_lsb.map(|sigma| 2.0 * sigma * sigma / rate_hz);
     density.iter_mut().for_each(|value| *value *= level.unwrap_or(1.0));
-    if let Some(filter) = stage("filter") {
+    if let Some(filter) = run.scene.filters().next() {
         for (value, row) in density.iter_mut().zip(&run.psd) {
             *value *= filter_power(filter, row.frequency_hz - if_hz);
         }
     }
-    if let Some(balance) = stage("iq") {
+    if let Some(balance) = run.scene.balance() {
         unbalance(&mut density, balance, run, bin_hz);
     }
     if level.is_some() {
         // Of a one-sided spectrum the integral is the one component's power, of a two-sided one that of both.
         let one_sided = run.psd.first().is_some_and(|row| row.frequency_hz >= 0.0);
         let power = density.iter().sum::<f64>() * bin_hz * if one_sided { 1.0 } else { 0.5 };
-        let (gain, added) = quantiser(stage("adc"), power.sqrt());
+        let (gain, added) = quantiser(run.scene.converter(), power.sqrt());
         density.iter_mut().for_each(|value| *value = *value * gain * gain + 2.0 * added / rate_hz);
     }
     let shape: Vec<f64> = density.into_iter().map(|value| 10.0 * libm::log10(value.max(1e-30))).collect();
@@ -128,14 +128,11 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
 }
 
 /// Power gain of a filter at a frequency from its middle.
-fn filter_power(filter: &Stage, f_hz: f64) -> f64 {
-    let half_hz = 0.5 * filter.bandwidth_hz.unwrap_or(f64::INFINITY);
-    match filter.shape.as_deref() {
-        Some("butterworth") => {
-            let order = f64::from(2 * filter.order.unwrap_or(1));
-            1.0 / (1.0 + libm::pow((f_hz / half_hz).abs(), order))
-        }
-        _ => {
+fn filter_power(filter: &FilterSpec, f_hz: f64) -> f64 {
+    let half_hz = 0.5 * filter.bandwidth_hz;
+    match filter.shape {
+        FilterShape::Butterworth { order } => 1.0 / (1.0 + libm::pow((f_hz / half_hz).abs(), f64::from(2 * order))),
+        FilterShape::BrickWall => {
             let amplitude = 0.5 * erfc(EDGE_ERFC * (f_hz.abs() - half_hz) / (EDGE * half_hz));
             amplitude * amplitude
         }
@@ -143,29 +140,27 @@ fn filter_power(filter: &Stage, f_hz: f64) -> f64 {
 }
 
 /// Adds the image of quadratures out of balance and the line of direct current.
-fn unbalance(density: &mut [f64], balance: &Stage, run: &Run, bin_hz: f64) {
+fn unbalance(density: &mut [f64], balance: &BalanceSpec, run: &Run, bin_hz: f64) {
     let image = libm::pow(10.0, balance.image_db.unwrap_or(-300.0) / 10.0);
     let before = density.to_vec();
     for ((value, row), index) in density.iter_mut().zip(&run.psd).zip(0..) {
         // Two-sided frequencies run from −N/2: bin k mirrors to N − k.
         let mirrored = before.get(before.len() - usize::min(index, before.len())).copied().unwrap_or(0.0);
         *value += image * mirrored;
-        *value += balance.dc_power_lsb2.unwrap_or(0.0) * jamming::hann(row.frequency_hz / bin_hz) / bin_hz;
+        *value += balance.dc_power_lsb2 * jamming::hann(row.frequency_hz / bin_hz) / bin_hz;
     }
 }
 
 /// Gain of the converter, and the power that quantisation adds to a component, for Gaussian samples of `sigma_lsb`.
-fn quantiser(adc: Option<&Stage>, sigma_lsb: f64) -> (f64, f64) {
-    let rounding = (1.0, 1.0 / 12.0);
-    let Some(adc) = adc else { return rounding };
-    let (Some(bits), Some(step_sigma)) = (adc.bits, adc.step_sigma) else { return rounding };
-    let made_for_lsb = if adc.gain_control == Some(true) { sigma_lsb } else { adc.nominal_lsb.unwrap_or(sigma_lsb) };
-    let step_lsb = step_sigma * made_for_lsb;
-    if adc.whole == Some(true) {
+fn quantiser(adc: Option<&ConverterSpec>, sigma_lsb: f64) -> (f64, f64) {
+    let Some(adc) = adc else { return (1.0, 1.0 / 12.0) };
+    let made_for_lsb = if adc.gain_control { sigma_lsb } else { adc.nominal_lsb };
+    let step_lsb = adc.step_sigma * made_for_lsb;
+    if adc.whole {
         return (1.0 / step_lsb, 1.0 / 12.0);
     }
     // Cells of the step's width, levels 2k + 1, outermost cells endless.
-    let half = 1_i64 << (bits - 1);
+    let half = 1_i64 << (adc.bits - 1);
     let cumulated = |x: f64| 0.5 * (1.0 + erf(x / std::f64::consts::SQRT_2));
     let bell = |x: f64| libm::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
     let edge = |k: i64| match k {
@@ -189,19 +184,19 @@ type Null = (f64, f64);
 /// Decibels of C/N0 that the front end's filter and converter cost each signal's code, noise alone counted: a
 /// filter passes less of the code than of noise with the code's spectrum, and rounding adds noise.
 pub fn costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
-    let stage = |name: &str| run.scene.front_end.iter().find(|stage| stage.stage == name);
     let kept = run.scene.noise_lsb.filter(|_| run.scene.noise).map_or(1.0, |sigma_lsb| {
-        let (gain, added) = quantiser(stage("adc"), sigma_lsb);
+        let (gain, added) = quantiser(run.scene.converter(), sigma_lsb);
         let power = (gain * sigma_lsb) * (gain * sigma_lsb);
         power / (power + added)
     });
-    let filtered = |signal: &'static Signal| stage("filter").map_or(1.0, |filter| passed(filter, run, signal));
+    let filtered =
+        |signal: &'static Signal| run.scene.filters().next().map_or(1.0, |filter| passed(filter, run, signal));
     run.signals.iter().map(|&signal| (signal, -10.0 * libm::log10(filtered(signal) * kept))).collect()
 }
 
 /// What a filter about the first signal's carrier leaves of a code's power over noise:
 /// (∫S|H| df)²/(∫S|H|² df · ∫S df).
-fn passed(filter: &Stage, run: &Run, signal: &Signal) -> f64 {
+fn passed(filter: &FilterSpec, run: &Run, signal: &Signal) -> f64 {
     let Some(code) = Waveform::of(signal) else { return 1.0 };
     let rate_hz = run.scene.sample_rate_hz;
     let off_hz = run.expected.first().map_or(0.0, |first| signal.centre_hz() - first.nominal_hz);
@@ -286,8 +281,7 @@ mod tests {
         // Correlation loss 10 lg(g²σ²/(g²σ² + d)) (Hegarty 2011): 1.96 dB of one bit, 0.549 of two and 0.166
         // of three at best steps.
         for (bits, step_sigma, loss_db) in [(1, 1.0, 1.961), (2, 0.9957, 0.549), (3, 0.586, 0.166)] {
-            let adc =
-                Stage { bits: Some(bits), step_sigma: Some(step_sigma), nominal_lsb: Some(28.0), ..Stage::default() };
+            let adc = ConverterSpec { bits, step_sigma, nominal_lsb: 28.0, gain_control: false, whole: false };
             let (gain, added) = quantiser(Some(&adc), 28.0);
             let kept = gain * gain * 28.0 * 28.0;
             let found = 10.0 * libm::log10((kept + added) / kept);
@@ -298,16 +292,11 @@ mod tests {
 
     #[test]
     fn filters_halve_the_power_where_they_say() {
-        let filter = |shape: &str, order| Stage {
-            shape: Some(shape.to_owned()),
-            order,
-            bandwidth_hz: Some(2e6),
-            ..Stage::default()
-        };
-        let butterworth = filter("butterworth", Some(4));
+        let filter = |shape| FilterSpec { shape, bandwidth_hz: 2e6, group_delay_s: 0.0 };
+        let butterworth = filter(FilterShape::Butterworth { order: 4 });
         assert!((filter_power(&butterworth, 1e6) - 0.5).abs() < 1e-12);
         assert!((filter_power(&butterworth, 2e6) - 1.0 / 257.0).abs() < 1e-12);
-        let wall = filter("brick_wall", None);
+        let wall = filter(FilterShape::BrickWall);
         assert!((filter_power(&wall, 0.9e6) - 1.0).abs() < 1e-6 && filter_power(&wall, 1.06e6) < 1e-7);
     }
 

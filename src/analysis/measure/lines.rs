@@ -10,6 +10,7 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use crate::analysis::read::Run;
+use crate::gnss::facts::Interference;
 use crate::gnss::record::{InterferenceRow, LineRow};
 
 /// Waves this strong have to be told: 8 dB above what shows at 2.6 Msps, for wider bins and for waves between two.
@@ -48,7 +49,7 @@ impl Lines {
             move |sample: u64| (low..high).contains(&(sample as f64))
         };
         let is_wave = |row: &InterferenceRow| {
-            run.scene.interference.get(row.source.wrapping_sub(1)).is_some_and(|shape| shape.kind == "cw")
+            run.scene.interference.get(row.source.wrapping_sub(1)).is_some_and(|waveform| *waveform == Interference::Cw)
         };
         let waves = |first: u64| {
             let inside = second(first);

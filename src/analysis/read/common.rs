@@ -9,8 +9,8 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::delay;
-use super::facts::SceneFacts;
 use crate::analysis::waveform::Waveform;
+use crate::gnss::facts::{FilterSpec, SceneFacts, StageSpec};
 use crate::gnss::record::Observation;
 use crate::gnss::signal::{Link, Signal};
 
@@ -40,7 +40,9 @@ impl Common {
 
     /// Takes what a scene's facts say, for the rows counted so far and a code loop of that spacing.
     pub(super) fn set_front_end(&mut self, scene: &SceneFacts, spacing_chips: f64) {
-        let offset_hz: f64 = scene.front_end.iter().filter_map(|stage| stage.offset_hz).sum();
+        let offset_hz =
+            |stage: &StageSpec| if let StageSpec::LocalOscillator { offset_hz } = stage { *offset_hz } else { 0.0 };
+        let offset_hz: f64 = scene.front_end.iter().map(offset_hz).sum();
         self.doppler_hz = if scene.inverted { -offset_hz } else { offset_hz };
         self.satellites.clear();
         for link in self.last.keys() {
@@ -48,8 +50,8 @@ impl Common {
         }
         let delay_s = |signal: &&'static Signal| {
             let code = Waveform::of(signal)?;
-            let of = |stage| delay::code_delay_s(stage, &code, scene.sample_rate_hz, spacing_chips);
-            Some((*signal, scene.front_end.iter().filter_map(of).sum()))
+            let of = |filter: &FilterSpec| delay::code_delay_s(filter, &code, scene.sample_rate_hz, spacing_chips);
+            Some((*signal, scene.filters().map(of).sum()))
         };
         self.code_delays_s = self.satellites.keys().filter_map(delay_s).collect();
     }

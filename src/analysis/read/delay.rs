@@ -8,21 +8,18 @@
 
 use num_complex::Complex64;
 
-use super::facts::Stage;
 use crate::analysis::waveform::Waveform;
+use crate::gnss::facts::{FilterShape, FilterSpec};
 
 /// Steps of the integral over half the band of the samples: 5 kHz at 10 Msps, far below what a response or a
 /// lag of a chip turns in.
 const STEPS: u32 = 1000;
 
-/// Delay of one stage at a loop of that spacing; the one that the stage states where its shape is not known to bend.
-pub fn code_delay_s(stage: &Stage, code: &Waveform, sample_rate_hz: f64, spacing_chips: f64) -> Option<f64> {
-    let middle_s = stage.group_delay_s?;
-    let (Some("butterworth"), Some(order), Some(bandwidth_hz)) =
-        (stage.shape.as_deref(), stage.order, stage.bandwidth_hz)
-    else {
-        return Some(middle_s);
-    };
+/// Delay of a filter's code at a loop of that spacing; the one that it states where its shape does not bend.
+pub fn code_delay_s(filter: &FilterSpec, code: &Waveform, sample_rate_hz: f64, spacing_chips: f64) -> f64 {
+    let middle_s = filter.group_delay_s;
+    let FilterShape::Butterworth { order } = filter.shape else { return middle_s };
+    let bandwidth_hz = filter.bandwidth_hz;
     let step_hz = 0.5 * sample_rate_hz / f64::from(STEPS);
     let lines: Vec<(f64, Complex64)> = (0..STEPS)
         .map(|k| {
@@ -41,7 +38,7 @@ pub fn code_delay_s(stage: &Stage, code: &Waveform, sample_rate_hz: f64, spacing
         let at_s = 0.5 * (low_s + high_s);
         if late_wins(at_s) { low_s = at_s } else { high_s = at_s }
     }
-    Some(0.5 * (low_s + high_s) - 0.5 / sample_rate_hz)
+    0.5 * (low_s + high_s) - 0.5 / sample_rate_hz
 }
 
 /// Response of the low-pass prototype at a frequency in units of its cut-off; its poles lie on the unit circle.
@@ -79,14 +76,12 @@ mod tests {
     #[test]
     fn a_wide_filter_delays_a_code_by_its_delay_in_the_middle_and_a_narrow_one_by_more() {
         let delay_m = |bandwidth_hz: f64, rate_hz: f64| {
-            let stage = Stage {
-                shape: Some("butterworth".to_owned()),
-                order: Some(4),
-                bandwidth_hz: Some(bandwidth_hz),
-                group_delay_s: Some(2.6131 / (std::f64::consts::PI * bandwidth_hz)),
-                ..Stage::default()
+            let filter = FilterSpec {
+                shape: FilterShape::Butterworth { order: 4 },
+                bandwidth_hz,
+                group_delay_s: 2.6131 / (std::f64::consts::PI * bandwidth_hz),
             };
-            299_792_458.0 * code_delay_s(&stage, &Waveform::of(&L1_CA).unwrap(), rate_hz, 0.5).unwrap()
+            299_792_458.0 * code_delay_s(&filter, &Waveform::of(&L1_CA).unwrap(), rate_hz, 0.5)
         };
         // 2.6131/(πB) is 12.47 m, half a sample 3.00 m.
         let wide_m = delay_m(20e6, 50e6);

@@ -8,7 +8,6 @@
 mod common;
 mod delay;
 mod emission;
-mod facts;
 mod fault;
 mod files;
 pub mod nmea;
@@ -19,6 +18,5 @@ pub mod spill_store;
 
 pub use common::Common;
 pub use emission::{Emission, MeanSignal};
-pub use facts::{Interference, Oscillator, SceneFacts, Stage};
 pub use fault::Fault;
 pub use run::{PsdRow, Run, Speed};

@@ -12,11 +12,11 @@ use serde_json::Value;
 
 use super::common::Common;
 use super::emission::{self, Emission, MeanSignal};
-use super::facts::SceneFacts;
 use super::files::{believable, dated, each, json, missing, optional, rows, text};
 use crate::analysis::error::JudgeError;
 use crate::analysis::read::spill_store::SpillStore;
 use crate::analysis::statistics::{mean, median};
+use crate::gnss::facts::SceneFacts;
 use crate::gnss::record::{
     AcquisitionRow, EventRow, Fix, InterferenceRow, LineRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
     TrajectoryRow,
@@ -355,12 +355,6 @@ mod tests {
         let refused = of(&[&L1_CA, &CHANNELS], 1_575.42e6 - 2e6).unwrap_err().to_string();
         assert!(refused.contains("center_hz") && refused.contains("same multiple"), "{refused}");
         assert!(of(&[], 1e9).is_ok());
-    }
-
-    #[test]
-    fn an_unknown_kind_of_edge_is_refused_by_name() {
-        let refused = serde_json::from_str::<crate::analysis::waveform::Edge>("\"aera\"").unwrap_err().to_string();
-        assert!(refused.contains("aera") && refused.contains("band_limited"), "{refused}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::read::Table;
 use super::{Scenario, ScenarioError, satellite_list};
 use crate::generator::scenario::{MessageKind, SatelliteFault};
-use crate::gnss::facts::{Expect, Fault, Fixes, Interval, Losses, Sizes, Terms};
+use crate::gnss::facts::{Expect, Fault, FaultKind, Fixes, Interval, Losses, Sizes, Terms};
 
 pub(super) fn expect(table: &Table<'_>, duration_s: f64) -> Result<Expect, ScenarioError> {
     let intervals = table.tables("interval")?.unwrap_or_default();
@@ -49,30 +49,30 @@ fn terms(table: &Table<'_>) -> Result<Terms, ScenarioError> {
 impl Scenario {
     /// What is wrong with satellites and messages, as the judge needs it.
     pub(super) fn faults(&self) -> Vec<Fault> {
-        let fault = |kind: &str, satellites: Option<&[_]>, from_s, to_s| Fault {
-            kind: kind.to_owned(),
+        let fault = |kind: FaultKind, satellites: Option<&[_]>, from_s, to_s| Fault {
+            kind,
             satellites: satellites.map(<[_]>::to_vec),
             from_s,
             to_s,
         };
         let of_satellite = |one: &SatelliteFault| match one {
             SatelliteFault::Step { satellites, on_s, off_s, .. } => {
-                fault("clock_step", Some(satellites), *on_s, *off_s)
+                fault(FaultKind::ClockStep, Some(satellites), *on_s, *off_s)
             }
             SatelliteFault::Ramp { satellites, on_s, off_s, .. } => {
-                fault("clock_ramp", Some(satellites), *on_s, *off_s)
+                fault(FaultKind::ClockRamp, Some(satellites), *on_s, *off_s)
             }
-            SatelliteFault::Noise { satellites, .. } => fault("clock_noise", satellites.as_deref(), 0.0, None),
+            SatelliteFault::Noise { satellites, .. } => fault(FaultKind::ClockNoise, satellites.as_deref(), 0.0, None),
             SatelliteFault::Orbit { satellites, growth_s, .. } => {
-                fault("orbit", Some(satellites), growth_s.map_or(0.0, |(on_s, _)| on_s), None)
+                fault(FaultKind::Orbit, Some(satellites), growth_s.map_or(0.0, |(on_s, _)| on_s), None)
             }
         };
         let of_message = |one: &super::MessageSpec| {
             let kind = match one.kind {
-                MessageKind::BitErrors { .. } => "bit_errors",
-                MessageKind::Bit { .. } => "bit",
-                MessageKind::Health(_) => "health",
-                MessageKind::Parameter { .. } => "parameter",
+                MessageKind::BitErrors { .. } => FaultKind::BitErrors,
+                MessageKind::Bit { .. } => FaultKind::Bit,
+                MessageKind::Health(_) => FaultKind::Health,
+                MessageKind::Parameter { .. } => FaultKind::Parameter,
             };
             fault(kind, one.satellites.as_deref(), one.on_s, one.off_s)
         };

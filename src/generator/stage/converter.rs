@@ -7,8 +7,9 @@
 //! samples; without, it is the thermal noise's as the scene sets it. The scene's first run has nothing before
 //! it and is measured itself, whole, whatever part of it is asked for. Limits: the gain of a run is constant.
 
-use crate::generator::stage::{Block, Fact, Stage};
+use crate::generator::stage::{Block, Stage};
 use crate::generator::synth::RUN_SAMPLES;
+use crate::gnss::facts::{ConverterSpec, StageSpec};
 
 /// Steps in units of the deviation that lose least, by bits.
 const BEST_STEP: [(u32, f64); 7] =
@@ -64,16 +65,14 @@ impl Stage for Converter {
         format!("{} bits, step {} sigma, {gain}", self.bits, self.step_sigma)
     }
 
-    fn fact(&self) -> Option<Fact> {
-        Some(Fact {
-            stage: self.name(),
-            bits: Some(self.bits),
-            step_sigma: Some(self.step_sigma),
-            nominal_lsb: Some(f64::from(self.nominal_lsb)),
-            gain_control: Some(self.window_runs.is_some()),
-            whole: Some(self.whole),
-            ..Fact::default()
-        })
+    fn fact(&self) -> Option<StageSpec> {
+        Some(StageSpec::Adc(ConverterSpec {
+            bits: self.bits,
+            step_sigma: self.step_sigma,
+            nominal_lsb: f64::from(self.nominal_lsb),
+            gain_control: self.window_runs.is_some(),
+            whole: self.whole,
+        }))
     }
 
     fn full_scale_lsb(&self, deviation_lsb: f64) -> Option<f64> {

@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use crate::generator::stage::{Block, Fact, Stage};
+use crate::generator::stage::{Block, Stage};
+use crate::gnss::facts::{FilterShape, FilterSpec, StageSpec};
 
 /// Shapes of filters, by the name that a scenario uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -190,14 +191,13 @@ impl Stage for Filter {
         format!("{shape}, {} Hz wide, delay {delay_ns:.1} ns, {} taps", self.bandwidth_hz, self.taps())
     }
 
-    fn fact(&self) -> Option<Fact> {
-        let (shape, order) = match self.shape {
-            Shape::BrickWall => ("brick_wall", None),
-            Shape::Butterworth { order } => ("butterworth", Some(order)),
+    fn fact(&self) -> Option<StageSpec> {
+        let shape = match self.shape {
+            Shape::BrickWall => FilterShape::BrickWall,
+            Shape::Butterworth { order } => FilterShape::Butterworth { order },
         };
-        let bandwidth_hz = Some(self.bandwidth_hz);
-        let group_delay_s = Some(self.group_delay_s);
-        Some(Fact { stage: self.name(), shape: Some(shape), order, bandwidth_hz, group_delay_s, ..Fact::default() })
+        let (bandwidth_hz, group_delay_s) = (self.bandwidth_hz, self.group_delay_s);
+        Some(StageSpec::Filter(FilterSpec { shape, bandwidth_hz, group_delay_s }))
     }
 
     fn memory_samples(&self) -> usize {

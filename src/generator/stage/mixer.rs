@@ -7,7 +7,8 @@
 //! Limits: noise of the reference itself is the receiver clock's; what is left out of the response is e^−12.
 
 use crate::generator::random::Stream;
-use crate::generator::stage::{Block, Fact, Stage};
+use crate::generator::stage::{Block, Stage};
+use crate::gnss::facts::{BalanceSpec, StageSpec};
 use crate::gnss::time::{Rate, tone_turns};
 
 /// Nodes in a time constant, and time constants of response.
@@ -85,8 +86,8 @@ impl Stage for Oscillator {
         "local_oscillator"
     }
 
-    fn fact(&self) -> Option<Fact> {
-        Some(Fact { stage: self.name(), offset_hz: Some(self.offset_hz), ..Fact::default() })
+    fn fact(&self) -> Option<StageSpec> {
+        Some(StageSpec::LocalOscillator { offset_hz: self.offset_hz })
     }
 
     fn describe(&self) -> String {
@@ -149,15 +150,10 @@ impl Stage for Balance {
         format!("{image}direct current {} and {} LSB", self.dc_i_lsb, self.dc_q_lsb)
     }
 
-    fn fact(&self) -> Option<Fact> {
+    fn fact(&self) -> Option<StageSpec> {
         let (i, q) = (f64::from(self.dc_i_lsb), f64::from(self.dc_q_lsb));
         let unbalanced = self.gain != 0.0 || self.phase_rad != 0.0;
-        Some(Fact {
-            stage: self.name(),
-            image_db: unbalanced.then(|| self.image_db()),
-            dc_power_lsb2: Some(i * i + q * q),
-            ..Fact::default()
-        })
+        Some(StageSpec::Iq(BalanceSpec { image_db: unbalanced.then(|| self.image_db()), dc_power_lsb2: i * i + q * q }))
     }
 
     fn act(&self, block: &mut Block<'_>) {

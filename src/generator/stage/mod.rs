@@ -12,9 +12,8 @@ pub mod mixer;
 pub mod noise;
 pub mod playback;
 
-use serde::Serialize;
-
 use crate::generator::synth::isa::Level;
+use crate::gnss::facts::StageSpec;
 
 /// A stretch of planar samples on its way from the antenna to the file, in LSB of the sample format.
 pub struct Block<'a> {
@@ -41,38 +40,6 @@ impl<'a> Block<'a> {
     }
 }
 
-/// A stage as `scene.json` states it.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Fact {
-    pub stage: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shape: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub order: Option<u32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bandwidth_hz: Option<f64>,
-    /// Delay that every satellite's code has in common.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub group_delay_s: Option<f64>,
-    /// By how much carriers lie higher in the samples.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub offset_hz: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub image_db: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub dc_power_lsb2: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bits: Option<u32>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub step_sigma: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub nominal_lsb: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gain_control: Option<bool>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub whole: Option<bool>,
-}
-
 /// Something that acts on all samples of the scene.
 ///
 /// Laws: a stage of zero strength gives the same bits as its absence; sample n depends on n, on the scene and
@@ -83,7 +50,7 @@ pub trait Stage: Send + Sync {
     /// What it does, for the plan.
     fn describe(&self) -> String;
     /// What it does, for the judge's spectrum; nothing where it leaves that alone.
-    fn fact(&self) -> Option<Fact> {
+    fn fact(&self) -> Option<StageSpec> {
         None
     }
     /// Of a converter: its full scale, in LSB before it, when a component of deviation `deviation_lsb`

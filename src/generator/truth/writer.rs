@@ -13,9 +13,8 @@ use super::Truth;
 use crate::generator::effect::obstruction;
 use crate::generator::scene::{Scene, sources};
 use crate::generator::spoof::Constellation;
-use crate::generator::stage::Fact;
-use crate::generator::stage::interference::{Interferer, Spectrum};
-use crate::gnss::facts::{Expect, Fault, TimeOffset};
+use crate::generator::stage::interference::Interferer;
+use crate::gnss::facts::{FrontEndFacts, OscillatorFacts, SceneFacts, TimeOffset};
 use crate::gnss::record::{InterferenceRow, NavigationRow, PassRow, TrajectoryRow};
 
 /// Why the truth could not be written.
@@ -67,62 +66,6 @@ pub struct Writer {
     claims: Vec<Claims>,
 }
 
-#[derive(Serialize)]
-struct SceneFile<'a> {
-    name: &'a str,
-    /// Where it has a name.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    front_end_name: Option<&'a str>,
-    seed: u64,
-    start: String,
-    /// Of the scene, where only a part of it was made.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    first_sample: Option<u64>,
-    duration_s: f64,
-    samples: u64,
-    sample_rate_hz: f64,
-    center_hz: f64,
-    inverted: bool,
-    format: &'a str,
-    fidelity: &'a str,
-    code_edge: &'a str,
-    carrier: &'a str,
-    knot_tolerance_cycles: f64,
-    mask_deg: f64,
-    truth_interval_s: f64,
-    signals: Vec<&'a str>,
-    noise: bool,
-    noise_arithmetic: &'a str,
-    noise_lsb: f32,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    front_end: Vec<Fact>,
-    /// Where there are several: those above belong to the first of them.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    front_ends: Vec<FrontEndFile<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    skyline_deg: Option<Vec<[f64; 2]>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    oscillator: Option<OscillatorFile>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    interference: Vec<Spectrum>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    spoofers: Vec<String>,
-    /// What is true of the satellites that they do not broadcast.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    orbits: Option<String>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    satellite_faults: Vec<String>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    message_faults: Vec<String>,
-    /// Both kinds again, for the judge.
-    #[serde(skip_serializing_if = "<[Fault]>::is_empty")]
-    faults: &'a [Fault],
-    #[serde(skip_serializing_if = "Expect::is_empty")]
-    expect: &'a Expect,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    time_offsets: Vec<TimeOffset>,
-}
-
 /// The time scales of the scene's signals that are ahead of GPS time or behind it, whole seconds apart, each
 /// once.
 fn time_offsets(scene: &Scene) -> Vec<TimeOffset> {
@@ -137,54 +80,35 @@ fn time_offsets(scene: &Scene) -> Vec<TimeOffset> {
 }
 
 /// One of several front ends.
-#[derive(Serialize)]
-struct FrontEndFile<'a> {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    name: Option<&'a str>,
-    samples: u64,
-    sample_rate_hz: f64,
-    center_hz: f64,
-    inverted: bool,
-    format: &'a str,
-    code_edge: &'a str,
-    signals: Vec<&'a str>,
-    noise_lsb: f32,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    front_end: Vec<Fact>,
+fn front_end(scene: &Scene) -> FrontEndFacts {
+    FrontEndFacts {
+        name: scene.front_end_name.clone(),
+        samples: scene.samples,
+        sample_rate_hz: scene.clock.rate.hz(),
+        center_hz: scene.metadata.center_hz,
+        inverted: scene.metadata.inverted,
+        format: scene.metadata.format.name().to_owned(),
+        code_edge: scene.fidelity.code_edge.fact(),
+        signals: signals(std::slice::from_ref(scene)),
+        noise_lsb: decimal(scene.noise_lsb),
+        front_end: scene.front_end.iter().filter_map(|stage| stage.fact()).collect(),
+    }
 }
 
-impl<'a> FrontEndFile<'a> {
-    fn of(scene: &'a Scene) -> Self {
-        Self {
-            name: scene.front_end_name.as_deref(),
-            samples: scene.samples,
-            sample_rate_hz: scene.clock.rate.hz(),
-            center_hz: scene.metadata.center_hz,
-            inverted: scene.metadata.inverted,
-            format: scene.metadata.format.name(),
-            code_edge: scene.fidelity.code_edge.name(),
-            signals: signals(std::slice::from_ref(scene)),
-            noise_lsb: scene.noise_lsb,
-            front_end: scene.front_end.iter().filter_map(|stage| stage.fact()).collect(),
-        }
-    }
+/// The number that has the same shortest decimal text: what a reader of that text takes it for.
+fn decimal(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
 }
 
 /// The names of all signals of the scenes, each once.
-fn signals(scenes: &[Scene]) -> Vec<&'static str> {
-    let mut names: Vec<&'static str> = Vec::new();
+fn signals(scenes: &[Scene]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
     for signal in scenes.iter().flat_map(|scene| &scene.signals) {
-        if !names.contains(&signal.name) {
-            names.push(signal.name);
+        if names.iter().all(|name| name != signal.name) {
+            names.push(signal.name.to_owned());
         }
     }
     names
-}
-
-/// Power law of the receiver's oscillator, from white phase noise to random-walk frequency noise.
-#[derive(Serialize)]
-struct OscillatorFile {
-    h: [f64; 5],
 }
 
 impl Writer {
@@ -238,40 +162,40 @@ impl Writer {
             });
         }
         let (orbits, departures) = scene.catalogue.describe();
-        let file = SceneFile {
-            name: &scene.name,
-            front_end_name: scene.front_end_name.as_deref(),
+        let file = SceneFacts {
+            name: scene.name.clone(),
+            front_end_name: scene.front_end_name.clone(),
             seed: scene.seed,
             start: scene.clock.epoch(part.start).to_string(),
             first_sample: (part.start > 0).then_some(part.start),
             duration_s: scene.clock.rate.elapsed_s(part.end - part.start),
             samples: part.end - part.start,
             sample_rate_hz: scene.clock.rate.hz(),
-            center_hz: scene.metadata.center_hz,
+            center_hz: Some(scene.metadata.center_hz),
             inverted: scene.metadata.inverted,
-            format: scene.metadata.format.name(),
-            fidelity: scene.fidelity.grade.name(),
-            code_edge: scene.fidelity.code_edge.name(),
-            carrier: scene.fidelity.carrier.name(),
+            format: scene.metadata.format.name().to_owned(),
+            fidelity: scene.fidelity.grade.name().to_owned(),
+            code_edge: scene.fidelity.code_edge.fact(),
+            carrier: scene.fidelity.carrier.name().to_owned(),
             knot_tolerance_cycles: scene.fidelity.knot_tolerance_cycles,
-            mask_deg: scene.mask_rad.to_degrees(),
+            mask_deg: Some(scene.mask_rad.to_degrees()),
             truth_interval_s: scene.truth_interval_s,
             signals: signals(scenes),
             noise: scene.noise,
-            noise_arithmetic: scene.fidelity.noise.name(),
-            noise_lsb: scene.noise_lsb,
+            noise_arithmetic: scene.fidelity.noise.name().to_owned(),
+            noise_lsb: Some(decimal(scene.noise_lsb)),
             front_end: scene.front_end.iter().filter_map(|stage| stage.fact()).collect(),
-            skyline_deg: obstruction::skyline_deg(scene),
+            skyline_deg: obstruction::skyline_deg(scene).unwrap_or_default(),
             oscillator: (scene.receiver_clock.oscillator.as_ref())
-                .map(|oscillator| OscillatorFile { h: oscillator.law.levels() }),
-            front_ends: if scenes.len() > 1 { scenes.iter().map(FrontEndFile::of).collect() } else { Vec::new() },
-            interference: heard.iter().map(|(_, source)| source.spectrum()).collect(),
+                .map(|oscillator| OscillatorFacts { h: oscillator.law.levels() }),
+            front_ends: if scenes.len() > 1 { scenes.iter().map(front_end).collect() } else { Vec::new() },
+            interference: heard.iter().map(|(_, source)| source.fact()).collect(),
             spoofers: scene.spoofers.iter().map(|spoofer| spoofer.describe()).collect(),
             orbits,
             satellite_faults: [departures, scene.satellite_clocks.descriptions.clone()].concat(),
             message_faults: scene.message_faults.iter().map(|fault| fault.describe(scene.clock.start)).collect(),
-            faults: &scene.faults,
-            expect: &scene.expect,
+            faults: scene.faults.clone(),
+            expect: scene.expect.clone(),
             time_offsets: time_offsets(scene),
         };
         let path = self.directory.join("scene.json");

@@ -21,7 +21,7 @@ use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::earth::Geodetic;
-use crate::gnss::facts::{Expect, Fixes};
+use crate::gnss::facts::{Expect, FaultKind, Fixes};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 use crate::gnss::signal::Signal;
@@ -185,7 +185,8 @@ impl Expectations {
         })?;
         let strengths: Vec<f64> = rows.iter().map(|(_, row)| row.cn0_dbhz).collect();
         let usual_dbhz = median(&strengths).unwrap_or(0.0);
-        let healthy = self.message.says_healthy(link.sv) || run.scene.faults.iter().any(|fault| fault.kind == "health");
+        let healthy =
+            self.message.says_healthy(link.sv) || run.scene.faults.iter().any(|fault| fault.kind == FaultKind::Health);
         let plain: Vec<SatelliteEpoch> = rows.iter().map(|(_, row)| *row).collect();
         let required = scene.required(link.sv, &plain, usual_dbhz, healthy);
         let seen = observed.samples(link)?;

@@ -117,7 +117,7 @@ impl Receiver {
 
 /// What a converter of few bits takes from every signal (Van Vleck; optimal steps, white noise), in dB.
 fn front_end_cost_db(run: &Run) -> f64 {
-    let bits = run.scene.front_end.iter().find(|stage| stage.stage == "adc").and_then(|stage| stage.bits);
+    let bits = run.scene.converter().map(|converter| converter.bits);
     match bits {
         Some(1) => 1.96,
         Some(2) => 0.55,

@@ -7,7 +7,7 @@
 
 use super::receiver::Receiver;
 use super::timetable::Timetable;
-use crate::gnss::facts::{Expect, Fault, Losses};
+use crate::gnss::facts::{Expect, Fault, FaultKind, Losses};
 use crate::gnss::satellite::Sv;
 
 /// Chance of never being found, in that many nepers, below which absence is no bad luck.
@@ -89,28 +89,29 @@ pub struct Scene<'s> {
 }
 
 impl Scene<'_> {
-    fn of(&self, sv: Sv, kinds: &[&str]) -> impl Iterator<Item = &Fault> {
-        let kinds = kinds.iter().map(|kind| (*kind).to_owned()).collect::<Vec<_>>();
+    fn of<'k>(&'k self, sv: Sv, kinds: &'k [FaultKind]) -> impl Iterator<Item = &'k Fault> {
         let concerns = move |fault: &&Fault| fault.satellites.as_ref().is_none_or(|list| list.contains(&sv));
         self.faults.iter().filter(concerns).filter(move |fault| kinds.contains(&fault.kind))
     }
 
     /// Whether the message cannot be read without errors.
     fn garbled(&self, sv: Sv, time_s: f64) -> bool {
-        self.of(sv, &["bit_errors", "bit"]).any(|fault| during(fault, time_s, HEALTH_S))
+        self.of(sv, &[FaultKind::BitErrors, FaultKind::Bit]).any(|fault| during(fault, time_s, HEALTH_S))
     }
 
     /// Whether the satellite must not, or need not, be used.
     fn unfit(&self, sv: Sv, time_s: f64) -> bool {
-        let wrong = ["clock_step", "clock_ramp", "clock_noise", "orbit", "parameter"];
+        let wrong =
+            [FaultKind::ClockStep, FaultKind::ClockRamp, FaultKind::ClockNoise, FaultKind::Orbit, FaultKind::Parameter];
         // What is wrong leaves smoothed ranges and decoded sets wrong for a while after.
         let wrong = self.of(sv, &wrong).any(|fault| time_s >= fault.from_s);
-        wrong || self.of(sv, &["health"]).any(|fault| during(fault, time_s, HEALTH_S))
+        wrong || self.of(sv, &[FaultKind::Health]).any(|fault| during(fault, time_s, HEALTH_S))
     }
 
     /// Why a lock may end at a row, if it may.
     pub fn excuse(&self, sv: Sv, row: &SatelliteEpoch, usual_dbhz: f64) -> Option<Excuse> {
-        let steps = || self.of(sv, &["clock_step"]).flat_map(|fault| [Some(fault.from_s), fault.to_s]).flatten();
+        let steps =
+            || self.of(sv, &[FaultKind::ClockStep]).flat_map(|fault| [Some(fault.from_s), fault.to_s]).flatten();
         match self.expect.losses(sv, row.time_s) {
             Some(Losses::Any) => return Some(Excuse::Scene),
             Some(Losses::None) => return None,
@@ -294,19 +295,18 @@ mod tests {
             let other = scene.required(Sv::gps(6), &all, 45.0, true);
             assert!(own[59].used && !own[65].observed && other[65].used);
         });
-        let fault = |kind: &str, from_s, to_s| Fault {
-            kind: kind.to_owned(),
-            satellites: Some(vec![Sv::gps(5)]),
-            from_s,
-            to_s,
-        };
-        with(Expect::default(), &[fault("health", 60.0, Some(62.0)), fault("bit_errors", 100.0, None)], |scene| {
-            let all = rows(120, |_| Some(45.0));
-            let own = scene.required(Sv::gps(5), &all, 45.0, true);
-            assert!(own[59].used && own[65].observed && !own[65].used && own[98].used);
-            assert!(scene.required(Sv::gps(5), &all, 45.0, false).iter().all(|r| !r.used), "unhealthy all along");
-        });
-        with(Expect::default(), &[fault("bit_errors", 0.0, None)], |scene| {
+        let fault = |kind: FaultKind, from_s, to_s| Fault { kind, satellites: Some(vec![Sv::gps(5)]), from_s, to_s };
+        with(
+            Expect::default(),
+            &[fault(FaultKind::Health, 60.0, Some(62.0)), fault(FaultKind::BitErrors, 100.0, None)],
+            |scene| {
+                let all = rows(120, |_| Some(45.0));
+                let own = scene.required(Sv::gps(5), &all, 45.0, true);
+                assert!(own[59].used && own[65].observed && !own[65].used && own[98].used);
+                assert!(scene.required(Sv::gps(5), &all, 45.0, false).iter().all(|r| !r.used), "unhealthy all along");
+            },
+        );
+        with(Expect::default(), &[fault(FaultKind::BitErrors, 0.0, None)], |scene| {
             assert_eq!(first(scene, &rows(90, |_| Some(45.0)), 0.0), [Some(0.0), None, None]);
         });
     }

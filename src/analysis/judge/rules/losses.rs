@@ -10,7 +10,7 @@ use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::measure::slips::{Kind, Slip, Slips};
 use crate::analysis::read::Run;
 use crate::analysis::statistics::median;
-use crate::gnss::facts::Losses;
+use crate::gnss::facts::{FaultKind, Losses};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 use crate::gnss::signal::Signal;
@@ -132,7 +132,7 @@ impl Witness {
         }
         // Without a frame for so long, a channel gives up what it cannot read.
         let garbled = run.scene.faults.iter().any(|fault| {
-            matches!(fault.kind.as_str(), "bit_errors" | "bit")
+            matches!(fault.kind, FaultKind::BitErrors | FaultKind::Bit)
                 && fault.satellites.as_ref().is_none_or(|list| list.contains(&sv))
                 && slip.time_s >= fault.from_s
         });

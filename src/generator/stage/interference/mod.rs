@@ -13,8 +13,6 @@ pub mod tone;
 use std::ops::Range;
 use std::sync::Arc;
 
-use serde::Serialize;
-
 use arrival::{Path, Repetition, Tuning};
 use resample::{Interpolator, Position, draw};
 use tone::{Modulation, Tone};
@@ -27,6 +25,7 @@ use crate::generator::synth::chips::MARGIN_STEPS;
 use crate::generator::synth::isa::{self, Level};
 use crate::generator::synth::lanes::Buffers;
 use crate::generator::synth::{CODE_ONE, Edge, Run};
+use crate::gnss::facts::Interference;
 use crate::gnss::record::InterferenceRow;
 
 /// Samples of a run, on an absolute grid.
@@ -98,24 +97,6 @@ pub struct Recorded {
     pub q: Vec<f32>,
 }
 
-/// What the judge must know of a waveform's spectrum, in `scene.json`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Spectrum {
-    pub kind: &'static str,
-    /// Of the band, the sweep or the recording.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub width_hz: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub deviation_hz: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub repetition_hz: Option<f64>,
-    /// Share of a repetition in which it is on, and by how much of one it comes late.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub duty: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub jitter: Option<f64>,
-}
-
 /// One source of interference in a scene.
 #[derive(Clone, Debug)]
 pub struct Interferer {
@@ -166,35 +147,27 @@ impl Interferer {
         })
     }
 
-    /// Its spectrum's shape.
-    pub fn spectrum(&self) -> Spectrum {
-        let bare = Spectrum {
-            kind: self.kind,
-            width_hz: None,
-            deviation_hz: None,
-            repetition_hz: None,
-            duty: None,
-            jitter: None,
-        };
-        let rate_hz = self.tuning.clock.rate.hz();
+    /// Its waveform, as far as its spectrum needs it.
+    pub fn fact(&self) -> Interference {
         match &self.waveform {
-            Waveform::Cw => bare,
-            Waveform::Chirp { sweep_hz, repetition } | Waveform::Fmcw { sweep_hz, repetition } => {
-                Spectrum { width_hz: Some(*sweep_hz), repetition_hz: Some(repetition.hz()), ..bare }
+            Waveform::Cw => Interference::Cw,
+            Waveform::Chirp { sweep_hz, repetition } => {
+                Interference::Chirp { width_hz: *sweep_hz, repetition_hz: repetition.hz() }
+            }
+            Waveform::Fmcw { sweep_hz, repetition } => {
+                Interference::Fmcw { width_hz: *sweep_hz, repetition_hz: repetition.hz() }
             }
             Waveform::SineFm { deviation_hz, repetition } => {
-                Spectrum { deviation_hz: Some(*deviation_hz), repetition_hz: Some(repetition.hz()), ..bare }
+                Interference::SineFm { deviation_hz: *deviation_hz, repetition_hz: repetition.hz() }
             }
-            Waveform::Pulse { width_s, repetition, jitter } => Spectrum {
-                repetition_hz: Some(repetition.hz()),
-                duty: Some(width_s * repetition.hz()),
-                jitter: Some(*jitter),
-                ..bare
-            },
-            Waveform::Matched { chips, .. } => Spectrum { repetition_hz: Some(chips.hz()), ..bare },
-            Waveform::White => Spectrum { width_hz: Some(rate_hz), ..bare },
-            Waveform::Noise { width_hz, .. } => Spectrum { width_hz: Some(*width_hz), ..bare },
-            Waveform::Recording { rate, .. } => Spectrum { width_hz: Some(rate.hz()), ..bare },
+            Waveform::Pulse { width_s, repetition, jitter } => {
+                let repetition_hz = repetition.hz();
+                Interference::Pulse { repetition_hz, duty: width_s * repetition_hz, jitter: *jitter }
+            }
+            Waveform::Matched { chips, .. } => Interference::Matched { repetition_hz: chips.hz() },
+            Waveform::White => Interference::Noise { width_hz: self.tuning.clock.rate.hz() },
+            Waveform::Noise { width_hz, .. } => Interference::Noise { width_hz: *width_hz },
+            Waveform::Recording { rate, .. } => Interference::Recording { width_hz: rate.hz() },
         }
     }
 

@@ -1,12 +1,20 @@
-//! Facts of a scene that generator and judge share: what it expects of a receiver, and what is wrong with its
-//! satellites.
+//! Facts of a scene that generator and judge share: what is in its samples, what it expects of a receiver, and
+//! what is wrong with its satellites.
 //!
-//! They lie in `truth/scene.json`, so that a run can be judged wherever it is. No receiver reads them. Times
-//! are seconds from the scene's first sample.
+//! They lie in `truth/scene.json` ([`SceneFacts`]), so that a run can be judged wherever it is. No receiver reads
+//! them. Both sides use these types: a name that one side does not know is refused, not taken for a default.
+//! Times are seconds from the scene's first sample.
+
+mod front_end;
+mod interference;
+mod scene;
 
 use serde::{Deserialize, Serialize};
 
 use crate::gnss::satellite::Sv;
+pub use front_end::{BalanceSpec, ConverterSpec, Edge, FilterShape, FilterSpec, StageSpec};
+pub use interference::Interference;
+pub use scene::{FrontEndFacts, OscillatorFacts, SceneFacts};
 
 /// The time of a system that is not GPS time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -68,6 +76,7 @@ impl Sizes {
 /// Expectations over a time. What is absent follows from the scene's physics.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Terms {
+    /// Of fixes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fix: Option<Fixes>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -135,11 +144,33 @@ impl Expect {
     }
 }
 
+/// What is wrong, by the word that a scenario uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FaultKind {
+    /// A satellite's clock jumps.
+    ClockStep,
+    /// A satellite's clock runs away.
+    ClockRamp,
+    /// A satellite's clock is noisier than its message says.
+    ClockNoise,
+    /// A satellite is not where its message says.
+    Orbit,
+    /// Bits of the message are wrong at random.
+    BitErrors,
+    /// One bit of the message is wrong.
+    Bit,
+    /// The message says that the satellite is not healthy.
+    Health,
+    /// A parameter of the message is wrong.
+    Parameter,
+}
+
 /// Something wrong with satellites or their messages.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
-    /// As the scenario calls it: `clock_step`, `bit_errors`, `health`, …
-    pub kind: String,
+    /// What it is.
+    pub kind: FaultKind,
     /// Absent means all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub satellites: Option<Vec<Sv>>,

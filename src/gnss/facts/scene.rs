@@ -1,0 +1,170 @@
+//! `truth/scene.json`: the facts of a scene, one record that the generator writes and the judge reads.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Edge, Expect, Fault, Interference, StageSpec, TimeOffset};
+
+/// The facts of a scene. What a file may lack has a default: a scene without it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SceneFacts {
+    /// The scene's name.
+    pub name: String,
+    /// Name of the front end, where it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub front_end_name: Option<String>,
+    /// Seed of every random number.
+    pub seed: u64,
+    /// Time of the first sample by the receiver's clock, GPS time as text.
+    #[serde(default)]
+    pub start: String,
+    /// The part's first sample by the scene's count, where only a part of the scene was made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_sample: Option<u64>,
+    /// Length of the samples, seconds.
+    pub duration_s: f64,
+    /// Number of samples.
+    #[serde(default)]
+    pub samples: u64,
+    /// Samples a second, Hz.
+    pub sample_rate_hz: f64,
+    /// Frequency on the air that lies at 0 in the samples, Hz.
+    #[serde(default)]
+    pub center_hz: Option<f64>,
+    /// Whether the samples' spectrum is mirrored about `center_hz`.
+    #[serde(default)]
+    pub inverted: bool,
+    /// SigMF name of the sample format.
+    #[serde(default)]
+    pub format: String,
+    /// Level of fidelity, by name.
+    #[serde(default)]
+    pub fidelity: String,
+    /// How the edges of chips fall between samples.
+    #[serde(default)]
+    pub code_edge: Edge,
+    /// Arithmetic of the carrier, by name.
+    #[serde(default)]
+    pub carrier: String,
+    /// Largest error of a carrier between knots, cycles.
+    #[serde(default)]
+    pub knot_tolerance_cycles: f64,
+    /// Elevation below which no satellite is received, degrees.
+    #[serde(default)]
+    pub mask_deg: Option<f64>,
+    /// Time between the rows of the truth, seconds.
+    #[serde(default)]
+    pub truth_interval_s: f64,
+    /// Names of the signals.
+    #[serde(default)]
+    pub signals: Vec<String>,
+    /// Whether thermal noise was added.
+    #[serde(default = "yes")]
+    pub noise: bool,
+    /// Arithmetic of the noise, by name.
+    #[serde(default)]
+    pub noise_arithmetic: String,
+    /// Standard deviation of the thermal noise per component, in LSB: the gain, also of a scene without noise.
+    #[serde(default)]
+    pub noise_lsb: Option<f64>,
+    /// Stages of the front end, in order; of several front ends, those of the first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub front_end: Vec<StageSpec>,
+    /// Azimuth and elevation in degrees below which the direct path is obstructed at the start.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub skyline_deg: Vec<[f64; 2]>,
+    /// The receiver's oscillator, if the scene has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub oscillator: Option<OscillatorFacts>,
+    /// Where there are several front ends, each of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub front_ends: Vec<FrontEndFacts>,
+    /// Waveforms of the sources of interference, in the order of their numbers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub interference: Vec<Interference>,
+    /// Each spoofer in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub spoofers: Vec<String>,
+    /// What is true of the orbits that satellites do not broadcast, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orbits: Option<String>,
+    /// What is wrong with satellites, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub satellite_faults: Vec<String>,
+    /// What is wrong with messages, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub message_faults: Vec<String>,
+    /// Both kinds of faults again, for the judge.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<Fault>,
+    /// What the scene expects of a receiver.
+    #[serde(default, skip_serializing_if = "Expect::is_empty")]
+    pub expect: Expect,
+    /// Systems' times that are off GPS time by more than whole seconds.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub time_offsets: Vec<TimeOffset>,
+}
+
+impl SceneFacts {
+    /// By how much a system's time is ahead of GPS time, seconds, whole seconds apart.
+    pub fn ahead_s(&self, scale: &str) -> f64 {
+        self.time_offsets.iter().find(|offset| offset.time_scale == scale).map_or(0.0, |offset| offset.ahead_s)
+    }
+
+    /// The converter, if there is one.
+    pub fn converter(&self) -> Option<&super::ConverterSpec> {
+        self.front_end
+            .iter()
+            .find_map(|stage| if let StageSpec::Adc(converter) = stage { Some(converter) } else { None })
+    }
+
+    /// The filters, in order.
+    pub fn filters(&self) -> impl Iterator<Item = &super::FilterSpec> {
+        self.front_end
+            .iter()
+            .filter_map(|stage| if let StageSpec::Filter(filter) = stage { Some(filter) } else { None })
+    }
+
+    /// The quadratures' balance, if it is stated.
+    pub fn balance(&self) -> Option<&super::BalanceSpec> {
+        self.front_end.iter().find_map(|stage| if let StageSpec::Iq(balance) = stage { Some(balance) } else { None })
+    }
+}
+
+/// Power law of the receiver's oscillator.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OscillatorFacts {
+    /// Strengths h₂, h₁, h₀, h₋₁, h₋₂ of S_y = Σ h f^α, in Hz^(−α − 1).
+    pub h: [f64; 5],
+}
+
+/// One of several front ends. Keys as in [`SceneFacts`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FrontEndFacts {
+    /// Its name, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Number of samples.
+    pub samples: u64,
+    /// Samples a second, Hz.
+    pub sample_rate_hz: f64,
+    /// Frequency on the air that lies at 0 in the samples, Hz.
+    pub center_hz: f64,
+    /// Whether the samples' spectrum is mirrored.
+    pub inverted: bool,
+    /// SigMF name of the sample format.
+    pub format: String,
+    /// How the edges of chips fall between samples.
+    pub code_edge: Edge,
+    /// Names of the signals.
+    pub signals: Vec<String>,
+    /// Standard deviation of the thermal noise per component, in LSB.
+    pub noise_lsb: f64,
+    /// Stages, in order.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub front_end: Vec<StageSpec>,
+}
+
+fn yes() -> bool {
+    true
+}
