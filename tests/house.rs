@@ -1,9 +1,9 @@
 //! The house: the order of rooms, the length of files and comments, and panics, as the sources have them.
 //!
-//! A room is a file or folder of `src`. [`ORDER`] lists the rooms of each folder from the ground up, and a room
-//! imports only rooms before it. The checks read text: comments, strings and test modules are cut away, then
-//! every path that begins with `crate`, `super` or `self` is resolved. Limits: a path that a macro builds is
-//! not seen, and neither is an item that is used through a value.
+//! A room is a file or folder of `src`. [`ORDER`] lists the rooms of each folder from the ground up, and a
+//! room imports only rooms before it. The checks read text: comments, strings and test modules are cut away,
+//! then every path that begins with `crate`, `super` or `self` is resolved. Limits: a path that a macro
+//! builds is not seen, and neither is an item that is used through a value.
 
 #[path = "house/order.rs"]
 mod order;

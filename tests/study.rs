@@ -190,7 +190,8 @@ fn damaged_and_foreign_shards_are_seen_set_aside_and_computed_again() {
     good(&["run", "other"], here);
     let (hurt, other) = (shards(here, "hurt"), shards(here, "other"));
     let content = fs::read_to_string(&hurt[1]).unwrap();
-    // Cut at every place of its last line and at some others; one bit changed; that of another plan; another shard.
+    // Cut at every place of its last line and at some others; one bit changed; that of another plan; another
+    // shard.
     let end = content.len() - 90;
     for length in (0..end).step_by(97).chain(end..content.len()) {
         fs::write(&hurt[1], &content[..length]).unwrap();

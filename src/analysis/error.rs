@@ -8,27 +8,91 @@ use thiserror::Error;
 /// Why a run cannot be judged.
 #[derive(Debug, Error)]
 pub enum JudgeError {
+    /// A file that is needed is not there; the remedy says who writes it.
     #[error("{} is missing: {remedy}", path.display())]
-    Missing { path: PathBuf, remedy: &'static str },
+    Missing {
+        /// The file or directory.
+        path: PathBuf,
+        /// Who writes it.
+        remedy: &'static str,
+    },
+    /// A file cannot be created or written.
     #[error("{}: {source}", path.display())]
-    File { path: PathBuf, source: io::Error },
+    File {
+        /// The file or directory.
+        path: PathBuf,
+        /// What the system or the parser reports.
+        source: io::Error,
+    },
+    /// A file cannot be read.
     #[error("cannot read {}: {source}", path.display())]
-    Read { path: PathBuf, source: io::Error },
+    Read {
+        /// The file or directory.
+        path: PathBuf,
+        /// What the system or the parser reports.
+        source: io::Error,
+    },
+    /// A row of a table is not as its columns ask, or cannot be written.
     #[error("{} holds a row that is not as expected: {source}", path.display())]
-    Row { path: PathBuf, source: csv::Error },
+    Row {
+        /// The file or directory.
+        path: PathBuf,
+        /// What the system or the parser reports.
+        source: csv::Error,
+    },
+    /// A JSON file is not as its record asks.
     #[error("{} is not the JSON expected: {source}", path.display())]
-    Json { path: PathBuf, source: serde_json::Error },
+    Json {
+        /// The file or directory.
+        path: PathBuf,
+        /// What the system or the parser reports.
+        source: serde_json::Error,
+    },
+    /// A fact of the scene is one that cannot be judged.
     #[error("scene.json: {key} = {value}, expected {expected}")]
-    Scene { key: &'static str, value: f64, expected: &'static str },
+    Scene {
+        /// The key.
+        key: &'static str,
+        /// The value as written.
+        value: f64,
+        /// What was expected, in words.
+        expected: &'static str,
+    },
+    /// The receiver's rows and the truth's have no sample in common.
     #[error(
         "none of the receiver's {count} {what} falls on a sample of the truth: do both come from the same run, \
          with the same measurement interval?"
     )]
-    NothingJoins { what: &'static str, count: usize },
+    NothingJoins {
+        /// What is wrong, or which rows, in words.
+        what: &'static str,
+        /// Number of the receiver's rows.
+        count: usize,
+    },
+    /// A line of a file is not as its format asks.
     #[error("{}: line {line}: {what}", path.display())]
-    Line { path: PathBuf, line: u64, what: String },
+    Line {
+        /// The file or directory.
+        path: PathBuf,
+        /// Line of the file, counted from 1.
+        line: u64,
+        /// What is wrong, or which rows, in words.
+        what: String,
+    },
+    /// A foreign receiver's file belongs to another time or place than the truth.
     #[error("{}: {what}", path.display())]
-    NotOfThisTruth { path: PathBuf, what: String },
+    NotOfThisTruth {
+        /// The file or directory.
+        path: PathBuf,
+        /// What is wrong, or which rows, in words.
+        what: String,
+    },
+    /// The drawing library failed.
     #[error("{} could not be drawn: {reason}", path.display())]
-    Plot { path: PathBuf, reason: String },
+    Plot {
+        /// The file or directory.
+        path: PathBuf,
+        /// Why, in words.
+        reason: String,
+    },
 }

@@ -1,6 +1,6 @@
 //! A run made by hand for tests: truth, an estimate with known errors planted, and the files of both.
 //!
-//! Nine satellites stand still in number for a minute; the receiver reports from the thirtieth second on. Every
+//! Nine satellites are in view for a minute; the receiver reports from the thirtieth second on. Every
 //! error has a known size ([`PLANTED`]), so that a test can say what the judge must find.
 
 use std::fs;
@@ -105,7 +105,7 @@ pub(in crate::analysis) fn write_truth(run: &Path) {
         sample: tick * RATE_HZ / 10,
         sv: Sv::gps(PRNS[index]),
         azimuth_deg: 40.0 * index as f64 + 0.02 * tick as f64,
-        // The first stands below the mask of 5 degrees.
+        // The first is below the mask of 5 degrees.
         elevation_deg: 4.0 + 9.5 * index as f64 + 0.004 * tick as f64,
         range_m: 2.1e7,
         satellite_clock_m: 0.0,

@@ -10,7 +10,8 @@
 //! 4. [`judge`](mod@judge): figures against limits.
 //! 5. [`show`]: tables, pictures, reports.
 //!
-//! Below all of them lie [`error`], [`statistics`] and [`waveform`], the spectrum and the correlation of a signal.
+//! Below all of them lie [`error`], [`statistics`] and [`waveform`], the spectrum and the correlation of a
+//! signal.
 
 #![warn(missing_docs)]
 

@@ -9,6 +9,7 @@
 pub struct Spread {
     /// How many values there were.
     pub count: usize,
+    /// Mean of the values.
     pub mean: f64,
     /// Standard deviation about the mean (n − 1 in the divisor; 0 for one value).
     pub sigma: f64,

@@ -20,7 +20,7 @@ const RISE: f64 = 1e-9;
 /// Share of a spectrum's peak below which there is nothing: 120 dB down.
 const NOTHING: f64 = 1e-12;
 
-/// The component whose chips count where distances are told in chips: the strongest, the first of equals.
+/// The component whose chips count where distances are given in chips: the strongest, the first of equals.
 pub fn leading(signal: &Signal) -> Option<&'static Component> {
     let stronger = |a: &'static Component, b: &'static Component| if b.power_share > a.power_share { b } else { a };
     signal.components.iter().reduce(stronger)
@@ -34,7 +34,7 @@ impl Waveform {
         Some(Self { parts: signal.components.iter().map(part).collect(), chip_rate_hz })
     }
 
-    /// Rate of the chips in which distances are told.
+    /// Rate of the chips in which distances are given.
     pub fn chip_rate_hz(&self) -> f64 {
         self.chip_rate_hz
     }
@@ -109,7 +109,8 @@ impl Waveform {
     /// κ of another signal against this one: what its power adds to the noise density, over that power, in
     /// seconds. `apart_hz` is by how much the other's carrier is higher.
     ///
-    /// ∫ S₁·S₂ df/(∫S₁ df · ∫S₂ df) (J. W. Betz, NAVIGATION 48(4), 2001) of the spectra that the sampler meets.
+    /// ∫ S₁·S₂ df/(∫S₁ df · ∫S₂ df) (J. W. Betz, NAVIGATION 48(4), 2001) of the spectra that the sampler
+    /// meets.
     pub fn separation_s(&self, other: &Self, apart_hz: f64, edge: Edge, rate_hz: f64) -> f64 {
         let ((own_step_s, own_chip_s), (step_s, chip_s)) = (self.scales_s(), other.scales_s());
         // To ±30 step rates, where the tail of S² is below 1e-7 of the whole; midpoints every hundredth of a
@@ -165,8 +166,8 @@ mod tests {
 
     #[test]
     fn separations_of_bpsk_and_boc_are_the_printed_ones() {
-        // J. W. Betz, "Binary offset carrier modulations for radionavigation" (2001), within 24 MHz: −61.8 dB of
-        // C/A from itself, −67.9 dB of BOC(1,1) from C/A, −64.8 dB of BOC(1,1) from itself.
+        // J. W. Betz, "Binary offset carrier modulations for radionavigation" (2001), within 24 MHz: −61.8 dB
+        // of C/A from itself, −67.9 dB of BOC(1,1) from C/A, −64.8 dB of BOC(1,1) from itself.
         let db = |a: &Signal, b: &Signal, apart_hz: f64| {
             10.0 * libm::log10(of(a).separation_s(&of(b), apart_hz, Edge::BandLimited, 24e6))
         };
@@ -216,8 +217,8 @@ mod tests {
         };
         assert_eq!(chips(&L1_CA), (1.0, f64::INFINITY));
         assert_eq!(chips(&QUADRATURE), (1.0, f64::INFINITY));
-        // BOC(1,1): lobes about ±1 chip rate end at 2; the correlation's first minimum is half a chip away, with
-        // 1/11 of BOC(6,1), which falls by 11 a chip there, a step further.
+        // BOC(1,1): lobes about ±1 chip rate end at 2; the correlation's first minimum is half a chip away,
+        // with 1/11 of BOC(6,1), which falls by 11 a chip there, a step further.
         for (signal, minimum) in [(&LONG_BOC, 0.5), (&MIXED, 7.0 / 12.0)] {
             let (null, reach) = chips(signal);
             assert_eq!(null, 2.0, "{signal}");
@@ -227,8 +228,8 @@ mod tests {
 
     #[test]
     fn components_count_by_their_share_of_power() {
-        // Three quarters TMBOC, itself 29/33 BOC(1,1), and a quarter BOC(1,1): 4/33 · 3/4 = 1/11 of BOC(6,1), the
-        // MBOC spectrum that all of them share.
+        // Three quarters TMBOC, itself 29/33 BOC(1,1), and a quarter BOC(1,1): 4/33 · 3/4 = 1/11 of BOC(6,1),
+        // the MBOC spectrum that all of them share.
         let (chip_s, hz) = (1.0 / 1.023e6, 0.7e6);
         let boc = |m: f64| {
             let wave = libm::tan(std::f64::consts::PI * hz * chip_s / (2.0 * m))

@@ -16,13 +16,21 @@ pub enum Correlation {
     Triangle,
     /// Of other pulses without a front end.
     Pulses(Waveform),
-    /// Behind a front end of `band` chip rates: values and slopes (times the step) at multiples of the table's step.
-    BandLimited { band: f64, table: Vec<(f64, f64)>, code: Option<Waveform> },
+    /// Behind a front end of `band` chip rates: values and slopes (times the step) at multiples of the
+    /// table's step.
+    BandLimited {
+        /// Bandwidth of the front end, chip rates.
+        band: f64,
+        /// Value and slope, the slope times the step, at each step of the lag.
+        table: Vec<(f64, f64)>,
+        /// Waveform of the code; `None` of an ideal one.
+        code: Option<Waveform>,
+    },
 }
 
 /// Steps a chip: a cubic then errs by less than 1e-7 for bands to 20 chip rates.
 const STEPS_PER_CHIP: f64 = 128.0;
-/// Chips beyond which nothing is tabulated: no loop holds there.
+/// Chips beyond which nothing is tabulated: no loop locks there.
 const LARGEST_CHIPS: f64 = 3.0;
 /// Intervals of the spectrum's integral in one chip rate.
 const INTERVALS: f64 = 96.0;
@@ -94,8 +102,8 @@ impl Correlation {
         }
     }
 
-    /// Standard deviation of one discriminator value in chips, for a C/N0 before the front end; `None` for the
-    /// dot product behind one.
+    /// Standard deviation of one discriminator value in chips, for a C/N0 before the front end; `None` for
+    /// the dot product behind one.
     pub fn raw_chips(&self, discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> Option<f64> {
         match self {
             Self::Triangle => Some(crate::analysis::expect::theory::dll::raw_chips(discriminator, d, t_s, cn0_hz)),

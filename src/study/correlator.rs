@@ -26,20 +26,27 @@ const PILOT_GROUP: u32 = 20;
 /// One channel to be simulated.
 #[derive(Clone, Debug)]
 pub struct Case {
+    /// The signal that is followed.
     pub signal: &'static Signal,
     /// As validated.
     pub settings: TrackingSettings,
+    /// Which loops run.
     pub mode: Mode,
     /// `None` for no noise.
     pub cn0_dbhz: Option<f64>,
+    /// How the truth moves.
     pub motion: Motion,
+    /// Noise of the receiver's oscillator, if it has any.
     pub oscillator: Option<PowerLaw>,
+    /// Shape of the correlation's peak.
     pub correlation: Correlation,
     /// Whether the receiver's detectors may give the signal up.
     pub watched: bool,
     /// Time before anything is measured; the loops begin on the true Doppler and its rate.
     pub settle_s: f64,
+    /// Time that is measured, seconds.
     pub duration_s: f64,
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
@@ -99,13 +106,16 @@ pub struct Epoch {
     pub code_chips: f64,
     /// Since the start, without regard to slips.
     pub phase_cycles: f64,
+    /// Mean error of the frequency, Hz.
     pub frequency_hz: f64,
+    /// What the discriminators gave, and what the loops made of it.
     pub update: Update,
 }
 
 /// What was measured over a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Outcome {
+    /// Time of an update, seconds.
     pub update_s: f64,
     /// Truth minus oscillator, means over an integration.
     pub code_chips: Moments,
@@ -113,10 +123,13 @@ pub struct Outcome {
     pub phase_cycles: Moments,
     /// Largest of those.
     pub phase_peak_cycles: f64,
+    /// Error of the frequency, Hz.
     pub frequency_hz: Moments,
     /// Values of the discriminators.
     pub raw_code_chips: Moments,
+    /// Of the phase, cycles.
     pub raw_phase_cycles: Moments,
+    /// Of the frequency, Hz.
     pub raw_frequency_hz: Moments,
     /// Passages to the next point of lock, half a cycle away with symbols and a whole one without.
     pub slips: u64,

@@ -16,18 +16,22 @@ use crate::receiver::track::loops::Gains;
 /// What a line of sight asks of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
+    /// Along the line of sight, m/s².
     pub acceleration_mps2: f64,
+    /// Along the line of sight, m/s³.
     pub jerk_mps3: f64,
     /// From the least to the largest acceleration.
     pub swing_mps2: f64,
     /// Radius of a circle that the antenna describes besides, and turns a second.
     pub circle: Option<(f64, f64)>,
+    /// Of the signal, dB-Hz; `None` for no noise.
     pub cn0_dbhz: Option<f64>,
 }
 
 /// What the loop makes of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
+    /// Error that the motion leaves in the phase loop, radians.
     pub stress_rad: f64,
     /// Thermal; 0 where nothing is known of C/N0.
     pub jitter_rad: f64,

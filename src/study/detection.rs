@@ -1,7 +1,7 @@
 //! How often the receiver's search finds a satellite that is there, and one that is not, counted in samples.
 //!
 //! A scene of one satellite is generated once for a C/N0 and cut into stretches, one trial each; the search
-//! is told a centre frequency that puts the satellite's Doppler where the trial wants it between two bins.
+//! is given a centre frequency that puts the satellite's Doppler where the trial wants it between two bins.
 //! Expected are [`search`](super::search) for detections and the designed probability for false alarms.
 //! Limits: trials of one C/N0 share a satellite and its message.
 
@@ -42,8 +42,10 @@ const DRAWS: u32 = 20_000;
 /// Why trials could not be made.
 #[derive(Debug, Error)]
 pub enum DetectionError {
+    /// A scene of the study cannot be composed.
     #[error("scene of the trials: {0}")]
     Scene(String),
+    /// The receiver's search refuses it.
     #[error("{0}")]
     Search(#[from] AcquireError),
 }
@@ -53,13 +55,19 @@ pub enum DetectionError {
 pub struct DetectionRow {
     /// `detection`, or `false alarm` where nothing is there to be found.
     pub what: &'static str,
+    /// Of the signal, dB-Hz; absent of noise alone.
     pub cn0_dbhz: Option<f64>,
+    /// Searches.
     pub trials: u32,
+    /// Searches that found it.
     pub found: u32,
+    /// Share that found it.
     pub measured: f64,
+    /// Share that theory expects.
     pub expected: f64,
     /// Between which 95 % of counts lie if the expectation holds, as shares.
     pub low: f64,
+    /// Upper end of the interval.
     pub high: f64,
 }
 
@@ -101,9 +109,11 @@ pub fn interval(probability: f64, trials: u32) -> (f64, f64) {
 /// All rows whose expectation leaves room on both sides, together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
+    /// Rows that were compared.
     pub rows: u32,
     /// Sum of squared deviations over their variances, and the probability that it is exceeded by chance.
     pub chi_square: f64,
+    /// Probability of a deviation so large by chance.
     pub exceeded: f64,
     /// Sum of all deviations in standard deviations of it: normal if the expectations hold.
     pub bias_sigma: f64,
@@ -177,7 +187,8 @@ fn scene(cn0_dbhz: f64, seed: u64, duration_s: f64) -> Result<Scene, DetectionEr
     Ok(scene)
 }
 
-/// Runs `each` on every stretch of a scene, with the satellite's true Doppler there; the truth goes through `writer`.
+/// Runs `each` on every stretch of a scene, with the satellite's true Doppler there; the truth goes through
+/// `writer`.
 fn on_stretches(
     scene: &Scene,
     writer: &mut truth::Writer,
@@ -392,7 +403,8 @@ mod tests {
             assert!((row.measured - row.expected).abs() < scatter, "{row:?}");
         }
         let row = false_alarms(&settings(0.1), 1500, 6, &mut writer(9)).unwrap();
-        // Cells are alike, so that alarms are fewer than designed, by a tenth at most; four deviations of the count.
+        // Cells are alike, so that alarms are fewer than designed, by a tenth at most; four deviations of the
+        // count.
         let scatter = 4.0 * (0.09 / f64::from(row.trials)).sqrt();
         assert!(row.measured < 0.1 + scatter && row.measured > 0.09 - scatter, "{row:?}");
     }

@@ -1,8 +1,9 @@
-//! What theory predicts for a simulated channel: the plain description of the receiver's loops, and its thermal jitter.
+//! What theory predicts for a simulated channel: the plain description of the receiver's loops, and its
+//! thermal jitter.
 //!
-//! Gains are those that the receiver's settings lead to; everything else is `analysis::expect::theory`, which does
-//! not know the receiver. Half-cycle wraps of the frequency discriminator count as white noise of their own.
-//! Limits: small errors, noise as the squaring-loss formulas have it, no dynamics and no oscillator.
+//! Gains are those that the receiver's settings lead to; everything else is `analysis::expect::theory`, which
+//! does not know the receiver. Half-cycle wraps of the frequency discriminator count as white noise of their
+//! own. Limits: small errors, noise as the squaring-loss formulas have it, no dynamics and no oscillator.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +20,8 @@ use crate::receiver::track::{CodeDiscriminator, TrackingSettings};
 pub struct Jitter {
     /// In the unit that the function names.
     pub sigma: f64,
-    /// One-sided noise bandwidth of the loop as it is closed; for a frequency loop, half its noise gain over T.
+    /// One-sided noise bandwidth of the loop as it is closed; for a frequency loop, half its noise gain over
+    /// T.
     pub bandwidth_hz: f64,
     /// Loop updates per independent value.
     pub updates_per_value: f64,
@@ -36,7 +38,8 @@ impl Jitter {
     }
 }
 
-/// Variance in cycles² that half-cycle wraps leave in a loop that a two-quadrant frequency discriminator drives.
+/// Variance in cycles² that half-cycle wraps leave in a loop that a two-quadrant frequency discriminator
+/// drives.
 fn wrapped(case: &Case, system: &Linear) -> Option<f64> {
     let wraps = if case.has_symbols() { fll::wrap_probability(case.update_s(), cn0_hz(case)?) } else { 0.0 };
     Some(0.25 * wraps * system.noise_gain()?)

@@ -1,4 +1,5 @@
-//! What given loops do against the rules of thumb: jitter over C/N0 beside 15°, d/6 and 1/(12T), and error under jerk.
+//! What given loops do against the rules of thumb: jitter over C/N0 beside 15°, d/6 and 1/(12T), and error
+//! under jerk.
 //!
 //! The rules are those of Kaplan and Hegarty, Understanding GPS 2nd ed., 5.6: 3σ and dynamic error within
 //! 45°, d/2 and 1/(4T). They are conservative, not the point of loss, which the simulation shows beside them.
@@ -21,6 +22,7 @@ use crate::receiver::track::loops::Gains;
 /// Jitter of the loops at one C/N0; predicted and measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Level {
+    /// C/N0, dB-Hz.
     pub cn0_dbhz: f64,
     /// Phase loop, thermal noise alone, degrees.
     pub phase_deg: (f64, Option<f64>),
@@ -85,8 +87,8 @@ pub fn level(settings: &TrackingSettings, noise: &PowerLaw, cn0_dbhz: f64, durat
     }
 }
 
-/// Steady phase error of a loop of order 3 under a constant jerk along the line of sight: theory and simulation without
-/// noise, degrees.
+/// Steady phase error of a loop of order 3 under a constant jerk along the line of sight: theory and
+/// simulation without noise, degrees.
 ///
 /// The simulated one is `None` where the loop lets go within four seconds.
 pub fn jerk_stress_deg(settings: &TrackingSettings, jerk_mps3: f64) -> (f64, Option<f64>) {

@@ -3,6 +3,7 @@
 /// Mean and mean square of what was put in.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moments {
+    /// Values so far.
     pub count: u64,
     sum: f64,
     squares: f64,
@@ -34,9 +35,11 @@ impl Moments {
     }
 }
 
-/// Relative standard error of a standard deviation from `freedom` independent values: 1/√(2ν), the normal limit of χ².
+/// Relative standard error of a standard deviation from `freedom` independent values: 1/√(2ν), the normal
+/// limit of χ².
 ///
-/// A loop's error has about 4·B·t independent values in a time t; `analysis::expect::theory::linear` counts them exactly.
+/// A loop's error has about 4·B·t independent values in a time t; `analysis::expect::theory::linear` counts
+/// them exactly.
 pub fn relative_error(freedom: f64) -> f64 {
     1.0 / (2.0 * freedom).sqrt()
 }

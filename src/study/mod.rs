@@ -3,7 +3,7 @@
 //! [`correlator`] drives the loops of a receiver's channel with early, prompt and late correlations drawn
 //! from their statistics; [`motion`] is the truth that it follows, [`correlation`] the shape of the peak.
 //! [`expect`] says what theory predicts for the same loops, [`proof`] compares both over a grid, [`limits`]
-//! holds them against rules of thumb and [`report`] writes both down; [`demand`] asks whether a loop follows
+//! compares them with rules of thumb and [`report`] writes both down; [`demand`] asks whether a loop follows
 //! a motion. [`search`] draws what an acquisition would find, [`detection`] counts what the receiver's does
 //! find in samples. [`sweep`] runs studies that a file describes, on either. This is the only module that
 //! sees receiver, generator and judge at once; none of them sees it.

@@ -23,7 +23,9 @@ pub struct Step {
 /// Motion along the line of sight, as Doppler.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
+    /// Doppler at the start, Hz.
     pub doppler_hz: f64,
+    /// Rate of the Doppler at the start, Hz/s.
     pub rate_hz_s: f64,
     /// In the order of time.
     pub steps: Vec<Step>,
@@ -37,7 +39,8 @@ pub(super) struct Advance {
     pub(super) mean_cycles: f64,
 }
 
-/// Poles of the flicker bank: each a factor of 4 above the one before, the highest at half the rate of periods.
+/// Poles of the flicker bank: each a factor of 4 above the one before, the highest at half the rate of
+/// periods.
 const FLICKER_POLES: usize = 14;
 const FLICKER_RATIO: f64 = 4.0;
 
@@ -62,7 +65,8 @@ impl Oscillator {
         let walk = (drive * period_s).sqrt();
         let from_walk = 0.5 * period_s * walk;
         let phase = (white * period_s + drive * period_s.powi(3) / 3.0 - from_walk * from_walk).max(0.0).sqrt();
-        // Poles p a factor r apart, each of variance h₋₁·ln r, add up to h₋₁/f: ∫ (2/π)/(p(1+(f/p)²)) d ln p = 1/f.
+        // Poles p a factor r apart, each of variance h₋₁·ln r, add up to h₋₁/f: ∫ (2/π)/(p(1+(f/p)²)) d ln p
+        // = 1/f.
         let sigma_hz = carrier_hz * (noise.h[3] * libm::log(FLICKER_RATIO)).sqrt();
         let mut pole_hz = 0.5 / period_s;
         let flicker = std::array::from_fn(|_| {

@@ -1,4 +1,5 @@
-//! The receiver's loops against theory over a grid: measured jitter of truth minus oscillator over the predicted one.
+//! The receiver's loops against theory over a grid: measured jitter of truth minus oscillator over the
+//! predicted one.
 //!
 //! Where T·C/N0 is at least 10 and B·T at most 0.36 the ratio must be one within 5 % (10 % for the frequency
 //! loop) or the measurement's own uncertainty; outside, the cause of a departure is named. Every cell runs
@@ -30,34 +31,52 @@ pub enum Quantity {
 /// One cell of the grid.
 #[derive(Clone, Debug)]
 pub struct Cell {
+    /// What is compared.
     pub quantity: Quantity,
+    /// The channel that is simulated.
     pub case: Case,
 }
 
 /// A cell measured; sigmas in the unit of its quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ProofRow {
+    /// What is compared.
     pub quantity: Quantity,
+    /// Which loops run, by name.
     pub mode: String,
+    /// Integrators of the loop.
     pub order: u32,
+    /// Discriminator, by name.
     pub discriminator: String,
+    /// Distance of early and late, chips.
     pub spacing_chips: f64,
+    /// Coherent integration, seconds.
     pub integration_s: f64,
+    /// One-sided noise bandwidth, Hz.
     pub bandwidth_hz: f64,
+    /// C/N0, dB-Hz.
     pub cn0_dbhz: f64,
     /// T·C/N0.
     pub snr: f64,
+    /// Bandwidth times integration.
     pub bandwidth_time: f64,
+    /// Standard deviation by theory.
     pub theory: f64,
+    /// Standard deviation of the simulation.
     pub measured: f64,
+    /// Measured over theory.
     pub ratio: f64,
     /// Relative standard error of `measured`.
     pub uncertainty: f64,
     /// Mean error.
     pub mean: f64,
+    /// Time simulated, seconds.
     pub simulated_s: f64,
+    /// Slips of the phase.
     pub slips: u64,
+    /// Whether the signal was lost.
     pub lost: bool,
+    /// Whether the linear theory claims to hold.
     pub in_region: bool,
     /// Largest departure of the ratio from one that is allowed in the region.
     pub bar: f64,
@@ -67,9 +86,11 @@ pub struct ProofRow {
 
 /// Least T·C/N0 and largest B·T of the region in which theory must hold.
 pub const LEAST_SNR: f64 = 10.0;
+/// Bandwidth times integration up to which the linear theory claims to hold.
 pub const LARGEST_BANDWIDTH_TIME: f64 = 0.36;
 /// Allowed departures there.
 pub const BAR: f64 = 0.05;
+/// Largest relative deviation from theory of a frequency's jitter.
 pub const FREQUENCY_BAR: f64 = 0.10;
 /// Shortest run, seconds: twenty wraps of a pair of prompts at T·C/N0 = 10 and T = 1 ms.
 const LEAST_S: f64 = 1000.0;

@@ -1,11 +1,11 @@
 //! Probability that a search finds a satellite, from the joint statistics of the cells about its peak.
 //!
 //! A search takes the largest of neighbouring cells, whose noise is alike and of which two or four may share
-//! the peak, so its detection probability exceeds that of one cell (`analysis::expect::theory::detection`) and has no
-//! closed form. Here the correlations of a neighbourhood are drawn: mean from the folded spectrum of the code
-//! averaged over a sample, sinc over frequency and symbols that turn within a sum; noise with the covariance
-//! that the same two functions give. Limits: complex samples, one satellite, random codes beyond the
-//! neighbourhood.
+//! the peak, so its detection probability exceeds that of one cell (`analysis::expect::theory::detection`)
+//! and has no closed form. Here the correlations of a neighbourhood are drawn: mean from the folded spectrum
+//! of the code averaged over a sample, sinc over frequency and symbols that turn within a sum; noise with the
+//! covariance that the same two functions give. Limits: complex samples, one satellite, random codes beyond
+//! the neighbourhood.
 
 use std::f64::consts::TAU;
 
@@ -29,17 +29,23 @@ pub struct Model {
     pub signal: &'static Signal,
     /// Coherent sums whose powers are added, and the length of one.
     pub sums: u32,
+    /// Coherent integration, seconds.
     pub coherent_s: f64,
     /// What the largest Σ|S|², in units of the noise of one component, has to exceed.
     pub threshold: f64,
+    /// Distance of lags, chips.
     pub lag_chips: f64,
+    /// Distance of frequencies, Hz.
     pub doppler_step_hz: f64,
     /// A sample's length.
     pub sample_chips: f64,
+    /// Length of the code, chips.
     pub code_chips: f64,
+    /// Length of a symbol, seconds.
     pub symbol_s: f64,
     /// The code is anywhere within this share of a lag about the nearest one: 1 where nothing is known of it.
     pub code_spread: f64,
+    /// C/N0, dB-Hz.
     pub cn0_dbhz: f64,
 }
 
@@ -161,8 +167,8 @@ impl Model {
     }
 }
 
-/// Mean square of a code's correlation away from its peak, in units of one over its chips: ∫R² over a chip, of a
-/// polygon. Two thirds of rectangular chips.
+/// Mean square of a code's correlation away from its peak, in units of one over its chips: ∫R² over a chip,
+/// of a polygon. Two thirds of rectangular chips.
 fn sidelobe(code: &Waveform) -> f64 {
     let (step_s, chip_s) = code.scales_s();
     let steps = (chip_s / step_s).round() as i32;
@@ -219,7 +225,8 @@ mod tests {
 
     #[test]
     fn at_whole_samples_the_correlation_is_that_of_two_triangles() {
-        // ∫ Λ(τ − u s) Λ(u) du of chips and sample: 1 − s/3 at zero; from s to 1 − s chips both triangles are straight.
+        // ∫ Λ(τ − u s) Λ(u) du of chips and sample: 1 − s/3 at zero; from s to 1 − s chips both triangles are
+        // straight.
         let s = 0.4;
         let folded = Folded::new(&chips(), s, 1.0);
         let at_zero = 1.0 - s / 3.0;
@@ -270,7 +277,8 @@ mod tests {
             let scatter = 4.0 * (expected * (1.0 - expected) / f64::from(DRAWS)).sqrt() + 4e-6;
             assert!((found - expected).abs() < scatter, "{cn0_dbhz} dB-Hz: {found}, expected {expected}");
         }
-        // Where the peak is shared, a neighbour may stand in: more are found than in the nearest cell alone.
+        // Where the peak is shared, a neighbour may replace it: more are found than in the nearest cell
+        // alone.
         let shared = Model { lag_chips: 0.4, doppler_step_hz: 500.0, cn0_dbhz: 36.0, ..model };
         let lambda = detection::noncentrality(10, 1e-3, libm::pow(10.0, 3.6), detection::frequency_loss(250.0, 1e-3));
         let alone = detection::detection(model.threshold, 10, lambda);

@@ -64,7 +64,8 @@ fn discriminators_spread_as_their_formulas_say() {
 #[test]
 fn correlations_keep_their_value_and_slope_behind_a_front_end() {
     assert_eq!(Correlation::Triangle.value(-0.25), 0.75);
-    // Loss of a two-sided band of 2, 4 and 24 chip rates: 0.444, 0.223 and 0.037 dB (own tables of a brick wall).
+    // Loss of a two-sided band of 2, 4 and 24 chip rates: 0.444, 0.223 and 0.037 dB (own tables of a brick
+    // wall).
     for (band, loss_db) in [(2.0, 0.444), (4.0, 0.223), (24.0, 0.037)] {
         let shape = Correlation::band_limited(band);
         assert!((10.0 * libm::log10(shape.value(0.0)) + loss_db).abs() < 6e-4, "{band}");
@@ -106,8 +107,8 @@ fn code_jitter_behind_a_front_end_is_that_of_its_spectrum() {
 
 #[test]
 fn frequency_jitter_of_separate_pairs_is_the_printed_formula() {
-    // The receiver pairs every prompt with the one before; the printed formula is for pairs that share none. Its own
-    // discriminator and loop step, on pairs of their own.
+    // The receiver pairs every prompt with the one before; the printed formula is for pairs that share none.
+    // Its own discriminator and loop step, on pairs of their own.
     let (t_s, cn0_hz, k) = (1e-3, hz(45.0), 0.04);
     let mut normals = super::normal::Normals::new(3, super::normal::Purpose::Thermal);
     let amplitude = (2.0 * t_s * cn0_hz).sqrt();
@@ -186,8 +187,8 @@ fn a_step_of_acceleration_passes_through_the_third_order_loop() {
         }
         last = (error, epoch.code_chips.abs());
     });
-    // A Doppler rate from the start is known to the loops; the step errs, and is followed without error. The code
-    // keeps what its first-order loop was moved by, all but the aid: nothing.
+    // A Doppler rate from the start is known to the loops; the step errs, and is followed without error. The
+    // code keeps what its first-order loop was moved by, all but the aid: nothing.
     assert!(before < 1e-3 && largest > 0.01 && largest < 0.25, "{before} {largest}");
     assert!(last.0 < 1e-4 && last.1 < 1e-4, "{last:?}");
 }

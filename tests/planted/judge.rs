@@ -82,7 +82,8 @@ fn near(name: &str, found: Option<f64>, expected: f64) {
     assert!((found - expected).abs() <= 1e-3 * expected.abs() + 1e-6, "{name}: {found}, by hand {expected}");
 }
 
-/// Rows of east, north and up at an ECEF position; geodetic latitude of the ellipsoid to 1e-9 rad near its surface.
+/// Rows of east, north and up at an ECEF position; geodetic latitude of the ellipsoid to 1e-9 rad near its
+/// surface.
 fn axes(position_m: Vector3<f64>) -> Matrix3<f64> {
     let longitude = libm::atan2(position_m.y, position_m.x);
     let level_m = libm::hypot(position_m.x, position_m.y);
@@ -161,8 +162,8 @@ fn figures_of_the_observations_are_those_of_their_rows() {
     let observables = &summary.observables;
     near("pseudorange", observables.pseudorange_rms_m, rms(without_clock));
     near("Doppler", observables.doppler_rms_hz, rms(doppler_hz.into_iter()));
-    // Eight equal satellites of 50 dB-Hz: each meets seven others as noise of κ·C, κ = 0.85 chip (see analysis::expect::multiple_access), which
-    // costs 10 lg(1 + 7·0.85/1.023e6·1e5) = 2.0 dB.
+    // Eight equal satellites of 50 dB-Hz: each meets seven others as noise of κ·C, κ = 0.85 chip (see
+    // analysis::expect::multiple_access), which costs 10 lg(1 + 7·0.85/1.023e6·1e5) = 2.0 dB.
     let count = cn0_dbhz.len() as f64;
     let measured = cn0_dbhz.iter().map(|(measured, _)| measured).sum::<f64>() / count;
     let bias = observables.cn0_bias_db.unwrap();

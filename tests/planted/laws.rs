@@ -1,5 +1,5 @@
-//! Laws that need no samples: the position solution against the generator's own geometry, covariances against a plain
-//! inversion, effects and statistics against their definitions.
+//! Laws that need no samples: the position solution against the generator's own geometry, covariances against
+//! a plain inversion, effects and statistics against their definitions.
 
 use std::collections::BTreeMap;
 
@@ -98,7 +98,8 @@ impl Ideal {
         self.effects.iter().for_each(|effect| effect.act(&found.sight, &L1_CA, &mut rays));
         let delay_s = self.travel_s(sv, local)? + rays[0].code_delay_s;
         let sent = local.plus_s(-delay_s);
-        // The atmosphere's rate, millimetres a second, is left out of the Doppler, as the solver leaves it out.
+        // The atmosphere's rate, millimetres a second, is left out of the Doppler, as the solver leaves it
+        // out.
         let rate = (self.travel_s(sv, local.plus_s(0.05))? - self.travel_s(sv, local.plus_s(-0.05))?) / 0.1;
         Some(Observation {
             sample,
@@ -375,7 +376,8 @@ fn statistics_are_those_of_their_definitions() {
 
 #[test]
 fn jitter_is_kaplan_and_hegarty_s() {
-    // Equations 5.6 and 5.23 by hand at C/N0 = 10^4 Hz, T = 1 ms, B = 18 and 1 Hz, d = 0.5 chips: 1/(2·T·C/N0) = 0.05.
+    // Equations 5.6 and 5.23 by hand at C/N0 = 10^4 Hz, T = 1 ms, B = 18 and 1 Hz, d = 0.5 chips:
+    // 1/(2·T·C/N0) = 0.05.
     let expected = (18.0 / 1e4 * (1.0 + 0.05_f64)).sqrt();
     let phase_rad = pll::jitter_rad(18.0, 1e-3, 1e4);
     assert!((phase_rad - expected).abs() < 1e-9, "{phase_rad}");

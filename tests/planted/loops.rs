@@ -34,7 +34,8 @@ pub fn run_and_keep(scene: &str, directory: &Path) {
     make(scene, directory, |bytes| file.write_all(bytes).unwrap());
 }
 
-/// Receives the kept samples of a run; its truth is linked. A fault in the receiver shows as if the samples were made anew.
+/// Receives the kept samples of a run; its truth is linked. A fault in the receiver shows as if the samples
+/// were made anew.
 fn receive_again(scene: &str, kept: &Path, directory: &Path) {
     let truth = directory.join("truth");
     fs::create_dir(&truth).unwrap();
@@ -95,8 +96,8 @@ pub fn failures(summary: &Summary) -> Vec<String> {
     summary.details.verdict.rows.iter().filter(failed).map(text).collect()
 }
 
-/// Satellites whose carrier is no whole number of cycles off at their last observation: the message shows the half cycle, which the
-/// verdict forgives.
+/// Satellites whose carrier is no whole number of cycles off at their last observation: the message shows the
+/// half cycle, which the verdict forgives.
 fn half_cycles(directory: &Path) -> Vec<String> {
     type Rows = BTreeMap<(u64, Sv), Observation>;
     let read = |side: &str| -> Rows {

@@ -378,7 +378,8 @@ fn stated() -> Vec<Kind> {
                 (0..most).for_each(|row| {
                     table.put(row, "excluded", "G03");
                     let satellites = table.get(row, "satellites") - 1.0;
-                    // What a fix without one satellite states is not known here: only those without a test of it.
+                    // What a fix without one satellite states is not known here: only those without a test of
+                    // it.
                     table.put(row, "satellites", satellites);
                 });
             }

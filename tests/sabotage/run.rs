@@ -22,7 +22,8 @@ struct Made {
     run: PathBuf,
 }
 
-/// Runs a scenario, or takes the run of that name in the directory `GNSS_TWIN_SABOTAGE_RUNS`, to look at other receivers' runs.
+/// Runs a scenario, or takes the run of that name in the directory `GNSS_TWIN_SABOTAGE_RUNS`, to look at
+/// other receivers' runs.
 fn make(slot: &'static OnceLock<Made>, name: &str, scenario: &str) -> &'static Path {
     let made = slot.get_or_init(|| {
         if let Some(runs) = std::env::var_os("GNSS_TWIN_SABOTAGE_RUNS") {

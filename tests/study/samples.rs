@@ -50,8 +50,9 @@ fn a_case_is_what_run_would_say_and_agrees_with_theory() {
     let number = |row: &csv::StringRecord, column: usize| row[column].parse::<f64>().unwrap();
     for (row, case) in rows.iter().zip(0..) {
         assert_eq!((number(row, 0), number(row, 9), number(row, 10)), (f64::from(case), 1.0, 0.0), "{row:?}");
-        // Some 15 s past frame and pull-in: loops of 10 and 18 Hz, read every 50 ms, give at least 250 independent errors, so
-        // their spread is known to 1/√(2·250) = 4.5 %; three of that. The code's 120 (4·2 Hz·15 s): 6.5 %.
+        // Some 15 s past frame and pull-in: loops of 10 and 18 Hz, read every 50 ms, give at least 250
+        // independent errors, so their spread is known to 1/√(2·250) = 4.5 %; three of that. The code's 120
+        // (4·2 Hz·15 s): 6.5 %.
         let ratio = number(row, 5) / number(row, 6);
         println!("phase {ratio:.3}, code {:.3}: {row:?}", number(row, 7) / number(row, 8));
         assert!((ratio - 1.0).abs() < 0.135, "{ratio}: {row:?}");

@@ -17,7 +17,7 @@ use crate::analysis::waveform::{Edge, Waveform};
 use crate::gnss::facts::Interference;
 use crate::gnss::signal::sinc_squared;
 
-/// Cycles of a sweep beyond which its lines lie too close to tell from a band.
+/// Cycles of a sweep beyond which its lines lie too close to be distinguished from a band.
 const MOST_CYCLES: f64 = 4096.0;
 
 /// A spectrum of unit power about its carrier.
@@ -129,7 +129,9 @@ impl Spectrum {
 /// What a run's interference was on average, in the samples.
 #[derive(Clone, Debug)]
 pub struct Source {
+    /// Shape of the spectrum at unit power.
     pub spectrum: Spectrum,
+    /// Mean frequency in the samples, Hz.
     pub frequency_hz: f64,
     /// Mean over the whole run, silence counted.
     pub jn0_hz: f64,
@@ -164,7 +166,8 @@ pub fn separation_s(source: &Source, signal: &Waveform, signal_hz: f64, edge: Ed
     shared / power
 }
 
-/// Density of the interference at a frequency of the samples as a Hann window of bins `bin_hz` apart shows it, over N0.
+/// Density of the interference at a frequency of the samples as a Hann window of bins `bin_hz` apart shows
+/// it, over N0.
 pub fn density(source: &Source, f_hz: f64, bin_hz: f64) -> f64 {
     let from_hz = f_hz - source.frequency_hz;
     // Lines as far as eight bins; the window's side lobes are 100 dB down there.

@@ -1,4 +1,5 @@
-//! The three loops of a receiver as theory sees them: linear, with the exact bandwidth that the settings ask for.
+//! The three loops of a receiver as theory sees them: linear, with the exact bandwidth that the settings ask
+//! for.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -22,19 +23,29 @@ use crate::gnss::signal::{Link, Signal};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Loop {
+    /// Of the code.
     Dll,
+    /// Of the carrier's phase.
     Pll,
+    /// Of the carrier's frequency.
     Fll,
 }
 
-/// Receiver's settings that the theory needs; the defaults are the receiver's where its file does not name them.
+/// Receiver's settings that the theory needs; the defaults are the receiver's where its file does not name
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
+    /// Integrators of the phase loop, 1 to 3.
     pub pll_order: u32,
+    /// One-sided noise bandwidth of the phase loop, Hz.
     pub pll_bandwidth_hz: f64,
+    /// Integrators of the code loop, 1 or 2.
     pub dll_order: u32,
+    /// One-sided noise bandwidth of the code loop, Hz.
     pub dll_bandwidth_hz: f64,
+    /// Distance of early and late, chips.
     pub spacing_chips: f64,
+    /// Whether the replica's samples are means over their intervals.
     pub averaged_replica: bool,
 }
 
@@ -90,10 +101,12 @@ pub(in crate::analysis) fn natural_radps(closed: &PhaseLoop, order: u32, update_
     -libm::log(controlled_root(order, closed.gains)) / update_s
 }
 
-/// Up to here the truth's drift follows the oscillator: a spline over 0.8 s has 80 % of that rate's variance left.
+/// Up to here the truth's drift follows the oscillator: a spline over 0.8 s has 80 % of that rate's variance
+/// left.
 const NODES_HZ: f64 = 0.5;
 
-/// Intervals after which nothing is left of a value in any loop that can be set: bandwidth times time is 1e-4 or more.
+/// Intervals after which nothing is left of a value in any loop that can be set: bandwidth times time is 1e-4
+/// or more.
 const LONGEST: usize = 200_000;
 
 impl Response {
@@ -251,8 +264,8 @@ pub(in crate::analysis) struct Theory {
 }
 
 impl Theory {
-    /// `None` where a loop of these settings cannot hold the signal: no such loop is stable, or early and late lie
-    /// beyond the correlation's main peak.
+    /// `None` where a loop of these settings cannot follow the signal: no such loop is stable, or early and
+    /// late lie beyond the correlation's main peak.
     pub fn new(run: &Run, settings: Settings, link: &Link, update_s: f64) -> Option<Self> {
         let waveform = Waveform::of(link.signal)?;
         let chip_rate_hz = waveform.chip_rate_hz();
@@ -334,7 +347,8 @@ impl Theory {
         let d = self.settings.spacing_chips;
         match which {
             Loop::Dll => {
-                // Early or late beyond the main peak ends the discriminator's range before half the spacing does.
+                // Early or late beyond the main peak ends the discriminator's range before half the spacing
+                // does.
                 let range = (0.5 * d).min(self.code.reach_chips - 0.5 * d);
                 (dll::threshold_chips(2.0 * range), range)
             }
@@ -381,7 +395,7 @@ impl Stresses {
         let begin = || (Follower::new(&theory.pll.0, t_s), Follower::new(&theory.dll.0, t_s));
         let (mut pll, mut dll) = begin();
         for k in 0..count {
-            // The middle of an interval stands for its mean.
+            // The middle of an interval is taken for its mean.
             let Some(state) = timeline.state(link, from_s + (k as f64 + 0.5) * t_s) else {
                 (pll, dll) = begin();
                 continue;
@@ -410,10 +424,11 @@ impl Stresses {
     }
 }
 
-/// Errors in degrees that the true motion leaves in the phase loop of a satellite, with their times since sample 0.
+/// Errors in degrees that the true motion leaves in the phase loop of a satellite, with their times since
+/// sample 0.
 ///
 /// # Errors
-/// [`JudgeError::Read`] where rows that were put by cannot be read.
+/// [`JudgeError::Read`] where spilled rows cannot be read.
 pub fn motion_error_deg(
     run: &Run,
     access: &MultipleAccess<'_>,
@@ -511,8 +526,8 @@ mod tests {
             let peak = Peak::new(&Waveform::of(signal).unwrap(), 0.0, 0);
             raw_chips(&peak, &peak, d, 1e6)
         };
-        // With slope s and 1 − ρ = s·d the variance is d/(4·s·snr): s is 1 of BPSK and 3 of BOC(1,1). Of MBOC it
-        // is 10/11 · 3 + 1/11 · 23, BOC(6,1) falling by 2·12 − 1 a chip.
+        // With slope s and 1 − ρ = s·d the variance is d/(4·s·snr): s is 1 of BPSK and 3 of BOC(1,1). Of MBOC
+        // it is 10/11 · 3 + 1/11 · 23, BOC(6,1) falling by 2·12 − 1 a chip.
         for (signal, slope) in [(&QUADRATURE, 1.0), (&LONG_BOC, 3.0), (&MIXED, 53.0 / 11.0)] {
             let ratio = raw(signal, 0.05) / raw(&L1_CA, 0.05);
             // Squaring at 60 dB, 1e-6; slopes by differences, 1e-9.

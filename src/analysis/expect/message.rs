@@ -22,6 +22,7 @@ pub struct Message {
     sets: BTreeMap<Sv, Vec<(u32, Ephemeris)>>,
     /// From which sample on the receiver had which issue, ascending.
     read: BTreeMap<Sv, Vec<(u64, u32)>>,
+    /// The ionosphere's parameters, where they were sent.
     pub klobuchar: Option<Klobuchar>,
 }
 
@@ -55,8 +56,8 @@ impl Message {
         self.sets.get(&sv).is_none_or(|sets| sets.iter().all(|(_, set)| set.health == 0))
     }
 
-    /// The set of a satellite that the receiver had read last at `sample`, or else the one whose reference time is nearest
-    /// to `at`.
+    /// The set of a satellite that the receiver had read last at `sample`, or else the one whose reference
+    /// time is nearest to `at`.
     pub fn ephemeris(&self, sv: Sv, (sample, at): (u64, Epoch)) -> Option<&Ephemeris> {
         let sets = self.sets.get(&sv)?;
         let last = self.read.get(&sv).and_then(|read| read.iter().rev().find(|(since, _)| *since <= sample));
@@ -66,8 +67,8 @@ impl Message {
     }
 }
 
-/// When the receiver completed the sets of a satellite, with their issues in the order in which it wrote them down. A
-/// set that it read again after a loss comes before a new one.
+/// When the receiver completed the sets of a satellite, with their issues in the order in which it wrote them
+/// down. A set that it read again after a loss comes before a new one.
 fn read(run: &Run, sv: Sv) -> Vec<(u64, u32)> {
     let mut issues: Vec<u32> = Vec::new();
     for row in run.navigation.iter().filter(|row| row.sv == sv && row.parameter == OF_EVERY_SET) {

@@ -22,8 +22,8 @@ pub(in crate::analysis) fn error_chips(code: &Code, rays: &[(f64, f64, f64)], sp
         }
         i * i + q * q
     };
-    // Falls through zero where the loop rests, between half a spacing before the direct ray and one behind it,
-    // before early leaves the main peak.
+    // Falls through zero where the loop rests, between half a spacing before the direct ray and one behind
+    // it, before early leaves the main peak.
     let discriminator = |at: f64| power(at + 0.5 * spacing_chips) - power(at - 0.5 * spacing_chips);
     let (mut low, mut high) = (-0.5 * spacing_chips, spacing_chips.min(code.reach_chips - 0.5 * spacing_chips));
     for _ in 0..40 {
@@ -59,8 +59,8 @@ mod tests {
 
     #[test]
     fn a_ray_beyond_the_main_peak_of_boc_errs_the_other_way() {
-        // R falls by 3 a chip and rises by 1 beyond half a chip: late minus early of the direct ray is −6e, of
-        // the other one 3αd on the steep flank and −αd on the gentle one.
+        // R falls by 3 a chip and rises by 1 beyond half a chip: late minus early of the direct ray is −6e,
+        // of the other one 3αd on the steep flank and −αd on the gentle one.
         let code = Code::of(&Waveform::of(&LONG_BOC).unwrap());
         let error = |excess: f64, phase: f64| error_chips(&code, &[(excess, 0.25, phase)], 0.1);
         assert!((error(0.2, 0.0) - 0.25 * 0.05).abs() < 1e-4, "{}", error(0.2, 0.0));

@@ -34,7 +34,8 @@ impl<'r> MultipleAccess<'r> {
         Self { run, kappa_s: separations(run, &emissions, &waveforms), jammed: jammed(run, &emissions, &waveforms) }
     }
 
-    /// C/N0 of a true observation with the other satellites and interference counted as noise; infinite without any.
+    /// C/N0 of a true observation with the other satellites and interference counted as noise; infinite
+    /// without any.
     pub fn effective_dbhz(&self, row: &Observation) -> f64 {
         let (own_hz, own) = (linear(row.cn0_dbhz), Emission::of(row.link()));
         let sum_hz = |emission: Emission| self.run.cn0_sums_hz.get(&(row.sample, emission)).copied();

@@ -28,7 +28,8 @@ fn beyond(axes: u32, p: f64) -> f64 {
     }
 }
 
-/// Band of the mean square of so many independent normal values of unit variance, half of the false alarm on each side.
+/// Band of the mean square of so many independent normal values of unit variance, half of the false alarm on
+/// each side.
 pub fn mean_square(independent: f64) -> (f64, f64) {
     let freedom = independent.max(1.0);
     let Ok(law) = ChiSquared::new(freedom) else { return (0.0, f64::INFINITY) };
@@ -41,7 +42,8 @@ mod tests {
 
     #[test]
     fn factors_are_those_of_the_tables() {
-        // Normal, two-sided 1e-5: 4.4172; Rayleigh: √(2·ln 1e5); chi-square of three degrees beyond 1e-5: 25.902.
+        // Normal, two-sided 1e-5: 4.4172; Rayleigh: √(2·ln 1e5); chi-square of three degrees beyond 1e-5:
+        // 25.902.
         assert!((largest(1, 1) - 4.4172).abs() < 1e-3, "{}", largest(1, 1));
         assert!((largest(2, 1) - 4.7985).abs() < 1e-3, "{}", largest(2, 1));
         assert!((largest(3, 1) - 25.902_f64.sqrt()).abs() < 2e-3, "{}", largest(3, 1));

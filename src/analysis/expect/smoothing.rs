@@ -1,4 +1,5 @@
-//! What Hatch's filter makes of a satellite's code: bias of what parts code and carrier, and the noise that is left.
+//! What Hatch's filter makes of a satellite's code: bias of what parts code and carrier, and the noise that
+//! is left.
 //!
 //! Written from the settings, not from the receiver's code: the weight of a new code value falls from one to
 //! interval over window, a break of lock or a gap begins anew. Noise of a first-order code loop is correlated

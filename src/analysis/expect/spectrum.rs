@@ -28,10 +28,13 @@ pub struct Spectrum {
     pub level_error_db: Option<f64>,
     /// 95th percentile of the same about its median, where the density is less than 20 dB below its peak.
     pub shape_error_p95_db: Option<f64>,
+    /// Null below the carrier as measured, Hz from the carrier.
     pub null_low_hz: Option<f64>,
+    /// Null above the carrier as measured, Hz from the carrier.
     pub null_high_hz: Option<f64>,
-    /// Where the same search finds them in the expected spectrum: Doppler moves them.
+    /// Where the same search finds the lower one in the expected spectrum: Doppler moves it.
     pub null_low_expected_hz: Option<f64>,
+    /// Where it finds the upper one.
     pub null_high_expected_hz: Option<f64>,
     /// Why a null is not reported.
     pub null_reason: Option<&'static str>,
@@ -151,7 +154,8 @@ fn unbalance(density: &mut [f64], balance: &BalanceSpec, run: &Run, bin_hz: f64)
     }
 }
 
-/// Gain of the converter, and the power that quantisation adds to a component, for Gaussian samples of `sigma_lsb`.
+/// Gain of the converter, and the power that quantisation adds to a component, for Gaussian samples of
+/// `sigma_lsb`.
 fn quantiser(adc: Option<&ConverterSpec>, sigma_lsb: f64) -> (f64, f64) {
     let Some(adc) = adc else { return (1.0, 1.0 / 12.0) };
     let made_for_lsb = if adc.gain_control { sigma_lsb } else { adc.nominal_lsb };

@@ -1,6 +1,6 @@
 //! The truth as a function of GPS time, for receivers that label their epochs with a clock of their own.
 //!
-//! Files give it at samples; their true GPS times stand in `trajectory.csv`. The sampler's clock is taken
+//! Files give it at samples; their true GPS times are in `trajectory.csv`. The sampler's clock is taken
 //! out, so that what is left is what a receiver with a perfect clock would have seen. Between rows a cubic
 //! through values and rates (Hermite): its error is h⁴/384 of the fourth derivative. It is measured here, not
 //! assumed: a row is predicted from its neighbours, 2h apart, and a sixteenth of what that misses is the
@@ -25,12 +25,15 @@ use crate::gnss::time::Epoch;
 pub struct State {
     /// Speed of light times (GPS time − time sent).
     pub range_m: f64,
+    /// Range in cycles of the carrier.
     pub carrier_cycles: f64,
     /// Minus the carrier's rate.
     pub doppler_hz: f64,
+    /// True C/N0, dB-Hz.
     pub cn0_dbhz: f64,
     /// With the other satellites and interference counted as noise.
     pub effective_dbhz: f64,
+    /// Elevation of the satellite, degrees.
     pub elevation_deg: f64,
 }
 
@@ -43,17 +46,24 @@ struct Track {
 /// Antenna and sampler's clock at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
+    /// Place, Earth-fixed, metres.
     pub position_m: Vector3<f64>,
+    /// Velocity, Earth-fixed, m/s.
     pub velocity_mps: Vector3<f64>,
+    /// Reading of the sampler's clock minus true time, seconds.
     pub clock_bias_s: f64,
+    /// Rate of that bias, seconds a second.
     pub clock_drift: f64,
 }
 
 /// What interpolation leaves, at most.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Interpolation {
+    /// Of a range, metres.
     pub range_m: f64,
+    /// Of a carrier, cycles.
     pub carrier_cycles: f64,
+    /// Of a Doppler, Hz.
     pub doppler_hz: f64,
 }
 
@@ -64,6 +74,7 @@ pub struct Timeline {
     interval_s: f64,
     tracks: BTreeMap<Link, Track>,
     places: Vec<(f64, Place)>,
+    /// Largest errors of interpolation between rows.
     pub interpolation: Interpolation,
 }
 
@@ -74,7 +85,7 @@ impl Timeline {
     /// From a run's truth; `None` without a trajectory.
     ///
     /// # Errors
-    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn new(run: &Run) -> Result<Option<Self>, JudgeError> {
         let Some(mut timeline) = Self::of_links(run, &MultipleAccess::new(run), run.truth.keys())? else {
             return Ok(None);

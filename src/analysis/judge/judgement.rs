@@ -6,11 +6,14 @@ use serde_json::Value;
 /// Share of a limit below which what is left of it is marginal.
 pub const MARGINAL_SHARE: f64 = 0.1;
 
-/// What a figure is held against.
+/// What a figure is compared with.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Bound {
+    /// The figure must not be larger.
     Max(f64),
+    /// The figure must not be smaller.
     Min(f64),
+    /// The figure must be this.
     Equals(Value),
 }
 
@@ -28,8 +31,11 @@ impl std::fmt::Display for Bound {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
+    /// Within its limit.
     Pass,
+    /// Within its limit, by less than the marginal share of it.
     Marginal,
+    /// Beyond its limit, or missing.
     Fail,
 }
 
@@ -53,10 +59,14 @@ pub struct Judgement {
     pub path: Option<String>,
     /// Null where the run has no such figure.
     pub value: Value,
+    /// Unit of the value.
     pub unit: String,
+    /// What it is compared with.
     pub bound: Bound,
-    /// What is left of the limit as a share of it, negative beyond it; `None` where the limit is zero or no number.
+    /// What is left of the limit as a share of it, negative beyond it; `None` where the limit is zero or no
+    /// number.
     pub margin: Option<f64>,
+    /// How it came out.
     pub status: Status,
     /// Where the limit comes from.
     pub source: String,

@@ -7,8 +7,8 @@
 //! "fidelity" = { equals = "balanced" }
 //! ```
 //!
-//! A path may also be written as nested tables; a number in it counts list items from 0. A path that the schema
-//! ([`super::schema`]) does not have is an error, one that a run has no figure for fails.
+//! A path may also be written as nested tables; a number in it counts list items from 0. A path that the
+//! schema ([`super::schema`]) does not have is an error, one that a run has no figure for fails.
 
 use serde_json::Value;
 use thiserror::Error;
@@ -21,16 +21,52 @@ use crate::gnss::place::Keys;
 /// Why a file of limits cannot be used. `name` is the file's, with line and column where they are known.
 #[derive(Debug, Error, PartialEq)]
 pub enum LimitsError {
+    /// The file is not TOML.
     #[error("{name}: {message}")]
-    Toml { name: String, message: String },
+    Toml {
+        /// Name of the file of limits.
+        name: String,
+        /// What the parser reports, with line and column.
+        message: String,
+    },
+    /// A path that `summary.json` does not have.
     #[error("{name}: {} is not in summary.json; the nearest path is {nearest} (all: assets/summary.schema.json)", path.escape_debug())]
-    Path { name: String, path: String, nearest: String },
+    Path {
+        /// Name of the file of limits.
+        name: String,
+        /// The path into `summary.json`.
+        path: String,
+        /// The path that is spelt most like it.
+        nearest: String,
+    },
+    /// A value that a limit cannot have.
     #[error("{name}: {path}.{} = {value}, expected {expected}", key.escape_debug())]
-    Value { name: String, path: String, key: String, value: String, expected: &'static str },
+    Value {
+        /// Name of the file of limits.
+        name: String,
+        /// The path into `summary.json`.
+        path: String,
+        /// The key beside the limit.
+        key: String,
+        /// The value as written.
+        value: String,
+        /// What was expected, in words.
+        expected: &'static str,
+    },
+    /// A path without a limit.
     #[error("{name}: {path} has no limit; expected {{ min = … }}, {{ max = … }}, both, or {{ equals = … }}")]
-    Empty { name: String, path: String },
+    Empty {
+        /// Name of the file of limits.
+        name: String,
+        /// The path into `summary.json`.
+        path: String,
+    },
+    /// A file without any limit.
     #[error("{name} sets no limit at all")]
-    Nothing { name: String },
+    Nothing {
+        /// Name of the file of limits.
+        name: String,
+    },
 }
 
 impl LimitsError {

@@ -2,7 +2,7 @@
 //!
 //! `assets/summary.schema.json` is a JSON Schema (draft 2020-12) with one annotation more: `unit`, which is
 //! `1` for counts, ratios and names. A key that may be any word, such as a signal's name, is `*` in a path. A
-//! test holds it against what a run really writes.
+//! test compares it with what a run really writes.
 
 use serde_json::{Map, Value};
 use std::sync::OnceLock;
@@ -15,8 +15,11 @@ pub static TEXT: &str = include_str!("../../../assets/summary.schema.json");
 pub struct Leaf {
     /// Keys and list positions, joined by dots.
     pub path: String,
+    /// Unit of the value.
     pub unit: String,
+    /// What it means, in words.
     pub meaning: String,
+    /// Whether it is a number, so that it can have a largest or smallest value.
     pub is_number: bool,
 }
 
@@ -53,10 +56,10 @@ fn walk(path: &str, schema: &Value, leaves: &mut Vec<Leaf>) {
     }
 }
 
-/// What stands in the schema's paths for any key, such as the name of a signal.
+/// What replaces any key in the schema's paths, such as the name of a signal.
 const ANY: &str = "*";
 
-/// Whether a path is one of those that a path of the schema stands for.
+/// Whether a path is one of those that a path of the schema covers.
 pub fn covers(pattern: &str, path: &str) -> bool {
     let (mut keys, mut own) = (pattern.split('.'), path.split('.'));
     loop {

@@ -10,6 +10,7 @@ use crate::analysis::judge::judgement::{Bound, Judgement, MARGINAL_SHARE, Status
 /// Every figure of a run that is judged.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Verdict {
+    /// Every judgement, those of a user first.
     pub rows: Vec<Judgement>,
     /// How many of the first rows hold a user's limits.
     pub of_user: usize,

@@ -1,10 +1,11 @@
-//! Whether the receiver's own covariance is honest: normalised error squared.
+//! Whether fixes are consistent with the covariance that the receiver states: normalised error squared.
 //!
-//! With e the error of a fix east, north, up and P the covariance that the receiver states, eᵀP⁻¹e is chi-square of three
-//! degrees if P is right (Bar-Shalom, Li and Kirubarajan 2001, 5.4), so that its mean is 3. Fixes of smoothed ranges remember
-//! each other: the mean of n of them is held against the band of as many *independent* ones as the autocorrelation of
-//! L⁻¹e says, P = LLᵀ, about zero, so that a lasting error counts once. Limits: with a window of smoothing as long as the
-//! run there are few, and the band is wide; a fix without a formal covariance is left out.
+//! With e the error of a fix east, north, up and P the covariance that the receiver states, eᵀP⁻¹e is
+//! chi-square of three degrees if P is right (Bar-Shalom, Li and Kirubarajan 2001, 5.4), so that its mean is
+//! 3. Fixes of smoothed ranges remember each other: the mean of n of them is compared with the band of as
+//! many *independent* ones as the autocorrelation of L⁻¹e says, P = LLᵀ, about zero, so that a lasting error
+//! counts once. Limits: with a window of smoothing as long as the run there are few, and the band is wide; a
+//! fix without a formal covariance is left out.
 
 use nalgebra::{Cholesky, Matrix3};
 use serde::Serialize;
@@ -19,7 +20,7 @@ use crate::gnss::record::Fix;
 
 /// Degrees of freedom of one fix.
 pub const FREEDOM: f64 = 3.0;
-/// Probability with which the mean of an honest receiver lies within the band.
+/// Probability with which the mean of a consistent receiver lies within the band.
 pub const CONFIDENCE: f64 = 0.95;
 
 /// What the comparison says.
@@ -49,13 +50,21 @@ impl Calibration {
 /// One fix: a row of `honesty.csv`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct NormalisedError {
+    /// Number of the sample, counted from the first one.
     pub sample: u64,
+    /// Seconds from sample 0 by the receiver's clock.
     pub time_s: f64,
+    /// Error to the east, metres.
     pub east_m: f64,
+    /// Error to the north, metres.
     pub north_m: f64,
+    /// Error upward, metres.
     pub up_m: f64,
+    /// Standard deviation to the east that the receiver states, metres.
     pub sigma_east_m: f64,
+    /// The same to the north, metres.
     pub sigma_north_m: f64,
+    /// The same upward, metres.
     pub sigma_up_m: f64,
     /// Normalised error squared.
     pub nees: f64,
@@ -64,12 +73,15 @@ pub struct NormalisedError {
 /// A run's covariance against its errors.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Consistency {
+    /// Every fix that states a covariance.
     pub rows: Vec<NormalisedError>,
+    /// Mean of the normalised errors squared; 3 where the covariance is right.
     pub nees_mean: Option<f64>,
     /// How many independent fixes the mean is worth.
     pub independent: Option<f64>,
     /// Ends of the 95 % band of the mean.
     pub band: Option<(f64, f64)>,
+    /// What the comparison says.
     pub verdict: Option<Calibration>,
     /// Share of east, north and up errors within twice their sigma; 0.954 of normal ones.
     pub within_two_sigma: Option<f64>,

@@ -3,7 +3,7 @@
 //! Code minus carrier is free of orbits, clocks and the troposphere; it holds code noise, multipath, a
 //! constant and twice the ionosphere, which the truth gives and which is taken out here: M = P − λφ − 2I,
 //! each arc about its mean, each signal with its own carrier. It is what a user of one frequency can see of
-//! multipath, and beside it stands what only the truth can tell, the code's error. Bands of elevation are ten
+//! multipath, and beside it is what only the truth shows, the code's error. Bands of elevation are ten
 //! degrees wide; errors in them are without the epoch's common part of their signal.
 
 use std::collections::{BTreeMap, HashMap};
@@ -22,11 +22,15 @@ const BAND_DEG: f64 = 10.0;
 /// One observation: a row of `multipath.csv`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
+    /// Seconds from sample 0 by the receiver's clock.
     pub time_s: f64,
+    /// Elevation of the satellite, degrees.
     pub elevation_deg: f64,
     /// Without the epoch's common part of its signal; none of the only satellite of an epoch.
     pub code_m: Option<f64>,
+    /// Error of the carrier without its arc's constant, cycles.
     pub carrier_cycles: f64,
+    /// Error of the Doppler, Hz.
     pub doppler_hz: f64,
     /// Measured minus expected.
     pub cn0_db: f64,
@@ -37,37 +41,59 @@ pub struct Point {
 /// One satellite: a row of `satellites.csv`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Satellite {
+    /// The satellite.
     pub sv: Sv,
+    /// Name of the signal.
     pub signal: &'static str,
+    /// Number of observations.
     pub observations: usize,
+    /// Its mean elevation, degrees.
     pub elevation_mean_deg: Option<f64>,
+    /// Mean of its code errors, metres.
     pub code_mean_m: Option<f64>,
+    /// Standard deviation of the code errors, metres.
     pub code_sigma_m: Option<f64>,
+    /// Standard deviation of the carrier errors, cycles.
     pub carrier_sigma_cycles: Option<f64>,
+    /// Mean of its Doppler errors, Hz.
     pub doppler_mean_hz: Option<f64>,
+    /// Standard deviation of the Doppler errors, Hz.
     pub doppler_sigma_hz: Option<f64>,
+    /// Mean error of C/N0, dB.
     pub cn0_bias_db: Option<f64>,
+    /// Standard deviation of the C/N0 errors, dB.
     pub cn0_sigma_db: Option<f64>,
+    /// Root mean square of the multipath combination, metres.
     pub multipath_rms_m: Option<f64>,
 }
 
 /// A band of elevation: a row of `elevation.csv`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Band {
+    /// Lower edge, degrees.
     pub from_deg: f64,
+    /// Upper edge, degrees.
     pub to_deg: f64,
+    /// Number of observations.
     pub observations: usize,
+    /// Root mean square of the code errors, metres.
     pub code_rms_m: Option<f64>,
+    /// Code error that 95 % stay below, metres.
     pub code_p95_m: Option<f64>,
+    /// Root mean square of the carrier errors, cycles.
     pub carrier_rms_cycles: Option<f64>,
+    /// Root mean square of the Doppler errors, Hz.
     pub doppler_rms_hz: Option<f64>,
+    /// Mean error of C/N0, dB.
     pub cn0_bias_db: Option<f64>,
+    /// Root mean square of the multipath combination, metres.
     pub multipath_rms_m: Option<f64>,
 }
 
 /// What all points come to.
 #[derive(Clone, Debug, Default)]
 pub struct Elevations {
+    /// Every satellite's signal.
     pub satellites: Vec<Satellite>,
     /// Those that have observations, from the horizon up.
     pub bands: Vec<Band>,
@@ -76,7 +102,7 @@ pub struct Elevations {
 /// The points of a satellite.
 ///
 /// # Errors
-/// [`JudgeError::Read`] where rows that were put by cannot be read.
+/// [`JudgeError::Read`] where spilled rows cannot be read.
 pub fn points(run: &Run, errors: &Errors, link: Link) -> Result<Vec<Point>, JudgeError> {
     let elevations: HashMap<u64, f64> =
         run.sky.map(link.sv, |row| (row.sample, row.elevation_deg))?.into_iter().collect();

@@ -1,4 +1,5 @@
-//! How much a series of correlated errors says: independent values, intervals of a spread, a test of normality.
+//! How much a series of correlated errors says: independent values, intervals of a spread, a test of
+//! normality.
 //!
 //! Errors of loops and of smoothed fixes remember the ones before, so that n of them count as fewer. With ρ
 //! the autocorrelation, a mean square of n normal values varies like one of n/(1 + 2Σρ²) independent ones
@@ -21,7 +22,8 @@ pub struct Correlated {
 }
 
 impl Correlated {
-    /// Autocovariance about zero: where an error's mean ought to be nothing, a lasting one is a part of the error.
+    /// Autocovariance about zero: where an error's mean ought to be nothing, a lasting one is a part of the
+    /// error.
     pub fn about_zero(groups: &[Vec<f64>]) -> Option<Self> {
         let count: usize = groups.iter().map(Vec::len).sum();
         let longest = groups.iter().map(Vec::len).max()?;

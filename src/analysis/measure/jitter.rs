@@ -4,10 +4,10 @@
 //! Raw and closed-loop figures are never mixed: a discriminator's value is noise of one integration,
 //! √(1/(2B·T)) times what the loop lets through. The theory takes the loops as the settings file describes
 //! them, controlled roots of exact bandwidth, with phase and rate fed back
-//! ([`crate::analysis::expect::theory::linear`]), and adds the scene's oscillator and the stress that the true motion
-//! puts on that same linear loop. In the tracking stage the frequency is that of the phase loop; its row
-//! judges the rate. Limits: discriminators as of early minus late power and two-quadrant arctangent; a
-//! front-end filter's rounding of the correlation is left out.
+//! ([`crate::analysis::expect::theory::linear`]), and adds the scene's oscillator and the stress that the
+//! true motion puts on that same linear loop. In the tracking stage the frequency is that of the phase loop;
+//! its row judges the rate. Limits: discriminators as of early minus late power and two-quadrant arctangent;
+//! a front-end filter's rounding of the correlation is left out.
 
 use serde::Serialize;
 
@@ -21,42 +21,59 @@ use crate::analysis::measure::independent::Correlated;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::{mean, median};
 
-/// One loop of one satellite: a row of `jitter.csv`. Sigmas and limits are in `unit`: chips, degrees or hertz.
+/// One loop of one satellite: a row of `jitter.csv`. Sigmas and limits are in `unit`: chips, degrees or
+/// hertz.
 #[derive(Clone, Debug, Serialize)]
 pub struct LinkJitter {
+    /// The satellite.
     pub sv: String,
+    /// Name of the signal.
     pub signal: &'static str,
+    /// Which loop.
     #[serde(rename = "loop")]
     pub which: Loop,
+    /// Unit of sigmas and limits: chips, degrees or hertz.
     pub unit: &'static str,
     /// As the receiver measured it, mean over what is counted here.
     pub cn0_dbhz: f64,
+    /// Time of an update, seconds.
     pub integration_s: f64,
     /// Standard deviation of the discriminator's values, and what theory says of it: noise of one integration
     /// and what the loop carries over from those before.
     pub raw_sigma: Option<f64>,
+    /// Theory of the same.
     pub raw_theory_sigma: Option<f64>,
     /// Oscillator minus truth.
     pub values: usize,
+    /// How many independent values they are worth.
     pub independent: f64,
+    /// Their mean.
     pub mean: f64,
+    /// Their standard deviation.
     pub sigma: f64,
     /// Half width of the 95 % interval of `sigma`, relative.
     pub sigma_interval: f64,
+    /// Standard deviation by theory, of thermal noise alone.
     pub thermal_theory_sigma: f64,
+    /// The same, of the oscillators alone.
     pub oscillator_theory_sigma: f64,
     /// Error that the true motion leaves in the loop without noise: root mean square, and largest.
     pub stress_rms: f64,
+    /// The largest of it.
     pub stress_max: f64,
     /// Square root of the sum of the squares of thermal, oscillator and motion.
     pub theory_sigma: f64,
+    /// Measured over theory; 1 is right.
     pub sigma_over_theory: f64,
     /// Rule of thumb for jitter alone, and what is left to it.
     pub threshold: f64,
+    /// Threshold minus sigma.
     pub margin: f64,
     /// 3σ and the largest stress, against the end of the discriminator's range.
     pub rule: f64,
+    /// The end of the range.
     pub rule_limit: f64,
+    /// Whether the rule is kept.
     pub holds: bool,
     /// Probability of a distribution so far from normal, if it were normal.
     pub normality_p: Option<f64>,
@@ -67,19 +84,26 @@ pub struct LinkJitter {
 /// Rows of all satellites.
 #[derive(Clone, Debug, Default)]
 pub struct Jitter {
+    /// A row for each loop of each satellite's signal.
     pub rows: Vec<LinkJitter>,
 }
 
 /// What all satellites' rows of one loop come to; of several thresholds the least.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Pooled {
+    /// Of the discriminator's values.
     pub raw_sigma: Option<f64>,
+    /// Theory of the same.
     pub raw_theory_sigma: Option<f64>,
+    /// Of the closed loop.
     pub sigma: f64,
+    /// Theory of the same.
     pub theory_sigma: f64,
+    /// The least of the satellites'.
     pub threshold: f64,
     /// The least of the satellites'.
     pub margin_min: f64,
+    /// Rows whose rule is broken.
     pub rules_broken: usize,
 }
 
@@ -87,7 +111,7 @@ impl Jitter {
     /// Measures every satellite that was past its pull-in for ten observations.
     ///
     /// # Errors
-    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
         let Some(settings) = Settings::of(run) else { return Ok(Self::default()) };
         let access = MultipleAccess::new(run);
@@ -132,7 +156,8 @@ impl Jitter {
     }
 }
 
-/// Stretches of observations past their pull-in, without interruption, where the scene does not expect any errors.
+/// Stretches of observations past their pull-in, without interruption, where the scene does not expect any
+/// errors.
 fn settled(all: &[SignalError], bounded: impl Fn(&SignalError) -> bool) -> Vec<Vec<SignalError>> {
     // A scene that expects them throughout is measured all the same.
     let any = all.iter().any(&bounded);

@@ -1,7 +1,7 @@
-//! Continuous waves that the receiver told of, against the interference that there was.
+//! Continuous waves that the receiver reported, against the interference that there was.
 //!
 //! The receiver makes a spectrum a second. A row of it is false where no source was on in that second. A wave
-//! is held to be told where it was on for a whole second with a J/N0 of [`LEAST_DBHZ`], which stands out of
+//! has to be reported where it was on for a whole second with a J/N0 of [`LEAST_DBHZ`], which is clear of
 //! any bin of such a spectrum. Limits: sweeps and pulses have lines too, so rows of them are neither false
 //! nor asked for.
 
@@ -13,35 +13,38 @@ use crate::analysis::read::Run;
 use crate::gnss::facts::Interference;
 use crate::gnss::record::{InterferenceRow, LineRow};
 
-/// Waves this strong have to be told: 8 dB above what shows at 2.6 Msps, for wider bins and for waves between two.
+/// Waves this strong have to be reported: 8 dB above what shows at 2.6 Msps, for wider bins and for waves
+/// between two.
 pub const LEAST_DBHZ: f64 = 45.0;
 
 /// `interference` in `summary.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Lines {
-    /// Spectra in which the receiver told of a line, and those of them in whose second nothing was on.
+    /// Spectra in which the receiver reported a line.
     pub told: usize,
+    /// Those of them in whose second nothing was on.
     pub false_told: usize,
-    /// Seconds all through which a strong continuous wave was on, and those of them that were told.
+    /// Seconds all through which a strong continuous wave was on.
     pub wave_seconds: usize,
+    /// Those of them that the receiver reported.
     pub wave_seconds_told: usize,
-    /// Largest distance in frequency of what was told from the nearest wave where nothing else was on, and
-    /// the width of the spectrum's bins.
+    /// Largest distance in frequency of a report from the nearest wave where nothing else was on, Hz.
     pub frequency_error_max_hz: Option<f64>,
+    /// Width of the spectrum's bins, Hz.
     pub resolution_hz: Option<f64>,
     /// Largest difference of its J/N0 from that wave's.
     pub jn0_error_max_db: Option<f64>,
 }
 
 impl Lines {
-    /// `None` where the receiver did not look, and where there was nothing to see and nothing told.
+    /// `None` where the receiver did not look, and where there was nothing to see and nothing reported.
     pub fn of(run: &Run) -> Option<Self> {
         let told = run.lines.as_ref()?;
         if told.is_empty() && run.interference.is_empty() {
             return None;
         }
         let rate_hz = run.scene.sample_rate_hz;
-        // The truth is written at intervals: within one of a second stands what is true of it.
+        // The truth is written at intervals: within one of a second is what is true of it.
         let ticks: BTreeSet<u64> = run.trajectory.iter().map(|row| row.sample).collect();
         let interval = ticks.iter().zip(ticks.iter().skip(1)).map(|(a, b)| b - a).min().unwrap_or(0) as f64;
         let second = |first: u64| {
@@ -113,7 +116,7 @@ mod tests {
         let text =
             fs::read_to_string(&scene).unwrap().replace("\"seed\"", "\"interference\": [{\"kind\": \"cw\"}], \"seed\"");
         fs::write(&scene, text).unwrap();
-        // On from 20 s to 30 s; the receiver misses 25 s, is 40 Hz off at 26 s and tells of something at 50 s.
+        // On from 20 s to 30 s; the receiver misses 25 s, is 40 Hz off at 26 s and reports something at 50 s.
         let wave = |tick: u64| InterferenceRow {
             sample: tick * RATE_HZ / 10,
             source: 1,

@@ -1,7 +1,7 @@
 //! Power spectral density of the samples by Welch's method.
 //!
-//! Hann window, half overlap, periodograms averaged in f64 (Welch 1967). [`crate::analysis::expect::spectrum`] says what is
-//! expected of it.
+//! Hann window, half overlap, periodograms averaged in f64 (Welch 1967).
+//! [`crate::analysis::expect::spectrum`] says what is expected of it.
 
 use std::sync::Arc;
 
@@ -25,7 +25,8 @@ pub struct Psd {
 }
 
 impl Psd {
-    /// A spectrum of `bins` frequencies (at least 8, made even) of samples at `rate_hz`; `one_sided` for real samples.
+    /// A spectrum of `bins` frequencies (at least 8, made even) of samples at `rate_hz`; `one_sided` for real
+    /// samples.
     pub fn new(rate_hz: f64, one_sided: bool, bins: usize) -> Self {
         let bins = bins.max(8).next_multiple_of(2);
         let fft = FftPlanner::new().plan_fft_forward(bins);

@@ -5,9 +5,9 @@
 //! half cycle of a Costas loop; where the count began anew (another lock) it has none. The cause is the first
 //! of these that the half second before it shows: the signal is not there or fell by [`FADE_DB`];
 //! interference takes [`JAMMED_DB`] and leaves less than the loop needs; the true motion leaves a phase error
-//! of which 3σ + θ > 45° (the loop of the receiver's settings, [`crate::analysis::expect::loops`]); noise alone breaks that
-//! rule. What is left is unexplained. Limits: causes are those that the truth's rows, a tenth of a second
-//! apart, can show.
+//! of which 3σ + θ > 45° (the loop of the receiver's settings, [`crate::analysis::expect::loops`]); noise
+//! alone breaks that rule. What is left is unexplained. Limits: causes are those that the truth's rows, a
+//! tenth of a second apart, can show.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -35,7 +35,9 @@ const SIDE: usize = 10;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
+    /// The count jumps and goes on.
     CycleSlip,
+    /// The channel gives the signal up.
     LossOfLock,
 }
 
@@ -47,10 +49,13 @@ pub enum Cause {
     NotThere,
     /// The signal was blocked or faded.
     Obstruction,
+    /// Interference was strong enough.
     Interference,
+    /// The motion was too fast for the loop.
     Dynamics,
     /// Too little C/N0 for the loop.
     WeakSignal,
+    /// Nothing in the truth explains it.
     Unexplained,
 }
 
@@ -63,10 +68,15 @@ impl Cause {
 /// A row of `slips.csv`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Slip {
+    /// Number of the sample, counted from the first one.
     pub sample: u64,
+    /// Seconds from sample 0 by the receiver's clock.
     pub time_s: f64,
+    /// The satellite.
     pub sv: String,
+    /// Name of the signal.
     pub signal: &'static str,
+    /// Slip or loss.
     pub kind: Kind,
     /// Whether the receiver said so itself.
     pub declared: bool,
@@ -74,22 +84,27 @@ pub struct Slip {
     pub size_cycles: Option<f64>,
     /// What rounding to the half cycle took away.
     pub remainder_cycles: Option<f64>,
+    /// What the truth says of its cause.
     pub cause: Cause,
     /// The evidence: least C/N0 that the scene allowed, what interference took of it, largest error that the
     /// motion leaves in the phase loop, and 3σ of its noise at that C/N0.
     pub cn0_dbhz: Option<f64>,
+    /// By how much interference lowers C/N0, dB.
     pub interference_db: Option<f64>,
+    /// Error that the motion leaves in the phase loop, degrees.
     pub motion_deg: Option<f64>,
+    /// Three standard deviations of the loop's noise, degrees.
     pub noise_3sigma_deg: Option<f64>,
 }
 
-/// The first line of `slips.csv`, which stands there without slips too.
+/// The first line of `slips.csv`, which is there without slips too.
 pub(in crate::analysis) const COLUMNS: &str = "sample,time_s,sv,signal,kind,declared,size_cycles,remainder_cycles,cause,cn0_dbhz,interference_db,\
                        motion_deg,noise_3sigma_deg\n";
 
 /// All slips and losses of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Slips {
+    /// All, in the order of time.
     pub rows: Vec<Slip>,
 }
 
@@ -97,7 +112,7 @@ impl Slips {
     /// Finds them.
     ///
     /// # Errors
-    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn find(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
         let evidence = Evidence::new(run);
         let lost = run.events.iter().filter(|row| row.event == Event::LossOfLock);
@@ -279,7 +294,7 @@ impl<'r> Evidence<'r> {
             let cn0_hz = libm::pow(10.0, dbhz / 10.0);
             3.0 * pll::jitter_rad(settings.pll_bandwidth_hz, update_s, cn0_hz).to_degrees()
         });
-        // No row within an interval and a half before: it has set, or something stands before it.
+        // No row within an interval and a half before: it has set, or something obstructs it.
         let before = rows.iter().rev().find(|row| row.sample <= sample);
         let absent = before.is_none_or(|row| time_s - run.time_s(row.sample) > 1.5 * self.interval_s);
         let gone = (near.len() < 2 || absent) && sample < self.last;

@@ -1,7 +1,7 @@
 //! What a spoofer did to the fixes: how far from the truth they went, and how near to its claim.
 //!
 //! A fix counts as captured when it lies nearer to what the first spoofer claims than to the truth and the
-//! two are further apart than the fixes' own scatter can tell. Limits: one spoofer; its clock is not judged.
+//! two are further apart than the fixes' own scatter. Limits: one spoofer; its clock is not judged.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::percentile;
 
-/// Distance between truth and claim from which on a fix can be told to be at one of them.
+/// Distance between truth and claim from which on a fix can be assigned to one of them.
 pub const APART_M: f64 = 20.0;
 
 /// `spoofing` in `summary.json`.
@@ -29,9 +29,13 @@ pub struct Spoofing {
 /// One fix while the spoofer was on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moved {
+    /// Seconds from sample 0 by the receiver's clock.
     pub time_s: f64,
+    /// Distance of the fix from the truth, metres.
     pub from_truth_m: f64,
+    /// Distance of the fix from what the spoofer claims, metres.
     pub from_claim_m: f64,
+    /// Distance of the claim from the truth, metres.
     pub claim_from_truth_m: f64,
 }
 

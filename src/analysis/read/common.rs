@@ -1,4 +1,5 @@
-//! What all satellites' signals have in common in the samples beside the receiver's clock, as the truth knows it.
+//! What all satellites' signals have in common in the samples beside the receiver's clock, as the truth knows
+//! it.
 //!
 //! A front end's filter delays every code by its group delay; a local oscillator off its frequency shifts
 //! every carrier; an antenna that turns winds up every carrier. A receiver that measures them is right: they

@@ -41,7 +41,8 @@ pub fn code_delay_s(filter: &FilterSpec, code: &Waveform, sample_rate_hz: f64, s
     0.5 * (low_s + high_s) - 0.5 / sample_rate_hz
 }
 
-/// Response of the low-pass prototype at a frequency in units of its cut-off; its poles lie on the unit circle.
+/// Response of the low-pass prototype at a frequency in units of its cut-off; its poles lie on the unit
+/// circle.
 fn butterworth(order: u32, x: f64) -> Complex64 {
     let n = f64::from(order);
     (0..order).fold(Complex64::ONE, |gain, k| {

@@ -12,6 +12,7 @@ use crate::gnss::signal::{Link, Signal};
 /// A signal on a carrier: that of all satellites, or of those that share a channel of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Emission {
+    /// The signal.
     pub signal: &'static Signal,
     /// Frequencies are positive, so that their bits have their order.
     carrier: u64,
@@ -37,12 +38,17 @@ impl Emission {
 /// A satellite's signal on average over the run.
 #[derive(Clone, Copy, Debug)]
 pub struct MeanSignal {
+    /// The satellite.
     pub sv: Sv,
+    /// The signal.
     pub signal: &'static Signal,
     /// Carrier as received, and as sent.
     pub carrier_hz: f64,
+    /// Carrier as sent, Hz.
     pub nominal_hz: f64,
+    /// Mean power over noise density, Hz.
     pub cn0_hz: f64,
+    /// Mean of the decibels, dB-Hz.
     pub cn0_mean_dbhz: f64,
 }
 

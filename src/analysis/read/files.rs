@@ -1,4 +1,5 @@
-//! The files of a run: tables row by row, and JSON; a file that is missing is named together with what would write it.
+//! The files of a run: tables row by row, and JSON; a file that is missing is named together with what would
+//! write it.
 
 use std::fs;
 use std::io;
@@ -12,7 +13,8 @@ pub(super) fn missing(path: &Path, remedy: &'static str) -> JudgeError {
     JudgeError::Missing { path: path.to_owned(), remedy }
 }
 
-/// Gives every row of a CSV file to `take`, with the number of its line; a file without even a header has none.
+/// Gives every row of a CSV file to `take`, with the number of its line; a file without even a header has
+/// none.
 pub(super) fn each<T: DeserializeOwned>(
     path: &Path,
     remedy: &'static str,

@@ -17,7 +17,9 @@ use crate::gnss::time::Epoch;
 pub struct PlaceFix {
     /// As the receiver labels it, in GPS time.
     pub label: Epoch,
+    /// Place, Earth-fixed, metres.
     pub position_m: Vector3<f64>,
+    /// Satellites used.
     pub satellites: u32,
     /// Speed over ground and course from north over east, of the RMC with the same time.
     pub ground_mps_rad: Option<(f64, f64)>,
@@ -26,6 +28,7 @@ pub struct PlaceFix {
 /// A file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Places {
+    /// In the order of the file.
     pub fixes: Vec<PlaceFix>,
     /// Sentences that say that there is no fix.
     pub without_fix: usize,

@@ -16,13 +16,17 @@ use crate::gnss::time::Epoch;
 /// What one satellite's signal gave at one epoch; a blank or a zero in the file is `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Values {
+    /// Pseudorange, metres.
     pub pseudorange_m: Option<f64>,
+    /// Carrier, cycles.
     pub carrier_cycles: Option<f64>,
     /// Bit 0 of the phase's loss-of-lock indicator: its count is broken since the epoch before.
     pub lost_lock: bool,
     /// Bit 1: half a cycle may be missing.
     pub half_cycle_ambiguous: bool,
+    /// Doppler, Hz; positive where the satellite comes nearer.
     pub doppler_hz: Option<f64>,
+    /// C/N0, dB-Hz.
     pub cn0_dbhz: Option<f64>,
 }
 
@@ -40,6 +44,7 @@ pub struct ObservedEpoch {
 pub struct Observations {
     /// `PGM` and `REC # / TYPE / VERS`, to say whose file it is.
     pub receiver: String,
+    /// In the order of the file.
     pub epochs: Vec<ObservedEpoch>,
     /// Event records passed over.
     pub events: usize,
@@ -246,7 +251,7 @@ fn satellite(line: &str, at: usize, header: &Header, all: &mut BTreeMap<(Sv, Str
         let value = value.ok_or_else(|| {
             fault(at, format!("{sv} {code} = '{text}': expected a number in columns {} to {}", from + 1, from + 14))
         })?;
-        // A zero stands for no observation (RINEX 3.05, 6.7).
+        // A zero means no observation (RINEX 3.05, 6.7).
         if value == 0.0 {
             continue;
         }

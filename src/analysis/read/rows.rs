@@ -1,4 +1,4 @@
-//! How the rows of a run's long tables lie on a [`super::SpillStore`].
+//! How the rows of a run's long tables are put into a [`super::spill_store::SpillStore`].
 
 use crate::analysis::read::spill_store::{SpillRow, Words};
 use crate::gnss::record::{Observation, RayRow, SkyRow, TrackingRow};

@@ -1,8 +1,8 @@
 //! Everything that a run wrote, read once.
 //!
 //! Truth and estimate are CSV files of the rows in [`crate::gnss::record`]; the scene and the receiver's
-//! settings are JSON. Tables with a row for every satellite of every epoch lie on directory, satellite by
-//! satellite; those with a row an epoch, and shorter ones, are held.
+//! settings are JSON. Tables with a row for every satellite of every epoch go to spill stores, grouped by
+//! satellite; those with a row an epoch, and shorter ones, stay in memory.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
@@ -28,10 +28,15 @@ use crate::gnss::signal::{Link, Signal};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Speed {
+    /// Seconds of signal that the generator made in a second.
     pub generate_x_real_time: Option<f64>,
+    /// Seconds of signal that the receiver took in a second.
     pub receive_x_real_time: Option<f64>,
+    /// Seconds of signal that both did in a second, side by side.
     pub run_x_real_time: Option<f64>,
+    /// Time of all processors, seconds.
     pub cpu_s: Option<f64>,
+    /// Largest memory of the process, MiB.
     pub peak_memory_mib: Option<f64>,
 }
 
@@ -46,12 +51,15 @@ pub struct PsdRow {
 
 /// A run as read.
 pub struct Run {
+    /// Facts of the scene.
     pub scene: SceneFacts,
     /// The whole of `truth/scene.json`.
     pub scene_json: Value,
     /// The scene as it was written, where the run kept it.
     pub scenario: Option<String>,
+    /// True observations.
     pub truth: SpillStore<Link, Observation>,
+    /// Where the satellites are, and what delays their signals.
     pub sky: SpillStore<Sv, SkyRow>,
     /// The truth's signals.
     pub signals: BTreeSet<&'static Signal>,
@@ -65,30 +73,41 @@ pub struct Run {
     pub common: Common,
     /// Largest delays of the atmosphere.
     pub ionosphere_m: f64,
+    /// Largest delay of the troposphere, metres.
     pub troposphere_m: f64,
     /// The mean of each satellite's true signal.
     pub expected: Vec<MeanSignal>,
     /// Reflected rays; none in a scene without multipath.
     pub rays: SpillStore<Link, RayRow>,
+    /// The antenna's true places.
     pub trajectory: Vec<TrajectoryRow>,
+    /// Parameters as sent.
     pub truth_navigation: Vec<NavigationRow>,
     /// Empty without interference.
     pub interference: Vec<InterferenceRow>,
     /// What the first spoofer claims; empty without one.
     pub claimed: Vec<TrajectoryRow>,
+    /// The receiver's observations.
     pub observations: SpillStore<Link, Observation>,
+    /// The receiver's fixes.
     pub fixes: Vec<Fix>,
+    /// What its search found.
     pub acquisition: Vec<AcquisitionRow>,
+    /// Its loops' updates.
     pub tracking: SpillStore<Link, TrackingRow>,
     /// Median time of the loops' updates.
     pub update_s: Option<f64>,
+    /// Parameters as it decoded them.
     pub navigation: Vec<NavigationRow>,
+    /// What happened to its channels.
     pub events: Vec<EventRow>,
-    /// What the receiver told of lines in the spectrum; `None` of one that does not look.
+    /// What the receiver reported of lines in the spectrum; `None` of one that does not look.
     pub lines: Option<Vec<LineRow>>,
     /// `rx/receiver.json`, or null when there is none.
     pub receiver: Value,
+    /// Spectrum of the samples; empty where it was not estimated.
     pub psd: Vec<PsdRow>,
+    /// How fast the stages ran.
     pub speed: Speed,
 }
 
@@ -99,7 +118,7 @@ const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RU
 
 impl Run {
     /// Reads a run's directory. `psd.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json` may be
-    /// missing. What is too long for memory is put by in a file without a name there.
+    /// missing. Tables that are too long for memory spill to an unnamed file there.
     pub fn read(run: &Path) -> Result<Self, JudgeError> {
         Self::read_parts(run, &run.join("truth"), &run.join("rx"))
     }
@@ -238,8 +257,7 @@ impl Run {
         median(&steps.collect::<Vec<_>>()).unwrap_or(0.0)
     }
 
-    /// What [`Self::read`] does to the scene's facts: an IF above half the rate of real samples becomes the
-    /// one at which they hold it.
+    /// Folds an IF above half the rate of real samples to its alias.
     ///
     /// # Errors
     /// Signals that samples hold in different multiples of half the rate.
@@ -271,7 +289,7 @@ impl Run {
     }
 }
 
-/// Observations on a store, each shown to `see`.
+/// Observations in a spill store, each shown to `see`.
 fn observations(
     path: &Path,
     remedy: &'static str,

@@ -1,10 +1,9 @@
-//! Rows of one kind, parted by satellite, most of them in a file: a long run takes no more memory than a short one.
+//! Row store grouped by satellite that spills to disk: a long run takes no more memory than a short one.
 //!
-//! Tables come epoch by epoch and are wanted satellite by satellite. A [`SpillStore`] collects the rows of each
-//! key until there are 256 of them, then moves them as plain words to the end of a file that has no name, so
-//! that nothing stays when the process ends, however it ends. What few rows there are never leave memory.
-//! Limits: the rows of one key are read all at once; rows of a key keep their order, rows of different keys
-//! do not.
+//! Tables come epoch by epoch and are needed satellite by satellite. A [`SpillStore`] collects the rows of
+//! each key until there are 256 of them, then appends them as plain words to a file without a name, which the
+//! system removes when the process ends, however it ends. Groups under 256 rows stay in memory. Limits: the
+//! rows of one key are read all at once; rows of a key keep their order, rows of different keys do not.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -17,7 +16,7 @@ use crate::analysis::error::JudgeError;
 /// Rows of a key that are kept in memory.
 const MOST_ROWS: usize = 256;
 
-/// What can lie on a store: a row as words of 64 bits, its key left out.
+/// What a store can take: a row as words of 64 bits, its key left out.
 pub trait SpillRow<K>: Sized {
     /// Words of a row.
     const WORDS: usize;

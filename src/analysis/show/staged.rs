@@ -1,8 +1,10 @@
-//! Files and directories in the making: written under a name of their own, renamed when they are whole, else removed.
+//! Staged files and directories: written under a temporary name, renamed when they are complete, else
+//! removed.
 //!
-//! The process knows all of them, so that a signal can take them away at any moment ([`abandon`]); beginning, finishing
-//! and abandoning exclude each other. Limits: the contents of a directory are its maker's affair, and a process that is
-//! killed leaves what it was making to be swept by whoever makes it next.
+//! The process keeps a list of all of them, so that the interrupt handler can remove them at any moment
+//! ([`abandon`]). Beginning, finishing and abandoning exclude each other. Limits: what is in a directory is
+//! its writer's concern. A process that is killed leaves its staged file, which the next one of that name
+//! removes.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -23,17 +25,17 @@ fn known() -> Known {
     KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A file or directory in the making; dropped before it is finished, it vanishes.
+/// A staged file or directory; dropped before it is finished, it is removed.
 #[derive(Debug)]
 pub struct Staged {
     path: PathBuf,
 }
 
 impl Staged {
-    /// Begins a file, in place of what stands there: links are removed and never followed.
+    /// Begins a file, in place of what is there: links are removed and never followed.
     ///
     /// # Errors
-    /// What stands there and cannot be removed; a file that cannot be created.
+    /// What is there and cannot be removed; a file that cannot be created.
     pub fn file(path: PathBuf) -> io::Result<(Self, File)> {
         let mut known = known();
         remove(&path)?;
@@ -42,7 +44,7 @@ impl Staged {
         Ok((Self { path }, file))
     }
 
-    /// Begins a directory, in place of what stands there.
+    /// Begins a directory, in place of what is there.
     ///
     /// # Errors
     /// As [`Self::file`].
@@ -67,7 +69,8 @@ impl Staged {
         let mut known = known();
         let old = aside(&self.path);
         remove(&old)?;
-        // A directory cannot be renamed over a full one, and removing that piece by piece would leave half of it.
+        // A directory cannot be renamed over a full one, and removing that piece by piece would leave half of
+        // it.
         let replaces = fs::symlink_metadata(&self.path)?.is_dir() && present(target)?;
         if replaces {
             fs::rename(target, &old)?;
@@ -95,7 +98,8 @@ impl Drop for Staged {
     }
 }
 
-/// Removes everything in the making, and lets nothing be begun or finished from then on: the caller ends the process.
+/// Removes everything that is staged, and lets nothing be begun or finished from then on: the caller ends the
+/// process.
 pub fn abandon() {
     let known = known();
     for _ in 0..ROUNDS {

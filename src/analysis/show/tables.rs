@@ -114,7 +114,8 @@ pub(in crate::analysis) fn write_slips(directory: &Path, slips: &Slips) -> Resul
     if slips.rows.is_empty() { write_whole(&path, COLUMNS.as_bytes()) } else { write_rows(&path, slips.rows.iter()) }
 }
 
-/// Writes `errors.csv`, `position.csv`, `histograms.csv`, `psd_theory.csv` and `verdict.csv` into a run's directory.
+/// Writes `errors.csv`, `position.csv`, `histograms.csv`, `psd_theory.csv` and `verdict.csv` into a run's
+/// directory.
 pub(in crate::analysis) fn write(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let mut errors = Table::create(&directory.join("errors.csv"))?;
     for link in judged.errors.signals.keys() {

@@ -17,18 +17,25 @@ use crate::analysis::show::write::{write_rows, write_whole};
 /// One setting and what was measured for it; errors are against the `reference` level.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TradeRow {
+    /// Name of the scene.
     pub scene: String,
+    /// Samples a second, millions.
     pub sample_rate_msps: f64,
     /// A level's name, or the knob and its value.
     pub setting: String,
+    /// Edges of chips, by name.
     pub code_edge: String,
+    /// Arithmetic of the carrier, by name.
     pub carrier: String,
+    /// Largest error of a carrier between knots, cycles.
     pub knot_tolerance_cycles: f64,
     /// Time for one sample of one satellite on one core, the whole generator included.
     pub ns: f64,
     /// Pseudorange error over 20 ms pieces: largest mean of a satellite, spread about the means, largest.
     pub pseudorange_mean_m: f64,
+    /// Standard deviation of the pseudoranges against the reference, metres.
     pub pseudorange_sigma_m: f64,
+    /// The largest of them, metres.
     pub pseudorange_max_m: f64,
     /// Largest error of the carrier over 1 ms.
     pub carrier_cycles: f64,
@@ -76,7 +83,8 @@ impl fmt::Display for TradeRow {
     }
 }
 
-/// One width of samples and quality of noise, against single-precision samples with noise in double precision.
+/// One width of samples and quality of noise, against single-precision samples with noise in double
+/// precision.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Width {
     /// Format, what its noise was computed in, converter.
@@ -85,6 +93,7 @@ pub struct Width {
     pub bytes: usize,
     /// Time for a sample of the whole scene on one core, and the part of noise, converter and the wider file.
     pub ns: f64,
+    /// Time of the stages, nanoseconds a sample.
     pub stages_ns: f64,
     /// Root mean square of what differs, beside that of the samples.
     pub sample_error: f64,
@@ -92,6 +101,7 @@ pub struct Width {
     pub cn0_loss_db: f64,
     /// What the code moved by, over pieces of 20 ms: mean and spread.
     pub code_mean_m: f64,
+    /// Standard deviation of the receiver's code, metres.
     pub code_sigma_m: f64,
 }
 
@@ -136,7 +146,8 @@ pub fn write_widths(directory: &Path, rows: &[Width], machine: &str) -> Result<(
     write_whole(&directory.join("widths.md"), text.as_bytes())
 }
 
-/// Whether row `index` is beaten or equalled in cost and error by another of its scene, and beaten in one of them.
+/// Whether row `index` is beaten or equalled in cost and error by another of its scene, and beaten in one of
+/// them.
 pub fn dominated(rows: &[TradeRow], index: usize) -> bool {
     let Some(row) = rows.get(index) else { return false };
     let error = row.pseudorange_m();
@@ -146,7 +157,8 @@ pub fn dominated(rows: &[TradeRow], index: usize) -> bool {
     })
 }
 
-/// Writes `trade.csv`, `trade.md` and `trade.png` into a directory; `preface` is the machine, the flags and the date.
+/// Writes `trade.csv`, `trade.md` and `trade.png` into a directory; `preface` is the machine, the flags and
+/// the date.
 ///
 /// # Errors
 /// [`JudgeError`] with the file that could not be written.

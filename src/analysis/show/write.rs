@@ -10,10 +10,10 @@ use serde::Serialize;
 use super::staged::Staged;
 use crate::analysis::error::JudgeError;
 
-/// A CSV file in the making.
+/// A CSV file that is still being written.
 pub(crate) struct Table {
     path: PathBuf,
-    making: Staged,
+    staged: Staged,
     rows: csv::Writer<File>,
 }
 
@@ -21,8 +21,8 @@ impl Table {
     /// Begins one, which gets its name when it is finished.
     pub fn create(path: &Path) -> Result<Self, JudgeError> {
         let begun = Staged::file(part(path)).map_err(|source| JudgeError::File { path: path.to_owned(), source });
-        let (making, file) = begun?;
-        Ok(Self { path: path.to_owned(), making, rows: csv::Writer::from_writer(file) })
+        let (staged, file) = begun?;
+        Ok(Self { path: path.to_owned(), staged, rows: csv::Writer::from_writer(file) })
     }
 
     /// Adds a row.
@@ -41,7 +41,7 @@ impl Table {
 
     /// Gives it its name.
     pub fn finish(mut self) -> Result<(), JudgeError> {
-        let finished = self.rows.flush().and_then(|()| self.making.finish(&self.path));
+        let finished = self.rows.flush().and_then(|()| self.staged.finish(&self.path));
         finished.map_err(|source| JudgeError::File { path: self.path, source })
     }
 }
@@ -64,9 +64,9 @@ fn part(path: &Path) -> PathBuf {
 /// Writes a file so that a reader sees the old one or the new one, never a part.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), JudgeError> {
     Staged::file(part(path))
-        .and_then(|(making, mut file)| {
+        .and_then(|(staged, mut file)| {
             file.write_all(bytes)?;
-            making.finish(path)
+            staged.finish(path)
         })
         .map_err(|source| JudgeError::File { path: path.to_owned(), source })
 }

@@ -64,7 +64,8 @@ pub enum FilterShape {
 /// Gain and phase of one quadrature against the other, and direct current.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BalanceSpec {
-    /// Power of the mirrored spectrum relative to the spectrum, dB; absent where the quadratures are balanced.
+    /// Power of the mirrored spectrum relative to the spectrum, dB; absent where the quadratures are
+    /// balanced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image_db: Option<f64>,
     /// Power of the line of direct current, LSB².

@@ -1,7 +1,7 @@
 //! Waveforms of interference, as far as their spectra need them.
 //!
-//! In `scene.json` each source is an object whose key `kind` names its waveform. A kind that is not known here
-//! is refused by name.
+//! In `scene.json` each source is an object whose key `kind` names its waveform. A kind that is not known
+//! here is refused by name.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,9 +1,9 @@
-//! Facts of a scene that generator and judge share: what is in its samples, what it expects of a receiver, and
-//! what is wrong with its satellites.
+//! Facts of a scene that generator and judge share: what is in its samples, what it expects of a receiver,
+//! and what is wrong with its satellites.
 //!
-//! They lie in `truth/scene.json` ([`SceneFacts`]), so that a run can be judged wherever it is. No receiver reads
-//! them. Both sides use these types: a name that one side does not know is refused, not taken for a default.
-//! Times are seconds from the scene's first sample.
+//! They lie in `truth/scene.json` ([`SceneFacts`]), so that a run can be judged wherever it is. No receiver
+//! reads them. Both sides use these types: a name that one side does not know is refused, not taken for a
+//! default. Times are seconds from the scene's first sample.
 
 mod front_end;
 mod interference;

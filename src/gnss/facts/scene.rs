@@ -63,7 +63,8 @@ pub struct SceneFacts {
     /// Arithmetic of the noise, by name.
     #[serde(default)]
     pub noise_arithmetic: String,
-    /// Standard deviation of the thermal noise per component, in LSB: the gain, also of a scene without noise.
+    /// Standard deviation of the thermal noise per component, in LSB: the gain, also of a scene without
+    /// noise.
     #[serde(default)]
     pub noise_lsb: Option<f64>,
     /// Stages of the front end, in order; of several front ends, those of the first.

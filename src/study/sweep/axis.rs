@@ -1,8 +1,8 @@
 //! Axes as written, and the grid of cases that they span.
 //!
-//! Zipped axes step together and count as one. Case i is mixed radix, slowest first: axes that change the signal in the
-//! order written, then repetitions, then axes that only change the receiver; so cases that share a signal are
-//! neighbours. Limits: ten million cases, a hundred thousand values an axis.
+//! Zipped axes step together and count as one. Case i is mixed radix, slowest first: axes that change the
+//! signal in the order written, then repetitions, then axes that only change the receiver; so cases that
+//! share a signal are neighbours. Limits: ten million cases, a hundred thousand values an axis.
 
 use std::path::Path;
 
@@ -20,12 +20,15 @@ const MOST_VALUES: usize = 100_000;
 /// One axis: a key of the base and the values that it takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
+    /// Key of the scene, the settings or the channel that it sets.
     pub key: String,
+    /// Its values in order.
     pub values: Vec<Value>,
     /// Axes with the same word step together.
     pub zip: Option<String>,
     /// What plots call it in place of the key.
     pub label: Option<String>,
+    /// Where the file names it.
     pub place: Place,
 }
 
@@ -70,7 +73,8 @@ impl Axis {
         self.values.iter().all(|value| number_of(value).is_some())
     }
 
-    /// What plots call its value of this rank: a scene goes by its file's name alone where no other has the same.
+    /// What plots call its value of this rank: a scene goes by its file's name alone where no other has the
+    /// same.
     pub fn words_of(&self, rank: usize) -> String {
         let text = self.values.get(rank).map_or_else(String::new, text_of);
         let stem = |text: &str| Path::new(text).file_stem().map(|stem| stem.to_string_lossy().into_owned());
@@ -144,6 +148,7 @@ pub fn number_of(value: &Value) -> Option<f64> {
 pub struct Digit {
     /// Numbers of the axes in the study's list.
     pub axes: Vec<usize>,
+    /// How many values it has.
     pub length: usize,
 }
 
@@ -152,14 +157,18 @@ pub struct Digit {
 pub struct Grid {
     /// Slowest first.
     pub signal: Vec<Digit>,
+    /// Cases with equal values and seeds of their own.
     pub repetitions: u64,
+    /// Axes of the receiver's settings: cases that differ in them alone share samples.
     pub receiver: Vec<Digit>,
 }
 
-/// Where a case stands.
+/// Where a case is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Case {
+    /// Counted from 0 over the whole study.
     pub number: u64,
+    /// Which of the repetitions, from 0.
     pub repetition: u64,
     /// For each axis of the study, the number of its value.
     pub at: Vec<usize>,
@@ -170,7 +179,7 @@ fn product(digits: &[Digit]) -> Option<u64> {
 }
 
 impl Grid {
-    /// The grid of `axes`; `changes_signal` tells which keys do more than change the receiver.
+    /// The grid of `axes`; `changes_signal` says which keys do more than change the receiver.
     ///
     /// # Errors
     /// Axes that are zipped though they differ in length, too many cases; with the number of the axis.

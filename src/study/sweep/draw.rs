@@ -25,8 +25,11 @@ use crate::analysis::show::plot::canvas::{
 pub struct Picture {
     /// Name of its file, without an ending.
     pub stem: String,
+    /// Words above all charts.
     pub title: String,
+    /// Its charts.
     pub charts: Vec<Chart>,
+    /// Series that are named below them.
     pub legend: Vec<Series>,
     /// For crossings: names of the columns, and rows.
     pub crossings: Option<(Vec<String>, Vec<Vec<String>>)>,
@@ -82,7 +85,7 @@ pub fn pictures(results: &Results) -> Vec<Picture> {
 
 /// Values of an axis that are written under it at most.
 const MOST_TICKS: usize = 10;
-/// From one series to the next where names stand on the axis, in steps of the names.
+/// From one series to the next where names are on the axis, in steps of the names.
 const NAMED_STEP: f64 = 0.12;
 
 /// What of the results a plot shows.
@@ -152,7 +155,7 @@ impl View<'_> {
         cell.estimates.get(self.figure).copied().flatten()
     }
 
-    /// Where a cell stands on an axis: its number, or its rank where values are none; logarithms if asked for.
+    /// Where a cell is on an axis: its number, or its rank where values are none; logarithms if asked for.
     fn place(&self, cell: &Cell, key: &str, log: bool) -> Option<f64> {
         let axis = self.results.axis(key)?;
         let numbers = self.axis(axis)?.is_of_numbers();

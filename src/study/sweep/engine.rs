@@ -18,7 +18,9 @@ use super::{StudyError, plan, sampled, temporary};
 /// What there is of a study.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Status {
+    /// Numbers of shards that are there and whole.
     pub whole: Vec<u32>,
+    /// Numbers of shards that are not there.
     pub missing: Vec<u32>,
     /// Among the missing: those that are there and cannot be used, and why.
     pub bad: Vec<(u32, String)>,
@@ -47,7 +49,9 @@ pub fn status(plan: &Plan) -> Result<Status, StudyError> {
 /// What a run came to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ran {
+    /// Shards that were made.
     pub shards: u32,
+    /// Cases in them.
     pub cases: u64,
 }
 
@@ -58,7 +62,7 @@ struct Making {
     state: Mutex<(Vec<Option<CaseFigures>>, u64)>,
 }
 
-/// Runs these shards; `progress` hears how many of their cases are done.
+/// Runs these shards; `progress` gets how many of their cases are done.
 ///
 /// # Errors
 /// The first case or file that fails. What was committed stays.

@@ -2,7 +2,7 @@
 //!
 //! `ensemble = [axis, …]` names the axes that keep ensembles apart; all others are pooled. One case counts
 //! once, however long it is, so that the intervals are those of independent runs. Percentiles are of the
-//! cases that have the figure, and how many have it stands beside them.
+//! cases that have the figure, and how many have it is given beside them.
 
 use super::StudyError;
 use super::estimate::Estimate;
@@ -15,8 +15,11 @@ use crate::analysis::statistics::{median, percentile};
 pub struct Spread {
     /// Mean and its 95 % interval, of the cases that have the figure.
     pub estimate: Estimate,
+    /// Half of the values are below.
     pub median: f64,
+    /// 95 % of the values are below.
     pub p95: f64,
+    /// The largest value.
     pub largest: f64,
 }
 
@@ -37,6 +40,7 @@ impl Spread {
 pub struct Ensemble {
     /// Of each axis named, the number of its value.
     pub at: Vec<usize>,
+    /// Cases of the ensemble.
     pub cases: u64,
     /// Of each kept figure.
     pub spreads: Vec<Option<Spread>>,

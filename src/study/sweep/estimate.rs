@@ -1,4 +1,4 @@
-//! What repetitions say: a mean and the interval that holds the true one with 95 % confidence.
+//! What repetitions say: a mean and the interval that contains the true one with 95 % confidence.
 //!
 //! Numbers: Student's t. Of figures that are 0 or 1 in every repetition (held, detected), Wilson's score
 //! interval (1927), whose coverage does not collapse at 0 and 1 as that of the normal approximation does.
@@ -9,12 +9,14 @@
 pub struct Estimate {
     /// Repetitions that have a value.
     pub count: u64,
+    /// Mean of the cases.
     pub mean: f64,
     /// `None` for one repetition.
     pub interval: Option<(f64, f64)>,
 }
 
-/// Two-sided 95 % point of Student's t for 1 to 30 degrees of freedom (e.g. NIST/SEMATECH e-Handbook, 1.3.6.7.2).
+/// Two-sided 95 % point of Student's t for 1 to 30 degrees of freedom (e.g. NIST/SEMATECH e-Handbook,
+/// 1.3.6.7.2).
 const T95: [f64; 30] = [
     12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131, 2.120,
     2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056, 2.052, 2.048, 2.045, 2.042,

@@ -1,5 +1,6 @@
-//! Scripts that hand the missing shards to an engine. Exactly once is not the engine's matter but the shards'; a
-//! script says which exit codes may pass by themselves (75, and deaths by a signal) and are worth another try.
+//! Scripts that hand the missing shards to an engine. Exactly once is not the engine's matter but the
+//! shards'; a script says which exit codes may pass by themselves (75, and deaths by a signal) and are worth
+//! another try.
 
 use super::StudyError;
 use super::plan::Plan;

@@ -93,10 +93,12 @@ impl<'r> Fixes<'r> {
         Some((after.enu_m - before.enu_m, before.fix))
     }
 
-    /// When the last of subframes 1 to 3 that begins [`LOCK_S`] after the start or later has come from all satellites.
+    /// When the last of subframes 1 to 3 that begins [`LOCK_S`] after the start or later has come from all
+    /// satellites.
     fn ready_s(&self) -> Option<f64> {
         let first = self.run.trajectory.first()?;
-        // Of the week's 20 160 frames each begins at a multiple of 30 s of GPS time, which 1980's seconds are too.
+        // Of the week's 20 160 frames each begins at a multiple of 30 s of GPS time, which 1980's seconds are
+        // too.
         let lock_s = first.time().seconds().rem_euclid(FRAME_S as i64) as f64 + first.time().fraction() + LOCK_S;
         let end_s = |number: f64| {
             let begin_s = SUBFRAME_S * number;

@@ -1,4 +1,5 @@
-//! Studies: a base scene, axes and repetitions become a table of figures, in shards that survive what kills a run.
+//! Studies: a base scene, axes and repetitions become a table of figures, in shards that survive what kills a
+//! run.
 //!
 //! [`spec`] is STUDY.toml as written, [`axis`] its grid: case i follows from mixed radix, so no list of cases
 //! exists. A case is run by [`model`] (the loops on modelled correlations) or [`sampled`] (samples streamed
@@ -45,44 +46,117 @@ use crate::receiver::output::OutputError;
 /// Why a study cannot be planned, run or merged.
 #[derive(Debug, Error)]
 pub enum StudyError {
+    /// The study's file is not as its keys ask.
     #[error(transparent)]
     Text(#[from] ScenarioError),
+    /// A value of an axis is not one that its key can have.
     #[error("{place}: axis {key} = {value}: {reason}")]
-    Axis { place: Place, key: String, value: String, reason: String },
+    Axis {
+        /// Where the file names it.
+        place: Place,
+        /// The key.
+        key: String,
+        /// The value as written.
+        value: String,
+        /// Why, in words.
+        reason: String,
+    },
+    /// A case's values together make no scene or no settings.
     #[error("{origin}: case {case} ({values}): {reason}")]
-    Case { origin: String, case: u64, values: String, reason: String },
-    /// Data that no repetition will mend.
+    Case {
+        /// The study's file.
+        origin: String,
+        /// Number of the case.
+        case: u64,
+        /// The case's values, as written.
+        values: String,
+        /// Why, in words.
+        reason: String,
+    },
+    /// Data that no repetition will mend: a file that the study names cannot be used.
     #[error("{}: {reason}", path.display())]
-    Input { path: PathBuf, reason: String },
+    Input {
+        /// The file or directory.
+        path: PathBuf,
+        /// Why, in words.
+        reason: String,
+    },
+    /// A file cannot be read.
     #[error("cannot read {}: {source}", path.display())]
-    Read { path: PathBuf, source: io::Error },
+    Read {
+        /// The file or directory.
+        path: PathBuf,
+        /// What the system or the parser reports.
+        source: io::Error,
+    },
+    /// A file or directory cannot be made.
     #[error("cannot create {}: {source}", path.display())]
-    Create { path: PathBuf, source: io::Error },
+    Create {
+        /// The file or directory.
+        path: PathBuf,
+        /// What the system or the parser reports.
+        source: io::Error,
+    },
+    /// A file cannot be written.
     #[error("cannot write {}: {source}", path.display())]
-    Write { path: PathBuf, source: io::Error },
+    Write {
+        /// The file or directory.
+        path: PathBuf,
+        /// What the system or the parser reports.
+        source: io::Error,
+    },
+    /// The directory holds something else.
     #[error("{} {reason}", path.display())]
-    Occupied { path: PathBuf, reason: String },
+    Occupied {
+        /// The file or directory.
+        path: PathBuf,
+        /// Why, in words.
+        reason: String,
+    },
+    /// A shard that was made again differs from the one that is there.
     #[error(
         "{} is there with other bytes than were computed now: the study is not reproducible on these machines; compare \
          their builds and remove the wrong file",
         path.display()
     )]
-    NotReproducible { path: PathBuf },
+    NotReproducible {
+        /// The file or directory.
+        path: PathBuf,
+    },
+    /// Shards are missing.
     #[error("{missing} of {shards} shards are missing: {list}")]
-    Incomplete { missing: usize, shards: u32, list: String },
+    Incomplete {
+        /// How many.
+        missing: usize,
+        /// How many there are in all.
+        shards: u32,
+        /// Numbers of the missing ones.
+        list: String,
+    },
+    /// The plan has no such shard.
     #[error("shard {shard}: expected 0 to {last}")]
-    NoSuchShard { shard: u32, last: u32 },
+    NoSuchShard {
+        /// The number asked for.
+        shard: u32,
+        /// The largest number.
+        last: u32,
+    },
     /// As another case had failed.
     #[error("stopped")]
     Stopped,
+    /// The generator failed.
     #[error(transparent)]
     Generate(#[from] GenerateError),
+    /// The receiver failed.
     #[error(transparent)]
     Receive(#[from] ReceiveError),
+    /// The receiver's results cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// The judge failed.
     #[error(transparent)]
     Judge(#[from] JudgeError),
+    /// A fault of this program.
     #[error("{0}")]
     Bug(String),
 }

@@ -1,6 +1,7 @@
-//! A case at correlator level: the receiver's own loops on modelled correlations, thousands of times real time.
+//! A case at correlator level: the receiver's own loops on modelled correlations, thousands of times real
+//! time.
 //!
-//! The base is `[signal]`, `[motion]`, `[loop]`, `[measure]` and `[receiver.tracking]`; figures stand in
+//! The base is `[signal]`, `[motion]`, `[loop]`, `[measure]` and `[receiver.tracking]`; figures are in
 //! [`FIGURES`], those of theory under `theory.`. Limits are those of [`crate::study::correlator`]: one
 //! satellite in steady tracking, constant C/N0, no multipath. Where the signal was lost, spreads have no
 //! value.
@@ -95,7 +96,7 @@ impl Model {
         })
     }
 
-    /// Reads a document that stands in no file.
+    /// Reads a document that is in no file.
     pub(super) fn of(document: &toml::Table, origin: &str) -> Result<Self, ScenarioError> {
         let text = toml::to_string(document).unwrap_or_default();
         let source = Source { origin, text: &text };
@@ -170,6 +171,7 @@ fn law(table: &Table<'_>) -> Result<Option<PowerLaw>, ScenarioError> {
 /// A figure of a case.
 #[derive(Clone, Copy)]
 pub struct Figure {
+    /// Its name in a study.
     pub name: &'static str,
     of: fn(&Case, &Outcome) -> Option<f64>,
 }
@@ -209,8 +211,8 @@ fn phase_theory_deg(case: &Case) -> Option<f64> {
 pub const SNR: &str = "theory.snr";
 
 /// What a study may keep. Spreads are of truth minus oscillator, mean over an integration, about their mean;
-/// `raw_…` are of discriminator values. `theory.…` is what `analysis::expect::theory` predicts for the loop as it is
-/// closed.
+/// `raw_…` are of discriminator values. `theory.…` is what `analysis::expect::theory` predicts for the loop
+/// as it is closed.
 pub const FIGURES: &[Figure] = &[
     figure("held", |_, outcome| Some(f64::from(u8::from(outcome.lost.is_none())))),
     figure("slip_free", |_, outcome| Some(f64::from(u8::from(outcome.lost.is_none() && outcome.slips == 0)))),

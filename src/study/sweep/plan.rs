@@ -1,8 +1,9 @@
 //! A study on disk: `manifest.json`, copies of everything that it needs, and its shards.
 //!
-//! The manifest says what will be computed; its hash stands in every shard. Inputs lie in the directory under their
-//! content's hash, so a worker needs the directory and the program only. A plan that is loaded is made again from its
-//! inputs and must come out the same, byte by byte: what a manifest says is checked, never believed.
+//! The manifest says what will be computed; its hash is in every shard. Inputs lie in the directory under
+//! their content's hash, so a worker needs the directory and the program only. A plan that is loaded is made
+//! again from its inputs and must come out the same, byte by byte: what a manifest says is checked, never
+//! believed.
 
 use std::fs;
 use std::io::{self, Write};
@@ -23,11 +24,11 @@ use crate::generator::scenario::{Overrides, Scenario};
 /// Version of manifest and shards.
 const SCHEMA: u32 = 1;
 const TOOL: &str = concat!("gnss-twin ", env!("CARGO_PKG_VERSION"));
-/// Most shards unless told otherwise: clusters take arrays of a thousand tasks by default.
+/// Most shards unless set otherwise: clusters take arrays of a thousand tasks by default.
 const MOST_SHARDS: u64 = 1000;
 /// As many at least where there are as many cases, so that a kill costs little.
 const LEAST_SHARDS: u64 = 50;
-/// Length of a shard unless told otherwise.
+/// Length of a shard unless set otherwise.
 const SHARD_MINUTES: f64 = 1.0;
 
 /// How to cut a study into shards.
@@ -35,6 +36,7 @@ const SHARD_MINUTES: f64 = 1.0;
 pub enum Cut {
     /// About a minute of one core each at most, 50 to 1000.
     Default,
+    /// Into so many shards.
     Shards(u64),
     /// Of one core.
     Minutes(f64),
@@ -44,18 +46,27 @@ pub enum Cut {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
+    /// Version of this format.
     pub schema: u32,
+    /// Program and version that made it.
     pub tool: String,
     /// Hash of the program that planned.
     pub build: String,
+    /// Name of the study.
     pub name: String,
+    /// Correlations or samples.
     pub level: String,
+    /// Seed from which every case's seed follows.
     pub seed: u64,
+    /// Files that the study needs, with their hashes.
     pub inputs: Vec<Input>,
     /// Slowest first; the last case has the last value of each.
     pub axes: Vec<AxisEntry>,
+    /// Number of cases.
     pub n_cases: u64,
+    /// Cases of a shard; the last one may have fewer.
     pub shard_size: u64,
+    /// Columns of the results.
     pub columns: Vec<Column>,
 }
 
@@ -67,6 +78,7 @@ pub struct Input {
     pub written: String,
     /// Below the study's directory.
     pub path: String,
+    /// Hash of its contents, hexadecimal.
     pub sha256: String,
 }
 
@@ -74,6 +86,7 @@ pub struct Input {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AxisEntry {
+    /// Keys that change together.
     pub keys: Vec<String>,
     /// A list a key.
     pub values: Vec<Vec<Json>>,
@@ -83,15 +96,20 @@ pub struct AxisEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
+    /// Its heading.
     pub name: String,
+    /// Unit of the value.
     pub unit: String,
 }
 
 /// A study with its directory.
 #[derive(Clone, Debug)]
 pub struct Plan {
+    /// Where the plan lies.
     pub directory: PathBuf,
+    /// The study as described.
     pub study: Study,
+    /// What the results are bound to.
     pub manifest: Manifest,
     /// Of the manifest's bytes.
     pub hash: String,
@@ -106,10 +124,12 @@ struct Sources {
 }
 
 impl Plan {
-    /// Plans the study at `path` into `directory`; `build` is the program's hash. Doing so again changes nothing.
+    /// Plans the study at `path` into `directory`; `build` is the program's hash. Doing so again changes
+    /// nothing.
     ///
     /// # Errors
-    /// A study or scene that its reader refuses, a directory that holds another plan, files that cannot be written.
+    /// A study or scene that its reader refuses, a directory that holds another plan, files that cannot be
+    /// written.
     pub fn create(path: &Path, directory: &Path, cut: Cut, build: &str) -> Result<Self, StudyError> {
         let (study, sources) = gather(path)?;
         check(&study, &sources.bases)?;
@@ -313,7 +333,7 @@ fn parse(path: &Path) -> Result<Study, StudyError> {
 }
 
 fn base(written: &Path, path: &Path, text: &str) -> Result<Base, StudyError> {
-    // As it stands first, so that its own errors have their place.
+    // As it is first, so that its own errors have their place.
     let scenario = Scenario::parse(text, &path.display().to_string())?;
     let document = text.parse().map_err(|e: toml::de::Error| StudyError::input(path, e.message()))?;
     let directory = path.parent().unwrap_or(Path::new(".")).to_owned();
@@ -444,7 +464,8 @@ pub(super) fn modelled(study: &Study, values: &[(&Axis, &Value)]) -> Result<Mode
     Model::of(&document, "model").map_err(|e| e.without_place())
 }
 
-/// Real time that one core covers in a second: of the loops, and of each satellite generated and followed at 2.6 Msps.
+/// Real time that one core covers in a second: of the loops, and of each satellite generated and followed at
+/// 2.6 Msps.
 const MODEL_SPEED: f64 = 3000.0;
 const SAMPLES_PER_S: f64 = 0.6e9;
 /// Satellites in a scene, and what a search and the judge cost, seconds.

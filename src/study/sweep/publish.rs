@@ -1,6 +1,7 @@
-//! Writes a finished study down: `cases.csv`, `cells.csv`, pictures, `report.md` and `report.pdf` in its directory.
+//! Writes a finished study down: `cases.csv`, `cells.csv`, pictures, `report.md` and `report.pdf` in its
+//! directory.
 //!
-//! Bytes follow from plan and results alone: how long it took and where stands nowhere. Other forms of report
+//! Bytes follow from plan and results alone: how long it took and where is not in them. Other forms of report
 //! start from [`Results`] and [`draw::pictures`] as this one does.
 
 use std::fmt::Write;
@@ -12,10 +13,10 @@ use super::spec::Level;
 use super::{StudyError, axis, plan};
 use crate::study::proof::LEAST_SNR;
 
-/// Cells that the report lists; the rest stand in `cells.csv`.
+/// Cells that the report lists; the rest are in `cells.csv`.
 const MOST_LISTED: usize = 60;
 
-/// Values of an axis that the report lists; all stand in `cells.csv`.
+/// Values of an axis that the report lists; all are in `cells.csv`.
 const MOST_VALUES: usize = 40;
 
 /// Writes everything.
@@ -111,7 +112,7 @@ fn text(plan: &Plan, results: &Results, pictures: &[Picture]) -> String {
     text
 }
 
-/// Words as a cell of a table can hold them.
+/// Words as a cell of a table can have them.
 fn word(text: &str) -> String {
     text.replace('|', "\\|").replace('\n', " ")
 }

@@ -12,7 +12,7 @@ use super::spec::Study;
 use super::{StudyError, axis, unit_of};
 use crate::study::proof::LEAST_SNR;
 
-/// Figures of theory stand under this before the name of the figure that they predict.
+/// Figures of theory have this before the name of the figure that they predict.
 pub const THEORY: &str = "theory.";
 
 /// Every line of data, case by case.
@@ -51,6 +51,7 @@ pub fn table(plan: &Plan, lines: &[String]) -> Vec<u8> {
 /// A study's outcome.
 #[derive(Clone, Debug)]
 pub struct Results {
+    /// The study.
     pub study: Study,
     /// Kept figures with their units, in the order of [`Cell::estimates`].
     pub figures: Vec<Column>,
@@ -65,6 +66,7 @@ pub struct Results {
 pub struct Cell {
     /// For each axis, the number of its value.
     pub at: Vec<usize>,
+    /// Of each figure; `None` where no case gave one.
     pub estimates: Vec<Option<Estimate>>,
 }
 
@@ -185,16 +187,20 @@ pub const BAR: f64 = 0.05;
 /// A figure beside its theory.
 #[derive(Clone, Debug)]
 pub struct Agreement {
+    /// Index of the figure.
     pub figure: usize,
+    /// Every cell that has a theory.
     pub cells: Vec<Compared>,
 }
 
 /// One cell of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Compared {
+    /// Index of the cell.
     pub cell: usize,
     /// Measured over predicted.
     pub ratio: f64,
+    /// Largest deviation that is allowed, relative.
     pub bar: f64,
     /// T·C/N0.
     pub snr: Option<f64>,

@@ -1,4 +1,5 @@
-//! Cases at sample level: one stream of samples from the generator feeds every receiver that is to hear it, in memory.
+//! Cases at sample level: one stream of samples from the generator feeds every receiver that takes it, in
+//! memory.
 //!
 //! Cases that differ in `receiver.…` alone share their signal, so it is generated once. Figures are those of
 //! `summary.json` by their path, the first search's detections, those of single fixes ([`super::fixes`]), and
@@ -43,7 +44,9 @@ pub struct Base {
     pub written: PathBuf,
     /// Where its files are.
     pub directory: PathBuf,
+    /// Name of the file without its ending.
     pub name: String,
+    /// The scene as written.
     pub document: toml::Table,
 }
 
@@ -52,8 +55,8 @@ pub fn changes_signal(key: &str) -> bool {
     !key.starts_with("receiver.")
 }
 
-/// What a study may keep. `acquisition.…` count the first search alone; `theory.…` predict for thermal noise alone, the
-/// mean C/N0 of the run and the loop as it is closed.
+/// What a study may keep. `acquisition.…` count the first search alone; `theory.…` predict for thermal noise
+/// alone, the mean C/N0 of the run and the loop as it is closed.
 pub const FIGURES: &[&str] = &[
     "acquisition.detected_share",
     "acquisition.false",
@@ -242,7 +245,8 @@ fn alone(run: &Run) -> Option<&'static Signal> {
     signals.next().filter(|signal| signals.next().is_none() && signal.components.len() == 1)
 }
 
-/// Share of the satellites in view at the start that the first search found, and how many it found that were not there.
+/// Share of the satellites in view at the start that the first search found, and how many it found that were
+/// not there.
 fn first_search(run: &Run) -> (Option<f64>, f64) {
     let there = &run.in_view_at_start;
     let first = run.acquisition.iter().map(|row| row.sample).min();

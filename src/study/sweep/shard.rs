@@ -1,6 +1,6 @@
 //! Shards: files of whole cases, bound to their manifest, that are there wholly or not at all.
 //!
-//! The first line binds manifest and range, the last one counts rows and hashes what stands before it. A
+//! The first line binds manifest and range, the last one counts rows and hashes what is before it. A
 //! shard is written under a temporary name, synchronised, linked to its own, and the directory synchronised.
 //! What is there already must have the same bytes: a shard that is computed twice is a check of
 //! reproducibility. Limits: a network file system may refuse links; then a rename is used, and of two writers
@@ -18,9 +18,10 @@ use crate::analysis::show::staged::{Staged, present};
 /// Figures of one case.
 pub type CaseFigures = Vec<Option<f64>>;
 
-/// What stands under a shard's name.
+/// What is under a shard's name.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Found {
+    /// There is no such file.
     Nothing,
     /// Its lines of data.
     Whole(Vec<String>),
@@ -86,7 +87,7 @@ pub fn render(plan: &Plan, shard: u32, rows: &[CaseFigures]) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// Looks at what stands under a shard's name, and checks all of it.
+/// Looks at what is under a shard's name, and checks all of it.
 ///
 /// # Errors
 /// A file that is there and cannot be read.
@@ -127,7 +128,7 @@ fn verify(plan: &Plan, shard: u32, bytes: Vec<u8>) -> Result<Vec<String>, String
     Ok(rows)
 }
 
-/// Moves what stands under a shard's name out of the way, for someone to look at.
+/// Moves what is under a shard's name out of the way, for someone to look at.
 ///
 /// # Errors
 /// A directory that cannot be written.
@@ -143,7 +144,7 @@ pub fn discard(plan: &Plan, shard: u32) -> Result<(), StudyError> {
 /// Gives a shard its name, durably.
 ///
 /// # Errors
-/// [`StudyError::NotReproducible`] if other bytes stand there; files that cannot be written.
+/// [`StudyError::NotReproducible`] if other bytes are there; files that cannot be written.
 pub fn commit(plan: &Plan, shard: u32, bytes: &[u8]) -> Result<(), StudyError> {
     let (directory, target) = (plan.shard_directory(), path(plan, shard));
     // A second try, should another run have swept the temporary away as a dead one's.

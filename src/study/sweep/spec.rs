@@ -39,41 +39,52 @@ impl Level {
 pub struct Study {
     /// What errors call it.
     pub origin: String,
+    /// Name of its results.
     pub name: String,
+    /// Words above its report.
     pub title: String,
     /// What the report says first.
     pub about: String,
+    /// Correlations or samples.
     pub level: Level,
+    /// Seed from which every case's seed follows.
     pub seed: u64,
+    /// What is varied.
     pub axes: Vec<Axis>,
+    /// How the axes make cases.
     pub grid: Grid,
     /// At correlator level: the tables of the study that make its base.
     pub base: toml::Table,
     /// At samples level: the scene's file, as written; absent where an axis names the files.
     pub scenario: Option<PathBuf>,
-    /// Figures to keep; at correlator level those of theory stand behind the ones that they predict.
+    /// Figures to keep; at correlator level those of theory follow the ones that they predict.
     pub keep: Vec<String>,
     /// Numbers of the axes that keep ensembles apart; `None` where the study asks for no ensemble.
     pub ensemble: Option<Vec<usize>>,
+    /// Pictures of its report.
     pub plots: Vec<Plot>,
 }
 
 /// A picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
+    /// What kind of picture.
     pub kind: PlotKind,
+    /// Words above it.
     pub title: String,
     /// Axis across.
     pub x: String,
     /// Figure that is drawn.
     pub figure: String,
-    /// Axis that tells curves apart.
+    /// Axis that distinguishes curves.
     pub series: Option<String>,
-    /// Axis that tells pictures apart.
+    /// Axis that distinguishes pictures.
     pub panel: Option<String>,
     /// Values of other axes.
     pub fixed: Vec<(String, Value)>,
+    /// Whether the axis across is logarithmic.
     pub log_x: bool,
+    /// Whether the axis upward is logarithmic.
     pub log_y: bool,
 }
 
@@ -83,9 +94,17 @@ pub enum PlotKind {
     /// The figure over x, a band of 95 % about its mean.
     Curve,
     /// The figure as colour over x and this axis.
-    Heat { y: String },
+    Heat {
+        /// The axis upward.
+        y: String,
+    },
     /// Where along this axis the figure crosses a level, over x.
-    Crossing { along: String, level: f64 },
+    Crossing {
+        /// The axis along which it is sought.
+        along: String,
+        /// The level.
+        level: f64,
+    },
 }
 
 const BASE: [&str; 5] = ["signal", "motion", "loop", "measure", "receiver"];
@@ -208,7 +227,7 @@ fn name(root: &Table<'_>) -> Result<String, ScenarioError> {
     if name.len() <= 64 && name.chars().all(fits) { Ok(name.to_owned()) } else { Err(root.bad("name", expected)) }
 }
 
-/// Refuses keys that stand twice, or that are the study's own matter.
+/// Refuses keys that occur twice, or that are the study's own matter.
 fn unlike(root: &Table<'_>, axes: &[Axis]) -> Result<(), ScenarioError> {
     for (number, axis) in axes.iter().enumerate() {
         let message = if axes.iter().take(number).any(|other| other.key == axis.key) {
@@ -354,7 +373,8 @@ fn plot(table: &Table<'_>, axes: &[Axis], grid: &Grid, keep: &[String]) -> Resul
         log_x: table.flag("log_x")?.unwrap_or(false),
         log_y: table.flag("log_y")?.unwrap_or(false),
     };
-    // Each axis, or one that is zipped with it, must have its place: else several cells would fall on one point.
+    // Each axis, or one that is zipped with it, must have its place: else several cells would fall on one
+    // point.
     let mut placed: Vec<&str> = vec![&plot.x];
     placed.extend(plot.series.iter().chain(&plot.panel).map(String::as_str));
     placed.extend(plot.fixed.iter().map(|(key, _)| key.as_str()));

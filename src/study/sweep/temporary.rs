@@ -1,4 +1,4 @@
-//! Names for work in progress: they tell whose it is, so that what a dead run left behind can be swept and
+//! Names for work in progress: they say whose it is, so that what a dead run left behind can be swept and
 //! nothing else.
 
 use std::fs;
@@ -53,7 +53,7 @@ fn old(entry: &fs::DirEntry) -> bool {
     modified.is_ok_and(|then| SystemTime::now().duration_since(then).is_ok_and(|age| age > FOREIGN_AGE))
 }
 
-/// A directory that vanishes with its owner.
+/// A directory that is removed with its owner.
 pub(super) fn directory(parent: &Path) -> Result<Staged, StudyError> {
     let path = parent.join(name());
     Staged::directory(path.clone()).map_err(|source| StudyError::Create { path, source })

@@ -3,7 +3,7 @@
 //!
 //! It follows from the truth (who is in view, how strong, how well placed), the receiver's settings
 //! ([`receiver`]), the message's timetable ([`timetable`]) and what the scene itself expects
-//! ([`crate::gnss::facts`]); [`satellite`] holds the rules. Nothing that nature or the scene took away is the
+//! ([`crate::gnss::facts`]); [`satellite`] has the rules. Nothing that nature or the scene took away is the
 //! receiver's fault. Limits: searches are those of a cold start with worst losses, so a receiver may be
 //! earlier than required; geometry counts the satellites that must be used, not those that might be.
 
@@ -42,10 +42,13 @@ const SOLVE_S: f64 = 1.0;
 /// What is required at one epoch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Due {
+    /// Number of the sample, counted from the first one.
     pub sample: u64,
+    /// Seconds from sample 0 by the receiver's clock.
     pub time_s: f64,
-    /// Satellites that must be used, and that could be held.
+    /// Satellites that must be used.
     pub used: u32,
+    /// Satellites whose signal can be held.
     pub held: u32,
     /// Normal matrix of the directions of those that must be used, upper triangle.
     normal: [f32; 10],
@@ -77,18 +80,23 @@ impl Due {
 /// What is required of one satellite over the run, in epochs of the truth.
 #[derive(Clone, Debug, Default)]
 pub struct Satellite {
+    /// Epochs in which the truth has it.
     pub epochs: usize,
+    /// Median of its true C/N0, dB-Hz.
     pub usual_dbhz: f64,
     /// When it must have been acquired.
     pub acquired_by_s: Option<f64>,
-    /// Epochs at which it must be observed, and those of them at which it was.
+    /// Epochs at which it must be observed.
     pub due: usize,
+    /// Those of them at which it was.
     pub observed: usize,
     /// The latest of those at which it was not, and the first.
     pub missing_s: Option<(f64, f64)>,
+    /// Epochs in which it had to be used.
     pub used_due: usize,
     /// Most frequent reason for not being required.
     pub excuse: Option<Excuse>,
+    /// Largest of its true Doppler, Hz, without sign.
     pub doppler_hz: f64,
 }
 
@@ -110,7 +118,9 @@ impl Observed for Run {
 /// The whole of what a scene allows.
 #[derive(Clone, Debug)]
 pub struct Expectations {
+    /// What its settings let one expect.
     pub receiver: Receiver,
+    /// What each satellite's signal must give, and gave.
     pub satellites: BTreeMap<Link, Satellite>,
     /// Epochs of the truth at which the receiver measures.
     pub epochs: Vec<Due>,
@@ -126,7 +136,7 @@ impl Expectations {
     /// Finds them.
     ///
     /// # Errors
-    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn of(run: &Run, receiver: Receiver, observed: &impl Observed) -> Result<Self, JudgeError> {
         let due = |sample: u64| Due { sample, time_s: run.time_s(sample), ..Due::default() };
         let mut found = Self {
@@ -271,7 +281,8 @@ struct Measured {
 }
 
 impl Measured {
-    /// Samples are whole: a tick and its sample differ by less than one, 1e-3 s at the lowest rate that there is.
+    /// Samples are whole: a tick and its sample differ by less than one, 1e-3 s at the lowest rate that there
+    /// is.
     fn at(self, time_s: f64) -> bool {
         let away = time_s / self.interval_s;
         (away - away.round()).abs() * self.interval_s < 1e-5

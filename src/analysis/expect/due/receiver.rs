@@ -1,4 +1,5 @@
-//! What a receiver's settings let one expect of it: how weak a signal it finds, how soon, how weak a one it holds.
+//! What a receiver's settings let one expect of it: how weak a signal it finds, how soon, how weak a one it
+//! holds.
 //!
 //! Search and loops are those of theory with the settings of `rx/receiver.json`: a receiver that names none
 //! is taken to have the defaults of a common one. Losses of the search are its worst: half a cell of code,
@@ -32,16 +33,19 @@ pub struct Receiver {
     pairs: u32,
     coherent_s: f64,
     step_cycles: f64,
+    /// Time between two searches for what is not tracked, seconds.
     pub search_interval_s: f64,
     /// Frequencies searched on either side; `None` where it is not known.
     pub doppler_max_hz: Option<f64>,
-    /// Least C/N0 that loops and message stand for long.
+    /// Least C/N0 at which loops and message last.
     pub hold_dbhz: f64,
     /// Time between observations.
     pub interval_s: f64,
+    /// Elevation below which it uses no satellite, degrees.
     pub mask_deg: f64,
     /// Whether fixes need the ionosphere's page, and else how long the first one waits for it.
     pub requires_ionosphere: bool,
+    /// How long it waits for the ionosphere's parameters before a fix, seconds.
     pub ionosphere_wait_s: f64,
     /// What its front end takes from every signal.
     pub cost_db: f64,

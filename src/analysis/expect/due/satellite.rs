@@ -29,12 +29,15 @@ const HEALTH_S: f64 = 36.0;
 /// One row of the truth as expectation needs it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SatelliteEpoch {
+    /// Seconds from sample 0 by the receiver's clock.
     pub time_s: f64,
+    /// True C/N0, dB-Hz.
     pub cn0_dbhz: f64,
     /// With other satellites, interference and the front end's cost counted.
     pub effective_dbhz: f64,
     /// The strongest satellite's.
     pub strongest_dbhz: f64,
+    /// True Doppler, Hz.
     pub doppler_hz: f64,
     /// Whether the receiver's mask lets it into fixes.
     pub above_mask: bool,
@@ -43,11 +46,15 @@ pub struct SatelliteEpoch {
 /// Why a satellite is not expected at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Excuse {
+    /// The truth does not have it then.
     NotThere,
+    /// It is weaker than the receiver can hold.
     Weak,
+    /// It was weaker for a moment than the receiver can hold.
     Faded,
     /// Below another's cross-correlation.
     Hidden,
+    /// Something is wrong with the satellite or its message.
     Fault,
     /// The scene says so.
     Scene,
@@ -72,17 +79,24 @@ impl Excuse {
 pub struct Required {
     /// The signal can be held here, so that fixes that have begun can go on.
     pub held: bool,
+    /// Whether it must be found by now.
     pub acquired: bool,
+    /// Whether it must be observed.
     pub observed: bool,
+    /// Whether a fix must use it.
     pub used: bool,
 }
 
 /// Everything about the scene that is not in the rows.
 #[derive(Clone, Copy)]
 pub struct Scene<'s> {
+    /// What the settings let one expect.
     pub receiver: &'s Receiver,
+    /// When its message says what.
     pub timetable: Timetable,
+    /// What the scene expects.
     pub expect: &'s Expect,
+    /// What is wrong with satellites.
     pub faults: &'s [Fault],
     /// Interval of the truth's rows.
     pub interval_s: f64,
@@ -249,7 +263,8 @@ mod tests {
     fn a_strong_satellite_must_be_found_at_once_observed_after_two_headers_and_used_with_its_ephemeris() {
         with(Expect::default(), &[], |scene| {
             let found = first(scene, &rows(90, |_| Some(45.0)), 0.0);
-            // Locked by 4 s, between subframes at 2 and 8 s; headers at 8 and 14 s; subframe 1 is whole at 38 s.
+            // Locked by 4 s, between subframes at 2 and 8 s; headers at 8 and 14 s; subframe 1 is whole at 38
+            // s.
             assert_eq!(found, [Some(0.0), Some(16.0), Some(40.0)]);
         });
     }

@@ -1,8 +1,10 @@
-//! What theory says of a clock's stability: Allan variance of power-law noise, and of white noise in its readings.
+//! What theory says of a clock's stability: Allan variance of power-law noise, and of white noise in its
+//! readings.
 //!
 //! Source: IEEE Std 1139-2008 and W. J. Riley, NIST Special Publication 1065 (2008).
-//! S_y(f) = Σ h_α f^α is one-sided and ends at a cutoff, which only the two phase noises feel. Limit: the flicker-phase
-//! form needs 2π × cutoff × τ well above 1, which sampled phase (cutoff at half the rate) keeps at every τ.
+//! S_y(f) = Σ h_α f^α is one-sided and ends at a cutoff, which only the two phase noises feel. Limit: the
+//! flicker-phase form needs 2π × cutoff × τ well above 1, which sampled phase (cutoff at half the rate) keeps
+//! at every τ.
 
 use std::f64::consts::{LN_2, PI};
 
@@ -43,8 +45,8 @@ impl Deviation {
     }
 }
 
-/// Exponents α of the noises, in the order of every list of h here: white phase, flicker phase, white frequency,
-/// flicker frequency, random walk of frequency.
+/// Exponents α of the noises, in the order of every list of h here: white phase, flicker phase, white
+/// frequency, flicker frequency, random walk of frequency.
 pub const EXPONENTS: [i32; 5] = [2, 1, 0, -1, -2];
 
 /// Euler's constant.
@@ -87,9 +89,11 @@ pub fn allan_variance_of_each(tau_s: f64, cutoff_hz: f64) -> [f64; 5] {
     ]
 }
 
-/// A deviation when readings `tau0_s` apart carry independent errors of `sigma_s`; in seconds for the time deviation.
+/// A deviation when readings `tau0_s` apart carry independent errors of `sigma_s`; in seconds for the time
+/// deviation.
 pub fn white_phase(deviation: Deviation, sigma_s: f64, tau_s: f64, tau0_s: f64) -> f64 {
-    // Sums of the squared weights of a second and of a third difference, 6 and 20, over the definitions' 2 and 6.
+    // Sums of the squared weights of a second and of a third difference, 6 and 20, over the definitions' 2
+    // and 6.
     let allan = 3.0_f64.sqrt() * sigma_s / tau_s;
     let averaged = (tau0_s / tau_s).sqrt();
     match deviation {
@@ -121,9 +125,10 @@ mod tests {
         let (tau_s, cutoff_hz) = (3.0, 50.0);
         for (alpha, closed) in EXPONENTS.into_iter().zip(allan_variance_of_each(tau_s, cutoff_hz)) {
             let integral = by_definition(alpha, tau_s, cutoff_hz);
-            // Beyond the closed forms' leading term: with x = 2π·cutoff·τ = 942, the phase noises leave out terms
-            // of 4/(3x) and 1/x; what white frequency noise has above the cutoff is 3/(4π²·cutoff·τ²)·2τ = 1/1000;
-            // flicker and random walk have less there, and below 1e-7/τ the integrand ends as f^(4 + α − 2 + 1).
+            // Beyond the closed forms' leading term: with x = 2π·cutoff·τ = 942, the phase noises leave out
+            // terms of 4/(3x) and 1/x; what white frequency noise has above the cutoff is
+            // 3/(4π²·cutoff·τ²)·2τ = 1/1000; flicker and random walk have less there, and below 1e-7/τ the
+            // integrand ends as f^(4 + α − 2 + 1).
             assert!((integral / closed - 1.0).abs() < 1.5e-3, "h{alpha}: {integral} against {closed}");
         }
     }

@@ -1,8 +1,9 @@
 //! Detection in noise: false alarms and detections of K summed correlations.
 //!
-//! The statistic is Σ|S|²/σ² with σ² the noise of one component: χ² of 2K degrees without a signal, non-central with
-//! λ = 2K·T·C/N0·L with one, L being the loss by code and frequency offset. Source: Kay, Fundamentals of Statistical
-//! Signal Processing II, 2.2; the generalised Marcum function as a Poisson mixture (Shnidman 1989).
+//! The statistic is Σ|S|²/σ² with σ² the noise of one component: χ² of 2K degrees without a signal,
+//! non-central with λ = 2K·T·C/N0·L with one, L being the loss by code and frequency offset. Source: Kay,
+//! Fundamentals of Statistical Signal Processing II, 2.2; the generalised Marcum function as a Poisson
+//! mixture (Shnidman 1989).
 
 /// Probability that χ² of 2·`pairs` degrees exceeds `threshold`: e^(−V/2)·Σ (V/2)^i/i!.
 pub fn false_alarm(threshold: f64, pairs: u32) -> f64 {
@@ -45,7 +46,8 @@ pub fn noncentrality(pairs: u32, t_s: f64, cn0_hz: f64, loss: f64) -> f64 {
     2.0 * f64::from(pairs) * t_s * cn0_hz * loss
 }
 
-/// C/N0 in dB-Hz at which a signal without offsets is detected with `probability`, by bisection from 0 to 100 dB-Hz.
+/// C/N0 in dB-Hz at which a signal without offsets is detected with `probability`, by bisection from 0 to 100
+/// dB-Hz.
 pub fn cn0_dbhz(probability: f64, threshold: f64, pairs: u32, t_s: f64) -> f64 {
     let (mut low, mut high) = (0.0, 100.0);
     for _ in 0..60 {

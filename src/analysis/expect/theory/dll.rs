@@ -39,6 +39,7 @@ pub fn raw_chips(discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) ->
 pub struct Taps {
     /// Its value there, and how much it falls a chip.
     pub height: f64,
+    /// Slope of early minus late at zero error, per chip.
     pub slope: f64,
     /// Correlation of the noise of early and late.
     pub common: f64,
@@ -46,9 +47,9 @@ pub struct Taps {
 
 /// Standard deviation of one discriminator value, in chips, on a correlation of any shape.
 ///
-/// With a and a′ height and slope and ρ the noise in common, (1−ρ)/(4·snr·a′²) times 1 plus the squaring loss:
-/// (1+ρ)/(2·snr·a²) of early minus late power, 1/snr of the dot product. Betz and Kolodziejski 2009, their
-/// integrals written as the correlations that they are.
+/// With a and a′ height and slope and ρ the noise in common, (1−ρ)/(4·snr·a′²) times 1 plus the squaring
+/// loss: (1+ρ)/(2·snr·a²) of early minus late power, 1/snr of the dot product. Betz and Kolodziejski 2009,
+/// their integrals written as the correlations that they are.
 pub fn raw_on_chips(discriminator: Discriminator, taps: Taps, snr: f64) -> f64 {
     let Taps { height, slope, common } = taps;
     let squaring = match discriminator {
@@ -90,7 +91,8 @@ pub struct BandIntegrals {
     gabor: f64,
 }
 
-/// Intervals of the integrals in one lobe of spectrum or discriminator; Simpson's rule then errs by less than 1e-9.
+/// Intervals of the integrals in one lobe of spectrum or discriminator; Simpson's rule then errs by less than
+/// 1e-9.
 const INTERVALS_PER_LOBE: f64 = 64.0;
 
 impl BandIntegrals {
@@ -99,8 +101,8 @@ impl BandIntegrals {
         Self::of(sinc_squared, d, band)
     }
 
-    /// For a spectrum of unit area over all frequencies (so C/N0 is that before the filter), whose lobes are a
-    /// chip rate wide, and `band` chip rates of two-sided bandwidth.
+    /// For a spectrum of unit area over all frequencies (so C/N0 is that before the filter), whose lobes are
+    /// a chip rate wide, and `band` chip rates of two-sided bandwidth.
     pub fn of(spectrum: impl Fn(f64) -> f64, d: f64, band: f64) -> Self {
         let pi = std::f64::consts::PI;
         let intervals = 2.0 * (0.5 * INTERVALS_PER_LOBE * (0.5 * band + 1.0) * (1.0 + d)).ceil();
@@ -171,12 +173,14 @@ pub fn threshold_chips(d: f64) -> f64 {
     d / 6.0
 }
 
-/// Whether 3σ and the dynamic error stay within the discriminator's linear range, ±d/2 (Kaplan and Hegarty, eq. 5.24).
+/// Whether 3σ and the dynamic error stay within the discriminator's linear range, ±d/2 (Kaplan and Hegarty,
+/// eq. 5.24).
 pub fn holds(jitter_chips: f64, stress_chips: f64, d: f64) -> bool {
     3.0 * jitter_chips + stress_chips.abs() <= 0.5 * d
 }
 
-/// Least C/N0 in dB-Hz at which the early-minus-late jitter is d/6: the positive root of the quadratic in 1/(C/N0).
+/// Least C/N0 in dB-Hz at which the early-minus-late jitter is d/6: the positive root of the quadratic in
+/// 1/(C/N0).
 pub fn least_cn0_dbhz(d: f64, bandwidth_hz: f64, t_s: f64) -> f64 {
     // σ² = a·x·(1 + s·x), x = 1/(C/N0).
     let (a, s) = (0.5 * bandwidth_hz * d, 2.0 / ((2.0 - d) * t_s));

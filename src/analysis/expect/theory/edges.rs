@@ -1,4 +1,4 @@
-//! What chip edges that are averaged over a sample's interval cost a standing code.
+//! What chip edges that are averaged over a sample's interval cost a code at rest.
 //!
 //! Averaging is a filter sinc(f/fs) before sampling; what it leaves above half the rate folds back as a code
 //! of its own, with phases that do not follow the code's. An early-minus-late correlator weighs a line of the
@@ -23,7 +23,8 @@ const ZONES: i32 = 4;
 /// 2.6 Msps.
 pub const CREST: f64 = 0.40 / 0.14;
 
-/// Error of a signal's standing code, root mean square over codes and phases, in metres; 0 of one without a code.
+/// Error of a signal's code at rest, root mean square over codes and phases, in metres; 0 of one without a
+/// code.
 pub fn averaged_m(signal: &Signal, rate_hz: f64) -> f64 {
     let code = leading(signal).zip(Waveform::of(signal));
     code.map_or(0.0, |(component, waveform)| {

@@ -10,12 +10,14 @@ use std::f64::consts::TAU;
 use super::linear::{FrequencyLoop, Pairs};
 use super::pll;
 
-/// Jitter √(4F·B/(C/N0)·(1+1/(T·C/N0)))/(2πT), eq. 5.19, for separate pairs; `f` is 1, or 2 near the threshold.
+/// Jitter √(4F·B/(C/N0)·(1+1/(T·C/N0)))/(2πT), eq. 5.19, for separate pairs; `f` is 1, or 2 near the
+/// threshold.
 pub fn jitter_hz(bandwidth_hz: f64, t_s: f64, cn0_hz: f64, f: f64) -> f64 {
     (4.0 * f * bandwidth_hz / cn0_hz * (1.0 + 1.0 / (t_s * cn0_hz))).sqrt() / (TAU * t_s)
 }
 
-/// Jitter of a loop as it is closed, from the noise of prompt phases (squaring loss included); `None` if unstable.
+/// Jitter of a loop as it is closed, from the noise of prompt phases (squaring loss included); `None` if
+/// unstable.
 pub fn jitter_of_loop_hz(frequency_loop: &FrequencyLoop, t_s: f64, cn0_hz: f64) -> Option<f64> {
     let phase_cycles = pll::raw_rad(t_s, cn0_hz) / TAU;
     let prompts = match frequency_loop.pairs {
@@ -25,8 +27,8 @@ pub fn jitter_of_loop_hz(frequency_loop: &FrequencyLoop, t_s: f64, cn0_hz: f64) 
     Some((frequency_loop.linear().noise_gain()? * prompts).sqrt() * phase_cycles / t_s)
 }
 
-/// The same in closed form for order 1 and gain `k` on overlapping pairs, if the discriminator saw the rate of the
-/// last interval alone: √(2k²/(2−k))·σ/(2πT).
+/// The same in closed form for order 1 and gain `k` on overlapping pairs, if the discriminator saw the rate
+/// of the last interval alone: √(2k²/(2−k))·σ/(2πT).
 pub fn jitter_overlapping_first_order_hz(k: f64, t_s: f64, cn0_hz: f64) -> f64 {
     (2.0 * k * k / (2.0 - k)).sqrt() * pll::raw_rad(t_s, cn0_hz) / (TAU * t_s)
 }

@@ -1,9 +1,10 @@
-//! Discrete tracking loops as exact linear systems: noise, stability, response, from a plain description of the loop.
+//! Discrete tracking loops as exact linear systems: noise, stability, response, from a plain description of
+//! the loop.
 //!
-//! A loop is stepped with unit vectors into x' = A·x + b·n, y = c·x, where n is white noise of the discriminator
-//! and y the error of what the loop tracks. The variance of y is c·P·cᵀ with P = A·P·Aᵀ + b·bᵀ, summed by doubling
-//! (Smith 1968). One-sided noise bandwidth: B·T = variance/2 for a phase loop. Limits: small errors, so
-//! no discriminator's range and no cycle slip; noise is white from update to update.
+//! A loop is stepped with unit vectors into x' = A·x + b·n, y = c·x, where n is white noise of the
+//! discriminator and y the error of what the loop tracks. The variance of y is c·P·cᵀ with P = A·P·Aᵀ + b·bᵀ,
+//! summed by doubling (Smith 1968). One-sided noise bandwidth: B·T = variance/2 for a phase loop. Limits:
+//! small errors, so no discriminator's range and no cycle slip; noise is white from update to update.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -28,22 +29,35 @@ pub enum Feedback {
     /// Only the rate is set: the filters of Kaplan and Hegarty, table 8.23. `interval_mean` says whether the
     /// discriminator sees the mean phase of an interval (a correlator does) or that at its start; `delay` is
     /// one more epoch.
-    Rate { integrator: Integrator, interval_mean: bool, delay: bool },
+    Rate {
+        /// How the filter integrates.
+        integrator: Integrator,
+        /// Whether the phase compared is the interval's mean.
+        interval_mean: bool,
+        /// Whether the output acts one update later.
+        delay: bool,
+    },
 }
 
 /// A phase or code loop of order 1 to 3, with gains per update: dimensionless, times 1, T, T² those a second.
 ///
-/// For [`Feedback::Rate`] they are b·ω0·T, a·(ω0·T)², (ω0·T)³ of the analogue prototype; see [`analogue_gains`].
+/// For [`Feedback::Rate`] they are b·ω0·T, a·(ω0·T)², (ω0·T)³ of the analogue prototype; see
+/// [`analogue_gains`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseLoop {
+    /// Gains of phase, rate and acceleration per update.
     pub gains: [f64; 3],
+    /// What reaches the oscillator.
     pub feedback: Feedback,
 }
 
-/// A frequency loop of order 1 or 2 that sets the rate of an oscillator; noise is that of the phase of a prompt.
+/// A frequency loop of order 1 or 2 that sets the rate of an oscillator; noise is that of the phase of a
+/// prompt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrequencyLoop {
+    /// Gains of rate and acceleration per update.
     pub gains: [f64; 2],
+    /// Which prompts make the discriminator.
     pub pairs: Pairs,
 }
 
@@ -60,7 +74,9 @@ pub enum Pairs {
 /// successive phase errors, as a frequency loop of order 1 on overlapping pairs does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AssistedLoop {
+    /// Gains of phase, rate and acceleration per update.
     pub gains: [f64; 3],
+    /// Gain of the frequency discriminator on the rate.
     pub assist: f64,
 }
 
@@ -82,7 +98,8 @@ pub fn analogue_gains(order: u32, bandwidth_time: f64) -> [f64; 3] {
     }
 }
 
-/// Gains per update of a loop whose roots all lie at `root` (controlled-root formulation, Stephens and Thomas 1995).
+/// Gains per update of a loop whose roots all lie at `root` (controlled-root formulation, Stephens and Thomas
+/// 1995).
 pub fn controlled_root_gains(order: u32, root: f64) -> [f64; 3] {
     let d = 1.0 - root;
     match order {
@@ -154,8 +171,8 @@ impl Linear {
         Some(self.c.dot(&(self.covariance()? * &self.c)))
     }
 
-    /// Updates that count as one independent value where a variance is estimated: Σρ² over all lags of the error's
-    /// autocorrelation ρ (Bartlett 1946). `None` if the loop is unstable.
+    /// Updates that count as one independent value where a variance is estimated: Σρ² over all lags of the
+    /// error's autocorrelation ρ (Bartlett 1946). `None` if the loop is unstable.
     ///
     /// A first-order loop has 1/(4B·T), hence the 4·B·t independent values of a time t.
     pub fn updates_per_value(&self) -> Option<f64> {
@@ -229,13 +246,15 @@ impl PhaseLoop {
 }
 
 impl FrequencyLoop {
-    /// The loop as a linear system: noise is the phase of each prompt in cycles, the error that of the rate in
-    /// cycles an interval T. For [`Pairs::Separate`] one step is 2T and noise is the *difference* of the two phases.
+    /// The loop as a linear system: noise is the phase of each prompt in cycles, the error that of the rate
+    /// in cycles an interval T. For [`Pairs::Separate`] one step is 2T and noise is the *difference* of the
+    /// two phases.
     pub fn linear(&self) -> Linear {
         self.driven(|noise, before| noise - before)
     }
 
-    /// The same, driven by noise that the discriminator's values have beyond the difference of phases, in cycles.
+    /// The same, driven by noise that the discriminator's values have beyond the difference of phases, in
+    /// cycles.
     pub fn linear_of_discriminator(&self) -> Linear {
         self.driven(|noise, _| noise)
     }
@@ -266,7 +285,8 @@ impl AssistedLoop {
         self.stepped(|phase, _| phase, |noise| [noise, 0.0])
     }
 
-    /// The same, driven by noise that the frequency discriminator has beyond the difference of phases, in cycles.
+    /// The same, driven by noise that the frequency discriminator has beyond the difference of phases, in
+    /// cycles.
     pub fn linear_of_discriminator(&self) -> Linear {
         self.stepped(|phase, _| phase, |noise| [0.0, noise])
     }

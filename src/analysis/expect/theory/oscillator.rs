@@ -17,7 +17,8 @@ pub const TCXO: PowerLaw = PowerLaw::of_frequency(1e-21, 1e-20, 2e-20);
 /// An oven-controlled crystal of low noise (OCXO2 of the same table).
 pub const OCXO: PowerLaw = PowerLaw::of_frequency(2.51e-26, 2.51e-23, 2.51e-22);
 
-/// Points of the integral in an octave; the integrand is smooth there, so that the trapezium rule errs below 1e-4.
+/// Points of the integral in an octave; the integrand is smooth there, so that the trapezium rule errs below
+/// 1e-4.
 const POINTS_PER_OCTAVE: u32 = 48;
 
 /// Jitter in radians of an oscillator multiplied to `carrier_hz`, `remaining(f)` being |1−H|² at `f` Hz,
@@ -38,7 +39,8 @@ fn jitter_rad(noise: &PowerLaw, carrier_hz: f64, lowest_hz: f64, octaves: u32, r
 /// Octaves below and above the natural frequency that the integral of an analogue loop covers.
 const OCTAVES: u32 = 15;
 
-/// Jitter in radians of an analogue loop of order 2 (damping a2 = √2) or 3 (a3 = 1.1, b3 = 2.4) of nominal bandwidth B.
+/// Jitter in radians of an analogue loop of order 2 (damping a2 = √2) or 3 (a3 = 1.1, b3 = 2.4) of nominal
+/// bandwidth B.
 pub fn jitter_analogue_rad(noise: &PowerLaw, carrier_hz: f64, order: u32, bandwidth_hz: f64) -> f64 {
     let w0 = if order == 2 { bandwidth_hz / 0.53 } else { bandwidth_hz / 0.7845 };
     let lowest_hz = w0 / TAU / f64::from(1 << OCTAVES);
@@ -53,7 +55,8 @@ pub fn jitter_analogue_rad(noise: &PowerLaw, carrier_hz: f64, order: u32, bandwi
     })
 }
 
-/// The integral in closed form for order 2 with a2 = √2: 4π²f0²·[π²h₋₂/(√2ω³) + πh₋₁/(4ω²) + h₀/(4√2ω)], in radians.
+/// The integral in closed form for order 2 with a2 = √2: 4π²f0²·[π²h₋₂/(√2ω³) + πh₋₁/(4ω²) + h₀/(4√2ω)], in
+/// radians.
 pub fn jitter_second_order_rad(noise: &PowerLaw, carrier_hz: f64, bandwidth_hz: f64) -> f64 {
     let (w, root2) = (bandwidth_hz / 0.53, std::f64::consts::SQRT_2);
     let walk = PI * PI * noise.h[4] / (root2 * w * w * w);

@@ -1,8 +1,9 @@
 //! Thermal jitter, dynamic stress, thresholds and cycle slips of Costas phase loops.
 //!
-//! Angles in radians, C/N0 in hertz, T the coherent integration, B the one-sided noise bandwidth of the discrete loop.
-//! Sources: Kaplan and Hegarty, Understanding GPS 2nd ed., 5.6.1; Viterbi, Principles of Coherent Communication 1966.
-//! Limits: small errors; the arctangent departs upward by 4 % where T·C/N0 is 3 and by 10 to 20 % where it is 1.
+//! Angles in radians, C/N0 in hertz, T the coherent integration, B the one-sided noise bandwidth of the
+//! discrete loop. Sources: Kaplan and Hegarty, Understanding GPS 2nd ed., 5.6.1; Viterbi, Principles of
+//! Coherent Communication 1966. Limits: small errors; the arctangent departs upward by 4 % where T·C/N0 is 3
+//! and by 10 to 20 % where it is 1.
 
 use std::f64::consts::PI;
 
@@ -22,8 +23,9 @@ pub fn jitter_rad(bandwidth_hz: f64, t_s: f64, cn0_hz: f64) -> f64 {
     raw_rad(t_s, cn0_hz) * (2.0 * bandwidth_hz * t_s).sqrt()
 }
 
-/// Steady error under a constant n-th derivative of the phase (any unit a second^n), n being the loop's order:
-/// derivative/ω0^n for the analogue prototypes of nominal bandwidth B (table 5.6, ω0 = 4B, B/0.53, B/0.7845).
+/// Steady error under a constant n-th derivative of the phase (any unit a second^n), n being the loop's
+/// order: derivative/ω0^n for the analogue prototypes of nominal bandwidth B (table 5.6, ω0 = 4B, B/0.53,
+/// B/0.7845).
 pub fn stress(order: u32, bandwidth_hz: f64, derivative: f64) -> f64 {
     let w = match order {
         1 => 4.0 * bandwidth_hz,
@@ -38,7 +40,8 @@ pub fn stress_discrete(order: u32, last_gain: f64, t_s: f64, derivative: f64) ->
     (0..order.clamp(1, 3)).fold(derivative, |error, _| error * t_s) / last_gain
 }
 
-/// Jitter from several causes and dynamic error within 3σ + θ ≤ 45°: thermal, vibration and oscillator add in square.
+/// Jitter from several causes and dynamic error within 3σ + θ ≤ 45°: thermal, vibration and oscillator add in
+/// square.
 pub fn holds(jitters_rad: &[f64], stress_rad: f64) -> bool {
     let variance: f64 = jitters_rad.iter().map(|sigma| sigma * sigma).sum();
     3.0 * variance.sqrt() + stress_rad.abs() <= LIMIT_RAD
@@ -76,7 +79,8 @@ pub fn slip_time_s(jitter_rad: f64, bandwidth_hz: f64) -> f64 {
     PI * PI * rho * scaled * scaled * libm::exp(2.0 * rho) / (2.0 * bandwidth_hz)
 }
 
-/// e^−x·I0(x): the power series for small x, Hankel's expansion for large (Abramowitz and Stegun 9.6.12, 9.7.1).
+/// e^−x·I0(x): the power series for small x, Hankel's expansion for large (Abramowitz and Stegun 9.6.12,
+/// 9.7.1).
 fn bessel_i0_scaled(x: f64) -> f64 {
     let (mut term, mut sum) = (1.0, 1.0);
     if x < 30.0 {

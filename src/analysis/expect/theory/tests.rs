@@ -139,7 +139,8 @@ fn code_jitter_is_the_tabled_one() {
 
 #[test]
 fn band_limited_code_jitter_is_the_tabled_one() {
-    // Two-sided band in chip rates, d, chips at 45 dB-Hz, B = 1 Hz, T = 1 ms: 400 001-point quadrature in NumPy.
+    // Two-sided band in chip rates, d, chips at 45 dB-Hz, B = 1 Hz, T = 1 ms: 400 001-point quadrature in
+    // NumPy.
     for (band, d, chips) in [
         (2.0, 0.1, 0.002_859_83),
         (4.0, 0.1, 0.002_020_83),
@@ -155,7 +156,8 @@ fn band_limited_code_jitter_is_the_tabled_one() {
         close(found * 0.9995_f64.sqrt(), chips, 5e-6);
     }
     close(BandIntegrals::rectangular(0.5, 2.0).bound_chips(1.0, hz(45.0)) * 0.9995_f64.sqrt(), 0.002_811, 5e-6);
-    // Wide open, the integral becomes the triangle's closed form; what lies outside the band is 1/(π²·band) of it.
+    // Wide open, the integral becomes the triangle's closed form; what lies outside the band is 1/(π²·band)
+    // of it.
     let wide = BandIntegrals::rectangular(0.5, 400.0);
     let triangle = dll::jitter_chips(Discriminator::EarlyMinusLate, 0.5, 1.0, 1e-3, hz(45.0));
     close(wide.jitter_chips(Discriminator::EarlyMinusLate, 1.0, 1e-3, hz(45.0)).unwrap(), triangle, 2e-3);
@@ -255,9 +257,11 @@ fn frequency_jitter_is_the_tabled_one() {
     close(fll::jitter_hz(2.0, 20e-3, hz(35.0), 1.0), 0.403_405, 3e-6);
     close(fll::threshold_hz(1e-3), 83.3333, 1e-6);
     assert!(fll::holds(50.0, 100.0, 1e-3) && !fll::holds(50.0, 101.0, 1e-3));
-    // Wrong signs of differential phase shift keying at Eb/N0 = 10 dB (Proakis, Digital Communications, 5.2-69).
+    // Wrong signs of differential phase shift keying at Eb/N0 = 10 dB (Proakis, Digital Communications,
+    // 5.2-69).
     close(fll::wrap_probability(1e-3, 1e4), 2.27e-5, 1e-3);
-    // Separate pairs, order 1: the loop's own variance is the printed formula but for its squaring loss, 1 against ½.
+    // Separate pairs, order 1: the loop's own variance is the printed formula but for its squaring loss, 1
+    // against ½.
     let (bandwidth_hz, t_s, cn0_hz) = (2.0, 1e-3, hz(45.0));
     let k = 8.0 * bandwidth_hz * t_s / (1.0 + 4.0 * bandwidth_hz * t_s);
     let separate = FrequencyLoop { gains: [k, 0.0], pairs: Pairs::Separate };
@@ -359,7 +363,8 @@ fn jitter_on_any_spectrum_is_that_of_its_correlation() {
         (boc / dll::raw_chips(Discriminator::Coherent, d, t_s, 30.0 / t_s)).powi(2)
     };
     close(ratio(0.05), 1.0 / 3.0, 1e-12);
-    // The bound of any discriminator follows the spectrum too: within 24 chip rates BOC(1,1) has more far out.
+    // The bound of any discriminator follows the spectrum too: within 24 chip rates BOC(1,1) has more far
+    // out.
     let bound = |integrals: BandIntegrals| integrals.bound_chips(1.0, hz(45.0));
     assert!(bound(BandIntegrals::of(density, 0.1, 24.0)) < 0.65 * bound(BandIntegrals::rectangular(0.1, 24.0)));
 }

@@ -2,9 +2,9 @@
 //! and C/N0.
 //!
 //! Every figure of a satellite is put over its own limit, so that the worst satellite speaks for all. Theory
-//! is that of [`crate::analysis::measure::jitter`] at the true C/N0 less what front end and converter cost, with the
-//! oscillator's noise and the motion's stress. Limits: epochs that interference costs more than `JAMMED_DB`,
-//! or whose C/N0 moved by more than `STEADY_DB` within the receiver's averages, are left out.
+//! is that of [`crate::analysis::measure::jitter`] at the true C/N0 less what front end and converter cost,
+//! with the oscillator's noise and the motion's stress. Limits: epochs that interference costs more than
+//! `JAMMED_DB`, or whose C/N0 moved by more than `STEADY_DB` within the receiver's averages, are left out.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -48,35 +48,55 @@ const LEAST: usize = 30;
 /// A figure of the satellite that is nearest to its limit, or farthest beyond.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Worst {
+    /// The satellite, or satellite and signal.
     pub name: String,
+    /// Its figure.
     pub value: f64,
+    /// Its limit.
     pub limit: f64,
 }
 
 /// What is judged satellite by satellite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Figure {
+    /// Mean of the code errors, metres.
     CodeBias,
+    /// Largest code error, metres.
     CodeLargest,
+    /// Mean of the carrier errors, cycles.
     CarrierBias,
+    /// Largest carrier error, cycles.
     CarrierLargest,
+    /// Mean of the Doppler errors, Hz.
     DopplerBias,
+    /// Largest Doppler error, Hz.
     DopplerLargest,
+    /// Jitter of a loop over its theory, against the largest ratio.
     Above(Loop),
+    /// Jitter of a loop over its theory, against the smallest ratio.
     Below(Loop),
+    /// Spread of a raw discriminator over its theory, against the largest ratio.
     RawAbove(Loop),
+    /// Spread of a raw discriminator over its theory, against the smallest ratio.
     RawBelow(Loop),
+    /// Mean of a raw discriminator.
     RawBias(Loop),
+    /// Mean error of C/N0 among the observations, dB.
     Cn0Bias,
+    /// Largest error of C/N0 among the observations, dB.
     Cn0Largest,
+    /// Mean error of C/N0 among the loops' updates, dB.
     LoopCn0Bias,
+    /// Power of the prompts against their C/N0, dB.
     PromptPower,
+    /// Share of the prompts' power in quadrature.
     PromptQuadrature,
 }
 
 /// The worst of each figure.
 #[derive(Clone, Debug, Default)]
 pub struct Links {
+    /// The worst satellite of each figure.
     pub worst: BTreeMap<Figure, Worst>,
     /// Satellites whose signal no loop of the receiver's settings can hold.
     pub unheld: Vec<String>,
@@ -86,7 +106,7 @@ impl Links {
     /// Measures every satellite; nothing where the receiver names no settings.
     ///
     /// # Errors
-    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
         let mut links = Self::default();
         let Some(settings) = Settings::of(run) else { return Ok(links) };

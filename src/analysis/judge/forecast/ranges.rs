@@ -31,12 +31,17 @@ use crate::gnss::time::GPST;
 /// The receiver's choices that its accuracy follows from.
 #[derive(Clone, Debug)]
 pub struct Choices {
+    /// Of the loops.
     pub loops: Settings,
     /// Time of a loop's update, by signal.
     pub updates_s: BTreeMap<&'static Signal, f64>,
+    /// Memory of the smoothing of code by carrier, seconds.
     pub smoothing_s: f64,
+    /// Elevation below which no satellite is used, radians.
     pub mask_rad: f64,
+    /// Deviation of the receiver's models of the atmosphere at the zenith, metres.
     pub model_sigma_m: f64,
+    /// Whether it corrects the ionosphere by the broadcast model.
     pub ionosphere: bool,
     /// Of the ionosphere's model, as a share of its delay.
     pub ionosphere_error_share: f64,
@@ -78,23 +83,29 @@ const MASK_SLACK_RAD: f64 = 2e-3;
 /// One range as it should be.
 #[derive(Clone, Copy, Debug)]
 pub struct Forecast {
+    /// The satellite.
     pub sv: Sv,
     /// Which of [`Scene::scales`] its clock is counted against.
     pub clock: usize,
     /// Towards the satellite: east, north, up.
     pub sight: Vector3<f64>,
-    /// Expected bias once the ionosphere is corrected, and what not correcting it adds.
+    /// Expected bias once the ionosphere is corrected, metres.
     pub bias_m: f64,
+    /// What not correcting the ionosphere adds to it, metres.
     pub ionosphere_m: f64,
     /// What the true troposphere delays, for the share that a model of it errs by.
     pub troposphere_m: f64,
-    /// Variances of thermal noise, and of edges and rays.
+    /// Variance of thermal noise, m².
     pub noise_m2: f64,
+    /// Variance of what chip edges and reflected rays leave, m².
     pub other_m2: f64,
+    /// How long a range remembers its noise, seconds.
     pub memory_s: f64,
-    /// Standard deviation of its Doppler, as a rate, and its bias by the rate of the atmosphere.
+    /// Standard deviation of its Doppler as a rate, m/s.
     pub rate_sigma_mps: f64,
+    /// Bias of that rate by the rate of the atmosphere, m/s.
     pub rate_bias_mps: f64,
+    /// C/N0 that the scene allows, Hz.
     pub cn0_hz: f64,
     /// Whether the C/N0 observed is near the true one: in fades and jamming averages lag, which rows of their
     /// own judge.
@@ -109,11 +120,15 @@ pub struct Forecast {
 
 /// What is the same for all satellites of a run.
 pub struct Scene<'r> {
+    /// The run.
     pub run: &'r Run,
+    /// What the receiver's designer chose.
     pub choices: Choices,
+    /// What the satellites sent.
     pub message: Message,
     /// Names of the time scales of the run's signals, GPS time first.
     pub scales: Vec<&'static str>,
+    /// The truth's places by sample.
     pub trajectory: HashMap<u64, &'r TrajectoryRow>,
     /// Samples with a fix, and those of them that leave satellites out.
     pub fixes: HashMap<u64, usize>,
@@ -123,7 +138,7 @@ pub struct Scene<'r> {
     health: BTreeMap<Sv, Vec<(u64, bool)>>,
     /// Decibels that filter and converter cost, by signal.
     costs_db: BTreeMap<&'static Signal, f64>,
-    /// Error of chip edges with a standing code, root mean square.
+    /// Error of chip edges with a code at rest, root mean square.
     edges_m: BTreeMap<&'static Signal, f64>,
 }
 
@@ -176,7 +191,7 @@ impl<'r> Scene<'r> {
     /// Gives every range of a satellite that a fix may use to `take`, with the number of that fix.
     ///
     /// # Errors
-    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn ranges(&self, errors: &Errors, link: Link, mut take: impl FnMut(usize, Forecast)) -> Result<(), JudgeError> {
         let update_s = self.choices.updates_s.get(link.signal);
         let theory = update_s.and_then(|update_s| Theory::new(self.run, self.choices.loops, &link, *update_s));

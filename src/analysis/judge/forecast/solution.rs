@@ -37,7 +37,8 @@ struct Sums {
     memory_s: f64,
 }
 
-/// A zenith's ionosphere before its parameters are known, one sigma: the order of a day's mean at solar maximum.
+/// A zenith's ionosphere before its parameters are known, one sigma: the order of a day's mean at solar
+/// maximum.
 const IONOSPHERE_SIGMA_M: f64 = 5.0;
 /// Standard deviations from which on a bias is a fault that the residuals may show.
 const FAULT: f64 = 3.0;
@@ -108,29 +109,36 @@ impl Sums {
 /// What is expected of one fix: east, north, up and clock, the clock's sign as the receiver's bias has it.
 #[derive(Clone, Debug)]
 pub struct Expected {
+    /// Number of the sample, counted from the first one.
     pub sample: u64,
     /// Least and most satellites that it should use.
     pub satellites: (u32, u32),
     /// Satellites that the fix leaves out though nothing is wrong with them.
     pub blameless: u32,
-    /// Known bias, and what may come on top of it in either direction.
+    /// Known bias, metres.
     pub bias: Vector4<f64>,
+    /// What may come on top of it in either direction, metres.
     pub allowed: Vector4<f64>,
-    /// Covariance of the errors: of all that may vary, and of what varies within a run; of what should be
-    /// stated, and squares of the dilutions.
+    /// Covariance of all that may vary, m².
     pub noise: Matrix4<f64>,
+    /// Covariance of what varies within a run, m².
     pub thermal: Matrix4<f64>,
+    /// Covariance that should be stated, m².
     pub stated: Matrix4<f64>,
+    /// Cofactors without weights: squares of the dilutions.
     pub dilution: Matrix4<f64>,
     /// Ratio of the extreme singular values of the geometry, all clocks counted.
     pub condition: f64,
-    /// Whether the fix says that the message's ionosphere corrects it without an error of its own, or needs none.
+    /// Whether the fix says that the message's ionosphere corrects it without an error of its own, or needs
+    /// none.
     pub corrected: bool,
     /// Whether every satellite's C/N0 was measured as it is: what is stated follows from it.
     pub steady: bool,
+    /// How long a fix remembers its noise, seconds.
     pub memory_s: f64,
-    /// Covariance of velocity and of c times the drift, and what may come on top by the atmosphere.
+    /// Covariance of velocity and of c times the drift, (m/s)².
     pub rate_noise: Matrix4<f64>,
+    /// What the atmosphere may add to either rate, m/s.
     pub rate_allowed: Vector4<f64>,
 }
 
@@ -143,7 +151,7 @@ const TROPOSPHERE_SHARE: f64 = 0.05;
 /// Expectations of all fixes that have a truth and enough satellites.
 ///
 /// # Errors
-/// [`JudgeError::Read`] where rows that were put by cannot be read.
+/// [`JudgeError::Read`] where spilled rows cannot be read.
 pub fn expected(scene: &Scene<'_>, errors: &Errors) -> Result<Vec<Expected>, JudgeError> {
     let mut sums = vec![Sums::new(scene.scales.len().max(1)); scene.run.fixes.len()];
     for link in errors.signals.keys() {

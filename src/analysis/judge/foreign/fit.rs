@@ -11,7 +11,9 @@ use std::collections::BTreeMap;
 /// A number and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
+    /// The estimate.
     pub value: f64,
+    /// Its standard deviation.
     pub sigma: f64,
 }
 

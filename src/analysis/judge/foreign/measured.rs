@@ -9,14 +9,23 @@ use crate::gnss::signal::Link;
 /// what is common to the satellites of its epoch is taken out, of carriers also an arc's constant.
 #[derive(Clone, Debug, Serialize)]
 pub struct ObservationError {
+    /// The receiver's label, in seconds after the truth began.
     pub label_s: f64,
+    /// The satellite.
     pub sv: String,
+    /// Name of the signal.
     pub signal: &'static str,
+    /// Elevation of the satellite, degrees.
     pub elevation_deg: f64,
+    /// Error of the pseudorange, metres.
     pub code_m: Option<f64>,
+    /// Error of the carrier, cycles.
     pub carrier_cycles: Option<f64>,
+    /// Error of the Doppler, Hz.
     pub doppler_hz: Option<f64>,
+    /// Error of C/N0, dB.
     pub cn0_db: Option<f64>,
+    /// Satellite and signal.
     #[serde(skip)]
     pub link: Link,
 }
@@ -24,9 +33,12 @@ pub struct ObservationError {
 /// What an epoch's satellites have in common: a row of `foreign_clock.csv`.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ClockRow {
+    /// The receiver's label, in seconds after the truth began.
     pub label_s: f64,
+    /// Number of satellites.
     pub satellites: usize,
-    /// Mean error of the pseudoranges over the speed of light: reading of the receiver's clock minus GPS time.
+    /// Mean error of the pseudoranges over the speed of light: reading of the receiver's clock minus GPS
+    /// time.
     pub bias_s: f64,
     /// The sampler's clock there.
     pub sampler_bias_s: f64,
@@ -35,7 +47,9 @@ pub struct ClockRow {
 /// A break of a carrier's count: a row of `foreign_slips.csv`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Slip {
+    /// The receiver's label, in seconds after the truth began.
     pub label_s: f64,
+    /// The satellite.
     pub sv: String,
     /// To the half cycle; unknown where the count was interrupted.
     pub size_cycles: Option<f64>,
@@ -46,49 +60,82 @@ pub struct Slip {
 /// What one satellite's errors come to: a row of `foreign_satellites.csv`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Satellite {
+    /// The satellite.
     pub sv: String,
+    /// Name of the signal.
     pub signal: &'static str,
+    /// Epochs in which it was observed.
     pub epochs: usize,
+    /// Its mean elevation, degrees.
     pub elevation_deg: f64,
+    /// Mean error of the code, metres.
     pub code_bias_m: Option<f64>,
+    /// Standard deviation of the code errors, metres.
     pub code_sigma_m: Option<f64>,
+    /// Standard deviation of the carrier errors, cycles.
     pub carrier_sigma_cycles: Option<f64>,
+    /// Mean error of the Doppler, Hz.
     pub doppler_bias_hz: Option<f64>,
+    /// Standard deviation of the Doppler errors, Hz.
     pub doppler_sigma_hz: Option<f64>,
+    /// Mean error of C/N0, dB.
     pub cn0_bias_db: Option<f64>,
+    /// Standard deviation of the C/N0 errors, dB.
     pub cn0_sigma_db: Option<f64>,
     /// Code minus carrier, against that of the truth.
     pub code_carrier_drift_mps: Option<f64>,
+    /// Number of cycle slips.
     pub slips: usize,
 }
 
 /// Everything measured.
 #[derive(Clone, Debug, Default)]
 pub struct Measured {
+    /// Epochs of the file.
     pub epochs: usize,
+    /// Epochs that the truth has.
     pub joined: usize,
+    /// Observations that the truth has.
     pub observations: usize,
     /// Of satellites or times that the truth does not have.
     pub unmatched: usize,
+    /// Observations left out as of a wrong lock.
     pub outliers: usize,
+    /// By how much labels are late, seconds.
     pub time_tag_s: Option<Estimate>,
     /// Whether it was significant, so that the truth was taken at the corrected times.
     pub time_tag_applied: bool,
+    /// Every observation.
     pub rows: Vec<ObservationError>,
+    /// Every epoch.
     pub clock: Vec<ClockRow>,
+    /// Every break of a carrier.
     pub slips: Vec<Slip>,
+    /// Every satellite.
     pub satellites: Vec<Satellite>,
+    /// Root mean square of the code errors, metres.
     pub code_rms_m: Option<f64>,
+    /// Standard deviation of the code errors, metres.
     pub code_sigma_m: Option<f64>,
+    /// +1 where carriers grow with range, −1 where they fall.
     pub carrier_sign: Option<f64>,
+    /// Root mean square of the carrier errors, cycles.
     pub carrier_rms_cycles: Option<f64>,
+    /// Slope of measured over true Doppler; 1 is right.
     pub doppler_scale: Option<Estimate>,
+    /// Root mean square of the Doppler errors, Hz.
     pub doppler_rms_hz: Option<f64>,
+    /// Mean error of C/N0, dB.
     pub cn0_db: Option<Estimate>,
+    /// Drift of the receiver's clock by its code, seconds a second.
     pub drift_code: Option<f64>,
+    /// The same by its carrier.
     pub drift_carrier: Option<f64>,
+    /// The same by its Doppler.
     pub drift_doppler: Option<f64>,
+    /// Rate of code minus carrier beside that of the truth, m/s.
     pub code_carrier_mps: Option<Estimate>,
+    /// Doppler minus the carrier's own rate, Hz.
     pub doppler_carrier_hz: Option<Estimate>,
 }
 

@@ -1,10 +1,11 @@
 //! Judging a receiver that this project did not write and that was fed this project's samples.
 //!
-//! It is known by its files alone: observations in RINEX 3 ([`crate::analysis::read::rinex_obs`]), positions in NMEA ([`crate::analysis::read::nmea`]).
-//! They are joined with the truth by GPS time ([`timeline`]), since a foreign receiver knows nothing of sample
-//! numbers. [`observables`] and [`place`] measure; [`report`] names the biases. A receiver that took its week
-//! for one 1024 weeks off is moved back and told so. Results: `foreign.json`,
-//! `foreign_{observations,satellites,clock,slips,fixes}.csv` and pictures.
+//! It is known by its files alone: observations in RINEX 3 ([`crate::analysis::read::rinex_obs`]), positions
+//! in NMEA ([`crate::analysis::read::nmea`]). They are joined with the truth by GPS time ([`timeline`]),
+//! since a foreign receiver knows nothing of sample numbers. [`observables`] and [`place`] measure;
+//! [`report`] names the biases. A receiver that took its week for one 1024 weeks off is moved back, and the
+//! report says so. Results: `foreign.json`, `foreign_{observations,satellites,clock,slips,fixes}.csv` and
+//! pictures.
 
 mod carriers;
 mod fit;
@@ -31,7 +32,9 @@ pub use report::ForeignSummary;
 /// The files of a receiver under test.
 #[derive(Clone, Debug, Default)]
 pub struct Files {
+    /// Observations, RINEX 3.
     pub rinex_obs: Option<PathBuf>,
+    /// Positions, NMEA 0183.
     pub nmea: Option<PathBuf>,
 }
 
@@ -43,8 +46,8 @@ const NEAR_S: f64 = 86_400.0;
 /// Judges a receiver's files against the truth in a directory.
 ///
 /// # Errors
-/// [`JudgeError::Line`] with the first line of a file that is not as its format has it, and [`JudgeError::NotOfThisTruth`] for
-/// files of another time.
+/// [`JudgeError::Line`] with the first line of a file that is not as its format has it, and
+/// [`JudgeError::NotOfThisTruth`] for files of another time.
 pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
     let run = Run::read_truth(truth)?;
     let timeline = timeline::Timeline::new(&run)?.ok_or_else(|| JudgeError::NotOfThisTruth {
@@ -94,7 +97,9 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
 
 /// A judgement that is not written yet.
 pub struct Judgement {
+    /// Everything that was measured.
     pub judged: Judged,
+    /// What it comes to.
     pub summary: ForeignSummary,
 }
 
@@ -120,7 +125,8 @@ fn line(path: &Path, fault: Fault) -> JudgeError {
     JudgeError::Line { path: path.to_owned(), line: fault.line, what: fault.what }
 }
 
-/// Seconds, a multiple of 1024 weeks, by which labels lie ahead of the truth; `None` where no multiple brings one near.
+/// Seconds, a multiple of 1024 weeks, by which labels lie ahead of the truth; `None` where no multiple brings
+/// one near.
 fn rollover(labels: &[Epoch], timeline: &timeline::Timeline) -> Option<i64> {
     let (from_s, to_s) = timeline.span_s();
     let first = labels.first()?;

@@ -4,8 +4,8 @@
 //! so their mean error, signal by signal, is its clock and not an error; the same goes for carriers and
 //! Dopplers. A label that is late by δ adds δ·λ·f_D to a pseudorange, whose slope over Doppler therefore
 //! gives δ; where it is significant the truth is looked up again at the corrected time. Carriers lose one
-//! constant an arc. Limits: biases common to all satellites cannot be told from the clock, and a code bias
-//! that happens to go with Doppler not from a late label in a short static scene.
+//! constant an arc. Limits: biases common to all satellites cannot be separated from the clock, and a code
+//! bias that happens to go with Doppler not from a late label in a short static scene.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -161,7 +161,7 @@ fn doppler_and_strength(measured: &mut Measured, pairs: &[Pair<'_>]) {
     measured.cn0_db = mean_of_means(&strengths.values().filter_map(|errors| mean(errors)).collect::<Vec<_>>());
 }
 
-/// Whether code, carrier and Doppler of the receiver tell of one clock and one motion.
+/// Whether code, carrier and Doppler of the receiver agree on one clock and one motion.
 fn consistency(measured: &mut Measured, pairs: &[Pair<'_>], carriers: &Carriers, arcs: &Arcs) {
     let mut drifts = Vec::new();
     let mut turns = Vec::new();

@@ -1,8 +1,8 @@
 //! Errors of a foreign receiver's positions.
 //!
 //! Positions are compared with the antenna's at the time on their label. A late label shows as an error along
-//! the motion, −δ·v, so that only a moving scene tells. The sigma of a bias counts errors that remember each
-//! other once ([`crate::analysis::measure::independent`]).
+//! the motion, −δ·v, so that only a moving scene shows it. The sigma of a bias counts errors that remember
+//! each other once ([`crate::analysis::measure::independent`]).
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -17,14 +17,21 @@ use crate::gnss::earth::Geodetic;
 /// One fix against the truth: a row of `foreign_fixes.csv`.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct FixError {
+    /// The receiver's label, in seconds after the truth began.
     pub label_s: f64,
+    /// Satellites that the receiver used.
     pub satellites: u32,
+    /// Error to the east, metres.
     pub east_m: f64,
+    /// Error to the north, metres.
     pub north_m: f64,
+    /// Error upward, metres.
     pub up_m: f64,
     /// Of the velocity over ground.
     pub velocity_east_mps: Option<f64>,
+    /// Error of the velocity to the north, m/s.
     pub velocity_north_mps: Option<f64>,
+    /// True velocity east, north and up, m/s.
     #[serde(skip)]
     pub true_velocity_enu_mps: Vector3<f64>,
 }
@@ -32,19 +39,27 @@ pub struct FixError {
 /// What the positions come to.
 #[derive(Clone, Debug, Default)]
 pub struct Places {
+    /// Fixes of the file.
     pub fixes: usize,
+    /// Every fix that the truth has.
     pub rows: Vec<FixError>,
     /// Mean error east, north, up.
     pub bias_enu_m: Option<[Estimate; 3]>,
+    /// Root mean square of the horizontal error, metres.
     pub horizontal_rms_m: Option<f64>,
+    /// Horizontal error that 95 % of the fixes stay below, metres.
     pub horizontal_p95_m: Option<f64>,
+    /// Root mean square of the vertical error, metres.
     pub up_rms_m: Option<f64>,
+    /// Error in space that 95 % of the fixes stay below, metres.
     pub error_3d_p95_m: Option<f64>,
+    /// Root mean square of the error of the ground speed, m/s.
     pub ground_speed_rms_mps: Option<f64>,
+    /// By how much labels are late along the motion, seconds.
     pub time_tag_s: Option<Estimate>,
 }
 
-/// Truth slower than this cannot tell a late label.
+/// Truth slower than this does not show a late label.
 const SLOWEST_MPS: f64 = 1.0;
 
 /// Joins and measures; `shift_s` is taken from every label first.

@@ -14,18 +14,26 @@ use super::measured::Measured;
 use crate::analysis::statistics::mean;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 
-/// `foreign.json`. A number that the files cannot tell is null.
+/// `foreign.json`. A number that the files do not show is null.
 #[derive(Clone, Debug, Serialize)]
 pub struct ForeignSummary {
+    /// The scene's name.
     pub scene: String,
     /// As its RINEX header says.
     pub receiver: Option<String>,
+    /// How the files were joined with the truth.
     pub join: Join,
+    /// The receiver's clock.
     pub clock: Clock,
+    /// Pseudoranges.
     pub code: Code,
+    /// Carriers.
     pub carrier: Carrier,
+    /// Dopplers.
     pub doppler: Doppler,
+    /// Signal strengths.
     pub cn0: Cn0,
+    /// Positions.
     pub position: Position,
     /// Each bias in one sentence.
     pub findings: Vec<String>,
@@ -34,23 +42,31 @@ pub struct ForeignSummary {
 /// How files and truth were brought together.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Join {
+    /// Epochs of the file of observations.
     pub epochs: usize,
+    /// Epochs that the truth has.
     pub epochs_joined: usize,
+    /// Observations that the truth has.
     pub observations: usize,
     /// Of satellites or times that the truth does not have.
     pub observations_unmatched: usize,
     /// Pseudoranges so far from the others that another signal must have been followed.
     pub observations_outliers: usize,
+    /// Time between the truth's rows, seconds.
     pub truth_interval_s: f64,
     /// Largest errors of the truth between its rows.
     pub interpolation_code_m: f64,
+    /// Largest error of a carrier between the truth's rows, cycles.
     pub interpolation_carrier_cycles: f64,
+    /// Largest error of a Doppler between the truth's rows, Hz.
     pub interpolation_doppler_hz: f64,
     /// By how many weeks the dates of observations and positions were off.
     pub observations_week_offset: i64,
+    /// Weeks by which the positions' labels were moved.
     pub positions_week_offset: i64,
     /// By how much labels of observations are late, from the slope of pseudorange errors over Doppler.
     pub time_tag_offset_s: Option<f64>,
+    /// Standard deviation of the time tag, seconds.
     pub time_tag_sigma_s: Option<f64>,
     /// Whether that was significant, and the truth taken at the corrected times.
     pub time_tag_applied: bool,
@@ -64,26 +80,34 @@ pub struct Clock {
     /// The same less the sampler's clock: a bias of all pseudoranges, of a receiver that labels its epochs by
     /// counting samples.
     pub pseudorange_common_less_sampler_m: Option<f64>,
+    /// Mean reading minus GPS time, seconds.
     pub bias_mean_s: Option<f64>,
+    /// Drift by the code, seconds a second.
     pub drift_code: Option<f64>,
+    /// Drift by the carrier, seconds a second.
     pub drift_carrier: Option<f64>,
+    /// Drift by the Doppler, seconds a second.
     pub drift_doppler: Option<f64>,
     /// Drift of the clock that sampled the signal, in truth.
     pub sampler_drift: f64,
+    /// Mean reading of the sampler's clock minus true time, seconds.
     pub sampler_bias_mean_s: Option<f64>,
 }
 
 /// Pseudoranges without the clock.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Code {
+    /// Root mean square of the errors, metres.
     pub rms_m: Option<f64>,
     /// Each satellite about its own mean.
     pub sigma_m: Option<f64>,
     /// The largest bias of one satellite against the others, and whose.
     pub largest_bias_m: Option<f64>,
+    /// The satellite with the largest bias.
     pub largest_bias_sv: Option<String>,
     /// Slope over time of code minus carrier.
     pub minus_carrier_drift_mps: Option<f64>,
+    /// Its standard deviation, m/s.
     pub minus_carrier_drift_sigma_mps: Option<f64>,
 }
 
@@ -92,8 +116,11 @@ pub struct Code {
 pub struct Carrier {
     /// +1 where it grows with range, as RINEX has it.
     pub sign: Option<f64>,
+    /// Root mean square of the errors, cycles.
     pub rms_cycles: Option<f64>,
+    /// Breaks of a count.
     pub slips: usize,
+    /// Those that the file does not declare.
     pub slips_undeclared: usize,
 }
 
@@ -102,39 +129,57 @@ pub struct Carrier {
 pub struct Doppler {
     /// Slope of what is reported over the truth: 1, or −1 with the opposite sign.
     pub scale: Option<f64>,
+    /// Standard deviation of the scale.
     pub scale_sigma: Option<f64>,
     /// Without the clock's drift.
     pub rms_hz: Option<f64>,
     /// Doppler plus the carrier's own rate.
     pub minus_carrier_rate_hz: Option<f64>,
+    /// Its standard deviation, Hz.
     pub minus_carrier_rate_sigma_hz: Option<f64>,
 }
 
 /// C/N0 against what the scene allows: other satellites and interference counted as noise.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Cn0 {
+    /// Mean error, dB.
     pub bias_db: Option<f64>,
+    /// Its standard deviation, dB.
     pub bias_sigma_db: Option<f64>,
 }
 
 /// Positions.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Position {
+    /// Number of fixes.
     pub fixes: usize,
+    /// Fixes that the truth has.
     pub fixes_joined: usize,
+    /// Mean error to the east, metres.
     pub bias_east_m: Option<f64>,
+    /// Mean error to the north, metres.
     pub bias_north_m: Option<f64>,
+    /// Mean error upward, metres.
     pub bias_up_m: Option<f64>,
+    /// Standard deviation of the mean to the east, metres.
     pub bias_east_sigma_m: Option<f64>,
+    /// Standard deviation of the mean to the north, metres.
     pub bias_north_sigma_m: Option<f64>,
+    /// Standard deviation of the mean upward, metres.
     pub bias_up_sigma_m: Option<f64>,
+    /// Root mean square of the horizontal error, metres.
     pub horizontal_rms_m: Option<f64>,
+    /// Horizontal error that 95 % of the fixes stay below, metres.
     pub horizontal_p95_m: Option<f64>,
+    /// Root mean square of the vertical error, metres.
     pub up_rms_m: Option<f64>,
+    /// Error in space that 95 % of the fixes stay below, metres.
     pub error_3d_p95_m: Option<f64>,
+    /// Root mean square of the error of the ground speed, m/s.
     pub ground_speed_rms_mps: Option<f64>,
     /// Null in a scene at rest.
     pub time_tag_offset_s: Option<f64>,
+    /// Standard deviation of the time tag, seconds.
     pub time_tag_sigma_s: Option<f64>,
 }
 
@@ -290,7 +335,7 @@ impl ForeignSummary {
                 common_m / SPEED_OF_LIGHT_MPS * 1e6
             ));
         }
-        // A tenth of a hertz at L1 tells two clocks apart.
+        // A tenth of a hertz at L1 separates two clocks.
         let same = |drift: f64| (drift - clock.sampler_drift).abs() < 6e-11;
         for (what, drift) in
             [("pseudoranges", clock.drift_code), ("carriers", clock.drift_carrier), ("Dopplers", clock.drift_doppler)]

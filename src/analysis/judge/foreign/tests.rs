@@ -18,7 +18,7 @@ const RATE_HZ: u64 = 2_600_000;
 const PRNS: [u8; 9] = [2, 5, 7, 12, 15, 18, 21, 26, 29];
 const SAMPLER: (f64, f64) = (1.3e-4, 5e-8);
 
-/// What a receiver does to what it hears.
+/// What a receiver does to what it receives.
 struct Planted {
     late_s: f64,
     clock: (f64, f64),
@@ -33,7 +33,7 @@ const PLANTED: Planted =
 const CODE_SIGMA_M: f64 = 0.3;
 const CARRIER_SIGMA: f64 = 0.01;
 const DOPPLER_SIGMA_HZ: f64 = 0.2;
-/// The biased satellite stands where Doppler is near the mean, so that it does not pull at the time tag.
+/// The biased satellite is where Doppler is near the mean, so that it does not pull at the time tag.
 const BIASED: (usize, f64) = (4, 2.0);
 
 fn start() -> Epoch {

@@ -1,7 +1,8 @@
-//! Searches against the truth: a found satellite's Doppler, code phase and C/N0, and whether found and tracked agree.
+//! Searches against the truth: a found satellite's Doppler, code phase and C/N0, and whether found and
+//! tracked agree.
 //!
-//! The truth has rows every tenth of a second or so; a search in between is held against cubics through
-//! values and rates. Limits: a search that begins before the first or after the last row is not held against
+//! The truth has rows every tenth of a second or so; a search in between is compared with cubics through
+//! values and rates. Limits: a search that begins before the first or after the last row is not compared with
 //! anything.
 
 use std::collections::BTreeSet;

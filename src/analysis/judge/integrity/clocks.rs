@@ -17,7 +17,8 @@ use crate::gnss::signal::Link;
 
 /// What a lock time may err by: it counts whole updates, of which none is longer than a bit.
 const LOCK_S: f64 = 0.02;
-/// Rounding of readings: pseudoranges of 1e8 m in a double are known to 2e-8 m, and GPS time's fraction to 1e-16 s.
+/// Rounding of readings: pseudoranges of 1e8 m in a double are known to 2e-8 m, and GPS time's fraction to
+/// 1e-16 s.
 const READING_M: f64 = 1e-4;
 const IDENTITY: f64 = 1e-9;
 

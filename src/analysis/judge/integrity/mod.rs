@@ -17,8 +17,11 @@ use crate::analysis::read::Run;
 /// One law of the tables and how far it is broken.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
+    /// What is measured, in words.
     pub figure: &'static str,
+    /// The value.
     pub value: f64,
+    /// Unit of the value.
     pub unit: &'static str,
     /// Most that a sound receiver has.
     pub limit: f64,
@@ -58,7 +61,7 @@ impl Found {
 /// Every law.
 ///
 /// # Errors
-/// [`JudgeError::Read`] where rows that were put by cannot be read.
+/// [`JudgeError::Read`] where spilled rows cannot be read.
 pub fn findings(run: &Run, errors: &Errors) -> Result<Vec<Finding>, JudgeError> {
     let mut all = tables::findings(run, errors)?;
     all.extend(clocks::findings(run)?);

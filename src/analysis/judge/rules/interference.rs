@@ -27,7 +27,7 @@ impl Verdict {
             Bound::Max(0.0),
             "none of those with a wave of J/N0 ≥ 45 dB-Hz all through",
         );
-        // Where a wave is never alone, what is told may be another source's line.
+        // Where a wave is never alone, what is reported may be another source's line.
         if let (Some(bin_hz), Some(error_hz)) = (lines.resolution_hz, lines.frequency_error_max_hz) {
             let source = "half a bin of the receiver's spectrum";
             self.judge(

@@ -25,7 +25,7 @@ impl Verdict {
     /// Judges what [`Slips`] found.
     ///
     /// # Errors
-    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub(super) fn losses(&mut self, run: &Run, receiver: &Receiver, slips: &Slips) -> Result<(), JudgeError> {
         let mut links: Vec<(String, &'static str)> =
             slips.rows.iter().map(|row| (row.sv.clone(), row.signal)).collect();
@@ -118,7 +118,8 @@ impl Witness {
         if let Some(found) = near.iter().find_map(|row| scene.excuse(sv, row, self.usual_dbhz)) {
             return Some(found);
         }
-        // A row that is missing at the end, in the middle, or before: the satellite was not there for a while.
+        // A row that is missing at the end, in the middle, or before: the satellite was not there for a
+        // while.
         let step_s = 1.5 * self.interval_s;
         let gone = near.windows(2).any(|two| two[1].time_s - two[0].time_s > step_s);
         // The row after counts too: a loss may be declared within an interval of the last one.

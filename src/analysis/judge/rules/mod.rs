@@ -33,7 +33,7 @@ impl Verdict {
     /// A run against the limits that need no user: those of theory and of the receiver's own covariance.
     ///
     /// # Errors
-    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn of(run: &Run, errors: &Errors, slips: &Slips, summary: &Summary) -> Result<Self, JudgeError> {
         let mut verdict = Self::default();
         let expected = Expectations::of(run, Receiver::of(run), run)?;

@@ -15,7 +15,8 @@ use crate::gnss::signal::Link;
 /// Share of the time over which a satellite must be observed, of what is required. The rest is for one
 /// unlucky search in many.
 const OBSERVED_SHARE: f64 = 0.95;
-/// Share of required satellites, over all epochs, that fixes may leave out, in percent: a residual test's false alarms.
+/// Share of required satellites, over all epochs, that fixes may leave out, in percent: a residual test's
+/// false alarms.
 const UNUSED_PERCENT: f64 = 5.0;
 
 impl Verdict {

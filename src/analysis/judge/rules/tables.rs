@@ -1,4 +1,5 @@
-//! Whether the receiver's tables are whole and agree with one another ([`crate::analysis::judge::integrity`]).
+//! Whether the receiver's tables are whole and agree with one another
+//! ([`crate::analysis::judge::integrity`]).
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::judge::integrity;

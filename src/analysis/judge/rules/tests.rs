@@ -151,7 +151,8 @@ fn an_oscillator_s_offset_and_a_front_end_s_delay_are_no_errors() {
     let directory = planted();
     let scene = directory.path().join("truth/scene.json");
     let text = std::fs::read_to_string(&scene).unwrap();
-    let stages = r#""front_end": [{"stage": "local_oscillator", "offset_hz": 5.0}, {"stage": "filter", "group_delay_s": 2.4e-7}],"#;
+    let stages = r#""front_end": [{"stage": "local_oscillator", "offset_hz": 5.0},
+        {"stage": "filter", "shape": "brick_wall", "bandwidth_hz": 1e9, "group_delay_s": 2.4e-7}],"#;
     std::fs::write(&scene, text.replace("{\"name\"", &format!("{{{stages} \"name\""))).unwrap();
     let mut run = Run::read(directory.path()).unwrap();
     let mut seen = SpillStore::new(run.truth.directory());

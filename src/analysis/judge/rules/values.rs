@@ -26,7 +26,8 @@ use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{Event, Fix, IonosphereModel};
 use crate::gnss::signal::Link;
 
-/// By how much theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a real one.
+/// By how much theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a real
+/// one.
 pub(super) const THEORY: f64 = 1.2;
 /// Factor within which a stated sigma lies about the expected one: 1 dB of C/N0 (1.12) and 12 % of theory and
 /// smoothing.
@@ -35,7 +36,8 @@ const SIGMA: f64 = 1.25;
 const GEOMETRY: f64 = 2e-3;
 /// How far formal correlations may be from the expected ones: weights within 1 dB move them by less.
 const CORRELATION: f64 = 0.1;
-/// Share of fixes that may leave out a satellite without cause: a residual test of probability 1e-3 whose errors last.
+/// Share of fixes that may leave out a satellite without cause: a residual test of probability 1e-3 whose
+/// errors last.
 const BLAMELESS_SHARE: f64 = 0.05;
 /// Independent fixes from which on a mean normalised error squared says something: below, a factor of three
 /// of sigma is within its band.
@@ -122,7 +124,8 @@ impl Verdict {
         let limit = largest(axes, 1) * THEORY * (square / kind.independent).sqrt() + allowed;
         let source = format!("theory of C/N0, geometry and loops; {:.0} independent", kind.independent);
         self.judge(&format!("{name} error, mean"), "", sum.norm() / count, unit, Bound::Max(limit), &source);
-        // More than a twentieth beyond a limit has twenty times the probability of one beyond, at most (Markov).
+        // More than a twentieth beyond a limit has twenty times the probability of one beyond, at most
+        // (Markov).
         let limits: Vec<f64> = kind.values.iter().map(|value| value.limit(largest(axes, 20))).collect();
         let (value, limit) = (percentile(&lengths, 0.95), percentile(&limits, 0.95));
         if let Some(limit) = limit {
@@ -360,7 +363,8 @@ impl Weight {
     }
 }
 
-/// When errors of fixes are judged: not while the scene expects any, and not while smoothing remembers that time.
+/// When errors of fixes are judged: not while the scene expects any, and not while smoothing remembers that
+/// time.
 struct Bounded<'a> {
     run: &'a Run,
     memory_s: f64,

@@ -34,28 +34,44 @@ pub const PLL_THRESHOLD_DEG: f64 = 15.0;
 /// `summary.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
+    /// The scene's name.
     pub scene: String,
+    /// Seed of the random numbers.
     pub seed: u64,
+    /// Length of the samples, seconds.
     pub duration_s: f64,
+    /// Samples a second, Hz.
     pub sample_rate_hz: f64,
+    /// The generator's level of fidelity, by name.
     pub fidelity: String,
+    /// Satellites that there were and that were found.
     pub satellites: Satellites,
+    /// Errors of the fixes.
     pub position: Position,
+    /// The receiver's clock.
     pub clock: Clock,
+    /// Errors of the observations of all signals.
     pub observables: Observables,
+    /// The loops of all signals.
     pub tracking: Tracking,
     /// Every signal that was observed by its name, also where it is the only one.
     pub signals: BTreeMap<&'static str, BySignal>,
+    /// The decoded messages.
     pub navigation: Navigation,
+    /// The spectrum of the samples.
     pub psd: Spectrum,
+    /// Continuous waves that the receiver reported; absent of one that does not look.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interference: Option<Lines>,
+    /// What a spoofer did; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spoofing: Option<Spoofing>,
+    /// How fast the stages ran.
     pub speed: Speed,
     /// Whether there was interference.
     #[serde(skip)]
     pub jammed: bool,
+    /// What the report prints beyond the keys.
     #[serde(skip)]
     pub details: Details,
 }
@@ -65,6 +81,7 @@ pub struct Summary {
 pub struct Satellites {
     /// Above the scene's mask at its first sample.
     pub in_view: usize,
+    /// Found by the receiver's search, true or not.
     pub acquired: usize,
     /// Most satellites in one fix.
     pub used: usize,
@@ -75,11 +92,17 @@ pub struct Satellites {
 /// Errors of the fixes.
 #[derive(Clone, Debug, Serialize)]
 pub struct Position {
+    /// Number of fixes.
     pub fixes: usize,
+    /// Seconds from sample 0 to the first fix.
     pub first_fix_s: Option<f64>,
+    /// Mean of the horizontal error, metres.
     pub horizontal_mean_m: Option<f64>,
+    /// Horizontal error that 95 % of the fixes stay below, metres.
     pub horizontal_p95_m: Option<f64>,
+    /// Vertical error that 95 % of the fixes stay below, metres.
     pub vertical_p95_m: Option<f64>,
+    /// Error in space that 95 % of the fixes stay below, metres.
     pub error_3d_p95_m: Option<f64>,
     /// Mean of the errors east, north, up.
     pub bias_enu_m: Option<[f64; 3]>,
@@ -88,8 +111,11 @@ pub struct Position {
     /// Mean normalised error squared with the receiver's own covariance, 3 of an honest one; the 95 % band of
     /// that mean for as many independent fixes as the errors' autocorrelation leaves.
     pub nees_mean: Option<f64>,
+    /// The 95 % band of the mean for a consistent receiver.
     pub nees_band: Option<[f64; 2]>,
+    /// Independent fixes that the mean is worth.
     pub nees_independent: Option<f64>,
+    /// Where the mean lies against the band.
     pub nees_verdict: Option<Calibration>,
 }
 
@@ -105,19 +131,25 @@ pub struct Clock {
     pub bias_sigma_s: Option<f64>,
     /// Slopes of the straight lines through the bias as estimated and as it was, in seconds a second.
     pub drift: Option<f64>,
+    /// Slope of the truth's bias, seconds a second.
     pub true_drift: Option<f64>,
     /// Overlapping Allan, modified Allan, overlapping Hadamard and time deviation of the estimate.
     pub oadev_1s: Option<f64>,
+    /// Modified Allan deviation at 1 s of the estimate.
     pub mdev_1s: Option<f64>,
+    /// Hadamard deviation at 1 s of the estimate.
     pub ohdev_1s: Option<f64>,
+    /// Time deviation at 1 s of the estimate, seconds.
     pub tdev_1s_s: Option<f64>,
     /// The true clock's, over the whole run.
     pub true_oadev_1s: Option<f64>,
-    /// That of a clock solved from independent code measurements: √3 × TDOP × σ of the code/(speed of light × 1 s).
+    /// That of a clock solved from independent code measurements: √3 × TDOP × σ of the code/(speed of light ×
+    /// 1 s).
     pub code_noise_oadev_1s: Option<f64>,
     /// Strengths h₂, h₁, h₀, h₋₁, h₋₂ of power-law noises (S_y = Σ h f^α, in Hz^(−α − 1)) fitted to the Allan
     /// deviations of the estimate and of the true clock.
     pub h: Option<[f64; 5]>,
+    /// The same of the truth.
     pub true_h: Option<[f64; 5]>,
 }
 
@@ -128,10 +160,12 @@ pub struct Observables {
     pub pseudorange_rms_m: Option<f64>,
     /// Mean of the satellites' mean code errors, nothing removed.
     pub pseudorange_bias_m: Option<f64>,
+    /// Root mean square of the carrier errors, cycles.
     pub carrier_rms_cycles: Option<f64>,
+    /// Root mean square of the Doppler errors, Hz.
     pub doppler_rms_hz: Option<f64>,
-    /// Mean of measured minus expected: the scene's C/N0 with other satellites and interference counted as noise (see
-    /// [`crate::analysis::expect::multiple_access`]). The quantiser's loss is not counted.
+    /// Mean of measured minus expected: the scene's C/N0 with other satellites and interference counted as
+    /// noise (see [`crate::analysis::expect::multiple_access`]). The quantiser's loss is not counted.
     pub cn0_bias_db: Option<f64>,
 }
 
@@ -139,19 +173,26 @@ pub struct Observables {
 /// first [`PULL_IN_S`](crate::analysis::measure::errors::PULL_IN_S) of each lock.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tracking {
+    /// Number of losses of lock.
     pub losses_of_lock: usize,
     /// Declared by the receiver, or found against the truth and not declared.
     pub cycle_slips: usize,
+    /// Standard deviation of the code loop, chips.
     pub dll_sigma_chips: Option<f64>,
+    /// Standard deviation of the phase loop, degrees.
     pub pll_sigma_deg: Option<f64>,
+    /// Standard deviation of the frequency, Hz.
     pub fll_sigma_hz: Option<f64>,
     /// Slips that the receiver did not declare, and how many slips and losses have which cause (`slips.csv`).
     pub slips_undeclared: usize,
+    /// Slips and losses by their cause.
     pub slip_causes: BTreeMap<Cause, usize>,
     /// The loops of all satellites three ways (`jitter.csv`): chips, degrees, hertz. Null where the receiver
     /// names no settings.
     pub dll_chips: Option<Pooled>,
+    /// The phase loop of all satellites, degrees.
     pub pll_deg: Option<Pooled>,
+    /// The frequency of all satellites, Hz.
     pub fll_hz: Option<Pooled>,
 }
 
@@ -160,22 +201,29 @@ pub struct Tracking {
 pub struct BySignal {
     /// That were observed.
     pub satellites: usize,
+    /// Errors of its observations.
     pub observables: Observables,
+    /// Its loops.
     pub tracking: SignalTracking,
 }
 
 /// Standard deviations of a signal's loops.
 #[derive(Clone, Debug, Serialize)]
 pub struct SignalTracking {
+    /// Number of losses of lock.
     pub losses_of_lock: usize,
+    /// Standard deviation of the code loop, chips.
     pub dll_sigma_chips: Option<f64>,
+    /// Standard deviation of the phase loop, degrees.
     pub pll_sigma_deg: Option<f64>,
+    /// Standard deviation of the frequency, Hz.
     pub fll_sigma_hz: Option<f64>,
 }
 
 /// Decoded parameters against those sent.
 #[derive(Clone, Debug, Serialize)]
 pub struct Navigation {
+    /// Parameters that were compared with those sent.
     pub parameters_checked: usize,
     /// Different from what was sent, or never sent.
     pub parameters_wrong: usize,
@@ -186,19 +234,31 @@ pub struct Navigation {
 pub struct Details {
     /// Code error with the epoch's common part removed.
     pub pseudorange_m: Option<Spread>,
+    /// Errors of the carriers, cycles.
     pub carrier_cycles: Option<Spread>,
+    /// Errors of the Dopplers, Hz.
     pub doppler_hz: Option<Spread>,
+    /// Errors of C/N0, dB.
     pub cn0_db: Option<Spread>,
+    /// Mean of the C/N0 that the scene sets, dB-Hz.
     pub cn0_true_dbhz: Option<f64>,
+    /// The same with other satellites and interference counted as noise, dB-Hz.
     pub cn0_effective_dbhz: Option<f64>,
+    /// Mean of the C/N0 that the receiver measures, dB-Hz.
     pub cn0_measured_dbhz: Option<f64>,
+    /// Errors of the fixes to the east, metres.
     pub east_m: Option<Spread>,
+    /// Errors of the fixes to the north, metres.
     pub north_m: Option<Spread>,
+    /// Errors of the fixes upward, metres.
     pub up_m: Option<Spread>,
+    /// Errors of the receiver's clock, metres.
     pub clock_m: Option<Spread>,
+    /// Errors of the velocity, m/s.
     pub velocity_mps: Option<Spread>,
     /// Overlapping Allan deviation of the clock's estimate at 1 s.
     pub clock_oadev_1s: Option<Point>,
+    /// Rules of thumb for the loops.
     pub thresholds: Thresholds,
     /// Lowest point of the spectrum near each first null of the code, noise-free scenes only.
     pub psd_nulls_hz: Vec<f64>,
@@ -206,7 +266,9 @@ pub struct Details {
     pub unmatched_observations: usize,
     /// Wrong parameters, as decoded.
     pub wrong_parameters: Vec<NavigationRow>,
+    /// Satellites found that the truth never has.
     pub false_satellites: Vec<String>,
+    /// Every figure against its limit.
     pub verdict: Verdict,
 }
 
@@ -215,6 +277,7 @@ pub struct Details {
 pub struct Thresholds {
     /// A sixth of the early-late spacing: 3σ stays inside the discriminator's linear zone.
     pub dll_chips: f64,
+    /// Of the phase loop, degrees.
     pub pll_deg: f64,
     /// A twelfth of the inverse integration time.
     pub fll_hz: f64,
@@ -230,7 +293,7 @@ impl Summary {
     /// Condenses the errors of a run.
     ///
     /// # Errors
-    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn new(run: &Run, errors: &Errors, clock: &clock::Clock) -> Result<Self, JudgeError> {
         let mut details = Details::default();
         let satellites = satellites(run, &mut details);

@@ -1,9 +1,10 @@
 //! Strengths of the power-law noises behind an Allan deviation.
 //!
-//! ln σ²(τ) is fitted by ln Σ h_α × closed form (see [`crate::analysis::expect::theory::clock`]), each point weighted
-//! by half its degrees of freedom, the inverse variance of ln χ². No h is negative, and one is admitted only
-//! if it lowers the sum of squares by four. Limits: estimates at different τ are correlated, so no errors of
-//! h are given; white and flicker phase noise differ by a logarithm only and share what there is of either.
+//! ln σ²(τ) is fitted by ln Σ h_α × closed form (see [`crate::analysis::expect::theory::clock`]), each point
+//! weighted by half its degrees of freedom, the inverse variance of ln χ². No h is negative, and one is
+//! admitted only if it lowers the sum of squares by four. Limits: estimates at different τ are correlated, so
+//! no errors of h are given; white and flicker phase noise differ by a logarithm only and share what there is
+//! of either.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -23,7 +24,8 @@ struct Datum {
     units: [f64; 5],
 }
 
-/// Fits noises up to `cutoff_hz` to (overlapping) Allan deviations; `None` without a point that has degrees of freedom.
+/// Fits noises up to `cutoff_hz` to (overlapping) Allan deviations; `None` without a point that has degrees
+/// of freedom.
 pub fn power_law(points: &[Point], cutoff_hz: f64) -> Option<PowerLaw> {
     let data: Vec<Datum> = points
         .iter()

@@ -1,10 +1,11 @@
 //! Equivalent degrees of freedom of a stability estimate, and the confidence interval that follows.
 //!
-//! Source: C. A. Greenhall and W. J. Riley, "Uncertainty of stability variances based on finite differences", 35th PTTI
-//! (2003), which NIST SP 1065 repeats in section 5.4; in full, without its shortcuts: the sum has (order + 1) m
-//! terms. An estimate is the mean of squares of a stationary sequence whose covariance the noise type fixes; its
-//! edf is 2 mean²/variance, and edf × estimate/truth is nearly χ². They take each phase as a mean over τ₀; here it is a
-//! reading at an instant, which matters below m = 10 (at m = 1 in white frequency noise, theirs is 17 % too many).
+//! Source: C. A. Greenhall and W. J. Riley, "Uncertainty of stability variances based on finite differences",
+//! 35th PTTI (2003), which NIST SP 1065 repeats in section 5.4; in full, without its shortcuts: the sum has
+//! (order + 1) m terms. An estimate is the mean of squares of a stationary sequence whose covariance the
+//! noise type fixes; its edf is 2 mean²/variance, and edf × estimate/truth is nearly χ². They take each phase
+//! as a mean over τ₀; here it is a reading at an instant, which matters below m = 10 (at m = 1 in white
+//! frequency noise, theirs is 17 % too many).
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -19,11 +20,12 @@ pub struct Estimator {
     pub overlapped: bool,
 }
 
-/// Averaging factor up to which a mean of samples is summed; above, a mean over continuous time stands for it, whose
-/// covariance differs by less than 1/m².
+/// Averaging factor up to which a mean of samples is summed; above, a mean over continuous time replaces it,
+/// whose covariance differs by less than 1/m².
 const SUMMED: usize = 64;
 
-/// Equivalent degrees of freedom of a variance from `count` phases at averaging factor `m`, in noise S_y ∝ f^α.
+/// Equivalent degrees of freedom of a variance from `count` phases at averaging factor `m`, in noise S_y ∝
+/// f^α.
 ///
 /// `None` if the variance does not exist (α ≤ 1 − 2 order) or no difference fits.
 pub fn degrees_of_freedom(estimator: Estimator, alpha: i32, m: usize, count: usize) -> Option<f64> {
@@ -37,7 +39,8 @@ pub fn degrees_of_freedom(estimator: Estimator, alpha: i32, m: usize, count: usi
     let filter = match (modified, alpha > 0 || m > SUMMED) {
         (true, true) => Filter::Mean { steps: 1.0 },
         (true, false) => Filter::Sum(m),
-        // Phase noises exist only below a cutoff, here that of a mean over τ₀; sampled white phase noise is just that.
+        // Phase noises exist only below a cutoff, here that of a mean over τ₀; sampled white phase noise is
+        // just that.
         (false, _) if alpha > 0 => Filter::Mean { steps: m as f64 },
         (false, _) => Filter::Sum(1),
     };
@@ -62,7 +65,8 @@ enum Filter {
     Sum(usize),
 }
 
-/// Generalised autocovariance of the integral of phase, its constant left out: |t|^(3 − α), with ln |t| for odd α.
+/// Generalised autocovariance of the integral of phase, its constant left out: |t|^(3 − α), with ln |t| for
+/// odd α.
 fn integral(t: f64, alpha: i32) -> f64 {
     let t = t.abs();
     if t == 0.0 {
@@ -89,7 +93,8 @@ fn averaged(t: f64, filter: Filter, alpha: i32) -> f64 {
     }
 }
 
-/// Of its differences of that order over τ: the weights are the binomials of twice the order with alternating sign.
+/// Of its differences of that order over τ: the weights are the binomials of twice the order with alternating
+/// sign.
 fn differenced(t: f64, order: usize, filter: Filter, alpha: i32) -> f64 {
     let weights: &[f64] = match order {
         1 => &[2.0, -1.0],
@@ -121,8 +126,8 @@ pub fn total(alpha: i32, t_over_tau: f64) -> Option<(f64, f64)> {
     }
 }
 
-/// Factors that take an estimated deviation to the ends of the interval that holds the true one with probability
-/// `confidence` (0 to 1, both excluded).
+/// Factors that take an estimated deviation to the ends of the interval that contains the true one with
+/// probability `confidence` (0 to 1, both excluded).
 pub fn interval(freedom: f64, confidence: f64) -> Option<(f64, f64)> {
     let tail = (1.0 - confidence) / 2.0;
     let chi_square = ChiSquared::new(freedom).ok().filter(|_| tail > 0.0 && tail < 0.5)?;

@@ -3,8 +3,8 @@
 //! Source: W. J. Riley, Handbook of Frequency Stability Analysis, NIST Special Publication 1065 (2008),
 //! section 5.2. Input is phase, the reading minus the true time, in seconds on an even grid without gaps; a
 //! constant offset and rate of it change nothing. Every estimate takes one pass over the data. [`noise`]
-//! tells the noise type, [`freedom`] the confidence, [`fit`] the strengths. Limits: no drift is removed; the
-//! total deviation's bias is not corrected.
+//! identifies the noise type, [`freedom`] the confidence, [`fit`] the strengths. Limits: no drift is removed;
+//! the total deviation's bias is not corrected.
 
 pub mod fit;
 pub mod freedom;
@@ -96,7 +96,8 @@ fn averages(values: &[f64], m: usize) -> impl Iterator<Item = f64> + '_ {
     first.into_iter().chain(sums).map(move |sum| sum / m as f64)
 }
 
-/// Second differences about every inner phase of the data mirrored through both end points (SP 1065, section 5.2).
+/// Second differences about every inner phase of the data mirrored through both end points (SP 1065, section
+/// 5.2).
 fn reflected_differences(x: &[f64], m: usize) -> impl Iterator<Item = f64> + '_ {
     let count = if m < x.len() { x.len() } else { 0 };
     let before = move |index: usize| match index.checked_sub(m) {
@@ -127,12 +128,13 @@ pub fn decades(longest: usize) -> impl Iterator<Item = usize> {
 pub struct Point {
     /// Averaging time in steps of the grid.
     pub m: usize,
+    /// Averaging time, seconds.
     pub tau_s: f64,
     /// Dimensionless; in seconds for the time deviation.
     pub deviation: f64,
     /// Differences that went into it.
     pub terms: usize,
-    /// Exponent of the noise that dominates, S_y ∝ f^α, if it can be told.
+    /// Exponent of the noise that dominates, S_y ∝ f^α, if it can be identified.
     pub alpha: Option<i32>,
     /// Equivalent degrees of freedom in that noise.
     pub freedom: Option<f64>,
@@ -145,10 +147,11 @@ const INDEPENDENT: usize = 3;
 /// A deviation this small times rounding is rounding: phases are right to a few units in the last place.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// A deviation over averaging factors, each with the interval that holds the true one with probability `confidence`.
+/// A deviation over averaging factors, each with the interval that contains the true one with probability
+/// `confidence`.
 ///
 /// A factor that leaves fewer than three independent differences, or a deviation that rounding alone would
-/// give, is left out. Where too few phases remain to tell the noise, it is taken to be that of the factor
+/// give, is left out. Where too few phases remain to identify the noise, it is taken to be that of the factor
 /// before.
 pub fn curve(
     deviation: Deviation,

@@ -2,14 +2,15 @@
 //!
 //! Source: W. J. Riley and C. A. Greenhall, "Power law noise identification using the lag 1 autocorrelation",
 //! 18th EFTF (2004), which NIST SP 1065 repeats in section 5.5. Phase is taken every τ and differenced until
-//! it is stationary; the lag-1 autocorrelation then tells the exponent. Limits: one noise a τ, at least
+//! it is stationary; the lag-1 autocorrelation then gives the exponent. Limits: one noise a τ, at least
 //! [`FEWEST`] phases, drift not removed.
 
-/// Fewest phases at the spacing of τ from which a noise is told.
+/// Fewest phases at the spacing of τ from which a noise is identified.
 pub const FEWEST: usize = 30;
 
 /// Exponent α of S_y ∝ f^α at averaging factor `m`, rounded to the nearest noise for which a variance of that
-/// difference order (2 or 3) exists: at most 2, at least 2 − 2 order. `None` with too few phases, or none that differ.
+/// difference order (2 or 3) exists: at most 2, at least 2 − 2 order. `None` with too few phases, or none
+/// that differ.
 pub fn identify(x: &[f64], m: usize, order: usize) -> Option<i32> {
     let mut z: Vec<f64> = x.iter().step_by(m.max(1)).copied().collect();
     if z.len() < FEWEST {

@@ -79,7 +79,8 @@ fn the_nine_frequencies_of_nbs_monograph_140_come_out_to_every_printed_digit() {
 #[test]
 fn intervals_are_those_of_stable32_on_the_thousand_point_set() {
     let x = thousand_points();
-    // Stable32 1.60, white frequency noise, confidence 0.683, octaves: lower and upper end, and count of differences.
+    // Stable32 1.60, white frequency noise, confidence 0.683, octaves: lower and upper end, and count of
+    // differences.
     let table = [
         (
             Deviation::Adev,
@@ -183,14 +184,16 @@ fn intervals_of_the_total_deviation_are_those_of_stable32() {
         let (freedom, bias) = freedom::total(0, 1000.0 / m as f64).unwrap();
         let ends = interval(freedom, 0.682_689_492_137).unwrap();
         assert_eq!(bias, 1.0);
-        // Five digits are printed, and the estimate before them; that program's quantiles agree to 2e-4 elsewhere.
+        // Five digits are printed, and the estimate before them; that program's quantiles agree to 2e-4
+        // elsewhere.
         for (factor, printed) in [(ends.0, low), (ends.1, high)] {
             assert!((factor * estimate.deviation / printed - 1.0).abs() < 3e-4, "{m}: {freedom} {ends:?}");
         }
     }
 }
 
-/// Covariance at each lag of the differences of white noise summed `sums` times: the autocorrelation of their weights.
+/// Covariance at each lag of the differences of white noise summed `sums` times: the autocorrelation of their
+/// weights.
 fn covariance(estimator: Estimator, m: usize, sums: usize) -> Vec<f64> {
     let times = |a: &[f64], b: &[f64]| {
         let mut product = vec![0.0; a.len() + b.len() - 1];
@@ -361,8 +364,8 @@ impl Normal {
         (0..count).map(|_| step()).collect()
     }
 
-    /// Samples of the integral of a Wiener process that has unit variance after one step: the two of a step have the
-    /// covariance 1, 1/2; 1/2, 1/3.
+    /// Samples of the integral of a Wiener process that has unit variance after one step: the two of a step
+    /// have the covariance 1, 1/2; 1/2, 1/3.
     fn walk_of_frequency(&mut self, count: usize) -> Vec<f64> {
         let (mut phase, mut frequency) = (0.0, 0.0);
         let mut step = || {
@@ -382,7 +385,8 @@ fn ninety_five_percent_intervals_hold_the_truth_ninety_five_times_in_a_hundred()
     let series: Vec<Vec<f64>> = (0..SERIES).map(|_| normal.white_frequency(512)).collect();
     for deviation in [Deviation::Oadev, Deviation::Mdev, Deviation::Ohdev, Deviation::Totdev] {
         for m in [1, 4, 16] {
-            // Unit variance of frequency over τ₀: 1/m over τ; of the modified variance half of that and 1/m² more.
+            // Unit variance of frequency over τ₀: 1/m over τ; of the modified variance half of that and 1/m²
+            // more.
             let narrowed = if deviation == Deviation::Mdev { 0.5 + 0.5 / (m * m) as f64 } else { 1.0 };
             let truth = (narrowed / m as f64).sqrt();
             let held = series.iter().filter(|x| {
@@ -428,8 +432,9 @@ fn white_phase_noise_has_the_deviations_that_theory_draws() {
         for m in [1, 8, 64] {
             let estimate = deviation.estimate(&x, 0.1, m).unwrap();
             let expected = white_phase(deviation, 1.0, 0.1 * m as f64, 0.1);
-            // White phase: means of τ are independent, so at least the count of them less two is free in effect; a
-            // deviation's error is 1/√(2 edf). Four times that, with a factor 2 for third differences.
+            // White phase: means of τ are independent, so at least the count of them less two is free in
+            // effect; a deviation's error is 1/√(2 edf). Four times that, with a factor 2 for third
+            // differences.
             let tolerance = 4.0 / ((x.len() / m) as f64).sqrt();
             let off = estimate.deviation / expected - 1.0;
             assert!(off.abs() < tolerance, "{deviation:?} {m}: {off}");
@@ -441,7 +446,8 @@ fn white_phase_noise_has_the_deviations_that_theory_draws() {
 fn what_cannot_be_said_is_left_out() {
     let x = Normal::new(11).white_frequency(41);
     let points = curve(Deviation::Oadev, &x, 1.0, decades(41), 0.95);
-    // A quarter of the record is 10. From m = 2 there are fewer than 30 phases: the noise found at m = 1 stands.
+    // A quarter of the record is 10. From m = 2 there are fewer than 30 phases: the noise found at m = 1 is
+    // kept.
     assert_eq!(points.iter().map(|point| point.m).collect::<Vec<_>>(), [1, 2, 4, 10]);
     assert!(points.iter().all(|point| point.alpha == Some(0) && point.interval.is_some()));
     let few = curve(Deviation::Oadev, &x[..20], 1.0, octaves(20), 0.95);

@@ -19,16 +19,19 @@ use crate::analysis::read::Run;
 use crate::analysis::statistics::{mean, median, pooled_std};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 
-/// Probability with which an interval holds the true deviation.
+/// Probability with which an interval contains the true deviation.
 pub const CONFIDENCE: f64 = 0.95;
 
 /// The clock at one fix: a row of `clock.csv`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockRow {
+    /// Number of the sample, counted from the first one.
     pub sample: u64,
+    /// Seconds from sample 0 by the receiver's clock.
     pub time_s: f64,
     /// Reading minus GPS time as the receiver found it.
     pub estimate_s: f64,
+    /// Bias of the truth, seconds; positive where the clock is ahead.
     pub truth_s: f64,
     /// Estimate minus truth.
     pub error_s: f64,
@@ -77,9 +80,11 @@ pub enum Of {
 /// Phases on an even grid, with their deviations over decades of τ.
 #[derive(Clone, Debug)]
 pub struct Series {
+    /// Which of the three.
     pub of: Of,
     phases_s: Vec<f64>,
     tau0_s: f64,
+    /// Each deviation at its averaging times.
     pub curves: Vec<(Deviation, Vec<Point>)>,
 }
 
@@ -107,7 +112,8 @@ impl Series {
         allan::curve(deviation, &self.phases_s, self.tau0_s, [m as usize], CONFIDENCE).into_iter().next()
     }
 
-    /// Strengths of its power-law noises below half its rate, from octaves, so that no stretch of τ counts more.
+    /// Strengths of its power-law noises below half its rate, from octaves, so that no stretch of τ counts
+    /// more.
     pub fn power_law(&self) -> Option<PowerLaw> {
         let octaves = octaves(self.phases_s.len());
         fit::power_law(
@@ -132,8 +138,11 @@ impl Series {
 pub struct Clock {
     /// The longest stretch of fixes without a gap.
     pub rows: Vec<ClockRow>,
+    /// Straight line of the estimate.
     pub estimate_line: Option<Line>,
+    /// Straight line of the truth.
     pub truth_line: Option<Line>,
+    /// Straight line of the error.
     pub error_line: Option<Line>,
     /// Those that have an interval.
     pub series: Vec<Series>,
@@ -149,7 +158,7 @@ impl Clock {
     /// Measures it.
     ///
     /// # Errors
-    /// [`JudgeError::Read`] where rows that were put by cannot be read.
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
         let samples: Vec<u64> = errors.positions.iter().map(|error| error.sample).collect();
         let stretch = longest_even(&samples);
@@ -250,7 +259,8 @@ fn truth(run: &Run) -> Option<Series> {
     Some(Series::new(Of::Truth, phases_s, tau0_s))
 }
 
-/// The longest run of samples at their usual distance, within one: an interval need not be a whole number of samples.
+/// The longest run of samples at their usual distance, within one: an interval need not be a whole number of
+/// samples.
 fn longest_even(samples: &[u64]) -> Range<usize> {
     let steps: Vec<f64> = samples.windows(2).map(|pair| pair[1].abs_diff(pair[0]) as f64).collect();
     let Some(usual) = median(&steps) else { return 0..samples.len() };

@@ -94,7 +94,8 @@ fn the_clock_that_was_planted_is_found_and_told_from_the_receiver_s_error() {
     // σ² of 0.1 s is known to 1/√(edf/2) = 1/√200; four times that.
     let h = clock.true_h.unwrap();
     assert!((h[2] / H0 - 1.0).abs() < 0.28 && h.iter().filter(|h| **h > 0.0).count() == 1, "{h:?}");
-    // Phases of the error are independent: √3 ERROR_S/1 s, known to 1/√(2 edf) with edf ≈ 199/2: four times that.
+    // Phases of the error are independent: √3 ERROR_S/1 s, known to 1/√(2 edf) with edf ≈ 199/2: four times
+    // that.
     let error = measured.series(Of::Error).unwrap().at(Deviation::Oadev, 1.0).unwrap();
     assert!((error.deviation / (3.0_f64.sqrt() * ERROR_S) - 1.0).abs() < 0.28, "{:e}", error.deviation);
     assert_eq!(error.alpha, None, "20 phases that are 1 s apart do not tell a noise");

@@ -24,15 +24,21 @@ pub use crate::gnss::signal::Link;
 /// Errors of one observation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignalError {
+    /// Number of the sample, counted from the first one.
     pub sample: u64,
+    /// Seconds from sample 0 by the receiver's clock.
     pub time_s: f64,
     /// Positive when the code is measured late: −c × (time sent as measured − as it was).
     pub code_m: f64,
     /// After the arc's constant is removed, and with it.
     pub carrier_cycles: f64,
+    /// The error with the arc's constant, cycles.
     pub raw_cycles: f64,
+    /// Measured minus true Doppler, Hz.
     pub doppler_hz: f64,
+    /// C/N0 as measured, dB-Hz.
     pub cn0_dbhz: f64,
+    /// C/N0 that the scene sets, dB-Hz.
     pub cn0_true_dbhz: f64,
     /// The true one with the other satellites counted as noise.
     pub cn0_effective_dbhz: f64,
@@ -43,7 +49,9 @@ pub struct SignalError {
 /// Errors of one fix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionError {
+    /// Number of the sample, counted from the first one.
     pub sample: u64,
+    /// Seconds from sample 0 by the receiver's clock.
     pub time_s: f64,
     /// East, north, up about the true position.
     pub enu_m: Vector3<f64>,
@@ -51,6 +59,7 @@ pub struct PositionError {
     pub clock_m: f64,
     /// What the receiver's clock read minus GPS time, in truth.
     pub true_clock_s: f64,
+    /// Error of the velocity east, north and up, m/s.
     pub velocity_enu_mps: Vector3<f64>,
 }
 
@@ -85,9 +94,10 @@ impl SpillRow<Link> for SignalError {
 pub struct Errors {
     /// In the order of their samples.
     pub signals: SpillStore<Link, SignalError>,
-    /// Sum and number of the code errors of each epoch, signal by signal: what signals differ by is no error of a
-    /// satellite.
+    /// Sum and number of the code errors of each epoch, signal by signal: what signals differ by is no error
+    /// of a satellite.
     epochs: BTreeMap<(u64, &'static Signal), (f64, usize)>,
+    /// Errors of all fixes that have a truth.
     pub positions: Vec<PositionError>,
     /// Changes of the carrier's constant: those declared by the receiver's events after a satellite's first
     /// observation, and jumps of at least [`SLIP_CYCLES`] that stay and that it did not declare.
@@ -98,7 +108,7 @@ pub struct Errors {
 
 /// Phase lock is a fading mean over six symbols of 20 ms. When a satellite has gone, what it held fades as
 /// (5/6)ⁿ and noise leaves a deviation of 0.21: it falls below 0.4 after five symbols in the mean, and after
-/// twenty where noise holds it up as it does once in a thousand times. A tick of 0.1 s comes on top.
+/// twenty where noise delays it as it does once in a thousand times. A tick of 0.1 s comes on top.
 const DETECTION_S: f64 = 0.5;
 
 /// Whether a sample that the truth has for other satellites follows so closely on this one's last row that no
@@ -117,7 +127,7 @@ pub const SLIP_CYCLES: f64 = 0.4;
 const SIDE: usize = 5;
 
 impl Errors {
-    /// Joins and measures; what is too long for memory is put by beside what the run put by.
+    /// Joins and measures; rows that are too many for memory spill to a file beside those of the run.
     pub fn measure(run: &Run) -> Result<Self, JudgeError> {
         let mut errors = Self {
             signals: SpillStore::new(run.observations.directory()),
@@ -255,9 +265,9 @@ impl Errors {
         self.of(signal).map(one).collect()
     }
 
-    /// Code errors after the mean over the satellites of each epoch and signal is removed: receiver clock, time
-    /// scale and the delay of the signal's own path. Epochs of one satellite are left out. With n satellites the
-    /// mean takes 1/n of the variance with it. Of one signal, or of all.
+    /// Code errors after the mean over the satellites of each epoch and signal is removed: receiver clock,
+    /// time scale and the delay of the signal's own path. Epochs of one satellite are left out. With n
+    /// satellites the mean takes 1/n of the variance with it. Of one signal, or of all.
     pub fn code_without_clock_m(&self, of: Option<&Signal>) -> Result<Vec<f64>, JudgeError> {
         let mut all = Vec::with_capacity(self.signals.len());
         for link in self.of(of) {
@@ -294,8 +304,8 @@ fn level_carrier(rows: &mut [SignalError], declared: &[u64]) -> usize {
     slips
 }
 
-/// The first row of an arc whose carrier jumped by [`SLIP_CYCLES`] or more against the rows before, and stayed.
-/// A slip may take place during a measurement and show as two half steps.
+/// The first row of an arc whose carrier jumped by [`SLIP_CYCLES`] or more against the rows before, and
+/// stayed. A slip may take place during a measurement and show as two half steps.
 fn first_jump(arc: &[SignalError]) -> Option<usize> {
     first_jump_of(&arc.iter().map(|row| row.carrier_cycles).collect::<Vec<_>>())
 }

@@ -74,7 +74,8 @@ impl Fonts {
         }
     }
 
-    /// The glyphs of one line; a character that a font lacks comes from the regular one, then becomes a question mark.
+    /// The glyphs of one line; a character that a font lacks comes from the regular one, then becomes a
+    /// question mark.
     pub fn glyphs(&self, face: Face, text: &str) -> Vec<Glyph> {
         let find = |face: Face, c: char| Some((face, self.of(face).glyph_index(c)?));
         let one = |(at, c): (usize, char)| {

@@ -1,4 +1,4 @@
-//! Items onto pages: what stands where, before any file is written.
+//! Items onto pages: what is placed where, before any file is written.
 
 use super::fonts::{Face, Fonts};
 use super::{Item, Report, Tone, table};

@@ -20,31 +20,46 @@ use crate::analysis::show::plot::drawing::Drawing;
 /// Why a report could not be made. Each is a fault of the program, not of its data.
 #[derive(Debug, Error)]
 pub enum PdfError {
+    /// A font of the program cannot be used.
     #[error("the bundled font {0} is unreadable")]
     Font(&'static str),
+    /// A picture, counted from 1, cannot be put on a page.
     #[error("picture {number}: {reason}")]
-    Picture { number: usize, reason: String },
+    Picture {
+        /// Number of the picture, counted from 1.
+        number: usize,
+        /// Why, in words.
+        reason: String,
+    },
+    /// The document cannot be put together.
     #[error("the PDF could not be written: {0}")]
     Write(String),
 }
 
-/// How a cell or a banner is to be taken. Colours that colour-blind people tell apart; words say the same.
+/// How a cell or a banner is to be taken. Colours that colour-blind people distinguish; words say the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tone {
+    /// As the text about it.
     #[default]
     Plain,
     /// Of less weight.
     Faint,
+    /// In bold.
     Strong,
+    /// Green: passed.
     Good,
+    /// Orange: marginal.
     Caution,
+    /// Red: failed.
     Bad,
 }
 
 /// One cell of a table.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Cell {
+    /// What it says.
     pub text: String,
+    /// How it is set.
     pub tone: Tone,
 }
 
@@ -61,17 +76,21 @@ impl<T: Into<String>> From<T> for Cell {
     }
 }
 
-/// On which side a column's text stands; numbers stand right.
+/// On which side a column's text is aligned; numbers are aligned right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
+    /// Words, flush left.
     Left,
+    /// Numbers, flush right.
     Right,
 }
 
 /// A table; rows shorter than the header end in empty cells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
+    /// Heading and side of each.
     pub columns: Vec<(String, Side)>,
+    /// Cells of each row, as many as there are columns.
     pub rows: Vec<Vec<Cell>>,
     /// Above it, with its number; empty for a table without either.
     pub caption: String,
@@ -97,6 +116,7 @@ pub enum Item {
     Heading(String),
     /// Within a chapter.
     Subheading(String),
+    /// A paragraph.
     Text(String),
     /// In small letters.
     Note(String),
@@ -104,22 +124,26 @@ pub enum Item {
     Banner(String, Tone),
     /// Names and values, two pairs a row.
     Facts(Vec<(String, String)>),
+    /// A table, over several pages where it is long.
     Table(Table),
     /// A picture as wide as the text, and its caption below.
     Figure(Drawing, String),
     /// Lines as they are, in a font of equal widths.
     Listing(String),
+    /// What follows begins on a page of its own.
     NewPage,
 }
 
 /// A report to be printed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
+    /// On the first page and at the head of the others.
     pub title: String,
     /// Below the title.
     pub subtitle: String,
-    /// At the right of every page's head; the title stands at its left.
+    /// At the right of every page's head; the title is at its left.
     pub head: String,
+    /// In the order of the pages.
     pub items: Vec<Item>,
 }
 

@@ -138,7 +138,8 @@ fn lines_are_no_longer_than_their_width_and_keep_every_word() {
         let letters = |text: &str| text.chars().filter(|c| !c.is_whitespace()).collect::<String>();
         assert_eq!(letters(&lines.concat()), letters(text));
     }
-    // A glyph that no font has becomes a question mark, one that only the regular font has is taken from there.
+    // A glyph that no font has becomes a question mark, one that only the regular font has is taken from
+    // there.
     let glyphs = fonts.glyphs(Face::Bold, "a\u{1F6F0}\u{2708}");
     assert_eq!(glyphs[1].id, fonts.glyphs(Face::Bold, "?")[0].id);
     assert_eq!((glyphs[2].face, glyphs.len()), (Face::Regular, 3));

@@ -62,7 +62,7 @@ pub fn font(pixels: i32) -> TextStyle<'static> {
     ("sans-serif", pixels * FINE).into_font().color(&RGBColor(30, 30, 30))
 }
 
-/// That font, hung on its point as told.
+/// That font, anchored to its point as given.
 pub fn anchored(pixels: i32, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
     font(pixels).pos(Pos::new(horizontal, vertical))
 }
@@ -207,7 +207,8 @@ const LEGEND_ROW_PX: i32 = 20;
 const MARK_PX: i32 = 24;
 const GAP_PX: i32 = 18;
 
-/// Where each named series of a legend stands: its left end, its row, itself. Rows are as long as the picture is wide.
+/// Where each named series of a legend is: its left end, its row, itself. Rows are as long as the picture is
+/// wide.
 fn placed<'a>(area: &Area<'_>, legend: &'a [Series], width_px: i32) -> Result<Vec<(i32, i32, &'a Series)>, Failure> {
     let (mut x, mut row) = (LEFT_PX + EDGE_PX, 0);
     let mut entries = Vec::new();
@@ -256,7 +257,7 @@ fn widen(axis: &mut Axis, span: f64) {
     (axis.from, axis.to) = (middle - span / 2.0, middle + span / 2.0);
 }
 
-/// Decimals that tell neighbouring ticks of an axis apart.
+/// Decimals that distinguish neighbouring ticks of an axis.
 fn decimals(span: f64) -> usize {
     libm::ceil(-libm::log10(span / 5.0)).clamp(0.0, 12.0) as usize
 }

@@ -1,11 +1,11 @@
-//! Charts as data: points, axes and how they look, with no more points than can be told apart.
+//! Charts as data: points, axes and how they look, with no more points than the eye can resolve.
 
 use plotters::style::RGBColor;
 
 /// Width of a picture that fills a page's text width.
 pub const WIDTH_PX: u32 = 680;
 
-/// Colours that colour-blind people tell apart (Okabe and Ito 2008), without its yellow, too pale on white.
+/// Colours that colour-blind people distinguish (Okabe and Ito 2008), without its yellow, too pale on white.
 pub const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -15,18 +15,24 @@ pub const COLOURS: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
     RGBColor(0, 0, 0),
 ];
+/// The first colour, of estimates.
 pub const BLUE: RGBColor = COLOURS[0];
+/// The second colour, of limits and of what is to be noticed.
 pub const ORANGE: RGBColor = COLOURS[1];
+/// The third colour, of the truth and of theory.
 pub const GREEN: RGBColor = COLOURS[2];
+/// Of what is in the background.
 pub const GREY: RGBColor = RGBColor(120, 120, 120);
 pub(super) const LIGHT: RGBColor = RGBColor(225, 225, 225);
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mark {
+    /// A solid line through the points.
     Line,
     /// A thin dashed line.
     Dash,
+    /// Small filled dots.
     Dots,
     /// Hollow dots.
     Rings,
@@ -45,13 +51,18 @@ pub enum Mark {
 /// Points in data units and how they look.
 #[derive(Clone, Debug)]
 pub struct Series {
+    /// Words of the legend.
     pub name: String,
+    /// Of its marks.
     pub colour: RGBColor,
+    /// How its points are drawn.
     pub mark: Mark,
+    /// In data units.
     pub points: Vec<(f64, f64)>,
 }
 
 impl Series {
+    /// Points with a name of the legend, a colour and a mark.
     pub fn new(name: impl Into<String>, colour: RGBColor, mark: Mark, points: Vec<(f64, f64)>) -> Self {
         Self { name: name.into(), colour, mark, points }
     }
@@ -67,12 +78,16 @@ impl Series {
 /// An axis in data units.
 #[derive(Clone, Debug)]
 pub struct Axis {
+    /// Words beside it, with the unit.
     pub label: String,
+    /// Lower end.
     pub from: f64,
+    /// Upper end.
     pub to: f64,
 }
 
 impl Axis {
+    /// From one value to another; half a unit about the first where they are the same.
     pub fn new(label: &str, (from, to): (f64, f64)) -> Self {
         // plotters needs a range with a length.
         let (from, to) = if from < to { (from, to) } else { (from - 0.5, from + 0.5) };
@@ -111,9 +126,13 @@ impl Axis {
 /// One pair of axes with what is drawn in it.
 #[derive(Clone, Debug)]
 pub struct Chart {
+    /// Words above it.
     pub title: String,
+    /// Across.
     pub x: Axis,
+    /// Upward.
     pub y: Axis,
+    /// What is drawn, the first below the others.
     pub series: Vec<Series>,
     /// One metre is as long up as across.
     pub equal: bool,
@@ -126,13 +145,15 @@ pub struct Chart {
 }
 
 impl Chart {
+    /// Axes with series, without labels of its own.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis, series: Vec<Series>) -> Self {
         Self { title: title.into(), x, y, series, equal: false, x_ticks: None, y_ticks: None, labels: Vec::new() }
     }
 }
 
 impl Series {
-    /// Leaves as many points as are drawn where so many series of marks share a chart; bars and tiles are all drawn.
+    /// Leaves as many points as are drawn where so many series of marks share a chart; bars and tiles are all
+    /// drawn.
     pub fn thin(&mut self, clouds: usize) {
         if !matches!(self.mark, Mark::Bars(_) | Mark::Tile(..)) {
             let most = if self.is_cloud() { (MOST_MARKS / clouds.max(1)).clamp(100, MOST_POINTS) } else { MOST_POINTS };
@@ -140,7 +161,7 @@ impl Series {
         }
     }
 
-    /// Whether its points stand alone.
+    /// Whether its points are separate marks.
     pub(super) fn is_cloud(&self) -> bool {
         matches!(self.mark, Mark::Dots | Mark::Rings)
     }
@@ -152,7 +173,7 @@ const MOST_POINTS: usize = 1000;
 const MOST_MARKS: usize = 4000;
 
 /// Few enough points to draw. Of a line, the lowest and the highest of each run of neighbours, so that no
-/// spike is lost; of marks that stand alone, every so many, so that their density stays true.
+/// spike is lost; of separate marks, every so many, so that their density stays true.
 fn thinned(points: &[(f64, f64)], mark: Mark, most: usize) -> Vec<(f64, f64)> {
     let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
     if finite.len() <= most {

@@ -12,7 +12,8 @@ use crate::analysis::show::plot::sketch::Sketch;
 
 type Points = Vec<(f64, f64)>;
 
-/// Bias as estimated and as it was with the straight line through it, the error, and both without their lines.
+/// Bias as estimated and as it was with the straight line through it, the error, and both without their
+/// lines.
 pub fn bias(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let clock = judged.clock;
     let points = |scale: f64, of: &dyn Fn(&ClockRow) -> f64| -> Points {
@@ -55,7 +56,8 @@ struct Curves<'a> {
     deviation: Deviation,
 }
 
-/// Four deviations over averaging time, with intervals of 95 %, what independent measurements would give, and theory.
+/// Four deviations over averaging time, with intervals of 95 %, what independent measurements would give, and
+/// theory.
 pub fn stability(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let charts = [
         (Deviation::Oadev, "Allan deviation, overlapping", "deviation of relative frequency"),

@@ -33,7 +33,9 @@ pub(crate) static FONT: &[u8] = include_bytes!("../../../../assets/DejaVuSans.tt
 pub struct Drawing {
     /// In virtual pixels, [`FINE`] times the size.
     pub svg: String,
+    /// Width, pixels of the picture.
     pub width_px: u32,
+    /// Height, pixels of the picture.
     pub height_px: u32,
 }
 

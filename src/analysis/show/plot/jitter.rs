@@ -51,7 +51,7 @@ impl Histogram {
     pub fn new(of: &Loop) -> Self {
         let sigma = std(&of.errors).unwrap_or(0.0);
         let tails = (5.0 * sigma).max(1e-9);
-        // The threshold is drawn if it is not so far that the histogram would vanish.
+        // The threshold is drawn if it is not so far that the histogram would disappear.
         let half = if of.threshold < 2.0 * tails { tails.max(1.15 * of.threshold) } else { tails };
         let width = 2.0 * half / BINS as f64;
         let mut counts = [0; BINS];

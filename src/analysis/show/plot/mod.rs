@@ -36,7 +36,7 @@ pub(crate) use sketch::Sketch;
 /// One picture of a run; `None` where the run has nothing of the kind.
 type Sketcher = fn(&Judged<'_>) -> Result<Option<Sketch>, JudgeError>;
 
-/// A picture by its name, what to look at in it, and the files that hold its numbers.
+/// A picture by its name, what to look at in it, and the files with its numbers.
 #[cfg_attr(not(feature = "pdf"), allow(dead_code, reason = "captions are for paper, and a test holds the tables"))]
 pub(crate) struct Picture {
     /// The PNG's, without its ending.

@@ -16,7 +16,8 @@ use crate::gnss::record::Fix;
 
 type Points = Vec<(f64, f64)>;
 
-/// East and north errors with the ellipses of 50 % and 95 %, and the distribution of horizontal and vertical errors.
+/// East and north errors with the ellipses of 50 % and 95 %, and the distribution of horizontal and vertical
+/// errors.
 pub fn scatter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let errors = &judged.errors.positions;
     let flat: Vec<Vector2<f64>> = errors.iter().map(|error| error.enu_m.xy()).collect();

@@ -17,7 +17,7 @@ pub(super) struct Frame<'a> {
     pub least: f64,
 }
 
-/// Values by which an axis is chosen: enough to tell a thousandth of them.
+/// Values by which an axis is chosen: enough to resolve a thousandth of them.
 const MOST_VALUES: usize = 1 << 16;
 
 /// Points of all satellites, as many as are drawn, in a frame that holds most of them.

@@ -1,4 +1,4 @@
-//! What pictures show before they are drawn: charts with no more points than can be told apart.
+//! What pictures show before they are drawn: charts with no more points than the eye can resolve.
 
 use super::canvas::compose;
 use super::chart::{Chart, Series};

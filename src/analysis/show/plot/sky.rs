@@ -1,4 +1,4 @@
-//! Where the satellites stood and how strong they were received.
+//! Where the satellites were and how strong they were received.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
@@ -17,14 +17,14 @@ const RADIUS: f64 = (195 * FINE) as f64;
 /// A satellite's way over the sky.
 struct Track {
     sv: Sv,
-    /// Where it stood, in virtual pixels; places that follow each other differ.
+    /// Where it was, in virtual pixels; places that follow each other differ.
     places: Vec<(i32, i32)>,
     cn0_dbhz: Option<f64>,
     observed: bool,
 }
 
-/// Polar plot: north up, zenith in the middle, tracks ending in a labelled dot whose colour is the mean C/N0 as
-/// set; a satellite that the receiver did not observe is hollow.
+/// Polar plot: north up, zenith in the middle, tracks ending in a labelled dot whose colour is the mean C/N0
+/// as set; a satellite that the receiver did not observe is hollow.
 pub fn sky(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let run = judged.run;
     let mut tracks = Vec::new();
@@ -88,7 +88,7 @@ fn label(area: &Area<'_>, sv: Sv, (x, y): (i32, i32), taken: &mut Vec<(i32, i32)
         taken.iter().all(|other| (spot.0 - other.0).abs() > 24 * FINE || (spot.1 - other.1).abs() > 13 * FINE)
     };
     let spot = spots.iter().copied().find(free).unwrap_or(spots[0]);
-    // A name is wider than a dot: its two ends stand for it.
+    // A name is wider than a dot: its two ends represent it.
     taken.extend([(spot.0 - 12 * FINE, spot.1), (spot.0 + 12 * FINE, spot.1)]);
     area.draw(&Text::new(sv.to_string(), spot, anchored(14, HPos::Center, VPos::Center)))?;
     Ok(())
@@ -101,7 +101,7 @@ fn place(azimuth_deg: f64, elevation_deg: f64) -> (i32, i32) {
 }
 
 fn shade(cn0_dbhz: f64, low: f64, high: f64) -> RGBColor {
-    // The palest yellow end of the map is left out: it vanishes on white.
+    // The palest yellow end of the map is left out: it cannot be seen on white.
     ViridisRGB.get_color_normalized((cn0_dbhz - low) / (high - low) * 0.92, 0.0, 1.0)
 }
 

@@ -1,4 +1,5 @@
-//! The end of a run's report: every figure of `summary.json` with its meaning, and how figures and limits come about.
+//! The end of a run's report: every figure of `summary.json` with its meaning, and how figures and limits
+//! come about.
 
 use serde_json::Value;
 

@@ -1,4 +1,5 @@
-//! `report.pdf` of a run: the verdict on one page, then tables, pictures, settings, and how the figures were made.
+//! `report.pdf` of a run: the verdict on one page, then tables, pictures, settings, and how the figures were
+//! made.
 
 mod method;
 mod tables;
