@@ -256,12 +256,12 @@ fn tree<'a>(tokens: &[&'a str], mut i: usize, before: &[&'a str], leaves: &mut V
 fn resolve(here: &[String], path: &[&str]) -> Option<Vec<String>> {
     let mut base = here.to_vec();
     let mut rest = path;
-    match path.first()? {
-        &"crate" => {
+    match *path.first()? {
+        "crate" => {
             base.clear();
             rest = &path[1..];
         }
-        &"self" => rest = &path[1..],
+        "self" => rest = &path[1..],
         _ => {}
     }
     while let Some((&"super", behind)) = rest.split_first() {
