@@ -137,11 +137,13 @@ mod tests {
             "{lines:?}"
         );
         let text = summary.to_string();
-        assert!(text.contains("9 of 10 s with a continuous wave told, 1 told in error"), "{text}");
+        assert!(text.contains("9 of 10 s with a continuous wave reported, 1 reported in error"), "{text}");
         let failed = |figure: &str| {
             let row = summary.details.verdict.rows.iter().find(|row| row.figure.starts_with(figure)).unwrap();
             row.status == Status::Fail
         };
-        assert!(failed("interference told while") && failed("seconds of a continuous") && !failed("frequency of the"));
+        assert!(
+            failed("interference reported while") && failed("seconds of a continuous") && !failed("frequency of the")
+        );
     }
 }

@@ -71,7 +71,7 @@ impl Summary {
         if let Some(lines) = &self.interference {
             write!(
                 f,
-                "interference  {} of {} s with a continuous wave told, {} told in error",
+                "interference  {} of {} s with a continuous wave reported, {} reported in error",
                 lines.wave_seconds_told, lines.wave_seconds, lines.false_told
             )?;
             if let (Some(error_hz), Some(error_db)) = (lines.frequency_error_max_hz, lines.jn0_error_max_db) {

@@ -118,7 +118,7 @@ fn verify(plan: &Plan, shard: u32, bytes: Vec<u8>) -> Result<Vec<String>, String
     }
     let rows: Vec<String> = lines.map(str::to_owned).collect();
     if trailer != format!("# rows {} sha256 {}", rows.len(), sha256_hex(body.as_bytes())) {
-        return Err("its last line does not count and hash what stands before it".to_owned());
+        return Err("its last line does not count and hash what is before it".to_owned());
     }
     let cases = plan.cases(shard);
     let numbered = |(row, case): (&String, u64)| row.split(',').next() == Some(case.to_string().as_str());

@@ -9,7 +9,7 @@ impl Verdict {
     pub(super) fn interference(&mut self, summary: &Summary) {
         let Some(lines) = summary.interference else { return };
         self.judge(
-            "interference told while there was none",
+            "interference reported while there was none",
             "interference.false_told",
             lines.false_told,
             "",
@@ -20,7 +20,7 @@ impl Verdict {
             return;
         }
         self.judge(
-            "seconds of a continuous wave that were not told",
+            "seconds of a continuous wave that were not reported",
             "",
             lines.wave_seconds - lines.wave_seconds_told,
             "",
