@@ -1,4 +1,5 @@
-//! Fills `reports/acquisition.md`, `.csv` and `.png`: how often the receiver's search finds what is there and what is not.
+//! Fills `reports/acquisition.md`, `.csv` and `.png`: how often the receiver's search finds what is there and
+//! what is not.
 //!
 //! `cargo bench --bench acquisition`, under a minute.
 

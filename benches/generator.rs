@@ -1,8 +1,9 @@
 //! The generator's speed and memory against their bars: `cargo bench --bench generator` prints the rows of
 //! `reports/performance.md` and, with `-- --write`, writes them there.
 //!
-//! Every rate is the whole generator (knots, truth, synthesis, rounding and packing) on one thread: processor time of
-//! that thread, the median of interleaved runs. The end-to-end rows start the program itself on two threads.
+//! Every rate is the whole generator (knots, truth, synthesis, rounding and packing) on one thread: processor
+//! time of that thread, the median of interleaved runs. The end-to-end rows start the program itself on two
+//! threads.
 
 use std::fmt::Write as _;
 use std::hint::black_box;
@@ -13,14 +14,14 @@ use std::time::Instant;
 use gnss_twin::analysis::statistics::median;
 use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::generator::scene::{Arithmetic, Fidelity, Grade, Scene};
-use gnss_twin::generator::stage::noise::{BLOCK_SAMPLES, add_block_exact};
 use gnss_twin::generator::stream::{Options, generate_with};
 use gnss_twin::generator::synth::chips::CodeTime;
 use gnss_twin::generator::synth::isa::{self, Level, add_noise};
 use gnss_twin::generator::synth::lanes::{Buffers, GROUP};
-use gnss_twin::generator::synth::transmitter::{Scratch, Transmitter};
+use gnss_twin::generator::synth::noise::{BLOCK_SAMPLES, add_block_exact};
 use gnss_twin::generator::synth::waveform::plain;
 use gnss_twin::generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run};
+use gnss_twin::generator::transmit::{Scratch, Transmitter};
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::samples::Format;
@@ -34,20 +35,21 @@ const TROPOSPHERE: &str = "[troposphere]\nmodel = \"saastamoinen\"\n";
 const CLOCK: &str = "[receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n";
 const NOISE: &str = "[noise]\n";
 
-/// Processor time of this thread in seconds, which other programs on the machine disturb less than the clock on the
-/// wall; the latter where the system does not tell.
+/// Processor time of this thread in seconds, which other programs on the machine disturb less than the clock
+/// on the wall; the latter where the system does not tell.
 fn busy_s(start: Instant) -> f64 {
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let ns = told.and_then(|text| text.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()));
     ns.map_or_else(|| start.elapsed().as_secs_f64(), |ns| ns * 1e-9)
 }
 
-/// Vector operations of the fast kernel on a group of 32 samples of one satellite with AVX-512, counted in its machine code.
+/// Vector operations of the fast kernel on a group of 32 samples of one satellite with AVX-512, counted in
+/// its machine code.
 const NEAREST_OPERATIONS: f64 = 26.0;
 const AREA_OPERATIONS: f64 = 40.0;
 
-/// Operations of 512 bits that a core begins in a cycle: Zen 4 has four vector pipes of 256 bits, Intel's server
-/// cores two of 512.
+/// Operations of 512 bits that a core begins in a cycle: Zen 4 has four vector pipes of 256 bits, Intel's
+/// server cores two of 512.
 const OPERATIONS_PER_CYCLE: f64 = 2.0;
 
 /// One thing to time.
@@ -190,7 +192,8 @@ fn formats(lines: &mut Vec<Line>) {
     }
 }
 
-/// Median time of one call, in ns. A turn lasts about 0.1 s: the system tells processor time in steps of milliseconds.
+/// Median time of one call, in ns. A turn lasts about 0.1 s: the system tells processor time in steps of
+/// milliseconds.
 fn nanoseconds(mut call: impl FnMut()) -> f64 {
     (0..200).for_each(|_| call());
     let start = Instant::now();
@@ -205,7 +208,8 @@ fn nanoseconds(mut call: impl FnMut()) -> f64 {
     median(&(0..9).map(&mut turn).collect::<Vec<_>>()).unwrap()
 }
 
-/// Where the time of a satellite's sample goes at 2.6 Msps, and the least that the processor's arithmetic allows.
+/// Where the time of a satellite's sample goes at 2.6 Msps, and the least that the processor's arithmetic
+/// allows.
 fn profile() -> Vec<Line> {
     const SATELLITES: usize = 11;
     let level = Level::detect();
@@ -261,8 +265,8 @@ fn profile() -> Vec<Line> {
     lines
 }
 
-/// Runs the program on a scene: times real time of generator and receiver together (pictures apart), and the most
-/// memory that it took, in MiB.
+/// Runs the program on a scene: times real time of generator and receiver together (pictures apart), and the
+/// most memory that it took, in MiB.
 fn run(program: &Path, text: &str) -> Option<(f64, f64)> {
     let directory = tempfile::tempdir().ok()?;
     let scenario = directory.path().join("scene.toml");
@@ -347,9 +351,10 @@ fn required(lines: &mut Vec<Line>) {
     }
 }
 
-/// Knots and messages of a minute at the beginning of a day, late in it, and at its end. Broadcast sets change on even
-/// hours: in the last minute the orbit passes from one set to the next, so each evaluation is two and the curve takes
-/// shorter polynomials; the first minute of the file has no set before, and 23:00 is as far from a change as can be.
+/// Knots and messages of a minute at the beginning of a day, late in it, and at its end. Broadcast sets
+/// change on even hours: in the last minute the orbit passes from one set to the next, so each evaluation is
+/// two and the curve takes shorter polynomials; the first minute of the file has no set before, and 23:00 is
+/// as far from a change as can be.
 fn day(lines: &mut Vec<Line>) {
     let scene = Case::at("00:00:00", "day", "", (Grade::Balanced, 2.6e6), 86_400.0, 9).scene;
     let satellites: Vec<Sv> = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)).collect();

@@ -1,6 +1,8 @@
-//! Fills `reports/loops.md`, `.csv` and `.png`: the receiver's loops on modelled correlations, held against theory.
+//! Fills `reports/loops.md`, `.csv` and `.png`: the receiver's loops on modelled correlations, held against
+//! theory.
 //!
-//! About 500 cells, each run until its spread is known to 0.8 %; a few minutes of processor time. `cargo bench --bench loops`.
+//! About 500 cells, each run until its spread is known to 0.8 %; a few minutes of processor time. `cargo
+//! bench --bench loops`.
 
 use std::path::Path;
 use std::time::Instant;

@@ -1,8 +1,8 @@
-//! Speed of the receiver against its bars, and what its correlators err: `cargo bench --bench receiver` prints the rows of
-//! `reports/performance.md` and, with `-- --write`, writes them there.
+//! Speed of the receiver against its bars, and what its correlators err: `cargo bench --bench receiver`
+//! prints the rows of `reports/performance.md` and, with `-- --write`, writes them there.
 //!
-//! Speeds are medians of runs that take turns, so that a disturbance of the machine meets all of them. Errors are against
-//! correlation in `f64` of the same samples, millisecond by millisecond.
+//! Speeds are medians of runs that take turns, so that a disturbance of the machine meets all of them. Errors
+//! are against correlation in `f64` of the same samples, millisecond by millisecond.
 
 use std::fmt::Write as _;
 use std::hint::black_box;
@@ -27,8 +27,8 @@ const CHIP_HZ: f64 = 1.023e6;
 const CHIP_M: f64 = 299_792_458.0 / CHIP_HZ;
 /// Early, prompt and late, in chips.
 const TAPS: [f64; 3] = [0.25, 0.0, -0.25];
-/// Vector operations of 512 bits for 32 samples and three taps with area edges in 16 bits, counted in the source: 8 to
-/// make integers, 6 to turn them, 14 a tap.
+/// Vector operations of 512 bits for 32 samples and three taps with area edges in 16 bits, counted in the
+/// source: 8 to make integers, 6 to turn them, 14 a tap.
 const OPERATIONS: f64 = 8.0 + 6.0 + 3.0 * 14.0;
 /// Such operations a cycle at most, on Zen 4 (two halves each on four ports) as on two ports of Intel's.
 const OPERATIONS_A_CYCLE: f64 = 2.0;
@@ -53,7 +53,8 @@ fn noise(bytes: usize) -> Vec<u8> {
     (0..bytes).map(|_| ((0..4).map(|_| next() % 32).sum::<u32>() as i32 - 62) as i8 as u8).collect()
 }
 
-/// Channel·samples a second, in 1e9: blocks of 50 ms (at most 2^17 samples) unpacked once, then every channel period by period.
+/// Channel·samples a second, in 1e9: blocks of 50 ms (at most 2^17 samples) unpacked once, then every channel
+/// period by period.
 fn tracking(rate_hz: f64, edge: Edge, arithmetic: Arithmetic) -> Box<dyn FnMut() -> f64> {
     let block = ((rate_hz * 0.05) as usize).min(1 << 17);
     let period = (rate_hz * 1e-3) as usize;
@@ -85,7 +86,8 @@ fn tracking(rate_hz: f64, edge: Edge, arithmetic: Arithmetic) -> Box<dyn FnMut()
     })
 }
 
-/// Seconds for a search of 32 satellites, of which twelve are there at 44 dB-Hz; plans and code spectra are made before.
+/// Seconds for a search of 32 satellites, of which twelve are there at 44 dB-Hz; plans and code spectra are
+/// made before.
 fn acquisition(settings: AcquisitionSettings, threads: usize) -> Box<dyn FnMut() -> f64> {
     let rate_hz = 2.6e6;
     let rate = Rate::from_hz(rate_hz).expect("a rate");
@@ -129,8 +131,8 @@ fn unpacking() -> Box<dyn FnMut() -> f64> {
     })
 }
 
-/// What an arithmetic errs against `f64`: code in metres and carrier in cycles, largest mean of a satellite and root mean
-/// square of a millisecond, and lost C/N0 in decibels.
+/// What an arithmetic errs against `f64`: code in metres and carrier in cycles, largest mean of a satellite
+/// and root mean square of a millisecond, and lost C/N0 in decibels.
 struct Errors {
     code_mean_m: f64,
     code_rms_m: f64,
@@ -172,7 +174,8 @@ fn errors(arithmetic: Arithmetic, rate_hz: f64) -> Errors {
             }
             let tested = replica.correlate_in(arithmetic, (&i, &q), &nco, &taps);
             let exact = replica.slow(&i, &q, &nco, &taps);
-            // Early less late is twice the error of a triangle, over the prompt that the signal has on average.
+            // Early less late is twice the error of a triangle, over the prompt that the signal has on
+            // average.
             let prompt = amplitude * period as f64;
             let chips = |[early, _, late]: [Complex64; 3]| (early - late).re / (2.0 * prompt);
             code_m.push((chips(tested) - chips(exact)) * CHIP_M);

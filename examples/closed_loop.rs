@@ -1,22 +1,24 @@
-//! A scene from a text, its samples in memory, and a receiver whose fixes are compared with the place in the
-//! scene.
+//! Generator and receiver in one loop, twice: in one call with the results in memory, and batch by batch with
+//! a receiver that is fed by hand. Fixes are compared with the true place.
 //!
 //! `cargo run --release --example closed_loop`
 
 use std::error::Error;
-use std::path::Path;
 
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::stream::{Options, Stream};
-use gnss_twin::generator::truth;
+use gnss_twin::generator::Generator;
+use gnss_twin::generator::scenario::Scenario;
+use gnss_twin::generator::scene::Scene;
 use gnss_twin::gnss::earth::Geodetic;
+use gnss_twin::gnss::record::Fix;
 use gnss_twin::receiver::output::Record;
+use gnss_twin::receiver::position::{IonosphereChoice, TroposphereChoice};
 use gnss_twin::receiver::{Receiver, settings::Settings};
+use gnss_twin::twin;
 
-const SCENE: &str = r#"
+const SCENARIO: &str = r#"
 name = "closed_loop"
 start = 2010-07-01T08:05:58
-duration_s = 40
+duration_s = 22
 
 [motion]
 kind = "static"
@@ -28,31 +30,32 @@ height_m = 520
 "#;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let (scene, warnings) = Scenario::parse(SCENE, "closed_loop")?.compose(Path::new("."), &Overrides::default())?;
-    warnings.iter().for_each(|warning| eprintln!("{warning}"));
-    // The truth goes to files, here to those of a directory that ends with the program.
-    let directory = tempfile::tempdir()?;
-    let mut truth = truth::Writer::create(directory.path())?;
+    let scene = Scenario::from_toml(SCENARIO)?.scene()?;
     let mut settings = Settings::default();
     // The scene has no atmosphere.
-    settings.position.ionosphere = gnss_twin::receiver::position::IonosphereChoice::None;
-    settings.position.troposphere = gnss_twin::receiver::position::TroposphereChoice::None;
+    settings.position.ionosphere = IonosphereChoice::None;
+    settings.position.troposphere = TroposphereChoice::None;
 
-    let mut stream = Stream::new(&scene, &mut truth, &Options::default())?;
+    let mut records: Vec<Record> = Vec::new();
+    let done = twin::run(std::slice::from_ref(&scene), &settings, &mut (), &mut records)?;
+    println!("{}\n{}", done.generated[0], done.outcome);
+
     let mut receiver = Receiver::new(&scene.metadata, &settings)?;
-    let place = scene.trajectory.at(0.0).position_m;
-    let axes = Geodetic::from_ecef(&place).ecef_to_enu();
-    let (mut samples, mut more) = (Vec::new(), true);
-    while more {
-        more = stream.next(&mut truth, &mut samples)?;
-        for record in receiver.push(&samples)? {
+    for batch in Generator::new(&scene)? {
+        for record in receiver.push(&batch?.samples)? {
             if let Record::Fix(fix) = record {
-                let error_m = axes * (fix.position_m() - place);
-                println!("{}  {:+.3} m east {:+.3} m north {:+.3} m up", fix.time(), error_m.x, error_m.y, error_m.z);
+                print(&scene, &fix);
             }
         }
     }
     let (_, outcome) = receiver.finish()?;
-    println!("{outcome}");
+    assert_eq!(outcome.fixes, done.outcome.fixes, "both ways give the same");
     Ok(())
+}
+
+/// Prints by how much a fix is off.
+fn print(scene: &Scene, fix: &Fix) {
+    let place = scene.trajectory.at(0.0).position_m;
+    let error_m = Geodetic::from_ecef(&place).ecef_to_enu() * (fix.position_m() - place);
+    println!("{}  {:+.3} m east {:+.3} m north {:+.3} m up", fix.time(), error_m.x, error_m.y, error_m.z);
 }

@@ -4,15 +4,13 @@
 //! `cargo run --release --example own_signal`
 
 use std::error::Error;
-use std::path::Path;
 
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::stream::generate;
-use gnss_twin::generator::truth;
+use gnss_twin::generator::scenario::Scenario;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::signal::{Component, Layer, Signal, register};
 use gnss_twin::receiver::output::Record;
-use gnss_twin::receiver::{Receiver, settings::Settings};
+use gnss_twin::receiver::settings::Settings;
+use gnss_twin::twin;
 
 /// The codes, message and carrier of L1 C/A with a square wave under each chip: BOC(1,1).
 static SPLIT: Signal = Signal {
@@ -22,7 +20,7 @@ static SPLIT: Signal = Signal {
     ..L1_CA
 };
 
-const SCENE: &str = r#"
+const SCENARIO: &str = r#"
 name = "own_signal"
 start = 2010-07-01T08:05:58
 duration_s = 3
@@ -45,16 +43,12 @@ cn0_dbhz = 47
 
 fn main() -> Result<(), Box<dyn Error>> {
     register(&SPLIT)?;
-    let (scene, _) = Scenario::parse(SCENE, "own_signal")?.compose(Path::new("."), &Overrides::default())?;
-    let directory = tempfile::tempdir()?;
-    let mut samples = Vec::new();
-    let generated = generate(&scene, &mut samples, &mut truth::Writer::create(directory.path())?, &mut |_| ())?;
-    println!("{generated}");
-
+    let scene = Scenario::from_toml(SCENARIO)?.scene()?;
     let mut settings = Settings::default();
     settings.acquisition.signals = vec![SPLIT.name.to_owned()];
-    let mut receiver = Receiver::new(&scene.metadata, &settings)?;
-    let (found, _) = (receiver.push(&samples)?, receiver.finish()?);
+    let mut found: Vec<Record> = Vec::new();
+    let done = twin::run(std::slice::from_ref(&scene), &settings, &mut (), &mut found)?;
+    println!("{}\n{}", done.generated[0], done.outcome);
     for record in found {
         if let Record::Acquisition(row) = record
             && row.acquired

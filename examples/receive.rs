@@ -1,28 +1,27 @@
-//! Receives a recording and prints fixes and losses as they are found; nothing is written.
+//! Receives a recording and prints fixes and losses of lock as they are found; nothing is written.
 //!
-//! `cargo run --release --example receive -- recording.ci8 2.6e6` for 8-bit complex samples around L1 at 2.6
-//! Msps.
+//! `cargo run --release --example receive -- [FILE.sigmf-data]`; without a file the one that the example
+//! `generate` wrote. The metadata lie beside it as `FILE.sigmf-meta`.
 
 use std::error::Error;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::Read;
+use std::path::PathBuf;
 
 use gnss_twin::gnss::earth::Geodetic;
 use gnss_twin::gnss::record::Event;
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::time::Rate;
+use gnss_twin::gnss::sigmf;
 use gnss_twin::receiver::output::Record;
 use gnss_twin::receiver::{Receiver, settings::Settings};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let (Some(path), Some(rate)) = (arguments.next(), arguments.next()) else {
-        return Err("expected a recording and its sample rate in hertz: receive recording.ci8 2.6e6".into());
-    };
-    let rate = rate.parse().ok().and_then(Rate::from_hz).ok_or("the rate is no number of hertz")?;
-    let metadata = IfMetadata { format: Format::Ci8, rate, center_hz: 1_575.42e6, inverted: false, start: None };
+    let usual = || std::env::temp_dir().join("gnss-twin-example.sigmf-data");
+    let data = std::env::args().nth(1).map_or_else(usual, PathBuf::from);
+    let meta = data.with_extension("sigmf-meta");
+    let text = fs::read_to_string(&meta).map_err(|error| format!("{}: {error}", meta.display()))?;
+    let metadata = sigmf::parse(&text, &meta.display().to_string())?;
     let mut receiver = Receiver::new(&metadata, &Settings::default())?;
-    let mut file = File::open(path)?;
+    let mut file = File::open(&data)?;
     let mut bytes = vec![0; 1 << 18];
     loop {
         let count = file.read(&mut bytes)?;

@@ -10,10 +10,43 @@
 //! - [`analysis`] is the judge: it joins what the receiver found with the truth on
 //!   (sample number, satellite, signal) and measures every error.
 //!
-//! Above the three stands [`study`]: the receiver's loops on modelled correlations, held against the judge's theory.
+//! Above the three stand [`twin`], which closes the loop, and [`study`]: the receiver's loops on modelled
+//! correlations, compared with the judge's theory.
 //!
-//! Each world is a cargo feature and compiles without the others. Units: SI and radians
-//! inside, cycles for carrier phase, GPS time; a name ends with its unit.
+//! Results are values: the generator iterates samples with their truth, the receiver returns records, and
+//! files are one sink among others.
+//!
+//! ```
+//! use gnss_twin::generator::{Generator, scenario::Scenario};
+//! use gnss_twin::receiver::{Receiver, output::Record, settings::Settings};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scenario = r#"
+//!     name = "glimpse"
+//!     start = 2010-07-01T08:06:00
+//!     duration_s = 0.3
+//!     motion = { kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
+//!     noise = {}
+//! "#;
+//! let scene = Scenario::from_toml(scenario)?.scene()?;
+//! let mut receiver = Receiver::new(&scene.metadata, &Settings::default())?;
+//! let mut found = Vec::new();
+//! for batch in Generator::new(&scene)? {
+//!     for record in receiver.push(&batch?.samples)? {
+//!         match record {
+//!             Record::Acquisition(row) if row.acquired => found.push(row.sv),
+//!             _ => {}
+//!         }
+//!     }
+//! }
+//! assert!(found.len() >= 4, "{found:?}");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Each world is a cargo feature and compiles without the others; a program that needs generator and receiver
+//! takes the package with `default-features = false, features = ["generator", "receiver"]`. Units: SI and
+//! radians inside, cycles for carrier phase, GPS time; a name ends with its unit.
 
 #[macro_use]
 pub mod plant;
@@ -30,3 +63,5 @@ pub mod generator;
 pub mod receiver;
 #[cfg(feature = "study")]
 pub mod study;
+#[cfg(all(feature = "generator", feature = "receiver"))]
+pub mod twin;

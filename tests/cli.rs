@@ -184,7 +184,8 @@ fn broken_limits_exit_with_three_and_say_by_how_much_and_unusable_ones_stop_befo
     }
     assert!(message.contains("2 of 2 limits of broken.toml are broken"), "{message}");
 
-    // Alone, it holds the verdict's own limits: this scene's codes are sound; a satellite that is taken away is missed.
+    // Alone, it holds the verdict's own limits: this scene's codes are sound; a satellite that is taken away
+    // is missed.
     let sound = twin(&["analyze", "run", "--check"], here.path());
     assert_eq!(code(&sound), 0, "{}", String::from_utf8_lossy(&sound.stdout));
     assert!(String::from_utf8_lossy(&sound.stdout).contains("limits of the verdict hold"));
@@ -231,7 +232,8 @@ fn a_sought_part_is_that_part_of_the_whole_and_one_outside_is_refused() {
     assert!(found.status.success(), "{}", stderr(&found));
     let read = |name: &str| fs::read(here.path().join(name)).unwrap();
     assert!(read("part.sigmf-data") == read("whole.sigmf-data")[2 * 2_600_001..2 * 2_650_001]);
-    // A second and a sample after the start, by the receiver's clock: the metadata say so, and the truth counts from there.
+    // A second and a sample after the start, by the receiver's clock: the metadata say so, and the truth
+    // counts from there.
     let meta = String::from_utf8(read("part.sigmf-meta")).unwrap();
     assert!(meta.contains("2010-07-01T07:59:46.000000"), "{meta}");
     let scene = String::from_utf8(read("part.truth/scene.json")).unwrap();
@@ -293,7 +295,8 @@ fn ten_milliseconds_are_searched_and_reported_in_milliseconds() {
     assert_eq!(code(&output), 3, "{}", stderr(&output));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(text.contains("10.0 ms received") && text.contains("there are 10.0 ms"), "{text}");
-    // Four sums of 2 ms find 45 dB-Hz (256 on average against 56) in all but the worst place of code, Doppler and data bit.
+    // Four sums of 2 ms find 45 dB-Hz (256 on average against 56) in all but the worst place of code, Doppler
+    // and data bit.
     let sky = fs::read_to_string(here.path().join("s.truth/sky.csv")).unwrap();
     let found = acquired(&here.path().join("rx"));
     assert!(found.len() >= 8 && found.iter().all(|sv| sky.contains(sv)), "{found:?}");

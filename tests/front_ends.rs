@@ -104,24 +104,35 @@ fn every_front_end_has_its_files_which_are_those_that_it_has_alone() {
         65,
         &["front_ends = 2", "--front-end NAME"],
     );
+    // A collection is one reception; what is said of one recording's samples is refused.
     let collection = "both/two.sigmf-collection";
     refused(
-        &["receive", collection, "--out", "rx"],
+        &["receive", collection, "--format", "ci8", "--out", "rx"],
         here.path(),
-        65,
-        &["2 recordings", "both/wide.sigmf-meta, both/narrow.sigmf-meta"],
+        2,
+        &["--format", "2 recordings", "both/wide.sigmf-meta, both/narrow.sigmf-meta"],
     );
+    let output = twin(&["receive", collection, "--out", "rx"], here.path());
+    // Two seconds are too short for a fix.
+    assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
+    let outcome = fs::read_to_string(here.path().join("rx/receiver.json")).unwrap();
+    let outcome: serde_json::Value = serde_json::from_str(&outcome).unwrap();
+    assert_eq!(outcome["samples"], 8_000_000);
+    assert_eq!(outcome["front_ends"][0]["signals"][0], "GPS L1 C/A");
+    assert_eq!(outcome["front_ends"][1]["sample_rate_hz"], 2.6e6);
+    assert_eq!(outcome["front_ends"][1]["signals"].as_array().unwrap().len(), 0);
+    assert!(outcome["warnings"][0].as_str().unwrap().starts_with("front end 2"), "{outcome}");
+    assert!(outcome["acquired"].as_array().unwrap().len() >= 6, "{outcome}");
 }
 
 #[test]
-fn a_run_receives_the_front_end_that_is_chosen() {
+fn a_run_receives_all_front_ends_or_the_one_that_is_chosen() {
     let here = workplace();
-    refused(
-        &["run", "two.toml", "--out", "none"],
-        here.path(),
-        2,
-        &["2 front ends (wide, narrow)", "--front-end NAME"],
-    );
+    let text = done(&["run", "two.toml", "--keep-if", "--out", "both"], here.path());
+    assert!(text.matches("made ").count() == 2, "{text}");
+    for name in ["wide.sigmf-data", "wide.sigmf-meta", "narrow.sigmf-data", "psd.csv", "summary.json"] {
+        assert!(here.path().join("both").join(name).exists(), "{name}");
+    }
     refused(&["run", "two.toml", "--front-end", "broad"], here.path(), 2, &["broad", "wide, narrow"]);
     done(&["run", "two.toml", "--front-end", "narrow", "--keep-if", "--out", "run"], here.path());
     done(&["generate", "two.toml", "--front-end", "narrow", "--out", "narrow.sigmf-data"], here.path());

@@ -1,11 +1,11 @@
 //! Laws of the sample kernels: the fast one against the obvious one, the noise, the phases.
 #![cfg(feature = "generator")]
 
-use gnss_twin::generator::stage::noise::BLOCK_SAMPLES;
 use gnss_twin::generator::synth::band::Filter;
 use gnss_twin::generator::synth::chips::CodeTime;
 use gnss_twin::generator::synth::isa::{Level, accumulate, add_noise};
 use gnss_twin::generator::synth::lanes::Buffers;
+use gnss_twin::generator::synth::noise::BLOCK_SAMPLES;
 use gnss_twin::generator::synth::waveform::{Waveform, plain};
 use gnss_twin::generator::synth::{CODE_ONE, Edge, Run, reference};
 use gnss_twin::gnss::gps::l1ca::L1_CA;
@@ -65,11 +65,13 @@ fn the_fast_kernel_keeps_to_the_reference_at_all_lengths_phases_and_rates() {
                 reference::accumulate(edge, &run, &mut ri, &mut rq);
                 for n in 0..length {
                     let error = (i[n] - ri[n]).abs().max((q[n] - rq[n]).abs());
-                    // A lane's code phase resolves 2^-27 chip: nearest chips may differ that close to an edge.
+                    // A lane's code phase resolves 2^-27 chip: nearest chips may differ that close to an
+                    // edge.
                     let p = run.position + run.step * n as u64;
                     let near_edge = edge_is_nearest(edge) && (p % CODE_ONE).min(CODE_ONE - p % CODE_ONE) < 1 << 22;
-                    // Carrier: 2e-7 for each of three sines, 2e-7 for each of seven rotations. An area edge: two
-                    // roundings of 2^-27 chip, times 2/0.04. A filter's table: 4e-6 an edge, some edges at once.
+                    // Carrier: 2e-7 for each of three sines, 2e-7 for each of seven rotations. An area edge:
+                    // two roundings of 2^-27 chip, times 2/0.04. A filter's table: 4e-6 an edge, some edges
+                    // at once.
                     let bound = match edge {
                         Edge::Nearest => 2e-6,
                         Edge::Area => 2e-6 + 8e-7,
@@ -208,7 +210,8 @@ fn harmonic(x: &[f64], k: usize) -> (f64, f64) {
 /// Where the code best matches one period of samples, in metres behind the true place: the zero of early
 /// minus late, half a chip apart, of the continuous correlation with the code below half the sample rate.
 ///
-/// By Fourier series: the code's harmonics `k` kHz, from its chips and the pulse's sinc, times those of the samples.
+/// By Fourier series: the code's harmonics `k` kHz, from its chips and the pulse's sinc, times those of the
+/// samples.
 fn code_bias_m(edge: Edge<'_>, rate_khz: usize, start_chips: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     let spreading = plain(&L1_CA, 11).unwrap();

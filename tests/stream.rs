@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::clock::ReceiverClock;
+use gnss_twin::generator::clock::nodes::Nodes;
 use gnss_twin::generator::effect::link::FixedCn0;
 use gnss_twin::generator::message::Senders;
-use gnss_twin::generator::ripple::nodes::Nodes;
 use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade, Scene};
 use gnss_twin::generator::stream::{Generated, Options, generate_with};
 use gnss_twin::generator::synth::isa::Level;
@@ -126,16 +126,17 @@ fn levels_keep_to_the_reference_within_their_bounds() {
     };
     let edges = |grade: Grade| Fidelity { code_edge: Fidelity::of(grade).code_edge, ..reference };
     for grade in [Grade::Fast, Grade::Balanced, Grade::Reference] {
-        // Against its own edges in f64 a level differs by its carrier: a phase error of `tolerance` cycles moves a
-        // sample by 2π of it, single precision by 2e-5; nearest chips fall on the other side of an edge once in
-        // 2^27/0.4 samples.
+        // Against its own edges in f64 a level differs by its carrier: a phase error of `tolerance` cycles
+        // moves a sample by 2π of it, single precision by 2e-5; nearest chips fall on the other side of an
+        // edge once in 2^27/0.4 samples.
         let base = at_level(edges(grade), 2.6e6, false);
         let bound = std::f64::consts::TAU * Fidelity::of(grade).knot_tolerance_cycles + 2e-5;
         let error = distance(Fidelity::of(grade), &base).sqrt();
         assert!(error < bound, "{grade:?}: {error} of {bound}");
     }
-    // A chip changes half the time; nearest edges put a step up to half a sample away: about a sixth of the power of
-    // the changes' samples. Area edges stay closer to the band-limited waveform than nearest ones do.
+    // A chip changes half the time; nearest edges put a step up to half a sample away: about a sixth of the
+    // power of the changes' samples. Area edges stay closer to the band-limited waveform than nearest ones
+    // do.
     let base = at_level(reference, 2.6e6, false);
     let [fast, balanced] = [Grade::Fast, Grade::Balanced].map(|grade| distance(Fidelity::of(grade), &base));
     assert!(balanced < fast && fast < 0.25 && balanced > 1e-4, "{fast} {balanced}");
@@ -182,7 +183,8 @@ fn a_plain_correlation_finds_every_satellite_where_truth_says() {
         assert!(done.satellites.len() >= 7 && rows.len() == 3 * done.satellites.len());
         for row in &rows {
             let code = l1ca::code(row.sv.number).unwrap();
-            // From sent time: chips in the second, then to the next start of a code period (no data edge inside).
+            // From sent time: chips in the second, then to the next start of a code period (no data edge
+            // inside).
             let chips = row.sent_fraction_s * 1.023e6;
             let chip_hz = 1.023e6 * (1.0 + row.doppler_hz / 1_575.42e6);
             let skip = ((1023.0 - chips.rem_euclid(1023.0)) / chip_hz * rate_hz).ceil();
@@ -233,8 +235,8 @@ fn without_satellites_the_noise_has_its_set_power_and_without_noise_the_signal_h
 
 #[test]
 fn a_day_into_the_stream_the_carrier_is_where_the_equation_says() {
-    use gnss_twin::generator::synth::transmitter::{Scratch, Transmitter};
     use gnss_twin::generator::synth::{Edge, Kernel};
+    use gnss_twin::generator::transmit::{Scratch, Transmitter};
     let mut scene = scene(25e6, 90_000.0, Format::Cf32Le, 1_571.328e6, false);
     scene.clock.start = Epoch::parse("2010-06-30T23:50:00").unwrap();
     scene.fidelity.code_edge = CodeEdge::Nearest;

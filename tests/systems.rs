@@ -25,7 +25,7 @@ use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::{Sv, System};
 use gnss_twin::gnss::signal::register;
 use gnss_twin::gnss::signal::synthetic::{LONG_BOC, OWN_TIME};
-use gnss_twin::receiver::output::Output;
+use gnss_twin::receiver::output::{Output, Record};
 use gnss_twin::receiver::receive;
 use gnss_twin::receiver::settings::Settings;
 
@@ -84,6 +84,52 @@ fn scene(case: &Case) -> Scene {
     scene.messages = Arc::new(Senders::new(&common, &scene.signals).unwrap());
     scene.catalogue = Arc::new(catalogue);
     scene
+}
+
+#[test]
+fn lost_samples_cost_no_channel_of_either_system_and_are_counted_by_each_alone() {
+    let scene = scene(&Case { duration_s: 46, ..CASES[0] });
+    let directory = tempfile::tempdir().unwrap();
+    let mut writer = truth::Writer::create(directory.path()).unwrap();
+    let mut bytes = Vec::new();
+    let whole = 0..scene.samples;
+    generate_part(&scene, whole, &mut bytes, &mut writer, &mut |_| (), &Options::default()).unwrap();
+    let path: Vec<TrajectoryRow> = rows(directory.path(), "trajectory.csv");
+    let passes: Vec<PassRow> = rows(directory.path(), "passes.csv");
+    let at = |second: f64| 2 * (second * 4.3e6) as usize;
+    // 1.6 ms, which displaces codes and symbols of both systems.
+    let (first, lost) = (36.0, 7000);
+    let cut = [&bytes[..at(first)], &bytes[at(first) + 2 * lost..]].concat();
+    for signals in ["\"GPS L1 C/A\", \"synthetic A\"", "\"synthetic A\""] {
+        let text = format!(
+            "[acquisition]\nsignals = [{signals}]\n[position]\nionosphere = \"none\"\ntroposphere = \"none\"\n"
+        );
+        let settings = Settings::from_table(text.parse().unwrap(), "systems").unwrap();
+        let mut records = Vec::new();
+        let outcome = receive(&scene.metadata, cut.as_slice(), &settings, &mut records, &mut |_| ()).unwrap();
+        println!("{signals}: {outcome}");
+        let counts: Vec<i64> = outcome.jumps.iter().map(|jump| jump.samples).collect();
+        assert_eq!(counts, [lost as i64], "{signals}");
+        // Those that set are lost, and nothing else is.
+        let sets = |sv: Sv| passes.iter().any(|pass| pass.sv == sv && pass.ends_by != PassEnd::Scene);
+        let lost = |record: &Record| match record {
+            Record::Event(row) if row.event == Event::LossOfLock && !sets(row.sv) => Some((row.sample, row.sv)),
+            _ => None,
+        };
+        let lost: Vec<(u64, Sv)> = records.iter().filter_map(lost).collect();
+        assert!(lost.is_empty(), "{signals}: {lost:?}");
+        let fixes = records.iter().filter_map(|record| if let Record::Fix(fix) = record { Some(fix) } else { None });
+        let mut last = None;
+        for fix in fixes {
+            let error_m = (fix.position_m() - path[0].position_m()).norm();
+            let second = fix.sample as f64 / 4.3e6;
+            // Half a meter of code noise times a PDOP of 2, five deviations.
+            assert!(error_m < 6.0, "{signals}: {error_m} m at {second} s");
+            assert!(last.is_none_or(|before| second - before < 3.0), "{signals}: none from {last:?} to {second} s");
+            last = Some(second);
+        }
+        assert!(last.is_some_and(|second| second > 45.0), "{signals}: {last:?}");
+    }
 }
 
 fn rows<T: serde::de::DeserializeOwned>(directory: &Path, name: &str) -> Vec<T> {

@@ -1,8 +1,9 @@
 //! Not a test: the last lines of `cargo test`, which say what the witnesses did not see.
 //!
-//! Reads the notes that the tests of `tests/witness` leave about files outside of the repository (`tests/witness/data.rs`).
-//! Its name sorts behind theirs, and it has no harness that would capture what it prints. Limits: notes are those of each
-//! test's latest run; where tests run one at a time, on the main thread, they are counted as one.
+//! Reads the notes that the tests of `tests/witness` leave about files outside of the repository
+//! (`tests/witness/data.rs`). Its name sorts behind theirs, and it has no harness that would capture what it
+//! prints. Limits: notes are those of each test's latest run; where tests run one at a time, on the main
+//! thread, they are counted as one.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,9 +1,10 @@
 //! Fills `reports/trade.md`, `.csv` and `.png`: what each setting of the generator costs and what it errs.
 //!
-//! Errors are measured without noise and without rounding, one satellite at a time, by correlating its samples with
-//! those of the `reference` level: prompt, and half a chip apart for the code, whose discriminator is calibrated with a
-//! reference moved by 0.02 chip. Costs are medians of interleaved runs of the whole generator on one thread. Run alone:
-//! `cargo bench --bench trade`; `-- --widths` measures the widths of samples alone.
+//! Errors are measured without noise and without rounding, one satellite at a time, by correlating its
+//! samples with those of the `reference` level: prompt, and half a chip apart for the code, whose
+//! discriminator is calibrated with a reference moved by 0.02 chip. Costs are medians of interleaved runs of
+//! the whole generator on one thread. Run alone: `cargo bench --bench trade`; `-- --widths` measures the
+//! widths of samples alone.
 
 mod widths;
 
@@ -238,8 +239,8 @@ fn spur_dbc(tested: &[Complex<f32>], base: &[Complex<f32>]) -> f64 {
     20.0 * libm::log10((spur / carrier).max(1e-15))
 }
 
-/// Processor time of this thread in seconds, which other programs on the machine disturb less than the clock on the
-/// wall; the latter where the system does not tell.
+/// Processor time of this thread in seconds, which other programs on the machine disturb less than the clock
+/// on the wall; the latter where the system does not tell.
 fn busy_s(start: Instant) -> f64 {
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let ns = told.and_then(|text| text.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()));

@@ -92,7 +92,7 @@ pub(in crate::analysis) fn true_observation(index: usize, tick: u64) -> Observat
 }
 
 pub(in crate::analysis) fn parameter(prn: u8, name: &str, raw: i64) -> NavigationRow {
-    NavigationRow { sv: Sv::gps(prn), issue: 17, parameter: name.to_owned(), raw }
+    NavigationRow { sv: Sv::gps(prn), issue: 17, parameter: name.to_owned(), raw, message: "LNAV".to_owned() }
 }
 
 /// Writes the truth's half of a run.

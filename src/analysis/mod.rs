@@ -6,12 +6,38 @@
 //!
 //! 1. [`read`]: a run's files as values.
 //! 2. [`expect`]: what theory and truth let one expect.
-//! 3. [`measure`]: estimate minus truth, and what follows from it.
+//! 3. [`measure`](mod@measure): estimate minus truth, and what follows from it.
 //! 4. [`judge`](mod@judge): figures against limits.
 //! 5. [`show`]: tables, pictures, reports.
 //!
 //! Below all of them lie [`error`], [`statistics`] and [`waveform`], the spectrum and the correlation of a
 //! signal.
+//!
+//! ```
+//! use gnss_twin::generator::{scenario::Scenario, truth};
+//! use gnss_twin::receiver::{output::Output, settings::Settings};
+//! use gnss_twin::{analysis, twin};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scenario = r#"
+//!     name = "judged"
+//!     start = 2010-07-01T08:06:00
+//!     duration_s = 4
+//!     motion = { kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
+//!     noise = {}
+//! "#;
+//! let scene = Scenario::from_toml(scenario)?.scene()?;
+//! let run = tempfile::tempdir()?;
+//! let [truth, rx] = ["truth", "rx"].map(|name| run.path().join(name));
+//! std::fs::create_dir(&truth)?;
+//! std::fs::create_dir(&rx)?;
+//! let (mut truth, mut rx) = (truth::Writer::create(&truth)?, Output::create(&rx)?);
+//! twin::run(std::slice::from_ref(&scene), &Settings::default(), &mut truth, &mut rx)?;
+//! let summary = analysis::assess(run.path(), None)?;
+//! assert_eq!(summary.satellites.false_acquired, 0);
+//! # Ok(())
+//! # }
+//! ```
 
 #![warn(missing_docs)]
 
@@ -59,7 +85,7 @@ pub fn judge(run: &Path) -> Result<Summary, JudgeError> {
 /// The same with a user's limits beside those of theory; what came of them is in the summary's details.
 ///
 /// # Errors
-/// As [`judge`].
+/// As [`judge()`].
 pub fn judge_against(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
     // On one of the threads that draw: what it needed before serves again.
     rayon::scope(|_| judged(run, limits))
@@ -69,7 +95,7 @@ pub fn judge_against(run: &Path, limits: Option<&Limits>) -> Result<Summary, Jud
 /// drawn.
 ///
 /// # Errors
-/// As [`judge`], but for files that cannot be written.
+/// As [`judge()`], but for files that cannot be written.
 pub fn assess(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
     Ok(measure(Run::read(run)?, run, limits)?.summary)
 }

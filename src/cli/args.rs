@@ -50,7 +50,7 @@ pub struct Run {
     /// Directory for the results [default: reports/<scene's name>, and -NAME with --front-end NAME]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Front end to receive, of a scene that has several
+    /// Front end to receive, of a scene that has several [default: all of them in one reception]
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,
     /// Seed of the noise, in place of the scene's
@@ -62,7 +62,8 @@ pub struct Run {
     /// Also keep the samples: if.sigmf-data and if.sigmf-meta
     #[arg(long)]
     pub keep_if: bool,
-    /// Exit with 3 if a limit is broken: one of this file's for summary.json, or of the verdict's own without a file
+    /// Exit with 3 if a limit is broken: one of this file's for summary.json, or of the verdict's own without
+    /// a file
     #[arg(long, value_name = "LIMITS.toml", num_args = 0..=1)]
     pub check: Option<Option<PathBuf>>,
     /// Also read files that lie outside the scenario's directory
@@ -103,12 +104,13 @@ pub struct Generate {
     pub threads: Option<u16>,
 }
 
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 #[command(
     after_help = "Examples:\n  gnss-twin receive if.sigmf-data --out reports/mine\n  gnss-twin receive raw.bin --out reports/raw --format ci8 --rate-hz 4e6\n\nExit code: 0 with a fix, 3 without one (results are written, the reason is printed), 65 when the input is no recording"
 )]
 pub struct Receive {
-    /// Recording: a SigMF pair (either file), or a raw file with --format and --rate-hz; - is standard input
+    /// Recording: a SigMF pair (either file), a SigMF collection of front ends that share a clock, or a raw
+    /// file with --format and --rate-hz; - is standard input
     pub file: PathBuf,
     /// Directory for the results
     #[arg(long, value_name = "DIR")]
@@ -144,7 +146,8 @@ pub struct Analyze {
     /// Directory of a run, with truth/ and rx/
     #[arg(required_unless_present = "truth", conflicts_with = "truth")]
     pub run: Option<PathBuf>,
-    /// Exit with 3 if a limit is broken: one of this file's for summary.json, or of the verdict's own without a file
+    /// Exit with 3 if a limit is broken: one of this file's for summary.json, or of the verdict's own without
+    /// a file
     #[arg(long, value_name = "LIMITS.toml", num_args = 0..=1, conflicts_with = "truth")]
     pub check: Option<Option<PathBuf>>,
     /// Judge another receiver, which was fed a scene's samples, against that scene's truth/ directory
@@ -237,7 +240,8 @@ pub struct StudyPlan {
 pub struct StudyRun {
     /// Directory of the study
     pub directory: PathBuf,
-    /// Number of a shard, or auto: the number that the engine gives to this task [default: all that are missing]
+    /// Number of a shard, or auto: the number that the engine gives to this task [default: all that are
+    /// missing]
     #[arg(long, value_name = "K")]
     pub shard: Option<Shard>,
     /// Threads to use [default: one a core]

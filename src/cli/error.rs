@@ -1,7 +1,8 @@
 //! What ends the program, and with which exit code.
 //!
-//! 0 done · 2 usage · 3 a check failed or a result is incomplete · 65 input data is bad · 70 our bug · 73 output cannot
-//! be created · 74 read or write failed · 75 passing trouble, try again · 129, 130, 141, 143 by signal.
+//! 0 done · 2 usage · 3 a check failed or a result is incomplete · 65 input data is bad · 70 our bug · 73
+//! output cannot be created · 74 read or write failed · 75 passing trouble, try again · 129, 130, 141, 143 by
+//! signal.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -67,11 +68,6 @@ impl CliError {
     /// The machine lacks something now that it may have later.
     pub fn passing(message: impl Display) -> Self {
         Self { code: 75, message: message.to_string() }
-    }
-
-    /// A signal asked the program to end.
-    pub fn signal(number: i32) -> Self {
-        Self { code: 128 + number as u8, message: String::new() }
     }
 
     /// Something that cannot happen.

@@ -1,7 +1,7 @@
 //! Signals: the first takes outputs in the making away and ends the process, the second ends it at once.
 //!
-//! A thread of its own waits for them, so that they are heard whatever the others are at: computing, reading
-//! a pipe that stays silent, or drawing.
+//! A thread of its own waits for them, so that they are noticed whatever the others are at: computing,
+//! reading a pipe that stays silent, or drawing.
 
 use std::io::Read;
 use std::os::unix::net::UnixStream;
@@ -24,7 +24,7 @@ const STACK_BYTES: usize = 1 << 18;
 // A signal handler has no other place to write to.
 static RECEIVED: OnceLock<Arc<AtomicUsize>> = OnceLock::new();
 
-/// Installs the handlers, and the thread that hears of them.
+/// Installs the handlers, and the thread that waits for them.
 pub fn install() -> Result<(), CliError> {
     handle().map_err(|error| CliError::passing(format!("cannot handle signals: {error}")))
 }
@@ -36,7 +36,8 @@ fn handle() -> std::io::Result<()> {
     thread::Builder::new().name("signals".to_owned()).stack_size(STACK_BYTES).spawn(move || wait(reader))?;
     let (handled, detached) = ([SIGINT, SIGTERM, SIGHUP], is_detached());
     for signal in handled.into_iter().filter(|signal| !(detached && *signal == SIGHUP)) {
-        // Order matters: the shutdown sees the flag that an earlier signal has set, and who is woken finds its number.
+        // Order matters: the shutdown sees the flag that an earlier signal has set, and who is woken finds
+        // its number.
         signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&second))?;
         signal_hook::flag::register(signal, Arc::clone(&second))?;
         signal_hook::flag::register_usize(signal, Arc::clone(received), signal as usize)?;
@@ -48,7 +49,7 @@ fn handle() -> std::io::Result<()> {
 /// Whether whoever started the program wants it to outlive the terminal (`nohup`): hang-ups are ignored then,
 /// and stay so.
 fn is_detached() -> bool {
-    // Linux tells it there (proc(5)), bit 0 for signal 1; elsewhere it is taken not to be.
+    // Linux reports it there (proc(5)), bit 0 for signal 1; elsewhere it is taken not to be.
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
@@ -76,7 +77,8 @@ fn wait(mut reader: UnixStream) {
     signal_hook::low_level::exit(128 + signal);
 }
 
-/// Does nothing unless a signal has come: an error may then be its consequence, so that the end is left to that thread.
+/// Does nothing unless a signal has come: an error may then be its consequence, so that the end is left to
+/// that thread.
 pub fn give_way() {
     while received().is_some() {
         thread::sleep(LOOK);

@@ -1,24 +1,26 @@
 //! The command line: arguments as written, one file a subcommand, and what they share.
 //!
 //! Everything printed goes through writers that return errors, so a full disk or a closed pipe
-//! ends in an exit code and never in a panic. Exit codes are listed in [`error`].
+//! ends in an exit code and never in a panic. Exit codes are listed in `error`.
 
-pub mod analyze;
-pub mod args;
-pub mod check;
+#![warn(missing_docs)]
+
+mod analyze;
+mod args;
+mod check;
 mod collection;
-pub mod error;
-pub mod generate;
-pub mod interrupt;
-pub mod plan;
-pub mod progress;
-pub mod receive;
-pub mod reference;
-pub mod run;
-pub mod scenario;
-pub mod speed;
-pub mod staging;
-pub mod study;
+mod error;
+mod generate;
+mod interrupt;
+mod plan;
+mod progress;
+mod receive;
+mod reference;
+mod run;
+mod scenario;
+mod speed;
+mod staging;
+mod study;
 
 use std::panic::catch_unwind;
 use std::process::ExitCode;

@@ -31,7 +31,7 @@ pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
     }
     let (mut plans, mut texts) = (Vec::new(), Vec::new());
     for scene in &scenes {
-        let machinery = generator::stream::machinery(scene).map_err(generator_error)?;
+        let machinery = generator::plan::machinery(scene).map_err(generator_error)?;
         let levels = Levels::new(scene).map_err(generator_error)?;
         let plan = Plan::new(scene, machinery, levels).map_err(CliError::input)?;
         let loops = Loops::new(scene, &settings.tracking)?;

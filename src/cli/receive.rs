@@ -29,17 +29,19 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
             Settings::parse(&text, &name).map_err(CliError::input)?
         }
     };
-    let recording = open(arguments)?;
+    let recordings = open(arguments)?;
+    let samples = recordings.first().and_then(|first| first.samples);
+    let format = recordings.first().map(|first| first.metadata.format);
+    let mut front_ends: Vec<(IfMetadata, Box<dyn Read>)> =
+        recordings.into_iter().map(|recording| (recording.metadata, recording.reader)).collect();
     let staging = Staging::directory(&arguments.out)?;
     let mut output = Output::create(staging.path()).map_err(output_error)?;
-    let progress = Progress::new("receive", recording.samples);
-    let (metadata, samples) = (&recording.metadata, recording.reader);
-    let outcome = receiver::receive(metadata, samples, &settings, &mut output, &mut |done| progress.set(done));
+    let progress = Progress::new("receive", samples);
+    let outcome = receiver::receive_several(&mut front_ends, &settings, &mut output, &mut |done| progress.set(done));
     drop(progress);
     let outcome = outcome.map_err(receiver_error)?;
     drop(output);
-    if outcome.samples == 0 {
-        let format = recording.metadata.format;
+    if let Some(format) = format.filter(|_| outcome.samples == 0) {
         return Err(CliError::input(format!(
             "{}: no whole sample: expected {} bytes or more of {format}",
             shown(&arguments.file),
@@ -68,12 +70,17 @@ struct Recording {
     samples: Option<u64>,
 }
 
-/// Opens the recording and finds out what it is: SigMF metadata if there are any, then flags over them.
-fn open(arguments: &args::Receive) -> Result<Recording, CliError> {
-    let stdin = arguments.file.as_os_str() == "-";
+/// Opens the recording, or all that a collection names.
+fn open(arguments: &args::Receive) -> Result<Vec<Recording>, CliError> {
     if arguments.file.extension().is_some_and(|extension| extension == "sigmf-collection") {
-        return Err(of_collection(&arguments.file)?);
+        return of_collection(arguments);
     }
+    Ok(vec![open_one(arguments)?])
+}
+
+/// Opens a recording and finds out what it is: SigMF metadata if there are any, then flags over them.
+fn open_one(arguments: &args::Receive) -> Result<Recording, CliError> {
+    let stdin = arguments.file.as_os_str() == "-";
     let (data_path, meta_path) = pair(&arguments.file);
     let there = !stdin && present(&meta_path).map_err(|error| CliError::read(shown(&meta_path), &error))?;
     let described = if there {
@@ -96,16 +103,29 @@ fn open(arguments: &args::Receive) -> Result<Recording, CliError> {
     Ok(Recording { metadata, reader: Box::new(file), samples })
 }
 
-/// The refusal of a collection, with the recordings in it that can be received.
-fn of_collection(path: &Path) -> Result<CliError, CliError> {
+/// The recordings of a collection: front ends that share a clock.
+fn of_collection(arguments: &args::Receive) -> Result<Vec<Recording>, CliError> {
+    let path = &arguments.file;
     let (name, text) = scenario::text(path)?;
     let members = sigmf::parse_collection(&text, &name).map_err(CliError::input)?;
-    let files = members.iter().map(|member| shown(&path.with_file_name(format!("{member}.sigmf-meta"))));
-    Ok(CliError::input(format!(
-        "{name}: a collection of {} recordings: receive one of them by its path: {}",
-        members.len(),
-        files.collect::<Vec<_>>().join(", ")
-    )))
+    let files: Vec<PathBuf> =
+        members.iter().map(|member| path.with_file_name(format!("{member}.sigmf-meta"))).collect();
+    let flags = [
+        ("--format", arguments.format.is_some()),
+        ("--rate-hz", arguments.rate_hz.is_some()),
+        ("--if-hz", arguments.if_hz.is_some()),
+        ("--inverted", arguments.inverted),
+    ];
+    if let Some((flag, _)) = flags.into_iter().find(|(_, given)| *given) {
+        let names: Vec<String> = files.iter().map(|file| shown(file)).collect();
+        return Err(CliError::usage(format!(
+            "{flag}: {name} is a collection of {} recordings, each with metadata of its own: receive one of them by its \
+             path: {}",
+            members.len(),
+            names.join(", ")
+        )));
+    }
+    files.into_iter().map(|file| open_one(&args::Receive { file, ..arguments.clone() })).collect()
 }
 
 /// The data and metadata files of a recording that is named by either.

@@ -1,6 +1,7 @@
 //! `run`: generator and receiver side by side with samples passed in memory, then the judge.
 //!
-//! Two batches of samples are in memory at a time: the one that is received and the one that is made meanwhile.
+//! All front ends of a scene are received in one reception. The loop itself is [`twin::feed`]; here are the
+//! files, the spectrum of the samples and the times.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -20,13 +21,14 @@ use crate::cli::speed::Speed;
 use crate::cli::staging::Staging;
 use crate::generator::scenario::Overrides;
 use crate::generator::scene::Scene;
-use crate::generator::stream::{Generated, Options, Stream};
+use crate::generator::stream::Generated;
 use crate::generator::{GenerateError, truth};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::sigmf;
 use crate::receiver::output::{Output, OutputError};
 use crate::receiver::settings::Settings;
 use crate::receiver::{Outcome, ReceiveError, Reception};
+use crate::twin;
 
 /// Length of the signal's start from which the spectrum is estimated.
 const SPECTRUM_S: f64 = 0.2;
@@ -39,13 +41,13 @@ const SPECTRUM_BINS: usize = 2048;
 pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
     let named = scenario::read(arguments.scenario.as_deref())?.choose(arguments.front_end.as_deref())?;
-    named.one_front_end("run")?;
     let gate = Gate::read(arguments.check.as_ref())?;
-    let (scene, warnings) = scenario::compose(
+    let (scenes, warnings) = scenario::compose_all(
         &named,
         &Overrides { seed: arguments.seed, format: None, allow_outside: arguments.allow_outside },
     )?;
-    let settings = scenario::receiver_settings(&named)?;
+    let Some(scene) = scenes.first() else { return Err(CliError::bug("a scenario without a front end")) };
+    let settings = twin::settings_for(&scenes, &scenario::receiver_settings(&named)?);
     for warning in warnings {
         scenario::warn(&warning);
     }
@@ -61,9 +63,12 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     };
     let mut truth = truth::Writer::create(&below("truth")?).map_err(truth_error)?;
     let mut output = Output::create(&below("rx")?).map_err(output_error)?;
-    let mut tap = Tap::new(&scene, run, arguments.keep_if)?;
-    let both = both(&scene, &settings, &mut truth, &mut output, &mut tap)?;
-    tap.finish(run)?;
+    let mut taps: Vec<Tap> =
+        scenes.iter().map(|scene| Tap::new(scene, run, arguments.keep_if, scenes.len())).collect::<Result<_, _>>()?;
+    let both = both(&scenes, &settings, &mut truth, &mut output, &mut taps)?;
+    // The spectrum that is judged is that of the first front end.
+    taps.first().map_or(Ok(()), |first| first.write_psd(run))?;
+    taps.into_iter().try_for_each(|tap| tap.finish(run))?;
     drop((truth, output));
 
     let duration_s = scene.metadata.rate.elapsed_s(scene.samples);
@@ -82,54 +87,46 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
         text += &format!("{diagnosis}\n");
     }
     text += &format!("margins       {}\n", both.outcome.conditioning);
-    text += &format!("made          {}\n", both.generated);
+    for generated in &both.generated {
+        text += &format!("made          {generated}\n");
+    }
     text += &format!("results in {}\n", target.display());
     scenario::print(&text)?;
     gate.enforce(&summary)
 }
 
 struct Both {
-    generated: Generated,
+    generated: Vec<Generated>,
     outcome: Outcome,
     generator_busy: Duration,
     receiver_busy: Duration,
     whole: Duration,
 }
 
-/// Generates and receives side by side: while the receiver takes one batch of samples, the generator makes the next,
-/// and whichever core has nothing left to do for one helps the other.
+/// Generates and receives side by side, and looks at the samples on their way.
 fn both(
-    scene: &Scene,
+    scenes: &[Scene],
     settings: &Settings,
     truth: &mut truth::Writer,
     output: &mut Output,
-    tap: &mut Tap,
+    taps: &mut [Tap],
 ) -> Result<Both, CliError> {
-    let progress = Progress::new(&format!("run {}", scene.name), Some(scene.samples));
+    let name = scenes.first().map_or("", |scene| scene.name.as_str());
+    let progress = Progress::new(&format!("run {name}"), scenes.first().map(|scene| scene.samples));
     let start = Instant::now();
-    let (mut generator_busy, mut receiver_busy) = (Duration::ZERO, Duration::ZERO);
-    // Inside the pool, so that no batch has to wake its threads up.
-    let (generated, outcome) = rayon::scope(|_| {
-        let mut stream = Stream::new(scene, truth, &Options::default()).map_err(generator_error)?;
-        let mut reception = Reception::new(&scene.metadata, settings).map_err(receiver_error)?;
-        let (mut made, mut taken) = (Vec::new(), Vec::new());
-        let mut more = true;
-        while more {
-            let (generated, received) = rayon::join(
-                || timed(&mut generator_busy, || stream.next(truth, &mut made)),
-                || {
-                    tap.see(&taken).map_err(|error| CliError::output("samples", &error))?;
-                    timed(&mut receiver_busy, || reception.take(&taken, output)).map_err(receiver_error)
-                },
-            );
-            received?;
-            more = generated.map_err(generator_error)?;
-            std::mem::swap(&mut made, &mut taken);
-            progress.set(reception.samples());
+    let mut receiver_busy = Duration::ZERO;
+    let metadata: Vec<IfMetadata> = scenes.iter().map(|scene| scene.metadata.clone()).collect();
+    let mut reception = Reception::of_several(&metadata, settings).map_err(receiver_error)?;
+    let fed = twin::feed(scenes, truth, &mut |number, samples| {
+        if let Some(tap) = taps.get_mut(number) {
+            tap.see(samples).map_err(|error| CliError::output("samples", &error))?;
         }
-        let generated = stream.finish(truth).map_err(generator_error)?;
-        Ok::<_, CliError>((generated, reception.finish(output).map_err(receiver_error)?))
+        timed(&mut receiver_busy, || reception.take_of(number, samples, output)).map_err(receiver_error)?;
+        progress.set(reception.samples());
+        Ok::<_, CliError>(())
     })?;
+    let outcome = reception.finish(output).map_err(receiver_error)?;
+    let twin::Fed { generated, busy: generator_busy } = fed;
     Ok(Both { generated, outcome, generator_busy, receiver_busy, whole: start.elapsed() })
 }
 
@@ -141,8 +138,8 @@ fn timed<T>(busy: &mut Duration, work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// Looks at the samples on their way: estimates the spectrum of the first part, or of pieces all over a scene whose
-/// spectrum changes, and keeps all samples if asked to.
+/// Looks at the samples on their way: estimates the spectrum of the first part, or of pieces all over a scene
+/// whose spectrum changes, and keeps all samples if asked to.
 struct Tap {
     metadata: IfMetadata,
     psd: Psd,
@@ -152,13 +149,18 @@ struct Tap {
     stride: u64,
     i: Vec<f32>,
     q: Vec<f32>,
+    /// Name of its files, and the samples.
+    name: String,
     kept: Option<BufWriter<File>>,
 }
 
 impl Tap {
-    fn new(scene: &Scene, run: &Path, keep: bool) -> Result<Self, CliError> {
+    /// For one of so many front ends.
+    fn new(scene: &Scene, run: &Path, keep: bool, front_ends: usize) -> Result<Self, CliError> {
+        let own = scene.front_end_name.as_ref().filter(|_| front_ends > 1);
+        let name = own.map_or_else(|| "if".to_owned(), Clone::clone);
         let kept = if keep {
-            let path = run.join("if.sigmf-data");
+            let path = run.join(format!("{name}.sigmf-data"));
             let file = File::create(&path).map_err(|error| CliError::create(path.display(), &error))?;
             Some(BufWriter::new(file))
         } else {
@@ -170,7 +172,7 @@ impl Tap {
         let length = (SPECTRUM_S * metadata.rate.hz()) as u64 / pieces * sample_bytes;
         let stride = scene.samples / pieces * sample_bytes;
         let psd = Psd::new(metadata.rate.hz(), !metadata.format.is_complex(), SPECTRUM_BINS);
-        Ok(Self { psd, metadata, seen: 0, piece: 0..length, stride, i: Vec::new(), q: Vec::new(), kept })
+        Ok(Self { psd, metadata, seen: 0, piece: 0..length, stride, i: Vec::new(), q: Vec::new(), name, kept })
     }
 
     fn see(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -194,13 +196,15 @@ impl Tap {
         }
     }
 
-    fn finish(&mut self, run: &Path) -> Result<(), CliError> {
-        let path = run.join("psd.csv");
-        tables::write_psd(&path, &self.psd).map_err(judge_error)?;
-        if let Some(mut file) = self.kept.take() {
-            let path = run.join("if.sigmf-data");
+    fn write_psd(&self, run: &Path) -> Result<(), CliError> {
+        tables::write_psd(&run.join("psd.csv"), &self.psd).map_err(judge_error)
+    }
+
+    fn finish(self, run: &Path) -> Result<(), CliError> {
+        if let Some(mut file) = self.kept {
+            let path = run.join(format!("{}.sigmf-data", self.name));
             file.flush().map_err(|error| CliError::output(path.display(), &error))?;
-            let path = run.join("if.sigmf-meta");
+            let path = run.join(format!("{}.sigmf-meta", self.name));
             fs::write(&path, sigmf::write(&self.metadata)).map_err(|error| CliError::output(path.display(), &error))?;
         }
         Ok(())
@@ -211,6 +215,12 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), CliError
     let mut text = serde_json::to_string_pretty(value).map_err(CliError::bug)?;
     text.push('\n');
     fs::write(path, text).map_err(|error| CliError::output(path.display(), &error))
+}
+
+impl From<GenerateError> for CliError {
+    fn from(error: GenerateError) -> Self {
+        generator_error(error)
+    }
 }
 
 /// The exit that a generator's failure means.
@@ -234,6 +244,7 @@ pub fn truth_error(error: truth::TruthError) -> CliError {
             };
             CliError::output(path.display(), &source)
         }
+        truth::TruthError::Refused(error) => CliError::output("truth", &io::Error::other(error)),
     }
 }
 

@@ -35,21 +35,6 @@ impl Named {
         let scenario = self.scenario.with_front_end(name).map_err(refuse)?;
         Ok(Self { scenario, ..self })
     }
-
-    /// Refuses a scenario with several front ends where `what` takes one.
-    pub fn one_front_end(&self, what: &str) -> Result<(), CliError> {
-        let names = self.scenario.front_end_names();
-        if self.scenario.front_ends.len() < 2 {
-            return Ok(());
-        }
-        Err(CliError::usage(format!(
-            "{}: the scene has {} front ends ({}), and {what} takes one: choose it with --front-end NAME, or write all of \
-             them with `gnss-twin generate`",
-            self.name,
-            names.len(),
-            names.join(", ")
-        )))
-    }
 }
 
 /// Reads the scenario at `path`, or the embedded one.
@@ -71,7 +56,8 @@ pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
     Ok(Named { scenario, text, name, directory: directory.to_owned() })
 }
 
-/// The name that messages give a file, and its text: at most `LARGEST_BYTES`, so that a device without end is refused.
+/// The name that messages give a file, and its text: at most `LARGEST_BYTES`, so that a device without end is
+/// refused.
 pub fn text(path: &Path) -> Result<(String, String), CliError> {
     let name = shown(path);
     let mut bytes = Vec::new();
@@ -95,11 +81,6 @@ pub fn use_threads(threads: Option<u16>) -> Result<(), CliError> {
         pool = pool.num_threads(threads.into());
     }
     pool.build_global().map_err(|error| CliError::passing(format!("cannot start threads: {error}")))
-}
-
-/// The scene that the scenario means, with what the command line puts in its place.
-pub fn compose(named: &Named, overrides: &Overrides) -> Result<(Scene, Vec<String>), CliError> {
-    named.scenario.compose(&named.directory, overrides).map_err(scenario_error)
 }
 
 /// The scenes of all front ends of the scenario.

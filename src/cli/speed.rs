@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-/// Speed of the stages of a run; `None` where the system does not tell.
+/// Speed of the stages of a run; `None` where the system does not report it.
 #[derive(Debug, Serialize)]
 pub struct Speed {
     pub generate_x_real_time: f64,

@@ -21,7 +21,8 @@ pub struct Staging {
 }
 
 impl Staging {
-    /// Starts a directory that will be `target`. An existing target is replaced only if it is empty or one of ours.
+    /// Starts a directory that will be `target`. An existing target is replaced only if it is empty or one of
+    /// ours.
     pub fn directory(target: &Path) -> Result<Self, CliError> {
         let error = |error: io::Error| CliError::create(target.display(), &error);
         if present(target).map_err(error)? && !replaceable(target).map_err(error)? {

@@ -130,7 +130,7 @@ fn missing(plan: &Plan) -> Result<Vec<u32>, CliError> {
     Ok(missing)
 }
 
-/// Runs shards, with a bar that tells the time left.
+/// Runs shards, with a bar that shows the time left.
 fn compute(plan: &Plan, shards: &[u32]) -> Result<(), CliError> {
     let cases = shards.iter().map(|&number| plan.cases(number)).map(|cases| cases.end - cases.start).sum();
     let start = Instant::now();

@@ -1,6 +1,7 @@
-//! Which broadcast set each satellite sends at each time, and the smooth orbit that the generator takes for true.
+//! Which broadcast set each satellite sends at each time, and the smooth orbit that the generator takes for
+//! true.
 //!
-//! A set goes on the air two hours before its reference time (IS-GPS-200N, 20.3.4.4), or when it was
+//! A set of GPS goes on the air two hours before its reference time (IS-GPS-200N, 20.3.4.4), or when it was
 //! first received if its reference time is off the two-hour grid, which marks a fresh upload; it stays
 //! until the next one or the end of its curve fit interval. Neighbouring sets disagree by
 //! a metre or two, so the truth passes from one to the next over [`BLEND_S`]: the received phase
@@ -12,7 +13,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::generator::departure::{Departure, minimum_jerk};
+use crate::generator::orbit_error::{Displacement, minimum_jerk};
 use crate::generator::precise::Orbits;
 use crate::gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
 use crate::gnss::satellite::{Sv, System};
@@ -27,6 +28,9 @@ const COMPARABLE_S: f64 = 6.0 * 3600.0;
 /// Good sets of one satellite agree to some ten metres half way between their reference times, where
 /// they are at most six hours apart.
 const CONTRADICTION_M: f64 = 2000.0;
+/// The longest time from a Galileo set's reference time to its first sending: records of 2020 have 11 min at
+/// least.
+const GALILEO_DELAY_S: f64 = 600.0;
 /// The same for clocks: 300 m.
 const CONTRADICTION_S: f64 = 1e-6;
 
@@ -47,7 +51,9 @@ struct Timeline {
 /// sending of the next one. Open where no set comes before or after.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Silence {
+    /// When it begins; `None` where it has always been.
     pub from: Option<Epoch>,
+    /// When it ends; `None` where it never does.
     pub until: Option<Epoch>,
 }
 
@@ -56,20 +62,20 @@ pub struct Silence {
 pub struct Catalogue {
     satellites: BTreeMap<Sv, Timeline>,
     precise: Option<Orbits>,
-    departures: Vec<Departure>,
+    departures: Vec<Displacement>,
     /// By how much a system's time is ahead of GPS time, whole seconds apart; zero for those that are not
     /// here.
     time_offsets_s: BTreeMap<System, f64>,
 }
 
 impl Catalogue {
-    /// Arranges `sets`, whose order does not matter, and tells in words which were left out.
+    /// Arranges `sets`, whose order does not matter, and reports in words which were left out.
     ///
     /// Repeated sets count once. Two sets of a satellite contradict each other when, half way between
     /// their reference times, their positions differ by more than 2 km or their clocks by more than
     /// 1 µs; sets more than six hours apart are not compared. While some set is contradicted by more
     /// others than agree with it, the worst are left out; of equally bad ones only those that do not
-    /// look like a GPS orbit, and all of them if that does not tell them apart.
+    /// look like a GPS orbit, and all of them if that does not distinguish them.
     pub fn new(sets: Vec<Ephemeris>) -> (Self, Vec<String>) {
         let mut warnings = Vec::new();
         let mut grouped: BTreeMap<Sv, Vec<Ephemeris>> = BTreeMap::new();
@@ -99,7 +105,7 @@ impl Catalogue {
     }
 
     /// Adds what true orbits depart by.
-    pub fn depart(&mut self, departures: Vec<Departure>) {
+    pub fn depart(&mut self, departures: Vec<Displacement>) {
         self.departures = departures;
     }
 
@@ -117,7 +123,7 @@ impl Catalogue {
     /// What is true besides the broadcast sets, in words: precise orbits, and departures.
     pub fn describe(&self) -> (Option<String>, Vec<String>) {
         let precise = self.precise.as_ref().map(Orbits::describe);
-        (precise, self.departures.iter().map(Departure::describe).collect())
+        (precise, self.departures.iter().map(Displacement::describe).collect())
     }
 
     /// Satellites of which there is at least one set.
@@ -156,7 +162,7 @@ impl Catalogue {
 
     /// Whether `sv` sends a set at `at` that says it is healthy.
     pub fn healthy(&self, sv: Sv, at: Epoch) -> bool {
-        self.sent_at(sv, at).is_some_and(|set| set.health == 0)
+        self.sent_at(sv, at).is_some_and(|set| set.is_healthy())
     }
 
     /// Orbit (in the ECEF axes of `at`) and L1 C/A clock, T_GD included, taken for true at GPS time
@@ -260,12 +266,16 @@ fn contradict(a: &Ephemeris, b: &Ephemeris) -> bool {
     }
 }
 
-/// Whether elements are those of the nominal constellation (IS-GPS-200N, table 20-III has wider fields):
-/// a 12 h sidereal orbit of 55° and small eccentricity.
+/// Whether elements are those of the nominal constellation (the fields are wider): a 12 h sidereal orbit of
+/// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo.
 fn plausible(set: &Ephemeris) -> bool {
-    (set.sqrt_a_sqrtm - 5153.6).abs() < 5.0
+    let (sqrt_a_sqrtm, inclination_deg) = match set.sv.system {
+        System::Galileo => (5440.6, 56_f64),
+        _ => (5153.6, 55_f64),
+    };
+    (set.sqrt_a_sqrtm - sqrt_a_sqrtm).abs() < 5.0
         && set.eccentricity < 0.03
-        && (set.i0_rad - 55_f64.to_radians()).abs() < 4_f64.to_radians()
+        && (set.i0_rad - inclination_deg.to_radians()).abs() < 4_f64.to_radians()
 }
 
 fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
@@ -304,8 +314,12 @@ fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
     sets.retain(|_| kept.next().unwrap_or(true));
 }
 
-/// When a set goes on the air.
+/// When a set goes on the air. Galileo's sets, of every ten minutes at best, do so after their reference
+/// time, and a file says when a receiver had the whole set: some minutes later.
 fn first_sent(set: &Ephemeris) -> Epoch {
+    if set.sv.system == System::Galileo {
+        return set.toe.plus_s(set.transmitted.since(set.toe).clamp(0.0, GALILEO_DELAY_S));
+    }
     let nominal = set.toe.plus_s(-7200.0);
     let on_grid = set.toe.seconds() % 7200 == 0;
     let late_s = set.transmitted.since(nominal);
@@ -336,5 +350,4 @@ fn spans(sets: &[Ephemeris]) -> Vec<Span> {
 }
 
 #[cfg(test)]
-#[path = "catalogue_tests.rs"]
 mod tests;

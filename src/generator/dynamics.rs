@@ -25,9 +25,11 @@ const PLACES: u32 = 10;
 /// The largest that a satellite's range does while it is in view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineOfSight {
+    /// The satellite.
     pub sv: Sv,
     /// Largest magnitude of the range's second and third derivative.
     pub acceleration_mps2: f64,
+    /// Largest jerk along it.
     pub jerk_mps3: f64,
     /// From the least to the largest second derivative: what no step of it exceeds.
     pub swing_mps2: f64,
@@ -141,55 +143,4 @@ fn pulls(scene: &Scene, duration_s: f64) -> Vec<Pull> {
         }
     }
     found
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use super::*;
-    use crate::generator::scenario::{Overrides, Scenario};
-    use crate::generator::truth;
-
-    fn lines(text: &str) -> (Scene, Vec<LineOfSight>) {
-        let scenario = Scenario::parse(text, "lines").unwrap();
-        let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
-        let (scene, _) = scenario.compose(&directory, &Overrides::default()).unwrap();
-        let lines = lines_of_sight(&scene).unwrap();
-        (scene, lines)
-    }
-
-    #[test]
-    fn a_rocket_s_lines_of_sight_have_its_thrust_and_its_ramp_and_a_place_at_rest_has_neither() {
-        let (_, lines) = lines(include_str!("../../scenarios/high_dynamics.toml"));
-        // The rocket flies towards G23: jerk 196 m/s³ along the line of sight within the cosine of 10°, and
-        // of its thrust, 225 m/s², gravity (9.8) and drag take at most 30.
-        let line = lines.iter().find(|line| line.sv == Sv::gps(23)).unwrap();
-        assert!((190.0..206.0).contains(&line.jerk_mps3), "{line:?}");
-        assert!((195.0..225.0).contains(&line.acceleration_mps2), "{line:?}");
-        assert!(line.swing_mps2 >= line.acceleration_mps2 && (39.9..46.3).contains(&line.jerk_s), "{line:?}");
-        // No other line of sight has more than the motion itself, 196 m/s³ and the drag's growth.
-        assert!(lines.len() > 8 && lines.iter().all(|other| other.jerk_mps3 < 210.0), "{lines:?}");
-        let (_, rest) = self::lines(include_str!("../../scenarios/static.toml"));
-        // A GPS satellite's range accelerates by at most 0.18 m/s².
-        assert!(rest.len() > 8 && rest.iter().all(|line| line.jerk_mps3 == 0.0 && line.acceleration_mps2 < 0.18));
-    }
-
-    #[test]
-    fn the_satellites_share_is_the_second_difference_of_the_true_range() {
-        let (scene, lines) = lines(include_str!("../../scenarios/static.toml"));
-        let middle_s = 0.5 * scene.clock.rate.elapsed_s(scene.samples);
-        for line in lines.iter().take(4) {
-            let range_m = |t_s: f64| {
-                let local = scene.clock.start.plus_s(t_s);
-                let seen = truth::seen(&scene, line.sv, scene.signals[0], local).unwrap().unwrap();
-                seen.emission.sight.range_m
-            };
-            let h_s = 10.0;
-            let second = (range_m(middle_s + h_s) - 2.0 * range_m(middle_s) + range_m(middle_s - h_s)) / (h_s * h_s);
-            // Light time stretches the range by 1e-5, gravity is that of a point (1e-3 m/s²), and over a
-            // minute the acceleration itself moves by 2e-5 m/s³ · 30 s.
-            assert!((line.acceleration_mps2 - second.abs()).abs() < 2e-3, "{line:?} {second}");
-        }
-    }
 }

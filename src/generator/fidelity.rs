@@ -1,10 +1,9 @@
 //! Choices that trade speed for accuracy, each with the error and the cost that were measured for it.
 //!
-//! A scene names a level or single knobs; [`choices`] says what was picked and what it is worth. The figures are those
-//! of `reports/trade.csv` (`cargo bench --bench trade` fills it), rounded up; costs are one core of the machine named
-//! there. Limits: a knob's figure assumes that every other knob is at its best.
+//! A scene names a level or single knobs; [`choices`] says what was picked and what it is worth. The figures
+//! are those of `reports/trade.csv` (`cargo bench --bench trade` fills it), rounded up; costs are one core of
+//! the machine named there. Limits: a knob's figure assumes that every other knob is at its best.
 
-use crate::generator::scene::Scene;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::facts::Edge;
 
@@ -45,7 +44,9 @@ pub enum Arithmetic {
 /// Every knob, with the level that they were taken from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fidelity {
+    /// The level that it was chosen by.
     pub grade: Grade,
+    /// How code edges fall between samples.
     pub code_edge: CodeEdge,
     /// Of the carrier and the code's place, sample by sample.
     pub carrier: Arithmetic,
@@ -106,8 +107,8 @@ impl Fidelity {
     /// The knobs of a level.
     pub const fn of(grade: Grade) -> Self {
         match grade {
-            // Half the tolerance is the secant's within a run, a parabola of that height A (cycles) that repeats
-            // with the runs: its first sideband is 2π·A·2/π², −72 dBc for A = 2e-4.
+            // Half the tolerance is the secant's within a run, a parabola of that height A (cycles) that
+            // repeats with the runs: its first sideband is 2π·A·2/π², −72 dBc for A = 2e-4.
             Grade::Fast => Self {
                 grade,
                 code_edge: CodeEdge::Nearest,
@@ -137,7 +138,8 @@ impl Fidelity {
         }
     }
 
-    /// Measured time for one sample of one satellite, in ns on one core, everything that the generator does included.
+    /// Measured time for one sample of one satellite, in ns on one core, everything that the generator does
+    /// included.
     pub fn satellite_sample_ns(&self, rate_hz: f64) -> f64 {
         // Edges come once in so many samples: what a filter's response costs falls with the rate.
         let dense = rate_hz >= 8e6;
@@ -153,8 +155,9 @@ impl Fidelity {
         }
     }
 
-    /// The knobs of a level for samples at `rate_hz`: `balanced` takes the cheapest edges whose code error is below
-    /// `allowed_m`, for which see [`allowed_m`], and never nearest ones, whose spurs are those of `fast`.
+    /// The knobs of a level for samples at `rate_hz`: `balanced` takes the cheapest edges whose code error is
+    /// below `allowed_m`, for which see [`allowed_m`], and never nearest ones, whose spurs are those of
+    /// `fast`.
     pub fn suited(grade: Grade, rate_hz: f64, allowed_m: f64) -> Self {
         let level = Self { allowed_m, ..Self::of(grade) };
         if grade != Grade::Balanced {
@@ -192,7 +195,8 @@ impl Fidelity {
 }
 
 impl Fidelity {
-    /// What to tell of edges that leave the code metres off at a rate where chips meet the same places of every sample.
+    /// What to warn of edges that leave the code metres off at a rate where chips meet the same places of
+    /// every sample.
     pub fn warning(&self, rate_hz: f64) -> Option<String> {
         let bias_m = standing_bias_m(self.code_edge, rate_hz);
         (bias_m > self.allowed_m).then(|| {
@@ -249,10 +253,11 @@ const FOLDS: i32 = 4;
 /// Error of the code that a scene's own noise hides, in metres: that of a delay loop on its strongest signal,
 /// 0.2 m at most.
 ///
-/// Thermal noise of a loop of bandwidth B with correlators d chips apart is √(B·d / (2·C/N0)) chips where T·C/N0 is far
-/// above one (Kaplan & Hegarty, equation 5.23, first branch). With 1 Hz and half a chip it is 0.2 m at 57 dB-Hz: above
-/// what any GPS signal reaches on the ground (52 dB-Hz, 0.37 m), so that only signals set stronger than nature's
-/// ask for less. Without noise nothing hides an error, and the 0.2 m stand by themselves.
+/// Thermal noise of a loop of bandwidth B with correlators d chips apart is √(B·d / (2·C/N0)) chips where
+/// T·C/N0 is far above one (Kaplan & Hegarty, equation 5.23, first branch). With 1 Hz and half a chip it is
+/// 0.2 m at 57 dB-Hz: above what any GPS signal reaches on the ground (52 dB-Hz, 0.37 m), so that only
+/// signals set stronger than nature's ask for less. Without noise nothing hides an error, and the 0.2 m stand
+/// by themselves.
 pub fn allowed_m(cn0_dbhz: Option<f64>) -> f64 {
     const BANDWIDTH_HZ: f64 = 1.0;
     const SPACING_CHIPS: f64 = 0.5;
@@ -265,8 +270,8 @@ pub fn allowed_m(cn0_dbhz: Option<f64>) -> f64 {
 
 /// Error where every chip meets the same few places between samples, root mean square, in metres.
 ///
-/// With `q` places in turn, nearest edges know the code to a sample in `q` (uniform: over √12); for area edges
-/// it falls with the square, from 1.6 m measured at 4.092 Msps.
+/// With `q` places in turn, nearest edges know the code to a sample in `q` (uniform: over √12); for area
+/// edges it falls with the square, from 1.6 m measured at 4.092 Msps.
 fn standing_bias_m(edge: CodeEdge, rate_hz: f64) -> f64 {
     // Places drift apart within a code period of 1023 chips when the ratio misses by more than this.
     let meets = |q: u32| {
@@ -287,18 +292,20 @@ fn standing_bias_m(edge: CodeEdge, rate_hz: f64) -> f64 {
 pub struct Choice {
     /// Its key in `[fidelity]`.
     pub knob: &'static str,
+    /// What was chosen.
     pub value: String,
     /// Whether the level would have chosen another value.
     pub own: bool,
     /// What it does to the samples, and for how much.
     pub error: String,
+    /// Its time a sample on one core.
     pub cost: String,
 }
 
-/// What a scene chose for each knob, the error to expect of it and its cost.
-pub fn choices(scene: &Scene) -> Vec<Choice> {
-    let rate_hz = scene.clock.rate.hz();
-    let (chosen, level) = (scene.fidelity, Fidelity::suited(scene.fidelity.grade, rate_hz, scene.fidelity.allowed_m));
+/// What was chosen for each knob at a sample rate, the error to expect of it and its cost; of the noise's
+/// arithmetic where there is `noise`.
+pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool) -> Vec<Choice> {
+    let level = Fidelity::suited(chosen.grade, rate_hz, chosen.allowed_m);
     let f32_carrier = Fidelity { carrier: Arithmetic::F32, ..chosen };
     let edge_ns = f32_carrier.satellite_sample_ns(rate_hz);
     let mut found = vec![
@@ -334,7 +341,7 @@ pub fn choices(scene: &Scene) -> Vec<Choice> {
             cost: "none per sample".to_owned(),
         },
     ];
-    if scene.noise {
+    if noise {
         let (error, ns) = match chosen.noise {
             Arithmetic::F32 => ("3e-7 of its size", 1.3),
             Arithmetic::F64 => ("1e-16 of its size", 20.0),
@@ -389,7 +396,8 @@ mod tests {
 
     #[test]
     fn signals_stronger_than_nature_s_ask_for_better_edges() {
-        // σ = 293.05 m · √(0.25 / 10^(x/10)): 0.46 m at 50 dB-Hz, hidden under the cap, and 0.2 m at 57.3 dB-Hz.
+        // σ = 293.05 m · √(0.25 / 10^(x/10)): 0.46 m at 50 dB-Hz, hidden under the cap, and 0.2 m at 57.3
+        // dB-Hz.
         assert_eq!((allowed_m(None), allowed_m(Some(50.0))), (0.2, 0.2));
         assert!((allowed_m(Some(70.0)) - 0.046_335).abs() < 1e-6);
         let edge = |rate_hz: f64, cn0_dbhz: f64| {

@@ -20,6 +20,7 @@ const KEPT: usize = 1024;
 /// How one satellite of a constellation arrives at one reading of the receiver's clock, whatever the signal.
 #[derive(Clone, Debug)]
 pub struct Arriving {
+    /// Where and when it was sent.
     pub emission: Emission,
     /// By how much the receiver's clock is ahead of the sender's.
     pub bias_s: f64,

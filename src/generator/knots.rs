@@ -1,21 +1,21 @@
 //! Delay and carrier of a satellite between knots: cubic polynomials on an absolute grid of samples.
 //!
-//! The grid's roots are 2^r samples, 8 to 16 s long. A root is halved until the cubic through four
-//! nodes of each part misses the truth at three further points by less than half the tolerance,
-//! so the knots follow from the scene and never from how the stream is cut or where it
-//! starts. Power is a straight line through the ends where that keeps the amplitude to [`AMPLITUDE_ERROR`], a cubic
-//! elsewhere, and parts are halved until it does. Parts also end at breaks of the motion. Rays that are silent
-//! throughout a part are left out of it. Limits: parts are not shorter than 1024 samples.
+//! The grid's roots are 2^r samples, 8 to 16 s long. A root is halved until the cubic through four nodes of
+//! each part misses the truth at three further points by less than half the tolerance, so the knots follow
+//! from the scene and never from how the stream is cut or where it starts. Power is a straight line through
+//! the ends where that keeps the amplitude to [`AMPLITUDE_ERROR`], a cubic elsewhere, and parts are halved
+//! until it does. Parts also end at breaks of the motion. Rays that are silent throughout a part are left out
+//! of it. Limits: parts are not shorter than 1024 samples.
 
-use crate::generator::ripple::Ripple;
+use crate::generator::fast_phase::FastPhase;
 use crate::gnss::time::Rate;
 
 /// Parts of the grid are not halved below this; what error remains is reported.
 const SHORTEST_SAMPLES: u64 = 1024;
 /// Error of a ray's amplitude between knots at most, of its largest in the part: 0.0087 dB.
 pub const AMPLITUDE_ERROR: f64 = 1e-3;
-/// Half the step of the amplitude from run to run at most, of its largest in the part: a run keeps the power of its
-/// middle, so the staircase does not bias it, and its rms error is 45 dB below the ray.
+/// Half the step of the amplitude from run to run at most, of its largest in the part: a run keeps the power
+/// of its middle, so the staircase does not bias it, and its rms error is 45 dB below the ray.
 pub const AMPLITUDE_STEP: f64 = 1e-2;
 
 /// What one ray's signal says at one reading of the receiver's clock.
@@ -31,11 +31,11 @@ pub struct Arrival {
 
 impl Arrival {
     /// With what is too quick for knots.
-    pub fn rippled(self, ripple: Ripple) -> Self {
+    pub fn with_fast_phase(self, fast: FastPhase) -> Self {
         Self {
-            delay_s: self.delay_s + ripple.delay_s,
-            carrier_cycles: self.carrier_cycles + ripple.carrier_cycles,
-            cn0_hz: self.cn0_hz * ripple.gain * ripple.gain,
+            delay_s: self.delay_s + fast.delay_s,
+            carrier_cycles: self.carrier_cycles + fast.carrier_cycles,
+            cn0_hz: self.cn0_hz * fast.gain * fast.gain,
         }
     }
 }
@@ -64,16 +64,19 @@ pub struct Path {
     pub carrier: Cubic,
     /// Linear C/N0 (Hz).
     pub cn0_hz: Cubic,
-    /// Longest power of two of samples on which a secant of the carrier stays within the tolerance and the amplitude
-    /// within [`AMPLITUDE_STEP`].
+    /// Longest power of two of samples on which a secant of the carrier stays within the tolerance and the
+    /// amplitude within [`AMPLITUDE_STEP`].
     pub run_samples: u64,
 }
 
 /// One part of the grid with the rays that are there all the time.
 #[derive(Clone, Debug)]
 pub struct Part {
+    /// First sample.
     pub start: u64,
+    /// The sample after the last one.
     pub end: u64,
+    /// A polynomial for each ray.
     pub paths: Vec<Path>,
     /// Largest error met at the points of comparison.
     pub error_cycles: f64,
@@ -257,7 +260,8 @@ impl Grid {
     }
 }
 
-/// The power between the ends of a part, and the largest error of its amplitude, of the largest amplitude seen.
+/// The power between the ends of a part, and the largest error of its amplitude, of the largest amplitude
+/// seen.
 fn power(seen: &[(f64, Arrival)], u: [f64; 4], nodes: [f64; 4]) -> (Cubic, f64) {
     let strongest = seen.iter().fold(0.0_f64, |most, (_, r)| most.max(r.cn0_hz)).sqrt();
     let error = |cubic: &Cubic| {

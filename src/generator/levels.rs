@@ -10,13 +10,12 @@
 use std::fmt;
 use std::ops::Range;
 
+use crate::generator::arrival;
 use crate::generator::ray::Ray;
 use crate::generator::scene::Scene;
 use crate::generator::sky::emission;
 use crate::generator::spoof::Constellation;
-use crate::generator::stage::interference::arrival::Tuning;
 use crate::generator::stream::{self, GenerateError, Stretch};
-use crate::generator::truth;
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::satellite::Sv;
 
@@ -30,7 +29,9 @@ const INSTANTS: u64 = 60;
 /// Smallest and largest of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
+    /// The smallest.
     pub least: f64,
+    /// The largest.
     pub most: f64,
 }
 
@@ -49,6 +50,7 @@ impl Span {
 /// A source of interference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Source {
+    /// Its kind as a scenario writes it.
     pub kind: &'static str,
     /// While it is on, at the antenna; of pulses the mean. `None` when it is never on in the scene.
     pub jn0_dbhz: Option<Span>,
@@ -59,7 +61,9 @@ pub struct Source {
 /// A spoofer's weakest and strongest signal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spoofed {
+    /// Number of the spoofer, from 1.
     pub number: usize,
+    /// C/N0 of its signals, in dB-Hz; `None` where none is in view.
     pub cn0_dbhz: Option<Span>,
 }
 
@@ -68,13 +72,17 @@ pub struct Spoofed {
 pub struct Levels {
     /// Full scale in LSB of the scene's gain, and what it is.
     pub full_scale_lsb: f64,
+    /// What full scale is that of, in words.
     pub scale: String,
     /// Level of a power over noise density of 1 Hz.
     unit_dbfs: f64,
     /// What a playback takes off satellites and spoofers.
     attenuation_db: f64,
+    /// Level of the thermal noise; `None` without noise.
     pub noise_dbfs: Option<f64>,
+    /// Sources of interference, in the scene's order.
     pub sources: Vec<Source>,
+    /// The spoofers, in the scene's order.
     pub spoofers: Vec<Spoofed>,
     /// The satellite that J/S counts from, and its C/N0: the strongest at the scene's start.
     pub strongest: Option<(Sv, f64)>,
@@ -82,6 +90,7 @@ pub struct Levels {
     pub sum_dbfs: f64,
     /// Share of components that are clipped, and the largest of a stretch, which begins at this time.
     pub clipped_share: f64,
+    /// Largest share of a stretch's components that is clipped, and when that stretch begins in s.
     pub worst: (f64, f64),
     stretches: u64,
 }
@@ -92,7 +101,7 @@ impl Levels {
     /// # Errors
     /// Those of the stream.
     pub fn new(scene: &Scene) -> Result<Self, GenerateError> {
-        let tuning = Tuning::of(scene);
+        let tuning = scene.tuning();
         let (even, own) = stretches(scene);
         let met = stream::measured(scene, &even)?;
         let extra = stream::measured(scene, &own)?;
@@ -201,7 +210,7 @@ fn sources(scene: &Scene) -> Vec<Source> {
 
 /// The signals of a spoofer while it is on.
 fn spoofed(scene: &Scene, from: &Constellation) -> Result<Spoofed, OrbitError> {
-    let (on, mut cn0_dbhz) = (from.on(scene), None);
+    let (on, mut cn0_dbhz) = (from.on(scene.clock, &scene.receiver_clock), None);
     let last = scene.samples.saturating_sub(1);
     for k in 0..=INSTANTS {
         let sample = (last as f64 * k as f64 / INSTANTS as f64) as u64;
@@ -210,12 +219,12 @@ fn spoofed(scene: &Scene, from: &Constellation) -> Result<Spoofed, OrbitError> {
         }
         let local = scene.clock.epoch(sample);
         for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv) && from.sends(*sv)) {
-            if !truth::in_view_from(scene, from, sv, local)? {
+            if !arrival::in_view_from(scene, from, sv, local)? {
                 continue;
             }
             let mut sum_hz = 0.0;
             for signal in scene.signals_of(sv) {
-                let seen = truth::seen_from(scene, from, sv, signal, local)?;
+                let seen = arrival::seen_from(scene, from, sv, signal, local)?;
                 sum_hz += seen.map_or(0.0, |seen| seen.rays.iter().map(|ray| ray.cn0_hz).sum::<f64>());
             }
             if sum_hz > 0.0 {
@@ -267,7 +276,3 @@ impl fmt::Display for Levels {
         writeln!(f, ", in {} stretches of samples", self.stretches)
     }
 }
-
-#[cfg(test)]
-#[path = "levels_tests.rs"]
-mod tests;

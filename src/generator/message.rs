@@ -52,6 +52,7 @@ pub struct MessageFault {
     pub satellites: Option<Vec<Sv>>,
     /// When it is sent.
     pub on: Range<Epoch>,
+    /// What goes wrong.
     pub kind: Kind,
 }
 
@@ -59,14 +60,31 @@ pub struct MessageFault {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
     /// Each symbol by itself, with a probability.
-    BitErrors { rate: f64, stream: Stream },
+    BitErrors {
+        /// Probability of a wrong symbol.
+        rate: f64,
+        /// Where the random numbers come from.
+        stream: Stream,
+    },
     /// One symbol of every unit with this number, by a word of 30 of them and its place in it, both counted
     /// from 1.
-    Bit { subframe: u8, word: u8, bit: u8 },
+    Bit {
+        /// Number of the unit within its frame, from 1.
+        subframe: u8,
+        /// Word of 30 symbols, from 1.
+        word: u8,
+        /// Symbol of the word, from 1.
+        bit: u8,
+    },
     /// The bits of health (IS-GPS-200N, 20.3.3.3.1.4).
     Health(u8),
     /// A parameter of a set of elements by its name in the message's table, wrong by `add` in its unit.
-    Parameter { name: &'static str, add: f64 },
+    Parameter {
+        /// Name in the message's table.
+        name: &'static str,
+        /// What is added, in the parameter's unit.
+        add: f64,
+    },
 }
 
 /// The symbols of a unit.
@@ -82,8 +100,11 @@ pub struct Sent {
 /// beginning.
 #[derive(Clone, Copy, Debug)]
 pub struct Slot {
+    /// Its form.
     pub message: &'static Message,
+    /// The scale of the sender's clock.
     pub time: &'static TimeScale,
+    /// Its number since that clock's beginning.
     pub unit: i64,
 }
 

@@ -1,13 +1,15 @@
-//! What a scene will compute, told before it is computed.
+//! What a scene will compute, reported before it is computed.
 //!
 //! Satellites are placed at a few hundred instants, effects act on them there, and sizes and times follow
 //! from counts. What concerns the synthesiser (knots, speed, memory) is given to it, and so are the levels
 //! ([`crate::generator::levels`]), for which a few stretches of samples are made.
 
+mod machinery;
 mod models;
 
 use std::fmt;
 
+pub use machinery::{Machinery, machinery};
 use models::models;
 
 use crate::generator::catalogue::Silence;
@@ -25,25 +27,14 @@ use crate::gnss::time::Epoch;
 /// Instants between start and end at which the sky is looked at.
 const INSTANTS: u32 = 240;
 
-/// What the plan cannot know of itself.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Machinery {
-    /// Shortest and longest time between knots of the signal's delay, and why it is that.
-    pub knot_spacing_s: f64,
-    pub longest_knot_spacing_s: f64,
-    pub knot_reason: String,
-    /// Memory of the generator's blocks, which does not grow with the scene.
-    pub block_bytes: u64,
-    /// Samples times satellites that this machine makes a second.
-    pub satellite_samples_per_s: f64,
-}
-
 /// A satellite that is in view for some of the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InView {
+    /// The satellite.
     pub sv: Sv,
     /// At the first instant at which it is above the mask.
     pub azimuth_deg: f64,
+    /// Elevation then.
     pub elevation_deg: f64,
     /// Of its first signal; `None` when nothing in the scene says how strong it is.
     pub cn0_dbhz: Option<f64>,
@@ -59,39 +50,58 @@ pub struct InView {
 /// A thing that the scene has, or has not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
+    /// Table or thing, as a scenario calls it.
     pub name: String,
+    /// Whether the scene has it.
     pub present: bool,
+    /// What it does, or what would bring it.
     pub why: String,
 }
 
 /// What a scene will compute.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
+    /// Name of the scene.
     pub name: String,
     /// Name of the front end, where the scenario gives it one.
     pub front_end: Option<String>,
+    /// What the receiver's clock reads at sample 0.
     pub start: String,
+    /// Length of the scene.
     pub duration_s: f64,
+    /// Names of the signals.
     pub signals: Vec<&'static str>,
+    /// Elevation below which satellites are left out.
     pub mask_deg: f64,
     /// Whether the scene begins so high that the Earth takes the mask's place.
     pub in_space: bool,
     /// Largest speed and acceleration of the antenna during the scene.
     pub speed_mps: f64,
+    /// Largest acceleration of the antenna.
     pub acceleration_mps2: f64,
+    /// Those in view at any time, highest first.
     pub satellites: Vec<InView>,
+    /// What is computed, and what is not.
     pub models: Vec<Model>,
     /// The parts of the sum against full scale.
     pub levels: Levels,
     /// The level of fidelity, its time for a sample of a satellite (ns on one core), and each knob.
     pub level: &'static str,
+    /// Time for a sample of a satellite, in ns on one core.
     pub satellite_sample_ns: f64,
+    /// What was chosen for each knob of fidelity.
     pub knobs: Vec<Choice>,
+    /// Rate, format and tuning, in words.
     pub sampling: String,
+    /// Samples of the scene.
     pub samples: u64,
+    /// Bytes of all of them.
     pub bytes: u64,
+    /// Memory of a batch and of the motion.
     pub memory_bytes: u64,
+    /// Estimated time to generate them.
     pub time_s: f64,
+    /// What the synthesiser will do.
     pub machinery: Machinery,
 }
 
@@ -125,7 +135,7 @@ impl Plan {
             levels,
             level: scene.fidelity.grade.name(),
             satellite_sample_ns: scene.fidelity.satellite_sample_ns(scene.clock.rate.hz()),
-            knobs: fidelity::choices(scene),
+            knobs: fidelity::choices(scene.fidelity, scene.clock.rate.hz(), scene.noise),
             sampling: sampling(scene),
             samples: scene.samples,
             bytes,
@@ -313,86 +323,5 @@ impl fmt::Display for Together<'_> {
             writeln!(f, "  {name:14}  {}: {}, {}", plan.sampling, size(plan.bytes), plan.signals.join(", "))?;
         }
         writeln!(f, "together   {} of samples, {} of memory, about {time_s:.1} s", size(bytes), size(memory_bytes))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use super::*;
-    use crate::generator::scenario::{Overrides, Scenario};
-
-    fn plan(text: &str) -> Plan {
-        let scenario = Scenario::parse(text, "plan").unwrap();
-        let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
-        let (scene, _) = scenario.compose(&directory, &Overrides::default()).unwrap();
-        let machinery = Machinery {
-            knot_spacing_s: 0.5,
-            longest_knot_spacing_s: 0.5,
-            knot_reason: "a test".to_owned(),
-            block_bytes: 1 << 20,
-            satellite_samples_per_s: 1e8,
-        };
-        Plan::new(&scene, machinery, Levels::new(&scene).unwrap()).unwrap()
-    }
-
-    #[test]
-    fn the_static_scene_has_the_satellites_that_its_comment_promises() {
-        let plan = plan(include_str!("../../scenarios/static.toml"));
-        let names: Vec<String> = plan.satellites.iter().map(|s| s.sv.to_string()).collect();
-        // Found independently from the same file by a short script.
-        let expected = ["G23", "G13", "G03", "G19", "G06", "G07", "G20", "G16", "G32", "G10", "G08", "G28"];
-        assert_eq!(names.len(), expected.len(), "{plan}");
-        assert!(expected.iter().all(|sv| names.iter().any(|n| n == sv)), "{plan}");
-        let (highest, lowest) = (&plan.satellites[0], &plan.satellites[11]);
-        assert!((highest.elevation_deg - 82.0).abs() < 0.6 && highest.sv == Sv::gps(23), "{plan}");
-        assert!((6.5..7.5).contains(&lowest.elevation_deg), "{plan}");
-        assert!(plan.satellites.iter().all(|s| s.appears.is_none() && s.leaves.is_none()), "{plan}");
-        assert_eq!((plan.samples, plan.bytes), (156_000_000, 312_000_000));
-        // 156e6 samples of 12 satellites at 1e8 a second.
-        assert!((plan.time_s - 18.72).abs() < 1e-9 && plan.speed_mps == 0.0);
-        // The link budget's reach from 5 degrees to the zenith.
-        assert!(plan.satellites.iter().all(|s| s.cn0_dbhz.is_some_and(|x| (37.0..52.0).contains(&x))), "{plan}");
-    }
-
-    #[test]
-    fn what_is_absent_is_named_with_the_table_that_would_bring_it() {
-        let text = plan(include_str!("../../scenarios/noise_free.toml")).to_string();
-        let (_, absent) = text.split_once("not computed").unwrap();
-        for word in ["no [ionosphere]", "no [troposphere]", "no [noise]", "quantiser"] {
-            assert!(absent.contains(word), "{text}");
-        }
-    }
-
-    #[test]
-    fn every_knob_is_named_with_its_choice_its_error_and_its_cost() {
-        let bare = include_str!("../../scenarios/static.toml");
-        let balanced = plan(bare).to_string();
-        assert!(balanced.contains("fidelity balanced"), "{balanced}");
-        for knob in ["code_edge", "carrier", "knot_tolerance_cycles", "noise"] {
-            let line = balanced.lines().find(|line| line.trim_start().starts_with(knob)).expect(knob);
-            assert!(!line.contains("(own)"), "{line}");
-        }
-        let reference = plan(&format!("{bare}[fidelity]\nlevel = \"reference\"\ncode_edge = \"area\"\n"));
-        let text = reference.to_string();
-        assert!(text.contains("area (own)") && text.contains("fidelity reference"), "{text}");
-        assert!(reference.satellite_sample_ns > plan(bare).satellite_sample_ns);
-        // Without noise there is nothing for its knob to do.
-        let free = plan(include_str!("../../scenarios/noise_free.toml"));
-        assert!(free.knobs.iter().all(|choice| choice.knob != "noise"));
-    }
-
-    #[test]
-    fn satellites_that_rise_and_set_are_told_apart() {
-        let day = include_str!("../../scenarios/noise_free.toml").replace("duration_s = 60", "duration_s = 14400");
-        let plan = plan(&day);
-        assert!(
-            plan.satellites.iter().any(|s| matches!(s.appears, Some((_, PassEnd::Mask))))
-                && plan.satellites.iter().any(|s| matches!(s.leaves, Some((_, PassEnd::Mask))))
-        );
-        // 11 satellites on average in view, each for some five hours: more than 12 and fewer than all in four
-        // hours.
-        assert!((13..=28).contains(&plan.satellites.len()), "{plan}");
     }
 }

@@ -1,4 +1,5 @@
-//! True orbits and clocks out of precise products: a polynomial through the tabulated positions, a line between clocks.
+//! True orbits and clocks out of precise products: a polynomial through the tabulated positions, a line
+//! between clocks.
 //!
 //! A position is the polynomial of degree 11 through the twelve epochs around it, in ECEF. Neighbouring
 //! polynomials meet at an epoch of the table, so the position is continuous; velocity is the polynomial's

@@ -16,8 +16,8 @@ use crate::gnss::record::{PassEnd, PassRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
 
-/// Farthest from its reference time that a set places a satellite above or below the mask. Half a day on, real sets of
-/// two days are some kilometres off: 1e-4 rad of elevation.
+/// Farthest from its reference time that a set places a satellite above or below the mask. Half a day on,
+/// real sets of two days are some kilometres off: 1e-4 rad of elevation.
 const EXTRAPOLATED_S: f64 = 43_200.0;
 /// Spacing of the instants at which the sky without an ephemeris is looked at: satellites move 5° in it.
 const LOOK_S: f64 = 600.0;
@@ -25,7 +25,9 @@ const LOOK_S: f64 = 600.0;
 /// Where a satellite is.
 #[derive(Clone, Debug)]
 pub enum Presence {
+    /// In view: where and when it sent what arrives.
     InView(Box<Emission>),
+    /// Below the elevation mask.
     BelowMask,
     /// As seen from space.
     BehindEarth,
@@ -65,6 +67,7 @@ pub fn presence(scene: &Scene, sv: Sv, time: Epoch, motion: &Motion) -> Result<P
 /// A satellite that would be in view while it has nothing to send.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Missing {
+    /// The satellite that has nothing to send.
     pub sv: Sv,
     /// When the ephemerides leave off and begin again, as far as the navigation file has any there.
     pub silence: Silence,
@@ -96,7 +99,7 @@ fn would_be_seen(scene: &Scene, sv: Sv, silence: &Silence, end_s: f64) -> Result
         let t_s = from_s + (until_s - from_s) * k as f64 / looks as f64;
         let at = start.plus_s(t_s);
         let Some(set) = scene.catalogue.nearest_set(sv, at) else { continue };
-        if set.health != 0 || at.since(set.toe).abs() > EXTRAPOLATED_S {
+        if !set.is_healthy() || at.since(set.toe).abs() > EXTRAPOLATED_S {
             continue;
         }
         let found = emission_of_set(set, at, &scene.trajectory.at(t_s))?;
@@ -177,77 +180,5 @@ impl Passes {
                 ends_by: if until >= last { PassEnd::Scene } else { end },
             }
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use super::*;
-    use crate::generator::scenario::{Overrides, Scenario};
-    use crate::generator::{stream, truth};
-
-    /// The embedded day's last sets end at midnight, but for those of two uploads.
-    fn midnight(duration_s: f64) -> (Scene, Vec<String>) {
-        let start_s = 86_400.0 - duration_s / 2.0;
-        let (hour, rest) = ((start_s / 3600.0).floor(), start_s % 3600.0);
-        let text = format!(
-            "name = \"x\"\nstart = 2010-07-01T{hour:02}:{:02}:{:04.1}\nduration_s = {duration_s}\n\
-             [motion]\nkind = \"static\"\nlatitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\n\
-             [front_end]\nsample_rate_hz = 1.1e6\nformat = \"ci8\"\n",
-            (rest / 60.0).floor(),
-            rest % 60.0
-        );
-        Scenario::parse(&text, "midnight").unwrap().compose(Path::new("."), &Overrides::default()).unwrap()
-    }
-
-    #[test]
-    fn a_satellite_whose_ephemeris_ends_is_warned_of_by_name_and_time() {
-        let (scene, warnings) = midnight(1200.0);
-        let warning = warnings.iter().find(|w| w.contains("does not cover the scene")).unwrap();
-        assert!(warning.contains("2010-07-02T00:00:00.000000 GPST (600.0 s) on"), "{warning}");
-        let missing = missing(&scene, 1200.0).unwrap();
-        // Each is named and not sent after midnight; most were in view until then, others would rise later.
-        let mut ended = 0;
-        for Missing { sv, silence } in &missing {
-            assert!(warning.contains(&sv.to_string()), "{warning}");
-            let end = silence.from.unwrap();
-            let at = |t: Epoch| presence(&scene, *sv, t, &scene.trajectory.at(0.0)).unwrap().end();
-            assert_eq!(at(end), Some(PassEnd::Ephemeris), "{sv}");
-            ended += usize::from(at(end.plus_s(-0.001)).is_none());
-        }
-        assert!(ended >= 6, "{missing:?}");
-        // Before midnight the same file says all there is to say.
-        assert!(super::missing(&scene, 599.0).unwrap().is_empty());
-    }
-
-    #[test]
-    fn the_truth_s_passes_say_that_an_ephemeris_ended_and_not_that_a_satellite_set() {
-        let (scene, _) = midnight(4.0);
-        let directory = tempfile::tempdir().unwrap();
-        let rows = |part: Range<u64>| -> Vec<PassRow> {
-            let mut writer = truth::Writer::create(directory.path()).unwrap();
-            let (mut sink, options) = (std::io::sink(), stream::Options::default());
-            stream::generate_part(&scene, part, &mut sink, &mut writer, &mut |_| (), &options).unwrap();
-            let mut file = csv::Reader::from_path(directory.path().join("passes.csv")).unwrap();
-            file.deserialize().map(Result::unwrap).collect()
-        };
-        let whole = rows(0..scene.samples);
-        let ended: Vec<&PassRow> = whole.iter().filter(|row| row.ends_by == PassEnd::Ephemeris).collect();
-        assert_eq!(ended.len(), missing(&scene, 4.0).unwrap().len());
-        for row in &whole {
-            assert_eq!((row.sample, row.begins_by), (0, PassEnd::Scene), "{row:?}");
-            let until = if row.ends_by == PassEnd::Scene { scene.samples } else { 2_200_000 };
-            assert_eq!(row.until_sample, until, "{row:?}");
-        }
-        // A part that begins later says the same of its own samples, and one that ends before says nothing of the end.
-        let part = rows(1_500_000..3_000_000);
-        assert_eq!(part.len(), whole.len());
-        for (row, of) in part.iter().zip(&whole) {
-            let until_sample = of.until_sample.min(3_000_000) - 1_500_000;
-            assert_eq!(*row, PassRow { sample: 0, until_sample, ..*of });
-        }
-        assert!(rows(0..2_000_000).iter().all(|row| row.ends_by == PassEnd::Scene && row.until_sample == 2_000_000));
     }
 }

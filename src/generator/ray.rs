@@ -11,17 +11,21 @@ use crate::gnss::time::Epoch;
 /// The geometry between one satellite and the antenna at one instant of reception.
 #[derive(Clone, Debug)]
 pub struct Sight {
+    /// The satellite.
     pub sv: Sv,
     /// True GPS time of reception.
     pub received: Epoch,
     /// Antenna, in the ECEF axes of `received`.
     pub user: Geodetic,
+    /// Antenna, ECEF.
     pub user_m: Vector3<f64>,
+    /// Velocity of the antenna, ECEF.
     pub user_mps: Vector3<f64>,
     /// Satellite when it sent what is received now, in the ECEF axes of `received`.
     pub satellite: State,
     /// Geometric range between the two.
     pub range_m: f64,
+    /// Azimuth and elevation of the satellite at the antenna.
     pub look: Look,
     /// Angle at the satellite between the Earth's centre and the antenna.
     pub off_nadir_rad: f64,

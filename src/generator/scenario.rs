@@ -12,7 +12,6 @@ mod expect;
 mod files;
 mod front_end;
 mod hardware;
-mod hostile;
 pub mod interference;
 pub mod keys;
 mod link;
@@ -25,12 +24,14 @@ pub(crate) mod read;
 mod satellite;
 pub mod schema;
 mod scintillation;
+mod spoofing_and_jamming;
 mod stages;
 #[cfg(test)]
 mod tests;
 mod trajectory;
 
-use std::path::PathBuf;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 use toml::de::DeTable;
@@ -49,8 +50,8 @@ use stages::PlaybackSpec;
 
 use crate::generator::effect::multipath::Echo;
 use crate::generator::effect::obstruction::Obstacle;
+use crate::generator::fast_phase::scintillation::Strength;
 use crate::generator::fidelity::allowed_m;
-use crate::generator::ripple::scintillation::Strength;
 use crate::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::generator::vehicle::attitude::Attitude;
 use crate::gnss::facts::Expect;
@@ -67,18 +68,80 @@ const MAX_BYTES: usize = 1 << 20;
 /// Why a scenario is refused.
 #[derive(Debug, Error)]
 pub enum ScenarioError {
+    /// A text that is no TOML, or cannot be read at all.
     #[error("{place}: {message}")]
-    Toml { place: Place, message: String },
+    Toml {
+        /// Where in the text.
+        place: Place,
+        /// What the parser reports.
+        message: String,
+    },
+    /// A key that no table has.
     #[error("{place}: unknown key '{key}'{}; known here: {known}", nearest.as_ref().map_or(String::new(), |n| format!(": did you mean '{n}'?")))]
-    UnknownKey { place: Place, key: String, nearest: Option<String>, known: String },
+    UnknownKey {
+        /// Where in the text.
+        place: Place,
+        /// The key, with the tables that it is in.
+        key: String,
+        /// The known key that is spelled most alike.
+        nearest: Option<String>,
+        /// The keys that the table has.
+        known: String,
+    },
+    /// A value out of its range or of another type.
     #[error("{place}: {key} = {value}: expected {expected}")]
-    Value { place: Place, key: String, value: String, expected: String },
+    Value {
+        /// Where in the text.
+        place: Place,
+        /// The key, with the tables that it is in.
+        key: String,
+        /// The value as written.
+        value: String,
+        /// What is expected.
+        expected: String,
+    },
+    /// Things that cannot be together.
     #[error("{origin}: {key}: {reason}")]
-    Conflict { origin: String, key: &'static str, reason: String },
+    Conflict {
+        /// What errors call the scenario: its path.
+        origin: String,
+        /// The key that is at fault.
+        key: &'static str,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A file that the scenario names and that cannot be used.
     #[error("{origin}: {key} = {path:?}: {reason}")]
-    File { origin: String, key: &'static str, path: PathBuf, reason: String },
+    File {
+        /// What errors call the scenario: its path.
+        origin: String,
+        /// The key that names it.
+        key: &'static str,
+        /// The file as written.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A file that the scenario names and that cannot be read.
     #[error("{origin}: {key} = {path:?}: cannot be read: {error}")]
-    Read { origin: String, key: &'static str, path: PathBuf, error: std::io::Error },
+    Read {
+        /// What errors call the scenario: its path.
+        origin: String,
+        /// The key that names it.
+        key: &'static str,
+        /// The file as written.
+        path: PathBuf,
+        /// What the system reports.
+        error: std::io::Error,
+    },
+    /// A scenario that [`Scenario::open`] cannot read.
+    #[error("{}: cannot be read: {error}", path.display())]
+    Open {
+        /// The scenario.
+        path: PathBuf,
+        /// What the system reports.
+        error: std::io::Error,
+    },
     /// All that is wrong, in the order of the text: two at least.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Several(Vec<ScenarioError>),
@@ -91,6 +154,7 @@ impl ScenarioError {
         let place = match self {
             Self::Toml { place, .. } | Self::UnknownKey { place, .. } | Self::Value { place, .. } => place.to_string(),
             Self::Conflict { origin, .. } | Self::File { origin, .. } | Self::Read { origin, .. } => origin.clone(),
+            Self::Open { path, .. } => path.display().to_string(),
             Self::Several(errors) => return errors.iter().map(Self::without_place).collect::<Vec<_>>().join("; "),
         };
         whole.strip_prefix(&format!("{place}: ")).map_or(whole.clone(), str::to_owned)
@@ -126,38 +190,63 @@ impl ScenarioError {
 pub struct Scenario {
     /// What errors call it: its path.
     pub origin: String,
+    /// Where [`Scenario::scene`] looks for the files that it names.
+    pub directory: PathBuf,
+    /// Name of the scene: letters, digits, '-' and '_'.
     pub name: String,
     /// What the receiver's clock reads at sample 0, and where the scene's true time counts from.
     pub start: Epoch,
+    /// Length of the scene by the receiver's clock.
     pub duration_s: f64,
+    /// Seed of all that is random.
     pub seed: u64,
+    /// The signals that satellites send.
     pub signals: Vec<&'static Signal>,
     /// Relative to the scenario's directory; none means the embedded file.
     pub navigation: Vec<PathBuf>,
+    /// By how much Galileo's time is ahead of GPS time; none means what the navigation file says, or zero.
+    pub galileo_ahead_s: Option<f64>,
+    /// Elevation below which satellites are left out.
     pub mask_rad: f64,
+    /// Satellites that are left out.
     pub excluded: Vec<Sv>,
+    /// Whether satellites that report themselves unhealthy are sent too.
     pub include_unhealthy: bool,
     /// True orbits and clocks; absent means those that are broadcast.
     pub orbits: Option<OrbitsSpec>,
+    /// Faults of satellites' clocks and orbits.
     pub satellite_faults: Vec<SatelliteFault>,
+    /// Faults of navigation messages.
     pub message_faults: Vec<MessageSpec>,
+    /// How the antenna moves.
     pub motion: MotionSpec,
+    /// How the body turns that carries the antenna; absent means an antenna that points up.
     pub attitude: Option<Attitude>,
     /// One at least.
     pub front_ends: Vec<FrontEnd>,
+    /// How strong signals are.
     pub power: Power,
+    /// Reflections.
     pub multipath: Vec<Echo>,
+    /// The ionosphere; absent means none.
     pub ionosphere: Option<Ionosphere>,
+    /// The troposphere; absent means none.
     pub troposphere: Option<NeutralAtmosphere>,
     /// What stands in the way; buildings are measured from where the motion starts.
     pub obstacles: Vec<Obstacle>,
+    /// Scintillation; absent means none.
     pub scintillation: Option<Strength>,
+    /// The receiver's clock.
     pub receiver_clock: ClockSpec,
+    /// Whether there is thermal noise.
     pub noise: bool,
     /// Of a scene with one front end.
     pub playback: Option<PlaybackSpec>,
+    /// Sources of interference.
     pub interference: Vec<InterferenceSpec>,
+    /// Spoofers.
     pub spoofers: Vec<SpooferSpec>,
+    /// Spacing of the truth's ticks.
     pub truth_interval_s: f64,
     /// What the judge is to expect of a receiver.
     pub expect: Expect,
@@ -166,6 +255,29 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// Reads a scenario from a text; files that it names are relative to the working directory.
+    ///
+    /// # Errors
+    /// As [`Scenario::parse`].
+    pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
+        Self::parse(text, "scenario")
+    }
+
+    /// Reads a scenario from a file; files that it names are relative to its directory.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Open`], and those of [`Scenario::parse`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, ScenarioError> {
+        let path = path.as_ref();
+        let mut text = String::new();
+        // A byte more than is read, so that a longer text is refused as such.
+        std::fs::File::open(path)
+            .and_then(|file| file.take(MAX_BYTES as u64 + 1).read_to_string(&mut text))
+            .map_err(|error| ScenarioError::Open { path: path.to_owned(), error })?;
+        let directory = path.parent().unwrap_or(Path::new(".")).to_owned();
+        Ok(Self { directory, ..Self::parse(&text, &path.display().to_string())? })
+    }
+
     /// Reads a scenario; `origin` names it in errors.
     ///
     /// # Errors
@@ -206,6 +318,8 @@ impl Scenario {
         let duration_s = refusals.take(root.need("duration_s"));
         let seed = refusals.take(root.need_integer("seed"));
         let signals = refusals.take(signals(root));
+        let ahead_ns = navigation.as_ref().map(|t| t.number("galileo_ahead_ns")).transpose();
+        let ahead_ns = refusals.take(ahead_ns);
         let files = navigation.map(|t| t.texts("file")).transpose();
         let files = refusals.take(files).flatten().flatten().unwrap_or_default();
         let chosen = refusals.take(satellites(of_satellites.as_ref()));
@@ -236,12 +350,14 @@ impl Scenario {
         let (mask_rad, excluded, include_unhealthy) = chosen?;
         Some(Self {
             origin: String::new(),
+            directory: PathBuf::from("."),
             name: name?,
             start: start?,
             duration_s: duration_s?,
             seed: seed?,
             signals: signals?,
             navigation: files.iter().map(PathBuf::from).collect(),
+            galileo_ahead_s: ahead_ns?.flatten().map(|ns: f64| ns * 1e-9),
             mask_rad,
             excluded,
             include_unhealthy,

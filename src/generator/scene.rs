@@ -6,16 +6,18 @@ use nalgebra::Vector3;
 
 use crate::generator::catalogue::Catalogue;
 use crate::generator::clock::ReceiverClock;
+use crate::generator::clock::nodes::Nodes;
+use crate::generator::fast_phase;
+use crate::generator::fast_phase::satellite::SatelliteClocks;
+use crate::generator::fast_phase::scintillation::Scintillation;
 pub use crate::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::generator::message::{MessageFault, Senders};
 use crate::generator::random::Stream;
 use crate::generator::ray::{Effect, Sight};
-use crate::generator::ripple::nodes::Nodes;
-use crate::generator::ripple::satellite::SatelliteClocks;
-use crate::generator::ripple::scintillation::Scintillation;
 use crate::generator::spoof::Constellation;
 use crate::generator::stage::Stage;
 use crate::generator::stage::interference::Interferer;
+use crate::generator::stage::interference::arrival::Tuning;
 use crate::generator::stage::noise::Thermal;
 use crate::generator::stage::playback::Playback;
 use crate::generator::vehicle::Trajectory;
@@ -28,15 +30,20 @@ use crate::gnss::time::SampleClock;
 
 /// Height from which on the Earth hides satellites, and no longer the mask.
 pub const SPACE_M: f64 = 100e3;
-/// Height below which no ray to a user in space may pass: the neutral atmosphere, which is modelled for rays that come
-/// down through it once.
+/// Height below which no ray to a user in space may pass: the neutral atmosphere, which is modelled for rays
+/// that come down through it once.
 const LIMB_M: f64 = 50e3;
+
+/// Cut-off of band-limited edges, in cycles a sample.
+const CUTOFF_CPS: f64 = 0.45;
 
 /// Everything that the generator computes for the samples of one front end, and nothing that it does not.
 pub struct Scene {
+    /// Its name.
     pub name: String,
     /// Name of the front end, where the scenario gives it one.
     pub front_end_name: Option<String>,
+    /// Seed of all that is random.
     pub seed: u64,
     /// Number of samples.
     pub samples: u64,
@@ -44,8 +51,9 @@ pub struct Scene {
     pub clock: SampleClock,
     /// How the receiver's clock departs from GPS time.
     pub receiver_clock: ReceiverClock,
-    /// Where what ripples has its nodes.
+    /// Where what changes quickly has its nodes.
     pub nodes: Nodes,
+    /// What describes the samples: format, rate, centre, start.
     pub metadata: IfMetadata,
     /// Antenna motion over true time since `clock.start`.
     pub trajectory: Trajectory,
@@ -57,17 +65,19 @@ pub struct Scene {
     pub message_faults: Vec<MessageFault>,
     /// What satellites' clocks do that they do not broadcast.
     pub satellite_clocks: Arc<SatelliteClocks>,
+    /// The signals that satellites send.
     pub signals: Vec<&'static Signal>,
     /// Satellites that the scene leaves out.
     pub excluded: Vec<Sv>,
     /// Satellites below this elevation are not computed for a user below [`SPACE_M`].
     pub mask_rad: f64,
+    /// What acts on rays, in order.
     pub effects: Vec<Box<dyn Effect>>,
     /// Quick fading of satellites.
     pub scintillation: Option<Arc<Scintillation>>,
     /// A transmitter that plays the satellites' signals back, before anything else is added.
     pub playback: Option<Playback>,
-    /// What the antenna hears besides satellites, in order.
+    /// What the antenna receives besides satellites, in order.
     pub interference: Vec<Interferer>,
     /// Who sends other satellites' signals over the true ones.
     pub spoofers: Vec<Arc<Constellation>>,
@@ -75,14 +85,16 @@ pub struct Scene {
     pub noise: bool,
     /// What the front end does to the sum, in the order of the hardware.
     pub front_end: Vec<Box<dyn Stage>>,
-    /// Standard deviation of the noise per component, in LSB of the sample format (the gain). Without
-    /// noise the same gain scales the signals: a ray has amplitude `sqrt(cn0_hz / rate) * sqrt(2) * noise_lsb`.
+    /// Standard deviation of the noise per component, in LSB of the sample format (the gain). Without noise
+    /// the same gain scales the signals: a ray has amplitude `sqrt(cn0_hz / rate) * sqrt(2) * noise_lsb`.
     pub noise_lsb: f32,
+    /// How samples are made.
     pub fidelity: Fidelity,
     /// Spacing of truth records.
     pub truth_interval_s: f64,
     /// What the judge is to expect of a receiver, and what it must know of satellites.
     pub expect: Expect,
+    /// What the judge must know of satellites.
     pub faults: Vec<Fault>,
 }
 
@@ -119,6 +131,40 @@ impl Scene {
         }
     }
 
+    /// Cut-off of band-limited edges, in cycles a sample. In a real format the band around the IF must fit
+    /// between zero and half the rate.
+    pub fn cutoff_cps(&self) -> f64 {
+        if self.metadata.format.is_complex() {
+            return CUTOFF_CPS;
+        }
+        let rate_hz = self.clock.rate.hz();
+        self.signals.iter().fold(CUTOFF_CPS, |least, signal| {
+            let (lowest_hz, highest_hz) = signal.carriers_hz();
+            [lowest_hz, highest_hz].into_iter().fold(least, |least, carrier_hz| {
+                let place = (folded_hz(self.metadata.if_hz(carrier_hz), rate_hz) / rate_hz).abs();
+                let room = place.min(0.5 - place);
+                if room > 0.05 { least.min(2.0 * CUTOFF_CPS * room) } else { least }
+            })
+        })
+    }
+
+    /// What moves the phases of the signals quickly.
+    pub fn fast_phases(&self) -> fast_phase::Sources<'_> {
+        fast_phase::Sources {
+            nodes: self.nodes,
+            clock: self.clock,
+            receiver_clock: &self.receiver_clock,
+            scintillation: self.scintillation.as_deref(),
+            satellite_clocks: &self.satellite_clocks,
+        }
+    }
+
+    /// What the receiver does to a wave of interference.
+    pub fn tuning(&self) -> Tuning {
+        let clocks = (self.clock, &self.receiver_clock);
+        Tuning::new(&self.metadata, clocks, &self.signals, f64::from(self.noise_lsb))
+    }
+
     /// Samples before a block that its stages must see.
     pub fn memory_samples(&self) -> usize {
         let mut sum = 0;
@@ -127,8 +173,8 @@ impl Scene {
     }
 }
 
-/// Every source of interference once, with the number of the first of the scenes that hears it: what several
-/// front ends hear is one source.
+/// Every source of interference once, with the number of the first of the scenes that receives it: what
+/// several front ends receive is one source.
 pub fn sources<'s>(scenes: impl Iterator<Item = &'s Scene>) -> Vec<(usize, &'s Interferer)> {
     let mut found: Vec<(usize, &Interferer)> = Vec::new();
     for (number, scene) in scenes.enumerate() {

@@ -29,6 +29,7 @@ const LEAST_RANGE_M: f64 = 1.0;
 /// Geometry and satellite clock behind what is received at one instant.
 #[derive(Clone, Debug)]
 pub struct Emission {
+    /// The line of sight at reception.
     pub sight: Sight,
     /// Geometric light time.
     pub travel_s: f64,
@@ -78,7 +79,7 @@ pub fn emission_of_set(set: &Ephemeris, received: Epoch, motion: &Motion) -> Res
     emission_of(|at| set.state_and_clock_l1(at).map(Some), set.sv, received, motion, LIGHT_TIME_S)
 }
 
-/// [`emission_near`] of a satellite whose orbit and clock `truth` tells.
+/// [`emission_near`] of a satellite whose orbit and clock are those of `truth`.
 fn emission_of(
     truth: impl Fn(Epoch) -> Result<Option<(State, ClockState)>, OrbitError>,
     sv: Sv,
@@ -140,7 +141,8 @@ const ARC_LEAD_S: f64 = 0.3;
 /// Position, velocity, clock and its rate.
 type Row = SVector<f64, 8>;
 
-/// A satellite's orbit and clock over some seconds: the polynomial of degree five through six states of the catalogue.
+/// A satellite's orbit and clock over some seconds: the polynomial of degree five through six states of the
+/// catalogue.
 ///
 /// The remainder is `r (ω h)⁶ / (32 · 6!)` with half a span h and ω below 3e-4 rad/s in ECEF: 1e-12 m over 16
 /// s, so what is left is rounding; at the edge of a hand-over of Δ metres, whose jerk jumps, 3e-6 Δ.
@@ -154,7 +156,8 @@ pub struct Arc {
 }
 
 impl Arc {
-    /// The arc for what is received from `from` to `to`; `None` where the catalogue has no set for some of it.
+    /// The arc for what is received from `from` to `to`; `None` where the catalogue has no set for some of
+    /// it.
     ///
     /// # Errors
     /// [`OrbitError`] from the elements.
@@ -261,8 +264,9 @@ mod tests {
                 let at = from.plus_s(0.54 * f64::from(k));
                 let Some(exact) = emission(&catalogue, sv, at, &motion).unwrap() else { continue };
                 let found = arc.emission(at, &motion).unwrap().unwrap();
-                // Coordinates are rounded to 4e-9 m, three of them, in six nodes whose weights add up to 2.2 at most;
-                // each evaluation of Kepler's equation rounds an angle of some radians, 4e-16, to 1e-8 m.
+                // Coordinates are rounded to 4e-9 m, three of them, in six nodes whose weights add up to 2.2
+                // at most; each evaluation of Kepler's equation rounds an angle of some radians, 4e-16, to
+                // 1e-8 m.
                 assert!((found.sight.range_m - exact.sight.range_m).abs() < 6e-8, "{sv} {k}");
                 assert!((found.satellite_clock_s - exact.satellite_clock_s).abs() < 1e-16, "{sv} {k}");
             }

@@ -1,6 +1,6 @@
 //! Whose signals reach the antenna: the true constellation, or that of a spoofer.
 //!
-//! A spoofer sends what the true satellites would be heard to send at a claimed place and by a clock of its
+//! A spoofer sends what would arrive from the true satellites at a claimed place and by a clock of its
 //! own, with the same messages; every signal of it goes through the machinery of the true ones. It may begin
 //! on top of them (claiming the antenna's true motion) and drag the place off smoothly. Limits: its carriers
 //! are those of the claimed geometry (no phase of its own), its own path's delay is taken as compensated, it
@@ -11,9 +11,10 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use crate::generator::scene::Scene;
+use crate::generator::clock::ReceiverClock;
 use crate::generator::vehicle::{Motion, Trajectory};
 use crate::gnss::satellite::Sv;
+use crate::gnss::time::SampleClock;
 
 /// Pieces of a power ramp, each linear in power: of 60 dB, a piece is 0.9 dB and off by 0.02 dB at most.
 const RAMP_PIECES: u32 = 64;
@@ -23,6 +24,7 @@ const RAMP_PIECES: u32 = 64;
 pub enum Place {
     /// Where the antenna is.
     Antenna,
+    /// Where it moves by a trajectory of its own.
     Claimed(Box<Trajectory>),
 }
 
@@ -33,6 +35,7 @@ pub struct Drag {
     pub start_s: f64,
     /// Unit vector, ECEF.
     pub direction: Vector3<f64>,
+    /// Final speed.
     pub speed_mps: f64,
     /// Until the speed is reached.
     pub acceleration_mps2: f64,
@@ -41,7 +44,9 @@ pub struct Drag {
 /// Power over that of the true signals (what the scene's effects give at the claimed place).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Advantage {
+    /// When it is switched on.
     pub start_db: f64,
+    /// After the ramp.
     pub end_db: f64,
     /// Time from one to the other after switching on, linear in decibels.
     pub ramp_s: f64,
@@ -52,10 +57,13 @@ pub struct Advantage {
 pub struct Constellation {
     /// 0 for the true satellites; spoofers count from 1.
     pub number: usize,
+    /// The place that its signals are made for.
     pub place: Place,
+    /// How the claimed place is moved; absent means that it stays.
     pub drag: Option<Drag>,
     /// Its clock minus GPS time at the scene's start, and its gain in seconds a second.
     pub clock_bias_s: f64,
+    /// Gain of its clock, in seconds a second.
     pub clock_drift: f64,
     /// `None` for all in view of the claimed place.
     pub satellites: Option<Vec<Sv>>,
@@ -86,7 +94,7 @@ impl Drag {
 }
 
 impl Constellation {
-    /// The true satellites as the antenna hears them.
+    /// The true satellites as the antenna receives them.
     pub fn authentic() -> Self {
         Self {
             number: 0,
@@ -100,10 +108,10 @@ impl Constellation {
         }
     }
 
-    /// The motion that its signals are made for.
-    pub fn motion(&self, scene: &Scene, t_s: f64) -> Motion {
+    /// The motion that its signals are made for, where the antenna's is `antenna`.
+    pub fn motion(&self, antenna: &Trajectory, t_s: f64) -> Motion {
         let mut motion = match &self.place {
-            Place::Antenna => scene.trajectory.at(t_s),
+            Place::Antenna => antenna.at(t_s),
             Place::Claimed(trajectory) => trajectory.at(t_s),
         };
         if let Some(drag) = &self.drag {
@@ -138,9 +146,9 @@ impl Constellation {
     }
 
     /// Times at which the motion's acceleration or its slope jumps, ascending.
-    pub fn motion_breaks_s(&self, scene: &Scene) -> Vec<f64> {
+    pub fn motion_breaks_s(&self, antenna: &Trajectory) -> Vec<f64> {
         let mut breaks = match &self.place {
-            Place::Antenna => scene.trajectory.breaks_s().to_vec(),
+            Place::Antenna => antenna.breaks_s().to_vec(),
             Place::Claimed(trajectory) => trajectory.breaks_s().to_vec(),
         };
         if let Some(drag) = &self.drag {
@@ -151,8 +159,8 @@ impl Constellation {
     }
 
     /// Those, and the times at which its power changes its slope.
-    pub fn breaks_s(&self, scene: &Scene) -> Vec<f64> {
-        let mut breaks = self.motion_breaks_s(scene);
+    pub fn breaks_s(&self, antenna: &Trajectory) -> Vec<f64> {
+        let mut breaks = self.motion_breaks_s(antenna);
         if let Some(Advantage { ramp_s, .. }) = self.advantage.filter(|a| a.ramp_s > 0.0) {
             breaks.extend((1..=RAMP_PIECES).map(|k| self.on_s.start + ramp_s * f64::from(k) / f64::from(RAMP_PIECES)));
         }
@@ -160,11 +168,11 @@ impl Constellation {
         breaks
     }
 
-    /// Samples in which it sends.
-    pub fn on(&self, scene: &Scene) -> Range<u64> {
+    /// Samples in which it sends, of those that the receiver's clock numbers.
+    pub fn on(&self, clock: SampleClock, receiver_clock: &ReceiverClock) -> Range<u64> {
         let sample = |t_s: f64| {
-            let reading_s = scene.receiver_clock.reading_elapsed_s(scene.clock.start, t_s);
-            (reading_s * scene.clock.rate.hz()).ceil().max(0.0) as u64
+            let reading_s = receiver_clock.reading_elapsed_s(clock.start, t_s);
+            (reading_s * clock.rate.hz()).ceil().max(0.0) as u64
         };
         let end = if self.on_s.end.is_finite() { sample(self.on_s.end) } else { u64::MAX };
         (if self.on_s.start.is_finite() { sample(self.on_s.start) } else { 0 })..end

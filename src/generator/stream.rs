@@ -1,5 +1,9 @@
 //! A scene becomes a stream of packed IF samples, with the truth beside it.
 //!
+//! [`Generator`] iterates batches of samples with their truth as values. [`Stream`] gives the truth to a
+//! [`Sink`] and the samples to a buffer of the caller's, [`generate`] writes both to their ends,
+//! [`Fronts`] does so for several front ends.
+//!
 //! The stream is made of blocks on an absolute grid, each a pure function of the scene: satellites are
 //! added, then noise, then samples are rounded and packed. Blocks of a batch run side by side and
 //! are written in order, so bytes depend neither on threads nor on block lengths, and memory stays flat.
@@ -7,29 +11,27 @@
 mod block;
 mod front;
 mod fronts;
+mod generator;
 mod measure;
-#[cfg(test)]
-mod tests;
 mod ticks;
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::io::Write;
 use std::ops::Range;
 
-pub(crate) use block::cutoff_cps;
+pub(crate) use front::transmitters;
 use front::{Front, share_geometry};
 pub use fronts::Fronts;
-pub use measure::machinery;
+pub use generator::{Batch, Generator};
 pub(crate) use measure::{Stretch, measured};
-use thiserror::Error;
 use ticks::Ticks;
 
+pub use crate::generator::error::GenerateError;
 use crate::generator::scene::Scene;
 use crate::generator::synth::isa::Level;
-use crate::generator::synth::waveform::WaveformError;
-use crate::generator::truth::{self, TruthError};
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::gps::lnav::FieldError;
+use crate::generator::truth::{Record, Sink};
+use crate::gnss::record::{NavigationRow, PassRow};
 use crate::gnss::satellite::Sv;
 
 /// How the work is cut; no choice changes a byte.
@@ -52,13 +54,15 @@ impl Default for Options {
 /// What a run of the generator did.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Generated {
+    /// Samples made.
     pub samples: u64,
     /// Satellites that were in view at some time.
     pub satellites: Vec<Sv>,
     /// Components that the format could not hold.
     pub clipped: u64,
-    /// Polynomials made, and the largest error met between their knots.
+    /// Polynomials made.
     pub knots: u64,
+    /// Largest error of the carrier met between their knots.
     pub worst_knot_cycles: f64,
     /// What the scene allows of it.
     pub knot_tolerance_cycles: f64,
@@ -83,35 +87,15 @@ impl fmt::Display for Generated {
     }
 }
 
-/// Why a scene could not be generated.
-#[derive(Debug, Error)]
-pub enum GenerateError {
-    #[error(transparent)]
-    Orbit(#[from] OrbitError),
-    #[error("a navigation message cannot be made: {0}")]
-    Message(#[from] FieldError),
-    #[error("truth: {0}")]
-    Truth(#[from] TruthError),
-    #[error("samples could not be written: {0}")]
-    Write(#[from] std::io::Error),
-    #[error(transparent)]
-    Waveform(#[from] WaveformError),
-    #[error("no front end: expected one at least")]
-    NoFrontEnd,
-    #[error("truth_interval_s = {0}: expected 1e-6 to 1e6 s")]
-    TruthInterval(f64),
-    #[error("samples {first} to {end} of a scene that has {samples}: expected a first one before the last")]
-    Part { first: u64, end: u64, samples: u64 },
-}
-
-/// Writes the samples of `scene` and its truth; `progress` hears the samples done after each batch.
+/// Writes the samples of `scene` and gives `truth` what is true; `progress` is called with the number of
+/// samples done after each batch.
 ///
 /// # Errors
 /// [`GenerateError`]; what was written before stays.
 pub fn generate(
     scene: &Scene,
     samples: &mut dyn Write,
-    truth: &mut truth::Writer,
+    truth: &mut dyn Sink,
     progress: &mut dyn FnMut(u64),
 ) -> Result<Generated, GenerateError> {
     generate_with(scene, samples, truth, progress, &Options::default())
@@ -124,7 +108,7 @@ pub fn generate(
 pub fn generate_with(
     scene: &Scene,
     samples: &mut dyn Write,
-    truth: &mut truth::Writer,
+    truth: &mut dyn Sink,
     progress: &mut dyn FnMut(u64),
     options: &Options,
 ) -> Result<Generated, GenerateError> {
@@ -140,7 +124,7 @@ pub fn generate_part(
     scene: &Scene,
     part: Range<u64>,
     samples: &mut dyn Write,
-    truth: &mut truth::Writer,
+    truth: &mut dyn Sink,
     progress: &mut dyn FnMut(u64),
     options: &Options,
 ) -> Result<Generated, GenerateError> {
@@ -160,11 +144,11 @@ pub struct Stream<'a> {
 }
 
 impl<'a> Stream<'a> {
-    /// The stream of `scene` from its first sample on; tells `truth` what the scene is.
+    /// The stream of `scene` from its first sample on; gives `truth` what the scene is.
     ///
     /// # Errors
-    /// A rate that the scene's signals cannot have, a truth that cannot be written.
-    pub fn new(scene: &'a Scene, truth: &mut truth::Writer, options: &Options) -> Result<Self, GenerateError> {
+    /// A rate that the scene's signals cannot have, a sink that does not take the truth.
+    pub fn new(scene: &'a Scene, truth: &mut dyn Sink, options: &Options) -> Result<Self, GenerateError> {
         Self::of(scene, 0..scene.samples, truth, options)
     }
 
@@ -175,7 +159,7 @@ impl<'a> Stream<'a> {
     pub fn of(
         scene: &'a Scene,
         part: Range<u64>,
-        truth: &mut truth::Writer,
+        truth: &mut dyn Sink,
         options: &Options,
     ) -> Result<Self, GenerateError> {
         if part.start > part.end || part.end > scene.samples {
@@ -183,7 +167,7 @@ impl<'a> Stream<'a> {
         }
         let mut front = Front::new(scene, part.clone(), options)?;
         share_geometry(std::slice::from_mut(&mut front));
-        truth.scene(scene, &part)?;
+        truth.begin(std::slice::from_ref(scene), &part)?;
         Ok(Self { front, ticks: Ticks::new(scene, part.start)? })
     }
 
@@ -192,30 +176,41 @@ impl<'a> Stream<'a> {
         self.front.samples()
     }
 
-    /// Replaces what `packed` holds by the next batch, and writes the truth as far; `false` after the last
-    /// sample.
+    /// Replaces what `packed` holds by the next batch, and gives `truth` what is true of it; `false` after
+    /// the last sample.
     ///
     /// # Errors
     /// [`GenerateError`] of orbits, messages and truth.
-    pub fn next(&mut self, truth: &mut truth::Writer, packed: &mut Vec<u8>) -> Result<bool, GenerateError> {
+    pub fn next(&mut self, truth: &mut dyn Sink, packed: &mut Vec<u8>) -> Result<bool, GenerateError> {
         let to = self.front.batch_end();
         if !self.front.is_before(to) {
             packed.clear();
             return Ok(false);
         }
         self.front.prepare(to)?;
-        self.ticks.write(std::slice::from_ref(&self.front), to, truth)?;
+        self.ticks.give(std::slice::from_ref(&self.front), to, truth)?;
         self.front.render(to, packed);
         Ok(true)
     }
 
-    /// Writes the rest of the truth, and tells what was done.
+    /// Gives `truth` the rest, and reports what was done.
     ///
     /// # Errors
-    /// A truth that cannot be written.
-    pub fn finish(self, truth: &mut truth::Writer) -> Result<Generated, GenerateError> {
+    /// A sink that does not take the truth.
+    pub fn finish(self, truth: &mut dyn Sink) -> Result<Generated, GenerateError> {
         let mut front = self.front;
-        truth.finish(&front.navigation(), &front.passes().collect())?;
+        end(truth, front.navigation(), front.passes().collect())?;
         Ok(front.done())
     }
+}
+
+/// Gives `truth` what is known at the end alone.
+fn end(
+    truth: &mut dyn Sink,
+    navigation: BTreeSet<NavigationRow>,
+    passes: BTreeSet<PassRow>,
+) -> Result<(), GenerateError> {
+    navigation.into_iter().try_for_each(|row| truth.take(Record::Navigation(row)))?;
+    passes.into_iter().try_for_each(|row| truth.take(Record::Pass(row)))?;
+    Ok(truth.finish()?)
 }

@@ -11,7 +11,7 @@ use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{Epoch, WEEK_S};
 
 /// A set of broadcast elements of one satellite, in SI units and radians.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,9 +26,10 @@ pub struct Ephemeris {
     /// Issue of data: IODE of GPS, IODnav of Galileo.
     pub iode: u16,
     pub iodc: u16,
-    /// User range accuracy index, 0..=15 (IS-GPS-200N, 20.3.3.3.1.3).
+    /// User range accuracy index, 0..=15 (IS-GPS-200N, 20.3.3.3.1.3); SISA index of Galileo.
     pub ura_index: u8,
-    /// Six-bit health, 0 is healthy (IS-GPS-200N, 20.3.3.3.1.4).
+    /// Six bits of which 0 is healthy: those of IS-GPS-200N, 20.3.3.3.1.4; of Galileo, from the lowest bit
+    /// on, data validity (1) and health (2) of E1-B, then those of E5b. See [`Self::is_healthy`].
     pub health: u8,
     pub l2_codes: u8,
     pub l2_p_data_off: bool,
@@ -85,6 +86,18 @@ pub enum OrbitError {
     Kepler { sv: Sv, eccentricity: f64 },
     #[error("{sv}: the antenna is {range_m:.3} m away from the satellite: expected at least 1 m")]
     Near { sv: Sv, range_m: f64 },
+}
+
+/// Elements at a reference time of choice, without harmonics: [`Ephemeris::mean_at`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mean {
+    pub sqrt_a_sqrtm: f64,
+    pub inclination_rad: f64,
+    /// Node at the beginning of the reference time's week.
+    pub omega0_rad: f64,
+    pub m0_rad: f64,
+    /// Clock's offset at the reference time.
+    pub af0_s: f64,
 }
 
 /// What the users of a system's elements compute with.
@@ -250,6 +263,25 @@ impl Ephemeris {
         State { position_m, velocity_mps }
     }
 
+    /// The elements without harmonics, carried to another reference time: what almanacs are made of. The
+    /// correction of the mean motion goes into the axis, and the node counts from the beginning of that week.
+    pub fn mean_at(&self, at: Epoch) -> Mean {
+        let Constants { mu_m3ps2, rotation_radps, .. } = *Constants::of(self.sv.system);
+        let age_s = at.since(self.toe);
+        let a = self.sqrt_a_sqrtm;
+        let motion_radps = mu_m3ps2.sqrt() / (a * a * a) + self.delta_n_radps;
+        // Another week's beginning is the Earth's rotation away.
+        let weeks = (at.week() - self.toe.week()) as f64;
+        let clock_age_s = at.since(self.toc);
+        Mean {
+            sqrt_a_sqrtm: libm::cbrt(mu_m3ps2.sqrt() / motion_radps),
+            inclination_rad: self.i0_rad + self.idot_radps * age_s,
+            omega0_rad: self.omega0_rad + self.omega_dot_radps * age_s - rotation_radps * WEEK_S as f64 * weeks,
+            m0_rad: self.m0_rad + motion_radps * age_s,
+            af0_s: self.af0_s + clock_age_s * (self.af1_sps + clock_age_s * self.af2_sps2),
+        }
+    }
+
     /// The satellite clock at GPS time `at` with the relativistic term, without group delay
     /// (IS-GPS-200N, 20.3.3.3.3.1, equation 1).
     ///
@@ -304,10 +336,23 @@ impl Ephemeris {
         Ok(ClockState { offset_s: clock.offset_s - self.group_delay_s(signal), ..clock })
     }
 
-    /// Curve fit interval: four hours, or what the issue of data says when the fit flag is set
+    /// Whether the satellite says that its signal on L1 or E1 may be used.
+    pub fn is_healthy(&self) -> bool {
+        match self.sv.system {
+            System::Galileo => self.health & 0b111 == 0,
+            _ => self.health == 0,
+        }
+    }
+
+    /// Curve fit interval around the reference time. Of Galileo, whose document has none, eight hours:
+    /// receivers take sets for four hours (Galileo OS SIS ICD 2.1, 5.1.9.2 counts on new ones every three at
+    /// most).
+    ///
+    /// Of GPS four hours, or what the issue of data says when the fit flag is set
     /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).
     pub fn fit_interval_s(&self) -> f64 {
         let hours = match (self.long_fit, self.iodc) {
+            _ if self.sv.system == System::Galileo => 8.0,
             (false, _) => 4.0,
             (true, 240..=247) => 8.0,
             (true, 248..=255 | 496) => 14.0,
@@ -372,7 +417,8 @@ fn wrap(angle_rad: f64) -> f64 {
     angle_rad - TAU * (angle_rad / TAU).round()
 }
 
-/// The eccentric anomaly in [−π, π] of a mean anomaly; `None` when 20 Newton steps leave a residual above 1e-13.
+/// The eccentric anomaly in [−π, π] of a mean anomaly; `None` when 20 Newton steps leave a residual above
+/// 1e-13.
 ///
 /// For M in [0, π] the start min(M + e, π) lies above the root, where E − e sin E is convex, so
 /// Newton's steps descend to the root for every eccentricity below one.

@@ -1,9 +1,10 @@
 //! IONEX: global maps of the ionosphere's vertical electron content, and how to read a value off them.
 //!
-//! Source: Schaer, Gurtner & Feltens 1998, "IONEX: The IONosphere Map EXchange Format Version 1". Between two maps
-//! the value is linear in time, each map turned with the Sun by the time since it (their equation 3); between nodes
-//! it is bilinear (their equation 1) or, with a continuous slope, bicubic (Catmull & Rom 1974). Limits: only
-//! two-dimensional maps of the whole globe without gaps; beyond the last row towards a pole that row's values hold.
+//! Source: Schaer, Gurtner & Feltens 1998, "IONEX: The IONosphere Map EXchange Format Version 1". Between two
+//! maps the value is linear in time, each map turned with the Sun by the time since it (their equation 3);
+//! between nodes it is bilinear (their equation 1) or, with a continuous slope, bicubic (Catmull & Rom 1974).
+//! Limits: only two-dimensional maps of the whole globe without gaps; beyond the last row towards a pole that
+//! row's values hold.
 
 use std::f64::consts::TAU;
 

@@ -15,7 +15,7 @@ use crate::gnss::gps::lnav::UtcData;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{Epoch, TimeOffset};
 
 /// A form of message.
 pub struct Message {
@@ -64,6 +64,8 @@ pub struct Common {
     /// squared.
     pub nequick: Option<[f64; 3]>,
     pub utc: UtcData,
+    /// Galileo's time against GPS time; absent means that nothing is said of it.
+    pub galileo: Option<TimeOffset>,
     /// One set of elements a satellite, for almanacs, and the time near which they hold.
     pub almanac: Vec<Ephemeris>,
     pub reference: Option<Epoch>,

@@ -3,6 +3,24 @@
 //! No truth and no opinions live here. Both generator and receiver use these modules, so an
 //! error in them would cancel in a closed loop: everything here is tested against something
 //! that this project did not write (`tests/witness.rs`).
+//!
+//! ```
+//! use gnss_twin::gnss::gps::l1ca::L1_CA;
+//! use gnss_twin::gnss::satellite::Sv;
+//! use gnss_twin::gnss::{rinex, time::Epoch};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // The code of PRN 7, and where its satellite was by what it broadcast.
+//! let code = L1_CA.code(7).ok_or("no code")?;
+//! assert_eq!(code.iter().map(|&chip| i32::from(chip)).sum::<i32>(), -1);
+//! let at = Epoch::parse("2010-07-01T08:00:00")?;
+//! let sets = rinex::embedded()?.ephemerides;
+//! let near = sets.iter().find(|set| set.sv == Sv::gps(7) && at.since(set.toe).abs() < 7200.0);
+//! let radius_m = near.ok_or("no ephemeris")?.state(at)?.position_m.norm();
+//! assert!((26.0e6..27.2e6).contains(&radius_m));
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod bits;
 pub mod broadcast;

@@ -84,7 +84,8 @@ pub enum PassEnd {
     Ephemeris,
 }
 
-/// A time in which a satellite is in the scene's sky, whole seconds of the receiver's clock: `truth/passes.csv`.
+/// A time in which a satellite is in the scene's sky, whole seconds of the receiver's clock:
+/// `truth/passes.csv`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct PassRow {
     pub sv: Sv,
@@ -233,10 +234,13 @@ pub struct ClockRow {
 pub enum IonosphereModel {
     /// Nothing: the settings say that there is none.
     None,
-    /// A typical ionosphere, whose error is in the covariance: no satellite's parameters have been decoded yet.
+    /// A typical ionosphere, whose error is in the covariance: no satellite's parameters have been decoded
+    /// yet.
     Nominal,
     /// The parameters that the satellites send.
     Broadcast,
+    /// Two carriers of every satellite, in the combination that has no ionosphere.
+    Combined,
 }
 
 impl Fix {
@@ -329,12 +333,31 @@ pub struct NavigationRow {
     /// Name in the message's field table.
     pub parameter: String,
     pub raw: i64,
+    /// The message's name: satellites may send several. Files of one message do not say it: LNAV.
+    #[serde(default = "lnav")]
+    pub message: String,
+}
+
+fn lnav() -> String {
+    "LNAV".to_owned()
 }
 
 impl NavigationRow {
-    /// A row for each parameter of a satellite.
-    pub fn each(sv: Sv, issue: u32, parameters: Vec<(&'static str, i64)>) -> impl Iterator<Item = Self> {
-        parameters.into_iter().map(move |(parameter, raw)| Self { sv, issue, parameter: parameter.to_owned(), raw })
+    /// A row for each parameter of a message of a satellite.
+    pub fn each(
+        sv: Sv,
+        message: &'static str,
+        issue: u32,
+        parameters: Vec<(&'static str, i64)>,
+    ) -> impl Iterator<Item = Self> {
+        let row = move |(parameter, raw): (&str, i64)| Self {
+            sv,
+            issue,
+            parameter: parameter.to_owned(),
+            raw,
+            message: message.to_owned(),
+        };
+        parameters.into_iter().map(row)
     }
 }
 
@@ -367,7 +390,8 @@ pub enum Event {
     LossOfLock,
     /// The half-cycle or whole-cycle count of the carrier was broken and restarted.
     CycleSlip,
-    /// Samples are missing in the recording: the code of this satellite, like all others, was ahead by as many.
+    /// Samples are missing in the recording: the code of this satellite, like all others, was ahead by as
+    /// many.
     SamplesLost,
     /// Samples are in the recording twice.
     SamplesDoubled,

@@ -1,10 +1,12 @@
-//! RINEX navigation files, versions 2 to 4: GPS LNAV ephemerides, the ionosphere's coefficients and the leap seconds.
+//! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV and Galileo I/NAV, the coefficients of
+//! both systems' ionosphere, their times against each other and UTC, and the leap seconds.
 //!
-//! Source: RINEX 2.11, table A4; RINEX 3.05, table A6; RINEX 4.02. Lines and columns are `columns`'s matter;
-//! here every element is held against the range of its LNAV field (IS-GPS-200N, tables 20-I and 20-III). A
-//! record that fails is left out and named in [`Navigation::skipped`].
+//! Source: RINEX 2.11, table A4; RINEX 3.05, tables A6 and A8; RINEX 4.02. Lines and columns are read in
+//! `columns`; `elements` holds every element against the range of its field in the message. A record that
+//! fails is left out and named in [`Navigation::skipped`].
 
 mod columns;
+mod elements;
 
 use thiserror::Error;
 
@@ -12,9 +14,7 @@ use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::{LeapEvent, UtcPolynomial};
 use crate::gnss::inflate::{InflateError, inflate};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, WEEK_S};
-use columns::Record;
+use crate::gnss::time::{Epoch, TimeOffset, WEEK_S};
 
 /// Step of the reference time of UTC, and the last one inside a week.
 const UTC_STEP_S: f64 = 4096.0;
@@ -22,18 +22,22 @@ const UTC_LAST_S: f64 = 602_112.0;
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
 
-/// What a navigation file says about GPS.
+/// What a navigation file says about GPS and Galileo.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Navigation {
-    /// GPS LNAV sets by satellite and time of clock.
+    /// Sets of GPS LNAV and Galileo I/NAV by satellite and time of clock.
     pub ephemerides: Vec<Ephemeris>,
     pub klobuchar: Option<Klobuchar>,
+    /// Effective ionisation coefficients of NeQuick-G: solar flux units, per degree, per degree squared.
+    pub nequick: Option<[f64; 3]>,
     /// GPS time minus UTC, in whole seconds.
     pub leap_seconds: Option<i64>,
     /// A change of these that the file names.
     pub leap_event: Option<LeapEvent>,
     /// GPS time minus UTC beyond whole seconds.
     pub utc: Option<UtcPolynomial>,
+    /// Galileo's time minus GPS time, whole weeks apart.
+    pub galileo: Option<TimeOffset>,
     /// Records that were left out, each with its reason.
     pub skipped: Vec<String>,
 }
@@ -51,16 +55,25 @@ pub enum NavigationError {
     NotNavigation { name: String, found: String },
     #[error("{name}: damaged RINEX file ({detail}): expected navigation data of version 2, 3 or 4")]
     Damaged { name: String, detail: String },
-    #[error("{name}: no usable GPS ephemeris: found {found}")]
+    #[error("{name}: no usable ephemeris of GPS or Galileo: found {found}")]
     Nothing { name: String, found: String },
 }
 
-/// The whole day of 2010-07-01 as broadcast: what a scene uses that names no file.
+/// The whole day of 2010-07-01 as broadcast by GPS: what a scene uses that names no file.
 ///
 /// # Errors
-/// As [`read`]; a test sees to it that there are none.
+/// As [`read`]; a test makes sure that there are none.
 pub fn embedded() -> Result<Navigation, NavigationError> {
     read(include_bytes!("../../data/brdc1820-2010.n.gz"), "embedded brdc1820-2010.n.gz")
+}
+
+/// The hours around 2020-11-29T12:40 as broadcast by GPS and Galileo: the same for scenes of that day.
+///
+/// # Errors
+/// As [`read`]; a test makes sure that there are none.
+pub fn embedded_two_systems() -> Result<Navigation, NavigationError> {
+    let name = "embedded CARD00ESP_R_20203340900_15H_MN.rnx.gz";
+    read(include_bytes!("../../data/CARD00ESP_R_20203340900_15H_MN.rnx.gz"), name)
 }
 
 /// Reads a navigation file, plain or gzip, whose `name` goes into errors.
@@ -71,15 +84,17 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     let text = clean(&unpack(bytes, name)?);
     check_first_line(&text, name)?;
     let contents = columns::read(&text).map_err(|detail| NavigationError::Damaged { name: name.to_owned(), detail })?;
-    let columns::Contents { records, klobuchar, leap_seconds, leap_event, utc, others, reasons } = contents;
+    let columns::Contents { records, klobuchar, nequick, leap_seconds, leap_event, utc, galileo, others, reasons } =
+        contents;
     let leap_event = leap_event.map(|(after_s, week, day)| LeapEvent { after_s, week, day });
-    let mut navigation = Navigation { klobuchar, leap_seconds, leap_event, skipped: reasons, ..Navigation::default() };
+    let mut navigation =
+        Navigation { klobuchar, nequick, leap_seconds, leap_event, skipped: reasons, ..Navigation::default() };
     let mut found: Vec<(usize, Ephemeris)> = Vec::new();
     for record in &records {
-        match ephemeris(record) {
+        match elements::ephemeris(record) {
             Ok(set) => found.push((record.line, set)),
             Err(reason) => {
-                let skipped = format!("line {} (G{:02} {}): {reason}", record.line, record.number, record.toc);
+                let skipped = format!("line {} ({} {}): {reason}", record.line, record.sv, record.toc);
                 navigation.skipped.push(skipped);
             }
         }
@@ -107,6 +122,12 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
             Err(reason) => navigation.skipped.push(reason),
         }
     }
+    if let (Some(line), Some(first)) = (galileo, navigation.ephemerides.first()) {
+        match time_offset(line, first.toe) {
+            Ok(found) => navigation.galileo = found,
+            Err(reason) => navigation.skipped.push(reason),
+        }
+    }
     if navigation.ephemerides.is_empty() {
         let reasons = navigation.skipped.iter().take(3).cloned().collect::<Vec<_>>().join("; ");
         let found = format!(
@@ -121,8 +142,8 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
 
 /// GPS time against UTC with its week near `anchor`, for files write it counted on or modulo 1024 or 256;
 /// none where all is zero, as files have it that know nothing.
-fn utc_polynomial(line: columns::UtcLine, anchor: Epoch) -> Result<Option<UtcPolynomial>, String> {
-    let columns::UtcLine { a0_s, a1_sps, tow_s, week } = line;
+fn utc_polynomial(line: columns::Polynomial, anchor: Epoch) -> Result<Option<UtcPolynomial>, String> {
+    let columns::Polynomial { a0_s, a1_sps, tow_s, week } = line;
     if (a0_s, a1_sps) == (0.0, 0.0) && tow_s == 0.0 {
         return Ok(None);
     }
@@ -138,6 +159,24 @@ fn utc_polynomial(line: columns::UtcLine, anchor: Epoch) -> Result<Option<UtcPol
     let ahead = (week - anchor.week() + 128).rem_euclid(256) - 128;
     let reference = Epoch::new((anchor.week() + ahead) * WEEK_S, tow_s);
     Ok(Some(UtcPolynomial { a0_s, a1_sps, reference }))
+}
+
+/// Galileo's time against GPS time with its week near `anchor`; none where all is zero.
+fn time_offset(line: columns::Polynomial, anchor: Epoch) -> Result<Option<TimeOffset>, String> {
+    let columns::Polynomial { a0_s, a1_sps, tow_s, week } = line;
+    if (a0_s, a1_sps) == (0.0, 0.0) && tow_s == 0.0 {
+        return Ok(None);
+    }
+    // Ranges of the fields (Galileo OS SIS ICD 2.1, table 69); files write times of transmission too.
+    if !(0.0..WEEK_S as f64).contains(&tow_s) || a0_s.abs() > 9.54e-7 || a1_sps.abs() > 9.1e-13 {
+        return Err(format!(
+            "Galileo's time: A0 = {a0_s:e}, A1 = {a1_sps:e}, reference time {tow_s} s: expected at most 9.54e-7 s \
+             and 9.1e-13 s/s in size, and a time of week"
+        ));
+    }
+    // Six bits of the week are in the message.
+    let ahead = (week - anchor.week() + 32).rem_euclid(64) - 32;
+    Ok(Some(TimeOffset { a0_s, a1_sps, reference: Epoch::new((anchor.week() + ahead) * WEEK_S, tow_s) }))
 }
 
 fn unpack(bytes: &[u8], name: &str) -> Result<Vec<u8>, NavigationError> {
@@ -176,115 +215,10 @@ fn check_first_line(text: &[u8], name: &str) -> Result<(), NavigationError> {
     }
 }
 
-/// An element that must stand there and lie within its range, in SI units.
-fn field(record: &Record, key: &'static str, least: f64, most: f64) -> Result<f64, String> {
-    let value = record.get(key).ok_or_else(|| format!("{key} is blank"))?;
-    if (least..=most).contains(&value) {
-        Ok(value)
-    } else {
-        Err(format!("{key} = {value:e}: expected {least:e} to {most:e}"))
-    }
-}
-
-fn whole(record: &Record, key: &'static str, most: u32) -> Result<u32, String> {
-    let value = field(record, key, 0.0, f64::from(most))?;
-    if value == value.floor() { Ok(value as u32) } else { Err(format!("{key} = {value}: expected a whole number")) }
-}
-
-fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
-    // Field ranges of IS-GPS-200N, tables 20-I and 20-III; RINEX rounds to twelve digits.
-    const ANGLE_RAD: f64 = 2.0 * std::f64::consts::TAU;
-    const HARMONIC_RAD: f64 = 6.104e-5;
-    const HARMONIC_M: f64 = 1024.001;
-    let both = |name, most: f64| field(record, name, -most, most);
-    let optional = |name, most| if record.get(name).is_some() { whole(record, name, most).map(Some) } else { Ok(None) };
-
-    let toc = record.toc;
-    let toe = near(toc, field(record, "toe", 0.0, 604_800.0)?);
-    let week = f64::from(whole(record, "week", 9999)?);
-    let astray = (week - toe.week() as f64).abs() % 1024.0;
-    if astray > 1.0 && astray < 1023.0 {
-        return Err(format!("week = {week}: expected that of its epoch, {}", toe.week()));
-    }
-    // The last line of a record begins with it: without it the file was cut, perhaps inside a number.
-    if record.get("t_tm").is_none() {
-        return Err("no transmission time: the record is cut short".to_owned());
-    }
-    let iode = whole(record, "iode", 255)?;
-    Ok(Ephemeris {
-        sv: Sv::gps(record.number),
-        toe,
-        toc,
-        transmitted: transmitted(record, toe),
-        iode: iode as u16,
-        iodc: optional("iodc", 1023)?.unwrap_or(iode) as u16,
-        ura_index: ura_index(optional_accuracy(record)?),
-        health: whole(record, "health", 63)? as u8,
-        l2_codes: optional("l2Codes", 3)?.unwrap_or(0) as u8,
-        l2_p_data_off: optional("l2p", 1)? == Some(1),
-        // Hours or the flag itself, as the file's producer meant it; blank is the usual four hours.
-        long_fit: record.get("fitInt").is_some_and(|fit| fit == 1.0 || fit > 4.0),
-        aodo: 0,
-        sqrt_a_sqrtm: field(record, "sqrta", 5000.0, 5300.0)?,
-        eccentricity: field(record, "e", 0.0, 0.1)?,
-        m0_rad: both("m0", ANGLE_RAD)?,
-        delta_n_radps: both("deltaN", 1.171e-8)?,
-        omega0_rad: both("omega0", ANGLE_RAD)?,
-        omega_dot_radps: both("omegaDot", 2.997e-6)?,
-        omega_rad: both("omega", ANGLE_RAD)?,
-        i0_rad: field(record, "i0", 0.0, std::f64::consts::PI)?,
-        idot_radps: both("idot", 2.927e-9)?,
-        cuc_rad: both("cuc", HARMONIC_RAD)?,
-        cus_rad: both("cus", HARMONIC_RAD)?,
-        crc_m: both("crc", HARMONIC_M)?,
-        crs_m: both("crs", HARMONIC_M)?,
-        cic_rad: both("cic", HARMONIC_RAD)?,
-        cis_rad: both("cis", HARMONIC_RAD)?,
-        af0_s: both("af0", 9.766e-4)?,
-        af1_sps: both("af1", 3.726e-9)?,
-        af2_sps2: both("af2", 3.553e-15)?,
-        tgd_s: both("tgd", 5.961e-8)?,
-        tgd2_s: 0.0,
-        signal_delays_s: Vec::new(),
-    })
-}
-
-/// Metres of accuracy, where they are given; a negative one says nothing.
-fn optional_accuracy(record: &Record) -> Result<Option<f64>, String> {
-    if record.get("accuracy").is_some() { field(record, "accuracy", 0.0, 1e6).map(Some) } else { Ok(None) }
-}
-
-/// The instant nearest to `anchor` with that time of week.
-fn near(anchor: Epoch, tow_s: f64) -> Epoch {
-    let week_s = WEEK_S as f64;
-    let start = Epoch::new(anchor.week() * WEEK_S, 0.0);
-    let ahead_s = tow_s - anchor.tow_s();
-    start.plus_s(tow_s - (ahead_s / week_s).round() * week_s)
-}
-
-/// Time of transmission, or two hours before the reference time where the file leaves it out or fills it.
-fn transmitted(record: &Record, toe: Epoch) -> Epoch {
-    let assumed = toe.plus_s(-7200.0);
-    match record.get("t_tm") {
-        Some(tow_s) if tow_s.abs() <= 2.0 * WEEK_S as f64 => {
-            let said = near(toe, tow_s.rem_euclid(WEEK_S as f64));
-            if said.since(toe).abs() <= 86_400.0 { said } else { assumed }
-        }
-        _ => assumed,
-    }
-}
-
-/// The index whose interval holds an accuracy in metres (IS-GPS-200N, 20.3.3.3.1.3); blank is 15, no prediction.
-fn ura_index(accuracy_m: Option<f64>) -> u8 {
-    const UPPER_M: [f64; 15] =
-        [2.4, 3.4, 4.85, 6.85, 9.65, 13.65, 24.0, 48.0, 96.0, 192.0, 384.0, 768.0, 1536.0, 3072.0, 6144.0];
-    let Some(accuracy_m) = accuracy_m else { return 15 };
-    UPPER_M.iter().take_while(|upper| accuracy_m > **upper).count() as u8
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::satellite::Sv;
 
     #[test]
     fn the_embedded_day_reads_whole() {
@@ -345,23 +279,6 @@ mod tests {
         let none = line("GPUT  0.0000000000e+00 0.000000000e+00      0    0", "TIME SYSTEM CORR");
         let found = read((head("3.04") + &none + &end + &three(&record)).as_bytes(), "none").unwrap();
         assert_eq!((found.utc, &found.skipped), (None, &Vec::new()));
-    }
-
-    #[test]
-    fn times_of_week_wrap_to_the_nearest_week() {
-        let anchor = Epoch::from_week(1590, 604_000.0);
-        assert_eq!(near(anchor, 0.0), Epoch::from_week(1591, 0.0));
-        assert_eq!(near(anchor, 604_784.0), Epoch::from_week(1590, 604_784.0));
-        assert_eq!(near(Epoch::from_week(1591, 16.0), 604_784.0), Epoch::from_week(1590, 604_784.0));
-    }
-
-    #[test]
-    fn accuracies_become_the_index_of_their_interval() {
-        let cases = [(0.0, 0), (2.0, 0), (2.8, 1), (4.0, 2), (16.0, 6), (4096.0, 14), (8192.0, 15)];
-        for (metres, index) in cases {
-            assert_eq!(ura_index(Some(metres)), index);
-        }
-        assert_eq!(ura_index(None), 15);
     }
 
     #[test]

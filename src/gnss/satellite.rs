@@ -30,9 +30,28 @@ impl System {
         (Self::Sbas, 'S'),
     ];
 
+    /// The name that people know it by.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gps => "GPS",
+            Self::Glonass => "GLONASS",
+            Self::Galileo => "Galileo",
+            Self::BeiDou => "BeiDou",
+            Self::Qzss => "QZSS",
+            Self::Navic => "NavIC",
+            Self::Sbas => "SBAS",
+        }
+    }
+
     /// The RINEX letter.
     pub fn letter(self) -> char {
         Self::LETTERS.iter().find(|(system, _)| *system == self).map_or('?', |(_, letter)| *letter)
+    }
+}
+
+impl fmt::Display for System {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }
 

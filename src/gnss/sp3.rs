@@ -1,4 +1,5 @@
-//! Precise orbits and clocks, SP3 versions c and d: an adapter over the `sp3` crate that yields GPS satellites.
+//! Precise orbits and clocks, SP3 versions c and d: an adapter over the `sp3` crate that yields satellites of
+//! GPS and Galileo.
 //!
 //! Source: The Extended Standard Product 3 Orbit Format (SP3-d), S. Hilla, 2016. Positions are of the centre
 //! of mass in the axes of the Earth; clocks belong to the ionosphere-free combination of P1 and P2 and leave
@@ -19,7 +20,7 @@ use thiserror::Error;
 
 use crate::gnss::inflate::{InflateError, inflate};
 use crate::gnss::rinex::clean;
-use crate::gnss::satellite::Sv;
+use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::Epoch;
 
 /// Largest file that is read, in bytes after decompression.
@@ -38,7 +39,7 @@ pub struct Sample {
     pub broken: bool,
 }
 
-/// What a file says about GPS: samples by satellite and GPS time (its whole seconds).
+/// What a file says about GPS and Galileo: samples by satellite and GPS time (its whole seconds).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Precise {
     pub satellites: BTreeMap<Sv, BTreeMap<i64, Sample>>,
@@ -55,14 +56,14 @@ pub enum Sp3Error {
     Damaged { name: String, detail: String },
     #[error("{name}:{line}: '{found}': expected an epoch at a whole second")]
     Fraction { name: String, line: usize, found: String },
-    #[error("{name}: no position of a GPS satellite")]
+    #[error("{name}: no position of a satellite of GPS or Galileo")]
     Nothing { name: String },
 }
 
 /// Reads an SP3 file, plain or gzip, whose `name` goes into errors.
 ///
 /// # Errors
-/// [`Sp3Error`], also when no GPS satellite is in it.
+/// [`Sp3Error`], also when no satellite of GPS or Galileo is in it.
 pub fn read(bytes: &[u8], name: &str) -> Result<Precise, Sp3Error> {
     let packed = |source| Sp3Error::Packed { name: name.to_owned(), source };
     let text = clean(&inflate(bytes, LARGEST_BYTES).map_err(packed)?);
@@ -78,23 +79,25 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Precise, Sp3Error> {
     for (key, entry) in &file.data {
         let (x_km, y_km, z_km) = entry.position_km;
         let position_m = Vector3::new(x_km, y_km, z_km) * 1e3;
-        if key.sv.constellation != Constellation::GPS {
-            continue;
-        }
-        // A GPS orbit of any age: 26 560 km and an eccentricity below 0.1.
+        let system = match key.sv.constellation {
+            Constellation::GPS => System::Gps,
+            Constellation::Galileo => System::Galileo,
+            _ => continue,
+        };
+        let sv = Sv { system, number: key.sv.prn };
+        // Orbits of any age: 26 560 km and an eccentricity below 0.1, 29 600 km, and two of 27 980 km and
+        // 0.16.
         let radius_m = position_m.norm();
-        if !(2.3e7..=3.0e7).contains(&radius_m) {
-            let what = format!(
-                "G{:02} at {}: {radius_m:e} m from the Earth's centre, expected 2.3e7 to 3e7",
-                key.sv.prn, key.epoch
-            );
+        if !(2.3e7..=3.3e7).contains(&radius_m) {
+            let epoch = key.epoch;
+            let what = format!("{sv} at {epoch}: {radius_m:e} m from the Earth's centre, expected 2.3e7 to 3.3e7");
             return Err(damaged(what));
         }
         let nanoseconds = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();
         let seconds = i64::try_from(nanoseconds / 1_000_000_000).map_err(|e| damaged(e.to_string()))?;
         let clock_s = entry.clock_us.filter(|us| us.abs() < NO_CLOCK_US).map(|us| us * 1e-6);
         let sample = Sample { position_m, clock_s, broken: entry.clock_event || entry.maneuver };
-        precise.satellites.entry(Sv::gps(key.sv.prn)).or_default().insert(seconds, sample);
+        precise.satellites.entry(sv).or_default().insert(seconds, sample);
     }
     if precise.satellites.is_empty() { Err(Sp3Error::Nothing { name: name.to_owned() }) } else { Ok(precise) }
 }
@@ -166,20 +169,23 @@ mod tests {
         PG01  15402.861499  21607.418873   -992.500669     10.571484\n\
         PG02  15402.861499  21607.418873   -992.500669 999999.999999\n\
         PE05  15402.861499  21607.418873   -992.500669     10.571484\n\
+        PR05  15402.861499  21607.418873   -992.500669     10.571484\n\
         *  2020  6 25  0 15  0.00000000\n\
         PG01  15402.861499  21607.418873   -992.500669    -10.571484 10  9 11 102 E\nEOF\n";
 
     #[test]
-    fn gps_satellites_arrive_in_metres_and_seconds_and_a_missing_clock_as_none() {
+    fn satellites_arrive_in_metres_and_seconds_and_a_missing_clock_as_none() {
         let precise = read(format!("{HEAD}{BODY}").as_bytes(), "x").unwrap();
         let begin = Epoch::parse("2020-06-25T00:00:00").unwrap();
         assert_eq!(precise.span().unwrap(), (begin, begin.plus_s(900.0)));
-        assert_eq!(precise.satellites.len(), 2);
+        assert_eq!(precise.satellites.len(), 3);
         let first = &precise.satellites[&Sv::gps(1)];
         let sample = first[&begin.seconds()];
         assert_eq!(sample.position_m, Vector3::new(15_402.861_499, 21_607.418_873, -992.500_669) * 1e3);
         assert_eq!((sample.clock_s, sample.broken), (Some(10.571_484 * 1e-6), false));
         assert!(first[&(begin.seconds() + 900)].broken);
+        let galileo = Sv { system: System::Galileo, number: 5 };
+        assert_eq!(precise.satellites[&galileo][&begin.seconds()], Sample { broken: false, ..sample });
         assert_eq!(precise.satellites[&Sv::gps(2)][&begin.seconds()].clock_s, None);
     }
 
@@ -189,7 +195,7 @@ mod tests {
         assert!(matches!(read(b"", "x"), Err(Sp3Error::NotSp3 { .. })));
         assert!(matches!(read(whole.replacen("#d", "#a", 1).as_bytes(), "x"), Err(Sp3Error::NotSp3 { .. })));
         let odd = whole.replace("15  0.00000000", "15  0.50000000");
-        assert!(matches!(read(odd.as_bytes(), "x"), Err(Sp3Error::Fraction { line: 8, .. })));
+        assert!(matches!(read(odd.as_bytes(), "x"), Err(Sp3Error::Fraction { line: 9, .. })));
         assert_eq!(read(HEAD.as_bytes(), "x"), Err(Sp3Error::Nothing { name: "x".to_owned() }));
         assert!(matches!(read(&[0x1f, 0x8b, 0, 1], "x"), Err(Sp3Error::Packed { .. })));
         for at in 0..whole.len() {

@@ -23,8 +23,8 @@ pub struct Epoch {
 
 /// The time of a satellite system, by which its codes and messages run.
 ///
-/// An [`Epoch`] stays GPS time; what a system's clock shows is some whole seconds less by definition, and off by
-/// nanoseconds in truth.
+/// An [`Epoch`] stays GPS time; what a system's clock shows is some whole seconds less by definition, and off
+/// by nanoseconds in truth.
 #[derive(Debug, PartialEq, Eq)]
 pub struct TimeScale {
     pub name: &'static str,
@@ -47,6 +47,24 @@ impl TimeScale {
 
 /// GPS time (IS-GPS-200N, 3.3.4).
 pub static GPST: TimeScale = TimeScale { name: "GPST", behind_gpst_s: 0 };
+
+/// Galileo system time: its weeks begin when those of GPS do (Galileo OS SIS ICD 2.1, 5.1.2).
+pub static GST: TimeScale = TimeScale { name: "GST", behind_gpst_s: 0 };
+
+/// How far a system's time is ahead of GPS time, whole seconds apart: `a0 + a1 (t − reference)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeOffset {
+    pub a0_s: f64,
+    pub a1_sps: f64,
+    pub reference: Epoch,
+}
+
+impl TimeOffset {
+    /// Seconds ahead at an instant.
+    pub fn at_s(&self, at: Epoch) -> f64 {
+        self.a0_s + self.a1_sps * at.since(self.reference)
+    }
+}
 
 /// Why a text is not an instant.
 #[derive(Debug, Error, PartialEq)]
@@ -96,7 +114,8 @@ impl Epoch {
         }
         let fraction: f64 =
             if fraction.is_empty() { 0.0 } else { format!("0.{fraction}").parse().map_err(|_| error())? };
-        // The sixtieth second is UTC's alone, and there only where one was inserted: it comes after the fifty-ninth.
+        // The sixtieth second is UTC's alone, and there only where one was inserted: it comes after the
+        // fifty-ninth.
         let inserted = second == 60;
         if !(1980..=2180).contains(&year) || hour > 23 || minute > 59 || second > 60 || (inserted && !utc) {
             return Err(error());
@@ -192,7 +211,8 @@ impl Epoch {
         self.hifitime(hifitime::TimeScale::UTC).day_of_year()
     }
 
-    /// GPS time minus UTC, in whole seconds, at this instant: the new number from the end of an inserted second on.
+    /// GPS time minus UTC, in whole seconds, at this instant: the new number from the end of an inserted
+    /// second on.
     pub fn leap_seconds(self) -> i64 {
         // The crate holds UTC readings against atomic time, and so changes over up to 37 s early.
         let table = |seconds: i64| {
@@ -263,8 +283,8 @@ impl Rate {
         whole as f64 + fraction
     }
 
-    /// Whole turns, and 2^-64 turns, at sample `n` of something that turns `count` times in `seconds`; exact up to
-    /// 1e14 samples, 1e12 turns and 1e13 seconds.
+    /// Whole turns, and 2^-64 turns, at sample `n` of something that turns `count` times in `seconds`; exact
+    /// up to 1e14 samples, 1e12 turns and 1e13 seconds.
     pub fn turns(self, n: u64, count: u64, seconds: u64) -> (i64, u64) {
         let turns = u128::from(n) * u128::from(self.seconds) * u128::from(count);
         let one = u128::from(self.samples) * u128::from(seconds);
@@ -281,7 +301,8 @@ impl Rate {
     }
 }
 
-/// Turns of a tone of `hz` (to the millihertz) at sample `n`, modulo one, as a fraction of 2^64; exact in `n`.
+/// Turns of a tone of `hz` (to the millihertz) at sample `n`, modulo one, as a fraction of 2^64; exact in
+/// `n`.
 pub fn tone_turns(hz: f64, rate: Rate, n: u64) -> u64 {
     let milli = (hz * 1000.0).round() as i128;
     // Phase in turns = n * milli / 1000 * seconds / samples; keep the remainder only.

@@ -1,9 +1,10 @@
-//! Vienna grids of the neutral atmosphere: GPT3 (weather by place and season) and the coefficients a of the mapping
-//! functions, as TU Wien publishes them.
+//! Vienna grids of the neutral atmosphere: GPT3 (weather by place and season) and the coefficients a of the
+//! mapping functions, as TU Wien publishes them.
 //!
-//! Source: Landskron & Böhm 2018, "VMF3/GPT3: refined discrete and empirical troposphere mapping functions", and the
-//! columns that head the files. Values are bilinear between nodes; beyond the last row towards a pole that row's
-//! values hold. Limits: gradients are not read; a mapping grid is one epoch's. VMF3's b and c are in [`super::vmf3`].
+//! Source: Landskron & Böhm 2018, "VMF3/GPT3: refined discrete and empirical troposphere mapping functions",
+//! and the columns that head the files. Values are bilinear between nodes; beyond the last row towards a pole
+//! that row's values hold. Limits: gradients are not read; a mapping grid is one epoch's. VMF3's b and c are
+//! in [`super::vmf3`].
 
 use std::f64::consts::TAU;
 
@@ -47,9 +48,9 @@ struct Globe<T> {
 }
 
 impl<T> Globe<T> {
-    /// Reads rows of `columns` numbers that begin with latitude and longitude in degrees; lines that begin with `!` or
-    /// `%` are comments.
-    /// `ranges` are columns with the least and the largest value that they may hold.
+    /// Reads rows of `columns` numbers that begin with latitude and longitude in degrees; lines that begin
+    /// with `!` or `%` are comments. `ranges` are columns with the least and the largest value that they may
+    /// hold.
     fn read(
         text: &str,
         name: &str,
@@ -147,7 +148,8 @@ pub enum Vienna {
     Vmf3,
 }
 
-/// A file `VMF1_…` or `VMF3_…` of one epoch: latitude, longitude, a_h, a_w, and zenith delays, which are not read.
+/// A file `VMF1_…` or `VMF3_…` of one epoch: latitude, longitude, a_h, a_w, and zenith delays, which are not
+/// read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MappingGrid {
     globe: Globe<MappingA>,

@@ -23,7 +23,8 @@ pub struct MappingBc {
     pub c_wet: f64,
 }
 
-/// What one degree and order adds to each of [`QUANTITIES`], with the cosine and the sine of the order times longitude.
+/// What one degree and order adds to each of [`QUANTITIES`], with the cosine and the sine of the order times
+/// longitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Term {
     cosine: [Season; 4],
@@ -43,7 +44,8 @@ impl Vmf3 {
         Self::read(include_str!("../../data/vmf3.csv"), "embedded vmf3.csv")
     }
 
-    /// Reads an expansion whose `name` goes into errors; sines of order zero, which add nothing, are not in it.
+    /// Reads an expansion whose `name` goes into errors; sines of order zero, which add nothing, are not in
+    /// it.
     ///
     /// # Errors
     /// [`ViennaError`] with the line that is wrong, or the last one if numbers are missing.

@@ -1,12 +1,13 @@
 //! Correlation of samples with a replica: carrier wipe-off and any number of code taps in one pass.
 //!
-//! The replica's phases are exact integers: carrier in 2⁻⁶⁴ turns, code in 2⁻⁴⁸ chips. A replica sample is the
-//! chip at the sample's instant ([`Edge::Nearest`]) or the mean of the chips over the interval of one sample
-//! centred on that instant ([`Edge::Area`]). Sums come in three arithmetics: integers of 16 bits for samples of 8
-//! ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin of both in `f64`
-//! ([`Replica::slow`]). A chip has the steps of its pulse ([`Wave`]); phases count chips, kernels see steps. Steps of zero
-//! are the mean of +1 and −1, so such a code takes two passes. Limits: area edges are exact up to one step a sample;
-//! beyond that they leave steps out. A period has fewer than 2¹⁵ steps.
+//! The replica's phases are exact integers: carrier in 2⁻⁶⁴ turns, code in 2⁻⁴⁸ chips. A replica sample is
+//! the chip at the sample's instant ([`Edge::Nearest`]) or the mean of the chips over the interval of one
+//! sample centred on that instant ([`Edge::Area`]). Sums come in three arithmetics: integers of 16 bits for
+//! samples of 8 ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin
+//! of both in `f64` ([`Replica::slow`]). A chip has the steps of its pulse ([`Wave`]); phases count chips,
+//! kernels see steps. Steps of zero are the mean of +1 and −1, so such a code takes two passes. Limits: area
+//! edges are exact up to one step a sample; beyond that they leave steps out. A period has fewer than 2¹⁵
+//! steps.
 
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
@@ -26,9 +27,11 @@ pub use wave::{Wave, fits};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Edge {
-    /// Mean of the chip waveform over the sample's interval: code bias 0.1 m rms at 2.6 Msps at the worst phase.
+    /// Mean of the chip waveform over the sample's interval: code bias 0.1 m rms at 2.6 Msps at the worst
+    /// phase.
     Area,
-    /// Chip at the sample's instant: 0.7 to 1.5 m rms at 2.6 Msps, and a dead zone at multiples of the chip rate.
+    /// Chip at the sample's instant: 0.7 to 1.5 m rms at 2.6 Msps, and a dead zone at multiples of the chip
+    /// rate.
     Nearest,
 }
 
@@ -38,6 +41,7 @@ pub enum Edge {
 pub enum Arithmetic {
     /// Integers of 16 bits where samples have 8, `f32` where they have more.
     I16,
+    /// Floating point of 32 bits.
     F32,
     /// One sample after the other: the exact twin, thirty times slower and more.
     F64,
@@ -76,15 +80,17 @@ pub struct Replica {
 /// Steps from which on a period cannot be counted in 64 bits.
 const MOST_STEPS: usize = 1 << (63 - CODE_BITS);
 
-/// Where the replica stands at the first sample and how it moves.
+/// Phases of the replica at the first sample and their steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Nco {
     /// Carrier phase in 2⁻⁶⁴ turns.
     pub carrier: u64,
     /// Turns a sample; negative frequencies wrap.
     pub carrier_step: u64,
-    /// Code phase in 2⁻⁴⁸ chips from the start of a period; outside [0, period) it is taken modulo the period.
+    /// Code phase in 2⁻⁴⁸ chips from the start of a period; outside [0, period) it is taken modulo the
+    /// period.
     pub code: i64,
+    /// Code phase units a sample.
     pub code_step: u64,
 }
 
@@ -125,7 +131,7 @@ impl Replica {
     }
 
     /// … and of steps.
-    fn steps_period(&self) -> i64 {
+    pub(super) fn steps_period(&self) -> i64 {
         (self.wave.values.len() as i64) << CODE_BITS
     }
 
@@ -259,7 +265,7 @@ pub fn power(i: &[f32], q: &[f32]) -> f64 {
 }
 
 /// Error of the code, root mean square, while every chip meets the same few places between samples: at whole
-/// ratios of sample and chip rate, or ratios of small numbers, and a satellite whose code stands still
+/// ratios of sample and chip rate, or ratios of small numbers, and a satellite whose code does not move
 /// against the samples. In metres.
 ///
 /// With `q` places in turn nearest edges know the code to a sample in `q` (uniform: over √12). Area edges
@@ -284,8 +290,8 @@ pub fn standing_bias_m(edge: Edge, rate_hz: f64, component: &Component) -> f64 {
 /// 2⁶⁴ as a float.
 pub(crate) const TURN: f64 = 18_446_744_073_709_551_616.0;
 
-/// The mean correlation of a replica with a signal of the same edges, `offset` chips apart, and its slope for positive
-/// offsets: that of ideal waveforms (`shape`), seen twice through the mean over `chips_per_sample`.
+/// The mean correlation of a replica with a signal of the same edges, `offset` chips apart, and its slope for
+/// positive offsets: that of ideal waveforms (`shape`), seen twice through the mean over `chips_per_sample`.
 ///
 /// At offset 0 it is the power of the replica, below one for area edges.
 pub fn correlation(shape: &Shape, edge: Edge, chips_per_sample: f64, offset: f64) -> (f64, f64) {
@@ -424,7 +430,8 @@ mod tests {
                         // and 2⁻¹⁶ of it.
                         let unit = 1.0 / f64::from(1_u32 << steps.fine);
                         let sample = 90.0 * (1.0 / 512.0 + 2.0 * unit / units_to_chips(step) + 2e-5) + 0.011;
-                        // Errors have any sign: four standard deviations of the sum, were they all this large.
+                        // Errors have any sign: four standard deviations of the sum, were they all this
+                        // large.
                         let mut bar = sample * (4.0 * (length as f64).sqrt()).min(length as f64);
                         if edge == Edge::Nearest {
                             // Within the phase's last bit of an edge either chip will do.
@@ -506,7 +513,8 @@ mod tests {
 
     #[test]
     fn the_correlation_model_is_the_measured_one() {
-        // Mean over many sub-sample phases of the replica's own products; sidelobes of a Gold code are below 65/1023.
+        // Mean over many sub-sample phases of the replica's own products; sidelobes of a Gold code are below
+        // 65/1023.
         for (edge, rate) in [(Edge::Area, 2.6007), (Edge::Nearest, 2.6007), (Edge::Area, 10.3007)] {
             let replica = replica(edge);
             let step = chips_to_units(1.023 / rate);

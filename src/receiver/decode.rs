@@ -19,7 +19,10 @@ pub enum News {
     /// The frame was found: the satellite's time is known from here on.
     FrameSynchronised,
     /// Whether the symbols arrive upside down, as the latest unit showed.
-    Polarity { inverted: bool },
+    Polarity {
+        /// Whether a logical 0 arrives as a logical 1.
+        inverted: bool,
+    },
     /// The time that the latest unit says contradicts the frame: synchronisation starts anew.
     Contradiction,
     /// Start of a unit, with the week that it says, resolved near the given epoch.
@@ -52,7 +55,8 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// A decoder of the first message of `signal`; `None` for a pilot or a code without whole periods a second.
+    /// A decoder of the first message of `signal`; `None` for a pilot or a code without whole periods a
+    /// second.
     pub fn new(signal: &Signal, sv: Sv) -> Option<Self> {
         let component = signal.components.iter().find(|component| component.message.is_some())?;
         let message = component.message?;

@@ -15,22 +15,47 @@ const PAGE_EVERY_MIN: f64 = 12.5;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stage {
     /// There were not enough samples for a search.
-    NothingSearched { samples: u64, needed: u64 },
+    NothingSearched {
+        /// Samples that there were.
+        samples: u64,
+        /// Samples that a search asks for.
+        needed: u64,
+    },
     /// No satellite passed the threshold; the one that came nearest.
-    NothingAcquired { strongest: Option<(Sv, f64, f64)> },
+    NothingAcquired {
+        /// Satellite, its statistic, and the threshold that it missed.
+        strongest: Option<(Sv, f64, f64)>,
+    },
     /// Satellites were acquired, but no symbols came out of them.
-    NoSymbols { acquired: Vec<Sv> },
+    NoSymbols {
+        /// Satellites that were found.
+        acquired: Vec<Sv>,
+    },
     /// Symbols came, but no frame was found in them.
-    NoFrame { with_symbols: Vec<Sv> },
+    NoFrame {
+        /// Satellites whose symbols came.
+        with_symbols: Vec<Sv>,
+    },
     /// Too few satellites have an ephemeris: of each with a frame, the subframes that are missing.
-    NoEphemeris { complete: Vec<Sv>, missing: Vec<(Sv, Vec<u8>)> },
+    NoEphemeris {
+        /// Satellites with a whole ephemeris.
+        complete: Vec<Sv>,
+        /// Parts that are missing of the others.
+        missing: Vec<(Sv, Vec<u8>)>,
+    },
     /// Enough ephemerides, but no position.
-    NoPosition { with_ephemeris: Vec<Sv>, reason: Option<NoFix> },
+    NoPosition {
+        /// Satellites with an ephemeris.
+        with_ephemeris: Vec<Sv>,
+        /// What the last attempt failed of.
+        reason: Option<NoFix>,
+    },
 }
 
 /// Why there was no fix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnosis {
+    /// Where the chain broke.
     pub stage: Stage,
     /// Length of the recording.
     pub seconds: f64,
@@ -39,8 +64,8 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// A diagnosis of a recording of `seconds` at `rate_hz` in `format`, whose carrier appears at `if_hz`, and in which
-    /// `acquired` satellites were found.
+    /// A diagnosis of a recording of `seconds` at `rate_hz` in `format`, whose carrier appears at `if_hz`,
+    /// and in which `acquired` satellites were found.
     pub fn new(
         stage: Stage,
         seconds: f64,

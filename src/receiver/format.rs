@@ -2,9 +2,9 @@
 //!
 //! Noise from an antenna is nearly Gaussian about zero, so the bytes of each format have a shape of their
 //! own: one peak about 0 or about 127.5 for single bytes; bytes of all values in turn with few about 0 for 16
-//! bits; and for floats, exponents near that of one. Limits: real samples cannot be told from complex ones of
-//! the same width, nor anything from samples that are silent, or that saturate or are jammed until all bytes
-//! are alike; then nothing is said.
+//! bits; and for floats, exponents near that of one. Limits: real samples cannot be distinguished from
+//! complex ones of the same width, nor anything from samples that are silent, or that saturate or are jammed
+//! until all bytes are alike; then nothing is said.
 
 use std::fmt;
 
@@ -17,7 +17,8 @@ const LEAST_BYTES: usize = 1 << 12;
 /// Root mean square of a byte of evenly spread values, about 0 and about 127.5 alike, is 73.9; below this it
 /// has a peak there.
 const PEAKED: f64 = 60.0;
-/// And above this it is spread as evenly as the low byte of 16-bit samples with a deviation of a hundred or more.
+/// And above this it is spread as evenly as the low byte of 16-bit samples with a deviation of a hundred or
+/// more.
 const SPREAD: f64 = 68.0;
 /// Part of the samples that must be as the format has them: the rest may be damaged.
 const MOST: f64 = 0.95;
@@ -25,12 +26,17 @@ const MOST: f64 = 0.95;
 /// How components are written, whether there are one or two of them in a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
+    /// Two's complement of 8 bits.
     Signed8,
+    /// 8 bits with an offset of 128.
     Offset8,
+    /// Two's complement of 16 bits.
     Signed16,
+    /// IEEE 754 of 32 bits, little-endian.
     Float32,
     /// Most significant byte first, which cannot be received.
     Signed16BigEndian,
+    /// IEEE 754 of 32 bits, big-endian.
     Float32BigEndian,
 }
 
@@ -45,7 +51,7 @@ impl Look {
         }
     }
 
-    /// What the first bytes of a recording look like; `None` where they do not tell.
+    /// What the first bytes of a recording look like; `None` where they do not show it.
     pub fn judge(bytes: &[u8]) -> Option<Self> {
         let bytes = bytes.get(..bytes.len().min(LOOKED_AT_BYTES))?;
         if bytes.len() < LEAST_BYTES || bytes.iter().all(|byte| Some(byte) == bytes.first()) {
@@ -70,7 +76,8 @@ impl Look {
             (sum / pairs.len() as f64).sqrt()
         };
         let (first, second) = (about(0.0, 0), about(0.0, 1));
-        // A sample below 128 has a high byte that only repeats its sign; a larger one has low bytes of all values.
+        // A sample below 128 has a high byte that only repeats its sign; a larger one has low bytes of all
+        // values.
         if signs(1) > MOST || (first > SPREAD && second < 0.5 * first) {
             return Some(Self::Signed16);
         }

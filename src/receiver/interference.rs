@@ -1,4 +1,4 @@
-//! Continuous waves among the samples: lines that stand out of the averaged spectrum.
+//! Continuous waves among the samples: lines that exceed the averaged spectrum.
 //!
 //! Ten times a second a segment of the samples is transformed (Hann window, bins of 0.5 to 1 kHz); ten powers
 //! are averaged and each bin is held against those beside it. In Gaussian noise, white or coloured, a bin's
@@ -7,9 +7,9 @@
 //! 64 bins on either side, the greater of both, so that the edge of a filter is no line (a greatest-of CFAR
 //! test: Hansen 1973; order statistics: Rohling 1983). Satellites have lines of their own, 1 kHz apart and at
 //! most 21.3 dB below the whole for C/A: what is no stronger than those of the strongest satellite followed
-//! is not told.
+//! is not reported.
 //!
-//! Sensitivity: J/N0 of 37 dB-Hz at 2.6 Msps, far below what a loop minds. Limits: nothing is told within
+//! Sensitivity: J/N0 of 37 dB-Hz at 2.6 Msps, far below what a loop minds. Limits: nothing is reported within
 //! three bins of a constant offset, nor of a real recording's half rate; a wave that comes and goes within a
 //! second is averaged; lines of a strong signal that is not followed pass for interference, and a sweep shows
 //! as many lines.
@@ -21,8 +21,8 @@ use rustfft::{Fft, FftPlanner};
 
 use crate::gnss::record::LineRow;
 use crate::gnss::samples::IfMetadata;
-use crate::receiver::acquire::threshold::threshold;
 use crate::receiver::source::{Packed, Planes};
+use crate::receiver::threshold::threshold;
 
 /// Probability that noise alone shows a line in one spectrum, a second's.
 pub const FALSE_ALARM: f64 = 1e-6;
@@ -31,7 +31,8 @@ const INTERVAL_MS: u64 = 100;
 const SEGMENTS: u32 = 10;
 /// Widest bin; the segment is the next power of two.
 const BIN_HZ: f64 = 1000.0;
-/// Bins on either side that make the density, and those between them and the one tested: a Hann window's lobe and more.
+/// Bins on either side that make the density, and those between them and the one tested: a Hann window's lobe
+/// and more.
 const BESIDE: usize = 64;
 const GUARD: usize = 4;
 /// Bins about a constant offset that are not looked at.
@@ -92,7 +93,7 @@ impl Watch {
         }
     }
 
-    /// Takes the next block and tells `told` of every spectrum that it completes: the number of its first
+    /// Takes the next block and reports to `told` every spectrum that it completes: the number of its first
     /// sample, and its strongest line if it has one. `strongest_cn0_hz` is that of the satellites followed.
     pub fn take(&mut self, block: &Packed, strongest_cn0_hz: f64, mut told: impl FnMut(u64, Option<LineRow>)) {
         let bins = self.window.len();
@@ -181,7 +182,7 @@ impl Watch {
             let near = (0..5).map(|k| (line.bin + bins + k - 2) % bins);
             bin_hz * near.map(|n| self.powers[n] / density[line.bin] - 1.0).sum::<f64>()
         };
-        // A correlator's noise is the density where it is high; beside it the same line stands out further.
+        // A correlator's noise is the density where it is high; beside it the same line exceeds it further.
         let mut sorted = density.clone();
         sorted.sort_by(f64::total_cmp);
         let usual = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(0.0);
@@ -293,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wave_is_told_with_its_frequency_and_power_and_an_offset_is_none() {
+    fn a_wave_is_reported_with_its_frequency_and_power_and_an_offset_is_none() {
         for (format, rate_hz, f_hz) in
             [(Format::Ci8, 2.6e6, -227_123.0), (Format::Ri8, 5.2e6, 1_234_567.0), (Format::Ci8, 1.1e6, 300_001.0)]
         {

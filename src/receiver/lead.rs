@@ -1,8 +1,7 @@
 //! The component of a signal that a receiver searches and follows.
 
-use crate::gnss::signal::{Component, Signal};
-use crate::receiver::correlate::fits;
-use crate::receiver::track::beside;
+use crate::gnss::signal::{Component, Layer, Shape, Signal};
+use crate::receiver::correlate::{fits, wave};
 
 /// The strongest component whose code is short enough to be made; of equally strong ones a pilot.
 ///
@@ -14,6 +13,47 @@ pub fn lead(signal: &'static Signal) -> Option<&'static Component> {
     };
     let possible = signal.components.iter().filter(|component| fits(component));
     possible.rev().max_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(std::cmp::Ordering::Equal))
+}
+
+/// The component whose data can be read once the overlay of `pilot` is aligned: their codes have the same
+/// length, and symbols and overlay of the data begin where the pilot's overlay does.
+pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
+    let fits = |component: &&Component| {
+        let periods = component.periods_per_symbol().unwrap_or(0);
+        let whole = |periods: u32| pilot.overlay.periods().is_multiple_of(periods.max(1));
+        let same = (component.period_s() / pilot.period_s() - 1.0).abs() < 1e-12;
+        periods > 0 && same && whole(periods) && whole(component.overlay.periods())
+    };
+    signal.components.iter().find(|component| !std::ptr::eq(*component, pilot) && fits(component))
+}
+
+/// Correlation of a component with the replica that is made of it, and of the replica with itself.
+pub fn shapes(component: &Component) -> Option<[Shape; 2]> {
+    let strongest = wave::strongest(component)?;
+    let made = [Layer { weight: 1.0, phase_cycles: 0.0, ..*strongest }];
+    // The replica has the layer's phase and sign.
+    let sign = strongest.weight.signum();
+    let turned: Vec<Layer> = (component.layers.iter())
+        .map(|layer| Layer {
+            weight: sign * layer.weight,
+            phase_cycles: layer.phase_cycles - strongest.phase_cycles,
+            ..*layer
+        })
+        .collect();
+    Some([&turned, &made[..]].map(|sent| Shape::between(sent, &made, component.chip_rate_hz)))
+}
+
+/// Power that the replica finds, over the component's.
+pub fn efficiency(signal: &Shape, own: &Shape) -> f64 {
+    let found = signal.correlation(0.0);
+    found * found / own.correlation(0.0)
+}
+
+/// C/N0 of what the receiver follows of a signal over that of the whole signal, in decibels: the component's
+/// share of the power, less what its replica does not have.
+pub fn followed_db(component: &Component) -> f64 {
+    let efficiency = shapes(component).map_or(1.0, |[signal, own]| efficiency(&signal, &own));
+    10.0 * libm::log10(component.power_share * efficiency)
 }
 
 /// What this receiver cannot do with a signal, if it cannot follow it to a position.

@@ -1,12 +1,41 @@
 //! The estimating world: one designer's receiver, from IF samples to position.
 //!
-//! It sees IF metadata, samples and settings; no argument can carry truth. [`acquire`] finds
-//! satellites, [`track`] follows them with [`correlate`], [`decode`] reads their messages,
-//! [`observe`] makes observables at common epochs and [`position`] solves for place and time. [`interference`] watches
-//! the spectrum, [`parting`] how code and carrier part, [`gap`] whether samples are missing.
+//! It sees IF metadata, samples and settings; no argument can carry truth. [`acquire`] finds satellites,
+//! [`track`] follows them with [`correlate`], [`decode`] reads their messages, [`observe`] makes observables
+//! at common epochs and [`position`] solves for place and time. [`interference`] watches the spectrum,
+//! [`parting`] how code and carrier part, [`gap`] whether samples are missing.
 //!
 //! A [`Receiver`] takes samples and returns [`output::Record`]s as values; [`receive`] reads a stream to its
-//! end and gives them to any [`output::Sink`], of which the CSV files of [`output::Output`] are one.
+//! end and gives them to any [`output::Sink`], of which the CSV files of [`output::Output`] are one. Several
+//! front ends of one clock are one reception ([`Receiver::of_several`], [`receive_several`]).
+//!
+//! ```
+//! use gnss_twin::gnss::samples::{Format, IfMetadata};
+//! use gnss_twin::gnss::time::Rate;
+//! use gnss_twin::receiver::{Receiver, output::Record, settings::Settings};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let rate = Rate::from_hz(2.6e6).ok_or("no rate")?;
+//! let (format, center_hz) = (Format::Ci8, 1_575.42e6);
+//! let metadata = IfMetadata { format, rate, center_hz, inverted: false, start: None };
+//! let mut receiver = Receiver::new(&metadata, &Settings::default())?;
+//! // 50 ms of a triangle: nothing that a satellite sends.
+//! let samples: Vec<u8> = (0..2 * 130_000_u32).map(|k| (k % 17) as u8).collect();
+//! let mut records = receiver.push(&samples)?;
+//! let (rest, outcome) = receiver.finish()?;
+//! records.extend(rest);
+//! assert!(!records.iter().any(|record| matches!(record, Record::Fix(_))));
+//! println!("{}", outcome.diagnosis.ok_or("a fix without a satellite")?);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Rooms from the ground up; each imports only rooms before it:
+//! source, format, thresholds · [`correlate`] · [`lead`] · [`gap`], [`interference`], [`parting`] ·
+//! [`acquire`], looks · [`track`] · [`decode`] · [`observe`], [`position`] · [`settings`] (of all those) ·
+//! [`diagnosis`], [`output`], outcome · session · run.
+
+#![warn(missing_docs)]
 
 pub mod acquire;
 pub mod correlate;
@@ -19,6 +48,7 @@ pub mod interference;
 pub mod lead;
 pub mod looks;
 pub mod observe;
+mod outcome;
 pub mod output;
 pub mod parting;
 pub mod position;
@@ -26,6 +56,8 @@ mod run;
 mod session;
 pub mod settings;
 pub mod source;
+mod threshold;
 pub mod track;
 
-pub use run::{Conditioning, Interfered, Outcome, ReceiveError, Receiver, Reception, receive};
+pub use outcome::{Conditioning, Interfered, Outcome, ReceiveError};
+pub use run::{Receiver, Reception, receive, receive_several};

@@ -10,7 +10,7 @@ use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::Observation;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, Rate, SampleClock};
+use crate::gnss::time::{Epoch, Rate, SampleClock, WEEK_S};
 use crate::receiver::decode::Decoder;
 use crate::receiver::track::Measurement;
 
@@ -29,11 +29,16 @@ const BELIEVED_S: f64 = 1.0;
 /// One channel at one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
+    /// The satellite.
     pub sv: Sv,
+    /// The signal.
     pub signal: &'static Signal,
+    /// The state of the channel's replica.
     pub measurement: Measurement,
     /// Time of week sent, in the time of the signal's system: whole seconds and a fraction.
     pub sent_of_week: (i64, f64),
+    /// By how much later than the measurement it is observed: less than a sample of the front end.
+    pub later_s: f64,
 }
 
 impl Reading {
@@ -43,21 +48,39 @@ impl Reading {
             return None;
         }
         let sent_of_week = decoder.time_of_week(measurement.code_periods, measurement.code_fraction)?;
-        Some(Self { sv, signal, measurement: *measurement, sent_of_week })
+        Some(Self { sv, signal, measurement: *measurement, sent_of_week, later_s: 0.0 })
+    }
+
+    /// The same carried on to an instant that is so much later.
+    pub fn later(self, later_s: f64) -> Self {
+        let carrier_cycles = self.measurement.carrier_cycles - self.measurement.doppler_hz * later_s;
+        Self { measurement: Measurement { carrier_cycles, ..self.measurement }, later_s, ..self }
+    }
+
+    /// By how much later, by the satellite's clock, this was sent than another signal of the same system,
+    /// less than half a week.
+    pub fn sent_after_s(&self, other: &Self) -> f64 {
+        let rate = |reading: &Self| 1.0 + reading.measurement.doppler_hz / reading.signal.carrier_hz(reading.sv);
+        let ((whole, fraction), (other_whole, other_fraction)) = (self.sent_of_week, other.sent_of_week);
+        let weeks = (whole - other_whole + WEEK_S / 2).rem_euclid(WEEK_S) - WEEK_S / 2;
+        weeks as f64 + (fraction - other_fraction) + self.later_s * rate(self) - other.later_s * rate(other)
     }
 
     /// The time sent, in the week that brings it nearest to `near`.
     fn sent(&self, near: Epoch) -> Epoch {
         let (whole, fraction) = self.sent_of_week;
         let label = self.signal.time.label(near).nearest_tow(whole);
-        self.signal.time.instant(Epoch::new(label.seconds(), fraction))
+        let rate = 1.0 + self.measurement.doppler_hz / self.signal.carrier_hz(self.sv);
+        self.signal.time.instant(Epoch::new(label.seconds(), fraction + self.later_s * rate))
     }
 }
 
 /// An observation, and whether its carrier is known to the half cycle.
 #[derive(Clone, Debug)]
 pub struct Observed {
+    /// The row as it is written.
     pub observation: Observation,
+    /// Whether the carrier's half cycle is resolved.
     pub half_cycle_known: bool,
 }
 
@@ -67,13 +90,13 @@ pub struct Timebase {
     rate: Rate,
     stated: Option<Epoch>,
     clock: Option<SampleClock>,
-    heard: Option<Epoch>,
+    stated_by_message: Option<Epoch>,
 }
 
 impl Timebase {
     /// A clock that has read nothing but the recording's metadata.
     pub fn new(rate: Rate, stated: Option<Epoch>) -> Self {
-        Self { rate, stated, clock: None, heard: None }
+        Self { rate, stated, clock: None, stated_by_message: None }
     }
 
     /// What labels samples, once it is set.
@@ -81,9 +104,9 @@ impl Timebase {
         self.clock
     }
 
-    /// Takes a time that a satellite's message says, right within half a week.
-    pub fn hear(&mut self, time: Epoch) {
-        self.heard.get_or_insert(time);
+    /// Takes a time that a satellite's message states, right within half a week.
+    pub fn take_time(&mut self, time: Epoch) {
+        self.stated_by_message.get_or_insert(time);
     }
 
     /// So many samples are missing before those that come now, or came twice if negative: samples count time
@@ -151,7 +174,7 @@ impl Timebase {
                 return;
             }
         }
-        let Some(near) = self.heard else { return };
+        let Some(near) = self.stated_by_message else { return };
         let sent = readings.iter().map(|reading| reading.sent(near));
         let Some(latest) = sent.reduce(|latest, sent| if sent > latest { sent } else { latest }) else { return };
         // Whole milliseconds, so that the label is a clock that a person could have set.
@@ -185,7 +208,7 @@ mod tests {
             locked_s: 1.0,
             locked: true,
         };
-        Reading { sv: Sv::gps(prn), signal: &L1_CA, measurement, sent_of_week: of_week }
+        Reading { sv: Sv::gps(prn), signal: &L1_CA, measurement, sent_of_week: of_week, later_s: 0.0 }
     }
 
     fn rate() -> Rate {
@@ -201,7 +224,7 @@ mod tests {
         assert_eq!(near.clock().unwrap().start, start);
         let mut far = Timebase::new(rate(), Some(start.plus_s(-5.0)));
         assert!(far.observe(0, &sent).is_empty());
-        far.hear(Epoch::from_week(1590, 960.0));
+        far.take_time(Epoch::from_week(1590, 960.0));
         // 70 ms to the nearest satellite, in whole milliseconds.
         assert_eq!(far.observe(0, &sent).len(), 2);
         assert!(far.clock().unwrap().start.since(start).abs() < 1e-15);

@@ -1,14 +1,15 @@
 //! How fast code and carrier part, which all channels share.
 //!
-//! One oscillator behind sampling and mixing moves code and carrier alike. A mixer with an error of its own, or samples
-//! at another rate than stated, part them: the carrier runs ahead of the code's Doppler by the same frequency on every
-//! satellite. A [`Line`] measures it on one channel, from what the replica's code and carrier have counted;
-//! [`common`] joins the channels, and an [`Offset`] decides when that is believed.
+//! One oscillator behind sampling and mixing moves code and carrier alike. A mixer with an error of its own,
+//! or samples at another rate than stated, part them: the carrier runs ahead of the code's Doppler by the
+//! same frequency on every satellite. A [`Line`] measures it on one channel, from what the replica's code and
+//! carrier have counted; [`common`] joins the channels, and an [`Offset`] decides when that is believed.
 //!
-//! **Noise.** Code noise of a loop of bandwidth B is correlated as exp(−4Bt): a line through T seconds of it has the
-//! slope's variance 12σ²τ/T³ with τ = 1/(2B), when T ≫ τ (less before). σ² grows with B, so that σ²τ, and with it the
-//! slope, does not depend on B. At 45 dB-Hz (σ = 0.58 m at 0.5 Hz, 3.1 carrier cycles) that is 11 Hz/T^1.5 for one
-//! satellite and 3.7 Hz/T^1.5 for eight: 4 Hz after a second, 0.12 Hz after ten, 0.02 Hz after thirty.
+//! **Noise.** Code noise of a loop of bandwidth B is correlated as exp(−4Bt): a line through T seconds of it
+//! has the slope's variance 12σ²τ/T³ with τ = 1/(2B), when T ≫ τ (less before). σ² grows with B, so that σ²τ,
+//! and with it the slope, does not depend on B. At 45 dB-Hz (σ = 0.58 m at 0.5 Hz, 3.1 carrier cycles) that
+//! is 11 Hz/T^1.5 for one satellite and 3.7 Hz/T^1.5 for eight: 4 Hz after a second, 0.12 Hz after ten, 0.02
+//! Hz after thirty.
 //!
 //! Limits: an ionosphere that changes for all satellites alike, or a turning antenna, looks the same; the
 //! first is below [`LEAST_HZ`], the second is removed like an oscillator's offset. Multipath counts by its
@@ -33,12 +34,15 @@ const LEAST_POINTS: u32 = 6;
 const LEAST_LINES: usize = 3;
 /// The share of all lines that has to agree.
 const AGREEING_SHARE: f64 = 0.66;
-/// Lines agree when they are this many deviations apart, and this much for what no noise explains (multipath).
+/// Lines agree when they are this many deviations apart, and this much for what no noise explains
+/// (multipath).
 const AGREEING_SIGMAS: f64 = 5.0;
 const AGREEING_HZ: f64 = 3.0;
-/// An offset is believed beyond so many deviations: 1e-9 a look, with a look each 50 ms of which few are independent …
+/// An offset is believed beyond so many deviations: 1e-9 a look, with a look each 50 ms of which few are
+/// independent …
 const BELIEVED_SIGMAS: f64 = 6.0;
-/// … and beyond this: an ionosphere whose delay changes by 5 mm/s everywhere parts code and carrier by 0.05 Hz.
+/// … and beyond this: an ionosphere whose delay changes by 5 mm/s everywhere parts code and carrier by 0.05
+/// Hz.
 pub const LEAST_HZ: f64 = 0.1;
 /// A change of the offset by more moves the code loops by more than their noise (0.5 m).
 const RESTART_HZ: f64 = 5.0;
@@ -46,9 +50,11 @@ const RESTART_HZ: f64 = 5.0;
 /// What a replica has counted where a code period of it begins.
 #[derive(Clone, Copy, Debug)]
 pub struct Phases {
+    /// Sample at which the period begins.
     pub sample: u64,
     /// Code periods, and chips of the running one.
     pub periods: u64,
+    /// Chips of the running period.
     pub chips: f64,
     /// Carrier without the nominal IF in the sense of Doppler, in 2⁻⁶⁴ turns.
     pub carrier: i128,
@@ -71,13 +77,17 @@ impl Phases {
 /// A frequency and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
+    /// The frequency.
     pub hz: f64,
+    /// Its standard deviation.
     pub sigma_hz: f64,
 }
 
-/// A least-squares line through what code and carrier of one channel have parted by, with a memory that fades.
+/// A least-squares line through what code and carrier of one channel have parted by, with a memory that
+/// fades.
 ///
-/// The gains of a growing memory, (4n−2)/(n(n+1)) and 6/(n(n+1)), make the recursion the exact line through n points.
+/// The gains of a growing memory, (4n−2)/(n(n+1)) and 6/(n(n+1)), make the recursion the exact line through n
+/// points.
 #[derive(Clone, Debug, Default)]
 pub struct Line {
     last: Option<Phases>,
@@ -158,6 +168,7 @@ pub fn common(lines: &[Estimate]) -> Option<Estimate> {
 /// What a new estimate does to the offset in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
+    /// The offset stays as it was.
     None,
     /// The offset is known better.
     Refined,
@@ -206,6 +217,7 @@ impl Offset {
 pub struct Parted {
     /// The carrier's Doppler over the code's, in hertz of the carrier.
     pub offset_hz: f64,
+    /// Its standard deviation.
     pub sigma_hz: f64,
     /// The same as an error of the sample rate: the true one over the stated one, less one.
     pub rate_error_ppm: f64,
@@ -217,7 +229,8 @@ pub struct Parted {
     pub code_drift: Option<f64>,
 }
 
-/// One of two explanations is taken for the likely one when the clock's gain by the other is so many times as large.
+/// One of two explanations is taken for the likely one when the clock's gain by the other is so many times as
+/// large.
 const LIKELIER: f64 = 3.0;
 /// … and is more than an oscillator's usual part in a million.
 const UNUSUAL: f64 = 1e-6;

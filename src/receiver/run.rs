@@ -1,32 +1,23 @@
 //! The receiver at work: samples in, records out.
 //!
-//! Block by block: search when it is due, follow every channel in parallel, then, in a fixed order, read messages,
-//! make observables, solve. Results do not depend on the number of threads. Memory holds one block, one search
-//! window and what the satellites said.
+//! Block by block: search when it is due, follow every channel in parallel, then, in a fixed order, read
+//! messages, make observables, solve. Results do not depend on the number of threads. Memory holds one block,
+//! one search window and what the satellites said.
 
-use std::fmt;
 use std::io::{ErrorKind, Read};
 
-use serde::Serialize;
 use serde_json::json;
-use thiserror::Error;
 
-use crate::gnss::record::LineRow;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Link, Signal};
-use crate::receiver::acquire::{self, AcquireError, AcquisitionSettings};
-use crate::receiver::correlate::standing_bias_m;
-use crate::receiver::diagnosis::{Diagnosis, Stage, duration};
+use crate::receiver::acquire;
+use crate::receiver::diagnosis::{Diagnosis, Stage};
 use crate::receiver::format::Check;
-use crate::receiver::gap::Jump;
-use crate::receiver::lead::lead;
-use crate::receiver::output::{OutputError, Record, Sink};
-use crate::receiver::parting::Parted;
+use crate::receiver::outcome::{Outcome, ReceiveError};
+use crate::receiver::output::{Record, Sink};
 use crate::receiver::session::Session;
-use crate::receiver::settings::{Settings, SettingsError};
-use crate::receiver::source::Source;
-use crate::receiver::track::LoopMargin;
+use crate::receiver::settings::Settings;
+use crate::receiver::source::{Packed, Queue, Source};
 
 /// Length of the blocks that channels work on.
 const BLOCK_MS: u64 = 50;
@@ -35,178 +26,25 @@ const BLOCK_SAMPLES: u64 = 1 << 17;
 /// Bytes read at a time.
 const READ_BYTES: usize = 1 << 18;
 
-/// Why a reception was broken off.
-#[derive(Debug, Error)]
-pub enum ReceiveError {
-    #[error("acquisition.signals: {signal} cannot be received: {reason}")]
-    Unsupported { signal: &'static str, reason: String },
-    #[error(transparent)]
-    Settings(#[from] SettingsError),
-    #[error(transparent)]
-    Acquire(#[from] AcquireError),
-    #[error("cannot read the samples after sample {sample}: {error}")]
-    Read { sample: u64, error: std::io::Error },
-    #[error(transparent)]
-    Output(#[from] OutputError),
-}
-
-/// What a reception came to.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// Whole samples read, and their time.
-    pub samples: u64,
-    pub seconds: f64,
-    /// Satellites found by any search, and those in any fix.
-    pub acquired: Vec<Sv>,
-    pub used: Vec<Sv>,
-    pub fixes: u64,
-    /// Time of the first fix since the first sample.
-    pub first_fix_s: Option<f64>,
-    /// Channels lost or dropped.
-    pub losses: u64,
-    /// Bytes of a sample that the end cut off.
-    pub cut_bytes: usize,
-    /// What the bytes look like, if not like the format that was taken.
-    pub format_warning: Option<String>,
-    /// Why there was no fix, when there was none.
-    pub diagnosis: Option<Diagnosis>,
-    /// Continuous waves that were met; the rows are in `interference.csv`.
-    pub interfered: Option<Interfered>,
-    /// How far carrier and code part on all satellites alike, where they do.
-    pub parted: Option<Parted>,
-    /// Where samples are missing, or came twice.
-    pub jumps: Vec<Jump>,
-    pub conditioning: Conditioning,
-    /// What makes the results worse than need be, and the remedy.
-    pub warnings: Vec<String>,
-}
-
-/// How near the reception was to what is refused as ill-conditioned.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Conditioning {
-    /// Largest ratio of the geometry's singular values that a fix had, and from which on there is none.
-    pub geometry_worst: Option<f64>,
-    pub geometry_limit: f64,
-    /// Bandwidth times update time of every loop.
-    pub loops: Vec<LoopMargin>,
-}
-
-impl fmt::Display for Conditioning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(worst) = self.geometry_worst {
-            write!(f, "condition of the geometry up to {worst:.1}, refused from {:e}; ", self.geometry_limit)?;
-        }
-        let least = self.loops.iter().min_by(|a, b| a.margin_share.total_cmp(&b.margin_share));
-        let Some(LoopMargin { key, bandwidth_time, limit, margin_share, .. }) = least else { return Ok(()) };
-        write!(
-            f,
-            "largest bandwidth times update time {bandwidth_time:.3} ({key}), refused above {limit}: {:.0} % left",
-            100.0 * margin_share
-        )
-    }
-}
-
-/// What there was of continuous waves.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Interfered {
-    /// Spectra of a second that had a line.
-    pub spectra: u64,
-    /// The strongest line.
-    pub strongest: LineRow,
-}
-
-impl fmt::Display for Interfered {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let LineRow { frequency_hz, jn0_dbhz, js_db, lines, .. } = &self.strongest;
-        let what = if *lines > 1 { "lines of interference, the strongest" } else { "a continuous wave" };
-        write!(f, "{what} at {:+.1} kHz in the samples, J/N0 {jn0_dbhz:.1} dB-Hz", 1e-3 * frequency_hz)?;
-        js_db.map_or(Ok(()), |js_db| write!(f, ", J/S {js_db:.1} dB"))?;
-        write!(f, ", in {} s", self.spectra)
-    }
-}
-
-impl fmt::Display for Outcome {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} received: {} satellites acquired, {} used, {} fixes",
-            duration(self.seconds),
-            self.acquired.len(),
-            self.used.len(),
-            self.fixes
-        )?;
-        self.first_fix_s.map_or(Ok(()), |s| write!(f, ", the first after {s:.1} s"))?;
-        if self.cut_bytes > 0 {
-            write!(f, " ({} bytes of a cut sample left out)", self.cut_bytes)?;
-        }
-        self.interfered.as_ref().map_or(Ok(()), |seen| write!(f, "; {seen}"))?;
-        self.parted.as_ref().map_or(Ok(()), |parted| write!(f, "; {parted}"))?;
-        self.jumps.iter().try_for_each(|jump| write!(f, "; {jump}"))
-    }
-}
-
-/// Errors of the code from which on a rate is warned of.
-const STANDING_BIAS_M: f64 = 0.5;
-
-/// What of samples and settings makes the results worse than need be.
-pub(super) fn warnings(metadata: &IfMetadata, settings: &Settings) -> Vec<String> {
-    let rate_hz = metadata.rate.hz();
-    let one = |signal: &Signal, component: &Component| {
-        let bias_m = standing_bias_m(settings.tracking.replica, rate_hz, component);
-        let samples_per_chip = rate_hz / component.chip_rate_hz;
-        // The code's error turns once while the code passes a sample; what is quicker than the loop averages.
-        let cycles_per_chip = signal.centre_hz() / component.chip_rate_hz;
-        let slow_hz = cycles_per_chip * settings.tracking.dll_bandwidth_hz / samples_per_chip;
-        (bias_m > STANDING_BIAS_M).then(|| {
-            format!(
-                "{:.3} Msps are {samples_per_chip:.3} samples a chip: while a satellite's Doppler stays below {slow_hz:.0} Hz, \
-                 its pseudorange errs by {bias_m:.1} m rms (tracking.replica = {:?}); another rate, like 2.6 Msps, avoids it",
-                1e-6 * rate_hz, settings.tracking.replica
-            )
-        })
-    };
-    let signals = settings.acquisition.signals();
-    let mut found: Vec<String> = signals.iter().filter_map(|signal| one(signal, lead(signal)?)).collect();
-    found.extend(signals.iter().filter_map(|signal| image(metadata, signal, settings.acquisition.doppler_max_hz)));
-    found
-}
-
-/// Real samples whose carriers meet their own image: at 0 Hz or half the rate a carrier above and one below look alike.
-fn image(metadata: &IfMetadata, signal: &Signal, doppler_max_hz: f64) -> Option<String> {
-    let half_hz = 0.5 * metadata.rate.hz();
-    let if_hz = metadata.if_hz(signal.centre_hz());
-    let image_hz = half_hz * (if_hz / half_hz).round();
-    let near = !metadata.format.is_complex() && (if_hz - image_hz).abs() < doppler_max_hz;
-    near.then(|| {
-        format!(
-            "{} real samples with {} at {:.4} MHz, {:.1} kHz from {} of the rate: a carrier and its image are less than two Dopplers \
-             of {doppler_max_hz:.0} Hz apart, and Dopplers get the wrong sign; another intermediate frequency or complex \
-             samples avoid it",
-            metadata.format.name(),
-            signal.name,
-            1e-6 * if_hz,
-            1e-3 * (if_hz - image_hz).abs(),
-            if (image_hz / half_hz) as i64 % 2 == 0 { "a multiple" } else { "an odd half" },
-        )
-    })
-}
-
-/// Signals and satellites that are searched for, as far as the samples can hold them.
-pub(super) fn candidates(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Vec<Link> {
-    let signals = settings.signals().into_iter().filter(|signal| acquire::can_hold(metadata, signal));
-    signals
-        .flat_map(|signal| signal.satellites().map(move |sv| signal.link(sv)))
-        .filter(|link| settings.reserved_codes || link.is_of_constellation())
-        .collect()
-}
-
 /// A reception that is given its samples piece by piece.
+///
+/// Records count samples: those of the first front end, where there are several.
 pub struct Reception {
-    metadata: IfMetadata,
+    metadata: Vec<IfMetadata>,
     settings: Settings,
-    check: Check,
-    source: Source,
+    checks: Vec<Check>,
+    source: Input,
     session: Session,
+}
+
+/// Samples on their way in: blocks of one front end, or of several that end at the same time.
+enum Input {
+    One(Source),
+    Several {
+        queues: Vec<Queue>,
+        /// Samples of the first front end in a block.
+        block: u64,
+    },
 }
 
 impl Reception {
@@ -215,33 +53,118 @@ impl Reception {
     /// # Errors
     /// Settings out of range, samples that cannot be searched.
     pub fn new(metadata: &IfMetadata, settings: &Settings) -> Result<Self, ReceiveError> {
+        Self::of_several(std::slice::from_ref(metadata), settings)
+    }
+
+    /// A cold start on the samples of several front ends that sample by one clock from one instant on, each
+    /// at its own rate. Every signal is received in the first front end whose band holds its main lobes, or
+    /// else its carrier.
+    ///
+    /// # Errors
+    /// As [`Reception::new`], and [`ReceiveError::NoFrontEnd`].
+    pub fn of_several(metadata: &[IfMetadata], settings: &Settings) -> Result<Self, ReceiveError> {
         settings.validate("settings")?;
-        let interval = u64::from(settings.operation.measurement_interval_ms);
-        let block = metadata.rate.first_sample_at(interval.min(BLOCK_MS), 1000).min(BLOCK_SAMPLES);
+        let session = Session::new(metadata, settings)?;
+        let interval = u64::from(settings.operation.measurement_interval_ms).min(BLOCK_MS);
+        let length = |metadata: &IfMetadata| metadata.rate.first_sample_at(interval, 1000);
+        let source = match metadata {
+            [one] => Input::One(Source::new(one.format, length(one).min(BLOCK_SAMPLES) as usize)),
+            several => {
+                // No front end has more samples in a block than one alone may have.
+                let longest = several.iter().map(length).max().unwrap_or(1).max(1);
+                let first = several.first().map_or(1, length);
+                let block = if longest > BLOCK_SAMPLES {
+                    (u128::from(first) * u128::from(BLOCK_SAMPLES) / u128::from(longest)) as u64
+                } else {
+                    first
+                };
+                let queues = several.iter().map(|metadata| Queue::new(metadata.format)).collect();
+                Input::Several { queues, block: block.max(1) }
+            }
+        };
         Ok(Self {
-            metadata: metadata.clone(),
+            metadata: metadata.to_vec(),
             settings: settings.clone(),
-            check: Check::new(metadata.format),
-            source: Source::new(metadata.format, block as usize),
-            session: Session::new(metadata, settings)?,
+            checks: metadata.iter().map(|metadata| Check::new(metadata.format)).collect(),
+            source,
+            session,
         })
     }
 
-    /// Takes the next bytes, cut anywhere, and gives what they bring to `sink`.
+    /// Takes the next bytes of the first front end, cut anywhere, and gives what they bring to `sink`.
     ///
     /// # Errors
     /// Records that cannot be written.
-    pub fn take(&mut self, mut bytes: &[u8], sink: &mut dyn Sink) -> Result<(), ReceiveError> {
-        self.check.take(bytes);
-        while let Some(block) = self.source.next(&mut bytes) {
-            self.session.process(&block, sink)?;
+    pub fn take(&mut self, bytes: &[u8], sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        self.take_of(0, bytes, sink)
+    }
+
+    /// Takes the next bytes of a front end, cut anywhere. What lies before the end of what all front ends
+    /// have is worked on; the rest is kept in memory until the others have caught up.
+    ///
+    /// # Errors
+    /// A front end that is not there, records that cannot be written.
+    pub fn take_of(&mut self, number: usize, mut bytes: &[u8], sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        let have = self.checks.len();
+        let check = self.checks.get_mut(number).ok_or(ReceiveError::UnknownFrontEnd { number, have })?;
+        check.take(bytes);
+        match &mut self.source {
+            Input::One(source) => {
+                while let Some(block) = source.next(&mut bytes) {
+                    self.session.process(&[block], sink)?;
+                }
+            }
+            Input::Several { queues, block } => {
+                if let Some(queue) = queues.get_mut(number) {
+                    queue.push(bytes);
+                }
+                loop {
+                    let ends = self.session.ends(queues.first().map_or(0, Queue::samples) + *block);
+                    if queues.iter().zip(&ends).any(|(queue, end)| queue.end() < *end) {
+                        break;
+                    }
+                    take_blocks(&mut self.session, queues, &ends, sink)?;
+                }
+            }
         }
         Ok(())
     }
 
-    /// Samples taken so far, those of a block that is not full yet left out.
+    /// Samples of the first front end taken so far, those of a block that is not full yet left out.
     pub fn samples(&self) -> u64 {
-        self.source.samples()
+        match &self.source {
+            Input::One(source) => source.samples(),
+            Input::Several { queues, .. } => queues.first().map_or(0, Queue::samples),
+        }
+    }
+
+    /// Works on what is left, as far as all front ends have it; returns the bytes of samples that were cut.
+    fn take_rest(&mut self, sink: &mut dyn Sink) -> Result<usize, ReceiveError> {
+        match &mut self.source {
+            Input::One(source) => {
+                let (rest, cut_bytes) = source.rest();
+                if let Some(block) = rest {
+                    self.session.process(&[block], sink)?;
+                }
+                Ok(cut_bytes)
+            }
+            Input::Several { queues, .. } => {
+                let Some(first) = queues.first() else { return Ok(0) };
+                // The most samples of the first front end over which all have theirs: less than a block.
+                let (mut fits, mut too_far) = (first.samples(), first.end() + 1);
+                while too_far - fits > 1 {
+                    let middle = fits + (too_far - fits) / 2;
+                    let ends = self.session.ends(middle);
+                    let there = queues.iter().zip(&ends).all(|(queue, end)| queue.end() >= *end);
+                    if there { fits = middle } else { too_far = middle }
+                }
+                if fits > first.samples() {
+                    let ends = self.session.ends(fits);
+                    take_blocks(&mut self.session, queues, &ends, sink)?;
+                }
+                Ok(queues.iter().map(Queue::cut_bytes).sum())
+            }
+        }
     }
 
     /// Ends the reception: gives what is left to `sink` and returns what came of it.
@@ -249,20 +172,18 @@ impl Reception {
     /// # Errors
     /// Records that cannot be written.
     pub fn finish(mut self, sink: &mut dyn Sink) -> Result<Outcome, ReceiveError> {
-        let (rest, cut_bytes) = self.source.rest();
-        if let Some(block) = rest {
-            self.session.process(&block, sink)?;
-        }
+        let cut_bytes = self.take_rest(sink)?;
         self.session.search_rest(sink)?;
-        let (metadata, settings) = (&self.metadata, &self.settings);
-        let count = self.source.samples();
+        let Some(metadata) = self.metadata.first() else { return Err(ReceiveError::NoFrontEnd) };
+        let settings = &self.settings;
+        let count = self.samples();
         let seconds = metadata.rate.elapsed_s(count);
         let mut outcome = self.session.outcome();
         let findings = self.session.findings();
         outcome.samples = count;
         outcome.seconds = seconds;
         outcome.cut_bytes = cut_bytes;
-        outcome.format_warning = self.check.warning();
+        outcome.format_warning = self.checks.iter().find_map(Check::warning);
         if outcome.fixes == 0 {
             let stage = if self.session.has_searched() {
                 self.session.failed_stage()
@@ -282,9 +203,22 @@ impl Reception {
         } else {
             outcome.warnings.extend(findings);
         }
-        sink.finish(&summary(metadata, settings, &outcome))?;
+        sink.finish(&summary(&self.metadata, &self.session.signals(), settings, &outcome))?;
         Ok(outcome)
     }
+}
+
+/// Takes the samples before these ends from all queues through the session.
+fn take_blocks(
+    session: &mut Session,
+    queues: &mut [Queue],
+    ends: &[u64],
+    sink: &mut dyn Sink,
+) -> Result<(), ReceiveError> {
+    let blocks: Vec<Packed> = queues.iter().zip(ends).map(|(queue, end)| queue.block(*end)).collect();
+    session.process(&blocks, sink)?;
+    queues.iter_mut().zip(ends).for_each(|(queue, end)| queue.take(*end));
+    Ok(())
 }
 
 /// A receiver whose results are values: nothing is written.
@@ -325,6 +259,25 @@ impl Receiver {
         Reception::new(metadata, settings).map(|reception| Self { reception })
     }
 
+    /// A cold start on the samples of several front ends: see [`Reception::of_several`].
+    ///
+    /// # Errors
+    /// As [`Reception::of_several`].
+    pub fn of_several(metadata: &[IfMetadata], settings: &Settings) -> Result<Self, ReceiveError> {
+        Reception::of_several(metadata, settings).map(|reception| Self { reception })
+    }
+
+    /// Takes the next bytes of a front end, cut anywhere, and returns what they bring once all front ends
+    /// have come as far.
+    ///
+    /// # Errors
+    /// As [`Reception::take_of`].
+    pub fn push_of(&mut self, number: usize, bytes: &[u8]) -> Result<Vec<Record>, ReceiveError> {
+        let mut records = Vec::new();
+        self.reception.take_of(number, bytes, &mut records)?;
+        Ok(records)
+    }
+
     /// Takes the next bytes, cut anywhere, and returns what they bring, in the order in which the receiver
     /// found it.
     ///
@@ -348,24 +301,48 @@ impl Receiver {
 }
 
 /// Receives `samples`, packed as `metadata` says, from the first to the last, and gives everything to `sink`.
-/// `progress` is told the number of samples done after every block.
+/// `progress` gets the number of samples done after every block.
 ///
 /// # Errors
-/// Settings out of range, samples that cannot be searched or read, records that cannot be written. No fix is no error: see
-/// [`Outcome::diagnosis`].
+/// Settings out of range, samples that cannot be searched or read, records that cannot be written. No fix is
+/// no error: see [`Outcome::diagnosis`].
 pub fn receive<R: Read>(
     metadata: &IfMetadata,
-    mut samples: R,
+    samples: R,
     settings: &Settings,
     sink: &mut dyn Sink,
     progress: &mut dyn FnMut(u64),
 ) -> Result<Outcome, ReceiveError> {
-    let mut reception = Reception::new(metadata, settings)?;
+    receive_several(&mut [(metadata.clone(), samples)], settings, sink, progress)
+}
+
+/// [`receive`] of several front ends that share a clock: their streams are read in step, so that memory stays
+/// flat. The reception ends where the first of them does.
+///
+/// # Errors
+/// As [`receive`], and [`ReceiveError::NoFrontEnd`].
+pub fn receive_several<R: Read>(
+    front_ends: &mut [(IfMetadata, R)],
+    settings: &Settings,
+    sink: &mut dyn Sink,
+    progress: &mut dyn FnMut(u64),
+) -> Result<Outcome, ReceiveError> {
+    let metadata: Vec<IfMetadata> = front_ends.iter().map(|(metadata, _)| metadata.clone()).collect();
+    let mut reception = Reception::of_several(&metadata, settings)?;
     let mut bytes = vec![0; READ_BYTES];
+    let mut read_s = vec![0.0_f64; front_ends.len()];
     loop {
+        // The one that is least far.
+        let least = read_s.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1)).map(|(number, _)| number);
+        let Some(number) = least else { return reception.finish(sink) };
+        let Some((metadata, samples)) = front_ends.get_mut(number) else { return reception.finish(sink) };
         match samples.read(&mut bytes) {
             Ok(0) => return reception.finish(sink),
-            Ok(count) => reception.take(bytes.get(..count).unwrap_or_default(), sink)?,
+            Ok(count) => {
+                let bytes_a_second = metadata.format.bytes() as f64 * metadata.rate.hz();
+                read_s.iter_mut().skip(number).take(1).for_each(|read_s| *read_s += count as f64 / bytes_a_second);
+                reception.take_of(number, bytes.get(..count).unwrap_or_default(), sink)?;
+            }
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(error) => return Err(ReceiveError::Read { sample: reception.samples(), error }),
         }
@@ -374,17 +351,25 @@ pub fn receive<R: Read>(
 }
 
 /// What `receiver.json` says.
-fn summary(metadata: &IfMetadata, settings: &Settings, outcome: &Outcome) -> serde_json::Value {
+fn summary(
+    metadata: &[IfMetadata],
+    signals: &[Vec<&'static str>],
+    settings: &Settings,
+    outcome: &Outcome,
+) -> serde_json::Value {
     let names = |svs: &[Sv]| svs.iter().map(Sv::to_string).collect::<Vec<_>>();
-    json!({
-        "settings": settings,
-        "metadata": {
+    let of = |metadata: &IfMetadata| {
+        json!({
             "format": metadata.format.name(),
             "sample_rate_hz": metadata.rate.hz(),
             "center_hz": metadata.center_hz,
             "inverted": metadata.inverted,
             "start": metadata.start.map(|start| start.to_string()),
-        },
+        })
+    };
+    let mut summary = json!({
+        "settings": settings,
+        "metadata": metadata.first().map(of),
         "samples": outcome.samples,
         "seconds": outcome.seconds,
         "cut_bytes": outcome.cut_bytes,
@@ -403,7 +388,16 @@ fn summary(metadata: &IfMetadata, settings: &Settings, outcome: &Outcome) -> ser
         "conditioning": outcome.conditioning,
         "warnings": outcome.warnings,
         "diagnosis": outcome.diagnosis.as_ref().map(ToString::to_string),
-    })
+    });
+    if metadata.len() > 1 {
+        let each = metadata.iter().zip(signals).map(|(metadata, signals)| {
+            let mut front_end = of(metadata);
+            front_end["signals"] = json!(signals);
+            front_end
+        });
+        summary["front_ends"] = each.collect();
+    }
+    summary
 }
 
 #[cfg(test)]

@@ -20,9 +20,13 @@ use crate::receiver::track::{TrackingSettings, TrackingSettingsError};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
+    /// Search.
     pub acquisition: AcquisitionSettings,
+    /// Channels.
     pub tracking: TrackingSettings,
+    /// Position solution.
     pub position: PositionSettings,
+    /// Main loop.
     pub operation: OperationSettings,
 }
 
@@ -65,25 +69,68 @@ impl Default for OperationSettings {
 /// Why settings are refused. `origin` is the file's name, with line and column where they are known.
 #[derive(Debug, Error)]
 pub enum SettingsError {
+    /// A text that is no TOML, or a value of the wrong type.
     #[error("{origin}: {message}")]
-    Toml { origin: String, message: String },
+    Toml {
+        /// Name of the file, with line and column where they are known.
+        origin: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// A key that there is not.
     #[error("{origin}: unknown key '{}': expected {expected}", key.escape_debug())]
-    UnknownKey { origin: String, key: String, expected: String },
+    UnknownKey {
+        /// Name of the file, with line and column where they are known.
+        origin: String,
+        /// The key with its tables.
+        key: String,
+        /// What is expected in its place.
+        expected: String,
+    },
+    /// A value out of its range.
     #[error("{origin}: {key} = {value}: expected {expected}")]
-    Range { origin: String, key: &'static str, value: String, expected: String },
+    Range {
+        /// Name of the file, with line and column where they are known.
+        origin: String,
+        /// The key with its tables.
+        key: &'static str,
+        /// The value.
+        value: String,
+        /// What is expected in its place.
+        expected: String,
+    },
+    /// A setting of the search.
     #[error("{origin}: {source}")]
-    Acquisition { origin: String, source: AcquireError },
+    Acquisition {
+        /// Name of the file, with line and column where they are known.
+        origin: String,
+        /// What is wrong with it.
+        source: AcquireError,
+    },
+    /// A setting of the channels.
     #[error("{origin}: {source}")]
-    Tracking { origin: String, source: TrackingSettingsError },
+    Tracking {
+        /// Name of the file, with line and column where they are known.
+        origin: String,
+        /// What is wrong with it.
+        source: TrackingSettingsError,
+    },
+    /// A week reference that is no time.
     #[error("{origin}: operation.week_reference: {source}")]
-    Week { origin: String, source: TimeError },
+    Week {
+        /// Name of the file, with line and column where they are known.
+        origin: String,
+        /// What is wrong with it.
+        source: TimeError,
+    },
 }
 
 impl Settings {
     /// Reads a TOML text; `origin` names it in errors.
     ///
     /// # Errors
-    /// Text that is no TOML, an unknown key, a value of the wrong type or out of its range, each with its place.
+    /// Text that is no TOML, an unknown key, a value of the wrong type or out of its range, each with its
+    /// place.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SettingsError> {
         Self::read(text, origin, "", |text| toml::from_str(text))
     }
@@ -130,7 +177,7 @@ impl Settings {
         checked.map_err(|error| error.at(&Keys::new(origin, text), above))
     }
 
-    /// Reads a TOML table that stands in no text.
+    /// Reads a TOML table that is in no text.
     ///
     /// # Errors
     /// As [`Self::parse`], without places.
@@ -215,7 +262,7 @@ impl SettingsError {
         }
     }
 
-    /// The error with the place of its key in place of the file's name alone; settings stand below `above`.
+    /// The error with the place of its key in place of the file's name alone; settings are below `above`.
     fn at(mut self, keys: &Keys<'_>, above: &str) -> Self {
         let below = |key: String| if above.is_empty() { key } else { format!("{above}.{key}") };
         let (origin, key) = match &mut self {

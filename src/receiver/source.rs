@@ -1,7 +1,10 @@
-//! Samples as the receiver meets them: packed bytes, however they arrive, become blocks of a fixed number of samples.
+//! Samples as the receiver meets them: packed bytes, however they arrive, become blocks of a fixed number of
+//! samples.
 //!
 //! A [`Source`] keeps at most one unfinished block, so that memory stays flat however long the recording is.
-//! A sample cut off at the end of the stream is left out and its bytes are counted.
+//! A sample cut off at the end of the stream is left out and its bytes are counted. Of several front ends
+//! each has a [`Queue`]: blocks end where those of the first do, and it keeps what another has not caught up
+//! with.
 
 use std::ops::Range;
 
@@ -12,14 +15,18 @@ use crate::gnss::samples::Format;
 pub struct Block<'a> {
     /// Number of the first sample since the start of the recording.
     pub first: u64,
+    /// In-phase samples.
     pub i: &'a [f32],
+    /// Quadrature samples.
     pub q: &'a [f32],
 }
 
 /// Planar samples of some piece, kept to be filled again.
 #[derive(Clone, Debug, Default)]
 pub struct Planes {
+    /// In-phase samples.
     pub i: Vec<f32>,
+    /// Quadrature samples.
     pub q: Vec<f32>,
 }
 
@@ -43,7 +50,8 @@ impl Packed<'_> {
         self.first + self.samples() as u64
     }
 
-    /// The samples of `range`, counted from the first one and cut to those that are there, unpacked into `planes`.
+    /// The samples of `range`, counted from the first one and cut to those that are there, unpacked into
+    /// `planes`.
     pub fn unpack<'b>(&self, range: Range<usize>, planes: &'b mut Planes) -> Block<'b> {
         let size = self.format.bytes();
         let end = range.end.min(self.samples());
@@ -70,7 +78,7 @@ impl Source {
         Self { format, block_bytes: block_samples.max(1) * format.bytes(), kept: Vec::new(), samples: 0 }
     }
 
-    /// The next whole block of what was kept and what stands in `bytes`, which moves on; `None` when they hold no more.
+    /// The next whole block of what was kept and of `bytes`, which moves on; `None` when they hold no more.
     pub fn next<'a, 'b: 'a>(&'a mut self, bytes: &mut &'b [u8]) -> Option<Packed<'a>> {
         if self.kept.len() == self.block_bytes {
             self.kept.clear();
@@ -90,8 +98,8 @@ impl Source {
         Some(Packed { first, format: self.format, bytes: &self.kept })
     }
 
-    /// At the end of the stream: the whole samples of a block that was not filled, if there are any, and the bytes of a
-    /// sample that was cut off. More than none of the latter usually means a wrong format.
+    /// At the end of the stream: the whole samples of a block that was not filled, if there are any, and the
+    /// bytes of a sample that was cut off. More than none of the latter usually means a wrong format.
     pub fn rest(&mut self) -> (Option<Packed<'_>>, usize) {
         if self.kept.len() == self.block_bytes {
             self.kept.clear();
@@ -106,6 +114,62 @@ impl Source {
     /// Samples given out so far.
     pub fn samples(&self) -> u64 {
         self.samples
+    }
+}
+
+/// Packed samples of one front end among several, of which blocks are taken that end at given samples.
+#[derive(Debug)]
+pub struct Queue {
+    format: Format,
+    bytes: Vec<u8>,
+    /// Bytes at the front that were taken.
+    taken: usize,
+    samples: u64,
+}
+
+impl Queue {
+    /// Samples in `format`, none so far.
+    pub fn new(format: Format) -> Self {
+        Self { format, bytes: Vec::new(), taken: 0, samples: 0 }
+    }
+
+    /// Keeps the next bytes, cut anywhere.
+    pub fn push(&mut self, bytes: &[u8]) {
+        // Moved are at most as many bytes as were taken since the last time.
+        if self.taken > self.bytes.len() / 2 {
+            self.bytes.drain(..self.taken);
+            self.taken = 0;
+        }
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    /// Number of the sample after the last whole one that is kept.
+    pub fn end(&self) -> u64 {
+        self.samples + ((self.bytes.len() - self.taken) / self.format.bytes()) as u64
+    }
+
+    /// Number of the first sample that was not taken.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// The samples before `end` that were not taken, as far as they are there.
+    pub fn block(&self, end: u64) -> Packed<'_> {
+        let count = end.min(self.end()).saturating_sub(self.samples) as usize;
+        let bytes = self.bytes.get(self.taken..self.taken + count * self.format.bytes()).unwrap_or_default();
+        Packed { first: self.samples, format: self.format, bytes }
+    }
+
+    /// Takes the samples before `end`.
+    pub fn take(&mut self, end: u64) {
+        let count = end.min(self.end()).saturating_sub(self.samples);
+        self.samples += count;
+        self.taken += count as usize * self.format.bytes();
+    }
+
+    /// Bytes of a sample that the end of the stream cut off.
+    pub fn cut_bytes(&self) -> usize {
+        (self.bytes.len() - self.taken) % self.format.bytes()
     }
 }
 
@@ -154,5 +218,27 @@ mod tests {
         let part = packed.unpack(8..20, &mut planes);
         assert_eq!((part.first, part.i, part.q), (18, &[36.0, 38.0][..], &[37.0, 39.0][..]));
         assert_eq!((packed.first, packed.end()), (10, 20));
+    }
+
+    #[test]
+    fn a_queue_gives_the_samples_before_any_end_as_far_as_it_has_them() {
+        let bytes: Vec<u8> = (0..101).collect();
+        let mut planes = Planes::default();
+        for piece in [1, 2, 7, 101] {
+            let (mut queue, mut seen) = (Queue::new(Format::Ci8), Vec::new());
+            let mut ends = [3, 3, 20, 21, 44].into_iter().peekable();
+            for bytes in bytes.chunks(piece) {
+                queue.push(bytes);
+                while let Some(end) = ends.next_if(|end| *end <= queue.end()) {
+                    let block = queue.block(end);
+                    assert_eq!((block.first, block.end()), (seen.len() as u64, end));
+                    seen.extend_from_slice(block.unpack(0..usize::MAX, &mut planes).i);
+                    queue.take(end);
+                }
+            }
+            // What is left is cut to what is there: 50 samples and half of one.
+            assert_eq!((queue.samples(), queue.block(1000).end(), queue.cut_bytes()), (44, 50, 1));
+            assert!(seen.iter().enumerate().all(|(k, i)| *i == 2.0 * k as f32), "{piece}");
+        }
     }
 }

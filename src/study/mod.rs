@@ -7,6 +7,27 @@
 //! a motion. [`search`] draws what an acquisition would find, [`detection`] counts what the receiver's does
 //! find in samples. [`sweep`] runs studies that a file describes, on either. This is the only module that
 //! sees receiver, generator and judge at once; none of them sees it.
+//!
+//! ```
+//! use gnss_twin::study::sweep::spec::Study;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let text = r#"
+//!     name = "jitter"
+//!     level = "correlator"
+//!     repetitions = 8
+//!     keep = ["phase_sigma_deg"]
+//!
+//!     [[axis]]
+//!     key = "receiver.tracking.pll_bandwidth_hz"
+//!     values = [5, 10, 18]
+//! "#;
+//! let study = Study::parse(text, "jitter.toml")?;
+//! assert_eq!(study.axes.len(), 1);
+//! assert!(Study::parse(&text.replace("repetitions", "repetition"), "jitter.toml").is_err());
+//! # Ok(())
+//! # }
+//! ```
 
 #![warn(missing_docs)]
 

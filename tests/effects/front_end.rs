@@ -37,8 +37,9 @@ fn a_wall_loses_the_power_that_lies_outside() {
             let sum: f64 = i[period..].iter().zip(&sharp[period - delay..]).map(|(x, s)| f64::from(x * s)).sum();
             mean_db -= 10.0 * libm::log10(sum / period as f64) / 8.0;
         }
-        // Lines of a C/A code stand up to 4 dB off sinc²; over eight codes, with the edge of a twentieth of the width at
-        // the null or in side lobes, 0.02 dB are left. The samples' aliases add 1 / (3 · 40) of the power outside.
+        // Lines of a C/A code stand up to 4 dB off sinc²; over eight codes, with the edge of a twentieth of
+        // the width at the null or in side lobes, 0.02 dB are left. The samples' aliases add 1 / (3 · 40) of
+        // the power outside.
         assert!((mean_db - expected_db).abs() < 0.02, "{bandwidth_hz} Hz: {mean_db} dB, expected {expected_db}");
     }
 }

@@ -64,8 +64,8 @@ fn line(samples: &[(f64, f64)], cycles: i64) -> f64 {
     (re * re + im * im) / (n * n) as f64
 }
 
-/// Fresnel's C(x) + jS(x): power series below 3.5 (terms up to e^19, 2e-8 lost), auxiliary functions above (Abramowitz and
-/// Stegun 7.3.9, 7.3.27; the first terms left out are 3e-6 of 1/πx).
+/// Fresnel's C(x) + jS(x): power series below 3.5 (terms up to e^19, 2e-8 lost), auxiliary functions above
+/// (Abramowitz and Stegun 7.3.9, 7.3.27; the first terms left out are 3e-6 of 1/πx).
 fn fresnel(x: f64) -> (f64, f64) {
     let z = x.abs();
     let a = 0.5 * PI * z * z;
@@ -179,8 +179,8 @@ fn a_pulse_train_has_the_lines_of_a_sampled_rectangle_and_jitter_takes_them_away
         let found = line(&regular, 1000 * k);
         assert!((found - expected).abs() < 1e-8, "{k}: {found} {expected}");
     }
-    // Late by a uniform share of 0.8 of a period: a line k keeps sinc²(0.8k); what is left of 1000 random phases adds
-    // 1/1000 of the rest, exponentially distributed: 12 times that is passed with 6e-6.
+    // Late by a uniform share of 0.8 of a period: a line k keeps sinc²(0.8k); what is left of 1000 random
+    // phases adds 1/1000 of the rest, exponentially distributed: 12 times that is passed with 6e-6.
     let jittered = pulses(0.8);
     for k in [1_i64, 2, 3] {
         let whole = line(&regular, 1000 * k);
@@ -210,8 +210,8 @@ fn band_limited_noise_is_flat_inside_its_band_and_absent_outside() {
     for (f_hz, found) in density(&samples, rate_hz) {
         let from = (f_hz - 1.5e6).abs() / 1e6;
         let db = 10.0 * libm::log10(found * 2e6);
-        // 8190 half-overlapping segments count as 7700 (Hann): 0.05 dB a bin; five of them. The filter's slope is
-        // ±0.09 of an edge, a bin 0.04, the window's main lobe two bins.
+        // 8190 half-overlapping segments count as 7700 (Hann): 0.05 dB a bin; five of them. The filter's
+        // slope is ±0.09 of an edge, a bin 0.04, the window's main lobe two bins.
         if from < 0.8 {
             assert!(db.abs() < 0.25, "{f_hz}: {db}");
         } else if from > 1.2 {
@@ -259,7 +259,8 @@ fn a_recording_at_the_samples_own_rate_comes_back_and_repeats() {
         let samples = alone(&scene, 0, 20_000);
         for (k, (i, q)) in samples.iter().enumerate() {
             let (sin, cos) = libm::sincos(TAU * k as f64 * file_hz / rate_hz / 20.0);
-            // The pass band's ripple of an 80 dB window, and the interpolation between 256 phases: 2e-4 and 2e-5.
+            // The pass band's ripple of an 80 dB window, and the interpolation between 256 phases: 2e-4 and
+            // 2e-5.
             assert!((i - cos).abs() < 1e-3 && (q - sin).abs() < 1e-3, "{file_hz} {k}: {i} {cos}");
         }
     }
@@ -365,7 +366,8 @@ fn an_emitter_at_a_place_weakens_with_distance_and_shifts_with_the_receiver_s_os
     let shifted = scene.interference[0].row(1, 2_600_000).unwrap().frequency_hz;
     // Of the carrier at RF, by 1/(1 + 1e-6).
     assert!((shifted - 1e5 + 1_575.52).abs() < 0.01, "{shifted}");
-    // A receiver that climbs towards it at 100 m/s: after 5 s of 10 half the distance and 6.02 dB; Doppler v/λ.
+    // A receiver that climbs towards it at 100 m/s: after 5 s of 10 half the distance and 6.02 dB; Doppler
+    // v/λ.
     let at = |height_m: f64| Geodetic::from_degrees(26.5, 80.2, height_m).to_ecef();
     let velocity_mps = (at(1120.0) - at(120.0)) / 10.0;
     let knot = |t_s: f64| Knot {

@@ -1,4 +1,5 @@
-//! The laws of every effect and stage: zero strength is absence, and bytes depend on nothing but scene and seed.
+//! The laws of every effect and stage: zero strength is absence, and bytes depend on nothing but scene and
+//! seed.
 
 use std::path::Path;
 
@@ -66,7 +67,8 @@ const TABLES: &[(&str, Option<&str>)] = &[
         "[[message_fault]]\nkind = \"bit_errors\"\nrate = 0.3",
         Some("[[message_fault]]\nkind = \"bit_errors\"\nrate = 0"),
     ),
-    // The fault begins at 58.00 s of the minute, and what is sent to 58.05 s is bits 21 to 23 of word 7 of subframe 5.
+    // The fault begins at 58.00 s of the minute, and what is sent to 58.05 s is bits 21 to 23 of word 7 of
+    // subframe 5.
     ("[[message_fault]]\nkind = \"bit\"\nsubframe = 5\nword = 7\nbit = 22", None),
     ("[noise]\n[adc]\nbits = 2\nagc_window_s = 0.004", None),
 ];

@@ -8,8 +8,8 @@ use gnss_twin::receiver::track::TrackingSettings;
 
 use super::single::{scene, track};
 
-/// A satellite that is 10 dB stronger for two seconds and fades to its strength over the third, so that the pull-in, whose
-/// threshold lies near 31 dB-Hz, is no part of what is measured.
+/// A satellite that is 10 dB stronger for two seconds and fades to its strength over the third, so that the
+/// pull-in, whose threshold lies near 31 dB-Hz, is no part of what is measured.
 struct Beginning {
     start: Epoch,
 }
@@ -80,6 +80,7 @@ fn a_spinning_antenna_is_followed_and_counted_turn_by_turn() {
     let find = |sample: u64| unspun.iter().find(|(truth, _)| truth.sample == sample).unwrap().0.carrier_cycles;
     let turns = truth - (find(late.sample) - find(early.sample));
     let elapsed_s = (late.sample - early.sample) as f64 / 2.6e6;
-    // The satellite stands near the nose: the carrier runs ahead by a cycle a turn. It moves 1e-4 rad a second.
+    // The satellite stands near the nose: the carrier runs ahead by a cycle a turn. It moves 1e-4 rad a
+    // second.
     assert!((turns + spin_hz * elapsed_s).abs() < 1e-2, "{turns} in {elapsed_s} s");
 }

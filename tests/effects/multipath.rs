@@ -14,8 +14,9 @@ const WAVELENGTH_M: f64 = 0.190_293_672_8;
 /// The satellite near the zenith of static.toml.
 const SV: u8 = 23;
 
-/// Error of an early-late loop with one echo of amplitude `a` (negative in anti-phase) after `delay` chips, unlimited
-/// bandwidth and spacing `d`: the zero of |E| − |L| on the sides of two triangles (van Nee 1993; Braasch 1996).
+/// Error of an early-late loop with one echo of amplitude `a` (negative in anti-phase) after `delay` chips,
+/// unlimited bandwidth and spacing `d`: the zero of |E| − |L| on the sides of two triangles (van Nee 1993;
+/// Braasch 1996).
 fn envelope_chips(a: f64, delay: f64, d: f64) -> f64 {
     if delay <= 0.5 * (1.0 + a) * d {
         a * delay / (1.0 + a)
@@ -54,8 +55,9 @@ fn the_code_loop_s_error_keeps_to_the_envelope_of_theory() {
                 assert_eq!(late.len(), 4, "not locked");
                 let mean_m = late.iter().sum::<f64>() / 4.0;
                 let expected_m = envelope_chips(a, excess_m / CHIP_M, spacing_chips) * CHIP_M;
-                // Chips sampled at 11.44 a chip put an edge within 1.1 m by a sample, of which the 512 edges of a period
-                // leave 1.1/√512 = 0.05 m; the loop has had at least ten of its time constants (0.05 s).
+                // Chips sampled at 11.44 a chip put an edge within 1.1 m by a sample, of which the 512 edges
+                // of a period leave 1.1/√512 = 0.05 m; the loop has had at least ten of its time constants
+                // (0.05 s).
                 worst = worst.max((mean_m - expected_m).abs());
                 assert!(
                     (mean_m - expected_m).abs() < 0.3,
@@ -94,7 +96,8 @@ fn a_ground_reflection_fades_with_the_period_of_its_geometry() {
         // Degrees are printed in full; the wavelength above has ten digits: 7 m of 2e-11.
         assert!((ray.excess_m - excess_m).abs() < 1e-6 && (miss - miss.round()).abs() < 1e-5, "{ray:?} {cycles}");
     }
-    // Power of the sum where the code loop (0.5 chip) puts its prompt; the estimate lags by its mean of 0.5 s.
+    // Power of the sum where the code loop (0.5 chip) puts its prompt; the estimate lags by its mean of 0.5
+    // s.
     let (mut sum, mut count, mut least, mut most) = (0.0, 0, f64::MAX, f64::MIN);
     for (truth, measured) in pairs.iter().filter(|(truth, _)| truth.sample > 5 * 2_600_000) {
         let (_, excess_m, cycles) = expected.iter().find(|row| row.0 == truth.sample).unwrap();
@@ -114,8 +117,8 @@ fn a_ground_reflection_fades_with_the_period_of_its_geometry() {
         let miss = measured.cn0_dbhz - expected_dbhz;
         (sum, count) = (sum + miss, count + 1);
         (least, most) = (least.min(measured.cn0_dbhz), most.max(measured.cn0_dbhz));
-        // 0.14 dB rms of a second's estimate at 40 dB-Hz and more, 0.2 of half a second's, five sigma; half a second of
-        // lag at 20 s a fade and 9.5 dB of swing is at most 0.5 dB more where the fade is deepest.
+        // 0.14 dB rms of a second's estimate at 40 dB-Hz and more, 0.2 of half a second's, five sigma; half a
+        // second of lag at 20 s a fade and 9.5 dB of swing is at most 0.5 dB more where the fade is deepest.
         assert!(miss.abs() < 1.5, "{miss} at {}", truth.sample);
     }
     let mean_db = sum / f64::from(count);

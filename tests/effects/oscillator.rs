@@ -1,10 +1,11 @@
-//! The oscillator's noise has the Allan deviation of its power law, wherever and in whatever order it is drawn.
+//! The oscillator's noise has the Allan deviation of its power law, wherever and in whatever order it is
+//! drawn.
 
 use std::f64::consts::{LN_2, PI};
 
+use gnss_twin::generator::clock::nodes::node_samples;
+use gnss_twin::generator::clock::oscillator::{Oscillator, PowerLaw};
 use gnss_twin::generator::random::Stream;
-use gnss_twin::generator::ripple::node_samples;
-use gnss_twin::generator::ripple::oscillator::{Oscillator, PowerLaw};
 use gnss_twin::gnss::time::Rate;
 
 fn rate() -> Rate {
@@ -31,8 +32,8 @@ fn allan(phase_s: &[f64], tau0_s: f64, m: usize) -> f64 {
     (sum / (2.0 * (m as f64 * tau0_s).powi(2) * (phase_s.len() - 2 * m) as f64)).sqrt()
 }
 
-/// The power laws, one at a time, with the Allan variance of each (SP 1065, table 3) as a factor and a power of the
-/// averaging time, for an upper cut-off `f_h`.
+/// The power laws, one at a time, with the Allan variance of each (SP 1065, table 3) as a factor and a power
+/// of the averaging time, for an upper cut-off `f_h`.
 fn laws(f_h: f64) -> [(&'static str, PowerLaw, (f64, i32)); 4] {
     let none = PowerLaw::default();
     [
@@ -58,9 +59,10 @@ fn the_allan_deviation_is_that_of_the_power_law_from_a_millisecond_to_minutes() 
             for m in [1, 4, 16, 64] {
                 let tau_s = m as f64 * tau0_s;
                 let ratio = allan(phase, tau0_s, m) / (factor * tau_s.powi(power)).sqrt();
-                // Some N / m independent second differences at least, of which the deviation's relative error is
-                // 1 / √(2 N / m): five sigma. Flicker: 0.3 % of ripple, and at the shortest interval the poles end
-                // at four nodes' worth of frequency, and a path through nodes has no more above (measured: 20 %).
+                // Some N / m independent second differences at least, of which the deviation's relative error
+                // is 1 / √(2 N / m): five sigma. Flicker: 0.3 % of ripple, and at the shortest interval the
+                // poles end at four nodes' worth of frequency, and a path through nodes has no more above
+                // (measured: 20 %).
                 let scatter = 5.0 * (m as f64 / (2.0 * phase.len() as f64)).sqrt();
                 let model = match (name, m) {
                     ("flicker FM", 1) if tau0_s < 0.01 => 0.2,

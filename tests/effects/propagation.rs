@@ -68,7 +68,8 @@ fn bytes_depend_neither_on_threads_nor_on_the_cut() {
 
 #[test]
 fn slopes_that_step_cost_few_knots() {
-    // Twenty minutes of sky at a low rate: what the maps' bilinear cells cost against the bicubic surface and against none.
+    // Twenty minutes of sky at a low rate: what the maps' bilinear cells cost against the bicubic surface and
+    // against none.
     let knots = |lines: &str| {
         let text = format!("{BASE}{lines}").replace("duration_s = 0.3", "duration_s = 1200").replace("2.6e6", "1.5e6");
         let scenario = Scenario::parse(&text, "knots").unwrap();
@@ -100,7 +101,8 @@ fn slopes_that_step_cost_few_knots() {
     let bilinear = knots(IONEX).0;
     let bicubic = knots(&format!("{IONEX}interpolation = \"bicubic\"\n")).0;
     println!("{roots} roots: {none} parts without, {bilinear} bilinear, {bicubic} bicubic");
-    // A kink of the slope halves one root down to the length at which it no longer shows, once in some minutes.
+    // A kink of the slope halves one root down to the length at which it no longer shows, once in some
+    // minutes.
     assert!(none <= bicubic && bicubic <= bilinear && bilinear < 2 * none, "{none} {bicubic} {bilinear}");
 }
 
@@ -156,13 +158,14 @@ fn a_receiver_that_corrects_by_the_broadcast_is_left_with_what_nature_adds_to_it
         let mean = |of: fn(&(f64, f64, f64)) -> f64| rows.iter().map(of).sum::<f64>() / rows.len() as f64;
         let (held_m, map_m, corrected_m) = (mean(|r| r.0), mean(|r| r.1), mean(|r| r.2));
         println!("{sv}: in the samples {held_m:.2} m, map {map_m:.2} m, broadcast {corrected_m:.2} m");
-        // 0.8 m rms of code at the strongest, 1.6 m at 38 dB-Hz; a loop of 0.5 Hz forgets within 1 s, so 30 s are 30
-        // samples: 0.15 to 0.3 m, of which four.
+        // 0.8 m rms of code at the strongest, 1.6 m at 38 dB-Hz; a loop of 0.5 Hz forgets within 1 s, so 30 s
+        // are 30 samples: 0.15 to 0.3 m, of which four.
         let bound_m = if map_m > 6.0 { 1.2 } else { 0.6 };
         assert!((held_m - map_m).abs() < bound_m, "{sv}: {held_m} {map_m}");
         largest_m = largest_m.max((map_m - corrected_m).abs());
     }
-    // The two differ by metres, and so does the position: a common part goes into the clock, the rest into height.
+    // The two differ by metres, and so does the position: a common part goes into the clock, the rest into
+    // height.
     assert!(largest_m > 1.0, "{largest_m}");
     let truth_m = place.to_ecef();
     let up = place.ecef_to_enu();
@@ -174,7 +177,8 @@ fn a_receiver_that_corrects_by_the_broadcast_is_left_with_what_nature_adds_to_it
     assert!(!errors.is_empty());
     let mean = errors.iter().sum::<nalgebra::Vector3<f64>>() / errors.len() as f64;
     println!("mean error east {:.2}, north {:.2}, up {:.2} m", mean.x, mean.y, mean.z);
-    // The static scene, whose broadcast is the truth, is within 0.1 m. A PDOP of at most 3 bounds the other side.
+    // The static scene, whose broadcast is the truth, is within 0.1 m. A PDOP of at most 3 bounds the other
+    // side.
     assert!((0.3..3.0 * largest_m).contains(&mean.norm()), "{mean}");
 }
 

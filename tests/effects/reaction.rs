@@ -57,8 +57,9 @@ fn the_oscillator_adds_to_the_phase_loop_what_its_power_law_says() {
         let system = carrier_loop(&settings, Mode::Phase, update_s).linear();
         let added = oscillator::jitter_discrete_rad(&law, L1_HZ, &system, update_s) / TAU;
         let found = (noisy.0.powi(2) - quiet.0.powi(2)).sqrt();
-        // Errors of a loop of B Hz are alike for about 1/(2B): of 30 s, so many are independent, and a deviation of
-        // N values scatters by 1/√(2N); four of that. Flicker and walk are inside the loop's band no slower than B.
+        // Errors of a loop of B Hz are alike for about 1/(2B): of 30 s, so many are independent, and a
+        // deviation of N values scatters by 1/√(2N); four of that. Flicker and walk are inside the loop's
+        // band no slower than B.
         let independent = f64::min(noisy.1 as f64, 2.0 * bandwidth_hz * 30.0);
         let scatter = 4.0 / (2.0 * independent).sqrt();
         let ratio = found / added;
@@ -88,8 +89,9 @@ fn a_converter_of_few_bits_costs_the_receiver_what_its_levels_cost() {
     for (bits, left) in [(1, 2.0 / std::f64::consts::PI), (2, 0.8825), (4, 0.9885)] {
         let lost = exact - cn0("ci8", &format!("[adc]\nbits = {bits}\n"));
         let expected = -10.0 * libm::log10(left);
-        // The same noise on both: what remains is the estimate's own scatter, over 27 s of 1 ms prompts at 45 dB-Hz
-        // √(1/27000 · (1 + 2·31.6)/31.6²) = 0.15 %, twice, and rounding's own independent part, 4σ in all 0.04 dB.
+        // The same noise on both: what remains is the estimate's own scatter, over 27 s of 1 ms prompts at 45
+        // dB-Hz √(1/27000 · (1 + 2·31.6)/31.6²) = 0.15 %, twice, and rounding's own independent part, 4σ in
+        // all 0.04 dB.
         assert!((lost - expected).abs() < 0.05, "{bits} bits: {lost:.3} dB lost, {expected:.3} expected");
     }
 }
@@ -157,7 +159,8 @@ fn scintillation_is_found_again_in_the_samples() {
         let origin = mean(&phase);
         let turned = mean(&phase.iter().map(|p| libm::remainder(p - origin, TAU).powi(2)).collect::<Vec<_>>()).sqrt();
         let found = spread / middle;
-        // 600 decorrelation times each way; a spread of 600 values scatters by 2.9 %: 10 % are more than three sigma.
+        // 600 decorrelation times each way; a spread of 600 values scatters by 2.9 %: 10 % are more than
+        // three sigma.
         assert!((found / s4 - 1.0).abs() < 0.1, "S4 {found:.3}, set {s4}");
         assert!((turned / sigma_phi_rad - 1.0).abs() < 0.1, "phase {turned:.3} rad, set {sigma_phi_rad}");
     }

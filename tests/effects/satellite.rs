@@ -1,5 +1,5 @@
-//! The satellites' side: precise orbits and clocks as truth, faults of clocks, orbits and messages, and what a receiver
-//! makes of them.
+//! The satellites' side: precise orbits and clocks as truth, faults of clocks, orbits and messages, and what
+//! a receiver makes of them.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -73,14 +73,15 @@ fn positions_and_clocks_withheld_from_the_interpolation_come_out_of_it() {
     }
     let largest = misses.iter().copied().fold(0.0, f64::max);
     println!("{} withheld: rms {:.4} m, largest {largest:.4} m", misses.len(), rms(&misses));
-    // Of 2e5 m at ω = 3.6e-4 rad/s twelve nodes 1800 s apart miss 17 µm · 2¹² = 0.07 m. At 900 s, where a scene
-    // works, that is 4096 times less and the printed millimetre remains.
+    // Of 2e5 m at ω = 3.6e-4 rad/s twelve nodes 1800 s apart miss 17 µm · 2¹² = 0.07 m. At 900 s, where a
+    // scene works, that is 4096 times less and the printed millimetre remains.
     assert!(misses.len() > 700 && rms(&misses) < 0.03 && largest < 0.07);
     println!("{} clocks withheld: rms {:.3} m", late.len(), rms(&late));
-    // White frequency noise of σ_y(1 s) = 7e-12 (rubidium) to 2e-11 (caesium) spreads the middle of a bridge of 1800 s by
-    // σ_y √450 s · c: 0.04 to 0.13 m.
+    // White frequency noise of σ_y(1 s) = 7e-12 (rubidium) to 2e-11 (caesium) spreads the middle of a bridge
+    // of 1800 s by σ_y √450 s · c: 0.04 to 0.13 m.
     assert!(late.len() > 700 && rms(&late) < 0.13, "{}", rms(&late));
-    // At its own epochs the table comes back to the rounding of twelve products, and pieces meet there with equal speeds.
+    // At its own epochs the table comes back to the rounding of twelve products, and pieces meet there with
+    // equal speeds.
     let orbits = Orbits::new(&whole, |_| Some(BARE)).unwrap();
     let (mut met, mut kink) = (0, 0.0_f64);
     for (sv, samples) in &whole.satellites {
@@ -97,8 +98,9 @@ fn positions_and_clocks_withheld_from_the_interpolation_come_out_of_it() {
         }
     }
     println!("{met} epochs, speeds differ by {:.1} µm/s at most", 1e6 * kink);
-    // Neighbours differ by the table's twelfth difference times 12 · 5!² / 12! / 900 s = 4e-7 of it a second; five millimetres
-    // of noise have one of √C(24, 12) times that, 8 m, and one in thousands four times as much.
+    // Neighbours differ by the table's twelfth difference times 12 · 5!² / 12! / 900 s = 4e-7 of it a second;
+    // five millimetres of noise have one of √C(24, 12) times that, 8 m, and one in thousands four times as
+    // much.
     assert!(met > 2000 && kink < 2e-5, "{kink}");
 }
 
@@ -128,8 +130,8 @@ fn precise_truth_and_broadcast_are_a_metre_or_two_apart_in_orbit_and_in_clock() 
         clocks.extend(offsets.iter().map(|offset| offset - mean));
     }
     println!("orbit {:.2} m rms, clock {:.2} m rms", rms(&orbit), rms(&clocks));
-    // tests/witness/orbit.rs finds 1.84 m and 1.11 m at the table's epochs, with sets that do not hand over smoothly. Relativity
-    // left out, or of the wrong sign, would leave the clocks metres apart.
+    // tests/witness/orbit.rs finds 1.84 m and 1.11 m at the table's epochs, with sets that do not hand over
+    // smoothly. Relativity left out, or of the wrong sign, would leave the clocks metres apart.
     assert!((1.4..2.1).contains(&rms(&orbit)) && (0.5..1.3).contains(&rms(&clocks)));
 }
 
@@ -169,8 +171,8 @@ fn ranges_of_the_broadcast_miss_precise_ones_like_those_of_real_receivers() {
         misses.extend(epoch.iter().map(|miss| miss - mean));
     }
     println!("{} ranges: {:.2} m rms about each epoch's mean", misses.len(), rms(&misses));
-    // The signal-in-space error of GPS in 2010, about 1 m rms; five real stations of other days leave 0.4 to 0.6 m after a
-    // position is solved for.
+    // The signal-in-space error of GPS in 2010, about 1 m rms; five real stations of other days leave 0.4 to
+    // 0.6 m after a position is solved for.
     assert!(misses.len() > 40 && (0.4..1.8).contains(&rms(&misses)));
 }
 
@@ -206,7 +208,8 @@ fn a_clock_s_step_is_in_the_pseudorange_in_full_and_in_the_doppler_not_at_all() 
     };
     let (before_m, after_m) = (mean(1.0, 2.0), mean(4.5, 6.0));
     println!("code error {before_m:.2} m before, {after_m:.2} m after a step of {step_m:.2} m");
-    // 55 dB-Hz leaves 0.25 m in a loop of 0.5 Hz, of which two to three independent values are averaged: four sigma.
+    // 55 dB-Hz leaves 0.25 m in a loop of 0.5 Hz, of which two to three independent values are averaged: four
+    // sigma.
     assert!(before_m.abs() < 0.7 && after_m.abs() < 0.9, "{before_m} {after_m}");
 }
 
@@ -265,7 +268,8 @@ fn bits_are_wrong_as_often_as_asked_and_where_the_samples_say() {
     }
     println!("{wrong} of 300000 bits wrong, {refused} of 1000 subframes refused");
     assert!((wrong as f64 - 600.0).abs() < 4.0 * 24.5);
-    // A subframe is whole with (1 − 2e-3)^300 = 0.548: 452 ± 16 refused; fewer than four wrong bits of a word never pass.
+    // A subframe is whole with (1 − 2e-3)^300 = 0.548: 452 ± 16 refused; fewer than four wrong bits of a word
+    // never pass.
     assert!((f64::from(refused) - 452.0).abs() < 4.0 * 15.7);
 
     // Through the samples: every bit as sent, and as many of them other than encoded as were flipped.
@@ -362,7 +366,8 @@ fn a_receiver_of_broadcast_orbits_in_a_precise_sky_is_a_metre_or_two_off_and_exc
     let reduced: Vec<f64> = fixes.iter().map(|(_, fix, _)| fix.chi_square / f64::from(fix.satellites - 4)).collect();
     let reduced = reduced.iter().sum::<f64>() / reduced.len() as f64;
     println!("mean error {mean:.2} m, chi-square over its freedom {reduced:.3}");
-    // Ranges 1 m rms apart, a PDOP of 1.5 to 2 for twelve satellites; the static scene, where there is no difference, has 0.1 m.
+    // Ranges 1 m rms apart, a PDOP of 1.5 to 2 for twelve satellites; the static scene, where there is no
+    // difference, has 0.1 m.
     assert!((0.3..4.0).contains(&mean), "{mean}");
     // Expected at 1.5 m at the zenith and more below; 1 m rms would be 0.2.
     assert!((0.02..1.0).contains(&reduced), "{reduced}");
@@ -379,7 +384,8 @@ fn each_fault_of_the_satellites_is_met_by_what_should_meet_it() {
     let fixes = misses_m(run);
     let events: Vec<EventRow> = rows(run, "rx/events.csv");
     let at_s = |row: &EventRow| row.sample as f64 / 2.6e6;
-    // Health goes out with subframe 1, every 30 s from 2 s on, and is read at its end, or with the first whole ephemeris.
+    // Health goes out with subframe 1, every 30 s from 2 s on, and is read at its end, or with the first
+    // whole ephemeris.
     let said = |event: Event| -> Vec<(Sv, f64)> {
         events.iter().filter(|row| row.event == event).map(|row| (row.sv, at_s(row))).collect()
     };
@@ -403,7 +409,8 @@ fn each_fault_of_the_satellites_is_met_by_what_should_meet_it() {
             share("G03", from_s, to_s)
         );
     }
-    // The step stands out when the smoothed code has taken up a metre or two of its 30, of which it takes 1 m a second.
+    // The step stands out when the smoothed code has taken up a metre or two of its 30, of which it takes 1 m
+    // a second.
     assert!(share("G13", 30.0, 44.5) == 0.0 && share("G13", 50.0, 80.0) > 0.95);
     // The ramp, 0.6 m/s, does so within some seconds.
     assert!(share("G03", 30.0, 60.0) == 0.0 && share("G03", 72.0, 80.0) > 0.95);
@@ -428,7 +435,8 @@ fn each_fault_of_the_satellites_is_met_by_what_should_meet_it() {
         events.iter().find(of).map_or(f64::INFINITY, at_s)
     };
     assert!(complete(23) < 25.0 && complete(16) > 25.0, "{} {}", complete(23), complete(16));
-    // Nothing decoded was never sent; of the satellite with bit errors no subframe with a wrong word was taken.
+    // Nothing decoded was never sent; of the satellite with bit errors no subframe with a wrong word was
+    // taken.
     assert_eq!(summary.pointer("/navigation/parameters_wrong").and_then(Value::as_f64), Some(0.0), "{summary}");
     let sent: Vec<NavigationRow> = rows(run, "truth/navigation.csv");
     assert!(sent.iter().any(|row| row.sv == Sv::gps(6) && row.parameter == "health" && row.raw == 63));

@@ -126,7 +126,8 @@ fn effective_cn0_is_that_of_spectral_separation_from_0_to_50_db() {
             let bar = if js_db < 45.0 { 0.5 } else { 2.5 };
             assert!((found - expected).abs() < bar, "{name} {js_db}: {found} {expected}");
         }
-        // Free of the signal's uncertainty, and so for any J/S: the interference's own power behind a correlator of 1 ms.
+        // Free of the signal's uncertainty, and so for any J/S: the interference's own power behind a
+        // correlator of 1 ms.
         let power = jammer.iter().map(|z| z.0 * z.0 + z.1 * z.1).sum::<f64>() / jammer.len() as f64;
         let received = 2.0 * libm::pow(10.0, 4.5) * f64::from(quiet.noise_lsb).powi(2) / rate_hz;
         let kappa = 10.0 * libm::log10(power / received * 1e-3);
@@ -137,8 +138,8 @@ fn effective_cn0_is_that_of_spectral_separation_from_0_to_50_db() {
 
 #[test]
 fn a_cw_on_a_line_of_the_code_is_a_constant_and_between_lines_it_is_what_the_code_s_spectrum_says() {
-    // PRN 6's strongest line: −21.29 dB at −227 kHz; at J/S 20 and 30 dB it is 0.86 and 2.73 of the signal (computed outside
-    // this project; confirmed there by simulation as 0.86 and 2.72).
+    // PRN 6's strongest line: −21.29 dB at −227 kHz; at J/S 20 and 30 dB it is 0.86 and 2.73 of the signal
+    // (computed outside this project; confirmed there by simulation as 0.86 and 2.72).
     let rate_hz = 5e6;
     let code = l1ca::code(6).unwrap();
     let spectrum = |f_hz: f64| {

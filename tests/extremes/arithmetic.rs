@@ -36,8 +36,9 @@ impl Double {
     }
 }
 
-/// Largest error of the receiver's sums in f64, one sample after the other, in standard deviations of their noise: against
-/// phases by multiplication in 128 bits, sines of a quarter turn at most, and sums in pairs of doubles.
+/// Largest error of the receiver's sums in f64, one sample after the other, in standard deviations of their
+/// noise: against phases by multiplication in 128 bits, sines of a quarter turn at most, and sums in pairs of
+/// doubles.
 pub fn twin_error(count: usize) -> f64 {
     let code = l1ca::code(9).unwrap();
     let replica = Replica::new(code.clone(), Edge::Nearest).unwrap();
@@ -73,7 +74,8 @@ pub fn twin_error(count: usize) -> f64 {
     worst
 }
 
-/// Largest error of a correlation of `count` samples with a constant of `dc` in them, in standard deviations of its noise.
+/// Largest error of a correlation of `count` samples with a constant of `dc` in them, in standard deviations
+/// of its noise.
 pub fn sum_error(arithmetic: Arithmetic, count: usize, dc: f32) -> f64 {
     let replica = Replica::new(l1ca::code(9).unwrap(), Edge::Area).unwrap();
     let mut worst = 0.0_f64;
@@ -99,8 +101,9 @@ pub fn sum_error(arithmetic: Arithmetic, count: usize, dc: f32) -> f64 {
 fn long_sums_of_single_precision_stay_far_below_the_noise() {
     let the = case(44, "f32 and f64 accumulators");
     for (count, dc) in [(50_000, 0.0), (1_000_000, 0.0), (50_000, 10.0), (1_000_000, 10.0)] {
-        // Products are rounded to 6e-8 of themselves, in blocks that are added in f64: a walk of 6e-8 · √(1 + DC²) noises,
-        // and a carrier within 1e-6 turn of the exact one in a block, 6.3e-6 rad of what the DC leaves.
+        // Products are rounded to 6e-8 of themselves, in blocks that are added in f64: a walk of 6e-8 · √(1 +
+        // DC²) noises, and a carrier within 1e-6 turn of the exact one in a block, 6.3e-6 rad of what the DC
+        // leaves.
         let bar = 1e-5 * (1.0 + f64::from(dc));
         let name = format!("f32, {count} samples, DC of {dc} σ: error over the sum's noise");
         the.at_most(&name, sum_error(Arithmetic::F32, count, dc), bar, "");
@@ -122,8 +125,8 @@ fn full_scale_for_a_second_overflows_nothing() {
     let expected = 127.0 * count as f64;
     for (name, arithmetic) in [("i16", Arithmetic::I16), ("f32", Arithmetic::F32)] {
         let [sum] = replica.correlate_in(arithmetic, (&i, &q), &nco, &[0]);
-        // Nearest chips of the two may fall on the other side of an edge once in a while, 2 in 1e5; a wrapped integer would
-        // miss by all.
+        // Nearest chips of the two may fall on the other side of an edge once in a while, 2 in 1e5; a wrapped
+        // integer would miss by all.
         the.at_most(
             &format!("{name}: sum of 2e6 full-scale products, relative"),
             (sum.re / expected - 1.0).abs(),
@@ -137,7 +140,8 @@ fn full_scale_for_a_second_overflows_nothing() {
 fn epochs_of_prime_and_odd_lengths_give_the_same_peaks() {
     let the = case(46, "FFT lengths");
     let (mut held, mut same, mut of) = (0, 0, 0);
-    // 5003 and 2069 are primes, 4092 is the code's, 5000 and 25 000 are powers of five and a little, 4000.9 is no whole number.
+    // 5003 and 2069 are primes, 4092 is the code's, 5000 and 25 000 are powers of five and a little, 4000.9
+    // is no whole number.
     for rate_hz in [5.003e6, 2.069e6, 4.092e6, 5e6, 4.0009e6, 25e6] {
         let tables = format!(
             "[front_end]\nsample_rate_hz = {rate_hz:e}\nformat = \"ci8\"\n[noise]\n[power]\ncn0_dbhz = 52\n[fidelity]\n\
@@ -176,7 +180,8 @@ fn epochs_of_prime_and_odd_lengths_give_the_same_peaks() {
             };
             let (_, best) = (0..3069).map(|cell| (power(cell), cell)).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
             let apart = (f64::from(best) / 3.0 - hit.code_phase_chips).rem_euclid(1023.0);
-            // The nearest cell, or where the peak lies between two the noise of 0.05 chip may choose the other.
+            // The nearest cell, or where the peak lies between two the noise of 0.05 chip may choose the
+            // other.
             same += usize::from(apart.min(1023.0 - apart) < 1.0 / 6.0 + 0.1);
         }
     }

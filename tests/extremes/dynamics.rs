@@ -2,7 +2,7 @@
 
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::synth::Edge;
-use gnss_twin::generator::synth::transmitter::Transmitter;
+use gnss_twin::generator::transmit::Transmitter;
 use gnss_twin::generator::truth;
 use gnss_twin::generator::vehicle::{Knot, Motion, Trajectory};
 use gnss_twin::gnss::earth::Geodetic;
@@ -44,8 +44,8 @@ fn after(&[t, s, v, a]: &[f64; 4], dt: f64, jerk: f64) -> [f64; 4] {
     ]
 }
 
-/// Largest departure of the synthesiser's carrier and code (as cycles) from the truth over samples `from..to`, taken at
-/// `count` places.
+/// Largest departure of the synthesiser's carrier and code (as cycles) from the truth over samples
+/// `from..to`, taken at `count` places.
 fn worst_cycles(scene: &Scene, sv: Sv, (from, to): (u64, u64), count: u64) -> (f64, f64) {
     let mut transmitter = Transmitter::new(scene, sv, &L1_CA, Edge::Nearest).unwrap().unwrap();
     transmitter.prepare(scene, from, to).unwrap();
@@ -149,8 +149,9 @@ fn a_gun_is_followed_by_the_generator_and_told_by_the_receiver() {
         wrong += usize::from(error_m > (6.0 * sigma_m).max(10.0));
     }
     the.at_most("fixes wrong in silence", wrong as f64, 0.0, "");
-    // Told in 0.5 s, searched for again after 2 s, 1.5 s to lock and find the symbols, and a frame is believed when the preamble has
-    // come back: at worst one just missed, two more of 6 s and two words of 0.6 s.
+    // Told in 0.5 s, searched for again after 2 s, 1.5 s to lock and find the symbols, and a frame is
+    // believed when the preamble has come back: at worst one just missed, two more of 6 s and two words of
+    // 0.6 s.
     let back_s = after.first().copied().unwrap_or(f64::INFINITY);
     the.at_most("first fix after the shot", back_s, 0.5 + 2.0 + 1.5 + 12.0 + 1.2, "s");
     the.at_least("fixes from there on, of those due", after.len() as f64 / (10.0 * (20.0 - back_s)), 0.95, "");
@@ -175,7 +176,8 @@ fn a_minute_of_twenty_g_ends_at_sixty_kilohertz_with_code_and_carrier_together()
     the.at_most("carrier between knots", carrier, 1e-4, "cycle");
     // The code's place resolves 1e-10 chip or 1.5e-7 cycle; the rest is the knots'.
     the.at_most("code between knots, in carrier cycles", code, 1e-4, "cycle");
-    // The receiver's own oscillators there, from 57.5 s on, before the thrust ends: 40 chips a second of code, 1000 Hz/s.
+    // The receiver's own oscillators there, from 57.5 s on, before the thrust ends: 40 chips a second of
+    // code, 1000 Hz/s.
     let first = (57.5 * 2.6e6) as u64;
     let at = |sv: Sv, sample: u64| {
         let authentic = gnss_twin::generator::spoof::Constellation::authentic();

@@ -2,7 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use gnss_twin::generator::ripple;
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
@@ -18,7 +17,8 @@ use crate::run;
 
 const TURN: f64 = 18_446_744_073_709_551_616.0;
 
-/// A whole code period of a satellite: its first sample at or after `near`, samples, and the truth at its begin, middle, end.
+/// A whole code period of a satellite: its first sample at or after `near`, samples, and the truth at its
+/// begin, middle, end.
 pub struct Period {
     pub first: u64,
     pub samples: u64,
@@ -33,7 +33,7 @@ impl Period {
         let rate_hz = scene.clock.rate.hz();
         let seen = |n: u64| {
             let seen = truth::seen(scene, sv, &L1_CA, scene.clock.epoch(n)).unwrap()?;
-            Some(seen.arrivals[0].rippled(ripple::at(scene, Some(sv), L1_CA.centre_hz(), n as f64)))
+            Some(seen.arrivals[0].with_fast_phase(scene.fast_phases().at(Some(sv), L1_CA.centre_hz(), n as f64)))
         };
         let sent = |n: u64, delay_s: f64| scene.clock.epoch(n).plus_s(-delay_s);
         let into_s = (sent(near, seen(near)?.delay_s).fraction() * 1e3).fract() * 1e-3;
@@ -74,8 +74,9 @@ impl Period {
 }
 
 impl Period {
-    /// Amplitude and phase of real samples by least squares against a replica of area edges: a mean alone would keep the image
-    /// at twice the IF, which meets the dips that such edges leave, coherently near a multiple of half the chip rate.
+    /// Amplitude and phase of real samples by least squares against a replica of area edges: a mean alone
+    /// would keep the image at twice the IF, which meets the dips that such edges leave, coherently near a
+    /// multiple of half the chip rate.
     fn phasor(&self, scene: &Scene, sv: Sv, x: &[f32]) -> Complex64 {
         let code = l1ca::code(sv.number).unwrap();
         let if_hz = scene.metadata.if_hz(L1_CA.centre_hz());
@@ -176,8 +177,8 @@ fn scenes() -> impl Strategy<Value = (String, f64)> {
     )
 }
 
-/// Departures of one scene: carrier between generator and replica (cycles), C/N0 (dB), second difference of the range beyond
-/// what the motion allows (m), code less carrier less what the rays say (m).
+/// Departures of one scene: carrier between generator and replica (cycles), C/N0 (dB), second difference of
+/// the range beyond what the motion allows (m), code less carrier less what the rays say (m).
 fn departures(text: &str, share: f64) -> Result<Option<[f64; 4]>, TestCaseError> {
     let scene = run::try_scene(text).map_err(TestCaseError::fail)?;
     let near = (share * scene.samples as f64) as u64;
@@ -198,7 +199,8 @@ fn departures(text: &str, share: f64) -> Result<Option<[f64; 4]>, TestCaseError>
     let prompt = period.prompt(&alone, sv, &i, &q);
     let rate_hz = alone.clock.rate.hz();
     let width = 1.023e6 / rate_hz;
-    // Mean waveform over a sample, brought to unit power, against the chip at its middle; a real one keeps half.
+    // Mean waveform over a sample, brought to unit power, against the chip at its middle; a real one keeps
+    // half.
     let edges = (1.0 - width / 4.0) / (1.0 - width / 3.0).sqrt();
     let real = if alone.metadata.format.is_complex() { 1.0 } else { 0.5_f64.sqrt() };
     let amplitude = real * edges * f64::from(alone.noise_lsb) * (2.0 * period.cn0_hz / rate_hz).sqrt();
@@ -241,8 +243,9 @@ fn random_scenes_keep_the_laws_of_all_scenes() {
         for (worst, found) in worst.0.iter_mut().zip(found) {
             *worst = worst.max(found);
         }
-        // Knots leave 1e-4 cycle, single precision 1e-6, a kink of a noisy oscillator within the period some 1e-4. A ri16 signal
-        // is 150 LSB high at least: without noise its rounding repeats with the carrier, in harmonics worth 1e-5 cycle each.
+        // Knots leave 1e-4 cycle, single precision 1e-6, a kink of a noisy oscillator within the period some
+        // 1e-4. A ri16 signal is 150 LSB high at least: without noise its rounding repeats with the carrier,
+        // in harmonics worth 1e-5 cycle each.
         prop_assert!(found[0] < 1e-3 && found[1] < 0.3 && found[2] < 1e-6 && found[3] < 1e-6, "{found:?} of\n{text}");
         Ok(())
     });

@@ -219,6 +219,7 @@ fn ranges(sky: &[(f64, f64)]) -> Vec<Range> {
             carrier_hz: L1_HZ,
             noise_m: 1.0,
             cn0_hz: 1e4,
+            is_combined: false,
         }
     };
     sky.iter().zip(1..).map(range).collect()
@@ -265,7 +266,8 @@ fn too_few_satellites_are_said_to_be_and_four_prove_nothing() {
 #[test]
 fn of_two_signals_of_one_satellite_the_stronger_is_found() {
     let the = case(22, "one PRN twice");
-    // A direct ray and its echo two chips behind, 8 dB below it and 8 dB above; a spoofer 10 dB above the truth.
+    // A direct ray and its echo two chips behind, 8 dB below it and 8 dB above; a spoofer 10 dB above the
+    // truth.
     let front = "[front_end]\nsample_rate_hz = 4e6\nformat = \"ci16\"\n[noise]\n[power]\ncn0_dbhz = 45\n";
     let sv = Sv::gps(23);
     let found_m = |tables: &str| {
@@ -281,8 +283,8 @@ fn of_two_signals_of_one_satellite_the_stronger_is_found() {
         let tracked_m = run::code_error_m(&scene, sv, last.sample, last.code_fraction);
         [run::code_error_m(&scene, sv, 0, hit.code_phase_chips / 1023.0), tracked_m]
     };
-    // The search is right to a seventh of a chip. The loop's noise is 0.6 m at 45 dB-Hz and 0.5 Hz, 1 m where pull-in ends, and
-    // the other ray is more than a chip and a half away: three sigma.
+    // The search is right to a seventh of a chip. The loop's noise is 0.6 m at 45 dB-Hz and 0.5 Hz, 1 m where
+    // pull-in ends, and the other ray is more than a chip and a half away: three sigma.
     let told = |name: &str, [found_m, tracked_m]: [f64; 2], theory_m: f64| {
         the.near(&format!("{name}: code found, off the true one"), found_m, theory_m, 40.0, "m");
         the.near(&format!("{name}: code tracked for 2 s"), tracked_m, theory_m, 3.0, "m");
@@ -319,7 +321,8 @@ fn a_position_is_as_good_as_its_condition_says_or_refused_with_it() {
             Ok(solution) => {
                 let values = solution.dilution.symmetric_eigenvalues();
                 most_solved = most_solved.max((values.max() / values.min()).sqrt());
-                // A range moves the solution by no more than the dilution's square root, its largest singular value.
+                // A range moves the solution by no more than the dilution's square root, its largest singular
+                // value.
                 let moved_m = ((solution.position_m - place).norm_squared() + solution.clock_m().powi(2)).sqrt();
                 worst = worst.max(moved_m / (1e-3 * values.max().sqrt()));
             }

@@ -1,5 +1,5 @@
-//! The levels of fidelity and the accumulators over time, rate and dynamics: no error grows with time. And how near to
-//! singular a position may be.
+//! The levels of fidelity and the accumulators over time, rate and dynamics: no error grows with time. And
+//! how near to singular a position may be.
 
 use std::fmt::Write;
 
@@ -8,8 +8,8 @@ use gnss_twin::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::synth::band::Filter;
 use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::synth::transmitter::{Scratch, Transmitter};
 use gnss_twin::generator::synth::{Edge, Kernel};
+use gnss_twin::generator::transmit::{Scratch, Transmitter};
 use gnss_twin::generator::vehicle::{Knot, Motion, Trajectory};
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::satellite::Sv;
@@ -24,7 +24,8 @@ use crate::run;
 const LEVELS: [Grade; 3] = [Grade::Fast, Grade::Balanced, Grade::Reference];
 const RUN: u64 = 4096;
 
-/// Carrier error of a level at `places` code periods from `first` on, `apart_s` seconds from each to the next: rms and worst.
+/// Carrier error of a level at `places` code periods from `first` on, `apart_s` seconds from each to the
+/// next: rms and worst.
 fn carrier_error(scene: &Scene, grade: Grade, first: u64, places: u64, apart_s: f64) -> (f64, f64) {
     let sv = Sv::gps(23);
     let fidelity = Fidelity::of(grade);
@@ -140,7 +141,8 @@ fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
             curve.push((before_s as f64, carrier_error(&scene, grade, first + 26_000, 40, 0.37).0));
         }
         let (now, later) = (curve[0].1, curve[curve.len() - 1].1);
-        // An hour's places are others than the first second's; what is rounded late is a month's drift, 6e-8 cycle.
+        // An hour's places are others than the first second's; what is rounded late is a month's drift, 6e-8
+        // cycle.
         the.at_most(
             &format!("{}: carrier after 30 d over that at first", grade.name()),
             later,
@@ -191,7 +193,8 @@ fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
         over_length.push((name, curve));
     }
     let curve: Vec<_> = counts.iter().map(|count| (*count as f64, twin_error(*count))).collect();
-    // A partial sum of √n is rounded n times to 1.1e-16 of itself: √(n/6) of that over the noise, and four sigma.
+    // A partial sum of √n is rounded n times to 1.1e-16 of itself: √(n/6) of that over the noise, and four
+    // sigma.
     the.at_most(
         "f64 sums: error of 1e6 samples over the noise, against pairs of doubles",
         curve[3].1,

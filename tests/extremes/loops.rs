@@ -40,8 +40,8 @@ fn sums_over_unknown_bits_lose_what_theory_says_and_two_quadrants_see_no_bit() {
     let mean = prompts.iter().map(|x| x.abs()).sum::<f64>() / prompts.len() as f64;
     let power = prompts.windows(20).map(|w| (w.iter().sum::<f64>() / 20.0 / mean).powi(2)).sum::<f64>()
         / (prompts.len() - 19) as f64;
-    // Of these bits a share p turns. Then (1 − k/10)² is left for k = 0 … 19 periods, 0.335 on average; half of them
-    // turning would leave 0.6675, the −1.76 dB of the textbook.
+    // Of these bits a share p turns. Then (1 − k/10)² is left for k = 0 … 19 periods, 0.335 on average; half
+    // of them turning would leave 0.6675, the −1.76 dB of the textbook.
     let turns = prompts.windows(2).filter(|w| w[0] * w[1] < 0.0).count() as f64 / (prompts.len() as f64 / 20.0);
     let theory_db = 10.0 * libm::log10(1.0 - turns * (1.0 - 0.335));
     assert!((0.4..0.6).contains(&turns), "{turns}");

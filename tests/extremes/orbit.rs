@@ -1,4 +1,5 @@
-//! Cases 8 to 12: elements at the edge of being an orbit, sets at the edge of their age, fields at the edge of their bits.
+//! Cases 8 to 12: elements at the edge of being an orbit, sets at the edge of their age, fields at the edge
+//! of their bits.
 
 use std::collections::BTreeMap;
 use std::io::Read;

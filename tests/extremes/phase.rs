@@ -1,13 +1,14 @@
 //! Cases 5 to 7: integer phases over hours and weeks, against integers and geometry evaluated here.
 //!
-//! The scene is at 1575.42 MHz = 1540 · 1.023 MHz, so carrier cycles of code time are whole numbers of 2^-48 chip, and
-//! what the local oscillator and the receiver's clock add is a fraction of integers. Only the range needs `f64`.
+//! The scene is at 1575.42 MHz = 1540 · 1.023 MHz, so carrier cycles of code time are whole numbers of 2^-48
+//! chip, and what the local oscillator and the receiver's clock add is a fraction of integers. Only the range
+//! needs `f64`.
 
 use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
 use gnss_twin::generator::scene::{CodeEdge, Scene};
 use gnss_twin::generator::sky;
 use gnss_twin::generator::synth::Edge;
-use gnss_twin::generator::synth::transmitter::Transmitter;
+use gnss_twin::generator::transmit::Transmitter;
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::rinex;
@@ -64,8 +65,9 @@ fn code_and_carrier_stay_together_for_an_hour_and_the_ionosphere_parts_them_by_t
         for first in (0..scene.samples).step_by(73_211 * RUN as usize) {
             transmitter.prepare(&scene, first, first + RUN).unwrap();
             let (carrier, code) = transmitter.phases(&scene, first).unwrap();
-            // Pseudorange of the code in cycles: carrier · (reading − time sent). The start is a whole second, n/25e6
-            // readings are n · 1575.42/25 cycles, a code period is 1540 · 1023 of them and a chip 1540.
+            // Pseudorange of the code in cycles: carrier · (reading − time sent). The start is a whole
+            // second, n/25e6 readings are n · 1575.42/25 cycles, a code period is 1540 · 1023 of them and a
+            // chip 1540.
             let reading = turns(u128::from(first) * 157_542, 2500);
             let sent = turns(1540 * code.phase(), 1 << 48);
             let tone = turns(u128::from(first) * 4092, 25_000);
@@ -79,14 +81,14 @@ fn code_and_carrier_stay_together_for_an_hour_and_the_ionosphere_parts_them_by_t
         }
         let figure = if ionosphere { "parted by other than 2I" } else { "code less carrier" };
         CASE.at_most(figure, worst, 1.1e-5, "cycle");
-        // 0.1 mm is 5.3e-4 cycle; what remains is the place of the code, 1e-10 chip or 1.5e-7 cycle, and two knots' errors
-        // of 5e-6 cycle at most.
+        // 0.1 mm is 5.3e-4 cycle; what remains is the place of the code, 1e-10 chip or 1.5e-7 cycle, and two
+        // knots' errors of 5e-6 cycle at most.
         assert!(checked > 250, "{checked}");
     }
 }
 
-/// Carrier at sample `n` in 2^-64 turn: `IF · n / rate − carrier · (reading − true time + light time − satellite clock)`,
-/// the first two terms in integers of 1e-18 s.
+/// Carrier at sample `n` in 2^-64 turn: `IF · n / rate − carrier · (reading − true time + light time −
+/// satellite clock)`, the first two terms in integers of 1e-18 s.
 fn carrier(scene: &Scene, sv: Sv, n: u64) -> u64 {
     // 50 Msps: 2e10 units a sample. The clock of the scene: 1.3e-4 s ahead, 5e-8 s/s fast.
     let (elapsed, bias) = (u128::from(n) * 20_000_000_000, 130_000_000_000_000);
@@ -130,8 +132,8 @@ fn after_a_day_and_after_thirty_days_at_50_msps_the_carrier_is_within_a_milliont
                 checked += 1;
             }
         }
-        // Half the knots' tolerance, and the floor of `f64`: coordinates of 2.6e7 m resolve 3.7e-9 m or 2e-8 cycle,
-        // the sum of a delay and a month's drift, 4e8 cycles, 6e-8, a few of each on both sides.
+        // Half the knots' tolerance, and the floor of `f64`: coordinates of 2.6e7 m resolve 3.7e-9 m or 2e-8
+        // cycle, the sum of a delay and a month's drift, 4e8 cycles, 6e-8, a few of each on both sides.
         CASE.at_most(&format!("carrier after {days} d at 50 Msps, to integers"), worst, 1e-6, "cycle");
         assert!(checked > 200, "{checked}");
     }

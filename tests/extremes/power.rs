@@ -102,7 +102,8 @@ fn what_a_strong_satellite_puts_into_others_is_not_taken_for_them() {
         the.at_most(&format!("{apart_db} dB: absent satellites acquired"), f64::from(ghosts), 0.0, "");
         the.at_most(&format!("{apart_db} dB: weak one acquired at a cross-correlation"), wrong as f64, 0.0, "");
         if apart_db < 24 {
-            // Without the strong one 47 dB-Hz and more are found always, and their powers are known to a decibel.
+            // Without the strong one 47 dB-Hz and more are found always, and their powers are known to a
+            // decibel.
             let share = found as f64 / f64::from(of);
             the.at_least(&format!("{apart_db} dB: weak one found at its place"), share, 0.9, "of them");
         }
@@ -248,7 +249,8 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
         "",
     );
     let worst = |of: &dyn Fn(&gnss_twin::gnss::record::LineRow) -> f64| lines.iter().map(of).fold(0.0, f64::max);
-    // Of a bin of 635 Hz; a line 40 dB above its bin is known to a hundredth of it, half a percent of its neighbour's.
+    // Of a bin of 635 Hz; a line 40 dB above its bin is known to a hundredth of it, half a percent of its
+    // neighbour's.
     the.at_most("frequency told", worst(&|row| (row.frequency_hz - wave_hz).abs()), 0.05 * 635.0, "Hz");
     // The density of what lies beside it is known to 4 % and 3 % high; C/N0 of four reads 44.8.
     the.at_most("J/S told, off 30 dB", worst(&|row| (row.js_db.unwrap_or(f64::INFINITY) - 30.0).abs()), 1.0, "dB");

@@ -9,9 +9,9 @@ use gnss_twin::generator::synth::band::Filter;
 use gnss_twin::generator::synth::bank::Bank;
 use gnss_twin::generator::synth::chips::CodeTime;
 use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::synth::transmitter::Transmitter;
 use gnss_twin::generator::synth::waveform::plain;
 use gnss_twin::generator::synth::{Edge, Kernel, Run};
+use gnss_twin::generator::transmit::Transmitter;
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
 use gnss_twin::gnss::satellite::Sv;
@@ -63,8 +63,8 @@ fn places() -> impl Iterator<Item = f64> {
     (0..24).map(|place| 11.0 + (f64::from(place) + 0.5) / 24.0)
 }
 
-/// Where the receiver's own correlators, half a chip apart, see one period of samples of `edge` that stand still on the grid,
-/// in metres off the true place, rms over places.
+/// Where the receiver's own correlators, half a chip apart, see one period of samples of `edge` that stand
+/// still on the grid, in metres off the true place, rms over places.
 fn received_bias_m(rate_khz: usize, edge: Edge<'_>, replica: correlate::Edge) -> f64 {
     let replica = correlate::Replica::new(l1ca::code(7).unwrap(), replica).unwrap();
     let of = |start: f64| {
@@ -87,8 +87,9 @@ fn received_bias_m(rate_khz: usize, edge: Edge<'_>, replica: correlate::Edge) ->
     (places().map(of).sum::<f64>() / 24.0).sqrt()
 }
 
-/// Where the code best matches one period of samples of `edge`, in metres behind the true place, rms over places: the zero
-/// of early minus late, half a chip apart, of the continuous correlation below half the rate, by Fourier series.
+/// Where the code best matches one period of samples of `edge`, in metres behind the true place, rms over
+/// places: the zero of early minus late, half a chip apart, of the continuous correlation below half the
+/// rate, by Fourier series.
 fn bias_m(rate_khz: usize, edge: Edge<'_>) -> f64 {
     let transform = |x: Vec<f64>| {
         let mut x: Vec<Complex64> = x.into_iter().map(Complex64::from).collect();
@@ -133,7 +134,8 @@ fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_
         the.near(&name("nearest"), bias_m(rate_khz, Edge::Nearest), sample_m / 12.0_f64.sqrt(), 0.05 * sample_m, "m");
         the.at_most(&name("band-limited"), bias_m(rate_khz, Edge::BandLimited(&filter)), 0.1, "m");
     }
-    // What users get: the level's own edges in the samples, the receiver's own in the replica; it warns where it is half a metre.
+    // What users get: the level's own edges in the samples, the receiver's own in the replica; it warns where
+    // it is half a metre.
     let mut warned = 0;
     for (rate_khz, expected) in [(2046, true), (4092, true), (10_230, false), (2600, false)] {
         let scene = run::scene(0.01, &format!("[front_end]\nsample_rate_hz = {rate_khz}e3\n[power]\ncn0_dbhz = 45\n"));
@@ -147,8 +149,8 @@ fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_
         let bias_m = received_bias_m(rate_khz, edge, replica);
         let told_m = correlate::standing_bias_m(replica, 1e3 * rate_khz as f64, &L1_CA.components[0]);
         let name = format!("{:.3} Msps, generated and received by default: rms over places", rate_khz as f64 / 1e3);
-        // The law that warns errs to the safe side; where places drift apart nothing stands still, and a decimetre and a
-        // half is what one of them has.
+        // The law that warns errs to the safe side; where places drift apart nothing stands still, and a
+        // decimetre and a half is what one of them has.
         the.at_most(&name, bias_m, told_m.max(0.15), "m");
         let outcome = Received::from_bytes(&scene, &[], &settings, tempfile::tempdir().unwrap()).outcome;
         warned += usize::from(outcome.warnings.iter().any(|text| text.contains("samples a chip")) == expected);
@@ -242,8 +244,8 @@ fn folded_and_mirrored_bands_give_the_doppler_its_sign() {
     let sv = run::in_view(&any).into_iter().max_by(|a, b| speed_hz(a).total_cmp(&speed_hz(b))).unwrap();
     let settings = TrackingSettings::default();
     let (mut held, mut of) = (0, 0);
-    // IF within the band, and upside down there; above half the rate, where the samples hold it mirrored, and above all of it, in both
-    // senses: made so by the generator, and received by what its metadata say.
+    // IF within the band, and upside down there; above half the rate, where the samples hold it mirrored, and
+    // above all of it, in both senses: made so by the generator, and received by what its metadata say.
     let text_of = |tables: &str| run::text(2.0, &format!("{}{tables}", run::PLACE));
     let mut made = Vec::new();
     for (if_hz, inverted) in
@@ -273,8 +275,9 @@ fn folded_and_mirrored_bands_give_the_doppler_its_sign() {
         made.push((if_hz, inverted, bytes));
     }
     the.all("acquired, locked, Doppler with its sign and code right", held, of);
-    // Folded samples are those of the IF at which they hold the carrier, mirrored where the band is. A carrier that turns the
-    // other way is rounded otherwise in f32, 1e-6 of an LSB, and so are as many of the integers.
+    // Folded samples are those of the IF at which they hold the carrier, mirrored where the band is. A
+    // carrier that turns the other way is rounded otherwise in f32, 1e-6 of an LSB, and so are as many of the
+    // integers.
     let bytes = |hz: f64, inverted: bool| {
         made.iter().find(|(if_hz, sense, _)| *if_hz == hz && *sense == inverted).map_or(&[][..], |(.., bytes)| bytes)
     };

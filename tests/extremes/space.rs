@@ -23,7 +23,8 @@ fn shipped(name: &str) -> Scene {
     run::try_scene(&text(name)).unwrap()
 }
 
-/// Doppler in inertial axes: the ratio of the two clocks' rates by the relativity-free equation of a moving pair, all orders.
+/// Doppler in inertial axes: the ratio of the two clocks' rates by the relativity-free equation of a moving
+/// pair, all orders.
 fn doppler_hz(scene: &Scene, sv: Sv, sample: u64, second_order: bool) -> f64 {
     let local = scene.clock.epoch(sample);
     let seen = truth::seen(scene, sv, &L1_CA, local).unwrap().unwrap();
@@ -39,7 +40,8 @@ fn doppler_hz(scene: &Scene, sv: Sv, sample: u64, second_order: bool) -> f64 {
     L1_CA.centre_hz() * (clocks * motion - 1.0)
 }
 
-/// Largest departure of the truth's Doppler from the equation, largest Doppler, largest second-order term, Doppler rate.
+/// Largest departure of the truth's Doppler from the equation, largest Doppler, largest second-order term,
+/// Doppler rate.
 fn dopplers(scene: &Scene, step_s: f64) -> [f64; 4] {
     let mut most = [0.0_f64; 4];
     let rate_hz = scene.clock.rate.hz();
@@ -71,8 +73,8 @@ fn dopplers(scene: &Scene, step_s: f64) -> [f64; 4] {
     most
 }
 
-/// How many of the satellites in view at the start with at least `least_dbhz` a search finds where truth says, of how many,
-/// and how many it finds that are not there.
+/// How many of the satellites in view at the start with at least `least_dbhz` a search finds where truth
+/// says, of how many, and how many it finds that are not there.
 fn found(name: &str, scene: &Scene, least_dbhz: f64) -> (usize, usize, usize) {
     let settings = run::settings(&text(name));
     let bytes = run::part(scene, 0..200_000, tempfile::tempdir().unwrap().path());
@@ -201,7 +203,8 @@ fn a_low_orbit_has_the_dopplers_of_the_equation_and_a_receiver_finds_its_way() {
         let t_s = scene.receiver_clock.true_elapsed_s(scene.clock.start, local);
         (fix.velocity_mps() - scene.trajectory.at(t_s).velocity_mps).norm()
     };
-    // Lag of a third-order loop of 18 Hz at 0.02 Hz/s² is nothing; noise of 0.09 Hz is 0.02 m/s, times PDOP, four sigma.
+    // Lag of a third-order loop of 18 Hz at 0.02 Hz/s² is nothing; noise of 0.09 Hz is 0.02 m/s, times PDOP,
+    // four sigma.
     the.at_most("velocity, 3-D", received.fixes().iter().map(speed).fold(0.0, f64::max), 0.5, "m/s");
 }
 

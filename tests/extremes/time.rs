@@ -6,7 +6,7 @@ use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::message::Senders;
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::synth::Edge;
-use gnss_twin::generator::synth::transmitter::Transmitter;
+use gnss_twin::generator::transmit::Transmitter;
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::earth::{EARTH_ROTATION_RADPS, SPEED_OF_LIGHT_MPS};
@@ -230,8 +230,8 @@ fn a_part_of_a_scene_has_the_bits_that_the_whole_has_there() {
         held += usize::from(same);
     }
     the.all("parts equal to the whole, bit for bit, and their truth", held, parts.len());
-    // Six hours in: a part, and one that begins 20 000 samples before it. A fading's phase is followed from the scene's start,
-    // 50 s of arithmetic: the long run has it.
+    // Six hours in: a part, and one that begins 20 000 samples before it. A fading's phase is followed from
+    // the scene's start, 50 s of arithmetic: the long run has it.
     let mut tables = tables.replace("2.6e6", "50e6").replace("2e6", "20e6");
     if !figures::long() {
         tables = tables.replace("[scintillation]\ns4 = 0.6\nsigma_phi_rad = 0.4\ndecorrelation_s = 0.5\n", "");

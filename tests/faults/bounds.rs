@@ -1,5 +1,5 @@
-//! Elements at the bounds of their fields and one unit beyond, in the last of the twelve digits that a file holds; and times of
-//! files and messages against tables from outside.
+//! Elements at the bounds of their fields and one unit beyond, in the last of the twelve digits that a file
+//! holds; and times of files and messages against tables from outside.
 
 use gnss_twin::gnss::rinex::read;
 use gnss_twin::gnss::time::Epoch;
@@ -8,8 +8,8 @@ use crate::damage::Random;
 use crate::navigation::{bases, with_field};
 use crate::tally::{End, Tally, cases};
 
-/// Field of a record, the name that refusals give it, and its bounds (IS-GPS-200N, tables 20-I and 20-III, as RINEX rounds them:
-/// two's complement of the field's bits times its scale; angles of any turn up to two).
+/// Field of a record, the name that refusals give it, and its bounds (IS-GPS-200N, tables 20-I and 20-III, as
+/// RINEX rounds them: two's complement of the field's bits times its scale; angles of any turn up to two).
 const FIELDS: [(usize, &str, f64, f64); 22] = [
     (0, "af0", -9.766e-4, 9.766e-4),
     (1, "af1", -3.726e-9, 3.726e-9),
@@ -35,7 +35,8 @@ const FIELDS: [(usize, &str, f64, f64); 22] = [
     (25, "tgd", -5.961e-8, 5.961e-8),
 ];
 
-/// The twelve-digit numbers next to a bound: the one that it holds, and the one beyond it, away from the other bound.
+/// The twelve-digit numbers next to a bound: the one that it holds, and the one beyond it, away from the
+/// other bound.
 fn beside(bound: f64, outwards: f64) -> (String, String) {
     let text = |digits: i64, power: i32| {
         let sign = if digits < 0 { "-" } else { "" };
@@ -108,7 +109,8 @@ fn elements_at_their_bounds_pass_and_a_unit_beyond_are_refused_by_name() {
     tally.finish();
 }
 
-/// First days (UTC) with a new number of leap seconds, and GPS time minus UTC from then on: IERS Bulletin C 1 to 52.
+/// First days (UTC) with a new number of leap seconds, and GPS time minus UTC from then on: IERS Bulletin C 1
+/// to 52.
 const LEAPS: [(i64, u8, u8, i64); 18] = [
     (1981, 7, 1, 1),
     (1982, 7, 1, 2),

@@ -1,4 +1,5 @@
-//! The same bytes on any threads, in any pieces, on any processor, under any locale, and from two runs at once.
+//! The same bytes on any threads, in any pieces, on any processor, under any locale, and from two runs at
+//! once.
 
 use std::fs;
 use std::path::Path;

@@ -31,7 +31,8 @@ fn a_damaged_trajectory_is_refused_at_its_row() {
     let set = |field: usize, value: &'static str| {
         move |rows: &mut Vec<String>, at: usize| rows[at] = row(&rows[at], field, value)
     };
-    // What becomes of the rows, and how many rows further on it shows: of two rows that do not follow each other, the later.
+    // What becomes of the rows, and how many rows further on it shows: of two rows that do not follow each
+    // other, the later.
     let classes: Vec<Change> = vec![
         ("rows swapped", 1, Box::new(|rows, at| rows.swap(at, at + 1))),
         ("row doubled", 1, Box::new(|rows, at| rows.insert(at, rows[at].clone()))),

@@ -1,9 +1,10 @@
-//! Fuzzing of every parser: texts of a kept corpus (`tests/faults/corpus`), bent by seed in bytes, digits, fields, lines and splices.
+//! Fuzzing of every parser: texts of a kept corpus (`tests/faults/corpus`), bent by seed in bytes, digits,
+//! fields, lines and splices.
 //!
-//! Each is read or refused by a message that begins with the file's name; nothing panics, hangs or takes much memory; what
-//! is accepted lies within physical ranges and is the same when it is read again. What was found once stays in the
-//! corpus under a name that begins with `found`. Executions in the long run are 1 000 000 a parser, fewer where TOML, the file
-//! system or the judge's work on tables takes longer.
+//! Each is read or refused by a message that begins with the file's name; nothing panics, hangs or takes much
+//! memory; what is accepted lies within physical ranges and is the same when it is read again. What was found
+//! once stays in the corpus under a name that begins with `found`. Executions in the long run are 1 000 000 a
+//! parser, fewer where TOML, the file system or the judge's work on tables takes longer.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -182,7 +183,8 @@ fn text(error: impl ToString) -> String {
 
 /// Whether a motion is where bodies are, all along.
 fn moves(trajectory: &Trajectory) -> Result<u64, String> {
-    // A motion that rests at an end is known for ever there; another one only within its span, wherever that lies.
+    // A motion that rests at an end is known for ever there; another one only within its span, wherever that
+    // lies.
     let (from_s, to_s) = trajectory.span_s();
     let from_s = if from_s.is_finite() { from_s } else { to_s.min(0.0) - 1e3 };
     let to_s = if to_s.is_finite() { to_s } else { from_s + 1e5 };

@@ -1,4 +1,5 @@
-//! What numbers physics and the meaning of a key allow, key by key: an oracle that knows nothing of the product's ranges.
+//! What numbers physics and the meaning of a key allow, key by key: an oracle that knows nothing of the
+//! product's ranges.
 
 /// Whether a value can stand there.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,5 @@
-//! Commands on tiny scenes, each with the directory that it starts from and the bytes that it is to leave there.
+//! Commands on tiny scenes, each with the directory that it starts from and the bytes that it is to leave
+//! there.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -48,7 +49,8 @@ pub struct Task {
     pub printed: Option<Vec<u8>>,
     /// A directory of results that replaces another one as a whole.
     pub whole: Option<&'static str>,
-    /// The exit code with which it has done its work: 3 for a reception, as these recordings are too short for a fix.
+    /// The exit code with which it has done its work: 3 for a reception, as these recordings are too short
+    /// for a fix.
     pub done: i32,
 }
 
@@ -262,7 +264,8 @@ pub fn left_over(found: &Files) -> Vec<String> {
     found.keys().filter(|name| is_left_over(name)).cloned().collect()
 }
 
-/// What stands below a directory; empty directories end with a slash. Left out is what tells how fast a run was.
+/// What stands below a directory; empty directories end with a slash. Left out is what tells how fast a run
+/// was.
 pub fn files(directory: &Path) -> Files {
     let mut found = Files::new();
     gather(directory, "", &mut found);

@@ -1,6 +1,7 @@
 //! Memory over time: what ten minutes hold beyond a short run.
 //!
-//! Generator and receiver hold the same. The judge holds what has a row an epoch, and its pictures fill in their first minute.
+//! Generator and receiver hold the same. The judge holds what has a row an epoch, and its pictures fill in
+//! their first minute.
 
 use std::fs;
 use std::path::Path;
@@ -33,9 +34,11 @@ fn peak_kib(words: &str, place: &Path) -> Result<f64, String> {
     }
 }
 
-/// What the judge holds of an epoch of a tenth of a second, in bytes: its place (88), fix (264), error (96), honesty (72), clock (48) and
-/// phases (24), two sums by sample (80), a list of one number of twelve satellites and its sorted copy (192); lists grow by doubling. What theory expects of a fix: sums over
-/// its satellites (930), covariances (640), these beside fix and error (680), five kinds of error (280), each list of a known length.
+/// What the judge holds of an epoch of a tenth of a second, in bytes: its place (88), fix (264), error (96),
+/// honesty (72), clock (48) and phases (24), two sums by sample (80), a list of one number of twelve
+/// satellites and its sorted copy (192); lists grow by doubling. What theory expects of a fix: sums over its
+/// satellites (930), covariances (640), these beside fix and error (680), five kinds of error (280), each
+/// list of a known length.
 const EPOCH_BYTES: f64 =
     2.0 * (88.0 + 264.0 + 96.0 + 72.0 + 48.0 + 24.0 + 80.0 + 192.0) + 930.0 + 640.0 + 680.0 + 280.0;
 

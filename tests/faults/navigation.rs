@@ -1,4 +1,5 @@
-//! Navigation files: what is accepted is what stands in the file, in the columns where its format has it; nothing is lost unsaid.
+//! Navigation files: what is accepted is what stands in the file, in the columns where its format has it;
+//! nothing is lost unsaid.
 
 use std::io::{Read, Write};
 
@@ -117,7 +118,8 @@ fn fields(line: &str, from: usize, count: usize) -> Option<Vec<Option<f64>>> {
         .collect()
 }
 
-/// Elements of a set by their place among the values, each with the range of its field (IS-GPS-200N, tables 20-I and 20-III).
+/// Elements of a set by their place among the values, each with the range of its field (IS-GPS-200N, tables
+/// 20-I and 20-III).
 fn elements(set: &Ephemeris) -> [(usize, f64, f64, f64); 25] {
     let tau2 = 12.57;
     [
@@ -149,12 +151,14 @@ fn elements(set: &Ephemeris) -> [(usize, f64, f64, f64); 25] {
     ]
 }
 
-/// Whether a set is what stands there; an optional field that is blank, and a week that begins meanwhile, are as good.
+/// Whether a set is what stands there; an optional field that is blank, and a week that begins meanwhile, are
+/// as good.
 fn same(set: &Ephemeris, record: &Written) -> bool {
     set.sv.number == record.number
         && Epoch::parse(&record.toc).is_ok_and(|toc| toc == set.toc)
         && elements(set).iter().all(|(place, value, ..)| match (place, record.values[*place]) {
-            // An epoch is whole seconds and a fraction: a sum of two numbers below 2^20, each rounded to 2^-33 s.
+            // An epoch is whole seconds and a fraction: a sum of two numbers below 2^20, each rounded to
+            // 2^-33 s.
             (11, Some(tow_s)) => (tow_s.rem_euclid(604_800.0) - *value).abs() < 1e-9,
             (21, Some(week)) => [0.0, 1.0, 1023.0].contains(&((week - value).abs() % 1024.0)),
             (20 | 26, None) => true,
@@ -203,7 +207,8 @@ fn check(version: u8, whole: &[Written], bytes: &[u8]) -> Result<End, String> {
             Err("a record is left out without a reason".to_owned())
         };
     }
-    // Nothing was left out: no record that stands there may be missing, and of none only a part may stand there.
+    // Nothing was left out: no record that stands there may be missing, and of none only a part may stand
+    // there.
     if let Some(lost) = stands.iter().find(|record| !ephemerides.iter().any(|set| same(set, record))) {
         return Err(format!("'{}' is lost and not named", lost.title));
     }

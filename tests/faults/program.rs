@@ -168,7 +168,8 @@ fn outputs_that_cannot_be_made_and_inputs_that_are_no_files_have_their_exit_code
             },
         );
     }
-    // As another user, whom modes bind; where there is no such user or no right to become it, modes cannot be tested.
+    // As another user, whom modes bind; where there is no such user or no right to become it, modes cannot be
+    // tested.
     fs::set_permissions(here.path(), fs::Permissions::from_mode(0o755)).unwrap();
     let nobody = Command::new("setpriv")
         .args(["--reuid=65534", "--clear-groups", TWIN, "generate", "tiny.toml", "--out", "z.sigmf-data"])

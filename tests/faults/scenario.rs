@@ -1,5 +1,5 @@
-//! TOML texts - scenarios, receiver's settings, limits, studies: each line mistyped and given bad values; and values that
-//! contradict each other.
+//! TOML texts - scenarios, receiver's settings, limits, studies: each line mistyped and given bad values; and
+//! values that contradict each other.
 
 use std::path::{Path, PathBuf};
 
@@ -55,7 +55,8 @@ fn with_line(text: &str, number: usize, line: &str) -> String {
     text.lines().enumerate().map(|(at, old)| if at == number { line } else { old }).collect::<Vec<_>>().join("\n")
 }
 
-/// A kind of TOML text: texts with its keys, and what reads them. Whatever it refuses begins with the text's name and place.
+/// A kind of TOML text: texts with its keys, and what reads them. Whatever it refuses begins with the text's
+/// name and place.
 struct Kind {
     name: &'static str,
     texts: Vec<(String, String)>,
@@ -124,7 +125,8 @@ fn a_mistyped_key_of_any_text_is_refused_at_its_line_with_the_right_key() {
                     slips.extend(typos(&key).map(|typo| (number, format!("{typo} = {value}"), typo, key.clone())));
                 }
             }
-            // Headers of tables, but for the first part of a name in several parts, which other headers may have too.
+            // Headers of tables, but for the first part of a name in several parts, which other headers may
+            // have too.
             for (number, line) in text.lines().enumerate().filter(|(_, line)| line.starts_with('[')) {
                 let header = line.split(" #").next().unwrap().trim().trim_matches(['[', ']']).to_owned();
                 let (above, key) = header.rsplit_once('.').map_or(("", header.as_str()), |(above, key)| (above, key));

@@ -1,4 +1,5 @@
-//! Texts with every key that a scenario, the receiver's settings, limits or a study may have, each on a line of its own.
+//! Texts with every key that a scenario, the receiver's settings, limits or a study may have, each on a line
+//! of its own.
 
 /// Scenes for the keys that none of those has that come with the program. They are read, not composed.
 pub const SCENES: [(&str, &str); 6] = [

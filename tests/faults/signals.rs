@@ -1,4 +1,5 @@
-//! Signals at random moments: the program ends at once, takes what it was making away, and the next run is right.
+//! Signals at random moments: the program ends at once, takes what it was making away, and the next run is
+//! right.
 
 use std::fs;
 use std::path::Path;
@@ -27,7 +28,8 @@ fn detached() -> bool {
     u64::from_str_radix(mask.trim(), 16).unwrap() & 1 == 1
 }
 
-/// The promise; where many programs share the machine in the short run, it may keep this one from the processor.
+/// The promise; where many programs share the machine in the short run, it may keep this one from the
+/// processor.
 const PROMISED: Duration = Duration::from_secs(1);
 
 fn limit() -> Duration {
@@ -182,7 +184,8 @@ fn a_signal_ends_a_wait_for_samples_that_never_come() {
                         .spawn()
                         .unwrap();
                     let silent = child.stdin.take();
-                    // Its staging directory says that it waits, but for a pipe that nobody has opened for writing.
+                    // Its staging directory says that it waits, but for a pipe that nobody has opened for
+                    // writing.
                     let begun = Instant::now();
                     while begun.elapsed() < Duration::from_secs(20)
                         && (source == "-" && !place.path().join(".rx.part").exists())

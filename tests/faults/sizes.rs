@@ -15,8 +15,8 @@ use gnss_twin::gnss::{ionex, rinex, sp3};
 use crate::navigation::{bases, packed};
 use crate::tally::{End, Tally, long};
 
-/// Refusals may take this much memory beyond what the process had: the cap on what a packed file may hold, and half of it
-/// again while the vector that receives it grows.
+/// Refusals may take this much memory beyond what the process had: the cap on what a packed file may hold,
+/// and half of it again while the vector that receives it grows.
 const CAP_KIB: u64 = (256 + 128 + 64) << 10;
 /// And where nothing is unpacked: 64 MiB.
 const PLAIN_KIB: u64 = 64 << 10;

@@ -1,6 +1,8 @@
-//! Every system call of every command fails once, and every command is killed at every call: `strace` injects it.
+//! Every system call of every command fails once, and every command is killed at every call: `strace` injects
+//! it.
 //!
-//! Faults begin where the program's own code does: what the loader and the runtime call before cannot be answered by it.
+//! Faults begin where the program's own code does: what the loader and the runtime call before cannot be
+//! answered by it.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -63,7 +65,8 @@ struct Fault {
 enum Became {
     Held(End),
     NotReached,
-    /// The standard library allows no answer: without memory it aborts, and it panics where a directory cannot be closed.
+    /// The standard library allows no answer: without memory it aborts, and it panics where a directory
+    /// cannot be closed.
     Library(&'static str),
     Failed(String),
 }
@@ -83,7 +86,8 @@ fn strace(options: &[&str], log: &Path, task: &Task, place: &Path) -> Ended {
     task.ended(output)
 }
 
-/// How often each call is made: by the first thread before its own code begins, and by the thread that makes most of them.
+/// How often each call is made: by the first thread before its own code begins, and by the thread that makes
+/// most of them.
 fn counts(task: &Task) -> Option<BTreeMap<&'static str, (u32, u32)>> {
     let (place, log) = (task.workplace(), tempfile::NamedTempFile::new().unwrap());
     let ended = strace(&[], log.path(), task, place.path());

@@ -140,7 +140,8 @@ fn read(text: &str) -> Rows {
     rows
 }
 
-/// Writes the report. Rows of faults that this run does not look at stay as they are, so that it can be made in parts.
+/// Writes the report. Rows of faults that this run does not look at stay as they are, so that it can be made
+/// in parts.
 fn write(rows: &Rows) {
     let Some(path) = std::env::var_os("GNSS_TWIN_WRITE_ROBUSTNESS") else { return };
     let mut all = read(&std::fs::read_to_string(&path).unwrap_or_default());

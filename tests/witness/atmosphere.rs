@@ -28,7 +28,8 @@ fn klobuchar_gives_the_worked_value_of_rtklib() {
 
 #[test]
 fn saastamoinen_gives_the_worked_value_of_rtklib() {
-    // The same file: humidity 0.5 at the same place, a cosecant mapping and that program's own vapour formula.
+    // The same file: humidity 0.5 at the same place, a cosecant mapping and that program's own vapour
+    // formula.
     let temperature_k = 15.0 - 6.5e-3 * 100.0 + 273.16;
     let pressure_hpa = 1013.25 * libm::pow(1.0 - 2.2557e-5 * 100.0, 5.2568);
     let vapour_hpa = 6.108 * 0.5 * libm::exp((17.15 * temperature_k - 4684.0) / (temperature_k - 38.45));
@@ -39,8 +40,8 @@ fn saastamoinen_gives_the_worked_value_of_rtklib() {
 
 #[test]
 fn gpt3_gives_what_the_authors_program_prints_for_graz() {
-    // gpt3_5.m, saasthyd.m, asknewet.m and vmf3_ht.m of TU Wien, run in Octave for Graz (gnss.ell) at MJD 60 310.0, which
-    // is 2024-01-01; each printed to the digits that bound it here.
+    // gpt3_5.m, saasthyd.m, asknewet.m and vmf3_ht.m of TU Wien, run in Octave for Graz (gnss.ell) at MJD 60
+    // 310.0, which is 2024-01-01; each printed to the digits that bound it here.
     let Some(path) = external("ref/gpt3_5.grd") else { return };
     let gpt3 = Gpt3::read(&std::fs::read(path).unwrap(), "gpt3_5.grd").unwrap();
     let graz = Geodetic::from_degrees(47.0671, 15.4935, 538.30);
@@ -72,11 +73,13 @@ fn gpt3_gives_what_the_authors_program_prints_for_graz() {
     }
 }
 
-/// Day of the year, seconds of that day, latitude, longitude, height, zenith distance, a_h, a_w; then the factors printed.
+/// Day of the year, seconds of that day, latitude, longitude, height, zenith distance, a_h, a_w; then the
+/// factors printed.
 type Printed = ([f64; 8], [f64; 2]);
 
 /// What vmf3_ht.m of TU Wien gave in Octave for ten random places from 1982 to 2023, as the tests of iers2010
-/// (github.com/xanthospap/iers2010) print it; the tenth is at 0.2° of elevation, where this program stops at 1°.
+/// (github.com/xanthospap/iers2010) print it; the tenth is at 0.2° of elevation, where this program stops at
+/// 1°.
 #[rustfmt::skip]
 const VMF3_HT: [Printed; 9] = [
     ([193.0, 63_840.313_720_4, -1.006_558_397_623_224_6, -1.269_846_006_397_009, 829.891_988_105_157_7,
@@ -107,11 +110,12 @@ fn vmf3_gives_what_the_authors_program_prints() {
         let bc = own.at(latitude_rad, longitude_rad, day + second / 86_400.0);
         let elevation_rad = std::f64::consts::FRAC_PI_2 - zenith_rad;
         let found = vmf3(MappingA { hydrostatic, wet }, bc, user, elevation_rad);
-        // Rounding of a hundred terms, 1e-17 of b, moves a factor by 1e-14 at 5°. All but 2 of the table's 3380 numbers,
-        // if a tenth off, would move one of these factors by more than this.
+        // Rounding of a hundred terms, 1e-17 of b, moves a factor by 1e-14 at 5°. All but 2 of the table's
+        // 3380 numbers, if a tenth off, would move one of these factors by more than this.
         assert!((found.0 - printed[0]).abs() < 1e-12 && (found.1 - printed[1]).abs() < 1e-12, "{found:?} {printed:?}");
     }
-    // vmf3.m at the node 37.5° N, 277.5° E of 2018-11-25, as Orekit's tests quote it to 1e-6; that program has no height.
+    // vmf3.m at the node 37.5° N, 277.5° E of 2018-11-25, as Orekit's tests quote it to 1e-6; that program
+    // has no height.
     let user = Geodetic::from_degrees(37.5, 277.5, 0.0);
     let a = MappingA { hydrostatic: 0.001_234_62, wet: 0.000_471_01 };
     let bc = own.at(user.latitude_rad, user.longitude_rad, 329.0);
@@ -137,8 +141,8 @@ fn a_mapping_grid_has_its_printed_values_at_its_nodes() {
         let west = grid.at(f64::to_radians(latitude), f64::to_radians(longitude - 360.0));
         assert!((west.hydrostatic - dry).abs() < 1e-14);
     }
-    // The whole mapping, for that node's factors at 5°: the mean year's day is half a day off the calendar's, which moves
-    // them by 1.1e-5 and 8e-7.
+    // The whole mapping, for that node's factors at 5°: the mean year's day is half a day off the calendar's,
+    // which moves them by 1.1e-5 and 8e-7.
     let mapping = Mapping::Vmf3(Coefficients::Grid(Box::new(grid)), Box::new(Vmf3::embedded().unwrap()));
     let at = Epoch::parse("2018-11-25T00:00:00").unwrap();
     let found = mapping.factors(Geodetic::from_degrees(37.5, 277.5, 0.0), 5_f64.to_radians(), at);

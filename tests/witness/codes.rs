@@ -1,5 +1,6 @@
-//! Every chip of every C/A code against digests that another program computed from the same tables.
+//! Every chip of every code against digests that another program computed from the same tables.
 
+use gnss_twin::gnss::galileo::e1::{self, Code};
 use gnss_twin::gnss::gps::l1ca::{CODE_CHIPS, code};
 use sha2::{Digest, Sha256};
 
@@ -12,15 +13,38 @@ fn all_chips_of_all_codes_are_those_of_another_program() {
     for line in CODES.lines().skip(1) {
         let column: Vec<&str> = line.split(',').collect();
         let chips: Vec<u8> = code(column[0].parse().unwrap()).unwrap().into_iter().map(u8::from).collect();
-        let word = |part: &[u8]| part.iter().fold(0_u32, |word, chip| word << 1 | u32::from(*chip));
         assert_eq!(chips.len(), CODE_CHIPS as usize);
-        assert_eq!(chips.iter().map(|chip| usize::from(*chip)).sum::<usize>().to_string(), column[1], "{line}");
-        assert_eq!(format!("{:06X}", word(&chips[..24])), column[2], "{line}");
-        assert_eq!(format!("{:06X}", word(&chips[chips.len() - 24..])), column[3], "{line}");
-        let digest: String = Sha256::digest(&chips).iter().map(|byte| format!("{byte:02x}")).collect();
-        assert_eq!(digest, column[4], "{line}");
+        holds(&chips, &column[1..], line);
         codes += 1;
     }
     assert_eq!(codes, 37);
     assert!(code(38).is_none());
+}
+
+/// Code, number, ones, first and last 24 chips in hexadecimal, SHA-256 of a byte 0 or 1 for each chip.
+const MEMORY_CODES: &str = include_str!("../../data/witness/e1_codes.csv");
+
+#[test]
+fn all_chips_of_all_memory_codes_are_those_of_another_program() {
+    let mut codes = 0;
+    for line in MEMORY_CODES.lines().skip(1) {
+        let column: Vec<&str> = line.split(',').collect();
+        let which = if column[0] == "E1B" { Code::Data } else { Code::Pilot };
+        let signs = e1::code(which, column[1].parse().unwrap()).unwrap();
+        let chips: Vec<u8> = signs.into_iter().map(|sign| u8::from(sign < 0)).collect();
+        assert_eq!(chips.len(), e1::CODE_CHIPS as usize);
+        holds(&chips, &column[2..], line);
+        codes += 1;
+    }
+    assert_eq!(codes, 100);
+}
+
+/// The number of ones, the first and last 24 chips and the digest of a code.
+fn holds(chips: &[u8], expected: &[&str], line: &str) {
+    let word = |part: &[u8]| part.iter().fold(0_u32, |word, chip| word << 1 | u32::from(*chip));
+    assert_eq!(chips.iter().map(|chip| usize::from(*chip)).sum::<usize>().to_string(), expected[0], "{line}");
+    assert_eq!(format!("{:06X}", word(&chips[..24])), expected[1], "{line}");
+    assert_eq!(format!("{:06X}", word(&chips[chips.len() - 24..])), expected[2], "{line}");
+    let digest: String = Sha256::digest(chips).iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_eq!(digest, expected[3], "{line}");
 }

@@ -40,8 +40,9 @@ pub fn keplerian<'a>(record: &'a [&'a str]) -> (Ephemeris, impl Fn(usize, usize)
     (set, v)
 }
 
-/// The path of a file under `GNSS_TWIN_DATA`, or `None` where it is not there. `tests/witness_skips.rs` reports at the end of
-/// the run what was missed: a line goes past the capture of test output at once, and a note to the build's directory.
+/// The path of a file under `GNSS_TWIN_DATA`, or `None` where it is not there. `tests/witness_skips.rs`
+/// reports at the end of the run what was missed: a line goes past the capture of test output at once, and a
+/// note to the build's directory.
 pub fn external(name: &str) -> Option<PathBuf> {
     let root = std::env::var_os("GNSS_TWIN_DATA").map_or_else(|| PathBuf::from("../shared/data"), PathBuf::from);
     let path = root.join(name);
@@ -53,7 +54,8 @@ pub fn external(name: &str) -> Option<PathBuf> {
     there.then_some(path)
 }
 
-/// Remembers whether this test found that file; other targets that include these modules leave the notes alone.
+/// Remembers whether this test found that file; other targets that include these modules leave the notes
+/// alone.
 fn note(name: &str, there: bool) {
     if env!("CARGO_CRATE_NAME") != "witness" {
         return;

@@ -136,8 +136,8 @@ fn real_subframes_decode_to_the_rinex_file_and_it_encodes_to_them() {
         for (word, mask) in carried(subframe.id).into_iter().enumerate() {
             assert_eq!(sent.data[word] & mask, subframe.data[word] & mask, "{sv} {} word {}", subframe.id, word + 1);
         }
-        // With what RINEX leaves out taken from the air, subframes 2 and 3 are the same words, parity included
-        // (from word 3 on: the telemetry message also decides the polarity of word 2).
+        // With what RINEX leaves out taken from the air, subframes 2 and 3 are the same words, parity
+        // included (from word 3 on: the telemetry message also decides the polarity of word 2).
         if subframe.id > 1 {
             let complete = Ephemeris { aodo: heard.aodo, ..record.clone() };
             assert_eq!(empty.subframe(&complete, start).unwrap()[2..], words[2..]);
@@ -195,10 +195,10 @@ fn real_pages_of_subframes_4_and_5_are_where_ours_are_and_say_what_ours_would() 
         }
         let derived = Almanac::derive(record, toa);
         let turn = |a: f64, b: f64| ((a - b) / (2.0 * GPS_PI) - ((a - b) / (2.0 * GPS_PI)).round()) * 2.0 * GPS_PI;
-        // A fitted almanac leaves out the half-daily terms that an ephemeris follows; measured at most 6e-5 rad along
-        // the orbit and 3.4e-5 rad in the node, held to three times that. The node's momentary rate differs by up to
-        // 1e-9 rad/s. A node of the wrong week would be 0.12 rad off, a missing
-        // correction of the mean motion 3.6e-4 rad along the orbit.
+        // A fitted almanac leaves out the half-daily terms that an ephemeris follows; measured at most 6e-5
+        // rad along the orbit and 3.4e-5 rad in the node, held to three times that. The node's momentary rate
+        // differs by up to 1e-9 rad/s. A node of the wrong week would be 0.12 rad off, a missing correction
+        // of the mean motion 3.6e-4 rad along the orbit.
         assert!((derived.eccentricity - almanac.eccentricity).abs() < 2e-4);
         assert!((derived.delta_i_rad - almanac.delta_i_rad).abs() < 2e-4);
         assert!(turn(derived.omega0_rad, almanac.omega0_rad).abs() < 1e-4);

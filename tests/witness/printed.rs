@@ -11,7 +11,8 @@ use gnss_twin::gnss::gps::lnav::{self, Field, Kind};
 use gnss_twin::gnss::time::Epoch;
 use nalgebra::Vector3;
 
-/// Subframe or page; parameter; first bit and length of each piece; signed; power of two of the scale; in semicircles.
+/// Subframe or page; parameter; first bit and length of each piece; signed; power of two of the scale; in
+/// semicircles.
 type Row = (&'static str, &'static str, &'static [(u16, u8)], bool, i32, bool);
 
 /// Figure 20-1 (sheets 1, 2, 3, 4 and 8) and tables 20-I, 20-III, 20-VI, 20-IX and 20-X.
@@ -139,10 +140,10 @@ fn every_field_of_the_message_has_the_printed_place_sign_and_scale() {
     assert_eq!(met, 59);
 }
 
-/// Galileo OS SIS ICD 2.1, tables 42 to 54 (places, from 0) and 57 to 68 (lengths and scales). Times in words
-/// 1 and 4 count minutes, t0UTC hours.
+/// Galileo OS SIS ICD 2.1, tables 42 to 54 (places, from 0) and 57 to 71 (lengths and scales). Times in words
+/// 1 and 4 count minutes, t0UTC and t0G hours, t0a ten minutes.
 #[rustfmt::skip]
-const INAV_FIELDS: [Row; 48] = [
+const INAV_FIELDS: [Row; 104] = [
     ("word 0", "week", &[(96, 12)], false, 0, false),
     ("word 0", "tow_s", &[(108, 20)], false, 0, false),
     ("word 1", "iodnav", &[(6, 10)], false, 0, false),
@@ -191,6 +192,62 @@ const INAV_FIELDS: [Row; 48] = [
     ("word 6", "utc_event_day", &[(94, 3)], false, 0, false),
     ("word 6", "utc_leap_after_s", &[(97, 8)], true, 0, false),
     ("word 6", "tow_s", &[(105, 20)], false, 0, false),
+    ("word 7", "almanac_issue", &[(6, 4)], false, 0, false),
+    ("word 7", "almanac_week", &[(10, 2)], false, 0, false),
+    ("word 7", "toa_10min", &[(12, 10)], false, 0, false),
+    ("word 7", "svid", &[(22, 6)], false, 0, false),
+    ("word 7", "delta_sqrt_a_sqrtm", &[(28, 13)], true, -9, false),
+    ("word 7", "eccentricity", &[(41, 11)], false, -16, false),
+    ("word 7", "omega_rad", &[(52, 16)], true, -15, true),
+    ("word 7", "delta_i_rad", &[(68, 11)], true, -14, true),
+    ("word 7", "omega0_rad", &[(79, 16)], true, -15, true),
+    ("word 7", "omega_dot_radps", &[(95, 11)], true, -33, true),
+    ("word 7", "m0_rad", &[(106, 16)], true, -15, true),
+    ("word 8", "almanac_issue", &[(6, 4)], false, 0, false),
+    ("word 8", "af0_s", &[(10, 16)], true, -19, false),
+    ("word 8", "af1_sps", &[(26, 13)], true, -38, false),
+    ("word 8", "e5b_health", &[(39, 2)], false, 0, false),
+    ("word 8", "e1b_health", &[(41, 2)], false, 0, false),
+    ("word 8", "svid", &[(43, 6)], false, 0, false),
+    ("word 8", "delta_sqrt_a_sqrtm", &[(49, 13)], true, -9, false),
+    ("word 8", "eccentricity", &[(62, 11)], false, -16, false),
+    ("word 8", "omega_rad", &[(73, 16)], true, -15, true),
+    ("word 8", "delta_i_rad", &[(89, 11)], true, -14, true),
+    ("word 8", "omega0_rad", &[(100, 16)], true, -15, true),
+    ("word 8", "omega_dot_radps", &[(116, 11)], true, -33, true),
+    ("word 9", "almanac_issue", &[(6, 4)], false, 0, false),
+    ("word 9", "almanac_week", &[(10, 2)], false, 0, false),
+    ("word 9", "toa_10min", &[(12, 10)], false, 0, false),
+    ("word 9", "m0_rad", &[(22, 16)], true, -15, true),
+    ("word 9", "af0_s", &[(38, 16)], true, -19, false),
+    ("word 9", "af1_sps", &[(54, 13)], true, -38, false),
+    ("word 9", "e5b_health", &[(67, 2)], false, 0, false),
+    ("word 9", "e1b_health", &[(69, 2)], false, 0, false),
+    ("word 9", "svid", &[(71, 6)], false, 0, false),
+    ("word 9", "delta_sqrt_a_sqrtm", &[(77, 13)], true, -9, false),
+    ("word 9", "eccentricity", &[(90, 11)], false, -16, false),
+    ("word 9", "omega_rad", &[(101, 16)], true, -15, true),
+    ("word 9", "delta_i_rad", &[(117, 11)], true, -14, true),
+    ("word 10", "almanac_issue", &[(6, 4)], false, 0, false),
+    ("word 10", "omega0_rad", &[(10, 16)], true, -15, true),
+    ("word 10", "omega_dot_radps", &[(26, 11)], true, -33, true),
+    ("word 10", "m0_rad", &[(37, 16)], true, -15, true),
+    ("word 10", "af0_s", &[(53, 16)], true, -19, false),
+    ("word 10", "af1_sps", &[(69, 13)], true, -38, false),
+    ("word 10", "e5b_health", &[(82, 2)], false, 0, false),
+    ("word 10", "e1b_health", &[(84, 2)], false, 0, false),
+    ("word 10", "ggto_a0_s", &[(86, 16)], true, -35, false),
+    ("word 10", "ggto_a1_sps", &[(102, 12)], true, -51, false),
+    ("word 10", "ggto_t0_h", &[(114, 8)], false, 0, false),
+    ("word 10", "ggto_week", &[(122, 6)], false, 0, false),
+    ("word 16", "delta_axis_m", &[(6, 5)], true, 8, false),
+    ("word 16", "ex", &[(11, 13)], true, -22, false),
+    ("word 16", "ey", &[(24, 13)], true, -22, false),
+    ("word 16", "delta_i_rad", &[(37, 17)], true, -22, true),
+    ("word 16", "omega0_rad", &[(54, 23)], true, -22, true),
+    ("word 16", "latitude_rad", &[(77, 23)], true, -22, true),
+    ("word 16", "af0_s", &[(100, 22)], true, -26, false),
+    ("word 16", "af1_sps", &[(122, 6)], true, -35, false),
 ];
 
 #[test]
@@ -264,7 +321,8 @@ fn a_word_s_parity_is_the_printed_one_and_one_wrong_bit_breaks_it() {
 
 #[test]
 fn weeks_begin_on_sunday_and_leap_seconds_are_those_of_the_bulletins() {
-    // Week 0 began at 1980-01-06T00:00:00; 2010-07-01 was a Thursday in week 1590. IERS Bulletins C 37 and C 52.
+    // Week 0 began at 1980-01-06T00:00:00; 2010-07-01 was a Thursday in week 1590. IERS Bulletins C 37 and C
+    // 52.
     for (utc, week, tow_s, leap_s) in [
         ("1980-01-06T00:00:00Z", 0, 0.0, 0),
         ("2010-07-01T00:00:00Z", 1590, 345_615.0, 15),
@@ -290,7 +348,8 @@ fn places_and_directions_are_the_published_ones() {
     let Look { azimuth_rad, .. } = towards(1e3, 0.0);
     assert!((azimuth_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
     assert!(towards(0.0, 1e3).azimuth_rad.abs() < 1e-12);
-    // A star over the Greenwich meridian stands over 15.04° W a sidereal hour's worth of rotation later: the axes turn east.
+    // A star over the Greenwich meridian stands over 15.04° W a sidereal hour's worth of rotation later: the
+    // axes turn east.
     let later = rotate_earth(&Vector3::new(1.0, 0.0, 0.0), 3600.0);
     assert!(later.y < 0.0 && (libm::atan2(-later.y, later.x) - 7.292_115_146_7e-5 * 3600.0).abs() < 1e-12);
 }

@@ -195,7 +195,8 @@ fn european_stations_of_2020_fit_the_model() {
     let Some(navigation) = outside("day177-2020/ESBC00DNK_R_20201770000_01D_MN.rnx.gz") else { return };
     for name in ["WTZR00DEU", "ESBC00DNK"] {
         let file = format!("day177-2020/{name}_R_20201770000_01D_30S_MO_120epoch.rnx.gz");
-        // At the known position 3 m of north, which another program finds in these files too, outweigh the ionosphere.
+        // At the known position 3 m of north, which another program finds in these files too, outweigh the
+        // ionosphere.
         check(name, &navigation, &outside(&file).unwrap(), None);
     }
 }

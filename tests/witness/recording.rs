@@ -1,5 +1,6 @@
 //! Acquisition on recordings that others made with real antennas.
 
+use gnss_twin::gnss::galileo::e1::E1;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::samples::{Format, IfMetadata};
 use gnss_twin::gnss::satellite::Sv;
@@ -42,7 +43,8 @@ fn read(name: &str, format: Format) -> Option<(Vec<f32>, Vec<f32>)> {
     Some((i, q))
 }
 
-/// Exactly these satellites, each within `tolerance_hz` of the Doppler that another program listed, if it listed one.
+/// Exactly these satellites, each within `tolerance_hz` of the Doppler that another program listed, if it
+/// listed one.
 fn assert_found(found: &[Acquired], listed: &[(u8, Option<f64>)], tolerance_hz: f64) {
     let mut expected: Vec<u8> = listed.iter().map(|(prn, _)| *prn).collect();
     expected.sort_unstable();
@@ -60,8 +62,9 @@ fn assert_found(found: &[Acquired], listed: &[(u8, Option<f64>)], tolerance_hz: 
 fn a_complex_recording_holds_the_satellites_that_others_found_in_it() {
     let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
     let metadata = metadata(Format::Ci8, 4e6, 0.0);
-    // The recording holds strong signals of other systems with codes of the same family near 0 Hz, whose cross-correlation crowds
-    // the bins at whole kilohertz: the threshold of noise alone brought up to six false satellites a window.
+    // The recording holds strong signals of other systems with codes of the same family near 0 Hz, whose
+    // cross-correlation crowds the bins at whole kilohertz: the threshold of noise alone brought up to six
+    // false satellites a window.
     let windows = [400_000, 800_000, 1_200_000, 1_600_000]
         .map(|start| acquire(&metadata, &i[start..], &q[start..], &AcquisitionSettings::default()));
     let listed = [
@@ -79,7 +82,8 @@ fn a_complex_recording_holds_the_satellites_that_others_found_in_it() {
     }
     for (prn, doppler_hz) in listed {
         let hits: Vec<&Acquired> = windows.iter().flatten().filter(|hit| hit.sv.number == prn).collect();
-        // Two of 35 to 37 dB-Hz have a mean statistic of 170 ± 25 there, where crowded bins ask for up to 138: one window in ten.
+        // Two of 35 to 37 dB-Hz have a mean statistic of 170 ± 25 there, where crowded bins ask for up to
+        // 138: one window in ten.
         assert!(hits.len() >= 3, "{prn} in {} windows", hits.len());
         // The list is on a grid of 250 Hz.
         assert!(
@@ -91,9 +95,9 @@ fn a_complex_recording_holds_the_satellites_that_others_found_in_it() {
 
 #[test]
 fn a_recording_with_a_mirrored_spectrum_shows_it_in_its_code_doppler() {
-    // From the list alone the sense of this recording's spectrum cannot be told. Code and carrier Doppler agree
-    // (f/1540 chips a second) in one sense only: in the other the code phases found 0.4 s apart contradict it by
-    // 2 f/1540 x 0.4 s = 1.7 chips at 3250 Hz.
+    // From the list alone the sense of this recording's spectrum cannot be told. Code and carrier Doppler
+    // agree (f/1540 chips a second) in one sense only: in the other the code phases found 0.4 s apart
+    // contradict it by 2 f/1540 x 0.4 s = 1.7 chips at 3250 Hz.
     let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
     let settings = AcquisitionSettings::default();
     let later = 1_600_000;
@@ -123,7 +127,8 @@ fn a_real_recording_at_an_if_holds_the_satellites_that_others_found_in_it() {
     let prns = [13, 20, 5, 15, 11, 30, 29, 2, 18, 24, 28];
     assert_found(&found, &prns.map(|prn| (prn, None)), 0.0);
     let later = 600_000;
-    // These two are the weakest: they need more of the recording and a threshold that lets a thousandth of noise through.
+    // These two are the weakest: they need more of the recording and a threshold that lets a thousandth of
+    // noise through.
     let longer = AcquisitionSettings { noncoherent_sums: 20, false_alarm_probability: 1e-3, ..settings };
     let again = acquire(&metadata, &i[later..], &q[later..], &longer);
     for prn in [24, 28] {
@@ -192,7 +197,8 @@ fn one_bit_snapshots_hold_only_satellites_that_were_up() {
         }
     }
     println!("{times_found:?}");
-    // PRN 18 is not in the list but found twice, three snapshots apart, at the same Doppler and a code phase that fits.
+    // PRN 18 is not in the list but found twice, three snapshots apart, at the same Doppler and a code phase
+    // that fits.
     assert!(
         (1..33).all(|prn| times_found[prn] == 0 || [5, 7, 13, 14, 15, 18, 20, 30].contains(&prn)),
         "{times_found:?}"
@@ -218,16 +224,16 @@ fn half_a_second_of_real_signal_tracks_with_steady_power_and_bit_edges_twenty_mi
         let rows = &report.rows[250..];
         assert!(rows.len() > 240, "{}", rows.len());
 
-        // Signal to noise of a 1 ms prompt at 47 dB-Hz is 20 dB: its magnitude wanders by a tenth, so a mean of
-        // 240 by 1 %, and the halves of the stretch agree to 5 %.
+        // Signal to noise of a 1 ms prompt at 47 dB-Hz is 20 dB: its magnitude wanders by a tenth, so a mean
+        // of 240 by 1 %, and the halves of the stretch agree to 5 %.
         let magnitude = |rows: &[gnss_twin::gnss::record::TrackingRow]| {
             rows.iter().map(|row| libm::hypot(row.prompt_i, row.prompt_q)).sum::<f64>() / rows.len() as f64
         };
         let (first, second) = rows.split_at(rows.len() / 2);
         let ratio = magnitude(first) / magnitude(second);
         assert!((ratio - 1.0).abs() < 0.05, "PRN {prn}: {ratio}");
-        // The in-phase prompts hold the signal, the quadrature ones its noise and what phase jitter leaks. Estimates by
-        // other programs differ by a decibel and a half.
+        // The in-phase prompts hold the signal, the quadrature ones its noise and what phase jitter leaks.
+        // Estimates by other programs differ by a decibel and a half.
         let quadrature = rows.iter().map(|row| row.prompt_q * row.prompt_q).sum::<f64>() / rows.len() as f64;
         let in_phase = rows.iter().map(|row| row.prompt_i.abs()).sum::<f64>() / rows.len() as f64;
         let measured = 10.0 * libm::log10(in_phase * in_phase / (2.0 * 1e-3 * quadrature));
@@ -240,4 +246,62 @@ fn half_a_second_of_real_signal_tracks_with_steady_power_and_bit_edges_twenty_mi
         assert!(edges.len() >= 3, "{edges:?}");
         assert!(edges.iter().all(|edge| edge % 20 == edges[0] % 20), "PRN {prn}: {edges:?}");
     }
+}
+
+/// Searches for Galileo E1 alone: data and pilot for as long as `settings` say.
+fn acquire_e1(metadata: &IfMetadata, i: &[f32], q: &[f32], settings: &AcquisitionSettings) -> Vec<Acquired> {
+    let settings = AcquisitionSettings { signals: vec![E1.name.to_owned()], ..settings.clone() };
+    let mut searcher = Searcher::new(metadata, &settings).unwrap();
+    let candidates: Vec<Link> =
+        E1.satellites().map(|sv| E1.link(sv)).filter(|link| link.is_of_constellation()).collect();
+    let rows = searcher.search(&Block { first: 0, i, q }, &candidates).unwrap();
+    for (row, _) in rows.iter().filter(|(row, _)| row.statistic > 0.8 * row.threshold) {
+        println!(
+            "{} {} {:9.1} Hz {:7.2} chips {:5.1} dB-Hz  {:.1}/{:.1}",
+            row.sv, row.acquired, row.doppler_hz, row.code_phase_chips, row.cn0_dbhz, row.statistic, row.threshold
+        );
+    }
+    rows.iter().filter_map(|(_, hit)| *hit).collect()
+}
+
+#[test]
+fn a_recording_holds_the_galileo_satellites_that_others_found_in_it() {
+    let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
+    let metadata = IfMetadata { inverted: true, ..metadata(Format::Ci8, 4e6, 0.0) };
+    let settings = AcquisitionSettings { coherent_periods: 4, noncoherent_sums: 25, ..AcquisitionSettings::default() };
+    let found = acquire_e1(&metadata, &i, &q, &settings);
+    // Number 19 is not in the list, which ends at stronger ones: 36 dB-Hz, 20 % above its threshold.
+    let listed = [27, 30, 7, 15, 21, 20, 19];
+    let numbers: Vec<u8> = found.iter().map(|hit| hit.sv.number).collect();
+    assert!(numbers.iter().all(|number| listed.contains(number)), "{numbers:?}");
+    assert_eq!(numbers.len(), listed.len(), "{numbers:?}");
+}
+
+/// Two bits a sample, real, four in a byte from the low bits on, at 20 Msps and an IF of 5 000 446 Hz.
+fn two_bits(name: &str) -> Option<Vec<f32>> {
+    let bytes = std::fs::read(external(name)?).unwrap();
+    let value = |pair: u8| [1.0, 3.0, -3.0, -1.0][usize::from(pair & 3)];
+    Some(bytes.iter().flat_map(|byte| (0..4).map(move |place| value(byte >> (2 * place)))).collect())
+}
+
+#[test]
+fn a_recording_of_2016_holds_four_galileo_satellites_where_another_program_found_them() {
+    let Some(i) = two_bits("if-signals/ifen_e1_2016-01-19_20msps_r2bit.bin") else { return };
+    let q = vec![0.0; i.len()];
+    let metadata = metadata(Format::Ri8, 20e6, 5_000_446.0);
+    let settings = AcquisitionSettings { coherent_periods: 4, noncoherent_sums: 9, ..AcquisitionSettings::default() };
+    let found = acquire_e1(&metadata, &i, &q, &settings);
+    // Doppler to a grid of 125 Hz and the delay in chips of the first sample, of E1-C.
+    let listed = [(12, -1000.0, 3530.9), (19, -250.0, 943.2), (11, 1625.0, 905.0), (30, -500.0, 3968.8)];
+    // The list has the four strongest: number 20 is weaker than three of them, at 1.7 times its threshold.
+    let numbers: Vec<u8> = found.iter().map(|hit| hit.sv.number).collect();
+    let known = |number: &u8| *number == 20 || listed.iter().any(|(known, ..)| known == number);
+    assert!(numbers.iter().all(known), "{numbers:?}");
+    for (number, doppler_hz, delay_chips) in listed {
+        let Some(hit) = found.iter().find(|hit| hit.sv.number == number) else { continue };
+        assert!((hit.doppler_hz - doppler_hz).abs() < 100.0, "{hit:?}, listed at {doppler_hz} Hz");
+        let apart = |sign: f64| libm::remainder(sign * hit.code_phase_chips - delay_chips, 4092.0).abs();
+        assert!(apart(1.0).min(apart(-1.0)) < 0.3, "{hit:?}, listed at {delay_chips} chips");
+    }
+    assert_eq!(numbers.len(), 5, "{numbers:?}");
 }

@@ -32,8 +32,8 @@ fn deviations_at_every_averaging_time_are_those_of_stable32() {
             let (m, terms, printed) = (row[0] as usize, row[2] as usize, row[5]);
             let estimate = deviation.estimate(&x, 1.0, m).unwrap();
             assert_eq!(estimate.terms, terms, "{deviation:?} {m}");
-            // Five digits are printed. One value of 852 lies 1.4e-3 of a unit beyond the half: a time deviation that is
-            // 0.788355013 and was printed as 0.78835.
+            // Five digits are printed. One value of 852 lies 1.4e-3 of a unit beyond the half: a time
+            // deviation that is 0.788355013 and was printed as 0.78835.
             let unit = libm::pow(10.0, libm::log10(printed).floor() - 4.0);
             let off = (estimate.deviation - printed).abs() / unit;
             assert!(off < 0.502, "{deviation:?} {m}: {} against {printed}", estimate.deviation);

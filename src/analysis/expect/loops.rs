@@ -254,6 +254,8 @@ pub(in crate::analysis) struct Theory {
     pub update_s: f64,
     pub chip_m: f64,
     carrier_hz: f64,
+    /// Power of the component whose carrier is followed, over the signal's.
+    carrier_share: f64,
     pll: (PhaseLoop, Response),
     dll: (PhaseLoop, Response),
     /// Of signal and noise.
@@ -283,6 +285,7 @@ impl Theory {
             update_s,
             chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
             carrier_hz: link.carrier_hz(),
+            carrier_share: leading(link.signal)?.power_share,
             pll: (pll, Response::of(&pll)),
             dll: (dll, Response::of(&dll)),
             peaks: (
@@ -294,10 +297,11 @@ impl Theory {
         })
     }
 
-    /// Raw and thermal sigma, in the loop's unit.
+    /// Raw and thermal sigma, in the loop's unit. Carrier loops follow the leading component alone, for
+    /// others have data or overlays of their own; codes are taken from all.
     pub fn noise(&self, which: Loop, cn0_hz: f64) -> (f64, f64) {
         let update_s = self.update_s;
-        let phase_rad = pll::raw_rad(update_s, cn0_hz);
+        let phase_rad = pll::raw_rad(update_s, cn0_hz * self.carrier_share);
         let (loop_, code) = (&self.pll.1, &self.dll.1);
         match which {
             Loop::Dll => {

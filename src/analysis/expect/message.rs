@@ -33,16 +33,16 @@ impl Message {
     /// Of a run's truth.
     pub fn of(run: &Run) -> Self {
         let Some(near) = run.trajectory.first().map(|row| row.time()) else { return Self::default() };
-        let mut groups: BTreeMap<(Sv, u32), Vec<&NavigationRow>> = BTreeMap::new();
+        let mut groups: BTreeMap<(Sv, &str, u32), Vec<&NavigationRow>> = BTreeMap::new();
         for row in &run.truth_navigation {
-            groups.entry((row.sv, row.issue)).or_default().push(row);
+            groups.entry((row.sv, &row.message, row.issue)).or_default().push(row);
         }
         let mut message = Self::default();
-        for ((sv, issue), rows) in &groups {
+        for ((sv, name, issue), rows) in &groups {
             // What a set has beside its issue is sent for all issues alike.
-            let common = groups.get(&(*sv, 0)).into_iter().flatten();
+            let common = groups.get(&(*sv, *name, 0)).into_iter().flatten();
             let all: Vec<&NavigationRow> = rows.iter().chain(common).copied().collect();
-            if let Some(set) = set(run, (*sv, *issue), &all, near).filter(|set| u32::from(set.iode) == *issue) {
+            if let Some(set) = set(run, (*sv, name, *issue), &all, near).filter(|set| u32::from(set.iode) == *issue) {
                 message.sets.entry(*sv).or_default().push((*issue, set));
             }
             message.klobuchar = message.klobuchar.or_else(|| klobuchar(rows));
@@ -53,7 +53,7 @@ impl Message {
 
     /// Whether every set of a satellite says that it is healthy.
     pub fn says_healthy(&self, sv: Sv) -> bool {
-        self.sets.get(&sv).is_none_or(|sets| sets.iter().all(|(_, set)| set.health == 0))
+        self.sets.get(&sv).is_none_or(|sets| sets.iter().all(|(_, set)| set.is_healthy()))
     }
 
     /// The set of a satellite that the receiver had read last at `sample`, or else the one whose reference
@@ -93,9 +93,9 @@ fn words(table: &str, rows: &[&NavigationRow]) -> Option<[u32; 10]> {
     Some(data)
 }
 
-/// The set in those rows, by the message of one of the satellite's signals.
-fn set(run: &Run, (sv, issue): (Sv, u32), rows: &[&NavigationRow], near: Epoch) -> Option<Ephemeris> {
-    messages(run, sv).find_map(|(message, time)| {
+/// The set in those rows, by the message of one of the satellite's signals that has that name.
+fn set(run: &Run, (sv, name, issue): (Sv, &str, u32), rows: &[&NavigationRow], near: Epoch) -> Option<Ephemeris> {
+    messages(run, sv).filter(|(message, _)| message.name == name).find_map(|(message, time)| {
         // What bears an issue is never taken from another one.
         let bound = (message.set_parameters)();
         let own = |row: &&&NavigationRow| row.issue == issue || !bound.contains(&row.parameter.as_str());

@@ -5,7 +5,7 @@
 //! half cycle of a Costas loop; where the count began anew (another lock) it has none. The cause is the first
 //! of these that the half second before it shows: the signal is not there or fell by [`FADE_DB`];
 //! interference takes [`JAMMED_DB`] and leaves less than the loop needs; the true motion leaves a phase error
-//! of which 3σ + θ > 45° (the loop of the receiver's settings, [`crate::analysis::expect::loops`]); noise
+//! of which 3σ + θ > 45° (the loop of the receiver's settings, `expect::loops`); noise
 //! alone breaks that rule. What is left is unexplained. Limits: causes are those that the truth's rows, a
 //! tenth of a second apart, can show.
 

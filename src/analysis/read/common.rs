@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::delay;
 use crate::analysis::waveform::Waveform;
-use crate::gnss::facts::{FilterSpec, SceneFacts, StageSpec};
+use crate::gnss::facts::{FilterSpec, SceneFacts, filters, oscillator_offset_hz};
 use crate::gnss::record::Observation;
 use crate::gnss::signal::{Link, Signal};
 
@@ -39,11 +39,15 @@ impl Common {
         Self { rate_hz, ..Self::default() }
     }
 
-    /// Takes what a scene's facts say, for the rows counted so far and a code loop of that spacing.
-    pub(super) fn set_front_end(&mut self, scene: &SceneFacts, spacing_chips: f64) {
-        let offset_hz =
-            |stage: &StageSpec| if let StageSpec::LocalOscillator { offset_hz } = stage { *offset_hz } else { 0.0 };
-        let offset_hz: f64 = scene.front_end.iter().map(offset_hz).sum();
+    /// Takes what a scene's facts say, for the rows counted so far and a code loop of that spacing;
+    /// `received` gives the front end in which a signal is received, by its place.
+    pub(super) fn set_front_end(
+        &mut self,
+        scene: &SceneFacts,
+        spacing_chips: f64,
+        received: &dyn Fn(&Signal) -> usize,
+    ) {
+        let offset_hz = oscillator_offset_hz(&scene.front_end);
         self.doppler_hz = if scene.inverted { -offset_hz } else { offset_hz };
         self.satellites.clear();
         for link in self.last.keys() {
@@ -51,8 +55,9 @@ impl Common {
         }
         let delay_s = |signal: &&'static Signal| {
             let code = Waveform::of(signal)?;
-            let of = |filter: &FilterSpec| delay::code_delay_s(filter, &code, scene.sample_rate_hz, spacing_chips);
-            Some((*signal, scene.filters().map(of).sum()))
+            let (stages, rate_hz) = scene.stages(received(signal));
+            let of = |filter: &FilterSpec| delay::code_delay_s(filter, &code, rate_hz, spacing_chips);
+            Some((*signal, filters(stages).map(of).sum()))
         };
         self.code_delays_s = self.satellites.keys().filter_map(delay_s).collect();
     }

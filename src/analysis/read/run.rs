@@ -16,7 +16,7 @@ use super::files::{believable, dated, each, json, missing, optional, rows, text}
 use crate::analysis::error::JudgeError;
 use crate::analysis::read::spill_store::SpillStore;
 use crate::analysis::statistics::{mean, median};
-use crate::gnss::facts::SceneFacts;
+use crate::gnss::facts::{FrontEndFacts, SceneFacts};
 use crate::gnss::record::{
     AcquisitionRow, EventRow, Fix, InterferenceRow, LineRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
     TrajectoryRow,
@@ -152,7 +152,15 @@ impl Run {
         };
         read.receiver = json(&rx.join("receiver.json"))?.unwrap_or(Value::Null);
         if let Some(spacing_chips) = read.tracking_setting("spacing_chips") {
-            read.common.set_front_end(&read.scene, spacing_chips);
+            let front_ends = read.receiver.pointer("/front_ends").and_then(Value::as_array);
+            let received = |signal: &Signal| {
+                let has = |one: &Value| {
+                    let names = one.get("signals").and_then(Value::as_array);
+                    names.is_some_and(|names| names.iter().any(|name| name.as_str() == Some(signal.name)))
+                };
+                front_ends.and_then(|all| all.iter().position(has)).unwrap_or(0)
+            };
+            read.common.set_front_end(&read.scene, spacing_chips, &received);
         }
         read.psd = optional(&run.join("psd.csv"))?;
         read.speed = json(&run.join("speed.json"))?.unwrap_or_default();
@@ -162,16 +170,23 @@ impl Run {
     /// Reads a truth alone, for a receiver that writes files of its own.
     pub fn read_truth(truth: &Path) -> Result<Self, JudgeError> {
         // A truth may lie where nothing can be written.
-        Self::read_truth_by(truth, &std::env::temp_dir())
+        let read = Self::read_truth_by(truth, &std::env::temp_dir())?;
+        if read.scene.front_ends.len() > 1 {
+            let expected = "one: a receiver's samples are those of one front end, whose truth `gnss-twin generate \
+                            --front-end NAME` writes";
+            let value = read.scene.front_ends.len() as f64;
+            return Err(JudgeError::Scene { key: "front_ends", value, expected });
+        }
+        Ok(read)
     }
 
     fn read_truth_by(truth: &Path, directory: &Path) -> Result<Self, JudgeError> {
         let scene = truth.join("scene.json");
         let mut scene: SceneFacts = json(&scene)?.ok_or_else(|| missing(&scene, TRUTH))?;
-        if scene.front_ends.len() > 1 {
-            let expected = "one: a receiver's samples are those of one front end, whose truth `gnss-twin generate \
-                            --front-end NAME` writes";
-            return Err(JudgeError::Scene { key: "front_ends", value: scene.front_ends.len() as f64, expected });
+        let own_hz = |place: usize| scene.front_ends.get(place).map_or(0.0, FrontEndFacts::doppler_hz);
+        if let Some(other) = (1..scene.front_ends.len()).find(|place| own_hz(*place) != own_hz(0)) {
+            let expected = "the offset of the first front end: Dopplers are judged against one of all";
+            return Err(JudgeError::Scene { key: "front_end.local_oscillator", value: own_hz(other), expected });
         }
         let (mut cn0_sums_hz, mut cn0_most_hz) = (HashMap::new(), HashMap::new());
         let mut common = Common::new(scene.sample_rate_hz);
@@ -183,7 +198,7 @@ impl Run {
             common.add(row);
         })?;
         Self::fold(&mut scene, &Emission::all(observed.keys()))?;
-        common.set_front_end(&scene, USUAL_SPACING_CHIPS);
+        common.set_front_end(&scene, USUAL_SPACING_CHIPS, &|_| 0);
         let (mut ionosphere_m, mut troposphere_m) = (0.0_f64, 0.0_f64);
         let (mut first, mut in_view_at_start) = (u64::MAX, BTreeSet::new());
         let mut sky = SpillStore::new(directory);

@@ -91,7 +91,7 @@ pub fn write_psd(path: &Path, psd: &Psd) -> Result<(), JudgeError> {
     write_rows(path, rows.into_iter())
 }
 
-/// Writes the tables of a run's measurements, all but those of [`write`].
+/// Writes the tables of a run's measurements, all but those of [`write()`].
 pub(in crate::analysis) fn write_measured(
     directory: &Path,
     judged: &Judged<'_>,

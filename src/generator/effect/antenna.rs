@@ -1,8 +1,9 @@
 //! The receiving antenna: gain and phase over direction, in the axes of the body that carries it.
 //!
-//! Patterns are a function of azimuth from the antenna's north over its east and of elevation above its plane. On
-//! a body with an attitude north leans towards the nose; else antenna and local axes are the same. A table is
-//! linear in dB and in degrees of phase between its directions. Limits: one polarisation, one frequency.
+//! Patterns are a function of azimuth from the antenna's north over its east and of elevation above its
+//! plane. On a body with an attitude north leans towards the nose; else antenna and local axes are the same.
+//! A table is linear in dB and in degrees of phase between its directions. Limits: one polarisation, one
+//! frequency.
 
 use std::fmt;
 use std::io::Read;
@@ -41,7 +42,7 @@ const DEEPEST_DB: f64 = -60.0;
 /// Directions of a table at most.
 const MAX_DIRECTIONS: usize = 1 << 20;
 
-/// How an antenna hears over direction.
+/// Gain and phase of an antenna by direction.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pattern {
     /// 0 dBic everywhere.
@@ -96,6 +97,7 @@ pub(super) fn gain_db(curve: &Curve, angle_deg: f64) -> f64 {
 /// An antenna, and the body that turns it.
 #[derive(Clone, Debug)]
 pub struct Antenna {
+    /// Gain and phase by direction.
     pub pattern: Pattern,
     /// Scene's start and the motion of the body, if it has an attitude.
     pub body: Option<(Epoch, Arc<Trajectory>)>,
@@ -140,16 +142,50 @@ pub struct Table {
 /// Why a table is refused.
 #[derive(Debug, Error)]
 pub enum PatternError {
+    /// A table that is no CSV file.
     #[error("{name}: {source}; expected columns azimuth_deg, elevation_deg, gain_dbic, phase_deg")]
-    Csv { name: String, source: csv::Error },
+    Csv {
+        /// The file.
+        name: String,
+        /// What the CSV reader reports.
+        source: csv::Error,
+    },
+    /// A number that is out of range.
     #[error("{name}, row {row}: {column} = {value}: expected {expected}")]
-    Value { name: String, row: usize, column: &'static str, value: f64, expected: &'static str },
+    Value {
+        /// The file.
+        name: String,
+        /// Line of the table, from 1.
+        row: usize,
+        /// Its column.
+        column: &'static str,
+        /// The value that stands there.
+        value: f64,
+        /// What is expected.
+        expected: &'static str,
+    },
+    /// Rows that form no complete grid of azimuths and elevations.
     #[error("{name}: {rows} rows for {azimuths} azimuths and {elevations} elevations: expected each pair once")]
-    Grid { name: String, rows: usize, azimuths: usize, elevations: usize },
+    Grid {
+        /// The file.
+        name: String,
+        /// Rows found.
+        rows: usize,
+        /// Different azimuths.
+        azimuths: usize,
+        /// Different elevations.
+        elevations: usize,
+    },
+    /// Azimuths that are not equally spaced over the whole circle.
     #[error(
         "{name}: the phase changes by {step_deg:.1} deg between neighbours: expected less than 180; add or subtract turns"
     )]
-    Wrap { name: String, step_deg: f64 },
+    Wrap {
+        /// The file.
+        name: String,
+        /// The spacing found.
+        step_deg: f64,
+    },
 }
 
 #[derive(Deserialize)]
@@ -161,7 +197,8 @@ struct Row {
 }
 
 impl Table {
-    /// Reads a CSV table; `name` stands in errors. Directions may come in any order but must make a whole grid.
+    /// Reads a CSV table; `name` stands in errors. Directions may come in any order but must make a whole
+    /// grid.
     ///
     /// # Errors
     /// [`PatternError`] with row and column.
@@ -297,7 +334,8 @@ mod tests {
 
     #[test]
     fn a_turnstile_radiates_what_it_is_fed_with() {
-        // Mean over the sphere of the gain for its own polarisation: one half, the other half is of the other sense.
+        // Mean over the sphere of the gain for its own polarisation: one half, the other half is of the other
+        // sense.
         let steps = 2000;
         let mean = (0..steps).map(|k| (f64::from(k) + 0.5) / f64::from(steps) * 2.0 - 1.0).map(|sin| {
             let elevation_rad = libm::asin(sin);

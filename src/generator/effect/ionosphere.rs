@@ -29,6 +29,7 @@ const L1_HZ: f64 = 1_575.42e6;
 /// Klobuchar's ionosphere with smooth edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KlobucharIonosphere {
+    /// The model's eight coefficients.
     pub model: Klobuchar,
 }
 

@@ -1,9 +1,9 @@
 //! Carrier power over noise density: a link budget from transmitter to receiver, or a fixed value.
 //!
-//! C/N0 = P_t + G_t(off-nadir) − 20 lg(4πRf/c) − L_a + G_r(direction) − N0 − L_i, in dB (Friis). Transmit patterns
-//! are means of a block of satellites, as published, or that of a typical shaped L1 beam (Kaplan & Hegarty; beyond the
-//! Earth's edge at 13.9° it falls away as the mean of Block IIR). Limits: patterns are means over azimuth, not those of
-//! one satellite; beyond their last angle they keep its gain.
+//! C/N0 = P_t + G_t(off-nadir) − 20 lg(4πRf/c) − L_a + G_r(direction) − N0 − L_i, in dB (Friis). Transmit
+//! patterns are means of a block of satellites, as published, or that of a typical shaped L1 beam (Kaplan &
+//! Hegarty; beyond the Earth's edge at 13.9° it falls away as the mean of Block IIR). Limits: patterns are
+//! means over azimuth, not those of one satellite; beyond their last angle they keep its gain.
 
 use super::antenna::{Antenna, Curve, Pattern, gain_db};
 use super::transmit::Block;
@@ -16,7 +16,8 @@ use crate::gnss::signal::Signal;
 /// k·T0 in dBW/Hz as the budget rounds it: a matched source at 290 K gives −203.98.
 const REFERENCE_NOISE_DBWHZ: f64 = -204.0;
 
-/// Height of a GPS orbit's lowest point: 26 560 km less 2 % (plausible eccentricities) less the Earth's radius.
+/// Height of a GPS orbit's lowest point: 26 560 km less 2 % (plausible eccentricities) less the Earth's
+/// radius.
 const ZENITH_RANGE_M: f64 = 1.965e7;
 
 /// A link budget; [`LinkBudget::default`] is a GPS L1 C/A satellite and an ordinary receiver.
@@ -31,6 +32,7 @@ pub struct LinkBudget {
     pub blocks: Vec<(Sv, Block)>,
     /// Atmospheric and polarisation losses.
     pub path_loss_db: f64,
+    /// The receiving antenna.
     pub antenna: Antenna,
     /// Noise figure of the receiver, against 290 K.
     pub noise_figure_db: f64,
@@ -133,6 +135,7 @@ impl Effect for LinkBudget {
 /// The same C/N0 for every satellite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixedCn0 {
+    /// C/N0 of every satellite, in dB-Hz.
     pub cn0_dbhz: f64,
 }
 

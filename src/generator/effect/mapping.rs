@@ -25,14 +25,18 @@ const WINTER_DAY: f64 = 28.0;
 pub enum Mapping {
     /// A flat atmosphere: 1/sin of the elevation for both parts.
     Cosecant,
+    /// Niell's functions of latitude, height and day.
     Niell,
+    /// VMF1's functions of coefficients a.
     Vmf1(Coefficients),
+    /// VMF3's functions of coefficients a, and the harmonics of b and c.
     Vmf3(Coefficients, Box<Vmf3>),
 }
 
 /// Where VMF's coefficients a come from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Coefficients {
+    /// From a grid of TU Wien's, by place and time.
     Grid(Box<MappingGrid>),
     /// The climatology.
     Gpt3(Box<Gpt3>),
@@ -101,7 +105,8 @@ fn height_correction(sin: f64, height_m: f64) -> f64 {
     (1.0 / sin - herring(sin, HEIGHT)) * height_m * 1e-3
 }
 
-/// VMF1's hydrostatic and wet mapping factors with coefficients `a` at zero height, by day of year (from 1.0).
+/// VMF1's hydrostatic and wet mapping factors with coefficients `a` at zero height, by day of year (from
+/// 1.0).
 ///
 /// Böhm et al. 2006, equations 3 to 6 and table 1; the factors hold still below [`LOWEST_RAD`].
 pub fn vmf1(a: MappingA, user: Geodetic, elevation_rad: f64, day_of_year: f64) -> (f64, f64) {
@@ -113,7 +118,8 @@ pub fn vmf1(a: MappingA, user: Geodetic, elevation_rad: f64, day_of_year: f64) -
     (dry, herring(sin, [a.wet, 0.00146, 0.04391]))
 }
 
-/// VMF3's hydrostatic and wet mapping factors with coefficients `a` at zero height, and `bc` of the place and day.
+/// VMF3's hydrostatic and wet mapping factors with coefficients `a` at zero height, and `bc` of the place and
+/// day.
 ///
 /// Landskron & Böhm 2018; the factors hold still below [`LOWEST_RAD`].
 pub fn vmf3(a: MappingA, bc: MappingBc, user: Geodetic, elevation_rad: f64) -> (f64, f64) {
@@ -182,8 +188,8 @@ mod tests {
 
     #[test]
     fn vmf1_is_the_conventions_worked_example() {
-        // IERS Conventions 2010, software of chapter 9, VMF1_HT: modified Julian date 55 055, latitude 0.6708665767,
-        // height 824.17 m, zenith distance 1.278564131; day 1.0 of the formula is MJD 44 239.
+        // IERS Conventions 2010, software of chapter 9, VMF1_HT: modified Julian date 55 055, latitude
+        // 0.6708665767, height 824.17 m, zenith distance 1.278564131; day 1.0 of the formula is MJD 44 239.
         let user = Geodetic { latitude_rad: 0.670_866_576_7, longitude_rad: 0.0, height_m: 824.17 };
         let a = MappingA { hydrostatic: 0.001_276_83, wet: 0.000_609_55 };
         let (dry, wet) = vmf1(a, user, FRAC_PI_2 - 1.278_564_131, 55_055.0 - 44_239.0 + 1.0);
@@ -193,8 +199,9 @@ mod tests {
 
     #[test]
     fn vmf1_with_vmf3_s_coefficients_departs_from_vmf3_by_what_the_module_says() {
-        // Greenbelt, 2018-11-25: a_h = 0.00123462, a_w = 0.00047101 and the factors 1.621024 and 1.623023 at 38°, from
-        // vmf3.m of TU Wien as Orekit's tests quote them. At 38° b and c hardly count: 6e-5 of 2.2 m are 0.1 mm.
+        // Greenbelt, 2018-11-25: a_h = 0.00123462, a_w = 0.00047101 and the factors 1.621024 and 1.623023 at
+        // 38°, from vmf3.m of TU Wien as Orekit's tests quote them. At 38° b and c hardly count: 6e-5 of 2.2
+        // m are 0.1 mm.
         let user = Geodetic::from_degrees(37.5, 277.5, 824.0);
         let a = MappingA { hydrostatic: 0.001_234_62, wet: 0.000_471_01 };
         let (dry, wet) = vmf1(a, user, 38_f64.to_radians(), 329.0);

@@ -19,16 +19,30 @@ use crate::gnss::time::Epoch;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Detour {
     /// The excess at the scene's start and its rate.
-    Given { excess_m: f64, rate_mps: f64 },
+    Given {
+        /// Path beyond the direct one at the scene's start.
+        excess_m: f64,
+        /// Growth of that excess a second.
+        rate_mps: f64,
+    },
     /// Level ground, which keeps its distance to the antenna.
-    Ground { height_m: f64 },
+    Ground {
+        /// Height of the antenna above the ground.
+        height_m: f64,
+    },
     /// A vertical plane in a direction (from north over east) that stays where it is while the antenna moves.
-    Wall { azimuth_rad: f64, distance_m: f64 },
+    Wall {
+        /// Azimuth of the wall as seen from the antenna.
+        azimuth_rad: f64,
+        /// Distance of the wall.
+        distance_m: f64,
+    },
 }
 
 /// One reflected ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Echo {
+    /// How much longer its way is.
     pub detour: Detour,
     /// Of the direct ray's.
     pub amplitude: f64,
@@ -41,6 +55,7 @@ pub struct Echo {
 /// Every reflected ray of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Multipath {
+    /// The reflections.
     pub echoes: Vec<Echo>,
     /// Scene's start, from which excesses and walls are counted …
     pub start: Epoch,
@@ -168,7 +183,8 @@ mod tests {
             ];
             for (detour, enu_m) in cases {
                 let expected = image(enu_m, azimuth, elevation);
-                // The ellipsoid's normal bends by 1e-15 over the place's rounding; sines of degrees within 1e-15.
+                // The ellipsoid's normal bends by 1e-15 over the place's rounding; sines of degrees within
+                // 1e-15.
                 match multipath(detour, origin_m).excess_m(&detour, &from) {
                     Some(found) => assert!((found - expected).abs() < 1e-7, "{detour:?} {found} {expected}"),
                     None => assert!(expected < 1e-7, "{detour:?} {expected}"),

@@ -1,10 +1,12 @@
-//! What stands between antenna and sky: a horizon by azimuth, a sector up to a roof, or buildings by their place.
+//! What stands between antenna and sky: a horizon by azimuth, a sector up to a roof, or buildings by their
+//! place.
 //!
-//! Horizon and sector take their loss from power within an edge of given width. A building is four walls; each is a
-//! screen whose nearest edge diffracts (ITU-R P.526-15, 4.1, equation 31), so that the edge of its shadow is as wide
-//! as Fresnel's zone, deep shadow is never quite dark, and what goes through the building adds a given share of power.
-//! Only the first ray, the direct one, is obstructed: reflections come by other ways. Limits: one edge at a time; a
-//! building has no roof to an antenna inside it; walls reach down without end.
+//! Horizon and sector take their loss from power within an edge of given width. A building is four walls;
+//! each is a screen whose nearest edge diffracts (ITU-R P.526-15, 4.1, equation 31), so that the edge of its
+//! shadow is as wide as Fresnel's zone, deep shadow is never quite dark, and what goes through the building
+//! adds a given share of power. Only the first ray, the direct one, is obstructed: reflections come by other
+//! ways. Limits: one edge at a time; a building has no roof to an antenna inside it; walls reach down without
+//! end.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,36 +14,47 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::generator::effect::ionosphere::smooth;
 use crate::generator::ray::{Effect, Ray, Sight};
-use crate::generator::scene::Scene;
-use crate::gnss::broadcast::State;
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
 use crate::gnss::signal::Signal;
 
 /// A thing that stands in the way.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Obstacle {
-    /// Everything below a line given by azimuth (ascending, in [0, 2π)) and elevation, straight between its points.
+    /// Everything below a line given by azimuth (ascending, in [0, 2π)) and elevation, straight between its
+    /// points.
     Horizon {
+        /// Azimuths in [0, 2π), ascending, and elevations.
         points_rad: Vec<(f64, f64)>,
+        /// Elevation over which the loss goes from nothing to all.
         edge_rad: f64,
+        /// Share of the power that is left behind it.
         share: f64,
     },
     /// Everything below `roof_rad` from azimuth `from_rad` clockwise to `to_rad`.
     Sector {
+        /// Azimuth at which it begins.
         from_rad: f64,
+        /// Azimuth at which it ends, clockwise.
         to_rad: f64,
+        /// Elevation of its upper edge.
         roof_rad: f64,
+        /// Elevation over which the loss goes from nothing to all.
         edge_rad: f64,
+        /// Share of the power that is left behind it.
         share: f64,
     },
+    /// A block that diffracts over its edges.
     Building(Building),
 }
 
 /// A box that stands on the ground, by metres east, north and up of where the motion starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Building {
+    /// From and to, east of the scene's first place.
     pub east_m: [f64; 2],
+    /// From and to, north of it.
     pub north_m: [f64; 2],
+    /// Height of the roof above that place.
     pub top_m: f64,
     /// Power that goes through it, 0 to 1.
     pub share: f64,
@@ -50,6 +63,7 @@ pub struct Building {
 /// Everything that stands in the way of the direct ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obstruction {
+    /// What stands in the way.
     pub obstacles: Vec<Obstacle>,
     /// ECEF place that buildings are measured from, and the matrix to its east, north and up.
     origin_m: Vector3<f64>,
@@ -163,7 +177,8 @@ fn screen_db(a: [f64; 2], b: [f64; 2], top_m: f64, here_m: &Vector3<f64>, look: 
     knife_edge_db(edges.into_iter().map(nu).fold(f64::INFINITY, f64::min))
 }
 
-/// Loss in dB behind a knife edge by Fresnel's parameter ν (ITU-R P.526-15, equation 31), none where it is below −0.78.
+/// Loss in dB behind a knife edge by Fresnel's parameter ν (ITU-R P.526-15, equation 31), none where it is
+/// below −0.78.
 pub fn knife_edge_db(nu: f64) -> f64 {
     if nu <= -0.78 {
         return 0.0;
@@ -195,39 +210,6 @@ impl Effect for Obstruction {
             direct.cn0_hz *= self.left(&sight.user_m, sight.look, signal.carrier_hz(sight.sv));
         }
     }
-}
-
-/// Azimuth and elevation (degrees) below which a direct ray has lost half of its power at the start, if anything in the
-/// scene is in the way.
-pub fn skyline_deg(scene: &Scene) -> Option<Vec<[f64; 2]>> {
-    let obstruction = scene.effects.iter().find(|effect| effect.name() == "obstruction")?;
-    let (sv, signal) = (scene.catalogue.satellites().next()?, scene.signals.first()?);
-    let motion = scene.trajectory.at(0.0);
-    let user = Geodetic::from_ecef(&motion.position_m);
-    let blocked = |azimuth_deg: f64, elevation_deg: f64| {
-        let look = Look { azimuth_rad: azimuth_deg.to_radians(), elevation_rad: elevation_deg.to_radians() };
-        let sight = Sight {
-            sv,
-            received: scene.clock.start,
-            user,
-            user_m: motion.position_m,
-            user_mps: motion.velocity_mps,
-            satellite: State { position_m: motion.position_m, velocity_mps: motion.velocity_mps },
-            range_m: 0.0,
-            look,
-            off_nadir_rad: 0.0,
-        };
-        let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 1.0 }];
-        obstruction.act(&sight, signal, &mut rays);
-        rays.first().is_some_and(|ray| ray.cn0_hz < 0.5)
-    };
-    // Steps of 2° and 0.5°, which a picture does not resolve further.
-    let rows = (0..=180).map(|k| {
-        let azimuth_deg = 2.0 * f64::from(k);
-        let steps = (0..=180).rev().find(|k| blocked(azimuth_deg % 360.0, 0.5 * f64::from(*k)));
-        [azimuth_deg, steps.map_or(0.0, |k| 0.5 * f64::from(k))]
-    });
-    Some(rows.collect())
 }
 
 #[cfg(test)]
@@ -304,7 +286,8 @@ mod tests {
 
     #[test]
     fn a_building_shades_what_geometry_says_and_six_decibels_at_its_edges() {
-        // 20 m to the north, 30 m wide, 20 m above the antenna: the roof stands at 45°, the corners at ±atan(15/20).
+        // 20 m to the north, 30 m wide, 20 m above the antenna: the roof stands at 45°, the corners at
+        // ±atan(15/20).
         let building = Building { east_m: [-15.0, 15.0], north_m: [20.0, 60.0], top_m: 20.0, share: 0.0 };
         let loss = |azimuth: f64, elevation: f64| building.loss_db(&Vector3::zeros(), look(azimuth, elevation), L1_HZ);
         assert!((loss(0.0, 45.0) - 6.0).abs() < 0.1, "{}", loss(0.0, 45.0));
@@ -353,8 +336,8 @@ mod tests {
                 |k: i32| building.loss_db(&Vector3::zeros(), look(f64::from(k) * 0.02, f64::from(elevation)), L1_HZ);
             steepest = (0..18_000).map(|k| (db(k + 1) - db(k)).abs()).fold(steepest, f64::max);
         }
-        // 0.02° at 22 m (the near corners) are 8 mm; ν counts in 1.4 m there and a unit of it is 9 dB at most.
-        // At the far corners 22 mm in 2.4 m: 0.08 dB.
+        // 0.02° at 22 m (the near corners) are 8 mm; ν counts in 1.4 m there and a unit of it is 9 dB at
+        // most. At the far corners 22 mm in 2.4 m: 0.08 dB.
         assert!(steepest < 0.12, "{steepest}");
     }
 }

@@ -1,10 +1,10 @@
 //! The ionosphere by its electron content: on one thin shell, constant or from IONEX maps.
 //!
-//! A column of TEC electrons/m² delays the code by 40.3·TEC/f² metres and advances the carrier by as much (IS-GPS-200N,
-//! 20.3.3.3.3.3 rests on the same 1/f²). The vertical column is taken where the straight line meets the shell, and
-//! stretched by 1/cos z' there (Schaer 1999, single-layer mapping) or as CODE does it (modified single layer). Limits:
-//! the geometry is that of a user on the ground; above 350 km the delay fades as in
-//! [`super::ionosphere`]. What satellites broadcast is not this module's.
+//! A column of TEC electrons/m² delays the code by 40.3·TEC/f² metres and advances the carrier by as much
+//! (IS-GPS-200N, 20.3.3.3.3.3 rests on the same 1/f²). The vertical column is taken where the straight line
+//! meets the shell, and stretched by 1/cos z' there (Schaer 1999, single-layer mapping) or as CODE does it
+//! (modified single layer). Limits: the geometry is that of a user on the ground; above 350 km the delay
+//! fades as in [`super::ionosphere`]. What satellites broadcast is not this module's.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -36,22 +36,26 @@ pub enum Mapping {
 pub struct Shell {
     /// Radius of the Earth, and height of the shell above it.
     pub radius_m: f64,
+    /// Height above the sphere of the maps.
     pub height_m: f64,
+    /// From vertical to slant content.
     pub mapping: Mapping,
 }
 
 /// Where a line of sight meets the shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pierce {
+    /// Geocentric latitude.
     pub latitude_rad: f64,
+    /// Longitude, east positive.
     pub longitude_rad: f64,
     /// Slant over vertical column.
     pub slant: f64,
 }
 
 impl Shell {
-    /// Where the line from a `user` on the ground towards `look` leaves the shell; below the horizon the line goes
-    /// through the Earth and leaves on the far side, so that nothing steps at 0°.
+    /// Where the line from a `user` on the ground towards `look` leaves the shell; below the horizon the line
+    /// goes through the Earth and leaves on the far side, so that nothing steps at 0°.
     pub fn pierce(&self, user: Geodetic, look: Look) -> Pierce {
         let zenith_angle = |share: f64, height_m: f64| {
             let zenith_rad = share * (FRAC_PI_2 - look.elevation_rad);
@@ -82,13 +86,22 @@ pub enum Content {
     /// The same above every place at every time, in TEC units.
     Constant(f64),
     /// Off maps, in which the time of the scene stands `later_s` later.
-    Maps { maps: Box<Maps>, later_s: f64, interpolation: Interpolation },
+    Maps {
+        /// The maps of the file.
+        maps: Box<Maps>,
+        /// By how much the scene's time stands later in the maps.
+        later_s: f64,
+        /// How values between two maps are found.
+        interpolation: Interpolation,
+    },
 }
 
 /// An ionosphere of given electron content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShellIonosphere {
+    /// Vertical content by place and time.
     pub content: Content,
+    /// Where the electrons are taken to be.
     pub shell: Shell,
 }
 

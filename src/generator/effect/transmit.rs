@@ -1,4 +1,5 @@
-//! Transmit antennas of GPS satellites by block: gain on L1 over the angle off the boresight, mean over azimuth.
+//! Transmit antennas of GPS satellites by block: gain on L1 over the angle off the boresight, mean over
+//! azimuth.
 //!
 //! Sources: Block IIA after Czopek and Shollenberger 1993 (ION GPS-93); Blocks IIR and IIR-M (improved panel)
 //! after the manufacturer's measurements (Marquis and Reigh 2015, Navigation 62), each the mean of a few
@@ -16,8 +17,11 @@ use crate::gnss::time::Epoch;
 pub enum Block {
     /// None in particular.
     Typical,
+    /// GPS block IIA.
     Iia,
+    /// GPS block IIR.
     Iir,
+    /// GPS block IIR-M.
     IirM,
 }
 
@@ -158,8 +162,8 @@ mod tests {
     fn every_beam_covers_the_earth_s_edge_as_the_interface_document_asks() {
         for (name, block) in Block::NAMES {
             let gain = |angle| gain_db(block.gain_dbi(), angle);
-            // 13.4 dBi 14.3° off the boresight is what Block IIA was built for; beams are dented in their middle, and
-            // fall by 10 dB and more within 8° of the Earth's edge.
+            // 13.4 dBi 14.3° off the boresight is what Block IIA was built for; beams are dented in their
+            // middle, and fall by 10 dB and more within 8° of the Earth's edge.
             assert!(gain(14.3) > 11.5 && gain(14.3) < 15.2, "{name}");
             assert!(gain(11.0) > gain(0.0) && gain(22.0) < gain(14.0) - 10.0, "{name}");
         }

@@ -1,10 +1,11 @@
 //! The neutral atmosphere: hydrostatic and wet zenith delays, each brought to the line of sight by its
 //! mapping function.
 //!
-//! Sources: Davis et al. 1985 (hydrostatic, with Saastamoinen's gravity term), Saastamoinen 1972 (wet), the Magnus
-//! formula with 237.3 °C; mapping functions are in [`super::mapping`]. Weather is the scene's, which follows the
-//! standard atmosphere from a reference height, or GPT3's by place and season with the wet delay of Askne & Nordius
-//! 1987. Limits: above 44.3 km the pressure of the standard atmosphere, and so the delay, is zero; GPT3's fades there.
+//! Sources: Davis et al. 1985 (hydrostatic, with Saastamoinen's gravity term), Saastamoinen 1972 (wet), the
+//! Magnus formula with 237.3 °C; mapping functions are in [`super::mapping`]. Weather is the scene's, which
+//! follows the standard atmosphere from a reference height, or GPT3's by place and season with the wet delay
+//! of Askne & Nordius 1987. Limits: above 44.3 km the pressure of the standard atmosphere, and so the delay,
+//! is zero; GPT3's fades there.
 
 use crate::generator::effect::ionosphere::smooth;
 use crate::generator::effect::mapping::{Mapping, season_day};
@@ -29,7 +30,9 @@ const TOP_M: f64 = 50e3;
 pub struct Weather {
     /// Height at which the next three were measured, below 44 km.
     pub height_m: f64,
+    /// Total pressure, in hPa.
     pub pressure_hpa: f64,
+    /// Temperature.
     pub temperature_k: f64,
     /// 0 to 1, the same at every height.
     pub relative_humidity: f64,
@@ -85,7 +88,9 @@ pub enum Air {
 /// Zenith delays × mapping functions, the same for code and carrier.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Troposphere {
+    /// Zenith delays of the air.
     pub air: Air,
+    /// From zenith to slant delays.
     pub mapping: Mapping,
 }
 

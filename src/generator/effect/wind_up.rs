@@ -1,15 +1,16 @@
 //! Wind-up: the carrier phase of right-hand circular polarisation when antennas turn about the line of sight.
 //!
-//! Source: Wu, Wu, Hajj, Bertiger and Lichten 1993 (crossed dipoles at both ends); the satellite yaws nominally, its
-//! x axis towards the Sun. The received carrier grows (as with range) when the antenna turns right-handed about the
-//! direction in which the wave travels.
+//! Source: Wu, Wu, Hajj, Bertiger and Lichten 1993 (crossed dipoles at both ends); the satellite yaws
+//! nominally, its x axis towards the Sun. The received carrier grows (as with range) when the antenna turns
+//! right-handed about the direction in which the wave travels.
 //!
-//! Turns are counted, not unwrapped. A pair of crossed dipoles whose axis stands β off the spin axis hears a satellite
-//! that stands θ off that axis as `(cos θ/2 cos β/2 e^{jx/2} + sin θ/2 sin β/2 e^{-jx/2})²`, x its azimuth about the
-//! axis. For θ + β below 180° the phase is therefore `x + 2 arg(1 + tan θ/2 tan β/2 e^{-jx})`, whose second term
-//! never leaves ±180°; beyond, the first term's sign turns round. What is left is slow and stays within half a cycle
-//! of its value at the start, headings counted. Limits: a satellite that crosses θ + β = 180°, where the antenna is
-//! deaf to it once a turn, changes its whole number of cycles; so does one that crosses the spin axis's rear.
+//! Turns are counted, not unwrapped. A pair of crossed dipoles whose axis stands β off the spin axis hears a
+//! satellite that stands θ off that axis as `(cos θ/2 cos β/2 e^{jx/2} + sin θ/2 sin β/2 e^{-jx/2})²`, x its
+//! azimuth about the axis. For θ + β below 180° the phase is therefore `x + 2 arg(1 + tan θ/2 tan β/2
+//! e^{-jx})`, whose second term never leaves ±180°; beyond, the first term's sign turns round. What is left
+//! is slow and stays within half a cycle of its value at the start, headings counted. Limits: a satellite
+//! that crosses θ + β = 180°, where the antenna is deaf to it once a turn, changes its whole number of
+//! cycles; so does one that crosses the spin axis's rear.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -88,7 +89,8 @@ impl WindUp {
             let antenna = dipole(&wave, (body.still * east, body.still * north), 1.0);
             return (angle_cycles(&wave, &satellite, &antenna), 0.0);
         }
-        // Azimuths about the nose of the unspun boresight and of the satellite, from the right side over down.
+        // Azimuths about the nose of the unspun boresight and of the satellite, from the right side over
+        // down.
         let boresight_rad = libm::atan2(boresight.z, boresight.y);
         let satellite_rad = libm::atan2(-wave.dot(&down), -wave.dot(&right));
         let half_tangent = |along: f64, across: f64| across / (1.0 + along);
@@ -155,8 +157,8 @@ pub(super) fn dipoles(up: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (north.cross(up), north)
 }
 
-/// The effective dipole of crossed ones for a wave along `wave` (Wu et al., equations 8 and 9); `sense` is −1 for
-/// the satellite and 1 for the receiver.
+/// The effective dipole of crossed ones for a wave along `wave` (Wu et al., equations 8 and 9); `sense` is −1
+/// for the satellite and 1 for the receiver.
 fn dipole(wave: &Vector3<f64>, (x, y): (Vector3<f64>, Vector3<f64>), sense: f64) -> Vector3<f64> {
     x - wave * wave.dot(&x) + wave.cross(&y) * sense
 }
@@ -217,8 +219,8 @@ mod tests {
 
     #[test]
     fn the_sun_stands_where_the_almanac_says() {
-        // Equinox of 2010-03-20 17:32 UTC: declination 0. Noon at Greenwich on 2010-07-01: the equation of time is
-        // −3.9 min, so the Sun stands 0.97° east of the meridian; declination 23.1°.
+        // Equinox of 2010-03-20 17:32 UTC: declination 0. Noon at Greenwich on 2010-07-01: the equation of
+        // time is −3.9 min, so the Sun stands 0.97° east of the meridian; declination 23.1°.
         let equinox = sun(Epoch::parse("2010-03-20T17:32:15").unwrap());
         assert!(libm::asin(equinox.z).to_degrees().abs() < 0.02);
         let noon = sun(Epoch::parse("2010-07-01T12:00:15").unwrap());

@@ -9,16 +9,16 @@ use std::sync::Arc;
 use super::files::Files;
 use super::front_end::FrontEnd;
 use super::stages::PlaybackSpec;
-use super::{Scenario, ScenarioError, hostile, parts, satellite};
+use super::{Scenario, ScenarioError, parts, satellite, spoofing_and_jamming};
 use crate::generator::catalogue::Catalogue;
 use crate::generator::clock::ReceiverClock;
+use crate::generator::clock::nodes::Nodes;
+use crate::generator::fast_phase::satellite::SatelliteClocks;
+use crate::generator::fast_phase::scintillation::Scintillation;
 use crate::generator::message::{MessageFault, Senders};
 use crate::generator::presence;
 use crate::generator::random::Stream;
 use crate::generator::ray::{Effect, Ray};
-use crate::generator::ripple::nodes::Nodes;
-use crate::generator::ripple::satellite::SatelliteClocks;
-use crate::generator::ripple::scintillation::Scintillation;
 use crate::generator::scene::Scene;
 use crate::generator::sky::emission;
 use crate::generator::stage::playback::Playback;
@@ -37,6 +37,7 @@ const LARGEST_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;
 /// What the command line changes in a scenario.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Overrides {
+    /// In place of the scenario's.
     pub seed: Option<u64>,
     /// Of every front end.
     pub format: Option<Format>,
@@ -70,6 +71,15 @@ struct Band<'s> {
 }
 
 impl Scenario {
+    /// Makes the scene of a scenario with one front end, as it is written. What [`Scenario::compose`] would
+    /// warn of is left out.
+    ///
+    /// # Errors
+    /// As [`Scenario::compose`].
+    pub fn scene(&self) -> Result<Scene, ScenarioError> {
+        self.compose(&self.directory, &Overrides::default()).map(|(scene, _)| scene)
+    }
+
     /// Makes the scene of a scenario with one front end, reading files relative to `directory`; also returns
     /// what the user should know of.
     ///
@@ -112,11 +122,12 @@ impl Scenario {
         let world = self.world(&bands, &files, &mut warnings)?;
         let mut scenes = Vec::with_capacity(bands.len());
         for band in bands {
-            scenes.push(self.scene(&world, band, &files, &mut warnings)?);
+            scenes.push(self.scene_of(&world, band, &files, &mut warnings)?);
         }
-        warnings.extend(hostile::unheard(self, &scenes));
+        warnings.extend(spoofing_and_jamming::unheard(self, &scenes));
         if let Some(first) = scenes.first() {
-            let spoofers = hostile::spoofers(self, first, world.end_s, directory, overrides, &mut warnings)?;
+            let spoofers =
+                spoofing_and_jamming::spoofers(self, first, world.end_s, directory, overrides, &mut warnings)?;
             scenes.iter_mut().for_each(|scene| scene.spoofers.clone_from(&spoofers));
         }
         for (scene, front_end) in scenes.iter_mut().zip(&self.front_ends) {
@@ -189,7 +200,7 @@ impl Scenario {
     }
 
     /// The scene of a front end, without spoofers and playback.
-    fn scene(
+    fn scene_of(
         &self,
         world: &World,
         band: Band<'_>,
@@ -233,7 +244,8 @@ impl Scenario {
             metadata,
         };
         let mut told = Vec::new();
-        scene.interference = hostile::interferers(self, &scene, files.directory, files.overrides, &mut told)?;
+        scene.interference =
+            spoofing_and_jamming::interferers(self, &scene, files.directory, files.overrides, &mut told)?;
         warnings.extend(told.into_iter().map(|warning| front_end.of_it() + &warning));
         Ok(scene)
     }
@@ -261,7 +273,8 @@ impl Scenario {
     }
 }
 
-/// Satellites of the scene above the mask at its start, and the standard deviation per component of their sum in LSB.
+/// Satellites of the scene above the mask at its start, and the standard deviation per component of their sum
+/// in LSB.
 fn at_start(scene: &Scene) -> Result<(usize, f64), OrbitError> {
     let motion = scene.trajectory.at(0.0);
     let (mut visible, mut sum_hz) = (0, 0.0);
@@ -279,9 +292,9 @@ fn at_start(scene: &Scene) -> Result<(usize, f64), OrbitError> {
     Ok((visible, f64::from(scene.noise_lsb) * (real * sum_hz / scene.clock.rate.hz()).sqrt()))
 }
 
-/// Gain when the scenario sets none. Eleven satellites at 47 dB-Hz in 2.6 Msps add a tenth to the noise's standard
-/// deviation, so 8-bit full scale at 4.5 times the noise is 4 times the composite: 1e-4 of the samples saturate.
-/// 16 bits leave 24 dB of headroom on top; floating point has the noise as its unit.
+/// Gain when the scenario sets none. Eleven satellites at 47 dB-Hz in 2.6 Msps add a tenth to the noise's
+/// standard deviation, so 8-bit full scale at 4.5 times the noise is 4 times the composite: 1e-4 of the
+/// samples saturate. 16 bits leave 24 dB of headroom on top; floating point has the noise as its unit.
 fn default_noise_lsb(format: Format) -> f32 {
     match format {
         Format::Ci8 | Format::Cu8 | Format::Ri8 => 28.0,

@@ -20,9 +20,15 @@ const RATE_HZ: f64 = 2.6e6;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tuned {
     /// The carrier of its first signal appears there in the samples.
-    If { if_hz: f64 },
+    If {
+        /// The carrier's frequency in the samples.
+        if_hz: f64,
+    },
     /// That radio frequency appears at 0 Hz.
-    Centre { center_hz: f64 },
+    Centre {
+        /// Radio frequency at 0 Hz in the samples.
+        center_hz: f64,
+    },
 }
 
 /// A front end: what the samples of one file are.
@@ -30,15 +36,21 @@ pub enum Tuned {
 pub struct FrontEnd {
     /// Names its files and keys its random numbers; required in a list of several.
     pub name: Option<String>,
+    /// The sample rate.
     pub rate: Rate,
+    /// Which frequencies the samples hold.
     pub tuned: Tuned,
+    /// Whether the spectrum is mirrored.
     pub inverted: bool,
+    /// How samples are packed.
     pub format: Format,
     /// The gain, if the scenario sets it.
     pub noise_lsb: Option<f32>,
     /// The signals that it is for; absent means those of the scene's that reach into its band.
     pub signals: Option<Vec<&'static Signal>>,
+    /// What the hardware does to them.
     pub stages: Stages,
+    /// How they are made.
     pub fidelity: Fidelity,
 }
 

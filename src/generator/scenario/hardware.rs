@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::ScenarioError;
 use super::read::Table;
 use crate::generator::clock::ReceiverClock;
+use crate::generator::clock::oscillator::{Oscillator, PowerLaw};
 use crate::generator::random::Stream;
-use crate::generator::ripple::oscillator::{Oscillator, PowerLaw};
 use crate::generator::vehicle::Trajectory;
 use crate::generator::vehicle::shaking::Shaking;
 use crate::gnss::time::Rate;
@@ -14,11 +14,15 @@ use crate::gnss::time::Rate;
 /// The receiver's clock as written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ClockSpec {
+    /// Reading minus GPS time at the scene's start.
     pub bias_s: f64,
+    /// Gain at the start, in seconds a second.
     pub drift: f64,
+    /// Growth of the drift a second.
     pub ageing_per_s: f64,
     /// Fractional frequency a g of acceleration.
     pub per_g: f64,
+    /// Noise of its oscillator; absent means none.
     pub noise: Option<PowerLaw>,
 }
 

@@ -16,11 +16,22 @@ use crate::gnss::satellite::Sv;
 pub enum Strength {
     /// Over `power.cn0_dbhz`, or behind a link budget over the strongest satellite at the scene's start, at
     /// the antenna.
-    OverSignal { db: f64 },
+    OverSignal {
+        /// Power over the strongest satellite's.
+        db: f64,
+    },
     /// At the antenna's port.
-    Received { dbw: f64 },
+    Received {
+        /// Power in dBW.
+        dbw: f64,
+    },
     /// Radiated towards the antenna, from the source's place, or from a distance that stays.
-    Radiated { dbw: f64, distance_m: Option<f64> },
+    Radiated {
+        /// Power in dBW.
+        dbw: f64,
+        /// Distance from the antenna; absent where the source has a place.
+        distance_m: Option<f64>,
+    },
 }
 
 impl Strength {
@@ -37,14 +48,56 @@ impl Strength {
 /// What it sends, as written.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
+    /// A continuous wave.
     Cw,
-    Chirp { sweep_hz: f64, sweep_s: f64 },
-    Fmcw { sweep_hz: f64, sweep_s: f64 },
-    SineFm { deviation_hz: f64, rate_hz: f64 },
-    Pulse { width_s: f64, rate_hz: f64, jitter: f64 },
+    /// A frequency that rises linearly and jumps back.
+    Chirp {
+        /// Width of the sweep.
+        sweep_hz: f64,
+        /// Period of the sweep.
+        sweep_s: f64,
+    },
+    /// A frequency that rises and falls linearly.
+    Fmcw {
+        /// Width of the sweep.
+        sweep_hz: f64,
+        /// Period of the sweep.
+        sweep_s: f64,
+    },
+    /// A frequency that follows a cosine.
+    SineFm {
+        /// Largest deviation from the carrier.
+        deviation_hz: f64,
+        /// Periods a second.
+        rate_hz: f64,
+    },
+    /// A carrier that is on for short times.
+    Pulse {
+        /// Length of a pulse.
+        width_s: f64,
+        /// Pulses a second.
+        rate_hz: f64,
+        /// Largest delay of a pulse, as a share of the period.
+        jitter: f64,
+    },
+    /// Random chips at the rate of the signal's code.
     Matched,
-    Noise { bandwidth_hz: f64 },
-    Recording { path: PathBuf, format: Format, rate_hz: f64, repeat: bool },
+    /// Gaussian noise of a band.
+    Noise {
+        /// Width of the band.
+        bandwidth_hz: f64,
+    },
+    /// Samples of a file.
+    Recording {
+        /// The file.
+        path: PathBuf,
+        /// How its samples are packed.
+        format: Format,
+        /// Its sample rate.
+        rate_hz: f64,
+        /// Whether it begins anew at its end.
+        repeat: bool,
+    },
 }
 
 impl Kind {
@@ -66,37 +119,53 @@ impl Kind {
 /// One `[[interference]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InterferenceSpec {
+    /// What it sends.
     pub kind: Kind,
     /// From GPS L1.
     pub offset_hz: f64,
+    /// How strong it is.
     pub strength: Strength,
+    /// Where it stands; absent where it has no place.
     pub place: Option<Geodetic>,
     /// True time since the scene's start; to the scene's end if absent.
     pub on_s: f64,
+    /// When it is switched off; never where absent.
     pub off_s: Option<f64>,
 }
 
 /// `[spoofer.drag]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DragSpec {
+    /// When it begins, true seconds since the scene's start.
     pub start_s: f64,
+    /// Direction of the drag, clockwise from north.
     pub azimuth_rad: f64,
+    /// Direction of the drag, upwards.
     pub elevation_rad: f64,
+    /// Final speed.
     pub speed_mps: f64,
+    /// Acceleration until that speed.
     pub acceleration_mps2: f64,
 }
 
 /// One `[[spoofer]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpooferSpec {
+    /// Power over the true signals'.
     pub advantage: Advantage,
+    /// When it is switched on, true seconds since the scene's start.
     pub on_s: f64,
+    /// When it is switched off; never where absent.
     pub off_s: Option<f64>,
+    /// Satellites that it imitates; absent means all in view of the claimed place.
     pub satellites: Option<Vec<Sv>>,
+    /// Its clock minus GPS time at the scene's start.
     pub clock_bias_s: f64,
+    /// Gain of its clock, in seconds a second.
     pub clock_drift: f64,
     /// The claimed motion; absent means that of the antenna.
     pub motion: Option<MotionSpec>,
+    /// How the claimed place is moved; absent means that it stays.
     pub drag: Option<DragSpec>,
 }
 
@@ -153,7 +222,7 @@ fn strength(table: &Table<'_>, placed: bool) -> Result<Strength, ScenarioError> 
 }
 
 fn kind(table: &Table<'_>) -> Result<Kind, ScenarioError> {
-    let names = super::keys::hostile::kinds();
+    let names = super::keys::spoofing_and_jamming::kinds();
     let names: Vec<(&str, &str)> = names.into_iter().map(|name| (name, name)).collect();
     let sweep = || -> Result<(f64, f64), ScenarioError> {
         let sweep_hz = table.need("sweep_hz")?;

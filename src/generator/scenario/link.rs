@@ -18,15 +18,25 @@ use crate::gnss::signal::Signal;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Power {
     /// The same for all but those listed.
-    Fixed { cn0_dbhz: f64, satellites: Vec<(Sv, f64)> },
+    Fixed {
+        /// C/N0 of all satellites without a value of their own, in dB-Hz.
+        cn0_dbhz: f64,
+        /// Satellites with a C/N0 of their own, in dB-Hz.
+        satellites: Vec<(Sv, f64)>,
+    },
     /// From range, elevation and antennas.
     LinkBudget {
+        /// The satellites' transmit patterns.
         transmit: Transmit,
+        /// Power that a satellite radiates at least, in dBW.
         transmit_dbw: f64,
         /// Satellites whose block the scene names.
         blocks: Vec<(Sv, Block)>,
+        /// The antenna.
         antenna: AntennaSpec,
+        /// Noise figure of the receiver.
         noise_figure_db: f64,
+        /// Losses between antenna and receiver.
         loss_db: f64,
     },
 }
@@ -34,6 +44,7 @@ pub enum Power {
 /// The antennas of the satellites that a scene does not name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transmit {
+    /// That of one block for all satellites.
     Block(Block),
     /// What flew at the scene's date.
     Constellation,
@@ -42,9 +53,13 @@ pub enum Transmit {
 /// The receiving antenna, with its file not yet read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AntennaSpec {
+    /// The same gain in every direction.
     Isotropic,
+    /// A patch antenna.
     Patch,
+    /// Crossed dipoles.
     Turnstile,
+    /// A table of gain and phase.
     Table(PathBuf),
 }
 

@@ -12,17 +12,36 @@ use crate::gnss::earth::Geodetic;
 /// How a trajectory file is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileKind {
+    /// Rows of time and place.
     Csv,
+    /// NMEA sentences of kind GGA.
     Nmea,
 }
 
 /// The motion as meant, with its file not yet read.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MotionSpec {
+    /// At rest.
     Static(Geodetic),
-    Waypoints { points: Vec<Waypoint>, limits: Limits },
-    File { path: PathBuf, kind: FileKind, max_gap_s: f64 },
+    /// From place to place on smooth turns.
+    Waypoints {
+        /// The places, with the speeds between them.
+        points: Vec<Waypoint>,
+        /// What accelerations the route may have.
+        limits: Limits,
+    },
+    /// Rows of a file.
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the file holds.
+        kind: FileKind,
+        /// Longest time between two rows.
+        max_gap_s: f64,
+    },
+    /// A powered flight.
     Rocket(Rocket),
+    /// A free flight round the Earth.
     Orbit(Orbit),
 }
 

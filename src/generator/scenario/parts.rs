@@ -14,9 +14,10 @@ use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::UtcData;
 use crate::gnss::message::Common;
 use crate::gnss::rinex::{self, Navigation};
-use crate::gnss::satellite::Sv;
+use crate::gnss::satellite::{Sv, System};
+use crate::gnss::time::TimeOffset;
 
-/// Warnings of one kind that are told in full.
+/// Warnings of one kind that are listed in full.
 const TOLD: usize = 4;
 
 /// Orbits, messages, and who is left out.
@@ -35,21 +36,37 @@ pub(super) fn navigation(
     warnings: &mut Vec<String>,
 ) -> Result<Navigation, ScenarioError> {
     let refuse = |e: rinex::NavigationError| scenario.conflict("navigation.file", e.to_string());
-    let mut navigation =
-        if scenario.navigation.is_empty() { rinex::embedded().map_err(refuse)? } else { Navigation::default() };
+    let mut navigation = if scenario.navigation.is_empty() { embedded(scenario)? } else { Navigation::default() };
     for path in &scenario.navigation {
         let bytes = scenario.load("navigation.file", directory, path, overrides)?;
-        let Navigation { ephemerides, klobuchar, leap_seconds, leap_event, utc, skipped } =
-            rinex::read(&bytes, &path.display().to_string()).map_err(refuse)?;
+        let found = rinex::read(&bytes, &path.display().to_string()).map_err(refuse)?;
+        let Navigation { ephemerides, klobuchar, nequick, leap_seconds, leap_event, utc, galileo, skipped } = found;
         navigation.ephemerides.extend(ephemerides);
         navigation.klobuchar = navigation.klobuchar.or(klobuchar);
+        navigation.nequick = navigation.nequick.or(nequick);
+        navigation.galileo = navigation.galileo.or(galileo);
         navigation.leap_seconds = navigation.leap_seconds.or(leap_seconds);
         navigation.leap_event = navigation.leap_event.or(leap_event);
         navigation.utc = navigation.utc.or(utc);
         navigation.skipped.extend(skipped);
     }
     tell(warnings, &navigation.skipped, "records of the navigation file left out");
+    // Merged files have more systems than the scene.
+    navigation.ephemerides.retain(|set| systems(scenario).any(|system| system == set.sv.system));
     Ok(navigation)
+}
+
+/// The systems of a scene's signals, each once or more.
+fn systems(scenario: &Scenario) -> impl Iterator<Item = System> {
+    scenario.signals.iter().map(|signal| signal.system)
+}
+
+/// The embedded file of the scene's day: the one with both systems where it reaches to the start.
+fn embedded(scenario: &Scenario) -> Result<Navigation, ScenarioError> {
+    let refuse = |e: rinex::NavigationError| scenario.conflict("navigation.file", e.to_string());
+    let second = rinex::embedded_two_systems().map_err(refuse)?;
+    let near = |set: &Ephemeris| scenario.start.since(set.toe).abs() < 0.5 * set.fit_interval_s();
+    if second.ephemerides.iter().any(near) { Ok(second) } else { rinex::embedded().map_err(refuse) }
 }
 
 /// Arranges the ephemerides and checks that they reach over the scene, which lasts `end_s`.
@@ -63,12 +80,20 @@ pub(super) fn sky(
     let (mut catalogue, rogues) = Catalogue::new(navigation.ephemerides.clone());
     tell(warnings, &rogues, "ephemerides left out");
     let (start, end) = (scenario.start, scenario.start.plus_s(end_s));
-    let sending = |at| catalogue.satellites().filter(|sv| catalogue.sent_at(*sv, at).is_some()).count();
-    for at in [start, end] {
-        if sending(at) == 0 {
-            return Err(scenario.conflict("start", outside(&navigation.ephemerides, scenario)));
+    let sends = |system: System, at| {
+        catalogue.satellites().any(|sv| sv.system == system && catalogue.sent_at(sv, at).is_some())
+    };
+    let mut silent: Vec<System> = systems(scenario).filter(|s| !sends(*s, start) || !sends(*s, end)).collect();
+    silent.dedup();
+    for &system in &silent {
+        let reason = outside(&navigation.ephemerides, system, scenario);
+        if systems(scenario).all(|other| silent.contains(&other)) {
+            return Err(scenario.conflict("start", reason));
         }
+        warnings.push(format!("no satellite sends signals of {system}: {reason}"));
     }
+    let ahead = galileo_ahead(scenario, navigation);
+    catalogue.set_time_offset(System::Galileo, ahead.map_or(0.0, |offset| offset.at_s(start)));
     for sv in scenario.excluded.iter().filter(|sv| catalogue.sent_at(**sv, start).is_none()) {
         warnings.push(format!("satellites.exclude names {sv}, which has no ephemeris then"));
     }
@@ -108,6 +133,12 @@ pub(super) fn sky(
     Ok(Sky { catalogue, messages, excluded })
 }
 
+/// Galileo's time against GPS time: as the scene gives it, or else as the file does.
+fn galileo_ahead(scenario: &Scenario, navigation: &Navigation) -> Option<TimeOffset> {
+    let given = scenario.galileo_ahead_s.map(|a0_s| TimeOffset { a0_s, a1_sps: 0.0, reference: scenario.start });
+    given.or(navigation.galileo)
+}
+
 /// What the satellites send about the ionosphere is what the scenario gives, or what the file says.
 fn messages(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>) -> Result<Senders, ScenarioError> {
     let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent);
@@ -118,19 +149,27 @@ fn messages(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris
     };
     let key = if given.is_some() { "ionosphere" } else { "navigation.file" };
     let klobuchar = given.or(navigation.klobuchar);
-    let common = Common { klobuchar, nequick: None, utc, almanac, reference: Some(scenario.start) };
+    let common = Common {
+        klobuchar,
+        nequick: navigation.nequick,
+        utc,
+        galileo: galileo_ahead(scenario, navigation),
+        almanac,
+        reference: Some(scenario.start),
+    };
     Senders::new(&common, &scenario.signals)
         .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
 }
 
 /// Why no ephemeris fits: the span of the file against that of the scene.
-fn outside(ephemerides: &[Ephemeris], scenario: &Scenario) -> String {
+fn outside(ephemerides: &[Ephemeris], system: System, scenario: &Scenario) -> String {
+    let ephemerides: Vec<&Ephemeris> = ephemerides.iter().filter(|set| set.sv.system == system).collect();
     let reach = |e: &Ephemeris, sign: f64| e.toe.plus_s(sign * 0.5 * e.fit_interval_s());
     let first = ephemerides.iter().map(|e| reach(e, -1.0)).min_by(|a, b| a.since(*b).total_cmp(&0.0));
     let last = ephemerides.iter().map(|e| reach(e, 1.0)).max_by(|a, b| a.since(*b).total_cmp(&0.0));
     let text = |at: Option<crate::gnss::time::Epoch>| at.map_or_else(|| "nowhere".to_owned(), |at| at.to_string());
     format!(
-        "{} and {} s from then on: no ephemeris of the navigation file fits; expected a scene within {} to {}",
+        "{} and {} s from then on: no {system} ephemeris of the navigation file fits; expected a scene within {} to {}",
         scenario.start,
         scenario.duration_s,
         text(first),

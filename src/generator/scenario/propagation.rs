@@ -19,6 +19,7 @@ use crate::gnss::vmf3::Vmf3;
 /// What the ionosphere truly is, and what the satellites say that it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ionosphere {
+    /// What delays the signals.
     pub truth: Electrons,
     /// Coefficients that the satellites send; absent means those of `truth`, or else the navigation file's.
     pub broadcast: Option<Klobuchar>,
@@ -30,9 +31,23 @@ pub enum Electrons {
     /// Klobuchar's model with the given coefficients, or those of the navigation file.
     Klobuchar(Option<Klobuchar>),
     /// The same vertical content everywhere.
-    Constant { vtec_tecu: f64, shell: Shell },
+    Constant {
+        /// Vertical content, in TECU.
+        vtec_tecu: f64,
+        /// Where the electrons are taken to be.
+        shell: Shell,
+    },
     /// Maps from a file; `map_start` is the instant of the maps that stands at the scene's start.
-    Ionex { file: PathBuf, map_start: Option<Epoch>, interpolation: Interpolation, mapping: Mapping },
+    Ionex {
+        /// The IONEX file.
+        file: PathBuf,
+        /// The time in the file at which the scene begins; absent means the scene's own.
+        map_start: Option<Epoch>,
+        /// How values between two maps are found.
+        interpolation: Interpolation,
+        /// How the delay grows towards the horizon.
+        mapping: Mapping,
+    },
 }
 
 pub(super) fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError> {
@@ -82,7 +97,8 @@ impl Ionosphere {
         })
     }
 
-    /// The effect, with its file read; `file_klobuchar` is what the navigation file says, `end_s` the scene's end.
+    /// The effect, with its file read; `file_klobuchar` is what the navigation file says, `end_s` the scene's
+    /// end.
     pub(super) fn effect(
         &self,
         scenario: &Scenario,
@@ -128,16 +144,20 @@ impl Ionosphere {
 /// The neutral atmosphere as written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeutralAtmosphere {
+    /// The weather at the ground.
     pub weather: Weather,
     /// Taken for the weather, and for the mapping if that wants coefficients.
     pub gpt3_file: Option<PathBuf>,
+    /// How the delay grows towards the horizon.
     pub mapping: MappingKind,
 }
 
 /// Which mapping function is wanted.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MappingKind {
+    /// One over the sine of the elevation.
     Cosecant,
+    /// Niell's functions.
     Niell,
     /// With coefficients a from this grid, or from GPT3.
     Vienna(Vienna, Option<PathBuf>),

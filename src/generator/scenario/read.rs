@@ -1,9 +1,9 @@
 //! Typed access to TOML tables: one place where a key's name, type, range and unit are checked.
 //!
-//! Values are read by the declarations of [`super::schema`]: a reader names a key, and its type, range and default are
-//! there. [`Table::check`] holds a whole document against them and collects every refusal. Each carries the file, the
-//! line and the column, because values are read off the spanned document; serde's derived structures lose the place of
-//! a value behind `kind = …`.
+//! Values are read by the declarations of [`super::schema`]: a reader names a key, and its type, range and
+//! default are there. [`Table::check`] holds a whole document against them and collects every refusal. Each
+//! carries the file, the line and the column, because values are read off the spanned document; serde's
+//! derived structures lose the place of a value behind `kind = …`.
 
 mod refusals;
 
@@ -100,8 +100,8 @@ impl<'t> Table<'t> {
         })
     }
 
-    /// Holds the table and those in it against their declarations: unknown keys, values of a wrong type or out of their
-    /// range, required keys that are absent.
+    /// Holds the table and those in it against their declarations: unknown keys, values of a wrong type or
+    /// out of their range, required keys that are absent.
     pub fn check(&self, refusals: &mut Refusals) {
         let known = self.known();
         if self.each.is_none() {

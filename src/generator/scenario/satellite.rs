@@ -12,53 +12,118 @@ use super::read::Table;
 use super::{Scenario, ScenarioError, satellite_list};
 use crate::generator::catalogue::Catalogue;
 use crate::generator::clock::ReceiverClock;
-use crate::generator::departure::Departure;
+use crate::generator::clock::nodes::node_samples;
+use crate::generator::clock::oscillator::{Oscillator, PowerLaw};
+use crate::generator::fast_phase::satellite::{Change, ChangeKind, SatelliteClocks};
 use crate::generator::message::{FOREVER_S, Kind, MessageFault, spoiled};
+use crate::generator::orbit_error::Displacement;
 use crate::generator::precise::{Hardware, Orbits};
 use crate::generator::random::Stream;
-use crate::generator::ripple::node_samples;
-use crate::generator::ripple::oscillator::{Oscillator, PowerLaw};
-use crate::generator::ripple::satellite::{Change, ChangeKind, SatelliteClocks};
-use crate::gnss::satellite::Sv;
+use crate::gnss::satellite::{Sv, System};
 use crate::gnss::sp3::{self, Precise};
 use crate::gnss::time::Rate;
 
-/// True time beyond both ends of the scene for which there must be orbits: light times and the receiver's clock.
+/// True time beyond both ends of the scene for which there must be orbits: light times and the receiver's
+/// clock.
 const MARGIN_S: f64 = 2.0;
 
 /// `[orbits]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrbitsSpec {
+    /// SP3 files, in the order of time.
     pub files: Vec<PathBuf>,
     /// Antenna below the centre of mass: of all satellites, and of some by name.
     pub antenna_m: f64,
+    /// Offset of the antenna from the centre of mass towards the Earth, by satellite.
     pub antennas_m: Vec<(Sv, f64)>,
 }
 
 /// One `[[satellite_fault]]`. Times are true ones since the scene's start.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SatelliteFault {
-    Step { satellites: Vec<Sv>, step_s: f64, on_s: f64, off_s: Option<f64> },
-    Ramp { satellites: Vec<Sv>, drift: f64, on_s: f64, off_s: Option<f64> },
-    Noise { satellites: Option<Vec<Sv>>, law: PowerLaw },
-    Orbit { satellites: Vec<Sv>, radial_m: f64, along_m: f64, cross_m: f64, growth_s: Option<(f64, f64)> },
+    /// A clock that jumps and, at the end, jumps back.
+    Step {
+        /// The satellites concerned.
+        satellites: Vec<Sv>,
+        /// By how much it is ahead.
+        step_s: f64,
+        /// When it begins, in seconds of true time since the scene's start.
+        on_s: f64,
+        /// When it ends; to the end of the scene where absent.
+        off_s: Option<f64>,
+    },
+    /// A clock that gains until the end and keeps what it gained.
+    Ramp {
+        /// The satellites concerned.
+        satellites: Vec<Sv>,
+        /// What it gains, in seconds a second.
+        drift: f64,
+        /// When it begins, in seconds of true time since the scene's start.
+        on_s: f64,
+        /// When it ends; to the end of the scene where absent.
+        off_s: Option<f64>,
+    },
+    /// A clock that is noisier than it broadcasts.
+    Noise {
+        /// The satellites concerned; absent means all.
+        satellites: Option<Vec<Sv>>,
+        /// Power law of the added noise.
+        law: PowerLaw,
+    },
+    /// A true orbit beside the broadcast one.
+    Orbit {
+        /// The satellites concerned.
+        satellites: Vec<Sv>,
+        /// Outwards.
+        radial_m: f64,
+        /// Along the inertial motion.
+        along_m: f64,
+        /// Along the angular momentum.
+        cross_m: f64,
+        /// When the offset begins to grow and for how long; absent means from the beginning.
+        growth_s: Option<(f64, f64)>,
+    },
 }
 
 /// One `[[message_fault]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MessageSpec {
+    /// The satellites concerned; absent means all.
     pub satellites: Option<Vec<Sv>>,
+    /// When it begins, in seconds of true time since the scene's start.
     pub on_s: f64,
+    /// When it ends; to the end of the scene where absent.
     pub off_s: Option<f64>,
+    /// What goes wrong.
     pub kind: MessageKind,
 }
 
+/// What goes wrong with a message.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MessageKind {
-    BitErrors { rate: f64 },
-    Bit { subframe: u8, word: u8, bit: u8 },
+    /// Symbols that are wrong at random.
+    BitErrors {
+        /// Probability of a wrong symbol.
+        rate: f64,
+    },
+    /// One symbol of every unit of a kind.
+    Bit {
+        /// Number of the unit within its frame, from 1.
+        subframe: u8,
+        /// Word of 30 symbols, from 1.
+        word: u8,
+        /// Symbol of the word, from 1.
+        bit: u8,
+    },
+    /// The bits of health.
     Health(u8),
-    Parameter { name: &'static str, add: f64 },
+    /// A wrong value with right parity.
+    Parameter {
+        /// Name in the message's table.
+        name: &'static str,
+        /// What is added, in the parameter's unit.
+        add: f64,
+    },
 }
 
 pub(super) fn orbits(table: &Table<'_>) -> Result<OrbitsSpec, ScenarioError> {
@@ -162,8 +227,8 @@ pub(super) fn message_fault(table: &Table<'_>) -> Result<MessageSpec, ScenarioEr
 }
 
 impl OrbitsSpec {
-    /// Lets `catalogue` follow the files' orbits, and tells which of its satellites they do not hold over the
-    /// scene, which lasts to `end_s`.
+    /// Lets `catalogue` follow the files' orbits, and reports which of its satellites they do not hold over
+    /// the scene, which lasts to `end_s`.
     pub(super) fn follow(
         &self,
         scenario: &Scenario,
@@ -179,7 +244,9 @@ impl OrbitsSpec {
         }
         let hardware = |sv: Sv| {
             let own = self.antennas_m.iter().find(|(named, _)| *named == sv).map(|(_, offset_m)| *offset_m);
-            let tgd_s = catalogue.sent_at(sv, scenario.start)?.tgd_s;
+            let set = catalogue.sent_at(sv, scenario.start)?;
+            // The products' clocks of Galileo belong to the combination of E1 and E5a.
+            let tgd_s = if sv.system == System::Galileo { set.tgd2_s } else { set.tgd_s };
             Some(Hardware { tgd_s, antenna_m: own.unwrap_or(self.antenna_m) })
         };
         let orbits = Orbits::new(&precise, hardware)
@@ -200,12 +267,12 @@ impl OrbitsSpec {
 }
 
 /// What a fault of true orbits comes to; those of no size are left out.
-pub(super) fn departures(scenario: &Scenario) -> Vec<Departure> {
+pub(super) fn departures(scenario: &Scenario) -> Vec<Displacement> {
     let departure = |fault: &SatelliteFault| match fault {
         SatelliteFault::Orbit { satellites, radial_m, along_m, cross_m, growth_s } => {
             let growth = growth_s.map(|(on_s, ramp_s)| (scenario.start.plus_s(on_s), ramp_s));
             let felt = (*radial_m, *along_m, *cross_m) != (0.0, 0.0, 0.0);
-            felt.then(|| Departure {
+            felt.then(|| Displacement {
                 satellites: satellites.clone(),
                 radial_m: *radial_m,
                 along_m: *along_m,

@@ -1,5 +1,5 @@
-//! Keys as data: name, type, range, unit, default and meaning, in one place for the readers, their refusals and the
-//! reference.
+//! Keys as data: name, type, range, unit, default and meaning, in one place for the readers, their refusals
+//! and the reference.
 //!
 //! A table is a list of [`Key`]s; tables in tables make a tree. `read::Table` reads a value by its key's
 //! declaration alone, so that no range and no default is written twice. Of a table with kinds (`kind`, or
@@ -10,28 +10,43 @@ use std::fmt::Write as _;
 /// What a key's value may be.
 #[derive(Clone, Copy, Debug)]
 pub enum Value {
+    /// A number.
     Number {
+        /// The smallest allowed.
         least: f64,
+        /// The largest allowed.
         most: f64,
+        /// Its unit.
         unit: &'static str,
     },
     /// An array of so many numbers.
     Numbers {
+        /// How many.
         count: usize,
+        /// The smallest allowed.
         least: f64,
+        /// The largest allowed.
         most: f64,
+        /// Its unit.
         unit: &'static str,
     },
     /// An array of any number of numbers.
     List {
+        /// The smallest allowed.
         least: f64,
+        /// The largest allowed.
         most: f64,
+        /// Its unit.
         unit: &'static str,
     },
+    /// A whole number.
     Integer {
+        /// The smallest allowed.
         least: u64,
+        /// The largest allowed.
         most: u64,
     },
+    /// True or false.
     Flag,
     /// A text; how to describe it.
     Text(&'static str),
@@ -47,6 +62,7 @@ pub enum Value {
     Values,
     /// A table whose keys are satellites, and their values.
     BySatellite(&'static Key),
+    /// A table of keys.
     Table(&'static [Key]),
     /// An array of tables, `[[…]]`.
     Tables(&'static [Key]),
@@ -59,9 +75,11 @@ pub enum Value {
 /// What holds if a key is absent.
 #[derive(Clone, Copy, Debug)]
 pub enum Absent {
+    /// The scenario is refused.
     Required,
     /// Nothing of the kind.
     Optional,
+    /// This number.
     Number(f64),
     /// Something else, in words.
     Means(&'static str),
@@ -70,11 +88,15 @@ pub enum Absent {
 /// One key of a table.
 #[derive(Clone, Copy, Debug)]
 pub struct Key {
+    /// As it is written.
     pub name: &'static str,
+    /// What it may be.
     pub value: Value,
+    /// What holds without it.
     pub absent: Absent,
     /// Kinds of the table that know it; empty for all.
     pub kinds: &'static [&'static str],
+    /// What it means, for the reference.
     pub meaning: &'static str,
 }
 
@@ -245,7 +267,9 @@ pub struct Listed {
     pub heading: String,
     /// Its full name: `front_end`.
     pub path: String,
+    /// What it means, for the reference.
     pub meaning: String,
+    /// Its keys.
     pub keys: Vec<&'static Key>,
 }
 

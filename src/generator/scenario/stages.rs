@@ -1,4 +1,5 @@
-//! What the front end does to samples, as written: filter, mixer, balance, converter; and the playback before it.
+//! What the front end does to samples, as written: filter, mixer, balance, converter; and the playback before
+//! it.
 
 use super::ScenarioError;
 use super::front_end::{FrontEnd, Tuned};

@@ -1,9 +1,9 @@
 mod declared;
 mod front_end;
-mod hostile;
 mod propagation;
 mod satellite;
 mod shipped;
+mod spoofing_and_jamming;
 
 use std::path::Path;
 
@@ -13,9 +13,9 @@ use satellite::FAULTS;
 
 use super::schema::{Absent, Value, tables_of};
 use super::*;
+use crate::generator::clock::oscillator::PowerLaw;
 use crate::generator::effect::multipath::Detour;
 use crate::generator::effect::transmit::Block;
-use crate::generator::ripple::oscillator::PowerLaw;
 use crate::generator::vehicle::attitude::Nose;
 use crate::gnss::samples::Format;
 
@@ -30,7 +30,7 @@ const FILE: &str = "[motion]\nkind = \"file\"\nfile = \"ride.csv\"\nformat = \"c
 const ORBIT: &str = "[motion]\nkind = \"orbit\"\nsemi_major_axis_m = 6.9e6\neccentricity = 0.01\ninclination_deg = 51\n\
     node_longitude_deg = 60\nargument_of_perigee_deg = 10\nmean_anomaly_deg = 20\n";
 const RADIUS: &str = "[motion]\nkind = \"waypoints\"\nturn_radius_m = 30\n";
-const REST: &str = "[navigation]\nfile = \"brdc.10n\"\n[satellites]\nmask_deg = 10\nexclude = [\"G01\"]\ninclude_unhealthy = true\n\
+const REST: &str = "[navigation]\nfile = \"brdc.10n\"\ngalileo_ahead_ns = 3\n[satellites]\nmask_deg = 10\nexclude = [\"G01\"]\ninclude_unhealthy = true\n\
     [front_end]\nsample_rate_hz = 4e6\nif_hz = 1e6\nspectrum_inverted = true\nformat = \"ri8\"\nnoise_lsb = 3\n\
     [attitude]\nkind = \"fixed\"\nyaw_deg = 30\npitch_deg = 10\nroll_deg = 5\nspin_hz = 2\nlever_arm_m = [1, 0, 0]\nboresight = [0, 1, -1]\n\
     [power]\nkind = \"link_budget\"\ntransmit = \"IIR\"\ntransmit_dbw = 15\nantenna = \"table\"\nantenna_file = \"gain.csv\"\nnoise_figure_db = 2\nloss_db = 1\n\

@@ -18,6 +18,7 @@ const BEST_STEP: [(u32, f64); 7] =
 /// A converter, behind a gain control or a fixed gain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Converter {
+    /// Bits of a component, 1 to 16.
     pub bits: u32,
     /// Step in units of the standard deviation of a component.
     pub step_sigma: f64,
@@ -65,7 +66,7 @@ impl Stage for Converter {
         format!("{} bits, step {} sigma, {gain}", self.bits, self.step_sigma)
     }
 
-    fn fact(&self) -> Option<StageSpec> {
+    fn spec(&self) -> Option<StageSpec> {
         Some(StageSpec::Adc(ConverterSpec {
             bits: self.bits,
             step_sigma: self.step_sigma,
@@ -121,7 +122,7 @@ pub(super) fn level(y: f32, half: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::stage::noise::add_block;
+    use crate::generator::synth::noise::add_block;
 
     /// Correlation loss of a weak signal: 10 lg of (E[x Q(x)])² / E[Q(x)²], for Gaussian x.
     fn loss_db(converter: &Converter, sigma: f32) -> f64 {

@@ -1,9 +1,10 @@
 //! The front end's band-pass filter, as a finite response around the signal's IF.
 //!
-//! A `brick_wall` is a sinc under a Kaiser window of 80 dB (Kaiser 1974), of linear phase; a `butterworth` is the
-//! impulse response of the analogue prototype of its order sampled at the scene's rate and cut off at −100 dB. In a
-//! real format the filter acts on the real samples, on both sides of zero. Limits: a filter delays code and carrier's
-//! envelope by its group delay, which every satellite shares; an ideal wall has edges of a twentieth of its width.
+//! A `brick_wall` is a sinc under a Kaiser window of 80 dB (Kaiser 1974), of linear phase; a `butterworth` is
+//! the impulse response of the analogue prototype of its order sampled at the scene's rate and cut off at
+//! −100 dB. In a real format the filter acts on the real samples, on both sides of zero. Limits: a filter
+//! delays code and carrier's envelope by its group delay, which every satellite shares; an ideal wall has
+//! edges of a twentieth of its width.
 
 use std::f64::consts::PI;
 
@@ -15,8 +16,13 @@ use crate::gnss::facts::{FilterShape, FilterSpec, StageSpec};
 /// Shapes of filters, by the name that a scenario uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
+    /// A long symmetric filter with steep edges.
     BrickWall,
-    Butterworth { order: u32 },
+    /// A Butterworth filter, causal.
+    Butterworth {
+        /// Its order.
+        order: u32,
+    },
 }
 
 /// Attenuation of a Kaiser window's side lobes, dB, and the β that it takes.
@@ -31,6 +37,7 @@ const MAX_TAPS: usize = 8192;
 /// A band-pass filter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filter {
+    /// What its response looks like.
     pub shape: Shape,
     /// Width between the points of half power (both sides of the IF together).
     pub bandwidth_hz: f64,
@@ -46,10 +53,26 @@ pub struct Filter {
 /// Why a filter cannot be made.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FilterError {
+    /// A band that the sample rate cannot hold.
     #[error("{bandwidth_hz} Hz at {rate_hz} samples a second: expected less than {limit_hz} Hz, or no filter")]
-    Wide { bandwidth_hz: f64, rate_hz: f64, limit_hz: f64 },
+    Wide {
+        /// The band asked for.
+        bandwidth_hz: f64,
+        /// The sample rate.
+        rate_hz: f64,
+        /// The widest band at that rate.
+        limit_hz: f64,
+    },
+    /// A band that would take too long a filter.
     #[error("{bandwidth_hz} Hz at {rate_hz} samples a second takes {taps} taps: expected at most 8192")]
-    Narrow { bandwidth_hz: f64, rate_hz: f64, taps: usize },
+    Narrow {
+        /// The band asked for.
+        bandwidth_hz: f64,
+        /// The sample rate.
+        rate_hz: f64,
+        /// Taps that it would take.
+        taps: usize,
+    },
 }
 
 impl Filter {
@@ -106,7 +129,8 @@ fn wall_taps(width: f64) -> usize {
     ((KAISER_DB - 7.95) / (14.36 * EDGE * width)).ceil() as usize | 1
 }
 
-/// A sinc of `width` cycles a sample under a Kaiser window, of unit gain in the middle, and its delay in samples.
+/// A sinc of `width` cycles a sample under a Kaiser window, of unit gain in the middle, and its delay in
+/// samples.
 fn brick_wall(width: f64, length: usize) -> (Vec<f64>, f64) {
     let beta = 0.1102 * (KAISER_DB - 8.7);
     let middle = 0.5 * (length - 1) as f64;
@@ -134,7 +158,8 @@ fn butterworth_taps(order: u32, width: f64) -> usize {
     (-libm::log(CUT) / slowest).ceil() as usize + 1
 }
 
-/// The response of that low-pass as a sum of its poles' exponentials, and its delay in samples at zero frequency.
+/// The response of that low-pass as a sum of its poles' exponentials, and its delay in samples at zero
+/// frequency.
 fn butterworth(order: u32, width: f64, length: usize) -> (Vec<f64>, f64) {
     let omega = PI * width;
     let poles: Vec<Complex64> = butterworth_poles(order, width).collect();
@@ -152,7 +177,8 @@ fn butterworth(order: u32, width: f64, length: usize) -> (Vec<f64>, f64) {
             sum + (residue * Complex64::new(cos, sin) * libm::exp(pole.re * t)).re
         })
     };
-    // Sampled at the middles of intervals, so that a first-order filter's step at zero counts half on each side.
+    // Sampled at the middles of intervals, so that a first-order filter's step at zero counts half on each
+    // side.
     let taps = normal((0..length).map(|k| at(k as f64 + 0.5)).collect());
     let delay = taps.iter().enumerate().fold(0.0, |sum, (k, h)| sum + k as f64 * h);
     (taps, delay)
@@ -191,7 +217,7 @@ impl Stage for Filter {
         format!("{shape}, {} Hz wide, delay {delay_ns:.1} ns, {} taps", self.bandwidth_hz, self.taps())
     }
 
-    fn fact(&self) -> Option<StageSpec> {
+    fn spec(&self) -> Option<StageSpec> {
         let shape = match self.shape {
             Shape::BrickWall => FilterShape::BrickWall,
             Shape::Butterworth { order } => FilterShape::Butterworth { order },
@@ -220,8 +246,8 @@ impl Stage for Filter {
     }
 }
 
-/// Adds `sign` times the convolution of `input` with `taps`; before `input` there is silence. Tap by tap, so that each
-/// sample's sum has one order however many samples are done at once.
+/// Adds `sign` times the convolution of `input` with `taps`; before `input` there is silence. Tap by tap, so
+/// that each sample's sum has one order however many samples are done at once.
 fn add(output: &mut [f32], input: &[f32], taps: &[f32], sign: f32) {
     const PIECE: usize = 2048;
     for (piece, output) in output.chunks_mut(PIECE).enumerate() {
@@ -258,7 +284,8 @@ mod tests {
         ] {
             let filter = Filter::new(shape, 2.5e6, rate_hz, if_hz, real).unwrap();
             let gain = |hz: f64| filter.response((if_hz + hz) / rate_hz).norm();
-            // Half power of the sampled prototype moves by its aliases: order 4 at a sixteenth of the rate, 0.5 %.
+            // Half power of the sampled prototype moves by its aliases: order 4 at a sixteenth of the rate,
+            // 0.5 %.
             for edge_hz in [-1.25e6, 1.25e6] {
                 let expected = if shape == Shape::BrickWall { 0.5 } else { 0.5_f64.sqrt() };
                 assert!((gain(edge_hz) - expected).abs() < 0.01, "{shape:?} {if_hz}: {}", gain(edge_hz));

@@ -1,10 +1,11 @@
 //! The faults of a down-converter: oscillator offset and phase noise, I and Q out of balance, a residue of
 //! direct current.
 //!
-//! Phase noise is that of a synthesiser locked to its reference: flat up to the loop's bandwidth and falling by 20 dB a
-//! decade above (a first-order process), known at nodes a twentieth of its time constant apart and linear between
-//! them. I and Q: I is taken as reference, Q gets the gain and the phase error (Razavi, RF Microelectronics, 4.2).
-//! Limits: noise of the reference itself is the receiver clock's; what is left out of the response is e^−12.
+//! Phase noise is that of a synthesiser locked to its reference: flat up to the loop's bandwidth and falling
+//! by 20 dB a decade above (a first-order process), known at nodes a twentieth of its time constant apart and
+//! linear between them. I and Q: I is taken as reference, Q gets the gain and the phase error (Razavi, RF
+//! Microelectronics, 4.2). Limits: noise of the reference itself is the receiver clock's; what is left out of
+//! the response is e^−12.
 
 use crate::generator::random::Stream;
 use crate::generator::stage::{Block, Stage};
@@ -20,7 +21,9 @@ const GROUP_NODES: u64 = 1024;
 /// A local oscillator that is off its frequency, or noisy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Oscillator {
+    /// By how much it is tuned too low: carriers lie higher by so much.
     pub offset_hz: f64,
+    /// Its phase noise; absent means none.
     pub noise: Option<PhaseNoise>,
     rate: Rate,
 }
@@ -28,6 +31,7 @@ pub struct Oscillator {
 /// Phase noise of a synthesiser.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhaseNoise {
+    /// Standard deviation of the phase.
     pub rms_rad: f64,
     /// Half-power bandwidth of the noise, that of the synthesiser's loop.
     pub bandwidth_hz: f64,
@@ -52,8 +56,8 @@ impl PhaseNoise {
         Self { rms_rad, bandwidth_hz, spacing, response, keeps: libm::exp(-decay), gains: scale, stream }
     }
 
-    /// Phase at nodes `first..first + count`, in rad. Each group of nodes begins with the whole response and goes on by
-    /// recursion, so that a node's bits depend on its group alone.
+    /// Phase at nodes `first..first + count`, in rad. Each group of nodes begins with the whole response and
+    /// goes on by recursion, so that a node's bits depend on its group alone.
     fn nodes(&self, first: u64, count: usize) -> Vec<f64> {
         let length = self.response.len() as u64;
         let mut nodes = Vec::with_capacity(count + GROUP_NODES as usize);
@@ -76,6 +80,7 @@ impl PhaseNoise {
 }
 
 impl Oscillator {
+    /// An oscillator for samples at `rate`, `offset_hz` too low.
     pub fn new(offset_hz: f64, noise: Option<PhaseNoise>, rate: Rate) -> Self {
         Self { offset_hz, noise, rate }
     }
@@ -86,7 +91,7 @@ impl Stage for Oscillator {
         "local_oscillator"
     }
 
-    fn fact(&self) -> Option<StageSpec> {
+    fn spec(&self) -> Option<StageSpec> {
         Some(StageSpec::LocalOscillator { offset_hz: self.offset_hz })
     }
 
@@ -123,7 +128,9 @@ pub struct Balance {
     pub gain: f64,
     /// By how much Q is short of 90 degrees behind I.
     pub phase_rad: f64,
+    /// Direct current in I, in LSB.
     pub dc_i_lsb: f32,
+    /// Direct current in Q, in LSB.
     pub dc_q_lsb: f32,
 }
 
@@ -150,7 +157,7 @@ impl Stage for Balance {
         format!("{image}direct current {} and {} LSB", self.dc_i_lsb, self.dc_q_lsb)
     }
 
-    fn fact(&self) -> Option<StageSpec> {
+    fn spec(&self) -> Option<StageSpec> {
         let (i, q) = (f64::from(self.dc_i_lsb), f64::from(self.dc_q_lsb));
         let unbalanced = self.gain != 0.0 || self.phase_rad != 0.0;
         Some(StageSpec::Iq(BalanceSpec { image_db: unbalanced.then(|| self.image_db()), dc_power_lsb2: i * i + q * q }))

@@ -2,8 +2,8 @@
 //!
 //! A stage is a function of the absolute sample number and of a bounded number of samples before it, so the
 //! stream is the same however it is cut and wherever it starts. The scene fixes the order, which is that of
-//! the hardware: what the antenna hears, thermal noise, then the front end. Limits: before sample 0 there is
-//! silence.
+//! the hardware: what the antenna receives, thermal noise, then the front end. Limits: before sample 0 there
+//! is silence.
 
 pub mod converter;
 pub mod filter;
@@ -21,6 +21,7 @@ pub struct Block<'a> {
     pub start: u64,
     /// In-phase and quadrature components, of one length.
     pub i: &'a mut [f32],
+    /// Quadrature components.
     pub q: &'a mut [f32],
     /// Samples at the front that only serve the memory of stages and are not sent on.
     pub lead: usize,
@@ -50,7 +51,7 @@ pub trait Stage: Send + Sync {
     /// What it does, for the plan.
     fn describe(&self) -> String;
     /// What it does, for the judge's spectrum; nothing where it leaves that alone.
-    fn fact(&self) -> Option<StageSpec> {
+    fn spec(&self) -> Option<StageSpec> {
         None
     }
     /// Of a converter: its full scale, in LSB before it, when a component of deviation `deviation_lsb`

@@ -1,9 +1,9 @@
 //! A transmitter that plays the signals back over a cable: a converter of few bits, and an attenuator.
 //!
-//! What is played is the sum of all signals without the receiver's noise, rounded to uniform levels around zero; full
-//! scale is a multiple of the sum's deviation at the scene's start. Limits: images of the converter lie outside the
-//! sampled band and are not made; an error of its reference acts on carriers, codes and times alike and is therefore
-//! the receiver clock's drift, with the opposite sign.
+//! What is played is the sum of all signals without the receiver's noise, rounded to uniform levels around
+//! zero; full scale is a multiple of the sum's deviation at the scene's start. Limits: images of the
+//! converter lie outside the sampled band and are not made; an error of its reference acts on carriers, codes
+//! and times alike and is therefore the receiver clock's drift, with the opposite sign.
 
 use crate::generator::stage::converter::level;
 use crate::generator::stage::{Block, Stage};
@@ -11,6 +11,7 @@ use crate::generator::stage::{Block, Stage};
 /// A converter and what lies behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Playback {
+    /// Bits of a component.
     pub bits: u32,
     /// Width of a level, in LSB of the scene.
     pub step_lsb: f32,

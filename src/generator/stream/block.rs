@@ -3,16 +3,13 @@
 //! A block is a pure function of the scene and of what transmitters have prepared, so blocks are made side by
 //! side. What stages look back at is rendered before it and not sent on.
 
-use crate::generator::scene::{CodeEdge, Scene, folded_hz};
+use crate::generator::scene::{CodeEdge, Scene};
 use crate::generator::stage::Block;
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::isa;
-use crate::generator::synth::transmitter::{Scratch, Transmitter};
 use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
+use crate::generator::transmit::{Scratch, Transmitter};
 use crate::gnss::samples::Format;
-
-/// Cut-off of band-limited edges, in cycles a sample.
-const CUTOFF_CPS: f64 = 0.45;
 
 /// The sample at which the run of a sample begins.
 pub(super) fn run_begin(sample: u64) -> u64 {
@@ -32,22 +29,6 @@ pub(super) fn edge<'a>(scene: &Scene, filter: Option<&'a Filter>) -> Edge<'a> {
         None if scene.fidelity.code_edge == CodeEdge::Nearest => Edge::Nearest,
         None => Edge::Area,
     }
-}
-
-/// In a real format the band around the IF must fit between zero and half the rate.
-pub(crate) fn cutoff_cps(scene: &Scene) -> f64 {
-    if scene.metadata.format.is_complex() {
-        return CUTOFF_CPS;
-    }
-    let rate_hz = scene.clock.rate.hz();
-    scene.signals.iter().fold(CUTOFF_CPS, |least, signal| {
-        let (lowest_hz, highest_hz) = signal.carriers_hz();
-        [lowest_hz, highest_hz].into_iter().fold(least, |least, carrier_hz| {
-            let place = (folded_hz(scene.metadata.if_hz(carrier_hz), rate_hz) / rate_hz).abs();
-            let room = place.min(0.5 - place);
-            if room > 0.05 { least.min(2.0 * CUTOFF_CPS * room) } else { least }
-        })
-    })
 }
 
 /// Buffers of one worker.

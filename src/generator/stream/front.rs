@@ -6,15 +6,15 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::block::{Worker, cutoff_cps, edge, first_run, render, run_begin};
+use super::block::{Worker, edge, first_run, render, run_begin};
 use super::{GenerateError, Generated, Options};
 use crate::generator::geometry::Geometry;
 use crate::generator::scene::{CodeEdge, Scene};
 use crate::generator::spoof::Constellation;
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::isa::Level;
-use crate::generator::synth::transmitter::Transmitter;
 use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
+use crate::generator::transmit::Transmitter;
 use crate::gnss::record::{NavigationRow, PassRow};
 use crate::gnss::satellite::Sv;
 
@@ -45,7 +45,7 @@ impl<'a> Front<'a> {
     /// A rate that the scene's signals cannot have.
     pub fn new(scene: &'a Scene, part: Range<u64>, options: &Options) -> Result<Self, GenerateError> {
         let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
-        let filter = limited.then(|| Filter::new(cutoff_cps(scene)));
+        let filter = limited.then(|| Filter::new(scene.cutoff_cps()));
         let transmitters = transmitters(scene, edge(scene, filter.as_ref()))?;
         // What stages look back at is rendered twice: blocks are long against it.
         let lead = scene.memory_samples().next_multiple_of(RUN_SAMPLES) as u64;
@@ -151,7 +151,7 @@ pub(super) fn share_geometry(fronts: &mut [Front<'_>]) {
 }
 
 /// The signals of a scene, by constellation, satellite and signal.
-pub(super) fn transmitters(scene: &Scene, edge: Edge<'_>) -> Result<Vec<Transmitter>, GenerateError> {
+pub(crate) fn transmitters(scene: &Scene, edge: Edge<'_>) -> Result<Vec<Transmitter>, GenerateError> {
     let satellites: BTreeSet<Sv> = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)).collect();
     let mut found = Vec::new();
     let authentic = Arc::new(Constellation::authentic());

@@ -9,11 +9,11 @@ use std::io;
 
 use super::front::{Front, share_geometry};
 use super::ticks::Ticks;
-use super::{GenerateError, Generated, Options};
+use super::{GenerateError, Generated, Options, end};
 use crate::generator::geometry::is_shared;
 use crate::generator::scene::Scene;
 use crate::generator::synth::RUN_SAMPLES;
-use crate::generator::truth;
+use crate::generator::truth::Sink;
 use crate::gnss::record::PassRow;
 
 /// The front ends of a scene on their way to samples.
@@ -31,20 +31,18 @@ struct Ends {
 }
 
 impl<'a> Fronts<'a> {
-    /// The streams of `scenes`, which
-    /// [`Scenario::compose_all`](crate::generator::scenario::Scenario::compose_all) has made; gives `truth`
-    /// what they are.
+    /// The streams of `scenes`, which were composed from one scenario; gives `truth` what they are.
     ///
     /// # Errors
-    /// A rate that signals cannot have, a truth that cannot be written.
-    pub fn new(scenes: &'a [Scene], truth: &mut truth::Writer, options: &Options) -> Result<Self, GenerateError> {
+    /// A rate that signals cannot have, a sink that does not take the truth.
+    pub fn new(scenes: &'a [Scene], truth: &mut dyn Sink, options: &Options) -> Result<Self, GenerateError> {
         let fronts: Result<Vec<Front<'a>>, _> =
             scenes.iter().map(|scene| Front::new(scene, 0..scene.samples, options)).collect();
         let (mut fronts, Some(first)) = (fronts?, scenes.first()) else { return Err(GenerateError::NoFrontEnd) };
         if scenes.iter().all(|scene| is_shared(first, scene)) {
             share_geometry(&mut fronts);
         }
-        truth.scenes(scenes)?;
+        truth.begin(scenes, &(0..first.samples))?;
         // The shortest batch bounds the memory; a slice with less than a block would render its lead again
         // and again.
         let seconds = |front: &Front<'_>, samples: u64| samples as f64 / front.scene.clock.rate.hz();
@@ -59,14 +57,14 @@ impl<'a> Fronts<'a> {
         self.fronts.first().map_or(0, Front::samples)
     }
 
-    /// Makes the next slice of time: hands the bytes of each front end, by its number, to `sink`, and writes
-    /// the truth as far. `false` after the last sample.
+    /// Makes the next slice of time: hands the bytes of each front end, by its number, to `sink`, and gives
+    /// `truth` what is true of it. `false` after the last sample.
     ///
     /// # Errors
     /// [`GenerateError`] of orbits, messages and truth, and what `sink` meets.
     pub fn next(
         &mut self,
-        truth: &mut truth::Writer,
+        truth: &mut dyn Sink,
         packed: &mut Vec<u8>,
         sink: &mut dyn FnMut(usize, &[u8]) -> io::Result<()>,
     ) -> Result<bool, GenerateError> {
@@ -75,7 +73,7 @@ impl<'a> Fronts<'a> {
             front.prepare(end.prepared)?;
         }
         if let Some(end) = ends.first() {
-            self.ticks.write(&self.fronts, end.rendered, truth)?;
+            self.ticks.give(&self.fronts, end.rendered, truth)?;
         }
         for (number, (front, Ends { rendered: to, .. })) in self.fronts.iter_mut().zip(ends).enumerate() {
             while front.is_before(to) {
@@ -106,14 +104,14 @@ impl<'a> Fronts<'a> {
         first.is_before(to).then_some(ends)
     }
 
-    /// Writes the rest of the truth, and reports what was done for each front end.
+    /// Gives `truth` the rest, and reports what was done for each front end.
     ///
     /// # Errors
-    /// A truth that cannot be written.
-    pub fn finish(mut self, truth: &mut truth::Writer) -> Result<Vec<Generated>, GenerateError> {
+    /// A sink that does not take the truth.
+    pub fn finish(mut self, truth: &mut dyn Sink) -> Result<Vec<Generated>, GenerateError> {
         let mut navigation = BTreeSet::new();
         self.fronts.iter_mut().for_each(|front| navigation.append(&mut front.navigation()));
-        truth.finish(&navigation, &self.passes())?;
+        end(truth, navigation, self.passes())?;
         Ok(self.fronts.iter().map(Front::done).collect())
     }
 

@@ -1,59 +1,15 @@
-//! What a plan asks of the synthesiser: knots met along the scene, and stretches of samples that are
-//! measured.
+//! Stretches of samples that are made to be measured.
 
 use std::ops::Range;
 
-use super::block::{Worker, cutoff_cps, edge, first_run, pack, run_begin, satellites};
+use super::GenerateError;
+use super::block::{Worker, edge, first_run, pack, run_begin, satellites};
 use super::front::transmitters;
-use super::{GenerateError, Options};
-use crate::generator::plan::Machinery;
 use crate::generator::scene::{CodeEdge, Scene};
 use crate::generator::stage::Block;
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::isa::Level;
-use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
-use crate::generator::truth;
-
-/// Roots of each satellite's grid that a plan looks at.
-const PLANNED_ROOTS: u64 = 16;
-
-/// What the plan reports of the synthesiser: knots met along the scene, memory of a batch, and the usual
-/// speed.
-///
-/// # Errors
-/// Those of orbits.
-pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
-    let transmitters = transmitters(scene, Edge::Nearest)?;
-    let rate = scene.clock.rate;
-    let (mut shortest, mut longest, mut worst_cycles) = (u64::MAX, 0, 0.0_f64);
-    for transmitter in &transmitters {
-        if !truth::in_view_from(scene, &transmitter.from, transmitter.sv, scene.clock.start)? {
-            continue;
-        }
-        let size = transmitter.root_samples();
-        let roots = scene.samples.div_ceil(size);
-        for root in (0..roots).step_by(roots.div_ceil(PLANNED_ROOTS).max(1) as usize) {
-            for part in transmitter.root(scene, root)? {
-                shortest = shortest.min(part.end - part.start);
-                longest = longest.max(part.end - part.start);
-                worst_cycles = worst_cycles.max(part.error_cycles);
-            }
-        }
-    }
-    let shortest = shortest.min(longest);
-    let options = Options::default();
-    let batch = u64::from(options.block_runs) * u64::from(options.batch_blocks) * RUN_SAMPLES as u64;
-    Ok(Machinery {
-        knot_spacing_s: rate.elapsed_s(shortest),
-        longest_knot_spacing_s: rate.elapsed_s(longest),
-        knot_reason: format!(
-            "the longest on which a cubic stays within {:e} cycles of the motion; {worst_cycles:.1e} met",
-            scene.fidelity.knot_tolerance_cycles
-        ),
-        block_bytes: batch.min(scene.samples) * scene.metadata.format.bytes() as u64,
-        satellite_samples_per_s: 1e9 / scene.fidelity.satellite_sample_ns(rate.hz()),
-    })
-}
+use crate::generator::synth::{Kernel, RUN_SAMPLES};
 
 /// What a stretch of the scene's samples holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -72,7 +28,7 @@ pub(crate) struct Stretch {
 /// Those of [`super::Stream::next`].
 pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<Stretch>, GenerateError> {
     let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
-    let filter = limited.then(|| Filter::new(cutoff_cps(scene)));
+    let filter = limited.then(|| Filter::new(scene.cutoff_cps()));
     let edge = edge(scene, filter.as_ref());
     let mut transmitters = transmitters(scene, edge)?;
     let kernel = Kernel { edge, arithmetic: scene.fidelity.carrier, level: Level::detect() };

@@ -1,4 +1,4 @@
-//! When truth is written, and what of it.
+//! At which samples there is truth, and what of it.
 
 use std::collections::BTreeSet;
 
@@ -8,13 +8,12 @@ use super::GenerateError;
 use super::front::Front;
 use crate::generator::scene::{Scene, sources};
 use crate::generator::spoof::Constellation;
-use crate::generator::stage::interference::Interferer;
-use crate::generator::truth;
+use crate::generator::truth::{self, Record, Sink};
 use crate::gnss::broadcast::OrbitError;
-use crate::gnss::record::TrajectoryRow;
+use crate::gnss::record::{InterferenceRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 
-/// The samples at which truth is written.
+/// The samples at which there is truth.
 pub(super) struct Ticks {
     next: u64,
     interval_us: u64,
@@ -36,11 +35,12 @@ impl Ticks {
         Ok(Self { next, interval_us, origin })
     }
 
-    /// Writes every tick before sample `to` of the first of `fronts`, all of which have prepared as much.
+    /// Gives `truth` every tick before sample `to` of the first of `fronts`, all of which have prepared as
+    /// much.
     ///
     /// # Errors
-    /// Those of orbits, and a truth that cannot be written.
-    pub fn write(&mut self, fronts: &[Front<'_>], to: u64, truth: &mut truth::Writer) -> Result<(), GenerateError> {
+    /// Those of orbits, and of a sink that does not take a record.
+    pub fn give(&mut self, fronts: &[Front<'_>], to: u64, truth: &mut dyn Sink) -> Result<(), GenerateError> {
         let Some(scene) = fronts.first().map(|front| front.scene) else { return Ok(()) };
         let origin = self.origin;
         let place = |from: &Constellation, sample: u64| {
@@ -54,14 +54,25 @@ impl Ticks {
                 return Ok(());
             }
             let authentic = Constellation::authentic();
-            truth.epoch(&place(&authentic, sample), &rows(fronts, &authentic, &at, origin)?)?;
-            let heard: Vec<(&Interferer, u64)> = sources(fronts.iter().map(|front| front.scene))
-                .into_iter()
-                .filter_map(|(number, source)| Some((source, *at.samples.get(number)?)))
-                .collect();
-            truth.interference(&heard, sample - origin)?;
-            for spoofer in scene.spoofers.iter().filter(|spoofer| spoofer.on(scene).contains(&sample)) {
-                truth.claim(spoofer, &place(spoofer, sample), &rows(fronts, spoofer, &at, origin)?)?;
+            truth.take(Record::Trajectory(place(&authentic, sample)))?;
+            for (observation, sky, rays) in rows(fronts, &authentic, &at, origin)? {
+                truth.take(Record::Observation(observation))?;
+                truth.take(Record::Sky(sky))?;
+                rays.into_iter().try_for_each(|ray| truth.take(Record::Ray(ray)))?;
+            }
+            for (number, (front, source)) in (1..).zip(sources(fronts.iter().map(|front| front.scene))) {
+                let row = at.samples.get(front).and_then(|own| source.row(number, *own));
+                let Some(row) = row else { continue };
+                truth.take(Record::Interference(InterferenceRow { sample: sample - origin, ..row }))?;
+            }
+            for spoofer in
+                scene.spoofers.iter().filter(|spoofer| spoofer.on(scene.clock, &scene.receiver_clock).contains(&sample))
+            {
+                let number = spoofer.number;
+                truth.take(Record::Claim { spoofer: number, place: place(spoofer, sample) })?;
+                for (observation, ..) in rows(fronts, spoofer, &at, origin)? {
+                    truth.take(Record::Spoofed { spoofer: number, observation })?;
+                }
             }
             self.next += 1;
         }
@@ -84,7 +95,7 @@ impl Tick {
     }
 }
 
-/// What is true of the signals that a constellation sends: each once, though several front ends hear it.
+/// What is true of the signals that a constellation sends: each once, though several front ends receive it.
 fn rows(fronts: &[Front<'_>], from: &Constellation, at: &Tick, origin: u64) -> Result<Vec<truth::Truth>, OrbitError> {
     let (Some(first), Some(sample)) = (fronts.first(), at.samples.first().copied()) else { return Ok(Vec::new()) };
     let mut known: BTreeSet<(Sv, &str)> = BTreeSet::new();

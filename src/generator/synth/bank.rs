@@ -1,7 +1,8 @@
 //! The runs of all rays in one stretch of samples, gathered before any is made.
 //!
-//! Kernels are faster with all satellites at hand: sums stay in registers and memory is written once. Runs that share
-//! their first and last sample go together; sums of `f32` are in the order of those spans, then in that of arrival.
+//! Kernels are faster with all satellites at hand: sums stay in registers and memory is written once. Runs
+//! that share their first and last sample go together; sums of `f32` are in the order of those spans, then in
+//! that of arrival.
 
 use std::ops::Range;
 
@@ -29,8 +30,8 @@ struct Entry {
 }
 
 impl Bank {
-    /// Adds a run for `samples` of the stretch, part of `span`: `make` appends its signs to the strip that it is handed
-    /// and returns everything else.
+    /// Adds a run for `samples` of the stretch, part of `span`: `make` appends its signs to the strip that it
+    /// is handed and returns everything else.
     pub fn push(&mut self, span: (u64, u64), samples: Range<usize>, make: impl FnOnce(&mut Vec<u64>) -> Run<'static>) {
         let begin = self.bits.len();
         let run = make(&mut self.bits);

@@ -46,8 +46,11 @@ pub struct Spreading {
 /// time, whole steps, and a fraction of a step in 2^-48.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CodeTime {
+    /// Whole periods.
     pub period: i64,
+    /// Whole steps of the period.
     pub step: u32,
+    /// The rest, in 2^-48 step.
     pub fraction: u64,
 }
 

@@ -1,9 +1,9 @@
 //! The `f64` kernel of the `reference` level: every sample by itself, as in
 //! [`reference`](mod@super::reference), at speed.
 //!
-//! Carrier phase is the 64-bit turns of each sample, its sine and cosine are Taylor series within 2e-16 over an eighth
-//! of a turn; code positions are read with all their 48 fractional bits. No value depends on the sample before.
-//! Only the sum over satellites is `f32`.
+//! Carrier phase is the 64-bit turns of each sample, its sine and cosine are Taylor series within 2e-16 over
+//! an eighth of a turn; code positions are read with all their 48 fractional bits. No value depends on the
+//! sample before. Only the sum over satellites is `f32`.
 
 use super::band::{Filter, HALF_WIDTH};
 use super::chips::{sign, window};

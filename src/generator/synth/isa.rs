@@ -5,9 +5,9 @@
 
 use super::lanes::{self, Buffers};
 use super::{Edge, Run, exact};
-use crate::generator::stage::interference::resample::{self, Interpolator, Position};
-use crate::generator::stage::interference::tone::{self, Tone};
-use crate::generator::stage::noise;
+use crate::generator::synth::noise;
+use crate::generator::synth::resample::{self, Interpolator, Position};
+use crate::generator::synth::tone::{self, Tone};
 use crate::gnss::samples::Format;
 
 /// An instruction set for which kernels are compiled.
@@ -15,11 +15,14 @@ use crate::gnss::samples::Format;
 pub enum Level {
     /// What every processor of the target has.
     Baseline,
+    /// 256-bit vectors.
     Avx2,
+    /// 512-bit vectors.
     Avx512,
 }
 
 impl Level {
+    /// From the narrowest to the widest.
     pub const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
 
     /// The widest that this processor has.

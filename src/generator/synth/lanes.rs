@@ -13,7 +13,8 @@ use super::band::{Filter, HALF_WIDTH};
 use super::chips::window;
 use super::{CODE_BITS, CODE_ONE, Edge, RUN_SAMPLES, Run, reference};
 
-/// Samples on each side of a group's middle. The same on every instruction set, because rounding depends on it.
+/// Samples on each side of a group's middle. The same on every instruction set, because rounding depends on
+/// it.
 const HALF: usize = 16;
 
 /// Samples of a group.
@@ -234,7 +235,8 @@ fn add<const AREA: bool>(bits: &[u64], voice: &Voice, group: usize, sums: &mut S
     }
 }
 
-/// The code at a lane's place: for area edges the mean over the sample in units of 1/`reach`, else the sign alone.
+/// The code at a lane's place: for area edges the mean over the sample in units of 1/`reach`, else the sign
+/// alone.
 #[inline(always)]
 fn chip<const AREA: bool>(place: u32, now: u32, changes: u32, reach: u32) -> f32 {
     let index = place >> LANE_BITS;
@@ -242,7 +244,8 @@ fn chip<const AREA: bool>(place: u32, now: u32, changes: u32, reach: u32) -> f32
     if !AREA {
         return f32::from_bits(sign);
     }
-    // Behind a change the mean rises from −reach to reach, as far as the edge lies back; elsewhere it is reach already.
+    // Behind a change the mean rises from −reach to reach, as far as the edge lies back; elsewhere it is
+    // reach already.
     let behind = (place & FRACTION) as i32 as f32;
     let mean = behind + f32::from_bits(((changes << index) & SIGN) | reach);
     let reach = f32::from_bits(reach);

@@ -15,9 +15,10 @@ pub mod chips;
 pub mod exact;
 pub mod isa;
 pub mod lanes;
+pub mod noise;
 pub mod reference;
-pub mod symbols;
-pub mod transmitter;
+pub mod resample;
+pub mod tone;
 pub mod waveform;
 
 use band::Filter;
@@ -45,6 +46,7 @@ pub struct Run<'a> {
     pub step: u64,
     /// Carrier phase of sample 0, in 2^-64 turn, and its advance a sample.
     pub turns: u64,
+    /// Advance of the carrier a sample, in 2^-64 turn.
     pub turns_step: u64,
     /// Peak amplitude of the carrier, in LSB.
     pub amplitude: f64,
@@ -53,16 +55,22 @@ pub struct Run<'a> {
 /// How a code edge falls between samples, with what it needs at hand.
 #[derive(Clone, Copy, Debug)]
 pub enum Edge<'a> {
+    /// At the nearest sample.
     Nearest,
+    /// By the share of the sample on either side.
     Area,
+    /// Through a low-pass filter.
     BandLimited(&'a Filter),
 }
 
 /// How samples are made: the edge model, the arithmetic and the instruction set.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel<'a> {
+    /// How code edges fall between samples.
     pub edge: Edge<'a>,
+    /// Arithmetic of the kernel.
     pub arithmetic: Arithmetic,
+    /// The instruction set.
     pub level: isa::Level,
 }
 
@@ -115,9 +123,6 @@ fn area_power(correlation: &[f64], d: f64) -> f64 {
 pub(crate) fn radians(turns: u64) -> f64 {
     turns as i64 as f64 * (std::f64::consts::TAU / 18_446_744_073_709_551_616.0)
 }
-
-#[cfg(test)]
-mod signals_tests;
 
 #[cfg(test)]
 mod tests {

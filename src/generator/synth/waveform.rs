@@ -20,6 +20,7 @@ use crate::gnss::signal::{Component, Layer, Link, Signal};
 /// A sequence with its part in the component.
 #[derive(Clone, Debug)]
 pub struct Voice {
+    /// Its signs over a code period.
     pub spreading: Spreading,
     /// Factor of the component's amplitude.
     pub amplitude: f64,
@@ -41,12 +42,40 @@ pub struct Waveform {
 /// Why a component cannot be rendered.
 #[derive(Debug, Error, PartialEq)]
 pub enum WaveformError {
+    /// A rate at which a sample would span more than 15 steps of a sequence.
     #[error(
         "{signal}, component {component}, layer {layer}: {steps_hz} steps a second at {rate_hz} samples a second: expected at least {least_hz} samples a second"
     )]
-    Rate { signal: &'static str, component: usize, layer: usize, steps_hz: f64, rate_hz: f64, least_hz: f64 },
+    Rate {
+        /// The signal.
+        signal: &'static str,
+        /// Number of the component, from 0.
+        component: usize,
+        /// Number of the layer, from 0.
+        layer: usize,
+        /// Steps a second.
+        steps_hz: f64,
+        /// The sample rate.
+        rate_hz: f64,
+        /// The least rate that would do.
+        least_hz: f64,
+    },
+    /// A table that is no code.
     #[error("{signal}, component {component}, {what} of {sv}: {found}: expected {expected}")]
-    Code { signal: &'static str, component: usize, sv: Sv, what: &'static str, found: String, expected: String },
+    Code {
+        /// The signal.
+        signal: &'static str,
+        /// Number of the component, from 0.
+        component: usize,
+        /// The satellite.
+        sv: Sv,
+        /// Which of the tables.
+        what: &'static str,
+        /// What was found.
+        found: String,
+        /// What is expected.
+        expected: String,
+    },
 }
 
 impl Waveform {

@@ -1,30 +1,16 @@
 //! The truth's files: tables that grow with the scene, and `scene.json`.
 
-use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use thiserror::Error;
 
-use super::Truth;
-use crate::generator::effect::obstruction;
+use super::record::{Record, Sink, TruthError};
+use super::skyline::skyline_deg;
 use crate::generator::scene::{Scene, sources};
-use crate::generator::spoof::Constellation;
-use crate::generator::stage::interference::Interferer;
 use crate::gnss::facts::{FrontEndFacts, OscillatorFacts, SceneFacts, TimeOffset};
-use crate::gnss::record::{InterferenceRow, NavigationRow, PassRow, TrajectoryRow};
-
-/// Why the truth could not be written.
-#[derive(Debug, Error)]
-pub enum TruthError {
-    #[error("{path}: {source}")]
-    File { path: PathBuf, source: io::Error },
-    #[error("{path}: {source}")]
-    Row { path: PathBuf, source: csv::Error },
-}
 
 struct Table {
     path: PathBuf,
@@ -64,6 +50,8 @@ pub struct Writer {
     trajectory: Table,
     interference: Option<Table>,
     claims: Vec<Claims>,
+    navigation: Option<Table>,
+    passes: Option<Table>,
 }
 
 /// The time scales of the scene's signals that are ahead of GPS time or behind it, whole seconds apart, each
@@ -91,7 +79,7 @@ fn front_end(scene: &Scene) -> FrontEndFacts {
         code_edge: scene.fidelity.code_edge.fact(),
         signals: signals(std::slice::from_ref(scene)),
         noise_lsb: decimal(scene.noise_lsb),
-        front_end: scene.front_end.iter().filter_map(|stage| stage.fact()).collect(),
+        front_end: scene.front_end.iter().filter_map(|stage| stage.spec()).collect(),
     }
 }
 
@@ -112,8 +100,8 @@ fn signals(scenes: &[Scene]) -> Vec<String> {
 }
 
 impl Writer {
-    /// Creates the files in a directory that is there: were it made here, one that a signal has taken away
-    /// would come back.
+    /// Creates the files in an existing directory. Creating it here would resurrect one that an interrupt
+    /// handler has just removed.
     ///
     /// # Errors
     /// [`TruthError`] with the path that failed.
@@ -130,25 +118,12 @@ impl Writer {
             trajectory: Table::create(directory, "trajectory.csv")?,
             interference: None,
             claims: Vec::new(),
+            navigation: None,
+            passes: None,
         })
     }
 
-    /// Writes `scene.json` for a part of the scene, and creates the files that only this scene has.
-    ///
-    /// # Errors
-    /// [`TruthError`] with the path that failed.
-    pub fn scene(&mut self, scene: &Scene, part: &Range<u64>) -> Result<(), TruthError> {
-        self.facts(scene, std::slice::from_ref(scene), part)
-    }
-
-    /// [`Writer::scene`] for the whole of several front ends' scenes: what is said once is that of the first.
-    ///
-    /// # Errors
-    /// As [`Writer::scene`].
-    pub fn scenes(&mut self, scenes: &[Scene]) -> Result<(), TruthError> {
-        scenes.first().map_or(Ok(()), |first| self.facts(first, scenes, &(0..first.samples)))
-    }
-
+    /// Writes `scene.json`, and creates the files that only this scene has.
     fn facts(&mut self, scene: &Scene, scenes: &[Scene], part: &Range<u64>) -> Result<(), TruthError> {
         let heard = sources(scenes.iter());
         if !heard.is_empty() {
@@ -184,8 +159,8 @@ impl Writer {
             noise: scene.noise,
             noise_arithmetic: scene.fidelity.noise.name().to_owned(),
             noise_lsb: Some(decimal(scene.noise_lsb)),
-            front_end: scene.front_end.iter().filter_map(|stage| stage.fact()).collect(),
-            skyline_deg: obstruction::skyline_deg(scene).unwrap_or_default(),
+            front_end: scene.front_end.iter().filter_map(|stage| stage.spec()).collect(),
+            skyline_deg: skyline_deg(scene).unwrap_or_default(),
             oscillator: (scene.receiver_clock.oscillator.as_ref())
                 .map(|oscillator| OscillatorFacts { h: oscillator.law.levels() }),
             front_ends: if scenes.len() > 1 { scenes.iter().map(front_end).collect() } else { Vec::new() },
@@ -205,56 +180,40 @@ impl Writer {
             .map_err(|source| TruthError::File { path, source })
     }
 
-    /// Appends what is true at one sample.
-    pub fn epoch(&mut self, trajectory: &TrajectoryRow, satellites: &[Truth]) -> Result<(), TruthError> {
-        self.trajectory.write(trajectory)?;
-        for (observation, sky, rays) in satellites {
-            self.observations.write(observation)?;
-            self.sky.write(sky)?;
-            for ray in rays {
-                if self.rays.is_none() {
-                    self.rays = Some(Table::create(&self.directory, "rays.csv")?);
-                }
-                self.rays.as_mut().map_or(Ok(()), |table| table.write(ray))?;
+    /// The claims of a spoofer, which [`Writer::facts`] has counted.
+    fn claims(&mut self, spoofer: usize) -> Option<&mut Claims> {
+        spoofer.checked_sub(1).and_then(|index| self.claims.get_mut(index))
+    }
+}
+
+impl Sink for Writer {
+    fn begin(&mut self, scenes: &[Scene], part: &Range<u64>) -> Result<(), TruthError> {
+        scenes.first().map_or(Ok(()), |first| self.facts(first, scenes, part))
+    }
+
+    fn take(&mut self, record: Record) -> Result<(), TruthError> {
+        match record {
+            Record::Trajectory(row) => self.trajectory.write(row),
+            Record::Observation(row) => self.observations.write(row),
+            Record::Sky(row) => self.sky.write(row),
+            Record::Ray(row) => opened(&mut self.rays, &self.directory, "rays.csv")?.write(row),
+            Record::Interference(row) => self.interference.as_mut().map_or(Ok(()), |table| table.write(row)),
+            Record::Claim { spoofer, place } => {
+                self.claims(spoofer).map_or(Ok(()), |claims| claims.trajectory.write(place))
             }
+            Record::Spoofed { spoofer, observation } => {
+                self.claims(spoofer).map_or(Ok(()), |claims| claims.observations.write(observation))
+            }
+            Record::Navigation(row) => opened(&mut self.navigation, &self.directory, "navigation.csv")?.write(row),
+            Record::Pass(row) => opened(&mut self.passes, &self.directory, "passes.csv")?.write(row),
         }
-        Ok(())
     }
 
-    /// Appends what interference there is at one sample: of each source, at that sample of the front end that
-    /// hears it.
-    pub fn interference(&mut self, heard: &[(&Interferer, u64)], sample: u64) -> Result<(), TruthError> {
-        let Some(table) = &mut self.interference else { return Ok(()) };
-        let mut rows = (1..).zip(heard).filter_map(|(number, (source, own))| source.row(number, *own));
-        rows.try_for_each(|row| table.write(InterferenceRow { sample, ..row }))
-    }
-
-    /// Appends what a spoofer claims at one sample.
-    pub fn claim(
-        &mut self,
-        spoofer: &Constellation,
-        claimed: &TrajectoryRow,
-        satellites: &[Truth],
-    ) -> Result<(), TruthError> {
-        let Some(claims) = spoofer.number.checked_sub(1).and_then(|index| self.claims.get_mut(index)) else {
-            return Ok(());
-        };
-        claims.trajectory.write(claimed)?;
-        satellites.iter().try_for_each(|(observation, ..)| claims.observations.write(observation))
-    }
-
-    /// Writes `navigation.csv`, `passes.csv` and everything that is still buffered.
-    pub fn finish(
-        &mut self,
-        navigation: &BTreeSet<NavigationRow>,
-        passes: &BTreeSet<PassRow>,
-    ) -> Result<(), TruthError> {
-        let mut table = Table::create(&self.directory, "navigation.csv")?;
-        navigation.iter().try_for_each(|row| table.write(row))?;
-        table.flush()?;
-        let mut table = Table::create(&self.directory, "passes.csv")?;
-        passes.iter().try_for_each(|row| table.write(row))?;
-        table.flush()?;
+    /// Writes everything that is still buffered. `navigation.csv` and `passes.csv` exist from here on, even
+    /// without a row.
+    fn finish(&mut self) -> Result<(), TruthError> {
+        opened(&mut self.navigation, &self.directory, "navigation.csv")?.flush()?;
+        opened(&mut self.passes, &self.directory, "passes.csv")?.flush()?;
         self.observations.flush()?;
         self.sky.flush()?;
         self.rays.iter_mut().chain(&mut self.interference).try_for_each(Table::flush)?;
@@ -263,5 +222,13 @@ impl Writer {
             claims.trajectory.flush()?;
         }
         self.trajectory.flush()
+    }
+}
+
+/// The table, created with its first row.
+fn opened<'t>(table: &'t mut Option<Table>, directory: &Path, name: &str) -> Result<&'t mut Table, TruthError> {
+    match table {
+        Some(table) => Ok(table),
+        none => Ok(none.insert(Table::create(directory, name)?)),
     }
 }

@@ -1,10 +1,10 @@
 //! Attitude of the body that carries the antenna, and where on it the antenna sits.
 //!
-//! Body axes are nose, right, down. The nose either keeps a direction of the local frame (yaw, pitch, roll about
-//! down, right, nose) or follows the velocity; the body may spin about its nose at a constant rate, right-handed. The
-//! spin stays a number of turns, so that a carrier can count it over any time. Limits: a nose along the velocity has no
-//! roll of its own (its right side stays level), which is undefined while it points straight up or down, and it leans
-//! towards its direction at rest by up to 1 m/s over the speed.
+//! Body axes are nose, right, down. The nose either keeps a direction of the local frame (yaw, pitch, roll
+//! about down, right, nose) or follows the velocity; the body may spin about its nose at a constant rate,
+//! right-handed. The spin stays a number of turns, so that a carrier can count it over any time. Limits: a
+//! nose along the velocity has no roll of its own (its right side stays level), which is undefined while it
+//! points straight up or down, and it leans towards its direction at rest by up to 1 m/s over the speed.
 
 use std::f64::consts::TAU;
 
@@ -20,14 +20,27 @@ const REST_MPS: f64 = 1.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Nose {
     /// Yaw from north over east, pitch above the horizon, roll to the right.
-    Fixed { yaw_rad: f64, pitch_rad: f64, roll_rad: f64 },
+    Fixed {
+        /// Clockwise from north, or from the velocity.
+        yaw_rad: f64,
+        /// Nose up.
+        pitch_rad: f64,
+        /// Right side down.
+        roll_rad: f64,
+    },
     /// Along the velocity over ground, and in this direction at rest.
-    Velocity { yaw_rad: f64, pitch_rad: f64 },
+    Velocity {
+        /// Clockwise from north, or from the velocity.
+        yaw_rad: f64,
+        /// Nose up.
+        pitch_rad: f64,
+    },
 }
 
 /// How a body is turned, and how the antenna is mounted on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attitude {
+    /// Where the body points.
     pub nose: Nose,
     /// Turns a second about the nose, positive to the right.
     pub spin_hz: f64,
@@ -70,8 +83,8 @@ impl Attitude {
         Orientation { still, spin_cycles: self.spin_hz * t_s }
     }
 
-    /// The antenna's motion `t_s` seconds after the scene's start, when the trajectory says `motion`. The slow
-    /// turning of the nose moves the lever arm, but does not enter its velocity and acceleration.
+    /// The antenna's motion `t_s` seconds after the scene's start, when the trajectory says `motion`. The
+    /// slow turning of the nose moves the lever arm, but does not enter its velocity and acceleration.
     pub fn antenna(&self, t_s: f64, motion: &Motion) -> Motion {
         if self.lever_arm_m == Vector3::zeros() {
             return *motion;
@@ -164,7 +177,8 @@ mod tests {
         for t_s in [0.0, 0.123, 10.01] {
             let [before, now, after] = [t_s - step_s, t_s, t_s + step_s].map(|t_s| body.antenna(t_s, &motion));
             let slope = (after.position_m - before.position_m) / (2.0 * step_s);
-            // Third derivative 0.36 m (44/s)³ times step²/6 is 5e-7; positions rounded to 1e-9 m over 2e-5 s are 1e-4.
+            // Third derivative 0.36 m (44/s)³ times step²/6 is 5e-7; positions rounded to 1e-9 m over 2e-5 s
+            // are 1e-4.
             assert!((slope - now.velocity_mps).norm() < 2e-4, "{t_s}");
             let bend = (after.velocity_mps - before.velocity_mps) / (2.0 * step_s);
             assert!((bend - now.acceleration_mps2).norm() < 1e-4, "{t_s}");

@@ -1,9 +1,10 @@
 //! Trajectories from files: CSV with named columns, and NMEA 0183 GGA sentences.
 //!
 //! CSV columns, in any order: time as `time_s` (since the scene's start) or `gps_s` with an optional
-//! `gps_fraction_s`; position as `x_m,y_m,z_m` (ECEF) or `latitude_deg,longitude_deg,height_m`; velocity, if known, as
-//! `vx_mps,vy_mps,vz_mps` (ECEF) or `east_mps,north_mps,up_mps`. `#` begins a comment. NMEA heights become
-//! ellipsoidal by the sentence's own geoid separation. A file is read row by row and refused at the first bad one.
+//! `gps_fraction_s`; position as `x_m,y_m,z_m` (ECEF) or `latitude_deg,longitude_deg,height_m`; velocity, if
+//! known, as `vx_mps,vy_mps,vz_mps` (ECEF) or `east_mps,north_mps,up_mps`. `#` begins a comment. NMEA heights
+//! become ellipsoidal by the sentence's own geoid separation. A file is read row by row and refused at the
+//! first bad one.
 
 mod rows;
 
@@ -18,7 +19,8 @@ use crate::gnss::earth::Geodetic;
 use crate::gnss::time::Epoch;
 use rows::Rows;
 
-/// Rows read at most: eleven hours at 25 Hz. They become 80 MB of knots, and take three times that while read.
+/// Rows read at most: eleven hours at 25 Hz. They become 80 MB of knots, and take three times that while
+/// read.
 pub const MAX_ROWS: usize = 1_000_000;
 /// Bytes read at most.
 pub const MAX_BYTES: u64 = 256 << 20;
@@ -30,7 +32,9 @@ const LEAST_RADIUS_M: f64 = 6.3e6;
 /// Where a file's times lie and how far apart its rows may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
+    /// When the scene starts.
     pub start: Epoch,
+    /// Longest time between two rows.
     pub max_gap_s: f64,
 }
 
@@ -38,48 +42,123 @@ pub struct Options {
 #[derive(Debug, Error)]
 #[error("{file}: line {line}: {fault}")]
 pub struct FileError {
+    /// The file.
     pub file: String,
+    /// Its line, from 1.
     pub line: u64,
+    /// What is wrong there.
     pub fault: Fault,
 }
 
 /// What is wrong with a row.
 #[derive(Debug, Error)]
 pub enum Fault {
+    /// It cannot be read.
     #[error("{0}")]
     Read(std::io::Error),
+    /// Bytes that are no UTF-8.
     #[error("not UTF-8 text")]
     NotText,
+    /// A row beyond the length that is read.
     #[error("a row of more than {MAX_ROW_BYTES} bytes: expected numbers")]
     LongRow,
+    /// A row with more or fewer fields than columns.
     #[error("{fields} fields, but the header names {columns}: expected ',' between fields and '.' in numbers")]
-    Fields { fields: u64, columns: u64 },
+    Fields {
+        /// Fields of the row.
+        fields: u64,
+        /// Columns of the header.
+        columns: u64,
+    },
+    /// Another separator than a comma.
     #[error("fields are separated by {separator:?}: expected ','")]
-    Separator { separator: char },
+    Separator {
+        /// The one that is there.
+        separator: char,
+    },
+    /// A column that is missing.
     #[error("no column for {what}: expected {expected}; found {found}")]
-    Column { what: &'static str, expected: &'static str, found: String },
+    Column {
+        /// What the column would give.
+        what: &'static str,
+        /// What is expected.
+        expected: &'static str,
+        /// What was found.
+        found: String,
+    },
+    /// A column that comes twice.
     #[error("column {column:?} appears twice")]
-    ColumnTwice { column: String },
+    ColumnTwice {
+        /// The column.
+        column: String,
+    },
+    /// A field that is no number, or out of range.
     #[error("{column} = {value:?}: expected {expected}")]
-    Number { column: String, value: String, expected: &'static str },
+    Number {
+        /// The column.
+        column: String,
+        /// The value.
+        value: String,
+        /// What is expected.
+        expected: &'static str,
+    },
+    /// Two rows of one time.
     #[error("time {t_s} s repeats that of the row before")]
-    SameTime { t_s: f64 },
+    SameTime {
+        /// That time, seconds since the scene's start.
+        t_s: f64,
+    },
+    /// A row that is earlier than the one before.
     #[error("time {t_s} s is before the row before ({before_s} s): rows must ascend in time")]
-    Unsorted { t_s: f64, before_s: f64 },
+    Unsorted {
+        /// That time, seconds since the scene's start.
+        t_s: f64,
+        /// Time of the row before.
+        before_s: f64,
+    },
+    /// Rows too far apart.
     #[error("{gap_s:.3} s since the row before: expected at most max_gap_s = {max_gap_s} s")]
-    Gap { gap_s: f64, max_gap_s: f64 },
+    Gap {
+        /// Time between them.
+        gap_s: f64,
+        /// Longest time between two rows.
+        max_gap_s: f64,
+    },
+    /// A motion that is too fast.
     #[error("{speed_mps:.6e} m/s since the row before: expected at most 0.1 c = 2.998e7 m/s")]
-    Speed { speed_mps: f64 },
+    Speed {
+        /// The speed.
+        speed_mps: f64,
+    },
+    /// A way that passes through the Earth.
     #[error("the way from the row before passes {:.0} km from the Earth's centre: expected at least 6300 km", radius_m / 1e3)]
-    Depth { radius_m: f64 },
+    Depth {
+        /// Least distance from the Earth's centre.
+        radius_m: f64,
+    },
+    /// A motion that accelerates too much.
     #[error("acceleration of {acceleration_mps2:.3e} m/s2: expected at most 1e6 m/s2")]
-    Acceleration { acceleration_mps2: f64 },
+    Acceleration {
+        /// The acceleration.
+        acceleration_mps2: f64,
+    },
+    /// Fewer rows than a motion needs.
     #[error("{have} rows: expected at least 2")]
-    TooFew { have: usize },
+    TooFew {
+        /// How many there are.
+        have: usize,
+    },
+    /// More rows than are read.
     #[error("more than {MAX_ROWS} rows or 256 MiB")]
     TooLong,
+    /// An NMEA sentence that is not as it must be.
     #[error("{sentence:?}: {reason}")]
-    Sentence { sentence: String, reason: &'static str },
+    Sentence {
+        /// The sentence.
+        sentence: String,
+        /// What is wrong.
+        reason: &'static str,
+    },
 }
 
 /// Reads a number within a range.
@@ -279,7 +358,8 @@ pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<(Traj
     Ok((rows.finish(file)?, columns.ignored))
 }
 
-/// Reads the GGA sentences of an NMEA file; also returns how many said that there was no fix and were left out.
+/// Reads the GGA sentences of an NMEA file; also returns how many said that there was no fix and were left
+/// out.
 pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<(Trajectory, usize), FileError> {
     let error = |line, fault| FileError { file: file.to_owned(), line, fault };
     let mut input = BufReader::new(input.take(MAX_BYTES + 1));

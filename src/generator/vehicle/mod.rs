@@ -22,8 +22,11 @@ use nalgebra::Vector3;
 /// Position, velocity and acceleration of the antenna in ECEF.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
+    /// Place, ECEF.
     pub position_m: Vector3<f64>,
+    /// Its derivative.
     pub velocity_mps: Vector3<f64>,
+    /// Its second derivative, in the rotating axes.
     pub acceleration_mps2: Vector3<f64>,
 }
 
@@ -46,7 +49,9 @@ impl Motion {
 /// The motion at one instant, true seconds after the scene's start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Knot {
+    /// True time since the scene's start.
     pub t_s: f64,
+    /// The motion then.
     pub motion: Motion,
 }
 
@@ -181,7 +186,9 @@ impl Trajectory {
 /// The largest values that a motion reaches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extremes {
+    /// Largest acceleration.
     pub acceleration_mps2: f64,
+    /// Largest speed.
     pub speed_mps: f64,
 }
 

@@ -25,27 +25,50 @@ const LOWEST_M: f64 = 80e3;
 /// Elements at the scene's start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orbit {
+    /// Half of the longest diameter.
     pub semi_major_axis_m: f64,
+    /// Eccentricity, from 0 to below 1.
     pub eccentricity: f64,
+    /// Angle between the orbit's plane and the equator.
     pub inclination_rad: f64,
     /// Longitude of the ascending node in the Earth-fixed axes of the scene's start.
     pub node_longitude_rad: f64,
+    /// From the ascending node to the perigee.
     pub argument_of_perigee_rad: f64,
+    /// Mean anomaly at the scene's start.
     pub mean_anomaly_rad: f64,
 }
 
 /// Why an orbit cannot be flown.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum OrbitMotionError {
+    /// An orbit that meets the Earth or its air.
     #[error(
         "semi_major_axis_m = {semi_major_axis_m} and eccentricity = {eccentricity} put the perigee {perigee_m:.0} m above the \
          equator's radius: expected at least 80 000 m"
     )]
-    Perigee { semi_major_axis_m: f64, eccentricity: f64, perigee_m: f64 },
+    Perigee {
+        /// Half of the longest diameter.
+        semi_major_axis_m: f64,
+        /// Eccentricity, from 0 to below 1.
+        eccentricity: f64,
+        /// Height of the perigee.
+        perigee_m: f64,
+    },
+    /// A flight with more knots than are kept.
     #[error("an orbit over {duration_s} s needs {knots:.0} knots: expected at most 500 000, a shorter duration_s")]
-    Long { duration_s: f64, knots: f64 },
+    Long {
+        /// Length of the flight.
+        duration_s: f64,
+        /// Knots that it would take.
+        knots: f64,
+    },
+    /// Kepler's equation was not solved.
     #[error("Kepler's equation did not converge for eccentricity = {eccentricity}")]
-    Kepler { eccentricity: f64 },
+    Kepler {
+        /// Eccentricity, from 0 to below 1.
+        eccentricity: f64,
+    },
 }
 
 impl Orbit {
@@ -81,7 +104,8 @@ impl Orbit {
         (MU_M3PS2 / (self.semi_major_axis_m * self.semi_major_axis_m * self.semi_major_axis_m)).sqrt()
     }
 
-    /// The motion in the Earth-fixed axes `t_s` after the start; `None` where Kepler's equation is not solved.
+    /// The motion in the Earth-fixed axes `t_s` after the start; `None` where Kepler's equation is not
+    /// solved.
     pub fn at(&self, t_s: f64) -> Option<Motion> {
         let (n, e) = (self.mean_motion(), self.eccentricity);
         let anomaly = solve_kepler(self.mean_anomaly_rad + n * t_s, e)?;
@@ -102,7 +126,8 @@ impl Orbit {
         })
     }
 
-    /// Unit vectors towards the perigee and a quarter turn on, in the inertial axes that are Earth-fixed at the start.
+    /// Unit vectors towards the perigee and a quarter turn on, in the inertial axes that are Earth-fixed at
+    /// the start.
     fn axes(&self) -> (Vector3<f64>, Vector3<f64>) {
         let (sin_node, cos_node) = libm::sincos(self.node_longitude_rad);
         let (sin_i, cos_i) = libm::sincos(self.inclination_rad);

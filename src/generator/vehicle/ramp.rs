@@ -5,7 +5,9 @@
 pub struct Ramp {
     /// Rate while it holds, with the sign of the change.
     pub rate: f64,
+    /// Time in which it grows, and in which it falls.
     pub ramp_s: f64,
+    /// Time in which it is whole.
     pub hold_s: f64,
 }
 
@@ -73,7 +75,8 @@ impl Ramp {
         } else if left_s >= self.ramp_s {
             held(t_s)
         } else {
-            // The change is antisymmetric about its middle: its integral is delta·(t − half) + integral(left).
+            // The change is antisymmetric about its middle: its integral is delta·(t − half) +
+            // integral(left).
             self.delta() * (t_s - 0.5 * self.duration_s()) + third(left_s.max(0.0))
         }
     }
@@ -92,7 +95,8 @@ mod tests {
             assert!(ramp.rate.abs() / ramp.ramp_s <= slope * (1.0 + 1e-15));
             let end = ramp.at(ramp.duration_s());
             assert!((end.0 - delta).abs() < 1e-12 * delta.abs() && end.1 == 0.0);
-            // Trapezoids over 20 000 steps: the integral's error is duration·h²/12 times the largest slope, 1e-8 of it.
+            // Trapezoids over 20 000 steps: the integral's error is duration·h²/12 times the largest slope,
+            // 1e-8 of it.
             let n = 20_000;
             let h = ramp.duration_s() / f64::from(n);
             let (mut sum, mut integral) = (0.0, 0.0);

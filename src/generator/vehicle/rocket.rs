@@ -1,10 +1,10 @@
 //! A rocket or projectile: rests on its pad, burns, and coasts under gravity and drag.
 //!
-//! Equations of motion in ECEF with centrifugal and Coriolis acceleration, integrated by the classical Runge-Kutta
-//! method of order four. Gravity: WGS 84 (NGA.STND.0036, table 3.1) central, and J2 on request. Drag: Cd·A/m with an
-//! exponential atmosphere that rotates with the Earth. Limits: thrust keeps its direction (no guidance, no gravity
-//! turn), no wind, no lift. The pad hands the weight over in proportion to the first ramp of the thrust, so that
-//! acceleration is continuous at lift-off.
+//! Equations of motion in ECEF with centrifugal and Coriolis acceleration, integrated by the classical
+//! Runge-Kutta method of order four. Gravity: WGS 84 (NGA.STND.0036, table 3.1) central, and J2 on request.
+//! Drag: Cd·A/m with an exponential atmosphere that rotates with the Earth. Limits: thrust keeps its
+//! direction (no guidance, no gravity turn), no wind, no lift. The pad hands the weight over in proportion to
+//! the first ramp of the thrust, so that acceleration is continuous at lift-off.
 
 use nalgebra::Vector3;
 use thiserror::Error;
@@ -17,7 +17,8 @@ use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SEMI_MAJOR_AXIS_M};
 pub(super) const MU_M3PS2: f64 = 3.986_004_418e14;
 /// Dynamic form factor: −√5 times the EGM's C̄20 = −4.841 653 717 36e-4 (NGA.STND.0036, table 5.1).
 const J2: f64 = 1.082_629_8e-3;
-/// Density at sea level (U.S. Standard Atmosphere 1976) and the scale height that fits it within a fifth to 30 km.
+/// Density at sea level (U.S. Standard Atmosphere 1976) and the scale height that fits it within a fifth to
+/// 30 km.
 const SEA_LEVEL_DENSITY_KGPM3: f64 = 1.225;
 const SCALE_HEIGHT_M: f64 = 7_400.0;
 /// Longest step of the integration; error of a 100 s coast is below 1 µm.
@@ -29,10 +30,13 @@ const LONGEST_FLIGHT_S: f64 = 10_800.0;
 /// How the rocket is built and launched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rocket {
+    /// Where it starts.
     pub pad: Geodetic,
     /// Direction of the thrust at the pad, kept in ECEF.
     pub azimuth_rad: f64,
+    /// Elevation of the launch.
     pub elevation_rad: f64,
+    /// When the thrust begins, true seconds since the scene's start.
     pub ignition_s: f64,
     /// Thrust over mass while it holds.
     pub thrust_mps2: f64,
@@ -49,12 +53,28 @@ pub struct Rocket {
 /// Why a rocket does not fly.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum RocketError {
+    /// Ramps of the thrust that take longer than the burn.
     #[error(
         "thrust_mps2 = {thrust_mps2} and jerk_mps3 = {jerk_mps3} need burn_s of at least {ramps_s:.3} s for both ramps, not {burn_s}"
     )]
-    Burn { thrust_mps2: f64, jerk_mps3: f64, ramps_s: f64, burn_s: f64 },
+    Burn {
+        /// Largest acceleration by the thrust.
+        thrust_mps2: f64,
+        /// How fast it grows.
+        jerk_mps3: f64,
+        /// Time that both ramps take.
+        ramps_s: f64,
+        /// Length of the burn.
+        burn_s: f64,
+    },
+    /// A thrust that does not lift the rocket.
     #[error("thrust_mps2 = {thrust_mps2} at this elevation does not lift off: net {net_mps2:.2} m/s2 upwards")]
-    Weak { thrust_mps2: f64, net_mps2: f64 },
+    Weak {
+        /// Largest acceleration by the thrust.
+        thrust_mps2: f64,
+        /// What gravity leaves of the thrust.
+        net_mps2: f64,
+    },
 }
 
 /// Position and velocity, or their rates.
@@ -189,8 +209,8 @@ mod tests {
             let (a, b) = (flight.at(f64::from(k) * h), flight.at(f64::from(k + 1) * h));
             largest = largest.max((b.acceleration_mps2 - a.acceleration_mps2).norm() / h);
         }
-        // The ramps have 20 g/s; the released weight takes 1 g off over 1.15 s, and burn-out adds the drag's decay:
-        // 2 v v̇ of half ρ CdA/m v² is below 4e-5·0.6·1200·230 / 9.8 = 0.7 g/s.
+        // The ramps have 20 g/s; the released weight takes 1 g off over 1.15 s, and burn-out adds the drag's
+        // decay: 2 v v̇ of half ρ CdA/m v² is below 4e-5·0.6·1200·230 / 9.8 = 0.7 g/s.
         assert!(largest > 18.0 * G_MPS2 && largest < 21.5 * G_MPS2, "{}", largest / G_MPS2);
     }
 
@@ -202,7 +222,8 @@ mod tests {
             let t_s = 40.003 + f64::from(k) * 0.01;
             let m = flight.at(t_s);
             let want = rocket.acceleration(&thrust, t_s, (m.position_m, m.velocity_mps));
-            // Hermite's second derivative over 0.02 s: knots rounded to 5e-10 m in h² give 5.8·1e-9/4e-4 = 1.5e-5.
+            // Hermite's second derivative over 0.02 s: knots rounded to 5e-10 m in h² give 5.8·1e-9/4e-4 =
+            // 1.5e-5.
             assert!((m.acceleration_mps2 - want).norm() < 5e-5, "{t_s}");
         }
     }
@@ -218,7 +239,8 @@ mod tests {
         };
         let (r0, v0) = inertial(&flight.at(50.0), 0.0);
         let (r1, v1) = inertial(&flight.at(140.0), 90.0);
-        // Lagrange's f and g from the eccentric anomaly (Battin, 1999, 3.6): closed form but for Kepler's equation.
+        // Lagrange's f and g from the eccentric anomaly (Battin, 1999, 3.6): closed form but for Kepler's
+        // equation.
         let a = 1.0 / (2.0 / r0.norm() - v0.norm_squared() / MU_M3PS2);
         let n = (MU_M3PS2 / (a * a * a)).sqrt();
         let (ec, es) = (1.0 - r0.norm() / a, r0.dot(&v0) / (MU_M3PS2 * a).sqrt());
@@ -231,8 +253,8 @@ mod tests {
         let f = 1.0 - a / r0.norm() * (1.0 - c);
         let g = 90.0 - (x - s) / n;
         let want = r0 * f + v0 * g;
-        // The orbit nearly falls through the centre (e ≈ 0.99): cancellation in f and g loses about three digits
-        // of 6.4e6 m · 1e-16; Runge-Kutta itself is below 1e-6 m.
+        // The orbit nearly falls through the centre (e ≈ 0.99): cancellation in f and g loses about three
+        // digits of 6.4e6 m · 1e-16; Runge-Kutta itself is below 1e-6 m.
         assert!((r1 - want).norm() < 1e-4, "{}", (r1 - want).norm());
         let energy = |r: Vector3<f64>, v: Vector3<f64>| 0.5 * v.norm_squared() - MU_M3PS2 / r.norm();
         // 4500 steps, each rounding velocity by 1e-13 and position by 1e-9 (times g).

@@ -1,9 +1,10 @@
 //! A route through waypoints: straight chords joined by smooth turns, with changes of speed on the chords.
 //!
-//! Each waypoint has the speed at which it is rounded. The turn (or the bend into a climb) lies in the plane of its
-//! two chords and is flown at that speed: the turn rate rises, holds and falls linearly, so curvature is continuous
-//! and jerk finite. Then the speed changes to that of the next waypoint, by a trapezoid of acceleration.
-//! Limit: a chord is straight in space, so it sags below the Earth's curve by d²/(8R), 2 m on 10 km.
+//! Each waypoint has the speed at which it is rounded. The turn (or the bend into a climb) lies in the plane
+//! of its two chords and is flown at that speed: the turn rate rises, holds and falls linearly, so curvature
+//! is continuous and jerk finite. Then the speed changes to that of the next waypoint, by a trapezoid of
+//! acceleration. Limit: a chord is straight in space, so it sags below the Earth's curve by d²/(8R), 2 m on
+//! 10 km.
 
 use nalgebra::Vector3;
 use thiserror::Error;
@@ -15,6 +16,7 @@ use crate::gnss::earth::Geodetic;
 /// A place on the route and how it is passed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
+    /// Where it is.
     pub place: Geodetic,
     /// Speed there; 0 is a stop.
     pub speed_mps: f64,
@@ -26,38 +28,74 @@ pub struct Waypoint {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turning {
     /// Lateral acceleration held in a turn.
-    Acceleration { mps2: f64 },
+    Acceleration {
+        /// The acceleration across the way.
+        mps2: f64,
+    },
     /// Radius of the circular part of a turn.
-    Radius { m: f64 },
+    Radius {
+        /// The radius of turns.
+        m: f64,
+    },
 }
 
 /// What the vehicle can do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
+    /// How tight turns are.
     pub turning: Turning,
     /// Along the path.
     pub acceleration_mps2: f64,
+    /// Largest jerk.
     pub jerk_mps3: f64,
 }
 
 /// Why waypoints make no route. Waypoints are counted from 1.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum RouteError {
+    /// Fewer waypoints than a route needs.
     #[error("a route needs at least 2 waypoints, not {have}")]
-    TooFew { have: usize },
+    TooFew {
+        /// How many there are.
+        have: usize,
+    },
+    /// A leg that is too short or too long.
     #[error("waypoints {from} and {} are {length_m:.3} m apart: expected 1 m to 50 km (add points on a longer leg)", from + 1)]
-    Length { from: usize, length_m: f64 },
+    Length {
+        /// Number of the waypoint at which the leg begins, from 1.
+        from: usize,
+        /// Length of the leg.
+        length_m: f64,
+    },
+    /// A leg without a speed at either end.
     #[error("waypoints {from} and {} both have speed_mps = 0: give one of them a speed, or add a point between", from + 1)]
-    Standstill { from: usize },
+    Standstill {
+        /// Number of the waypoint at which the leg begins, from 1.
+        from: usize,
+    },
+    /// A turn that is too sharp.
     #[error(
         "the route turns by {angle_deg:.1} deg at waypoint {at}: expected at most 165 deg (stop there, or add points)"
     )]
-    Sharp { at: usize, angle_deg: f64 },
+    Sharp {
+        /// Number of the waypoint, from 1.
+        at: usize,
+        /// Change of direction.
+        angle_deg: f64,
+    },
+    /// A leg in which the speed cannot change as much.
     #[error(
         "the leg from waypoint {from} to {} is {length_m:.1} m long, but its turns and its change of speed need {needed_m:.1} m",
         from + 1
     )]
-    Short { from: usize, length_m: f64, needed_m: f64 },
+    Short {
+        /// Number of the waypoint at which the leg begins, from 1.
+        from: usize,
+        /// Length of the leg.
+        length_m: f64,
+        /// Length that it would take.
+        needed_m: f64,
+    },
 }
 
 /// A turn at constant speed from direction `from` towards `side`, a unit vector square to it.
@@ -169,8 +207,8 @@ impl Turn {
         (self.from * cos + self.side * sin, (self.side * cos - self.from * sin) * rate_radps)
     }
 
-    /// The turn cut at its corners and then every twentieth of a radian at most: a quintic over 0.05 rad of a circle
-    /// of radius R is off by R·0.05⁶/46080 < 4e-13 R. At most 63 steps, however slow the turn.
+    /// The turn cut at its corners and then every twentieth of a radian at most: a quintic over 0.05 rad of a
+    /// circle of radius R is off by R·0.05⁶/46080 < 4e-13 R. At most 63 steps, however slow the turn.
     fn steps(&self) -> Vec<(f64, f64)> {
         let corners = self.angle.corners_s();
         let mut steps = Vec::new();
@@ -293,7 +331,8 @@ mod tests {
         let (start_s, end_s) = trajectory.span_s();
         assert!(start_s == f64::NEG_INFINITY && end_s.is_finite());
         let peak = trajectory.max_acceleration_mps2();
-        // The quintic between knots overshoots the trapezoid by nothing but its own error, V ω⁵ h⁴ / 384 < 1e-6.
+        // The quintic between knots overshoots the trapezoid by nothing but its own error, V ω⁵ h⁴ / 384 <
+        // 1e-6.
         assert!(peak > 2.999_99 && peak < 3.0 + 1e-5, "{peak}");
         let n = 40_000;
         let mut closest = vec![f64::INFINITY; waypoints.len()];
@@ -305,7 +344,8 @@ mod tests {
                 *closest = closest.min((waypoint.place.to_ecef() - a.position_m).norm());
             }
         }
-        // In the held part of a turn the acceleration vector itself turns: V ω² = a²/V = 9/20 adds to the ramp's 1.5.
+        // In the held part of a turn the acceleration vector itself turns: V ω² = a²/V = 9/20 adds to the
+        // ramp's 1.5.
         assert!(jerk > 1.49 && jerk < 1.6, "{jerk}");
         // The stop and both ends are hit but for the sampling (20 m/s · 3 ms); corners are cut.
         for i in [0, 3, 5] {
@@ -319,7 +359,8 @@ mod tests {
     fn the_path_returns_to_the_chord_after_a_turn() {
         let trajectory = trajectory(&circuit(), &LIMITS).unwrap();
         let stop = trajectory.knots().iter().skip(3).find(|k| k.motion.velocity_mps.norm() == 0.0).unwrap();
-        // 60 knots of a turn, each sum rounded to an ulp of 6.4e6 m, and the chord's direction rounded to 1e-16.
+        // 60 knots of a turn, each sum rounded to an ulp of 6.4e6 m, and the chord's direction rounded to
+        // 1e-16.
         assert!((stop.motion.position_m - circuit()[3].place.to_ecef()).norm() < 1e-6);
     }
 

@@ -1,8 +1,9 @@
-//! What acceleration does to a crystal: a shift of its frequency, in proportion to the antenna's acceleration.
+//! What acceleration does to a crystal: a shift of its frequency, in proportion to the antenna's
+//! acceleration.
 //!
-//! δf / f = k · |a| / g, with a the acceleration in ECEF (gravity is part of the nominal frequency) along the most
-//! sensitive axis of the crystal. Typical k: 1e-9 a g for a TCXO, 1e-10 for an OCXO (Filler 1988). Limits: vibration is
-//! seen only as far as the motion contains it.
+//! δf / f = k · |a| / g, with a the acceleration in ECEF (gravity is part of the nominal frequency) along the
+//! most sensitive axis of the crystal. Typical k: 1e-9 a g for a TCXO, 1e-10 for an OCXO (Filler 1988).
+//! Limits: vibration is seen only as far as the motion contains it.
 
 use super::Trajectory;
 

@@ -1,8 +1,8 @@
 //! Knots from rows of positions, with or without velocities: splines with continuous acceleration.
 //!
-//! Positions alone: the natural cubic spline. Positions and velocities: the quintic spline through both whose third
-//! derivative is continuous, with none at the ends. Both are tridiagonal systems (de Boor, "A Practical Guide to
-//! Splines", chapter IV), solved in time and memory proportional to the rows.
+//! Positions alone: the natural cubic spline. Positions and velocities: the quintic spline through both whose
+//! third derivative is continuous, with none at the ends. Both are tridiagonal systems (de Boor, "A Practical
+//! Guide to Splines", chapter IV), solved in time and memory proportional to the rows.
 
 use nalgebra::Vector3;
 
@@ -11,8 +11,11 @@ use super::{Knot, Motion};
 /// One row: time, position and perhaps velocity in ECEF.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
+    /// True time since the scene's start.
     pub t_s: f64,
+    /// Place, ECEF.
     pub position_m: Vector3<f64>,
+    /// Velocity, ECEF; `None` where it is not given.
     pub velocity_mps: Option<Vector3<f64>>,
 }
 
@@ -98,8 +101,8 @@ fn natural_cubic(rows: &[Row]) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
 
 /// Accelerations that make the third derivative of the quintic pieces continuous.
 ///
-/// On an interval h with mean velocity d the piece has p‴ = (60 (d − v₀) − 24 (v₁ − v₀))/h² + (3 a₁ − 9 a₀)/h at its
-/// left end, and the mirror image of it at its right end.
+/// On an interval h with mean velocity d the piece has p‴ = (60 (d − v₀) − 24 (v₁ − v₀))/h² + (3 a₁ − 9 a₀)/h
+/// at its left end, and the mirror image of it at its right end.
 fn smooth_accelerations(rows: &[Row], velocities: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     struct Piece {
         h: f64,
@@ -162,7 +165,8 @@ mod tests {
         for (with_velocity, bound_m) in [
             // Away from natural ends: 5/384 h⁴ p⁗ = 0.013·1.2⁴·0.16 = 4.3e-3 m for steps up to 1.2 s.
             (false, 5e-3),
-            // Hermite h⁶/46080·p⁽⁶⁾ = 1.2⁶·6.4e-3/46080 = 4e-7, and an acceleration error of a·O((ωh)⁴)/100 in h²/32.
+            // Hermite h⁶/46080·p⁽⁶⁾ = 1.2⁶·6.4e-3/46080 = 4e-7, and an acceleration error of a·O((ωh)⁴)/100
+            // in h²/32.
             (true, 5e-5),
         ] {
             let rows = circle(1.0, with_velocity);

@@ -35,6 +35,18 @@ pub enum StageSpec {
     Adc(ConverterSpec),
 }
 
+/// The filters among stages, in order.
+pub fn filters(stages: &[StageSpec]) -> impl Iterator<Item = &FilterSpec> {
+    stages.iter().filter_map(|stage| if let StageSpec::Filter(filter) = stage { Some(filter) } else { None })
+}
+
+/// By how much oscillators among stages bring carriers higher in the samples, Hz.
+pub fn oscillator_offset_hz(stages: &[StageSpec]) -> f64 {
+    let offset_hz =
+        |stage: &StageSpec| if let StageSpec::LocalOscillator { offset_hz } = stage { *offset_hz } else { 0.0 };
+    stages.iter().map(offset_hz).sum()
+}
+
 /// A filter's shape, width and delay.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FilterSpec {

@@ -12,7 +12,9 @@ mod scene;
 use serde::{Deserialize, Serialize};
 
 use crate::gnss::satellite::Sv;
-pub use front_end::{BalanceSpec, ConverterSpec, Edge, FilterShape, FilterSpec, StageSpec};
+pub use front_end::{
+    BalanceSpec, ConverterSpec, Edge, FilterShape, FilterSpec, StageSpec, filters, oscillator_offset_hz,
+};
 pub use interference::Interference;
 pub use scene::{FrontEndFacts, OscillatorFacts, SceneFacts};
 

@@ -111,6 +111,14 @@ impl SceneFacts {
         self.time_offsets.iter().find(|offset| offset.time_scale == scale).map_or(0.0, |offset| offset.ahead_s)
     }
 
+    /// The stages and the sample rate in Hz of a front end by its place among several.
+    pub fn stages(&self, front_end: usize) -> (&[StageSpec], f64) {
+        match self.front_ends.get(front_end) {
+            Some(own) => (&own.front_end, own.sample_rate_hz),
+            None => (&self.front_end, self.sample_rate_hz),
+        }
+    }
+
     /// The converter, if there is one.
     pub fn converter(&self) -> Option<&super::ConverterSpec> {
         self.front_end
@@ -120,9 +128,7 @@ impl SceneFacts {
 
     /// The filters, in order.
     pub fn filters(&self) -> impl Iterator<Item = &super::FilterSpec> {
-        self.front_end
-            .iter()
-            .filter_map(|stage| if let StageSpec::Filter(filter) = stage { Some(filter) } else { None })
+        super::filters(&self.front_end)
     }
 
     /// The quadratures' balance, if it is stated.
@@ -164,6 +170,14 @@ pub struct FrontEndFacts {
     /// Stages, in order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub front_end: Vec<StageSpec>,
+}
+
+impl FrontEndFacts {
+    /// What its oscillator adds to every Doppler, Hz.
+    pub fn doppler_hz(&self) -> f64 {
+        let offset_hz = super::oscillator_offset_hz(&self.front_end);
+        if self.inverted { -offset_hz } else { offset_hz }
+    }
 }
 
 fn yes() -> bool {

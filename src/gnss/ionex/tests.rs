@@ -62,11 +62,13 @@ fn a_node_at_a_map_s_epoch_has_the_printed_value() {
 #[test]
 fn between_nodes_and_maps_the_value_is_that_of_the_format_s_equations() {
     let maps = maps();
-    // 02:00 UT is a map: the middle of a cell is the mean of its four printed nodes (equation 1 with p = q = 1/2).
+    // 02:00 UT is a map: the middle of a cell is the mean of its four printed nodes (equation 1 with p = q =
+    // 1/2).
     let at = |latitude: f64, longitude: f64| tecu(&maps, latitude, longitude, "2010-12-04T02:00:00Z", Bilinear);
     let mean = (at(20.0, 100.0) + at(20.0, 105.0) + at(22.5, 100.0) + at(22.5, 105.0)) / 4.0;
     assert!((at(21.25, 102.5) - mean).abs() < 1e-9);
-    // A third of the way from 02 to 04 h: equation 3 with both maps turned by 10° and −20°, which are whole columns.
+    // A third of the way from 02 to 04 h: equation 3 with both maps turned by 10° and −20°, which are whole
+    // columns.
     let now = tecu(&maps, 20.0, 100.0, "2010-12-04T02:40:00Z", Bilinear);
     let early = tecu(&maps, 20.0, 110.0, "2010-12-04T02:00:00Z", Bilinear);
     let late = tecu(&maps, 20.0, 80.0, "2010-12-04T04:00:00Z", Bilinear);

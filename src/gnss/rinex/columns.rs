@@ -1,12 +1,14 @@
-//! A navigation file as lines and columns: the header's lines that are used, and GPS LNAV records of eight
-//! lines with a number or nothing in each field of 19 columns.
+//! A navigation file as lines and columns: the header's lines that are used, and records of GPS LNAV and
+//! Galileo I/NAV, eight lines with a number or nothing in each field of 19 columns.
 //!
-//! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5 and A6; RINEX 4.02, tables A9 and A33. Where a
-//! line is missing, doubled or cut, or text stands beside the fields, what follows would be read into the
-//! wrong elements; so such a record is left out and named with its line and column, and so is whatever cannot
-//! be told to be of another system. Records of other systems and messages are counted and not read.
+//! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5, A6 and A8; RINEX 4.02, tables A9, A13 and
+//! A33. Where a line is missing, doubled or cut, or text stands beside the fields, what follows would be read
+//! into the wrong elements; so such a record is left out and named with its line and column, and so is
+//! whatever cannot be told to be of another system. Records of other systems and messages are counted and not
+//! read.
 
 use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::Epoch;
 
 /// Lines of a record: satellite, epoch and clock, then seven lines of the orbit.
@@ -16,12 +18,22 @@ const FIELD: usize = 19;
 const HEADER_FIELD: usize = 12;
 const LABEL: usize = 60;
 
-/// The fields of a record in their order; spare ones have no name.
-const FIELDS: [&str; 31] = [
+/// Fields of a record.
+const FIELDS: usize = 31;
+/// Those with which records begin, in their order, …
+const FIRST: [&str; 20] = [
     "af0", "af1", "af2", "iode", "crs", "deltaN", "m0", "cuc", "e", "cus", "sqrta", "toe", "cic", "omega0", "cis",
-    "i0", "crc", "omega", "omegaDot", "idot", "l2Codes", "week", "l2p", "accuracy", "health", "tgd", "iodc", "t_tm",
-    "fitInt", "", "",
+    "i0", "crc", "omega", "omegaDot", "idot",
 ];
+/// … and the rest of an LNAV and of an I/NAV record; spare ones have no name.
+const OF_LNAV: [&str; FIELDS - FIRST.len()] =
+    ["l2Codes", "week", "l2p", "accuracy", "health", "tgd", "iodc", "t_tm", "fitInt", "", ""];
+const OF_INAV: [&str; FIELDS - FIRST.len()] =
+    ["sources", "week", "", "accuracy", "health", "bgdE5aE1", "bgdE5bE1", "t_tm", "", "", ""];
+/// Bits of an I/NAV record's sources: sent on E1-B or E5b, sent on E5a (F/NAV), and a clock of E5b and E1.
+const SENT_INAV: u32 = 0b101;
+const SENT_FNAV: u32 = 0b010;
+const CLOCK_INAV: u32 = 1 << 9;
 
 /// Labels that a header of any version may have.
 const LABELS: [&str; 21] = [
@@ -48,6 +60,12 @@ const LABELS: [&str; 21] = [
     "END OF HEADER",
 ];
 
+/// Kinds of time offsets: GPS time against UTC, and Galileo's against GPS time with its name of older
+/// versions.
+const UTC: &str = "GPUT";
+const GALILEO: &str = "GAGP";
+const GALILEO_OLD: &str = "GPGA";
+
 /// Systems and the messages with ephemerides that each has in version 4.
 const MESSAGES: [(char, &[&str]); 7] = [
     ('G', &["LNAV", "CNAV", "CNV2"]),
@@ -59,19 +77,34 @@ const MESSAGES: [(char, &[&str]); 7] = [
     ('S', &["SBAS"]),
 ];
 
-/// A GPS LNAV record in form.
+/// A record of GPS LNAV or Galileo I/NAV in form.
 pub(super) struct Record {
     /// Number of its first line.
     pub line: usize,
-    pub number: u8,
+    pub sv: Sv,
     pub toc: Epoch,
-    values: [Option<f64>; FIELDS.len()],
+    values: [Option<f64>; FIELDS],
 }
 
 impl Record {
     /// A field by its name; `None` if it is blank.
     pub fn get(&self, name: &str) -> Option<f64> {
-        FIELDS.iter().position(|field| *field == name).and_then(|at| self.values[at])
+        let rest = if self.sv.system == System::Galileo { OF_INAV } else { OF_LNAV };
+        let at = FIRST.iter().chain(&rest).position(|field| *field == name)?;
+        self.values.get(at).copied().flatten()
+    }
+
+    /// Whether a Galileo record is one of I/NAV, of version 3, which has both messages in one form.
+    fn is_inav(&self) -> Result<bool, String> {
+        let sources = self.get("sources").unwrap_or(0.0) as u32;
+        if sources & SENT_FNAV != 0 {
+            return Ok(false);
+        }
+        if sources & SENT_INAV != 0 && sources & CLOCK_INAV != 0 {
+            return Ok(true);
+        }
+        let expected = "bit 0, 1 or 2 for the signal, and bit 8 or 9 for the clock";
+        Err(format!("line {} ({} {}): data sources = {sources}: expected {expected}", self.line, self.sv, self.toc))
     }
 }
 
@@ -80,20 +113,24 @@ impl Record {
 pub(super) struct Contents {
     pub records: Vec<Record>,
     pub klobuchar: Option<Klobuchar>,
+    /// Effective ionisation coefficients of Galileo.
+    pub nequick: Option<[f64; 3]>,
     pub leap_seconds: Option<i64>,
     /// Seconds after the last or next change, week and day at whose end it comes.
     pub leap_event: Option<(i64, i64, u8)>,
     /// Of GPS against UTC: A0, A1, reference time of week, week as written.
-    pub utc: Option<UtcLine>,
+    pub utc: Option<Polynomial>,
+    /// The same of Galileo's time against GPS time.
+    pub galileo: Option<Polynomial>,
     /// Records of other systems and messages.
     pub others: usize,
     /// What was left out, and why.
     pub reasons: Vec<String>,
 }
 
-/// GPS time against UTC as written: constant, rate, time of week and week.
+/// One time against another as written: constant, rate, time of week and week.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct UtcLine {
+pub(super) struct Polynomial {
     pub a0_s: f64,
     pub a1_sps: f64,
     pub tow_s: f64,
@@ -123,33 +160,38 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     };
     let mut contents = Contents::default();
     form.header(header, &mut contents);
+    // Of what satellites repeat, the first of the day, whatever the order in the file.
     let mut ionosphere: Option<(String, Klobuchar)> = None;
-    let mut utc: Option<(String, UtcLine)> = None;
+    let mut nequick: Option<(String, [f64; 3])> = None;
+    let mut utc: Option<(String, Polynomial)> = None;
+    let mut galileo: Option<(String, Polynomial)> = None;
     let body: Vec<Line<'_>> = body.iter().filter(|(_, line)| !line.trim().is_empty()).copied().collect();
     for group in body.chunk_by(|_, next| !form.begins(next.1)) {
         match form.group(group) {
             Ok(Group::Record(record)) => contents.records.push(*record),
-            Ok(Group::Ionosphere(age, found)) => {
-                // The first of the day, whatever the order in the file.
-                if ionosphere.as_ref().is_none_or(|(before, _)| age < *before) {
-                    ionosphere = Some((age, found));
-                }
-            }
-            Ok(Group::Utc(age, found)) => {
-                if utc.as_ref().is_none_or(|(before, _)| age < *before) {
-                    utc = Some((age, found));
-                }
-            }
+            Ok(Group::Ionosphere(age, found)) => keep_first(&mut ionosphere, age, found),
+            Ok(Group::Ionisation(age, found)) => keep_first(&mut nequick, age, found),
+            Ok(Group::Utc(age, found)) => keep_first(&mut utc, age, found),
+            Ok(Group::Galileo(age, found)) => keep_first(&mut galileo, age, found),
             Ok(Group::Other) => contents.others += 1,
             Err(reason) => contents.reasons.push(reason),
         }
     }
     contents.klobuchar = contents.klobuchar.or(ionosphere.map(|(_, found)| found));
+    contents.nequick = contents.nequick.or(nequick.map(|(_, found)| found));
     contents.utc = contents.utc.or(utc.map(|(_, found)| found));
+    contents.galileo = contents.galileo.or(galileo.map(|(_, found)| found));
     Ok(contents)
 }
 
-/// What a header's line is. A foreign letter before it, of two bytes or more, moves a comment's label to the right.
+fn keep_first<T>(kept: &mut Option<(String, T)>, age: String, found: T) {
+    if kept.as_ref().is_none_or(|(before, _)| age < *before) {
+        *kept = Some((age, found));
+    }
+}
+
+/// What a header's line is. A foreign letter before it, of two bytes or more, moves a comment's label to the
+/// right.
 fn label(line: &str) -> &str {
     let label = line.get(LABEL..).unwrap_or("").trim();
     if label.ends_with("COMMENT") { "COMMENT" } else { label }
@@ -160,8 +202,12 @@ enum Group {
     Record(Box<Record>),
     /// When and by which satellite, in an order that sorts, and what it said.
     Ionosphere(String, Klobuchar),
+    /// The same of Galileo's effective ionisation.
+    Ionisation(String, [f64; 3]),
     /// The same of GPS time against UTC.
-    Utc(String, UtcLine),
+    Utc(String, Polynomial),
+    /// The same of Galileo's time against GPS time.
+    Galileo(String, Polynomial),
     Other,
 }
 
@@ -199,9 +245,12 @@ impl Form {
                 "ION BETA" if self.version < 3 => four(2, &mut beta),
                 "IONOSPHERIC CORR" if line.starts_with("GPSA") => four(5, &mut alpha),
                 "IONOSPHERIC CORR" if line.starts_with("GPSB") => four(5, &mut beta),
+                "IONOSPHERIC CORR" if line.starts_with("GAL ") => match numbers::<3>(line, 5, HEADER_FIELD) {
+                    Ok(found) => contents.nequick = Some(found),
+                    Err(reason) => contents.reasons.push(format!("line {number} (IONOSPHERIC CORR): {reason}")),
+                },
                 "IONOSPHERIC CORR" => {
-                    let known =
-                        ["GAL ", "QZSA", "QZSB", "BDSA", "BDSB", "BDS1", "BDS2", "BDS3", "IRNA", "IRNB", "BDS "];
+                    let known = ["QZSA", "QZSB", "BDSA", "BDSB", "BDS1", "BDS2", "BDS3", "IRNA", "IRNB", "BDS "];
                     let name: String = line.chars().take(4).collect();
                     if !known.contains(&name.as_str()) {
                         contents
@@ -213,10 +262,13 @@ impl Form {
                     Ok(found) => contents.utc = Some(found),
                     Err(reason) => contents.reasons.push(format!("line {number} ({}): {reason}", label(line))),
                 },
-                "TIME SYSTEM CORR" if line.starts_with("GPUT") => match system_time(line) {
-                    Ok(found) => contents.utc = Some(found),
-                    Err(reason) => contents.reasons.push(format!("line {number} (TIME SYSTEM CORR): {reason}")),
-                },
+                "TIME SYSTEM CORR" if [UTC, GALILEO, GALILEO_OLD].iter().any(|kind| line.starts_with(kind)) => {
+                    match system_time(line) {
+                        Ok(found) if line.starts_with(UTC) => contents.utc = Some(found),
+                        Ok(found) => contents.galileo = Some(found),
+                        Err(reason) => contents.reasons.push(format!("line {number} (TIME SYSTEM CORR): {reason}")),
+                    }
+                }
                 "LEAP SECONDS" => match line.get(..6).unwrap_or("").trim().parse() {
                     Ok(seconds) => {
                         contents.leap_seconds = Some(seconds);
@@ -267,16 +319,18 @@ impl Form {
             ));
         }
         if self.version == 3 {
-            if letter != 'G' {
+            if !['G', 'E'].contains(&letter) {
                 return Ok(Group::Other);
             }
-            return self.record(group).map(|record| Group::Record(Box::new(record)));
+            let record = self.record(group)?;
+            let read = letter == 'G' || record.is_inav()?;
+            return Ok(if read { Group::Record(Box::new(record)) } else { Group::Other });
         }
         match (words.get(1).copied().unwrap_or(""), words.get(3).copied().unwrap_or("")) {
             ("EPH", message) if !messages.contains(&message) => {
                 refuse(&format!("message '{message}': expected {}", messages.join(" or ")))
             }
-            ("EPH", "LNAV") if letter == 'G' => {
+            ("EPH", "LNAV" | "INAV") if ['G', 'E'].contains(&letter) => {
                 let rest = group.get(1..).unwrap_or_default();
                 if rest.first().is_none_or(|(_, line)| line.get(..3) != Some(satellite)) {
                     return refuse("expected the same satellite and its epoch in the line after this one");
@@ -284,7 +338,9 @@ impl Form {
                 self.record(rest).map(|record| Group::Record(Box::new(record)))
             }
             ("ION", "LNAV") if letter == 'G' => self.ionosphere(group, satellite),
-            ("STO", "LNAV") if letter == 'G' => self.system_time(group, satellite),
+            ("ION", "IFNV") => self.ionisation(group, satellite),
+            // Merged files name no satellite, and the message in its place.
+            ("STO", _) if ['G', 'E'].contains(&letter) => self.system_time(group, satellite),
             ("EPH" | "STO" | "EOP" | "ION", _) => Ok(Group::Other),
             (kind, _) => refuse(&format!("'{kind}': expected EPH, STO, EOP or ION")),
         }
@@ -298,7 +354,7 @@ impl Form {
         if record.len() != LINES {
             return refuse(first, format!("a record of {} lines: expected {LINES}", record.len()));
         }
-        let mut values = Vec::with_capacity(FIELDS.len());
+        let mut values = Vec::with_capacity(FIELDS);
         for (row, &(number, line)) in record.iter().enumerate() {
             // Satellite and epoch are as wide as one field.
             let (start, count) = if row == 0 { (margin + FIELD, 3) } else { (margin, 4) };
@@ -316,8 +372,9 @@ impl Form {
         // Version 2 leaves the letter of the only system out.
         let letter = usize::from(self.version > 2 || title.starts_with('G'));
         let number = title.get(letter..margin - usize::from(letter == 0 || self.version > 2)).unwrap_or("");
-        let Some(number) = digits::<u8>(number.trim()).filter(|number| (1..=32).contains(number)) else {
-            return refuse(first, format!("column {}: PRN '{}': expected 1 to 32", letter + 1, number.trim()));
+        let (system, most) = if title.starts_with('E') { (System::Galileo, 36) } else { (System::Gps, 32) };
+        let Some(number) = digits::<u8>(number.trim()).filter(|number| (1..=most).contains(number)) else {
+            return refuse(first, format!("column {}: PRN '{}': expected 1 to {most}", letter + 1, number.trim()));
         };
         if title.get(margin - 1..margin) != Some(" ") && !(self.version < 3 && letter == 1) {
             return refuse(first, format!("column {margin}: expected a blank after the satellite"));
@@ -330,7 +387,7 @@ impl Form {
             );
         };
         let Ok(values) = values.try_into() else { return refuse(first, "expected 31 fields".to_owned()) };
-        Ok(Record { line: first, number, toc, values })
+        Ok(Record { line: first, sv: Sv { system, number }, toc, values })
     }
 
     /// Year, month, day, hour, minute and second, of GPS time.
@@ -389,7 +446,26 @@ impl Form {
 }
 
 impl Form {
-    /// GPS time against another in a record of version 4; that against UTC is wanted.
+    /// Galileo's effective ionisation in a record of version 4; the flags after it are not read.
+    fn ionisation(&self, group: &[Line<'_>], satellite: &str) -> Result<Group, String> {
+        let (first, title) = group.first().copied().unwrap_or_default();
+        let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", title.trim_end()));
+        let Some(&(number, line)) = group.get(1).filter(|_| group.len() == 3) else {
+            return refuse(first, format!("a record of {} lines: expected 3", group.len()));
+        };
+        let Some(epoch) = self.epoch(line.get(self.margin()..self.margin() + FIELD).unwrap_or("")) else {
+            return refuse(number, "column 5: expected an epoch".to_owned());
+        };
+        match fields(line, self.margin() + FIELD, FIELD, 3) {
+            Ok(found) => match found.as_slice() {
+                &[Some(a0), Some(a1), Some(a2)] => Ok(Group::Ionisation(format!("{epoch} {satellite}"), [a0, a1, a2])),
+                _ => refuse(number, "expected three coefficients".to_owned()),
+            },
+            Err(reason) => refuse(number, reason),
+        }
+    }
+
+    /// GPS time against another in a record of version 4: UTC and Galileo's are wanted.
     fn system_time(&self, group: &[Line<'_>], satellite: &str) -> Result<Group, String> {
         let (first, title) = group.first().copied().unwrap_or_default();
         let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", title.trim_end()));
@@ -398,7 +474,8 @@ impl Form {
         };
         let margin = self.margin();
         let rest = when.1.get(margin + FIELD..).unwrap_or("");
-        if rest.split_ascii_whitespace().next() != Some("GPUT") {
+        let kind = rest.split_ascii_whitespace().next().unwrap_or("");
+        if ![UTC, GALILEO, GALILEO_OLD].contains(&kind) {
             return Ok(Group::Other);
         }
         if self.cut == Some(what.0) && !what.1.trim_end().len().saturating_sub(margin).is_multiple_of(FIELD) {
@@ -411,8 +488,9 @@ impl Form {
         match fields(what.1, margin, FIELD, 4) {
             Ok(found) => match found.as_slice() {
                 &[_, Some(a0_s), Some(a1_sps), _] => {
-                    let found = UtcLine { a0_s, a1_sps, tow_s: epoch.tow_s(), week: epoch.week() };
-                    Ok(Group::Utc(format!("{epoch} {satellite}"), found))
+                    let found = Polynomial { a0_s, a1_sps, tow_s: epoch.tow_s(), week: epoch.week() };
+                    let age = format!("{epoch} {satellite}");
+                    Ok(if kind == UTC { Group::Utc(age, found) } else { Group::Galileo(age, found) })
                 }
                 _ => refuse(what.0, "expected two coefficients".to_owned()),
             },
@@ -422,25 +500,28 @@ impl Form {
 }
 
 /// `3X, 2D19.12, 2I9` of version 2.
-fn delta_utc(line: &str) -> Result<UtcLine, String> {
+fn delta_utc(line: &str) -> Result<Polynomial, String> {
     let [a0_s, a1_sps] = numbers::<2>(line, 3, FIELD)?;
     let whole = |from: usize| line.get(from..from + 9).unwrap_or("").trim().parse::<i64>();
     match (whole(41), whole(50)) {
-        (Ok(tow_s), Ok(week)) => Ok(UtcLine { a0_s, a1_sps, tow_s: tow_s as f64, week }),
+        (Ok(tow_s), Ok(week)) => Ok(Polynomial { a0_s, a1_sps, tow_s: tow_s as f64, week }),
         _ => Err("expected two whole numbers from column 42 on".to_owned()),
     }
 }
 
 /// `A4, 1X, D17.10, D16.9, 1X, I6, 1X, I4` of version 3.
-fn system_time(line: &str) -> Result<UtcLine, String> {
+fn system_time(line: &str) -> Result<Polynomial, String> {
     let number = |from: usize, to: usize| number_of(line.get(from..to).unwrap_or("").trim());
     match (number(5, 22), number(22, 38), number(38, 45), number(45, 50)) {
-        (Some(a0_s), Some(a1_sps), Some(tow_s), Some(week)) => Ok(UtcLine { a0_s, a1_sps, tow_s, week: week as i64 }),
+        (Some(a0_s), Some(a1_sps), Some(tow_s), Some(week)) => {
+            Ok(Polynomial { a0_s, a1_sps, tow_s, week: week as i64 })
+        }
         _ => Err("expected two coefficients, a time of week and a week from column 6 on".to_owned()),
     }
 }
 
-/// What follows the present number of leap seconds in versions 3 and 4: that after the change, its week and its day.
+/// What follows the present number of leap seconds in versions 3 and 4: that after the change, its week and
+/// its day.
 fn leap_event(line: &str) -> Option<(i64, i64, u8)> {
     let whole = |from: usize| line.get(from..from + 6).and_then(|text| text.trim().parse::<i64>().ok());
     let (after_s, week, day) = (whole(6)?, whole(12)?, whole(18)?);

@@ -1,5 +1,5 @@
-//! A signal is data: a carrier and components, each with a code, the pulses that its chips have, and perhaps an overlay
-//! code and a message.
+//! A signal is data: a carrier and components, each with a code, the pulses that its chips have, and perhaps
+//! an overlay code and a message.
 //!
 //! To add a signal: one file in `gnss/<system>/` with a `static` [`Signal`], one word in [`SIGNALS`]. Law
 //! tests walk that registry. A program that has a signal of its own calls [`register`] before it names it
@@ -13,10 +13,10 @@ use std::sync::{PoisonError, RwLock};
 use thiserror::Error;
 
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::gps;
 use crate::gnss::message::Message;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::TimeScale;
+use crate::gnss::{galileo, gps};
 
 mod shape;
 #[cfg(any(test, feature = "planted"))]
@@ -25,13 +25,14 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 1] = [&gps::l1ca::L1_CA];
+pub static SIGNALS: [&Signal; 2] = [&gps::l1ca::L1_CA, &galileo::e1::E1];
 
-/// Signals that [`register`] has added. Names in files have to find them, so they are the program's, not a scene's.
+/// Signals that [`register`] has added. Names in files have to find them, so they are the program's, not a
+/// scene's.
 static ADDED: RwLock<Vec<&'static Signal>> = RwLock::new(Vec::new());
 
-/// Adds a signal to those that names find. The receiver searches for it where its settings name it. Adding the same
-/// signal again changes nothing.
+/// Adds a signal to those that names find. The receiver searches for it where its settings name it. Adding
+/// the same signal again changes nothing.
 ///
 /// # Errors
 /// Another signal of that name.
@@ -66,7 +67,8 @@ pub struct Signal {
     pub system: System,
     /// By which its codes and messages are timed.
     pub time: &'static TimeScale,
-    /// First and last number of the constellation's satellites; codes of others are reserved for other transmitters.
+    /// First and last number of the constellation's satellites; codes of others are reserved for other
+    /// transmitters.
     pub constellation: [u8; 2],
     pub carrier: Carrier,
     /// Least power received on the ground that its documents promise, of all components together; where none
@@ -159,6 +161,21 @@ impl Signal {
                 centre_hz + step_hz * f64::from(channel(sv.number).unwrap_or(0))
             }
         }
+    }
+
+    /// The code of its first component for a satellite's number: chips of −1, 0 and +1 over one period;
+    /// `None` for a number to which the document assigns none.
+    ///
+    /// ```
+    /// use gnss_twin::gnss::gps::l1ca::L1_CA;
+    ///
+    /// // IS-GPS-200, table 3-Ia: the code of PRN 7 begins with 1131 octal, and a 1 is sent as −1.
+    /// let code = L1_CA.code(7).unwrap();
+    /// let first = code[..10].iter().fold(0, |word, &chip| word << 1 | u32::from(chip < 0));
+    /// assert_eq!((code.len(), first), (1023, 0o1131));
+    /// ```
+    pub fn code(&self, number: u8) -> Option<Vec<i8>> {
+        self.components.first().and_then(|component| (component.code)(number))
     }
 
     /// This signal of one satellite.

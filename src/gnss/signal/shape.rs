@@ -26,8 +26,8 @@ impl Shape {
         Self::between(component.layers, component.layers, component.chip_rate_hz)
     }
 
-    /// Of a waveform of `sent` layers with one of `made` layers, where the code is not zero: the part in phase, and of
-    /// delays of either sign the mean. [`Self::density`] is that of the cross spectrum then.
+    /// Of a waveform of `sent` layers with one of `made` layers, where the code is not zero: the part in
+    /// phase, and of delays of either sign the mean. [`Self::density`] is that of the cross spectrum then.
     pub fn between(sent: &[Layer], made: &[Layer], chip_rate_hz: f64) -> Self {
         let both = || sent.iter().chain(made);
         let steps = both().fold(1, |all, layer| super::least_common_multiple(all, layer.pulse.len().max(1)));
@@ -120,7 +120,8 @@ mod tests {
         component.shape()
     }
 
-    /// √(10/11) and √(1/11) (Galileo OS SIS ICD 2.1, 2.3.3), √(29/33) and √(4/33) of chips (IS-GPS-800J, 3.3).
+    /// √(10/11) and √(1/11) (Galileo OS SIS ICD 2.1, 2.3.3), √(29/33) and √(4/33) of chips (IS-GPS-800J,
+    /// 3.3).
     const A: f64 = 0.953_462_589_245_592_4;
     const B: f64 = 0.301_511_344_577_763_6;
     static CBOC_PLUS: [Layer; 2] = [Layer { weight: A, ..Layer::BOC11 }, Layer { weight: B, ..Layer::BOC61 }];
@@ -167,8 +168,8 @@ mod tests {
             near(bpsk, CHIP_S * sinc_squared(hz * CHIP_S), "BPSK");
             near(one, boc(hz, 1.0), "BOC(1,1)");
             near(six, boc(hz, 6.0), "BOC(6,1)");
-            // MBOC is the mean of both components of E1; TMBOC has 4 of 33 chips, so 29/33 and 4/33; layers at right
-            // angles do not interfere.
+            // MBOC is the mean of both components of E1; TMBOC has 4 of 33 chips, so 29/33 and 4/33; layers
+            // at right angles do not interfere.
             near(0.5 * (plus + minus), 10.0 / 11.0 * boc(hz, 1.0) + boc(hz, 6.0) / 11.0, "MBOC");
             near(time, 29.0 / 33.0 * boc(hz, 1.0) + 4.0 / 33.0 * boc(hz, 6.0), "TMBOC");
             near(quadrature, 10.0 / 11.0 * boc(hz, 1.0) + boc(hz, 6.0) / 11.0, "QMBOC");

@@ -1,7 +1,7 @@
 //! Signals that no satellite sends, for tests alone: together they have every property that signals may have.
 //!
-//! Their codes are random. What assumes one BPSK component of 1 ms, one carrier, a code of ±1 or one time scale goes
-//! wrong with one of them.
+//! Their codes are random. What assumes one BPSK component of 1 ms, one carrier, a code of ±1 or one time
+//! scale goes wrong with one of them.
 
 use super::{Carrier, Component, Layer, Overlay, Signal};
 use crate::gnss::galileo::inav::INAV;

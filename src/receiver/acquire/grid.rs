@@ -1,11 +1,11 @@
 //! The search proper: correlation with every code phase at once by FFT, for every Doppler.
 //!
-//! A dwell is a coherent sum over whole code periods. Each period is transformed by itself, from the sample at which
-//! the code of that Doppler says it begins, turned to a fraction of a sample, and the spectra are added, so neither a
-//! period of broken samples nor code Doppler smears the sum. Correlation is circular over one period: with a period
-//! that is no whole number of samples its seam is off by at most half a sample, and a data bit may turn anywhere
-//! within a dwell (it takes two thirds of that dwell's power on average). Only the band of the code's main lobe
-//! goes back to lags.
+//! A dwell is a coherent sum over whole code periods. Each period is transformed by itself, from the sample
+//! at which the code of that Doppler says it begins, turned to a fraction of a sample, and the spectra are
+//! added, so neither a period of broken samples nor code Doppler smears the sum. Correlation is circular over
+//! one period: with a period that is no whole number of samples its seam is off by at most half a sample, and
+//! a data bit may turn anywhere within a dwell (it takes two thirds of that dwell's power on average). Only
+//! the band of the code's main lobe goes back to lags.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -18,11 +18,11 @@ use super::kernel;
 use super::multiple_access::Law;
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
-use super::threshold::{of_one_cell, threshold};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Component;
 use crate::receiver::correlate::wave::strongest;
 use crate::receiver::source::Block;
+use crate::receiver::threshold::{of_one_cell, threshold};
 
 /// Cells within this of a peak are not noise.
 const PEAK_CHIPS: f64 = 2.0;
@@ -159,7 +159,8 @@ impl Grid {
         self.is_real && (turns - turns.round()).abs() * coherent_samples < 0.75
     }
 
-    /// Conjugate spectrum of a satellite's code, over the band. Sample n covers the phases from n to n + 1 samples.
+    /// Conjugate spectrum of a satellite's code, over the band. Sample n covers the phases from n to n + 1
+    /// samples.
     pub fn spectrum(&self, replica: &Replica) -> Vec<Complex<f32>> {
         let mut buffer = vec![Complex::default(); self.forward.len()];
         // Scaled so that powers stay near one whatever the length.
@@ -171,8 +172,8 @@ impl Grid {
         self.band(&buffer).map(|(_, bin)| bin.conj()).collect()
     }
 
-    /// The bins within the band, with their signed numbers, in the order of the short transform; zeros where the
-    /// long one has none.
+    /// The bins within the band, with their signed numbers, in the order of the short transform; zeros where
+    /// the long one has none.
     fn band<'a>(&self, spectrum: &'a [Complex<f32>]) -> impl Iterator<Item = (f64, Complex<f32>)> + 'a {
         let (length, band) = (spectrum.len(), self.inverse.len());
         let positive = band.div_ceil(2);

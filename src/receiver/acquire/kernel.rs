@@ -1,4 +1,5 @@
-//! The two passes over spectra and lags, compiled for AVX2 too; no operation is fused, so bits do not depend on it.
+//! The two passes over spectra and lags, compiled for AVX2 too; no operation is fused, so bits do not depend
+//! on it.
 
 use num_complex::Complex;
 

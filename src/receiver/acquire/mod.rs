@@ -13,25 +13,25 @@
 //! raise the cells of all codes, the threshold rises (`multiple_access`). Continuous waves that could pass
 //! for satellites are taken out first (`tone`).
 //!
-//! **Threshold.** A cell's statistic is Σ|S|² in units of half its noise power: chi-square with 2K degrees
-//! of freedom for K sums. With N cells (lags in one code period times Dopplers), a cell is given
-//! 1 − (1 − P)^(1/N) of the probability P. Neighbouring cells are correlated, so this errs to the safe side, but
-//! little: at three cells a chip and half-cycle Doppler steps neighbours share 40 % of their power, and where one
-//! exceeds a high threshold the next does so in few of a hundred cases (measured in this module's tests). Near a
-//! multiple of half the rate of a real recording a carrier meets its own image and a sum has one degree of freedom
-//! only; there the statistic is scaled by the ratio of both thresholds.
+//! **Threshold.** A cell's statistic is Σ|S|² in units of half its noise power: chi-square with 2K degrees of
+//! freedom for K sums. With N cells (lags in one code period times Dopplers), a cell is given 1 − (1 −
+//! P)^(1/N) of the probability P. Neighbouring cells are correlated, so this errs to the safe side, but
+//! little: at three cells a chip and half-cycle Doppler steps neighbours share 40 % of their power, and where
+//! one exceeds a high threshold the next does so in few of a hundred cases (measured in this module's tests).
+//! Near a multiple of half the rate of a real recording a carrier meets its own image and a sum has one
+//! degree of freedom only; there the statistic is scaled by the ratio of both thresholds.
 //!
-//! **Sensitivity.** By default 10 sums of 2 ms with half-cycle steps. At 38 dB-Hz and 2.6 Msps, with the worst
-//! losses of code (2.0 dB) and Doppler (0.9 dB) and one sum in ten lost to a data bit, 20 + λ = 138 ± 23 stands
-//! against a threshold of 95. A bit that turns within a sum leaves a third of its power on average.
+//! **Sensitivity.** By default 10 sums of 2 ms with half-cycle steps. At 38 dB-Hz and 2.6 Msps, with the
+//! worst losses of code (2.0 dB) and Doppler (0.9 dB) and one sum in ten lost to a data bit, 20 + λ = 138 ±
+//! 23 exceeds a threshold of 95. A bit that turns within a sum leaves a third of its power on average.
 
+mod error;
 mod grid;
 mod kernel;
 mod multiple_access;
 mod refine;
 mod replica;
 mod settings;
-pub(in crate::receiver) mod threshold;
 mod tone;
 mod window;
 
@@ -39,15 +39,15 @@ use std::collections::BTreeMap;
 
 use num_complex::Complex;
 use rayon::prelude::*;
-use thiserror::Error;
 
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Component, Link, Signal};
-use crate::receiver::lead::lead;
+use crate::receiver::lead::{followed_db, lead};
 use crate::receiver::source::Block;
-use crate::receiver::track::model::followed_db;
+
+pub use error::AcquireError;
 use grid::Grid;
 use refine::Refined;
 use replica::Replica;
@@ -56,10 +56,11 @@ use window::Window;
 
 /// Hits this much weaker than the strongest (10 dB) have to show without those that are stronger.
 ///
-/// One C/A code appears in the correlator of another at most 21 dB down, several together seldom above 14 dB down.
+/// One C/A code appears in the correlator of another at most 21 dB down, several together seldom above 14 dB
+/// down.
 const WEAK_SHARE: f64 = 0.1;
-/// A hit this much weaker than the strongest (40 dB) is not believed even then: subtraction leaves something over, and
-/// without noise to cover it that something has the cross-correlation's peaks.
+/// A hit this much weaker than the strongest (40 dB) is not believed even then: subtraction leaves something
+/// over, and without noise to cover it that something has the cross-correlation's peaks.
 const LEAST_SHARE: f64 = 1e-4;
 /// Satellites with this share of the samples' power take 1.2 dB from those that were not found.
 const MASKING_SHARE: f64 = 0.25;
@@ -72,13 +73,17 @@ const LARGEST_LOOKS: u32 = 4;
 /// A satellite that was found.
 #[derive(Clone, Copy, Debug)]
 pub struct Acquired {
+    /// The satellite.
     pub sv: Sv,
+    /// The signal.
     pub signal: &'static Signal,
     /// Sample at which `code_phase_chips` holds.
     pub sample: u64,
     /// Code phase in [0, code length): chips of the received code already begun at `sample`.
     pub code_phase_chips: f64,
+    /// Positive when approaching.
     pub doppler_hz: f64,
+    /// Of the whole signal, estimated by the search.
     pub cn0_dbhz: f64,
 }
 
@@ -89,31 +94,8 @@ impl Acquired {
     }
 }
 
-/// Why a search could not be made.
-#[derive(Debug, Error, PartialEq)]
-pub enum AcquireError {
-    #[error("acquisition.{key} is {value}: expected {expected}")]
-    Setting { key: &'static str, value: f64, expected: &'static str },
-    #[error("{have} samples are too few for the search: expected at least {need}")]
-    TooFewSamples { have: u64, need: u64 },
-    #[error("a block has {i} in-phase and {q} quadrature samples: expected as many of both")]
-    Uneven { i: usize, q: usize },
-    #[error("the sample rate is {rate_hz} Hz: expected at least {need_hz} Hz for {signal}")]
-    RateTooLow { signal: &'static str, rate_hz: f64, need_hz: f64 },
-    #[error(
-        "{signal} lies {if_hz} Hz from the centre of the samples: expected within half the sample rate, {half_hz} Hz"
-    )]
-    OutOfBand { signal: &'static str, if_hz: f64, half_hz: f64 },
-    #[error("acquisition.signals names '{name}': expected some of {known}")]
-    UnknownSignal { name: String, known: String },
-    #[error("no code of {signal} is short enough for this receiver: expected fewer than 32 768 steps a period")]
-    TooLong { signal: &'static str },
-    #[error("{sv} has no {signal} code: expected a satellite to which its documents assign one")]
-    NoCode { signal: &'static str, sv: Sv },
-}
-
-/// Whether a signal's carrier lies within the band of the samples. Of a real recording the IF may lie beyond half the rate
-/// on purpose.
+/// Whether a signal's carrier lies within the band of the samples. Of a real recording the IF may lie beyond
+/// half the rate on purpose.
 pub fn can_hold(metadata: &IfMetadata, signal: &Signal) -> bool {
     !metadata.format.is_complex() || metadata.if_hz(signal.centre_hz()).abs() <= 0.5 * metadata.rate.hz()
 }
@@ -251,7 +233,8 @@ impl Searcher {
     }
 
     /// Searches the beginning of `block` for every candidate, by the component of its signal that leads; rows
-    /// come in the order of the candidates. Of candidates with the same code and carrier only the first is acquired.
+    /// come in the order of the candidates. Of candidates with the same code and carrier only the first is
+    /// acquired.
     ///
     /// # Errors
     /// A block that is too short, or a candidate that these samples cannot hold: see [`AcquireError`].
@@ -387,7 +370,8 @@ impl Searcher {
         rows.map(|(finding, (sv, _))| finding.report(of, *sv, window.first, code_chips)).collect()
     }
 
-    /// One search of these samples, and refinement of what passes the threshold; with the number of crowded Dopplers.
+    /// One search of these samples, and refinement of what passes the threshold; with the number of crowded
+    /// Dopplers.
     fn detect(
         &self,
         grid: &Grid,

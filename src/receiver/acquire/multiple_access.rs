@@ -10,19 +10,20 @@
 //! cells of all codes in one Doppler bin are a sample of that bin's own law. Where their median is above what
 //! noise explains, the bin is *crowded*. Cross-correlation of a code family is bounded, so what lies beyond
 //! the values that many codes reach is noise about a cross-correlation, and that adds to the amplitude: the
-//! root of a cell is nearly normal with unit deviation, whatever it stands on. In amplitude the bar is
+//! root of a cell is nearly normal with unit deviation, whatever its mean. In amplitude the bar is
 //! therefore the bin's median, plus the [`REACHED`] quantile of what the codes exceed the medians of their
 //! bins by (all crowded bins together), plus what a normal variable goes on from that quantile to the false
 //! alarm. Elsewhere the threshold is that of noise. Limits: fewer codes than [`LEAST_CODES`] say nothing; a
 //! bin that is raised by less than 0.7 dB is not noticed.
 
-use super::threshold::{of_one_cell, threshold};
+use crate::receiver::threshold::{of_one_cell, threshold};
 
 /// Fewer codes are no sample.
 const LEAST_CODES: usize = 12;
 /// A bin is crowded when its median is so many standard deviations above that of noise.
 const CROWDED: f64 = 5.0;
-/// Standard deviation of a Gumbel sample's median over scale, times √n: 1 / (2 × density there, ½ ln 2) = 1/ln 2.
+/// Standard deviation of a Gumbel sample's median over scale, times √n: 1 / (2 × density there, ½ ln 2) =
+/// 1/ln 2.
 const MEDIAN_SPREAD: f64 = std::f64::consts::LOG2_E;
 /// Quantile of what the codes reach in crowded bins: few of them are those of satellites that are there.
 const REACHED: f64 = 0.9;
@@ -34,7 +35,8 @@ const RAISED: f64 = 1.0 / 16.0;
 pub(super) struct Law {
     /// What a peak has to exceed in noise, and with what probability a bin does.
     pub threshold: f64,
-    /// Deviations of a normal variable from the [`REACHED`] quantile of a bin's largest cell to the false alarm.
+    /// Deviations of a normal variable from the [`REACHED`] quantile of a bin's largest cell to the false
+    /// alarm.
     further: f64,
     /// Of the largest cell of a bin in noise: median and scale, circular and where a carrier meets its image.
     circular: (f64, f64),
@@ -157,7 +159,7 @@ mod tests {
         assert!((law.threshold - 95.5).abs() < 0.1, "{}", law.threshold);
     }
 
-    /// Largest of `cells` sums of ten powers, a quarter of which stands on an amplitude of `raised` over all
+    /// Largest of `cells` sums of ten powers, a quarter of which has an amplitude of `raised` over all
     /// sums, noise of unit variance a component.
     fn largest_of_raised(noise: &mut Noise, cells: usize, raised: f64) -> f64 {
         let mut cell = |k: usize| {
@@ -197,7 +199,8 @@ mod tests {
             println!("{raised}: {false_ones} of {searches}, bar {:.1}", mean_root * mean_root);
             // 1280 searches at 1 %: 12.8 and three deviations of 3.6.
             assert!(false_ones <= 24, "{raised}: {false_ones} of {searches}");
-            // Of 750 raised cells 1.3e-5 each are 4.2 deviations along the amplitude; 19 other components stand across.
+            // Of 750 raised cells 1.3e-5 each are 4.2 deviations along the amplitude; 19 other components are
+            // across.
             let exact_root = libm::hypot(raised + 4.2, 19.0_f64.sqrt());
             assert!((mean_root / exact_root - 1.0).abs() < 0.12, "{raised}: {mean_root} for {exact_root}");
         }

@@ -42,7 +42,8 @@ struct Correlators<'a> {
     periods: usize,
 }
 
-/// Refines what the search made of a satellite; its C/N0 is kept if the refined power does not exceed the noise.
+/// Refines what the search made of a satellite; its C/N0 is kept if the refined power does not exceed the
+/// noise.
 pub(super) fn refine(
     grid: &Grid,
     block: &Block,
@@ -118,7 +119,8 @@ impl Correlators<'_> {
             let nco = Nco {
                 carrier: fraction_of_turn(turns * from as f64),
                 carrier_step: fraction_of_turn(turns),
-                // Code phase within the period, so that its resolution does not fall with the length of the block.
+                // Code phase within the period, so that its resolution does not fall with the length of the
+                // block.
                 code: chips_to_units(phase_chips + from as f64 * step - (period + 1) as f64 * self.code_chips),
                 code_step: chips_to_units(step) as u64,
             };
@@ -159,7 +161,7 @@ impl Correlators<'_> {
         // that is noise.
         let reach_hz = self.grid.step_hz;
         let residual_hz = square_frequency_cycles(&prompts, 2.0 * period_s * reach_hz) / (2.0 * period_s);
-        // Squares repeat every 1/(2T), and one period's sum tells such neighbours apart by its own loss.
+        // Squares repeat every 1/(2T), and one period's sum separates such neighbours by its own loss.
         let spacing_hz = 0.5 / period_s;
         let mut best = (f64::NEG_INFINITY, coarse_hz);
         for alias in [0.0, -1.0, 1.0] {

@@ -1,8 +1,9 @@
-//! What a search may be told.
+//! Settings of a search.
 
 use serde::{Deserialize, Serialize};
 
-use crate::gnss::signal::{self, Component, SIGNALS, Signal};
+use crate::gnss::gps::l1ca::L1_CA;
+use crate::gnss::signal::{self, Component, Signal};
 use crate::receiver::described::described;
 
 use super::AcquireError;
@@ -14,15 +15,18 @@ described! {
 pub struct AcquisitionSettings {
     /// Dopplers from minus to plus this are searched. It has to hold the offset of the local oscillator too.
     pub doppler_max_hz: f64,
-    /// Names of the signals that are searched for; empty for every built-in one that the samples can hold.
+    /// Names of the signals that are searched for; empty for GPS L1 C/A, and in `run` for those of the scene.
     pub signals: Vec<String>,
-    /// Code periods of 1 ms summed coherently; of longer codes as many as begin in that time, under an overlay code one.
+    /// Code periods of 1 ms summed coherently; of longer codes as many as begin in that time, under an
+    /// overlay code one.
     pub coherent_periods: u32,
     /// Coherent sums whose powers are added; more where sums are shorter.
     pub noncoherent_sums: u32,
-    /// Doppler step times coherent time: 0.5 loses 0.91 dB at worst and 0.29 dB on average, 2/3 1.65 and 0.51 dB.
+    /// Doppler step times coherent time: 0.5 loses 0.91 dB at worst and 0.29 dB on average, 2/3 1.65 and 0.51
+    /// dB.
     pub doppler_step_cycles: f64,
-    /// Cells a chip at most: faster recordings are band-limited to this many times the chip rate for the search.
+    /// Cells a chip at most: faster recordings are band-limited to this many times the chip rate for the
+    /// search.
     pub cells_per_chip: f64,
     /// Probability that the search for one absent satellite, over all its cells, finds it in noise alone;
     /// where the others' cross-correlation is seen to make the tail heavier, in that too. The default costs
@@ -49,10 +53,17 @@ impl Default for AcquisitionSettings {
 }
 
 impl AcquisitionSettings {
+    /// Searches for these where no names are set.
+    pub fn or_signals(&mut self, signals: &[&'static Signal]) {
+        if self.signals.is_empty() && signals != [&L1_CA] {
+            self.signals = signals.iter().map(|signal| signal.name.to_owned()).collect();
+        }
+    }
+
     /// The signals that are searched for, of names that are known.
     pub fn signals(&self) -> Vec<&'static Signal> {
         if self.signals.is_empty() {
-            return SIGNALS.to_vec();
+            return vec![&L1_CA];
         }
         self.signals.iter().filter_map(|name| Signal::find(name)).collect()
     }

@@ -78,7 +78,8 @@ fn an_open_sky_brings_no_false_satellites() {
         count(&mut searcher, &recording, &sent, &certain, &mut total);
     }
     println!("open sky: {total:?}");
-    // One in a thousand searches, and three deviations of so many; 38 dB-Hz is found with a probability above 0.99.
+    // One in a thousand searches, and three deviations of so many; 38 dB-Hz is found with a probability above
+    // 0.99.
     let expected = f64::from(total.skies) / 1000.0;
     assert!(f64::from(total.false_ones) <= expected + 3.0 * expected.sqrt(), "{total:?}");
     assert!(f64::from(total.found) >= 0.97 * f64::from(total.there), "{total:?}");

@@ -222,7 +222,7 @@ fn detection_probability(value: f64, degrees: u32, noncentrality: f64) -> f64 {
     (0..400)
         .map(|j| {
             let weight = libm::exp(f64::from(j) * libm::log(half) - half - libm::lgamma(f64::from(j) + 1.0));
-            weight * threshold::exceedance(value, degrees + 2 * j)
+            weight * crate::receiver::threshold::exceedance(value, degrees + 2 * j)
         })
         .sum()
 }

@@ -1,7 +1,8 @@
 //! The carrier replica: one phasor for sixteen samples, from powers in `f64`.
 //!
-//! A vector of sixteen samples is turned by the phasor of its first sample only; what is left, the turn within a
-//! vector, is the same for every vector and is applied to the sums. Phasors carry an error of a few 1e-7.
+//! A vector of sixteen samples is turned by the phasor of its first sample only; what is left, the turn
+//! within a vector, is the same for every vector and is applied to the sums. Phasors carry an error of a few
+//! 1e-7.
 
 use num_complex::Complex64;
 

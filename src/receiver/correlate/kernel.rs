@@ -1,7 +1,7 @@
 //! The fast correlators compiled for three instruction sets, and all that is written for one of them.
 //!
-//! [`single`] and [`short`] are plain Rust for any processor and for AVX2. With AVX-512 chips are looked up in tables,
-//! sixteen or thirty-two at a time. Every level gives the same bits.
+//! [`single`] and [`short`] are plain Rust for any processor and for AVX2. With AVX-512 chips are looked up
+//! in tables, sixteen or thirty-two at a time. Every level gives the same bits.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64 as x86;

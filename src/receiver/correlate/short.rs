@@ -1,4 +1,5 @@
-//! The correlator in integers of 16 bits, for samples of 8: exact sums, so any order of them gives the same bits.
+//! The correlator in integers of 16 bits, for samples of 8: exact sums, so any order of them gives the same
+//! bits.
 //!
 //! Samples are taken in 2⁻⁷ LSB, phasors in 2⁻¹⁵, replicas in 2⁻⁸, and products are summed in 32 bits. Of the
 //! 16 bits of a code phase as many are whole chips as a group of 32 samples spans (2⁻¹² chip is the last bit

@@ -1,7 +1,7 @@
 //! The correlator in `f32`: sixteen lanes of plain Rust with a fixed order of sums.
 //!
-//! No fused multiply-add that could round otherwise, so that every instruction set gives the same bits. Code phases of
-//! lanes resolve 2⁻²⁷ chip.
+//! No fused multiply-add that could round otherwise, so that every instruction set gives the same bits. Code
+//! phases of lanes resolve 2⁻²⁷ chip.
 
 use num_complex::{Complex32, Complex64};
 

@@ -1,14 +1,17 @@
-//! The steps of a code as a receiver makes them: the strongest layer of a component, and nothing where that is not sent.
+//! The steps of a code as a receiver makes them: the strongest layer of a component, and nothing where that
+//! is not sent.
 //!
-//! BPSK and BOC are made as they are. Of CBOC, TMBOC and QMBOC the strongest layer is made: against the full waveform
-//! that costs 0.4 dB where BOC(6,1) has a tenth of the power, and spares steps six times as short.
+//! BPSK and BOC are made as they are. Of CBOC, TMBOC and QMBOC the strongest layer is made: against the full
+//! waveform that costs 0.4 dB where BOC(6,1) has a tenth of the power, and spares steps six times as short.
 
 use crate::gnss::signal::{Component, Layer};
 
 /// One period of a replica: equal steps of −1, 0 and +1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wave {
+    /// One period: −1, 0 where another code has its turn, +1.
     pub values: Vec<i8>,
+    /// Equal steps into which a chip is divided.
     pub steps_per_chip: usize,
     /// Share of the chips that are this code's turn.
     pub share: f64,

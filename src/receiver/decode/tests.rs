@@ -98,7 +98,8 @@ fn the_frame_is_found_in_inverted_bits_of_which_one_in_a_hundred_is_wrong() {
             late += 1;
         }
     }
-    // A header of 62 bits is whole with 0.54, and two of them within four subframes nearly always among twenty.
+    // A header of 62 bits is whole with 0.54, and two of them within four subframes nearly always among
+    // twenty.
     assert!(found >= 19, "{found} found, {late} not");
 }
 

@@ -3,18 +3,19 @@
 //! n missing samples put the codes of all satellites ahead of where they are expected by n/rate seconds: by
 //! the same number of chips, a whole number of samples. No satellite, antenna or oscillator does that. Four
 //! steps find n:
-//! 1. A [`Trend`] predicts each code from the last seconds. A common step beyond it, or power that vanishes on most channels at
-//!    once, is a suspicion ([`common_step`]).
+//! 1. A [`Trend`] predicts each code from the last seconds. A common step beyond it, or power that vanishes
+//!    on most channels at once, is a suspicion ([`common_step`]).
 //! 2. A [`scan`] correlates at all delays for all channels together and finds n modulo a code period.
-//! 3. [`turned_by`] finds by how many code periods, modulo a symbol, the turns of the prompts' signs are displaced.
-//! 4. A satellite's code moves by its own Doppler in the time that is missing: a [`Fit`] of the codes over the Dopplers finds that
-//!    time to milliseconds, so that whole symbols are known too, and n to the sample.
+//! 3. [`turned_by`] finds by how many code periods, modulo a symbol, the turns of the prompts' signs are
+//!    displaced.
+//! 4. A satellite's code moves by its own Doppler in the time that is missing: a [`Fit`] of the codes over
+//!    the Dopplers finds that time to milliseconds, so that whole symbols are known too, and n to the sample.
 //!
 //! **Noise.** At 45 dB-Hz 50 ms of discriminators have 0.010 chip: a sample at 2.6 Msps is 0.39 chip, at 10
 //! Msps 0.10. A suspicion needs six deviations of at least three satellites' common step, 2e-9 a look: with
 //! 20 looks a second once in ten months by noise. It means nothing by itself: where the scan finds no
-//! displaced code, the fit has to give a whole number of samples other than zero. Limits: exact multiples of
-//! a symbol's length (20 ms) move codes by their Doppler alone and pass unseen.
+//! displaced code, the fit has to give a whole number of samples other than zero. Exact multiples of a
+//! symbol's length (20 ms) move codes by their Doppler alone, 0.03 chip: the mean of eight looks shows them.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -55,7 +56,9 @@ pub struct Trend {
 /// What a trend expects, and its variance over that of a look.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
+    /// Code, in chips.
     pub chips: f64,
+    /// Variance of the forecast over that of a look.
     pub variance_ratio: f64,
 }
 
@@ -108,7 +111,9 @@ impl Trend {
 /// One channel's code beyond what was expected, and its Doppler.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
+    /// Code, in chips.
     pub chips: f64,
+    /// Its standard deviation.
     pub sigma_chips: f64,
     /// Chips a second that the code gains by Doppler.
     pub doppler_chips: f64,
@@ -151,9 +156,13 @@ pub fn doppler_step(steps: &[Step]) -> bool {
 /// What the steps of all channels have in common, and the seconds of Doppler in them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
+    /// Code, in chips.
     pub chips: f64,
+    /// Its standard deviation.
     pub sigma_chips: f64,
+    /// Seconds of Doppler.
     pub seconds: f64,
+    /// Their standard deviation.
     pub sigma_s: f64,
 }
 
@@ -202,20 +211,42 @@ impl Fit {
     }
 }
 
-/// Sums of the products of neighbouring prompts, by the code period's number modulo a symbol's.
+/// Sums of the products of neighbouring prompts, by the code period's number modulo a symbol's or an
+/// overlay's.
 #[derive(Clone, Debug)]
 pub struct Edges {
     products: Vec<f64>,
     count: u64,
+    /// Of an overlay: the sign that has been taken off each product.
+    signs: Option<Vec<f64>>,
 }
 
 impl Edges {
     /// For symbols of so many code periods.
     pub fn new(periods: u32) -> Self {
-        Self { products: vec![0.0; periods.max(1) as usize], count: 0 }
+        Self { products: vec![0.0; periods.max(1) as usize], count: 0, signs: None }
     }
 
-    /// Takes the product of the prompt of code period `number` and the one before, noise of unit variance a component.
+    /// For an overlay whose chips, one a code period by its number, are these: they have been taken off the
+    /// prompts.
+    pub fn of_overlay(chips: &[f64]) -> Self {
+        let before = chips.iter().skip(chips.len().saturating_sub(1)).chain(chips);
+        let signs = before.zip(chips).map(|(before, chip)| before * chip).collect();
+        Self { signs: Some(signs), ..Self::new(chips.len() as u32) }
+    }
+
+    /// The same before any prompt.
+    pub fn emptied(&self) -> Self {
+        Self { signs: self.signs.clone(), ..Self::new(self.products.len() as u32) }
+    }
+
+    /// Code periods in a symbol, or in an overlay.
+    pub fn periods(&self) -> u64 {
+        self.products.len() as u64
+    }
+
+    /// Takes the product of the prompt of code period `number` and the one before, noise of unit variance a
+    /// component.
     pub fn add(&mut self, number: u64, product: f64) {
         let length = self.products.len() as u64;
         if let Some(sum) = self.products.get_mut((number % length) as usize) {
@@ -229,6 +260,9 @@ impl Edges {
 /// products since the jump, and the period in which its symbols began before. `None` while it is in doubt.
 pub fn turned_by(channels: &[(&Edges, u64)]) -> Option<u64> {
     let length = channels.first()?.0.products.len();
+    if channels.first()?.0.signs.is_some() {
+        return overlay_turned_by(channels, length);
+    }
     let mut sums = vec![0.0; length];
     let (mut expected, mut noise) = (0.0, 0.0);
     for (edges, begin) in channels.iter().filter(|(edges, _)| edges.products.len() == length) {
@@ -255,20 +289,55 @@ pub fn turned_by(channels: &[(&Edges, u64)]) -> Option<u64> {
     (lead > TURN_SIGMAS * (2.0 * noise).sqrt() && lead > TURN_SHARE * expected).then_some(best as u64)
 }
 
+/// [`turned_by`] of channels whose overlay is known: with the chips of `shift` periods later taken off in
+/// place of its own, every product is positive.
+fn overlay_turned_by(channels: &[(&Edges, u64)], length: usize) -> Option<u64> {
+    let mut sums = vec![0.0; length];
+    let mut noise = 0.0;
+    for (edges, _) in channels.iter().filter(|(edges, _)| edges.products.len() == length) {
+        let Some(signs) = &edges.signs else { continue };
+        let sent: Vec<(usize, f64)> = (edges.products.iter().zip(signs).enumerate())
+            .filter(|(_, (product, _))| **product != 0.0)
+            .map(|(place, (product, sign))| (place, product * sign))
+            .collect();
+        let own: Vec<f64> = (0..length)
+            .map(|shift| sent.iter().map(|(place, product)| product * signs[(place + shift) % length]).sum())
+            .collect();
+        let power = own.iter().copied().fold(0.0, f64::max) / edges.count.max(1) as f64;
+        let variance = 2.0 * power + 2.0;
+        let weight = power / (power * power + variance);
+        sums.iter_mut().zip(&own).for_each(|(sum, own)| *sum += weight * own);
+        noise += edges.count as f64 * weight * weight * variance;
+    }
+    let (best, most) = sums.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let second =
+        sums.iter().enumerate().filter(|(k, _)| *k != best).map(|(_, &sum)| sum).fold(f64::NEG_INFINITY, f64::max);
+    let lead = most - second;
+    (most > 0.0 && lead > TURN_SIGMAS * (2.0 * noise).sqrt() && lead > TURN_SHARE * most).then_some(best as u64)
+}
+
 /// A place at which samples are missing or came twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Jump {
-    /// Near which sample of the recording: 0.1 s at most after it.
+    /// Near which sample of the recording, of several front ends the first one's: 0.1 s at most after it.
     pub sample: u64,
     /// So many are missing; negative where as many came twice.
     pub samples: i64,
+    /// The place of the front end that lost its own samples, from 0 on.
+    #[serde(skip_serializing_if = "is_first")]
+    pub front_end: usize,
+}
+
+fn is_first(front_end: &usize) -> bool {
+    *front_end == 0
 }
 
 impl fmt::Display for Jump {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (count, what) = (self.samples.unsigned_abs(), if self.samples > 0 { "lost" } else { "doubled" });
         let noun = if count == 1 { "sample" } else { "samples" };
-        write!(f, "{count} {noun} {what} near sample {}", self.sample)
+        write!(f, "{count} {noun} {what} near sample {}", self.sample)?;
+        if self.front_end > 0 { write!(f, " in front end {}", self.front_end + 1) } else { Ok(()) }
     }
 }
 

@@ -26,10 +26,13 @@ const STEP_S: f64 = 0.04;
 /// No jump of whole seconds is taken for what one within a step explains as well as this.
 const AS_GOOD: f64 = 0.97;
 
-/// What a scan came to: the codes are ahead by so many samples, modulo a code period, with so many seconds of Doppler.
+/// What a scan came to: the codes are ahead by so many samples, modulo a code period, with so many seconds of
+/// Doppler.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
+    /// Samples by which codes are ahead.
     pub samples: i64,
+    /// Seconds of Doppler in that.
     pub seconds: f64,
 }
 
@@ -55,7 +58,8 @@ impl Scan {
         Self { length, forward: planner.plan_fft_forward(2 * length), inverse: planner.plan_fft_inverse(2 * length) }
     }
 
-    /// Adds what a block shows of one channel, whose replica and oscillators are `nco` at the block's first sample.
+    /// Adds what a block shows of one channel, whose replica and oscillators are `nco` at the block's first
+    /// sample.
     pub fn add(&self, block: &Block, replica: &Replica, nco: &Nco, profile: &mut Profile) {
         profile.powers.resize(self.length, 0.0);
         let half = (self.length / 2) as i64;
@@ -73,8 +77,14 @@ impl Scan {
                 carrier = carrier.wrapping_add(nco.carrier_step);
             }
             let step = nco.code_step as i64;
-            for (code, place) in codes.iter_mut().zip(start - half..) {
-                *code = Complex::new(replica.value(nco.code + place * step, nco.code_step) as f32, 0.0);
+            // Within a period, for four periods of a long code are beyond 64 bits.
+            let begin = i128::from(nco.code) + i128::from(start - half) * i128::from(step);
+            let period = replica.steps_period();
+            let mut phase = begin.rem_euclid(i128::from(period)) as i64;
+            for code in &mut codes {
+                *code = Complex::new(replica.value(phase, nco.code_step) as f32, 0.0);
+                // A step is far below a period.
+                phase = if phase >= period - step { phase - (period - step) } else { phase + step };
             }
             self.correlate(&mut samples, &mut codes);
             for (power, x) in profile.powers.iter_mut().zip(&samples) {
@@ -84,7 +94,8 @@ impl Scan {
         }
     }
 
-    /// Correlates conjugate samples with codes, in place of the samples: entry j is for delays of j − length/2.
+    /// Correlates conjugate samples with codes, in place of the samples: entry j is for delays of j −
+    /// length/2.
     fn correlate(&self, samples: &mut [Complex<f32>], codes: &mut [Complex<f32>]) {
         // Of conjugate samples the inverse transform is the spectrum's conjugate.
         self.inverse.process(samples);
@@ -154,7 +165,8 @@ impl Profile {
         self.periods
     }
 
-    /// Powers over their mean, less one: 0 with a deviation of one over the root of the periods where there is noise.
+    /// Powers over their mean, less one: 0 with a deviation of one over the root of the periods where there
+    /// is noise.
     fn relative(&self) -> Vec<f64> {
         let mean = self.powers.iter().map(|power| f64::from(*power)).sum::<f64>() / self.powers.len().max(1) as f64;
         let scale = if mean > 0.0 { 1.0 / mean } else { 0.0 };

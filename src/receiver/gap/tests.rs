@@ -52,7 +52,8 @@ fn one_to_four_samples_of_either_sign_are_suspected_at_once_and_counted_right() 
                 let looks = steps_after(80, 74, f64::from(samples) * sample_chips, &mut state);
                 assert!(looks[..74].iter().all(|steps| common_step(steps, sample_chips).is_none()));
                 let chips = common_step(&looks[74], sample_chips).unwrap();
-                // Eight channels know a step to 0.005 chip, trends included: a twentieth of a sample at 10 Msps.
+                // Eight channels know a step to 0.005 chip, trends included: a twentieth of a sample at 10
+                // Msps.
                 assert_eq!((chips / sample_chips).round() as i32, samples, "{rate_hz} {chips}");
             }
         }
@@ -146,7 +147,7 @@ fn turns_of_signs_tell_the_periods_that_are_missing() {
 
 #[test]
 fn a_jump_says_how_many_samples_and_which_way() {
-    let of = |samples| Jump { sample: 77, samples }.to_string();
+    let of = |samples| Jump { sample: 77, samples, front_end: 0 }.to_string();
     assert_eq!(of(1), "1 sample lost near sample 77");
     assert_eq!(of(-5000), "5000 samples doubled near sample 77");
 }
@@ -200,7 +201,8 @@ fn a_scan_finds_the_common_delay_in_a_code_period_and_nothing_where_there_is_non
         let found = scanned(samples, 0.0, 42.0, &mut state).unwrap();
         assert_eq!(found.samples, samples);
     }
-    // Half a second parts these codes by 2.3 chips; steps of 40 ms leave 0.05 chip of the farthest, no sample.
+    // Half a second parts these codes by 2.3 chips; steps of 40 ms leave 0.05 chip of the farthest, no
+    // sample.
     let long = scanned(600, 0.5, 45.0, &mut state).unwrap();
     assert!(long.samples == 600 && (long.seconds - 0.5).abs() < 0.2, "{long:?}");
     assert_eq!(scanned(0, 0.0, 0.0, &mut state), None);

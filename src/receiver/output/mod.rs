@@ -4,7 +4,8 @@
 //! Rows go out as they come, so memory stays flat. Headers are written at once: a file without rows says that
 //! there were none, a missing file that nothing ran.
 
-use std::collections::BTreeSet;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
@@ -18,10 +19,23 @@ use crate::gnss::time::GPST;
 /// A file that could not be made or written.
 #[derive(Debug, Error)]
 pub enum OutputError {
+    /// A file that cannot be made.
     #[error("cannot create {}: {error}", path.display())]
-    Create { path: PathBuf, error: std::io::Error },
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// A file that cannot be written.
     #[error("cannot write {}: {error}", path.display())]
-    Write { path: PathBuf, error: std::io::Error },
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// A sink that takes no records.
     #[error("the receiver's results are not taken: {0}")]
     Refused(Box<dyn std::error::Error + Send + Sync>),
 }
@@ -33,15 +47,23 @@ pub enum Record {
     Acquisition(AcquisitionRow),
     /// The state of a channel's loops.
     Tracking(TrackingRow),
+    /// Something that happened to a channel.
     Event(EventRow),
+    /// What a channel measured at a common epoch.
     Observation(Observation),
     /// Parameters as decoded; those of a set that is read again come again.
     Navigation(Vec<NavigationRow>),
+    /// A position, velocity and time.
     Fix(Fix),
     /// The clocks of the fix before: one a time scale.
     Clocks(Vec<ClockRow>),
-    /// A line in the samples' spectrum.
-    Interference(LineRow),
+    /// A line in the spectrum of a front end's samples; front ends count from 0.
+    Interference {
+        /// The front end's place, from 0 on.
+        front_end: usize,
+        /// The line.
+        row: LineRow,
+    },
 }
 
 /// Takes what a receiver reports, in the order in which it is found.
@@ -78,7 +100,7 @@ fn write_error(path: &Path, error: std::io::Error) -> OutputError {
     OutputError::Write { path: path.to_owned(), error }
 }
 
-/// The I/O error itself, which tells whether another try is worth it.
+/// The I/O error itself, which shows whether another try is worth it.
 fn io_error(error: csv::Error) -> std::io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(error) => error,
@@ -120,6 +142,8 @@ pub struct Output {
     navigation: Sheet,
     events: Sheet,
     interference: Sheet,
+    /// Of the second front end and those after it: there once one has a line.
+    interference_of: BTreeMap<usize, Sheet>,
     /// There once a fix has another time scale than GPS time.
     clocks: Option<Sheet>,
     /// Parameters written so far: those of one issue are written once.
@@ -187,14 +211,14 @@ const TRACKING: [&str; 11] = [
     "phase_lock",
     "integration_s",
 ];
-const NAVIGATION: [&str; 4] = ["sv", "issue", "parameter", "raw"];
+const NAVIGATION: [&str; 5] = ["sv", "issue", "parameter", "raw", "message"];
 const EVENTS: [&str; 4] = ["sample", "sv", "signal", "event"];
 const INTERFERENCE: [&str; 8] =
     ["sample", "frequency_hz", "jn0_dbhz", "js_db", "statistic", "threshold", "lines", "resolution_hz"];
 
 impl Output {
-    /// Creates the files in a directory that is there: were it made here, one that a signal has taken away
-    /// would come back.
+    /// Requires an existing directory: creating it here would resurrect one that the interrupt handler has
+    /// just removed.
     ///
     /// # Errors
     /// [`OutputError::Create`] with the path that cannot be made.
@@ -212,6 +236,7 @@ impl Output {
             navigation: Sheet::create(directory, "navigation.csv", &NAVIGATION)?,
             events: Sheet::create(directory, "events.csv", &EVENTS)?,
             interference: Sheet::create(directory, "interference.csv", &INTERFERENCE)?,
+            interference_of: BTreeMap::new(),
             clocks: None,
             parameters: BTreeSet::new(),
         })
@@ -227,6 +252,21 @@ impl Output {
         }
         let Some(sheet) = &mut self.clocks else { return Ok(()) };
         rows.iter().try_for_each(|row| sheet.write(row))
+    }
+
+    /// Writes a line of a front end's spectrum.
+    fn interference(&mut self, front_end: usize, row: &LineRow) -> Result<(), OutputError> {
+        if front_end == 0 {
+            return self.interference.write(row);
+        }
+        let sheet = match self.interference_of.entry(front_end) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let name = format!("interference_{}.csv", front_end + 1);
+                entry.insert(Sheet::create(&self.directory, &name, &INTERFERENCE)?)
+            }
+        };
+        sheet.write(row)
     }
 
     /// Writes decoded parameters, each but once.
@@ -251,7 +291,7 @@ impl Sink for Output {
             Record::Navigation(rows) => self.navigation(rows),
             Record::Fix(row) => self.fixes.write(&row),
             Record::Clocks(rows) => self.clocks(&rows),
-            Record::Interference(row) => self.interference.write(&row),
+            Record::Interference { front_end, row } => self.interference(front_end, &row),
         }
     }
 
@@ -269,6 +309,7 @@ impl Sink for Output {
             sheet.flush()?;
         }
         self.clocks.as_mut().map_or(Ok(()), Sheet::flush)?;
+        self.interference_of.values_mut().try_for_each(Sheet::flush)?;
         let path = self.directory.join("receiver.json");
         let text = serde_json::to_string_pretty(summary).unwrap_or_default() + "\n";
         fs::write(&path, text).map_err(|error| write_error(&path, error))
@@ -302,7 +343,7 @@ mod tests {
         assert_eq!(header(&row), ACQUISITION.join(","));
         let row: TrackingRow = from_csv(&TRACKING, &format!("0,G03,{},{}", L1_CA.name, zero(8)));
         assert_eq!(header(&row), TRACKING.join(","));
-        let row = NavigationRow { sv, issue: 1, parameter: "x".into(), raw: 0 };
+        let row = NavigationRow { sv, issue: 1, parameter: "x".into(), raw: 0, message: "LNAV".into() };
         assert_eq!(header(&row), NAVIGATION.join(","));
         let row = EventRow { sample: 0, sv, signal: &L1_CA, event: Event::Acquired };
         assert_eq!(header(&row), EVENTS.join(","));

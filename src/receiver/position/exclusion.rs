@@ -7,9 +7,9 @@
 //! ranked by the exact change of the sum of squares in the linearised problem, wᵀS⁻¹w of the set's own
 //! normalised residuals and their covariance; only the best few are solved.
 //!
-//! Where two sets leave ranges that agree within themselves but on different places, nothing tells which is
+//! Where two sets leave ranges that agree within themselves but on different places, nothing shows which is
 //! right: then there is no position ([`NoFix::Ambiguous`]). Places nearer than what a wrong model of the
-//! atmosphere does are no faults told apart: the best fit serves. Limits: faults on so many satellites that
+//! atmosphere does are no separate faults: the best fit serves. Limits: faults on so many satellites that
 //! good ones are the minority, and faults that happen to fit another position: as many directions as there
 //! are degrees of freedom are all that residuals see.
 
@@ -39,8 +39,8 @@ pub type Consistent = (Vec<Range>, Solution, Vec<(Sv, f64)>);
 /// Solves, and leaves out the fewest satellites without which the residuals fit.
 ///
 /// # Errors
-/// As [`least_squares::position`]; [`NoFix::Inconsistent`] when a fault shows but no set explains it, [`NoFix::Ambiguous`] when
-/// several do and lead to different places.
+/// As [`least_squares::position`]; [`NoFix::Inconsistent`] when a fault shows but no set explains it,
+/// [`NoFix::Ambiguous`] when several do and lead to different places.
 pub fn consistent(
     ranges: Vec<Range>,
     start_m: Vector3<f64>,
@@ -159,8 +159,8 @@ fn sets(count: usize, size: usize) -> Option<Vec<Vec<usize>>> {
     Some(sets)
 }
 
-/// Whether two solutions lie further apart than the noise of both explains at that probability. What both share is
-/// counted twice, so that only clear separations count.
+/// Whether two solutions lie further apart than the noise of both explains at that probability. What both
+/// share is counted twice, so that only clear separations count.
 fn elsewhere(one: &Solution, other: &Solution, false_alarm: f64) -> bool {
     let block = |solution: &Solution| -> Matrix3<f64> { solution.covariance.fixed_view::<3, 3>(0, 0).into_owned() };
     let apart_m = one.position_m - other.position_m;

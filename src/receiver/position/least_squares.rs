@@ -27,7 +27,8 @@ pub const UNKNOWNS: usize = COORDINATES + 1;
 const LARGEST_ITERATIONS: u32 = 8;
 /// A step below this ends the iteration.
 const CONVERGED_M: f64 = 1e-4;
-/// Largest ratio of singular values of the geometry: position errors would be thousands of times range errors.
+/// Largest ratio of singular values of the geometry: position errors would be thousands of times range
+/// errors.
 pub const LARGEST_CONDITION: f64 = 1e4;
 /// Corrections of the atmosphere wait until the estimate is near the Earth's surface or above it.
 const NEAR_EARTH_M: f64 = 6.2e6;
@@ -39,7 +40,9 @@ const IONOSPHERE_TOP_M: f64 = 1e6;
 /// A pseudorange and where its satellite was.
 #[derive(Clone, Debug)]
 pub struct Range {
+    /// The satellite.
     pub sv: Sv,
+    /// The signal, of two carriers the first.
     pub signal: &'static Signal,
     /// Satellite at emission, in the ECEF axes of that instant.
     pub satellite: State,
@@ -47,13 +50,18 @@ pub struct Range {
     pub clock: ClockState,
     /// GPS time of emission.
     pub emitted: Epoch,
+    /// Smoothed code.
     pub pseudorange_m: f64,
+    /// Doppler less what the carrier exceeds the code's by.
     pub doppler_hz: f64,
+    /// Carrier of the Doppler.
     pub carrier_hz: f64,
     /// Standard deviation of the pseudorange by thermal noise.
     pub noise_m: f64,
     /// Relative weight of the Doppler: carrier power over noise density.
     pub cn0_hz: f64,
+    /// Whether two carriers were combined, so that the ionosphere is not in it.
+    pub is_combined: bool,
 }
 
 /// What is known of the ionosphere.
@@ -70,6 +78,7 @@ pub enum Ionosphere {
 /// What corrects and weights ranges.
 #[derive(Clone, Copy, Debug)]
 pub struct Corrections {
+    /// The ionosphere's model.
     pub ionosphere: Ionosphere,
     /// Whether there is a troposphere to correct.
     pub troposphere: bool,
@@ -80,6 +89,7 @@ pub struct Corrections {
 /// A position and clock.
 #[derive(Clone, Debug)]
 pub struct Solution {
+    /// ECEF position.
     pub position_m: Vector3<f64>,
     /// The time scales of the ranges, GPS time first, with the reading of the receiver's clock minus each but
     /// for whole seconds, in metres.
@@ -88,8 +98,11 @@ pub struct Solution {
     pub clock_of: Vec<usize>,
     /// … measured minus computed, standard deviation, unit vector to the satellite, elevation.
     pub residuals_m: Vec<f64>,
+    /// Standard deviation of each range.
     pub sigmas_m: Vec<f64>,
+    /// Unit vector to each satellite.
     pub sights: Vec<Vector3<f64>>,
+    /// Elevation of each satellite.
     pub elevations_rad: Vec<f64>,
     /// What one prior deviation of each of the ionosphere's common errors adds to each range.
     pub commons_m: Vec<Vector3<f64>>,
@@ -105,6 +118,7 @@ pub struct Solution {
     /// Estimated errors of the ionosphere's model in their prior deviations (level, gain northwards,
     /// eastwards); 0 where the model is right.
     pub ionosphere_error: Vector3<f64>,
+    /// Iterations made.
     pub iterations: u32,
 }
 
@@ -230,7 +244,8 @@ fn line(range: &Range, clock: usize, at: &Estimate, corrections: &Corrections, d
     }
 }
 
-/// Delay by the atmosphere, and deviations of the ionosphere's part: common to all satellites, and this one's own.
+/// Delay by the atmosphere, and deviations of the ionosphere's part: common to all satellites, and this one's
+/// own.
 #[derive(Default)]
 struct Air {
     delay_m: f64,
@@ -250,7 +265,7 @@ fn atmosphere(
     let delay_m = if corrections.troposphere { troposphere::delay_m(user, sine, day) } else { 0.0 };
     let delay_m = planted!("receiver.position.troposphere", delay_m, 1.02 * delay_m);
     let alone = Air { delay_m, ..Air::default() };
-    if user.height_m > IONOSPHERE_TOP_M {
+    if range.is_combined || user.height_m > IONOSPHERE_TOP_M {
         return alone;
     }
     match corrections.ionosphere {

@@ -3,8 +3,9 @@
 //! A [`Solver`] smooths code with carrier ([`smooth`]), finds where satellites were, corrects the atmosphere
 //! by the decoded ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`troposphere`],
 //! solves ([`least_squares`]), with a clock for each time scale, and tests the residuals, leaving out the
-//! fewest satellites that contradict the others ([`exclusion`]). Limits: carriers of one satellite are not
-//! combined.
+//! fewest satellites that contradict the others ([`exclusion`]). Two carriers of a satellite are used in the
+//! [`combination`] without ionosphere. Limits: delays of one band's front end against another's are not
+//! estimated.
 
 use std::collections::BTreeMap;
 
@@ -22,9 +23,11 @@ use crate::gnss::time::{Epoch, GPST, Rate, SampleClock, TimeScale};
 use crate::receiver::described::described;
 use crate::receiver::track::loops::CodeShape;
 
+pub mod combination;
 pub mod exclusion;
 pub mod ionosphere;
 pub mod least_squares;
+mod ranges;
 pub mod smooth;
 #[cfg(test)]
 mod tests;
@@ -37,16 +40,13 @@ use least_squares::{
 };
 use smooth::Smoother;
 
-/// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
-const HALF_FIT_S: f64 = 7200.0;
-const HALF_LONG_FIT_S: f64 = 10_800.0;
-/// A set is used a little beyond its interval, until the next one is decoded.
-const FIT_GRACE_S: f64 = 600.0;
-
 /// How the ionosphere is corrected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IonosphereChoice {
+    /// Where a satellite is observed on two carriers by the combination of both that has none; else as
+    /// `Broadcast`.
+    Combined,
     /// Klobuchar's model with the parameters that satellites send; until they are decoded, a nominal
     /// ionosphere and its error.
     Broadcast,
@@ -60,6 +60,7 @@ pub enum IonosphereChoice {
 pub enum TroposphereChoice {
     /// A standard atmosphere, half saturated.
     Standard,
+    /// No troposphere: recordings made without one.
     None,
 }
 
@@ -74,9 +75,11 @@ pub struct PositionSettings {
     pub smoothing_s: f64,
     /// Probability that the residual test raises a false alarm.
     pub false_alarm: f64,
-    /// Standard deviation of the models at the zenith, for weights; it grows with one over the elevation's sine.
+    /// Standard deviation of the models at the zenith, for weights; it grows with one over the elevation's
+    /// sine.
     pub model_sigma_m: f64,
-    /// How the ionosphere is corrected.
+    /// How the ionosphere is corrected: combined for two carriers of a satellite where there are two, and
+    /// else the model; broadcast for the model alone; none.
     pub ionosphere: IonosphereChoice,
     /// Standard deviation of the broadcast ionosphere's error as a share of its delay, common to all
     /// satellites: about 0.5 under a real sky, of whose ionosphere the model removes half; 0 where satellites
@@ -98,7 +101,7 @@ impl Default for PositionSettings {
             smoothing_s: 30.0,
             false_alarm: 1e-3,
             model_sigma_m: 0.1,
-            ionosphere: IonosphereChoice::Broadcast,
+            ionosphere: IonosphereChoice::Combined,
             ionosphere_error_share: 0.0,
             troposphere: TroposphereChoice::Standard,
             require_ionosphere: false,
@@ -110,10 +113,13 @@ impl Default for PositionSettings {
 /// Thermal noise of a code loop, from its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CodeNoise {
+    /// Length of a chip.
     pub chip_m: f64,
     /// The correlation that early and late meet: averaging replicas round it and correlate its noise.
     pub shape: CodeShape,
+    /// Bandwidth of the code loop.
     pub bandwidth_hz: f64,
+    /// Time of an integration.
     pub integration_s: f64,
 }
 
@@ -136,31 +142,67 @@ impl CodeNoise {
 /// Why there is no position.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum NoFix {
+    /// Fewer ranges than unknowns.
     #[error("{have} satellites with ephemeris: at least {need} are needed")]
-    TooFew { have: usize, need: usize },
+    TooFew {
+        /// Ranges that there are.
+        have: usize,
+        /// Ranges that a position takes.
+        need: usize,
+    },
     #[error(
         "the satellites' directions give no position: condition {condition:.3e}, {} times the largest that is solved, {:e}",
         (condition / LARGEST_CONDITION).ceil(),
         LARGEST_CONDITION
     )]
-    Singular { condition: f64 },
+    /// Directions that give no position.
+    Singular {
+        /// Ratio of the geometry's singular values.
+        condition: f64,
+    },
+    /// Iterations that do not end.
     #[error("the solution does not converge: the step is {step_m} m after {iterations} iterations")]
-    Diverged { iterations: u32, step_m: f64 },
+    Diverged {
+        /// Iterations made.
+        iterations: u32,
+        /// Length of the last step.
+        step_m: f64,
+    },
+    /// A fault without a satellite that explains it.
     #[error(
         "the ranges contradict each other and no satellite stands out: chi-square {chi_square:.1} above {threshold:.1}"
     )]
-    Inconsistent { chi_square: f64, threshold: f64 },
+    Inconsistent {
+        /// Weighted sum of squared residuals.
+        chi_square: f64,
+        /// What it has to stay below.
+        threshold: f64,
+    },
+    /// A fault that several satellites explain.
     #[error(
         "the ranges contradict each other, and without {} they agree as well as without {}, on places {separation_m:.1} m apart",
         names(one),
         names(other)
     )]
-    Ambiguous { one: Vec<Sv>, other: Vec<Sv>, separation_m: f64 },
+    Ambiguous {
+        /// Satellites without which the others agree.
+        one: Vec<Sv>,
+        /// Others without which the rest agrees as well.
+        other: Vec<Sv>,
+        /// Distance of both positions.
+        separation_m: f64,
+    },
+    /// Parameters that the settings wait for.
     #[error(
         "the ionosphere's parameters are awaited: {waited_s:.1} s so far, of {}",
         limit_s.map_or("any time, as position.require_ionosphere is set".to_owned(), |s| format!("{s:.1} s at most"))
     )]
-    AwaitingIonosphere { waited_s: f64, limit_s: Option<f64> },
+    AwaitingIonosphere {
+        /// Time since the first fix was possible.
+        waited_s: f64,
+        /// The longest wait, if there is one.
+        limit_s: Option<f64>,
+    },
 }
 
 fn names(svs: &[Sv]) -> String {
@@ -170,9 +212,11 @@ fn names(svs: &[Sv]) -> String {
 /// A fix and what the records do not hold.
 #[derive(Clone, Debug)]
 pub struct Solved {
+    /// The record.
     pub fix: Fix,
     /// The clock against each time scale.
     pub clocks: Vec<ClockRow>,
+    /// Satellites in it.
     pub used: Vec<Sv>,
     /// Satellites that the residual test left out, with their distance from the others' solution.
     pub excluded: Vec<(Sv, f64)>,
@@ -185,8 +229,6 @@ pub struct Solver {
     noises: Noises,
     smoother: Smoother,
     rate: Rate,
-    /// What the carrier's Doppler exceeds the code's by.
-    offset_hz: f64,
     last_m: Option<Vector3<f64>>,
     ready_since: Option<u64>,
 }
@@ -196,19 +238,20 @@ impl Solver {
     pub fn new(settings: &PositionSettings, noises: Noises, rate: Rate) -> Self {
         let bandwidth_hz = noises.first().map_or(1.0, |(_, noise)| noise.bandwidth_hz);
         let smoother = Smoother::new(settings.smoothing_s, bandwidth_hz, rate);
-        Self { settings: settings.clone(), noises, smoother, rate, offset_hz: 0.0, last_m: None, ready_since: None }
+        Self { settings: settings.clone(), noises, smoother, rate, last_m: None, ready_since: None }
     }
 
     /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: smoothing and
     /// velocity leave it out, so that the clock's drift is that of the code, whose bias the position has.
-    pub fn set_carrier_offset(&mut self, hz: f64) {
-        self.offset_hz = hz;
-        self.smoother.set_carrier_offset(hz);
+    /// `signals` are those of one front end.
+    pub fn set_carrier_offset(&mut self, signals: &[&'static Signal], hz: f64) {
+        signals.iter().for_each(|signal| self.smoother.set_carrier_offset(signal, hz));
     }
 
-    /// Samples were lost or doubled: carriers are whole to a quarter of a cycle, or were lost.
-    pub fn jump(&mut self, carriers_whole: bool) {
-        if carriers_whole { self.smoother.bridge() } else { self.smoother.clear() }
+    /// Samples of the front end with these signals were lost or doubled: carriers are whole to a quarter of a
+    /// cycle, or were lost.
+    pub fn jump(&mut self, signals: &[&'static Signal], carriers_whole: bool) {
+        if carriers_whole { self.smoother.bridge(signals) } else { self.smoother.clear(signals) }
     }
 
     /// Solves from the observations of one sample.
@@ -223,23 +266,14 @@ impl Solver {
         ephemerides: &BTreeMap<Sv, Ephemeris>,
         klobuchar: Option<Klobuchar>,
     ) -> Result<Solved, NoFix> {
-        let ranges: Vec<Range> = observations
-            .iter()
-            .filter_map(|observation| {
-                let smoothed = self.smoother.smooth(observation);
-                let cn0_hz = libm::pow(10.0, observation.cn0_dbhz / 10.0);
-                let (_, noise) = self.noises.iter().find(|(signal, _)| *signal == observation.signal)?;
-                let noise_m = noise.sigma_m(cn0_hz) * smoothed.variance_ratio.sqrt();
-                let ephemeris = ephemerides.get(&observation.sv)?;
-                let range = range(observation, ephemeris, smoothed.pseudorange_m, noise_m, cn0_hz)?;
-                Some(Range { doppler_hz: range.doppler_hz - self.offset_hz, ..range })
-            })
-            .collect();
+        let ranges = self.ranges(observations, ephemerides);
         if freedom(&ranges) < 0 || ranges.is_empty() {
             let need = COORDINATES + scales(&ranges).len().max(1);
             return Err(NoFix::TooFew { have: ranges.len(), need });
         }
-        self.await_ionosphere(sample, klobuchar)?;
+        if ranges.iter().any(|range| !range.is_combined) {
+            self.await_ionosphere(sample, klobuchar)?;
+        }
         let (ionosphere, model) = self.ionosphere(klobuchar);
         let corrections = Corrections {
             ionosphere,
@@ -269,6 +303,8 @@ impl Solver {
         used.sort();
         used.dedup();
         let counts = [used.len(), kept.len()];
+        let combined = kept.iter().all(|range| range.is_combined);
+        let model = if combined { IonosphereModel::Combined } else { model };
         let fix = fix(sample, clock, &solution, velocity_mps, drift, counts, &excluded, model);
         let clocks = clocks(sample, &solution);
         Ok(Solved { fix, clocks, used, excluded })
@@ -279,13 +315,11 @@ impl Solver {
         let share = self.settings.ionosphere_error_share;
         match (self.settings.ionosphere, klobuchar) {
             (IonosphereChoice::None, _) => (Ionosphere::Absent, IonosphereModel::None),
-            (IonosphereChoice::Broadcast, None) => {
-                (Ionosphere::Uncertain(NOMINAL, NOMINAL_ERROR), IonosphereModel::Nominal)
-            }
-            (IonosphereChoice::Broadcast, Some(model)) if share > 0.0 => {
+            (_, None) => (Ionosphere::Uncertain(NOMINAL, NOMINAL_ERROR), IonosphereModel::Nominal),
+            (_, Some(model)) if share > 0.0 => {
                 (Ionosphere::Uncertain(model, DelayError { share, least_m: 0.0 }), IonosphereModel::Broadcast)
             }
-            (IonosphereChoice::Broadcast, Some(model)) => (Ionosphere::Known(model), IonosphereModel::Broadcast),
+            (_, Some(model)) => (Ionosphere::Known(model), IonosphereModel::Broadcast),
         }
     }
 
@@ -302,40 +336,6 @@ impl Solver {
             Ok(())
         }
     }
-}
-
-/// Where the satellite was when it sent what this observation met; `None` when its ephemeris is unhealthy,
-/// stale or no orbit.
-fn range(
-    observation: &Observation,
-    ephemeris: &Ephemeris,
-    pseudorange_m: f64,
-    noise_m: f64,
-    cn0_hz: f64,
-) -> Option<Range> {
-    let sent = observation.sent();
-    let half_s = FIT_GRACE_S + if ephemeris.long_fit { HALF_LONG_FIT_S } else { HALF_FIT_S };
-    if ephemeris.health != 0 || sent.since(ephemeris.toe).abs() > half_s {
-        return None;
-    }
-    // The clock's argument is GPS time; one correction leaves drift × offset², far below a picosecond.
-    let rough = ephemeris.clock_of_signal(sent, observation.signal).ok()?;
-    let emitted = sent.plus_s(-rough.offset_s);
-    let clock = ephemeris.clock_of_signal(emitted, observation.signal).ok()?;
-    let clock = planted!("receiver.position.group_delay", clock, ephemeris.clock(emitted).ok()?);
-    let emitted = sent.plus_s(-clock.offset_s);
-    Some(Range {
-        sv: observation.sv,
-        signal: observation.signal,
-        satellite: ephemeris.state(emitted).ok()?,
-        clock,
-        emitted,
-        pseudorange_m,
-        doppler_hz: observation.doppler_hz,
-        carrier_hz: observation.signal.carrier_hz(observation.sv),
-        noise_m,
-        cn0_hz,
-    })
 }
 
 #[expect(clippy::too_many_arguments, reason = "a record with as many sources")]

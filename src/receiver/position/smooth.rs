@@ -1,20 +1,22 @@
 //! Carrier-smoothed code: Hatch's filter, one a satellite, with the variance that is left.
 //!
-//! The weight of a new code measurement falls from one to interval / window. Code errors of a tracking loop are
-//! correlated over its own time constant, so the variance is carried along for correlated noise (first-order
-//! loop: correlation exp(−4 B t)) and not assumed to fall with the count. A diverging ionosphere biases the
-//! result by twice its rate times the window.
+//! The weight of a new code measurement falls from one to interval / window. Code errors of a tracking loop
+//! are correlated over its own time constant, so the variance is carried along for correlated noise
+//! (first-order loop: correlation exp(−4 B t)) and not assumed to fall with the count. A diverging ionosphere
+//! biases the result by twice its rate times the window.
 //!
 //! Where code and carrier part at a known rate ([`parting`](crate::receiver::parting)), that rate is taken
 //! off. How much of it the filter has taken in is carried beside its value, so that a better rate corrects
-//! the past as well.
+//! the past as well. Two carriers are smoothed in the [`combination`](super::combination) that has no
+//! ionosphere.
 
 use std::collections::BTreeMap;
 
 use crate::gnss::record::Observation;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
+use crate::gnss::signal::Signal;
 use crate::gnss::time::Rate;
+use crate::receiver::position::combination::Combination;
 
 /// A gap longer than this breaks the carrier.
 const LONGEST_GAP_S: f64 = 1.05;
@@ -24,6 +26,7 @@ const LARGEST_JUMP_M: f64 = 30.0;
 /// A smoothed pseudorange.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothed {
+    /// Code smoothed by the carrier.
     pub pseudorange_m: f64,
     /// Its variance over that of one code measurement.
     pub variance_ratio: f64,
@@ -43,76 +46,120 @@ struct State {
     covariance: f64,
 }
 
+/// What a filter belongs to: a signal of a satellite, or two in combination.
+type Key = (Sv, &'static Signal, Option<&'static Signal>);
+
+/// Code and carrier as a filter takes them.
+struct Input {
+    key: Key,
+    sample: u64,
+    pseudorange_m: f64,
+    carrier_m: f64,
+    locked_s: f64,
+    /// By how much the carrier's Doppler exceeds the code's, and the metres a second of each hertz of it.
+    offset_hz: f64,
+    metres_per_hz: f64,
+}
+
 /// Filters of all satellites.
 #[derive(Clone, Debug)]
 pub struct Smoother {
     window_s: f64,
     bandwidth_hz: f64,
     rate: Rate,
-    offset_hz: f64,
-    states: BTreeMap<Link, State>,
+    offsets_hz: BTreeMap<&'static Signal, f64>,
+    states: BTreeMap<Key, State>,
 }
 
 impl Smoother {
     /// Filters of `window_s` (0 for none) over code loops of `bandwidth_hz`.
     pub fn new(window_s: f64, bandwidth_hz: f64, rate: Rate) -> Self {
-        Self { window_s, bandwidth_hz, rate, offset_hz: 0.0, states: BTreeMap::new() }
+        Self { window_s, bandwidth_hz, rate, offsets_hz: BTreeMap::new(), states: BTreeMap::new() }
     }
 
-    /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier.
-    pub fn set_carrier_offset(&mut self, hz: f64) {
-        self.offset_hz = hz;
+    /// States by how much the carrier's Doppler of a signal exceeds the code's, in hertz of the carrier.
+    pub fn set_carrier_offset(&mut self, signal: &'static Signal, hz: f64) {
+        self.offsets_hz.insert(signal, hz);
+    }
+
+    /// By how much the carrier's Doppler of a signal exceeds the code's.
+    pub fn carrier_offset_hz(&self, signal: &Signal) -> f64 {
+        self.offsets_hz.get(signal).copied().unwrap_or(0.0)
     }
 
     /// Forgets a satellite.
     pub fn reset(&mut self, sv: Sv) {
-        self.states.retain(|link, _| link.sv != sv);
+        self.states.retain(|key, _| key.0 != sv);
     }
 
-    /// Forgets all satellites.
-    pub fn clear(&mut self) {
-        self.states.clear();
+    /// Forgets all satellites' filters of these signals.
+    pub fn clear(&mut self, signals: &[&'static Signal]) {
+        self.states.retain(|key, _| !is_of(key, signals));
     }
 
-    /// The carriers' counts go on although lock was broken: the next observation of each satellite may have
-    /// been locked anew.
-    pub fn bridge(&mut self) {
-        self.states.values_mut().for_each(|state| state.locked_s = f64::NEG_INFINITY);
+    /// The carriers' counts of these signals go on although lock was broken: the next observation of each
+    /// satellite may have been locked anew.
+    pub fn bridge(&mut self, signals: &[&'static Signal]) {
+        let own = self.states.iter_mut().filter(|(key, _)| is_of(key, signals));
+        own.for_each(|(_, state)| state.locked_s = f64::NEG_INFINITY);
     }
 
     /// Takes an observation and gives its smoothed pseudorange.
     pub fn smooth(&mut self, observation: &Observation) -> Smoothed {
-        let carrier_m = observation.carrier_cycles * observation.signal.wavelength_m(observation.sv);
-        let key = observation.link();
-        let fresh = State {
+        let wavelength_m = observation.signal.wavelength_m(observation.sv);
+        self.take(&Input {
+            key: (observation.sv, observation.signal, None),
             sample: observation.sample,
             pseudorange_m: observation.pseudorange_m,
-            carrier_m,
+            carrier_m: observation.carrier_cycles * wavelength_m,
             locked_s: observation.locked_s,
+            offset_hz: self.carrier_offset_hz(observation.signal),
+            metres_per_hz: wavelength_m,
+        })
+    }
+
+    /// Takes two carriers of a satellite in combination and gives their smoothed pseudorange; its variance is
+    /// over that of a code measurement of the combination.
+    pub fn smooth_combined(&mut self, pair: &Combination<'_>) -> Smoothed {
+        let parted_mps = |row: &Observation| self.carrier_offset_hz(row.signal) * row.signal.wavelength_m(row.sv);
+        self.take(&Input {
+            key: (pair.first.sv, pair.first.signal, Some(pair.second.signal)),
+            sample: pair.first.sample,
+            pseudorange_m: pair.pseudorange_m(),
+            carrier_m: pair.carrier_m(),
+            locked_s: pair.locked_s(),
+            // Of the combination, a hertz of which is counted as a metre a second.
+            offset_hz: pair.sum(parted_mps(pair.first), parted_mps(pair.second)),
+            metres_per_hz: 1.0,
+        })
+    }
+
+    fn take(&mut self, input: &Input) -> Smoothed {
+        let fresh = State {
+            sample: input.sample,
+            pseudorange_m: input.pseudorange_m,
+            carrier_m: input.carrier_m,
+            locked_s: input.locked_s,
             age_s: 0.0,
             parted_m_per_hz: 0.0,
             variance: 1.0,
             covariance: 1.0,
         };
-        let next = self
-            .states
-            .get(&key)
-            .and_then(|old| self.step(old, &fresh, observation.signal.wavelength_m(observation.sv)))
-            .unwrap_or(fresh);
-        self.states.insert(key, next);
-        let pseudorange_m = next.pseudorange_m + self.offset_hz * next.parted_m_per_hz;
+        let next = self.states.get(&input.key).and_then(|old| self.step(old, &fresh, input)).unwrap_or(fresh);
+        self.states.insert(input.key, next);
+        let pseudorange_m = next.pseudorange_m + input.offset_hz * next.parted_m_per_hz;
         Smoothed { pseudorange_m, variance_ratio: next.variance }
     }
 
-    fn step(&self, old: &State, new: &State, wavelength_m: f64) -> Option<State> {
+    fn step(&self, old: &State, new: &State, input: &Input) -> Option<State> {
         let passed_s = self.rate.elapsed_s(new.sample.checked_sub(old.sample)?);
         let predicted_m = old.pseudorange_m + new.carrier_m - old.carrier_m;
         let predicted_m = planted!("receiver.smooth.carrier_sign", predicted_m, 2.0 * old.pseudorange_m - predicted_m);
-        let parted_m_per_hz = old.parted_m_per_hz + wavelength_m * passed_s;
+        let parted_m_per_hz = old.parted_m_per_hz + input.metres_per_hz * passed_s;
         let whole = passed_s > 0.0
             && passed_s <= LONGEST_GAP_S
             && new.locked_s > old.locked_s
-            && (new.pseudorange_m - predicted_m - self.offset_hz * parted_m_per_hz).abs() < LARGEST_JUMP_M;
+            && (new.pseudorange_m - predicted_m - input.offset_hz * parted_m_per_hz).abs() < LARGEST_JUMP_M;
         if !whole || self.window_s <= 0.0 {
             return None;
         }
@@ -132,6 +179,10 @@ impl Smoother {
             ..*new
         })
     }
+}
+
+fn is_of((_, first, second): &Key, signals: &[&'static Signal]) -> bool {
+    signals.contains(first) || second.is_some_and(|second| signals.contains(&second))
 }
 
 #[cfg(test)]
@@ -201,7 +252,8 @@ mod tests {
                 }
             }
         }
-        // A variance from 2000 independent runs has a relative deviation of sqrt(2/2000) = 3.2 %; four of them.
+        // A variance from 2000 independent runs has a relative deviation of sqrt(2/2000) = 3.2 %; four of
+        // them.
         let measured = total / f64::from(runs);
         assert!((measured / stated - 1.0).abs() < 0.13, "{measured} {stated}");
         // Far from what independence would promise: 1/199.

@@ -57,6 +57,7 @@ fn ranges(sky: &[(f64, f64)], bias_s: f64) -> Vec<Range> {
                 carrier_hz: 1_575.42e6,
                 noise_m: 1.0,
                 cn0_hz: 1e4,
+                is_combined: false,
             }
         })
         .collect()
@@ -160,14 +161,16 @@ fn residuals_and_positions_have_the_stated_statistics() {
         nees += (error.transpose() * found.covariance.clone().try_inverse().unwrap() * error)[(0, 0)];
     }
     let runs = f64::from(runs);
-    // Six degrees of freedom: variance 12 a run; four deviations of the mean. Four for position and clock: variance 8.
+    // Six degrees of freedom: variance 12 a run; four deviations of the mean. Four for position and clock:
+    // variance 8.
     assert!((sum / runs - 6.0).abs() < 4.0 * (12.0 / runs).sqrt(), "{}", sum / runs);
     assert!((nees / runs - 4.0).abs() < 4.0 * (8.0 / runs).sqrt(), "{}", nees / runs);
     // 40 expected, deviation 6.3; sums of twelve uniforms have slightly light tails.
     assert!((15..=65).contains(&above), "{above}");
 }
 
-/// Delay of the nominal ionosphere towards a direction of [`SKY`], and the deviations of its errors, common and own.
+/// Delay of the nominal ionosphere towards a direction of [`SKY`], and the deviations of its errors, common
+/// and own.
 fn nominal(&(azimuth_deg, elevation_deg): &(f64, f64), error: DelayError) -> (f64, Vector3<f64>, f64) {
     let look = Look { azimuth_rad: azimuth_deg.to_radians(), elevation_rad: elevation_deg.to_radians() };
     let received = Epoch::from_week(1590, 374_400.0).plus_s(0.075);
@@ -281,13 +284,15 @@ mod with_real_orbits {
                 carrier_hz,
                 noise_m: 1.0,
                 cn0_hz: 1e4,
+                is_combined: false,
             });
         }
         assert!(ranges.len() >= 6);
         let found = position(&ranges, Vector3::zeros(), &BARE).unwrap();
         assert!((found.position_m - here_m).norm() < 1e-4);
         let (velocity_mps, found_drift) = velocity(&ranges, &found).unwrap();
-        // The orbit's velocity is a derivative of what it prints to 1e-5 m/s; a difference of 0.1 s resolves 1e-7.
+        // The orbit's velocity is a derivative of what it prints to 1e-5 m/s; a difference of 0.1 s resolves
+        // 1e-7.
         assert!((velocity_mps - motion_mps).norm() < 1e-4, "{}", (velocity_mps - motion_mps).norm());
         assert!((found_drift - drift).abs() < 1e-12);
     }

@@ -1,8 +1,9 @@
-//! The receiver's model of the neutral atmosphere: a standard atmosphere, half saturated, and Niell's mapping.
+//! The receiver's model of the neutral atmosphere: a standard atmosphere, half saturated, and Niell's
+//! mapping.
 //!
-//! Sources: zenith delays after Saastamoinen 1972 and Davis et al. 1985, Magnus' saturation pressure, mapping functions
-//! of Niell 1996 (tables 3 and 4). The receiver knows no weather, so true delays differ from
-//! it by several centimetres at the zenith. Below 2° the mapping stands still.
+//! Sources: zenith delays after Saastamoinen 1972 and Davis et al. 1985, Magnus' saturation pressure, mapping
+//! functions of Niell 1996 (tables 3 and 4). The receiver knows no weather, so true delays differ from it by
+//! several centimetres at the zenith. Below 2° the mapping is constant.
 
 use crate::gnss::earth::Geodetic;
 
@@ -52,9 +53,10 @@ const HEIGHT: [f64; 3] = [2.53e-5, 5.49e-3, 1.14e-3];
 /// The day of the year with the northern winter's extreme, and the length of a year.
 const WINTER_DAY: f64 = 28.0;
 const YEAR_DAYS: f64 = 365.25;
-/// Mapping at this elevation stands for all below it: sin 2°.
+/// Mapping at this elevation serves for all below it: sin 2°.
 const LOWEST_SINE: f64 = 0.034_899_5;
-/// Heights of the model; none outside. The lower end is below the lowest shore, the upper where pressure vanishes.
+/// Heights of the model; none outside. The lower end is below the lowest shore, the upper where pressure
+/// vanishes.
 const LOWEST_M: f64 = -1000.0;
 const HIGHEST_M: f64 = 44_000.0;
 const TROPOPAUSE_M: f64 = 11_000.0;

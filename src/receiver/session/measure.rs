@@ -1,55 +1,124 @@
 //! Observations and a fix at one tick.
 
-use super::{Session, WRONG_TIME_FIXES};
+use super::{FrontEnd, Session, Tick, WRONG_TIME_FIXES};
 use crate::gnss::record::Observation;
 use crate::receiver::observe::Reading;
+use crate::receiver::outcome::ReceiveError;
 use crate::receiver::output::{Record, Sink};
-use crate::receiver::run::ReceiveError;
 
 /// Residuals beyond this are no noise: the channel has the wrong time.
 const WRONG_TIME_M: f64 = 10_000.0;
+/// Satellites that have to show by how much a front end is out of step, and how well they agree: the
+/// ionosphere parts two carriers by less than a microsecond.
+const SHOWING: usize = 3;
+const AGREEING_S: f64 = 1e-6;
+
+impl FrontEnd {
+    /// What its channels read at a tick.
+    fn readings(&self, main: u64) -> Vec<Reading> {
+        let Some(Tick { own, .. }) = self.ticks.iter().find(|tick| tick.main == main) else { return Vec::new() };
+        let later_s = self.step.later_s(main, *own);
+        let one = |track: &super::Track| {
+            let measurement = track.report.measurements.iter().find(|measurement| measurement.sample == *own)?;
+            let reading =
+                Reading::new(track.channel.sv(), track.channel.signal(), measurement, track.decoder.as_ref()?)?;
+            Some(if later_s == 0.0 { reading } else { reading.later(later_s) })
+        };
+        self.tracks.iter().filter(|track| !track.dropped).filter_map(one).collect()
+    }
+}
 
 impl Session {
     /// Observes and solves at one tick.
     pub(super) fn measure(&mut self, tick: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
-        let readings: Vec<Reading> = self
-            .tracks
-            .iter()
-            .filter(|track| !track.dropped)
-            .filter_map(|track| {
-                let measurement = track.report.measurements.iter().find(|measurement| measurement.sample == tick)?;
-                Reading::new(track.channel.sv(), track.channel.signal(), measurement, track.decoder.as_ref()?)
-            })
-            .collect();
-        let observed = self.timebase.observe(tick, &readings);
+        let readings = self.readings(tick, sink)?;
+        let shared = &mut self.shared;
+        let observed = shared.timebase.observe(tick, &readings);
         for one in observed.iter().filter(|one| one.half_cycle_known) {
             sink.take(Record::Observation(one.observation.clone()))?;
         }
-        let Some(clock) = self.timebase.clock() else { return Ok(()) };
+        let Some(clock) = shared.timebase.clock() else { return Ok(()) };
         let observations: Vec<Observation> = observed.into_iter().map(|one| one.observation).collect();
-        match self.solver.solve(tick, clock, &observations, &self.ephemerides, self.klobuchar) {
+        match shared.solver.solve(tick, clock, &observations, &shared.ephemerides, shared.klobuchar) {
             Ok(solved) => {
-                if self.clock_jumped(&solved.fix, sink)? {
+                if let Some(first) = self.front_ends.first_mut()
+                    && first.clock_jumped(&solved.fix, shared, sink)?
+                {
+                    self.keep_step();
                     return Ok(());
                 }
                 sink.take(Record::Fix(solved.fix.clone()))?;
                 sink.take(Record::Clocks(solved.clocks))?;
                 let condition = solved.fix.condition;
-                self.worst_condition = Some(self.worst_condition.map_or(condition, |worst| worst.max(condition)));
-                self.fixes += 1;
-                self.clock_drift = Some(solved.fix.clock_drift);
-                let at_s = self.metadata.rate.elapsed_s(tick);
-                self.first_fix_s.get_or_insert(at_s);
-                self.used.extend(solved.used);
-                for track in &mut self.tracks {
+                shared.worst_condition = Some(shared.worst_condition.map_or(condition, |worst| worst.max(condition)));
+                shared.fixes += 1;
+                shared.clock_drift = Some(solved.fix.clock_drift);
+                if let Some(first) = self.front_ends.first() {
+                    shared.first_fix_s.get_or_insert(first.metadata.rate.elapsed_s(tick));
+                }
+                shared.used.extend(solved.used);
+                for track in self.front_ends.iter_mut().flat_map(|front_end| &mut front_end.tracks) {
                     let sv = track.channel.sv();
                     let wrong = solved.excluded.iter().any(|(out, miss_m)| *out == sv && miss_m.abs() > WRONG_TIME_M);
                     track.wrong_time = if wrong { track.wrong_time + 1 } else { 0 };
                     track.dropped |= track.wrong_time >= WRONG_TIME_FIXES;
                 }
             }
-            Err(reason) => self.reason = Some(reason),
+            Err(reason) => shared.reason = Some(reason),
         }
         Ok(())
     }
+
+    /// What all channels read at a tick, sorted as channels are. A front end that lost an unknown number of
+    /// samples is put in step again by the satellites that another one follows too; until then it is left
+    /// out.
+    fn readings(&mut self, tick: u64, sink: &mut dyn Sink) -> Result<Vec<Reading>, ReceiveError> {
+        let mut all: Vec<Vec<Reading>> = self.front_ends.iter().map(|front_end| front_end.readings(tick)).collect();
+        let known = |front_ends: &[FrontEnd]| -> Vec<bool> {
+            front_ends.iter().map(|front_end| front_end.gap.unknown.is_none()).collect()
+        };
+        let mut in_step = known(&self.front_ends);
+        for number in 0..self.front_ends.len() {
+            if in_step[number] {
+                continue;
+            }
+            let others = all.iter().zip(&in_step).filter(|(_, known)| **known).flat_map(|(readings, _)| readings);
+            let apart_s = apart_s(&all[number], &others.copied().collect::<Vec<_>>());
+            let front_end = &mut self.front_ends[number];
+            if let (Some(apart_s), Some(since)) = (apart_s, front_end.gap.unknown) {
+                let samples = (apart_s * front_end.metadata.rate.hz()).round() as i64;
+                let step = front_end.step;
+                let sink = &mut super::step::Counted { sink, step, ticks: &[] };
+                front_end.report(since, samples, &mut self.shared, sink)?;
+                self.shared.solver.jump(&front_end.signals, false);
+                self.keep_step();
+            }
+            // Its ticks were those of another instant.
+            all[number].clear();
+            in_step[number] = false;
+        }
+        // By itself the first front end sets the clock anew.
+        if in_step.iter().all(|known| !known)
+            && let Some(first) = self.front_ends.first()
+        {
+            all[0] = first.readings(tick);
+        }
+        let mut readings = all.concat();
+        readings.sort_by_key(|reading| (reading.sv, reading.signal));
+        Ok(readings)
+    }
+}
+
+/// By how much later readings of one front end were sent than those of others by the same satellites: the
+/// median, where enough agree with it.
+fn apart_s(own: &[Reading], others: &[Reading]) -> Option<f64> {
+    let mut apart_s: Vec<f64> = own
+        .iter()
+        .filter_map(|reading| others.iter().find(|other| other.sv == reading.sv).map(|other| (reading, other)))
+        .map(|(reading, other)| reading.sent_after_s(other))
+        .collect();
+    apart_s.sort_by(f64::total_cmp);
+    let median_s = *apart_s.get(apart_s.len() / 2)?;
+    let agreeing = apart_s.iter().filter(|apart_s| (*apart_s - median_s).abs() < AGREEING_S).count();
+    (agreeing >= SHOWING && 2 * agreeing > apart_s.len()).then_some(median_s)
 }

@@ -1,12 +1,14 @@
 //! How code and carrier part on all channels, and what follows from it for loops, smoothing and velocity.
 
-use super::Session;
+use super::FrontEnd;
+use super::shared::Shared;
 use crate::gnss::record::AcquisitionRow;
 use crate::receiver::acquire::Acquired;
 use crate::receiver::looks::Pattern;
 use crate::receiver::parting::{Change, Estimate, Parted, common};
 
-/// Lines begin anew so long after the code loops were moved: two time constants 1/(4B) of the narrow loop at least.
+/// Lines begin anew so long after the code loops were moved: two time constants 1/(4B) of the narrow loop at
+/// least.
 const MOVING_S: f64 = 1.0;
 /// A rate beyond so many deviations is named beside a mirrored spectrum.
 const RATE_SIGMAS: f64 = 6.0;
@@ -15,9 +17,10 @@ const LINES: usize = 3;
 /// Median Dopplers of satellites in view from near the Earth stay within this.
 const SKY_HZ: f64 = 4000.0;
 
-impl Session {
-    /// Measures the common rate at the end of a block, and lets channels and solver know it when it is believed.
-    pub(super) fn part(&mut self, now: u64) {
+impl FrontEnd {
+    /// Measures the common rate at the end of a block, and lets channels and solver know it when it is
+    /// believed.
+    pub(super) fn part(&mut self, now: u64, shared: &mut Shared) {
         if now < self.offset_moved {
             return;
         }
@@ -29,18 +32,19 @@ impl Session {
             }
             let link = track.channel.link();
             track.line.take(track.channel.phases(), link, self.metadata.rate);
-            let Some((_, noise)) = self.noises.iter().find(|(of, _)| *of == link.signal) else { continue };
+            let Some(noise) = shared.noise(link.signal) else { continue };
             let sigma_m = noise.sigma_m(libm::pow(10.0, track.cn0_dbhz / 10.0));
             lines.extend(track.line.estimate(sigma_m / link.wavelength_m(), noise.bandwidth_hz));
         }
         self.lines = lines.len();
         if let Some(estimate) = common(&lines) {
-            self.adopt(estimate, now);
+            self.adopt(estimate, now, shared);
         }
     }
 
-    /// Compares the codes of a search with those of the search before; that counts while no channel is followed.
-    pub(super) fn look(&mut self, results: &[(AcquisitionRow, Option<Acquired>)], now: u64) {
+    /// Compares the codes of a search with those of the search before; that counts while no channel is
+    /// followed.
+    pub(super) fn look(&mut self, results: &[(AcquisitionRow, Option<Acquired>)], now: u64, shared: &mut Shared) {
         let hits: Vec<Acquired> = results.iter().filter_map(|(_, hit)| *hit).collect();
         let mut dopplers_hz: Vec<f64> = hits.iter().map(|hit| hit.doppler_hz).collect();
         dopplers_hz.sort_by(f64::total_cmp);
@@ -50,20 +54,20 @@ impl Session {
             self.found = (hits.len(), median);
         }
         match self.looks.take(&hits, self.metadata.rate) {
-            Some(Pattern::Sound(estimate)) if self.lines < LINES => self.adopt(estimate, now),
-            Some(Pattern::Mirrored(estimate)) if self.fixes == 0 => self.mirrored = Some(estimate),
+            Some(Pattern::Sound(estimate)) if self.lines < LINES => self.adopt(estimate, now, shared),
+            Some(Pattern::Mirrored(estimate)) if shared.fixes == 0 => self.mirrored = Some(estimate),
             _ => {}
         }
     }
 
-    fn adopt(&mut self, estimate: Estimate, now: u64) {
+    fn adopt(&mut self, estimate: Estimate, now: u64, shared: &mut Shared) {
         let change = self.offset.take(estimate);
         if change == Change::None {
             return;
         }
         let hz = self.offset.hz();
         self.tracks.iter_mut().for_each(|track| track.channel.set_carrier_offset(hz));
-        self.solver.set_carrier_offset(hz);
+        shared.solver.set_carrier_offset(&self.signals, hz);
         if change == Change::Moved {
             for track in &mut self.tracks {
                 track.line.clear();
@@ -74,10 +78,10 @@ impl Session {
     }
 
     /// What flags fit these samples better, in words.
-    pub(in crate::receiver) fn findings(&self) -> Vec<String> {
+    pub(super) fn findings(&self, shared: &Shared) -> Vec<String> {
         let Some(signal) = self.signal() else { return Vec::new() };
         let mut findings = Vec::new();
-        if let Some(estimate) = self.mirrored.filter(|_| self.fixes == 0) {
+        if let Some(estimate) = self.mirrored.filter(|_| shared.fixes == 0) {
             let cure = if self.metadata.inverted { "leave --inverted out" } else { "--inverted" };
             let mut text = format!(
                 "the spectrum is mirrored: on every satellite the code drifts against the carrier's Doppler; {cure} cures it"
@@ -93,7 +97,7 @@ impl Session {
             findings.push(text);
         }
         let (_, median_hz) = self.found;
-        if median_hz.abs() > SKY_HZ.max(self.settings.acquisition.doppler_max_hz) && self.clock_drift.is_none() {
+        if median_hz.abs() > SKY_HZ.max(self.settings.acquisition.doppler_max_hz) && shared.clock_drift.is_none() {
             let sense = if self.metadata.inverted { -1.0 } else { 1.0 };
             let if_hz = self.metadata.if_hz(signal.centre_hz()) + sense * median_hz;
             findings.push(format!(
@@ -105,7 +109,7 @@ impl Session {
     }
 
     /// What the outcome says of it.
-    pub(super) fn parted(&self) -> Option<Parted> {
+    pub(super) fn parted(&self, shared: &Shared) -> Option<Parted> {
         let offset = self.offset.believed()?;
         let carrier_hz = self.signal()?.centre_hz();
         let sense = if self.metadata.inverted { -1.0 } else { 1.0 };
@@ -115,7 +119,7 @@ impl Session {
             rate_error_ppm: 1e6 * offset.hz / carrier_hz,
             if_hz: self.signal().map_or(0.0, |signal| self.metadata.if_hz(signal.centre_hz())) + sense * offset.hz,
             rate_hz: self.metadata.rate.hz() * (1.0 + offset.hz / carrier_hz),
-            code_drift: self.clock_drift,
+            code_drift: shared.clock_drift,
         })
     }
 }

@@ -6,7 +6,8 @@
 //! range is stretched to hold both. While too few satellites are found for a fix, every search is wider than
 //! the one before, then the widths begin anew.
 
-use super::Session;
+use super::FrontEnd;
+use super::shared::Shared;
 use crate::receiver::acquire::{AcquireError, Searcher, samples_needed};
 use crate::receiver::position::least_squares::UNKNOWNS;
 
@@ -26,14 +27,14 @@ pub(super) struct Sweep {
     pub half_hz: f64,
 }
 
-impl Session {
+impl FrontEnd {
     /// Where to look now.
-    pub(super) fn sweep(&self) -> Sweep {
+    pub(super) fn sweep(&self, shared: &Shared) -> Sweep {
         let half_hz = self.settings.acquisition.doppler_max_hz;
         let carrier_hz = self.signal().map_or(0.0, |signal| signal.centre_hz());
         let offset_hz = self.offset.hz();
         let grid = |hz: f64| (hz / CENTRE_STEP_HZ).round() * CENTRE_STEP_HZ;
-        if let Some(drift) = self.clock_drift {
+        if let Some(drift) = shared.clock_drift {
             return Sweep { centre_hz: grid(offset_hz - drift * carrier_hz), half_hz };
         }
         let width = WIDTHS.get(self.widenings % WIDTHS.len()).copied().unwrap_or(1.0);
@@ -42,16 +43,16 @@ impl Session {
     }
 
     /// Takes note of how many satellites there are after a search.
-    pub(super) fn widen(&mut self) {
-        let enough = self.tracks.len() >= UNKNOWNS || self.clock_drift.is_some();
+    pub(super) fn widen(&mut self, shared: &Shared) {
+        let enough = self.tracks.len() >= UNKNOWNS || shared.clock_drift.is_some();
         self.widenings = if enough { 0 } else { self.widenings + 1 };
     }
 
     /// Searches soon when there is another place to look at than last time.
-    pub(super) fn hasten(&mut self, now: u64) {
+    pub(super) fn hasten(&mut self, now: u64, shared: &Shared) {
         let exhausted = self.widenings > 0 && self.widenings.is_multiple_of(WIDTHS.len());
         let Some((aimed, _)) = self.aimed else { return };
-        if self.window.is_none() && !exhausted && aimed != self.sweep() {
+        if self.window.is_none() && !exhausted && aimed != self.sweep(shared) {
             self.next_search = self.next_search.min(now + self.samples(WIDEN_S));
         }
     }

@@ -3,14 +3,16 @@
 use std::collections::BTreeSet;
 
 use super::gap::Watched;
-use super::{Session, Track, WRONG_TIME_FIXES, Window};
+use super::shared::Shared;
+use super::step::Counted;
+use super::{FrontEnd, Track, WRONG_TIME_FIXES, Window};
 use crate::gnss::record::{AcquisitionRow, Event, EventRow};
 use crate::gnss::signal::Link;
 use crate::receiver::acquire::{self, Acquired};
 use crate::receiver::decode::Decoder;
+use crate::receiver::outcome::ReceiveError;
 use crate::receiver::output::{Record, Sink};
 use crate::receiver::parting::Line;
-use crate::receiver::run::ReceiveError;
 use crate::receiver::source::{Packed, Planes};
 use crate::receiver::track::{Channel, Report};
 
@@ -19,15 +21,23 @@ const EAGER_S: f64 = 30.0;
 /// A channel that was dropped for what it said is not followed again so long.
 const REFUSED_S: f64 = 120.0;
 
-impl Session {
+impl FrontEnd {
     /// Collects samples while a search is due, searches when there are enough, starts channels.
-    pub(super) fn search(&mut self, block: &Packed, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    pub(super) fn search(
+        &mut self,
+        block: &Packed,
+        shared: &mut Shared,
+        sink: &mut dyn Sink,
+    ) -> Result<(), ReceiveError> {
         let end = block.end();
+        if self.signals.is_empty() {
+            return Ok(());
+        }
         if self.window.is_none() {
             if end <= self.next_search {
                 return Ok(());
             }
-            self.aim(self.sweep())?;
+            self.aim(self.sweep(shared))?;
             self.window = Some(Window { first: block.first, samples: Planes::default() });
         }
         let Some(window) = &mut self.window else { return Ok(()) };
@@ -47,32 +57,28 @@ impl Session {
             self.candidates.iter().all(|link| self.tracks.iter().any(|track| track.channel.link() == *link));
         if !all_found {
             let results = self.searcher.search(&window.block(), &self.candidates)?;
-            self.look(&results, end);
-            self.start_channels(results, block.first, sink)?;
+            self.look(&results, end, shared);
+            self.start_channels(results, block.first, shared, sink)?;
         }
         self.searched = true;
-        self.widen();
+        self.widen(shared);
         self.plan_search(end);
         Ok(())
     }
 
     /// Searches a recording that ended before the first search had all the samples that it asks for: by fewer
     /// sums, and by sums of one code period where there is no room for another.
-    pub(in crate::receiver) fn search_rest(&mut self, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    pub(super) fn search_rest(&mut self, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        let sink = &mut Counted { sink, step: self.step, ticks: &[] };
         let Some(window) = self.window.take().filter(|_| !self.searched) else { return Ok(()) };
         let have = window.samples.i.len() as u64;
         let Some(settings) = acquire::shortened(&self.metadata, &self.settings.acquisition, have)? else {
             return Ok(());
         };
         let results = acquire::search(&self.metadata, &window.block(), &self.candidates, &settings)?;
-        self.start_channels(results, window.first, sink)?;
+        self.start_channels(results, window.first, shared, sink)?;
         self.searched = true;
         Ok(())
-    }
-
-    /// Whether there were samples enough for a search.
-    pub(in crate::receiver) fn has_searched(&self) -> bool {
-        self.searched
     }
 
     /// Records what a search came to, and starts channels on what it found.
@@ -80,6 +86,7 @@ impl Session {
         &mut self,
         results: Vec<(AcquisitionRow, Option<Acquired>)>,
         since: u64,
+        shared: &mut Shared,
         sink: &mut dyn Sink,
     ) -> Result<(), ReceiveError> {
         let followed: BTreeSet<Link> = self.tracks.iter().map(|track| track.channel.link()).collect();
@@ -88,17 +95,17 @@ impl Session {
             if followed.contains(&key) || self.refused.contains_key(&key) {
                 continue;
             }
-            if self.strongest.is_none_or(|(_, best, threshold)| row.statistic * threshold > best * row.threshold) {
-                self.strongest = Some((row.sv, row.statistic, row.threshold));
+            if shared.strongest.is_none_or(|(_, best, threshold)| row.statistic * threshold > best * row.threshold) {
+                shared.strongest = Some((row.sv, row.statistic, row.threshold));
             }
             // Of later searches only what was found says anything new.
             if row.acquired || !self.searched {
                 sink.take(Record::Acquisition(row.clone()))?;
             }
             let Some(hit) = hit else { continue };
-            self.acquired.insert(hit.sv);
+            shared.acquired.insert(hit.sv);
             self.lost.remove(&key);
-            self.progress.entry(hit.sv).or_default();
+            shared.progress.entry(hit.sv).or_default();
             sink.take(Record::Event(EventRow {
                 sample: hit.sample,
                 sv: hit.sv,
@@ -135,7 +142,7 @@ impl Session {
     }
 
     /// Takes away channels that lost their signal, say what cannot be, or lead nowhere.
-    pub(super) fn retire(&mut self, now: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    pub(super) fn retire(&mut self, now: u64, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let limit = self.samples(self.settings.operation.frame_limit_s);
         let refused = now + self.samples(REFUSED_S);
         let mut gone = false;
@@ -160,7 +167,7 @@ impl Session {
                 continue;
             }
             gone = true;
-            self.losses += 1;
+            shared.losses += 1;
         }
         self.tracks = kept;
         if gone && self.window.is_none() {

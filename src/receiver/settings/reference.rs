@@ -13,10 +13,13 @@ use crate::receiver::track::TrackingSettings;
 /// One key of the receiver's settings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Described {
+    /// Name within its table.
     pub name: String,
+    /// Default as TOML.
     pub default: String,
     /// What a value is expected to be.
     pub expected: String,
+    /// What it does.
     pub meaning: String,
 }
 

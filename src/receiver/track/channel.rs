@@ -13,7 +13,7 @@ use super::closed::{Loops, Mode, Update};
 use super::cn0::Cn0;
 use super::lock::{PhaseLock, Rotation, SymbolLock};
 use super::loops::CodeShape;
-use super::model::{ReplicaModel, followed_db};
+use super::model::ReplicaModel;
 use super::overlay::{OverlayPhase, OverlaySync};
 use super::pull_in::Batch;
 use super::sync::SymbolSync;
@@ -24,7 +24,7 @@ use crate::gnss::signal::{Component, Link, Signal};
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
 use crate::receiver::correlate::{Arithmetic, Replica, Wave, chips_to_units, units_to_chips};
-use crate::receiver::lead::lead;
+use crate::receiver::lead::{followed_db, lead};
 use crate::receiver::parting::Phases;
 use crate::receiver::source::Block;
 
@@ -37,7 +37,6 @@ mod side;
 mod supervise;
 
 use pilot::Data;
-pub use pilot::beside;
 use side::SidePeaks;
 use supervise::pilot_group;
 
@@ -48,8 +47,8 @@ use reseat::Glances;
 const LOCK_PERIODS: f64 = 100.0;
 /// Time constants 1/(4B) of the code's pull-in, times four, until its first error has decayed to 2 %.
 const SETTLED: f64 = 1.0;
-/// Signals that the search found weaker than this are pulled in by a batch of prompts: T·C/N0 is then below ten, and a
-/// frequency loop's discriminator, ±250 Hz wide, scatters by more than 40 Hz.
+/// Signals that the search found weaker than this are pulled in by a batch of prompts: T·C/N0 is then below
+/// ten, and a frequency loop's discriminator, ±250 Hz wide, scatters by more than 40 Hz.
 const WEAK_DBHZ: f64 = 40.0;
 /// How far a channel is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -287,7 +286,7 @@ impl Channel {
         Link { sv: self.sv, signal: self.signal }
     }
 
-    /// Tells the channel whether the message showed its symbols to be inverted: from now on, until the carrier is
+    /// States whether the message showed the symbols to be inverted: from now on, until the carrier is
     /// interrupted, measurements have the half cycle right. Symbols keep their polarity.
     pub fn resolve_half_cycle(&mut self, inverted: bool) {
         self.polarity = Some(inverted);
@@ -315,7 +314,8 @@ impl Channel {
         !self.lost && self.locked_since.is_some() && passed_s >= SETTLED / self.settings.dll_pull_in_bandwidth_hz
     }
 
-    /// Follows the signal through the next block. `ticks` are samples inside the block, ascending, at which to measure.
+    /// Follows the signal through the next block. `ticks` are samples inside the block, ascending, at which
+    /// to measure.
     pub fn advance(&mut self, block: &Block, ticks: &[u64], report: &mut Report) {
         if self.lost {
             return;

@@ -1,8 +1,8 @@
 //! The three loops of a channel as they are closed: which discriminator drives which loop, with which gains.
 //!
-//! Takes the correlations of an integration and gives the rates and jumps of the oscillators. It knows neither samples
-//! nor time of day, so that modelled correlations can drive the loops of a channel as well as real ones. The
-//! code loop is aided by the carrier, which is left to the owner of the oscillators.
+//! Takes the correlations of an integration and gives the rates and jumps of the oscillators. It knows
+//! neither samples nor time of day, so that modelled correlations can drive the loops of a channel as well as
+//! real ones. The code loop is aided by the carrier, which is left to the owner of the oscillators.
 
 use num_complex::Complex64;
 
@@ -35,12 +35,17 @@ impl Mode {
 pub struct Update {
     /// Prompt sum, scaled to noise of the variance of one code period's.
     pub prompt: Complex64,
+    /// Time of the integration.
     pub integration_s: f64,
+    /// Code discriminator.
     pub dll_chips: f64,
+    /// Phase discriminator.
     pub pll_cycles: f64,
     /// In mode [`Mode::Phase`] only reported: the frequency loop has done its work.
     pub fll_hz: f64,
+    /// Phase that the loop adds at once.
     pub carrier_jump_cycles: f64,
+    /// Code phase that the loop adds at once.
     pub code_jump_chips: f64,
 }
 
@@ -111,8 +116,8 @@ impl Loops {
         chips_per_s * update_s / self.dll.phase
     }
 
-    /// Closes the loops with the sums of early, prompt and late over the `periods` code periods of an integration of
-    /// `t_s`. `before` is the prompt `t_s` earlier, `cn0_hz` the best estimate of C/N0.
+    /// Closes the loops with the sums of early, prompt and late over the `periods` code periods of an
+    /// integration of `t_s`. `before` is the prompt `t_s` earlier, `cn0_hz` the best estimate of C/N0.
     pub fn close(
         &mut self,
         mode: Mode,

@@ -7,11 +7,11 @@
 //! at a delay where the code's own correlation vanishes. It meets the same filters, interference and
 //! satellites as the prompt does, so multiple access counts as noise.
 //!
-//! Where each prompt has a sign of its own (symbols of one period, an unknown overlay) the signal is what the power of
-//! prompts exceeds the reference by.
+//! Where each prompt has a sign of its own (symbols of one period, an unknown overlay) the signal is what the
+//! power of prompts exceeds the reference by.
 //!
-//! **After.** Power within and between the M prompts of a symbol (narrow against wide band, as moments): all noise is
-//! within. The reference is not needed any more.
+//! **After.** Power within and between the M prompts of a symbol (narrow against wide band, as moments): all
+//! noise is within. The reference is not needed any more.
 //!
 //! **Spread.** With s = T·C/N0 and N periods averaged (an exponential mean of N periods counts as 2N, one
 //! whose weights grow linearly as 3N/4) the relative variance is that of the signal, (4s + 1)/2s² before and
@@ -125,7 +125,8 @@ impl Cn0 {
         !self.known
     }
 
-    /// Takes the next prompt and, while edges are unknown, the power that the noise reference shows beside it.
+    /// Takes the next prompt and, while edges are unknown, the power that the noise reference shows beside
+    /// it.
     pub fn add(&mut self, prompt: Complex64, reference: Option<f64>) {
         if self.known {
             self.add_in_symbol(prompt);
@@ -149,7 +150,8 @@ impl Cn0 {
         if self.seen < self.group {
             return;
         }
-        // With A² the power of the mean prompt and 2σ² that of its noise: E|Σ|² = M²A²+2Mσ², EΣ|·|² = MA²+2Mσ².
+        // With A² the power of the mean prompt and 2σ² that of its noise: E|Σ|² = M²A²+2Mσ², EΣ|·|² =
+        // MA²+2Mσ².
         let m = f64::from(self.group);
         let coherent = self.sum.norm_sqr() / m;
         let noise = (self.power - coherent) / (m - 1.0);

@@ -26,8 +26,8 @@ impl Mean {
         Self { terms: terms.max(1.0), count: 0.0, lean: 1.0, values: [0.0; 2] }
     }
 
-    /// One whose first terms weigh the more the later they come, in proportion: what was measured before the loops
-    /// had settled fades fast.
+    /// One whose first terms weigh the more the later they come, in proportion: what was measured before the
+    /// loops had settled fades fast.
     pub(super) fn leaning(terms: f64) -> Self {
         Self { lean: 2.0, ..Self::new(terms) }
     }
@@ -86,13 +86,14 @@ impl PhaseLock {
         Self { mean: Mean::new(prompts) }
     }
 
-    /// Takes a prompt whose noise has a power of `noise` (both components), which is not counted as phase error.
+    /// Takes a prompt whose noise has a power of `noise` (both components), which is not counted as phase
+    /// error.
     pub fn add(&mut self, prompt: Complex64, noise: f64) {
         let (i2, q2) = (prompt.re * prompt.re, prompt.im * prompt.im);
         self.mean.add([i2 - q2, i2 + q2 - noise]);
     }
 
-    /// From −1 to 1; 0 where nothing stands out of the noise.
+    /// From −1 to 1; 0 where nothing exceeds the noise.
     pub fn value(&self) -> f64 {
         let [difference, sum] = self.mean.values();
         if sum <= 0.0 { 0.0 } else { planted!("receiver.lock.always", (difference / sum).clamp(-1.0, 1.0), 1.0) }
@@ -124,7 +125,7 @@ impl SymbolLock {
         Self { mean: Mean::new(LOCK_SYMBOLS), last: VecDeque::new() }
     }
 
-    /// The lock that was just shown by other means stands as the first of the mean.
+    /// The lock that was just shown by other means is the first of the mean.
     pub fn locked() -> Self {
         let mut lock = Self::new();
         lock.mean.add([1.0, 1.0]);
@@ -136,7 +137,8 @@ impl SymbolLock {
     pub fn add(&mut self, symbol: Complex64, energy: Option<f64>) -> bool {
         let (i2, q2) = (symbol.re * symbol.re, symbol.im * symbol.im);
         let [difference, sum] = [i2 - q2, i2 + q2];
-        // A phasor in Gaussian noise: the mean of cos 2θ is 1 − (1 − e⁻ˣ)/x, x its energy over the noise density.
+        // A phasor in Gaussian noise: the mean of cos 2θ is 1 − (1 − e⁻ˣ)/x, x its energy over the noise
+        // density.
         let coherence = energy.map_or(1.0, |x| 1.0 + libm::expm1(-x) / x).max(LEAST_COHERENCE);
         self.mean.add([if sum > 0.0 { difference / sum } else { 0.0 }, coherence]);
         self.last.push_front([difference, sum]);
@@ -148,7 +150,7 @@ impl SymbolLock {
         self.last.len() >= several && sum > 0.0 && difference < SLIP_COSINE * sum
     }
 
-    /// From −1 to 1; 0 where nothing stands out of the noise.
+    /// From −1 to 1; 0 where nothing exceeds the noise.
     pub fn value(&self) -> f64 {
         let [cosine, coherence] = self.mean.values();
         if coherence <= 0.0 { 0.0 } else { (cosine / coherence).clamp(-1.0, 1.0) }
@@ -229,7 +231,8 @@ mod tests {
             // A cosine's deviation is 0.3 at most here: 0.0021 over these symbols, three of them and as much
             // for the clamp at one.
             assert!((mean - 1.0).abs() < 0.035 && mean <= 1.0 + 1e-12, "{dbhz}: {mean}");
-            // Together the symbols that decide have 13° of noise over root two: 60° are more than six deviations.
+            // Together the symbols that decide have 13° of noise over root two: 60° are more than six
+            // deviations.
             assert_eq!(slips, 0, "{dbhz}");
         }
     }
@@ -274,7 +277,7 @@ mod tests {
     #[test]
     fn the_cross_correlation_of_other_satellites_is_no_rotation() {
         // Eleven satellites 10 dB above, each 21 to 24 dB down in this one's correlator, at differences of
-        // Doppler that a prompt's 1 ms does not tell apart. Products of neighbouring prompts would turn by
+        // Doppler that a prompt's 1 ms does not separate. Products of neighbouring prompts would turn by
         // 0.04 rad for each: up to 7 Hz.
         let mut normal = Normal::new(8);
         let mut worst: f64 = 0.0;

@@ -1,25 +1,29 @@
-//! Tracking loops in the discrete domain: gains with an exact noise bandwidth, the step of a loop, discriminators.
+//! Tracking loops in the discrete domain: gains with an exact noise bandwidth, the step of a loop,
+//! discriminators.
 //!
-//! Gains put every closed-loop root at one place p (Stephens and Thomas, controlled-root formulation):
-//! order 1: K1 = 1−p; 2: K1 = 1−p², K2 = (1−p)²; 3: K1 = 1−p³, K2 = (1−p)²(1+2p), K3 = (1−p)³. The state is corrected
-//! in phase and rate at each update, without further delay, and is the mean phase of the coming interval; then
-//! the one-sided noise bandwidth is exact and the loop is stable for every p in (0, 1). Steady error of order 3 under
-//! constant jerk: jerk·T³/K3.
+//! Gains put every closed-loop root at one place p (Stephens and Thomas, controlled-root formulation): order
+//! 1: K1 = 1−p; 2: K1 = 1−p², K2 = (1−p)²; 3: K1 = 1−p³, K2 = (1−p)²(1+2p), K3 = (1−p)³. The state is
+//! corrected in phase and rate at each update, without further delay, and is the mean phase of the coming
+//! interval; then the one-sided noise bandwidth is exact and the loop is stable for every p in (0, 1). Steady
+//! error of order 3 under constant jerk: jerk·T³/K3.
 
 use num_complex::Complex64;
 
 /// Gains of a loop; those beyond its order are zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
+    /// Gain of the phase.
     pub phase: f64,
+    /// Gain of the rate.
     pub rate: f64,
+    /// Gain of the acceleration.
     pub acceleration: f64,
 }
 
 /// One-sided noise bandwidth times update time of a loop of order 1 to 3 with all roots at `root`.
 ///
-/// The error's transfer function is ((z−1)/(z−p))^N, so B·T = (mean of its squared modulus − 1)/2, a sum of the
-/// integrals of 1/(1+p²−2p cos)^m.
+/// The error's transfer function is ((z−1)/(z−p))^N, so B·T = (mean of its squared modulus − 1)/2, a sum of
+/// the integrals of 1/(1+p²−2p cos)^m.
 pub fn bandwidth_time(order: u32, root: f64) -> f64 {
     let (p2, q) = (root * root, (1.0 - root) * (1.0 - root));
     let (a, s) = (1.0 + p2, 1.0 - p2);
@@ -79,12 +83,14 @@ impl Rates {
     }
 }
 
-/// One update: the error `e` (units) averaged over an interval of `t_s` that has just ended, in which the NCO ran at
-/// `rates.mean(t_s)`. Returns the rates for the next interval and the jump of the NCO's phase at the boundary.
+/// One update: the error `e` (units) averaged over an interval of `t_s` that has just ended, in which the NCO
+/// ran at `rates.mean(t_s)`. Returns the rates for the next interval and the jump of the NCO's phase at the
+/// boundary.
 pub fn step(gains: &Gains, rates: &Rates, e: f64, t_s: f64) -> (Rates, f64) {
     let acceleration = rates.acceleration + gains.acceleration * e / (t_s * t_s);
     let next = Rates { rate: rates.rate + gains.rate * e / t_s + acceleration * t_s, acceleration };
-    // The mean phases of the two intervals differ by K1·e + rate; the two half intervals already bring their share.
+    // The mean phases of the two intervals differ by K1·e + rate; the two half intervals already bring their
+    // share.
     let brought = 0.5 * (rates.mean(t_s) + next.mean(t_s)) * t_s;
     (next, gains.phase * e + next.rate * t_s - planted!("receiver.loops.step", brought, 0.99 * brought))
 }
@@ -108,7 +114,8 @@ pub fn phase(prompt: Complex64) -> f64 {
     libm::atan2(prompt.im, prompt.re) / std::f64::consts::TAU
 }
 
-/// Frequency error in hertz from two successive prompts `t_s` apart, for a pair that may straddle a bit edge: ±1/(4T).
+/// Frequency error in hertz from two successive prompts `t_s` apart, for a pair that may straddle a bit edge:
+/// ±1/(4T).
 pub fn frequency_two_quadrant(before: Complex64, after: Complex64, t_s: f64) -> f64 {
     let product = planted!("receiver.loops.frequency_sign", after * before.conj(), before * after.conj());
     costas(product) / t_s
@@ -138,8 +145,9 @@ impl CodeShape {
 
     /// Mean gain of [`early_minus_late`] at a T·C/N0 of the prompts.
     ///
-    /// Sum and difference of early and late are independent, so with 1/x = ∫e^(−xt)dt the mean of the quotient is
-    /// x·∫₀¹[(1−u)/(1−(1−r)u)]²·e^(−xu)du, x = 2·snr·value²/(1+common), r = (1−common)/(1+common): about 1−2r/x.
+    /// Sum and difference of early and late are independent, so with 1/x = ∫e^(−xt)dt the mean of the
+    /// quotient is x·∫₀¹[(1−u)/(1−(1−r)u)]²·e^(−xu)du, x = 2·snr·value²/(1+common), r =
+    /// (1−common)/(1+common): about 1−2r/x.
     pub fn early_minus_late_gain(&self, snr: f64) -> f64 {
         let x = 2.0 * snr * self.value * self.value / (1.0 + self.common);
         let r = (1.0 - self.common) / (1.0 + self.common);
@@ -160,7 +168,8 @@ impl CodeShape {
 /// Intervals of the gain's integral.
 const INTERVALS: u32 = 256;
 
-/// Mean gain of [`dot_product`] at a T·C/N0 of the prompts: 1−e^(−snr), the mean of Re(P)/|P|² of a complex Gaussian.
+/// Mean gain of [`dot_product`] at a T·C/N0 of the prompts: 1−e^(−snr), the mean of Re(P)/|P|² of a complex
+/// Gaussian.
 pub fn dot_product_gain(snr: f64) -> f64 {
     -libm::expm1(-snr)
 }
@@ -193,10 +202,11 @@ impl CodeGain {
     }
 }
 
-/// Code error in chips: (|E|²−|L|²)/(|E|²+|L|²), scaled by its slope at zero, 2·slope/value (4/(2−d) for the triangle).
+/// Code error in chips: (|E|²−|L|²)/(|E|²+|L|²), scaled by its slope at zero, 2·slope/value (4/(2−d) for the
+/// triangle).
 ///
-/// Noise in the denominator lowers the mean gain to `gain` ([`CodeShape::early_minus_late_gain`]), which is given back.
-/// Positive when the received code is ahead of the replica.
+/// Noise in the denominator lowers the mean gain to `gain` ([`CodeShape::early_minus_late_gain`]), which is
+/// given back. Positive when the received code is ahead of the replica.
 pub fn early_minus_late(early: Complex64, late: Complex64, shape: &CodeShape, gain: f64) -> f64 {
     let (e, l) = (early.norm_sqr(), late.norm_sqr());
     if e + l <= 0.0 {

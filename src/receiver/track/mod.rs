@@ -3,8 +3,8 @@
 //! A [`Channel`] takes consecutive blocks of samples and gives the state of its replica at requested samples,
 //! message symbols, rows for the judge and events. Its loops ([`loops`]) are designed in the discrete domain
 //! and closed in [`closed`]; detectors are in [`lock`], [`cn0`] and `sync`, the pull-in of weak signals in
-//! `pull_in`, the overlay of pilots in `overlay`. Limits: loops follow the component that leads, a code period is at least
-//! as long as a few samples.
+//! `pull_in`, the overlay of pilots in `overlay`. Limits: loops follow the component that leads, a code
+//! period is at least as long as a few samples.
 
 use crate::gnss::record::{Event, TrackingRow};
 
@@ -27,14 +27,16 @@ mod sync;
 #[cfg(test)]
 mod tests;
 
-pub use channel::{Channel, Glance, beside};
+pub use channel::{Channel, Glance};
 pub use model::ReplicaModel;
 pub use settings::{CodeDiscriminator, LoopMargin, TrackingSettings, TrackingSettingsError};
 
 /// What a channel found in a block.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
+    /// States at the samples that were asked for.
     pub measurements: Vec<Measurement>,
+    /// Symbols that ended in the block.
     pub symbols: Vec<Symbol>,
     /// One a measurement, with the latest loop update.
     pub rows: Vec<TrackingRow>,
@@ -45,17 +47,23 @@ pub struct Report {
 /// The state of a channel's replica at a requested sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Measurement {
+    /// The sample.
     pub sample: u64,
     /// Whole code periods since the channel's own period 0, and the fraction of the running one.
     pub code_periods: u64,
+    /// Fraction of the running code period.
     pub code_fraction: f64,
     /// Accumulated carrier in the RINEX sense (grows with range, that is, against Doppler), nominal IF
     /// removed: θ(n)/turns − f_IF·n/fs, negated, and negated once more for an inverted spectrum. Unknown
     /// whole number, and half while `half_cycle_known` is false.
     pub carrier_cycles: f64,
+    /// Whether the carrier's half cycle is resolved.
     pub half_cycle_known: bool,
+    /// Positive when approaching.
     pub doppler_hz: f64,
+    /// Of the whole signal.
     pub cn0_dbhz: f64,
+    /// Time since the carrier was locked.
     pub locked_s: f64,
     /// Whether the carrier loop is locked now.
     pub locked: bool,
@@ -66,6 +74,7 @@ pub struct Measurement {
 pub struct Symbol {
     /// The channel's number of the code period in which the symbol began.
     pub first_period: u64,
-    /// In-phase prompt summed over the symbol, in standard deviations of the noise of that sum: its sign is the bit.
+    /// In-phase prompt summed over the symbol, in standard deviations of the noise of that sum: its sign is
+    /// the bit.
     pub soft: f32,
 }

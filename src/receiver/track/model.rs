@@ -2,8 +2,9 @@
 
 use super::TrackingSettings;
 use super::loops::CodeShape;
-use crate::gnss::signal::{Component, Layer, Shape};
-use crate::receiver::correlate::{correlation, wave};
+use crate::gnss::signal::{Component, Shape};
+use crate::receiver::correlate::correlation;
+use crate::receiver::lead::{efficiency, shapes};
 
 /// The correlation of a component with the replica that is made of it.
 #[derive(Clone, Copy, Debug)]
@@ -30,22 +31,6 @@ impl ReplicaModel {
     }
 }
 
-/// Correlation of a component with the replica that is made of it, and of the replica with itself.
-fn shapes(component: &Component) -> Option<[Shape; 2]> {
-    let strongest = wave::strongest(component)?;
-    let made = [Layer { weight: 1.0, phase_cycles: 0.0, ..*strongest }];
-    // The replica has the layer's phase and sign.
-    let sign = strongest.weight.signum();
-    let turned: Vec<Layer> = (component.layers.iter())
-        .map(|layer| Layer {
-            weight: sign * layer.weight,
-            phase_cycles: layer.phase_cycles - strongest.phase_cycles,
-            ..*layer
-        })
-        .collect();
-    Some([&turned, &made[..]].map(|sent| Shape::between(sent, &made, component.chip_rate_hz)))
-}
-
 /// A side peak of a replica's correlation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SidePeak {
@@ -69,24 +54,13 @@ pub fn side_peak(component: &Component) -> Option<SidePeak> {
     Some(SidePeak { chips: f64::from(corner) / f64::from(corners), ratio: at(corner) / at(0) })
 }
 
-/// Power that the replica finds, over the component's.
-fn efficiency(signal: &Shape, own: &Shape) -> f64 {
-    let found = signal.correlation(0.0);
-    found * found / own.correlation(0.0)
-}
-
-/// C/N0 of what the receiver follows of a signal over that of the whole signal, in decibels: the component's share of
-/// the power, less what its replica does not have.
-pub fn followed_db(component: &Component) -> f64 {
-    let efficiency = shapes(component).map_or(1.0, |[signal, own]| efficiency(&signal, &own));
-    10.0 * libm::log10(component.power_share * efficiency)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::Layer;
     use crate::gnss::signal::synthetic::{LONG_BOC, MIXED};
+    use crate::receiver::lead::followed_db;
 
     #[test]
     fn the_nearest_side_peak_is_that_of_the_printed_correlation() {

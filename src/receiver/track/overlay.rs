@@ -1,4 +1,4 @@
-//! Where the overlay code of a pilot stands, from the signs of its prompts.
+//! The phase of a pilot's overlay code, from the signs of its prompts.
 
 use num_complex::Complex64;
 
@@ -11,7 +11,7 @@ pub struct OverlaySync {
     taken: u32,
 }
 
-/// Where an overlay code stands.
+/// The phase of an overlay code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverlayPhase {
     /// Added to the number of a code period it gives the overlay chip's, modulo the overlay's length.
@@ -24,7 +24,7 @@ pub struct OverlayPhase {
 const LEAST_PROMPTS: u32 = 20;
 /// Standard deviations by which the best shift leads the next.
 const LEAD_SIGMAS: f64 = 6.0;
-/// The next has less than this of the best: what differs in few of the prompts is not told apart yet.
+/// The next has less than this of the best: what differs in few of the prompts is not separated yet.
 const NEXT_SHARE: f64 = 0.8;
 /// Prompts after which a search begins anew, in overlay codes: longer searches do not become surer.
 const MOST_CODES: u32 = 20;
@@ -33,6 +33,11 @@ impl OverlaySync {
     /// For that overlay code.
     pub fn new(code: Vec<i8>) -> Self {
         Self { sums: vec![0.0; code.len()], code, taken: 0 }
+    }
+
+    /// Its length in code periods.
+    pub fn periods(&self) -> usize {
+        self.code.len()
     }
 
     /// Forgets what was taken.
@@ -47,8 +52,8 @@ impl OverlaySync {
         self.code.get(((number + phase.shift) % length) as usize).map_or(1.0, |&chip| f64::from(chip))
     }
 
-    /// Takes the prompt (noise of unit variance a component) of code period `number`, in phase lock; gives the phase
-    /// when it is beyond doubt.
+    /// Takes the prompt (noise of unit variance a component) of code period `number`, in phase lock; gives
+    /// the phase when it is beyond doubt.
     pub fn add(&mut self, number: u64, prompt: Complex64) -> Option<OverlayPhase> {
         let length = self.code.len();
         let at = (number % length.max(1) as u64) as usize;

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use crate::receiver::acquire::threshold;
+use crate::receiver::threshold;
 
 /// Half the range of frequencies, cycles a code period: there a prompt has lost 2.4 dB.
 const REACH_CYCLES: f64 = 0.4;
@@ -48,8 +48,8 @@ pub struct Found {
     pub changes: bool,
 }
 
-/// Where symbols change sign, the worst place of the edges is below the best by this share of a symbol's energy at
-/// least: one change takes a whole symbol.
+/// Where symbols change sign, the worst place of the edges is below the best by this share of a symbol's
+/// energy at least: one change takes a whole symbol.
 const LEAST_CHANGE: f64 = 0.75;
 
 impl Batch {
@@ -106,7 +106,8 @@ impl Batch {
         }
         let (most, offset, number) = best;
         let cells = f64::from(2 * steps + 1) * self.group as f64;
-        // Twice the power over that of the noise: chi-square, two degrees a symbol. Neighbouring cells count as others.
+        // Twice the power over that of the noise: chi-square, two degrees a symbol. Neighbouring cells count
+        // as others.
         let least = threshold::threshold(threshold::of_one_cell(FALSE_ALARM, cells), 2 * symbols as u32);
         if 2.0 * most / (noise * self.group as f64) < least {
             return None;
@@ -124,7 +125,8 @@ impl Batch {
         Some(Found { changes, ..self.refine(offset, (f64::from(number) + vertex) * step) })
     }
 
-    /// Energy of the symbols for every place of the first edge, with the oscillator faster by `cycles` a period.
+    /// Energy of the symbols for every place of the first edge, with the oscillator faster by `cycles` a
+    /// period.
     fn energies(&self, cycles: f64, symbols: usize, energies: &mut Vec<f64>) {
         let mut sums = Vec::with_capacity(self.prompts.len() + 1);
         let mut sum = Complex64::ZERO;
@@ -171,7 +173,8 @@ impl Batch {
         let group = self.group as f64;
         let residual = 0.5 * best.1 / group;
         let total = cycles + residual;
-        // Prompt k shows the phase of its middle, at k + 1/2 periods, less what it was turned back by, `cycles`·k.
+        // Prompt k shows the phase of its middle, at k + 1/2 periods, less what it was turned back by,
+        // `cycles`·k.
         let shown = 0.5 * spectrum(best.1).arg() / TAU;
         let begin = shown - 0.5 * total - residual * 0.5 * (group - 1.0);
         let ahead = begin + total * rest.len() as f64;

@@ -47,7 +47,8 @@ pub struct TrackingSettings {
     pub dll_discriminator: CodeDiscriminator,
     /// Distance from early to late; of BOC divided by the steps of its pulse.
     pub spacing_chips: f64,
-    /// Code periods of 1 ms a loop update once symbols are known: a divisor of 20. Of longer codes as many as fit.
+    /// Code periods of 1 ms a loop update once symbols are known: a divisor of 20. Of longer codes as many as
+    /// fit.
     pub integration: u32,
     /// How the replica's chips fall on the samples.
     pub replica: Edge,
@@ -99,13 +100,35 @@ impl Default for TrackingSettings {
 /// A tracking setting that cannot work.
 #[derive(Debug, Error, PartialEq)]
 pub enum TrackingSettingsError {
+    /// A setting out of its range.
     #[error("tracking.{key} = {value}: expected {expected}")]
-    Range { key: &'static str, value: f64, expected: &'static str },
+    Range {
+        /// Name of the setting.
+        key: &'static str,
+        /// What it is.
+        value: f64,
+        /// Its range.
+        expected: &'static str,
+    },
+    /// A loop that is too wide for its update time.
     #[error(
         "tracking.{key} = {value_hz:?} Hz, expected less: with updates every {update_s} s bandwidth times update time is \
          {product:?}, above the limit {limit} (at most {largest_hz} Hz here)"
     )]
-    Bandwidth { key: &'static str, value_hz: f64, update_s: f64, product: f64, limit: f64, largest_hz: f64 },
+    Bandwidth {
+        /// Name of the setting.
+        key: &'static str,
+        /// The bandwidth.
+        value_hz: f64,
+        /// Time between updates.
+        update_s: f64,
+        /// Bandwidth times update time.
+        product: f64,
+        /// The largest product.
+        limit: f64,
+        /// The largest bandwidth that fits.
+        largest_hz: f64,
+    },
 }
 
 /// Largest bandwidth times update time that [`TrackingSettings::validate`] accepts. The loops are stable for
@@ -121,19 +144,22 @@ const INTEGRATIONS: [u32; 6] = [1, 2, 4, 5, 10, 20];
 pub struct LoopMargin {
     /// The bandwidth's key.
     pub key: &'static str,
+    /// Bandwidth of the loop.
     pub bandwidth_hz: f64,
+    /// Time between updates.
     pub update_s: f64,
     /// Bandwidth times update time, and its largest.
     pub bandwidth_time: f64,
+    /// The largest product.
     pub limit: f64,
     /// What is left of the limit, as a share of it.
     pub margin_share: f64,
 }
 
 impl TrackingSettings {
-    /// These settings for a component. Numbers of code periods are those of 1 ms, so an update of longer codes has fewer;
-    /// the spacing is that of BPSK, so pulses of several steps have as much less; bandwidths that an update of one code
-    /// period cannot have are the largest that it can.
+    /// These settings for a component. Numbers of code periods are those of 1 ms, so an update of longer
+    /// codes has fewer; the spacing is that of BPSK, so pulses of several steps have as much less; bandwidths
+    /// that an update of one code period cannot have are the largest that it can.
     pub fn fitted(&self, component: &Component) -> Self {
         let period_s = component.period_s();
         let most = (1e-3 * f64::from(self.integration) / period_s + 1e-9).floor() as u32;

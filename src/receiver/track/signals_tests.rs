@@ -1,5 +1,5 @@
-//! Search and channels on every synthetic signal, made here from its definition: chips, layers, overlays and random data
-//! in `f64`, one satellite.
+//! Search and channels on every synthetic signal, made here from its definition: chips, layers, overlays and
+//! random data in `f64`, one satellite.
 
 use std::f64::consts::TAU;
 
@@ -99,7 +99,8 @@ impl Sky {
         all.sum::<Complex64>() * 0.125
     }
 
-    /// Calls `each` with blocks of 50 ms until `until_s`. Samples are means of eight looks across their interval.
+    /// Calls `each` with blocks of 50 ms until `until_s`. Samples are means of eight looks across their
+    /// interval.
     fn play(&self, until_s: f64, mut each: impl FnMut(&Block)) {
         let components: Vec<Made> =
             self.link.signal.components.iter().map(|component| Made::new(component, self.link.sv.number)).collect();
@@ -263,9 +264,10 @@ fn every_synthetic_signal_is_followed_with_the_phase_of_the_whole_signal() {
             found.symbols.len()
         );
         let component = lead(sky.link.signal).unwrap();
-        let followed_hz = libm::pow(10.0, 0.1 * (sky.cn0_dbhz + model::followed_db(component)));
-        // Early minus late of a correlation of slope s at ±d/2: σ² = B·(1 − R(d))/(2 s² C/N0) (squaring loss apart),
-        // and both the mean over a second and a half of a loop of half a hertz and its scatter are within 4 σ.
+        let followed_hz = libm::pow(10.0, 0.1 * (sky.cn0_dbhz + crate::receiver::lead::followed_db(component)));
+        // Early minus late of a correlation of slope s at ±d/2: σ² = B·(1 − R(d))/(2 s² C/N0) (squaring loss
+        // apart), and both the mean over a second and a half of a loop of half a hertz and its scatter are
+        // within 4 σ.
         let settings = TrackingSettings::default().fitted(component);
         let shape = ReplicaModel::new(&settings, component, sky.rate_hz).unwrap().shape;
         let sigma =

@@ -10,7 +10,8 @@ pub struct SymbolSync {
     taken: u64,
 }
 
-/// Symbols before a decision is tried, and after which a new search begins: those of a pull-in's default limit, 6 s.
+/// Symbols before a decision is tried, and after which a new search begins: those of a pull-in's default
+/// limit, 6 s.
 const LEAST_SYMBOLS: u64 = 25;
 const MOST_SYMBOLS: u64 = 300;
 /// Standard deviations by which the best edge must lead every other. Where no symbol turns, noise alone leads
@@ -65,8 +66,8 @@ impl SymbolSync {
         // each difference of energies has a deviation of 2·sqrt(2)·amplitude, amplitude² = most/symbols.
         let deviation = (8.0 * most).sqrt();
         let enough = LEAD_SIGMAS * deviation;
-        // Without noise the deviation stays small, yet real edges must be there: each takes 4/length of a symbol's
-        // energy from the neighbours, and one edge in twenty symbols is the least believed.
+        // Without noise the deviation stays small, yet real edges must be there: each takes 4/length of a
+        // symbol's energy from the neighbours, and one edge in twenty symbols is the least believed.
         let edges = 0.2 * most / self.energy.len() as f64;
         (most - second > enough.max(edges)).then_some(best as u64)
     }

@@ -1,4 +1,5 @@
-//! Whole channels on synthetic signals written here, independently of the generator: `f64` phases, one satellite.
+//! Whole channels on synthetic signals written here, independently of the generator: `f64` phases, one
+//! satellite.
 
 use super::*;
 use crate::gnss::gps::l1ca;
@@ -46,7 +47,8 @@ struct Sky {
     if_hz: f64,
     inverted: bool,
     real: bool,
-    /// Phase, Doppler, its rate and acceleration at t = 0; the acceleration begins at `jerk_at_s`, and ends after 1 s.
+    /// Phase, Doppler, its rate and acceleration at t = 0; the acceleration begins at `jerk_at_s`, and ends
+    /// after 1 s.
     doppler_hz: f64,
     boost: Option<(f64, f64)>,
     chips: f64,
@@ -188,7 +190,8 @@ impl Sky {
         let truth = (self.code(t) / 1023.0).rem_euclid(1.0);
         let mut code = m.code_fraction - truth;
         code -= code.round();
-        // The RINEX sense is against Doppler; an inverted spectrum has its constant phase the other way round.
+        // The RINEX sense is against Doppler; an inverted spectrum has its constant phase the other way
+        // round.
         let mut carrier = m.carrier_cycles + cycles;
         carrier -= (2.0 * carrier).round() / 2.0;
         (code * 1023.0 * CHIP_M, carrier, m.doppler_hz - doppler)
@@ -223,7 +226,8 @@ fn pulls_in_from_100_hz_and_a_third_of_a_chip_at_40_dbhz() {
         let (_, doppler) = mean_and_rms(late.clone().map(|m| sky.errors(m).2));
         let cn0 = report.measurements.last().unwrap().cn0_dbhz;
         println!("40 dB-Hz: code {code_m:.2} m, carrier {carrier:.4} cycle, Doppler {doppler:.2} Hz, C/N0 {cn0:.2}");
-        // DLL theory at B = 0.5 Hz: 1.1 m (the tail of the wide loop makes it 2); PLL 2.5 degrees = 0.007 cycle.
+        // DLL theory at B = 0.5 Hz: 1.1 m (the tail of the wide loop makes it 2); PLL 2.5 degrees = 0.007
+        // cycle.
         assert!(code_m < 4.0 && carrier < 0.012 && doppler < 2.0 && (cn0 - 40.0).abs() < 0.6);
         // Symbols are the bits sent, up to one sign, and their number is the right period.
         let wrong = report.symbols.iter().filter(|symbol| {
@@ -276,7 +280,8 @@ fn cn0_of_a_channel_in_its_pull_in_is_within_a_decibel_after_three_tenths_of_a_s
         let errors: Vec<f64> = from(0.3).map(|m| m.cn0_dbhz - dbhz).collect();
         let worst = errors.iter().fold(0.0_f64, |worst, e| worst.max(e.abs()));
         println!("{dbhz}: {:.2} at 0.3 s, worst {worst:.2} until 1 s", errors[0]);
-        // Deviations at 0.3 s: 0.5 dB at 30 dB-Hz, 0.3 beyond 37; another 0.2 of the carrier's and code's first errors.
+        // Deviations at 0.3 s: 0.5 dB at 30 dB-Hz, 0.3 beyond 37; another 0.2 of the carrier's and code's
+        // first errors.
         assert!(worst < if dbhz < 35.0 { 1.7 } else { 1.0 }, "{dbhz}: {errors:?}");
         // What the search found is reported until then, nothing wilder.
         assert!(from(0.0).all(|m| (m.cn0_dbhz - dbhz).abs() < 3.0), "{dbhz}");
@@ -348,7 +353,8 @@ fn cn0_of_a_whole_channel_is_within_three_tenths_of_a_decibel() {
         let (_, report) = sky.follow(&settings, 100_000, &sky.hit(5.0, 0.1));
         let found = report.measurements.last().unwrap().cn0_dbhz;
         println!("C/N0 {dbhz}: {found:.2}");
-        // 0.14 to 0.2 dB a second (theory 3.5) over 2.5 s, and 1.8 % of the loop's own jitter counted as noise.
+        // 0.14 to 0.2 dB a second (theory 3.5) over 2.5 s, and 1.8 % of the loop's own jitter counted as
+        // noise.
         assert!((found - dbhz).abs() < 0.3, "{dbhz}: {found}");
     }
 }

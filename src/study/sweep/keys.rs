@@ -1,6 +1,6 @@
 //! Every key of STUDY.toml, declared once: see [`crate::generator::scenario::schema`].
 
-use crate::generator::ripple::oscillator::PowerLaw;
+use crate::generator::clock::oscillator::PowerLaw;
 use crate::generator::scenario::schema::{
     Key, flag, foreign, integer, number, numbers, table, tables, text, values, word, words,
 };

@@ -10,7 +10,7 @@ use super::keys;
 use crate::analysis::expect::theory::clock::PowerLaw;
 use crate::analysis::expect::theory::{dll, fll, oscillator, pll};
 use crate::analysis::waveform::Waveform;
-use crate::generator::ripple::oscillator::PowerLaw as Levels;
+use crate::generator::clock::oscillator::PowerLaw as Levels;
 use crate::generator::scenario::ScenarioError;
 use crate::generator::scenario::read::{Source, Table};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;

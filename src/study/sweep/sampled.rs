@@ -27,7 +27,6 @@ use crate::analysis::measure::errors::Errors;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::mean;
 use crate::generator::scenario::{Overrides, Scenario};
-use crate::generator::stream::{Options, Stream};
 use crate::generator::{GenerateError, truth};
 use crate::gnss::signal::Signal;
 use crate::receiver::output::Output;
@@ -36,6 +35,7 @@ use crate::receiver::track::closed::Mode;
 use crate::receiver::{ReceiveError, Reception};
 use crate::study::correlator::Case;
 use crate::study::{expect, limits};
+use crate::twin;
 
 /// A scene that a study is based on.
 #[derive(Clone, Debug)]
@@ -183,22 +183,12 @@ pub fn run(
         let reception = Some(Reception::new(&scene.metadata, &settings)?);
         ears.push(Ear { directory, settings, output, reception });
     }
-    let mut stream = Stream::new(&scene, &mut truth, &Options::default())?;
-    let (mut made, mut taken) = (Vec::new(), Vec::new());
-    let mut more = true;
-    while more {
-        let (generated, received) = rayon::join(
-            || stream.next(&mut truth, &mut made),
-            || ears.par_iter_mut().try_for_each(|ear| ear.take(&taken)),
-        );
-        received?;
-        more = generated?;
-        std::mem::swap(&mut made, &mut taken);
+    twin::feed(std::slice::from_ref(&scene), &mut truth, &mut |_, samples| {
         if halt() {
             return Err(StudyError::Stopped);
         }
-    }
-    stream.finish(&mut truth)?;
+        Ok(ears.par_iter_mut().try_for_each(|ear| ear.take(samples))?)
+    })?;
     drop(truth);
     for ear in &mut ears {
         if let Some(reception) = ear.reception.take() {

@@ -59,7 +59,7 @@ impl Choices {
             smoothing_s: number("smoothing_s")?,
             mask_rad: number("mask_deg")?.to_radians(),
             model_sigma_m: number("model_sigma_m")?,
-            ionosphere: word("ionosphere")? == "broadcast",
+            ionosphere: word("ionosphere")? != "none",
             ionosphere_error_share: number("ionosphere_error_share").unwrap_or(0.0),
         })
     }

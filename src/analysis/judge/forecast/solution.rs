@@ -166,7 +166,9 @@ pub fn expected(scene: &Scene<'_>, errors: &Errors) -> Result<Vec<Expected>, Jud
         let corrected = exact || !scene.choices.ionosphere;
         one(fix.sample, sums, corrected)
     };
-    Ok(scene.run.fixes.iter().zip(&sums).filter_map(of).collect())
+    // The noise of combined carriers is not that of the signals by themselves.
+    let single = |(fix, _): &(&crate::gnss::record::Fix, &Sums)| fix.ionosphere != IonosphereModel::Combined;
+    Ok(scene.run.fixes.iter().zip(&sums).filter(single).filter_map(of).collect())
 }
 
 fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {

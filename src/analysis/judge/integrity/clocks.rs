@@ -93,8 +93,8 @@ fn fixes(run: &Run, reading_m: Option<f64>) -> Vec<Finding> {
         .iter()
         .filter_map(|fix| {
             let true_row = truth.get(&fix.sample)?;
-            let bias_m =
-                SPEED_OF_LIGHT_MPS * (fix.clock_bias_s - true_row.clock_bias_s + run.scene.ahead_s(&fix.time_scale));
+            // Both are by the scale of the fix, and what that is ahead of GPS time cancels.
+            let bias_m = SPEED_OF_LIGHT_MPS * (fix.clock_bias_s - true_row.clock_bias_s);
             Some(SPEED_OF_LIGHT_MPS * fix.time().since(true_row.time()) + bias_m)
         })
         .collect();

@@ -51,7 +51,11 @@ fn mismatches(run: &Run) -> Vec<String> {
     }
     if let Some(ionosphere) = choice("ionosphere") {
         let used = |model: IonosphereModel| run.fixes.iter().any(|fix| fix.ionosphere == model);
-        if ionosphere == "none" || used(IonosphereModel::Broadcast) || run.ionosphere_m < NOTHING_M {
+        if ionosphere == "none"
+            || used(IonosphereModel::Broadcast)
+            || used(IonosphereModel::Combined)
+            || run.ionosphere_m < NOTHING_M
+        {
             compare("ionosphere", run.ionosphere_m, ionosphere != "none", "broadcast");
         } else if run.ionosphere_m >= NOTHING_M {
             found.push(format!(

@@ -230,7 +230,8 @@ impl Verdict {
 
     fn ionosphere_of_fixes(&mut self, run: &Run) {
         let setting = |key: &str| run.receiver.pointer(&format!("/settings/position/{key}"));
-        if setting("ionosphere").and_then(serde_json::Value::as_str) != Some("broadcast") {
+        let corrected = setting("ionosphere").and_then(serde_json::Value::as_str);
+        if !matches!(corrected, Some("broadcast" | "combined")) {
             return;
         }
         let decoded = run.events.iter().find(|row| row.event == Event::IonosphereDecoded).map(|row| row.sample);
@@ -240,6 +241,7 @@ impl Verdict {
             IonosphereModel::None => true,
             IonosphereModel::Nominal => required || known(fix),
             IonosphereModel::Broadcast => !known(fix),
+            IonosphereModel::Combined => corrected != Some("combined"),
         };
         let count = run.fixes.iter().filter(wrong).count();
         let source = "decoded parameters are used from their event on, and none before";

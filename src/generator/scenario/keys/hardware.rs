@@ -1,6 +1,6 @@
 //! Keys of the receiver's hardware, and of a transmitter that plays signals back.
 
-use crate::generator::ripple::oscillator::PowerLaw;
+use crate::generator::clock::oscillator::PowerLaw;
 use crate::generator::scenario::schema::{Key, flag, integer, number, numbers, table, text, word, words};
 
 pub(crate) const FRONT_END: &[Key] = &[

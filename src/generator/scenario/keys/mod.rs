@@ -1,9 +1,9 @@
 //! Every key of a scenario, declared once: see [`super::schema`].
 
 pub(crate) mod hardware;
-pub(crate) mod hostile;
 pub(crate) mod motion;
 pub(crate) mod satellites;
+pub(crate) mod spoofing_and_jamming;
 pub(crate) mod way;
 
 use super::schema::{Key, flag, foreign, integer, number, one_or_more, table, tables, text, texts, time, word, words};
@@ -29,7 +29,7 @@ pub const SCENARIO: &[Key] = &[
     integer("seed", 0, i64::MAX as u64, "of everything random: noise, oscillators, faults").or(1.0),
     words("signals", "an array of different signals of this program", "signals that the satellites send")
         .or_else("[\"GPS L1 C/A\"]"),
-    table("navigation", NAVIGATION, "What the satellites broadcast. Absent: the program's own day, 2010-07-01."),
+    table("navigation", NAVIGATION, "What the satellites broadcast. Absent: the program's own files."),
     table("satellites", SATELLITE_CHOICE, "Which satellites are computed."),
     table("orbits", satellites::ORBITS, "True orbits and clocks. Absent: those that are broadcast."),
     tables(
@@ -69,10 +69,10 @@ pub const SCENARIO: &[Key] = &[
     ),
     tables(
         "interference",
-        hostile::INTERFERENCE,
+        spoofing_and_jamming::INTERFERENCE,
         "A source of interference. Exactly one of `js_db`, `power_dbw`, `eirp_dbw`.",
     ),
-    tables("spoofer", hostile::SPOOFER, "A second constellation, for another place, motion or clock."),
+    tables("spoofer", spoofing_and_jamming::SPOOFER, "A second constellation, for another place, motion or clock."),
     table(
         "fidelity",
         FIDELITY,
@@ -88,13 +88,17 @@ pub const SCENARIO: &[Key] = &[
     foreign("receiver", "the receiver's settings", "settings of the receiver that `run` uses, as below"),
 ];
 
-const NAVIGATION: &[Key] = &[texts(
-    "file",
-    "a path, or an array of paths",
-    "RINEX navigation files, version 2 to 4, plain or gzip, relative to the scenario and below its directory; together they \
-     have to cover the scene's time",
-)
-.or_else("embedded brdc1820-2010.n")];
+const NAVIGATION: &[Key] = &[
+    texts(
+        "file",
+        "a path, or an array of paths",
+        "RINEX navigation files, version 2 to 4, plain or gzip, relative to the scenario and below its directory; \
+         together they have to cover the scene's time",
+    )
+    .or_else("embedded: GPS of 2010-07-01; GPS and Galileo of 2020-11-29, 10:10 to 16:00"),
+    number("galileo_ahead_ns", -900.0, 900.0, "ns", "by which Galileo's time is ahead of GPS time; it is broadcast")
+        .or_else("the navigation file's at the start, or 0"),
+];
 
 const SATELLITE_CHOICE: &[Key] = &[
     number(

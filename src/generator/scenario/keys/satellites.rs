@@ -1,8 +1,8 @@
 //! Keys of `[orbits]`, `[[satellite_fault]]`, `[[message_fault]]` and `[power]`.
 
 use super::{A_PATH, LONGEST_S, SATELLITES};
+use crate::generator::clock::oscillator::PowerLaw;
 use crate::generator::effect::transmit::Block;
-use crate::generator::ripple::oscillator::PowerLaw;
 use crate::generator::scenario::schema::{Key, by_satellite, integer, number, numbers, text, texts, word, words};
 use crate::gnss::gps::lnav;
 

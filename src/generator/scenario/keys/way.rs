@@ -55,7 +55,7 @@ pub(crate) const MULTIPATH: &[Key] = &[
     // more than they get.
     number("amplitude", 0.0, 10.0, "(of the direct ray's)", "of the reflected ray").required().of(GIVEN),
     number("amplitude", 0.0, 1.0, "(of the direct ray's)", "of the reflected ray").required().of(PLANES),
-    // A surface turns the field round unless it is told otherwise.
+    // A surface turns the field round unless the scenario says otherwise.
     number("phase_deg", -360.0, 360.0, "deg", "turn of the carrier at the reflection").or(0.0).of(GIVEN),
     number("phase_deg", -360.0, 360.0, "deg", "turn of the carrier at the reflection").or(180.0).of(PLANES),
     words("satellites", "an array of satellites like [\"G01\", \"G12\"], or absent for all", "whose ray it is")

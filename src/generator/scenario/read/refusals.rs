@@ -17,8 +17,11 @@ pub(crate) struct Source<'t> {
 /// A place in it, counted from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
+    /// The text's name.
     pub origin: String,
+    /// Line, from 1.
     pub line: usize,
+    /// Character of the line, from 1.
     pub column: usize,
 }
 

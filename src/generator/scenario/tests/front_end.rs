@@ -97,7 +97,7 @@ fn warnings_say_whose_they_are() {
     assert!(told.iter().any(|w| w.starts_with("front end narrow: ") && w.contains("fold over")), "{told:?}");
     assert!(!told.iter().any(|w| w.starts_with("front end wide: ")), "{told:?}");
     let source = "[[interference]]\nkind = \"cw\"\njs_db = 10\noffset_hz = 3e6\n[power]\ncn0_dbhz = 45\n";
-    // One front end hears it: nothing is left out.
+    // One front end receives it: nothing is left out.
     let (scenes, told) = composed(&format!("{WIDE}{narrow}{source}")).unwrap();
     assert_eq!((scenes[0].interference.len(), scenes[1].interference.len()), (1, 0));
     assert!(!told.iter().any(|w| w.contains("outside")), "{told:?}");
@@ -109,7 +109,7 @@ fn warnings_say_whose_they_are() {
 fn a_front_end_puts_l1_where_the_scenario_says() {
     for (inverted, center_hz) in [(false, 1_574.42e6), (true, 1_576.42e6)] {
         let text = replaced(&full(), "front_end", "spectrum_inverted", &inverted.to_string());
-        let text = text.replace("[navigation]\nfile = \"brdc.10n\"\n", "");
+        let text = text.replace("[navigation]\nfile = \"brdc.10n\"\ngalileo_ahead_ns = 3\n", "");
         let text = text.replace("antenna = \"table\"\nantenna_file = \"gain.csv\"\n", "antenna = \"patch\"\n");
         let (scene, warnings) = parse(&text).unwrap().compose(Path::new("."), &Overrides::default()).unwrap();
         assert_eq!(scene.metadata.center_hz, center_hz);

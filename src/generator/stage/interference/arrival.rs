@@ -8,18 +8,22 @@
 use nalgebra::Vector3;
 
 use crate::generator::clock::ReceiverClock;
-use crate::generator::scene::Scene;
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::earth::{SPEED_OF_LIGHT_MPS, rotate_earth};
+use crate::gnss::samples::IfMetadata;
+use crate::gnss::signal::Signal;
 use crate::gnss::time::{Rate, SampleClock, tone_turns};
 
 /// What the receiver does to any wave from its antenna to its samples.
 #[derive(Clone, Debug)]
 pub struct Tuning {
+    /// Sample numbers as readings of the receiver's clock.
     pub clock: SampleClock,
+    /// That clock against GPS time.
     pub receiver_clock: ReceiverClock,
     /// Radio frequency at 0 Hz in the samples.
     pub center_hz: f64,
+    /// Whether the spectrum is mirrored.
     pub inverted: bool,
     /// Whether only the I plane is sent on.
     pub real: bool,
@@ -30,17 +34,23 @@ pub struct Tuning {
 }
 
 impl Tuning {
-    /// That of a scene.
-    pub fn of(scene: &Scene) -> Self {
-        let half_hz = 0.5 * scene.clock.rate.hz();
+    /// That of a receiver whose samples are as `metadata` say, at readings `clock` of `receiver_clock`; real
+    /// samples are those of the zone in which most of `signals` lie. `noise_lsb` is the gain.
+    pub fn new(
+        metadata: &IfMetadata,
+        (clock, receiver_clock): (SampleClock, &ReceiverClock),
+        signals: &[&Signal],
+        noise_lsb: f64,
+    ) -> Self {
+        let half_hz = 0.5 * clock.rate.hz();
         Self {
-            clock: scene.clock,
-            receiver_clock: scene.receiver_clock.clone(),
-            center_hz: scene.metadata.center_hz,
-            inverted: scene.metadata.inverted,
-            real: !scene.metadata.format.is_complex(),
-            low_hz: zone_of(scene, half_hz) * half_hz,
-            noise_lsb: f64::from(scene.noise_lsb),
+            clock,
+            receiver_clock: receiver_clock.clone(),
+            center_hz: metadata.center_hz,
+            inverted: metadata.inverted,
+            real: !metadata.format.is_complex(),
+            low_hz: zone_of(metadata, signals, half_hz) * half_hz,
+            noise_lsb,
         }
     }
 
@@ -92,11 +102,11 @@ impl Tuning {
     }
 }
 
-/// The stretch of `half_hz` in which most of the scene's carriers lie, counted from 0 Hz; of equals the first
-/// signal's.
-fn zone_of(scene: &Scene, half_hz: f64) -> f64 {
-    let carriers = scene.signals.iter().flat_map(|signal| <[f64; 2]>::from(signal.carriers_hz()));
-    let zones: Vec<f64> = carriers.map(|hz| (scene.metadata.if_hz(hz) / half_hz).floor()).collect();
+/// The stretch of `half_hz` in which most of the signals' carriers lie, counted from 0 Hz; of equals the
+/// first signal's.
+fn zone_of(metadata: &IfMetadata, signals: &[&Signal], half_hz: f64) -> f64 {
+    let carriers = signals.iter().flat_map(|signal| <[f64; 2]>::from(signal.carriers_hz()));
+    let zones: Vec<f64> = carriers.map(|hz| (metadata.if_hz(hz) / half_hz).floor()).collect();
     let votes = |zone: &f64| zones.iter().filter(|other| *other == zone).count();
     // The last of equals is the first in reverse.
     zones.iter().rev().max_by_key(|zone| votes(zone)).copied().unwrap_or(0.0)
@@ -107,11 +117,12 @@ fn fraction_turns(cycles: f64) -> u64 {
     ((cycles - cycles.floor()) * 18_446_744_073_709_551_616.0) as u64
 }
 
-/// An emitter at a place, and the antenna that hears it.
+/// An emitter at a place, and the antenna that receives it.
 #[derive(Clone, Debug)]
 pub struct Path {
     /// ECEF.
     pub emitter_m: Vector3<f64>,
+    /// Motion of the antenna.
     pub antenna: Trajectory,
 }
 
@@ -148,7 +159,8 @@ impl Repetition {
         self.count as f64 / self.seconds as f64
     }
 
-    /// Whole periods, and the phase in 2^-64 period, at sample `n` of what was sent `behind_s` before its reading.
+    /// Whole periods, and the phase in 2^-64 period, at sample `n` of what was sent `behind_s` before its
+    /// reading.
     pub fn at(self, rate: Rate, n: u64, behind_s: f64) -> (i64, u64) {
         let (whole, fraction) = rate.turns(n, self.count, self.seconds);
         let behind = behind_s * self.hz();
@@ -186,7 +198,8 @@ mod tests {
             low_hz: 0.0,
             noise_lsb: 1.0,
         };
-        // 1 MHz above the centre: a quarter turn a sample; half a period late: half a turn less at RF 1576.42 MHz.
+        // 1 MHz above the centre: a quarter turn a sample; half a period late: half a turn less at RF 1576.42
+        // MHz.
         let carrier_hz = 1_576.42e6;
         assert_eq!(tuning.turns(carrier_hz, 5, 0.0), 1 << 62);
         let half = tuning.turns(carrier_hz, 5, 0.5 / carrier_hz);

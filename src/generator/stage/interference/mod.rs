@@ -7,23 +7,21 @@
 //! no pattern, one straight path.
 
 pub mod arrival;
-pub mod resample;
-pub mod tone;
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use arrival::{Path, Repetition, Tuning};
-use resample::{Interpolator, Position, draw};
-use tone::{Modulation, Tone};
 
 use crate::generator::random::mix;
-use crate::generator::stage::noise::BLOCK_SAMPLES;
 use crate::generator::stage::{Block, Stage};
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::chips::MARGIN_STEPS;
 use crate::generator::synth::isa::{self, Level};
 use crate::generator::synth::lanes::Buffers;
+use crate::generator::synth::noise::BLOCK_SAMPLES;
+use crate::generator::synth::resample::{Interpolator, Position, draw};
+use crate::generator::synth::tone::{Modulation, Tone};
 use crate::generator::synth::{CODE_ONE, Edge, Run};
 use crate::gnss::facts::Interference;
 use crate::gnss::record::InterferenceRow;
@@ -38,54 +36,76 @@ const EDGE_SAMPLES: f64 = 1e-6;
 /// How the chips of a matched waveform meet the samples.
 #[derive(Clone, Debug)]
 pub enum ChipEdge {
+    /// At the nearest sample.
     Nearest,
+    /// By the share of the sample on either side.
     Area,
+    /// Through a low-pass filter.
     BandLimited(Box<Filter>),
 }
 
 /// What an interferer sends.
 #[derive(Clone, Debug)]
 pub enum Waveform {
+    /// A continuous wave.
     Cw,
     /// Linear sweep over `sweep_hz` (downwards if negative), from the start again at once.
     Chirp {
+        /// Width of the sweep.
         sweep_hz: f64,
+        /// How often it repeats.
         repetition: Repetition,
     },
     /// Linear up and down; a repetition is both.
     Fmcw {
+        /// Width of the sweep.
         sweep_hz: f64,
+        /// How often it repeats.
         repetition: Repetition,
     },
     /// Frequency that follows a cosine.
     SineFm {
+        /// Largest deviation from the carrier.
         deviation_hz: f64,
+        /// How often it repeats.
         repetition: Repetition,
     },
     /// A carrier that is on for `width_s`; each pulse comes late by up to `jitter` of a period, at random.
     Pulse {
+        /// Length of a pulse.
         width_s: f64,
+        /// How often it repeats.
         repetition: Repetition,
+        /// Largest delay of a pulse, as a share of the period.
         jitter: f64,
     },
     /// Random chips, so that the spectrum is that of a code.
     Matched {
+        /// How often chips come.
         chips: Repetition,
+        /// How their edges fall between samples.
         edge: ChipEdge,
     },
     /// Gaussian noise over the samples' whole band.
     White,
     /// Gaussian noise of a band; `step` source samples a sample, in 2^-32.
     Noise {
+        /// Width of the band.
         width_hz: f64,
+        /// Source samples a sample, in 2^-32.
         step: u64,
+        /// From the source's samples to the scene's.
         by: Interpolator,
     },
     /// Recorded samples of unit mean power.
     Recording {
+        /// The samples of the file.
         samples: Arc<Recorded>,
+        /// How often they come.
         rate: Repetition,
+        /// From the source's samples to the scene's.
         by: Interpolator,
+        /// Whether they begin anew at their end.
         repeat: bool,
     },
 }
@@ -93,7 +113,9 @@ pub enum Waveform {
 /// Planar samples of a file.
 #[derive(Clone, Debug)]
 pub struct Recorded {
+    /// In-phase components.
     pub i: Vec<f32>,
+    /// Quadrature components.
     pub q: Vec<f32>,
 }
 
@@ -104,15 +126,19 @@ pub struct Interferer {
     pub source: u64,
     /// Its kind as a scenario writes it.
     pub kind: &'static str,
+    /// What it sends.
     pub waveform: Waveform,
     /// Carrier, or middle of the band, as sent.
     pub carrier_hz: f64,
     /// Power over noise density at the antenna when the scene starts; of a pulse while it is on.
     pub jn0_hz: f64,
+    /// Its way to the antenna; `None` for a source without a place.
     pub path: Option<Path>,
     /// Samples in which it is on, at the antenna.
     pub on: Range<u64>,
+    /// Seed of its random numbers.
     pub seed: u64,
+    /// What the receiver does to its wave.
     pub tuning: Tuning,
     /// For the plan.
     pub description: String,

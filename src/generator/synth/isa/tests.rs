@@ -3,9 +3,9 @@
 //! reach beyond the planes.
 
 use super::*;
-use crate::generator::stage::interference::tone::Modulation;
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::chips::CodeTime;
+use crate::generator::synth::tone::Modulation;
 use crate::generator::synth::waveform::plain;
 use crate::generator::synth::{CODE_ONE, reference};
 use crate::gnss::gps::l1ca::L1_CA;
@@ -180,7 +180,8 @@ fn samples_are_packed_as_the_twin_does_at_every_length_and_offset() {
     }
 }
 
-/// The obvious packing: rounded half to even in `f64`, held at full scale, and the number of components beyond it.
+/// The obvious packing: rounded half to even in `f64`, held at full scale, and the number of components
+/// beyond it.
 fn packed(format: Format, i: &[f32], q: &[f32]) -> (Vec<u8>, u64) {
     let (mut bytes, mut outside) = (Vec::new(), 0);
     let planes: &[&[f32]] = if format.is_complex() { &[i, q] } else { &[i] };

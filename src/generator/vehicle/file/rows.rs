@@ -12,8 +12,9 @@ const MAX_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;
 /// Hardest motion: a hundred thousand g, beyond any gun.
 const MAX_ACCELERATION_MPS2: f64 = 1e6;
 
-/// Rows before and after the first bent knot among which the wrong one is looked for. From the hardest bend that the
-/// largest speed allows, 1e11 m/s2 between rows 1 ms apart, to the limit is a factor 1e5 = 3.7^9: nine rows.
+/// Rows before and after the first bent knot among which the wrong one is looked for. From the hardest bend
+/// that the largest speed allows, 1e11 m/s2 between rows 1 ms apart, to the limit is a factor 1e5 = 3.7^9:
+/// nine rows.
 const BEFORE: usize = 2;
 const AFTER: usize = 14;
 
@@ -85,7 +86,7 @@ impl Rows {
     /// One wrong row bends the spline at its neighbours too, each a quarter as hard as the one before: it is
     /// the row without which the rows about it are smooth. Where the motion jumps for good, leaving out a row
     /// beside the jump takes no more than a third of the bend away: then it is the row after the fastest
-    /// interval (within two rows of an end the two cannot be told apart, and the row beside the jump is
+    /// interval (within two rows of an end the two cannot be distinguished, and the row beside the jump is
     /// named). Of fewer than five rows any could be the wrong one.
     fn culprit(&self, bent: usize) -> (usize, f64) {
         // At the end of the file more of those before it, so that there is something to be smooth.

@@ -157,9 +157,9 @@ fn a_written_truth_flies_again_as_it_was() {
     for k in 0..1_000 {
         let t_s = f64::from(k) * 0.01;
         let (a, b) = (flight.at(t_s), again.at(t_s));
-        // A corner of the thrust between rows: half the slope's jump J = 196 m/s3 over h = 0.1 s. Hermite's error
-        // for a jump of the third derivative is at most J h³/192 with exact accelerations; those of the spline
-        // are off by less than J h/8, which weighs h²/32 more: 1.0e-3 m + 0.8e-3 m.
+        // A corner of the thrust between rows: half the slope's jump J = 196 m/s3 over h = 0.1 s. Hermite's
+        // error for a jump of the third derivative is at most J h³/192 with exact accelerations; those of the
+        // spline are off by less than J h/8, which weighs h²/32 more: 1.0e-3 m + 0.8e-3 m.
         assert!((a.position_m - b.position_m).norm() < 2e-3, "{t_s}");
         assert!((a.velocity_mps - b.velocity_mps).norm() < 0.1, "{t_s}");
     }

@@ -1,6 +1,7 @@
 //! The field tables of I/NAV: places count from 0, the first bit of a word (Galileo OS SIS ICD 2.1, tables 42
 //! to 54).
 
+use super::almanac::{GPS_OFFSET, WORD_7, WORD_8, WORD_9, WORD_10, WORD_16};
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::gnss::bits::{Element, Field, element};
 use crate::gnss::broadcast::Ephemeris;
@@ -30,14 +31,16 @@ pub(super) struct Utc {
 }
 
 impl Utc {
-    /// UTC as a scene has it: GPS time's offset is taken for that of the system's own time.
+    /// UTC as a scene has it: GPS time's offset, and by how much the system's own time is ahead of that.
     pub(super) fn of(common: &Common, start: Epoch) -> Self {
         let utc = &common.utc;
         let reference = utc.polynomial.map_or(common.reference.unwrap_or(start), |polynomial| polynomial.reference);
         let event = utc.event.map_or((start.week(), 7, utc.leap_s), |e| (e.week, i64::from(e.day), e.after_s));
         Self {
-            a0_s: utc.polynomial.map_or(0.0, |polynomial| polynomial.a0_s),
-            a1_sps: utc.polynomial.map_or(0.0, |polynomial| polynomial.a1_sps),
+            a0_s: utc.polynomial.map_or(0.0, |polynomial| polynomial.a0_s)
+                + common.galileo.map_or(0.0, |offset| offset.at_s(reference)),
+            a1_sps: utc.polynomial.map_or(0.0, |polynomial| polynomial.a1_sps)
+                + common.galileo.map_or(0.0, |offset| offset.a1_sps),
             leap_s: utc.leap_s,
             reference: (reference.week(), reference.tow_whole_s() / HOUR_S),
             event: (event.0, event.1),
@@ -168,6 +171,16 @@ pub(super) static WORD_6: [Element<Utc>; 9] = [
     element(Field::new("tow_s", &[(105, 20)], Whole, 0, TIME), |u| (u.sent_s % WEEK_S) as f64, |u, v| u.sent_s = v as i64),
 ];
 
+/// The index of the signal in space accuracy nearest to one in metres (5.1.12, table 90); 255, no prediction,
+/// without one or above 6 m.
+pub fn sisa_index(accuracy_m: Option<f64>) -> u8 {
+    // First index, its metres, and the step to the next one, of each range.
+    const RANGES: [(f64, f64, f64); 4] = [(0.0, 0.0, 0.01), (50.0, 0.5, 0.02), (75.0, 1.0, 0.04), (100.0, 2.0, 0.16)];
+    let Some(metres) = accuracy_m.filter(|metres| (0.0..=6.0).contains(metres)) else { return 255 };
+    let range = RANGES.iter().rev().find(|(_, least, _)| metres > least - 1e-9);
+    range.map_or(255, |(first, least, step)| (first + ((metres - least) / step).round()) as u8)
+}
+
 /// Every field by the word that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
@@ -181,5 +194,10 @@ pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
         ("word 4", of(&WORD_4)),
         ("word 5", of(&WORD_5)),
         ("word 6", of(&WORD_6)),
+        ("word 7", of(&WORD_7)),
+        ("word 8", of(&WORD_8)),
+        ("word 9", of(&WORD_9)),
+        ("word 10", WORD_10.iter().chain(&GPS_OFFSET).map(|element| &element.field).collect()),
+        ("word 16", of(&WORD_16)),
     ]
 }

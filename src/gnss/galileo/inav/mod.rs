@@ -3,11 +3,11 @@
 //!
 //! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is
 //! a pattern of ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both
-//! parts carry one word of 128 bits and a check. Limits: words 0 to 6; where satellites send almanacs,
-//! reduced elements or redundancy (words 7 to 10 and 16 to 20) the spare word 0 is sent, and such words are
-//! read as pages without parameters. Alert pages are not read. The bits reserved for authentication and the
-//! return link are zero.
+//! parts carry one word of 128 bits and a check. Limits: where satellites send redundancy (words 17 to 20)
+//! the spare word 0 is sent. Of almanacs and reduced elements (words 7 to 10 and 16) only the offset of GPS
+//! time is read. Alert pages are not read. The bits reserved for authentication and the return link are zero.
 
+mod almanac;
 mod fields;
 mod reader;
 
@@ -21,7 +21,9 @@ use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::message::{Common, Message, Sender};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
-pub use fields::{GST_WEEK, tables};
+pub use almanac::gps_offset;
+use almanac::{GPS_OFFSET, Reduced, Triple, WORD_7, WORD_8, WORD_9, WORD_10, WORD_16};
+pub use fields::{GST_WEEK, sisa_index, tables};
 use fields::{Orbit, Utc, WORD_1, WORD_2, WORD_3, WORD_4, WORD_5, WORD_6};
 pub use reader::InavReader;
 
@@ -73,8 +75,9 @@ const CHECK_BITS: usize = 24;
 /// Where the secondary synchronisation pattern begins in the odd part (4.3.2.3).
 const SSP_BEGIN: usize = 106;
 const SSP_BITS: usize = 8;
-/// The word that has nothing to say (5.1.9.11), and those that make up a set of elements.
+/// The word that has nothing to say (5.1.9.11), that of reduced elements, and those of a set of elements.
 const SPARE: u8 = 0;
+const REDUCED: u8 = 16;
 const WORDS_OF_SET: [u8; 4] = [1, 2, 3, 4];
 
 /// The code of a part (4.1.4).
@@ -86,10 +89,15 @@ const INTERLEAVER: Interleaver = Interleaver { columns: 30, rows: 8 };
 
 /// Type of the word that begins at a time: the nominal sequence of E1-B (4.3.5, table 38).
 pub fn word_at(start: Epoch) -> u8 {
+    // Almanac words 7 and 8 alternate with 9 and 10 from sub-frame to sub-frame.
+    let second_half = 2 * (start.tow_whole_s().div_euclid(SUBFRAME_S).rem_euclid(2)) as u8;
     match start.tow_whole_s().rem_euclid(SUBFRAME_S) + planted!("gnss.inav.word_order", 0, 2) {
         1 => 2,
         3 => 4,
         5 => 6,
+        7 => 7 + second_half,
+        9 => 8 + second_half,
+        15 | 29 => REDUCED,
         21 => 1,
         23 => 3,
         25 => 5,
@@ -113,12 +121,21 @@ impl Sender for Pages {
             let expected = "an odd whole second";
             return Err(FieldError::Start { message: INAV.name, start_s: start.tow_s(), expected });
         }
-        let word = self.word(word_at(start), ephemeris, start)?;
+        let word = match self.word(word_at(start), ephemeris, start) {
+            // Two satellites were left on orbits that are no reduced elements, and send the spare word.
+            Err(FieldError::OutOfRange { .. }) if word_at(start) == REDUCED => self.word(SPARE, ephemeris, start)?,
+            word => word?,
+        };
         Ok(encode_page(&page(&word, start)))
     }
 }
 
 impl Pages {
+    /// The part of the almanac that is sent in the minute of `start`.
+    fn triple(&self, start: Epoch) -> Triple {
+        Triple::at(start, &self.common.almanac, self.common.reference.unwrap_or(start), self.common.galileo)
+    }
+
     /// A word as it leaves at `start`.
     fn word(&self, number: u8, ephemeris: &Ephemeris, start: Epoch) -> Result<u128, FieldError> {
         let mut word = 0;
@@ -135,6 +152,20 @@ impl Pages {
                 alternate(&mut word, 105, WORD_BITS);
             }
             6 => write_all(&WORD_6, &Utc::of(&self.common, start), &mut word)?,
+            7..=10 => {
+                let triple = self.triple(start);
+                let table: &[Element<Triple>] = match number {
+                    7 => &WORD_7,
+                    8 => &WORD_8,
+                    9 => &WORD_9,
+                    _ => &WORD_10,
+                };
+                write_all(table, &triple, &mut word)?;
+                if number == 10 {
+                    write_all(&GPS_OFFSET, &triple, &mut word)?;
+                }
+            }
+            REDUCED => write_all(&WORD_16, &Reduced::of(ephemeris, start), &mut word)?,
             _ => {
                 // "10": week and time of week are valid (5.1.9.11).
                 word.set_piece((6, 2), 2);
@@ -231,6 +262,7 @@ pub fn parameters(word: &u128) -> Option<Vec<(&'static str, i64)>> {
         4 => Some(integers(&WORD_4, word)),
         5 => Some(integers(&WORD_5, word)),
         6 => Some(integers(&WORD_6, word)),
+        10 => Some(integers(&GPS_OFFSET, word)),
         _ => None,
     };
     found.map(|all| all.into_iter().filter(|(name, _)| *name != "tow_s").collect())

@@ -62,7 +62,7 @@ impl InavReader {
         self.words.insert(word_type(&word), word);
         match word_type(&word) {
             1..=5 => self.look_for_set(near, &mut news),
-            6 => news.push(Read::Parameters(self.rows(&word, 0))),
+            6 | 10 => news.push(Read::Parameters(self.rows(&word, 0))),
             _ => {}
         }
         news
@@ -88,7 +88,7 @@ impl InavReader {
     }
 
     fn rows(&self, word: &u128, issue: u32) -> Vec<NavigationRow> {
-        NavigationRow::each(self.sv, issue, parameters(word).unwrap_or_default()).collect()
+        NavigationRow::each(self.sv, super::INAV.name, issue, parameters(word).unwrap_or_default()).collect()
     }
 }
 

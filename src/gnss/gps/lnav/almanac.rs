@@ -6,7 +6,7 @@
 use super::fields::{ALMANAC_PAGE, IONOSPHERE_PAGE, UTC_PAGE};
 use crate::gnss::bits::{FieldError, write_all};
 use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2, GPS_PI};
+use crate::gnss::earth::GPS_PI;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::{Epoch, WEEK_S};
@@ -58,25 +58,19 @@ impl Almanac {
     ///
     /// The mean-motion correction goes into the semi-major axis, for an almanac has no other place for it.
     pub fn derive(ephemeris: &Ephemeris, toa: Epoch) -> Self {
-        let age_s = toa.since(ephemeris.toe);
-        let a = ephemeris.sqrt_a_sqrtm;
-        let motion_radps = GPS_MU_M3PS2.sqrt() / (a * a * a) + ephemeris.delta_n_radps;
-        // The node is counted from the week's start; another week's is Earth's rotation away.
-        let weeks = (toa.week() - ephemeris.toe.week()) as f64;
-        let clock_age_s = toa.since(ephemeris.toc);
+        let mean = ephemeris.mean_at(toa);
         Self {
             number: ephemeris.sv.number,
             eccentricity: ephemeris.eccentricity,
             toa_s: toa.tow_s(),
-            delta_i_rad: ephemeris.i0_rad + ephemeris.idot_radps * age_s - ALMANAC_INCLINATION_SEMICIRCLES * GPS_PI,
+            delta_i_rad: mean.inclination_rad - ALMANAC_INCLINATION_SEMICIRCLES * GPS_PI,
             omega_dot_radps: ephemeris.omega_dot_radps,
             health: if ephemeris.health & 0x20 == 0 { ephemeris.health } else { 0xE0 | (ephemeris.health & 0x1F) },
-            sqrt_a_sqrtm: libm::cbrt(GPS_MU_M3PS2.sqrt() / motion_radps),
-            omega0_rad: ephemeris.omega0_rad + ephemeris.omega_dot_radps * age_s
-                - EARTH_ROTATION_RADPS * WEEK_S as f64 * weeks,
+            sqrt_a_sqrtm: mean.sqrt_a_sqrtm,
+            omega0_rad: mean.omega0_rad,
             omega_rad: ephemeris.omega_rad,
-            m0_rad: ephemeris.m0_rad + motion_radps * age_s,
-            af0_s: ephemeris.af0_s + clock_age_s * (ephemeris.af1_sps + clock_age_s * ephemeris.af2_sps2),
+            m0_rad: mean.m0_rad,
+            af0_s: mean.af0_s,
             af1_sps: ephemeris.af1_sps,
         }
     }

@@ -1,7 +1,7 @@
 //! The GPS legacy navigation message (LNAV): 300-bit subframes of six seconds, encoded and decoded.
 //!
-//! Source: IS-GPS-200N, 20.3. Limits: the telemetry message and the correction table (page 13 of
-//! subframe 4) are empty, reserved bits alternate; a leap second is announced where the navigation file announces one.
+//! Source: IS-GPS-200N, 20.3. Limits: the telemetry message and the correction table (page 13 of subframe 4)
+//! are empty, reserved bits alternate; a leap second is announced where the navigation file announces one.
 
 mod almanac;
 mod fields;
@@ -111,7 +111,8 @@ pub struct Broadcast {
 impl Broadcast {
     /// Builds all pages; almanac and UTC refer to the multiple of 4096 s nearest to `reference`.
     ///
-    /// `almanac` holds one ephemeris a satellite (the first counts). Without `klobuchar` page 18 is a dummy page.
+    /// `almanac` holds one ephemeris a satellite (the first counts). Without `klobuchar` page 18 is a dummy
+    /// page.
     pub fn new(
         klobuchar: Option<Klobuchar>,
         leap_seconds: i64,

@@ -1,4 +1,5 @@
-//! The (32, 26) Hamming code of a word: six parity bits that also depend on the two last bits of the word before.
+//! The (32, 26) Hamming code of a word: six parity bits that also depend on the two last bits of the word
+//! before.
 //!
 //! Source: IS-GPS-200N, 20.3.5.2 and table 20-XIV. Any one or two wrong bits of the 32 are detected.
 

@@ -158,7 +158,9 @@ impl LnavReader {
     fn read(&mut self, subframe: Subframe, near: Epoch, news: &mut Vec<Read>) {
         if let Some(klobuchar) = subframe.klobuchar() {
             news.push(Read::Klobuchar(klobuchar));
-            news.push(Read::Parameters(NavigationRow::each(self.sv, 0, subframe.parameters()).collect()));
+            news.push(Read::Parameters(
+                NavigationRow::each(self.sv, super::LNAV.name, 0, subframe.parameters()).collect(),
+            ));
         }
         if !(1..=3).contains(&subframe.id) {
             return;
@@ -185,7 +187,10 @@ impl LnavReader {
         if let Ok(ephemeris) = ephemeris(self.sv, one, two, three, near) {
             let set = [*one, *two, *three];
             let issue = u32::from(ephemeris.iode);
-            let rows = set.iter().flat_map(|part| NavigationRow::each(self.sv, issue, part.parameters())).collect();
+            let rows = set
+                .iter()
+                .flat_map(|part| NavigationRow::each(self.sv, super::LNAV.name, issue, part.parameters()))
+                .collect();
             self.complete = Some(set);
             news.push(Read::Ephemeris(Box::new(ephemeris)));
             news.push(Read::Parameters(rows));

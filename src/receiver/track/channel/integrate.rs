@@ -168,14 +168,18 @@ impl Channel {
     /// Closes the loops with the sums of an integration.
     fn update(&mut self) {
         let t_s = self.period_s * f64::from(self.summed);
+        // With an overlay out of place nothing but the code is where it seems.
+        let astray = self.held && self.has_overlay();
         let before = match self.stage {
+            _ if astray => None,
             Stage::Tracking(_) => self.previous_sum,
             Stage::Frequency | Stage::Assisted => self.previous,
             // Nothing may correct the frequency.
             Stage::Open => None,
         };
         self.previous_sum = Some(self.sums[1]);
-        self.last = self.loops.close(self.stage.mode(), self.sums, before, self.summed, t_s, Some(self.cn0_hz()));
+        let mode = if astray { Stage::Open.mode() } else { self.stage.mode() };
+        self.last = self.loops.close(mode, self.sums, before, self.summed, t_s, Some(self.cn0_hz()));
         self.carrier += (self.last.carrier_jump_cycles * TURN) as i128;
         self.glances.close(self.last.dll_chips, self.last.code_jump_chips);
         self.code += chips_to_units(self.last.code_jump_chips);

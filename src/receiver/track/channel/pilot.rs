@@ -9,6 +9,7 @@ use super::{Channel, Symbol};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Component, Signal};
 use crate::receiver::correlate::{Arithmetic, Nco, Replica, TURN, Wave};
+use crate::receiver::lead::beside;
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::model::ReplicaModel;
 use crate::receiver::track::overlay::{OverlayPhase, OverlaySync};
@@ -50,8 +51,8 @@ impl Data {
         })
     }
 
-    /// Correlates the data of code period `number`, and gives the symbol that ends with it; `scale` brings the pilot's
-    /// noise to unit variance a component.
+    /// Correlates the data of code period `number`, and gives the symbol that ends with it; `scale` brings
+    /// the pilot's noise to unit variance a component.
     pub(super) fn read(
         &mut self,
         samples: (&[f32], &[f32]),
@@ -72,18 +73,6 @@ impl Data {
         let soft = (self.sum.0.re / (self.periods_per_symbol as f64).sqrt()) as f32;
         whole.then(|| Symbol { first_period: number + 1 - self.periods_per_symbol, soft })
     }
-}
-
-/// The component whose data can be read once the overlay of `pilot` stands: their codes have the same length, and
-/// symbols and overlay of the data begin where the pilot's overlay does.
-pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
-    let fits = |component: &&Component| {
-        let periods = component.periods_per_symbol().unwrap_or(0);
-        let whole = |periods: u32| pilot.overlay.periods().is_multiple_of(periods.max(1));
-        let same = (component.period_s() / pilot.period_s() - 1.0).abs() < 1e-12;
-        periods > 0 && same && whole(periods) && whole(component.overlay.periods())
-    };
-    signal.components.iter().find(|component| !std::ptr::eq(*component, pilot) && fits(component))
 }
 
 impl Channel {
@@ -107,5 +96,6 @@ impl Channel {
         self.cn0 = self.cn0.wiped(self.group);
         self.previous = None;
         self.previous_sum = None;
+        self.watch_overlay();
     }
 }

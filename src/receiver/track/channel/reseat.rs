@@ -8,6 +8,7 @@ use crate::receiver::gap::Edges;
 use crate::receiver::track::Report;
 use crate::receiver::track::lock::{PhaseLock, Rotation, SymbolLock};
 use crate::receiver::track::loops::Rates;
+use crate::receiver::track::overlay::OverlaySync;
 use crate::receiver::track::sync::SymbolSync;
 
 use super::LOCK_PERIODS;
@@ -22,6 +23,7 @@ pub struct Glance {
     pub moved_chips: f64,
     /// Power of the prompts over that of their noise's two components, less that: T·C/N0 of a code period.
     pub power: f64,
+    /// Code periods in the means.
     pub periods: u32,
     /// Rates of carrier (Hz) and code (chips a second).
     pub rates: [Rates; 2],
@@ -77,22 +79,37 @@ impl Channel {
         })
     }
 
-    /// The code period modulo a symbol's in which symbols begin, where that is beyond doubt.
+    /// The code period modulo a symbol's in which symbols begin, where that is beyond doubt; 0 where an
+    /// overlay is known, which numbers periods itself.
     pub fn symbols_begin(&self) -> Option<u64> {
         match self.stage {
+            Stage::Tracking(_) if self.has_overlay() => Some(0),
             Stage::Tracking(begin) if self.confirmed && self.has_symbols => Some(begin),
             _ => None,
         }
     }
 
-    /// Where the signs of prompts have turned since the code was last reseated, or [`Self::forget_edges`] was called.
+    /// Where the signs of prompts have turned since the code was last reseated, or [`Self::forget_edges`] was
+    /// called.
     pub fn edges(&self) -> &Edges {
         &self.glances.edges
     }
 
     /// Begins anew to look where signs turn.
     pub fn forget_edges(&mut self) {
-        self.glances.edges = Edges::new(self.group);
+        self.glances.edges = self.glances.edges.emptied();
+    }
+
+    /// Whether an overlay has been recognised, and is taken off the prompts.
+    pub fn has_overlay(&self) -> bool {
+        self.overlay_phase.is_some()
+    }
+
+    /// Signs turn where an overlay has them turn.
+    pub(super) fn watch_overlay(&mut self) {
+        let periods = self.overlay.as_ref().map_or(0, OverlaySync::periods);
+        let chips: Vec<f64> = (0..periods as u64).map(|number| self.overlay_chip(number)).collect();
+        self.glances.edges = Edges::of_overlay(&chips);
     }
 
     /// The carrier's Doppler at these rates, less what the code does not share.

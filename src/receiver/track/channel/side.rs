@@ -1,7 +1,7 @@
 //! A code that rests on a side peak of its correlation, as BOC has them: it is seen, and moved to the main
 //! one.
 //!
-//! **Statistic.** Correlators stand on the two neighbouring peaks. The noise of taps is correlated as the
+//! **Statistic.** Two correlators follow the neighbouring peaks. The noise of taps is correlated as the
 //! code is, so where the phase of each period is unknown, how likely the main peak is at a tap depends on
 //! that tap's power alone: what the others show follows from it. Hence D, the power of a neighbour less the
 //! prompt's, period by period, without any help of phase, overlay or symbols; it works from the first period
@@ -82,7 +82,7 @@ impl Channel {
     /// main peak.
     pub(super) fn watch_side_peaks(&mut self, prompt: Complex64, neighbours: [Complex64; 2], report: &mut Report) {
         let snr = self.cn0_hz() * self.period_s;
-        // The noise that was measured stands beside the C/N0 that was.
+        // Noise and C/N0 are those that were measured.
         let scale = if self.cn0.hz().is_some() { 2.0 / self.noise() } else { 1.0 };
         let powers = neighbours.map(|sum| scale * sum.norm_sqr());
         let Some(peaks) = &mut self.side_peaks else { return };

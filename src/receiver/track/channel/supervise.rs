@@ -11,7 +11,8 @@ use crate::receiver::track::pull_in::Batch;
 use crate::receiver::track::sync::SymbolSync;
 use crate::receiver::track::{Report, TrackingSettings};
 
-/// A frequency error beyond this, in spite of phase lock, is a false lock: between 0 and the nearest one, 1/(2·symbol).
+/// A frequency error beyond this, in spite of phase lock, is a false lock: between 0 and the nearest one,
+/// 1/(2·symbol).
 const FALSE_LOCK_SHARE: f64 = 0.4;
 /// Symbols over which the frequency is verified: at 25 dB-Hz the error that is found scatters by 2 Hz.
 const VERIFY_SYMBOLS: u32 = 25;

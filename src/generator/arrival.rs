@@ -1,0 +1,167 @@
+//! How a satellite's signal arrives at one reading of the receiver's clock.
+//!
+//! One definition serves samples and truth: with T the clock's reading, t the true time and τ the light time,
+//! the delay of the code is (T − t) + τ + (delays of the ray) − (satellite clock); that of the carrier takes
+//! the ray's carrier delay instead, and is counted in cycles at RF.
+
+use crate::generator::geometry::{Arriving, Geometry};
+use crate::generator::knots::Arrival;
+use crate::generator::presence::{Presence, presence};
+use crate::generator::ray::Ray;
+use crate::generator::scene::Scene;
+use crate::generator::sky::{Arc, Emission, LIGHT_TIME_S, emission_near};
+use crate::generator::spoof::Constellation;
+use crate::generator::vehicle::Motion;
+use crate::gnss::broadcast::OrbitError;
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+use crate::gnss::time::Epoch;
+
+/// A satellite's signal as it arrives at one reading of the receiver's clock.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// Where and when it was sent, and along which line of sight.
+    pub emission: Emission,
+    /// The satellite's clock minus GPS time at emission, for this signal.
+    pub satellite_clock_s: f64,
+    /// The rays as effects leave them, the direct one first.
+    pub rays: Vec<Ray>,
+    /// What each ray brings to the antenna: delay, carrier phase and power.
+    pub arrivals: Vec<Arrival>,
+}
+
+/// True time, and the motion that a constellation's signals are made for, when the receiver's clock reads
+/// `local`.
+pub(super) fn received(scene: &Scene, from: &Constellation, local: Epoch) -> (Epoch, f64, Motion) {
+    let start = scene.clock.start;
+    let elapsed_s = scene.receiver_clock.true_elapsed_s(start, local);
+    (scene.receiver_clock.true_time(start, local), elapsed_s, from.motion(&scene.trajectory, elapsed_s))
+}
+
+/// What arrives from the true satellite `sv` when the receiver's clock reads `local`; `None` without an
+/// ephemeris.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn seen(scene: &Scene, sv: Sv, signal: &Signal, local: Epoch) -> Result<Option<Seen>, OrbitError> {
+    seen_from(scene, &Constellation::authentic(), sv, signal, local)
+}
+
+/// What a constellation sends as `sv` that arrives when the receiver's clock reads `local`.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn seen_from(
+    scene: &Scene,
+    from: &Constellation,
+    sv: Sv,
+    signal: &Signal,
+    local: Epoch,
+) -> Result<Option<Seen>, OrbitError> {
+    seen_by(scene, from, (sv, signal), local, None)
+}
+
+/// [`seen_from`] where what all signals of the satellite have in common may be known.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn seen_by(
+    scene: &Scene,
+    from: &Constellation,
+    link: (Sv, &Signal),
+    local: Epoch,
+    known: Option<&Geometry>,
+) -> Result<Option<Seen>, OrbitError> {
+    seen_near(scene, from, link, local, (LIGHT_TIME_S, known))
+}
+
+/// [`seen_by`] with a guess of the light time.
+pub(super) fn seen_near(
+    scene: &Scene,
+    from: &Constellation,
+    (sv, signal): (Sv, &Signal),
+    local: Epoch,
+    (guess_s, known): (f64, Option<&Geometry>),
+) -> Result<Option<Seen>, OrbitError> {
+    let find = || {
+        let (time, elapsed_s, motion) = received(scene, from, local);
+        let emission = emission_near(&scene.catalogue, sv, time, &motion, guess_s)?;
+        let bias_s = local.since(time) - from.clock_s(elapsed_s);
+        Ok(emission.map(|emission| Arriving { emission, bias_s, gain: from.gain(elapsed_s) }))
+    };
+    let found = match known {
+        Some(known) => known.at(local, guess_s, find)?,
+        None => find()?,
+    };
+    Ok(found.map(|found| arriving(scene, signal, found)))
+}
+
+/// [`seen_from`] of a satellite on a short arc of its orbit.
+///
+/// # Errors
+/// None by itself; the type is that of [`seen_from`].
+pub fn seen_on(
+    scene: &Scene,
+    from: &Constellation,
+    arc: &Arc,
+    signal: &Signal,
+    local: Epoch,
+) -> Result<Option<Seen>, OrbitError> {
+    let (time, elapsed_s, motion) = received(scene, from, local);
+    let bias_s = local.since(time) - from.clock_s(elapsed_s);
+    let found = arc.emission(time, &motion)?;
+    let gain = from.gain(elapsed_s);
+    Ok(found.map(|emission| arriving(scene, signal, Arriving { emission, bias_s, gain })))
+}
+
+/// The rays of a signal of what arrives.
+fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }: Arriving) -> Seen {
+    let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
+    for effect in &scene.effects {
+        effect.act(&emission.sight, signal, &mut rays);
+    }
+    // Small numbers only: no reading of a clock enters a sum of seconds.
+    let sent = emission.sight.received.plus_s(-emission.travel_s);
+    let ahead_s = scene.catalogue.signal_clock_s(emission.sight.sv, sent, signal);
+    let satellite_clock_s = emission.satellite_clock_s + ahead_s;
+    let common_s = bias_s + emission.travel_s - satellite_clock_s;
+    rays.iter_mut().for_each(|ray| ray.cn0_hz *= gain);
+    let arrivals = rays
+        .iter()
+        .map(|ray| Arrival {
+            delay_s: common_s + ray.code_delay_s,
+            carrier_cycles: signal.carrier_hz(emission.sight.sv)
+                * (planted!("generator.truth.clock_in_carrier", common_s, common_s - bias_s) + ray.carrier_delay_s)
+                + ray.phase_cycles,
+            cn0_hz: ray.cn0_hz,
+        })
+        .collect();
+    Seen { emission, satellite_clock_s, rays, arrivals }
+}
+
+/// Whether `sv` is in the scene's sky when the receiver's clock reads `local`: it has a message to send and
+/// stands above the mask, or from space not behind the Earth. Health is the scene's to judge, through its
+/// exclusions.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn in_view(scene: &Scene, sv: Sv, local: Epoch) -> Result<bool, OrbitError> {
+    in_view_from(scene, &Constellation::authentic(), sv, local)
+}
+
+/// Whether `sv` is in the sky of the place that a constellation's signals are made for.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn in_view_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -> Result<bool, OrbitError> {
+    Ok(presence_from(scene, from, sv, local)?.end().is_none())
+}
+
+/// Where `sv` is in the sky of the place that a constellation's signals are made for.
+///
+/// # Errors
+/// Those of the orbit.
+pub fn presence_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -> Result<Presence, OrbitError> {
+    let (time, _, motion) = received(scene, from, local);
+    presence(scene, sv, time, &motion)
+}

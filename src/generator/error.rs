@@ -1,0 +1,44 @@
+//! Why a scene could not be generated.
+
+use thiserror::Error;
+
+use crate::generator::synth::waveform::WaveformError;
+use crate::generator::truth::TruthError;
+use crate::gnss::broadcast::OrbitError;
+use crate::gnss::gps::lnav::FieldError;
+
+/// Why a scene could not be generated.
+#[derive(Debug, Error)]
+pub enum GenerateError {
+    /// An orbit that cannot be computed.
+    #[error(transparent)]
+    Orbit(#[from] OrbitError),
+    /// An ephemeris whose values do not fit its message.
+    #[error("a navigation message cannot be made: {0}")]
+    Message(#[from] FieldError),
+    /// A sink that does not take the truth.
+    #[error("truth: {0}")]
+    Truth(#[from] TruthError),
+    /// A writer that does not take the samples.
+    #[error("samples could not be written: {0}")]
+    Write(#[from] std::io::Error),
+    /// A signal that cannot be rendered at the scene's rate.
+    #[error(transparent)]
+    Waveform(#[from] WaveformError),
+    /// Front ends without a scene.
+    #[error("no front end: expected one at least")]
+    NoFrontEnd,
+    /// `truth.interval_s` out of range.
+    #[error("truth_interval_s = {0}: expected 1e-6 to 1e6 s")]
+    TruthInterval(f64),
+    /// A part that the scene does not have.
+    #[error("samples {first} to {end} of a scene that has {samples}: expected a first one before the last")]
+    Part {
+        /// First sample asked for.
+        first: u64,
+        /// The sample after the last one asked for.
+        end: u64,
+        /// Samples of the scene.
+        samples: u64,
+    },
+}

@@ -1,0 +1,110 @@
+//! Satellites' clocks as they depart from what they broadcast: steps, ramps and the oscillator's noise.
+//!
+//! A departure reaches the antenna as a change of code and carrier alike. Steps and ramps begin and end at
+//! nodes, up to a millisecond after the time that the scene gives, which is that of arrival; a step takes no
+//! time. Limits: the noise is drawn over the received samples, whose time runs a millionth faster or slower
+//! than the satellite's.
+
+use std::collections::BTreeMap;
+
+use super::Sources;
+use crate::generator::clock::oscillator::Oscillator;
+use crate::gnss::satellite::Sv;
+
+/// A change of a clock between two nodes; the end is `u64::MAX` where there is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Change {
+    /// Number of the node at which it begins.
+    pub from_node: u64,
+    /// Number of the node at which it ends.
+    pub until_node: u64,
+    /// What it does between them.
+    pub kind: ChangeKind,
+}
+
+/// What a change does to the clock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ChangeKind {
+    /// Ahead by so much between the nodes.
+    Step {
+        /// By how much the clock is ahead.
+        step_s: f64,
+    },
+    /// Gains so much a second between the nodes and keeps what it gained.
+    Ramp {
+        /// What it gains, in seconds a second.
+        drift: f64,
+    },
+}
+
+/// One satellite's clock against what it broadcasts.
+#[derive(Debug, Default)]
+pub struct SatelliteClock {
+    /// Steps and ramps, which add up.
+    pub changes: Vec<Change>,
+    /// Noise beyond that of the broadcast clock, which adds up too.
+    pub noise: Vec<Oscillator>,
+}
+
+/// Those clocks that depart.
+#[derive(Debug, Default)]
+pub struct SatelliteClocks {
+    /// The departing clocks by satellite.
+    pub clocks: BTreeMap<Sv, SatelliteClock>,
+    /// What they do, for the plan.
+    pub descriptions: Vec<String>,
+}
+
+impl SatelliteClocks {
+    /// The clock of a satellite, if it departs.
+    pub fn of(&self, sv: Sv) -> Option<&SatelliteClock> {
+        self.clocks.get(&sv)
+    }
+}
+
+/// True seconds since the scene's start at a node.
+fn elapsed_s(sources: &Sources<'_>, node: u64) -> f64 {
+    let local = sources.nodes.clock(sources.clock).epoch(sources.nodes.tick(node));
+    sources.receiver_clock.true_elapsed_s(sources.clock.start, local)
+}
+
+impl SatelliteClock {
+    /// Clock minus what is broadcast of it, between node number `node` and the next: at its beginning and at
+    /// its end.
+    pub fn cell_s(&self, sources: &Sources<'_>, node: u64) -> [f64; 2] {
+        [node, node + 1].map(|at| {
+            let changed = self.changes.iter().map(|change| change.offset_s(sources, node, at));
+            let elapsed_s = sources.nodes.elapsed_s(at);
+            let noise = |oscillator: &Oscillator| oscillator.slow_s(elapsed_s) + oscillator.quick_s(at);
+            changed.chain(self.noise.iter().map(noise)).sum::<f64>()
+        })
+    }
+
+    /// The same at a place between samples.
+    pub fn at_s(&self, sources: &Sources<'_>, sample: f64) -> f64 {
+        let place = sources.nodes.place(sources.clock.rate, sample);
+        let node = place.floor();
+        let [from_s, to_s] = self.cell_s(sources, node as u64);
+        from_s + (to_s - from_s) * (place - node)
+    }
+
+    /// True times since the scene's start at which offset or drift jumps.
+    pub fn breaks_s(&self, sources: &Sources<'_>) -> impl Iterator<Item = f64> {
+        let nodes = self.changes.iter().flat_map(|change| [change.from_node, change.until_node]);
+        nodes.filter(|node| *node != u64::MAX).map(|node| elapsed_s(sources, node))
+    }
+}
+
+impl Change {
+    /// At node `at`, which ends or begins the stretch behind node `node`.
+    fn offset_s(&self, sources: &Sources<'_>, node: u64, at: u64) -> f64 {
+        match self.kind {
+            ChangeKind::Step { step_s } if (self.from_node..self.until_node).contains(&node) => step_s,
+            ChangeKind::Step { .. } => 0.0,
+            ChangeKind::Ramp { .. } if at <= self.from_node => 0.0,
+            ChangeKind::Ramp { drift } => {
+                drift * (elapsed_s(sources, at.min(self.until_node)) - elapsed_s(sources, self.from_node))
+            }
+        }
+    }
+}

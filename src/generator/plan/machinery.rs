@@ -1,0 +1,63 @@
+//! What the synthesiser will do for a scene: knots, memory and speed.
+
+use crate::generator::arrival;
+use crate::generator::error::GenerateError;
+use crate::generator::scene::Scene;
+use crate::generator::stream::{Options, transmitters};
+use crate::generator::synth::{Edge, RUN_SAMPLES};
+
+/// Roots of each satellite's grid that a plan looks at.
+const PLANNED_ROOTS: u64 = 16;
+
+/// What the plan cannot know of itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machinery {
+    /// Shortest and longest time between knots of the signal's delay, and why it is that.
+    pub knot_spacing_s: f64,
+    /// Longest time between knots.
+    pub longest_knot_spacing_s: f64,
+    /// Why they stand so.
+    pub knot_reason: String,
+    /// Memory of the generator's blocks, which does not grow with the scene.
+    pub block_bytes: u64,
+    /// Samples times satellites that this machine makes a second.
+    pub satellite_samples_per_s: f64,
+}
+
+/// What the plan reports of the synthesiser: knots met along the scene, memory of a batch, and the usual
+/// speed.
+///
+/// # Errors
+/// Those of orbits.
+pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
+    let transmitters = transmitters(scene, Edge::Nearest)?;
+    let rate = scene.clock.rate;
+    let (mut shortest, mut longest, mut worst_cycles) = (u64::MAX, 0, 0.0_f64);
+    for transmitter in &transmitters {
+        if !arrival::in_view_from(scene, &transmitter.from, transmitter.sv, scene.clock.start)? {
+            continue;
+        }
+        let size = transmitter.root_samples();
+        let roots = scene.samples.div_ceil(size);
+        for root in (0..roots).step_by(roots.div_ceil(PLANNED_ROOTS).max(1) as usize) {
+            for part in transmitter.root(scene, root)? {
+                shortest = shortest.min(part.end - part.start);
+                longest = longest.max(part.end - part.start);
+                worst_cycles = worst_cycles.max(part.error_cycles);
+            }
+        }
+    }
+    let shortest = shortest.min(longest);
+    let options = Options::default();
+    let batch = u64::from(options.block_runs) * u64::from(options.batch_blocks) * RUN_SAMPLES as u64;
+    Ok(Machinery {
+        knot_spacing_s: rate.elapsed_s(shortest),
+        longest_knot_spacing_s: rate.elapsed_s(longest),
+        knot_reason: format!(
+            "the longest on which a cubic stays within {:e} cycles of the motion; {worst_cycles:.1e} met",
+            scene.fidelity.knot_tolerance_cycles
+        ),
+        block_bytes: batch.min(scene.samples) * scene.metadata.format.bytes() as u64,
+        satellite_samples_per_s: 1e9 / scene.fidelity.satellite_sample_ns(rate.hz()),
+    })
+}

@@ -1,0 +1,347 @@
+//! From `[[interference]]` and `[[spoofer]]` as written to sources in a scene.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use super::interference::{InterferenceSpec, Kind, SpooferSpec, Strength};
+use super::{Overrides, Power, Scenario, ScenarioError};
+use crate::generator::effect::link::LinkBudget;
+use crate::generator::levels::strongest;
+use crate::generator::scene::{CodeEdge, Scene};
+use crate::generator::spoof::{Constellation, Drag, Place};
+use crate::generator::stage::interference::arrival::{Path as Way, Repetition, Tuning};
+use crate::generator::stage::interference::{ChipEdge, Interferer, Recorded, Waveform};
+use crate::generator::synth::band::Filter;
+use crate::generator::synth::resample::Interpolator;
+use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use crate::gnss::gps::l1ca::L1_CA;
+use crate::gnss::samples::Format;
+
+/// Source samples a cycle of a noise's bandwidth: its filter falls within 0.08 of that beyond each edge.
+const NOISE_RATE: f64 = 1.5;
+
+/// A part of the sampled band from which on noise is white in all of it.
+const WHOLE: f64 = 0.98;
+
+/// The interference of a scene. What lies wholly outside the samples' band is left out: [`unheard`].
+pub(super) fn interferers(
+    scenario: &Scenario,
+    scene: &Scene,
+    directory: &Path,
+    overrides: &Overrides,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Interferer>, ScenarioError> {
+    let mut found = Vec::new();
+    for (number, spec) in (1_u64..).zip(&scenario.interference) {
+        let source = Source { scenario, scene, spec, number, tuning: scene.tuning() };
+        found.extend(source.interferer(directory, overrides, warnings)?);
+    }
+    Ok(found)
+}
+
+/// Warnings about sources that lie outside the bands of all front ends.
+pub(super) fn unheard<'s>(scenario: &'s Scenario, scenes: &'s [Scene]) -> impl Iterator<Item = String> + 's {
+    let numbered = (1_u64..).zip(&scenario.interference);
+    let heard = |number: u64| scenes.iter().flat_map(|scene| &scene.interference).any(|found| found.source == number);
+    numbered.filter(move |(number, _)| !heard(*number)).map(|(number, spec)| {
+        let kind = spec.kind.name();
+        format!("interference number {number} ({kind}) lies outside the samples' band: it is not computed")
+    })
+}
+
+struct Source<'a> {
+    scenario: &'a Scenario,
+    scene: &'a Scene,
+    spec: &'a InterferenceSpec,
+    number: u64,
+    tuning: Tuning,
+}
+
+/// A waveform with the share of its power and the middle of what is in the samples' band.
+struct Fitted {
+    waveform: Waveform,
+    share: f64,
+    carrier_hz: f64,
+    text: String,
+}
+
+impl Source<'_> {
+    fn refuse(&self, reason: &str) -> ScenarioError {
+        let reason = format!("number {} ({}): {reason}", self.number, self.spec.kind.name());
+        self.scenario.conflict("interference", reason)
+    }
+
+    fn interferer(
+        &self,
+        directory: &Path,
+        overrides: &Overrides,
+        warnings: &mut Vec<String>,
+    ) -> Result<Option<Interferer>, ScenarioError> {
+        let spec = self.spec;
+        let kind = spec.kind.name();
+        let Some(fitted) = self.waveform(directory, overrides, warnings)? else { return Ok(None) };
+        let path = spec.place.map(|place| Way { emitter_m: place.to_ecef(), antenna: self.scene.trajectory.clone() });
+        let jn0_dbhz = self.jn0_dbhz(path.as_ref())? + 10.0 * libm::log10(fitted.share);
+        let on = self.tuning.sample_at(spec.on_s)..spec.off_s.map_or(u64::MAX, |t_s| self.tuning.sample_at(t_s));
+        let place = if path.is_some() { " from its place" } else { "" };
+        let end = spec.off_s.map_or(String::new(), |t_s| format!(" to {t_s} s"));
+        let description = format!(
+            "{kind} at L1 {:+.6} MHz{}{place}, {jn0_dbhz:.1} dB-Hz over the noise, from {} s{end}",
+            (fitted.carrier_hz - L1_CA.centre_hz()) / 1e6,
+            fitted.text,
+            spec.on_s
+        );
+        // Noise is drawn at the front end's rate, all else by the time: that is the same for every front end.
+        let own = matches!(fitted.waveform, Waveform::Noise { .. } | Waveform::White);
+        let seed = if own { self.scene.noise_seed() } else { self.scene.seed };
+        Ok(Some(Interferer {
+            source: self.number,
+            kind,
+            waveform: fitted.waveform,
+            carrier_hz: fitted.carrier_hz,
+            jn0_hz: libm::pow(10.0, jn0_dbhz / 10.0),
+            path,
+            on,
+            // Sources of one scene, and the thermal noise, draw from streams of their own.
+            seed: seed ^ self.number.wrapping_mul(0xd1b5_4a32_d192_ed03),
+            tuning: self.tuning.clone(),
+            description,
+        }))
+    }
+
+    /// Its whole power over noise density at the antenna when the scene starts.
+    fn jn0_dbhz(&self, path: Option<&Way>) -> Result<f64, ScenarioError> {
+        let budget = match &self.scenario.power {
+            Power::Fixed { cn0_dbhz, .. } => match self.spec.strength {
+                Strength::OverSignal { db } => return Ok(cn0_dbhz + db),
+                Strength::Received { .. } | Strength::Radiated { .. } => {
+                    let key = self.spec.strength.key();
+                    let reason =
+                        format!("{key} is in dBW and needs [power] kind = \"link_budget\"; write js_db instead");
+                    return Err(self.refuse(&reason));
+                }
+            },
+            Power::LinkBudget { noise_figure_db, loss_db, .. } => {
+                LinkBudget { noise_figure_db: *noise_figure_db, extra_loss_db: *loss_db, ..LinkBudget::default() }
+            }
+        };
+        let radiated = |dbw: f64, travel_s: f64| {
+            let turns = 2.0 * std::f64::consts::TAU * travel_s * L1_CA.centre_hz();
+            budget.over_noise_dbhz(dbw - 20.0 * libm::log10(turns))
+        };
+        match (self.spec.strength, path) {
+            (Strength::Received { dbw }, _) => Ok(budget.over_noise_dbhz(dbw)),
+            (Strength::Radiated { dbw, distance_m: Some(distance_m) }, _) => {
+                Ok(radiated(dbw, distance_m / SPEED_OF_LIGHT_MPS))
+            }
+            (Strength::Radiated { dbw, distance_m: None }, Some(path)) => Ok(radiated(dbw, path.travel_s(0.0))),
+            (Strength::Radiated { distance_m: None, .. }, None) => {
+                Err(self.refuse("eirp_dbw needs a place, or distance_m"))
+            }
+            (Strength::OverSignal { db }, _) => {
+                let strongest = strongest(self.scene).map_err(|e| self.refuse(&e.to_string()))?;
+                let nothing = "js_db counts from the strongest satellite in view at the scene's start, and there is \
+                               none; write power_dbw instead";
+                strongest.map(|(_, cn0_dbhz)| cn0_dbhz + db).ok_or_else(|| self.refuse(nothing))
+            }
+        }
+    }
+
+    /// Lowest and highest frequency of a band of `width_hz` about the carrier that samples hold.
+    fn overlap_hz(&self, width_hz: f64) -> Option<(f64, f64)> {
+        let (low_hz, high_hz) = self.tuning.band_hz();
+        let place_hz = self.tuning.place_hz(L1_CA.centre_hz() + self.spec.offset_hz);
+        let (low_hz, high_hz) = (low_hz.max(place_hz - 0.5 * width_hz), high_hz.min(place_hz + 0.5 * width_hz));
+        // A line has no width, and lies inside or outside.
+        (low_hz < high_hz || (width_hz == 0.0 && low_hz == high_hz)).then_some((low_hz, high_hz))
+    }
+
+    fn waveform(
+        &self,
+        directory: &Path,
+        overrides: &Overrides,
+        warnings: &mut Vec<String>,
+    ) -> Result<Option<Fitted>, ScenarioError> {
+        let (waveform, width_hz, text) = match &self.spec.kind {
+            Kind::Cw => (Waveform::Cw, 0.0, String::new()),
+            Kind::Chirp { sweep_hz, sweep_s } => {
+                self.lasts("sweep_s", *sweep_s)?;
+                let waveform = Waveform::Chirp { sweep_hz: *sweep_hz, repetition: Repetition::every_s(*sweep_s) };
+                (waveform, sweep_hz.abs(), format!(", sweep of {sweep_hz:e} Hz in {sweep_s:e} s"))
+            }
+            Kind::Fmcw { sweep_hz, sweep_s } => {
+                self.lasts("sweep_s", *sweep_s)?;
+                let waveform = Waveform::Fmcw { sweep_hz: *sweep_hz, repetition: Repetition::every_s(2.0 * sweep_s) };
+                (waveform, sweep_hz.abs(), format!(", sweeps of {sweep_hz:e} Hz in {sweep_s:e} s and back"))
+            }
+            Kind::SineFm { deviation_hz, rate_hz } => {
+                self.lasts("1/rate_hz", 1.0 / rate_hz)?;
+                let waveform =
+                    Waveform::SineFm { deviation_hz: *deviation_hz, repetition: Repetition::of_hz(*rate_hz) };
+                (waveform, 2.0 * deviation_hz, format!(", deviation {deviation_hz:e} Hz at {rate_hz} Hz"))
+            }
+            Kind::Pulse { width_s, rate_hz, jitter } => {
+                self.lasts("width_s", *width_s)?;
+                let repetition = Repetition::of_hz(*rate_hz);
+                let waveform = Waveform::Pulse { width_s: *width_s, repetition, jitter: *jitter };
+                (waveform, 0.0, format!(", {width_s:e} s on, {rate_hz} times a second, jitter {jitter}"))
+            }
+            Kind::Matched => {
+                let chips_hz = L1_CA.components.first().map_or(0.0, |c| c.chip_rate_hz);
+                let waveform = Waveform::Matched { chips: Repetition::of_hz(chips_hz), edge: self.edge() };
+                (waveform, 2.0 * chips_hz, format!(", random chips at {:.3} MHz", chips_hz / 1e6))
+            }
+            Kind::Noise { bandwidth_hz } => return Ok(self.noise(*bandwidth_hz)),
+            Kind::Recording { path, format, rate_hz, repeat } => {
+                let bytes = self.scenario.load("interference.file", directory, path, overrides)?;
+                return self.recording(&bytes, (*format, *rate_hz, *repeat), warnings).map(Some);
+            }
+        };
+        let Some((low_hz, high_hz)) = self.overlap_hz(width_hz) else { return Ok(None) };
+        if high_hz - low_hz < width_hz * (1.0 - 1e-12) {
+            let what = if matches!(waveform, Waveform::Matched { .. }) { "folds over" } else { "is silent" };
+            warnings.push(format!(
+                "interference number {} ({}): only {:.6} of its {:.6} MHz lie in the samples' band: the rest {what}",
+                self.number,
+                self.spec.kind.name(),
+                (high_hz - low_hz) / 1e6,
+                width_hz / 1e6
+            ));
+        }
+        let carrier_hz = L1_CA.centre_hz() + self.spec.offset_hz;
+        Ok(Some(Fitted { waveform, share: 1.0, carrier_hz, text }))
+    }
+
+    /// Refuses what happens within less than two samples.
+    fn lasts(&self, what: &str, time_s: f64) -> Result<(), ScenarioError> {
+        let least_s = 2.0 / self.scene.clock.rate.hz();
+        if time_s >= least_s {
+            return Ok(());
+        }
+        Err(self.refuse(&format!("{what} = {time_s:e} s: expected at least two samples, {least_s:e} s")))
+    }
+
+    fn edge(&self) -> ChipEdge {
+        match self.scene.fidelity.code_edge {
+            CodeEdge::Nearest => ChipEdge::Nearest,
+            CodeEdge::Area => ChipEdge::Area,
+            CodeEdge::BandLimited => ChipEdge::BandLimited(Box::new(Filter::new(self.scene.cutoff_cps()))),
+        }
+    }
+
+    /// Noise in what its band shares with the samples'.
+    fn noise(&self, bandwidth_hz: f64) -> Option<Fitted> {
+        let (low_hz, high_hz) = self.overlap_hz(bandwidth_hz)?;
+        let rate_hz = self.scene.clock.rate.hz();
+        let width_hz = high_hz - low_hz;
+        let text = format!(", Gaussian in {:.6} MHz of {:.6} MHz", width_hz / 1e6, bandwidth_hz / 1e6);
+        let carrier_hz = self.scene.metadata.center_hz + self.tuning.sign() * 0.5 * (low_hz + high_hz);
+        let waveform = if width_hz >= WHOLE * rate_hz {
+            Waveform::White
+        } else {
+            // To a source sample in 2^32; the cut-off takes the rounding up.
+            let step = (NOISE_RATE * width_hz / rate_hz * 4_294_967_296.0).round().max(1.0);
+            let source_hz = step / 4_294_967_296.0 * rate_hz;
+            Waveform::Noise { width_hz, step: step as u64, by: Interpolator::new(0.5 * width_hz / source_hz, true) }
+        };
+        Some(Fitted { waveform, share: width_hz / bandwidth_hz, carrier_hz, text })
+    }
+
+    fn recording(
+        &self,
+        bytes: &[u8],
+        (format, file_rate_hz, repeat): (Format, f64, bool),
+        warnings: &mut Vec<String>,
+    ) -> Result<Fitted, ScenarioError> {
+        let (mut i, mut q) = (Vec::new(), Vec::new());
+        format.unpack(bytes, &mut i, &mut q);
+        let power: f64 = i.iter().zip(&q).map(|(i, q)| f64::from(*i).powi(2) + f64::from(*q).powi(2)).sum();
+        let mean = power / i.len() as f64;
+        if i.len() < 64 || !mean.is_finite() || mean <= 0.0 {
+            return Err(
+                self.refuse(&format!("{} samples of mean power {mean}: expected at least 64, not silent", i.len()))
+            );
+        }
+        let scale = (1.0 / mean.sqrt()) as f32;
+        i.iter_mut().chain(&mut q).for_each(|x| *x *= scale);
+        let (low_hz, high_hz) = self.tuning.band_hz();
+        let place_hz = self.tuning.place_hz(L1_CA.centre_hz() + self.spec.offset_hz);
+        let room_hz = (place_hz - low_hz).min(high_hz - place_hz);
+        let cutoff_cps = (room_hz / file_rate_hz).min(0.5);
+        // Below a sixteenth of the file's rate the interpolator's 64 neighbours hold no two cycles of the
+        // cut-off.
+        if cutoff_cps < 1.0 / 16.0 {
+            let reason = format!(
+                "the samples' band leaves {room_hz} Hz on a side of it: expected at least a sixteenth of sample_rate_hz, {} Hz",
+                file_rate_hz / 16.0
+            );
+            return Err(self.refuse(&reason));
+        }
+        if cutoff_cps < 0.5 {
+            warnings.push(format!(
+                "interference number {} (recording): the samples' band holds {:.6} MHz on each side of its middle: the rest is filtered away",
+                self.number,
+                room_hz / 1e6
+            ));
+        }
+        let waveform = Waveform::Recording {
+            samples: Arc::new(Recorded { i, q }),
+            rate: Repetition::of_hz(file_rate_hz),
+            by: Interpolator::new(cutoff_cps, false),
+            repeat,
+        };
+        let text = format!(", {:.3} s at {file_rate_hz} Hz", bytes.len() as f64 / format.bytes() as f64 / file_rate_hz);
+        Ok(Fitted { waveform, share: 1.0, carrier_hz: L1_CA.centre_hz() + self.spec.offset_hz, text })
+    }
+}
+
+/// The spoofers of a scene that ends at `end_s`.
+pub(super) fn spoofers(
+    scenario: &Scenario,
+    scene: &Scene,
+    end_s: f64,
+    directory: &Path,
+    overrides: &Overrides,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Arc<Constellation>>, ScenarioError> {
+    let mut found = Vec::new();
+    for (number, spec) in (1..).zip(&scenario.spoofers) {
+        let place = match &spec.motion {
+            None => Place::Antenna,
+            Some(motion) => {
+                let trajectory = scenario.trajectory_of(motion, directory, overrides, warnings)?;
+                let last_s = spec.off_s.map_or(end_s, |off_s| off_s.min(end_s));
+                scenario.covers(motion, &trajectory, spec.on_s.min(last_s), last_s)?;
+                Place::Claimed(Box::new(trajectory))
+            }
+        };
+        let mut constellation = Constellation {
+            number,
+            place,
+            drag: None,
+            clock_bias_s: spec.clock_bias_s,
+            clock_drift: spec.clock_drift,
+            satellites: spec.satellites.clone(),
+            advantage: Some(spec.advantage),
+            on_s: spec.on_s..spec.off_s.unwrap_or(f64::INFINITY),
+        };
+        constellation.drag = drag(spec, &constellation, scene);
+        found.push(Arc::new(constellation));
+    }
+    Ok(found)
+}
+
+/// The drag in ECEF, its direction that at the place where it begins.
+fn drag(spec: &SpooferSpec, from: &Constellation, scene: &Scene) -> Option<Drag> {
+    let drag = spec.drag?;
+    let here = Geodetic::from_ecef(&from.motion(&scene.trajectory, drag.start_s).position_m);
+    let ((sin_a, cos_a), (sin_e, cos_e)) = (libm::sincos(drag.azimuth_rad), libm::sincos(drag.elevation_rad));
+    Some(Drag {
+        start_s: drag.start_s,
+        direction: here.ecef_to_enu().transpose() * Vector3::new(sin_a * cos_e, cos_a * cos_e, sin_e),
+        speed_mps: drag.speed_mps,
+        acceleration_mps2: drag.acceleration_mps2,
+    })
+}

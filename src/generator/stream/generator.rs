@@ -1,0 +1,101 @@
+//! The generator as an iterator: batches of samples with the truth of each.
+
+use super::{GenerateError, Generated, Options, Stream};
+use crate::generator::scene::Scene;
+use crate::generator::truth::Record;
+
+/// Consecutive samples of a scene, and what is true of them.
+#[derive(Clone, Debug)]
+pub struct Batch {
+    /// Number of the first of them in the scene.
+    pub first_sample: u64,
+    /// The samples as the scene's metadata describe them.
+    pub samples: Vec<u8>,
+    /// The truth at the ticks within these samples. The last batch ends with the messages that were sent and
+    /// the times in view.
+    pub truth: Vec<Record>,
+}
+
+/// Iterates the batches of a scene; ends after the last sample or the first error.
+///
+/// A batch has half a million samples by default, and memory holds one: how the work is cut changes no byte.
+///
+/// ```
+/// use gnss_twin::generator::scenario::Scenario;
+/// use gnss_twin::generator::stream::Generator;
+/// use gnss_twin::generator::truth::Record;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let scene = Scenario::from_toml(
+///     r#"
+///     name = "short"
+///     start = 2010-07-01T08:06:00
+///     duration_s = 0.1
+///     motion = { kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
+///     "#,
+/// )?
+/// .scene()?;
+/// let (mut bytes, mut observations) = (0, 0);
+/// for batch in Generator::new(&scene)? {
+///     let batch = batch?;
+///     bytes += batch.samples.len();
+///     observations += batch.truth.iter().filter(|record| matches!(record, Record::Observation(_))).count();
+/// }
+/// assert_eq!(bytes, 2 * 260_000); // 2.6 Msps of complex 8-bit samples
+/// assert!(observations >= 4);
+/// # Ok(())
+/// # }
+/// ```
+pub struct Generator<'a> {
+    scene: &'a Scene,
+    /// Taken with the last sample.
+    stream: Option<Stream<'a>>,
+    next: u64,
+    done: Option<Generated>,
+}
+
+impl<'a> Generator<'a> {
+    /// The batches of `scene` from its first sample on.
+    ///
+    /// # Errors
+    /// A rate that the scene's signals cannot have.
+    pub fn new(scene: &'a Scene) -> Result<Self, GenerateError> {
+        Self::with(scene, &Options::default())
+    }
+
+    /// [`Generator::new`] with the work cut as `options` say.
+    ///
+    /// # Errors
+    /// As [`Generator::new`].
+    pub fn with(scene: &'a Scene, options: &Options) -> Result<Self, GenerateError> {
+        Ok(Self { scene, stream: Some(Stream::new(scene, &mut (), options)?), next: 0, done: None })
+    }
+
+    /// What was done, once the last batch was returned.
+    pub fn done(&self) -> Option<&Generated> {
+        self.done.as_ref()
+    }
+
+    /// The next batch; `None` where there is none.
+    fn batch(&mut self) -> Result<Option<Batch>, GenerateError> {
+        let Some(mut stream) = self.stream.take() else { return Ok(None) };
+        let (mut samples, mut truth) = (Vec::new(), Vec::new());
+        let first_sample = self.next;
+        let more = stream.next(&mut truth, &mut samples)?;
+        self.next = stream.samples();
+        if self.next < self.scene.samples {
+            self.stream = Some(stream);
+        } else {
+            self.done = Some(stream.finish(&mut truth)?);
+        }
+        Ok(more.then_some(Batch { first_sample, samples, truth }))
+    }
+}
+
+impl Iterator for Generator<'_> {
+    type Item = Result<Batch, GenerateError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.batch().transpose()
+    }
+}

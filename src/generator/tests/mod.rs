@@ -1,0 +1,8 @@
+//! Laws that need the whole generator: rooms below compose scenes and generate samples here.
+
+mod dynamics;
+mod fronts;
+mod levels;
+mod plan;
+mod presence;
+mod signals;

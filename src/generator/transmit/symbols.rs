@@ -1,0 +1,108 @@
+//! The data of a satellite: which code periods its messages invert.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::generator::error::GenerateError;
+use crate::generator::message::{self, Sent as SentSymbols, Slot};
+use crate::generator::scene::Scene;
+use crate::generator::spoof::Constellation;
+use crate::gnss::message::Message;
+use crate::gnss::record::NavigationRow;
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::{Component, Signal};
+use crate::gnss::time::Epoch;
+
+/// What a satellite sends in a stretch of time.
+pub struct Symbols {
+    /// Units by their number since 1980-01-06T00:00:00 of the system's time, of each form of message.
+    units: Vec<(&'static Message, BTreeMap<i64, Vec<bool>>)>,
+    /// What has been sent so far.
+    pub navigation: BTreeSet<NavigationRow>,
+}
+
+/// The symbols of a component's message: which of a satellite's, and how many code periods one takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Data {
+    form: usize,
+    periods_per_symbol: i64,
+}
+
+impl Symbols {
+    /// Nothing sent yet of the messages of a signal.
+    pub fn new(signal: &Signal) -> Self {
+        let mut units: Vec<(&'static Message, BTreeMap<i64, Vec<bool>>)> = Vec::new();
+        for message in signal.components.iter().filter_map(|component| component.message) {
+            if units.iter().all(|(known, _)| *known != message) {
+                units.push((message, BTreeMap::new()));
+            }
+        }
+        Self { units, navigation: BTreeSet::new() }
+    }
+
+    /// Whether nothing modulates the signal.
+    pub fn is_empty(&self) -> bool {
+        self.units.is_empty()
+    }
+
+    /// The data of a component; `None` for a pilot.
+    pub fn of(&self, component: &Component) -> Option<Data> {
+        let message = component.message?;
+        let form = self.units.iter().position(|(known, _)| *known == message)?;
+        Some(Data { form, periods_per_symbol: i64::from(component.periods_per_symbol()?) })
+    }
+
+    /// Gathers what `sv` sends from `first` to `last`, and forgets what lies before. A unit for which no set
+    /// was uploaded carries the one of `heard`.
+    ///
+    /// # Errors
+    /// Those of messages.
+    pub fn prepare(
+        &mut self,
+        scene: &Scene,
+        from: &Constellation,
+        (sv, signal): (Sv, &Signal),
+        [first, last]: [Epoch; 2],
+        heard: Epoch,
+    ) -> Result<(), GenerateError> {
+        let faults = if from.number == 0 { scene.message_faults.as_slice() } else { &[] };
+        for (message, units) in &mut self.units {
+            let Some(sender) = scene.messages.of(message) else { continue };
+            let number = |at: Epoch| message.unit_at(signal.time.label(at).seconds());
+            let (first, last) = (number(first), number(last));
+            *units = units.split_off(&first);
+            for unit in first..=last {
+                if units.contains_key(&unit) {
+                    continue;
+                }
+                let slot = Slot { message, time: signal.time, unit };
+                let fallback = || scene.catalogue.sent_at(sv, heard);
+                let Some(ephemeris) = scene.catalogue.sent_at(sv, slot.start()).or_else(fallback) else { continue };
+                let SentSymbols { encoded, symbols } = message::unit(faults, sender, ephemeris, &slot)?;
+                // What was meant and, where wrong symbols pass for right ones, what was sent.
+                let both = [&encoded, &symbols];
+                let distinct = if symbols == encoded { 1 } else { 2 };
+                for (of_set, parameters) in both.iter().take(distinct).filter_map(|sent| (message.parameters)(sent)) {
+                    let issue = if of_set { u32::from(ephemeris.iode) } else { 0 };
+                    self.navigation.extend(NavigationRow::each(sv, message.name, issue, parameters));
+                }
+                units.insert(unit, symbols);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a code period of a component is sent inverted.
+    pub fn negative(&self, data: Option<Data>, period: i64) -> bool {
+        let Some(Data { form, periods_per_symbol }) = data else { return false };
+        let Some((message, units)) = self.units.get(form) else { return false };
+        let period = planted!("generator.synth.message_time", period, period + 1);
+        let length = message.unit_symbols() as i64;
+        // Units of a message need not begin where the week does.
+        let before = (message.first_s as f64 / message.symbol_s).round() as i64;
+        let symbol = period.div_euclid(periods_per_symbol) - before;
+        let Some(symbols) = units.get(&symbol.div_euclid(length)) else { return false };
+        let place = symbol.rem_euclid(length) as usize;
+        let place = planted!("generator.synth.bit_order", place, place / 30 * 30 + 29 - place % 30);
+        symbols.get(place).copied().unwrap_or(false)
+    }
+}

@@ -1,0 +1,113 @@
+//! The truth as values: what is true of a scene ([`Record`]) and who takes it ([`Sink`]).
+//!
+//! Records come in the order of the samples: at each tick of the truth the trajectory, then each satellite's
+//! rows, interference and what spoofers claim; at the end the messages sent and the times in view. Samples
+//! count from the first one that is generated. A `Vec` keeps every record, `()` none, and [`super::Writer`]
+//! writes files.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::generator::scene::Scene;
+use crate::gnss::record::{InterferenceRow, NavigationRow, Observation, PassRow, RayRow, SkyRow, TrajectoryRow};
+
+/// Why a sink does not take the truth.
+#[derive(Debug, Error)]
+pub enum TruthError {
+    /// A file that cannot be created, removed or written.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system reports.
+        source: std::io::Error,
+    },
+    /// A row that cannot be written.
+    #[error("{path}: {source}")]
+    Row {
+        /// The table.
+        path: PathBuf,
+        /// What the CSV writer reports.
+        source: csv::Error,
+    },
+    /// What a sink of one's own reports.
+    #[error("the truth is not taken: {0}")]
+    Refused(Box<dyn std::error::Error + Send + Sync>),
+}
+
+/// One thing that is true of a scene.
+#[derive(Clone, Debug)]
+pub enum Record {
+    /// Antenna and clocks at a tick.
+    Trajectory(TrajectoryRow),
+    /// What an ideal receiver would observe of a signal's first ray.
+    Observation(Observation),
+    /// Where the satellite of the observation before stands, and its delays.
+    Sky(SkyRow),
+    /// Another ray of that satellite.
+    Ray(RayRow),
+    /// A source of interference at a tick.
+    Interference(InterferenceRow),
+    /// Place and clock that a spoofer claims.
+    Claim {
+        /// Number of the spoofer, from 1.
+        spoofer: usize,
+        /// The claimed motion, and the receiver's clock against the spoofer's.
+        place: TrajectoryRow,
+    },
+    /// What would be observed of a spoofer's signal alone.
+    Spoofed {
+        /// Number of the spoofer, from 1.
+        spoofer: usize,
+        /// The observation.
+        observation: Observation,
+    },
+    /// A parameter of a navigation message that was sent; at the end.
+    Navigation(NavigationRow),
+    /// A time in which a satellite was in view; at the end.
+    Pass(PassRow),
+}
+
+/// Takes the truth of a scene.
+pub trait Sink {
+    /// The samples `part` of `scenes` will be generated. Several scenes are those of several front ends:
+    /// facts that they share, and the numbers of samples, are those of the first.
+    ///
+    /// # Errors
+    /// What keeps the sink from it; generation ends with it.
+    fn begin(&mut self, scenes: &[Scene], part: &Range<u64>) -> Result<(), TruthError> {
+        let _ = (scenes, part);
+        Ok(())
+    }
+
+    /// Takes a record.
+    ///
+    /// # Errors
+    /// As [`Sink::begin`].
+    fn take(&mut self, record: Record) -> Result<(), TruthError>;
+
+    /// The last record was taken.
+    ///
+    /// # Errors
+    /// As [`Sink::begin`].
+    fn finish(&mut self) -> Result<(), TruthError> {
+        Ok(())
+    }
+}
+
+/// Keeps every record.
+impl Sink for Vec<Record> {
+    fn take(&mut self, record: Record) -> Result<(), TruthError> {
+        self.push(record);
+        Ok(())
+    }
+}
+
+/// Keeps nothing.
+impl Sink for () {
+    fn take(&mut self, _: Record) -> Result<(), TruthError> {
+        Ok(())
+    }
+}

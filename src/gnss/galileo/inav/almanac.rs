@@ -1,0 +1,287 @@
+//! What I/NAV says of other satellites, of GPS time, and in short of the sender: words 7 to 10 and 16.
+//!
+//! Source: Galileo OS SIS ICD 2.1, 5.1.10 (almanac), 5.1.8 (offset of GPS time) and 5.1.11 (reduced
+//! elements). Words 7 to 10 carry three satellites a minute, a whole almanac in twelve minutes. Reference
+//! orbits: 29 600 km, 56°.
+
+use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::gnss::bits::{Element, Field, element};
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::earth::GPS_PI;
+use crate::gnss::satellite::System;
+use crate::gnss::time::{Epoch, TimeOffset, WEEK_S};
+
+use super::fields::GST_WEEK;
+
+/// Semi-major axis from which almanacs and reduced elements count.
+const NOMINAL_AXIS_M: f64 = 29_600_000.0;
+/// Inclination from which they count, 56°.
+const NOMINAL_INCLINATION_RAD: f64 = 56.0 / 180.0 * GPS_PI;
+/// Step of the almanac's reference time, and its last one inside a week.
+const TOA_STEP_S: i64 = 600;
+const TOA_LAST_S: i64 = WEEK_S - TOA_STEP_S;
+const HOUR_S: i64 = 3600;
+/// Duration of what carries three satellites, and how many of them there are until all have been sent.
+const TRIPLE_S: i64 = 60;
+const TRIPLES: i64 = 12;
+const TRIPLE: u8 = 3;
+/// Seconds from a sub-frame's nominal beginning to that on E1-B, to which reduced elements refer.
+const REDUCED_BEGIN_S: i64 = 1;
+
+const ALMANAC: &str = "5.1.10, table 71";
+const STATUS: &str = "5.1.9.7";
+const OFFSET: &str = "5.1.8, table 69";
+const REDUCED: &str = "5.1.11";
+
+/// One satellite in the almanac; number 0 for a place without one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Entry {
+    number: u8,
+    delta_sqrt_a_sqrtm: f64,
+    eccentricity: f64,
+    omega_rad: f64,
+    delta_i_rad: f64,
+    omega0_rad: f64,
+    omega_dot_radps: f64,
+    m0_rad: f64,
+    af0_s: f64,
+    af1_sps: f64,
+    e5b_health: u8,
+    e1b_health: u8,
+}
+
+impl Entry {
+    /// Whether the fields can hold it: those of the two satellites on eccentric orbits cannot.
+    fn fits(&self) -> bool {
+        self.delta_sqrt_a_sqrtm.abs() < 7.9 && self.eccentricity < 0.031 && self.delta_i_rad.abs() < 0.19
+    }
+
+    /// What elements come to at an almanac's reference time. The correction of the mean motion goes into the
+    /// axis, for an almanac has no other place for it.
+    fn of(set: &Ephemeris, toa: Epoch) -> Self {
+        let mean = set.mean_at(toa);
+        Self {
+            number: set.sv.number,
+            delta_sqrt_a_sqrtm: mean.sqrt_a_sqrtm - NOMINAL_AXIS_M.sqrt(),
+            eccentricity: set.eccentricity,
+            omega_rad: set.omega_rad,
+            delta_i_rad: mean.inclination_rad - NOMINAL_INCLINATION_RAD,
+            omega0_rad: mean.omega0_rad,
+            omega_dot_radps: set.omega_dot_radps,
+            m0_rad: mean.m0_rad,
+            af0_s: mean.af0_s,
+            af1_sps: set.af1_sps,
+            e5b_health: set.health >> 4 & 0b11,
+            e1b_health: set.health >> 1 & 0b11,
+        }
+    }
+}
+
+/// The content of words 7 to 10: three satellites, and the offset of GPS time.
+#[derive(Clone, Debug)]
+pub(super) struct Triple {
+    issue: u8,
+    toa: Epoch,
+    entries: [Entry; TRIPLE as usize],
+    offset: Option<TimeOffset>,
+}
+
+impl Triple {
+    /// What is sent in the minute of `start`.
+    pub(super) fn at(start: Epoch, sets: &[Ephemeris], reference: Epoch, offset: Option<TimeOffset>) -> Self {
+        let toa_s = ((reference.tow_whole_s() + TOA_STEP_S / 2) / TOA_STEP_S * TOA_STEP_S).min(TOA_LAST_S);
+        let toa = Epoch::new(reference.week() * WEEK_S + toa_s, 0.0);
+        let turn = start.tow_whole_s().div_euclid(TRIPLE_S).rem_euclid(TRIPLES) as u8;
+        let entry = |place: u8| {
+            let number = TRIPLE * turn + place + 1;
+            let set = sets.iter().find(|set| set.sv.system == System::Galileo && set.sv.number == number);
+            set.map(|set| Entry::of(set, toa)).filter(Entry::fits).unwrap_or_default()
+        };
+        // Four bits that change with the reference time.
+        let issue = (toa_s / TOA_STEP_S).rem_euclid(16) as u8;
+        Self { issue, toa, entries: [0, 1, 2].map(entry), offset }
+    }
+
+    /// The offset's constant and rate with its reference time of week in hours and week; all ones in the
+    /// message, here −1 and 255 and 63, where nothing is said.
+    fn offset_field(&self, field: usize) -> f64 {
+        let Some(offset) = self.offset else { return NO_OFFSET[field] };
+        let week = (offset.reference.week() - GST_WEEK).rem_euclid(64);
+        // The reference time has steps of an hour; the constant is that of the last one before.
+        let hours = offset.reference.tow_whole_s() / HOUR_S;
+        let whole = Epoch::new(offset.reference.week() * WEEK_S + hours * HOUR_S, 0.0);
+        [offset.at_s(whole), offset.a1_sps, hours as f64, week as f64][field]
+    }
+}
+
+/// What an offset's fields hold when nothing is said: all ones.
+const NO_OFFSET: [f64; 4] = [-1.0 / 34_359_738_368.0, -1.0 / 2_251_799_813_685_248.0, 255.0, 63.0];
+
+type Of = Element<Triple>;
+
+const ISSUE: Of = element(
+    Field::new("almanac_issue", &[(6, 4)], Whole, 0, ALMANAC),
+    |t| f64::from(t.issue),
+    |t, v| t.issue = v as u8,
+);
+const WEEK: Of = element(
+    Field::new("almanac_week", &[(10, 2)], Whole, 0, ALMANAC),
+    |t| (t.toa.week() - GST_WEEK).rem_euclid(4) as f64,
+    |_, _| {},
+);
+const TOA: Of = element(
+    Field::new("toa_10min", &[(12, 10)], Whole, 0, ALMANAC),
+    |t| t.toa.tow_s() / TOA_STEP_S as f64,
+    |t, v| t.toa = Epoch::new(t.toa.week() * WEEK_S + v as i64 * TOA_STEP_S, 0.0),
+);
+
+/// A field of one of the three satellites, from its first bit on.
+macro_rules! of {
+    ($entry:literal, number, $at:literal) => {
+        element(
+            Field::new("svid", &[($at, 6)], Whole, 0, ALMANAC),
+            |t| f64::from(t.entries[$entry].number),
+            |t, v| t.entries[$entry].number = v as u8,
+        )
+    };
+    ($entry:literal, $status:ident, $at:literal, status) => {
+        element(
+            Field::new(stringify!($status), &[($at, 2)], Whole, 0, STATUS),
+            |t| f64::from(t.entries[$entry].$status),
+            |t, v| t.entries[$entry].$status = v as u8,
+        )
+    };
+    ($entry:literal, $field:ident, $at:literal, $bits:literal, $kind:ident, $exponent:literal) => {
+        element(
+            Field::new(stringify!($field), &[($at, $bits)], $kind, $exponent, ALMANAC),
+            |t| t.entries[$entry].$field,
+            |t, v| t.entries[$entry].$field = v,
+        )
+    };
+}
+
+#[rustfmt::skip]
+pub(super) static WORD_7: [Of; 11] = [
+    ISSUE,
+    WEEK,
+    TOA,
+    of!(0, number, 22),
+    of!(0, delta_sqrt_a_sqrtm, 28, 13, Signed, -9),
+    of!(0, eccentricity, 41, 11, Unsigned, -16),
+    of!(0, omega_rad, 52, 16, Turn, -15),
+    of!(0, delta_i_rad, 68, 11, Semicircles, -14),
+    of!(0, omega0_rad, 79, 16, Turn, -15),
+    of!(0, omega_dot_radps, 95, 11, Semicircles, -33),
+    of!(0, m0_rad, 106, 16, Turn, -15),
+];
+
+#[rustfmt::skip]
+pub(super) static WORD_8: [Of; 12] = [
+    ISSUE,
+    of!(0, af0_s, 10, 16, Signed, -19),
+    of!(0, af1_sps, 26, 13, Signed, -38),
+    of!(0, e5b_health, 39, status),
+    of!(0, e1b_health, 41, status),
+    of!(1, number, 43),
+    of!(1, delta_sqrt_a_sqrtm, 49, 13, Signed, -9),
+    of!(1, eccentricity, 62, 11, Unsigned, -16),
+    of!(1, omega_rad, 73, 16, Turn, -15),
+    of!(1, delta_i_rad, 89, 11, Semicircles, -14),
+    of!(1, omega0_rad, 100, 16, Turn, -15),
+    of!(1, omega_dot_radps, 116, 11, Semicircles, -33),
+];
+
+#[rustfmt::skip]
+pub(super) static WORD_9: [Of; 13] = [
+    ISSUE,
+    WEEK,
+    TOA,
+    of!(1, m0_rad, 22, 16, Turn, -15),
+    of!(1, af0_s, 38, 16, Signed, -19),
+    of!(1, af1_sps, 54, 13, Signed, -38),
+    of!(1, e5b_health, 67, status),
+    of!(1, e1b_health, 69, status),
+    of!(2, number, 71),
+    of!(2, delta_sqrt_a_sqrtm, 77, 13, Signed, -9),
+    of!(2, eccentricity, 90, 11, Unsigned, -16),
+    of!(2, omega_rad, 101, 16, Turn, -15),
+    of!(2, delta_i_rad, 117, 11, Semicircles, -14),
+];
+
+#[rustfmt::skip]
+pub(super) static WORD_10: [Of; 8] = [
+    ISSUE,
+    of!(2, omega0_rad, 10, 16, Turn, -15),
+    of!(2, omega_dot_radps, 26, 11, Semicircles, -33),
+    of!(2, m0_rad, 37, 16, Turn, -15),
+    of!(2, af0_s, 53, 16, Signed, -19),
+    of!(2, af1_sps, 69, 13, Signed, -38),
+    of!(2, e5b_health, 82, status),
+    of!(2, e1b_health, 84, status),
+];
+
+/// The rest of word 10: by how much the system's time is ahead of GPS time. What sets it is [`gps_offset`].
+#[rustfmt::skip]
+pub(super) static GPS_OFFSET: [Of; 4] = [
+    element(Field::new("ggto_a0_s", &[(86, 16)], Signed, -35, OFFSET), |t| t.offset_field(0), |_, _| {}),
+    element(Field::new("ggto_a1_sps", &[(102, 12)], Signed, -51, OFFSET), |t| t.offset_field(1), |_, _| {}),
+    element(Field::new("ggto_t0_h", &[(114, 8)], Whole, 0, OFFSET), |t| t.offset_field(2), |_, _| {}),
+    element(Field::new("ggto_week", &[(122, 6)], Whole, 0, OFFSET), |t| t.offset_field(3), |_, _| {}),
+];
+
+/// By how much the system's time is ahead of GPS time according to word 10, its week near `near`; `None`
+/// where all bits are ones and nothing is said.
+pub fn gps_offset(word: &u128, near: Epoch) -> Option<TimeOffset> {
+    let [a0, a1, hours, week] = GPS_OFFSET.each_ref().map(|element| (element.field, element.field.read(word)));
+    if (a0.1, a1.1, hours.1, week.1) == (-1, -1, 255, 63) {
+        return None;
+    }
+    let week = near.nearest_week(week.1 + GST_WEEK, 64);
+    let reference = Epoch::new(week * WEEK_S + hours.1 * HOUR_S, 0.0);
+    Some(TimeOffset { a0_s: a0.0.value(a0.1), a1_sps: a1.0.value(a1.1), reference })
+}
+
+/// The elements of the sender in short, of the sub-frame's beginning.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reduced {
+    delta_axis_m: f64,
+    ex: f64,
+    ey: f64,
+    delta_i_rad: f64,
+    omega0_rad: f64,
+    latitude_rad: f64,
+    af0_s: f64,
+    af1_sps: f64,
+}
+
+impl Reduced {
+    /// Of the sub-frame in which `start` lies.
+    pub(super) fn of(set: &Ephemeris, start: Epoch) -> Self {
+        let since_s = (start.tow_whole_s() - REDUCED_BEGIN_S).rem_euclid(super::SUBFRAME_S);
+        let mean = set.mean_at(start.plus_s(-(since_s as f64)));
+        let (sin, cos) = libm::sincos(set.omega_rad);
+        Self {
+            delta_axis_m: set.sqrt_a_sqrtm * set.sqrt_a_sqrtm - NOMINAL_AXIS_M,
+            ex: set.eccentricity * cos,
+            ey: set.eccentricity * sin,
+            delta_i_rad: mean.inclination_rad - NOMINAL_INCLINATION_RAD,
+            omega0_rad: mean.omega0_rad,
+            latitude_rad: mean.m0_rad + set.omega_rad,
+            af0_s: mean.af0_s,
+            af1_sps: set.af1_sps,
+        }
+    }
+}
+
+/// Word 16.
+#[rustfmt::skip]
+pub(super) static WORD_16: [Element<Reduced>; 8] = [
+    element(Field::new("delta_axis_m", &[(6, 5)], Signed, 8, REDUCED), |r| r.delta_axis_m, |r, v| r.delta_axis_m = v),
+    element(Field::new("ex", &[(11, 13)], Signed, -22, REDUCED), |r| r.ex, |r, v| r.ex = v),
+    element(Field::new("ey", &[(24, 13)], Signed, -22, REDUCED), |r| r.ey, |r, v| r.ey = v),
+    element(Field::new("delta_i_rad", &[(37, 17)], Semicircles, -22, REDUCED), |r| r.delta_i_rad, |r, v| r.delta_i_rad = v),
+    element(Field::new("omega0_rad", &[(54, 23)], Turn, -22, REDUCED), |r| r.omega0_rad, |r, v| r.omega0_rad = v),
+    element(Field::new("latitude_rad", &[(77, 23)], Turn, -22, REDUCED), |r| r.latitude_rad, |r, v| r.latitude_rad = v),
+    element(Field::new("af0_s", &[(100, 22)], Signed, -26, REDUCED), |r| r.af0_s, |r, v| r.af0_s = v),
+    element(Field::new("af1_sps", &[(122, 6)], Signed, -35, REDUCED), |r| r.af1_sps, |r, v| r.af1_sps = v),
+];

@@ -1,0 +1,175 @@
+//! Records of a navigation file as ephemerides: every element held against the range of its field in the
+//! message.
+//!
+//! Source: IS-GPS-200N, tables 20-I and 20-III; Galileo OS SIS ICD 2.1, tables 57, 62 and 64; RINEX 4.02,
+//! tables A9 and A13.
+
+use super::columns::Record;
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::galileo::inav::sisa_index;
+use crate::gnss::satellite::System;
+use crate::gnss::time::{Epoch, WEEK_S};
+
+/// An element that must stand there and lie within its range, in SI units.
+fn field(record: &Record, key: &'static str, least: f64, most: f64) -> Result<f64, String> {
+    let value = record.get(key).ok_or_else(|| format!("{key} is blank"))?;
+    if (least..=most).contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{key} = {value:e}: expected {least:e} to {most:e}"))
+    }
+}
+
+fn whole(record: &Record, key: &'static str, most: u32) -> Result<u32, String> {
+    let value = field(record, key, 0.0, f64::from(most))?;
+    if value == value.floor() { Ok(value as u32) } else { Err(format!("{key} = {value}: expected a whole number")) }
+}
+
+/// The set in a record.
+///
+/// # Errors
+/// The element that is missing or out of its range.
+pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
+    // Fields that both messages have in the same units and lengths; RINEX rounds to twelve digits.
+    const ANGLE_RAD: f64 = 2.0 * std::f64::consts::TAU;
+    const HARMONIC_RAD: f64 = 6.104e-5;
+    const HARMONIC_M: f64 = 1024.001;
+    let both = |name, most: f64| field(record, name, -most, most);
+
+    let toc = record.toc;
+    let toe = near(toc, field(record, "toe", 0.0, 604_800.0)?);
+    let week = f64::from(whole(record, "week", 9999)?);
+    let astray = (week - toe.week() as f64).abs() % 1024.0;
+    if astray > 1.0 && astray < 1023.0 {
+        return Err(format!("week = {week}: expected that of its epoch, {}", toe.week()));
+    }
+    // The last line of a record begins with it: without it the file was cut, perhaps inside a number.
+    if record.get("t_tm").is_none() {
+        return Err("no transmission time: the record is cut short".to_owned());
+    }
+    let common = Ephemeris {
+        toe,
+        toc,
+        m0_rad: both("m0", ANGLE_RAD)?,
+        delta_n_radps: both("deltaN", 1.171e-8)?,
+        omega0_rad: both("omega0", ANGLE_RAD)?,
+        omega_dot_radps: both("omegaDot", 2.997e-6)?,
+        omega_rad: both("omega", ANGLE_RAD)?,
+        i0_rad: field(record, "i0", 0.0, std::f64::consts::PI)?,
+        idot_radps: both("idot", 2.927e-9)?,
+        cuc_rad: both("cuc", HARMONIC_RAD)?,
+        cus_rad: both("cus", HARMONIC_RAD)?,
+        crc_m: both("crc", HARMONIC_M)?,
+        crs_m: both("crs", HARMONIC_M)?,
+        cic_rad: both("cic", HARMONIC_RAD)?,
+        cis_rad: both("cis", HARMONIC_RAD)?,
+        ..Ephemeris::blank(record.sv, toe)
+    };
+    if record.sv.system == System::Galileo { galileo(record, common) } else { gps(record, common) }
+}
+
+/// The rest of an LNAV set (IS-GPS-200N, tables 20-I and 20-III).
+fn gps(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
+    let both = |name, most: f64| field(record, name, -most, most);
+    let optional = |name, most| if record.get(name).is_some() { whole(record, name, most).map(Some) } else { Ok(None) };
+    let iode = whole(record, "iode", 255)?;
+    Ok(Ephemeris {
+        // Sets go on the air two hours before their reference time.
+        transmitted: transmitted(record, common.toe, common.toe.plus_s(-7200.0)),
+        iode: iode as u16,
+        iodc: optional("iodc", 1023)?.unwrap_or(iode) as u16,
+        ura_index: ura_index(optional_accuracy(record)?),
+        health: whole(record, "health", 63)? as u8,
+        l2_codes: optional("l2Codes", 3)?.unwrap_or(0) as u8,
+        l2_p_data_off: optional("l2p", 1)? == Some(1),
+        // Hours or the flag itself, as the file's producer meant it; blank is the usual four hours.
+        long_fit: record.get("fitInt").is_some_and(|fit| fit == 1.0 || fit > 4.0),
+        sqrt_a_sqrtm: field(record, "sqrta", 5000.0, 5300.0)?,
+        eccentricity: field(record, "e", 0.0, 0.1)?,
+        af0_s: both("af0", 9.766e-4)?,
+        af1_sps: both("af1", 3.726e-9)?,
+        af2_sps2: both("af2", 3.553e-15)?,
+        tgd_s: both("tgd", 5.961e-8)?,
+        ..common
+    })
+}
+
+/// The rest of an I/NAV set (Galileo OS SIS ICD 2.1, tables 57, 62, 64 and 90).
+fn galileo(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
+    let both = |name, most: f64| field(record, name, -most, most);
+    let issue = whole(record, "iode", 1023)? as u16;
+    let health = whole(record, "health", 511)?;
+    Ok(Ephemeris {
+        transmitted: transmitted(record, common.toe, common.toe),
+        iode: issue,
+        iodc: issue,
+        ura_index: sisa_index(record.get("accuracy").filter(|metres| *metres >= 0.0)),
+        // Data validity and health of E1-B in bits 0 to 2 and of E5b in bits 6 to 8, with those of E5a
+        // between.
+        health: (health & 0b111 | (health >> 6 & 0b111) << 3) as u8,
+        sqrt_a_sqrtm: field(record, "sqrta", 5200.0, 5500.0)?,
+        // Two satellites were left on orbits of 0.16.
+        eccentricity: field(record, "e", 0.0, 0.2)?,
+        af0_s: both("af0", 6.2501e-2)?,
+        af1_sps: both("af1", 1.4902e-8)?,
+        af2_sps2: both("af2", 5.552e-17)?,
+        tgd_s: both("bgdE5bE1", 1.1921e-7)?,
+        tgd2_s: both("bgdE5aE1", 1.1921e-7)?,
+        ..common
+    })
+}
+
+/// Metres of accuracy, where they are given; a negative one says nothing.
+fn optional_accuracy(record: &Record) -> Result<Option<f64>, String> {
+    if record.get("accuracy").is_some() { field(record, "accuracy", 0.0, 1e6).map(Some) } else { Ok(None) }
+}
+
+/// The instant nearest to `anchor` with that time of week.
+fn near(anchor: Epoch, tow_s: f64) -> Epoch {
+    let week_s = WEEK_S as f64;
+    let start = Epoch::new(anchor.week() * WEEK_S, 0.0);
+    let ahead_s = tow_s - anchor.tow_s();
+    start.plus_s(tow_s - (ahead_s / week_s).round() * week_s)
+}
+
+/// Time of transmission, or an assumed one where the file leaves it out or fills it.
+fn transmitted(record: &Record, toe: Epoch, assumed: Epoch) -> Epoch {
+    match record.get("t_tm") {
+        Some(tow_s) if tow_s.abs() <= 2.0 * WEEK_S as f64 => {
+            let said = near(toe, tow_s.rem_euclid(WEEK_S as f64));
+            if said.since(toe).abs() <= 86_400.0 { said } else { assumed }
+        }
+        _ => assumed,
+    }
+}
+
+/// The index whose interval holds an accuracy in metres (IS-GPS-200N, 20.3.3.3.1.3); blank is 15, no
+/// prediction.
+fn ura_index(accuracy_m: Option<f64>) -> u8 {
+    const UPPER_M: [f64; 15] =
+        [2.4, 3.4, 4.85, 6.85, 9.65, 13.65, 24.0, 48.0, 96.0, 192.0, 384.0, 768.0, 1536.0, 3072.0, 6144.0];
+    let Some(accuracy_m) = accuracy_m else { return 15 };
+    UPPER_M.iter().take_while(|upper| accuracy_m > **upper).count() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_week_wrap_to_the_nearest_week() {
+        let anchor = Epoch::from_week(1590, 604_000.0);
+        assert_eq!(near(anchor, 0.0), Epoch::from_week(1591, 0.0));
+        assert_eq!(near(anchor, 604_784.0), Epoch::from_week(1590, 604_784.0));
+        assert_eq!(near(Epoch::from_week(1591, 16.0), 604_784.0), Epoch::from_week(1590, 604_784.0));
+    }
+
+    #[test]
+    fn accuracies_become_the_index_of_their_interval() {
+        let cases = [(0.0, 0), (2.0, 0), (2.8, 1), (4.0, 2), (16.0, 6), (4096.0, 14), (8192.0, 15)];
+        for (metres, index) in cases {
+            assert_eq!(ura_index(Some(metres)), index);
+        }
+        assert_eq!(ura_index(None), 15);
+    }
+}

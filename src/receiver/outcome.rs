@@ -1,0 +1,157 @@
+//! What a reception comes to: its outcome, its conditioning, and the errors that end it.
+
+use std::fmt;
+
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::gnss::record::LineRow;
+use crate::gnss::satellite::Sv;
+use crate::receiver::acquire::AcquireError;
+use crate::receiver::diagnosis::{Diagnosis, duration};
+use crate::receiver::gap::Jump;
+use crate::receiver::output::OutputError;
+use crate::receiver::parting::Parted;
+use crate::receiver::settings::SettingsError;
+use crate::receiver::track::LoopMargin;
+
+/// Why a reception was broken off.
+#[derive(Debug, Error)]
+pub enum ReceiveError {
+    /// No samples at all.
+    #[error("no front end: expected the samples of one at least")]
+    NoFrontEnd,
+    /// Samples of a front end that the reception does not have.
+    #[error("front end {number} of a reception that has {have}: expected one of them, from 0 on")]
+    UnknownFrontEnd {
+        /// The number that was given.
+        number: usize,
+        /// Front ends of the reception.
+        have: usize,
+    },
+    /// A signal that cannot be followed to a position.
+    #[error("acquisition.signals: {signal} cannot be received: {reason}")]
+    Unsupported {
+        /// Its name.
+        signal: &'static str,
+        /// Why.
+        reason: String,
+    },
+    /// Settings that are refused.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// A search that cannot be made.
+    #[error(transparent)]
+    Acquire(#[from] AcquireError),
+    /// Samples that cannot be read.
+    #[error("cannot read the samples after sample {sample}: {error}")]
+    Read {
+        /// The last sample that was read.
+        sample: u64,
+        /// What the reader says.
+        error: std::io::Error,
+    },
+    /// Records that cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// What a reception came to.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Whole samples read, and their time.
+    pub samples: u64,
+    /// The time of those samples.
+    pub seconds: f64,
+    /// Satellites found by any search, and those in any fix.
+    pub acquired: Vec<Sv>,
+    /// Satellites in any fix.
+    pub used: Vec<Sv>,
+    /// Fixes written.
+    pub fixes: u64,
+    /// Time of the first fix since the first sample.
+    pub first_fix_s: Option<f64>,
+    /// Channels lost or dropped.
+    pub losses: u64,
+    /// Bytes of a sample that the end cut off.
+    pub cut_bytes: usize,
+    /// What the bytes look like, if not like the format that was taken.
+    pub format_warning: Option<String>,
+    /// Why there was no fix, when there was none.
+    pub diagnosis: Option<Diagnosis>,
+    /// Continuous waves that were met; the rows are in `interference.csv`.
+    pub interfered: Option<Interfered>,
+    /// How far carrier and code part on all satellites alike, where they do.
+    pub parted: Option<Parted>,
+    /// Where samples are missing, or came twice.
+    pub jumps: Vec<Jump>,
+    /// Margins to what is refused.
+    pub conditioning: Conditioning,
+    /// What makes the results worse than need be, and the remedy.
+    pub warnings: Vec<String>,
+}
+
+/// How near the reception was to what is refused as ill-conditioned.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Conditioning {
+    /// Largest ratio of the geometry's singular values that a fix had, and from which on there is none.
+    pub geometry_worst: Option<f64>,
+    /// The largest condition that is solved.
+    pub geometry_limit: f64,
+    /// Bandwidth times update time of every loop.
+    pub loops: Vec<LoopMargin>,
+}
+
+impl fmt::Display for Conditioning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(worst) = self.geometry_worst {
+            write!(f, "condition of the geometry up to {worst:.1}, refused from {:e}; ", self.geometry_limit)?;
+        }
+        let least = self.loops.iter().min_by(|a, b| a.margin_share.total_cmp(&b.margin_share));
+        let Some(LoopMargin { key, bandwidth_time, limit, margin_share, .. }) = least else { return Ok(()) };
+        write!(
+            f,
+            "largest bandwidth times update time {bandwidth_time:.3} ({key}), refused above {limit}: {:.0} % left",
+            100.0 * margin_share
+        )
+    }
+}
+
+/// What there was of continuous waves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Interfered {
+    /// Spectra of a second that had a line.
+    pub spectra: u64,
+    /// The strongest line.
+    pub strongest: LineRow,
+}
+
+impl fmt::Display for Interfered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let LineRow { frequency_hz, jn0_dbhz, js_db, lines, .. } = &self.strongest;
+        let what = if *lines > 1 { "lines of interference, the strongest" } else { "a continuous wave" };
+        write!(f, "{what} at {:+.1} kHz in the samples, J/N0 {jn0_dbhz:.1} dB-Hz", 1e-3 * frequency_hz)?;
+        js_db.map_or(Ok(()), |js_db| write!(f, ", J/S {js_db:.1} dB"))?;
+        write!(f, ", in {} s", self.spectra)
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} received: {} satellites acquired, {} used, {} fixes",
+            duration(self.seconds),
+            self.acquired.len(),
+            self.used.len(),
+            self.fixes
+        )?;
+        self.first_fix_s.map_or(Ok(()), |s| write!(f, ", the first after {s:.1} s"))?;
+        if self.cut_bytes > 0 {
+            write!(f, " ({} bytes of a cut sample left out)", self.cut_bytes)?;
+        }
+        self.interfered.as_ref().map_or(Ok(()), |seen| write!(f, "; {seen}"))?;
+        self.parted.as_ref().map_or(Ok(()), |parted| write!(f, "; {parted}"))?;
+        self.jumps.iter().try_for_each(|jump| write!(f, "; {jump}"))
+    }
+}

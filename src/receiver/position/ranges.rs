@@ -1,0 +1,109 @@
+//! Observations and ephemerides become ranges: of one carrier, or of two in combination.
+
+use std::collections::BTreeMap;
+
+use super::combination::{Combination, Used, paired};
+use super::least_squares::Range;
+use super::smooth::Smoothed;
+use super::{IonosphereChoice, Solver};
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::record::Observation;
+use crate::gnss::satellite::{Sv, System};
+use crate::gnss::signal::Link;
+
+/// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
+const HALF_FIT_S: f64 = 7200.0;
+const HALF_LONG_FIT_S: f64 = 10_800.0;
+/// A set is used a little beyond its interval, until the next one is decoded.
+const FIT_GRACE_S: f64 = 600.0;
+
+impl Solver {
+    /// The ranges of observations whose satellites' ephemerides are known: of a satellite with two carriers
+    /// their combination, if the settings say so.
+    pub(super) fn ranges(&mut self, observations: &[Observation], ephemerides: &BTreeMap<Sv, Ephemeris>) -> Vec<Range> {
+        let known: Vec<Observation> = (observations.iter())
+            .filter(|row| ephemerides.contains_key(&row.sv) || self.settings.ionosphere != IonosphereChoice::Combined)
+            .cloned()
+            .collect();
+        // The filters of single signals go on: one of two carriers may be lost.
+        let smoothed: BTreeMap<Link, Smoothed> =
+            observations.iter().map(|row| (row.link(), self.smoother.smooth(row))).collect();
+        let used = match self.settings.ionosphere {
+            IonosphereChoice::Combined => paired(&known),
+            IonosphereChoice::Broadcast | IonosphereChoice::None => known.iter().map(Used::Single).collect(),
+        };
+        let mut one = |used: &Used<'_>| match used {
+            Used::Single(row) => self.single(row, smoothed.get(&row.link())?, ephemerides.get(&row.sv)?),
+            Used::Combined(pair) => self.combined(pair, ephemerides.get(&pair.first.sv)?),
+        };
+        used.iter().filter_map(&mut one).collect()
+    }
+
+    /// Thermal noise of a code measurement, and the carrier's power over noise density.
+    fn noise(&self, row: &Observation) -> Option<(f64, f64)> {
+        let cn0_hz = libm::pow(10.0, row.cn0_dbhz / 10.0);
+        let (_, noise) = self.noises.iter().find(|(signal, _)| *signal == row.signal)?;
+        Some((noise.sigma_m(cn0_hz), cn0_hz))
+    }
+
+    fn single(&self, row: &Observation, smoothed: &Smoothed, ephemeris: &Ephemeris) -> Option<Range> {
+        let (sigma_m, cn0_hz) = self.noise(row)?;
+        let noise_m = sigma_m * smoothed.variance_ratio.sqrt();
+        let range = range(row, ephemeris, smoothed.pseudorange_m, noise_m, cn0_hz)?;
+        Some(Range { doppler_hz: range.doppler_hz - self.smoother.carrier_offset_hz(row.signal), ..range })
+    }
+
+    /// Velocity comes from the first of the two carriers.
+    fn combined(&mut self, pair: &Combination<'_>, ephemeris: &Ephemeris) -> Option<Range> {
+        let ((first_m, cn0_hz), (second_m, _)) = (self.noise(pair.first)?, self.noise(pair.second)?);
+        let smoothed = self.smoother.smooth_combined(pair);
+        let noise_m = pair.sigma(first_m, second_m) * smoothed.variance_ratio.sqrt();
+        let range = range(pair.first, ephemeris, smoothed.pseudorange_m, noise_m, cn0_hz)?;
+        let second = ephemeris.clock_of_signal(range.emitted, pair.second.signal).ok()?;
+        Some(Range {
+            doppler_hz: range.doppler_hz - self.smoother.carrier_offset_hz(pair.first.signal),
+            clock: pair.clock(range.clock, second),
+            is_combined: true,
+            ..range
+        })
+    }
+}
+
+/// Where the satellite was when it sent what this observation met; `None` when its ephemeris is unhealthy,
+/// stale or no orbit.
+fn range(
+    observation: &Observation,
+    ephemeris: &Ephemeris,
+    pseudorange_m: f64,
+    noise_m: f64,
+    cn0_hz: f64,
+) -> Option<Range> {
+    let sent = observation.sent();
+    let half_s = match ephemeris.sv.system {
+        System::Galileo => 0.5 * ephemeris.fit_interval_s(),
+        _ if ephemeris.long_fit => HALF_LONG_FIT_S,
+        _ => HALF_FIT_S,
+    } + FIT_GRACE_S;
+    if !ephemeris.is_healthy() || sent.since(ephemeris.toe).abs() > half_s {
+        return None;
+    }
+    // The clock's argument is GPS time; one correction leaves drift × offset², far below a picosecond.
+    let rough = ephemeris.clock_of_signal(sent, observation.signal).ok()?;
+    let emitted = sent.plus_s(-rough.offset_s);
+    let clock = ephemeris.clock_of_signal(emitted, observation.signal).ok()?;
+    let clock = planted!("receiver.position.group_delay", clock, ephemeris.clock(emitted).ok()?);
+    let emitted = sent.plus_s(-clock.offset_s);
+    Some(Range {
+        sv: observation.sv,
+        signal: observation.signal,
+        satellite: ephemeris.state(emitted).ok()?,
+        clock,
+        emitted,
+        pseudorange_m,
+        doppler_hz: observation.doppler_hz,
+        carrier_hz: observation.signal.carrier_hz(observation.sv),
+        noise_m,
+        cn0_hz,
+        is_combined: false,
+    })
+}

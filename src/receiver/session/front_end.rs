@@ -1,0 +1,274 @@
+//! One front end at work: what is searched for and followed in its samples.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::shared::Shared;
+use super::step::{Counted, Step, Tick};
+use super::{gap, plan, suited};
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::record::{EventRow, LineRow};
+use crate::gnss::samples::IfMetadata;
+use crate::gnss::signal::{Link, Signal};
+use crate::receiver::acquire::{self, AcquireError, Searcher};
+use crate::receiver::decode::Decoder;
+use crate::receiver::interference::Watch;
+use crate::receiver::lead::lead;
+use crate::receiver::looks::Looks;
+use crate::receiver::outcome::{Interfered, ReceiveError};
+use crate::receiver::output::{Record, Sink};
+use crate::receiver::parting::{Estimate, Line, Offset};
+use crate::receiver::position::CodeNoise;
+use crate::receiver::settings::Settings;
+use crate::receiver::source::{Block, Packed, Planes};
+use crate::receiver::track::loops::CodeShape;
+use crate::receiver::track::{Channel, ReplicaModel, Report};
+
+/// Channels go over a block in parts of so many samples at least: 512 KiB in planar `f32`, a core's own cache
+/// …
+const PART_SAMPLES: usize = 1 << 16;
+/// … and so long at least, as a code period that a part's end cuts is copied.
+const PART_S: f64 = 0.01;
+
+/// One channel and its decoder.
+pub(super) struct Track {
+    pub channel: Channel,
+    pub line: Line,
+    pub watched: gap::Watched,
+    pub decoder: Option<Decoder>,
+    pub report: Report,
+    pub since: u64,
+    pub cn0_dbhz: f64,
+    /// By the search that found it.
+    pub found_dbhz: f64,
+    pub symbols: u64,
+    pub wrong_time: u32,
+    pub dropped: bool,
+}
+
+/// Samples collected for a search.
+pub(super) struct Window {
+    pub first: u64,
+    pub samples: Planes,
+}
+
+impl Window {
+    pub fn block(&self) -> Block<'_> {
+        Block { first: self.first, i: &self.samples.i, q: &self.samples.q }
+    }
+}
+
+/// The state of one front end between blocks. Samples are its own.
+pub(super) struct FrontEnd {
+    pub step: Step,
+    pub metadata: IfMetadata,
+    /// With its own signals.
+    pub settings: Settings,
+    /// The signals that are received here; none where other front ends receive all.
+    pub signals: Vec<&'static Signal>,
+    pub candidates: Vec<Link>,
+    pub searcher: Searcher,
+    /// Where it looks, and whether as after the first search.
+    pub aimed: Option<(plan::Sweep, bool)>,
+    pub widenings: usize,
+    pub looks: Looks,
+    pub mirrored: Option<Estimate>,
+    /// Median Doppler of the search that found most, with how many it found.
+    pub found: (usize, f64),
+    pub needed: u64,
+    pub searched: bool,
+    pub next_search: u64,
+    pub window: Option<Window>,
+    pub tracks: Vec<Track>,
+    /// Of each share of the tracks.
+    planes: Vec<Planes>,
+    pub lost: BTreeMap<Link, u64>,
+    pub refused: BTreeMap<Link, u64>,
+    pub offset: Offset,
+    /// Channels that measure it.
+    pub lines: usize,
+    /// Code loops are on their way to a new offset until this sample.
+    pub offset_moved: u64,
+    pub gap: gap::Gap,
+    /// Samples of the running block at which channels report.
+    pub ticks: Vec<Tick>,
+    watch: Watch,
+    /// Median C/N0 of the satellites when the spectrum last had no line.
+    quiet_dbhz: Option<f64>,
+    pub interfered: Option<Interfered>,
+}
+
+impl FrontEnd {
+    /// Before the first sample; `settings` name the signals of this front end, which are `signals` as far as
+    /// its samples hold them.
+    pub fn new(
+        step: Step,
+        metadata: &IfMetadata,
+        settings: Settings,
+        signals: Vec<&'static Signal>,
+    ) -> Result<Self, AcquireError> {
+        Ok(Self {
+            step,
+            metadata: metadata.clone(),
+            candidates: if signals.is_empty() {
+                Vec::new()
+            } else {
+                suited::candidates(metadata, &settings.acquisition)
+            },
+            searcher: Searcher::new(metadata, &settings.acquisition)?,
+            aimed: None,
+            widenings: 0,
+            looks: Looks::default(),
+            mirrored: None,
+            found: (0, 0.0),
+            needed: acquire::samples_needed(metadata, &settings.acquisition)?,
+            searched: false,
+            next_search: 0,
+            window: None,
+            tracks: Vec::new(),
+            planes: Vec::new(),
+            lost: BTreeMap::new(),
+            refused: BTreeMap::new(),
+            offset: Offset::default(),
+            lines: 0,
+            offset_moved: 0,
+            gap: gap::Gap::default(),
+            ticks: Vec::new(),
+            watch: Watch::new(metadata),
+            quiet_dbhz: None,
+            interfered: None,
+            settings,
+            signals,
+        })
+    }
+
+    /// The first signal, by whose band offsets are reported.
+    pub fn signal(&self) -> Option<&'static Signal> {
+        self.signals.first().copied()
+    }
+
+    /// Samples in so many seconds.
+    pub fn samples(&self, seconds: f64) -> u64 {
+        (seconds * self.metadata.rate.hz()) as u64
+    }
+
+    /// Takes the next block as far as every front end goes by itself: search, channels, lost samples.
+    pub fn process(&mut self, block: &Packed, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        let ticks = std::mem::take(&mut self.ticks);
+        let sink = &mut Counted { sink, step: self.step, ticks: &ticks };
+        self.search(block, shared, sink)?;
+        self.advance(block, &ticks);
+        self.record(sink)?;
+        self.leap(block, shared, sink)?;
+        if !self.gap.is_busy() {
+            self.part(block.end(), shared);
+        }
+        self.ticks = ticks;
+        Ok(())
+    }
+
+    /// Takes every channel through the block, on every core its share of them.
+    ///
+    /// Each share unpacks the samples for itself, in parts that stay in its core's cache: to read what
+    /// another core has written takes longer than to unpack it again.
+    fn advance(&mut self, block: &Packed, ticks: &[Tick]) {
+        let ticks: Vec<u64> = ticks.iter().map(|tick| tick.own).collect();
+        let share = self.tracks.len().div_ceil(rayon::current_num_threads()).max(1);
+        self.planes.resize_with(self.tracks.len().div_ceil(share), Planes::default);
+        let part = PART_SAMPLES.max(self.samples(PART_S) as usize);
+        self.tracks.par_chunks_mut(share).zip(&mut self.planes).for_each(|(tracks, planes)| {
+            tracks.iter_mut().for_each(|track| clear(&mut track.report));
+            for start in (0..block.samples()).step_by(part) {
+                let samples = block.unpack(start..start + part, planes);
+                let ticks = within(&ticks, samples.first, samples.first + samples.i.len() as u64);
+                for track in tracks.iter_mut() {
+                    track.channel.advance(&samples, ticks, &mut track.report);
+                }
+            }
+        });
+    }
+
+    /// Writes rows and events of all channels.
+    fn record(&mut self, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        for track in &mut self.tracks {
+            for row in &track.report.rows {
+                sink.take(Record::Tracking(row.clone()))?;
+            }
+            for &(sample, event) in &track.report.events {
+                let (sv, signal) = (track.channel.sv(), track.channel.signal());
+                sink.take(Record::Event(EventRow { sample, sv, signal, event }))?;
+            }
+            if let Some(last) = track.report.measurements.last() {
+                track.cn0_dbhz = last.cn0_dbhz;
+            }
+        }
+        Ok(())
+    }
+
+    /// What follows when the block has been measured: the spectrum, the channels that end, the next search.
+    pub fn close(&mut self, block: &Packed, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        let sink = &mut Counted { sink, step: self.step, ticks: &[] };
+        self.watch(block, sink)?;
+        self.retire(block.end(), shared, sink)?;
+        self.hasten(block.end(), shared);
+        Ok(())
+    }
+
+    /// Looks for continuous waves, and reports those that are none of the satellites' own lines.
+    fn watch(&mut self, block: &Packed, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        let mut followed: Vec<f64> = self.tracks.iter().map(|track| track.cn0_dbhz).collect();
+        followed.sort_by(f64::total_cmp);
+        // A channel's first estimates may be low; the search's is not.
+        let found = self.tracks.iter().map(|track| track.found_dbhz);
+        let strongest_hz = found
+            .chain(followed.last().copied())
+            .max_by(f64::total_cmp)
+            .map_or(0.0, |dbhz| libm::pow(10.0, dbhz / 10.0));
+        let mut reported = Vec::new();
+        self.watch.take(block, strongest_hz, |_, row| reported.push(row));
+        for row in reported {
+            let Some(row) = row else {
+                self.quiet_dbhz = followed.get(followed.len() / 2).copied().or(self.quiet_dbhz);
+                continue;
+            };
+            let row = LineRow { js_db: self.quiet_dbhz.map(|dbhz| row.jn0_dbhz - dbhz), ..row };
+            sink.take(Record::Interference { front_end: self.step.number, row: row.clone() })?;
+            let seen = self.interfered.get_or_insert_with(|| Interfered { spectra: 0, strongest: row.clone() });
+            seen.spectra += 1;
+            if row.jn0_dbhz > seen.strongest.jn0_dbhz {
+                seen.strongest = row;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Noise of the code loops that follow a signal.
+pub(super) fn noise(signal: &'static Signal, metadata: &IfMetadata, settings: &Settings) -> CodeNoise {
+    let component = lead(signal);
+    let tracking = component.map_or(settings.tracking.clone(), |component| settings.tracking.fitted(component));
+    let (chip_rate_hz, period_s) = component.map_or((1.0, 1.0), |c| (c.chip_rate_hz, c.period_s()));
+    CodeNoise {
+        chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
+        shape: component
+            .and_then(|c| ReplicaModel::new(&tracking, c, metadata.rate.hz()))
+            .map_or(CodeShape::triangle(tracking.spacing_chips), |model| model.shape),
+        bandwidth_hz: tracking.dll_bandwidth_hz,
+        integration_s: period_s * f64::from(tracking.integration),
+    }
+}
+
+/// Empties a report and keeps its room.
+fn clear(report: &mut Report) {
+    report.measurements.clear();
+    report.symbols.clear();
+    report.rows.clear();
+    report.events.clear();
+}
+
+/// Those of the ascending `ticks` that lie in `first..end`.
+fn within(ticks: &[u64], first: u64, end: u64) -> &[u64] {
+    let of = |sample: u64| ticks.partition_point(|tick| *tick < sample);
+    ticks.get(of(first)..of(end)).unwrap_or_default()
+}

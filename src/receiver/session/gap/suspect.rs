@@ -1,0 +1,157 @@
+//! What makes a jump suspected: steps that all codes share, steps by their Dopplers, power that vanishes, and
+//! signs that turn in the wrong places.
+
+use std::collections::VecDeque;
+
+use super::{FrontEnd, LEAST_CHANNELS, Moved, Stage, VANISHED_SHARE};
+use crate::gnss::signal::Signal;
+use crate::receiver::gap::scan::{Found, Profile};
+use crate::receiver::gap::{Edges, Step, Trend, common_step, doppler_step, turned_by};
+use crate::receiver::outcome::ReceiveError;
+use crate::receiver::output::Sink;
+use crate::receiver::session::shared::Shared;
+use crate::receiver::track::Glance;
+
+/// Power has vanished below this share of what it was.
+const VANISHED: f64 = 0.25;
+/// Channels whose power is this many deviations of a look above the noise count.
+const SEEN_SIGMAS: f64 = 4.0;
+/// Turns of signs are compared with where symbols begin so often while nothing is suspected.
+const EDGES_S: f64 = 0.4;
+/// Looks that are averaged before they enter a trend: whole symbols that are missing move codes by their
+/// Dopplers alone, 0.02 chip in 20 ms, twice the noise of one look at 45 dB-Hz.
+const AVERAGED: usize = 8;
+
+/// A look at a code: when, where it was, over how many code periods, and its power.
+#[derive(Clone, Copy, Debug)]
+struct Look {
+    t_s: f64,
+    chips: f64,
+    periods: u32,
+    power: f64,
+}
+
+/// A trend without the latest looks, and these: what moves codes a little, and stays, shows in their mean.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Settled {
+    trend: Trend,
+    /// Seconds, chips, code periods and power of each.
+    latest: VecDeque<Look>,
+}
+
+impl Settled {
+    /// Takes a look at `t_s`.
+    pub fn take(&mut self, t_s: f64, glance: &Glance) {
+        if self.latest.len() >= AVERAGED
+            && let Some(Look { t_s, chips, power, .. }) = self.latest.pop_front()
+        {
+            self.trend.take(t_s, chips, power);
+        }
+        let Glance { code_chips, periods, power, .. } = *glance;
+        self.latest.push_back(Look { t_s, chips: code_chips, periods, power });
+    }
+
+    /// The mean of the latest looks beyond what the looks before them foretell: chips, code periods, and its
+    /// variance over that of a look of as many periods.
+    fn step(&self) -> Option<(f64, f64, f64)> {
+        if self.latest.len() < AVERAGED {
+            return None;
+        }
+        let n = self.latest.len() as f64;
+        let mean = |of: &dyn Fn(&Look) -> f64| self.latest.iter().map(of).sum::<f64>() / n;
+        let expected = self.trend.forecast(mean(&|look| look.t_s))?;
+        let periods = n * mean(&|look| f64::from(look.periods));
+        // A trend's variance is in that of one look.
+        Some((mean(&|look| look.chips) - expected.chips, periods, 1.0 + n * expected.variance_ratio))
+    }
+}
+
+impl FrontEnd {
+    /// Takes a look into the trends, unless it shows something common.
+    pub(super) fn suspect(&mut self, glances: &[Option<Glance>], at_s: f64, since: u64, shared: &Shared) {
+        let Some(reference) = self.reference() else { return };
+        let (mut steps, mut seen, mut gone) = (Vec::new(), 0, 0);
+        for (track, glance) in self.tracks.iter().zip(glances) {
+            let (Some(glance), Some(expected)) = (glance, track.watched.trend.forecast(at_s)) else { continue };
+            let (power, periods) = (track.watched.trend.power(), f64::from(glance.periods));
+            if power > SEEN_SIGMAS * ((1.0 + 2.0 * power) / periods).sqrt() {
+                seen += 1;
+                gone += usize::from(glance.power < VANISHED * power);
+            }
+            if track.channel.is_settled() {
+                let look = (glance.code_chips - expected.chips, periods, 1.0 + expected.variance_ratio);
+                steps.extend(self.step_of(track, look, &glance.rates, shared));
+            }
+        }
+        let vanished = gone >= LEAST_CHANNELS && gone as f64 >= VANISHED_SHARE * f64::from(seen);
+        let sample_chips = reference.chip_rate_hz / self.metadata.rate.hz();
+        if vanished
+            || common_step(&steps, sample_chips).is_some()
+            || doppler_step(&steps)
+            || doppler_step(&self.lasting(shared))
+        {
+            for track in &mut self.tracks {
+                track.watched.profile = Profile::default();
+                track.watched.begin = track.channel.symbols_begin();
+            }
+            self.gap.stage = Stage::Scanning { since, whole: !vanished };
+            return;
+        }
+        for (track, glance) in self.tracks.iter_mut().zip(glances) {
+            let watched = &mut track.watched;
+            match glance {
+                Some(glance) if track.channel.is_settled() => {
+                    watched.trend.take(at_s, glance.code_chips, glance.power);
+                    watched.settled.take(at_s, glance);
+                    (watched.rates, watched.moved_chips) = (Some(glance.rates), glance.moved_chips);
+                }
+                _ => watched.forget(),
+            }
+        }
+    }
+
+    /// Steps of the latest looks together.
+    fn lasting(&self, shared: &Shared) -> Vec<Step> {
+        let one = |track: &super::Track| {
+            let rates = track.watched.rates?;
+            self.step_of(track, track.watched.settled.step()?, &rates, shared)
+        };
+        self.tracks.iter().filter(|track| track.channel.is_settled()).filter_map(one).collect()
+    }
+
+    /// Whether signs turn elsewhere than where symbols or overlays have them turn: then code periods are
+    /// missing, and nothing else shows it.
+    pub(super) fn compare_edges(&mut self, now: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        if self.gap.stage != Stage::Quiet || now < self.gap.last_edges + self.samples(EDGES_S) {
+            return Ok(());
+        }
+        let since = std::mem::replace(&mut self.gap.last_edges, now);
+        let begins: Vec<Option<u64>> = self.tracks.iter().map(|track| track.channel.symbols_begin()).collect();
+        let moved = self.signals.iter().any(|signal| {
+            let own = || self.tracks.iter().zip(&begins).filter(|(track, _)| track.channel.signal() == *signal);
+            let edges: Vec<(&Edges, u64)> =
+                own().filter_map(|(track, begin)| Some((track.channel.edges(), (*begin)?))).collect();
+            let enough = edges.len() >= LEAST_CHANNELS && edges.len() as f64 >= VANISHED_SHARE * own().count() as f64;
+            enough && turned_by(&edges).is_some_and(|turned| turned != 0)
+        });
+        self.tracks.iter_mut().for_each(|track| track.channel.forget_edges());
+        if !moved {
+            return Ok(());
+        }
+        for (track, begin) in self.tracks.iter_mut().zip(begins) {
+            track.watched.begin = begin;
+        }
+        let found = Found { samples: 0, seconds: 0.0 };
+        self.reseat(Moved { since, at: now, found, whole: true }, sink)
+    }
+
+    /// Periods by which the counts of a signal's channels are short, modulo a symbol's or an overlay's, with
+    /// that number of them; `None` while it is in doubt.
+    pub(super) fn turned(&self, signal: &'static Signal) -> Option<(u64, u64)> {
+        let own = self.tracks.iter().filter(|track| track.channel.signal() == signal);
+        let edges: Vec<(&Edges, u64)> =
+            own.filter_map(|track| Some((track.channel.edges(), track.watched.begin?))).collect();
+        let turned = turned_by(&edges).filter(|_| edges.len() >= LEAST_CHANNELS)?;
+        Some((turned, edges.first()?.0.periods()))
+    }
+}

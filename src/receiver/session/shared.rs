@@ -1,0 +1,124 @@
+//! What all front ends of a reception have in common: navigation data, the receiver's clock, the solver, and
+//! what became of the satellites.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+use crate::gnss::time::{Epoch, Rate};
+use crate::receiver::diagnosis::Stage;
+use crate::receiver::observe::Timebase;
+use crate::receiver::position::least_squares::UNKNOWNS;
+use crate::receiver::position::{CodeNoise, NoFix, Noises, Solver};
+use crate::receiver::settings::Settings;
+
+/// What became of a satellite, for the diagnosis.
+#[derive(Clone, Default)]
+pub(super) struct Progress {
+    pub symbols: bool,
+    pub frame: bool,
+    pub missing: Vec<u8>,
+}
+
+/// The last fix, by whose clock lost samples show that no channel lived through.
+#[derive(Clone, Copy)]
+pub(super) struct LastFix {
+    pub sample: u64,
+    pub bias_s: f64,
+    pub drift: f64,
+    pub sigma_s: f64,
+}
+
+/// The state that channels of all front ends feed.
+pub(super) struct Shared {
+    pub settings: Settings,
+    pub week_reference: Epoch,
+    /// When the recording says that it begins.
+    pub start: Option<Epoch>,
+    pub noises: Noises,
+    pub timebase: Timebase,
+    pub solver: Solver,
+    pub ephemerides: BTreeMap<Sv, Ephemeris>,
+    pub klobuchar: Option<Klobuchar>,
+    pub last_fix: Option<LastFix>,
+    pub clock_drift: Option<f64>,
+    pub fixes: u64,
+    pub first_fix_s: Option<f64>,
+    pub worst_condition: Option<f64>,
+    pub reason: Option<NoFix>,
+    /// The best that a search met: satellite, statistic and threshold.
+    pub strongest: Option<(Sv, f64, f64)>,
+    pub progress: BTreeMap<Sv, Progress>,
+    pub acquired: BTreeSet<Sv>,
+    pub used: BTreeSet<Sv>,
+    pub losses: u64,
+}
+
+impl Shared {
+    /// Before the first sample; `rate` is that of the first front end.
+    pub fn new(
+        settings: &Settings,
+        noises: Noises,
+        rate: Rate,
+        (start, week_reference): (Option<Epoch>, Epoch),
+    ) -> Self {
+        Self {
+            settings: settings.clone(),
+            week_reference,
+            start,
+            timebase: Timebase::new(rate, start),
+            solver: Solver::new(&settings.position, noises.clone(), rate),
+            noises,
+            ephemerides: BTreeMap::new(),
+            klobuchar: None,
+            last_fix: None,
+            clock_drift: None,
+            fixes: 0,
+            first_fix_s: None,
+            worst_condition: None,
+            reason: None,
+            strongest: None,
+            progress: BTreeMap::new(),
+            acquired: BTreeSet::new(),
+            used: BTreeSet::new(),
+            losses: 0,
+        }
+    }
+
+    /// Noise of the code loop of a signal.
+    pub fn noise(&self, signal: &Signal) -> Option<&CodeNoise> {
+        self.noises.iter().find(|(of, _)| *of == signal).map(|(_, noise)| noise)
+    }
+
+    /// The time near which weeks are resolved.
+    pub fn near(&self) -> Epoch {
+        self.timebase.clock().map(|clock| clock.start).or(self.start).unwrap_or(self.week_reference)
+    }
+
+    /// The first stage that failed, where there was no fix.
+    pub fn failed_stage(&self) -> Stage {
+        if self.acquired.is_empty() {
+            return Stage::NothingAcquired { strongest: self.strongest };
+        }
+        let of = |test: fn(&Progress) -> bool| -> Vec<Sv> {
+            self.progress.iter().filter(|(_, progress)| test(progress)).map(|(sv, _)| *sv).collect()
+        };
+        let with_symbols = of(|progress| progress.symbols);
+        if with_symbols.is_empty() {
+            return Stage::NoSymbols { acquired: self.acquired.iter().copied().collect() };
+        }
+        if of(|progress| progress.frame).is_empty() {
+            return Stage::NoFrame { with_symbols };
+        }
+        let complete: Vec<Sv> = self.ephemerides.keys().copied().collect();
+        if complete.len() < UNKNOWNS {
+            let lacking = |(sv, progress): (&Sv, &Progress)| {
+                (progress.frame && !progress.missing.is_empty()).then(|| (*sv, progress.missing.clone()))
+            };
+            return Stage::NoEphemeris { complete, missing: self.progress.iter().filter_map(lacking).collect() };
+        }
+        Stage::NoPosition { with_ephemeris: complete, reason: self.reason.clone() }
+    }
+}

@@ -1,0 +1,242 @@
+//! Generator and receiver in one loop, with samples passed in memory.
+//!
+//! [`run`] composes one generator and one receiver; [`feed`] gives the samples of a generator to anything
+//! that takes them, such as several receivers. While a batch of samples is received, the next one is
+//! generated: two batches are in memory at a time. Results go to sinks on both sides: files
+//! ([`truth::Writer`], [`Output`](crate::receiver::output::Output)), a `Vec` of records, or for the truth
+//! `()`. They do not depend on the number of threads.
+//!
+//! The receiver gets metadata and samples alone; the truth never passes through it.
+//!
+//! ```
+//! use gnss_twin::generator::scenario::Scenario;
+//! use gnss_twin::receiver::output::Record;
+//! use gnss_twin::receiver::settings::Settings;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scenario = r#"
+//!     name = "second"
+//!     start = 2010-07-01T08:06:00
+//!     duration_s = 0.3
+//!     motion = { kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
+//!     noise = {}
+//! "#;
+//! let scene = Scenario::from_toml(scenario)?.scene()?;
+//! let mut found: Vec<Record> = Vec::new();
+//! let done = gnss_twin::twin::run(std::slice::from_ref(&scene), &Settings::default(), &mut (), &mut found)?;
+//! let acquired = |record: &&Record| matches!(record, Record::Acquisition(row) if row.acquired);
+//! assert_eq!(found.iter().filter(acquired).count(), done.outcome.acquired.len());
+//! assert_eq!(done.outcome.acquired, done.generated[0].satellites);
+//! # Ok(())
+//! # }
+//! ```
+
+#![warn(missing_docs)]
+
+use std::time::{Duration, Instant};
+
+use thiserror::Error;
+
+use crate::generator::scene::Scene;
+use crate::generator::stream::{Fronts, GenerateError, Generated, Options, Stream};
+use crate::generator::truth;
+use crate::gnss::samples::IfMetadata;
+use crate::gnss::signal::Signal;
+use crate::receiver::output;
+use crate::receiver::settings::Settings;
+use crate::receiver::{Outcome, ReceiveError, Reception};
+
+/// Why a run of the twin ended early.
+#[derive(Debug, Error)]
+pub enum TwinError {
+    /// The scene cannot be generated, or its truth is not taken.
+    #[error(transparent)]
+    Generate(#[from] GenerateError),
+    /// The samples cannot be received, or the records are not taken.
+    #[error(transparent)]
+    Receive(#[from] ReceiveError),
+}
+
+/// What a run of the twin did.
+#[derive(Clone, Debug)]
+pub struct Done {
+    /// By the generator, for each front end.
+    pub generated: Vec<Generated>,
+    /// By the receiver.
+    pub outcome: Outcome,
+}
+
+/// Generates a scene and receives its samples with `settings`, from the first to the last. `scenes` are its
+/// front ends, one or several ([`settings_for`]); a reference to one [`Scene`] is made such a slice by
+/// [`std::slice::from_ref`].
+///
+/// # Errors
+/// The first error of either side; what the sinks took before stays.
+pub fn run(
+    scenes: &[Scene],
+    settings: &Settings,
+    truth: &mut (dyn truth::Sink + Send),
+    records: &mut (dyn output::Sink + Send),
+) -> Result<Done, TwinError> {
+    let metadata: Vec<IfMetadata> = scenes.iter().map(|scene| scene.metadata.clone()).collect();
+    let mut reception = Reception::of_several(&metadata, &settings_for(scenes, settings))?;
+    let fed =
+        feed(scenes, truth, &mut |number, samples| Ok::<_, TwinError>(reception.take_of(number, samples, records)?))?;
+    Ok(Done { generated: fed.generated, outcome: reception.finish(records)? })
+}
+
+/// The settings with which a scene is received: where they name no signals to search for, those of the scene.
+pub fn settings_for(scenes: &[Scene], settings: &Settings) -> Settings {
+    let mut signals: Vec<&'static Signal> = Vec::new();
+    for signal in scenes.iter().flat_map(|scene| &scene.signals) {
+        if !signals.contains(signal) {
+            signals.push(signal);
+        }
+    }
+    let mut own = settings.clone();
+    own.acquisition.or_signals(&signals);
+    own
+}
+
+/// Takes a batch of samples of a front end by its place.
+pub type Listen<'a, E> = dyn FnMut(usize, &[u8]) -> Result<(), E> + Send + 'a;
+
+/// What [`feed`] did.
+#[derive(Clone, Debug)]
+pub struct Fed {
+    /// By the generator, for each front end.
+    pub generated: Vec<Generated>,
+    /// Wall-clock time for which the generator was at work.
+    pub busy: Duration,
+}
+
+/// Generates a scene and gives its samples to `listen`, batch by batch in their order, for each front end by
+/// its place; the first call comes with none, while the first batch is generated. Whichever side is done
+/// first helps the other's threads.
+///
+/// # Errors
+/// The generator's, and what `listen` returns: the loop ends with it.
+pub fn feed<E: From<GenerateError> + Send>(
+    scenes: &[Scene],
+    truth: &mut (dyn truth::Sink + Send),
+    listen: &mut Listen<'_, E>,
+) -> Result<Fed, E> {
+    // Inside the pool, so that no batch has to wake its threads.
+    rayon::scope(|_| {
+        let mut maker = Maker::new(scenes, truth)?;
+        let (mut made, mut taken) = (vec![Vec::new(); scenes.len()], vec![Vec::new(); scenes.len()]);
+        let (mut busy, mut more) = (Duration::ZERO, true);
+        while more {
+            let (generated, listened) = rayon::join(
+                || {
+                    let start = Instant::now();
+                    let more = maker.next(truth, &mut made);
+                    busy += start.elapsed();
+                    more
+                },
+                || taken.iter().enumerate().try_for_each(|(number, samples)| listen(number, samples)),
+            );
+            listened?;
+            more = generated?;
+            std::mem::swap(&mut made, &mut taken);
+        }
+        Ok(Fed { generated: maker.finish(truth)?, busy })
+    })
+}
+
+/// The samples of a scene on their way out: of its one front end, or of several in step.
+enum Maker<'a> {
+    One(Stream<'a>),
+    Several(Fronts<'a>),
+}
+
+impl<'a> Maker<'a> {
+    fn new(scenes: &'a [Scene], truth: &mut dyn truth::Sink) -> Result<Self, GenerateError> {
+        match scenes {
+            [scene] => Stream::new(scene, truth, &Options::default()).map(Self::One),
+            several => Fronts::new(several, truth, &Options::default()).map(Self::Several),
+        }
+    }
+
+    /// Replaces what `made` holds of each front end by the next batch; `false` after the last sample.
+    fn next(&mut self, truth: &mut dyn truth::Sink, made: &mut [Vec<u8>]) -> Result<bool, GenerateError> {
+        match self {
+            Self::One(stream) => match made.first_mut() {
+                Some(made) => stream.next(truth, made),
+                None => Ok(false),
+            },
+            Self::Several(fronts) => {
+                made.iter_mut().for_each(Vec::clear);
+                let mut sink = |number: usize, bytes: &[u8]| {
+                    made.iter_mut().skip(number).take(1).for_each(|made| made.extend_from_slice(bytes));
+                    Ok(())
+                };
+                fronts.next(truth, &mut Vec::new(), &mut sink)
+            }
+        }
+    }
+
+    fn finish(self, truth: &mut dyn truth::Sink) -> Result<Vec<Generated>, GenerateError> {
+        match self {
+            Self::One(stream) => stream.finish(truth).map(|generated| vec![generated]),
+            Self::Several(fronts) => fronts.finish(truth),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generator::Generator;
+    use crate::generator::scenario::Scenario;
+    use crate::gnss::samples::Format;
+    use crate::receiver::Receiver;
+
+    fn scene(duration_s: f64) -> Scene {
+        let text = format!(
+            "name = \"loop\"\nstart = 2010-07-01T08:06:00\nduration_s = {duration_s}\nnoise = {{}}\n\
+             motion = {{ kind = \"static\", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }}\n"
+        );
+        Scenario::from_toml(&text).unwrap().scene().unwrap()
+    }
+
+    /// The loop in steps of one's own: the generator's iterator, and the receiver's records as values.
+    #[test]
+    fn a_run_gives_what_generator_and_receiver_give_one_after_the_other() {
+        let scene = scene(0.5);
+        let settings = Settings::default();
+        let (mut truth, mut records) = (Vec::new(), Vec::new());
+        let done = run(std::slice::from_ref(&scene), &settings, &mut truth, &mut records).unwrap();
+
+        let mut receiver = Receiver::new(&scene.metadata, &settings).unwrap();
+        let (mut own_truth, mut own_records, mut bytes) = (Vec::new(), Vec::new(), 0);
+        let mut generator = Generator::new(&scene).unwrap();
+        for batch in &mut generator {
+            let batch = batch.unwrap();
+            assert_eq!(batch.first_sample as usize * Format::Ci8.bytes(), bytes);
+            bytes += batch.samples.len();
+            own_records.extend(receiver.push(&batch.samples).unwrap());
+            own_truth.extend(batch.truth);
+        }
+        let (rest, outcome) = receiver.finish().unwrap();
+        own_records.extend(rest);
+        assert_eq!(bytes as u64, scene.samples * Format::Ci8.bytes() as u64);
+        assert_eq!(generator.done(), done.generated.first());
+        assert_eq!(outcome.acquired, done.outcome.acquired);
+        assert_eq!(format!("{own_truth:?}"), format!("{truth:?}"));
+        assert_eq!(format!("{own_records:?}"), format!("{records:?}"));
+        assert!(truth.len() > 100 && records.len() > 32, "{} and {}", truth.len(), records.len());
+    }
+
+    #[test]
+    fn an_error_of_who_listens_ends_the_loop() {
+        let scene = scene(2.0);
+        let mut calls = 0;
+        let stopped = feed(std::slice::from_ref(&scene), &mut (), &mut |_, _| {
+            calls += 1;
+            if calls < 3 { Ok(()) } else { Err(GenerateError::NoFrontEnd) }
+        });
+        assert!(matches!(stopped, Err(GenerateError::NoFrontEnd)), "{stopped:?}");
+        assert_eq!(calls, 3);
+    }
+}
