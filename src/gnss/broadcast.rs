@@ -344,9 +344,8 @@ impl Ephemeris {
         }
     }
 
-    /// Curve fit interval around the reference time. Of Galileo, whose document has none, eight hours:
-    /// receivers take sets for four hours (Galileo OS SIS ICD 2.1, 5.1.9.2 counts on new ones every three at
-    /// most).
+    /// Curve fit interval around the reference time. Of Galileo, whose document has none, eight hours: a set
+    /// is used for four hours after its reference time.
     ///
     /// Of GPS four hours, or what the issue of data says when the fit flag is set
     /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).

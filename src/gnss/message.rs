@@ -15,7 +15,7 @@ use crate::gnss::gps::lnav::UtcData;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, TimeOffset};
+use crate::gnss::time::{Epoch, TimePolynomial};
 
 /// A form of message.
 pub struct Message {
@@ -65,7 +65,7 @@ pub struct Common {
     pub nequick: Option<[f64; 3]>,
     pub utc: UtcData,
     /// Galileo's time against GPS time; absent means that nothing is said of it.
-    pub galileo: Option<TimeOffset>,
+    pub galileo: Option<TimePolynomial>,
     /// One set of elements a satellite, for almanacs, and the time near which they hold.
     pub almanac: Vec<Ephemeris>,
     pub reference: Option<Epoch>,

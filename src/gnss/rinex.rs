@@ -11,14 +11,11 @@ mod elements;
 use thiserror::Error;
 
 use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::gps::lnav::{LeapEvent, UtcPolynomial};
+use crate::gnss::gps::lnav::LeapEvent;
 use crate::gnss::inflate::{InflateError, inflate};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::time::{Epoch, TimeOffset, WEEK_S};
+use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
 
-/// Step of the reference time of UTC, and the last one inside a week.
-const UTC_STEP_S: f64 = 4096.0;
-const UTC_LAST_S: f64 = 602_112.0;
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
 
@@ -35,9 +32,9 @@ pub struct Navigation {
     /// A change of these that the file names.
     pub leap_event: Option<LeapEvent>,
     /// GPS time minus UTC beyond whole seconds.
-    pub utc: Option<UtcPolynomial>,
+    pub utc: Option<TimePolynomial>,
     /// Galileo's time minus GPS time, whole weeks apart.
-    pub galileo: Option<TimeOffset>,
+    pub galileo: Option<TimePolynomial>,
     /// Records that were left out, each with its reason.
     pub skipped: Vec<String>,
 }
@@ -116,18 +113,15 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
             _ => navigation.ephemerides.push(set),
         }
     }
-    if let (Some(line), Some(first)) = (utc, navigation.ephemerides.first()) {
-        match utc_polynomial(line, first.toe) {
-            Ok(found) => navigation.utc = found,
-            Err(reason) => navigation.skipped.push(reason),
-        }
-    }
-    if let (Some(line), Some(first)) = (galileo, navigation.ephemerides.first()) {
-        match time_offset(line, first.toe) {
-            Ok(found) => navigation.galileo = found,
-            Err(reason) => navigation.skipped.push(reason),
-        }
-    }
+    let near = navigation.ephemerides.first().map(|first| first.toe);
+    let mut offset = |line: Option<columns::Polynomial>, allowed| {
+        let found = polynomial(line?, near?, allowed);
+        found.unwrap_or_else(|reason| {
+            navigation.skipped.push(reason);
+            None
+        })
+    };
+    (navigation.utc, navigation.galileo) = (offset(utc, &OF_UTC), offset(galileo, &OF_GALILEO));
     if navigation.ephemerides.is_empty() {
         let reasons = navigation.skipped.iter().take(3).cloned().collect::<Vec<_>>().join("; ");
         let found = format!(
@@ -140,43 +134,55 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     Ok(navigation)
 }
 
-/// GPS time against UTC with its week near `anchor`, for files write it counted on or modulo 1024 or 256;
-/// none where all is zero, as files have it that know nothing.
-fn utc_polynomial(line: columns::Polynomial, anchor: Epoch) -> Result<Option<UtcPolynomial>, String> {
-    let columns::Polynomial { a0_s, a1_sps, tow_s, week } = line;
-    if (a0_s, a1_sps) == (0.0, 0.0) && tow_s == 0.0 {
-        return Ok(None);
-    }
-    // The field's step and its largest value inside a week (IS-GPS-200N, table 20-IX).
-    let on_step = tow_s.rem_euclid(UTC_STEP_S) == 0.0 && (0.0..=UTC_LAST_S).contains(&tow_s);
-    if !on_step || a0_s.abs() > 1.0 || a1_sps.abs() > 7.451e-9 {
-        return Err(format!(
-            "UTC: A0 = {a0_s:e}, A1 = {a1_sps:e}, reference time {tow_s} s: expected at most 1 s and 7.451e-9 s/s in size, and a \
-             multiple of {UTC_STEP_S} s up to {UTC_LAST_S}"
-        ));
-    }
-    // Eight bits of the week are in the message.
-    let ahead = (week - anchor.week() + 128).rem_euclid(256) - 128;
-    let reference = Epoch::new((anchor.week() + ahead) * WEEK_S, tow_s);
-    Ok(Some(UtcPolynomial { a0_s, a1_sps, reference }))
+/// What a line of one time against another may hold.
+struct Allowed {
+    what: &'static str,
+    a0_s: f64,
+    a1_sps: f64,
+    /// Whether a reference time is one, and what it has to be.
+    is_time: fn(f64) -> bool,
+    time: &'static str,
+    /// Weeks that the message tells apart.
+    weeks: i64,
 }
 
-/// Galileo's time against GPS time with its week near `anchor`; none where all is zero.
-fn time_offset(line: columns::Polynomial, anchor: Epoch) -> Result<Option<TimeOffset>, String> {
+/// IS-GPS-200N, table 20-IX: the field's step and its largest value inside a week.
+const OF_UTC: Allowed = Allowed {
+    what: "UTC",
+    a0_s: 1.0,
+    a1_sps: 7.451e-9,
+    is_time: |tow_s| tow_s.rem_euclid(4096.0) == 0.0 && (0.0..=602_112.0).contains(&tow_s),
+    time: "a multiple of 4096 s up to 602112",
+    weeks: 256,
+};
+/// Galileo OS SIS ICD 2.1, table 69; files write times of transmission too.
+const OF_GALILEO: Allowed = Allowed {
+    what: "Galileo's time",
+    a0_s: 9.54e-7,
+    a1_sps: 9.1e-13,
+    is_time: |tow_s| (0.0..WEEK_S as f64).contains(&tow_s),
+    time: "a time of week",
+    weeks: 64,
+};
+
+/// One time against another with its week near `anchor`, for files write it counted on or modulo 1024 or 256;
+/// none where all is zero, as files have it that know nothing.
+fn polynomial(line: columns::Polynomial, anchor: Epoch, allowed: &Allowed) -> Result<Option<TimePolynomial>, String> {
     let columns::Polynomial { a0_s, a1_sps, tow_s, week } = line;
     if (a0_s, a1_sps) == (0.0, 0.0) && tow_s == 0.0 {
         return Ok(None);
     }
-    // Ranges of the fields (Galileo OS SIS ICD 2.1, table 69); files write times of transmission too.
-    if !(0.0..WEEK_S as f64).contains(&tow_s) || a0_s.abs() > 9.54e-7 || a1_sps.abs() > 9.1e-13 {
+    if !(allowed.is_time)(tow_s) || a0_s.abs() > allowed.a0_s || a1_sps.abs() > allowed.a1_sps {
         return Err(format!(
-            "Galileo's time: A0 = {a0_s:e}, A1 = {a1_sps:e}, reference time {tow_s} s: expected at most 9.54e-7 s \
-             and 9.1e-13 s/s in size, and a time of week"
+            "{}: A0 = {a0_s:e}, A1 = {a1_sps:e}, reference time {tow_s} s: expected at most {} s and {:e} s/s in size, \
+             and {}",
+            allowed.what, allowed.a0_s, allowed.a1_sps, allowed.time
         ));
     }
-    // Six bits of the week are in the message.
-    let ahead = (week - anchor.week() + 32).rem_euclid(64) - 32;
-    Ok(Some(TimeOffset { a0_s, a1_sps, reference: Epoch::new((anchor.week() + ahead) * WEEK_S, tow_s) }))
+    let half = allowed.weeks / 2;
+    let ahead = (week - anchor.week() + half).rem_euclid(allowed.weeks) - half;
+    let reference = Epoch::new((anchor.week() + ahead) * WEEK_S, tow_s);
+    Ok(Some(TimePolynomial { a0_s, a1_sps, reference }))
 }
 
 fn unpack(bytes: &[u8], name: &str) -> Result<Vec<u8>, NavigationError> {
@@ -234,7 +240,7 @@ mod tests {
         assert_eq!(day.klobuchar, Some(expected));
         // The file's week is 1590 modulo 1024.
         let reference = Epoch::from_week(1590, 503_808.0);
-        let utc = UtcPolynomial { a0_s: -0.838190317154e-8, a1_sps: -0.213162820728e-13, reference };
+        let utc = TimePolynomial { a0_s: -0.838190317154e-8, a1_sps: -0.213162820728e-13, reference };
         assert_eq!((day.utc, day.leap_event), (Some(utc), None));
         let first = &day.ephemerides[0];
         assert_eq!((first.sv, first.health, first.iode, first.ura_index), (Sv::gps(1), 63, 63, 0));
@@ -262,7 +268,7 @@ mod tests {
         let leaps = line("    15    16  1694     7", "LEAP SECONDS");
         let found = read((head("3.04") + &corr + &leaps + &end + &three(&record)).as_bytes(), "three").unwrap();
         let reference = Epoch::from_week(1590, 503_808.0);
-        let utc = UtcPolynomial { a0_s: -8.3819031715e-9, a1_sps: -2.131628207e-14, reference };
+        let utc = TimePolynomial { a0_s: -8.3819031715e-9, a1_sps: -2.131628207e-14, reference };
         assert_eq!((found.utc, &found.skipped), (Some(utc), &Vec::new()));
         assert_eq!(found.leap_event, Some(LeapEvent { after_s: 16, week: 1694, day: 7 }));
 
@@ -270,7 +276,7 @@ mod tests {
                    3.456000000000e+05-8.381903171540e-09-2.131628207280e-14 0.000000000000e+00\n";
         let eph = format!("> EPH G01 LNAV\n{}", three(&record));
         let found = read((head("4.00") + &leaps + &end + sto + &eph).as_bytes(), "four").unwrap();
-        let utc = UtcPolynomial { a0_s: -8.38190317154e-9, a1_sps: -2.13162820728e-14, reference };
+        let utc = TimePolynomial { a0_s: -8.38190317154e-9, a1_sps: -2.13162820728e-14, reference };
         assert_eq!((found.utc, &found.skipped), (Some(utc), &Vec::new()));
 
         let off = corr.replace("503808", "503809");
@@ -279,6 +285,23 @@ mod tests {
         let none = line("GPUT  0.0000000000e+00 0.000000000e+00      0    0", "TIME SYSTEM CORR");
         let found = read((head("3.04") + &none + &end + &three(&record)).as_bytes(), "none").unwrap();
         assert_eq!((found.utc, &found.skipped), (None, &Vec::new()));
+    }
+
+    #[test]
+    fn the_embedded_hours_have_both_systems_with_ionosphere_and_time() {
+        let hours = embedded_two_systems().unwrap();
+        // By the file's lines GAL and GAGP, the week that of 2020-11-29.
+        assert_eq!(hours.nequick, Some([69.25, 3.5156e-2, -3.9063e-3]));
+        let reference = Epoch::from_week(2134, 86_400.0);
+        let offset = TimePolynomial { a0_s: -4.9185473472e-9, a1_sps: -1.731947918e-14, reference };
+        assert_eq!(hours.galileo, Some(offset));
+        // E01's only I/NAV record: `E01 2020 11 29 12 20 00`, data sources 517; the one of F/NAV is left
+        // alone.
+        let e01: Vec<&Ephemeris> = hours.ephemerides.iter().filter(|set| set.sv.to_string() == "E01").collect();
+        let [set] = e01.as_slice() else { panic!("{} sets of E01", e01.len()) };
+        assert_eq!((set.iode, set.ura_index, set.health), (74, 107, 0));
+        assert_eq!((set.af0_s, set.tgd_s, set.tgd2_s), (-9.928549989127e-4, 4.656612873077e-10, 4.656612873077e-10));
+        assert_eq!(set.transmitted, Epoch::from_week(2134, 47_792.0));
     }
 
     #[test]

@@ -51,15 +51,15 @@ pub static GPST: TimeScale = TimeScale { name: "GPST", behind_gpst_s: 0 };
 /// Galileo system time: its weeks begin when those of GPS do (Galileo OS SIS ICD 2.1, 5.1.2).
 pub static GST: TimeScale = TimeScale { name: "GST", behind_gpst_s: 0 };
 
-/// How far a system's time is ahead of GPS time, whole seconds apart: `a0 + a1 (t − reference)`.
+/// How far one time is ahead of another, whole seconds apart: `a0 + a1 (t − reference)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TimeOffset {
+pub struct TimePolynomial {
     pub a0_s: f64,
     pub a1_sps: f64,
     pub reference: Epoch,
 }
 
-impl TimeOffset {
+impl TimePolynomial {
     /// Seconds ahead at an instant.
     pub fn at_s(&self, at: Epoch) -> f64 {
         self.a0_s + self.a1_sps * at.since(self.reference)

@@ -104,7 +104,7 @@ impl Diagnosis {
             Stage::NoSymbols { .. } => {
                 say(format!("the length: symbols need a second or two, there are {length}"));
                 say(format!("the sample rate: {rate_hz} Hz was taken; a small error shows here first"));
-                say("the signal's strength: below 25 dB-Hz symbols are not to be told".into());
+                say("the signal's strength: below 25 dB-Hz symbols cannot be distinguished".into());
             }
             Stage::NoFrame { .. } | Stage::NoEphemeris { .. } => {
                 if seconds < SHORTEST_S {

@@ -97,7 +97,7 @@ impl Scenario {
         let mut inside = Vec::new();
         for &signal in front_end.signals.as_ref().unwrap_or(&self.signals) {
             let (from, to) = main_lobe_hz(metadata, signal);
-            let told = format!(
+            let what = format!(
                 "{signal}: its main lobe, {:.3} to {:.3} MHz, does not fit into the samples' band, {:.3} to {:.3} MHz",
                 from / 1e6,
                 to / 1e6,
@@ -106,16 +106,16 @@ impl Scenario {
             );
             if is_outside(metadata, signal) {
                 if front_end.signals.is_some() {
-                    return Err(self.conflict("front_end.signals", format!("{of_it}{told} at all")));
+                    return Err(self.conflict("front_end.signals", format!("{of_it}{what} at all")));
                 }
                 // Another front end may be for it.
                 if self.front_ends.len() == 1 {
-                    warnings.push(format!("{told} at all: it is not computed"));
+                    warnings.push(format!("{what} at all: it is not computed"));
                 }
                 continue;
             }
             if from < low || to > high {
-                warnings.push(format!("{of_it}{told}: it will fold over"));
+                warnings.push(format!("{of_it}{what}: it will fold over"));
             }
             let outside = |sv: &Sv| is_link_outside(metadata, signal.link(*sv));
             if matches!(signal.carrier, Carrier::Channels { .. }) {

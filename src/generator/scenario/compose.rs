@@ -138,8 +138,8 @@ impl Scenario {
             warnings.extend(presence::warning(&missing, self.start));
         }
         for (scene, front_end) in scenes.iter().zip(&self.front_ends) {
-            let told = scene.fidelity.warning(scene.clock.rate.hz());
-            warnings.extend(told.map(|warning| front_end.of_it() + &warning));
+            let warning = scene.fidelity.warning(scene.clock.rate.hz());
+            warnings.extend(warning.map(|warning| front_end.of_it() + &warning));
         }
         Ok((scenes, warnings))
     }
@@ -243,10 +243,10 @@ impl Scenario {
             faults: self.faults(),
             metadata,
         };
-        let mut told = Vec::new();
+        let mut own = Vec::new();
         scene.interference =
-            spoofing_and_jamming::interferers(self, &scene, files.directory, files.overrides, &mut told)?;
-        warnings.extend(told.into_iter().map(|warning| front_end.of_it() + &warning));
+            spoofing_and_jamming::interferers(self, &scene, files.directory, files.overrides, &mut own)?;
+        warnings.extend(own.into_iter().map(|warning| front_end.of_it() + &warning));
         Ok(scene)
     }
 

@@ -15,10 +15,10 @@ use crate::gnss::gps::lnav::UtcData;
 use crate::gnss::message::Common;
 use crate::gnss::rinex::{self, Navigation};
 use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::TimeOffset;
+use crate::gnss::time::TimePolynomial;
 
 /// Warnings of one kind that are listed in full.
-const TOLD: usize = 4;
+const LISTED: usize = 4;
 
 /// Orbits, messages, and who is left out.
 pub(super) struct Sky {
@@ -50,7 +50,7 @@ pub(super) fn navigation(
         navigation.utc = navigation.utc.or(utc);
         navigation.skipped.extend(skipped);
     }
-    tell(warnings, &navigation.skipped, "records of the navigation file left out");
+    summarise(warnings, &navigation.skipped, "records of the navigation file left out");
     // Merged files have more systems than the scene.
     navigation.ephemerides.retain(|set| systems(scenario).any(|system| system == set.sv.system));
     Ok(navigation)
@@ -78,7 +78,7 @@ pub(super) fn sky(
     warnings: &mut Vec<String>,
 ) -> Result<Sky, ScenarioError> {
     let (mut catalogue, rogues) = Catalogue::new(navigation.ephemerides.clone());
-    tell(warnings, &rogues, "ephemerides left out");
+    summarise(warnings, &rogues, "ephemerides left out");
     let (start, end) = (scenario.start, scenario.start.plus_s(end_s));
     let sends = |system: System, at| {
         catalogue.satellites().any(|sv| sv.system == system && catalogue.sent_at(sv, at).is_some())
@@ -134,8 +134,8 @@ pub(super) fn sky(
 }
 
 /// Galileo's time against GPS time: as the scene gives it, or else as the file does.
-fn galileo_ahead(scenario: &Scenario, navigation: &Navigation) -> Option<TimeOffset> {
-    let given = scenario.galileo_ahead_s.map(|a0_s| TimeOffset { a0_s, a1_sps: 0.0, reference: scenario.start });
+fn galileo_ahead(scenario: &Scenario, navigation: &Navigation) -> Option<TimePolynomial> {
+    let given = scenario.galileo_ahead_s.map(|a0_s| TimePolynomial { a0_s, a1_sps: 0.0, reference: scenario.start });
     given.or(navigation.galileo)
 }
 
@@ -178,11 +178,11 @@ fn outside(ephemerides: &[Ephemeris], system: System, scenario: &Scenario) -> St
 }
 
 /// Passes a list on: the first few, and how many more.
-fn tell(warnings: &mut Vec<String>, list: &[String], what: &str) {
-    if list.len() <= TOLD {
+fn summarise(warnings: &mut Vec<String>, list: &[String], what: &str) {
+    if list.len() <= LISTED {
         warnings.extend_from_slice(list);
     } else {
-        let first = list.iter().take(TOLD - 1).cloned().collect::<Vec<_>>().join("; ");
+        let first = list.iter().take(LISTED - 1).cloned().collect::<Vec<_>>().join("; ");
         warnings.push(format!("{} {what}: {first}; …", list.len()));
     }
 }

@@ -7,9 +7,14 @@
 //! whatever cannot be told to be of another system. Records of other systems and messages are counted and not
 //! read.
 
+mod corrections;
+mod numbers;
+
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::Epoch;
+use corrections::{delta_utc, leap_event, system_time};
+use numbers::{digits, fields, numbers};
 
 /// Lines of a record: satellite, epoch and clock, then seven lines of the orbit.
 const LINES: usize = 8;
@@ -339,8 +344,9 @@ impl Form {
             }
             ("ION", "LNAV") if letter == 'G' => self.ionosphere(group, satellite),
             ("ION", "IFNV") => self.ionisation(group, satellite),
-            // Merged files name no satellite, and the message in its place.
-            ("STO", _) if ['G', 'E'].contains(&letter) => self.system_time(group, satellite),
+            ("STO", "LNAV") if letter == 'G' => self.system_time(group, satellite),
+            // Merged files name the system alone.
+            ("STO", "IFNV") => self.system_time(group, satellite),
             ("EPH" | "STO" | "EOP" | "ION", _) => Ok(Group::Other),
             (kind, _) => refuse(&format!("'{kind}': expected EPH, STO, EOP or ION")),
         }
@@ -410,179 +416,11 @@ impl Form {
         let (month, day, hour, minute) = (month?, day?, hour?, minute?);
         Epoch::parse(&format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{fraction}")).ok()
     }
-
-    /// Klobuchar's coefficients in a record of version 4.
-    fn ionosphere(&self, group: &[Line<'_>], satellite: &str) -> Result<Group, String> {
-        let (first, title) = group.first().copied().unwrap_or_default();
-        let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", title.trim_end()));
-        let [_, one, two, three] = group else {
-            return refuse(first, format!("a record of {} lines: expected 4", group.len()));
-        };
-        let mut coefficients = Vec::with_capacity(8);
-        // The field after the last coefficient is the region, and may be blank.
-        for (&(number, line), start, count) in
-            [(one, self.margin() + FIELD, 3), (two, self.margin(), 4), (three, self.margin(), 2)]
-        {
-            if self.cut == Some(number) && !line.trim_end().len().saturating_sub(start).is_multiple_of(FIELD) {
-                return refuse(number, "the file ends within a number".to_owned());
-            }
-            match fields(line, start, FIELD, count) {
-                Ok(found) => coefficients.extend(found),
-                Err(reason) => return refuse(number, reason),
-            }
-        }
-        let Some(epoch) = self.epoch(one.1.get(self.margin()..self.margin() + FIELD).unwrap_or("")) else {
-            return refuse(one.0, "column 5: expected an epoch".to_owned());
-        };
-        let coefficients: Option<Vec<f64>> = coefficients.into_iter().take(8).collect();
-        match coefficients.as_deref() {
-            Some(&[a0, a1, a2, a3, b0, b1, b2, b3]) => {
-                let found = Klobuchar { alpha: [a0, a1, a2, a3], beta: [b0, b1, b2, b3] };
-                Ok(Group::Ionosphere(format!("{epoch} {satellite}"), found))
-            }
-            _ => refuse(one.0, "expected eight coefficients".to_owned()),
-        }
-    }
-}
-
-impl Form {
-    /// Galileo's effective ionisation in a record of version 4; the flags after it are not read.
-    fn ionisation(&self, group: &[Line<'_>], satellite: &str) -> Result<Group, String> {
-        let (first, title) = group.first().copied().unwrap_or_default();
-        let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", title.trim_end()));
-        let Some(&(number, line)) = group.get(1).filter(|_| group.len() == 3) else {
-            return refuse(first, format!("a record of {} lines: expected 3", group.len()));
-        };
-        let Some(epoch) = self.epoch(line.get(self.margin()..self.margin() + FIELD).unwrap_or("")) else {
-            return refuse(number, "column 5: expected an epoch".to_owned());
-        };
-        match fields(line, self.margin() + FIELD, FIELD, 3) {
-            Ok(found) => match found.as_slice() {
-                &[Some(a0), Some(a1), Some(a2)] => Ok(Group::Ionisation(format!("{epoch} {satellite}"), [a0, a1, a2])),
-                _ => refuse(number, "expected three coefficients".to_owned()),
-            },
-            Err(reason) => refuse(number, reason),
-        }
-    }
-
-    /// GPS time against another in a record of version 4: UTC and Galileo's are wanted.
-    fn system_time(&self, group: &[Line<'_>], satellite: &str) -> Result<Group, String> {
-        let (first, title) = group.first().copied().unwrap_or_default();
-        let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", title.trim_end()));
-        let [_, when, what] = group else {
-            return refuse(first, format!("a record of {} lines: expected 3", group.len()));
-        };
-        let margin = self.margin();
-        let rest = when.1.get(margin + FIELD..).unwrap_or("");
-        let kind = rest.split_ascii_whitespace().next().unwrap_or("");
-        if ![UTC, GALILEO, GALILEO_OLD].contains(&kind) {
-            return Ok(Group::Other);
-        }
-        if self.cut == Some(what.0) && !what.1.trim_end().len().saturating_sub(margin).is_multiple_of(FIELD) {
-            return refuse(what.0, "the file ends within a number".to_owned());
-        }
-        let Some(epoch) = self.epoch(when.1.get(margin..margin + FIELD).unwrap_or("")) else {
-            return refuse(when.0, "column 5: expected an epoch".to_owned());
-        };
-        // Time of transmission, then the polynomial's coefficients; a quadratic one is CNAV's.
-        match fields(what.1, margin, FIELD, 4) {
-            Ok(found) => match found.as_slice() {
-                &[_, Some(a0_s), Some(a1_sps), _] => {
-                    let found = Polynomial { a0_s, a1_sps, tow_s: epoch.tow_s(), week: epoch.week() };
-                    let age = format!("{epoch} {satellite}");
-                    Ok(if kind == UTC { Group::Utc(age, found) } else { Group::Galileo(age, found) })
-                }
-                _ => refuse(what.0, "expected two coefficients".to_owned()),
-            },
-            Err(reason) => refuse(what.0, reason),
-        }
-    }
-}
-
-/// `3X, 2D19.12, 2I9` of version 2.
-fn delta_utc(line: &str) -> Result<Polynomial, String> {
-    let [a0_s, a1_sps] = numbers::<2>(line, 3, FIELD)?;
-    let whole = |from: usize| line.get(from..from + 9).unwrap_or("").trim().parse::<i64>();
-    match (whole(41), whole(50)) {
-        (Ok(tow_s), Ok(week)) => Ok(Polynomial { a0_s, a1_sps, tow_s: tow_s as f64, week }),
-        _ => Err("expected two whole numbers from column 42 on".to_owned()),
-    }
-}
-
-/// `A4, 1X, D17.10, D16.9, 1X, I6, 1X, I4` of version 3.
-fn system_time(line: &str) -> Result<Polynomial, String> {
-    let number = |from: usize, to: usize| number_of(line.get(from..to).unwrap_or("").trim());
-    match (number(5, 22), number(22, 38), number(38, 45), number(45, 50)) {
-        (Some(a0_s), Some(a1_sps), Some(tow_s), Some(week)) => {
-            Ok(Polynomial { a0_s, a1_sps, tow_s, week: week as i64 })
-        }
-        _ => Err("expected two coefficients, a time of week and a week from column 6 on".to_owned()),
-    }
-}
-
-/// What follows the present number of leap seconds in versions 3 and 4: that after the change, its week and
-/// its day.
-fn leap_event(line: &str) -> Option<(i64, i64, u8)> {
-    let whole = |from: usize| line.get(from..from + 6).and_then(|text| text.trim().parse::<i64>().ok());
-    let (after_s, week, day) = (whole(6)?, whole(12)?, whole(18)?);
-    (week > 0 && (1..=7).contains(&day)).then_some((after_s, week, day as u8))
-}
-
-/// Fields of `width` columns from `start` on, after which nothing may stand; a blank one is `None`.
-fn fields(line: &str, start: usize, width: usize, count: usize) -> Result<Vec<Option<f64>>, String> {
-    let end = start + width * count;
-    if let Some(at) = line.bytes().skip(end).position(|byte| byte != b' ') {
-        return Err(format!("column {}: expected nothing after {count} fields", end + at + 1));
-    }
-    let field = |number: usize| {
-        let from = (start + width * number).min(line.len());
-        let text = line.get(from..line.len().min(from + width)).unwrap_or("").trim();
-        match (text.is_empty(), number_of(text)) {
-            (true, _) => Ok(None),
-            (false, Some(value)) => Ok(Some(value)),
-            (false, None) => Err(format!("column {}: '{text}': expected a number or blanks", from + 1)),
-        }
-    };
-    (0..count).map(field).collect()
-}
-
-/// As many numbers of a header's line, none of them blank.
-fn numbers<const N: usize>(line: &str, start: usize, width: usize) -> Result<[f64; N], String> {
-    // A time mark and a satellite may follow in version 3.
-    let found = fields(line.get(..start + width * N).unwrap_or(line), start, width, N)?;
-    let found: Option<Vec<f64>> = found.into_iter().collect();
-    found
-        .and_then(|found| found.try_into().ok())
-        .ok_or_else(|| format!("expected {N} numbers from column {} on", start + 1))
-}
-
-/// A whole number of digits alone.
-fn digits<T: std::str::FromStr>(text: &str) -> Option<T> {
-    if text.bytes().all(|byte| byte.is_ascii_digit()) { text.parse().ok() } else { None }
-}
-
-/// A number as FORTRAN's D19.12 writes it, or E, or without an exponent: finite as a double.
-fn number_of(text: &str) -> Option<f64> {
-    let plain = |c: char| c.is_ascii_digit() || "+-.eEdD".contains(c);
-    if !text.chars().all(plain) {
-        return None;
-    }
-    text.replace(['d', 'D'], "e").parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_are_those_of_fortran() {
-        for good in ["0.1D-05", "-.5e+3", "1.E2", "12", "+7", "0.483528291807D-02"] {
-            assert!(number_of(good).is_some(), "{good}");
-        }
-        for bad in ["nan", "inf", "0.1D+999", "0x10", "1,5", "0.1D", "--1", "1 2", "?"] {
-            assert!(number_of(bad).is_none(), "{bad}");
-        }
-    }
 
     #[test]
     fn an_epoch_is_read_to_its_fraction_and_in_its_century() {

@@ -9,7 +9,7 @@ use crate::gnss::bits::{Element, Field, element};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::GPS_PI;
 use crate::gnss::satellite::System;
-use crate::gnss::time::{Epoch, TimeOffset, WEEK_S};
+use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
 
 use super::fields::GST_WEEK;
 
@@ -83,12 +83,12 @@ pub(super) struct Triple {
     issue: u8,
     toa: Epoch,
     entries: [Entry; TRIPLE as usize],
-    offset: Option<TimeOffset>,
+    offset: Option<TimePolynomial>,
 }
 
 impl Triple {
     /// What is sent in the minute of `start`.
-    pub(super) fn at(start: Epoch, sets: &[Ephemeris], reference: Epoch, offset: Option<TimeOffset>) -> Self {
+    pub(super) fn at(start: Epoch, sets: &[Ephemeris], reference: Epoch, offset: Option<TimePolynomial>) -> Self {
         let toa_s = ((reference.tow_whole_s() + TOA_STEP_S / 2) / TOA_STEP_S * TOA_STEP_S).min(TOA_LAST_S);
         let toa = Epoch::new(reference.week() * WEEK_S + toa_s, 0.0);
         let turn = start.tow_whole_s().div_euclid(TRIPLE_S).rem_euclid(TRIPLES) as u8;
@@ -231,14 +231,14 @@ pub(super) static GPS_OFFSET: [Of; 4] = [
 
 /// By how much the system's time is ahead of GPS time according to word 10, its week near `near`; `None`
 /// where all bits are ones and nothing is said.
-pub fn gps_offset(word: &u128, near: Epoch) -> Option<TimeOffset> {
+pub fn gps_offset(word: &u128, near: Epoch) -> Option<TimePolynomial> {
     let [a0, a1, hours, week] = GPS_OFFSET.each_ref().map(|element| (element.field, element.field.read(word)));
     if (a0.1, a1.1, hours.1, week.1) == (-1, -1, 255, 63) {
         return None;
     }
     let week = near.nearest_week(week.1 + GST_WEEK, 64);
     let reference = Epoch::new(week * WEEK_S + hours.1 * HOUR_S, 0.0);
-    Some(TimeOffset { a0_s: a0.0.value(a0.1), a1_sps: a1.0.value(a1.1), reference })
+    Some(TimePolynomial { a0_s: a0.0.value(a0.1), a1_sps: a1.0.value(a1.1), reference })
 }
 
 /// The elements of the sender in short, of the sub-frame's beginning.

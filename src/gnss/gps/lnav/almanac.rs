@@ -9,7 +9,7 @@ use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::GPS_PI;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
 
 /// The inclination from which the almanac counts, in semicircles (IS-GPS-200N, table 20-VI).
 pub const ALMANAC_INCLINATION_SEMICIRCLES: f64 = 0.30;
@@ -96,20 +96,12 @@ pub struct Utc {
 pub struct UtcData {
     /// GPS time minus UTC in whole seconds.
     pub leap_s: i64,
-    /// What is left of it; absent means none, referred to the almanac's time.
-    pub polynomial: Option<UtcPolynomial>,
+    /// What is left of it, its reference time a multiple of 4096 s inside its week (IS-GPS-200N,
+    /// 20.3.3.5.2.4); absent means none, referred to the almanac's time.
+    pub polynomial: Option<TimePolynomial>,
     /// The last change of the whole seconds, or the next one: those after it, and the week and day at whose
     /// end it comes.
     pub event: Option<LeapEvent>,
-}
-
-/// GPS time minus UTC beyond whole seconds: `a0 + a1 (t − reference)` (IS-GPS-200N, 20.3.3.5.2.4).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct UtcPolynomial {
-    pub a0_s: f64,
-    pub a1_sps: f64,
-    /// A multiple of 4096 s inside its week.
-    pub reference: Epoch,
 }
 
 /// A change of the whole seconds at the end of a day.
@@ -212,7 +204,7 @@ fn special_message() -> [u32; 10] {
     data
 }
 
-/// Page 18; a dummy page when there is no ionosphere to tell of, since the page cannot say "none".
+/// Page 18; a dummy page when there is no ionosphere to report, since the page cannot say "none".
 fn ionosphere_and_utc(
     klobuchar: Option<&Klobuchar>,
     utc: &UtcData,
@@ -221,8 +213,8 @@ fn ionosphere_and_utc(
     let Some(klobuchar) = klobuchar else { return Ok(blank(0)) };
     let mut data = blank(56);
     write_all(&IONOSPHERE_PAGE, klobuchar, &mut data)?;
-    let none = UtcPolynomial { a0_s: 0.0, a1_sps: 0.0, reference: almanac_time };
-    let UtcPolynomial { a0_s, a1_sps, reference } = utc.polynomial.unwrap_or(none);
+    let none = TimePolynomial { a0_s: 0.0, a1_sps: 0.0, reference: almanac_time };
+    let TimePolynomial { a0_s, a1_sps, reference } = utc.polynomial.unwrap_or(none);
     // Without an event the numbers before and after are the same, at the end of this week.
     let still = LeapEvent { after_s: utc.leap_s, week: almanac_time.week(), day: 7 };
     let LeapEvent { after_s, week, day } = utc.event.unwrap_or(still);

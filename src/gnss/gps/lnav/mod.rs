@@ -11,7 +11,7 @@ mod reader;
 use thiserror::Error;
 
 pub use crate::gnss::bits::{Field, FieldError, Kind};
-pub use almanac::{ALMANAC_INCLINATION_SEMICIRCLES, Almanac, LeapEvent, Utc, UtcData, UtcPolynomial};
+pub use almanac::{ALMANAC_INCLINATION_SEMICIRCLES, Almanac, LeapEvent, Utc, UtcData};
 pub use fields::tables;
 pub use parity::check_parity;
 pub use reader::LnavReader;

@@ -5,7 +5,8 @@
 //! codes, [`settle`] counts the samples. Codes of all signals take part: their steps are compared in chips of
 //! the front end's first signal, the scan takes the signal whose code is longest, and whole code periods are
 //! counted by the signal whose symbols or overlay are longest. Limits: a channel whose code period does not
-//! divide what the scan leaves open is searched for anew.
+//! divide what the scan leaves open is searched for anew. Whole periods of all codes that are no whole symbol
+//! show in no code: channels lose their symbols and are found anew, and the loss may go uncounted.
 
 use super::front_end::{FrontEnd, Track};
 use super::shared::{LastFix, Shared};
