@@ -101,11 +101,11 @@ pub struct Mean {
 }
 
 /// What the users of a system's elements compute with.
-struct Constants {
+pub(in crate::gnss) struct Constants {
     /// Gravitational constant of the Earth.
-    mu_m3ps2: f64,
+    pub mu_m3ps2: f64,
     /// Rotation of the Earth.
-    rotation_radps: f64,
+    pub rotation_radps: f64,
     /// Relativistic clock constant F = −2√μ/c².
     relativity_spsqrtm: f64,
     /// The week from whose beginning the node counts begins so much after that of GPS.
@@ -126,7 +126,7 @@ const OF_GALILEO: Constants =
 const OF_BEIDOU: Constants = Constants { rotation_radps: 7.292_115_0e-5, behind_gpst_s: 14.0, ..OF_GALILEO };
 
 impl Constants {
-    const fn of(system: System) -> &'static Self {
+    pub const fn of(system: System) -> &'static Self {
         match system {
             System::Galileo => &OF_GALILEO,
             System::BeiDou => &OF_BEIDOU,

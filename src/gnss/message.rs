@@ -33,6 +33,8 @@ pub struct Message {
     /// Numbers of the units that say their time, and of those that make up a set of elements.
     pub timed: &'static [u8],
     pub set: &'static [u8],
+    /// Numbers of the units each of which carries a set in short.
+    pub reduced: &'static [u8],
     /// Whether the unit that begins then carries the ionosphere that [`Klobuchar`] describes.
     pub ionosphere: fn(Epoch) -> bool,
     /// Names of the parameters of a set that bear its issue.
@@ -89,6 +91,9 @@ pub enum Read {
     Time(Epoch),
     /// A whole set of elements.
     Ephemeris(Box<Ephemeris>),
+    /// A set in short, good to metres, for some minutes from its reference time on; whether group delays and health
+    /// were read too, else they are zero.
+    Reduced { set: Box<Ephemeris>, with_delays: bool },
     /// The ionosphere's parameters.
     Klobuchar(Klobuchar),
     /// Raw parameters as decoded.

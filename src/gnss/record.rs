@@ -379,6 +379,8 @@ pub enum Event {
     PhaseLocked,
     BitSynchronised,
     FrameSynchronised,
+    /// Elements in short came, which serve until the ephemeris is complete.
+    ReducedElements,
     EphemerisComplete,
     /// The ionosphere's parameters came, for the first time or other than before: fixes are corrected by them
     /// from here on.

@@ -29,6 +29,13 @@ pub enum News {
     Time(Epoch),
     /// A whole set of elements.
     Ephemeris(Box<Ephemeris>),
+    /// A set of elements in short.
+    Reduced {
+        /// The set.
+        set: Box<Ephemeris>,
+        /// Whether it has group delays and health.
+        with_delays: bool,
+    },
     /// The ionosphere's parameters.
     Klobuchar(Klobuchar),
     /// Raw parameters as decoded.
@@ -114,6 +121,10 @@ impl Decoder {
                 Read::Time(label) => news.push(News::Time(self.time.instant(label))),
                 Read::Ephemeris(set) => {
                     news.push(News::Ephemeris(Box::new(set.timed(|label| self.time.instant(label)))));
+                }
+                Read::Reduced { set, with_delays } => {
+                    let set = Box::new(set.timed(|label| self.time.instant(label)));
+                    news.push(News::Reduced { set, with_delays });
                 }
                 Read::Klobuchar(klobuchar) => news.push(News::Klobuchar(klobuchar)),
                 Read::Parameters(rows) => news.push(News::Parameters(rows)),

@@ -14,6 +14,7 @@ const PARITY: &str = "witness::printed::a_word_s_parity_is_the_printed_one_and_o
 const FIELDS: &str = "witness::printed::every_field_of_the_message_has_the_printed_place_sign_and_scale";
 const INAV: &str = "witness::printed::every_field_of_i_nav_has_the_printed_place_sign_and_scale";
 const CODED: &str = "witness::printed::pages_of_i_nav_are_checked_coded_interleaved_and_timed_as_printed";
+const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
 const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_place_and_a_clock_of_each";
 const PAGES: &str =
     "witness::printed::the_page_with_the_ionosphere_and_the_count_of_the_handover_are_where_they_are_printed";
@@ -64,6 +65,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.inav.scale_af0", "the scale of a_f0 is 2^-33, sent and read", INAV),
     fault("gnss.inav.second_symbol", "the symbols of G2 are not inverted, sent and read", CODED),
     fault("gnss.inav.word_order", "words come a page early, sent and read", CODED),
+    fault("gnss.inav.reduced_begin", "elements in short refer to the second before the sub-frame, sent and read", SHORT),
     fault("gnss.fec.interleaver", "neighbouring symbols change places", CODED),
     fault("gnss.crc.polynomial", "the check has another polynomial, sent and read", CODED),
     fault("gnss.orbit.crs", "C_rs with the wrong sign, on both sides", ORBITS),

@@ -6,6 +6,8 @@ mod atmosphere;
 mod codes;
 #[path = "../witness/data.rs"]
 mod data;
+#[path = "../witness/inav.rs"]
+mod inav;
 #[path = "../witness/lnav.rs"]
 mod lnav;
 #[path = "../witness/orbit.rs"]
@@ -14,3 +16,5 @@ mod orbit;
 mod printed;
 #[path = "../witness/pseudorange.rs"]
 mod pseudorange;
+#[path = "../witness/reduced.rs"]
+mod reduced;

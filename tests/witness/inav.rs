@@ -13,14 +13,14 @@ use gnss_twin::gnss::time::Epoch;
 use super::data::{external, keplerian};
 
 /// A page on the air: satellite, whether on E1-B, start, and both parts of 120 bits.
-struct RealPage {
-    sv: Sv,
-    on_e1b: bool,
-    start: Epoch,
-    parts: [Vec<bool>; 2],
+pub struct RealPage {
+    pub sv: Sv,
+    pub on_e1b: bool,
+    pub start: Epoch,
+    pub parts: [Vec<bool>; 2],
 }
 
-fn real_pages(name: &str) -> Option<Vec<RealPage>> {
+pub fn real_pages(name: &str) -> Option<Vec<RealPage>> {
     let packed = std::fs::read(external(name)?).unwrap();
     let text = String::from_utf8(inflate::inflate(&packed, 1 << 26).unwrap()).unwrap();
     let parse = |line: &str| {
@@ -247,8 +247,8 @@ fn real_almanacs_and_reduced_elements_describe_the_orbits_of_the_same_hour() {
                 let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
                 let ours = inav::word_of(&inav::decode_soft(&soft).unwrap().0);
                 let apart = |name| raw("word 16", name, &ours) - raw("word 16", name, &word);
-                // Satellites send what is fitted to more than an instant: these are the differences that
-                // another program found between the real words and the elements.
+                // Both are fitted to ten minutes; where the axis falls on another step, the real clock makes up
+                // for it. How good they are as ranges, `reduced` holds.
                 assert!(apart("delta_axis_m").abs() <= 2048.0, "{sv} {}", apart("delta_axis_m"));
                 assert!(apart("ex").abs() < 6e-5 && apart("ey").abs() < 6e-5, "{sv}");
                 assert!(apart("delta_i_rad").abs() < 5e-5 && turn(apart("omega0_rad")) < 4e-5, "{sv}");

@@ -13,4 +13,5 @@ mod orbit;
 mod printed;
 mod pseudorange;
 mod recording;
+mod reduced;
 mod stability;

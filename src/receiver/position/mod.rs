@@ -28,6 +28,7 @@ pub mod exclusion;
 pub mod ionosphere;
 pub mod least_squares;
 mod ranges;
+mod reduced;
 pub mod smooth;
 #[cfg(test)]
 mod tests;
@@ -38,6 +39,7 @@ use ionosphere::{DelayError, NOMINAL, NOMINAL_ERROR};
 use least_squares::{
     COORDINATES, Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, Solution, freedom, scales,
 };
+use reduced::InShort;
 use smooth::Smoother;
 
 /// How the ionosphere is corrected.
@@ -91,6 +93,9 @@ pub struct PositionSettings {
     pub require_ionosphere: bool,
     /// Else the first fix waits for them this long, counted from the fourth ephemeris; 0 for a fix at once.
     pub ionosphere_wait_s: f64,
+    /// Whether a Galileo satellite is used by its elements in short, word 16, until its whole set is
+    /// decoded: a first fix within 20 s, but to metres, and at first without the satellites' health.
+    pub reduced_elements: bool,
 }
 }
 
@@ -106,6 +111,8 @@ impl Default for PositionSettings {
             troposphere: TroposphereChoice::Standard,
             require_ionosphere: false,
             ionosphere_wait_s: 0.0,
+            // Metres in place of decimetres, and of satellites that may be unhealthy: only who asks for it.
+            reduced_elements: false,
         }
     }
 }
@@ -231,6 +238,8 @@ pub struct Solver {
     rate: Rate,
     last_m: Option<Vector3<f64>>,
     ready_since: Option<u64>,
+    /// Elements in short.
+    reduced: BTreeMap<Sv, InShort>,
 }
 
 impl Solver {
@@ -238,7 +247,15 @@ impl Solver {
     pub fn new(settings: &PositionSettings, noises: Noises, rate: Rate) -> Self {
         let bandwidth_hz = noises.first().map_or(1.0, |(_, noise)| noise.bandwidth_hz);
         let smoother = Smoother::new(settings.smoothing_s, bandwidth_hz, rate);
-        Self { settings: settings.clone(), noises, smoother, rate, last_m: None, ready_since: None }
+        Self {
+            settings: settings.clone(),
+            noises,
+            smoother,
+            rate,
+            last_m: None,
+            ready_since: None,
+            reduced: BTreeMap::new(),
+        }
     }
 
     /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: smoothing and

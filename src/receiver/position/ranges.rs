@@ -21,8 +21,9 @@ impl Solver {
     /// The ranges of observations whose satellites' ephemerides are known: of a satellite with two carriers
     /// their combination, if the settings say so.
     pub(super) fn ranges(&mut self, observations: &[Observation], ephemerides: &BTreeMap<Sv, Ephemeris>) -> Vec<Range> {
+        let is_known = |sv: &Sv| ephemerides.contains_key(sv) || self.reduced.contains_key(sv);
         let known: Vec<Observation> = (observations.iter())
-            .filter(|row| ephemerides.contains_key(&row.sv) || self.settings.ionosphere != IonosphereChoice::Combined)
+            .filter(|row| is_known(&row.sv) || self.settings.ionosphere != IonosphereChoice::Combined)
             .cloned()
             .collect();
         // The filters of single signals go on: one of two carriers may be lost.
@@ -32,9 +33,22 @@ impl Solver {
             IonosphereChoice::Combined => paired(&known),
             IonosphereChoice::Broadcast | IonosphereChoice::None => known.iter().map(Used::Single).collect(),
         };
-        let mut one = |used: &Used<'_>| match used {
-            Used::Single(row) => self.single(row, smoothed.get(&row.link())?, ephemerides.get(&row.sv)?),
-            Used::Combined(pair) => self.combined(pair, ephemerides.get(&pair.first.sv)?),
+        let mut one = |used: &Used<'_>| {
+            let row = match used {
+                Used::Single(row) => row,
+                Used::Combined(pair) => pair.first,
+            };
+            let in_short = self.reduced.get(&row.sv).filter(|short| short.holds(row.sent())).cloned();
+            let whole = ephemerides.get(&row.sv);
+            let set = whole.or(in_short.as_ref().map(|short| &short.set))?;
+            let range = match used {
+                Used::Single(row) => self.single(row, smoothed.get(&row.link())?, set),
+                Used::Combined(pair) => self.combined(pair, set),
+            }?;
+            Some(match in_short.filter(|_| whole.is_none()) {
+                Some(short) => Range { noise_m: libm::hypot(range.noise_m, short.sigma_m), ..range },
+                None => range,
+            })
         };
         used.iter().filter_map(&mut one).collect()
     }

@@ -93,6 +93,10 @@ impl FrontEnd {
                         sink.take(Record::Navigation(rows))?;
                         None
                     }
+                    News::Reduced { set, with_delays } => {
+                        let serves = shared.solver.take_reduced(*set, with_delays);
+                        (serves && !shared.ephemerides.contains_key(&sv)).then_some(Event::ReducedElements)
+                    }
                     News::Ephemeris(ephemeris) => {
                         let sick = !ephemeris.is_healthy();
                         let before = shared.ephemerides.insert(sv, *ephemeris).is_some_and(|set| !set.is_healthy());

@@ -47,6 +47,8 @@ pub struct Receiver {
     pub requires_ionosphere: bool,
     /// How long it waits for the ionosphere's parameters before a fix, seconds.
     pub ionosphere_wait_s: f64,
+    /// Whether it uses satellites by their elements in short.
+    pub reduced_elements: bool,
     /// What its front end takes from every signal.
     pub cost_db: f64,
 }
@@ -99,6 +101,7 @@ impl Receiver {
             interval_s: 1e-3 * number("operation", "measurement_interval_ms", 100.0),
             mask_deg: number("position", "mask_deg", 5.0),
             requires_ionosphere: broadcast && required,
+            reduced_elements: value("position", "reduced_elements").and_then(Value::as_bool).unwrap_or(false),
             cost_db: 0.0,
             ionosphere_wait_s: if broadcast { number("position", "ionosphere_wait_s", 0.0) } else { 0.0 },
         }

@@ -122,6 +122,12 @@ impl Scene<'_> {
         wrong || self.of(sv, &[FaultKind::Health]).any(|fault| during(fault, time_s, HEALTH_S))
     }
 
+    /// When its elements are known, in short where that is enough.
+    fn elements_by_s(&self, locked_s: f64) -> f64 {
+        let whole_s = self.timetable.ephemeris_by_s(locked_s);
+        if self.receiver.reduced_elements { whole_s.min(self.timetable.reduced_by_s(locked_s)) } else { whole_s }
+    }
+
     /// Why a lock may end at a row, if it may.
     pub fn excuse(&self, sv: Sv, row: &SatelliteEpoch, usual_dbhz: f64) -> Option<Excuse> {
         let steps =
@@ -164,7 +170,7 @@ impl Scene<'_> {
                 let locked_s = acquired_s + LOCK_S;
                 state.observed_s.get_or_insert(self.timetable.frame_by_s(locked_s));
                 let known = state.ephemeris_s.is_some_and(|at_s| row.time_s < at_s + EPHEMERIS_S);
-                let ready_s = if known { locked_s } else { self.timetable.ephemeris_by_s(locked_s) };
+                let ready_s = if known { locked_s } else { self.elements_by_s(locked_s) };
                 state.used_s.get_or_insert(ready_s.max(state.observed_s.unwrap_or(ready_s)) + USE_S);
             }
             let reached = |at_s: Option<f64>| at_s.is_some_and(|at_s| row.time_s >= at_s);

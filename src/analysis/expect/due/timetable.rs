@@ -55,6 +55,11 @@ impl Timetable {
         message.set.iter().map(whole).fold(0.0, f64::max)
     }
 
+    /// When a set in short has arrived whole; never, where the message has none.
+    pub fn reduced_by_s(&self, locked_s: f64) -> f64 {
+        self.whole_by_s(locked_s, |message, start| message.reduced.contains(&(message.number)(start)))
+    }
+
     /// When the ionosphere has arrived whole; never, where the message does not carry it.
     pub fn ionosphere_by_s(&self, locked_s: f64) -> f64 {
         self.whole_by_s(locked_s, |message, start| (message.ionosphere)(start))
@@ -102,5 +107,9 @@ mod tests {
         assert!((timetable.frame_by_s(0.0) - 2.0 - HEADER_S - LIGHT_S).abs() < 1e-9);
         assert!((timetable.ephemeris_by_s(0.0) - 30.0 - LIGHT_S).abs() < 1e-9);
         assert!(timetable.ionosphere_by_s(0.0).is_infinite());
+        // Word 16 from :59 on, and from 08:06:15 on.
+        assert!((timetable.reduced_by_s(0.0) - 6.0 - LIGHT_S).abs() < 1e-9);
+        assert!((timetable.reduced_by_s(5.0) - 22.0 - LIGHT_S).abs() < 1e-9);
+        assert!(at("2010-07-01T08:05:58").reduced_by_s(0.0).is_infinite());
     }
 }

@@ -74,6 +74,9 @@ fn updates_s(run: &Run) -> Option<BTreeMap<&'static Signal, f64>> {
 const SPACE_M: f64 = 1e5;
 /// Klobuchar's ionosphere ends here.
 const IONOSPHERE_TOP_M: f64 = 1e6;
+/// Error of a range by elements in short, whose steps are 4.5 m of clock and 22 m across the line of sight, of
+/// which a fifth shows at the most; and by a group delay that they lack.
+const IN_SHORT_M: f64 = 2.5;
 /// Share of the rays' computed effect by which it may be wrong: the front end rounds the correlation, the
 /// loop lags.
 const MULTIPATH_SHARE: f64 = 0.5;
@@ -133,8 +136,10 @@ pub struct Scene<'r> {
     /// Samples with a fix, and those of them that leave satellites out.
     pub fixes: HashMap<u64, usize>,
     excluded: HashMap<u64, HashSet<String>>,
-    /// From when on each satellite's message is known, and while it says that it is unhealthy.
+    /// From when on each satellite's message is known, in short or whole, and while it says that it is
+    /// unhealthy.
     known: BTreeMap<Sv, u64>,
+    whole: BTreeMap<Sv, u64>,
     health: BTreeMap<Sv, Vec<(u64, bool)>>,
     /// Decibels that filter and converter cost, by signal.
     costs_db: BTreeMap<&'static Signal, f64>,
@@ -145,10 +150,14 @@ pub struct Scene<'r> {
 impl<'r> Scene<'r> {
     /// `None` without the receiver's settings.
     pub fn new(run: &'r Run) -> Option<Self> {
-        let (mut known, mut health) = (BTreeMap::new(), BTreeMap::<Sv, Vec<(u64, bool)>>::new());
+        let (mut known, mut whole, mut health) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::<_, Vec<_>>::new());
         for row in &run.events {
             match row.event {
                 Event::EphemerisComplete => {
+                    known.entry(row.sv).or_insert(row.sample);
+                    whole.entry(row.sv).or_insert(row.sample);
+                }
+                Event::ReducedElements => {
                     known.entry(row.sv).or_insert(row.sample);
                 }
                 Event::Unhealthy => health.entry(row.sv).or_default().push((row.sample, false)),
@@ -167,6 +176,7 @@ impl<'r> Scene<'r> {
             fixes: run.fixes.iter().map(|fix| fix.sample).zip(0..).collect(),
             excluded: left_out.map(|fix| (fix.sample, names(&fix.excluded))).collect(),
             known,
+            whole,
             health,
             costs_db: crate::analysis::expect::spectrum::costs_db(run),
             edges_m: (run.signals.iter())
@@ -276,7 +286,7 @@ impl<'r> Scene<'r> {
             ionosphere_m,
             troposphere_m: sky.troposphere_m,
             noise_m2: (code * theory.chip_m) * (code * theory.chip_m),
-            other_m2: self.edge_m2(true_row),
+            other_m2: self.edge_m2(true_row) + self.short_m2(true_row.sv, row.sample),
             memory_s: 0.0,
             rate_sigma_mps: rate_hz * true_row.link().wavelength_m(),
             rate_bias_mps: 0.0,
@@ -286,6 +296,11 @@ impl<'r> Scene<'r> {
             near_mask: !in_space && elevation_rad < self.choices.mask_rad + MASK_SLACK_RAD,
             excluded: self.left_out(true_row.sv, row.sample),
         })
+    }
+
+    /// Variance of what elements in short leave, while nothing better is known.
+    fn short_m2(&self, sv: Sv, sample: u64) -> f64 {
+        if self.whole.get(&sv).is_some_and(|since| *since <= sample) { 0.0 } else { IN_SHORT_M * IN_SHORT_M }
     }
 
     /// Variance that chip edges between samples leave: a code that moves by whole samples within the

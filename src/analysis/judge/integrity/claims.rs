@@ -78,7 +78,7 @@ fn order(run: &Run) -> Result<Found, JudgeError> {
             Event::PhaseLocked => Some((2, 1)),
             Event::BitSynchronised => Some((3, 2)),
             Event::FrameSynchronised => Some((4, 3)),
-            Event::EphemerisComplete => Some((5, 4)),
+            Event::EphemerisComplete | Event::ReducedElements => Some((5, 4)),
             _ => None,
         };
         let needs = stage.map_or(1, |(_, before)| before);
@@ -131,7 +131,7 @@ fn counts(run: &Run) -> Result<Option<Found>, JudgeError> {
         found.add(|| "acquired".to_owned());
     }
     let known: HashMap<String, ()> = (run.events.iter())
-        .filter(|row| row.event == Event::EphemerisComplete)
+        .filter(|row| matches!(row.event, Event::EphemerisComplete | Event::ReducedElements))
         .map(|row| (row.sv.to_string(), ()))
         .collect();
     if let Some(used) = names("used") {

@@ -1,8 +1,7 @@
-//! What I/NAV says of other satellites, of GPS time, and in short of the sender: words 7 to 10 and 16.
+//! What I/NAV says of other satellites and of GPS time: words 7 to 10.
 //!
-//! Source: Galileo OS SIS ICD 2.1, 5.1.10 (almanac), 5.1.8 (offset of GPS time) and 5.1.11 (reduced
-//! elements). Words 7 to 10 carry three satellites a minute, a whole almanac in twelve minutes. Reference
-//! orbits: 29 600 km, 56°.
+//! Source: Galileo OS SIS ICD 2.1, 5.1.10 (almanac) and 5.1.8 (offset of GPS time). They carry three
+//! satellites a minute, a whole almanac in twelve minutes. Reference orbits: 29 600 km, 56°.
 
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::gnss::bits::{Element, Field, element};
@@ -14,9 +13,9 @@ use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
 use super::fields::GST_WEEK;
 
 /// Semi-major axis from which almanacs and reduced elements count.
-const NOMINAL_AXIS_M: f64 = 29_600_000.0;
+pub(super) const NOMINAL_AXIS_M: f64 = 29_600_000.0;
 /// Inclination from which they count, 56°.
-const NOMINAL_INCLINATION_RAD: f64 = 56.0 / 180.0 * GPS_PI;
+pub(super) const NOMINAL_INCLINATION_RAD: f64 = 56.0 / 180.0 * GPS_PI;
 /// Step of the almanac's reference time, and its last one inside a week.
 const TOA_STEP_S: i64 = 600;
 const TOA_LAST_S: i64 = WEEK_S - TOA_STEP_S;
@@ -25,13 +24,10 @@ const HOUR_S: i64 = 3600;
 const TRIPLE_S: i64 = 60;
 const TRIPLES: i64 = 12;
 const TRIPLE: u8 = 3;
-/// Seconds from a sub-frame's nominal beginning to that on E1-B, to which reduced elements refer.
-const REDUCED_BEGIN_S: i64 = 1;
 
 const ALMANAC: &str = "5.1.10, table 71";
 const STATUS: &str = "5.1.9.7";
 const OFFSET: &str = "5.1.8, table 69";
-const REDUCED: &str = "5.1.11";
 
 /// One satellite in the almanac; number 0 for a place without one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -240,48 +236,3 @@ pub fn gps_offset(word: &u128, near: Epoch) -> Option<TimePolynomial> {
     let reference = Epoch::new(week * WEEK_S + hours.1 * HOUR_S, 0.0);
     Some(TimePolynomial { a0_s: a0.0.value(a0.1), a1_sps: a1.0.value(a1.1), reference })
 }
-
-/// The elements of the sender in short, of the sub-frame's beginning.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Reduced {
-    delta_axis_m: f64,
-    ex: f64,
-    ey: f64,
-    delta_i_rad: f64,
-    omega0_rad: f64,
-    latitude_rad: f64,
-    af0_s: f64,
-    af1_sps: f64,
-}
-
-impl Reduced {
-    /// Of the sub-frame in which `start` lies.
-    pub(super) fn of(set: &Ephemeris, start: Epoch) -> Self {
-        let since_s = (start.tow_whole_s() - REDUCED_BEGIN_S).rem_euclid(super::SUBFRAME_S);
-        let mean = set.mean_at(start.plus_s(-(since_s as f64)));
-        let (sin, cos) = libm::sincos(set.omega_rad);
-        Self {
-            delta_axis_m: set.sqrt_a_sqrtm * set.sqrt_a_sqrtm - NOMINAL_AXIS_M,
-            ex: set.eccentricity * cos,
-            ey: set.eccentricity * sin,
-            delta_i_rad: mean.inclination_rad - NOMINAL_INCLINATION_RAD,
-            omega0_rad: mean.omega0_rad,
-            latitude_rad: mean.m0_rad + set.omega_rad,
-            af0_s: mean.af0_s,
-            af1_sps: set.af1_sps,
-        }
-    }
-}
-
-/// Word 16.
-#[rustfmt::skip]
-pub(super) static WORD_16: [Element<Reduced>; 8] = [
-    element(Field::new("delta_axis_m", &[(6, 5)], Signed, 8, REDUCED), |r| r.delta_axis_m, |r, v| r.delta_axis_m = v),
-    element(Field::new("ex", &[(11, 13)], Signed, -22, REDUCED), |r| r.ex, |r, v| r.ex = v),
-    element(Field::new("ey", &[(24, 13)], Signed, -22, REDUCED), |r| r.ey, |r, v| r.ey = v),
-    element(Field::new("delta_i_rad", &[(37, 17)], Semicircles, -22, REDUCED), |r| r.delta_i_rad, |r, v| r.delta_i_rad = v),
-    element(Field::new("omega0_rad", &[(54, 23)], Turn, -22, REDUCED), |r| r.omega0_rad, |r, v| r.omega0_rad = v),
-    element(Field::new("latitude_rad", &[(77, 23)], Turn, -22, REDUCED), |r| r.latitude_rad, |r, v| r.latitude_rad = v),
-    element(Field::new("af0_s", &[(100, 22)], Signed, -26, REDUCED), |r| r.af0_s, |r, v| r.af0_s = v),
-    element(Field::new("af1_sps", &[(122, 6)], Signed, -35, REDUCED), |r| r.af1_sps, |r, v| r.af1_sps = v),
-];

@@ -1,7 +1,8 @@
 //! The field tables of I/NAV: places count from 0, the first bit of a word (Galileo OS SIS ICD 2.1, tables 42
 //! to 54).
 
-use super::almanac::{GPS_OFFSET, WORD_7, WORD_8, WORD_9, WORD_10, WORD_16};
+use super::almanac::{GPS_OFFSET, WORD_7, WORD_8, WORD_9, WORD_10};
+use super::reduced::WORD_16;
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::gnss::bits::{Element, Field, element};
 use crate::gnss::broadcast::Ephemeris;

@@ -4,12 +4,12 @@
 //! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is
 //! a pattern of ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both
 //! parts carry one word of 128 bits and a check. Limits: where satellites send redundancy (words 17 to 20)
-//! the spare word 0 is sent. Of almanacs and reduced elements (words 7 to 10 and 16) only the offset of GPS
-//! time is read. Alert pages are not read. The bits reserved for authentication and the return link are zero.
+//! the spare word 0 is sent. Of almanacs (words 7 to 10) only the offset of GPS time is read. Alert pages are not read. The bits reserved for authentication and the return link are zero.
 
 mod almanac;
 mod fields;
 mod reader;
+mod reduced;
 
 use crate::gnss::bits::{
     Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
@@ -22,10 +22,12 @@ use crate::gnss::message::{Common, Message, Sender};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
 pub use almanac::gps_offset;
-use almanac::{GPS_OFFSET, Reduced, Triple, WORD_7, WORD_8, WORD_9, WORD_10, WORD_16};
+use almanac::{GPS_OFFSET, Triple, WORD_7, WORD_8, WORD_9, WORD_10};
 pub use fields::{GST_WEEK, sisa_index, tables};
 use fields::{Orbit, Utc, WORD_1, WORD_2, WORD_3, WORD_4, WORD_5, WORD_6};
 pub use reader::InavReader;
+pub use reduced::VALID_S as REDUCED_VALID_S;
+use reduced::{Reduced, WORD_16};
 
 /// I/NAV as signals name it.
 pub static INAV: Message = Message {
@@ -38,6 +40,7 @@ pub static INAV: Message = Message {
     number: word_at,
     timed: &[SPARE, 5, 6],
     set: &[1, 2, 3, 4, 5],
+    reduced: &[REDUCED],
     ionosphere: |_| false,
     set_parameters: || {
         let words = tables().into_iter().filter(|(name, _)| ["word 1", "word 2", "word 3", "word 4"].contains(name));
@@ -121,11 +124,7 @@ impl Sender for Pages {
             let expected = "an odd whole second";
             return Err(FieldError::Start { message: INAV.name, start_s: start.tow_s(), expected });
         }
-        let word = match self.word(word_at(start), ephemeris, start) {
-            // Two satellites were left on orbits that are no reduced elements, and send the spare word.
-            Err(FieldError::OutOfRange { .. }) if word_at(start) == REDUCED => self.word(SPARE, ephemeris, start)?,
-            word => word?,
-        };
+        let word = self.word(word_at(start), ephemeris, start)?;
         Ok(encode_page(&page(&word, start)))
     }
 }
@@ -165,7 +164,11 @@ impl Pages {
                     write_all(&GPS_OFFSET, &triple, &mut word)?;
                 }
             }
-            REDUCED => write_all(&WORD_16, &Reduced::of(ephemeris, start), &mut word)?,
+            REDUCED => match Reduced::of(ephemeris, start) {
+                Some(reduced) => write_all(&WORD_16, &reduced, &mut word)?,
+                // Two satellites were left on orbits that are no reduced elements, and send the spare word.
+                None => return self.word(SPARE, ephemeris, start),
+            },
             _ => {
                 // "10": week and time of week are valid (5.1.9.11).
                 word.set_piece((6, 2), 2);
@@ -302,6 +305,18 @@ pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut sent, by));
     *ephemeris = sent.ephemeris;
     found
+}
+
+/// The elements in short in word 16, sent at `start`, with the group delays and the health of word 5 where it
+/// was read.
+fn elements_in_short(sv: Sv, (word, start): (&u128, Epoch), five: Option<&u128>) -> Ephemeris {
+    let mut reduced = Reduced::default();
+    read_all(&WORD_16, word, &mut reduced);
+    let mut orbit = Orbit { ephemeris: reduced.ephemeris(sv, start), nequick: [0.0; 3] };
+    if let Some(five) = five {
+        read_all(&WORD_5, five, &mut orbit);
+    }
+    orbit.ephemeris
 }
 
 /// The elements in words 1 to 5 with the time at which word 5 was sent; `None` where the issues differ or

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use super::{
-    PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, WORDS_OF_SET, decode_soft, elements, parameters, sent_at, time_of_week,
-    word_of, word_type,
+    INAV, PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, REDUCED, WORDS_OF_SET, decode_soft, elements, elements_in_short,
+    parameters, sent_at, time_of_week, word_of, word_type,
 };
 use crate::gnss::message::{Read, Reader};
 use crate::gnss::record::NavigationRow;
@@ -28,6 +28,10 @@ pub struct InavReader {
     words: BTreeMap<u8, u128>,
     /// Those of the set that was reported last.
     complete: Option<[u128; 5]>,
+    /// Numbers of the first symbols of the latest page with reduced elements, and of the latest one that said
+    /// its time, with that time.
+    reduced: Option<u64>,
+    timed: Option<(u64, Epoch)>,
 }
 
 impl InavReader {
@@ -41,6 +45,8 @@ impl InavReader {
             failures: 0,
             words: BTreeMap::new(),
             complete: None,
+            reduced: None,
+            timed: None,
         }
     }
 
@@ -53,19 +59,37 @@ impl InavReader {
         [false, true].into_iter().any(|flip| pattern(0, flip) && pattern(PART_SYMBOLS, flip))
     }
 
-    fn read(&mut self, word: u128, inverted: bool, near: Epoch) -> Vec<Read> {
+    /// Takes the word of the page whose first symbol has the number `begin`.
+    fn read(&mut self, word: u128, begin: u64, inverted: bool, near: Epoch) -> Vec<Read> {
         let mut news = Vec::new();
-        if let Some(tow_s) = time_of_week(&word) {
-            news.push(Read::Unit { symbols: PAGE_SYMBOLS as u64, of_week_s: i64::from(tow_s), inverted });
+        let dated = sent_at(&word, near);
+        if let Some(tow_s) = time_of_week(&word).map(i64::from) {
+            news.push(Read::Unit { symbols: PAGE_SYMBOLS as u64, of_week_s: tow_s, inverted });
+            self.timed = Some((begin, dated.unwrap_or_else(|| near.nearest_tow(tow_s))));
         }
-        news.extend(sent_at(&word, near).map(Read::Time));
+        news.extend(dated.map(Read::Time));
         self.words.insert(word_type(&word), word);
         match word_type(&word) {
             1..=5 => self.look_for_set(near, &mut news),
             6 | 10 => news.push(Read::Parameters(self.rows(&word, 0))),
+            REDUCED => self.reduced = Some(begin),
             _ => {}
         }
+        // It says neither its time nor its delays, and is worth telling anew with either.
+        if [0, 5, 6, REDUCED].contains(&word_type(&word)) {
+            news.extend(self.in_short());
+        }
         news
+    }
+
+    /// The reduced elements, once the time of their page is known.
+    fn in_short(&self) -> Option<Read> {
+        let (word, begin, (page, time)) = (self.words.get(&REDUCED)?, self.reduced?, self.timed?);
+        let symbols = begin as i64 - page as i64;
+        let start = Epoch::new(time.seconds() + (symbols as f64 * INAV.symbol_s).round() as i64, 0.0);
+        let five = self.words.get(&5);
+        let set = Box::new(elements_in_short(self.sv, (word, start), five));
+        Some(Read::Reduced { set, with_delays: five.is_some() })
     }
 
     fn look_for_set(&mut self, near: Epoch, news: &mut Vec<Read>) {
@@ -110,7 +134,7 @@ impl Reader for InavReader {
         match decode_soft(self.symbols.make_contiguous()) {
             Some((parts, inverted)) => {
                 (self.page, self.failures) = (Some(begin), 0);
-                self.read(word_of(&parts), inverted, near)
+                self.read(word_of(&parts), begin, inverted, near)
             }
             None => {
                 if due {
@@ -131,6 +155,8 @@ impl Reader for InavReader {
 
     fn doubt(&mut self) {
         (self.page, self.failures) = (None, 0);
+        // Symbols between pages are no longer known by their number.
+        (self.reduced, self.timed) = (None, None);
     }
 
     fn missing(&self) -> Vec<u8> {

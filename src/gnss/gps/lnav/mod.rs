@@ -47,6 +47,7 @@ pub static LNAV: Message = Message {
     number: subframe_at,
     timed: &[1, 2, 3, 4, 5],
     set: &[1, 2, 3],
+    reduced: &[],
     ionosphere: |start| subframe_at(start) == 4 && start.tow_whole_s() / (5 * SUBFRAME_S) % PAGES == IONOSPHERE_PAGE_AT,
     set_parameters: || {
         let orbit = tables().into_iter().filter(|(name, _)| name.starts_with("subframe"));
