@@ -96,6 +96,8 @@ pub enum Read {
     Reduced { set: Box<Ephemeris>, with_delays: bool },
     /// The ionosphere's parameters.
     Klobuchar(Klobuchar),
+    /// By how much the system's time is ahead of GPS time, whole seconds apart.
+    AheadOfGps(TimePolynomial),
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
 }

@@ -10,7 +10,7 @@ use crate::gnss::message::{Read, Reader};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, TimeScale, WEEK_S};
+use crate::gnss::time::{Epoch, TimePolynomial, TimeScale, WEEK_S};
 use crate::receiver::track::Symbol;
 
 /// What a symbol completed.
@@ -38,6 +38,13 @@ pub enum News {
     },
     /// The ionosphere's parameters.
     Klobuchar(Klobuchar),
+    /// By how much a system's time is ahead of GPS time, whole seconds apart.
+    AheadOfGps {
+        /// The system's time.
+        scale: &'static TimeScale,
+        /// By how much, at GPS time.
+        ahead: TimePolynomial,
+    },
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
 }
@@ -127,6 +134,10 @@ impl Decoder {
                     news.push(News::Reduced { set, with_delays });
                 }
                 Read::Klobuchar(klobuchar) => news.push(News::Klobuchar(klobuchar)),
+                Read::AheadOfGps(ahead) => {
+                    let ahead = TimePolynomial { reference: self.time.instant(ahead.reference), ..ahead };
+                    news.push(News::AheadOfGps { scale: self.time, ahead });
+                }
                 Read::Parameters(rows) => news.push(News::Parameters(rows)),
             }
         }

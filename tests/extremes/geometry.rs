@@ -15,7 +15,7 @@ use gnss_twin::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_ea
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::Epoch;
+use gnss_twin::gnss::time::{Epoch, GPST};
 use gnss_twin::receiver::acquire;
 use gnss_twin::receiver::position::least_squares::{Corrections, Ionosphere, Range, position};
 use gnss_twin::receiver::position::{NoFix, consistent};
@@ -208,6 +208,7 @@ fn ranges(sky: &[(f64, f64)]) -> Vec<Range> {
         Range {
             sv: Sv::gps(number),
             signal: &L1_CA,
+            time: &GPST,
             satellite: State {
                 position_m: rotate_earth(&there, -distance_m / SPEED_OF_LIGHT_MPS),
                 velocity_mps: Vector3::zeros(),

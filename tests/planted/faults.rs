@@ -16,6 +16,7 @@ const INAV: &str = "witness::printed::every_field_of_i_nav_has_the_printed_place
 const CODED: &str = "witness::printed::pages_of_i_nav_are_checked_coded_interleaved_and_timed_as_printed";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
 const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_place_and_a_clock_of_each";
+const OFFSET: &str = "laws::with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_time";
 const PAGES: &str =
     "witness::printed::the_page_with_the_ionosphere_and_the_count_of_the_handover_are_where_they_are_printed";
 const TIMES: &str = "witness::printed::weeks_begin_on_sunday_and_leap_seconds_are_those_of_the_bulletins";
@@ -128,6 +129,7 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.decode.polarity", "the half cycle is resolved the wrong way", LOOP),
     fault("receiver.observe.code_fraction", "the time sent is 3 ns late", LOOP),
     fault("receiver.position.earth_rotation", "the Earth does not turn during flight", EXACT),
+    fault("receiver.position.system_offset", "the broadcast offset of a system's time with the wrong sign", OFFSET),
     fault("receiver.position.own_clock", "all systems' ranges count against one clock", CLOCKS),
     fault("receiver.position.clock_sign", "satellite clocks with the wrong sign", EXACT),
     fault("receiver.position.group_delay", "T_GD is left out", EXACT),

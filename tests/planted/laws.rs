@@ -22,9 +22,9 @@ use gnss_twin::gnss::record::Observation;
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::signal::Signal;
-use gnss_twin::gnss::time::{Epoch, Rate, SampleClock, TimeScale};
+use gnss_twin::gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
 use gnss_twin::receiver::position::smooth::Smoother;
-use gnss_twin::receiver::position::{CodeNoise, PositionSettings, Solver};
+use gnss_twin::receiver::position::{CodeNoise, NoFix, PositionSettings, Solver, SystemClocks};
 use gnss_twin::receiver::track::loops::CodeShape;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -161,6 +161,50 @@ fn two_systems_whose_times_differ_give_one_place_and_a_clock_of_each() {
     // What is behind a clock that is ahead by so much.
     assert!((own_s - BIAS_S).abs() < 4e-11 && (other_s - (BIAS_S - AHEAD_S)).abs() < 4e-11, "{clocks:?}");
     assert_eq!(solved.fix.freedom() as usize, observations.len() - 5);
+}
+
+#[test]
+fn with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_time() {
+    const AHEAD_S: f64 = 40e-9;
+    let ideal = Ideal::new();
+    let mut observations = ideal.observations(SAMPLE);
+    for observation in observations.iter_mut().skip(1).step_by(2) {
+        let sent = observation.sent().plus_s(AHEAD_S);
+        (observation.sent_s, observation.sent_fraction_s) = (sent.seconds(), sent.fraction());
+        (observation.signal, observation.pseudorange_m) =
+            (&OTHER, observation.pseudorange_m - SPEED_OF_LIGHT_MPS * AHEAD_S);
+    }
+    let settings = PositionSettings { system_clocks: SystemClocks::Broadcast, ..PositionSettings::default() };
+    let at = ideal.clock.epoch(SAMPLE);
+    // An hour old, with a rate.
+    let ahead = TimePolynomial { a0_s: AHEAD_S - 3.6e-9, a1_sps: 1e-12, reference: at.plus_s(-3600.0) };
+    let solve = |observations: &[Observation], known: bool| {
+        let noises = vec![(&L1_CA, noise()), (&OTHER, noise())];
+        let mut solver = Solver::new(&settings, noises, ideal.clock.rate);
+        if known {
+            solver.take_ahead(OTHER.time, ahead);
+        }
+        solver.solve(SAMPLE, ideal.clock, observations, &ideal.ephemerides(), Some(ideal.klobuchar))
+    };
+    let truth = ideal.motion(at.plus_s(-BIAS_S)).position_m;
+    let solved = solve(&observations, true).unwrap();
+    assert!((solved.fix.position_m() - truth).norm() < 8e-3);
+    assert_eq!((solved.clocks.len(), solved.fix.freedom() as usize), (1, observations.len() - 4));
+    assert_eq!(solved.clocks[0].time_scale, "GPST");
+    assert!((solved.clocks[0].clock_bias_s - BIAS_S).abs() < 4e-11, "{:?}", solved.clocks);
+    // Until it is known each system has its clock, and four satellites are too few.
+    assert_eq!(solve(&observations, false).unwrap().clocks.len(), 2);
+    let mut fewest = 0;
+    for first in 0..observations.len() - 4 {
+        let four = &observations[first..first + 4];
+        assert!(matches!(solve(four, false), Err(NoFix::TooFew { have: 4, need: 5 })));
+        // A geometry may be as bad as four neighbours make it.
+        let Ok(solved) = solve(four, true) else { continue };
+        let off_m = (solved.fix.position_m() - truth).norm();
+        assert!(off_m < 4e-3 * solved.fix.pdop, "{off_m} m, dilution {}", solved.fix.pdop);
+        fewest += 1;
+    }
+    assert!(fewest > 3, "{fewest}");
 }
 
 /// A code loop of 1 Hz with early and late half a chip apart.

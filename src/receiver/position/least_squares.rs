@@ -44,6 +44,9 @@ pub struct Range {
     pub sv: Sv,
     /// The signal, of two carriers the first.
     pub signal: &'static Signal,
+    /// The time against which its clock is counted: of the signal's system, or GPS time where it is brought to
+    /// that.
+    pub time: &'static TimeScale,
     /// Satellite at emission, in the ECEF axes of that instant.
     pub satellite: State,
     /// Satellite clock as this signal carries it.
@@ -138,8 +141,8 @@ impl Solution {
 pub fn scales(ranges: &[Range]) -> Vec<&'static TimeScale> {
     let mut scales: Vec<&'static TimeScale> = Vec::new();
     for range in ranges {
-        if !scales.contains(&range.signal.time) {
-            scales.push(range.signal.time);
+        if !scales.contains(&range.time) {
+            scales.push(range.time);
         }
     }
     scales.sort_by_key(|scale| (**scale != GPST, scale.name));
@@ -294,7 +297,7 @@ pub fn position(ranges: &[Range], start_m: Vector3<f64>, corrections: &Correctio
     if ranges.len() < need {
         return Err(NoFix::TooFew { have: ranges.len(), need });
     }
-    let clock = |range: &Range| scales.iter().position(|scale| *scale == range.signal.time).unwrap_or(0);
+    let clock = |range: &Range| scales.iter().position(|scale| *scale == range.time).unwrap_or(0);
     let clock_of: Vec<usize> =
         ranges.iter().map(|range| planted!("receiver.position.own_clock", clock(range), 0)).collect();
     let day = ranges.first().map_or(1.0, |range| range.emitted.day_of_year());

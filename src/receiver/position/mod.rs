@@ -19,7 +19,7 @@ use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::{ClockRow, Fix, IonosphereModel, Observation};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, GPST, Rate, SampleClock, TimeScale};
+use crate::gnss::time::{Epoch, GPST, Rate, SampleClock, TimePolynomial, TimeScale};
 use crate::receiver::described::described;
 use crate::receiver::track::loops::CodeShape;
 
@@ -66,6 +66,16 @@ pub enum TroposphereChoice {
     None,
 }
 
+/// What is taken for the difference of two systems' times.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SystemClocks {
+    /// Nothing: each time scale has a clock of its own among the unknowns.
+    Estimated,
+    /// What the systems broadcast of it; a clock of its own until that is decoded.
+    Broadcast,
+}
+
 described! {
 /// Choices of the position solution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -96,6 +106,10 @@ pub struct PositionSettings {
     /// Whether a Galileo satellite is used by its elements in short, word 16, until its whole set is
     /// decoded: a first fix within 20 s, but to metres, and at first without the satellites' health.
     pub reduced_elements: bool,
+    /// How the times of two systems are joined: estimated for a clock of each, of which a second one takes a
+    /// satellite more; broadcast for one clock and the offset that Galileo sends, which counts as exact, so
+    /// that any four satellites give a fix once it is decoded.
+    pub system_clocks: SystemClocks,
 }
 }
 
@@ -113,6 +127,8 @@ impl Default for PositionSettings {
             ionosphere_wait_s: 0.0,
             // Metres in place of decimetres, and of satellites that may be unhealthy: only who asks for it.
             reduced_elements: false,
+            // Real offsets are off by nanoseconds, metres of range, as estimated ones are not.
+            system_clocks: SystemClocks::Estimated,
         }
     }
 }
@@ -240,6 +256,8 @@ pub struct Solver {
     ready_since: Option<u64>,
     /// Elements in short.
     reduced: BTreeMap<Sv, InShort>,
+    /// What other times are ahead of GPS time.
+    ahead: Vec<(&'static TimeScale, TimePolynomial)>,
 }
 
 impl Solver {
@@ -255,6 +273,7 @@ impl Solver {
             last_m: None,
             ready_since: None,
             reduced: BTreeMap::new(),
+            ahead: Vec::new(),
         }
     }
 
@@ -263,6 +282,12 @@ impl Solver {
     /// `signals` are those of one front end.
     pub fn set_carrier_offset(&mut self, signals: &[&'static Signal], hz: f64) {
         signals.iter().for_each(|signal| self.smoother.set_carrier_offset(signal, hz));
+    }
+
+    /// Takes what a system says that its time is ahead of GPS time.
+    pub fn take_ahead(&mut self, scale: &'static TimeScale, ahead: TimePolynomial) {
+        self.ahead.retain(|(known, _)| **known != *scale);
+        self.ahead.push((scale, ahead));
     }
 
     /// Samples of the front end with these signals were lost or doubled: carriers are whole to a quarter of a

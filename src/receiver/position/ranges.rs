@@ -5,11 +5,13 @@ use std::collections::BTreeMap;
 use super::combination::{Combination, Used, paired};
 use super::least_squares::Range;
 use super::smooth::Smoothed;
-use super::{IonosphereChoice, Solver};
+use super::{IonosphereChoice, Solver, SystemClocks};
 use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::Observation;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Link;
+use crate::gnss::time::GPST;
 
 /// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
 const HALF_FIT_S: f64 = 7200.0;
@@ -45,12 +47,26 @@ impl Solver {
                 Used::Single(row) => self.single(row, smoothed.get(&row.link())?, set),
                 Used::Combined(pair) => self.combined(pair, set),
             }?;
+            let range = self.on_one_time(range);
             Some(match in_short.filter(|_| whole.is_none()) {
                 Some(short) => Range { noise_m: libm::hypot(range.noise_m, short.sigma_m), ..range },
                 None => range,
             })
         };
         used.iter().filter_map(&mut one).collect()
+    }
+
+    /// The range with its clock against GPS time, where the settings take the system's offset from it out of
+    /// the message and it is known.
+    fn on_one_time(&self, range: Range) -> Range {
+        let known = self.ahead.iter().find(|(scale, _)| **scale == *range.time);
+        let Some((_, ahead)) = known.filter(|_| self.settings.system_clocks == SystemClocks::Broadcast) else {
+            return range;
+        };
+        // A clock reads less against a time that is ahead.
+        let ahead_m = SPEED_OF_LIGHT_MPS * ahead.at_s(range.emitted);
+        let ahead_m = planted!("receiver.position.system_offset", ahead_m, -ahead_m);
+        Range { time: &GPST, pseudorange_m: range.pseudorange_m + ahead_m, ..range }
     }
 
     /// Thermal noise of a code measurement, and the carrier's power over noise density.
@@ -110,6 +126,7 @@ fn range(
     Some(Range {
         sv: observation.sv,
         signal: observation.signal,
+        time: observation.signal.time,
         satellite: ephemeris.state(emitted).ok()?,
         clock,
         emitted,

@@ -7,7 +7,7 @@ use crate::gnss::broadcast::{ClockState, State};
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{Epoch, GPST};
 
 /// Azimuth and elevation in degrees of a reference sky with known dilutions of precision.
 const SKY: [(f64, f64); 10] = [
@@ -45,6 +45,7 @@ fn ranges(sky: &[(f64, f64)], bias_s: f64) -> Vec<Range> {
             Range {
                 sv: Sv::gps(prn),
                 signal: &L1_CA,
+                time: &GPST,
                 // Back into the axes of the instant of emission.
                 satellite: State {
                     position_m: rotate_earth(&(here_m + distance_m * direction), -travel_s),
@@ -274,6 +275,7 @@ mod with_real_orbits {
             let carrier_hz = 1_575.42e6;
             ranges.push(Range {
                 signal: &L1_CA,
+                time: &GPST,
                 sv: set.sv,
                 satellite: state,
                 clock: set.clock_l1(emitted).unwrap(),

@@ -93,6 +93,10 @@ impl FrontEnd {
                         sink.take(Record::Navigation(rows))?;
                         None
                     }
+                    News::AheadOfGps { scale, ahead } => {
+                        shared.solver.take_ahead(scale, ahead);
+                        None
+                    }
                     News::Reduced { set, with_delays } => {
                         let serves = shared.solver.take_reduced(*set, with_delays);
                         (serves && !shared.ephemerides.contains_key(&sv)).then_some(Event::ReducedElements)

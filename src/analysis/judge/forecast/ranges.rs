@@ -225,9 +225,12 @@ impl<'r> Scene<'r> {
             }
             let Some(one) = self.one(&theory, &row, true_row, sky) else { return };
             let bounced_m = MULTIPATH_SHARE * bounced.value_m;
+            // A fix with one clock brought all ranges to its time.
+            let joined = self.run.fixes.get(fix).is_some_and(|fix| fix.clocks == Some(1));
             let whole = Forecast {
+                clock: if joined { 0 } else { one.clock },
                 bias_m: one.bias_m + smooth.value_m - parted_m,
-                noise_m2: one.noise_m2 * smooth.variance_ratio,
+                noise_m2: one.noise_m2 * smooth.variance_ratio + self.short_m2(link.sv, row.sample),
                 other_m2: one.other_m2 + bounced_m * bounced_m,
                 memory_s: smooth.memory_s,
                 rate_bias_mps: rate_mps,
@@ -286,7 +289,7 @@ impl<'r> Scene<'r> {
             ionosphere_m,
             troposphere_m: sky.troposphere_m,
             noise_m2: (code * theory.chip_m) * (code * theory.chip_m),
-            other_m2: self.edge_m2(true_row) + self.short_m2(true_row.sv, row.sample),
+            other_m2: self.edge_m2(true_row),
             memory_s: 0.0,
             rate_sigma_mps: rate_hz * true_row.link().wavelength_m(),
             rate_bias_mps: 0.0,
@@ -298,7 +301,7 @@ impl<'r> Scene<'r> {
         })
     }
 
-    /// Variance of what elements in short leave, while nothing better is known.
+    /// Variance of what elements in short leave, while nothing better is known; receivers weight by it.
     fn short_m2(&self, sv: Sv, sample: u64) -> f64 {
         if self.whole.get(&sv).is_some_and(|since| *since <= sample) { 0.0 } else { IN_SHORT_M * IN_SHORT_M }
     }

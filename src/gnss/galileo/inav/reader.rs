@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::{
     INAV, PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, REDUCED, WORDS_OF_SET, decode_soft, elements, elements_in_short,
-    parameters, sent_at, time_of_week, word_of, word_type,
+    gps_offset, parameters, sent_at, time_of_week, word_of, word_type,
 };
 use crate::gnss::message::{Read, Reader};
 use crate::gnss::record::NavigationRow;
@@ -71,7 +71,11 @@ impl InavReader {
         self.words.insert(word_type(&word), word);
         match word_type(&word) {
             1..=5 => self.look_for_set(near, &mut news),
-            6 | 10 => news.push(Read::Parameters(self.rows(&word, 0))),
+            6 => news.push(Read::Parameters(self.rows(&word, 0))),
+            10 => {
+                news.push(Read::Parameters(self.rows(&word, 0)));
+                news.extend(gps_offset(&word, near).map(Read::AheadOfGps));
+            }
             REDUCED => self.reduced = Some(begin),
             _ => {}
         }
