@@ -14,6 +14,7 @@ const PARITY: &str = "witness::printed::a_word_s_parity_is_the_printed_one_and_o
 const FIELDS: &str = "witness::printed::every_field_of_the_message_has_the_printed_place_sign_and_scale";
 const INAV: &str = "witness::printed::every_field_of_i_nav_has_the_printed_place_sign_and_scale";
 const CODED: &str = "witness::printed::pages_of_i_nav_are_checked_coded_interleaved_and_timed_as_printed";
+const REDUNDANT: &str = "witness::redundancy::real_words_17_to_20_are_the_redundancy_of_the_real_words_1_to_4";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
 const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_place_and_a_clock_of_each";
 const OFFSET: &str = "laws::with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_time";
@@ -67,6 +68,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.inav.second_symbol", "the symbols of G2 are not inverted, sent and read", CODED),
     fault("gnss.inav.word_order", "words come a page early, sent and read", CODED),
     fault("gnss.inav.reduced_begin", "elements in short refer to the second before the sub-frame, sent and read", SHORT),
+    fault("gnss.fec.field", "the field of the Reed-Solomon code has another polynomial, sent and read", REDUNDANT),
     fault("gnss.fec.interleaver", "neighbouring symbols change places", CODED),
     fault("gnss.crc.polynomial", "the check has another polynomial, sent and read", CODED),
     fault("gnss.orbit.crs", "C_rs with the wrong sign, on both sides", ORBITS),

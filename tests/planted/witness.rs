@@ -18,3 +18,5 @@ mod printed;
 mod pseudorange;
 #[path = "../witness/reduced.rs"]
 mod reduced;
+#[path = "../witness/redundancy.rs"]
+mod redundancy;

@@ -14,4 +14,5 @@ mod printed;
 mod pseudorange;
 mod recording;
 mod reduced;
+mod redundancy;
 mod stability;

@@ -2,3 +2,4 @@
 
 pub mod convolutional;
 pub mod interleaver;
+pub mod reed_solomon;

@@ -3,13 +3,13 @@
 //!
 //! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is
 //! a pattern of ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both
-//! parts carry one word of 128 bits and a check. Limits: where satellites send redundancy (words 17 to 20)
-//! the spare word 0 is sent. Of almanacs (words 7 to 10) only the offset of GPS time is read. Alert pages are not read. The bits reserved for authentication and the return link are zero.
+//! parts carry one word of 128 bits and a check. Limits: Of almanacs (words 7 to 10) only the offset of GPS time is read. Alert pages are not read. The bits reserved for authentication and the return link are zero.
 
 mod almanac;
 mod fields;
 mod reader;
 mod reduced;
+mod redundancy;
 
 use crate::gnss::bits::{
     Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
@@ -28,6 +28,7 @@ use fields::{Orbit, Utc, WORD_1, WORD_2, WORD_3, WORD_4, WORD_5, WORD_6};
 pub use reader::InavReader;
 pub use reduced::VALID_S as REDUCED_VALID_S;
 use reduced::{Reduced, WORD_16};
+pub use redundancy::redundancy;
 
 /// I/NAV as signals name it.
 pub static INAV: Message = Message {
@@ -90,8 +91,14 @@ fn code() -> Convolutional {
 
 const INTERLEAVER: Interleaver = Interleaver { columns: 30, rows: 8 };
 
-/// Type of the word that begins at a time: the nominal sequence of E1-B (4.3.5, table 38).
+/// From when on satellites send redundancy: the document has it since January 2021, satellites got it later.
+/// The real words that it was compared with are of 2025.
+const REDUNDANT_SINCE_WEEK: i64 = 2243;
+
+/// Type of the word that begins at a time: the nominal sequence of E1-B (4.3.5, table 38). Before 2023 spare
+/// words stand where redundancy does since.
 pub fn word_at(start: Epoch) -> u8 {
+    let redundant = start.week() >= REDUNDANT_SINCE_WEEK;
     // Almanac words 7 and 8 alternate with 9 and 10 from sub-frame to sub-frame.
     let second_half = 2 * (start.tow_whole_s().div_euclid(SUBFRAME_S).rem_euclid(2)) as u8;
     match start.tow_whole_s().rem_euclid(SUBFRAME_S) + planted!("gnss.inav.word_order", 0, 2) {
@@ -100,6 +107,8 @@ pub fn word_at(start: Epoch) -> u8 {
         5 => 6,
         7 => 7 + second_half,
         9 => 8 + second_half,
+        11 if redundant => 17 + u8::from(second_half > 0),
+        13 if redundant => 19 + u8::from(second_half > 0),
         15 | 29 => REDUCED,
         21 => 1,
         23 => 3,
@@ -164,6 +173,13 @@ impl Pages {
                     write_all(&GPS_OFFSET, &triple, &mut word)?;
                 }
             }
+            17..=20 => {
+                let mut four = [0; 4];
+                for (word, number) in four.iter_mut().zip(WORDS_OF_SET) {
+                    *word = self.word(number, ephemeris, start)?;
+                }
+                word = redundancy(four.each_ref())[usize::from(number - 17)];
+            }
             REDUCED => match Reduced::of(ephemeris, start) {
                 Some(reduced) => write_all(&WORD_16, &reduced, &mut word)?,
                 // Two satellites were left on orbits that are no reduced elements, and send the spare word.
@@ -188,7 +204,7 @@ fn alternate(word: &mut u128, from: usize, to: usize) {
 }
 
 /// The two parts of a nominal page around a word, checked and with their tails.
-fn page(word: &u128, start: Epoch) -> [Vec<bool>; 2] {
+pub fn page(word: &u128, start: Epoch) -> [Vec<bool>; 2] {
     let mut even = vec![false; PART_BITS];
     let mut odd = vec![false; PART_BITS];
     odd[0] = true;

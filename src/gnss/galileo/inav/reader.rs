@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use super::redundancy::{REDUNDANT, completed, is_redundant, issue, low_issue};
 use super::{
     INAV, PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, REDUCED, WORDS_OF_SET, decode_soft, elements, elements_in_short,
     gps_offset, parameters, sent_at, time_of_week, word_of, word_type,
@@ -26,6 +27,8 @@ pub struct InavReader {
     failures: u32,
     /// The latest words by their types.
     words: BTreeMap<u8, u128>,
+    /// The issue of data of the latest of words 1 to 4.
+    issue: Option<u32>,
     /// Those of the set that was reported last.
     complete: Option<[u128; 5]>,
     /// Numbers of the first symbols of the latest page with reduced elements, and of the latest one that said
@@ -44,6 +47,7 @@ impl InavReader {
             page: None,
             failures: 0,
             words: BTreeMap::new(),
+            issue: None,
             complete: None,
             reduced: None,
             timed: None,
@@ -68,9 +72,13 @@ impl InavReader {
             self.timed = Some((begin, dated.unwrap_or_else(|| near.nearest_tow(tow_s))));
         }
         news.extend(dated.map(Read::Time));
+        // Redundancy of an issue before is that of another set.
+        if WORDS_OF_SET.contains(&word_type(&word)) && self.issue.replace(issue(&word)) != Some(issue(&word)) {
+            self.words.retain(|_, word| !is_redundant(word));
+        }
         self.words.insert(word_type(&word), word);
         match word_type(&word) {
-            1..=5 => self.look_for_set(near, &mut news),
+            1..=5 | 17..=20 => self.look_for_set(near, &mut news),
             6 => news.push(Read::Parameters(self.rows(&word, 0))),
             10 => {
                 news.push(Read::Parameters(self.rows(&word, 0)));
@@ -96,19 +104,29 @@ impl InavReader {
         Some(Read::Reduced { set, with_delays: five.is_some() })
     }
 
+    /// Words 1 to 4 of the latest issue, with those that lack found from redundancy.
+    fn four(&self) -> Option<[u128; 4]> {
+        let issued = self.issue?;
+        let own = WORDS_OF_SET.map(|number| self.words.get(&number).filter(|word| issue(word) == issued));
+        if let [Some(one), Some(two), Some(three), Some(four)] = own {
+            return Some([*one, *two, *three, *four]);
+        }
+        let of_issue = |word: &&u128| low_issue(word) == issued & 0b11;
+        completed(issued, own, REDUNDANT.map(|number| self.words.get(&number).filter(of_issue)))
+    }
+
     fn look_for_set(&mut self, near: Epoch, news: &mut Vec<Read>) {
-        let words = [1, 2, 3, 4, 5].map(|number| self.words.get(&number));
-        let [Some(one), Some(two), Some(three), Some(four), Some(five)] = words else { return };
-        let set = [*one, *two, *three, *four, *five];
+        let (Some([one, two, three, four]), Some(five)) = (self.four(), self.words.get(&5)) else { return };
+        let set = [one, two, three, four, *five];
         // Word 5 ends with its own time.
         let content = |set: &[u128; 5]| [set[0], set[1], set[2], set[3], set[4] >> 43];
         if self.complete.is_some_and(|before| content(&before) == content(&set)) {
             return;
         }
-        let Some(ephemeris) = elements(self.sv, [one, two, three, four, five], near) else { return };
+        let Some(ephemeris) = elements(self.sv, set.each_ref(), near) else { return };
         let issue = u32::from(ephemeris.iode);
-        let of_set = WORDS_OF_SET.iter().filter_map(|number| self.words.get(number));
-        let mut rows: Vec<NavigationRow> = of_set.flat_map(|word| self.rows(word, issue)).collect();
+        let mut rows: Vec<NavigationRow> =
+            [one, two, three, four].iter().flat_map(|word| self.rows(word, issue)).collect();
         rows.extend(self.rows(five, 0));
         news.push(Read::Ephemeris(Box::new(ephemeris)));
         news.push(Read::Parameters(rows));
