@@ -85,6 +85,22 @@ pub enum Kind {
         /// What is added, in the parameter's unit.
         add: f64,
     },
+    /// Every unit is an alert page, its check right.
+    Alert,
+}
+
+impl Kind {
+    /// Why it cannot befall a message; `None` where it can.
+    pub fn foreign(&self, message: &Message) -> Option<String> {
+        match self {
+            Self::Parameter { name, .. } if !(message.adjustable)().contains(name) => {
+                let names = (message.adjustable)().join(", ");
+                Some(format!("{} has no parameter {name}: expected one of {names}", message.name))
+            }
+            Self::Alert if message.alert.is_none() => Some(format!("{} has no alert pages", message.name)),
+            _ => None,
+        }
+    }
 }
 
 /// The symbols of a unit.
@@ -130,7 +146,7 @@ impl MessageFault {
             Kind::Parameter { name, add } => {
                 (message.adjust)(ephemeris, name, add);
             }
-            Kind::BitErrors { .. } | Kind::Bit { .. } => {}
+            Kind::BitErrors { .. } | Kind::Bit { .. } | Kind::Alert => {}
         }
     }
 
@@ -151,7 +167,7 @@ impl MessageFault {
                 let place = u64::from(word - 1) * WORD_BITS + u64::from(bit - 1);
                 (message.number)(message.unit_start(slot.unit)) == subframe && symbol == place
             }
-            Kind::Health(_) | Kind::Parameter { .. } => false,
+            Kind::Health(_) | Kind::Parameter { .. } | Kind::Alert => false,
         }
     }
 }
@@ -184,6 +200,9 @@ pub fn unit(
     let sv = ephemeris.sv;
     let changed = spoiled(faults, message, sv, ephemeris, slot.start()).unwrap_or_else(|| ephemeris.clone());
     let encoded = sender.unit(&changed.timed(|at| time.label(at)), message.unit_start(unit))?;
+    let is_alert = |fault: &MessageFault| fault.kind == Kind::Alert && fault.on.contains(&slot.start());
+    let alert = faults.iter().any(|fault| fault.concerns(sv) && is_alert(fault));
+    let encoded = if alert { message.alert.and_then(|of| of(&encoded)).unwrap_or(encoded) } else { encoded };
     let mut symbols = encoded.clone();
     for fault in faults.iter().filter(|fault| fault.concerns(sv)) {
         for (number, symbol) in (0..).zip(symbols.iter_mut()) {
@@ -204,6 +223,7 @@ impl MessageFault {
             Kind::BitErrors { rate, .. } => format!("bits wrong with a probability of {rate:e}"),
             Kind::Bit { subframe, word, bit } => format!("bit {bit} of word {word} of subframe {subframe} flipped"),
             Kind::Health(health) => format!("health = {health}"),
+            Kind::Alert => "alert pages".to_owned(),
             Kind::Parameter { name, add } => format!("{name} wrong by {add:e}"),
         };
         let from_s = self.on.start.since(start);

@@ -49,12 +49,20 @@ pub struct Message {
     pub reader: fn(Sv) -> Box<dyn Reader>,
     /// The set that a receiver decodes when this one is sent.
     pub quantised: fn(&Ephemeris) -> Result<Ephemeris, FieldError>,
+    /// Names of the parameters of a set that may be wrong with a right check: all but those that tell sets
+    /// and senders apart.
+    pub adjustable: fn() -> Vec<&'static str>,
+    /// Makes an alert page of a unit; absent where the message has none.
+    pub alert: Option<Alert>,
     /// Adds to the parameter of a set that the tables call so, in its unit; whether there is one.
     pub adjust: fn(&mut Ephemeris, &str, f64) -> bool,
 }
 
 /// The raw integers of some parameters, by their names in the tables.
 pub type Parameters = Vec<(&'static str, i64)>;
+/// The symbols of a unit without content but that something is wrong, its checks right, in place of those of
+/// another; `None` where these fail their own.
+pub type Alert = fn(&[bool]) -> Option<Vec<bool>>;
 /// Gives the raw integer of a parameter by its name.
 pub type Raw<'a> = &'a dyn Fn(&str) -> Option<i64>;
 
@@ -91,8 +99,8 @@ pub enum Read {
     Time(Epoch),
     /// A whole set of elements.
     Ephemeris(Box<Ephemeris>),
-    /// A set in short, good to metres, for some minutes from its reference time on; whether group delays and health
-    /// were read too, else they are zero.
+    /// A set in short, good to metres, for some minutes from its reference time on; whether group delays and
+    /// health were read too, else they are zero.
     Reduced { set: Box<Ephemeris>, with_delays: bool },
     /// The ionosphere's parameters.
     Klobuchar(Klobuchar),

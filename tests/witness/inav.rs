@@ -247,8 +247,8 @@ fn real_almanacs_and_reduced_elements_describe_the_orbits_of_the_same_hour() {
                 let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
                 let ours = inav::word_of(&inav::decode_soft(&soft).unwrap().0);
                 let apart = |name| raw("word 16", name, &ours) - raw("word 16", name, &word);
-                // Both are fitted to ten minutes; where the axis falls on another step, the real clock makes up
-                // for it. How good they are as ranges, `reduced` holds.
+                // Both are fitted to ten minutes; where the axis falls on another step, the real clock makes
+                // up for it. How good they are as ranges, `reduced` holds.
                 assert!(apart("delta_axis_m").abs() <= 2048.0, "{sv} {}", apart("delta_axis_m"));
                 assert!(apart("ex").abs() < 6e-5 && apart("ey").abs() < 6e-5, "{sv}");
                 assert!(apart("delta_i_rad").abs() < 5e-5 && turn(apart("omega0_rad")) < 4e-5, "{sv}");

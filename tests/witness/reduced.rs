@@ -1,5 +1,5 @@
-//! Elements in short, word 16 of I/NAV, as ranges: real ones against the whole sets of the same satellites, and
-//! ours against the sets that they are made of.
+//! Elements in short, word 16 of I/NAV, as ranges: real ones against the whole sets of the same satellites,
+//! and ours against the sets that they are made of.
 
 use std::collections::BTreeMap;
 
@@ -101,8 +101,8 @@ fn real_elements_in_short_are_good_to_two_metres_for_ten_minutes_and_ours_as_goo
     let (real, own) = (theirs.figures_m(), ours.figures_m());
     println!("{} real sets in short {real:.2?} m, ours for the same {own:.2?} m: mean, sigma, 95 %", theirs.sets);
     assert!(theirs.sets > 700 && ours.sets == theirs.sets, "{}", theirs.sets);
-    // Another program found 1.8 m below the satellites in the same words and 5 m across the line of sight, at a
-    // minute of age.
+    // Another program found 1.8 m below the satellites in the same words and 5 m across the line of sight, at
+    // a minute of age.
     assert!(real[0].abs() < 0.5 && (1.4..1.8).contains(&real[1]) && real[2] < 3.3, "{real:?}");
     assert!(own[0].abs() < 0.5 && own[1] < 2.1 && own[2] < 4.1, "{own:?}");
 }

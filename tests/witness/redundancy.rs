@@ -1,5 +1,5 @@
-//! Redundancy of I/NAV, words 17 to 20: real ones against the real words 1 to 4 of the same issue, and sets read
-//! with words missing.
+//! Redundancy of I/NAV, words 17 to 20: real ones against the real words 1 to 4 of the same issue, and sets
+//! read with words missing.
 
 use std::collections::BTreeMap;
 

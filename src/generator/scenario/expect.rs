@@ -73,6 +73,7 @@ impl Scenario {
                 MessageKind::Bit { .. } => FaultKind::Bit,
                 MessageKind::Health(_) => FaultKind::Health,
                 MessageKind::Parameter { .. } => FaultKind::Parameter,
+                MessageKind::Alert => FaultKind::Alert,
             };
             fault(kind, one.satellites.as_deref(), one.on_s, one.off_s)
         };

@@ -124,6 +124,8 @@ pub enum MessageKind {
         /// What is added, in the parameter's unit.
         add: f64,
     },
+    /// Alert pages in place of all others.
+    Alert,
 }
 
 pub(super) fn orbits(table: &Table<'_>) -> Result<OrbitsSpec, ScenarioError> {
@@ -201,7 +203,7 @@ pub(super) fn satellite_fault(table: &Table<'_>) -> Result<SatelliteFault, Scena
 }
 
 pub(super) fn message_fault(table: &Table<'_>) -> Result<MessageSpec, ScenarioError> {
-    let kinds = [("bit_errors", 0), ("bit", 1), ("health", 2), ("parameter", 3)];
+    let kinds = [("bit_errors", 0), ("bit", 1), ("health", 2), ("parameter", 3), ("alert", 4)];
     let kind = table.need_choice("kind", &kinds)?;
     let count = |key: &str| table.need_integer(key).map(|value| value as u8);
     let (on_s, off_s) = times(table)?;
@@ -215,6 +217,10 @@ pub(super) fn message_fault(table: &Table<'_>) -> Result<MessageSpec, ScenarioEr
         2 => {
             named(table)?;
             MessageKind::Health(count("health")?)
+        }
+        4 => {
+            named(table)?;
+            MessageKind::Alert
         }
         _ => {
             named(table)?;
@@ -350,6 +356,7 @@ pub(super) fn message_faults(
             MessageKind::Health(health) => Kind::Health(health),
             MessageKind::Parameter { add: 0.0, .. } => continue,
             MessageKind::Parameter { name, add } => Kind::Parameter { name, add },
+            MessageKind::Alert => Kind::Alert,
         };
         let fault = MessageFault {
             satellites: spec.satellites.clone(),
@@ -360,6 +367,9 @@ pub(super) fn message_faults(
             let sent = catalogue.sent_at(*sv, fault.on.start);
             let own = scenario.signals.iter().filter(|signal| signal.system == sv.system);
             for message in own.flat_map(|signal| signal.components.iter().filter_map(|component| component.message)) {
+                if let Some(reason) = fault.kind.foreign(message) {
+                    return Err(scenario.conflict("message_fault", format!("number {number}, {sv}: {reason}")));
+                }
                 let only = std::slice::from_ref(&fault);
                 let wrong = sent.and_then(|set| spoiled(only, message, *sv, set, fault.on.start));
                 if let Some(Err(error)) = wrong.map(|set| (message.quantised)(&set)) {

@@ -166,6 +166,8 @@ pub enum FaultKind {
     Health,
     /// A parameter of the message is wrong.
     Parameter,
+    /// The message says nothing but that something is wrong.
+    Alert,
 }
 
 /// Something wrong with satellites or their messages.

@@ -1,9 +1,9 @@
 //! A systematic Reed-Solomon code over octets, and the recovery of octets that are known to be missing.
 //!
 //! Source: Galileo OS SIS ICD 2.1, 5.1.13.2: GF(256) of x⁸ + x⁴ + x³ + x² + 1, 60 parity octets whose
-//! generator has the roots α¹ to α⁶⁰ (255, 195), shortened to the information that there is. Information octet
-//! j is the coefficient of x^(60 + j), parity octet i that of xⁱ. Limits: wrong octets are not found, as what
-//! is decoded here has passed a check of its own; octets more than are needed must agree.
+//! generator has the roots α¹ to α⁶⁰ (255, 195), shortened to the information that there is. Information
+//! octet j is the coefficient of x^(60 + j), parity octet i that of xⁱ. Limits: wrong octets are not found,
+//! as what is decoded here has passed a check of its own; octets more than are needed must agree.
 
 use std::sync::OnceLock;
 
@@ -77,8 +77,8 @@ pub fn parity(information: &[u8]) -> [u8; PARITY] {
     rest
 }
 
-/// The information with its missing octets found from parity octets; `None` where those are too few, or do not
-/// agree.
+/// The information with its missing octets found from parity octets; `None` where those are too few, or do
+/// not agree.
 pub fn recovered(information: &[Option<u8>], parity_octets: &[Option<u8>; PARITY]) -> Option<Vec<u8>> {
     let missing: Vec<usize> = (0..information.len()).filter(|&place| information[place].is_none()).collect();
     let mut whole: Vec<u8> = information.iter().map(|octet| octet.unwrap_or(0)).collect();

@@ -44,8 +44,8 @@ pub struct Range {
     pub sv: Sv,
     /// The signal, of two carriers the first.
     pub signal: &'static Signal,
-    /// The time against which its clock is counted: of the signal's system, or GPS time where it is brought to
-    /// that.
+    /// The time against which its clock is counted: of the signal's system, or GPS time where it is brought
+    /// to that.
     pub time: &'static TimeScale,
     /// Satellite at emission, in the ECEF axes of that instant.
     pub satellite: State,

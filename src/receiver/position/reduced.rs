@@ -39,3 +39,57 @@ impl Solver {
         self.settings.reduced_elements && self.reduced.insert(set.sv, InShort { set, sigma_m }).is_none()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::gnss::galileo::e1::E1;
+    use crate::gnss::record::Observation;
+    use crate::gnss::rinex;
+    use crate::gnss::satellite::System;
+    use crate::gnss::time::Rate;
+    use crate::receiver::position::{CodeNoise, PositionSettings};
+    use crate::receiver::track::loops::CodeShape;
+
+    #[test]
+    fn elements_in_short_serve_for_ten_minutes_until_the_whole_set_does_and_only_if_wanted() {
+        let all = rinex::embedded_two_systems().unwrap().ephemerides;
+        let set = all.into_iter().find(|set| set.sv.system == System::Galileo && set.is_healthy()).unwrap();
+        let noise =
+            CodeNoise { chip_m: 293.0, shape: CodeShape::triangle(0.5), bandwidth_hz: 1.0, integration_s: 4e-3 };
+        let solver = |reduced_elements: bool| {
+            let settings = PositionSettings { reduced_elements, ..PositionSettings::default() };
+            Solver::new(&settings, vec![(&E1, noise)], Rate::from_hz(1e6).unwrap())
+        };
+        let sent = |after_s: f64| Observation {
+            sample: 0,
+            sv: set.sv,
+            signal: &E1,
+            sent_s: set.toe.plus_s(after_s).seconds(),
+            sent_fraction_s: 0.0,
+            pseudorange_m: 2.5e7,
+            carrier_cycles: 0.0,
+            doppler_hz: 0.0,
+            cn0_dbhz: 45.0,
+            locked_s: 1.0,
+        };
+        let none = BTreeMap::new();
+        let mut wants = solver(true);
+        assert!(wants.ranges(&[sent(60.0)], &none).is_empty());
+        assert!(wants.take_reduced(set.clone(), false) && !wants.take_reduced(set.clone(), false));
+        let noise_m = |solver: &mut Solver, after_s: f64, whole: &BTreeMap<_, _>| -> Vec<f64> {
+            solver.ranges(&[sent(after_s)], whole).iter().map(|range| range.noise_m).collect()
+        };
+        // 2 m of elements and 1.5 m of a delay that is not known; code noise is 0.4 m.
+        assert!(matches!(noise_m(&mut wants, 60.0, &none)[..], [sigma_m] if (2.5..2.7).contains(&sigma_m)));
+        assert!(noise_m(&mut wants, 601.0, &none).is_empty() && noise_m(&mut wants, -1.0, &none).is_empty());
+        assert!(!wants.take_reduced(set.clone(), true));
+        assert!(matches!(noise_m(&mut wants, 60.0, &none)[..], [sigma_m] if (2.0..2.2).contains(&sigma_m)));
+        let whole = BTreeMap::from([(set.sv, set.clone())]);
+        assert!(matches!(noise_m(&mut wants, 60.0, &whole)[..], [sigma_m] if sigma_m < 1.0));
+        let mut other = solver(false);
+        assert!(!other.take_reduced(set.clone(), true) && noise_m(&mut other, 60.0, &none).is_empty());
+    }
+}

@@ -74,8 +74,8 @@ fn updates_s(run: &Run) -> Option<BTreeMap<&'static Signal, f64>> {
 const SPACE_M: f64 = 1e5;
 /// Klobuchar's ionosphere ends here.
 const IONOSPHERE_TOP_M: f64 = 1e6;
-/// Error of a range by elements in short, whose steps are 4.5 m of clock and 22 m across the line of sight, of
-/// which a fifth shows at the most; and by a group delay that they lack.
+/// Error of a range by elements in short, whose steps are 4.5 m of clock and 22 m across the line of sight,
+/// of which a fifth shows at the most; and by a group delay that they lack.
 const IN_SHORT_M: f64 = 2.5;
 /// Share of the rays' computed effect by which it may be wrong: the front end rounds the correlation, the
 /// loop lags.

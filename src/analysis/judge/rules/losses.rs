@@ -133,7 +133,7 @@ impl Witness {
         }
         // Without a frame for so long, a channel gives up what it cannot read.
         let garbled = run.scene.faults.iter().any(|fault| {
-            matches!(fault.kind, FaultKind::BitErrors | FaultKind::Bit)
+            matches!(fault.kind, FaultKind::BitErrors | FaultKind::Bit | FaultKind::Alert)
                 && fault.satellites.as_ref().is_none_or(|list| list.contains(&sv))
                 && slip.time_s >= fault.from_s
         });

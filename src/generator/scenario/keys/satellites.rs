@@ -4,7 +4,7 @@ use super::{A_PATH, LONGEST_S, SATELLITES};
 use crate::generator::clock::oscillator::PowerLaw;
 use crate::generator::effect::transmit::Block;
 use crate::generator::scenario::schema::{Key, by_satellite, integer, number, numbers, text, texts, word, words};
-use crate::gnss::gps::lnav;
+use crate::gnss::signal::SIGNALS;
 
 const OFFSET: Key = number("G01", -5.0, 5.0, "m", "of one satellite, by its name");
 const CN0: Key = number("G01", 0.0, 100.0, "dB-Hz", "C/N0 of one satellite, by its name");
@@ -49,15 +49,16 @@ pub(crate) const SATELLITE_FAULT: &[Key] = &[
         .of(ORBIT),
 ];
 
-/// Parameters that a fault cannot change: sets are distinguished by them.
-const FIXED_PARAMETERS: [&str; 4] = ["week", "iodc", "iode", "health"];
-
-/// The parameters of subframes 1 to 3 that a fault can change.
+/// The parameters of all messages that a fault can change.
 pub(crate) fn parameters() -> Vec<&'static str> {
-    let tables = lnav::tables();
-    let ephemeris = tables.iter().filter(|(name, _)| name.starts_with("subframe "));
-    let names = ephemeris.flat_map(|(_, fields)| fields.iter().map(|field| field.name));
-    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
+    let messages = SIGNALS.iter().flat_map(|signal| signal.components.iter().filter_map(|c| c.message));
+    let mut names: Vec<&'static str> = Vec::new();
+    for name in messages.flat_map(|message| (message.adjustable)()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
 }
 
 fn presets() -> Vec<&'static str> {
@@ -65,9 +66,9 @@ fn presets() -> Vec<&'static str> {
 }
 
 pub(crate) const MESSAGE_FAULT: &[Key] = &[
-    word("kind", || vec!["bit_errors", "bit", "health", "parameter"], "what goes wrong").required(),
+    word("kind", || vec!["bit_errors", "bit", "health", "parameter", "alert"], "what goes wrong").required(),
     words("satellites", SATELLITES, "which satellites").or_else("all").of(&["bit_errors", "bit"]),
-    words("satellites", SATELLITES, "which satellites").required().of(&["health", "parameter"]),
+    words("satellites", SATELLITES, "which satellites").required().of(&["health", "parameter", "alert"]),
     on(),
     off(),
     number("rate", 0.0, 0.5, "(a probability)", "probability of each bit to be wrong").required().of(&["bit_errors"]),

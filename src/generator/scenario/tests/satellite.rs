@@ -3,6 +3,10 @@
 use std::path::Path;
 
 use super::*;
+use crate::generator::message::{self, MessageFault, Slot};
+use crate::gnss::galileo::inav::INAV;
+use crate::gnss::satellite::System;
+use crate::gnss::time::GST;
 
 /// Every key of the tables.
 pub(super) const FAULTS: &str = "[orbits]\nsp3 = [\"a.sp3\", \"b.sp3.gz\"]\nantenna_offset_m = 0.7\nantenna_offsets_m = { G13 = 1.5 }\n\
@@ -100,4 +104,63 @@ fn orbits_that_do_not_reach_over_the_scene_are_refused_with_their_reach() {
     let stranger = "[[message_fault]]\nkind = \"health\"\nsatellites = [\"G99\"]\nhealth = 1\n";
     let (_, told) = composed("2010-07-01T10:00:00", stranger).unwrap();
     assert!(told.iter().any(|line| line.contains("a fault names G99")), "{told:?}");
+}
+
+/// The faults of a scene of both systems, and what its satellite sends under them in the page of word 1.
+fn of_galileo(fault: &str) -> Result<(Vec<bool>, Vec<bool>), String> {
+    let scene = "name = \"x\"\nstart = 2020-11-29T12:50:30\nduration_s = 60\nsignals = [\"GPS L1 C/A\", \"Galileo E1\"]\n";
+    let text = format!("{scene}{STATIC}\n[[message_fault]]\n{fault}\n");
+    let scenario = parse(&text).map_err(|e| e.to_string())?;
+    let (scene, _) = scenario.compose(Path::new("."), &Overrides::default()).map_err(|e| e.to_string())?;
+    let sv = Sv { system: System::Galileo, number: 12 };
+    let set = scene.catalogue.sent_at(sv, scene.clock.start).unwrap();
+    let sender = scene.messages.of(&INAV).unwrap();
+    // 12:50:51.
+    let unit = INAV.unit_at(scene.clock.start.seconds() + 21);
+    let slot = Slot { message: &INAV, time: &GST, unit };
+    let sent = |faults: &[MessageFault]| message::unit(faults, sender, set, &slot).unwrap().symbols;
+    Ok((sent(&[]), sent(&scene.message_faults)))
+}
+
+#[test]
+fn a_parameter_is_wrong_in_the_message_that_has_it_and_refused_by_name_in_another() {
+    let raw = |symbols: &[bool], name: &str| {
+        let (_, all) = (INAV.parameters)(symbols).unwrap();
+        all.into_iter().find(|(found, _)| *found == name).unwrap().1
+    };
+    let (plain, wrong) =
+        of_galileo("kind = \"parameter\"\nsatellites = [\"E12\"]\nparameter = \"m0_rad\"\nadd = 1e-6").unwrap();
+    // 1e-6 rad are 683.6 steps of π·2^-31.
+    assert!([683, 684].contains(&(raw(&wrong, "m0_rad") - raw(&plain, "m0_rad"))));
+    assert_eq!(raw(&wrong, "eccentricity"), raw(&plain, "eccentricity"));
+    let refused = |satellite: &str, parameter: &str| {
+        let lines = format!("kind = \"parameter\"\nsatellites = [\"{satellite}\"]\nparameter = \"{parameter}\"\nadd = 1e-9");
+        of_galileo(&lines).err().unwrap()
+    };
+    let inav = refused("E12", "tgd_s");
+    assert!(inav.contains("E12: I/NAV has no parameter tgd_s") && inav.contains("bgd_e1_e5b_s"), "{inav}");
+    let lnav = refused("G05", "bgd_e1_e5b_s");
+    assert!(lnav.contains("G05: LNAV has no parameter bgd_e1_e5b_s") && lnav.contains("tgd_s"), "{lnav}");
+    // Nothing may pretend to be another satellite or issue.
+    assert!(refused("E12", "svid").contains("parameter"));
+}
+
+#[test]
+fn alert_pages_say_nothing_and_keep_their_place() {
+    let (plain, alert) = of_galileo("kind = \"alert\"\nsatellites = [\"E12\"]").unwrap();
+    assert!((INAV.parameters)(&plain).is_some() && (INAV.parameters)(&alert).is_none());
+    // Both parts have the pattern, and the tail of coded zeros at their end.
+    assert_eq!((&alert[..10], &alert[250..260]), (&plain[..10], &plain[250..260]));
+    let mut reader = (INAV.reader)(Sv { system: System::Galileo, number: 12 });
+    let near = Epoch::parse("2020-11-29T12:50:30").unwrap();
+    let mut take = |symbols: &[bool]| -> usize {
+        symbols.iter().map(|&one| reader.take(if one { -1.0 } else { 1.0 }, near).len()).sum()
+    };
+    let (_, other) = of_galileo("kind = \"alert\"\nsatellites = [\"E11\"]").unwrap();
+    assert_eq!(other, plain);
+    take(&plain);
+    // More than the reader lets fail where it expects pages.
+    assert_eq!((0..8).map(|_| take(&alert)).sum::<usize>(), 0);
+    let refused = of_galileo("kind = \"alert\"\nsatellites = [\"G05\"]").err().unwrap();
+    assert!(refused.contains("G05: LNAV has no alert pages"), "{refused}");
 }

@@ -3,7 +3,9 @@
 //!
 //! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is
 //! a pattern of ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both
-//! parts carry one word of 128 bits and a check. Limits: Of almanacs (words 7 to 10) only the offset of GPS time is read. Alert pages are not read. The bits reserved for authentication and the return link are zero.
+//! parts carry one word of 128 bits and a check. Limits: Of almanacs (words 7 to 10) only the offset of GPS
+//! time is read. Alert pages keep their place and say nothing. The bits reserved for authentication and the
+//! return link are zero.
 
 mod almanac;
 mod fields;
@@ -55,6 +57,8 @@ pub static INAV: Message = Message {
     },
     reader: |sv| Box::new(InavReader::new(sv)),
     quantised,
+    adjustable,
+    alert: Some(alerted),
     adjust,
 };
 
@@ -248,6 +252,29 @@ fn decode_page(symbols: &[bool]) -> Option<([Vec<bool>; 2], bool)> {
 /// The parts of 120 bits in the 500 soft symbols of a page, and whether they came upside down; `None` where
 /// they are no nominal page of a right check.
 pub fn decode_soft(symbols: &[f32]) -> Option<([Vec<bool>; 2], bool)> {
+    decode_any(symbols).filter(|(parts, _)| !is_alert(parts))
+}
+
+/// Whether the type of a page is that of an alert, whose content is reserved (4.3.2.3).
+fn is_alert(parts: &[Vec<bool>; 2]) -> bool {
+    parts.iter().any(|part| part[1])
+}
+
+/// An alert page in place of a nominal one, its data ones and zeros in turn.
+fn alerted(symbols: &[bool]) -> Option<Vec<bool>> {
+    let ([mut even, mut odd], _) = decode_page(symbols)?;
+    (even[1], odd[1]) = (true, true);
+    let data = even[WORD_BEGIN..WORD_BEGIN + EVEN_WORD_BITS].iter_mut();
+    let data = data.chain(odd[WORD_BEGIN..WORD_BEGIN + WORD_BITS - EVEN_WORD_BITS].iter_mut());
+    data.enumerate().for_each(|(place, bit)| *bit = place.is_multiple_of(2));
+    let check = crc24q(covered(&even, &odd));
+    let bits = bits_of(u128::from(check), CHECK_BITS);
+    odd[CHECK_BEGIN..].iter_mut().zip(bits).for_each(|(slot, bit)| *slot = bit);
+    Some(encode_page(&[even, odd]))
+}
+
+/// The parts of any page of a right check, nominal or alert.
+fn decode_any(symbols: &[f32]) -> Option<([Vec<bool>; 2], bool)> {
     if symbols.len() != PAGE_SYMBOLS {
         return None;
     }
@@ -261,8 +288,8 @@ pub fn decode_soft(symbols: &[f32]) -> Option<([Vec<bool>; 2], bool)> {
     };
     let [even, odd] = [part(0), part(PART_SYMBOLS)];
     let check = number(&odd[CHECK_BEGIN..CHECK_BEGIN + CHECK_BITS]) as u32;
-    let nominal = !even[0] && odd[0] && !even[1] && !odd[1];
-    (nominal && crc24q(covered(&even, &odd)) == check).then_some(([even, odd], inverted))
+    let in_order = !even[0] && odd[0] && even[1] == odd[1];
+    (in_order && crc24q(covered(&even, &odd)) == check).then_some(([even, odd], inverted))
 }
 
 /// The word of 128 bits in a page's parts.
@@ -313,6 +340,16 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
     of_set().into_iter().try_for_each(|table| quantise_all(table, &mut sent))?;
     Ok(sent.ephemeris)
+}
+
+/// Parameters by which sets and senders are told apart, and what all satellites say alike.
+const FIXED_PARAMETERS: [&str; 7] =
+    ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
+
+/// Those of words 1 to 5.
+fn adjustable() -> Vec<&'static str> {
+    let names = of_set().into_iter().flatten().map(|element| element.field.name);
+    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
 }
 
 /// Adds `by` to a parameter of words 1 to 5 in the unit of the tables; whether there is one.

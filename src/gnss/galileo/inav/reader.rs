@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::redundancy::{REDUNDANT, completed, is_redundant, issue, low_issue};
 use super::{
-    INAV, PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, REDUCED, WORDS_OF_SET, decode_soft, elements, elements_in_short,
-    gps_offset, parameters, sent_at, time_of_week, word_of, word_type,
+    INAV, PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, REDUCED, WORDS_OF_SET, decode_any, elements, elements_in_short,
+    gps_offset, is_alert, parameters, sent_at, time_of_week, word_of, word_type,
 };
 use crate::gnss::message::{Read, Reader};
 use crate::gnss::record::NavigationRow;
@@ -153,7 +153,11 @@ impl Reader for InavReader {
         if (self.page.is_some() && !due) || (self.page.is_none() && !self.has_patterns()) {
             return Vec::new();
         }
-        match decode_soft(self.symbols.make_contiguous()) {
+        match decode_any(self.symbols.make_contiguous()) {
+            Some((parts, _)) if is_alert(&parts) => {
+                (self.page, self.failures) = (Some(begin), 0);
+                Vec::new()
+            }
             Some((parts, inverted)) => {
                 (self.page, self.failures) = (Some(begin), 0);
                 self.read(word_of(&parts), begin, inverted, near)

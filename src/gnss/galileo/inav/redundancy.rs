@@ -1,8 +1,8 @@
 //! Words 17 to 20: octets by which any of words 1 to 4 are found that were not read.
 //!
-//! Source: Galileo OS SIS ICD 2.1, 5.1.13. The 58 octets of the code's information are the type of word 1 with
-//! the two low bits of the issue of data, its other eight bits, and the 112 bits that follow the issue in
-//! words 1 to 4. Each of words 17 to 20 carries 15 of 60 parity octets, and the two low bits of the issue.
+//! Source: Galileo OS SIS ICD 2.1, 5.1.13. The 58 octets of the code's information are the type of word 1
+//! with the two low bits of the issue of data, its other eight bits, and the 112 bits that follow the issue
+//! in words 1 to 4. Each of words 17 to 20 carries 15 of 60 parity octets, and the two low bits of the issue.
 
 use super::word_type;
 use crate::gnss::bits::Store;

@@ -57,6 +57,8 @@ pub static LNAV: Message = Message {
     parameters: opened,
     reader: |sv| Box::new(LnavReader::new(sv)),
     quantised,
+    adjustable,
+    alert: None,
     adjust,
 };
 
@@ -214,6 +216,15 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     quantise_all(&SUBFRAME_2, &mut sent)?;
     quantise_all(&SUBFRAME_3, &mut sent)?;
     Ok(sent)
+}
+
+/// Parameters by which sets are told apart, and the health, which has a fault of its own.
+const FIXED_PARAMETERS: [&str; 4] = ["week", "iodc", "iode", "health"];
+
+fn adjustable() -> Vec<&'static str> {
+    let tables = tables().into_iter().filter(|(name, _)| name.starts_with("subframe "));
+    let names = tables.flat_map(|(_, fields)| fields).map(|field| field.name);
+    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
 }
 
 /// Adds `by` to the parameter of subframes 1 to 3 that the field table calls `parameter`, in its unit;
