@@ -76,7 +76,7 @@ const SPACE_M: f64 = 1e5;
 const IONOSPHERE_TOP_M: f64 = 1e6;
 /// Error of a range by elements in short, whose steps are 4.5 m of clock and 22 m across the line of sight,
 /// of which a fifth shows at the most; and by a group delay that they lack.
-const IN_SHORT_M: f64 = 2.5;
+const IN_SHORT_M: f64 = 2.2;
 /// Share of the rays' computed effect by which it may be wrong: the front end rounds the correlation, the
 /// loop lags.
 const MULTIPATH_SHARE: f64 = 0.5;
