@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::analysis::expect::timeline::{State, Timeline};
 use crate::analysis::read::rinex_obs::{ObservedEpoch, Values};
+use crate::gnss::satellite::System;
 use crate::gnss::signal::{self, Link, Signal};
 
 /// One observation and the truth at its time.
@@ -35,6 +36,7 @@ pub(super) fn join<'a>(
     for (number, epoch) in epochs.iter().enumerate() {
         let label_s = label(epoch);
         for ((sv, code), values) in &epoch.values {
+            let code = whole(sv.system, code);
             let signal = signals.iter().find(|signal| signal.system == sv.system && signal.rinex == code);
             let Some(signal) = signal else { continue };
             let link = Link { sv: *sv, signal };
@@ -44,6 +46,15 @@ pub(super) fn join<'a>(
         }
     }
     pairs
+}
+
+/// The code of a signal by that of a component or of both: E1's data are 1B, data and pilot 1X (RINEX 4.02,
+/// table 14).
+fn whole(system: System, code: &str) -> &str {
+    match (system, code) {
+        (System::Galileo, "1B" | "1X") => "1C",
+        _ => code,
+    }
 }
 
 /// Splits pairs, which ascend by epoch, into epochs.
