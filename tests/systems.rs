@@ -97,10 +97,13 @@ fn lost_samples_cost_no_channel_of_either_system_and_are_counted_by_each_alone()
     let path: Vec<TrajectoryRow> = rows(directory.path(), "trajectory.csv");
     let passes: Vec<PassRow> = rows(directory.path(), "passes.csv");
     let at = |second: f64| 2 * (second * 4.3e6) as usize;
-    // 1.6 ms, which displaces codes and symbols of both systems.
-    let (first, lost) = (36.0, 7000);
-    let cut = [&bytes[..at(first)], &bytes[at(first) + 2 * lost..]].concat();
-    for signals in ["\"GPS L1 C/A\", \"synthetic A\"", "\"synthetic A\""] {
+    let both = "\"GPS L1 C/A\", \"synthetic A\"";
+    let second = "\"synthetic A\"";
+    // 1.6 ms displace codes and symbols of both systems; 4 ms are a symbol and a code period of the second,
+    // whose overlay alone shows them.
+    for (signals, lost) in [(both, 7000), (second, 7000), (both, 17_200), (second, 17_200)] {
+        let first = 36.0;
+        let cut = [&bytes[..at(first)], &bytes[at(first) + 2 * lost..]].concat();
         let text = format!(
             "[acquisition]\nsignals = [{signals}]\n[position]\nionosphere = \"none\"\ntroposphere = \"none\"\n"
         );

@@ -34,6 +34,11 @@ impl Waveform {
         Some(Self { parts: signal.components.iter().map(part).collect(), chip_rate_hz })
     }
 
+    /// Of one shape, for chips of that rate.
+    pub fn of_shape(shape: Shape, chip_rate_hz: f64) -> Self {
+        Self { parts: vec![(1.0, shape)], chip_rate_hz }
+    }
+
     /// Rate of the chips in which distances are given.
     pub fn chip_rate_hz(&self) -> f64 {
         self.chip_rate_hz

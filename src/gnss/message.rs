@@ -12,6 +12,7 @@ use std::fmt;
 use crate::gnss::bits::FieldError;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::UtcData;
+use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
@@ -35,8 +36,8 @@ pub struct Message {
     pub set: &'static [u8],
     /// Numbers of the units each of which carries a set in short.
     pub reduced: &'static [u8],
-    /// Whether the unit that begins then carries the ionosphere that [`Klobuchar`] describes.
-    pub ionosphere: fn(Epoch) -> bool,
+    /// What it says of the ionosphere.
+    pub ionosphere: IonosphereForm,
     /// Names of the parameters of a set that bear its issue.
     pub set_parameters: fn() -> Vec<&'static str>,
     /// The set of a satellite by the raw integers of its parameters, read near a time; `None` where some are
@@ -56,6 +57,16 @@ pub struct Message {
     pub alert: Option<Alert>,
     /// Adds to the parameter of a set that the tables call so, in its unit; whether there is one.
     pub adjust: fn(&mut Ephemeris, &str, f64) -> bool,
+}
+
+/// How a message describes the ionosphere.
+pub struct IonosphereForm {
+    /// By which model.
+    pub model: Model,
+    /// Whether the unit that begins then carries its coefficients.
+    pub unit: fn(Epoch) -> bool,
+    /// The coefficients by the raw integers of their parameters; `None` where one is missing.
+    pub coefficients: fn(Raw<'_>) -> Option<Coefficients>,
 }
 
 /// The raw integers of some parameters, by their names in the tables.
@@ -103,7 +114,7 @@ pub enum Read {
     /// health were read too, else they are zero.
     Reduced { set: Box<Ephemeris>, with_delays: bool },
     /// The ionosphere's parameters.
-    Klobuchar(Klobuchar),
+    Ionosphere(Coefficients),
     /// By how much the system's time is ahead of GPS time, whole seconds apart.
     AheadOfGps(TimePolynomial),
     /// Raw parameters as decoded.

@@ -35,8 +35,10 @@ pub mod gps;
 pub mod inflate;
 #[cfg(feature = "generator")]
 pub mod ionex;
+pub mod ionosphere;
 pub mod klobuchar;
 pub mod message;
+pub mod nequick;
 #[cfg(any(feature = "receiver", feature = "analysis"))]
 pub mod place;
 pub mod record;

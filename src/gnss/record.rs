@@ -237,8 +237,10 @@ pub enum IonosphereModel {
     /// A typical ionosphere, whose error is in the covariance: no satellite's parameters have been decoded
     /// yet.
     Nominal,
-    /// The parameters that the satellites send.
+    /// Klobuchar's model with the parameters that the satellites send.
     Broadcast,
+    /// NeQuick-G with the parameters that the satellites send.
+    NequickG,
     /// Two carriers of every satellite, in the combination that has no ionosphere.
     Combined,
 }

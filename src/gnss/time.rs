@@ -206,6 +206,12 @@ impl Epoch {
         format!("{y:04}-{m:02}-{d:02}T{hh:02}:{mm:02}:{ss:02}.{:06}Z", ns / 1000)
     }
 
+    /// Month of the calendar in GPS time, from 1, and hours of its day.
+    pub fn month_and_hour(self) -> (u8, f64) {
+        let (_, month, ..) = self.hifitime(hifitime::TimeScale::GPST).to_gregorian(hifitime::TimeScale::GPST);
+        (month, (self.seconds.rem_euclid(86_400) as f64 + self.fraction) / 3600.0)
+    }
+
     /// UTC calendar date of this instant and its day of the year counted from 1.0.
     pub fn day_of_year(self) -> f64 {
         self.hifitime(hifitime::TimeScale::UTC).day_of_year()

@@ -5,7 +5,7 @@
 //! time. A time that contradicts the one before drops both.
 
 use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::ionosphere::Coefficients;
 use crate::gnss::message::{Read, Reader};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
@@ -37,7 +37,7 @@ pub enum News {
         with_delays: bool,
     },
     /// The ionosphere's parameters.
-    Klobuchar(Klobuchar),
+    Ionosphere(Coefficients),
     /// By how much a system's time is ahead of GPS time, whole seconds apart.
     AheadOfGps {
         /// The system's time.
@@ -133,11 +133,11 @@ impl Decoder {
                     let set = Box::new(set.timed(|label| self.time.instant(label)));
                     news.push(News::Reduced { set, with_delays });
                 }
-                Read::Klobuchar(klobuchar) => news.push(News::Klobuchar(klobuchar)),
                 Read::AheadOfGps(ahead) => {
                     let ahead = TimePolynomial { reference: self.time.instant(ahead.reference), ..ahead };
                     news.push(News::AheadOfGps { scale: self.time, ahead });
                 }
+                Read::Ionosphere(coefficients) => news.push(News::Ionosphere(coefficients)),
                 Read::Parameters(rows) => news.push(News::Parameters(rows)),
             }
         }

@@ -42,6 +42,7 @@ pub mod correlate;
 pub mod decode;
 mod described;
 pub mod diagnosis;
+pub mod followed;
 pub mod format;
 pub mod gap;
 pub mod interference;

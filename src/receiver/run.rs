@@ -12,6 +12,7 @@ use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
 use crate::receiver::acquire;
 use crate::receiver::diagnosis::{Diagnosis, Stage};
+use crate::receiver::followed::Followed;
 use crate::receiver::format::Check;
 use crate::receiver::outcome::{Outcome, ReceiveError};
 use crate::receiver::output::{Record, Sink};
@@ -369,6 +370,7 @@ fn summary(
     };
     let mut summary = json!({
         "settings": settings,
+        "followed": settings.acquisition.signals().into_iter().filter_map(|s| Followed::of(s, settings)).collect::<Vec<_>>(),
         "metadata": metadata.first().map(of),
         "samples": outcome.samples,
         "seconds": outcome.seconds,

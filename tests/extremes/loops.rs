@@ -173,7 +173,7 @@ fn data_upside_down_are_the_same_data() {
         let mut found = Vec::new();
         for (k, bit) in bits.iter().enumerate().skip(from) {
             let soft = if *bit != upside_down { -9.0 } else { 9.0 };
-            let symbol = Symbol { first_period: 20 * k as u64, soft };
+            let symbol = Symbol { first_period: 20 * k as u64, end: 0, soft };
             found.extend(decoder.take(&symbol, Epoch::new(start, 0.0)));
         }
         let time = decoder.time_of_week(20 * 2000, 0.0);

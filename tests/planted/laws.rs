@@ -17,6 +17,7 @@ use gnss_twin::generator::vehicle::Motion;
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use gnss_twin::gnss::gps::l1ca::L1_CA;
+use gnss_twin::gnss::ionosphere::Coefficients;
 use gnss_twin::gnss::klobuchar::Klobuchar;
 use gnss_twin::gnss::record::Observation;
 use gnss_twin::gnss::rinex;
@@ -148,7 +149,7 @@ fn two_systems_whose_times_differ_give_one_place_and_a_clock_of_each() {
     }
     let noises = vec![(&L1_CA, noise()), (&OTHER, noise())];
     let solved = Solver::new(&PositionSettings::default(), noises, ideal.clock.rate)
-        .solve(SAMPLE, ideal.clock, &observations, &ideal.ephemerides(), Some(ideal.klobuchar))
+        .solve(SAMPLE, ideal.clock, &observations, &ideal.ephemerides(), Some(Coefficients::Klobuchar(ideal.klobuchar)))
         .unwrap();
     let truth = ideal.motion(ideal.clock.epoch(SAMPLE).plus_s(-BIAS_S));
     let off_m = (solved.fix.position_m() - truth.position_m).norm();
@@ -184,7 +185,13 @@ fn with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_t
         if known {
             solver.take_ahead(OTHER.time, ahead);
         }
-        solver.solve(SAMPLE, ideal.clock, observations, &ideal.ephemerides(), Some(ideal.klobuchar))
+        solver.solve(
+            SAMPLE,
+            ideal.clock,
+            observations,
+            &ideal.ephemerides(),
+            Some(Coefficients::Klobuchar(ideal.klobuchar)),
+        )
     };
     let truth = ideal.motion(at.plus_s(-BIAS_S)).position_m;
     let solved = solve(&observations, true).unwrap();
@@ -220,7 +227,7 @@ fn exact_ranges_give_the_exact_place_velocity_and_clock() {
     assert!(observations.len() >= 10);
     let solved = ideal
         .solver(&PositionSettings::default())
-        .solve(SAMPLE, ideal.clock, &observations, &ideal.ephemerides(), Some(ideal.klobuchar))
+        .solve(SAMPLE, ideal.clock, &observations, &ideal.ephemerides(), Some(Coefficients::Klobuchar(ideal.klobuchar)))
         .unwrap();
     let (fix, truth) = (&solved.fix, ideal.motion(ideal.clock.epoch(SAMPLE).plus_s(-BIAS_S)));
     let off_m = ideal.place.ecef_to_enu() * (fix.position_m() - truth.position_m);
@@ -243,7 +250,7 @@ fn the_covariance_is_the_inverse_of_the_weighted_geometry() {
     let settings = PositionSettings::default();
     let fix = ideal
         .solver(&settings)
-        .solve(SAMPLE, ideal.clock, &observations, &ideal.ephemerides(), Some(ideal.klobuchar))
+        .solve(SAMPLE, ideal.clock, &observations, &ideal.ephemerides(), Some(Coefficients::Klobuchar(ideal.klobuchar)))
         .unwrap()
         .fix;
     // Kaplan and Hegarty, eq. 5.23, written out for d = 0.5 chips, B = 1 Hz, T = 4 ms.
@@ -312,7 +319,10 @@ fn errors_of_independent_epochs_are_as_large_as_the_covariance_says() {
         let mut noisy = exact.clone();
         noisy.iter_mut().for_each(|observation| observation.pseudorange_m += sigma_m * normal.next());
         let mut solver = ideal.solver(&settings);
-        let fix = solver.solve(SAMPLE, ideal.clock, &noisy, &ephemerides, Some(ideal.klobuchar)).unwrap().fix;
+        let fix = solver
+            .solve(SAMPLE, ideal.clock, &noisy, &ephemerides, Some(Coefficients::Klobuchar(ideal.klobuchar)))
+            .unwrap()
+            .fix;
         let error_m = ideal.place.ecef_to_enu() * (fix.position_m() - ideal.place.to_ecef());
         let (e, n, u) = (fix.sigma_east_m, fix.sigma_north_m, fix.sigma_up_m);
         let (en, eu, nu) = (fix.correlation_en * e * n, fix.correlation_eu * e * u, fix.correlation_nu * n * u);
@@ -331,7 +341,13 @@ fn a_range_that_is_wrong_by_twenty_metres_is_excluded_and_no_other() {
         observations[wrong].pseudorange_m += 20.0;
         let solved = ideal
             .solver(&PositionSettings::default())
-            .solve(SAMPLE, ideal.clock, &observations, &ideal.ephemerides(), Some(ideal.klobuchar))
+            .solve(
+                SAMPLE,
+                ideal.clock,
+                &observations,
+                &ideal.ephemerides(),
+                Some(Coefficients::Klobuchar(ideal.klobuchar)),
+            )
             .unwrap();
         let names: Vec<Sv> = solved.excluded.iter().map(|(sv, _)| *sv).collect();
         assert_eq!(names, [observations[wrong].sv]);

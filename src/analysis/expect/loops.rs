@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
+use crate::analysis::expect::followed::Followed;
 use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::expect::theory::clock::PowerLaw;
 use crate::analysis::expect::theory::dll::{Discriminator, Taps};
@@ -65,10 +66,24 @@ impl Settings {
     }
 }
 
-/// Time of a loop's update in the tracking stage, by the settings, which count it in code periods.
+impl Settings {
+    /// These as the receiver fits them to a signal.
+    pub(in crate::analysis) fn fitted(self, followed: &Followed) -> Self {
+        Self {
+            spacing_chips: followed.spacing_chips.unwrap_or(self.spacing_chips),
+            pll_bandwidth_hz: followed.pll_bandwidth_hz.unwrap_or(self.pll_bandwidth_hz),
+            dll_bandwidth_hz: followed.dll_bandwidth_hz.unwrap_or(self.dll_bandwidth_hz),
+            ..self
+        }
+    }
+}
+
+/// Time of a loop's update in the tracking stage: as the receiver says it, or by its settings, which count it
+/// in code periods.
 pub fn update_s(run: &Run, signal: &Signal) -> Option<f64> {
+    let stated = || Followed::of(run, signal)?.integration_s;
     let counted = || Some(run.tracking_setting("integration")? * leading(signal)?.period_s());
-    counted().or(run.update_s)
+    stated().or_else(counted).or(run.update_s)
 }
 
 /// A loop of exact bandwidth whose roots all lie at one place; `None` where no such place is.
@@ -254,11 +269,11 @@ pub(in crate::analysis) struct Theory {
     pub update_s: f64,
     pub chip_m: f64,
     carrier_hz: f64,
-    /// Power of the component whose carrier is followed, over the signal's.
-    carrier_share: f64,
+    /// Power that the replica finds, over the signal's.
+    share: f64,
     pll: (PhaseLoop, Response),
     dll: (PhaseLoop, Response),
-    /// Of signal and noise.
+    /// Of the signal with the replica, and of the noise.
     peaks: (Peak, Peak),
     /// Of the code without any average.
     pub code: Code,
@@ -266,12 +281,14 @@ pub(in crate::analysis) struct Theory {
 }
 
 impl Theory {
-    /// `None` where a loop of these settings cannot follow the signal: no such loop is stable, or early and
-    /// late lie beyond the correlation's main peak.
+    /// `None` where a loop of these settings, as the receiver fits them to the signal, cannot follow it: no
+    /// such loop is stable, or early and late lie beyond the correlation's main peak.
     pub fn new(run: &Run, settings: Settings, link: &Link, update_s: f64) -> Option<Self> {
-        let waveform = Waveform::of(link.signal)?;
+        let followed = Followed::of(run, link.signal)?;
+        let settings = settings.fitted(&followed);
+        let [waveform, replica] = &followed.waveforms;
         let chip_rate_hz = waveform.chip_rate_hz();
-        let code = Code::of(&waveform);
+        let code = Code::of(waveform);
         if 0.5 * settings.spacing_chips >= code.reach_chips {
             return None;
         }
@@ -285,27 +302,36 @@ impl Theory {
             update_s,
             chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
             carrier_hz: link.carrier_hz(),
-            carrier_share: leading(link.signal)?.power_share,
+            share: followed.share,
             pll: (pll, Response::of(&pll)),
             dll: (dll, Response::of(&dll)),
             peaks: (
-                Peak::new(&waveform, width_chips, of_replica + of_signal),
-                Peak::new(&waveform, width_chips, 2 * of_replica),
+                Peak::new(waveform, width_chips, of_replica + of_signal),
+                Peak::new(replica, width_chips, 2 * of_replica),
             ),
             code,
             oscillator: run.scene.oscillator.map(|noise| PowerLaw { h: noise.h }),
         })
     }
 
-    /// Raw and thermal sigma, in the loop's unit. Carrier loops follow the leading component alone, for
-    /// others have data or overlays of their own; codes are taken from all.
+    /// Distance of early and late, in chips.
+    pub fn spacing_chips(&self) -> f64 {
+        self.settings.spacing_chips
+    }
+
+    /// Energy of what the replica finds in an update over the noise density, at the whole signal's C/N0.
+    pub fn snr(&self, cn0_hz: f64) -> f64 {
+        self.update_s * cn0_hz * self.share
+    }
+
+    /// Raw and thermal sigma, in the loop's unit, at the whole signal's C/N0.
     pub fn noise(&self, which: Loop, cn0_hz: f64) -> (f64, f64) {
-        let update_s = self.update_s;
-        let phase_rad = pll::raw_rad(update_s, cn0_hz * self.carrier_share);
+        let (update_s, snr) = (self.update_s, self.snr(cn0_hz));
+        let phase_rad = pll::raw_rad(update_s, cn0_hz * self.share);
         let (loop_, code) = (&self.pll.1, &self.dll.1);
         match which {
             Loop::Dll => {
-                let raw = raw_chips(&self.peaks.0, &self.peaks.1, self.settings.spacing_chips, update_s * cn0_hz);
+                let raw = raw_chips(&self.peaks.0, &self.peaks.1, self.settings.spacing_chips, snr);
                 (raw * code.put_out.sqrt(), raw * code.phase.sqrt())
             }
             // Observations fall anywhere in an interval, in which the phase runs at the loop's rate: x²·rate²
@@ -440,6 +466,7 @@ pub fn motion_error_deg(
     settings: Settings,
     update_s: f64,
 ) -> Result<Vec<(f64, f64)>, JudgeError> {
+    let settings = Followed::of(run, link.signal).map_or(settings, |followed| settings.fitted(&followed));
     let (Some(timeline), Some(closed)) =
         (Timeline::of(run, access, link)?, exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s))
     else {

@@ -8,8 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::analysis::read::Run;
 use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::gps::lnav::{Subframe, tables};
-use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::message::Message as Form;
 use crate::gnss::record::{Event, NavigationRow};
 use crate::gnss::satellite::Sv;
@@ -22,8 +21,8 @@ pub struct Message {
     sets: BTreeMap<Sv, Vec<(u32, Ephemeris)>>,
     /// From which sample on the receiver had which issue, ascending.
     read: BTreeMap<Sv, Vec<(u64, u32)>>,
-    /// The ionosphere's parameters, where they were sent.
-    pub klobuchar: Option<Klobuchar>,
+    /// The ionosphere's coefficients, where they were sent: one of a model.
+    ionospheres: Vec<Coefficients>,
 }
 
 /// A parameter that every set has.
@@ -45,10 +44,19 @@ impl Message {
             if let Some(set) = set(run, (*sv, name, *issue), &all, near).filter(|set| u32::from(set.iode) == *issue) {
                 message.sets.entry(*sv).or_default().push((*issue, set));
             }
-            message.klobuchar = message.klobuchar.or_else(|| klobuchar(rows));
+            if let Some(found) = ionosphere(run, (*sv, name), rows)
+                && message.ionosphere(found.model()).is_none()
+            {
+                message.ionospheres.push(found);
+            }
         }
         message.read = message.sets.keys().map(|sv| (*sv, read(run, *sv))).collect();
         message
+    }
+
+    /// The coefficients of a model of the ionosphere, where they were sent.
+    pub fn ionosphere(&self, model: Model) -> Option<&Coefficients> {
+        self.ionospheres.iter().find(|sent| sent.model() == model)
     }
 
     /// Whether every set of a satellite says that it is healthy.
@@ -83,16 +91,6 @@ fn read(run: &Run, sv: Sv) -> Vec<(u64, u32)> {
     completed.iter().enumerate().filter_map(|(index, sample)| Some((*sample, issue(index)?))).collect()
 }
 
-/// Ten words that carry those rows' parameters, and whether all of the table's are there.
-fn words(table: &str, rows: &[&NavigationRow]) -> Option<[u32; 10]> {
-    let mut data = [0; 10];
-    let fields = tables().into_iter().find(|(name, _)| name.starts_with(table))?.1;
-    for field in fields {
-        field.write(&mut data, rows.iter().find(|row| row.parameter == field.name)?.raw);
-    }
-    Some(data)
-}
-
 /// The set in those rows, by the message of one of the satellite's signals that has that name.
 fn set(run: &Run, (sv, name, issue): (Sv, &str, u32), rows: &[&NavigationRow], near: Epoch) -> Option<Ephemeris> {
     messages(run, sv).filter(|(message, _)| message.name == name).find_map(|(message, time)| {
@@ -111,14 +109,11 @@ fn messages(run: &Run, sv: Sv) -> impl Iterator<Item = (&'static Form, &'static 
     own.flat_map(|signal| signal.components.iter().filter_map(|c| Some((c.message?, signal.time))))
 }
 
-fn klobuchar(rows: &[&NavigationRow]) -> Option<Klobuchar> {
-    let data = words("ionosphere", rows)?;
-    // Page 18 of subframe 4 bears the identity 56 (IS-GPS-200N, table 20-V).
-    let mut page = Subframe { id: 4, tow_count: 0, alert: false, antispoof: false, data };
-    if let Some(word) = page.data.get_mut(2) {
-        *word |= 56 << 16;
-    }
-    page.klobuchar()
+/// What those rows say of the ionosphere, by the message of that name.
+fn ionosphere(run: &Run, (sv, name): (Sv, &str), rows: &[&NavigationRow]) -> Option<Coefficients> {
+    let raw = |name: &str| rows.iter().find(|row| row.parameter == name).map(|row| row.raw);
+    let (message, _) = messages(run, sv).find(|(message, _)| message.name == name)?;
+    (message.ionosphere.coefficients)(&raw)
 }
 
 /// Names of the parameters of a satellite's sets that bear their issue.

@@ -9,6 +9,7 @@
 //! times at which it took its rows.
 
 pub mod due;
+pub(in crate::analysis) mod followed;
 pub mod jamming;
 pub(in crate::analysis) mod loops;
 pub mod message;

@@ -14,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
+use crate::analysis::expect::loops::update_s;
 use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::expect::theory::pll;
 use crate::analysis::measure::errors::{Errors, Link, SLIP_CYCLES, SignalError, first_jump_of};
@@ -210,7 +211,7 @@ fn undeclared(all: &[SignalError], declared: &[u64]) -> Vec<(u64, f64)> {
 struct Evidence<'r> {
     run: &'r Run,
     access: MultipleAccess<'r>,
-    loop_: Option<(Settings, f64)>,
+    settings: Option<Settings>,
     least_dbhz: f64,
     interval_s: f64,
     last: u64,
@@ -232,7 +233,7 @@ impl Known {
         let Some(usual_dbhz) = median(&rows.iter().map(|row| row.cn0_dbhz).collect::<Vec<_>>()) else {
             return Ok(None);
         };
-        let motion_deg = match evidence.loop_ {
+        let motion_deg = match evidence.settings.zip(update_s(run, link.signal)) {
             Some((settings, update_s)) => motion_error_deg(run, &evidence.access, link, settings, update_s)?,
             None => Vec::new(),
         };
@@ -246,7 +247,7 @@ impl<'r> Evidence<'r> {
         Self {
             run,
             access: MultipleAccess::new(run),
-            loop_: Settings::of(run).zip(run.update_s),
+            settings: Settings::of(run),
             least_dbhz: run.tracking_setting("cn0_threshold_dbhz").unwrap_or(f64::NEG_INFINITY),
             interval_s: run.truth_interval_s(),
             last: run.trajectory.last().map_or(0, |row| row.sample),
@@ -290,10 +291,12 @@ impl<'r> Evidence<'r> {
         slip.interference_db = near.iter().map(|(cn0_dbhz, effective_dbhz)| cn0_dbhz - effective_dbhz).reduce(f64::max);
         let inside = motion_deg.iter().filter(|(t_s, _)| (time_s - back_s..=time_s).contains(t_s));
         slip.motion_deg = inside.map(|(_, error)| error.abs()).reduce(f64::max);
-        slip.noise_3sigma_deg = slip.cn0_dbhz.zip(self.loop_).map(|(dbhz, (settings, update_s))| {
-            let cn0_hz = libm::pow(10.0, dbhz / 10.0);
-            3.0 * pll::jitter_rad(settings.pll_bandwidth_hz, update_s, cn0_hz).to_degrees()
-        });
+        slip.noise_3sigma_deg = slip.cn0_dbhz.zip(self.settings.zip(update_s(self.run, link.signal))).map(
+            |(dbhz, (settings, update_s))| {
+                let cn0_hz = libm::pow(10.0, dbhz / 10.0);
+                3.0 * pll::jitter_rad(settings.pll_bandwidth_hz, update_s, cn0_hz).to_degrees()
+            },
+        );
         // No row within an interval and a half before: it has set, or something obstructs it.
         let before = rows.iter().rev().find(|row| row.sample <= sample);
         let absent = before.is_none_or(|row| time_s - run.time_s(row.sample) > 1.5 * self.interval_s);

@@ -5,6 +5,7 @@ pub mod ionosphere;
 pub mod link;
 pub mod mapping;
 pub mod multipath;
+pub mod nequick;
 pub mod obstruction;
 pub mod tec;
 pub mod transmit;

@@ -151,7 +151,7 @@ fn messages(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris
     let klobuchar = given.or(navigation.klobuchar);
     let common = Common {
         klobuchar,
-        nequick: navigation.nequick,
+        nequick: scenario.ionosphere.as_ref().and_then(Ionosphere::sent_nequick).or(navigation.nequick),
         utc,
         galileo: galileo_ahead(scenario, navigation),
         almanac,
@@ -198,7 +198,7 @@ pub(super) fn effects(
 ) -> Result<Vec<Box<dyn Effect>>, ScenarioError> {
     let mut effects: Vec<Box<dyn Effect>> = Vec::new();
     if let Some(ionosphere) = &scenario.ionosphere {
-        effects.push(ionosphere.effect(scenario, files, navigation.klobuchar, end_s)?);
+        effects.push(ionosphere.effect(scenario, files, navigation, end_s)?);
     }
     if let Some(troposphere) = &scenario.troposphere {
         effects.push(troposphere.effect(scenario, files)?);

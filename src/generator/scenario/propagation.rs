@@ -7,11 +7,14 @@ use super::read::Table;
 use super::{Scenario, ScenarioError};
 use crate::generator::effect::ionosphere::KlobucharIonosphere;
 use crate::generator::effect::mapping;
+use crate::generator::effect::nequick::NequickIonosphere;
 use crate::generator::effect::tec::{Content, EARTH_RADIUS_M, Mapping, Shell, ShellIonosphere};
 use crate::generator::effect::troposphere::{Air, Troposphere, Weather};
 use crate::generator::ray::Effect;
 use crate::gnss::ionex::{Interpolation, Maps};
 use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::nequick::NequickG;
+use crate::gnss::rinex::Navigation;
 use crate::gnss::time::Epoch;
 use crate::gnss::vienna::{Gpt3, MappingGrid, Vienna};
 use crate::gnss::vmf3::Vmf3;
@@ -23,6 +26,8 @@ pub struct Ionosphere {
     pub truth: Electrons,
     /// Coefficients that the satellites send; absent means those of `truth`, or else the navigation file's.
     pub broadcast: Option<Klobuchar>,
+    /// Coefficients of NeQuick-G that are sent in place of the true ones or the file's.
+    pub broadcast_ai: Option<[f64; 3]>,
 }
 
 /// Where the electrons are.
@@ -30,6 +35,8 @@ pub struct Ionosphere {
 pub enum Electrons {
     /// Klobuchar's model with the given coefficients, or those of the navigation file.
     Klobuchar(Option<Klobuchar>),
+    /// NeQuick-G with the given coefficients, or those of the navigation file.
+    NequickG(Option<[f64; 3]>),
     /// The same vertical content everywhere.
     Constant {
         /// Vertical content, in TECU.
@@ -51,7 +58,7 @@ pub enum Electrons {
 }
 
 pub(super) fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError> {
-    let models = [("klobuchar", 0), ("constant_tec", 1), ("ionex", 2)];
+    let models = [("klobuchar", 0), ("constant_tec", 1), ("ionex", 2), ("nequick_g", 3)];
     let model = table.need_choice("model", &models)?;
     let broadcast = coefficients(table, "broadcast_alpha", "broadcast_beta")?;
     let mappings = [("single_layer", Mapping::SingleLayer), ("modified_single_layer", Mapping::ModifiedSingleLayer)];
@@ -63,6 +70,7 @@ pub(super) fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError>
             let shell = Shell { radius_m: EARTH_RADIUS_M, height_m, mapping: mapping(table)? };
             Electrons::Constant { vtec_tecu: table.need("vtec_tecu")?, shell }
         }
+        3 => Electrons::NequickG(table.numbers("ai")?),
         _ => {
             let file = table.need_text("file")?;
             let start = table.instant("map_start")?;
@@ -75,7 +83,7 @@ pub(super) fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError>
             }
         }
     };
-    Ok(Ionosphere { truth, broadcast })
+    Ok(Ionosphere { truth, broadcast, broadcast_ai: table.numbers("broadcast_ai")? })
 }
 
 /// Klobuchar's coefficients, both lists or none.
@@ -97,23 +105,39 @@ impl Ionosphere {
         })
     }
 
-    /// The effect, with its file read; `file_klobuchar` is what the navigation file says, `end_s` the scene's
+    /// Coefficients of NeQuick-G that the satellites send, if the scenario says them.
+    pub(super) fn sent_nequick(&self) -> Option<[f64; 3]> {
+        self.broadcast_ai.or(match self.truth {
+            Electrons::NequickG(given) => given,
+            _ => None,
+        })
+    }
+
+    /// The effect, with its file read; `navigation` says what the scenario does not, `end_s` is the scene's
     /// end.
     pub(super) fn effect(
         &self,
         scenario: &Scenario,
         files: &Files<'_>,
-        file_klobuchar: Option<Klobuchar>,
+        navigation: &Navigation,
         end_s: f64,
     ) -> Result<Box<dyn Effect>, ScenarioError> {
         match &self.truth {
             Electrons::Klobuchar(given) => {
-                let model = given.or(file_klobuchar).ok_or_else(|| {
+                let model = given.or(navigation.klobuchar).ok_or_else(|| {
                     let reason = "the navigation file has no Klobuchar coefficients: write alpha and beta here, name a file that \
                                   has them, or remove [ionosphere]";
                     scenario.conflict("ionosphere", reason.to_owned())
                 })?;
                 Ok(Box::new(KlobucharIonosphere { model }))
+            }
+            Electrons::NequickG(given) => {
+                let coefficients = given.or(navigation.nequick).ok_or_else(|| {
+                    let reason = "the navigation file has no coefficients of NeQuick-G (GAL): write ai here, name a file that has \
+                                  them, or choose another model";
+                    scenario.conflict("ionosphere", reason.to_owned())
+                })?;
+                Ok(Box::new(NequickIonosphere { model: NequickG { coefficients } }))
             }
             Electrons::Constant { vtec_tecu, shell } => {
                 Ok(Box::new(ShellIonosphere { content: Content::Constant(*vtec_tecu), shell: *shell }))

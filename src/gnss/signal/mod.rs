@@ -314,9 +314,19 @@ impl Component {
         self.layers.iter().fold(1, |steps, layer| least_common_multiple(steps, layer.pulse.len().max(1)))
     }
 
-    /// How far from the carrier the main lobes of the spectrum reach.
+    /// The layer with the largest power over all chips; of equal ones the first.
+    pub fn strongest(&self) -> Option<&Layer> {
+        let power = |layer: &Layer| {
+            let covered = layer.chips.iter().filter(|&&covered| covered).count();
+            let share = if layer.chips.is_empty() { 1.0 } else { covered as f64 / layer.chips.len() as f64 };
+            layer.weight * layer.weight * share
+        };
+        self.layers.iter().rev().max_by(|a, b| power(a).total_cmp(&power(b)))
+    }
+
+    /// How far from the carrier the main lobes of the spectrum reach: those of the strongest layer.
     pub fn lobe_hz(&self) -> f64 {
-        self.chip_rate_hz * self.layers.iter().fold(0.0_f64, |most, layer| most.max(layer.lobe_chips()))
+        self.chip_rate_hz * self.strongest().map_or(0.0, Layer::lobe_chips)
     }
 
     /// Correlation and spectrum of the waveform.
@@ -426,7 +436,8 @@ mod tests {
         assert_eq!(pulse(&[1, -1, -1, 1]), 2.0);
         assert_eq!(pulse(&[1, -1, -1, 1, 1, -1, -1, 1]), 3.0);
         assert_eq!(pulse(&[1, 1, 1]), 1.0);
-        assert_eq!(synthetic::MIXED.lobe_hz(), 7.0 * 1.023e6);
+        // A tenth of the power in BOC(6,1) reaches further.
+        assert_eq!(synthetic::MIXED.lobe_hz(), 2.0 * 1.023e6);
         assert_eq!(synthetic::CHANNELS.carriers_hz(), (1_598_062_500.0, 1_605_375_000.0));
     }
 

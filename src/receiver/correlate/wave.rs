@@ -38,14 +38,9 @@ pub fn fits(component: &Component) -> bool {
     (64..super::MOST_STEPS).contains(&(component.code_chips as usize * each))
 }
 
-/// The layer with the largest power over all chips; of equal ones the first.
+/// The layer that replicas are made of.
 pub fn strongest(component: &Component) -> Option<&Layer> {
-    let power = |layer: &Layer| {
-        let covered = layer.chips.iter().filter(|&&covered| covered).count();
-        let share = if layer.chips.is_empty() { 1.0 } else { covered as f64 / layer.chips.len() as f64 };
-        layer.weight * layer.weight * share
-    };
-    component.layers.iter().rev().max_by(|a, b| power(a).total_cmp(&power(b)))
+    component.strongest()
 }
 
 #[cfg(test)]

@@ -25,7 +25,8 @@ fn bits(start: Epoch, set: &Ephemeris, subframes: i64) -> Vec<bool> {
 fn feed(decoder: &mut Decoder, bits: &[bool], first_period: u64, near: Epoch) -> Vec<(usize, News)> {
     let mut all = Vec::new();
     for (k, bit) in bits.iter().enumerate() {
-        let symbol = Symbol { first_period: first_period + 20 * k as u64, soft: if *bit { -9.0 } else { 9.0 } };
+        let soft = if *bit { -9.0 } else { 9.0 };
+        let symbol = Symbol { first_period: first_period + 20 * k as u64, end: 0, soft };
         all.extend(decoder.take(&symbol, near).into_iter().map(|news| (k, news)));
     }
     all

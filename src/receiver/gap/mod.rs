@@ -245,6 +245,18 @@ impl Edges {
         self.products.len() as u64
     }
 
+    /// Products that were taken.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// These products and those of a later time, of the same symbols or overlay.
+    pub fn and(mut self, later: &Self) -> Self {
+        self.products.iter_mut().zip(&later.products).for_each(|(sum, product)| *sum += product);
+        self.count += later.count;
+        self
+    }
+
     /// Takes the product of the prompt of code period `number` and the one before, noise of unit variance a
     /// component.
     pub fn add(&mut self, number: u64, product: f64) {

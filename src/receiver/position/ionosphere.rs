@@ -12,8 +12,12 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
-use crate::gnss::earth::{Look, SPEED_OF_LIGHT_MPS};
+use super::least_squares::{IONOSPHERE_TOP_M, Range};
+use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
 use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::nequick;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
 
 /// Coefficients of the nominal ionosphere: even in magnetic latitude, with a period of 100 000 s.
 ///
@@ -35,6 +39,29 @@ const INDEPENDENT_SHARE: f64 = 0.25;
 /// Angles at the Earth's centre, northwards and eastwards, over which the error changes by its own deviation:
 /// the crests of the equatorial anomaly are 10° wide, and an hour of local time is 15°.
 const GRADIENT_RAD: [f64; 2] = [10.0 / 180.0 * PI, 20.0 / 180.0 * PI];
+
+/// The delays that a model foresees.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Delays {
+    /// By a formula for every place.
+    Klobuchar(Klobuchar),
+    /// By the electrons on the way to each satellite, in TECU, from near where the receiver is.
+    Electrons(Vec<(Sv, f64)>),
+}
+
+impl Delays {
+    /// Delay of a range that is received at a place from a direction, in seconds.
+    pub fn delay_s(&self, range: &Range, user: Geodetic, look: Look, received: Epoch) -> f64 {
+        match self {
+            Self::Klobuchar(_) if user.height_m > IONOSPHERE_TOP_M => 0.0,
+            Self::Klobuchar(model) => model.delay_s(user, look, received, range.carrier_hz),
+            Self::Electrons(contents) => {
+                let own = contents.iter().find(|(sv, _)| *sv == range.sv);
+                own.map_or(0.0, |(_, tecu)| nequick::delay_s(*tecu, range.carrier_hz))
+            }
+        }
+    }
+}
 
 /// Standard deviation of a modelled vertical delay.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,11 +12,10 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Matrix4, MatrixXx3, Vector3,
 
 use crate::gnss::broadcast::{ClockState, State};
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_earth};
-use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, GPST, TimeScale};
-use crate::receiver::position::ionosphere::DelayError;
+use crate::receiver::position::ionosphere::{DelayError, Delays, NOMINAL};
 use crate::receiver::position::{NoFix, troposphere};
 
 /// Unknown coordinates; each time scale adds a clock.
@@ -35,7 +34,7 @@ const NEAR_EARTH_M: f64 = 6.2e6;
 /// Above this there is no horizon: no mask, and models that are as good in every direction.
 pub const SPACE_M: f64 = 1e5;
 /// Klobuchar's model describes the whole ionosphere, which ends about here.
-const IONOSPHERE_TOP_M: f64 = 1e6;
+pub const IONOSPHERE_TOP_M: f64 = 1e6;
 
 /// A pseudorange and where its satellite was.
 #[derive(Clone, Debug)]
@@ -68,18 +67,18 @@ pub struct Range {
 }
 
 /// What is known of the ionosphere.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Ionosphere {
     /// There is none.
     Absent,
     /// The model is right but for what [`Corrections::model_sigma_m`] covers.
-    Known(Klobuchar),
+    Known(Delays),
     /// The model has an error that is common to all satellites: it is estimated with the position.
-    Uncertain(Klobuchar, DelayError),
+    Uncertain(Delays, DelayError),
 }
 
 /// What corrects and weights ranges.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Corrections {
     /// The ionosphere's model.
     pub ionosphere: Ionosphere,
@@ -268,19 +267,21 @@ fn atmosphere(
     let delay_m = if corrections.troposphere { troposphere::delay_m(user, sine, day) } else { 0.0 };
     let delay_m = planted!("receiver.position.troposphere", delay_m, 1.02 * delay_m);
     let alone = Air { delay_m, ..Air::default() };
-    if range.is_combined || user.height_m > IONOSPHERE_TOP_M {
+    if range.is_combined {
         return alone;
     }
-    match corrections.ionosphere {
+    match &corrections.ionosphere {
         Ionosphere::Absent => alone,
-        Ionosphere::Known(model) => {
-            let delay_s = model.delay_s(user, direction, received, range.carrier_hz);
+        Ionosphere::Known(delays) => {
+            let delay_s = delays.delay_s(range, user, direction, received);
             let delay_s = planted!("receiver.position.ionosphere", delay_s, 0.9 * delay_s);
             Air { delay_m: delay_m + SPEED_OF_LIGHT_MPS * delay_s, ..alone }
         }
-        Ionosphere::Uncertain(model, error) => {
-            let delay_s = model.delay_s(user, direction, received, range.carrier_hz);
-            let obliquity = model.bulge(user, direction, received).obliquity;
+        // Above all electrons there is no error of them.
+        Ionosphere::Uncertain(_, _) if user.height_m > IONOSPHERE_TOP_M => alone,
+        Ionosphere::Uncertain(delays, error) => {
+            let delay_s = delays.delay_s(range, user, direction, received);
+            let obliquity = NOMINAL.bulge(user, direction, received).obliquity;
             let (common_m, own_m) = error.slant_m(delay_s, obliquity, direction);
             Air { delay_m: delay_m + SPEED_OF_LIGHT_MPS * delay_s, common_m, own_m }
         }

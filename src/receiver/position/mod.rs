@@ -15,7 +15,7 @@ use thiserror::Error;
 
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::record::{ClockRow, Fix, IonosphereModel, Observation};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
@@ -24,6 +24,7 @@ use crate::receiver::described::described;
 use crate::receiver::track::loops::CodeShape;
 
 pub mod combination;
+mod electrons;
 pub mod exclusion;
 pub mod ionosphere;
 pub mod least_squares;
@@ -34,8 +35,9 @@ pub mod smooth;
 mod tests;
 pub mod troposphere;
 
+use electrons::Electrons;
 pub use exclusion::{Consistent, chi_square_threshold, consistent};
-use ionosphere::{DelayError, NOMINAL, NOMINAL_ERROR};
+use ionosphere::{DelayError, Delays, NOMINAL, NOMINAL_ERROR};
 use least_squares::{
     COORDINATES, Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, Solution, freedom, scales,
 };
@@ -49,11 +51,31 @@ pub enum IonosphereChoice {
     /// Where a satellite is observed on two carriers by the combination of both that has none; else as
     /// `Broadcast`.
     Combined,
-    /// Klobuchar's model with the parameters that satellites send; until they are decoded, a nominal
-    /// ionosphere and its error.
+    /// By the model that satellites send: Klobuchar's where signals are received that bring it, else
+    /// NeQuick-G. Until its coefficients are decoded, by a nominal ionosphere and its error.
     Broadcast,
+    /// The same by Klobuchar's model and no other.
+    Klobuchar,
+    /// The same by NeQuick-G and no other.
+    NequickG,
     /// Not at all: recordings made without an ionosphere.
     None,
+}
+
+impl IonosphereChoice {
+    /// The model whose coefficients correct, where signals are received that bring them.
+    pub fn model(self, signals: &[&'static Signal]) -> Option<Model> {
+        let brought = |model: Model| {
+            let messages = signals.iter().flat_map(|signal| signal.components.iter().filter_map(|c| c.message));
+            messages.into_iter().any(|message| message.ionosphere.model == model).then_some(model)
+        };
+        match self {
+            Self::None => None,
+            Self::Klobuchar => Some(Model::Klobuchar),
+            Self::NequickG => Some(Model::NequickG),
+            Self::Combined | Self::Broadcast => brought(Model::Klobuchar).or_else(|| brought(Model::NequickG)),
+        }
+    }
 }
 
 /// How the troposphere is corrected.
@@ -91,7 +113,8 @@ pub struct PositionSettings {
     /// sine.
     pub model_sigma_m: f64,
     /// How the ionosphere is corrected: combined for two carriers of a satellite where there are two, and
-    /// else the model; broadcast for the model alone; none.
+    /// else the model; broadcast for the model alone, Klobuchar's if received signals bring it and else
+    /// NeQuick-G; klobuchar or nequick_g for that one; none.
     pub ionosphere: IonosphereChoice,
     /// Standard deviation of the broadcast ionosphere's error as a share of its delay, common to all
     /// satellites: about 0.5 under a real sky, of whose ionosphere the model removes half; 0 where satellites
@@ -251,6 +274,7 @@ pub struct Solver {
     settings: PositionSettings,
     noises: Noises,
     smoother: Smoother,
+    electrons: Electrons,
     rate: Rate,
     last_m: Option<Vector3<f64>>,
     ready_since: Option<u64>,
@@ -269,6 +293,7 @@ impl Solver {
             settings: settings.clone(),
             noises,
             smoother,
+            electrons: Electrons::default(),
             rate,
             last_m: None,
             ready_since: None,
@@ -306,7 +331,7 @@ impl Solver {
         clock: SampleClock,
         observations: &[Observation],
         ephemerides: &BTreeMap<Sv, Ephemeris>,
-        klobuchar: Option<Klobuchar>,
+        sent: Option<Coefficients>,
     ) -> Result<Solved, NoFix> {
         let ranges = self.ranges(observations, ephemerides);
         if freedom(&ranges) < 0 || ranges.is_empty() {
@@ -314,15 +339,22 @@ impl Solver {
             return Err(NoFix::TooFew { have: ranges.len(), need });
         }
         if ranges.iter().any(|range| !range.is_combined) {
-            self.await_ionosphere(sample, klobuchar)?;
+            self.await_ionosphere(sample, sent.is_some())?;
         }
-        let (ionosphere, model) = self.ionosphere(klobuchar);
-        let corrections = Corrections {
-            ionosphere,
+        let mut corrections = Corrections {
+            ionosphere: Ionosphere::Absent,
             troposphere: self.settings.troposphere == TroposphereChoice::Standard,
             model_sigma_m: self.settings.model_sigma_m,
         };
-        let start_m = self.last_m.unwrap_or_else(Vector3::zeros);
+        // An integral along the line of sight wants to know where that is.
+        let start_m = match (self.last_m, sent) {
+            (None, Some(Coefficients::NequickG(_))) => {
+                least_squares::position(&ranges, Vector3::zeros(), &corrections)?.position_m
+            }
+            (last_m, _) => last_m.unwrap_or_else(Vector3::zeros),
+        };
+        let (ionosphere, model) = self.ionosphere(sent, &ranges, &start_m);
+        corrections.ionosphere = ionosphere;
         let first = least_squares::position(&ranges, start_m, &corrections);
         // A stale estimate may be too far away for its atmosphere.
         let first = match (first, self.last_m) {
@@ -352,21 +384,35 @@ impl Solver {
         Ok(Solved { fix, clocks, used, excluded })
     }
 
-    /// What corrects for the ionosphere, and its name in a fix.
-    fn ionosphere(&self, klobuchar: Option<Klobuchar>) -> (Ionosphere, IonosphereModel) {
-        let share = self.settings.ionosphere_error_share;
-        match (self.settings.ionosphere, klobuchar) {
-            (IonosphereChoice::None, _) => (Ionosphere::Absent, IonosphereModel::None),
-            (_, None) => (Ionosphere::Uncertain(NOMINAL, NOMINAL_ERROR), IonosphereModel::Nominal),
-            (_, Some(model)) if share > 0.0 => {
-                (Ionosphere::Uncertain(model, DelayError { share, least_m: 0.0 }), IonosphereModel::Broadcast)
-            }
-            (_, Some(model)) => (Ionosphere::Known(model), IonosphereModel::Broadcast),
+    /// What corrects for the ionosphere near a place, and its name in a fix.
+    fn ionosphere(
+        &mut self,
+        sent: Option<Coefficients>,
+        ranges: &[Range],
+        place_m: &Vector3<f64>,
+    ) -> (Ionosphere, IonosphereModel) {
+        if self.settings.ionosphere == IonosphereChoice::None {
+            return (Ionosphere::Absent, IonosphereModel::None);
         }
+        let (delays, model) = match sent {
+            None => {
+                let nominal = Ionosphere::Uncertain(Delays::Klobuchar(NOMINAL), NOMINAL_ERROR);
+                return (nominal, IonosphereModel::Nominal);
+            }
+            Some(Coefficients::Klobuchar(model)) => (Delays::Klobuchar(model), IonosphereModel::Broadcast),
+            Some(Coefficients::NequickG(model)) => {
+                (Delays::Electrons(self.electrons.of(model, ranges, place_m)), IonosphereModel::NequickG)
+            }
+        };
+        let share = self.settings.ionosphere_error_share;
+        if share > 0.0 {
+            return (Ionosphere::Uncertain(delays, DelayError { share, least_m: 0.0 }), model);
+        }
+        (Ionosphere::Known(delays), model)
     }
 
-    fn await_ionosphere(&mut self, sample: u64, klobuchar: Option<Klobuchar>) -> Result<(), NoFix> {
-        if klobuchar.is_some() || self.settings.ionosphere == IonosphereChoice::None {
+    fn await_ionosphere(&mut self, sample: u64, is_known: bool) -> Result<(), NoFix> {
+        if is_known || self.settings.ionosphere == IonosphereChoice::None {
             return Ok(());
         }
         let since = *self.ready_since.get_or_insert(sample);

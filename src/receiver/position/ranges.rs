@@ -33,7 +33,7 @@ impl Solver {
             observations.iter().map(|row| (row.link(), self.smoother.smooth(row))).collect();
         let used = match self.settings.ionosphere {
             IonosphereChoice::Combined => paired(&known),
-            IonosphereChoice::Broadcast | IonosphereChoice::None => known.iter().map(Used::Single).collect(),
+            _ => known.iter().map(Used::Single).collect(),
         };
         let mut one = |used: &Used<'_>| {
             let row = match used {

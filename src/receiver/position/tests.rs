@@ -1,6 +1,6 @@
 use nalgebra::{Vector3, Vector4};
 
-use super::ionosphere::{DelayError, NOMINAL, NOMINAL_ERROR};
+use super::ionosphere::{DelayError, Delays, NOMINAL, NOMINAL_ERROR};
 use super::least_squares::{Corrections, Ionosphere, Range, position};
 use super::{NoFix, chi_square_threshold, consistent};
 use crate::gnss::broadcast::{ClockState, State};
@@ -184,7 +184,8 @@ fn nominal(&(azimuth_deg, elevation_deg): &(f64, f64), error: DelayError) -> (f6
 fn the_covariance_holds_an_ionospheric_error_that_all_satellites_share() {
     let truth_m = place().to_ecef();
     let up = place().ecef_to_enu().row(2).transpose();
-    let corrections = Corrections { ionosphere: Ionosphere::Uncertain(NOMINAL, NOMINAL_ERROR), ..BARE };
+    let corrections =
+        Corrections { ionosphere: Ionosphere::Uncertain(Delays::Klobuchar(NOMINAL), NOMINAL_ERROR), ..BARE };
     let (mut state, runs) = (5, 4000);
     let axes = place().ecef_to_enu();
     let (mut nees, mut chi_square, mut squares, mut stated, mut north) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -225,7 +226,10 @@ fn a_model_without_error_is_solved_as_a_known_one() {
     }
     let none = DelayError { share: 0.0, least_m: 0.0 };
     let at = |ionosphere| position(&all, Vector3::zeros(), &Corrections { ionosphere, ..BARE }).unwrap();
-    let (known, uncertain) = (at(Ionosphere::Known(NOMINAL)), at(Ionosphere::Uncertain(NOMINAL, none)));
+    let (known, uncertain) = (
+        at(Ionosphere::Known(Delays::Klobuchar(NOMINAL))),
+        at(Ionosphere::Uncertain(Delays::Klobuchar(NOMINAL), none)),
+    );
     assert_eq!((known.position_m, known.covariance), (uncertain.position_m, uncertain.covariance));
     assert_eq!(uncertain.ionosphere_error, Vector3::zeros());
 }

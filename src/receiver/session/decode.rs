@@ -8,13 +8,17 @@ use crate::gnss::satellite::Sv;
 use crate::receiver::decode::News;
 use crate::receiver::outcome::ReceiveError;
 use crate::receiver::output::{Record, Sink};
-use crate::receiver::source::Packed;
 
 impl Session {
-    /// Gives the symbols of all front ends, which were followed through `blocks`, to their decoders.
-    pub(super) fn decode(&mut self, blocks: &[Packed], sink: &mut dyn Sink) -> Result<(), ReceiveError> {
-        for (front_end, block) in self.front_ends.iter_mut().zip(blocks) {
-            front_end.decode(block.end(), &mut self.shared, sink)?;
+    /// Gives the decoders the symbols that ended by a tick of the running block, or all that are left of it.
+    /// What is measured at a tick knows no message of later samples, however long the blocks are.
+    pub(super) fn decode(&mut self, tick: Option<u64>, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        for front_end in &mut self.front_ends {
+            let own = tick.map(|main| {
+                let known = front_end.ticks.iter().find(|tick| tick.main == main);
+                known.map_or_else(|| front_end.step.own(main), |tick| tick.own)
+            });
+            front_end.decode(own.unwrap_or(u64::MAX), &mut self.shared, sink)?;
         }
         self.drop_echoes();
         Ok(())
@@ -51,27 +55,25 @@ impl Session {
 }
 
 impl FrontEnd {
-    /// Gives every symbol to its decoder and takes in what comes out; `end` is the sample after those that
-    /// were followed.
-    fn decode(&mut self, end: u64, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    /// Gives every symbol that ended before the sample `until` to its decoder and takes in what comes out.
+    fn decode(&mut self, until: u64, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let sink = &mut Counted { sink, step: self.step, ticks: &[] };
         for track in &mut self.tracks {
             let near = shared.near();
             let (sv, signal) = (track.channel.sv(), track.channel.signal());
             let Some(decoder) = &mut track.decoder else { continue };
             let slipped = track.report.events.iter().any(|(_, event)| *event == Event::CycleSlip);
-            // The last tick, or where the block ends that had none.
-            let sample = track.report.measurements.last().map_or(end.saturating_sub(1), |last| last.sample);
             let mut all = Vec::new();
-            for symbol in &track.report.symbols {
+            let ended = track.report.symbols.partition_point(|symbol| symbol.end <= until);
+            for symbol in track.report.symbols.drain(..ended) {
                 track.symbols += 1;
-                all.extend(decoder.take(symbol, near));
+                all.extend(decoder.take(&symbol, near).into_iter().map(|news| (symbol.end, news)));
             }
             let progress = shared.progress.entry(sv).or_default();
             progress.symbols |= track.symbols > 0;
             progress.frame |= decoder.is_synchronised();
             progress.missing = decoder.missing();
-            for news in all {
+            for (sample, news) in all {
                 let event = match news {
                     News::FrameSynchronised => Some(Event::FrameSynchronised),
                     News::Polarity { inverted } => {
@@ -85,10 +87,12 @@ impl FrontEnd {
                         shared.timebase.take_time(time);
                         None
                     }
-                    News::Klobuchar(klobuchar) => {
-                        let before = shared.klobuchar.replace(klobuchar);
-                        (before != Some(klobuchar)).then_some(Event::IonosphereDecoded)
+                    // Of several models the receiver takes one.
+                    News::Ionosphere(sent) if shared.ionosphere_model == Some(sent.model()) => {
+                        let before = shared.ionosphere.replace(sent);
+                        (before != Some(sent)).then_some(Event::IonosphereDecoded)
                     }
+                    News::Ionosphere(_) => None,
                     News::Parameters(rows) => {
                         sink.take(Record::Navigation(rows))?;
                         None

@@ -39,7 +39,7 @@ impl Session {
         }
         let Some(clock) = shared.timebase.clock() else { return Ok(()) };
         let observations: Vec<Observation> = observed.into_iter().map(|one| one.observation).collect();
-        match shared.solver.solve(tick, clock, &observations, &shared.ephemerides, shared.klobuchar) {
+        match shared.solver.solve(tick, clock, &observations, &shared.ephemerides, shared.ionosphere) {
             Ok(solved) => {
                 if let Some(first) = self.front_ends.first_mut()
                     && first.clock_jumped(&solved.fix, shared, sink)?

@@ -92,13 +92,14 @@ impl Session {
             front_end.process(block, &mut self.shared, sink)?;
         }
         self.keep_step();
-        self.decode(blocks, sink)?;
         for tick in measured {
+            self.decode(Some(tick), sink)?;
             // Nothing is right while codes are not where they were to be.
             if !self.front_ends.iter().any(|front_end| front_end.gap.is_busy()) {
                 self.measure(tick, sink)?;
             }
         }
+        self.decode(None, sink)?;
         for (front_end, block) in self.front_ends.iter_mut().zip(blocks) {
             front_end.close(block, &mut self.shared, sink)?;
         }

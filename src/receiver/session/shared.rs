@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, Rate};
@@ -41,7 +41,9 @@ pub(super) struct Shared {
     pub timebase: Timebase,
     pub solver: Solver,
     pub ephemerides: BTreeMap<Sv, Ephemeris>,
-    pub klobuchar: Option<Klobuchar>,
+    /// The model by which it corrects the ionosphere, if by one, and its coefficients.
+    pub ionosphere_model: Option<Model>,
+    pub ionosphere: Option<Coefficients>,
     pub last_fix: Option<LastFix>,
     pub clock_drift: Option<f64>,
     pub fixes: u64,
@@ -72,7 +74,8 @@ impl Shared {
             solver: Solver::new(&settings.position, noises.clone(), rate),
             noises,
             ephemerides: BTreeMap::new(),
-            klobuchar: None,
+            ionosphere_model: settings.position.ionosphere.model(&settings.acquisition.signals()),
+            ionosphere: None,
             last_fix: None,
             clock_drift: None,
             fixes: 0,

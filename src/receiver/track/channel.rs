@@ -38,7 +38,7 @@ mod supervise;
 
 use pilot::Data;
 use side::SidePeaks;
-use supervise::pilot_group;
+pub use supervise::pilot_group;
 
 pub use reseat::Glance;
 use reseat::Glances;

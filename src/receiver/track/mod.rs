@@ -27,7 +27,7 @@ mod sync;
 #[cfg(test)]
 mod tests;
 
-pub use channel::{Channel, Glance};
+pub use channel::{Channel, Glance, pilot_group};
 pub use model::ReplicaModel;
 pub use settings::{CodeDiscriminator, LoopMargin, TrackingSettings, TrackingSettingsError};
 
@@ -74,6 +74,8 @@ pub struct Measurement {
 pub struct Symbol {
     /// The channel's number of the code period in which the symbol began.
     pub first_period: u64,
+    /// The sample after its last one.
+    pub end: u64,
     /// In-phase prompt summed over the symbol, in standard deviations of the noise of that sum: its sign is
     /// the bit.
     pub soft: f32,

@@ -110,7 +110,8 @@ impl Scene<'_> {
 
     /// Whether the message cannot be read without errors.
     fn garbled(&self, sv: Sv, time_s: f64) -> bool {
-        self.of(sv, &[FaultKind::BitErrors, FaultKind::Bit, FaultKind::Alert]).any(|fault| during(fault, time_s, HEALTH_S))
+        self.of(sv, &[FaultKind::BitErrors, FaultKind::Bit, FaultKind::Alert])
+            .any(|fault| during(fault, time_s, HEALTH_S))
     }
 
     /// Whether the satellite must not, or need not, be used.

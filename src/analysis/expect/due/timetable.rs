@@ -62,7 +62,7 @@ impl Timetable {
 
     /// When the ionosphere has arrived whole; never, where the message does not carry it.
     pub fn ionosphere_by_s(&self, locked_s: f64) -> f64 {
-        self.whole_by_s(locked_s, |message, start| (message.ionosphere)(start))
+        self.whole_by_s(locked_s, |message, start| (message.ionosphere.unit)(start))
     }
 }
 

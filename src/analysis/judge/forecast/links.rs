@@ -248,7 +248,7 @@ impl<'a> One<'a> {
         let code_m = rows
             .iter()
             .map(|row| {
-                rays.get(&row.sample).map_or(0.0, |r| multipath::error_chips(&theory.code, r, settings.spacing_chips))
+                rays.get(&row.sample).map_or(0.0, |r| multipath::error_chips(&theory.code, r, theory.spacing_chips()))
             })
             .map(|chips| chips * theory.chip_m)
             .collect();
@@ -335,7 +335,7 @@ impl<'a> One<'a> {
         links.put(bias, &self.name, middle.abs(), CN0_DB + self.ray_db);
         // A noise power of n values is known to 4.34·√(2/n) dB; the averages hold a second of updates.
         let updates = (1.0 / self.theory.update_s).max(2.0);
-        let weak = 1.0 + 1.0 / (self.cn0_hz * self.theory.update_s);
+        let weak = 1.0 + 1.0 / self.theory.snr(self.cn0_hz);
         let sigma_db = 4.343 * (2.0 / updates).sqrt() * weak;
         let largest_db = self.rows.iter().map(|row| off(row).abs()).fold(0.0, f64::max);
         links.put(most, &self.name, largest_db, CN0_DB + self.ray_db + largest(1, self.rows.len()) * sigma_db);
@@ -371,7 +371,7 @@ impl<'a> One<'a> {
         links.put(Figure::LoopCn0Bias, &self.name, (mean(&|row| row.cn0_dbhz) - cn0_dbhz).abs(), CN0_DB + self.ray_db);
         // In units of noise per component a prompt has the mean power 2 + 2·T·C/N0.
         let power = mean(&|row| row.prompt_i * row.prompt_i + row.prompt_q * row.prompt_q);
-        let snr = self.theory.update_s * self.cn0_hz;
+        let snr = self.theory.snr(self.cn0_hz);
         let off_db = 10.0 * libm::log10((0.5 * power - 1.0).max(1e-3) / snr);
         let random_db = 4.343 * largest(1, 1) * (2.0 / (snr * count)).sqrt();
         if self.white {

@@ -1,7 +1,7 @@
 //! Bias and noise of each range that a fix may use.
 //!
 //! Bias: the true range, all of the scene's delays in it, less what a receiver computes from the message as
-//! sent (orbit, clock, Klobuchar) and the true troposphere; and what smoothing makes of code and carrier that
+//! sent (orbit, clock, ionosphere) and the true troposphere; and what smoothing makes of code and carrier that
 //! part. Noise: theory of the code loop at the true C/N0, other codes and interference counted, through
 //! Hatch's filter. Apart from these: chip edges between samples, and reflected rays. Limits: the difference
 //! of the receiver's troposphere from the true one is a stated share of it.
@@ -23,7 +23,8 @@ use crate::analysis::read::Run;
 use crate::analysis::waveform::Edge;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
-use crate::gnss::record::{Event, Observation, RayRow, SkyRow, TrajectoryRow};
+use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::record::{Event, IonosphereModel, Observation, RayRow, SkyRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal};
 use crate::gnss::time::GPST;
@@ -41,8 +42,8 @@ pub struct Choices {
     pub mask_rad: f64,
     /// Deviation of the receiver's models of the atmosphere at the zenith, metres.
     pub model_sigma_m: f64,
-    /// Whether it corrects the ionosphere by the broadcast model.
-    pub ionosphere: bool,
+    /// By which broadcast model it corrects the ionosphere, if by one.
+    pub ionosphere: Option<Model>,
     /// Of the ionosphere's model, as a share of its delay.
     pub ionosphere_error_share: f64,
 }
@@ -53,13 +54,21 @@ impl Choices {
         let position = run.receiver.get("settings")?.get("position")?;
         let number = |key: &str| position.get(key)?.as_f64();
         let word = |key: &str| position.get(key)?.as_str();
+        let used = |model: IonosphereModel| run.fixes.iter().any(|fix| fix.ionosphere == model);
+        let ionosphere = match word("ionosphere")? {
+            "none" => None,
+            "nequick_g" => Some(Model::NequickG),
+            "klobuchar" => Some(Model::Klobuchar),
+            _ if used(IonosphereModel::NequickG) => Some(Model::NequickG),
+            _ => Some(Model::Klobuchar),
+        };
         Some(Self {
             loops: Settings::of(run)?,
             updates_s: updates_s(run)?,
             smoothing_s: number("smoothing_s")?,
             mask_rad: number("mask_deg")?.to_radians(),
             model_sigma_m: number("model_sigma_m")?,
-            ionosphere: word("ionosphere")? != "none",
+            ionosphere,
             ionosphere_error_share: number("ionosphere_error_share").unwrap_or(0.0),
         })
     }
@@ -246,7 +255,7 @@ impl<'r> Scene<'r> {
         self.run.rays.each(link, |row: RayRow| {
             groups.entry(row.sample).or_default().push(multipath::ray(&row, theory.chip_m));
         })?;
-        let spacing = self.choices.loops.spacing_chips;
+        let spacing = theory.spacing_chips();
         Ok(groups
             .into_iter()
             .map(|(at, rays)| (at, theory.chip_m * multipath::error_chips(&theory.code, &rays, spacing)))
@@ -264,11 +273,14 @@ impl<'r> Scene<'r> {
         }
         let ephemeris = self.message.ephemeris(true_row.sv, (row.sample, place.time()))?;
         let look = Look { azimuth_rad: sky.azimuth_deg.to_radians(), elevation_rad };
-        let computed_m = computed_m(ephemeris, true_row, place)?;
-        let ionosphere_m = match self.message.klobuchar.filter(|_| user.height_m <= IONOSPHERE_TOP_M) {
+        let (satellite_m, computed_m) = computed_m(ephemeris, true_row, place)?;
+        let carrier_hz = true_row.link().carrier_hz();
+        let sent = self.choices.ionosphere.and_then(|model| self.message.ionosphere(model));
+        let reached = |own: &&Coefficients| own.model() != Model::Klobuchar || user.height_m <= IONOSPHERE_TOP_M;
+        let ionosphere_m = match sent.filter(reached) {
             // A correction of what the scene does not have is an error, not an expectation.
-            Some(model) if self.choices.ionosphere && sky.ionosphere_m != 0.0 => {
-                SPEED_OF_LIGHT_MPS * model.delay_s(user, look, place.time(), true_row.link().carrier_hz())
+            Some(model) if sky.ionosphere_m != 0.0 => {
+                SPEED_OF_LIGHT_MPS * model.delay_s((user, look), &satellite_m, place.time(), carrier_hz)
             }
             _ => 0.0,
         };
@@ -326,7 +338,7 @@ fn scales(run: &Run) -> Vec<&'static str> {
 
 /// What a receiver computes of a range from the message alone: geometry, light time, Earth rotation and
 /// satellite clock.
-fn computed_m(ephemeris: &Ephemeris, row: &Observation, place: &TrajectoryRow) -> Option<f64> {
+fn computed_m(ephemeris: &Ephemeris, row: &Observation, place: &TrajectoryRow) -> Option<(Vector3<f64>, f64)> {
     let sent = row.sent();
     let rough = ephemeris.clock_of_signal(sent, row.signal).ok()?;
     let clock = ephemeris.clock_of_signal(sent.plus_s(-rough.offset_s), row.signal).ok()?;
@@ -335,7 +347,7 @@ fn computed_m(ephemeris: &Ephemeris, row: &Observation, place: &TrajectoryRow) -
     for _ in 0..3 {
         seen_m = rotate_earth(&satellite_m, (seen_m - place.position_m()).norm() / SPEED_OF_LIGHT_MPS);
     }
-    Some((seen_m - place.position_m()).norm() - SPEED_OF_LIGHT_MPS * clock.offset_s)
+    Some((seen_m, (seen_m - place.position_m()).norm() - SPEED_OF_LIGHT_MPS * clock.offset_s))
 }
 
 /// Rate of a quantity between successive rows.

@@ -162,8 +162,9 @@ pub fn expected(scene: &Scene<'_>, errors: &Errors) -> Result<Vec<Expected>, Jud
         })?;
     }
     let of = |(fix, sums): (&crate::gnss::record::Fix, &Sums)| {
-        let exact = scene.choices.ionosphere_error_share == 0.0 && fix.ionosphere == IonosphereModel::Broadcast;
-        let corrected = exact || !scene.choices.ionosphere;
+        let sent = matches!(fix.ionosphere, IonosphereModel::Broadcast | IonosphereModel::NequickG);
+        let exact = scene.choices.ionosphere_error_share == 0.0 && sent;
+        let corrected = exact || scene.choices.ionosphere.is_none();
         one(fix.sample, sums, corrected)
     };
     // The noise of combined carriers is not that of the signals by themselves.

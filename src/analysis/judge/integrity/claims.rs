@@ -45,13 +45,14 @@ fn missing(run: &Run) -> Found {
         let least = decoded.get(&sv).and_then(|sets| sets.values().map(lacks).min()).unwrap_or(expected.len());
         (0..least).for_each(|_| found.add(|| sv.to_string()));
     }
-    // Whoever says that the ionosphere is known has all of its parameters from one satellite.
-    if run.fixes.iter().any(|fix| fix.ionosphere == IonosphereModel::Broadcast) {
-        let of = |name: &str| run.navigation.iter().any(|row| row.parameter == name);
-        for name in ["alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0", "beta_1", "beta_2", "beta_3"] {
-            if !of(name) {
-                found.add(|| name.to_owned());
-            }
+    // Whoever says that the ionosphere is known has all of its parameters.
+    let klobuchar = ["alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0", "beta_1", "beta_2", "beta_3"];
+    let nequick = ["ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
+    let models = [(IonosphereModel::Broadcast, &klobuchar[..]), (IonosphereModel::NequickG, &nequick[..])];
+    for (model, names) in models {
+        if run.fixes.iter().any(|fix| fix.ionosphere == model) {
+            let lacks = |name: &&&str| !run.navigation.iter().any(|row| row.parameter == **name);
+            names.iter().filter(lacks).for_each(|name| found.add(|| (*name).to_owned()));
         }
     }
     found

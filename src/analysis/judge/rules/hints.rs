@@ -53,6 +53,7 @@ fn mismatches(run: &Run) -> Vec<String> {
         let used = |model: IonosphereModel| run.fixes.iter().any(|fix| fix.ionosphere == model);
         if ionosphere == "none"
             || used(IonosphereModel::Broadcast)
+            || used(IonosphereModel::NequickG)
             || used(IonosphereModel::Combined)
             || run.ionosphere_m < NOTHING_M
         {

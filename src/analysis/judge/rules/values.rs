@@ -231,7 +231,7 @@ impl Verdict {
     fn ionosphere_of_fixes(&mut self, run: &Run) {
         let setting = |key: &str| run.receiver.pointer(&format!("/settings/position/{key}"));
         let corrected = setting("ionosphere").and_then(serde_json::Value::as_str);
-        if !matches!(corrected, Some("broadcast" | "combined")) {
+        if matches!(corrected, None | Some("none")) {
             return;
         }
         let decoded = run.events.iter().find(|row| row.event == Event::IonosphereDecoded).map(|row| row.sample);
@@ -240,7 +240,8 @@ impl Verdict {
         let wrong = |fix: &&Fix| match fix.ionosphere {
             IonosphereModel::None => true,
             IonosphereModel::Nominal => required || known(fix),
-            IonosphereModel::Broadcast => !known(fix),
+            IonosphereModel::Broadcast => !known(fix) || corrected == Some("nequick_g"),
+            IonosphereModel::NequickG => !known(fix) || corrected == Some("klobuchar"),
             IonosphereModel::Combined => corrected != Some("combined"),
         };
         let count = run.fixes.iter().filter(wrong).count();

@@ -10,14 +10,20 @@ const IONEX: &[&str] = &["ionex"];
 const ALPHA: (f64, f64) = (-1e-4, 1e-4);
 const BETA: (f64, f64) = (-1e7, 1e7);
 
+/// What word 5 of I/NAV carries at most (Galileo OS SIS ICD, table 65).
+const AI: (f64, f64) = (-4.0, 511.75);
+
 pub(crate) const IONOSPHERE: &[Key] = &[
-    word("model", || vec!["klobuchar", "constant_tec", "ionex"], "where the electrons are").required(),
+    word("model", || vec!["klobuchar", "constant_tec", "ionex", "nequick_g"], "where the electrons are").required(),
     numbers("alpha", 4, ALPHA, "s, by powers of semicircles", "amplitude of the true delay; with beta")
         .or_else("the navigation file's")
         .of(KLOBUCHAR),
     numbers("beta", 4, BETA, "s, by powers of semicircles", "period of the true delay; with alpha")
         .or_else("the navigation file's")
         .of(KLOBUCHAR),
+    numbers("ai", 3, AI, "sfu, sfu/deg, sfu/deg^2", "effective ionisation by modified dip")
+        .or_else("the navigation file's (GAL)")
+        .of(&["nequick_g"]),
     number("vtec_tecu", 0.0, 1000.0, "TECU", "vertical content everywhere").required().of(&["constant_tec"]),
     number("shell_km", 100.0, 1000.0, "km", "height of the shell; the default is that of the IGS's maps")
         .or(450.0)
@@ -32,6 +38,8 @@ pub(crate) const IONOSPHERE: &[Key] = &[
         .or_else("alpha, or the navigation file's"),
     numbers("broadcast_beta", 4, BETA, "as beta", "what the satellites broadcast; with broadcast_alpha")
         .or_else("beta, or the navigation file's"),
+    numbers("broadcast_ai", 3, AI, "as ai", "what Galileo's satellites broadcast")
+        .or_else("ai, or the navigation file's"),
 ];
 
 pub(crate) const TROPOSPHERE: &[Key] = &[

@@ -108,7 +108,8 @@ fn orbits_that_do_not_reach_over_the_scene_are_refused_with_their_reach() {
 
 /// The faults of a scene of both systems, and what its satellite sends under them in the page of word 1.
 fn of_galileo(fault: &str) -> Result<(Vec<bool>, Vec<bool>), String> {
-    let scene = "name = \"x\"\nstart = 2020-11-29T12:50:30\nduration_s = 60\nsignals = [\"GPS L1 C/A\", \"Galileo E1\"]\n";
+    let scene =
+        "name = \"x\"\nstart = 2020-11-29T12:50:30\nduration_s = 60\nsignals = [\"GPS L1 C/A\", \"Galileo E1\"]\n";
     let text = format!("{scene}{STATIC}\n[[message_fault]]\n{fault}\n");
     let scenario = parse(&text).map_err(|e| e.to_string())?;
     let (scene, _) = scenario.compose(Path::new("."), &Overrides::default()).map_err(|e| e.to_string())?;
@@ -134,7 +135,8 @@ fn a_parameter_is_wrong_in_the_message_that_has_it_and_refused_by_name_in_anothe
     assert!([683, 684].contains(&(raw(&wrong, "m0_rad") - raw(&plain, "m0_rad"))));
     assert_eq!(raw(&wrong, "eccentricity"), raw(&plain, "eccentricity"));
     let refused = |satellite: &str, parameter: &str| {
-        let lines = format!("kind = \"parameter\"\nsatellites = [\"{satellite}\"]\nparameter = \"{parameter}\"\nadd = 1e-9");
+        let lines =
+            format!("kind = \"parameter\"\nsatellites = [\"{satellite}\"]\nparameter = \"{parameter}\"\nadd = 1e-9");
         of_galileo(&lines).err().unwrap()
     };
     let inav = refused("E12", "tgd_s");

@@ -20,7 +20,9 @@ use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::crc::crc24q;
 use crate::gnss::fec::convolutional::Convolutional;
 use crate::gnss::fec::interleaver::Interleaver;
-use crate::gnss::message::{Common, Message, Sender};
+use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::message::{Common, IonosphereForm, Message, Sender};
+use crate::gnss::nequick::NequickG;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
 pub use almanac::gps_offset;
@@ -44,7 +46,7 @@ pub static INAV: Message = Message {
     timed: &[SPARE, 5, 6],
     set: &[1, 2, 3, 4, 5],
     reduced: &[REDUCED],
-    ionosphere: |_| false,
+    ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| word_at(start) == 5, coefficients: ionosphere },
     set_parameters: || {
         let words = tables().into_iter().filter(|(name, _)| ["word 1", "word 2", "word 3", "word 4"].contains(name));
         words.flat_map(|(_, fields)| fields).map(|field| field.name).collect()
@@ -328,6 +330,16 @@ fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option
     Some(orbit.ephemeris)
 }
 
+/// The coefficients of the ionosphere that raw integers of word 5 give.
+fn ionosphere(raw: &dyn Fn(&str) -> Option<i64>) -> Option<Coefficients> {
+    let mut found = [0.0; 3];
+    for (name, value) in ["ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"].into_iter().zip(&mut found) {
+        let field = WORD_5.iter().map(|element| &element.field).find(|field| field.name == name)?;
+        *value = field.value(raw(name)?);
+    }
+    Some(Coefficients::NequickG(NequickG { coefficients: found }))
+}
+
 fn of_set() -> [&'static [Element<Orbit>]; 5] {
     [&WORD_1, &WORD_2, &WORD_3, &WORD_4, &WORD_5]
 }
@@ -343,8 +355,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
 }
 
 /// Parameters by which sets and senders are told apart, and what all satellites say alike.
-const FIXED_PARAMETERS: [&str; 7] =
-    ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
+const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
 
 /// Those of words 1 to 5.
 fn adjustable() -> Vec<&'static str> {

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use super::redundancy::{REDUNDANT, completed, is_redundant, issue, low_issue};
 use super::{
     INAV, PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, REDUCED, WORDS_OF_SET, decode_any, elements, elements_in_short,
-    gps_offset, is_alert, parameters, sent_at, time_of_week, word_of, word_type,
+    gps_offset, ionosphere, is_alert, parameters, sent_at, time_of_week, word_of, word_type,
 };
 use crate::gnss::message::{Read, Reader};
 use crate::gnss::record::NavigationRow;
@@ -77,6 +77,11 @@ impl InavReader {
             self.words.retain(|_, word| !is_redundant(word));
         }
         self.words.insert(word_type(&word), word);
+        if word_type(&word) == 5 {
+            let all = parameters(&word).unwrap_or_default();
+            let raw = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
+            news.extend(ionosphere(&raw).map(Read::Ionosphere));
+        }
         match word_type(&word) {
             1..=5 | 17..=20 => self.look_for_set(near, &mut news),
             6 => news.push(Read::Parameters(self.rows(&word, 0))),

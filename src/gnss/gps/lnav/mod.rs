@@ -18,8 +18,9 @@ pub use reader::LnavReader;
 
 use crate::gnss::bits::{add_to, bits_of, integers, number, quantise_all, read_all, write_all};
 use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{Common, Message, Sender};
+use crate::gnss::message::{Common, IonosphereForm, Message, Sender};
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::{Epoch, WEEK_S};
 use fields::{ALMANAC_PAGE, IONOSPHERE_PAGE, SUBFRAME_1, SUBFRAME_2, SUBFRAME_3, UTC_PAGE};
@@ -48,7 +49,18 @@ pub static LNAV: Message = Message {
     timed: &[1, 2, 3, 4, 5],
     set: &[1, 2, 3],
     reduced: &[],
-    ionosphere: |start| subframe_at(start) == 4 && start.tow_whole_s() / (5 * SUBFRAME_S) % PAGES == IONOSPHERE_PAGE_AT,
+    ionosphere: IonosphereForm {
+        model: Model::Klobuchar,
+        unit: |start| subframe_at(start) == 4 && start.tow_whole_s() / (5 * SUBFRAME_S) % PAGES == IONOSPHERE_PAGE_AT,
+        coefficients: |raw| {
+            let (mut page, mut found) = ([0_u32; 10], Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] });
+            for field in IONOSPHERE_PAGE.iter().map(|element| &element.field) {
+                field.write(&mut page, raw(field.name)?);
+            }
+            read_all(&IONOSPHERE_PAGE, &page, &mut found);
+            Some(Coefficients::Klobuchar(found))
+        },
+    },
     set_parameters: || {
         let orbit = tables().into_iter().filter(|(name, _)| name.starts_with("subframe"));
         orbit.flat_map(|(_, fields)| fields).map(|field| field.name).collect()

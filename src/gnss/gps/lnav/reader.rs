@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use super::{PREAMBLE, SUBFRAME_S, Subframe, TOW_COUNTS, check_parity, ephemeris};
+use crate::gnss::ionosphere::Coefficients;
 use crate::gnss::message::{Read, Reader};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
@@ -157,7 +158,7 @@ impl LnavReader {
 
     fn read(&mut self, subframe: Subframe, near: Epoch, news: &mut Vec<Read>) {
         if let Some(klobuchar) = subframe.klobuchar() {
-            news.push(Read::Klobuchar(klobuchar));
+            news.push(Read::Ionosphere(Coefficients::Klobuchar(klobuchar)));
             news.push(Read::Parameters(
                 NavigationRow::each(self.sv, super::LNAV.name, 0, subframe.parameters()).collect(),
             ));

@@ -8,13 +8,15 @@
 //! divide what the scan leaves open is searched for anew. Whole periods of all codes that are no whole symbol
 //! show in no code: channels lose their symbols and are found anew, and the loss may go uncounted.
 
+use std::collections::VecDeque;
+
 use super::front_end::{FrontEnd, Track};
 use super::shared::{LastFix, Shared};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{Event, EventRow, Fix};
 use crate::gnss::signal::{Component, Signal};
 use crate::receiver::gap::scan::{Found, Profile, Scan};
-use crate::receiver::gap::{Jump, Step, Trend};
+use crate::receiver::gap::{Edges, Jump, Step, Trend};
 use crate::receiver::lead::lead;
 use crate::receiver::outcome::ReceiveError;
 use crate::receiver::output::{Record, Sink};
@@ -28,6 +30,8 @@ mod suspect;
 
 /// Seconds between looks at least.
 const LOOK_S: f64 = 0.045;
+/// Looks whose rates are remembered: a phase loop that an overlay misleads is noticed after three at most.
+const REMEMBERED: usize = 5;
 /// Channels whose power has to vanish at once, and their share.
 const LEAST_CHANNELS: usize = 3;
 const VANISHED_SHARE: f64 = 0.66;
@@ -47,6 +51,12 @@ pub(super) struct Watched {
     settled: suspect::Settled,
     /// Rates when it last took a look.
     rates: Option<[Rates; 2]>,
+    /// The same of the last looks, with their times in seconds, the latest last.
+    rates_of_late: VecDeque<(f64, [Rates; 2])>,
+    /// Looks in a row without a carrier lock.
+    unlocked: usize,
+    /// Where the signs of an overlay turned in the window before the running one.
+    turns: Option<Edges>,
     moved_chips: f64,
     profile: Profile,
     /// Where symbols began before the jump.
@@ -60,6 +70,31 @@ impl Watched {
     pub fn forget(&mut self) {
         self.trend.clear();
         self.settled = suspect::Settled::default();
+        self.rates_of_late.clear();
+    }
+
+    /// A look without a carrier lock: what it shows is not taken, and after some nothing before counts. A
+    /// phase loop that an overlay misleads loses its lock first.
+    fn pause(&mut self) {
+        self.unlocked += 1;
+        if self.unlocked >= REMEMBERED {
+            self.forget();
+        }
+    }
+
+    /// Remembers the rates of a look at `t_s`.
+    fn remember(&mut self, t_s: f64, rates: [Rates; 2]) {
+        if self.rates_of_late.len() >= REMEMBERED {
+            self.rates_of_late.pop_front();
+        }
+        self.rates_of_late.push_back((t_s, rates));
+    }
+
+    /// The rates at `t_s` by the earliest look that is remembered.
+    fn rates_before(&self, t_s: f64) -> Option<[Rates; 2]> {
+        let (seen_s, rates) = self.rates_of_late.front()?;
+        let later = |rates: &Rates| Rates { rate: rates.rate + rates.acceleration * (t_s - seen_s), ..*rates };
+        Some(rates.each_ref().map(later))
     }
 }
 

@@ -97,6 +97,7 @@ impl FrontEnd {
             }
             let watched = &mut track.watched;
             watched.since = (0.0, 0.0, 0);
+            watched.turns = None;
             let jump_chips = found.samples as f64 * sample_chips;
             let Some(glanced) = watched.rates else {
                 track.channel.reseat(now, jump_chips / units.chips, None, None, &mut report);

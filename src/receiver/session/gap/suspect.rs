@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use super::{FrontEnd, LEAST_CHANNELS, Moved, Stage, VANISHED_SHARE};
+use super::{FrontEnd, LEAST_CHANNELS, LOOK_S, Moved, Stage, Track, VANISHED_SHARE};
 use crate::gnss::signal::Signal;
 use crate::receiver::gap::scan::{Found, Profile};
 use crate::receiver::gap::{Edges, Step, Trend, common_step, doppler_step, turned_by};
@@ -18,6 +18,9 @@ const VANISHED: f64 = 0.25;
 const SEEN_SIGMAS: f64 = 4.0;
 /// Turns of signs are compared with where symbols begin so often while nothing is suspected.
 const EDGES_S: f64 = 0.4;
+/// Code periods in a window over which the turns of an overlay are compared, at least. Two windows of a chip
+/// sequence of 25 tell every displacement; a phase loop in a wrong overlay loses its lock after 0.2 s.
+const OVERLAY_PERIODS: u64 = 10;
 /// Looks that are averaged before they enter a trend: whole symbols that are missing move codes by their
 /// Dopplers alone, 0.02 chip in 20 ms, twice the noise of one look at 45 dB-Hz.
 const AVERAGED: usize = 8;
@@ -66,13 +69,29 @@ impl Settled {
     }
 }
 
+/// Where signs turned of late, and where symbols begin: of an overlay over the last two windows, of symbols
+/// since the last comparison where another is `due`; `None` where there is nothing to compare.
+fn latest_turns(track: &mut Track, due: bool) -> Option<(Edges, u64)> {
+    let begin = track.channel.symbols_begin();
+    if !track.channel.has_overlay() {
+        return due.then(|| track.channel.take_edges()).zip(begin);
+    }
+    if track.channel.edges().count() < OVERLAY_PERIODS {
+        return None;
+    }
+    let latest = track.channel.take_edges();
+    let both = track.watched.turns.replace(latest.clone()).map_or_else(|| latest.clone(), |before| before.and(&latest));
+    Some((both, begin?))
+}
+
 impl FrontEnd {
     /// Takes a look into the trends, unless it shows something common.
     pub(super) fn suspect(&mut self, glances: &[Option<Glance>], at_s: f64, since: u64, shared: &Shared) {
         let Some(reference) = self.reference() else { return };
         let (mut steps, mut seen, mut gone) = (Vec::new(), 0, 0);
         for (track, glance) in self.tracks.iter().zip(glances) {
-            let (Some(glance), Some(expected)) = (glance, track.watched.trend.forecast(at_s)) else { continue };
+            let expected = track.watched.trend.forecast(at_s).filter(|_| track.watched.unlocked == 0);
+            let (Some(glance), Some(expected)) = (glance, expected) else { continue };
             let (power, periods) = (track.watched.trend.power(), f64::from(glance.periods));
             if power > SEEN_SIGMAS * ((1.0 + 2.0 * power) / periods).sqrt() {
                 seen += 1;
@@ -104,15 +123,17 @@ impl FrontEnd {
                     watched.trend.take(at_s, glance.code_chips, glance.power);
                     watched.settled.take(at_s, glance);
                     (watched.rates, watched.moved_chips) = (Some(glance.rates), glance.moved_chips);
+                    watched.unlocked = 0;
+                    watched.remember(at_s, glance.rates);
                 }
-                _ => watched.forget(),
+                _ => watched.pause(),
             }
         }
     }
 
     /// Steps of the latest looks together.
     fn lasting(&self, shared: &Shared) -> Vec<Step> {
-        let one = |track: &super::Track| {
+        let one = |track: &Track| {
             let rates = track.watched.rates?;
             self.step_of(track, track.watched.settled.step()?, &rates, shared)
         };
@@ -122,24 +143,32 @@ impl FrontEnd {
     /// Whether signs turn elsewhere than where symbols or overlays have them turn: then code periods are
     /// missing, and nothing else shows it.
     pub(super) fn compare_edges(&mut self, now: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
-        if self.gap.stage != Stage::Quiet || now < self.gap.last_edges + self.samples(EDGES_S) {
+        if self.gap.stage != Stage::Quiet {
             return Ok(());
         }
-        let since = std::mem::replace(&mut self.gap.last_edges, now);
-        let begins: Vec<Option<u64>> = self.tracks.iter().map(|track| track.channel.symbols_begin()).collect();
+        let due = now >= self.gap.last_edges + self.samples(EDGES_S);
+        let turns: Vec<Option<(Edges, u64)>> = self.tracks.iter_mut().map(|track| latest_turns(track, due)).collect();
         let moved = self.signals.iter().any(|signal| {
-            let own = || self.tracks.iter().zip(&begins).filter(|(track, _)| track.channel.signal() == *signal);
+            let own = || self.tracks.iter().zip(&turns).filter(|(track, _)| track.channel.signal() == *signal);
             let edges: Vec<(&Edges, u64)> =
-                own().filter_map(|(track, begin)| Some((track.channel.edges(), (*begin)?))).collect();
+                own().filter_map(|(_, turns)| turns.as_ref().map(|(edges, begin)| (edges, *begin))).collect();
             let enough = edges.len() >= LEAST_CHANNELS && edges.len() as f64 >= VANISHED_SHARE * own().count() as f64;
             enough && turned_by(&edges).is_some_and(|turned| turned != 0)
         });
-        self.tracks.iter_mut().for_each(|track| track.channel.forget_edges());
+        // An overlay shows it within two looks, symbols within the time between two comparisons.
+        let since = if due { self.gap.last_edges } else { now.saturating_sub(self.samples(2.0 * LOOK_S)) };
+        if due {
+            self.gap.last_edges = now;
+        }
         if !moved {
             return Ok(());
         }
-        for (track, begin) in self.tracks.iter_mut().zip(begins) {
-            track.watched.begin = begin;
+        let now_s = self.metadata.rate.elapsed_s(now);
+        for track in &mut self.tracks {
+            track.watched.begin = track.channel.symbols_begin();
+            if track.channel.has_overlay() {
+                track.watched.rates = track.watched.rates_before(now_s).or(track.watched.rates);
+            }
         }
         let found = Found { samples: 0, seconds: 0.0 };
         self.reseat(Moved { since, at: now, found, whole: true }, sink)

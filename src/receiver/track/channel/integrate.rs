@@ -56,7 +56,7 @@ impl Channel {
         let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
         if read && let Some(data) = &mut self.data {
             let phase = self.overlay_phase.unwrap_or_default();
-            report.symbols.extend(data.read((i, q), self.arithmetic, &nco, (self.period, phase), scale));
+            report.symbols.extend(data.read((i, q), self.arithmetic, &nco, (self.period, phase, next), scale));
         }
         self.carry.0.clear();
         self.carry.1.clear();
@@ -159,7 +159,7 @@ impl Channel {
             }
             if self.has_symbols && self.confirmed {
                 let soft = (self.symbol.0.re / f64::from(self.group).sqrt()) as f32;
-                report.symbols.push(Symbol { first_period: number + 1 - length, soft });
+                report.symbols.push(Symbol { first_period: number + 1 - length, end: self.first, soft });
             }
         }
         self.symbol = (Complex64::ZERO, 0);

@@ -51,14 +51,14 @@ impl Data {
         })
     }
 
-    /// Correlates the data of code period `number`, and gives the symbol that ends with it; `scale` brings
-    /// the pilot's noise to unit variance a component.
+    /// Correlates the data of code period `number`, which ends before sample `end`, and gives the symbol that
+    /// ends with it; `scale` brings the pilot's noise to unit variance a component.
     pub(super) fn read(
         &mut self,
         samples: (&[f32], &[f32]),
         arithmetic: Arithmetic,
         nco: &Nco,
-        (number, phase): (u64, OverlayPhase),
+        (number, phase, end): (u64, OverlayPhase, u64),
         scale: f64,
     ) -> Option<Symbol> {
         let [sum] = self.replica.correlate_in(arithmetic, samples, nco, &[0]);
@@ -71,7 +71,7 @@ impl Data {
         self.sum.1 += 1;
         let whole = at + 1 == self.periods_per_symbol && self.sum.1 == self.periods_per_symbol;
         let soft = (self.sum.0.re / (self.periods_per_symbol as f64).sqrt()) as f32;
-        whole.then(|| Symbol { first_period: number + 1 - self.periods_per_symbol, soft })
+        whole.then(|| Symbol { first_period: number + 1 - self.periods_per_symbol, end, soft })
     }
 }
 

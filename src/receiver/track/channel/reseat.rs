@@ -97,7 +97,13 @@ impl Channel {
 
     /// Begins anew to look where signs turn.
     pub fn forget_edges(&mut self) {
-        self.glances.edges = self.glances.edges.emptied();
+        self.take_edges();
+    }
+
+    /// Where signs have turned so far; begins anew to look.
+    pub fn take_edges(&mut self) -> Edges {
+        let emptied = self.glances.edges.emptied();
+        std::mem::replace(&mut self.glances.edges, emptied)
     }
 
     /// Whether an overlay has been recognised, and is taken off the prompts.

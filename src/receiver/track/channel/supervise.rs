@@ -25,7 +25,7 @@ const BATCHES: f64 = 4.0;
 const PILOT_S: f64 = 0.02;
 
 /// Code periods of a pilot that are summed like a symbol's.
-pub(super) fn pilot_group(period_s: f64) -> u32 {
+pub fn pilot_group(period_s: f64) -> u32 {
     ((PILOT_S / period_s).round() as u32).max(1)
 }
 

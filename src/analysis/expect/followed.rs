@@ -1,0 +1,115 @@
+//! What of a signal a receiver follows, as it says itself: which component, by a replica of which layer, and
+//! with which loops.
+
+use serde::Deserialize;
+
+use crate::analysis::read::Run;
+use crate::analysis::waveform::{Waveform, leading};
+use crate::gnss::signal::{Component, Layer, Shape, Signal};
+
+/// What `receiver.json` says of a signal.
+#[derive(Clone, Debug, Deserialize)]
+struct Entry {
+    signal: String,
+    component: usize,
+    layer: usize,
+    spacing_chips: f64,
+    integration_s: f64,
+    pll_bandwidth_hz: f64,
+    dll_bandwidth_hz: f64,
+}
+
+/// What a receiver follows of a signal.
+#[derive(Clone, Debug)]
+pub(in crate::analysis) struct Followed {
+    /// Of what is sent with the replica, and of the replica with itself.
+    pub waveforms: [Waveform; 2],
+    /// Power that the replica finds, over the whole signal's.
+    pub share: f64,
+    /// Distance of early and late, chips; the settings' where the receiver does not say it, as the others.
+    pub spacing_chips: Option<f64>,
+    /// Time of a loop's update, seconds.
+    pub integration_s: Option<f64>,
+    /// Noise bandwidths, Hz.
+    pub pll_bandwidth_hz: Option<f64>,
+    pub dll_bandwidth_hz: Option<f64>,
+}
+
+impl Followed {
+    /// In a run. A receiver that does not say it follows the leading component by a replica of all its layers.
+    pub fn of(run: &Run, signal: &Signal) -> Option<Self> {
+        let stated = run.receiver.get("followed").and_then(|all| all.as_array());
+        let entries = stated.into_iter().flatten().filter_map(|entry| Entry::deserialize(entry).ok());
+        let entry = entries.into_iter().find(|entry| entry.signal == signal.name);
+        let component = match &entry {
+            Some(entry) => signal.components.get(entry.component)?,
+            None => leading(signal)?,
+        };
+        let made = match &entry {
+            Some(entry) => Some(component.layers.get(entry.layer)?),
+            None => None,
+        };
+        let [found, own] = shapes(component, made);
+        let peak = found.correlation(0.0);
+        let share = component.power_share * peak * peak / own.correlation(0.0);
+        let rate_hz = component.chip_rate_hz;
+        Some(Self {
+            waveforms: [found, own].map(|shape| Waveform::of_shape(shape, rate_hz)),
+            share,
+            spacing_chips: entry.as_ref().map(|entry| entry.spacing_chips),
+            integration_s: entry.as_ref().map(|entry| entry.integration_s),
+            pll_bandwidth_hz: entry.as_ref().map(|entry| entry.pll_bandwidth_hz),
+            dll_bandwidth_hz: entry.as_ref().map(|entry| entry.dll_bandwidth_hz),
+        })
+    }
+}
+
+/// Correlation of a component with a replica that has one layer of it, or all, and of that replica with
+/// itself.
+fn shapes(component: &Component, made: Option<&Layer>) -> [Shape; 2] {
+    let of = |sent: &[Layer], made: &[Layer]| Shape::between(sent, made, component.chip_rate_hz);
+    let Some(made) = made else {
+        return [of(component.layers, component.layers), of(component.layers, component.layers)];
+    };
+    // In the layer's phase and sign.
+    let turned = |layer: &Layer| Layer {
+        weight: made.weight.signum() * layer.weight,
+        phase_cycles: layer.phase_cycles - made.phase_cycles,
+        ..*layer
+    };
+    let sent: Vec<Layer> = component.layers.iter().map(turned).collect();
+    let alone = [Layer { weight: 1.0, phase_cycles: 0.0, ..*made }];
+    [of(&sent, &alone), of(&alone, &alone)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::galileo::e1::E1;
+    use crate::gnss::gps::l1ca::L1_CA;
+
+    #[test]
+    fn a_pilot_s_boc_finds_half_the_power_less_a_tenth_and_a_bit_for_a_wide_slope() {
+        let pilot = &E1.components[1];
+        let [found, own] = shapes(pilot, pilot.layers.first());
+        let chip_s = 1.0 / pilot.chip_rate_hz;
+        // BOC(1,1) with itself is 1 − 3τ, and BOC(6,1) beside it has no part in phase at no delay.
+        assert!((own.correlation(0.1 * chip_s) - 0.7).abs() < 1e-12 && (own.correlation(0.0) - 1.0).abs() < 1e-12);
+        assert!((found.correlation(0.0) - f64::sqrt(10.0 / 11.0)).abs() < 1e-12);
+        // Other layers are orthogonal at whole sixths of a half chip, and leave their edges between.
+        let sixth = chip_s / 6.0;
+        assert!((found.correlation(sixth) / found.correlation(0.0) - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_code_of_one_layer_is_what_it_was() {
+        let component = &L1_CA.components[0];
+        let [found, own] = shapes(component, component.layers.first());
+        for k in 0..=20 {
+            let delay_s = 0.05 * f64::from(k) / component.chip_rate_hz;
+            let triangle = 1.0 - 0.05 * f64::from(k);
+            assert!((found.correlation(delay_s) - triangle).abs() < 1e-12);
+            assert!((own.correlation(delay_s) - triangle).abs() < 1e-12);
+        }
+    }
+}

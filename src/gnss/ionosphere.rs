@@ -1,0 +1,49 @@
+//! What satellites broadcast of the ionosphere: coefficients of one model or another.
+
+use nalgebra::Vector3;
+
+use crate::gnss::earth::{Geodetic, Look};
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::nequick::NequickG;
+use crate::gnss::time::Epoch;
+
+/// The models that there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Model {
+    /// Of GPS.
+    Klobuchar,
+    /// Of Galileo.
+    NequickG,
+}
+
+/// The coefficients of a model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Coefficients {
+    Klobuchar(Klobuchar),
+    NequickG(NequickG),
+}
+
+impl Coefficients {
+    /// Of which model they are.
+    pub fn model(&self) -> Model {
+        match self {
+            Self::Klobuchar(_) => Model::Klobuchar,
+            Self::NequickG(_) => Model::NequickG,
+        }
+    }
+
+    /// Group delay in seconds on a carrier of `carrier_hz` at GPS time `at` from `user` to `satellite_m`,
+    /// earth-fixed, which is seen at `look`.
+    pub fn delay_s(
+        &self,
+        (user, look): (Geodetic, Look),
+        satellite_m: &Vector3<f64>,
+        at: Epoch,
+        carrier_hz: f64,
+    ) -> f64 {
+        match self {
+            Self::Klobuchar(model) => model.delay_s(user, look, at, carrier_hz),
+            Self::NequickG(model) => model.delay_s(user, satellite_m, at, carrier_hz),
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! What of each signal the loops follow, and by which settings: theory needs to know it.
+
+use serde::Serialize;
+
+use crate::gnss::signal::Signal;
+use crate::receiver::correlate::wave::strongest;
+use crate::receiver::lead::lead;
+use crate::receiver::settings::Settings;
+
+/// How a signal is followed, as `receiver.json` says it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Followed {
+    /// Its name.
+    pub signal: &'static str,
+    /// Place of the component among the signal's …
+    pub component: usize,
+    /// … and of the layer that the replica has among that component's.
+    pub layer: usize,
+    /// Distance of early and late, fitted to the layer's pulse.
+    pub spacing_chips: f64,
+    /// Time of a loop's update.
+    pub integration_s: f64,
+    /// One-sided noise bandwidth of the phase loop, as far as such updates allow.
+    pub pll_bandwidth_hz: f64,
+    /// The same of the code loop.
+    pub dll_bandwidth_hz: f64,
+}
+
+impl Followed {
+    /// Of a signal by these settings; `None` where nothing of it can be followed.
+    pub fn of(signal: &'static Signal, settings: &Settings) -> Option<Self> {
+        let leading = lead(signal)?;
+        let made = strongest(leading)?;
+        let fitted = settings.tracking.fitted(leading);
+        Some(Self {
+            signal: signal.name,
+            component: signal.components.iter().position(|component| std::ptr::eq(component, leading))?,
+            layer: leading.layers.iter().position(|layer| std::ptr::eq(layer, made))?,
+            spacing_chips: fitted.spacing_chips,
+            integration_s: leading.period_s() * f64::from(fitted.integration),
+            pll_bandwidth_hz: fitted.pll_bandwidth_hz,
+            dll_bandwidth_hz: fitted.dll_bandwidth_hz,
+        })
+    }
+}
