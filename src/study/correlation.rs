@@ -6,7 +6,8 @@
 
 use crate::analysis::expect::theory::dll::{BandIntegrals, Discriminator, Taps, raw_on_chips};
 use crate::analysis::waveform::Waveform;
-use crate::gnss::signal::sinc_squared;
+use crate::gnss::signal::{Component, sinc_squared};
+use crate::receiver::lead::shapes;
 use crate::receiver::track::loops::CodeShape;
 
 /// R and R' over positive offsets in chips.
@@ -16,6 +17,14 @@ pub enum Correlation {
     Triangle,
     /// Of other pulses without a front end.
     Pulses(Waveform),
+    /// Of a component with a replica that has one of its layers, and of that replica with itself, without a
+    /// front end.
+    Replica {
+        /// What is sent with the replica.
+        found: Waveform,
+        /// The replica with itself.
+        own: Waveform,
+    },
     /// Behind a front end of `band` chip rates: values and slopes (times the step) at multiples of the
     /// table's step.
     BandLimited {
@@ -36,6 +45,17 @@ const LARGEST_CHIPS: f64 = 3.0;
 const INTERVALS: f64 = 96.0;
 
 impl Correlation {
+    /// Of a component with this receiver's replica, without a front end.
+    pub fn of_component(component: &Component) -> Self {
+        let rate_hz = component.chip_rate_hz;
+        match shapes(component) {
+            Some([found, own]) if component.layers.len() > 1 => {
+                Self::Replica { found: Waveform::of_shape(found, rate_hz), own: Waveform::of_shape(own, rate_hz) }
+            }
+            _ => Self::of(Waveform::of_shape(component.shape(), rate_hz), None),
+        }
+    }
+
     /// Of a signal, behind a front end of so many hertz (two-sided) if there is one.
     pub fn of(code: Waveform, band_hz: Option<f64>) -> Self {
         let (step_s, chip_s) = code.scales_s();
@@ -77,7 +97,7 @@ impl Correlation {
     pub fn value(&self, chips: f64) -> f64 {
         match self {
             Self::Triangle => (1.0 - chips.abs()).max(0.0),
-            Self::Pulses(code) => code.correlation(chips / code.chip_rate_hz()),
+            Self::Pulses(code) | Self::Replica { found: code, .. } => code.correlation(chips / code.chip_rate_hz()),
             Self::BandLimited { table, .. } => {
                 let x = chips.abs() * STEPS_PER_CHIP;
                 let (index, u) = (x.floor(), x - x.floor());
@@ -91,11 +111,34 @@ impl Correlation {
         }
     }
 
+    /// Correlation of the noise of taps so many chips apart.
+    pub fn noise(&self, chips: f64) -> f64 {
+        match self {
+            Self::Replica { own, .. } => own.correlation(chips / own.chip_rate_hz()) / own.correlation(0.0),
+            _ => self.value(chips) / self.value(0.0),
+        }
+    }
+
+    /// Power of the noise of a tap, over that of a replica of unit power before the front end.
+    pub fn noise_power(&self) -> f64 {
+        match self {
+            Self::Replica { own, .. } => own.correlation(0.0),
+            _ => self.value(0.0),
+        }
+    }
+
+    /// Power that a tap finds over the noise in it, over that of the component: what the front end passes, or
+    /// the replica has.
+    pub fn efficiency(&self) -> f64 {
+        let peak = self.value(0.0);
+        peak * peak / self.noise_power()
+    }
+
     /// What a receiver that knows the peak's shape takes for a spacing of `d` chips.
     pub fn code_shape(&self, d: f64) -> CodeShape {
         match self {
             Self::Triangle => CodeShape::triangle(d),
-            Self::Pulses(_) | Self::BandLimited { .. } => {
+            Self::Pulses(_) | Self::Replica { .. } | Self::BandLimited { .. } => {
                 let Taps { height, slope, common } = self.taps(d);
                 CodeShape { value: height, slope, common }
             }
@@ -107,7 +150,9 @@ impl Correlation {
     pub fn raw_chips(&self, discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> Option<f64> {
         match self {
             Self::Triangle => Some(crate::analysis::expect::theory::dll::raw_chips(discriminator, d, t_s, cn0_hz)),
-            Self::Pulses(_) => Some(raw_on_chips(discriminator, self.taps(d), t_s * cn0_hz)),
+            Self::Pulses(_) | Self::Replica { .. } => {
+                Some(raw_on_chips(discriminator, self.taps(d), t_s * cn0_hz * self.efficiency()))
+            }
             Self::BandLimited { band, code, .. } => BandIntegrals::of(|f| density(code.as_ref(), f), d, *band)
                 .jitter_chips(discriminator, 0.5 / t_s, t_s, cn0_hz),
         }
@@ -116,7 +161,7 @@ impl Correlation {
     fn taps(&self, d: f64) -> Taps {
         let (peak, half, h) = (self.value(0.0), 0.5 * d, 0.5 / STEPS_PER_CHIP);
         let slope = (self.value(half - h) - self.value(half + h)) / (2.0 * h);
-        Taps { height: self.value(half) / peak, slope: slope / peak, common: self.value(d) / peak }
+        Taps { height: self.value(half) / peak, slope: slope / peak, common: self.noise(d) }
     }
 }
 

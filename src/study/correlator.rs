@@ -15,24 +15,24 @@ use super::normal::{Normals, Purpose, symbol};
 use super::watch::Watch;
 use crate::analysis::expect::theory::clock::PowerLaw;
 use crate::gnss::signal::{self, Carrier, Component, Signal};
-use crate::receiver::track::TrackingSettings;
+use crate::receiver::lead::lead;
 use crate::receiver::track::closed::{Loops, Mode, Update};
 use crate::receiver::track::cn0::Cn0;
 use crate::receiver::track::loops::Rates;
-
-/// Code periods of a group in which a signal without symbols is integrated.
-const PILOT_GROUP: u32 = 20;
+use crate::receiver::track::{TrackingSettings, pilot_group};
 
 /// One channel to be simulated.
 #[derive(Clone, Debug)]
 pub struct Case {
     /// The signal that is followed.
     pub signal: &'static Signal,
-    /// As validated.
+    /// The component of it whose replica is made.
+    pub component: &'static Component,
+    /// As validated, and fitted to the component.
     pub settings: TrackingSettings,
     /// Which loops run.
     pub mode: Mode,
-    /// `None` for no noise.
+    /// Of the whole signal; `None` for no noise.
     pub cn0_dbhz: Option<f64>,
     /// How the truth moves.
     pub motion: Motion,
@@ -50,34 +50,29 @@ pub struct Case {
     pub seed: u64,
 }
 
-/// The signals that a channel of this kind can follow: those of one component, whose carrier is the same for
-/// all satellites.
+/// The signals that a channel of this kind can follow: those whose carrier is the same for all satellites.
 pub fn signals() -> Vec<&'static Signal> {
-    let simple =
-        |signal: &&'static Signal| signal.components.len() == 1 && matches!(signal.carrier, Carrier::Common(_));
-    signal::all().into_iter().filter(simple).collect()
-}
-
-/// The component that a channel follows.
-pub(super) fn tracked(signal: &'static Signal) -> Option<&'static Component> {
-    match signal.components {
-        [one] => Some(one),
-        _ => None,
-    }
+    let common = |signal: &&'static Signal| matches!(signal.carrier, Carrier::Common(_)) && lead(signal).is_some();
+    signal::all().into_iter().filter(common).collect()
 }
 
 impl Case {
     /// Code periods that carry a symbol, or that are grouped without one.
     fn group(&self) -> u32 {
-        tracked(self.signal).and_then(Component::periods_per_symbol).unwrap_or(PILOT_GROUP)
+        self.component.periods_per_symbol().unwrap_or_else(|| pilot_group(self.period_s()))
     }
 
     fn period_s(&self) -> f64 {
-        tracked(self.signal).map_or(1.0, Component::period_s)
+        self.component.period_s()
     }
 
     pub(super) fn has_symbols(&self) -> bool {
-        tracked(self.signal).is_some_and(|c| c.message.is_some())
+        self.component.message.is_some()
+    }
+
+    /// C/N0 of the component before any front end; `None` without noise.
+    pub(super) fn component_hz(&self) -> Option<f64> {
+        Some(libm::pow(10.0, self.cn0_dbhz? / 10.0) * self.component.power_share)
     }
 
     /// Time between loop updates, which is the coherent integration.
@@ -202,9 +197,7 @@ struct Covariance {
 
 impl Covariance {
     fn new(correlation: &Correlation, spacing_chips: f64) -> Self {
-        let peak = correlation.value(0.0);
-        let near = correlation.value(0.5 * spacing_chips) / peak;
-        let far = correlation.value(spacing_chips) / peak;
+        let (near, far) = (correlation.noise(0.5 * spacing_chips), correlation.noise(spacing_chips));
         let own = (1.0 - near * near).sqrt();
         let shared = (near - near * far) / own;
         Self { prompt: [near, own], late: [far, shared, (1.0 - far * far - shared * shared).max(0.0).sqrt()] }
@@ -241,7 +234,7 @@ struct Channel<'a> {
 
 impl<'a> Channel<'a> {
     fn new(case: &'a Case) -> Self {
-        let chip_rate_hz = tracked(case.signal).map_or(1.0, |c| c.chip_rate_hz);
+        let chip_rate_hz = case.component.chip_rate_hz;
         let (period_s, update_s, group) = (case.period_s(), case.update_s(), case.group());
         let shape = case.correlation.code_shape(case.settings.spacing_chips);
         let mut loops = Loops::new(&case.settings, shape, case.has_symbols(), case.motion.doppler_hz);
@@ -251,13 +244,13 @@ impl<'a> Channel<'a> {
         if case.mode == Mode::Phase {
             cn0.know_symbols();
         }
-        let cn0_hz = case.cn0_dbhz.map(|dbhz| libm::pow(10.0, dbhz / 10.0));
+        let cn0_hz = case.component_hz();
         Self {
             case,
             truth: Truth::new(&case.motion, case.oscillator.as_ref(), case.signal.centre_hz(), period_s, case.seed),
             normals: Normals::new(case.seed, Purpose::Thermal),
             covariance: Covariance::new(&case.correlation, case.settings.spacing_chips),
-            amplitude: (2.0 * period_s * cn0_hz.unwrap_or(1.0) / case.correlation.value(0.0)).sqrt(),
+            amplitude: (2.0 * period_s * cn0_hz.unwrap_or(1.0) / case.correlation.noise_power()).sqrt(),
             noisy: cn0_hz.is_some(),
             chips_per_cycle: chip_rate_hz / case.signal.centre_hz(),
             period_s,

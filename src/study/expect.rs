@@ -70,9 +70,9 @@ pub fn code_loop(settings: &TrackingSettings, update_s: f64) -> PhaseLoop {
     PhaseLoop { gains: plain(gains), feedback: Feedback::PhaseAndRate }
 }
 
-/// C/N0 behind the front end, Hz.
+/// C/N0 of what the replica finds behind the front end, Hz.
 fn cn0_hz(case: &Case) -> Option<f64> {
-    Some(libm::pow(10.0, case.cn0_dbhz? / 10.0) * case.correlation.value(0.0))
+    Some(case.component_hz()? * case.correlation.efficiency())
 }
 
 /// Jitter of the carrier's phase in cycles; `None` without noise, or where no phase is followed.
@@ -110,7 +110,6 @@ pub fn code_chips(case: &Case) -> Option<Jitter> {
         CodeDiscriminator::EarlyMinusLate => Discriminator::EarlyMinusLate,
         CodeDiscriminator::DotProduct => Discriminator::DotProduct,
     };
-    let before_filter_hz = libm::pow(10.0, case.cn0_dbhz? / 10.0);
-    let raw = case.correlation.raw_chips(discriminator, settings.spacing_chips, update_s, before_filter_hz)?;
+    let raw = case.correlation.raw_chips(discriminator, settings.spacing_chips, update_s, case.component_hz()?)?;
     Jitter::of(&code_loop(settings, update_s).linear(), raw, update_s)
 }

@@ -12,9 +12,9 @@ use super::motion::Motion;
 use crate::analysis::expect::theory::clock::PowerLaw;
 use crate::analysis::expect::theory::oscillator;
 use crate::analysis::expect::theory::pll;
-use crate::analysis::waveform::Waveform;
 use crate::gnss::gps::l1ca;
 use crate::gnss::signal::Signal;
+use crate::receiver::lead::lead;
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::closed::Mode;
 use crate::receiver::track::loops::Gains;
@@ -43,16 +43,18 @@ pub fn channel(settings: &TrackingSettings, mode: Mode, cn0_dbhz: Option<f64>) -
     channel_of(&l1ca::L1_CA, settings, mode, cn0_dbhz)
 }
 
-/// A channel of a signal of one component with these settings, without a front end.
+/// A channel of a signal's leading component with these settings, without a front end.
 pub fn channel_of(signal: &'static Signal, settings: &TrackingSettings, mode: Mode, cn0_dbhz: Option<f64>) -> Case {
+    let component = lead(signal).unwrap_or(&l1ca::L1_CA.components[0]);
     Case {
         signal,
-        settings: settings.clone(),
+        component,
+        settings: settings.fitted(component),
         mode,
         cn0_dbhz,
         motion: Motion::default(),
         oscillator: None,
-        correlation: Waveform::of(signal).map_or(Correlation::Triangle, |code| Correlation::of(code, None)),
+        correlation: Correlation::of_component(component),
         watched: false,
         settle_s: 10.0,
         duration_s: 600.0,

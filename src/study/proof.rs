@@ -100,6 +100,7 @@ const SIGMAS: f64 = 3.0;
 fn cell(quantity: Quantity, mode: Mode, settings: TrackingSettings, cn0_dbhz: f64) -> Cell {
     let case = Case {
         signal: &l1ca::L1_CA,
+        component: &l1ca::L1_CA.components[0],
         settings,
         mode,
         cn0_dbhz: Some(cn0_dbhz),

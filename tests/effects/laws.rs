@@ -9,13 +9,48 @@ use gnss_twin::generator::stream::{Options, generate_with};
 use gnss_twin::generator::synth::isa::Level;
 use gnss_twin::generator::truth;
 
-const BASE: &str = "name = \"laws\"\nstart = 2010-07-01T08:05:58\nduration_s = 0.12\nseed = 3\n\
-    [motion]\nkind = \"static\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n\
-    [satellites]\nmask_deg = 30\n";
+/// A scene for each signal that satellites send, with what its tables call a satellite and precise orbits.
+struct Base {
+    scenario: &'static str,
+    satellite: &'static str,
+    orbits: &'static str,
+}
+
+const GPS: Base = Base {
+    scenario: "name = \"laws\"\nstart = 2010-07-01T08:05:58\nduration_s = 0.12\nseed = 3\n\
+        [motion]\nkind = \"static\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n\
+        [satellites]\nmask_deg = 30\n",
+    satellite: "G23",
+    orbits: "igs15904.sp3.gz",
+};
+const GALILEO: Base = Base {
+    scenario: "name = \"laws\"\nstart = 2020-11-29T12:50:31\nduration_s = 0.12\nseed = 3\nsignals = [\"Galileo E1\"]\n\
+        [motion]\nkind = \"static\"\nlatitude_deg = 37.6\nlongitude_deg = -1\nheight_m = 130\n\
+        [satellites]\nmask_deg = 30\n",
+    satellite: "E12",
+    orbits: "COD21340.sp3.gz",
+};
+
+impl Base {
+    /// Tables as this base has their satellite and orbits; `None` of those that are about another message.
+    fn tables(&self, tables: &str) -> Option<String> {
+        let other = self.satellite != GPS.satellite && tables.contains("word = 7");
+        (!other).then(|| tables.replace(GPS.satellite, self.satellite).replace(GPS.orbits, self.orbits))
+    }
+
+    /// Every table with the one without strength.
+    fn all(&self) -> impl Iterator<Item = (String, Option<String>)> {
+        let both = |(tables, zero): &(&str, Option<&str>)| {
+            Some((self.tables(tables)?, zero.and_then(|zero| self.tables(zero))))
+        };
+        TABLES.iter().filter_map(both)
+    }
+}
 
 /// Tables of a scenario, each with one that has no strength where there is such a thing.
 const TABLES: &[(&str, Option<&str>)] = &[
     ("[ionosphere]\nmodel = \"klobuchar\"", None),
+    ("[ionosphere]\nmodel = \"nequick_g\"\nai = [120, 0.3, 0.01]", None),
     ("[troposphere]\nmodel = \"saastamoinen\"", None),
     ("[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf3\"\nvmf_file = \"tests/effects/coarse.vmf3\"", None),
     ("[receiver_clock]\nbias_s = 1e-4\ndrift_sps = 1e-7", Some("[receiver_clock]\nbias_s = 0\ndrift_sps = 0")),
@@ -37,6 +72,8 @@ const TABLES: &[(&str, Option<&str>)] = &[
         "[ionosphere]\nmodel = \"constant_tec\"\nvtec_tecu = 20",
         Some("[ionosphere]\nmodel = \"constant_tec\"\nvtec_tecu = 0"),
     ),
+    ("[power]\ncn0_dbhz = 45\n[[interference]]\nkind = \"matched\"\njs_db = 10", None),
+    ("[[spoofer]]\npower_db = 3\nclock_bias_s = 1e-6", None),
     ("[noise]", None),
     ("[playback]\nbits = 4", None),
     (
@@ -73,8 +110,8 @@ const TABLES: &[(&str, Option<&str>)] = &[
     ("[noise]\n[adc]\nbits = 2\nagc_window_s = 0.004", None),
 ];
 
-fn scene(tables: &str, seed: Option<u64>) -> Scene {
-    let scenario = Scenario::parse(&format!("{BASE}{tables}\n"), "laws.toml").unwrap();
+fn scene(base: &Base, tables: &str, seed: Option<u64>) -> Scene {
+    let scenario = Scenario::parse(&format!("{}{tables}\n", base.scenario), "laws.toml").unwrap();
     scenario.compose(Path::new("."), &Overrides { seed, ..Overrides::default() }).unwrap().0
 }
 
@@ -88,8 +125,8 @@ fn bytes(scene: &Scene, options: &Options) -> Vec<u8> {
 
 #[test]
 fn bytes_depend_neither_on_threads_nor_on_the_cut_nor_on_the_instruction_set() {
-    for (tables, _) in TABLES {
-        let scene = scene(tables, None);
+    for (base, (tables, _)) in [&GPS, &GALILEO].into_iter().flat_map(|base| base.all().map(move |one| (base, one))) {
+        let scene = scene(base, &tables, None);
         let expected = bytes(&scene, &Options::default());
         for (threads, block_runs, batch_blocks, level) in [(1, 1, 3, Level::detect()), (3, 5, 1, Level::Baseline)] {
             let options = Options { block_runs, batch_blocks, level };
@@ -101,22 +138,25 @@ fn bytes_depend_neither_on_threads_nor_on_the_cut_nor_on_the_instruction_set() {
 
 #[test]
 fn everything_present_changes_the_samples_and_nothing_of_zero_strength_does() {
-    let bare = bytes(&scene("", None), &Options::default());
-    for (tables, zero) in TABLES {
-        assert!(bytes(&scene(tables, None), &Options::default()) != bare, "{tables} changes nothing");
-        if let Some(zero) = zero {
-            assert!(bytes(&scene(zero, None), &Options::default()) == bare, "{zero} changes something");
+    for base in [&GPS, &GALILEO] {
+        let bare = bytes(&scene(base, "", None), &Options::default());
+        for (tables, zero) in base.all() {
+            let of = |tables: &str| bytes(&scene(base, tables, None), &Options::default());
+            assert!(of(&tables) != bare, "{tables} changes nothing of {}", base.satellite);
+            if let Some(zero) = zero {
+                assert!(of(&zero) == bare, "{zero} changes something of {}", base.satellite);
+            }
         }
     }
 }
 
 #[test]
 fn the_seed_moves_what_is_random_and_nothing_else() {
-    for (tables, _) in TABLES {
-        let random = ["oscillator = ", "scintillation", "[noise]", "phase_noise", "bit_errors"]
+    for (base, (tables, _)) in [&GPS, &GALILEO].into_iter().flat_map(|base| base.all().map(move |one| (base, one))) {
+        let random = ["oscillator = ", "scintillation", "[noise]", "phase_noise", "bit_errors", "matched"]
             .iter()
             .any(|word| tables.contains(word));
-        let [a, b] = [1, 2].map(|seed| bytes(&scene(tables, Some(seed)), &Options::default()));
+        let [a, b] = [1, 2].map(|seed| bytes(&scene(base, &tables, Some(seed)), &Options::default()));
         assert_eq!(a != b, random, "{tables}");
     }
 }

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::stream_tests::{Echo, Random, Stream};
 use super::*;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::galileo::e1::E1;
 use crate::gnss::record::Event;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
@@ -168,7 +169,7 @@ fn cold_starts(signal: &'static Signal, starts: u64, duration_s: f64) -> Vec<Sta
 fn no_cold_start_holds_a_side_peak_and_none_leaves_the_main_one() {
     // Five seconds are the bar; the few starts of a short run are given one.
     let (starts, duration_s, bar_s) = if is_long() { (200, 5.4, 5.0) } else { (3, 1.5, 1.0) };
-    for signal in [&LONG_BOC, &MIXED] {
+    for signal in [&LONG_BOC, &MIXED, &E1] {
         let runs = cold_starts(signal, starts, duration_s);
         let beside: Vec<&Start> = runs.iter().filter(|run| run.begin_chips.abs() > 0.25).collect();
         let late = runs.iter().filter(|run| run.last_off_s > bar_s).count();
@@ -374,8 +375,14 @@ fn jitter(signal: &'static Signal, rate_hz: f64, channels: u64, duration_s: f64)
 #[test]
 fn jitter_of_code_and_carrier_is_that_of_theory() {
     let (channels, duration_s) = if is_long() { (16, 10.0) } else { (1, 2.0) };
-    let signals: [(&'static Signal, f64); 5] =
-        [(&LONG_BOC, 5.3e6), (&QUADRATURE, 12.3e6), (&CHANNELS, 2.6e6), (&MULTIPLEXED, 2.6e6), (&MIXED, 5.3e6)];
+    let signals: [(&'static Signal, f64); 6] = [
+        (&LONG_BOC, 5.3e6),
+        (&QUADRATURE, 12.3e6),
+        (&CHANNELS, 2.6e6),
+        (&MULTIPLEXED, 2.6e6),
+        (&MIXED, 5.3e6),
+        (&E1, 6.5e6),
+    ];
     let found: Vec<Jitter> =
         signals.into_par_iter().map(|(signal, rate_hz)| jitter(signal, rate_hz, channels, duration_s)).collect();
     for Jitter { signal, update_s, code_m, carrier_cycles, ratios, spreads } in &found {

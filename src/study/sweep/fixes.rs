@@ -79,7 +79,9 @@ impl<'r> Fixes<'r> {
     }
 
     fn with(&self, model: IonosphereModel) -> impl DoubleEndedIterator<Item = &Judged<'r>> {
-        self.rows.iter().filter(move |row| row.fix.ionosphere == model)
+        // What is broadcast, of whichever model.
+        let of = |used| if used == IonosphereModel::NequickG { IonosphereModel::Broadcast } else { used };
+        self.rows.iter().filter(move |row| of(row.fix.ionosphere) == model)
     }
 
     fn p95(&self, model: IonosphereModel, of: impl Fn(&Judged) -> f64) -> Option<f64> {

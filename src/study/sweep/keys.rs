@@ -42,8 +42,8 @@ pub const STUDY: &[Key] = &[
 ];
 
 const SIGNAL: &[Key] = &[
-    word("name", || signals().into_iter().map(|signal| signal.name).collect(), "which signal, of one component")
-        .or_else("GPS L1 C/A"),
+    word("name", || signals().into_iter().map(|signal| signal.name).collect(), "which signal").or_else("GPS L1 C/A"),
+    word("component", || vec!["leading", "data", "pilot"], "which of its components is followed").or_else("leading"),
     number("cn0_dbhz", 0.0, 80.0, "dB-Hz", "C/N0").or_else("no noise"),
     number("bandwidth_hz", 1e3, 1e9, "Hz", "of the front end").or_else("none"),
     word(

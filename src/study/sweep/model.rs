@@ -15,12 +15,13 @@ use crate::generator::scenario::ScenarioError;
 use crate::generator::scenario::read::{Source, Table};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::{Component, Signal};
+use crate::receiver::lead::lead;
 use crate::receiver::settings::Settings;
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::closed::Mode;
 use crate::study::correlation::Correlation;
-use crate::study::correlator::{Case, Outcome, run, signals, tracked};
+use crate::study::correlator::{Case, Outcome, run, signals};
 use crate::study::expect::{self, Jitter};
 use crate::study::motion::{Motion, Step};
 
@@ -31,6 +32,7 @@ const GRAVITY_MPS2: f64 = 9.80665;
 #[derive(Clone, Debug)]
 pub struct Model {
     signal: &'static Signal,
+    component: &'static Component,
     cn0_dbhz: Option<f64>,
     band_hz: Option<f64>,
     oscillator: Option<PowerLaw>,
@@ -76,11 +78,24 @@ impl Model {
         let settings = receiver.map(|table| table.whole()).transpose()?.unwrap_or_default();
         let settings = Settings::from_table(settings, "receiver")
             .map_err(|e| ScenarioError::Toml { place, message: e.to_string() })?;
+        let named = match &signal {
+            Some(table) => table.choice("name", &names)?.unwrap_or(&L1_CA),
+            None => &L1_CA,
+        };
+        let component = match &signal {
+            Some(table) => component(table, named)?,
+            None => &L1_CA.components[0],
+        };
+        if let Some(table) = signal.as_ref().filter(|_| component.layers.len() > 1)
+            && table.number("bandwidth_hz")?.is_some()
+        {
+            let reason =
+                format!("nothing for {}, whose pulses of several layers are modelled without a front end", named.name);
+            return Err(table.bad("bandwidth_hz", reason));
+        }
         Ok(Self {
-            signal: match &signal {
-                Some(table) => table.choice("name", &names)?.unwrap_or(&L1_CA),
-                None => &L1_CA,
-            },
+            signal: named,
+            component,
             cn0_dbhz: number(&signal, "cn0_dbhz")?,
             band_hz: number(&signal, "bandwidth_hz")?,
             oscillator: signal.as_ref().map(law).transpose()?.flatten(),
@@ -125,13 +140,19 @@ impl Model {
         }
         Case {
             signal: self.signal,
-            settings: self.tracking.clone(),
+            component: self.component,
+            settings: self.tracking.fitted(self.component),
             mode: self.mode,
             cn0_dbhz: self.cn0_dbhz,
             motion,
             oscillator: self.oscillator,
-            correlation: Waveform::of(self.signal)
-                .map_or(Correlation::Triangle, |code| Correlation::of(code, self.band_hz)),
+            correlation: match self.band_hz {
+                Some(band_hz) => {
+                    let code = Waveform::of_shape(self.component.shape(), self.component.chip_rate_hz);
+                    Correlation::of(code, Some(band_hz))
+                }
+                None => Correlation::of_component(self.component),
+            },
             watched: self.watched,
             settle_s: self.settle_s,
             duration_s: self.duration_s,
@@ -147,6 +168,17 @@ impl Model {
             |name: &String| FIGURES.iter().find(|figure| figure.name == name).and_then(|f| (f.of)(&case, &outcome));
         keep.iter().map(of).map(|value| value.filter(|x| x.is_finite())).collect()
     }
+}
+
+/// The component of a signal that a base names.
+fn component(table: &Table<'_>, signal: &'static Signal) -> Result<&'static Component, ScenarioError> {
+    let choices = [("leading", 0), ("data", 1), ("pilot", 2)];
+    let found = match table.choice("component", &choices)?.unwrap_or(0) {
+        0 => lead(signal),
+        1 => signal.components.iter().find(|component| component.message.is_some()),
+        _ => signal.components.iter().find(|component| component.message.is_none()),
+    };
+    found.ok_or_else(|| table.bad("component", format!("one that {} has", signal.name)))
 }
 
 /// The oscillator as a scene would write it; its phase noises are not modelled here.
@@ -186,7 +218,7 @@ fn kept(outcome: &Outcome, value: Option<f64>) -> Option<f64> {
 }
 
 fn chip_m(case: &Case) -> f64 {
-    tracked(case.signal).map_or(f64::NAN, |c| SPEED_OF_LIGHT_MPS / c.chip_rate_hz)
+    SPEED_OF_LIGHT_MPS / case.component.chip_rate_hz
 }
 
 fn sigma(jitter: Option<Jitter>) -> Option<f64> {
@@ -236,7 +268,7 @@ pub const FIGURES: &[Figure] = &[
     figure("raw_phase_sigma_deg", |_, outcome| kept(outcome, outcome.raw_phase_cycles.sigma().map(|x| 360.0 * x))),
     figure("raw_code_sigma_chips", |_, outcome| kept(outcome, outcome.raw_code_chips.sigma())),
     figure("raw_frequency_sigma_hz", |_, outcome| kept(outcome, outcome.raw_frequency_hz.sigma())),
-    figure(SNR, |case, _| Some(case.update_s() * libm::pow(10.0, case.cn0_dbhz? / 10.0))),
+    figure(SNR, |case, _| Some(case.update_s() * case.component_hz()?)),
     figure("pll_bandwidth_exact_hz", |case, _| expect::phase_cycles(case).map(|jitter| jitter.bandwidth_hz)),
     figure("dll_bandwidth_exact_hz", |case, _| expect::code_chips(case).map(|jitter| jitter.bandwidth_hz)),
     figure("phase_threshold_deg", |_, _| Some(pll::THRESHOLD_RAD.to_degrees())),
