@@ -12,7 +12,8 @@ pub const ORDER: Order<'static> = &[
         "gnss",
         &[
             &["time", "earth", "satellite", "crc", "fec", "inflate", "place"],
-            &["bits", "facts", "klobuchar", "ionex", "samples", "vienna"],
+            &["bits", "facts", "klobuchar", "nequick", "ionex", "samples", "vienna"],
+            &["ionosphere"],
             &["signal", "sigmf", "vmf3"],
             &["broadcast"],
             &["record"],
@@ -74,6 +75,7 @@ pub const ORDER: Order<'static> = &[
             &["observe"],
             &["position"],
             &["settings"],
+            &["followed"],
             &["diagnosis"],
             &["output"],
             &["outcome"],
@@ -95,7 +97,7 @@ pub const ORDER: Order<'static> = &[
         "analysis/expect",
         &[
             &["theory"],
-            &["jamming", "message", "quantile", "smoothing"],
+            &["followed", "jamming", "message", "quantile", "smoothing"],
             &["multiple_access", "spectrum"],
             &["due", "timeline"],
             &["loops"],

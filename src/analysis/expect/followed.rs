@@ -36,7 +36,8 @@ pub(in crate::analysis) struct Followed {
 }
 
 impl Followed {
-    /// In a run. A receiver that does not say it follows the leading component by a replica of all its layers.
+    /// In a run. A receiver that does not say it follows the leading component by a replica of all its
+    /// layers.
     pub fn of(run: &Run, signal: &Signal) -> Option<Self> {
         let stated = run.receiver.get("followed").and_then(|all| all.as_array());
         let entries = stated.into_iter().flatten().filter_map(|entry| Entry::deserialize(entry).ok());

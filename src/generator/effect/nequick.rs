@@ -2,8 +2,8 @@
 //!
 //! The model as its document has it steps at 0 h UT, by a day of the Sun's declination and at the end of a
 //! month by the month's maps (0.1 to 10 % of the delay), which nature does not: here one day passes into the
-//! next over [`MIDNIGHT_S`]. Limits: the F1 layer begins and ends at sunrise and sunset within seconds, as the
-//! document has it, which moves a delay by centimetres.
+//! next over [`MIDNIGHT_S`]. Limits: the F1 layer begins and ends at sunrise and sunset within seconds, as
+//! the document has it, which moves a delay by centimetres.
 
 use nalgebra::Vector3;
 

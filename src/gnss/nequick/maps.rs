@@ -2,9 +2,9 @@
 //!
 //! Source: the document's annexes; the maps are those of ITU-R P.1239. `maps.bin` holds, little-endian, for
 //! every month the F2 layer's critical frequency (quiet and active Sun, 76 functions of the place, 13 of the
-//! time) and the transmission factor M(3000)F2 (49 and 9) as `f64`, and then the dip as `i16` in hundredths of
-//! a degree: 39 rows of 39, a row every 5° of latitude and a column every 10° of longitude, both beginning one
-//! before −90° and −180°.
+//! time) and the transmission factor M(3000)F2 (49 and 9) as `f64`, and then the dip as `i16` in hundredths
+//! of a degree: 39 rows of 39, a row every 5° of latitude and a column every 10° of longitude, both beginning
+//! one before −90° and −180°.
 
 use std::f64::consts::PI;
 
@@ -25,7 +25,8 @@ const MONTH: usize = 2 * (76 * 13 + 49 * 9);
 /// Rows and columns of the dip's grid.
 const GRID: usize = 39;
 
-/// Powers of the sine of the dip in the map of the frequency, for each multiple of the longitude (2.5.5.3.2.2).
+/// Powers of the sine of the dip in the map of the frequency, for each multiple of the longitude
+/// (2.5.5.3.2.2).
 const FREQUENCY_POWERS: [usize; 9] = [12, 12, 9, 5, 2, 1, 1, 1, 1];
 /// The same of the transmission factor (2.5.5.3.2.3).
 const FACTOR_POWERS: [usize; 7] = [7, 8, 6, 3, 2, 1, 1];

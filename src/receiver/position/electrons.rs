@@ -43,7 +43,8 @@ impl Electrons {
                 range.emitted.since(content.emitted).abs() < KEPT_S && (place_m - content.place_m).norm() < KEPT_M
             };
             if !self.latest.get(&range.sv).is_some_and(fresh) {
-                // That the Earth turns while the signal travels moves the satellite by a millionth of its way.
+                // That the Earth turns while the signal travels moves the satellite by a millionth of its
+                // way.
                 let satellite = Geodetic::from_ecef(&range.satellite.position_m);
                 let (month, ut_h) = range.emitted.month_and_hour();
                 let tecu = model.stec_tecu(user, satellite, month, ut_h);

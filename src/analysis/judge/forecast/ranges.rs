@@ -1,8 +1,8 @@
 //! Bias and noise of each range that a fix may use.
 //!
 //! Bias: the true range, all of the scene's delays in it, less what a receiver computes from the message as
-//! sent (orbit, clock, ionosphere) and the true troposphere; and what smoothing makes of code and carrier that
-//! part. Noise: theory of the code loop at the true C/N0, other codes and interference counted, through
+//! sent (orbit, clock, ionosphere) and the true troposphere; and what smoothing makes of code and carrier
+//! that part. Noise: theory of the code loop at the true C/N0, other codes and interference counted, through
 //! Hatch's filter. Apart from these: chip edges between samples, and reflected rays. Limits: the difference
 //! of the receiver's troposphere from the true one is a stated share of it.
 
