@@ -12,13 +12,14 @@ use std::time::Instant;
 
 use num_complex::Complex64;
 
+use gnss_twin::gnss::galileo::e1::{self, E1};
 use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
 use gnss_twin::gnss::samples::{Format, IfMetadata};
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::signal::Link;
 use gnss_twin::gnss::time::Rate;
 use gnss_twin::receiver::acquire::{AcquisitionSettings, Searcher, samples_needed};
-use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
+use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, Wave, chips_to_units};
 use gnss_twin::receiver::source::Block;
 
 const ROUNDS: usize = 15;
@@ -117,6 +118,90 @@ fn acquisition(settings: AcquisitionSettings, threads: usize) -> Box<dyn FnMut()
         let elapsed_s = begin.elapsed().as_secs_f64();
         assert_eq!(rows.iter().filter(|row| row.1.is_some()).count(), 12);
         elapsed_s
+    })
+}
+
+/// Seconds for a first search of all GPS and all Galileo satellites at 10 Msps, plans and code spectra made
+/// on the way; ten of each are there, from 41 to 50 dB-Hz.
+fn cold_search(threads: usize) -> Box<dyn FnMut() -> f64> {
+    let rate_hz = 10e6;
+    let rate = Rate::from_hz(rate_hz).expect("a rate");
+    let metadata = IfMetadata { format: Format::Ci8, rate, center_hz: L1_CA.centre_hz(), inverted: false, start: None };
+    let signals = vec![L1_CA.name.to_owned(), E1.name.to_owned()];
+    let settings = AcquisitionSettings { signals, ..Default::default() };
+    let samples = samples_needed(&metadata, &settings).expect("settings") as usize;
+    let (mut i, mut q) = (Vec::new(), Vec::new());
+    Format::Ci8.unpack(&noise(2 * samples), &mut i, &mut q);
+    let signs = |one: bool| if one { -1.0 } else { 1.0 };
+    for n in 0..10_u8 {
+        let amplitude = 18.5 * (2.0 * libm::pow(10.0, 4.1 + 0.1 * f64::from(n)) / rate_hz).sqrt();
+        let gps = l1ca::code(3 * n + 1).expect("a code");
+        let [data, pilot] = [e1::Code::Data, e1::Code::Pilot].map(|which| e1::code(which, 3 * n + 1).expect("a code"));
+        for (doppler_hz, is_gps) in [(700.0 * (f64::from(n) - 4.6), true), (650.0 * (4.4 - f64::from(n)), false)] {
+            let step = CHIP_HZ / rate_hz * (1.0 + doppler_hz / L1_CA.centre_hz());
+            for k in 0..samples {
+                let chips = f64::from(n) * 377.7 + k as f64 * step;
+                let (chip, period) = (chips as usize, (chips / 4092.0) as usize);
+                let value = if is_gps {
+                    signs(gps[chip % 1023])
+                } else {
+                    let square = |rate: f64| signs((chips * 2.0 * rate) as u64 % 2 == 1);
+                    let (one, six) = ((10.0_f64 / 22.0).sqrt() * square(1.0), (1.0_f64 / 22.0).sqrt() * square(6.0));
+                    let symbol = [3, 4].map(|every| signs(period.is_multiple_of(every)));
+                    let [data, pilot] = [&data, &pilot].map(|code| f64::from(code[chip % 4092]));
+                    symbol[0] * data * (one + six) - symbol[1] * pilot * (one - six)
+                };
+                let angle = std::f64::consts::TAU * (doppler_hz * k as f64 / rate_hz).fract();
+                i[k] += (amplitude * value * libm::cos(angle)) as f32;
+                q[k] += (amplitude * value * libm::sin(angle)) as f32;
+            }
+        }
+    }
+    let gps = (1..=32).map(|prn| L1_CA.link(Sv::gps(prn)));
+    let galileo = (1..=36).map(|number| E1.link(Sv { system: E1.system, number }));
+    let candidates: Vec<Link> = gps.chain(galileo).collect();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    Box::new(move || {
+        let block = Block { first: 0, i: &i, q: &q };
+        let begin = Instant::now();
+        let mut searcher = Searcher::new(&metadata, &settings).expect("settings");
+        let rows = pool.install(|| searcher.search(&block, &candidates)).expect("a search");
+        let elapsed_s = begin.elapsed().as_secs_f64();
+        assert_eq!(rows.iter().filter(|row| row.1.is_some()).count(), 20);
+        elapsed_s
+    })
+}
+
+/// As [`tracking`] of the pilot of Galileo E1 with five taps, and of the data beside it with one, at 10 Msps.
+fn tracking_pairs(arithmetic: Arithmetic) -> Box<dyn FnMut() -> f64> {
+    let (rate_hz, block, period) = (10e6, 1 << 17, 40_000);
+    let bytes = noise(2 * block);
+    let of = |component: usize| -> Vec<Replica> {
+        let wave = |number| Wave::new(&E1.components[component], number);
+        (1..=CHANNELS as u8).filter_map(|number| Replica::of(wave(number)?, Edge::Area)).collect()
+    };
+    let (data, pilot) = (of(0), of(1));
+    let taps = [0.15, 0.0, -0.15, 0.5, -0.5].map(chips_to_units);
+    let (mut i, mut q) = (Vec::new(), Vec::new());
+    Box::new(move || {
+        let begin = Instant::now();
+        Format::Ci8.unpack(&bytes, &mut i, &mut q);
+        let mut done = 0;
+        for (n, (data, pilot)) in data.iter().zip(&pilot).enumerate() {
+            let nco = Nco {
+                carrier: 0,
+                carrier_step: (n as u64 + 1) << 52,
+                code: chips_to_units(n as f64 * 0.1),
+                code_step: chips_to_units(CHIP_HZ / rate_hz) as u64,
+            };
+            let (i, q) = (&i[n..], &q[n..]);
+            for samples in i.chunks_exact(period).zip(q.chunks_exact(period)) {
+                black_box(pilot.correlate_in(arithmetic, samples, &nco, &taps));
+                black_box(data.correlate_in(arithmetic, samples, &nco, &[0]));
+                done += period;
+            }
+        }
+        done as f64 / begin.elapsed().as_secs_f64() / 1e9
     })
 }
 
@@ -225,6 +310,16 @@ fn rows() -> Vec<Row> {
     for (settings, name) in [(AcquisitionSettings::default(), "10 × 2 ms"), (noncoherent, "10 × 1 ms")] {
         let figure = format!("search, 32 PRNs, ±5 kHz, {name}, 2.6 Msps, two cores");
         add(figure, "s", Some(-0.15), acquisition(settings, 2));
+    }
+    add(
+        "first search, 32 GPS and 36 Galileo E1, ±5 kHz, 10 Msps, two cores".to_owned(),
+        "s",
+        Some(-1.0),
+        cold_search(2),
+    );
+    for (arithmetic, name, bar) in [(Arithmetic::I16, "i16", Some(0.8)), (Arithmetic::F32, "f32", None)] {
+        let figure = format!("tracking in {name}, Galileo E1, 5 taps of the pilot and 1 of the data, ci8, 10 Msps");
+        add(figure, "G channel·samples/s/core", bar, tracking_pairs(arithmetic));
     }
     add("unpacking ci8".to_owned(), "G samples/s/core", None, unpacking());
     rows

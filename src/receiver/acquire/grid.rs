@@ -16,6 +16,7 @@ use rustfft::{Fft, FftPlanner};
 
 use super::kernel;
 use super::multiple_access::Law;
+use super::pair::{Dwells, Spectra};
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
 use crate::gnss::samples::IfMetadata;
@@ -37,10 +38,14 @@ pub(super) struct Grid {
     pub rate_hz: f64,
     if_hz: f64,
     doppler_sign: f64,
-    carrier_hz: f64,
+    pub(super) carrier_hz: f64,
     /// Code periods in a coherent sum.
     pub coherent_periods: u32,
     pub sums: u32,
+    /// Code periods that the search looks at.
+    pub periods: u32,
+    /// Where data and pilot are searched for together.
+    pub(super) pair: Option<Dwells>,
     pub dopplers_hz: Vec<f64>,
     /// From one of them to the next.
     pub step_hz: f64,
@@ -52,8 +57,8 @@ pub(super) struct Grid {
     /// What the statistic is multiplied by where a real recording's noise is not circular.
     image_scale: f64,
     is_real: bool,
-    forward: Arc<dyn Fft<f32>>,
-    inverse: Arc<dyn Fft<f32>>,
+    pub(super) forward: Arc<dyn Fft<f32>>,
+    pub(super) inverse: Arc<dyn Fft<f32>>,
 }
 
 /// The outcome for one satellite.
@@ -76,12 +81,14 @@ pub(super) struct Peaks {
 
 /// One satellite at one Doppler: the largest cell, and sums over all cells and over those near it.
 #[derive(Clone, Copy)]
-struct Strip {
-    peak: f32,
-    lag: usize,
-    total: f64,
-    near: f64,
-    near_cells: usize,
+pub(super) struct Strip {
+    pub peak: f32,
+    pub lag: usize,
+    pub total: f64,
+    pub near: f64,
+    pub near_cells: usize,
+    /// Powers in every cell: fewer than all where the Doppler was left.
+    pub sums: u32,
 }
 
 /// Samples up to the last lag of the last dwell, at the code rate of the slowest code over the nominal one.
@@ -98,7 +105,7 @@ fn step_rate_hz(component: &Component) -> Option<f64> {
 
 impl Grid {
     pub fn new(
-        (component, carrier_hz): (&Component, f64),
+        (component, pair, carrier_hz): (&Component, bool, f64),
         metadata: &IfMetadata,
         settings: &AcquisitionSettings,
         centre_hz: f64,
@@ -118,7 +125,9 @@ impl Grid {
         let dopplers_hz: Vec<f64> = (centre - side..=centre + side).map(|bin| bin as f64 * step_hz).collect();
         let lags = (period_samples / lag_samples).ceil() as usize;
         let per_cell = of_one_cell(settings.false_alarm_probability, (lags * dopplers_hz.len()) as f64);
-        let sums = settings.sums(component);
+        let looked = settings.sums(component);
+        let pair = pair.then(|| Dwells::new(looked, lags));
+        let sums = pair.as_ref().map_or(looked, Dwells::sums);
         // One degree of freedom a sum, with the same mean.
         let image_scale = threshold(per_cell, 2 * sums) / (2.0 * threshold(per_cell, sums));
         let law = Law::new(settings.false_alarm_probability, lags, dopplers_hz.len(), sums, image_scale);
@@ -132,6 +141,8 @@ impl Grid {
             carrier_hz,
             coherent_periods,
             sums,
+            periods: looked * coherent_periods,
+            pair,
             dopplers_hz,
             step_hz,
             lags,
@@ -147,13 +158,14 @@ impl Grid {
     /// Samples that a search looks at.
     pub fn samples_needed(&self) -> u64 {
         let slowest_hz = self.dopplers_hz.first().copied().unwrap_or(0.0);
+        let sums = self.periods / self.coherent_periods;
         let periods = f64::from(self.coherent_periods);
-        samples_needed(self.period_samples, periods, self.sums, 1.0 + slowest_hz / self.carrier_hz)
+        samples_needed(self.period_samples, periods, sums, 1.0 + slowest_hz / self.carrier_hz)
     }
 
     /// Whether the carrier lies so near its own image (at a multiple of half the rate of a real
     /// recording) that a coherent sum's noise has one degree of freedom instead of two.
-    fn meets_image(&self, doppler_hz: f64) -> bool {
+    pub(super) fn meets_image(&self, doppler_hz: f64) -> bool {
         let turns = 2.0 * self.frequency_hz(doppler_hz) / self.rate_hz;
         let coherent_samples = f64::from(self.coherent_periods) * self.period_samples;
         self.is_real && (turns - turns.round()).abs() * coherent_samples < 0.75
@@ -189,15 +201,18 @@ impl Grid {
     }
 
     /// The largest cell of every satellite, in their order.
-    pub fn search(&self, block: &Block, spectra: &[&[Complex<f32>]]) -> Peaks {
+    pub fn search(&self, block: &Block, spectra: &[Spectra<'_>]) -> Peaks {
         let power: f64 = block.i.iter().chain(block.q).map(|x| f64::from(x * x)).sum();
         let rms = (power / block.i.len().max(1) as f64).sqrt();
         if rms == 0.0 {
             let none = Peak { statistic: 0.0, threshold: self.law.threshold, doppler_hz: 0.0, lag: 0 };
             return Peaks { of: vec![none; spectra.len()], crowded: 0 };
         }
-        let strips: Vec<Vec<Strip>> =
-            self.dopplers_hz.par_iter().map(|&doppler| self.one_doppler(block, 1.0 / rms, doppler, spectra)).collect();
+        let one = |&doppler: &f64| self.one_doppler(block, 1.0 / rms, doppler, spectra);
+        let strips: Vec<Vec<Strip>> = match &self.pair {
+            None => self.dopplers_hz.par_iter().map(one).collect(),
+            Some(dwells) => self.strips_of_pairs(dwells, block, 1.0 / rms, spectra),
+        };
         let heights: Vec<Vec<f64>> = (0..spectra.len()).map(|satellite| self.heights(&strips, satellite)).collect();
         let image = |bin: usize| self.dopplers_hz.get(bin).is_some_and(|doppler_hz| self.meets_image(*doppler_hz));
         let bar = self.law.bar(&heights, image);
@@ -220,7 +235,7 @@ impl Grid {
         self.law.threshold
     }
 
-    fn one_doppler(&self, block: &Block, scale: f64, doppler_hz: f64, spectra: &[&[Complex<f32>]]) -> Vec<Strip> {
+    fn one_doppler(&self, block: &Block, scale: f64, doppler_hz: f64, spectra: &[Spectra<'_>]) -> Vec<Strip> {
         let mut scratch = vec![
             Complex::default();
             self.forward.get_inplace_scratch_len().max(self.inverse.get_inplace_scratch_len())
@@ -240,7 +255,7 @@ impl Grid {
         let mut powers = vec![0.0_f32; self.lags];
         spectra
             .iter()
-            .map(|spectrum| {
+            .map(|[spectrum, _]| {
                 powers.fill(0.0);
                 for data in &dwells {
                     kernel::multiply(&mut short, data, spectrum);
@@ -290,7 +305,16 @@ impl Grid {
         }
     }
 
-    fn strip(&self, powers: &[f32]) -> Strip {
+    #[cfg(test)]
+    pub fn spectrum_of_period(&self, block: &Block, doppler_hz: f64, period: u32) -> Vec<Complex<f32>> {
+        let (mut long, mut sum) =
+            (vec![Complex::default(); self.forward.len()], vec![Complex::default(); self.inverse.len()]);
+        let mut scratch = vec![Complex::default(); self.forward.get_inplace_scratch_len()];
+        self.add_period(block, 1.0, doppler_hz, period, (&mut long, &mut scratch), &mut sum);
+        sum
+    }
+
+    pub(super) fn strip(&self, powers: &[f32]) -> Strip {
         let (mut lag, mut peak, mut total) = (0, 0.0_f32, 0.0_f64);
         for (n, &power) in powers.iter().enumerate() {
             total += f64::from(power);
@@ -303,26 +327,28 @@ impl Grid {
         let near = (0..near_cells)
             .map(|n| f64::from(powers[(lag + powers.len() + n - side.min(powers.len())) % powers.len()]))
             .sum();
-        Strip { peak, lag, total, near, near_cells }
+        Strip { peak, lag, total, near, near_cells, sums: self.sums }
     }
 
     fn near_cells(&self) -> usize {
         (PEAK_CHIPS / (self.chips_per_sample * self.lag_samples)).ceil() as usize
     }
 
-    /// The largest cell of a satellite at every Doppler, over the noise floor of its map. Of each Doppler
+    /// The largest cell of a satellite at every Doppler, zero where that was left, over the noise floor of
+    /// its map. Of each Doppler
     /// whose own largest cell lies at the peak's code phase, the neighbourhood is left out of the floor.
     fn heights(&self, strips: &[Vec<Strip>], satellite: usize) -> Vec<f64> {
         let column = || strips.iter().filter_map(|strip| strip.get(satellite));
         let scaled: Vec<f64> = (column().zip(&self.dopplers_hz))
             .map(|(strip, &doppler_hz)| {
-                f64::from(strip.peak) * if self.meets_image(doppler_hz) { self.image_scale } else { 1.0 }
+                let whole = if strip.sums == self.sums { f64::from(strip.peak) } else { 0.0 };
+                whole * if self.meets_image(doppler_hz) { self.image_scale } else { 1.0 }
             })
             .collect();
         let highest = (0..scaled.len()).fold(0, |best, bin| if scaled[bin] > scaled[best] { bin } else { best });
         let best_lag = column().nth(highest).map_or(0, |strip| strip.lag);
         let (mut total, mut cells) = (0.0, 0);
-        for strip in column() {
+        for strip in column().filter(|strip| strip.sums == self.sums) {
             let apart = strip.lag.abs_diff(best_lag);
             let same = apart.min(self.lags - apart.min(self.lags)) <= self.near_cells();
             total += strip.total - if same { strip.near } else { 0.0 };

@@ -106,7 +106,7 @@ fn strong_signals_that_are_no_candidates_bring_no_false_satellites() {
         // Above the threshold of noise there are many.
         let window = Window::centred(&Block { first: 0, i: &recording.i, q: &recording.q }, samples);
         let grid = searcher.grids.values().next().unwrap();
-        let spectra: Vec<_> = searcher.codes.values().map(|code| code.spectrum.as_slice()).collect();
+        let spectra: Vec<_> = searcher.codes.values().map(Code::spectra).collect();
         let peaks = grid.search(&window.block(), &spectra);
         noise_alone += peaks.of.iter().filter(|peak| peak.statistic > grid.threshold()).count() as u32;
     }
