@@ -154,6 +154,30 @@ fn synthesis(lines: &mut Vec<Line>) {
     }
 }
 
+/// Galileo E1 with CBOC on data and pilot: satellites count once, not once a component.
+fn galileo(lines: &mut Vec<Line>) {
+    const SATELLITES: usize = 8;
+    let cases = [Grade::Fast, Grade::Balanced].map(|grade| {
+        let name = format!("{}, Galileo E1 (CBOC, data and pilot), noise-free, 10 Msps, ci8", grade.name());
+        let text = "name = \"bench\"\nstart = 2020-11-29T12:50:30\nduration_s = 2\nsignals = [\"Galileo E1\"]\n\
+            [motion]\nkind = \"static\"\nlatitude_deg = 37.605\nlongitude_deg = -0.986\nheight_m = 60\n\
+            [front_end]\nsample_rate_hz = 10e6\n";
+        let scenario = Scenario::parse(text, "bench").unwrap();
+        let (mut scene, _) = scenario.compose(Path::new("scenarios"), &Overrides::default()).unwrap();
+        scene.fidelity = Fidelity::suited(grade, 10e6, scene.fidelity.allowed_m);
+        let start = scene.clock.start;
+        let up = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv));
+        let up: Vec<Sv> = up.filter(|sv| truth::in_view(&scene, *sv, start).unwrap()).collect();
+        assert!(up.len() >= SATELLITES, "{} satellites in view", up.len());
+        scene.excluded.extend(up.into_iter().skip(SATELLITES));
+        Case { name, scene }
+    });
+    for ((case, seconds), bar) in cases.iter().zip(medians(&cases, 7)).zip([2.0, 1.2]) {
+        let giga = case.scene.samples as f64 * SATELLITES as f64 / seconds / 1e9;
+        lines.push(Line::new(&case.name, giga, "G satellite·samples/s/core", Some(bar)));
+    }
+}
+
 /// Adds a block of noise.
 type Add<'a> = &'a dyn Fn(u64, &mut [f32], &mut [f32]);
 
@@ -429,6 +453,7 @@ fn main() {
     let mut lines = Vec::new();
     let profile = profile();
     synthesis(&mut lines);
+    galileo(&mut lines);
     normals(&mut lines);
     formats(&mut lines);
     whole(&mut lines);

@@ -25,17 +25,25 @@ struct Entry {
     /// Samples of the stretch that it makes.
     samples: Range<usize>,
     strip: Range<usize>,
+    /// Place among the runs of its ray.
+    part: usize,
     /// All but its bits.
     run: Run<'static>,
 }
 
 impl Bank {
     /// Adds a run for `samples` of the stretch, part of `span`: `make` appends its signs to the strip that it
-    /// is handed and returns everything else.
-    pub fn push(&mut self, span: (u64, u64), samples: Range<usize>, make: impl FnOnce(&mut Vec<u64>) -> Run<'static>) {
+    /// is handed and returns everything else. `part` is its place among the runs of its ray, from 0.
+    pub fn push(
+        &mut self,
+        span: (u64, u64),
+        part: usize,
+        samples: Range<usize>,
+        make: impl FnOnce(&mut Vec<u64>) -> Run<'static>,
+    ) {
         let begin = self.bits.len();
         let run = make(&mut self.bits);
-        self.entries.push(Entry { span, samples, strip: begin..self.bits.len(), run });
+        self.entries.push(Entry { span, samples, strip: begin..self.bits.len(), part, run });
     }
 
     /// Adds the samples of all runs to the planar stretch and forgets the runs.
@@ -49,7 +57,20 @@ impl Bank {
             let Some(samples) = entries.first().map(|entry| entry.samples.clone()) else { continue };
             let (Some(i), Some(q)) = (i.get_mut(samples.clone()), q.get_mut(samples)) else { continue };
             match kernel.arithmetic {
-                Arithmetic::F32 => isa::accumulate(kernel.level, kernel.edge, &runs, i, q, &mut self.buffers),
+                Arithmetic::F32 => {
+                    let mut left = runs.as_slice();
+                    let rays: Vec<&[Run<'_>]> = (entries.chunk_by(|_, next| next.part > 0))
+                        .filter_map(|ray| left.split_off(..ray.len()))
+                        .collect();
+                    for rays in rays.chunk_by(|a, b| (a.len() == 1) == (b.len() == 1)) {
+                        if let [[_], ..] = rays {
+                            let singles: Vec<Run<'_>> = rays.iter().flat_map(|ray| ray.iter().copied()).collect();
+                            isa::accumulate(kernel.level, kernel.edge, &singles, i, q, &mut self.buffers);
+                        } else {
+                            isa::accumulate_rays(kernel.level, kernel.edge, rays, i, q, &mut self.buffers);
+                        }
+                    }
+                }
                 Arithmetic::F64 => runs
                     .iter()
                     .for_each(|run| isa::accumulate_exact(kernel.level, kernel.edge, run, i, q, &mut self.exact)),

@@ -62,6 +62,38 @@ pub fn accumulate(level: Level, edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32],
     }
 }
 
+/// [`lanes::accumulate_rays`] on one instruction set; the baseline where the processor lacks it.
+pub fn accumulate_rays(
+    level: Level,
+    edge: Edge<'_>,
+    rays: &[&[Run<'_>]],
+    i: &mut [f32],
+    q: &mut [f32],
+    buffers: &mut Buffers,
+) {
+    match level {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the processor has these instructions.
+        Level::Avx512 if level.is_available() => unsafe { rays_avx512(edge, rays, i, q, buffers) },
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the processor has these instructions.
+        Level::Avx2 if level.is_available() => unsafe { rays_avx2(edge, rays, i, q, buffers) },
+        _ => lanes::accumulate_rays(edge, rays, i, q, buffers),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+fn rays_avx512(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
+    lanes::accumulate_rays(edge, rays, i, q, buffers);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn rays_avx2(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
+    lanes::accumulate_rays(edge, rays, i, q, buffers);
+}
+
 /// [`exact::accumulate`] on one instruction set; the baseline where the processor lacks it.
 pub fn accumulate_exact(
     level: Level,

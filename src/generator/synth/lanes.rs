@@ -11,11 +11,12 @@
 use super::angle::{cos_sin, ramp};
 use super::band::{Filter, HALF_WIDTH};
 use super::chips::window;
+use super::chorus::{self, Chord};
 use super::{CODE_BITS, CODE_ONE, Edge, RUN_SAMPLES, Run, reference};
 
 /// Samples on each side of a group's middle. The same on every instruction set, because rounding depends on
 /// it.
-const HALF: usize = 16;
+pub(super) const HALF: usize = 16;
 
 /// Samples of a group.
 pub const GROUP: usize = 2 * HALF;
@@ -24,19 +25,21 @@ pub const GROUP: usize = 2 * HALF;
 const GROUPS: usize = RUN_SAMPLES / GROUP;
 
 /// Fractional bits of a lane's code phase; the five above count steps in the window.
-const LANE_BITS: u32 = 27;
-const FRACTION: u32 = (1 << LANE_BITS) - 1;
+pub(super) const LANE_BITS: u32 = 27;
+pub(super) const FRACTION: u32 = (1 << LANE_BITS) - 1;
 
 /// Sign of an `f32`.
-const SIGN: u32 = 1 << 31;
+pub(super) const SIGN: u32 = 1 << 31;
 
-type Side = [f32; HALF];
+/// A value for each sample of half a group.
+pub(super) type Side<T = f32> = [T; HALF];
 
 /// Scratch of the kernel.
 #[derive(Default)]
 pub struct Buffers {
     voices: Vec<Voice>,
     wave: Vec<f32>,
+    chords: Vec<Chord>,
 }
 
 /// A run made ready: its carrier, and where its code stands in each group.
@@ -58,13 +61,13 @@ struct Voice {
 /// A carrier as two factors.
 #[derive(Clone)]
 #[repr(align(64))]
-struct Carrier {
+pub(super) struct Carrier {
     /// At half a sample, one and a half … from the middle of a group, amplitude one.
-    cos: Side,
-    sin: Side,
+    pub cos: Side,
+    pub sin: Side,
     /// At the middle of each group.
-    re: [f32; GROUPS],
-    im: [f32; GROUPS],
+    pub re: [f32; GROUPS],
+    pub im: [f32; GROUPS],
 }
 
 impl Default for Carrier {
@@ -83,7 +86,7 @@ impl Default for Voice {
 impl Carrier {
     /// Phases are exact to 2^-32 turn, sines to 2e-7; seven rotations in `f32` lose 4e-7 at most.
     #[inline(always)]
-    fn anchor(&mut self, run: &Run<'_>, amplitude: f32) {
+    pub fn anchor(&mut self, run: &Run<'_>, amplitude: f32) {
         let half = run.turns_step >> 1;
         (self.cos, self.sin) = cos_sin(&ramp(half, run.turns_step));
         let middle = run.turns.wrapping_add(run.turns_step.wrapping_mul(HALF as u64 - 1)).wrapping_add(half);
@@ -131,28 +134,28 @@ impl Voice {
 
 /// A Q16.48 position as a lane's place.
 #[inline(always)]
-fn lane(position: u64) -> u32 {
+pub(super) fn lane(position: u64) -> u32 {
     (position >> (CODE_BITS - LANE_BITS)) as u32
 }
 
 /// Sums of rays over a group: in-phase and quadrature, the earlier half backwards.
-struct Sums {
-    i_before: Side,
-    q_before: Side,
-    i_after: Side,
-    q_after: Side,
+pub(super) struct Sums {
+    pub i_before: Side,
+    pub q_before: Side,
+    pub i_after: Side,
+    pub q_after: Side,
 }
 
 impl Sums {
     #[inline(always)]
-    fn new() -> Self {
+    pub fn new() -> Self {
         let [i_before, q_before, i_after, q_after] = [[0.0; HALF]; 4];
         Self { i_before, q_before, i_after, q_after }
     }
 
     /// Adds them to a group, or to as much of it as there is.
     #[inline(always)]
-    fn add_to(&self, i: &mut [f32], q: &mut [f32]) {
+    pub fn add_to(&self, i: &mut [f32], q: &mut [f32]) {
         let forwards = |before: &Side, after: &Side| -> [f32; GROUP] {
             std::array::from_fn(|k| if k < HALF { before[HALF - 1 - k] } else { after[k - HALF] })
         };
@@ -174,7 +177,7 @@ impl Sums {
 /// At most [`RUN_SAMPLES`] of them.
 #[inline(always)]
 pub fn accumulate(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
-    let Buffers { voices, wave } = buffers;
+    let Buffers { voices, wave, .. } = buffers;
     if voices.len() < runs.len() {
         voices.resize_with(runs.len(), Voice::default);
     }
@@ -195,6 +198,20 @@ pub fn accumulate(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32]
                 let skip = band_limited(filter, run, i.len(), wave);
                 rotate(run, wave.get(skip..).unwrap_or(&[]), voices, i, q);
             }),
+        }
+    }
+}
+
+/// Adds rays of several runs, each at once where their runs allow it.
+#[inline(always)]
+pub fn accumulate_rays(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
+    for rays in rays.chunk_by(|a, b| chorus::fits(edge, a) == chorus::fits(edge, b)) {
+        match edge {
+            _ if !rays.iter().all(|runs| chorus::fits(edge, runs)) => {
+                rays.iter().for_each(|runs| accumulate(edge, runs, i, q, buffers));
+            }
+            Edge::Nearest => chorus::accumulate::<false>(rays, &mut buffers.chords, i, q),
+            Edge::Area | Edge::BandLimited(_) => chorus::accumulate::<true>(rays, &mut buffers.chords, i, q),
         }
     }
 }

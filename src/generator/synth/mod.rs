@@ -3,15 +3,17 @@
 //! A [`Run`] is up to 4096 samples of one ray with constant carrier and code steps, both phases as
 //! fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
 //! [`mod@reference`] evaluates each sample in `f64`, [`exact`] the same at speed; [`lanes`] is the fast
-//! kernel, for all runs of a stretch at once as [`bank`] gathers them. Both are plain lane-array code that
+//! kernel, for all runs of a stretch at once as [`bank`] gathers them, and those of one ray together
+//! (`chorus`). Both are plain lane-array code that
 //! [`isa`] compiles for each instruction set with the same bits on all. What a component's layers and zeros
 //! come to are several sequences of ±1 ([`waveform`]), a run each. Limits: 15 code steps a sample; lanes fall
-//! back to a wave buffer above one step a sample.
+//! back to a wave buffer above one step a sample, above 1.93 where several runs make a ray.
 
 pub(crate) mod angle;
 pub mod band;
 pub mod bank;
 pub mod chips;
+mod chorus;
 pub mod exact;
 pub mod isa;
 pub mod lanes;

@@ -219,9 +219,9 @@ fn stretches(waveform: &Waveform, kernel: Kernel<'_>, rate_hz: f64, count: u32, 
     let mut bank = Bank::default();
     let stretch = |k: u32| {
         let at = Epoch::new(WEEK + 1000, 0.0).plus_s(f64::from(k) * apart_s);
-        for Voice { spreading, amplitude, phase_cycles } in &voices {
+        for (part, Voice { spreading, amplitude, phase_cycles }) in voices.iter().enumerate() {
             let step = (spreading.pace().step_rate_hz() / rate_hz * CODE_ONE as f64) as u64;
-            bank.push((0, RUN_SAMPLES as u64), 0..RUN_SAMPLES, |bits| Run {
+            bank.push((0, RUN_SAMPLES as u64), part, 0..RUN_SAMPLES, |bits| Run {
                 bits: &[],
                 position: spreading.strip(spreading.at(at, 0.0), step, RUN_SAMPLES, |_| false, bits),
                 step,

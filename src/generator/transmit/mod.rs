@@ -356,7 +356,7 @@ impl Transmitter {
         let gain = 0.5 * (first.gain + last.gain);
         let real = planted!("generator.synth.amplitude", real, 1.06 * real);
         let amplitude = real * gain * (2.0 * cn0_hz.max(0.0) / rate_hz).sqrt() * f64::from(scene.noise_lsb);
-        for sent in &self.sent {
+        for (number, sent) in self.sent.iter().enumerate() {
             let sent_s = length / rate_hz - path.delay.change(u, v) - (last.delay_s - first.delay_s);
             let sent_s = planted!("generator.synth.code_rate", sent_s, sent_s * (1.0 + 2e-5));
             let step = (sent_s * sent.spreading.pace().step_rate_hz() / length * CODE_ONE as f64) as u64;
@@ -366,7 +366,7 @@ impl Transmitter {
                 planted!("generator.synth.code_phase", delay_s, delay_s + 2e-9 * f64::from(self.sv.number % 3));
             let at = sent.spreading.at(anchor.epoch, delay_s);
             let negative = |period| self.symbols.negative(sent.data, period);
-            bank.push((anchor.n, end), samples.clone(), |bits| Run {
+            bank.push((anchor.n, end), number, samples.clone(), |bits| Run {
                 bits: &[],
                 position: sent.spreading.strip(at, step, samples.len(), negative, bits),
                 step,

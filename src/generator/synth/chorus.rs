@@ -1,0 +1,232 @@
+//! All sequences of one ray in one pass: components and layers that share a carrier.
+//!
+//! Data and pilot of CBOC are four sequences on one carrier, half a turn apart at most. Their waves are added
+//! first and turned once. Sequences that step together (*a layer*) share their places and, for area edges,
+//! the shares of a sample that its steps have. Each half of a group begins its window anew, so that a sample
+//! may span two steps: BOC(6,1) from 6.4 Msps on. Accuracy and order of operations are those of
+//! [`super::lanes`]: the same bits on every instruction set.
+
+use super::chips::window;
+use super::lanes::{Carrier, FRACTION, GROUP, HALF, LANE_BITS, SIGN, Side, Sums, lane};
+use super::{CODE_BITS, CODE_ONE, Edge, Run};
+
+/// Most steps a sample: half a group then spans 30 of the 32 of a window, two of which an area looks back.
+const DENSEST: u64 = 29 * CODE_ONE / 15;
+
+/// The sequences of a ray made ready.
+#[derive(Default)]
+pub(super) struct Chord {
+    carrier: Carrier,
+    layers: Vec<Layer>,
+}
+
+/// Sequences that step together.
+struct Layer {
+    /// Places of the lanes from the first sample of half a group on, and the same backwards.
+    ahead: Side<u32>,
+    behind: Side<u32>,
+    /// Code position of the first half group, early by the steps that an area looks back, and the advance
+    /// from half group to half group, Q16.48.
+    position: u64,
+    stride: u64,
+    /// Whether a sample spans more than a step.
+    dense: bool,
+    /// A sample's span, or half of it where it is not dense, in units of a lane's place.
+    span: f32,
+    /// Number of each sequence's run, and its amplitude.
+    voices: Vec<(usize, f32)>,
+    step: u64,
+    begins: u64,
+}
+
+/// Whether the runs of a ray can be made together.
+pub(super) fn fits(edge: Edge<'_>, runs: &[Run<'_>]) -> bool {
+    let Some(first) = runs.first() else { return false };
+    let together = |run: &Run<'_>| {
+        let apart = run.turns.wrapping_sub(first.turns);
+        run.turns_step == first.turns_step && apart << 1 == 0 && run.step <= DENSEST
+    };
+    !matches!(edge, Edge::BandLimited(_)) && runs.iter().all(together)
+}
+
+/// Adds rays of several runs each to planar samples, as [`super::lanes::accumulate`] does single runs.
+#[inline(always)]
+pub(super) fn accumulate<const AREA: bool>(rays: &[&[Run<'_>]], chords: &mut Vec<Chord>, i: &mut [f32], q: &mut [f32]) {
+    if chords.len() < rays.len() {
+        chords.resize_with(rays.len(), Chord::default);
+    }
+    for (chord, runs) in chords.iter_mut().zip(rays) {
+        chord.anchor::<AREA>(runs);
+    }
+    for (group, (i, q)) in i.chunks_mut(GROUP).zip(q.chunks_mut(GROUP)).enumerate() {
+        let mut sums = Sums::new();
+        for (chord, runs) in chords.iter().zip(rays) {
+            chord.add::<AREA>(runs, group, &mut sums);
+        }
+        sums.add_to(i, q);
+    }
+}
+
+impl Chord {
+    #[inline(always)]
+    fn anchor<const AREA: bool>(&mut self, runs: &[Run<'_>]) {
+        let Some(first) = runs.first() else { return };
+        self.carrier.anchor(first, 1.0);
+        self.layers.clear();
+        for (number, run) in runs.iter().enumerate() {
+            let sign = if run.turns == first.turns { 1.0 } else { -1.0 };
+            let amplitude = sign * run.amplitude;
+            let known = self.layers.iter_mut().find(|layer| layer.step == run.step && layer.begins == run.position);
+            match known {
+                Some(layer) => layer.voices.push((number, layer.scaled::<AREA>(amplitude))),
+                None => {
+                    let mut layer = Layer::new::<AREA>(run);
+                    layer.voices.push((number, layer.scaled::<AREA>(amplitude)));
+                    self.layers.push(layer);
+                }
+            }
+        }
+    }
+
+    /// Adds one group.
+    #[inline(always)]
+    fn add<const AREA: bool>(&self, runs: &[Run<'_>], group: usize, sums: &mut Sums) {
+        let Carrier { cos, sin, re, im } = &self.carrier;
+        let (Some(re), Some(im)) = (re.get(group), im.get(group)) else { return };
+        let (mut before, mut after) = ([0.0_f32; HALF], [0.0_f32; HALF]);
+        for layer in &self.layers {
+            layer.add::<AREA>(runs, group as u64, &mut before, &mut after);
+        }
+        for k in 0..HALF {
+            let (a, b, c, d) = (re * cos[k], im * sin[k], re * sin[k], im * cos[k]);
+            sums.i_before[k] += before[k] * (a + b);
+            sums.q_before[k] += before[k] * (d - c);
+            sums.i_after[k] += after[k] * (a - b);
+            sums.q_after[k] += after[k] * (d + c);
+        }
+    }
+}
+
+impl Layer {
+    #[inline(always)]
+    fn new<const AREA: bool>(run: &Run<'_>) -> Self {
+        let unit = (1_u64 << (CODE_BITS - LANE_BITS)) as f64;
+        let dense = run.step > CODE_ONE;
+        let span = run.step as f64 / unit * if dense { 1.0 } else { 0.5 };
+        // The area of a sample ends half a step after its instant.
+        let position = match (AREA, dense) {
+            (false, _) => run.position,
+            (true, false) => run.position - run.step / 2 + run.step - CODE_ONE,
+            (true, true) => run.position - run.step / 2 + run.step - 2 * CODE_ONE,
+        };
+        let ahead: Side<u32> = std::array::from_fn(|k| lane(run.step * k as u64));
+        Self {
+            ahead,
+            behind: std::array::from_fn(|k| ahead[HALF - 1 - k]),
+            position,
+            stride: run.step * HALF as u64,
+            dense,
+            span: span as f32,
+            voices: Vec::with_capacity(4),
+            step: run.step,
+            begins: run.position,
+        }
+    }
+
+    /// Area values are ±`span`.
+    #[inline(always)]
+    fn scaled<const AREA: bool>(&self, amplitude: f64) -> f32 {
+        (if AREA { amplitude / f64::from(self.span) } else { amplitude }) as f32
+    }
+
+    /// Adds the layer's wave over a group, its earlier half backwards.
+    #[inline(always)]
+    fn add<const AREA: bool>(&self, runs: &[Run<'_>], group: u64, before: &mut Side, after: &mut Side) {
+        let (pairs, rest) = self.voices.as_chunks::<2>();
+        for voices in pairs {
+            self.add_some::<AREA, 2>(runs, voices, group, before, after);
+        }
+        for &voice in rest {
+            self.add_some::<AREA, 1>(runs, &[voice], group, before, after);
+        }
+    }
+
+    #[inline(always)]
+    fn add_some<const AREA: bool, const V: usize>(
+        &self,
+        runs: &[Run<'_>],
+        voices: &[(usize, f32); V],
+        group: u64,
+        before: &mut Side,
+        after: &mut Side,
+    ) {
+        let early = self.position + 2 * self.stride * group;
+        let late = early + self.stride;
+        let index = (early / CODE_ONE) as usize;
+        let signs = voices.map(|(number, _)| runs.get(number).map_or(0, |run| window(run.bits, index)));
+        // At most 29 of 64 steps have passed.
+        let passed = (late / CODE_ONE - early / CODE_ONE) as u32;
+        let later = signs.map(|signs| ((signs << passed) >> 32) as u32);
+        let amplitudes = voices.map(|(_, amplitude)| amplitude);
+        let signs = signs.map(|signs| (signs >> 32) as u32);
+        let sides = [(early, signs, &self.behind, before), (late, later, &self.ahead, after)];
+        for (position, signs, places, wave) in sides {
+            let fraction = lane(position) & FRACTION;
+            match (AREA, self.dense) {
+                (false, _) => each(fraction, places, wave, |place| nearest(&signs, &amplitudes, place)),
+                (true, false) => each(fraction, places, wave, |place| sparse(&signs, &amplitudes, self.span, place)),
+                (true, true) => each(fraction, places, wave, |place| dense(&signs, &amplitudes, self.span, place)),
+            }
+        }
+    }
+}
+
+/// Adds what a sequence is at every lane's place.
+#[inline(always)]
+fn each(fraction: u32, places: &Side<u32>, wave: &mut Side, value: impl Fn(u32) -> f32) {
+    for k in 0..HALF {
+        wave[k] += value(fraction.wrapping_add(places[k]));
+    }
+}
+
+/// `x` with its sign turned where the first bit is set.
+#[inline(always)]
+fn turned(x: f32, bits: u32) -> f32 {
+    f32::from_bits(x.to_bits() ^ (bits & SIGN))
+}
+
+#[inline(always)]
+fn nearest<const V: usize>(signs: &[u32; V], amplitudes: &[f32; V], place: u32) -> f32 {
+    let value = |v: usize| turned(amplitudes[v], signs[v] << (place >> LANE_BITS));
+    (1..V).fold(value(0), |sum, v| sum + value(v))
+}
+
+/// Behind a change the mean rises from −`span` to `span`, as far as the edge lies back; elsewhere it is
+/// `span` already.
+#[inline(always)]
+fn sparse<const V: usize>(signs: &[u32; V], amplitudes: &[f32; V], span: f32, place: u32) -> f32 {
+    let behind = (place & FRACTION) as i32 as f32;
+    let value = |v: usize| {
+        let earlier = signs[v] << (place >> LANE_BITS);
+        let now = earlier << 1;
+        let mean = behind + turned(span, earlier ^ now);
+        amplitudes[v] * turned(if mean < span { mean } else { span }, now)
+    };
+    (1..V).fold(value(0), |sum, v| sum + value(v))
+}
+
+/// A sample ends within a step and holds as much of it as lies behind its beginning, of the step before as
+/// much as is left or all of it, and the rest of the one before that.
+#[inline(always)]
+fn dense<const V: usize>(signs: &[u32; V], amplitudes: &[f32; V], span: f32, place: u32) -> f32 {
+    const STEP: f32 = (1_u32 << LANE_BITS) as f32;
+    let behind = (place & FRACTION) as i32 as f32;
+    let rest = span - behind;
+    let whole = if rest < STEP { rest } else { STEP };
+    let left = rest - whole;
+    let value = |v: usize| {
+        let first = signs[v] << (place >> LANE_BITS);
+        amplitudes[v] * (turned(left, first) + turned(whole, first << 1) + turned(behind, first << 2))
+    };
+    (1..V).fold(value(0), |sum, v| sum + value(v))
+}
