@@ -111,6 +111,15 @@ impl Waveform {
         }
     }
 
+    /// Power that the sampler meets, over that of the signal.
+    pub fn power(&self, edge: Edge, rate_hz: f64) -> f64 {
+        const HALF: i32 = 500;
+        let step_hz = 0.5 * rate_hz / f64::from(HALF);
+        // Midpoints over the samples' band, which holds every alias.
+        let at = |k: i32| self.sampled(edge, (f64::from(k) + 0.5) * step_hz, rate_hz);
+        step_hz * (-HALF..HALF).map(at).sum::<f64>()
+    }
+
     /// κ of another signal against this one: what its power adds to the noise density, over that power, in
     /// seconds. `apart_hz` is by how much the other's carrier is higher.
     ///
@@ -156,6 +165,17 @@ mod tests {
             assert!((power - expected).abs() < 5e-3, "{edge:?} {power}");
         }
         assert!(code.sampled(Edge::BandLimited, 1.023e6, 10e6) < 1e-20);
+    }
+
+    #[test]
+    fn the_power_that_is_met_is_that_of_the_averaged_correlation() {
+        // The triangle over ±w about a BPSK peak leaves 1 − w/3 of it; the tail beyond the fiftieth alias is
+        // below a thousandth.
+        for rate_hz in [2.6e6, 10e6] {
+            let found = of(&L1_CA).power(Edge::Area, rate_hz);
+            assert!((found - (1.0 - 1.023e6 / rate_hz / 3.0)).abs() < 1e-3, "{found}");
+            assert!((of(&L1_CA).power(Edge::Nearest, rate_hz) - 1.0).abs() < 3e-3);
+        }
     }
 
     #[test]

@@ -22,9 +22,9 @@ struct Entry {
 /// What a receiver follows of a signal.
 #[derive(Clone, Debug)]
 pub(in crate::analysis) struct Followed {
-    /// Of what is sent with the replica, and of the replica with itself.
-    pub waveforms: [Waveform; 2],
-    /// Power that the replica finds, over the whole signal's.
+    /// Of what is sent with the replica, of the replica with itself, and of what is sent with itself.
+    pub waveforms: [Waveform; 3],
+    /// Power of the component over the whole signal's.
     pub share: f64,
     /// Distance of early and late, chips; the settings' where the receiver does not say it, as the others.
     pub spacing_chips: Option<f64>,
@@ -51,12 +51,10 @@ impl Followed {
             None => None,
         };
         let [found, own] = shapes(component, made);
-        let peak = found.correlation(0.0);
-        let share = component.power_share * peak * peak / own.correlation(0.0);
         let rate_hz = component.chip_rate_hz;
         Some(Self {
-            waveforms: [found, own].map(|shape| Waveform::of_shape(shape, rate_hz)),
-            share,
+            waveforms: [found, own, component.shape()].map(|shape| Waveform::of_shape(shape, rate_hz)),
+            share: component.power_share,
             spacing_chips: entry.as_ref().map(|entry| entry.spacing_chips),
             integration_s: entry.as_ref().map(|entry| entry.integration_s),
             pll_bandwidth_hz: entry.as_ref().map(|entry| entry.pll_bandwidth_hz),

@@ -286,7 +286,7 @@ impl Theory {
     pub fn new(run: &Run, settings: Settings, link: &Link, update_s: f64) -> Option<Self> {
         let followed = Followed::of(run, link.signal)?;
         let settings = settings.fitted(&followed);
-        let [waveform, replica] = &followed.waveforms;
+        let [waveform, replica, sent] = &followed.waveforms;
         let chip_rate_hz = waveform.chip_rate_hz();
         let code = Code::of(waveform);
         if 0.5 * settings.spacing_chips >= code.reach_chips {
@@ -297,18 +297,20 @@ impl Theory {
         let width_chips = chip_rate_hz / run.scene.sample_rate_hz;
         let of_replica = u32::from(settings.averaged_replica);
         let of_signal = u32::from(run.scene.code_edge == Edge::Area);
+        let found = Peak::new(waveform, width_chips, of_replica + of_signal);
+        let own = Peak::new(replica, width_chips, 2 * of_replica);
+        // Of the component's power in the samples, which is whole whatever their averages leave of a layer.
+        let efficiency = found.value(0.0) * found.value(0.0) / own.value(0.0);
+        let efficiency = efficiency / Peak::new(sent, width_chips, 2 * of_signal).value(0.0);
         Some(Self {
             settings,
             update_s,
             chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
             carrier_hz: link.carrier_hz(),
-            share: followed.share,
+            share: followed.share * efficiency,
             pll: (pll, Response::of(&pll)),
             dll: (dll, Response::of(&dll)),
-            peaks: (
-                Peak::new(waveform, width_chips, of_replica + of_signal),
-                Peak::new(replica, width_chips, 2 * of_replica),
-            ),
+            peaks: (found, own),
             code,
             oscillator: run.scene.oscillator.map(|noise| PowerLaw { h: noise.h }),
         })

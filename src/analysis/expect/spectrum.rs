@@ -88,15 +88,20 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
     let sign = if run.scene.inverted { -1.0 } else { 1.0 };
     let bin_hz = run.psd.get(1).zip(run.psd.first()).map_or(1.0, |(b, a)| b.frequency_hz - a.frequency_hz);
     let if_hz = signals.first().map_or(0.0, |signal| sign * (signal.nominal_hz - center_hz));
-    let waveforms: Vec<(&MeanSignal, Waveform)> =
-        signals.iter().filter_map(|signal| Some((signal, Waveform::of(signal.signal)?))).collect();
+    // Samples have the whole power of a signal, whatever of its spectrum the sampler meets.
+    let edge = run.scene.code_edge;
+    let met = |signal: &'static Signal| Some((Waveform::of(signal)?, Waveform::of(signal)?.power(edge, rate_hz)));
+    let known: BTreeMap<&Signal, (Waveform, f64)> =
+        run.signals.iter().filter_map(|&signal| Some((signal, met(signal)?))).collect();
+    let waveforms: Vec<(&MeanSignal, &(Waveform, f64))> =
+        signals.iter().filter_map(|signal| Some((signal, known.get(signal.signal)?))).collect();
     let mut density: Vec<f64> = run
         .psd
         .iter()
         .map(|row| {
-            let of = |(signal, waveform): &(&MeanSignal, Waveform)| {
+            let of = |(signal, (waveform, power)): &(&MeanSignal, &(Waveform, f64))| {
                 let from_carrier_hz = row.frequency_hz - sign * (signal.carrier_hz - center_hz);
-                signal.cn0_hz * waveform.sampled(run.scene.code_edge, from_carrier_hz, rate_hz)
+                signal.cn0_hz * waveform.sampled(edge, from_carrier_hz, rate_hz) / power
             };
             let jammed: f64 = sources.values().map(|source| jamming::density(source, row.frequency_hz, bin_hz)).sum();
             floor + waveforms.iter().map(of).sum::<f64>() + jammed
