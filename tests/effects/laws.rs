@@ -27,7 +27,7 @@ const GALILEO: Base = Base {
     scenario: "name = \"laws\"\nstart = 2020-11-29T12:50:31\nduration_s = 0.12\nseed = 3\nsignals = [\"Galileo E1\"]\n\
         [motion]\nkind = \"static\"\nlatitude_deg = 37.6\nlongitude_deg = -1\nheight_m = 130\n\
         [satellites]\nmask_deg = 30\n",
-    satellite: "E12",
+    satellite: "E19",
     orbits: "COD21340.sp3.gz",
 };
 

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, Normal as Gauss};
 
 use crate::gnss::samples::{Format, IfMetadata};
-use crate::gnss::signal::{Component, Link};
+use crate::gnss::signal::{Component, Layer, Link};
 use crate::gnss::time::Rate;
 use crate::receiver::lead::lead;
 use crate::receiver::source::Block;
@@ -76,13 +76,16 @@ impl Integral {
     fn new(component: &'static Component, number: u8) -> Self {
         let (code, steps) = ((component.code)(number).unwrap(), component.steps_per_chip());
         let duty = code.iter().filter(|chip| **chip != 0).count() as f64 / code.len() as f64;
-        assert!(component.layers.iter().all(|layer| layer.phase_cycles == 0.0));
+        // In phase or against it.
+        assert!(component.layers.iter().all(|layer| layer.phase_cycles == 0.0 || layer.phase_cycles == 0.5));
+        let weight = |layer: &Layer| if layer.phase_cycles == 0.5 { -layer.weight } else { layer.weight };
         let mut sums = vec![0.0];
         for (index, &chip) in code.iter().enumerate() {
             let layers = || component.layers.iter().filter(|layer| layer.covers(index));
             for step in 0..steps {
-                let value: f64 =
-                    layers().map(|layer| layer.weight * f64::from(layer.pulse[step * layer.pulse.len() / steps])).sum();
+                let value: f64 = layers()
+                    .map(|layer| weight(layer) * f64::from(layer.pulse[step * layer.pulse.len() / steps]))
+                    .sum();
                 sums.push(sums[sums.len() - 1] + value * f64::from(chip) / steps as f64);
             }
         }

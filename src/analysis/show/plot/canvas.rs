@@ -95,12 +95,13 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         .set_label_area_size(LabelAreaPosition::Left, LEFT_PX * FINE)
         .set_label_area_size(LabelAreaPosition::Bottom, BOTTOM_PX * FINE)
         .build_cartesian_2d(x.from..x.to, y.from..y.to)?;
-    let (x_decimals, y_decimals) = (decimals(x.span()), decimals(y.span()));
     // As many as fit side by side, a digit being 7 pixels wide at most.
-    let digits = [x.from, x.to].map(|end| tick(end, x_decimals).len()).into_iter().max().unwrap_or(1);
+    let finest = decimals(x.span(), 10);
+    let digits = [x.from, x.to].map(|end| tick(end, finest).len()).into_iter().max().unwrap_or(1);
     let across_px = width as i32 / FINE - LEFT_PX - RIGHT_PX - EDGE_PX;
     let x_labels = (across_px / (7 * digits as i32 + 12)).clamp(3, 10) as usize;
     let y_labels = ((height as i32 / FINE - TOP_PX - BOTTOM_PX - EDGE_PX) / 18).clamp(4, 12) as usize;
+    let (x_decimals, y_decimals) = (decimals(x.span(), x_labels), decimals(y.span(), y_labels));
     let (ticked, y_ticked) = (chart.x_ticks.is_some(), chart.y_ticks.is_some());
     let mut mesh = context.configure_mesh();
     if y_ticked {
@@ -258,8 +259,12 @@ fn widen(axis: &mut Axis, span: f64) {
 }
 
 /// Decimals that distinguish neighbouring ticks of an axis.
-fn decimals(span: f64) -> usize {
-    libm::ceil(-libm::log10(span / 5.0)).clamp(0.0, 12.0) as usize
+fn decimals(span: f64, labels: usize) -> usize {
+    // Labels stand 1, 2 or 5 times a power of ten apart, so that there are no more than wanted.
+    let least = span / labels as f64;
+    let power = libm::pow(10.0, libm::floor(libm::log10(least)));
+    let apart = [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|apart| *apart > 0.999 * least);
+    libm::ceil(-libm::log10(apart.unwrap_or(power)) - 1e-6).clamp(0.0, 12.0) as usize
 }
 
 fn tick(value: f64, decimals: usize) -> String {
@@ -274,7 +279,9 @@ mod tests {
 
     #[test]
     fn ticks_have_as_many_decimals_as_tell_them_apart() {
-        assert_eq!((decimals(60.0), decimals(4.0), decimals(0.03)), (0, 1, 3));
+        assert_eq!((decimals(60.0, 10), decimals(4.0, 10), decimals(0.03, 5)), (0, 1, 2));
+        // Four and a half units in twelve labels stand half a unit apart, in five a whole one.
+        assert_eq!((decimals(4.5, 12), decimals(4.5, 5)), (1, 0));
         assert_eq!((tick(-0.0, 1), tick(-0.04, 1), tick(-1.0, 0)), ("0.0".into(), "0.0".into(), "-1".into()));
     }
 }

@@ -7,6 +7,8 @@ pub(super) const IONEX: &str = "[ionosphere]\nmodel = \"ionex\"\nfile = \"igrg33
     interpolation = \"bicubic\"\nmapping = \"modified_single_layer\"\n";
 pub(super) const TEC: &str =
     "[ionosphere]\nmodel = \"constant_tec\"\nvtec_tecu = 20\nshell_km = 400\nmapping = \"single_layer\"\n";
+pub(super) const NEQUICK: &str =
+    "[ionosphere]\nmodel = \"nequick_g\"\nai = [120, 0.25, 0.0125]\nbroadcast_ai = [100, 0.125, 0]\n";
 pub(super) const VIENNA: &str = "[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf1\"\ngpt3_file = \"gpt3_5.grd\"\nvmf_file = \"VMF3_20181125.H00\"\n";
 
 #[test]
@@ -52,6 +54,23 @@ fn maps_of_another_day_are_refused_unless_the_scene_says_so() {
     assert!(error.contains("ionosphere.file"), "{error}");
     let error = compose(&IONEX.replace("igrg3380.10i.gz", "ride.csv")).unwrap_err();
     assert!(error.contains("ride.csv:1") && error.contains("IONEX VERSION / TYPE"), "{error}");
+}
+
+#[test]
+fn nequick_wants_coefficients_and_sends_what_the_scene_says() {
+    let compose = |lines: &str| {
+        let text = format!("{MINIMAL}{STATIC}{lines}");
+        parse(&text).unwrap().compose(Path::new("."), &Overrides::default())
+    };
+    let (scene, _) = compose(NEQUICK).unwrap();
+    assert!(scene.effects[0].describe().contains("NeQuick-G"));
+    // The file of 2010 has none of Galileo's.
+    let error = compose("[ionosphere]\nmodel = \"nequick_g\"\n").err().unwrap().to_string();
+    assert!(error.contains("write ai here"), "{error}");
+    let error = parse(&format!("{MINIMAL}{STATIC}{NEQUICK}alpha = [0, 0, 0, 0]\n")).unwrap_err().to_string();
+    assert!(error.contains("unknown key 'ionosphere.alpha'"), "{error}");
+    let parsed = parse(&format!("{MINIMAL}{STATIC}{NEQUICK}")).unwrap();
+    assert_eq!(parsed.ionosphere.unwrap().sent_nequick(), Some([100.0, 0.125, 0.0]));
 }
 
 #[test]
