@@ -6,7 +6,9 @@
 //! the front end's first signal, the scan takes the signal whose code is longest, and whole code periods are
 //! counted by the signal whose symbols or overlay are longest. Limits: a channel whose code period does not
 //! divide what the scan leaves open is searched for anew. Whole periods of all codes that are no whole symbol
-//! show in no code: channels lose their symbols and are found anew, and the loss may go uncounted.
+//! show in no code but in the signs of symbols within 0.4 s and of overlays within 0.15 s, in which a phase
+//! loop loses its lock: where that takes longer than the lock's patience (code periods of 10 ms and more),
+//! or the signs stay in doubt for two seconds, channels are lost and found anew.
 
 use std::collections::VecDeque;
 

@@ -69,7 +69,10 @@ impl FrontEnd {
             .collect();
         let enough = profiles.len() >= LEAST_CHANNELS;
         match scan.decide(&profiles).filter(|_| enough) {
-            // A power that vanished without a jump is someone else's matter.
+            // An overlay out of place shakes the carrier until no power is left: the turns of its signs show
+            // it next, and want to know what was before.
+            Some(found) if found.samples == 0 && !whole && self.has_overlays() => self.gap.stage = Stage::Quiet,
+            // Otherwise a power that vanished without a jump is someone else's matter.
             Some(found) if found.samples == 0 && !whole => self.calm(),
             Some(found) => self.reseat(Moved { since, at: block.end(), found, whole }, sink)?,
             None if block.end() > since + self.samples(SCAN_S) => self.calm(),
@@ -105,8 +108,9 @@ impl FrontEnd {
             };
             let ahead = jump_chips + found.seconds * units.doppler_chips(&track.channel, &glanced);
             let expected = watched.trend.forecast(now_s).map_or(watched.moved_chips, |expected| expected.chips);
-            // Where an overlay is out of place the phase loop has followed anything.
-            let rates = (!whole || track.channel.has_overlay()).then_some(glanced);
+            // Where an overlay is out of place the phase loop has followed anything, for several looks.
+            let before = watched.rates_before(now_s).filter(|_| whole && track.channel.has_overlay());
+            let rates = before.or((!whole).then_some(glanced));
             track.channel.reseat(now, ahead / units.chips, Some(expected), rates, &mut report);
             track.line.clear();
             let (sv, signal) = (track.channel.sv(), track.channel.signal());

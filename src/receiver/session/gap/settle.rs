@@ -56,7 +56,7 @@ impl FrontEnd {
 
     /// Code periods that are missing beside what the scan found, and their length: as the signal says whose
     /// symbols or overlay are longest of those that say something, and near what the Dopplers say.
-    fn missing(&self, found: Found, fit: &Fit) -> Option<(i64, f64)> {
+    fn missing(&self, found: Found, fit: Option<&Fit>) -> Option<(i64, f64)> {
         let rate_hz = self.metadata.rate.hz();
         let one = |signal: &'static Signal| {
             let (turned, group) = self.turned(signal)?;
@@ -65,7 +65,11 @@ impl FrontEnd {
         };
         let known = self.signals.iter().rev().filter_map(|signal| one(signal));
         let (_, (turned, group, period_s)) = known.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let periods = whole_periods(found, turned, group, period_s * rate_hz, rate_hz, fit)?;
+        let periods = match fit {
+            Some(fit) => whole_periods(found, turned, group, period_s * rate_hz, rate_hz, fit)?,
+            // Where no code has a past to compare with, the smallest is the likely one.
+            None => smallest(turned as i64, group as i64),
+        };
         Some((periods, period_s))
     }
 
@@ -85,12 +89,17 @@ impl FrontEnd {
         let Some(reference) = self.reference() else { return Ok(()) };
         let steps = self.steps(shared);
         let rate_hz = self.metadata.rate.hz();
-        let known = Fit::robust(&steps, None).and_then(|fit| self.missing(found, &fit));
+        let fit = Fit::robust(&steps, None);
+        // Codes that did not move may have no past to compare with, where their carriers were shaken for
+        // long.
+        let guessed = steps.is_empty() && whole && found.samples == 0;
+        let known = if fit.is_some() || guessed { self.missing(found, fit.as_ref()) } else { None };
         if known.is_none() && waited < self.samples(TURNS_LIMIT_S) {
             return Ok(());
         }
         // Codes that are where they were, on carriers that never broke, have lost no periods as far as anyone
         // can say.
+        let counted = known.is_some();
         let known = known.or((whole && found.samples == 0).then_some((0, 1e-3)));
         let (periods, period_s) = known.unwrap_or((0, 1e-3));
         let missing_s = periods as f64 * period_s;
@@ -114,7 +123,9 @@ impl FrontEnd {
         let now_s = self.metadata.rate.elapsed_s(now);
         for track in self.tracks.iter_mut().filter(|track| !track.dropped) {
             let units = Units::of(&track.channel, reference);
-            let Some(own) = whole_number(missing_s / units.period_s) else {
+            // Signs that stay in doubt are those of an overlay that is somewhere else.
+            let own = whole_number(missing_s / units.period_s);
+            let Some(own) = own.filter(|_| counted || !track.channel.has_overlay()) else {
                 // Its code is elsewhere: it is searched for anew.
                 (track.dropped, track.wrong_time) = (true, WRONG_TIME_FIXES);
                 continue;
@@ -152,6 +163,11 @@ impl FrontEnd {
     }
 }
 
+/// The number nearest to zero that is `turned` modulo `group`.
+fn smallest(turned: i64, group: i64) -> i64 {
+    turned - if 2 * turned > group { group } else { 0 }
+}
+
 /// The whole code periods that are missing beside what the scan found: `turned` modulo `group`, and near what
 /// the Dopplers say.
 fn whole_periods(found: Found, turned: u64, group: u64, period_samples: f64, rate_hz: f64, fit: &Fit) -> Option<i64> {
@@ -165,7 +181,7 @@ fn whole_periods(found: Found, turned: u64, group: u64, period_samples: f64, rat
     let fits = off_s < SURE_SIGMAS * fit.sigma_s + MODEL_S;
     let alone = group_s > 2.0 * SURE_SIGMAS * fit.sigma_s;
     // Where the Dopplers say little, a jump within half a symbol is the likely one if they allow for it.
-    let small = turned - if 2 * turned > group { group } else { 0 };
+    let small = smallest(turned, group);
     if fits && alone {
         return Some(periods);
     }

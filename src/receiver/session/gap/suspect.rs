@@ -131,6 +131,11 @@ impl FrontEnd {
         }
     }
 
+    /// Whether channels follow pilots whose overlay is known.
+    pub(super) fn has_overlays(&self) -> bool {
+        self.tracks.iter().any(|track| track.channel.has_overlay())
+    }
+
     /// Steps of the latest looks together.
     fn lasting(&self, shared: &Shared) -> Vec<Step> {
         let one = |track: &Track| {
@@ -163,12 +168,8 @@ impl FrontEnd {
         if !moved {
             return Ok(());
         }
-        let now_s = self.metadata.rate.elapsed_s(now);
         for track in &mut self.tracks {
             track.watched.begin = track.channel.symbols_begin();
-            if track.channel.has_overlay() {
-                track.watched.rates = track.watched.rates_before(now_s).or(track.watched.rates);
-            }
         }
         let found = Found { samples: 0, seconds: 0.0 };
         self.reseat(Moved { since, at: now, found, whole: true }, sink)
