@@ -44,6 +44,16 @@ struct Row {
 }
 
 /// Noise of 8 bits, by a 64-bit congruential generator.
+/// Oscillators of channel `n`: all of them differ.
+fn oscillators(n: usize, rate_hz: f64) -> Nco {
+    Nco {
+        carrier: 0,
+        carrier_step: (n as u64 + 1) << 52,
+        code: chips_to_units(n as f64 * 0.1),
+        code_step: chips_to_units(CHIP_HZ / rate_hz) as u64,
+    }
+}
+
 fn noise(bytes: usize) -> Vec<u8> {
     let mut state = 1_u64;
     let mut next = || {
@@ -70,12 +80,7 @@ fn tracking(rate_hz: f64, edge: Edge, arithmetic: Arithmetic) -> Box<dyn FnMut()
         Format::Ci8.unpack(&bytes, &mut i, &mut q);
         let mut done = 0;
         for (n, replica) in replicas.iter().take(channels).enumerate() {
-            let nco = Nco {
-                carrier: 0,
-                carrier_step: (n as u64 + 1) << 52,
-                code: chips_to_units(n as f64 * 0.1),
-                code_step: chips_to_units(CHIP_HZ / rate_hz) as u64,
-            };
+            let nco = oscillators(n, rate_hz);
             // Periods of a real channel begin anywhere.
             let (i, q) = (&i[n..], &q[n..]);
             for (i, q) in i.chunks_exact(period).zip(q.chunks_exact(period)) {
@@ -188,12 +193,7 @@ fn tracking_pairs(arithmetic: Arithmetic) -> Box<dyn FnMut() -> f64> {
         Format::Ci8.unpack(&bytes, &mut i, &mut q);
         let mut done = 0;
         for (n, (data, pilot)) in data.iter().zip(&pilot).enumerate() {
-            let nco = Nco {
-                carrier: 0,
-                carrier_step: (n as u64 + 1) << 52,
-                code: chips_to_units(n as f64 * 0.1),
-                code_step: chips_to_units(CHIP_HZ / rate_hz) as u64,
-            };
+            let nco = oscillators(n, rate_hz);
             let (i, q) = (&i[n..], &q[n..]);
             for samples in i.chunks_exact(period).zip(q.chunks_exact(period)) {
                 black_box(pilot.correlate_in(arithmetic, samples, &nco, &taps));

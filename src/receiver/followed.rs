@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use crate::gnss::signal::Signal;
-use crate::receiver::correlate::wave::strongest;
 use crate::receiver::lead::lead;
 use crate::receiver::settings::Settings;
 
@@ -30,7 +29,7 @@ impl Followed {
     /// Of a signal by these settings; `None` where nothing of it can be followed.
     pub fn of(signal: &'static Signal, settings: &Settings) -> Option<Self> {
         let leading = lead(signal)?;
-        let made = strongest(leading)?;
+        let made = leading.strongest()?;
         let fitted = settings.tracking.fitted(leading);
         Some(Self {
             signal: signal.name,

@@ -1,7 +1,7 @@
 //! The component of a signal that a receiver searches and follows.
 
-use crate::gnss::signal::{Component, Layer, Shape, Signal};
-use crate::receiver::correlate::{fits, wave};
+use crate::gnss::signal::{Component, Shape, Signal};
+use crate::receiver::correlate::fits;
 
 /// The strongest component whose code is short enough to be made; of equally strong ones a pilot.
 ///
@@ -29,18 +29,7 @@ pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'st
 
 /// Correlation of a component with the replica that is made of it, and of the replica with itself.
 pub fn shapes(component: &Component) -> Option<[Shape; 2]> {
-    let strongest = wave::strongest(component)?;
-    let made = [Layer { weight: 1.0, phase_cycles: 0.0, ..*strongest }];
-    // The replica has the layer's phase and sign.
-    let sign = strongest.weight.signum();
-    let turned: Vec<Layer> = (component.layers.iter())
-        .map(|layer| Layer {
-            weight: sign * layer.weight,
-            phase_cycles: layer.phase_cycles - strongest.phase_cycles,
-            ..*layer
-        })
-        .collect();
-    Some([&turned, &made[..]].map(|sent| Shape::between(sent, &made, component.chip_rate_hz)))
+    Some(component.shapes_by(component.strongest()?))
 }
 
 /// Power that the replica finds, over the component's.

@@ -368,9 +368,11 @@ fn summary(
             "start": metadata.start.map(|start| start.to_string()),
         })
     };
+    let all = settings.acquisition.signals();
+    let followed: Vec<Followed> = all.into_iter().filter_map(|signal| Followed::of(signal, settings)).collect();
     let mut summary = json!({
         "settings": settings,
-        "followed": settings.acquisition.signals().into_iter().filter_map(|s| Followed::of(s, settings)).collect::<Vec<_>>(),
+        "followed": followed,
         "metadata": metadata.first().map(of),
         "samples": outcome.samples,
         "seconds": outcome.seconds,

@@ -132,21 +132,30 @@ impl Ideal {
     }
 }
 
+/// By how much the time of [`OTHER`] is ahead.
+const AHEAD_S: f64 = 40e-9;
+
+impl Ideal {
+    /// Observations of which every other satellite sends by a clock that is ahead.
+    fn of_two_systems(&self) -> Vec<Observation> {
+        let mut observations = self.observations(SAMPLE);
+        for observation in observations.iter_mut().skip(1).step_by(2) {
+            let sent = observation.sent().plus_s(AHEAD_S);
+            (observation.sent_s, observation.sent_fraction_s) = (sent.seconds(), sent.fraction());
+            (observation.signal, observation.pseudorange_m) =
+                (&OTHER, observation.pseudorange_m - SPEED_OF_LIGHT_MPS * AHEAD_S);
+        }
+        observations
+    }
+}
+
 /// L1 C/A in a time of its own, behind GPS time by no whole second.
 static OTHER: Signal = Signal { name: "other", time: &TimeScale { name: "other", behind_gpst_s: 0 }, ..L1_CA };
 
 #[test]
 fn two_systems_whose_times_differ_give_one_place_and_a_clock_of_each() {
-    const AHEAD_S: f64 = 40e-9;
     let ideal = Ideal::new();
-    let mut observations = ideal.observations(SAMPLE);
-    // Every other satellite sends by a clock that is ahead.
-    for observation in observations.iter_mut().skip(1).step_by(2) {
-        let sent = observation.sent().plus_s(AHEAD_S);
-        (observation.sent_s, observation.sent_fraction_s) = (sent.seconds(), sent.fraction());
-        (observation.signal, observation.pseudorange_m) =
-            (&OTHER, observation.pseudorange_m - SPEED_OF_LIGHT_MPS * AHEAD_S);
-    }
+    let observations = ideal.of_two_systems();
     let noises = vec![(&L1_CA, noise()), (&OTHER, noise())];
     let solved = Solver::new(&PositionSettings::default(), noises, ideal.clock.rate)
         .solve(SAMPLE, ideal.clock, &observations, &ideal.ephemerides(), Some(Coefficients::Klobuchar(ideal.klobuchar)))
@@ -166,15 +175,8 @@ fn two_systems_whose_times_differ_give_one_place_and_a_clock_of_each() {
 
 #[test]
 fn with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_time() {
-    const AHEAD_S: f64 = 40e-9;
     let ideal = Ideal::new();
-    let mut observations = ideal.observations(SAMPLE);
-    for observation in observations.iter_mut().skip(1).step_by(2) {
-        let sent = observation.sent().plus_s(AHEAD_S);
-        (observation.sent_s, observation.sent_fraction_s) = (sent.seconds(), sent.fraction());
-        (observation.signal, observation.pseudorange_m) =
-            (&OTHER, observation.pseudorange_m - SPEED_OF_LIGHT_MPS * AHEAD_S);
-    }
+    let observations = ideal.of_two_systems();
     let settings = PositionSettings { system_clocks: SystemClocks::Broadcast, ..PositionSettings::default() };
     let at = ideal.clock.epoch(SAMPLE);
     // An hour old, with a rate.

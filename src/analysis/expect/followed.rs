@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::analysis::read::Run;
 use crate::analysis::waveform::{Waveform, leading};
-use crate::gnss::signal::{Component, Layer, Shape, Signal};
+use crate::gnss::signal::Signal;
 
 /// What `receiver.json` says of a signal.
 #[derive(Clone, Debug, Deserialize)]
@@ -46,11 +46,10 @@ impl Followed {
             Some(entry) => signal.components.get(entry.component)?,
             None => leading(signal)?,
         };
-        let made = match &entry {
-            Some(entry) => Some(component.layers.get(entry.layer)?),
-            None => None,
+        let [found, own] = match &entry {
+            Some(entry) => component.shapes_by(component.layers.get(entry.layer)?),
+            None => [component.shape(), component.shape()],
         };
-        let [found, own] = shapes(component, made);
         let rate_hz = component.chip_rate_hz;
         Some(Self {
             waveforms: [found, own, component.shape()].map(|shape| Waveform::of_shape(shape, rate_hz)),
@@ -63,34 +62,15 @@ impl Followed {
     }
 }
 
-/// Correlation of a component with a replica that has one layer of it, or all, and of that replica with
-/// itself.
-fn shapes(component: &Component, made: Option<&Layer>) -> [Shape; 2] {
-    let of = |sent: &[Layer], made: &[Layer]| Shape::between(sent, made, component.chip_rate_hz);
-    let Some(made) = made else {
-        return [of(component.layers, component.layers), of(component.layers, component.layers)];
-    };
-    // In the layer's phase and sign.
-    let turned = |layer: &Layer| Layer {
-        weight: made.weight.signum() * layer.weight,
-        phase_cycles: layer.phase_cycles - made.phase_cycles,
-        ..*layer
-    };
-    let sent: Vec<Layer> = component.layers.iter().map(turned).collect();
-    let alone = [Layer { weight: 1.0, phase_cycles: 0.0, ..*made }];
-    [of(&sent, &alone), of(&alone, &alone)]
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::gnss::galileo::e1::E1;
     use crate::gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn a_pilot_s_boc_finds_half_the_power_less_a_tenth_and_a_bit_for_a_wide_slope() {
         let pilot = &E1.components[1];
-        let [found, own] = shapes(pilot, pilot.layers.first());
+        let [found, own] = pilot.shapes_by(&pilot.layers[0]);
         let chip_s = 1.0 / pilot.chip_rate_hz;
         // BOC(1,1) with itself is 1 − 3τ, and BOC(6,1) beside it has no part in phase at no delay.
         assert!((own.correlation(0.1 * chip_s) - 0.7).abs() < 1e-12 && (own.correlation(0.0) - 1.0).abs() < 1e-12);
@@ -103,7 +83,7 @@ mod tests {
     #[test]
     fn a_code_of_one_layer_is_what_it_was() {
         let component = &L1_CA.components[0];
-        let [found, own] = shapes(component, component.layers.first());
+        let [found, own] = component.shapes_by(&component.layers[0]);
         for k in 0..=20 {
             let delay_s = 0.05 * f64::from(k) / component.chip_rate_hz;
             let triangle = 1.0 - 0.05 * f64::from(k);

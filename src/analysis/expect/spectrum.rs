@@ -90,9 +90,12 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
     let if_hz = signals.first().map_or(0.0, |signal| sign * (signal.nominal_hz - center_hz));
     // Samples have the whole power of a signal, whatever of its spectrum the sampler meets.
     let edge = run.scene.code_edge;
-    let met = |signal: &'static Signal| Some((Waveform::of(signal)?, Waveform::of(signal)?.power(edge, rate_hz)));
+    let with_power = |waveform: Waveform| {
+        let power = waveform.power(edge, rate_hz);
+        (waveform, power)
+    };
     let known: BTreeMap<&Signal, (Waveform, f64)> =
-        run.signals.iter().filter_map(|&signal| Some((signal, met(signal)?))).collect();
+        run.signals.iter().filter_map(|&signal| Some((signal, with_power(Waveform::of(signal)?)))).collect();
     let waveforms: Vec<(&MeanSignal, &(Waveform, f64))> =
         signals.iter().filter_map(|signal| Some((signal, known.get(signal.signal)?))).collect();
     let mut density: Vec<f64> = run

@@ -334,6 +334,20 @@ impl Component {
         Shape::of(self)
     }
 
+    /// Correlation of the waveform with a replica of one of its layers, which has that layer's phase and sign,
+    /// and of the replica, of unit weight, with itself.
+    pub fn shapes_by(&self, made: &Layer) -> [Shape; 2] {
+        let turned: Vec<Layer> = (self.layers.iter())
+            .map(|layer| Layer {
+                weight: made.weight.signum() * layer.weight,
+                phase_cycles: layer.phase_cycles - made.phase_cycles,
+                ..*layer
+            })
+            .collect();
+        let alone = [Layer { weight: 1.0, phase_cycles: 0.0, ..*made }];
+        [&turned, &alone[..]].map(|sent| Shape::between(sent, &alone, self.chip_rate_hz))
+    }
+
     fn has_code(&self, number: u8) -> bool {
         (self.code)(number).is_some() && self.overlay.of(number).is_some()
     }

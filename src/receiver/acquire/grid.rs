@@ -21,7 +21,6 @@ use super::replica::Replica;
 use super::settings::AcquisitionSettings;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Component;
-use crate::receiver::correlate::wave::strongest;
 use crate::receiver::source::Block;
 use crate::receiver::threshold::{of_one_cell, threshold};
 
@@ -100,7 +99,7 @@ pub(super) fn samples_needed(period_samples: f64, coherent_periods: f64, sums: u
 
 /// Steps of a replica a second: cells are theirs, as its correlation is as narrow as they are.
 fn step_rate_hz(component: &Component) -> Option<f64> {
-    Some(component.chip_rate_hz * strongest(component)?.pulse.len() as f64)
+    Some(component.chip_rate_hz * component.strongest()?.pulse.len() as f64)
 }
 
 impl Grid {

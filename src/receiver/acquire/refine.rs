@@ -12,7 +12,6 @@ use rustfft::FftPlanner;
 use super::grid::Grid;
 use super::replica::Replica;
 use crate::gnss::signal::{Component, Shape};
-use crate::receiver::correlate::wave::strongest;
 use crate::receiver::correlate::{Nco, TURN, chips_to_units, units_to_chips};
 use crate::receiver::source::Block;
 
@@ -62,7 +61,7 @@ pub(super) fn refine(
     };
     let doppler_hz = correlators.fine_doppler_hz(phase, doppler_hz);
 
-    let shape = strongest(component).map_or_else(
+    let shape = component.strongest().map_or_else(
         || component.shape(),
         |layer| {
             let layers = [*layer];

@@ -4,7 +4,7 @@
 //! BPSK and BOC are made as they are. Of CBOC, TMBOC and QMBOC the strongest layer is made: against the full
 //! waveform that costs 0.4 dB where BOC(6,1) has a tenth of the power, and spares steps six times as short.
 
-use crate::gnss::signal::{Component, Layer};
+use crate::gnss::signal::Component;
 
 /// One period of a replica: equal steps of −1, 0 and +1.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +21,7 @@ impl Wave {
     /// Of a satellite by its number; `None` where the documents assign it no code.
     pub fn new(component: &Component, number: u8) -> Option<Self> {
         let chips = (component.code)(number)?;
-        let layer = strongest(component)?;
+        let layer = component.strongest()?;
         let values = chips.iter().enumerate().flat_map(|(index, &chip)| {
             let chip = if layer.covers(index) { chip } else { 0 };
             layer.pulse.iter().map(move |&sign| chip * sign)
@@ -34,13 +34,8 @@ impl Wave {
 
 /// Whether a replica can be made of a component's code: its period has fewer than 2¹⁵ steps.
 pub fn fits(component: &Component) -> bool {
-    let each = strongest(component).map_or(0, |layer| layer.pulse.len());
+    let each = component.strongest().map_or(0, |layer| layer.pulse.len());
     (64..super::MOST_STEPS).contains(&(component.code_chips as usize * each))
-}
-
-/// The layer that replicas are made of.
-pub fn strongest(component: &Component) -> Option<&Layer> {
-    component.strongest()
 }
 
 #[cfg(test)]

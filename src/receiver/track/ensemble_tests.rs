@@ -15,7 +15,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
 use crate::gnss::signal::{Component, Layer, Shape, Signal};
 use crate::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
-use crate::receiver::correlate::{correlation, wave};
+use crate::receiver::correlate::correlation;
 use crate::receiver::lead::lead;
 
 fn is_long() -> bool {
@@ -210,7 +210,7 @@ struct Theory {
 impl Theory {
     /// Of the leading component of a signal of `cn0_dbhz`, followed with settings that are fitted to it.
     fn new(component: &Component, settings: &TrackingSettings, rate_hz: f64, cn0_dbhz: f64) -> Self {
-        let strongest = wave::strongest(component).unwrap();
+        let strongest = component.strongest().unwrap();
         let made = [Layer { weight: 1.0, ..*strongest }];
         let chips_per_sample = component.chip_rate_hz / rate_hz;
         let at = |sent: &[Layer], chips: f64| {

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::gnss::signal::Component;
-use crate::receiver::correlate::wave::strongest;
 use crate::receiver::correlate::{Arithmetic, Edge};
 use crate::receiver::described::described;
 
@@ -164,7 +163,7 @@ impl TrackingSettings {
         let period_s = component.period_s();
         let most = (1e-3 * f64::from(self.integration) / period_s + 1e-9).floor() as u32;
         let integration = INTEGRATIONS.into_iter().rev().find(|periods| *periods <= most).unwrap_or(1);
-        let steps = strongest(component).map_or(1, |layer| layer.pulse.len());
+        let steps = component.strongest().map_or(1, |layer| layer.pulse.len());
         let fit = |bandwidth_hz: f64, periods: u32| {
             bandwidth_hz.min(LARGEST_BANDWIDTH_TIME / (period_s * f64::from(periods)))
         };

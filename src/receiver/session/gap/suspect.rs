@@ -19,7 +19,7 @@ const SEEN_SIGMAS: f64 = 4.0;
 /// Turns of signs are compared with where symbols begin so often while nothing is suspected.
 const EDGES_S: f64 = 0.4;
 /// Code periods in a window over which the turns of an overlay are compared, at least. Two windows of a chip
-/// sequence of 25 tell every displacement; a phase loop in a wrong overlay loses its lock after 0.2 s.
+/// sequence of 25 show every displacement; a phase loop in a wrong overlay loses its lock after 0.2 s.
 const OVERLAY_PERIODS: u64 = 10;
 /// Looks that are averaged before they enter a trend: whole symbols that are missing move codes by their
 /// Dopplers alone, 0.02 chip in 20 ms, twice the noise of one look at 45 dB-Hz.
