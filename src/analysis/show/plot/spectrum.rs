@@ -9,7 +9,7 @@ use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, 
 use crate::analysis::show::plot::judged::Judged;
 use crate::analysis::show::plot::sketch::Sketch;
 use crate::gnss::record::AcquisitionRow;
-use crate::gnss::signal::Link;
+use crate::gnss::signal::{Link, Signal};
 
 /// Measured density and the theory's; nothing without `psd.csv`.
 pub fn psd(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
@@ -45,40 +45,53 @@ pub fn acquisition(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
             *kept = row;
         }
     }
+    // A chart for each signal, the scene's first; one without bars where nothing was searched.
+    let mut signals: Vec<&Signal> = best.keys().map(|link| link.signal).collect();
+    let place = |signal: &Signal| judged.run.signals.iter().position(|other| *other == signal).unwrap_or(usize::MAX);
+    signals.sort_by_key(|signal| (place(signal), signal.name));
+    signals.dedup();
+    let mut legend = Vec::new();
+    let mut charts = Vec::new();
+    for signal in &signals {
+        let own: Vec<&AcquisitionRow> = best.values().copied().filter(|row| row.signal == *signal).collect();
+        let title = if signals.len() > 1 { format!("Acquisition, {signal}") } else { "Acquisition".to_owned() };
+        charts.push(statistics(judged.run, &own, title, &mut legend));
+    }
+    if charts.is_empty() {
+        charts.push(statistics(judged.run, &[], "Acquisition".to_owned(), &mut legend));
+    }
+    let height_px = 330 * charts.len() as u32;
+    Ok(Some(Sketch::charts((WIDTH_PX, height_px), 1, charts, legend)))
+}
+
+/// The best of each satellite of a signal, with the threshold; the legend is that of every signal.
+fn statistics(run: &Run, best: &[&AcquisitionRow], title: String, legend: &mut Vec<Series>) -> Chart {
     let bars = |acquired: bool| -> Vec<(f64, f64)> {
-        let placed = best.values().enumerate().filter(|(_, row)| row.acquired == acquired);
+        let placed = best.iter().enumerate().filter(|(_, row)| row.acquired == acquired);
         placed.map(|(place, row)| (place as f64, row.statistic)).collect()
     };
     let edges = |(place, row): (usize, &&AcquisitionRow)| {
         [(place as f64 - 0.5, row.threshold), (place as f64 + 0.5, row.threshold)]
     };
-    let threshold: Vec<(f64, f64)> = best.values().enumerate().flat_map(edges).collect();
-    let top = best.values().map(|row| row.statistic.max(row.threshold)).fold(1.0, f64::max);
+    let threshold: Vec<(f64, f64)> = best.iter().enumerate().flat_map(edges).collect();
+    let top = best.iter().map(|row| row.statistic.max(row.threshold)).fold(1.0, f64::max);
+    let truly: Vec<(f64, f64)> = (0..)
+        .zip(best)
+        .filter(|(_, best)| run.truth.contains(&best.link()))
+        .map(|(place, best)| (f64::from(place), best.statistic + 0.03 * top))
+        .collect();
     let series = vec![
         Series::new("acquired", BLUE, Mark::Bars(0.7), bars(true)),
         Series::new("not acquired", GREY, Mark::Bars(0.7), bars(false)),
         Series::new("threshold", ORANGE, Mark::Line, threshold),
+        Series::new("in the truth", GREEN, Mark::Cross, truly),
     ];
-    let mut legend = series.clone();
+    legend.clone_from(&series);
     let x = Axis::new("satellite", (-0.8, best.len().max(1) as f64 - 0.2));
     let y = Axis::new("largest statistic of the search", (0.0, 1.08 * top));
-    let mut chart = Chart::new("Acquisition", x, y, series);
-    chart.x_ticks =
-        Some((0..).zip(best.keys()).map(|(place, link)| (f64::from(place), tick(judged.run, *link))).collect());
-    let truly: Vec<(f64, f64)> = (0..)
-        .zip(best.values())
-        .filter(|(_, best)| judged.run.truth.contains(&best.link()))
-        .map(|(place, best)| (f64::from(place), best.statistic + 0.03 * top))
-        .collect();
-    let in_truth = Series::new("in the truth", GREEN, Mark::Cross, truly);
-    legend.push(in_truth.clone());
-    chart.series.push(in_truth);
-    Ok(Some(Sketch::charts((WIDTH_PX, 330), 1, [chart], legend)))
-}
-
-/// Satellites of the only system by number alone, to fit side by side.
-fn tick(run: &Run, link: Link) -> String {
-    let name = run.name(link);
-    let alone = run.signals.iter().all(|signal| signal.system == link.sv.system) && name == link.sv.to_string();
-    if alone { link.sv.number.to_string() } else { name }
+    let mut chart = Chart::new(title, x, y, series);
+    // By number alone, to fit side by side.
+    let tick = |(place, row): (u32, &&AcquisitionRow)| (f64::from(place), row.sv.number.to_string());
+    chart.x_ticks = Some((0..).zip(best).map(tick).collect());
+    chart
 }
