@@ -50,8 +50,8 @@ pub struct Message {
     pub reader: fn(Sv) -> Box<dyn Reader>,
     /// The set that a receiver decodes when this one is sent.
     pub quantised: fn(&Ephemeris) -> Result<Ephemeris, FieldError>,
-    /// Names of the parameters of a set that may be wrong with a right check: all but those that distinguish sets
-    /// and senders apart.
+    /// Names of the parameters of a set that may be wrong with a right check: all but those that distinguish
+    /// sets and senders apart.
     pub adjustable: fn() -> Vec<&'static str>,
     /// Makes an alert page of a unit; absent where the message has none.
     pub alert: Option<Alert>,

@@ -1,9 +1,9 @@
 //! NeQuick-G taken for the true ionosphere: group delay on the code, the same as advance on the carrier.
 //!
-//! The model as its document has it steps at 0 h UT: by a day of the Sun's declination, up to 2 cm, and at the
-//! end of a month by the next month's maps, by metres and at night severalfold. Nature does neither: here one
-//! day passes into the next over [`MIDNIGHT_S`]. Limits: at the end of a month that is still faster than any
-//! ionosphere; the F1 layer begins and ends at sunrise and sunset within seconds, as the document has it,
+//! The model as its document has it steps at 0 h UT: by a day of the Sun's declination, up to 2 cm, and at
+//! the end of a month by the next month's maps, by metres and at night severalfold. Nature does neither: here
+//! one day passes into the next over [`MIDNIGHT_S`]. Limits: at the end of a month that is still faster than
+//! any ionosphere; the F1 layer begins and ends at sunrise and sunset within seconds, as the document has it,
 //! which bends a delay by up to 3 mm in ten seconds.
 
 use nalgebra::Vector3;

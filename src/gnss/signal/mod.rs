@@ -334,8 +334,8 @@ impl Component {
         Shape::of(self)
     }
 
-    /// Correlation of the waveform with a replica of one of its layers, which has that layer's phase and sign,
-    /// and of the replica, of unit weight, with itself.
+    /// Correlation of the waveform with a replica of one of its layers, which has that layer's phase and
+    /// sign, and of the replica, of unit weight, with itself.
     pub fn shapes_by(&self, made: &Layer) -> [Shape; 2] {
         let turned: Vec<Layer> = (self.layers.iter())
             .map(|layer| Layer {

@@ -1,7 +1,7 @@
 //! Electrons on the way to each satellite by NeQuick-G, an integral of a tenth of a millisecond each.
 //!
-//! A content is kept for a second: at the horizon under the strongest Sun, where it changes most, that is 3 cm
-//! of delay in 43 m.
+//! A content is kept for a second: at the horizon under the strongest Sun, where it changes most, that is 3
+//! cm of delay in 43 m.
 
 use std::collections::BTreeMap;
 
