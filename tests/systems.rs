@@ -6,6 +6,7 @@
 //! turned nodes.
 #![cfg(all(feature = "planted", feature = "generator", feature = "receiver", feature = "analysis"))]
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,7 +21,9 @@ use gnss_twin::generator::truth;
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use gnss_twin::gnss::message::Common;
-use gnss_twin::gnss::record::{ClockRow, Event, EventRow, Fix, NavigationRow, PassEnd, PassRow, TrajectoryRow};
+use gnss_twin::gnss::record::{
+    ClockRow, Event, EventRow, Fix, NavigationRow, Observation, PassEnd, PassRow, TrajectoryRow,
+};
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::{Sv, System};
 use gnss_twin::gnss::signal::register;
@@ -191,7 +194,23 @@ fn holds(case: &Case) {
         let wrong: Vec<_> = read.iter().filter(|row| !sent.contains(row)).collect();
         assert!(!read.is_empty() && wrong.is_empty(), "{signals:?}: {wrong:?}");
 
+        // Nothing is measured by what a later symbol said, wherever ticks lie in the blocks of a reception.
+        let observations: Vec<Observation> = rows(&rx, "observations.csv");
+        let said = |sv: Sv, event: Event| {
+            let first = events.iter().find(|row| row.sv == sv && row.event == event);
+            first.map_or(u64::MAX, |row| row.sample)
+        };
+        let early: Vec<(u64, Sv)> = (observations.iter())
+            .filter(|row| row.sample < said(row.sv, Event::FrameSynchronised))
+            .map(|row| (row.sample, row.sv))
+            .collect();
+        assert!(early.is_empty(), "{signals:?}: observed before the frame was found: {early:?}");
         let fixes: Vec<Fix> = rows(&rx, "fixes.csv");
+        for fix in &fixes {
+            let sets = events.iter().filter(|row| row.event == Event::EphemerisComplete && row.sample <= fix.sample);
+            let complete: BTreeSet<Sv> = sets.map(|row| row.sv).collect();
+            assert!(complete.len() >= fix.satellites as usize, "{signals:?}: {fix:?} with {complete:?}");
+        }
         let own = if signals == ["synthetic A"] { "synthetic" } else { "GPST" };
         assert!(fixes.len() > 100, "{signals:?}: {} fixes", fixes.len());
         let last = fixes.last().unwrap();
