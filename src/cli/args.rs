@@ -72,7 +72,9 @@ pub struct Run {
 }
 
 #[derive(Args, Debug)]
-#[command(after_help = "Example: gnss-twin generate scenarios/static.toml --out static.sigmf-data --format ci16")]
+#[command(
+    after_help = "Examples:\n  gnss-twin generate scenarios/static.toml --out static.sigmf-data --format ci16\n  gnss-twin generate scenarios/static.toml --out - | hackrf_transfer -t - -f 1575420000 -s 2600000\n  gnss-twin generate scenarios/static.toml --out rtl-tcp:1234 --truth static.truth"
+)]
 pub struct Generate {
     /// Scene to generate
     pub scenario: PathBuf,
@@ -81,13 +83,18 @@ pub struct Generate {
     pub allow_outside: bool,
     /// File for the samples; metadata (.sigmf-meta) and truth (.truth/) are written beside it. Of a scene
     /// with several front ends a directory, for NAME.sigmf-data and NAME.sigmf-meta of each, a
-    /// .sigmf-collection and truth/
+    /// .sigmf-collection and truth/. Or a stream, the samples alone at the reader's pace: - (standard output),
+    /// fifo:PATH, file:PATH, tcp:ADDR, rtl-tcp:ADDR, whose ADDR is where to listen for one client: PORT on this machine
+    /// alone, or IP:PORT
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
+    /// Directory for the truth of a stream [default: none]
+    #[arg(long, value_name = "DIR")]
+    pub truth: Option<PathBuf>,
     /// Front end to generate, of a scene that has several [default: all of them]
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,
-    /// Sample format, in place of the scene's: ci8, cu8, ci16, cf32, ri8, ri16
+    /// Sample format, in place of the scene's: ci8, cu8, ci16, cf32, ri8, ri16 [default to rtl-tcp: cu8]
     #[arg(long)]
     pub format: Option<Format>,
     /// First sample of the scene to write: the same bits as in the whole, without making what lies before

@@ -3,31 +3,50 @@
 
 use std::fs;
 use std::io;
+use std::ops::Range;
 use std::path::Path;
 
 use crate::cli::args;
 use crate::cli::collection;
-use crate::cli::error::CliError;
+use crate::cli::error::{CliError, shown};
 use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, truth_error};
 use crate::cli::scenario;
+use crate::cli::sink;
 use crate::cli::staging::Staging;
 use crate::generator::scenario::Overrides;
+use crate::generator::scene::Scene;
 use crate::generator::stream::Options;
 use crate::generator::{self, truth};
-use crate::gnss::samples::IfMetadata;
+use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::sigmf;
 
 /// Writes a scene's samples to a file.
 pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
+    let stream = sink::Spec::of_out(&arguments.out)?;
+    if stream.is_none() && arguments.truth.is_some() {
+        return Err(CliError::usage("--truth names the truth of a stream: that of a file lies beside it"));
+    }
     let named = scenario::read(Some(&arguments.scenario))?.choose(arguments.front_end.as_deref())?;
     let (mut scenes, warnings) = scenario::compose_all(
         &named,
-        &Overrides { seed: arguments.seed, format: arguments.format, allow_outside: arguments.allow_outside },
+        &Overrides {
+            seed: arguments.seed,
+            format: format(arguments, stream.as_ref()),
+            allow_outside: arguments.allow_outside,
+        },
     )?;
     for warning in warnings {
         scenario::warn(&warning);
+    }
+    if scenes.len() > 1 && stream.is_some() {
+        let names: Vec<&str> = scenes.iter().filter_map(|scene| scene.front_end_name.as_deref()).collect();
+        return Err(CliError::usage(format!(
+            "--out {}: a stream carries one front end, and the scene has several: choose with --front-end NAME one of {}",
+            shown(&arguments.out),
+            names.join(", ")
+        )));
     }
     if scenes.len() > 1 {
         return collection::generate(arguments, &scenes);
@@ -41,6 +60,9 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
             arguments.samples.map_or_else(String::new, |count| format!(" --samples {count}")),
             scene.samples.saturating_sub(1)
         )));
+    }
+    if let Some(stream) = stream {
+        return to_stream(&stream, arguments.truth.as_deref(), &scene, first..end);
     }
     let meta_path = arguments.out.with_extension("sigmf-meta");
     let truth_path = arguments.out.with_extension("truth");
@@ -83,6 +105,47 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
         meta_path.display(),
         truth_path.display()
     ))
+}
+
+/// The format that was asked for; a dongle's samples are rounded to its own zero from the start.
+fn format(arguments: &args::Generate, stream: Option<&sink::Spec>) -> Option<Format> {
+    let own = matches!(stream, Some(sink::Spec::RtlTcp(_))).then_some(Format::Cu8);
+    arguments.format.or(own)
+}
+
+/// Hands the samples of a part of the scene to a reader, and says on standard error what they are.
+fn to_stream(stream: &sink::Spec, truth: Option<&Path>, scene: &Scene, part: Range<u64>) -> Result<(), CliError> {
+    let staging = truth.map(Staging::directory).transpose()?;
+    let mut writer: Box<dyn truth::Sink> = match &staging {
+        Some(staging) => Box::new(truth::Writer::create(staging.path()).map_err(truth_error)?),
+        None => Box::new(()),
+    };
+    let metadata = &scene.metadata;
+    let mut sink = stream.open(metadata)?;
+    scenario::note(&format!(
+        "samples: {}, {} a second, {} Hz in the middle, {} of them to {stream}",
+        metadata.format,
+        metadata.rate.hz(),
+        metadata.center_hz,
+        part.end - part.start
+    ));
+    let progress = Progress::new(&format!("generate {}", scene.name), Some(part.end - part.start));
+    let generated = generator::generate_part(
+        scene,
+        part,
+        &mut sink::Through(sink.as_mut()),
+        writer.as_mut(),
+        &mut |done| progress.set(done),
+        &Options::default(),
+    );
+    drop(progress);
+    let generated = generated.map_err(generator_error)?;
+    sink.finish().map_err(|error| CliError::output("samples", &error))?;
+    drop(writer);
+    staging.map_or(Ok(()), Staging::commit)?;
+    // Standard output has the samples.
+    scenario::note(&generated.to_string());
+    Ok(())
 }
 
 fn discard(path: &Path) -> Result<(), CliError> {

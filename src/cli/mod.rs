@@ -5,6 +5,7 @@
 
 #![warn(missing_docs)]
 
+mod address;
 mod analyze;
 mod args;
 mod check;
@@ -18,6 +19,7 @@ mod receive;
 mod reference;
 mod run;
 mod scenario;
+mod sink;
 mod speed;
 mod staging;
 mod study;

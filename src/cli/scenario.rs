@@ -121,3 +121,8 @@ pub fn print(text: &str) -> Result<(), CliError> {
 pub fn warn(text: &str) {
     let _ = writeln!(std::io::stderr(), "warning: {}", escaped(text));
 }
+
+/// Prints on standard error what is neither result nor warning; a failure to do so is silent.
+pub fn note(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", escaped(text));
+}

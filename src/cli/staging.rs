@@ -68,6 +68,12 @@ impl Staging {
         self.writer().write_all(bytes).map_err(|error| CliError::output(self.target.display(), &error))
     }
 
+    /// [`Self::commit`] of a file, where what fails is a writer's concern.
+    pub fn finish(self) -> io::Result<()> {
+        self.file.as_ref().map_or(Ok(()), File::sync_all)?;
+        self.making.finish(&self.target)
+    }
+
     /// Gives the finished work its name.
     pub fn commit(self) -> Result<(), CliError> {
         if let Some(file) = &self.file {

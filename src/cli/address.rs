@@ -1,0 +1,68 @@
+//! Addresses of listeners and of peers as the command line takes them: loopback unless another one is named.
+
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
+
+use crate::cli::error::CliError;
+use crate::cli::scenario;
+
+const LOOPBACK: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+
+/// Where a listener waits: `PORT` and `localhost:PORT` on this machine alone, `IP:PORT` on the interface that
+/// has this address, `0.0.0.0:PORT` and `[::]:PORT` on all of them.
+///
+/// # Errors
+/// What was expected, of any other text. Host names are refused: what they mean changes from place to place.
+pub fn listen_address(text: &str) -> Result<SocketAddr, String> {
+    let port = text.strip_prefix("localhost:").or_else(|| text.strip_prefix(':')).unwrap_or(text);
+    if let Ok(port) = port.parse() {
+        return Ok(SocketAddr::new(LOOPBACK, port));
+    }
+    text.parse().map_err(|_| {
+        format!(
+            "'{text}': expected PORT for this machine alone (0 for a free one), or IP:PORT for one of its addresses, \
+             0.0.0.0:PORT for all"
+        )
+    })
+}
+
+/// Begins to listen, says so, and warns where others than this machine can come in.
+///
+/// # Errors
+/// An address that is taken, not this machine's, or not permitted.
+pub fn listen(address: SocketAddr, what: &str) -> Result<(TcpListener, SocketAddr), CliError> {
+    let fail = |error: io::Error| {
+        let cure = match error.kind() {
+            io::ErrorKind::AddrInUse => ": another program has it; name another port, or 0 for a free one",
+            io::ErrorKind::AddrNotAvailable => ": this machine has no such address",
+            _ => "",
+        };
+        CliError::refused_output(format!("cannot listen on {address}: {error}{cure}"))
+    };
+    let listener = TcpListener::bind(address).map_err(fail)?;
+    let own = listener.local_addr().map_err(fail)?;
+    if !own.ip().is_loopback() {
+        scenario::warn(&format!("{own} is open to other machines, without a password"));
+    }
+    scenario::note(&format!("{what}: listening on {own}"));
+    Ok((listener, own))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_listener_is_on_loopback_unless_another_address_is_named() {
+        for text in ["1234", ":1234", "localhost:1234", "127.0.0.1:1234"] {
+            assert_eq!(listen_address(text).unwrap().to_string(), "127.0.0.1:1234");
+        }
+        for text in ["0.0.0.0:1234", "192.168.7.1:1234", "[::1]:1234"] {
+            assert_eq!(listen_address(text).unwrap().to_string(), text);
+        }
+        for text in ["", ":", "example.org:1234", "127.0.0.1", "65536", "-1", "1.2.3.4:x", "localhost"] {
+            let error = listen_address(text).unwrap_err();
+            assert!(error.contains("expected PORT"), "{error}");
+        }
+    }
+}
