@@ -83,9 +83,9 @@ pub struct Generate {
     pub allow_outside: bool,
     /// File for the samples; metadata (.sigmf-meta) and truth (.truth/) are written beside it. Of a scene
     /// with several front ends a directory, for NAME.sigmf-data and NAME.sigmf-meta of each, a
-    /// .sigmf-collection and truth/. Or a stream, the samples alone at the reader's pace: - (standard output),
-    /// fifo:PATH, file:PATH, tcp:ADDR, rtl-tcp:ADDR, whose ADDR is where to listen for one client: PORT on this machine
-    /// alone, or IP:PORT
+    /// .sigmf-collection and truth/. Or a stream of samples alone, at the reader's pace: - (standard output),
+    /// fifo:PATH, file:PATH, tcp:ADDR, rtl-tcp:ADDR. ADDR is where to listen for one client: PORT on this
+    /// machine alone, or IP:PORT
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Directory for the truth of a stream [default: none]
