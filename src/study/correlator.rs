@@ -262,7 +262,7 @@ impl<'a> Channel<'a> {
             loops,
             cn0,
             before: None,
-            watch: Watch::new(period_s * f64::from(group)),
+            watch: Watch::new(period_s, group),
             given_up: false,
             symbol_sum: Complex64::ZERO,
             number: 0,
@@ -318,8 +318,7 @@ impl<'a> Channel<'a> {
         }
         self.symbol_sum += prompt;
         if self.number.is_multiple_of(u64::from(self.group)) {
-            let time_s = self.number as f64 * self.period_s;
-            self.given_up |= self.watch.add(self.symbol_sum, self.cn0.hz(), time_s, &self.case.settings);
+            self.given_up |= self.watch.add(self.symbol_sum, self.cn0.hz(), self.number, &self.case.settings);
             self.symbol_sum = Complex64::ZERO;
         }
     }

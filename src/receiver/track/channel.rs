@@ -11,7 +11,7 @@ use num_complex::Complex64;
 
 use super::closed::{Loops, Mode, Update};
 use super::cn0::Cn0;
-use super::lock::{PhaseLock, Rotation, SymbolLock};
+use super::lock::{LockState, PhaseLock, Rotation, SymbolLock};
 use super::loops::CodeShape;
 use super::model::ReplicaModel;
 use super::overlay::{OverlayPhase, OverlaySync};
@@ -143,8 +143,7 @@ pub struct Channel {
     symbol_lock: SymbolLock,
     sync: SymbolSync,
     pending: Option<u64>,
-    locked_since: Option<u64>,
-    unlocked_since: Option<u64>,
+    lock: LockState,
     polarity: Option<bool>,
     lost: bool,
     /// Detectors sleep: the code has jumped, and nobody knows yet by how many periods.
@@ -253,8 +252,7 @@ impl Channel {
             symbol_lock: SymbolLock::new(),
             sync: SymbolSync::new(group),
             pending: None,
-            locked_since: None,
-            unlocked_since: None,
+            lock: LockState::default(),
             polarity: None,
             held: false,
             moved: false,
@@ -311,7 +309,7 @@ impl Channel {
     /// Whether the carrier is locked, and the code no longer on its way from where the search left it.
     pub fn is_settled(&self) -> bool {
         let passed_s = self.start.map_or(0.0, |start| self.since_s(start));
-        !self.lost && self.locked_since.is_some() && passed_s >= SETTLED / self.settings.dll_pull_in_bandwidth_hz
+        !self.lost && self.lock.is_locked() && passed_s >= SETTLED / self.settings.dll_pull_in_bandwidth_hz
     }
 
     /// Follows the signal through the next block. `ticks` are samples inside the block, ascending, at which

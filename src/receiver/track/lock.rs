@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 use num_complex::Complex64;
 
-use super::loops;
+use super::{TrackingSettings, loops};
 
 /// Mean of what was put in, exponential with a number of terms, but the plain mean until that many have come.
 #[derive(Clone, Debug)]
@@ -162,6 +162,95 @@ impl SymbolLock {
     }
 }
 
+/// Whether C/N0 is below what a channel is kept for; nothing is known of a signal without an estimate.
+pub fn is_weak(cn0_hz: Option<f64>, settings: &TrackingSettings) -> bool {
+    cn0_hz.is_some_and(|hz| 10.0 * libm::log10(hz) < settings.cn0_threshold_dbhz)
+}
+
+/// What changed in a [`LockState`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LockChange {
+    /// The carrier has locked.
+    Locked,
+    /// Its count is broken.
+    Broken,
+}
+
+/// What the detectors decide of a carrier: whether it is locked, and whether lock or strength has been missing
+/// for so long that the signal is lost. Instants are numbers of the caller's own clock, samples or code periods.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LockState {
+    locked_since: Option<u64>,
+    missing_since: Option<u64>,
+}
+
+impl LockState {
+    /// A carrier that is locked from `now` on.
+    pub fn locked(now: u64) -> Self {
+        Self { locked_since: Some(now), missing_since: None }
+    }
+
+    /// Since when the carrier is locked; `None` where it is not.
+    pub fn locked_since(&self) -> Option<u64> {
+        self.locked_since
+    }
+
+    /// Whether the carrier is locked.
+    pub fn is_locked(&self) -> bool {
+        self.locked_since.is_some()
+    }
+
+    /// Whether a lock has neither been found nor lost so far.
+    pub fn is_new(&self) -> bool {
+        self.locked_since.is_none() && self.missing_since.is_none()
+    }
+
+    /// The carrier is not locked any more, for a reason that does not count against the signal. Says whether it
+    /// was locked.
+    pub fn interrupt(&mut self) -> bool {
+        self.locked_since.take().is_some()
+    }
+
+    /// The phase has slipped. Says whether the carrier was locked; only then is it a loss of lock.
+    pub fn slip(&mut self, now: u64) -> bool {
+        let was_locked = self.interrupt();
+        if was_locked {
+            self.missing_since = Some(now);
+        }
+        was_locked
+    }
+
+    /// Follows the value of phase lock, which counts for a new lock once its mean is `settled`.
+    pub fn follow(
+        &mut self,
+        now: u64,
+        (value, settled): (f64, bool),
+        weak: bool,
+        settings: &TrackingSettings,
+    ) -> Option<LockChange> {
+        let change = if self.is_locked() {
+            (value < settings.phase_unlock_threshold && self.slip(now)).then_some(LockChange::Broken)
+        } else if settled && value >= settings.phase_lock_threshold {
+            self.locked_since = Some(now);
+            Some(LockChange::Locked)
+        } else {
+            None
+        };
+        if weak {
+            self.missing_since = self.missing_since.or(Some(now));
+        } else if self.is_locked() {
+            self.missing_since = None;
+        }
+        change
+    }
+
+    /// Whether the signal is lost: lock or strength has been missing for `loss_s`. `passed_s` gives the time
+    /// since an instant.
+    pub fn is_lost(&self, passed_s: impl Fn(u64) -> f64, settings: &TrackingSettings) -> bool {
+        self.missing_since.is_some_and(|since| passed_s(since) >= settings.loss_s)
+    }
+}
+
 /// How the carrier turns within symbols, between quarters of one: where a Costas loop rests on a wrong
 /// frequency, it shows.
 #[derive(Clone, Debug, Default)]
@@ -300,6 +389,32 @@ mod tests {
         // A false lock is declared at 10 Hz.
         println!("worst {worst:.2} Hz");
         assert!(worst < 5.0, "{worst} Hz");
+    }
+
+    #[test]
+    fn a_lock_breaks_at_one_threshold_comes_back_at_the_other_and_is_lost_after_its_time() {
+        let settings = TrackingSettings::default();
+        let (low, high) = (settings.phase_unlock_threshold, settings.phase_lock_threshold);
+        assert!(low < high);
+        let passed_s = |now: u64| move |since: u64| (now - since) as f64 * 1e-3;
+        let mut state = LockState::default();
+        assert_eq!(state.follow(1, (1.0, false), false, &settings), None);
+        assert_eq!(state.follow(2, (0.5 * (low + high), true), false, &settings), None);
+        assert!(state.is_new() && !state.slip(3));
+        assert_eq!(state.follow(4, (high, true), false, &settings), Some(LockChange::Locked));
+        assert_eq!(state.locked_since(), Some(4));
+        // Between the thresholds nothing changes; below the lower one the lock breaks and its time runs.
+        assert_eq!(state.follow(5, (low, true), false, &settings), None);
+        assert_eq!(state.follow(6, (low - 0.01, true), false, &settings), Some(LockChange::Broken));
+        let limit = (settings.loss_s * 1e3) as u64;
+        assert!(!state.is_lost(passed_s(5 + limit), &settings) && state.is_lost(passed_s(6 + limit), &settings));
+        // A new lock ends that time, but not for a signal that is too weak, whose time runs on.
+        let mut weak = state;
+        assert_eq!(state.follow(7, (high, true), false, &settings), Some(LockChange::Locked));
+        assert_eq!(weak.follow(7, (high, true), true, &settings), Some(LockChange::Locked));
+        assert!(!state.is_lost(passed_s(7 + limit), &settings) && weak.is_lost(passed_s(6 + limit), &settings));
+        // An interruption that is no slip starts no time.
+        assert!(state.interrupt() && state.is_new());
     }
 
     #[test]

@@ -153,9 +153,8 @@ impl Channel {
         if self.symbol.1 == self.group {
             let symbol_s = self.period_s * f64::from(self.group);
             let slipped = self.symbol_lock.add(self.symbol.0, self.cn0.hz().map(|hz| hz * symbol_s));
-            if slipped && self.locked_since.is_some() {
-                self.interrupt(report);
-                self.unlocked_since = Some(self.first);
+            if slipped && self.lock.slip(self.first) {
+                self.break_count(report);
             }
             if self.has_symbols && self.confirmed {
                 let soft = (self.symbol.0.re / f64::from(self.group).sqrt()) as f32;

@@ -27,8 +27,8 @@ impl Channel {
             half_cycle_known: self.polarity.is_some() || self.overlay_phase.is_some(),
             doppler_hz: planted!("receiver.measure.doppler_sign", self.sense, -self.sense) * offset_hz,
             cn0_dbhz,
-            locked_s: self.locked_since.map_or(0.0, |since| tick.saturating_sub(since) as f64 / self.rate.hz()),
-            locked: self.locked_since.is_some(),
+            locked_s: self.lock.locked_since().map_or(0.0, |since| tick.saturating_sub(since) as f64 / self.rate.hz()),
+            locked: self.lock.is_locked(),
         });
         report.rows.push(TrackingRow {
             sample: tick,

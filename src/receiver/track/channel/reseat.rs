@@ -6,7 +6,7 @@ use super::{Channel, Stage};
 use crate::receiver::correlate::{Nco, Replica, TURN, chips_to_units};
 use crate::receiver::gap::Edges;
 use crate::receiver::track::Report;
-use crate::receiver::track::lock::{PhaseLock, Rotation, SymbolLock};
+use crate::receiver::track::lock::{LockState, PhaseLock, Rotation, SymbolLock};
 use crate::receiver::track::loops::Rates;
 use crate::receiver::track::overlay::OverlaySync;
 use crate::receiver::track::sync::SymbolSync;
@@ -169,7 +169,7 @@ impl Channel {
         self.shift(now, ahead_chips + moved_chips - self.glances.moved_chips);
         self.glances.moved_chips = moved_chips;
         self.interrupt(report);
-        self.unlocked_since = None;
+        self.lock = LockState::default();
         self.held = true;
         self.forget_edges();
     }
@@ -182,7 +182,7 @@ impl Channel {
         self.glances.moved_chips = moved_chips;
         self.period = (i128::from(self.period) + i128::from(periods)).max(0) as u64;
         self.held = false;
-        (self.locked_since, self.unlocked_since) = (None, None);
+        self.lock = LockState::default();
         self.pull_in_since = now;
         self.sync = SymbolSync::new(self.group);
         self.rotation = Rotation::default();

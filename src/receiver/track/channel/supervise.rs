@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use super::{Channel, LOCK_PERIODS, Stage, WEAK_DBHZ};
 use crate::gnss::record::Event;
 use crate::receiver::correlate::TURN;
-use crate::receiver::track::lock::{PhaseLock, Rotation, SymbolLock};
+use crate::receiver::track::lock::{LockChange, PhaseLock, Rotation, SymbolLock, is_weak};
 use crate::receiver::track::loops::Rates;
 use crate::receiver::track::pull_in::Batch;
 use crate::receiver::track::sync::SymbolSync;
@@ -58,7 +58,7 @@ impl Channel {
             Stage::Frequency => {}
             Stage::Assisted => {
                 self.limit_pull_in(self.stage_since, report);
-                if self.locked_since.is_some() {
+                if self.lock.is_locked() {
                     self.find_symbols(number, prompt, report);
                 }
             }
@@ -66,7 +66,7 @@ impl Channel {
                 if !self.confirmed {
                     self.limit_pull_in(self.pull_in_since, report);
                 }
-                if self.locked_since.is_some() {
+                if self.lock.is_locked() {
                     self.verify_symbols(begin, number, prompt, report);
                 }
                 if self.rotation.symbols() >= VERIFY_SYMBOLS {
@@ -80,8 +80,7 @@ impl Channel {
     fn limit_pull_in(&mut self, since: u64, report: &mut Report) {
         let (waited_s, limit_s) = (self.since_s(since), self.settings.pull_in_limit_s);
         // A lock that was there and broke has a limit of its own.
-        let never_locked = self.locked_since.is_none() && self.unlocked_since.is_none();
-        if waited_s > limit_s || (never_locked && waited_s > PHASE_LIMIT_SHARE * limit_s) {
+        if waited_s > limit_s || (self.lock.is_new() && waited_s > PHASE_LIMIT_SHARE * limit_s) {
             self.lose(report);
         }
     }
@@ -171,7 +170,7 @@ impl Channel {
         match stage {
             Stage::Tracking(_) => {
                 self.cn0.know_symbols();
-                self.symbol_lock = if self.locked_since.is_some() { SymbolLock::locked() } else { SymbolLock::new() };
+                self.symbol_lock = if self.lock.is_locked() { SymbolLock::locked() } else { SymbolLock::new() };
             }
             Stage::Open | Stage::Frequency | Stage::Assisted => {
                 self.cn0.forget_symbols();
@@ -223,45 +222,39 @@ impl Channel {
 
     /// Follows phase lock; a dip is a slip, a long one the end.
     fn watch_phase(&mut self, report: &mut Report) {
-        let value = self.lock_value();
-        let weak = matches!(self.stage, Stage::Tracking(_))
-            && self.cn0.hz().is_some_and(|hz| 10.0 * libm::log10(hz) < self.settings.cn0_threshold_dbhz);
-        if self.locked_since.is_some() {
-            if value < self.settings.phase_unlock_threshold {
-                self.interrupt(report);
-                self.unlocked_since = Some(self.first);
-            }
-        } else if value >= self.settings.phase_lock_threshold {
-            let settled = match self.stage {
-                Stage::Tracking(_) => self.symbol_lock.settled(),
-                Stage::Assisted => self.phase_lock.settled(),
-                Stage::Open | Stage::Frequency => false,
-            };
-            if settled {
-                self.locked_since = Some(self.first);
-                report.events.push((self.first, Event::PhaseLocked));
-                if !weak {
-                    self.unlocked_since = None;
-                }
-            }
+        let (settled, weak) = match self.stage {
+            Stage::Tracking(_) => (self.symbol_lock.settled(), is_weak(self.cn0.hz(), &self.settings)),
+            Stage::Assisted => (self.phase_lock.settled(), false),
+            Stage::Open | Stage::Frequency => (false, false),
+        };
+        match self.lock.follow(self.first, (self.lock_value(), settled), weak, &self.settings) {
+            Some(LockChange::Locked) => report.events.push((self.first, Event::PhaseLocked)),
+            Some(LockChange::Broken) => self.break_count(report),
+            None => {}
         }
-        if weak && self.unlocked_since.is_none() {
-            self.unlocked_since = Some(self.first);
-        } else if !weak && self.locked_since.is_some() {
-            self.unlocked_since = None;
-        }
-        if self.unlocked_since.is_some_and(|since| self.since_s(since) >= self.settings.loss_s) {
+        if self.lock.is_lost(|since| self.since_s(since), &self.settings) {
             self.lose(report);
         }
     }
 
-    /// The carrier's count is broken here.
+    /// The carrier is not locked any more.
     pub(super) fn interrupt(&mut self, report: &mut Report) {
-        if self.locked_since.take().is_some() {
-            report.events.push((self.first, Event::CycleSlip));
+        if self.lock.interrupt() {
+            self.break_count(report);
+        } else {
+            self.forget_phase();
         }
+    }
+
+    /// The count of a locked carrier is broken here.
+    pub(super) fn break_count(&mut self, report: &mut Report) {
+        report.events.push((self.first, Event::CycleSlip));
+        self.forget_phase();
+    }
+
+    /// Symbols and overlay are sought where the phase is right only.
+    fn forget_phase(&mut self) {
         self.polarity = None;
-        // Symbols and overlay are sought where the phase is right only.
         self.sync = SymbolSync::new(self.group);
         if let Some(overlay) = &mut self.overlay {
             overlay.clear();
@@ -272,7 +265,7 @@ impl Channel {
     fn lose(&mut self, report: &mut Report) {
         if !self.lost {
             self.lost = true;
-            self.locked_since = None;
+            self.lock.interrupt();
             report.events.push((self.first, Event::LossOfLock));
         }
     }
@@ -283,7 +276,7 @@ impl Channel {
         let error_hz = self.rotation.cycles(self.group) / self.period_s;
         self.rotation = Rotation::default();
         let nearest_hz = 0.5 / (self.period_s * f64::from(self.group));
-        if error_hz.abs() > FALSE_LOCK_SHARE * nearest_hz && self.locked_since.is_some() {
+        if error_hz.abs() > FALSE_LOCK_SHARE * nearest_hz && self.lock.is_locked() {
             self.loops.carrier = Rates { rate: self.loops.carrier.rate + error_hz, acceleration: 0.0 };
             self.interrupt(report);
             self.begin_pull_in();
