@@ -353,11 +353,12 @@ fn limits(rows: &[Row]) -> String {
     let sample_ns = (long_ns - short_ns) / 7400.0;
     let fixed_ns = short_ns - 2600.0 * sample_ns;
     format!(
-        "**Limit.** With AVX-512, 32 samples and three taps with area edges take {OPERATIONS} operations of 512 bits in 16-bit \
-         integers, {OPERATIONS_A_CYCLE} a cycle at most: {limit:.1} G channel·samples a second at the {ghz:.2} GHz measured here. Of \
-         a period at 2.6 Msps {:.0} % is fixed ({fixed_ns:.0} ns: powers of the carrier's turn, the last sums, both in f64), and \
-         its samples take {sample_ns:.3} ns each, {:.0} % of the limit's speed; loads that cross cache lines, and a processor's \
-         window that holds about one group's operations, are what else is known of the rest.\n",
+        "**Limit.** With AVX-512, 32 samples and three taps with area edges take {OPERATIONS} operations of 512 bits \
+         in 16-bit integers, {OPERATIONS_A_CYCLE} a cycle at most: {limit:.1} G channel·samples a second at the \
+         {ghz:.2} GHz measured here. Of a period at 2.6 Msps {:.0} % is fixed ({fixed_ns:.0} ns: powers of the \
+         carrier's turn, the last sums, both in f64), and its samples take {sample_ns:.3} ns each, {:.0} % of the \
+         limit's speed; loads that cross cache lines, and a processor's window that holds about one group's \
+         operations, are what else is known of the rest.\n",
         100.0 * fixed_ns / short_ns,
         100.0 / sample_ns / limit,
     )
@@ -390,8 +391,9 @@ fn main() {
     let model =
         cpu.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or("").trim_start_matches(['\t', ' ', ':']);
     let mut text = format!(
-        "{model}, {} cores; {}; release profile, instruction set chosen at run time; {}; medians of {ROUNDS} interleaved \
-         runs. The default is i16 for 8-bit formats.\n\n|figure|value|unit|bar|met|\n|---|---|---|---|---|\n",
+        "{model}, {} cores; {}; release profile, instruction set chosen at run time; {}; medians of {ROUNDS} \
+         interleaved runs. The default is i16 for 8-bit formats.\n\n|figure|value|unit|bar|met|\n\
+         |---|---|---|---|---|\n",
         std::thread::available_parallelism().map_or(1, |n| n.get()),
         output_of("rustc", &["--version"]),
         output_of("date", &["-u", "+%F"]),
@@ -401,9 +403,10 @@ fn main() {
     }
     let _ = write!(
         text,
-        "\n{}\nWhat `tracking.arithmetic` errs against f64, area edges, three satellites at 45 dB-Hz for a second; rms of one \
-         millisecond, whose noise is 18 m and 0.02 cycles:\n\n\
-         |arithmetic|Msps|code, largest mean (m)|code, rms (m)|carrier, rms (cycles)|C/N0 loss (dB)|\n|---|---|---|---|---|---|\n",
+        "\n{}\nWhat `tracking.arithmetic` errs against f64, area edges, three satellites at 45 dB-Hz for a second; \
+         rms of one millisecond, whose noise is 18 m and 0.02 cycles:\n\n\
+         |arithmetic|Msps|code, largest mean (m)|code, rms (m)|carrier, rms (cycles)|C/N0 loss (dB)|\n\
+         |---|---|---|---|---|---|\n",
         limits(&rows)
     );
     for (arithmetic, name) in [(Arithmetic::I16, "i16"), (Arithmetic::F32, "f32")] {

@@ -13,7 +13,7 @@ mod source;
 use std::collections::BTreeSet;
 
 use order::{EXCEPTIONS, ORDER, arrows};
-use source::{Source, comments_too_wide, lines_of_code, unwraps};
+use source::{Source, code_too_wide, comments_too_wide, lines_of_code, unwraps};
 
 /// Lines of code that a file may have: comments, blank lines and tests not counted.
 const MOST_LINES: usize = 400;
@@ -21,6 +21,8 @@ const MOST_LINES: usize = 400;
 const LONG: &[&str] = &[];
 /// Columns that a line of comment may have.
 const MOST_COLUMNS: usize = 110;
+/// Columns that a line of code may have: rustfmt keeps them but for long strings and tables.
+const MOST_CODE_COLUMNS: usize = 120;
 
 #[test]
 fn a_room_imports_only_rooms_before_it() {
@@ -67,6 +69,17 @@ fn comments_are_wrapped() {
         }
     }
     assert!(wide.is_empty(), "{} comments beyond {MOST_COLUMNS} columns:\n{}", wide.len(), wide.join("\n"));
+}
+
+#[test]
+fn lines_of_code_fit_the_columns() {
+    let mut wide = Vec::new();
+    for folder in ["src", "benches", "examples"] {
+        for (path, text) in source::files(folder) {
+            wide.extend(code_too_wide(&text, MOST_CODE_COLUMNS).into_iter().map(|line| format!("{path}:{line}")));
+        }
+    }
+    assert!(wide.is_empty(), "{} lines beyond {MOST_CODE_COLUMNS} columns:\n{}", wide.len(), wide.join("\n"));
 }
 
 #[test]
@@ -141,10 +154,11 @@ mod planted {
     }
 
     #[test]
-    fn a_wide_comment_is_found_and_a_wide_line_of_code_is_not() {
+    fn wide_comments_and_wide_lines_of_code_are_found_apart() {
         let columns = |count: usize| "é".repeat(count);
         let text = format!("    // {}\n/// {}\nlet x = \"{}\";\n", columns(103), columns(107), columns(200));
         assert_eq!(comments_too_wide(&text, 110), [2]);
+        assert_eq!(code_too_wide(&text, 120), [3]);
         assert_eq!(comments_too_wide(&format!("//! <https://{}>", columns(120)), 110), Vec::<usize>::new());
     }
 

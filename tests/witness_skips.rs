@@ -37,8 +37,8 @@ fn main() {
     }
     println!(
         "witnesses: {} of {asked} tests that compare with data outside of the repository skipped some or all of them. \
-         GNSS_TWIN_DATA (default ../shared/data) names the directory; no licence allows real GPS subframes or an antenna \
-         recording to be shipped (data/README.md)",
+         GNSS_TWIN_DATA (default ../shared/data) names the directory; no licence allows real GPS subframes or an \
+         antenna recording to be shipped (data/README.md)",
         tests.len()
     );
 }

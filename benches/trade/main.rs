@@ -366,13 +366,15 @@ fn machine() -> String {
 
 fn preface() -> String {
     format!(
-        "Each row is one setting of `[fidelity]`. Errors are against the `reference` level, without noise and rounding, over \
-         pieces of 20 ms (carrier: 1 ms) of three satellites: the mean is the largest of a satellite, σ is about the means, \
-         the last is the largest. A piece of 20 ms sees the code at nearly one place of the sampling grid; a code loop \
-         averages over the seconds in which the code's Doppler moves it along, and sees the mean. Where the rate is a multiple of the chip rate, or over \
-         short stretches, it sees one piece. ns are one core's for a sample of a satellite with everything that the generator does (truth, rounding to 8 bits), \
-         processor time, medians of interleaved runs. The position is the closed loop's mean over 45 s with noise, against that of \
-         `reference` with the same seed. Settings that no other beats in cost and pseudorange error are on the front. Widths of samples and qualities of noise have [a page of their own](widths.md).\n\n\
+        "Each row is one setting of `[fidelity]`. Errors are against the `reference` level, without noise and \
+         rounding, over pieces of 20 ms (carrier: 1 ms) of three satellites: the mean is the largest of a satellite, \
+         σ is about the means, the last is the largest. A piece of 20 ms sees the code at nearly one place of the \
+         sampling grid; a code loop averages over the seconds in which the code's Doppler moves it along, and sees \
+         the mean. Where the rate is a multiple of the chip rate, or over short stretches, it sees one piece. ns are \
+         one core's for a sample of a satellite with everything that the generator does (truth, rounding to 8 bits), \
+         processor time, medians of interleaved runs. The position is the closed loop's mean over 45 s with noise, \
+         against that of `reference` with the same seed. Settings that no other beats in cost and pseudorange error \
+         are on the front. Widths of samples and qualities of noise have [a page of their own](widths.md).\n\n\
          {} `cargo bench --bench trade` makes this page.",
         machine()
     )

@@ -113,7 +113,9 @@ pub struct Generate {
 
 #[derive(Args, Clone, Debug)]
 #[command(
-    after_help = "Examples:\n  gnss-twin receive if.sigmf-data --out reports/mine\n  gnss-twin receive raw.bin --out reports/raw --format ci8 --rate-hz 4e6\n\nExit code: 0 with a fix, 3 without one (results are written, the reason is printed), 65 when the input is no recording"
+    after_help = "Examples:\n  gnss-twin receive if.sigmf-data --out reports/mine\n  gnss-twin receive raw.bin --out \
+                  reports/raw --format ci8 --rate-hz 4e6\n\nExit code: 0 with a fix, 3 without one (results are \
+                  written, the reason is printed), 65 when the input is no recording"
 )]
 pub struct Receive {
     /// Recording: a SigMF pair (either file), a SigMF collection of front ends that share a clock, or a raw
@@ -147,7 +149,8 @@ pub struct Receive {
 
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Examples:\n  gnss-twin analyze reports/static --check scenarios/limits.toml\n  gnss-twin analyze --truth static.truth --rinex-obs rx.26O --nmea rx.nmea --out reports/mine"
+    after_help = "Examples:\n  gnss-twin analyze reports/static --check scenarios/limits.toml\n  gnss-twin analyze \
+                  --truth static.truth --rinex-obs rx.26O --nmea rx.nmea --out reports/mine"
 )]
 pub struct Analyze {
     /// Directory of a run, with truth/ and rx/
@@ -191,7 +194,8 @@ pub struct Plan {
 #[derive(Args, Debug)]
 #[command(
     args_conflicts_with_subcommands = true,
-    after_help = "Examples:\n  gnss-twin study studies/pll_jitter.toml\n  gnss-twin study plan studies/pll_jitter.toml -o big && gnss-twin study export slurm big | sbatch"
+    after_help = "Examples:\n  gnss-twin study studies/pll_jitter.toml\n  gnss-twin study plan \
+                  studies/pll_jitter.toml -o big && gnss-twin study export slurm big | sbatch"
 )]
 pub struct Study {
     #[command(subcommand)]
@@ -233,7 +237,8 @@ pub struct StudyPlan {
     #[arg(long, short, value_name = "DIR")]
     pub out: PathBuf,
     /// Number of shards [default: 50 to 1000, of a minute at most]
-    #[arg(long, value_name = "N", conflicts_with = "shard_minutes", value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    #[arg(long, value_name = "N", conflicts_with = "shard_minutes")]
+    #[arg(value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub shards: Option<u64>,
     /// Length of a shard in minutes of one core, roughly
     #[arg(long, value_name = "M")]

@@ -39,8 +39,8 @@ pub fn generate(arguments: &args::Generate, scenes: &[Scene]) -> Result<(), CliE
     }
     let out = shown(&arguments.out);
     scenario::print(&format!(
-        "{text}in {out}: samples and metadata as NAME.sigmf-data and NAME.sigmf-meta, {base}.sigmf-collection over them, \
-         truth/ of all of them\n"
+        "{text}in {out}: samples and metadata as NAME.sigmf-data and NAME.sigmf-meta, {base}.sigmf-collection over \
+         them, truth/ of all of them\n"
     ))
 }
 
@@ -49,15 +49,15 @@ fn check(arguments: &args::Generate, names: &[&str]) -> Result<(), CliError> {
     let (count, known) = (names.len(), names.join(", "));
     if arguments.seek != 0 || arguments.samples.is_some() {
         return Err(CliError::usage(format!(
-            "--seek and --samples count the samples of one front end, and the scene has {count} ({known}): choose one with \
-             --front-end NAME"
+            "--seek and --samples count the samples of one front end, and the scene has {count} ({known}): choose \
+             one with --front-end NAME"
         )));
     }
     let extension = arguments.out.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     if extension.starts_with("sigmf") {
         return Err(CliError::usage(format!(
-            "--out {}: the scene has {count} front ends ({known}), each with files of its own: name a directory for them, or \
-             choose one with --front-end NAME",
+            "--out {}: the scene has {count} front ends ({known}), each with files of its own: name a directory for \
+             them, or choose one with --front-end NAME",
             shown(&arguments.out)
         )));
     }

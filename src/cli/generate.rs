@@ -68,7 +68,8 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     let truth_path = arguments.out.with_extension("truth");
     if meta_path == arguments.out || truth_path == arguments.out {
         return Err(CliError::usage(format!(
-            "--out {}: the samples need another name than their metadata (.sigmf-meta) and truth (.truth): use .sigmf-data",
+            "--out {}: the samples need another name than their metadata (.sigmf-meta) and truth (.truth): use \
+             .sigmf-data",
             arguments.out.display()
         )));
     }

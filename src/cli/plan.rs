@@ -117,7 +117,8 @@ impl<'s> Loops<'s> {
         };
         Some(format!(
             "the carrier loop does not follow the motion on {count} of {} satellites: {} accelerates by up to \
-             {:.1} g, {:.1} g/s (at {:.1} s), a stress of {:.1} deg where {:.1} deg are left: expect cycle slips or a lost lock; {remedy}",
+             {:.1} g, {:.1} g/s (at {:.1} s), a stress of {:.1} deg where {:.1} deg are left: expect cycle slips or \
+             a lost lock; {remedy}",
             self.rows.len(),
             line.sv,
             line.acceleration_mps2 / G_MPS2,

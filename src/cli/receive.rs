@@ -119,8 +119,8 @@ fn of_collection(arguments: &args::Receive) -> Result<Vec<Recording>, CliError> 
     if let Some((flag, _)) = flags.into_iter().find(|(_, given)| *given) {
         let names: Vec<String> = files.iter().map(|file| shown(file)).collect();
         return Err(CliError::usage(format!(
-            "{flag}: {name} is a collection of {} recordings, each with metadata of its own: receive one of them by its \
-             path: {}",
+            "{flag}: {name} is a collection of {} recordings, each with metadata of its own: receive one of them by \
+             its path: {}",
             members.len(),
             names.join(", ")
         )));

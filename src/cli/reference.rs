@@ -86,9 +86,10 @@ fn of_receiver() -> Vec<Section> {
 
 fn limits() -> String {
     let mut text = format!(
-        "Keys are paths into `summary.json`, as `\"position.horizontal_p95_m\" = {{ max = 1.5 }}`; a bound is `min`, `max`, both, \
-         or `equals`. Besides them `marginal_share` (a number from 0 to below 1, {MARGINAL_SHARE} if absent): what is left of a \
-         limit below this share of it is marginal.\n\n| path | unit | meaning |\n| --- | --- | --- |\n"
+        "Keys are paths into `summary.json`, as `\"position.horizontal_p95_m\" = {{ max = 1.5 }}`; a bound is `min`, \
+         `max`, both, or `equals`. Besides them `marginal_share` (a number from 0 to below 1, {MARGINAL_SHARE} if \
+         absent): what is left of a limit below this share of it is marginal.\n\n| path | unit | meaning |\n| --- | \
+         --- | --- |\n"
     );
     for leaf in schema::leaves() {
         let _ = writeln!(text, "| `{}` | {} | {} |", leaf.path, leaf.unit, leaf.meaning.replace('|', "\\|"));

@@ -201,8 +201,8 @@ impl Fidelity {
         let bias_m = standing_bias_m(self.code_edge, rate_hz);
         (bias_m > self.allowed_m).then(|| {
             format!(
-                "fidelity.code_edge = {} at {:.3} Msps: chips meet the same places between samples, and the code of a satellite \
-                 without Doppler is {bias_m:.1} m off, rms; \"band_limited\" or another rate avoids it",
+                "fidelity.code_edge = {} at {:.3} Msps: chips meet the same places between samples, and the code of \
+                 a satellite without Doppler is {bias_m:.1} m off, rms; \"band_limited\" or another rate avoids it",
                 self.code_edge.name(),
                 1e-6 * rate_hz
             )
@@ -314,8 +314,8 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool) -> Vec<Choice> {
             value: chosen.code_edge.name().to_owned(),
             own: chosen.code_edge != level.code_edge,
             error: format!(
-                "pseudorange {:.1e} m rms at {:.3} Msps where the code stands, {:.1e} m at 1 kHz of Doppler behind a loop of \
-                 {LOOP_HZ} Hz (balanced: below {:.1e} m)",
+                "pseudorange {:.1e} m rms at {:.3} Msps where the code stands, {:.1e} m at 1 kHz of Doppler behind a \
+                 loop of {LOOP_HZ} Hz (balanced: below {:.1e} m)",
                 chosen.code_bias_m(rate_hz),
                 1e-6 * rate_hz,
                 chosen.moving_bias_m(rate_hz, 1000.0),

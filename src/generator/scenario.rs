@@ -77,7 +77,8 @@ pub enum ScenarioError {
         message: String,
     },
     /// A key that no table has.
-    #[error("{place}: unknown key '{key}'{}; known here: {known}", nearest.as_ref().map_or(String::new(), |n| format!(": did you mean '{n}'?")))]
+    #[error("{place}: unknown key '{key}'{}; known here: \
+             {known}", nearest.as_ref().map_or(String::new(), |n| format!(": did you mean '{n}'?")))]
     UnknownKey {
         /// Where in the text.
         place: Place,

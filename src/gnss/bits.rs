@@ -184,6 +184,19 @@ pub const fn element<T>(field: Field, get: fn(&T) -> f64, set: fn(&mut T, f64)) 
     Element { field, get, set }
 }
 
+/// [`element`] of a part of the parameters that is kept as the number that the field has: `plain!(name,
+/// places, kind, power of two, clause, path of the part)`.
+macro_rules! plain {
+    ($name:literal, $places:expr, $kind:expr, $power:expr, $clause:expr, $($part:tt)+) => {
+        $crate::gnss::bits::element(
+            $crate::gnss::bits::Field::new($name, &$places, $kind, $power, $clause),
+            |of| of.$($part)+,
+            |of, value| of.$($part)+ = value,
+        )
+    };
+}
+pub(crate) use plain;
+
 /// Writes every field of `table` into `data`.
 pub fn write_all<T, S: Store>(table: &[Element<T>], from: &T, data: &mut S) -> Result<(), FieldError> {
     table.iter().try_for_each(|element| {

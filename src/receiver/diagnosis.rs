@@ -86,8 +86,9 @@ impl Diagnosis {
         let few = acquired < UNKNOWNS;
         if few && matches!(stage, Stage::NoSymbols { .. } | Stage::NoFrame { .. } | Stage::NoEphemeris { .. }) {
             say(format!(
-                "the number of satellites: a position needs {UNKNOWNS}, there are {acquired}, and one that barely passes the \
-                 threshold may be false: are {rate_hz} Hz, {format}, the carrier at {if_hz} Hz and the sense of the spectrum right?"
+                "the number of satellites: a position needs {UNKNOWNS}, there are {acquired}, and one that barely \
+                 passes the threshold may be false: are {rate_hz} Hz, {format}, the carrier at {if_hz} Hz and the \
+                 sense of the spectrum right?"
             ));
         }
         match &stage {
@@ -96,7 +97,8 @@ impl Diagnosis {
                 say(format!("the sample rate: {rate_hz} Hz was taken"));
                 say(format!("the format: {format} was taken"));
                 say(format!(
-                    "the intermediate frequency: the carrier was looked for at {if_hz} Hz (and whether the spectrum is inverted)"
+                    "the intermediate frequency: the carrier was looked for at {if_hz} Hz (and whether the spectrum \
+                     is inverted)"
                 ));
                 say("the local oscillator: an offset beyond acquisition.doppler_max_hz hides every satellite".into());
                 say("the antenna: is there any signal?".into());
@@ -124,8 +126,8 @@ fn without_position(reason: Option<&NoFix>, length: &str) -> Vec<String> {
     match reason {
         Some(NoFix::AwaitingIonosphere { limit_s, .. }) => vec![
             format!(
-                "the length: the ionosphere's parameters are on page 18 of subframe 4, sent once in {PAGE_EVERY_MIN} min; \
-                 there are {length}"
+                "the length: the ionosphere's parameters are on page 18 of subframe 4, sent once in {PAGE_EVERY_MIN} \
+                 min; there are {length}"
             ),
             match limit_s {
                 Some(limit_s) => format!("position.ionosphere_wait_s = {limit_s}: 0 fixes without them at once"),
@@ -164,7 +166,8 @@ impl fmt::Display for Stage {
             }
             Self::NothingAcquired { strongest: Some((sv, statistic, threshold)) } => write!(
                 f,
-                "no satellite was acquired: the strongest peak, of {sv}, is {statistic:.1} against a threshold of {threshold:.1}"
+                "no satellite was acquired: the strongest peak, of {sv}, is {statistic:.1} against a threshold of \
+                 {threshold:.1}"
             ),
             Self::NothingAcquired { strongest: None } => {
                 write!(f, "no satellite was acquired: no known signal lies within the recorded band")

@@ -202,6 +202,7 @@ impl Settings {
         // Longer codes have settings that are fitted to them.
         self.tracking.validate(1e-3).map_err(|source| SettingsError::Tracking { origin: origin.to_owned(), source })?;
         let (position, operation) = (&self.position, &self.operation);
+        let measurement_ms = f64::from(operation.measurement_interval_ms);
         #[rustfmt::skip]
         let ranges = [
             ("position.mask_deg", position.mask_deg, 0.0, 90.0),
@@ -210,8 +211,8 @@ impl Settings {
             ("position.model_sigma_m", position.model_sigma_m, 1e-3, 100.0),
             ("position.ionosphere_error_share", position.ionosphere_error_share, 0.0, 10.0),
             ("position.ionosphere_wait_s", position.ionosphere_wait_s, 0.0, 1500.0),
-            ("operation.measurement_interval_ms", f64::from(operation.measurement_interval_ms), 10.0, 60_000.0),
-            ("operation.tracking_interval_ms", f64::from(operation.tracking_interval_ms), 1.0, f64::from(operation.measurement_interval_ms)),
+            ("operation.measurement_interval_ms", measurement_ms, 10.0, 60_000.0),
+            ("operation.tracking_interval_ms", f64::from(operation.tracking_interval_ms), 1.0, measurement_ms),
             ("operation.search_interval_s", operation.search_interval_s, 0.1, 86_400.0),
             ("operation.reacquisition_interval_s", operation.reacquisition_interval_s, 0.1, 86_400.0),
             ("operation.repeated_false_alarm_share", operation.repeated_false_alarm_share, 1e-6, 1.0),

@@ -178,7 +178,8 @@ fn scene(cn0_dbhz: f64, seed: u64, duration_s: f64) -> Result<Scene, DetectionEr
     let text = format!(
         "name = \"search\"\nstart = 2010-07-01T08:05:58\nduration_s = {duration_s}\nseed = {seed}\n\
          [motion]\nkind = \"static\"\nlatitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\n\
-         [front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[power]\nkind = \"fixed\"\ncn0_dbhz = {cn0_dbhz}\n[noise]\n"
+         [front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[power]\nkind = \"fixed\"\ncn0_dbhz = {cn0_dbhz}\n\
+         [noise]\n"
     );
     let scenario = Scenario::parse(&text, "search").map_err(|error| DetectionError::Scene(error.to_string()))?;
     let (mut scene, _) = (scenario.compose(Path::new("."), &Overrides::default()))
@@ -320,12 +321,13 @@ pub fn write(directory: &Path, rows: &[DetectionRow], settings: &AcquisitionSett
     let joint = Joint::of(rows);
     let mut text = format!(
         "# Acquisition against theory\n\n\
-         One satellite in the noise of a scene at 2.6 Msps, 8 bit; each trial is the receiver's search of a stretch of its own \
-         ({} sums of {} ms, Doppler steps of {} Hz, Doppler up to half a step off, code and symbol edges anywhere). Detections are \
-         expected from the joint statistics of the cells about the peak (`study::search`), false alarms as designed. \
-         {held} of {} counts are within the 95 % of their binomial law. The {} detections that leave room on both sides have together \
-         a chi-square of {:.1} (exceeded by chance with {:.2}) and a bias of {:+.1} σ. \
-         `cargo bench --bench acquisition` makes this page.\n\n![Probability of detection](acquisition.png)\n\n\
+         One satellite in the noise of a scene at 2.6 Msps, 8 bit; each trial is the receiver's search of a stretch \
+         of its own ({} sums of {} ms, Doppler steps of {} Hz, Doppler up to half a step off, code and symbol edges \
+         anywhere). Detections are expected from the joint statistics of the cells about the peak (`study::search`), \
+         false alarms as designed. {held} of {} counts are within the 95 % of their binomial law. The {} detections \
+         that leave room on both sides have together a chi-square of {:.1} (exceeded by chance with {:.2}) and a \
+         bias of {:+.1} σ. `cargo bench --bench acquisition` makes this page.\n\n![Probability of \
+         detection](acquisition.png)\n\n\
          | what | C/N0 (dB-Hz) | trials | found | measured | expected | 95 % of counts | within |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- |\n",
         settings.noncoherent_sums,

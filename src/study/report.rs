@@ -31,7 +31,8 @@ pub fn write(
         table.into_inner().map_err(|error| JudgeError::File { path: path.clone(), source: error.into_error() })?;
     write_whole(&path, &csv)?;
     let text = format!(
-        "# Tracking loops against theory\n\n{preface}\n\n![Ratio of measured and predicted jitter](loops.png)\n{}{}{}{}",
+        "# Tracking loops against theory\n\n{preface}\n\n![Ratio of measured and predicted jitter](loops.png)\n\
+         {}{}{}{}",
         inside(rows),
         outside(rows),
         against_rules(levels, settings),
@@ -70,8 +71,9 @@ fn inside(rows: &[ProofRow]) -> String {
     let good = region.iter().filter(|row| row.holds()).count();
     let mut text = format!(
         "\n## Where T·C/N0 ≥ {LEAST_SNR} and B·T ≤ {LARGEST_BANDWIDTH_TIME}\n\n\
-         Ratio of the measured spread of (truth − oscillator) to theory with the exact bandwidth of the discrete loop. {good} of \
-         {} cells are within {:.0} % (frequency {:.0} %) or three standard errors of the measurement.\n\n\
+         Ratio of the measured spread of (truth − oscillator) to theory with the exact bandwidth of the discrete \
+         loop. {good} of {} cells are within {:.0} % (frequency {:.0} %) or three standard errors of the \
+         measurement.\n\n\
          | loop | cells | within | ratio: mean | least | largest | standard error, at most |\n\
          | --- | --- | --- | --- | --- | --- | --- |\n",
         region.len(),
@@ -98,9 +100,10 @@ fn outside(rows: &[ProofRow]) -> String {
     let rest = rows.iter().filter(|row| !row.in_region);
     let departing = rest.clone().filter(|row| !row.holds()).count();
     let mut text = format!(
-        "\n## Outside\n\n{departing} of {} cells depart from linear theory. Causes: the arctangent of a noisy prompt loses gain and \
-         spreads more than its squaring loss says; pairs of prompts wrap by half a cycle; the quotient of noisy \
-         correlations has long tails (those of the dot product are unbounded); errors leave the linear range ±d/2.\n",
+        "\n## Outside\n\n{departing} of {} cells depart from linear theory. Causes: the arctangent of a noisy prompt \
+         loses gain and spreads more than its squaring loss says; pairs of prompts wrap by half a cycle; the \
+         quotient of noisy correlations has long tails (those of the dot product are unbounded); errors leave the \
+         linear range ±d/2.\n",
         rest.clone().count()
     );
     text += &listed("Cells that depart", rest.filter(|row| !row.holds()));
@@ -113,7 +116,8 @@ fn listed<'a>(title: &str, rows: impl Iterator<Item = &'a ProofRow>) -> String {
         if text.is_empty() {
             let _ = write!(
                 text,
-                "\n{title}:\n\n| loop | T (ms) | B (Hz) | d (chip) | C/N0 (dB-Hz) | T·C/N0 | theory | measured | ratio | slips | cause |\n\
+                "\n{title}:\n\n| loop | T (ms) | B (Hz) | d (chip) | C/N0 (dB-Hz) | T·C/N0 | theory | measured | \
+                 ratio | slips | cause |\n\
                  | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
             );
         }
@@ -144,11 +148,12 @@ fn against_rules(levels: &[Level], settings: &TrackingSettings) -> String {
     let cell = |value: Option<f64>, digits: usize| value.map_or_else(|| "–".to_owned(), |v| format!("{v:.digits$}"));
     let mut text = format!(
         "\n## The receiver's default loops against the rules\n\n\
-         Phase loop order {}, {} Hz, T = {:.0} ms; code loop order {}, {} Hz, d = {d}; frequency loop order {}, {} Hz, T = 1 ms. \
-         Rules: 15°, d/6 = {:.4} chip, 1/(12T) = {:.1} Hz. Thermal jitter alone reaches 15° at {:.1} dB-Hz and d/6 at {:.1} dB-Hz. \
-         Oscillator: TCXO with h₀ {:e}, h₋₁ {:e}, h₋₂ {:e}. Theory / simulation; the run with the oscillator is \
-         watched by the receiver's lock detectors, which may give up.\n\n\
-         | C/N0 (dB-Hz) | phase (°) | with TCXO (°) | 3σ ≤ 45° | code (chip) | σ ≤ d/6 | frequency (Hz) | σ ≤ 1/(12T) | slips (1/h) | lost after (s) |\n\
+         Phase loop order {}, {} Hz, T = {:.0} ms; code loop order {}, {} Hz, d = {d}; frequency loop order {}, {} \
+         Hz, T = 1 ms. Rules: 15°, d/6 = {:.4} chip, 1/(12T) = {:.1} Hz. Thermal jitter alone reaches 15° at {:.1} \
+         dB-Hz and d/6 at {:.1} dB-Hz. Oscillator: TCXO with h₀ {:e}, h₋₁ {:e}, h₋₂ {:e}. Theory / simulation; the \
+         run with the oscillator is watched by the receiver's lock detectors, which may give up.\n\n\
+         | C/N0 (dB-Hz) | phase (°) | with TCXO (°) | 3σ ≤ 45° | code (chip) | σ ≤ d/6 | frequency (Hz) | σ ≤ \
+         1/(12T) | slips (1/h) | lost after (s) |\n\
          | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
         settings.pll_order,
         settings.pll_bandwidth_hz,

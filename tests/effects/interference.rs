@@ -20,7 +20,8 @@ fn scene_in(directory: &Path, rate_hz: f64, more: &str, interference: &str) -> (
     let text = format!(
         "name = \"jammed\"\nstart = 2010-07-01T08:12:30\nduration_s = 2\nseed = 11\n\
          [motion]\nkind = \"static\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 120\n\
-         [power]\ncn0_dbhz = 45\n[noise]\n[front_end]\nsample_rate_hz = {rate_hz}\nformat = \"cf32\"\n{more}\n{interference}"
+         [power]\ncn0_dbhz = 45\n[noise]\n[front_end]\nsample_rate_hz = {rate_hz}\nformat = \"cf32\"\n{more}\n\
+         {interference}"
     );
     Scenario::parse(&text, "jammed.toml").unwrap().compose(directory, &Overrides::default()).unwrap()
 }
@@ -253,7 +254,8 @@ fn a_recording_at_the_samples_own_rate_comes_back_and_repeats() {
     std::fs::write(room.path().join("tone.cf32"), bytes).unwrap();
     for (rate_hz, file_hz) in [(4e6, 4e6), (4e6, 2e6), (4e6, 5e6)] {
         let text = format!(
-            "[[interference]]\nkind = \"recording\"\nfile = \"tone.cf32\"\nformat = \"cf32\"\nsample_rate_hz = {file_hz}\njs_db = 20\n"
+            "[[interference]]\nkind = \"recording\"\nfile = \"tone.cf32\"\nformat = \"cf32\"\nsample_rate_hz = \
+             {file_hz}\njs_db = 20\n"
         );
         let (scene, _) = scene_in(room.path(), rate_hz, "", &text);
         let samples = alone(&scene, 0, 20_000);
@@ -268,7 +270,8 @@ fn a_recording_at_the_samples_own_rate_comes_back_and_repeats() {
 
 #[test]
 fn interference_keeps_the_laws_of_stages() {
-    let text = "[[interference]]\nkind = \"chirp\"\nsweep_hz = 1e6\nsweep_s = 3.3e-5\njs_db = 30\non_s = 0.01\noff_s = 0.05\n\
+    let text = "[[interference]]\nkind = \"chirp\"\nsweep_hz = 1e6\nsweep_s = 3.3e-5\njs_db = 30\non_s = 0.01\noff_s \
+                = 0.05\n\
         [[interference]]\nkind = \"pulse\"\nwidth_s = 2e-5\nrate_hz = 3e3\njitter = 0.5\njs_db = 40\n\
         [[interference]]\nkind = \"noise\"\nbandwidth_hz = 1e5\noffset_hz = 3e5\njs_db = 20\n\
         [[interference]]\nkind = \"matched\"\njs_db = 90\noffset_hz = 1000\n\
@@ -357,7 +360,8 @@ fn a_pulse_that_lasts_a_period_is_a_tone() {
 
 #[test]
 fn an_emitter_at_a_place_weakens_with_distance_and_shifts_with_the_receiver_s_oscillator() {
-    let text = "[[interference]]\nkind = \"cw\"\noffset_hz = 1e5\njs_db = 25\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 1120\n";
+    let text = "[[interference]]\nkind = \"cw\"\noffset_hz = 1e5\njs_db = 25\nlatitude_deg = 26.5\nlongitude_deg = \
+                80.2\nheight_m = 1120\n";
     let (mut scene, _) = scene_in(Path::new("."), 2.6e6, "", text);
     let row = scene.interference[0].row(1, 0).unwrap();
     assert!((row.jn0_dbhz - 70.0).abs() < 1e-9 && (row.frequency_hz - 1e5).abs() < 1e-3, "{row:?}");

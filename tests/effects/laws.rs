@@ -92,7 +92,8 @@ const TABLES: &[(&str, Option<&str>)] = &[
         Some("[[satellite_fault]]\nkind = \"clock_step\"\nsatellites = [\"G23\"]\nstep_s = 0"),
     ),
     (
-        "[[satellite_fault]]\nkind = \"clock_ramp\"\nsatellites = [\"G23\"]\ndrift_sps = 1e-8\non_s = 0.01\noff_s = 0.1",
+        "[[satellite_fault]]\nkind = \"clock_ramp\"\nsatellites = [\"G23\"]\ndrift_sps = 1e-8\non_s = 0.01\noff_s = \
+         0.1",
         Some("[[satellite_fault]]\nkind = \"clock_ramp\"\nsatellites = [\"G23\"]\ndrift_sps = 0"),
     ),
     ("[[satellite_fault]]\nkind = \"clock_noise\"\noscillator = \"cesium1\"", None),

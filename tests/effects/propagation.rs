@@ -16,7 +16,8 @@ use gnss_twin::gnss::time::Epoch;
 use serde::de::DeserializeOwned;
 
 const BASE: &str = "name = \"laws\"\nstart = 2010-07-01T08:05:58\nduration_s = 0.3\n[motion]\nkind = \"static\"\n\
-    latitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\n[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n";
+    latitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\n[front_end]\nsample_rate_hz = 2.6e6\nformat \
+    = \"ci8\"\n";
 const IONEX: &str = "[ionosphere]\nmodel = \"ionex\"\nfile = \"igrg3380.10i.gz\"\nmap_start = 2010-12-04T08:05:58\n";
 const WALLS: &str = "[[obstruction]]\nkind = \"sector\"\nfrom_deg = 300\nto_deg = 60\nroof_deg = 50\n\
     [[obstruction]]\nkind = \"building\"\neast_m = [-30, -10]\nnorth_m = [-20, 20]\ntop_m = 15\nloss_db = 10\n";

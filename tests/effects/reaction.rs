@@ -46,7 +46,8 @@ fn the_oscillator_adds_to_the_phase_loop_what_its_power_law_says() {
         };
         let tables = |clock: &str| {
             format!(
-                "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[power]\nkind = \"fixed\"\ncn0_dbhz = 65\n[noise]\n\
+                "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[power]\nkind = \"fixed\"\ncn0_dbhz = 65\n\
+                 [noise]\n\
                  [truth]\ninterval_s = 0.05\n{clock}"
             )
         };
@@ -65,7 +66,8 @@ fn the_oscillator_adds_to_the_phase_loop_what_its_power_law_says() {
         let ratio = found / added;
         assert!(
             (ratio - 1.0).abs() < scatter,
-            "{name}, {bandwidth_hz} Hz: {:.3}° added, {:.3}° expected, ratio {ratio:.3} within {scatter:.3}; thermal {:.3}°",
+            "{name}, {bandwidth_hz} Hz: {:.3}° added, {:.3}° expected, ratio {ratio:.3} within {scatter:.3}; thermal \
+             {:.3}°",
             360.0 * found,
             360.0 * added,
             360.0 * quiet.0
@@ -78,7 +80,8 @@ fn a_converter_of_few_bits_costs_the_receiver_what_its_levels_cost() {
     let settings = TrackingSettings::default();
     let cn0 = |format: &str, adc: &str| {
         let tables = format!(
-            "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"{format}\"\n[power]\nkind = \"fixed\"\ncn0_dbhz = 45\n[noise]\n{adc}"
+            "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"{format}\"\n[power]\nkind = \"fixed\"\ncn0_dbhz = 45\n\
+             [noise]\n{adc}"
         );
         let (pairs, _kept) = track(&scene(sv(), 30.0, &tables), &settings);
         let settled = pairs.iter().filter(|(_, seen)| seen.locked_s > 3.0);

@@ -217,7 +217,8 @@ fn a_clock_s_step_is_in_the_pseudorange_in_full_and_in_the_doppler_not_at_all() 
 fn a_clock_s_ramp_moves_code_carrier_and_doppler_together_while_it_is_on() {
     let (sv, drift) = (Sv::gps(13), 2e-9);
     let fault = format!(
-        "[[satellite_fault]]\nkind = \"clock_ramp\"\nsatellites = [\"{sv}\"]\ndrift_sps = {drift:e}\non_s = 2\noff_s = 5\n"
+        "[[satellite_fault]]\nkind = \"clock_ramp\"\nsatellites = [\"{sv}\"]\ndrift_sps = {drift:e}\non_s = 2\noff_s \
+         = 5\n"
     );
     let plain = tempfile::tempdir().unwrap();
     samples(&scene(sv, 7.0, STRONG), plain.path());

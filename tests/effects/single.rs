@@ -12,7 +12,8 @@ use gnss_twin::receiver::acquire::Acquired;
 use gnss_twin::receiver::source::Block;
 use gnss_twin::receiver::track::{Channel, Measurement, Report, TrackingSettings};
 
-const PLACE: &str = "name = \"single\"\nstart = 2010-07-01T08:05:58\nseed = 3\n[motion]\nkind = \"static\"\nlatitude_deg = 26.5123\n\
+const PLACE: &str = "name = \"single\"\nstart = 2010-07-01T08:05:58\nseed = 3\n[motion]\nkind = \"static\"\n\
+                     latitude_deg = 26.5123\n\
     longitude_deg = 80.2329\nheight_m = 130\n";
 
 /// A static scene of `tables` in which `sv` is alone.

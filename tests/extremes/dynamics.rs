@@ -221,8 +221,10 @@ fn beyond_a_tenth_of_light_s_speed_a_motion_is_refused() {
         run::text(
             700.0,
             &format!(
-                "[motion]\nkind = \"rocket\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\nazimuth_deg = 0\n\
-                 elevation_deg = 90\nignition_s = 0\nthrust_mps2 = {thrust}\nburn_s = 600\njerk_mps3 = 1e6\n[front_end]\n\
+                "[motion]\nkind = \"rocket\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\nazimuth_deg \
+                 = 0\n\
+                 elevation_deg = 90\nignition_s = 0\nthrust_mps2 = {thrust}\nburn_s = 600\njerk_mps3 = 1e6\n\
+                 [front_end]\n\
                  sample_rate_hz = 2.6e6\n[power]\ncn0_dbhz = 45\n"
             ),
         )

@@ -120,7 +120,8 @@ fn write(rows: &BTreeMap<(u32, usize), (Case, [String; 3])>) {
     let mut text = String::from(
         "# Stability at the edges\n\nEach case with the figure that its test measured beside its bar. Filled by\n\n\
          ```\nGNSS_TWIN_WRITE_STABILITY=$PWD/reports/stability.md cargo test --test extremes\n```\n\n\
-         in one run; `bash .ci/long` does the same with a thousand random scenes (`GNSS_TWIN_LONG=1`). A figure that misses its bar fails its test.\n",
+         in one run; `bash .ci/long` does the same with a thousand random scenes (`GNSS_TWIN_LONG=1`). A figure that \
+         misses its bar fails its test.\n",
     );
     let mut family = "";
     let mut last = 0;

@@ -120,19 +120,22 @@ fn motions() -> impl Strategy<Value = String> {
         (place(0.0..4e3), 60.0..2000.0, 1e2..1e5, 0.0..0.1, 5.0..90.0).prop_map(|(p, thrust, jerk, at, up)| {
             let burn = 2.0 * thrust / jerk + 0.3;
             format!(
-                "[motion]\nkind = \"rocket\"\n{p}azimuth_deg = 50\nelevation_deg = {:.3}\nignition_s = {at:.4}\nthrust_mps2 = \
-                 {thrust:.3}\nburn_s = {burn:.6}\njerk_mps3 = {jerk:.3}\n",
+                "[motion]\nkind = \"rocket\"\n{p}azimuth_deg = 50\nelevation_deg = {:.3}\nignition_s = {at:.4}\n\
+                 thrust_mps2 = {thrust:.3}\nburn_s = {burn:.6}\njerk_mps3 = {jerk:.3}\n",
                 60.0 + up / 3.0
             )
         }),
-        (6.6e6..4e8, 0.0..0.98, 0.0..180.0, -180.0..180.0, -180.0..180.0).prop_map(|(a, e, i, node, m): (f64, f64, f64, f64, f64)| {
-            let e = e.min(1.0 - 6.5e6 / a);
-            format!(
-                "[motion]\nkind = \"orbit\"\nsemi_major_axis_m = {a:.1}\neccentricity = {e:.6}\ninclination_deg = {i:.3}\n\
+        (6.6e6..4e8, 0.0..0.98, 0.0..180.0, -180.0..180.0, -180.0..180.0).prop_map(
+            |(a, e, i, node, m): (f64, f64, f64, f64, f64)| {
+                let e = e.min(1.0 - 6.5e6 / a);
+                format!(
+                    "[motion]\nkind = \"orbit\"\nsemi_major_axis_m = {a:.1}\neccentricity = {e:.6}\ninclination_deg = \
+                 {i:.3}\n\
                  node_longitude_deg = {node:.3}\nargument_of_perigee_deg = {:.3}\nmean_anomaly_deg = {m:.3}\n",
-                -node
-            )
-        }),
+                    -node
+                )
+            }
+        ),
     ]
 }
 
@@ -148,7 +151,8 @@ fn scenes() -> impl Strategy<Value = (String, f64)> {
         }),
         (5e6..12e6, 0.22..0.28, any::<bool>()).prop_map(|(rate, place, inverted): (f64, f64, bool)| {
             format!(
-                "sample_rate_hz = {:.0}\nif_hz = {:.0}\nspectrum_inverted = {inverted}\nformat = \"ri16\"\nnoise_lsb = 4000\n",
+                "sample_rate_hz = {:.0}\nif_hz = {:.0}\nspectrum_inverted = {inverted}\nformat = \"ri16\"\nnoise_lsb \
+                 = 4000\n",
                 rate.round(),
                 place * rate
             )
@@ -168,8 +172,9 @@ fn scenes() -> impl Strategy<Value = (String, f64)> {
             let (h, m, s) = (second / 3600, second / 60 % 60, second % 60);
             (
                 format!(
-                    "name = \"random\"\nstart = 2010-07-01T{h:02}:{m:02}:{s:02}\nduration_s = 2\nseed = {seed}\n{motion}\
-                     [front_end]\n{band}[noise]\n[power]\ncn0_dbhz = {cn0:.2}\n{clock}{air}[fidelity]\ncode_edge = \"area\"\n"
+                    "name = \"random\"\nstart = 2010-07-01T{h:02}:{m:02}:{s:02}\nduration_s = 2\nseed = {seed}\n\
+                     {motion}[front_end]\n{band}[noise]\n[power]\ncn0_dbhz = {cn0:.2}\n{clock}{air}[fidelity]\n\
+                     code_edge = \"area\"\n"
                 ),
                 share,
             )

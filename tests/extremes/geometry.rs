@@ -85,8 +85,10 @@ fn the_two_names_of_the_antimeridian_are_one_place() {
         run::text(
             60.0,
             &format!(
-                "[motion]\nkind = \"static\"\nlatitude_deg = 10\nlongitude_deg = {longitude}\nheight_m = 10\n[front_end]\n\
-                 sample_rate_hz = 2.6e6\n[power]\n[ionosphere]\nmodel = \"klobuchar\"\n[troposphere]\nmodel = \"saastamoinen\"\n"
+                "[motion]\nkind = \"static\"\nlatitude_deg = 10\nlongitude_deg = {longitude}\nheight_m = 10\n\
+                 [front_end]\n\
+                 sample_rate_hz = 2.6e6\n[power]\n[ionosphere]\nmodel = \"klobuchar\"\n[troposphere]\nmodel \
+                 = \"saastamoinen\"\n"
             ),
         )
     };
@@ -155,7 +157,8 @@ fn overhead_there_is_no_azimuth_and_in_the_antenna_no_direction() {
     let the = case(19, "satellite at the zenith, and at the antenna");
     let scene = run::scene(
         60.0,
-        "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\nmodel = \"klobuchar\"\n",
+        "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\nmodel \
+         = \"klobuchar\"\n",
     );
     let (mut finite, mut refused, mut of, mut worst) = (0, 0, 0, 0.0_f64);
     for sv in scene.catalogue.satellites() {
@@ -170,7 +173,8 @@ fn overhead_there_is_no_azimuth_and_in_the_antenna_no_direction() {
         }
         let mut overhead = run::scene(
             60.0,
-            "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\nmodel = \"klobuchar\"\n",
+            "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\n\
+             model = \"klobuchar\"\n",
         );
         overhead.trajectory = gnss_twin::generator::vehicle::Trajectory::fixed(place);
         let seen = truth::seen(&overhead, sv, &L1_CA, at).unwrap().unwrap();

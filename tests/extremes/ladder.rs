@@ -61,7 +61,8 @@ fn carrier_error(scene: &Scene, grade: Grade, first: u64, places: u64, apart_s: 
 /// The usual scene at a rate and a level, `before_s` seconds after its first sample when it is looked at.
 fn scene(rate_hz: f64, grade: Grade, before_s: i64) -> (Scene, u64) {
     let tables = format!(
-        "[front_end]\nsample_rate_hz = {rate_hz:e}\nformat = \"cf32\"\n[power]\ncn0_dbhz = 60\n[fidelity]\nlevel = \"{}\"\n\
+        "[front_end]\nsample_rate_hz = {rate_hz:e}\nformat = \"cf32\"\n[power]\ncn0_dbhz = 60\n[fidelity]\nlevel \
+         = \"{}\"\n\
          [receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n",
         grade.name()
     );
@@ -218,7 +219,8 @@ fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
         figure(&path.with_extension("png"), (1280, 900), 2, &charts, &legend).unwrap();
         let name = path.with_extension("png").file_name().unwrap().to_string_lossy().into_owned();
         let text = format!(
-            "The same scene at every level: carrier in the samples against the truth, over whole code periods.\n\n![Error curves]({name})\n\n{}{}{}{}",
+            "The same scene at every level: carrier in the samples against the truth, over whole code periods.\n\n\
+             ![Error curves]({name})\n\n{}{}{}{}",
             table("seconds since the first sample", &over_time),
             table("Msps", &over_rate),
             table("g at 1 Hz", &over_dynamics),

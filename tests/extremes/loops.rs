@@ -238,7 +238,8 @@ fn away_from_the_peak_a_channel_comes_back_or_gives_up() {
 #[test]
 fn threads_change_no_byte() {
     let the = case(52, "determinism");
-    let tables = "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[noise]\n[power]\n[receiver_clock]\noscillator = \"tcxo\"\n\
+    let tables = "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[noise]\n[power]\n[receiver_clock]\n\
+                  oscillator = \"tcxo\"\n\
         [scintillation]\ns4 = 0.5\nsigma_phi_rad = 0.3\ndecorrelation_s = 0.5\n";
     let scene = run::scene(0.4, tables);
     let make = |threads: usize| {

@@ -28,7 +28,8 @@ const RUN: u64 = 4096;
 fn scene(rate_hz: f64, duration_s: f64) -> Scene {
     let if_hz = 1_575.42e6 - CENTER_HZ;
     let tables = format!(
-        "[front_end]\nsample_rate_hz = {rate_hz:e}\nif_hz = {if_hz}\nformat = \"cf32\"\n[receiver_clock]\nbias_s = 1.3e-4\n\
+        "[front_end]\nsample_rate_hz = {rate_hz:e}\nif_hz = {if_hz}\nformat = \"cf32\"\n[receiver_clock]\nbias_s = \
+         1.3e-4\n\
          drift_sps = 5e-8\n[power]\ncn0_dbhz = 45\n[fidelity]\nknot_tolerance_cycles = 1e-5\n"
     );
     run::scene(duration_s, &tables)

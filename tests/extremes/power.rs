@@ -150,7 +150,8 @@ fn silence_is_received_without_a_number_that_is_none() {
 fn without_noise_the_ratio_has_its_cap() {
     let the = case(38, "noise off");
     let sv = Sv::gps(23);
-    let tables = "[front_end]\nsample_rate_hz = 5e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 60\n[fidelity]\nlevel = \"reference\"\ncode_edge = \"area\"\n";
+    let tables = "[front_end]\nsample_rate_hz = 5e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 60\n[fidelity]\nlevel \
+                  = \"reference\"\ncode_edge = \"area\"\n";
     let scene = run::only(run::scene(3.0, tables), &[sv]);
     let (_, report) = run::track(
         &scene,

@@ -252,7 +252,8 @@ fn folded_and_mirrored_bands_give_the_doppler_its_sign() {
         [(1.3e6, false), (1.3e6, true), (3.9e6, false), (3.9e6, true), (6.5e6, false), (6.5e6, true), (9.1e6, false)]
     {
         let tables = format!(
-            "[front_end]\nsample_rate_hz = 5.2e6\nif_hz = {if_hz}\nspectrum_inverted = {inverted}\nformat = \"ri8\"\n[noise]\n\
+            "[front_end]\nsample_rate_hz = 5.2e6\nif_hz = {if_hz}\nspectrum_inverted = {inverted}\nformat = \"ri8\"\n\
+             [noise]\n\
              [power]\ncn0_dbhz = 50\n"
         );
         let scene = run::only(run::try_scene(&text_of(&tables)).unwrap(), &[sv]);
@@ -331,7 +332,8 @@ fn a_quarter_of_the_rate_is_exactly_four_samples() {
     // The signal there against f64: the reference's arithmetic, sample by sample.
     let made = |level: &str| {
         let tables = format!(
-            "[front_end]\nsample_rate_hz = 10.4e6\nif_hz = 2.6e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 45\n[fidelity]\n\
+            "[front_end]\nsample_rate_hz = 10.4e6\nif_hz = 2.6e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 45\n\
+             [fidelity]\n\
              level = \"reference\"\ncarrier = \"{level}\"\n"
         );
         let scene = run::only(run::scene(0.02, &tables), &[Sv::gps(23)]);

@@ -191,7 +191,8 @@ fn a_part_of_a_scene_has_the_bits_that_the_whole_has_there() {
     let tables = "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[noise]\n[power]\ncn0_dbhz = 45\n[filter]\n\
         kind = \"butterworth\"\norder = 4\nbandwidth_hz = 2e6\n[adc]\nbits = 4\nagc_window_s = 0.01\n[receiver_clock]\n\
         bias_s = 1e-3\noscillator = \"tcxo\"\n[scintillation]\ns4 = 0.6\nsigma_phi_rad = 0.4\ndecorrelation_s = 0.5\n\
-        [[interference]]\nkind = \"chirp\"\nsweep_hz = 1e6\nsweep_s = 1e-4\njs_db = 20\n[[interference]]\nkind = \"pulse\"\n\
+        [[interference]]\nkind = \"chirp\"\nsweep_hz = 1e6\nsweep_s = 1e-4\njs_db = 20\n[[interference]]\nkind \
+        = \"pulse\"\n\
         width_s = 1e-4\nrate_hz = 300\njitter = 0.5\njs_db = 20\n[[spoofer]]\non_s = 0.2\npower_db = 3\n[truth]\n\
         interval_s = 0.02\n";
     let scene = run::scene(1.0, tables);

@@ -69,7 +69,8 @@ const NUMBERS: [&str; 20] = [
 ];
 
 /// Settings of every type.
-const SETTINGS: &str = "[acquisition]\ndoppler_max_hz = 5000.0\n[tracking]\npll_order = 3\npll_bandwidth_hz = 18.0\nreplica = \"area\"\n\
+const SETTINGS: &str = "[acquisition]\ndoppler_max_hz = 5000.0\n[tracking]\npll_order = 3\npll_bandwidth_hz = 18.0\n\
+                        replica = \"area\"\n\
                         [position]\nmask_deg = 5\nrequire_ionosphere = true\n[operation]\nsearch_interval_s = 15.0\n\
                         week_reference = \"2024-01-01T00:00:00\"\n";
 

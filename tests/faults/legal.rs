@@ -90,7 +90,8 @@ const NUMBERS: &[Row] = &[
     // The receiver's settings.
     ("acquisition", "doppler_max_hz", Yes, No),
     ("acquisition", "doppler_step_cycles cells_per_chip false_alarm_probability", No, No),
-    ("tracking", "pll_bandwidth_hz fll_bandwidth_hz dll_bandwidth_hz dll_pull_in_bandwidth_hz spacing_chips fll_pull_in_s phase_lock_threshold loss_s pull_in_limit_s cn0_average_s", No, No),
+    ("tracking", "pll_bandwidth_hz fll_bandwidth_hz dll_bandwidth_hz dll_pull_in_bandwidth_hz spacing_chips \
+                  fll_pull_in_s phase_lock_threshold loss_s pull_in_limit_s cn0_average_s", No, No),
     ("tracking", "fll_assist_bandwidth_hz dll_pull_in_s phase_unlock_threshold cn0_threshold_dbhz", Yes, No),
     ("position", "mask_deg smoothing_s ionosphere_wait_s ionosphere_error_share", Yes, No),
     ("position", "false_alarm model_sigma_m", No, No),

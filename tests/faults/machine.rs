@@ -24,7 +24,8 @@ pub fn scene(duration_s: f64, seed: u64) -> String {
 /// A study of modelled correlations of `signal_s` seconds, in two cells.
 pub fn modelled(signal_s: f64) -> String {
     format!(
-        "name = \"modelled\"\nlevel = \"correlator\"\nseed = 9\nrepetitions = 2\nkeep = [\"phase_sigma_deg\", \"held\"]\n\
+        "name = \"modelled\"\nlevel = \"correlator\"\nseed = 9\nrepetitions = 2\nkeep = \
+         [\"phase_sigma_deg\", \"held\"]\n\
          [measure]\nsettle_s = 0.1\nduration_s = {signal_s}\n[[axis]]\nkey = \"signal.cn0_dbhz\"\nvalues = [36, 45]\n"
     )
 }

@@ -190,10 +190,17 @@ fn a_reader_that_goes_away_ends_the_program_quietly_and_a_slow_one_gets_everythi
                 || {
                     let work = task.workplace();
                     let words = task.arguments.join(" ");
-                    let script = format!("{{ '{TWIN}' {words}; echo $? >../$$.status; }} | head -c {bytes} >/dev/null; cat ../$$.status; rm ../$$.status");
+                    let script = format!(
+                        "{{ '{TWIN}' {words}; echo $? >../$$.status; }} | head -c {bytes} \
+                                          >/dev/null; cat ../$$.status; rm ../$$.status"
+                    );
                     let output = Command::new("bash").args(["-c", &script]).current_dir(work.path()).output().unwrap();
-                    let (status, message) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-                    if !["0", "141"].contains(&status.trim()) || message.contains("panicked") || message.contains("error") {
+                    let (status, message) =
+                        (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+                    if !["0", "141"].contains(&status.trim())
+                        || message.contains("panicked")
+                        || message.contains("error")
+                    {
                         return Err(format!("{status}: {message}"));
                     }
                     // What it makes is made before it is told.

@@ -16,8 +16,10 @@ const FAMILY: &str = "The program";
 const TWIN: &str = env!("CARGO_BIN_EXE_gnss-twin");
 
 /// A scene of a twentieth of a second.
-const TINY: &str = "name = \"tiny\"\nstart = 2010-07-01T08:05:58\nduration_s = 0.05\nseed = 1\n[motion]\nkind = \"static\"\n\
-                        latitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n[front_end]\nsample_rate_hz = 2.6e6\n\
+const TINY: &str = "name = \"tiny\"\nstart = 2010-07-01T08:05:58\nduration_s = 0.05\nseed = 1\n[motion]\nkind \
+                    = \"static\"\n\
+                        latitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n[front_end]\nsample_rate_hz = \
+                        2.6e6\n\
                         format = \"ci8\"\n[power]\ncn0_dbhz = 45\n[noise]\n";
 
 fn workplace() -> tempfile::TempDir {

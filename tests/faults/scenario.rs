@@ -226,7 +226,8 @@ fn values_that_contradict_each_other_are_refused_with_the_number_that_decides() 
     let add = |tables: &str| format!("{base}{tables}\n");
     let moving = base.replace(
         "kind = \"static\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n",
-        "kind = \"waypoints\"\n[[motion.point]]\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\nspeed_mps = 5\n\
+        "kind = \"waypoints\"\n[[motion.point]]\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n\
+         speed_mps = 5\n\
          [[motion.point]]\nlatitude_deg = 26.50001\nlongitude_deg = 80.2\nheight_m = 130\nspeed_mps = 5\n",
     );
     let power = |line: &str| base.replace("cn0_dbhz = 45", &format!("kind = \"link_budget\"\n{line}"));
@@ -244,49 +245,70 @@ fn values_that_contradict_each_other_are_refused_with_the_number_that_decides() 
         ("a scene before its data", base.replace("2010-07-01", "2010-05-01"), "expected a scene within"),
         ("a scene after its data", base.replace("2010-07-01", "2031-07-01"), "expected a scene within"),
         ("half of Klobuchar", add("[ionosphere]\nmodel = \"klobuchar\"\nalpha = [0, 0, 0, 0]"), "beta"),
-        ("a wall without a distance", add("[[multipath]]\nkind = \"wall\"\namplitude = 0.5\nazimuth_deg = 3"), "distance_m"),
-        ("a building inside out", obstruction("kind = \"building\"\neast_m = [9, 2]\nnorth_m = [1, 2]\ntop_m = 3"), "smaller of its two sides"),
-        ("azimuths that fall", obstruction("kind = \"horizon\"\nazimuth_deg = [9, 2]\nelevation_deg = [1, 2]"), "ascending"),
-        ("elevations too few", obstruction("kind = \"horizon\"\nazimuth_deg = [1, 2]\nelevation_deg = [1]"), "as many as azimuth_deg has: 2"),
-        ("a pulse longer than its period", jam("kind = \"pulse\"\njs_db = 9\nwidth_s = 0.01\nrate_hz = 1100"), "at most 9.09"),
-        ("a pulse of half a sample", jam("kind = \"pulse\"\njs_db = 9\nwidth_s = 1e-7\nrate_hz = 1100"), "two samples, 7.69"),
+        ("a wall without a distance", add("[[multipath]]\nkind = \"wall\"\namplitude = 0.5\nazimuth_deg = \
+                                           3"), "distance_m"),
+        ("a building inside out", obstruction("kind = \"building\"\neast_m = [9, 2]\nnorth_m = [1, 2]\ntop_m = \
+                                               3"), "smaller of its two sides"),
+        ("azimuths that fall", obstruction("kind = \"horizon\"\nazimuth_deg = [9, 2]\nelevation_deg = [1, \
+                                            2]"), "ascending"),
+        ("elevations too few", obstruction("kind = \"horizon\"\nazimuth_deg = [1, 2]\nelevation_deg = [1]"), "as \
+                                                                                                              many as azimuth_deg has: 2"),
+        ("a pulse longer than its period", jam("kind = \"pulse\"\njs_db = 9\nwidth_s = 0.01\nrate_hz = 1100"), "at \
+                                                                                                                most 9.09"),
+        ("a pulse of half a sample", jam("kind = \"pulse\"\njs_db = 9\nwidth_s = 1e-7\nrate_hz = 1100"), "two \
+                                                                                                          samples, 7.69"),
         ("off before on", jam("kind = \"cw\"\njs_db = 9\noff_s = 0.5"), "from 1 s (on_s) upwards"),
         ("two strengths", jam("kind = \"cw\"\njs_db = 9\npower_dbw = -90"), "exactly one of"),
         ("radiated from nowhere", jam("kind = \"cw\"\neirp_dbw = -9"), "a place with it"),
         ("watts against a fixed C/N0", jam("kind = \"cw\"\npower_dbw = -90"), "link_budget"),
         ("a ratio at a distance", jam("kind = \"cw\"\njs_db = 9\ndistance_m = 5"), "only eirp_dbw needs it"),
         ("a line outside the band", jam("kind = \"cw\"\njs_db = 9\noffset_hz = 5e6"), "outside the samples' band"),
-        ("a chirp half outside the band", jam("kind = \"chirp\"\njs_db = 9\nsweep_hz = 2e6\nsweep_s = 1e-4\noffset_hz = 1.3e6"), "is silent"),
+        ("a chirp half outside the band", jam("kind = \"chirp\"\njs_db = 9\nsweep_hz = 2e6\nsweep_s = 1e-4\n\
+                                               offset_hz = 1.3e6"), "is silent"),
         ("a ramp from nowhere", add("[[spoofer]]\npower_db = 3\nramp_s = 4"), "both or none"),
-        ("phase below its amplitude's", add("[scintillation]\ns4 = 0.9\nsigma_phi_rad = 0.01\ndecorrelation_s = 1"), "comes with s4 = 0.9"),
-        ("a roll along the velocity", format!("{moving}[attitude]\nkind = \"velocity\"\nroll_deg = 3\n"), "keeps the right side level"),
+        ("phase below its amplitude's", add("[scintillation]\ns4 = 0.9\nsigma_phi_rad = 0.01\ndecorrelation_s = \
+                                             1"), "comes with s4 = 0.9"),
+        ("a roll along the velocity", format!("{moving}[attitude]\nkind = \"velocity\"\nroll_deg = 3\n"), "keeps the \
+                                                                                                           right side level"),
         ("a velocity that is none", add("[attitude]\nkind = \"velocity\""), "stands still"),
         ("holding while moving", moving.replace("speed_mps = 5", "speed_mps = 5\nhold_s = 3"), "speed_mps is not 0"),
-        ("two laws of turning", moving.replace("[[motion.point]]\nlatitude_deg = 26.5\n", "turn_radius_m = 5\nturn_acceleration_mps2 = 2\n[[motion.point]]\nlatitude_deg = 26.5\n"), "only one of"),
-        ("one point", base.replace("kind = \"static\"\nlatitude_deg", "kind = \"waypoints\"\n[[motion.point]]\nspeed_mps = 0\nlatitude_deg"), "two or more"),
+        ("two laws of turning", moving.replace("[[motion.point]]\nlatitude_deg = 26.5\n", "turn_radius_m = 5\n\
+                                                                                           turn_acceleration_mps2 = 2\n[[motion.point]]\nlatitude_deg = 26.5\n"), "only one of"),
+        ("one point", base.replace("kind = \"static\"\nlatitude_deg", "kind = \"waypoints\"\n[[motion.point]]\n\
+                                                                       speed_mps = 0\nlatitude_deg"), "two or more"),
         ("a motion that ends first", moving.clone(), "change duration_s"),
         ("an antenna's file alone", power("antenna_file = \"a.csv\""), "unless antenna"),
         ("a table without a file", power("antenna = \"table\""), "because antenna"),
         ("C/N0 in a link budget", power("cn0_dbhz = 45"), "unknown key 'power.cn0_dbhz'"),
-        ("weather beside GPT3", add("[troposphere]\nmodel = \"saastamoinen\"\ngpt3_file = \"g\"\npressure_hpa = 900"), "brings its own"),
-        ("VMF1 without coefficients", add("[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf1\""), "vmf_file or gpt3_file"),
-        ("coefficients without VMF", add("[troposphere]\nmodel = \"saastamoinen\"\nvmf_file = \"v\""), "mapping = \"vmf1\""),
+        ("weather beside GPT3", add("[troposphere]\nmodel = \"saastamoinen\"\ngpt3_file = \"g\"\npressure_hpa = \
+                                     900"), "brings its own"),
+        ("VMF1 without coefficients", add("[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf1\""), "vmf_file \
+                                                                                                           or gpt3_file"),
+        ("coefficients without VMF", add("[troposphere]\nmodel = \"saastamoinen\"\nvmf_file = \"v\""), "mapping \
+                                                                                                        = \"vmf1\""),
         ("phase noise without a band", add("[local_oscillator]\nphase_noise_rad = 0.1"), "because phase_noise_rad"),
         ("Q of a real format", add("[front_end]\nformat = \"ri8\"\nif_hz = 6e5\n[iq]\ngain_db = 1"), "has no Q"),
-        ("a filter without order", add("[filter]\nkind = \"butterworth\"\nbandwidth_hz = 2e6"), "an integer from 1 to 10"),
+        ("a filter without order", add("[filter]\nkind = \"butterworth\"\nbandwidth_hz = 2e6"), "an integer from 1 \
+                                                                                                 to 10"),
         ("an order that is none", add("[filter]\nkind = \"brick_wall\"\norder = 3\nbandwidth_hz = 2e6"), "no order"),
-        ("two laws of an oscillator", add("[receiver_clock]\noscillator = \"tcxo\"\npower_law = [0, 0, 1e-20, 0, 0]"), "nothing beside oscillator"),
+        ("two laws of an oscillator", add("[receiver_clock]\noscillator = \"tcxo\"\npower_law = [0, 0, 1e-20, 0, \
+                                           0]"), "nothing beside oscillator"),
         ("negative noise", add("[receiver_clock]\npower_law = [0, 0, -1e-20, 0, 0]"), "none negative"),
-        ("an orbit that jumps", add("[[satellite_fault]]\nkind = \"orbit\"\nsatellites = [\"G03\"]\nalong_m = 3\non_s = 2"), "orbits do not jump"),
-        ("an echo that overtakes", add("[[multipath]]\nkind = \"given\"\namplitude = 0.5\nexcess_m = 5\nrate_mps = -1"), "fall below 0 after 5.000 s"),
-        ("a playback of nothing", add("[satellites]\nmask_deg = 89\n[playback]\nbits = 8"), "nothing to set its level by"),
+        ("an orbit that jumps", add("[[satellite_fault]]\nkind = \"orbit\"\nsatellites = [\"G03\"]\nalong_m = 3\n\
+                                     on_s = 2"), "orbits do not jump"),
+        ("an echo that overtakes", add("[[multipath]]\nkind = \"given\"\namplitude = 0.5\nexcess_m = 5\nrate_mps = \
+                                        -1"), "fall below 0 after 5.000 s"),
+        ("a playback of nothing", add("[satellites]\nmask_deg = 89\n[playback]\nbits = 8"), "nothing to set its \
+                                                                                             level by"),
         ("a signal twice", format!("signals = [\"GPS L1 C/A\", \"GPS L1 C/A\"]\n{base}"), "different signals"),
         ("orbits of another day", format!("{later}[orbits]\nsp3 = \"igs15904_05h_12h.sp3.gz\"\n"), "the scene needs"),
         ("maps of another day", add("[ionosphere]\nmodel = \"ionex\"\nfile = \"igrg3380.10i.gz\""), "the maps are of"),
         ("health of nobody", add("[[message_fault]]\nkind = \"health\"\nhealth = 3"), "satellites"),
         ("B T above the limit", add("[receiver.tracking]\npll_bandwidth_hz = 25\nintegration = 20"), "at most 20 Hz"),
-        ("intervals that do not divide", add("[receiver.operation]\ntracking_interval_ms = 33"), "a divisor of measurement_interval_ms, 100"),
-        ("an unlock above the lock", add("[receiver.tracking]\nphase_unlock_threshold = 0.9"), "0 to phase_lock_threshold"),
+        ("intervals that do not divide", add("[receiver.operation]\ntracking_interval_ms = 33"), "a divisor of \
+                                                                                                  measurement_interval_ms, 100"),
+        ("an unlock above the lock", add("[receiver.tracking]\nphase_unlock_threshold = 0.9"), "0 to \
+                                                                                                phase_lock_threshold"),
         ("a file that is a directory", add("[navigation]\nfile = \"extremes\""), "not a file"),
     ];
     let mut tally = Tally::new(FAMILY, "11. contradictions");

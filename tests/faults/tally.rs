@@ -147,10 +147,10 @@ fn write(rows: &Rows) {
     let mut all = read(&std::fs::read_to_string(&path).unwrap_or_default());
     all.extend(rows.clone());
     let mut text = String::from(
-        "# Robustness\n\nCases of damaged input and of a failing machine, and what became of them: refused with the place and the \
-         reason; accepted with a part left out and named; accepted as it legally stands. A failure is a panic, an end after \
-         more than two seconds of work (a process: thirty seconds), a result that is not what the input says, or a wrong exit code. `bash .ci/long` fills this \
-         table.\n",
+        "# Robustness\n\nCases of damaged input and of a failing machine, and what became of them: refused with the \
+         place and the reason; accepted with a part left out and named; accepted as it legally stands. A failure is \
+         a panic, an end after more than two seconds of work (a process: thirty seconds), a result that is not what \
+         the input says, or a wrong exit code. `bash .ci/long` fills this table.\n",
     );
     let mut family = "";
     for ((now, _), row) in &all {

@@ -192,6 +192,12 @@ pub fn comments_too_wide(text: &str, most: usize) -> Vec<usize> {
     lines.filter(|(_, line)| wide(line) && !line.contains("://")).map(|(number, _)| number).collect()
 }
 
+/// Numbers of the lines that hold code and are wider.
+pub fn code_too_wide(text: &str, most: usize) -> Vec<usize> {
+    let wide = |line: &str| !line.trim_start().starts_with("//") && line.chars().count() > most;
+    (1..).zip(text.lines()).filter(|(_, line)| wide(line)).map(|(number, _)| number).collect()
+}
+
 /// Numbers of the lines of a blanked text on which something is unwrapped.
 pub fn unwraps(code: &str) -> Vec<usize> {
     let is_call = |line: &str| {

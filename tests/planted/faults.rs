@@ -67,7 +67,8 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.inav.scale_af0", "the scale of a_f0 is 2^-33, sent and read", INAV),
     fault("gnss.inav.second_symbol", "the symbols of G2 are not inverted, sent and read", CODED),
     fault("gnss.inav.word_order", "words come a page early, sent and read", CODED),
-    fault("gnss.inav.reduced_begin", "elements in short refer to the second before the sub-frame, sent and read", SHORT),
+    fault("gnss.inav.reduced_begin", "elements in short refer to the second before the sub-frame, sent and \
+                                      read", SHORT),
     fault("gnss.fec.field", "the field of the Reed-Solomon code has another polynomial, sent and read", REDUNDANT),
     fault("gnss.fec.interleaver", "neighbouring symbols change places", CODED),
     fault("gnss.crc.polynomial", "the check has another polynomial, sent and read", CODED),

@@ -111,8 +111,10 @@ fn report(outcomes: &[Outcome]) -> String {
     let caught = outcomes.iter().filter(|outcome| outcome.caught.is_ok()).count();
     let mut text = format!(
         "# Planted faults\n\n\
-         Each row is one fault, planted in the code behind the feature `planted`, which only the package's own tests turn on.\n\
-         A process with that fault runs one check, and the check must fail; without a fault every check passes. The last column is\n\
+         Each row is one fault, planted in the code behind the feature `planted`, which only the package's own tests \
+         turn on.\n\
+         A process with that fault runs one check, and the check must fail; without a fault every check passes. The \
+         last column is\n\
          what the check reported. `tests/planted` is part of `cargo test`; this file is written by `.ci/long`.\n\n\
          {caught} of {} faults are caught.\n\n| fault | what is wrong | caught by | how |\n| --- | --- | --- | --- |\n",
         outcomes.len()

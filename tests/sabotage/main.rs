@@ -115,8 +115,9 @@ fn every_kind_of_damage_passes_where_it_is_tolerable_and_fails_by_its_row_where_
 fn report(both: usize, found: &[(usize, (String, Option<String>))]) -> String {
     let caught = found.iter().filter(|(_, (_, wrong))| wrong.is_none()).count();
     let mut text = format!(
-        "# Sabotaged results\n\nThe results of a sound receiver, damaged in `rx/` and judged again. The tolerable size passes every row, the broken one \
-         fails by the rows named; {both} of {} kinds have a tolerable size. Caught: {caught} of {}. Written by `tests/sabotage`.\n\n\
+        "# Sabotaged results\n\nThe results of a sound receiver, damaged in `rx/` and judged again. The tolerable \
+         size passes every row, the broken one fails by the rows named; {both} of {} kinds have a tolerable size. \
+         Caught: {caught} of {}. Written by `tests/sabotage`.\n\n\
          | damage | tolerable | broken | failed by |\n| --- | --- | --- | --- |\n",
         found.len(),
         found.len()

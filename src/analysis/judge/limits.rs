@@ -30,7 +30,8 @@ pub enum LimitsError {
         message: String,
     },
     /// A path that `summary.json` does not have.
-    #[error("{name}: {} is not in summary.json; the nearest path is {nearest} (all: assets/summary.schema.json)", path.escape_debug())]
+    #[error("{name}: {} is not in summary.json; the nearest path is {nearest} (all: \
+             assets/summary.schema.json)", path.escape_debug())]
     Path {
         /// Name of the file of limits.
         name: String,
@@ -247,8 +248,10 @@ mod tests {
                     [position]\nvertical_p95_m.max = 3\n";
         // TOML forbids to open `position` twice: dotted keys close it.
         assert!(matches!(Limits::parse(text, "l.toml"), Err(LimitsError::Toml { .. })));
-        let text = "marginal_share = 0.05\nfidelity = { equals = \"balanced\" }\n\"position.horizontal_p95_m\" = { max = 1.5 }\n\
-                    [satellites]\nused = { min = 10 }\n[position]\nvertical_p95_m.max = 3\nbias_enu_m.1 = { min = -0.3, max = -0.1 }\n";
+        let text = "marginal_share = 0.05\nfidelity = { equals = \"balanced\" }\n\"position.horizontal_p95_m\" = { \
+                    max = 1.5 }\n\
+                    [satellites]\nused = { min = 10 }\n[position]\nvertical_p95_m.max = 3\nbias_enu_m.1 = { min = \
+                    -0.3, max = -0.1 }\n";
         let limits = Limits::parse(text, "l.toml").unwrap();
         let rows = limits.judge(&summary());
         let of = |path: &str| {

@@ -372,7 +372,8 @@ mod tests {
     fn real_samples_hold_signals_of_one_zone_at_the_frequency_that_they_fold_to() {
         let scene = |center_hz: f64| -> SceneFacts {
             let json = serde_json::json!({
-                "name": "x", "seed": 1, "duration_s": 1.0, "sample_rate_hz": 6e6, "center_hz": center_hz, "format": "ri8"
+                "name": "x", "seed": 1, "duration_s": 1.0,
+                "sample_rate_hz": 6e6, "center_hz": center_hz, "format": "ri8"
             });
             serde_json::from_value(json).unwrap()
         };

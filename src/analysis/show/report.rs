@@ -61,7 +61,8 @@ impl Summary {
         {
             writeln!(
                 f,
-                "C/N0          {measured:.2} dB-Hz measured, {effective:.2} expected: {set:.2} set, less the other satellites' codes{}",
+                "C/N0          {measured:.2} dB-Hz measured, {effective:.2} expected: {set:.2} set, less the other \
+                 satellites' codes{}",
                 if self.jammed { " and interference" } else { "" }
             )?;
         }
@@ -83,7 +84,8 @@ impl Summary {
             let metres = |value: Option<f64>| number(value, 1);
             writeln!(
                 f,
-                "spoofing      fixes up to {} m from the truth, claims up to {:.1} m; {} % of the fixes captured, 95 % within {} m of the claim",
+                "spoofing      fixes up to {} m from the truth, claims up to {:.1} m; {} % of the fixes captured, 95 \
+                 % within {} m of the claim",
                 metres(spoofing.displacement_max_m),
                 spoofing.claimed_displacement_max_m,
                 number(spoofing.captured_share.map(|share| 100.0 * share), 0),
@@ -123,7 +125,8 @@ impl Summary {
             let verdict = self.position.nees_verdict.map_or("unjudged", Calibration::name);
             writeln!(
                 f,
-                "covariance    {verdict}: normalised error squared {mean:.2}, of honest ones {low:.2} to {high:.2} ({fixes} independent fixes)"
+                "covariance    {verdict}: normalised error squared {mean:.2}, of honest ones {low:.2} to {high:.2} \
+                 ({fixes} independent fixes)"
             )?;
         }
         Ok(())

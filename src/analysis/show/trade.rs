@@ -131,11 +131,12 @@ pub fn write_widths(directory: &Path, rows: &[Width], machine: &str) -> Result<(
     write_rows(&directory.join("widths.csv"), rows.iter())?;
     let mut text = format!(
         "# Width of samples and quality of noise\n\n\
-         The static scene at 2.6 Msps, `balanced`. Time is that of the whole generator on one core for a sample of twelve \
-         satellites, and of it what noise, converter and format take; processor time, medians of interleaved runs. What is lost is that of \
-         one satellite in noise, against single-precision samples with noise in double precision and the same seed, over 3 s: the \
-         samples' difference beside their own root mean square, C/N0, and the code over pieces of 20 ms. Converters of 1 and 2 bits lose \
-         1.96 and 0.55 dB of white noise (Max 1960; van Vleck & Middleton 1966).\n\n\
+         The static scene at 2.6 Msps, `balanced`. Time is that of the whole generator on one core for a sample of \
+         twelve satellites, and of it what noise, converter and format take; processor time, medians of interleaved \
+         runs. What is lost is that of one satellite in noise, against single-precision samples with noise in double \
+         precision and the same seed, over 3 s: the samples' difference beside their own root mean square, C/N0, and \
+         the code over pieces of 20 ms. Converters of 1 and 2 bits lose 1.96 and 0.55 dB of white noise (Max 1960; \
+         van Vleck & Middleton 1966).\n\n\
          {machine} `cargo bench --bench trade -- --widths` makes this page.\n\n\
          | samples | bytes | ns | of it stages | difference (rms) | C/N0 loss (dB) | code mean / σ (m) |\n\
          | --- | --- | --- | --- | --- | --- | --- |\n"

@@ -178,7 +178,8 @@ pub enum PatternError {
     },
     /// Azimuths that are not equally spaced over the whole circle.
     #[error(
-        "{name}: the phase changes by {step_deg:.1} deg between neighbours: expected less than 180; add or subtract turns"
+        "{name}: the phase changes by {step_deg:.1} deg between neighbours: expected less than 180; add or subtract \
+         turns"
     )]
     Wrap {
         /// The file.

@@ -87,8 +87,8 @@ impl Scenario {
             let folded = folded_hz(if_hz, metadata.rate.hz());
             let mirrored = if folded < 0.0 { ", mirrored" } else { "" };
             warnings.push(format!(
-                "{of_it}front_end.if_hz = {if_hz} lies above half of sample_rate_hz: the samples hold the band from {:.3} to {:.3} MHz, \
-                 the carrier at {:.6} MHz{mirrored}",
+                "{of_it}front_end.if_hz = {if_hz} lies above half of sample_rate_hz: the samples hold the band from \
+                 {:.3} to {:.3} MHz, the carrier at {:.6} MHz{mirrored}",
                 low / 1e6,
                 high / 1e6,
                 folded.abs() / 1e6
@@ -134,7 +134,8 @@ impl Scenario {
                 Tuned::Centre { center_hz } => center_hz,
             };
             let reason = format!(
-                "{of_it}{place_hz} Hz: expected one at which the main lobe of some signal ({}) reaches into the samples' band, {:.3} to {:.3} MHz",
+                "{of_it}{place_hz} Hz: expected one at which the main lobe of some signal ({}) reaches into the \
+                 samples' band, {:.3} to {:.3} MHz",
                 names.join(", "),
                 low / 1e6,
                 high / 1e6

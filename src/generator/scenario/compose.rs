@@ -265,8 +265,8 @@ impl Scenario {
         if visible < 4 {
             let (mask_deg, of_it) = (self.mask_rad.to_degrees(), front_end.of_it());
             warnings.push(format!(
-                "{of_it}{visible} satellites above satellites.mask_deg = {mask_deg}, or from space not behind the Earth, at \
-                 the start: a position needs 4"
+                "{of_it}{visible} satellites above satellites.mask_deg = {mask_deg}, or from space not behind the \
+                 Earth, at the start: a position needs 4"
             ));
         }
         Ok(())

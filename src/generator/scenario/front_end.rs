@@ -134,7 +134,8 @@ fn alone(root: &Table<'_>, count: usize) -> Vec<ScenarioError> {
     let mut refused = Vec::new();
     for table in ["local_oscillator", "filter", "iq", "adc"].into_iter().filter(|table| root.has(table)) {
         let expected = format!(
-            "nothing at the top beside several front ends: write [front_end.{table}] below the [[front_end]] that has it"
+            "nothing at the top beside several front ends: write [front_end.{table}] below the [[front_end]] that \
+             has it"
         );
         refused.push(root.bad(table, expected));
     }
@@ -216,7 +217,8 @@ impl Reader<'_, '_> {
             return Err(table.bad(
                 "if_hz",
                 format!(
-                    "more than 0 and no multiple of half of sample_rate_hz, {half} Hz, because format = {format} is real"
+                    "more than 0 and no multiple of half of sample_rate_hz, {half} Hz, because format = {format} is \
+                     real"
                 ),
             ));
         }

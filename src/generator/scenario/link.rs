@@ -102,7 +102,8 @@ impl Power {
             Self::LinkBudget { transmit, transmit_dbw, blocks, antenna, noise_figure_db, loss_db } => {
                 if let Some(signal) = scenario.signals.iter().find(|signal| signal.minimum_power_dbw.is_none()) {
                     let reason = format!(
-                        "\"link_budget\" with {signal}: no least power on the ground is known of it; write cn0_dbhz instead"
+                        "\"link_budget\" with {signal}: no least power on the ground is known of it; write cn0_dbhz \
+                         instead"
                     );
                     return Err(scenario.conflict("power.kind", reason));
                 }
@@ -136,8 +137,8 @@ impl Power {
 fn constellation(scenario: &Scenario) -> Result<Vec<(Sv, Block)>, ScenarioError> {
     transmit::constellation(scenario.start).ok_or_else(|| {
         let reason = format!(
-            "\"constellation\" at {}: the blocks are known here from 2010-05-28 to 2011-07-16; name them in [power.blocks] \
-             (G05 = \"IIR-M\") or let transmit be one for all",
+            "\"constellation\" at {}: the blocks are known here from 2010-05-28 to 2011-07-16; name them in \
+             [power.blocks] (G05 = \"IIR-M\") or let transmit be one for all",
             scenario.start
         );
         scenario.conflict("power.transmit", reason)

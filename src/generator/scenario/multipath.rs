@@ -57,8 +57,9 @@ pub(super) fn effect(scenario: &Scenario, trajectory: &Trajectory) -> Result<Mul
         match echo.detour {
             Detour::Given { excess_m, rate_mps } if excess_m + rate_mps * duration_s < 0.0 => {
                 return refuse(format!(
-                    "excess_m = {excess_m} and rate_mps = {rate_mps} fall below 0 after {:.3} s of {duration_s}: expected \
-                     a path that is never shorter than the direct one; begin further away or end the scene before",
+                    "excess_m = {excess_m} and rate_mps = {rate_mps} fall below 0 after {:.3} s of {duration_s}: \
+                     expected a path that is never shorter than the direct one; begin further away or end the scene \
+                     before",
                     -excess_m / rate_mps
                 ));
             }
@@ -70,8 +71,8 @@ pub(super) fn effect(scenario: &Scenario, trajectory: &Trajectory) -> Result<Mul
                     .find(|t_s| effect.clearance_m(azimuth_rad, distance_m, &trajectory.at(*t_s).position_m) <= 0.0);
                 if let Some(t_s) = behind {
                     return refuse(format!(
-                        "the antenna is behind the wall, {distance_m} m off at the start, after {t_s:.1} s: move the wall \
-                         (azimuth_deg, distance_m) or the route"
+                        "the antenna is behind the wall, {distance_m} m off at the start, after {t_s:.1} s: move the \
+                         wall (azimuth_deg, distance_m) or the route"
                     ));
                 }
             }

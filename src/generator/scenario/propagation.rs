@@ -125,16 +125,16 @@ impl Ionosphere {
         match &self.truth {
             Electrons::Klobuchar(given) => {
                 let model = given.or(navigation.klobuchar).ok_or_else(|| {
-                    let reason = "the navigation file has no Klobuchar coefficients: write alpha and beta here, name a file that \
-                                  has them, or remove [ionosphere]";
+                    let reason = "the navigation file has no Klobuchar coefficients: write alpha and beta here, name \
+                                  a file that has them, or remove [ionosphere]";
                     scenario.conflict("ionosphere", reason.to_owned())
                 })?;
                 Ok(Box::new(KlobucharIonosphere { model }))
             }
             Electrons::NequickG(given) => {
                 let coefficients = given.or(navigation.nequick).ok_or_else(|| {
-                    let reason = "the navigation file has no coefficients of NeQuick-G (GAL): write ai here, name a file that has \
-                                  them, or choose another model";
+                    let reason = "the navigation file has no coefficients of NeQuick-G (GAL): write ai here, name a \
+                                  file that has them, or choose another model";
                     scenario.conflict("ionosphere", reason.to_owned())
                 })?;
                 Ok(Box::new(NequickIonosphere { model: NequickG { coefficients } }))
@@ -151,8 +151,8 @@ impl Ionosphere {
                 if from.since(first) < 0.0 || last.since(from.plus_s(end_s)) < 0.0 {
                     let until = from.plus_s(end_s);
                     let reason = format!(
-                        "the maps are of {first} to {last}, the scene needs {from} to {until}: name the maps of that day, \
-                         or say with ionosphere.map_start which instant of theirs stands at the scene's start"
+                        "the maps are of {first} to {last}, the scene needs {from} to {until}: name the maps of that \
+                         day, or say with ionosphere.map_start which instant of theirs stands at the scene's start"
                     );
                     return Err(scenario.conflict("ionosphere.file", reason));
                 }
@@ -264,8 +264,8 @@ fn grid(path: &Path, wanted: Vienna, scenario: &Scenario, files: &Files<'_>) -> 
     let read = MappingGrid::read(&bytes, &path.display().to_string());
     let grid = read.map_err(|e| scenario.conflict(key, e.to_string()))?;
     if (wanted, grid.fitted_with) == (Vienna::Vmf3, Some(Vienna::Vmf1)) {
-        let reason = "the file's heading says that its coefficients are VMF1's, which do not go with VMF3's others: name a VMF3 \
-                      file, or write mapping = \"vmf1\"";
+        let reason = "the file's heading says that its coefficients are VMF1's, which do not go with VMF3's others: \
+                      name a VMF3 file, or write mapping = \"vmf1\"";
         return Err(scenario.conflict(key, reason.to_owned()));
     }
     Ok(grid)

@@ -263,8 +263,8 @@ impl OrbitsSpec {
             let (first, last) = orbits.reach();
             let (begin, end) = precise.span().unwrap_or((first, last));
             return Err(refuse(format!(
-                "epochs from {begin} to {end} give orbits from {first} to {last} (six epochs on either side), the scene needs \
-                 {from} to {to}: name the files of its days, the neighbouring day's too near midnight"
+                "epochs from {begin} to {end} give orbits from {first} to {last} (six epochs on either side), the \
+                 scene needs {from} to {to}: name the files of its days, the neighbouring day's too near midnight"
             )));
         }
         catalogue.follow(orbits);

@@ -274,14 +274,16 @@ impl Source<'_> {
         // cut-off.
         if cutoff_cps < 1.0 / 16.0 {
             let reason = format!(
-                "the samples' band leaves {room_hz} Hz on a side of it: expected at least a sixteenth of sample_rate_hz, {} Hz",
+                "the samples' band leaves {room_hz} Hz on a side of it: expected at least a sixteenth of \
+                 sample_rate_hz, {} Hz",
                 file_rate_hz / 16.0
             );
             return Err(self.refuse(&reason));
         }
         if cutoff_cps < 0.5 {
             warnings.push(format!(
-                "interference number {} (recording): the samples' band holds {:.6} MHz on each side of its middle: the rest is filtered away",
+                "interference number {} (recording): the samples' band holds {:.6} MHz on each side of its middle: \
+                 the rest is filtered away",
                 self.number,
                 room_hz / 1e6
             ));

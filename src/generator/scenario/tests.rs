@@ -21,49 +21,64 @@ use crate::gnss::samples::Format;
 
 const MINIMAL: &str = "name = \"test\"\nstart = 2010-07-01T10:00:00\nduration_s = 10\n";
 const STATIC: &str = "[motion]\nkind = \"static\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n";
-const ROCKET: &str = "[motion]\nkind = \"rocket\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\nazimuth_deg = 90\n\
-    elevation_deg = 80\nignition_s = 1\nthrust_mps2 = 200\nburn_s = 3\njerk_mps3 = 200\ndrag_m2pkg = 1e-5\ngravity = \"j2\"\n";
-const WAYPOINTS: &str = "[motion]\nkind = \"waypoints\"\nacceleration_mps2 = 2\njerk_mps3 = 1\nturn_acceleration_mps2 = 3\n\
+const ROCKET: &str = "[motion]\nkind = \"rocket\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n\
+                      azimuth_deg = 90\n\
+    elevation_deg = 80\nignition_s = 1\nthrust_mps2 = 200\nburn_s = 3\njerk_mps3 = 200\ndrag_m2pkg = 1e-5\ngravity \
+    = \"j2\"\n";
+const WAYPOINTS: &str = "[motion]\nkind = \"waypoints\"\nacceleration_mps2 = 2\njerk_mps3 = 1\n\
+                         turn_acceleration_mps2 = 3\n\
     [[motion.point]]\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\nspeed_mps = 0\nhold_s = 1\n\
     [[motion.point]]\nlatitude_deg = 26.51\nlongitude_deg = 80.2\nheight_m = 130\nspeed_mps = 20\n";
 const FILE: &str = "[motion]\nkind = \"file\"\nfile = \"ride.csv\"\nformat = \"csv\"\nmax_gap_s = 3\n";
 const ORBIT: &str = "[motion]\nkind = \"orbit\"\nsemi_major_axis_m = 6.9e6\neccentricity = 0.01\ninclination_deg = 51\n\
     node_longitude_deg = 60\nargument_of_perigee_deg = 10\nmean_anomaly_deg = 20\n";
 const RADIUS: &str = "[motion]\nkind = \"waypoints\"\nturn_radius_m = 30\n";
-const REST: &str = "[navigation]\nfile = \"brdc.10n\"\ngalileo_ahead_ns = 3\n[satellites]\nmask_deg = 10\nexclude = [\"G01\"]\ninclude_unhealthy = true\n\
+const REST: &str = "[navigation]\nfile = \"brdc.10n\"\ngalileo_ahead_ns = 3\n[satellites]\nmask_deg = 10\nexclude = \
+                    [\"G01\"]\ninclude_unhealthy = true\n\
     [front_end]\nsample_rate_hz = 4e6\nif_hz = 1e6\nspectrum_inverted = true\nformat = \"ri8\"\nnoise_lsb = 3\n\
-    [attitude]\nkind = \"fixed\"\nyaw_deg = 30\npitch_deg = 10\nroll_deg = 5\nspin_hz = 2\nlever_arm_m = [1, 0, 0]\nboresight = [0, 1, -1]\n\
-    [power]\nkind = \"link_budget\"\ntransmit = \"IIR\"\ntransmit_dbw = 15\nantenna = \"table\"\nantenna_file = \"gain.csv\"\nnoise_figure_db = 2\nloss_db = 1\n\
+    [attitude]\nkind = \"fixed\"\nyaw_deg = 30\npitch_deg = 10\nroll_deg = 5\nspin_hz = 2\nlever_arm_m = [1, 0, 0]\n\
+    boresight = [0, 1, -1]\n\
+    [power]\nkind = \"link_budget\"\ntransmit = \"IIR\"\ntransmit_dbw = 15\nantenna = \"table\"\nantenna_file \
+    = \"gain.csv\"\nnoise_figure_db = 2\nloss_db = 1\n\
     blocks = { G05 = \"IIR-M\" }\n\
     [ionosphere]\nmodel = \"klobuchar\"\nalpha = [1e-8, 0, 0, 0]\nbeta = [1e5, 0, 0, 0]\n\
     broadcast_alpha = [2e-8, 0, 0, 0]\nbroadcast_beta = [2e5, 0, 0, 0]\n\
-    [troposphere]\nmodel = \"saastamoinen\"\nheight_m = 100\npressure_hpa = 1000\ntemperature_c = 30\nrelative_humidity = 0.5\n\
+    [troposphere]\nmodel = \"saastamoinen\"\nheight_m = 100\npressure_hpa = 1000\ntemperature_c = 30\n\
+    relative_humidity = 0.5\n\
     mapping = \"niell\"\n\
     [[obstruction]]\nkind = \"horizon\"\nazimuth_deg = [0, 90]\nelevation_deg = [10, 20]\nedge_deg = 1\nloss_db = 20\n\
     [[obstruction]]\nkind = \"sector\"\nfrom_deg = 350\nto_deg = 10\nroof_deg = 40\n\
     [[obstruction]]\nkind = \"building\"\neast_m = [10, 20]\nnorth_m = [-5, 5]\ntop_m = 20\n\
     [scintillation]\ns4 = 0.5\nsigma_phi_rad = 0.8\ndecorrelation_s = 1\nsatellites = [\"G02\"]\n\
-    [receiver_clock]\nbias_s = 1e-4\ndrift_sps = 1e-7\nageing_per_day = 1e-9\nsensitivity_per_g = 1e-9\noscillator = \"tcxo\"\n[noise]\n\
+    [receiver_clock]\nbias_s = 1e-4\ndrift_sps = 1e-7\nageing_per_day = 1e-9\nsensitivity_per_g = 1e-9\noscillator \
+    = \"tcxo\"\n[noise]\n\
     [playback]\nbits = 8\nload_sigma = 3\nattenuation_db = 1\n\
     [local_oscillator]\noffset_hz = 10\nphase_noise_rad = 0.1\nphase_noise_bandwidth_hz = 1000\n\
     [filter]\nkind = \"butterworth\"\norder = 4\nbandwidth_hz = 1.8e6\n[iq]\ndc_i_lsb = 0.5\n\
     [adc]\nbits = 2\nstep_sigma = 1\nagc_window_s = 0.001\n\
-    [fidelity]\nlevel = \"balanced\"\ncarrier = \"f64\"\nnoise = \"f32\"\ncode_edge = \"nearest\"\nknot_tolerance_cycles = 1e-3\n[truth]\ninterval_s = 0.5\n\
+    [fidelity]\nlevel = \"balanced\"\ncarrier = \"f64\"\nnoise = \"f32\"\ncode_edge = \"nearest\"\n\
+    knot_tolerance_cycles = 1e-3\n[truth]\ninterval_s = 0.5\n\
     [expect]\nfix = \"none\"\nlosses = \"any\"\nsatellites = [\"G02\"]\nerrors = \"any\"\nreason = \"why\"\n\
     [receiver.tracking]\nwhatever = 1\n";
-const ECHOES: &str = "[[multipath]]\nkind = \"given\"\namplitude = 0.5\nphase_deg = 90\nsatellites = [\"G13\"]\nexcess_m = 30\nrate_mps = -0.5\n\
+const ECHOES: &str = "[[multipath]]\nkind = \"given\"\namplitude = 0.5\nphase_deg = 90\nsatellites = [\"G13\"]\n\
+                      excess_m = 30\nrate_mps = -0.5\n\
     [[multipath]]\nkind = \"ground\"\namplitude = 0.3\nheight_m = 2\n\
     [[multipath]]\nkind = \"wall\"\namplitude = 0.4\nazimuth_deg = 90\ndistance_m = 12\n";
 
 /// Every key of the tables that may stand several times.
-const HOSTILE: &str = "[[interference]]\nkind = \"chirp\"\noffset_hz = 1e5\njs_db = 30\non_s = 1\noff_s = 2\nsweep_hz = -2e6\n\
+const HOSTILE: &str = "[[interference]]\nkind = \"chirp\"\noffset_hz = 1e5\njs_db = 30\non_s = 1\noff_s = 2\n\
+                       sweep_hz = -2e6\n\
     sweep_s = 1e-5\n[[interference]]\nkind = \"sine_fm\"\npower_dbw = -130\ndeviation_hz = 5e4\nrate_hz = 1e4\n\
     [[interference]]\nkind = \"pulse\"\neirp_dbw = -20\nwidth_s = 1e-5\nrate_hz = 1e4\njitter = 0.5\n\
-    latitude_deg = 26.6\nlongitude_deg = 80.2\nheight_m = 100\n[[interference]]\nkind = \"noise\"\njs_db = 1\nbandwidth_hz = 1e6\n\
-    [[interference]]\nkind = \"recording\"\njs_db = 1\nfile = \"iq.bin\"\nformat = \"ci8\"\nsample_rate_hz = 4e6\nrepeat = true\n\
+    latitude_deg = 26.6\nlongitude_deg = 80.2\nheight_m = 100\n[[interference]]\nkind = \"noise\"\njs_db = 1\n\
+    bandwidth_hz = 1e6\n\
+    [[interference]]\nkind = \"recording\"\njs_db = 1\nfile = \"iq.bin\"\nformat = \"ci8\"\nsample_rate_hz = 4e6\n\
+    repeat = true\n\
     [[interference]]\nkind = \"cw\"\neirp_dbw = -20\ndistance_m = 500\n\
-    [[spoofer]]\npower_db = 6\npower_start_db = -10\nramp_s = 5\non_s = 1\noff_s = 9\nsatellites = [\"G13\"]\nclock_bias_s = 1e-6\n\
-    clock_drift_sps = 1e-9\n[spoofer.drag]\nstart_s = 3\nazimuth_deg = 90\nelevation_deg = 0\nspeed_mps = 5\nacceleration_mps2 = 2\n";
+    [[spoofer]]\npower_db = 6\npower_start_db = -10\nramp_s = 5\non_s = 1\noff_s = 9\nsatellites = [\"G13\"]\n\
+    clock_bias_s = 1e-6\n\
+    clock_drift_sps = 1e-9\n[spoofer.drag]\nstart_s = 3\nazimuth_deg = 90\nelevation_deg = 0\nspeed_mps = 5\n\
+    acceleration_mps2 = 2\n";
 
 fn parse(text: &str) -> Result<Scenario, ScenarioError> {
     Scenario::parse(text, "scene.toml")

@@ -87,8 +87,8 @@ impl Scenario {
             return Err(self.conflict(
                 "motion",
                 format!(
-                    "kind = {kind:?} is known from {from_s:.3} s to {to_s:.3} s, but the scene needs {start_s:.6} s to {end_s:.6} s: \
-                     change duration_s, or let the motion end at rest"
+                    "kind = {kind:?} is known from {from_s:.3} s to {to_s:.3} s, but the scene needs {start_s:.6} s \
+                     to {end_s:.6} s: change duration_s, or let the motion end at rest"
                 ),
             ));
         }

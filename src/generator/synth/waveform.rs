@@ -44,7 +44,8 @@ pub struct Waveform {
 pub enum WaveformError {
     /// A rate at which a sample would span more than 15 steps of a sequence.
     #[error(
-        "{signal}, component {component}, layer {layer}: {steps_hz} steps a second at {rate_hz} samples a second: expected at least {least_hz} samples a second"
+        "{signal}, component {component}, layer {layer}: {steps_hz} steps a second at {rate_hz} samples a second: \
+         expected at least {least_hz} samples a second"
     )]
     Rate {
         /// The signal.

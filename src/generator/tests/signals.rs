@@ -542,7 +542,7 @@ fn a_rate_that_a_scene_cannot_have_is_refused_with_the_rate_that_it_could() {
     let mut writer = truth::Writer::create(directory.path()).unwrap();
     let done = generate_part(&scene, 0..100, &mut Vec::new(), &mut writer, &mut |_| (), &Options::default());
     let Err(GenerateError::Waveform(error)) = done else { panic!("{done:?}") };
-    let expected = "faster, component 1, layer 1: 20460000 steps a second at 1100000 samples a second: expected at least \
-                    1364000 samples a second";
+    let expected = "faster, component 1, layer 1: 20460000 steps a second at 1100000 samples a second: expected at \
+                    least 1364000 samples a second";
     assert_eq!(error.to_string(), expected);
 }

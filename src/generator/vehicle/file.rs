@@ -131,7 +131,8 @@ pub enum Fault {
         speed_mps: f64,
     },
     /// A way that passes through the Earth.
-    #[error("the way from the row before passes {:.0} km from the Earth's centre: expected at least 6300 km", radius_m / 1e3)]
+    #[error("the way from the row before passes {:.0} km from the Earth's centre: expected at least 6300 \
+             km", radius_m / 1e3)]
     Depth {
         /// Least distance from the Earth's centre.
         radius_m: f64,

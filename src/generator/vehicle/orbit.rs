@@ -44,8 +44,8 @@ pub struct Orbit {
 pub enum OrbitMotionError {
     /// An orbit that meets the Earth or its air.
     #[error(
-        "semi_major_axis_m = {semi_major_axis_m} and eccentricity = {eccentricity} put the perigee {perigee_m:.0} m above the \
-         equator's radius: expected at least 80 000 m"
+        "semi_major_axis_m = {semi_major_axis_m} and eccentricity = {eccentricity} put the perigee {perigee_m:.0} m \
+         above the equator's radius: expected at least 80 000 m"
     )]
     Perigee {
         /// Half of the longest diameter.

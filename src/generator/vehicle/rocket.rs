@@ -55,7 +55,8 @@ pub struct Rocket {
 pub enum RocketError {
     /// Ramps of the thrust that take longer than the burn.
     #[error(
-        "thrust_mps2 = {thrust_mps2} and jerk_mps3 = {jerk_mps3} need burn_s of at least {ramps_s:.3} s for both ramps, not {burn_s}"
+        "thrust_mps2 = {thrust_mps2} and jerk_mps3 = {jerk_mps3} need burn_s of at least {ramps_s:.3} s for both \
+         ramps, not {burn_s}"
     )]
     Burn {
         /// Largest acceleration by the thrust.

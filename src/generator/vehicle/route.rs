@@ -60,7 +60,8 @@ pub enum RouteError {
         have: usize,
     },
     /// A leg that is too short or too long.
-    #[error("waypoints {from} and {} are {length_m:.3} m apart: expected 1 m to 50 km (add points on a longer leg)", from + 1)]
+    #[error("waypoints {from} and {} are {length_m:.3} m apart: expected 1 m to 50 km (add points on a longer \
+             leg)", from + 1)]
     Length {
         /// Number of the waypoint at which the leg begins, from 1.
         from: usize,
@@ -68,7 +69,8 @@ pub enum RouteError {
         length_m: f64,
     },
     /// A leg without a speed at either end.
-    #[error("waypoints {from} and {} both have speed_mps = 0: give one of them a speed, or add a point between", from + 1)]
+    #[error("waypoints {from} and {} both have speed_mps = 0: give one of them a speed, or add a point \
+             between", from + 1)]
     Standstill {
         /// Number of the waypoint at which the leg begins, from 1.
         from: usize,
@@ -85,7 +87,8 @@ pub enum RouteError {
     },
     /// A leg in which the speed cannot change as much.
     #[error(
-        "the leg from waypoint {from} to {} is {length_m:.1} m long, but its turns and its change of speed need {needed_m:.1} m",
+        "the leg from waypoint {from} to {} is {length_m:.1} m long, but its turns and its change of speed need \
+         {needed_m:.1} m",
         from + 1
     )]
     Short {

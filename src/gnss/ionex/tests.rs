@@ -148,8 +148,8 @@ proptest::proptest! {
     #[test]
     fn no_text_makes_the_reader_panic(line in 0_usize..600, garbage in "\\PC{0,80}") {
         let whole = text();
-        let damaged: Vec<&str> =
-            whole.lines().take(1000).enumerate().map(|(n, text)| if n == line { garbage.as_str() } else { text }).collect();
+        let instead = |(n, text)| if n == line { garbage.as_str() } else { text };
+        let damaged: Vec<&str> = whole.lines().take(1000).enumerate().map(instead).collect();
         let _ = Maps::read(damaged.join("\n").as_bytes(), "map");
         let _ = Maps::read(garbage.as_bytes(), "map");
     }

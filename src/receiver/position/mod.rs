@@ -197,7 +197,8 @@ pub enum NoFix {
         need: usize,
     },
     #[error(
-        "the satellites' directions give no position: condition {condition:.3e}, {} times the largest that is solved, {:e}",
+        "the satellites' directions give no position: condition {condition:.3e}, {} times the largest that is \
+         solved, {:e}",
         (condition / LARGEST_CONDITION).ceil(),
         LARGEST_CONDITION
     )]
@@ -226,7 +227,8 @@ pub enum NoFix {
     },
     /// A fault that several satellites explain.
     #[error(
-        "the ranges contradict each other, and without {} they agree as well as without {}, on places {separation_m:.1} m apart",
+        "the ranges contradict each other, and without {} they agree as well as without {}, on places \
+         {separation_m:.1} m apart",
         names(one),
         names(other)
     )]

@@ -180,7 +180,8 @@ impl Session {
         for front_end in &self.front_ends {
             if front_end.signals.is_empty() && several {
                 warnings.push(format!(
-                    "front end {}, {:.3} MHz, receives nothing: another front end holds every signal that its band does",
+                    "front end {}, {:.3} MHz, receives nothing: another front end holds every signal that its band \
+                     does",
                     front_end.step.number + 1,
                     1e-6 * front_end.metadata.center_hz
                 ));
@@ -202,8 +203,9 @@ impl Session {
     fn assumed_era(&self) -> Option<String> {
         let clock = self.shared.timebase.clock().filter(|_| self.shared.start.is_none())?;
         Some(format!(
-            "the recording has no start time and the message counts weeks modulo 1024: of times {ERA_YEARS} years apart the one \
-             nearest to operation.week_reference = {:?} was taken, {}; --start TIME or that setting takes another",
+            "the recording has no start time and the message counts weeks modulo 1024: of times {ERA_YEARS} years \
+             apart the one nearest to operation.week_reference = {:?} was taken, {}; --start TIME or that setting \
+             takes another",
             self.shared.settings.operation.week_reference, clock.start
         ))
     }

@@ -84,7 +84,8 @@ impl FrontEnd {
         if let Some(estimate) = self.mirrored.filter(|_| shared.fixes == 0) {
             let cure = if self.metadata.inverted { "leave --inverted out" } else { "--inverted" };
             let mut text = format!(
-                "the spectrum is mirrored: on every satellite the code drifts against the carrier's Doppler; {cure} cures it"
+                "the spectrum is mirrored: on every satellite the code drifts against the carrier's Doppler; {cure} \
+                 cures it"
             );
             if estimate.hz.abs() > RATE_SIGMAS * estimate.sigma_hz {
                 let share = estimate.hz / signal.centre_hz();

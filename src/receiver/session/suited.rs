@@ -21,9 +21,11 @@ pub(super) fn warnings(metadata: &IfMetadata, settings: &Settings) -> Vec<String
         let slow_hz = cycles_per_chip * settings.tracking.dll_bandwidth_hz / samples_per_chip;
         (bias_m > STANDING_BIAS_M).then(|| {
             format!(
-                "{:.3} Msps are {samples_per_chip:.3} samples a chip: while a satellite's Doppler stays below {slow_hz:.0} Hz, \
-                 its pseudorange errs by {bias_m:.1} m rms (tracking.replica = {:?}); another rate, like 2.6 Msps, avoids it",
-                1e-6 * rate_hz, settings.tracking.replica
+                "{:.3} Msps are {samples_per_chip:.3} samples a chip: while a satellite's Doppler stays below \
+                 {slow_hz:.0} Hz, its pseudorange errs by {bias_m:.1} m rms (tracking.replica = {:?}); another rate, \
+                 like 2.6 Msps, avoids it",
+                1e-6 * rate_hz,
+                settings.tracking.replica
             )
         })
     };
@@ -42,9 +44,9 @@ fn image(metadata: &IfMetadata, signal: &Signal, doppler_max_hz: f64) -> Option<
     let near = !metadata.format.is_complex() && (if_hz - image_hz).abs() < doppler_max_hz;
     near.then(|| {
         format!(
-            "{} real samples with {} at {:.4} MHz, {:.1} kHz from {} of the rate: a carrier and its image are less than two Dopplers \
-             of {doppler_max_hz:.0} Hz apart, and Dopplers get the wrong sign; another intermediate frequency or complex \
-             samples avoid it",
+            "{} real samples with {} at {:.4} MHz, {:.1} kHz from {} of the rate: a carrier and its image are less \
+             than two Dopplers of {doppler_max_hz:.0} Hz apart, and Dopplers get the wrong sign; another \
+             intermediate frequency or complex samples avoid it",
             metadata.format.name(),
             signal.name,
             1e-6 * if_hz,

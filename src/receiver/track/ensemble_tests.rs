@@ -182,8 +182,8 @@ fn no_cold_start_holds_a_side_peak_and_none_leaves_the_main_one() {
         let last_s = runs.last().map_or(0.0, |run| run.last_off_s);
         println!(
             "{signal}: {} of {starts} starts found, {} on a side peak, moved after {middle_s:.2} s (median) and \
-             {last_s:.2} s at most; {late} later than {bar_s} s, {left} left the main peak, {slips} slips, {lost} lost, {unlocked} not in lock \
-             and {unknown} without overlay at the end, {} searches",
+             {last_s:.2} s at most; {late} later than {bar_s} s, {left} left the main peak, {slips} slips, {lost} \
+             lost, {unlocked} not in lock and {unknown} without overlay at the end, {} searches",
             runs.len(),
             beside.len(),
             runs.iter().map(|run| run.searches).sum::<u32>(),
@@ -387,8 +387,8 @@ fn jitter_of_code_and_carrier_is_that_of_theory() {
         signals.into_par_iter().map(|(signal, rate_hz)| jitter(signal, rate_hz, channels, duration_s)).collect();
     for Jitter { signal, update_s, code_m, carrier_cycles, ratios, spreads } in &found {
         println!(
-            "{signal}: updates of {:.0} ms; code {code_m:.4} m, {:.3} ± {:.3} of theory; carrier {:.3}°, {:.3} ± {:.3} of \
-             theory",
+            "{signal}: updates of {:.0} ms; code {code_m:.4} m, {:.3} ± {:.3} of theory; carrier {:.3}°, {:.3} ± \
+             {:.3} of theory",
             1e3 * update_s,
             ratios[0],
             spreads[0],

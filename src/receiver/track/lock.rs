@@ -176,8 +176,9 @@ pub enum LockChange {
     Broken,
 }
 
-/// What the detectors decide of a carrier: whether it is locked, and whether lock or strength has been missing
-/// for so long that the signal is lost. Instants are numbers of the caller's own clock, samples or code periods.
+/// What the detectors decide of a carrier: whether it is locked, and whether lock or strength has been
+/// missing for so long that the signal is lost. Instants are counts of the caller's clock, samples or code
+/// periods.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LockState {
     locked_since: Option<u64>,
@@ -205,13 +206,13 @@ impl LockState {
         self.locked_since.is_none() && self.missing_since.is_none()
     }
 
-    /// The carrier is not locked any more, for a reason that does not count against the signal. Says whether it
-    /// was locked.
+    /// The carrier is not locked any more, for a reason that does not count against the signal. Gives whether
+    /// it was locked.
     pub fn interrupt(&mut self) -> bool {
         self.locked_since.take().is_some()
     }
 
-    /// The phase has slipped. Says whether the carrier was locked; only then is it a loss of lock.
+    /// The phase has slipped. Gives whether the carrier was locked; only then is it a loss of lock.
     pub fn slip(&mut self, now: u64) -> bool {
         let was_locked = self.interrupt();
         if was_locked {

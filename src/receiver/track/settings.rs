@@ -111,8 +111,8 @@ pub enum TrackingSettingsError {
     },
     /// A loop that is too wide for its update time.
     #[error(
-        "tracking.{key} = {value_hz:?} Hz, expected less: with updates every {update_s} s bandwidth times update time is \
-         {product:?}, above the limit {limit} (at most {largest_hz} Hz here)"
+        "tracking.{key} = {value_hz:?} Hz, expected less: with updates every {update_s} s bandwidth times update \
+         time is {product:?}, above the limit {limit} (at most {largest_hz} Hz here)"
     )]
     Bandwidth {
         /// Name of the setting.
@@ -217,17 +217,23 @@ impl TrackingSettings {
             ("dll_order", f64::from(self.dll_order), order(self.dll_order, 1, 2), "1 or 2"),
             ("pll_bandwidth_hz", self.pll_bandwidth_hz, positive(self.pll_bandwidth_hz), "above 0"),
             ("fll_bandwidth_hz", self.fll_bandwidth_hz, positive(self.fll_bandwidth_hz), "above 0"),
-            ("fll_assist_bandwidth_hz", self.fll_assist_bandwidth_hz, within(self.fll_assist_bandwidth_hz, 0.0, f64::MAX), "0 or more"),
+            ("fll_assist_bandwidth_hz", self.fll_assist_bandwidth_hz,
+             within(self.fll_assist_bandwidth_hz, 0.0, f64::MAX), "0 or more"),
             ("fll_pull_in_s", self.fll_pull_in_s, within(self.fll_pull_in_s, 0.02, 10.0), "0.02 to 10"),
             ("dll_bandwidth_hz", self.dll_bandwidth_hz, positive(self.dll_bandwidth_hz), "above 0"),
-            ("dll_pull_in_bandwidth_hz", self.dll_pull_in_bandwidth_hz, positive(self.dll_pull_in_bandwidth_hz), "above 0"),
+            ("dll_pull_in_bandwidth_hz", self.dll_pull_in_bandwidth_hz,
+             positive(self.dll_pull_in_bandwidth_hz), "above 0"),
             ("dll_pull_in_s", self.dll_pull_in_s, within(self.dll_pull_in_s, 0.0, 60.0), "0 to 60"),
             ("spacing_chips", self.spacing_chips, within(self.spacing_chips, 0.02, 1.5), "0.02 to 1.5"),
-            ("integration", f64::from(self.integration), INTEGRATIONS.contains(&self.integration), "1, 2, 4, 5, 10 or 20"),
-            ("phase_lock_threshold", self.phase_lock_threshold, within(self.phase_lock_threshold, 0.1, 0.99), "0.1 to 0.99"),
-            ("phase_unlock_threshold", self.phase_unlock_threshold, within(self.phase_unlock_threshold, 0.0, self.phase_lock_threshold), "0 to phase_lock_threshold"),
+            ("integration", f64::from(self.integration),
+             INTEGRATIONS.contains(&self.integration), "1, 2, 4, 5, 10 or 20"),
+            ("phase_lock_threshold", self.phase_lock_threshold,
+             within(self.phase_lock_threshold, 0.1, 0.99), "0.1 to 0.99"),
+            ("phase_unlock_threshold", self.phase_unlock_threshold,
+             within(self.phase_unlock_threshold, 0.0, self.phase_lock_threshold), "0 to phase_lock_threshold"),
             ("loss_s", self.loss_s, within(self.loss_s, 0.05, 10.0), "0.05 to 10"),
-            ("cn0_threshold_dbhz", self.cn0_threshold_dbhz, within(self.cn0_threshold_dbhz, 0.0, 60.0), "0 to 60"),
+            ("cn0_threshold_dbhz", self.cn0_threshold_dbhz,
+             within(self.cn0_threshold_dbhz, 0.0, 60.0), "0 to 60"),
             ("pull_in_limit_s", self.pull_in_limit_s, within(self.pull_in_limit_s, 1.0, 600.0), "1 to 600"),
             ("cn0_average_s", self.cn0_average_s, within(self.cn0_average_s, 0.1, 60.0), "0.1 to 60"),
         ];

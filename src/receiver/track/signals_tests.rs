@@ -1,20 +1,17 @@
-//! Search and channels on every synthetic signal, made here from its definition: chips, layers, overlays and
-//! random data in `f64`, one satellite.
+//! Search and channels on every synthetic signal, one satellite. Its samples are those of a [`Stream`], which
+//! are held here to the signal's definition: chips, layers, overlays and symbols one by one.
 
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use super::tests::Normal;
+use super::stream_tests::{Stream, symbol};
 use super::*;
-use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE_DATA};
 use crate::gnss::signal::{Component, Link, Signal};
-use crate::gnss::time::Rate;
 use crate::receiver::acquire::{Acquired, AcquisitionSettings, search};
 use crate::receiver::lead::lead;
-use crate::receiver::source::Block;
 
 /// One satellite's signal: its code at time zero, and a Doppler that code and carrier share.
 struct Sky {
@@ -54,14 +51,14 @@ impl Made {
     /// Random symbols: those of a message, or one a period where the power is that of data.
     fn symbol(&self, period: i64) -> f64 {
         match self.component.periods_per_symbol() {
-            Some(periods) => sign(period.div_euclid(i64::from(periods))),
-            None if self.component.power_share < 0.3 => sign(period),
+            Some(periods) => symbol(period.div_euclid(i64::from(periods))),
+            None if self.component.power_share < 0.3 => symbol(period),
             None => 1.0,
         }
     }
 
-    /// The component when its code has run for so many chips; `data` gives the sign of a code period.
-    fn at(&self, chips: f64, data: impl Fn(i64) -> f64) -> Complex64 {
+    /// The component when its code has run for so many chips.
+    fn at(&self, chips: f64) -> Complex64 {
         let whole = chips.floor() as i64;
         let (length, steps) = (self.code.len() as i64, chips - chips.floor());
         let period = whole.div_euclid(length);
@@ -71,16 +68,11 @@ impl Made {
             .map(|(layer, phasor)| phasor * f64::from(layer.pulse[(steps * layer.pulse.len() as f64) as usize]))
             .sum();
         let overlay = f64::from(self.overlay[period.rem_euclid(self.overlay.len() as i64) as usize]);
-        wave * (self.amplitude * f64::from(self.code[index]) * overlay * data(period))
+        wave * (self.amplitude * f64::from(self.code[index]) * overlay * self.symbol(period))
     }
 }
 
 impl Sky {
-    fn metadata(&self) -> IfMetadata {
-        let (rate, center_hz) = (Rate::from_hz(self.rate_hz).unwrap(), self.link.carrier_hz() - 0.07 * self.rate_hz);
-        IfMetadata { format: Format::Cf32Le, rate, center_hz, inverted: false, start: None }
-    }
-
     fn sent_s(&self, t_s: f64) -> f64 {
         self.sent_s + t_s * (1.0 + self.doppler_hz / self.link.carrier_hz())
     }
@@ -90,53 +82,28 @@ impl Sky {
         0.2 + self.doppler_hz * t_s
     }
 
-    /// All components over the interval of the sample at a time, without the carrier.
-    fn mean(&self, components: &[Made], t_s: f64) -> Complex64 {
-        let looks = (0..8).map(|look| self.sent_s(t_s + (f64::from(look) - 3.5) / 8.0 / self.rate_hz));
-        let all = looks.flat_map(|sent_s| {
-            components.iter().map(move |made| made.at(sent_s * made.component.chip_rate_hz, |n| made.symbol(n)))
-        });
-        all.sum::<Complex64>() * 0.125
+    /// All components over the interval of the sample at a time, without the carrier, by so many looks.
+    fn mean(&self, components: &[Made], t_s: f64, looks: u32) -> Complex64 {
+        let look_s = |look: u32| (f64::from(look) + 0.5) / f64::from(looks) - 0.5;
+        let sent_s = (0..looks).map(|look| self.sent_s(t_s + look_s(look) / self.rate_hz));
+        let all = sent_s.flat_map(|sent_s| components.iter().map(move |m| m.at(sent_s * m.component.chip_rate_hz)));
+        all.sum::<Complex64>() / f64::from(looks)
     }
 
-    /// Calls `each` with blocks of 50 ms until `until_s`. Samples are means of eight looks across their
-    /// interval.
-    fn play(&self, until_s: f64, mut each: impl FnMut(&Block)) {
-        let components: Vec<Made> =
-            self.link.signal.components.iter().map(|component| Made::new(component, self.link.sv.number)).collect();
-        let mut normal = Normal::new(self.seed);
-        // Means over samples have less power than what they are of: C/N0 is that of the samples.
-        let seen = |n: u64| self.mean(&components, 1.37 * n as f64 / self.rate_hz).norm_sqr();
-        let power = (0..20_000).map(seen).sum::<f64>() / 20_000.0;
-        let amplitude = (libm::pow(10.0, self.cn0_dbhz / 10.0) / self.rate_hz / power).sqrt();
-        let (block, total) = ((0.05 * self.rate_hz) as u64, (until_s * self.rate_hz) as u64);
-        let (mut first, mut i, mut q) = (0, Vec::new(), Vec::new());
-        while first < total {
-            i.clear();
-            q.clear();
-            for n in first..(first + block).min(total) {
-                let t_s = n as f64 / self.rate_hz;
-                let sum = self.mean(&components, t_s);
-                let (sin, cos) = libm::sincos(TAU * (0.07 * n as f64 + self.cycles(t_s)));
-                let sample = sum * Complex64::new(cos, sin) * amplitude;
-                let noise = Complex64::new(normal.next(), normal.next()) * 0.5_f64.sqrt();
-                i.push((sample + noise).re as f32);
-                q.push((sample + noise).im as f32);
-            }
-            each(&Block { first, i: &i, q: &q });
-            first += block;
-        }
+    /// Its samples. Means over samples have less power than what they are of: C/N0 is that of the samples.
+    fn stream(&self) -> Stream {
+        let mut stream = Stream::new(self.link, self.rate_hz, self.seed);
+        (stream.sent_s, stream.doppler_hz) = (self.sent_s, self.doppler_hz);
+        stream.send_symbols();
+        stream.cn0_dbhz = self.cn0_dbhz - 10.0 * libm::log10(stream.power());
+        stream
     }
 
     fn find(&self) -> Option<Acquired> {
         let settings = AcquisitionSettings { doppler_max_hz: 1500.0, ..Default::default() };
-        let mut samples = (Vec::new(), Vec::new());
-        self.play(0.25, |block| {
-            samples.0.extend_from_slice(block.i);
-            samples.1.extend_from_slice(block.q);
-        });
-        let block = Block { first: 0, i: &samples.0, q: &samples.1 };
-        search(&self.metadata(), &block, &[self.link], &settings).unwrap()[0].1
+        let mut stream = self.stream();
+        let metadata = stream.metadata();
+        search(&metadata, &stream.block((0.25 * self.rate_hz) as usize), &[self.link], &settings).unwrap()[0].1
     }
 
     /// Code error of a phase of the leading component at sample 0, in chips.
@@ -146,12 +113,6 @@ impl Sky {
         let true_chips = self.sent_s * component.chip_rate_hz;
         (phase_chips - true_chips + 0.5 * length).rem_euclid(length) - 0.5 * length
     }
-}
-
-fn sign(number: i64) -> f64 {
-    let mut z = (number as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    if (z ^ (z >> 27)) & 1 == 1 { -1.0 } else { 1.0 }
 }
 
 /// Every synthetic signal at a rate that holds it.
@@ -171,6 +132,27 @@ fn skies() -> Vec<Sky> {
         of(&MULTIPLEXED, 9, 2.6e6),
         of(&MIXED, 2, 5.3e6),
     ]
+}
+
+#[test]
+fn samples_are_the_means_of_the_waveform() {
+    for sky in skies() {
+        let components: Vec<Made> =
+            sky.link.signal.components.iter().map(|component| Made::new(component, sky.link.sv.number)).collect();
+        let mut stream = sky.stream();
+        // As strong as it has to be for the noise not to be seen.
+        stream.cn0_dbhz = 200.0;
+        let amplitude = (libm::pow(10.0, 0.1 * stream.cn0_dbhz) / stream.rate_hz).sqrt();
+        let block = stream.block((0.05 * sky.rate_hz) as usize);
+        for (n, (i, q)) in block.i.iter().zip(block.q).enumerate().step_by(997) {
+            let t_s = n as f64 / sky.rate_hz;
+            let (sin, cos) = libm::sincos(TAU * (0.07 * n as f64 + sky.cycles(t_s)));
+            let expected = sky.mean(&components, t_s, 400) * Complex64::new(cos, sin) * amplitude;
+            let found = Complex64::new(f64::from(*i), f64::from(*q));
+            // Four hundred looks a sample, which may hold twelve edges of two components.
+            assert!((found - expected).norm() < 0.04 * amplitude, "{} {n}: {found} {expected}", sky.link);
+        }
+    }
 }
 
 #[test]
@@ -201,15 +183,16 @@ impl Sky {
     fn follow(&self, until_s: f64, from_s: f64) -> Followed {
         let hit = self.find().unwrap();
         let component = lead(self.link.signal).unwrap();
-        let metadata = self.metadata();
-        let mut channel = Channel::start(&hit, &metadata, &TrackingSettings::default());
+        let mut stream = self.stream();
+        let mut channel = Channel::start(&hit, &stream.metadata(), &TrackingSettings::default());
         let mut report = Report::default();
-        self.play(until_s, |block| {
-            let step = (0.01 * self.rate_hz) as u64;
-            let ticks: Vec<u64> =
-                (block.first..block.first + block.i.len() as u64).filter(|n| n.is_multiple_of(step)).collect();
-            channel.advance(block, &ticks, &mut report);
-        });
+        let (step, length) = ((0.01 * self.rate_hz) as u64, (0.05 * self.rate_hz) as usize);
+        while (stream.now() as f64) < until_s * self.rate_hz {
+            let block = stream.block(length);
+            let inside = block.first..block.first + length as u64;
+            let ticks: Vec<u64> = inside.filter(|n| n.is_multiple_of(step)).collect();
+            channel.advance(&block, &ticks, &mut report);
+        }
         let events: Vec<_> = report.events.iter().map(|(n, event)| (*n as f64 / self.rate_hz, *event)).collect();
         assert!(!channel.is_lost(), "{}: {events:?}", self.link);
         let late: Vec<&Measurement> =
@@ -291,9 +274,9 @@ fn every_synthetic_signal_is_followed_with_the_phase_of_the_whole_signal() {
             let length = i64::from(periods);
             let first = (sky.sent_s / component.period_s()).floor() as i64;
             assert!(found.symbols.len() >= 50, "{}", sky.link);
-            for symbol in &found.symbols {
-                let number = (first + symbol.first_period as i64).div_euclid(length);
-                assert_eq!(f64::from(symbol.soft.signum()), sign(number), "{} symbol {number}", sky.link);
+            for found in &found.symbols {
+                let number = (first + found.first_period as i64).div_euclid(length);
+                assert_eq!(f64::from(found.soft.signum()), symbol(number), "{} symbol {number}", sky.link);
             }
         }
         assert_eq!(found.channel.link(), sky.link);

@@ -42,13 +42,14 @@ pub fn script(plan: &Plan, engine: Engine, program: &str, shards: &[u32]) -> Res
              #SBATCH --array={}\n\
              #SBATCH --cpus-per-task=1\n\
              #SBATCH --requeue\n\
-             # Shards that are missing when this is written. Run `study status --missing` afterwards: what an engine loses is\n\
+             # Shards that are missing when this is written. Run `study status --missing` afterwards: what an engine \
+             loses is\n\
              # submitted again, what it runs twice comes out the same.\n\
              {program} study run {directory} --shard \"$SLURM_ARRAY_TASK_ID\" --jobs \"${{SLURM_CPUS_PER_TASK:-1}}\"\n\
              code=$?\n\
              # 75 and deaths by a signal may pass by themselves; bad data (65) never does.\n\
-             if {{ [ \"$code\" -eq 75 ] || [ \"$code\" -gt 128 ]; }} && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt 3 ]; then\n    \
-             scontrol requeue \"${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}\"\n\
+             if {{ [ \"$code\" -eq 75 ] || [ \"$code\" -gt 128 ]; }} && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt 3 ]; \
+             then\n    scontrol requeue \"${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}\"\n\
              fi\n\
              exit \"$code\"\n",
             ranges(shards)

@@ -31,8 +31,8 @@ pub(super) fn pdf(plan: &Plan, results: &Results, pictures: &[Picture]) -> Resul
         ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
     ]));
     report.text(format!(
-        "What a case is: {} Intervals hold the mean with 95 % confidence. Every case stands in cases.csv, every cell in cells.csv; \
-         manifest.json binds them to their inputs.",
+        "What a case is: {} Intervals hold the mean with 95 % confidence. Every case stands in cases.csv, every cell \
+         in cells.csv; manifest.json binds them to their inputs.",
         publish::level(results)
     ));
     let agreements = results.agreement();

@@ -173,7 +173,8 @@ impl Plan {
             .map_err(|e| refuse(format!("{e}: expected a manifest of {TOOL}; plan the study again")))?;
         if (manifest.schema, manifest.tool.as_str()) != (SCHEMA, TOOL) {
             let reason = format!(
-                "planned by {} (schema {}): this is {TOOL} (schema {SCHEMA}); plan the study again in another directory",
+                "planned by {} (schema {}): this is {TOOL} (schema {SCHEMA}); plan the study again in another \
+                 directory",
                 manifest.tool, manifest.schema
             );
             return Err(refuse(reason));

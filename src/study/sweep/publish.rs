@@ -52,7 +52,8 @@ pub(super) fn in_words(results: &Results, agreement: &Agreement) -> String {
     let good = |cells: &[&Compared]| cells.iter().filter(|cell| cell.holds()).count();
     let ratios = || region.iter().map(|cell| cell.ratio);
     let mut words = format!(
-        "{name}: {} of {} cells with T·C/N0 ≥ {LEAST_SNR} are within {:.0} % of theory or the measurement's 95 % interval",
+        "{name}: {} of {} cells with T·C/N0 ≥ {LEAST_SNR} are within {:.0} % of theory or the measurement's 95 % \
+         interval",
         good(&region),
         region.len(),
         100.0 * result::BAR,
@@ -81,8 +82,8 @@ fn text(plan: &Plan, results: &Results, pictures: &[Picture]) -> String {
     };
     let _ = write!(
         text,
-        "\n**{name}**: {} {} cases: {} cells, {} repetitions each with other noise. Intervals hold the mean with 95 % confidence. \
-         Everything: `cases.csv`, `cells.csv`.\n",
+        "\n**{name}**: {} {} cases: {} cells, {} repetitions each with other noise. Intervals hold the mean with 95 \
+         % confidence. Everything: `cases.csv`, `cells.csv`.\n",
         level(results),
         grid.cases(),
         grid.cells(),
@@ -200,12 +201,12 @@ pub(super) fn cells(results: &Results) -> Option<Rows> {
 pub(super) fn level(results: &Results) -> &'static str {
     match results.study.level {
         Level::Correlator => {
-            "the receiver's own loops on modelled correlations (means from signal and errors, noise of the taps' covariance), \
-             no samples."
+            "the receiver's own loops on modelled correlations (means from signal and errors, noise of the taps' \
+             covariance), no samples."
         }
         Level::Samples => {
-            "samples go from the generator to the receiver in memory, from a cold start; cases that differ in the receiver \
-             alone hear the same ones."
+            "samples go from the generator to the receiver in memory, from a cold start; cases that differ in the \
+             receiver alone hear the same ones."
         }
     }
 }

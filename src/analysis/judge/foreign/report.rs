@@ -306,8 +306,8 @@ impl ForeignSummary {
         }
         if let (Some(late_s), Some(places)) = (judged.labels_late_s, &judged.places) {
             found.push(format!(
-                "{} of {} positions join; more would if their labels were {late_s} s earlier, the leap seconds: GPS time in \
-                 place of NMEA's UTC",
+                "{} of {} positions join; more would if their labels were {late_s} s earlier, the leap seconds: GPS \
+                 time in place of NMEA's UTC",
                 places.rows.len(),
                 places.fixes
             ));

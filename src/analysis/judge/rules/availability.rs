@@ -81,7 +81,8 @@ impl Verdict {
                     String::new()
                 };
                 let source = format!(
-                    "the message's own timetable: four satellites found and locked within {} s, their subframes 1 to 3 whole by {:.1} s{page}",
+                    "the message's own timetable: four satellites found and locked within {} s, their subframes 1 to \
+                     3 whole by {:.1} s{page}",
                     crate::analysis::expect::due::satellite::LOCK_S,
                     expected.four_by_s.unwrap_or(0.0)
                 );
@@ -111,10 +112,12 @@ impl Verdict {
                 } else {
                     match expected.four_by_s {
                         Some(four_s) => format!(
-                            "four satellites can be used from {four_s:.1} s on, and the ionosphere's page comes after {duration_s} s"
+                            "four satellites can be used from {four_s:.1} s on, and the ionosphere's page comes \
+                             after {duration_s} s"
                         ),
                         None => format!(
-                            "within {duration_s} s no four satellites that must be held are placed well and have sent their orbits"
+                            "within {duration_s} s no four satellites that must be held are placed well and have \
+                             sent their orbits"
                         ),
                     }
                 };

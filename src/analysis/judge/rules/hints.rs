@@ -60,8 +60,8 @@ fn mismatches(run: &Run) -> Vec<String> {
             compare("ionosphere", run.ionosphere_m, ionosphere != "none", "broadcast");
         } else if run.ionosphere_m >= NOTHING_M {
             found.push(format!(
-                "hint: the ionosphere's page was never decoded, up to {:.1} m are corrected by a nominal model: [receiver.position] \
-                 require_ionosphere = true waits for the page",
+                "hint: the ionosphere's page was never decoded, up to {:.1} m are corrected by a nominal model: \
+                 [receiver.position] require_ionosphere = true waits for the page",
                 run.ionosphere_m
             ));
         }

@@ -255,7 +255,8 @@ impl Verdict {
         let (Some(nees), Some(independent)) = (position.nees_mean, position.nees_independent) else { return };
         if independent < ENOUGH {
             let reason = format!(
-                "consistency (mean normalised error squared {nees:.2}): too short to say, {independent:.1} independent fixes"
+                "consistency (mean normalised error squared {nees:.2}): too short to say, {independent:.1} \
+                 independent fixes"
             );
             self.not_judged.push(reason);
             return;

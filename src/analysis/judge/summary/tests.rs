@@ -64,15 +64,15 @@ fn the_keys_of_the_summary_are_a_contract() {
     let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>().join(" ");
     assert_eq!(
         keys(&value),
-        "scene seed duration_s sample_rate_hz fidelity satellites position clock observables tracking signals navigation psd \
-         speed"
+        "scene seed duration_s sample_rate_hz fidelity satellites position clock observables tracking signals \
+         navigation psd speed"
     );
     for (section, expected) in [
         ("satellites", "in_view acquired used false_acquired"),
         (
             "position",
-            "fixes first_fix_s horizontal_mean_m horizontal_p95_m vertical_p95_m error_3d_p95_m bias_enu_m velocity_p95_mps \
-             nees_mean nees_band nees_independent nees_verdict",
+            "fixes first_fix_s horizontal_mean_m horizontal_p95_m vertical_p95_m error_3d_p95_m bias_enu_m \
+             velocity_p95_mps nees_mean nees_band nees_independent nees_verdict",
         ),
         (
             "clock",
@@ -82,12 +82,13 @@ fn the_keys_of_the_summary_are_a_contract() {
         ("observables", "pseudorange_rms_m pseudorange_bias_m carrier_rms_cycles doppler_rms_hz cn0_bias_db"),
         (
             "tracking",
-            "losses_of_lock cycle_slips dll_sigma_chips pll_sigma_deg fll_sigma_hz slips_undeclared slip_causes dll_chips \
-             pll_deg fll_hz",
+            "losses_of_lock cycle_slips dll_sigma_chips pll_sigma_deg fll_sigma_hz slips_undeclared slip_causes \
+             dll_chips pll_deg fll_hz",
         ),
         (
             "psd",
-            "level_error_db shape_error_p95_db null_low_hz null_high_hz null_low_expected_hz null_high_expected_hz null_reason",
+            "level_error_db shape_error_p95_db null_low_hz null_high_hz null_low_expected_hz null_high_expected_hz \
+             null_reason",
         ),
         ("navigation", "parameters_checked parameters_wrong"),
         ("speed", "generate_x_real_time receive_x_real_time run_x_real_time cpu_s peak_memory_mib"),

@@ -45,7 +45,8 @@ pub fn consistency(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     }
     let words = match (found.nees_mean, found.band, found.independent) {
         (Some(mean), Some((low, high)), Some(independent)) => format!(
-            "Normalised error squared: mean {mean:.2}, 95 % band {low:.2} to {high:.2} of {independent:.0} independent fixes"
+            "Normalised error squared: mean {mean:.2}, 95 % band {low:.2} to {high:.2} of {independent:.0} \
+             independent fixes"
         ),
         _ => "Normalised error squared: no fixes".to_owned(),
     };

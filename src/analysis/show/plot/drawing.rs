@@ -155,7 +155,8 @@ impl Look<'_> {
             let width = 2 * radius;
             write!(
                 svg,
-                "<path fill=\"none\" stroke=\"{fill}\" stroke-width=\"{width}\" stroke-linecap=\"round\" opacity=\"{opacity}\" d=\""
+                "<path fill=\"none\" stroke=\"{fill}\" stroke-width=\"{width}\" stroke-linecap=\"round\" \
+                 opacity=\"{opacity}\" d=\""
             )
         } else {
             write!(

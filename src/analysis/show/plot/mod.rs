@@ -51,8 +51,8 @@ pub(crate) struct Picture {
 pub(crate) const PICTURES: [Picture; 17] = [
     Picture {
         name: "sky",
-        caption: "Sky at the antenna. Each track ends in a dot at its last place, coloured by the mean C/N0 that the scene \
-                  sets; a hollow dot was never observed by the receiver.",
+        caption: "Sky at the antenna. Each track ends in a dot at its last place, coloured by the mean C/N0 that the \
+                  scene sets; a hollow dot was never observed by the receiver.",
         numbers: &["truth/sky.csv", "truth/observations.csv"],
         sketch: sky::sky,
     },
@@ -66,52 +66,55 @@ pub(crate) const PICTURES: [Picture; 17] = [
     },
     Picture {
         name: "psd",
-        caption: "Power spectral density of the samples (Welch, Hann window, half overlap) with the theory of this scene: \
-                  main spectra of the codes over their aliases, noise floor, interference. Look for lines or slopes \
-                  that theory does not have.",
+        caption: "Power spectral density of the samples (Welch, Hann window, half overlap) with the theory of this \
+                  scene: main spectra of the codes over their aliases, noise floor, interference. Look for lines or \
+                  slopes that theory does not have.",
         numbers: &["psd.csv", "psd_theory.csv"],
         sketch: spectrum::psd,
     },
     Picture {
         name: "cn0",
-        caption: "C/N0 as the receiver estimates it against what the scene sets. Below, the difference: the codes of the \
-                  other satellites cost about 1 dB, quantisation up to 1.96 dB with one bit.",
+        caption: "C/N0 as the receiver estimates it against what the scene sets. Below, the difference: the codes of \
+                  the other satellites cost about 1 dB, quantisation up to 1.96 dB with one bit.",
         numbers: &["errors.csv"],
         sketch: signals::cn0,
     },
     Picture {
         name: "discriminators",
-        caption: "Raw discriminator outputs of the three loops while they track, before any filter. They scatter more than \
-                  the loops' errors by the root of the loop's bandwidth; a mean off zero shows dynamic stress.",
+        caption: "Raw discriminator outputs of the three loops while they track, before any filter. They scatter \
+                  more than the loops' errors by the root of the loop's bandwidth; a mean off zero shows dynamic \
+                  stress.",
         numbers: &["rx/tracking.csv"],
         sketch: signals::discriminators,
     },
     Picture {
         name: "jitter",
-        caption: "Errors of the closed loops, replica minus truth, each satellite about its mean and without the pull-in, \
-                  with the normal curve of the same mean and σ. The rules of thumb (d/6, 15°, 1/(12T)) are \
-                  bounds for σ, and are drawn where they come near. Satellites of different C/N0 together are more peaked than normal.",
+        caption: "Errors of the closed loops, replica minus truth, each satellite about its mean and without the \
+                  pull-in, with the normal curve of the same mean and σ. The rules of thumb (d/6, 15°, 1/(12T)) are \
+                  bounds for σ, and are drawn where they come near. Satellites of different C/N0 together are more \
+                  peaked than normal.",
         numbers: &["histograms.csv", "errors.csv"],
         sketch: jitter::jitter,
     },
     Picture {
         name: "observables",
-        caption: "Errors of the observables against the truth. Code and carrier share the delays that the receiver cannot \
-                  see; what all satellites share is the clock's and harmless to the position.",
+        caption: "Errors of the observables against the truth. Code and carrier share the delays that the receiver \
+                  cannot see; what all satellites share is the clock's and harmless to the position.",
         numbers: &["errors.csv"],
         sketch: signals::observables,
     },
     Picture {
         name: "elevation",
-        caption: "Errors of the observables over elevation, and the multipath combination over time: code that errs more low down, \
-                  or a combination that swings, is multipath or atmosphere.",
+        caption: "Errors of the observables over elevation, and the multipath combination over time: code that errs \
+                  more low down, or a combination that swings, is multipath or atmosphere.",
         numbers: &["satellites.csv", "elevation.csv"],
         sketch: elevation::elevation,
     },
     Picture {
         name: "position_scatter",
-        caption: "Horizontal errors of the fixes about the truth with the ellipses that would hold 50 % and 95 % of a normal \
-                  scatter of the same covariance, and how errors are distributed. A cloud off the cross is a bias.",
+        caption: "Horizontal errors of the fixes about the truth with the ellipses that would hold 50 % and 95 % of \
+                  a normal scatter of the same covariance, and how errors are distributed. A cloud off the cross is \
+                  a bias.",
         numbers: &["position.csv"],
         sketch: position::scatter,
     },
@@ -123,8 +126,9 @@ pub(crate) const PICTURES: [Picture; 17] = [
     },
     Picture {
         name: "position_honesty",
-        caption: "Whether the receiver's own σ is honest: errors between ±2σ, and the normalised error squared, whose mean should \
-                  lie in the band that so many independent fixes allow. Above it the receiver is optimistic, below pessimistic.",
+        caption: "Whether the receiver's own σ is honest: errors between ±2σ, and the normalised error squared, \
+                  whose mean should lie in the band that so many independent fixes allow. Above it the receiver is \
+                  optimistic, below pessimistic.",
         numbers: &["honesty.csv"],
         sketch: consistency::consistency,
     },
@@ -136,8 +140,8 @@ pub(crate) const PICTURES: [Picture; 17] = [
     },
     Picture {
         name: "clock_bias",
-        caption: "The receiver's clock: its bias as estimated and as it was with the straight line of least squares, the \
-                  difference, and both without their lines.",
+        caption: "The receiver's clock: its bias as estimated and as it was with the straight line of least squares, \
+                  the difference, and both without their lines.",
         numbers: &["clock.csv"],
         sketch: clock::bias,
     },
@@ -149,8 +153,8 @@ pub(crate) const PICTURES: [Picture; 17] = [
     },
     Picture {
         name: "allan",
-        caption: "Stability of the clock with intervals of 95 %: its estimate, the truth, the error, and what white noise \
-                  of code or carrier alone would give.",
+        caption: "Stability of the clock with intervals of 95 %: its estimate, the truth, the error, and what white \
+                  noise of code or carrier alone would give.",
         numbers: &["allan.csv"],
         sketch: clock::stability,
     },

@@ -40,8 +40,9 @@ fn accuracy(report: &mut Report, judged: &Judged<'_>) {
         ("values", Side::Right),
     ];
     let mut table = Table::new(
-        "Errors against the truth: mean, standard deviation, and 95th percentile of the magnitude. Of the pseudorange the part \
-         common to all satellites of an epoch is removed, of the carrier a constant from each arc.",
+        "Errors against the truth: mean, standard deviation, and 95th percentile of the magnitude. Of the \
+         pseudorange the part common to all satellites of an epoch is removed, of the carrier a constant from each \
+         arc.",
         columns,
     );
     let details = &judged.summary.details;
@@ -71,8 +72,8 @@ fn loops(report: &mut Report, judged: &Judged<'_>) {
         ("share of it", Side::Right),
     ];
     let mut table = Table::new(
-        "Loops: standard deviation of replica minus truth, each satellite about its mean and without the pull-in, against \
-         the rules of thumb d/6, 15° and 1/(12T).",
+        "Loops: standard deviation of replica minus truth, each satellite about its mean and without the pull-in, \
+         against the rules of thumb d/6, 15° and 1/(12T).",
         columns,
     );
     let (tracking, limits) = (&judged.summary.tracking, &judged.summary.details.thresholds);

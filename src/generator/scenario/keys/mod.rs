@@ -64,8 +64,8 @@ pub const SCENARIO: &[Key] = &[
     one_or_more(
         "front_end",
         hardware::FRONT_END,
-        "Sampling. Several, each written as [[front_end]], listen to one sky by one clock: one file each. The tables of stages \
-         (local_oscillator, filter, iq, adc) stand below each of them then.",
+        "Sampling. Several, each written as [[front_end]], listen to one sky by one clock: one file each. The tables \
+         of stages (local_oscillator, filter, iq, adc) stand below each of them then.",
     ),
     tables(
         "interference",
@@ -82,8 +82,8 @@ pub const SCENARIO: &[Key] = &[
     table(
         "expect",
         EXPECT,
-        "What the scene expects of its receiver where physics alone would expect something else; at least one of `fix`, \
-         `losses` and `errors`, with the `reason`.",
+        "What the scene expects of its receiver where physics alone would expect something else; at least one of \
+         `fix`, `losses` and `errors`, with the `reason`.",
     ),
     foreign("receiver", "the receiver's settings", "settings of the receiver that `run` uses, as below"),
 ];

@@ -22,7 +22,8 @@ pub(crate) const INTERFERENCE: &[Key] = &[
         120.0,
         "dB",
         "power over the satellites' at the antenna's port, when the scene starts: over power.cn0_dbhz, or with a \
-         link budget over the C/N0 of the satellite that is the strongest in view then (its direct ray; `gnss-twin plan` names it)",
+         link budget over the C/N0 of the satellite that is the strongest in view then (its direct ray; `gnss-twin \
+         plan` names it)",
     ),
     number("power_dbw", -250.0, 0.0, "dBW", "power at the antenna's port; needs a link budget"),
     number(

@@ -190,7 +190,8 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
     for key in keys_of("obstruction") {
         cases.push((full.clone(), "obstruction", key));
     }
-    let interval = "[[expect.interval]]\nfrom_s = 1\nto_s = 2\nfix = \"any\"\nlosses = \"any\"\nsatellites = [\"G02\"]\n\
+    let interval = "[[expect.interval]]\nfrom_s = 1\nto_s = 2\nfix = \"any\"\nlosses = \"any\"\nsatellites = \
+                    [\"G02\"]\n\
                     errors = \"any\"\nreason = \"x\"\n";
     for key in keys_of("expect.interval") {
         cases.push((format!("{MINIMAL}{STATIC}{interval}"), "expect.interval", key));

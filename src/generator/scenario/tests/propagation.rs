@@ -3,13 +3,15 @@
 use super::*;
 use crate::gnss::gps::lnav;
 
-pub(super) const IONEX: &str = "[ionosphere]\nmodel = \"ionex\"\nfile = \"igrg3380.10i.gz\"\nmap_start = 2010-12-04T10:00:00\n\
+pub(super) const IONEX: &str = "[ionosphere]\nmodel = \"ionex\"\nfile = \"igrg3380.10i.gz\"\nmap_start = \
+                                2010-12-04T10:00:00\n\
     interpolation = \"bicubic\"\nmapping = \"modified_single_layer\"\n";
 pub(super) const TEC: &str =
     "[ionosphere]\nmodel = \"constant_tec\"\nvtec_tecu = 20\nshell_km = 400\nmapping = \"single_layer\"\n";
 pub(super) const NEQUICK: &str =
     "[ionosphere]\nmodel = \"nequick_g\"\nai = [120, 0.25, 0.0125]\nbroadcast_ai = [100, 0.125, 0]\n";
-pub(super) const VIENNA: &str = "[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf1\"\ngpt3_file = \"gpt3_5.grd\"\nvmf_file = \"VMF3_20181125.H00\"\n";
+pub(super) const VIENNA: &str = "[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf1\"\ngpt3_file \
+                                 = \"gpt3_5.grd\"\nvmf_file = \"VMF3_20181125.H00\"\n";
 
 #[test]
 fn what_the_satellites_send_stands_apart_from_what_nature_does() {

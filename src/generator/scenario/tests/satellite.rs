@@ -9,12 +9,14 @@ use crate::gnss::satellite::System;
 use crate::gnss::time::GST;
 
 /// Every key of the tables.
-pub(super) const FAULTS: &str = "[orbits]\nsp3 = [\"a.sp3\", \"b.sp3.gz\"]\nantenna_offset_m = 0.7\nantenna_offsets_m = { G13 = 1.5 }\n\
+pub(super) const FAULTS: &str = "[orbits]\nsp3 = [\"a.sp3\", \"b.sp3.gz\"]\nantenna_offset_m = 0.7\n\
+                                 antenna_offsets_m = { G13 = 1.5 }\n\
     [[satellite_fault]]\nkind = \"clock_step\"\nsatellites = [\"G13\"]\nstep_s = 1e-7\non_s = 3\noff_s = 5\n\
     [[satellite_fault]]\nkind = \"clock_ramp\"\nsatellites = [\"G13\"]\ndrift_sps = 1e-9\n\
     [[satellite_fault]]\nkind = \"clock_noise\"\noscillator = \"rubidium1\"\n\
     [[satellite_fault]]\nkind = \"clock_noise\"\npower_law = [0, 0, 1e-22, 0, 0]\n\
-    [[satellite_fault]]\nkind = \"orbit\"\nsatellites = [\"G13\"]\nradial_m = 1\nalong_m = 20\ncross_m = 3\non_s = 2\nramp_s = 60\n\
+    [[satellite_fault]]\nkind = \"orbit\"\nsatellites = [\"G13\"]\nradial_m = 1\nalong_m = 20\ncross_m = 3\non_s = 2\n\
+    ramp_s = 60\n\
     [[message_fault]]\nkind = \"bit_errors\"\nsatellites = [\"G13\"]\nrate = 1e-3\non_s = 3\noff_s = 5\n\
     [[message_fault]]\nkind = \"bit\"\nsubframe = 2\nword = 3\nbit = 30\n\
     [[message_fault]]\nkind = \"health\"\nsatellites = [\"G13\"]\nhealth = 63\n\

@@ -4,7 +4,7 @@
 use super::almanac::{GPS_OFFSET, WORD_7, WORD_8, WORD_9, WORD_10};
 use super::reduced::WORD_16;
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, element};
+use crate::gnss::bits::{Element, Field, element, plain};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::message::Common;
 use crate::gnss::time::{Epoch, WEEK_S};
@@ -105,71 +105,85 @@ pub(super) static WORD_0: [Of; 2] = [
 #[rustfmt::skip]
 pub(super) static WORD_1: [Of; 5] = [
     ISSUE,
-    element(Field::new("toe_min", &[(16, 14)], Whole, 0, ORBIT), |o| o.ephemeris.toe.tow_s() / MINUTE_S, |o, v| o.ephemeris.toe = o.ephemeris.toe.nearest_tow((v * MINUTE_S) as i64)),
-    element(Field::new("m0_rad", &[(30, 32)], Turn, -31, ORBIT), |o| o.ephemeris.m0_rad, |o, v| o.ephemeris.m0_rad = v),
-    element(Field::new("eccentricity", &[(62, 32)], Unsigned, -33, ORBIT), |o| o.ephemeris.eccentricity, |o, v| o.ephemeris.eccentricity = v),
-    element(Field::new("sqrt_a_sqrtm", &[(94, 32)], Unsigned, -19, ORBIT), |o| o.ephemeris.sqrt_a_sqrtm, |o, v| o.ephemeris.sqrt_a_sqrtm = v),
+    element(Field::new("toe_min", &[(16, 14)], Whole, 0, ORBIT),
+        |o| o.ephemeris.toe.tow_s() / MINUTE_S,
+        |o, v| o.ephemeris.toe = o.ephemeris.toe.nearest_tow((v * MINUTE_S) as i64)),
+    plain!("m0_rad", [(30, 32)], Turn, -31, ORBIT, ephemeris.m0_rad),
+    plain!("eccentricity", [(62, 32)], Unsigned, -33, ORBIT, ephemeris.eccentricity),
+    plain!("sqrt_a_sqrtm", [(94, 32)], Unsigned, -19, ORBIT, ephemeris.sqrt_a_sqrtm),
 ];
 
 #[rustfmt::skip]
 pub(super) static WORD_2: [Of; 5] = [
     ISSUE,
-    element(Field::new("omega0_rad", &[(16, 32)], Turn, -31, ORBIT), |o| o.ephemeris.omega0_rad, |o, v| o.ephemeris.omega0_rad = v),
-    element(Field::new("i0_rad", &[(48, 32)], Semicircles, -31, ORBIT), |o| o.ephemeris.i0_rad, |o, v| o.ephemeris.i0_rad = v),
-    element(Field::new("omega_rad", &[(80, 32)], Turn, -31, ORBIT), |o| o.ephemeris.omega_rad, |o, v| o.ephemeris.omega_rad = v),
-    element(Field::new("idot_radps", &[(112, 14)], Semicircles, -43, ORBIT), |o| o.ephemeris.idot_radps, |o, v| o.ephemeris.idot_radps = v),
+    plain!("omega0_rad", [(16, 32)], Turn, -31, ORBIT, ephemeris.omega0_rad),
+    plain!("i0_rad", [(48, 32)], Semicircles, -31, ORBIT, ephemeris.i0_rad),
+    plain!("omega_rad", [(80, 32)], Turn, -31, ORBIT, ephemeris.omega_rad),
+    plain!("idot_radps", [(112, 14)], Semicircles, -43, ORBIT, ephemeris.idot_radps),
 ];
 
 #[rustfmt::skip]
 pub(super) static WORD_3: [Of; 8] = [
     ISSUE,
-    element(Field::new("omega_dot_radps", &[(16, 24)], Semicircles, -43, ORBIT), |o| o.ephemeris.omega_dot_radps, |o, v| o.ephemeris.omega_dot_radps = v),
-    element(Field::new("delta_n_radps", &[(40, 16)], Semicircles, -43, ORBIT), |o| o.ephemeris.delta_n_radps, |o, v| o.ephemeris.delta_n_radps = v),
-    element(Field::new("cuc_rad", &[(56, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cuc_rad, |o, v| o.ephemeris.cuc_rad = v),
-    element(Field::new("cus_rad", &[(72, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cus_rad, |o, v| o.ephemeris.cus_rad = v),
-    element(Field::new("crc_m", &[(88, 16)], Signed, -5, ORBIT), |o| o.ephemeris.crc_m, |o, v| o.ephemeris.crc_m = v),
-    element(Field::new("crs_m", &[(104, 16)], Signed, -5, ORBIT), |o| o.ephemeris.crs_m, |o, v| o.ephemeris.crs_m = v),
-    element(Field::new("sisa_index", &[(120, 8)], Whole, 0, "5.1.12, table 90"), |o| f64::from(o.ephemeris.ura_index), |o, v| o.ephemeris.ura_index = v as u8),
+    plain!("omega_dot_radps", [(16, 24)], Semicircles, -43, ORBIT, ephemeris.omega_dot_radps),
+    plain!("delta_n_radps", [(40, 16)], Semicircles, -43, ORBIT, ephemeris.delta_n_radps),
+    plain!("cuc_rad", [(56, 16)], Signed, -29, ORBIT, ephemeris.cuc_rad),
+    plain!("cus_rad", [(72, 16)], Signed, -29, ORBIT, ephemeris.cus_rad),
+    plain!("crc_m", [(88, 16)], Signed, -5, ORBIT, ephemeris.crc_m),
+    plain!("crs_m", [(104, 16)], Signed, -5, ORBIT, ephemeris.crs_m),
+    element(Field::new("sisa_index", &[(120, 8)], Whole, 0, "5.1.12, table 90"),
+        |o| f64::from(o.ephemeris.ura_index), |o, v| o.ephemeris.ura_index = v as u8),
 ];
 
 #[rustfmt::skip]
 pub(super) static WORD_4: [Of; 8] = [
     ISSUE,
     element(Field::new("svid", &[(16, 6)], Whole, 0, "5.1.9.3"), |o| f64::from(o.ephemeris.sv.number), |_, _| {}),
-    element(Field::new("cic_rad", &[(22, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cic_rad, |o, v| o.ephemeris.cic_rad = v),
-    element(Field::new("cis_rad", &[(38, 16)], Signed, -29, ORBIT), |o| o.ephemeris.cis_rad, |o, v| o.ephemeris.cis_rad = v),
-    element(Field::new("toc_min", &[(54, 14)], Whole, 0, CLOCK), |o| o.ephemeris.toc.tow_s() / MINUTE_S, |o, v| o.ephemeris.toc = o.ephemeris.toc.nearest_tow((v * MINUTE_S) as i64)),
-    element(Field::new("af0_s", &[(68, 31)], Signed, -34, CLOCK), |o| o.ephemeris.af0_s, |o, v| o.ephemeris.af0_s = v),
-    element(Field::new("af1_sps", &[(99, 21)], Signed, -46, CLOCK), |o| o.ephemeris.af1_sps, |o, v| o.ephemeris.af1_sps = v),
-    element(Field::new("af2_sps2", &[(120, 6)], Signed, -59, CLOCK), |o| o.ephemeris.af2_sps2, |o, v| o.ephemeris.af2_sps2 = v),
+    plain!("cic_rad", [(22, 16)], Signed, -29, ORBIT, ephemeris.cic_rad),
+    plain!("cis_rad", [(38, 16)], Signed, -29, ORBIT, ephemeris.cis_rad),
+    element(Field::new("toc_min", &[(54, 14)], Whole, 0, CLOCK),
+        |o| o.ephemeris.toc.tow_s() / MINUTE_S,
+        |o, v| o.ephemeris.toc = o.ephemeris.toc.nearest_tow((v * MINUTE_S) as i64)),
+    plain!("af0_s", [(68, 31)], Signed, -34, CLOCK, ephemeris.af0_s),
+    plain!("af1_sps", [(99, 21)], Signed, -46, CLOCK, ephemeris.af1_sps),
+    plain!("af2_sps2", [(120, 6)], Signed, -59, CLOCK, ephemeris.af2_sps2),
 ];
 
 #[rustfmt::skip]
 pub(super) static WORD_5: [Of; 11] = [
-    element(Field::new("ai0_sfu", &[(6, 11)], Unsigned, -2, IONOSPHERE), |o| o.nequick[0], |o, v| o.nequick[0] = v),
-    element(Field::new("ai1_sfupdeg", &[(17, 11)], Signed, -8, IONOSPHERE), |o| o.nequick[1], |o, v| o.nequick[1] = v),
-    element(Field::new("ai2_sfupdeg2", &[(28, 14)], Signed, -15, IONOSPHERE), |o| o.nequick[2], |o, v| o.nequick[2] = v),
-    element(Field::new("bgd_e1_e5a_s", &[(47, 10)], Signed, -32, DELAY), |o| o.ephemeris.tgd2_s, |o, v| o.ephemeris.tgd2_s = v),
-    element(Field::new("bgd_e1_e5b_s", &[(57, 10)], Signed, -32, DELAY), |o| o.ephemeris.tgd_s, |o, v| o.ephemeris.tgd_s = v),
-    element(Field::new("e5b_health", &[(67, 2)], Whole, 0, "5.1.9.7"), |o| status(o.ephemeris.health, 4, 2), |o, v| set_status(&mut o.ephemeris.health, 4, 2, v)),
-    element(Field::new("e1b_health", &[(69, 2)], Whole, 0, "5.1.9.7"), |o| status(o.ephemeris.health, 1, 2), |o, v| set_status(&mut o.ephemeris.health, 1, 2, v)),
-    element(Field::new("e5b_data_validity", &[(71, 1)], Whole, 0, "5.1.9.6"), |o| status(o.ephemeris.health, 3, 1), |o, v| set_status(&mut o.ephemeris.health, 3, 1, v)),
-    element(Field::new("e1b_data_validity", &[(72, 1)], Whole, 0, "5.1.9.6"), |o| status(o.ephemeris.health, 0, 1), |o, v| set_status(&mut o.ephemeris.health, 0, 1, v)),
+    plain!("ai0_sfu", [(6, 11)], Unsigned, -2, IONOSPHERE, nequick[0]),
+    plain!("ai1_sfupdeg", [(17, 11)], Signed, -8, IONOSPHERE, nequick[1]),
+    plain!("ai2_sfupdeg2", [(28, 14)], Signed, -15, IONOSPHERE, nequick[2]),
+    plain!("bgd_e1_e5a_s", [(47, 10)], Signed, -32, DELAY, ephemeris.tgd2_s),
+    plain!("bgd_e1_e5b_s", [(57, 10)], Signed, -32, DELAY, ephemeris.tgd_s),
+    element(Field::new("e5b_health", &[(67, 2)], Whole, 0, "5.1.9.7"),
+        |o| status(o.ephemeris.health, 4, 2), |o, v| set_status(&mut o.ephemeris.health, 4, 2, v)),
+    element(Field::new("e1b_health", &[(69, 2)], Whole, 0, "5.1.9.7"),
+        |o| status(o.ephemeris.health, 1, 2), |o, v| set_status(&mut o.ephemeris.health, 1, 2, v)),
+    element(Field::new("e5b_data_validity", &[(71, 1)], Whole, 0, "5.1.9.6"),
+        |o| status(o.ephemeris.health, 3, 1), |o, v| set_status(&mut o.ephemeris.health, 3, 1, v)),
+    element(Field::new("e1b_data_validity", &[(72, 1)], Whole, 0, "5.1.9.6"),
+        |o| status(o.ephemeris.health, 0, 1), |o, v| set_status(&mut o.ephemeris.health, 0, 1, v)),
     week(&[(73, 12)]),
     tow(&[(85, 20)]),
 ];
 
 #[rustfmt::skip]
 pub(super) static WORD_6: [Element<Utc>; 9] = [
-    element(Field::new("utc_a0_s", &[(6, 32)], Signed, -30, UTC), |u| u.a0_s, |u, v| u.a0_s = v),
-    element(Field::new("utc_a1_sps", &[(38, 24)], Signed, -50, UTC), |u| u.a1_sps, |u, v| u.a1_sps = v),
+    plain!("utc_a0_s", [(6, 32)], Signed, -30, UTC, a0_s),
+    plain!("utc_a1_sps", [(38, 24)], Signed, -50, UTC, a1_sps),
     element(Field::new("utc_leap_s", &[(62, 8)], Signed, 0, UTC), |u| u.leap_s as f64, |u, v| u.leap_s = v as i64),
-    element(Field::new("utc_t0_h", &[(70, 8)], Whole, 0, UTC), |u| u.reference.1 as f64, |u, v| u.reference.1 = v as i64),
-    element(Field::new("utc_week", &[(78, 8)], Whole, 0, UTC), |u| (u.reference.0 - GST_WEEK).rem_euclid(256) as f64, |u, v| u.reference.0 = v as i64 + GST_WEEK),
-    element(Field::new("utc_event_week", &[(86, 8)], Whole, 0, UTC), |u| (u.event.0 - GST_WEEK).rem_euclid(256) as f64, |u, v| u.event.0 = v as i64 + GST_WEEK),
+    element(Field::new("utc_t0_h", &[(70, 8)], Whole, 0, UTC),
+        |u| u.reference.1 as f64, |u, v| u.reference.1 = v as i64),
+    element(Field::new("utc_week", &[(78, 8)], Whole, 0, UTC),
+        |u| (u.reference.0 - GST_WEEK).rem_euclid(256) as f64, |u, v| u.reference.0 = v as i64 + GST_WEEK),
+    element(Field::new("utc_event_week", &[(86, 8)], Whole, 0, UTC),
+        |u| (u.event.0 - GST_WEEK).rem_euclid(256) as f64, |u, v| u.event.0 = v as i64 + GST_WEEK),
     element(Field::new("utc_event_day", &[(94, 3)], Whole, 0, UTC), |u| u.event.1 as f64, |u, v| u.event.1 = v as i64),
-    element(Field::new("utc_leap_after_s", &[(97, 8)], Signed, 0, UTC), |u| u.leap_after_s as f64, |u, v| u.leap_after_s = v as i64),
-    element(Field::new("tow_s", &[(105, 20)], Whole, 0, TIME), |u| (u.sent_s % WEEK_S) as f64, |u, v| u.sent_s = v as i64),
+    element(Field::new("utc_leap_after_s", &[(97, 8)], Signed, 0, UTC),
+        |u| u.leap_after_s as f64, |u, v| u.leap_after_s = v as i64),
+    element(Field::new("tow_s", &[(105, 20)], Whole, 0, TIME),
+        |u| (u.sent_s % WEEK_S) as f64, |u, v| u.sent_s = v as i64),
 ];
 
 /// The index of the signal in space accuracy nearest to one in metres (5.1.12, table 90); 255, no prediction,

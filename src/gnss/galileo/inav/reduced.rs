@@ -9,7 +9,7 @@
 use nalgebra::Vector3;
 
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn};
-use crate::gnss::bits::{Element, Field, element, quantise_all};
+use crate::gnss::bits::{Element, plain, quantise_all};
 use crate::gnss::broadcast::{Constants, Ephemeris, State};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::satellite::Sv;
@@ -123,12 +123,12 @@ impl Reduced {
 /// Word 16.
 #[rustfmt::skip]
 pub(super) static WORD_16: [Element<Reduced>; 8] = [
-    element(Field::new("delta_axis_m", &[(6, 5)], Signed, 8, REDUCED), |r| r.delta_axis_m, |r, v| r.delta_axis_m = v),
-    element(Field::new("ex", &[(11, 13)], Signed, -22, REDUCED), |r| r.ex, |r, v| r.ex = v),
-    element(Field::new("ey", &[(24, 13)], Signed, -22, REDUCED), |r| r.ey, |r, v| r.ey = v),
-    element(Field::new("delta_i_rad", &[(37, 17)], Semicircles, -22, REDUCED), |r| r.delta_i_rad, |r, v| r.delta_i_rad = v),
-    element(Field::new("omega0_rad", &[(54, 23)], Turn, -22, REDUCED), |r| r.omega0_rad, |r, v| r.omega0_rad = v),
-    element(Field::new("latitude_rad", &[(77, 23)], Turn, -22, REDUCED), |r| r.latitude_rad, |r, v| r.latitude_rad = v),
-    element(Field::new("af0_s", &[(100, 22)], Signed, -26, REDUCED), |r| r.af0_s, |r, v| r.af0_s = v),
-    element(Field::new("af1_sps", &[(122, 6)], Signed, -35, REDUCED), |r| r.af1_sps, |r, v| r.af1_sps = v),
+    plain!("delta_axis_m", [(6, 5)], Signed, 8, REDUCED, delta_axis_m),
+    plain!("ex", [(11, 13)], Signed, -22, REDUCED, ex),
+    plain!("ey", [(24, 13)], Signed, -22, REDUCED, ey),
+    plain!("delta_i_rad", [(37, 17)], Semicircles, -22, REDUCED, delta_i_rad),
+    plain!("omega0_rad", [(54, 23)], Turn, -22, REDUCED, omega0_rad),
+    plain!("latitude_rad", [(77, 23)], Turn, -22, REDUCED, latitude_rad),
+    plain!("af0_s", [(100, 22)], Signed, -26, REDUCED, af0_s),
+    plain!("af1_sps", [(122, 6)], Signed, -35, REDUCED, af1_sps),
 ];
