@@ -1,4 +1,4 @@
-//! Fields of navigation messages: where each parameter stands among the bits, and what its integer means.
+//! Fields of navigation messages: where each parameter is among the bits, and what its integer means.
 //!
 //! A field is read and written through the same entry of a table, so that encoder and decoder cannot differ.
 //! What holds the bits is a [`Store`]: ten words with parity of GPS LNAV, a word of 128 bits of Galileo
@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::gnss::earth::GPS_PI;
 
-/// Bits in which fields stand.
+/// Bits that hold fields.
 pub trait Store {
     /// The bits of a piece of a field: its first bit as the document counts, and its length, 32 at most.
     fn piece(&self, piece: (u16, u8)) -> u32;
@@ -33,17 +33,49 @@ impl Store for u128 {
 /// Why a value cannot be sent.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum FieldError {
+    /// A value beyond its field.
     #[error("{name} = {value} does not fit the navigation message: expected {minimum} to {maximum}")]
-    OutOfRange { name: &'static str, value: f64, minimum: f64, maximum: f64 },
+    OutOfRange {
+        /// Name of the field.
+        name: &'static str,
+        /// In the unit of its name.
+        value: f64,
+        /// Least value that the field holds.
+        minimum: f64,
+        /// Largest value.
+        maximum: f64,
+    },
+    /// A count or time between two steps of its field.
     #[error("{name} = {value} cannot be sent exactly: expected a multiple of {step}")]
-    NotMultiple { name: &'static str, value: f64, step: f64 },
+    NotMultiple {
+        /// Name of the field.
+        name: &'static str,
+        /// In the unit of its name.
+        value: f64,
+        /// What one step is worth.
+        step: f64,
+    },
+    /// Issues that do not go together (IS-GPS-200N, 20.3.4.4).
     #[error("iode = {iode} contradicts iodc = {iodc}: expected the low eight bits of it")]
-    Issue { iode: u16, iodc: u16 },
+    Issue {
+        /// Issue of the ephemeris.
+        iode: u16,
+        /// Issue of the clock.
+        iodc: u16,
+    },
+    /// A stream that cannot begin at that time.
     #[error("the message of {message} cannot begin {start_s} s after the week's start: expected {expected}")]
-    Start { message: &'static str, start_s: f64, expected: &'static str },
+    Start {
+        /// Name of the message.
+        message: &'static str,
+        /// Seconds after the beginning of the week.
+        start_s: f64,
+        /// What is possible.
+        expected: &'static str,
+    },
 }
 
-/// What the integer of a field stands for.
+/// What the integer of a field means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Not negative, rounded to the nearest step.
@@ -75,6 +107,7 @@ pub struct Field {
     pub name: &'static str,
     /// First bit, counted as the document does, and length of each piece, most significant first.
     pub pieces: &'static [(u16, u8)],
+    /// What its integer means.
     pub kind: Kind,
     /// One step is two to this power.
     pub exponent: i32,
@@ -125,7 +158,7 @@ impl Field {
         if matches!(self.kind, Kind::Semicircles | Kind::Turn) { power * GPS_PI } else { power }
     }
 
-    /// The integer that stands there.
+    /// The integer that is there.
     pub fn read<S: Store>(&self, data: &S) -> i64 {
         let raw = self.pieces.iter().fold(0_i64, |raw, piece| (raw << piece.1) | i64::from(data.piece(*piece)));
         let span = 1_i64 << self.bits();
@@ -141,7 +174,7 @@ impl Field {
         }
     }
 
-    /// What an integer of this field stands for, in the unit of its name.
+    /// What an integer of this field means, in the unit of its name.
     pub fn value(&self, raw: i64) -> f64 {
         let scaled = libm::ldexp(raw as f64, self.exponent());
         let angle = matches!(self.kind, Kind::Semicircles | Kind::Turn);
@@ -149,7 +182,7 @@ impl Field {
         if angle { scaled * GPS_PI } else { scaled }
     }
 
-    /// The nearest integer that stands for `value`.
+    /// The integer whose meaning is nearest to `value`.
     pub fn raw(&self, value: f64) -> Result<i64, FieldError> {
         let angle = matches!(self.kind, Kind::Semicircles | Kind::Turn);
         let scaled = libm::ldexp(if angle { value / GPS_PI } else { value }, -self.exponent());

@@ -16,6 +16,7 @@ use crate::gnss::time::{Epoch, WEEK_S};
 /// A set of broadcast elements of one satellite, in SI units and radians.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ephemeris {
+    /// The satellite.
     pub sv: Sv,
     /// Reference time of the orbit.
     pub toe: Epoch,
@@ -25,36 +26,58 @@ pub struct Ephemeris {
     pub transmitted: Epoch,
     /// Issue of data: IODE of GPS, IODnav of Galileo.
     pub iode: u16,
+    /// Issue of the clock: IODC of GPS (IS-GPS-200N, 20.3.3.3.1.5), IODnav of Galileo.
     pub iodc: u16,
     /// User range accuracy index, 0..=15 (IS-GPS-200N, 20.3.3.3.1.3); SISA index of Galileo.
     pub ura_index: u8,
     /// Six bits of which 0 is healthy: those of IS-GPS-200N, 20.3.3.3.1.4; of Galileo, from the lowest bit
     /// on, data validity (1) and health (2) of E1-B, then those of E5b. See [`Self::is_healthy`].
     pub health: u8,
+    /// Codes on L2: 1 for P, 2 for C/A (IS-GPS-200N, 20.3.3.3.1.2).
     pub l2_codes: u8,
+    /// Whether P on L2 has no message (IS-GPS-200N, 20.3.3.3.1.6).
     pub l2_p_data_off: bool,
     /// Whether the curve fit is longer than four hours (IS-GPS-200N, 20.3.3.4.3.1).
     pub long_fit: bool,
     /// Age of data offset, in its 900 s units.
     pub aodo: u8,
+    /// Square root of the semi-major axis, √m.
     pub sqrt_a_sqrtm: f64,
+    /// Eccentricity of the orbit.
     pub eccentricity: f64,
+    /// Mean anomaly at the reference time.
     pub m0_rad: f64,
+    /// Mean motion beyond that of the semi-major axis, rad/s.
     pub delta_n_radps: f64,
+    /// Longitude of the ascending node at the beginning of the week.
     pub omega0_rad: f64,
+    /// Rate of right ascension of the node, rad/s.
     pub omega_dot_radps: f64,
+    /// Argument of perigee.
     pub omega_rad: f64,
+    /// Inclination at the reference time.
     pub i0_rad: f64,
+    /// Rate of the inclination, rad/s.
     pub idot_radps: f64,
+    /// Amplitude of the cosine of twice the argument of latitude, in that argument …
     pub cuc_rad: f64,
+    /// … and of its sine.
     pub cus_rad: f64,
+    /// The same in the radius, metres: of the cosine …
     pub crc_m: f64,
+    /// … and of its sine.
     pub crs_m: f64,
+    /// The same in the inclination: of the cosine …
     pub cic_rad: f64,
+    /// … and of its sine.
     pub cis_rad: f64,
+    /// Clock's offset at its reference time.
     pub af0_s: f64,
+    /// Clock's drift, s/s.
     pub af1_sps: f64,
+    /// Half the rate of that drift, s/s².
     pub af2_sps2: f64,
+    /// Group delay: T_GD of GPS (IS-GPS-200N, 20.3.3.3.3.2), BGD(E1,E5b) of Galileo.
     pub tgd_s: f64,
     /// The second group delay of messages that have two: BGD(E1,E5a) of Galileo beside BGD(E1,E5b) in
     /// `tgd_s`.
@@ -66,35 +89,64 @@ pub struct Ephemeris {
 /// Position and velocity in ECEF at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
+    /// Place, ECEF.
     pub position_m: Vector3<f64>,
+    /// Velocity, ECEF.
     pub velocity_mps: Vector3<f64>,
 }
 
 /// A clock's offset from GPS time (reading minus true) and its rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockState {
+    /// Reading minus true time.
     pub offset_s: f64,
+    /// Rate of the offset, s/s.
     pub drift: f64,
 }
 
 /// Why elements give no state.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum OrbitError {
+    /// An element that no orbit has.
     #[error("{sv}: {element} = {value} is not that of an orbit: expected {expected}")]
-    Element { sv: Sv, element: &'static str, value: f64, expected: &'static str },
+    Element {
+        /// The satellite.
+        sv: Sv,
+        /// Name of the element.
+        element: &'static str,
+        /// In its SI unit.
+        value: f64,
+        /// What an orbit would have.
+        expected: &'static str,
+    },
+    /// Kepler's equation without a solution.
     #[error("{sv}: Kepler's equation did not converge for eccentricity {eccentricity}")]
-    Kepler { sv: Sv, eccentricity: f64 },
+    Kepler {
+        /// The satellite.
+        sv: Sv,
+        /// Of its orbit.
+        eccentricity: f64,
+    },
+    /// A satellite at the antenna.
     #[error("{sv}: the antenna is {range_m:.3} m away from the satellite: expected at least 1 m")]
-    Near { sv: Sv, range_m: f64 },
+    Near {
+        /// The satellite.
+        sv: Sv,
+        /// Distance of the two.
+        range_m: f64,
+    },
 }
 
 /// Elements at a reference time of choice, without harmonics: [`Ephemeris::mean_at`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mean {
+    /// Square root of the semi-major axis, √m.
     pub sqrt_a_sqrtm: f64,
+    /// Inclination.
     pub inclination_rad: f64,
     /// Node at the beginning of the reference time's week.
     pub omega0_rad: f64,
+    /// Mean anomaly at the reference time.
     pub m0_rad: f64,
     /// Clock's offset at the reference time.
     pub af0_s: f64,
@@ -126,6 +178,7 @@ const OF_GALILEO: Constants =
 const OF_BEIDOU: Constants = Constants { rotation_radps: 7.292_115_0e-5, behind_gpst_s: 14.0, ..OF_GALILEO };
 
 impl Constants {
+    /// Those of a system's interface document.
     pub const fn of(system: System) -> &'static Self {
         match system {
             System::Galileo => &OF_GALILEO,

@@ -24,8 +24,11 @@ pub const ECCENTRICITY_SQUARED: f64 = FLATTENING * (2.0 - FLATTENING);
 /// A place by latitude, longitude and height above the ellipsoid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geodetic {
+    /// Geodetic latitude, north positive.
     pub latitude_rad: f64,
+    /// Longitude, east positive.
     pub longitude_rad: f64,
+    /// Height above the ellipsoid.
     pub height_m: f64,
 }
 
@@ -95,7 +98,9 @@ impl Geodetic {
 /// A direction as seen from a place: azimuth from north over east in [0, 2π), elevation above the horizon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
+    /// From north over east, in [0, 2π).
     pub azimuth_rad: f64,
+    /// Above the horizon.
     pub elevation_rad: f64,
 }
 

@@ -9,8 +9,10 @@ const MAGIC: [u8; 2] = [0x1f, 0x8b];
 /// Why bytes do not unpack.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum InflateError {
+    /// More bytes than allowed, which are these.
     #[error("more than {0} bytes after decompression")]
     TooLarge(u64),
+    /// Data that are no gzip, with what was wrong.
     #[error("damaged gzip data ({0})")]
     Damaged(String),
 }

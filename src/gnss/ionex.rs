@@ -17,7 +17,7 @@ use crate::gnss::time::Epoch;
 pub const LARGEST_BYTES: u64 = 64 << 20;
 /// Values of all maps at most: 32 MiB of memory, 62 days of the IGS's maps.
 const MOST_VALUES: usize = 4 << 20;
-/// What stands where no value is known.
+/// What is written where no value is known.
 const NO_VALUE: f64 = 9999.0;
 const DAY_S: f64 = 86_400.0;
 /// A grid that ends farther from a pole than this is not one of the globe.
@@ -42,6 +42,7 @@ pub struct Maps {
     longitudes: Axis,
     /// Radius of the Earth and height of the shell above it, as the header gives them.
     pub radius_m: f64,
+    /// Height of the shell above that radius.
     pub height_m: f64,
     /// TEC units (1e16 electrons/m²): by map, latitude, longitude.
     values_tecu: Vec<f64>,
@@ -58,12 +59,36 @@ struct Axis {
 /// Why a file gives no maps.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum IonexError {
+    /// A file that cannot be decompressed.
     #[error("{name}: {source}: expected an IONEX file, plain or gzip")]
-    Packed { name: String, source: InflateError },
+    Packed {
+        /// Name of the file.
+        name: String,
+        /// Why.
+        source: InflateError,
+    },
+    /// A line that is not as the format has it.
     #[error("{name}:{line}: '{found}': expected {expected}")]
-    Line { name: String, line: usize, found: String, expected: String },
+    Line {
+        /// Name of the file.
+        name: String,
+        /// Its number, from 1.
+        line: usize,
+        /// What is there.
+        found: String,
+        /// What is expected.
+        expected: String,
+    },
+    /// A file that lacks something as a whole.
     #[error("{name}: {found}: expected {expected}")]
-    Whole { name: String, found: String, expected: String },
+    Whole {
+        /// Name of the file.
+        name: String,
+        /// What was found.
+        found: String,
+        /// What is expected.
+        expected: String,
+    },
 }
 
 impl Maps {
@@ -125,7 +150,7 @@ impl Maps {
 }
 
 impl Axis {
-    /// Where a coordinate stands between the nodes, counted from the first.
+    /// The place of a coordinate between the nodes, counted from the first.
     fn place(&self, degrees: f64) -> f64 {
         (degrees - self.first_deg) / self.step_deg
     }

@@ -19,7 +19,9 @@ pub enum Model {
 /// The coefficients of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Coefficients {
+    /// Of GPS's model.
     Klobuchar(Klobuchar),
+    /// Of Galileo's.
     NequickG(NequickG),
 }
 

@@ -26,7 +26,9 @@ pub const DAY_S: f64 = 86_400.0;
 /// The eight broadcast coefficients, in the document's units (seconds and powers of semicircles).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Klobuchar {
+    /// Polynomial of the amplitude over geomagnetic latitude: s, s/semicircle and higher powers.
     pub alpha: [f64; 4],
+    /// Polynomial of the period: the same units.
     pub beta: [f64; 4],
 }
 

@@ -26,6 +26,7 @@ pub struct Message {
     pub symbol_s: f64,
     /// Duration of a unit, which is encoded in one piece, and when in the week the first one begins.
     pub unit_s: i64,
+    /// Seconds after the beginning of the week at which its first unit begins.
     pub first_s: i64,
     /// Makes what all satellites of a scene send alike.
     pub sender: fn(&Common) -> Result<Box<dyn Sender>, FieldError>,
@@ -33,6 +34,7 @@ pub struct Message {
     pub number: fn(Epoch) -> u8,
     /// Numbers of the units that say their time, and of those that make up a set of elements.
     pub timed: &'static [u8],
+    /// Numbers of the units that make up a set of elements.
     pub set: &'static [u8],
     /// Numbers of the units each of which carries a set in short.
     pub reduced: &'static [u8],
@@ -80,15 +82,18 @@ pub type Raw<'a> = &'a dyn Fn(&str) -> Option<i64>;
 /// What all satellites of a system say alike.
 #[derive(Clone, Debug, Default)]
 pub struct Common {
+    /// Coefficients of GPS's model of the ionosphere; absent means none are sent.
     pub klobuchar: Option<Klobuchar>,
     /// Effective ionisation coefficients of NeQuick-G, in solar flux units, per degree and per degree
     /// squared.
     pub nequick: Option<[f64; 3]>,
+    /// GPS time against UTC.
     pub utc: UtcData,
     /// Galileo's time against GPS time; absent means that nothing is said of it.
     pub galileo: Option<TimePolynomial>,
     /// One set of elements a satellite, for almanacs, and the time near which they hold.
     pub almanac: Vec<Ephemeris>,
+    /// Time near which the almanac holds.
     pub reference: Option<Epoch>,
 }
 
@@ -105,14 +110,26 @@ pub trait Sender: Send + Sync {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Read {
     /// A unit that passed its checks began `symbols` before the end of the newest symbol, at a time of week.
-    Unit { symbols: u64, of_week_s: i64, inverted: bool },
+    Unit {
+        /// From its first symbol to the newest, both counted.
+        symbols: u64,
+        /// Seconds of the week at which its first symbol was sent.
+        of_week_s: i64,
+        /// Whether symbols are received upside down.
+        inverted: bool,
+    },
     /// The start of a unit with its week, resolved near what the reader was given.
     Time(Epoch),
     /// A whole set of elements.
     Ephemeris(Box<Ephemeris>),
     /// A set in short, good to metres, for some minutes from its reference time on; whether group delays and
     /// health were read too, else they are zero.
-    Reduced { set: Box<Ephemeris>, with_delays: bool },
+    Reduced {
+        /// As whole elements, the rest zero.
+        set: Box<Ephemeris>,
+        /// Whether group delays and health are in it.
+        with_delays: bool,
+    },
     /// The ionosphere's parameters.
     Ionosphere(Coefficients),
     /// By how much the system's time is ahead of GPS time, whole seconds apart.

@@ -2,7 +2,7 @@
 //!
 //! No truth and no opinions live here. Both generator and receiver use these modules, so an
 //! error in them would cancel in a closed loop: everything here is tested against something
-//! that this project did not write (`tests/witness.rs`).
+//! that this project did not write (`tests/witness`).
 //!
 //! ```
 //! use gnss_twin::gnss::gps::l1ca::L1_CA;
@@ -21,6 +21,8 @@
 //! # Ok(())
 //! # }
 //! ```
+
+#![warn(missing_docs)]
 
 pub mod bits;
 pub mod broadcast;

@@ -1,4 +1,4 @@
-//! Where keys and values stand in a TOML text, so that errors can name line and column.
+//! Where keys and values are in a TOML text, so that errors can name line and column.
 //!
 //! Source: TOML 1.0, through the spans of the `toml` crate. Keys are named from the top, with dots between: a
 //! quoted key that has dots of its own is one with the tables that it abbreviates. Arrays are not looked

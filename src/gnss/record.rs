@@ -27,8 +27,11 @@ linked!(Observation, RayRow, AcquisitionRow, TrackingRow, EventRow);
 /// One satellite's signal at one sample: `observations.csv`, on both sides.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Observation {
+    /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
+    /// The satellite.
     pub sv: Sv,
+    /// Its signal.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
     /// What the satellite's clock read when it sent what arrives at this sample, as its signal
@@ -42,6 +45,7 @@ pub struct Observation {
     pub carrier_cycles: f64,
     /// Positive when approaching (RINEX sense).
     pub doppler_hz: f64,
+    /// Carrier power over noise density of the whole signal, dB-Hz.
     pub cn0_dbhz: f64,
     /// Time since the carrier was locked without interruption; in the truth, since the satellite appeared.
     pub locked_s: f64,
@@ -57,9 +61,13 @@ impl Observation {
 /// Where a satellite truly was as seen by the antenna: `truth/sky.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SkyRow {
+    /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
+    /// The satellite.
     pub sv: Sv,
+    /// From north over east.
     pub azimuth_deg: f64,
+    /// Above the horizon.
     pub elevation_deg: f64,
     /// Geometric range with light time and Earth rotation.
     pub range_m: f64,
@@ -67,6 +75,7 @@ pub struct SkyRow {
     pub satellite_clock_m: f64,
     /// Group delay of the ionosphere on this signal.
     pub ionosphere_m: f64,
+    /// Delay of the troposphere.
     pub troposphere_m: f64,
 }
 
@@ -88,19 +97,26 @@ pub enum PassEnd {
 /// `truth/passes.csv`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct PassRow {
+    /// The satellite.
     pub sv: Sv,
     /// First sample in view, and the first one that is not any more.
     pub sample: u64,
+    /// The first sample out of view again.
     pub until_sample: u64,
+    /// What begins it.
     pub begins_by: PassEnd,
+    /// What ends it.
     pub ends_by: PassEnd,
 }
 
 /// A ray that comes beside the direct one: `truth/rays.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RayRow {
+    /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
+    /// The satellite.
     pub sv: Sv,
+    /// Its signal.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
     /// Counted from 1; the direct ray is 0.
@@ -116,19 +132,27 @@ pub struct RayRow {
 /// Where the antenna was and what the clocks read: `truth/trajectory.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TrajectoryRow {
+    /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
     /// True GPS time of the sample: whole seconds since 1980 …
     pub gps_s: i64,
     /// … and the fraction.
     pub gps_fraction_s: f64,
+    /// Place, ECEF: x …
     pub x_m: f64,
+    /// … y …
     pub y_m: f64,
+    /// … and z.
     pub z_m: f64,
+    /// Velocity, ECEF: x …
     pub vx_mps: f64,
+    /// … y …
     pub vy_mps: f64,
+    /// … and z.
     pub vz_mps: f64,
     /// Reading of the receiver's clock minus true time.
     pub clock_bias_s: f64,
+    /// Rate of that bias, s/s.
     pub clock_drift: f64,
 }
 
@@ -152,6 +176,7 @@ impl TrajectoryRow {
 /// A source of interference at one sample: `truth/interference.csv`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InterferenceRow {
+    /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
     /// Its number among those that are computed, from 1.
     pub source: usize,
@@ -164,33 +189,51 @@ pub struct InterferenceRow {
 /// One position solution: `rx/fixes.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Fix {
+    /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
     /// GPS time of the sample as the receiver found it: whole seconds since 1980 …
     pub gps_s: i64,
     /// … and the fraction.
     pub gps_fraction_s: f64,
+    /// Place, ECEF: x …
     pub x_m: f64,
+    /// … y …
     pub y_m: f64,
+    /// … and z.
     pub z_m: f64,
+    /// Velocity, ECEF: x …
     pub vx_mps: f64,
+    /// … y …
     pub vy_mps: f64,
+    /// … and z.
     pub vz_mps: f64,
     /// Reading of the receiver's clock minus GPS time, and its rate.
     pub clock_bias_s: f64,
+    /// Rate of that bias, s/s.
     pub clock_drift: f64,
     /// Formal standard deviations in the local frame, and of the clock.
     pub sigma_east_m: f64,
+    /// North.
     pub sigma_north_m: f64,
+    /// Up.
     pub sigma_up_m: f64,
+    /// Clock, times the speed of light.
     pub sigma_clock_m: f64,
     /// Formal correlations of east and north, east and up, north and up.
     pub correlation_en: f64,
+    /// East and up.
     pub correlation_eu: f64,
+    /// North and up.
     pub correlation_nu: f64,
+    /// Geometric dilution of precision, place and clock.
     pub gdop: f64,
+    /// Of the place.
     pub pdop: f64,
+    /// Of its horizontal part.
     pub hdop: f64,
+    /// Of its vertical part.
     pub vdop: f64,
+    /// Of the clock.
     pub tdop: f64,
     /// Ratio of the extreme singular values of the geometry: 1 would be perfect, 10 000 and more is refused.
     pub condition: f64,
@@ -206,6 +249,7 @@ pub struct Fix {
     /// not say.
     #[serde(default)]
     pub ranges: Option<u32>,
+    /// Clocks that it estimates.
     #[serde(default)]
     pub clocks: Option<u32>,
     /// What `clock_bias_s` and the time of the fix are counted from: GPS time, or that of the only system.
@@ -220,7 +264,9 @@ fn gpst() -> String {
 /// The receiver's clock against one time scale: `rx/clocks.csv`, of fixes with another than GPS time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClockRow {
+    /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
+    /// Name of the time scale.
     pub time_scale: String,
     /// Reading of the receiver's clock minus that time, whole seconds by which it is behind GPS time apart.
     pub clock_bias_s: f64,
@@ -272,16 +318,22 @@ impl Fix {
 pub struct AcquisitionRow {
     /// First sample searched.
     pub sample: u64,
+    /// The satellite.
     pub sv: Sv,
+    /// Its signal.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
+    /// Whether the satellite was found.
     pub acquired: bool,
     /// Largest detection statistic of the search, and the threshold that it had to pass.
     pub statistic: f64,
+    /// What the statistic had to pass.
     pub threshold: f64,
+    /// Doppler of the largest statistic.
     pub doppler_hz: f64,
     /// Code phase at `sample`.
     pub code_phase_chips: f64,
+    /// Carrier power over noise density of the whole signal, dB-Hz.
     pub cn0_dbhz: f64,
 }
 
@@ -299,6 +351,7 @@ pub struct LineRow {
     pub js_db: Option<f64>,
     /// Its bin over those beside it, and what that had to pass.
     pub statistic: f64,
+    /// What the statistic had to pass.
     pub threshold: f64,
     /// Lines above the threshold: one of a continuous wave, many of a sweep or of pulses.
     pub lines: u32,
@@ -309,31 +362,41 @@ pub struct LineRow {
 /// A tracking loop at work: `rx/tracking.csv`, thinned.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TrackingRow {
+    /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
+    /// The satellite.
     pub sv: Sv,
+    /// Its signal.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
     /// Prompt correlator, in units of its noise's standard deviation per component.
     pub prompt_i: f64,
+    /// Its component at right angles.
     pub prompt_q: f64,
     /// Raw discriminators of this update.
     pub dll_discriminator_chips: f64,
+    /// Of the phase.
     pub pll_discriminator_cycles: f64,
+    /// Of the frequency.
     pub fll_discriminator_hz: f64,
+    /// Carrier power over noise density of the whole signal, dB-Hz.
     pub cn0_dbhz: f64,
     /// cos of twice the phase error, averaged: 1 is perfect lock.
     pub phase_lock: f64,
+    /// Time between updates of the loops.
     pub integration_s: f64,
 }
 
 /// One parameter of a navigation message as its raw integer: `navigation.csv`, on both sides.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct NavigationRow {
+    /// The satellite.
     pub sv: Sv,
     /// What identifies the data set within the satellite: the issue of data for ephemerides, 0 otherwise.
     pub issue: u32,
     /// Name in the message's field table.
     pub parameter: String,
+    /// Its integer as sent, sign extended.
     pub raw: i64,
     /// The message's name: satellites may send several. Files of one message do not say it: LNAV.
     #[serde(default = "lnav")]
@@ -366,10 +429,14 @@ impl NavigationRow {
 /// Something that happened to a channel: `rx/events.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct EventRow {
+    /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
+    /// The satellite.
     pub sv: Sv,
+    /// Its signal.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
+    /// What happened.
     pub event: Event,
 }
 
@@ -377,12 +444,17 @@ pub struct EventRow {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Event {
+    /// A search found it.
     Acquired,
+    /// The carrier loop locked.
     PhaseLocked,
+    /// The edges of symbols are known.
     BitSynchronised,
+    /// The message's frame is known, and with it the time.
     FrameSynchronised,
     /// Elements in short came, which serve until the ephemeris is complete.
     ReducedElements,
+    /// A whole set of elements was read.
     EphemerisComplete,
     /// The ionosphere's parameters came, for the first time or other than before: fixes are corrected by them
     /// from here on.
@@ -391,6 +463,7 @@ pub enum Event {
     Unhealthy,
     /// It says that it is healthy again.
     Healthy,
+    /// The channel gave the signal up.
     LossOfLock,
     /// The half-cycle or whole-cycle count of the carrier was broken and restarted.
     CycleSlip,

@@ -24,6 +24,7 @@ pub const LARGEST_BYTES: u64 = 256 << 20;
 pub struct Navigation {
     /// Sets of GPS LNAV and Galileo I/NAV by satellite and time of clock.
     pub ephemerides: Vec<Ephemeris>,
+    /// Coefficients of GPS's model of the ionosphere, where the header has them.
     pub klobuchar: Option<Klobuchar>,
     /// Effective ionisation coefficients of NeQuick-G: solar flux units, per degree, per degree squared.
     pub nequick: Option<[f64; 3]>,
@@ -42,18 +43,52 @@ pub struct Navigation {
 /// Why a file gives no navigation data.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum NavigationError {
+    /// More than a navigation file can have.
     #[error("{name}: more than {LARGEST_BYTES} bytes after decompression: expected a RINEX navigation file")]
-    TooLarge { name: String },
+    TooLarge {
+        /// Name of the file.
+        name: String,
+    },
+    /// A file that cannot be decompressed.
     #[error("{name}: damaged gzip data ({detail}): expected a RINEX navigation file, plain or gzip")]
-    Gzip { name: String, detail: String },
+    Gzip {
+        /// Name of the file.
+        name: String,
+        /// What is wrong.
+        detail: String,
+    },
+    /// No RINEX file.
     #[error("{name}: begins with '{found}': expected a first line that ends in RINEX VERSION / TYPE")]
-    NotRinex { name: String, found: String },
+    NotRinex {
+        /// Name of the file.
+        name: String,
+        /// How it begins.
+        found: String,
+    },
+    /// A RINEX file of something else.
     #[error("{name}: a RINEX file of type '{found}': expected navigation data (N)")]
-    NotNavigation { name: String, found: String },
+    NotNavigation {
+        /// Name of the file.
+        name: String,
+        /// Its type.
+        found: String,
+    },
+    /// A record or header that is not as the format has it.
     #[error("{name}: damaged RINEX file ({detail}): expected navigation data of version 2, 3 or 4")]
-    Damaged { name: String, detail: String },
+    Damaged {
+        /// Name of the file.
+        name: String,
+        /// Where and what.
+        detail: String,
+    },
+    /// No set of elements that can be used.
     #[error("{name}: no usable ephemeris of GPS or Galileo: found {found}")]
-    Nothing { name: String, found: String },
+    Nothing {
+        /// Name of the file.
+        name: String,
+        /// What there is instead.
+        found: String,
+    },
 }
 
 /// The whole day of 2010-07-01 as broadcast by GPS: what a scene uses that names no file.
@@ -142,7 +177,7 @@ struct Allowed {
     /// Whether a reference time is one, and what it has to be.
     is_time: fn(f64) -> bool,
     time: &'static str,
-    /// Weeks that the message tells apart.
+    /// Weeks that the message distinguishes.
     weeks: i64,
 }
 

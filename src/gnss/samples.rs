@@ -197,6 +197,7 @@ impl FromStr for Format {
 /// What a data sheet says of a stream of samples; no truth can be written here.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IfMetadata {
+    /// How samples are written.
     pub format: Format,
     /// Samples a second by the recorder's clock.
     pub rate: Rate,

@@ -9,12 +9,19 @@ use thiserror::Error;
 /// A satellite system (RINEX 4.02, table 2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum System {
+    /// GPS, the United States.
     Gps,
+    /// GLONASS, Russia.
     Glonass,
+    /// Galileo, the European Union.
     Galileo,
+    /// BeiDou, China.
     BeiDou,
+    /// QZSS, Japan.
     Qzss,
+    /// NavIC (IRNSS), India.
     Navic,
+    /// Satellite-based augmentation systems.
     Sbas,
 }
 
@@ -59,7 +66,9 @@ impl fmt::Display for System {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Sv {
+    /// The system.
     pub system: System,
+    /// Its number there: the PRN of GPS, the slot of GLONASS.
     pub number: u8,
 }
 

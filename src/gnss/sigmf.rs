@@ -20,13 +20,34 @@ const EXTENSION: &str = "gnss_twin";
 pub enum SigmfError {
     /// Not JSON, or not the objects that SigMF asks for.
     #[error("{name}: not SigMF metadata: {error}")]
-    Syntax { name: String, error: serde_json::Error },
+    Syntax {
+        /// Name of the file.
+        name: String,
+        /// What the parser reports.
+        error: serde_json::Error,
+    },
     /// A needed key is absent.
     #[error("{name}: {key} is missing: expected {expected}")]
-    Missing { name: String, key: &'static str, expected: &'static str },
+    Missing {
+        /// Name of the file.
+        name: String,
+        /// The key.
+        key: &'static str,
+        /// What is expected there.
+        expected: &'static str,
+    },
     /// A key has a value that cannot be used.
     #[error("{name}: {key} is {value}: expected {expected}")]
-    Value { name: String, key: &'static str, value: String, expected: &'static str },
+    Value {
+        /// Name of the file.
+        name: String,
+        /// The key.
+        key: &'static str,
+        /// The value as written.
+        value: String,
+        /// What is expected.
+        expected: &'static str,
+    },
 }
 
 #[derive(Serialize, Deserialize)]

@@ -42,22 +42,53 @@ pub struct Sample {
 /// What a file says about GPS and Galileo: samples by satellite and GPS time (its whole seconds).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Precise {
+    /// Samples of each satellite by GPS time.
     pub satellites: BTreeMap<Sv, BTreeMap<i64, Sample>>,
 }
 
 /// Why a file gives no orbits.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Sp3Error {
+    /// A file that cannot be decompressed.
     #[error("{name}: {source}: expected an SP3 file, plain or gzip")]
-    Packed { name: String, source: InflateError },
+    Packed {
+        /// Name of the file.
+        name: String,
+        /// Why.
+        source: InflateError,
+    },
+    /// No SP3 file.
     #[error("{name}: begins with '{found}': expected an SP3 file of version c or d (#cP… or #dP…)")]
-    NotSp3 { name: String, found: String },
+    NotSp3 {
+        /// Name of the file.
+        name: String,
+        /// How it begins.
+        found: String,
+    },
+    /// A line that is not as the format has it.
     #[error("{name}: damaged SP3 file ({detail}): expected version c or d as the format has it")]
-    Damaged { name: String, detail: String },
+    Damaged {
+        /// Name of the file.
+        name: String,
+        /// Where and what.
+        detail: String,
+    },
+    /// An epoch between two seconds.
     #[error("{name}:{line}: '{found}': expected an epoch at a whole second")]
-    Fraction { name: String, line: usize, found: String },
+    Fraction {
+        /// Name of the file.
+        name: String,
+        /// Its number, from 1.
+        line: usize,
+        /// The epoch.
+        found: String,
+    },
+    /// No orbit that can be used.
     #[error("{name}: no position of a satellite of GPS or Galileo")]
-    Nothing { name: String },
+    Nothing {
+        /// Name of the file.
+        name: String,
+    },
 }
 
 /// Reads an SP3 file, plain or gzip, whose `name` goes into errors.

@@ -27,6 +27,7 @@ pub struct Epoch {
 /// by nanoseconds in truth.
 #[derive(Debug, PartialEq, Eq)]
 pub struct TimeScale {
+    /// Name, such as GPST.
     pub name: &'static str,
     /// Whole seconds by which it is behind GPS time.
     pub behind_gpst_s: i64,
@@ -54,8 +55,11 @@ pub static GST: TimeScale = TimeScale { name: "GST", behind_gpst_s: 0 };
 /// How far one time is ahead of another, whole seconds apart: `a0 + a1 (t − reference)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimePolynomial {
+    /// Seconds ahead at the reference time.
     pub a0_s: f64,
+    /// Rate of that, s/s.
     pub a1_sps: f64,
+    /// Reference time.
     pub reference: Epoch,
 }
 

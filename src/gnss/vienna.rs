@@ -23,10 +23,26 @@ const YEAR_DAYS: f64 = 365.25;
 /// Why a file gives no grid.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ViennaError {
+    /// A file that cannot be decompressed.
     #[error("{name}: {source}: expected a grid, plain or gzip")]
-    Packed { name: String, source: InflateError },
+    Packed {
+        /// Name of the file.
+        name: String,
+        /// Why.
+        source: InflateError,
+    },
+    /// A line that is not as the format has it.
     #[error("{name}:{line}: {found}: expected {expected}")]
-    Line { name: String, line: usize, found: String, expected: String },
+    Line {
+        /// Name of the file.
+        name: String,
+        /// Its number, from 1.
+        line: usize,
+        /// What is there.
+        found: String,
+        /// What is expected.
+        expected: String,
+    },
 }
 
 /// The text of a file, plain or gzip.
@@ -137,14 +153,18 @@ impl<T> Globe<T> {
 /// Coefficients a of the mapping functions at zero height.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MappingA {
+    /// Of dry air.
     pub hydrostatic: f64,
+    /// Of water vapour.
     pub wet: f64,
 }
 
 /// Which mapping functions coefficients a were fitted with: each has b and c of its own.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Vienna {
+    /// Vienna mapping functions 1.
     Vmf1,
+    /// Vienna mapping functions 3.
     Vmf3,
 }
 
@@ -217,14 +237,19 @@ struct Climate {
 /// What GPT3 says of a place at a day of the year.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gpt3Weather {
+    /// Pressure of the air.
     pub pressure_hpa: f64,
+    /// Temperature of the air.
     pub temperature_k: f64,
+    /// Pressure of the water vapour.
     pub vapour_hpa: f64,
     /// Mean temperature of the water vapour above.
     pub mean_temperature_k: f64,
     /// Exponent with which vapour falls off against pressure, less one.
     pub vapour_decrease: f64,
+    /// Coefficients of the mapping functions.
     pub a: MappingA,
+    /// Height of the geoid above the ellipsoid.
     pub undulation_m: f64,
 }
 

@@ -17,9 +17,13 @@ const COLUMNS: &str = "quantity,factor,n,m,mean,annual_cos,annual_sin,semiannual
 /// Coefficients b and c of the continued fractions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MappingBc {
+    /// Second coefficient of dry air.
     pub b_hydrostatic: f64,
+    /// Third coefficient of dry air.
     pub c_hydrostatic: f64,
+    /// Second coefficient of water vapour.
     pub b_wet: f64,
+    /// Third coefficient of water vapour.
     pub c_wet: f64,
 }
 

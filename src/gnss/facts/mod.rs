@@ -81,11 +81,13 @@ pub struct Terms {
     /// Of fixes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fix: Option<Fixes>,
+    /// Of losses of lock.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub losses: Option<Losses>,
     /// Satellites that `losses` is about; absent means all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub satellites: Option<Vec<Sv>>,
+    /// Of the size of the fixes' errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub errors: Option<Sizes>,
     /// Why, in the scene's words.
@@ -95,8 +97,11 @@ pub struct Terms {
 /// Expectations from one time to another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
+    /// When it begins, seconds since the start of the samples.
     pub from_s: f64,
+    /// When it ends.
     pub to_s: f64,
+    /// What is expected meanwhile.
     #[serde(flatten)]
     pub terms: Terms,
 }
@@ -104,8 +109,10 @@ pub struct Interval {
 /// `[expect]`: of the whole scene, and over intervals, which replace what is said of the whole.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Expect {
+    /// Of the whole scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub whole: Option<Terms>,
+    /// Of parts of it; the last one that covers a time counts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub intervals: Vec<Interval>,
 }
@@ -178,7 +185,9 @@ pub struct Fault {
     /// Absent means all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub satellites: Option<Vec<Sv>>,
+    /// When it begins, seconds since the start of the samples.
     pub from_s: f64,
+    /// When it ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to_s: Option<f64>,
 }

@@ -3,7 +3,9 @@
 /// A rectangle of symbols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Interleaver {
+    /// Symbols of a row.
     pub columns: usize,
+    /// Symbols of a column.
     pub rows: usize,
 }
 

@@ -70,7 +70,9 @@ const fn overlay(word: u32) -> [i8; 25] {
 /// Which of the two codes of a satellite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Code {
+    /// Of E1-B, which carries the message.
     Data,
+    /// Of E1-C, which has an overlay.
     Pilot,
 }
 

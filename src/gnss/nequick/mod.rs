@@ -4,7 +4,7 @@
 //! Frequency Users, issue 1.2 (2016). The electrons at a place are three Epstein layers below a peak whose
 //! density and height the ITU's monthly maps give (`maps`, `profile`), and one above it. The delay is
 //! their integral along the straight line to the satellite. Limits: the document takes latitudes and heights
-//! above the ellipsoid for those on a sphere of 6371.2 km, and so does this; GPS time stands for UT, which
+//! above the ellipsoid for those on a sphere of 6371.2 km, and so does this; GPS time is taken for UT, which
 //! moves the Sun by less than 0.1°; the model steps where a month begins and, by a day of the Sun's
 //! declination, at 0 h UT.
 

@@ -31,7 +31,7 @@ impl Sun {
     pub fn new(month: u8, ut_h: f64, ionisation_sfu: f64) -> Self {
         // ITU-R P.371 (2.5.4.4).
         let sunspots = (167_273.0 + (ionisation_sfu - 63.7) * 1123.6).max(0.0).sqrt() - 408.99;
-        // The middle of the month stands for its days (2.5.4.5).
+        // The middle of the month represents its days (2.5.4.5).
         let day = 30.5 * f64::from(month) - 15.0 + (18.0 - ut_h) / 24.0;
         let anomaly_rad = (0.9856 * day - 3.289).to_radians();
         let wobble_deg = 1.916 * libm::sin(anomaly_rad) + 0.020 * libm::sin(2.0 * anomaly_rad) + 282.634;

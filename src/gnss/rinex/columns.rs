@@ -2,10 +2,10 @@
 //! Galileo I/NAV, eight lines with a number or nothing in each field of 19 columns.
 //!
 //! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5, A6 and A8; RINEX 4.02, tables A9, A13 and
-//! A33. Where a line is missing, doubled or cut, or text stands beside the fields, what follows would be read
+//! A33. Where a line is missing, doubled or cut, or text is beside the fields, what follows would be read
 //! into the wrong elements; so such a record is left out and named with its line and column, and so is
-//! whatever cannot be told to be of another system. Records of other systems and messages are counted and not
-//! read.
+//! whatever cannot be recognised as of another system. Records of other systems and messages are counted and
+//! not read.
 
 mod corrections;
 mod numbers;
@@ -113,7 +113,7 @@ impl Record {
     }
 }
 
-/// What stands in a file.
+/// What is in a file.
 #[derive(Default)]
 pub(super) struct Contents {
     pub records: Vec<Record>,

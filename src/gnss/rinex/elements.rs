@@ -10,7 +10,7 @@ use crate::gnss::galileo::inav::sisa_index;
 use crate::gnss::satellite::System;
 use crate::gnss::time::{Epoch, WEEK_S};
 
-/// An element that must stand there and lie within its range, in SI units.
+/// An element that must be there and lie within its range, in SI units.
 fn field(record: &Record, key: &'static str, least: f64, most: f64) -> Result<f64, String> {
     let value = record.get(key).ok_or_else(|| format!("{key} is blank"))?;
     if (least..=most).contains(&value) {

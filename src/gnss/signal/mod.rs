@@ -64,12 +64,14 @@ pub struct Signal {
     pub name: &'static str,
     /// RINEX 3 band and attribute, for `C1C`, `L1C`, `D1C`, `S1C`.
     pub rinex: &'static str,
+    /// Whose satellites send it.
     pub system: System,
     /// By which its codes and messages are timed.
     pub time: &'static TimeScale,
     /// First and last number of the constellation's satellites; codes of others are reserved for other
     /// transmitters.
     pub constellation: [u8; 2],
+    /// Its carrier.
     pub carrier: Carrier,
     /// Least power received on the ground that its documents promise, of all components together; where none
     /// is known a link budget is refused.
@@ -81,7 +83,9 @@ pub struct Signal {
 /// A signal of one satellite. Sorted by satellite, then by signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Link {
+    /// The satellite.
     pub sv: Sv,
+    /// The signal.
     pub signal: &'static Signal,
 }
 
@@ -92,7 +96,9 @@ pub enum Carrier {
     Common(f64),
     /// Frequency division: satellite `n` sends on `centre_hz + step_hz · channel(n)`.
     Channels {
+        /// Carrier of channel 0.
         centre_hz: f64,
+        /// Distance of channels.
         step_hz: f64,
         /// Channel of a satellite by its number; `None` where none is assigned.
         channel: fn(u8) -> Option<i8>,
@@ -115,6 +121,7 @@ pub struct Component {
     pub code: fn(u8) -> Option<Vec<i8>>,
     /// What the waveform of a chip is the sum of.
     pub layers: &'static [Layer],
+    /// Secondary code: a chip for each period of the code.
     pub overlay: Overlay,
     /// What modulates it; a pilot has none.
     pub message: Option<&'static Message>,
@@ -137,12 +144,15 @@ pub struct Layer {
 /// A code of one chip for each period of the spreading code, which it multiplies.
 #[derive(Clone, Copy, Debug)]
 pub enum Overlay {
+    /// No secondary code.
     None,
     /// The same for all satellites: values of ±1.
     Shared(&'static [i8]),
     /// A satellite's own by its number; `chips` values of ±1.
     PerSatellite {
+        /// Length of each.
         chips: u32,
+        /// A satellite's chips; `None` where none are assigned.
         of: fn(u8) -> Option<Vec<i8>>,
     },
 }

@@ -102,7 +102,7 @@ const INTERLEAVER: Interleaver = Interleaver { columns: 30, rows: 8 };
 const REDUNDANT_SINCE_WEEK: i64 = 2243;
 
 /// Type of the word that begins at a time: the nominal sequence of E1-B (4.3.5, table 38). Before 2023 spare
-/// words stand where redundancy does since.
+/// words are where redundancy is since.
 pub fn word_at(start: Epoch) -> u8 {
     let redundant = start.week() >= REDUNDANT_SINCE_WEEK;
     // Almanac words 7 and 8 alternate with 9 and 10 from sub-frame to sub-frame.
@@ -354,7 +354,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent.ephemeris)
 }
 
-/// Parameters by which sets and senders are told apart, and what all satellites say alike.
+/// Parameters by which sets and senders are distinguished, and what all satellites say alike.
 const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
 
 /// Those of words 1 to 5.

@@ -10,7 +10,7 @@ use crate::gnss::fec::reed_solomon::{PARITY, parity, recovered};
 
 /// The words with redundancy, by type.
 pub(super) const REDUNDANT: [u8; 4] = [17, 18, 19, 20];
-/// Octets of one of them, and of what it stands for in one of words 1 to 4.
+/// Octets of one of them, and of what it replaces in one of words 1 to 4.
 const SHARE: usize = 15;
 const DATA: usize = 14;
 /// Octets of type and issue before those of the words.

@@ -37,19 +37,27 @@ const HEALTH_ID: u8 = 51;
 pub struct Almanac {
     /// PRN.
     pub number: u8,
+    /// Eccentricity of the orbit.
     pub eccentricity: f64,
     /// Reference time in its week.
     pub toa_s: f64,
     /// Inclination minus [`ALMANAC_INCLINATION_SEMICIRCLES`].
     pub delta_i_rad: f64,
+    /// Rate of right ascension of the node, rad/s.
     pub omega_dot_radps: f64,
     /// Eight bits: three of the message, five of the signals (IS-GPS-200N, 20.3.3.5.1.3).
     pub health: u8,
+    /// Square root of the semi-major axis, √m.
     pub sqrt_a_sqrtm: f64,
+    /// Longitude of the ascending node at the beginning of the week.
     pub omega0_rad: f64,
+    /// Argument of perigee.
     pub omega_rad: f64,
+    /// Mean anomaly at the reference time.
     pub m0_rad: f64,
+    /// Clock's offset at the reference time.
     pub af0_s: f64,
+    /// Clock's drift, s/s.
     pub af1_sps: f64,
 }
 
@@ -79,15 +87,21 @@ impl Almanac {
 /// GPS time against UTC, as page 18 gives it; weeks modulo 256 (IS-GPS-200N, 20.3.3.5.2.4).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Utc {
+    /// GPS time minus UTC beyond whole seconds at the reference time.
     pub a0_s: f64,
+    /// Its rate, s/s.
     pub a1_sps: f64,
     /// Reference time in its week.
     pub tot_s: f64,
+    /// Week of the reference time, modulo 256.
     pub week: u8,
+    /// GPS time minus UTC in whole seconds.
     pub leap_s: i64,
     /// Week and day (1..=7) at whose end `leap_after_s` takes effect.
     pub event_week: u8,
+    /// Day of that week, 1 to 7.
     pub event_day: u8,
+    /// Whole seconds after the change.
     pub leap_after_s: i64,
 }
 
@@ -107,6 +121,7 @@ pub struct UtcData {
 /// A change of the whole seconds at the end of a day.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeapEvent {
+    /// Whole seconds after the change.
     pub after_s: i64,
     /// Any count of weeks: 8 bits of it are sent.
     pub week: i64,

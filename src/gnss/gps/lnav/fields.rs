@@ -1,4 +1,4 @@
-//! The field table: where each parameter of the message stands, and what its integer means.
+//! The field table: where each parameter of the message is, and what its integer means.
 //!
 //! Source: IS-GPS-200N, figure 20-1 (places) and tables 20-I, 20-III, 20-VI, 20-IX and 20-X (lengths and
 //! scales). A field is read and written through the same entry. Places are the document's: bit 1 is

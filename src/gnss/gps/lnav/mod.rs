@@ -230,7 +230,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent)
 }
 
-/// Parameters by which sets are told apart, and the health, which has a fault of its own.
+/// Parameters by which sets are distinguished, and the health, which has a fault of its own.
 const FIXED_PARAMETERS: [&str; 4] = ["week", "iodc", "iode", "health"];
 
 fn adjustable() -> Vec<&'static str> {
@@ -250,20 +250,53 @@ pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
 /// Why words are no subframe, or subframes no ephemeris.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum SubframeError {
+    /// A word with a wrong bit.
     #[error("word {word} fails its parity")]
-    Parity { word: u8 },
+    Parity {
+        /// Its number, from 1.
+        word: u8,
+    },
+    /// No subframe begins here.
     #[error("the preamble is {found:#04x}: expected 0x8b")]
-    Preamble { found: u32 },
+    Preamble {
+        /// The eight bits there.
+        found: u32,
+    },
+    /// A number that is no subframe's.
     #[error("subframe id {id}: expected {expected}")]
-    Id { id: u8, expected: &'static str },
+    Id {
+        /// The number.
+        id: u8,
+        /// The numbers that are possible.
+        expected: &'static str,
+    },
+    /// A count beyond the week.
     #[error("the count of the time of week is {count}: expected below 100800")]
-    TowCount { count: u32 },
+    TowCount {
+        /// Of 6 s since its beginning.
+        count: u32,
+    },
+    /// Words whose last bits the parity should have made zero.
     #[error("words 2 and 10 do not end like the word before the subframe")]
     Tail,
+    /// Subframes of different sets.
     #[error("issues of data disagree: iodc {iodc}, iode {iode_2} in subframe 2 and {iode_3} in subframe 3")]
-    Issue { iodc: u16, iode_2: i64, iode_3: i64 },
+    Issue {
+        /// Issue of the clock, subframe 1.
+        iodc: u16,
+        /// Issue of the ephemeris in subframe 2 …
+        iode_2: i64,
+        /// … and in subframe 3.
+        iode_3: i64,
+    },
+    /// A reference time that no week has.
     #[error("{name} = {value_s} s is beyond the week")]
-    BeyondWeek { name: &'static str, value_s: i64 },
+    BeyondWeek {
+        /// Name of the field.
+        name: &'static str,
+        /// Its value.
+        value_s: i64,
+    },
 }
 
 /// A subframe whose parity held.
@@ -275,6 +308,7 @@ pub struct Subframe {
     pub tow_count: u32,
     /// The signal's accuracy may be worse than the URA says (IS-GPS-200N, 20.3.3.2).
     pub alert: bool,
+    /// Whether P is encrypted to Y (IS-GPS-200N, 20.3.3.2).
     pub antispoof: bool,
     /// 24 bits a word, inversion removed.
     pub data: [u32; 10],

@@ -1,6 +1,6 @@
 //! Numbers in columns, as FORTRAN writes them.
 
-/// Fields of `width` columns from `start` on, after which nothing may stand; a blank one is `None`.
+/// Fields of `width` columns from `start` on, after which nothing may follow; a blank one is `None`.
 pub(super) fn fields(line: &str, start: usize, width: usize, count: usize) -> Result<Vec<Option<f64>>, String> {
     let end = start + width * count;
     if let Some(at) = line.bytes().skip(end).position(|byte| byte != b' ') {
