@@ -19,6 +19,9 @@ use crate::gnss::signal::{Signal, sinc_squared};
 /// Cells to either side of the nearest one that are drawn, in code and in Doppler.
 const SIDE_LAGS: i32 = 3;
 const SIDE_BINS: i32 = 2;
+/// Lags and bins of the neighbourhood.
+const LAGS: usize = 2 * SIDE_LAGS as usize + 1;
+const BINS: usize = 2 * SIDE_BINS as usize + 1;
 /// Steps of an integral over a sum in which symbols turn.
 const STEPS: u32 = 40;
 
@@ -130,7 +133,7 @@ impl Model {
         let across_doppler = covariance(&bins, &|d| sinc(d * self.doppler_step_hz * self.coherent_s));
         // Neighbours this close are never dependent, so both are positive definite; if not, nothing is found.
         let (Some(code), Some(doppler)) = (across_code.cholesky(), across_doppler.cholesky()) else { return 0.0 };
-        let (code, doppler) = (code.l(), doppler.l());
+        let (code, doppler) = (Factor::<LAGS>::of(&code.l()), Factor::<BINS>::of(&doppler.l()));
         let cn0_hz = libm::pow(10.0, self.cn0_dbhz / 10.0);
         // Correlations of unit noise a component; the floor holds the sidelobes of the signal too.
         let amplitude = (2.0 * self.coherent_s * cn0_hz * chips.share).sqrt();
@@ -146,24 +149,45 @@ impl Model {
             let doppler_hz = doppler_hz.get(draw as usize % doppler_hz.len().max(1)).copied().unwrap_or(0.0);
             let height = |number: &f64| chips.signal((offset - number) * lag, between + number * lag);
             let shape: Vec<f64> = lags.iter().map(height).collect();
-            let mut powers = DMatrix::<f64>::zeros(lags.len(), bins.len());
+            let mut powers = [[0.0; LAGS]; BINS];
             for sum in 0..self.sums {
                 let begin_s = f64::from(sum) * self.coherent_s;
                 let symbols = Symbols { seed, first: u64::from(draw) << 16, edge_s, symbol_s: self.symbol_s };
                 let across: Vec<Complex64> = (bins.iter())
                     .map(|bin| symbols.mean(begin_s, self.coherent_s, doppler_hz - bin * self.doppler_step_hz))
                     .collect();
-                let white = DMatrix::from_fn(lags.len(), bins.len(), |_, _| noise.next());
-                let coloured = code.map(Complex64::from) * white * doppler.transpose().map(Complex64::from);
-                for (column, mean) in across.iter().enumerate() {
-                    for (row, height) in shape.iter().enumerate() {
-                        powers[(row, column)] += (coloured[(row, column)] + mean * height * amplitude).norm_sqr();
+                let mut coloured = [[Complex64::ZERO; LAGS]; BINS];
+                coloured.iter_mut().flatten().for_each(|cell| *cell = noise.next());
+                coloured.iter_mut().for_each(|column| *column = code.times(column));
+                for row in 0..LAGS {
+                    let across_bins = doppler.times(&coloured.map(|column| column[row]));
+                    coloured.iter_mut().zip(across_bins).for_each(|(column, cell)| column[row] = cell);
+                }
+                for ((powers, coloured), mean) in powers.iter_mut().zip(&coloured).zip(&across) {
+                    for ((power, noise), height) in powers.iter_mut().zip(coloured).zip(&shape) {
+                        *power += (noise + mean * height * amplitude).norm_sqr();
                     }
                 }
             }
-            found += u32::from(powers.max() / floor > self.threshold);
+            found += u32::from(powers.iter().flatten().any(|power| power / floor > self.threshold));
         }
         f64::from(found) / f64::from(draws.max(1))
+    }
+}
+
+/// A lower triangle that gives independent numbers a covariance.
+struct Factor<const N: usize>([[f64; N]; N]);
+
+impl<const N: usize> Factor<N> {
+    fn of(matrix: &DMatrix<f64>) -> Self {
+        Self(std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)])))
+    }
+
+    fn times(&self, numbers: &[Complex64; N]) -> [Complex64; N] {
+        std::array::from_fn(|row| {
+            let parts = self.0[row].iter().zip(numbers).take(row + 1);
+            parts.fold(Complex64::ZERO, |sum, (factor, number)| sum + number * *factor)
+        })
     }
 }
 

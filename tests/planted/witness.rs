@@ -1,4 +1,9 @@
-//! The witnesses that hold what both sides share; `tests/witness` has them all.
+//! The witnesses: everything in `gnss` held against something that this project did not write.
+//!
+//! Files that the repository ships are tested everywhere; the rest where `GNSS_TWIN_DATA` points (default
+//! `../shared/data`). What was skipped is listed in the last lines of `cargo test`
+//! (`tests/witness_skips.rs`). They are tests of this target because most planted faults of `gnss` are theirs
+//! to notice, and one target compiles and runs them once.
 
 #[path = "../witness/atmosphere.rs"]
 mod atmosphere;
@@ -16,7 +21,11 @@ mod orbit;
 mod printed;
 #[path = "../witness/pseudorange.rs"]
 mod pseudorange;
+#[path = "../witness/recording.rs"]
+mod recording;
 #[path = "../witness/reduced.rs"]
 mod reduced;
 #[path = "../witness/redundancy.rs"]
 mod redundancy;
+#[path = "../witness/stability.rs"]
+mod stability;

@@ -186,11 +186,14 @@ impl Waveform {
     /// One period of a layer, `per_chip` steps to each chip.
     fn steps(&self, layer: &Layer, per_chip: usize) -> Vec<i8> {
         let each = per_chip / layer.pulse.len().max(1);
-        let chip = |(index, &chip): (usize, &i8)| {
+        let mut steps = Vec::with_capacity(self.chips.len() * per_chip);
+        for (index, &chip) in self.chips.iter().enumerate() {
             let chip = if layer.covers(index) { chip } else { 0 };
-            layer.pulse.iter().flat_map(move |&step| std::iter::repeat_n(chip * step, each))
-        };
-        self.chips.iter().enumerate().flat_map(chip).collect()
+            for &step in layer.pulse {
+                steps.extend(std::iter::repeat_n(chip * step, each));
+            }
+        }
+        steps
     }
 }
 

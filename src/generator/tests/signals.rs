@@ -155,11 +155,21 @@ impl Definition {
     }
 }
 
+/// A waveform's sequences behind an edge, and the gain that they have there.
+fn voices(waveform: &Waveform, edge: Edge<'_>, rate_hz: f64) -> (Vec<Voice>, f64) {
+    (waveform.voices(edge, rate_hz).unwrap(), 1.0 / waveform.power(edge, rate_hz).sqrt())
+}
+
 /// The sequences' sum at `samples` instants `1 / rate_hz` apart from `start` on, without gain.
-fn rendered(waveform: &Waveform, edge: Edge<'_>, start: Epoch, rate_hz: f64, samples: usize) -> Vec<Complex64> {
-    let gain = 1.0 / waveform.power(edge, rate_hz).sqrt();
+fn rendered(
+    (voices, gain): &(Vec<Voice>, f64),
+    edge: Edge<'_>,
+    start: Epoch,
+    rate_hz: f64,
+    samples: usize,
+) -> Vec<Complex64> {
     let mut sum = vec![Complex64::ZERO; samples];
-    for Voice { spreading, amplitude, phase_cycles } in waveform.voices(edge, rate_hz).unwrap() {
+    for Voice { spreading, amplitude, phase_cycles } in voices {
         let step = (spreading.pace().step_rate_hz() / rate_hz * CODE_ONE as f64) as u64;
         let mut bits = Vec::new();
         let position = spreading.strip(spreading.at(start, 0.0), step, samples, |_| false, &mut bits);
@@ -182,16 +192,19 @@ fn every_component_is_its_definition_with_every_edge() {
             let waveform = Waveform::new(signal.link(sv), index).unwrap().unwrap();
             let behind_s = signal.time.behind_gpst_s;
             for rate_hz in [2.6e6, 26.123e6] {
+                let power = waveform.power(Edge::Nearest, rate_hz) * definition.scale * definition.scale;
+                assert!((power - 1.0).abs() < 1e-12, "{signal} {index}: {power}");
+                let edges = [Edge::Nearest, Edge::Area, Edge::BandLimited(&filter)];
+                let edges = edges.map(|edge| (edge, voices(&waveform, edge, rate_hz)));
                 // Across the beginning of a week, of periods of 4 ms, 0.1 s, 1.5 s and 18 s, and away from
                 // any.
                 for (seconds, after_s) in [(0, 0.0), (3, 0.3), (18, 0.0), (1, 0.5), (374_400, 0.004), (7, 0.123_456_7)]
                 {
                     let at = |n: f64| Epoch::new(WEEK + seconds + behind_s, after_s + (n - 60.3) / rate_hz);
-                    for edge in [Edge::Nearest, Edge::Area, Edge::BandLimited(&filter)] {
-                        let found = rendered(&waveform, edge, at(0.0), rate_hz, 140);
+                    for (edge, voices) in &edges {
+                        let edge = *edge;
+                        let found = rendered(voices, edge, at(0.0), rate_hz, 140);
                         let scale = definition.scale;
-                        let power = waveform.power(Edge::Nearest, rate_hz);
-                        assert!((power * scale * scale - 1.0).abs() < 1e-12, "{signal} {index}: {power}");
                         for (n, found) in found.into_iter().enumerate() {
                             let (expected, next) = definition.sample(edge, at(n as f64), rate_hz);
                             // A place is rounded to 1e-16 s or 3e-9 steps on both sides; on an edge either is
@@ -343,7 +356,8 @@ fn composites_have_the_envelope_that_their_components_give() {
             let waveform = Waveform::new(signal.link(Sv { system: signal.system, number: 2 }), index).unwrap().unwrap();
             let gain = (component.power_share / waveform.power(Edge::Nearest, 26.123e6)).sqrt();
             let factor = Complex64::from_polar(gain, TAU * component.phase_cycles);
-            let made = rendered(&waveform, Edge::Nearest, Epoch::new(WEEK, 0.25), 26.123e6, sum.len());
+            let voices = voices(&waveform, Edge::Nearest, 26.123e6);
+            let made = rendered(&voices, Edge::Nearest, Epoch::new(WEEK, 0.25), 26.123e6, sum.len());
             sum.iter_mut().zip(made).for_each(|(sum, value)| *sum += factor * value);
         }
         for envelope in envelopes {

@@ -29,15 +29,15 @@ fn record(rate_hz: f64, samples: usize, sent: Option<(u8, f64, f64, f64)>, rando
         sent.map(|(number, ..)| [e1::Code::Data, e1::Code::Pilot].map(|which| e1::code(which, number).unwrap()));
     let signs: Vec<[f64; 2]> =
         (0..64).map(|_| [0, 1].map(|_| if random.uniform() < 0.5 { -1.0 } else { 1.0 })).collect();
+    let amplitude = sent.map_or(0.0, |(_, cn0_dbhz, ..)| (libm::pow(10.0, cn0_dbhz / 10.0) / rate_hz / 2.0).sqrt());
     for n in 0..samples {
         let (a, b) = random.pair();
         let mut x = Complex::new(a, b) * 0.5_f64.sqrt();
-        if let (Some((_, cn0_dbhz, doppler_hz, phase)), Some([data, pilot])) = (sent, &codes) {
+        if let (Some((.., doppler_hz, phase)), Some([data, pilot])) = (sent, &codes) {
             let chips = phase + n as f64 * 1.023e6 / rate_hz * (1.0 + doppler_hz / E1.centre_hz());
             let square = |rate: f64| if ((chips * rate * 2.0) as u64).is_multiple_of(2) { 1.0 } else { -1.0 };
             let (one, six) = ((10.0_f64 / 11.0).sqrt() * square(1.0), (1.0_f64 / 11.0).sqrt() * square(6.0));
             let (chip, [d, p]) = (chips as usize % 4092, signs[chips as usize / 4092]);
-            let amplitude = (libm::pow(10.0, cn0_dbhz / 10.0) / rate_hz / 2.0).sqrt();
             let value = d * f64::from(data[chip]) * (one + six) - p * f64::from(pilot[chip]) * (one - six);
             let (sin, cos) = libm::sincos(TAU * (doppler_hz * n as f64 / rate_hz + 0.3).fract());
             x += Complex::new(cos, sin) * (amplitude * value);
