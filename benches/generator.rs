@@ -36,10 +36,10 @@ const CLOCK: &str = "[receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n";
 const NOISE: &str = "[noise]\n";
 
 /// Processor time of this thread in seconds, which other programs on the machine disturb less than the clock
-/// on the wall; the latter where the system does not tell.
+/// on the wall; the latter where the system does not report it.
 fn busy_s(start: Instant) -> f64 {
-    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    let ns = told.and_then(|text| text.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()));
+    let reported = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let ns = reported.and_then(|text| text.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()));
     ns.map_or_else(|| start.elapsed().as_secs_f64(), |ns| ns * 1e-9)
 }
 
@@ -216,7 +216,7 @@ fn formats(lines: &mut Vec<Line>) {
     }
 }
 
-/// Median time of one call, in ns. A turn lasts about 0.1 s: the system tells processor time in steps of
+/// Median time of one call, in ns. A turn lasts about 0.1 s: the system reports processor time in steps of
 /// milliseconds.
 fn nanoseconds(mut call: impl FnMut()) -> f64 {
     (0..200).for_each(|_| call());
@@ -415,7 +415,7 @@ fn output_of(program: &str, arguments: &[&str]) -> String {
     found.map_or_else(String::new, |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
 }
 
-/// Replaces what stands between the marks of `reports/performance.md`.
+/// Replaces what is between the marks of `reports/performance.md`.
 fn publish(lines: &[Line], split: usize, profile: &[Line]) {
     const HEAD: &str = "|figure|value|unit|bar|met|\n|---|---|---|---|---|\n";
     let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();

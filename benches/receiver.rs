@@ -369,7 +369,7 @@ fn output_of(program: &str, arguments: &[&str]) -> String {
     found.map_or_else(String::new, |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
 }
 
-/// Replaces what stands between two marks of `reports/performance.md`.
+/// Replaces what is between two marks of `reports/performance.md`.
 fn publish(text: &str) {
     let path = Path::new("reports/performance.md");
     let page = std::fs::read_to_string(path).expect("the page");

@@ -10,7 +10,7 @@
 //! - [`analysis`] is the judge: it joins what the receiver found with the truth on
 //!   (sample number, satellite, signal) and measures every error.
 //!
-//! Above the three stand [`twin`], which closes the loop, and [`study`]: the receiver's loops on modelled
+//! Above the three are [`twin`], which closes the loop, and [`study`]: the receiver's loops on modelled
 //! correlations, compared with the judge's theory.
 //!
 //! Results are values: the generator iterates samples with their truth, the receiver returns records, and

@@ -13,8 +13,10 @@ const TWIN: &str = env!("CARGO_BIN_EXE_gnss-twin");
 fn workplace(duration_s: f64) -> tempfile::TempDir {
     let directory = tempfile::tempdir().unwrap();
     let scene = format!(
-        "name = \"tiny\"\nstart = 2010-07-01T08:05:58\nduration_s = {duration_s}\nseed = 1\n[motion]\nkind = \"static\"\n\
-         latitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n\
+        "name = \"tiny\"\nstart = 2010-07-01T08:05:58\nduration_s = {duration_s}\nseed = 1\n[motion]\nkind \
+         = \"static\"\n\
+         latitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n[front_end]\nsample_rate_hz = 2.6e6\nformat \
+         = \"ci8\"\n\
          [power]\ncn0_dbhz = 45\n[noise]\n"
     );
     fs::write(directory.path().join("tiny.toml"), scene).unwrap();

@@ -240,10 +240,10 @@ fn spur_dbc(tested: &[Complex<f32>], base: &[Complex<f32>]) -> f64 {
 }
 
 /// Processor time of this thread in seconds, which other programs on the machine disturb less than the clock
-/// on the wall; the latter where the system does not tell.
+/// on the wall; the latter where the system does not report it.
 fn busy_s(start: Instant) -> f64 {
-    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    let ns = told.and_then(|text| text.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()));
+    let reported = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let ns = reported.and_then(|text| text.split_whitespace().next().and_then(|x| x.parse::<f64>().ok()));
     ns.map_or_else(|| start.elapsed().as_secs_f64(), |ns| ns * 1e-9)
 }
 

@@ -73,7 +73,9 @@ pub struct Run {
 
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Examples:\n  gnss-twin generate scenarios/static.toml --out static.sigmf-data --format ci16\n  gnss-twin generate scenarios/static.toml --out - | hackrf_transfer -t - -f 1575420000 -s 2600000\n  gnss-twin generate scenarios/static.toml --out rtl-tcp:1234 --truth static.truth"
+    after_help = "Examples:\n  gnss-twin generate scenarios/static.toml --out static.sigmf-data --format ci16\n  \
+                  gnss-twin generate scenarios/static.toml --out - | hackrf_transfer -t - -f 1575420000 -s \
+                  2600000\n  gnss-twin generate scenarios/static.toml --out rtl-tcp:1234 --truth static.truth"
 )]
 pub struct Generate {
     /// Scene to generate

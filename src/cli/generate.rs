@@ -43,7 +43,8 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     if scenes.len() > 1 && stream.is_some() {
         let names: Vec<&str> = scenes.iter().filter_map(|scene| scene.front_end_name.as_deref()).collect();
         return Err(CliError::usage(format!(
-            "--out {}: a stream carries one front end, and the scene has several: choose with --front-end NAME one of {}",
+            "--out {}: a stream carries one front end, and the scene has several: choose with --front-end NAME one \
+             of {}",
             shown(&arguments.out),
             names.join(", ")
         )));

@@ -153,9 +153,9 @@ mod tests {
     fn the_rocket_passes_with_its_own_settings_and_is_warned_of_with_the_defaults() {
         let rocket = include_str!("../../scenarios/high_dynamics.toml");
         assert_eq!(warning(rocket, None), None);
-        let told = warning(rocket, Some(TrackingSettings::default())).unwrap();
-        assert!(told.contains("[receiver.tracking] pll_bandwidth_hz = 35, integration = 2 would"), "{told}");
-        assert!(told.contains("20.") && told.contains("expect cycle slips"), "{told}");
+        let warned = warning(rocket, Some(TrackingSettings::default())).unwrap();
+        assert!(warned.contains("[receiver.tracking] pll_bandwidth_hz = 35, integration = 2 would"), "{warned}");
+        assert!(warned.contains("20.") && warned.contains("expect cycle slips"), "{warned}");
     }
 
     #[test]

@@ -140,7 +140,7 @@ fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }:
 }
 
 /// Whether `sv` is in the scene's sky when the receiver's clock reads `local`: it has a message to send and
-/// stands above the mask, or from space not behind the Earth. Health is the scene's to judge, through its
+/// is above the mask, or from space not behind the Earth. Health is the scene's to judge, through its
 /// exclusions.
 ///
 /// # Errors

@@ -7,7 +7,7 @@
 //! a metre or two, so the truth passes from one to the next over [`BLEND_S`]: the received phase
 //! stays smooth and the decoded set stays right to that metre.
 //!
-//! Records that their neighbours contradict are left out ([`Catalogue::new`]). Precise orbits may stand in
+//! Records that their neighbours contradict are left out ([`Catalogue::new`]). Precise orbits may step in
 //! for the true ones ([`Catalogue::follow`]), and faults add to either ([`Catalogue::depart`]); what is sent
 //! stays as it is.
 

@@ -171,7 +171,7 @@ impl Fidelity {
             .unwrap_or(Self { code_edge: CodeEdge::BandLimited, ..level })
     }
 
-    /// Error of a code whose phase stands still on the sampling grid, root mean square over phases, in
+    /// Error of a code whose phase is at rest on the sampling grid, root mean square over phases, in
     /// metres: measured, and for area edges computed.
     pub fn code_bias_m(&self, rate_hz: f64) -> f64 {
         let near = |at: [(f64, f64); 3]| {
@@ -210,14 +210,14 @@ impl Fidelity {
     }
 }
 
-/// Largest error of a standing code that `balanced` leaves, whatever the noise.
+/// Largest error of a code at rest that `balanced` leaves, whatever the noise.
 const LARGEST_BIAS_M: f64 = 0.2;
 /// Cycles of L1 in a chip: how much slower the code moves than the carrier.
 const CARRIER_CYCLES_PER_CHIP: f64 = 1540.0;
 /// Noise bandwidth of the code loop behind which the plan states a moving code's error.
 const LOOP_HZ: f64 = 0.5;
 
-/// Error of a standing code with area edges, root mean square over codes and phases, in metres.
+/// Error of a code at rest with area edges, root mean square over codes and phases, in metres.
 ///
 /// A mean over the sample's interval is a filter sinc(f/fs) before sampling, and what it leaves above half
 /// the rate folds back as a code of its own. An ideal early-minus-late correlator (half a chip) weighs line m
@@ -256,7 +256,7 @@ const FOLDS: i32 = 4;
 /// Thermal noise of a loop of bandwidth B with correlators d chips apart is √(B·d / (2·C/N0)) chips where
 /// T·C/N0 is far above one (Kaplan & Hegarty, equation 5.23, first branch). With 1 Hz and half a chip it is
 /// 0.2 m at 57 dB-Hz: above what any GPS signal reaches on the ground (52 dB-Hz, 0.37 m), so that only
-/// signals set stronger than nature's ask for less. Without noise nothing hides an error, and the 0.2 m stand
+/// signals set stronger than nature's ask for less. Without noise nothing hides an error, and the 0.2 m apply
 /// by themselves.
 pub fn allowed_m(cn0_dbhz: Option<f64>) -> f64 {
     const BANDWIDTH_HZ: f64 = 1.0;
@@ -314,8 +314,8 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool) -> Vec<Choice> {
             value: chosen.code_edge.name().to_owned(),
             own: chosen.code_edge != level.code_edge,
             error: format!(
-                "pseudorange {:.1e} m rms at {:.3} Msps where the code stands, {:.1e} m at 1 kHz of Doppler behind a \
-                 loop of {LOOP_HZ} Hz (balanced: below {:.1e} m)",
+                "pseudorange {:.1e} m rms at {:.3} Msps where the code is at rest, {:.1e} m at 1 kHz of Doppler \
+                 behind a loop of {LOOP_HZ} Hz (balanced: below {:.1e} m)",
                 chosen.code_bias_m(rate_hz),
                 1e-6 * rate_hz,
                 chosen.moving_bias_m(rate_hz, 1000.0),

@@ -176,7 +176,7 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
                     });
                 }
                 // It came back (a vehicle that goes round the Earth): in view to the end, as far as this
-                // table tells.
+                // table says.
                 (Presence::InView(_), Some(row)) => row.leaves = None,
                 (_, Some(row)) if row.leaves.is_none() => {
                     row.leaves = end.map(|by| (change_s(scene, sv, t_s, by, |silence| silence.from), by));

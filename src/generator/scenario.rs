@@ -2,7 +2,7 @@
 //!
 //! [`Scenario::parse`] holds each key and each value against its declaration ([`keys::SCENARIO`]) and
 //! collects what is wrong; [`Scenario::compose`] checks what concerns several of them, loads files and makes
-//! a [`Scene`](crate::generator::scene::Scene). Units stand in the names of the keys: degrees and dB here,
+//! a [`Scene`](crate::generator::scene::Scene). Units are in the names of the keys: degrees and dB here,
 //! radians and ratios from here on. `[receiver]` is kept as written for the receiver's own settings.
 
 mod attitude;
@@ -149,7 +149,7 @@ pub enum ScenarioError {
 }
 
 impl ScenarioError {
-    /// The message without its place, for a document that stands nowhere as it was read.
+    /// The message without its place, for a document that is in no file as it was read.
     pub fn without_place(&self) -> String {
         let whole = self.to_string();
         let place = match self {
@@ -233,7 +233,7 @@ pub struct Scenario {
     pub ionosphere: Option<Ionosphere>,
     /// The troposphere; absent means none.
     pub troposphere: Option<NeutralAtmosphere>,
-    /// What stands in the way; buildings are measured from where the motion starts.
+    /// Obstructions; buildings are measured from where the motion starts.
     pub obstacles: Vec<Obstacle>,
     /// Scintillation; absent means none.
     pub scintillation: Option<Strength>,
@@ -457,7 +457,7 @@ fn fidelity_of(table: Option<&Table<'_>>, rate: Rate, allowed_m: f64) -> Result<
     })
 }
 
-/// The receiver's table as it stands, through the ordinary parser.
+/// The receiver's table as written, through the ordinary parser.
 fn receiver(root: &Table<'_>, text: &str) -> Result<Option<toml::Table>, toml::de::Error> {
     if !root.has("receiver") {
         return Ok(None);

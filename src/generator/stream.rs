@@ -80,7 +80,7 @@ impl fmt::Display for Generated {
         write!(f, "; the carrier is up to {worst:.1e} cycles off between {} knots, ", self.knots)?;
         let left = 100.0 * (1.0 - worst / allowed);
         if worst > allowed {
-            write!(f, "beyond the {allowed:e} that the scene allows: knots stand no closer")
+            write!(f, "beyond the {allowed:e} that the scene allows: knots are no closer")
         } else {
             write!(f, "{left:.0} % below what the scene allows, {allowed:e}")
         }

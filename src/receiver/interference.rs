@@ -93,9 +93,9 @@ impl Watch {
         }
     }
 
-    /// Takes the next block and reports to `told` every spectrum that it completes: the number of its first
+    /// Takes the next block and reports to `each` every spectrum that it completes: the number of its first
     /// sample, and its strongest line if it has one. `strongest_cn0_hz` is that of the satellites followed.
-    pub fn take(&mut self, block: &Packed, strongest_cn0_hz: f64, mut told: impl FnMut(u64, Option<LineRow>)) {
+    pub fn take(&mut self, block: &Packed, strongest_cn0_hz: f64, mut each: impl FnMut(u64, Option<LineRow>)) {
         let bins = self.window.len();
         loop {
             let begins = self.rate.first_sample_at(self.number * INTERVAL_MS, 1000);
@@ -119,7 +119,7 @@ impl Watch {
                 self.number += 1;
             }
             if self.segments == SEGMENTS {
-                told(self.first, self.judge(strongest_cn0_hz));
+                each(self.first, self.judge(strongest_cn0_hz));
                 self.powers.fill(0.0);
                 self.segments = 0;
             }
@@ -187,11 +187,11 @@ impl Watch {
         sorted.sort_by(f64::total_cmp);
         let usual = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(0.0);
         let share = |line: &Line| if usual > 0.0 { (density[line.bin] / usual).min(1.0) } else { 1.0 };
-        let told: Vec<(f64, Line)> = (lines.into_iter())
+        let found: Vec<(f64, Line)> = (lines.into_iter())
             .map(|line| (jn0_hz(&line), line))
             .filter(|(power_hz, line)| *power_hz * share(line) > OWN_LINE * strongest_cn0_hz)
             .collect();
-        let (power_hz, line) = told.iter().max_by(|a, b| a.0.total_cmp(&b.0)).copied()?;
+        let (power_hz, line) = found.iter().max_by(|a, b| a.0.total_cmp(&b.0)).copied()?;
         Some(LineRow {
             sample: self.first,
             frequency_hz: bin_hz * self.place(line.bin),
@@ -199,7 +199,7 @@ impl Watch {
             js_db: None,
             statistic: line.statistic,
             threshold: self.threshold,
-            lines: told.len() as u32,
+            lines: found.len() as u32,
             resolution_hz: bin_hz,
         })
     }
@@ -311,7 +311,7 @@ mod tests {
             });
             assert!(!rows.is_empty());
             for row in rows {
-                let row = row.expect("told");
+                let row = row.expect("reported");
                 assert!((row.frequency_hz - f_hz).abs() < 0.3 * row.resolution_hz, "{row:?}");
                 // Ten segments at 15 dB over a bin: 0.7 dB, two sigma and the lobe's tails.
                 assert!((row.jn0_dbhz - 45.0).abs() < 1.5 && row.lines == 1, "{row:?}");

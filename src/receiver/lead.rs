@@ -54,7 +54,7 @@ pub fn refusal(signal: &'static Signal) -> Option<String> {
         return Some("none of its codes has fewer than 32 768 steps a period".to_owned());
     };
     if component.message.is_some() && component.overlay.periods() > 1 {
-        return Some("its data have an overlay code, and no pilot beside them shows where it stands".to_owned());
+        return Some("its data have an overlay code, and no pilot beside them shows where it begins".to_owned());
     }
     if component.message.is_none() && component.overlay.periods() == 1 {
         return Some("its pilot has no overlay code that shows where the data beside it begin".to_owned());

@@ -246,9 +246,10 @@ pub fn detections(
             return;
         }
         let offset_hz = step_hz * OFFSETS[made as usize % OFFSETS.len()];
-        // What appears at 0 Hz is told wrong by the Doppler, but for the offset.
-        let told = IfMetadata { center_hz: metadata.center_hz - doppler_hz + offset_hz, ..metadata.clone() };
-        let rows = Searcher::new(&told, settings).and_then(|mut s| s.search(block, &[L1_CA.link(Sv::gps(PRESENT))]));
+        // What appears at 0 Hz is declared wrong by the Doppler, but for the offset.
+        let declared = IfMetadata { center_hz: metadata.center_hz - doppler_hz + offset_hz, ..metadata.clone() };
+        let rows =
+            Searcher::new(&declared, settings).and_then(|mut s| s.search(block, &[L1_CA.link(Sv::gps(PRESENT))]));
         match rows {
             Ok(rows) => {
                 made += 1;

@@ -270,7 +270,7 @@ fn values_that_contradict_each_other_are_refused_with_the_number_that_decides() 
                                              1"), "comes with s4 = 0.9"),
         ("a roll along the velocity", format!("{moving}[attitude]\nkind = \"velocity\"\nroll_deg = 3\n"), "keeps the \
                                                                                                            right side level"),
-        ("a velocity that is none", add("[attitude]\nkind = \"velocity\""), "stands still"),
+        ("a velocity that is none", add("[attitude]\nkind = \"velocity\""), "is at rest"),
         ("holding while moving", moving.replace("speed_mps = 5", "speed_mps = 5\nhold_s = 3"), "speed_mps is not 0"),
         ("two laws of turning", moving.replace("[[motion.point]]\nlatitude_deg = 26.5\n", "turn_radius_m = 5\n\
                                                                                            turn_acceleration_mps2 = 2\n[[motion.point]]\nlatitude_deg = 26.5\n"), "only one of"),

@@ -116,7 +116,8 @@ pub const ORDER: Order<'static> = &[
     (
         "analysis/judge",
         &[
-            &["forecast", "foreign", "integrity", "judgement", "schema"],
+            &["schema"],
+            &["forecast", "foreign", "integrity", "judgement"],
             &["verdict", "limits"],
             &["summary"],
             &["rules"],

@@ -29,7 +29,8 @@ impl Pipe {
         let stdout = io::stdout();
         if stdout.is_terminal() {
             return Err(CliError::usage(
-                "standard output is a terminal: send the samples through a pipe or into a file, as in `--out - | hackrf_transfer -t -`",
+                "standard output is a terminal: send the samples through a pipe or into a file, as in `--out - | \
+                 hackrf_transfer -t -`",
             ));
         }
         // Beside the library's own, which looks for ends of lines.

@@ -30,12 +30,12 @@ impl Nodes {
         Self::of(Rate::MEGAHERTZ)
     }
 
-    /// The rate whose ticks they stand on.
+    /// The rate of their ticks.
     pub fn rate(self) -> Rate {
         self.rate
     }
 
-    /// Where a sample of a clock stands among them: number of the node before it, and the share of the way to
+    /// The place of a sample of a clock among them: number of the node before it, and the share of the way to
     /// the next.
     pub fn at(self, rate: Rate, sample: u64) -> (u64, f64) {
         if rate == self.rate {
@@ -75,7 +75,7 @@ impl Nodes {
         self.rate.elapsed_s(node * self.ticks)
     }
 
-    /// A clock that reads `start` at sample 0, and ticks where nodes stand.
+    /// A clock that reads `start` at sample 0, and ticks where nodes are.
     pub fn clock(self, clock: SampleClock) -> SampleClock {
         SampleClock { rate: self.rate, ..clock }
     }

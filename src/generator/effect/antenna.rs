@@ -159,7 +159,7 @@ pub enum PatternError {
         row: usize,
         /// Its column.
         column: &'static str,
-        /// The value that stands there.
+        /// The value that is there.
         value: f64,
         /// What is expected.
         expected: &'static str,
@@ -198,7 +198,7 @@ struct Row {
 }
 
 impl Table {
-    /// Reads a CSV table; `name` stands in errors. Directions may come in any order but must make a whole
+    /// Reads a CSV table; `name` is used in errors. Directions may come in any order but must make a whole
     /// grid.
     ///
     /// # Errors

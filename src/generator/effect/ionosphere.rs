@@ -6,7 +6,7 @@
 //! [`FADE_RAD`] of its phase, and where local time wraps at midnight inside a bulge longer than 40 h, one
 //! day passes into the next over [`MIDNIGHT_S`]. Elsewhere the delay is the printed one to the last bit.
 //! Limits: where the bulge ends the fade departs from the printed delay by up to 0.16 m. The printed model's
-//! shell is a sphere on which the user's geodetic latitude stands for the geocentric one, which moves the
+//! shell is a sphere on which the user's geodetic latitude replaces the geocentric one, which moves the
 //! delay by up to 0.13 m. The model is meant for users below the ionosphere; it is applied in full below 350
 //! km, fades to zero at 1000 km and is absent above.
 

@@ -1,7 +1,7 @@
 //! Multipath: copies of the direct ray that come later, with an amplitude and a phase of their own.
 //!
 //! A reflected ray's code and carrier are delayed by the same excess δ, so its carrier is −δ/λ cycles against
-//! the direct one and fading, at δ̇/λ, is coherent with the code; what the surface adds to the phase stands
+//! the direct one and fading, at δ̇/λ, is coherent with the code; what the surface adds to the phase stays
 //! beside it. Planes reflect plane waves: δ = 2 h sin e above ground of distance h, and 2 d cos e cos(a −
 //! a_w) before a wall at distance d, in direction a_w, that the wave passes first. Limits: surfaces are
 //! endless, smooth and reflect once; no diffraction, no shadow; `amplitude` is what the antenna makes of the

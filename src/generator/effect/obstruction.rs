@@ -1,4 +1,4 @@
-//! What stands between antenna and sky: a horizon by azimuth, a sector up to a roof, or buildings by their
+//! What obstructs the sky: a horizon by azimuth, a sector up to a roof, or buildings by their
 //! place.
 //!
 //! Horizon and sector take their loss from power within an edge of given width. A building is four walls;
@@ -17,7 +17,7 @@ use crate::generator::ray::{Effect, Ray, Sight};
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
 use crate::gnss::signal::Signal;
 
-/// A thing that stands in the way.
+/// An obstruction.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Obstacle {
     /// Everything below a line given by azimuth (ascending, in [0, 2π)) and elevation, straight between its
@@ -47,7 +47,7 @@ pub enum Obstacle {
     Building(Building),
 }
 
-/// A box that stands on the ground, by metres east, north and up of where the motion starts.
+/// A box on the ground, by metres east, north and up of where the motion starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Building {
     /// From and to, east of the scene's first place.
@@ -60,10 +60,10 @@ pub struct Building {
     pub share: f64,
 }
 
-/// Everything that stands in the way of the direct ray.
+/// Everything that obstructs the direct ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obstruction {
-    /// What stands in the way.
+    /// The obstructions.
     pub obstacles: Vec<Obstacle>,
     /// ECEF place that buildings are measured from, and the matrix to its east, north and up.
     origin_m: Vector3<f64>,
@@ -247,7 +247,7 @@ mod tests {
         let points_rad =
             [(10.0, 20.0), (180.0, 40.0), (350.0, 10.0)].map(|(a, e): (f64, f64)| (a.to_radians(), e.to_radians()));
         let mask = |share: f64| Obstacle::Horizon { points_rad: points_rad.to_vec(), edge_rad: 0.01, share };
-        // North lies half way between 350° and 10°: 15°. Half way up the first side, 95°, stands 30°.
+        // North lies half way between 350° and 10°: 15°. Half way up the first side, 95°, is 30°.
         for (azimuth, elevation, expected) in [
             (0.0, 14.0, 0.0),
             (0.0, 16.0, 1.0),
@@ -286,7 +286,7 @@ mod tests {
 
     #[test]
     fn a_building_shades_what_geometry_says_and_six_decibels_at_its_edges() {
-        // 20 m to the north, 30 m wide, 20 m above the antenna: the roof stands at 45°, the corners at
+        // 20 m to the north, 30 m wide, 20 m above the antenna: the roof is at 45°, the corners at
         // ±atan(15/20).
         let building = Building { east_m: [-15.0, 15.0], north_m: [20.0, 60.0], top_m: 20.0, share: 0.0 };
         let loss = |azimuth: f64, elevation: f64| building.loss_db(&Vector3::zeros(), look(azimuth, elevation), L1_HZ);

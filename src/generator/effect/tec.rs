@@ -85,11 +85,11 @@ impl Shell {
 pub enum Content {
     /// The same above every place at every time, in TEC units.
     Constant(f64),
-    /// Off maps, in which the time of the scene stands `later_s` later.
+    /// Off maps, in which the time of the scene is `later_s` later.
     Maps {
         /// The maps of the file.
         maps: Box<Maps>,
-        /// By how much the scene's time stands later in the maps.
+        /// By how much the scene's time is later in the maps.
         later_s: f64,
         /// How values between two maps are found.
         interpolation: Interpolation,

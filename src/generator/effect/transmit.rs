@@ -5,7 +5,7 @@
 //! after the manufacturer's measurements (Marquis and Reigh 2015, Navigation 62), each the mean of a few
 //! satellites. Which satellite is of which block: the constellation list of the National
 //! Geospatial-Intelligence Agency of July 2011, which differs from that of July 2010 in PRN 1 alone. Limits:
-//! patterns end at 30°, beyond which their last gain stands: users above the satellites see it too high or
+//! patterns end at 30°, beyond which their last gain applies: users above the satellites see it too high or
 //! too low by a side lobe, some 10 dB.
 
 use super::antenna::Curve;

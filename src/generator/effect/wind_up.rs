@@ -4,8 +4,8 @@
 //! nominally, its x axis towards the Sun. The received carrier grows (as with range) when the antenna turns
 //! right-handed about the direction in which the wave travels.
 //!
-//! Turns are counted, not unwrapped. A pair of crossed dipoles whose axis stands β off the spin axis hears a
-//! satellite that stands θ off that axis as `(cos θ/2 cos β/2 e^{jx/2} + sin θ/2 sin β/2 e^{-jx/2})²`, x its
+//! Turns are counted, not unwrapped. A pair of crossed dipoles whose axis is β off the spin axis receives a
+//! satellite that is θ off that axis as `(cos θ/2 cos β/2 e^{jx/2} + sin θ/2 sin β/2 e^{-jx/2})²`, x its
 //! azimuth about the axis. For θ + β below 180° the phase is therefore `x + 2 arg(1 + tan θ/2 tan β/2
 //! e^{-jx})`, whose second term never leaves ±180°; beyond, the first term's sign turns round. What is left
 //! is slow and stays within half a cycle of its value at the start, headings counted. Limits: a satellite
@@ -220,7 +220,7 @@ mod tests {
     #[test]
     fn the_sun_stands_where_the_almanac_says() {
         // Equinox of 2010-03-20 17:32 UTC: declination 0. Noon at Greenwich on 2010-07-01: the equation of
-        // time is −3.9 min, so the Sun stands 0.97° east of the meridian; declination 23.1°.
+        // time is −3.9 min, so the Sun is 0.97° east of the meridian; declination 23.1°.
         let equinox = sun(Epoch::parse("2010-03-20T17:32:15").unwrap());
         assert!(libm::asin(equinox.z).to_degrees().abs() < 0.02);
         let noon = sun(Epoch::parse("2010-07-01T12:00:15").unwrap());

@@ -4,7 +4,7 @@
 //! tracking loops"): the signal is multiplied by z̄ + ξ(t), with ξ complex Gaussian noise through a
 //! Butterworth filter of second order whose autocorrelation falls to 1/e at the decorrelation time. That
 //! makes Rice's amplitudes of index S4 and fades in which the phase turns by half a cycle. A phase spread
-//! beyond what comes with S4 is added as Gaussian noise of the same spectrum, which stands for larger
+//! beyond what comes with S4 is added as Gaussian noise of the same spectrum, which represents larger
 //! structures. Limits: all carriers of a satellite fade alike, and satellites independently; elevation does
 //! not matter.
 

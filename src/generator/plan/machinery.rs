@@ -16,7 +16,7 @@ pub struct Machinery {
     pub knot_spacing_s: f64,
     /// Longest time between knots.
     pub longest_knot_spacing_s: f64,
-    /// Why they stand so.
+    /// Why they are so.
     pub knot_reason: String,
     /// Memory of the generator's blocks, which does not grow with the scene.
     pub block_bytes: u64,

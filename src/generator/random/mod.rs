@@ -42,7 +42,7 @@ impl Stream {
 
     /// The stream of a satellite.
     pub fn satellite(self, sv: Sv) -> Self {
-        // Numbers of GPS satellites stand for themselves; those of other systems follow in blocks of 256.
+        // Numbers of GPS satellites are their own; those of other systems follow in blocks of 256.
         let block = match sv.system {
             System::Gps => 0,
             System::Glonass => 1,

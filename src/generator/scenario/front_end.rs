@@ -129,7 +129,7 @@ pub(super) fn front_ends(root: &Table<'_>, allowed_m: f64, refusals: &mut Refusa
     Some(found)
 }
 
-/// What stands at the top of a scenario and cannot beside several front ends.
+/// What may be at the top of a scenario but not beside several front ends.
 fn alone(root: &Table<'_>, count: usize) -> Vec<ScenarioError> {
     let mut refused = Vec::new();
     for table in ["local_oscillator", "filter", "iq", "adc"].into_iter().filter(|table| root.has(table)) {

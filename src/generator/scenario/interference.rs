@@ -125,7 +125,7 @@ pub struct InterferenceSpec {
     pub offset_hz: f64,
     /// How strong it is.
     pub strength: Strength,
-    /// Where it stands; absent where it has no place.
+    /// Where it is; absent where it has no place.
     pub place: Option<Geodetic>,
     /// True time since the scene's start; to the scene's end if absent.
     pub on_s: f64,

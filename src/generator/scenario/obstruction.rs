@@ -1,4 +1,4 @@
-//! What stands between antenna and sky, as written: `[[obstruction]]`.
+//! What obstructs the sky, as written: `[[obstruction]]`.
 
 use super::ScenarioError;
 use super::read::Table;

@@ -188,7 +188,7 @@ fn summarise(warnings: &mut Vec<String>, list: &[String], what: &str) {
 }
 
 /// The effects in the order in which they act: ionosphere, troposphere, wind-up, strength, echoes of all
-/// that, then what stands in the way of the direct ray.
+/// that, then what obstructs the direct ray.
 pub(super) fn effects(
     scenario: &Scenario,
     files: &Files<'_>,

@@ -44,7 +44,7 @@ pub enum Electrons {
         /// Where the electrons are taken to be.
         shell: Shell,
     },
-    /// Maps from a file; `map_start` is the instant of the maps that stands at the scene's start.
+    /// Maps from a file; `map_start` is the instant of the maps that applies at the scene's start.
     Ionex {
         /// The IONEX file.
         file: PathBuf,
@@ -152,7 +152,7 @@ impl Ionosphere {
                     let until = from.plus_s(end_s);
                     let reason = format!(
                         "the maps are of {first} to {last}, the scene needs {from} to {until}: name the maps of that \
-                         day, or say with ionosphere.map_start which instant of theirs stands at the scene's start"
+                         day, or say with ionosphere.map_start which instant of theirs applies at the scene's start"
                     );
                     return Err(scenario.conflict("ionosphere.file", reason));
                 }

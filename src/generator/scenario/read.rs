@@ -35,9 +35,9 @@ pub(crate) struct Table<'t> {
 impl<'t> Table<'t> {
     /// A table with the keys that it may hold.
     pub fn new(source: &'t Source<'t>, path: &str, at: usize, table: &'t DeTable<'t>, keys: &'static [Key]) -> Self {
-        let tells = |key: &&Key| ["kind", "model"].contains(&key.name) && matches!(key.value, Value::Word(_));
+        let decides = |key: &&Key| ["kind", "model"].contains(&key.name) && matches!(key.value, Value::Word(_));
         let kind =
-            keys.iter().find(tells).and_then(|key| match (table.get(key.name).map(Spanned::get_ref), key.value) {
+            keys.iter().find(decides).and_then(|key| match (table.get(key.name).map(Spanned::get_ref), key.value) {
                 (Some(DeValue::String(word)), Value::Word(words)) => {
                     Some(word.as_ref()).filter(|word| words().contains(word))
                 }

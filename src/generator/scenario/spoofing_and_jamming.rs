@@ -44,8 +44,9 @@ pub(super) fn interferers(
 /// Warnings about sources that lie outside the bands of all front ends.
 pub(super) fn unheard<'s>(scenario: &'s Scenario, scenes: &'s [Scene]) -> impl Iterator<Item = String> + 's {
     let numbered = (1_u64..).zip(&scenario.interference);
-    let heard = |number: u64| scenes.iter().flat_map(|scene| &scene.interference).any(|found| found.source == number);
-    numbered.filter(move |(number, _)| !heard(*number)).map(|(number, spec)| {
+    let received =
+        |number: u64| scenes.iter().flat_map(|scene| &scene.interference).any(|found| found.source == number);
+    numbered.filter(move |(number, _)| !received(*number)).map(|(number, spec)| {
         let kind = spec.kind.name();
         format!("interference number {number} ({kind}) lies outside the samples' band: it is not computed")
     })

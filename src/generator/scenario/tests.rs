@@ -65,7 +65,7 @@ const ECHOES: &str = "[[multipath]]\nkind = \"given\"\namplitude = 0.5\nphase_de
     [[multipath]]\nkind = \"ground\"\namplitude = 0.3\nheight_m = 2\n\
     [[multipath]]\nkind = \"wall\"\namplitude = 0.4\nazimuth_deg = 90\ndistance_m = 12\n";
 
-/// Every key of the tables that may stand several times.
+/// Every key of the tables that may occur several times.
 const HOSTILE: &str = "[[interference]]\nkind = \"chirp\"\noffset_hz = 1e5\njs_db = 30\non_s = 1\noff_s = 2\n\
                        sweep_hz = -2e6\n\
     sweep_s = 1e-5\n[[interference]]\nkind = \"sine_fm\"\npower_dbw = -130\ndeviation_hz = 5e4\nrate_hz = 1e4\n\
@@ -339,11 +339,11 @@ fn a_scene_outside_its_navigation_file_is_refused_with_the_file_s_span() {
 #[test]
 fn what_looks_wrong_but_can_be_computed_is_warned_of() {
     let base = format!("{MINIMAL}{STATIC}");
-    let told = warnings(&format!("{base}[satellites]\nmask_deg = 80\nexclude = [\"G99\"]\n")).unwrap();
-    assert!(told.iter().any(|w| w.contains("a position needs 4")), "{told:?}");
-    assert!(told.iter().any(|w| w.contains("exclude names G99")), "{told:?}");
-    let told = warnings(&format!("{base}[front_end]\nsample_rate_hz = 1.5e6\n")).unwrap();
-    assert!(told.iter().any(|w| w.contains("-1.023 to 1.023 MHz")), "{told:?}");
+    let warned = warnings(&format!("{base}[satellites]\nmask_deg = 80\nexclude = [\"G99\"]\n")).unwrap();
+    assert!(warned.iter().any(|w| w.contains("a position needs 4")), "{warned:?}");
+    assert!(warned.iter().any(|w| w.contains("exclude names G99")), "{warned:?}");
+    let warned = warnings(&format!("{base}[front_end]\nsample_rate_hz = 1.5e6\n")).unwrap();
+    assert!(warned.iter().any(|w| w.contains("-1.023 to 1.023 MHz")), "{warned:?}");
     // Those of the file itself: a rogue record, and unhealthy satellites.
     assert!(warnings(&base).unwrap().len() <= 2);
 }

@@ -67,7 +67,7 @@ impl Scenario {
     pub(super) fn turned(&self, trajectory: Trajectory) -> Result<Trajectory, ScenarioError> {
         let Some(attitude) = self.attitude else { return Ok(trajectory) };
         if matches!(attitude.nose, Nose::Velocity { .. }) && trajectory.is_static() {
-            let reason = "kind = \"velocity\", but the motion stands still: use kind = \"fixed\", or let it move";
+            let reason = "kind = \"velocity\", but the motion is at rest: use kind = \"fixed\", or let it move";
             return Err(self.conflict("attitude", reason.to_owned()));
         }
         Ok(trajectory.with_attitude(attitude))

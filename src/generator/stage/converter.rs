@@ -1,6 +1,6 @@
 //! Gain control and analogue-to-digital conversion.
 //!
-//! The converter is uniform with odd levels ±1, ±3, … ±(2^b − 1), so that no level stands at zero; with as
+//! The converter is uniform with odd levels ±1, ±3, … ±(2^b − 1), so that no level is zero; with as
 //! many bits as the format has it rounds to the format's own integers. Its step against the standard
 //! deviation of what comes in is that of least loss (Max 1960; losses in Hegarty 2011): 1.96 dB with one bit,
 //! 0.55 with two. With gain control the deviation is measured over the window before each run of 4096

@@ -46,7 +46,7 @@ pub fn accumulate(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32], w
     }
 }
 
-/// Writes the code at each sample and returns where sample 0 stands.
+/// Writes the code at each sample and returns the place of sample 0.
 #[inline(always)]
 fn waveform(edge: Edge<'_>, run: &Run<'_>, samples: usize, wave: &mut Vec<f64>) -> usize {
     wave.clear();

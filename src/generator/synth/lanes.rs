@@ -4,7 +4,7 @@
 //! No fused multiply-add and no intrinsics: each operation is one IEEE rounding, so every instruction set
 //! gives the same bits. Samples come in groups of 32, sixteen before and sixteen behind the group's middle.
 //! The carrier at the middle, times that at half a sample, one and a half … from it, gives both sides with
-//! the same four products: the earlier half stands backwards until all rays are added. Carrier within 1e-6
+//! the same four products: the earlier half is kept backwards until all rays are added. Carrier within 1e-6
 //! cycle, no spur above −110 dBc. Chip signs come from one window of the strip per group, by a shift per
 //! lane; code phases resolve 2^-27 chip.
 
@@ -42,7 +42,7 @@ pub struct Buffers {
     chords: Vec<Chord>,
 }
 
-/// A run made ready: its carrier, and where its code stands in each group.
+/// A run made ready: its carrier, and the place of its code in each group.
 #[derive(Clone)]
 struct Voice {
     carrier: Carrier,
@@ -301,7 +301,7 @@ fn rotate(run: &Run<'_>, wave: &[f32], voices: &mut [Voice], i: &mut [f32], q: &
     }
 }
 
-/// Writes the band-limited waveform with borders into `wave`, and returns where sample 0 stands.
+/// Writes the band-limited waveform with borders into `wave`, and returns the place of sample 0.
 ///
 /// The square wave between edges, plus at each edge the filter's response minus the ideal step.
 #[inline(always)]

@@ -166,8 +166,8 @@ fn the_truth_has_every_signal_once_by_the_samples_of_the_first_front_end() {
         assert_eq!(lines(&both, name, ""), lines(&of_upper, name, ""), "{name}");
     }
     // The noise is received below, the chirp above, and each has its rows.
-    let heard: Vec<InterferenceRow> = rows(&both, "interference.csv");
-    let sources: BTreeSet<_> = heard.iter().map(|row| row.source).collect();
+    let received: Vec<InterferenceRow> = rows(&both, "interference.csv");
+    let sources: BTreeSet<_> = received.iter().map(|row| row.source).collect();
     assert_eq!(sources.len(), 2);
     let scene = std::fs::read_to_string(both.path().join("scene.json")).unwrap();
     for word in ["\"front_ends\"", "\"upper\"", "\"lower\"", "synthetic B", "\"chirp\"", "\"noise\""] {
@@ -185,14 +185,14 @@ fn a_front_end_at_another_rate_is_told_of_at_the_instants_of_the_first() {
         let all: Vec<Observation> = rows(directory, "observations.csv");
         all.into_iter().filter(|row| row.signal.name == QUADRATURE.name).collect()
     };
-    let (told, alone) = (of(&both), of(&own));
-    assert!(told.len() == alone.len() && told.len() > 100, "{} {}", told.len(), alone.len());
-    for (told, alone) in told.iter().zip(&alone) {
-        let apart_s = told.sample as f64 / 10e6 - alone.sample as f64 / 7.654_321e6;
-        assert!(told.sv == alone.sv && apart_s.abs() < 1.4e-7, "{} {}", told.sample, alone.sample);
+    let (beside, alone) = (of(&both), of(&own));
+    assert!(beside.len() == alone.len() && beside.len() > 100, "{} {}", beside.len(), alone.len());
+    for (beside, alone) in beside.iter().zip(&alone) {
+        let apart_s = beside.sample as f64 / 10e6 - alone.sample as f64 / 7.654_321e6;
+        assert!(beside.sv == alone.sv && apart_s.abs() < 1.4e-7, "{} {}", beside.sample, alone.sample);
         // A sample apart at most: 0.13 us, in which the carrier turns by less than 0.002 cycles at 10 kHz.
-        let moved = told.carrier_cycles - alone.carrier_cycles;
-        assert!(moved.abs() < 0.002, "{} {}: {moved}", told.sample, told.sv);
+        let moved = beside.carrier_cycles - alone.carrier_cycles;
+        assert!(moved.abs() < 0.002, "{} {}: {moved}", beside.sample, beside.sv);
     }
     // Views are counted by the first front end's samples too.
     let passes: Vec<PassRow> = rows(&both, "passes.csv");

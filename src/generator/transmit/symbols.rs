@@ -52,7 +52,7 @@ impl Symbols {
     }
 
     /// Gathers what `sv` sends from `first` to `last`, and forgets what lies before. A unit for which no set
-    /// was uploaded carries the one of `heard`.
+    /// was uploaded carries the one of `received`.
     ///
     /// # Errors
     /// Those of messages.
@@ -62,7 +62,7 @@ impl Symbols {
         from: &Constellation,
         (sv, signal): (Sv, &Signal),
         [first, last]: [Epoch; 2],
-        heard: Epoch,
+        received: Epoch,
     ) -> Result<(), GenerateError> {
         let faults = if from.number == 0 { scene.message_faults.as_slice() } else { &[] };
         for (message, units) in &mut self.units {
@@ -75,7 +75,7 @@ impl Symbols {
                     continue;
                 }
                 let slot = Slot { message, time: signal.time, unit };
-                let fallback = || scene.catalogue.sent_at(sv, heard);
+                let fallback = || scene.catalogue.sent_at(sv, received);
                 let Some(ephemeris) = scene.catalogue.sent_at(sv, slot.start()).or_else(fallback) else { continue };
                 let SentSymbols { encoded, symbols } = message::unit(faults, sender, ephemeris, &slot)?;
                 // What was meant and, where wrong symbols pass for right ones, what was sent.

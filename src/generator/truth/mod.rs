@@ -74,7 +74,7 @@ fn doppler_hz(
     Ok(Some(planted!("generator.truth.doppler", -sum, sum) / (12.0 * step_s)))
 }
 
-/// What is true of a satellite at a sample: the observation of its first ray, where it stands in the sky, and
+/// What is true of a satellite at a sample: the observation of its first ray, its place in the sky, and
 /// the other rays as they come beside the first.
 pub type Truth = (Observation, SkyRow, Vec<RayRow>);
 

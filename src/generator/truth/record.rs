@@ -44,7 +44,7 @@ pub enum Record {
     Trajectory(TrajectoryRow),
     /// What an ideal receiver would observe of a signal's first ray.
     Observation(Observation),
-    /// Where the satellite of the observation before stands, and its delays.
+    /// Where the satellite of the observation before is, and its delays.
     Sky(SkyRow),
     /// Another ray of that satellite.
     Ray(RayRow),

@@ -125,8 +125,8 @@ impl Writer {
 
     /// Writes `scene.json`, and creates the files that only this scene has.
     fn facts(&mut self, scene: &Scene, scenes: &[Scene], part: &Range<u64>) -> Result<(), TruthError> {
-        let heard = sources(scenes.iter());
-        if !heard.is_empty() {
+        let received = sources(scenes.iter());
+        if !received.is_empty() {
             self.interference = Some(Table::create(&self.directory, "interference.csv")?);
         }
         for spoofer in &scene.spoofers {
@@ -164,7 +164,7 @@ impl Writer {
             oscillator: (scene.receiver_clock.oscillator.as_ref())
                 .map(|oscillator| OscillatorFacts { h: oscillator.law.levels() }),
             front_ends: if scenes.len() > 1 { scenes.iter().map(front_end).collect() } else { Vec::new() },
-            interference: heard.iter().map(|(_, source)| source.fact()).collect(),
+            interference: received.iter().map(|(_, source)| source.fact()).collect(),
             spoofers: scene.spoofers.iter().map(|spoofer| spoofer.describe()).collect(),
             orbits,
             satellite_faults: [departures, scene.satellite_clocks.descriptions.clone()].concat(),

@@ -381,7 +381,7 @@ impl Grid {
 
     /// Code phase at the first sample of the block, in chips (not reduced), if the largest cell is at `lag`.
     pub fn code_phase_chips(&self, lag: usize, doppler_hz: f64) -> f64 {
-        // The replica's first sample stands for the middle of its interval.
+        // The replica's first sample represents the middle of its interval.
         0.5 * self.chips_per_sample - lag as f64 * self.lag_samples * self.received_chips_per_sample(doppler_hz)
     }
 }

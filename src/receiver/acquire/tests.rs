@@ -246,7 +246,7 @@ fn detections_come_as_often_as_theory_says() {
         let (mut found, trials) = (0, 300);
         let mut limit = 0.0;
         for seed in 0..trials {
-            // A replica's sample stands for the middle of half a chip.
+            // A replica's sample represents the middle of half a chip.
             let sent = Sent { prn: 9, doppler_hz: 0.0, phase_chips: 0.25, cn0_dbhz };
             let recording = record(metadata.clone(), samples, &[sent], 5000 + seed);
             let block = Block { first: 0, i: &recording.i, q: &recording.q };

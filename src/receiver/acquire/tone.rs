@@ -2,7 +2,7 @@
 //!
 //! A C/A code is a comb of lines 1 kHz apart, the largest 21.3 dB below the whole (PRN 24). Where a wave
 //! meets one, every code phase of that Doppler shows it: one of J/N0 54 dB-Hz passes for a satellite of 33. A
-//! short look at the spectrum costs a thousandth of a search. What stands out of it by [`STRONG_HZ`] is
+//! short look at the spectrum costs a thousandth of a search. What rises above it by [`STRONG_HZ`] is
 //! subtracted, with the amplitude and phase that it has in each quarter of a millisecond: a notch some
 //! kilohertz wide. Weaker waves are left to the threshold ([`super::multiple_access`]). Satellites' own lines
 //! are no stronger than that below 71 dB-Hz. Limits: pulses shorter than the look's segments, sweeps, and

@@ -217,7 +217,8 @@ pub enum NoFix {
     },
     /// A fault without a satellite that explains it.
     #[error(
-        "the ranges contradict each other and no satellite stands out: chi-square {chi_square:.1} above {threshold:.1}"
+        "the ranges contradict each other and no satellite is singled out: chi-square {chi_square:.1} above \
+         {threshold:.1}"
     )]
     Inconsistent {
         /// Weighted sum of squared residuals.

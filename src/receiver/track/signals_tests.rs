@@ -262,7 +262,7 @@ fn every_synthetic_signal_is_followed_with_the_phase_of_the_whole_signal() {
         let squaring = 1.0 + 0.5 / (t_s * followed_hz);
         let sigma = (settings.pll_bandwidth_hz / followed_hz * squaring).sqrt() / TAU;
         assert!(carrier.1 < 1.5 * sigma, "{}: {} cycles for {sigma}", sky.link, carrier.1);
-        // The whole signal's phase, where the overlay tells half cycles; the mean of 27 independent values.
+        // The whole signal's phase, where the overlay shows half cycles; the mean of 27 independent values.
         let is_pilot = component.message.is_none() && component.overlay.periods() > 1;
         assert_eq!(found.half_cycle_known, is_pilot, "{}", sky.link);
         let off = if is_pilot { carrier.0 } else { carrier.0 - 0.5 * (2.0 * carrier.0).round() };

@@ -31,7 +31,7 @@ pub(super) fn pdf(plan: &Plan, results: &Results, pictures: &[Picture]) -> Resul
         ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
     ]));
     report.text(format!(
-        "What a case is: {} Intervals hold the mean with 95 % confidence. Every case stands in cases.csv, every cell \
+        "What a case is: {} Intervals hold the mean with 95 % confidence. Every case is in cases.csv, every cell \
          in cells.csv; manifest.json binds them to their inputs.",
         publish::level(results)
     ));

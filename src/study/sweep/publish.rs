@@ -206,7 +206,7 @@ pub(super) fn level(results: &Results) -> &'static str {
         }
         Level::Samples => {
             "samples go from the generator to the receiver in memory, from a cold start; cases that differ in the \
-             receiver alone hear the same ones."
+             receiver alone receive the same ones."
         }
     }
 }

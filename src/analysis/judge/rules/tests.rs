@@ -200,7 +200,7 @@ fn the_verdict_names_what_was_planted_and_a_user_s_limits_come_first() {
     let status = |figure: &str| verdict.rows.iter().find(|row| row.figure == figure).map(|row| row.status);
     assert_eq!(verdict.of_user, 3);
     assert_eq!(status("position.horizontal_p95_m"), Some(Status::Pass));
-    assert_eq!(status("horizontal error, 95 %"), None, "the user's limit stands in its place");
+    assert_eq!(status("horizontal error, 95 %"), None, "the user's limit replaces it");
     let mut broken: Vec<&str> = verdict.broken().map(|row| row.figure.as_str()).collect();
     broken.sort_unstable();
     assert_eq!(broken, ["spoofing.captured_share", "tracking.cycle_slips"], "the first is a figure that is missing");

@@ -98,7 +98,7 @@ fn the_clock_that_was_planted_is_found_and_told_from_the_receiver_s_error() {
     // that.
     let error = measured.series(Of::Error).unwrap().at(Deviation::Oadev, 1.0).unwrap();
     assert!((error.deviation / (3.0_f64.sqrt() * ERROR_S) - 1.0).abs() < 0.28, "{:e}", error.deviation);
-    assert_eq!(error.alpha, None, "20 phases that are 1 s apart do not tell a noise");
+    assert_eq!(error.alpha, None, "20 phases that are 1 s apart do not show a noise");
 }
 
 #[test]

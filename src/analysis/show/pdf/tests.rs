@@ -24,7 +24,7 @@ const ROWS: usize = 150;
 fn everything() -> Report {
     let mut report = Report::new("A study of µ, σ² and <angle & brackets>", "with all there is", "seed 7");
     report.add(Item::Banner(
-        "3 passed, 1 marginal, 1 failed\nFailed: something long enough to be told in more than \
+        "3 passed, 1 marginal, 1 failed\nFailed: something long enough to be written in more than \
                              one line of this banner, which is wide"
             .into(),
         Tone::Bad,

@@ -260,7 +260,7 @@ fn widen(axis: &mut Axis, span: f64) {
 
 /// Decimals that distinguish neighbouring ticks of an axis.
 fn decimals(span: f64, labels: usize) -> usize {
-    // Labels stand 1, 2 or 5 times a power of ten apart, so that there are no more than wanted.
+    // Labels are 1, 2 or 5 times a power of ten apart, so that there are no more than wanted.
     let least = span / labels as f64;
     let power = libm::pow(10.0, libm::floor(libm::log10(least)));
     let apart = [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|apart| *apart > 0.999 * least);
@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn ticks_have_as_many_decimals_as_tell_them_apart() {
         assert_eq!((decimals(60.0, 10), decimals(4.0, 10), decimals(0.03, 5)), (0, 1, 2));
-        // Four and a half units in twelve labels stand half a unit apart, in five a whole one.
+        // Four and a half units in twelve labels are half a unit apart, in five a whole one.
         assert_eq!((decimals(4.5, 12), decimals(4.5, 5)), (1, 0));
         assert_eq!((tick(-0.0, 1), tick(-0.04, 1), tick(-1.0, 0)), ("0.0".into(), "0.0".into(), "-1".into()));
     }

@@ -48,7 +48,7 @@ pub const SCENARIO: &[Key] = &[
     tables("multipath", way::MULTIPATH, "A ray that is reflected; at most 64."),
     table("ionosphere", way::IONOSPHERE, "The true ionosphere, and what is broadcast of it. Absent: none."),
     table("troposphere", way::TROPOSPHERE, "The neutral atmosphere. Absent: none."),
-    tables("obstruction", way::OBSTRUCTION, "What stands between the antenna and the sky."),
+    tables("obstruction", way::OBSTRUCTION, "What obstructs the antenna's sky."),
     table("scintillation", way::SCINTILLATION, "Quick fading in the ionosphere."),
     table(
         "receiver_clock",
@@ -65,7 +65,7 @@ pub const SCENARIO: &[Key] = &[
         "front_end",
         hardware::FRONT_END,
         "Sampling. Several, each written as [[front_end]], listen to one sky by one clock: one file each. The tables \
-         of stages (local_oscillator, filter, iq, adc) stand below each of them then.",
+         of stages (local_oscillator, filter, iq, adc) go below each of them then.",
     ),
     tables(
         "interference",

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::generator::scenario::ScenarioError;
 
-/// What stands for the value of a key that is not there; a text would have quotes.
+/// Placeholder for the value of an absent key; a text would have quotes.
 pub(super) const ABSENT: &str = "absent";
 
 /// The text of a scenario and where it came from.

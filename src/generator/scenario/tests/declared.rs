@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A scene in which the line `line` stands in `table`.
+/// A scene with the line `line` in `table`.
 pub(super) fn with(table: &str, line: &str) -> String {
     match table {
         "" => format!("{line}\n{MINIMAL}{STATIC}"),

@@ -66,7 +66,7 @@ fn what_several_front_ends_cannot_have_is_refused_with_the_cure() {
         (many, ["front_end = ", "at most 16 front ends, not 17"]),
         ("front_end = 3\n".to_owned(), ["front_end = 3", "a table, or an array of tables"]),
     ] {
-        // A key at the top stands above all tables.
+        // A key at the top comes before all tables.
         let (top, below) = if tables.starts_with('[') { ("", tables.as_str()) } else { (tables.as_str(), "") };
         let error = parse(&format!("{MINIMAL}{top}{STATIC}{below}")).unwrap_err().to_string();
         assert!(words.iter().all(|word| error.contains(word)) && error.starts_with("scene.toml:"), "{tables}: {error}");
@@ -93,16 +93,16 @@ fn a_band_without_its_signals_is_refused_by_the_front_ends_name() {
 #[test]
 fn warnings_say_whose_they_are() {
     let narrow = NARROW.replace("4e6", "2.6e6");
-    let told = composed(&format!("{WIDE}{narrow}")).unwrap().1;
-    assert!(told.iter().any(|w| w.starts_with("front end narrow: ") && w.contains("fold over")), "{told:?}");
-    assert!(!told.iter().any(|w| w.starts_with("front end wide: ")), "{told:?}");
+    let warned = composed(&format!("{WIDE}{narrow}")).unwrap().1;
+    assert!(warned.iter().any(|w| w.starts_with("front end narrow: ") && w.contains("fold over")), "{warned:?}");
+    assert!(!warned.iter().any(|w| w.starts_with("front end wide: ")), "{warned:?}");
     let source = "[[interference]]\nkind = \"cw\"\njs_db = 10\noffset_hz = 3e6\n[power]\ncn0_dbhz = 45\n";
     // One front end receives it: nothing is left out.
-    let (scenes, told) = composed(&format!("{WIDE}{narrow}{source}")).unwrap();
+    let (scenes, warned) = composed(&format!("{WIDE}{narrow}{source}")).unwrap();
     assert_eq!((scenes[0].interference.len(), scenes[1].interference.len()), (1, 0));
-    assert!(!told.iter().any(|w| w.contains("outside")), "{told:?}");
-    let (_, told) = composed(&format!("{WIDE}{narrow}{}", source.replace("3e6", "30e6"))).unwrap();
-    assert_eq!(told.iter().filter(|w| w.contains("number 1 (cw) lies outside")).count(), 1, "{told:?}");
+    assert!(!warned.iter().any(|w| w.contains("outside")), "{warned:?}");
+    let (_, warned) = composed(&format!("{WIDE}{narrow}{}", source.replace("3e6", "30e6"))).unwrap();
+    assert_eq!(warned.iter().filter(|w| w.contains("number 1 (cw) lies outside")).count(), 1, "{warned:?}");
 }
 
 #[test]

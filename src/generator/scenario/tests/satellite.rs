@@ -94,18 +94,18 @@ fn orbits_that_do_not_reach_over_the_scene_are_refused_with_their_reach() {
     // 00:00 to 23:45 every 15 minutes: five epochs before the one at the start, five after that at the end.
     let early = composed("2010-07-01T01:00:00", witness).err().unwrap();
     assert!(early.contains("2010-07-01T01:15:00") && early.contains("2010-07-01T22:30:00"), "{early}");
-    let (scene, told) = composed("2010-07-01T10:00:00", witness).unwrap();
+    let (scene, warned) = composed("2010-07-01T10:00:00", witness).unwrap();
     // PRN 1 has positions and no clock that day; it is unhealthy by its message, too.
-    assert!(scene.excluded.contains(&Sv::gps(1)) && !scene.excluded.contains(&Sv::gps(13)), "{told:?}");
-    let (scene, told) =
+    assert!(scene.excluded.contains(&Sv::gps(1)) && !scene.excluded.contains(&Sv::gps(13)), "{warned:?}");
+    let (scene, warned) =
         composed("2010-07-01T10:00:00", &format!("{witness}[satellites]\ninclude_unhealthy = true\n")).unwrap();
     assert!(scene.excluded.contains(&Sv::gps(1)));
-    assert!(told.iter().any(|line| line.contains("without a precise orbit") && line.contains("G01")), "{told:?}");
+    assert!(warned.iter().any(|line| line.contains("without a precise orbit") && line.contains("G01")), "{warned:?}");
     let other = composed("2010-07-01T10:00:00", "[orbits]\nsp3 = \"Cargo.toml\"\n").err().unwrap();
     assert!(other.contains("orbits.sp3") && other.contains("begins with '[package]'"), "{other}");
     let stranger = "[[message_fault]]\nkind = \"health\"\nsatellites = [\"G99\"]\nhealth = 1\n";
-    let (_, told) = composed("2010-07-01T10:00:00", stranger).unwrap();
-    assert!(told.iter().any(|line| line.contains("a fault names G99")), "{told:?}");
+    let (_, warned) = composed("2010-07-01T10:00:00", stranger).unwrap();
+    assert!(warned.iter().any(|line| line.contains("a fault names G99")), "{warned:?}");
 }
 
 /// The faults of a scene of both systems, and what its satellite sends under them in the page of word 1.

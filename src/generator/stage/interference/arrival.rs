@@ -3,7 +3,7 @@
 //! Sample n is taken when the receiver's clock reads n/rate after its start; what it holds was sent
 //! `behind_s` before that reading (the clock's error plus the time on the way). Phases are the exact phase of
 //! sample n as integers, less frequency times `behind_s`, so neither a long scene nor a drifting clock loses
-//! a digit. Limits: emitters stand still.
+//! a digit. Limits: emitters do not move.
 
 use nalgebra::Vector3;
 

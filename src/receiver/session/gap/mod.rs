@@ -49,7 +49,7 @@ const PAUSE_S: f64 = 1.05;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watched {
     trend: Trend,
-    /// The same without the latest looks, which stand beside it.
+    /// The same without the latest looks, which are kept beside it.
     settled: suspect::Settled,
     /// Rates when it last took a look.
     rates: Option<[Rates; 2]>,
