@@ -1,7 +1,7 @@
 //! Addresses of listeners and of peers as the command line takes them: loopback unless another one is named.
 
 use std::io;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
 
 use crate::cli::error::CliError;
 use crate::cli::scenario;
@@ -48,6 +48,38 @@ pub fn listen(address: SocketAddr, what: &str) -> Result<(TcpListener, SocketAdd
     Ok((listener, own))
 }
 
+/// Text of a peer's address: `PORT` on this machine, or `HOST:PORT`.
+///
+/// # Errors
+/// What was expected, of any other text.
+pub fn peer_address(text: &str) -> Result<String, String> {
+    let expected = || format!("'{text}': expected HOST:PORT, or PORT on this machine");
+    let bare = text.strip_prefix(':').unwrap_or(text);
+    if bare.parse::<u16>().is_ok() {
+        return Ok(format!("{LOOPBACK}:{bare}"));
+    }
+    let (host, port) = text.rsplit_once(':').ok_or_else(expected)?;
+    if host.is_empty() || port.parse::<u16>().is_err() {
+        return Err(expected());
+    }
+    Ok(text.to_owned())
+}
+
+/// Connects to a peer.
+///
+/// # Errors
+/// The last address that failed, or a host that has none.
+pub fn connect(peer: &str) -> io::Result<TcpStream> {
+    let mut failed = io::Error::new(io::ErrorKind::AddrNotAvailable, "the host has no address");
+    for address in peer.to_socket_addrs()? {
+        match TcpStream::connect(address) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => failed = error,
+        }
+    }
+    Err(failed)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -63,6 +95,18 @@ mod tests {
         for text in ["", ":", "example.org:1234", "127.0.0.1", "65536", "-1", "1.2.3.4:x", "localhost"] {
             let error = listen_address(text).unwrap_err();
             assert!(error.contains("expected PORT"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_peer_is_a_host_and_a_port_or_a_port_of_this_machine() {
+        assert_eq!(peer_address("1234").unwrap(), "127.0.0.1:1234");
+        assert_eq!(peer_address(":1234").unwrap(), "127.0.0.1:1234");
+        for text in ["dongle.local:1234", "10.0.0.1:1", "[::1]:1234"] {
+            assert_eq!(peer_address(text).unwrap(), text);
+        }
+        for text in ["", "host", "host:", "host:99999", ":x"] {
+            assert!(peer_address(text).unwrap_err().contains("expected HOST:PORT"), "{text}");
         }
     }
 }

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::cli::lines;
 use crate::gnss::samples::Format;
 
 /// A GNSS digital twin: generate IF samples from real ephemerides, receive them, judge the receiver.
@@ -116,23 +117,37 @@ pub struct Generate {
 #[derive(Args, Clone, Debug)]
 #[command(
     after_help = "Examples:\n  gnss-twin receive if.sigmf-data --out reports/mine\n  gnss-twin receive raw.bin --out \
-                  reports/raw --format ci8 --rate-hz 4e6\n\nExit code: 0 with a fix, 3 without one (results are \
-                  written, the reason is printed), 65 when the input is no recording"
+                  reports/raw --format ci8 --rate-hz 4e6\n  gnss-twin receive rtl-tcp:1234 --rate-hz 2.4e6 --out \
+                  reports/now --live --nmea tcp:10110 --json -\n\nExit code: 0 with a fix, 3 without one (results \
+                  are written, the reason is printed), 74 when the sender broke off (results end there), 130 after \
+                  Ctrl-C with --live, 65 when the input is no recording"
 )]
 pub struct Receive {
     /// Recording: a SigMF pair (either file), a SigMF collection of front ends that share a clock, or a raw
-    /// file with --format and --rate-hz; - is standard input
+    /// file with --format and --rate-hz; - is standard input. Or a stream: fifo:PATH, tcp:ADDR of a server of
+    /// samples alone, rtl-tcp:ADDR of one that drives a dongle (ADDR is HOST:PORT, or PORT on this machine)
     pub file: PathBuf,
     /// Directory for the results
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Rows and lines can be read as they come, in DIR.unfinished until the end; Ctrl-C ends the stream, and
+    /// what came before it is finished
+    #[arg(long)]
+    pub live: bool,
+    /// NMEA 0183 of every fix (GGA, RMC, VTG, ZDA, GSA, GSV): a file, - (standard output), fifo:PATH, or
+    /// tcp:ADDR to listen on
+    #[arg(long, value_name = "TO")]
+    pub nmea: Option<lines::Spec>,
+    /// JSON lines of fixes, satellites, channels, searches and events: a file, -, fifo:PATH or tcp:ADDR
+    #[arg(long, value_name = "TO")]
+    pub json: Option<lines::Spec>,
     /// Receiver settings [default: the built-in ones]
     #[arg(long, value_name = "SETTINGS.toml")]
     pub receiver: Option<PathBuf>,
-    /// Sample format of a raw file: ci8, cu8, ci16, cf32, ri8, ri16
+    /// Sample format of a raw file or stream: ci8, cu8, ci16, cf32, ri8, ri16
     #[arg(long)]
     pub format: Option<Format>,
-    /// Sample rate of a raw file
+    /// Sample rate of a raw file or stream
     #[arg(long, value_name = "HZ")]
     pub rate_hz: Option<f64>,
     /// Frequency of GPS L1 in a raw file [default: 0]

@@ -70,6 +70,16 @@ impl CliError {
         Self { code: 75, message: message.to_string() }
     }
 
+    /// Whoever sent something did not send all of it; what came is kept.
+    pub fn broken(message: impl Display) -> Self {
+        Self { code: 74, message: message.to_string() }
+    }
+
+    /// A signal ended the work, whose results are whole as far as it came.
+    pub fn signal(number: i32) -> Self {
+        Self { code: 128_u8.saturating_add(number.clamp(0, 127) as u8), message: String::new() }
+    }
+
     /// Something that cannot happen.
     pub fn bug(message: impl Display) -> Self {
         Self { code: 70, message: format!("internal error, please report it: {message}") }

@@ -1,4 +1,5 @@
-//! Signals: the first takes outputs in the making away and ends the process, the second ends it at once.
+//! Signals: the first takes outputs in the making away and ends the process, the second ends it at once. Where
+//! work has no end of its own, the first one may end it instead ([`ends_work`]), as if its input had ended.
 //!
 //! A thread of its own waits for them, so that they are noticed whatever the others are at: computing,
 //! reading a pipe that stays silent, or drawing.
@@ -22,6 +23,7 @@ const LOOK: Duration = Duration::from_millis(50);
 const STACK_BYTES: usize = 1 << 18;
 
 // A signal handler has no other place to write to.
+static ENDS_WORK: AtomicBool = AtomicBool::new(false);
 static RECEIVED: OnceLock<Arc<AtomicUsize>> = OnceLock::new();
 
 /// Installs the handlers, and the thread that waits for them.
@@ -73,14 +75,27 @@ fn wait(mut reader: UnixStream) {
             break signal;
         }
     };
+    if ENDS_WORK.load(Ordering::Relaxed) {
+        return;
+    }
     staged::abandon();
     signal_hook::low_level::exit(128 + signal);
+}
+
+/// From here on the first signal is left to who does the work, and looks for it with [`ending`].
+pub fn ends_work() {
+    ENDS_WORK.store(true, Ordering::Relaxed);
+}
+
+/// The signal that is to end the work, if one came since [`ends_work`].
+pub fn ending() -> Option<i32> {
+    received().filter(|_| ENDS_WORK.load(Ordering::Relaxed))
 }
 
 /// Does nothing unless a signal has come: an error may then be its consequence, so that the end is left to
 /// that thread.
 pub fn give_way() {
-    while received().is_some() {
+    while received().is_some() && ending().is_none() {
         thread::sleep(LOOK);
     }
 }

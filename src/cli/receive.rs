@@ -1,25 +1,26 @@
-//! `receive`: a cold start on anyone's recording.
+//! `receive`: a cold start on anyone's recording, or on samples while they are made.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
-use crate::analysis::show::staged::present;
 use crate::cli::args;
 use crate::cli::error::{CliError, shown};
+use crate::cli::interrupt;
+use crate::cli::lines::{self, Made};
 use crate::cli::progress::Progress;
+use crate::cli::recording::{self, Recording};
 use crate::cli::run::{output_error, receiver_error};
 use crate::cli::scenario;
-use crate::cli::staging::Staging;
-use crate::gnss::gps::l1ca::L1_CA;
+use crate::cli::source::Ahead;
+use crate::cli::staging::{InSight, Staging};
 use crate::gnss::samples::IfMetadata;
-use crate::gnss::sigmf;
-use crate::gnss::time::{Epoch, Rate};
 use crate::receiver;
-use crate::receiver::output::Output;
+use crate::receiver::Outcome;
+use crate::receiver::output::{JsonLines, Nmea, Output, OutputError, Record, Sink};
 use crate::receiver::settings::Settings;
 
-/// Receives a recording.
+/// Receives a recording or a stream.
 pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
     let settings = match &arguments.receiver {
@@ -29,26 +30,45 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
             Settings::parse(&text, &name).map_err(CliError::input)?
         }
     };
-    let recordings = open(arguments)?;
+    let lines = [&arguments.nmea, &arguments.json];
+    if lines.iter().all(|spec| matches!(spec, Some(lines::Spec::Stdout))) {
+        return Err(CliError::usage("--nmea - and --json -: standard output takes one of them"));
+    }
+    let recordings = recording::open(arguments)?;
     let samples = recordings.first().and_then(|first| first.samples);
     let format = recordings.first().map(|first| first.metadata.format);
-    let mut front_ends: Vec<(IfMetadata, Box<dyn Read>)> =
-        recordings.into_iter().map(|recording| (recording.metadata, recording.reader)).collect();
-    let staging = Staging::directory(&arguments.out)?;
-    let mut output = Output::create(staging.path()).map_err(output_error)?;
+    let broken: Vec<Arc<OnceLock<String>>> = recordings.iter().filter_map(|one| one.broken.clone()).collect();
+    let directory = Directory::new(arguments)?;
+    let (mut listeners, made) = Listeners::new(arguments, directory.path())?;
+    let mut front_ends = read_ahead(recordings, arguments.live)?;
     let progress = Progress::new("receive", samples);
-    let outcome = receiver::receive_several(&mut front_ends, &settings, &mut output, &mut |done| progress.set(done));
+    let outcome = receiver::receive_several(&mut front_ends, &settings, &mut listeners, &mut |done| progress.set(done));
     drop(progress);
     let outcome = outcome.map_err(receiver_error)?;
-    drop(output);
+    drop(listeners);
+    let broken = broken.iter().find_map(|broken| broken.get());
     if let Some(format) = format.filter(|_| outcome.samples == 0) {
+        let why = broken.map_or_else(String::new, |broken| format!(" ({broken})"));
         return Err(CliError::input(format!(
-            "{}: no whole sample: expected {} bytes or more of {format}",
+            "{}: no whole sample: expected {} bytes or more of {format}{why}",
             shown(&arguments.file),
             format.bytes()
         )));
     }
-    staging.commit()?;
+    directory.commit()?;
+    made.into_iter().try_for_each(Made::commit)?;
+    report(arguments, &outcome)?;
+    if let Some(signal) = interrupt::ending() {
+        return Err(CliError::signal(signal));
+    }
+    if let Some(broken) = broken {
+        return Err(CliError::broken(format!("{broken}: the results end there")));
+    }
+    outcome.diagnosis.map_or(Ok(()), |diagnosis| Err(CliError::incomplete(diagnosis.headline())))
+}
+
+/// What came of it, on standard output unless lines go there.
+fn report(arguments: &args::Receive, outcome: &Outcome) -> Result<(), CliError> {
     if let Some(warning) = &outcome.format_warning {
         scenario::warn(&format!("{}: {warning}: check --format or the metadata", shown(&arguments.file)));
     }
@@ -60,113 +80,113 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
         text += &format!("{diagnosis}\n");
     }
     text += &format!("results in {}\n", shown(&arguments.out));
-    scenario::print(&text)?;
-    outcome.diagnosis.map_or(Ok(()), |diagnosis| Err(CliError::incomplete(diagnosis.headline())))
-}
-
-struct Recording {
-    metadata: IfMetadata,
-    reader: Box<dyn Read>,
-    samples: Option<u64>,
-}
-
-/// Opens the recording, or all that a collection names.
-fn open(arguments: &args::Receive) -> Result<Vec<Recording>, CliError> {
-    if arguments.file.extension().is_some_and(|extension| extension == "sigmf-collection") {
-        return of_collection(arguments);
+    if [&arguments.nmea, &arguments.json].contains(&&Some(lines::Spec::Stdout)) {
+        scenario::note(text.trim_end());
+        return Ok(());
     }
-    Ok(vec![open_one(arguments)?])
+    scenario::print(&text)
 }
 
-/// Opens a recording and finds out what it is: SigMF metadata if there are any, then flags over them.
-fn open_one(arguments: &args::Receive) -> Result<Recording, CliError> {
-    let stdin = arguments.file.as_os_str() == "-";
-    let (data_path, meta_path) = pair(&arguments.file);
-    let there = !stdin && present(&meta_path).map_err(|error| CliError::read(shown(&meta_path), &error))?;
-    let described = if there {
-        let (name, text) = scenario::text(&meta_path)?;
-        Some(sigmf::parse(&text, &name).map_err(CliError::input)?)
-    } else {
-        None
+/// The samples of every front end; of a live reception they are read ahead, and end with a signal.
+fn read_ahead(recordings: Vec<Recording>, live: bool) -> Result<Vec<(IfMetadata, Box<dyn Read>)>, CliError> {
+    if live {
+        interrupt::ends_work();
+    }
+    let one = |recording: Recording| {
+        let reader: Box<dyn Read> = if live {
+            let passing = |error| CliError::passing(format!("cannot start a thread: {error}"));
+            Box::new(Ahead::new(recording.reader).map_err(passing)?)
+        } else {
+            recording.reader
+        };
+        Ok((recording.metadata, reader))
     };
-    let metadata = metadata(arguments, described)?;
-    if stdin {
-        return Ok(Recording { metadata, reader: Box::new(io::stdin().lock()), samples: None });
-    }
-    let name = shown(&data_path);
-    let file = File::open(&data_path).map_err(|error| CliError::read(&name, &error))?;
-    let about = file.metadata().map_err(|error| CliError::read(&name, &error))?;
-    if about.is_dir() {
-        return Err(CliError::input(format!("{name} is a directory: expected a recording")));
-    }
-    let samples = about.is_file().then(|| about.len() / metadata.format.bytes() as u64);
-    Ok(Recording { metadata, reader: Box::new(file), samples })
+    recordings.into_iter().map(one).collect()
 }
 
-/// The recordings of a collection: front ends that share a clock.
-fn of_collection(arguments: &args::Receive) -> Result<Vec<Recording>, CliError> {
-    let path = &arguments.file;
-    let (name, text) = scenario::text(path)?;
-    let members = sigmf::parse_collection(&text, &name).map_err(CliError::input)?;
-    let files: Vec<PathBuf> =
-        members.iter().map(|member| path.with_file_name(format!("{member}.sigmf-meta"))).collect();
-    let flags = [
-        ("--format", arguments.format.is_some()),
-        ("--rate-hz", arguments.rate_hz.is_some()),
-        ("--if-hz", arguments.if_hz.is_some()),
-        ("--inverted", arguments.inverted),
-    ];
-    if let Some((flag, _)) = flags.into_iter().find(|(_, given)| *given) {
-        let names: Vec<String> = files.iter().map(|file| shown(file)).collect();
-        return Err(CliError::usage(format!(
-            "{flag}: {name} is a collection of {} recordings, each with metadata of its own: receive one of them by \
-             its path: {}",
-            members.len(),
-            names.join(", ")
-        )));
-    }
-    files.into_iter().map(|file| open_one(&args::Receive { file, ..arguments.clone() })).collect()
+/// Where the tables are made.
+enum Directory {
+    Hidden(Staging),
+    InSight(InSight),
 }
 
-/// The data and metadata files of a recording that is named by either.
-fn pair(file: &Path) -> (PathBuf, PathBuf) {
-    match file.extension().and_then(|extension| extension.to_str()) {
-        Some("sigmf-meta") => (file.with_extension("sigmf-data"), file.to_owned()),
-        _ => (file.to_owned(), file.with_extension("sigmf-meta")),
+impl Directory {
+    fn new(arguments: &args::Receive) -> Result<Self, CliError> {
+        if !arguments.live {
+            return Staging::directory(&arguments.out).map(Self::Hidden);
+        }
+        let directory = InSight::directory(&arguments.out)?;
+        scenario::note(&format!("rows as they come in {}", shown(directory.path())));
+        Ok(Self::InSight(directory))
+    }
+
+    fn path(&self) -> &Path {
+        match self {
+            Self::Hidden(staging) => staging.path(),
+            Self::InSight(directory) => directory.path(),
+        }
+    }
+
+    fn commit(self) -> Result<(), CliError> {
+        match self {
+            Self::Hidden(staging) => staging.commit(),
+            Self::InSight(directory) => directory.commit(),
+        }
     }
 }
 
-fn metadata(arguments: &args::Receive, described: Option<IfMetadata>) -> Result<IfMetadata, CliError> {
-    let rate = match arguments.rate_hz {
-        None => None,
-        Some(hz) => Some(
-            Rate::from_hz(hz)
-                .ok_or_else(|| CliError::usage(format!("--rate-hz {hz}: expected samples a second, above 0")))?,
-        ),
-    };
-    let start = match &arguments.start {
-        None => None,
-        Some(text) => Some(Epoch::parse(text).map_err(|error| CliError::usage(format!("--start: {error}")))?),
-    };
-    let missing = |flag: &str| {
-        CliError::usage(format!("{}: no .sigmf-meta beside it, so {flag} is needed", arguments.file.display()))
-    };
-    let mut metadata = match described {
-        Some(metadata) => metadata,
-        None => IfMetadata {
-            format: arguments.format.ok_or_else(|| missing("--format"))?,
-            rate: rate.ok_or_else(|| missing("--rate-hz"))?,
-            center_hz: L1_CA.centre_hz(),
-            inverted: false,
-            start: None,
-        },
-    };
-    metadata.format = arguments.format.unwrap_or(metadata.format);
-    metadata.rate = rate.unwrap_or(metadata.rate);
-    metadata.start = start.or(metadata.start);
-    metadata.inverted |= arguments.inverted;
-    if let Some(if_hz) = arguments.if_hz {
-        metadata.center_hz = L1_CA.centre_hz() - if metadata.inverted { -if_hz } else { if_hz };
+/// All that takes the receiver's records.
+struct Listeners {
+    output: Output,
+    /// Whether rows go out as they come.
+    live: bool,
+    /// The sample of the newest state of channels.
+    tracked: u64,
+    lines: Vec<Box<dyn Sink>>,
+}
+
+impl Listeners {
+    /// The tables in `directory`, and the lines that were asked for with what becomes of them.
+    fn new(arguments: &args::Receive, directory: &Path) -> Result<(Self, Vec<Made>), CliError> {
+        let output = Output::create(directory).map_err(output_error)?;
+        let (mut lines, mut made) = (Vec::<Box<dyn Sink>>::new(), Vec::new());
+        if let Some(spec) = &arguments.nmea {
+            let opened = spec.open("nmea", arguments.live)?;
+            lines.push(Box::new(Nmea::new(PathBuf::from(spec.to_string()), opened.writer)));
+            made.push(opened.made);
+        }
+        if let Some(spec) = &arguments.json {
+            let opened = spec.open("json", arguments.live)?;
+            lines.push(Box::new(JsonLines::new(PathBuf::from(spec.to_string()), opened.writer)));
+            made.push(opened.made);
+        }
+        Ok((Self { output, live: arguments.live, tracked: 0, lines }, made))
     }
-    Ok(metadata)
+}
+
+impl Listeners {
+    /// Whether a record is the last of its instant, the first of a later one, or one that comes seldom.
+    fn ends_tick(&mut self, record: &Record) -> bool {
+        match record {
+            Record::Tracking(row) => std::mem::replace(&mut self.tracked, row.sample) != row.sample,
+            Record::Observation(_) | Record::Fix(_) => false,
+            _ => true,
+        }
+    }
+}
+
+impl Sink for Listeners {
+    fn take(&mut self, record: Record) -> Result<(), OutputError> {
+        for line in &mut self.lines {
+            line.take(record.clone())?;
+        }
+        let flush = self.live && self.ends_tick(&record);
+        self.output.take(record)?;
+        if flush { self.output.flush() } else { Ok(()) }
+    }
+
+    fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
+        self.lines.iter_mut().try_for_each(|line| line.finish(summary))?;
+        self.output.finish(summary)
+    }
 }

@@ -1,13 +1,15 @@
 //! Outputs appear under their names only when they are whole.
 //!
 //! A directory is written as `.<name>.part` beside its final place and renamed at the end. What
-//! a killed run left behind is swept by the next one.
+//! a killed run left behind is swept by the next one. What is to be read while it grows, of a live reception,
+//! is written as `<name>.unfinished` ([`InSight`]) and stays there if the program is stopped.
 
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::analysis::show::staged::{Staged, present};
+use crate::analysis::show::staged::{Staged, present, remove};
 use crate::cli::error::CliError;
 
 /// Files that mark a directory as one of ours, which may be replaced.
@@ -24,32 +26,16 @@ impl Staging {
     /// Starts a directory that will be `target`. An existing target is replaced only if it is empty or one of
     /// ours.
     pub fn directory(target: &Path) -> Result<Self, CliError> {
-        let error = |error: io::Error| CliError::create(target.display(), &error);
-        if present(target).map_err(error)? && !replaceable(target).map_err(error)? {
-            return Err(CliError::refused_output(format!(
-                "{} exists and is not the result of a run: name another directory with --out, or remove it",
-                target.display()
-            )));
-        }
-        let making = Staged::directory(part(target)?).map_err(error)?;
+        refuse_others(target)?;
+        let making = Staged::directory(part(target)?).map_err(|error| CliError::create(target.display(), &error))?;
         Ok(Self { making, file: None, target: target.to_owned() })
     }
 
     /// Starts a file that will be `target`.
     pub fn file(target: &Path) -> Result<Self, CliError> {
-        let error = |error: io::Error| CliError::create(target.display(), &error);
-        // What is renamed over a device or a pipe takes its place.
-        let about = match fs::metadata(target) {
-            Err(missing) if missing.kind() == io::ErrorKind::NotFound => None,
-            other => Some(other.map_err(error)?),
-        };
-        if let Some(kind) = about.map(|metadata| metadata.file_type())
-            && !kind.is_file()
-        {
-            let what = if kind.is_dir() { "is a directory" } else { "is not an ordinary file" };
-            return Err(CliError::refused_output(format!("{} {what}: name a file with --out", target.display())));
-        }
-        let (making, file) = Staged::file(part(target)?).map_err(error)?;
+        refuse_special(target)?;
+        let made = Staged::file(part(target)?);
+        let (making, file) = made.map_err(|error| CliError::create(target.display(), &error))?;
         Ok(Self { making, file: Some(file), target: target.to_owned() })
     }
 
@@ -61,6 +47,11 @@ impl Staging {
     /// What takes the contents of a file.
     pub fn writer(&self) -> impl Write + '_ {
         Writer(self.file.as_ref())
+    }
+
+    /// A handle of a file of its own; a directory has none.
+    pub fn handle(&self) -> io::Result<File> {
+        self.file.as_ref().map_or(Err(io::ErrorKind::IsADirectory.into()), File::try_clone)
     }
 
     /// Writes all contents of a file.
@@ -83,6 +74,83 @@ impl Staging {
     }
 }
 
+/// A directory or file that may be read while it grows: `<name>.unfinished` until it is whole. It stays there
+/// where the program is stopped or fails, and the next one of that name replaces it.
+pub struct InSight {
+    path: PathBuf,
+    target: PathBuf,
+}
+
+impl InSight {
+    /// Starts a directory that will be `target`; both names are held to what [`Staging::directory`] asks.
+    pub fn directory(target: &Path) -> Result<Self, CliError> {
+        let (path, target) = (unfinished(target)?, target.to_owned());
+        refuse_others(&target)?;
+        let error = |error: io::Error| CliError::create(path.display(), &error);
+        // What an earlier one of these left has no marker yet.
+        if !path.join(ROWS).is_file() {
+            refuse_others(&path)?;
+        }
+        remove(&path).and_then(|()| fs::create_dir(&path)).map_err(error)?;
+        Ok(Self { path, target })
+    }
+
+    /// Starts a file that will be `target`.
+    pub fn file(target: &Path) -> Result<(Self, File), CliError> {
+        let (path, target) = (unfinished(target)?, target.to_owned());
+        refuse_special(&target)?;
+        refuse_special(&path)?;
+        let made = remove(&path).and_then(|()| File::options().write(true).create_new(true).open(&path));
+        let file = made.map_err(|error| CliError::create(path.display(), &error))?;
+        Ok((Self { path, target }, file))
+    }
+
+    /// Where it grows.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Gives the finished work its name.
+    pub fn commit(self) -> Result<(), CliError> {
+        let finished = Staged::adopt(self.path).finish(&self.target);
+        finished.map_err(|error| CliError::create(self.target.display(), &error))
+    }
+}
+
+/// A file that every reception has from its beginning.
+const ROWS: &str = "observations.csv";
+
+fn unfinished(target: &Path) -> Result<PathBuf, CliError> {
+    let mut name = name(target)?.to_owned();
+    name.push(".unfinished");
+    Ok(parent(target)?.join(name))
+}
+
+/// Refuses a directory that is not ours to replace.
+fn refuse_others(target: &Path) -> Result<(), CliError> {
+    let error = |error: io::Error| CliError::create(target.display(), &error);
+    if present(target).map_err(error)? && !replaceable(target).map_err(error)? {
+        return Err(CliError::refused_output(format!(
+            "{} exists and is not the result of a run: name another directory with --out, or remove it",
+            target.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Refuses a file that is none: what is renamed over a device or a pipe takes its place.
+fn refuse_special(target: &Path) -> Result<(), CliError> {
+    let about = match fs::metadata(target) {
+        Err(missing) if missing.kind() == io::ErrorKind::NotFound => return Ok(()),
+        other => other.map_err(|error| CliError::create(target.display(), &error))?,
+    };
+    if about.is_file() {
+        return Ok(());
+    }
+    let what = if about.is_dir() { "is a directory" } else { "is not an ordinary file" };
+    Err(CliError::refused_output(format!("{} {what}: name a file", target.display())))
+}
+
 /// A file's contents; a directory takes none.
 struct Writer<'a>(Option<&'a File>);
 
@@ -98,18 +166,25 @@ impl Write for Writer<'_> {
 
 /// Where it is made: beside its place, which is created.
 fn part(target: &Path) -> Result<PathBuf, CliError> {
-    let name = target
-        .file_name()
-        .ok_or_else(|| CliError::usage(format!("--out {}: expected a name to write to", target.display())))?;
+    let mut part = OsString::from(".");
+    part.push(name(target)?);
+    part.push(".part");
+    Ok(parent(target)?.join(part))
+}
+
+fn name(target: &Path) -> Result<&OsStr, CliError> {
+    let missing = || CliError::usage(format!("{}: expected a name to write to", target.display()));
+    target.file_name().ok_or_else(missing)
+}
+
+/// The directory of a file's or directory's name, which is made where there is none.
+fn parent(target: &Path) -> Result<PathBuf, CliError> {
     let parent = match target.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
         _ => PathBuf::from("."),
     };
     fs::create_dir_all(&parent).map_err(|error| CliError::create(parent.display(), &error))?;
-    let mut part = std::ffi::OsString::from(".");
-    part.push(name);
-    part.push(".part");
-    Ok(parent.join(part))
+    Ok(parent)
 }
 
 /// Whether a directory is there that is empty or one of ours.

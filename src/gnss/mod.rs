@@ -41,7 +41,7 @@ pub mod ionosphere;
 pub mod klobuchar;
 pub mod message;
 pub mod nequick;
-#[cfg(any(feature = "receiver", feature = "analysis"))]
+pub mod nmea;
 pub mod place;
 pub mod record;
 #[cfg(feature = "generator")]

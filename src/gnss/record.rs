@@ -261,6 +261,18 @@ fn gpst() -> String {
     GPST.name.to_owned()
 }
 
+/// Where a satellite stands as the receiver sees it from its fix. It is reported while the receiver runs, and has
+/// no table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SightRow {
+    pub sample: u64,
+    pub sv: Sv,
+    pub azimuth_deg: f64,
+    pub elevation_deg: f64,
+    /// Whether it is in the fix.
+    pub used: bool,
+}
+
 /// The receiver's clock against one time scale: `rx/clocks.csv`, of fixes with another than GPS time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClockRow {

@@ -18,6 +18,7 @@ pub const ORDER: Order<'static> = &[
             &["broadcast"],
             &["record"],
             &["message"],
+            &["nmea"],
             &["gps", "galileo"],
             &["rinex"],
             &["sp3"],

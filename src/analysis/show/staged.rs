@@ -61,6 +61,12 @@ impl Staged {
         &self.path
     }
 
+    /// What was made at `path` without being staged, from here on as if it had been.
+    pub fn adopt(path: PathBuf) -> Self {
+        known().insert(path.clone());
+        Self { path }
+    }
+
     /// Gives it its name. What bears that name is replaced, or stays if this fails.
     ///
     /// # Errors

@@ -4,6 +4,9 @@
 //! Rows go out as they come, so memory stays flat. Headers are written at once: a file without rows says that
 //! there were none, a missing file that nothing ran.
 
+mod json;
+mod nmea;
+
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -13,8 +16,12 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::gnss::record::{AcquisitionRow, ClockRow, EventRow, Fix, LineRow, NavigationRow, Observation, TrackingRow};
+use crate::gnss::record::{
+    AcquisitionRow, ClockRow, EventRow, Fix, LineRow, NavigationRow, Observation, SightRow, TrackingRow,
+};
 use crate::gnss::time::GPST;
+pub use json::JsonLines;
+pub use nmea::Nmea;
 
 /// A file that could not be made or written.
 #[derive(Debug, Error)]
@@ -57,6 +64,8 @@ pub enum Record {
     Fix(Fix),
     /// The clocks of the fix before: one a time scale.
     Clocks(Vec<ClockRow>),
+    /// Where the satellites of the fix before stand, those too that it left out.
+    Sights(Vec<SightRow>),
     /// A line in the spectrum of a front end's samples; front ends count from 0.
     Interference {
         /// The front end's place, from 0 on.
@@ -242,6 +251,26 @@ impl Output {
         })
     }
 
+    /// Writes what is buffered, so that whole rows can be read.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] with the file.
+    pub fn flush(&mut self) -> Result<(), OutputError> {
+        for sheet in [
+            &mut self.observations,
+            &mut self.fixes,
+            &mut self.acquisition,
+            &mut self.tracking,
+            &mut self.navigation,
+            &mut self.events,
+            &mut self.interference,
+        ] {
+            sheet.flush()?;
+        }
+        self.clocks.as_mut().map_or(Ok(()), Sheet::flush)?;
+        self.interference_of.values_mut().try_for_each(Sheet::flush)
+    }
+
     /// Writes a fix's clocks, if they are more than that of GPS time.
     fn clocks(&mut self, rows: &[ClockRow]) -> Result<(), OutputError> {
         if rows.iter().all(|row| row.time_scale == GPST.name) {
@@ -291,25 +320,15 @@ impl Sink for Output {
             Record::Navigation(rows) => self.navigation(rows),
             Record::Fix(row) => self.fixes.write(&row),
             Record::Clocks(rows) => self.clocks(&rows),
+            // It follows from the fix and the ephemerides.
+            Record::Sights(_) => Ok(()),
             Record::Interference { front_end, row } => self.interference(front_end, &row),
         }
     }
 
     /// Writes what is buffered, and `receiver.json`.
     fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
-        for sheet in [
-            &mut self.observations,
-            &mut self.fixes,
-            &mut self.acquisition,
-            &mut self.tracking,
-            &mut self.navigation,
-            &mut self.events,
-            &mut self.interference,
-        ] {
-            sheet.flush()?;
-        }
-        self.clocks.as_mut().map_or(Ok(()), Sheet::flush)?;
-        self.interference_of.values_mut().try_for_each(Sheet::flush)?;
+        self.flush()?;
         let path = self.directory.join("receiver.json");
         let text = serde_json::to_string_pretty(summary).unwrap_or_default() + "\n";
         fs::write(&path, text).map_err(|error| write_error(&path, error))

@@ -16,7 +16,7 @@ use thiserror::Error;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::record::{ClockRow, Fix, IonosphereModel, Observation};
+use crate::gnss::record::{ClockRow, Fix, IonosphereModel, Observation, SightRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, GPST, Rate, SampleClock, TimePolynomial, TimeScale};
@@ -265,6 +265,8 @@ pub struct Solved {
     pub fix: Fix,
     /// The clock against each time scale.
     pub clocks: Vec<ClockRow>,
+    /// Where the satellites stand that have an ephemeris.
+    pub sights: Vec<SightRow>,
     /// Satellites in it.
     pub used: Vec<Sv>,
     /// Satellites that the residual test left out, with their distance from the others' solution.
@@ -366,6 +368,7 @@ impl Solver {
         };
         let in_space = Geodetic::from_ecef(&first.position_m).height_m >= SPACE_M;
         let mask_rad = if in_space { f64::NEG_INFINITY } else { self.settings.mask_deg.to_radians() };
+        let mut sights = sights(sample, &ranges, &first);
         let visible: Vec<Range> = ranges
             .into_iter()
             .zip(&first.elevations_rad)
@@ -384,7 +387,8 @@ impl Solver {
         let model = if combined { IonosphereModel::Combined } else { model };
         let fix = fix(sample, clock, &solution, velocity_mps, drift, counts, &excluded, model);
         let clocks = clocks(sample, &solution);
-        Ok(Solved { fix, clocks, used, excluded })
+        sights.iter_mut().for_each(|sight| sight.used = used.contains(&sight.sv));
+        Ok(Solved { fix, clocks, sights, used, excluded })
     }
 
     /// What corrects for the ionosphere near a place, and its name in a fix.
@@ -484,6 +488,26 @@ fn fix(
         excluded: names.join(" "),
         ionosphere,
     }
+}
+
+/// Where the satellites of the ranges stand, each once, from a position that is metres off at most.
+fn sights(sample: u64, ranges: &[Range], from: &Solution) -> Vec<SightRow> {
+    let axes = Geodetic::from_ecef(&from.position_m).ecef_to_enu();
+    let mut rows: Vec<SightRow> = (ranges.iter().zip(&from.sights))
+        .map(|(range, sight)| {
+            let enu = axes * sight;
+            SightRow {
+                sample,
+                sv: range.sv,
+                azimuth_deg: libm::atan2(enu.x, enu.y).to_degrees().rem_euclid(360.0),
+                elevation_deg: libm::asin(enu.z.clamp(-1.0, 1.0)).to_degrees(),
+                used: false,
+            }
+        })
+        .collect();
+    rows.sort_by_key(|row| row.sv);
+    rows.dedup_by_key(|row| row.sv);
+    rows
 }
 
 /// The clock against each time scale of a solution, one row a scale.

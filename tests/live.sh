@@ -1,0 +1,146 @@
+#!/usr/bin/env bash
+# Programs that this project did not write take the twin's samples while they are made: Debian's GNSS-SDR by FIFO and by rtl_tcp, whose
+# fixes must lie within 5 m of the scene's place, and Debian's hackrf_transfer on a stand-in for its library (tests/live/hackrf.c), which
+# plays buffers at the sample rate, keeps the bytes and counts shortfalls. The receiver's NMEA is read by pynmeagps.
+#
+# usage: tests/live.sh [GNSS_TWIN_BINARY [long]]     (default: target/release/gnss-twin; long: a whole minute to each receiver)
+# exit:  0 all hold; 1 one does not; 75 a program could not be installed.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+twin=$(realpath "${1:-$root/target/release/gnss-twin}")
+limit_m=5
+duration_s=42
+if [[ ${2:-} == long ]]; then duration_s=60; fi
+
+need() { # program, package
+    command -v "$1" >/dev/null && return
+    echo "live: installing $2"
+    { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq "$2"; } >/dev/null 2>&1 || {
+        echo "live: cannot install $2 here" >&2
+        exit 75
+    }
+}
+need gnss-sdr gnss-sdr
+need hackrf_transfer hackrf
+
+work=$(mktemp -d)
+children=()
+end() {
+    for child in "${children[@]}"; do kill "$child" 2>/dev/null || true; done
+    rm -rf "$work"
+}
+trap end EXIT
+failed=0
+fail() {
+    echo "live: FAILED: $*"
+    failed=1
+}
+
+scene=$work/scene.toml
+sed -e "s/^duration_s = .*/duration_s = $duration_s/" "$root/scenarios/static.toml" >"$scene"
+value() { sed -n "s/^$1 *= *\([-0-9.e_]*\).*/\1/p" "$scene" | tr -d _ | head -n 1; }
+rate_hz=$(awk -v r="$(value sample_rate_hz)" 'BEGIN { printf "%.0f", r }')
+
+# The address at which a program of ours listens.
+address() { # its standard error
+    local found=
+    for _ in $(seq 200); do
+        found=$(sed -n 's/.*listening on //p' "$1" | head -n 1)
+        [ -n "$found" ] && break
+        sleep 0.05
+    done
+    echo "$found"
+}
+
+# Mean of all GGA fixes against the scene, in a local frame of the WGS 84 ellipsoid.
+place() { # name, NMEA file
+    awk -F, -v name="$1" -v lat0="$(value latitude_deg)" -v lon0="$(value longitude_deg)" -v h0="$(value height_m)" -v limit="$limit_m" '
+        function degrees(text,   d) { d = int(text / 100); return d + (text - 100 * d) / 60 }
+        $1 ~ /GGA$/ && $7 > 0 {
+            lat = degrees($3); if ($4 == "S") lat = -lat
+            lon = degrees($5); if ($6 == "W") lon = -lon
+            n++; slat += lat; slon += lon; sh += $10 + $12
+        }
+        END {
+            if (!n) { print "live: " name ": no GGA fix"; exit 1 }
+            rad = atan2(0, -1) / 180; s = sin(lat0 * rad); e2 = 0.00669437999014
+            north = (slat / n - lat0) * rad * (6378137 * (1 - e2) / (1 - e2 * s * s) ^ 1.5 + h0)
+            east = (slon / n - lon0) * rad * (6378137 / sqrt(1 - e2 * s * s) + h0) * cos(lat0 * rad)
+            up = sh / n - h0
+            error = sqrt(east * east + north * north + up * up)
+            printf "live: %s: %d fixes, mean error east %+.2f north %+.2f up %+.2f m, 3-D %.2f m (limit %g m)\n", name, n, east, north, up, error, limit
+            exit !(error <= limit)
+        }' "$2" || fail "$1"
+}
+
+# GNSS-SDR on the twin's samples while they are made. Its reader of a FIFO goes on for ever at the end, so that it is ended here.
+foreign() { # name, --out of the twin, lines of the signal source, format
+    local out=$work/$1 twin_is sdr_is address
+    mkdir -p "$out"
+    mkfifo "$out/keys"
+    exec 9<>"$out/keys"
+    "$twin" generate "$scene" --out "$2" --format "$4" 2>"$out/twin.txt" &
+    twin_is=$!
+    children+=("$twin_is")
+    if [[ $2 == rtl-tcp:* ]]; then address=$(address "$out/twin.txt"); else address=; fi
+    sed -e "/^SignalSource\./d; /^DataTypeAdapter\./d; s|@RATE_HZ@|$rate_hz|; s|@OUT@|$out|; s|@GPS@|12|; s|@GALILEO@|0|; s|@IONOSPHERE@|Broadcast|" \
+        "$root/tests/interop/gnss-sdr.conf.in" >"$out/gnss-sdr.conf"
+    {
+        echo "DataTypeAdapter.implementation=Pass_Through"
+        echo "DataTypeAdapter.item_type=gr_complex"
+        echo "SignalSource.sampling_frequency=$rate_hz"
+        sed "s|@PORT@|${address##*:}|" <<<"$3"
+    } >>"$out/gnss-sdr.conf"
+    (cd "$out" && GLOG_minloglevel=2 exec gnss-sdr --config_file="$out/gnss-sdr.conf" --log_dir="$out" <"$out/keys" >"$out/stdout.txt" 2>"$out/stderr.txt") &
+    sdr_is=$!
+    children+=("$sdr_is")
+    wait "$twin_is" || fail "$1: the twin ended with $?: $(tail -n 1 "$out/twin.txt")"
+    # What it still has in its buffers, then its key to stop.
+    sleep 2
+    echo q >&9
+    for _ in $(seq 100); do kill -0 "$sdr_is" 2>/dev/null || break; sleep 0.1; done
+    kill -KILL "$sdr_is" 2>/dev/null && echo "live: gnss-sdr did not stop by itself"
+    wait "$sdr_is" 2>/dev/null || true
+    exec 9>&-
+    if [ -s "$out/pvt.nmea" ]; then place "GNSS-SDR by $1" "$out/pvt.nmea"; else fail "$1: no position"; tail -n 5 "$out/stdout.txt"; fi
+}
+
+mkfifo "$work/if"
+foreign fifo "fifo:$work/if" "SignalSource.implementation=Fifo_Signal_Source
+SignalSource.filename=$work/if
+SignalSource.sample_type=ibyte" ci8
+# Its settings take ports below 32768.
+foreign rtl_tcp "rtl-tcp:$((20000 + $$ % 10000))" "SignalSource.implementation=RtlTcp_Signal_Source
+SignalSource.item_type=gr_complex
+SignalSource.address=127.0.0.1
+SignalSource.port=@PORT@
+SignalSource.freq=1575420000
+SignalSource.AGC_enabled=true
+SignalSource.gain=40
+SignalSource.rf_gain=40
+SignalSource.if_gain=40
+SignalSource.swap_iq=false" cu8
+
+# A transmitter in real time, with a stall on the way to it.
+count=$((5 * rate_hz / 2))
+"$twin" generate "$scene" --out "$work/plain.sigmf-data" --format ci8 --samples "$count" >/dev/null
+cc -O1 -shared -fPIC -Wl,-soname,libhackrf.so.0 -o "$work/libhackrf.so.0" "$root/tests/live/hackrf.c" -lpthread
+stall() { head -c 6000000; sleep "$1"; cat; }
+transmit() { # stall in seconds
+    "$twin" generate "$scene" --out - --samples "$count" 2>/dev/null | stall "$1" |
+        HACKRF_BYTES=$work/sent HACKRF_REPORT=$work/report LD_LIBRARY_PATH=$work hackrf_transfer -t - -f 1575420000 -s "$rate_hz" \
+            2>"$work/hackrf.txt" >&2
+    cmp "$work/sent" "$work/plain.sigmf-data" || fail "hackrf_transfer: other bytes than generate's"
+    shortfalls=$(sed -n 's/^shortfalls=//p' "$work/report")
+    echo "live: hackrf_transfer, stall of $1 s: $(stat -c %s "$work/sent") bytes as generated, $(tr '\n' ' ' <"$work/report")"
+}
+# Its queue is 202 ms long here. A busy machine may stall it for the rest of that too, which is no fault of the twin's: one in three is enough.
+for _ in 1 2 3; do
+    transmit 0.05
+    if [ "$shortfalls" = 0 ]; then break; fi
+done
+[ "$shortfalls" = 0 ] || fail "hackrf_transfer: a shortfall at a stall of 50 ms"
+transmit 0.5
+[ "$shortfalls" -ge 1 ] || fail "hackrf_transfer: no shortfall at a stall of 500 ms"
+
+exit "$failed"
