@@ -113,7 +113,8 @@ impl Wanted {
         let mut greeting = [0; 12];
         let refuse = |what: String| {
             CliError::input(format!(
-                "{peer} is no server of rtl_tcp: {what}, expected 12 bytes that begin with RTL0 (tcp:{peer} takes samples alone)"
+                "{peer} is no server of rtl_tcp: {what}, expected 12 bytes that begin with RTL0 (tcp:{peer} takes \
+                 samples alone)"
             ))
         };
         server.set_read_timeout(Some(GREETING)).map_err(|error| CliError::read(peer, &error))?;

@@ -23,24 +23,34 @@ const GSV_SATELLITES: usize = 4;
 /// Where somebody is, and when.
 #[derive(Clone, Debug)]
 pub struct Place {
+    /// GPS time of the position.
     pub time: Epoch,
+    /// ECEF position.
     pub position_m: Vector3<f64>,
+    /// ECEF velocity.
     pub velocity_mps: Vector3<f64>,
     /// Satellites in the solution.
     pub satellites: u32,
+    /// Dilution of precision: of the position,
     pub pdop: f64,
+    /// of the horizontal position,
     pub hdop: f64,
+    /// and of the height.
     pub vdop: f64,
 }
 
 /// A satellite of a GSA or GSV sentence.
 #[derive(Clone, Debug)]
 pub struct Seen {
+    /// The satellite.
     pub sv: Sv,
-    /// Strongest first where a satellite has several signals; absent if it is not received.
+    /// Its strongest signal and that one's C/N0 in dB-Hz; absent if it is not received.
     pub signal: Option<(&'static Signal, f64)>,
+    /// From north over east.
     pub azimuth_deg: f64,
+    /// Above the horizon.
     pub elevation_deg: f64,
+    /// Whether it is in the solution.
     pub used: bool,
 }
 

@@ -261,13 +261,17 @@ fn gpst() -> String {
     GPST.name.to_owned()
 }
 
-/// Where a satellite stands as the receiver sees it from its fix. It is reported while the receiver runs, and has
-/// no table.
+/// Where a satellite stands as the receiver sees it from its fix. It is reported while the receiver runs, and
+/// has no table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SightRow {
+    /// That of the fix.
     pub sample: u64,
+    /// The satellite.
     pub sv: Sv,
+    /// From north over east.
     pub azimuth_deg: f64,
+    /// Above the horizon.
     pub elevation_deg: f64,
     /// Whether it is in the fix.
     pub used: bool,
