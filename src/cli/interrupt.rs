@@ -1,5 +1,7 @@
-//! Signals: the first takes outputs in the making away and ends the process, the second ends it at once. Where
-//! work has no end of its own, the first one may end it instead ([`ends_work`]), as if its input had ended.
+//! Signals: the first takes outputs in the making away and ends the process, the second ends it at once.
+//!
+//! Where work has no end of its own, the first one may end it instead ([`ends_work`]), as if its input had
+//! ended.
 //!
 //! A thread of its own waits for them, so that they are noticed whatever the others are at: computing,
 //! reading a pipe that stays silent, or drawing.

@@ -87,8 +87,11 @@ fn report(arguments: &args::Receive, outcome: &Outcome) -> Result<(), CliError> 
     scenario::print(&text)
 }
 
+/// A front end's samples and what is said of them.
+type FrontEnd = (IfMetadata, Box<dyn Read>);
+
 /// The samples of every front end; of a live reception they are read ahead, and end with a signal.
-fn read_ahead(recordings: Vec<Recording>, live: bool) -> Result<Vec<(IfMetadata, Box<dyn Read>)>, CliError> {
+fn read_ahead(recordings: Vec<Recording>, live: bool) -> Result<Vec<FrontEnd>, CliError> {
     if live {
         interrupt::ends_work();
     }
