@@ -103,8 +103,8 @@ fn lost_samples_cost_no_channel_of_either_system_and_are_counted_by_each_alone()
     let both = "\"GPS L1 C/A\", \"synthetic A\"";
     let second = "\"synthetic A\"";
     // 1.6 ms displace codes and symbols of both systems; 4 ms are a symbol and a code period of the second,
-    // whose overlay alone shows them; GPS beside it keeps the Dopplers by which they are counted.
-    for (signals, lost) in [(both, 7000), (second, 7000), (both, 17_200)] {
+    // whose overlay alone shows them.
+    for (signals, lost) in [(both, 7000), (second, 7000), (both, 17_200), (second, 17_200)] {
         let first = 36.0;
         let cut = [&bytes[..at(first)], &bytes[at(first) + 2 * lost..]].concat();
         let text = format!(

@@ -128,6 +128,8 @@ pub(super) struct Gap {
     stage: Stage,
     last_look: u64,
     last_edges: u64,
+    /// When a scan found codes where they were.
+    in_place: Option<u64>,
     scan: Option<(&'static Signal, Scan)>,
     planes: Planes,
     pub jumps: Vec<Jump>,
@@ -190,8 +192,11 @@ impl FrontEnd {
         let glances: Vec<Option<Glance>> = self.tracks.iter_mut().map(|track| track.channel.glance()).collect();
         match self.gap.stage {
             Stage::Quiet => {
-                self.suspect(&glances, middle_s, before, shared);
+                // Signs in the wrong place say how many periods are missing; what shakes carriers says less.
                 self.compare_edges(now, sink)?;
+                if self.gap.stage == Stage::Quiet {
+                    self.suspect(&glances, middle_s, before, shared);
+                }
             }
             Stage::Scanning { .. } => {}
             Stage::Settling(moved) => {

@@ -71,7 +71,9 @@ impl FrontEnd {
         match scan.decide(&profiles).filter(|_| enough) {
             // An overlay out of place shakes the carrier until no power is left: the turns of its signs show
             // it next, and want to know what was before.
-            Some(found) if found.samples == 0 && !whole && self.has_overlays() => self.gap.stage = Stage::Quiet,
+            Some(found) if found.samples == 0 && !whole && self.has_overlays() => {
+                (self.gap.stage, self.gap.in_place) = (Stage::Quiet, Some(block.end()));
+            }
             // Otherwise a power that vanished without a jump is someone else's matter.
             Some(found) if found.samples == 0 && !whole => self.calm(),
             Some(found) => self.reseat(Moved { since, at: block.end(), found, whole }, sink)?,

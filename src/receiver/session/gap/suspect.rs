@@ -21,6 +21,9 @@ const EDGES_S: f64 = 0.4;
 /// Code periods in a window over which the turns of an overlay are compared, at least. Two windows of a chip
 /// sequence of 25 show every displacement; a phase loop in a wrong overlay loses its lock after 0.2 s.
 const OVERLAY_PERIODS: u64 = 10;
+/// An overlay out of place shakes the phase loop until no power is left: for so long after a scan has found
+/// the codes in place, that is no reason for another.
+const SHAKEN_S: f64 = 0.3;
 /// Looks that are averaged before they enter a trend: whole symbols that are missing move codes by their
 /// Dopplers alone, 0.02 chip in 20 ms, twice the noise of one look at 45 dB-Hz.
 const AVERAGED: usize = 8;
@@ -103,6 +106,8 @@ impl FrontEnd {
             }
         }
         let vanished = gone >= LEAST_CHANNELS && gone as f64 >= VANISHED_SHARE * f64::from(seen);
+        // Codes that a scan has found in place: it is the carriers that are shaken.
+        let vanished = vanished && self.gap.in_place.is_none_or(|at| since > at + self.samples(SHAKEN_S));
         let sample_chips = reference.chip_rate_hz / self.metadata.rate.hz();
         if vanished
             || common_step(&steps, sample_chips).is_some()
