@@ -10,7 +10,7 @@ use crate::gnss::samples::Format;
 
 /// A GNSS digital twin: generate IF samples from real ephemerides, receive them, judge the receiver.
 ///
-/// Without a command it runs the static scene that comes with the program.
+/// Without a command it runs the scene of GPS and Galileo that comes with the program.
 #[derive(Debug, Parser)]
 #[command(version, after_help = "Example: gnss-twin run scenarios/moderate.toml --out reports/moderate")]
 pub struct Arguments {
@@ -46,7 +46,7 @@ pub struct Reference {
 #[derive(Args, Debug, Default)]
 #[command(after_help = "Example: gnss-twin run scenarios/static.toml --seed 7 --keep-if")]
 pub struct Run {
-    /// Scene to run [default: the embedded static scene]
+    /// Scene to run [default: the embedded scene of GPS and Galileo]
     pub scenario: Option<PathBuf>,
     /// Directory for the results [default: reports/<scene's name>, and -NAME with --front-end NAME]
     #[arg(long, value_name = "DIR")]
@@ -201,7 +201,7 @@ pub struct ReceiverFiles {
 #[derive(Args, Debug)]
 #[command(after_help = "Example: gnss-twin plan scenarios/high_dynamics.toml")]
 pub struct Plan {
-    /// Scene to plan [default: the embedded static scene]
+    /// Scene to plan [default: the embedded scene of GPS and Galileo]
     pub scenario: Option<PathBuf>,
     /// Also read files that lie outside the scenario's directory
     #[arg(long)]

@@ -10,7 +10,7 @@ use crate::generator::scene::Scene;
 use crate::receiver::settings::Settings;
 
 /// The scene that runs when none is named.
-const EMBEDDED: &str = include_str!("../../scenarios/static.toml");
+const EMBEDDED: &str = include_str!("../../scenarios/two_systems.toml");
 
 /// Largest scenario, limits, settings or metadata that is read.
 const LARGEST_BYTES: u64 = 4 << 20;
@@ -40,7 +40,7 @@ impl Named {
 /// Reads the scenario at `path`, or the embedded one.
 pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
     let Some(path) = path else {
-        let name = "the embedded static scene".to_owned();
+        let name = "the embedded scene of two systems".to_owned();
         let scenario = Scenario::parse(EMBEDDED, &name).map_err(CliError::bug)?;
         return Ok(Named { scenario, text: EMBEDDED.to_owned(), name, directory: PathBuf::from(".") });
     };

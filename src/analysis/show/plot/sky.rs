@@ -8,7 +8,7 @@ use crate::analysis::show::plot::canvas::{Area, FINE, Failure, GREY, WIDTH_PX, a
 use crate::analysis::show::plot::judged::Judged;
 use crate::analysis::show::plot::sketch::Sketch;
 use crate::analysis::statistics::mean;
-use crate::gnss::satellite::Sv;
+use crate::gnss::satellite::{Sv, System};
 
 const HEIGHT_PX: i32 = 490;
 const CENTRE: (i32, i32) = (290 * FINE, 255 * FINE);
@@ -45,6 +45,9 @@ fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Resul
     let low = strengths().fold(f64::INFINITY, f64::min).floor();
     let high = strengths().fold(f64::NEG_INFINITY, f64::max).ceil();
     let (low, high) = if low < high { (low, high) } else { (30.0, 50.0) };
+    let mut systems: Vec<System> = tracks.iter().map(|track| track.sv.system).collect();
+    systems.sort_unstable();
+    systems.dedup();
     obstructed(area, skyline_deg)?;
     frame(area)?;
     scale(area, low, high)?;
@@ -55,8 +58,8 @@ fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Resul
         let colour = cn0_dbhz.map_or(GREY, |cn0| shade(cn0, low, high));
         let Some(&end) = places.last() else { continue };
         area.draw(&PathElement::new(places.clone(), colour.stroke_width(3 * FINE as u32)))?;
-        area.draw(&Circle::new(end, 8 * FINE, if *observed { colour.filled() } else { WHITE.filled() }))?;
-        area.draw(&Circle::new(end, 8 * FINE, colour.stroke_width(2 * FINE as u32)))?;
+        let inside = if *observed { colour } else { WHITE };
+        dot(area, end, systems.iter().position(|system| *system == sv.system).unwrap_or(0), (inside, colour))?;
         ends.push((*sv, end));
     }
     for (sv, end) in ends {
@@ -64,11 +67,37 @@ fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Resul
     }
     let note = anchored(12, HPos::Left, VPos::Center);
     let shaded = if skyline_deg.is_empty() { "" } else { "; shaded: obstructed at the start" };
+    let shapes: Vec<String> =
+        systems.iter().zip(SHAPES).map(|(system, shape)| format!("; {shape}: {system}")).collect();
+    let shapes = if systems.len() > 1 { shapes.concat() } else { String::new() };
     area.draw(&Text::new(
-        format!("filled: observed by the receiver{shaded}"),
+        format!("filled: observed by the receiver{shaded}{shapes}"),
         (14 * FINE, (HEIGHT_PX - 16) * FINE),
         note,
     ))?;
+    Ok(())
+}
+
+/// The dots of the first system, the second, and so on.
+const SHAPES: [&str; 4] = ["circles", "squares", "diamonds", "triangles"];
+
+/// A satellite's dot in the shape of its system: colours inside and of its rim.
+fn dot(area: &Area<'_>, (x, y): (i32, i32), system: usize, (inside, rim): (RGBColor, RGBColor)) -> Result<(), Failure> {
+    // Corners in eighths of a circle's radius that give about a circle's area.
+    let corners: &[(i32, i32)] = match system {
+        0 => {
+            area.draw(&Circle::new((x, y), 8 * FINE, inside.filled()))?;
+            area.draw(&Circle::new((x, y), 8 * FINE, rim.stroke_width(2 * FINE as u32)))?;
+            return Ok(());
+        }
+        1 => &[(-7, -7), (7, -7), (7, 7), (-7, 7)],
+        2 => &[(0, -10), (10, 0), (0, 10), (-10, 0)],
+        _ => &[(0, -10), (9, 6), (-9, 6)],
+    };
+    let outline: Vec<(i32, i32)> = corners.iter().map(|(dx, dy)| (x + dx * FINE, y + dy * FINE)).collect();
+    area.draw(&Polygon::new(outline.clone(), inside.filled()))?;
+    let closed: Vec<(i32, i32)> = outline.iter().chain(outline.first()).copied().collect();
+    area.draw(&PathElement::new(closed, rim.stroke_width(2 * FINE as u32)))?;
     Ok(())
 }
 

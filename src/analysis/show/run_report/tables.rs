@@ -15,6 +15,7 @@ const MOST_EVENTS: usize = 30;
 pub(super) fn add(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError> {
     report.heading("Accuracy");
     accuracy(report, judged);
+    signals(report, judged);
     loops(report, judged);
     satellites(report, judged)?;
     clock(report, judged);
@@ -60,6 +61,44 @@ fn accuracy(report: &mut Report, judged: &Judged<'_>) {
     row("position up", "m", details.up_m);
     row("clock, as a distance", "m", details.clock_m);
     row("velocity, magnitude", "m/s", details.velocity_mps);
+    report.table(table);
+}
+
+/// What each of several signals came to.
+fn signals(report: &mut Report, judged: &Judged<'_>) {
+    if judged.summary.signals.len() < 2 {
+        return;
+    }
+    let columns = [
+        ("signal", Side::Left),
+        ("satellites", Side::Right),
+        ("pseudorange (m)", Side::Right),
+        ("carrier (cycles)", Side::Right),
+        ("Doppler (Hz)", Side::Right),
+        ("C/N0, mean (dB)", Side::Right),
+        ("DLL σ (chips)", Side::Right),
+        ("PLL σ (°)", Side::Right),
+        ("losses", Side::Right),
+    ];
+    let mut table = Table::new(
+        "By signal: root mean square errors of its observations, what its C/N0 was measured beyond the expected one, \
+         deviation of its loops' errors, and losses of lock. Pseudoranges are against the mean of their own system.",
+        columns,
+    );
+    for (name, signal) in &judged.summary.signals {
+        let (errors, loops) = (&signal.observables, &signal.tracking);
+        table.row([
+            (*name).to_owned(),
+            signal.satellites.to_string(),
+            fixed(errors.pseudorange_rms_m, 3),
+            fixed(errors.carrier_rms_cycles, 4),
+            fixed(errors.doppler_rms_hz, 3),
+            fixed(errors.cn0_bias_db, 2),
+            fixed(loops.dll_sigma_chips, 4),
+            fixed(loops.pll_sigma_deg, 2),
+            loops.losses_of_lock.to_string(),
+        ]);
+    }
     report.table(table);
 }
 
