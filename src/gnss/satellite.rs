@@ -50,6 +50,18 @@ impl System {
         }
     }
 
+    /// Semi-major axis of its orbits, in metres: those of its medium ones, if it has any. Nominal values of
+    /// the systems' documents; SBAS, QZSS and NavIC turn with the Earth.
+    pub fn orbit_m(self) -> f64 {
+        match self {
+            Self::Gps => 26_559.7e3,
+            Self::Glonass => 25_510e3,
+            Self::Galileo => 29_600.318e3,
+            Self::BeiDou => 27_906.1e3,
+            Self::Qzss | Self::Navic | Self::Sbas => 42_164.2e3,
+        }
+    }
+
     /// The RINEX letter.
     pub fn letter(self) -> char {
         Self::LETTERS.iter().find(|(system, _)| *system == self).map_or('?', |(_, letter)| *letter)

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::{Layer, Signal};
+use crate::receiver::correlate::Waveform;
 use crate::receiver::lead::lead;
 use crate::receiver::settings::Settings;
 
@@ -13,8 +14,8 @@ pub struct Followed {
     pub signal: &'static str,
     /// Place of the component among the signal's …
     pub component: usize,
-    /// … and of the layer that the replica has among that component's.
-    pub layer: usize,
+    /// … and of the layer that the replica has among that component's; `None` where it has them all.
+    pub layer: Option<usize>,
     /// Distance of early and late, fitted to the layer's pulse.
     pub spacing_chips: f64,
     /// Time of a loop's update.
@@ -29,12 +30,16 @@ impl Followed {
     /// Of a signal by these settings; `None` where nothing of it can be followed.
     pub fn of(signal: &'static Signal, settings: &Settings) -> Option<Self> {
         let leading = lead(signal)?;
-        let made = leading.strongest()?;
+        let place = |made: &Layer| leading.layers.iter().position(|layer| std::ptr::eq(layer, made));
+        let layer = match settings.tracking.waveform {
+            Waveform::Strongest => Some(place(leading.strongest()?)?),
+            Waveform::Whole => None,
+        };
         let fitted = settings.tracking.fitted(leading);
         Some(Self {
             signal: signal.name,
             component: signal.components.iter().position(|component| std::ptr::eq(component, leading))?,
-            layer: leading.layers.iter().position(|layer| std::ptr::eq(layer, made))?,
+            layer,
             spacing_chips: fitted.spacing_chips,
             integration_s: leading.period_s() * f64::from(fitted.integration),
             pll_bandwidth_hz: fitted.pll_bandwidth_hz,

@@ -1,7 +1,7 @@
 //! The component of a signal that a receiver searches and follows.
 
 use crate::gnss::signal::{Component, Shape, Signal};
-use crate::receiver::correlate::fits;
+use crate::receiver::correlate::{Waveform, fits};
 
 /// The strongest component whose code is short enough to be made; of equally strong ones a pilot.
 ///
@@ -28,8 +28,12 @@ pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'st
 }
 
 /// Correlation of a component with the replica that is made of it, and of the replica with itself.
-pub fn shapes(component: &Component) -> Option<[Shape; 2]> {
-    Some(component.shapes_by(component.strongest()?))
+pub fn shapes(component: &Component, made: Waveform) -> Option<[Shape; 2]> {
+    let strongest = component.strongest()?;
+    Some(match made {
+        Waveform::Strongest => component.shapes_by(strongest),
+        Waveform::Whole => [component.shape(), component.shape()],
+    })
 }
 
 /// Power that the replica finds, over the component's.
@@ -40,8 +44,8 @@ pub fn efficiency(signal: &Shape, own: &Shape) -> f64 {
 
 /// C/N0 of what the receiver follows of a signal over that of the whole signal, in decibels: the component's
 /// share of the power, less what its replica does not have.
-pub fn followed_db(component: &Component) -> f64 {
-    let efficiency = shapes(component).map_or(1.0, |[signal, own]| efficiency(&signal, &own));
+pub fn followed_db(component: &Component, made: Waveform) -> f64 {
+    let efficiency = shapes(component, made).map_or(1.0, |[signal, own]| efficiency(&signal, &own));
     10.0 * libm::log10(component.power_share * efficiency)
 }
 
@@ -51,7 +55,7 @@ pub fn refusal(signal: &'static Signal) -> Option<String> {
         return Some("no message of it is known".to_owned());
     }
     let Some(component) = lead(signal) else {
-        return Some("none of its codes has fewer than 32 768 steps a period".to_owned());
+        return Some("none of its codes has fewer than 65 536 steps a period".to_owned());
     };
     if component.message.is_some() && component.overlay.periods() > 1 {
         return Some("its data have an overlay code, and no pilot beside them shows where it begins".to_owned());

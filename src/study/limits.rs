@@ -54,7 +54,7 @@ pub fn channel_of(signal: &'static Signal, settings: &TrackingSettings, mode: Mo
         cn0_dbhz,
         motion: Motion::default(),
         oscillator: None,
-        correlation: Correlation::of_component(component),
+        correlation: Correlation::of_component(component, settings.waveform),
         watched: false,
         settle_s: 10.0,
         duration_s: 600.0,

@@ -12,7 +12,8 @@ use crate::gnss::signal::Signal;
 struct Entry {
     signal: String,
     component: usize,
-    layer: usize,
+    /// None where the replica has all.
+    layer: Option<usize>,
     spacing_chips: f64,
     integration_s: f64,
     pll_bandwidth_hz: f64,
@@ -47,8 +48,8 @@ impl Followed {
             None => leading(signal)?,
         };
         let [found, own] = match &entry {
-            Some(entry) => component.shapes_by(component.layers.get(entry.layer)?),
-            None => [component.shape(), component.shape()],
+            Some(Entry { layer: Some(layer), .. }) => component.shapes_by(component.layers.get(*layer)?),
+            _ => [component.shape(), component.shape()],
         };
         let rate_hz = component.chip_rate_hz;
         Some(Self {

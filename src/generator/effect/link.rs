@@ -3,14 +3,16 @@
 //! C/N0 = P_t + G_t(off-nadir) − 20 lg(4πRf/c) − L_a + G_r(direction) − N0 − L_i, in dB (Friis). Transmit
 //! patterns are means of a block of satellites, as published, or that of a typical shaped L1 beam (Kaplan &
 //! Hegarty; beyond the Earth's edge at 13.9° it falls away as the mean of Block IIR). Limits: patterns are
-//! means over azimuth, not those of one satellite; beyond their last angle they keep its gain.
+//! means over azimuth, not those of one satellite; beyond their last angle they keep its gain. Satellites of
+//! other systems have GPS's typical beam, nominally: its edge at their edge of the Earth, and as much more
+//! power as their longer way takes, so that the ground receives the documents' minima in the same shape.
 
-use super::antenna::{Antenna, Curve, Pattern, gain_db};
+use super::antenna::{Antenna, Pattern, gain_db};
 use super::transmit::Block;
 use crate::generator::ray::{Effect, Ray, Sight};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::earth::{SEMI_MAJOR_AXIS_M, SPEED_OF_LIGHT_MPS};
 use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::satellite::Sv;
+use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
 
 /// k·T0 in dBW/Hz as the budget rounds it: a matched source at 290 K gives −203.98.
@@ -73,7 +75,7 @@ impl LinkBudget {
 
     /// C/N0 in dB-Hz and the receiving antenna's phase in cycles.
     fn budget(&self, sight: &Sight, carrier_hz: f64) -> (f64, f64) {
-        let transmit_db = gain_db(self.transmit(sight.sv), sight.off_nadir_rad.to_degrees());
+        let transmit_db = self.transmitted_db(sight.sv, sight.off_nadir_rad);
         let (receive_db, phase_cycles) = self.antenna.response(sight);
         let received_dbw = self.incident_dbw(transmit_db, sight.range_m, carrier_hz);
         (self.over_noise_dbhz(received_dbw + receive_db), phase_cycles)
@@ -92,9 +94,27 @@ impl LinkBudget {
         received_dbw - (REFERENCE_NOISE_DBWHZ + self.noise_figure_db) - self.implementation_loss_db - self.extra_loss_db
     }
 
-    fn transmit(&self, sv: Sv) -> &'static Curve {
-        self.blocks.iter().find(|(own, _)| *own == sv).map_or(self.block, |(_, block)| *block).gain_dbi()
+    /// Gain towards an angle off nadir, and what a system sends more than GPS for its longer way.
+    fn transmitted_db(&self, sv: Sv, off_nadir_rad: f64) -> f64 {
+        let all = if sv.system == System::Gps { self.block } else { Block::Typical };
+        let curve = self.blocks.iter().find(|(own, _)| *own == sv).map_or(all, |(_, block)| *block).gain_dbi();
+        if sv.system == System::Gps {
+            return gain_db(curve, off_nadir_rad.to_degrees());
+        }
+        let (own_m, gps_m) = (sv.system.orbit_m(), System::Gps.orbit_m());
+        // As far from nadir on the Earth as a GPS satellite's beam would be.
+        let alike_rad = libm::asin((libm::sin(off_nadir_rad) * own_m / gps_m).min(1.0));
+        let farther_db = 20.0 * libm::log10(lowest_range_m(own_m) / lowest_range_m(gps_m));
+        gain_db(curve, alike_rad.to_degrees()) + farther_db
     }
+}
+
+/// Range of a satellite on a circle of that radius, 5° above the horizon, where documents promise their
+/// minima.
+fn lowest_range_m(orbit_m: f64) -> f64 {
+    let (sine, cosine) = libm::sincos(5_f64.to_radians());
+    let across_m = SEMI_MAJOR_AXIS_M * cosine;
+    (orbit_m * orbit_m - across_m * across_m).sqrt() - SEMI_MAJOR_AXIS_M * sine
 }
 
 /// Power into the satellite's antenna above that of L1 C/A: as much as brings the powers received, range and
@@ -168,13 +188,18 @@ pub(crate) mod tests {
     use super::*;
     use crate::gnss::broadcast::State;
     use crate::gnss::earth::{Geodetic, Look};
+    use crate::gnss::galileo::e1::E1;
     use crate::gnss::signal::Carrier;
     use crate::gnss::time::Epoch;
 
     /// A sight line with the spherical geometry of the reference table: radii 6378 and 26 560 km.
     pub(crate) fn sight(elevation_deg: f64, height_m: f64) -> Sight {
+        from_orbit(elevation_deg, height_m, 26_560e3)
+    }
+
+    fn from_orbit(elevation_deg: f64, height_m: f64, orbit: f64) -> Sight {
         let elevation_rad = elevation_deg.to_radians();
-        let (earth, orbit) = (6_378e3, 26_560e3);
+        let earth = 6_378e3;
         let across = earth * libm::cos(elevation_rad);
         Sight {
             sv: Sv::gps(1),
@@ -218,6 +243,25 @@ pub(crate) mod tests {
             let budget = LinkBudget { antenna: Antenna::level(Pattern::Isotropic), ..LinkBudget::default() };
             let received_dbw = budget.cn0_dbhz(&sight(elevation, 0.0), L1_CA.centre_hz()) - 204.0 + 2.5 + 2.0;
             assert!((-158.5..-154.0).contains(&received_dbw), "{elevation}: {received_dbw}");
+        }
+    }
+
+    #[test]
+    fn galileo_keeps_its_documents_minimum_on_the_ground_in_the_shape_of_gps() {
+        let received_dbw = |sight: &Sight, signal: &Signal| {
+            let budget = LinkBudget { antenna: Antenna::level(Pattern::Isotropic), ..LinkBudget::default() };
+            let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
+            budget.act(sight, signal, &mut rays);
+            10.0 * libm::log10(rays[0].cn0_hz) - 204.0 + 2.5 + 2.0
+        };
+        for elevation in [5.0, 20.0, 45.0, 70.0, 90.0] {
+            let sv = Sv { system: System::Galileo, number: 11 };
+            let found = received_dbw(&Sight { sv, ..from_orbit(elevation, 0.0, 29_600.318e3) }, &E1);
+            // OS SIS ICD 2.1, table 11: −157.25 dBW of both components above 5°.
+            assert!((-157.25..-152.5).contains(&found), "{elevation}: {found}");
+            // The ways from both orbits differ by 1.01 dB at 5° and by 1.22 dB at the zenith.
+            let over_gps = found - received_dbw(&sight(elevation, 0.0), &L1_CA);
+            assert!((1.25 - 0.22..1.25 + 0.01).contains(&over_gps), "{elevation}: {over_gps}");
         }
     }
 

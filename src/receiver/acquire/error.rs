@@ -64,7 +64,7 @@ pub enum AcquireError {
         known: String,
     },
     /// A code that this receiver cannot make.
-    #[error("no code of {signal} is short enough for this receiver: expected fewer than 32 768 steps a period")]
+    #[error("no code of {signal} is short enough for this receiver: expected fewer than 65 536 steps a period")]
     TooLong {
         /// The signal.
         signal: &'static str,

@@ -48,6 +48,7 @@ use crate::gnss::record::AcquisitionRow;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Component, Link, Signal};
+use crate::receiver::correlate::Waveform;
 use crate::receiver::lead::{beside, followed_db, lead};
 use crate::receiver::source::Block;
 
@@ -416,7 +417,7 @@ impl Searcher {
             }
         }
         let rows = findings.iter().zip(codes);
-        let of = (signal, followed_db(component));
+        let of = (signal, followed_db(component, Waveform::Strongest));
         rows.map(|(finding, (sv, _))| finding.report(of, *sv, window.first, code_chips)).collect()
     }
 

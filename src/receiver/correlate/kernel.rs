@@ -15,7 +15,7 @@ use super::short::{self, GROUP};
 use super::single::{self, CHUNK};
 #[cfg(target_arch = "x86_64")]
 use super::single::{Chunk, FINE, FINE_MASK, Lanes, split};
-use super::{CODE_BITS, Edge, Nco, Replica};
+use super::{CODE_BITS, Edge, Nco, Pattern};
 
 /// Entries of a chip table beyond one period.
 pub(super) const TABLE_MARGIN: usize = CHUNK + LANES;
@@ -86,7 +86,7 @@ fn avx512() -> bool {
 
 /// Samples and replica of one call.
 pub(super) struct Job<'a> {
-    pub replica: &'a Replica,
+    pub replica: &'a Pattern,
     pub i: &'a [f32],
     pub q: &'a [f32],
     pub nco: Nco,
@@ -99,7 +99,7 @@ pub(super) struct Job<'a> {
 pub(super) fn correlate<const T: usize>(
     level: Level,
     fast: Fast,
-    replica: &Replica,
+    replica: &Pattern,
     (i, q): (&[f32], &[f32]),
     nco: &Nco,
     taps: &[i64; T],
@@ -116,7 +116,7 @@ pub(super) fn correlate<const T: usize>(
         Edge::Area => step - step / 2 - (1 << CODE_BITS),
         Edge::Nearest => 0,
     };
-    let period = replica.steps_period();
+    let period = replica.period();
     let code = (nco.code + ahead).rem_euclid(period) as u64;
     let begin = |tap: i64| {
         let tap = if (0..period).contains(&tap) { tap } else { tap.rem_euclid(period) };

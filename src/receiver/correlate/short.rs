@@ -11,7 +11,7 @@ use num_complex::Complex64;
 
 use super::carrier::{BLOCK, Carrier, LANES, filled};
 use super::kernel::{Job, wrapped};
-use super::{CODE_BITS, Edge, Replica};
+use super::{CODE_BITS, Edge, Pattern};
 
 /// Samples in a group: two vectors, whose products are added in pairs.
 pub(super) const GROUP: usize = 2 * LANES;
@@ -46,7 +46,7 @@ pub(super) struct Steps {
 
 impl Steps {
     /// `None` where 16 bits do not do.
-    pub fn new(replica: &Replica, step: u64) -> Option<Self> {
+    pub fn new(replica: &Pattern, step: u64) -> Option<Self> {
         let last = step.checked_mul(GROUP as u64 - 1)?;
         let index_bits = (1..=5_u32).find(|bits| last <= ((1 << bits) - 1) << CODE_BITS)?;
         let fine = 16 - index_bits;
@@ -68,7 +68,7 @@ impl Steps {
             slope,
             offset,
             advance: step * GROUP as u64,
-            period: replica.steps_period() as u64,
+            period: replica.period() as u64,
         })
     }
 
@@ -89,7 +89,7 @@ impl Steps {
 
 /// Up to [`GROUPS`] groups and their phasors.
 pub(super) struct Chunk<'a> {
-    pub replica: &'a Replica,
+    pub replica: &'a Pattern,
     pub steps: &'a Steps,
     pub i: &'a [[f32; GROUP]],
     pub q: &'a [[f32; GROUP]],

@@ -7,7 +7,7 @@ use num_complex::{Complex32, Complex64};
 
 use super::carrier::{Carrier, LANES, filled};
 use super::kernel::{Job, wrapped};
-use super::{CODE_BITS, Replica};
+use super::{CODE_BITS, Pattern};
 
 /// Vectors whose sums stay in `f32`.
 pub(super) const VECTORS: usize = 64;
@@ -18,7 +18,7 @@ pub(super) const FINE_MASK: u32 = (1 << FINE) - 1;
 
 /// Up to [`CHUNK`] samples, and what is needed to correlate them.
 pub(super) struct Chunk<'a> {
-    pub replica: &'a Replica,
+    pub replica: &'a Pattern,
     pub steps: &'a Steps,
     pub i: &'a [f32],
     pub q: &'a [f32],
@@ -50,7 +50,7 @@ pub(super) fn body<const T: usize>(
     let step = job.nco.code_step;
     let fine = CODE_BITS - FINE;
     let width = (step >> fine) as u32;
-    let period = job.replica.steps_period() as u64;
+    let period = job.replica.period() as u64;
     let steps = Steps {
         lane: std::array::from_fn(|k| (step.wrapping_mul(k as u64) >> fine) as u32),
         inverse_width: 1.0 / width.max(1) as f32,

@@ -1,10 +1,39 @@
-//! The steps of a code as a receiver makes them: the strongest layer of a component, and nothing where that
-//! is not sent.
+//! The steps of a code as a receiver makes them: a layer of a component, and nothing where that is not sent.
 //!
-//! BPSK and BOC are made as they are. Of CBOC, TMBOC and QMBOC the strongest layer is made: against the full
-//! waveform that costs 0.4 dB where BOC(6,1) has a tenth of the power, and spares steps six times as short.
+//! BPSK and BOC are made as they are. Of CBOC, TMBOC and QMBOC the strongest layer is made, unless settings
+//! say otherwise: against the full waveform that costs 0.4 dB where BOC(6,1) has a tenth of the power, and
+//! spares steps six times as short, which take six times the samples, and a pass for each layer.
 
-use crate::gnss::signal::Component;
+use serde::{Deserialize, Serialize};
+
+use crate::gnss::signal::{Component, Layer, Signal};
+
+/// What a replica has of a component's layers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Waveform {
+    /// The strongest one.
+    Strongest,
+    /// All, with their weights and phases.
+    Whole,
+}
+
+impl Waveform {
+    /// Why samples at `rate_hz` do not do for it, if they do not: area edges want a sample in each step.
+    pub fn refusal(self, signal: &Signal, rate_hz: f64) -> Option<String> {
+        let several = signal.components.iter().filter(|component| component.layers.len() > 1);
+        let steps_hz = several.map(|component| component.chip_rate_hz * component.steps_per_chip() as f64);
+        let need_hz = steps_hz.fold(0.0, f64::max);
+        (self == Self::Whole && rate_hz < need_hz).then(|| {
+            format!(
+                "tracking.waveform = \"whole\" takes a sample in each step of its pulses, {} Msps at least, and these \
+                 are {} Msps: write \"strongest\"",
+                1e-6 * need_hz,
+                1e-6 * rate_hz
+            )
+        })
+    }
+}
 
 /// One period of a replica: equal steps of −1, 0 and +1.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,10 +47,14 @@ pub struct Wave {
 }
 
 impl Wave {
-    /// Of a satellite by its number; `None` where the documents assign it no code.
+    /// The strongest layer of a satellite by its number; `None` where the documents assign it no code.
     pub fn new(component: &Component, number: u8) -> Option<Self> {
+        Self::of(component, component.strongest()?, number)
+    }
+
+    /// One of its layers.
+    pub fn of(component: &Component, layer: &Layer, number: u8) -> Option<Self> {
         let chips = (component.code)(number)?;
-        let layer = component.strongest()?;
         let values = chips.iter().enumerate().flat_map(|(index, &chip)| {
             let chip = if layer.covers(index) { chip } else { 0 };
             layer.pulse.iter().map(move |&sign| chip * sign)
@@ -32,7 +65,7 @@ impl Wave {
     }
 }
 
-/// Whether a replica can be made of a component's code: its period has fewer than 2¹⁵ steps.
+/// Whether a replica can be made of a component's code: its period has fewer than 2¹⁶ steps.
 pub fn fits(component: &Component) -> bool {
     let each = component.strongest().map_or(0, |layer| layer.pulse.len());
     (64..super::MOST_STEPS).contains(&(component.code_chips as usize * each))

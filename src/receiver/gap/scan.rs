@@ -79,7 +79,7 @@ impl Scan {
             let step = nco.code_step as i64;
             // Within a period, for four periods of a long code are beyond 64 bits.
             let begin = i128::from(nco.code) + i128::from(start - half) * i128::from(step);
-            let period = replica.steps_period();
+            let period = replica.period();
             let mut phase = begin.rem_euclid(i128::from(period)) as i64;
             for code in &mut codes {
                 *code = Complex::new(replica.value(phase, nco.code_step) as f32, 0.0);

@@ -59,6 +59,13 @@ impl Session {
         if let Some((signal, reason)) = all.filter_map(|signal| Some((signal, refusal(signal)?))).next() {
             return Err(ReceiveError::Unsupported { signal: signal.name, reason });
         }
+        for (metadata, signals) in metadata.iter().zip(&assigned) {
+            for signal in signals {
+                if let Some(reason) = settings.tracking.waveform.refusal(signal, metadata.rate.hz()) {
+                    return Err(ReceiveError::Unsupported { signal: signal.name, reason });
+                }
+            }
+        }
         let (mut noises, mut front_ends): (Noises, Vec<FrontEnd>) = (Vec::new(), Vec::new());
         for (number, (metadata, signals)) in metadata.iter().zip(&assigned).enumerate() {
             noises.extend(signals.iter().map(|signal| (*signal, front_end::noise(signal, metadata, settings))));

@@ -23,7 +23,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Component, Link, Signal};
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
-use crate::receiver::correlate::{Arithmetic, Replica, Wave, chips_to_units, units_to_chips};
+use crate::receiver::correlate::{Arithmetic, Replica, chips_to_units, units_to_chips};
 use crate::receiver::lead::{followed_db, lead};
 use crate::receiver::parting::Phases;
 use crate::receiver::source::Block;
@@ -173,13 +173,14 @@ impl Channel {
             None => pilot_group(period_s),
         };
         let has_symbols = message.is_some() || overlay.is_some();
-        let wave = component.and_then(|c| Wave::new(c, hit.sv.number));
-        let replica = wave.and_then(|wave| Replica::of(wave, settings.replica));
+        let waveform = settings.waveform;
+        let replica = component.and_then(|c| Replica::made(c, hit.sv.number, waveform, settings.replica));
         let model = component.and_then(|c| ReplicaModel::new(settings, c, metadata.rate.hz()));
         let half = 0.5 * settings.spacing_chips;
         let sense = if metadata.inverted { -1.0 } else { 1.0 };
         let shape = model.map_or(CodeShape::triangle(settings.spacing_chips), |model| model.shape);
         let share = replica.as_ref().map_or(1.0, Replica::share);
+        let followed = component.map_or(0.0, |c| followed_db(c, waveform));
         let loops = Loops::new(settings, shape, has_symbols, sense * hit.doppler_hz);
         let if_hz = metadata.if_hz(hit.link().carrier_hz());
         let mut channel = Self {
@@ -202,8 +203,8 @@ impl Channel {
                 .and_then(|c| Data::beside(c, (hit.signal, hit.sv), settings, (metadata.rate.hz(), sense))),
             overlay,
             overlay_phase: None,
-            side_peaks: component.and_then(SidePeaks::new),
-            followed_db: component.map_or(0.0, followed_db),
+            side_peaks: component.and_then(|c| SidePeaks::new(c, waveform)),
+            followed_db: followed,
             phase_cycles: component.map_or(0.0, |c| c.phase_cycles),
             lost: replica.is_none(),
             replica,
@@ -226,11 +227,7 @@ impl Channel {
             whole: false,
             loops,
             wide: true,
-            stage: if hit.cn0_dbhz + component.map_or(0.0, followed_db) < WEAK_DBHZ {
-                Stage::Open
-            } else {
-                Stage::Frequency
-            },
+            stage: if hit.cn0_dbhz + followed < WEAK_DBHZ { Stage::Open } else { Stage::Frequency },
             stage_since: 0,
             update_since: 0,
             pull_in_since: 0,

@@ -15,7 +15,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
 use crate::gnss::signal::{Component, Layer, Shape, Signal};
 use crate::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
-use crate::receiver::correlate::correlation;
+use crate::receiver::correlate::{Waveform, correlation};
 use crate::receiver::lead::lead;
 
 fn is_long() -> bool {
@@ -210,8 +210,10 @@ struct Theory {
 impl Theory {
     /// Of the leading component of a signal of `cn0_dbhz`, followed with settings that are fitted to it.
     fn new(component: &Component, settings: &TrackingSettings, rate_hz: f64, cn0_dbhz: f64) -> Self {
-        let strongest = component.strongest().unwrap();
-        let made = [Layer { weight: 1.0, ..*strongest }];
+        let made = match settings.waveform {
+            Waveform::Strongest => vec![Layer { weight: 1.0, ..*component.strongest().unwrap() }],
+            Waveform::Whole => component.layers.to_vec(),
+        };
         let chips_per_sample = component.chip_rate_hz / rate_hz;
         let at = |sent: &[Layer], chips: f64| {
             let shape = Shape::between(sent, &made, component.chip_rate_hz);
@@ -336,6 +338,9 @@ fn settle_s(component: &Component) -> f64 {
     0.8 + 115.0 * component.period_s()
 }
 
+/// A signal, the rate of its samples, and what replicas have of its layers.
+type Case = (&'static Signal, f64, Waveform);
+
 /// What was measured on a signal, and what theory expects.
 struct Jitter {
     signal: &'static Signal,
@@ -347,9 +352,10 @@ struct Jitter {
     spreads: [f64; 2],
 }
 
-fn jitter(signal: &'static Signal, rate_hz: f64, channels: u64, duration_s: f64) -> Jitter {
+fn jitter((signal, rate_hz, waveform): Case, channels: u64, duration_s: f64) -> Jitter {
     // A code loop eight times as wide as the default one has as many more independent values.
-    let settings = TrackingSettings { dll_bandwidth_hz: 4.0, dll_pull_in_s: 0.5, ..TrackingSettings::default() };
+    let settings =
+        TrackingSettings { dll_bandwidth_hz: 4.0, dll_pull_in_s: 0.5, waveform, ..TrackingSettings::default() };
     let component = lead(signal).unwrap();
     let fitted = settings.fitted(component);
     let theory = Theory::new(component, &fitted, rate_hz, JITTER_DBHZ);
@@ -375,16 +381,16 @@ fn jitter(signal: &'static Signal, rate_hz: f64, channels: u64, duration_s: f64)
 #[test]
 fn jitter_of_code_and_carrier_is_that_of_theory() {
     let (channels, duration_s) = if is_long() { (16, 10.0) } else { (1, 2.0) };
-    let signals: [(&'static Signal, f64); 6] = [
-        (&LONG_BOC, 5.3e6),
-        (&QUADRATURE, 12.3e6),
-        (&CHANNELS, 2.6e6),
-        (&MULTIPLEXED, 2.6e6),
-        (&MIXED, 5.3e6),
-        (&E1, 6.5e6),
+    let cases: [Case; 7] = [
+        (&LONG_BOC, 5.3e6, Waveform::Strongest),
+        (&QUADRATURE, 12.3e6, Waveform::Strongest),
+        (&CHANNELS, 2.6e6, Waveform::Strongest),
+        (&MULTIPLEXED, 2.6e6, Waveform::Strongest),
+        (&MIXED, 5.3e6, Waveform::Strongest),
+        (&E1, 6.5e6, Waveform::Strongest),
+        (&E1, 13.1e6, Waveform::Whole),
     ];
-    let found: Vec<Jitter> =
-        signals.into_par_iter().map(|(signal, rate_hz)| jitter(signal, rate_hz, channels, duration_s)).collect();
+    let found: Vec<Jitter> = cases.into_par_iter().map(|case| jitter(case, channels, duration_s)).collect();
     for Jitter { signal, update_s, code_m, carrier_cycles, ratios, spreads } in &found {
         println!(
             "{signal}: updates of {:.0} ms; code {code_m:.4} m, {:.3} ± {:.3} of theory; carrier {:.3}°, {:.3} ± \

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::gnss::signal::Component;
-use crate::receiver::correlate::{Arithmetic, Edge};
+use crate::receiver::correlate::{Arithmetic, Edge, Waveform};
 use crate::receiver::described::described;
 
 /// How the code error is measured.
@@ -49,6 +49,9 @@ pub struct TrackingSettings {
     /// Code periods of 1 ms a loop update once symbols are known: a divisor of 20. Of longer codes as many as
     /// fit.
     pub integration: u32,
+    /// What the replica has of a waveform of several layers, such as CBOC: strongest for the strongest one,
+    /// whole for all, from a sample in each step of the shortest pulse on.
+    pub waveform: Waveform,
     /// How the replica's chips fall on the samples.
     pub replica: Edge,
     /// What correlations are computed in.
@@ -84,6 +87,7 @@ impl Default for TrackingSettings {
             dll_discriminator: CodeDiscriminator::EarlyMinusLate,
             spacing_chips: 0.5,
             integration: 4,
+            waveform: Waveform::Strongest,
             replica: Edge::Area,
             arithmetic: Arithmetic::I16,
             phase_lock_threshold: 0.85,
@@ -163,7 +167,10 @@ impl TrackingSettings {
         let period_s = component.period_s();
         let most = (1e-3 * f64::from(self.integration) / period_s + 1e-9).floor() as u32;
         let integration = INTEGRATIONS.into_iter().rev().find(|periods| *periods <= most).unwrap_or(1);
-        let steps = component.strongest().map_or(1, |layer| layer.pulse.len());
+        let steps = match self.waveform {
+            Waveform::Strongest => component.strongest().map_or(1, |layer| layer.pulse.len()),
+            Waveform::Whole => component.steps_per_chip(),
+        };
         let fit = |bandwidth_hz: f64, periods: u32| {
             bandwidth_hz.min(LARGEST_BANDWIDTH_TIME / (period_s * f64::from(periods)))
         };

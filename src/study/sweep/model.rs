@@ -151,7 +151,7 @@ impl Model {
                     let code = Waveform::of_shape(self.component.shape(), self.component.chip_rate_hz);
                     Correlation::of(code, Some(band_hz))
                 }
-                None => Correlation::of_component(self.component),
+                None => Correlation::of_component(self.component, self.tracking.waveform),
             },
             watched: self.watched,
             settle_s: self.settle_s,

@@ -67,14 +67,14 @@ fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Resul
     }
     let note = anchored(12, HPos::Left, VPos::Center);
     let shaded = if skyline_deg.is_empty() { "" } else { "; shaded: obstructed at the start" };
-    let shapes: Vec<String> =
-        systems.iter().zip(SHAPES).map(|(system, shape)| format!("; {shape}: {system}")).collect();
-    let shapes = if systems.len() > 1 { shapes.concat() } else { String::new() };
-    area.draw(&Text::new(
-        format!("filled: observed by the receiver{shaded}{shapes}"),
-        (14 * FINE, (HEIGHT_PX - 16) * FINE),
-        note,
-    ))?;
+    let mut lines = vec![format!("filled: observed by the receiver{shaded}")];
+    if systems.len() > 1 {
+        let shapes = systems.iter().zip(SHAPES).map(|(system, shape)| format!("{shape}: {system}"));
+        lines.push(shapes.collect::<Vec<_>>().join("; "));
+    }
+    for (line, above) in lines.into_iter().rev().zip([16, 34]) {
+        area.draw(&Text::new(line, (14 * FINE, (HEIGHT_PX - above) * FINE), note.clone()))?;
+    }
     Ok(())
 }
 
