@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::analysis;
 use crate::analysis::judge::foreign::{self, Files};
+use crate::analysis::judge::schema::SUMMARY;
+use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::show;
 use crate::cli::args;
 use crate::cli::check::Gate;
@@ -20,20 +22,27 @@ pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
     let Some(run) = &arguments.run else {
         return Err(CliError::usage("analyze: expected a run's directory, or --truth"));
     };
-    let gate = Gate::read(arguments.check.as_ref())?;
+    let gate = Gate::read(arguments.check.as_ref(), &SUMMARY)?;
     let summary = analysis::judge_against(run, gate.limits()).map_err(judge_error)?;
     scenario::print(&format!("{summary}\nresults in {}\n", run.display()))?;
-    gate.enforce(&summary)
+    gate.enforce(&summary.details.verdict)
 }
 
 fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliError> {
     let files = Files { rinex_obs: arguments.files.rinex_obs.clone(), nmea: arguments.files.nmea.clone() };
+    let gate = Gate::read(arguments.check.as_ref(), &foreign::FIGURES)?;
     let judgement = foreign::judge(truth, &files).map_err(judge_error)?;
+    let mut verdict = Verdict::of_foreign(&judgement).map_err(judge_error)?;
+    if let Some(limits) = gate.limits() {
+        let figures = serde_json::to_value(&judgement.summary).unwrap_or_default();
+        verdict = verdict.with_user(limits.judge(&figures));
+    }
     let out = arguments.out.clone().unwrap_or_else(|| {
         let name = format!("{}-foreign", scenario::file_name(&judgement.summary.scene));
         PathBuf::from("reports").join(name)
     });
     std::fs::create_dir_all(&out).map_err(|error| CliError::create(out.display(), &error))?;
-    show::foreign::write(&judgement, &out).map_err(judge_error)?;
-    scenario::print(&format!("{}\nresults in {}\n", judgement.summary, out.display()))
+    show::foreign::write(&judgement, &verdict, &out).map_err(judge_error)?;
+    scenario::print(&format!("{}\n{verdict}\nresults in {}\n", judgement.summary, out.display()))?;
+    gate.enforce(&verdict)
 }

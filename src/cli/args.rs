@@ -173,9 +173,9 @@ pub struct Analyze {
     /// Directory of a run, with truth/ and rx/
     #[arg(required_unless_present = "truth", conflicts_with = "truth")]
     pub run: Option<PathBuf>,
-    /// Exit with 3 if a limit is broken: one of this file's for summary.json, or of the verdict's own without
-    /// a file
-    #[arg(long, value_name = "LIMITS.toml", num_args = 0..=1, conflicts_with = "truth")]
+    /// Exit with 3 if a limit is broken: one of this file's for summary.json (foreign.json with --truth), or
+    /// of the verdict's own without a file
+    #[arg(long, value_name = "LIMITS.toml", num_args = 0..=1)]
     pub check: Option<Option<PathBuf>>,
     /// Judge another receiver, which was fed a scene's samples, against that scene's truth/ directory
     #[arg(long, value_name = "DIR", requires = "files")]

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use crate::analysis::judge::judgement::{Judgement, Status};
 use crate::analysis::judge::limits::Limits;
-use crate::analysis::judge::summary::Summary;
+use crate::analysis::judge::schema::Figures;
+use crate::analysis::judge::verdict::Verdict;
 use crate::cli::error::CliError;
 use crate::cli::scenario;
 
@@ -19,15 +20,15 @@ pub enum Gate {
 }
 
 impl Gate {
-    /// From `--check` as written: absent, alone, or with a file.
-    pub fn read(argument: Option<&Option<PathBuf>>) -> Result<Self, CliError> {
+    /// From `--check` as written: absent, alone, or with a file of limits for those figures.
+    pub fn read(argument: Option<&Option<PathBuf>>, figures: &'static Figures) -> Result<Self, CliError> {
         let path = match argument {
             None => return Ok(Self::Open),
             Some(None) => return Ok(Self::Verdict),
             Some(Some(path)) => path,
         };
         let (name, text) = scenario::text(path)?;
-        Limits::parse(&text, &name).map(Self::Limits).map_err(CliError::input)
+        Limits::parse_for(figures, &text, &name).map(Self::Limits).map_err(CliError::input)
     }
 
     /// The user's limits, if there are any.
@@ -36,8 +37,7 @@ impl Gate {
     }
 
     /// Prints what broke a limit and by how much; exit code 3 if anything did.
-    pub fn enforce(&self, summary: &Summary) -> Result<(), CliError> {
-        let verdict = &summary.details.verdict;
+    pub fn enforce(&self, verdict: &Verdict) -> Result<(), CliError> {
         let (broken, all, whose): (Vec<&Judgement>, usize, String) = match self {
             Self::Open => return Ok(()),
             Self::Verdict => {

@@ -9,6 +9,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use crate::analysis::judge::schema::SUMMARY;
 use crate::analysis::measure::psd::Psd;
 use crate::analysis::show::tables;
 use crate::analysis::{self, JudgeError};
@@ -41,7 +42,7 @@ const SPECTRUM_BINS: usize = 2048;
 pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
     let named = scenario::read(arguments.scenario.as_deref())?.choose(arguments.front_end.as_deref())?;
-    let gate = Gate::read(arguments.check.as_ref())?;
+    let gate = Gate::read(arguments.check.as_ref(), &SUMMARY)?;
     let (scenes, warnings) = scenario::compose_all(
         &named,
         &Overrides { seed: arguments.seed, format: None, allow_outside: arguments.allow_outside },
@@ -92,7 +93,7 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     }
     text += &format!("results in {}\n", target.display());
     scenario::print(&text)?;
-    gate.enforce(&summary)
+    gate.enforce(&summary.details.verdict)
 }
 
 struct Both {

@@ -15,7 +15,7 @@ use thiserror::Error;
 use toml::{Table, Value as Toml};
 
 use crate::analysis::judge::judgement::{Bound, Judgement, MARGINAL_SHARE};
-use crate::analysis::judge::schema;
+use crate::analysis::judge::schema::{self, Figures};
 use crate::gnss::place::Keys;
 
 /// Why a file of limits cannot be used. `name` is the file's, with line and column where they are known.
@@ -29,13 +29,16 @@ pub enum LimitsError {
         /// What the parser reports, with line and column.
         message: String,
     },
-    /// A path that `summary.json` does not have.
-    #[error("{name}: {} is not in summary.json; the nearest path is {nearest} (all: \
-             assets/summary.schema.json)", path.escape_debug())]
+    /// A path that the file of figures does not have.
+    #[error("{name}: {} is not in {file}; the nearest path is {nearest} (all: {listed})", path.escape_debug())]
     Path {
         /// Name of the file of limits.
         name: String,
-        /// The path into `summary.json`.
+        /// The file of figures.
+        file: &'static str,
+        /// Where a user finds all paths.
+        listed: &'static str,
+        /// The path into that file.
         path: String,
         /// The path that is spelt most like it.
         nearest: String,
@@ -85,30 +88,46 @@ impl LimitsError {
 }
 
 /// The limits as read.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Limits {
     /// The file, as messages call it.
     pub name: String,
     entries: Vec<(String, Bound)>,
     marginal_share: f64,
+    figures: &'static Figures,
+}
+
+impl PartialEq for Limits {
+    fn eq(&self, other: &Self) -> bool {
+        let parts = |limits: &Self| (limits.name.clone(), limits.entries.clone(), limits.figures.file);
+        parts(self) == parts(other) && self.marginal_share == other.marginal_share
+    }
 }
 
 const KEYS: [&str; 3] = ["min", "max", "equals"];
 
 impl Limits {
-    /// Reads and checks a file's text; `name` is what messages call it.
+    /// Reads and checks a file's text of limits for `summary.json`; `name` is what messages call it.
     ///
     /// # Errors
     /// [`LimitsError`] with the path in question.
     pub fn parse(text: &str, name: &str) -> Result<Self, LimitsError> {
+        Self::parse_for(&schema::SUMMARY, text, name)
+    }
+
+    /// The same for another file of figures.
+    ///
+    /// # Errors
+    /// As [`Limits::parse`].
+    pub fn parse_for(figures: &'static Figures, text: &str, name: &str) -> Result<Self, LimitsError> {
         let table: Table = text.parse().map_err(|error: toml::de::Error| LimitsError::Toml {
             name: Keys::new(name, text).place(error.span().map_or(0, |span| span.start)),
             message: error.message().to_owned(),
         })?;
-        Self::of(table, name).map_err(|error| error.at(&Keys::new(name, text)))
+        Self::of(figures, table, name).map_err(|error| error.at(&Keys::new(name, text)))
     }
 
-    fn of(mut table: Table, name: &str) -> Result<Self, LimitsError> {
+    fn of(figures: &'static Figures, mut table: Table, name: &str) -> Result<Self, LimitsError> {
         let name = name.to_owned();
         let marginal_share = match table.remove("marginal_share") {
             None => MARGINAL_SHARE,
@@ -122,7 +141,7 @@ impl Limits {
                 })?
             }
         };
-        let mut limits = Self { name, entries: Vec::new(), marginal_share };
+        let mut limits = Self { name, entries: Vec::new(), marginal_share, figures };
         limits.collect("", &table)?;
         if limits.entries.is_empty() {
             return Err(LimitsError::Nothing { name: limits.name });
@@ -133,10 +152,12 @@ impl Limits {
     fn collect(&mut self, above: &str, table: &Table) -> Result<(), LimitsError> {
         for (key, value) in table {
             let path = if above.is_empty() { key.clone() } else { format!("{above}.{key}") };
-            let known = schema::leaf(&path);
+            let known = self.figures.leaf(&path);
             match value.as_table() {
                 Some(bounds) if known.is_some() => self.entry(&path, bounds)?,
-                Some(below) if !below.keys().any(|key| KEYS.contains(&key.as_str())) && schema::is_branch(&path) => {
+                Some(below)
+                    if !below.keys().any(|key| KEYS.contains(&key.as_str())) && self.figures.is_branch(&path) =>
+                {
                     self.collect(&path, below)?;
                 }
                 _ if known.is_some() => {
@@ -145,8 +166,9 @@ impl Limits {
                 _ => {
                     let path = whole(path, value);
                     let own = strsim::jaro_winkler(&path, "marginal_share") > 0.9;
-                    let nearest = if own { "marginal_share".to_owned() } else { schema::nearest(&path) };
-                    return Err(LimitsError::Path { name: self.name.clone(), path, nearest });
+                    let nearest = if own { "marginal_share".to_owned() } else { self.figures.nearest(&path) };
+                    let Figures { file, listed, .. } = *self.figures;
+                    return Err(LimitsError::Path { name: self.name.clone(), file, listed, path, nearest });
                 }
             }
         }
@@ -154,7 +176,7 @@ impl Limits {
     }
 
     fn entry(&mut self, path: &str, bounds: &Table) -> Result<(), LimitsError> {
-        let is_number = schema::leaf(path).is_some_and(|leaf| leaf.is_number);
+        let is_number = self.figures.leaf(path).is_some_and(|leaf| leaf.is_number);
         for (key, value) in bounds {
             let bound = match (key.as_str(), as_f64(value), is_number) {
                 ("max", Some(limit), true) => Bound::Max(limit),
@@ -194,11 +216,11 @@ impl Limits {
         LimitsError::Value { name, path: path.to_owned(), key, value: value.to_string(), expected }
     }
 
-    /// Holds `summary.json` against every limit.
+    /// Holds the figures against every limit.
     pub fn judge(&self, summary: &Value) -> Vec<Judgement> {
         let one = |(path, bound): &(String, Bound)| {
             let value = schema::find(summary, path).cloned().unwrap_or(Value::Null);
-            let unit = schema::leaf(path).map(|leaf| leaf.unit).unwrap_or_default();
+            let unit = self.figures.leaf(path).map(|leaf| leaf.unit).unwrap_or_default();
             let unit = if unit == "1" { "" } else { &unit };
             let row = Judgement::new(path, value, unit, bound.clone(), self.marginal_share, &self.name);
             Judgement { path: Some(path.clone()), ..row }

@@ -71,23 +71,54 @@ pub fn covers(pattern: &str, path: &str) -> bool {
     }
 }
 
-/// The figure at a path.
+/// The figures of a file that limits may name.
+#[derive(Clone, Copy, Debug)]
+pub struct Figures {
+    /// The file.
+    pub file: &'static str,
+    /// Where a user finds all paths.
+    pub listed: &'static str,
+    /// All of them.
+    pub leaves: fn() -> &'static [Leaf],
+}
+
+/// Those of `summary.json`.
+pub static SUMMARY: Figures = Figures { file: "summary.json", listed: "assets/summary.schema.json", leaves };
+
+impl Figures {
+    /// The figure at a path.
+    pub fn leaf(&self, path: &str) -> Option<Leaf> {
+        let found = (self.leaves)().iter().find(|leaf| covers(&leaf.path, path))?;
+        Some(Leaf { path: path.to_owned(), ..found.clone() })
+    }
+
+    /// Whether figures lie below a path.
+    pub fn is_branch(&self, path: &str) -> bool {
+        let keys = path.split('.').count();
+        let begin = |leaf: &Leaf| leaf.path.split('.').take(keys).collect::<Vec<_>>().join(".");
+        (self.leaves)().iter().any(|leaf| leaf.path.split('.').count() > keys && covers(&begin(leaf), path))
+    }
+
+    /// The path most like another.
+    pub fn nearest(&self, path: &str) -> String {
+        let distance = |leaf: &&Leaf| strsim::damerau_levenshtein(&leaf.path, path);
+        (self.leaves)().iter().min_by_key(distance).map(|leaf| leaf.path.clone()).unwrap_or_default()
+    }
+}
+
+/// The figure of `summary.json` at a path.
 pub fn leaf(path: &str) -> Option<Leaf> {
-    let found = leaves().iter().find(|leaf| covers(&leaf.path, path))?;
-    Some(Leaf { path: path.to_owned(), ..found.clone() })
+    SUMMARY.leaf(path)
 }
 
-/// Whether figures lie below a path.
+/// Whether figures of `summary.json` lie below a path.
 pub fn is_branch(path: &str) -> bool {
-    let keys = path.split('.').count();
-    let begin = |leaf: &Leaf| leaf.path.split('.').take(keys).collect::<Vec<_>>().join(".");
-    leaves().iter().any(|leaf| leaf.path.split('.').count() > keys && covers(&begin(leaf), path))
+    SUMMARY.is_branch(path)
 }
 
-/// The path most like another.
+/// The path of `summary.json` most like another.
 pub fn nearest(path: &str) -> String {
-    let distance = |leaf: &&Leaf| strsim::damerau_levenshtein(&leaf.path, path);
-    leaves().iter().min_by_key(distance).map(|leaf| leaf.path.clone()).unwrap_or_default()
+    SUMMARY.nearest(path)
 }
 
 /// The value at a path.

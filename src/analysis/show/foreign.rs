@@ -4,14 +4,15 @@ use std::path::Path;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::judge::foreign::Judgement;
+use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::show::plot;
 use crate::analysis::show::write::{write_rows, write_whole};
 
-/// Writes tables, pictures and `foreign.json` into an existing directory.
+/// Writes tables, verdict, pictures and `foreign.json` into an existing directory.
 ///
 /// # Errors
 /// The file that cannot be written or drawn.
-pub fn write(judgement: &Judgement, out: &Path) -> Result<(), JudgeError> {
+pub fn write(judgement: &Judgement, verdict: &Verdict, out: &Path) -> Result<(), JudgeError> {
     let judged = &judgement.judged;
     if let Some(measured) = &judged.observables {
         write_rows(&out.join("foreign_observations.csv"), measured.rows.iter())?;
@@ -22,6 +23,7 @@ pub fn write(judgement: &Judgement, out: &Path) -> Result<(), JudgeError> {
     if let Some(places) = &judged.places {
         write_rows(&out.join("foreign_fixes.csv"), places.rows.iter())?;
     }
+    write_rows(&out.join("foreign_verdict.csv"), verdict.csv_rows())?;
     plot::foreign::all(out, judged)?;
     let path = out.join("foreign.json");
     let mut json = serde_json::to_vec_pretty(&judgement.summary)

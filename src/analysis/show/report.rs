@@ -4,6 +4,7 @@ use std::fmt;
 
 use crate::analysis::judge::judgement::Status;
 use crate::analysis::judge::summary::Summary;
+use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::measure::consistency::Calibration;
 use crate::analysis::statistics::Spread;
 
@@ -29,7 +30,7 @@ impl fmt::Display for Summary {
         writeln!(f, "* the part common to all satellites of an epoch removed")?;
         self.loop_lines(f)?;
         self.clock_lines(f)?;
-        self.verdict_lines(f)?;
+        write!(f, "\n{}", self.details.verdict)?;
         self.speed_line(f)
     }
 }
@@ -152,17 +153,6 @@ impl Summary {
         }
     }
 
-    fn verdict_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let verdict = &self.details.verdict;
-        writeln!(f, "\nverdict       {}", verdict.in_words())?;
-        for row in verdict.rows.iter().filter(|row| row.status != Status::Pass) {
-            let (value, word, margin) = (row.value_text(), row.status.word(), row.margin_text());
-            writeln!(f, "{word:<14}{} {value} {}, limit {}: {margin}", row.figure, row.unit, row.bound)?;
-            row.why.iter().try_for_each(|line| writeln!(f, "{:<14}  {line}", ""))?;
-        }
-        Ok(())
-    }
-
     fn speed_line(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let speed = &self.speed;
         let stages = [
@@ -178,6 +168,18 @@ impl Summary {
         parts.extend(speed.cpu_s.map(|cpu_s| format!("{cpu_s:.1} s of CPU")));
         parts.extend(speed.peak_memory_mib.map(|mib| format!("{mib:.0} MiB")));
         writeln!(f, "\nspeed         {} (x real time)", parts.join(", "))
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "verdict       {}", self.in_words())?;
+        for row in self.rows.iter().filter(|row| row.status != Status::Pass) {
+            let (value, word, margin) = (row.value_text(), row.status.word(), row.margin_text());
+            writeln!(f, "{word:<14}{} {value} {}, limit {}: {margin}", row.figure, row.unit, row.bound)?;
+            row.why.iter().try_for_each(|line| writeln!(f, "{:<14}  {line}", ""))?;
+        }
+        Ok(())
     }
 }
 

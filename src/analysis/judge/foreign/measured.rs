@@ -141,7 +141,7 @@ pub struct Measured {
 
 impl Measured {
     /// −1 where the receiver's Doppler has the opposite sign of the truth's.
-    pub(super) fn doppler_sign(&self) -> f64 {
+    pub(in crate::analysis::judge) fn doppler_sign(&self) -> f64 {
         if self.doppler_scale.is_some_and(|scale| scale.value < 0.0) { -1.0 } else { 1.0 }
     }
 }

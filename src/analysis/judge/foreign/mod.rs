@@ -27,7 +27,7 @@ use crate::gnss::time::{Epoch, WEEK_S};
 
 pub use fit::Estimate;
 pub use judged::Judged;
-pub use report::ForeignSummary;
+pub use report::{FIGURES, ForeignSummary};
 
 /// The files of a receiver under test.
 #[derive(Clone, Debug, Default)]
@@ -92,11 +92,13 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         judged.places = Some(measured);
     }
     let summary = ForeignSummary::new(&judged);
-    Ok(Judgement { judged, summary })
+    Ok(Judgement { run, judged, summary })
 }
 
 /// A judgement that is not written yet.
 pub struct Judgement {
+    /// The scene's truth.
+    pub run: Run,
     /// Everything that was measured.
     pub judged: Judged,
     /// What it comes to.

@@ -5,17 +5,45 @@
 //! it is named for who builds on the file.
 
 use std::fmt;
+use std::sync::OnceLock;
 
 use serde::Serialize;
+use serde_json::Value;
 
 use super::fit::Estimate;
 use super::judged::Judged;
 use super::measured::Measured;
+use crate::analysis::judge::schema::{Figures, Leaf};
 use crate::analysis::statistics::mean;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 
+/// Paths of `foreign.json` that a user's limits may name.
+pub static FIGURES: Figures = Figures { file: "foreign.json", listed: "any foreign.json", leaves };
+
+/// The figures of a summary without any, in its order.
+fn leaves() -> &'static [Leaf] {
+    static LEAVES: OnceLock<Vec<Leaf>> = OnceLock::new();
+    LEAVES.get_or_init(|| {
+        let mut leaves = Vec::new();
+        // Numbers and texts always have a form in JSON; if not there would be no paths.
+        if let Ok(Value::Object(tables)) = serde_json::to_value(ForeignSummary::default()) {
+            for (table, figures) in tables.iter().filter_map(|(name, value)| Some((name, value.as_object()?))) {
+                for (name, value) in figures {
+                    let is_number = !value.is_boolean() && !name.ends_with("_sv");
+                    let endings = [("_mps", "m/s"), ("_cycles", "cycles"), ("_hz", "Hz"), ("_db", "dB")];
+                    let endings = endings.iter().chain(&[("_m", "m"), ("_s", "s")]);
+                    let mut units = endings.filter(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit);
+                    let unit = units.next().unwrap_or("1").to_owned();
+                    leaves.push(Leaf { path: format!("{table}.{name}"), unit, meaning: String::new(), is_number });
+                }
+            }
+        }
+        leaves
+    })
+}
+
 /// `foreign.json`. A number that the files do not show is null.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct ForeignSummary {
     /// The scene's name.
     pub scene: String,

@@ -7,6 +7,9 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::*;
+use crate::analysis::judge::judgement::Status;
+use crate::analysis::judge::limits::Limits;
+use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::measure::independent::tests::Draw;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::gps::l1ca::L1_CA;
@@ -268,7 +271,8 @@ fn every_planted_bias_is_named_with_its_size() {
     near("north", position.bias_north_m, 1.5, 5.0 * 0.4 / 50.0_f64.sqrt());
     near("up", position.bias_up_m, -2.0, 5.0 * 0.4 / 50.0_f64.sqrt());
     near("time tag of positions", position.time_tag_offset_s, 3e-3, 5.0 * 0.4 / 20.0 / 50.0_f64.sqrt());
-    crate::analysis::show::foreign::write(&judgement, place.path()).unwrap();
+    let verdict = Verdict::of_foreign(&judgement).unwrap();
+    crate::analysis::show::foreign::write(&judgement, &verdict, place.path()).unwrap();
     for name in [
         "foreign.json",
         "foreign_observations.csv",
@@ -276,6 +280,7 @@ fn every_planted_bias_is_named_with_its_size() {
         "foreign_clock.csv",
         "foreign_slips.csv",
         "foreign_fixes.csv",
+        "foreign_verdict.csv",
         "foreign_observables.png",
         "foreign_position.png",
     ] {
@@ -313,6 +318,62 @@ fn positions_in_gps_time_are_named_by_their_leap_seconds() {
     let found = findings(nmea_from(4.0 + leap_s, leap_s));
     assert!(found.contains("GPS time in place of NMEA's UTC") && found.contains("15 s earlier"), "{found}");
     assert!(!findings(nmea(0.0)).contains("UTC"), "labels that are right");
+}
+
+/// The rows of a verdict that fail.
+fn failed(verdict: &Verdict) -> Vec<&str> {
+    verdict.rows.iter().filter(|row| row.status == Status::Fail).map(|row| row.figure.as_str()).collect()
+}
+
+/// The verdict on files of the scene, damaged as asked for.
+fn verdict(planted: &Planted, damaged: impl Fn(String) -> String, positions: String) -> Verdict {
+    let place = tempfile::tempdir().unwrap();
+    write_truth(&place.path().join("truth"));
+    let (obs, pos) = (place.path().join("rx.26O"), place.path().join("rx.nmea"));
+    fs::write(&obs, damaged(rinex(planted))).unwrap();
+    fs::write(&pos, positions).unwrap();
+    let files = Files { rinex_obs: Some(obs), nmea: Some(pos) };
+    Verdict::of_foreign(&judge(&place.path().join("truth"), &files).unwrap()).unwrap()
+}
+
+#[test]
+fn a_receiver_is_judged_by_what_its_files_show_and_fails_by_the_right_row() {
+    let whole = |text: String| text;
+    let sound = verdict(&PLANTED, whole, nmea(3e-3));
+    // Its files end six seconds before the scene does, and nothing declares a half cycle: no more is wrong.
+    let ends_early = ["epochs without a fix", "longest time without a fix"];
+    assert_eq!(failed(&sound)[..2], ["satellites observed too little", "undeclared breaks of carriers"]);
+    assert_eq!(failed(&sound)[2..], ends_early);
+    let signs = Planted { doppler_sign: -1.0, carrier_sign: -1.0, weeks: 1024, ..PLANTED };
+    let broken = ["weeks by which dates are off", "sign of the carrier", "sign of Doppler"];
+    let found = verdict(&signs, whole, nmea(3e-3));
+    assert!(broken.iter().all(|row| failed(&found).contains(row)), "{:?}", failed(&found));
+    let deaf = Planted { cn0_db: -4.0, ..PLANTED };
+    assert!(failed(&verdict(&deaf, whole, nmea(3e-3))).contains(&"C/N0 bias, magnitude"));
+    // A pseudorange of another signal, half a code period off, and labels in GPS time.
+    let wrong = |text: String| text.replacen("G12  222", "G12  223", 1).replacen("G12  221", "G12  222", 1);
+    let found = verdict(&PLANTED, wrong, nmea_from(19.0, 15.0));
+    assert!(failed(&found).contains(&"pseudoranges of another signal"), "{:?}", failed(&found));
+    let late = found.rows.iter().find(|row| row.figure == "positions without a truth").unwrap();
+    assert!(late.status == Status::Fail && late.why[0].contains("15 s late"), "{late:?}");
+}
+
+#[test]
+fn limits_of_a_user_are_paths_of_the_foreign_summary_and_replace_the_verdict_s_own() {
+    let (_place, judgement) = judged(&PLANTED);
+    let verdict = Verdict::of_foreign(&judgement).unwrap();
+    let text =
+        "\"code.sigma_m\" = { max = 0.5 }\n[position]\nfixes = { min = 60 }\n[carrier]\nslips_undeclared.max = 1\n";
+    let limits = Limits::parse_for(&FIGURES, text, "mine.toml").unwrap();
+    let rows = limits.judge(&serde_json::to_value(&judgement.summary).unwrap());
+    let verdict = verdict.with_user(rows);
+    assert_eq!((verdict.of_user, failed(&verdict)[0]), (3, "position.fixes"));
+    assert!(!failed(&verdict).contains(&"undeclared breaks of carriers"), "the user's limit replaces it");
+    let sigma = verdict.rows.iter().find(|row| row.figure == "code.sigma_m").unwrap();
+    assert_eq!((sigma.unit.as_str(), sigma.status), ("m", Status::Pass));
+    let refused = Limits::parse_for(&FIGURES, "\"code.sigma\" = { max = 1 }\n", "mine.toml").unwrap_err().to_string();
+    assert!(refused.contains("not in foreign.json; the nearest path is code.sigma_m"), "{refused}");
+    assert!(Limits::parse_for(&FIGURES, "\"code.largest_bias_sv\" = { max = 1 }\n", "x").is_err());
 }
 
 #[test]

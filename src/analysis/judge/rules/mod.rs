@@ -6,6 +6,7 @@
 //! rules of thumb, not the points at which a receiver fails; several figures of one run share their causes.
 
 mod availability;
+mod foreign;
 mod hints;
 mod interference;
 mod links;

@@ -7,7 +7,7 @@ use crate::analysis::read::Run;
 use crate::gnss::facts::Sizes;
 
 /// 10 lg(π/2).
-const ONE_BIT_LOSS_DB: f64 = 1.961;
+pub(super) const ONE_BIT_LOSS_DB: f64 = 1.961;
 
 impl Verdict {
     pub(super) fn tracking(&mut self, run: &Run, summary: &Summary) {
