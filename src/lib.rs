@@ -10,8 +10,8 @@
 //! - [`analysis`] is the judge: it joins what the receiver found with the truth on
 //!   (sample number, satellite, signal) and measures every error.
 //!
-//! Above the three are [`twin`], which closes the loop, and [`study`]: the receiver's loops on modelled
-//! correlations, compared with the judge's theory.
+//! Above the three are [`twin`], which closes the loop, [`live`], which takes motion while samples go out,
+//! and [`study`]: the receiver's loops on modelled correlations, compared with the judge's theory.
 //!
 //! Results are values: the generator iterates samples with their truth, the receiver returns records, and
 //! files are one sink among others.
@@ -59,6 +59,8 @@ pub mod analysis;
 pub mod cli;
 #[cfg(feature = "generator")]
 pub mod generator;
+#[cfg(all(feature = "generator", feature = "receiver"))]
+pub mod live;
 #[cfg(feature = "receiver")]
 pub mod receiver;
 #[cfg(feature = "study")]

@@ -57,6 +57,7 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         scintillation: None,
         playback: None,
         interference: Vec::new(),
+        switches: None,
         spoofers: Vec::new(),
         noise: true,
         front_end: Vec::new(),

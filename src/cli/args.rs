@@ -6,7 +6,10 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::cli::lines;
+use crate::cli::live::intake::Origin;
+use crate::cli::sink::Spec;
 use crate::gnss::samples::Format;
+use crate::gnss::time::Epoch;
 
 /// A GNSS digital twin: generate IF samples from real ephemerides, receive them, judge the receiver.
 ///
@@ -24,6 +27,8 @@ pub enum Command {
     Run(Run),
     /// Write a scene's IF samples, their metadata and the truth
     Generate(Generate),
+    /// Send a scene in real time, while motion and events come in
+    Live(Live),
     /// Find position and time in a recording, from a cold start
     Receive(Receive),
     /// Judge an existing run again
@@ -112,6 +117,97 @@ pub struct Generate {
     /// Threads to use [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+}
+
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Examples:\n  gnss-twin live scene.toml --motion udp:4567 --to - | hackrf_transfer -t - -f 1575420000 \
+                  -s 2600000\n  gnss-twin live scene.toml --clock host --motion udp:4567 --to tcp:5000 --record \
+                  reports/flight\n  gnss-twin generate reports/flight/replay.toml --out again.sigmf-data\n\nStatus: a \
+                  line of JSON a second on standard error. Exit code: 3 past --max-underruns or --max-late, 130 or \
+                  143 by signal"
+)]
+pub struct Live {
+    /// Scene to send; with [motion] kind = "pushed" it takes motion and events
+    pub scenario: PathBuf,
+    /// Where samples go, several times for several: - (standard output), fifo:PATH, tcp:ADDR, rtl-tcp:ADDR,
+    /// file:PATH. The first one sets the pace; others lose whole ticks, which are counted, while they are
+    /// slow
+    #[arg(long, value_name = "SINK", default_value = "-")]
+    pub to: Vec<Spec>,
+    /// What the pace follows: the first sink's reading, this machine's clock, or nothing
+    #[arg(long, value_enum, default_value_t = Clock::Sink)]
+    pub clock: Clock,
+    /// How far ahead of their time samples are made: what a sluggish machine may lose without an underrun
+    #[arg(long, value_name = "MS", default_value_t = 8.0, value_parser = latency)]
+    pub latency: f64,
+    /// When the first sample is sent, and the time that it has: a UTC second like 2026-11-23T05:00:00Z, or +S
+    /// seconds from now [default: at once, at the scene's own time]
+    #[arg(long, value_name = "UTC|+S", value_parser = start_at)]
+    pub start_at: Option<StartAt>,
+    /// Where motion and events come in: udp:ADDR, tcp:ADDR or - (standard input). ADDR is PORT on this
+    /// machine alone, or IP:PORT
+    #[arg(long, value_name = "ORIGIN")]
+    pub motion: Option<Origin>,
+    /// Directory for a record of the run: what came in, what was sent, its truth, and replay.toml
+    #[arg(long, value_name = "DIR")]
+    pub record: Option<PathBuf>,
+    /// Exit with 3 after more underruns than that
+    #[arg(long, value_name = "N")]
+    pub max_underruns: Option<u64>,
+    /// Exit with 3 after more states that came too late than that
+    #[arg(long, value_name = "N")]
+    pub max_late: Option<u64>,
+    /// Front end to send, of a scene that has several
+    #[arg(long, value_name = "NAME")]
+    pub front_end: Option<String>,
+    /// Sample format, in place of the scene's: ci8, cu8, ci16, cf32, ri8, ri16 [default to rtl-tcp: cu8]
+    #[arg(long)]
+    pub format: Option<Format>,
+    /// Seed of the noise, in place of the scene's
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Threads to use [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Also read files that lie outside the scenario's directory
+    #[arg(long)]
+    pub allow_outside: bool,
+}
+
+/// What the pace of a live run follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Clock {
+    /// The first sink's reading: a radio's own clock
+    Sink,
+    /// This machine's clock
+    Host,
+    /// Nothing: as fast as sinks take it
+    Free,
+}
+
+/// When a live run starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StartAt {
+    /// At this instant.
+    Utc(Epoch),
+    /// At the first whole second that is so many seconds away.
+    After(f64),
+}
+
+fn start_at(text: &str) -> Result<StartAt, String> {
+    let expected = || "expected a whole UTC second like 2026-11-23T05:00:00Z, or +S with 0 to 86400 seconds".to_owned();
+    if let Some(seconds) = text.strip_prefix('+') {
+        let seconds = seconds.parse().ok().filter(|s| (0.0..=86_400.0).contains(s));
+        return seconds.map(StartAt::After).ok_or_else(expected);
+    }
+    let at = Some(text).filter(|text| text.ends_with('Z')).and_then(|text| Epoch::parse(text).ok());
+    at.filter(|at| at.fraction() == 0.0).map(StartAt::Utc).ok_or_else(expected)
+}
+
+fn latency(text: &str) -> Result<f64, String> {
+    let ms = text.parse().ok().filter(|ms| (0.5..=10_000.0).contains(ms));
+    ms.ok_or_else(|| "expected 0.5 to 10000 milliseconds".to_owned())
 }
 
 #[derive(Args, Clone, Debug)]

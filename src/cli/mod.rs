@@ -14,6 +14,7 @@ mod error;
 mod generate;
 mod interrupt;
 mod lines;
+mod live;
 mod plan;
 mod progress;
 mod receive;
@@ -65,6 +66,7 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
     match command {
         Command::Run(arguments) => run::execute(&arguments),
         Command::Generate(arguments) => generate::execute(&arguments),
+        Command::Live(arguments) => live::execute(&arguments),
         Command::Receive(arguments) => receive::execute(&arguments),
         Command::Analyze(arguments) => analyze::execute(&arguments),
         Command::Plan(arguments) => plan::execute(&arguments),

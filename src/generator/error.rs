@@ -31,6 +31,17 @@ pub enum GenerateError {
     /// `truth.interval_s` out of range.
     #[error("truth_interval_s = {0}: expected 1e-6 to 1e6 s")]
     TruthInterval(f64),
+    /// Samples for which the motion is not known yet, or not any more.
+    #[error(
+        "the motion is pushed and known up to sample {known}, but sample {needed} is asked for: `gnss-twin live` \
+         drives such a scene, and its record replays it"
+    )]
+    Unpushed {
+        /// Samples for which there are ticks.
+        known: u64,
+        /// The sample after the last one asked for.
+        needed: u64,
+    },
     /// A part that the scene does not have.
     #[error("samples {first} to {end} of a scene that has {samples}: expected a first one before the last")]
     Part {

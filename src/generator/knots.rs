@@ -7,7 +7,8 @@
 //! until it does. Parts also end at breaks of the motion. Rays that are silent throughout a part are left out
 //! of it. Each signal has knots of its own, because tolerance, effects and power are its carrier's; what they
 //! share is the geometry under them ([`super::geometry`]). All of that together is 1 % of the processor time
-//! of a scene of two signals in two front ends. Limits: parts are not shorter than 1024 samples.
+//! of a scene of two signals in two front ends. Where the motion is pushed, a root is a tick. Limits: parts
+//! are not shorter than 1024 samples.
 
 use crate::generator::fast_phase::FastPhase;
 use crate::gnss::time::Rate;
@@ -45,7 +46,7 @@ impl Arrival {
 /// Where polynomials are made.
 #[derive(Clone, Debug)]
 pub struct Grid {
-    /// Samples of a root part, a power of two.
+    /// Samples of a root part: a power of two, or a tick.
     root_samples: u64,
     /// Samples at which a part must end, ascending.
     breaks: Vec<u64>,
@@ -141,6 +142,11 @@ impl Grid {
         breaks.dedup();
         let longest = (16.0 * rate.hz()).max(2.0 * SHORTEST_SAMPLES as f64) as u64;
         Self { root_samples: 1 << longest.ilog2(), breaks, tolerance_cycles, carrier_hz }
+    }
+
+    /// The same grid with roots of so many samples, where there is such a number.
+    pub fn with_roots_of(self, samples: Option<u64>) -> Self {
+        Self { root_samples: samples.map_or(self.root_samples, |samples| samples.max(1)), ..self }
     }
 
     /// Samples of a root part.

@@ -33,9 +33,9 @@
 //! 1. [`random`], [`fidelity`]; the world: [`vehicle`], [`clock`], [`orbit_error`], [`precise`],
 //!    [`catalogue`], [`message`];
 //! 2. the channel: [`ray`], [`sky`], [`effect`], [`fast_phase`], [`spoof`];
-//! 3. the kernels and the front end: [`synth`], [`knots`], [`mod@stage`];
-//! 4. [`scene`], which holds all of these, and what follows from it: [`presence`], [`geometry`], [`arrival`],
-//!    [`truth`], [`error`], [`transmit`], [`mod@stream`];
+//! 3. the kernels and the front end: [`synth`], [`knots`], [`switches`], [`mod@stage`];
+//! 4. [`scene`], which holds all of these, and what follows from it: [`event`], [`presence`], [`geometry`],
+//!    [`arrival`], [`truth`], [`error`], [`transmit`], [`mod@stream`];
 //! 5. what is said before a run: [`levels`], [`plan`], [`dynamics`]; and [`scenario`], the scene as written.
 
 #![warn(missing_docs)]
@@ -46,6 +46,7 @@ pub mod clock;
 pub mod dynamics;
 pub mod effect;
 pub mod error;
+pub mod event;
 pub mod fast_phase;
 pub mod fidelity;
 pub mod geometry;
@@ -64,6 +65,7 @@ pub mod sky;
 pub mod spoof;
 pub mod stage;
 pub mod stream;
+pub mod switches;
 pub mod synth;
 #[cfg(test)]
 mod tests;

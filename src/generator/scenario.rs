@@ -20,6 +20,7 @@ mod multipath;
 mod obstruction;
 mod parts;
 mod propagation;
+mod pushed;
 pub(crate) mod read;
 mod satellite;
 pub mod schema;

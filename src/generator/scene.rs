@@ -20,6 +20,7 @@ use crate::generator::stage::interference::Interferer;
 use crate::generator::stage::interference::arrival::Tuning;
 use crate::generator::stage::noise::Thermal;
 use crate::generator::stage::playback::Playback;
+use crate::generator::switches::{Switched, Switches};
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::earth::{FLATTENING, SEMI_MAJOR_AXIS_M};
 use crate::gnss::facts::{Expect, Fault};
@@ -79,6 +80,8 @@ pub struct Scene {
     pub playback: Option<Playback>,
     /// What the antenna receives besides satellites, in order.
     pub interference: Vec<Interferer>,
+    /// What is switched while the scene is sent, where its motion is pushed.
+    pub switches: Option<Arc<Switches>>,
     /// Who sends other satellites' signals over the true ones.
     pub spoofers: Vec<Arc<Constellation>>,
     /// Thermal noise; absent means none.
@@ -157,6 +160,17 @@ impl Scene {
             scintillation: self.scintillation.as_deref(),
             satellite_clocks: &self.satellite_clocks,
         }
+    }
+
+    /// How the signals that a constellation (0 for the true one) sends as `sv` are switched at a sample.
+    pub fn switched(&self, constellation: usize, sv: Sv, sample: u64) -> Switched {
+        let switched = |all: &Arc<Switches>| all.of_constellation(constellation, sv, all.tick_of(sample));
+        self.switches.as_ref().map_or_else(Switched::default, switched)
+    }
+
+    /// True seconds since the scene's start when sample `n` is taken, without the clock's fast noise.
+    pub fn elapsed_s(&self, n: u64) -> f64 {
+        self.receiver_clock.true_elapsed_s(self.clock.start, self.clock.epoch(n))
     }
 
     /// What the receiver does to a wave of interference.

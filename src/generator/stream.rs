@@ -182,7 +182,15 @@ impl<'a> Stream<'a> {
     /// # Errors
     /// [`GenerateError`] of orbits, messages and truth.
     pub fn next(&mut self, truth: &mut dyn Sink, packed: &mut Vec<u8>) -> Result<bool, GenerateError> {
-        let to = self.front.batch_end();
+        self.advance(self.front.batch_end(), truth, packed)
+    }
+
+    /// The same with the samples before `to`, counted in the scene, for the next batch.
+    ///
+    /// # Errors
+    /// As [`Stream::next`], and [`GenerateError::Unpushed`] where the motion is not known so far.
+    pub fn advance(&mut self, to: u64, truth: &mut dyn Sink, packed: &mut Vec<u8>) -> Result<bool, GenerateError> {
+        let to = to.min(self.front.part.end);
         if !self.front.is_before(to) {
             packed.clear();
             return Ok(false);

@@ -23,7 +23,6 @@ use crate::generator::sky::emission;
 use crate::generator::vehicle::Trajectory;
 use crate::generator::vehicle::attitude::Attitude;
 use crate::gnss::broadcast::OrbitError;
-use crate::gnss::earth::Geodetic;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
@@ -53,11 +52,11 @@ impl WindUp {
         let Some(attitude) = trajectory.attitude().copied() else { return Ok(None) };
         let mut effect = Self { start, trajectory, attitude, origins: BTreeMap::new(), headings: Vec::new() };
         for knot in effect.trajectory.knots() {
-            let raw = effect.heading_raw_cycles(knot.t_s);
+            let raw = effect.trajectory.heading_cycles(knot.t_s);
             let counted = effect.headings.last().map_or(raw, |(_, last)| raw + (last - raw).round());
             effect.headings.push((knot.t_s, counted));
         }
-        let motion = effect.trajectory.at(0.0);
+        let motion = effect.trajectory.composed_for();
         for sv in catalogue.satellites() {
             if let Some(found) = emission(catalogue, sv, start, &motion)? {
                 let slow = effect.slow_cycles(&found.sight, 0.0).0 - effect.heading_cycles(0.0);
@@ -111,17 +110,12 @@ impl WindUp {
         (angle_cycles(&wave, &satellite, &still), -sense * (body.spin_cycles + beyond))
     }
 
-    /// Heading of the nose in turns, within one.
-    fn heading_raw_cycles(&self, t_s: f64) -> f64 {
-        let Some(body) = self.trajectory.orientation(t_s) else { return 0.0 };
-        let place = Geodetic::from_ecef(&self.trajectory.at(t_s).position_m);
-        let nose = place.ecef_to_enu() * (body.still * Vector3::x());
-        libm::atan2(nose.x, nose.y) / TAU
-    }
-
     /// The same with its turns counted from knot to knot of the trajectory.
     fn heading_cycles(&self, t_s: f64) -> f64 {
-        let raw = self.heading_raw_cycles(t_s);
+        let raw = self.trajectory.heading_cycles(t_s);
+        if let Some(grown) = self.trajectory.grown() {
+            return raw + (grown.heading_near_cycles(t_s).unwrap_or(raw) - raw).round();
+        }
         let next = self.headings.partition_point(|(knot_s, _)| *knot_s <= t_s);
         let near = match (next.checked_sub(1).and_then(|i| self.headings.get(i)), self.headings.get(next)) {
             (Some((a_s, a)), Some((b_s, b))) => a + (b - a) * (t_s - a_s) / (b_s - a_s),
@@ -195,6 +189,7 @@ mod tests {
 
     use super::*;
     use crate::generator::vehicle::attitude::Nose;
+    use crate::gnss::earth::Geodetic;
     use crate::gnss::rinex;
 
     fn body(nose: Nose, spin_hz: f64, boresight: Vector3<f64>) -> Attitude {

@@ -22,6 +22,7 @@ use crate::generator::ray::{Effect, Ray};
 use crate::generator::scene::Scene;
 use crate::generator::sky::emission;
 use crate::generator::stage::playback::Playback;
+use crate::generator::switches::Switches;
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
@@ -50,6 +51,7 @@ struct World {
     seed: u64,
     nodes: Nodes,
     trajectory: Trajectory,
+    switches: Option<Arc<Switches>>,
     receiver_clock: ReceiverClock,
     /// True time since the start at which the scene ends.
     end_s: f64,
@@ -141,6 +143,7 @@ impl Scenario {
             let warning = scene.fidelity.warning(scene.clock.rate.hz());
             warnings.extend(warning.map(|warning| front_end.of_it() + &warning));
         }
+        scenes.first().map_or(Ok(()), |scene| self.replay(scene, &files))?;
         Ok((scenes, warnings))
     }
 
@@ -175,6 +178,7 @@ impl Scenario {
         };
         let end_s = receiver_clock.true_elapsed_s(self.start, end);
         let start_s = receiver_clock.true_elapsed_s(self.start, self.start);
+        self.begin_ticks(&trajectory, start_s)?;
         // A file that begins at the scene's start must do with a receiver's clock that is ahead by its bias.
         self.covers(&self.motion, &trajectory, start_s.max(0.0), end_s.min(self.duration_s))?;
         let navigation = parts::navigation(self, directory, overrides, warnings)?;
@@ -193,6 +197,7 @@ impl Scenario {
             excluded: sky.excluded,
             seed,
             nodes,
+            switches: trajectory.tick_samples().map(|samples| Arc::new(Switches::new(samples))),
             trajectory,
             receiver_clock,
             end_s,
@@ -233,6 +238,7 @@ impl Scenario {
             scintillation: world.scintillation.clone(),
             playback: None,
             interference: Vec::new(),
+            switches: world.switches.clone(),
             spoofers: Vec::new(),
             noise: self.noise,
             front_end: stages.map_err(|reason| refuse(&reason))?,

@@ -43,6 +43,28 @@ pub enum MotionSpec {
     Rocket(Rocket),
     /// A free flight round the Earth.
     Orbit(Orbit),
+    /// What is pushed while the scene is sent, tick by tick.
+    Pushed {
+        /// Where it rests before the first push.
+        place: Geodetic,
+        /// Length of a tick.
+        tick_s: f64,
+        /// Time in which what is sent joins what was pushed.
+        join_s: f64,
+        /// Age of a push up to which its acceleration is kept.
+        hold_s: f64,
+        /// Largest jerk of a join.
+        max_jerk_mps3: f64,
+    },
+    /// The ticks of a live run again.
+    Ticks {
+        /// Their log.
+        path: PathBuf,
+        /// Table of what was switched meanwhile.
+        events: Option<PathBuf>,
+        /// Length of a tick.
+        tick_s: f64,
+    },
 }
 
 #[derive(Clone, Copy)]
@@ -52,6 +74,8 @@ enum Kind {
     File,
     Rocket,
     Orbit,
+    Pushed,
+    Ticks,
 }
 
 impl MotionSpec {
@@ -63,6 +87,8 @@ impl MotionSpec {
             Self::File { .. } => "file",
             Self::Rocket(_) => "rocket",
             Self::Orbit(_) => "orbit",
+            Self::Pushed { .. } => "pushed",
+            Self::Ticks { .. } => "ticks",
         }
     }
 
@@ -73,6 +99,8 @@ impl MotionSpec {
             ("file", Kind::File),
             ("rocket", Kind::Rocket),
             ("orbit", Kind::Orbit),
+            ("pushed", Kind::Pushed),
+            ("ticks", Kind::Ticks),
         ];
         match table.need_choice("kind", &kinds)? {
             Kind::Static => Ok(Self::Static(place(table)?)),
@@ -80,6 +108,17 @@ impl MotionSpec {
             Kind::File => file(table),
             Kind::Rocket => Ok(Self::Rocket(rocket(table)?)),
             Kind::Orbit => Ok(Self::Orbit(orbit(table)?)),
+            Kind::Pushed => Ok(Self::Pushed {
+                place: place(table)?,
+                tick_s: table.need("tick_s")?,
+                join_s: table.need("join_s")?,
+                hold_s: table.need("hold_s")?,
+                max_jerk_mps3: table.need("max_jerk_mps3")?,
+            }),
+            Kind::Ticks => {
+                let events = table.text("events")?.map(PathBuf::from);
+                Ok(Self::Ticks { path: PathBuf::from(table.need_text("file")?), events, tick_s: table.need("tick_s")? })
+            }
         }
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::interference::{InterferenceSpec, Kind, SpooferSpec, Strength};
-use super::{Overrides, Power, Scenario, ScenarioError};
+use super::{MotionSpec, Overrides, Power, Scenario, ScenarioError};
 use crate::generator::effect::link::LinkBudget;
 use crate::generator::levels::strongest;
 use crate::generator::scene::{CodeEdge, Scene};
@@ -108,6 +108,7 @@ impl Source<'_> {
             // Sources of one scene, and the thermal noise, draw from streams of their own.
             seed: seed ^ self.number.wrapping_mul(0xd1b5_4a32_d192_ed03),
             tuning: self.tuning.clone(),
+            switches: self.scene.switches.clone(),
             description,
         }))
     }
@@ -313,6 +314,10 @@ pub(super) fn spoofers(
     for (number, spec) in (1..).zip(&scenario.spoofers) {
         let place = match &spec.motion {
             None => Place::Antenna,
+            Some(motion @ (MotionSpec::Pushed { .. } | MotionSpec::Ticks { .. })) => {
+                let reason = format!("kind = {:?}: the antenna's motion alone can be pushed", motion.kind());
+                return Err(scenario.conflict("spoofer.motion", reason));
+            }
             Some(motion) => {
                 let trajectory = scenario.trajectory_of(motion, directory, overrides, warnings)?;
                 let last_s = spec.off_s.map_or(end_s, |off_s| off_s.min(end_s));

@@ -1,5 +1,5 @@
 //! From a motion as written to a trajectory: files are read, a body is given its attitude, and spans are
-//! checked.
+//! checked. What is pushed grows in `pushed`.
 
 use std::fs::File;
 use std::path::Path;
@@ -34,6 +34,7 @@ impl Scenario {
                 let until_s = self.duration_s * (1.0 + self.receiver_clock.drift.abs()) + reach_s;
                 orbit.trajectory(-reach_s, until_s).map_err(|e| self.conflict("motion", e.to_string()))
             }
+            MotionSpec::Pushed { .. } | MotionSpec::Ticks { .. } => self.growing(motion, directory, overrides),
             MotionSpec::File { path, kind, max_gap_s } => {
                 let options = file::Options { start: self.start, max_gap_s: *max_gap_s };
                 let full = self.resolve("motion.file", directory, path, overrides)?;

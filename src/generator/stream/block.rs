@@ -56,7 +56,11 @@ pub(super) fn render(
     let piece_bytes = if memory == 0 { RUN_SAMPLES * format.bytes() } else { bytes.len() };
     let mut clipped = 0;
     let mut first = start;
-    for bytes in bytes.chunks_mut(piece_bytes.max(1)) {
+    // A block that begins within a run begins with the rest of it, so that no run is rendered twice.
+    let rest = (run_begin(start) + RUN_SAMPLES as u64 - start) as usize * format.bytes();
+    let cut = if piece_bytes == bytes.len() { 0 } else { rest.min(bytes.len()) };
+    let (head, tail) = bytes.split_at_mut(cut);
+    for bytes in std::iter::once(head).filter(|head| !head.is_empty()).chain(tail.chunks_mut(piece_bytes.max(1))) {
         let samples = bytes.len() / format.bytes();
         let mut block = satellites(scene, transmitters, kernel, (first, samples, memory), worker);
         scene.stages(|stage| stage.act(&mut block));

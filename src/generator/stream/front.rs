@@ -85,6 +85,12 @@ impl<'a> Front<'a> {
         // Runs are made from their beginning on.
         let needed = run_begin(self.next).saturating_sub(self.lead);
         let made = to.max(first_run(scene, needed, self.lead));
+        if let Some(grown) = scene.trajectory.grown() {
+            let known = grown.ticks().saturating_mul(grown.joining().tick_samples);
+            if made > known {
+                return Err(GenerateError::Unpushed { known, needed: made });
+            }
+        }
         self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, made))
     }
 

@@ -8,6 +8,7 @@ use super::GenerateError;
 use super::front::Front;
 use crate::generator::scene::{Scene, sources};
 use crate::generator::spoof::Constellation;
+use crate::generator::switches::Source;
 use crate::generator::truth::{self, Record, Sink};
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::record::{InterferenceRow, TrajectoryRow};
@@ -69,6 +70,13 @@ impl Ticks {
                 scene.spoofers.iter().filter(|spoofer| spoofer.on(scene.clock, &scene.receiver_clock).contains(&sample))
             {
                 let number = spoofer.number;
+                if scene
+                    .switches
+                    .as_ref()
+                    .is_some_and(|all| all.at(Source::Spoofer(number), all.tick_of(sample)).gain <= 0.0)
+                {
+                    continue;
+                }
                 truth.take(Record::Claim { spoofer: number, place: place(spoofer, sample) })?;
                 for (observation, ..) in rows(fronts, spoofer, &at, origin)? {
                     truth.take(Record::Spoofed { spoofer: number, observation })?;

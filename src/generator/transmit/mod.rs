@@ -149,7 +149,8 @@ impl Transmitter {
         let reading_s = |t_s: &f64| scene.receiver_clock.reading_elapsed_s(scene.clock.start, *t_s);
         let breaks = from.breaks_s(&scene.trajectory);
         let breaks = breaks.iter().map(|t_s| (reading_s(t_s) * rate_hz).ceil().max(0.0) as u64).collect();
-        let grid = Grid::new(scene.clock.rate, breaks, scene.fidelity.knot_tolerance_cycles, carrier_hz);
+        let grid = Grid::new(scene.clock.rate, breaks, scene.fidelity.knot_tolerance_cycles, carrier_hz)
+            .with_roots_of(scene.trajectory.tick_samples());
         Ok(Some(Self {
             on: from.on(scene.clock, &scene.receiver_clock),
             from,
@@ -186,13 +187,17 @@ impl Transmitter {
         } else {
             None
         };
+        // A root is a tick where anything can be switched.
+        let switched = scene.switched(self.from.number, self.sv, root * self.root_samples());
+        let carrier_hz = self.signal.carrier_hz(self.sv);
         let observe = |n: u64| {
             let local = scene.clock.epoch(n);
             let seen = match &arc {
                 Some(arc) => arrival::seen_on(scene, &self.from, arc, self.signal, local),
                 None => arrival::seen_by(scene, &self.from, (self.sv, self.signal), local, self.geometry.as_deref()),
             };
-            seen.map(|seen| seen.map(|seen| seen.arrivals))
+            let act = |arrival| switched.act(arrival, carrier_hz, n as f64, scene.clock.rate);
+            seen.map(|seen| seen.map(|seen| seen.arrivals.into_iter().map(act).collect()))
         };
         Ok(self.grid.root(root, &observe)?)
     }

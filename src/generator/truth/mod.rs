@@ -1,8 +1,9 @@
 //! What is true at one reading of the receiver's clock, as records and as the files that the judge reads.
 //!
 //! Delays and phases are those of [`arrival`](crate::generator::arrival), which samples have too. Doppler is
-//! minus the derivative of that same carrier by the receiver's clock. Limits: tropospheric and
-//! ionospheric shares in `sky.csv` are half the sum and half the difference of code and carrier delays.
+//! minus the derivative of that same carrier by the receiver's clock, of pushed motion within its tick.
+//! Limits: tropospheric and ionospheric shares in `sky.csv` are half the sum and half the difference of code
+//! and carrier delays.
 
 mod record;
 mod skyline;
@@ -11,6 +12,7 @@ mod writer;
 pub use crate::generator::arrival::{Seen, in_view, in_view_from, presence_from, seen, seen_by, seen_from, seen_on};
 use crate::generator::arrival::{received, seen_near};
 use crate::generator::geometry::Geometry;
+use crate::generator::knots::Arrival;
 use crate::generator::scene::Scene;
 use crate::generator::spoof::Constellation;
 use crate::gnss::broadcast::OrbitError;
@@ -25,6 +27,8 @@ pub use writer::Writer;
 /// five points leave of a sinusoid of ω is (ω step)⁴/30 of its slope: 3e-6.
 const DOPPLER_STEP_S: f64 = 0.01;
 const DOPPLER_STEP_TURNS: f64 = 1.0 / 64.0;
+/// Its share of a tick of pushed motion: five points lie in half a tick.
+const DOPPLER_STEP_TICKS: f64 = 1.0 / 8.0;
 
 /// Doppler: minus the derivative of the carrier, by a stencil of five points 10 ms apart that does not
 /// straddle a break. `here` is what is seen at the sample, which is one of the five.
@@ -38,21 +42,28 @@ fn doppler_hz(
     let local = scene.clock.epoch(sample);
     let elapsed_s = scene.receiver_clock.true_elapsed_s(scene.clock.start, local);
     let spin_hz = scene.trajectory.attitude().map_or(0.0, |attitude| attitude.spin_hz.abs());
-    let step_s = if spin_hz > 0.0 { DOPPLER_STEP_S.min(DOPPLER_STEP_TURNS / spin_hz) } else { DOPPLER_STEP_S };
+    let tick_s = scene.trajectory.tick_samples().map(|samples| samples as f64 / scene.clock.rate.hz());
+    let widest_s = tick_s.map_or(DOPPLER_STEP_S, |tick_s| DOPPLER_STEP_S.min(DOPPLER_STEP_TICKS * tick_s));
+    let step_s = if spin_hz > 0.0 { widest_s.min(DOPPLER_STEP_TURNS / spin_hz) } else { widest_s };
     let reach_s = 2.0 * step_s;
     let mut breaks = from.motion_breaks_s(&scene.trajectory);
     if let Some(clock) = from.fading(sv).and_then(|sv| scene.satellite_clocks.of(sv)) {
         breaks.extend(clock.breaks_s(&scene.fast_phases()));
         breaks.sort_by(f64::total_cmp);
     }
+    let switched = scene.switched(from.number, sv, sample);
     let moved = |seen: &Seen, away_s: f64| {
         let place = sample as f64 + away_s * scene.clock.rate.hz();
         let fast = scene.fast_phases().at(from.fading(sv), signal.carrier_hz(sv), place);
-        seen.arrivals.first().map(|arrival| arrival.with_fast_phase(fast).carrier_cycles)
+        let act = |arrival: &Arrival| switched.act(*arrival, signal.carrier_hz(sv), place, scene.clock.rate);
+        seen.arrivals.first().map(|arrival| act(arrival).with_fast_phase(fast).carrier_cycles)
     };
     let near = |b: &&f64| (**b - elapsed_s).abs() < reach_s;
     // Lagrange's derivative weights; the middle of the stencil moves away from the break.
+    let into_tick = scene.trajectory.tick_samples().map(|samples| (sample % samples) as f64 / samples as f64);
     let (offset, weights) = match breaks.iter().find(near) {
+        None if into_tick.is_some_and(|share| share < 0.25) => (0, [-25.0, 48.0, -36.0, 16.0, -3.0]),
+        None if into_tick.is_some_and(|share| share > 0.75) => (-4, [3.0, -16.0, 36.0, -48.0, 25.0]),
         None => (-2, [1.0, -8.0, 0.0, 8.0, -1.0]),
         Some(b) if *b <= elapsed_s => (0, [-25.0, 48.0, -36.0, 16.0, -3.0]),
         Some(_) => (-4, [3.0, -16.0, 36.0, -48.0, 25.0]),
@@ -107,8 +118,10 @@ pub fn observe_by(
     let local = scene.clock.epoch(sample);
     let Some(seen) = seen_by(scene, from, (sv, signal), local, known)? else { return Ok(None) };
     let (Some(&arrival), Some(ray)) = (seen.arrivals.first(), seen.rays.first()) else { return Ok(None) };
-    // What is blocked altogether is not there to be observed.
-    if ray.cn0_hz <= 0.0 {
+    let switched = scene.switched(from.number, sv, sample);
+    let arrival = switched.act(arrival, signal.carrier_hz(sv), sample as f64, scene.clock.rate);
+    // What is blocked or switched off altogether is not there to be observed.
+    if arrival.cn0_hz <= 0.0 {
         return Ok(None);
     }
     let arrival =

@@ -10,7 +10,7 @@ use crate::gnss::earth::{Geodetic, Look};
 pub(super) fn skyline_deg(scene: &Scene) -> Option<Vec<[f64; 2]>> {
     let obstruction = scene.effects.iter().find(|effect| effect.name() == "obstruction")?;
     let (sv, signal) = (scene.catalogue.satellites().next()?, scene.signals.first()?);
-    let motion = scene.trajectory.at(0.0);
+    let motion = scene.trajectory.composed_for();
     let user = Geodetic::from_ecef(&motion.position_m);
     let blocked = |azimuth_deg: f64, elevation_deg: f64| {
         let look = Look { azimuth_rad: azimuth_deg.to_radians(), elevation_rad: elevation_deg.to_radians() };

@@ -59,6 +59,14 @@ pub enum Fault {
     /// Bytes that are no UTF-8.
     #[error("not UTF-8 text")]
     NotText,
+    /// What stands in a log of ticks in place of what belongs there.
+    #[error("'{what}': expected {expected}")]
+    Log {
+        /// What stands there.
+        what: String,
+        /// What is expected.
+        expected: String,
+    },
     /// A row beyond the length that is read.
     #[error("a row of more than {MAX_ROW_BYTES} bytes: expected numbers")]
     LongRow,
@@ -389,7 +397,11 @@ pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<(Tra
 }
 
 /// One GGA sentence (NMEA 0183, 6.3.29): checksum, UTC time of day, place and height above the ellipsoid.
-fn gga(text: &str, start: Epoch, before_s: Option<f64>) -> Result<Option<Row>, Fault> {
+/// `None` of one without a fix. The day is the one nearest to `before_s`, or to the scene's start.
+///
+/// # Errors
+/// [`Fault::Sentence`].
+pub fn gga(text: &str, start: Epoch, before_s: Option<f64>) -> Result<Option<Row>, Fault> {
     let fail = |reason| Fault::Sentence { sentence: text.to_owned(), reason };
     let (body, sum) = text.strip_prefix('$').and_then(|t| t.split_once('*')).ok_or_else(|| fail("no checksum"))?;
     let sum = u8::from_str_radix(sum.trim(), 16).map_err(|_| fail("the checksum is not two hexadecimal digits"))?;

@@ -4,9 +4,13 @@
 //! pieces, so position, velocity and acceleration are continuous and each is the exact derivative of the one
 //! before. One knot at rest is a static antenna. Where the acceleration's slope jumps, a break is reported,
 //! so that knots of the signal can be put there. With an [`Attitude`] the antenna sits on a body that turns.
+//! The knots of a [`grown`] motion become known while it is sent.
 
 pub mod attitude;
 pub mod file;
+pub mod grown;
+pub mod joining;
+pub mod log;
 pub mod orbit;
 pub mod ramp;
 pub mod rocket;
@@ -17,7 +21,10 @@ pub mod spline;
 use std::sync::Arc;
 
 use attitude::{Attitude, Orientation};
+use grown::{Grown, Joining};
 use nalgebra::Vector3;
+
+use crate::gnss::earth::Geodetic;
 
 /// Position, velocity and acceleration of the antenna in ECEF.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,13 +70,15 @@ pub struct Trajectory {
     breaks_s: Vec<f64>,
     first: Knot,
     attitude: Option<Attitude>,
+    /// Of a motion that is pushed while it is sent; the knots above are then its first alone.
+    grown: Option<Arc<Grown>>,
 }
 
 impl Trajectory {
     /// An antenna that does not move.
     pub fn fixed(position_m: Vector3<f64>) -> Self {
         let first = Knot { t_s: 0.0, motion: Motion::at_rest(position_m) };
-        Self { knots: Arc::new([first]), breaks_s: Vec::new(), first, attitude: None }
+        Self { knots: Arc::new([first]), breaks_s: Vec::new(), first, attitude: None, grown: None }
     }
 
     /// Motion through `knots`, whose times must ascend; `None` if they do not, or if there are none.
@@ -82,7 +91,61 @@ impl Trajectory {
         }
         breaks_s.sort_by(f64::total_cmp);
         breaks_s.dedup();
-        Some(Self { knots: knots.into(), breaks_s, first, attitude: None })
+        Some(Self { knots: knots.into(), breaks_s, first, attitude: None, grown: None })
+    }
+
+    /// Motion that begins as `first` and grows by [`Self::append`]; the newest `keep` knots are kept.
+    pub fn growing(first: Motion, joining: Joining, keep: usize) -> Self {
+        let first = Knot { t_s: 0.0, motion: first };
+        let grown = Some(Arc::new(Grown::new(joining, first, keep)));
+        Self { knots: Arc::new([first]), breaks_s: Vec::new(), first, attitude: None, grown }
+    }
+
+    /// The knots of a motion that grows.
+    pub fn grown(&self) -> Option<&Grown> {
+        self.grown.as_deref()
+    }
+
+    /// Samples of a tick of a motion that grows.
+    pub fn tick_samples(&self) -> Option<u64> {
+        self.grown().map(|grown| grown.joining().tick_samples)
+    }
+
+    /// Says at which true time the first tick of a growing motion begins.
+    pub fn begin(&self, t_s: f64) {
+        let first = Knot { t_s, ..self.first };
+        if let Some(grown) = &self.grown {
+            grown.begin(first, self.heading_of(&first));
+        }
+    }
+
+    /// Ends the next tick of a growing motion with `knot`, which must be later than the last one.
+    pub fn append(&self, knot: Knot) {
+        if let Some(grown) = &self.grown {
+            grown.append(knot, self.heading_of(&knot));
+        }
+    }
+
+    /// Heading of the nose at a knot in turns, within one; 0 without an attitude.
+    fn heading_of(&self, Knot { t_s, motion }: &Knot) -> f64 {
+        self.attitude.map_or(0.0, |attitude| {
+            heading_cycles(&attitude.at(*t_s, motion), &attitude.antenna(*t_s, motion).position_m)
+        })
+    }
+
+    /// Heading of the nose in turns, within one, where the body has an attitude.
+    pub fn heading_cycles(&self, t_s: f64) -> f64 {
+        self.orientation(t_s).map_or(0.0, |axes| heading_cycles(&axes, &self.at(t_s).position_m))
+    }
+
+    /// The antenna's motion for which the scene was composed: that at the scene's start, and of a growing
+    /// motion the one that it begins with.
+    pub fn composed_for(&self) -> Motion {
+        match (&self.grown, &self.attitude) {
+            (None, _) => self.at(0.0),
+            (Some(_), None) => self.first.motion,
+            (Some(_), Some(attitude)) => attitude.antenna(self.first.t_s, &self.first.motion),
+        }
     }
 
     /// The same motion of a body with an attitude.
@@ -121,6 +184,9 @@ impl Trajectory {
     /// The motion of the body that carries the antenna. Before the first knot and after the last one the
     /// acceleration there continues; [`Self::span_s`] says where that is.
     pub fn body(&self, t_s: f64) -> Motion {
+        if let Some(grown) = &self.grown {
+            return grown.body(t_s).unwrap_or(self.first.motion);
+        }
         let next = self.knots.partition_point(|knot| knot.t_s <= t_s);
         let left = next.checked_sub(1).and_then(|i| self.knots.get(i)).unwrap_or(&self.first);
         match self.knots.get(next) {
@@ -134,7 +200,7 @@ impl Trajectory {
         &self.breaks_s
     }
 
-    /// The knots themselves.
+    /// The knots themselves; of a growing motion the first alone.
     pub fn knots(&self) -> &[Knot] {
         &self.knots
     }
@@ -142,11 +208,16 @@ impl Trajectory {
     /// Whether the antenna never moves.
     pub fn is_static(&self) -> bool {
         let swings = self.spins() && self.attitude.is_some_and(|attitude| attitude.lever_arm_m.yz().norm() > 0.0);
-        !swings && self.knots.iter().all(|knot| knot.motion == Motion::at_rest(self.first.motion.position_m))
+        !swings
+            && self.grown.is_none()
+            && self.knots.iter().all(|knot| knot.motion == Motion::at_rest(self.first.motion.position_m))
     }
 
     /// First and last instant that the knots cover; for all times where nothing moves at that end.
     pub fn span_s(&self) -> (f64, f64) {
+        if self.grown.is_some() {
+            return (f64::NEG_INFINITY, f64::INFINITY);
+        }
         let last = self.knots.last().unwrap_or(&self.first);
         let rests = |knot: &Knot| knot.motion == Motion::at_rest(knot.motion.position_m);
         let start = if rests(&self.first) { f64::NEG_INFINITY } else { self.first.t_s };
@@ -183,6 +254,12 @@ impl Trajectory {
     }
 }
 
+/// Heading of the nose of a body with these axes at a place in ECEF, in turns within one.
+fn heading_cycles(axes: &Orientation, place_m: &Vector3<f64>) -> f64 {
+    let nose = Geodetic::from_ecef(place_m).ecef_to_enu() * (axes.still * Vector3::x());
+    libm::atan2(nose.x, nose.y) / std::f64::consts::TAU
+}
+
 /// The largest values that a motion reaches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extremes {
@@ -192,8 +269,9 @@ pub struct Extremes {
     pub speed_mps: f64,
 }
 
-/// The quintic with the position, velocity and acceleration of both knots, at `t_s`.
-fn between(left: &Knot, right: &Knot, t_s: f64) -> Motion {
+/// What the quintic between two knots departs by from the left one's parabola: the factors of the third,
+/// fourth and fifth power of the share of the time between them, in metres.
+fn third_fourth_fifth(left: &Knot, right: &Knot) -> [Vector3<f64>; 3] {
     let h = right.t_s - left.t_s;
     let (a, b) = (&left.motion, &right.motion);
     // Departures of the right knot from the left one's parabola, each scaled to metres; differences first, so
@@ -204,6 +282,14 @@ fn between(left: &Knot, right: &Knot, t_s: f64) -> Motion {
     let third = gap * 10.0 - slope * 4.0 + bend * 0.5;
     let fourth = gap * -15.0 + slope * 7.0 - bend;
     let fifth = gap * 6.0 - slope * 3.0 + bend * 0.5;
+    [third, fourth, fifth]
+}
+
+/// The quintic with the position, velocity and acceleration of both knots, at `t_s`.
+fn between(left: &Knot, right: &Knot, t_s: f64) -> Motion {
+    let h = right.t_s - left.t_s;
+    let a = &left.motion;
+    let [third, fourth, fifth] = third_fourth_fifth(left, right);
     let t = t_s - left.t_s;
     let x = t / h;
     Motion {

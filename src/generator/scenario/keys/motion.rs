@@ -20,14 +20,17 @@ pub(crate) const PLACE: [Key; 3] = [latitude().required(), longitude().required(
 /// A place that may be absent as a whole.
 pub(crate) const PLACE_IF_ANY: [Key; 3] = [latitude(), longitude(), height()];
 
-const GROUND: &[&str] = &["static", "rocket"];
+const GROUND: &[&str] = &["static", "rocket", "pushed"];
 const ROUTE: &[&str] = &["waypoints"];
 const FROM_FILE: &[&str] = &["file"];
+const TICKS: &[&str] = &["ticks"];
+const PUSHED: &[&str] = &["pushed"];
 const ROCKET: &[&str] = &["rocket"];
 const ORBIT: &[&str] = &["orbit"];
 
 pub(crate) const MOTION: &[Key] = &[
-    word("kind", || vec!["static", "waypoints", "file", "rocket", "orbit"], "which motion").required(),
+    word("kind", || vec!["static", "waypoints", "file", "rocket", "orbit", "pushed", "ticks"], "which motion")
+        .required(),
     PLACE[0].of(GROUND),
     PLACE[1].of(GROUND),
     PLACE[2].of(GROUND),
@@ -47,6 +50,14 @@ pub(crate) const MOTION: &[Key] = &[
     text("file", A_PATH, "a trajectory, CSV (`t_s` and a place a row) or NMEA GGA").required().of(FROM_FILE),
     word("format", || vec!["csv", "nmea"], "of the file").or_else("by the file's name").of(FROM_FILE),
     number("max_gap_s", 0.001, 3600.0, "s", "longest time between rows that is interpolated").or(2.0).of(FROM_FILE),
+    text("file", A_PATH, "`ticks.csv` of a live run's record, which is sent again").required().of(TICKS),
+    text("events", A_PATH, "`events.csv` beside it, where anything was switched").of(TICKS),
+    number("tick_s", 0.001, 0.1, "s", "length of a tick, to the sample; 4096 samples at least")
+        .or(0.01)
+        .of(&["pushed", "ticks"]),
+    number("join_s", 0.001, 2.0, "s", "time in which what is sent joins what was pushed").or(0.1).of(PUSHED),
+    number("hold_s", 0.001, 60.0, "s", "age of a push up to which its acceleration is kept").or(0.5).of(PUSHED),
+    number("max_jerk_mps3", 1.0, 1e9, "m/s3", "largest jerk of a join; what needs more is a snap").or(2e4).of(PUSHED),
     number("azimuth_deg", -360.0, 360.0, "deg", "direction of flight from north over east").required().of(ROCKET),
     number("elevation_deg", 0.0, 90.0, "deg", "of the direction of thrust").required().of(ROCKET),
     number("ignition_s", 0.0, 86_400.0, "s", "time of ignition").required().of(ROCKET),

@@ -129,7 +129,15 @@ pub struct Path {
 impl Path {
     /// Time on the way of what arrives `t_s` true seconds after the scene's start; a straight line in vacuum.
     pub fn travel_s(&self, t_s: f64) -> f64 {
-        let antenna_m = self.antenna.at(t_s).position_m;
+        self.travel_to_s(&self.antenna.at(t_s).position_m)
+    }
+
+    /// The same when the scene starts.
+    pub fn first_travel_s(&self) -> f64 {
+        self.travel_to_s(&self.antenna.composed_for().position_m)
+    }
+
+    fn travel_to_s(&self, antenna_m: &Vector3<f64>) -> f64 {
         let direct_s = (self.emitter_m - antenna_m).norm() / SPEED_OF_LIGHT_MPS;
         // The Earth turns under the wave: a second pass is 1e-6 of the first one's correction.
         (rotate_earth(&self.emitter_m, direct_s) - antenna_m).norm() / SPEED_OF_LIGHT_MPS

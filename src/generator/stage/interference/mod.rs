@@ -3,8 +3,8 @@
 //! An [`Interferer`] is a waveform on a carrier with a power, a time and perhaps a place. It lives in true
 //! time and arrives at RF, so the receiver's oscillator shifts it as it shifts satellites. Phases are
 //! anchored at every run of 4096 samples and linear within it (a Doppler rate of 1000 Hz/s leaves 3e-4 cycle
-//! at 2.6 Msps). Power is that at the antenna's port in the waveform's whole band. Limits: no polarisation,
-//! no pattern, one straight path.
+//! at 2.6 Msps); where the antenna's motion is pushed, at its ticks too. Power is that at the antenna's port
+//! in the waveform's whole band. Limits: no polarisation, no pattern, one straight path.
 
 pub mod arrival;
 
@@ -15,6 +15,7 @@ use arrival::{Path, Repetition, Tuning};
 
 use crate::generator::random::mix;
 use crate::generator::stage::{Block, Stage};
+use crate::generator::switches::{Source, Switches};
 use crate::generator::synth::band::Filter;
 use crate::generator::synth::chips::MARGIN_STEPS;
 use crate::generator::synth::isa::{self, Level};
@@ -140,6 +141,8 @@ pub struct Interferer {
     pub seed: u64,
     /// What the receiver does to its wave.
     pub tuning: Tuning,
+    /// What is switched while the scene is sent.
+    pub switches: Option<Arc<Switches>>,
     /// For the plan.
     pub description: String,
 }
@@ -147,6 +150,8 @@ pub struct Interferer {
 /// What holds over one run.
 struct Anchor {
     n: u64,
+    /// Samples to its other end.
+    length: u64,
     /// Reading of the receiver's clock minus the time sent, at both ends.
     behind_s: [f64; 2],
     turns: u64,
@@ -167,9 +172,11 @@ impl Interferer {
 
     /// Power over noise density at sample `n`, while on: falls with the square of the distance.
     fn jn0_at(&self, n: u64) -> f64 {
-        self.path.as_ref().map_or(self.jn0_hz, |path| {
-            let nearer = path.travel_s(0.0) / self.travel_s(n);
-            self.jn0_hz * nearer * nearer
+        let switch = |all: &Arc<Switches>| all.at(Source::Jammer(self.source), all.tick_of(n)).gain;
+        let jn0_hz = self.switches.as_ref().map_or(self.jn0_hz, |all| self.jn0_hz * switch(all));
+        self.path.as_ref().map_or(jn0_hz, |path| {
+            let nearer = path.first_travel_s() / self.travel_s(n);
+            jn0_hz * nearer * nearer
         })
     }
 
@@ -207,10 +214,12 @@ impl Interferer {
 
     /// What is true of it at a sample; `None` while it is off. Its power is the mean over a repetition.
     pub fn row(&self, source: usize, sample: u64) -> Option<InterferenceRow> {
-        if !self.on.contains(&sample) {
+        if !self.on.contains(&sample) || self.jn0_at(sample) <= 0.0 {
             return None;
         }
-        let step = self.tuning.turns_step(self.carrier_hz, self.behind_s(sample + RUN) - self.behind_s(sample), RUN);
+        let ends = self.span(sample / RUN * RUN, sample);
+        let (from, to) = if self.tick_samples().is_some() { (ends.start, ends.end) } else { (sample, sample + RUN) };
+        let step = self.tuning.turns_step(self.carrier_hz, self.behind_s(to) - self.behind_s(from), to - from);
         Some(InterferenceRow {
             sample,
             source,
@@ -219,31 +228,47 @@ impl Interferer {
         })
     }
 
-    fn anchor(&self, n: u64) -> Anchor {
-        let behind_s = [self.behind_s(n), self.behind_s(n + RUN)];
+    /// Samples of a tick, where the antenna's motion is pushed and sources are switched.
+    fn tick_samples(&self) -> Option<u64> {
+        self.switches.as_ref().map(|switches| switches.tick_samples())
+    }
+
+    /// The stretch around sample `at` of the run from `run` on, in which phases are linear.
+    fn span(&self, run: u64, at: u64) -> Range<u64> {
+        let whole = run..run + RUN;
+        self.tick_samples().map_or(whole.clone(), |tick| {
+            let begin = at / tick * tick;
+            whole.start.max(begin)..whole.end.min(begin + tick)
+        })
+    }
+
+    fn anchor(&self, span: Range<u64>) -> Anchor {
+        let (n, length) = (span.start, span.end - span.start);
+        let behind_s = [self.behind_s(n), self.behind_s(n + length)];
         let tuning = &self.tuning;
         Anchor {
             n,
+            length,
             behind_s,
             turns: tuning.turns(self.carrier_hz, n, behind_s[0]),
-            turns_step: tuning.turns_step(self.carrier_hz, behind_s[1] - behind_s[0], RUN),
-            amplitude: tuning.amplitude_lsb(self.jn0_at(n + RUN / 2)),
+            turns_step: tuning.turns_step(self.carrier_hz, behind_s[1] - behind_s[0], length),
+            amplitude: tuning.amplitude_lsb(self.jn0_at(n + length / 2)),
         }
     }
 
     /// Place in a repetition at the start of the run, whole and in 2^-64, and its advance a sample.
     fn place(&self, anchor: &Anchor, repetition: Repetition, late_s: f64) -> (i64, u64, i128) {
         let at = |end: usize| {
-            let n = anchor.n + RUN * end as u64;
+            let n = anchor.n + anchor.length * end as u64;
             let behind_s = anchor.behind_s.get(end).copied().unwrap_or(0.0);
             repetition.at(self.tuning.clock.rate, n, behind_s + late_s)
         };
         let ((whole, first), (end, last)) = (at(0), at(1));
         let advance = (i128::from(end - whole) << 64) + i128::from(last) - i128::from(first);
-        (whole, first, advance / i128::from(RUN))
+        (whole, first, advance / i128::from(anchor.length))
     }
 
-    /// Adds samples `from` to `from + i.len()` of the run.
+    /// Adds samples `from` to `from + i.len()` of the anchor's stretch.
     fn add(&self, level: Level, anchor: &Anchor, from: u64, i: &mut [f32], q: &mut [f32]) {
         match &self.waveform {
             Waveform::Cw => isa::add_tone(level, &self.tone(anchor, from, Modulation::None, None), i, q),
@@ -432,11 +457,20 @@ impl Stage for Interferer {
         let pieces = block.i.chunks_mut(BLOCK_SAMPLES).zip(block.q.chunks_mut(BLOCK_SAMPLES));
         for (number, (i, q)) in (0_u64..).zip(pieces) {
             let n = block.start + number * RUN;
-            let begin = self.on.start.clamp(n, n + i.len() as u64) - n;
-            let end = self.on.end.clamp(n, n + i.len() as u64) - n;
-            let inside = begin as usize..end as usize;
-            if let (false, Some(i), Some(q)) = (begin >= end, i.get_mut(inside.clone()), q.get_mut(inside)) {
-                self.add(block.level, &self.anchor(n), begin, i, q);
+            let last = n + i.len() as u64;
+            let mut at = n;
+            while at < last {
+                let span = self.span(n, at);
+                let begin = self.on.start.clamp(at, span.end.min(last)) - n;
+                let end = self.on.end.clamp(at, span.end.min(last)) - n;
+                let inside = begin as usize..end as usize;
+                if let (false, Some(i), Some(q)) = (begin >= end, i.get_mut(inside.clone()), q.get_mut(inside)) {
+                    let (from, anchor) = (n + begin - span.start, self.anchor(span.clone()));
+                    if anchor.amplitude > 0.0 || self.switches.is_none() {
+                        self.add(block.level, &anchor, from, i, q);
+                    }
+                }
+                at = span.end;
             }
         }
     }

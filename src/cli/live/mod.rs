@@ -1,0 +1,360 @@
+//! `live`: a scene in real time, tick by tick, while motion and events come in.
+//!
+//! One thread takes messages, one makes ticks, one writes to each sink. A tick is made as late as
+//! `--latency` permits, of what had come by then; how old the newest state was when its first sample was
+//! handed over is measured of every state that is used. Limits: what the sink itself buffers is not seen.
+
+mod account;
+pub mod intake;
+mod output;
+mod record;
+mod ring;
+
+use std::collections::VecDeque;
+use std::io::{IsTerminal, Write};
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use serde_json::{Value, json};
+
+use crate::cli::args::{self, StartAt};
+use crate::cli::error::CliError;
+use crate::cli::interrupt;
+use crate::cli::run::generator_error;
+use crate::cli::scenario;
+use crate::cli::sink::Spec;
+use crate::generator::scenario::Overrides;
+use crate::generator::scene::Scene;
+use crate::generator::truth;
+use crate::gnss::samples::Format;
+use crate::gnss::time::{Epoch, Rate};
+use crate::live::drive::{Driver, Made as Tick};
+use crate::live::wire::Message;
+use account::{Handed, Intake, Made};
+use intake::Inbox;
+use output::{Output, Pace};
+use record::{Recorder, Run};
+use ring::{Block, Put};
+
+/// Seconds from the Unix epoch to that of GPS time, leap seconds left out.
+const GPS_UNIX_S: i64 = 315_964_800;
+/// How long a wait lasts before signals are looked for.
+const LOOK: Duration = Duration::from_millis(20);
+/// How long sinks may take for the rest after a signal.
+const PARTING: Duration = Duration::from_millis(500);
+/// Pushes whose arrival is remembered until a tick shows them.
+const REMEMBERED: usize = 8192;
+
+/// Sends a scene in real time.
+pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
+    scenario::use_threads(arguments.threads)?;
+    if arguments.to.contains(&Spec::Stdout) && std::io::stdout().is_terminal() {
+        return Err(CliError::usage(
+            "--to -: standard output is a terminal: name a sink with --to, or a pipe behind |",
+        ));
+    }
+    let mut named = scenario::read(Some(&arguments.scenario))?.choose(arguments.front_end.as_deref())?;
+    let start = arguments.start_at.map(instant).transpose()?;
+    if let Some((epoch, _)) = start {
+        named.scenario.start = epoch;
+    }
+    let own = arguments.to.iter().any(|spec| matches!(spec, Spec::RtlTcp(_))).then_some(Format::Cu8);
+    let overrides =
+        Overrides { seed: arguments.seed, format: arguments.format.or(own), allow_outside: arguments.allow_outside };
+    let (scenes, warnings) = scenario::compose_all(&named, &overrides)?;
+    warnings.iter().for_each(|warning| scenario::warn(warning));
+    let [scene] = scenes.as_slice() else {
+        return Err(CliError::usage("a stream carries one front end: choose one with --front-end NAME"));
+    };
+    if arguments.motion.is_some() && scene.trajectory.grown().is_none_or(|grown| grown.ticks() > 0) {
+        let name = &named.name;
+        return Err(CliError::usage(format!("--motion: {name}: expected a scene with [motion] kind = \"pushed\"")));
+    }
+    let inbox = arguments.motion.map(|origin| intake::begin(origin, scene.clock.start)).transpose()?;
+    let mut recorder = arguments.record.as_ref().map(|target| Recorder::create(target, scene)).transpose()?;
+    let driver = match &mut recorder {
+        Some(recorder) => Driver::new(scene, &mut recorder.truth),
+        None => Driver::new(scene, &mut ()),
+    };
+    let driver = driver.map_err(generator_error)?;
+    let sinks: Result<Vec<_>, CliError> = arguments.to.iter().map(|spec| spec.open(&scene.metadata)).collect();
+    let sinks = sinks?;
+    interrupt::ends_work();
+    let pace = Pace::new(arguments, scene.clock.rate, start.map(|(_, at)| at));
+    let tick_s = scene.clock.rate.elapsed_s(driver.tick_samples());
+    let outputs: Result<Vec<Output>, CliError> = (0..)
+        .zip(sinks)
+        .zip(&arguments.to)
+        .map(|((number, sink), spec)| Output::begin((number, spec), sink, pace, tick_s))
+        .collect();
+    let live = Live { driver, recorder, inbox, outputs: outputs?, pace, scene, made: Made::default() };
+    live.run(arguments, &Run { named: &named, scene, overrides: &overrides, restarted: start.is_some() })
+}
+
+/// The GPS time with which a run starts, and the machine's.
+fn instant(at: StartAt) -> Result<(Epoch, SystemTime), CliError> {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_err(|_| CliError::usage("--start-at: no clock"))?;
+    let unix = |gps: i64| gps - Epoch::new(gps, 0.0).leap_seconds() + GPS_UNIX_S;
+    let (epoch, unix_s) = match at {
+        StartAt::Utc(epoch) => (epoch, unix(epoch.seconds())),
+        StartAt::After(seconds) => {
+            let unix_s = (now.as_secs_f64() + seconds).ceil() as i64;
+            let gps = unix_s - GPS_UNIX_S;
+            // Leap seconds are those of the time itself, a second look for one just inserted.
+            let gps = gps + Epoch::new(gps, 0.0).leap_seconds();
+            (Epoch::new(gps, 0.0), unix_s)
+        }
+    };
+    let at = UNIX_EPOCH + Duration::from_secs(unix_s.max(0) as u64);
+    if at < SystemTime::now() {
+        return Err(CliError::usage(format!(
+            "--start-at: {} is over: expected a second to come, or +S",
+            epoch.to_utc_text()
+        )));
+    }
+    Ok((epoch, at))
+}
+
+/// A live run at work.
+struct Live<'a> {
+    driver: Driver<'a>,
+    recorder: Option<Recorder>,
+    inbox: Option<Arc<Inbox>>,
+    outputs: Vec<Output>,
+    pace: Pace,
+    scene: &'a Scene,
+    made: Made,
+}
+
+/// Why a run ended.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum End {
+    Scene,
+    Signal,
+    SinkGone,
+}
+
+impl Live<'_> {
+    fn run(mut self, arguments: &args::Live, run: &Run<'_>) -> Result<(), CliError> {
+        let ended = self.ticks();
+        // Sinks have what was made, whatever ended it.
+        self.outputs.iter().for_each(|output| output.ring.end());
+        let patience = |output: &Output| {
+            let mut since: Option<Instant> = None;
+            while !output.is_done() && since.is_none_or(|since| since.elapsed() < PARTING) {
+                if since.is_none() && (interrupt::ending().is_some() || ended.is_err()) {
+                    since = Some(Instant::now());
+                }
+                thread::sleep(Duration::from_millis(2));
+            }
+        };
+        self.outputs.iter().for_each(patience);
+        let end = ended?;
+        let intake = self.intake();
+        let word = match end {
+            End::Scene => "scene",
+            End::Signal => "signal",
+            End::SinkGone => "sink",
+        };
+        let (underruns, mut summary) = self.status(&intake);
+        if let Some(object) = summary.as_object_mut() {
+            object.insert("ended_by".to_owned(), word.into());
+            object.insert("stated_latency_ms".to_owned(), self.stated(arguments));
+        }
+        print(&json!({ "summary": &summary }));
+        let rate = self.scene.clock.rate;
+        match self.recorder {
+            Some(mut recorder) => {
+                self.driver.finish(&mut recorder.truth).map_err(generator_error)?;
+                recorder.finish(run, summary)?;
+            }
+            None => drop(self.driver.finish(&mut ()).map_err(generator_error)?),
+        }
+        if let Some(signal) = interrupt::ending() {
+            return Err(CliError::signal(signal));
+        }
+        let mut failures = self.outputs.into_iter().map(Output::failure);
+        if let Some(Some(error)) = failures.next() {
+            return Err(error);
+        }
+        failures.flatten().for_each(|error| error.print());
+        let (late, made_s) = (self.made.late, rate.elapsed_s(self.made.samples));
+        if let Some(most) = arguments.max_underruns.filter(|most| underruns > *most) {
+            return Err(CliError::check(format!(
+                "{underruns} underruns in {made_s:.3} s: --max-underruns {most}; a larger --latency, a lower rate or \
+                 an idle machine helps"
+            )));
+        }
+        match arguments.max_late.filter(|most| late > *most) {
+            Some(most) => Err(CliError::check(format!(
+                "{late} states came after their time was sent and the join was over: --max-late {most}"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// The latency that is stated: a tick, the join and the ring; the sink's own comes on top.
+    fn stated(&self, arguments: &args::Live) -> Value {
+        let tick_ms = 1e3 * self.scene.clock.rate.elapsed_s(self.driver.tick_samples());
+        let join_ms = self.scene.trajectory.grown().map_or(0.0, |grown| 1e3 * grown.joining().join_s);
+        json!({ "tick": tick_ms, "join": join_ms, "ring": arguments.latency, "sink": "its own" })
+    }
+
+    /// Makes ticks to the scene's end, a signal, or the first sink's departure.
+    fn ticks(&mut self) -> Result<End, CliError> {
+        let (mut messages, mut arrivals) = (Vec::new(), VecDeque::new());
+        let mut used: VecDeque<Arc<Block>> = VecDeque::new();
+        let mut status = Instant::now() + Duration::from_secs(1);
+        let mut intake = Intake::default();
+        while !self.driver.is_done() {
+            if let Some(end) = self.wait() {
+                return Ok(end);
+            }
+            if let Some(inbox) = &self.inbox {
+                intake = inbox.drain(&mut messages);
+                self.take(&messages, &mut arrivals)?;
+            }
+            let reused = used.pop_front().and_then(|block| match Arc::try_unwrap(block) {
+                Ok(block) => Some(block.bytes),
+                Err(block) => {
+                    used.push_front(block);
+                    None
+                }
+            });
+            let mut bytes = reused.unwrap_or_default();
+            let begun = Instant::now();
+            let mut none = ();
+            let truth: &mut dyn truth::Sink = match &mut self.recorder {
+                Some(recorder) => &mut recorder.truth,
+                None => &mut none,
+            };
+            let Some(tick) = self.driver.tick(truth, &mut bytes).map_err(generator_error)? else { break };
+            self.made.slowest_tick = self.made.slowest_tick.max(begun.elapsed());
+            self.made.tick(tick.samples.0, tick.samples.1.min(self.scene.samples), tick.tick.as_ref());
+            if let Some(recorder) = &mut self.recorder {
+                recorder.tick(&tick, &bytes, self.scene.metadata.format.bytes())?;
+            }
+            let block = Arc::new(Block { bytes, first: tick.samples.0, shows: shown(&tick, &mut arrivals) });
+            self.hand(&block);
+            used.push_back(block);
+            if Instant::now() >= status {
+                status += Duration::from_secs(1);
+                print(&self.status(&intake).1);
+                self.made.low_water = None;
+            }
+        }
+        Ok(End::Scene)
+    }
+
+    /// Waits until the next tick is to be made; why it is not to be, if so.
+    fn wait(&mut self) -> Option<End> {
+        let first = self.driver.next_tick() * self.driver.tick_samples();
+        loop {
+            if interrupt::ending().is_some() {
+                return Some(End::Signal);
+            }
+            let Some(pacer) = self.outputs.first() else { return Some(End::SinkGone) };
+            if pacer.is_gone() {
+                return Some(End::SinkGone);
+            }
+            let early = self.pace.until_made(first);
+            if early > Duration::ZERO {
+                thread::sleep(early.min(LOOK));
+            } else if pacer.ring.has_room(LOOK) {
+                let waiting = pacer.ring.waiting();
+                self.made.low_water = Some(self.made.low_water.map_or(waiting, |least| least.min(waiting)));
+                return None;
+            }
+        }
+    }
+
+    /// Uses what came.
+    fn take(
+        &mut self,
+        messages: &[(Instant, Message)],
+        arrivals: &mut VecDeque<(u64, Instant)>,
+    ) -> Result<(), CliError> {
+        let sample = self.driver.next_tick() * self.driver.tick_samples();
+        let join_s = self.scene.trajectory.grown().map_or(0.0, |grown| grown.joining().join_s);
+        let now_s = self.scene.elapsed_s(sample);
+        for (at, message) in messages {
+            match message {
+                Message::Push(push, _) => {
+                    let taken = self.driver.offer(push);
+                    match &taken {
+                        Ok(number) => {
+                            self.made.taken += 1;
+                            self.made.late += u64::from(push.t_s < now_s - join_s);
+                            arrivals.push_back((*number, *at));
+                            if arrivals.len() > REMEMBERED {
+                                arrivals.pop_front();
+                            }
+                        }
+                        Err(refusal) => {
+                            if self.made.last_refusal.is_none() {
+                                scenario::warn(&format!("motion: {refusal}; further ones are counted"));
+                            }
+                            self.made.refuse(refusal);
+                        }
+                    }
+                    if let Some(recorder) = &mut self.recorder {
+                        recorder.push(sample, taken.is_ok(), push)?;
+                    }
+                }
+                Message::Event(event) => match self.driver.switch(event) {
+                    Ok(sample) => {
+                        self.made.events += 1;
+                        if let Some(recorder) = &mut self.recorder {
+                            recorder.event(sample, event)?;
+                        }
+                    }
+                    Err(error) => {
+                        if self.made.events_refused == 0 {
+                            scenario::warn(&format!("event: {error}; further ones are counted"));
+                        }
+                        self.made.events_refused += 1;
+                    }
+                },
+                Message::Hello | Message::Bye => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Hands a block to every sink; those behind the first lose it where they are slow.
+    fn hand(&mut self, block: &Arc<Block>) {
+        for (number, output) in self.outputs.iter().enumerate() {
+            let put = output.ring.put(block);
+            self.made.dropped_blocks += u64::from(number > 0 && put == Put::Full);
+        }
+    }
+
+    fn intake(&self) -> Intake {
+        self.inbox.as_ref().map_or_else(Intake::default, |inbox| inbox.drain(&mut Vec::new()))
+    }
+
+    /// Underruns so far, and everything.
+    fn status(&self, intake: &Intake) -> (u64, Value) {
+        let none = Handed::default();
+        let rate: Rate = self.scene.clock.rate;
+        match self.outputs.first() {
+            Some(first) => first.with(|handed| (handed.underruns, self.made.json(rate, handed, intake))),
+            None => (0, self.made.json(rate, &none, intake)),
+        }
+    }
+}
+
+/// When the push arrived that a tick is the first to show; earlier ones are forgotten.
+fn shown(tick: &Tick, arrivals: &mut VecDeque<(u64, Instant)>) -> Option<Instant> {
+    let news = tick.tick.as_ref()?.news?;
+    while arrivals.front().is_some_and(|(number, _)| *number < news) {
+        arrivals.pop_front();
+    }
+    arrivals.pop_front().filter(|(number, _)| *number == news).map(|(_, at)| at)
+}
+
+/// Prints a line of status; a failure to do so is silent.
+fn print(value: &Value) {
+    let _ = writeln!(std::io::stderr(), "{value}");
+}

@@ -1,0 +1,188 @@
+//! The record of a live run: what came in, what each tick became, what was switched, the truth, and the
+//! scenario that sends it all again.
+
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::cli::error::CliError;
+use crate::cli::run::truth_error;
+use crate::cli::scenario::Named;
+use crate::cli::staging::Staging;
+use crate::generator::event::{self, Event};
+use crate::generator::scenario::Overrides;
+use crate::generator::scene::Scene;
+use crate::generator::truth;
+use crate::generator::vehicle::joining::Push;
+use crate::generator::vehicle::log;
+use crate::live::drive::Made;
+
+/// What cannot be written.
+fn failed(error: &std::io::Error) -> CliError {
+    CliError::output("the record", error)
+}
+
+/// What is run, and what the command line changed in it.
+#[derive(Clone, Copy)]
+pub struct Run<'a> {
+    pub named: &'a Named,
+    pub scene: &'a Scene,
+    pub overrides: &'a Overrides,
+    /// Whether the scene starts at another time than it says.
+    pub restarted: bool,
+}
+
+/// A record in the making.
+pub struct Recorder {
+    staging: Staging,
+    target: PathBuf,
+    ticks: BufWriter<File>,
+    inputs: BufWriter<File>,
+    events: BufWriter<File>,
+    pub truth: truth::Writer,
+    sent: Sha256,
+    samples: u64,
+}
+
+impl Recorder {
+    /// Starts a record of `scene` that will be `target`.
+    pub fn create(target: &Path, scene: &Scene) -> Result<Self, CliError> {
+        let staging = Staging::directory(target)?;
+        let create = |name: &str| {
+            let path = staging.path().join(name);
+            File::create(&path).map(BufWriter::new).map_err(|error| CliError::create(path.display(), &error))
+        };
+        let (mut ticks, mut inputs, mut events) = (create("ticks.csv")?, create("inputs.csv")?, create("events.csv")?);
+        let below = staging.path().join("truth");
+        fs::create_dir(&below).map_err(|error| CliError::create(below.display(), &error))?;
+        let truth = truth::Writer::create(&below).map_err(truth_error)?;
+        if let Some(first) = scene.trajectory.grown().and_then(|grown| grown.last()) {
+            log::begin(&mut ticks, &first.motion).map_err(|error| failed(&error))?;
+        }
+        writeln!(
+            inputs,
+            "sample,taken,t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2,jx_mps3,jy_mps3,jz_mps3"
+        )
+        .and_then(|()| writeln!(events, "{}", event::HEADER))
+        .map_err(|error| failed(&error))?;
+        let target = target.to_owned();
+        Ok(Self { staging, target, ticks, inputs, events, truth, sent: Sha256::new(), samples: 0 })
+    }
+
+    /// A push that came before the tick that begins at `sample`, and whether it was taken.
+    pub fn push(&mut self, sample: u64, taken: bool, push: &Push) -> Result<(), CliError> {
+        let rates = [push.velocity_mps, push.acceleration_mps2, push.jerk_mps3];
+        let mut row = format!("{sample},{},{:?}", u8::from(taken), push.t_s);
+        push.position_m.iter().for_each(|value| row += &format!(",{value:?}"));
+        for rate in rates {
+            match rate {
+                Some(rate) => rate.iter().for_each(|value| row += &format!(",{value:?}")),
+                None => row += ",,,",
+            }
+        }
+        writeln!(self.inputs, "{row}").map_err(|error| failed(&error))
+    }
+
+    /// An event that was applied at `sample`.
+    pub fn event(&mut self, sample: u64, event: &Event) -> Result<(), CliError> {
+        writeln!(self.events, "{sample},{event}").map_err(|error| failed(&error))
+    }
+
+    /// A tick and the bytes of its samples.
+    pub fn tick(&mut self, made: &Made, bytes: &[u8], sample_bytes: usize) -> Result<(), CliError> {
+        self.sent.update(bytes);
+        self.samples += (bytes.len() / sample_bytes.max(1)) as u64;
+        match &made.tick {
+            Some(tick) => {
+                log::write(&mut self.ticks, made.samples.1, tick.kind, &tick.end).map_err(|error| failed(&error))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Ends the record with a summary, the scenario as it was run and the one that replays it.
+    pub fn finish(mut self, run: &Run<'_>, summary: serde_json::Value) -> Result<(), CliError> {
+        let digest = self.sent.finalize();
+        let sha256: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+        for output in [&mut self.ticks, &mut self.inputs, &mut self.events] {
+            output.flush().map_err(|error| failed(&error))?;
+        }
+        drop(self.truth);
+        let mut summary = summary;
+        if let Some(object) = summary.as_object_mut() {
+            object.insert("samples".to_owned(), self.samples.into());
+            object.insert("sha256".to_owned(), sha256.into());
+        }
+        let mut text = serde_json::to_string_pretty(&summary).map_err(CliError::bug)?;
+        text.push('\n');
+        let write = |name: &str, text: &str| {
+            let path = self.staging.path().join(name);
+            fs::write(&path, text).map_err(|error| CliError::output(path.display(), &error))
+        };
+        write("summary.json", &text)?;
+        write("scenario.toml", &run.named.text)?;
+        write("replay.toml", &replay(run, self.samples)?)?;
+        let target = self.target;
+        self.staging.commit()?;
+        crate::cli::scenario::note(&format!("record in {}", target.display()));
+        Ok(())
+    }
+}
+
+/// The scenario with what was sent in place of what was pushed. Files that it names are named from the root.
+fn replay(run: &Run<'_>, samples: u64) -> Result<String, CliError> {
+    let Run { named, scene, overrides, restarted } = *run;
+    let mut root: toml::Table = toml::from_str(&named.text).map_err(CliError::bug)?;
+    let directory = named.directory.canonicalize().unwrap_or_else(|_| named.directory.clone());
+    root.iter_mut().for_each(|(_, value)| rooted(value, &directory));
+    let rate = scene.clock.rate;
+    root.insert("duration_s".to_owned(), rate.elapsed_s(samples).into());
+    if restarted {
+        root.insert("start".to_owned(), scene.clock.start.to_string().into());
+    }
+    if let Some(seed) = overrides.seed {
+        root.insert("seed".to_owned(), toml::Value::Integer(seed as i64));
+    }
+    if let Some(tick_samples) = scene.trajectory.tick_samples() {
+        let motion = [
+            ("kind", "ticks".into()),
+            ("file", "ticks.csv".into()),
+            ("events", "events.csv".into()),
+            ("tick_s", toml::Value::Float(rate.elapsed_s(tick_samples))),
+        ];
+        let motion = motion.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+        root.insert("motion".to_owned(), toml::Value::Table(motion));
+    }
+    let own = match root.remove("front_end") {
+        Some(toml::Value::Array(many)) => {
+            let name = |one: &toml::Value| one.get("name").and_then(toml::Value::as_str).map(str::to_owned);
+            many.into_iter().find(|one| name(one) == scene.front_end_name)
+        }
+        one => one,
+    };
+    let mut front_end = own.and_then(|own| own.as_table().cloned()).unwrap_or_default();
+    if let Some(format) = overrides.format {
+        front_end.insert("format".to_owned(), format.to_string().trim_end_matches("_le").into());
+    }
+    if !front_end.is_empty() {
+        root.insert("front_end".to_owned(), toml::Value::Table(front_end));
+    }
+    toml::to_string(&root).map_err(CliError::bug)
+}
+
+/// Makes every text that is a path from `directory` one from the root.
+fn rooted(value: &mut toml::Value, directory: &Path) {
+    match value {
+        toml::Value::String(text) if text.contains(['.', '/']) => {
+            let path = directory.join(&*text);
+            if path.is_file() {
+                *text = path.display().to_string();
+            }
+        }
+        toml::Value::Array(many) => many.iter_mut().for_each(|value| rooted(value, directory)),
+        toml::Value::Table(table) => table.iter_mut().for_each(|(_, value)| rooted(value, directory)),
+        _ => {}
+    }
+}

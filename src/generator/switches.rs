@@ -1,0 +1,149 @@
+//! What is switched while a scene is sent: powers of satellites, spoofers and jammers, and satellites that
+//! stray.
+//!
+//! A change holds from the first sample of a tick on. Signals have their polynomials tick by tick, so every
+//! change is exact to the sample, and a replay that knows of later ones sends the same bits. Limits: changes
+//! are bounded in number ([`MOST`]); what a satellite strays by is in code and carrier alike.
+
+use std::collections::BTreeMap;
+use std::sync::{PoisonError, RwLock};
+
+use crate::generator::knots::Arrival;
+use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Rate;
+
+/// Changes of a scene at most.
+pub const MOST: usize = 100_000;
+
+/// What can be switched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Source {
+    /// A true satellite, all its signals.
+    Satellite(Sv),
+    /// A source of interference by its number, from 1.
+    Jammer(u64),
+    /// A spoofer by its number, from 1.
+    Spoofer(usize),
+}
+
+/// How a source is switched from a tick on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Switched {
+    /// Factor on its power.
+    pub gain: f64,
+    /// What its pseudorange and carrier have too much, in metres, at sample `since` …
+    pub astray_m: f64,
+    /// … and by how much that grows a second.
+    pub astray_mps: f64,
+    /// First sample of the tick from which that counts.
+    pub since: u64,
+}
+
+impl Default for Switched {
+    /// As the scene is without switches.
+    fn default() -> Self {
+        Self { gain: 1.0, astray_m: 0.0, astray_mps: 0.0, since: 0 }
+    }
+}
+
+impl Switched {
+    /// What arrives at a place between samples, as switched.
+    pub fn act(&self, arrival: Arrival, carrier_hz: f64, sample: f64, rate: Rate) -> Arrival {
+        if *self == Self::default() {
+            return arrival;
+        }
+        let astray_m = self.astray_m + self.astray_mps * (sample - self.since as f64) / rate.hz();
+        let astray_s = astray_m / SPEED_OF_LIGHT_MPS;
+        Arrival {
+            delay_s: arrival.delay_s + astray_s,
+            carrier_cycles: arrival.carrier_cycles + carrier_hz * astray_s,
+            cn0_hz: arrival.cn0_hz * self.gain,
+        }
+    }
+}
+
+/// The switches of a scene; clones of their `Arc` share them.
+#[derive(Debug)]
+pub struct Switches {
+    tick_samples: u64,
+    rows: RwLock<BTreeMap<Source, Vec<(u64, Switched)>>>,
+}
+
+impl Switches {
+    /// None switched yet; a tick has `tick_samples`.
+    pub fn new(tick_samples: u64) -> Self {
+        Self { tick_samples: tick_samples.max(1), rows: RwLock::new(BTreeMap::new()) }
+    }
+
+    /// Samples of a tick.
+    pub fn tick_samples(&self) -> u64 {
+        self.tick_samples
+    }
+
+    /// The tick in which a sample lies.
+    pub fn tick_of(&self, sample: u64) -> u64 {
+        sample / self.tick_samples
+    }
+
+    /// Changes a source from `tick` on, which must not be before its last change; `false` where there are too
+    /// many changes.
+    pub fn set(&self, source: Source, tick: u64, change: impl FnOnce(&mut Switched)) -> bool {
+        let mut rows = self.rows.write().unwrap_or_else(PoisonError::into_inner);
+        if rows.values().map(Vec::len).sum::<usize>() >= MOST {
+            return false;
+        }
+        let changes = rows.entry(source).or_default();
+        let mut switched = changes.last().map_or_else(Switched::default, |(_, switched)| *switched);
+        let astray = (switched.astray_m, switched.astray_mps);
+        change(&mut switched);
+        if (switched.astray_m, switched.astray_mps) != astray {
+            switched.since = tick * self.tick_samples;
+        }
+        match changes.last_mut().filter(|(last, _)| *last == tick) {
+            Some((_, last)) => *last = switched,
+            None => changes.push((tick, switched)),
+        }
+        true
+    }
+
+    /// How a source is switched in a tick.
+    pub fn at(&self, source: Source, tick: u64) -> Switched {
+        let rows = self.rows.read().unwrap_or_else(PoisonError::into_inner);
+        let Some(changes) = rows.get(&source) else { return Switched::default() };
+        let next = changes.partition_point(|(from, _)| *from <= tick);
+        next.checked_sub(1).and_then(|last| changes.get(last)).map_or_else(Switched::default, |(_, switched)| *switched)
+    }
+
+    /// How the source with that constellation's number (0 for the true one) is switched in a tick.
+    pub fn of_constellation(&self, number: usize, sv: Sv, tick: u64) -> Switched {
+        self.at(if number == 0 { Source::Satellite(sv) } else { Source::Spoofer(number) }, tick)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_holds_from_its_tick_on_and_later_ones_are_not_seen_before() {
+        let switches = Switches::new(1000);
+        let source = Source::Satellite(Sv::gps(5));
+        assert!(switches.set(source, 3, |row| row.gain = 0.1));
+        assert!(switches.set(source, 3, |row| row.astray_mps = 2.0));
+        assert!(switches.set(source, 7, |row| row.gain = 0.0));
+        assert_eq!(switches.at(source, 2), Switched::default());
+        let slipping = Switched { gain: 0.1, astray_m: 0.0, astray_mps: 2.0, since: 3000 };
+        assert_eq!((switches.at(source, 3), switches.at(source, 6)), (slipping, slipping));
+        assert_eq!(switches.at(source, 7), Switched { gain: 0.0, ..slipping });
+        assert_eq!(switches.at(Source::Spoofer(1), 7), Switched::default());
+        let arrival = Arrival { delay_s: 0.07, carrier_cycles: 1.1e8, cn0_hz: 1e4 };
+        let rate = Rate::from_hz(1e6).unwrap();
+        // Half a second on: a metre, 3.3 ns and 5.25 cycles.
+        let late = slipping.act(arrival, 1_575.42e6, 503_000.0, rate);
+        assert!((late.delay_s - arrival.delay_s - 1.0 / SPEED_OF_LIGHT_MPS).abs() < 1e-16);
+        assert!((late.carrier_cycles - arrival.carrier_cycles - 1_575.42e6 / SPEED_OF_LIGHT_MPS).abs() < 1e-7);
+        assert_eq!(late.cn0_hz, 1e3);
+        assert_eq!(Switched::default().act(arrival, 1_575.42e6, 5.0, rate), arrival);
+    }
+}

@@ -1,0 +1,11 @@
+//! The twin while it runs: motion and events come in, samples go out at once.
+//!
+//! [`drive`] makes ticks of a scene with `[motion] kind = "pushed"` and knows no clock; [`lockstep`] adds a
+//! receiver and keeps step with a simulation in virtual time. Each tick's samples depend on the scene and on
+//! the ticks before it alone.
+
+#![warn(missing_docs)]
+
+pub mod drive;
+pub mod lockstep;
+pub mod wire;
