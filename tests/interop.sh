@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A receiver that this project did not write, Debian's GNSS-SDR, must find the position of the static scene, and that of the scene of
 # two systems by Galileo alone and by GPS and Galileo, to 5 m. The judge must find from its RINEX and NMEA files what the scenes put
-# into them.
+# into them. Debian's RTKLIB must find the static scene's place by the RINEX files that a run writes, of the receiver and of the truth.
 #
 # usage: tests/interop.sh [GNSS_TWIN_BINARY [galileo]]     (default: target/release/gnss-twin, and GPS alone)
 # exit:  0 the mean fixes are within 5 m in three dimensions and every figure of the judgements within its bar; 1 they are not; 75 gnss-sdr could not be installed.
@@ -14,6 +14,14 @@ if ! command -v gnss-sdr >/dev/null; then
     echo "interop: installing gnss-sdr"
     { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq gnss-sdr; } >/dev/null 2>&1 || {
         echo "interop: cannot install gnss-sdr here" >&2
+        exit 75
+    }
+fi
+
+if ! command -v rnx2rtkp >/dev/null; then
+    echo "interop: installing rtklib"
+    { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq rtklib; } >/dev/null 2>&1 || {
+        echo "interop: cannot install rtklib here" >&2
         exit 75
     }
 fi
@@ -112,7 +120,41 @@ bars() { # C/N0 beside the truth's, and its bar
     within horizontal_rms_m 0 5
 }
 
+# RTKLIB's single points, by the broadcast ionosphere and Saastamoinen's troposphere, epoch by epoch.
+rtklib() { # name, directory of the files, bar in m
+    rnx2rtkp -p 0 -m 5 -t -o "$work/$1.pos" "$2/observations.rnx" "$2/navigation.rnx" 2>/dev/null
+    awk -v name="$1" -v lat0="$(value latitude_deg)" -v lon0="$(value longitude_deg)" -v h0="$(value height_m)" -v limit="$3" \
+        -v epochs="$(grep -c '^>' "$2/observations.rnx")" '
+        !/^%/ && $6 == 5 { n++; slat += $3; slon += $4; sh += $5 }
+        END {
+            if (n < 0.9 * epochs || !n) { printf "interop: RTKLIB, %s: %d positions of %d epochs\n", name, n, epochs; exit 1 }
+            rad = atan2(0, -1) / 180; s = sin(lat0 * rad); e2 = 0.00669437999014
+            north = (slat / n - lat0) * rad * (6378137 * (1 - e2) / (1 - e2 * s * s) ^ 1.5 + h0)
+            east = (slon / n - lon0) * rad * (6378137 / sqrt(1 - e2 * s * s) + h0) * cos(lat0 * rad)
+            up = sh / n - h0
+            error = sqrt(east * east + north * north + up * up)
+            printf "interop: RTKLIB, %s: %d positions of %d epochs, mean error east %+.3f north %+.3f up %+.3f m, 3-D %.3f m (limit %g m)\n", name, n, epochs, east, north, up, error, limit
+            exit !(error <= limit)
+        }' "$work/$1.pos" || failed=1
+}
+
 scene=$root/scenarios/static.toml
+"$twin" run "$scene" --out "$work/run" >/dev/null
+rtklib receiver "$work/run/rx" 1.5
+rtklib truth "$work/run/truth" 1.5
+# And what reads XML and NMEA: no word of theirs on standard error, every fix a position.
+if ! command -v xmllint >/dev/null || ! command -v gpsdecode >/dev/null; then
+    { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq libxml2-utils gpsd-clients; } >/dev/null 2>&1 || {
+        echo "interop: cannot install xmllint and gpsdecode here" >&2
+        exit 75
+    }
+fi
+xmllint --noout "$work/run/rx/fixes.kml" "$work/run/rx/fixes.gpx" || failed=1
+fixes=$(($(wc -l <"$work/run/rx/fixes.csv") - 1))
+sentences=$(gpsdecode <"$work/run/rx/fixes.nmea" | grep -c '"class":"TPV".*"mode":3' || true)
+points=$(grep -c '<trkpt' "$work/run/rx/fixes.gpx" || true)
+echo "interop: gpsdecode read $sentences positions of $fixes fixes; $points points in the track"
+[ "$sentences" -ge $((fixes - 1)) ] && [ "$points" -ge $((fixes / 10)) ] || failed=1
 generate static
 foreign static 12 0 Broadcast 0 1.5
 

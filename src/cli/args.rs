@@ -237,6 +237,9 @@ pub struct Receive {
     /// JSON lines of fixes, satellites, channels, searches and events: a file, -, fifo:PATH or tcp:ADDR
     #[arg(long, value_name = "TO")]
     pub json: Option<lines::Spec>,
+    /// Also write RINEX 3.05: observations.rnx and navigation.rnx
+    #[arg(long)]
+    pub rinex: bool,
     /// Receiver settings [default: the built-in ones]
     #[arg(long, value_name = "SETTINGS.toml")]
     pub receiver: Option<PathBuf>,

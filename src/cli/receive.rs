@@ -17,7 +17,7 @@ use crate::cli::staging::{InSight, Staging};
 use crate::gnss::samples::IfMetadata;
 use crate::receiver;
 use crate::receiver::Outcome;
-use crate::receiver::output::{JsonLines, Nmea, Output, OutputError, Record, Sink};
+use crate::receiver::output::{JsonLines, Nmea, Output, OutputError, Record, Rinex, Sink};
 use crate::receiver::settings::Settings;
 
 /// Receives a recording or a stream.
@@ -39,7 +39,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     let format = recordings.first().map(|first| first.metadata.format);
     let broken: Vec<Arc<OnceLock<String>>> = recordings.iter().filter_map(|one| one.broken.clone()).collect();
     let directory = Directory::new(arguments)?;
-    let (mut listeners, made) = Listeners::new(arguments, directory.path())?;
+    let (mut listeners, made) = Listeners::new(arguments, &settings, directory.path())?;
     let mut front_ends = read_ahead(recordings, arguments.live)?;
     let progress = Progress::new("receive", samples);
     let outcome = receiver::receive_several(&mut front_ends, &settings, &mut listeners, &mut |done| progress.set(done));
@@ -150,13 +150,17 @@ struct Listeners {
 
 impl Listeners {
     /// The tables in `directory`, and the lines that were asked for with what becomes of them.
-    fn new(arguments: &args::Receive, directory: &Path) -> Result<(Self, Vec<Made>), CliError> {
+    fn new(arguments: &args::Receive, settings: &Settings, directory: &Path) -> Result<(Self, Vec<Made>), CliError> {
         let output = Output::create(directory).map_err(output_error)?;
         let (mut lines, mut made) = (Vec::<Box<dyn Sink>>::new(), Vec::new());
         if let Some(spec) = &arguments.nmea {
             let opened = spec.open("nmea", arguments.live)?;
             lines.push(Box::new(Nmea::new(PathBuf::from(spec.to_string()), opened.writer)));
             made.push(opened.made);
+        }
+        if arguments.rinex {
+            let signals = settings.acquisition.signals();
+            lines.push(Box::new(Rinex::create(directory, "receive", &signals).map_err(output_error)?));
         }
         if let Some(spec) = &arguments.json {
             let opened = spec.open("json", arguments.live)?;

@@ -26,7 +26,7 @@ use crate::generator::stream::Generated;
 use crate::generator::{GenerateError, truth};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::sigmf;
-use crate::receiver::output::{Output, OutputError};
+use crate::receiver::output::{Nmea, Output, OutputError, Rinex, Sink, Tracks};
 use crate::receiver::settings::Settings;
 use crate::receiver::{Outcome, ReceiveError, Reception};
 use crate::twin;
@@ -62,15 +62,23 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
         let path = run.join(name);
         fs::create_dir(&path).map_err(|error| CliError::create(path.display(), &error)).map(|()| path)
     };
-    let mut truth = truth::Writer::create(&below("truth")?).map_err(truth_error)?;
-    let mut output = Output::create(&below("rx")?).map_err(output_error)?;
+    let (truth_in, rx_in) = (below("truth")?, below("rx")?);
+    let mut truth = truth::Writer::create(&truth_in).map_err(truth_error)?;
+    let mut output = Output::create(&rx_in).map_err(output_error)?;
+    // The same as other programs read it.
+    let mut truth_files = truth::Rinex::new(&truth_in);
+    let mut files = Rinex::create(&rx_in, &scene.name, &settings.acquisition.signals()).map_err(output_error)?;
     let mut taps: Vec<Tap> =
         scenes.iter().map(|scene| Tap::new(scene, run, arguments.keep_if, scenes.len())).collect::<Result<_, _>>()?;
-    let both = both(&scenes, &settings, &mut truth, &mut output, &mut taps)?;
+    let mut sentences = sentences(&rx_in)?;
+    let mut tracks = Tracks::create(&rx_in, &scene.name).map_err(output_error)?;
+    let (truths, others) = (&mut (&mut truth, &mut truth_files), &mut (&mut sentences, &mut tracks));
+    let outputs = &mut (&mut output, &mut (&mut files, others));
+    let both = both(&scenes, &settings, truths, outputs, &mut taps)?;
     // The spectrum that is judged is that of the first front end.
     taps.first().map_or(Ok(()), |first| first.write_psd(run))?;
     taps.into_iter().try_for_each(|tap| tap.finish(run))?;
-    drop((truth, output));
+    drop((truth, truth_files, output, files, sentences, tracks));
 
     let duration_s = scene.metadata.rate.elapsed_s(scene.samples);
     let speed = Speed::new(duration_s, both.generator_busy, both.receiver_busy, both.whole);
@@ -96,6 +104,13 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     gate.enforce(&summary.details.verdict)
 }
 
+/// What takes the fixes as NMEA 0183.
+fn sentences(directory: &Path) -> Result<Nmea<File>, CliError> {
+    let path = directory.join("fixes.nmea");
+    let file = File::create(&path).map_err(|error| CliError::create(path.display(), &error))?;
+    Ok(Nmea::new(path, file))
+}
+
 struct Both {
     generated: Vec<Generated>,
     outcome: Outcome,
@@ -108,8 +123,8 @@ struct Both {
 fn both(
     scenes: &[Scene],
     settings: &Settings,
-    truth: &mut truth::Writer,
-    output: &mut Output,
+    truth: &mut (dyn truth::Sink + Send),
+    output: &mut (dyn Sink + Send),
     taps: &mut [Tap],
 ) -> Result<Both, CliError> {
     let name = scenes.first().map_or("", |scene| scene.name.as_str());

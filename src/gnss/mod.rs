@@ -28,6 +28,7 @@ pub mod bits;
 pub mod broadcast;
 pub mod crc;
 pub mod earth;
+pub mod exchange;
 #[cfg(any(feature = "generator", feature = "analysis"))]
 pub mod facts;
 pub mod fec;

@@ -18,7 +18,7 @@ pub const ORDER: Order<'static> = &[
             &["broadcast"],
             &["record"],
             &["message"],
-            &["nmea"],
+            &["nmea", "exchange"],
             &["gps", "galileo"],
             &["rinex"],
             &["sp3"],

@@ -6,6 +6,7 @@
 //! and carrier delays.
 
 mod record;
+mod rinex;
 mod skyline;
 mod writer;
 
@@ -21,6 +22,7 @@ use crate::gnss::record::{Observation, RayRow, SkyRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 pub use record::{Record, Sink, TruthError};
+pub use rinex::Rinex;
 pub use writer::Writer;
 
 /// Step of the difference quotient behind the Doppler, and its share of a turn where the antenna spins. What

@@ -97,6 +97,24 @@ pub trait Sink {
     }
 }
 
+/// Hands every record to both.
+impl<A: Sink + ?Sized, B: Sink + ?Sized> Sink for (&mut A, &mut B) {
+    fn begin(&mut self, scenes: &[Scene], part: &Range<u64>) -> Result<(), TruthError> {
+        self.0.begin(scenes, part)?;
+        self.1.begin(scenes, part)
+    }
+
+    fn take(&mut self, record: Record) -> Result<(), TruthError> {
+        self.0.take(record.clone())?;
+        self.1.take(record)
+    }
+
+    fn finish(&mut self) -> Result<(), TruthError> {
+        self.0.finish()?;
+        self.1.finish()
+    }
+}
+
 /// Keeps every record.
 impl Sink for Vec<Record> {
     fn take(&mut self, record: Record) -> Result<(), TruthError> {

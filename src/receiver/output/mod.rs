@@ -6,6 +6,8 @@
 
 mod json;
 mod nmea;
+mod rinex;
+mod tracks;
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,6 +24,8 @@ use crate::gnss::record::{
 use crate::gnss::time::GPST;
 pub use json::JsonLines;
 pub use nmea::Nmea;
+pub use rinex::Rinex;
+pub use tracks::Tracks;
 
 /// A file that could not be made or written.
 #[derive(Debug, Error)]
@@ -98,6 +102,19 @@ impl Sink for Vec<Record> {
     fn take(&mut self, record: Record) -> Result<(), OutputError> {
         self.push(record);
         Ok(())
+    }
+}
+
+/// Hands every record to both.
+impl<A: Sink + ?Sized, B: Sink + ?Sized> Sink for (&mut A, &mut B) {
+    fn take(&mut self, record: Record) -> Result<(), OutputError> {
+        self.0.take(record.clone())?;
+        self.1.take(record)
+    }
+
+    fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
+        self.0.finish(summary)?;
+        self.1.finish(summary)
     }
 }
 

@@ -1,0 +1,86 @@
+//! What was true of the observations, and the messages that were sent, as RINEX files.
+
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::{Record, Sink, TruthError};
+use crate::generator::scene::Scene;
+use crate::gnss::exchange::{NavigationSets, ObservationFile};
+use crate::gnss::signal::Signal;
+use crate::gnss::time::Epoch;
+
+/// Writes `observations.rnx` as the truth comes, and `navigation.rnx` at the end: what an ideal receiver would
+/// have, its clock that of the scene's.
+pub struct Rinex {
+    directory: PathBuf,
+    observations: Option<ObservationFile<BufWriter<File>>>,
+    messages: NavigationSets,
+    signals: Vec<&'static Signal>,
+    near: Option<Epoch>,
+}
+
+impl Rinex {
+    /// In an existing directory; files are made when the truth begins.
+    pub fn new(directory: &Path) -> Self {
+        let directory = directory.to_owned();
+        Self { directory, observations: None, messages: NavigationSets::default(), signals: Vec::new(), near: None }
+    }
+
+    fn create(&self, name: &str) -> Result<BufWriter<File>, TruthError> {
+        let path = self.directory.join(name);
+        File::create(&path).map(BufWriter::new).map_err(|source| TruthError::File { path, source })
+    }
+
+    fn held(&self, name: &str, done: io::Result<()>) -> Result<(), TruthError> {
+        done.map_err(|source| TruthError::File { path: self.directory.join(name), source })
+    }
+}
+
+const OBSERVATIONS: &str = "observations.rnx";
+const NAVIGATION: &str = "navigation.rnx";
+
+impl Sink for Rinex {
+    fn begin(&mut self, scenes: &[Scene], _: &Range<u64>) -> Result<(), TruthError> {
+        for signal in scenes.iter().flat_map(|scene| &scene.signals) {
+            if !self.signals.iter().any(|known| known.name == signal.name) {
+                self.signals.push(signal);
+            }
+        }
+        let marker = scenes.first().map_or("", |scene| scene.name.as_str());
+        let file = self.create(OBSERVATIONS)?;
+        self.observations = Some(ObservationFile::new(file, marker, &self.signals));
+        Ok(())
+    }
+
+    fn take(&mut self, record: Record) -> Result<(), TruthError> {
+        let Some(observations) = &mut self.observations else { return Ok(()) };
+        match record {
+            // The first of a tick's records.
+            Record::Trajectory(row) => {
+                let ended = observations.end_epoch();
+                observations.set_clock(row.clock_bias_s);
+                self.near = Some(row.time());
+                self.held(OBSERVATIONS, ended)
+            }
+            Record::Observation(row) => {
+                let taken = observations.take(row);
+                self.held(OBSERVATIONS, taken)
+            }
+            Record::Navigation(row) => {
+                self.messages.take(&row);
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn finish(&mut self) -> Result<(), TruthError> {
+        let (Some(observations), Some(near)) = (&mut self.observations, self.near) else { return Ok(()) };
+        let ended = observations.finish();
+        self.held(OBSERVATIONS, ended)?;
+        let file = self.create(NAVIGATION)?;
+        self.held(NAVIGATION, self.messages.write(file, &self.signals, near))
+    }
+}

@@ -1,0 +1,44 @@
+//! Files for other programs: RINEX 3.05, observations row by row and navigation messages at the end, and tracks
+//! for maps.
+//!
+//! Source: RINEX 3.05, tables A2 to A8 (navigation) and A2, A3 (observations), section 5.2. The `rinex` crate
+//! writes columns as well, but holds a whole file in memory; observations of a day at 10 Hz are gigabytes.
+//! Limits: GPS and Galileo; no date of the run stands in the header, since the same run gives the same bytes
+//! at any time.
+
+mod navigation;
+mod observation;
+mod track;
+
+pub use navigation::NavigationSets;
+pub use observation::ObservationFile;
+pub use track::{Track, TrackForm};
+
+use crate::gnss::satellite::System;
+use crate::gnss::time::Epoch;
+
+/// One line of a header: 60 columns and a label.
+fn header_line(content: &str, label: &str) -> String {
+    format!("{content:<60}{label}\n")
+}
+
+/// The first two lines: version and type, and who made it; the date is that of the first epoch.
+fn opening(kind: &str, systems: &[System], first: Epoch) -> String {
+    let mixed = match systems {
+        [one] => format!("{}: {}", one.letter(), one.name()),
+        _ => "M: Mixed".to_owned(),
+    };
+    let date: String = first.to_string().chars().filter(char::is_ascii_digit).take(14).collect();
+    let (day, time) = date.split_at_checked(8).unwrap_or_default();
+    let program = concat!("gnss-twin ", env!("CARGO_PKG_VERSION"));
+    header_line(&format!("{:>9}{:11}{kind:<20}{mixed:<20}", "3.05", ""), "RINEX VERSION / TYPE")
+        + &header_line(&format!("{program:<20}{:20}{day} {time} LCL", ""), "PGM / RUN BY / DATE")
+}
+
+/// Year, month, day, hour and minute of a whole second, and the second.
+fn calendar(at: Epoch) -> [u32; 6] {
+    // As `YYYY-MM-DDThh:mm:ss.ssssss`.
+    let text = Epoch::new(at.seconds(), 0.0).to_string();
+    let part = |from: usize, to: usize| text.get(from..to).and_then(|part| part.parse().ok()).unwrap_or(0);
+    [part(0, 4), part(5, 7), part(8, 10), part(11, 13), part(14, 16), part(17, 19)]
+}
