@@ -11,8 +11,8 @@ use crate::gnss::exchange::{NavigationSets, ObservationFile};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
-/// Writes `observations.rnx` as the truth comes, and `navigation.rnx` at the end: what an ideal receiver would
-/// have, its clock that of the scene's.
+/// Writes `observations.rnx` as the truth comes, and `navigation.rnx` at the end: what an ideal receiver
+/// would have, its clock that of the scene's.
 pub struct Rinex {
     directory: PathBuf,
     observations: Option<ObservationFile<BufWriter<File>>>,

@@ -1,5 +1,5 @@
-//! Files for other programs: RINEX 3.05, observations row by row and navigation messages at the end, and tracks
-//! for maps.
+//! Files for other programs: RINEX 3.05, observations row by row and navigation messages at the end, and
+//! tracks for maps.
 //!
 //! Source: RINEX 3.05, tables A2 to A8 (navigation) and A2, A3 (observations), section 5.2. The `rinex` crate
 //! writes columns as well, but holds a whole file in memory; observations of a day at 10 Hz are gigabytes.

@@ -163,7 +163,7 @@ fn sisa_m(index: u8) -> f64 {
     }
 }
 
-#[cfg(all(test, feature = "generator"))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::gnss::rinex;
