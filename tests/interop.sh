@@ -122,7 +122,9 @@ bars() { # C/N0 beside the truth's, and its bar
 
 # RTKLIB's single points, by the broadcast ionosphere and Saastamoinen's troposphere, epoch by epoch.
 rtklib() { # name, directory of the files, bar in m
-    rnx2rtkp -p 0 -m 5 -t -o "$work/$1.pos" "$2/observations.rnx" "$2/navigation.rnx" 2>/dev/null
+    printf '%s\n' pos1-posmode=single pos1-elmask=5 pos1-ionoopt=brdc pos1-tropopt=saas out-solformat=llh out-timeform=hms \
+        out-height=ellipsoidal >"$work/rtklib.conf"
+    rnx2rtkp -k "$work/rtklib.conf" -o "$work/$1.pos" "$2/observations.rnx" "$2/navigation.rnx" 2>/dev/null
     awk -v name="$1" -v lat0="$(value latitude_deg)" -v lon0="$(value longitude_deg)" -v h0="$(value height_m)" -v limit="$3" \
         -v epochs="$(grep -c '^>' "$2/observations.rnx")" '
         !/^%/ && $6 == 5 { n++; slat += $3; slon += $4; sh += $5 }
