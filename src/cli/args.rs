@@ -128,7 +128,7 @@ pub struct Generate {
                   143 by signal"
 )]
 pub struct Live {
-    /// Scene to send; with [motion] kind = "pushed" it takes motion and events
+    /// Scene to send; where its motion is "pushed" it takes motion and events
     pub scenario: PathBuf,
     /// Where samples go, several times for several: - (standard output), fifo:PATH, tcp:ADDR, rtl-tcp:ADDR,
     /// file:PATH. The first one sets the pace; others lose whole ticks, which are counted, while they are
