@@ -32,6 +32,9 @@ const WAYPOINTS: &str = "[motion]\nkind = \"waypoints\"\nacceleration_mps2 = 2\n
 const FILE: &str = "[motion]\nkind = \"file\"\nfile = \"ride.csv\"\nformat = \"csv\"\nmax_gap_s = 3\n";
 const ORBIT: &str = "[motion]\nkind = \"orbit\"\nsemi_major_axis_m = 6.9e6\neccentricity = 0.01\ninclination_deg = 51\n\
     node_longitude_deg = 60\nargument_of_perigee_deg = 10\nmean_anomaly_deg = 20\n";
+const PUSHED: &str = "[motion]\nkind = \"pushed\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n\
+                      tick_s = 0.01\njoin_s = 0.1\nhold_s = 0.5\nmax_jerk_mps3 = 20000\n";
+const TICKS: &str = "[motion]\nkind = \"ticks\"\nfile = \"ticks.csv\"\nevents = \"events.csv\"\ntick_s = 0.01\n";
 const RADIUS: &str = "[motion]\nkind = \"waypoints\"\nturn_radius_m = 30\n";
 const REST: &str = "[navigation]\nfile = \"brdc.10n\"\ngalileo_ahead_ns = 3\n[satellites]\nmask_deg = 10\nexclude = \
                     [\"G01\"]\ninclude_unhealthy = true\n\
