@@ -19,7 +19,7 @@ use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::signal::Link;
 use gnss_twin::gnss::time::Rate;
 use gnss_twin::receiver::acquire::{AcquisitionSettings, Searcher, samples_needed};
-use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, Wave, chips_to_units};
+use gnss_twin::receiver::correlate::{Arithmetic, CODE_BITS, Edge, Nco, Replica, Wave, chips_to_units};
 use gnss_twin::receiver::source::Block;
 
 const ROUNDS: usize = 15;
@@ -250,7 +250,7 @@ fn errors(arithmetic: Arithmetic, rate_hz: f64) -> Errors {
             let (mut i, mut q) = (Vec::new(), Vec::new());
             Format::Ci8.unpack(&bytes[2 * first as usize..][..2 * period], &mut i, &mut q);
             for n in 0..period {
-                let chip = ((nco.code + n as i64 * step).rem_euclid(replica.period()) >> 48) as usize;
+                let chip = ((nco.code + n as i64 * step).rem_euclid(replica.period()) >> CODE_BITS) as usize;
                 let sign = if code[chip] { -amplitude } else { amplitude };
                 let turns = carrier_step.wrapping_mul((first + n as i64) as u64) as f64 / 18_446_744_073_709_551_616.0;
                 let (sin, cos) = libm::sincos(std::f64::consts::TAU * turns);

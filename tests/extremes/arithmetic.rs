@@ -4,7 +4,7 @@ use gnss_twin::gnss::gps::l1ca;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::receiver::acquire::search;
-use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
+use gnss_twin::receiver::correlate::{Arithmetic, CODE_BITS, Edge, Nco, Replica, chips_to_units};
 use gnss_twin::receiver::source::Block;
 
 use crate::figures::case;
@@ -45,14 +45,14 @@ pub fn twin_error(count: usize) -> f64 {
     let mut worst = 0.0_f64;
     for seed in 1..=3 {
         let (i, q) = (normals(seed, count), normals(seed + 50, count));
-        let step = (1.023e6 / 50e6 * 281_474_976_710_656.0) as u64;
+        let step = chips_to_units(1.023e6 / 50e6) as u64;
         let nco =
             Nco { carrier: 77 << 50, carrier_step: 0x0123_4567_89ab_cdef, code: chips_to_units(12.3), code_step: step };
         let [found] = replica.correlate_in(Arithmetic::F64, (&i, &q), &nco, &[0]);
         let (mut re, mut im) = (Double::default(), Double::default());
         for (n, (&i, &q)) in (0_u64..).zip(i.iter().zip(&q)) {
             let turns = nco.carrier.wrapping_add(nco.carrier_step.wrapping_mul(n));
-            let place = (nco.code as u128 + u128::from(step) * u128::from(n)) % (1023_u128 << 48);
+            let place = (nco.code as u128 + u128::from(step) * u128::from(n)) % (1023_u128 << CODE_BITS);
             let rest = (turns & (u64::MAX >> 2)) as f64 / 18_446_744_073_709_551_616.0;
             let (sin, cos) = libm::sincos(rest * std::f64::consts::TAU);
             let (sin, cos) = match turns >> 62 {
@@ -61,7 +61,7 @@ pub fn twin_error(count: usize) -> f64 {
                 2 => (-sin, -cos),
                 _ => (-cos, sin),
             };
-            let chip = if code[(place >> 48) as usize] { -1.0 } else { 1.0 };
+            let chip = if code[(place >> CODE_BITS) as usize] { -1.0 } else { 1.0 };
             let (i, q) = (f64::from(i) * chip, f64::from(q) * chip);
             re.add_product(i, cos);
             re.add_product(q, sin);
@@ -86,7 +86,7 @@ pub fn sum_error(arithmetic: Arithmetic, count: usize, dc: f32) -> f64 {
             carrier: 77 << 50,
             carrier_step: 1 << 50,
             code: chips_to_units(12.3),
-            code_step: (1.023e6 / 50e6 * 281_474_976_710_656.0) as u64,
+            code_step: chips_to_units(1.023e6 / 50e6) as u64,
         };
         let taps = [chips_to_units(0.25), 0, chips_to_units(-0.25)];
         let exact = replica.slow(&i, &q, &nco, &taps);
@@ -116,10 +116,10 @@ fn full_scale_for_a_second_overflows_nothing() {
     let replica = Replica::new(l1ca::code(9).unwrap(), Edge::Nearest).unwrap();
     // A replica of no carrier and samples in step with its code at full scale: every product has one sign.
     let count = 2_000_000_usize;
-    let step = (1.023e6 / 50e6 * 281_474_976_710_656.0) as u64;
+    let step = chips_to_units(1.023e6 / 50e6) as u64;
     let nco = Nco { carrier: 0, carrier_step: 0, code: 0, code_step: step };
     let code = l1ca::code(9).unwrap();
-    let chip = |n: usize| (((n as u64 * step) >> 48) % 1023) as usize;
+    let chip = |n: usize| (((n as u64 * step) >> CODE_BITS) % 1023) as usize;
     let i: Vec<f32> = (0..count).map(|n| if code[chip(n)] { -127.0 } else { 127.0 }).collect();
     let q = vec![0.0_f32; count];
     let expected = 127.0 * count as f64;

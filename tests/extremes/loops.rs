@@ -223,7 +223,12 @@ fn away_from_the_peak_a_channel_comes_back_or_gives_up() {
     let code = l1ca::code(23).unwrap();
     let i: Vec<f32> = code.iter().map(|chip| if *chip { -1.0 } else { 1.0 }).collect();
     let highest = (1..1023).map(|lag| {
-        let nco = Nco { carrier: 0, carrier_step: 0, code: chips_to_units(f64::from(lag) + 0.5), code_step: 1 << 48 };
+        let nco = Nco {
+            carrier: 0,
+            carrier_step: 0,
+            code: chips_to_units(f64::from(lag) + 0.5),
+            code_step: chips_to_units(1.0) as u64,
+        };
         replica.slow(&i, &vec![0.0; 1023], &nco, &[0])[0].norm() / 1023.0
     });
     the.near(

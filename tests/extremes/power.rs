@@ -218,7 +218,7 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
     let mut block = gnss_twin::generator::stage::Block::whole(0, &mut i, &mut q);
     gnss_twin::generator::stage::Stage::act(source, &mut block);
     let replica = Replica::new(l1ca::code(6).unwrap(), Edge::Area).unwrap();
-    let step = (1.023e6 / 5e6 * 281_474_976_710_656.0) as u64;
+    let step = chips_to_units(1.023e6 / 5e6) as u64;
     let amplitude = f64::from(scene.noise_lsb) * (2.0 * libm::pow(10.0, 4.5) / 5e6).sqrt();
     let mut sum = num_complex::Complex64::ZERO;
     for k in 0..200 {

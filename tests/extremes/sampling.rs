@@ -75,7 +75,7 @@ fn received_bias_m(rate_khz: usize, edge: Edge<'_>, replica: correlate::Edge) ->
                 carrier: 0,
                 carrier_step: 0,
                 code: correlate::chips_to_units(start - delay),
-                code_step: (1023.0 / rate_khz as f64 * 281_474_976_710_656.0) as u64,
+                code_step: correlate::chips_to_units(1023.0 / rate_khz as f64) as u64,
             };
             let taps = [0.25, -0.25].map(correlate::chips_to_units);
             // A replica ahead is early: too late a replica has more of it.
