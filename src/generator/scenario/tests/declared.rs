@@ -179,7 +179,7 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
     }
     for key in keys_of("motion") {
         let texts = [STATIC, WAYPOINTS, FILE, ROCKET, ORBIT, RADIUS, PUSHED, TICKS];
-        match texts.iter().find(|text| text.contains(&format!("\n{key} ="))) {
+        match texts.iter().find(|text| line_of(text, "motion", key).is_some()) {
             Some(text) => cases.push((format!("{MINIMAL}{text}"), "motion", key)),
             None => assert_eq!(*key, "point"),
         }
