@@ -1,12 +1,22 @@
-//! Addresses of listeners and of peers as the command line takes them: loopback unless another one is named.
+//! Paths, and addresses of listeners and of peers, as the command line takes them behind a word and a colon:
+//! loopback unless another address is named.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
+use std::path::PathBuf;
 
 use crate::cli::error::CliError;
 use crate::cli::scenario;
 
 const LOOPBACK: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+
+/// A path that is not empty.
+///
+/// # Errors
+/// What was expected.
+pub fn path(text: &str) -> Result<PathBuf, String> {
+    if text.is_empty() { Err("expected a path".to_owned()) } else { Ok(text.into()) }
+}
 
 /// Where a listener waits: `PORT` and `localhost:PORT` on this machine alone, `IP:PORT` on the interface that
 /// has this address, `0.0.0.0:PORT` and `[::]:PORT` on all of them.

@@ -12,7 +12,7 @@ use std::str::FromStr;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use crate::cli::address::{listen, listen_address};
+use crate::cli::address::{listen, listen_address, path};
 use crate::cli::error::{CliError, shown};
 use crate::cli::scenario;
 use crate::cli::staging::{InSight, Staging};
@@ -34,7 +34,6 @@ impl FromStr for Spec {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let path = |path: &str| if path.is_empty() { Err("expected a path".to_owned()) } else { Ok(path.into()) };
         match text.split_once(':') {
             _ if text == "-" => Ok(Self::Stdout),
             Some(("tcp", rest)) => listen_address(rest).map(Self::Tcp),

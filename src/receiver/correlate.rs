@@ -18,10 +18,12 @@ use crate::gnss::signal::{Component, Shape};
 
 mod carrier;
 mod kernel;
+mod pattern;
 mod short;
 mod single;
 pub mod wave;
 
+use pattern::Pattern;
 pub use wave::{Wave, Waveform, fits};
 
 /// How a replica's chips meet the samples.
@@ -68,24 +70,6 @@ pub struct Replica {
     patterns: Vec<Pattern>,
 }
 
-/// One period of steps of ±1, and its part in a replica.
-#[derive(Clone, Debug)]
-struct Pattern {
-    gain: Complex64,
-    steps_per_chip: usize,
-    /// Entry j holds the 64 steps from step 32 j on, cyclically, first step in the top bit, 1 for −1.
-    words: Vec<u64>,
-    /// What steps are sent as, and what each is short of the next; a little longer than the period.
-    values: Vec<f32>,
-    changes: Vec<f32>,
-    /// The same in short integers; changes are −1, 0 or 1.
-    short_values: Vec<i16>,
-    short_changes: Vec<i16>,
-    edge: Edge,
-    /// Steps of a period.
-    length: usize,
-}
-
 /// Steps from which on a period cannot be counted in 64 bits.
 const MOST_STEPS: usize = 1 << (63 - CODE_BITS);
 
@@ -119,15 +103,16 @@ impl Replica {
     /// A replica of a satellite's component in that waveform; `None` where the documents assign it no code,
     /// or the code is too long.
     pub fn made(component: &Component, number: u8, waveform: Waveform, edge: Edge) -> Option<Self> {
-        let mut replica = Self::of(Wave::new(component, number)?, edge)?;
-        if waveform == Waveform::Whole {
-            let patterns = component.layers.iter().map(|layer| {
-                let (sin, cos) = libm::sincos(std::f64::consts::TAU * layer.phase_cycles);
-                Pattern::of(&Wave::of(component, layer, number)?, layer.weight * Complex64::new(cos, -sin), edge)
-            });
-            replica.patterns = patterns.collect::<Option<Vec<_>>>()?.concat();
+        let wave = Wave::new(component, number)?;
+        if waveform == Waveform::Strongest {
+            return Self::of(wave, edge);
         }
-        Some(replica)
+        let patterns = component.layers.iter().map(|layer| {
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * layer.phase_cycles);
+            Pattern::of(&Wave::of(component, layer, number)?, layer.weight * Complex64::new(cos, -sin), edge)
+        });
+        let patterns = patterns.collect::<Option<Vec<_>>>()?.concat();
+        Some(Self { wave, patterns })
     }
 
     /// Length of the period in code phase units.
@@ -231,88 +216,6 @@ impl Replica {
             pattern.gain.re * pattern.value(code.rem_euclid(self.period()) * each as i64, step * each as u64)
         };
         self.patterns.iter().map(one).sum()
-    }
-}
-
-impl Pattern {
-    /// The patterns whose sum has those steps, with gains that add up to `gain`.
-    fn of(wave: &Wave, gain: Complex64, edge: Edge) -> Option<Vec<Self>> {
-        if wave.steps_per_chip == 0 || !(64..MOST_STEPS).contains(&wave.values.len()) {
-            return None;
-        }
-        let one = |zero: i8, gain: Complex64| {
-            let steps = wave.values.iter().map(|&value| if value == 0 { zero } else { value }).collect();
-            Self::of_signs(steps, wave.steps_per_chip, gain, edge)
-        };
-        if wave.values.contains(&0) {
-            return Some(vec![one(1, 0.5 * gain), one(-1, 0.5 * gain)]);
-        }
-        Some(vec![one(1, gain)])
-    }
-
-    fn of_signs(steps: Vec<i8>, steps_per_chip: usize, gain: Complex64, edge: Edge) -> Self {
-        let word = |start: usize| {
-            steps.iter().cycle().skip(start).take(64).fold(0_u64, |word, &step| word << 1 | u64::from(step < 0))
-        };
-        let words = (0..=steps.len() / 32).map(|j| word(32 * j)).collect();
-        let cyclic = |margin: usize| steps.iter().cycle().take(steps.len() + margin + 1);
-        let values: Vec<f32> = cyclic(kernel::TABLE_MARGIN).map(|&step| f32::from(step)).collect();
-        let changes = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let signs: Vec<i16> = cyclic(kernel::SHORT_MARGIN).map(|&step| i16::from(step)).collect();
-        let short_values = signs.iter().map(|sign| sign * short::AMPLITUDE).collect();
-        let short_changes = signs.windows(2).map(|pair| (pair[1] - pair[0]) / 2).collect();
-        let length = steps.len();
-        Self { gain, steps_per_chip, words, values, changes, short_values, short_changes, edge, length }
-    }
-
-    /// Length of the period in phase units of steps.
-    fn period(&self) -> i64 {
-        (self.length as i64) << CODE_BITS
-    }
-
-    /// Phases of chips as those of steps.
-    fn in_steps<const T: usize>(&self, nco: &Nco, taps: &[i64; T]) -> (Nco, [i64; T]) {
-        let each = self.steps_per_chip as i64;
-        let code = if each == 1 { nco.code } else { nco.code.rem_euclid(self.period() / each) * each };
-        let nco = Nco { code, code_step: nco.code_step * each as u64, ..*nco };
-        (nco, taps.map(|tap| tap * each))
-    }
-
-    fn slow<const T: usize>(&self, (i, q): (&[f32], &[f32]), nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
-        let mut sums = [Complex64::ZERO; T];
-        let period = self.period();
-        let code = nco.code.rem_euclid(period);
-        // A period is taken off first: two phases may not fit into 63 bits together.
-        let mut codes = taps.map(|tap| (code - period + tap.rem_euclid(period)) % period);
-        let mut carrier = nco.carrier;
-        for (&i, &q) in i.iter().zip(q) {
-            let (sin, cos) = libm::sincos(carrier as f64 / TURN * std::f64::consts::TAU);
-            let wiped = Complex64::new(f64::from(i), f64::from(q)) * Complex64::new(cos, -sin);
-            for (sum, code) in sums.iter_mut().zip(&mut codes) {
-                *sum += wiped * self.value(*code, nco.code_step);
-                *code = (*code + nco.code_step as i64) % period;
-            }
-            carrier = carrier.wrapping_add(nco.carrier_step);
-        }
-        sums
-    }
-
-    /// A sample when the phase is `code`, in units of steps.
-    fn value(&self, code: i64, step: u64) -> f64 {
-        let at = |units: i64| {
-            let index = (units.rem_euclid(self.period()) >> CODE_BITS) as usize;
-            self.values.get(index).map_or(0.0, |&value| f64::from(value))
-        };
-        match self.edge {
-            Edge::Nearest => at(code),
-            Edge::Area => {
-                let start = code - (step / 2) as i64;
-                let end = start + step as i64;
-                let fraction = end.rem_euclid(1 << CODE_BITS) as f64 / step as f64;
-                let w = fraction.min(1.0);
-                at(start) + (at(end) - at(start)) * w
-            }
-        }
     }
 }
 

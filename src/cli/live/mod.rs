@@ -255,7 +255,7 @@ impl Live<'_> {
                 return Some(End::Signal);
             }
             let Some(pacer) = self.outputs.first() else { return Some(End::SinkGone) };
-            if pacer.is_gone() {
+            if pacer.is_done() {
                 return Some(End::SinkGone);
             }
             let early = self.pace.until_made(first);

@@ -89,12 +89,8 @@ impl Output {
         Ok(Self { ring, name: spec.to_string(), handed, thread })
     }
 
+    /// Whether it takes nothing any more: it has everything, or failed.
     pub fn is_done(&self) -> bool {
-        self.thread.is_finished()
-    }
-
-    /// Whether it takes nothing any more though more is to come.
-    pub fn is_gone(&self) -> bool {
         self.thread.is_finished()
     }
 

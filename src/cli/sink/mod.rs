@@ -13,7 +13,7 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::cli::address::listen_address;
+use crate::cli::address::{listen_address, path};
 use crate::cli::error::{CliError, shown};
 use crate::gnss::samples::IfMetadata;
 
@@ -65,7 +65,6 @@ impl FromStr for Spec {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let path = |path: &str| if path.is_empty() { Err("expected a path".to_owned()) } else { Ok(path.into()) };
         match text.split_once(':') {
             _ if text == "-" => Ok(Self::Stdout),
             Some(("fifo", rest)) => path(rest).map(Self::Fifo),

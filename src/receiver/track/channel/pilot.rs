@@ -8,7 +8,7 @@ use super::supervise::pilot_group;
 use super::{Channel, Symbol};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Component, Signal};
-use crate::receiver::correlate::{Arithmetic, Nco, Replica, TURN};
+use crate::receiver::correlate::{Arithmetic, Nco, Replica, TURN, Wave};
 use crate::receiver::lead::beside;
 use crate::receiver::track::TrackingSettings;
 use crate::receiver::track::model::ReplicaModel;
@@ -37,10 +37,9 @@ impl Data {
     ) -> Option<Self> {
         let component = beside(pilot, signal)?;
         let model = |component| ReplicaModel::new(settings, component, rate_hz);
-        let made = |component| Replica::made(component, sv.number, settings.waveform, settings.replica);
-        let replica = made(component)?;
+        let replica = Replica::made(component, sv.number, settings.waveform, settings.replica)?;
         let share = replica.share() * model(component)?.power;
-        let own = made(pilot)?.share() * model(pilot)?.power;
+        let own = Wave::new(pilot, sv.number)?.share * model(pilot)?.power;
         let (sin, cos) = libm::sincos(TAU * sense * (pilot.phase_cycles - component.phase_cycles));
         Some(Self {
             replica,
