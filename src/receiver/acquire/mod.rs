@@ -32,6 +32,7 @@ mod error;
 mod grid;
 mod kernel;
 mod multiple_access;
+mod near;
 mod pair;
 mod refine;
 mod replica;
@@ -63,7 +64,7 @@ use window::Window;
 ///
 /// One C/A code appears in the correlator of another at most 21 dB down, several together seldom above 14 dB
 /// down.
-const WEAK_SHARE: f64 = 0.1;
+pub(in crate::receiver) const WEAK_SHARE: f64 = 0.1;
 /// A hit this much weaker than the strongest (40 dB) is not believed even then: subtraction leaves something
 /// over, and without noise to cover it that something has the cross-correlation's peaks.
 const LEAST_SHARE: f64 = 1e-4;

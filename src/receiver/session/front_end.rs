@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use super::predict::Near;
 use super::shared::Shared;
 use super::step::{Counted, Step, Tick};
 use super::{gap, plan, suited};
@@ -13,7 +14,7 @@ use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::{Link, Signal};
 use crate::receiver::acquire::{self, AcquireError, Searcher};
 use crate::receiver::decode::Decoder;
-use crate::receiver::interference::Watch;
+use crate::receiver::interference::{Followed, Watch};
 use crate::receiver::lead::lead;
 use crate::receiver::looks::Looks;
 use crate::receiver::outcome::{Interfered, ReceiveError};
@@ -42,15 +43,32 @@ pub(super) struct Track {
     pub cn0_dbhz: f64,
     /// By the search that found it.
     pub found_dbhz: f64,
+    pub found_hz: f64,
     pub symbols: u64,
     pub wrong_time: u32,
     pub dropped: bool,
+}
+
+impl Track {
+    /// What its code puts into a spectrum.
+    fn followed(&self) -> Followed {
+        let phases = self.channel.phases();
+        Followed {
+            link: self.channel.link(),
+            cn0_hz: libm::pow(10.0, self.cn0_dbhz / 10.0),
+            doppler_hz: self.channel.doppler_hz(),
+            sample: phases.sample,
+            chips: phases.chips,
+        }
+    }
 }
 
 /// Samples collected for a search.
 pub(super) struct Window {
     pub first: u64,
     pub samples: Planes,
+    /// What is searched for; all where there is none.
+    pub near: Option<Near>,
 }
 
 impl Window {
@@ -72,6 +90,8 @@ pub(super) struct FrontEnd {
     /// Where it looks, and whether as after the first search.
     pub aimed: Option<(plan::Sweep, bool)>,
     pub widenings: usize,
+    /// About which Dopplers are expected while the clock is unknown.
+    pub sky_hz: f64,
     pub looks: Looks,
     pub mirrored: Option<Estimate>,
     /// Median Doppler of the search that found most, with how many it found.
@@ -79,6 +99,8 @@ pub(super) struct FrontEnd {
     pub needed: u64,
     pub searched: bool,
     pub next_search: u64,
+    /// When satellites that are predicted are searched for.
+    pub next_foreseen: u64,
     pub window: Option<Window>,
     pub tracks: Vec<Track>,
     /// Of each share of the tracks.
@@ -119,12 +141,14 @@ impl FrontEnd {
             searcher: Searcher::new(metadata, &settings.acquisition)?,
             aimed: None,
             widenings: 0,
+            sky_hz: 0.0,
             looks: Looks::default(),
             mirrored: None,
             found: (0, 0.0),
             needed: acquire::samples_needed(metadata, &settings.acquisition)?,
             searched: false,
             next_search: 0,
+            next_foreseen: 0,
             window: None,
             tracks: Vec::new(),
             planes: Vec::new(),
@@ -225,8 +249,9 @@ impl FrontEnd {
             .chain(followed.last().copied())
             .max_by(f64::total_cmp)
             .map_or(0.0, |dbhz| libm::pow(10.0, dbhz / 10.0));
+        let known: Vec<Followed> = self.tracks.iter().map(Track::followed).collect();
         let mut reported = Vec::new();
-        self.watch.take(block, strongest_hz, |_, row| reported.push(row));
+        self.watch.take(block, (strongest_hz, &known), |_, row| reported.push(row));
         for row in reported {
             let Some(row) = row else {
                 self.quiet_dbhz = followed.get(followed.len() / 2).copied().or(self.quiet_dbhz);

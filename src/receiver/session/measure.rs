@@ -54,6 +54,7 @@ impl Session {
                 shared.worst_condition = Some(shared.worst_condition.map_or(condition, |worst| worst.max(condition)));
                 shared.fixes += 1;
                 shared.clock_drift = Some(solved.fix.clock_drift);
+                shared.latest = Some(solved.fix.clone());
                 if let Some(first) = self.front_ends.first() {
                     shared.first_fix_s.get_or_insert(first.metadata.rate.elapsed_s(tick));
                 }

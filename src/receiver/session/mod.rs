@@ -27,6 +27,7 @@ mod gap;
 mod measure;
 mod part;
 mod plan;
+mod predict;
 mod search;
 mod shared;
 mod step;

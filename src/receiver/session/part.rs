@@ -1,6 +1,7 @@
 //! How code and carrier part on all channels, and what follows from it for loops, smoothing and velocity.
 
 use super::FrontEnd;
+use super::plan::SKY_HZ;
 use super::shared::Shared;
 use crate::gnss::record::AcquisitionRow;
 use crate::receiver::acquire::Acquired;
@@ -14,8 +15,6 @@ const MOVING_S: f64 = 1.0;
 const RATE_SIGMAS: f64 = 6.0;
 /// With so many lines two searches have nothing to add.
 const LINES: usize = 3;
-/// Median Dopplers of satellites in view from near the Earth stay within this.
-const SKY_HZ: f64 = 4000.0;
 
 impl FrontEnd {
     /// Measures the common rate at the end of a block, and lets channels and solver know it when it is

@@ -2,9 +2,11 @@
 //!
 //! The first search takes the settings' range around zero. Once a fix knows the clock, searches are centred
 //! on its drift: a satellite's own Doppler stays within ±5 kHz, a clock of 2.5 ppm moves all of them by 3.9
-//! kHz. Before that an offset of the carrier from the code may be a mixer's or the sample rate's, and the
-//! range is stretched to hold both. While too few satellites are found for a fix, every search is wider than
-//! the one before, then the widths begin anew.
+//! kHz. Before that the middle of the Dopplers that were found counts: where it lies so far from that of the
+//! search that its edge may cut a sky of ±4 kHz, the next search follows at once and reaches as far about
+//! it. So an offset of several kHz, of the clock or of a mixer, costs a tenth of a second and not the
+//! satellites beyond the edge, or a subframe of theirs. While too few satellites are found for a fix, every
+//! search is wider than the one before, then the widths begin anew.
 
 use super::FrontEnd;
 use super::shared::Shared;
@@ -17,8 +19,10 @@ const WIDTHS: [f64; 3] = [1.0, 2.0, 5.0];
 const WIDEN_S: f64 = 1.0;
 /// Centres lie on this grid, so that a small drift changes nothing.
 const CENTRE_STEP_HZ: f64 = 500.0;
-/// An offset before the first fix stretches the range by this at most.
+/// A sky this far from zero stretches the range, and no further.
 const STRETCH_HZ: f64 = 30_000.0;
+/// Dopplers of satellites about their middle, from near the Earth.
+pub(super) const SKY_HZ: f64 = 4000.0;
 
 /// The Dopplers of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,8 +42,25 @@ impl FrontEnd {
             return Sweep { centre_hz: grid(offset_hz - drift * carrier_hz), half_hz };
         }
         let width = WIDTHS.get(self.widenings % WIDTHS.len()).copied().unwrap_or(1.0);
-        let stretch_hz = 0.5 * offset_hz.clamp(-STRETCH_HZ, STRETCH_HZ);
-        Sweep { centre_hz: grid(stretch_hz), half_hz: width * half_hz + grid(stretch_hz).abs() }
+        // Zero too: what was found may be one side of a sound sky.
+        let stretch_hz = grid(0.5 * self.sky_hz.clamp(-STRETCH_HZ, STRETCH_HZ));
+        Sweep { centre_hz: stretch_hz, half_hz: width * half_hz + stretch_hz.abs() }
+    }
+
+    /// Moves the middle of the sky to that of the Dopplers at which channels were found, where the edge of
+    /// the search may have cut it; whether it did.
+    pub(super) fn follow_sky(&mut self, shared: &Shared) -> bool {
+        let found = || self.tracks.iter().map(|track| track.found_hz);
+        let (Some(lowest), Some(highest)) = (found().min_by(f64::total_cmp), found().max_by(f64::total_cmp)) else {
+            return false;
+        };
+        let (middle_hz, half_hz) = (0.5 * (lowest + highest), self.settings.acquisition.doppler_max_hz);
+        let cut = half_hz > SKY_HZ && (middle_hz - self.sky_hz).abs() > half_hz - SKY_HZ;
+        if cut && shared.clock_drift.is_none() {
+            self.sky_hz = middle_hz;
+            return true;
+        }
+        false
     }
 
     /// Takes note of how many satellites there are after a search.

@@ -3,12 +3,13 @@
 use std::collections::BTreeSet;
 
 use super::gap::Watched;
+use super::predict::Near;
 use super::shared::Shared;
 use super::step::Counted;
 use super::{FrontEnd, Track, WRONG_TIME_FIXES, Window};
 use crate::gnss::record::{AcquisitionRow, Event, EventRow};
 use crate::gnss::signal::Link;
-use crate::receiver::acquire::{self, Acquired};
+use crate::receiver::acquire::{self, AcquireError, Acquired};
 use crate::receiver::decode::Decoder;
 use crate::receiver::outcome::ReceiveError;
 use crate::receiver::output::{Record, Sink};
@@ -34,11 +35,8 @@ impl FrontEnd {
             return Ok(());
         }
         if self.window.is_none() {
-            if end <= self.next_search {
-                return Ok(());
-            }
-            self.aim(self.sweep(shared))?;
-            self.window = Some(Window { first: block.first, samples: Planes::default() });
+            let Some(near) = self.due(block, shared)? else { return Ok(()) };
+            self.window = Some(Window { first: block.first, samples: Planes::default(), near });
         }
         let Some(window) = &mut self.window else { return Ok(()) };
         let missing = (self.needed as usize).saturating_sub(window.samples.i.len());
@@ -51,6 +49,14 @@ impl FrontEnd {
         }
         let Some(window) = self.window.take() else { return Ok(()) };
         self.refused.retain(|_, until| *until > end);
+        if let Some((near, half_hz)) = &window.near {
+            let results = self.searcher.search_near(&window.block(), near, *half_hz)?;
+            let (believed, doubted) = self.believed(results);
+            if doubted {
+                self.next_search = self.next_search.min(end);
+            }
+            return self.start_channels(believed, block.first, shared, sink);
+        }
         // Satellites that are followed are searched for too: without them their cross-correlation
         // would pass for others.
         let all_found =
@@ -63,7 +69,24 @@ impl FrontEnd {
         self.searched = true;
         self.widen(shared);
         self.plan_search(end);
+        if self.follow_sky(shared) {
+            self.next_search = end;
+        }
         Ok(())
+    }
+
+    /// Whether a search begins with this block: one for all, or one for the satellites that are foreseen.
+    fn due(&mut self, block: &Packed, shared: &Shared) -> Result<Option<Option<Near>>, AcquireError> {
+        if block.end() > self.next_search {
+            self.aim(self.sweep(shared))?;
+            return Ok(Some(None));
+        }
+        if block.end() <= self.next_foreseen {
+            return Ok(None);
+        }
+        self.next_foreseen = block.end() + self.foreseen_wait();
+        let near = self.foreseen(block.first, shared);
+        Ok((!near.0.is_empty()).then_some(Some(near)))
     }
 
     /// Searches a recording that ended before the first search had all the samples that it asks for: by fewer
@@ -123,6 +146,7 @@ impl FrontEnd {
                 since,
                 cn0_dbhz: hit.cn0_dbhz,
                 found_dbhz: hit.cn0_dbhz,
+                found_hz: hit.doppler_hz,
                 symbols: 0,
                 wrong_time: 0,
                 dropped: false,
@@ -173,6 +197,7 @@ impl FrontEnd {
         if gone && self.window.is_none() {
             let soon = now + self.samples(self.settings.operation.reacquisition_interval_s).max(1);
             self.next_search = self.next_search.min(soon);
+            self.next_foreseen = self.next_foreseen.min(now + self.foreseen_wait());
         }
         Ok(())
     }

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::record::Fix;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, Rate};
@@ -45,6 +46,8 @@ pub(super) struct Shared {
     pub ionosphere_model: Option<Model>,
     pub ionosphere: Option<Coefficients>,
     pub last_fix: Option<LastFix>,
+    /// By which satellites are predicted.
+    pub latest: Option<Fix>,
     pub clock_drift: Option<f64>,
     pub fixes: u64,
     pub first_fix_s: Option<f64>,
@@ -77,6 +80,7 @@ impl Shared {
             ionosphere_model: settings.position.ionosphere.model(&settings.acquisition.signals()),
             ionosphere: None,
             last_fix: None,
+            latest: None,
             clock_drift: None,
             fixes: 0,
             first_fix_s: None,

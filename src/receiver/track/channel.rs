@@ -303,6 +303,11 @@ impl Channel {
         Phases { sample: self.first, periods: self.period, chips: units_to_chips(self.code), carrier }
     }
 
+    /// Doppler of the carrier where the running code period begins, positive when approaching.
+    pub fn doppler_hz(&self) -> f64 {
+        self.sense * self.loops.carrier.rate
+    }
+
     /// Whether the carrier is locked, and the code no longer on its way from where the search left it.
     pub fn is_settled(&self) -> bool {
         let passed_s = self.start.map_or(0.0, |start| self.since_s(start));

@@ -205,7 +205,11 @@ struct One<'a> {
     raw: BTreeMap<Loop, f64>,
     span_s: f64,
     settings: Settings,
+    /// C/N0 by which variances go, by which powers do, and the mean of its decibels: over an hour in which a
+    /// satellite rises they are apart by more than a decibel.
     cn0_hz: f64,
+    power_hz: f64,
+    middle_dbhz: f64,
     cost_db: f64,
     /// Factor of σ that the worst pair of codes makes.
     pair: f64,
@@ -229,6 +233,8 @@ impl<'a> One<'a> {
         let hz = |row: &SignalError| libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
         // Variances go with one over C/N0.
         let cn0_hz = rows.len() as f64 / rows.iter().map(|row| 1.0 / hz(row)).sum::<f64>();
+        let power_hz = rows.iter().map(hz).sum::<f64>() / rows.len() as f64;
+        let middle_dbhz = rows.iter().map(|row| row.cn0_effective_dbhz - cost_db).sum::<f64>() / rows.len() as f64;
         let share = |row: &SignalError| libm::pow(10.0, (row.cn0_true_dbhz - row.cn0_effective_dbhz) / 10.0) - 1.0;
         let others = rows.iter().map(share).sum::<f64>() / rows.len() as f64;
         // Without noise there is nothing but others.
@@ -271,6 +277,8 @@ impl<'a> One<'a> {
             span_s,
             settings,
             cn0_hz,
+            power_hz,
+            middle_dbhz,
             cost_db,
             pair,
             white: run.scene.front_end.is_empty(),
@@ -367,12 +375,12 @@ impl<'a> One<'a> {
             let limit = largest(1, 1) * THEORY * self.pair * raw * (2.0 / count).sqrt() + stress;
             links.put(Figure::RawBias(which), &self.name, middle.abs(), limit);
         }
-        let cn0_dbhz = 10.0 * libm::log10(self.cn0_hz);
-        links.put(Figure::LoopCn0Bias, &self.name, (mean(&|row| row.cn0_dbhz) - cn0_dbhz).abs(), CN0_DB + self.ray_db);
+        let cn0_off_db = mean(&|row| row.cn0_dbhz) - self.middle_dbhz;
+        links.put(Figure::LoopCn0Bias, &self.name, cn0_off_db.abs(), CN0_DB + self.ray_db);
         // In units of noise per component a prompt has the mean power 2 + 2·T·C/N0.
         let power = mean(&|row| row.prompt_i * row.prompt_i + row.prompt_q * row.prompt_q);
         let snr = self.theory.snr(self.cn0_hz);
-        let off_db = 10.0 * libm::log10((0.5 * power - 1.0).max(1e-3) / snr);
+        let off_db = 10.0 * libm::log10((0.5 * power - 1.0).max(1e-3) / self.theory.snr(self.power_hz));
         let random_db = 4.343 * largest(1, 1) * (2.0 / (snr * count)).sqrt();
         if self.white {
             links.put(Figure::PromptPower, &self.name, off_db.abs(), CN0_DB + self.ray_db + random_db);

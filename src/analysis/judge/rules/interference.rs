@@ -14,7 +14,7 @@ impl Verdict {
             lines.false_told,
             "",
             Bound::Max(0.0),
-            "the detector's false alarms come once in a million seconds",
+            "the detector's false alarms come once in 1e8 seconds",
         );
         if lines.wave_seconds == 0 {
             return;

@@ -1,0 +1,43 @@
+//! A search for satellites whose Dopplers are known to some hundred hertz.
+
+use super::grid::Grid;
+use super::window::Window;
+use super::{AcquireError, Acquired, AcquisitionSettings, Searcher, companion};
+use crate::gnss::record::AcquisitionRow;
+use crate::gnss::signal::Link;
+use crate::receiver::lead::lead;
+use crate::receiver::source::Block;
+
+impl Searcher {
+    /// Searches the beginning of `block` for every one of `near`, within `half_hz` of its Doppler; rows come
+    /// in their order. Each is searched for by itself: what others' cross-correlation makes is found too.
+    ///
+    /// # Errors
+    /// As [`Searcher::search`].
+    pub fn search_near(
+        &mut self,
+        block: &Block,
+        near: &[(Link, f64)],
+        half_hz: f64,
+    ) -> Result<Vec<(AcquisitionRow, Option<Acquired>)>, AcquireError> {
+        let links: Vec<Link> = near.iter().map(|(link, _)| *link).collect();
+        for link in &links {
+            self.prepare(*link)?;
+        }
+        self.make_codes(&links)?;
+        let settings = AcquisitionSettings { doppler_max_hz: half_hz, ..self.settings.clone() };
+        let mut results = Vec::with_capacity(near.len());
+        for (link, doppler_hz) in near {
+            let (Some(component), Some(code)) = (lead(link.signal), self.codes.get(link)) else { continue };
+            let one = (component, companion(component, link.signal).is_some(), link.carrier_hz());
+            let Some(grid) = Grid::new(one, &self.metadata, &settings, *doppler_hz) else { continue };
+            let (have, need) = (block.i.len() as u64, grid.samples_needed());
+            if have < need {
+                return Err(AcquireError::TooFewSamples { have, need });
+            }
+            let window = Window::centred(block, need as usize);
+            results.extend(self.search_signal(link.signal, &grid, window, &[(link.sv, code)]));
+        }
+        Ok(results)
+    }
+}

@@ -1,0 +1,119 @@
+//! Searches for satellites that are known to be there: after a loss, or risen.
+//!
+//! Place, velocity and clock of the last fix and a satellite's ephemeris give its elevation and Doppler. Such
+//! a search looks at a few Doppler bins of a few satellites, a tenth of the work for each, and so comes four
+//! times as often as one for all. What it may miss is left to those: the place errs by a fraction of a hertz
+//! for each hundred metres, but velocity and clock change, by [`GROWTH_HZ`] a second (2 m/s²) while there
+//! is no fix. Limits: the strong satellites are not subtracted first, so a hit that their cross-correlation
+//! may have made is left to a search for all.
+
+use nalgebra::Vector3;
+
+use super::FrontEnd;
+use super::shared::Shared;
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS, look, rotate_earth};
+use crate::gnss::record::AcquisitionRow;
+use crate::gnss::signal::Link;
+use crate::gnss::time::Epoch;
+use crate::receiver::acquire::{Acquired, WEAK_SHARE};
+
+/// A Doppler may be so far from the predicted one …
+const HALF_HZ: f64 = 500.0;
+/// … and so much further for each second without a fix.
+const GROWTH_HZ: f64 = 10.0;
+/// Predictions older than this are none.
+const OLDEST_S: f64 = 60.0;
+/// Time between such searches over that between searches for all while a satellite is lost.
+const SHARE: f64 = 0.25;
+
+/// Satellites that should be there, with their Dopplers, and how far these may be off.
+pub(super) type Near = (Vec<(Link, f64)>, f64);
+
+/// Doppler of a satellite at an antenna's place and velocity, without the receiver's clock, in parts of the
+/// carrier, and its elevation.
+fn seen((here_m, velocity_mps): (Vector3<f64>, Vector3<f64>), at: Epoch, ephemeris: &Ephemeris) -> Option<(f64, f64)> {
+    let travel_s = (ephemeris.state(at).ok()?.position_m - here_m).norm() / SPEED_OF_LIGHT_MPS;
+    let sent = ephemeris.state(at.plus_s(-travel_s)).ok()?;
+    let there_m = rotate_earth(&sent.position_m, travel_s);
+    let sight_m = there_m - here_m;
+    let rate_mps = (rotate_earth(&sent.velocity_mps, travel_s) - velocity_mps).dot(&sight_m) / sight_m.norm();
+    Some((-rate_mps / SPEED_OF_LIGHT_MPS, look(Geodetic::from_ecef(&here_m), &here_m, &there_m).elevation_rad))
+}
+
+impl FrontEnd {
+    /// Satellites that are not followed and should be there.
+    pub(super) fn foreseen(&self, now: u64, shared: &Shared) -> Near {
+        let Some(fix) = &shared.latest else { return (Vec::new(), 0.0) };
+        let later_s = self.metadata.rate.elapsed_s(now.saturating_sub(self.step.own(fix.sample)));
+        if later_s > OLDEST_S {
+            return (Vec::new(), 0.0);
+        }
+        let velocity_mps = Vector3::new(fix.vx_mps, fix.vy_mps, fix.vz_mps);
+        let here_m = Vector3::new(fix.x_m, fix.y_m, fix.z_m) + velocity_mps * later_s;
+        let at = Epoch::new(fix.gps_s, fix.gps_fraction_s).plus_s(later_s);
+        let mask_rad = self.settings.position.mask_deg.to_radians();
+        let one = |link: &Link| {
+            let followed = self.tracks.iter().any(|track| track.channel.link() == *link);
+            let ephemeris = shared.ephemerides.get(&link.sv).filter(|set| !followed && set.is_healthy())?;
+            let (doppler, elevation_rad) = seen((here_m, velocity_mps), at, ephemeris)?;
+            let doppler_hz = (doppler - fix.clock_drift) * link.carrier_hz() + self.offset.hz();
+            (elevation_rad > mask_rad && !self.refused.contains_key(link)).then_some((*link, doppler_hz))
+        };
+        let half_hz = HALF_HZ + GROWTH_HZ * later_s;
+        (self.candidates.iter().filter_map(one).collect(), half_hz.min(self.settings.acquisition.doppler_max_hz))
+    }
+
+    /// Samples from one such search to the next: less while a satellite has been lost.
+    pub(super) fn foreseen_wait(&self) -> u64 {
+        let wait_s = self.settings.operation.reacquisition_interval_s;
+        self.samples(if self.lost.is_empty() { wait_s } else { SHARE * wait_s }).max(1)
+    }
+
+    /// Those results that no satellite that is followed may have made by cross-correlation, and whether there
+    /// were others.
+    pub(super) fn believed(
+        &self,
+        results: Vec<(AcquisitionRow, Option<Acquired>)>,
+    ) -> (Vec<(AcquisitionRow, Option<Acquired>)>, bool) {
+        let strongest_dbhz = self.tracks.iter().map(|track| track.cn0_dbhz).fold(f64::NEG_INFINITY, f64::max);
+        let before = results.len();
+        let own = |(_, hit): &(AcquisitionRow, Option<Acquired>)| {
+            hit.is_none_or(|hit| libm::pow(10.0, (hit.cn0_dbhz - strongest_dbhz) / 10.0) > WEAK_SHARE)
+        };
+        let believed: Vec<_> = results.into_iter().filter(own).collect();
+        let doubted = believed.len() < before;
+        (believed, doubted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::rinex;
+
+    #[test]
+    fn a_predicted_doppler_is_the_rate_at_which_the_range_shrinks() {
+        let sets = rinex::embedded().unwrap().ephemerides;
+        let at = Epoch::parse("2010-07-01T08:05:58").unwrap();
+        let here_m = Geodetic::from_degrees(26.5, 80.2, 130.0).to_ecef();
+        let velocity_mps = Vector3::new(200.0, -90.0, 40.0);
+        let near: Vec<&Ephemeris> = sets.iter().filter(|set| at.since(set.toe).abs() < 3600.0).collect();
+        let mut above = 0;
+        for set in near {
+            let range_m = |later_s: f64| {
+                let place_m = here_m + velocity_mps * later_s;
+                let there_m = set.state(at.plus_s(later_s - 0.075)).unwrap().position_m;
+                (rotate_earth(&there_m, 0.075) - place_m).norm()
+            };
+            let (doppler, elevation_rad) = seen((here_m, velocity_mps), at, set).unwrap();
+            let expected = -(range_m(0.5) - range_m(-0.5)) / SPEED_OF_LIGHT_MPS;
+            // Light times from 67 to 90 ms under accelerations of half a metre a second²; 1e-10 is 0.16 Hz.
+            assert!((doppler - expected).abs() < 1e-10, "{} {doppler} {expected}", set.sv);
+            above += u32::from(elevation_rad > 5_f64.to_radians());
+        }
+        // The twelve of the static scene, and G01 and G25, which say that they are sick; of G01 a set of 6 h
+        // is beside that of 8 h.
+        assert!((12..=15).contains(&above), "{above}");
+    }
+}
