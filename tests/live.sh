@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Programs that this project did not write take the twin's samples while they are made: Debian's GNSS-SDR by FIFO and by rtl_tcp, whose
 # fixes must lie within 5 m of the scene's place, and Debian's hackrf_transfer on a stand-in for its library (tests/live/hackrf.c), which
-# plays buffers at the sample rate, keeps the bytes and counts shortfalls. The receiver's NMEA is read by gpsd's gpsdecode.
+# plays buffers at the sample rate, keeps the bytes and counts shortfalls. The receiver's NMEA is read by gpsd's gpsdecode. Beside them, in
+# real time, a circle is pushed with jitter, losses and lateness to our own receiver by TCP.
 #
 # usage: tests/live.sh [GNSS_TWIN_BINARY [long]]     (default: target/release/gnss-twin; long: a whole minute to each receiver)
 # exit:  0 all hold; 1 one does not; 75 a program could not be installed.
@@ -46,10 +47,10 @@ value() { sed -n "s/^$1 *= *\([-0-9.e_]*\).*/\1/p" "$scene" | tr -d _ | head -n 
 rate_hz=$(awk -v r="$(value sample_rate_hz)" 'BEGIN { printf "%.0f", r }')
 
 # The address at which a program of ours listens.
-address() { # its standard error
+address() { # its standard error, and for what
     local found=
     for _ in $(seq 200); do
-        found=$(sed -n 's/.*listening on //p' "$1" | head -n 1)
+        found=$(sed -n "s/.*${2:-}: listening on //p" "$1" | head -n 1)
         [ -n "$found" ] && break
         sleep 0.05
     done
@@ -109,6 +110,88 @@ foreign() { # name, --out of the twin, lines of the signal source, format
     place "GNSS-SDR by $1" "$out/stdout.txt"
 }
 
+# Pushed motion, live, to our own receiver: a circle of 100 m that is entered smoothly, a hundred states a second, each up to 30 ms late, one in
+# twenty lost. Times are those of a clock that shares no start with the scene's. What comes of it is judged at the end.
+flight_s=34
+flight() {
+    local out=$work/flight at line now wait begun pause
+    mkdir -p "$out"
+    printf 'name = "flight"\nstart = 2010-07-01T08:05:58\nduration_s = %s\nseed = 1\nnoise = {}\nsatellites = { mask_deg = 5 }\n' "$flight_s" >"$out/scene.toml"
+    printf 'motion = { kind = "pushed", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }\n' >>"$out/scene.toml"
+    printf 'front_end = { sample_rate_hz = 2.6e6, format = "ci8" }\n' >>"$out/scene.toml"
+    printf '[position]\nionosphere = "none"\ntroposphere = "none"\n' >"$out/settings.toml"
+    # When each state is sent, in microseconds, and the state: of 1000 s and more by its own clock.
+    awk -v seconds="$flight_s" 'BEGIN {
+        srand(7); rad = atan2(0, -1) / 180; lat = 48.1 * rad; lon = 11.6 * rad; h = 520; a = 6378137; e2 = 0.00669437999014
+        n = a / sqrt(1 - e2 * sin(lat) ^ 2); x0 = (n + h) * cos(lat) * cos(lon); y0 = (n + h) * cos(lat) * sin(lon); z0 = (n * (1 - e2) + h) * sin(lat)
+        r = 100; w0 = 0.2; up = 8
+        for (k = 0; k < seconds * 100; k++) {
+            t = k / 100; u = (t - 2) / up
+            if (u <= 0) { th = w = dw = 0 }
+            else if (u < 1) { th = w0 * up * (2.5 * u ^ 4 - 3 * u ^ 5 + u ^ 6); w = w0 * u ^ 3 * (10 - 15 * u + 6 * u * u); dw = w0 / up * 30 * u * u * (1 - u) ^ 2 }
+            else { th = w0 * up * (0.5 + u - 1); w = w0; dw = 0 }
+            sent = t + 0.03 * rand(); if (sent < last) sent = last; last = sent
+            if (rand() < 0.05 && k > 0) continue
+            s = sin(th); c = cos(th)
+            printf "%d %.3f", sent * 1e6, 1000 + t
+            put(r * s, r * (1 - c), 1); put(r * w * c, r * w * s, 0); put(r * (dw * c - w * w * s), r * (dw * s + w * w * c), 0)
+            printf "\n"
+        }
+    }
+    function put(east, north, place) {
+        printf " %.9f %.9f %.9f", place * x0 - east * sin(lon) - north * sin(lat) * cos(lon), place * y0 + east * cos(lon) - north * sin(lat) * sin(lon), place * z0 + north * cos(lat)
+    }' >"$out/states"
+    "$twin" live "$out/scene.toml" --clock host --latency 200 --motion udp:0 --motion-time first --to tcp:0 --record "$out/record" 2>"$out/live.txt" &
+    local live_is=$!
+    local to; to=$(address "$out/live.txt" motion); to=${to#udp:}
+    "$twin" receive "tcp:$(address "$out/live.txt" samples)" --format ci8 --rate-hz 2600000 --start 2010-07-01T08:05:58 --live \
+        --receiver "$out/settings.toml" --out "$out/rx" >"$out/rx.txt" 2>&1 &
+    local rx_is=$!
+    mkfifo "$out/never"
+    exec 7<>"$out/never" 8>"/dev/udp/${to%:*}/${to##*:}"
+    sleep 1
+    begun=${EPOCHREALTIME//[.,]/}
+    while read -r at line; do
+        now=${EPOCHREALTIME//[.,]/}
+        wait=$((at + begun - now))
+        if ((wait > 0)); then
+            printf -v pause '0.%06d' "$wait"
+            read -r -t "$pause" -u 7 || true
+        fi
+        printf '%s' "$line" >&8 2>/dev/null || break
+    done <"$out/states"
+    wait "$live_is" || { echo "live ended with $?"; tail -n 1 "$out/live.txt"; }
+    wait "$rx_is" || { echo "receive ended with $?"; tail -n 3 "$out/rx.txt"; }
+}
+
+# What came of the flight.
+landed() {
+    local out=$work/flight
+    [ -d "$out/record" ] && [ -d "$out/rx" ] || { fail "flight: $(cat "$out/../flight.txt" 2>/dev/null | tail -n 3)"; return; }
+    mv "$out/rx" "$out/record/rx"
+    cat >"$out/limits.toml" <<'LIMITS'
+"position.first_fix_s" = { max = 30 }
+"position.fixes" = { min = 40 }
+"position.horizontal_p95_m" = { max = 1.0 }
+"position.vertical_p95_m" = { max = 1.5 }
+[tracking]
+losses_of_lock = { max = 0 }
+cycle_slips = { max = 0 }
+LIMITS
+    "$twin" analyze "$out/record" --check "$out/limits.toml" >"$out/judged.txt" 2>&1 || { fail "flight: the judge of the pushed circle"; tail -n 20 "$out/judged.txt"; }
+    # The joined motion may not depart from what was pushed by more than a millimetre, which a step in it would.
+    number() { sed -n "s/.*\"$1\": \([-0-9.e]*\).*/\1/p" "$out/record/live.json" | head -n 1; }
+    echo "live: pushed circle: $(number taken) states taken, $(number extrapolated) ticks extrapolated, $(number snap) snaps, worst gap $(number worst_gap_m) m"
+    [ "$(number snap)" = 0 ] || fail "flight: a snap"
+    awk -v gap="$(number worst_gap_m)" 'BEGIN { exit !(gap < 1e-3) }' || fail "flight: $(number worst_gap_m) m from the pushed motion"
+    awk -v taken="$(number taken)" -v extrapolated="$(number extrapolated)" 'BEGIN { exit !(taken > 2500 && extrapolated > 50) }' ||
+        fail "flight: losses and lateness were not exercised"
+}
+
+flight >"$work/flight.txt" 2>&1 &
+flight_is=$!
+children+=("$flight_is")
+
 mkfifo "$work/if"
 foreign fifo "fifo:$work/if" "SignalSource.implementation=Fifo_Signal_Source
 SignalSource.filename=$work/if
@@ -141,6 +224,10 @@ echo "live: gpsdecode: $decoded positions and $skies skies with twelve satellite
 sed -n 's/.*"mode":3.*"lat":\([-0-9.]*\),"lon":\([-0-9.]*\),"altHAE":\([-0-9.]*\),.*/Lat = \1 [deg], Long = \2 [deg], Height = \3 [m]/p' \
     "$work/rx.json" >"$work/rx.places"
 place "our NMEA by gpsdecode" "$work/rx.places"
+
+wait "$flight_is" || true
+cat "$work/flight.txt"
+landed
 
 # A transmitter in real time, with a stall on the way to it.
 count=$((5 * rate_hz / 2))

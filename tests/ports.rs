@@ -142,11 +142,16 @@ fn a_tcp_client_gets_the_bytes_and_nothing_else() {
     let mut client = TcpStream::connect(server.address).unwrap();
     // What nobody asked for does not cost the stream its end.
     client.write_all(b"GET / HTTP/1.0\r\n\r\n").unwrap();
+    // One stream has one pace: who comes second is sent away and named, and costs the first nothing.
+    let mut second = TcpStream::connect(server.address).unwrap();
+    assert_eq!(second.read(&mut [0; 10]).unwrap_or(0), 0);
     let mut bytes = Vec::new();
     client.read_to_end(&mut bytes).unwrap();
     assert!(bytes == plain, "{} bytes for {}", bytes.len(), plain.len());
     drop(client);
-    assert_eq!(server.end().0, 0);
+    let (code, said) = server.end();
+    let name = second.local_addr().unwrap();
+    assert!(code == 0 && said.contains(&format!("client {name} is sent away")), "{code}: {said}");
 
     let server = Server::start("generate tiny.toml --out tcp:0 --format cf32", here);
     TcpStream::connect(server.address).unwrap().read_exact(&mut [0; 1000]).unwrap();

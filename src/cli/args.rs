@@ -149,6 +149,10 @@ pub struct Live {
     /// machine alone, or IP:PORT
     #[arg(long, value_name = "ORIGIN")]
     pub motion: Option<Origin>,
+    /// What the times of states count from: sample 0 of the scene, or the first state, which is then of the
+    /// instant at which it is used: for a rig whose clock shares no start with the scene's
+    #[arg(long, value_enum, default_value_t = MotionTime::Scene)]
+    pub motion_time: MotionTime,
     /// Directory for a record of the run: what came in, what was sent, its truth, and replay.toml
     #[arg(long, value_name = "DIR")]
     pub record: Option<PathBuf>,
@@ -184,6 +188,15 @@ pub enum Clock {
     Host,
     /// Nothing: as fast as sinks take it
     Free,
+}
+
+/// What the times of pushed states count from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum MotionTime {
+    /// The scene's sample 0
+    Scene,
+    /// The first state, which is of the instant at which it is used
+    First,
 }
 
 /// When a live run starts.

@@ -4,12 +4,12 @@
 //! the delay of the code is (T − t) + τ + (delays of the ray) − (satellite clock); that of the carrier takes
 //! the ray's carrier delay instead, and is counted in cycles at RF.
 
-use crate::generator::geometry::{Arriving, Geometry};
+use crate::generator::geometry::{Arriving, Geometry, Places};
 use crate::generator::knots::Arrival;
 use crate::generator::presence::{Presence, presence};
 use crate::generator::ray::Ray;
 use crate::generator::scene::Scene;
-use crate::generator::sky::{Arc, Emission, LIGHT_TIME_S, emission_near};
+use crate::generator::sky::{Arc, Emission, LIGHT_TIME_S, Place, emission_near};
 use crate::generator::spoof::Constellation;
 use crate::generator::vehicle::Motion;
 use crate::gnss::broadcast::OrbitError;
@@ -96,7 +96,7 @@ pub(super) fn seen_near(
     Ok(found.map(|found| arriving(scene, signal, found)))
 }
 
-/// [`seen_from`] of a satellite on a short arc of its orbit.
+/// [`seen_from`] of a satellite on a short arc of its orbit; where the antenna is may be known.
 ///
 /// # Errors
 /// None by itself; the type is that of [`seen_from`].
@@ -106,11 +106,16 @@ pub fn seen_on(
     arc: &Arc,
     signal: &Signal,
     local: Epoch,
+    places: Option<&Places>,
 ) -> Result<Option<Seen>, OrbitError> {
-    let (time, elapsed_s, motion) = received(scene, from, local);
-    let bias_s = local.since(time) - from.clock_s(elapsed_s);
-    let found = arc.emission(time, &motion)?;
-    let gain = from.gain(elapsed_s);
+    let find = || {
+        let (time, elapsed_s, motion) = received(scene, from, local);
+        Place::new(time, elapsed_s, motion)
+    };
+    let place = places.map_or_else(find, |places| places.at(local, find));
+    let bias_s = local.since(place.time) - from.clock_s(place.elapsed_s);
+    let found = arc.emission(&place)?;
+    let gain = from.gain(place.elapsed_s);
     Ok(found.map(|emission| arriving(scene, signal, Arriving { emission, bias_s, gain })))
 }
 

@@ -3,14 +3,15 @@
 //!
 //! It is computed once for an instant, and kept for the other signals and for other front ends that ask for
 //! the same one: those at one sample rate do. What is kept is what would be computed again, so no bit depends
-//! on who asks first. Limits: instants that are further back than 1024 others are computed again.
+//! on who asks first. Where nodes are dense the same holds of the antenna ([`Places`]), which is one for all
+//! satellites. Limits: instants that are further back than 1024 others are computed again.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::generator::clock::ReceiverClock;
 use crate::generator::scene::Scene;
-use crate::generator::sky::Emission;
+use crate::generator::sky::{Emission, Place};
 use crate::gnss::broadcast::OrbitError;
 use crate::gnss::time::Epoch;
 
@@ -61,6 +62,24 @@ impl Geometry {
             known.pop_first();
         }
         Ok(found)
+    }
+}
+
+/// Where the antenna is at the readings of the receiver's clock that are known.
+#[derive(Debug, Default)]
+pub struct Places {
+    known: Mutex<BTreeMap<(i64, u64), Place>>,
+}
+
+impl Places {
+    /// The antenna when the clock reads `local`, computed by `find` if it is not known.
+    pub fn at(&self, local: Epoch, find: impl FnOnce() -> Place) -> Place {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = *known.entry((local.seconds(), local.fraction().to_bits())).or_insert_with(find);
+        while known.len() > KEPT {
+            known.pop_first();
+        }
+        place
     }
 }
 

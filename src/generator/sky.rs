@@ -6,13 +6,13 @@
 //! that is below a nanometre: twice from a guess for the Earth's surface, once from a neighbour's light time.
 //! The satellite's clock is evaluated at true GPS time of emission.
 
-use nalgebra::{SVector, Vector3};
+use nalgebra::{Matrix3, SVector, Vector3};
 
 use crate::generator::catalogue::Catalogue;
 use crate::generator::ray::Sight;
 use crate::generator::vehicle::Motion;
 use crate::gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
-use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SPEED_OF_LIGHT_MPS, look, rotate_earth};
+use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SPEED_OF_LIGHT_MPS, look_in, rotate_earth};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
 
@@ -37,6 +37,28 @@ pub struct Emission {
     pub satellite_clock_s: f64,
     /// Its rate against GPS time.
     pub satellite_clock_drift: f64,
+}
+
+/// The antenna at one instant, as all satellites see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// True GPS time.
+    pub time: Epoch,
+    /// The same since the scene's start.
+    pub elapsed_s: f64,
+    /// Its motion.
+    pub motion: Motion,
+    user: Geodetic,
+    /// East, north and up there.
+    axes: Matrix3<f64>,
+}
+
+impl Place {
+    /// The antenna with `motion` at `time`, `elapsed_s` after the scene's start.
+    pub fn new(time: Epoch, elapsed_s: f64, motion: Motion) -> Self {
+        let user = Geodetic::from_ecef(&motion.position_m);
+        Self { time, elapsed_s, motion, user, axes: user.ecef_to_enu() }
+    }
 }
 
 fn earth_rotation() -> Vector3<f64> {
@@ -68,7 +90,7 @@ pub fn emission_near(
     motion: &Motion,
     guess_s: f64,
 ) -> Result<Option<Emission>, OrbitError> {
-    emission_of(|at| catalogue.truth(sv, at), sv, received, motion, guess_s)
+    emission_of(|at| catalogue.truth(sv, at), sv, &Place::new(received, 0.0, *motion), guess_s)
 }
 
 /// [`emission`] by one set, whether it is sent then or not.
@@ -76,17 +98,18 @@ pub fn emission_near(
 /// # Errors
 /// As [`emission`].
 pub fn emission_of_set(set: &Ephemeris, received: Epoch, motion: &Motion) -> Result<Option<Emission>, OrbitError> {
-    emission_of(|at| set.state_and_clock_l1(at).map(Some), set.sv, received, motion, LIGHT_TIME_S)
+    let place = Place::new(received, 0.0, *motion);
+    emission_of(|at| set.state_and_clock_l1(at).map(Some), set.sv, &place, LIGHT_TIME_S)
 }
 
 /// [`emission_near`] of a satellite whose orbit and clock are those of `truth`.
 fn emission_of(
     truth: impl Fn(Epoch) -> Result<Option<(State, ClockState)>, OrbitError>,
     sv: Sv,
-    received: Epoch,
-    motion: &Motion,
+    place: &Place,
     guess_s: f64,
 ) -> Result<Option<Emission>, OrbitError> {
+    let Place { time: received, motion, user, axes, .. } = *place;
     let mut travel_s = guess_s;
     let mut found = None;
     for _ in 0..PASSES {
@@ -111,7 +134,6 @@ fn emission_of(
         }
     }
     Ok(found.map(|(satellite, satellite_clock_s, satellite_clock_drift)| {
-        let user = Geodetic::from_ecef(&motion.position_m);
         let down = -satellite.position_m;
         let to_user = motion.position_m - satellite.position_m;
         Emission {
@@ -123,7 +145,7 @@ fn emission_of(
                 user_mps: motion.velocity_mps,
                 satellite,
                 range_m: to_user.norm(),
-                look: look(user, &motion.position_m, &satellite.position_m),
+                look: look_in(&axes, &motion.position_m, &satellite.position_m),
                 off_nadir_rad: libm::atan2(down.cross(&to_user).norm(), down.dot(&to_user)),
             },
             travel_s,
@@ -153,6 +175,8 @@ pub struct Arc {
     nodes_s: [f64; ARC_NODES],
     /// Newton's divided differences.
     differences: [Row; ARC_NODES],
+    /// Light time at the middle, and what it gains a second.
+    guess: (f64, f64),
 }
 
 impl Arc {
@@ -177,7 +201,16 @@ impl Arc {
                 differences[k] = (differences[k] - differences[k - 1]) / (nodes_s[k] - nodes_s[k - order]);
             }
         }
-        Ok(Some(Self { sv, middle, nodes_s, differences }))
+        Ok(Some(Self { sv, middle, nodes_s, differences, guess: (LIGHT_TIME_S, 0.0) }))
+    }
+
+    /// The same with a guess of the light time for who is near a place in ECEF: one evaluation will do there.
+    pub fn near(self, place_m: &Vector3<f64>) -> Self {
+        let (State { position_m, velocity_mps }, _) = self.at(self.middle);
+        let sight_m = position_m - place_m;
+        let range_m = sight_m.norm().max(LEAST_RANGE_M);
+        let guess = (range_m / SPEED_OF_LIGHT_MPS, velocity_mps.dot(&sight_m) / range_m / SPEED_OF_LIGHT_MPS);
+        Self { guess, ..self }
     }
 
     /// Orbit and clock at `at`.
@@ -198,8 +231,11 @@ impl Arc {
     ///
     /// # Errors
     /// None by itself.
-    pub fn emission(&self, received: Epoch, motion: &Motion) -> Result<Option<Emission>, OrbitError> {
-        emission_of(|at| Ok(Some(self.at(at))), self.sv, received, motion, LIGHT_TIME_S)
+    pub fn emission(&self, place: &Place) -> Result<Option<Emission>, OrbitError> {
+        let (guess_s, gain) = self.guess;
+        // Without a place of its own, the guess is the same number at all times.
+        let guess_s = if gain == 0.0 { guess_s } else { guess_s + gain * place.time.since(self.middle) };
+        emission_of(|at| Ok(Some(self.at(at))), self.sv, place, guess_s)
     }
 }
 
@@ -263,7 +299,7 @@ mod tests {
             for k in 0..=30 {
                 let at = from.plus_s(0.54 * f64::from(k));
                 let Some(exact) = emission(&catalogue, sv, at, &motion).unwrap() else { continue };
-                let found = arc.emission(at, &motion).unwrap().unwrap();
+                let found = arc.emission(&Place::new(at, 0.0, motion)).unwrap().unwrap();
                 // Coordinates are rounded to 4e-9 m, three of them, in six nodes whose weights add up to 2.2
                 // at most; each evaluation of Kepler's equation rounds an angle of some radians, 4e-16, to
                 // 1e-8 m.

@@ -48,19 +48,39 @@ impl Default for Switched {
 }
 
 impl Switched {
+    /// What ranges have too much at a place between samples, as if the satellite's clock were behind by as
+    /// much.
+    pub fn astray_m(&self, sample: f64, rate: Rate) -> f64 {
+        self.astray_m + self.astray_mps * (sample - self.since as f64) / rate.hz()
+    }
+
     /// What arrives at a place between samples, as switched.
     pub fn act(&self, arrival: Arrival, carrier_hz: f64, sample: f64, rate: Rate) -> Arrival {
         if *self == Self::default() {
             return arrival;
         }
-        let astray_m = self.astray_m + self.astray_mps * (sample - self.since as f64) / rate.hz();
-        let astray_s = astray_m / SPEED_OF_LIGHT_MPS;
+        let astray_s = self.astray_m(sample, rate) / SPEED_OF_LIGHT_MPS;
         Arrival {
             delay_s: arrival.delay_s + astray_s,
             carrier_cycles: arrival.carrier_cycles + carrier_hz * astray_s,
             cn0_hz: arrival.cn0_hz * self.gain,
         }
     }
+}
+
+/// A satellite that strays from a sample on, until its next change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stray {
+    /// The satellite.
+    pub sv: Sv,
+    /// First sample of it.
+    pub first: u64,
+    /// What its ranges have too much then.
+    pub m: f64,
+    /// What that gains a second.
+    pub mps: f64,
+    /// By how much they jump there.
+    pub step_m: f64,
 }
 
 /// The switches of a scene; clones of their `Arc` share them.
@@ -107,6 +127,31 @@ impl Switches {
         true
     }
 
+    /// The satellites that strayed: each change by its first sample, with the step that it makes.
+    pub fn strays(&self, rate: Rate) -> Vec<Stray> {
+        let rows = self.rows.read().unwrap_or_else(PoisonError::into_inner);
+        let mut found = Vec::new();
+        for (source, changes) in rows.iter() {
+            let Source::Satellite(sv) = *source else { continue };
+            let mut before = Switched::default();
+            for (tick, now) in changes {
+                let first = tick * self.tick_samples;
+                if now.since == first && (now.astray_m, now.astray_mps) != (before.astray_m, before.astray_mps) {
+                    let reached_m = before.astray_m + before.astray_mps * rate.elapsed_s(first - before.since);
+                    found.push(Stray {
+                        sv,
+                        first,
+                        m: now.astray_m,
+                        mps: now.astray_mps,
+                        step_m: now.astray_m - reached_m,
+                    });
+                }
+                before = *now;
+            }
+        }
+        found
+    }
+
     /// How a source is switched in a tick.
     pub fn at(&self, source: Source, tick: u64) -> Switched {
         let rows = self.rows.read().unwrap_or_else(PoisonError::into_inner);
@@ -137,6 +182,11 @@ mod tests {
         assert_eq!((switches.at(source, 3), switches.at(source, 6)), (slipping, slipping));
         assert_eq!(switches.at(source, 7), Switched { gain: 0.0, ..slipping });
         assert_eq!(switches.at(Source::Spoofer(1), 7), Switched::default());
+        // Two metres a second from sample 3000 on, a megasample a second.
+        assert!(switches.set(source, 503, |row| (row.astray_m, row.astray_mps) = (1.0, 0.0)));
+        let strays = switches.strays(Rate::from_hz(1e6).unwrap());
+        let stray = |first, m, mps, step_m| Stray { sv: Sv::gps(5), first, m, mps, step_m };
+        assert_eq!(strays, [stray(3000, 0.0, 2.0, 0.0), stray(503_000, 1.0, 0.0, 0.0)]);
         let arrival = Arrival { delay_s: 0.07, carrier_cycles: 1.1e8, cn0_hz: 1e4 };
         let rate = Rate::from_hz(1e6).unwrap();
         // Half a second on: a metre, 3.3 ns and 5.25 cycles.

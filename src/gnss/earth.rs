@@ -106,7 +106,12 @@ pub struct Look {
 
 /// The direction from `here` (whose ECEF position is `here_m`) to `there_m`.
 pub fn look(here: Geodetic, here_m: &Vector3<f64>, there_m: &Vector3<f64>) -> Look {
-    let enu = here.ecef_to_enu() * (there_m - here_m);
+    look_in(&here.ecef_to_enu(), here_m, there_m)
+}
+
+/// [`look`] where the local directions ([`Geodetic::ecef_to_enu`]) are known.
+pub fn look_in(axes: &Matrix3<f64>, here_m: &Vector3<f64>, there_m: &Vector3<f64>) -> Look {
+    let enu = axes * (there_m - here_m);
     let azimuth_rad = planted!("gnss.earth.azimuth", libm::atan2(enu.x, enu.y), libm::atan2(enu.y, enu.x));
     Look {
         azimuth_rad: if azimuth_rad < 0.0 { azimuth_rad + std::f64::consts::TAU } else { azimuth_rad },

@@ -50,7 +50,7 @@ impl<'a> Driver<'a> {
         let joiner = grown.and_then(|grown| {
             let joining = grown.joining();
             let tick_s = joining.tick_samples as f64 / rate_hz;
-            grown.last().map(|first| Joiner::new(joining, tick_s, first.motion))
+            grown.last().map(|first| Joiner::new(joining, tick_s, first.motion).turning(grown.last_turn()))
         });
         let own = (TICK_S * rate_hz).max(RUN_SAMPLES as f64) as u64;
         let tick_samples = scene.trajectory.tick_samples().unwrap_or(own);
@@ -118,7 +118,7 @@ impl<'a> Driver<'a> {
         let (from_s, to_s) = (self.scene.elapsed_s(first), self.scene.elapsed_s(end));
         let tick = self.joiner.as_mut().map(|joiner| joiner.tick(from_s, to_s));
         if let Some(tick) = tick {
-            self.scene.trajectory.append(Knot { t_s: to_s, motion: tick.end });
+            self.scene.trajectory.append(Knot { t_s: to_s, motion: tick.end }, tick.turn);
         }
         self.ticks += 1;
         self.stream.advance(end, truth, packed)?;

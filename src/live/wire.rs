@@ -4,26 +4,35 @@
 //! request (passed over), 5 a place, 6 with attitude, 7 and 8 the same with a byte for the derivatives that
 //! follow (0 velocity, 1 and acceleration, 2 and jerk). Then the time in milliseconds since the start, the
 //! place and its derivatives, ECEF in metres, each with its angles' in 6 and 8; at the end a name, a 32-bit
-//! length before it. Everything else is a line: `t x y z` with velocity, acceleration and jerk where known
-//! (seconds, metres, ECEF), a GGA sentence, or an event. Limits: a pushed attitude is counted and not used;
-//! the order of angles in 8 is as its vendor's clients send it, by description and not seen on a wire.
+//! length before it. Angles are yaw, pitch and roll of nose, right and down against north, east and down, in
+//! radians, and their derivatives in 8. Everything else is a line: `t x y z` with velocity, acceleration and
+//! jerk where known (seconds, metres, ECEF) and `ypr` with the angles and their rates where known, a sentence
+//! of NMEA ([`nmea`]), or an event. Limits: the order of angles in 8 is as its vendor's clients send it, by
+//! description and not seen on a wire; of their derivatives the first is used.
+
+mod nmea;
 
 use nalgebra::Vector3;
 use thiserror::Error;
 
 use crate::generator::event::{Event, EventError};
-use crate::generator::vehicle::file::gga;
 use crate::generator::vehicle::joining::Push;
+use crate::generator::vehicle::turn::PushedTurn;
 use crate::gnss::time::Epoch;
 
 /// Bytes of a datagram or a line at most.
 pub const MOST_BYTES: usize = 512;
 
+/// The word before angles.
+const TURNED: &str = "ypr";
+
 /// Something that came in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message {
-    /// A state, and whether an attitude came with it.
-    Push(Push, bool),
+    /// A state.
+    Push(Push),
+    /// Half of a state, whose other half another sentence brings.
+    Half,
     /// Something to switch.
     Event(Event),
     /// A sender says that it begins, or asks something.
@@ -54,6 +63,9 @@ pub enum WireError {
     /// A line with a count of numbers that makes no state.
     #[error("{0} numbers: expected t x y z, then velocity, acceleration and jerk as far as known: 4, 7, 10 or 13")]
     Count(usize),
+    /// Another count of angles behind their word.
+    #[error("{TURNED} and {0} numbers: expected yaw, pitch and roll in radians, then their rates where known: 3 or 6")]
+    Angles(usize),
     /// A word of a line that is no number.
     #[error("'{0}': expected a number")]
     NotNumber(String),
@@ -68,17 +80,50 @@ pub enum WireError {
     Event(#[from] EventError),
 }
 
-/// Reads a datagram; `start` is the scene's, for times of day.
-///
-/// # Errors
-/// What is wrong with it.
-pub fn datagram(bytes: &[u8], start: Epoch) -> Result<Message, WireError> {
-    if bytes.len() > MOST_BYTES {
-        return Err(WireError::Long);
+/// Reads what one sender sends.
+#[derive(Clone, Debug)]
+pub struct Reader {
+    nmea: nmea::Reader,
+}
+
+impl Reader {
+    /// Of states of a scene that starts at `start`, for times of day; until a height comes it is `height_m`.
+    pub fn new(start: Epoch, height_m: f64) -> Self {
+        Self { nmea: nmea::Reader::new(start, height_m) }
     }
-    match bytes.split_first() {
-        Some((kind, rest)) if (1..=8).contains(kind) => binary(*kind, rest),
-        _ => line(std::str::from_utf8(bytes).map_err(|_| WireError::NotText)?, start),
+
+    /// Reads a datagram.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn datagram(&mut self, bytes: &[u8]) -> Result<Message, WireError> {
+        if bytes.len() > MOST_BYTES {
+            return Err(WireError::Long);
+        }
+        match bytes.split_first() {
+            Some((kind, rest)) if (1..=8).contains(kind) => binary(*kind, rest),
+            _ => self.line(std::str::from_utf8(bytes).map_err(|_| WireError::NotText)?),
+        }
+    }
+
+    /// Reads a line of text.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn line(&mut self, text: &str) -> Result<Message, WireError> {
+        if text.len() > MOST_BYTES {
+            return Err(WireError::Long);
+        }
+        let text = text.trim();
+        match text.chars().next() {
+            Some('$') => self.nmea.sentence(text),
+            Some(c) if c.is_ascii_alphabetic() => match text {
+                "hello" => Ok(Message::Hello),
+                "bye" => Ok(Message::Bye),
+                event => Ok(Message::Event(event.parse()?)),
+            },
+            _ => state(text),
+        }
     }
 }
 
@@ -111,72 +156,53 @@ fn binary(kind: u8, rest: &[u8]) -> Result<Message, WireError> {
     let values = numbers.chunks_exact(8).map(|chunk| f64::from_le_bytes(chunk.try_into().unwrap_or_default()));
     let mut values = values.collect::<Vec<f64>>().into_iter();
     let t_s = values.next().unwrap_or(f64::NAN) / 1e3;
-    let mut vector = || -> Vector3<f64> {
-        let found = Vector3::from_fn(|_, _| values.next().unwrap_or(f64::NAN));
-        if attitude {
-            values.by_ref().take(3).for_each(drop);
-        }
-        found
-    };
-    let position_m = vector();
-    let mut next = |order: usize| (derivatives >= order).then(&mut vector);
-    let (velocity_mps, acceleration_mps2, jerk_mps3) = (next(1), next(2), next(3));
-    Ok(Message::Push(Push { t_s, position_m, velocity_mps, acceleration_mps2, jerk_mps3 }, attitude))
-}
-
-/// Reads a line of text; `start` is the scene's, for times of day.
-///
-/// # Errors
-/// What is wrong with it.
-pub fn line(text: &str, start: Epoch) -> Result<Message, WireError> {
-    if text.len() > MOST_BYTES {
-        return Err(WireError::Long);
-    }
-    let text = text.trim();
-    match text.chars().next() {
-        Some('$') => sentence(text, start),
-        Some(c) if c.is_ascii_alphabetic() => match text {
-            "hello" => Ok(Message::Hello),
-            "bye" => Ok(Message::Bye),
-            event => Ok(Message::Event(event.parse()?)),
-        },
-        _ => state(text),
-    }
+    let mut three = || [(); 3].map(|()| values.next().unwrap_or(f64::NAN));
+    let mut vector = || (Vector3::from(three()), attitude.then(&mut three));
+    let (position_m, angles) = vector();
+    let mut next = |order: usize| (derivatives >= order).then(&mut vector).unzip();
+    let ((velocity_mps, rates), (acceleration_mps2, _), (jerk_mps3, _)) = (next(1), next(2), next(3));
+    let turn = angles.map(|angles_rad| PushedTurn { angles_rad, rates_radps: rates.flatten() });
+    Ok(Message::Push(Push { t_s, position_m, velocity_mps, acceleration_mps2, jerk_mps3, turn }))
 }
 
 fn state(text: &str) -> Result<Message, WireError> {
     let words = text.split(|c: char| c.is_ascii_whitespace() || c == ',').filter(|word| !word.is_empty());
-    let (mut values, mut count) = ([f64::NAN; 13], 0);
+    let (mut values, mut count, mut turned) = ([f64::NAN; 13], 0, None);
+    let (mut angles, mut turns) = ([f64::NAN; 6], 0);
     for word in words {
+        if word == TURNED && turned.is_none() {
+            turned = Some(());
+            continue;
+        }
         let shown = || WireError::NotNumber(word.chars().take(40).flat_map(char::escape_debug).collect());
         let value = word.parse().map_err(|_| shown())?;
-        if let Some(place) = values.get_mut(count) {
+        let (all, number): (&mut [f64], _) =
+            if turned.is_some() { (&mut angles, &mut turns) } else { (&mut values, &mut count) };
+        if let Some(place) = all.get_mut(*number) {
             *place = value;
         }
-        count += 1;
+        *number += 1;
     }
     if ![4, 7, 10, 13].contains(&count) {
         return Err(WireError::Count(count));
     }
+    if turned.is_some() && ![3, 6].contains(&turns) {
+        return Err(WireError::Angles(turns));
+    }
     let [t_s, x, y, z, vx, vy, vz, ax, ay, az, jx, jy, jz] = values;
+    let [yaw, pitch, roll, yaw_radps, pitch_radps, roll_radps] = angles;
     let known = |least: usize, x: f64, y: f64, z: f64| (count >= least).then(|| Vector3::new(x, y, z));
-    let push = Push {
+    Ok(Message::Push(Push {
         t_s,
         position_m: Vector3::new(x, y, z),
         velocity_mps: known(7, vx, vy, vz),
         acceleration_mps2: known(10, ax, ay, az),
         jerk_mps3: known(13, jx, jy, jz),
-    };
-    Ok(Message::Push(push, false))
-}
-
-fn sentence(text: &str, start: Epoch) -> Result<Message, WireError> {
-    if text.get(3..7) != Some("GGA,") {
-        return Err(WireError::Nmea("expected GGA".to_owned()));
-    }
-    let row = gga(text, start, None).map_err(|fault| WireError::Nmea(fault.to_string()))?;
-    let row = row.ok_or_else(|| WireError::Nmea("without a fix".to_owned()))?;
-    Ok(Message::Push(Push::at(row.t_s, row.position_m), false))
+        turn: turned.map(|()| PushedTurn {
+            angles_rad: [yaw, pitch, roll],
+            rates_radps: (turns == 6).then_some([yaw_radps, pitch_radps, roll_radps]),
+        }),
+    }))
 }
 
 #[cfg(test)]
@@ -185,6 +211,10 @@ mod tests {
 
     fn start() -> Epoch {
         Epoch::parse("2010-07-01T08:06:00").unwrap()
+    }
+
+    fn datagram(bytes: &[u8]) -> Result<Message, WireError> {
+        Reader::new(start(), 0.0).datagram(bytes)
     }
 
     fn packet(kind: u8, order: Option<u8>, values: &[f64], name: Option<&[u8]>) -> Vec<u8> {
@@ -200,18 +230,27 @@ mod tests {
 
     #[test]
     fn each_kind_of_datagram_gives_its_vectors_in_their_places() {
-        let read = |bytes: Vec<u8>| datagram(&bytes, start()).unwrap();
+        let read = |bytes: Vec<u8>| datagram(&bytes).unwrap();
         let numbers: Vec<f64> = (0..25).map(|k| 1000.0 * f64::from(k) + 500.0).collect();
         let v = |first: usize| Vector3::new(numbers[first], numbers[first + 1], numbers[first + 2]);
+        let three = |first: usize| [numbers[first], numbers[first + 1], numbers[first + 2]];
+        let turned_by = |angles: usize, rates: Option<usize>| {
+            Some(PushedTurn { angles_rad: three(angles), rates_radps: rates.map(three) })
+        };
         let place = Push::at(0.5, v(1));
-        assert_eq!(read(packet(5, None, &numbers[..4], Some(b"car"))), Message::Push(place, false));
-        assert_eq!(read(packet(6, None, &numbers[..7], None)), Message::Push(place, true));
+        assert_eq!(read(packet(5, None, &numbers[..4], Some(b"car"))), Message::Push(place));
+        assert_eq!(
+            read(packet(6, None, &numbers[..7], None)),
+            Message::Push(Push { turn: turned_by(4, None), ..place })
+        );
         let moving = Push { velocity_mps: Some(v(4)), ..place };
-        assert_eq!(read(packet(7, Some(0), &numbers[..7], Some(b""))), Message::Push(moving, false));
+        assert_eq!(read(packet(7, Some(0), &numbers[..7], Some(b""))), Message::Push(moving));
         let all = Push { acceleration_mps2: Some(v(7)), jerk_mps3: Some(v(10)), ..moving };
-        assert_eq!(read(packet(7, Some(2), &numbers[..13], None)), Message::Push(all, false));
-        let turned = Push { velocity_mps: Some(v(7)), acceleration_mps2: Some(v(13)), jerk_mps3: Some(v(19)), ..place };
-        assert_eq!(read(packet(8, Some(2), &numbers, Some(b"rocket"))), Message::Push(turned, true));
+        assert_eq!(read(packet(7, Some(2), &numbers[..13], None)), Message::Push(all));
+        let turn = turned_by(4, Some(10));
+        let rates = (Some(v(7)), Some(v(13)), Some(v(19)));
+        let turned = Push { velocity_mps: rates.0, acceleration_mps2: rates.1, jerk_mps3: rates.2, turn, ..place };
+        assert_eq!(read(packet(8, Some(2), &numbers, Some(b"rocket"))), Message::Push(turned));
         assert_eq!((read(vec![1, 9, 9]), read(vec![2])), (Message::Hello, Message::Bye));
     }
 
@@ -221,26 +260,33 @@ mod tests {
             let whole = packet(kind, order, &vec![1.0; values], Some(b"name"));
             for cut in 0..whole.len() {
                 let named = cut == whole.len() - 8;
-                assert_eq!(datagram(&whole[..cut], start()).is_ok(), named, "{kind}: {cut} of {}", whole.len());
+                assert_eq!(datagram(&whole[..cut]).is_ok(), named, "{kind}: {cut} of {}", whole.len());
             }
             let mut lying = packet(kind, order, &vec![1.0; values], Some(b"name"));
             let at = lying.len() - 8;
             lying[at..at + 4].copy_from_slice(&u32::MAX.to_le_bytes());
-            assert!(matches!(datagram(&lying, start()), Err(WireError::Length { .. })));
+            assert!(matches!(datagram(&lying), Err(WireError::Length { .. })));
         }
-        assert!(matches!(datagram(&packet(7, Some(3), &[1.0; 16], None), start()), Err(WireError::Length { .. })));
-        assert_eq!(datagram(&[4, 0], start()), Err(WireError::Unknown(4)));
-        assert_eq!(datagram(&[b'1'; 513], start()), Err(WireError::Long));
-        assert_eq!(datagram(&[200, 200], start()), Err(WireError::NotText));
+        assert!(matches!(datagram(&packet(7, Some(3), &[1.0; 16], None)), Err(WireError::Length { .. })));
+        assert_eq!(datagram(&[4, 0]), Err(WireError::Unknown(4)));
+        assert_eq!(datagram(&[b'1'; 513]), Err(WireError::Long));
+        assert_eq!(datagram(&[200, 200]), Err(WireError::NotText));
     }
 
     #[test]
     fn lines_give_states_sentences_and_events() {
-        let read = |text: &str| line(text, start());
+        let read = |text: &str| Reader::new(start(), 0.0).line(text);
         let place = Push::at(1.5, Vector3::new(1.0, 2.0, 3.0));
-        assert_eq!(read("1.5 1 2 3\r\n"), Ok(Message::Push(place, false)));
+        assert_eq!(read("1.5 1 2 3\r\n"), Ok(Message::Push(place)));
         let moving = Push { velocity_mps: Some(Vector3::new(4.0, 5.0, 6.0)), ..place };
-        assert_eq!(read("1.5,1,2,3, 4,5,6"), Ok(Message::Push(moving, false)));
+        assert_eq!(read("1.5,1,2,3, 4,5,6"), Ok(Message::Push(moving)));
+        let turn = PushedTurn { angles_rad: [0.1, 0.2, 0.3], rates_radps: None };
+        assert_eq!(read("1.5 1 2 3 ypr 0.1 0.2 0.3"), Ok(Message::Push(Push { turn: Some(turn), ..place })));
+        let turn = Some(PushedTurn { rates_radps: Some([4.0, 5.0, 6.0]), ..turn });
+        let both = Push { turn, ..moving };
+        assert_eq!(read("1.5 1 2 3 4 5 6 ypr 0.1 0.2 0.3 4 5 6"), Ok(Message::Push(both)));
+        assert_eq!(read("1.5 1 2 3 ypr 0.1 0.2"), Err(WireError::Angles(2)));
+        assert_eq!(read("1.5 1 2 3 ypr ypr 1 2 3"), Err(WireError::NotNumber("ypr".to_owned())));
         assert_eq!(read("1 2 3"), Err(WireError::Count(3)));
         assert_eq!(read(""), Err(WireError::Count(0)));
         assert_eq!(read("1 2 x 4"), Err(WireError::NotNumber("x".to_owned())));
@@ -250,7 +296,7 @@ mod tests {
         // 08:06:00 GPS time is 08:05:45 UTC that day.
         let body = "GPGGA,080550.00,4806.0000,N,01136.0000,E,1,08,1.0,473.0,M,47.0,M,,";
         let sum = body.bytes().fold(0, |sum, byte| sum ^ byte);
-        let Ok(Message::Push(push, false)) = read(&format!("${body}*{sum:02X}")) else { panic!() };
+        let Ok(Message::Push(push)) = read(&format!("${body}*{sum:02X}")) else { panic!() };
         assert!((push.t_s - 5.0).abs() < 1e-6, "{push:?}");
         assert!((crate::gnss::earth::Geodetic::from_ecef(&push.position_m).height_m - 520.0).abs() < 1e-6);
         assert!(matches!(read(&format!("${body}*{:02X}", sum ^ 1)), Err(WireError::Nmea(_))));
@@ -272,7 +318,7 @@ mod tests {
             if let Some(first) = bytes.first_mut() {
                 *first %= 12;
             }
-            taken += usize::from(datagram(&bytes, start()).is_ok());
+            taken += usize::from(datagram(&bytes).is_ok());
         }
         assert!(taken > 100, "{taken}");
     }

@@ -65,7 +65,7 @@ impl Bench {
 }
 
 fn summary(path: &Path) -> Value {
-    serde_json::from_str(&fs::read_to_string(path.join("summary.json")).unwrap()).unwrap()
+    serde_json::from_str(&fs::read_to_string(path.join("live.json")).unwrap()).unwrap()
 }
 
 fn errors(done: &Output) -> String {
@@ -105,6 +105,36 @@ fn lines_on_standard_input_steer_and_switch_and_their_record_replays_to_the_byte
     assert!(bench.path("flight/truth/scene.json").exists() && bench.path("flight/inputs.csv").exists());
     assert!(bench.replayed("flight") == done.stdout, "the replay differs");
     assert!(errors(&done).contains("no such source"), "{}", errors(&done));
+}
+
+#[test]
+fn a_rig_with_a_zero_of_its_own_turns_the_body_and_the_record_replays() {
+    let bench = Bench::new();
+    let turned = format!("{SCENE}\n[attitude]\nkind = \"pushed\"\nlever_arm_m = [1, 0, -2]\n");
+    let offset = |arguments: &[&str], scene: &str| {
+        fs::write(bench.path("scene.toml"), scene).unwrap();
+        let mut child = bench.start(&[&["--clock", "host", "--motion", "-", "--record", "rig"], arguments].concat());
+        let line = |k: u32| {
+            let state = state(f64::from(k) * 0.01);
+            let (_, rest) = state.split_once(' ').unwrap();
+            format!("{} {rest} ypr {} 0.1 -0.2\n", 5000.0 + f64::from(k) * 0.01, 0.02 * f64::from(k))
+        };
+        let text: String = (0..130).map(line).collect();
+        child.stdin.take().unwrap().write_all(text.as_bytes()).unwrap();
+        let done = child.wait_with_output().unwrap();
+        assert_eq!(done.status.code(), Some(0), "{}", errors(&done));
+        assert!(bench.replayed("rig") == done.stdout, "the replay differs");
+        let made = summary(&bench.path("rig"));
+        fs::remove_dir_all(bench.path("rig")).unwrap();
+        (made["motion"].clone(), made["ticks"]["fresh"].as_u64().unwrap(), errors(&done))
+    };
+    let (motion, fresh, _) = offset(&["--motion-time", "first"], &turned);
+    assert!((motion["offset_s"].as_f64().unwrap() + 5000.0).abs() < 1.2, "{motion}");
+    assert!(fresh > 50 && motion["attitudes"].as_u64().unwrap() >= 100, "{motion}");
+    // By the scene's time all of them lie far ahead, and by another table nothing turns.
+    let (motion, fresh, said) = offset(&[], SCENE);
+    assert!(motion["offset_s"].is_null() && fresh == 0, "{motion}");
+    assert!(motion["attitudes_not_used"].as_u64().unwrap() >= 100 && said.contains("[attitude] kind"), "{said}");
 }
 
 #[test]

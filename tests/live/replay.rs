@@ -10,6 +10,7 @@ use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::stream::{Options, Stream, generate_with};
 use gnss_twin::generator::truth::Record;
 use gnss_twin::generator::vehicle::joining::{Kind, Push};
+use gnss_twin::generator::vehicle::turn::PushedTurn;
 use gnss_twin::generator::vehicle::{Motion, log};
 use gnss_twin::live::drive::Driver;
 use nalgebra::Vector3;
@@ -48,6 +49,9 @@ power_db = -3
 "#;
 
 const DURATION_S: f64 = 0.4;
+const PUSHED: &str =
+    r#"motion = { kind = "pushed", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520, tick_s = 0.009 }"#;
+const ARM: &str = "[0.5, 0.2, -1.0]";
 
 fn scene(directory: &Path, motion: &str) -> Scene {
     let text = format!("duration_s = {DURATION_S}\n{motion}\n{TABLES}");
@@ -56,10 +60,7 @@ fn scene(directory: &Path, motion: &str) -> Scene {
 }
 
 fn pushed(directory: &Path) -> Scene {
-    scene(
-        directory,
-        r#"motion = { kind = "pushed", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520, tick_s = 0.009 }"#,
-    )
+    scene(directory, PUSHED)
 }
 
 /// A spiral that begins at 30 m/s with 8 m/s², so that the first ticks have to join it.
@@ -86,7 +87,8 @@ fn record(directory: &Path, seed: u64) -> Recorded {
     let (mut truth, mut packed, mut bytes, mut kinds) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let (mut ticks, mut events) = (Vec::new(), b"sample,event\n".to_vec());
     let mut driver = Driver::new(&scene, &mut truth).unwrap();
-    log::begin(&mut ticks, &scene.trajectory.grown().unwrap().last().unwrap().motion).unwrap();
+    let grown = scene.trajectory.grown().unwrap();
+    log::begin(&mut ticks, (&grown.last().unwrap().motion, grown.last_turn().as_ref())).unwrap();
     while !driver.is_done() {
         let tick = driver.next_tick();
         let chance = (tick + 1) * 2_654_435_761 % 4_294_967_296 / 65_536 + seed * 977;
@@ -115,7 +117,7 @@ fn record(directory: &Path, seed: u64) -> Recorded {
         }
         let made = driver.tick(&mut truth, &mut packed).unwrap().unwrap();
         let tick = made.tick.unwrap();
-        log::write(&mut ticks, made.samples.1, tick.kind, &tick.end).unwrap();
+        log::write(&mut ticks, made.samples.1, &tick).unwrap();
         bytes.extend_from_slice(&packed);
         kinds.push(tick.kind);
     }
@@ -251,4 +253,84 @@ fn a_record_that_does_not_fit_its_scene_is_refused_with_what_would_fit() {
     assert!(refused(&events, 0.4).contains("multiple of 23400"), "{}", refused(&events, 0.4));
     fs::write(directory.path().join("events.csv"), "sample,event\n23400,jammer 7 off\n").unwrap();
     assert!(refused(&events, 0.4).contains("no such source"), "{}", refused(&events, 0.4));
+}
+
+/// A roll of three turns a second, about a nose that yaws and swings through the vertical.
+fn rolling(t_s: f64) -> PushedTurn {
+    let pitch_rad = 1.5 + 0.4 * libm::sin(5.0 * t_s);
+    let angles_rad = [2.0 * t_s, pitch_rad, 0.2 + 6.0 * std::f64::consts::PI * t_s];
+    PushedTurn { angles_rad, rates_radps: Some([2.0, 2.0 * libm::cos(5.0 * t_s), 6.0 * std::f64::consts::PI]) }
+}
+
+#[test]
+fn a_pushed_attitude_turns_the_antenna_without_a_slip_and_replays_to_the_bit() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let scene = |motion: &str, arm: &str| {
+        let tables = TABLES.replace("kind = \"velocity\"", "kind = \"pushed\"\nroll_deg = 11");
+        let tables = tables.replace("[0.5, 0.2, -1.0]", arm);
+        let text = format!("duration_s = {DURATION_S}\n{motion}\n{tables}");
+        Scenario::from_toml(&text).unwrap().compose(directory, &Overrides::default()).unwrap().0
+    };
+    let pushed = scene(PUSHED, ARM);
+    let drive = |scene: &Scene, turned: bool, log: &mut Vec<u8>| {
+        let (mut truth, mut packed, mut bytes, mut turns) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let start_m = scene.trajectory.body(0.0).position_m;
+        let grown = scene.trajectory.grown().unwrap();
+        log::begin(log, (&grown.last().unwrap().motion, grown.last_turn().as_ref())).unwrap();
+        let mut driver = Driver::new(scene, &mut truth).unwrap();
+        while !driver.is_done() {
+            let t_s = driver.next_tick() as f64 * 0.009 + 0.05;
+            let turn = turned.then(|| rolling(t_s));
+            driver.offer(&Push { turn, ..Push::of(t_s, &spiral(start_m, t_s)) }).unwrap();
+            let made = driver.tick(&mut truth, &mut packed).unwrap().unwrap();
+            let tick = made.tick.unwrap();
+            log::write(log, made.samples.1, &tick).unwrap();
+            turns.push((scene.elapsed_s(made.samples.1), tick));
+            bytes.extend_from_slice(&packed);
+        }
+        driver.finish(&mut truth).unwrap();
+        (bytes, truth, turns)
+    };
+    let mut log = Vec::new();
+    let (bytes, truth, turns) = drive(&pushed, true, &mut log);
+    fs::write(directory.join("ticks.csv"), log).unwrap();
+    // Once joined, within 0.1 s, it is turned as was pushed, and so is the lever arm.
+    for (t_s, tick) in turns.iter().skip(30) {
+        let (turn, due) = (tick.turn.unwrap(), rolling(*t_s).turn());
+        assert!(turn.to(&due).norm() < 0.05, "{t_s}: {}", turn.to(&due));
+        let arm_m = pushed.trajectory.at(*t_s).position_m - tick.end.position_m;
+        let axes = pushed.trajectory.orientation(*t_s).unwrap().axes();
+        assert!((arm_m - axes * Vector3::new(0.5, 0.2, -1.0)).norm() < 1e-8, "{t_s}");
+    }
+    let again = scene(r#"motion = { kind = "ticks", file = "ticks.csv", tick_s = 0.009 }"#, ARM);
+    for (block_runs, batch_blocks, threads) in [(8, 16, 2), (1, 1, 1)] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let options = Options { block_runs, batch_blocks, ..Options::default() };
+        let (mut replayed, mut replayed_truth) = (Vec::new(), Vec::new());
+        pool.install(|| generate_with(&again, &mut replayed, &mut replayed_truth, &mut |_| (), &options)).unwrap();
+        assert!(replayed == bytes, "{block_runs} {threads}");
+        assert_eq!(format!("{replayed_truth:?}"), format!("{truth:?}"));
+    }
+    // Wind-up alone: more than a turn of the antenna, and never a whole cycle at once.
+    let [rolled, level] = [true, false].map(|turned| drive(&scene(PUSHED, "[0, 0, 0]"), turned, &mut Vec::new()).1);
+    let observed = |truth: &[Record], name: &str| -> Vec<(f64, f64)> {
+        let rows = truth.iter().filter_map(|record| match record {
+            Record::Observation(row) if row.sv.to_string() == name => Some((row.carrier_cycles, row.cn0_dbhz)),
+            _ => None,
+        });
+        rows.collect()
+    };
+    let (mut largest, mut weakest) = (0.0_f64, 0.0_f64);
+    for name in ["G13", "G23"] {
+        let (rolled, level) = (observed(&rolled, name), observed(&level, name));
+        let apart: Vec<f64> = rolled.iter().zip(&level).map(|(a, b)| a.0 - b.0).collect();
+        for (k, pair) in apart.windows(2).enumerate().skip(9) {
+            // Three turns and a third a second are 0.05 cycles in 13 ms, ten times that where it is nearly deaf.
+            assert!((pair[1] - pair[0]).abs() < 0.5, "{name} {k}: {pair:?}");
+        }
+        largest = largest.max(apart.iter().fold(0.0_f64, |most, x| most.max((x - apart[0]).abs())));
+        weakest = weakest.max(rolled.iter().zip(&level).fold(0.0_f64, |most, (a, b)| most.max((a.1 - b.1).abs())));
+    }
+    assert!(largest > 0.9 && weakest > 3.0, "{largest} cycles, {weakest} dB");
 }

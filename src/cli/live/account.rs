@@ -85,8 +85,6 @@ pub struct Intake {
     pub strangers: u64,
     /// Too many at once.
     pub dropped: u64,
-    /// With an attitude, which is not used.
-    pub attitudes: u64,
 }
 
 /// What the generator's side counts.
@@ -105,6 +103,11 @@ pub struct Made {
     /// Pushes that were taken, and those whose time had been sent by more than the joining time before.
     pub taken: u64,
     pub late: u64,
+    /// States with an attitude that turns the body, and with one that the scene does not use.
+    pub attitudes: u64,
+    pub attitudes_not_used: u64,
+    /// What was added to the times of states.
+    pub offset_s: Option<f64>,
     /// Refused by what they say, and the last reason.
     pub duplicates: u64,
     pub out_of_order: u64,
@@ -187,7 +190,9 @@ impl Made {
                 "malformed": intake.malformed,
                 "strangers": intake.strangers,
                 "dropped": intake.dropped,
-                "attitudes_not_used": intake.attitudes,
+                "attitudes": self.attitudes,
+                "attitudes_not_used": self.attitudes_not_used,
+                "offset_s": self.offset_s,
             },
             "events": { "applied": self.events, "refused": self.events_refused },
         })

@@ -15,8 +15,7 @@ use super::account::Intake;
 use crate::cli::address::{listen, listen_address};
 use crate::cli::error::CliError;
 use crate::cli::scenario;
-use crate::gnss::time::Epoch;
-use crate::live::wire::{self, MOST_BYTES, Message};
+use crate::live::wire::{MOST_BYTES, Message, Reader, WireError};
 
 /// Messages that wait for the next tick at most; older ones give way.
 const MOST_WAITING: usize = 4096;
@@ -76,7 +75,6 @@ impl Inbox {
         match came {
             Err(_) => inside.intake.malformed += 1,
             Ok(message) => {
-                inside.intake.attitudes += u64::from(matches!(message, Message::Push(_, true)));
                 if inside.messages.len() >= MOST_WAITING {
                     inside.messages.pop_front();
                     inside.intake.dropped += 1;
@@ -87,18 +85,18 @@ impl Inbox {
     }
 }
 
-/// Begins to listen; `start` is the scene's.
+/// Begins to listen; every sender has a `reader` of its own.
 ///
 /// # Errors
 /// An address that cannot be listened on, a thread that cannot be started.
-pub fn begin(origin: Origin, start: Epoch) -> Result<Arc<Inbox>, CliError> {
+pub fn begin(origin: Origin, reader: Reader) -> Result<Arc<Inbox>, CliError> {
     let inbox = Arc::new(Inbox::default());
     let own = Arc::clone(&inbox);
     let work: Box<dyn FnOnce() + Send> = match origin {
-        Origin::Stdin => Box::new(move || lines(io::stdin().lock(), &own, start)),
+        Origin::Stdin => Box::new(move || lines(io::stdin().lock(), &own, reader)),
         Origin::Tcp(address) => {
             let (listener, _) = listen(address, "motion")?;
-            Box::new(move || clients(&listener, &own, start))
+            Box::new(move || clients(&listener, &own, &reader))
         }
         Origin::Udp(address) => {
             let fail = |error| CliError::refused_output(format!("cannot listen on udp:{address}: {error}"));
@@ -108,7 +106,7 @@ pub fn begin(origin: Origin, start: Epoch) -> Result<Arc<Inbox>, CliError> {
                 scenario::warn(&format!("motion: whoever reaches udp:{bound} can move the vehicle"));
             }
             scenario::note(&format!("motion: listening on udp:{bound}"));
-            Box::new(move || datagrams(&socket, &own, start))
+            Box::new(move || datagrams(&socket, &own, &reader))
         }
     };
     let thread = thread::Builder::new().name("motion".to_owned()).stack_size(STACK_BYTES).spawn(work);
@@ -116,7 +114,8 @@ pub fn begin(origin: Origin, start: Epoch) -> Result<Arc<Inbox>, CliError> {
     Ok(inbox)
 }
 
-fn datagrams(socket: &UdpSocket, inbox: &Inbox, start: Epoch) {
+fn datagrams(socket: &UdpSocket, inbox: &Inbox, fresh: &Reader) {
+    let mut reader = fresh.clone();
     let mut buffer = [0; MOST_BYTES + 1];
     let mut known: Option<SocketAddr> = None;
     loop {
@@ -128,24 +127,24 @@ fn datagrams(socket: &UdpSocket, inbox: &Inbox, start: Epoch) {
             inside.intake.strangers += 1;
             continue;
         }
-        let came = wire::datagram(buffer.get(..length).unwrap_or_default(), start);
+        let came = reader.datagram(buffer.get(..length).unwrap_or_default());
         if came == Ok(Message::Bye) {
-            known = None;
+            (known, reader) = (None, fresh.clone());
         }
         inbox.take(came);
     }
 }
 
-fn clients(listener: &TcpListener, inbox: &Inbox, start: Epoch) {
+fn clients(listener: &TcpListener, inbox: &Inbox, fresh: &Reader) {
     loop {
         if let Ok((client, _)) = listener.accept() {
-            lines(BufReader::with_capacity(4096, client), inbox, start);
+            lines(BufReader::with_capacity(4096, client), inbox, fresh.clone());
         }
     }
 }
 
 /// Takes lines to the end of the input; what is beyond the longest line is passed over to the next.
-fn lines(mut input: impl BufRead, inbox: &Inbox, start: Epoch) {
+fn lines(mut input: impl BufRead, inbox: &Inbox, mut reader: Reader) {
     let mut line = Vec::with_capacity(MOST_BYTES + 1);
     loop {
         line.clear();
@@ -155,7 +154,7 @@ fn lines(mut input: impl BufRead, inbox: &Inbox, start: Epoch) {
             Ok(_) => {}
         }
         if line.len() > MOST_BYTES && !line.ends_with(b"\n") {
-            inbox.take(Err(wire::WireError::Long));
+            inbox.take(Err(WireError::Long));
             loop {
                 line.clear();
                 match input.by_ref().take(MOST_BYTES as u64).read_until(b'\n', &mut line) {
@@ -170,26 +169,27 @@ fn lines(mut input: impl BufRead, inbox: &Inbox, start: Epoch) {
         if text == Ok("") {
             continue;
         }
-        inbox.take(text.map_err(|_| wire::WireError::NotText).and_then(|text| wire::line(text, start)));
+        inbox.take(text.map_err(|_| WireError::NotText).and_then(|text| reader.line(text)));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::time::Epoch;
 
     #[test]
     fn lines_of_any_length_are_bounded_and_the_next_one_counts() {
         let inbox = Inbox::default();
         let mut text = vec![b'x'; 5000];
         text.extend_from_slice(b"\n1 2 3 4\n\nhello\nnonsense 1\n\xff\xfe\n5 6 7 8");
-        lines(text.as_slice(), &inbox, Epoch::new(0, 0.0));
+        lines(text.as_slice(), &inbox, Reader::new(Epoch::new(0, 0.0), 0.0));
         let mut messages = Vec::new();
         let intake = inbox.drain(&mut messages);
         assert_eq!((intake.messages, intake.malformed), (6, 3));
         assert!(matches!(
             messages.as_slice(),
-            [(_, Message::Push(..)), (_, Message::Hello), (_, Message::Push(last, _))] if last.t_s == 5.0
+            [(_, Message::Push(..)), (_, Message::Hello), (_, Message::Push(last))] if last.t_s == 5.0
         ));
     }
 
@@ -197,10 +197,10 @@ mod tests {
     fn a_flood_keeps_the_newest() {
         let inbox = Inbox::default();
         let text: String = (0..10_000).map(|k| format!("{k} 0 0 0\n")).collect();
-        lines(text.as_bytes(), &inbox, Epoch::new(0, 0.0));
+        lines(text.as_bytes(), &inbox, Reader::new(Epoch::new(0, 0.0), 0.0));
         let mut messages = Vec::new();
         assert_eq!(inbox.drain(&mut messages).dropped, 10_000 - MOST_WAITING as u64);
-        assert!(matches!(messages.last(), Some((_, Message::Push(last, _))) if last.t_s == 9999.0));
+        assert!(matches!(messages.last(), Some((_, Message::Push(last))) if last.t_s == 9999.0));
     }
 
     #[test]

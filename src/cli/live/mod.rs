@@ -18,7 +18,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use serde_json::{Value, json};
 
-use crate::cli::args::{self, StartAt};
+use crate::cli::args::{self, MotionTime, StartAt};
 use crate::cli::error::CliError;
 use crate::cli::interrupt;
 use crate::cli::run::generator_error;
@@ -27,10 +27,12 @@ use crate::cli::sink::Spec;
 use crate::generator::scenario::Overrides;
 use crate::generator::scene::Scene;
 use crate::generator::truth;
+use crate::generator::vehicle::joining::Push;
+use crate::gnss::earth::Geodetic;
 use crate::gnss::samples::Format;
 use crate::gnss::time::{Epoch, Rate};
 use crate::live::drive::{Driver, Made as Tick};
-use crate::live::wire::Message;
+use crate::live::wire::{Message, Reader};
 use account::{Handed, Intake, Made};
 use intake::Inbox;
 use output::{Output, Pace};
@@ -71,7 +73,13 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
         let name = &named.name;
         return Err(CliError::usage(format!("--motion: {name}: expected a scene with [motion] kind = \"pushed\"")));
     }
-    let inbox = arguments.motion.map(|origin| intake::begin(origin, scene.clock.start)).transpose()?;
+    let inbox = arguments
+        .motion
+        .map(|origin| {
+            let first_m = scene.trajectory.body(0.0).position_m;
+            intake::begin(origin, Reader::new(scene.clock.start, Geodetic::from_ecef(&first_m).height_m))
+        })
+        .transpose()?;
     let mut recorder = arguments.record.as_ref().map(|target| Recorder::create(target, scene)).transpose()?;
     let driver = match &mut recorder {
         Some(recorder) => Driver::new(scene, &mut recorder.truth),
@@ -88,7 +96,8 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
         .zip(&arguments.to)
         .map(|((number, sink), spec)| Output::begin((number, spec), sink, pace, tick_s))
         .collect();
-    let live = Live { driver, recorder, inbox, outputs: outputs?, pace, scene, made: Made::default() };
+    let first_is_now = arguments.motion_time == MotionTime::First;
+    let live = Live { driver, recorder, inbox, outputs: outputs?, pace, scene, made: Made::default(), first_is_now };
     live.run(arguments, &Run { named: &named, scene, overrides: &overrides, restarted: start.is_some() })
 }
 
@@ -125,6 +134,8 @@ struct Live<'a> {
     pace: Pace,
     scene: &'a Scene,
     made: Made,
+    /// Whether the first state says what time it is.
+    first_is_now: bool,
 }
 
 /// Why a run ended.
@@ -280,7 +291,9 @@ impl Live<'_> {
         let now_s = self.scene.elapsed_s(sample);
         for (at, message) in messages {
             match message {
-                Message::Push(push, _) => {
+                Message::Push(push) => {
+                    let push = &self.timed(push, now_s);
+                    self.count_turn(push);
                     let taken = self.driver.offer(push);
                     match &taken {
                         Ok(number) => {
@@ -316,10 +329,35 @@ impl Live<'_> {
                         self.made.events_refused += 1;
                     }
                 },
-                Message::Hello | Message::Bye => {}
+                Message::Half | Message::Hello | Message::Bye => {}
             }
         }
         Ok(())
+    }
+
+    /// A state by the scene's time: where the first one sets it, that one is of the instant at which it is used.
+    fn timed(&mut self, push: &Push, now_s: f64) -> Push {
+        if !self.first_is_now {
+            return *push;
+        }
+        let offset_s = *self.made.offset_s.get_or_insert(now_s - push.t_s);
+        Push { t_s: push.t_s + offset_s, ..*push }
+    }
+
+    /// Counts an attitude, and says once where the scene does not turn by it.
+    fn count_turn(&mut self, push: &Push) {
+        match (push.turn, self.scene.trajectory.is_turned()) {
+            (None, _) => {}
+            (Some(_), true) => self.made.attitudes += 1,
+            (Some(_), false) => {
+                if self.made.attitudes_not_used == 0 {
+                    scenario::warn(
+                        "motion: an attitude came, and the body does not turn by it: [attitude] kind = \"pushed\"",
+                    );
+                }
+                self.made.attitudes_not_used += 1;
+            }
+        }
     }
 
     /// Hands a block to every sink; those behind the first lose it where they are slow.

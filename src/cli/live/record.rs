@@ -15,6 +15,7 @@ use crate::generator::event::{self, Event};
 use crate::generator::scenario::Overrides;
 use crate::generator::scene::Scene;
 use crate::generator::truth;
+use crate::generator::vehicle::grown::Grown;
 use crate::generator::vehicle::joining::Push;
 use crate::generator::vehicle::log;
 use crate::live::drive::Made;
@@ -59,11 +60,13 @@ impl Recorder {
         fs::create_dir(&below).map_err(|error| CliError::create(below.display(), &error))?;
         let truth = truth::Writer::create(&below).map_err(truth_error)?;
         if let Some(first) = scene.trajectory.grown().and_then(|grown| grown.last()) {
-            log::begin(&mut ticks, &first.motion).map_err(|error| failed(&error))?;
+            log::begin(&mut ticks, (&first.motion, scene.trajectory.grown().and_then(Grown::last_turn).as_ref()))
+                .map_err(|error| failed(&error))?;
         }
         writeln!(
             inputs,
-            "sample,taken,t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2,jx_mps3,jy_mps3,jz_mps3"
+            "sample,taken,t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2,jx_mps3,jy_mps3,jz_mps3,\
+             yaw_rad,pitch_rad,roll_rad,yaw_radps,pitch_radps,roll_radps"
         )
         .and_then(|()| writeln!(events, "{}", event::HEADER))
         .map_err(|error| failed(&error))?;
@@ -82,6 +85,13 @@ impl Recorder {
                 None => row += ",,,",
             }
         }
+        let turn = push.turn;
+        for angles in [turn.map(|turn| turn.angles_rad), turn.and_then(|turn| turn.rates_radps)] {
+            match angles {
+                Some(angles) => angles.iter().for_each(|value| row += &format!(",{value:?}")),
+                None => row += ",,,",
+            }
+        }
         writeln!(self.inputs, "{row}").map_err(|error| failed(&error))
     }
 
@@ -95,9 +105,7 @@ impl Recorder {
         self.sent.update(bytes);
         self.samples += (bytes.len() / sample_bytes.max(1)) as u64;
         match &made.tick {
-            Some(tick) => {
-                log::write(&mut self.ticks, made.samples.1, tick.kind, &tick.end).map_err(|error| failed(&error))
-            }
+            Some(tick) => log::write(&mut self.ticks, made.samples.1, tick).map_err(|error| failed(&error)),
             None => Ok(()),
         }
     }
@@ -121,7 +129,8 @@ impl Recorder {
             let path = self.staging.path().join(name);
             fs::write(&path, text).map_err(|error| CliError::output(path.display(), &error))
         };
-        write("summary.json", &text)?;
+        // Not summary.json, which the judge of a record with rx/ writes.
+        write("live.json", &text)?;
         write("scenario.toml", &run.named.text)?;
         write("replay.toml", &replay(run, self.samples)?)?;
         let target = self.target;

@@ -2,10 +2,11 @@
 
 use std::fs::{self, File};
 use std::io::{self, IsTerminal, Read, Write};
-use std::net::{Shutdown, SocketAddr, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::os::fd::AsFd;
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use super::Sink;
@@ -17,6 +18,10 @@ use crate::cli::staging::Staging;
 /// How long a client may take to close its side when the stream has ended: who closes a connection on words
 /// that were not read takes the last samples away.
 pub(super) const PARTING: Duration = Duration::from_secs(2);
+/// Clients sent away that are named.
+const MOST_SAID: u32 = 5;
+/// Stack of the thread that sends them away.
+const STACK_BYTES: usize = 1 << 17;
 /// How often that is looked at.
 pub(super) const LOOK: Duration = Duration::from_millis(100);
 
@@ -73,7 +78,7 @@ pub(super) struct Client {
 }
 
 impl Client {
-    /// The first that comes; the listener is closed then.
+    /// The first that comes; later ones are sent away by name, as one stream has one pace.
     pub fn wait(address: SocketAddr, what: &str) -> Result<Self, CliError> {
         let (listener, own) = address::listen(address, what)?;
         let fail = |error: io::Error| CliError::create(format!("a connection on {own}"), &error);
@@ -87,6 +92,9 @@ impl Client {
         };
         stream.set_nodelay(true).and_then(|()| stream.set_read_timeout(Some(LOOK))).map_err(fail)?;
         scenario::note(&format!("{what}: client {peer}"));
+        let turned_away = thread::Builder::new().name("listener".to_owned()).stack_size(STACK_BYTES);
+        let turned_away = turned_away.spawn(move || send_away(&listener, peer));
+        turned_away.map_err(|error| CliError::passing(format!("cannot start a thread: {error}")))?;
         Ok(Self { stream, peer, sent: 0 })
     }
 
@@ -108,6 +116,25 @@ impl Client {
             // It had all and left.
             Err(error) if error.kind() == io::ErrorKind::NotConnected => Ok(()),
             other => other,
+        }
+    }
+}
+
+/// Closes the connections of further clients, and says why of the first ones.
+fn send_away(listener: &TcpListener, first: SocketAddr) {
+    let mut said = 0;
+    loop {
+        match listener.accept() {
+            Ok((_, peer)) if said < MOST_SAID => {
+                said += 1;
+                scenario::warn(&format!(
+                    "client {peer} is sent away: {first} has these samples; a sink takes one client, another needs one of \
+                     its own (live takes several --to)"
+                ));
+            }
+            Ok(_) => {}
+            // No more descriptors, or the like: not in a hurry.
+            Err(_) => thread::sleep(LOOK),
         }
     }
 }

@@ -8,12 +8,17 @@
 //! satellite that is θ off that axis as `(cos θ/2 cos β/2 e^{jx/2} + sin θ/2 sin β/2 e^{-jx/2})²`, x its
 //! azimuth about the axis. For θ + β below 180° the phase is therefore `x + 2 arg(1 + tan θ/2 tan β/2
 //! e^{-jx})`, whose second term never leaves ±180°; beyond, the first term's sign turns round. What is left
-//! is slow and stays within half a cycle of its value at the start, headings counted. Limits: a satellite
-//! that crosses θ + β = 180°, where the antenna is deaf to it once a turn, changes its whole number of
+//! is slow and stays within half a cycle of its value at the start, headings counted. On a body whose attitude is
+//! pushed whole turns are counted from tick to tick ([`counted`]). Limits: a satellite that crosses θ + β = 180°, where the antenna is deaf to it once a turn, changes its whole number of
 //! cycles; so does one that crosses the spin axis's rear.
+
+mod counted;
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use counted::Counted;
 
 use nalgebra::Vector3;
 
@@ -41,6 +46,8 @@ pub struct WindUp {
     origins: BTreeMap<Sv, f64>,
     /// Heading of the nose in turns, whole ones counted, at instants of the trajectory.
     headings: Vec<(f64, f64)>,
+    /// Whole turns where the attitude is pushed.
+    counted: Arc<Counted>,
 }
 
 impl WindUp {
@@ -50,7 +57,8 @@ impl WindUp {
     /// [`OrbitError`] from the elements.
     pub fn new(start: Epoch, trajectory: Trajectory, catalogue: &Catalogue) -> Result<Option<Self>, OrbitError> {
         let Some(attitude) = trajectory.attitude().copied() else { return Ok(None) };
-        let mut effect = Self { start, trajectory, attitude, origins: BTreeMap::new(), headings: Vec::new() };
+        let (origins, headings, counted) = (BTreeMap::new(), Vec::new(), Arc::default());
+        let mut effect = Self { start, trajectory, attitude, origins, headings, counted };
         for knot in effect.trajectory.knots() {
             let raw = effect.trajectory.heading_cycles(knot.t_s);
             let counted = effect.headings.last().map_or(raw, |(_, last)| raw + (last - raw).round());
@@ -69,6 +77,9 @@ impl WindUp {
     /// Wind-up along `sight` in cycles, whole turns included.
     pub fn cycles(&self, sight: &Sight) -> f64 {
         let t_s = sight.received.since(self.start);
+        if let Some(grown) = self.trajectory.grown().filter(|_| self.trajectory.is_turned()) {
+            return self.counted.cycles(grown, sight.sv, t_s, |t_s| self.slow_cycles(sight, t_s).0);
+        }
         let heading = self.heading_cycles(t_s);
         let origin = self.origins.get(&sight.sv).copied().unwrap_or(0.0);
         let (slow, fast) = self.slow_cycles(sight, t_s);

@@ -7,8 +7,13 @@ use super::read::Table;
 use crate::generator::vehicle::attitude::{Attitude, Nose};
 
 pub(super) fn attitude(table: &Table<'_>) -> Result<Attitude, ScenarioError> {
-    let kinds = [("fixed", false), ("velocity", true)];
-    let follows = table.need_choice("kind", &kinds)?;
+    let kinds = [("fixed", 0), ("velocity", 1), ("pushed", 2)];
+    let kind = table.need_choice("kind", &kinds)?;
+    let follows = kind == 1;
+    let spin_hz = table.need("spin_hz")?;
+    if kind == 2 && spin_hz != 0.0 {
+        return Err(table.bad("spin_hz", "absent, because kind = \"pushed\" turns as it is pushed"));
+    }
     let angle = |key: &str| -> Result<f64, ScenarioError> { Ok(table.need(key)?.to_radians()) };
     let (yaw_rad, pitch_rad) = (angle("yaw_deg")?, angle("pitch_deg")?);
     if follows && table.has("roll_deg") {
@@ -18,12 +23,12 @@ pub(super) fn attitude(table: &Table<'_>) -> Result<Attitude, ScenarioError> {
     let boresight = Unit::try_new(boresight, 1e-6)
         .ok_or_else(|| table.bad("boresight", "a direction: three numbers that are not all 0"))?;
     Ok(Attitude {
-        nose: if follows {
-            Nose::Velocity { yaw_rad, pitch_rad }
-        } else {
-            Nose::Fixed { yaw_rad, pitch_rad, roll_rad: angle("roll_deg")? }
+        nose: match kind {
+            0 => Nose::Fixed { yaw_rad, pitch_rad, roll_rad: angle("roll_deg")? },
+            1 => Nose::Velocity { yaw_rad, pitch_rad },
+            _ => Nose::Pushed { yaw_rad, pitch_rad, roll_rad: angle("roll_deg")? },
         },
-        spin_hz: table.need("spin_hz")?,
+        spin_hz,
         lever_arm_m: Vector3::from(table.numbers::<3>("lever_arm_m")?.unwrap_or_default()),
         boresight,
     })

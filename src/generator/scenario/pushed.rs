@@ -42,7 +42,7 @@ impl Scenario {
                 let tick_samples = self.tick_samples(*tick_s)?;
                 let joining = Joining { tick_samples, join_s: 0.0, hold_s: 0.0, max_jerk_mps3: 0.0 };
                 let first = self.states(path, tick_samples, 1, (directory, overrides))?;
-                let first =
+                let (first, _) =
                     first.first().copied().ok_or_else(|| self.conflict("motion.file", "no state".to_owned()))?;
                 Ok(Trajectory::growing(first, joining, usize::MAX))
             }
@@ -78,9 +78,10 @@ impl Scenario {
         tick_samples: u64,
         limit: usize,
         (directory, overrides): (&Path, &Overrides),
-    ) -> Result<Vec<Motion>, ScenarioError> {
+    ) -> Result<Vec<log::State>, ScenarioError> {
         let files = Files { directory, overrides };
-        self.table("motion.file", path, &files, |input, name| log::read(input, name, tick_samples, limit))
+        let turned = self.attitude.is_some_and(|attitude| attitude.first_turn().is_some());
+        self.table("motion.file", path, &files, |input, name| log::read(input, name, (tick_samples, turned), limit))
     }
 
     /// A file of a record, as `read` reads it.
@@ -128,8 +129,8 @@ impl Scenario {
             );
             return Err(self.conflict("motion.file", reason));
         }
-        for (tick, motion) in (1..).zip(states.into_iter().skip(1)) {
-            scene.trajectory.append(Knot { t_s: scene.elapsed_s(tick * tick_samples), motion });
+        for (tick, (motion, turn)) in (1..).zip(states.into_iter().skip(1)) {
+            scene.trajectory.append(Knot { t_s: scene.elapsed_s(tick * tick_samples), motion }, turn);
         }
         let Some(path) = events else { return Ok(()) };
         for (sample, event) in self.table("motion.events", path, files, event::read)? {

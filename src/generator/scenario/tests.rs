@@ -222,6 +222,7 @@ fn what_contradicts_itself_is_refused_with_the_computed_number() {
 fn what_cannot_be_turned_or_reflected_is_refused_with_the_remedy() {
     let parsed = |tables: &str| parse(&format!("{MINIMAL}{STATIC}{tables}")).unwrap_err().to_string();
     assert!(parsed("[attitude]\nkind = \"velocity\"\nroll_deg = 3").contains("level"));
+    assert!(parsed("[attitude]\nkind = \"pushed\"\nspin_hz = 3").contains("as it is pushed"));
     assert!(parsed("[attitude]\nkind = \"fixed\"\nboresight = [0, 0, 0]").contains("a direction"));
     assert!(
         parsed("[[multipath]]\nkind = \"ground\"\namplitude = 0.5\nheight_m = 2\nexcess_m = 3").contains("excess_m")
@@ -233,6 +234,8 @@ fn what_cannot_be_turned_or_reflected_is_refused_with_the_remedy() {
     assert!(parsed("[power]\nantenna = \"table\"").contains("antenna_file"));
     assert!(parsed("[power]\nantenna_file = \"x.csv\"").contains("unless antenna"));
     let composed = |text: &str| warnings(text).unwrap_err();
+    let error = composed(&format!("{MINIMAL}{STATIC}[attitude]\nkind = \"pushed\"\n"));
+    assert!(error.contains("kind = \"pushed\" or \"ticks\""), "{error}");
     let error = composed(&format!("{MINIMAL}{STATIC}[attitude]\nkind = \"velocity\"\n"));
     assert!(error.contains("use kind = \"fixed\""), "{error}");
     let wall = "[[multipath]]\nkind = \"wall\"\namplitude = 0.5\nazimuth_deg = 0\ndistance_m = 12\n";

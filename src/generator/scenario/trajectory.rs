@@ -71,6 +71,10 @@ impl Scenario {
             let reason = "kind = \"velocity\", but the motion is at rest: use kind = \"fixed\", or let it move";
             return Err(self.conflict("attitude", reason.to_owned()));
         }
+        if matches!(attitude.nose, Nose::Pushed { .. }) && trajectory.grown().is_none() {
+            let reason = "kind = \"pushed\" needs a motion that is pushed too: [motion] kind = \"pushed\" or \"ticks\"";
+            return Err(self.conflict("attitude", reason.to_owned()));
+        }
         Ok(trajectory.with_attitude(attitude))
     }
 

@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
 use super::block::{Worker, edge, first_run, render, run_begin};
 use super::{GenerateError, Generated, Options};
-use crate::generator::geometry::Geometry;
+use crate::generator::geometry::{Geometry, Places};
 use crate::generator::scene::{CodeEdge, Scene};
 use crate::generator::spoof::Constellation;
 use crate::generator::synth::band::Filter;
@@ -36,6 +36,27 @@ pub(super) struct Front<'a> {
     pub block: u64,
     pub batch: u64,
     clipped: u64,
+    /// Buffers that wait for a worker.
+    workers: Mutex<Vec<Worker>>,
+}
+
+/// A worker's buffers, which go back to where they came from.
+struct Lent<'a> {
+    worker: Worker,
+    from: &'a Mutex<Vec<Worker>>,
+}
+
+impl<'a> Lent<'a> {
+    fn of(from: &'a Mutex<Vec<Worker>>) -> Self {
+        let worker = from.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
+        Self { worker, from }
+    }
+}
+
+impl Drop for Lent<'_> {
+    fn drop(&mut self) {
+        self.from.lock().unwrap_or_else(PoisonError::into_inner).push(std::mem::take(&mut self.worker));
+    }
 }
 
 impl<'a> Front<'a> {
@@ -46,13 +67,31 @@ impl<'a> Front<'a> {
     pub fn new(scene: &'a Scene, part: Range<u64>, options: &Options) -> Result<Self, GenerateError> {
         let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
         let filter = limited.then(|| Filter::new(scene.cutoff_cps()));
-        let transmitters = transmitters(scene, edge(scene, filter.as_ref()))?;
+        let mut transmitters = transmitters(scene, edge(scene, filter.as_ref()))?;
+        if scene.trajectory.grown().is_some() {
+            // What spoofers send is made for places of their own.
+            let places = Arc::new(Places::default());
+            let authentic = transmitters.iter_mut().filter(|t| t.from.number == 0);
+            authentic.for_each(|t| t.places = Some(Arc::clone(&places)));
+        }
         // What stages look back at is rendered twice: blocks are long against it.
         let lead = scene.memory_samples().next_multiple_of(RUN_SAMPLES) as u64;
         let block = (u64::from(options.block_runs.max(1)) * RUN_SAMPLES as u64).max(LEADS_PER_BLOCK * lead);
         let batch = block * u64::from(options.batch_blocks.max(1));
         let (next, level) = (part.start, options.level);
-        Ok(Self { scene, filter, level, transmitters, part, next, lead, block, batch, clipped: 0 })
+        Ok(Self {
+            scene,
+            filter,
+            level,
+            transmitters,
+            part,
+            next,
+            lead,
+            block,
+            batch,
+            clipped: 0,
+            workers: Mutex::default(),
+        })
     }
 
     /// Samples made so far.
@@ -98,16 +137,24 @@ impl<'a> Front<'a> {
     pub fn render(&mut self, to: u64, packed: &mut Vec<u8>) {
         let (scene, from) = (self.scene, self.next);
         let sample_bytes = scene.metadata.format.bytes();
-        packed.resize(to.saturating_sub(from) as usize * sample_bytes, 0);
+        let length = to.saturating_sub(from) as usize * sample_bytes;
+        packed.resize(length, 0);
         let kernel =
             Kernel { edge: edge(scene, self.filter.as_ref()), arithmetic: scene.fidelity.carrier, level: self.level };
-        let (transmitters, block) = (&self.transmitters, self.block);
-        let clipped: u64 = packed
-            .par_chunks_mut(block as usize * sample_bytes)
-            .enumerate()
-            .map_init(Worker::default, |worker, (index, bytes)| {
-                render(scene, transmitters, kernel, from + index as u64 * block, bytes, worker)
-            })
+        let (transmitters, block, workers) = (&self.transmitters, self.block, &self.workers);
+        // Cut where runs begin: what a cut goes through is made twice.
+        let head = (run_begin(from) + block - from) as usize * sample_bytes;
+        let (head, tail) = packed.split_at_mut(head.min(length));
+        let second = from + (head.len() / sample_bytes) as u64;
+        let tail = (0..).zip(tail.chunks_mut(block as usize * sample_bytes));
+        let tail = tail.map(|(index, bytes): (u64, _)| (second + index * block, bytes));
+        let blocks: Vec<(u64, &mut [u8])> = std::iter::once((from, head)).chain(tail).collect();
+        let clipped: u64 = blocks
+            .into_par_iter()
+            .map_init(
+                || Lent::of(workers),
+                |lent, (start, bytes)| render(scene, transmitters, kernel, start, bytes, &mut lent.worker),
+            )
             .sum();
         self.clipped += clipped;
         self.next = to.max(from);

@@ -15,7 +15,7 @@ use symbols::{Data, Symbols};
 use crate::generator::arrival;
 use crate::generator::error::GenerateError;
 use crate::generator::fast_phase::FastPhases;
-use crate::generator::geometry::Geometry;
+use crate::generator::geometry::{Geometry, Places};
 use crate::generator::knots::{Grid, Part, Path};
 use crate::generator::presence::Passes;
 use crate::generator::scene::Scene;
@@ -25,9 +25,13 @@ use crate::generator::synth::bank::Bank;
 use crate::generator::synth::chips::{CodeTime, Spreading};
 use crate::generator::synth::waveform::{Voice, Waveform};
 use crate::generator::synth::{CODE_ONE, Edge, RUN_SAMPLES, Run};
+use crate::gnss::broadcast::OrbitError;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Carrier, Signal};
 use crate::gnss::time::{Epoch, tone_turns};
+
+/// Length of a short polynomial of an orbit at least, where roots are shorter.
+const SPAN_S: f64 = 8.0;
 
 /// A sequence of ±1 of a component.
 struct Sent {
@@ -51,6 +55,10 @@ pub struct Transmitter {
     pub signal: &'static Signal,
     /// What is known of the satellite for its other signals too, where it has any.
     pub geometry: Option<Arc<Geometry>>,
+    /// Where the antenna is, for all satellites, where nodes are dense.
+    pub places: Option<Arc<Places>>,
+    /// The orbit over the running span of roots, where nodes are dense, by the span's number.
+    arc: Option<(u64, Option<sky::Arc>)>,
     if_hz: f64,
     /// Of the IF, in 2^-64 turn a sample.
     tone_step: u64,
@@ -157,6 +165,8 @@ impl Transmitter {
             sv,
             signal,
             geometry: None,
+            places: None,
+            arc: None,
             if_hz,
             tone_step: tone_turns(if_hz, scene.clock.rate, 1),
             sent,
@@ -179,27 +189,51 @@ impl Transmitter {
     /// # Errors
     /// Those of orbits.
     pub fn root(&self, scene: &Scene, root: u64) -> Result<Vec<Part>, GenerateError> {
-        // A spinning antenna needs thousands of nodes a second, between which the orbit is a short
-        // polynomial.
-        let arc = if scene.trajectory.spins() {
-            let (first, last) = (root * self.root_samples(), (root + 1) * self.root_samples());
-            sky::Arc::through(&scene.catalogue, self.sv, scene.clock.epoch(first), scene.clock.epoch(last))?
-        } else {
-            None
+        let span = self.span(scene, root);
+        let made = match &self.arc {
+            Some((known, _)) if Some(*known) == span => None,
+            _ => span.map(|span| self.orbit(scene, span)).transpose()?,
+        };
+        let arc = match (&made, &self.arc) {
+            (Some(arc), _) => arc.as_ref(),
+            (None, Some((_, arc))) => arc.as_ref().filter(|_| span.is_some()),
+            (None, None) => None,
         };
         // A root is a tick where anything can be switched.
         let switched = scene.switched(self.from.number, self.sv, root * self.root_samples());
         let carrier_hz = self.signal.carrier_hz(self.sv);
         let observe = |n: u64| {
             let local = scene.clock.epoch(n);
-            let seen = match &arc {
-                Some(arc) => arrival::seen_on(scene, &self.from, arc, self.signal, local),
+            let seen = match arc {
+                Some(arc) => arrival::seen_on(scene, &self.from, arc, self.signal, local, self.places.as_deref()),
                 None => arrival::seen_by(scene, &self.from, (self.sv, self.signal), local, self.geometry.as_deref()),
             };
             let act = |arrival| switched.act(arrival, carrier_hz, n as f64, scene.clock.rate);
             seen.map(|seen| seen.map(|seen| seen.arrivals.into_iter().map(act).collect()))
         };
         Ok(self.grid.root(root, &observe)?)
+    }
+
+    /// Roots whose orbit is one short polynomial.
+    fn roots_of_span(&self, scene: &Scene) -> u64 {
+        ((SPAN_S * scene.clock.rate.hz()) as u64 / self.root_samples()).max(1)
+    }
+
+    /// The span of a root, where nodes are dense: a spinning antenna needs thousands a second, and pushed
+    /// motion seven a tick.
+    fn span(&self, scene: &Scene, root: u64) -> Option<u64> {
+        let dense = scene.trajectory.spins() || scene.trajectory.grown().is_some();
+        dense.then(|| root / self.roots_of_span(scene))
+    }
+
+    /// The orbit over a span.
+    fn orbit(&self, scene: &Scene, span: u64) -> Result<Option<sky::Arc>, OrbitError> {
+        let samples = self.roots_of_span(scene) * self.root_samples();
+        let [from, to] = [span, span + 1].map(|span| scene.clock.epoch(span * samples));
+        let arc = sky::Arc::through(&scene.catalogue, self.sv, from, to)?;
+        // Where the motion begins, which a replay knows as well.
+        let first_m = scene.trajectory.composed_for().position_m;
+        Ok(arc.map(|arc| if scene.trajectory.grown().is_some() { arc.near(&first_m) } else { arc }))
     }
 
     /// Samples of a root part.
@@ -248,6 +282,10 @@ impl Transmitter {
         self.roots = self.roots.split_off(&(from / size));
         for root in from / size..=to.saturating_sub(1) / size {
             if self.roots.insert(root) {
+                let span = self.span(scene, root);
+                if let Some(span) = span.filter(|span| self.arc.as_ref().is_none_or(|(known, _)| known != span)) {
+                    self.arc = Some((span, self.orbit(scene, span)?));
+                }
                 let parts = self.root(scene, root)?;
                 self.knots += parts.len() as u64;
                 self.worst_knot_cycles = parts.iter().fold(self.worst_knot_cycles, |w, p| w.max(p.error_cycles));

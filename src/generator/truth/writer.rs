@@ -4,13 +4,16 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Serialize;
 
 use super::record::{Record, Sink, TruthError};
 use super::skyline::skyline_deg;
 use crate::generator::scene::{Scene, sources};
-use crate::gnss::facts::{FrontEndFacts, OscillatorFacts, SceneFacts, TimeOffset};
+use crate::generator::switches::{Stray, Switches};
+use crate::gnss::facts::{Fault, FaultKind, FrontEndFacts, OscillatorFacts, SceneFacts, TimeOffset};
+use crate::gnss::time::Rate;
 
 struct Table {
     path: PathBuf,
@@ -52,6 +55,24 @@ pub struct Writer {
     claims: Vec<Claims>,
     navigation: Option<Table>,
     passes: Option<Table>,
+    /// Of a scene in which satellites may stray while it is sent: its facts, which are complete at the end.
+    driven: Option<(Arc<Switches>, Rate, SceneFacts)>,
+}
+
+/// Steps of a range below this are none: what a straying satellite has reached is computed anew.
+const STEP_M: f64 = 1e-6;
+
+/// The satellites that strayed, as faults and in words.
+fn strays(switches: &Switches, rate: Rate, first: u64) -> (Vec<Fault>, Vec<String>) {
+    let (mut faults, mut words) = (Vec::new(), Vec::new());
+    for Stray { sv, first: from, m, mps, step_m } in switches.strays(rate) {
+        let from_s = rate.elapsed_s(from.saturating_sub(first));
+        let fault = |kind| Fault { kind, satellites: Some(vec![sv]), from_s, to_s: None };
+        faults.extend((step_m.abs() > STEP_M).then(|| fault(FaultKind::ClockStep)));
+        faults.extend((mps != 0.0).then(|| fault(FaultKind::ClockRamp)));
+        words.push(format!("{sv}: ranges {m} m too long and {mps} m/s more from {from_s} s on"));
+    }
+    (faults, words)
 }
 
 /// The time scales of the scene's signals that are ahead of GPS time or behind it, whole seconds apart, each
@@ -120,6 +141,7 @@ impl Writer {
             claims: Vec::new(),
             navigation: None,
             passes: None,
+            driven: None,
         })
     }
 
@@ -173,8 +195,14 @@ impl Writer {
             expect: scene.expect.clone(),
             time_offsets: time_offsets(scene),
         };
+        self.write_facts(&file)?;
+        self.driven = scene.switches.as_ref().map(|switches| (Arc::clone(switches), scene.clock.rate, file));
+        Ok(())
+    }
+
+    fn write_facts(&self, facts: &SceneFacts) -> Result<(), TruthError> {
         let path = self.directory.join("scene.json");
-        serde_json::to_string_pretty(&file)
+        serde_json::to_string_pretty(facts)
             .map_err(io::Error::from)
             .and_then(|text| fs::write(&path, text + "\n"))
             .map_err(|source| TruthError::File { path, source })
@@ -212,6 +240,12 @@ impl Sink for Writer {
     /// Writes everything that is still buffered. `navigation.csv` and `passes.csv` exist from here on, even
     /// without a row.
     fn finish(&mut self) -> Result<(), TruthError> {
+        if let Some((switches, rate, mut facts)) = self.driven.take() {
+            let (faults, words) = strays(&switches, rate, facts.first_sample.unwrap_or(0));
+            facts.faults.extend(faults);
+            facts.satellite_faults.extend(words);
+            self.write_facts(&facts)?;
+        }
         opened(&mut self.navigation, &self.directory, "navigation.csv")?.flush()?;
         opened(&mut self.passes, &self.directory, "passes.csv")?.flush()?;
         self.observations.flush()?;

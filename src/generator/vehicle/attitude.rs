@@ -2,7 +2,8 @@
 //!
 //! Body axes are nose, right, down. The nose either keeps a direction of the local frame (yaw, pitch, roll
 //! about down, right, nose) or follows the velocity; the body may spin about its nose at a constant rate,
-//! right-handed. The spin stays a number of turns, so that a carrier can count it over any time. Limits: a
+//! right-handed. The spin stays a number of turns, so that a carrier can count it over any time. Of a pushed
+//! attitude the turn at an instant is handed in. Limits: a
 //! nose along the velocity has no roll of its own (its right side stays level), which is undefined while it
 //! points straight up or down, and it leans towards its direction at rest by up to 1 m/s over the speed.
 
@@ -11,6 +12,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 use super::Motion;
+use super::turn::Turn;
 use crate::gnss::earth::Geodetic;
 
 /// Weight of the direction at rest against the velocity.
@@ -22,6 +24,15 @@ pub enum Nose {
     /// Yaw from north over east, pitch above the horizon, roll to the right.
     Fixed {
         /// Clockwise from north, or from the velocity.
+        yaw_rad: f64,
+        /// Nose up.
+        pitch_rad: f64,
+        /// Right side down.
+        roll_rad: f64,
+    },
+    /// As it is pushed; so before anything came.
+    Pushed {
+        /// Clockwise from north.
         yaw_rad: f64,
         /// Nose up.
         pitch_rad: f64,
@@ -68,11 +79,23 @@ impl Orientation {
 }
 
 impl Attitude {
-    /// The body's axes `t_s` seconds after the scene's start, when its trajectory says `motion`.
-    pub fn at(&self, t_s: f64, motion: &Motion) -> Orientation {
+    /// How a body is turned before anything was pushed; `None` where nothing is.
+    pub fn first_turn(&self) -> Option<Turn> {
+        match self.nose {
+            Nose::Pushed { yaw_rad, pitch_rad, roll_rad } => Some(Turn::of(yaw_rad, pitch_rad, roll_rad)),
+            Nose::Fixed { .. } | Nose::Velocity { .. } => None,
+        }
+    }
+
+    /// The body's axes `t_s` seconds after the scene's start, when its trajectory says `motion`, and `pushed`
+    /// where the turn is pushed.
+    pub fn at(&self, t_s: f64, motion: &Motion, pushed: Option<&Turn>) -> Orientation {
         let local = local_axes(Geodetic::from_ecef(&motion.position_m));
         let still = match self.nose {
             Nose::Fixed { yaw_rad, pitch_rad, roll_rad } => local * turned(yaw_rad, pitch_rad, roll_rad),
+            Nose::Pushed { yaw_rad, pitch_rad, roll_rad } => {
+                local * pushed.map_or_else(|| turned(yaw_rad, pitch_rad, roll_rad), Turn::rotation)
+            }
             Nose::Velocity { yaw_rad, pitch_rad } => {
                 let at_rest = turned(yaw_rad, pitch_rad, 0.0) * Vector3::x();
                 let nose = local.inverse() * motion.velocity_mps + at_rest * REST_MPS;
@@ -83,14 +106,15 @@ impl Attitude {
         Orientation { still, spin_cycles: self.spin_hz * t_s }
     }
 
-    /// The antenna's motion `t_s` seconds after the scene's start, when the trajectory says `motion`. The
-    /// slow turning of the nose moves the lever arm, but does not enter its velocity and acceleration.
-    pub fn antenna(&self, t_s: f64, motion: &Motion) -> Motion {
+    /// The antenna's motion `t_s` seconds after the scene's start, when the trajectory says `motion`, and
+    /// `pushed` where the turn is pushed. The slow turning of the nose moves the lever arm, but does not
+    /// enter its velocity and acceleration; a pushed rate does, an angular acceleration does not.
+    pub fn antenna(&self, t_s: f64, motion: &Motion, pushed: Option<&Turn>) -> Motion {
         if self.lever_arm_m == Vector3::zeros() {
             return *motion;
         }
-        let axes = self.at(t_s, motion).axes();
-        let rate = Vector3::x() * (TAU * self.spin_hz);
+        let axes = self.at(t_s, motion, pushed).axes();
+        let rate = pushed.map_or_else(|| Vector3::x() * (TAU * self.spin_hz), |turn| turn.rate_radps);
         let velocity = rate.cross(&self.lever_arm_m);
         Motion {
             position_m: motion.position_m + axes * self.lever_arm_m,
@@ -108,7 +132,7 @@ fn local_axes(place: Geodetic) -> Rotation3<f64> {
 }
 
 /// From body axes to north, east, down.
-fn turned(yaw_rad: f64, pitch_rad: f64, roll_rad: f64) -> Rotation3<f64> {
+pub(super) fn turned(yaw_rad: f64, pitch_rad: f64, roll_rad: f64) -> Rotation3<f64> {
     let (sin_yaw, cos_yaw) = libm::sincos(yaw_rad);
     let (sin_pitch, cos_pitch) = libm::sincos(pitch_rad);
     #[rustfmt::skip]
@@ -145,7 +169,7 @@ mod tests {
         let still = |yaw: f64, pitch: f64, roll: f64| {
             let nose =
                 Nose::Fixed { yaw_rad: yaw.to_radians(), pitch_rad: pitch.to_radians(), roll_rad: roll.to_radians() };
-            attitude(nose, 0.0).at(0.0, &there(Vector3::zeros())).axes()
+            attitude(nose, 0.0).at(0.0, &there(Vector3::zeros()), None).axes()
         };
         let (north, east, up) = (Vector3::z(), Vector3::y(), Vector3::x());
         // Products of sines and cosines, each within 1e-16.
@@ -161,7 +185,7 @@ mod tests {
     #[test]
     fn the_nose_follows_the_velocity_and_rests_where_it_is_told() {
         let body = attitude(Nose::Velocity { yaw_rad: 0.0, pitch_rad: 1.0 }, 0.0);
-        let nose = |velocity_mps| body.at(0.0, &there(velocity_mps)).axes() * Vector3::x();
+        let nose = |velocity_mps| body.at(0.0, &there(velocity_mps), None).axes() * Vector3::x();
         let at_rest = Vector3::new(libm::sin(1.0), 0.0, libm::cos(1.0));
         assert!((nose(Vector3::zeros()) - at_rest).norm() < 1e-15);
         // One metre a second in six hundred: 1/600 rad at most.
@@ -175,7 +199,7 @@ mod tests {
         let motion = there(Vector3::zeros());
         let step_s = 1e-5;
         for t_s in [0.0, 0.123, 10.01] {
-            let [before, now, after] = [t_s - step_s, t_s, t_s + step_s].map(|t_s| body.antenna(t_s, &motion));
+            let [before, now, after] = [t_s - step_s, t_s, t_s + step_s].map(|t_s| body.antenna(t_s, &motion, None));
             let slope = (after.position_m - before.position_m) / (2.0 * step_s);
             // Third derivative 0.36 m (44/s)³ times step²/6 is 5e-7; positions rounded to 1e-9 m over 2e-5 s
             // are 1e-4.

@@ -6,6 +6,7 @@
 //! become ellipsoidal by the sentence's own geoid separation. A file is read row by row and refused at the
 //! first bad one.
 
+mod nmea;
 mod rows;
 
 use std::io::{BufRead, BufReader, Read};
@@ -17,6 +18,7 @@ use super::Trajectory;
 use super::spline::Row;
 use crate::gnss::earth::Geodetic;
 use crate::gnss::time::Epoch;
+pub use nmea::{Rmc, gga, rising, rmc};
 use rows::Rows;
 
 /// Rows read at most: eleven hours at 25 Hz. They become 80 MB of knots, and take three times that while
@@ -394,56 +396,6 @@ pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<(Tra
         }
     }
     Ok((rows.finish(file)?, without_fix))
-}
-
-/// One GGA sentence (NMEA 0183, 6.3.29): checksum, UTC time of day, place and height above the ellipsoid.
-/// `None` of one without a fix. The day is the one nearest to `before_s`, or to the scene's start.
-///
-/// # Errors
-/// [`Fault::Sentence`].
-pub fn gga(text: &str, start: Epoch, before_s: Option<f64>) -> Result<Option<Row>, Fault> {
-    let fail = |reason| Fault::Sentence { sentence: text.to_owned(), reason };
-    let (body, sum) = text.strip_prefix('$').and_then(|t| t.split_once('*')).ok_or_else(|| fail("no checksum"))?;
-    let sum = u8::from_str_radix(sum.trim(), 16).map_err(|_| fail("the checksum is not two hexadecimal digits"))?;
-    if body.bytes().fold(0, |x, b| x ^ b) != sum {
-        return Err(fail("the checksum is wrong"));
-    }
-    let fields: Vec<&str> = body.split(',').collect();
-    let [_, time, latitude, north, longitude, east, quality, _, _, height, _, geoid, ..] = fields.as_slice() else {
-        return Err(fail("expected at least 12 fields"));
-    };
-    if *quality == "0" {
-        return Ok(None);
-    }
-    let read = |text: &str| text.parse::<f64>().ok().filter(|x| x.is_finite());
-    let sexagesimal = |text: &str, digits: usize| Some((read(text.get(..digits)?)?, read(text.get(digits..)?)?));
-    let time_s = time_of_day_s(time).ok_or_else(|| fail("the time is not hhmmss"))?;
-    let angle = |text, digits, sign: &str, signs: [&str; 2]| {
-        let (degrees, minutes) = sexagesimal(text, digits)?;
-        let size = degrees + minutes / 60.0;
-        signs.iter().position(|s| *s == sign).map(|i| if i == 0 { size } else { -size })
-    };
-    let latitude = angle(latitude, 2, north, ["N", "S"]).filter(|x| x.abs() <= 90.0);
-    let longitude = angle(longitude, 3, east, ["E", "W"]).filter(|x| x.abs() <= 180.0);
-    let (latitude, longitude) =
-        latitude.zip(longitude).ok_or_else(|| fail("the position is not ddmm.mm,N,dddmm.mm,E"))?;
-    let height_m = read(height).ok_or_else(|| fail("no height"))?;
-    let geoid_m = read(geoid).ok_or_else(|| fail("no geoid separation: the height above the ellipsoid is unknown"))?;
-    let day_s = 86_400.0;
-    let utc_start_s = (start.seconds() - start.leap_seconds()).rem_euclid(86_400) as f64 + start.fraction();
-    let mut t_s = time_s - utc_start_s;
-    // A time of day names no day: take the one nearest to the row before, or to the scene's start.
-    t_s += day_s * ((before_s.unwrap_or(0.0) - t_s) / day_s).round();
-    let position_m = Geodetic::from_degrees(latitude, longitude, height_m + geoid_m).to_ecef();
-    Ok(Some(Row { t_s, position_m, velocity_mps: None }))
-}
-
-/// Seconds of the day of `hhmmss.ss`.
-fn time_of_day_s(text: &str) -> Option<f64> {
-    let hours: u32 = text.get(..2)?.parse().ok().filter(|h| *h < 24)?;
-    let minutes: u32 = text.get(2..4)?.parse().ok().filter(|m| *m < 60)?;
-    let seconds: f64 = text.get(4..)?.parse().ok().filter(|s| (0.0..61.0).contains(s))?;
-    Some(f64::from(hours * 3600 + minutes * 60) + seconds)
 }
 
 #[cfg(test)]

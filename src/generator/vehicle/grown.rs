@@ -9,6 +9,7 @@
 use std::collections::VecDeque;
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
+use super::turn::Turn;
 use super::{Knot, Motion, between};
 
 /// How pushed motion becomes ticks.
@@ -39,11 +40,13 @@ struct Rows {
     keep: usize,
 }
 
-/// A knot, and the heading of the nose there in turns, whole ones counted.
+/// A knot, and the heading of the nose there in turns, whole ones counted; where the attitude is pushed, the
+/// turn there.
 #[derive(Clone, Copy, Debug)]
 struct Row {
     knot: Knot,
     heading_cycles: f64,
+    turn: Option<Turn>,
 }
 
 /// Two trajectories are the same where they share their knots.
@@ -56,7 +59,7 @@ impl PartialEq for Grown {
 impl Grown {
     /// One knot, at which the first tick begins; the newest `keep` knots are kept.
     pub(super) fn new(joining: Joining, first: Knot, keep: usize) -> Self {
-        let rows = VecDeque::from([Row { knot: first, heading_cycles: 0.0 }]);
+        let rows = VecDeque::from([Row { knot: first, heading_cycles: 0.0, turn: None }]);
         Self { joining, rows: RwLock::new(Rows { rows, ticks: 0, keep: keep.max(2) }) }
     }
 
@@ -76,19 +79,19 @@ impl Grown {
     }
 
     /// Places the first knot anew, before the first tick.
-    pub(super) fn begin(&self, first: Knot, heading_cycles: f64) {
+    pub(super) fn begin(&self, first: Knot, heading_cycles: f64, turn: Option<Turn>) {
         let mut rows = self.rows.write().unwrap_or_else(PoisonError::into_inner);
         if rows.ticks == 0 {
-            rows.rows = VecDeque::from([Row { knot: first, heading_cycles }]);
+            rows.rows = VecDeque::from([Row { knot: first, heading_cycles, turn }]);
         }
     }
 
     /// Ends the next tick with `knot`, which must be later than the last one; `heading` is that of the nose
     /// within a turn.
-    pub(super) fn append(&self, knot: Knot, heading: f64) {
+    pub(super) fn append(&self, knot: Knot, heading: f64, turn: Option<Turn>) {
         let mut rows = self.rows.write().unwrap_or_else(PoisonError::into_inner);
         let last = rows.rows.back().map_or(heading, |row| row.heading_cycles);
-        rows.rows.push_back(Row { knot, heading_cycles: heading + (last - heading).round() });
+        rows.rows.push_back(Row { knot, heading_cycles: heading + (last - heading).round(), turn });
         rows.ticks += 1;
         while rows.rows.len() > rows.keep {
             rows.rows.pop_front();
@@ -104,6 +107,39 @@ impl Grown {
             (Some(one), None) | (None, Some(one)) => one.knot.motion.extrapolated(t_s - one.knot.t_s),
             (None, None) => return None,
         })
+    }
+
+    /// The turn that the newest knot has.
+    pub fn last_turn(&self) -> Option<Turn> {
+        self.read().rows.back().and_then(|row| row.turn)
+    }
+
+    /// The turn `t_s` true seconds after the scene's start, where the attitude is pushed.
+    pub(super) fn turn(&self, t_s: f64) -> Option<Turn> {
+        let rows = self.read();
+        match rows.around(t_s) {
+            (Some(a), Some(b)) => {
+                let length_s = b.knot.t_s - a.knot.t_s;
+                Some(a.turn?.between(&b.turn?, length_s, t_s - a.knot.t_s))
+            }
+            (Some(one), None) | (None, Some(one)) => Some(one.turn?.turned(t_s - one.knot.t_s)),
+            (None, None) => None,
+        }
+    }
+
+    /// Number of the tick in which an instant lies, 0 before the first, and when it begins.
+    pub fn tick_of(&self, t_s: f64) -> (u64, f64) {
+        let rows = self.read();
+        let oldest = (rows.ticks + 1).saturating_sub(rows.rows.len() as u64);
+        let place = rows.rows.partition_point(|row| row.knot.t_s <= t_s).saturating_sub(1);
+        (oldest + place as u64, rows.rows.get(place).map_or(t_s, |row| row.knot.t_s))
+    }
+
+    /// When a tick begins; of one that is not kept any more the oldest that is.
+    pub fn begins_s(&self, tick: u64) -> Option<f64> {
+        let rows = self.read();
+        let oldest = (rows.ticks + 1).saturating_sub(rows.rows.len() as u64);
+        rows.rows.get(tick.saturating_sub(oldest) as usize).map(|row| row.knot.t_s)
     }
 
     /// The counted heading between the knots around a time, straight from one to the other.

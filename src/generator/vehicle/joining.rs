@@ -13,6 +13,7 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::grown::Joining;
+use super::turn::{PushedTurn, Turn, Turning};
 use super::{Knot, Motion, between, third_fourth_fifth};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 
@@ -25,6 +26,8 @@ const MOST_RADIUS_M: f64 = 1e9;
 const MOST_SPEED_MPS: f64 = 0.01 * SPEED_OF_LIGHT_MPS;
 const MOST_ACCELERATION_MPS2: f64 = 1e6;
 const MOST_JERK_MPS3: f64 = 1e9;
+/// Largest angular rate.
+const MOST_TURNING_RADPS: f64 = 1e3;
 /// Mean speed of a snap at most; its peak is 1.875 times that.
 const SNAP_SPEED_MPS: f64 = 0.05 * SPEED_OF_LIGHT_MPS;
 /// Places in a join at which its jerk is taken.
@@ -43,18 +46,20 @@ pub struct Push {
     pub acceleration_mps2: Option<Vector3<f64>>,
     /// Its third derivative, where known.
     pub jerk_mps3: Option<Vector3<f64>>,
+    /// How the body is turned, where known.
+    pub turn: Option<PushedTurn>,
 }
 
 impl Push {
     /// A place alone.
     pub fn at(t_s: f64, position_m: Vector3<f64>) -> Self {
-        Self { t_s, position_m, velocity_mps: None, acceleration_mps2: None, jerk_mps3: None }
+        Self { t_s, position_m, velocity_mps: None, acceleration_mps2: None, jerk_mps3: None, turn: None }
     }
 
     /// A whole state.
     pub fn of(t_s: f64, motion: &Motion) -> Self {
         let (velocity_mps, acceleration_mps2) = (Some(motion.velocity_mps), Some(motion.acceleration_mps2));
-        Self { t_s, position_m: motion.position_m, velocity_mps, acceleration_mps2, jerk_mps3: None }
+        Self { velocity_mps, acceleration_mps2, ..Self::at(t_s, motion.position_m) }
     }
 }
 
@@ -130,6 +135,8 @@ impl Kind {
 pub struct Tick {
     /// The motion at its end.
     pub end: Motion,
+    /// The turn there, where the attitude is pushed.
+    pub turn: Option<Turn>,
     /// What it was made of.
     pub kind: Kind,
     /// The push that steered it for the first time, by its number; an older one, or none, gives `None`.
@@ -151,6 +158,7 @@ struct State {
     jerk_mps3: Vector3<f64>,
     /// Whether its velocity was pushed.
     own_velocity: bool,
+    turn: Option<PushedTurn>,
 }
 
 /// Makes ticks of pushes.
@@ -166,12 +174,19 @@ pub struct Joiner {
     waiting: VecDeque<State>,
     /// Taken so far.
     taken: u64,
+    /// Where the attitude is pushed.
+    turning: Option<Turning>,
 }
 
 impl Joiner {
     /// Begins with `now`; a tick lasts `tick_s`.
     pub fn new(joining: Joining, tick_s: f64, now: Motion) -> Self {
-        Self { joining, tick_s, now, used: None, waiting: VecDeque::new(), taken: 0 }
+        Self { joining, tick_s, now, used: None, waiting: VecDeque::new(), taken: 0, turning: None }
+    }
+
+    /// The same of a body whose turn is pushed, and is `first` before.
+    pub fn turning(self, first: Option<Turn>) -> Self {
+        Self { turning: first.map(Turning::new), ..self }
     }
 
     /// Takes a push, and returns its number.
@@ -208,6 +223,7 @@ impl Joiner {
             motion,
             jerk_mps3: push.jerk_mps3.unwrap_or(zero),
             own_velocity: push.velocity_mps.is_some(),
+            turn: push.turn,
         };
         self.waiting.push_back(state);
         self.taken += 1;
@@ -225,6 +241,7 @@ impl Joiner {
         if !push.t_s.is_finite()
             || !finite(&push.position_m)
             || rates.iter().any(|(_, rate, _)| rate.is_some_and(|rate| !finite(&rate)))
+            || push.turn.is_some_and(|turn| !turn.is_finite())
         {
             return Err(Refusal::NotFinite);
         }
@@ -235,6 +252,9 @@ impl Joiner {
             if let Some(value) = rate.map(|rate| rate.norm()).filter(|value| *value > most) {
                 return Err(Refusal::Rate { what, value, most });
             }
+        }
+        if let Some(value) = push.turn.map(|turn| turn.turn().rate_radps.norm()).filter(|x| *x > MOST_TURNING_RADPS) {
+            return Err(Refusal::Rate { what: "rad/s", value, most: MOST_TURNING_RADPS });
         }
         if push.t_s < 0.0 {
             return Err(Refusal::BeforeStart(push.t_s));
@@ -254,10 +274,16 @@ impl Joiner {
                 break;
             }
             self.used = self.waiting.pop_front();
+            if let (Some(turning), Some(state)) = (&mut self.turning, &self.used)
+                && let Some(turn) = &state.turn
+            {
+                turning.take(state.t_s, turn, self.joining.hold_s);
+            }
         }
+        let turn = self.turning.as_mut().map(|turning| turning.tick((from_s, to_s, horizon_s), self.joining.hold_s));
         let Some(state) = self.used else {
             let end = self.now;
-            return Tick { end, kind: Kind::Waiting, news: None, gap_m: 0.0, age_s: 0.0, jerk_mps3: 0.0 };
+            return Tick { end, turn, kind: Kind::Waiting, news: None, gap_m: 0.0, age_s: 0.0, jerk_mps3: 0.0 };
         };
         let hold_s = self.joining.hold_s;
         let left = Knot { t_s: from_s, motion: self.now };
@@ -274,7 +300,7 @@ impl Joiner {
         };
         self.now = end;
         let gap_m = (end.position_m - due.position_m).norm();
-        Tick { end, kind, news, gap_m, age_s: to_s - state.t_s, jerk_mps3 }
+        Tick { end, turn, kind, news, gap_m, age_s: to_s - state.t_s, jerk_mps3 }
     }
 }
 

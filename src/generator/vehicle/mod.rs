@@ -17,12 +17,14 @@ pub mod rocket;
 pub mod route;
 pub mod shaking;
 pub mod spline;
+pub mod turn;
 
 use std::sync::Arc;
 
 use attitude::{Attitude, Orientation};
 use grown::{Grown, Joining};
 use nalgebra::Vector3;
+use turn::Turn;
 
 use crate::gnss::earth::Geodetic;
 
@@ -115,21 +117,33 @@ impl Trajectory {
     pub fn begin(&self, t_s: f64) {
         let first = Knot { t_s, ..self.first };
         if let Some(grown) = &self.grown {
-            grown.begin(first, self.heading_of(&first));
+            let turn = self.attitude.and_then(|attitude| attitude.first_turn());
+            grown.begin(first, self.heading_of(&first, turn.as_ref()), turn);
         }
     }
 
-    /// Ends the next tick of a growing motion with `knot`, which must be later than the last one.
-    pub fn append(&self, knot: Knot) {
+    /// Ends the next tick of a growing motion with `knot`, which must be later than the last one, and where
+    /// the attitude is pushed with its turn.
+    pub fn append(&self, knot: Knot, turn: Option<Turn>) {
         if let Some(grown) = &self.grown {
-            grown.append(knot, self.heading_of(&knot));
+            grown.append(knot, self.heading_of(&knot, turn.as_ref()), turn);
         }
+    }
+
+    /// Whether the body turns as it is pushed.
+    pub fn is_turned(&self) -> bool {
+        self.attitude.is_some_and(|attitude| attitude.first_turn().is_some())
+    }
+
+    /// The turn at an instant, where it is pushed.
+    fn turn(&self, t_s: f64) -> Option<Turn> {
+        self.grown.as_ref().filter(|_| self.is_turned()).and_then(|grown| grown.turn(t_s))
     }
 
     /// Heading of the nose at a knot in turns, within one; 0 without an attitude.
-    fn heading_of(&self, Knot { t_s, motion }: &Knot) -> f64 {
+    fn heading_of(&self, Knot { t_s, motion }: &Knot, turn: Option<&Turn>) -> f64 {
         self.attitude.map_or(0.0, |attitude| {
-            heading_cycles(&attitude.at(*t_s, motion), &attitude.antenna(*t_s, motion).position_m)
+            heading_cycles(&attitude.at(*t_s, motion, turn), &attitude.antenna(*t_s, motion, turn).position_m)
         })
     }
 
@@ -144,7 +158,9 @@ impl Trajectory {
         match (&self.grown, &self.attitude) {
             (None, _) => self.at(0.0),
             (Some(_), None) => self.first.motion,
-            (Some(_), Some(attitude)) => attitude.antenna(self.first.t_s, &self.first.motion),
+            (Some(_), Some(attitude)) => {
+                attitude.antenna(self.first.t_s, &self.first.motion, attitude.first_turn().as_ref())
+            }
         }
     }
 
@@ -160,7 +176,7 @@ impl Trajectory {
 
     /// The body's axes `t_s` true seconds after the scene's start, where it has an attitude.
     pub fn orientation(&self, t_s: f64) -> Option<Orientation> {
-        self.attitude.map(|attitude| attitude.at(t_s, &self.body(t_s)))
+        self.attitude.map(|attitude| attitude.at(t_s, &self.body(t_s), self.turn(t_s).as_ref()))
     }
 
     /// Whether the body spins.
@@ -171,7 +187,7 @@ impl Trajectory {
     /// The antenna's motion `t_s` true seconds after the scene's start.
     pub fn at(&self, t_s: f64) -> Motion {
         let body = self.body(t_s);
-        self.attitude.map_or(body, |attitude| attitude.antenna(t_s, &body))
+        self.attitude.map_or(body, |attitude| attitude.antenna(t_s, &body, self.turn(t_s).as_ref()))
     }
 
     /// How far from the nose's axis a body that spins carries the antenna, in metres, and its turns a second.

@@ -87,10 +87,22 @@ pub(crate) const POINT: &[Key] = &[
 ];
 
 pub(crate) const ATTITUDE: &[Key] = &[
-    word("kind", || vec!["fixed", "velocity"], "fixed against north, or nose along the velocity").required(),
-    number("yaw_deg", -360.0, 360.0, "deg", "heading, or turn against the velocity").or(0.0),
+    word(
+        "kind",
+        || vec!["fixed", "velocity", "pushed"],
+        "fixed against north, nose along the velocity, or as it is pushed with the motion",
+    )
+    .required(),
+    number(
+        "yaw_deg",
+        -360.0,
+        360.0,
+        "deg",
+        "heading, or turn against the velocity; where it is pushed, before anything came",
+    )
+    .or(0.0),
     number("pitch_deg", -90.0, 90.0, "deg", "nose up").or(0.0),
-    number("roll_deg", -360.0, 360.0, "deg", "right side down; only with kind = \"fixed\"").or(0.0),
+    number("roll_deg", -360.0, 360.0, "deg", "right side down; not with kind = \"velocity\"").or(0.0),
     number("spin_hz", -1000.0, 1000.0, "Hz", "turns a second about the nose").or(0.0),
     numbers("lever_arm_m", 3, (-1e3, 1e3), "m", "antenna from the moved point: forward, right, down")
         .or_else("[0, 0, 0]"),
