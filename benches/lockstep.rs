@@ -1,5 +1,6 @@
 //! Speed of lock step: `cargo bench --bench lockstep [-- SECONDS]` prints how many times faster than real
-//! time generator and receiver go step by step, and the processor time of a second with and without the receiver.
+//! time generator and receiver go step by step, and what a second takes of the processor with and without
+//! the receiver.
 //!
 //! A vehicle on a circle over the place of `scenarios/static.toml`, twelve satellites in noise, 2.6 Msps, a
 //! state for each of a hundred steps a second. The receiver starts cold: its search counts.

@@ -326,7 +326,7 @@ fn a_pushed_attitude_turns_the_antenna_without_a_slip_and_replays_to_the_bit() {
         let (rolled, level) = (observed(&rolled, name), observed(&level, name));
         let apart: Vec<f64> = rolled.iter().zip(&level).map(|(a, b)| a.0 - b.0).collect();
         for (k, pair) in apart.windows(2).enumerate().skip(9) {
-            // Three turns and a third a second are 0.05 cycles in 13 ms, ten times that where it is nearly deaf.
+            // Three turns and a third a second are 0.05 cycles in 13 ms; ten times that nearly deaf.
             assert!((pair[1] - pair[0]).abs() < 0.5, "{name} {k}: {pair:?}");
         }
         largest = largest.max(apart.iter().fold(0.0_f64, |most, x| most.max((x - apart[0]).abs())));

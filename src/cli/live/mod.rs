@@ -335,7 +335,8 @@ impl Live<'_> {
         Ok(())
     }
 
-    /// A state by the scene's time: where the first one sets it, that one is of the instant at which it is used.
+    /// A state by the scene's time: where the first one sets it, that one is of the instant at which it is
+    /// used.
     fn timed(&mut self, push: &Push, now_s: f64) -> Push {
         if !self.first_is_now {
             return *push;

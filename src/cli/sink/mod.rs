@@ -1,8 +1,8 @@
 //! Where samples go while they are made: standard output, a FIFO, a TCP client, a client of rtl_tcp, a file.
 //!
 //! A write blocks until the reader has taken the block: the reader's pace is the stream's. Listeners take one
-//! client, the first, send later ones away by name, and are on loopback unless another address is named. Limits: a FIFO is not made here;
-//! who leaves does not come back.
+//! client, the first, send later ones away by name, and are on loopback unless another address is named.
+//! Limits: a FIFO is not made here; who leaves does not come back.
 
 mod plain;
 mod rtl_tcp;

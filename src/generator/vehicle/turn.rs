@@ -136,8 +136,8 @@ impl Turning {
         self.used = Some((t_s, turn));
     }
 
-    /// The turn at the end of a tick from `from_s` to `to_s`, on the way to the newest push at `horizon_s`. Past
-    /// `hold_s` that one stands still.
+    /// The turn at the end of a tick from `from_s` to `to_s`, on the way to the newest push at `horizon_s`.
+    /// Past `hold_s` that one stands still.
     pub fn tick(&mut self, (from_s, to_s, horizon_s): (f64, f64, f64), hold_s: f64) -> Turn {
         let Some((pushed_s, pushed)) = self.used else { return self.now };
         let due = |at_s: f64| {
@@ -234,7 +234,7 @@ mod tests {
             let step_s = 1e-5;
             let at = |s: f64| pushed([0, 1, 2].map(|k| angles[k] + rates[k] * s), rates);
             let measured = at(-step_s).to(&at(step_s)) / (2.0 * step_s);
-            // The second derivative of the rate, of the order of its cube, times step²/6, and 1e-16 over 2e-5.
+            // The second derivative of the rate, of the order of its cube, times step²/6; 1e-16 over 2e-5.
             assert!((measured - turn.rate_radps).norm() < 1e-9, "{angles:?}");
         }
     }
