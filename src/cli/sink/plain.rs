@@ -128,8 +128,8 @@ fn send_away(listener: &TcpListener, first: SocketAddr) {
             Ok((_, peer)) if said < MOST_SAID => {
                 said += 1;
                 scenario::warn(&format!(
-                    "client {peer} is sent away: {first} has these samples; a sink takes one client, another needs a sink \
-                     of its own (live takes several --to)"
+                    "client {peer} is sent away: {first} has these samples; a sink takes one client, another needs \
+                     a sink of its own (live takes several --to)"
                 ));
             }
             Ok(_) => {}

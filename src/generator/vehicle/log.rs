@@ -1,8 +1,8 @@
 //! The log of ticks: what each tick of a pushed motion became, so that it can be sent again bit by bit.
 //!
 //! A CSV table. The first row is the state at sample 0, each other one the state at the end of its tick, with
-//! what the tick was made of, and where the attitude is pushed its quaternion and rate. Numbers are the shortest
-//! decimals that give the same bits. Limits: rows read are bounded ([`MAX_ROWS`]).
+//! what the tick was made of, and where the attitude is pushed its quaternion and rate. Numbers are the
+//! shortest decimals that give the same bits. Limits: rows read are bounded ([`MAX_ROWS`]).
 
 use std::io::{self, BufRead, BufReader, Read, Write};
 
