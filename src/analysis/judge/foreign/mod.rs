@@ -88,7 +88,10 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         }
         let leap_s = timeline.origin.leap_seconds();
         let joined = |late_s: i64| place::measure(&read.fixes, &timeline, judged.rollover_s[1] + late_s).rows.len();
-        judged.labels_late_s = (leap_s > 0 && joined(leap_s) > measured.rows.len()).then_some(leap_s);
+        let end_s = timeline.span_s().1 + judged.rollover_s[1] as f64;
+        // A right label may be past the truth's end by its own error, one in GPS time by the leap seconds.
+        let past_end = labels.iter().any(|label| label.since(timeline.origin) - end_s > 0.5 * leap_s as f64);
+        judged.labels_late_s = (past_end && leap_s > 0 && joined(leap_s) > measured.rows.len()).then_some(leap_s);
         judged.places = Some(measured);
     }
     let summary = ForeignSummary::new(&judged);

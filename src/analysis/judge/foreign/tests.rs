@@ -318,6 +318,9 @@ fn positions_in_gps_time_are_named_by_their_leap_seconds() {
     let found = findings(nmea_from(4.0 + leap_s, leap_s));
     assert!(found.contains("GPS time in place of NMEA's UTC") && found.contains("15 s earlier"), "{found}");
     assert!(!findings(nmea(0.0)).contains("UTC"), "labels that are right");
+    // From 16 s to 60 s: the last is 0.1 s past the truth's end, and all would join 15 s earlier.
+    let to_the_end: Vec<String> = nmea_from(16.0, 0.0).split_inclusive('\n').take(45).map(str::to_owned).collect();
+    assert!(!findings(to_the_end.concat()).contains("UTC"), "one label past the end");
 }
 
 /// The rows of a verdict that fail.
