@@ -6,7 +6,7 @@
 //! component's turn counts as any other.
 
 pub use crate::gnss::facts::Edge;
-use crate::gnss::signal::{Component, Shape, Signal, sinc_squared};
+use crate::gnss::signal::{Component, Layers, Shape, Signal, sinc_squared};
 
 /// The components of a signal that a receiver correlates: all of them, by their shares of power.
 #[derive(Clone, Debug)]
@@ -27,10 +27,15 @@ pub fn leading(signal: &Signal) -> Option<&'static Component> {
 }
 
 impl Waveform {
-    /// Of a signal; `None` of one without components.
+    /// Of a whole signal; `None` of one without components.
     pub fn of(signal: &Signal) -> Option<Self> {
+        Self::sent(signal, Layers::Whole)
+    }
+
+    /// Of what is sent of a signal: its power is less than one where layers are left out.
+    pub fn sent(signal: &Signal, layers: Layers) -> Option<Self> {
         let chip_rate_hz = leading(signal)?.chip_rate_hz;
-        let part = |component: &Component| (component.power_share, component.shape());
+        let part = |component: &Component| (component.power_share, component.shape_of(layers));
         Some(Self { parts: signal.components.iter().map(part).collect(), chip_rate_hz })
     }
 
@@ -51,7 +56,7 @@ impl Waveform {
         (step_s, shapes().map(Shape::chip_s).fold(0.0, f64::max))
     }
 
-    /// Correlation with itself `delay_s` later, 1 at no delay.
+    /// Correlation with itself `delay_s` later; at no delay the power, 1 of a whole signal.
     pub fn correlation(&self, delay_s: f64) -> f64 {
         self.parts.iter().map(|(share, shape)| share * shape.correlation(delay_s)).sum()
     }
@@ -85,7 +90,7 @@ impl Waveform {
         (1..40).map(|k| f64::from(k) * 0.5 * self.chip_rate_hz).find(null)
     }
 
-    /// Power density at `hz` from the carrier, per hertz, for unit power.
+    /// Power density at `hz` from the carrier, per hertz, for unit power of the whole signal.
     pub fn density(&self, hz: f64) -> f64 {
         self.parts.iter().map(|(share, shape)| share * shape.density(hz)).sum()
     }
@@ -120,6 +125,12 @@ impl Waveform {
         step_hz * (-HALF..HALF).map(at).sum::<f64>()
     }
 
+    /// What is left of a whole signal's power in samples that have it with some of its layers alone.
+    pub fn kept(signal: &Signal, layers: Layers, edge: Edge, rate_hz: f64) -> f64 {
+        let [sent, whole] = [layers, Layers::Whole].map(|layers| Self::sent(signal, layers));
+        sent.zip(whole).map_or(0.0, |(sent, whole)| sent.power(edge, rate_hz) / whole.power(edge, rate_hz))
+    }
+
     /// κ of another signal against this one: what its power adds to the noise density, over that power, in
     /// seconds. `apart_hz` is by how much the other's carrier is higher.
     ///
@@ -146,6 +157,7 @@ impl Waveform {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::galileo::e1::E1;
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE, SYNTHETIC};
 
@@ -249,6 +261,32 @@ mod tests {
             assert_eq!(null, 2.0, "{signal}");
             assert!((reach - minimum).abs() < 1e-12, "{signal}: {reach}");
         }
+    }
+
+    #[test]
+    fn a_signal_sent_without_its_weak_layers_lacks_their_power_and_their_spectrum() {
+        let alone = Waveform::sent(&E1, Layers::Strongest).unwrap();
+        assert!((alone.correlation(0.0) - 10.0 / 11.0).abs() < 1e-12);
+        // Sine-phased BOC(m, 1) as printed (Betz 2001, eq. 12).
+        let chip_s = 1.0 / 1.023e6;
+        let printed = |hz: f64, m: f64| {
+            let whole_rad = std::f64::consts::PI * hz * chip_s;
+            let wave = libm::tan(0.5 * whole_rad / m) * libm::sin(whole_rad) / (std::f64::consts::PI * hz);
+            wave * wave / chip_s
+        };
+        for hz in [0.31e6, 1.1e6, 2.9e6, 6.1e6] {
+            assert!((alone.density(hz) / (10.0 / 11.0 * printed(hz, 1.0)) - 1.0).abs() < 1e-9, "{hz}");
+        }
+        let kept = |layers, edge, rate_hz| Waveform::kept(&E1, layers, edge, rate_hz);
+        for edge in [Edge::Nearest, Edge::Area, Edge::BandLimited] {
+            assert_eq!(kept(Layers::Whole, edge, 6.5e6), 1.0);
+        }
+        assert!((kept(Layers::Strongest, Edge::Nearest, 6.5e6) - 10.0 / 11.0).abs() < 1e-3);
+        // Midpoints every kilohertz to half the rate.
+        let within = |m: f64| (0..3250).map(|k| 2e3 * printed(1e3 * (f64::from(k) + 0.5), m)).sum::<f64>();
+        let [strong, weak] = [10.0 * within(1.0), within(6.0)];
+        let found = kept(Layers::Strongest, Edge::BandLimited, 6.5e6);
+        assert!((found - strong / (strong + weak)).abs() < 1e-4, "{found}: {strong}, {weak}");
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::facts::Edge;
+use crate::gnss::signal::{Component, Layers, Signal};
 
 /// Rate of the code that the figures were measured with.
 const CHIP_HZ: f64 = 1.023e6;
@@ -48,6 +49,8 @@ pub struct Fidelity {
     pub grade: Grade,
     /// How code edges fall between samples.
     pub code_edge: CodeEdge,
+    /// What of waveforms of several layers is sent. Every level sends all of them.
+    pub waveform: Layers,
     /// Of the carrier and the code's place, sample by sample.
     pub carrier: Arithmetic,
     /// Of the thermal noise's radius and angle; the random words are the same.
@@ -112,6 +115,7 @@ impl Fidelity {
             Grade::Fast => Self {
                 grade,
                 code_edge: CodeEdge::Nearest,
+                waveform: Layers::Whole,
                 carrier: Arithmetic::F32,
                 noise: Arithmetic::F32,
                 knot_tolerance_cycles: 4e-4,
@@ -121,6 +125,7 @@ impl Fidelity {
             Grade::Balanced => Self {
                 grade,
                 code_edge: CodeEdge::Area,
+                waveform: Layers::Whole,
                 carrier: Arithmetic::F32,
                 noise: Arithmetic::F32,
                 knot_tolerance_cycles: 1e-4,
@@ -130,6 +135,7 @@ impl Fidelity {
             Grade::Reference => Self {
                 grade,
                 code_edge: CodeEdge::BandLimited,
+                waveform: Layers::Whole,
                 carrier: Arithmetic::F64,
                 noise: Arithmetic::F64,
                 knot_tolerance_cycles: 1e-6,
@@ -303,8 +309,8 @@ pub struct Choice {
 }
 
 /// What was chosen for each knob at a sample rate, the error to expect of it and its cost; of the noise's
-/// arithmetic where there is `noise`.
-pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool) -> Vec<Choice> {
+/// arithmetic where there is `noise`, and of the waveform where one of the `signals` has several layers.
+pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal]) -> Vec<Choice> {
     let level = Fidelity::suited(chosen.grade, rate_hz, chosen.allowed_m);
     let f32_carrier = Fidelity { carrier: Arithmetic::F32, ..chosen };
     let edge_ns = f32_carrier.satellite_sample_ns(rate_hz);
@@ -341,6 +347,7 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool) -> Vec<Choice> {
             cost: "none per sample".to_owned(),
         },
     ];
+    found.extend(layers_choice(chosen, level, signals));
     if noise {
         let (error, ns) = match chosen.noise {
             Arithmetic::F32 => ("3e-7 of its size", 1.3),
@@ -355,6 +362,30 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool) -> Vec<Choice> {
         });
     }
     found
+}
+
+/// Of a component with several layers, the power that is left out and how many fewer sequences are made.
+fn layers_choice(chosen: Fidelity, level: Fidelity, signals: &[&Signal]) -> Option<Choice> {
+    let components = || signals.iter().flat_map(|signal| signal.components).filter(|one| one.layers.len() > 1);
+    let missing_db = |component: &Component| {
+        let power = |layers| component.shape_of(layers).correlation(0.0);
+        10.0 * libm::log10(power(Layers::Whole) / power(chosen.waveform))
+    };
+    let most_db = components().map(missing_db).reduce(f64::max)?;
+    let count = |layers| components().map(|component| component.made_with(layers).len()).sum::<usize>();
+    Some(Choice {
+        knob: "waveform",
+        value: chosen.waveform.name().to_owned(),
+        own: chosen.waveform != level.waveform,
+        error: match chosen.waveform {
+            Layers::Whole => "none: every layer is sent".to_owned(),
+            Layers::Strongest => format!(
+                "{most_db:.2} dB less power for a replica of the whole waveform, and only the strongest layer's slope; \
+                 nothing for a replica of that layer"
+            ),
+        },
+        cost: format!("{} of {} layers", count(chosen.waveform), count(Layers::Whole)),
+    })
 }
 
 #[cfg(test)]

@@ -135,7 +135,7 @@ impl Plan {
             levels,
             level: scene.fidelity.grade.name(),
             satellite_sample_ns: scene.fidelity.satellite_sample_ns(scene.clock.rate.hz()),
-            knobs: fidelity::choices(scene.fidelity, scene.clock.rate.hz(), scene.noise),
+            knobs: fidelity::choices(scene.fidelity, scene.clock.rate.hz(), scene.noise, &scene.signals),
             sampling: sampling(scene),
             samples: scene.samples,
             bytes,

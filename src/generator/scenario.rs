@@ -57,7 +57,7 @@ use crate::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::generator::vehicle::attitude::Attitude;
 use crate::gnss::facts::Expect;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::{Layers, Signal};
 use crate::gnss::time::{Epoch, Rate};
 
 /// What an absent table comes to; a test holds these against the declared defaults.
@@ -451,6 +451,7 @@ fn fidelity_of(table: Option<&Table<'_>>, rate: Rate, allowed_m: f64) -> Result<
     Ok(Fidelity {
         grade: level.grade,
         code_edge: table.choice("code_edge", &CodeEdge::NAMES)?.unwrap_or(level.code_edge),
+        waveform: table.choice("waveform", &Layers::NAMES)?.unwrap_or(level.waveform),
         carrier: table.choice("carrier", &Arithmetic::NAMES)?.unwrap_or(level.carrier),
         noise: table.choice("noise", &Arithmetic::NAMES)?.unwrap_or(level.noise),
         knot_tolerance_cycles: table.number("knot_tolerance_cycles")?.unwrap_or(level.knot_tolerance_cycles),

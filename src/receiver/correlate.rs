@@ -14,7 +14,7 @@ use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::{Component, Shape};
+use crate::gnss::signal::{Component, Layers, Shape};
 
 mod carrier;
 mod kernel;
@@ -24,7 +24,7 @@ mod single;
 pub mod wave;
 
 use pattern::Pattern;
-pub use wave::{Wave, Waveform, fits};
+pub use wave::{Wave, fits, layers_refusal};
 
 /// How a replica's chips meet the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -102,9 +102,9 @@ impl Replica {
 
     /// A replica of a satellite's component in that waveform; `None` where the documents assign it no code,
     /// or the code is too long.
-    pub fn made(component: &Component, number: u8, waveform: Waveform, edge: Edge) -> Option<Self> {
+    pub fn made(component: &Component, number: u8, waveform: Layers, edge: Edge) -> Option<Self> {
         let wave = Wave::new(component, number)?;
-        if waveform == Waveform::Strongest {
+        if waveform == Layers::Strongest {
             return Self::of(wave, edge);
         }
         let patterns = component.layers.iter().map(|layer| {
@@ -413,7 +413,7 @@ mod tests {
     fn a_replica_of_the_whole_waveform_has_every_layer_with_its_weight_to_the_end_of_the_period() {
         let pilot = &E1.components[1];
         let chips = (pilot.code)(11).unwrap();
-        let replica = Replica::made(pilot, 11, Waveform::Whole, Edge::Nearest).unwrap();
+        let replica = Replica::made(pilot, 11, Layers::Whole, Edge::Nearest).unwrap();
         let step = chips_to_units(1.023 / 13.0);
         for chip in [0, 1, 2000, 3000, 4091] {
             for sixth in 0..12 {
@@ -435,14 +435,17 @@ mod tests {
             code_step: step as u64,
         };
         for edge in [Edge::Area, Edge::Nearest] {
-            let replica = Replica::made(pilot, 11, Waveform::Whole, edge).unwrap();
+            let replica = Replica::made(pilot, 11, Layers::Whole, edge).unwrap();
             let (fast, slow) = (replica.correlate(&i, &q, &nco, &taps), replica.slow(&i, &q, &nco, &taps));
             // 2000 terms of size 0.7, each 6e-8 off, in lanes of 128.
             assert!(fast.iter().zip(&slow).all(|(a, b)| (a - b).norm() < 1e-3), "{edge:?}: {fast:?} {slow:?}");
         }
-        assert!(Waveform::Whole.refusal(&E1, 12.2e6).unwrap().contains("12.276 Msps"));
-        assert_eq!((Waveform::Whole.refusal(&E1, 12.3e6), Waveform::Strongest.refusal(&E1, 2e6)), (None, None));
-        assert_eq!(Waveform::Whole.refusal(&L1_CA, 2e6), None);
+        assert!(layers_refusal(Layers::Whole, &E1, 12.2e6).unwrap().contains("12.276 Msps"));
+        for (made, signal, rate_hz) in
+            [(Layers::Whole, &E1, 12.3e6), (Layers::Strongest, &E1, 2e6), (Layers::Whole, &L1_CA, 2e6)]
+        {
+            assert_eq!(layers_refusal(made, signal, rate_hz), None);
+        }
     }
 
     #[test]

@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 
-use crate::gnss::signal::{Layer, Signal};
-use crate::receiver::correlate::Waveform;
+use crate::gnss::signal::{Layer, Layers, Signal};
 use crate::receiver::lead::lead;
 use crate::receiver::settings::Settings;
 
@@ -32,8 +31,8 @@ impl Followed {
         let leading = lead(signal)?;
         let place = |made: &Layer| leading.layers.iter().position(|layer| std::ptr::eq(layer, made));
         let layer = match settings.tracking.waveform {
-            Waveform::Strongest => Some(place(leading.strongest()?)?),
-            Waveform::Whole => None,
+            Layers::Strongest => Some(place(leading.strongest()?)?),
+            Layers::Whole => None,
         };
         let fitted = settings.tracking.fitted(leading);
         Some(Self {

@@ -1,7 +1,7 @@
 //! The component of a signal that a receiver searches and follows.
 
-use crate::gnss::signal::{Component, Shape, Signal};
-use crate::receiver::correlate::{Waveform, fits};
+use crate::gnss::signal::{Component, Layers, Shape, Signal};
+use crate::receiver::correlate::fits;
 
 /// The strongest component whose code is short enough to be made; of equally strong ones a pilot.
 ///
@@ -28,11 +28,11 @@ pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'st
 }
 
 /// Correlation of a component with the replica that is made of it, and of the replica with itself.
-pub fn shapes(component: &Component, made: Waveform) -> Option<[Shape; 2]> {
+pub fn shapes(component: &Component, made: Layers) -> Option<[Shape; 2]> {
     let strongest = component.strongest()?;
     Some(match made {
-        Waveform::Strongest => component.shapes_by(strongest),
-        Waveform::Whole => [component.shape(), component.shape()],
+        Layers::Strongest => component.shapes_by(Layers::Whole, strongest),
+        Layers::Whole => [component.shape(), component.shape()],
     })
 }
 
@@ -44,7 +44,7 @@ pub fn efficiency(signal: &Shape, own: &Shape) -> f64 {
 
 /// C/N0 of what the receiver follows of a signal over that of the whole signal, in decibels: the component's
 /// share of the power, less what its replica does not have.
-pub fn followed_db(component: &Component, made: Waveform) -> f64 {
+pub fn followed_db(component: &Component, made: Layers) -> f64 {
     let efficiency = shapes(component, made).map_or(1.0, |[signal, own]| efficiency(&signal, &own));
     10.0 * libm::log10(component.power_share * efficiency)
 }

@@ -6,8 +6,7 @@
 
 use crate::analysis::expect::theory::dll::{BandIntegrals, Discriminator, Taps, raw_on_chips};
 use crate::analysis::waveform::Waveform;
-use crate::gnss::signal::{Component, sinc_squared};
-use crate::receiver::correlate;
+use crate::gnss::signal::{Component, Layers, sinc_squared};
 use crate::receiver::lead::shapes;
 use crate::receiver::track::loops::CodeShape;
 
@@ -47,10 +46,10 @@ const INTERVALS: f64 = 96.0;
 
 impl Correlation {
     /// Of a component with the replica that this receiver makes of it, without a front end.
-    pub fn of_component(component: &Component, made: correlate::Waveform) -> Self {
+    pub fn of_component(component: &Component, made: Layers) -> Self {
         let rate_hz = component.chip_rate_hz;
         match shapes(component, made) {
-            Some([found, own]) if component.layers.len() > 1 && made == correlate::Waveform::Strongest => {
+            Some([found, own]) if component.layers.len() > 1 && made == Layers::Strongest => {
                 Self::Replica { found: Waveform::of_shape(found, rate_hz), own: Waveform::of_shape(own, rate_hz) }
             }
             _ => Self::of(Waveform::of_shape(component.shape(), rate_hz), None),

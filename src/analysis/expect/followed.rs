@@ -23,7 +23,7 @@ struct Entry {
 /// What a receiver follows of a signal.
 #[derive(Clone, Debug)]
 pub(in crate::analysis) struct Followed {
-    /// Of what is sent with the replica, of the replica with itself, and of what is sent with itself.
+    /// Of what is sent with the replica, of the replica with itself, and of the whole waveform with itself.
     pub waveforms: [Waveform; 3],
     /// Power of the component over the whole signal's.
     pub share: f64,
@@ -48,8 +48,10 @@ impl Followed {
             None => leading(signal)?,
         };
         let [found, own] = match &entry {
-            Some(Entry { layer: Some(layer), .. }) => component.shapes_by(component.layers.get(*layer)?),
-            _ => [component.shape(), component.shape()],
+            Some(Entry { layer: Some(layer), .. }) => {
+                component.shapes_by(run.scene.waveform, component.layers.get(*layer)?)
+            }
+            _ => [component.shape_of(run.scene.waveform), component.shape()],
         };
         let rate_hz = component.chip_rate_hz;
         Some(Self {
@@ -67,11 +69,12 @@ impl Followed {
 mod tests {
     use crate::gnss::galileo::e1::E1;
     use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::Layers;
 
     #[test]
     fn a_pilot_s_boc_finds_half_the_power_less_a_tenth_and_a_bit_for_a_wide_slope() {
         let pilot = &E1.components[1];
-        let [found, own] = pilot.shapes_by(&pilot.layers[0]);
+        let [found, own] = pilot.shapes_by(Layers::Whole, &pilot.layers[0]);
         let chip_s = 1.0 / pilot.chip_rate_hz;
         // BOC(1,1) with itself is 1 − 3τ, and BOC(6,1) beside it has no part in phase at no delay.
         assert!((own.correlation(0.1 * chip_s) - 0.7).abs() < 1e-12 && (own.correlation(0.0) - 1.0).abs() < 1e-12);
@@ -84,7 +87,7 @@ mod tests {
     #[test]
     fn a_code_of_one_layer_is_what_it_was() {
         let component = &L1_CA.components[0];
-        let [found, own] = component.shapes_by(&component.layers[0]);
+        let [found, own] = component.shapes_by(Layers::Whole, &component.layers[0]);
         for k in 0..=20 {
             let delay_s = 0.05 * f64::from(k) / component.chip_rate_hz;
             let triangle = 1.0 - 0.05 * f64::from(k);

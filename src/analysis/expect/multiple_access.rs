@@ -29,8 +29,10 @@ impl<'r> MultipleAccess<'r> {
     /// From the truth of a run.
     pub fn new(run: &'r Run) -> Self {
         let emissions = Emission::all(run.truth.keys());
-        let waveforms: HashMap<&Signal, Waveform> =
-            emissions.iter().filter_map(|one| Some((one.signal, Waveform::of(one.signal)?))).collect();
+        let waveforms: HashMap<&Signal, Waveform> = emissions
+            .iter()
+            .filter_map(|one| Some((one.signal, Waveform::sent(one.signal, run.scene.waveform)?)))
+            .collect();
         Self { run, kappa_s: separations(run, &emissions, &waveforms), jammed: jammed(run, &emissions, &waveforms) }
     }
 
@@ -62,6 +64,8 @@ fn separations(
     waveforms: &HashMap<&Signal, Waveform>,
 ) -> HashMap<Emission, Vec<(Emission, f64)>> {
     let (edge, rate_hz) = (run.scene.code_edge, run.scene.sample_rate_hz);
+    let kept: HashMap<&Signal, f64> =
+        waveforms.keys().map(|signal| (*signal, Waveform::kept(signal, run.scene.waveform, edge, rate_hz))).collect();
     // Spectra are even: κ depends on the size of the distance, and on the pair in either order.
     let mut known: HashMap<(&str, &str, u64), f64> = HashMap::new();
     let mut all: HashMap<Emission, Vec<(Emission, f64)>> = HashMap::new();
@@ -75,7 +79,8 @@ fn separations(
             let [a, b] = [own.signal.name, other.signal.name];
             let key = (a.min(b), a.max(b), apart_hz.to_bits());
             let kappa_s = *known.entry(key).or_insert_with(|| one.separation_s(two, apart_hz, edge, rate_hz));
-            all.entry(*own).or_default().push((*other, kappa_s));
+            let kept = kept.get(other.signal).copied().unwrap_or(1.0);
+            all.entry(*own).or_default().push((*other, kept * kappa_s));
         }
     }
     all

@@ -88,14 +88,14 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
     let sign = if run.scene.inverted { -1.0 } else { 1.0 };
     let bin_hz = run.psd.get(1).zip(run.psd.first()).map_or(1.0, |(b, a)| b.frequency_hz - a.frequency_hz);
     let if_hz = signals.first().map_or(0.0, |signal| sign * (signal.nominal_hz - center_hz));
-    // Samples have the whole power of a signal, whatever of its spectrum the sampler meets.
+    // Samples of a whole signal have its whole power, whatever of its spectrum the sampler meets.
     let edge = run.scene.code_edge;
-    let with_power = |waveform: Waveform| {
-        let power = waveform.power(edge, rate_hz);
-        (waveform, power)
+    let with_power = |signal: &Signal| {
+        let power = Waveform::of(signal)?.power(edge, rate_hz);
+        Some((Waveform::sent(signal, run.scene.waveform)?, power))
     };
     let known: BTreeMap<&Signal, (Waveform, f64)> =
-        run.signals.iter().filter_map(|&signal| Some((signal, with_power(Waveform::of(signal)?)))).collect();
+        run.signals.iter().filter_map(|&signal| Some((signal, with_power(signal)?))).collect();
     let waveforms: Vec<(&MeanSignal, &(Waveform, f64))> =
         signals.iter().filter_map(|signal| Some((signal, known.get(signal.signal)?))).collect();
     let mut density: Vec<f64> = run
@@ -209,7 +209,7 @@ pub fn costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
 /// What a filter about the first signal's carrier leaves of a code's power over noise:
 /// (∫S|H| df)²/(∫S|H|² df · ∫S df).
 fn passed(filter: &FilterSpec, run: &Run, signal: &Signal) -> f64 {
-    let Some(code) = Waveform::of(signal) else { return 1.0 };
+    let Some(code) = Waveform::sent(signal, run.scene.waveform) else { return 1.0 };
     let rate_hz = run.scene.sample_rate_hz;
     let off_hz = run.expected.first().map_or(0.0, |first| signal.centre_hz() - first.nominal_hz);
     let (mut all, mut amplitude, mut power) = (0.0, 0.0, 0.0);
@@ -229,7 +229,7 @@ fn nulls(run: &Run, theory_db: &[f64]) -> Result<[Null; 2], &'static str> {
     if emissions.next().is_some() {
         return Err("filled: several signals or carriers share the spectrum");
     }
-    let waveform = Waveform::of(emission.signal).ok_or("the signal has no code")?;
+    let waveform = Waveform::sent(emission.signal, run.scene.waveform).ok_or("the signal has no code")?;
     let (chip_rate_hz, null_hz) = (waveform.chip_rate_hz(), waveform.null_hz().ok_or("the code has none")?);
     let center_hz = run.scene.center_hz.ok_or("the samples' frequency is unknown")?;
     let sign = if run.scene.inverted { -1.0 } else { 1.0 };

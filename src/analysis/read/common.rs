@@ -54,7 +54,7 @@ impl Common {
             *self.satellites.entry(link.signal).or_default() += 1;
         }
         let delay_s = |signal: &&'static Signal| {
-            let code = Waveform::of(signal)?;
+            let code = Waveform::sent(signal, scene.waveform)?;
             let (stages, rate_hz) = scene.stages(received(signal));
             let of = |filter: &FilterSpec| delay::code_delay_s(filter, &code, rate_hz, spacing_chips);
             Some((*signal, filters(stages).map(of).sum()))

@@ -60,7 +60,7 @@ const REST: &str = "[navigation]\nfile = \"brdc.10n\"\ngalileo_ahead_ns = 3\n[sa
     [filter]\nkind = \"butterworth\"\norder = 4\nbandwidth_hz = 1.8e6\n[iq]\ndc_i_lsb = 0.5\n\
     [adc]\nbits = 2\nstep_sigma = 1\nagc_window_s = 0.001\n\
     [fidelity]\nlevel = \"balanced\"\ncarrier = \"f64\"\nnoise = \"f32\"\ncode_edge = \"nearest\"\n\
-    knot_tolerance_cycles = 1e-3\n[truth]\ninterval_s = 0.5\n\
+    waveform = \"strongest\"\nknot_tolerance_cycles = 1e-3\n[truth]\ninterval_s = 0.5\n\
     [expect]\nfix = \"none\"\nlosses = \"any\"\nsatellites = [\"G02\"]\nerrors = \"any\"\nreason = \"why\"\n\
     [receiver.tracking]\nwhatever = 1\n";
 const ECHOES: &str = "[[multipath]]\nkind = \"given\"\namplitude = 0.5\nphase_deg = 90\nsatellites = [\"G13\"]\n\
@@ -133,11 +133,9 @@ fn every_value_arrives_where_it_belongs_in_si_units() {
     let clock = ClockSpec { bias_s: 1e-4, drift: 1e-7, ageing_per_s: 1e-9 / 86_400.0, per_g: 1e-9, noise: Some(tcxo) };
     assert_eq!(scenario.receiver_clock, clock);
     assert!(scenario.scintillation.is_some_and(|s| s.s4 == 0.5 && s.satellites == Some(vec![Sv::gps(2)])));
-    assert!(
-        scenario.noise
-            && scenario.front_ends[0].fidelity.code_edge == CodeEdge::Nearest
-            && scenario.truth_interval_s == 0.5
-    );
+    let fidelity = scenario.front_ends[0].fidelity;
+    assert_eq!((fidelity.code_edge, fidelity.waveform), (CodeEdge::Nearest, Layers::Strongest));
+    assert!(scenario.noise && scenario.truth_interval_s == 0.5);
     assert!(scenario.receiver.unwrap().contains_key("tracking"));
 }
 
@@ -261,6 +259,8 @@ fn a_level_sets_every_knob_and_a_knob_overrides_its_level() {
     let every = fidelity("level = \"fast\"\ncode_edge = \"band_limited\"\ncarrier = \"f64\"\nnoise = \"f64\"");
     let expected = Fidelity { grade: Grade::Fast, knot_tolerance_cycles: 4e-4, ..Fidelity::of(Grade::Reference) };
     assert_eq!(every, expected);
+    let alone = Fidelity { waveform: Layers::Strongest, ..Fidelity::of(Grade::Balanced) };
+    assert_eq!(fidelity("waveform = \"strongest\""), alone);
     for (key, value, hint) in [
         ("level", "\"refrence\"", "did you mean reference?"),
         ("level", "3", "fast, balanced, reference"),

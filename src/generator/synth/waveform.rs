@@ -15,7 +15,7 @@ use thiserror::Error;
 use super::Edge;
 use super::chips::{MAX_STEP, Pace, Spreading, packed, window};
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Layer, Link, Signal};
+use crate::gnss::signal::{Component, Layer, Layers, Link, Signal};
 
 /// A sequence with its part in the component.
 #[derive(Clone, Debug)]
@@ -123,13 +123,15 @@ impl Waveform {
         WaveformError::Code { signal, component, sv, what, found, expected: expected.to_owned() }
     }
 
-    /// Its sequences for samples at `rate_hz`, for a mean power of one behind `edge`.
+    /// The sequences of some of its layers for samples at `rate_hz`, as they are in the whole waveform when
+    /// that has a mean power of one behind `edge`.
     ///
     /// # Errors
     /// [`WaveformError`] for more than 15 steps a sample, and for a code whose periods cannot be counted.
-    pub fn voices(&self, edge: Edge<'_>, rate_hz: f64) -> Result<Vec<Voice>, WaveformError> {
+    pub fn voices(&self, layers: Layers, edge: Edge<'_>, rate_hz: f64) -> Result<Vec<Voice>, WaveformError> {
+        let layers = self.component.made_with(layers);
         let steps_hz = |layer: &Layer| self.component.chip_rate_hz * layer.pulse.len() as f64;
-        for (number, steps_hz) in (1..).zip(self.component.layers.iter().map(steps_hz)) {
+        for (number, steps_hz) in (1..).zip(layers.iter().map(steps_hz)) {
             if steps_hz > MAX_STEP * rate_hz {
                 let (signal, component, least_hz) = (self.link.signal.name, self.index + 1, steps_hz / MAX_STEP);
                 return Err(WaveformError::Rate { signal, component, layer: number, steps_hz, rate_hz, least_hz });
@@ -137,7 +139,7 @@ impl Waveform {
         }
         let gain = 1.0 / self.power(edge, rate_hz).sqrt();
         let mut voices = Vec::new();
-        for layer in self.component.layers {
+        for layer in layers {
             let steps_hz = steps_hz(layer);
             let steps = self.steps(layer, layer.pulse.len());
             let pace = Pace::new(steps.len(), steps_hz, self.link.signal.time.behind_gpst_s).ok_or_else(|| {
@@ -201,7 +203,7 @@ impl Waveform {
 pub fn plain(signal: &'static Signal, number: u8) -> Option<Spreading> {
     let [_] = signal.components else { return None };
     let waveform = Waveform::new(signal.link(Sv { system: signal.system, number }), 0).ok().flatten()?;
-    let mut voices = waveform.voices(Edge::Nearest, f64::INFINITY).ok()?;
+    let mut voices = waveform.voices(Layers::Whole, Edge::Nearest, f64::INFINITY).ok()?;
     voices.pop().filter(|_| voices.is_empty()).map(|voice| voice.spreading)
 }
 

@@ -20,11 +20,12 @@ use crate::generator::synth::waveform::{Voice, Waveform, WaveformError};
 use crate::generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run, reference};
 use crate::generator::truth;
 use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::galileo::e1::E1;
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::rinex;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE, SYNTHETIC};
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Shape, Signal};
+use crate::gnss::signal::{Carrier, Component, Layer, Layers, Overlay, Shape, Signal};
 use crate::gnss::time::{Epoch, TimeScale};
 
 /// Week 1590, whose beginning is that of every code and overlay.
@@ -157,7 +158,7 @@ impl Definition {
 
 /// A waveform's sequences behind an edge, and the gain that they have there.
 fn voices(waveform: &Waveform, edge: Edge<'_>, rate_hz: f64) -> (Vec<Voice>, f64) {
-    (waveform.voices(edge, rate_hz).unwrap(), 1.0 / waveform.power(edge, rate_hz).sqrt())
+    (waveform.voices(Layers::Whole, edge, rate_hz).unwrap(), 1.0 / waveform.power(edge, rate_hz).sqrt())
 }
 
 /// The sequences' sum at `samples` instants `1 / rate_hz` apart from `start` on, without gain.
@@ -226,9 +227,30 @@ fn every_component_is_its_definition_with_every_edge() {
     }
 }
 
+#[test]
+fn the_strongest_layer_alone_is_sent_as_it_is_in_the_whole() {
+    // Galileo OS SIS ICD 2.1, 2.3.3: √(10/11) of BOC(1,1), and √(1/11) of BOC(6,1) beside it.
+    let [strong, weak] = [10.0_f64, 1.0].map(|power| (power / 11.0).sqrt());
+    let (sv, start) = (Sv { system: E1.system, number: 11 }, Epoch::new(WEEK + 1000, 0.123_456));
+    for index in 0..E1.components.len() {
+        let waveform = Waveform::new(E1.link(sv), index).unwrap().unwrap();
+        for rate_hz in [6.5e6, 26.123e6] {
+            let gain = 1.0 / waveform.power(Edge::Nearest, rate_hz).sqrt();
+            let [whole, alone] = [Layers::Whole, Layers::Strongest].map(|layers| {
+                let voices = waveform.voices(layers, Edge::Nearest, rate_hz).unwrap();
+                rendered(&(voices, gain), Edge::Nearest, start, rate_hz, 3000)
+            });
+            for (whole, alone) in whole.into_iter().zip(alone) {
+                assert!((alone.norm() - strong).abs() < 1e-12, "{index}: {alone}");
+                assert!(((whole - alone).norm() - weak).abs() < 1e-12, "{index}: {whole} and {alone}");
+            }
+        }
+    }
+}
+
 /// Samples of a component as kernels make them, with its gain, in runs that begin `apart_s` apart.
 fn stretches(waveform: &Waveform, kernel: Kernel<'_>, rate_hz: f64, count: u32, apart_s: f64) -> Vec<Vec<Complex64>> {
-    let voices = waveform.voices(kernel.edge, rate_hz).unwrap();
+    let voices = waveform.voices(Layers::Whole, kernel.edge, rate_hz).unwrap();
     let mut bank = Bank::default();
     let stretch = |k: u32| {
         let at = Epoch::new(WEEK + 1000, 0.0).plus_s(f64::from(k) * apart_s);
@@ -372,7 +394,7 @@ fn composites_have_the_envelope_that_their_components_give() {
 fn what_cannot_be_rendered_is_refused_by_name() {
     let sv = Sv { system: System::Qzss, number: 3 };
     let mixed = Waveform::new(MIXED.link(sv), 0).unwrap().unwrap();
-    let refused = mixed.voices(Edge::Area, 0.8e6).unwrap_err();
+    let refused = mixed.voices(Layers::Whole, Edge::Area, 0.8e6).unwrap_err();
     // Layer 2 of component 1 has 12.276e6 steps a second, a fifteenth of which is 818 400.
     assert_eq!(
         refused,
@@ -386,7 +408,7 @@ fn what_cannot_be_rendered_is_refused_by_name() {
         }
     );
     assert!(refused.to_string().contains("at least 818400 samples a second"), "{refused}");
-    assert!(mixed.voices(Edge::Area, 0.8184e6).is_ok());
+    assert!(mixed.voices(Layers::Whole, Edge::Area, 0.8184e6).is_ok());
     static SHORT: Signal = Signal {
         name: "short",
         components: &[Component { code: |_| Some(vec![1; 5]), code_chips: 6, ..TEMPLATE }],
@@ -407,7 +429,7 @@ fn what_cannot_be_rendered_is_refused_by_name() {
         message: None,
     };
     let error = |signal: &'static Signal| match Waveform::new(signal.link(Sv::gps(4)), 0) {
-        Ok(found) => found.unwrap().voices(Edge::Nearest, 3e6).unwrap_err().to_string(),
+        Ok(found) => found.unwrap().voices(Layers::Whole, Edge::Nearest, 3e6).unwrap_err().to_string(),
         Err(error) => error.to_string(),
     };
     assert_eq!(error(&SHORT), "short, component 1, code of G04: 5 chips: expected 6, not all zero");

@@ -142,7 +142,9 @@ impl Transmitter {
         let (mut sent, symbols) = (Vec::new(), Symbols::new(signal));
         for (index, component) in signal.components.iter().enumerate() {
             let Some(waveform) = Waveform::new(signal.link(sv), index)? else { return Ok(None) };
-            for Voice { spreading, amplitude, phase_cycles } in waveform.voices(edge, rate_hz)? {
+            for Voice { spreading, amplitude, phase_cycles } in
+                waveform.voices(scene.fidelity.waveform, edge, rate_hz)?
+            {
                 let cycles = component.phase_cycles + phase_cycles;
                 sent.push(Sent {
                     spreading,

@@ -173,6 +173,7 @@ impl Writer {
             format: scene.metadata.format.name().to_owned(),
             fidelity: scene.fidelity.grade.name().to_owned(),
             code_edge: scene.fidelity.code_edge.fact(),
+            waveform: scene.fidelity.waveform,
             carrier: scene.fidelity.carrier.name().to_owned(),
             knot_tolerance_cycles: scene.fidelity.knot_tolerance_cycles,
             mask_deg: Some(scene.mask_rad.to_degrees()),

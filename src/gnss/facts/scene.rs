@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Edge, Expect, Fault, Interference, StageSpec, TimeOffset};
+use crate::gnss::signal::Layers;
 
 /// The facts of a scene. What a file may lack has a default: a scene without it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -42,6 +43,9 @@ pub struct SceneFacts {
     /// How the edges of chips fall between samples.
     #[serde(default)]
     pub code_edge: Edge,
+    /// What of waveforms of several layers is sent.
+    #[serde(default, skip_serializing_if = "is_whole")]
+    pub waveform: Layers,
     /// Arithmetic of the carrier, by name.
     #[serde(default)]
     pub carrier: String,
@@ -178,6 +182,10 @@ impl FrontEndFacts {
         let offset_hz = super::oscillator_offset_hz(&self.front_end);
         if self.inverted { -offset_hz } else { offset_hz }
     }
+}
+
+fn is_whole(waveform: &Layers) -> bool {
+    *waveform == Layers::Whole
 }
 
 fn yes() -> bool {

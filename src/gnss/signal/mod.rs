@@ -10,6 +10,7 @@ use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::{PoisonError, RwLock};
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
@@ -139,6 +140,30 @@ pub struct Layer {
     pub pulse: &'static [i8],
     /// The chips that have the pulse, repeated from the beginning of each code period; empty for all chips.
     pub chips: &'static [bool],
+}
+
+/// Which layers of its components a signal is made with, by a transmitter or as a replica.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Layers {
+    /// All, with their weights and phases.
+    #[default]
+    Whole,
+    /// Of each component the one with the largest power, as it is in the whole.
+    Strongest,
+}
+
+impl Layers {
+    /// Both, by the words of files.
+    pub const NAMES: [(&'static str, Self); 2] = [("whole", Self::Whole), ("strongest", Self::Strongest)];
+
+    /// Its word in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Whole => "whole",
+            Self::Strongest => "strongest",
+        }
+    }
 }
 
 /// A code of one chip for each period of the spreading code, which it multiplies.
@@ -324,6 +349,14 @@ impl Component {
         self.layers.iter().fold(1, |steps, layer| least_common_multiple(steps, layer.pulse.len().max(1)))
     }
 
+    /// The layers that it is made with.
+    pub fn made_with(&self, layers: Layers) -> &[Layer] {
+        match layers {
+            Layers::Whole => self.layers,
+            Layers::Strongest => self.strongest().map_or(&[], std::slice::from_ref),
+        }
+    }
+
     /// The layer with the largest power over all chips; of equal ones the first.
     pub fn strongest(&self) -> Option<&Layer> {
         let power = |layer: &Layer| {
@@ -341,13 +374,19 @@ impl Component {
 
     /// Correlation and spectrum of the waveform.
     pub fn shape(&self) -> Shape {
-        Shape::of(self)
+        self.shape_of(Layers::Whole)
     }
 
-    /// Correlation of the waveform with a replica of one of its layers, which has that layer's phase and
-    /// sign, and of the replica, of unit weight, with itself.
-    pub fn shapes_by(&self, made: &Layer) -> [Shape; 2] {
-        let turned: Vec<Layer> = (self.layers.iter())
+    /// The same of some of its layers: their power over that of the whole is the correlation at no delay.
+    pub fn shape_of(&self, layers: Layers) -> Shape {
+        let sent = self.made_with(layers);
+        Shape::between(sent, sent, self.chip_rate_hz)
+    }
+
+    /// Correlation of the waveform, sent with `sent`, with a replica of one of its layers, which has that
+    /// layer's phase and sign, and of the replica, of unit weight, with itself.
+    pub fn shapes_by(&self, sent: Layers, made: &Layer) -> [Shape; 2] {
+        let turned: Vec<Layer> = (self.made_with(sent).iter())
             .map(|layer| Layer {
                 weight: made.weight.signum() * layer.weight,
                 phase_cycles: layer.phase_cycles - made.phase_cycles,

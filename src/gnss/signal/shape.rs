@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::{Component, Layer};
+use super::Layer;
 
 /// Correlation and spectrum of a waveform of unit power.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,11 +21,6 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Of a component's waveform where its code is not zero.
-    pub(super) fn of(component: &Component) -> Self {
-        Self::between(component.layers, component.layers, component.chip_rate_hz)
-    }
-
     /// Of a waveform of `sent` layers with one of `made` layers, where the code is not zero: the part in
     /// phase, and of delays of either sign the mean. [`Self::density`] is that of the cross spectrum then.
     pub fn between(sent: &[Layer], made: &[Layer], chip_rate_hz: f64) -> Self {
@@ -101,7 +96,7 @@ pub fn sinc_squared(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Overlay;
+    use super::super::{Component, Overlay};
     use super::*;
 
     const CHIP_S: f64 = 1.0 / 1.023e6;

@@ -48,8 +48,7 @@ use rayon::prelude::*;
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Link, Signal};
-use crate::receiver::correlate::Waveform;
+use crate::gnss::signal::{Component, Layers, Link, Signal};
 use crate::receiver::lead::{beside, followed_db, lead};
 use crate::receiver::source::Block;
 
@@ -418,7 +417,7 @@ impl Searcher {
             }
         }
         let rows = findings.iter().zip(codes);
-        let of = (signal, followed_db(component, Waveform::Strongest));
+        let of = (signal, followed_db(component, Layers::Strongest));
         rows.map(|(finding, (sv, _))| finding.report(of, *sv, window.first, code_chips)).collect()
     }
 

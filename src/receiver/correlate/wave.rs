@@ -4,35 +4,22 @@
 //! say otherwise: against the full waveform that costs 0.4 dB where BOC(6,1) has a tenth of the power, and
 //! spares steps six times as short, which take six times the samples, and a pass for each layer.
 
-use serde::{Deserialize, Serialize};
+use crate::gnss::signal::{Component, Layer, Layers, Signal};
 
-use crate::gnss::signal::{Component, Layer, Signal};
-
-/// What a replica has of a component's layers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Waveform {
-    /// The strongest one.
-    Strongest,
-    /// All, with their weights and phases.
-    Whole,
-}
-
-impl Waveform {
-    /// Why samples at `rate_hz` do not do for it, if they do not: area edges want a sample in each step.
-    pub fn refusal(self, signal: &Signal, rate_hz: f64) -> Option<String> {
-        let several = signal.components.iter().filter(|component| component.layers.len() > 1);
-        let steps_hz = several.map(|component| component.chip_rate_hz * component.steps_per_chip() as f64);
-        let need_hz = steps_hz.fold(0.0, f64::max);
-        (self == Self::Whole && rate_hz < need_hz).then(|| {
-            format!(
-                "tracking.waveform = \"whole\" takes a sample in each step of its pulses, {} Msps at least, and these \
-                 are {} Msps: write \"strongest\"",
-                1e-6 * need_hz,
-                1e-6 * rate_hz
-            )
-        })
-    }
+/// Why samples at `rate_hz` do not do for replicas of these layers, if they do not: area edges want a sample
+/// in each step.
+pub fn layers_refusal(made: Layers, signal: &Signal, rate_hz: f64) -> Option<String> {
+    let several = signal.components.iter().filter(|component| component.layers.len() > 1);
+    let steps_hz = several.map(|component| component.chip_rate_hz * component.steps_per_chip() as f64);
+    let need_hz = steps_hz.fold(0.0, f64::max);
+    (made == Layers::Whole && rate_hz < need_hz).then(|| {
+        format!(
+            "tracking.waveform = \"whole\" takes a sample in each step of its pulses, {} Msps at least, and these \
+             are {} Msps: write \"strongest\"",
+            1e-6 * need_hz,
+            1e-6 * rate_hz
+        )
+    })
 }
 
 /// One period of a replica: equal steps of −1, 0 and +1.

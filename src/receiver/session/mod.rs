@@ -8,6 +8,7 @@
 
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Component;
+use crate::receiver::correlate::layers_refusal;
 use crate::receiver::diagnosis::Stage;
 use crate::receiver::lead::{lead, refusal};
 use crate::receiver::outcome::{Conditioning, Outcome, ReceiveError};
@@ -62,7 +63,7 @@ impl Session {
         }
         for (metadata, signals) in metadata.iter().zip(&assigned) {
             for signal in signals {
-                if let Some(reason) = settings.tracking.waveform.refusal(signal, metadata.rate.hz()) {
+                if let Some(reason) = layers_refusal(settings.tracking.waveform, signal, metadata.rate.hz()) {
                     return Err(ReceiveError::Unsupported { signal: signal.name, reason });
                 }
             }

@@ -13,9 +13,9 @@ use crate::gnss::galileo::e1::E1;
 use crate::gnss::record::Event;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
-use crate::gnss::signal::{Component, Layer, Shape, Signal};
+use crate::gnss::signal::{Component, Layer, Layers, Shape, Signal};
 use crate::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
-use crate::receiver::correlate::{Waveform, correlation};
+use crate::receiver::correlate::correlation;
 use crate::receiver::lead::lead;
 
 fn is_long() -> bool {
@@ -211,8 +211,8 @@ impl Theory {
     /// Of the leading component of a signal of `cn0_dbhz`, followed with settings that are fitted to it.
     fn new(component: &Component, settings: &TrackingSettings, rate_hz: f64, cn0_dbhz: f64) -> Self {
         let made = match settings.waveform {
-            Waveform::Strongest => vec![Layer { weight: 1.0, ..*component.strongest().unwrap() }],
-            Waveform::Whole => component.layers.to_vec(),
+            Layers::Strongest => vec![Layer { weight: 1.0, ..*component.strongest().unwrap() }],
+            Layers::Whole => component.layers.to_vec(),
         };
         let chips_per_sample = component.chip_rate_hz / rate_hz;
         let at = |sent: &[Layer], chips: f64| {
@@ -339,7 +339,7 @@ fn settle_s(component: &Component) -> f64 {
 }
 
 /// A signal, the rate of its samples, and what replicas have of its layers.
-type Case = (&'static Signal, f64, Waveform);
+type Case = (&'static Signal, f64, Layers);
 
 /// What was measured on a signal, and what theory expects.
 struct Jitter {
@@ -382,13 +382,13 @@ fn jitter((signal, rate_hz, waveform): Case, channels: u64, duration_s: f64) -> 
 fn jitter_of_code_and_carrier_is_that_of_theory() {
     let (channels, duration_s) = if is_long() { (16, 10.0) } else { (1, 2.0) };
     let cases: [Case; 7] = [
-        (&LONG_BOC, 5.3e6, Waveform::Strongest),
-        (&QUADRATURE, 12.3e6, Waveform::Strongest),
-        (&CHANNELS, 2.6e6, Waveform::Strongest),
-        (&MULTIPLEXED, 2.6e6, Waveform::Strongest),
-        (&MIXED, 5.3e6, Waveform::Strongest),
-        (&E1, 6.5e6, Waveform::Strongest),
-        (&E1, 13.1e6, Waveform::Whole),
+        (&LONG_BOC, 5.3e6, Layers::Strongest),
+        (&QUADRATURE, 12.3e6, Layers::Strongest),
+        (&CHANNELS, 2.6e6, Layers::Strongest),
+        (&MULTIPLEXED, 2.6e6, Layers::Strongest),
+        (&MIXED, 5.3e6, Layers::Strongest),
+        (&E1, 6.5e6, Layers::Strongest),
+        (&E1, 13.1e6, Layers::Whole),
     ];
     let found: Vec<Jitter> = cases.into_par_iter().map(|case| jitter(case, channels, duration_s)).collect();
     for Jitter { signal, update_s, code_m, carrier_cycles, ratios, spreads } in &found {

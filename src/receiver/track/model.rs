@@ -2,8 +2,8 @@
 
 use super::TrackingSettings;
 use super::loops::CodeShape;
-use crate::gnss::signal::{Component, Shape};
-use crate::receiver::correlate::{Waveform, correlation};
+use crate::gnss::signal::{Component, Layers, Shape};
+use crate::receiver::correlate::correlation;
 use crate::receiver::lead::{efficiency, shapes};
 
 /// The correlation of a component with the replica that is made of it.
@@ -41,7 +41,7 @@ pub struct SidePeak {
 }
 
 /// The side peak nearest to the main one of a component's replica; `None` where there is none.
-pub fn side_peak(component: &Component, made: Waveform) -> Option<SidePeak> {
+pub fn side_peak(component: &Component, made: Layers) -> Option<SidePeak> {
     let [_, own] = shapes(component, made)?;
     let corners = (own.chip_s() / own.step_s()).round() as u32;
     let at = |corner: u32| own.correlation(f64::from(corner) * own.step_s());
@@ -71,13 +71,13 @@ mod tests {
         // of a chip: R = 1 at 0, −1/4 at 1/4, −1/2 at 1/2, 1/4 at 3/4.
         const COSINE: [Layer; 1] = [Layer { pulse: &[1, -1, -1, 1], ..Layer::BPSK }];
         let near = |layers: &'static [Layer], chips: f64, ratio: f64| {
-            let found = side_peak(&of(layers), Waveform::Strongest).unwrap();
+            let found = side_peak(&of(layers), Layers::Strongest).unwrap();
             assert!((found.chips - chips).abs() < 1e-12 && (found.ratio - ratio).abs() < 1e-12, "{found:?}");
         };
         near(&[Layer::BOC11], 0.5, -0.5);
         near(&[Layer::BOC61], 1.0 / 12.0, -11.0 / 12.0);
         near(&COSINE, 0.5, -0.5);
-        assert_eq!(side_peak(&L1_CA.components[0], Waveform::Strongest), None);
+        assert_eq!(side_peak(&L1_CA.components[0], Layers::Strongest), None);
     }
 
     #[test]
@@ -98,7 +98,7 @@ mod tests {
         let mixed = model(&MIXED.components[0], 0.2);
         near(mixed.shape, 0.7, 3.0, 0.4);
         assert!((mixed.power - 29.0 / 33.0).abs() < 2e-3 && (mixed.efficiency - 29.0 / 33.0).abs() < 1e-12);
-        assert!((followed_db(&L1_CA.components[0], Waveform::Strongest)).abs() < 1e-12);
-        assert!((followed_db(&LONG_BOC.components[1], Waveform::Strongest) + 10.0 * libm::log10(2.0)).abs() < 1e-12);
+        assert!((followed_db(&L1_CA.components[0], Layers::Strongest)).abs() < 1e-12);
+        assert!((followed_db(&LONG_BOC.components[1], Layers::Strongest) + 10.0 * libm::log10(2.0)).abs() < 1e-12);
     }
 }

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::gnss::signal::Component;
-use crate::receiver::correlate::{Arithmetic, Edge, Waveform};
+use crate::gnss::signal::{Component, Layers};
+use crate::receiver::correlate::{Arithmetic, Edge};
 use crate::receiver::described::described;
 
 /// How the code error is measured.
@@ -51,7 +51,7 @@ pub struct TrackingSettings {
     pub integration: u32,
     /// What the replica has of a waveform of several layers, such as CBOC: strongest for the strongest one,
     /// whole for all, from a sample in each step of the shortest pulse on.
-    pub waveform: Waveform,
+    pub waveform: Layers,
     /// How the replica's chips fall on the samples.
     pub replica: Edge,
     /// What correlations are computed in.
@@ -87,7 +87,7 @@ impl Default for TrackingSettings {
             dll_discriminator: CodeDiscriminator::EarlyMinusLate,
             spacing_chips: 0.5,
             integration: 4,
-            waveform: Waveform::Strongest,
+            waveform: Layers::Strongest,
             replica: Edge::Area,
             arithmetic: Arithmetic::I16,
             phase_lock_threshold: 0.85,
@@ -168,8 +168,8 @@ impl TrackingSettings {
         let most = (1e-3 * f64::from(self.integration) / period_s + 1e-9).floor() as u32;
         let integration = INTEGRATIONS.into_iter().rev().find(|periods| *periods <= most).unwrap_or(1);
         let steps = match self.waveform {
-            Waveform::Strongest => component.strongest().map_or(1, |layer| layer.pulse.len()),
-            Waveform::Whole => component.steps_per_chip(),
+            Layers::Strongest => component.strongest().map_or(1, |layer| layer.pulse.len()),
+            Layers::Whole => component.steps_per_chip(),
         };
         let fit = |bandwidth_hz: f64, periods: u32| {
             bandwidth_hz.min(LARGEST_BANDWIDTH_TIME / (period_s * f64::from(periods)))

@@ -9,9 +9,8 @@ use super::stream_tests::{Stream, symbol};
 use super::*;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE_DATA};
-use crate::gnss::signal::{Component, Link, Signal};
+use crate::gnss::signal::{Component, Layers, Link, Signal};
 use crate::receiver::acquire::{Acquired, AcquisitionSettings, search};
-use crate::receiver::correlate::Waveform;
 use crate::receiver::lead::{followed_db, lead};
 
 /// One satellite's signal: its code at time zero, and a Doppler that code and carrier share.
@@ -248,7 +247,7 @@ fn every_synthetic_signal_is_followed_with_the_phase_of_the_whole_signal() {
             found.symbols.len()
         );
         let component = lead(sky.link.signal).unwrap();
-        let followed_hz = libm::pow(10.0, 0.1 * (sky.cn0_dbhz + followed_db(component, Waveform::Strongest)));
+        let followed_hz = libm::pow(10.0, 0.1 * (sky.cn0_dbhz + followed_db(component, Layers::Strongest)));
         // Early minus late of a correlation of slope s at ±d/2: σ² = B·(1 − R(d))/(2 s² C/N0) (squaring loss
         // apart), and both the mean over a second and a half of a loop of half a hertz and its scatter are
         // within 4 σ.

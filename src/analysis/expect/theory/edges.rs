@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 use crate::analysis::waveform::{Waveform, leading};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::{Layers, Signal};
 
 /// Lines a chip rate that are summed. A code of other length has others, whose power is in proportion.
 const LINES: f64 = 1023.0;
@@ -25,8 +25,8 @@ pub const CREST: f64 = 0.40 / 0.14;
 
 /// Error of a signal's code at rest, root mean square over codes and phases, in metres; 0 of one without a
 /// code.
-pub fn averaged_m(signal: &Signal, rate_hz: f64) -> f64 {
-    let code = leading(signal).zip(Waveform::of(signal));
+pub fn averaged_m(signal: &Signal, sent: Layers, rate_hz: f64) -> f64 {
+    let code = leading(signal).zip(Waveform::sent(signal, sent));
     code.map_or(0.0, |(component, waveform)| {
         let chips = f64::from(component.code_chips);
         folded_m(&waveform, chips, rate_hz).max(locked_m(component.chip_rate_hz, chips, rate_hz))
@@ -77,16 +77,17 @@ mod tests {
         for (rate_hz, expected_m) in [(2.048e6, 0.3273), (2.6e6, 0.1515), (5e6, 0.0563), (10e6, 0.0202), (25e6, 0.0038)]
         {
             assert!(
-                (averaged_m(&L1_CA, rate_hz) - expected_m).abs() < 6e-5,
+                (averaged_m(&L1_CA, Layers::Whole, rate_hz) - expected_m).abs() < 6e-5,
                 "{rate_hz}: {}",
-                averaged_m(&L1_CA, rate_hz)
+                averaged_m(&L1_CA, Layers::Whole, rate_hz)
             );
         }
         // Four samples a chip, and five chips to 8 · 2.5 samples: 1.6 · (4 / 5)² m with two places at 2.5575
         // Msps.
         assert!(
-            (averaged_m(&L1_CA, 4.092e6) - 1.6).abs() < 1e-9 && (averaged_m(&L1_CA, 2.5575e6) - 1.024).abs() < 1e-9
+            (averaged_m(&L1_CA, Layers::Whole, 4.092e6) - 1.6).abs() < 1e-9
+                && (averaged_m(&L1_CA, Layers::Whole, 2.5575e6) - 1.024).abs() < 1e-9
         );
-        assert!((CREST * averaged_m(&L1_CA, 2.048e6) - 0.935).abs() < 1e-3);
+        assert!((CREST * averaged_m(&L1_CA, Layers::Whole, 2.048e6) - 0.935).abs() < 1e-3);
     }
 }

@@ -190,7 +190,7 @@ impl<'r> Scene<'r> {
             costs_db: crate::analysis::expect::spectrum::costs_db(run),
             edges_m: (run.signals.iter())
                 .filter(|_| run.scene.code_edge == Edge::Area)
-                .map(|&signal| (signal, edges::averaged_m(signal, run.scene.sample_rate_hz)))
+                .map(|&signal| (signal, edges::averaged_m(signal, run.scene.waveform, run.scene.sample_rate_hz)))
                 .collect(),
         })
     }

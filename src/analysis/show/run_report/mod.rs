@@ -126,6 +126,7 @@ fn facts(judged: &Judged<'_>) -> Vec<(String, String)> {
     };
     let knobs = [
         ("edges", "code_edge"),
+        ("waveform", "waveform"),
         ("carrier", "carrier"),
         ("tolerance", "knot_tolerance_cycles"),
         ("noise", "noise_arithmetic"),

@@ -9,7 +9,7 @@ pub(crate) mod way;
 use super::schema::{Key, flag, foreign, integer, number, one_or_more, table, tables, text, texts, time, word, words};
 use crate::generator::scene::{Arithmetic, CodeEdge, Grade};
 use crate::gnss::facts::{Fixes, Losses, Sizes};
-use crate::gnss::signal::SIGNALS;
+use crate::gnss::signal::{Layers, SIGNALS};
 
 pub(super) const A_PATH: &str = "a path";
 pub(super) const SATELLITES: &str = "an array of satellites like [\"G01\", \"G12\"]";
@@ -117,6 +117,12 @@ const FIDELITY: &[Key] = &[
     word("level", || Grade::NAMES.map(|(name, _)| name).to_vec(), "sets every knob").or_else("balanced"),
     word("code_edge", || CodeEdge::NAMES.map(|(name, _)| name).to_vec(), "how chips' edges fall between samples")
         .or_else("the level's, for the rate, motion and noise"),
+    word(
+        "waveform",
+        || Layers::NAMES.map(|(name, _)| name).to_vec(),
+        "what is sent of waveforms of several layers, such as CBOC: all, or of each component the strongest one",
+    )
+    .or_else("whole"),
     word("carrier", || Arithmetic::NAMES.map(|(name, _)| name).to_vec(), "arithmetic of carrier and code")
         .or_else("the level's"),
     word("noise", || Arithmetic::NAMES.map(|(name, _)| name).to_vec(), "arithmetic of the noise")

@@ -11,6 +11,7 @@ use crate::generator::synth::{CODE_ONE, reference};
 use crate::gnss::galileo::e1::E1;
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::{Sv, System};
+use crate::gnss::signal::Layers;
 
 /// Longest length, number of offsets, and a plane that holds both.
 const LENGTHS: usize = 130;
@@ -101,7 +102,8 @@ fn rays_of_several_runs_are_the_sums_of_their_twins_at_every_length_and_offset()
         for (edge, bar) in [(Edge::Nearest, 2e-6), (Edge::Area, 2.8e-6)] {
             let (mut strips, mut runs) = (Vec::new(), Vec::new());
             for (index, component) in E1.components.iter().enumerate() {
-                for voice in Waveform::new(link, index).unwrap().unwrap().voices(edge, rate_hz).unwrap() {
+                for voice in Waveform::new(link, index).unwrap().unwrap().voices(Layers::Whole, edge, rate_hz).unwrap()
+                {
                     let (pace, mut bits) = (voice.spreading.pace(), Vec::new());
                     let step = (pace.step_rate_hz() / rate_hz * CODE_ONE as f64) as u64;
                     let from = CodeTime::new(8, u64::from(pace.steps) * CODE_ONE - 5 * step / 3);

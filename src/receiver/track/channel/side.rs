@@ -23,8 +23,8 @@
 use num_complex::Complex64;
 
 use super::{Channel, Report};
-use crate::gnss::signal::Component;
-use crate::receiver::correlate::{TURN, Waveform, chips_to_units, units_to_chips};
+use crate::gnss::signal::{Component, Layers};
+use crate::receiver::correlate::{TURN, chips_to_units, units_to_chips};
 use crate::receiver::track::model::side_peak;
 
 /// Mean time between false moves of a channel on the main peak, at least: ten years.
@@ -47,7 +47,7 @@ pub(super) struct SidePeaks {
 
 impl SidePeaks {
     /// `None` where the correlation has one peak.
-    pub(super) fn new(component: &Component, made: Waveform) -> Option<Self> {
+    pub(super) fn new(component: &Component, made: Layers) -> Option<Self> {
         let peak = side_peak(component, made)?;
         // Two sums may go wrong.
         let enough = libm::log(2.0 * BETWEEN_FALSE_S / component.period_s());
@@ -116,14 +116,14 @@ mod tests {
     }
 
     fn peaks(enough: f64) -> SidePeaks {
-        SidePeaks { enough, ..SidePeaks::new(&LONG_BOC.components[1], Waveform::Strongest).unwrap() }
+        SidePeaks { enough, ..SidePeaks::new(&LONG_BOC.components[1], Layers::Strongest).unwrap() }
     }
 
     #[test]
     fn signals_of_one_peak_are_not_looked_at() {
-        assert!(SidePeaks::new(&L1_CA.components[0], Waveform::Strongest).is_none());
+        assert!(SidePeaks::new(&L1_CA.components[0], Layers::Strongest).is_none());
         for component in [&LONG_BOC.components[1], &MIXED.components[0]] {
-            let peaks = SidePeaks::new(component, Waveform::Strongest).unwrap();
+            let peaks = SidePeaks::new(component, Layers::Strongest).unwrap();
             assert_eq!((units_to_chips(peaks.step), peaks.ratio), (0.5, -0.5));
         }
     }
@@ -160,7 +160,7 @@ mod tests {
             let amplitude = (2.0 * snr).sqrt();
             let (mut sum, mut most) = (0, 0);
             for run in 0..200 {
-                let mut peaks = SidePeaks::new(component, Waveform::Strongest).unwrap();
+                let mut peaks = SidePeaks::new(component, Layers::Strongest).unwrap();
                 let way = if run % 2 == 0 { [-0.5, 1.0, 0.0] } else { [-0.5, 0.0, 1.0] };
                 let found = (1..1000).find_map(|periods| {
                     let (prompt, neighbours) = powers(&mut normal, way.map(|ratio| ratio * amplitude));
