@@ -1,6 +1,6 @@
 //! The receiver's loops on modelled correlations: one channel in steady tracking, without a sample.
 //!
-//! Every code period early, prompt and late are drawn with means √(2T·C/N0)·R(ε)·sinc(ΔfT)·e^(jφ) and unit
+//! Every code period early, prompt and late, and the taps that watch for side peaks, are drawn with means √(2T·C/N0)·R(ε)·sinc(ΔfT)·e^(jφ) and unit
 //! noise a component whose covariance is that of the taps; they go through the loops, discriminators and C/N0
 //! estimate of `receiver::track`, and what is left between truth and oscillators is measured. Source of the
 //! model: Kaplan and Hegarty, Understanding GPS 2nd ed., 5.3. Limits: one satellite, constant C/N0, no
@@ -15,10 +15,12 @@ use super::normal::{Normals, Purpose, symbol};
 use super::watch::Watch;
 use crate::analysis::expect::theory::clock::PowerLaw;
 use crate::gnss::signal::{self, Carrier, Component, Signal};
+use crate::receiver::correlate::units_to_chips;
 use crate::receiver::lead::lead;
 use crate::receiver::track::closed::{Loops, Mode, Update};
 use crate::receiver::track::cn0::Cn0;
 use crate::receiver::track::loops::Rates;
+use crate::receiver::track::side::SidePeaks;
 use crate::receiver::track::{TrackingSettings, pilot_group};
 
 /// One channel to be simulated.
@@ -42,6 +44,8 @@ pub struct Case {
     pub correlation: Correlation,
     /// Whether the receiver's detectors may give the signal up.
     pub watched: bool,
+    /// By how much the code is late at the beginning.
+    pub start_chips: f64,
     /// Time before anything is measured; the loops begin on the true Doppler and its rate.
     pub settle_s: f64,
     /// Time that is measured, seconds.
@@ -132,7 +136,15 @@ pub struct Outcome {
     pub interruptions: u64,
     /// When the signal was lost, and why.
     pub lost: Option<(f64, Loss)>,
+    /// Last time at which the code was off the main peak, from the start on.
+    pub off_main_s: f64,
+    /// Whether it was on the main peak at the end.
+    pub on_main: bool,
 }
+
+/// Distance from the main peak within which the code is on it: half the way to the first side peak of
+/// BOC(1,1).
+const MAIN_CHIPS: f64 = 0.25;
 
 /// Runs a case and condenses it.
 pub fn run(case: &Case) -> Outcome {
@@ -142,6 +154,10 @@ pub fn run(case: &Case) -> Outcome {
     let follows_phase = case.mode != Mode::Frequency;
     let end = simulate(case, |epoch| {
         outcome.update_s = epoch.update.integration_s;
+        outcome.on_main = epoch.code_chips.abs() <= MAIN_CHIPS;
+        if !outcome.on_main {
+            outcome.off_main_s = epoch.time_s;
+        }
         let settled = epoch.time_s > case.settle_s;
         while follows_phase && (epoch.phase_cycles - locked_at).abs() > spacing {
             locked_at += spacing.copysign(epoch.phase_cycles - locked_at);
@@ -188,19 +204,38 @@ pub fn simulate(case: &Case, mut each: impl FnMut(&Epoch)) -> (u64, Option<(f64,
     (channel.watch.interruptions, None)
 }
 
-/// Factors that give three taps their covariance, from three independent normals (Cholesky).
+/// Early, prompt and late, and behind them the taps on either side peak where those are watched.
 #[derive(Clone, Copy, Debug)]
-struct Covariance {
-    prompt: [f64; 2],
-    late: [f64; 3],
+struct Taps {
+    count: usize,
+    /// By how much each is ahead of the prompt, chips.
+    ahead_chips: [f64; MOST_TAPS],
+    /// Rows that give them their covariance, from independent normals (Cholesky).
+    rows: [[f64; MOST_TAPS]; MOST_TAPS],
 }
 
-impl Covariance {
-    fn new(correlation: &Correlation, spacing_chips: f64) -> Self {
-        let (near, far) = (correlation.noise(0.5 * spacing_chips), correlation.noise(spacing_chips));
-        let own = (1.0 - near * near).sqrt();
-        let shared = (near - near * far) / own;
-        Self { prompt: [near, own], late: [far, shared, (1.0 - far * far - shared * shared).max(0.0).sqrt()] }
+const MOST_TAPS: usize = 5;
+
+impl Taps {
+    fn new(correlation: &Correlation, spacing_chips: f64, side: Option<&SidePeaks>) -> Self {
+        let half = 0.5 * spacing_chips;
+        let [above, below] = side.map_or([0.0; 2], |side| side.taps().map(units_to_chips));
+        let ahead_chips = [half, 0.0, -half, above, below];
+        let mut rows = [[0.0; MOST_TAPS]; MOST_TAPS];
+        for (i, tap) in ahead_chips.iter().enumerate() {
+            let (before, rest) = rows.split_at_mut(i);
+            let Some(row) = rest.first_mut() else { continue };
+            for (j, (other, earlier)) in ahead_chips.iter().zip(before).enumerate() {
+                let known: f64 = row.iter().zip(&*earlier).take(j).map(|(a, b)| a * b).sum();
+                let own = earlier.get(j).copied().unwrap_or(0.0);
+                // A tap that lies on another has nothing of its own.
+                let shared = if own > 0.0 { (correlation.noise(tap - other) - known) / own } else { 0.0 };
+                row.iter_mut().skip(j).take(1).for_each(|factor| *factor = shared);
+            }
+            let own = row.iter().take(i).fold(1.0, |left, x| left - x * x).max(0.0).sqrt();
+            row.iter_mut().skip(i).take(1).for_each(|factor| *factor = own);
+        }
+        Self { count: if side.is_some() { MOST_TAPS } else { 3 }, ahead_chips, rows }
     }
 }
 
@@ -209,7 +244,10 @@ struct Channel<'a> {
     case: &'a Case,
     truth: Truth<'a>,
     normals: Normals,
-    covariance: Covariance,
+    taps: Taps,
+    side: Option<SidePeaks>,
+    /// T·C/N0 of the prompt where the search found it.
+    found_snr: f64,
     /// Mean of a prompt without errors, over R(0).
     amplitude: f64,
     noisy: bool,
@@ -245,12 +283,18 @@ impl<'a> Channel<'a> {
             cn0.know_symbols();
         }
         let cn0_hz = case.component_hz();
+        let side = SidePeaks::new(case.component, case.settings.waveform).filter(|_| case.watched);
+        let taps = Taps::new(&case.correlation, case.settings.spacing_chips, side.as_ref());
+        let amplitude = (2.0 * period_s * cn0_hz.unwrap_or(1.0) / case.correlation.noise_power()).sqrt();
+        let found = amplitude * case.correlation.value(case.start_chips);
         Self {
             case,
             truth: Truth::new(&case.motion, case.oscillator.as_ref(), case.signal.centre_hz(), period_s, case.seed),
             normals: Normals::new(case.seed, Purpose::Thermal),
-            covariance: Covariance::new(&case.correlation, case.settings.spacing_chips),
-            amplitude: (2.0 * period_s * cn0_hz.unwrap_or(1.0) / case.correlation.noise_power()).sqrt(),
+            taps,
+            side,
+            found_snr: 0.5 * found * found,
+            amplitude,
             noisy: cn0_hz.is_some(),
             chips_per_cycle: chip_rate_hz / case.signal.centre_hz(),
             period_s,
@@ -267,7 +311,7 @@ impl<'a> Channel<'a> {
             symbol_sum: Complex64::ZERO,
             number: 0,
             phase_cycles: 0.0,
-            code_chips: 0.0,
+            code_chips: case.start_chips,
         }
     }
 
@@ -285,17 +329,18 @@ impl<'a> Channel<'a> {
             // The code's truth follows the carrier's, and so does the aid of its oscillator.
             let code_gained = gained * self.chips_per_cycle - code_hz * self.period_s;
             let mean_chips = self.code_chips + 0.5 * code_gained;
-            let taps = self.correlate(mean_cycles, gained, mean_chips);
+            let [early, prompt, late, ahead, behind] = self.correlate(mean_cycles, gained, mean_chips);
             // The model's noise has unit variance a component.
-            self.cn0.add(taps[1], Some(if self.noisy { 2.0 } else { 0.0 }));
-            sums.iter_mut().zip(taps).for_each(|(sum, tap)| *sum += tap);
+            self.cn0.add(prompt, Some(if self.noisy { 2.0 } else { 0.0 }));
+            sums.iter_mut().zip([early, prompt, late]).for_each(|(sum, tap)| *sum += tap);
             phase += mean_cycles;
             code += mean_chips;
             frequency += gained;
             self.phase_cycles += gained;
             self.code_chips += code_gained;
             self.number += 1;
-            self.watch(taps[1]);
+            self.watch(prompt);
+            self.watch_side_peaks(prompt, [ahead, behind]);
         }
         let update = self.loops.close(self.case.mode, sums, self.before, self.periods, self.update_s, self.cn0.hz());
         self.before = Some(sums[1]);
@@ -323,25 +368,38 @@ impl<'a> Channel<'a> {
         }
     }
 
-    /// Early, prompt and late of one period, of mean phase error `cycles`, which turns by `turned` cycles in
-    /// it, and mean code error `chips`.
-    fn correlate(&mut self, cycles: f64, turned: f64, chips: f64) -> [Complex64; 3] {
+    /// Shows the period just ended to the receiver's evidence for side peaks, and moves as a channel does.
+    fn watch_side_peaks(&mut self, prompt: Complex64, neighbours: [Complex64; 2]) {
+        let snr = self.cn0.hz().map_or(self.found_snr, |hz| hz * self.period_s);
+        let Some(side) = &mut self.side else { return };
+        let Some(units) = side.add(prompt.norm_sqr(), neighbours.map(|sum| sum.norm_sqr()), snr) else { return };
+        let ratio = side.ratio();
+        self.code_chips -= units_to_chips(units);
+        if ratio < 0.0 {
+            self.phase_cycles -= 0.5;
+        }
+        self.cn0.raise(1.0 / (ratio * ratio));
+        self.watch.interruptions += 1;
+    }
+
+    /// Early, prompt, late and both neighbours of one period, of mean phase error `cycles`, which turns by
+    /// `turned` cycles in it, and mean code error `chips`.
+    fn correlate(&mut self, cycles: f64, turned: f64, chips: f64) -> [Complex64; MOST_TAPS] {
         if self.has_symbols && self.number.is_multiple_of(u64::from(self.group)) {
             self.symbol = symbol(self.case.seed, self.number / u64::from(self.group));
         }
         let (sin, cos) = libm::sincos(std::f64::consts::TAU * (cycles - cycles.floor()));
         let carrier = Complex64::new(cos, sin) * (self.amplitude * self.symbol * sinc(turned));
-        let half = 0.5 * self.case.settings.spacing_chips;
-        let shape = &self.case.correlation;
-        let mut taps = [chips - half, chips, chips + half].map(|offset| carrier * shape.value(offset));
+        let Taps { count, ahead_chips, rows } = &self.taps;
+        let (mut sums, mut normals) = ([Complex64::ZERO; MOST_TAPS], [Complex64::ZERO; MOST_TAPS]);
         if self.noisy {
-            let normals = [self.normals.next(), self.normals.next(), self.normals.next()];
-            let Covariance { prompt, late } = self.covariance;
-            taps[0] += normals[0];
-            taps[1] += normals[0] * prompt[0] + normals[1] * prompt[1];
-            taps[2] += normals[0] * late[0] + normals[1] * late[1] + normals[2] * late[2];
+            normals.iter_mut().take(*count).for_each(|normal| *normal = self.normals.next());
         }
-        taps
+        for ((sum, ahead), row) in sums.iter_mut().zip(ahead_chips).zip(rows).take(*count) {
+            let noise: Complex64 = row.iter().zip(normals).map(|(factor, normal)| normal * *factor).sum();
+            *sum = carrier * self.case.correlation.value(chips - ahead) + noise;
+        }
+        sums
     }
 }
 

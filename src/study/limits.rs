@@ -56,6 +56,7 @@ pub fn channel_of(signal: &'static Signal, settings: &TrackingSettings, mode: Mo
         oscillator: None,
         correlation: Correlation::of_component(component, settings.waveform),
         watched: false,
+        start_chips: 0.0,
         settle_s: 10.0,
         duration_s: 600.0,
         seed: 1,

@@ -109,6 +109,7 @@ fn cell(quantity: Quantity, mode: Mode, settings: TrackingSettings, cn0_dbhz: f6
         correlation: Correlation::Triangle,
         // What their detectors do is another matter than the loops.
         watched: false,
+        start_chips: 0.0,
         settle_s: 0.0,
         duration_s: 0.0,
         seed: 0,

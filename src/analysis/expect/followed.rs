@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::analysis::read::Run;
 use crate::analysis::waveform::{Waveform, leading};
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::{Layers, Signal};
 
 /// What `receiver.json` says of a signal.
 #[derive(Clone, Debug, Deserialize)]
@@ -23,8 +23,14 @@ struct Entry {
 /// What a receiver follows of a signal.
 #[derive(Clone, Debug)]
 pub(in crate::analysis) struct Followed {
-    /// Of what is sent with the replica, of the replica with itself, and of the whole waveform with itself.
-    pub waveforms: [Waveform; 3],
+    /// Of what is sent with the replica.
+    pub found: Waveform,
+    /// Of the whole waveform with the replica: what the discriminator is made for.
+    pub assumed: Waveform,
+    /// Of the replica with itself.
+    pub own: Waveform,
+    /// Of the whole waveform with itself.
+    pub whole: Waveform,
     /// Power of the component over the whole signal's.
     pub share: f64,
     /// Distance of early and late, chips; the settings' where the receiver does not say it, as the others.
@@ -47,15 +53,21 @@ impl Followed {
             Some(entry) => signal.components.get(entry.component)?,
             None => leading(signal)?,
         };
-        let [found, own] = match &entry {
-            Some(Entry { layer: Some(layer), .. }) => {
-                component.shapes_by(run.scene.waveform, component.layers.get(*layer)?)
-            }
-            _ => [component.shape_of(run.scene.waveform), component.shape()],
+        let made = match &entry {
+            Some(Entry { layer: Some(layer), .. }) => Some(component.layers.get(*layer)?),
+            _ => None,
         };
-        let rate_hz = component.chip_rate_hz;
+        let by = |sent: Layers| match made {
+            Some(layer) => component.shapes_by(sent, layer),
+            None => [component.shape_between(sent, Layers::Whole), component.shape()],
+        };
+        let ([found, own], [assumed, _]) = (by(run.scene.waveform), by(Layers::Whole));
+        let of = |shape| Waveform::of_shape(shape, component.chip_rate_hz);
         Some(Self {
-            waveforms: [found, own, component.shape()].map(|shape| Waveform::of_shape(shape, rate_hz)),
+            found: of(found),
+            assumed: of(assumed),
+            own: of(own),
+            whole: of(component.shape()),
             share: component.power_share,
             spacing_chips: entry.as_ref().map(|entry| entry.spacing_chips),
             integration_s: entry.as_ref().map(|entry| entry.integration_s),

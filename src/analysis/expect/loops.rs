@@ -228,6 +228,12 @@ impl Peak {
         }
     }
 
+    /// What early less late changes by over their sum, for a distance of `spacing_chips`.
+    fn steepness(&self, spacing_chips: f64) -> f64 {
+        let half = 0.5 * spacing_chips;
+        self.slope(half) / self.value(half)
+    }
+
     /// Minus its slope at a delay, by a difference that errs by 1e-9.
     fn slope(&self, x: f64) -> f64 {
         let h = 1e-4;
@@ -273,6 +279,8 @@ pub(in crate::analysis) struct Theory {
     share: f64,
     pll: (PhaseLoop, Response),
     dll: (PhaseLoop, Response),
+    /// What the code discriminator puts out over the error, which is one for the waveform it is made for.
+    dll_gain: f64,
     /// Of the signal with the replica, and of the noise.
     peaks: (Peak, Peak),
     /// Of the code without any average.
@@ -286,22 +294,24 @@ impl Theory {
     pub fn new(run: &Run, settings: Settings, link: &Link, update_s: f64) -> Option<Self> {
         let followed = Followed::of(run, link.signal)?;
         let settings = settings.fitted(&followed);
-        let [waveform, replica, sent] = &followed.waveforms;
-        let chip_rate_hz = waveform.chip_rate_hz();
-        let code = Code::of(waveform);
+        let chip_rate_hz = followed.found.chip_rate_hz();
+        let code = Code::of(&followed.found);
         if 0.5 * settings.spacing_chips >= code.reach_chips {
             return None;
         }
         let pll = exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s)?;
-        let dll = exact_loop(settings.dll_order, settings.dll_bandwidth_hz * update_s)?;
+        let made_for = exact_loop(settings.dll_order, settings.dll_bandwidth_hz * update_s)?;
         let width_chips = chip_rate_hz / run.scene.sample_rate_hz;
         let of_replica = u32::from(settings.averaged_replica);
         let of_signal = u32::from(run.scene.code_edge == Edge::Area);
-        let found = Peak::new(waveform, width_chips, of_replica + of_signal);
-        let own = Peak::new(replica, width_chips, 2 * of_replica);
+        let peak = |waveform: &Waveform| Peak::new(waveform, width_chips, of_replica + of_signal);
+        let (found, assumed) = (peak(&followed.found), peak(&followed.assumed));
+        let own = Peak::new(&followed.own, width_chips, 2 * of_replica);
+        let dll_gain = found.steepness(settings.spacing_chips) / assumed.steepness(settings.spacing_chips);
+        let dll = PhaseLoop { gains: made_for.gains.map(|gain| dll_gain * gain), ..made_for };
         // Of the component's power in the samples, which is whole whatever their averages leave of a layer.
         let efficiency = found.value(0.0) * found.value(0.0) / own.value(0.0);
-        let efficiency = efficiency / Peak::new(sent, width_chips, 2 * of_signal).value(0.0);
+        let efficiency = efficiency / Peak::new(&followed.whole, width_chips, 2 * of_signal).value(0.0);
         Some(Self {
             settings,
             update_s,
@@ -310,6 +320,7 @@ impl Theory {
             share: followed.share * efficiency,
             pll: (pll, Response::of(&pll)),
             dll: (dll, Response::of(&dll)),
+            dll_gain,
             peaks: (found, own),
             code,
             oscillator: run.scene.oscillator.map(|noise| PowerLaw { h: noise.h }),
@@ -334,7 +345,7 @@ impl Theory {
         match which {
             Loop::Dll => {
                 let raw = raw_chips(&self.peaks.0, &self.peaks.1, self.settings.spacing_chips, snr);
-                (raw * code.put_out.sqrt(), raw * code.phase.sqrt())
+                (self.dll_gain * raw * code.put_out.sqrt(), raw * code.phase.sqrt())
             }
             // Observations fall anywhere in an interval, in which the phase runs at the loop's rate: x²·rate²
             // more, 1/12 in the mean.

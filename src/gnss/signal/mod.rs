@@ -379,8 +379,12 @@ impl Component {
 
     /// The same of some of its layers: their power over that of the whole is the correlation at no delay.
     pub fn shape_of(&self, layers: Layers) -> Shape {
-        let sent = self.made_with(layers);
-        Shape::between(sent, sent, self.chip_rate_hz)
+        self.shape_between(layers, layers)
+    }
+
+    /// Correlation of some of its layers with some of them.
+    pub fn shape_between(&self, sent: Layers, made: Layers) -> Shape {
+        Shape::between(self.made_with(sent), self.made_with(made), self.chip_rate_hz)
     }
 
     /// Correlation of the waveform, sent with `sent`, with a replica of one of its layers, which has that

@@ -16,6 +16,7 @@ use super::loops::CodeShape;
 use super::model::ReplicaModel;
 use super::overlay::{OverlayPhase, OverlaySync};
 use super::pull_in::Batch;
+use super::side::SidePeaks;
 use super::sync::SymbolSync;
 use super::{Report, Symbol, TrackingSettings};
 use crate::gnss::samples::{Format, IfMetadata};
@@ -37,7 +38,6 @@ mod side;
 mod supervise;
 
 use pilot::Data;
-use side::SidePeaks;
 pub use supervise::pilot_group;
 
 pub use reseat::Glance;

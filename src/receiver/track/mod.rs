@@ -19,6 +19,7 @@ pub mod model;
 mod overlay;
 mod pull_in;
 pub mod settings;
+pub mod side;
 #[cfg(test)]
 mod signals_tests;
 #[cfg(test)]

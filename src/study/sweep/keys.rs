@@ -63,7 +63,8 @@ const MOTION: &[Key] = &[
 
 const LOOP: &[Key] = &[
     word("mode", || vec!["phase", "assisted", "frequency"], "carrier loop").or_else("phase"),
-    flag("detectors", "whether the receiver's lock detectors may give the signal up"),
+    flag("detectors", "whether the receiver's lock detectors may give the signal up, and move the code off side peaks"),
+    number("start_chips", -1.0, 1.0, "chips", "by how much the code is late at the beginning").or(0.0),
 ];
 
 const MEASURE: &[Key] = &[

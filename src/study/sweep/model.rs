@@ -42,6 +42,7 @@ pub struct Model {
     jerk_s: f64,
     mode: Mode,
     watched: bool,
+    start_chips: f64,
     settle_s: f64,
     duration_s: f64,
     tracking: TrackingSettings,
@@ -105,6 +106,7 @@ impl Model {
             jerk_s: number(&motion, "jerk_s")?.unwrap_or(f64::INFINITY),
             mode: chosen(&closed, "mode", &modes)?.unwrap_or(Mode::Phase),
             watched: closed.as_ref().map(|table| table.flag("detectors")).transpose()?.flatten().unwrap_or(false),
+            start_chips: number(&closed, "start_chips")?.unwrap_or(0.0),
             settle_s: number(&measure, "settle_s")?.unwrap_or(5.0),
             duration_s: number(&measure, "duration_s")?.unwrap_or(60.0),
             tracking: settings.tracking,
@@ -154,6 +156,7 @@ impl Model {
                 None => Correlation::of_component(self.component, self.tracking.waveform),
             },
             watched: self.watched,
+            start_chips: self.start_chips,
             settle_s: self.settle_s,
             duration_s: self.duration_s,
             seed,
@@ -254,6 +257,9 @@ pub const FIGURES: &[Figure] = &[
         let hours = outcome.phase_cycles.count as f64 * case.update_s() / 3600.0;
         kept(outcome, Some(outcome.slips as f64 / hours))
     }),
+    figure("on_main_peak", |_, outcome| outcome.lost.is_none().then(|| f64::from(u8::from(outcome.on_main)))),
+    figure("off_main_peak_s", |_, outcome| kept(outcome, Some(outcome.off_main_s))),
+    figure("theory.off_main_peak_s", |case, _| expect::off_main_peak_s(case)),
     figure("phase_sigma_deg", |_, outcome| kept(outcome, outcome.phase_cycles.sigma().map(|x| 360.0 * x))),
     figure("theory.phase_sigma_deg", |case, _| phase_theory_deg(case)),
     figure("phase_mean_deg", |_, outcome| kept(outcome, outcome.phase_cycles.mean().map(|x| 360.0 * x))),

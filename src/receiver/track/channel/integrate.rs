@@ -3,10 +3,10 @@
 
 use num_complex::Complex64;
 
-use super::side::SidePeaks;
 use super::{Channel, Stage};
 use crate::gnss::time::tone_turns;
 use crate::receiver::correlate::{self, Nco, Replica, TURN, chips_to_units};
+use crate::receiver::track::side::SidePeaks;
 use crate::receiver::track::{Report, Symbol};
 
 /// Periods over which the power of the samples is averaged.
