@@ -1,10 +1,10 @@
 //! The receiver's loops on modelled correlations: one channel in steady tracking, without a sample.
 //!
-//! Every code period early, prompt and late, and the taps that watch for side peaks, are drawn with means √(2T·C/N0)·R(ε)·sinc(ΔfT)·e^(jφ) and unit
-//! noise a component whose covariance is that of the taps; they go through the loops, discriminators and C/N0
-//! estimate of `receiver::track`, and what is left between truth and oscillators is measured. Source of the
-//! model: Kaplan and Hegarty, Understanding GPS 2nd ed., 5.3. Limits: one satellite, constant C/N0, no
-//! multipath; a period lasts its nominal time.
+//! Every code period early, prompt and late, and the taps that watch for side peaks, are drawn with means
+//! √(2T·C/N0)·R(ε)·sinc(ΔfT)·e^(jφ) and unit noise a component whose covariance is that of the taps; they go
+//! through the loops, discriminators and C/N0 estimate of `receiver::track`, and what is left between truth
+//! and oscillators is measured. Source of the model: Kaplan and Hegarty, Understanding GPS 2nd ed., 5.3.
+//! Limits: one satellite, constant C/N0, no multipath; a period lasts its nominal time.
 
 use num_complex::Complex64;
 

@@ -12,10 +12,10 @@ pub const ORDER: Order<'static> = &[
         "gnss",
         &[
             &["time", "earth", "satellite", "crc", "fec", "inflate", "place"],
-            &["bits", "facts", "klobuchar", "nequick", "ionex", "samples", "vienna"],
+            &["bits", "klobuchar", "nequick", "ionex", "samples", "vienna"],
             &["ionosphere"],
             &["signal", "sigmf", "vmf3"],
-            &["broadcast"],
+            &["broadcast", "facts"],
             &["record"],
             &["message"],
             &["nmea", "exchange"],
