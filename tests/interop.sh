@@ -35,16 +35,16 @@ value() { sed -n "s/^$1 *= *\([-0-9.e_]*\).*/\1/p" "$scene" | tr -d _ | head -n 
 # Generates the samples of the file in $scene as $work/NAME.
 generate() { # name
     samples=$work/$1
-    "$twin" generate "$scene" --out "$samples.sigmf-data" --format ci8
+    "$twin" generate "$scene" --out "$samples.sigmf-data" --format ci8 --gnss-sdr
 }
 
 # Runs GNSS-SDR over the samples, and holds the mean of its fixes to the scene's place and its files to what the judge expects.
 foreign() { # name, channels of GPS and of Galileo, ionosphere, C/N0 beside the truth's and its bar
-    local out=$work/$1 rate_hz observations
+    local out=$work/$1 observations
     mkdir -p "$out"
-    rate_hz=$(awk -v r="$(value sample_rate_hz)" 'BEGIN { printf "%.0f", r }')
-    sed -e "s|@SAMPLES@|$samples.sigmf-data|; s|@RATE_HZ@|$rate_hz|; s|@OUT@|$out|; s|@GPS@|$2|; s|@GALILEO@|$3|; s|@IONOSPHERE@|$4|" \
-        "$root/tests/interop/gnss-sdr.conf.in" >"$out/gnss-sdr.conf"
+    # The configuration as written beside the samples, with other channels where a comparison wants them.
+    sed -e "s|^\(Channels_1C.count\)=.*|\1=$2|; s|^\(Channels_1B.count\)=.*|\1=$3|; s|^\(PVT.iono_model\)=.*|\1=$4|" \
+        "$samples.gnss-sdr.conf" >"$out/gnss-sdr.conf"
     (cd "$out" && GLOG_minloglevel=2 timeout 600 gnss-sdr --config_file="$out/gnss-sdr.conf" --log_dir="$out" \
         </dev/null >"$out/stdout.txt" 2>"$out/stderr.txt") || {
         echo "interop: gnss-sdr failed on $1" >&2
@@ -157,6 +157,21 @@ sentences=$(gpsdecode <"$work/run/rx/fixes.nmea" | grep -c '"class":"TPV".*"mode
 points=$(grep -c '<trkpt' "$work/run/rx/fixes.gpx" || true)
 echo "interop: gpsdecode read $sentences positions of $fixes fixes; $points points in the track"
 [ "$sentences" -ge $((fixes - 1)) ] && [ "$points" -ge $((fixes / 10)) ] || failed=1
+# The shipped files by the schemas that their first lines name.
+python=python3
+if ! "$python" -c 'import jsonschema' 2>/dev/null; then
+    # Debian's module is for Debian's own interpreter.
+    python=/usr/bin/python3
+    { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq python3-jsonschema; } >/dev/null 2>&1 || {
+        echo "interop: cannot install python3-jsonschema here" >&2
+        exit 75
+    }
+fi
+"$python" "$root/tests/schema.py" || failed=1
+"$twin" scenes ionex extremes/leo trajectory_file --out "$work/copies" >/dev/null
+"$twin" init "$work/copies/mine.toml" >/dev/null
+"$python" "$root/tests/schema.py" "$work/copies" || failed=1
+for copy in "$work"/copies/*.toml; do "$twin" plan "$copy" >/dev/null 2>&1 || { echo "interop: plan $copy failed"; failed=1; }; done
 generate static
 foreign static 12 0 Broadcast 0 1.5
 

@@ -88,7 +88,7 @@ foreign() { # name, --out of the twin, lines of the signal source, format
     children+=("$twin_is")
     if [[ $2 == rtl-tcp:* ]]; then address=$(address "$out/twin.txt"); else address=; fi
     sed -e "/^SignalSource\./d; /^DataTypeAdapter\./d; s|@RATE_HZ@|$rate_hz|; s|@OUT@|$out|; s|@GPS@|12|; s|@GALILEO@|0|; s|@IONOSPHERE@|OFF|" \
-        "$root/tests/interop/gnss-sdr.conf.in" >"$out/gnss-sdr.conf"
+        "$root/assets/gnss-sdr.conf.in" >"$out/gnss-sdr.conf"
     {
         echo "DataTypeAdapter.implementation=Pass_Through"
         echo "DataTypeAdapter.item_type=gr_complex"

@@ -39,6 +39,75 @@ pub enum Command {
     Study(Study),
     /// List every key of scenarios, receiver settings, studies and limits: default, unit, range, meaning
     Reference(Reference),
+    /// List the scenes that come with the program, or copy some of them
+    Scenes(Scenes),
+    /// Write a scene with comments, to begin with
+    Init(Init),
+    /// Print a JSON schema for editors and validators
+    Schema(Schema),
+    /// Print the completions of a shell
+    Completions(Completions),
+    /// Write the manual's pages
+    Man(Man),
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  gnss-twin scenes\n  gnss-twin scenes jammed ionex --out my-scenes")]
+pub struct Scenes {
+    /// Scenes to copy, with the files that they name [default: none, all are listed]
+    pub names: Vec<String>,
+    /// Directory to copy them to
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: PathBuf,
+    /// Replace files that are there
+    #[arg(long)]
+    pub force: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "Example: gnss-twin init my.toml && gnss-twin run my.toml")]
+pub struct Init {
+    /// Where to write it
+    #[arg(default_value = "scene.toml")]
+    pub path: PathBuf,
+    /// Replace a file that is there
+    #[arg(long)]
+    pub force: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "Example: gnss-twin schema scenario > scenario.schema.json, and in the scene's first line:\n  \
+                  #:schema scenario.schema.json")]
+pub struct Schema {
+    /// Of which kind of file
+    pub of: SchemaOf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SchemaOf {
+    /// A scene
+    Scenario,
+    /// The settings of `receive --settings`
+    Receiver,
+    /// A study
+    Study,
+    /// Limits of `--check`
+    Limits,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "Example: gnss-twin completions bash > ~/.local/share/bash-completion/completions/gnss-twin")]
+pub struct Completions {
+    /// The shell
+    pub shell: clap_complete::Shell,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "Example: gnss-twin man --out ~/.local/share/man/man1")]
+pub struct Man {
+    /// Directory that takes gnss-twin.1 and a page for each command
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 #[derive(Args, Debug)]
@@ -99,6 +168,9 @@ pub struct Generate {
     /// Directory for the truth of a stream [default: none]
     #[arg(long, value_name = "DIR")]
     pub truth: Option<PathBuf>,
+    /// Also write NAME.gnss-sdr.conf beside the samples, with which GNSS-SDR opens them
+    #[arg(long)]
+    pub gnss_sdr: bool,
     /// Front end to generate, of a scene that has several [default: all of them]
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,

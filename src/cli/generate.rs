@@ -12,6 +12,7 @@ use crate::cli::error::{CliError, shown};
 use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, truth_error};
 use crate::cli::scenario;
+use crate::cli::sidecar;
 use crate::cli::sink;
 use crate::cli::staging::Staging;
 use crate::generator::scenario::Overrides;
@@ -49,6 +50,9 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
             names.join(", ")
         )));
     }
+    if arguments.gnss_sdr && (scenes.len() > 1 || stream.is_some()) {
+        return Err(CliError::usage("--gnss-sdr: expected one file of samples: choose a front end, and name a file"));
+    }
     if scenes.len() > 1 {
         return collection::generate(arguments, &scenes);
     }
@@ -74,6 +78,8 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
             arguments.out.display()
         )));
     }
+    let foreign = arguments.gnss_sdr.then(|| sidecar::gnss_sdr(&scene, &arguments.out)).transpose()?;
+    let foreign = foreign.map(|text| (arguments.out.with_extension("gnss-sdr.conf"), text));
     let samples = Staging::file(&arguments.out)?;
     let meta = Staging::file(&meta_path)?;
     let truth = Staging::directory(&truth_path)?;
@@ -100,9 +106,16 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     truth.commit()?;
     samples.commit()?;
     meta.commit()?;
+    let mut beside = String::new();
+    if let Some((path, text)) = foreign {
+        let file = Staging::file(&path)?;
+        file.write(text.as_bytes())?;
+        file.commit()?;
+        beside = format!("\nopened by: gnss-sdr --config_file={}", path.display());
+    }
 
     scenario::print(&format!(
-        "{generated}\nsamples in {}, metadata in {}, truth in {}\n",
+        "{generated}\nsamples in {}, metadata in {}, truth in {}{beside}\n",
         arguments.out.display(),
         meta_path.display(),
         truth_path.display()

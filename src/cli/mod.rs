@@ -22,6 +22,10 @@ mod recording;
 mod reference;
 mod run;
 mod scenario;
+mod scenes;
+mod schema;
+mod shell;
+mod sidecar;
 mod sink;
 mod source;
 mod speed;
@@ -72,5 +76,10 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Plan(arguments) => plan::execute(&arguments),
         Command::Study(arguments) => study::execute(&arguments),
         Command::Reference(arguments) => reference::execute(&arguments),
+        Command::Scenes(arguments) => scenes::execute(&arguments),
+        Command::Init(arguments) => scenes::init(&arguments),
+        Command::Schema(arguments) => schema::execute(&arguments),
+        Command::Completions(arguments) => shell::completions(&arguments),
+        Command::Man(arguments) => shell::man(&arguments),
     }
 }

@@ -6,6 +6,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use crate::gnss::earth::Geodetic;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal, by_name};
 use crate::gnss::time::{Epoch, GPST};
@@ -170,6 +171,36 @@ impl TrajectoryRow {
     /// ECEF velocity.
     pub fn velocity_mps(&self) -> Vector3<f64> {
         Vector3::new(self.vx_mps, self.vy_mps, self.vz_mps)
+    }
+}
+
+/// A place and a time as people and maps have them: what stands behind the columns of a [`TrajectoryRow`] and
+/// of a [`Fix`] in their files, and is not read again.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Geographic {
+    /// Geodetic latitude, north positive.
+    pub latitude_deg: f64,
+    /// Longitude, east positive.
+    pub longitude_deg: f64,
+    /// Height above the ellipsoid of WGS 84.
+    pub height_m: f64,
+    /// UTC, ISO 8601.
+    pub utc: String,
+}
+
+impl Geographic {
+    /// Names of its columns.
+    pub const COLUMNS: [&'static str; 4] = ["latitude_deg", "longitude_deg", "height_m", "utc"];
+
+    /// Of an ECEF position at a time.
+    pub fn of(position_m: &Vector3<f64>, time: Epoch) -> Self {
+        let place = Geodetic::from_ecef(position_m);
+        Self {
+            latitude_deg: place.latitude_rad.to_degrees(),
+            longitude_deg: place.longitude_rad.to_degrees(),
+            height_m: place.height_m,
+            utc: time.to_utc_text(),
+        }
     }
 }
 

@@ -13,7 +13,23 @@ use super::skyline::skyline_deg;
 use crate::generator::scene::{Scene, sources};
 use crate::generator::switches::{Stray, Switches};
 use crate::gnss::facts::{Fault, FaultKind, FrontEndFacts, OscillatorFacts, SceneFacts, TimeOffset};
+use crate::gnss::record::{Geographic, TrajectoryRow};
 use crate::gnss::time::Rate;
+
+/// Columns of a [`TrajectoryRow`].
+const TRAJECTORY: [&str; 11] = [
+    "sample",
+    "gps_s",
+    "gps_fraction_s",
+    "x_m",
+    "y_m",
+    "z_m",
+    "vx_mps",
+    "vy_mps",
+    "vz_mps",
+    "clock_bias_s",
+    "clock_drift",
+];
 
 struct Table {
     path: PathBuf,
@@ -21,10 +37,29 @@ struct Table {
 }
 
 impl Table {
+    /// The header is that of the first row.
     fn create(directory: &Path, name: &str) -> Result<Self, TruthError> {
+        Self::open(directory, name, true)
+    }
+
+    /// Of places, whose rows have their geographic columns behind their own.
+    fn of_places(directory: &Path, name: &str) -> Result<Self, TruthError> {
+        let mut table = Self::open(directory, name, false)?;
+        let header = [&TRAJECTORY[..], &Geographic::COLUMNS].concat();
+        table.rows.write_record(header).map_err(|source| TruthError::Row { path: table.path.clone(), source })?;
+        Ok(table)
+    }
+
+    fn open(directory: &Path, name: &str, has_headers: bool) -> Result<Self, TruthError> {
         let path = directory.join(name);
         let file = File::create(&path).map_err(|source| TruthError::File { path: path.clone(), source })?;
-        Ok(Self { path, rows: csv::Writer::from_writer(BufWriter::new(file)) })
+        let rows = csv::WriterBuilder::new().has_headers(has_headers).from_writer(BufWriter::new(file));
+        Ok(Self { path, rows })
+    }
+
+    fn write_place(&mut self, row: TrajectoryRow) -> Result<(), TruthError> {
+        let place = Geographic::of(&row.position_m(), row.time());
+        self.write((row, place))
     }
 
     fn write(&mut self, row: impl Serialize) -> Result<(), TruthError> {
@@ -136,7 +171,7 @@ impl Writer {
             observations: Table::create(directory, "observations.csv")?,
             sky: Table::create(directory, "sky.csv")?,
             rays: None,
-            trajectory: Table::create(directory, "trajectory.csv")?,
+            trajectory: Table::of_places(directory, "trajectory.csv")?,
             interference: None,
             claims: Vec::new(),
             navigation: None,
@@ -155,7 +190,7 @@ impl Writer {
             let suffix = if spoofer.number > 1 { format!("_{}", spoofer.number) } else { String::new() };
             self.claims.push(Claims {
                 observations: Table::create(&self.directory, &format!("spoofed{suffix}.csv"))?,
-                trajectory: Table::create(&self.directory, &format!("claimed{suffix}.csv"))?,
+                trajectory: Table::of_places(&self.directory, &format!("claimed{suffix}.csv"))?,
             });
         }
         let (orbits, departures) = scene.catalogue.describe();
@@ -222,13 +257,13 @@ impl Sink for Writer {
 
     fn take(&mut self, record: Record) -> Result<(), TruthError> {
         match record {
-            Record::Trajectory(row) => self.trajectory.write(row),
+            Record::Trajectory(row) => self.trajectory.write_place(row),
             Record::Observation(row) => self.observations.write(row),
             Record::Sky(row) => self.sky.write(row),
             Record::Ray(row) => opened(&mut self.rays, &self.directory, "rays.csv")?.write(row),
             Record::Interference(row) => self.interference.as_mut().map_or(Ok(()), |table| table.write(row)),
             Record::Claim { spoofer, place } => {
-                self.claims(spoofer).map_or(Ok(()), |claims| claims.trajectory.write(place))
+                self.claims(spoofer).map_or(Ok(()), |claims| claims.trajectory.write_place(place))
             }
             Record::Spoofed { spoofer, observation } => {
                 self.claims(spoofer).map_or(Ok(()), |claims| claims.observations.write(observation))

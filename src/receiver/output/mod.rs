@@ -19,7 +19,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::gnss::record::{
-    AcquisitionRow, ClockRow, EventRow, Fix, LineRow, NavigationRow, Observation, SightRow, TrackingRow,
+    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, LineRow, NavigationRow, Observation, SightRow, TrackingRow,
 };
 use crate::gnss::time::GPST;
 pub use json::JsonLines;
@@ -256,7 +256,7 @@ impl Output {
         Ok(Self {
             directory: directory.to_owned(),
             observations: Sheet::create(directory, "observations.csv", &OBSERVATIONS)?,
-            fixes: Sheet::create(directory, "fixes.csv", &FIXES)?,
+            fixes: Sheet::create(directory, "fixes.csv", &[&FIXES[..], &Geographic::COLUMNS].concat())?,
             acquisition: Sheet::create(directory, "acquisition.csv", &ACQUISITION)?,
             tracking: Sheet::create(directory, "tracking.csv", &TRACKING)?,
             navigation: Sheet::create(directory, "navigation.csv", &NAVIGATION)?,
@@ -335,7 +335,10 @@ impl Sink for Output {
             Record::Event(row) => self.events.write(&row),
             Record::Observation(row) => self.observations.write(&row),
             Record::Navigation(rows) => self.navigation(rows),
-            Record::Fix(row) => self.fixes.write(&row),
+            Record::Fix(row) => {
+                let place = Geographic::of(&row.position_m(), row.time());
+                self.fixes.write(&(row, place))
+            }
             Record::Clocks(rows) => self.clocks(&rows),
             // It follows from the fix and the ephemerides.
             Record::Sights(_) => Ok(()),

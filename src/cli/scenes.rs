@@ -1,0 +1,180 @@
+//! `scenes` and `init`: the scenes that come with the program, and a commented one to begin with.
+//!
+//! Scenes are copied with the files that they name and with the schema that their first line names, so that a
+//! copy runs and an editor knows its keys wherever it lies.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use include_dir::{Dir, File, include_dir};
+
+use crate::cli::args;
+use crate::cli::error::CliError;
+use crate::cli::scenario;
+use crate::cli::schema;
+use crate::cli::staging::Staging;
+use crate::generator::scenario::read::nearest;
+
+static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenarios");
+/// The scene of [`init`]. Lines that begin with `#` and a letter or a bracket are TOML to be uncommented.
+const COMMENTED: &str = include_str!("../../assets/commented_scene.toml");
+/// The name of the schema beside a copy.
+const SCHEMA: &str = "scenario.schema.json";
+/// How a scene names its schema.
+const DIRECTIVE: &str = "#:schema ";
+
+/// Lists all scenes, or copies some.
+pub fn execute(arguments: &args::Scenes) -> Result<(), CliError> {
+    let scenes = scenes();
+    if arguments.names.is_empty() {
+        let width = scenes.keys().map(String::len).max().unwrap_or(0);
+        let lines = scenes.iter().map(|(name, file)| format!("{name:width$}  {}\n", about(text(file))));
+        return scenario::print(&lines.collect::<String>());
+    }
+    let mut copies: BTreeMap<PathBuf, Vec<u8>> = BTreeMap::new();
+    for wanted in &arguments.names {
+        let name = wanted.strip_suffix(".toml").unwrap_or(wanted);
+        let Some(scene) = scenes.get(name) else {
+            let names: Vec<&str> = scenes.keys().map(String::as_str).collect();
+            let hint = nearest(name, &names).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
+            return Err(CliError::usage(format!("no scene {wanted:?}{hint}: expected one of {}", names.join(", "))));
+        };
+        copies.extend(with_its_files(scene));
+    }
+    write_all(&arguments.out, copies, arguments.force)
+}
+
+/// Writes the commented scene, and the schema beside it.
+pub fn init(arguments: &args::Init) -> Result<(), CliError> {
+    let name = arguments.path.file_name().map(PathBuf::from);
+    let name = name.ok_or_else(|| CliError::usage(format!("{}: expected a file", arguments.path.display())))?;
+    let directory = arguments.path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let copies = BTreeMap::from([(name, COMMENTED.as_bytes().to_vec()), (SCHEMA.into(), schema::scenario().into())]);
+    write_all(directory.unwrap_or(Path::new(".")), copies, arguments.force)
+}
+
+/// Writes files into a directory; the schema is the program's own and may be replaced.
+fn write_all(directory: &Path, copies: BTreeMap<PathBuf, Vec<u8>>, force: bool) -> Result<(), CliError> {
+    let is_there = |name: &&PathBuf| name.as_path() != Path::new(SCHEMA) && directory.join(name).exists();
+    if let Some(name) = copies.keys().find(is_there).filter(|_| !force) {
+        let path = directory.join(name);
+        return Err(CliError::refused_output(format!("{} is there: --force replaces it", path.display())));
+    }
+    fs::create_dir_all(directory).map_err(|error| CliError::create(directory.display(), &error))?;
+    let mut told = String::new();
+    for (name, bytes) in copies {
+        let path = directory.join(name);
+        let staging = Staging::file(&path)?;
+        staging.write(&bytes)?;
+        staging.commit()?;
+        told += &format!("{}\n", path.display());
+    }
+    scenario::print(&told)
+}
+
+/// The shipped scenes by name; `extremes/leo` lies in a directory below.
+fn scenes() -> BTreeMap<String, &'static File<'static>> {
+    let below = SHIPPED.dirs().flat_map(Dir::files);
+    let scene = |file: &'static File<'static>| {
+        let is_scene = text(file).lines().any(|line| line.trim_start().starts_with("name"));
+        let name = file.path().to_str()?.strip_suffix(".toml").filter(|_| is_scene)?;
+        Some((name.to_owned(), file))
+    };
+    SHIPPED.files().chain(below).filter_map(scene).collect()
+}
+
+fn text(file: &'static File<'static>) -> &'static str {
+    file.contents_utf8().unwrap_or("")
+}
+
+/// The first sentence of the comment that is for people.
+fn about(text: &str) -> String {
+    let comments = text.lines().map_while(|line| line.strip_prefix('#'));
+    let words: Vec<&str> = comments.filter(|line| !line.starts_with(':')).flat_map(str::split_whitespace).collect();
+    let last = words.iter().position(|word| word.ends_with('.')).map_or(words.len(), |last| last + 1);
+    words.into_iter().take(last).collect::<Vec<_>>().join(" ")
+}
+
+/// A scene by its file's name, the files that it names and the schema.
+fn with_its_files(scene: &'static File<'static>) -> Vec<(PathBuf, Vec<u8>)> {
+    let name = |path: &Path| path.file_name().map(PathBuf::from).unwrap_or_default();
+    let beside = scene.path().parent().and_then(|parent| SHIPPED.get_dir(parent)).map_or(&SHIPPED, |found| found);
+    let named = beside.files().filter(|file| file.path() != scene.path()).filter(|file| {
+        let quoted = format!("\"{}\"", name(file.path()).display());
+        text(scene).contains(&quoted)
+    });
+    let mut copies: Vec<_> = named.map(|file| (name(file.path()), file.contents().to_vec())).collect();
+    let own = text(scene).lines().map(|line| match line.starts_with(DIRECTIVE) {
+        true => format!("{DIRECTIVE}{SCHEMA}\n"),
+        false => format!("{line}\n"),
+    });
+    copies.push((name(scene.path()), own.collect::<String>().into_bytes()));
+    copies.push((SCHEMA.into(), schema::scenario().into()));
+    copies
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generator::scenario::Scenario;
+
+    fn copied(names: &[&str], directory: &Path) -> Result<(), CliError> {
+        let names = names.iter().map(|name| (*name).to_owned()).collect();
+        execute(&args::Scenes { names, out: directory.to_owned(), force: false })
+    }
+
+    #[test]
+    fn every_scene_says_what_it_is_and_names_its_schema() {
+        let scenes = scenes();
+        assert!(scenes.len() > 20 && scenes.contains_key("extremes/leo") && !scenes.contains_key("limits"));
+        for (name, file) in scenes {
+            assert!(!about(text(file)).is_empty(), "{name}");
+            let up = if name.contains('/') { "../.." } else { ".." };
+            let first = text(file).lines().next().unwrap();
+            assert_eq!(first, format!("{DIRECTIVE}{up}/assets/{SCHEMA}"), "{name}");
+        }
+    }
+
+    #[test]
+    fn copies_come_with_the_files_that_they_name_and_are_not_written_over() {
+        let directory = tempfile::tempdir().unwrap();
+        let out = directory.path().join("mine");
+        copied(&["ionex", "precise.toml", "extremes/leo", "trajectory_file"], &out).unwrap();
+        let mut found: Vec<_> = fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        found.sort();
+        let expected = [
+            "igrg3380.10i.gz",
+            "igs15904_05h_12h.sp3.gz",
+            "ionex.toml",
+            "leo.toml",
+            "precise.toml",
+            "ride.csv",
+            SCHEMA,
+            "trajectory_file.toml",
+        ];
+        assert_eq!(found, expected);
+        for scene in ["ionex.toml", "leo.toml", "precise.toml", "trajectory_file.toml"] {
+            let text = fs::read_to_string(out.join(scene)).unwrap();
+            assert!(text.starts_with("#:schema scenario.schema.json\n") && Scenario::parse(&text, scene).is_ok());
+        }
+        let again = copied(&["ionex"], &out).unwrap_err();
+        assert!(format!("{again:?}").contains("--force"), "{again:?}");
+        let unknown = copied(&["jamed"], &out).unwrap_err();
+        assert!(format!("{unknown:?}").contains("did you mean jammed?"), "{unknown:?}");
+    }
+
+    #[test]
+    fn the_commented_scene_is_one_with_its_comments_and_without() {
+        assert!(Scenario::parse(COMMENTED, "commented").is_ok());
+        let switched = |line: &str| {
+            let rest = line.strip_prefix('#').filter(|rest| rest.starts_with(|c: char| c.is_alphabetic() || c == '['));
+            rest.unwrap_or(line).to_owned() + "\n"
+        };
+        let whole: String = COMMENTED.lines().map(switched).collect();
+        assert_ne!(whole, COMMENTED);
+        if let Err(error) = Scenario::parse(&whole, "uncommented") {
+            panic!("{error}\n{whole}");
+        }
+    }
+}

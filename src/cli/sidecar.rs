@@ -1,0 +1,92 @@
+//! A configuration of GNSS-SDR beside samples, so that it opens them at once.
+
+use std::path::Path;
+
+use crate::cli::error::CliError;
+use crate::generator::scene::Scene;
+use crate::gnss::galileo::e1::E1;
+use crate::gnss::gps::l1ca::L1_CA;
+use crate::gnss::samples::Format;
+
+/// What is filled in stands between signs.
+const TEMPLATE: &str = include_str!("../../assets/gnss-sdr.conf.in");
+/// Channels of a system that the samples have.
+const CHANNELS: u32 = 12;
+/// Distance of carriers from the middle of the samples that an acquisition to ±5 kHz does not notice.
+const CENTRED_HZ: f64 = 100.0;
+
+/// The configuration for a scene's samples in a file.
+///
+/// # Errors
+/// Samples that it would not read, by name: real or unsigned ones, carriers off the middle, other signals.
+pub fn gnss_sdr(scene: &Scene, samples: &Path) -> Result<String, CliError> {
+    let metadata = &scene.metadata;
+    let refuse = |what: String| CliError::usage(format!("--gnss-sdr: {what}"));
+    let (item, adapter) = match metadata.format {
+        Format::Ci8 => ("ibyte", "Ibyte_To_Complex"),
+        Format::Ci16 => ("ishort", "Ishort_To_Complex"),
+        Format::Cf32 => ("gr_complex", "Pass_Through"),
+        other => return Err(refuse(format!("format {other}: expected ci8, ci16 or cf32"))),
+    };
+    let has = |wanted| scene.signals.iter().any(|signal| *signal == wanted);
+    if let Some(other) = scene.signals.iter().find(|signal| ![&L1_CA, &E1].contains(signal)) {
+        return Err(refuse(format!("{other}: expected {L1_CA}, {E1} or both")));
+    }
+    let off_hz = metadata.if_hz(L1_CA.centre_hz());
+    if off_hz.abs() > CENTRED_HZ || metadata.inverted {
+        let sense = if metadata.inverted { " in a mirrored spectrum" } else { "" };
+        return Err(refuse(format!("a carrier at {off_hz} Hz{sense}: expected one in the middle of the samples")));
+    }
+    let samples = std::path::absolute(samples).map_err(|error| CliError::read(samples.display(), &error))?;
+    let channels = |signal| (if has(signal) { CHANNELS } else { 0 }).to_string();
+    let filled = [
+        ("@RATE_HZ@", metadata.rate.hz().to_string()),
+        ("@SAMPLES@", samples.display().to_string()),
+        ("@ITEM@", item.to_owned()),
+        ("@ADAPTER@", adapter.to_owned()),
+        ("@GPS@", channels(&L1_CA)),
+        ("@GALILEO@", channels(&E1)),
+        ("@IONOSPHERE@", if has(&L1_CA) { "Broadcast" } else { "OFF" }.to_owned()),
+        ("@OUT@", ".".to_owned()),
+    ];
+    Ok(filled.into_iter().fold(TEMPLATE.to_owned(), |text, (sign, value)| text.replace(sign, &value)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::scenario::{compose_all, read};
+    use crate::generator::scenario::Overrides;
+
+    fn text(changes: &[(&str, &str)], format: Option<Format>) -> Result<String, CliError> {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("scene.toml");
+        let scene = include_str!("../../scenarios/two_systems.toml").to_owned();
+        let scene = changes.iter().fold(scene, |text, (from, to)| text.replace(from, to));
+        std::fs::write(&path, scene).unwrap();
+        let overrides = Overrides { format, ..Overrides::default() };
+        let (mut scenes, _) = compose_all(&read(Some(&path)).unwrap(), &overrides).unwrap();
+        gnss_sdr(&scenes.pop().unwrap(), Path::new("/if/samples.bin"))
+    }
+
+    #[test]
+    fn a_configuration_has_rate_format_and_systems_of_the_samples_and_nothing_is_left_to_fill_in() {
+        let both = text(&[], None).unwrap();
+        assert!(!both.contains('@'), "{both}");
+        for line in ["filename=/if/samples.bin", "item_type=ibyte", "Channels_1C.count=12", "Channels_1B.count=12"] {
+            assert!(both.contains(line), "{line} in {both}");
+        }
+        let galileo = text(&[("\"GPS L1 C/A\", ", "")], Some(Format::Cf32)).unwrap();
+        for line in ["item_type=gr_complex", "implementation=Pass_Through", "Channels_1C.count=0", "iono_model=OFF"] {
+            assert!(galileo.contains(line), "{line} in {galileo}");
+        }
+    }
+
+    #[test]
+    fn what_that_receiver_would_not_read_is_refused_by_name() {
+        let refused = |changes: &[(&str, &str)], format| format!("{:?}", text(changes, format).unwrap_err());
+        assert!(refused(&[], Some(Format::Cu8)).contains("format cu8: expected ci8, ci16 or cf32"));
+        let off = refused(&[("[front_end]", "[front_end]\nif_hz = 1e5")], None);
+        assert!(off.contains("a carrier at 100000 Hz"), "{off}");
+    }
+}
