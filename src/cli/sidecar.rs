@@ -7,6 +7,7 @@ use crate::generator::scene::Scene;
 use crate::gnss::galileo::e1::E1;
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::samples::Format;
+use crate::gnss::signal::Signal;
 
 /// What is filled in stands between signs.
 const TEMPLATE: &str = include_str!("../../assets/gnss-sdr.conf.in");
@@ -24,11 +25,11 @@ pub fn gnss_sdr(scene: &Scene, samples: &Path) -> Result<String, CliError> {
     let refuse = |what: String| CliError::usage(format!("--gnss-sdr: {what}"));
     let (item, adapter) = match metadata.format {
         Format::Ci8 => ("ibyte", "Ibyte_To_Complex"),
-        Format::Ci16 => ("ishort", "Ishort_To_Complex"),
-        Format::Cf32 => ("gr_complex", "Pass_Through"),
+        Format::Ci16Le => ("ishort", "Ishort_To_Complex"),
+        Format::Cf32Le => ("gr_complex", "Pass_Through"),
         other => return Err(refuse(format!("format {other}: expected ci8, ci16 or cf32"))),
     };
-    let has = |wanted| scene.signals.iter().any(|signal| *signal == wanted);
+    let has = |wanted: &'static Signal| scene.signals.contains(&wanted);
     if let Some(other) = scene.signals.iter().find(|signal| ![&L1_CA, &E1].contains(signal)) {
         return Err(refuse(format!("{other}: expected {L1_CA}, {E1} or both")));
     }
@@ -38,7 +39,7 @@ pub fn gnss_sdr(scene: &Scene, samples: &Path) -> Result<String, CliError> {
         return Err(refuse(format!("a carrier at {off_hz} Hz{sense}: expected one in the middle of the samples")));
     }
     let samples = std::path::absolute(samples).map_err(|error| CliError::read(samples.display(), &error))?;
-    let channels = |signal| (if has(signal) { CHANNELS } else { 0 }).to_string();
+    let channels = |signal: &'static Signal| (if has(signal) { CHANNELS } else { 0 }).to_string();
     let filled = [
         ("@RATE_HZ@", metadata.rate.hz().to_string()),
         ("@SAMPLES@", samples.display().to_string()),
@@ -76,7 +77,7 @@ mod tests {
         for line in ["filename=/if/samples.bin", "item_type=ibyte", "Channels_1C.count=12", "Channels_1B.count=12"] {
             assert!(both.contains(line), "{line} in {both}");
         }
-        let galileo = text(&[("\"GPS L1 C/A\", ", "")], Some(Format::Cf32)).unwrap();
+        let galileo = text(&[("\"GPS L1 C/A\", ", "")], Some(Format::Cf32Le)).unwrap();
         for line in ["item_type=gr_complex", "implementation=Pass_Through", "Channels_1C.count=0", "iono_model=OFF"] {
             assert!(galileo.contains(line), "{line} in {galileo}");
         }
