@@ -7,7 +7,7 @@
 //! length before it. Angles are yaw, pitch and roll of nose, right and down against north, east and down, in
 //! radians, and their derivatives in 8. Everything else is a line: `t x y z` with velocity, acceleration and
 //! jerk where known (seconds, metres, ECEF) and `ypr` with the angles and their rates where known, a sentence
-//! of NMEA ([`nmea`]), or an event. Limits: the order of angles in 8 is as its vendor's clients send it, by
+//! of NMEA (`nmea`), or an event. Limits: the order of angles in 8 is as its vendor's clients send it, by
 //! description and not seen on a wire; of their derivatives the first is used.
 
 mod nmea;

@@ -9,7 +9,7 @@
 //! azimuth about the axis. For θ + β below 180° the phase is therefore `x + 2 arg(1 + tan θ/2 tan β/2
 //! e^{-jx})`, whose second term never leaves ±180°; beyond, the first term's sign turns round. What is left
 //! is slow and stays within half a cycle of its value at the start, headings counted. On a body that turns as
-//! it is pushed whole turns are counted from tick to tick ([`counted`]). Limits: a satellite that crosses
+//! it is pushed whole turns are counted from tick to tick (`counted`). Limits: a satellite that crosses
 //! θ + β = 180°, where the antenna is deaf to it once a turn, changes its whole number of cycles; so does one
 //! that crosses the spin axis's rear.
 
