@@ -28,9 +28,9 @@ const COMPARABLE_S: f64 = 6.0 * 3600.0;
 /// Good sets of one satellite agree to some ten metres half way between their reference times, where
 /// they are at most six hours apart.
 const CONTRADICTION_M: f64 = 2000.0;
-/// The longest time from a Galileo set's reference time to its first sending: records of 2020 have 11 min at
-/// least.
-const GALILEO_DELAY_S: f64 = 600.0;
+/// The longest time from the reference time of a set that is sent after it to its first sending: Galileo's
+/// records of 2020 have 11 min at least; of 283 records of NavIC of a day in 2026 all but one have 12 s to 252 s.
+const DELAY_S: f64 = 600.0;
 /// The same for clocks: 300 m.
 const CONTRADICTION_S: f64 = 1e-6;
 
@@ -267,15 +267,16 @@ fn contradict(a: &Ephemeris, b: &Ephemeris) -> bool {
 }
 
 /// Whether elements are those of the nominal constellation (the fields are wider): a 12 h sidereal orbit of
-/// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo.
+/// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo, and one of a day, 0° to 33°, for NavIC.
 fn plausible(set: &Ephemeris) -> bool {
-    let (sqrt_a_sqrtm, inclination_deg) = match set.sv.system {
-        System::Galileo => (5440.6, 56_f64),
-        _ => (5153.6, 55_f64),
+    let (sqrt_a_sqrtm, inclinations_deg) = match set.sv.system {
+        System::Galileo => (5440.6, 52.0..60.0),
+        System::Navic => (6493.4, 0.0..33.0),
+        _ => (5153.6, 51.0..59.0),
     };
     (set.sqrt_a_sqrtm - sqrt_a_sqrtm).abs() < 5.0
         && set.eccentricity < 0.03
-        && (set.i0_rad - inclination_deg.to_radians()).abs() < 4_f64.to_radians()
+        && inclinations_deg.contains(&set.i0_rad.to_degrees())
 }
 
 fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
@@ -314,11 +315,11 @@ fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
     sets.retain(|_| kept.next().unwrap_or(true));
 }
 
-/// When a set goes on the air. Galileo's sets, of every ten minutes at best, do so after their reference
-/// time, and a file says when a receiver had the whole set: some minutes later.
+/// When a set goes on the air. Those of Galileo and NavIC, of every ten minutes at best, do so after their
+/// reference time, and a file says when a receiver had the whole set: some minutes later.
 fn first_sent(set: &Ephemeris) -> Epoch {
-    if set.sv.system == System::Galileo {
-        return set.toe.plus_s(set.transmitted.since(set.toe).clamp(0.0, GALILEO_DELAY_S));
+    if set.is_sent_after_reference() {
+        return set.toe.plus_s(set.transmitted.since(set.toe).clamp(0.0, DELAY_S));
     }
     let nominal = set.toe.plus_s(-7200.0);
     let on_grid = set.toe.seconds() % 7200 == 0;

@@ -63,6 +63,16 @@ pub enum FieldError {
         /// Issue of the clock.
         iodc: u16,
     },
+    /// Reference times that a message cannot show to belong together.
+    #[error(
+        "toe = {toe_s} s and toc = {toc_s} s of the week: expected the same, as NavIC's message has no other mark of a set"
+    )]
+    References {
+        /// Of the orbit.
+        toe_s: f64,
+        /// Of the clock.
+        toc_s: f64,
+    },
     /// A stream that cannot begin at that time.
     #[error("the message of {message} cannot begin {start_s} s after the week's start: expected {expected}")]
     Start {

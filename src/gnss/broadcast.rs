@@ -8,7 +8,6 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
-use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, WEEK_S};
@@ -24,14 +23,15 @@ pub struct Ephemeris {
     pub toc: Epoch,
     /// When this set was first transmitted, as far as known.
     pub transmitted: Epoch,
-    /// Issue of data: IODE of GPS, IODnav of Galileo.
+    /// Issue of data: IODE of GPS, IODnav of Galileo, IODEC of NavIC.
     pub iode: u16,
     /// Issue of the clock: IODC of GPS (IS-GPS-200N, 20.3.3.3.1.5), IODnav of Galileo.
     pub iodc: u16,
     /// User range accuracy index, 0..=15 (IS-GPS-200N, 20.3.3.3.1.3); SISA index of Galileo.
     pub ura_index: u8,
     /// Six bits of which 0 is healthy: those of IS-GPS-200N, 20.3.3.3.1.4; of Galileo, from the lowest bit
-    /// on, data validity (1) and health (2) of E1-B, then those of E5b. See [`Self::is_healthy`].
+    /// on, data validity (1) and health (2) of E1-B, then those of E5b; of NavIC the flags of S and L5. See
+    /// [`Self::is_healthy`].
     pub health: u8,
     /// Codes on L2: 1 for P, 2 for C/A (IS-GPS-200N, 20.3.3.3.1.2).
     pub l2_codes: u8,
@@ -77,7 +77,7 @@ pub struct Ephemeris {
     pub af1_sps: f64,
     /// Half the rate of that drift, s/s².
     pub af2_sps2: f64,
-    /// Group delay: T_GD of GPS (IS-GPS-200N, 20.3.3.3.3.2), BGD(E1,E5b) of Galileo.
+    /// Group delay: T_GD of GPS (IS-GPS-200N, 20.3.3.3.3.2), BGD(E1,E5b) of Galileo, T_GD of NavIC's S.
     pub tgd_s: f64,
     /// The second group delay of messages that have two: BGD(E1,E5a) of Galileo beside BGD(E1,E5b) in
     /// `tgd_s`.
@@ -162,6 +162,8 @@ pub(in crate::gnss) struct Constants {
     relativity_spsqrtm: f64,
     /// The week from whose beginning the node counts begins so much after that of GPS.
     behind_gpst_s: f64,
+    /// Carrier to which the message's group delay belongs as it is.
+    delay_carrier_hz: f64,
 }
 
 /// IS-GPS-200N, table 20-IV and 20.3.3.3.3.1.
@@ -170,6 +172,7 @@ const OF_GPS: Constants = Constants {
     rotation_radps: EARTH_ROTATION_RADPS,
     relativity_spsqrtm: -4.442_807_633e-10,
     behind_gpst_s: 0.0,
+    delay_carrier_hz: 1_575.42e6,
 };
 /// Galileo OS SIS ICD 2.1, tables 60 and 66.
 const OF_GALILEO: Constants =
@@ -177,13 +180,17 @@ const OF_GALILEO: Constants =
 /// BDS-SIS-ICD-B1I-3.0, 5.2.4.10 and table 5-11: CGCS2000, and BDT.
 const OF_BEIDOU: Constants = Constants { rotation_radps: 7.292_115_0e-5, behind_gpst_s: 14.0, ..OF_GALILEO };
 
+/// IRNSS SIS ICD for SPS 1.1, user algorithms: constants of WGS 84, and a group delay of S.
+const OF_NAVIC: Constants = Constants { delay_carrier_hz: 2_492.028e6, ..OF_GPS };
+
 impl Constants {
     /// Those of a system's interface document.
     pub const fn of(system: System) -> &'static Self {
         match system {
             System::Galileo => &OF_GALILEO,
             System::BeiDou => &OF_BEIDOU,
-            System::Gps | System::Glonass | System::Qzss | System::Navic | System::Sbas => &OF_GPS,
+            System::Navic => &OF_NAVIC,
+            System::Gps | System::Glonass | System::Qzss | System::Sbas => &OF_GPS,
         }
     }
 }
@@ -357,7 +364,7 @@ impl Ephemeris {
     }
 
     /// The clock as a single-frequency L1 C/A user meets it: [`Self::clock`] minus T_GD
-    /// (IS-GPS-200N, 20.3.3.3.3.2).
+    /// (IS-GPS-200N, 20.3.3.3.3.2); of another system that of the carrier to which its group delay belongs.
     ///
     /// # Errors
     /// As [`Self::clock`].
@@ -366,18 +373,23 @@ impl Ephemeris {
     }
 
     fn on_l1(&self, clock: ClockState) -> ClockState {
-        ClockState { offset_s: clock.offset_s - self.group_delay_s(&L1_CA), ..clock }
+        ClockState { offset_s: clock.offset_s - self.given_delay_s(), ..clock }
+    }
+
+    /// The group delay as the message gives it.
+    fn given_delay_s(&self) -> f64 {
+        planted!("gnss.clock.group_delay", self.tgd_s, -self.tgd_s)
     }
 
     /// By how much less than [`Self::clock`] the clock reads for a user of `signal` alone.
     ///
     /// A signal without a delay of its own has T_GD · (f_L1/f)²: the clock is that of two carriers whose
-    /// combination is free of what goes with 1/f² (IS-GPS-200N, 20.3.3.3.3.2, equation for L2).
+    /// combination is free of what goes with 1/f² (IS-GPS-200N, 20.3.3.3.3.2, equation for L2). NavIC's T_GD is
+    /// that of S (IRNSS SIS ICD for SPS 1.1, user algorithms).
     pub fn group_delay_s(&self, signal: &Signal) -> f64 {
         let own = self.signal_delays_s.iter().find(|(name, _)| *name == signal.name);
-        let ratio = L1_CA.carrier_hz(self.sv) / signal.carrier_hz(self.sv);
-        let tgd_s = planted!("gnss.clock.group_delay", self.tgd_s, -self.tgd_s);
-        own.map_or(tgd_s * (ratio * ratio), |(_, delay_s)| *delay_s)
+        let ratio = Constants::of(self.sv.system).delay_carrier_hz / signal.carrier_hz(self.sv);
+        own.map_or(self.given_delay_s() * (ratio * ratio), |(_, delay_s)| *delay_s)
     }
 
     /// The clock as a user of `signal` alone meets it.
@@ -389,7 +401,7 @@ impl Ephemeris {
         Ok(ClockState { offset_s: clock.offset_s - self.group_delay_s(signal), ..clock })
     }
 
-    /// Whether the satellite says that its signal on L1 or E1 may be used.
+    /// Whether the satellite says that its signal on L1 or E1 may be used; of NavIC both, on L5 and S.
     pub fn is_healthy(&self) -> bool {
         match self.sv.system {
             System::Galileo => self.health & 0b111 == 0,
@@ -397,14 +409,19 @@ impl Ephemeris {
         }
     }
 
-    /// Curve fit interval around the reference time. Of Galileo, whose document has none, eight hours: a set
-    /// is used for four hours after its reference time.
+    /// Whether sets go on the air after their reference time, and not hours before it as those of GPS do.
+    pub fn is_sent_after_reference(&self) -> bool {
+        matches!(self.sv.system, System::Galileo | System::Navic)
+    }
+
+    /// Curve fit interval around the reference time. Of Galileo and NavIC, whose documents have none, eight
+    /// hours: a set is used for four hours after its reference time.
     ///
     /// Of GPS four hours, or what the issue of data says when the fit flag is set
     /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).
     pub fn fit_interval_s(&self) -> f64 {
         let hours = match (self.long_fit, self.iodc) {
-            _ if self.sv.system == System::Galileo => 8.0,
+            _ if self.is_sent_after_reference() => 8.0,
             (false, _) => 4.0,
             (true, 240..=247) => 8.0,
             (true, 248..=255 | 496) => 14.0,
@@ -494,6 +511,7 @@ pub fn solve_kepler(mean_rad: f64, eccentricity: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::signal::Carrier;
 
     fn example() -> Ephemeris {

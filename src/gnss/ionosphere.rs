@@ -14,6 +14,8 @@ pub enum Model {
     Klobuchar,
     /// Of Galileo.
     NequickG,
+    /// That of GPS as NavIC sends it: the delay of L5.
+    KlobucharNavic,
 }
 
 /// The coefficients of a model.
@@ -23,6 +25,16 @@ pub enum Coefficients {
     Klobuchar(Klobuchar),
     /// Of Galileo's.
     NequickG(NequickG),
+    /// Of that of GPS, for the delay of NavIC's L5.
+    KlobucharNavic(Klobuchar),
+}
+
+/// Carrier on which NavIC's coefficients give the delay (IRNSS SIS ICD for SPS 1.1: they are for users of L5).
+pub const NAVIC_HZ: f64 = 1_176.45e6;
+
+impl Model {
+    /// Forms of Klobuchar's model, in the order in which a receiver that takes any prefers them.
+    pub const KLOBUCHAR: [Self; 2] = [Self::Klobuchar, Self::KlobucharNavic];
 }
 
 impl Coefficients {
@@ -31,6 +43,7 @@ impl Coefficients {
         match self {
             Self::Klobuchar(_) => Model::Klobuchar,
             Self::NequickG(_) => Model::NequickG,
+            Self::KlobucharNavic(_) => Model::KlobucharNavic,
         }
     }
 
@@ -46,6 +59,7 @@ impl Coefficients {
         match self {
             Self::Klobuchar(model) => model.delay_s(user, look, at, carrier_hz),
             Self::NequickG(model) => model.delay_s(user, satellite_m, at, carrier_hz),
+            Self::KlobucharNavic(model) => model.delay_from_s(NAVIC_HZ, user, look, at, carrier_hz),
         }
     }
 }

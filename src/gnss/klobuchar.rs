@@ -13,7 +13,7 @@ use crate::gnss::earth::{Geodetic, Look};
 use crate::gnss::time::Epoch;
 
 /// Carrier on which the coefficients are defined (IS-GPS-200N, 3.3.1.1).
-const L1_HZ: f64 = 1_575.42e6;
+pub const L1_HZ: f64 = 1_575.42e6;
 /// Delay at night (IS-GPS-200N, figure 20-4).
 pub const NIGHT_S: f64 = 5e-9;
 /// Local time of the bulge's maximum (IS-GPS-200N, figure 20-4).
@@ -78,13 +78,25 @@ impl Klobuchar {
         }
     }
 
+    /// The coefficients whose bulge on a carrier of `defined_hz` is the one that these have on L1. Delays at
+    /// night are 5 ns on either.
+    pub fn bulge_on(&self, defined_hz: f64) -> Self {
+        let scale = L1_HZ / defined_hz;
+        Self { alpha: self.alpha.map(|alpha| alpha * (scale * scale)), beta: self.beta }
+    }
+
     /// Group delay on a carrier of `carrier_hz`, in seconds, seen from `user` towards `look` at GPS time
     /// `at`.
     pub fn delay_s(&self, user: Geodetic, look: Look, at: Epoch, carrier_hz: f64) -> f64 {
+        self.delay_from_s(L1_HZ, user, look, at, carrier_hz)
+    }
+
+    /// [`Self::delay_s`] of coefficients that give the delay on a carrier of `defined_hz`, at night too.
+    pub fn delay_from_s(&self, defined_hz: f64, user: Geodetic, look: Look, at: Epoch, carrier_hz: f64) -> f64 {
         let bulge = self.bulge(user, look, at);
         let phase_rad = bulge.phase_rad();
         let day_s = if phase_rad.abs() < SERIES_END_RAD { bulge.amplitude_s * cosine_series(phase_rad) } else { 0.0 };
-        let scale = L1_HZ / carrier_hz;
+        let scale = defined_hz / carrier_hz;
         bulge.obliquity * (NIGHT_S + day_s) * scale * scale
     }
 }

@@ -84,6 +84,8 @@ pub type Raw<'a> = &'a dyn Fn(&str) -> Option<i64>;
 pub struct Common {
     /// Coefficients of GPS's model of the ionosphere; absent means none are sent.
     pub klobuchar: Option<Klobuchar>,
+    /// Coefficients of the same model as NavIC sends them, for L5; absent means none are sent.
+    pub klobuchar_navic: Option<Klobuchar>,
     /// Effective ionisation coefficients of NeQuick-G, in solar flux units, per degree and per degree
     /// squared.
     pub nequick: Option<[f64; 3]>,

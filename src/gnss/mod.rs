@@ -41,6 +41,7 @@ pub mod ionex;
 pub mod ionosphere;
 pub mod klobuchar;
 pub mod message;
+pub mod navic;
 pub mod nequick;
 pub mod nmea;
 pub mod place;

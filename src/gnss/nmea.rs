@@ -122,6 +122,8 @@ fn signal_number(signal: &Signal) -> u8 {
     match (signal.system, signal.rinex) {
         (System::Gps | System::Glonass | System::Sbas, "1C") => 1,
         (System::Galileo, "1C") => 7,
+        (System::Navic, "5A") => 1,
+        (System::Navic, "9A") => 2,
         _ => 0,
     }
 }

@@ -1,7 +1,7 @@
-//! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV and Galileo I/NAV, the coefficients of
-//! both systems' ionosphere, their times against each other and UTC, and the leap seconds.
+//! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV, Galileo I/NAV and NavIC, the coefficients
+//! of these systems' ionosphere, times of GPS and Galileo against each other and UTC, and the leap seconds.
 //!
-//! Source: RINEX 2.11, table A4; RINEX 3.05, tables A6 and A8; RINEX 4.02. Lines and columns are read in
+//! Source: RINEX 2.11, table A4; RINEX 3.05, tables A6, A8 and A18; RINEX 4.02. Lines and columns are read in
 //! `columns`; `elements` holds every element against the range of its field in the message. A record that
 //! fails is left out and named in [`Navigation::skipped`].
 
@@ -19,13 +19,15 @@ use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
 
-/// What a navigation file says about GPS and Galileo.
+/// What a navigation file says about GPS, Galileo and NavIC.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Navigation {
-    /// Sets of GPS LNAV and Galileo I/NAV by satellite and time of clock.
+    /// Sets of GPS LNAV, Galileo I/NAV and NavIC by satellite and time of clock.
     pub ephemerides: Vec<Ephemeris>,
     /// Coefficients of GPS's model of the ionosphere, where the header has them.
     pub klobuchar: Option<Klobuchar>,
+    /// Coefficients of the same model as NavIC sends them, for L5, where the header has them.
+    pub klobuchar_navic: Option<Klobuchar>,
     /// Effective ionisation coefficients of NeQuick-G: solar flux units, per degree, per degree squared.
     pub nequick: Option<[f64; 3]>,
     /// GPS time minus UTC, in whole seconds.
@@ -82,7 +84,7 @@ pub enum NavigationError {
         detail: String,
     },
     /// No set of elements that can be used.
-    #[error("{name}: no usable ephemeris of GPS or Galileo: found {found}")]
+    #[error("{name}: no usable ephemeris of GPS, Galileo or NavIC: found {found}")]
     Nothing {
         /// Name of the file.
         name: String,
@@ -116,11 +118,28 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     let text = clean(&unpack(bytes, name)?);
     check_first_line(&text, name)?;
     let contents = columns::read(&text).map_err(|detail| NavigationError::Damaged { name: name.to_owned(), detail })?;
-    let columns::Contents { records, klobuchar, nequick, leap_seconds, leap_event, utc, galileo, others, reasons } =
-        contents;
+    let columns::Contents {
+        records,
+        klobuchar,
+        klobuchar_navic,
+        nequick,
+        leap_seconds,
+        leap_event,
+        utc,
+        galileo,
+        others,
+        reasons,
+    } = contents;
     let leap_event = leap_event.map(|(after_s, week, day)| LeapEvent { after_s, week, day });
-    let mut navigation =
-        Navigation { klobuchar, nequick, leap_seconds, leap_event, skipped: reasons, ..Navigation::default() };
+    let mut navigation = Navigation {
+        klobuchar,
+        klobuchar_navic,
+        nequick,
+        leap_seconds,
+        leap_event,
+        skipped: reasons,
+        ..Navigation::default()
+    };
     let mut found: Vec<(usize, Ephemeris)> = Vec::new();
     for record in &records {
         match elements::ephemeris(record) {

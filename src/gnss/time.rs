@@ -52,6 +52,9 @@ pub static GPST: TimeScale = TimeScale { name: "GPST", behind_gpst_s: 0 };
 /// Galileo system time: its weeks begin when those of GPS do (Galileo OS SIS ICD 2.1, 5.1.2).
 pub static GST: TimeScale = TimeScale { name: "GST", behind_gpst_s: 0 };
 
+/// IRNSS network time: its weeks begin when those of GPS do (IRNSS SIS ICD for SPS 1.1, system time).
+pub static IRNSST: TimeScale = TimeScale { name: "IRNSST", behind_gpst_s: 0 };
+
 /// How far one time is ahead of another, whole seconds apart: `a0 + a1 (t − reference)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimePolynomial {

@@ -14,10 +14,15 @@ use crate::gnss::time::{Epoch, Rate, SampleClock, WEEK_S};
 use crate::receiver::decode::Decoder;
 use crate::receiver::track::Measurement;
 
-/// Travel time to the nearest satellite that is assumed when the clock is set from satellites alone.
+/// Travel time to the nearest satellite in a medium orbit that is assumed when the clock is set from satellites
+/// alone.
 const NEAREST_TRAVEL_S: f64 = 0.070;
-/// Departure of a travel time from the median of all. From near the Earth they lie between 60 and 95 ms; from
-/// anywhere two satellites differ by 53 200 km at most, the width of their orbits.
+/// How much longer it is to a satellite that turns with the Earth, at 42 164 km from its centre and not 26 560.
+const FARTHER_S: f64 = 0.052;
+/// Semi-major axis between both kinds.
+const BETWEEN_M: f64 = 35e6;
+/// Departure of a travel time from the median of all, less the time to a medium orbit. From near the Earth
+/// they lie between 60 and 95 ms, and from 119 to 140 ms; from anywhere two satellites differ by 53 200 km at most, the width of their orbits.
 const NEAR_SPREAD_S: f64 = 0.035;
 const FAR_SPREAD_S: f64 = 0.178;
 /// A receiver is far away where this share of all satellites departs by more than from near the Earth: wrong
@@ -64,6 +69,11 @@ impl Reading {
         let ((whole, fraction), (other_whole, other_fraction)) = (self.sent_of_week, other.sent_of_week);
         let weeks = (whole - other_whole + WEEK_S / 2).rem_euclid(WEEK_S) - WEEK_S / 2;
         weeks as f64 + (fraction - other_fraction) + self.later_s * rate(self) - other.later_s * rate(other)
+    }
+
+    /// How much longer this has travelled than from a medium orbit.
+    fn farther_s(&self) -> f64 {
+        if self.sv.system.orbit_m() > BETWEEN_M { FARTHER_S } else { 0.0 }
     }
 
     /// The time sent, in the week that brings it nearest to `near`.
@@ -134,16 +144,19 @@ impl Timebase {
                 (sent, label.since(sent))
             })
             .collect();
-        let typical_s = median(travels.iter().map(|travel| travel.1).collect());
-        let within = |limit_s: f64| move |travel: &&(Epoch, f64)| (travel.1 - typical_s).abs() <= limit_s;
-        let beyond = travels.len() - travels.iter().filter(within(NEAR_SPREAD_S)).count();
+        let usual_s: Vec<f64> =
+            travels.iter().zip(readings).map(|((_, travel_s), reading)| travel_s - reading.farther_s()).collect();
+        let typical_s = median(usual_s.clone());
+        let within = |limit_s: f64| move |usual_s: &&f64| (**usual_s - typical_s).abs() <= limit_s;
+        let beyond = travels.len() - usual_s.iter().filter(within(NEAR_SPREAD_S)).count();
         let is_far = beyond as f64 > FAR_SHARE * travels.len() as f64 && beyond > 1;
         let limit_s = if is_far { FAR_SPREAD_S } else { NEAR_SPREAD_S };
         readings
             .iter()
             .zip(travels)
-            .filter(|(_, (_, travel_s))| (travel_s - typical_s).abs() <= limit_s)
-            .map(|(reading, (sent, travel_s))| Observed {
+            .zip(&usual_s)
+            .filter(|(_, usual_s)| (*usual_s - typical_s).abs() <= limit_s)
+            .map(|((reading, (sent, travel_s)), _)| Observed {
                 observation: Observation {
                     sample,
                     sv: reading.sv,
@@ -175,10 +188,11 @@ impl Timebase {
             }
         }
         let Some(near) = self.stated_by_message else { return };
-        let sent = readings.iter().map(|reading| reading.sent(near));
-        let Some(latest) = sent.reduce(|latest, sent| if sent > latest { sent } else { latest }) else { return };
+        let sent = readings.iter().map(|reading| (reading.sent(near), reading.farther_s()));
+        let latest = sent.reduce(|latest, next| if next.0 > latest.0 { next } else { latest });
+        let Some((latest, farther_s)) = latest else { return };
         // Whole milliseconds, so that the label is a clock that a person could have set.
-        let milliseconds = ((latest.fraction() + NEAREST_TRAVEL_S) * 1e3).round();
+        let milliseconds = ((latest.fraction() + NEAREST_TRAVEL_S + farther_s) * 1e3).round();
         let label = Epoch::new(latest.seconds(), milliseconds * 1e-3);
         let (whole, fraction) = self.rate.elapsed(sample);
         let start = Epoch::new(label.seconds() - whole, label.fraction() - fraction);

@@ -72,7 +72,7 @@ fn the_two_names_of_the_antimeridian_are_one_place() {
                     SPEED_OF_LIGHT_MPS
                         * [
                             model.delay_s(user, towards, at, L1_HZ),
-                            KlobucharIonosphere { model }.delay_s(user, towards, at, L1_HZ),
+                            KlobucharIonosphere::of_gps(model).delay_s(user, towards, at, L1_HZ),
                         ]
                         .iter()
                         .sum::<f64>()
@@ -137,7 +137,7 @@ fn at_and_below_the_horizon_delays_stand_still_and_keep_their_sign() {
         let elevation_rad = elevation.to_radians();
         let (dry, wet) = niell(user, elevation_rad, 180.0);
         let towards = Look { azimuth_rad: 2.0, elevation_rad };
-        let slant_m = SPEED_OF_LIGHT_MPS * KlobucharIonosphere { model }.delay_s(user, towards, at, L1_HZ);
+        let slant_m = SPEED_OF_LIGHT_MPS * KlobucharIonosphere::of_gps(model).delay_s(user, towards, at, L1_HZ);
         let printed_m = SPEED_OF_LIGHT_MPS * model.delay_s(user, towards, at, L1_HZ);
         of += 1;
         held += usize::from(

@@ -58,7 +58,7 @@ fn code_and_carrier_stay_together_for_an_hour_and_the_ionosphere_parts_them_by_t
     for ionosphere in [false, true] {
         if ionosphere {
             let model = rinex::embedded().unwrap().klobuchar.unwrap();
-            scene.effects.push(Box::new(KlobucharIonosphere { model }));
+            scene.effects.push(Box::new(KlobucharIonosphere::of_gps(model)));
         }
         let mut transmitter = transmitter(&scene, sv);
         let (mut worst, mut checked) = (0.0_f64, 0);

@@ -19,7 +19,7 @@ pub const ORDER: Order<'static> = &[
             &["record"],
             &["message"],
             &["nmea", "exchange"],
-            &["gps", "galileo"],
+            &["gps", "galileo", "navic"],
             &["rinex"],
             &["sp3"],
         ],

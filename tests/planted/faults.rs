@@ -14,6 +14,9 @@ const PARITY: &str = "witness::printed::a_word_s_parity_is_the_printed_one_and_o
 const FIELDS: &str = "witness::printed::every_field_of_the_message_has_the_printed_place_sign_and_scale";
 const INAV: &str = "witness::printed::every_field_of_i_nav_has_the_printed_place_sign_and_scale";
 const CODED: &str = "witness::printed::pages_of_i_nav_are_checked_coded_interleaved_and_timed_as_printed";
+const NAVIC: &str = "witness::navic::subframes_are_coded_interleaved_and_timed_as_printed";
+const NAVIC_CODES: &str = "witness::navic::all_chips_of_all_codes_are_those_of_another_program";
+const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_either_way_up_to_what_was_sent";
 const REDUNDANT: &str = "witness::redundancy::real_words_17_to_20_are_the_redundancy_of_the_real_words_1_to_4";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
 const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_place_and_a_clock_of_each";
@@ -69,6 +72,9 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.inav.word_order", "words come a page early, sent and read", CODED),
     fault("gnss.inav.reduced_begin", "elements in short refer to the second before the sub-frame, sent and \
                                       read", SHORT),
+    fault("gnss.navic.g2_start", "the code of PRN 7 begins elsewhere", NAVIC_CODES),
+    fault("gnss.navic.time_sent", "a subframe counts itself and not the next one", NAVIC),
+    fault("gnss.navic.time_read", "a subframe is read as the one after it", NAVIC_READ),
     fault("gnss.fec.field", "the field of the Reed-Solomon code has another polynomial, sent and read", REDUNDANT),
     fault("gnss.fec.interleaver", "neighbouring symbols change places", CODED),
     fault("gnss.crc.polynomial", "the check has another polynomial, sent and read", CODED),

@@ -54,7 +54,7 @@ impl Ideal {
             catalogue: Catalogue::new(navigation.ephemerides).0,
             klobuchar,
             effects: vec![
-                Box::new(KlobucharIonosphere { model: klobuchar }),
+                Box::new(KlobucharIonosphere::of_gps(klobuchar)),
                 Box::new(Troposphere { air: Air::Weather(Weather::STANDARD), mapping: Mapping::Niell }),
             ],
             clock: SampleClock {

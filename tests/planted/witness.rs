@@ -15,6 +15,8 @@ mod data;
 mod inav;
 #[path = "../witness/lnav.rs"]
 mod lnav;
+#[path = "../witness/navic.rs"]
+mod navic;
 #[path = "../witness/orbit.rs"]
 mod orbit;
 #[path = "../witness/printed.rs"]

@@ -40,7 +40,7 @@ fn all_chips_of_all_memory_codes_are_those_of_another_program() {
 }
 
 /// The number of ones, the first and last 24 chips and the digest of a code.
-fn holds(chips: &[u8], expected: &[&str], line: &str) {
+pub fn holds(chips: &[u8], expected: &[&str], line: &str) {
     let word = |part: &[u8]| part.iter().fold(0_u32, |word, chip| word << 1 | u32::from(*chip));
     assert_eq!(chips.iter().map(|chip| usize::from(*chip)).sum::<usize>().to_string(), expected[0], "{line}");
     assert_eq!(format!("{:06X}", word(&chips[..24])), expected[1], "{line}");

@@ -100,7 +100,7 @@ fn solve(name: &str, navigation: &[u8], station: &Station, known_m: Vector3<f64>
     let mut effects: Vec<Box<dyn Effect>> =
         vec![Box::new(Troposphere { air: Air::Weather(Weather::STANDARD), mapping: Mapping::Niell })];
     if model.ionosphere {
-        effects.push(Box::new(KlobucharIonosphere { model: navigation.klobuchar.unwrap() }));
+        effects.push(Box::new(KlobucharIonosphere::of_gps(navigation.klobuchar.unwrap())));
     }
     let (mut square, mut freedom, mut used, mut solved) = (0.0, 0.0, 0.0, 0.0);
     let mut offset_m = Vector3::zeros();

@@ -12,7 +12,7 @@
 
 use crate::generator::ray::{Effect, Ray, Sight};
 use crate::gnss::earth::{Geodetic, Look};
-use crate::gnss::klobuchar::{Bulge, DAY_S, Klobuchar, NIGHT_S, SERIES_END_RAD, cosine_series};
+use crate::gnss::klobuchar::{Bulge, DAY_S, Klobuchar, L1_HZ, NIGHT_S, SERIES_END_RAD, cosine_series};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
@@ -24,21 +24,27 @@ pub const MIDNIGHT_S: f64 = 1200.0;
 /// Heights between which the delay fades.
 const SHELL_M: f64 = 350e3;
 const TOP_M: f64 = 1000e3;
-const L1_HZ: f64 = 1_575.42e6;
 
 /// Klobuchar's ionosphere with smooth edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KlobucharIonosphere {
     /// The model's eight coefficients.
     pub model: Klobuchar,
+    /// The carrier on which these give the delay: L1, or L5 of NavIC.
+    pub defined_hz: f64,
 }
 
 impl KlobucharIonosphere {
+    /// By GPS's coefficients.
+    pub fn of_gps(model: Klobuchar) -> Self {
+        Self { model, defined_hz: L1_HZ }
+    }
+
     /// Group delay in seconds on `carrier_hz` from `user` towards `look` at GPS time `at`; twice
     /// continuously differentiable in time wherever the printed model's limits on φ, AMP and PER do not act.
     pub fn delay_s(&self, user: Geodetic, look: Look, at: Epoch, carrier_hz: f64) -> f64 {
         let bulge = self.model.bulge(user, look, at);
-        let scale = L1_HZ / carrier_hz;
+        let scale = self.defined_hz / carrier_hz;
         bulge.obliquity * (NIGHT_S + day_s(&bulge)) * scale * scale * share_above(user.height_m)
     }
 }
@@ -110,7 +116,7 @@ mod tests {
         let at = Epoch::from_week(1590, tow_s);
         (
             model.delay_s(user, look, at, L1_HZ) * SPEED_OF_LIGHT_MPS,
-            KlobucharIonosphere { model }.delay_s(user, look, at, L1_HZ) * SPEED_OF_LIGHT_MPS,
+            KlobucharIonosphere::of_gps(model).delay_s(user, look, at, L1_HZ) * SPEED_OF_LIGHT_MPS,
         )
     }
 
@@ -150,7 +156,7 @@ mod tests {
 
     #[test]
     fn code_is_delayed_by_what_the_carrier_is_advanced() {
-        let effect = KlobucharIonosphere { model: PRINTED };
+        let effect = KlobucharIonosphere::of_gps(PRINTED);
         let sight = crate::generator::effect::link::tests::sight(30.0, 0.0);
         let mut rays = vec![Ray { code_delay_s: 1.0, carrier_delay_s: 1.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
         effect.act(&sight, &crate::gnss::gps::l1ca::L1_CA, &mut rays);

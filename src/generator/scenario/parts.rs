@@ -12,6 +12,8 @@ use crate::generator::ray::Effect;
 use crate::generator::vehicle::Trajectory;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::UtcData;
+use crate::gnss::ionosphere::NAVIC_HZ;
+use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::message::Common;
 use crate::gnss::rinex::{self, Navigation};
 use crate::gnss::satellite::{Sv, System};
@@ -40,9 +42,20 @@ pub(super) fn navigation(
     for path in &scenario.navigation {
         let bytes = scenario.load("navigation.file", directory, path, overrides)?;
         let found = rinex::read(&bytes, &path.display().to_string()).map_err(refuse)?;
-        let Navigation { ephemerides, klobuchar, nequick, leap_seconds, leap_event, utc, galileo, skipped } = found;
+        let Navigation {
+            ephemerides,
+            klobuchar,
+            klobuchar_navic,
+            nequick,
+            leap_seconds,
+            leap_event,
+            utc,
+            galileo,
+            skipped,
+        } = found;
         navigation.ephemerides.extend(ephemerides);
         navigation.klobuchar = navigation.klobuchar.or(klobuchar);
+        navigation.klobuchar_navic = navigation.klobuchar_navic.or(klobuchar_navic);
         navigation.nequick = navigation.nequick.or(nequick);
         navigation.galileo = navigation.galileo.or(galileo);
         navigation.leap_seconds = navigation.leap_seconds.or(leap_seconds);
@@ -151,6 +164,7 @@ fn messages(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris
     let klobuchar = given.or(navigation.klobuchar);
     let common = Common {
         klobuchar,
+        klobuchar_navic: klobuchar_navic(scenario, navigation),
         nequick: scenario.ionosphere.as_ref().and_then(Ionosphere::sent_nequick).or(navigation.nequick),
         utc,
         galileo: galileo_ahead(scenario, navigation),
@@ -159,6 +173,16 @@ fn messages(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris
     };
     Senders::new(&common, &scenario.signals)
         .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
+}
+
+/// What NavIC's satellites send of the ionosphere: as the file has it, or else the bulge of GPS's model, where
+/// that is the scene's or the file has nothing of NavIC.
+fn klobuchar_navic(scenario: &Scenario, navigation: &Navigation) -> Option<Klobuchar> {
+    let scene = scenario.ionosphere.as_ref();
+    let of_gps = scene.and_then(Ionosphere::sent);
+    let is_of_gps = of_gps.is_some() || scene.is_some_and(Ionosphere::is_klobuchar) && navigation.klobuchar.is_some();
+    let own = navigation.klobuchar_navic.filter(|_| !is_of_gps);
+    own.or(of_gps.or(navigation.klobuchar).map(|model| model.bulge_on(NAVIC_HZ)))
 }
 
 /// Why no ephemeris fits: the span of the file against that of the scene.

@@ -12,7 +12,8 @@ use crate::generator::effect::tec::{Content, EARTH_RADIUS_M, Mapping, Shell, She
 use crate::generator::effect::troposphere::{Air, Troposphere, Weather};
 use crate::generator::ray::Effect;
 use crate::gnss::ionex::{Interpolation, Maps};
-use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::ionosphere::NAVIC_HZ;
+use crate::gnss::klobuchar::{Klobuchar, L1_HZ};
 use crate::gnss::nequick::NequickG;
 use crate::gnss::rinex::Navigation;
 use crate::gnss::time::Epoch;
@@ -105,6 +106,11 @@ impl Ionosphere {
         })
     }
 
+    /// Whether Klobuchar's model is taken for true.
+    pub(super) fn is_klobuchar(&self) -> bool {
+        matches!(self.truth, Electrons::Klobuchar(_))
+    }
+
     /// Coefficients of NeQuick-G that the satellites send, if the scenario says them.
     pub(super) fn sent_nequick(&self) -> Option<[f64; 3]> {
         self.broadcast_ai.or(match self.truth {
@@ -124,12 +130,14 @@ impl Ionosphere {
     ) -> Result<Box<dyn Effect>, ScenarioError> {
         match &self.truth {
             Electrons::Klobuchar(given) => {
-                let model = given.or(navigation.klobuchar).ok_or_else(|| {
+                let of_gps = given.or(navigation.klobuchar).map(|model| (model, L1_HZ));
+                let found = of_gps.or_else(|| navigation.klobuchar_navic.map(|model| (model, NAVIC_HZ)));
+                let (model, defined_hz) = found.ok_or_else(|| {
                     let reason = "the navigation file has no Klobuchar coefficients: write alpha and beta here, name \
                                   a file that has them, or remove [ionosphere]";
                     scenario.conflict("ionosphere", reason.to_owned())
                 })?;
-                Ok(Box::new(KlobucharIonosphere { model }))
+                Ok(Box::new(KlobucharIonosphere { model, defined_hz }))
             }
             Electrons::NequickG(given) => {
                 let coefficients = given.or(navigation.nequick).ok_or_else(|| {

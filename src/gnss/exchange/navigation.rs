@@ -81,6 +81,7 @@ fn ionosphere(sent: Coefficients) -> String {
     };
     match sent {
         Coefficients::Klobuchar(model) => line("GPSA", model.alpha) + &line("GPSB", model.beta),
+        Coefficients::KlobucharNavic(model) => line("IRNA", model.alpha) + &line("IRNB", model.beta),
         Coefficients::NequickG(model) => {
             let [a, b, c] = model.coefficients;
             line("GAL", [a, b, c, 0.0])
@@ -96,30 +97,29 @@ fn exponent(value: f64, digits: usize) -> String {
     format!("{mantissa}E{}{:02}", if exponent < 0 { '-' } else { '+' }, exponent.abs())
 }
 
-/// A set: a line with the clock, seven with the rest (RINEX 3.05, tables A6 and A8).
+/// A set: a line with the clock, seven with the rest (RINEX 3.05, tables A6, A8 and A18).
 fn record(set: &Ephemeris) -> String {
     let week = set.toe.week() as f64;
-    let galileo = set.sv.system == System::Galileo;
-    let fifth = if galileo {
-        [set.idot_radps, INAV_E1B, week, 0.0]
-    } else {
-        [set.idot_radps, f64::from(set.l2_codes), week, f64::from(u8::from(set.l2_p_data_off))]
+    let fifth = match set.sv.system {
+        System::Galileo => [set.idot_radps, INAV_E1B, week, 0.0],
+        System::Navic => [set.idot_radps, 0.0, week, 0.0],
+        _ => [set.idot_radps, f64::from(set.l2_codes), week, f64::from(u8::from(set.l2_p_data_off))],
     };
-    let sixth = if galileo {
-        // Bits of E1-B from 0, of E5b from 6.
-        let health = u16::from(set.health & 0b111) | u16::from(set.health >> 3 & 0b111) << 6;
-        [sisa_m(set.ura_index), f64::from(health), set.tgd2_s, set.tgd_s]
-    } else {
-        [ura_m(set.ura_index), f64::from(set.health), set.tgd_s, f64::from(set.iodc)]
+    let sixth = match set.sv.system {
+        System::Galileo => {
+            // Bits of E1-B from 0, of E5b from 6.
+            let health = u16::from(set.health & 0b111) | u16::from(set.health >> 3 & 0b111) << 6;
+            [sisa_m(set.ura_index), f64::from(health), set.tgd2_s, set.tgd_s]
+        }
+        System::Navic => [ura_m(set.ura_index), f64::from(set.health), set.tgd_s, 0.0],
+        _ => [ura_m(set.ura_index), f64::from(set.health), set.tgd_s, f64::from(set.iodc)],
     };
     // Seconds of the week of the reference time, before it too.
     let transmitted_s = set.transmitted.since(set.toe) + set.toe.tow_s();
-    let fit_h = if galileo {
-        0.0
-    } else if set.long_fit {
-        6.0
-    } else {
-        4.0
+    let fit_h = match set.long_fit {
+        _ if set.is_sent_after_reference() => 0.0,
+        true => 6.0,
+        false => 4.0,
     };
     let lines = [
         [f64::from(set.iode), set.crs_m, set.delta_n_radps, set.m0_rad],

@@ -1,8 +1,8 @@
-//! A navigation file as lines and columns: the header's lines that are used, and records of GPS LNAV and
-//! Galileo I/NAV, eight lines with a number or nothing in each field of 19 columns.
+//! A navigation file as lines and columns: the header's lines that are used, and records of GPS LNAV, Galileo
+//! I/NAV and NavIC, eight lines with a number or nothing in each field of 19 columns.
 //!
-//! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5, A6 and A8; RINEX 4.02, tables A9, A13 and
-//! A33. Where a line is missing, doubled or cut, or text is beside the fields, what follows would be read
+//! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5, A6, A8 and A18; RINEX 4.02, tables A9, A13 and
+//! A33, and those of NavIC. Where a line is missing, doubled or cut, or text is beside the fields, what follows would be read
 //! into the wrong elements; so such a record is left out and named with its line and column, and so is
 //! whatever cannot be recognised as of another system. Records of other systems and messages are counted and
 //! not read.
@@ -30,11 +30,14 @@ const FIRST: [&str; 20] = [
     "af0", "af1", "af2", "iode", "crs", "deltaN", "m0", "cuc", "e", "cus", "sqrta", "toe", "cic", "omega0", "cis",
     "i0", "crc", "omega", "omegaDot", "idot",
 ];
-/// … and the rest of an LNAV and of an I/NAV record; spare ones have no name.
+/// … and the rest of an LNAV, of an I/NAV and of a NavIC record; spare ones have no name.
 const OF_LNAV: [&str; FIELDS - FIRST.len()] =
     ["l2Codes", "week", "l2p", "accuracy", "health", "tgd", "iodc", "t_tm", "fitInt", "", ""];
 const OF_INAV: [&str; FIELDS - FIRST.len()] =
     ["sources", "week", "", "accuracy", "health", "bgdE5aE1", "bgdE5bE1", "t_tm", "", "", ""];
+const OF_NAVIC: [&str; FIELDS - FIRST.len()] = ["", "week", "", "accuracy", "health", "tgd", "", "t_tm", "", "", ""];
+/// Systems whose records are read, with the largest number of their satellites.
+const READ: [(char, System, u8); 3] = [('G', System::Gps, 32), ('E', System::Galileo, 36), ('I', System::Navic, 14)];
 /// Bits of an I/NAV record's sources: sent on E1-B or E5b, sent on E5a (F/NAV), and a clock of E5b and E1.
 const SENT_INAV: u32 = 0b101;
 const SENT_FNAV: u32 = 0b010;
@@ -82,7 +85,7 @@ const MESSAGES: [(char, &[&str]); 7] = [
     ('S', &["SBAS"]),
 ];
 
-/// A record of GPS LNAV or Galileo I/NAV in form.
+/// A record of GPS LNAV, Galileo I/NAV or NavIC in form.
 pub(super) struct Record {
     /// Number of its first line.
     pub line: usize,
@@ -94,7 +97,11 @@ pub(super) struct Record {
 impl Record {
     /// A field by its name; `None` if it is blank.
     pub fn get(&self, name: &str) -> Option<f64> {
-        let rest = if self.sv.system == System::Galileo { OF_INAV } else { OF_LNAV };
+        let rest = match self.sv.system {
+            System::Galileo => OF_INAV,
+            System::Navic => OF_NAVIC,
+            _ => OF_LNAV,
+        };
         let at = FIRST.iter().chain(&rest).position(|field| *field == name)?;
         self.values.get(at).copied().flatten()
     }
@@ -118,6 +125,8 @@ impl Record {
 pub(super) struct Contents {
     pub records: Vec<Record>,
     pub klobuchar: Option<Klobuchar>,
+    /// As NavIC sends them.
+    pub klobuchar_navic: Option<Klobuchar>,
     /// Effective ionisation coefficients of Galileo.
     pub nequick: Option<[f64; 3]>,
     pub leap_seconds: Option<i64>,
@@ -167,6 +176,7 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     form.header(header, &mut contents);
     // Of what satellites repeat, the first of the day, whatever the order in the file.
     let mut ionosphere: Option<(String, Klobuchar)> = None;
+    let mut navic: Option<(String, Klobuchar)> = None;
     let mut nequick: Option<(String, [f64; 3])> = None;
     let mut utc: Option<(String, Polynomial)> = None;
     let mut galileo: Option<(String, Polynomial)> = None;
@@ -174,7 +184,8 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     for group in body.chunk_by(|_, next| !form.begins(next.1)) {
         match form.group(group) {
             Ok(Group::Record(record)) => contents.records.push(*record),
-            Ok(Group::Ionosphere(age, found)) => keep_first(&mut ionosphere, age, found),
+            Ok(Group::Ionosphere(System::Navic, age, found)) => keep_first(&mut navic, age, found),
+            Ok(Group::Ionosphere(_, age, found)) => keep_first(&mut ionosphere, age, found),
             Ok(Group::Ionisation(age, found)) => keep_first(&mut nequick, age, found),
             Ok(Group::Utc(age, found)) => keep_first(&mut utc, age, found),
             Ok(Group::Galileo(age, found)) => keep_first(&mut galileo, age, found),
@@ -183,6 +194,7 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
         }
     }
     contents.klobuchar = contents.klobuchar.or(ionosphere.map(|(_, found)| found));
+    contents.klobuchar_navic = contents.klobuchar_navic.or(navic.map(|(_, found)| found));
     contents.nequick = contents.nequick.or(nequick.map(|(_, found)| found));
     contents.utc = contents.utc.or(utc.map(|(_, found)| found));
     contents.galileo = contents.galileo.or(galileo.map(|(_, found)| found));
@@ -205,8 +217,8 @@ fn label(line: &str) -> &str {
 /// Lines that belong together.
 enum Group {
     Record(Box<Record>),
-    /// When and by which satellite, in an order that sorts, and what it said.
-    Ionosphere(String, Klobuchar),
+    /// Of which system, when and by which satellite, in an order that sorts, and what it said.
+    Ionosphere(System, String, Klobuchar),
     /// The same of Galileo's effective ionisation.
     Ionisation(String, [f64; 3]),
     /// The same of GPS time against UTC.
@@ -240,6 +252,7 @@ impl Form {
 
     fn header(&self, lines: &[Line<'_>], contents: &mut Contents) {
         let (mut alpha, mut beta) = (None, None);
+        let (mut navic_alpha, mut navic_beta) = (None, None);
         for (number, line) in lines {
             let mut four = |start: usize, into: &mut Option<[f64; 4]>| match numbers::<4>(line, start, HEADER_FIELD) {
                 Ok(found) => *into = Some(found),
@@ -250,12 +263,14 @@ impl Form {
                 "ION BETA" if self.version < 3 => four(2, &mut beta),
                 "IONOSPHERIC CORR" if line.starts_with("GPSA") => four(5, &mut alpha),
                 "IONOSPHERIC CORR" if line.starts_with("GPSB") => four(5, &mut beta),
+                "IONOSPHERIC CORR" if line.starts_with("IRNA") => four(5, &mut navic_alpha),
+                "IONOSPHERIC CORR" if line.starts_with("IRNB") => four(5, &mut navic_beta),
                 "IONOSPHERIC CORR" if line.starts_with("GAL ") => match numbers::<3>(line, 5, HEADER_FIELD) {
                     Ok(found) => contents.nequick = Some(found),
                     Err(reason) => contents.reasons.push(format!("line {number} (IONOSPHERIC CORR): {reason}")),
                 },
                 "IONOSPHERIC CORR" => {
-                    let known = ["QZSA", "QZSB", "BDSA", "BDSB", "BDS1", "BDS2", "BDS3", "IRNA", "IRNB", "BDS "];
+                    let known = ["QZSA", "QZSB", "BDSA", "BDSB", "BDS1", "BDS2", "BDS3", "BDS "];
                     let name: String = line.chars().take(4).collect();
                     if !known.contains(&name.as_str()) {
                         contents
@@ -290,11 +305,17 @@ impl Form {
                     .push(format!("line {number}: '{unknown}': expected a label of a navigation header")),
             }
         }
-        match (alpha, beta) {
-            (Some(alpha), Some(beta)) => contents.klobuchar = Some(Klobuchar { alpha, beta }),
-            (None, None) => {}
-            _ => contents.reasons.push("the header has only one of the ionosphere's lists, alpha and beta".to_owned()),
-        }
+        let mut both = |alpha, beta| match (alpha, beta) {
+            (Some(alpha), Some(beta)) => Some(Klobuchar { alpha, beta }),
+            (None, None) => None,
+            _ => {
+                let reason = "the header has only one of the ionosphere's lists, alpha and beta";
+                contents.reasons.push(reason.to_owned());
+                None
+            }
+        };
+        let found = [both(alpha, beta), both(navic_alpha, navic_beta)];
+        [contents.klobuchar, contents.klobuchar_navic] = found;
     }
 
     fn group(&self, group: &[Line<'_>]) -> Result<Group, String> {
@@ -324,25 +345,25 @@ impl Form {
             ));
         }
         if self.version == 3 {
-            if !['G', 'E'].contains(&letter) {
+            if !READ.iter().any(|(read, ..)| *read == letter) {
                 return Ok(Group::Other);
             }
             let record = self.record(group)?;
-            let read = letter == 'G' || record.is_inav()?;
+            let read = letter != 'E' || record.is_inav()?;
             return Ok(if read { Group::Record(Box::new(record)) } else { Group::Other });
         }
         match (words.get(1).copied().unwrap_or(""), words.get(3).copied().unwrap_or("")) {
             ("EPH", message) if !messages.contains(&message) => {
                 refuse(&format!("message '{message}': expected {}", messages.join(" or ")))
             }
-            ("EPH", "LNAV" | "INAV") if ['G', 'E'].contains(&letter) => {
+            ("EPH", "LNAV" | "INAV") if READ.iter().any(|(read, ..)| *read == letter) => {
                 let rest = group.get(1..).unwrap_or_default();
                 if rest.first().is_none_or(|(_, line)| line.get(..3) != Some(satellite)) {
                     return refuse("expected the same satellite and its epoch in the line after this one");
                 }
                 self.record(rest).map(|record| Group::Record(Box::new(record)))
             }
-            ("ION", "LNAV") if letter == 'G' => self.ionosphere(group, satellite),
+            ("ION", "LNAV") if ['G', 'I'].contains(&letter) => self.ionosphere(group, satellite),
             ("ION", "IFNV") => self.ionisation(group, satellite),
             ("STO", "LNAV") if letter == 'G' => self.system_time(group, satellite),
             // Merged files name the system alone.
@@ -378,7 +399,8 @@ impl Form {
         // Version 2 leaves the letter of the only system out.
         let letter = usize::from(self.version > 2 || title.starts_with('G'));
         let number = title.get(letter..margin - usize::from(letter == 0 || self.version > 2)).unwrap_or("");
-        let (system, most) = if title.starts_with('E') { (System::Galileo, 36) } else { (System::Gps, 32) };
+        let read = READ.iter().find(|(letter, ..)| title.starts_with(*letter));
+        let (system, most) = read.map_or((System::Gps, 32), |(_, system, most)| (*system, *most));
         let Some(number) = digits::<u8>(number.trim()).filter(|number| (1..=most).contains(number)) else {
             return refuse(first, format!("column {}: PRN '{}': expected 1 to {most}", letter + 1, number.trim()));
         };

@@ -1,8 +1,8 @@
 //! Records of a navigation file as ephemerides: every element held against the range of its field in the
 //! message.
 //!
-//! Source: IS-GPS-200N, tables 20-I and 20-III; Galileo OS SIS ICD 2.1, tables 57, 62 and 64; RINEX 4.02,
-//! tables A9 and A13.
+//! Source: IS-GPS-200N, tables 20-I and 20-III; Galileo OS SIS ICD 2.1, tables 57, 62 and 64; IRNSS SIS ICD for
+//! SPS 1.1, subframes 1 and 2; RINEX 3.05, table A18; RINEX 4.02, tables A9 and A13.
 
 use super::columns::Record;
 use crate::gnss::broadcast::Ephemeris;
@@ -51,7 +51,7 @@ pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
         toe,
         toc,
         m0_rad: both("m0", ANGLE_RAD)?,
-        delta_n_radps: both("deltaN", 1.171e-8)?,
+        delta_n_radps: both("deltaN", if record.sv.system == System::Navic { 2.997e-6 } else { 1.171e-8 })?,
         omega0_rad: both("omega0", ANGLE_RAD)?,
         omega_dot_radps: both("omegaDot", 2.997e-6)?,
         omega_rad: both("omega", ANGLE_RAD)?,
@@ -65,7 +65,34 @@ pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
         cis_rad: both("cis", HARMONIC_RAD)?,
         ..Ephemeris::blank(record.sv, toe)
     };
-    if record.sv.system == System::Galileo { galileo(record, common) } else { gps(record, common) }
+    match record.sv.system {
+        System::Galileo => galileo(record, common),
+        System::Navic => navic(record, common),
+        _ => gps(record, common),
+    }
+}
+
+/// The rest of a NavIC set (IRNSS SIS ICD for SPS 1.1, subframes 1 and 2). Health is a bit each of S and L5.
+fn navic(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
+    let both = |name, most: f64| field(record, name, -most, most);
+    let issue = whole(record, "iode", 255)? as u16;
+    if common.toe != common.toc {
+        return Err(format!("toe = {}: expected the record's epoch, {}", common.toe, common.toc));
+    }
+    Ok(Ephemeris {
+        transmitted: transmitted(record, common.toe, common.toe),
+        iode: issue,
+        iodc: issue,
+        ura_index: ura_index(optional_accuracy(record)?),
+        health: whole(record, "health", 3)? as u8,
+        sqrt_a_sqrtm: field(record, "sqrta", 6450.0, 6540.0)?,
+        eccentricity: field(record, "e", 0.0, 0.1)?,
+        af0_s: both("af0", 9.766e-4)?,
+        af1_sps: both("af1", 3.726e-9)?,
+        af2_sps2: both("af2", 3.553e-15)?,
+        tgd_s: both("tgd", 5.961e-8)?,
+        ..common
+    })
 }
 
 /// The rest of an LNAV set (IS-GPS-200N, tables 20-I and 20-III).

@@ -43,8 +43,8 @@ const GRADIENT_RAD: [f64; 2] = [10.0 / 180.0 * PI, 20.0 / 180.0 * PI];
 /// The delays that a model foresees.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Delays {
-    /// By a formula for every place.
-    Klobuchar(Klobuchar),
+    /// By a formula for every place, which gives the delay on a carrier.
+    Klobuchar(Klobuchar, f64),
     /// By the electrons on the way to each satellite, in TECU, from near where the receiver is.
     Electrons(Vec<(Sv, f64)>),
 }
@@ -53,8 +53,10 @@ impl Delays {
     /// Delay of a range that is received at a place from a direction, in seconds.
     pub fn delay_s(&self, range: &Range, user: Geodetic, look: Look, received: Epoch) -> f64 {
         match self {
-            Self::Klobuchar(_) if user.height_m > IONOSPHERE_TOP_M => 0.0,
-            Self::Klobuchar(model) => model.delay_s(user, look, received, range.carrier_hz),
+            Self::Klobuchar(..) if user.height_m > IONOSPHERE_TOP_M => 0.0,
+            Self::Klobuchar(model, defined_hz) => {
+                model.delay_from_s(*defined_hz, user, look, received, range.carrier_hz)
+            }
             Self::Electrons(contents) => {
                 let own = contents.iter().find(|(sv, _)| *sv == range.sv);
                 own.map_or(0.0, |(_, tecu)| nequick::delay_s(*tecu, range.carrier_hz))

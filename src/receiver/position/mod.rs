@@ -15,7 +15,8 @@ use thiserror::Error;
 
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::ionosphere::{Coefficients, Model, NAVIC_HZ};
+use crate::gnss::klobuchar::L1_HZ;
 use crate::gnss::record::{ClockRow, Fix, IonosphereModel, Observation, SightRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
@@ -69,11 +70,12 @@ impl IonosphereChoice {
             let messages = signals.iter().flat_map(|signal| signal.components.iter().filter_map(|c| c.message));
             messages.into_iter().any(|message| message.ionosphere.model == model).then_some(model)
         };
+        let klobuchar = Model::KLOBUCHAR.into_iter().find_map(brought);
         match self {
             Self::None => None,
-            Self::Klobuchar => Some(Model::Klobuchar),
+            Self::Klobuchar => Some(klobuchar.unwrap_or(Model::Klobuchar)),
             Self::NequickG => Some(Model::NequickG),
-            Self::Combined | Self::Broadcast => brought(Model::Klobuchar).or_else(|| brought(Model::NequickG)),
+            Self::Combined | Self::Broadcast => klobuchar.or_else(|| brought(Model::NequickG)),
         }
     }
 }
@@ -403,10 +405,13 @@ impl Solver {
         }
         let (delays, model) = match sent {
             None => {
-                let nominal = Ionosphere::Uncertain(Delays::Klobuchar(NOMINAL), NOMINAL_ERROR);
+                let nominal = Ionosphere::Uncertain(Delays::Klobuchar(NOMINAL, L1_HZ), NOMINAL_ERROR);
                 return (nominal, IonosphereModel::Nominal);
             }
-            Some(Coefficients::Klobuchar(model)) => (Delays::Klobuchar(model), IonosphereModel::Broadcast),
+            Some(Coefficients::Klobuchar(model)) => (Delays::Klobuchar(model, L1_HZ), IonosphereModel::Broadcast),
+            Some(Coefficients::KlobucharNavic(model)) => {
+                (Delays::Klobuchar(model, NAVIC_HZ), IonosphereModel::Broadcast)
+            }
             Some(Coefficients::NequickG(model)) => {
                 (Delays::Electrons(self.electrons.of(model, ranges, place_m)), IonosphereModel::NequickG)
             }

@@ -9,7 +9,7 @@ use super::{IonosphereChoice, Solver, SystemClocks};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::Observation;
-use crate::gnss::satellite::{Sv, System};
+use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 use crate::gnss::time::GPST;
 
@@ -109,10 +109,10 @@ fn range(
     cn0_hz: f64,
 ) -> Option<Range> {
     let sent = observation.sent();
-    let half_s = match ephemeris.sv.system {
-        System::Galileo => 0.5 * ephemeris.fit_interval_s(),
-        _ if ephemeris.long_fit => HALF_LONG_FIT_S,
-        _ => HALF_FIT_S,
+    let half_s = match ephemeris.long_fit {
+        _ if ephemeris.is_sent_after_reference() => 0.5 * ephemeris.fit_interval_s(),
+        true => HALF_LONG_FIT_S,
+        false => HALF_FIT_S,
     } + FIT_GRACE_S;
     if !ephemeris.is_healthy() || sent.since(ephemeris.toe).abs() > half_s {
         return None;

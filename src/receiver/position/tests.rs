@@ -6,6 +6,7 @@ use super::{NoFix, chi_square_threshold, consistent};
 use crate::gnss::broadcast::{ClockState, State};
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
 use crate::gnss::gps::l1ca::L1_CA;
+use crate::gnss::klobuchar::L1_HZ;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, GPST};
 
@@ -185,7 +186,7 @@ fn the_covariance_holds_an_ionospheric_error_that_all_satellites_share() {
     let truth_m = place().to_ecef();
     let up = place().ecef_to_enu().row(2).transpose();
     let corrections =
-        Corrections { ionosphere: Ionosphere::Uncertain(Delays::Klobuchar(NOMINAL), NOMINAL_ERROR), ..BARE };
+        Corrections { ionosphere: Ionosphere::Uncertain(Delays::Klobuchar(NOMINAL, L1_HZ), NOMINAL_ERROR), ..BARE };
     let (mut state, runs) = (5, 4000);
     let axes = place().ecef_to_enu();
     let (mut nees, mut chi_square, mut squares, mut stated, mut north) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -227,8 +228,8 @@ fn a_model_without_error_is_solved_as_a_known_one() {
     let none = DelayError { share: 0.0, least_m: 0.0 };
     let at = |ionosphere| position(&all, Vector3::zeros(), &Corrections { ionosphere, ..BARE }).unwrap();
     let (known, uncertain) = (
-        at(Ionosphere::Known(Delays::Klobuchar(NOMINAL))),
-        at(Ionosphere::Uncertain(Delays::Klobuchar(NOMINAL), none)),
+        at(Ionosphere::Known(Delays::Klobuchar(NOMINAL, L1_HZ))),
+        at(Ionosphere::Uncertain(Delays::Klobuchar(NOMINAL, L1_HZ), none)),
     );
     assert_eq!((known.position_m, known.covariance), (uncertain.position_m, uncertain.covariance));
     assert_eq!(uncertain.ionosphere_error, Vector3::zeros());

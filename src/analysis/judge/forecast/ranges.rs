@@ -58,9 +58,9 @@ impl Choices {
         let ionosphere = match word("ionosphere")? {
             "none" => None,
             "nequick_g" => Some(Model::NequickG),
-            "klobuchar" => Some(Model::Klobuchar),
+            "klobuchar" => Some(klobuchar(run)),
             _ if used(IonosphereModel::NequickG) => Some(Model::NequickG),
-            _ => Some(Model::Klobuchar),
+            _ => Some(klobuchar(run)),
         };
         Some(Self {
             loops: Settings::of(run)?,
@@ -72,6 +72,16 @@ impl Choices {
             ionosphere_error_share: number("ionosphere_error_share").unwrap_or(0.0),
         })
     }
+}
+
+/// The form of Klobuchar's model that the messages brought which the receiver read, the one that it prefers.
+fn klobuchar(run: &Run) -> Model {
+    let messages = || run.signals.iter().flat_map(|signal| signal.components.iter().filter_map(|c| c.message));
+    let brought = |model: &Model| {
+        let names: Vec<&str> = messages().filter(|own| own.ionosphere.model == *model).map(|own| own.name).collect();
+        run.navigation.iter().any(|row| names.contains(&row.message.as_str()))
+    };
+    Model::KLOBUCHAR.into_iter().find(brought).unwrap_or(Model::Klobuchar)
 }
 
 /// That of every signal; `None` where one has none.
@@ -276,7 +286,8 @@ impl<'r> Scene<'r> {
         let (satellite_m, computed_m) = computed_m(ephemeris, true_row, place)?;
         let carrier_hz = true_row.link().carrier_hz();
         let sent = self.choices.ionosphere.and_then(|model| self.message.ionosphere(model));
-        let reached = |own: &&Coefficients| own.model() != Model::Klobuchar || user.height_m <= IONOSPHERE_TOP_M;
+        let is_formula = |own: &Coefficients| Model::KLOBUCHAR.contains(&own.model());
+        let reached = |own: &&Coefficients| !is_formula(own) || user.height_m <= IONOSPHERE_TOP_M;
         let ionosphere_m = match sent.filter(reached) {
             // A correction of what the scene does not have is an error, not an expectation.
             Some(model) if sky.ionosphere_m != 0.0 => {

@@ -3,6 +3,7 @@
 use super::numbers::{fields, number_of, numbers};
 use super::{FIELD, Form, GALILEO, GALILEO_OLD, Group, Line, Polynomial, UTC};
 use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::satellite::System;
 
 impl Form {
     /// Klobuchar's coefficients in a record of version 4.
@@ -32,7 +33,8 @@ impl Form {
         match coefficients.as_deref() {
             Some(&[a0, a1, a2, a3, b0, b1, b2, b3]) => {
                 let found = Klobuchar { alpha: [a0, a1, a2, a3], beta: [b0, b1, b2, b3] };
-                Ok(Group::Ionosphere(format!("{epoch} {satellite}"), found))
+                let system = if satellite.starts_with('I') { System::Navic } else { System::Gps };
+                Ok(Group::Ionosphere(system, format!("{epoch} {satellite}"), found))
             }
             _ => refuse(one.0, "expected eight coefficients".to_owned()),
         }

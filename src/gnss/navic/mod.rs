@@ -1,0 +1,4 @@
+//! NavIC (IRNSS): one file for its signals, one folder for the message.
+
+pub mod nav;
+pub mod sps;

@@ -1,0 +1,296 @@
+//! NavIC's message on L5 and S: subframes of twelve seconds, encoded and decoded.
+//!
+//! Source: IRNSS SIS ICD for SPS 1.1, data structure. A subframe is a pattern of 16 symbols and 292 bits, the
+//! last six of them zeros, coded ([`Convolutional`]) and interleaved ([`Interleaver`]); four of them are a
+//! frame. Subframes 1 and 2 carry a set of elements, subframes 3 and 4 a message each: here 11 (ionosphere) and
+//! 26 (UTC) in turn in subframe 3, and 7 (almanac) in subframe 4, for the document leaves their order open. A
+//! set has its issue in subframe 1 alone: what shows that both subframes are of one set is that their reference
+//! times agree, as they do in all real ones that were looked at. Limits: earth orientation is sent as zeros,
+//! and so is the second model of type 26, another system's time; types 5 (ionosphere by a grid), 9, 14 and 18
+//! are not sent, and not read. Flags of alert and of autonomous navigation are zero.
+
+mod fields;
+mod reader;
+
+use crate::gnss::bits::{
+    Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
+};
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::crc::crc24q;
+use crate::gnss::fec::convolutional::Convolutional;
+use crate::gnss::fec::interleaver::Interleaver;
+use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::message::{Common, IonosphereForm, Message, Sender};
+use crate::gnss::satellite::{Sv, System};
+use crate::gnss::time::{Epoch, WEEK_S};
+use fields::{Almanac, MESSAGE_7, MESSAGE_11, MESSAGE_26, SUBFRAME_1, SUBFRAME_2, Utc};
+pub use fields::{DATA_BITS, Subframe, tables};
+pub use reader::NavReader;
+
+/// NavIC's message as signals name it.
+pub static SPS_NAV: Message = Message {
+    name: "SPS NAV",
+    symbol_s: 0.02,
+    unit_s: SUBFRAME_S,
+    first_s: 0,
+    sender: |common| Ok(Box::new(Subframes { common: common.clone() })),
+    number: subframe_at,
+    timed: &[1, 2, 3, 4],
+    set: &[1, 2],
+    reduced: &[],
+    ionosphere: IonosphereForm {
+        model: Model::KlobucharNavic,
+        unit: |start| subframe_at(start) == 3 && message_at(start) == ELECTRONS,
+        coefficients: |raw| {
+            let mut page = blank();
+            for field in MESSAGE_11.iter().map(|element| &element.field) {
+                field.write(&mut page, raw(field.name)?);
+            }
+            Some(coefficients(&page))
+        },
+    },
+    set_parameters: || of_set().into_iter().flatten().map(|element| element.field.name).collect(),
+    elements: of_integers,
+    parameters: |symbols| {
+        let subframe = decode_soft(&soft(symbols))?;
+        let found = parameters(&subframe);
+        (!found.is_empty()).then(|| (matches!(id(&subframe), 1 | 2), found))
+    },
+    reader: |sv| Box::new(NavReader::new(sv)),
+    quantised,
+    adjustable,
+    alert: None,
+    adjust,
+};
+
+/// Continuous GPS week of week 0 of NavIC's time, which began on 1999-08-22.
+pub const NAVIC_WEEK: i64 = 1024;
+/// Seconds of a subframe, and of a frame.
+const SUBFRAME_S: i64 = 12;
+const FRAME_S: i64 = 48;
+/// Subframes of a week: the count of the next one's beginning runs below it.
+const TOW_COUNTS: i64 = WEEK_S / SUBFRAME_S;
+/// Symbols of the pattern with which a subframe begins, EB90 in hexadecimal, and of a subframe.
+const PATTERN: u16 = 0xEB90;
+const PATTERN_SYMBOLS: usize = 16;
+const SUBFRAME_SYMBOLS: usize = 600;
+/// Bits of the check and of the tail of zeros.
+const CHECK_BITS: usize = 24;
+const TAIL_BITS: usize = 6;
+/// What real satellites have in the telemetry word.
+const TELEMETRY: u32 = 0x8B;
+/// Message types of subframes 3 and 4.
+const NOTHING: u32 = 0;
+const ALMANAC: u32 = 7;
+const ELECTRONS: u32 = 11;
+const UTC: u32 = 26;
+
+/// Places of what all subframes, and all messages, have.
+const COUNT: (u16, u8) = (8, 17);
+const ID: (u16, u8) = (27, 2);
+const MESSAGE: (u16, u8) = (30, 6);
+const SENDER: (u16, u8) = (256, 6);
+
+const CODE: Convolutional = Convolutional { second_inverted: false };
+const INTERLEAVER: Interleaver = Interleaver { columns: 73, rows: 8 };
+
+fn blank() -> Subframe {
+    Subframe([false; DATA_BITS])
+}
+
+/// Number of the subframe that begins at a time.
+fn subframe_at(start: Epoch) -> u8 {
+    (start.tow_whole_s() / SUBFRAME_S % 4 + 1) as u8
+}
+
+/// Type of the message in subframe 3 or 4 that begins at a time.
+fn message_at(start: Epoch) -> u32 {
+    let frame = start.tow_whole_s() / FRAME_S;
+    match subframe_at(start) {
+        3 if frame % 2 == 0 => ELECTRONS,
+        3 => UTC,
+        _ => ALMANAC,
+    }
+}
+
+/// Number of a subframe by what it says.
+pub fn id(subframe: &Subframe) -> u8 {
+    subframe.piece(ID) as u8 + 1
+}
+
+/// Type of the message that a subframe carries; 0 also for subframes 1 and 2.
+pub fn message_type(subframe: &Subframe) -> u32 {
+    if id(subframe) > 2 { subframe.piece(MESSAGE) } else { NOTHING }
+}
+
+/// Seconds of the week at which a subframe began; `None` for a count that no week has.
+fn began_s(subframe: &Subframe) -> Option<i64> {
+    let count = i64::from(subframe.piece(COUNT));
+    let ahead = planted!("gnss.navic.time_read", 1, 0);
+    (count < TOW_COUNTS).then(|| (count - ahead).rem_euclid(TOW_COUNTS) * SUBFRAME_S)
+}
+
+/// Makes the subframes of satellites.
+struct Subframes {
+    common: Common,
+}
+
+impl Sender for Subframes {
+    fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        if start.tow_whole_s() % SUBFRAME_S != 0 || start.fraction() != 0.0 {
+            let expected = "a multiple of 12 s";
+            return Err(FieldError::Start { message: SPS_NAV.name, start_s: start.tow_s(), expected });
+        }
+        let mut subframe = blank();
+        let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
+        match subframe_at(start) {
+            1 => {
+                check(ephemeris)?;
+                write_all(&SUBFRAME_1, &on_air, &mut subframe)?;
+            }
+            2 => write_all(&SUBFRAME_2, &on_air, &mut subframe)?,
+            _ => self.message(&mut subframe, ephemeris.sv, start)?,
+        }
+        subframe.set_piece((0, 8), TELEMETRY);
+        let ahead = planted!("gnss.navic.time_sent", 1, 0);
+        subframe.set_piece(COUNT, ((start.tow_whole_s() / SUBFRAME_S + ahead) % TOW_COUNTS) as u32);
+        subframe.set_piece(ID, u32::from(subframe_at(start) - 1));
+        Ok(encode(&subframe))
+    }
+}
+
+impl Subframes {
+    /// Puts the message of the time into subframe 3 or 4; type 0, which says nothing, where nothing is known.
+    fn message(&self, subframe: &mut Subframe, sender: Sv, start: Epoch) -> Result<(), FieldError> {
+        let own: Vec<&Ephemeris> = self.common.almanac.iter().filter(|set| set.sv.system == System::Navic).collect();
+        let frame = (start.tow_whole_s() / FRAME_S) as usize;
+        let next = own.get(frame % own.len().max(1));
+        let kind = match (message_at(start), self.common.klobuchar_navic, next) {
+            (ELECTRONS, Some(klobuchar), _) => {
+                write_all(&MESSAGE_11, &klobuchar, subframe)?;
+                ELECTRONS
+            }
+            (UTC, ..) => {
+                write_all(&MESSAGE_26, &Utc::of(&self.common, start), subframe)?;
+                UTC
+            }
+            (ALMANAC, _, Some(set)) => {
+                let reference = self.common.reference.unwrap_or(start);
+                write_all(&MESSAGE_7, &Almanac::of(set, reference), subframe)?;
+                ALMANAC
+            }
+            _ => NOTHING,
+        };
+        subframe.set_piece(MESSAGE, kind);
+        subframe.set_piece(SENDER, u32::from(sender.number));
+        Ok(())
+    }
+}
+
+/// The symbols of a subframe, with check and tail.
+pub fn encode(subframe: &Subframe) -> Vec<bool> {
+    let check = bits_of(u128::from(crc24q(subframe.0)), CHECK_BITS);
+    let bits: Vec<bool> = subframe.0.into_iter().chain(check).chain([false; TAIL_BITS]).collect();
+    let pattern = bits_of(u128::from(PATTERN), PATTERN_SYMBOLS);
+    pattern.chain(INTERLEAVER.interleave(&CODE.encode(&bits))).collect()
+}
+
+/// The subframe in soft symbols the right way up, its pattern among them; `None` where its check fails.
+pub fn decode_soft(symbols: &[f32]) -> Option<Subframe> {
+    let coded = symbols.get(PATTERN_SYMBOLS..SUBFRAME_SYMBOLS)?;
+    let bits = CODE.decode(&INTERLEAVER.deinterleave(coded));
+    let (data, rest) = bits.split_at_checked(DATA_BITS)?;
+    let check = number(rest.get(..CHECK_BITS)?) as u32;
+    let data: [bool; DATA_BITS] = data.try_into().ok()?;
+    (crc24q(data) == check).then_some(Subframe(data))
+}
+
+fn soft(symbols: &[bool]) -> Vec<f32> {
+    symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect()
+}
+
+/// The raw integers of all parameters of a subframe; none for messages that are not read.
+pub fn parameters(subframe: &Subframe) -> Vec<(&'static str, i64)> {
+    match (id(subframe), message_type(subframe)) {
+        (1, _) => integers(&SUBFRAME_1, subframe),
+        (2, _) => integers(&SUBFRAME_2, subframe),
+        (_, ALMANAC) => integers(&MESSAGE_7, subframe),
+        (_, ELECTRONS) => integers(&MESSAGE_11, subframe),
+        (_, UTC) => integers(&MESSAGE_26, subframe),
+        _ => Vec::new(),
+    }
+}
+
+/// What message type 11 says of the ionosphere.
+fn coefficients(subframe: &Subframe) -> Coefficients {
+    let mut found = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
+    read_all(&MESSAGE_11, subframe, &mut found);
+    Coefficients::KlobucharNavic(found)
+}
+
+fn of_set() -> [&'static [Element<Ephemeris>]; 2] {
+    [&SUBFRAME_1, &SUBFRAME_2]
+}
+
+/// The elements that raw integers give, as if their subframes had been sent at `near`.
+fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option<Ephemeris> {
+    let mut found = Ephemeris::blank(sv, near);
+    for table in of_set() {
+        let mut subframe = blank();
+        for field in table.iter().map(|element| &element.field) {
+            field.write(&mut subframe, raw(field.name)?);
+        }
+        read_all(table, &subframe, &mut found);
+    }
+    (found.toe == found.toc).then_some(found)
+}
+
+/// The elements in subframes 1 and 2 with the time at which subframe 1 was sent; `None` where they are not of
+/// one set.
+pub fn elements(sv: Sv, one: &Subframe, two: &Subframe, near: Epoch) -> Option<Ephemeris> {
+    let mut found = Ephemeris::blank(sv, sent_at(one, near)?);
+    read_all(&SUBFRAME_1, one, &mut found);
+    read_all(&SUBFRAME_2, two, &mut found);
+    (found.toe == found.toc).then_some(found)
+}
+
+/// When subframe 1 began, by its own week near `near`.
+pub fn sent_at(one: &Subframe, near: Epoch) -> Option<Epoch> {
+    let week = integers(&SUBFRAME_1, one).iter().find(|(name, _)| *name == "week").map(|(_, raw)| *raw)?;
+    let week = near.nearest_week(week + NAVIC_WEEK, 1024);
+    Some(Epoch::new(week * WEEK_S + began_s(one)?, 0.0))
+}
+
+/// Nothing but equal reference times shows a receiver that subframes 1 and 2 belong together.
+fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
+    if ephemeris.toe == ephemeris.toc {
+        Ok(())
+    } else {
+        Err(FieldError::References { toe_s: ephemeris.toe.tow_s(), toc_s: ephemeris.toc.tow_s() })
+    }
+}
+
+/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+///
+/// # Errors
+/// A value that the message cannot carry.
+pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+    check(ephemeris)?;
+    let mut sent = ephemeris.clone();
+    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut sent))?;
+    Ok(sent)
+}
+
+/// Parameters by which sets are distinguished, and the health, which has a fault of its own.
+const FIXED_PARAMETERS: [&str; 5] = ["week", "iodec", "toc_s", "toe_s", "health"];
+
+fn adjustable() -> Vec<&'static str> {
+    let names = of_set().into_iter().flatten().map(|element| element.field.name);
+    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
+}
+
+/// Adds `by` to a parameter of subframes 1 and 2 in the unit of the tables; whether there is one.
+pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+    of_set().into_iter().any(|table| add_to(table, parameter, ephemeris, by))
+}
