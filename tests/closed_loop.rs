@@ -124,6 +124,30 @@ fn galileo_alone_finds_its_place_to_half_a_metre() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
+/// NavIC's bars: its four satellites give a PDOP of 4.7 and no redundancy, so a metre and a half; subframes 1 and 2 are
+/// whole 28 s after the start and the ionosphere, without which there is no fix, 40 s after it.
+#[test]
+fn navic_alone_finds_its_place_by_four_satellites_that_turn_with_the_earth() {
+    let scene = include_str!("../scenarios/navic.toml")
+        .replace("sample_rate_hz = 2.6e6", "sample_rate_hz = 2.1e6")
+        .replace("duration_s = 70", "duration_s = 58");
+    assert!(scene.contains("2.1e6") && scene.contains("duration_s = 58"));
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("navic.toml");
+    std::fs::write(&path, scene).unwrap();
+    let file = "navic_2026-03-09_10h_12h.rnx";
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(file);
+    std::fs::copy(beside, place.path().join(file)).unwrap();
+    let summary = run_with(&path, &["--check".as_ref()]);
+    found_and_decoded_what_is_there(&summary);
+    assert_eq!(number(&summary, "/satellites/used"), 4.0);
+    at_most(&summary, "/position/horizontal_p95_m", 1.5);
+    let first_s = number(&summary, "/position/first_fix_s");
+    assert!((40.0..44.0).contains(&first_s), "{first_s}");
+    assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
+    assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
+}
+
 #[test]
 fn real_samples_at_an_if_with_a_mirrored_spectrum_close_the_loop_as_well() {
     let scene = include_str!("../scenarios/static.toml")
