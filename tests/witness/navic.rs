@@ -342,9 +342,9 @@ fn a_day_of_real_records_is_read_and_its_orbits_turn_with_the_earth_and_agree_wi
             apart_m.sort_by(f64::total_cmp);
             let of = |share: f64| apart_m[(share * (apart_m.len() - 1) as f64) as usize];
             println!("{name} {sv}: {} pairs, {:.2} {:.2} {:.2} m apart", apart_m.len(), of(0.5), of(0.95), of(1.0));
-            // Their orbits are known to metres, those of I06 to ten, and step with uploads; a wrong sign among
-            // harmonics of hundreds of metres would show in every pair.
-            assert!(of(0.5) < 15.0 && of(1.0) < 150.0, "{sv}");
+            // NavIC's broadcast orbits step by metres to tens of metres from upload to upload: medians of 0.1 to
+            // 16.5 m and steps up to 98 m were found. A number read into another element is off by kilometres.
+            assert!(of(0.5) < 30.0 && of(1.0) < 200.0, "{sv}");
         }
     }
 }
@@ -424,7 +424,8 @@ const DECODED: [(u8, [f64; 9]); 5] = [
     ),
 ];
 /// The first four coefficients of the ionosphere, decoded and printed likewise.
-const IONOSPHERE: [f64; 4] = [2.980232238769531e-8, 3.874301910400390e-7, -2.562999725341796e-6, -7.510185241699216e-6];
+const IONOSPHERE: [f64; 4] =
+    [2.980232238769531e-8, 3.874_301_910_400_39e-7, -2.562999725341796e-6, -7.510185241699216e-6];
 
 #[test]
 fn almanacs_and_coefficients_that_a_receiver_decoded_are_whole_numbers_of_our_steps() {
@@ -440,7 +441,7 @@ fn almanacs_and_coefficients_that_a_receiver_decoded_are_whole_numbers_of_our_st
         "almanac_af1_sps",
     ];
     // Digits after the point, or of the mantissa, that are printed.
-    let digits = [1e-9, 1e-9, 1e-19, 1e-9, 1e-9, 1e-9, 1e-9, 1e-9, 1e-20];
+    let digits = [1e-9, 1e-9, 1e-18, 1e-9, 1e-9, 1e-9, 1e-9, 1e-9, 1e-20];
     let tables = nav::tables();
     let field = |table: &str, name: &str| {
         let (_, fields) = tables.iter().find(|(own, _)| *own == table).unwrap();
