@@ -124,8 +124,8 @@ fn galileo_alone_finds_its_place_to_half_a_metre() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
-/// NavIC's bars: its four satellites give a PDOP of 4.7 and no redundancy, so a metre and a half; subframes 1 and 2 are
-/// whole 28 s after the start and the ionosphere, without which there is no fix, 40 s after it.
+/// NavIC's bars: its four satellites give a PDOP of 4.7 and no redundancy, so a metre and a half; subframes 1
+/// and 2 are whole 28 s after the start and the ionosphere, without which there is no fix, 40 s after it.
 #[test]
 fn navic_alone_finds_its_place_by_four_satellites_that_turn_with_the_earth() {
     let scene = include_str!("../scenarios/navic.toml")

@@ -29,7 +29,8 @@ const COMPARABLE_S: f64 = 6.0 * 3600.0;
 /// they are at most six hours apart.
 const CONTRADICTION_M: f64 = 2000.0;
 /// The longest time from the reference time of a set that is sent after it to its first sending: Galileo's
-/// records of 2020 have 11 min at least; of 283 records of NavIC of a day in 2026 all but one have 12 s to 252 s.
+/// records of 2020 have 11 min at least; of 283 records of NavIC of a day in 2026 all but one have 12 s to
+/// 252 s.
 const DELAY_S: f64 = 600.0;
 /// The same for clocks: 300 m.
 const CONTRADICTION_S: f64 = 1e-6;
@@ -267,7 +268,8 @@ fn contradict(a: &Ephemeris, b: &Ephemeris) -> bool {
 }
 
 /// Whether elements are those of the nominal constellation (the fields are wider): a 12 h sidereal orbit of
-/// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo, and one of a day, 0° to 33°, for NavIC.
+/// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo, and one of a day, 0° to 33°, for
+/// NavIC.
 fn plausible(set: &Ephemeris) -> bool {
     let (sqrt_a_sqrtm, inclinations_deg) = match set.sv.system {
         System::Galileo => (5440.6, 52.0..60.0),

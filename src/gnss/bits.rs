@@ -65,7 +65,7 @@ pub enum FieldError {
     },
     /// Reference times that a message cannot show to belong together.
     #[error(
-        "toe = {toe_s} s and toc = {toc_s} s of the week: expected the same, as NavIC's message has no other mark of a set"
+        "toe = {toe_s} s and toc = {toc_s} s of the week: expected the same, as the message has no other mark of a set"
     )]
     References {
         /// Of the orbit.

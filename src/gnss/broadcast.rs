@@ -384,8 +384,8 @@ impl Ephemeris {
     /// By how much less than [`Self::clock`] the clock reads for a user of `signal` alone.
     ///
     /// A signal without a delay of its own has T_GD · (f_L1/f)²: the clock is that of two carriers whose
-    /// combination is free of what goes with 1/f² (IS-GPS-200N, 20.3.3.3.3.2, equation for L2). NavIC's T_GD is
-    /// that of S (IRNSS SIS ICD for SPS 1.1, user algorithms).
+    /// combination is free of what goes with 1/f² (IS-GPS-200N, 20.3.3.3.3.2, equation for L2). NavIC's T_GD
+    /// is that of S (IRNSS SIS ICD for SPS 1.1, user algorithms).
     pub fn group_delay_s(&self, signal: &Signal) -> f64 {
         let own = self.signal_delays_s.iter().find(|(name, _)| *name == signal.name);
         let ratio = Constants::of(self.sv.system).delay_carrier_hz / signal.carrier_hz(self.sv);

@@ -29,7 +29,8 @@ pub enum Coefficients {
     KlobucharNavic(Klobuchar),
 }
 
-/// Carrier on which NavIC's coefficients give the delay (IRNSS SIS ICD for SPS 1.1: they are for users of L5).
+/// Carrier on which NavIC's coefficients give the delay (IRNSS SIS ICD for SPS 1.1: they are for users of
+/// L5).
 pub const NAVIC_HZ: f64 = 1_176.45e6;
 
 impl Model {

@@ -1,5 +1,6 @@
-//! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV, Galileo I/NAV and NavIC, the coefficients
-//! of these systems' ionosphere, times of GPS and Galileo against each other and UTC, and the leap seconds.
+//! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV, Galileo I/NAV and NavIC, the
+//! coefficients of these systems' ionosphere, times of GPS and Galileo against each other and UTC, and the
+//! leap seconds.
 //!
 //! Source: RINEX 2.11, table A4; RINEX 3.05, tables A6, A8 and A18; RINEX 4.02. Lines and columns are read in
 //! `columns`; `elements` holds every element against the range of its field in the message. A record that

@@ -14,15 +14,17 @@ use crate::gnss::time::{Epoch, Rate, SampleClock, WEEK_S};
 use crate::receiver::decode::Decoder;
 use crate::receiver::track::Measurement;
 
-/// Travel time to the nearest satellite in a medium orbit that is assumed when the clock is set from satellites
-/// alone.
+/// Travel time to the nearest satellite in a medium orbit that is assumed when the clock is set from
+/// satellites alone.
 const NEAREST_TRAVEL_S: f64 = 0.070;
-/// How much longer it is to a satellite that turns with the Earth, at 42 164 km from its centre and not 26 560.
+/// How much longer it is to a satellite that turns with the Earth, at 42 164 km from its centre and not 26
+/// 560.
 const FARTHER_S: f64 = 0.052;
 /// Semi-major axis between both kinds.
 const BETWEEN_M: f64 = 35e6;
 /// Departure of a travel time from the median of all, less the time to a medium orbit. From near the Earth
-/// they lie between 60 and 95 ms, and from 119 to 140 ms; from anywhere two satellites differ by 53 200 km at most, the width of their orbits.
+/// they lie between 60 and 95 ms, and from 119 to 140 ms; from anywhere two satellites differ by 53 200 km at
+/// most, the width of their orbits.
 const NEAR_SPREAD_S: f64 = 0.035;
 const FAR_SPREAD_S: f64 = 0.178;
 /// A receiver is far away where this share of all satellites departs by more than from near the Earth: wrong

@@ -342,15 +342,16 @@ fn a_day_of_real_records_is_read_and_its_orbits_turn_with_the_earth_and_agree_wi
             apart_m.sort_by(f64::total_cmp);
             let of = |share: f64| apart_m[(share * (apart_m.len() - 1) as f64) as usize];
             println!("{name} {sv}: {} pairs, {:.2} {:.2} {:.2} m apart", apart_m.len(), of(0.5), of(0.95), of(1.0));
-            // NavIC's broadcast orbits step by metres to tens of metres from upload to upload: medians of 0.1 to
-            // 16.5 m and steps up to 98 m were found. A number read into another element is off by kilometres.
+            // NavIC's broadcast orbits step by metres to tens of metres from upload to upload: medians of 0.1
+            // to 16.5 m and steps up to 98 m were found. A number read into another element is off by
+            // kilometres.
             assert!(of(0.5) < 30.0 && of(1.0) < 200.0, "{sv}");
         }
     }
 }
 
-/// PRN, eccentricity, i0, rate of the node, root of the axis, node, perigee, mean anomaly, clock and its drift of
-/// almanacs as a receiver decoded them from real satellites, printed in its manual.
+/// PRN, eccentricity, i0, rate of the node, root of the axis, node, perigee, mean anomaly, clock and its
+/// drift of almanacs as a receiver decoded them from real satellites, printed in its manual.
 const DECODED: [(u8, [f64; 9]); 5] = [
     (
         6,

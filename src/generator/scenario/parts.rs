@@ -175,8 +175,8 @@ fn messages(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris
         .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
 }
 
-/// What NavIC's satellites send of the ionosphere: as the file has it, or else the bulge of GPS's model, where
-/// that is the scene's or the file has nothing of NavIC.
+/// What NavIC's satellites send of the ionosphere: as the file has it, or else the bulge of GPS's model,
+/// where that is the scene's or the file has nothing of NavIC.
 fn klobuchar_navic(scenario: &Scenario, navigation: &Navigation) -> Option<Klobuchar> {
     let scene = scenario.ionosphere.as_ref();
     let of_gps = scene.and_then(Ionosphere::sent);

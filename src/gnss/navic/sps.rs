@@ -2,9 +2,10 @@
 //! message.
 //!
 //! Source: IRNSS SIS ICD for SPS 1.1, tables of carrier frequencies, received powers and code phase
-//! assignments. Codes are those of GPS C/A but for where G2 begins, which is a satellite's own on each carrier.
-//! Limits: the service has 2/9 of what is sent on a carrier; the restricted service beside it, BOC(5,2), is not
-//! made, so that the rest is one BPSK(1) of constant envelope, and powers are the service's alone.
+//! assignments. Codes are those of GPS C/A but for where G2 begins, which is a satellite's own on each
+//! carrier. Limits: the service has 2/9 of what is sent on a carrier; the restricted service beside it,
+//! BOC(5,2), is not made, so that the rest is one BPSK(1) of constant envelope, and powers are the service's
+//! alone.
 
 use crate::gnss::navic::nav::SPS_NAV;
 use crate::gnss::satellite::System;

@@ -1,11 +1,11 @@
 //! A navigation file as lines and columns: the header's lines that are used, and records of GPS LNAV, Galileo
 //! I/NAV and NavIC, eight lines with a number or nothing in each field of 19 columns.
 //!
-//! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5, A6, A8 and A18; RINEX 4.02, tables A9, A13 and
-//! A33, and those of NavIC. Where a line is missing, doubled or cut, or text is beside the fields, what follows would be read
-//! into the wrong elements; so such a record is left out and named with its line and column, and so is
-//! whatever cannot be recognised as of another system. Records of other systems and messages are counted and
-//! not read.
+//! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5, A6, A8 and A18; RINEX 4.02, tables A9, A13
+//! and A33, and those of NavIC. Where a line is missing, doubled or cut, or text is beside the fields, what
+//! follows would be read into the wrong elements; so such a record is left out and named with its line and
+//! column, and so is whatever cannot be recognised as of another system. Records of other systems and
+//! messages are counted and not read.
 
 mod corrections;
 mod numbers;

@@ -1,8 +1,8 @@
 //! Records of a navigation file as ephemerides: every element held against the range of its field in the
 //! message.
 //!
-//! Source: IS-GPS-200N, tables 20-I and 20-III; Galileo OS SIS ICD 2.1, tables 57, 62 and 64; IRNSS SIS ICD for
-//! SPS 1.1, subframes 1 and 2; RINEX 3.05, table A18; RINEX 4.02, tables A9 and A13.
+//! Source: IS-GPS-200N, tables 20-I and 20-III; Galileo OS SIS ICD 2.1, tables 57, 62 and 64; IRNSS SIS ICD
+//! for SPS 1.1, subframes 1 and 2; RINEX 3.05, table A18; RINEX 4.02, tables A9 and A13.
 
 use super::columns::Record;
 use crate::gnss::broadcast::Ephemeris;

@@ -2,12 +2,12 @@
 //!
 //! Source: IRNSS SIS ICD for SPS 1.1, data structure. A subframe is a pattern of 16 symbols and 292 bits, the
 //! last six of them zeros, coded ([`Convolutional`]) and interleaved ([`Interleaver`]); four of them are a
-//! frame. Subframes 1 and 2 carry a set of elements, subframes 3 and 4 a message each: here 11 (ionosphere) and
-//! 26 (UTC) in turn in subframe 3, and 7 (almanac) in subframe 4, for the document leaves their order open. A
-//! set has its issue in subframe 1 alone: what shows that both subframes are of one set is that their reference
-//! times agree, as they do in all real ones that were looked at. Limits: earth orientation is sent as zeros,
-//! and so is the second model of type 26, another system's time; types 5 (ionosphere by a grid), 9, 14 and 18
-//! are not sent, and not read. Flags of alert and of autonomous navigation are zero.
+//! frame. Subframes 1 and 2 carry a set of elements, subframes 3 and 4 a message each: here 11 (ionosphere)
+//! and 26 (UTC) in turn in subframe 3, and 7 (almanac) in subframe 4, for the document leaves their order
+//! open. A set has its issue in subframe 1 alone: what shows that both subframes are of one set is that their
+//! reference times agree, as they do in all real ones that were looked at. Limits: earth orientation is sent
+//! as zeros, and so is the second model of type 26, another system's time; types 5 (ionosphere by a grid), 9,
+//! 14 and 18 are not sent, and not read. Flags of alert and of autonomous navigation are zero.
 
 mod fields;
 mod reader;
