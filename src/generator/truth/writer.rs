@@ -16,24 +16,10 @@ use crate::gnss::facts::{Fault, FaultKind, FrontEndFacts, OscillatorFacts, Scene
 use crate::gnss::record::{Geographic, TrajectoryRow};
 use crate::gnss::time::Rate;
 
-/// Columns of a [`TrajectoryRow`].
-const TRAJECTORY: [&str; 11] = [
-    "sample",
-    "gps_s",
-    "gps_fraction_s",
-    "x_m",
-    "y_m",
-    "z_m",
-    "vx_mps",
-    "vy_mps",
-    "vz_mps",
-    "clock_bias_s",
-    "clock_drift",
-];
-
 struct Table {
     path: PathBuf,
     rows: csv::Writer<BufWriter<File>>,
+    is_empty: bool,
 }
 
 impl Table {
@@ -44,21 +30,25 @@ impl Table {
 
     /// Of places, whose rows have their geographic columns behind their own.
     fn of_places(directory: &Path, name: &str) -> Result<Self, TruthError> {
-        let mut table = Self::open(directory, name, false)?;
-        let header = [&TRAJECTORY[..], &Geographic::COLUMNS].concat();
-        table.rows.write_record(header).map_err(|source| TruthError::Row { path: table.path.clone(), source })?;
-        Ok(table)
+        Self::open(directory, name, false)
     }
 
     fn open(directory: &Path, name: &str, has_headers: bool) -> Result<Self, TruthError> {
         let path = directory.join(name);
         let file = File::create(&path).map_err(|source| TruthError::File { path: path.clone(), source })?;
         let rows = csv::WriterBuilder::new().has_headers(has_headers).from_writer(BufWriter::new(file));
-        Ok(Self { path, rows })
+        Ok(Self { path, rows, is_empty: true })
     }
 
     fn write_place(&mut self, row: TrajectoryRow) -> Result<(), TruthError> {
         let place = Geographic::of(&row.position_m(), row.time());
+        if std::mem::replace(&mut self.is_empty, false) {
+            let header = header_of(&row).and_then(|mut header| {
+                header.extend(&Geographic::COLUMNS[..]);
+                self.rows.write_record(&header)
+            });
+            header.map_err(|source| TruthError::Row { path: self.path.clone(), source })?;
+        }
         self.write((row, place))
     }
 
@@ -69,6 +59,14 @@ impl Table {
     fn flush(&mut self) -> Result<(), TruthError> {
         self.rows.flush().map_err(|source| TruthError::File { path: self.path.clone(), source })
     }
+}
+
+/// The names of a row's columns: `csv` writes none for rows of two parts.
+fn header_of(row: &impl Serialize) -> Result<csv::StringRecord, csv::Error> {
+    let mut alone = csv::Writer::from_writer(Vec::new());
+    alone.serialize(row)?;
+    let text = alone.into_inner().map_err(|error| csv::Error::from(error.into_error()))?;
+    csv::Reader::from_reader(text.as_slice()).headers().cloned()
 }
 
 /// What a spoofer claims: observables like `observations.csv`, places like `trajectory.csv`.
@@ -300,5 +298,46 @@ fn opened<'t>(table: &'t mut Option<Table>, directory: &Path, name: &str) -> Res
     match table {
         Some(table) => Ok(table),
         none => Ok(none.insert(Table::create(directory, name)?)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use super::*;
+
+    #[test]
+    fn places_are_read_again_by_the_names_of_their_columns() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut table = Table::of_places(directory.path(), "places.csv").unwrap();
+        // 2010-07-01T08:05:58 GPS time, 15 s ahead of UTC then; on the equator at 90 degrees east.
+        let row = |sample| TrajectoryRow {
+            sample,
+            gps_s: 962_006_758,
+            gps_fraction_s: 0.5,
+            x_m: 0.0,
+            y_m: 6_378_137.0,
+            z_m: 0.0,
+            vx_mps: 1.0,
+            vy_mps: 2.0,
+            vz_mps: 3.0,
+            clock_bias_s: 1e-4,
+            clock_drift: 5e-8,
+        };
+        table.write_place(row(0)).unwrap();
+        table.write_place(row(7)).unwrap();
+        table.flush().unwrap();
+
+        let mut file = csv::Reader::from_path(directory.path().join("places.csv")).unwrap();
+        let rows: Vec<HashMap<String, String>> = file.deserialize().map(Result::unwrap).collect();
+        let number = |row: &HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
+        assert_eq!(rows.len(), 2);
+        assert_eq!(rows[1].len(), 15);
+        assert_eq!(rows[1]["sample"], "7");
+        assert_eq!((number(&rows[0], "y_m"), number(&rows[0], "clock_drift")), (6_378_137.0, 5e-8));
+        assert!((number(&rows[0], "longitude_deg") - 90.0).abs() < 1e-12);
+        assert!(number(&rows[0], "latitude_deg").abs() < 1e-12 && number(&rows[0], "height_m").abs() < 1e-6);
+        assert_eq!(rows[0]["utc"], "2010-07-01T08:05:43.500000Z");
     }
 }

@@ -396,6 +396,25 @@ mod tests {
     }
 
     #[test]
+    fn fixes_have_their_place_and_utc_behind_them() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut output = Output::create(directory.path()).unwrap();
+        let zeros = vec!["0"; 26].join(",");
+        let fix: Fix = from_csv(&FIXES, &format!("{zeros},,broadcast,4,1,GPST"));
+        // 2010-07-01T08:05:58 GPS time, 15 s ahead of UTC then; one kilometre above the north pole.
+        let fix = Fix { gps_s: 962_006_758, z_m: 6_356_752.314_245 + 1000.0, ..fix };
+        output.take(Record::Fix(fix)).unwrap();
+        output.flush().unwrap();
+
+        let mut file = csv::Reader::from_path(directory.path().join("fixes.csv")).unwrap();
+        let row: BTreeMap<String, String> = file.deserialize().next().unwrap().unwrap();
+        let number = |name: &str| row[name].parse::<f64>().unwrap();
+        assert!((number("latitude_deg") - 90.0).abs() < 1e-9);
+        assert!((number("height_m") - 1000.0).abs() < 1e-5);
+        assert_eq!(row["utc"], "2010-07-01T08:05:43.000000Z");
+    }
+
+    #[test]
     fn what_cannot_be_made_is_an_error_with_its_path() {
         let place = tempfile::tempdir().unwrap();
         let file = place.path().join("taken");

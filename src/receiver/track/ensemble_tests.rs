@@ -283,13 +283,14 @@ struct Scatter {
     values: f64,
 }
 
-/// Follows a signal at a C/N0 of 45 dB-Hz for `duration_s` after it has settled.
-fn follow(signal: &'static Signal, rate_hz: f64, settings: &TrackingSettings, seed: u64, duration_s: f64) -> Scatter {
+/// Follows a signal for `duration_s` after it has settled.
+fn follow(sent: Sent, settings: &TrackingSettings, duration_s: f64) -> Scatter {
+    let Sent { signal, rate_hz, cn0_dbhz, seed } = sent;
     let mut random = Random(seed);
     let mut stream = stream(signal, 1 + random.between(0.0, 10.0) as u8, rate_hz, seed ^ 0xfade);
     stream.doppler_hz = random.between(-3000.0, 3000.0);
     stream.sent_s = random.between(10.0, 1000.0);
-    stream.cn0_dbhz = JITTER_DBHZ;
+    stream.cn0_dbhz = cn0_dbhz;
     let component = lead(signal).unwrap();
     let hit = Acquired {
         sv: stream.link.sv,
@@ -297,7 +298,7 @@ fn follow(signal: &'static Signal, rate_hz: f64, settings: &TrackingSettings, se
         sample: 0,
         code_phase_chips: stream.chips(0.0).rem_euclid(f64::from(component.code_chips)),
         doppler_hz: stream.doppler_hz + 2.0,
-        cn0_dbhz: JITTER_DBHZ,
+        cn0_dbhz,
     };
     let mut channel = Channel::start(&hit, &stream.metadata(), settings);
     // Not in step with any code period.
@@ -330,20 +331,26 @@ fn follow(signal: &'static Signal, rate_hz: f64, settings: &TrackingSettings, se
     Scatter { code: scatter(&code), carrier: scatter(&carrier), values: code.len() as f64 }
 }
 
-const JITTER_DBHZ: f64 = 45.0;
-
 /// After so long the carrier was locked for its first hundred prompts, symbols and overlay are known, and
 /// nothing is left of the pull-in.
 fn settle_s(component: &Component) -> f64 {
     0.8 + 115.0 * component.period_s()
 }
 
-/// A signal, the rate of its samples, and what replicas have of its layers.
-type Case = (&'static Signal, f64, Layers);
+/// A signal in noise, as samples.
+#[derive(Clone, Copy, Debug)]
+struct Sent {
+    signal: &'static Signal,
+    rate_hz: f64,
+    cn0_dbhz: f64,
+    /// Of its noise, and of all that is drawn.
+    seed: u64,
+}
 
 /// What was measured on a signal, and what theory expects.
 struct Jitter {
-    signal: &'static Signal,
+    /// Which signal and settings.
+    case: String,
     update_s: f64,
     code_m: f64,
     carrier_cycles: f64,
@@ -352,15 +359,12 @@ struct Jitter {
     spreads: [f64; 2],
 }
 
-fn jitter((signal, rate_hz, waveform): Case, channels: u64, duration_s: f64) -> Jitter {
-    // A code loop eight times as wide as the default one has as many more independent values.
-    let settings =
-        TrackingSettings { dll_bandwidth_hz: 4.0, dll_pull_in_s: 0.5, waveform, ..TrackingSettings::default() };
-    let component = lead(signal).unwrap();
+fn jitter(case: String, sent: Sent, settings: &TrackingSettings, channels: u64, duration_s: f64) -> Jitter {
+    let component = lead(sent.signal).unwrap();
     let fitted = settings.fitted(component);
-    let theory = Theory::new(component, &fitted, rate_hz, JITTER_DBHZ);
-    let runs: Vec<Scatter> =
-        (0..channels).into_par_iter().map(|run| follow(signal, rate_hz, &settings, 9000 + run, duration_s)).collect();
+    let theory = Theory::new(component, &fitted, sent.rate_hz, sent.cn0_dbhz);
+    let one = |run: u64| follow(Sent { seed: sent.seed + run, ..sent }, settings, duration_s);
+    let runs: Vec<Scatter> = (0..channels).into_par_iter().map(one).collect();
     let values: f64 = runs.iter().map(|run| run.values).sum();
     let code_chips = (runs.iter().map(|run| run.code).sum::<f64>() / values).sqrt();
     let carrier_cycles = (runs.iter().map(|run| run.carrier).sum::<f64>() / values).sqrt();
@@ -369,7 +373,7 @@ fn jitter((signal, rate_hz, waveform): Case, channels: u64, duration_s: f64) -> 
     let bandwidths_hz = [fitted.dll_bandwidth_hz, fitted.pll_bandwidth_hz];
     let [left_code, left_carrier] = bandwidths_hz.map(|hz| (1.0 - 0.5 / (hz * duration_s)).sqrt());
     Jitter {
-        signal,
+        case,
         update_s: theory.update_s,
         code_m: code_chips * SPEED_OF_LIGHT_MPS / component.chip_rate_hz,
         carrier_cycles,
@@ -378,22 +382,16 @@ fn jitter((signal, rate_hz, waveform): Case, channels: u64, duration_s: f64) -> 
     }
 }
 
-#[test]
-fn jitter_of_code_and_carrier_is_that_of_theory() {
-    let (channels, duration_s) = if is_long() { (16, 10.0) } else { (1, 2.0) };
-    let cases: [Case; 7] = [
-        (&LONG_BOC, 5.3e6, Layers::Strongest),
-        (&QUADRATURE, 12.3e6, Layers::Strongest),
-        (&CHANNELS, 2.6e6, Layers::Strongest),
-        (&MULTIPLEXED, 2.6e6, Layers::Strongest),
-        (&MIXED, 5.3e6, Layers::Strongest),
-        (&E1, 6.5e6, Layers::Strongest),
-        (&E1, 13.1e6, Layers::Whole),
-    ];
-    let found: Vec<Jitter> = cases.into_par_iter().map(|case| jitter(case, channels, duration_s)).collect();
-    for Jitter { signal, update_s, code_m, carrier_cycles, ratios, spreads } in &found {
+/// Settings whose code loop is eight times as wide as the default one: it has as many more independent values.
+fn wide() -> TrackingSettings {
+    TrackingSettings { dll_bandwidth_hz: 4.0, dll_pull_in_s: 0.5, ..TrackingSettings::default() }
+}
+
+/// Prints every case, and compares it with theory.
+fn is_that_of_theory(found: &[Jitter]) {
+    for Jitter { case, update_s, code_m, carrier_cycles, ratios, spreads } in found {
         println!(
-            "{signal}: updates of {:.0} ms; code {code_m:.4} m, {:.3} ± {:.3} of theory; carrier {:.3}°, {:.3} ± \
+            "{case}: updates of {:.0} ms; code {code_m:.4} m, {:.3} ± {:.3} of theory; carrier {:.3}°, {:.3} ± \
              {:.3} of theory",
             1e3 * update_s,
             ratios[0],
@@ -403,10 +401,53 @@ fn jitter_of_code_and_carrier_is_that_of_theory() {
             spreads[1],
         );
     }
-    for Jitter { signal, ratios, spreads, .. } in &found {
+    for Jitter { case, ratios, spreads, .. } in found {
         for (ratio, spread) in ratios.iter().zip(spreads) {
             // Five per cent, or four deviations of a run that is too short to show them.
-            assert!((ratio - 1.0).abs() < f64::max(0.05, 4.0 * spread), "{signal}: {ratios:?}");
+            assert!((ratio - 1.0).abs() < f64::max(0.05, 4.0 * spread), "{case}: {ratios:?}");
         }
     }
+}
+
+#[test]
+fn jitter_of_code_and_carrier_is_that_of_theory() {
+    let (channels, duration_s) = if is_long() { (16, 10.0) } else { (1, 2.0) };
+    let cases: [(&'static Signal, f64, Layers); 7] = [
+        (&LONG_BOC, 5.3e6, Layers::Strongest),
+        (&QUADRATURE, 12.3e6, Layers::Strongest),
+        (&CHANNELS, 2.6e6, Layers::Strongest),
+        (&MULTIPLEXED, 2.6e6, Layers::Strongest),
+        (&MIXED, 5.3e6, Layers::Strongest),
+        (&E1, 6.5e6, Layers::Strongest),
+        (&E1, 13.1e6, Layers::Whole),
+    ];
+    let one = |(signal, rate_hz, waveform): (&'static Signal, f64, Layers)| {
+        let settings = TrackingSettings { waveform, ..wide() };
+        let sent = Sent { signal, rate_hz, cn0_dbhz: 45.0, seed: 9000 };
+        jitter(signal.name.to_owned(), sent, &settings, channels, duration_s)
+    };
+    let found: Vec<Jitter> = cases.into_par_iter().map(one).collect();
+    is_that_of_theory(&found);
+}
+
+#[test]
+fn jitter_of_a_cboc_pilot_is_that_of_theory_for_every_bandwidth_and_spacing() {
+    let (channels, duration_s) = if is_long() { (16, 10.0) } else { (1, 1.5) };
+    let mut cases = Vec::new();
+    for cn0_dbhz in [45.0, 50.0] {
+        for [dll_bandwidth_hz, pll_bandwidth_hz] in [[2.0, 8.0], [3.0, 12.0], [4.0, 18.0]] {
+            for spacing_chips in [0.6, 1.0] {
+                let settings = TrackingSettings { dll_bandwidth_hz, pll_bandwidth_hz, spacing_chips, ..wide() };
+                cases.push((cn0_dbhz, settings));
+            }
+        }
+    }
+    let one = |(index, (cn0_dbhz, settings)): (usize, (f64, TrackingSettings))| {
+        let TrackingSettings { dll_bandwidth_hz, pll_bandwidth_hz, spacing_chips, .. } = settings;
+        let case = format!("{cn0_dbhz} dB-Hz, {dll_bandwidth_hz} and {pll_bandwidth_hz} Hz, spacing {spacing_chips}");
+        let sent = Sent { signal: &E1, rate_hz: 6.5e6, cn0_dbhz, seed: 10_000 + 100 * index as u64 };
+        jitter(case, sent, &settings, channels, duration_s)
+    };
+    let found: Vec<Jitter> = cases.into_par_iter().enumerate().map(one).collect();
+    is_that_of_theory(&found);
 }
