@@ -261,13 +261,36 @@ fn lost_and_doubled_samples_are_counted_and_cost_less_than_a_second_of_fixes() {
 }
 
 #[test]
+fn a_satellite_sent_astray_while_samples_flow_is_left_out_and_the_verdict_knows_why() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = |name: &str| directory.path().join(name);
+    let scene = include_str!("../scenarios/static.toml")
+        .replace("duration_s = 60", "duration_s = 40")
+        .replace("kind = \"static\"", "kind = \"pushed\"");
+    std::fs::write(path("scene.toml"), scene).unwrap();
+    run_in(directory.path(), &["live", "scene.toml", "--clock", "free", "--to", "file:if.bin", "--record", "record"]);
+    // A step of one chip, 32 s after the start.
+    std::fs::write(path("record/events.csv"), "sample,event\n83200000,astray G23 300.0 0.0\n").unwrap();
+    run_in(directory.path(), &["run", "record/replay.toml", "--out", "out", "--check"]);
+
+    let facts: Value = serde_json::from_str(&std::fs::read_to_string(path("out/truth/scene.json")).unwrap()).unwrap();
+    let fault = serde_json::json!([{ "kind": "clock_step", "satellites": ["G23"], "from_s": 32.0 }]);
+    assert_eq!(facts["faults"], fault, "{facts}");
+    let mut fixes = csv::Reader::from_path(path("out/rx/fixes.csv")).unwrap();
+    let excluded = fixes.headers().unwrap().iter().position(|name| name == "excluded").unwrap();
+    let late = fixes.records().map(Result::unwrap).filter(|row| row[0].parse::<f64>().unwrap() > 33.0 * 2.6e6);
+    let left_out = late.map(|row| row[excluded].to_owned()).collect::<Vec<_>>();
+    assert!(left_out.len() > 60 && left_out.iter().all(|names| names == "G23"), "{left_out:?}");
+}
+
+#[test]
 fn a_mixer_and_a_clock_that_are_off_cost_neither_accuracy_nor_satellites() {
-    // A clock of 2.5 ppm takes three of twelve satellites out of the first search's ±5 kHz, and the mixer
-    // parts carrier and code by 2 kHz.
+    // Clock and mixer take six of twelve satellites out of the first search's ±5 kHz, and the mixer parts
+    // carrier and code by 2 kHz.
     let scene = include_str!("../scenarios/static.toml")
         .replace("drift_sps = 5e-8", "drift_sps = 2.5e-6")
         .replace("duration_s = 60", "duration_s = 40")
-        .replace("[noise]", "[noise]\n\n[local_oscillator]\noffset_hz = 2000");
+        .replace("[noise]", "[noise]\n\n[local_oscillator]\noffset_hz = -2000");
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("off.toml");
     std::fs::write(&path, scene).unwrap();
@@ -279,9 +302,15 @@ fn a_mixer_and_a_clock_that_are_off_cost_neither_accuracy_nor_satellites() {
         |name: &str| -> Value { serde_json::from_str(&std::fs::read_to_string(out.join(name)).unwrap()).unwrap() };
     let (summary, receiver) = (read("summary.json"), read("rx/receiver.json"));
     found_and_decoded_what_is_there(&summary);
+    // The search whose edge cuts this sky is followed by one about its middle, not by one after the interval
+    // of searches.
+    let mut events = csv::Reader::from_path(out.join("rx/events.csv")).unwrap();
+    let found = events.records().map(Result::unwrap).filter(|row| &row[3] == "acquired");
+    let last = found.map(|row| row[0].parse::<u64>().unwrap()).max().unwrap();
+    assert!(last < 1_300_000, "the last satellite is found {} s after the start", last as f64 / 2.6e6);
     at_most(&summary, "/position/horizontal_p95_m", 1.0);
     // 0.02 Hz of deviation after 30 s; 0.1 Hz are five of them.
-    assert!((number(&receiver, "/carrier_offset/offset_hz") - 2000.0).abs() < 0.1, "{receiver}");
+    assert!((number(&receiver, "/carrier_offset/offset_hz") + 2000.0).abs() < 0.1, "{receiver}");
     assert!((number(&receiver, "/carrier_offset/code_drift") - 2.5e-6).abs() < 1e-9, "{receiver}");
 }
 

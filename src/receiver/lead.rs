@@ -27,6 +27,21 @@ pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'st
     signal.components.iter().find(|component| !std::ptr::eq(*component, pilot) && fits(component))
 }
 
+/// The pilot whose code begins with that of `lead` and is whole periods of it long: too long to be searched
+/// for, but found once `lead` is followed.
+pub fn long_beside(lead: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
+    let is_long = |pilot: &&Component| {
+        let plain = pilot.message.is_none() && pilot.overlay.periods() == 1 && pilot.layers.len() == 1;
+        let in_step = pilot.chip_rate_hz == lead.chip_rate_hz && pilot.phase_cycles == lead.phase_cycles;
+        let of_one_step = pilot.steps_per_chip() == 1 && lead.steps_per_chip() == 1;
+        let segments = pilot.code_chips.checked_div(lead.code_chips).unwrap_or(0);
+        let whole = pilot.code_chips == segments * lead.code_chips
+            && segments.is_multiple_of(lead.periods_per_symbol().unwrap_or(1));
+        plain && in_step && of_one_step && segments > 1 && whole
+    };
+    signal.components.iter().find(|pilot| lead.overlay.periods() == 1 && is_long(pilot))
+}
+
 /// Correlation of a component with the replica that is made of it, and of the replica with itself.
 pub fn shapes(component: &Component, made: Layers) -> Option<[Shape; 2]> {
     let strongest = component.strongest()?;
@@ -72,7 +87,7 @@ mod tests {
     use super::*;
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::signal::Overlay;
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE, QUADRATURE_DATA};
+    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, MULTIPLEXED_DATA, QUADRATURE, QUADRATURE_DATA};
 
     #[test]
     fn the_strongest_component_that_can_be_made_leads_and_pilots_go_first() {
@@ -80,9 +95,12 @@ mod tests {
             let lead = lead(signal).unwrap();
             signal.components.iter().position(|component| std::ptr::eq(component, lead)).unwrap()
         };
-        // Of D the code of 1 534 500 chips cannot be made; B's components differ by their data alone.
+        // Of D the code of 1 534 500 chips is found later; B's components differ by their data alone.
         let found = [&L1_CA, &LONG_BOC, &QUADRATURE, &QUADRATURE_DATA, &MIXED, &MULTIPLEXED].map(index);
         assert_eq!(found, [0, 1, 0, 1, 0, 0]);
+        let long = |signal: &'static Signal| long_beside(lead(signal).unwrap(), signal);
+        assert!(long(&MULTIPLEXED).is_some_and(|pilot| std::ptr::eq(pilot, &MULTIPLEXED.components[1])));
+        assert!([&L1_CA, &LONG_BOC, &QUADRATURE, &QUADRATURE_DATA, &MIXED].map(long).iter().all(Option::is_none));
     }
 
     #[test]
@@ -95,6 +113,7 @@ mod tests {
         assert_eq!(refusal(&LONG_BOC), None);
         // With a message that begins where the overlays do it can be received.
         assert_eq!(refusal(&QUADRATURE_DATA), None);
+        assert_eq!(refusal(&MULTIPLEXED_DATA), None);
         static OVERLAID: Signal = Signal {
             name: "overlaid",
             components: &[Component { overlay: Overlay::Shared(&[1, -1]), ..L1_CA.components[0] }],

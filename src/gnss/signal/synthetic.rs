@@ -155,6 +155,16 @@ pub static MULTIPLEXED: Signal = Signal {
     ],
 };
 
+/// The same with data of a symbol a period on the shorter code.
+pub static MULTIPLEXED_DATA: Signal = Signal {
+    name: "synthetic D with data",
+    components: &[
+        Component { message: Some(&LNAV), ..MULTIPLEXED.components[0] },
+        Component { ..MULTIPLEXED.components[1] },
+    ],
+    ..MULTIPLEXED
+};
+
 const SIX: [bool; 33] = chips_with_six(true);
 const ONE: [bool; 33] = chips_with_six(false);
 

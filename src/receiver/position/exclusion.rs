@@ -48,6 +48,19 @@ pub fn consistent(
     false_alarm: f64,
 ) -> Result<Consistent, NoFix> {
     let all = least_squares::position(&ranges, start_m, corrections)?;
+    without_faults(ranges, all, corrections, false_alarm)
+}
+
+/// Leaves out the fewest satellites without which the residuals of a solution of all ranges fit.
+///
+/// # Errors
+/// As [`consistent`].
+pub fn without_faults(
+    ranges: Vec<Range>,
+    all: Solution,
+    corrections: &Corrections,
+    false_alarm: f64,
+) -> Result<Consistent, NoFix> {
     // Four ranges always fit, which proves nothing: as many as that are never left after an exclusion.
     let freedom = freedom(&ranges).max(0) as usize;
     let threshold = chi_square_threshold(freedom.max(1), false_alarm);

@@ -37,7 +37,7 @@ mod tests;
 pub mod troposphere;
 
 use electrons::Electrons;
-pub use exclusion::{Consistent, chi_square_threshold, consistent};
+pub use exclusion::{Consistent, chi_square_threshold, consistent, without_faults};
 use ionosphere::{DelayError, Delays, NOMINAL, NOMINAL_ERROR};
 use least_squares::{
     COORDINATES, Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, Solution, freedom, scales,
@@ -371,14 +371,20 @@ impl Solver {
         let in_space = Geodetic::from_ecef(&first.position_m).height_m >= SPACE_M;
         let mask_rad = if in_space { f64::NEG_INFINITY } else { self.settings.mask_deg.to_radians() };
         let mut sights = sights(sample, &ranges, &first);
+        let count = ranges.len();
         let visible: Vec<Range> = ranges
             .into_iter()
             .zip(&first.elevations_rad)
             .filter(|(_, elevation_rad)| **elevation_rad >= mask_rad)
             .map(|(range, _)| range)
             .collect();
-        let (kept, solution, excluded) =
-            consistent(visible, first.position_m, &corrections, self.settings.false_alarm)?;
+        // Where none is below the mask, the first solution is that of all.
+        let all = if visible.len() == count {
+            first
+        } else {
+            least_squares::position(&visible, first.position_m, &corrections)?
+        };
+        let (kept, solution, excluded) = without_faults(visible, all, &corrections, self.settings.false_alarm)?;
         let (velocity_mps, drift) = least_squares::velocity(&kept, &solution)?;
         self.last_m = Some(solution.position_m);
         let mut used: Vec<Sv> = kept.iter().map(|range| range.sv).collect();

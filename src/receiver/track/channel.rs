@@ -12,6 +12,7 @@ use num_complex::Complex64;
 use super::closed::{Loops, Mode, Update};
 use super::cn0::Cn0;
 use super::lock::{LockState, PhaseLock, Rotation, SymbolLock};
+use super::long::LongCode;
 use super::loops::CodeShape;
 use super::model::ReplicaModel;
 use super::overlay::{OverlayPhase, OverlaySync};
@@ -30,6 +31,7 @@ use crate::receiver::parting::Phases;
 use crate::receiver::source::Block;
 
 mod integrate;
+mod long;
 mod measure;
 mod oscillators;
 mod pilot;
@@ -95,6 +97,9 @@ pub struct Channel {
     overlay: Option<OverlaySync>,
     overlay_phase: Option<OverlayPhase>,
     data: Option<Data>,
+    /// A pilot with a code too long for the search, and the segment of it that is the replica.
+    long: Option<LongCode>,
+    segment: Option<u64>,
     side_peaks: Option<SidePeaks>,
     /// C/N0 of what is followed over that of the whole signal.
     followed_db: f64,
@@ -203,6 +208,8 @@ impl Channel {
                 .and_then(|c| Data::beside(c, (hit.signal, hit.sv), settings, (metadata.rate.hz(), sense))),
             overlay,
             overlay_phase: None,
+            long: component.and_then(|c| LongCode::beside(c, hit.signal, hit.sv.number, settings.replica)),
+            segment: None,
             side_peaks: component.and_then(|c| SidePeaks::new(c, waveform)),
             followed_db: followed,
             phase_cycles: component.map_or(0.0, |c| c.phase_cycles),
@@ -320,7 +327,7 @@ impl Channel {
         if self.lost {
             return;
         }
-        let Some(replica) = self.replica.take() else { return };
+        let Some(mut replica) = self.replica.take() else { return };
         if self.start.is_none() {
             self.begin(block.first, &replica);
         }
@@ -328,6 +335,9 @@ impl Channel {
         let end = block.first + block.i.len().min(block.q.len()) as u64;
         let mut taken = block.first;
         while !self.lost {
+            if let Some(segment) = self.next_segment() {
+                replica = segment;
+            }
             let next = self.first + self.samples_left(&replica);
             while let Some(tick) = ticks.next_if(|&tick| tick < next.min(end)) {
                 self.measure(tick, &replica, report);

@@ -382,7 +382,8 @@ fn jitter(case: String, sent: Sent, settings: &TrackingSettings, channels: u64, 
     }
 }
 
-/// Settings whose code loop is eight times as wide as the default one: it has as many more independent values.
+/// Settings whose code loop is eight times as wide as the default one: it has as many more independent
+/// values.
 fn wide() -> TrackingSettings {
     TrackingSettings { dll_bandwidth_hz: 4.0, dll_pull_in_s: 0.5, ..TrackingSettings::default() }
 }

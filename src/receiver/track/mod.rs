@@ -14,6 +14,7 @@ pub mod cn0;
 #[cfg(test)]
 mod ensemble_tests;
 pub mod lock;
+mod long;
 pub mod loops;
 pub mod model;
 mod overlay;

@@ -6,7 +6,12 @@ use num_complex::Complex64;
 #[derive(Clone, Debug)]
 pub struct OverlaySync {
     code: Vec<i8>,
-    /// For every shift of the code, the sum of prompts times its chips.
+    shifts: Shifts,
+}
+
+/// For every shift that a code may have against the count of its periods, the sum of what prompts say for it.
+#[derive(Clone, Debug)]
+pub(super) struct Shifts {
     sums: Vec<f64>,
     taken: u32,
 }
@@ -29,10 +34,42 @@ const NEXT_SHARE: f64 = 0.8;
 /// Prompts after which a search begins anew, in overlay codes: longer searches do not become surer.
 const MOST_CODES: u32 = 20;
 
+impl Shifts {
+    /// Nothing said yet, for so many shifts.
+    pub fn new(count: usize) -> Self {
+        Self { sums: vec![0.0; count], taken: 0 }
+    }
+
+    /// Forgets what was taken.
+    pub fn clear(&mut self) {
+        self.sums.fill(0.0);
+        self.taken = 0;
+    }
+
+    /// Takes what a code period says for each shift (noise of unit variance), from the first one on; gives
+    /// how many periods were taken.
+    pub fn add(&mut self, said: impl Iterator<Item = f64>) -> u32 {
+        self.sums.iter_mut().zip(said).for_each(|(sum, one)| *sum += one);
+        self.taken += 1;
+        self.taken
+    }
+
+    /// The shift that is beyond doubt.
+    pub fn decide(&self) -> Option<OverlayPhase> {
+        let (shift, best) = self.sums.iter().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        let others = self.sums.iter().enumerate().filter(|(other, _)| *other != shift);
+        let next = others.map(|(_, sum)| sum.abs()).fold(0.0, f64::max);
+        // Two sums of as many prompts, noise of unit variance in each.
+        let deviation = (2.0 * f64::from(self.taken)).sqrt();
+        let sure = best.abs() - next > LEAD_SIGMAS * deviation && next < NEXT_SHARE * best.abs();
+        sure.then_some(OverlayPhase { shift: shift as u64, inverted: best < 0.0 })
+    }
+}
+
 impl OverlaySync {
     /// For that overlay code.
     pub fn new(code: Vec<i8>) -> Self {
-        Self { sums: vec![0.0; code.len()], code, taken: 0 }
+        Self { shifts: Shifts::new(code.len()), code }
     }
 
     /// Its length in code periods.
@@ -42,8 +79,7 @@ impl OverlaySync {
 
     /// Forgets what was taken.
     pub fn clear(&mut self) {
-        self.sums.fill(0.0);
-        self.taken = 0;
+        self.shifts.clear();
     }
 
     /// The overlay chip of code period `number`.
@@ -58,26 +94,15 @@ impl OverlaySync {
         let length = self.code.len();
         let at = (number % length.max(1) as u64) as usize;
         let ahead = self.code.iter().cycle().skip(at);
-        self.sums.iter_mut().zip(ahead).for_each(|(sum, &chip)| *sum += f64::from(chip) * prompt.re);
-        self.taken += 1;
-        if self.taken < LEAST_PROMPTS {
+        let taken = self.shifts.add(ahead.map(|&chip| f64::from(chip) * prompt.re));
+        if taken < LEAST_PROMPTS {
             return None;
         }
-        let found = self.decide();
-        if self.taken >= MOST_CODES.saturating_mul(length as u32).max(10 * LEAST_PROMPTS) {
+        let found = self.shifts.decide();
+        if taken >= MOST_CODES.saturating_mul(length as u32).max(10 * LEAST_PROMPTS) {
             self.clear();
         }
         found
-    }
-
-    fn decide(&self) -> Option<OverlayPhase> {
-        let (shift, best) = self.sums.iter().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-        let others = self.sums.iter().enumerate().filter(|(other, _)| *other != shift);
-        let next = others.map(|(_, sum)| sum.abs()).fold(0.0, f64::max);
-        // Two sums of as many prompts, noise of unit variance in each.
-        let deviation = (2.0 * f64::from(self.taken)).sqrt();
-        let sure = best.abs() - next > LEAD_SIGMAS * deviation && next < NEXT_SHARE * best.abs();
-        sure.then_some(OverlayPhase { shift: shift as u64, inverted: best < 0.0 })
     }
 }
 

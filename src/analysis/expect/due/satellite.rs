@@ -26,6 +26,23 @@ const EPHEMERIS_S: f64 = 7200.0;
 /// A change of health reaches the user with the next subframe 1.
 const HEALTH_S: f64 = 36.0;
 
+/// Loops, their symbols and smoothed ranges move to a clock that has jumped within so long.
+const STEP_S: f64 = 5.0;
+
+/// Those of the faults that concern a satellite and are of these kinds.
+fn concerning<'f>(faults: &'f [Fault], sv: Sv, kinds: &'f [FaultKind]) -> impl Iterator<Item = &'f Fault> {
+    let concerns = move |fault: &&Fault| fault.satellites.as_ref().is_none_or(|list| list.contains(&sv));
+    faults.iter().filter(concerns).filter(move |fault| kinds.contains(&fault.kind))
+}
+
+/// Whether a satellite's clock has jumped so lately, or is about to, that a receiver is between both times.
+pub fn is_stepping(faults: &[Fault], sv: Sv, time_s: f64) -> bool {
+    concerning(faults, sv, &[FaultKind::ClockStep])
+        .flat_map(|fault| [Some(fault.from_s), fault.to_s])
+        .flatten()
+        .any(|at_s| (at_s - 0.5..at_s + STEP_S).contains(&time_s))
+}
+
 /// One row of the truth as expectation needs it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SatelliteEpoch {
@@ -104,8 +121,7 @@ pub struct Scene<'s> {
 
 impl Scene<'_> {
     fn of<'k>(&'k self, sv: Sv, kinds: &'k [FaultKind]) -> impl Iterator<Item = &'k Fault> {
-        let concerns = move |fault: &&Fault| fault.satellites.as_ref().is_none_or(|list| list.contains(&sv));
-        self.faults.iter().filter(concerns).filter(move |fault| kinds.contains(&fault.kind))
+        concerning(self.faults, sv, kinds)
     }
 
     /// Whether the message cannot be read without errors.
@@ -131,8 +147,6 @@ impl Scene<'_> {
 
     /// Why a lock may end at a row, if it may.
     pub fn excuse(&self, sv: Sv, row: &SatelliteEpoch, usual_dbhz: f64) -> Option<Excuse> {
-        let steps =
-            || self.of(sv, &[FaultKind::ClockStep]).flat_map(|fault| [Some(fault.from_s), fault.to_s]).flatten();
         match self.expect.losses(sv, row.time_s) {
             Some(Losses::Any) => return Some(Excuse::Scene),
             Some(Losses::None) => return None,
@@ -144,7 +158,7 @@ impl Scene<'_> {
             Some(Excuse::Faded)
         } else if row.cn0_dbhz < row.strongest_dbhz - ISOLATION_DB {
             Some(Excuse::Hidden)
-        } else if steps().any(|at_s| (at_s - 0.5..at_s + 5.0).contains(&row.time_s)) {
+        } else if is_stepping(self.faults, sv, row.time_s) {
             Some(Excuse::Fault)
         } else {
             None

@@ -9,6 +9,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use crate::analysis::error::JudgeError;
+use crate::analysis::expect::due::satellite::is_stepping;
 use crate::analysis::expect::loops::{Stresses, Theory, update_s};
 use crate::analysis::expect::multipath;
 use crate::analysis::expect::multiple_access::MultipleAccess;
@@ -125,7 +126,9 @@ impl Links {
             let cost_db = costs_db.get(link.signal).copied().unwrap_or(0.0);
             let mut rows = settled(&errors.signals.rows(link)?);
             let all = rows.len();
-            rows.retain(|row| run.scene.expect.bounded(row.time_s));
+            rows.retain(|row| {
+                run.scene.expect.bounded(row.time_s) && !is_stepping(&run.scene.faults, link.sv, row.time_s)
+            });
             if rows.len() < all {
                 level(&mut rows);
             }

@@ -11,6 +11,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use nalgebra::Vector3;
 
 use crate::analysis::error::JudgeError;
+use crate::analysis::expect::due::satellite::is_stepping;
 use crate::analysis::expect::loops::{Theory, update_s};
 use crate::analysis::expect::message::Message;
 use crate::analysis::expect::multipath;
@@ -113,6 +114,8 @@ pub struct Forecast {
     pub sight: Vector3<f64>,
     /// Expected bias once the ionosphere is corrected, metres.
     pub bias_m: f64,
+    /// Whether the satellite's clock has jumped so lately that the range is anywhere up to that bias.
+    pub stepping: bool,
     /// What not correcting the ionosphere adds to it, metres.
     pub ionosphere_m: f64,
     /// What the true troposphere delays, for the share that a model of it errs by.
@@ -125,7 +128,8 @@ pub struct Forecast {
     pub memory_s: f64,
     /// Standard deviation of its Doppler as a rate, m/s.
     pub rate_sigma_mps: f64,
-    /// Bias of that rate by the rate of the atmosphere, m/s.
+    /// Bias of that rate by what the message does not say of the carrier: atmosphere, scintillation, the
+    /// satellite's orbit and clock, m/s.
     pub rate_bias_mps: f64,
     /// C/N0 that the scene allows, Hz.
     pub cn0_hz: f64,
@@ -230,19 +234,18 @@ impl<'r> Scene<'r> {
         let rays = self.rays(link, &theory)?;
         let smoothing = || Smoothing::new(self.choices.smoothing_s, self.choices.loops.dll_bandwidth_hz);
         let (mut parting, mut reflected) = (smoothing(), smoothing());
-        let mut atmosphere = Rate::default();
+        let mut unmodelled = Rate::default();
         errors.signals.each(link, |row| {
             let (Some(true_row), Some(sky)) = (truth.get(&row.sample), sky.get(&row.sample)) else { return };
             let parted_m = true_row.pseudorange_m - link.wavelength_m() * true_row.carrier_cycles;
             let ray_m = rays.get(&row.sample).copied().unwrap_or(0.0);
             let smooth = parting.take(row.time_s, row.locked_s, parted_m + ray_m);
             let bounced = reflected.take(row.time_s, row.locked_s, ray_m.abs());
-            let rate_mps = atmosphere.of(row.time_s, sky.troposphere_m - sky.ionosphere_m);
             let Some(&fix) = self.fixes.get(&row.sample) else { return };
             if !self.usable(link.sv, row.sample) {
                 return;
             }
-            let Some(one) = self.one(&theory, &row, true_row, sky) else { return };
+            let Some((one, phase_m)) = self.one(&theory, &row, true_row, sky) else { return };
             let bounced_m = MULTIPATH_SHARE * bounced.value_m;
             // A fix with one clock brought all ranges to its time.
             let joined = self.run.fixes.get(fix).is_some_and(|fix| fix.clocks == Some(1));
@@ -252,7 +255,7 @@ impl<'r> Scene<'r> {
                 noise_m2: one.noise_m2 * smooth.variance_ratio + self.short_m2(link.sv, row.sample),
                 other_m2: one.other_m2 + bounced_m * bounced_m,
                 memory_s: smooth.memory_s,
-                rate_bias_mps: rate_mps,
+                rate_bias_mps: unmodelled.of(row.time_s, phase_m),
                 ..one
             };
             take(fix, whole);
@@ -272,8 +275,9 @@ impl<'r> Scene<'r> {
             .collect())
     }
 
-    /// A range without smoothing.
-    fn one(&self, theory: &Theory, row: &SignalError, true_row: &Observation, sky: &SkyRow) -> Option<Forecast> {
+    /// A range without smoothing; and, up to a constant, by how much its carrier is longer than what the
+    /// message says.
+    fn one(&self, theory: &Theory, row: &SignalError, true_row: &Observation, sky: &SkyRow) -> Option<(Forecast, f64)> {
         let place = self.trajectory.get(&row.sample)?;
         let user = Geodetic::from_ecef(&place.position_m());
         let in_space = user.height_m >= SPACE_M;
@@ -295,7 +299,9 @@ impl<'r> Scene<'r> {
             }
             _ => 0.0,
         };
-        let true_m = true_row.pseudorange_m - SPEED_OF_LIGHT_MPS * place.clock_bias_s;
+        let clock_m = SPEED_OF_LIGHT_MPS * place.clock_bias_s;
+        let true_m = true_row.pseudorange_m - clock_m;
+        let phase_m = true_row.link().wavelength_m() * true_row.carrier_cycles - clock_m - computed_m;
         // What the system's time is ahead of GPS time goes into its own clock.
         let ahead_m = SPEED_OF_LIGHT_MPS * self.run.scene.ahead_s(true_row.signal.time.name);
         let cost_db = self.costs_db.get(true_row.signal).copied().unwrap_or(0.0);
@@ -304,10 +310,11 @@ impl<'r> Scene<'r> {
         let (_, rate_hz) = theory.noise(Loop::Fll, cn0_hz);
         let (sin, cos) = libm::sincos(elevation_rad);
         let (east, north) = libm::sincos(look.azimuth_rad);
-        Some(Forecast {
+        let forecast = Forecast {
             sv: true_row.sv,
             clock: self.scales.iter().position(|scale| *scale == true_row.signal.time.name).unwrap_or(0),
             sight: Vector3::new(east * cos, north * cos, sin),
+            stepping: is_stepping(&self.run.scene.faults, true_row.sv, row.time_s),
             bias_m: true_m + ahead_m - computed_m - ionosphere_m - sky.troposphere_m,
             ionosphere_m,
             troposphere_m: sky.troposphere_m,
@@ -321,7 +328,8 @@ impl<'r> Scene<'r> {
             slant: if in_space { 1.0 } else { 1.0 / sin.max(0.05) },
             near_mask: !in_space && elevation_rad < self.choices.mask_rad + MASK_SLACK_RAD,
             excluded: self.left_out(true_row.sv, row.sample),
-        })
+        };
+        Some((forecast, phase_m))
     }
 
     /// Variance of what elements in short leave, while nothing better is known; receivers weight by it.

@@ -29,6 +29,8 @@ struct Sums {
     plain: DMatrix<f64>,
     noise: DMatrix<f64>,
     bias: DVector<f64>,
+    /// Biases that may be there or not.
+    stepping: DVector<f64>,
     ionosphere: DVector<f64>,
     troposphere: DVector<f64>,
     rate_normal: Matrix4<f64>,
@@ -60,6 +62,7 @@ impl Sums {
             plain: matrix.clone(),
             noise: matrix,
             bias: vector.clone(),
+            stepping: vector.clone(),
             ionosphere: vector.clone(),
             troposphere: vector,
             rate_normal: Matrix4::zeros(),
@@ -92,7 +95,8 @@ impl Sums {
         self.loose.ger(1.0 / (variance + shell_m2), &row, &row, 1.0);
         self.plain.ger(1.0, &row, &row, 1.0);
         self.noise.ger(weight * weight * (range.noise_m2 + range.other_m2), &row, &row, 1.0);
-        self.bias.axpy(weight * range.bias_m, &row, 1.0);
+        let bias = if range.stepping { &mut self.stepping } else { &mut self.bias };
+        bias.axpy(weight * range.bias_m, &row, 1.0);
         self.ionosphere.axpy(weight * range.ionosphere_m, &row, 1.0);
         self.troposphere.axpy(weight * range.troposphere_m, &row, 1.0);
         // All systems' times run alike: one drift.
@@ -201,7 +205,7 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
         satellites: (sums.least, sums.most),
         blameless: if sums.faulty || !corrected { 0 } else { sums.blameless },
         bias: centre,
-        allowed: weather + missing + BIAS_SHARE * centre.abs(),
+        allowed: weather + missing + solved(&sums.stepping).abs() + BIAS_SHARE * centre.abs(),
         noise,
         thermal,
         stated,

@@ -35,12 +35,13 @@ impl Channel {
             code: self.code,
             code_step: self.code_step as u64,
         };
-        let carried = !self.carry.0.is_empty();
+        let mut carry = std::mem::take(&mut self.carry);
+        let carried = !carry.0.is_empty();
         if carried {
-            self.carry.0.extend_from_slice(i);
-            self.carry.1.extend_from_slice(q);
+            carry.0.extend_from_slice(i);
+            carry.1.extend_from_slice(q);
         }
-        let (i, q) = if carried { (&self.carry.0[..], &self.carry.1[..]) } else { (i, q) };
+        let (i, q) = if carried { (&carry.0[..], &carry.1[..]) } else { (i, q) };
         let Correlations { sums, noise, sides } = self.correlations(replica, (i, q), &nco);
         let read = self.whole && self.confirmed && !self.held && self.overlay_phase.is_some();
         if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
@@ -58,8 +59,10 @@ impl Channel {
             let phase = self.overlay_phase.unwrap_or_default();
             report.symbols.extend(data.read((i, q), self.arithmetic, &nco, (self.period, phase, next), scale));
         }
-        self.carry.0.clear();
-        self.carry.1.clear();
+        let found = self.seek_segment((i, q), &nco, scale);
+        carry.0.clear();
+        carry.1.clear();
+        self.carry = carry;
         self.pass(next);
         self.code -= replica.period();
         let finished = self.period;
@@ -80,6 +83,9 @@ impl Channel {
             self.watch_side_peaks(taps[1], sides.map(|sum| sum * scale), report);
         }
         self.take(finished, taps, report);
+        if let Some(phase) = found {
+            self.follow_long(phase);
+        }
     }
 
     /// All taps of the running period in one pass.

@@ -35,20 +35,35 @@ impl Data {
         settings: &TrackingSettings,
         (rate_hz, sense): (f64, f64),
     ) -> Option<Self> {
-        let component = beside(pilot, signal)?;
+        Self::new(beside(pilot, signal)?, pilot, sv.number, settings, (rate_hz, sense))
+    }
+
+    /// The data of `component`, whose symbols are whole periods, beside `pilot`.
+    pub(super) fn new(
+        component: &'static Component,
+        pilot: &'static Component,
+        number: u8,
+        settings: &TrackingSettings,
+        (rate_hz, sense): (f64, f64),
+    ) -> Option<Self> {
         let model = |component| ReplicaModel::new(settings, component, rate_hz);
-        let replica = Replica::made(component, sv.number, settings.waveform, settings.replica)?;
+        let replica = Replica::made(component, number, settings.waveform, settings.replica)?;
         let share = replica.share() * model(component)?.power;
-        let own = Wave::new(pilot, sv.number)?.share * model(pilot)?.power;
+        let own = Wave::new(pilot, number)?.share * model(pilot)?.power;
         let (sin, cos) = libm::sincos(TAU * sense * (pilot.phase_cycles - component.phase_cycles));
         Some(Self {
             replica,
             turn: Complex64::new(cos, sin),
             deviation: (share / own).sqrt(),
             periods_per_symbol: u64::from(component.periods_per_symbol()?),
-            overlay: OverlaySync::new(component.overlay.of(sv.number)?),
+            overlay: OverlaySync::new(component.overlay.of(number)?),
             sum: (Complex64::ZERO, 0),
         })
+    }
+
+    /// What its code correlates with.
+    pub(super) fn replica(&self) -> &Replica {
+        &self.replica
     }
 
     /// Correlates the data of code period `number`, which ends before sample `end`, and gives the symbol that

@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use super::pilot::Data;
 use super::{Channel, Stage};
 use crate::receiver::correlate::{Nco, Replica, TURN, chips_to_units};
 use crate::receiver::gap::Edges;
@@ -126,7 +127,9 @@ impl Channel {
     /// The replica and its oscillators at `sample`, as they would be had the loop moved the code by
     /// `moved_chips` and no other amount, and at these rates.
     pub fn predicted(&self, sample: u64, moved_chips: f64, rates: &[Rates; 2]) -> Option<(&Replica, Nco)> {
-        let replica = self.replica.as_ref()?;
+        // A segment of a long code is there once; the code beside it comes in every period.
+        let beside = self.data.as_ref().filter(|_| self.segment.is_some()).map(Data::replica);
+        let replica = beside.or(self.replica.as_ref())?;
         let samples = i128::from(sample) - i128::from(self.first);
         let code = i128::from(self.code)
             + samples * i128::from(self.code_step)

@@ -259,6 +259,9 @@ impl Channel {
         if let Some(overlay) = &mut self.overlay {
             overlay.clear();
         }
+        if let Some(long) = &mut self.long {
+            long.clear();
+        }
         self.pending = None;
     }
 

@@ -1,0 +1,81 @@
+//! A pilot whose code is many periods of the followed one long: which of its segments is on the air.
+//!
+//! Both codes begin together, so each period of the followed code has one segment of the long one. What a
+//! period correlates to with every segment is summed for every place that the first period may have in the
+//! long code, until one is beyond doubt. Source of the scheme: IS-GPS-200N, 3.2.1.5 (L2 CL has 75 periods of
+//! CM). Limits: chips of one rectangular step; a segment's replica is cyclic, so its first and last chip lack
+//! their true neighbours, two of 20 460.
+
+use super::overlay::{OverlayPhase, Shifts};
+use crate::gnss::signal::{Component, Signal};
+use crate::receiver::correlate::{Edge, Replica, Wave};
+use crate::receiver::lead::long_beside;
+
+/// Code periods before a decision is tried, and after which a search begins anew.
+const LEAST_PERIODS: u32 = 4;
+const MOST_PERIODS: u32 = 200;
+
+/// Search for the segment of a code period, and the segments' replicas.
+#[derive(Clone, Debug)]
+pub struct LongCode {
+    component: &'static Component,
+    number: u8,
+    edge: Edge,
+    /// Chips of a segment, and segments of the code.
+    length: usize,
+    segments: u64,
+    /// The whole code; made when it is asked for.
+    chips: Vec<i8>,
+    shifts: Shifts,
+}
+
+impl LongCode {
+    /// The pilot of such a code beside `lead`, if the signal has one.
+    pub fn beside(lead: &'static Component, signal: &'static Signal, number: u8, edge: Edge) -> Option<Self> {
+        let component = long_beside(lead, signal)?;
+        let segments = component.code_chips / lead.code_chips;
+        let shifts = Shifts::new(segments as usize);
+        let length = lead.code_chips as usize;
+        Some(Self { component, number, edge, length, segments: u64::from(segments), chips: Vec::new(), shifts })
+    }
+
+    /// The pilot.
+    pub fn component(&self) -> &'static Component {
+        self.component
+    }
+
+    /// The segment of code period `number`.
+    pub fn segment(&self, phase: OverlayPhase, number: u64) -> u64 {
+        (number + phase.shift) % self.segments
+    }
+
+    /// The replica of a segment; `None` where the documents assign no code.
+    pub fn replica(&mut self, segment: u64) -> Option<Replica> {
+        if self.chips.is_empty() {
+            self.chips = (self.component.code)(self.number)?;
+        }
+        let values = self.chips.chunks_exact(self.length).nth(segment as usize)?.to_vec();
+        let sent = values.iter().filter(|&&chip| chip != 0).count();
+        let share = sent as f64 / values.len().max(1) as f64;
+        Replica::of(Wave { values, steps_per_chip: 1, share }, self.edge)
+    }
+
+    /// Forgets what was taken.
+    pub fn clear(&mut self) {
+        self.shifts.clear();
+    }
+
+    /// Takes code period `number`, in phase lock; `prompt` gives what it correlates to with a replica, in
+    /// phase (noise of unit variance). Gives the phase when it is beyond doubt.
+    pub fn add(&mut self, number: u64, prompt: impl Fn(&Replica) -> f64) -> Option<OverlayPhase> {
+        let all: Vec<f64> = (0..self.segments)
+            .map(|shift| self.replica((number + shift) % self.segments).map_or(0.0, |replica| prompt(&replica)))
+            .collect();
+        let taken = self.shifts.add(all.into_iter());
+        let found = if taken < LEAST_PERIODS { None } else { self.shifts.decide() };
+        if taken >= MOST_PERIODS {
+            self.clear();
+        }
+        found
+    }
+}
