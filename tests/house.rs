@@ -63,7 +63,7 @@ fn files_of_logic_are_short() {
 #[test]
 fn comments_are_wrapped() {
     let mut wide = Vec::new();
-    for folder in ["src", "tests", "benches", "examples", "fuzz"] {
+    for folder in ["src", "tests", "benches", "examples", "fuzz", "python"] {
         for (path, text) in source::files(folder) {
             wide.extend(comments_too_wide(&text, MOST_COLUMNS).into_iter().map(|line| format!("{path}:{line}")));
         }
@@ -74,7 +74,7 @@ fn comments_are_wrapped() {
 #[test]
 fn lines_of_code_fit_the_columns() {
     let mut wide = Vec::new();
-    for folder in ["src", "benches", "examples"] {
+    for folder in ["src", "benches", "examples", "python"] {
         for (path, text) in source::files(folder) {
             wide.extend(code_too_wide(&text, MOST_CODE_COLUMNS).into_iter().map(|line| format!("{path}:{line}")));
         }

@@ -7,7 +7,6 @@
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::Path;
-use std::process::ExitCode;
 
 /// An end that is not success: one message and its exit code.
 #[derive(Debug)]
@@ -86,8 +85,8 @@ impl CliError {
     }
 
     /// The exit code of this end.
-    pub fn exit_code(&self) -> ExitCode {
-        ExitCode::from(self.code)
+    pub fn exit_code(&self) -> u8 {
+        self.code
     }
 
     /// Prints the message on standard error, control characters escaped; a failure to do so is silent.

@@ -32,6 +32,7 @@ mod speed;
 mod staging;
 mod study;
 
+use std::ffi::OsString;
 use std::panic::catch_unwind;
 use std::process::ExitCode;
 
@@ -42,12 +43,17 @@ use error::CliError;
 
 /// Runs the program with the process's arguments.
 pub fn main() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    ExitCode::from(main_of(std::env::args_os()))
+}
+
+/// Runs the program with these arguments, of which the first is its own name; returns its exit code.
+pub fn main_of(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> u8 {
+    let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
             let code = usage.exit_code();
             return match usage.print() {
-                Ok(()) => ExitCode::from(code as u8),
+                Ok(()) => code as u8,
                 Err(io) => CliError::output("standard output", &io).exit_code(),
             };
         }
@@ -55,7 +61,7 @@ pub fn main() -> ExitCode {
     // The panic has been printed by then; what is left of outputs in the making is swept as they are dropped.
     let ended = catch_unwind(|| execute(arguments)).unwrap_or_else(|_| Err(CliError::bug("see above")));
     match ended {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
             interrupt::give_way();
             error.print();

@@ -67,6 +67,19 @@ struct Making {
 /// # Errors
 /// The first case or file that fails. What was committed stays.
 pub fn run(plan: &Plan, shards: &[u32], progress: &(dyn Fn(u64) + Sync)) -> Result<Ran, StudyError> {
+    run_while(plan, shards, progress, &|| true)
+}
+
+/// [`run`] as long as `goes_on` says so.
+///
+/// # Errors
+/// As [`run`], and [`StudyError::Stopped`].
+pub fn run_while(
+    plan: &Plan,
+    shards: &[u32],
+    progress: &(dyn Fn(u64) + Sync),
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Ran, StudyError> {
     temporary::sweep(&plan.shard_directory());
     let sharing = plan.study.grid.sharing();
     let makings: Vec<Making> = shards
@@ -84,7 +97,7 @@ pub fn run(plan: &Plan, shards: &[u32], progress: &(dyn Fn(u64) + Sync)) -> Resu
     });
     let (done, failed) = (AtomicU64::new(0), AtomicBool::new(false));
     let reason: Mutex<Option<StudyError>> = Mutex::new(None);
-    let halt = || failed.load(Ordering::Relaxed);
+    let halt = || failed.load(Ordering::Relaxed) || !goes_on();
     groups.par_bridge().for_each(|(making, cases)| {
         let worked = if halt() { Err(StudyError::Stopped) } else { work(plan, making, cases.clone(), &halt) };
         match worked {

@@ -1,0 +1,128 @@
+//! Generator and receiver in one loop, judged where the files are kept.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use gnss_twin::analysis::judge_against;
+use gnss_twin::analysis::show::staged::Staged;
+use gnss_twin::generator::scene::Scene as Composed;
+use gnss_twin::generator::truth::{self, Writer};
+use gnss_twin::gnss::samples::IfMetadata;
+use gnss_twin::receiver::Reception;
+use gnss_twin::receiver::output::{self, Output};
+use gnss_twin::receiver::settings::Settings;
+use gnss_twin::twin::feed;
+use pyo3::prelude::*;
+use serde_json::Value;
+
+use crate::call::{Halt, long};
+use crate::failure::Failure;
+use crate::scene::Scene;
+use crate::tables::{Received, Truth, object};
+
+/// What a run came to.
+#[pyclass(frozen, module = "gnss_twin")]
+pub struct Run {
+    #[pyo3(get)]
+    truth: Py<PyAny>,
+    #[pyo3(get)]
+    receiver: Py<PyAny>,
+    #[pyo3(get)]
+    summary: Py<PyAny>,
+    #[pyo3(get)]
+    judgement: Option<Py<PyAny>>,
+    text: String,
+}
+
+#[pymethods]
+impl Run {
+    fn __str__(&self) -> &str {
+        &self.text
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Run: {}>", self.text)
+    }
+}
+
+/// Generates and receives; a line of each side on what was done.
+fn closed_loop(
+    scenes: &[Composed],
+    settings: &Settings,
+    truth: &mut (dyn truth::Sink + Send),
+    records: &mut (dyn output::Sink + Send),
+    halt: &Halt,
+) -> Result<String, Failure> {
+    let metadata: Vec<IfMetadata> = scenes.iter().map(|scene| scene.metadata.clone()).collect();
+    let mut reception = Reception::of_several(&metadata, settings)?;
+    let fed = feed(scenes, truth, &mut |number, samples| {
+        halt.check()?;
+        reception.take_of(number, samples, records).map_err(Failure::from)
+    })?;
+    let outcome = reception.finish(records)?;
+    let made: Vec<String> = fed.generated.iter().map(ToString::to_string).collect();
+    Ok(format!("{}\n{outcome}", made.join("\n")))
+}
+
+/// Where a run's files grow, out of sight beside their place.
+struct Files {
+    making: Staged,
+    truth: Writer,
+    output: Output,
+}
+
+impl Files {
+    fn create(target: &Path) -> Result<Self, Failure> {
+        if target.exists() {
+            let there = io::Error::new(io::ErrorKind::AlreadyExists, "expected a new directory");
+            return Err(Failure::file(target, &there));
+        }
+        let name = target.file_name().ok_or_else(|| Failure::other(format!("{}: no name", target.display())))?;
+        let hidden = target.with_file_name(format!(".{}.part", name.to_string_lossy()));
+        let failed = |error: io::Error| Failure::file(target, &error);
+        let making = Staged::directory(hidden).map_err(failed)?;
+        let (truth, rx) = (making.path().join("truth"), making.path().join("rx"));
+        fs::create_dir(&truth).and_then(|()| fs::create_dir(&rx)).map_err(failed)?;
+        Ok(Self { truth: Writer::create(&truth)?, output: Output::create(&rx)?, making })
+    }
+}
+
+/// Runs a scene; with `out`, its files are written there and judged.
+#[pyfunction]
+#[pyo3(signature = (scene, settings = None, *, out = None))]
+pub fn run(py: Python<'_>, scene: &Scene, settings: Option<&Bound<'_, PyAny>>, out: Option<PathBuf>) -> PyResult<Run> {
+    let settings = scene.settings(settings)?;
+    let (mut truth, mut received) = (Truth::default(), Received::default());
+    let (text, judgement) = long(py, |halt| match &out {
+        None => Ok((closed_loop(&scene.scenes, &settings, &mut truth, &mut received, halt)?, None)),
+        Some(target) => {
+            let Files { making, truth: mut rows, mut output } = Files::create(target)?;
+            let (truths, records) = (&mut (&mut truth, &mut rows), &mut (&mut received, &mut output));
+            let text = closed_loop(&scene.scenes, &settings, truths, records, halt)?;
+            drop((rows, output));
+            let judgement = judged(making.path())?;
+            making.finish(target).map_err(|error| Failure::file(target, &error))?;
+            Ok((text, Some(judgement)))
+        }
+    })?;
+    Ok(Run {
+        truth: truth.drain(py)?.into_any().unbind(),
+        summary: received.drain_summary(py)?.unbind(),
+        receiver: received.drain(py)?.into_any().unbind(),
+        judgement: judgement.map(|judgement| object(py, &judgement)).transpose()?.map(Bound::unbind),
+        text,
+    })
+}
+
+fn judged(directory: &Path) -> Result<Value, Failure> {
+    let summary = judge_against(directory, None)?;
+    serde_json::to_value(&summary).map_err(|error| Failure::bug(&error.to_string()))
+}
+
+/// Judges the files of a run, writes tables, pictures and a report beside them, and returns the summary.
+#[pyfunction]
+pub fn judge(py: Python<'_>, directory: PathBuf) -> PyResult<Py<PyAny>> {
+    let summary = long(py, |_| judged(&directory))?;
+    Ok(object(py, &summary)?.unbind())
+}

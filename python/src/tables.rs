@@ -1,0 +1,135 @@
+//! The records of generator and receiver as tables, each under the name of the file that the program writes.
+
+use std::collections::BTreeSet;
+
+use gnss_twin::generator::truth::{self, TruthError};
+use gnss_twin::gnss::record::{
+    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, InterferenceRow, LineRow, NavigationRow, Observation, PassRow,
+    RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
+};
+use gnss_twin::receiver::output::{self, OutputError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde_json::Value;
+
+use crate::columns::{FrontEnd, Spoofer, Table};
+
+/// What is true of a scene.
+#[derive(Default)]
+pub struct Truth {
+    trajectory: Table<(TrajectoryRow, Geographic)>,
+    observations: Table<Observation>,
+    sky: Table<SkyRow>,
+    rays: Table<RayRow>,
+    interference: Table<InterferenceRow>,
+    claimed: Table<((TrajectoryRow, Geographic), Spoofer)>,
+    spoofed: Table<(Observation, Spoofer)>,
+    navigation: Table<NavigationRow>,
+    passes: Table<PassRow>,
+}
+
+/// A row with its place as people have it.
+fn placed(row: TrajectoryRow) -> (TrajectoryRow, Geographic) {
+    let place = Geographic::of(&row.position_m(), row.time());
+    (row, place)
+}
+
+impl truth::Sink for Truth {
+    fn take(&mut self, record: truth::Record) -> Result<(), TruthError> {
+        match record {
+            truth::Record::Trajectory(row) => self.trajectory.push(&placed(row)),
+            truth::Record::Observation(row) => self.observations.push(&row),
+            truth::Record::Sky(row) => self.sky.push(&row),
+            truth::Record::Ray(row) => self.rays.push(&row),
+            truth::Record::Interference(row) => self.interference.push(&row),
+            truth::Record::Claim { spoofer, place } => self.claimed.push(&(placed(place), Spoofer { spoofer })),
+            truth::Record::Spoofed { spoofer, observation } => self.spoofed.push(&(observation, Spoofer { spoofer })),
+            truth::Record::Navigation(row) => self.navigation.push(&row),
+            truth::Record::Pass(row) => self.passes.push(&row),
+        }
+        Ok(())
+    }
+}
+
+/// Hands over all tables, which are empty after it.
+macro_rules! tables {
+    ($tables:expr, $py:expr; $($name:ident),*) => {{
+        let dict = PyDict::new($py);
+        $(dict.set_item(stringify!($name), $tables.$name.take($py)?)?;)*
+        Ok(dict)
+    }};
+}
+
+impl Truth {
+    /// The tables by their names; they are empty after it.
+    pub fn drain<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        tables!(self, py; trajectory, observations, sky, rays, interference, claimed, spoofed, navigation, passes)
+    }
+}
+
+/// What a receiver reports.
+#[derive(Default)]
+pub struct Received {
+    acquisition: Table<AcquisitionRow>,
+    tracking: Table<TrackingRow>,
+    events: Table<EventRow>,
+    observations: Table<Observation>,
+    navigation: Table<NavigationRow>,
+    fixes: Table<(Fix, Geographic)>,
+    clocks: Table<ClockRow>,
+    sights: Table<SightRow>,
+    interference: Table<(LineRow, FrontEnd)>,
+    /// Parameters so far: those of one issue are reported once.
+    parameters: BTreeSet<NavigationRow>,
+    /// At the end.
+    pub summary: Option<Value>,
+}
+
+impl output::Sink for Received {
+    fn take(&mut self, record: output::Record) -> Result<(), OutputError> {
+        match record {
+            output::Record::Acquisition(row) => self.acquisition.push(&row),
+            output::Record::Tracking(row) => self.tracking.push(&row),
+            output::Record::Event(row) => self.events.push(&row),
+            output::Record::Observation(row) => self.observations.push(&row),
+            output::Record::Navigation(rows) => {
+                for row in rows {
+                    if !self.parameters.contains(&row) {
+                        self.navigation.push(&row);
+                        self.parameters.insert(row);
+                    }
+                }
+            }
+            output::Record::Fix(fix) => {
+                let place = Geographic::of(&fix.position_m(), fix.time());
+                self.fixes.push(&(fix, place));
+            }
+            output::Record::Clocks(rows) => rows.iter().for_each(|row| self.clocks.push(row)),
+            output::Record::Sights(rows) => rows.iter().for_each(|row| self.sights.push(row)),
+            output::Record::Interference { front_end, row } => self.interference.push(&(row, FrontEnd { front_end })),
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, summary: &Value) -> Result<(), OutputError> {
+        self.summary = Some(summary.clone());
+        Ok(())
+    }
+}
+
+impl Received {
+    /// The tables by their names; they are empty after it.
+    pub fn drain<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        tables!(self, py; acquisition, tracking, events, observations, navigation, fixes, clocks, sights, interference)
+    }
+
+    /// The summary as a dictionary; empty before the end.
+    pub fn drain_summary<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        object(py, &self.summary.take().unwrap_or_else(|| Value::Object(Default::default())))
+    }
+}
+
+/// JSON as Python has it.
+pub fn object<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
+    py.import("json")?.call_method1("loads", (value.to_string(),))
+}

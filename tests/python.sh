@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# The Python module as its users get it: a wheel is built and installed in a fresh environment, its tests, its stubs and its examples
+# run there.
+#
+# usage: tests/python.sh [PROFILE [OPT_LEVEL]]     (default: dev 1: the library is compiled in a third of the time, and quick enough)
+# exit:  0 all of it holds; 1 it does not; 75 maturin, numpy, pytest or mypy could not be installed.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+profile=${1:-dev}
+level=${2:-1}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+python3 -m venv "$work/env"
+bin=$work/env/bin
+"$bin/pip" install --quiet --disable-pip-version-check 'maturin>=1.9.4,<2' numpy pytest mypy pandas polars || {
+    echo "python: cannot install maturin, numpy, pytest, mypy, pandas and polars here" >&2
+    exit 75
+}
+(cd "$root" && "$bin/maturin" build --quiet --locked --manifest-path python/Cargo.toml --profile "$profile" \
+    --config "profile.$profile.package.gnss-twin.opt-level=$level" --out "$work/wheels")
+"$bin/pip" install --quiet --disable-pip-version-check --no-deps "$work"/wheels/*.whl
+# Elsewhere, so that what is tested is what was installed.
+cd "$work"
+"$bin/python" -m pytest -q -p no:cacheprovider "$root/python/tests"
+# The stubs against what the module has, and the examples against the stubs.
+"$bin/python" -m mypy.stubtest --ignore-missing-stub gnss_twin
+"$bin/python" -m mypy "$root"/python/examples/*.py
+"$bin/python" "$root/python/examples/acquire_recording.py" >acquired.txt
+grep -E '^([6-9]|1[0-9]) satellites of 32 searched$' acquired.txt
+"$bin/python" "$root/python/examples/sweep_loop_bandwidth.py" >swept.txt
+[ "$(grep -c 'modelled:.*theory' swept.txt)" -eq 3 ]
+"$bin/python" "$root/python/examples/fly_trajectory.py" 2 >flown.txt
+grep -E '^[0-9]+ steps, largest gap 0\.0' flown.txt
+echo "python: the wheel, its tests, stubs and examples hold"
