@@ -186,12 +186,14 @@ mod fields {
         SkyRow { sample, sv, azimuth_deg, elevation_deg, range_m, satellite_clock_m, ionosphere_m, troposphere_m }
         PassRow { sv, sample, until_sample, begins_by, ends_by }
         RayRow { sample, sv, signal, ray, excess_m, amplitude_ratio, phase_cycles }
-        TrajectoryRow { sample, gps_s, gps_fraction_s, x_m, y_m, z_m, vx_mps, vy_mps, vz_mps, clock_bias_s, clock_drift }
+        TrajectoryRow { sample, gps_s, gps_fraction_s, x_m, y_m, z_m, vx_mps, vy_mps, vz_mps, clock_bias_s,
+            clock_drift }
         Geographic { latitude_deg, longitude_deg, height_m, utc }
         InterferenceRow { sample, source, jn0_dbhz, frequency_hz }
         Fix { sample, gps_s, gps_fraction_s, x_m, y_m, z_m, vx_mps, vy_mps, vz_mps, clock_bias_s, clock_drift,
-            sigma_east_m, sigma_north_m, sigma_up_m, sigma_clock_m, correlation_en, correlation_eu, correlation_nu, gdop,
-            pdop, hdop, vdop, tdop, condition, satellites, chi_square, excluded, ionosphere, ranges, clocks, time_scale }
+            sigma_east_m, sigma_north_m, sigma_up_m, sigma_clock_m, correlation_en, correlation_eu,
+            correlation_nu, gdop, pdop, hdop, vdop, tdop, condition, satellites, chi_square, excluded, ionosphere,
+            ranges, clocks, time_scale }
         SightRow { sample, sv, azimuth_deg, elevation_deg, used }
         ClockRow { sample, time_scale, clock_bias_s, sigma_clock_m }
         AcquisitionRow { sample, sv, signal, acquired, statistic, threshold, doppler_hz, code_phase_chips, cn0_dbhz }
