@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use nalgebra::Vector3;
 
 use crate::analysis::error::JudgeError;
-use crate::analysis::expect::due::satellite::is_stepping;
+use crate::analysis::expect::due::satellite::{FADE_DB, is_stepping};
 use crate::analysis::expect::loops::{Theory, update_s};
 use crate::analysis::expect::message::Message;
 use crate::analysis::expect::multipath;
@@ -100,6 +100,11 @@ const IN_SHORT_M: f64 = 2.2;
 /// Share of the rays' computed effect by which it may be wrong: the front end rounds the correlation, the
 /// loop lags.
 const MULTIPATH_SHARE: f64 = 0.5;
+/// Time that a phase loop takes back to its signal after a fade.
+const FADE_S: f64 = 0.5;
+/// How quickly a strength is forgotten against which a signal fades, dB a second: what is weaker for longer
+/// is shaded, not fading.
+const FORGOTTEN_DBPS: f64 = 2.0;
 /// Satellites this near to the mask may be used or not: true and computed elevation differ.
 const MASK_SLACK_RAD: f64 = 2e-3;
 
@@ -136,6 +141,8 @@ pub struct Forecast {
     /// Whether the C/N0 observed is near the true one: in fades and jamming averages lag, which rows of their
     /// own judge.
     pub steady: bool,
+    /// Whether the signal has faded so lately that its phase turns quicker than the truth's rows show.
+    pub fading: bool,
     /// Of a model's error at the zenith: one over the elevation's sine.
     pub slant: f64,
     /// Whether it is so near to the mask that it may be used or not.
@@ -235,8 +242,10 @@ impl<'r> Scene<'r> {
         let smoothing = || Smoothing::new(self.choices.smoothing_s, self.choices.loops.dll_bandwidth_hz);
         let (mut parting, mut reflected) = (smoothing(), smoothing());
         let mut unmodelled = Rate::default();
+        let mut fades = Fades::default();
         errors.signals.each(link, |row| {
             let (Some(true_row), Some(sky)) = (truth.get(&row.sample), sky.get(&row.sample)) else { return };
+            let fading = fades.take(row.time_s, true_row.cn0_dbhz);
             let parted_m = true_row.pseudorange_m - link.wavelength_m() * true_row.carrier_cycles;
             let ray_m = rays.get(&row.sample).copied().unwrap_or(0.0);
             let smooth = parting.take(row.time_s, row.locked_s, parted_m + ray_m);
@@ -256,6 +265,7 @@ impl<'r> Scene<'r> {
                 other_m2: one.other_m2 + bounced_m * bounced_m,
                 memory_s: smooth.memory_s,
                 rate_bias_mps: unmodelled.of(row.time_s, phase_m),
+                fading,
                 ..one
             };
             take(fix, whole);
@@ -325,6 +335,7 @@ impl<'r> Scene<'r> {
             rate_bias_mps: 0.0,
             cn0_hz,
             steady: (row.cn0_dbhz - row.cn0_effective_dbhz + cost_db).abs() <= CN0_DB,
+            fading: false,
             slant: if in_space { 1.0 } else { 1.0 / sin.max(0.05) },
             near_mask: !in_space && elevation_rad < self.choices.mask_rad + MASK_SLACK_RAD,
             excluded: self.left_out(true_row.sv, row.sample),
@@ -379,5 +390,48 @@ impl Rate {
     fn of(&mut self, time_s: f64, value: f64) -> f64 {
         let before = self.last.replace((time_s, value));
         before.filter(|(t_s, _)| time_s - t_s > 1e-3).map_or(0.0, |(t_s, old)| (value - old) / (time_s - t_s))
+    }
+}
+
+/// Whether a signal fades, from its true strengths one after the other.
+struct Fades {
+    time_s: f64,
+    strongest_dbhz: f64,
+    faded_s: f64,
+}
+
+impl Default for Fades {
+    fn default() -> Self {
+        Self { time_s: 0.0, strongest_dbhz: f64::NEG_INFINITY, faded_s: f64::NEG_INFINITY }
+    }
+}
+
+impl Fades {
+    /// Whether it fades at the newest strength, or did a moment ago.
+    fn take(&mut self, time_s: f64, cn0_dbhz: f64) -> bool {
+        let forgotten_db = FORGOTTEN_DBPS * (time_s - self.time_s);
+        self.strongest_dbhz = cn0_dbhz.max(self.strongest_dbhz - forgotten_db);
+        self.time_s = time_s;
+        if cn0_dbhz < self.strongest_dbhz - FADE_DB {
+            self.faded_s = time_s;
+        }
+        time_s < self.faded_s + FADE_S
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fade_ends_half_a_second_after_the_signal_is_back_and_a_shade_is_none_after_some_seconds() {
+        let mut fades = Fades::default();
+        let mut at = |tenths: i32, cn0_dbhz: f64| fades.take(f64::from(tenths) * 0.1, cn0_dbhz);
+        assert!((0..20).all(|t| !at(t, 45.0)));
+        assert!(at(20, 34.0) && at(21, 30.0) && at(22, 44.0) && at(25, 45.0));
+        assert!((27..40).all(|t| !at(t, 45.0 - 9.0 * f64::from(t % 2))));
+        // 20 dB less from then on: ten of them are forgotten after 5 s.
+        assert!((40..88).all(|t| at(t, 25.0)));
+        assert!((97..120).all(|t| !at(t, 25.0)));
     }
 }

@@ -23,6 +23,7 @@ struct Sums {
     blameless: u32,
     faulty: bool,
     unsteady: bool,
+    fading: bool,
     normal: DMatrix<f64>,
     /// The same where the ionosphere is not known yet.
     loose: DMatrix<f64>,
@@ -57,6 +58,7 @@ impl Sums {
             blameless: 0,
             faulty: false,
             unsteady: false,
+            fading: false,
             normal: matrix.clone(),
             loose: matrix.clone(),
             plain: matrix.clone(),
@@ -86,6 +88,7 @@ impl Sums {
             return;
         }
         self.unsteady |= !range.steady;
+        self.fading |= range.fading;
         let weight = 1.0 / variance;
         let cosine2 = SHELL * SHELL * (1.0 - range.sight.z * range.sight.z);
         let shell_m2 = IONOSPHERE_SIGMA_M * IONOSPHERE_SIGMA_M / (1.0 - cosine2);
@@ -138,6 +141,8 @@ pub struct Expected {
     pub corrected: bool,
     /// Whether every satellite's C/N0 was measured as it is: what is stated follows from it.
     pub steady: bool,
+    /// Whether a signal of it fades: nothing is known of its rate then.
+    pub fading: bool,
     /// How long a fix remembers its noise, seconds.
     pub memory_s: f64,
     /// Covariance of velocity and of c times the drift, (m/s)².
@@ -213,6 +218,7 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
         condition: (geometry.max() / geometry.min()).sqrt(),
         corrected,
         steady: !sums.unsteady,
+        fading: sums.fading,
         memory_s: sums.memory_s,
         rate_noise: rates * sums.rate_noise * rates,
         rate_allowed: 2.0 * (rates * sums.rate_bias).abs(),

@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use super::motion::Motion;
 use crate::analysis::error::JudgeError;
+use crate::analysis::expect::due::satellite::FADE_DB;
 use crate::analysis::expect::loops::Theory;
 use crate::analysis::expect::quantile::{largest, mean_square};
 use crate::analysis::judge::forecast::ranges::{Choices, Scene};
@@ -105,6 +106,10 @@ impl Verdict {
             self.position(run, summary);
             return Ok(());
         }
+        let fading = cases.iter().filter(|case| case.expected.fading).count();
+        if fading > 0 {
+            self.not_judged.push(format!("velocity of {fading} fixes in which a signal fades by {FADE_DB} dB"));
+        }
         for kind in kinds(run, &scene.choices, &cases) {
             self.kind(&kind);
         }
@@ -116,6 +121,9 @@ impl Verdict {
 
     fn kind(&mut self, kind: &Kind) {
         let Kind { name, path, unit, axes, .. } = *kind;
+        if kind.values.is_empty() {
+            return;
+        }
         let lengths: Vec<f64> = kind.values.iter().map(|value| value.error.norm()).collect();
         let sum: Vector3<f64> = kind.values.iter().map(|value| value.error).sum();
         let count = kind.values.len() as f64;
@@ -417,6 +425,10 @@ fn kinds(run: &Run, choices: &Choices, cases: &[Case<'_>]) -> Vec<Kind> {
         independent,
         values: cases.iter().map(of).collect(),
     };
+    let rate = |name, path, axes, of: &dyn Fn(&Case<'_>) -> Value| {
+        let steady = cases.iter().filter(|case| !case.expected.fading);
+        Kind { name, path, unit: "m/s", axes, independent: fast, values: steady.map(of).collect() }
+    };
     let position = |case: &Case<'_>, error: Vector3<f64>, sigma: f64, allowed: f64| Value {
         time_s: case.error.time_s,
         error,
@@ -441,13 +453,13 @@ fn kinds(run: &Run, choices: &Choices, cases: &[Case<'_>]) -> Vec<Kind> {
             let error = Vector3::new(case.error.clock_m + e.bias.w, 0.0, 0.0);
             position(case, error, e.noise.m44.sqrt(), of(&e.allowed, 3))
         }),
-        kind("velocity", "position.velocity_p95_mps", "m/s", 3, fast, &|case| {
+        rate("velocity", "position.velocity_p95_mps", 3, &|case| {
             let e = &case.expected;
             let sigma = largest_axis(&e.rate_noise).max(e.rate_noise.m33.sqrt());
             let allowed = e.rate_allowed.fixed_rows::<3>(0).norm() + motion.allowed_mps(case.fix.sample);
             position(case, case.error.velocity_enu_mps, sigma, allowed)
         }),
-        kind("clock drift", "", "m/s", 1, fast, &|case| {
+        rate("clock drift", "", 1, &|case| {
             let e = &case.expected;
             let error = Vector3::new(case.drift_mps, 0.0, 0.0);
             let allowed = of(&e.rate_allowed, 3) + motion.allowed_mps(case.fix.sample);
