@@ -273,6 +273,83 @@ fn acquired(results: &Path) -> Vec<String> {
     rows.map(|row| row.split(',').nth(1).unwrap().to_owned()).collect()
 }
 
+/// Half a second in two bits: whole bytes, packed by flags and by metadata, as one of two channels, in a data
+/// set of another name with a header, and in an archive that another program wrote. All are the same samples.
+#[test]
+fn packed_samples_channels_headers_and_archives_are_received_as_what_they_hold() {
+    let here = workplace();
+    fs::write(here.path().join("short.toml"), SHORT.replace("duration_s = 2", "duration_s = 0.5")).unwrap();
+    assert_eq!(code(&twin(&["generate", "short.toml", "--out", "short.sigmf-data"], here.path())), 0);
+    let write = |name: &str, bytes: &[u8]| fs::write(here.path().join(name), bytes).unwrap();
+    let fine: Vec<i8> =
+        fs::read(here.path().join("short.sigmf-data")).unwrap().into_iter().map(|byte| byte as i8).collect();
+    // Magnitudes above the scatter are 3, those below 1.
+    let power = fine.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>() / fine.len() as f64;
+    let large = |value: i8| f64::from(value).powi(2) > power;
+    let coarse: Vec<i8> =
+        fine.iter().map(|value| if large(*value) { 3 } else { 1 } * if *value < 0 { -1 } else { 1 }).collect();
+    let bytes: Vec<u8> = coarse.iter().map(|value| *value as u8).collect();
+    write("whole.bin", &bytes);
+    let code_of = |value: &i8| u8::from(value.abs() == 3) | u8::from(*value < 0) << 1;
+    let byte = |four: &[i8]| four.iter().rev().fold(0, |byte, value| byte << 2 | code_of(value));
+    let packed: Vec<u8> = coarse.chunks(4).map(byte).collect();
+    write("packed.bin", &packed);
+    write("named.sigmf-data", &packed);
+    let metadata = |keys: &str, first: &str| {
+        format!(
+            r#"{{"global": {{"core:version": "1.2.0", "core:sample_rate": 2600000, {keys}}},
+                "captures": [{{"core:sample_start": 0, "core:frequency": 1575420000{first}}}], "annotations": []}}"#
+        )
+    };
+    let own = r#""core:datatype": "ru8", "gnss_twin:bits": 2, "gnss_twin:encoding": "sign-magnitude",
+        "gnss_twin:bit_order": "lsb", "core:extensions": [{"name": "gnss_twin", "version": "0.1.0", "optional": false}]"#;
+    write("named.sigmf-meta", metadata(own, "").as_bytes());
+    let other: Vec<u8> = bytes.chunks(2).flat_map(|pair| [7, 9, pair[0], pair[1]]).collect();
+    write("two.bin", &other);
+    let headed: Vec<u8> = b"sixteen bytes...".iter().chain(&bytes).chain(b"end").copied().collect();
+    write("headed.dat", &headed);
+    let keys = r#""core:datatype": "ci8", "core:dataset": "headed.dat", "core:trailing_bytes": 3"#;
+    write("headed.sigmf-meta", metadata(keys, r#", "core:header_bytes": 16"#).as_bytes());
+    fs::create_dir(here.path().join("kept")).unwrap();
+    write("kept/kept.sigmf-data", &bytes);
+    write("kept/kept.sigmf-meta", metadata(r#""core:datatype": "ci8""#, "").as_bytes());
+    let tar = ["--format=ustar", "-cf", "kept.sigmf", "kept"];
+    assert!(Command::new("tar").args(tar).current_dir(here.path()).status().unwrap().success());
+
+    let raw = ["--rate-hz", "2.6e6"];
+    let bits = ["--bits", "2", "--encoding", "sign-magnitude", "--lowest-first"];
+    let ways: [(&str, Vec<&str>); 6] = [
+        ("whole.bin", [&["--format", "ci8"][..], &raw].concat()),
+        ("packed.bin", [&bits[..], &raw].concat()),
+        ("named.sigmf-meta", vec![]),
+        ("two.bin", [&["--format", "ci8", "--channels", "2", "--channel", "2"][..], &raw].concat()),
+        ("headed.sigmf-meta", vec![]),
+        ("kept.sigmf", vec![]),
+    ];
+    let mut found = Vec::new();
+    for (number, (file, flags)) in ways.iter().enumerate() {
+        let out = format!("rx{number}");
+        let received = twin(&[&["receive", file, "--out", &out][..], flags].concat(), here.path());
+        assert_eq!(code(&received), 0, "{file}: {}", stderr(&received));
+        let table = |name| fs::read(here.path().join(&out).join(name)).unwrap();
+        found.push((table("acquisition.csv"), table("tracking.csv")));
+        assert!(acquired(&here.path().join(&out)).len() >= 6, "{file}");
+        assert_eq!(found[number], found[0], "{file}");
+    }
+    for (arguments, words) in [
+        (
+            &["receive", "two.bin", "--format", "ci8", "--channels", "2", "--rate-hz", "2.6e6", "--out", "x"][..],
+            "--channel 1 to 2",
+        ),
+        (&["receive", "packed.bin", "--bits", "5", "--rate-hz", "2.6e6", "--out", "x"], "5 bits a value"),
+        (&["receive", "packed.bin", "--bits", "2", "--format", "ci8", "--out", "x"], "cannot be used with"),
+    ] {
+        let refused = twin(arguments, here.path());
+        assert_eq!(code(&refused), 2, "{}", stderr(&refused));
+        assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
+    }
+}
+
 #[test]
 fn a_recording_without_a_sample_is_bad_input_and_leaves_nothing() {
     let here = workplace();

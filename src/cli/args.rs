@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
+use crate::cli::packed::Packed;
 use crate::cli::sink::Spec;
 use crate::gnss::samples::Format;
 use crate::gnss::time::Epoch;
@@ -304,9 +305,10 @@ fn latency(text: &str) -> Result<f64, String> {
                   Ctrl-C with --live, 65 when the input is no recording"
 )]
 pub struct Receive {
-    /// Recording: a SigMF pair (either file), a SigMF collection of front ends that share a clock, or a raw
-    /// file with --format and --rate-hz; - is standard input. Or a stream: fifo:PATH, tcp:ADDR of a server of
-    /// samples alone, rtl-tcp:ADDR of one that drives a dongle (ADDR is HOST:PORT, or PORT on this machine)
+    /// Recording: a SigMF pair (either file), archive (.sigmf) or collection of front ends that share a
+    /// clock, ION metadata (.xml, .sdrx), or a raw file with --format or --bits and --rate-hz; - is standard
+    /// input. Or a stream: fifo:PATH, tcp:ADDR of a server of samples alone, rtl-tcp:ADDR of one that drives
+    /// a dongle (ADDR is HOST:PORT, or PORT on this machine)
     pub file: PathBuf,
     /// Directory for the results
     #[arg(long, value_name = "DIR")]
@@ -340,6 +342,9 @@ pub struct Receive {
     /// The raw file's spectrum is mirrored (local oscillator above the signal)
     #[arg(long)]
     pub inverted: bool,
+    /// How samples of a few bits, or of several channels, lie in the file
+    #[command(flatten)]
+    pub packed: Packed,
     /// Time of the first sample, as GPS time or with a final Z as UTC; only labels the clock
     #[arg(long, value_name = "TIME")]
     pub start: Option<String>,

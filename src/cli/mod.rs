@@ -7,6 +7,7 @@
 
 mod address;
 mod analyze;
+mod archive;
 mod args;
 mod check;
 mod collection;
@@ -15,6 +16,7 @@ mod generate;
 mod interrupt;
 mod lines;
 mod live;
+mod packed;
 mod plan;
 mod progress;
 mod receive;

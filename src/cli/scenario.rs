@@ -13,7 +13,7 @@ use crate::receiver::settings::Settings;
 const EMBEDDED: &str = include_str!("../../scenarios/two_systems.toml");
 
 /// Largest scenario, limits, settings or metadata that is read.
-const LARGEST_BYTES: u64 = 4 << 20;
+pub const LARGEST_BYTES: u64 = 4 << 20;
 
 /// A scenario as written, and the directory that its paths are relative to.
 pub struct Named {

@@ -36,6 +36,7 @@ pub mod galileo;
 pub mod gps;
 #[cfg(feature = "generator")]
 pub mod inflate;
+pub mod ion;
 #[cfg(feature = "generator")]
 pub mod ionex;
 pub mod ionosphere;
@@ -44,8 +45,10 @@ pub mod message;
 pub mod navic;
 pub mod nequick;
 pub mod nmea;
+pub mod packed;
 pub mod place;
 pub mod record;
+pub mod recording;
 #[cfg(feature = "generator")]
 pub mod rinex;
 pub mod samples;

@@ -1,15 +1,20 @@
 //! SigMF metadata: what a data sheet says of a recording, as JSON beside the samples.
 //!
-//! Source: SigMF 1.2.0 (core namespace). One capture is written; of other people's files, unknown keys are
-//! passed over, while whatever would change the meaning of the samples (several channels, a header, a
-//! retuning) is refused. Recordings of one time are grouped by a collection. An inverted spectrum has no core
-//! key: it is written in an optional extension, `gnss_twin:spectrum_inverted`.
+//! Source: SigMF 1.2.0 (core namespace). One capture is written; of other people's files, unknown keys
+//! are passed over, and what is absent is left to whoever reads them ([`describe`]). Headers, offsets,
+//! channels and data sets of other names are described; a retuning, a later header and an extension that
+//! must be known and is not are refused by name. Recordings of one time are grouped by a collection. What
+//! has no core key is in an extension: `gnss_twin:spectrum_inverted`, and of samples of a few bits, whose
+//! `core:datatype` is `ru8`, `gnss_twin:bits` with `encoding`, `components` (`real`, `iq`, `qi`),
+//! `bit_order` (`msb` or `lsb` first), `word_bytes` and `byte_order` (`little` or `big`).
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::gnss::samples::IfMetadata;
+use crate::gnss::packed::{Components, Encoding, Interleaved};
+use crate::gnss::recording::{Description, Samples};
+use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::time::{Epoch, Rate};
 
 const VERSION: &str = "1.2.0";
@@ -62,6 +67,16 @@ struct Document {
 #[derive(Default, Serialize, Deserialize)]
 #[serde(default)]
 struct Global {
+    #[serde(flatten)]
+    packed: Packed,
+    #[serde(rename = "core:offset", skip_serializing_if = "Option::is_none")]
+    offset: Option<Value>,
+    #[serde(rename = "core:dataset", skip_serializing_if = "Option::is_none")]
+    dataset: Option<Value>,
+    #[serde(rename = "core:trailing_bytes", skip_serializing_if = "Option::is_none")]
+    trailing_bytes: Option<Value>,
+    #[serde(rename = "core:metadata_only", skip_serializing_if = "Option::is_none")]
+    metadata_only: Option<Value>,
     #[serde(rename = "core:datatype", skip_serializing_if = "Option::is_none")]
     datatype: Option<Value>,
     #[serde(rename = "core:sample_rate", skip_serializing_if = "Option::is_none")]
@@ -78,6 +93,24 @@ struct Global {
     extensions: Option<Value>,
     #[serde(rename = "gnss_twin:spectrum_inverted", skip_serializing_if = "Option::is_none")]
     inverted: Option<Value>,
+}
+
+/// Samples of a few bits.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(default)]
+struct Packed {
+    #[serde(rename = "gnss_twin:bits", skip_serializing_if = "Option::is_none")]
+    bits: Option<Value>,
+    #[serde(rename = "gnss_twin:encoding", skip_serializing_if = "Option::is_none")]
+    encoding: Option<Value>,
+    #[serde(rename = "gnss_twin:components", skip_serializing_if = "Option::is_none")]
+    components: Option<Value>,
+    #[serde(rename = "gnss_twin:bit_order", skip_serializing_if = "Option::is_none")]
+    bit_order: Option<Value>,
+    #[serde(rename = "gnss_twin:word_bytes", skip_serializing_if = "Option::is_none")]
+    word_bytes: Option<Value>,
+    #[serde(rename = "gnss_twin:byte_order", skip_serializing_if = "Option::is_none")]
+    byte_order: Option<Value>,
 }
 
 #[derive(Default, Serialize, Deserialize)]
@@ -110,6 +143,7 @@ pub fn write_in(metadata: &IfMetadata, collection: Option<&str>) -> String {
             collection: collection.map(Value::from),
             extensions: Some(serde_json::json!([{ "name": EXTENSION, "version": "0.1.0", "optional": true }])),
             inverted: Some(metadata.inverted.into()),
+            ..Global::default()
         },
         captures: vec![Capture {
             sample_start: Some(0.into()),
@@ -173,63 +207,82 @@ fn utc_text(start: Epoch) -> String {
     format!("{whole}.{}Z", fraction.strip_prefix("0.").unwrap_or("0"))
 }
 
-/// Reads the JSON text of a `.sigmf-meta` file; `name` is how errors call it.
+/// Reads the JSON text of a `.sigmf-meta` file that says all that there is to know of samples in whole bytes;
+/// `name` is how errors call it.
 ///
 /// # Errors
 /// [`SigmfError`] with the file, the key, its value and what was expected.
 pub fn parse(text: &str, name: &str) -> Result<IfMetadata, SigmfError> {
+    let of = describe(text, name)?;
+    let file = File { name };
+    let absent = |key, expected| SigmfError::Missing { name: name.to_owned(), key, expected };
+    file.only("core:num_channels", u64::from(of.channels), 1, "1 (a single channel)")?;
+    file.only("core:header_bytes", of.header_bytes, 0, "0 (no header)")?;
+    file.only("core:trailing_bytes", of.trailing_bytes, 0, "0 (samples to the end)")?;
+    file.only("core:sample_start", of.skipped_samples, 0, "0 (the capture starts with the file)")?;
+    if let Some(dataset) = of.dataset {
+        return Err(file.bad("core:dataset", &dataset.into(), "a data set of the same name"));
+    }
+    let format = match of.samples {
+        Some(Samples::Whole(format)) => format,
+        Some(_) => return Err(file.bad("core:datatype", &"packed".into(), DATATYPES)),
+        None => return Err(absent("core:datatype", DATATYPES)),
+    };
+    let rate = of.rate.ok_or_else(|| absent("core:sample_rate", RATES))?;
+    let center_hz = of.center_hz.ok_or_else(|| absent("core:frequency", FREQUENCIES))?;
+    Ok(IfMetadata { format, rate, center_hz, inverted: of.inverted, start: of.start })
+}
+
+const DATATYPES: &str = "one of ci8, cu8, ci16_le, cf32_le, ri8, ri16_le";
+const RATES: &str = "samples a second, above 0 and below 1e12";
+const FREQUENCIES: &str = "the radio frequency at 0 Hz of the samples, in Hz";
+
+/// Reads what the JSON text of a `.sigmf-meta` file says; `name` is how errors call it.
+///
+/// # Errors
+/// [`SigmfError`] with the file, the key, its value and what was expected: of what is there and cannot be
+/// used.
+pub fn describe(text: &str, name: &str) -> Result<Description, SigmfError> {
     let document: Document =
         serde_json::from_str(text).map_err(|error| SigmfError::Syntax { name: name.to_owned(), error })?;
     let Document { global, captures, .. } = document;
     let file = File { name };
-
-    let expected = "one of ci8, cu8, ci16_le, cf32_le, ri8, ri16_le";
-    let datatype = file.needed("core:datatype", global.datatype, expected)?;
-    let format = datatype.as_str().and_then(|text| text.parse().ok());
-    let format = format.ok_or_else(|| file.bad("core:datatype", &datatype, expected))?;
-
-    let expected = "samples a second, above 0 and below 1e12";
-    let sample_rate = file.needed("core:sample_rate", global.sample_rate, expected)?;
-    let rate = sample_rate.as_f64().and_then(Rate::from_hz);
-    let rate = rate.ok_or_else(|| file.bad("core:sample_rate", &sample_rate, expected))?;
-
-    file.only("core:num_channels", global.channels, 1, "1 (a single channel)")?;
+    file.known(global.extensions.as_ref())?;
+    if let Some(value @ Value::Bool(true)) = &global.metadata_only {
+        return Err(file.bad("core:metadata_only", value, "false (there are samples)"));
+    }
+    let samples = file.samples(global.datatype, global.packed)?;
+    let rate = match global.sample_rate {
+        None => None,
+        Some(value) => {
+            let rate = value.as_f64().and_then(Rate::from_hz);
+            Some(rate.ok_or_else(|| file.bad("core:sample_rate", &value, RATES))?)
+        }
+    };
     let inverted = match global.inverted {
         None => false,
         Some(Value::Bool(inverted)) => inverted,
         Some(other) => return Err(file.bad("gnss_twin:spectrum_inverted", &other, "true or false")),
     };
-
-    let mut captures = captures.into_iter();
-    let expected = "the radio frequency at 0 Hz of the samples, in Hz";
-    let Some(first) = captures.next() else {
-        return Err(SigmfError::Missing { name: name.to_owned(), key: "captures[0]", expected: "one capture" });
-    };
-    file.only("core:sample_start", first.sample_start, 0, "0 (the capture starts with the file)")?;
-    file.only("core:header_bytes", first.header_bytes, 0, "0 (no header)")?;
-    let frequency = file.needed("core:frequency", first.frequency, expected)?;
-    let center_hz = frequency.as_f64().filter(|hz| hz.is_finite() && *hz >= 0.0);
-    let center_hz = center_hz.ok_or_else(|| file.bad("core:frequency", &frequency, expected))?;
-    for later in captures {
-        file.only("core:header_bytes", later.header_bytes, 0, "0 (no header)")?;
-        match later.frequency {
-            Some(other) if other.as_f64() != Some(center_hz) => {
-                return Err(file.bad("core:frequency", &other, "the frequency of the first capture (no retuning)"));
-            }
-            _ => {}
-        }
-    }
-
-    let expected = "ISO 8601 in UTC with a final Z, like 2010-07-01T08:12:30.5Z";
-    let start = match first.datetime {
+    let channels = file.count("core:num_channels", global.channels, 1)?;
+    let channels = u32::try_from(channels).ok().filter(|channels| (1..=64).contains(channels));
+    let channels = channels.ok_or_else(|| file.bad("core:num_channels", &"0, or too many".into(), "1 to 64"))?;
+    let offset = file.count("core:offset", global.offset, 0)?;
+    let dataset = match global.dataset {
         None => None,
-        Some(value) => {
-            let text = value.as_str().filter(|text| text.ends_with('Z'));
-            let epoch = text.and_then(|text| Epoch::parse(text).ok());
-            Some(epoch.ok_or_else(|| file.bad("core:datetime", &value, expected))?)
-        }
+        Some(Value::String(name)) => Some(name),
+        Some(other) => return Err(file.bad("core:dataset", &other, "the name of a file")),
     };
-    Ok(IfMetadata { format, rate, center_hz, inverted, start })
+    let described = Description {
+        samples,
+        rate,
+        inverted,
+        channels,
+        dataset,
+        trailing_bytes: file.count("core:trailing_bytes", global.trailing_bytes, 0)?,
+        ..Description::default()
+    };
+    file.captures(captures, offset, described)
 }
 
 /// Makes errors that name the file.
@@ -246,18 +299,136 @@ impl File<'_> {
         value.ok_or_else(|| SigmfError::Missing { name: self.name.to_owned(), key, expected })
     }
 
-    /// Accepts absence and the one value that changes nothing.
-    fn only(
+    /// Accepts the one value that changes nothing.
+    fn only(&self, key: &'static str, value: u64, usual: u64, expected: &'static str) -> Result<(), SigmfError> {
+        if value == usual { Ok(()) } else { Err(self.bad(key, &value.into(), expected)) }
+    }
+
+    /// A whole number; `usual` where it is absent.
+    fn count(&self, key: &'static str, value: Option<Value>, usual: u64) -> Result<u64, SigmfError> {
+        match value {
+            None => Ok(usual),
+            Some(value) => value.as_u64().ok_or_else(|| self.bad(key, &value, "a whole number, 0 or more")),
+        }
+    }
+
+    /// Refuses an extension that must be known and is not.
+    fn known(&self, extensions: Option<&Value>) -> Result<(), SigmfError> {
+        let all = extensions.and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
+        let needed = |extension: &&Value| extension.get("optional") == Some(&Value::Bool(false));
+        let foreign = |extension: &&Value| extension.get("name").and_then(Value::as_str) != Some(EXTENSION);
+        match all.iter().filter(needed).find(foreign) {
+            None => Ok(()),
+            Some(extension) => Err(self.bad("core:extensions", extension, "optional ones, and gnss_twin")),
+        }
+    }
+
+    /// How samples lie in the file; nothing where no key says it.
+    fn samples(&self, datatype: Option<Value>, packed: Packed) -> Result<Option<Samples>, SigmfError> {
+        let Some(datatype) = datatype else { return Ok(None) };
+        let name = datatype.as_str().unwrap_or_default();
+        if let Some(bits) = packed.bits.clone() {
+            if name != "ru8" {
+                return Err(self.bad("core:datatype", &datatype, "ru8 (bytes) with gnss_twin:bits"));
+            }
+            let bits = bits.as_u64().and_then(|bits| u32::try_from(bits).ok());
+            let wrong = || self.bad("gnss_twin:bits", &packed.bits.clone().unwrap_or_default(), "1, 2, 3, 4, 8 or 16");
+            let bits = bits.ok_or_else(wrong)?;
+            return self.packed(bits, &packed).map(Some);
+        }
+        let bytes = |bits: u32, encoding, components, big_endian| {
+            let word_bytes = bits as usize / 8;
+            let (lowest_first, channels, channel) = (false, 1, 1);
+            Interleaved { bits, encoding, components, lowest_first, word_bytes, big_endian, channels, channel }
+        };
+        Ok(Some(match name {
+            "ru8" => Samples::Interleaved(bytes(8, Encoding::Offset, Components::Real, false)),
+            "ri16_be" => Samples::Interleaved(bytes(16, Encoding::TwosComplement, Components::Real, true)),
+            "ci16_be" => Samples::Interleaved(bytes(16, Encoding::TwosComplement, Components::Iq, true)),
+            name => {
+                let format = name.parse::<Format>().map_err(|_| self.bad("core:datatype", &datatype, DATATYPES))?;
+                Samples::Whole(format)
+            }
+        }))
+    }
+
+    fn packed(&self, bits: u32, packed: &Packed) -> Result<Samples, SigmfError> {
+        let encoding = match &packed.encoding {
+            None if bits == 1 => Encoding::Sign,
+            None => Encoding::TwosComplement,
+            Some(value) => {
+                let expected = "sign, negative-sign, sign-magnitude, twos-complement or offset";
+                let encoding = value.as_str().and_then(|text| text.parse().ok());
+                encoding.ok_or_else(|| self.bad("gnss_twin:encoding", value, expected))?
+            }
+        };
+        let components = [("iq", Components::Iq), ("qi", Components::Qi), ("real", Components::Real)];
+        let orders = [("msb", false), ("lsb", true)];
+        let ends = [("little", false), ("big", true)];
+        let of = Interleaved {
+            bits,
+            encoding,
+            components: self.one_of("gnss_twin:components", &packed.components, &components, "iq, qi or real")?,
+            lowest_first: self.one_of("gnss_twin:bit_order", &packed.bit_order, &orders, "msb or lsb")?,
+            word_bytes: self.count("gnss_twin:word_bytes", packed.word_bytes.clone(), 1)? as usize,
+            big_endian: self.one_of("gnss_twin:byte_order", &packed.byte_order, &ends, "little or big")?,
+            channels: 1,
+            channel: 1,
+        };
+        Ok(Samples::Interleaved(of))
+    }
+
+    /// What a word means; absent, what the first one does.
+    fn one_of<T: Copy>(
         &self,
         key: &'static str,
-        value: Option<Value>,
-        usual: u64,
+        value: &Option<Value>,
+        words: &[(&str, T)],
         expected: &'static str,
-    ) -> Result<(), SigmfError> {
-        match value {
-            Some(value) if value.as_u64() != Some(usual) => Err(self.bad(key, &value, expected)),
-            _ => Ok(()),
+    ) -> Result<T, SigmfError> {
+        let found = match value {
+            None => words.first(),
+            Some(value) => words.iter().find(|(word, _)| value.as_str() == Some(*word)),
+        };
+        let value = || value.clone().unwrap_or_default();
+        found.map(|(_, meaning)| *meaning).ok_or_else(|| self.bad(key, &value(), expected))
+    }
+
+    /// The recording with what its captures say of it; numbers of samples count from `offset`.
+    fn captures(&self, captures: Vec<Capture>, offset: u64, of: Description) -> Result<Description, SigmfError> {
+        let mut captures = captures.into_iter();
+        let Some(first) = captures.next() else { return Ok(of) };
+        let from = self.count("core:sample_start", first.sample_start.clone(), offset)?;
+        let before = |_| self.bad("core:sample_start", &from.into(), "core:offset, or more");
+        let skipped_samples = from.checked_sub(offset).ok_or(()).map_err(before)?;
+        let center_hz = match &first.frequency {
+            None => None,
+            Some(value) => {
+                let hz = value.as_f64().filter(|hz| hz.is_finite() && *hz >= 0.0);
+                Some(hz.ok_or_else(|| self.bad("core:frequency", value, FREQUENCIES))?)
+            }
+        };
+        for later in captures {
+            let header = self.count("core:header_bytes", later.header_bytes, 0)?;
+            self.only("core:header_bytes", header, 0, "0 (a header before the first capture alone)")?;
+            match later.frequency {
+                Some(other) if other.as_f64() != center_hz => {
+                    return Err(self.bad("core:frequency", &other, "the frequency of the first capture (no retuning)"));
+                }
+                _ => {}
+            }
         }
+        let expected = "ISO 8601 in UTC with a final Z, like 2010-07-01T08:12:30.5Z";
+        let start = match first.datetime {
+            None => None,
+            Some(value) => {
+                let text = value.as_str().filter(|text| text.ends_with('Z'));
+                let epoch = text.and_then(|text| Epoch::parse(text).ok());
+                Some(epoch.ok_or_else(|| self.bad("core:datetime", &value, expected))?)
+            }
+        };
+        let header_bytes = self.count("core:header_bytes", first.header_bytes, 0)?;
+        Ok(Description { center_hz, start, header_bytes, skipped_samples, ..of })
     }
 }
 
@@ -365,5 +536,72 @@ mod tests {
             assert!(error.starts_with("there/a.sigmf-meta") && words.iter().all(|w| error.contains(w)), "{error}");
         }
         assert!(parse(r#"{"global":{"core:datatype":"ci8","core:sample_rate":1e6},"captures":[]}"#, "x").is_err());
+    }
+
+    #[test]
+    fn what_is_absent_is_left_open_and_what_else_is_in_the_file_is_described() {
+        let bare = describe(r#"{"global": {"core:datatype": "ci8", "core:version": "1.2.0"}, "captures": []}"#, "x");
+        let open = Description { samples: Some(Samples::Whole(Format::Ci8)), ..Description::default() };
+        assert_eq!(bare.unwrap(), open);
+        assert_eq!(describe(r#"{"global": {}}"#, "x").unwrap(), Description::default());
+        let text = r#"{
+            "global": {"core:datatype": "cf32_le", "core:dataset": "a.bin", "core:num_channels": 2, "core:offset": 1000,
+                "core:trailing_bytes": 7,
+                "core:extensions": [{"name": "antenna", "version": "1.0.0", "optional": true}]},
+            "captures": [{"core:sample_start": 1020, "core:header_bytes": 512}, {"core:sample_start": 9000}]
+        }"#;
+        let expected = Description {
+            samples: Some(Samples::Whole(Format::Cf32Le)),
+            channels: 2,
+            header_bytes: 512,
+            trailing_bytes: 7,
+            skipped_samples: 20,
+            dataset: Some("a.bin".to_owned()),
+            ..Description::default()
+        };
+        assert_eq!(describe(text, "x").unwrap(), expected);
+        for (from, to, words) in [
+            ("true", "false", ["core:extensions", "antenna", "optional ones"]),
+            ("1020", "20", ["core:sample_start", "20", "core:offset"]),
+            ("\"core:num_channels\": 2", "\"core:num_channels\": 0", ["core:num_channels", "0", "1 to 64"]),
+            ("9000", "9000, \"core:header_bytes\": 3", ["core:header_bytes", "3", "first capture"]),
+            ("\"core:offset\"", "\"core:metadata_only\": true, \"core:offset\"", ["metadata_only", "true", "samples"]),
+        ] {
+            let error = describe(&text.replace(from, to), "x").unwrap_err().to_string();
+            assert!(words.iter().all(|word| error.contains(word)), "{error}");
+        }
+    }
+
+    #[test]
+    fn samples_of_a_few_bits_are_keys_of_an_extension_over_bytes() {
+        let text = r#"{"global": {"core:datatype": "ru8", "gnss_twin:bits": 2, "gnss_twin:encoding": "sign_magnitude",
+            "gnss_twin:components": "real", "gnss_twin:bit_order": "lsb",
+            "core:extensions": [{"name": "gnss_twin", "version": "0.1.0", "optional": false}]}}"#;
+        let expected = Interleaved {
+            bits: 2,
+            encoding: Encoding::SignMagnitude,
+            components: Components::Real,
+            lowest_first: true,
+            word_bytes: 1,
+            big_endian: false,
+            channels: 1,
+            channel: 1,
+        };
+        assert_eq!(describe(text, "x").unwrap().samples, Some(Samples::Interleaved(expected)));
+        assert!(parse(text, "x").unwrap_err().to_string().contains("packed"));
+        for (from, to, word) in [
+            ("ru8", "ci8", "core:datatype"),
+            ("\"lsb\"", "\"up\"", "msb or lsb"),
+            ("sign_magnitude", "gray", "offset"),
+            ("bits\": 2", "bits\": \"two\"", "gnss_twin:bits"),
+        ] {
+            let error = describe(&text.replace(from, to), "x").unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
+        let big = describe(r#"{"global": {"core:datatype": "ci16_be"}}"#, "x").unwrap().samples.unwrap();
+        let (format, layout) = big.unpacked().unwrap();
+        let mut out = Vec::new();
+        layout.unwrap().unpack(&[1, 2, 0xff, 0xfe], &mut out);
+        assert_eq!((format, out), (Format::Ci16Le, vec![2, 1, 0xfe, 0xff]));
     }
 }

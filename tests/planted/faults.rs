@@ -24,6 +24,8 @@ const OFFSET: &str = "laws::with_the_broadcast_offset_any_four_satellites_of_two
 const PAGES: &str =
     "witness::printed::the_page_with_the_ionosphere_and_the_count_of_the_handover_are_where_they_are_printed";
 const TIMES: &str = "witness::printed::weeks_begin_on_sunday_and_leap_seconds_are_those_of_the_bulletins";
+const PACKED: &str = "witness::packed::codes_and_their_places_are_those_that_makers_print";
+const BANDS: &str = "witness::packed::bands_of_one_oscillator_have_its_frequency_at_zero";
 const PLACES: &str = "witness::printed::places_and_directions_are_the_published_ones";
 const ORBITS: &str = "witness::orbit::broadcast_orbits_of_2010_meet_the_igs_final_ones";
 const STATIONS: &str = "witness::pseudorange::two_japanese_stations_fit_the_model";
@@ -96,6 +98,11 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.earth.azimuth", "azimuth is counted from east over north", PLACES),
     fault("gnss.time.leap_seconds", "a leap second too many", TIMES),
     fault("gnss.time.week", "a week too many", TIMES),
+    fault("gnss.packed.first", "packed samples begin at the other end of a byte", PACKED),
+    fault("gnss.packed.order", "I and Q of packed samples are exchanged", PACKED),
+    fault("gnss.packed.magnitude", "negative magnitudes are positive", PACKED),
+    fault("gnss.packed.middle", "two's complement of a few bits lies below the middle of its step", PACKED),
+    fault("gnss.ion.negated", "a negated quadrature part does not mirror the spectrum", BANDS),
     fault("generator.sky.earth_rotation", "the Earth does not turn during flight", LOOP),
     fault("generator.sky.light_time", "the satellite is where it is on arrival, not where it was on sending", LOOP),
     fault("generator.sky.clock_sign", "satellite clocks with the wrong sign", LOOP),

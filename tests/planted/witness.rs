@@ -19,6 +19,8 @@ mod lnav;
 mod navic;
 #[path = "../witness/orbit.rs"]
 mod orbit;
+#[path = "../witness/packed.rs"]
+mod packed;
 #[path = "../witness/printed.rs"]
 mod printed;
 #[path = "../witness/pseudorange.rs"]
