@@ -273,12 +273,12 @@ fn acquired(results: &Path) -> Vec<String> {
     rows.map(|row| row.split(',').nth(1).unwrap().to_owned()).collect()
 }
 
-/// Half a second in two bits: whole bytes, packed by flags and by metadata, as one of two channels, in a data
+/// A fifth of a second in two bits: whole bytes, packed by flags and by metadata, as one of two channels, in a data
 /// set of another name with a header, and in an archive that another program wrote. All are the same samples.
 #[test]
 fn packed_samples_channels_headers_and_archives_are_received_as_what_they_hold() {
     let here = workplace();
-    fs::write(here.path().join("short.toml"), SHORT.replace("duration_s = 2", "duration_s = 0.5")).unwrap();
+    fs::write(here.path().join("short.toml"), SHORT.replace("duration_s = 2", "duration_s = 0.2")).unwrap();
     assert_eq!(code(&twin(&["generate", "short.toml", "--out", "short.sigmf-data"], here.path())), 0);
     let write = |name: &str, bytes: &[u8]| fs::write(here.path().join(name), bytes).unwrap();
     let fine: Vec<i8> =
@@ -330,7 +330,8 @@ fn packed_samples_channels_headers_and_archives_are_received_as_what_they_hold()
     for (number, (file, flags)) in ways.iter().enumerate() {
         let out = format!("rx{number}");
         let received = twin(&[&["receive", file, "--out", &out][..], flags].concat(), here.path());
-        assert_eq!(code(&received), 0, "{file}: {}", stderr(&received));
+        // Satellites, and no fix in so short a time.
+        assert_eq!(code(&received), 3, "{file}: {}", stderr(&received));
         let table = |name| fs::read(here.path().join(&out).join(name)).unwrap();
         found.push((table("acquisition.csv"), table("tracking.csv")));
         assert!(acquired(&here.path().join(&out)).len() >= 6, "{file}");

@@ -84,7 +84,7 @@ fn open_one(arguments: &args::Receive) -> Result<Recording, CliError> {
     let found = match extension {
         Some("sigmf") => of_archive(&arguments.file)?,
         Some("xml" | "sdrx") => of_ion(arguments)?,
-        _ => of_pair(&arguments.file)?,
+        _ => of_pair(arguments)?,
     };
     let Found { name, mut file, first, bytes, description } = found;
     let (header, trailing) = (description.header_bytes, description.trailing_bytes);
@@ -127,9 +127,11 @@ fn data(path: &Path, description: Description) -> Result<Found, CliError> {
 }
 
 /// A recording with or without SigMF metadata beside it.
-fn of_pair(path: &Path) -> Result<Found, CliError> {
-    let (data_path, meta_path) = pair(path);
+fn of_pair(arguments: &args::Receive) -> Result<Found, CliError> {
+    let (data_path, meta_path) = pair(&arguments.file);
     if !present(&meta_path).map_err(|error| CliError::read(shown(&meta_path), &error))? {
+        // Flags that are missing are said before a file that is.
+        metadata(arguments, Description::default())?;
         return data(&data_path, Description::default());
     }
     let (name, text) = scenario::text(&meta_path)?;
