@@ -273,8 +273,8 @@ fn acquired(results: &Path) -> Vec<String> {
     rows.map(|row| row.split(',').nth(1).unwrap().to_owned()).collect()
 }
 
-/// A fifth of a second in two bits: whole bytes, packed by flags and by metadata, as one of two channels, in a
-/// data set of another name with a header, and in an archive that another program wrote. All are the same
+/// A fifth of a second in two bits: whole bytes, packed by flags and by metadata, as one of two channels, in
+/// a data set of another name with a header, and in an archive that another program wrote. All are the same
 /// samples.
 #[test]
 fn packed_samples_channels_headers_and_archives_are_received_as_what_they_hold() {
