@@ -268,12 +268,14 @@ fn contradict(a: &Ephemeris, b: &Ephemeris) -> bool {
 }
 
 /// Whether elements are those of the nominal constellation (the fields are wider): a 12 h sidereal orbit of
-/// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo, and one of a day, 0° to 33°, for
-/// NavIC.
+/// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo, one of a day, 0° to 33°, for NavIC
+/// and 0° to 60° for BeiDou, of which others take 13 h.
 fn plausible(set: &Ephemeris) -> bool {
     let (sqrt_a_sqrtm, inclinations_deg) = match set.sv.system {
         System::Galileo => (5440.6, 52.0..60.0),
         System::Navic => (6493.4, 0.0..33.0),
+        System::BeiDou if set.sv.orbit_m() > 40e6 => (6493.4, 0.0..60.0),
+        System::BeiDou => (5282.6, 51.0..59.0),
         _ => (5153.6, 51.0..59.0),
     };
     (set.sqrt_a_sqrtm - sqrt_a_sqrtm).abs() < 5.0
@@ -319,7 +321,12 @@ fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
 
 /// When a set goes on the air. Those of Galileo and NavIC, of every ten minutes at best, do so after their
 /// reference time, and a file says when a receiver had the whole set: some minutes later.
+///
+/// BeiDou's sets are those of an hour, and go on the air with it.
 fn first_sent(set: &Ephemeris) -> Epoch {
+    if set.sv.system == System::BeiDou {
+        return set.toe;
+    }
     if set.is_sent_after_reference() {
         return set.toe.plus_s(set.transmitted.since(set.toe).clamp(0.0, DELAY_S));
     }

@@ -30,6 +30,45 @@ impl Store for u128 {
     }
 }
 
+/// So many bits; the first one sent is the first, counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bits<const N: usize>(pub [bool; N]);
+
+impl<const N: usize> Default for Bits<N> {
+    fn default() -> Self {
+        Self([false; N])
+    }
+}
+
+impl<const N: usize> Bits<N> {
+    /// As many of them as the result has, from one on; zeros beyond the end.
+    pub fn part<const M: usize>(&self, first: usize) -> Bits<M> {
+        Bits::joined(std::iter::once(self.0.get(first..).unwrap_or_default()))
+    }
+
+    /// Rows of bits one after the other; zeros after the last.
+    pub fn joined<'a, B: AsRef<[bool]> + 'a + ?Sized>(rows: impl Iterator<Item = &'a B>) -> Self {
+        let mut all = Self::default();
+        let bits = rows.flat_map(|row| row.as_ref().iter().copied());
+        all.0.iter_mut().zip(bits).for_each(|(place, bit)| *place = bit);
+        all
+    }
+}
+
+impl<const N: usize> Store for Bits<N> {
+    fn piece(&self, (first, length): (u16, u8)) -> u32 {
+        let bits = self.0.iter().skip(usize::from(first)).take(usize::from(length));
+        bits.fold(0, |all, &bit| all << 1 | u32::from(bit))
+    }
+
+    fn set_piece(&mut self, (first, length): (u16, u8), value: u32) {
+        let places = self.0.iter_mut().skip(usize::from(first)).take(usize::from(length));
+        for (shift, place) in (0..u32::from(length)).rev().zip(places) {
+            *place = value >> shift & 1 == 1;
+        }
+    }
+}
+
 /// Why a value cannot be sent.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum FieldError {
@@ -220,6 +259,13 @@ pub struct Element<T> {
     pub field: Field,
     get: fn(&T) -> f64,
     set: fn(&mut T, f64),
+}
+
+impl<T> Element<T> {
+    /// The same parameter at other places.
+    pub const fn at(&self, pieces: &'static [(u16, u8)]) -> Self {
+        Self { field: Field { pieces, ..self.field }, get: self.get, set: self.set }
+    }
 }
 
 /// A field and how it is taken from, and put into, what carries it.

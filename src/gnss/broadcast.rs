@@ -23,9 +23,10 @@ pub struct Ephemeris {
     pub toc: Epoch,
     /// When this set was first transmitted, as far as known.
     pub transmitted: Epoch,
-    /// Issue of data: IODE of GPS, IODnav of Galileo, IODEC of NavIC.
+    /// Issue of data: IODE of GPS, IODnav of Galileo, IODEC of NavIC; of BeiDou a number of the
+    /// reference time.
     pub iode: u16,
-    /// Issue of the clock: IODC of GPS (IS-GPS-200N, 20.3.3.3.1.5), IODnav of Galileo.
+    /// Issue of the clock: IODC of GPS (IS-GPS-200N, 20.3.3.3.1.5), IODnav of Galileo, AODC of BeiDou.
     pub iodc: u16,
     /// User range accuracy index, 0..=15 (IS-GPS-200N, 20.3.3.3.1.3); SISA index of Galileo.
     pub ura_index: u8,
@@ -39,7 +40,7 @@ pub struct Ephemeris {
     pub l2_p_data_off: bool,
     /// Whether the curve fit is longer than four hours (IS-GPS-200N, 20.3.3.4.3.1).
     pub long_fit: bool,
-    /// Age of data offset, in its 900 s units.
+    /// Age of data offset, in its 900 s units; AODE of BeiDou.
     pub aodo: u8,
     /// Square root of the semi-major axis, √m.
     pub sqrt_a_sqrtm: f64,
@@ -77,10 +78,11 @@ pub struct Ephemeris {
     pub af1_sps: f64,
     /// Half the rate of that drift, s/s².
     pub af2_sps2: f64,
-    /// Group delay: T_GD of GPS (IS-GPS-200N, 20.3.3.3.3.2), BGD(E1,E5b) of Galileo, T_GD of NavIC's S.
+    /// Group delay: T_GD of GPS (IS-GPS-200N, 20.3.3.3.3.2), BGD(E1,E5b) of Galileo, T_GD of NavIC's S, T_GD1
+    /// of BeiDou.
     pub tgd_s: f64,
     /// The second group delay of messages that have two: BGD(E1,E5a) of Galileo beside BGD(E1,E5b) in
-    /// `tgd_s`.
+    /// `tgd_s`, T_GD2 of BeiDou.
     pub tgd2_s: f64,
     /// Group delays of signals that have one of their own, by the signal's name; others follow from `tgd_s`.
     pub signal_delays_s: Vec<(&'static str, f64)>,
@@ -195,6 +197,11 @@ impl Constants {
     }
 }
 
+/// Carriers whose delays against B3I BeiDou's messages D1 and D2 give as T_GD1 and T_GD2 (BDS-SIS-ICD-B1I
+/// 3.0, 5.2.4.8 and BDS-SIS-ICD 2.1): clocks are those of B3I.
+const B1I_HZ: f64 = 1_561.098e6;
+const B2I_HZ: f64 = 1_207.14e6;
+
 /// Residual of Kepler's equation at which it counts as solved.
 const KEPLER_TOLERANCE_RAD: f64 = 1e-13;
 const KEPLER_STEPS: u32 = 20;
@@ -300,7 +307,10 @@ impl Ephemeris {
             + self.cic_rad * cos2;
         let inclination_rate = self.idot_radps + 2.0 * true_rate * (self.cis_rad * cos2 - self.cic_rad * sin2);
 
-        let node_rate = planted!("gnss.orbit.omega_dot", self.omega_dot_radps, 0.0) - rotation_radps;
+        // Of BeiDou's geostationary satellites the plane is computed in axes that do not turn with the Earth.
+        let is_geostationary = self.sv.is_geostationary();
+        let turning_radps = if is_geostationary { 0.0 } else { rotation_radps };
+        let node_rate = planted!("gnss.orbit.omega_dot", self.omega_dot_radps, 0.0) - turning_radps;
         // Whole turns are taken from the constant part, so that rounding does not grow with the time of week.
         let node_at_toe_rad = wrap(self.omega0_rad - rotation_radps * (self.toe.tow_s() - behind_gpst_s));
         let node_rad = node_at_toe_rad + node_rate * anomaly.since_toe_s;
@@ -320,7 +330,8 @@ impl Ephemeris {
             x_rate * sin_node + level_rate * cos_node + position_m.x * node_rate,
             y_rate * sin_i + y * cos_i * inclination_rate,
         );
-        State { position_m, velocity_mps }
+        let state = State { position_m, velocity_mps };
+        if is_geostationary { tilted(state, rotation_radps, anomaly.since_toe_s) } else { state }
     }
 
     /// The elements without harmonics, carried to another reference time: what almanacs are made of. The
@@ -385,11 +396,17 @@ impl Ephemeris {
     ///
     /// A signal without a delay of its own has T_GD · (f_L1/f)²: the clock is that of two carriers whose
     /// combination is free of what goes with 1/f² (IS-GPS-200N, 20.3.3.3.3.2, equation for L2). NavIC's T_GD
-    /// is that of S (IRNSS SIS ICD for SPS 1.1, user algorithms).
+    /// is that of S (IRNSS SIS ICD for SPS 1.1, user algorithms). BeiDou's clock is that of B3I.
     pub fn group_delay_s(&self, signal: &Signal) -> f64 {
         let own = self.signal_delays_s.iter().find(|(name, _)| *name == signal.name);
         let ratio = Constants::of(self.sv.system).delay_carrier_hz / signal.carrier_hz(self.sv);
-        own.map_or(self.given_delay_s() * (ratio * ratio), |(_, delay_s)| *delay_s)
+        let of_carrier = || match (self.sv.system, signal.carrier_hz(self.sv)) {
+            (System::BeiDou, B1I_HZ) => self.given_delay_s(),
+            (System::BeiDou, B2I_HZ) => self.tgd2_s,
+            (System::BeiDou, _) => 0.0,
+            _ => self.given_delay_s() * (ratio * ratio),
+        };
+        own.map_or_else(of_carrier, |(_, delay_s)| *delay_s)
     }
 
     /// The clock as a user of `signal` alone meets it.
@@ -411,11 +428,11 @@ impl Ephemeris {
 
     /// Whether sets go on the air after their reference time, and not hours before it as those of GPS do.
     pub fn is_sent_after_reference(&self) -> bool {
-        matches!(self.sv.system, System::Galileo | System::Navic)
+        matches!(self.sv.system, System::Galileo | System::Navic | System::BeiDou)
     }
 
-    /// Curve fit interval around the reference time. Of Galileo and NavIC, whose documents have none, eight
-    /// hours: a set is used for four hours after its reference time.
+    /// Curve fit interval around the reference time. Of Galileo, NavIC and BeiDou, whose documents have none,
+    /// eight hours: a set is used for four hours after its reference time.
     ///
     /// Of GPS four hours, or what the issue of data says when the fit flag is set
     /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).
@@ -478,6 +495,19 @@ impl Ephemeris {
         let shrink = 1.0 - self.eccentricity * cos;
         Ok(Anomaly { since_toe_s, semi_major_m, sin, cos, shrink, rate_radps: mean_motion / shrink })
     }
+}
+
+/// The state of a geostationary satellite of BeiDou: computed in a plane that is tilted by 5°, as its own
+/// would leave the node undefined, in axes of the reference time (BDS-SIS-ICD-B1I 3.0, 5.2.4.10, table 5-11).
+fn tilted(state: State, rotation_radps: f64, since_toe_s: f64) -> State {
+    let tilt_rad = planted!("gnss.beidou.tilt", -5_f64, 5_f64).to_radians();
+    let (sin_tilt, cos_tilt) = libm::sincos(tilt_rad);
+    let about_x = |v: Vector3<f64>| Vector3::new(v.x, cos_tilt * v.y + sin_tilt * v.z, cos_tilt * v.z - sin_tilt * v.y);
+    let (sin_turn, cos_turn) = libm::sincos(rotation_radps * since_toe_s);
+    let about_z = |v: Vector3<f64>| Vector3::new(cos_turn * v.x + sin_turn * v.y, cos_turn * v.y - sin_turn * v.x, v.z);
+    let position_m = about_z(about_x(state.position_m));
+    let carried = Vector3::new(position_m.y, -position_m.x, 0.0) * rotation_radps;
+    State { position_m, velocity_mps: about_z(about_x(state.velocity_mps)) + carried }
 }
 
 /// The angle in [−π, π] with the same direction.

@@ -16,6 +16,8 @@ pub enum Model {
     NequickG,
     /// That of GPS as NavIC sends it: the delay of L5.
     KlobucharNavic,
+    /// That of GPS as BeiDou has it, with geographic latitudes: the delay of B1I.
+    KlobucharBeidou,
 }
 
 /// The coefficients of a model.
@@ -27,6 +29,8 @@ pub enum Coefficients {
     NequickG(NequickG),
     /// Of that of GPS, for the delay of NavIC's L5.
     KlobucharNavic(Klobuchar),
+    /// Of BeiDou's form of it.
+    KlobucharBeidou(Klobuchar),
 }
 
 /// Carrier on which NavIC's coefficients give the delay (IRNSS SIS ICD for SPS 1.1: they are for users of
@@ -35,7 +39,7 @@ pub const NAVIC_HZ: f64 = 1_176.45e6;
 
 impl Model {
     /// Forms of Klobuchar's model, in the order in which a receiver that takes any prefers them.
-    pub const KLOBUCHAR: [Self; 2] = [Self::Klobuchar, Self::KlobucharNavic];
+    pub const KLOBUCHAR: [Self; 3] = [Self::Klobuchar, Self::KlobucharNavic, Self::KlobucharBeidou];
 }
 
 impl Coefficients {
@@ -45,6 +49,7 @@ impl Coefficients {
             Self::Klobuchar(_) => Model::Klobuchar,
             Self::NequickG(_) => Model::NequickG,
             Self::KlobucharNavic(_) => Model::KlobucharNavic,
+            Self::KlobucharBeidou(_) => Model::KlobucharBeidou,
         }
     }
 
@@ -61,6 +66,7 @@ impl Coefficients {
             Self::Klobuchar(model) => model.delay_s(user, look, at, carrier_hz),
             Self::NequickG(model) => model.delay_s(user, satellite_m, at, carrier_hz),
             Self::KlobucharNavic(model) => model.delay_from_s(NAVIC_HZ, user, look, at, carrier_hz),
+            Self::KlobucharBeidou(model) => model.beidou_delay_s(user, look, at, carrier_hz),
         }
     }
 }

@@ -10,7 +10,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::gnss::earth::{Geodetic, Look};
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{BDT, Epoch};
 
 /// Carrier on which the coefficients are defined (IS-GPS-200N, 3.3.1.1).
 pub const L1_HZ: f64 = 1_575.42e6;
@@ -76,6 +76,32 @@ impl Klobuchar {
             period_s: cubic(&self.beta, magnetic).max(72_000.0),
             local_s: if local_s >= DAY_S { 0.0 } else { local_s },
         }
+    }
+
+    /// The same by BeiDou's form of the model (BDS-SIS-ICD-B1I 3.0, 5.2.4.7): geographic latitude of a point
+    /// 375 km above a sphere, a cosine over a quarter of its period on either side of 14 h, and the delay of
+    /// B1I.
+    pub fn beidou_delay_s(&self, user: Geodetic, look: Look, at: Epoch, carrier_hz: f64) -> f64 {
+        const EARTH_M: f64 = 6378e3;
+        const SHELL_M: f64 = EARTH_M + 375e3;
+        const B1I_HZ: f64 = 1_561.098e6;
+        let elevation_rad = look.elevation_rad.max(0.0);
+        let sine = EARTH_M / SHELL_M * libm::cos(elevation_rad);
+        let psi_rad = PI / 2.0 - elevation_rad - libm::asin(sine);
+        let (sin_psi, cos_psi) = libm::sincos(psi_rad);
+        let (sin_user, cos_user) = libm::sincos(user.latitude_rad);
+        let (sin_azimuth, cos_azimuth) = libm::sincos(look.azimuth_rad);
+        let latitude_rad = libm::asin((sin_user * cos_psi + cos_user * sin_psi * cos_azimuth).clamp(-1.0, 1.0));
+        let beside = sin_psi * sin_azimuth / libm::cos(latitude_rad);
+        let longitude_rad = user.longitude_rad + libm::asin(beside.clamp(-1.0, 1.0));
+        let local_s = (BDT.label(at).tow_s() + longitude_rad * 43_200.0 / PI).rem_euclid(DAY_S);
+        let north = planted!("gnss.beidou.latitude", (latitude_rad / PI).abs(), latitude_rad / PI);
+        let amplitude_s = cubic(&self.alpha, north).max(0.0);
+        let period_s = cubic(&self.beta, north).clamp(72_000.0, 172_800.0);
+        let phase_rad = TAU * (local_s - MAXIMUM_S) / period_s;
+        let day_s = if phase_rad.abs() < PI / 2.0 { amplitude_s * libm::cos(phase_rad) } else { 0.0 };
+        let scale = B1I_HZ / carrier_hz;
+        (NIGHT_S + day_s) / (1.0 - sine * sine).sqrt() * scale * scale
     }
 
     /// The coefficients whose bulge on a carrier of `defined_hz` is the one that these have on L1. Delays at

@@ -86,6 +86,8 @@ pub struct Common {
     pub klobuchar: Option<Klobuchar>,
     /// Coefficients of the same model as NavIC sends them, for L5; absent means none are sent.
     pub klobuchar_navic: Option<Klobuchar>,
+    /// Those of BeiDou's form of it; absent means none are sent.
+    pub klobuchar_beidou: Option<Klobuchar>,
     /// Effective ionisation coefficients of NeQuick-G, in solar flux units, per degree and per degree
     /// squared.
     pub nequick: Option<[f64; 3]>,

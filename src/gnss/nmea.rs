@@ -122,6 +122,9 @@ fn signal_number(signal: &Signal) -> u8 {
     match (signal.system, signal.rinex) {
         (System::Gps | System::Glonass | System::Sbas, "1C") => 1,
         (System::Galileo, "1C") => 7,
+        (System::BeiDou, "2I") => 1,
+        (System::BeiDou, "6I") => 8,
+        (System::BeiDou, "7I") => 0xB,
         (System::Navic, "5A") => 1,
         (System::Navic, "9A") => 2,
         _ => 0,

@@ -20,15 +20,17 @@ use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
 
-/// What a navigation file says about GPS, Galileo and NavIC.
+/// What a navigation file says about GPS, Galileo, NavIC and BeiDou.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Navigation {
-    /// Sets of GPS LNAV, Galileo I/NAV and NavIC by satellite and time of clock.
+    /// Sets of GPS LNAV, Galileo I/NAV, NavIC and BeiDou D1 or D2 by satellite and time of clock.
     pub ephemerides: Vec<Ephemeris>,
     /// Coefficients of GPS's model of the ionosphere, where the header has them.
     pub klobuchar: Option<Klobuchar>,
     /// Coefficients of the same model as NavIC sends them, for L5, where the header has them.
     pub klobuchar_navic: Option<Klobuchar>,
+    /// Those of BeiDou's form of it, likewise.
+    pub klobuchar_beidou: Option<Klobuchar>,
     /// Effective ionisation coefficients of NeQuick-G: solar flux units, per degree, per degree squared.
     pub nequick: Option<[f64; 3]>,
     /// GPS time minus UTC, in whole seconds.
@@ -85,7 +87,7 @@ pub enum NavigationError {
         detail: String,
     },
     /// No set of elements that can be used.
-    #[error("{name}: no usable ephemeris of GPS, Galileo or NavIC: found {found}")]
+    #[error("{name}: no usable ephemeris of GPS, Galileo, NavIC or BeiDou: found {found}")]
     Nothing {
         /// Name of the file.
         name: String,
@@ -123,6 +125,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
         records,
         klobuchar,
         klobuchar_navic,
+        klobuchar_beidou,
         nequick,
         leap_seconds,
         leap_event,
@@ -135,6 +138,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     let mut navigation = Navigation {
         klobuchar,
         klobuchar_navic,
+        klobuchar_beidou,
         nequick,
         leap_seconds,
         leap_event,

@@ -90,6 +90,19 @@ pub struct Sv {
 pub struct SvError(String);
 
 impl Sv {
+    /// Whether it is one of BeiDou's geostationary satellites, whose message and orbit differ from the
+    /// others' (BDS-SIS-ICD-B1I 3.0, table 4-1).
+    pub fn is_geostationary(self) -> bool {
+        self.system == System::BeiDou && matches!(self.number, 1..=5 | 59..=63)
+    }
+
+    /// Semi-major axis of its orbit, in metres: nominal values. Of BeiDou's inclined satellites that turn
+    /// with the Earth those are known that its status reports named in 2024.
+    pub fn orbit_m(self) -> f64 {
+        let is_inclined = self.system == System::BeiDou && matches!(self.number, 6..=10 | 13 | 16 | 31 | 38..=40 | 56);
+        if self.is_geostationary() || is_inclined { System::Navic.orbit_m() } else { self.system.orbit_m() }
+    }
+
     /// A GPS satellite by its PRN.
     pub const fn gps(number: u8) -> Self {
         Self { system: System::Gps, number }

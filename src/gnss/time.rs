@@ -55,6 +55,9 @@ pub static GST: TimeScale = TimeScale { name: "GST", behind_gpst_s: 0 };
 /// IRNSS network time: its weeks begin when those of GPS do (IRNSS SIS ICD for SPS 1.1, system time).
 pub static IRNSST: TimeScale = TimeScale { name: "IRNSST", behind_gpst_s: 0 };
 
+/// BeiDou's time: UTC of 2006-01-01, when GPS time was 14 s ahead of it (BDS-SIS-ICD-B1I 3.0, 3.3).
+pub static BDT: TimeScale = TimeScale { name: "BDT", behind_gpst_s: 14 };
+
 /// How far one time is ahead of another, whole seconds apart: `a0 + a1 (t − reference)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimePolynomial {

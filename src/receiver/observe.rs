@@ -75,7 +75,7 @@ impl Reading {
 
     /// How much longer this has travelled than from a medium orbit.
     fn farther_s(&self) -> f64 {
-        if self.sv.system.orbit_m() > BETWEEN_M { FARTHER_S } else { 0.0 }
+        if self.sv.orbit_m() > BETWEEN_M { FARTHER_S } else { 0.0 }
     }
 
     /// The time sent, in the week that brings it nearest to `near`.

@@ -21,7 +21,7 @@ pub const ORDER: Order<'static> = &[
             &["record"],
             &["message"],
             &["nmea", "exchange"],
-            &["gps", "galileo", "navic"],
+            &["gps", "galileo", "navic", "beidou"],
             &["rinex"],
             &["sp3"],
         ],
@@ -165,6 +165,7 @@ pub const ORDER: Order<'static> = &[
 pub const EXCEPTIONS: &[&str] = &[
     // The registry of signals names all of them, and a signal its message.
     "gnss/message: gnss/gps",
+    "gnss/signal: gnss/beidou",
     "gnss/signal: gnss/galileo",
     "gnss/signal: gnss/gps",
     "gnss/signal: gnss/navic",

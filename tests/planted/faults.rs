@@ -14,6 +14,11 @@ const PARITY: &str = "witness::printed::a_word_s_parity_is_the_printed_one_and_o
 const FIELDS: &str = "witness::printed::every_field_of_the_message_has_the_printed_place_sign_and_scale";
 const INAV: &str = "witness::printed::every_field_of_i_nav_has_the_printed_place_sign_and_scale";
 const CODED: &str = "witness::printed::pages_of_i_nav_are_checked_coded_interleaved_and_timed_as_printed";
+const BEIDOU: &str = "witness::beidou::real_subframes_keep_their_parities_and_come_back_through_our_interleaving";
+const BEIDOU_CODES: &str = "witness::beidou::all_chips_of_all_codes_are_those_of_another_program";
+const BEIDOU_SETS: &str = "witness::beidou::real_sets_are_the_records_of_a_converter_and_are_sent_by_us_bit_by_bit";
+const BEIDOU_GEO: &str = "witness::beidou::a_real_geostationary_satellite_stands_over_the_equator";
+const BEIDOU_DELAY: &str = "witness::beidou::delays_by_geographic_latitude_are_those_of_another_program";
 const NAVIC: &str = "witness::navic::subframes_are_coded_interleaved_and_timed_as_printed";
 const NAVIC_CODES: &str = "witness::navic::all_chips_of_all_codes_are_those_of_another_program";
 const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_either_way_up_to_what_was_sent";
@@ -74,6 +79,14 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.inav.word_order", "words come a page early, sent and read", CODED),
     fault("gnss.inav.reduced_begin", "elements in short refer to the second before the sub-frame, sent and \
                                       read", SHORT),
+    fault("gnss.beidou.g2_output", "the code of PRN 7 has another output", BEIDOU_CODES),
+    fault("gnss.beidou.g1_reset", "the first register of B3I begins anew a chip late", BEIDOU_CODES),
+    fault("gnss.beidou.neuman_hofman", "the last chip of the Neuman-Hofman code is wrong, sent and read", BEIDOU_SETS),
+    fault("gnss.beidou.bch", "the parity has another polynomial, sent and read", BEIDOU),
+    fault("gnss.beidou.second_sent", "subframes say the second of the next one", BEIDOU_SETS),
+    fault("gnss.beidou.second_read", "subframes are read as the ones after them", BEIDOU_SETS),
+    fault("gnss.beidou.tilt", "the plane of geostationary orbits is tilted the other way", BEIDOU_GEO),
+    fault("gnss.beidou.latitude", "the ionosphere's latitude has a sign", BEIDOU_DELAY),
     fault("gnss.navic.g2_start", "the code of PRN 7 begins elsewhere", NAVIC_CODES),
     fault("gnss.navic.time_sent", "a subframe counts itself and not the next one", NAVIC),
     fault("gnss.navic.time_read", "a subframe is read as the one after it", NAVIC_READ),

@@ -7,6 +7,8 @@
 
 #[path = "../witness/atmosphere.rs"]
 mod atmosphere;
+#[path = "../witness/beidou.rs"]
+mod beidou;
 #[path = "../witness/codes.rs"]
 mod codes;
 #[path = "../witness/data.rs"]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::bits::{Store, bits_of};
+use gnss_twin::gnss::bits::{Bits, Store, bits_of};
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::crc::crc24q;
 use gnss_twin::gnss::earth::{GPS_PI, Geodetic};
@@ -109,7 +109,7 @@ fn every_field_of_navic_s_message_has_the_printed_place_sign_and_scale() {
         let field = fields.iter().find(|field| field.name == name).unwrap();
         let unit = libm::exp2(f64::from(exponent)) * if semicircles { GPS_PI } else { 1.0 };
         for bit in 0..length {
-            let mut subframe = Subframe([false; DATA_BITS]);
+            let mut subframe = Subframe::default();
             subframe.0[usize::from(first + u16::from(bit))] = true;
             let weight = libm::exp2(f64::from(length - 1 - bit)) * if signed && bit == 0 { -1.0 } else { 1.0 };
             let found = field.value(field.read(&subframe));
@@ -132,7 +132,7 @@ fn real() -> Option<Vec<(String, Sv, Vec<bool>)>> {
 }
 
 fn subframe(bits: &[bool]) -> Subframe {
-    Subframe(bits[..DATA_BITS].try_into().unwrap())
+    Bits(bits[..DATA_BITS].try_into().unwrap())
 }
 
 #[test]

@@ -40,9 +40,9 @@ fn unpacked(path: &Path) -> Vec<u8> {
 
 /// Epochs of an SP3 file with the position (m) and clock (s, NaN where absent) of each satellite of some
 /// systems.
-type Precise = Vec<(Epoch, BTreeMap<Sv, (Vector3<f64>, f64)>)>;
+pub type Precise = Vec<(Epoch, BTreeMap<Sv, (Vector3<f64>, f64)>)>;
 
-fn sp3_columns(text: &[u8], systems: &str) -> Precise {
+pub fn sp3_columns(text: &[u8], systems: &str) -> Precise {
     let text = String::from_utf8_lossy(text);
     let mut epochs = Precise::new();
     for line in text.lines() {

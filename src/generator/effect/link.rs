@@ -101,7 +101,7 @@ impl LinkBudget {
         if sv.system == System::Gps {
             return gain_db(curve, off_nadir_rad.to_degrees());
         }
-        let (own_m, gps_m) = (sv.system.orbit_m(), System::Gps.orbit_m());
+        let (own_m, gps_m) = (sv.orbit_m(), System::Gps.orbit_m());
         // As far from nadir on the Earth as a GPS satellite's beam would be.
         let alike_rad = libm::asin((libm::sin(off_nadir_rad) * own_m / gps_m).min(1.0));
         let farther_db = 20.0 * libm::log10(lowest_range_m(own_m) / lowest_range_m(gps_m));

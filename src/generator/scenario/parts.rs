@@ -46,6 +46,7 @@ pub(super) fn navigation(
             ephemerides,
             klobuchar,
             klobuchar_navic,
+            klobuchar_beidou,
             nequick,
             leap_seconds,
             leap_event,
@@ -56,6 +57,7 @@ pub(super) fn navigation(
         navigation.ephemerides.extend(ephemerides);
         navigation.klobuchar = navigation.klobuchar.or(klobuchar);
         navigation.klobuchar_navic = navigation.klobuchar_navic.or(klobuchar_navic);
+        navigation.klobuchar_beidou = navigation.klobuchar_beidou.or(klobuchar_beidou);
         navigation.nequick = navigation.nequick.or(nequick);
         navigation.galileo = navigation.galileo.or(galileo);
         navigation.leap_seconds = navigation.leap_seconds.or(leap_seconds);
@@ -165,6 +167,7 @@ fn messages(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris
     let common = Common {
         klobuchar,
         klobuchar_navic: klobuchar_navic(scenario, navigation),
+        klobuchar_beidou: navigation.klobuchar_beidou,
         nequick: scenario.ionosphere.as_ref().and_then(Ionosphere::sent_nequick).or(navigation.nequick),
         utc,
         galileo: galileo_ahead(scenario, navigation),

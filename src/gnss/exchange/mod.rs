@@ -3,8 +3,8 @@
 //!
 //! Source: RINEX 3.05, tables A2 to A8 (navigation) and A2, A3 (observations), section 5.2. The `rinex` crate
 //! writes columns as well, but holds a whole file in memory; observations of a day at 10 Hz are gigabytes.
-//! Limits: GPS, Galileo and NavIC; no date of the run stands in the header, since the same run gives the same
-//! bytes at any time.
+//! Limits: GPS, Galileo, NavIC and BeiDou; no date of the run stands in the header, since the same run gives
+//! the same bytes at any time.
 
 mod navigation;
 mod observation;

@@ -10,8 +10,10 @@ use crate::gnss::message::Message;
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{BDT, Epoch, TimeScale};
 
+/// Continuous GPS week of week 0 of BDT.
+const BDT_WEEK: i64 = 1356;
 /// Data sources of a Galileo set: I/NAV of E1-B, its clock that of E5b and E1 (RINEX 3.05, table A8).
 const INAV_E1B: f64 = 513.0;
 
@@ -45,9 +47,9 @@ impl NavigationSets {
     /// # Errors
     /// What the writer reports.
     pub fn write(&self, mut writer: impl Write, signals: &[&'static Signal], near: Epoch) -> io::Result<()> {
-        let messages: BTreeMap<&str, &'static Message> = (signals.iter())
-            .flat_map(|signal| signal.components.iter().filter_map(|component| component.message))
-            .map(|message| (message.name, message))
+        let messages: BTreeMap<&str, (&'static Message, &'static TimeScale)> = (signals.iter())
+            .flat_map(|signal| signal.components.iter().filter_map(|component| Some((component.message?, signal.time))))
+            .map(|(message, time)| (message.name, (message, time)))
             .collect();
         let mut systems: Vec<System> = signals.iter().map(|signal| signal.system).collect();
         systems.sort();
@@ -56,15 +58,16 @@ impl NavigationSets {
         for (name, raws) in &self.common {
             let coefficients = messages
                 .get(name.as_str())
-                .and_then(|message| (message.ionosphere.coefficients)(&|name| raws.get(name).copied()));
+                .and_then(|(message, _)| (message.ionosphere.coefficients)(&|name| raws.get(name).copied()));
             text += &coefficients.map_or_else(String::new, ionosphere);
         }
         text += &header_line(&format!("{:6}", near.leap_seconds()), "LEAP SECONDS");
         text += &header_line("", "END OF HEADER");
         let mut known = BTreeSet::new();
         for ((name, sv, issue), raws) in &self.sets {
-            let Some(message) = messages.get(name.as_str()) else { continue };
-            let set = (message.elements)(*sv, &|name| raws.get(name).copied(), near);
+            let Some((message, time)) = messages.get(name.as_str()) else { continue };
+            let set = (message.elements)(*sv, &|name| raws.get(name).copied(), time.label(near));
+            let set = set.map(|set| set.timed(|label| time.instant(label)));
             if let Some(set) = set.filter(|_| known.insert((*sv, *issue))) {
                 text += &record(&set);
             }
@@ -82,6 +85,7 @@ fn ionosphere(sent: Coefficients) -> String {
     match sent {
         Coefficients::Klobuchar(model) => line("GPSA", model.alpha) + &line("GPSB", model.beta),
         Coefficients::KlobucharNavic(model) => line("IRNA", model.alpha) + &line("IRNB", model.beta),
+        Coefficients::KlobucharBeidou(model) => line("BDSA", model.alpha) + &line("BDSB", model.beta),
         Coefficients::NequickG(model) => {
             let [a, b, c] = model.coefficients;
             line("GAL", [a, b, c, 0.0])
@@ -97,12 +101,15 @@ fn exponent(value: f64, digits: usize) -> String {
     format!("{mantissa}E{}{:02}", if exponent < 0 { '-' } else { '+' }, exponent.abs())
 }
 
-/// A set: a line with the clock, seven with the rest (RINEX 3.05, tables A6, A8 and A18).
+/// A set: a line with the clock, seven with the rest (RINEX 3.05, tables A6, A8, A14 and A18).
 fn record(set: &Ephemeris) -> String {
-    let week = set.toe.week() as f64;
+    // BeiDou's records are in its own time.
+    let own_time = set.sv.system == System::BeiDou;
+    let set = &if own_time { set.clone().timed(|at| BDT.label(at)) } else { set.clone() };
+    let week = if own_time { set.toe.week() - BDT_WEEK } else { set.toe.week() } as f64;
     let fifth = match set.sv.system {
         System::Galileo => [set.idot_radps, INAV_E1B, week, 0.0],
-        System::Navic => [set.idot_radps, 0.0, week, 0.0],
+        System::Navic | System::BeiDou => [set.idot_radps, 0.0, week, 0.0],
         _ => [set.idot_radps, f64::from(set.l2_codes), week, f64::from(u8::from(set.l2_p_data_off))],
     };
     let sixth = match set.sv.system {
@@ -112,23 +119,26 @@ fn record(set: &Ephemeris) -> String {
             [sisa_m(set.ura_index), f64::from(health), set.tgd2_s, set.tgd_s]
         }
         System::Navic => [ura_m(set.ura_index), f64::from(set.health), set.tgd_s, 0.0],
+        System::BeiDou => [ura_m(set.ura_index), f64::from(set.health), set.tgd_s, set.tgd2_s],
         _ => [ura_m(set.ura_index), f64::from(set.health), set.tgd_s, f64::from(set.iodc)],
     };
     // Seconds of the week of the reference time, before it too.
     let transmitted_s = set.transmitted.since(set.toe) + set.toe.tow_s();
-    let fit_h = match set.long_fit {
+    let after = match set.long_fit {
+        _ if own_time => f64::from(set.iodc),
         _ if set.is_sent_after_reference() => 0.0,
         true => 6.0,
         false => 4.0,
     };
+    let issue = if own_time { u16::from(set.aodo) } else { set.iode };
     let lines = [
-        [f64::from(set.iode), set.crs_m, set.delta_n_radps, set.m0_rad],
+        [f64::from(issue), set.crs_m, set.delta_n_radps, set.m0_rad],
         [set.cuc_rad, set.eccentricity, set.cus_rad, set.sqrt_a_sqrtm],
         [set.toe.tow_s(), set.cic_rad, set.omega0_rad, set.cis_rad],
         [set.i0_rad, set.crc_m, set.omega_rad, set.omega_dot_radps],
         fifth,
         sixth,
-        [transmitted_s, fit_h, 0.0, 0.0],
+        [transmitted_s, after, 0.0, 0.0],
     ];
     let values =
         |values: &[f64]| values.iter().map(|value| format!("{:>19}", exponent(*value, 12))).collect::<String>();

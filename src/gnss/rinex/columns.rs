@@ -1,5 +1,5 @@
 //! A navigation file as lines and columns: the header's lines that are used, and records of GPS LNAV, Galileo
-//! I/NAV and NavIC, eight lines with a number or nothing in each field of 19 columns.
+//! I/NAV, NavIC and BeiDou D1 and D2, eight lines with a number or nothing in each field of 19 columns.
 //!
 //! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5, A6, A8 and A18; RINEX 4.02, tables A9, A13
 //! and A33, and those of NavIC. Where a line is missing, doubled or cut, or text is beside the fields, what
@@ -36,8 +36,11 @@ const OF_LNAV: [&str; FIELDS - FIRST.len()] =
 const OF_INAV: [&str; FIELDS - FIRST.len()] =
     ["sources", "week", "", "accuracy", "health", "bgdE5aE1", "bgdE5bE1", "t_tm", "", "", ""];
 const OF_NAVIC: [&str; FIELDS - FIRST.len()] = ["", "week", "", "accuracy", "health", "tgd", "", "t_tm", "", "", ""];
+const OF_BEIDOU: [&str; FIELDS - FIRST.len()] =
+    ["", "week", "", "accuracy", "health", "tgd1", "tgd2", "t_tm", "aodc", "", ""];
 /// Systems whose records are read, with the largest number of their satellites.
-const READ: [(char, System, u8); 3] = [('G', System::Gps, 32), ('E', System::Galileo, 36), ('I', System::Navic, 14)];
+const READ: [(char, System, u8); 4] =
+    [('G', System::Gps, 32), ('E', System::Galileo, 36), ('I', System::Navic, 14), ('C', System::BeiDou, 63)];
 /// Bits of an I/NAV record's sources: sent on E1-B or E5b, sent on E5a (F/NAV), and a clock of E5b and E1.
 const SENT_INAV: u32 = 0b101;
 const SENT_FNAV: u32 = 0b010;
@@ -100,6 +103,7 @@ impl Record {
         let rest = match self.sv.system {
             System::Galileo => OF_INAV,
             System::Navic => OF_NAVIC,
+            System::BeiDou => OF_BEIDOU,
             _ => OF_LNAV,
         };
         let at = FIRST.iter().chain(&rest).position(|field| *field == name)?;
@@ -127,6 +131,8 @@ pub(super) struct Contents {
     pub klobuchar: Option<Klobuchar>,
     /// As NavIC sends them.
     pub klobuchar_navic: Option<Klobuchar>,
+    /// As BeiDou sends them.
+    pub klobuchar_beidou: Option<Klobuchar>,
     /// Effective ionisation coefficients of Galileo.
     pub nequick: Option<[f64; 3]>,
     pub leap_seconds: Option<i64>,
@@ -177,6 +183,7 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     // Of what satellites repeat, the first of the day, whatever the order in the file.
     let mut ionosphere: Option<(String, Klobuchar)> = None;
     let mut navic: Option<(String, Klobuchar)> = None;
+    let mut beidou: Option<(String, Klobuchar)> = None;
     let mut nequick: Option<(String, [f64; 3])> = None;
     let mut utc: Option<(String, Polynomial)> = None;
     let mut galileo: Option<(String, Polynomial)> = None;
@@ -185,6 +192,7 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
         match form.group(group) {
             Ok(Group::Record(record)) => contents.records.push(*record),
             Ok(Group::Ionosphere(System::Navic, age, found)) => keep_first(&mut navic, age, found),
+            Ok(Group::Ionosphere(System::BeiDou, age, found)) => keep_first(&mut beidou, age, found),
             Ok(Group::Ionosphere(_, age, found)) => keep_first(&mut ionosphere, age, found),
             Ok(Group::Ionisation(age, found)) => keep_first(&mut nequick, age, found),
             Ok(Group::Utc(age, found)) => keep_first(&mut utc, age, found),
@@ -195,6 +203,7 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     }
     contents.klobuchar = contents.klobuchar.or(ionosphere.map(|(_, found)| found));
     contents.klobuchar_navic = contents.klobuchar_navic.or(navic.map(|(_, found)| found));
+    contents.klobuchar_beidou = contents.klobuchar_beidou.or(beidou.map(|(_, found)| found));
     contents.nequick = contents.nequick.or(nequick.map(|(_, found)| found));
     contents.utc = contents.utc.or(utc.map(|(_, found)| found));
     contents.galileo = contents.galileo.or(galileo.map(|(_, found)| found));
@@ -253,6 +262,7 @@ impl Form {
     fn header(&self, lines: &[Line<'_>], contents: &mut Contents) {
         let (mut alpha, mut beta) = (None, None);
         let (mut navic_alpha, mut navic_beta) = (None, None);
+        let (mut beidou_alpha, mut beidou_beta) = (None, None);
         for (number, line) in lines {
             let mut four = |start: usize, into: &mut Option<[f64; 4]>| match numbers::<4>(line, start, HEADER_FIELD) {
                 Ok(found) => *into = Some(found),
@@ -265,12 +275,14 @@ impl Form {
                 "IONOSPHERIC CORR" if line.starts_with("GPSB") => four(5, &mut beta),
                 "IONOSPHERIC CORR" if line.starts_with("IRNA") => four(5, &mut navic_alpha),
                 "IONOSPHERIC CORR" if line.starts_with("IRNB") => four(5, &mut navic_beta),
+                "IONOSPHERIC CORR" if line.starts_with("BDSA") => four(5, &mut beidou_alpha),
+                "IONOSPHERIC CORR" if line.starts_with("BDSB") => four(5, &mut beidou_beta),
                 "IONOSPHERIC CORR" if line.starts_with("GAL ") => match numbers::<3>(line, 5, HEADER_FIELD) {
                     Ok(found) => contents.nequick = Some(found),
                     Err(reason) => contents.reasons.push(format!("line {number} (IONOSPHERIC CORR): {reason}")),
                 },
                 "IONOSPHERIC CORR" => {
-                    let known = ["QZSA", "QZSB", "BDSA", "BDSB", "BDS1", "BDS2", "BDS3", "BDS "];
+                    let known = ["QZSA", "QZSB", "BDS1", "BDS2", "BDS3", "BDS "];
                     let name: String = line.chars().take(4).collect();
                     if !known.contains(&name.as_str()) {
                         contents
@@ -314,8 +326,8 @@ impl Form {
                 None
             }
         };
-        let found = [both(alpha, beta), both(navic_alpha, navic_beta)];
-        [contents.klobuchar, contents.klobuchar_navic] = found;
+        let found = [both(alpha, beta), both(navic_alpha, navic_beta), both(beidou_alpha, beidou_beta)];
+        [contents.klobuchar, contents.klobuchar_navic, contents.klobuchar_beidou] = found;
     }
 
     fn group(&self, group: &[Line<'_>]) -> Result<Group, String> {
@@ -356,7 +368,7 @@ impl Form {
             ("EPH", message) if !messages.contains(&message) => {
                 refuse(&format!("message '{message}': expected {}", messages.join(" or ")))
             }
-            ("EPH", "LNAV" | "INAV") if READ.iter().any(|(read, ..)| *read == letter) => {
+            ("EPH", "LNAV" | "INAV" | "D1" | "D2") if READ.iter().any(|(read, ..)| *read == letter) => {
                 let rest = group.get(1..).unwrap_or_default();
                 if rest.first().is_none_or(|(_, line)| line.get(..3) != Some(satellite)) {
                     return refuse("expected the same satellite and its epoch in the line after this one");
@@ -364,6 +376,7 @@ impl Form {
                 self.record(rest).map(|record| Group::Record(Box::new(record)))
             }
             ("ION", "LNAV") if ['G', 'I'].contains(&letter) => self.ionosphere(group, satellite),
+            ("ION", "D1D2") => self.ionosphere(group, satellite),
             ("ION", "IFNV") => self.ionisation(group, satellite),
             ("STO", "LNAV") if letter == 'G' => self.system_time(group, satellite),
             // Merged files name the system alone.

@@ -5,10 +5,11 @@
 //! for SPS 1.1, subframes 1 and 2; RINEX 3.05, table A18; RINEX 4.02, tables A9 and A13.
 
 use super::columns::Record;
+use crate::gnss::beidou::d1d2::{BDT_WEEK, issue};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::galileo::inav::sisa_index;
 use crate::gnss::satellite::System;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::gnss::time::{BDT, Epoch, WEEK_S};
 
 /// An element that must be there and lie within its range, in SI units.
 fn field(record: &Record, key: &'static str, least: f64, most: f64) -> Result<f64, String> {
@@ -35,13 +36,16 @@ pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
     const HARMONIC_RAD: f64 = 6.104e-5;
     const HARMONIC_M: f64 = 1024.001;
     let both = |name, most: f64| field(record, name, -most, most);
+    let harmonic_m = if record.sv.system == System::BeiDou { 2.0 * HARMONIC_M } else { HARMONIC_M };
 
     let toc = record.toc;
     let toe = near(toc, field(record, "toe", 0.0, 604_800.0)?);
-    let week = f64::from(whole(record, "week", 9999)?);
+    // BeiDou's records are in its own time.
+    let before = if record.sv.system == System::BeiDou { BDT_WEEK as f64 } else { 0.0 };
+    let week = f64::from(whole(record, "week", 9999)?) + before;
     let astray = (week - toe.week() as f64).abs() % 1024.0;
     if astray > 1.0 && astray < 1023.0 {
-        return Err(format!("week = {week}: expected that of its epoch, {}", toe.week()));
+        return Err(format!("week = {}: expected that of its epoch, {}", week - before, toe.week() as f64 - before));
     }
     // The last line of a record begins with it: without it the file was cut, perhaps inside a number.
     if record.get("t_tm").is_none() {
@@ -59,8 +63,8 @@ pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
         idot_radps: both("idot", 2.927e-9)?,
         cuc_rad: both("cuc", HARMONIC_RAD)?,
         cus_rad: both("cus", HARMONIC_RAD)?,
-        crc_m: both("crc", HARMONIC_M)?,
-        crs_m: both("crs", HARMONIC_M)?,
+        crc_m: both("crc", harmonic_m)?,
+        crs_m: both("crs", harmonic_m)?,
         cic_rad: both("cic", HARMONIC_RAD)?,
         cis_rad: both("cis", HARMONIC_RAD)?,
         ..Ephemeris::blank(record.sv, toe)
@@ -68,8 +72,34 @@ pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
     match record.sv.system {
         System::Galileo => galileo(record, common),
         System::Navic => navic(record, common),
+        System::BeiDou => beidou(record, common).map(|set| set.timed(|label| BDT.instant(label))),
         _ => gps(record, common),
     }
+}
+
+/// The rest of a set of BeiDou, by its own time (BDS-SIS-ICD-B1I 3.0, tables 5-6 and 5-8; RINEX 3.05, table
+/// A14).
+fn beidou(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
+    let both = |name, most: f64| field(record, name, -most, most);
+    if common.toe != common.toc {
+        return Err(format!("toe = {}: expected the record's epoch, {}", common.toe, common.toc));
+    }
+    Ok(Ephemeris {
+        transmitted: transmitted(record, common.toe, common.toe),
+        iode: issue(common.toe.tow_s()),
+        iodc: whole(record, "aodc", 31)? as u16,
+        aodo: whole(record, "iode", 31)? as u8,
+        ura_index: ura_index(optional_accuracy(record)?),
+        health: whole(record, "health", 1)? as u8,
+        sqrt_a_sqrtm: field(record, "sqrta", 5200.0, 6540.0)?,
+        eccentricity: field(record, "e", 0.0, 0.1)?,
+        af0_s: both("af0", 9.766e-4)?,
+        af1_sps: both("af1", 1.863e-9)?,
+        af2_sps2: both("af2", 1.388e-17)?,
+        tgd_s: both("tgd1", 5.121e-8)?,
+        tgd2_s: both("tgd2", 5.121e-8)?,
+        ..common
+    })
 }
 
 /// The rest of a NavIC set (IRNSS SIS ICD for SPS 1.1, subframes 1 and 2). Health is a bit each of S and L5.

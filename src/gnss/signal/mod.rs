@@ -17,7 +17,7 @@ use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::message::Message;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::TimeScale;
-use crate::gnss::{galileo, gps, navic};
+use crate::gnss::{beidou, galileo, gps, navic};
 
 mod shape;
 #[cfg(any(test, feature = "planted"))]
@@ -26,7 +26,15 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 4] = [&gps::l1ca::L1_CA, &galileo::e1::E1, &navic::sps::L5, &navic::sps::S];
+pub static SIGNALS: [&Signal; 7] = [
+    &gps::l1ca::L1_CA,
+    &galileo::e1::E1,
+    &navic::sps::L5,
+    &navic::sps::S,
+    &beidou::in_phase::B1I,
+    &beidou::in_phase::B2I,
+    &beidou::in_phase::B3I,
+];
 
 /// Signals that [`register`] has added. Names in files have to find them, so they are the program's, not a
 /// scene's.

@@ -45,6 +45,8 @@ const GRADIENT_RAD: [f64; 2] = [10.0 / 180.0 * PI, 20.0 / 180.0 * PI];
 pub enum Delays {
     /// By a formula for every place, which gives the delay on a carrier.
     Klobuchar(Klobuchar, f64),
+    /// The same by BeiDou's form of the formula.
+    Beidou(Klobuchar),
     /// By the electrons on the way to each satellite, in TECU, from near where the receiver is.
     Electrons(Vec<(Sv, f64)>),
 }
@@ -53,7 +55,8 @@ impl Delays {
     /// Delay of a range that is received at a place from a direction, in seconds.
     pub fn delay_s(&self, range: &Range, user: Geodetic, look: Look, received: Epoch) -> f64 {
         match self {
-            Self::Klobuchar(..) if user.height_m > IONOSPHERE_TOP_M => 0.0,
+            Self::Klobuchar(..) | Self::Beidou(_) if user.height_m > IONOSPHERE_TOP_M => 0.0,
+            Self::Beidou(model) => model.beidou_delay_s(user, look, received, range.carrier_hz),
             Self::Klobuchar(model, defined_hz) => {
                 model.delay_from_s(*defined_hz, user, look, received, range.carrier_hz)
             }

@@ -418,6 +418,7 @@ impl Solver {
             Some(Coefficients::KlobucharNavic(model)) => {
                 (Delays::Klobuchar(model, NAVIC_HZ), IonosphereModel::Broadcast)
             }
+            Some(Coefficients::KlobucharBeidou(model)) => (Delays::Beidou(model), IonosphereModel::Broadcast),
             Some(Coefficients::NequickG(model)) => {
                 (Delays::Electrons(self.electrons.of(model, ranges, place_m)), IonosphereModel::NequickG)
             }

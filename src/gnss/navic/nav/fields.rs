@@ -3,7 +3,7 @@
 
 use super::NAVIC_WEEK;
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, Store, element, plain};
+use crate::gnss::bits::{Bits, Element, Field, element, plain};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::message::Common;
@@ -13,22 +13,7 @@ use crate::gnss::time::Epoch;
 pub const DATA_BITS: usize = 262;
 
 /// The bits of a subframe that its check covers, the first sent first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Subframe(pub [bool; DATA_BITS]);
-
-impl Store for Subframe {
-    fn piece(&self, (first, length): (u16, u8)) -> u32 {
-        let bits = self.0.iter().skip(usize::from(first)).take(usize::from(length));
-        bits.fold(0, |all, &bit| all << 1 | u32::from(bit))
-    }
-
-    fn set_piece(&mut self, (first, length): (u16, u8), value: u32) {
-        let places = self.0.iter_mut().skip(usize::from(first)).take(usize::from(length));
-        for (shift, place) in (0..u32::from(length)).rev().zip(places) {
-            *place = value >> shift & 1 == 1;
-        }
-    }
-}
+pub type Subframe = Bits<DATA_BITS>;
 
 const CLOCK: &str = "subframe 1, clock parameters";
 const ORBIT: &str = "subframes 1 and 2, ephemeris parameters";

@@ -13,7 +13,7 @@ mod fields;
 mod reader;
 
 use crate::gnss::bits::{
-    Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
+    Bits, Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
 };
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::crc::crc24q;
@@ -96,7 +96,7 @@ const CODE: Convolutional = Convolutional { second_inverted: false };
 const INTERLEAVER: Interleaver = Interleaver { columns: 73, rows: 8 };
 
 fn blank() -> Subframe {
-    Subframe([false; DATA_BITS])
+    Subframe::default()
 }
 
 /// Number of the subframe that begins at a time.
@@ -203,7 +203,7 @@ pub fn decode_soft(symbols: &[f32]) -> Option<Subframe> {
     let (data, rest) = bits.split_at_checked(DATA_BITS)?;
     let check = number(rest.get(..CHECK_BITS)?) as u32;
     let data: [bool; DATA_BITS] = data.try_into().ok()?;
-    (crc24q(data) == check).then_some(Subframe(data))
+    (crc24q(data) == check).then_some(Bits(data))
 }
 
 fn soft(symbols: &[bool]) -> Vec<f32> {

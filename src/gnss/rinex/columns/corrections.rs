@@ -33,7 +33,11 @@ impl Form {
         match coefficients.as_deref() {
             Some(&[a0, a1, a2, a3, b0, b1, b2, b3]) => {
                 let found = Klobuchar { alpha: [a0, a1, a2, a3], beta: [b0, b1, b2, b3] };
-                let system = if satellite.starts_with('I') { System::Navic } else { System::Gps };
+                let system = match satellite.get(..1) {
+                    Some("I") => System::Navic,
+                    Some("C") => System::BeiDou,
+                    _ => System::Gps,
+                };
                 Ok(Group::Ionosphere(system, format!("{epoch} {satellite}"), found))
             }
             _ => refuse(one.0, "expected eight coefficients".to_owned()),

@@ -1,0 +1,340 @@
+//! D1 and D2, the messages of B1I, B2I and B3I: frames encoded and decoded.
+//!
+//! Source: BDS-SIS-ICD-B1I 3.0, section 5. A subframe is ten words of thirty bits: code words of
+//! BCH(15,11,1), two of them interleaved bit by bit, but for the first fifteen bits. In D1 (satellites in
+//! medium and inclined orbits) five subframes of 6 s are a frame; subframes 1 to 3 carry a set of elements.
+//! In D2 (geostationary ones) subframes last 0.6 s, and pages 1 to 10 of subframe 1 carry the set, one a
+//! frame of 3 s.
+//!
+//! A unit here is what repeats the set: 30 s of either, one frame of D1 or ten of D2. A symbol is what a code
+//! period of a millisecond carries: in D1 a bit times a chip of the Neuman-Hofman code, in D2 half a bit. A
+//! set is numbered by its reference time, as its ages of data repeat ([`issue`]).
+//!
+//! Limits: subframes 4 and 5 of D1 and 2 to 5 of D2 have their headers and page numbers alone: no almanac, no
+//! UTC, no integrity or grid. Parities detect errors and correct none. Coefficients of the ionosphere that
+//! are all zero count as none.
+
+mod fields;
+mod reader;
+
+use crate::gnss::bits::{Bits, FieldError, Store, add_to, integers, quantise_all, read_all, write_all};
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::message::{IonosphereForm, Message, Sender};
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::{Epoch, WEEK_S};
+pub use fields::{BDT_WEEK, SUBFRAME_BITS, tables};
+use fields::{D1_PARTS, D1_SET, D1Set, D2_PARTS, D2_SET, D2Set, Orbit};
+pub use reader::D1D2Reader;
+
+/// D1 and D2 as signals name them.
+pub static D1_D2: Message = Message {
+    name: "D1/D2",
+    symbol_s: 0.001,
+    unit_s: UNIT_S,
+    first_s: 0,
+    sender: |common| Ok(Box::new(Frames { klobuchar: common.klobuchar_beidou })),
+    number: |_| 1,
+    timed: &[1],
+    set: &[1],
+    reduced: &[],
+    ionosphere: IonosphereForm {
+        model: Model::KlobucharBeidou,
+        unit: |_| true,
+        coefficients: |raw| {
+            let mut found = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
+            for (index, name) in ["alpha_0", "alpha_1", "alpha_2", "alpha_3"].into_iter().enumerate() {
+                *found.alpha.get_mut(index)? = value(name, raw)?;
+            }
+            for (index, name) in ["beta_0", "beta_1", "beta_2", "beta_3"].into_iter().enumerate() {
+                *found.beta.get_mut(index)? = value(name, raw)?;
+            }
+            given(found)
+        },
+    },
+    set_parameters: || D1_SET.iter().map(|element| element.field.name).collect(),
+    elements: |sv, raw, near| {
+        let mut set = D1Set::default();
+        for field in D1_SET.iter().map(|element| &element.field) {
+            field.write(&mut set, raw(field.name)?);
+        }
+        let mut orbit = Orbit::blank(sv, near);
+        read_all(&D1_SET, &set, &mut orbit);
+        orbit.set()
+    },
+    parameters: |symbols| parameters(symbols).map(|found| (true, found)),
+    reader: |sv| Box::new(D1D2Reader::new(sv)),
+    quantised,
+    adjustable,
+    alert: None,
+    adjust,
+};
+
+/// Seconds of a unit, of a subframe of D1 and of a frame of D2.
+const UNIT_S: i64 = 30;
+const D1_SUBFRAME_S: i64 = 6;
+const D2_FRAME_S: i64 = 3;
+/// Symbols of a bit, and subframes of a unit.
+const D1_SYMBOLS: usize = 20;
+const D2_SYMBOLS: usize = 2;
+const D1_SUBFRAMES: usize = 5;
+const D2_SUBFRAMES: usize = 50;
+/// First bits of every subframe, and bits of a word.
+const PREAMBLE: u32 = 0b111_0001_0010;
+const WORD_BITS: usize = 30;
+/// Places of the subframe's number, of the second of the week in two pieces, and of the page's number in
+/// subframes of D1 and in D2's subframe 1.
+const FRAME_ID: (u16, u8) = (15, 3);
+const SECOND: [(u16, u8); 2] = [(18, 8), (30, 12)];
+const D1_PAGE: (u16, u8) = (43, 7);
+const D2_PAGE: (u16, u8) = (42, 4);
+
+/// The Neuman-Hofman code (5.1.1): 0000 0100 1101 0100 1110, first chip in the highest of twenty bits.
+const NEUMAN_HOFMAN: u32 = 0b0000_0100_1101_0100_1110;
+
+/// A subframe without its interleaving.
+pub type Subframe = Bits<SUBFRAME_BITS>;
+
+/// Chip of the Neuman-Hofman code.
+fn chip(index: usize) -> bool {
+    planted!("gnss.beidou.neuman_hofman", NEUMAN_HOFMAN, NEUMAN_HOFMAN ^ 1) >> (19 - index) & 1 == 1
+}
+
+/// Number of a set by its reference time, in 12 min (RTKLIB's, for the message has none that differs from set
+/// to set).
+pub fn issue(toe_of_week_s: f64) -> u16 {
+    ((toe_of_week_s / 720.0) as u16) % 240
+}
+
+impl Orbit {
+    fn blank(sv: Sv, near: Epoch) -> Self {
+        Self { ephemeris: Ephemeris::blank(sv, near), klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] } }
+    }
+
+    /// The set, numbered; `None` where clock and orbit refer to different times.
+    fn set(mut self) -> Option<Ephemeris> {
+        self.ephemeris.iode = issue(self.ephemeris.toe.tow_s());
+        (self.ephemeris.toe == self.ephemeris.toc).then_some(self.ephemeris)
+    }
+}
+
+fn value(name: &str, raw: &dyn Fn(&str) -> Option<i64>) -> Option<f64> {
+    let field = D1_SET.iter().map(|element| &element.field).find(|field| field.name == name)?;
+    raw(name).map(|raw| field.value(raw))
+}
+
+/// Coefficients that are not all zero.
+fn given(found: Klobuchar) -> Option<Coefficients> {
+    let is_given = found.alpha.iter().chain(&found.beta).any(|value| *value != 0.0);
+    is_given.then_some(Coefficients::KlobucharBeidou(found))
+}
+
+/// Makes the frames of satellites.
+struct Frames {
+    klobuchar: Option<Klobuchar>,
+}
+
+impl Sender for Frames {
+    fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        if start.tow_whole_s() % UNIT_S != 0 || start.fraction() != 0.0 {
+            let expected = "a multiple of 30 s of BDT";
+            return Err(FieldError::Start { message: D1_D2.name, start_s: start.tow_s(), expected });
+        }
+        check(ephemeris)?;
+        let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
+        let klobuchar = self.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] });
+        let orbit = Orbit { ephemeris: on_air, klobuchar };
+        if ephemeris.sv.is_geostationary() { d2(&orbit, start) } else { d1(&orbit, start) }
+    }
+}
+
+/// A frame of D1.
+fn d1(orbit: &Orbit, start: Epoch) -> Result<Vec<bool>, FieldError> {
+    let mut set = D1Set::default();
+    write_all(&D1_SET, orbit, &mut set)?;
+    let mut symbols = Vec::with_capacity(D1_SUBFRAMES * SUBFRAME_BITS * D1_SYMBOLS);
+    for index in 0..D1_SUBFRAMES {
+        let mut subframe: Subframe = set.part(index * SUBFRAME_BITS);
+        let begin_s = start.tow_whole_s() + index as i64 * D1_SUBFRAME_S;
+        if index >= D1_PARTS {
+            subframe.set_piece(D1_PAGE, (start.tow_whole_s() / UNIT_S % 24 + 1) as u32);
+        }
+        for bit in finished(subframe, index + 1, begin_s) {
+            symbols.extend((0..D1_SYMBOLS).map(|place| bit ^ chip(place)));
+        }
+    }
+    Ok(symbols)
+}
+
+/// Ten frames of D2.
+fn d2(orbit: &Orbit, start: Epoch) -> Result<Vec<bool>, FieldError> {
+    let mut set = D2Set::default();
+    write_all(&D2_SET, orbit, &mut set)?;
+    let mut symbols = Vec::with_capacity(D2_SUBFRAMES * SUBFRAME_BITS * D2_SYMBOLS);
+    for index in 0..D2_SUBFRAMES {
+        let (frame, number) = (index / 5, index % 5 + 1);
+        let mut subframe = if number == 1 { set.part(frame * SUBFRAME_BITS) } else { Subframe::default() };
+        if number == 1 {
+            subframe.set_piece(D2_PAGE, frame as u32 + 1);
+        }
+        let begin_s = start.tow_whole_s() + frame as i64 * D2_FRAME_S;
+        for bit in finished(subframe, number, begin_s) {
+            symbols.extend([bit; D2_SYMBOLS]);
+        }
+    }
+    Ok(symbols)
+}
+
+/// The bits of a subframe as they are sent: with its header, parities and interleaving.
+fn finished(mut subframe: Subframe, number: usize, begin_s: i64) -> Vec<bool> {
+    subframe.set_piece((0, 11), PREAMBLE);
+    subframe.set_piece(FRAME_ID, number as u32);
+    let second = (begin_s + planted!("gnss.beidou.second_sent", 0, D1_SUBFRAME_S)).rem_euclid(WEEK_S) as u32;
+    subframe.set_piece(SECOND[0], second >> 12);
+    subframe.set_piece(SECOND[1], second);
+    encode(&subframe)
+}
+
+/// The bits of a subframe as they are sent: parities are made anew.
+pub fn encode(subframe: &Subframe) -> Vec<bool> {
+    let mut sent = Vec::with_capacity(SUBFRAME_BITS);
+    for (index, word) in subframe.0.chunks_exact(WORD_BITS).enumerate() {
+        if index == 0 {
+            let info = word.get(15..26).unwrap_or_default();
+            sent.extend(word.iter().take(26).copied().chain(parity(info)));
+        } else {
+            let of = |first: usize| {
+                let info = word.get(first..first + 11).unwrap_or_default();
+                info.iter().copied().chain(parity(info))
+            };
+            sent.extend(of(0).zip(of(11)).flat_map(|(one, other)| [one, other]));
+        }
+    }
+    sent
+}
+
+/// The subframe in bits as they were sent; `None` where a preamble or a parity is wrong.
+pub fn decode(sent: &[bool]) -> Option<Subframe> {
+    let mut subframe = Subframe::default();
+    let words = subframe.0.chunks_exact_mut(WORD_BITS).zip(sent.chunks_exact(WORD_BITS));
+    for (index, (word, bits)) in words.enumerate() {
+        if index == 0 {
+            word.copy_from_slice(bits);
+            let (info, check) = word.get(15..)?.split_at_checked(11)?;
+            if parity(info) != check {
+                return None;
+            }
+        } else {
+            let of = |phase: usize| bits.iter().skip(phase).step_by(2).copied().collect::<Vec<bool>>();
+            let (one, other) = (of(0), of(1));
+            for (code, first) in [(&one, 0), (&other, 1)] {
+                let (info, check) = code.split_at_checked(11)?;
+                if parity(info) != check {
+                    return None;
+                }
+                word.get_mut(11 * first..11 * first + 11)?.copy_from_slice(info);
+                word.get_mut(22 + 4 * first..26 + 4 * first)?.copy_from_slice(check);
+            }
+        }
+    }
+    let whole = sent.len() == SUBFRAME_BITS && subframe.piece((0, 11)) == PREAMBLE;
+    (whole && (1..=5).contains(&subframe.piece(FRAME_ID)) && i64::from(second(&subframe)) < WEEK_S).then_some(subframe)
+}
+
+/// Parity of BCH(15,11,1), whose polynomial is x⁴ + x + 1 (5.1.3).
+fn parity(info: &[bool]) -> [bool; 4] {
+    let polynomial = planted!("gnss.beidou.bch", 0b0011, 0b1001);
+    let register = info.iter().fold(0_u8, |register, &bit| {
+        let feedback = (register >> 3 & 1 == 1) != bit;
+        (register << 1 & 0b1111) ^ if feedback { polynomial } else { 0 }
+    });
+    [3, 2, 1, 0].map(|place| register >> place & 1 == 1)
+}
+
+/// Number of a subframe.
+pub fn id(subframe: &Subframe) -> u8 {
+    subframe.piece(FRAME_ID) as u8
+}
+
+/// Second of the week of BDT that a subframe says: in D1 when it began, in D2 when its frame did.
+pub fn second(subframe: &Subframe) -> u32 {
+    subframe.piece(SECOND[0]) << 12 | subframe.piece(SECOND[1])
+}
+
+/// Subframes of D1 or pages of D2 that make up a set: the parts, first to last.
+fn orbit_of(sv: Sv, parts: &[Subframe], sent: Epoch) -> (Orbit, Vec<(&'static str, i64)>) {
+    let mut orbit = Orbit::blank(sv, sent);
+    if sv.is_geostationary() {
+        let set = D2Set::joined(parts.iter().map(|part| &part.0));
+        read_all(&D2_SET, &set, &mut orbit);
+        (orbit, integers(&D2_SET, &set))
+    } else {
+        let set = D1Set::joined(parts.iter().map(|part| &part.0));
+        read_all(&D1_SET, &set, &mut orbit);
+        (orbit, integers(&D1_SET, &set))
+    }
+}
+
+/// When a part was sent, by its second and a week near `near`, or by the week in the first part.
+fn sent_at(first: &Subframe, is_d2: bool, near: Epoch) -> Epoch {
+    let week = first.piece(if is_d2 { (64, 13) } else { (60, 13) });
+    let week = near.nearest_week(i64::from(week) + BDT_WEEK, 8192);
+    Epoch::new(week * WEEK_S + i64::from(second(first)), 0.0)
+}
+
+/// The parameters in the symbols of a unit; `None` where one of the parts with a set fails its check.
+fn parameters(symbols: &[bool]) -> Option<Vec<(&'static str, i64)>> {
+    let bits = |per_bit: usize| -> Vec<bool> {
+        let first = symbols.iter().step_by(per_bit);
+        first.map(|one| one ^ (per_bit == D1_SYMBOLS && chip(0))).collect()
+    };
+    let subframes = |bits: Vec<bool>, every: usize, count: usize| -> Option<Vec<Subframe>> {
+        bits.chunks(SUBFRAME_BITS).step_by(every).take(count).map(decode).collect()
+    };
+    if let Some(parts) = subframes(bits(D1_SYMBOLS), 1, D1_PARTS) {
+        return Some(integers(&D1_SET, &D1Set::joined(parts.iter().map(|part| &part.0))));
+    }
+    let parts = subframes(bits(D2_SYMBOLS), 5, D2_PARTS)?;
+    Some(integers(&D2_SET, &D2Set::joined(parts.iter().map(|part| &part.0))))
+}
+
+/// Nothing but equal reference times shows a receiver that the parts of a set belong together.
+fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
+    if ephemeris.toe == ephemeris.toc {
+        Ok(())
+    } else {
+        Err(FieldError::References { toe_s: ephemeris.toe.tow_s(), toc_s: ephemeris.toc.tow_s() })
+    }
+}
+
+/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays. Times are BDT's.
+///
+/// # Errors
+/// A value that the message cannot carry.
+pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+    check(ephemeris)?;
+    let mut orbit = Orbit { ephemeris: ephemeris.clone(), ..Orbit::blank(ephemeris.sv, ephemeris.toe) };
+    quantise_all(&D1_SET, &mut orbit)?;
+    Ok(orbit.ephemeris)
+}
+
+/// Parameters by which sets are distinguished, what all satellites say alike, and the health, which has a
+/// fault of its own.
+const FIXED_PARAMETERS: [&str; 14] = [
+    "week", "toc_s", "toe_s", "health", "aodc", "aode", "alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0", "beta_1",
+    "beta_2", "beta_3",
+];
+
+fn adjustable() -> Vec<&'static str> {
+    let names = D1_SET.iter().map(|element| element.field.name);
+    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
+}
+
+/// Adds `by` to a parameter of a set in the unit of the tables; whether there is one.
+pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+    let mut orbit = Orbit { ephemeris: ephemeris.clone(), ..Orbit::blank(ephemeris.sv, ephemeris.toe) };
+    let found = add_to(&D1_SET, parameter, &mut orbit, by);
+    *ephemeris = orbit.ephemeris;
+    found
+}

@@ -1,0 +1,215 @@
+//! Finds bits and subframes in the soft values of code periods, whichever way up they come, and gathers sets.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::{
+    D1_D2, D1_PARTS, D1_SYMBOLS, D2_PAGE, D2_PARTS, D2_SYMBOLS, SUBFRAME_BITS, Subframe, chip, decode, given, id,
+    orbit_of, second, sent_at,
+};
+use crate::gnss::bits::Store;
+use crate::gnss::message::{Read, Reader};
+use crate::gnss::record::NavigationRow;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::{Epoch, WEEK_S};
+
+/// Bits over which the place of their edges is sought: half a second of D1, 0.2 s of D2.
+const D1_SOUGHT: u64 = 25;
+const D2_SOUGHT: u64 = 100;
+/// Share of the best place's energy that any other has at most: of the wrong places of D1's code the best has
+/// a ninth without noise, of D2's half.
+const NEXT_SHARE: f64 = 0.7;
+/// Subframes in a row that fail where they are expected before bits are sought anew.
+const FAILURES: u32 = 3;
+
+/// Reads D1 or D2, as the satellite's number says.
+#[derive(Clone, Debug)]
+pub struct D1D2Reader {
+    sv: Sv,
+    /// Symbols of a bit.
+    per_bit: usize,
+    /// The latest symbols, a bit at most; `next` numbers the one to come.
+    symbols: VecDeque<f32>,
+    next: u64,
+    /// Energies of bits by the residue of their last symbol, and how many symbols were taken for them.
+    energies: Vec<f64>,
+    sought: u64,
+    /// The residue of bits' last symbols.
+    edge: Option<u64>,
+    /// The latest bits, a subframe at most.
+    bits: VecDeque<bool>,
+    /// Number of the symbol after some subframe, and those that failed since the last one that did not.
+    frame: Option<u64>,
+    failures: u32,
+    /// The latest parts of a set: subframes of D1, pages of D2.
+    parts: BTreeMap<u8, Subframe>,
+    complete: Option<Vec<(&'static str, i64)>>,
+}
+
+impl D1D2Reader {
+    /// A reader that has read nothing.
+    pub fn new(sv: Sv) -> Self {
+        let per_bit = if sv.is_geostationary() { D2_SYMBOLS } else { D1_SYMBOLS };
+        Self {
+            sv,
+            per_bit,
+            symbols: VecDeque::with_capacity(per_bit),
+            next: 0,
+            energies: vec![0.0; per_bit],
+            sought: 0,
+            edge: None,
+            bits: VecDeque::with_capacity(SUBFRAME_BITS),
+            frame: None,
+            failures: 0,
+            parts: BTreeMap::new(),
+            complete: None,
+        }
+    }
+
+    fn is_d2(&self) -> bool {
+        self.per_bit == D2_SYMBOLS
+    }
+
+    /// Parts of a set.
+    fn wanted(&self) -> u8 {
+        (if self.is_d2() { D2_PARTS } else { D1_PARTS }) as u8
+    }
+
+    /// The latest symbols as one bit: positive for a logical 0.
+    fn bit(&self) -> f32 {
+        let chips = self.symbols.iter().enumerate();
+        chips.map(|(place, soft)| if !self.is_d2() && chip(place) { -soft } else { *soft }).sum()
+    }
+
+    /// Looks for the place of bits.
+    fn seek(&mut self) {
+        let energy = f64::from(self.bit()).powi(2);
+        let residue = (self.next - 1) % self.per_bit as u64;
+        if let Some(sum) = self.energies.get_mut(residue as usize) {
+            *sum += energy;
+        }
+        self.sought += 1;
+        let bits = if self.is_d2() { D2_SOUGHT } else { D1_SOUGHT };
+        if self.sought < bits * self.per_bit as u64 {
+            return;
+        }
+        let best = (0_u64..).zip(&self.energies).max_by(|a, b| a.1.total_cmp(b.1));
+        let Some((place, most)) = best.map(|(place, most)| (place, *most)) else { return };
+        let others = (0_u64..).zip(&self.energies).filter(|(other, _)| *other != place);
+        let next = others.fold(0.0_f64, |next, (_, energy)| next.max(*energy));
+        if next < NEXT_SHARE * most {
+            self.edge = Some(place);
+        }
+        self.energies.fill(0.0);
+        self.sought = 0;
+    }
+
+    /// Looks at the newest 300 bits as a subframe.
+    fn look(&mut self, near: Epoch) -> Vec<Read> {
+        if self.bits.len() < SUBFRAME_BITS {
+            return Vec::new();
+        }
+        let symbols = (SUBFRAME_BITS * self.per_bit) as u64;
+        let due = self.frame.map(|frame| self.next.abs_diff(frame).is_multiple_of(symbols));
+        if due == Some(false) {
+            return Vec::new();
+        }
+        let sent: Vec<bool> = self.bits.iter().copied().collect();
+        let turned: Vec<bool> = sent.iter().map(|bit| !bit).collect();
+        let found = decode(&sent).map(|found| (found, false)).or_else(|| Some((decode(&turned)?, true)));
+        let Some((subframe, inverted)) = found else {
+            self.failures += u32::from(due.is_some());
+            if self.failures >= FAILURES {
+                self.doubt();
+            }
+            return Vec::new();
+        };
+        (self.frame, self.failures) = (Some(self.next), 0);
+        self.read(subframe, inverted, near)
+    }
+
+    fn read(&mut self, subframe: Subframe, inverted: bool, near: Epoch) -> Vec<Read> {
+        // D2 says when its frame began, the first of five subframes.
+        let subframes = if self.is_d2() { u64::from(id(&subframe)) } else { 1 };
+        let symbols = subframes * (SUBFRAME_BITS * self.per_bit) as u64;
+        let early = planted!("gnss.beidou.second_read", 0, 6);
+        let of_week_s = (i64::from(second(&subframe)) + early) % WEEK_S;
+        let mut news = vec![Read::Unit { symbols, of_week_s, inverted }];
+        let part = match (self.is_d2(), id(&subframe)) {
+            (true, 1) => subframe.piece(D2_PAGE) as u8,
+            (false, number) => number,
+            (true, _) => 0,
+        };
+        if part == 1 {
+            news.push(Read::Time(sent_at(&subframe, self.is_d2(), near)));
+        }
+        if (1..=self.wanted()).contains(&part) {
+            self.parts.insert(part, subframe);
+            self.look_for_set(near, &mut news);
+        }
+        news
+    }
+
+    fn look_for_set(&mut self, near: Epoch, news: &mut Vec<Read>) {
+        let parts: Vec<Subframe> = self.parts.values().cloned().collect();
+        let Some(first) = parts.first().filter(|_| parts.len() == usize::from(self.wanted())) else { return };
+        let sent = sent_at(first, self.is_d2(), near);
+        let (orbit, content) = orbit_of(self.sv, &parts, sent);
+        let klobuchar = orbit.klobuchar;
+        let Some(set) = orbit.set() else { return };
+        // A set is sent from its reference time on: an older part is of the one before.
+        let toe_s = set.toe.tow_whole_s();
+        let is_later = |part: &Subframe| {
+            let since_s = (i64::from(second(part)) - toe_s + WEEK_S / 2).rem_euclid(WEEK_S) - WEEK_S / 2;
+            since_s >= 0
+        };
+        if !parts.iter().all(is_later) || self.complete.as_ref() == Some(&content) {
+            return;
+        }
+        let rows = NavigationRow::each(self.sv, D1_D2.name, u32::from(set.iode), content.clone()).collect();
+        news.push(Read::Ephemeris(Box::new(set)));
+        news.extend(given(klobuchar).map(Read::Ionosphere));
+        news.push(Read::Parameters(rows));
+        self.complete = Some(content);
+    }
+}
+
+impl Reader for D1D2Reader {
+    fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
+        if self.symbols.len() == self.per_bit {
+            self.symbols.pop_front();
+        }
+        self.symbols.push_back(soft);
+        self.next += 1;
+        if self.symbols.len() < self.per_bit {
+            return Vec::new();
+        }
+        let Some(edge) = self.edge else {
+            self.seek();
+            return Vec::new();
+        };
+        if (self.next - 1) % self.per_bit as u64 != edge {
+            return Vec::new();
+        }
+        if self.bits.len() == SUBFRAME_BITS {
+            self.bits.pop_front();
+        }
+        self.bits.push_back(self.bit() < 0.0);
+        self.look(near)
+    }
+
+    fn skip(&mut self) {
+        self.symbols.clear();
+        self.bits.clear();
+        self.doubt();
+    }
+
+    fn doubt(&mut self) {
+        (self.frame, self.failures, self.edge, self.sought) = (None, 0, None, 0);
+        self.energies.fill(0.0);
+        self.bits.clear();
+    }
+
+    fn missing(&self) -> Vec<u8> {
+        (1..=self.wanted()).filter(|part| !self.parts.contains_key(part)).collect()
+    }
+}
