@@ -7,7 +7,8 @@
 //! bit/s without it. Both are whole code periods a bit, so that here a symbol is what one code period
 //! carries: in D1 a bit times a chip of that code, in D2 half a bit. The message makes and reads them
 //! ([`super::d1d2`]), and one signal of one name serves all satellites. Limits: receivers that know the bit
-//! integrate over 20 ms; ours over one code period.
+//! integrate over 20 ms, ours over one code period; below some 38 dB-Hz its phase detector declares slips
+//! that are none.
 
 use crate::gnss::beidou::d1d2::D1_D2;
 use crate::gnss::satellite::System;

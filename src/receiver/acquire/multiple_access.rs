@@ -27,6 +27,11 @@ const CROWDED: f64 = 5.0;
 const MEDIAN_SPREAD: f64 = std::f64::consts::LOG2_E;
 /// Quantile of what the codes reach in crowded bins: few of them are those of satellites that are there.
 const REACHED: f64 = 0.9;
+/// Amplitudes of which more than a tenth of the codes lie beyond so many times the median, and so many
+/// deviations of noise, are those of satellites that are there: NavIC has fourteen codes and three satellites
+/// and more at one Doppler.
+const OWN_RATIO: f64 = 1.5;
+const OWN_DEVIATIONS: f64 = 4.0;
 /// Share of a bin's cells that a cross-correlation raises to its largest values, at least.
 const RAISED: f64 = 1.0 / 16.0;
 
@@ -92,7 +97,11 @@ impl Law {
         for bin in 0..bins {
             let (place, scale) = if image(bin) { self.image } else { self.circular };
             let mut column: Vec<f64> = heights.iter().filter_map(|code| code.get(bin).copied()).collect();
-            let median = quantile(&mut column, 0.5);
+            let mut median = quantile(&mut column, 0.5);
+            if stands_out(&column, median) {
+                column.retain(|height| !is_beyond_cross_correlation(*height, median));
+                median = quantile(&mut column, 0.5);
+            }
             if median > place + CROWDED * MEDIAN_SPREAD * scale / count.sqrt() {
                 crowded.push((bin, median.sqrt()));
                 beyond.extend(column.iter().map(|height| height.sqrt() - median.sqrt()));
@@ -110,6 +119,18 @@ impl Law {
         }
         bar
     }
+}
+
+/// Whether more codes than the quantile leaves room for are higher than cross-correlation explains.
+fn stands_out(column: &[f64], median: f64) -> bool {
+    let beyond = column.iter().filter(|height| is_beyond_cross_correlation(**height, median)).count();
+    beyond as f64 > (1.0 - REACHED) * column.len() as f64
+}
+
+/// Whether a cell is a satellite's own: cross-correlations of a family differ by the root of two in
+/// amplitude.
+fn is_beyond_cross_correlation(height: f64, median: f64) -> bool {
+    height.sqrt() > OWN_RATIO * median.sqrt() + OWN_DEVIATIONS
 }
 
 /// The value below which that share of the values lies; sorts them.
@@ -157,6 +178,26 @@ mod tests {
         assert!(crowded <= 1, "{crowded}");
         // Table of chi-square with 20 degrees: 1e-6/125829 is exceeded above 95.5.
         assert!((law.threshold - 95.5).abs() < 0.1, "{}", law.threshold);
+    }
+
+    #[test]
+    fn satellites_that_share_a_doppler_do_not_hide_each_other() {
+        // Fourteen codes, of which four are there at one Doppler and raise it for the other ten.
+        let law = Law::new(1e-6, 3069, 41, 10, 1.0);
+        let mut noise = Noise(23);
+        for present in [600.0, 1600.0] {
+            let heights: Vec<Vec<f64>> = (0..14)
+                .map(|code| {
+                    let own = if code < 4 { present } else { largest_of_raised(&mut noise, 3069, 5.0) };
+                    (0..41).map(|bin| if bin == 20 { own } else { largest(0.5, 3069.0) }).collect()
+                })
+                .collect();
+            let bar = law.bar(&heights, |_| false);
+            assert_eq!(bar.crowded, 1);
+            let others = heights.iter().skip(4).map(|code| code[20]).fold(0.0, f64::max);
+            // Over all others, and far below the four.
+            assert!((others..0.5 * present).contains(&bar.thresholds[20]), "{} {others}", bar.thresholds[20]);
+        }
     }
 
     /// Largest of `cells` sums of ten powers, a quarter of which has an amplitude of `raised` over all
