@@ -148,6 +148,19 @@ fn navic_alone_finds_its_place_by_four_satellites_that_turn_with_the_earth() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
+/// BeiDou's bars: half a metre by B1I of satellites in all three kinds of orbits, with D1 and D2;
+/// frames begin 5 s after the start: sets of D1 are whole 18 s later.
+#[test]
+fn beidou_alone_finds_its_place_by_both_messages() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/beidou.toml");
+    let summary = run_with(&path, &["--check".as_ref()]);
+    found_and_decoded_what_is_there(&summary);
+    at_most(&summary, "/position/horizontal_p95_m", 0.5);
+    at_most(&summary, "/position/first_fix_s", 26.0);
+    assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
+    assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
+}
+
 #[test]
 fn real_samples_at_an_if_with_a_mirrored_spectrum_close_the_loop_as_well() {
     let scene = include_str!("../scenarios/static.toml")
