@@ -240,8 +240,8 @@ fn broadcast_orbits_meet_precise_ones() {
     let (mut square, mut points, mut satellites) = (0.0, 0, Vec::new());
     for (at, places) in sp3_columns(&precise, "C") {
         for (sv, (position_m, _)) in places {
-            let own = sets.iter().filter(|set| set.sv == sv && set.is_healthy());
-            let near = own.filter(|set| (0.0..=3600.0).contains(&at.since(set.toe))).next_back();
+            let is_near = |set: &&Ephemeris| (0.0..=3600.0).contains(&at.since(set.toe));
+            let near = sets.iter().rfind(|set| set.sv == sv && set.is_healthy() && is_near(set));
             let Some(set) = near else { continue };
             let off_m = (set.state(at).unwrap().position_m - position_m).norm();
             assert!(off_m < 20.0, "{sv} {at}: {off_m}");
