@@ -11,7 +11,6 @@ use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::stream::{Fronts, Options};
 use gnss_twin::generator::truth;
-use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::earth::Geodetic;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::record::{Event, Fix, IonosphereModel, Observation, TrajectoryRow};
@@ -19,7 +18,7 @@ use gnss_twin::gnss::samples::IfMetadata;
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::signal::{Carrier, Signal, register};
 use gnss_twin::receiver::output::Record;
-use gnss_twin::receiver::position::{CodeNoise, Solver};
+use gnss_twin::receiver::position::{CodeNoise, Sets, Solver};
 use gnss_twin::receiver::settings::Settings;
 use gnss_twin::receiver::track::loops::CodeShape;
 use gnss_twin::receiver::{Outcome, Receiver};
@@ -203,9 +202,8 @@ fn fixes_from_two_carriers_have_the_covariance_that_they_state() {
         .filter(|row| row.sample == path[0].sample)
         .collect();
     let scene = &scenes[0];
-    let sets: BTreeMap<Sv, Ephemeris> = (first.iter())
-        .filter_map(|row| Some((row.sv, scene.catalogue.sent_at(row.sv, scene.clock.start)?.clone())))
-        .collect();
+    let sets: Sets =
+        (first.iter()).filter_map(|row| scene.catalogue.sent_at(row.sv, scene.clock.start).cloned()).collect();
     let noise = CodeNoise { chip_m: 293.05, shape: CodeShape::triangle(0.5), bandwidth_hz: 0.5, integration_s: 0.004 };
     let mut settings = settings("combined").position;
     settings.smoothing_s = 0.0;

@@ -161,6 +161,13 @@ impl Catalogue {
         sets.iter().min_by(|a, b| a.toe.since(at).abs().total_cmp(&b.toe.since(at).abs()))
     }
 
+    /// Whether `sv` sends a set at `at` that calls no signal of its system among `signals` healthy.
+    pub fn is_sick(&self, sv: Sv, at: Epoch, signals: &[&'static Signal]) -> bool {
+        let own = || signals.iter().filter(|signal| signal.system == sv.system);
+        let good = |set: &Ephemeris, signal: &Signal| set.is_healthy_on(signal).unwrap_or(set.is_healthy());
+        self.sent_at(sv, at).is_some_and(|set| !own().any(|signal| good(set, signal)))
+    }
+
     /// Whether `sv` sends a set at `at` that says it is healthy.
     pub fn healthy(&self, sv: Sv, at: Epoch) -> bool {
         self.sent_at(sv, at).is_some_and(|set| set.is_healthy())
@@ -189,7 +196,7 @@ impl Catalogue {
     /// From the group delays of the broadcast sets, through hand-overs as smoothly as the clock.
     pub fn signal_clock_s(&self, sv: Sv, at: Epoch, signal: &Signal) -> f64 {
         let sets = self.satellites.get(&sv).into_iter().flat_map(|timeline| weights(timeline, at));
-        sets.fold(0.0, |sum, (set, weight, _)| sum + (set.tgd_s - set.group_delay_s(signal)) * weight)
+        sets.fold(0.0, |sum, (set, weight, _)| sum + (set.given_delay_s() - set.group_delay_s(signal)) * weight)
     }
 
     /// The broadcast sets' orbit and clock; twice continuously differentiable across hand-overs.

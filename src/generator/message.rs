@@ -76,8 +76,8 @@ pub enum Kind {
         /// Symbol of the word, from 1.
         bit: u8,
     },
-    /// The bits of health (IS-GPS-200N, 20.3.3.3.1.4).
-    Health(u8),
+    /// The bits of health ([`Ephemeris::health`]).
+    Health(u16),
     /// A parameter of a set of elements by its name in the message's table, wrong by `add` in its unit.
     Parameter {
         /// Name in the message's table.
@@ -172,7 +172,7 @@ impl MessageFault {
     }
 }
 
-/// The set that `sv` sends as `message` at `start` under `faults`, where they spoil it.
+/// The set that `sv` sends as `message` at `start` under `faults`, where they spoil it, in that form.
 pub fn spoiled(
     faults: &[MessageFault],
     message: &Message,
@@ -180,10 +180,11 @@ pub fn spoiled(
     ephemeris: &Ephemeris,
     start: Epoch,
 ) -> Option<Ephemeris> {
-    let mut changed = ephemeris.clone();
+    let set = (message.form)(ephemeris);
+    let mut changed = set.clone();
     let own = faults.iter().filter(|fault| fault.concerns(sv));
     own.for_each(|fault| fault.spoil(message, &mut changed, start));
-    (changed != *ephemeris).then_some(changed)
+    (changed != set).then_some(changed)
 }
 
 /// The unit of a slot that the satellite of `ephemeris` sends under `faults`.
@@ -198,7 +199,8 @@ pub fn unit(
 ) -> Result<Sent, FieldError> {
     let Slot { message, time, unit } = *slot;
     let sv = ephemeris.sv;
-    let changed = spoiled(faults, message, sv, ephemeris, slot.start()).unwrap_or_else(|| ephemeris.clone());
+    let spoiled = spoiled(faults, message, sv, ephemeris, slot.start());
+    let changed = spoiled.unwrap_or_else(|| (message.form)(ephemeris));
     let encoded = sender.unit(&changed.timed(|at| time.label(at)), message.unit_start(unit))?;
     let is_alert = |fault: &MessageFault| fault.kind == Kind::Alert && fault.on.contains(&slot.start());
     let alert = faults.iter().any(|fault| fault.concerns(sv) && is_alert(fault));

@@ -2,7 +2,7 @@
 //!
 //! A field is read and written through the same entry of a table, so that encoder and decoder cannot differ.
 //! What holds the bits is a [`Store`]: ten words with parity of GPS LNAV, a word of 128 bits of Galileo
-//! I/NAV.
+//! I/NAV, bit by bit a longer message.
 
 use thiserror::Error;
 
@@ -66,6 +66,19 @@ impl<const N: usize> Store for Bits<N> {
         for (shift, place) in (0..u32::from(length)).rev().zip(places) {
             *place = value >> shift & 1 == 1;
         }
+    }
+}
+
+/// A bit each, counted from 0.
+impl Store for Vec<bool> {
+    fn piece(&self, (first, length): (u16, u8)) -> u32 {
+        let own = self.iter().skip(usize::from(first)).take(usize::from(length));
+        own.fold(0, |all, &bit| all << 1 | u32::from(bit))
+    }
+
+    fn set_piece(&mut self, (first, length): (u16, u8), value: u32) {
+        let own = self.iter_mut().skip(usize::from(first)).take(usize::from(length));
+        own.zip(bits_of(u128::from(value), usize::from(length))).for_each(|(slot, bit)| *slot = bit);
     }
 }
 
@@ -345,6 +358,11 @@ mod tests {
                 // Put back what was there: nothing else had changed.
                 bits.set_piece((first, length), ground as u32);
                 assert_eq!(bits, ground, "{first} {length}");
+                let mut each = vec![ground != 0; 128];
+                each.set_piece((first, length), value);
+                assert_eq!(each.piece((first, length)), value, "{first} {length}");
+                each.set_piece((first, length), ground as u32);
+                assert!(each.iter().all(|bit| *bit == (ground != 0)), "{first} {length}");
             }
         }
     }

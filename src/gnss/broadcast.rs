@@ -12,11 +12,17 @@ use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, WEEK_S};
 
+mod form;
+
+pub use form::{PLAIN, SetForm, status_of_record};
+
 /// A set of broadcast elements of one satellite, in SI units and radians.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ephemeris {
     /// The satellite.
     pub sv: Sv,
+    /// What clock and health mean in the message that it is of.
+    pub form: &'static SetForm,
     /// Reference time of the orbit.
     pub toe: Epoch,
     /// Reference time of the clock.
@@ -30,10 +36,10 @@ pub struct Ephemeris {
     pub iodc: u16,
     /// User range accuracy index, 0..=15 (IS-GPS-200N, 20.3.3.3.1.3); SISA index of Galileo.
     pub ura_index: u8,
-    /// Six bits of which 0 is healthy: those of IS-GPS-200N, 20.3.3.3.1.4; of Galileo, from the lowest bit
-    /// on, data validity (1) and health (2) of E1-B, then those of E5b; of NavIC the flags of S and L5. See
-    /// [`Self::is_healthy`].
-    pub health: u8,
+    /// Bits of which 0 is healthy: the six of IS-GPS-200N, 20.3.3.3.1.4; of Galileo, from the lowest bit on,
+    /// data validity (1) and health (2) of E1-B, then those of E5b, then those of E5a; of NavIC the flags of
+    /// S and L5. See [`Self::is_healthy`].
+    pub health: u16,
     /// Codes on L2: 1 for P, 2 for C/A (IS-GPS-200N, 20.3.3.3.1.2).
     pub l2_codes: u8,
     /// Whether P on L2 has no message (IS-GPS-200N, 20.3.3.3.1.6).
@@ -224,6 +230,7 @@ impl Ephemeris {
     pub fn blank(sv: Sv, at: Epoch) -> Self {
         Self {
             sv,
+            form: &PLAIN,
             toe: at,
             toc: at,
             transmitted: at,
@@ -387,26 +394,24 @@ impl Ephemeris {
         ClockState { offset_s: clock.offset_s - self.given_delay_s(), ..clock }
     }
 
-    /// The group delay as the message gives it.
-    fn given_delay_s(&self) -> f64 {
-        planted!("gnss.clock.group_delay", self.tgd_s, -self.tgd_s)
+    /// The group delay on the carrier of which the message gives it.
+    pub fn given_delay_s(&self) -> f64 {
+        let given_s = (self.form.given_delay_s)(self);
+        planted!("gnss.clock.group_delay", given_s, -given_s)
     }
 
-    /// By how much less than [`Self::clock`] the clock reads for a user of `signal` alone.
-    ///
-    /// A signal without a delay of its own has T_GD · (f_L1/f)²: the clock is that of two carriers whose
-    /// combination is free of what goes with 1/f² (IS-GPS-200N, 20.3.3.3.3.2, equation for L2). NavIC's T_GD
-    /// is that of S (IRNSS SIS ICD for SPS 1.1, user algorithms). BeiDou's clock is that of B3I.
+    /// By how much less than [`Self::clock`] the clock reads for a user of `signal` alone: its own delay
+    /// where the set has one, or else what its message makes of the delays that it has.
     pub fn group_delay_s(&self, signal: &Signal) -> f64 {
         let own = self.signal_delays_s.iter().find(|(name, _)| *name == signal.name);
+        own.map_or_else(|| (self.form.group_delay_s)(self, signal), |(_, delay_s)| *delay_s)
+    }
+
+    /// (f/f_signal)² with the carrier on which the message gives its delay: that of L1, and of NavIC that of
+    /// S (IRNSS SIS ICD for SPS 1.1, user algorithms).
+    pub fn dispersion(&self, signal: &Signal) -> f64 {
         let ratio = Constants::of(self.sv.system).delay_carrier_hz / signal.carrier_hz(self.sv);
-        let of_carrier = || match (self.sv.system, signal.carrier_hz(self.sv)) {
-            (System::BeiDou, B1I_HZ) => self.given_delay_s(),
-            (System::BeiDou, B2I_HZ) => self.tgd2_s,
-            (System::BeiDou, _) => 0.0,
-            _ => self.given_delay_s() * (ratio * ratio),
-        };
-        own.map_or_else(of_carrier, |(_, delay_s)| *delay_s)
+        ratio * ratio
     }
 
     /// The clock as a user of `signal` alone meets it.
@@ -418,12 +423,14 @@ impl Ephemeris {
         Ok(ClockState { offset_s: clock.offset_s - self.group_delay_s(signal), ..clock })
     }
 
-    /// Whether the satellite says that its signal on L1 or E1 may be used; of NavIC both, on L5 and S.
+    /// Whether the satellite says that its signal on L1 or E1 may be used, or the one that its message is of.
     pub fn is_healthy(&self) -> bool {
-        match self.sv.system {
-            System::Galileo => self.health & 0b111 == 0,
-            _ => self.health == 0,
-        }
+        (self.form.is_healthy)(self)
+    }
+
+    /// Whether the satellite says that `signal` may be used; `None` where the set says nothing of it.
+    pub fn is_healthy_on(&self, signal: &Signal) -> Option<bool> {
+        (self.form.healthy)(self, signal)
     }
 
     /// Whether sets go on the air after their reference time, and not hours before it as those of GPS do.
@@ -548,6 +555,7 @@ mod tests {
         let toe = Epoch::from_week(1590, 345_600.0);
         Ephemeris {
             sv: Sv::gps(2),
+            form: &PLAIN,
             toe,
             toc: toe,
             transmitted: toe,

@@ -10,7 +10,7 @@
 use std::fmt;
 
 use crate::gnss::bits::FieldError;
-use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::gps::lnav::UtcData;
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
@@ -50,6 +50,11 @@ pub struct Message {
     pub parameters: fn(&[bool]) -> Option<(bool, Parameters)>,
     /// A reader of what a satellite sends.
     pub reader: fn(Sv) -> Box<dyn Reader>,
+    /// The set that satellites send in this form, of one in the form of another of their messages: orbits
+    /// are the same, clocks differ by group delays.
+    pub form: fn(&Ephemeris) -> Ephemeris,
+    /// What clock and health of its sets mean.
+    pub sets: &'static SetForm,
     /// The set that a receiver decodes when this one is sent.
     pub quantised: fn(&Ephemeris) -> Result<Ephemeris, FieldError>,
     /// Names of the parameters of a set that may be wrong with a right check: all but those that distinguish

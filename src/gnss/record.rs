@@ -308,6 +308,21 @@ pub struct SightRow {
     pub used: bool,
 }
 
+/// The ionosphere on the way from a satellite as two of its carriers show it: `rx/ionosphere.csv`, of fixes
+/// with a satellite on two bands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IonosphereRow {
+    /// That of the fix.
+    pub sample: u64,
+    /// The satellite.
+    pub sv: Sv,
+    /// Group delay on 1575.42 MHz, smoothed by the carriers. What the receiver's bands are apart, seen on
+    /// that carrier, is in it, alike for all satellites of the same signals.
+    pub delay_m: f64,
+    /// Standard deviation by thermal noise.
+    pub sigma_m: f64,
+}
+
 /// The receiver's clock against one time scale: `rx/clocks.csv`, of fixes with another than GPS time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClockRow {

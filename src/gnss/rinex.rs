@@ -1,6 +1,6 @@
-//! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV, Galileo I/NAV and NavIC, the
-//! coefficients of these systems' ionosphere, times of GPS and Galileo against each other and UTC, and the
-//! leap seconds.
+//! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV, Galileo I/NAV (or F/NAV of satellites
+//! that have no I/NAV) and NavIC, the coefficients of these systems' ionosphere, times of GPS and Galileo
+//! against each other and UTC, and the leap seconds.
 //!
 //! Source: RINEX 2.11, table A4; RINEX 3.05, tables A6, A8 and A18; RINEX 4.02. Lines and columns are read in
 //! `columns`; `elements` holds every element against the range of its field in the message. A record that
@@ -9,12 +9,15 @@
 mod columns;
 mod elements;
 
+use std::collections::BTreeSet;
+
 use thiserror::Error;
 
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::LeapEvent;
 use crate::gnss::inflate::{InflateError, inflate};
 use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
 
 /// Largest file that is read, in bytes after decompression.
@@ -23,7 +26,8 @@ pub const LARGEST_BYTES: u64 = 256 << 20;
 /// What a navigation file says about GPS, Galileo, NavIC and BeiDou.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Navigation {
-    /// Sets of GPS LNAV, Galileo I/NAV, NavIC and BeiDou D1 or D2 by satellite and time of clock.
+    /// Sets of GPS LNAV, Galileo I/NAV, NavIC and BeiDou D1 or D2 by satellite and time of clock; of a
+    /// Galileo satellite without any of I/NAV those of F/NAV.
     pub ephemerides: Vec<Ephemeris>,
     /// Coefficients of GPS's model of the ionosphere, where the header has them.
     pub klobuchar: Option<Klobuchar>,
@@ -122,7 +126,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     check_first_line(&text, name)?;
     let contents = columns::read(&text).map_err(|detail| NavigationError::Damaged { name: name.to_owned(), detail })?;
     let columns::Contents {
-        records,
+        mut records,
         klobuchar,
         klobuchar_navic,
         klobuchar_beidou,
@@ -131,9 +135,14 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
         leap_event,
         utc,
         galileo,
-        others,
+        mut others,
         reasons,
     } = contents;
+    // One clock of a satellite: that of I/NAV, from which the other's follows.
+    let before = records.len();
+    let with_inav: BTreeSet<Sv> = records.iter().filter(|record| !record.is_fnav).map(|record| record.sv).collect();
+    records.retain(|record| !record.is_fnav || !with_inav.contains(&record.sv));
+    others += before - records.len();
     let leap_event = leap_event.map(|(after_s, week, day)| LeapEvent { after_s, week, day });
     let mut navigation = Navigation {
         klobuchar,
@@ -283,7 +292,6 @@ fn check_first_line(text: &[u8], name: &str) -> Result<(), NavigationError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::satellite::Sv;
 
     #[test]
     fn the_embedded_day_reads_whole() {

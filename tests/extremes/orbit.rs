@@ -154,7 +154,7 @@ fn an_old_set_is_sent_by_no_satellite_and_used_by_no_receiver() {
             0,
             SampleClock { start: at, rate },
             &seen,
-            &sets,
+            &sets.values().cloned().collect(),
             None,
         );
         matches!(found, Err(NoFix::TooFew { have: 0, .. }))

@@ -113,7 +113,7 @@ pub const ORDER: Order<'static> = &[
     (
         "analysis/measure",
         &[
-            &["allan", "errors", "independent", "lines", "psd", "spoofing"],
+            &["allan", "errors", "independent", "ionosphere", "lines", "psd", "spoofing"],
             &["clock", "consistency", "elevation", "jitter"],
             &["slips"],
         ],

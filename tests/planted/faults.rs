@@ -24,6 +24,10 @@ const NAVIC_CODES: &str = "witness::navic::all_chips_of_all_codes_are_those_of_a
 const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_either_way_up_to_what_was_sent";
 const REDUNDANT: &str = "witness::redundancy::real_words_17_to_20_are_the_redundancy_of_the_real_words_1_to_4";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
+const E5_PAGES: &str = "witness::fnav::shipped_pages_of_e5a_and_e5b_hold_and_are_sent_by_us_bit_by_bit";
+const E5_CODES: &str = "witness::codes::all_chips_of_all_codes_and_overlays_of_e5_are_those_of_another_program";
+const TWO_BANDS: &str =
+    "laws::two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_place_without_it";
 const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_place_and_a_clock_of_each";
 const OFFSET: &str = "laws::with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_time";
 const PAGES: &str =
@@ -179,6 +183,12 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.velocity.frame", "velocity forgets that the axes turn", EXACT),
     fault("receiver.velocity.satellite_drift", "velocity takes another drift for the satellites' clocks", EXACT),
     fault("receiver.velocity.drift_sign", "the clock's drift has the wrong sign", EXACT),
+    fault("gnss.e5.registers", "the second registers of E5 give the other bit", E5_CODES),
+    fault("gnss.fnav.clock", "the clock of F/NAV is on the other side of that of I/NAV", E5_PAGES),
+    fault("gnss.fnav.page_order", "pages of F/NAV come one place early", E5_PAGES),
+    fault("gnss.inav.word_order_e5b", "words on E5b come one page early", E5_PAGES),
+    fault("receiver.position.dispersion", "the ionosphere is weighted as on the other carrier", TWO_BANDS),
+    fault("receiver.position.dispersion_delay", "group delays enter the ionosphere with the wrong sign", TWO_BANDS),
     fault("analysis.errors.join", "observations are joined with the satellite's first epoch", JOBS),
     fault("analysis.errors.code_scale", "code errors are halved", JOBS),
     fault("analysis.errors.doppler", "Doppler errors are zero", JOBS),

@@ -1,8 +1,6 @@
 //! Laws that need no samples: the position solution against the generator's own geometry, covariances against
 //! a plain inversion, effects and statistics against their definitions.
 
-use std::collections::BTreeMap;
-
 use gnss_twin::analysis::expect::theory::{dll, pll};
 use gnss_twin::analysis::statistics;
 use gnss_twin::generator::catalogue::Catalogue;
@@ -14,7 +12,6 @@ use gnss_twin::generator::effect::troposphere::{Air, Troposphere, Weather};
 use gnss_twin::generator::ray::{Effect, Ray};
 use gnss_twin::generator::sky::{Emission, emission};
 use gnss_twin::generator::vehicle::Motion;
-use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::ionosphere::Coefficients;
@@ -22,10 +19,10 @@ use gnss_twin::gnss::klobuchar::Klobuchar;
 use gnss_twin::gnss::record::Observation;
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::Signal;
+use gnss_twin::gnss::signal::{Carrier, Signal};
 use gnss_twin::gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
 use gnss_twin::receiver::position::smooth::Smoother;
-use gnss_twin::receiver::position::{CodeNoise, NoFix, PositionSettings, Solver, SystemClocks};
+use gnss_twin::receiver::position::{CodeNoise, NoFix, PositionSettings, Sets, Solver, SystemClocks};
 use gnss_twin::receiver::track::loops::CodeShape;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -122,9 +119,9 @@ impl Ideal {
         healthy.filter_map(|sv| self.observation(sv, sample)).collect()
     }
 
-    fn ephemerides(&self) -> BTreeMap<Sv, Ephemeris> {
+    fn ephemerides(&self) -> Sets {
         let at = self.clock.epoch(SAMPLE);
-        self.catalogue.satellites().filter_map(|sv| Some((sv, self.catalogue.sent_at(sv, at)?.clone()))).collect()
+        self.catalogue.satellites().filter_map(|sv| self.catalogue.sent_at(sv, at).cloned()).collect()
     }
 
     fn solver(&self, settings: &PositionSettings) -> Solver {
@@ -171,6 +168,46 @@ fn two_systems_whose_times_differ_give_one_place_and_a_clock_of_each() {
     // What is behind a clock that is ahead by so much.
     assert!((own_s - BIAS_S).abs() < 4e-11 && (other_s - (BIAS_S - AHEAD_S)).abs() < 4e-11, "{clocks:?}");
     assert_eq!(solved.fix.freedom() as usize, observations.len() - 5);
+}
+
+/// L1 C/A on the carrier of L5.
+static BAND: Signal = Signal { name: "other band", carrier: Carrier::Common(1_176.45e6), ..L1_CA };
+
+#[test]
+fn two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_place_without_it() {
+    let ideal = Ideal::new();
+    let local = ideal.clock.epoch(SAMPLE);
+    let mut true_m: Vec<(Sv, f64)> = Vec::new();
+    let mut apart_m = 0.0_f64;
+    let mut both = Vec::new();
+    for first in ideal.observations(SAMPLE) {
+        let (found, _) = ideal.arriving(first.sv, local).unwrap();
+        let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
+        ideal.effects[0].act(&found.sight, &L1_CA, &mut rays);
+        let ionosphere_m = SPEED_OF_LIGHT_MPS * rays[0].code_delay_s;
+        let gamma = (154.0_f64 / 115.0).powi(2);
+        let ahead_m = SPEED_OF_LIGHT_MPS * ideal.catalogue.signal_clock_s(first.sv, local, &BAND);
+        let pseudorange_m = first.pseudorange_m + (gamma - 1.0) * ionosphere_m - ahead_m;
+        let sent = local.plus_s(-pseudorange_m / SPEED_OF_LIGHT_MPS);
+        apart_m = apart_m.max(ahead_m.abs());
+        true_m.push((first.sv, ionosphere_m));
+        let (sent_s, sent_fraction_s) = (sent.seconds(), sent.fraction());
+        both.push(Observation { signal: &BAND, sent_s, sent_fraction_s, pseudorange_m, ..first.clone() });
+        both.push(first);
+    }
+    let noises = vec![(&L1_CA, noise()), (&BAND, noise())];
+    let mut solver = Solver::new(&PositionSettings::default(), noises, ideal.clock.rate);
+    let solved = solver.solve(SAMPLE, ideal.clock, &both, &ideal.ephemerides(), None).unwrap();
+    // Group delays of metres would show.
+    assert!(apart_m > 2.0 && solved.ionosphere.len() == true_m.len(), "{apart_m}");
+    for (row, (sv, delay_m)) in solved.ionosphere.iter().zip(&true_m) {
+        // Differences of two ranges of 2.5e7 m, each to 4e-9 m.
+        assert!(row.sv == *sv && (row.delay_m - delay_m).abs() < 1e-6, "{row:?} {delay_m}");
+    }
+    let truth = ideal.motion(local.plus_s(-BIAS_S));
+    // The atmosphere's millimetre a satellite again; the clock is that of the combination.
+    assert!((solved.fix.position_m() - truth.position_m).norm() < 8e-3);
+    assert!((solved.fix.clock_bias_s - BIAS_S).abs() < 4e-11, "{}", solved.fix.clock_bias_s);
 }
 
 #[test]

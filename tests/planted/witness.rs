@@ -13,6 +13,8 @@ mod beidou;
 mod codes;
 #[path = "../witness/data.rs"]
 mod data;
+#[path = "../witness/fnav.rs"]
+mod fnav;
 #[path = "../witness/inav.rs"]
 mod inav;
 #[path = "../witness/lnav.rs"]

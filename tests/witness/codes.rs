@@ -1,7 +1,9 @@
 //! Every chip of every code against digests that another program computed from the same tables.
 
 use gnss_twin::gnss::galileo::e1::{self, Code};
+use gnss_twin::gnss::galileo::e5;
 use gnss_twin::gnss::gps::l1ca::{CODE_CHIPS, code};
+use gnss_twin::gnss::signal::Overlay;
 use sha2::{Digest, Sha256};
 
 /// PRN, ones, first and last 24 chips in hexadecimal, SHA-256 of a byte 0 or 1 for each chip.
@@ -37,6 +39,40 @@ fn all_chips_of_all_memory_codes_are_those_of_another_program() {
         codes += 1;
     }
     assert_eq!(codes, 100);
+}
+
+/// The same, and the overlays of 100 chips as `CS100`.
+const REGISTER_CODES: &str = include_str!("../../data/witness/e5_codes.csv");
+
+#[test]
+fn all_chips_of_all_codes_and_overlays_of_e5_are_those_of_another_program() {
+    let mut codes = 0;
+    for line in REGISTER_CODES.lines().skip(1) {
+        let column: Vec<&str> = line.split(',').collect();
+        let number = column[1].parse().unwrap();
+        let signs = match column[0] {
+            "E5AI" => e5::code(e5::Code::E5aData, number),
+            "E5AQ" => e5::code(e5::Code::E5aPilot, number),
+            "E5BI" => e5::code(e5::Code::E5bData, number),
+            "E5BQ" => e5::code(e5::Code::E5bPilot, number),
+            _ => e5::overlay(number),
+        };
+        let chips: Vec<u8> = signs.unwrap().into_iter().map(|sign| u8::from(sign < 0)).collect();
+        holds(&chips, &column[2..], line);
+        codes += 1;
+    }
+    assert_eq!(codes, 300);
+    assert!(e5::code(e5::Code::E5aData, 0).is_none() && e5::code(e5::Code::E5aData, 51).is_none());
+    assert!(e5::overlay(0).is_none() && e5::overlay(101).is_none());
+    // Which satellite has which overlay, and those of the data (Galileo OS SIS ICD 2.1, tables 17 to 19).
+    let chips = |overlay: &Overlay, number| overlay.of(number).unwrap();
+    for number in [1, 17, 50] {
+        assert_eq!(chips(&e5::E5A.components[1].overlay, number), e5::overlay(number).unwrap());
+        assert_eq!(chips(&e5::E5B.components[1].overlay, number), e5::overlay(number + 50).unwrap());
+    }
+    let word = |chips: Vec<i8>| chips.iter().fold(0, |word, chip| word << 1 | u32::from(*chip < 0));
+    assert_eq!(word(chips(&e5::E5A.components[0].overlay, 1)), 0x842E9);
+    assert_eq!(word(chips(&e5::E5B.components[0].overlay, 1)), 0xE);
 }
 
 /// The number of ones, the first and last 24 chips and the digest of a code.

@@ -78,7 +78,7 @@ fn rinex_records(text: &str) -> Vec<Ephemeris> {
             transmitted: Epoch::from_week(week, v(7, 0)),
             iodc: v(6, 3) as u16,
             ura_index: ura_index(v(6, 0)),
-            health: v(6, 1) as u8,
+            health: v(6, 1) as u16,
             l2_codes: v(5, 1) as u8,
             l2_p_data_off: v(5, 3) != 0.0,
             long_fit: v(7, 1) > 4.0 || v(7, 1) == 1.0,
@@ -219,6 +219,7 @@ fn example() -> Ephemeris {
     let toe = Epoch::from_week(2353, 583_200.0);
     Ephemeris {
         sv: Sv::gps(5),
+        form: &lnav::LNAV_SETS,
         toe,
         toc: toe,
         transmitted: Epoch::from_week(2353, 576_000.0),

@@ -165,7 +165,7 @@ fn real_subframes_are_those_of_their_time_and_satellites_and_are_sent_by_us_bit_
                     "week" => {}
                     "ura_index" => set.ura_index = raw as u8,
                     "iodec" => set.iode = raw as u16,
-                    "health" => set.health = raw as u8,
+                    "health" => set.health = raw as u16,
                     "toc_s" => set.toc = start.nearest_tow(field.value(raw) as i64),
                     _ => assert!((SPS_NAV.adjust)(&mut set, name, field.value(raw)), "{name}"),
                 }

@@ -301,7 +301,7 @@ impl Theory {
         }
         let pll = exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s)?;
         let made_for = exact_loop(settings.dll_order, settings.dll_bandwidth_hz * update_s)?;
-        let width_chips = chip_rate_hz / run.scene.sample_rate_hz;
+        let width_chips = chip_rate_hz / run.rate_hz(link.signal);
         let of_replica = u32::from(settings.averaged_replica);
         let of_signal = u32::from(run.scene.code_edge == Edge::Area);
         let peak = |waveform: &Waveform| Peak::new(waveform, width_chips, of_replica + of_signal);

@@ -10,17 +10,18 @@ use crate::analysis::read::Run;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::message::Message as Form;
-use crate::gnss::record::{Event, NavigationRow};
+use crate::gnss::record::{Event, EventRow, NavigationRow};
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Link;
 use crate::gnss::time::{Epoch, TimeScale};
 
 /// What all satellites sent.
 #[derive(Clone, Debug, Default)]
 pub struct Message {
-    /// With their issues.
-    sets: BTreeMap<Sv, Vec<(u32, Ephemeris)>>,
+    /// Of each satellite those of each message, with their issues.
+    sets: BTreeMap<(Sv, &'static str), Vec<(u32, Ephemeris)>>,
     /// From which sample on the receiver had which issue, ascending.
-    read: BTreeMap<Sv, Vec<(u64, u32)>>,
+    read: BTreeMap<(Sv, &'static str), Vec<(u64, u32)>>,
     /// The ionosphere's coefficients, where they were sent: one of a model.
     ionospheres: Vec<Coefficients>,
 }
@@ -41,8 +42,9 @@ impl Message {
             // What a set has beside its issue is sent for all issues alike.
             let common = groups.get(&(*sv, *name, 0)).into_iter().flatten();
             let all: Vec<&NavigationRow> = rows.iter().chain(common).copied().collect();
-            if let Some(set) = set(run, (*sv, name, *issue), &all, near).filter(|set| u32::from(set.iode) == *issue) {
-                message.sets.entry(*sv).or_default().push((*issue, set));
+            let found = set(run, (*sv, name, *issue), &all, near);
+            if let Some((name, set)) = found.filter(|(_, set)| u32::from(set.iode) == *issue) {
+                message.sets.entry((*sv, name)).or_default().push((*issue, set));
             }
             if let Some(found) = ionosphere(run, (*sv, name), rows)
                 && message.ionosphere(found.model()).is_none()
@@ -50,7 +52,7 @@ impl Message {
                 message.ionospheres.push(found);
             }
         }
-        message.read = message.sets.keys().map(|sv| (*sv, read(run, *sv))).collect();
+        message.read = message.sets.keys().map(|of| (*of, read(run, *of))).collect();
         message
     }
 
@@ -59,32 +61,39 @@ impl Message {
         self.ionospheres.iter().find(|sent| sent.model() == model)
     }
 
-    /// Whether every set of a satellite says that it is healthy.
-    pub fn says_healthy(&self, sv: Sv) -> bool {
-        self.sets.get(&sv).is_none_or(|sets| sets.iter().all(|(_, set)| set.is_healthy()))
+    /// Whether no set of a satellite says that a signal must not be used.
+    pub fn says_healthy(&self, link: Link) -> bool {
+        let mut own = self.sets.iter().filter(|((sv, _), _)| *sv == link.sv).flat_map(|(_, sets)| sets);
+        own.all(|(_, set)| set.is_healthy_on(link.signal) != Some(false))
     }
 
-    /// The set of a satellite that the receiver had read last at `sample`, or else the one whose reference
-    /// time is nearest to `at`.
-    pub fn ephemeris(&self, sv: Sv, (sample, at): (u64, Epoch)) -> Option<&Ephemeris> {
-        let sets = self.sets.get(&sv)?;
-        let last = self.read.get(&sv).and_then(|read| read.iter().rev().find(|(since, _)| *since <= sample));
+    /// Of the sets of a satellite that serve a signal, those of a message that it carries first, the one that
+    /// the receiver had read last at `sample`, or else the one whose reference time is nearest to `at`.
+    pub fn ephemeris(&self, link: Link, (sample, at): (u64, Epoch)) -> Option<&Ephemeris> {
+        let serves = |(_, set): &(u32, Ephemeris)| (set.form.serves)(link.signal);
+        let carried = |name: &str| link.signal.components.iter().any(|c| c.message.is_some_and(|m| m.name == name));
+        let own = || self.sets.iter().filter(|((sv, _), sets)| *sv == link.sv && sets.iter().any(serves));
+        let (of, sets) = own().find(|((_, name), _)| carried(name)).or_else(|| own().next())?;
+        let last = self.read.get(of).and_then(|read| read.iter().rev().find(|(since, _)| *since <= sample));
         let issued = last.and_then(|(_, issue)| sets.iter().find(|(other, _)| other == issue));
         let age_s = |(_, set): &&(u32, Ephemeris)| at.since(set.toe).abs();
         issued.or_else(|| sets.iter().min_by(|a, b| age_s(a).total_cmp(&age_s(b)))).map(|(_, set)| set)
     }
 }
 
-/// When the receiver completed the sets of a satellite, with their issues in the order in which it wrote them
-/// down. A set that it read again after a loss comes before a new one.
-fn read(run: &Run, sv: Sv) -> Vec<(u64, u32)> {
+/// When the receiver completed the sets of a satellite's message, with their issues in the order in which it
+/// wrote them down. A set that it read again after a loss comes before a new one.
+fn read(run: &Run, (sv, name): (Sv, &str)) -> Vec<(u64, u32)> {
     let mut issues: Vec<u32> = Vec::new();
-    for row in run.navigation.iter().filter(|row| row.sv == sv && row.parameter == OF_EVERY_SET) {
+    let own = |row: &&NavigationRow| row.sv == sv && row.message == name && row.parameter == OF_EVERY_SET;
+    for row in run.navigation.iter().filter(own) {
         if !issues.contains(&row.issue) {
             issues.push(row.issue);
         }
     }
+    let carried = |row: &EventRow| row.signal.components.iter().any(|c| c.message.is_some_and(|m| m.name == name));
     let completed = run.events.iter().filter(|row| row.sv == sv && row.event == Event::EphemerisComplete);
+    let completed = completed.filter(|row| carried(row));
     let completed: Vec<u64> = completed.map(|row| row.sample).collect();
     let again = completed.len().saturating_sub(issues.len());
     let issue = |index: usize| issues.get(index.saturating_sub(again)).copied();
@@ -92,14 +101,19 @@ fn read(run: &Run, sv: Sv) -> Vec<(u64, u32)> {
 }
 
 /// The set in those rows, by the message of one of the satellite's signals that has that name.
-fn set(run: &Run, (sv, name, issue): (Sv, &str, u32), rows: &[&NavigationRow], near: Epoch) -> Option<Ephemeris> {
+fn set(
+    run: &Run,
+    (sv, name, issue): (Sv, &str, u32),
+    rows: &[&NavigationRow],
+    near: Epoch,
+) -> Option<(&'static str, Ephemeris)> {
     messages(run, sv).filter(|(message, _)| message.name == name).find_map(|(message, time)| {
         // What bears an issue is never taken from another one.
         let bound = (message.set_parameters)();
         let own = |row: &&&NavigationRow| row.issue == issue || !bound.contains(&row.parameter.as_str());
         let raw = |name: &str| rows.iter().filter(own).find(|row| row.parameter == name).map(|row| row.raw);
         let set = (message.elements)(sv, &raw, time.label(near))?;
-        Some(set.timed(|label| time.instant(label)))
+        Some((message.name, set.timed(|label| time.instant(label))))
     })
 }
 
@@ -116,7 +130,7 @@ fn ionosphere(run: &Run, (sv, name): (Sv, &str), rows: &[&NavigationRow]) -> Opt
     (message.ionosphere.coefficients)(&raw)
 }
 
-/// Names of the parameters of a satellite's sets that bear their issue.
-pub fn orbit_parameters(run: &Run, sv: Sv) -> BTreeSet<&'static str> {
-    messages(run, sv).next().map(|(message, _)| (message.set_parameters)().into_iter().collect()).unwrap_or_default()
+/// Names of the parameters of sets that bear their issue, of each message of a satellite's signals.
+pub fn orbit_parameters(run: &Run, sv: Sv) -> BTreeMap<&'static str, BTreeSet<&'static str>> {
+    messages(run, sv).map(|(message, _)| (message.name, (message.set_parameters)().into_iter().collect())).collect()
 }

@@ -5,8 +5,8 @@
 //! satellite and elevation, [`jitter`] compares each loop with its theory, [`consistency`] the fixes with
 //! their own covariance, [`clock`] the receiver's clock with the deviations of [`allan`]. [`psd`] estimates
 //! the spectrum of the samples, [`lines`] compares the continuous waves that the receiver reported with those
-//! that there were, [`spoofing`] measures how far a spoofer moved the fixes. [`independent`] says how many
-//! independent values a correlated series is worth.
+//! that there were, [`spoofing`] measures how far a spoofer moved the fixes, [`ionosphere`] what two bands
+//! showed of it. [`independent`] says how many independent values a correlated series is worth.
 
 pub mod allan;
 pub mod clock;
@@ -14,6 +14,7 @@ pub mod consistency;
 pub mod elevation;
 pub mod errors;
 pub mod independent;
+pub mod ionosphere;
 pub mod jitter;
 pub mod lines;
 pub mod psd;

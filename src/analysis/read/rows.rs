@@ -1,7 +1,7 @@
 //! How the rows of a run's long tables are put into a [`super::spill_store::SpillStore`].
 
 use crate::analysis::read::spill_store::{SpillRow, Words};
-use crate::gnss::record::{Observation, RayRow, SkyRow, TrackingRow};
+use crate::gnss::record::{IonosphereRow, Observation, RayRow, SkyRow, TrackingRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 
@@ -78,6 +78,18 @@ impl SpillRow<Sv> for SkyRow {
             ionosphere_m: words.number(),
             troposphere_m: words.number(),
         }
+    }
+}
+
+impl SpillRow<Sv> for IonosphereRow {
+    const WORDS: usize = 3;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.extend([self.sample, self.delay_m.to_bits(), self.sigma_m.to_bits()]);
+    }
+
+    fn take(sv: Sv, words: &mut Words<'_>) -> Self {
+        Self { sv, sample: words.word(), delay_m: words.number(), sigma_m: words.number() }
     }
 }
 

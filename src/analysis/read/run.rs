@@ -18,8 +18,8 @@ use crate::analysis::read::spill_store::SpillStore;
 use crate::analysis::statistics::{mean, median};
 use crate::gnss::facts::{FrontEndFacts, SceneFacts};
 use crate::gnss::record::{
-    AcquisitionRow, EventRow, Fix, InterferenceRow, LineRow, NavigationRow, Observation, RayRow, SkyRow, TrackingRow,
-    TrajectoryRow,
+    AcquisitionRow, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation, RayRow, SkyRow,
+    TrackingRow, TrajectoryRow,
 };
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal};
@@ -97,6 +97,10 @@ pub struct Run {
     pub tracking: SpillStore<Link, TrackingRow>,
     /// Median time of the loops' updates.
     pub update_s: Option<f64>,
+    /// Samples a second of the front end in which each signal is received.
+    pub rates_hz: BTreeMap<&'static Signal, f64>,
+    /// The ionosphere that it measured with two bands; none without.
+    pub ionosphere: SpillStore<Sv, IonosphereRow>,
     /// Parameters as it decoded them.
     pub navigation: Vec<NavigationRow>,
     /// What happened to its channels.
@@ -144,6 +148,10 @@ impl Run {
             read.tracking.push(row.link(), &row)
         })?;
         read.update_s = updates.median();
+        match each(&rx.join("ionosphere.csv"), "", |_, row: IonosphereRow| read.ionosphere.push(row.sv, &row)) {
+            Ok(()) | Err(JudgeError::Missing { .. }) => {}
+            Err(error) => return Err(error),
+        }
         read.navigation = rows(&rx.join("navigation.csv"), RECEIVER)?;
         read.events = rows(&rx.join("events.csv"), RECEIVER)?;
         read.lines = match rows(&rx.join("interference.csv"), RECEIVER) {
@@ -161,6 +169,8 @@ impl Run {
                 front_ends.and_then(|all| all.iter().position(has)).unwrap_or(0)
             };
             read.common.set_front_end(&read.scene, spacing_chips, &received);
+            let rate_hz = |signal: &&'static Signal| (*signal, read.scene.stages(received(signal)).1);
+            read.rates_hz = read.signals.iter().map(rate_hz).collect();
         }
         read.psd = optional(&run.join("psd.csv"))?;
         read.speed = json(&run.join("speed.json"))?.unwrap_or_default();
@@ -237,6 +247,8 @@ impl Run {
             acquisition: Vec::new(),
             tracking: SpillStore::new(directory),
             update_s: None,
+            rates_hz: BTreeMap::new(),
+            ionosphere: SpillStore::new(directory),
             navigation: Vec::new(),
             events: Vec::new(),
             lines: None,
@@ -249,6 +261,11 @@ impl Run {
     /// Seconds from sample 0 by the receiver's clock.
     pub fn time_s(&self, sample: u64) -> f64 {
         sample as f64 / self.scene.sample_rate_hz
+    }
+
+    /// Samples a second of what a signal is received from.
+    pub fn rate_hz(&self, signal: &Signal) -> f64 {
+        self.rates_hz.get(signal).copied().unwrap_or(self.scene.sample_rate_hz)
     }
 
     /// C/N0 of the strongest satellite at a sample.

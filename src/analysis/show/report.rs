@@ -93,6 +93,13 @@ impl Summary {
                 metres(spoofing.from_claim_p95_m)
             )?;
         }
+        if let Some(measured) = &self.ionosphere {
+            writeln!(
+                f,
+                "ionosphere    by two bands: error 95 % {:.2} m, rms {:.2} m, of {:.2} m on average; stated {:.2} m",
+                measured.error_p95_m, measured.error_rms_m, measured.true_mean_m, measured.stated_rms_m
+            )?;
+        }
         for null_hz in &self.details.psd_nulls_hz {
             writeln!(f, "spectrum      null at {:+.4} MHz from the carrier", null_hz / 1e6)?;
         }

@@ -114,10 +114,8 @@ pub(super) fn sky(
     }
     let mut excluded = scenario.excluded.clone();
     if !scenario.include_unhealthy {
-        let sick: Vec<Sv> = catalogue
-            .satellites()
-            .filter(|sv| catalogue.sent_at(*sv, start).is_some() && !catalogue.healthy(*sv, start))
-            .collect();
+        let sick: Vec<Sv> =
+            catalogue.satellites().filter(|sv| catalogue.is_sick(*sv, start, &scenario.signals)).collect();
         if !sick.is_empty() {
             let names: Vec<String> = sick.iter().map(Sv::to_string).collect();
             warnings.push(format!("unhealthy by their own message and left out: {}", names.join(", ")));

@@ -19,6 +19,7 @@ use crate::generator::message::{FOREVER_S, Kind, MessageFault, spoiled};
 use crate::generator::orbit_error::Displacement;
 use crate::generator::precise::{Hardware, Orbits};
 use crate::generator::random::Stream;
+use crate::gnss::message::Message;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::sp3::{self, Precise};
 use crate::gnss::time::Rate;
@@ -116,7 +117,7 @@ pub enum MessageKind {
         bit: u8,
     },
     /// The bits of health.
-    Health(u8),
+    Health(u16),
     /// A wrong value with right parity.
     Parameter {
         /// Name in the message's table.
@@ -216,7 +217,7 @@ pub(super) fn message_fault(table: &Table<'_>) -> Result<MessageSpec, ScenarioEr
         }
         2 => {
             named(table)?;
-            MessageKind::Health(count("health")?)
+            MessageKind::Health(table.need_integer("health")? as u16)
         }
         4 => {
             named(table)?;
@@ -366,10 +367,14 @@ pub(super) fn message_faults(
         for sv in spec.satellites.iter().flatten() {
             let sent = catalogue.sent_at(*sv, fault.on.start);
             let own = scenario.signals.iter().filter(|signal| signal.system == sv.system);
-            for message in own.flat_map(|signal| signal.components.iter().filter_map(|component| component.message)) {
-                if let Some(reason) = fault.kind.foreign(message) {
-                    return Err(scenario.conflict("message_fault", format!("number {number}, {sv}: {reason}")));
-                }
+            let all: Vec<&'static Message> =
+                own.flat_map(|signal| signal.components.iter().filter_map(|component| component.message)).collect();
+            // Of several messages those are spoiled that can be.
+            let reasons: Vec<Option<String>> = all.iter().map(|message| fault.kind.foreign(message)).collect();
+            if let (true, Some(reason)) = (reasons.iter().all(Option::is_some), reasons.iter().flatten().next()) {
+                return Err(scenario.conflict("message_fault", format!("number {number}, {sv}: {reason}")));
+            }
+            for message in all {
                 let only = std::slice::from_ref(&fault);
                 let wrong = sent.and_then(|set| spoiled(only, message, *sv, set, fault.on.start));
                 if let Some(Err(error)) = wrong.map(|set| (message.quantised)(&set)) {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
 use super::{calendar, header_line, opening};
-use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::broadcast::{Ephemeris, status_of_record};
 use crate::gnss::ionosphere::Coefficients;
 use crate::gnss::message::Message;
 use crate::gnss::record::NavigationRow;
@@ -14,8 +14,6 @@ use crate::gnss::time::{BDT, Epoch, TimeScale};
 
 /// Continuous GPS week of week 0 of BDT.
 const BDT_WEEK: i64 = 1356;
-/// Data sources of a Galileo set: I/NAV of E1-B, its clock that of E5b and E1 (RINEX 3.05, table A8).
-const INAV_E1B: f64 = 513.0;
 
 /// The parameters of a set, or of what is common to all, by name.
 type Raws = BTreeMap<String, i64>;
@@ -68,7 +66,7 @@ impl NavigationSets {
             let Some((message, time)) = messages.get(name.as_str()) else { continue };
             let set = (message.elements)(*sv, &|name| raws.get(name).copied(), time.label(near));
             let set = set.map(|set| set.timed(|label| time.instant(label)));
-            if let Some(set) = set.filter(|_| known.insert((*sv, *issue))) {
+            if let Some(set) = set.filter(|set| known.insert((*sv, *issue, set.form.name))) {
                 text += &record(&set);
             }
         }
@@ -108,16 +106,12 @@ fn record(set: &Ephemeris) -> String {
     let set = &if own_time { set.clone().timed(|at| BDT.label(at)) } else { set.clone() };
     let week = if own_time { set.toe.week() - BDT_WEEK } else { set.toe.week() } as f64;
     let fifth = match set.sv.system {
-        System::Galileo => [set.idot_radps, INAV_E1B, week, 0.0],
+        System::Galileo => [set.idot_radps, set.form.rinex_sources.unwrap_or(0.0), week, 0.0],
         System::Navic | System::BeiDou => [set.idot_radps, 0.0, week, 0.0],
         _ => [set.idot_radps, f64::from(set.l2_codes), week, f64::from(u8::from(set.l2_p_data_off))],
     };
     let sixth = match set.sv.system {
-        System::Galileo => {
-            // Bits of E1-B from 0, of E5b from 6.
-            let health = u16::from(set.health & 0b111) | u16::from(set.health >> 3 & 0b111) << 6;
-            [sisa_m(set.ura_index), f64::from(health), set.tgd2_s, set.tgd_s]
-        }
+        System::Galileo => [sisa_m(set.ura_index), f64::from(status_of_record(set.health)), set.tgd2_s, set.tgd_s],
         System::Navic => [ura_m(set.ura_index), f64::from(set.health), set.tgd_s, 0.0],
         System::BeiDou => [ura_m(set.ura_index), f64::from(set.health), set.tgd_s, set.tgd2_s],
         _ => [ura_m(set.ura_index), f64::from(set.health), set.tgd_s, f64::from(set.iodc)],
@@ -176,6 +170,7 @@ fn sisa_m(index: u8) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::galileo::fnav::FNAV;
     use crate::gnss::rinex;
 
     /// What RINEX rounds to twelve digits after the first.
@@ -187,12 +182,15 @@ mod tests {
     fn sets_of_both_systems_are_read_back_as_they_were_written() {
         let mut count = [0, 0];
         let sets = rinex::embedded().unwrap().ephemerides.into_iter().step_by(17);
-        for set in sets.chain(rinex::embedded_two_systems().unwrap().ephemerides) {
+        let both = rinex::embedded_two_systems().unwrap().ephemerides;
+        let fnav = both.iter().filter(|set| set.sv.system == System::Galileo).map(FNAV.form).collect::<Vec<_>>();
+        for set in sets.chain(both).chain(fnav) {
             let systems = [set.sv.system];
             let header = opening("N: GNSS NAV DATA", &systems, set.toe) + &header_line("", "END OF HEADER");
             let text = header + &record(&set);
             let read = rinex::read(text.as_bytes(), "own").unwrap_or_else(|error| panic!("{error}\n{text}"));
             let [back] = read.ephemerides.as_slice() else { panic!("{:?}\n{text}", read.skipped) };
+            assert_eq!(back.form, set.form);
             let whole = |e: &Ephemeris| (e.sv, e.toe, e.toc, e.iode, e.iodc, e.ura_index, e.health, e.long_fit);
             assert_eq!(whole(back), whole(&set), "{text}");
             let values = |e: &Ephemeris| {

@@ -1,5 +1,6 @@
 //! A navigation file as lines and columns: the header's lines that are used, and records of GPS LNAV, Galileo
-//! I/NAV, NavIC and BeiDou D1 and D2, eight lines with a number or nothing in each field of 19 columns.
+//! I/NAV and F/NAV, NavIC and BeiDou D1 and D2, eight lines with a number or nothing in each field of 19
+//! columns.
 //!
 //! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5, A6, A8 and A18; RINEX 4.02, tables A9, A13
 //! and A33, and those of NavIC. Where a line is missing, doubled or cut, or text is beside the fields, what
@@ -30,10 +31,10 @@ const FIRST: [&str; 20] = [
     "af0", "af1", "af2", "iode", "crs", "deltaN", "m0", "cuc", "e", "cus", "sqrta", "toe", "cic", "omega0", "cis",
     "i0", "crc", "omega", "omegaDot", "idot",
 ];
-/// … and the rest of an LNAV, of an I/NAV and of a NavIC record; spare ones have no name.
+/// … and the rest of an LNAV, of a Galileo and of a NavIC record; spare ones have no name.
 const OF_LNAV: [&str; FIELDS - FIRST.len()] =
     ["l2Codes", "week", "l2p", "accuracy", "health", "tgd", "iodc", "t_tm", "fitInt", "", ""];
-const OF_INAV: [&str; FIELDS - FIRST.len()] =
+const OF_GALILEO: [&str; FIELDS - FIRST.len()] =
     ["sources", "week", "", "accuracy", "health", "bgdE5aE1", "bgdE5bE1", "t_tm", "", "", ""];
 const OF_NAVIC: [&str; FIELDS - FIRST.len()] = ["", "week", "", "accuracy", "health", "tgd", "", "t_tm", "", "", ""];
 const OF_BEIDOU: [&str; FIELDS - FIRST.len()] =
@@ -44,6 +45,7 @@ const READ: [(char, System, u8); 4] =
 /// Bits of an I/NAV record's sources: sent on E1-B or E5b, sent on E5a (F/NAV), and a clock of E5b and E1.
 const SENT_INAV: u32 = 0b101;
 const SENT_FNAV: u32 = 0b010;
+const CLOCK_FNAV: u32 = 1 << 8;
 const CLOCK_INAV: u32 = 1 << 9;
 
 /// Labels that a header of any version may have.
@@ -88,8 +90,10 @@ const MESSAGES: [(char, &[&str]); 7] = [
     ('S', &["SBAS"]),
 ];
 
-/// A record of GPS LNAV, Galileo I/NAV or NavIC in form.
+/// A record of GPS LNAV, Galileo I/NAV or F/NAV or NavIC in form.
 pub(super) struct Record {
+    /// Whether it is one of F/NAV.
+    pub is_fnav: bool,
     /// Number of its first line.
     pub line: usize,
     pub sv: Sv,
@@ -101,7 +105,7 @@ impl Record {
     /// A field by its name; `None` if it is blank.
     pub fn get(&self, name: &str) -> Option<f64> {
         let rest = match self.sv.system {
-            System::Galileo => OF_INAV,
+            System::Galileo => OF_GALILEO,
             System::Navic => OF_NAVIC,
             System::BeiDou => OF_BEIDOU,
             _ => OF_LNAV,
@@ -110,14 +114,14 @@ impl Record {
         self.values.get(at).copied().flatten()
     }
 
-    /// Whether a Galileo record is one of I/NAV, of version 3, which has both messages in one form.
-    fn is_inav(&self) -> Result<bool, String> {
+    /// Whether a Galileo record of version 3, which has both messages in one form, is one of F/NAV.
+    fn says_fnav(&self) -> Result<bool, String> {
         let sources = self.get("sources").unwrap_or(0.0) as u32;
         if sources & SENT_FNAV != 0 {
-            return Ok(false);
+            return Ok(true);
         }
         if sources & SENT_INAV != 0 && sources & CLOCK_INAV != 0 {
-            return Ok(true);
+            return Ok(false);
         }
         let expected = "bit 0, 1 or 2 for the signal, and bit 8 or 9 for the clock";
         Err(format!("line {} ({} {}): data sources = {sources}: expected {expected}", self.line, self.sv, self.toc))
@@ -361,19 +365,26 @@ impl Form {
                 return Ok(Group::Other);
             }
             let record = self.record(group)?;
-            let read = letter != 'E' || record.is_inav()?;
-            return Ok(if read { Group::Record(Box::new(record)) } else { Group::Other });
+            let is_fnav = letter == 'E' && record.says_fnav()?;
+            // Some converters join both messages: a clock that is not that of E1 and E5a is no set of F/NAV.
+            if is_fnav && record.get("sources").unwrap_or(0.0) as u32 & CLOCK_FNAV == 0 {
+                return Ok(Group::Other);
+            }
+            return Ok(Group::Record(Box::new(Record { is_fnav, ..record })));
         }
         match (words.get(1).copied().unwrap_or(""), words.get(3).copied().unwrap_or("")) {
             ("EPH", message) if !messages.contains(&message) => {
                 refuse(&format!("message '{message}': expected {}", messages.join(" or ")))
             }
-            ("EPH", "LNAV" | "INAV" | "D1" | "D2") if READ.iter().any(|(read, ..)| *read == letter) => {
+            ("EPH", message @ ("LNAV" | "INAV" | "FNAV" | "D1" | "D2"))
+                if READ.iter().any(|(read, ..)| *read == letter) =>
+            {
                 let rest = group.get(1..).unwrap_or_default();
                 if rest.first().is_none_or(|(_, line)| line.get(..3) != Some(satellite)) {
                     return refuse("expected the same satellite and its epoch in the line after this one");
                 }
-                self.record(rest).map(|record| Group::Record(Box::new(record)))
+                let is_fnav = message == "FNAV";
+                self.record(rest).map(|record| Group::Record(Box::new(Record { is_fnav, ..record })))
             }
             ("ION", "LNAV") if ['G', 'I'].contains(&letter) => self.ionosphere(group, satellite),
             ("ION", "D1D2") => self.ionosphere(group, satellite),
@@ -428,7 +439,7 @@ impl Form {
             );
         };
         let Ok(values) = values.try_into() else { return refuse(first, "expected 31 fields".to_owned()) };
-        Ok(Record { line: first, sv: Sv { system, number }, toc, values })
+        Ok(Record { is_fnav: false, line: first, sv: Sv { system, number }, toc, values })
     }
 
     /// Year, month, day, hour, minute and second, of GPS time.

@@ -6,8 +6,10 @@
 
 use super::columns::Record;
 use crate::gnss::beidou::d1d2::{BDT_WEEK, issue};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::galileo::inav::sisa_index;
+use crate::gnss::broadcast::{Ephemeris, status_of_record};
+use crate::gnss::galileo::fnav::FNAV_SETS;
+use crate::gnss::galileo::inav::{INAV_SETS, sisa_index};
+use crate::gnss::gps::lnav::LNAV_SETS;
 use crate::gnss::satellite::System;
 use crate::gnss::time::{BDT, Epoch, WEEK_S};
 
@@ -90,7 +92,7 @@ fn beidou(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
         iodc: whole(record, "aodc", 31)? as u16,
         aodo: whole(record, "iode", 31)? as u8,
         ura_index: ura_index(optional_accuracy(record)?),
-        health: whole(record, "health", 1)? as u8,
+        health: whole(record, "health", 1)? as u16,
         sqrt_a_sqrtm: field(record, "sqrta", 5200.0, 6540.0)?,
         eccentricity: field(record, "e", 0.0, 0.1)?,
         af0_s: both("af0", 9.766e-4)?,
@@ -114,7 +116,7 @@ fn navic(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
         iode: issue,
         iodc: issue,
         ura_index: ura_index(optional_accuracy(record)?),
-        health: whole(record, "health", 3)? as u8,
+        health: whole(record, "health", 3)? as u16,
         sqrt_a_sqrtm: field(record, "sqrta", 6450.0, 6540.0)?,
         eccentricity: field(record, "e", 0.0, 0.1)?,
         af0_s: both("af0", 9.766e-4)?,
@@ -131,12 +133,13 @@ fn gps(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     let optional = |name, most| if record.get(name).is_some() { whole(record, name, most).map(Some) } else { Ok(None) };
     let iode = whole(record, "iode", 255)?;
     Ok(Ephemeris {
+        form: &LNAV_SETS,
         // Sets go on the air two hours before their reference time.
         transmitted: transmitted(record, common.toe, common.toe.plus_s(-7200.0)),
         iode: iode as u16,
         iodc: optional("iodc", 1023)?.unwrap_or(iode) as u16,
         ura_index: ura_index(optional_accuracy(record)?),
-        health: whole(record, "health", 63)? as u8,
+        health: whole(record, "health", 63)? as u16,
         l2_codes: optional("l2Codes", 3)?.unwrap_or(0) as u8,
         l2_p_data_off: optional("l2p", 1)? == Some(1),
         // Hours or the flag itself, as the file's producer meant it; blank is the usual four hours.
@@ -151,26 +154,26 @@ fn gps(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     })
 }
 
-/// The rest of an I/NAV set (Galileo OS SIS ICD 2.1, tables 57, 62, 64 and 90).
+/// The rest of an I/NAV or F/NAV set (Galileo OS SIS ICD 2.1, tables 57, 62, 64 and 90).
 fn galileo(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     let both = |name, most: f64| field(record, name, -most, most);
     let issue = whole(record, "iode", 1023)? as u16;
     let health = whole(record, "health", 511)?;
     Ok(Ephemeris {
+        form: if record.is_fnav { &FNAV_SETS } else { &INAV_SETS },
         transmitted: transmitted(record, common.toe, common.toe),
         iode: issue,
         iodc: issue,
         ura_index: sisa_index(record.get("accuracy").filter(|metres| *metres >= 0.0)),
-        // Data validity and health of E1-B in bits 0 to 2 and of E5b in bits 6 to 8, with those of E5a
-        // between.
-        health: (health & 0b111 | (health >> 6 & 0b111) << 3) as u8,
+        health: status_of_record(health as u16),
         sqrt_a_sqrtm: field(record, "sqrta", 5200.0, 5500.0)?,
         // Two satellites were left on orbits of 0.16.
         eccentricity: field(record, "e", 0.0, 0.2)?,
         af0_s: both("af0", 6.2501e-2)?,
         af1_sps: both("af1", 1.4902e-8)?,
         af2_sps2: both("af2", 5.552e-17)?,
-        tgd_s: both("bgdE5bE1", 1.1921e-7)?,
+        // Records of F/NAV may leave it blank, as that message does.
+        tgd_s: if record.is_fnav && record.get("bgdE5bE1").is_none() { 0.0 } else { both("bgdE5bE1", 1.1921e-7)? },
         tgd2_s: both("bgdE5aE1", 1.1921e-7)?,
         ..common
     })

@@ -26,9 +26,11 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 7] = [
+pub static SIGNALS: [&Signal; 9] = [
     &gps::l1ca::L1_CA,
     &galileo::e1::E1,
+    &galileo::e5::E5A,
+    &galileo::e5::E5B,
     &navic::sps::L5,
     &navic::sps::S,
     &beidou::in_phase::B1I,
@@ -219,6 +221,11 @@ impl Signal {
     /// ```
     pub fn code(&self, number: u8) -> Option<Vec<i8>> {
         self.components.first().and_then(|component| (component.code)(number))
+    }
+
+    /// Whether one of its components has that message.
+    pub fn carries(&self, message: &Message) -> bool {
+        self.components.iter().any(|component| component.message == Some(message))
     }
 
     /// This signal of one satellite.

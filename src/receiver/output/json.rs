@@ -10,8 +10,8 @@ use super::{OutputError, Record, Sink, write_error};
 use crate::gnss::earth::Geodetic;
 use crate::gnss::record::Fix;
 
-/// Writes fixes, satellites in view, channels, searches, events and lines of interference, and at the end the
-/// summary. Observations and parameters of messages are in tables alone.
+/// Writes fixes, satellites in view, the ionosphere that two bands show, channels, searches, events and lines
+/// of interference, and at the end the summary. Observations and parameters of messages are in tables alone.
 pub struct JsonLines<W> {
     name: PathBuf,
     writer: W,
@@ -57,6 +57,8 @@ impl<W: Write> Sink for JsonLines<W> {
         match record {
             Record::Fix(fix) => self.fix(&fix),
             Record::Sights(rows) => self.row("satellites", &rows),
+            Record::Ionosphere(rows) if rows.is_empty() => Ok(()),
+            Record::Ionosphere(rows) => self.row("ionosphere", &rows),
             Record::Tracking(row) => self.row("channel", &row),
             Record::Event(row) => self.row("event", &row),
             Record::Acquisition(row) => self.row("search", &row),

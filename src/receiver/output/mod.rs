@@ -19,7 +19,8 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::gnss::record::{
-    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, LineRow, NavigationRow, Observation, SightRow, TrackingRow,
+    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, IonosphereRow, LineRow, NavigationRow, Observation, SightRow,
+    TrackingRow,
 };
 use crate::gnss::time::GPST;
 pub use json::JsonLines;
@@ -70,6 +71,8 @@ pub enum Record {
     Clocks(Vec<ClockRow>),
     /// Where the satellites of the fix before stand, those too that it left out.
     Sights(Vec<SightRow>),
+    /// The ionosphere at the fix before, of satellites with two bands.
+    Ionosphere(Vec<IonosphereRow>),
     /// A line in the spectrum of a front end's samples; front ends count from 0.
     Interference {
         /// The front end's place, from 0 on.
@@ -172,6 +175,8 @@ pub struct Output {
     interference_of: BTreeMap<usize, Sheet>,
     /// There once a fix has another time scale than GPS time.
     clocks: Option<Sheet>,
+    /// There once a satellite has two bands.
+    ionosphere: Option<Sheet>,
     /// Parameters written so far: those of one issue are written once.
     parameters: BTreeSet<NavigationRow>,
 }
@@ -222,6 +227,7 @@ const FIXES: [&str; 31] = [
     "time_scale",
 ];
 const CLOCKS: [&str; 4] = ["sample", "time_scale", "clock_bias_s", "sigma_clock_m"];
+const IONOSPHERE: [&str; 4] = ["sample", "sv", "delay_m", "sigma_m"];
 const ACQUISITION: [&str; 9] =
     ["sample", "sv", "signal", "acquired", "statistic", "threshold", "doppler_hz", "code_phase_chips", "cn0_dbhz"];
 const TRACKING: [&str; 11] = [
@@ -249,9 +255,12 @@ impl Output {
     /// # Errors
     /// [`OutputError::Create`] with the path that cannot be made.
     pub fn create(directory: &Path) -> Result<Self, OutputError> {
-        let clocks = directory.join("clocks.csv");
-        if clocks.exists() {
-            fs::remove_file(&clocks).map_err(|error| write_error(&clocks, error))?;
+        // Of another run, where this one may have none.
+        for name in ["clocks.csv", "ionosphere.csv"] {
+            let path = directory.join(name);
+            if path.exists() {
+                fs::remove_file(&path).map_err(|error| write_error(&path, error))?;
+            }
         }
         Ok(Self {
             directory: directory.to_owned(),
@@ -264,6 +273,7 @@ impl Output {
             interference: Sheet::create(directory, "interference.csv", &INTERFERENCE)?,
             interference_of: BTreeMap::new(),
             clocks: None,
+            ionosphere: None,
             parameters: BTreeSet::new(),
         })
     }
@@ -285,6 +295,7 @@ impl Output {
             sheet.flush()?;
         }
         self.clocks.as_mut().map_or(Ok(()), Sheet::flush)?;
+        self.ionosphere.as_mut().map_or(Ok(()), Sheet::flush)?;
         self.interference_of.values_mut().try_for_each(Sheet::flush)
     }
 
@@ -297,6 +308,15 @@ impl Output {
             self.clocks = Some(Sheet::create(&self.directory, "clocks.csv", &CLOCKS)?);
         }
         let Some(sheet) = &mut self.clocks else { return Ok(()) };
+        rows.iter().try_for_each(|row| sheet.write(row))
+    }
+
+    /// Writes what two bands show of the ionosphere.
+    fn ionosphere(&mut self, rows: &[IonosphereRow]) -> Result<(), OutputError> {
+        if self.ionosphere.is_none() && !rows.is_empty() {
+            self.ionosphere = Some(Sheet::create(&self.directory, "ionosphere.csv", &IONOSPHERE)?);
+        }
+        let Some(sheet) = &mut self.ionosphere else { return Ok(()) };
         rows.iter().try_for_each(|row| sheet.write(row))
     }
 
@@ -340,6 +360,7 @@ impl Sink for Output {
                 self.fixes.write(&(row, place))
             }
             Record::Clocks(rows) => self.clocks(&rows),
+            Record::Ionosphere(rows) => self.ionosphere(&rows),
             // It follows from the fix and the ephemerides.
             Record::Sights(_) => Ok(()),
             Record::Interference { front_end, row } => self.interference(front_end, &row),
@@ -386,6 +407,8 @@ mod tests {
         assert_eq!(header(&row), NAVIGATION.join(","));
         let row = EventRow { sample: 0, sv, signal: &L1_CA, event: Event::Acquired };
         assert_eq!(header(&row), EVENTS.join(","));
+        let row = IonosphereRow { sample: 0, sv, delay_m: 0.0, sigma_m: 0.0 };
+        assert_eq!(header(&row), IONOSPHERE.join(","));
         let row: LineRow = from_csv(&INTERFERENCE, &zero(8));
         assert_eq!(header(&row), INTERFERENCE.join(","));
     }

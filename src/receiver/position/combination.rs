@@ -3,10 +3,11 @@
 //! The ionosphere delays code by I·(f₁/f)² and advances the carrier by as much, to first order. With a₁ =
 //! f₁²/(f₁²−f₂²) and a₂ = −f₂²/(f₁²−f₂²) the sum a₁x₁ + a₂x₂ has none of it, of codes and of carriers alike
 //! (IS-GPS-200N, 20.3.3.3.3.3; Kaplan and Hegarty, 7.2.4). Codes are smoothed in the combination, so that
-//! nothing diverges. Clock and group delays go the same way, each signal with its own. Noise grows to
-//! √(a₁²σ₁² + a₂²σ₂²): 2.98 of equal ones on L1 and L2. Limits: terms of higher order (centimetres) stay; a
-//! front end that delays one band against the other adds a₂ times that, alike for all satellites that are
-//! combined, but not for those beside them that have one carrier alone.
+//! nothing diverges. The difference of both, times −a₂, is the ionosphere on the first carrier. Clock and
+//! group delays go the same way, each signal with its own. Noise grows to √(a₁²σ₁² + a₂²σ₂²): 2.98 of equal
+//! ones on L1 and L2. Limits: terms of higher order (centimetres) stay; a front end that delays one band
+//! against the other adds a₂ times that, alike for all satellites that are combined, but not for those beside
+//! them that have one carrier alone.
 
 use crate::gnss::broadcast::ClockState;
 use crate::gnss::record::Observation;
@@ -56,6 +57,24 @@ impl<'a> Combination<'a> {
     pub fn carrier_m(&self) -> f64 {
         let metres = |row: &Observation| row.carrier_cycles * row.signal.wavelength_m(row.sv);
         self.sum(metres(self.first), metres(self.second))
+    }
+
+    /// Group delay of the ionosphere on the first carrier by the codes, with what the satellite's clocks and
+    /// the receiver's bands are apart.
+    pub fn dispersion_m(&self) -> f64 {
+        let apart_m = self.second.pseudorange_m - self.first.pseudorange_m;
+        planted!("receiver.position.dispersion", -self.weights[1], self.weights[0]) * apart_m
+    }
+
+    /// The same by the carriers, but for a constant: they are advanced by what delays the codes.
+    pub fn carrier_dispersion_m(&self) -> f64 {
+        let metres = |row: &Observation| row.carrier_cycles * row.signal.wavelength_m(row.sv);
+        -self.weights[1] * (metres(self.first) - metres(self.second))
+    }
+
+    /// What a difference of both signals, second minus first, comes to in the ionosphere.
+    pub fn dispersed(&self, apart: f64) -> f64 {
+        -self.weights[1] * apart
     }
 
     /// Time since either carrier was locked.

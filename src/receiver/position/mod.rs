@@ -9,28 +9,30 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use crate::gnss::earth::Geodetic;
 use crate::gnss::ionosphere::{Coefficients, Model, NAVIC_HZ};
 use crate::gnss::klobuchar::L1_HZ;
-use crate::gnss::record::{ClockRow, Fix, IonosphereModel, Observation, SightRow};
+use crate::gnss::record::{ClockRow, Fix, IonosphereModel, IonosphereRow, Observation, SightRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, GPST, Rate, SampleClock, TimePolynomial, TimeScale};
+use crate::gnss::time::{Rate, SampleClock, TimePolynomial, TimeScale};
 use crate::receiver::described::described;
 use crate::receiver::track::loops::CodeShape;
 
 pub mod combination;
+mod dispersion;
 mod electrons;
 pub mod exclusion;
 pub mod ionosphere;
 pub mod least_squares;
 mod ranges;
+mod records;
 mod reduced;
+mod sets;
 pub mod smooth;
 #[cfg(test)]
 mod tests;
@@ -39,10 +41,10 @@ pub mod troposphere;
 use electrons::Electrons;
 pub use exclusion::{Consistent, chi_square_threshold, consistent, without_faults};
 use ionosphere::{DelayError, Delays, NOMINAL, NOMINAL_ERROR};
-use least_squares::{
-    COORDINATES, Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, Solution, freedom, scales,
-};
+use least_squares::{COORDINATES, Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, freedom, scales};
+use records::{clocks, fix, sights};
 use reduced::InShort;
+pub use sets::Sets;
 use smooth::Smoother;
 
 /// How the ionosphere is corrected.
@@ -269,6 +271,8 @@ pub struct Solved {
     pub clocks: Vec<ClockRow>,
     /// Where the satellites stand that have an ephemeris.
     pub sights: Vec<SightRow>,
+    /// The ionosphere of satellites with two bands.
+    pub ionosphere: Vec<IonosphereRow>,
     /// Satellites in it.
     pub used: Vec<Sv>,
     /// Satellites that the residual test left out, with their distance from the others' solution.
@@ -281,6 +285,8 @@ pub struct Solver {
     settings: PositionSettings,
     noises: Noises,
     smoother: Smoother,
+    /// The same of differences of two carriers.
+    dispersion: Smoother,
     electrons: Electrons,
     rate: Rate,
     last_m: Option<Vector3<f64>>,
@@ -296,10 +302,13 @@ impl Solver {
     pub fn new(settings: &PositionSettings, noises: Noises, rate: Rate) -> Self {
         let bandwidth_hz = noises.first().map_or(1.0, |(_, noise)| noise.bandwidth_hz);
         let smoother = Smoother::new(settings.smoothing_s, bandwidth_hz, rate);
+        let window_s = if settings.smoothing_s > 0.0 { dispersion::WINDOW_S } else { 0.0 };
+        let dispersion = Smoother::new(window_s, bandwidth_hz, rate);
         Self {
             settings: settings.clone(),
             noises,
             smoother,
+            dispersion,
             electrons: Electrons::default(),
             rate,
             last_m: None,
@@ -313,7 +322,9 @@ impl Solver {
     /// velocity leave it out, so that the clock's drift is that of the code, whose bias the position has.
     /// `signals` are those of one front end.
     pub fn set_carrier_offset(&mut self, signals: &[&'static Signal], hz: f64) {
-        signals.iter().for_each(|signal| self.smoother.set_carrier_offset(signal, hz));
+        for smoother in [&mut self.smoother, &mut self.dispersion] {
+            signals.iter().for_each(|signal| smoother.set_carrier_offset(signal, hz));
+        }
     }
 
     /// Takes what a system says that its time is ahead of GPS time.
@@ -325,7 +336,9 @@ impl Solver {
     /// Samples of the front end with these signals were lost or doubled: carriers are whole to a quarter of a
     /// cycle, or were lost.
     pub fn jump(&mut self, signals: &[&'static Signal], carriers_whole: bool) {
-        if carriers_whole { self.smoother.bridge(signals) } else { self.smoother.clear(signals) }
+        for smoother in [&mut self.smoother, &mut self.dispersion] {
+            if carriers_whole { smoother.bridge(signals) } else { smoother.clear(signals) }
+        }
     }
 
     /// Solves from the observations of one sample.
@@ -337,10 +350,11 @@ impl Solver {
         sample: u64,
         clock: SampleClock,
         observations: &[Observation],
-        ephemerides: &BTreeMap<Sv, Ephemeris>,
+        ephemerides: &Sets,
         sent: Option<Coefficients>,
     ) -> Result<Solved, NoFix> {
         let ranges = self.ranges(observations, ephemerides);
+        let measured = self.measured_ionosphere(observations, ephemerides);
         if freedom(&ranges) < 0 || ranges.is_empty() {
             let need = COORDINATES + scales(&ranges).len().max(1);
             return Err(NoFix::TooFew { have: ranges.len(), need });
@@ -396,7 +410,7 @@ impl Solver {
         let fix = fix(sample, clock, &solution, velocity_mps, drift, counts, &excluded, model);
         let clocks = clocks(sample, &solution);
         sights.iter_mut().for_each(|sight| sight.used = used.contains(&sight.sv));
-        Ok(Solved { fix, clocks, sights, used, excluded })
+        Ok(Solved { fix, clocks, sights, ionosphere: measured, used, excluded })
     }
 
     /// What corrects for the ionosphere near a place, and its name in a fix.
@@ -443,92 +457,4 @@ impl Solver {
             Ok(())
         }
     }
-}
-
-#[expect(clippy::too_many_arguments, reason = "a record with as many sources")]
-fn fix(
-    sample: u64,
-    clock: SampleClock,
-    solution: &Solution,
-    velocity_mps: Vector3<f64>,
-    drift: f64,
-    [satellites, ranges]: [usize; 2],
-    excluded: &[(Sv, f64)],
-    ionosphere: IonosphereModel,
-) -> Fix {
-    let bias_s = solution.clock_m() / SPEED_OF_LIGHT_MPS;
-    let time: Epoch = clock.epoch(sample).plus_s(planted!("receiver.position.time_sign", -bias_s, bias_s));
-    let axes = Geodetic::from_ecef(&solution.position_m).ecef_to_enu();
-    let block = |m: &DMatrix<f64>| -> Matrix3<f64> { m.fixed_view::<3, 3>(0, 0).into_owned() };
-    let scale = planted!("receiver.position.sigma_x3", 1.0, 9.0) * planted!("receiver.position.sigma_x05", 1.0, 0.25);
-    let covariance = scale * axes * block(&solution.covariance) * axes.transpose();
-    let correlation = |a, b| covariance[(a, b)] / (covariance[(a, a)] * covariance[(b, b)]).sqrt();
-    let dilution = axes * block(&solution.dilution) * axes.transpose();
-    let (de, dn, du) = (dilution[(0, 0)], dilution[(1, 1)], dilution[(2, 2)]);
-    let dt = solution.dilution[(3, 3)];
-    let names: Vec<String> = excluded.iter().map(|(sv, _)| sv.to_string()).collect();
-    Fix {
-        sample,
-        gps_s: time.seconds(),
-        gps_fraction_s: time.fraction(),
-        x_m: solution.position_m.x,
-        y_m: solution.position_m.y,
-        z_m: solution.position_m.z,
-        vx_mps: velocity_mps.x,
-        vy_mps: velocity_mps.y,
-        vz_mps: velocity_mps.z,
-        clock_bias_s: bias_s,
-        clock_drift: drift,
-        sigma_east_m: covariance[(0, 0)].sqrt(),
-        sigma_north_m: covariance[(1, 1)].sqrt(),
-        sigma_up_m: covariance[(2, 2)].sqrt(),
-        sigma_clock_m: solution.covariance[(3, 3)].sqrt() * planted!("receiver.position.sigma_clock", 1.0, 3.0),
-        correlation_en: planted!("receiver.position.correlation", correlation(0, 1), -correlation(0, 1)),
-        correlation_eu: correlation(0, 2),
-        correlation_nu: correlation(1, 2),
-        gdop: (de + dn + du + dt).sqrt(),
-        pdop: (de + dn + du).sqrt(),
-        hdop: (de + planted!("receiver.position.hdop", dn, du)).sqrt(),
-        vdop: du.sqrt(),
-        tdop: dt.sqrt(),
-        condition: solution.condition,
-        satellites: satellites as u32,
-        ranges: Some(ranges as u32),
-        clocks: Some(solution.clocks.len() as u32),
-        time_scale: solution.clocks.first().map_or(GPST.name, |(scale, _)| scale.name).to_owned(),
-        chi_square: solution.chi_square,
-        excluded: names.join(" "),
-        ionosphere,
-    }
-}
-
-/// Where the satellites of the ranges stand, each once, from a position that is metres off at most.
-fn sights(sample: u64, ranges: &[Range], from: &Solution) -> Vec<SightRow> {
-    let axes = Geodetic::from_ecef(&from.position_m).ecef_to_enu();
-    let mut rows: Vec<SightRow> = (ranges.iter().zip(&from.sights))
-        .map(|(range, sight)| {
-            let enu = axes * sight;
-            SightRow {
-                sample,
-                sv: range.sv,
-                azimuth_deg: libm::atan2(enu.x, enu.y).to_degrees().rem_euclid(360.0),
-                elevation_deg: libm::asin(enu.z.clamp(-1.0, 1.0)).to_degrees(),
-                used: false,
-            }
-        })
-        .collect();
-    rows.sort_by_key(|row| row.sv);
-    rows.dedup_by_key(|row| row.sv);
-    rows
-}
-
-/// The clock against each time scale of a solution, one row a scale.
-fn clocks(sample: u64, solution: &Solution) -> Vec<ClockRow> {
-    let row = |(index, (scale, clock_m)): (usize, &(&'static TimeScale, f64))| ClockRow {
-        sample,
-        time_scale: scale.name.to_owned(),
-        clock_bias_s: clock_m / SPEED_OF_LIGHT_MPS,
-        sigma_clock_m: solution.covariance[(COORDINATES + index, COORDINATES + index)].sqrt(),
-    };
-    solution.clocks.iter().enumerate().map(row).collect()
 }

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use super::combination::{Combination, Used, paired};
 use super::least_squares::Range;
+use super::reduced::InShort;
 use super::smooth::Smoothed;
-use super::{IonosphereChoice, Solver, SystemClocks};
+use super::{IonosphereChoice, Sets, Solver, SystemClocks};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::Observation;
-use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 use crate::gnss::time::GPST;
 
@@ -22,15 +22,26 @@ const FIT_GRACE_S: f64 = 600.0;
 impl Solver {
     /// The ranges of observations whose satellites' ephemerides are known: of a satellite with two carriers
     /// their combination, if the settings say so.
-    pub(super) fn ranges(&mut self, observations: &[Observation], ephemerides: &BTreeMap<Sv, Ephemeris>) -> Vec<Range> {
-        let is_known = |sv: &Sv| ephemerides.contains_key(sv) || self.reduced.contains_key(sv);
+    pub(super) fn ranges(&mut self, observations: &[Observation], ephemerides: &Sets) -> Vec<Range> {
+        let is_known = |row: &Observation| {
+            let short = |short: &InShort| short.serves(&[row.signal], row.sent());
+            ephemerides.serving(row.sv, &[row.signal]).is_some() || self.reduced.get(&row.sv).is_some_and(short)
+        };
         let known: Vec<Observation> = (observations.iter())
-            .filter(|row| is_known(&row.sv) || self.settings.ionosphere != IonosphereChoice::Combined)
+            .filter(|row| is_known(row) || self.settings.ionosphere != IonosphereChoice::Combined)
             .cloned()
             .collect();
         // The filters of single signals go on: one of two carriers may be lost.
         let smoothed: BTreeMap<Link, Smoothed> =
             observations.iter().map(|row| (row.link(), self.smoother.smooth(row))).collect();
+        // Those of two carriers too, though no message may serve both yet.
+        let mut combined: BTreeMap<(Link, Link), Smoothed> = BTreeMap::new();
+        if self.settings.ionosphere == IonosphereChoice::Combined {
+            for used in paired(observations) {
+                let Used::Combined(pair) = used else { continue };
+                combined.insert((pair.first.link(), pair.second.link()), self.smoother.smooth_combined(&pair));
+            }
+        }
         let used = match self.settings.ionosphere {
             IonosphereChoice::Combined => paired(&known),
             _ => known.iter().map(Used::Single).collect(),
@@ -40,12 +51,23 @@ impl Solver {
                 Used::Single(row) => row,
                 Used::Combined(pair) => pair.first,
             };
-            let in_short = self.reduced.get(&row.sv).filter(|short| short.holds(row.sent())).cloned();
-            let whole = ephemerides.get(&row.sv);
+            let signals = match used {
+                Used::Single(row) => vec![row.signal],
+                Used::Combined(pair) => vec![pair.first.signal, pair.second.signal],
+            };
+            if !signals.iter().all(|signal| ephemerides.is_healthy_on(row.sv, signal)) {
+                return None;
+            }
+            let whole = ephemerides.serving(row.sv, &signals);
+            let in_short = self.reduced.get(&row.sv).filter(|short| short.serves(&signals, row.sent())).cloned();
             let set = whole.or(in_short.as_ref().map(|short| &short.set))?;
             let range = match used {
                 Used::Single(row) => self.single(row, smoothed.get(&row.link())?, set),
-                Used::Combined(pair) => self.combined(pair, set),
+                Used::Combined(pair) => {
+                    let known = combined.get(&(pair.first.link(), pair.second.link())).copied();
+                    let smoothed = known.unwrap_or_else(|| self.smoother.smooth_combined(pair));
+                    self.combined(pair, &smoothed, set)
+                }
             }?;
             let range = self.on_one_time(range);
             Some(match in_short.filter(|_| whole.is_none()) {
@@ -70,7 +92,7 @@ impl Solver {
     }
 
     /// Thermal noise of a code measurement, and the carrier's power over noise density.
-    fn noise(&self, row: &Observation) -> Option<(f64, f64)> {
+    pub(super) fn noise(&self, row: &Observation) -> Option<(f64, f64)> {
         let cn0_hz = libm::pow(10.0, row.cn0_dbhz / 10.0);
         let (_, noise) = self.noises.iter().find(|(signal, _)| *signal == row.signal)?;
         Some((noise.sigma_m(cn0_hz), cn0_hz))
@@ -84,9 +106,8 @@ impl Solver {
     }
 
     /// Velocity comes from the first of the two carriers.
-    fn combined(&mut self, pair: &Combination<'_>, ephemeris: &Ephemeris) -> Option<Range> {
+    fn combined(&self, pair: &Combination<'_>, smoothed: &Smoothed, ephemeris: &Ephemeris) -> Option<Range> {
         let ((first_m, cn0_hz), (second_m, _)) = (self.noise(pair.first)?, self.noise(pair.second)?);
-        let smoothed = self.smoother.smooth_combined(pair);
         let noise_m = pair.sigma(first_m, second_m) * smoothed.variance_ratio.sqrt();
         let range = range(pair.first, ephemeris, smoothed.pseudorange_m, noise_m, cn0_hz)?;
         let second = ephemeris.clock_of_signal(range.emitted, pair.second.signal).ok()?;
@@ -99,8 +120,8 @@ impl Solver {
     }
 }
 
-/// Where the satellite was when it sent what this observation met; `None` when its ephemeris is unhealthy,
-/// stale or no orbit.
+/// Where the satellite was when it sent what this observation met; `None` when its ephemeris is stale or no
+/// orbit.
 fn range(
     observation: &Observation,
     ephemeris: &Ephemeris,
@@ -114,7 +135,7 @@ fn range(
         true => HALF_LONG_FIT_S,
         false => HALF_FIT_S,
     } + FIT_GRACE_S;
-    if !ephemeris.is_healthy() || sent.since(ephemeris.toe).abs() > half_s {
+    if sent.since(ephemeris.toe).abs() > half_s {
         return None;
     }
     // The clock's argument is GPS time; one correction leaves drift × offset², far below a picosecond.

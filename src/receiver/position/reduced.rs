@@ -9,6 +9,7 @@
 use super::Solver;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::galileo::inav::REDUCED_VALID_S;
+use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
 /// Standard deviation of a range by the elements.
@@ -25,9 +26,10 @@ pub(super) struct InShort {
 }
 
 impl InShort {
-    /// Whether it describes the orbit at a time.
-    pub(super) fn holds(&self, at: Epoch) -> bool {
-        (0.0..=REDUCED_VALID_S).contains(&at.since(self.set.toe))
+    /// Whether it describes the orbit at a time, and the clock of some signals.
+    pub(super) fn serves(&self, signals: &[&'static Signal], at: Epoch) -> bool {
+        let holds = (0.0..=REDUCED_VALID_S).contains(&at.since(self.set.toe));
+        holds && signals.iter().all(|signal| (self.set.form.serves)(signal))
     }
 }
 
@@ -42,15 +44,13 @@ impl Solver {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::*;
     use crate::gnss::galileo::e1::E1;
     use crate::gnss::record::Observation;
     use crate::gnss::rinex;
     use crate::gnss::satellite::System;
     use crate::gnss::time::Rate;
-    use crate::receiver::position::{CodeNoise, PositionSettings};
+    use crate::receiver::position::{CodeNoise, PositionSettings, Sets};
     use crate::receiver::track::loops::CodeShape;
 
     #[test]
@@ -75,11 +75,11 @@ mod tests {
             cn0_dbhz: 45.0,
             locked_s: 1.0,
         };
-        let none = BTreeMap::new();
+        let none = Sets::default();
         let mut wants = solver(true);
         assert!(wants.ranges(&[sent(60.0)], &none).is_empty());
         assert!(wants.take_reduced(set.clone(), false) && !wants.take_reduced(set.clone(), false));
-        let noise_m = |solver: &mut Solver, after_s: f64, whole: &BTreeMap<_, _>| -> Vec<f64> {
+        let noise_m = |solver: &mut Solver, after_s: f64, whole: &Sets| -> Vec<f64> {
             solver.ranges(&[sent(after_s)], whole).iter().map(|range| range.noise_m).collect()
         };
         // 2 m of elements and 1.5 m of a delay that is not known; code noise is 0.4 m.
@@ -87,7 +87,7 @@ mod tests {
         assert!(noise_m(&mut wants, 601.0, &none).is_empty() && noise_m(&mut wants, -1.0, &none).is_empty());
         assert!(!wants.take_reduced(set.clone(), true));
         assert!(matches!(noise_m(&mut wants, 60.0, &none)[..], [sigma_m] if (2.0..2.2).contains(&sigma_m)));
-        let whole = BTreeMap::from([(set.sv, set.clone())]);
+        let whole: Sets = [set.clone()].into_iter().collect();
         assert!(matches!(noise_m(&mut wants, 60.0, &whole)[..], [sigma_m] if sigma_m < 1.0));
         let mut other = solver(false);
         assert!(!other.take_reduced(set.clone(), true) && noise_m(&mut other, 60.0, &none).is_empty());

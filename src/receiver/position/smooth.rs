@@ -134,6 +134,21 @@ impl Smoother {
         })
     }
 
+    /// The ionosphere on the first of two carriers by the codes, smoothed by the carriers; its variance is
+    /// over that of one measurement by the codes.
+    pub fn smooth_dispersion(&mut self, pair: &Combination<'_>) -> Smoothed {
+        let parted_mps = |row: &Observation| self.carrier_offset_hz(row.signal) * row.signal.wavelength_m(row.sv);
+        self.take(&Input {
+            key: (pair.first.sv, pair.first.signal, Some(pair.second.signal)),
+            sample: pair.first.sample,
+            pseudorange_m: pair.dispersion_m(),
+            carrier_m: pair.carrier_dispersion_m(),
+            locked_s: pair.locked_s(),
+            offset_hz: -pair.dispersed(parted_mps(pair.second) - parted_mps(pair.first)),
+            metres_per_hz: 1.0,
+        })
+    }
+
     fn take(&mut self, input: &Input) -> Smoothed {
         let fresh = State {
             sample: input.sample,

@@ -26,17 +26,16 @@ impl Session {
 
     /// Two satellites never send the same orbit: the weaker is the other's cross-correlation.
     fn drop_echoes(&mut self) {
-        let content = |e: &Ephemeris| {
-            [e.sqrt_a_sqrtm, e.m0_rad, e.omega0_rad, e.omega_rad, e.eccentricity, e.af0_s].map(f64::to_bits)
-        };
+        let content =
+            |e: &Ephemeris| [e.sqrt_a_sqrtm, e.m0_rad, e.omega0_rad, e.omega_rad, e.eccentricity].map(f64::to_bits);
         let ephemerides = &mut self.shared.ephemerides;
         let mut tracks: Vec<&mut Track> =
             self.front_ends.iter_mut().flat_map(|front_end| front_end.tracks.iter_mut()).collect();
-        let known: Vec<(usize, Sv, f64, [u64; 6])> = tracks
+        let known: Vec<(usize, Sv, f64, [u64; 5])> = tracks
             .iter()
             .enumerate()
             .filter_map(|(index, track)| {
-                let ephemeris = ephemerides.get(&track.channel.sv())?;
+                let ephemeris = ephemerides.of(track.channel.sv()).first()?;
                 Some((index, track.channel.sv(), track.cn0_dbhz, content(ephemeris)))
             })
             .collect();
@@ -44,7 +43,7 @@ impl Session {
             for b in known.iter().skip(place + 1) {
                 if a.1 != b.1 && a.3 == b.3 {
                     let weaker = if a.2 < b.2 { a } else { b };
-                    ephemerides.remove(&weaker.1);
+                    ephemerides.remove(weaker.1);
                     if let Some(track) = tracks.get_mut(weaker.0) {
                         track.dropped = true;
                     }
@@ -103,11 +102,12 @@ impl FrontEnd {
                     }
                     News::Reduced { set, with_delays } => {
                         let serves = shared.solver.take_reduced(*set, with_delays);
-                        (serves && !shared.ephemerides.contains_key(&sv)).then_some(Event::ReducedElements)
+                        (serves && shared.ephemerides.of(sv).is_empty()).then_some(Event::ReducedElements)
                     }
                     News::Ephemeris(ephemeris) => {
-                        let sick = !ephemeris.is_healthy();
-                        let before = shared.ephemerides.insert(sv, *ephemeris).is_some_and(|set| !set.is_healthy());
+                        let is_sick = |set: &Ephemeris| set.is_healthy_on(signal) == Some(false);
+                        let sick = is_sick(&ephemeris);
+                        let before = shared.ephemerides.insert(*ephemeris).as_ref().is_some_and(is_sick);
                         sink.take(Record::Event(EventRow { sample, sv, signal, event: Event::EphemerisComplete }))?;
                         match (before, sick) {
                             (false, true) => Some(Event::Unhealthy),

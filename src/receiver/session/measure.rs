@@ -50,6 +50,7 @@ impl Session {
                 sink.take(Record::Fix(solved.fix.clone()))?;
                 sink.take(Record::Clocks(solved.clocks))?;
                 sink.take(Record::Sights(solved.sights))?;
+                sink.take(Record::Ionosphere(solved.ionosphere))?;
                 let condition = solved.fix.condition;
                 shared.worst_condition = Some(shared.worst_condition.map_or(condition, |worst| worst.max(condition)));
                 shared.fixes += 1;

@@ -55,7 +55,8 @@ impl FrontEnd {
         let mask_rad = self.settings.position.mask_deg.to_radians();
         let one = |link: &Link| {
             let followed = self.tracks.iter().any(|track| track.channel.link() == *link);
-            let ephemeris = shared.ephemerides.get(&link.sv).filter(|set| !followed && set.is_healthy())?;
+            let healthy = shared.ephemerides.is_healthy_on(link.sv, link.signal);
+            let ephemeris = shared.ephemerides.of(link.sv).first().filter(|_| !followed && healthy)?;
             let (doppler, elevation_rad) = seen((here_m, velocity_mps), at, ephemeris)?;
             let doppler_hz = (doppler - fix.clock_drift) * link.carrier_hz() + self.offset.hz();
             (elevation_rad > mask_rad && !self.refused.contains_key(link)).then_some((*link, doppler_hz))

@@ -3,7 +3,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::record::Fix;
 use crate::gnss::satellite::Sv;
@@ -12,7 +11,7 @@ use crate::gnss::time::{Epoch, Rate};
 use crate::receiver::diagnosis::Stage;
 use crate::receiver::observe::Timebase;
 use crate::receiver::position::least_squares::UNKNOWNS;
-use crate::receiver::position::{CodeNoise, NoFix, Noises, Solver};
+use crate::receiver::position::{CodeNoise, NoFix, Noises, Sets, Solver};
 use crate::receiver::settings::Settings;
 
 /// What became of a satellite, for the diagnosis.
@@ -41,7 +40,7 @@ pub(super) struct Shared {
     pub noises: Noises,
     pub timebase: Timebase,
     pub solver: Solver,
-    pub ephemerides: BTreeMap<Sv, Ephemeris>,
+    pub ephemerides: Sets,
     /// The model by which it corrects the ionosphere, if by one, and its coefficients.
     pub ionosphere_model: Option<Model>,
     pub ionosphere: Option<Coefficients>,
@@ -76,7 +75,7 @@ impl Shared {
             timebase: Timebase::new(rate, start),
             solver: Solver::new(&settings.position, noises.clone(), rate),
             noises,
-            ephemerides: BTreeMap::new(),
+            ephemerides: Sets::default(),
             ionosphere_model: settings.position.ionosphere.model(&settings.acquisition.signals()),
             ionosphere: None,
             last_fix: None,
@@ -119,7 +118,7 @@ impl Shared {
         if of(|progress| progress.frame).is_empty() {
             return Stage::NoFrame { with_symbols };
         }
-        let complete: Vec<Sv> = self.ephemerides.keys().copied().collect();
+        let complete: Vec<Sv> = self.ephemerides.satellites().collect();
         if complete.len() < UNKNOWNS {
             let lacking = |(sv, progress): (&Sv, &Progress)| {
                 (progress.frame && !progress.missing.is_empty()).then(|| (*sv, progress.missing.clone()))

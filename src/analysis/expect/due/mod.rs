@@ -196,7 +196,7 @@ impl Expectations {
         let strengths: Vec<f64> = rows.iter().map(|(_, row)| row.cn0_dbhz).collect();
         let usual_dbhz = median(&strengths).unwrap_or(0.0);
         let healthy =
-            self.message.says_healthy(link.sv) || run.scene.faults.iter().any(|fault| fault.kind == FaultKind::Health);
+            self.message.says_healthy(link) || run.scene.faults.iter().any(|fault| fault.kind == FaultKind::Health);
         let plain: Vec<SatelliteEpoch> = rows.iter().map(|(_, row)| *row).collect();
         let required = scene.required(link.sv, &plain, usual_dbhz, healthy);
         let seen = observed.samples(link)?;

@@ -263,7 +263,7 @@ impl<'a> One<'a> {
             .collect();
         let strongest = rays.values().map(|r| r.iter().map(|ray| ray.1).sum::<f64>()).fold(0.0, f64::max).min(0.99);
         let edge_m = match run.scene.code_edge {
-            Edge::Area => edges::CREST * edges::averaged_m(link.signal, run.scene.waveform, run.scene.sample_rate_hz),
+            Edge::Area => edges::CREST * edges::averaged_m(link.signal, run.scene.waveform, run.rate_hz(link.signal)),
             _ => 0.0,
         };
         let span_s = 0.1_f64.max(last.time_s - first.time_s);

@@ -25,6 +25,7 @@ use crate::analysis::waveform::Edge;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
 use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::message::Message as Form;
 use crate::gnss::record::{Event, IonosphereModel, Observation, RayRow, SkyRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal};
@@ -45,6 +46,8 @@ pub struct Choices {
     pub model_sigma_m: f64,
     /// By which broadcast model it corrects the ionosphere, if by one.
     pub ionosphere: Option<Model>,
+    /// Whether it combines two carriers of a satellite.
+    pub combined: bool,
     /// Of the ionosphere's model, as a share of its delay.
     pub ionosphere_error_share: f64,
 }
@@ -70,6 +73,7 @@ impl Choices {
             mask_rad: number("mask_deg")?.to_radians(),
             model_sigma_m: number("model_sigma_m")?,
             ionosphere,
+            combined: word("ionosphere") == Some("combined"),
             ionosphere_error_share: number("ionosphere_error_share").unwrap_or(0.0),
         })
     }
@@ -115,6 +119,8 @@ pub struct Forecast {
     pub sv: Sv,
     /// Which of [`Scene::scales`] its clock is counted against.
     pub clock: usize,
+    /// Of its carrier.
+    pub carrier_hz: f64,
     /// Towards the satellite: east, north, up.
     pub sight: Vector3<f64>,
     /// Expected bias once the ionosphere is corrected, metres.
@@ -168,9 +174,9 @@ pub struct Scene<'r> {
     excluded: HashMap<u64, HashSet<String>>,
     /// From when on each satellite's message is known, in short or whole, and while it says that it is
     /// unhealthy.
-    known: BTreeMap<Sv, u64>,
+    known: BTreeMap<(Sv, &'static str), (u64, &'static Form)>,
     whole: BTreeMap<Sv, u64>,
-    health: BTreeMap<Sv, Vec<(u64, bool)>>,
+    health: BTreeMap<Link, Vec<(u64, bool)>>,
     /// Decibels that filter and converter cost, by signal.
     costs_db: BTreeMap<&'static Signal, f64>,
     /// Error of chip edges with a code at rest, root mean square.
@@ -182,16 +188,22 @@ impl<'r> Scene<'r> {
     pub fn new(run: &'r Run) -> Option<Self> {
         let (mut known, mut whole, mut health) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::<_, Vec<_>>::new());
         for row in &run.events {
+            let message = row.signal.components.iter().find_map(|component| component.message);
+            let mut know = || {
+                if let Some(message) = message {
+                    known.entry((row.sv, message.name)).or_insert((row.sample, message));
+                }
+            };
             match row.event {
                 Event::EphemerisComplete => {
-                    known.entry(row.sv).or_insert(row.sample);
+                    know();
                     whole.entry(row.sv).or_insert(row.sample);
                 }
                 Event::ReducedElements => {
-                    known.entry(row.sv).or_insert(row.sample);
+                    know();
                 }
-                Event::Unhealthy => health.entry(row.sv).or_default().push((row.sample, false)),
-                Event::Healthy => health.entry(row.sv).or_default().push((row.sample, true)),
+                Event::Unhealthy => health.entry(row.link()).or_default().push((row.sample, false)),
+                Event::Healthy => health.entry(row.link()).or_default().push((row.sample, true)),
                 _ => {}
             }
         }
@@ -211,15 +223,16 @@ impl<'r> Scene<'r> {
             costs_db: crate::analysis::expect::spectrum::costs_db(run),
             edges_m: (run.signals.iter())
                 .filter(|_| run.scene.code_edge == Edge::Area)
-                .map(|&signal| (signal, edges::averaged_m(signal, run.scene.waveform, run.scene.sample_rate_hz)))
+                .map(|&signal| (signal, edges::averaged_m(signal, run.scene.waveform, run.rate_hz(signal))))
                 .collect(),
         })
     }
 
-    /// Whether a fix at that sample may use the satellite, by its message.
-    fn usable(&self, sv: Sv, sample: u64) -> bool {
-        let known = self.known.get(&sv).is_some_and(|since| *since <= sample);
-        let last = self.health.get(&sv).and_then(|all| all.iter().rev().find(|(since, _)| *since <= sample));
+    /// Whether a fix at that sample may use the signal of the satellite, by its messages.
+    fn usable(&self, link: Link, sample: u64) -> bool {
+        let mut own = self.known.iter().filter(|((sv, _), _)| *sv == link.sv).map(|(_, known)| known);
+        let known = own.any(|(since, message)| *since <= sample && (message.sets.serves)(link.signal));
+        let last = self.health.get(&link).and_then(|all| all.iter().rev().find(|(since, _)| *since <= sample));
         known && last.is_none_or(|(_, healthy)| *healthy)
     }
 
@@ -251,7 +264,7 @@ impl<'r> Scene<'r> {
             let smooth = parting.take(row.time_s, row.locked_s, parted_m + ray_m);
             let bounced = reflected.take(row.time_s, row.locked_s, ray_m.abs());
             let Some(&fix) = self.fixes.get(&row.sample) else { return };
-            if !self.usable(link.sv, row.sample) {
+            if !self.usable(link, row.sample) {
                 return;
             }
             let Some((one, phase_m)) = self.one(&theory, &row, true_row, sky) else { return };
@@ -295,7 +308,7 @@ impl<'r> Scene<'r> {
         if !in_space && elevation_rad < self.choices.mask_rad - MASK_SLACK_RAD {
             return None;
         }
-        let ephemeris = self.message.ephemeris(true_row.sv, (row.sample, place.time()))?;
+        let ephemeris = self.message.ephemeris(true_row.link(), (row.sample, place.time()))?;
         let look = Look { azimuth_rad: sky.azimuth_deg.to_radians(), elevation_rad };
         let (satellite_m, computed_m) = computed_m(ephemeris, true_row, place)?;
         let carrier_hz = true_row.link().carrier_hz();
@@ -323,6 +336,7 @@ impl<'r> Scene<'r> {
         let forecast = Forecast {
             sv: true_row.sv,
             clock: self.scales.iter().position(|scale| *scale == true_row.signal.time.name).unwrap_or(0),
+            carrier_hz,
             sight: Vector3::new(east * cos, north * cos, sin),
             stepping: is_stepping(&self.run.scene.faults, true_row.sv, row.time_s),
             bias_m: true_m + ahead_m - computed_m - ionosphere_m - sky.troposphere_m,
@@ -351,7 +365,7 @@ impl<'r> Scene<'r> {
     /// Variance that chip edges between samples leave: a code that moves by whole samples within the
     /// smoothing averages it.
     fn edge_m2(&self, row: &Observation) -> f64 {
-        let rate_hz = self.run.scene.sample_rate_hz;
+        let rate_hz = self.run.rate_hz(row.signal);
         let patterns = (row.doppler_hz / row.link().carrier_hz() * rate_hz).abs() * self.choices.smoothing_s.max(1.0);
         let left_m = self.edges_m.get(row.signal).copied().unwrap_or(0.0) / (1.0 + 2.0 * patterns);
         left_m * left_m

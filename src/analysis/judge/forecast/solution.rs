@@ -6,6 +6,9 @@
 //! N⁻¹, and N⁻¹ is what the receiver ought to state. One set of sums a fix is kept, whatever the number of
 //! satellites; of several clocks the first with ranges is the fix's. Limits: weights by the measured C/N0
 //! differ from these by its noise.
+//!
+//! Two bands of a satellite that the receiver combines are one range here too, with a₁ = f₁²/(f₁²−f₂²) and
+//! a₂ = 1 − a₁: what the ionosphere adds to either cancels, noise grows to √(a₁²σ₁² + a₂²σ₂²).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix4, Vector4};
 
@@ -19,6 +22,8 @@ use crate::gnss::record::IonosphereModel;
 struct Sums {
     least: u32,
     most: u32,
+    /// Ranges of the satellite that came last.
+    pending: Vec<Forecast>,
     /// Left out, and whether any range is so wrong that residuals may show it, in whichever satellite.
     blameless: u32,
     faulty: bool,
@@ -45,6 +50,8 @@ struct Sums {
 const IONOSPHERE_SIGMA_M: f64 = 5.0;
 /// Standard deviations from which on a bias is a fault that the residuals may show.
 const FAULT: f64 = 3.0;
+/// Carriers nearer to each other than this share are no two bands.
+const SAME_BAND: f64 = 0.05;
 /// A thin shell's slant is at most 3.2.
 const SHELL: f64 = 0.948;
 
@@ -55,6 +62,7 @@ impl Sums {
         Self {
             least: 0,
             most: 0,
+            pending: Vec::new(),
             blameless: 0,
             faulty: false,
             unsteady: false,
@@ -71,6 +79,26 @@ impl Sums {
             rate_noise: Matrix4::zeros(),
             rate_bias: Vector4::zeros(),
             memory_s: 0.0,
+        }
+    }
+
+    /// Takes a range; they come satellite by satellite.
+    fn take(&mut self, range: Forecast, scene: &Scene<'_>) {
+        if self.pending.first().is_some_and(|first| first.sv != range.sv) {
+            self.finish(scene);
+        }
+        self.pending.push(range);
+    }
+
+    /// Adds what the last satellite has: its two bands farthest apart as one, or all its ranges.
+    fn finish(&mut self, scene: &Scene<'_>) {
+        let own = std::mem::take(&mut self.pending);
+        let pairs = own.iter().flat_map(|a| own.iter().map(move |b| (a, b)));
+        let apart = |(a, b): &(&Forecast, &Forecast)| a.carrier_hz / b.carrier_hz - 1.0;
+        let widest = pairs.max_by(|one, other| apart(one).total_cmp(&apart(other)));
+        match widest.filter(|pair| scene.choices.combined && apart(pair) >= SAME_BAND) {
+            Some((first, second)) => self.add(&combined(first, second), scene.choices.model_sigma_m),
+            None => own.iter().for_each(|range| self.add(range, scene.choices.model_sigma_m)),
         }
     }
 
@@ -166,19 +194,38 @@ pub fn expected(scene: &Scene<'_>, errors: &Errors) -> Result<Vec<Expected>, Jud
     for link in errors.signals.keys() {
         scene.ranges(errors, link, |fix, range| {
             if let Some(sums) = sums.get_mut(fix) {
-                sums.add(&range, scene.choices.model_sigma_m);
+                sums.take(range, scene);
             }
         })?;
     }
+    sums.iter_mut().for_each(|sums| sums.finish(scene));
     let of = |(fix, sums): (&crate::gnss::record::Fix, &Sums)| {
         let sent = matches!(fix.ionosphere, IonosphereModel::Broadcast | IonosphereModel::NequickG);
         let exact = scene.choices.ionosphere_error_share == 0.0 && sent;
-        let corrected = exact || scene.choices.ionosphere.is_none();
+        let combined = fix.ionosphere == IonosphereModel::Combined;
+        let corrected = exact || combined || scene.choices.ionosphere.is_none();
         one(fix.sample, sums, corrected)
     };
-    // The noise of combined carriers is not that of the signals by themselves.
-    let single = |(fix, _): &(&crate::gnss::record::Fix, &Sums)| fix.ionosphere != IonosphereModel::Combined;
-    Ok(scene.run.fixes.iter().zip(&sums).filter(single).filter_map(of).collect())
+    Ok(scene.run.fixes.iter().zip(&sums).filter_map(of).collect())
+}
+
+/// Two bands as one range; what is of the carrier and of the satellite is the first one's, the higher.
+fn combined(first: &Forecast, second: &Forecast) -> Forecast {
+    let square = |range: &Forecast| range.carrier_hz * range.carrier_hz;
+    let a = square(first) / (square(first) - square(second));
+    let b = 1.0 - a;
+    Forecast {
+        // Without the model's correction, which combined ranges do not get.
+        bias_m: a * (first.bias_m + first.ionosphere_m) + b * (second.bias_m + second.ionosphere_m),
+        ionosphere_m: 0.0,
+        noise_m2: a * a * first.noise_m2 + b * b * second.noise_m2,
+        other_m2: a * a * first.other_m2 + b * b * second.other_m2,
+        memory_s: first.memory_s.max(second.memory_s),
+        steady: first.steady && second.steady,
+        near_mask: first.near_mask || second.near_mask,
+        excluded: first.excluded || second.excluded,
+        ..*first
+    }
 }
 
 fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {

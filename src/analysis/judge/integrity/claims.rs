@@ -9,7 +9,7 @@ use super::{Finding, Found};
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::message::orbit_parameters;
 use crate::analysis::read::Run;
-use crate::gnss::record::{Event, IonosphereModel};
+use crate::gnss::record::{Event, EventRow, IonosphereModel};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 
@@ -32,17 +32,18 @@ pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
 
 /// Parameters that a satellite with a complete message lacks.
 fn missing(run: &Run) -> Found {
-    let mut decoded: BTreeMap<Sv, BTreeMap<u32, BTreeSet<&str>>> = BTreeMap::new();
+    let mut decoded: BTreeMap<(Sv, &str), BTreeMap<u32, BTreeSet<&str>>> = BTreeMap::new();
     for row in &run.navigation {
-        decoded.entry(row.sv).or_default().entry(row.issue).or_default().insert(&row.parameter);
+        decoded.entry((row.sv, &row.message)).or_default().entry(row.issue).or_default().insert(&row.parameter);
     }
-    let complete: BTreeSet<Sv> =
-        run.events.iter().filter(|row| row.event == Event::EphemerisComplete).map(|row| row.sv).collect();
+    let complete = run.events.iter().filter(|row| row.event == Event::EphemerisComplete);
+    let message = |row: &EventRow| row.signal.components.iter().find_map(|component| component.message);
+    let complete: BTreeSet<(Sv, &str)> = complete.filter_map(|row| Some((row.sv, message(row)?.name))).collect();
     let mut found = Found::default();
-    for sv in complete {
-        let expected = orbit_parameters(run, sv);
+    for (sv, name) in complete {
+        let expected = orbit_parameters(run, sv).remove(name).unwrap_or_default();
         let lacks = |names: &BTreeSet<&str>| expected.iter().filter(|name| !names.contains(*name)).count();
-        let least = decoded.get(&sv).and_then(|sets| sets.values().map(lacks).min()).unwrap_or(expected.len());
+        let least = decoded.get(&(sv, name)).and_then(|sets| sets.values().map(lacks).min()).unwrap_or(expected.len());
         (0..least).for_each(|_| found.add(|| sv.to_string()));
     }
     // Whoever says that the ionosphere is known has all of its parameters.

@@ -6,6 +6,11 @@ use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::read::Run;
 use crate::gnss::record::Fix;
 
+/// Deviations within which the largest of twelve normals lies with 99 %.
+const WORST_OF_TWELVE: f64 = 3.3;
+/// Half a step of a broadcast group delay, 2⁻³² s: that of E1 and E5a is as much in the measured ionosphere.
+const STEPS_M: f64 = 0.035;
+
 impl Verdict {
     pub(super) fn position(&mut self, run: &Run, summary: &Summary) {
         let position = &summary.position;
@@ -22,6 +27,14 @@ impl Verdict {
             expected(2.4477, |fix| 0.5 * (fix.sigma_east_m * fix.sigma_east_m + fix.sigma_north_m * fix.sigma_north_m));
         let up = expected(1.96, |fix| fix.sigma_up_m * fix.sigma_up_m);
         let clock = expected(1.96, |fix| fix.sigma_clock_m * fix.sigma_clock_m);
+        if let Some(measured) = &summary.ionosphere {
+            // Errors last as long as an arc is smoothed, so that each satellite counts as one: the largest of
+            // a dozen normals stays below 3.3 of their deviations in 99 of 100 runs.
+            let bound = Bound::Max(WORST_OF_TWELVE * measured.stated_rms_m + STEPS_M);
+            let source = "3.3 σ of what the receiver states, and the steps of group delays";
+            let figure = "error of the measured ionosphere, 95 %";
+            self.judge(figure, "ionosphere.error_p95_m", measured.error_p95_m, "m", bound, source);
+        }
         let details = &summary.details;
         let rows = [
             ("horizontal error, 95 %", "position.horizontal_p95_m", position.horizontal_p95_m, flat, "2.45 σ"),

@@ -16,6 +16,7 @@ use crate::analysis::measure::clock;
 use crate::analysis::measure::clock::{Of, Series};
 use crate::analysis::measure::consistency::{Calibration, Consistency};
 use crate::analysis::measure::errors::{Errors, Link, SignalError};
+use crate::analysis::measure::ionosphere::Ionosphere;
 use crate::analysis::measure::jitter::{Jitter as LoopJitter, Loop, Pooled};
 use crate::analysis::measure::lines::Lines;
 use crate::analysis::measure::slips::{Cause, Slips};
@@ -66,6 +67,9 @@ pub struct Summary {
     /// What a spoofer did; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spoofing: Option<Spoofing>,
+    /// The ionosphere that two bands showed; absent without a satellite that has them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ionosphere: Option<Ionosphere>,
     /// How fast the stages ran.
     pub speed: Speed,
     /// Whether there was interference.
@@ -321,6 +325,7 @@ impl Summary {
             psd,
             interference: Lines::of(run),
             spoofing: Spoofing::of(run),
+            ionosphere: Ionosphere::of(run)?,
             jammed: !run.scene.interference.is_empty(),
             speed: run.speed,
             details,

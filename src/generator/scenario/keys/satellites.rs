@@ -75,7 +75,9 @@ pub(crate) const MESSAGE_FAULT: &[Key] = &[
     integer("subframe", 1, 5, "number of the subframe").required().of(&["bit"]),
     integer("word", 1, 10, "word in it").required().of(&["bit"]),
     integer("bit", 1, 30, "bit of the word that is flipped").required().of(&["bit"]),
-    integer("health", 0, 63, "the six bits of health").required().of(&["health"]),
+    integer("health", 0, 511, "the bits of health: GPS has six; of Galileo three each of E1-B, E5b and E5a")
+        .required()
+        .of(&["health"]),
     word("parameter", parameters, "which parameter is wrong").required().of(&["parameter"]),
     number("add", -1e6, 1e6, "in the parameter's unit", "by how much").required().of(&["parameter"]),
 ];

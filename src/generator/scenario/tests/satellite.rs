@@ -73,7 +73,7 @@ fn faults_that_cannot_be_are_refused_with_their_remedy() {
     let jump = refused(&fault("kind = \"orbit\"\nsatellites = [\"G13\"]\non_s = 3\nalong_m = 10"));
     assert!(jump.contains("orbits do not jump"), "{jump}");
     assert!(refused(&message("kind = \"bit\"\nsubframe = 6\nword = 1\nbit = 1")).contains("an integer from 1 to 5"));
-    assert!(refused(&message("kind = \"health\"\nhealth = 64")).contains("an integer from 0 to 63"));
+    assert!(refused(&message("kind = \"health\"\nhealth = 512")).contains("an integer from 0 to 511"));
     let misspelt = refused(&message("kind = \"parameter\"\nparameter = \"m0\"\nadd = 1"));
     assert!(misspelt.contains("did you mean m0_rad?"), "{misspelt}");
     // Half a semicircle of eccentricity does not fit, and the message says what would.

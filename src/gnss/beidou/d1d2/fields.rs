@@ -46,7 +46,7 @@ const STEP_S: f64 = 1e-10;
 #[rustfmt::skip]
 const OF_D1: [Of; 35] = [
     element(Field::new("health", &[(42, 1)], Whole, 0, CLOCK),
-        |o| f64::from(o.ephemeris.health), |o, v| o.ephemeris.health = v as u8),
+        |o| f64::from(o.ephemeris.health), |o, v| o.ephemeris.health = v as u16),
     element(Field::new("aodc", &[(43, 5)], Whole, 0, CLOCK),
         |o| f64::from(o.ephemeris.iodc), |o, v| o.ephemeris.iodc = v as u16),
     element(Field::new("ura_index", &[(48, 4)], Whole, 0, CLOCK),

@@ -18,7 +18,7 @@ mod fields;
 mod reader;
 
 use crate::gnss::bits::{Bits, FieldError, Store, add_to, integers, quantise_all, read_all, write_all};
-use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::broadcast::{Ephemeris, PLAIN};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::message::{IonosphereForm, Message, Sender};
@@ -65,6 +65,8 @@ pub static D1_D2: Message = Message {
     },
     parameters: |symbols| parameters(symbols).map(|found| (true, found)),
     reader: |sv| Box::new(D1D2Reader::new(sv)),
+    form: Ephemeris::clone,
+    sets: &PLAIN,
     quantised,
     adjustable,
     alert: None,

@@ -11,18 +11,19 @@ use crate::gnss::satellite::System;
 use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
 
 use super::fields::GST_WEEK;
+use crate::gnss::galileo::status::{E1B, E5A, E5B};
 
 /// Semi-major axis from which almanacs and reduced elements count.
 pub(super) const NOMINAL_AXIS_M: f64 = 29_600_000.0;
 /// Inclination from which they count, 56°.
 pub(super) const NOMINAL_INCLINATION_RAD: f64 = 56.0 / 180.0 * GPS_PI;
 /// Step of the almanac's reference time, and its last one inside a week.
-const TOA_STEP_S: i64 = 600;
+pub(in crate::gnss::galileo) const TOA_STEP_S: i64 = 600;
 const TOA_LAST_S: i64 = WEEK_S - TOA_STEP_S;
 const HOUR_S: i64 = 3600;
 /// Duration of what carries three satellites, and how many of them there are until all have been sent.
 const TRIPLE_S: i64 = 60;
-const TRIPLES: i64 = 12;
+pub(in crate::gnss::galileo) const TRIPLES: i64 = 12;
 const TRIPLE: u8 = 3;
 
 const ALMANAC: &str = "5.1.10, table 71";
@@ -31,17 +32,18 @@ const OFFSET: &str = "5.1.8, table 69";
 
 /// One satellite in the almanac; number 0 for a place without one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Entry {
-    number: u8,
-    delta_sqrt_a_sqrtm: f64,
-    eccentricity: f64,
-    omega_rad: f64,
-    delta_i_rad: f64,
-    omega0_rad: f64,
-    omega_dot_radps: f64,
-    m0_rad: f64,
-    af0_s: f64,
-    af1_sps: f64,
+pub(in crate::gnss::galileo) struct Entry {
+    pub number: u8,
+    pub delta_sqrt_a_sqrtm: f64,
+    pub eccentricity: f64,
+    pub omega_rad: f64,
+    pub delta_i_rad: f64,
+    pub omega0_rad: f64,
+    pub omega_dot_radps: f64,
+    pub m0_rad: f64,
+    pub af0_s: f64,
+    pub af1_sps: f64,
+    pub e5a_health: u8,
     e5b_health: u8,
     e1b_health: u8,
 }
@@ -67,27 +69,37 @@ impl Entry {
             m0_rad: mean.m0_rad,
             af0_s: mean.af0_s,
             af1_sps: set.af1_sps,
-            e5b_health: set.health >> 4 & 0b11,
-            e1b_health: set.health >> 1 & 0b11,
+            e5a_health: E5A.health(set) as u8,
+            e5b_health: E5B.health(set) as u8,
+            e1b_health: E1B.health(set) as u8,
         }
     }
 }
 
 /// The content of words 7 to 10: three satellites, and the offset of GPS time.
 #[derive(Clone, Debug)]
-pub(super) struct Triple {
-    issue: u8,
-    toa: Epoch,
-    entries: [Entry; TRIPLE as usize],
-    offset: Option<TimePolynomial>,
+pub(in crate::gnss::galileo) struct Triple {
+    pub issue: u8,
+    pub toa: Epoch,
+    pub entries: [Entry; TRIPLE as usize],
+    offset: Offset,
 }
 
+/// By how much the system's time is ahead of GPS time, if something is said of it.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::gnss::galileo) struct Offset(pub Option<TimePolynomial>);
+
 impl Triple {
-    /// What is sent in the minute of `start`.
+    /// What I/NAV sends in the minute of `start`.
     pub(super) fn at(start: Epoch, sets: &[Ephemeris], reference: Epoch, offset: Option<TimePolynomial>) -> Self {
+        let turn = start.tow_whole_s().div_euclid(TRIPLE_S).rem_euclid(TRIPLES) as u8;
+        Self::of(turn, sets, reference, offset)
+    }
+
+    /// The satellites of that turn, counted from 0, of the twelve of an almanac.
+    pub fn of(turn: u8, sets: &[Ephemeris], reference: Epoch, offset: Option<TimePolynomial>) -> Self {
         let toa_s = ((reference.tow_whole_s() + TOA_STEP_S / 2) / TOA_STEP_S * TOA_STEP_S).min(TOA_LAST_S);
         let toa = Epoch::new(reference.week() * WEEK_S + toa_s, 0.0);
-        let turn = start.tow_whole_s().div_euclid(TRIPLE_S).rem_euclid(TRIPLES) as u8;
         let entry = |place: u8| {
             let number = TRIPLE * turn + place + 1;
             let set = sets.iter().find(|set| set.sv.system == System::Galileo && set.sv.number == number);
@@ -95,13 +107,15 @@ impl Triple {
         };
         // Four bits that change with the reference time.
         let issue = (toa_s / TOA_STEP_S).rem_euclid(16) as u8;
-        Self { issue, toa, entries: [0, 1, 2].map(entry), offset }
+        Self { issue, toa, entries: [0, 1, 2].map(entry), offset: Offset(offset) }
     }
+}
 
+impl Offset {
     /// The offset's constant and rate with its reference time of week in hours and week; all ones in the
     /// message, here −1 and 255 and 63, where nothing is said.
-    fn offset_field(&self, field: usize) -> f64 {
-        let Some(offset) = self.offset else { return NO_OFFSET[field] };
+    pub fn field(&self, field: usize) -> f64 {
+        let Some(offset) = self.0 else { return NO_OFFSET[field] };
         let week = (offset.reference.week() - GST_WEEK).rem_euclid(64);
         // The reference time has steps of an hour; the constant is that of the last one before.
         let hours = offset.reference.tow_whole_s() / HOUR_S;
@@ -219,16 +233,23 @@ pub(super) static WORD_10: [Of; 8] = [
 /// The rest of word 10: by how much the system's time is ahead of GPS time. What sets it is [`gps_offset`].
 #[rustfmt::skip]
 pub(super) static GPS_OFFSET: [Of; 4] = [
-    element(Field::new("ggto_a0_s", &[(86, 16)], Signed, -35, OFFSET), |t| t.offset_field(0), |_, _| {}),
-    element(Field::new("ggto_a1_sps", &[(102, 12)], Signed, -51, OFFSET), |t| t.offset_field(1), |_, _| {}),
-    element(Field::new("ggto_t0_h", &[(114, 8)], Whole, 0, OFFSET), |t| t.offset_field(2), |_, _| {}),
-    element(Field::new("ggto_week", &[(122, 6)], Whole, 0, OFFSET), |t| t.offset_field(3), |_, _| {}),
+    element(Field::new("ggto_a0_s", &[(86, 16)], Signed, -35, OFFSET), |t| t.offset.field(0), |_, _| {}),
+    element(Field::new("ggto_a1_sps", &[(102, 12)], Signed, -51, OFFSET), |t| t.offset.field(1), |_, _| {}),
+    element(Field::new("ggto_t0_h", &[(114, 8)], Whole, 0, OFFSET), |t| t.offset.field(2), |_, _| {}),
+    element(Field::new("ggto_week", &[(122, 6)], Whole, 0, OFFSET), |t| t.offset.field(3), |_, _| {}),
 ];
 
 /// By how much the system's time is ahead of GPS time according to word 10, its week near `near`; `None`
 /// where all bits are ones and nothing is said.
 pub fn gps_offset(word: &u128, near: Epoch) -> Option<TimePolynomial> {
-    let [a0, a1, hours, week] = GPS_OFFSET.each_ref().map(|element| (element.field, element.field.read(word)));
+    offset_of(GPS_OFFSET.each_ref().map(|element| (element.field, element.field.read(word))), near)
+}
+
+/// The same of the four fields and their integers, by which any message says it.
+pub(in crate::gnss::galileo) fn offset_of(
+    [a0, a1, hours, week]: [(Field, i64); 4],
+    near: Epoch,
+) -> Option<TimePolynomial> {
     if (a0.1, a1.1, hours.1, week.1) == (-1, -1, 255, 63) {
         return None;
     }

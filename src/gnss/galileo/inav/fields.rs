@@ -6,6 +6,7 @@ use super::reduced::WORD_16;
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::gnss::bits::{Element, Field, element, plain};
 use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::galileo::status::{E1B, E5B};
 use crate::gnss::message::Common;
 use crate::gnss::time::{Epoch, WEEK_S};
 
@@ -14,26 +15,26 @@ pub const GST_WEEK: i64 = 1024;
 
 /// What words 1 to 5 say.
 #[derive(Clone, Debug)]
-pub(super) struct Orbit {
+pub(in crate::gnss::galileo) struct Orbit {
     pub ephemeris: Ephemeris,
     pub nequick: [f64; 3],
 }
 
 /// What word 6 says (5.1.7), and its own time.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Utc {
-    a0_s: f64,
-    a1_sps: f64,
-    leap_s: i64,
-    reference: (i64, i64),
-    event: (i64, i64),
-    leap_after_s: i64,
-    sent_s: i64,
+pub(in crate::gnss::galileo) struct Utc {
+    pub a0_s: f64,
+    pub a1_sps: f64,
+    pub leap_s: i64,
+    pub reference: (i64, i64),
+    pub event: (i64, i64),
+    pub leap_after_s: i64,
+    pub sent_s: i64,
 }
 
 impl Utc {
     /// UTC as a scene has it: GPS time's offset, and by how much the system's own time is ahead of that.
-    pub(super) fn of(common: &Common, start: Epoch) -> Self {
+    pub fn of(common: &Common, start: Epoch) -> Self {
         let utc = &common.utc;
         let reference = utc.polynomial.map_or(common.reference.unwrap_or(start), |polynomial| polynomial.reference);
         let event = utc.event.map_or((start.week(), 7, utc.leap_s), |e| (e.week, i64::from(e.day), e.after_s));
@@ -51,31 +52,21 @@ impl Utc {
     }
 }
 
-const HOUR_S: i64 = 3600;
-const MINUTE_S: f64 = 60.0;
+pub(in crate::gnss::galileo) const HOUR_S: i64 = 3600;
+pub(in crate::gnss::galileo) const MINUTE_S: f64 = 60.0;
 
-const ORBIT: &str = "5.1.1, table 57";
-const CLOCK: &str = "5.1.3, table 62";
-const DELAY: &str = "5.1.5, table 64";
-const IONOSPHERE: &str = "5.1.6, table 65";
-const UTC: &str = "5.1.7, table 68";
-const TIME: &str = "5.1.2, table 59";
+pub(in crate::gnss::galileo) const ORBIT: &str = "5.1.1, table 57";
+pub(in crate::gnss::galileo) const CLOCK: &str = "5.1.3, table 62";
+pub(in crate::gnss::galileo) const DELAY: &str = "5.1.5, table 64";
+pub(in crate::gnss::galileo) const IONOSPHERE: &str = "5.1.6, table 65";
+pub(in crate::gnss::galileo) const UTC: &str = "5.1.7, table 68";
+pub(in crate::gnss::galileo) const TIME: &str = "5.1.2, table 59";
 
 type Of = Element<Orbit>;
 
-fn gst_week(at: Epoch) -> f64 {
+/// The week as messages count it.
+pub(in crate::gnss::galileo) fn gst_week(at: Epoch) -> f64 {
     (at.week() - GST_WEEK).rem_euclid(4096) as f64
-}
-
-/// The status of a signal in [`Ephemeris::health`]: one bit of data validity, then two of signal health;
-/// those of E1-B are the lowest three bits, those of E5b the three above.
-fn status(health: u8, low: u32, bits: u32) -> f64 {
-    f64::from(health >> low & ((1 << bits) - 1))
-}
-
-fn set_status(health: &mut u8, low: u32, bits: u32, value: f64) {
-    let mask = ((1 << bits) - 1) << low;
-    *health = *health & !mask | (value as u8) << low & mask;
 }
 
 /// The issue of data, alike in words 1 to 4.
@@ -157,13 +148,13 @@ pub(super) static WORD_5: [Of; 11] = [
     plain!("bgd_e1_e5a_s", [(47, 10)], Signed, -32, DELAY, ephemeris.tgd2_s),
     plain!("bgd_e1_e5b_s", [(57, 10)], Signed, -32, DELAY, ephemeris.tgd_s),
     element(Field::new("e5b_health", &[(67, 2)], Whole, 0, "5.1.9.7"),
-        |o| status(o.ephemeris.health, 4, 2), |o, v| set_status(&mut o.ephemeris.health, 4, 2, v)),
+        |o| E5B.health(&o.ephemeris), |o, v| E5B.set_health(&mut o.ephemeris, v)),
     element(Field::new("e1b_health", &[(69, 2)], Whole, 0, "5.1.9.7"),
-        |o| status(o.ephemeris.health, 1, 2), |o, v| set_status(&mut o.ephemeris.health, 1, 2, v)),
+        |o| E1B.health(&o.ephemeris), |o, v| E1B.set_health(&mut o.ephemeris, v)),
     element(Field::new("e5b_data_validity", &[(71, 1)], Whole, 0, "5.1.9.6"),
-        |o| status(o.ephemeris.health, 3, 1), |o, v| set_status(&mut o.ephemeris.health, 3, 1, v)),
+        |o| E5B.validity(&o.ephemeris), |o, v| E5B.set_validity(&mut o.ephemeris, v)),
     element(Field::new("e1b_data_validity", &[(72, 1)], Whole, 0, "5.1.9.6"),
-        |o| status(o.ephemeris.health, 0, 1), |o, v| set_status(&mut o.ephemeris.health, 0, 1, v)),
+        |o| E1B.validity(&o.ephemeris), |o, v| E1B.set_validity(&mut o.ephemeris, v)),
     week(&[(73, 12)]),
     tow(&[(85, 20)]),
 ];

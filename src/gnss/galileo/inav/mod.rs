@@ -1,14 +1,15 @@
-//! The Galileo integrity navigation message (I/NAV) as E1-B sends it: pages of two seconds, encoded and
-//! decoded.
+//! The Galileo integrity navigation message (I/NAV) as E1-B and E5b-I send it: pages of two seconds, encoded
+//! and decoded.
 //!
 //! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is
 //! a pattern of ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both
 //! parts carry one word of 128 bits and a check. Limits: Of almanacs (words 7 to 10) only the offset of GPS
 //! time is read. Alert pages keep their place and say nothing. The bits reserved for authentication and the
-//! return link are zero.
+//! return link are zero, as satellites send them on E5b.
 
-mod almanac;
-mod fields;
+pub(super) mod almanac;
+mod e5b;
+pub(super) mod fields;
 mod reader;
 mod reduced;
 mod redundancy;
@@ -16,10 +17,12 @@ mod redundancy;
 use crate::gnss::bits::{
     Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
 };
-use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::crc::crc24q;
 use crate::gnss::fec::convolutional::Convolutional;
 use crate::gnss::fec::interleaver::Interleaver;
+use crate::gnss::galileo::fnav::FNAV_SETS;
+use crate::gnss::galileo::status::{self, Band};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::message::{Common, IonosphereForm, Message, Sender};
 use crate::gnss::nequick::NequickG;
@@ -27,6 +30,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
 pub use almanac::gps_offset;
 use almanac::{GPS_OFFSET, Triple, WORD_7, WORD_8, WORD_9, WORD_10};
+pub use e5b::INAV_E5B;
 pub use fields::{GST_WEEK, sisa_index, tables};
 use fields::{Orbit, Utc, WORD_1, WORD_2, WORD_3, WORD_4, WORD_5, WORD_6};
 pub use reader::InavReader;
@@ -41,28 +45,61 @@ pub static INAV: Message = Message {
     unit_s: PAGE_S,
     // The even part begins at an odd second on E1-B (4.3.2.2).
     first_s: 1,
-    sender: |common| Ok(Box::new(Pages { common: common.clone() })),
+    sender: |common| Ok(Box::new(Pages { common: common.clone(), carrier: &ON_E1B })),
     number: word_at,
     timed: &[SPARE, 5, 6],
     set: &[1, 2, 3, 4, 5],
     reduced: &[REDUCED],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| word_at(start) == 5, coefficients: ionosphere },
-    set_parameters: || {
-        let words = tables().into_iter().filter(|(name, _)| ["word 1", "word 2", "word 3", "word 4"].contains(name));
-        words.flat_map(|(_, fields)| fields).map(|field| field.name).collect()
-    },
+    set_parameters: of_issue,
     elements: of_integers,
-    parameters: |symbols| {
-        let (bits, _) = decode_page(symbols)?;
-        let word = word_of(&bits);
-        parameters(&word).map(|found| (WORDS_OF_SET.contains(&word_type(&word)), found))
-    },
+    parameters: opened,
     reader: |sv| Box::new(InavReader::new(sv)),
+    form,
+    sets: &INAV_SETS,
     quantised,
     adjustable,
     alert: Some(alerted),
     adjust,
 };
+
+/// The set as I/NAV has it, of either message.
+fn form(set: &Ephemeris) -> Ephemeris {
+    let ahead_s = if *set.form == FNAV_SETS { status::fnav_ahead_s(set) } else { 0.0 };
+    Ephemeris { form: &INAV_SETS, af0_s: set.af0_s - ahead_s, ..set.clone() }
+}
+
+/// Sets of I/NAV, on either carrier: the clock of E1 and E5b.
+pub static INAV_SETS: SetForm = SetForm {
+    name: "I/NAV",
+    group_delay_s: status::against_inav_s,
+    serves: |signal| signal.carries(&INAV) || signal.carries(&INAV_E5B),
+    given_delay_s: |set| set.tgd_s,
+    is_healthy: |set| status::E1B.is_good(set),
+    healthy: |set, signal| status::healthy(set, signal, &[Band::E1, Band::E5b]),
+    // Of E1-B, the clock that of E5b and E1 (RINEX 3.05, table A8).
+    rinex_sources: Some(513.0),
+};
+
+/// What differs from one carrier to the other.
+struct On {
+    message: &'static Message,
+    /// Type of the word that begins at a time.
+    word_at: fn(Epoch) -> u8,
+    /// The bits of the odd part before the check and after it, by the time of the page.
+    rest: fn(Epoch) -> (u64, u8),
+}
+
+static ON_E1B: On = On { message: &INAV, word_at, rest: |start| (0, pattern(start)) };
+
+/// The secondary synchronisation pattern, by the time within six seconds (4.3.2.3, table 41).
+fn pattern(start: Epoch) -> u8 {
+    match start.tow_whole_s().rem_euclid(6) {
+        1 => 0x04,
+        3 => 0x2B,
+        _ => 0x2F,
+    }
+}
 
 /// Seconds of a page.
 const PAGE_S: i64 = 2;
@@ -82,16 +119,18 @@ const WORD_BEGIN: usize = 2;
 /// Where the check begins in the odd part, and its length (5.1.9.4); before it, it covers everything.
 const CHECK_BEGIN: usize = 82;
 const CHECK_BITS: usize = 24;
-/// Where the secondary synchronisation pattern begins in the odd part (4.3.2.3).
-const SSP_BEGIN: usize = 106;
-const SSP_BITS: usize = 8;
+/// Where the bits before the check begin in the odd part, and those after it (4.3.2.3).
+const RESERVED_BEGIN: usize = 18;
+const RESERVED_BITS: usize = 64;
+const LAST_BEGIN: usize = 106;
+const LAST_BITS: usize = 8;
 /// The word that has nothing to say (5.1.9.11), that of reduced elements, and those of a set of elements.
 const SPARE: u8 = 0;
 const REDUCED: u8 = 16;
 const WORDS_OF_SET: [u8; 4] = [1, 2, 3, 4];
 
 /// The code of a part (4.1.4).
-fn code() -> Convolutional {
+pub(super) fn code() -> Convolutional {
     Convolutional { second_inverted: planted!("gnss.inav.second_symbol", true, false) }
 }
 
@@ -100,6 +139,19 @@ const INTERLEAVER: Interleaver = Interleaver { columns: 30, rows: 8 };
 /// From when on satellites send redundancy: the document has it since January 2021, satellites got it later.
 /// The real words that it was compared with are of 2025.
 const REDUNDANT_SINCE_WEEK: i64 = 2243;
+
+/// The parameters in the symbols of a page, and whether they are a set's.
+fn opened(symbols: &[bool]) -> Option<(bool, Vec<(&'static str, i64)>)> {
+    let (bits, _) = decode_page(symbols)?;
+    let word = word_of(&bits);
+    parameters(&word).map(|found| (WORDS_OF_SET.contains(&word_type(&word)), found))
+}
+
+/// Names of the parameters in words 1 to 4.
+fn of_issue() -> Vec<&'static str> {
+    let words = tables().into_iter().filter(|(name, _)| ["word 1", "word 2", "word 3", "word 4"].contains(name));
+    words.flat_map(|(_, fields)| fields).map(|field| field.name).collect()
+}
 
 /// Type of the word that begins at a time: the nominal sequence of E1-B (4.3.5, table 38). Before 2023 spare
 /// words are where redundancy is since.
@@ -131,16 +183,18 @@ pub fn word_type(word: &u128) -> u8 {
 /// Makes the pages of satellites.
 struct Pages {
     common: Common,
+    carrier: &'static On,
 }
 
 impl Sender for Pages {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.tow_whole_s() % PAGE_S != INAV.first_s || start.fraction() != 0.0 {
-            let expected = "an odd whole second";
-            return Err(FieldError::Start { message: INAV.name, start_s: start.tow_s(), expected });
+        let On { message, word_at, rest } = self.carrier;
+        if start.tow_whole_s() % PAGE_S != message.first_s || start.fraction() != 0.0 {
+            let expected = if message.first_s == 1 { "an odd whole second" } else { "an even whole second" };
+            return Err(FieldError::Start { message: message.name, start_s: start.tow_s(), expected });
         }
         let word = self.word(word_at(start), ephemeris, start)?;
-        Ok(encode_page(&page(&word, start)))
+        Ok(encode_page(&page_with(&word, rest(start))))
     }
 }
 
@@ -209,8 +263,13 @@ fn alternate(word: &mut u128, from: usize, to: usize) {
     }
 }
 
-/// The two parts of a nominal page around a word, checked and with their tails.
+/// The two parts of a nominal page of E1-B around a word, checked and with their tails.
 pub fn page(word: &u128, start: Epoch) -> [Vec<bool>; 2] {
+    page_with(word, (ON_E1B.rest)(start))
+}
+
+/// The same with the rest of the odd part.
+fn page_with(word: &u128, (reserved, last): (u64, u8)) -> [Vec<bool>; 2] {
     let mut even = vec![false; PART_BITS];
     let mut odd = vec![false; PART_BITS];
     odd[0] = true;
@@ -220,15 +279,10 @@ pub fn page(word: &u128, start: Epoch) -> [Vec<bool>; 2] {
     let mut bits = bits_of(*word, WORD_BITS);
     put(&mut even, WORD_BEGIN, &mut bits.by_ref().take(EVEN_WORD_BITS));
     put(&mut odd, WORD_BEGIN, &mut bits);
+    put(&mut odd, RESERVED_BEGIN, &mut bits_of(u128::from(reserved), RESERVED_BITS));
     let check = crc24q(covered(&even, &odd));
     put(&mut odd, CHECK_BEGIN, &mut bits_of(u128::from(check), CHECK_BITS));
-    // By the time within six seconds (4.3.2.3, table 41).
-    let pattern = match start.tow_whole_s().rem_euclid(6) {
-        1 => 0x04,
-        3 => 0x2B,
-        _ => 0x2F,
-    };
-    put(&mut odd, SSP_BEGIN, &mut bits_of(pattern, SSP_BITS));
+    put(&mut odd, LAST_BEGIN, &mut bits_of(u128::from(last), LAST_BITS));
     [even, odd]
 }
 
@@ -318,7 +372,8 @@ pub fn parameters(word: &u128) -> Option<Vec<(&'static str, i64)>> {
 
 /// The elements that raw integers of words 1 to 5 give, as if they had been sent at `near`.
 fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option<Ephemeris> {
-    let mut orbit = Orbit { ephemeris: Ephemeris::blank(sv, near), nequick: [0.0; 3] };
+    let blank = Ephemeris { form: &INAV_SETS, ..Ephemeris::blank(sv, near) };
+    let mut orbit = Orbit { ephemeris: blank, nequick: [0.0; 3] };
     for table in of_set() {
         let mut word = 0_u128;
         // The week and time of word 5 are those of its sending, which the set has already.
@@ -392,7 +447,8 @@ fn elements(sv: Sv, words: [&u128; 5], near: Epoch) -> Option<Ephemeris> {
     if !same || four.piece((16, 6)) != u32::from(sv.number) {
         return None;
     }
-    let mut orbit = Orbit { ephemeris: Ephemeris::blank(sv, sent_at(five, near)?), nequick: [0.0; 3] };
+    let blank = Ephemeris { form: &INAV_SETS, ..Ephemeris::blank(sv, sent_at(five, near)?) };
+    let mut orbit = Orbit { ephemeris: blank, nequick: [0.0; 3] };
     for (table, word) in of_set().into_iter().zip(words) {
         read_all(table, word, &mut orbit);
     }

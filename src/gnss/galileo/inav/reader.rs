@@ -7,7 +7,7 @@ use super::{
     INAV, PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, REDUCED, WORDS_OF_SET, decode_any, elements, elements_in_short,
     gps_offset, ionosphere, is_alert, parameters, sent_at, time_of_week, word_of, word_type,
 };
-use crate::gnss::message::{Read, Reader};
+use crate::gnss::message::{Message, Read, Reader};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
@@ -19,6 +19,8 @@ const FAILURES: u32 = 5;
 #[derive(Clone, Debug)]
 pub struct InavReader {
     sv: Sv,
+    /// That of its carrier.
+    message: &'static Message,
     /// The latest symbols, a page at most; `next` numbers the one to come.
     symbols: VecDeque<f32>,
     next: u64,
@@ -38,10 +40,16 @@ pub struct InavReader {
 }
 
 impl InavReader {
-    /// A reader that has read nothing.
+    /// A reader of E1-B that has read nothing.
     pub fn new(sv: Sv) -> Self {
+        Self::of(&INAV, sv)
+    }
+
+    /// The same of either carrier.
+    pub(super) fn of(message: &'static Message, sv: Sv) -> Self {
         Self {
             sv,
+            message,
             symbols: VecDeque::with_capacity(PAGE_SYMBOLS),
             next: 0,
             page: None,
@@ -139,7 +147,7 @@ impl InavReader {
     }
 
     fn rows(&self, word: &u128, issue: u32) -> Vec<NavigationRow> {
-        NavigationRow::each(self.sv, super::INAV.name, issue, parameters(word).unwrap_or_default()).collect()
+        NavigationRow::each(self.sv, self.message.name, issue, parameters(word).unwrap_or_default()).collect()
     }
 }
 

@@ -106,6 +106,7 @@ impl Reduced {
         let reference = begin(start);
         let omega_rad = libm::atan2(self.ey, self.ex);
         Ephemeris {
+            form: &super::INAV_SETS,
             transmitted: start,
             sqrt_a_sqrtm: (NOMINAL_AXIS_M + self.delta_axis_m).sqrt(),
             eccentricity: libm::hypot(self.ex, self.ey),

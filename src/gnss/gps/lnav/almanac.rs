@@ -73,7 +73,10 @@ impl Almanac {
             toa_s: toa.tow_s(),
             delta_i_rad: mean.inclination_rad - ALMANAC_INCLINATION_SEMICIRCLES * GPS_PI,
             omega_dot_radps: ephemeris.omega_dot_radps,
-            health: if ephemeris.health & 0x20 == 0 { ephemeris.health } else { 0xE0 | (ephemeris.health & 0x1F) },
+            health: match ephemeris.health as u8 {
+                whole if whole & 0x20 == 0 => whole,
+                bad => 0xE0 | (bad & 0x1F),
+            },
             sqrt_a_sqrtm: mean.sqrt_a_sqrtm,
             omega0_rad: mean.omega0_rad,
             omega_rad: ephemeris.omega_rad,

@@ -48,7 +48,7 @@ pub(super) static SUBFRAME_1: [Element<Ephemeris>; 11] = [
     element(Field::new("ura_index", &[(73, 4)], Whole, 0, "20.3.3.3.1.3"),
         |e| f64::from(e.ura_index), |e, v| e.ura_index = v as u8),
     element(Field::new("health", &[(77, 6)], Whole, 0, "20.3.3.3.1.4"),
-        |e| f64::from(e.health), |e, v| e.health = v as u8),
+        |e| f64::from(e.health), |e, v| e.health = v as u16),
     element(Field::new("iodc", &[(83, 2), (211, 8)], Whole, 0, "20.3.3.3.1.5"),
         |e| f64::from(e.iodc), |e, v| e.iodc = v as u16),
     element(Field::new("l2_p_data_off", &[(91, 1)], Whole, 0, "20.3.3.3.1.6"),

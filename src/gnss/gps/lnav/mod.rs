@@ -17,7 +17,7 @@ pub use parity::check_parity;
 pub use reader::LnavReader;
 
 use crate::gnss::bits::{add_to, bits_of, integers, number, quantise_all, read_all, write_all};
-use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::broadcast::{Ephemeris, PLAIN, SetForm};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::message::{Common, IonosphereForm, Message, Sender};
@@ -68,11 +68,17 @@ pub static LNAV: Message = Message {
     elements: of_integers,
     parameters: opened,
     reader: |sv| Box::new(LnavReader::new(sv)),
+    form: |set| Ephemeris { form: &LNAV_SETS, ..set.clone() },
+    sets: &LNAV_SETS,
     quantised,
     adjustable,
     alert: None,
     adjust,
 };
+
+/// Sets of LNAV: one group delay, and six bits of health that speak of all signals together (IS-GPS-200N,
+/// 20.3.3.3.3.2 and 20.3.3.3.1.4).
+pub static LNAV_SETS: SetForm = SetForm { name: "LNAV", serves: |signal| signal.carries(&LNAV), ..PLAIN };
 
 /// The page of subframe 4 that carries the ionosphere, counted from 0 (IS-GPS-200N, 20.3.3.5.1.7).
 const IONOSPHERE_PAGE_AT: i64 = 17;
@@ -421,7 +427,7 @@ pub fn ephemeris(
     let week = near.nearest_week(one.parameter("week"), 1024);
     let count = i64::from((one.tow_count + TOW_COUNTS - 1) % TOW_COUNTS);
     let sent = Epoch::new(week * WEEK_S + count * SUBFRAME_S, 0.0);
-    let mut ephemeris = Ephemeris::blank(sv, sent);
+    let mut ephemeris = Ephemeris { form: &LNAV_SETS, ..Ephemeris::blank(sv, sent) };
     read_all(&SUBFRAME_1, &one.data, &mut ephemeris);
     read_all(&SUBFRAME_2, &two.data, &mut ephemeris);
     read_all(&SUBFRAME_3, &three.data, &mut ephemeris);

@@ -44,7 +44,7 @@ pub(super) static SUBFRAME_1: [Of; 17] = [
         |e| f64::from(e.iode), |e, v| (e.iode, e.iodc) = (v as u16, v as u16)),
     // The flag of L5, then that of S.
     element(Field::new("health", &[(154, 2)], Whole, 0, CLOCK),
-        |e| f64::from(e.health), |e, v| e.health = v as u8),
+        |e| f64::from(e.health), |e, v| e.health = v as u16),
     plain!("cuc_rad", [(156, 15)], Signed, -28, ORBIT, cuc_rad),
     plain!("cus_rad", [(171, 15)], Signed, -28, ORBIT, cus_rad),
     plain!("cic_rad", [(186, 15)], Signed, -28, ORBIT, cic_rad),

@@ -15,7 +15,7 @@ mod reader;
 use crate::gnss::bits::{
     Bits, Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
 };
-use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::broadcast::{Ephemeris, PLAIN};
 use crate::gnss::crc::crc24q;
 use crate::gnss::fec::convolutional::Convolutional;
 use crate::gnss::fec::interleaver::Interleaver;
@@ -58,6 +58,8 @@ pub static SPS_NAV: Message = Message {
         (!found.is_empty()).then(|| (matches!(id(&subframe), 1 | 2), found))
     },
     reader: |sv| Box::new(NavReader::new(sv)),
+    form: Ephemeris::clone,
+    sets: &PLAIN,
     quantised,
     adjustable,
     alert: None,

@@ -1,0 +1,63 @@
+//! What the receiver measured of the ionosphere with two bands, against the truth's delays.
+//!
+//! Of the truth's rows of a satellite at a sample, one a signal, the least delay is that of the highest
+//! carrier; (f/1575.42 MHz)² brings it to the receiver's carrier. Limits: delays between the receiver's own
+//! bands count as its error.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::analysis::error::JudgeError;
+use crate::analysis::read::Run;
+use crate::analysis::statistics::{mean, percentile, rms};
+use crate::gnss::gps::l1ca::L1_CA;
+use crate::gnss::record::IonosphereRow;
+
+/// `ionosphere` in `summary.json`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Ionosphere {
+    /// Measurements at samples that the truth has.
+    pub count: usize,
+    /// Mean of the true delays on 1575.42 MHz.
+    pub true_mean_m: f64,
+    /// Root mean square of the errors.
+    pub error_rms_m: f64,
+    /// 95th percentile of the errors' sizes.
+    pub error_p95_m: f64,
+    /// Root mean square of the standard deviations that the receiver states.
+    pub stated_rms_m: f64,
+}
+
+impl Ionosphere {
+    /// `None` without a measurement.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
+    pub fn of(run: &Run) -> Result<Option<Self>, JudgeError> {
+        let (mut errors_m, mut true_m, mut stated_m) = (Vec::new(), Vec::new(), Vec::new());
+        for sv in run.ionosphere.keys() {
+            let carriers = run.truth.keys().filter(|link| link.sv == sv).map(|link| link.carrier_hz());
+            let highest_hz = carriers.fold(0.0, f64::max);
+            let ratio = highest_hz / L1_CA.carrier_hz(sv);
+            let mut delays_m: BTreeMap<u64, f64> = BTreeMap::new();
+            for (sample, delay_m) in run.sky.map(sv, |row| (row.sample, row.ionosphere_m))? {
+                let least_m = delays_m.entry(sample).or_insert(delay_m);
+                *least_m = least_m.min(delay_m);
+            }
+            run.ionosphere.each(sv, |row: IonosphereRow| {
+                let Some(delay_m) = delays_m.get(&row.sample) else { return };
+                let delay_m = ratio * ratio * delay_m;
+                errors_m.push(row.delay_m - delay_m);
+                true_m.push(delay_m);
+                stated_m.push(row.sigma_m);
+            })?;
+        }
+        let sizes_m: Vec<f64> = errors_m.iter().map(|error_m| error_m.abs()).collect();
+        let figures = (mean(&true_m), rms(&errors_m), percentile(&sizes_m, 95.0), rms(&stated_m));
+        let (Some(true_mean_m), Some(error_rms_m), Some(error_p95_m), Some(stated_rms_m)) = figures else {
+            return Ok(None);
+        };
+        Ok(Some(Self { count: errors_m.len(), true_mean_m, error_rms_m, error_p95_m, stated_rms_m }))
+    }
+}

@@ -1,0 +1,69 @@
+//! What the numbers of a set mean by the message that it is of.
+//!
+//! Sources: those of the messages. A set of no message in particular has one group delay of two carriers
+//! (IS-GPS-200N, 20.3.3.3.3.2), BeiDou's two against B3I.
+
+use std::fmt;
+
+use super::{B1I_HZ, B2I_HZ, Ephemeris};
+use crate::gnss::satellite::System;
+use crate::gnss::signal::Signal;
+
+/// What clock, delays and health of a set mean: messages of one satellite have the same orbit, but clocks of
+/// other signals.
+pub struct SetForm {
+    /// Name of the message.
+    pub name: &'static str,
+    /// By how much less than a set's clock the clock reads for a user of a signal alone.
+    pub group_delay_s: fn(&Ephemeris, &Signal) -> f64,
+    /// Whether a decoded set is enough for ranges of a signal: with its delays the message is complete.
+    pub serves: fn(&Signal) -> bool,
+    /// The group delay on the carrier of which the message gives it.
+    pub given_delay_s: fn(&Ephemeris) -> f64,
+    /// Whether a set says that the first of the signals that it speaks of may be used.
+    pub is_healthy: fn(&Ephemeris) -> bool,
+    /// Whether a set says that a signal may be used; `None` where it says nothing of it.
+    pub healthy: fn(&Ephemeris, &Signal) -> Option<bool>,
+    /// Data sources as records of RINEX name them; none of messages whose records have no such field.
+    pub rinex_sources: Option<f64>,
+}
+
+/// A set of no message in particular: one group delay, which goes with 1/f², and health of all signals
+/// together.
+pub static PLAIN: SetForm = SetForm {
+    name: "",
+    group_delay_s: plain_delay_s,
+    serves: |_| true,
+    given_delay_s: |set| set.tgd_s,
+    is_healthy: |set| set.health == 0,
+    healthy: |set, _| Some(set.health == 0),
+    rinex_sources: None,
+};
+
+/// The one delay of a set on the carrier of a signal; BeiDou's clock is that of B3I.
+fn plain_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
+    match (set.sv.system, signal.carrier_hz(set.sv)) {
+        (System::BeiDou, B1I_HZ) => set.given_delay_s(),
+        (System::BeiDou, B2I_HZ) => set.tgd2_s,
+        (System::BeiDou, _) => 0.0,
+        _ => set.given_delay_s() * set.dispersion(signal),
+    }
+}
+
+impl fmt::Debug for SetForm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+impl PartialEq for SetForm {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+/// Galileo's data validity and health in the order of a set, of RINEX's: E1-B in bits 0 to 2, E5a in 3 to 5,
+/// E5b in 6 to 8; and the other way, for it exchanges the last two.
+pub fn status_of_record(health: u16) -> u16 {
+    health & 0b111 | (health >> 6 & 0b111) << 3 | (health >> 3 & 0b111) << 6
+}

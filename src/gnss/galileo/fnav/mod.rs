@@ -1,0 +1,301 @@
+//! The Galileo freely accessible navigation message (F/NAV) of E5a-I: pages of ten seconds, encoded and
+//! decoded.
+//!
+//! Source: Galileo OS SIS ICD 2.1, 4.2 and 5.1. A page is a pattern of twelve symbols and 244 bits, coded
+//! ([`Convolutional`]) and interleaved ([`Interleaver`]). Its clock is that of E1 and E5a. Limits: of
+//! almanacs nothing is read. Flags of ionospheric storms are zero. Satellites begin their almanacs at places
+//! of their own; here all begin at the same one.
+//!
+//! [`Convolutional`]: crate::gnss::fec::convolutional::Convolutional
+
+mod fields;
+mod reader;
+
+use crate::gnss::bits::{
+    Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
+};
+use crate::gnss::broadcast::{Ephemeris, SetForm};
+use crate::gnss::crc::crc24q;
+use crate::gnss::fec::interleaver::Interleaver;
+use crate::gnss::galileo::inav::almanac::{Offset, TRIPLES, Triple, offset_of};
+use crate::gnss::galileo::inav::fields::{Orbit, Utc};
+use crate::gnss::galileo::inav::{GST_WEEK, INAV, code};
+use crate::gnss::galileo::status::{self, Band};
+use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Sender};
+use crate::gnss::nequick::NequickG;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
+pub use fields::tables;
+use fields::{PAGE_1, PAGE_2, PAGE_3, PAGE_4, PAGE_4_GPS, PAGE_4_UTC, PAGE_5, PAGE_6};
+pub use reader::FnavReader;
+
+/// F/NAV as signals name it.
+pub static FNAV: Message = Message {
+    name: "F/NAV",
+    symbol_s: 0.02,
+    unit_s: PAGE_S,
+    first_s: 0,
+    sender: |common| Ok(Box::new(Pages { common: common.clone() })),
+    number: page_at,
+    timed: &PAGES_OF_SET,
+    set: &PAGES_OF_SET,
+    reduced: &[],
+    ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| page_at(start) == 1, coefficients: ionosphere },
+    set_parameters: || {
+        let names = of_set().into_iter().flatten().map(|element| element.field.name);
+        names.filter(|name| *name != "tow_s").collect()
+    },
+    elements: of_integers,
+    parameters: |symbols| {
+        let soft: Vec<f32> = symbols.iter().map(|&bit| if bit { -1.0 } else { 1.0 }).collect();
+        let (page, _) = decode_soft(&soft)?;
+        parameters(&page).map(|found| (true, found))
+    },
+    reader: |sv| Box::new(FnavReader::new(sv)),
+    form: |set| {
+        let ahead_s = if *set.form == FNAV_SETS { 0.0 } else { status::fnav_ahead_s(set) };
+        Ephemeris { form: &FNAV_SETS, af0_s: set.af0_s + ahead_s, ..set.clone() }
+    },
+    sets: &FNAV_SETS,
+    quantised,
+    adjustable,
+    alert: None,
+    adjust,
+};
+
+/// Sets of F/NAV: its clock and its delay are those of E1 and E5a (5.1.5, table 66).
+pub static FNAV_SETS: SetForm = SetForm {
+    name: "F/NAV",
+    group_delay_s: status::against_fnav_s,
+    serves: |signal| signal.carries(&FNAV) || signal.carries(&INAV),
+    given_delay_s: |set| set.tgd2_s,
+    is_healthy: |set| status::E5A.is_good(set),
+    healthy: |set, signal| status::healthy(set, signal, &[Band::E5a]),
+    // Of E5a-I, the clock that of E5a and E1 (RINEX 3.05, table A8).
+    rinex_sources: Some(258.0),
+};
+
+/// Seconds of a page, and of the two sub-frames in which all pages have their places (4.2.3).
+const PAGE_S: i64 = 10;
+const SUBFRAME_S: i64 = 50;
+const PAIR_S: i64 = 2 * SUBFRAME_S;
+/// Symbols of the pattern with which a page begins (4.2.2.1), and of a page.
+const PATTERN: [bool; 12] = [true, false, true, true, false, true, true, true, false, false, false, false];
+const PAGE_SYMBOLS: usize = 500;
+/// Bits of a page without and with its check, and with the tail of zeros (4.2.2.2).
+const DATA_BITS: usize = 214;
+const CHECK_BITS: usize = 24;
+const PAGE_BITS: usize = 244;
+/// The pages of a set of elements, all of which say their time.
+const PAGES_OF_SET: [u8; 4] = [1, 2, 3, 4];
+
+const INTERLEAVER: Interleaver = Interleaver { columns: 61, rows: 8 };
+
+/// Bits that nobody reads, as satellites sent them in 2025: ones and zeros in turn, by page with the first
+/// place and the first bit.
+const SPARE: [(u8, usize, bool); 4] = [(1, 188, true), (3, 206, false), (4, 209, false), (6, 211, false)];
+
+/// Type of the page that begins at a time (4.2.3, table 28): pages 5 and 6 alternate from sub-frame to
+/// sub-frame.
+pub fn page_at(start: Epoch) -> u8 {
+    let place = start.tow_whole_s().rem_euclid(PAIR_S) / PAGE_S + planted!("gnss.fnav.page_order", 0, 1);
+    match place % 5 {
+        4 => 5 + (place / 5 % 2) as u8,
+        place => place as u8 + 1,
+    }
+}
+
+/// The type that a page says it has.
+pub fn page_type(page: &Vec<bool>) -> u8 {
+    page.piece((0, 6)) as u8
+}
+
+/// Makes the pages of satellites.
+struct Pages {
+    common: Common,
+}
+
+impl Sender for Pages {
+    fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        if start.tow_whole_s() % PAGE_S != 0 || start.fraction() != 0.0 {
+            let expected = "a multiple of 10 s";
+            return Err(FieldError::Start { message: FNAV.name, start_s: start.tow_s(), expected });
+        }
+        Ok(encode_page(&self.page(page_at(start), ephemeris, start)?))
+    }
+}
+
+impl Pages {
+    /// A page as it leaves at `start`.
+    fn page(&self, kind: u8, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        let mut page = vec![false; DATA_BITS];
+        page.set_piece((0, 6), u32::from(kind));
+        let common = &self.common;
+        let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
+        let orbit = Orbit { ephemeris: on_air, nequick: common.nequick.unwrap_or_default() };
+        match kind {
+            1 => write_all(&PAGE_1, &orbit, &mut page)?,
+            2 => write_all(&PAGE_2, &orbit, &mut page)?,
+            3 => write_all(&PAGE_3, &orbit, &mut page)?,
+            4 => {
+                write_all(&PAGE_4, &orbit, &mut page)?;
+                write_all(&PAGE_4_UTC, &Utc::of(common, start), &mut page)?;
+                write_all(&PAGE_4_GPS, &Offset(common.galileo), &mut page)?;
+            }
+            _ => {
+                let turn = start.tow_whole_s().div_euclid(PAIR_S).rem_euclid(TRIPLES) as u8;
+                let reference = common.reference.unwrap_or(start);
+                let triple = Triple::of(turn, &common.almanac, reference, common.galileo);
+                let table: &[Element<Triple>] = if kind == 5 { &PAGE_5 } else { &PAGE_6 };
+                write_all(table, &triple, &mut page)?;
+            }
+        }
+        for (_, from, first) in SPARE.into_iter().filter(|(of, _, _)| *of == kind) {
+            page.iter_mut().skip(from).enumerate().for_each(|(place, bit)| *bit = place.is_multiple_of(2) == first);
+        }
+        Ok(page)
+    }
+}
+
+/// The symbols of a page of 214 bits: pattern, then the bits with check and tail, coded and interleaved.
+pub fn encode_page(page: &[bool]) -> Vec<bool> {
+    let check = crc24q(page.iter().copied());
+    let mut bits: Vec<bool> = page.iter().copied().chain(bits_of(u128::from(check), CHECK_BITS)).collect();
+    bits.resize(PAGE_BITS, false);
+    let coded = INTERLEAVER.interleave(&code().encode(&bits));
+    PATTERN.into_iter().chain(coded).collect()
+}
+
+/// The 214 bits in the 500 soft symbols of a page, and whether they came upside down; `None` where the check
+/// is wrong.
+pub fn decode_soft(symbols: &[f32]) -> Option<(Vec<bool>, bool)> {
+    if symbols.len() != PAGE_SYMBOLS {
+        return None;
+    }
+    let sum: f32 = symbols.iter().zip(PATTERN).map(|(soft, bit)| if bit { -soft } else { *soft }).sum();
+    let inverted = sum < 0.0;
+    let sense = if inverted { -1.0 } else { 1.0 };
+    let coded: Vec<f32> = symbols[PATTERN.len()..].iter().map(|soft| soft * sense).collect();
+    let mut bits = code().decode(&INTERLEAVER.deinterleave(&coded));
+    let check = number(&bits[DATA_BITS..DATA_BITS + CHECK_BITS]) as u32;
+    bits.truncate(DATA_BITS);
+    (crc24q(bits.iter().copied()) == check).then_some((bits, inverted))
+}
+
+/// The raw integers of all parameters of a page but its time; `None` for almanacs.
+pub fn parameters(page: &Vec<bool>) -> Option<Parameters> {
+    let mut found = match page_type(page) {
+        1 => integers(&PAGE_1, page),
+        2 => integers(&PAGE_2, page),
+        3 => integers(&PAGE_3, page),
+        4 => [integers(&PAGE_4, page), integers(&PAGE_4_UTC, page), integers(&PAGE_4_GPS, page)].concat(),
+        _ => return None,
+    };
+    found.retain(|(name, _)| *name != "tow_s");
+    Some(found)
+}
+
+fn of_set() -> [&'static [Element<Orbit>]; 4] {
+    [&PAGE_1, &PAGE_2, &PAGE_3, &PAGE_4]
+}
+
+/// Nothing read yet, sent at `at`.
+fn blank(sv: Sv, at: Epoch) -> Orbit {
+    Orbit { ephemeris: Ephemeris { form: &FNAV_SETS, ..Ephemeris::blank(sv, at) }, nequick: [0.0; 3] }
+}
+
+/// The elements that raw integers of pages 1 to 4 give, as if they had been sent at `near`.
+fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
+    let mut orbit = blank(sv, near);
+    for table in of_set() {
+        let mut page = vec![false; DATA_BITS];
+        for field in table.iter().map(|element| &element.field).filter(|field| field.name != "tow_s") {
+            field.write(&mut page, raw(field.name)?);
+        }
+        read_all(table, &page, &mut orbit);
+    }
+    Some(orbit.ephemeris)
+}
+
+/// The coefficients of the ionosphere that raw integers of page 1 give.
+fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
+    let mut found = [0.0; 3];
+    for (name, value) in ["ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"].into_iter().zip(&mut found) {
+        let field = PAGE_1.iter().map(|element| &element.field).find(|field| field.name == name)?;
+        *value = field.value(raw(name)?);
+    }
+    Some(Coefficients::NequickG(NequickG { coefficients: found }))
+}
+
+/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays, and so does what the
+/// message does not say.
+///
+/// # Errors
+/// A value that the message cannot carry.
+pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+    let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
+    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut sent))?;
+    Ok(sent.ephemeris)
+}
+
+/// Parameters by which sets and senders are distinguished, and what all satellites say alike.
+const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
+
+/// Those of pages 1 to 4.
+fn adjustable() -> Vec<&'static str> {
+    let names = of_set().into_iter().flatten().map(|element| element.field.name);
+    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
+}
+
+/// Adds `by` to a parameter of pages 1 to 4 in the unit of the tables; whether there is one.
+fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+    let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
+    let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut sent, by));
+    *ephemeris = sent.ephemeris;
+    found
+}
+
+/// The elements in pages 1 to 4 with the time at which page 1 was sent; `None` where the issues differ or
+/// page 1 is another satellite's.
+fn elements(sv: Sv, pages: [&Vec<bool>; 4], near: Epoch) -> Option<Ephemeris> {
+    let [one, two, three, four] = pages;
+    let same = [two, three, four].iter().all(|page| page.piece((6, 10)) == one.piece((12, 10)));
+    if !same || one.piece((6, 6)) != u32::from(sv.number) {
+        return None;
+    }
+    let mut orbit = blank(sv, sent_at(one, near)?);
+    for (table, page) in of_set().into_iter().zip(pages) {
+        read_all(table, page, &mut orbit);
+    }
+    Some(orbit.ephemeris)
+}
+
+/// A page's own week and time of week, the week near `near`; `None` for pages without them.
+fn sent_at(page: &Vec<bool>, near: Epoch) -> Option<Epoch> {
+    let week = match page_type(page) {
+        1 => page.piece((155, 12)),
+        2 => page.piece((182, 12)),
+        3 => page.piece((174, 12)),
+        _ => return None,
+    };
+    let week = near.nearest_week(i64::from(week) + GST_WEEK, 4096);
+    Some(Epoch::new(week * WEEK_S + time_of_week(page)?, 0.0))
+}
+
+/// Seconds of the week at which a page began, of pages that say them.
+fn time_of_week(page: &Vec<bool>) -> Option<i64> {
+    let first = match page_type(page) {
+        1 => 167,
+        2 => 194,
+        3 => 186,
+        4 => 189,
+        _ => return None,
+    };
+    Some(i64::from(page.piece((first, 20)))).filter(|tow_s| *tow_s < WEEK_S)
+}
+
+/// By how much the system's time is ahead of GPS time according to page 4.
+fn gps_offset(page: &Vec<bool>, near: Epoch) -> Option<TimePolynomial> {
+    offset_of(PAGE_4_GPS.each_ref().map(|element| (element.field, element.field.read(page))), near)
+}

@@ -1,0 +1,107 @@
+//! Validity and health of Galileo's signals as sets keep them, and the clocks of its two messages.
+//!
+//! Source: Galileo OS SIS ICD 2.1, 5.1.9.6 and 5.1.9.7 (status), 5.1.5 (broadcast group delays). I/NAV has
+//! the clock of the combination of E1 and E5b, F/NAV that of E1 and E5a; a set keeps BGD(E1,E5b) in `tgd_s`
+//! and BGD(E1,E5a) in `tgd2_s`, whichever clock it has.
+
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::signal::Signal;
+
+/// Where the three bits of a signal are in [`Ephemeris::health`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Status {
+    low: u32,
+}
+
+/// Of E1-B.
+pub(super) const E1B: Status = Status { low: 0 };
+/// Of E5b.
+pub(super) const E5B: Status = Status { low: 3 };
+/// Of E5a.
+pub(super) const E5A: Status = Status { low: 6 };
+
+impl Status {
+    /// The bit of data validity.
+    pub(super) fn validity(self, set: &Ephemeris) -> f64 {
+        f64::from(set.health >> self.low & 1)
+    }
+
+    /// The two bits of signal health.
+    pub(super) fn health(self, set: &Ephemeris) -> f64 {
+        f64::from(set.health >> (self.low + 1) & 0b11)
+    }
+
+    /// Puts the bit of data validity there.
+    pub(super) fn set_validity(self, set: &mut Ephemeris, value: f64) {
+        set.health = set.health & !(1 << self.low) | (value as u16 & 1) << self.low;
+    }
+
+    /// Puts the bits of signal health there.
+    pub(super) fn set_health(self, set: &mut Ephemeris, value: f64) {
+        let low = self.low + 1;
+        set.health = set.health & !(0b11 << low) | (value as u16 & 0b11) << low;
+    }
+
+    /// Whether all three are zero.
+    pub(super) fn is_good(self, set: &Ephemeris) -> bool {
+        set.health >> self.low & 0b111 == 0
+    }
+}
+
+/// Between the carriers of E5a and E5b.
+const BETWEEN_HZ: f64 = 1_191.795e6;
+/// Between those of E5b and E6.
+const ABOVE_E5_HZ: f64 = 1_240e6;
+
+/// Of which part of the spectrum a signal is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Band {
+    /// E1, and what is beside it.
+    E1,
+    /// The lower side of E5.
+    E5a,
+    /// Its upper side.
+    E5b,
+}
+
+/// The band of a signal.
+pub(super) fn band(signal: &Signal) -> Band {
+    match signal.centre_hz() {
+        hz if hz < BETWEEN_HZ => Band::E5a,
+        hz if hz < ABOVE_E5_HZ => Band::E5b,
+        _ => Band::E1,
+    }
+}
+
+/// Group delay of a signal against the clock of E1 and E5b: BGD(E1,E5b) on E1, (f₁/f)² times that on E5b,
+/// and on E5a what makes the combination of E1 and E5a have the clock of F/NAV.
+pub(super) fn against_inav_s(set: &Ephemeris, signal: &Signal) -> f64 {
+    match band(signal) {
+        Band::E5a => set.tgd_s + set.tgd2_s * set.dispersion(signal) - set.tgd2_s,
+        Band::E1 | Band::E5b => set.tgd_s * set.dispersion(signal),
+    }
+}
+
+/// The same against the clock of E1 and E5a.
+pub(super) fn against_fnav_s(set: &Ephemeris, signal: &Signal) -> f64 {
+    match band(signal) {
+        Band::E5b => set.tgd2_s + set.tgd_s * set.dispersion(signal) - set.tgd_s,
+        Band::E1 | Band::E5a => set.tgd2_s * set.dispersion(signal),
+    }
+}
+
+/// By how much the clock of F/NAV is ahead of that of I/NAV: on E1 both have to be one clock.
+pub(super) fn fnav_ahead_s(set: &Ephemeris) -> f64 {
+    planted!("gnss.fnav.clock", set.tgd2_s - set.tgd_s, set.tgd_s - set.tgd2_s)
+}
+
+/// Whether a set says that a signal may be used, of those bands of which its message says something.
+pub(super) fn healthy(set: &Ephemeris, signal: &Signal, says: &[Band]) -> Option<bool> {
+    let band = band(signal);
+    let status = match band {
+        Band::E1 => E1B,
+        Band::E5a => E5A,
+        Band::E5b => E5B,
+    };
+    says.contains(&band).then(|| status.is_good(set))
+}

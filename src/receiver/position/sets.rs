@@ -1,0 +1,102 @@
+//! The decoded elements: of each satellite those of each of its messages, the latest.
+//!
+//! A set serves the signals whose delays its message has ([`SetForm::serves`]). For several signals together
+//! one set is taken that serves them all, so that they have one clock.
+//!
+//! [`SetForm::serves`]: crate::gnss::broadcast::SetForm::serves
+
+use std::collections::BTreeMap;
+
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+
+/// Sets by satellite.
+#[derive(Clone, Debug, Default)]
+pub struct Sets(BTreeMap<Sv, Vec<Ephemeris>>);
+
+impl Sets {
+    /// Takes a set in place of the one of the same satellite and message, which it returns.
+    pub fn insert(&mut self, set: Ephemeris) -> Option<Ephemeris> {
+        let own = self.0.entry(set.sv).or_default();
+        if let Some(old) = own.iter_mut().find(|old| old.form == set.form) {
+            return Some(std::mem::replace(old, set));
+        }
+        own.push(set);
+        None
+    }
+
+    /// Forgets the sets of a satellite.
+    pub fn remove(&mut self, sv: Sv) {
+        self.0.remove(&sv);
+    }
+
+    /// Satellites of which there is a set.
+    pub fn satellites(&self) -> impl Iterator<Item = Sv> {
+        self.0.keys().copied()
+    }
+
+    /// All sets of a satellite.
+    pub fn of(&self, sv: Sv) -> &[Ephemeris] {
+        self.0.get(&sv).map_or(&[], Vec::as_slice)
+    }
+
+    /// The set for ranges of some signals of a satellite: of those that serve all of them one of a message
+    /// that the last of them carries, if there is one.
+    pub fn serving(&self, sv: Sv, signals: &[&'static Signal]) -> Option<&Ephemeris> {
+        let serves = |set: &&Ephemeris| signals.iter().all(|signal| (set.form.serves)(signal));
+        let own = |signal: &Signal, set: &Ephemeris| {
+            let mut messages = signal.components.iter().filter_map(|component| component.message);
+            messages.any(|message| message.sets == set.form)
+        };
+        let carried = |set: &&Ephemeris| signals.last().is_some_and(|last| own(last, set));
+        let all = || self.of(sv).iter().filter(serves);
+        all().find(carried).or_else(|| all().next())
+    }
+
+    /// Whether no set of a satellite says that a signal must not be used.
+    pub fn is_healthy_on(&self, sv: Sv, signal: &Signal) -> bool {
+        self.of(sv).iter().all(|set| set.is_healthy_on(signal) != Some(false))
+    }
+}
+
+impl FromIterator<Ephemeris> for Sets {
+    fn from_iter<T: IntoIterator<Item = Ephemeris>>(sets: T) -> Self {
+        let mut all = Self::default();
+        sets.into_iter().for_each(|set| {
+            all.insert(set);
+        });
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::galileo::e1::E1;
+    use crate::gnss::galileo::e5::{E5A, E5B};
+    use crate::gnss::galileo::fnav::FNAV_SETS;
+    use crate::gnss::galileo::inav::INAV_SETS;
+    use crate::gnss::satellite::System;
+    use crate::gnss::time::Epoch;
+
+    #[test]
+    fn each_signal_has_the_set_of_its_own_message_and_a_pair_one_that_has_the_clock_of_both() {
+        let sv = Sv { system: System::Galileo, number: 11 };
+        let blank = Ephemeris::blank(sv, Epoch::from_week(2134, 0.0));
+        let of = |form| Ephemeris { form, ..blank.clone() };
+        let mut sets: Sets = [of(&INAV_SETS)].into_iter().collect();
+        let name = |sets: &Sets, signals: &[&'static Signal]| sets.serving(sv, signals).map(|set| set.form.name);
+        assert_eq!((name(&sets, &[&E1]), name(&sets, &[&E5A])), (Some("I/NAV"), None));
+        assert!(sets.insert(of(&FNAV_SETS)).is_none() && sets.insert(of(&FNAV_SETS)).is_some());
+        let found = [&[&E1][..], &[&E5A], &[&E5B], &[&E1, &E5A], &[&E1, &E5B], &[&E5A, &E5B]];
+        let expected = [Some("I/NAV"), Some("F/NAV"), Some("I/NAV"), Some("F/NAV"), Some("I/NAV"), None];
+        assert_eq!(found.map(|signals| name(&sets, signals)), expected);
+        // Data of E5a not valid: E1 may be used all the same.
+        sets.insert(Ephemeris { health: 1 << 6, ..of(&FNAV_SETS) });
+        assert!(!sets.is_healthy_on(sv, &E5A) && sets.is_healthy_on(sv, &E1));
+        assert_eq!(sets.satellites().collect::<Vec<_>>(), [sv]);
+        sets.remove(sv);
+        assert!(sets.of(sv).is_empty());
+    }
+}

@@ -1,0 +1,47 @@
+//! The shipped scene of two bands through the whole program: positions without ionosphere, and the ionosphere
+//! itself, against the truth. A minute of processors: with `GNSS_TWIN_LONG=1`.
+#![cfg(all(feature = "generator", feature = "receiver", feature = "analysis"))]
+
+use std::path::Path;
+use std::process::Command;
+
+use gnss_twin::gnss::earth::Geodetic;
+use gnss_twin::gnss::record::{Fix, IonosphereModel, TrajectoryRow};
+
+fn rows<T: serde::de::DeserializeOwned>(directory: &Path, name: &str) -> Vec<T> {
+    csv::Reader::from_path(directory.join(name)).unwrap().deserialize().map(Result::unwrap).collect()
+}
+
+#[test]
+fn two_bands_give_a_place_to_a_metre_and_the_ionosphere_to_three_decimetres() {
+    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+        return;
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let place = tempfile::tempdir().unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
+        .current_dir(root)
+        .args(["run", "scenarios/dual_band.toml", "--out"])
+        .arg(place.path().join("run"))
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&done.stdout).into_owned();
+    println!("{text}");
+    // Every row of the verdict passes, or the program says so by its code.
+    assert!(done.status.success(), "{text}");
+    let run = place.path().join("run");
+    let summary: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(run.join("summary.json")).unwrap()).unwrap();
+    let figure = |path: &str| summary.pointer(path).and_then(serde_json::Value::as_f64).unwrap();
+    assert!(figure("/ionosphere/error_p95_m") <= 0.3 && figure("/ionosphere/true_mean_m") > 3.0);
+    let here: Vec<TrajectoryRow> = rows(&run.join("truth"), "trajectory.csv");
+    let here_m = here[0].position_m();
+    let to_enu = Geodetic::from_ecef(&here_m).ecef_to_enu();
+    let fixes: Vec<Fix> = rows(&run.join("rx"), "fixes.csv");
+    let off_m = |fix: &Fix| (to_enu * (fix.position_m() - here_m)).xy().norm();
+    let mut combined: Vec<f64> =
+        fixes.iter().filter(|fix| fix.ionosphere == IonosphereModel::Combined).map(off_m).collect();
+    combined.sort_by(f64::total_cmp);
+    assert!(combined.len() > 200, "{}", combined.len());
+    assert!(combined[combined.len() * 95 / 100] <= 1.0, "{:?}", combined.last());
+}
