@@ -173,6 +173,15 @@ fi
 "$python" "$root/tests/schema.py" "$work/copies" || failed=1
 for copy in "$work"/copies/*.toml; do "$twin" plan "$copy" >/dev/null 2>&1 || { echo "interop: plan $copy failed"; failed=1; }; done
 generate static
+# The metadata beside the samples by SigMF's own validator, which is to refuse a data type that there is not.
+python3 -m venv "$work/sigmf" && "$work/sigmf/bin/pip" install --quiet --disable-pip-version-check sigmf || {
+    echo "interop: cannot install sigmf here" >&2
+    exit 75
+}
+sed 's/"ci8"/"ci9"/' "$work/static.sigmf-meta" >"$work/wrong.sigmf-meta"
+ln "$work/static.sigmf-data" "$work/wrong.sigmf-data"
+"$work/sigmf/bin/sigmf_validate" "$work/static.sigmf-meta" || { echo "interop: sigmf_validate refuses our metadata"; failed=1; }
+! "$work/sigmf/bin/sigmf_validate" "$work/wrong.sigmf-meta" 2>/dev/null || { echo "interop: sigmf_validate takes anything"; failed=1; }
 foreign static 12 0 Broadcast 0 1.5
 
 # Galileo on demand: that receiver's searches drop what they have no time for, so that a busy machine finds no place.
