@@ -8,7 +8,7 @@ use std::path::Path;
 use gnss_twin::generator::truth::Writer;
 use gnss_twin::study::detection::{detections, false_alarms, settings, write};
 
-const TRIALS: u32 = 20_000;
+const TRIALS: u32 = 2000;
 
 fn main() {
     let directory = tempfile::tempdir().unwrap();

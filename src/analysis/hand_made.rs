@@ -12,8 +12,8 @@ use serde::Serialize;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::record::{
-    AcquisitionRow, Event, EventRow, Fix, IonosphereModel, LineRow, NavigationRow, Observation, SkyRow, TrackingRow,
-    TrajectoryRow,
+    AcquisitionRow, Event, EventRow, Fix, IonosphereModel, IonosphereRow, LineRow, NavigationRow, Observation, SkyRow,
+    TrackingRow, TrajectoryRow,
 };
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::Epoch;
@@ -284,4 +284,15 @@ pub(in crate::analysis) fn reported(second: u64, frequency_hz: f64) -> LineRow {
         lines: 1,
         resolution_hz: 635.0,
     }
+}
+
+/// Writes 41 delays that two bands showed of the second satellite, each with an error of its own.
+pub(in crate::analysis) fn two_bands(run: &Path, error_m: impl Fn(u64) -> f64) {
+    let row = |row: u64| IonosphereRow {
+        sample: (FIRST_TICK + row) * RATE_HZ / 10,
+        sv: Sv::gps(PRNS[1]),
+        delay_m: 3.0 + error_m(row),
+        sigma_m: 0.05,
+    };
+    write(&run.join("rx/ionosphere.csv"), &(0..41).map(row).collect::<Vec<_>>());
 }

@@ -75,6 +75,7 @@ fn rinex_records(text: &str) -> Vec<Ephemeris> {
         let (set, v) = keplerian(&lines[at + 1..]);
         let week = v(5, 2) as u32;
         records.push(Ephemeris {
+            form: &lnav::LNAV_SETS,
             transmitted: Epoch::from_week(week, v(7, 0)),
             iodc: v(6, 3) as u16,
             ura_index: ura_index(v(6, 0)),

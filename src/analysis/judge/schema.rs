@@ -133,7 +133,7 @@ pub fn find<'a>(summary: &'a Value, path: &str) -> Option<&'a Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::hand_made::{planted, reported, write};
+    use crate::analysis::hand_made::{planted, reported, two_bands, write};
     use crate::analysis::judge;
     use std::fs;
 
@@ -152,6 +152,7 @@ mod tests {
         let run = planted();
         fs::copy(run.path().join("truth/trajectory.csv"), run.path().join("truth/claimed.csv")).unwrap();
         write(&run.path().join("rx/interference.csv"), &[reported(3, 1e5)]);
+        two_bands(run.path(), |_| 0.1);
         let summary = judge(run.path()).unwrap();
         let mut written = Vec::new();
         paths("", &serde_json::to_value(&summary).unwrap(), &mut written);

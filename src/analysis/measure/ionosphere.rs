@@ -54,10 +54,33 @@ impl Ionosphere {
             })?;
         }
         let sizes_m: Vec<f64> = errors_m.iter().map(|error_m| error_m.abs()).collect();
-        let figures = (mean(&true_m), rms(&errors_m), percentile(&sizes_m, 95.0), rms(&stated_m));
+        let figures = (mean(&true_m), rms(&errors_m), percentile(&sizes_m, 0.95), rms(&stated_m));
         let (Some(true_mean_m), Some(error_rms_m), Some(error_p95_m), Some(stated_rms_m)) = figures else {
             return Ok(None);
         };
         Ok(Some(Self { count: errors_m.len(), true_mean_m, error_rms_m, error_p95_m, stated_rms_m }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::hand_made::{planted, two_bands};
+    use crate::analysis::read::Run;
+
+    #[test]
+    fn its_figures_are_those_of_the_planted_errors() {
+        let run = planted();
+        // Of 41 rows two err by a metre, the others by a decimetre either way; true delays are 3 m.
+        two_bands(run.path(), |row| match row {
+            3 | 30 => 1.0,
+            even if even % 2 == 0 => 0.1,
+            _ => -0.1,
+        });
+        let found = Ionosphere::of(&Run::read(run.path()).unwrap()).unwrap().unwrap();
+        assert_eq!(found.count, 41);
+        assert!((found.true_mean_m - 3.0).abs() < 1e-12 && (found.stated_rms_m - 0.05).abs() < 1e-12, "{found:?}");
+        assert!((found.error_p95_m - 0.1).abs() < 1e-12, "{found:?}");
+        assert!((found.error_rms_m - ((2.0 + 39.0 * 0.01) / 41.0_f64).sqrt()).abs() < 1e-12, "{found:?}");
     }
 }
