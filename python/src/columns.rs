@@ -4,8 +4,8 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 
 use gnss_twin::gnss::record::{
-    AcquisitionRow, ClockRow, Event, EventRow, Fix, Geographic, InterferenceRow, IonosphereModel, LineRow,
-    NavigationRow, Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, Event, EventRow, Fix, Geographic, InterferenceRow, IonosphereModel, IonosphereRow,
+    LineRow, NavigationRow, Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::signal::Signal;
@@ -196,6 +196,7 @@ mod fields {
             ranges, clocks, time_scale }
         SightRow { sample, sv, azimuth_deg, elevation_deg, used }
         ClockRow { sample, time_scale, clock_bias_s, sigma_clock_m }
+        IonosphereRow { sample, sv, delay_m, sigma_m }
         AcquisitionRow { sample, sv, signal, acquired, statistic, threshold, doppler_hz, code_phase_chips, cn0_dbhz }
         LineRow { sample, frequency_hz, jn0_dbhz, js_db, statistic, threshold, lines, resolution_hz }
         TrackingRow { sample, sv, signal, prompt_i, prompt_q, dll_discriminator_chips, pll_discriminator_cycles,

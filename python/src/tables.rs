@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use gnss_twin::generator::truth::{self, TruthError};
 use gnss_twin::gnss::record::{
-    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, InterferenceRow, LineRow, NavigationRow, Observation, PassRow,
-    RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
+    Observation, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss_twin::receiver::output::{self, OutputError};
 use pyo3::prelude::*;
@@ -78,6 +78,7 @@ pub struct Received {
     fixes: Table<(Fix, Geographic)>,
     clocks: Table<ClockRow>,
     sights: Table<SightRow>,
+    ionosphere: Table<IonosphereRow>,
     interference: Table<(LineRow, FrontEnd)>,
     /// Parameters so far: those of one issue are reported once.
     parameters: BTreeSet<NavigationRow>,
@@ -106,6 +107,7 @@ impl output::Sink for Received {
             }
             output::Record::Clocks(rows) => rows.iter().for_each(|row| self.clocks.push(row)),
             output::Record::Sights(rows) => rows.iter().for_each(|row| self.sights.push(row)),
+            output::Record::Ionosphere(rows) => rows.iter().for_each(|row| self.ionosphere.push(row)),
             output::Record::Interference { front_end, row } => self.interference.push(&(row, FrontEnd { front_end })),
         }
         Ok(())
@@ -120,7 +122,10 @@ impl output::Sink for Received {
 impl Received {
     /// The tables by their names; they are empty after it.
     pub fn drain<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        tables!(self, py; acquisition, tracking, events, observations, navigation, fixes, clocks, sights, interference)
+        tables!(
+            self, py;
+            acquisition, tracking, events, observations, navigation, fixes, clocks, sights, ionosphere, interference
+        )
     }
 
     /// The summary as a dictionary; empty before the end.
