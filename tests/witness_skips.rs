@@ -2,8 +2,8 @@
 //!
 //! Reads the notes that the tests of `tests/witness` leave about files outside of the repository
 //! (`tests/witness/data.rs`). Its name sorts behind theirs, and it has no harness that would capture what it
-//! prints. Limits: notes are those of each test's latest run; where tests run one at a time, on the main
-//! thread, they are counted as one.
+//! prints. Limits: notes are those of each test's latest run; tests that run one at a time, on the main
+//! thread, leave none.
 
 use std::collections::BTreeMap;
 use std::path::Path;
