@@ -466,3 +466,97 @@ fn an_interrupted_run_leaves_nothing_and_says_which_signal() {
         assert_eq!(names(here.path()), ["long.toml", "short.toml"], "{signal}");
     }
 }
+
+/// The one object on standard output of a command that succeeds.
+fn object(arguments: &[&str], directory: &Path) -> serde_json::Value {
+    let output = twin(arguments, directory);
+    assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(text.lines().count(), 1, "{text}");
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+#[test]
+fn results_are_words_or_one_object_or_nothing_as_the_flags_say() {
+    let here = workplace();
+    let at = here.path();
+    let plan = object(&["plan", "short.toml", "--json"], at);
+    let in_view = plan["front_ends"][0]["plan"]["satellites"].as_array().unwrap().len();
+    assert!(in_view > 6 && plan["front_ends"][0]["loops"].as_array().unwrap().len() == in_view, "{plan}");
+    let made = object(&["generate", "short.toml", "--out", "if.sigmf-data", "--json"], at);
+    assert_eq!((&made["made"][0]["samples"], &made["samples"]), (&5_200_000.into(), &"if.sigmf-data".into()));
+    assert_eq!(made["made"][0]["satellites"].as_array().unwrap().len(), in_view, "{made}");
+    assert!(at.join(made["truth"].as_str().unwrap()).join("scene.json").exists());
+    let run = object(&["run", "short.toml", "--out", "run", "--json"], at);
+    let summary: serde_json::Value = serde_json::from_slice(&fs::read(at.join("run/summary.json")).unwrap()).unwrap();
+    assert_eq!((&run["summary"], &run["results"]), (&summary, &"run".into()));
+    let count = |verdict: &serde_json::Value| {
+        ["pass", "marginal", "fail"].map(|key| verdict[key].as_u64().unwrap()).iter().sum::<u64>()
+    };
+    let rows = fs::read_to_string(at.join("run/verdict.csv")).unwrap().lines().count() as u64 - 1;
+    assert_eq!(count(&run["verdict"]), rows, "{run}");
+    assert_eq!(run["verdict"]["fail"], run["verdict"]["failed"].as_array().unwrap().len(), "{run}");
+    let again = object(&["analyze", "run", "--json"], at);
+    assert_eq!((&again["verdict"], &again["summary"]["position"]), (&run["verdict"], &summary["position"]));
+    // Two seconds give no fix: exit code 3 and its reason, results none the less.
+    let received = twin(&["receive", "if.sigmf-data", "--out", "rx", "--json"], at);
+    assert_eq!(code(&received), 3, "{}", stderr(&received));
+    let received: serde_json::Value = serde_json::from_slice(&received.stdout).unwrap();
+    let written: serde_json::Value = serde_json::from_slice(&fs::read(at.join("rx/receiver.json")).unwrap()).unwrap();
+    assert_eq!(received["receiver"], written);
+    // The same, and nothing is said.
+    for arguments in [
+        &["plan", "short.toml", "-q"][..],
+        &["generate", "short.toml", "--out", "if.sigmf-data", "--quiet"],
+        &["run", "short.toml", "--out", "run", "--quiet"],
+        &["analyze", "run", "--quiet"],
+    ] {
+        let output = twin(arguments, at);
+        assert_eq!((code(&output), output.stdout.len()), (0, 0), "{arguments:?}: {}", stderr(&output));
+    }
+    let quiet = twin(&["receive", "if.sigmf-data", "--out", "rx", "--quiet"], at);
+    assert_eq!((code(&quiet), quiet.stdout.len()), (3, 0));
+    assert_eq!(stderr(&quiet).lines().count(), 1, "{}", stderr(&quiet));
+    for arguments in [
+        &["run", "short.toml", "--quiet", "--json"][..],
+        &["generate", "short.toml", "--out", "-", "--json"],
+        &["receive", "if.sigmf-data", "--out", "x", "--nmea", "-", "--json"],
+    ] {
+        assert_eq!(code(&twin(arguments, at)), 2, "{arguments:?}");
+    }
+}
+
+#[test]
+fn forms_of_other_programs_lie_in_the_truth_if_they_are_asked_for() {
+    let here = workplace();
+    let at = here.path();
+    let scene = SHORT.replace("duration_s = 2", "duration_s = 1");
+    fs::write(at.join("short.toml"), scene).unwrap();
+    let generate =
+        |more: &[&str]| twin(&[&["generate", "short.toml", "--out", "if.sigmf-data"][..], more].concat(), at);
+    assert_eq!(code(&generate(&[])), 0);
+    let tables = names(&at.join("if.truth"));
+    let all = generate(&["--rinex=4.02", "--nmea", "--maps"]);
+    assert_eq!(code(&all), 0, "{}", stderr(&all));
+    let more: Vec<String> = names(&at.join("if.truth")).into_iter().filter(|name| !tables.contains(name)).collect();
+    let expected = ["navigation.rnx", "observations.rnx", "trajectory.gpx", "trajectory.kml", "trajectory.nmea"]
+        .map(str::to_owned);
+    assert_eq!(more, expected);
+    let text = |name: &str| fs::read_to_string(at.join("if.truth").join(name)).unwrap();
+    let version = |name| text(name).lines().next().unwrap().trim_start()[..4].to_owned();
+    assert_eq!((version("observations.rnx"), version("navigation.rnx")), ("4.02".to_owned(), "4.02".to_owned()));
+    assert_eq!(
+        (text("trajectory.nmea").matches("GGA").count(), text("trajectory.gpx").matches("<trkpt").count()),
+        (10, 1)
+    );
+    for (more, words) in
+        [(&["--rinex=2.11"][..], "expected 3.05 or 4.02"), (&["--out", "-", "--maps"], "--maps lies in the truth")]
+    {
+        let refused = twin(
+            &[&["generate", "short.toml"][..], more, &["--out", "x"][..if more.len() == 1 { 2 } else { 0 }]].concat(),
+            at,
+        );
+        assert_eq!(code(&refused), 2);
+        assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
+    }
+}

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use serde_json::json;
+
 use crate::analysis;
 use crate::analysis::judge::foreign::{self, Files};
 use crate::analysis::judge::schema::SUMMARY;
@@ -10,6 +12,7 @@ use crate::analysis::show;
 use crate::cli::args;
 use crate::cli::check::Gate;
 use crate::cli::error::CliError;
+use crate::cli::printed;
 use crate::cli::run::judge_error;
 use crate::cli::scenario;
 
@@ -24,8 +27,12 @@ pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
     };
     let gate = Gate::read(arguments.check.as_ref(), &SUMMARY)?;
     let summary = analysis::judge_against(run, gate.limits()).map_err(judge_error)?;
-    scenario::print(&format!("{summary}\nresults in {}\n", run.display()))?;
-    gate.enforce(&summary.details.verdict)
+    let verdict = &summary.details.verdict;
+    arguments.printed.results(
+        &format!("{summary}\nresults in {}\n", run.display()),
+        || json!({ "results": run, "summary": summary, "verdict": printed::verdict(verdict) }),
+    )?;
+    gate.enforce(verdict, arguments.printed)
 }
 
 fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliError> {
@@ -43,6 +50,10 @@ fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliEr
     });
     std::fs::create_dir_all(&out).map_err(|error| CliError::create(out.display(), &error))?;
     show::foreign::write(&judgement, &verdict, &out).map_err(judge_error)?;
-    scenario::print(&format!("{}\n{verdict}\nresults in {}\n", judgement.summary, out.display()))?;
-    gate.enforce(&verdict)
+    let text = format!("{}\n{verdict}\nresults in {}\n", judgement.summary, out.display());
+    arguments.printed.results(
+        &text,
+        || json!({ "results": out, "summary": judgement.summary, "verdict": printed::verdict(&verdict) }),
+    )?;
+    gate.enforce(&verdict, arguments.printed)
 }

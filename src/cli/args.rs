@@ -8,7 +8,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
 use crate::cli::packed::Packed;
+use crate::cli::printed::Printed;
 use crate::cli::sink::Spec;
+use crate::gnss::exchange::Version;
 use crate::gnss::samples::Format;
 use crate::gnss::time::Epoch;
 
@@ -135,6 +137,9 @@ pub struct Run {
     /// Threads to use [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    /// Version of the RINEX files: 3.05 or 4.02
+    #[arg(long, value_name = "VERSION", default_value_t)]
+    pub rinex: Version,
     /// Also keep the samples: if.sigmf-data and if.sigmf-meta
     #[arg(long)]
     pub keep_if: bool,
@@ -145,6 +150,8 @@ pub struct Run {
     /// Also read files that lie outside the scenario's directory
     #[arg(long)]
     pub allow_outside: bool,
+    #[command(flatten)]
+    pub printed: Printed,
 }
 
 #[derive(Args, Debug)]
@@ -169,6 +176,16 @@ pub struct Generate {
     /// Directory for the truth of a stream [default: none]
     #[arg(long, value_name = "DIR")]
     pub truth: Option<PathBuf>,
+    /// Also write RINEX into the truth, what an ideal receiver would have and the sets that are sent: 3.05,
+    /// or --rinex=4.02
+    #[arg(long, value_name = "VERSION", num_args = 0..=1, require_equals = true, default_missing_value = "3.05")]
+    pub rinex: Option<Version>,
+    /// Also write the antenna's place into the truth as NMEA 0183: trajectory.nmea
+    #[arg(long)]
+    pub nmea: bool,
+    /// Also write it as tracks for maps, a point a second: trajectory.kml and trajectory.gpx
+    #[arg(long)]
+    pub maps: bool,
     /// Also write NAME.gnss-sdr.conf beside the samples, with which GNSS-SDR opens them
     #[arg(long)]
     pub gnss_sdr: bool,
@@ -190,6 +207,8 @@ pub struct Generate {
     /// Threads to use [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    #[command(flatten)]
+    pub printed: Printed,
 }
 
 #[derive(Args, Debug)]
@@ -321,12 +340,16 @@ pub struct Receive {
     /// tcp:ADDR to listen on
     #[arg(long, value_name = "TO")]
     pub nmea: Option<lines::Spec>,
-    /// JSON lines of fixes, satellites, channels, searches and events: a file, -, fifo:PATH or tcp:ADDR
-    #[arg(long, value_name = "TO")]
-    pub json: Option<lines::Spec>,
-    /// Also write RINEX 3.05: observations.rnx and navigation.rnx
-    #[arg(long)]
-    pub rinex: bool,
+    /// JSON lines of fixes, satellites, channels, searches and events: a file, -, fifo:PATH or tcp:ADDR;
+    /// without one of these, print the results as one JSON object
+    #[arg(long, value_name = "TO", num_args = 0..=1)]
+    pub json: Option<Option<lines::Spec>>,
+    /// Print neither results nor progress: only warnings and errors
+    #[arg(long, short)]
+    pub quiet: bool,
+    /// Also write RINEX, observations.rnx and navigation.rnx: 3.05, or --rinex=4.02
+    #[arg(long, value_name = "VERSION", num_args = 0..=1, require_equals = true, default_missing_value = "3.05")]
+    pub rinex: Option<Version>,
     /// Receiver settings [default: the built-in ones]
     #[arg(long, value_name = "SETTINGS.toml")]
     pub receiver: Option<PathBuf>,
@@ -374,6 +397,8 @@ pub struct Analyze {
     /// Directory for what is found of another receiver [default: reports/<scene's name>-foreign]
     #[arg(long, value_name = "DIR", requires = "truth")]
     pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub printed: Printed,
 }
 
 #[derive(Args, Debug)]
@@ -395,6 +420,8 @@ pub struct Plan {
     /// Also read files that lie outside the scenario's directory
     #[arg(long)]
     pub allow_outside: bool,
+    #[command(flatten)]
+    pub printed: Printed,
 }
 
 #[derive(Args, Debug)]

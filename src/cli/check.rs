@@ -7,6 +7,7 @@ use crate::analysis::judge::limits::Limits;
 use crate::analysis::judge::schema::Figures;
 use crate::analysis::judge::verdict::Verdict;
 use crate::cli::error::CliError;
+use crate::cli::printed::Printed;
 use crate::cli::scenario;
 
 /// What a run must keep for the program to end with 0.
@@ -36,8 +37,9 @@ impl Gate {
         if let Self::Limits(limits) = self { Some(limits) } else { None }
     }
 
-    /// Prints what broke a limit and by how much; exit code 3 if anything did.
-    pub fn enforce(&self, verdict: &Verdict) -> Result<(), CliError> {
+    /// Prints what broke a limit and by how much, if results are printed in words; exit code 3 if anything
+    /// did.
+    pub fn enforce(&self, verdict: &Verdict, printed: Printed) -> Result<(), CliError> {
         let (broken, all, whose): (Vec<&Judgement>, usize, String) = match self {
             Self::Open => return Ok(()),
             Self::Verdict => {
@@ -47,9 +49,12 @@ impl Gate {
             Self::Limits(limits) => (verdict.broken().collect(), verdict.of_user, limits.name.clone()),
         };
         if broken.is_empty() {
-            return scenario::print(&format!("all {all} limits of {whose} hold\n"));
+            let text = format!("all {all} limits of {whose} hold\n");
+            return if printed.in_words() { scenario::print(&text) } else { Ok(()) };
         }
-        scenario::print(&table(&broken))?;
+        if printed.in_words() {
+            scenario::print(&table(&broken))?;
+        }
         Err(CliError::check(format!("{} of {all} limits of {whose} are broken", broken.len())))
     }
 }

@@ -5,10 +5,13 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use serde_json::json;
+
 use crate::cli::args;
 use crate::cli::error::{CliError, shown};
+use crate::cli::generate::truth_files;
 use crate::cli::progress::Progress;
-use crate::cli::run::{generator_error, truth_error};
+use crate::cli::run::generator_error;
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
 use crate::generator::scene::Scene;
@@ -24,9 +27,9 @@ pub fn generate(arguments: &args::Generate, scenes: &[Scene]) -> Result<(), CliE
     let staging = Staging::directory(&arguments.out)?;
     let truth = staging.path().join("truth");
     fs::create_dir(&truth).map_err(|error| CliError::create(truth.display(), &error))?;
-    let mut writer = truth::Writer::create(&truth).map_err(truth_error)?;
+    let mut writer = truth_files(arguments, &truth)?;
     let mut files = names.iter().map(|name| Samples::create(staging.path(), name)).collect::<Result<Vec<_>, _>>()?;
-    let done = samples(scenes, &mut writer, &mut files)?;
+    let done = samples(scenes, &mut writer, &mut files, arguments.printed.in_words())?;
     drop(writer);
     files.into_iter().try_for_each(Samples::finish)?;
     let base = scenes.first().map_or_else(String::new, |scene| scenario::file_name(&scene.name));
@@ -38,10 +41,19 @@ pub fn generate(arguments: &args::Generate, scenes: &[Scene]) -> Result<(), CliE
         text += &format!("{name}: {done}\n");
     }
     let out = shown(&arguments.out);
-    scenario::print(&format!(
-        "{text}in {out}: samples and metadata as NAME.sigmf-data and NAME.sigmf-meta, {base}.sigmf-collection over \
-         them, truth/ of all of them\n"
-    ))
+    text += &format!(
+        "in {out}: samples and metadata as NAME.sigmf-data and NAME.sigmf-meta, {base}.sigmf-collection over them, \
+         truth/ of all of them\n"
+    );
+    arguments.printed.results(&text, || {
+        json!({
+            "samples": arguments.out,
+            "collection": arguments.out.join(format!("{base}.sigmf-collection")),
+            "truth": arguments.out.join("truth"),
+            "front_ends": names,
+            "made": done,
+        })
+    })
 }
 
 /// What several front ends cannot have.
@@ -65,9 +77,15 @@ fn check(arguments: &args::Generate, names: &[&str]) -> Result<(), CliError> {
 }
 
 /// Makes the samples of all front ends, slice by slice.
-fn samples(scenes: &[Scene], truth: &mut truth::Writer, files: &mut [Samples]) -> Result<Vec<Generated>, CliError> {
+fn samples(
+    scenes: &[Scene],
+    truth: &mut dyn truth::Sink,
+    files: &mut [Samples],
+    with_progress: bool,
+) -> Result<Vec<Generated>, CliError> {
     let first = scenes.first().map(|scene| (scene.name.as_str(), scene.samples));
-    let progress = Progress::new(&format!("generate {}", first.unwrap_or_default().0), first.map(|(_, count)| count));
+    let label = format!("generate {}", first.unwrap_or_default().0);
+    let progress = Progress::new(&label, first.map(|(_, count)| count), with_progress);
     let mut fronts = Fronts::new(scenes, truth, &Options::default()).map_err(generator_error)?;
     let mut packed = Vec::new();
     // Which file a write failed on.

@@ -6,6 +6,8 @@ use std::io;
 use std::ops::Range;
 use std::path::Path;
 
+use serde_json::json;
+
 use crate::cli::args;
 use crate::cli::collection;
 use crate::cli::error::{CliError, shown};
@@ -28,6 +30,14 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     let stream = sink::Spec::of_out(&arguments.out)?;
     if stream.is_none() && arguments.truth.is_some() {
         return Err(CliError::usage("--truth names the truth of a stream: that of a file lies beside it"));
+    }
+    let forms = [("--rinex", arguments.rinex.is_some()), ("--nmea", arguments.nmea), ("--maps", arguments.maps)];
+    let wanted = forms.iter().find(|(_, wanted)| *wanted && stream.is_some() && arguments.truth.is_none());
+    if let Some((flag, _)) = wanted {
+        return Err(CliError::usage(format!("{flag} lies in the truth: a stream has one with --truth DIR")));
+    }
+    if arguments.printed.json && matches!(stream, Some(sink::Spec::Stdout)) {
+        return Err(CliError::usage("--json and --out -: standard output takes one of them"));
     }
     let named = scenario::read(Some(&arguments.scenario))?.choose(arguments.front_end.as_deref())?;
     let (mut scenes, warnings) = scenario::compose_all(
@@ -67,7 +77,7 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
         )));
     }
     if let Some(stream) = stream {
-        return to_stream(&stream, arguments.truth.as_deref(), &scene, first..end);
+        return to_stream(&stream, arguments, &scene, first..end);
     }
     let meta_path = arguments.out.with_extension("sigmf-meta");
     let truth_path = arguments.out.with_extension("truth");
@@ -84,8 +94,8 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     let meta = Staging::file(&meta_path)?;
     let truth = Staging::directory(&truth_path)?;
 
-    let mut writer = truth::Writer::create(truth.path()).map_err(truth_error)?;
-    let progress = Progress::new(&format!("generate {}", scene.name), Some(end - first));
+    let mut writer = truth_files(arguments, truth.path())?;
+    let progress = Progress::new(&format!("generate {}", scene.name), Some(end - first), arguments.printed.in_words());
     let options = Options::default();
     let generated = generator::generate_part(
         &scene,
@@ -114,12 +124,29 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
         beside = format!("\nopened by: gnss-sdr --config_file={}", path.display());
     }
 
-    scenario::print(&format!(
-        "{generated}\nsamples in {}, metadata in {}, truth in {}{beside}\n",
-        arguments.out.display(),
-        meta_path.display(),
-        truth_path.display()
-    ))
+    let (out, meta, truth) = (arguments.out.display(), meta_path.display(), truth_path.display());
+    let text = format!("{generated}\nsamples in {out}, metadata in {meta}, truth in {truth}{beside}\n");
+    arguments.printed.results(
+        &text,
+        || json!({ "samples": arguments.out, "metadata": meta_path, "truth": truth_path, "made": [generated] }),
+    )
+}
+
+/// What takes the truth into an existing directory: its tables, and the forms of other programs that are asked
+/// for.
+pub fn truth_files(arguments: &args::Generate, directory: &Path) -> Result<truth::Several, CliError> {
+    let mut sinks: Vec<Box<dyn truth::Sink + Send>> =
+        vec![Box::new(truth::Writer::create(directory).map_err(truth_error)?)];
+    if let Some(version) = arguments.rinex {
+        sinks.push(Box::new(truth::Rinex::new(directory, version)));
+    }
+    if arguments.nmea {
+        sinks.push(Box::new(truth::Nmea::create(directory).map_err(truth_error)?));
+    }
+    if arguments.maps {
+        sinks.push(Box::new(truth::Tracks::new(directory)));
+    }
+    Ok(truth::Several(sinks))
 }
 
 /// The format that was asked for; a dongle's samples are rounded to its own zero from the start.
@@ -129,27 +156,30 @@ fn format(arguments: &args::Generate, stream: Option<&sink::Spec>) -> Option<For
 }
 
 /// Hands the samples of a part of the scene to a reader, and says on standard error what they are.
-fn to_stream(stream: &sink::Spec, truth: Option<&Path>, scene: &Scene, part: Range<u64>) -> Result<(), CliError> {
-    let staging = truth.map(Staging::directory).transpose()?;
-    let mut writer: Box<dyn truth::Sink> = match &staging {
-        Some(staging) => Box::new(truth::Writer::create(staging.path()).map_err(truth_error)?),
-        None => Box::new(()),
+fn to_stream(stream: &sink::Spec, arguments: &args::Generate, scene: &Scene, part: Range<u64>) -> Result<(), CliError> {
+    let staging = arguments.truth.as_deref().map(Staging::directory).transpose()?;
+    let mut writer = match &staging {
+        Some(staging) => truth_files(arguments, staging.path())?,
+        None => truth::Several::default(),
     };
     let metadata = &scene.metadata;
     let mut sink = stream.open(metadata)?;
-    scenario::note(&format!(
-        "samples: {}, {} a second, {} Hz in the middle, {} of them to {stream}",
-        metadata.format,
-        metadata.rate.hz(),
-        metadata.center_hz,
-        part.end - part.start
-    ));
-    let progress = Progress::new(&format!("generate {}", scene.name), Some(part.end - part.start));
+    if arguments.printed.in_words() {
+        scenario::note(&format!(
+            "samples: {}, {} a second, {} Hz in the middle, {} of them to {stream}",
+            metadata.format,
+            metadata.rate.hz(),
+            metadata.center_hz,
+            part.end - part.start
+        ));
+    }
+    let progress =
+        Progress::new(&format!("generate {}", scene.name), Some(part.end - part.start), arguments.printed.in_words());
     let generated = generator::generate_part(
         scene,
         part,
         &mut sink::Through(sink.as_mut()),
-        writer.as_mut(),
+        &mut writer,
         &mut |done| progress.set(done),
         &Options::default(),
     );
@@ -158,8 +188,12 @@ fn to_stream(stream: &sink::Spec, truth: Option<&Path>, scene: &Scene, part: Ran
     sink.finish().map_err(|error| CliError::output("samples", &error))?;
     drop(writer);
     staging.map_or(Ok(()), Staging::commit)?;
-    // Standard output has the samples.
-    scenario::note(&generated.to_string());
+    // Standard output may have the samples.
+    let to = stream.to_string();
+    match arguments.printed {
+        printed if printed.in_words() => scenario::note(&generated.to_string()),
+        printed => printed.results("", || json!({ "samples": to, "truth": arguments.truth, "made": [generated] }))?,
+    }
     Ok(())
 }
 

@@ -18,6 +18,7 @@ mod lines;
 mod live;
 mod packed;
 mod plan;
+mod printed;
 mod progress;
 mod receive;
 mod recording;

@@ -3,6 +3,8 @@
 
 use std::fmt::Write;
 
+use serde_json::{Value, json};
+
 use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::run::generator_error;
@@ -29,7 +31,7 @@ pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
     for warning in warnings {
         scenario::warn(&warning);
     }
-    let (mut plans, mut texts) = (Vec::new(), Vec::new());
+    let (mut plans, mut texts, mut objects) = (Vec::new(), Vec::new(), Vec::new());
     for scene in &scenes {
         let machinery = generator::plan::machinery(scene).map_err(generator_error)?;
         let levels = Levels::new(scene).map_err(generator_error)?;
@@ -39,10 +41,11 @@ pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
         let of_it = of_it.map_or_else(String::new, |name| format!("front end {name}: "));
         loops.warning().iter().for_each(|warning| scenario::warn(&format!("{of_it}{warning}")));
         texts.push(format!("{plan}\n{}", loops.text()));
+        objects.push(json!({ "plan": plan, "loops": loops.object() }));
         plans.push(plan);
     }
     let together = if plans.len() > 1 { format!("{}\n", Together(&plans)) } else { String::new() };
-    scenario::print(&(together + &texts.join("\n")))
+    arguments.printed.results(&(together + &texts.join("\n")), || json!({ "front_ends": objects }))
 }
 
 /// The carrier loop of the scene's settings on every line of sight.
@@ -103,6 +106,19 @@ impl<'s> Loops<'s> {
             );
         }
         out
+    }
+
+    /// The same as values: of each line of sight what it demands, and the stress and its limit.
+    fn object(&self) -> Value {
+        let row = |(line, _, answer): &(LineOfSight, Demand, Answer)| {
+            json!({
+                "line_of_sight": line,
+                "stress_deg": answer.stress_rad.to_degrees(),
+                "limit_deg": answer.limit_rad.to_degrees(),
+                "breaks": answer.breaks(),
+            })
+        };
+        self.rows.iter().map(row).collect()
     }
 
     /// What the loop does not follow, and settings that would.

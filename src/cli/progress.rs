@@ -10,10 +10,13 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A bar that shows itself only on a terminal, and updates four times a second.
-    pub fn new(label: &str, samples: Option<u64>) -> Self {
-        let target =
-            if stderr().is_terminal() { ProgressDrawTarget::stderr_with_hz(4) } else { ProgressDrawTarget::hidden() };
+    /// A bar that shows itself only on a terminal and if it may, and updates four times a second.
+    pub fn new(label: &str, samples: Option<u64>, may: bool) -> Self {
+        let target = if may && stderr().is_terminal() {
+            ProgressDrawTarget::stderr_with_hz(4)
+        } else {
+            ProgressDrawTarget::hidden()
+        };
         let bar = ProgressBar::with_draw_target(samples, target).with_prefix(label.to_owned());
         let template = match samples {
             Some(_) => "{prefix} {wide_bar} {percent:>3} %  {elapsed} elapsed, {eta} left",

@@ -4,10 +4,13 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+use serde_json::{Value, json};
+
 use crate::cli::args;
 use crate::cli::error::{CliError, shown};
 use crate::cli::interrupt;
 use crate::cli::lines::{self, Made};
+use crate::cli::printed::Printed;
 use crate::cli::progress::Progress;
 use crate::cli::recording::{self, Recording};
 use crate::cli::run::{output_error, receiver_error};
@@ -30,9 +33,9 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
             Settings::parse(&text, &name).map_err(CliError::input)?
         }
     };
-    let lines = [&arguments.nmea, &arguments.json];
-    if lines.iter().all(|spec| matches!(spec, Some(lines::Spec::Stdout))) {
-        return Err(CliError::usage("--nmea - and --json -: standard output takes one of them"));
+    let taken = to_lines(arguments).filter(|spec| **spec == lines::Spec::Stdout).count();
+    if taken + usize::from(printed(arguments).json) > 1 {
+        return Err(CliError::usage("--nmea - and --json: standard output takes one of them"));
     }
     let recordings = recording::open(arguments)?;
     let samples = recordings.first().and_then(|first| first.samples);
@@ -41,10 +44,11 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     let directory = Directory::new(arguments)?;
     let (mut listeners, made) = Listeners::new(arguments, &settings, directory.path())?;
     let mut front_ends = read_ahead(recordings, arguments.live)?;
-    let progress = Progress::new("receive", samples);
+    let progress = Progress::new("receive", samples, printed(arguments).in_words());
     let outcome = receiver::receive_several(&mut front_ends, &settings, &mut listeners, &mut |done| progress.set(done));
     drop(progress);
     let outcome = outcome.map_err(receiver_error)?;
+    let summary = std::mem::take(&mut listeners.summary);
     drop(listeners);
     let broken = broken.iter().find_map(|broken| broken.get());
     if let Some(format) = format.filter(|_| outcome.samples == 0) {
@@ -57,7 +61,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     }
     directory.commit()?;
     made.into_iter().try_for_each(Made::commit)?;
-    report(arguments, &outcome)?;
+    report(arguments, &outcome, &summary)?;
     if let Some(signal) = interrupt::ending() {
         return Err(CliError::signal(signal));
     }
@@ -68,7 +72,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
 }
 
 /// What came of it, on standard output unless lines go there.
-fn report(arguments: &args::Receive, outcome: &Outcome) -> Result<(), CliError> {
+fn report(arguments: &args::Receive, outcome: &Outcome, summary: &Value) -> Result<(), CliError> {
     if let Some(warning) = &outcome.format_warning {
         scenario::warn(&format!("{}: {warning}: check --format or the metadata", shown(&arguments.file)));
     }
@@ -80,11 +84,22 @@ fn report(arguments: &args::Receive, outcome: &Outcome) -> Result<(), CliError> 
         text += &format!("{diagnosis}\n");
     }
     text += &format!("results in {}\n", shown(&arguments.out));
-    if [&arguments.nmea, &arguments.json].contains(&&Some(lines::Spec::Stdout)) {
+    let printed = printed(arguments);
+    if to_lines(arguments).any(|spec| *spec == lines::Spec::Stdout) && printed.in_words() {
         scenario::note(text.trim_end());
         return Ok(());
     }
-    scenario::print(&text)
+    printed.results(&text, || json!({ "results": arguments.out, "receiver": summary }))
+}
+
+/// How much is printed: `--json` without a place for lines is the object.
+fn printed(arguments: &args::Receive) -> Printed {
+    Printed { quiet: arguments.quiet, json: matches!(arguments.json, Some(None)) }
+}
+
+/// Where lines go.
+fn to_lines(arguments: &args::Receive) -> impl Iterator<Item = &lines::Spec> {
+    arguments.nmea.iter().chain(arguments.json.iter().flatten())
 }
 
 /// A front end's samples and what is said of them.
@@ -146,6 +161,8 @@ struct Listeners {
     /// The sample of the newest state of channels.
     tracked: u64,
     lines: Vec<Box<dyn Sink>>,
+    /// What `receiver.json` says, at the end.
+    summary: Value,
 }
 
 impl Listeners {
@@ -158,16 +175,16 @@ impl Listeners {
             lines.push(Box::new(Nmea::new(PathBuf::from(spec.to_string()), opened.writer)));
             made.push(opened.made);
         }
-        if arguments.rinex {
+        if let Some(version) = arguments.rinex {
             let signals = settings.acquisition.signals();
-            lines.push(Box::new(Rinex::create(directory, "receive", &signals).map_err(output_error)?));
+            lines.push(Box::new(Rinex::create(directory, version, "receive", &signals).map_err(output_error)?));
         }
-        if let Some(spec) = &arguments.json {
+        if let Some(Some(spec)) = &arguments.json {
             let opened = spec.open("json", arguments.live)?;
             lines.push(Box::new(JsonLines::new(PathBuf::from(spec.to_string()), opened.writer)));
             made.push(opened.made);
         }
-        Ok((Self { output, live: arguments.live, tracked: 0, lines }, made))
+        Ok((Self { output, live: arguments.live, tracked: 0, lines, summary: Value::Null }, made))
     }
 }
 
@@ -194,6 +211,7 @@ impl Sink for Listeners {
 
     fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
         self.lines.iter_mut().try_for_each(|line| line.finish(summary))?;
+        self.summary = summary.clone();
         self.output.finish(summary)
     }
 }

@@ -9,6 +9,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use serde_json::json;
+
 use crate::analysis::judge::schema::SUMMARY;
 use crate::analysis::measure::psd::Psd;
 use crate::analysis::show::tables;
@@ -16,6 +18,7 @@ use crate::analysis::{self, JudgeError};
 use crate::cli::args;
 use crate::cli::check::Gate;
 use crate::cli::error::CliError;
+use crate::cli::printed;
 use crate::cli::progress::Progress;
 use crate::cli::scenario;
 use crate::cli::speed::Speed;
@@ -63,22 +66,26 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
         fs::create_dir(&path).map_err(|error| CliError::create(path.display(), &error)).map(|()| path)
     };
     let (truth_in, rx_in) = (below("truth")?, below("rx")?);
-    let mut truth = truth::Writer::create(&truth_in).map_err(truth_error)?;
     let mut output = Output::create(&rx_in).map_err(output_error)?;
     // The same as other programs read it.
-    let mut truth_files = truth::Rinex::new(&truth_in);
-    let mut files = Rinex::create(&rx_in, &scene.name, &settings.acquisition.signals()).map_err(output_error)?;
+    let mut truth = truth::Several(vec![
+        Box::new(truth::Writer::create(&truth_in).map_err(truth_error)?),
+        Box::new(truth::Rinex::new(&truth_in, arguments.rinex)),
+        Box::new(truth::Nmea::create(&truth_in).map_err(truth_error)?),
+        Box::new(truth::Tracks::new(&truth_in)),
+    ]);
+    let mut files =
+        Rinex::create(&rx_in, arguments.rinex, &scene.name, &settings.acquisition.signals()).map_err(output_error)?;
     let mut taps: Vec<Tap> =
         scenes.iter().map(|scene| Tap::new(scene, run, arguments.keep_if, scenes.len())).collect::<Result<_, _>>()?;
     let mut sentences = sentences(&rx_in)?;
     let mut tracks = Tracks::create(&rx_in, &scene.name).map_err(output_error)?;
-    let (truths, others) = (&mut (&mut truth, &mut truth_files), &mut (&mut sentences, &mut tracks));
-    let outputs = &mut (&mut output, &mut (&mut files, others));
-    let both = both(&scenes, &settings, truths, outputs, &mut taps)?;
+    let outputs = &mut (&mut output, &mut (&mut files, &mut (&mut sentences, &mut tracks)));
+    let both = both(&scenes, &settings, &mut truth, outputs, (&mut taps, arguments.printed.in_words()))?;
     // The spectrum that is judged is that of the first front end.
     taps.first().map_or(Ok(()), |first| first.write_psd(run))?;
     taps.into_iter().try_for_each(|tap| tap.finish(run))?;
-    drop((truth, truth_files, output, files, sentences, tracks));
+    drop((truth, output, files, sentences, tracks));
 
     let duration_s = scene.metadata.rate.elapsed_s(scene.samples);
     let speed = Speed::new(duration_s, both.generator_busy, both.receiver_busy, both.whole);
@@ -100,8 +107,18 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
         text += &format!("made          {generated}\n");
     }
     text += &format!("results in {}\n", target.display());
-    scenario::print(&text)?;
-    gate.enforce(&summary.details.verdict)
+    let verdict = &summary.details.verdict;
+    arguments.printed.results(&text, || {
+        json!({
+            "results": target,
+            "made": both.generated,
+            "diagnosis": both.outcome.diagnosis.as_ref().map(ToString::to_string),
+            "margins": both.outcome.conditioning,
+            "summary": summary,
+            "verdict": printed::verdict(verdict),
+        })
+    })?;
+    gate.enforce(verdict, arguments.printed)
 }
 
 /// What takes the fixes as NMEA 0183.
@@ -119,16 +136,16 @@ struct Both {
     whole: Duration,
 }
 
-/// Generates and receives side by side, and looks at the samples on their way.
+/// Generates and receives side by side, and looks at the samples on their way; shows progress if wanted.
 fn both(
     scenes: &[Scene],
     settings: &Settings,
     truth: &mut (dyn truth::Sink + Send),
     output: &mut (dyn Sink + Send),
-    taps: &mut [Tap],
+    (taps, with_progress): (&mut [Tap], bool),
 ) -> Result<Both, CliError> {
     let name = scenes.first().map_or("", |scene| scene.name.as_str());
-    let progress = Progress::new(&format!("run {name}"), scenes.first().map(|scene| scene.samples));
+    let progress = Progress::new(&format!("run {name}"), scenes.first().map(|scene| scene.samples), with_progress);
     let start = Instant::now();
     let mut receiver_busy = Duration::ZERO;
     let metadata: Vec<IfMetadata> = scenes.iter().map(|scene| scene.metadata.clone()).collect();

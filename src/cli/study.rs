@@ -134,7 +134,7 @@ fn missing(plan: &Plan) -> Result<Vec<u32>, CliError> {
 fn compute(plan: &Plan, shards: &[u32]) -> Result<(), CliError> {
     let cases = shards.iter().map(|&number| plan.cases(number)).map(|cases| cases.end - cases.start).sum();
     let start = Instant::now();
-    let progress = Progress::new(&format!("study {}", plan.study.name), Some(cases));
+    let progress = Progress::new(&format!("study {}", plan.study.name), Some(cases), true);
     let ran = engine::run(plan, shards, &|done| progress.set(done));
     drop(progress);
     let ran = ran.map_err(study_error)?;

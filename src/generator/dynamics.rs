@@ -9,6 +9,8 @@
 
 use nalgebra::Vector3;
 
+use serde::Serialize;
+
 use crate::generator::plan::strength_dbhz;
 use crate::generator::presence::{Presence, presence};
 use crate::generator::ray::Sight;
@@ -23,7 +25,7 @@ const INSTANTS: u32 = 240;
 const PLACES: u32 = 10;
 
 /// The largest that a satellite's range does while it is in view.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LineOfSight {
     /// The satellite.
     pub sv: Sv,

@@ -4,6 +4,8 @@
 //! are those of `reports/trade.csv` (`cargo bench --bench trade` fills it), rounded up; costs are one core of
 //! the machine named there. Limits: a knob's figure assumes that every other knob is at its best.
 
+use serde::Serialize;
+
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::facts::Edge;
 use crate::gnss::signal::{Component, Layers, Signal};
@@ -294,7 +296,7 @@ fn standing_bias_m(edge: CodeEdge, rate_hz: f64) -> f64 {
 }
 
 /// One knob as a plan shows it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     /// Its key in `[fidelity]`.
     pub knob: &'static str,

@@ -10,6 +10,8 @@
 use std::fmt;
 use std::ops::Range;
 
+use serde::Serialize;
+
 use crate::generator::arrival;
 use crate::generator::ray::Ray;
 use crate::generator::scene::Scene;
@@ -27,7 +29,7 @@ const STRETCH_SAMPLES: u64 = 16_384;
 const INSTANTS: u64 = 60;
 
 /// Smallest and largest of a quantity.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Span {
     /// The smallest.
     pub least: f64,
@@ -48,7 +50,7 @@ impl Span {
 }
 
 /// A source of interference.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Source {
     /// Its kind as a scenario writes it.
     pub kind: &'static str,
@@ -59,7 +61,7 @@ pub struct Source {
 }
 
 /// A spoofer's weakest and strongest signal.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spoofed {
     /// Number of the spoofer, from 1.
     pub number: usize,
@@ -68,7 +70,7 @@ pub struct Spoofed {
 }
 
 /// The parts of a scene against full scale.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Levels {
     /// Full scale in LSB of the scene's gain, and what it is.
     pub full_scale_lsb: f64,

@@ -12,6 +12,8 @@ use std::fmt;
 pub use machinery::{Machinery, machinery};
 use models::models;
 
+use serde::Serialize;
+
 use crate::generator::catalogue::Silence;
 use crate::generator::fidelity::{self, Choice};
 use crate::generator::levels::{Levels, Span};
@@ -28,7 +30,7 @@ use crate::gnss::time::Epoch;
 const INSTANTS: u32 = 240;
 
 /// A satellite that is in view for some of the scene.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InView {
     /// The satellite.
     pub sv: Sv,
@@ -48,7 +50,7 @@ pub struct InView {
 }
 
 /// A thing that the scene has, or has not.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Model {
     /// Table or thing, as a scenario calls it.
     pub name: String,
@@ -59,7 +61,7 @@ pub struct Model {
 }
 
 /// What a scene will compute.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// Name of the scene.
     pub name: String,

@@ -27,6 +27,8 @@ pub use generator::{Batch, Generator};
 pub(crate) use measure::{Stretch, measured};
 use ticks::Ticks;
 
+use serde::Serialize;
+
 pub use crate::generator::error::GenerateError;
 use crate::generator::scene::Scene;
 use crate::generator::synth::isa::Level;
@@ -52,7 +54,7 @@ impl Default for Options {
 }
 
 /// What a run of the generator did.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Generated {
     /// Samples made.
     pub samples: u64,

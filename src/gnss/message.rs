@@ -64,6 +64,17 @@ pub struct Message {
     pub alert: Option<Alert>,
     /// Adds to the parameter of a set that the tables call so, in its unit; whether there is one.
     pub adjust: fn(&mut Ephemeris, &str, f64) -> bool,
+    /// What records of RINEX have of it; absent where they have it in a form that is not written.
+    pub rinex: Option<Records>,
+}
+
+/// Names of a message's records in navigation files of RINEX 4 (RINEX 4.02, tables 24 and 25).
+#[derive(Clone, Copy, Debug)]
+pub struct Records {
+    /// Of the sets of a satellite.
+    pub set: fn(Sv) -> &'static str,
+    /// Of the ionosphere's coefficients.
+    pub ionosphere: &'static str,
 }
 
 /// How a message describes the ionosphere.

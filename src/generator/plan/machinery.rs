@@ -1,5 +1,7 @@
 //! What the synthesiser will do for a scene: knots, memory and speed.
 
+use serde::Serialize;
+
 use crate::generator::arrival;
 use crate::generator::error::GenerateError;
 use crate::generator::scene::Scene;
@@ -10,7 +12,7 @@ use crate::generator::synth::{Edge, RUN_SAMPLES};
 const PLANNED_ROOTS: u64 = 16;
 
 /// What the plan cannot know of itself.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Machinery {
     /// Shortest and longest time between knots of the signal's delay, and why it is that.
     pub knot_spacing_s: f64,

@@ -5,6 +5,7 @@
 //! Limits: tropospheric and ionospheric shares in `sky.csv` are half the sum and half the difference of code
 //! and carrier delays.
 
+mod place;
 mod record;
 mod rinex;
 mod skyline;
@@ -21,7 +22,8 @@ use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{Observation, RayRow, SkyRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-pub use record::{Record, Sink, TruthError};
+pub use place::{Nmea, Tracks};
+pub use record::{Record, Several, Sink, TruthError};
 pub use rinex::Rinex;
 pub use writer::Writer;
 

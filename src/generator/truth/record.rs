@@ -123,6 +123,24 @@ impl Sink for Vec<Record> {
     }
 }
 
+/// Hands every record to all of them, in their order.
+#[derive(Default)]
+pub struct Several(pub Vec<Box<dyn Sink + Send>>);
+
+impl Sink for Several {
+    fn begin(&mut self, scenes: &[Scene], part: &Range<u64>) -> Result<(), TruthError> {
+        self.0.iter_mut().try_for_each(|sink| sink.begin(scenes, part))
+    }
+
+    fn take(&mut self, record: Record) -> Result<(), TruthError> {
+        self.0.iter_mut().try_for_each(|sink| sink.take(record.clone()))
+    }
+
+    fn finish(&mut self) -> Result<(), TruthError> {
+        self.0.iter_mut().try_for_each(|sink| sink.finish())
+    }
+}
+
 /// Keeps nothing.
 impl Sink for () {
     fn take(&mut self, _: Record) -> Result<(), TruthError> {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Record, Sink, TruthError};
 use crate::generator::scene::Scene;
-use crate::gnss::exchange::{NavigationSets, ObservationFile};
+use crate::gnss::exchange::{NavigationSets, ObservationFile, Version};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
@@ -15,6 +15,7 @@ use crate::gnss::time::Epoch;
 /// would have, its clock that of the scene's.
 pub struct Rinex {
     directory: PathBuf,
+    version: Version,
     observations: Option<ObservationFile<BufWriter<File>>>,
     messages: NavigationSets,
     signals: Vec<&'static Signal>,
@@ -23,9 +24,9 @@ pub struct Rinex {
 
 impl Rinex {
     /// In an existing directory; files are made when the truth begins.
-    pub fn new(directory: &Path) -> Self {
-        let directory = directory.to_owned();
-        Self { directory, observations: None, messages: NavigationSets::default(), signals: Vec::new(), near: None }
+    pub fn new(directory: &Path, version: Version) -> Self {
+        let (directory, messages) = (directory.to_owned(), NavigationSets::default());
+        Self { directory, version, observations: None, messages, signals: Vec::new(), near: None }
     }
 
     fn create(&self, name: &str) -> Result<BufWriter<File>, TruthError> {
@@ -50,7 +51,7 @@ impl Sink for Rinex {
         }
         let marker = scenes.first().map_or("", |scene| scene.name.as_str());
         let file = self.create(OBSERVATIONS)?;
-        self.observations = Some(ObservationFile::new(file, marker, &self.signals));
+        self.observations = Some(ObservationFile::new(file, self.version, marker, &self.signals));
         Ok(())
     }
 
@@ -81,6 +82,6 @@ impl Sink for Rinex {
         let ended = observations.finish();
         self.held(OBSERVATIONS, ended)?;
         let file = self.create(NAVIGATION)?;
-        self.held(NAVIGATION, self.messages.write(file, &self.signals, near))
+        self.held(NAVIGATION, self.messages.write(file, self.version, &self.signals, near))
     }
 }

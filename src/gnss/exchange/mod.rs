@@ -1,10 +1,12 @@
-//! Files for other programs: RINEX 3.05, observations row by row and navigation messages at the end, and
-//! tracks for maps.
+//! Files for other programs: RINEX 3.05 and 4.02, observations row by row and navigation messages at the
+//! end, and tracks for maps.
 //!
-//! Source: RINEX 3.05, tables A2 to A8 (navigation) and A2, A3 (observations), section 5.2. The `rinex` crate
-//! writes columns as well, but holds a whole file in memory; observations of a day at 10 Hz are gigabytes.
-//! Limits: GPS, Galileo, NavIC and BeiDou; no date of the run stands in the header, since the same run gives
-//! the same bytes at any time.
+//! Source: RINEX 3.05, tables A2 to A8 (navigation) and A2, A3 (observations), section 5.2; RINEX 4.02,
+//! section 5.4 and tables A9 to A36, whose observations are those of 3.05 and whose navigation messages have a
+//! line of their own before each. The `rinex` crate writes columns as well, but holds a whole file in memory;
+//! observations of a day at 10 Hz are gigabytes.
+//! Limits: GPS, Galileo, NavIC and BeiDou, and of navigation what a message's `rinex` names; no date of the
+//! run stands in the header, since the same run gives the same bytes at any time.
 
 mod navigation;
 mod observation;
@@ -14,8 +16,49 @@ pub use navigation::NavigationSets;
 pub use observation::ObservationFile;
 pub use track::{Track, TrackForm};
 
+use std::fmt;
+use std::str::FromStr;
+
+use thiserror::Error;
+
 use crate::gnss::satellite::System;
 use crate::gnss::time::Epoch;
+
+/// A version of RINEX that is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Version {
+    /// 3.05.
+    #[default]
+    Three,
+    /// 4.02.
+    Four,
+}
+
+/// A version that is not written.
+#[derive(Debug, Error, PartialEq)]
+#[error("RINEX {0}: expected 3.05 or 4.02")]
+pub struct VersionError(String);
+
+impl fmt::Display for Version {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Three => "3.05",
+            Self::Four => "4.02",
+        })
+    }
+}
+
+impl FromStr for Version {
+    type Err = VersionError;
+
+    fn from_str(text: &str) -> Result<Self, VersionError> {
+        match text {
+            "3" | "3.05" => Ok(Self::Three),
+            "4" | "4.02" => Ok(Self::Four),
+            other => Err(VersionError(other.to_owned())),
+        }
+    }
+}
 
 /// One line of a header: 60 columns and a label.
 fn header_line(content: &str, label: &str) -> String {
@@ -23,7 +66,7 @@ fn header_line(content: &str, label: &str) -> String {
 }
 
 /// The first two lines: version and type, and who made it; the date is that of the first epoch.
-fn opening(kind: &str, systems: &[System], first: Epoch) -> String {
+fn opening(version: Version, kind: &str, systems: &[System], first: Epoch) -> String {
     let mixed = match systems {
         [one] => format!("{}: {}", one.letter(), one.name()),
         _ => "M: Mixed".to_owned(),
@@ -31,7 +74,7 @@ fn opening(kind: &str, systems: &[System], first: Epoch) -> String {
     let date: String = first.to_string().chars().filter(char::is_ascii_digit).take(14).collect();
     let (day, time) = date.split_at_checked(8).unwrap_or_default();
     let program = concat!("gnss-twin ", env!("CARGO_PKG_VERSION"));
-    header_line(&format!("{:>9}{:11}{kind:<20}{mixed:<20}", "3.05", ""), "RINEX VERSION / TYPE")
+    header_line(&format!("{version:>9}{:11}{kind:<20}{mixed:<20}", ""), "RINEX VERSION / TYPE")
         + &header_line(&format!("{program:<20}{:20}{day} {time} LCL", ""), "PGM / RUN BY / DATE")
 }
 

@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
-use super::{calendar, header_line, opening};
+use super::{Version, calendar, header_line, opening};
 use crate::gnss::broadcast::{Ephemeris, status_of_record};
 use crate::gnss::ionosphere::Coefficients;
-use crate::gnss::message::Message;
+use crate::gnss::message::{Message, Records};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
@@ -40,11 +40,18 @@ impl NavigationSets {
     }
 
     /// Writes all whole sets, each once, near a time by which their weeks are resolved; `signals` are those
-    /// whose messages were read.
+    /// whose messages were read. Coefficients of the ionosphere, which all satellites of a system send alike,
+    /// have in RINEX 4 the first of them that sent a message.
     ///
     /// # Errors
     /// What the writer reports.
-    pub fn write(&self, mut writer: impl Write, signals: &[&'static Signal], near: Epoch) -> io::Result<()> {
+    pub fn write(
+        &self,
+        mut writer: impl Write,
+        version: Version,
+        signals: &[&'static Signal],
+        near: Epoch,
+    ) -> io::Result<()> {
         let messages: BTreeMap<&str, (&'static Message, &'static TimeScale)> = (signals.iter())
             .flat_map(|signal| signal.components.iter().filter_map(|component| Some((component.message?, signal.time))))
             .map(|(message, time)| (message.name, (message, time)))
@@ -52,21 +59,35 @@ impl NavigationSets {
         let mut systems: Vec<System> = signals.iter().map(|signal| signal.system).collect();
         systems.sort();
         systems.dedup();
-        let mut text = opening("N: GNSS NAV DATA", &systems, near);
-        for (name, raws) in &self.common {
-            let coefficients = messages
-                .get(name.as_str())
-                .and_then(|(message, _)| (message.ionosphere.coefficients)(&|name| raws.get(name).copied()));
-            text += &coefficients.map_or_else(String::new, ionosphere);
+        let mut text = opening(version, "N: GNSS NAV DATA", &systems, near);
+        let (mut body, mut described) = (String::new(), BTreeSet::new());
+        for (name, (message, _)) in &messages {
+            // BeiDou's come with the sets.
+            let own = self.sets.iter().filter(|((known, ..), _)| known == name);
+            let mut raws = self.common.get(*name).into_iter().chain(own.clone().map(|(_, raws)| raws));
+            let sent = raws.find_map(|raws| (message.ionosphere.coefficients)(&|name| raws.get(name).copied()));
+            let (Some(sent), Some(records), Some(((_, sv, _), _))) = (sent, message.rinex, own.clone().next()) else {
+                continue;
+            };
+            // Messages of one system that send the same have one record.
+            if described.insert((sv.system, records.ionosphere)) {
+                match version {
+                    Version::Three => text += &ionosphere(sent),
+                    Version::Four => body += &ionosphere_record(records, sent, *sv, near),
+                }
+            }
         }
         text += &header_line(&format!("{:6}", near.leap_seconds()), "LEAP SECONDS");
         text += &header_line("", "END OF HEADER");
+        text += &body;
         let mut known = BTreeSet::new();
         for ((name, sv, issue), raws) in &self.sets {
             let Some((message, time)) = messages.get(name.as_str()) else { continue };
+            let Some(records) = message.rinex else { continue };
             let set = (message.elements)(*sv, &|name| raws.get(name).copied(), time.label(near));
             let set = set.map(|set| set.timed(|label| time.instant(label)));
             if let Some(set) = set.filter(|set| known.insert((*sv, *issue, set.form.name))) {
+                text += &heading(version, records, *sv);
                 text += &record(&set);
             }
         }
@@ -89,6 +110,42 @@ fn ionosphere(sent: Coefficients) -> String {
             line("GAL", [a, b, c, 0.0])
         }
     }
+}
+
+/// The line before a set: its kind, satellite and message (RINEX 4.02, section 5.4); version 3 has none.
+fn heading(version: Version, records: Records, sv: Sv) -> String {
+    match version {
+        Version::Three => String::new(),
+        Version::Four => format!("> EPH {sv} {}\n", (records.set)(sv)),
+    }
+}
+
+/// A message with the ionosphere's coefficients (RINEX 4.02, tables of `ION` records) of a satellite that
+/// sent them, its time that of the file.
+fn ionosphere_record(records: Records, sent: Coefficients, sv: Sv, near: Epoch) -> String {
+    // Those of BeiDou are in its own time.
+    let [year, month, day, hour, minute, second] = calendar(match sv.system {
+        System::BeiDou => BDT.label(near),
+        _ => near,
+    });
+    let values = match &sent {
+        Coefficients::Klobuchar(model) | Coefficients::KlobucharNavic(model) | Coefficients::KlobucharBeidou(model) => {
+            [model.alpha, model.beta].concat()
+        }
+        // The last one are the flags of storms, of which nothing is said.
+        Coefficients::NequickG(model) => [&model.coefficients[..], &[0.0]].concat(),
+    };
+    let epoch = format!("{year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}");
+    let mut text = format!("> ION {sv} {}\n    {epoch}", records.ionosphere);
+    // Three beside the time, then four a line.
+    for (place, value) in values.iter().enumerate() {
+        if place >= 3 && (place - 3) % 4 == 0 {
+            text += "\n    ";
+        }
+        text += &format!("{:>19}", exponent(*value, 12));
+    }
+    text.push('\n');
+    text
 }
 
 /// A number with an exponent of two digits.
@@ -170,24 +227,54 @@ fn sisa_m(index: u8) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::beidou::d1d2::D1_D2;
+    use crate::gnss::beidou::in_phase::B1I;
+    use crate::gnss::galileo::e1::E1;
+    use crate::gnss::galileo::e5::{E5A, E5B};
     use crate::gnss::galileo::fnav::FNAV;
+    use crate::gnss::galileo::inav::{INAV, INAV_E5B};
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::gps::lnav::LNAV;
+    use crate::gnss::klobuchar::Klobuchar;
+    use crate::gnss::message::Common;
+    use crate::gnss::navic::nav::SPS_NAV;
+    use crate::gnss::navic::sps::L5;
     use crate::gnss::rinex;
+
+    const NAVIC: &[u8] = include_bytes!("../../../scenarios/navic_2026-03-09_10h_12h.rnx");
 
     /// What RINEX rounds to twelve digits after the first.
     fn near(a: f64, b: f64) -> bool {
         (a - b).abs() <= 1e-12 * b.abs()
     }
 
+    /// A file as the crate of that name reads it.
+    fn foreign(text: &str) -> ::rinex::prelude::Rinex {
+        let read = ::rinex::prelude::Rinex::parse_with_diagnostics(&mut std::io::BufReader::new(text.as_bytes()));
+        let (file, left_out) = read.unwrap_or_else(|error| panic!("{error}\n{text}"));
+        assert!(left_out.is_empty(), "{left_out:?}\n{text}");
+        file
+    }
+
     #[test]
-    fn sets_of_both_systems_are_read_back_as_they_were_written() {
-        let mut count = [0, 0];
-        let sets = rinex::embedded().unwrap().ephemerides.into_iter().step_by(17);
+    fn sets_of_every_system_are_read_back_as_they_were_written_here_and_elsewhere() {
+        let mut count = BTreeMap::new();
+        let day = rinex::embedded().unwrap().ephemerides.into_iter().step_by(17);
         let both = rinex::embedded_two_systems().unwrap().ephemerides;
         let fnav = both.iter().filter(|set| set.sv.system == System::Galileo).map(FNAV.form).collect::<Vec<_>>();
-        for set in sets.chain(both).chain(fnav) {
-            let systems = [set.sv.system];
-            let header = opening("N: GNSS NAV DATA", &systems, set.toe) + &header_line("", "END OF HEADER");
-            let text = header + &record(&set);
+        let navic = rinex::read(NAVIC, "navic").unwrap().ephemerides;
+        let sets = day.chain(both).chain(fnav).chain(navic);
+        for (set, version) in sets.flat_map(|set| [(set.clone(), Version::Three), (set, Version::Four)]) {
+            let records = match set.sv.system {
+                System::Galileo if set.form.name == FNAV.name => FNAV.rinex,
+                System::Galileo => INAV.rinex,
+                System::Navic => SPS_NAV.rinex,
+                System::BeiDou => D1_D2.rinex,
+                _ => LNAV.rinex,
+            };
+            let title = heading(version, records.unwrap(), set.sv);
+            let end = header_line("", "END OF HEADER");
+            let text = opening(version, "N: GNSS NAV DATA", &[set.sv.system], set.toe) + &end + &title + &record(&set);
             let read = rinex::read(text.as_bytes(), "own").unwrap_or_else(|error| panic!("{error}\n{text}"));
             let [back] = read.ephemerides.as_slice() else { panic!("{:?}\n{text}", read.skipped) };
             assert_eq!(back.form, set.form);
@@ -200,9 +287,110 @@ mod tests {
                 [&orbit[..], &rates, &rest].concat()
             };
             assert!(values(back).iter().zip(values(&set)).all(|(a, b)| near(*a, b)), "{back:?}\n{set:?}");
-            count[usize::from(set.sv.system == System::Galileo)] += 1;
+            // Another program's reader finds the same elements of the same satellite and message.
+            let file = foreign(&text);
+            let frames: Vec<_> = file.nav_ephemeris_frames_iter().collect();
+            let [(key, frame)] = frames.as_slice() else { panic!("{} frames\n{text}", frames.len()) };
+            assert_eq!(key.sv.to_string(), set.sv.to_string(), "{text}");
+            if version == Version::Four {
+                assert_eq!(key.msgtype.to_string(), title.trim_end().rsplit(' ').next().unwrap_or(""), "{text}");
+            }
+            let names = ["sqrta", "e", "m0", "deltaN", "omega0", "omega", "omegaDot", "i0", "idot", "cuc", "cus"];
+            let rest = ["crc", "crs", "cic", "cis"];
+            let found: Vec<f64> = names.iter().chain(&rest).filter_map(|name| frame.get_orbit_f64(name)).collect();
+            let clock = [frame.clock_bias, frame.clock_drift, frame.clock_drift_rate];
+            assert_eq!([&found[..], &clock].concat(), values(back)[..18], "{text}");
+            *count.entry(title).or_insert(0) += 1;
         }
-        assert!(count.iter().all(|count| *count > 10), "{count:?}");
+        let of = |version: &str| count.keys().filter(|title| title.contains(version)).count();
+        assert!(count[""] > 100, "{count:?}");
+        let per_message = [" LNAV", " INAV", " FNAV", " D1", " D2"].map(of);
+        assert!(per_message.iter().all(|satellites| *satellites > 0) && of("> EPH I") > 3, "{count:?}");
+    }
+
+    #[test]
+    fn a_file_of_all_messages_sent_has_each_set_and_each_systems_ionosphere() {
+        let both = rinex::embedded_two_systems().unwrap();
+        let navic = rinex::read(NAVIC, "navic").unwrap();
+        let alpha_beta = |scale: f64| Klobuchar {
+            alpha: [1.0, -2.0, 8.0, -16.0].map(|steps: f64| steps * scale * libm::exp2(-27.0)),
+            beta: [3.0, -1.0, 4.0, -8.0].map(|steps: f64| steps * scale * libm::exp2(14.0)),
+        };
+        let common = Common {
+            klobuchar: Some(alpha_beta(1.0)),
+            klobuchar_navic: Some(alpha_beta(2.0)),
+            klobuchar_beidou: Some(alpha_beta(4.0)),
+            nequick: Some([100.0, 0.25, 0.0625]),
+            ..Common::default()
+        };
+        let first = |system| {
+            let mut sets = both.ephemerides.iter().chain(&navic.ephemerides);
+            sets.find(|set| set.sv.system == system && set.is_healthy()).unwrap().clone()
+        };
+        let d2 = Ephemeris { sv: Sv { system: System::BeiDou, number: 2 }, ..first(System::BeiDou) };
+        let sent: [(&Message, &'static Signal, Ephemeris); 7] = [
+            (&LNAV, &L1_CA, first(System::Gps)),
+            (&INAV, &E1, first(System::Galileo)),
+            (&INAV_E5B, &E5B, first(System::Galileo)),
+            (&FNAV, &E5A, first(System::Galileo)),
+            (&D1_D2, &B1I, first(System::BeiDou)),
+            (&D1_D2, &B1I, d2),
+            (&SPS_NAV, &L5, first(System::Navic)),
+        ];
+        let mut sets = NavigationSets::default();
+        for (message, signal, set) in &sent {
+            let sender = (message.sender)(&common).unwrap();
+            let set = (message.form)(&set.clone().timed(|at| signal.time.label(at)));
+            // As long as the slowest, LNAV, takes for its page with the ionosphere.
+            let begin = set.toe.seconds().div_euclid(1500) * 1500 + message.first_s;
+            for start in (0..750).step_by(message.unit_s as usize) {
+                let symbols = sender.unit(&set, Epoch::new(begin + start, 0.0)).unwrap();
+                let Some((of_set, parameters)) = (message.parameters)(&symbols) else { continue };
+                let issue = if of_set { u32::from(set.iode) } else { 0 };
+                NavigationRow::each(set.sv, message.name, issue, parameters).for_each(|row| sets.take(&row));
+            }
+        }
+        let signals: Vec<&'static Signal> = sent.iter().map(|(_, signal, _)| *signal).collect();
+        for version in [Version::Three, Version::Four] {
+            let mut bytes = Vec::new();
+            sets.write(&mut bytes, version, &signals, first(System::Gps).toe).unwrap();
+            let text = String::from_utf8(bytes).unwrap();
+            let ours = rinex::read(text.as_bytes(), "own").unwrap();
+            assert!(ours.skipped.is_empty(), "{:?}\n{text}", ours.skipped);
+            // A header of version 3 has five digits.
+            let digits = if version == Version::Three { 4 } else { 12 };
+            let printed = |model: Option<Klobuchar>| {
+                let four = |values: [f64; 4]| values.map(|value| exponent(value, digits).parse::<f64>().unwrap());
+                model.map(|model| Klobuchar { alpha: four(model.alpha), beta: four(model.beta) })
+            };
+            assert_eq!(ours.klobuchar, printed(common.klobuchar), "{text}");
+            assert_eq!(ours.klobuchar_navic, printed(common.klobuchar_navic), "{text}");
+            assert_eq!(
+                (ours.klobuchar_beidou, ours.nequick),
+                (printed(common.klobuchar_beidou), common.nequick),
+                "{text}"
+            );
+            let file = foreign(&text);
+            assert_eq!(file.nav_ephemeris_frames_iter().count(), 6, "{text}");
+            if version == Version::Four {
+                let models = file.nav_ionosphere_models_iter().map(|(key, model)| {
+                    let klobuchar = model.as_klobuchar().map(|found| [found.alpha.1, found.beta.3]);
+                    let values = klobuchar.or(model.as_nequick_g().map(|found| [found.a.0, found.a.2]));
+                    (format!("{} {}", key.sv.constellation, key.msgtype), values)
+                });
+                let models: BTreeMap<String, Option<[f64; 2]>> = models.collect();
+                let sent = |model| printed(model).map(|model| [model.alpha[1], model.beta[3]]);
+                assert_eq!(models.len(), 4, "{models:?}\n{text}");
+                assert_eq!(models["GPS (US) LNAV"], sent(common.klobuchar), "{text}");
+                assert_eq!(models["IRNSS (IN) LNAV"], sent(common.klobuchar_navic), "{text}");
+                assert_eq!(models["BeiDou (CH) D1D2"], sent(common.klobuchar_beidou), "{text}");
+                assert_eq!(models["Galileo (EU) IFNV"], Some([100.0, 0.0625]), "{text}");
+            } else {
+                assert_eq!(text.matches("IONOSPHERIC CORR").count(), 7, "{text}");
+            }
+        }
+        assert_eq!("4".parse(), Ok(Version::Four));
+        assert!("2.11".parse::<Version>().unwrap_err().to_string().contains("3.05 or 4.02"));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::{calendar, header_line, opening};
+use super::{Version, calendar, header_line, opening};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::Observation;
 use crate::gnss::satellite::{Sv, System};
@@ -26,6 +26,7 @@ const SAME_TIME_S: f64 = 1e-6;
 /// since the epoch before has its loss-of-lock flag set.
 pub struct ObservationFile<W> {
     writer: W,
+    version: Version,
     marker: String,
     signals: Vec<&'static Signal>,
     begun: bool,
@@ -37,7 +38,7 @@ pub struct ObservationFile<W> {
 
 impl<W: Write> ObservationFile<W> {
     /// Of such signals at a place of that name; nothing is written yet.
-    pub fn new(writer: W, marker: &str, signals: &[&'static Signal]) -> Self {
+    pub fn new(writer: W, version: Version, marker: &str, signals: &[&'static Signal]) -> Self {
         let mut own: Vec<&'static Signal> = Vec::new();
         for signal in signals {
             if !own.iter().any(|known| (known.system, known.rinex) == (signal.system, signal.rinex)) {
@@ -47,7 +48,7 @@ impl<W: Write> ObservationFile<W> {
         own.sort_by_key(|signal| (signal.system, signal.rinex));
         let marker = marker.chars().filter(char::is_ascii_graphic).take(60).collect();
         let (rows, seen) = (Vec::new(), BTreeMap::new());
-        Self { writer, marker, signals: own, begun: false, rows, clock_bias_s: None, seen }
+        Self { writer, version, marker, signals: own, begun: false, rows, clock_bias_s: None, seen }
     }
 
     /// Takes an observation; those of a sample come one after the other.
@@ -133,7 +134,7 @@ impl<W: Write> ObservationFile<W> {
     fn begin(&mut self, first: Epoch) -> io::Result<()> {
         let mut systems: Vec<System> = self.signals.iter().map(|signal| signal.system).collect();
         systems.dedup();
-        let mut text = opening("OBSERVATION DATA", &systems, first);
+        let mut text = opening(self.version, "OBSERVATION DATA", &systems, first);
         text += &header_line(&self.marker, "MARKER NAME");
         text += &header_line("NON_GEODETIC", "MARKER TYPE");
         text += &header_line("", "OBSERVER / AGENCY");
@@ -159,8 +160,8 @@ impl<W: Write> ObservationFile<W> {
             &format!("{year:6}{month:6}{day:6}{hour:6}{minute:6}{second:5}.{ticks:07}     GPS"),
             "TIME OF FIRST OBS",
         );
-        // Carriers of the signals' own: none is shifted against another.
-        for signal in &self.signals {
+        // Carriers of the signals' own: none is shifted against another. RINEX 4 asks for no such line.
+        for signal in self.signals.iter().filter(|_| self.version == Version::Three) {
             let one = format!("{} L{}", signal.system.letter(), signal.rinex);
             text += &header_line(&one, "SYS / PHASE SHIFT");
         }
@@ -211,7 +212,7 @@ mod tests {
     fn columns_are_those_of_the_format_and_a_slip_is_flagged() {
         let galileo = Sv { system: System::Galileo, number: 11 };
         let mut bytes = Vec::new();
-        let mut file = ObservationFile::new(&mut bytes, "roof 7", &[&E1, &L1_CA]);
+        let mut file = ObservationFile::new(&mut bytes, Version::Three, "roof 7", &[&E1, &L1_CA]);
         for (sample, locked_s) in [(0, 5.0), (1, 6.0), (2, 0.2), (3, 1.2)] {
             file.take(row(sample, Sv::gps(3), &L1_CA, locked_s)).unwrap();
             file.take(row(sample, galileo, &E1, 100.0)).unwrap();

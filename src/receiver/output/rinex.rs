@@ -5,13 +5,14 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use super::{OutputError, Record, Sink, create_error, write_error};
-use crate::gnss::exchange::{NavigationSets, ObservationFile};
+use crate::gnss::exchange::{NavigationSets, ObservationFile, Version};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
 /// Writes `observations.rnx` as observations come, and `navigation.rnx` at the end.
 pub struct Rinex {
     directory: PathBuf,
+    version: Version,
     observations: ObservationFile<BufWriter<File>>,
     messages: NavigationSets,
     signals: Vec<&'static Signal>,
@@ -24,12 +25,18 @@ impl Rinex {
     ///
     /// # Errors
     /// [`OutputError::Create`] with the path that cannot be made.
-    pub fn create(directory: &Path, marker: &str, signals: &[&'static Signal]) -> Result<Self, OutputError> {
+    pub fn create(
+        directory: &Path,
+        version: Version,
+        marker: &str,
+        signals: &[&'static Signal],
+    ) -> Result<Self, OutputError> {
         let path = directory.join(OBSERVATIONS);
         let file = File::create(&path).map_err(|error| create_error(&path, error))?;
         Ok(Self {
             directory: directory.to_owned(),
-            observations: ObservationFile::new(BufWriter::new(file), marker, signals),
+            version,
+            observations: ObservationFile::new(BufWriter::new(file), version, marker, signals),
             messages: NavigationSets::default(),
             signals: signals.to_vec(),
             near: None,
@@ -61,7 +68,7 @@ impl Sink for Rinex {
         let Some(near) = self.near else { return Ok(()) };
         let path = self.directory.join("navigation.rnx");
         let file = File::create(&path).map_err(|error| create_error(&path, error))?;
-        let written = self.messages.write(BufWriter::new(file), &self.signals, near);
+        let written = self.messages.write(BufWriter::new(file), self.version, &self.signals, near);
         written.map_err(|error| write_error(&path, error))
     }
 }

@@ -21,7 +21,7 @@ use crate::gnss::bits::{Bits, FieldError, Store, add_to, integers, quantise_all,
 use crate::gnss::broadcast::{Ephemeris, PLAIN};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{IonosphereForm, Message, Sender};
+use crate::gnss::message::{IonosphereForm, Message, Records, Sender};
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
 pub use fields::{BDT_WEEK, SUBFRAME_BITS, tables};
@@ -71,6 +71,7 @@ pub static D1_D2: Message = Message {
     adjustable,
     alert: None,
     adjust,
+    rinex: Some(Records { set: |sv| if sv.is_geostationary() { "D2" } else { "D1" }, ionosphere: "D1D2" }),
 };
 
 /// Seconds of a unit, of a subframe of D1 and of a frame of D2.

@@ -22,7 +22,7 @@ use crate::gnss::galileo::inav::fields::{Orbit, Utc};
 use crate::gnss::galileo::inav::{GST_WEEK, INAV, code};
 use crate::gnss::galileo::status::{self, Band};
 use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Sender};
+use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Records, Sender};
 use crate::gnss::nequick::NequickG;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
@@ -62,6 +62,7 @@ pub static FNAV: Message = Message {
     adjustable,
     alert: None,
     adjust,
+    rinex: Some(Records { set: |_| "FNAV", ionosphere: "IFNV" }),
 };
 
 /// Sets of F/NAV: its clock and its delay are those of E1 and E5a (5.1.5, table 66).

@@ -10,7 +10,7 @@ use super::{
     of_issue, opened, quantised,
 };
 use crate::gnss::ionosphere::Model;
-use crate::gnss::message::{IonosphereForm, Message};
+use crate::gnss::message::{IonosphereForm, Message, Records};
 use crate::gnss::time::Epoch;
 
 /// I/NAV as E5b names it. Its sets are those of I/NAV on E1-B.
@@ -35,6 +35,7 @@ pub static INAV_E5B: Message = Message {
     adjustable,
     alert: Some(alerted),
     adjust,
+    rinex: Some(Records { set: |_| "INAV", ionosphere: "IFNV" }),
 };
 
 /// The last 24 of the reserved bits before the check are ones and zeros in turn.

@@ -24,7 +24,7 @@ use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::galileo::fnav::FNAV_SETS;
 use crate::gnss::galileo::status::{self, Band};
 use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::message::{Common, IonosphereForm, Message, Sender};
+use crate::gnss::message::{Common, IonosphereForm, Message, Records, Sender};
 use crate::gnss::nequick::NequickG;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
@@ -61,6 +61,7 @@ pub static INAV: Message = Message {
     adjustable,
     alert: Some(alerted),
     adjust,
+    rinex: Some(Records { set: |_| "INAV", ionosphere: "IFNV" }),
 };
 
 /// The set as I/NAV has it, of either message.

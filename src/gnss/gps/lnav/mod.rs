@@ -20,7 +20,7 @@ use crate::gnss::bits::{add_to, bits_of, integers, number, quantise_all, read_al
 use crate::gnss::broadcast::{Ephemeris, PLAIN, SetForm};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{Common, IonosphereForm, Message, Sender};
+use crate::gnss::message::{Common, IonosphereForm, Message, Records, Sender};
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::{Epoch, WEEK_S};
 use fields::{ALMANAC_PAGE, IONOSPHERE_PAGE, SUBFRAME_1, SUBFRAME_2, SUBFRAME_3, UTC_PAGE};
@@ -74,6 +74,7 @@ pub static LNAV: Message = Message {
     adjustable,
     alert: None,
     adjust,
+    rinex: Some(Records { set: |_| "LNAV", ionosphere: "LNAV" }),
 };
 
 /// Sets of LNAV: one group delay, and six bits of health that speak of all signals together (IS-GPS-200N,

@@ -21,7 +21,7 @@ use crate::gnss::fec::convolutional::Convolutional;
 use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{Common, IonosphereForm, Message, Sender};
+use crate::gnss::message::{Common, IonosphereForm, Message, Records, Sender};
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::{Epoch, WEEK_S};
 use fields::{Almanac, MESSAGE_7, MESSAGE_11, MESSAGE_26, SUBFRAME_1, SUBFRAME_2, Utc};
@@ -64,6 +64,7 @@ pub static SPS_NAV: Message = Message {
     adjustable,
     alert: None,
     adjust,
+    rinex: Some(Records { set: |_| "LNAV", ionosphere: "LNAV" }),
 };
 
 /// Continuous GPS week of week 0 of NavIC's time, which began on 1999-08-22.
