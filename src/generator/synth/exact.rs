@@ -7,7 +7,7 @@
 
 use super::band::{Filter, HALF_WIDTH};
 use super::chips::{sign, window};
-use super::{CODE_ONE, Edge, Run, reference};
+use super::{CODE_ONE, Edge, Run, reference, to_step};
 
 /// Samples side by side; results do not depend on it.
 const LANES: usize = 16;
@@ -85,7 +85,7 @@ fn band_limited(filter: &Filter, run: &Run<'_>, samples: usize, wave: &mut Vec<f
         let signs = window(run.bits, step as usize - 1);
         let (old, new) = (1.0 - 2.0 * (signs >> 63) as f64, 1.0 - 2.0 * (signs >> 62 & 1) as f64);
         // Samples from the run's first one to the edge.
-        let x = ((step * CODE_ONE) as i64 - run.position as i64) as f64 * per_step;
+        let x = to_step(run.position, step) * per_step;
         let place = x.ceil();
         let at = (place as i64 + BORDER as i64).max(0) as usize;
         if let Some(stretch) = wave.get_mut(filled..at) {

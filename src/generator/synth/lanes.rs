@@ -12,7 +12,7 @@ use super::angle::{cos_sin, ramp};
 use super::band::{Filter, HALF_WIDTH};
 use super::chips::window;
 use super::chorus::{self, Chord};
-use super::{CODE_BITS, CODE_ONE, Edge, RUN_SAMPLES, Run, reference};
+use super::{CODE_BITS, CODE_ONE, Edge, RUN_SAMPLES, Run, reference, to_step};
 
 /// Samples on each side of a group's middle. The same on every instruction set, because rounding depends on
 /// it.
@@ -324,7 +324,7 @@ fn band_limited(filter: &Filter, run: &Run<'_>, samples: usize, wave: &mut Vec<f
         if zeros == 64 || step > last {
             continue;
         }
-        let x = ((step * CODE_ONE) as i64 - run.position as i64) as f64 * per_step;
+        let x = to_step(run.position, step) * per_step;
         let place = x.ceil();
         let at = (place as i64 + BORDER as i64).max(0) as usize;
         let old = if negative == 1 { -1.0 } else { 1.0 };

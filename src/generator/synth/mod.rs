@@ -54,6 +54,14 @@ pub struct Run<'a> {
     pub amplitude: f64,
 }
 
+/// From a position to the beginning of a code step, Q16.48 steps. Steps of a run reach beyond 2^15, so neither
+/// is a signed number.
+#[inline(always)]
+fn to_step(position: u64, step: u64) -> f64 {
+    let edge = step * CODE_ONE;
+    if edge >= position { (edge - position) as f64 } else { -((position - edge) as f64) }
+}
+
 /// How a code edge falls between samples, with what it needs at hand.
 #[derive(Clone, Copy, Debug)]
 pub enum Edge<'a> {

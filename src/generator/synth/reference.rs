@@ -4,7 +4,7 @@
 
 use super::band::HALF_WIDTH;
 use super::chips::sign;
-use super::{CODE_ONE, Edge, Run, radians};
+use super::{CODE_ONE, Edge, Run, radians, to_step};
 
 /// Adds the run to planar samples; `i` and `q` have the same length.
 pub fn accumulate(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32]) {
@@ -27,7 +27,7 @@ pub fn waveform(edge: Edge<'_>, run: &Run<'_>, position: u64) -> f64 {
             let mut value = sign(run.bits, first as usize);
             for step in first + 1..=last {
                 let change = sign(run.bits, step as usize) - sign(run.bits, step as usize - 1);
-                let since = (position as i64 - (step * CODE_ONE) as i64) as f64 / run.step as f64;
+                let since = -to_step(position, step) / run.step as f64;
                 value += change * filter.step(since);
             }
             value

@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::generator::synth::band::Filter;
-use crate::generator::synth::chips::CodeTime;
+use crate::generator::synth::chips::{CodeTime, MAX_STEP};
 use crate::generator::synth::tone::Modulation;
 use crate::generator::synth::waveform::{Waveform, plain};
 use crate::generator::synth::{CODE_ONE, reference};
@@ -90,6 +90,30 @@ fn signals_are_their_twins_at_every_length_and_offset() {
                 |i, q| twin(i, q, 6.1e-8),
             );
         }
+    }
+}
+
+/// As many steps a sample as are taken, so that those at the end of a run lie in the upper half of 16 bits.
+#[test]
+fn the_longest_runs_are_their_twins_to_the_last_sample() {
+    const SAMPLES: usize = 4096;
+    let filter = Filter::new(0.45);
+    let spreading = plain(&L1_CA, 11).unwrap();
+    let step = (MAX_STEP * CODE_ONE as f64) as u64 - 12_345;
+    let mut bits = Vec::new();
+    let from = CodeTime::new(8, 1010 * CODE_ONE + 12_345);
+    let position = spreading.strip(from, step, SAMPLES, |period| period % 2 == 1, &mut bits);
+    let run = Run { bits: &bits, position, step, turns: 1 << 61, turns_step: 0, amplitude: 1.0 };
+    // Bars as above; over fifteen steps a sample a mean is smaller and its error with it.
+    for (edge, bar) in [(Edge::Nearest, 2e-6), (Edge::Area, 2.8e-6), (Edge::BandLimited(&filter), 2e-5)] {
+        let plane = || vec![0.0; SAMPLES];
+        let ((mut ri, mut rq), (mut i, mut q)) = ((plane(), plane()), (plane(), plane()));
+        reference::accumulate(edge, &run, &mut ri, &mut rq);
+        accumulate(Level::Baseline, edge, &[run], &mut i, &mut q, &mut Buffers::default());
+        assert!(difference((&i, &q), (&ri, &rq)) < bar, "{edge:.0?}");
+        let (mut i, mut q) = (plane(), plane());
+        accumulate_exact(Level::Baseline, edge, &run, &mut i, &mut q, &mut Vec::new());
+        assert!(difference((&i, &q), (&ri, &rq)) < 6.1e-8, "{edge:.0?}");
     }
 }
 
