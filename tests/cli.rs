@@ -560,3 +560,52 @@ fn forms_of_other_programs_lie_in_the_truth_if_they_are_asked_for() {
         assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
     }
 }
+
+#[test]
+fn packed_samples_are_opened_by_what_is_written_beside_them_and_are_those_of_whole_bytes() {
+    let here = workplace();
+    let at = here.path();
+    let with = |bits: u32| format!("{}[adc]\nbits = {bits}\n", SHORT.replace("duration_s = 2", "duration_s = 0.1"));
+    for (bits, flags) in [
+        (1, &["--encoding", "negative-sign"][..]),
+        (2, &["--encoding", "sign-magnitude", "--qi", "--lowest-first"]),
+        (4, &["--word-bytes", "4", "--big-endian"]),
+    ] {
+        fs::write(at.join("few.toml"), with(bits)).unwrap();
+        let generate = |out: &str, more: &[&str]| {
+            let made = twin(&[&["generate", "few.toml", "--out", out][..], more].concat(), at);
+            assert_eq!(code(&made), 0, "{more:?}: {}", stderr(&made));
+            let _ = fs::remove_dir_all(at.join(format!("rx-{out}")));
+            let received = twin(&["receive", out, "--out", &format!("rx-{out}")], at);
+            assert_eq!(code(&received), 3, "{}", stderr(&received));
+        };
+        let text = bits.to_string();
+        generate("whole.sigmf-data", &[]);
+        generate("packed.sigmf-data", &[&["--bits", &text][..], flags].concat());
+        let bytes = |name: &str| fs::metadata(at.join(name)).unwrap().len();
+        assert_eq!(bytes("whole.sigmf-data") * u64::from(bits), 8 * bytes("packed.sigmf-data"));
+        for table in ["acquisition.csv", "tracking.csv"] {
+            let of = |name: &str| fs::read(at.join(format!("rx-{name}.sigmf-data")).join(table)).unwrap();
+            assert!(of("whole") == of("packed"), "{bits} bits: {table}");
+        }
+    }
+    // Four bits are there now.
+    for (arguments, words) in [
+        (&["--bits", "2"][..], "the scene's converter has 4 bits: expected a table adc with bits = 2"),
+        (
+            &["--bits", "4", "--samples", "3", "--word-bytes", "4"],
+            "3 samples are no multiple of the 4 that fill a word",
+        ),
+        (&["--bits", "4", "--pocketsdr"], "--pocketsdr and --bits"),
+        (&["--bits", "5"], "5 bits a value"),
+        (&["--bits", "4", "--format", "ci8"], "cannot be used with"),
+    ] {
+        let refused = twin(&[&["generate", "few.toml", "--out", "no.sigmf-data"][..], arguments].concat(), at);
+        assert_eq!(code(&refused), 2, "{arguments:?}");
+        assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
+    }
+    let tagged = twin(&["generate", "few.toml", "--out", "if.sigmf-data", "--pocketsdr"], at);
+    assert_eq!(code(&tagged), 0, "{}", stderr(&tagged));
+    let tag = fs::read_to_string(at.join("if.sigmf-data.tag")).unwrap();
+    assert!(tag.contains("FMT  = CS8\nF_S  = 2.6\nF_LO = 1575.42\nIQ   = 2\n"), "{tag}");
+}

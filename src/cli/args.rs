@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
-use crate::cli::packed::Packed;
+use crate::cli::packed::{Bits, Packed};
 use crate::cli::printed::Printed;
 use crate::cli::sink::Spec;
 use crate::gnss::exchange::Version;
@@ -189,6 +189,12 @@ pub struct Generate {
     /// Also write NAME.gnss-sdr.conf beside the samples, with which GNSS-SDR opens them
     #[arg(long)]
     pub gnss_sdr: bool,
+    /// Also write FILE.tag beside the samples, with which PocketSDR opens them
+    #[arg(long)]
+    pub pocketsdr: bool,
+    /// How samples of a few bits are packed: those of the scene's converter
+    #[command(flatten)]
+    pub packed: Bits,
     /// Front end to generate, of a scene that has several [default: all of them]
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,

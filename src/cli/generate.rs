@@ -4,7 +4,7 @@
 use std::fs;
 use std::io;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -20,7 +20,8 @@ use crate::cli::staging::Staging;
 use crate::generator::scenario::Overrides;
 use crate::generator::scene::Scene;
 use crate::generator::stream::Options;
-use crate::generator::{self, truth};
+use crate::generator::{self, GenerateError, truth};
+use crate::gnss::packed::Packer;
 use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::sigmf;
 
@@ -60,8 +61,15 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
             names.join(", ")
         )));
     }
-    if arguments.gnss_sdr && (scenes.len() > 1 || stream.is_some()) {
-        return Err(CliError::usage("--gnss-sdr: expected one file of samples: choose a front end, and name a file"));
+    let one_file = [
+        ("--gnss-sdr", arguments.gnss_sdr),
+        ("--pocketsdr", arguments.pocketsdr),
+        ("--bits", arguments.packed.given()),
+    ];
+    if let Some((flag, _)) = one_file.iter().find(|(_, wanted)| *wanted && (scenes.len() > 1 || stream.is_some())) {
+        return Err(CliError::usage(format!(
+            "{flag}: expected one file of samples: choose a front end, and name a file"
+        )));
     }
     if scenes.len() > 1 {
         return collection::generate(arguments, &scenes);
@@ -88,8 +96,8 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
             arguments.out.display()
         )));
     }
-    let foreign = arguments.gnss_sdr.then(|| sidecar::gnss_sdr(&scene, &arguments.out)).transpose()?;
-    let foreign = foreign.map(|text| (arguments.out.with_extension("gnss-sdr.conf"), text));
+    let packed = arguments.packed.of_scene(&scene, end - first)?;
+    let sidecars = sidecars(arguments, &scene, first)?;
     let samples = Staging::file(&arguments.out)?;
     let meta = Staging::file(&meta_path)?;
     let truth = Staging::directory(&truth_path)?;
@@ -97,33 +105,38 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     let mut writer = truth_files(arguments, truth.path())?;
     let progress = Progress::new(&format!("generate {}", scene.name), Some(end - first), arguments.printed.in_words());
     let options = Options::default();
-    let generated = generator::generate_part(
-        &scene,
-        first..end,
-        &mut samples.writer(),
-        &mut writer,
-        &mut |done| progress.set(done),
-        &options,
-    );
+    let mut generate = |out: &mut dyn io::Write| {
+        generator::generate_part(&scene, first..end, out, &mut writer, &mut |done| progress.set(done), &options)
+    };
+    let generated = match &packed {
+        None => generate(&mut samples.writer()),
+        Some((_, layout)) => {
+            let mut packer = Packer::new(layout.clone(), samples.writer());
+            generate(&mut packer).and_then(|made| packer.finish().map(|()| made).map_err(GenerateError::Write))
+        }
+    };
     drop(progress);
     let generated = generated.map_err(generator_error)?;
     drop(writer);
     // What the receiver's clock reads at the first sample of the file.
     let metadata = IfMetadata { start: Some(scene.clock.epoch(first)), ..scene.metadata.clone() };
-    meta.write(sigmf::write(&metadata).as_bytes())?;
+    let text = match &packed {
+        None => sigmf::write(&metadata),
+        Some((of, _)) => sigmf::write_packed(&metadata, of),
+    };
+    meta.write(text.as_bytes())?;
     // Metadata last, and never those of other samples: a run that is killed here leaves none.
     discard(&meta_path)?;
     truth.commit()?;
     samples.commit()?;
     meta.commit()?;
     let mut beside = String::new();
-    if let Some((path, text)) = foreign {
+    for Sidecar { path, text, opened_by } in sidecars {
         let file = Staging::file(&path)?;
         file.write(text.as_bytes())?;
         file.commit()?;
-        beside = format!("\nopened by: gnss-sdr --config_file={}", path.display());
+        beside += &format!("\nopened by: {opened_by}");
     }
-
     let (out, meta, truth) = (arguments.out.display(), meta_path.display(), truth_path.display());
     let text = format!("{generated}\nsamples in {out}, metadata in {meta}, truth in {truth}{beside}\n");
     arguments.printed.results(
@@ -147,6 +160,36 @@ pub fn truth_files(arguments: &args::Generate, directory: &Path) -> Result<truth
         sinks.push(Box::new(truth::Tracks::new(directory)));
     }
     Ok(truth::Several(sinks))
+}
+
+/// A file beside the samples, and what it opens them with.
+struct Sidecar {
+    path: PathBuf,
+    text: String,
+    opened_by: String,
+}
+
+/// The sidecars that are asked for, of samples from `first` on.
+fn sidecars(arguments: &args::Generate, scene: &Scene, first: u64) -> Result<Vec<Sidecar>, CliError> {
+    let mut all = Vec::new();
+    let packed = if arguments.packed.given() { Some("--bits") } else { None };
+    let refuse = |flag| Err(CliError::usage(format!("{flag} and --bits: expected samples of whole bytes")));
+    if arguments.gnss_sdr {
+        let text = sidecar::gnss_sdr(scene, &arguments.out)?;
+        let path = arguments.out.with_extension("gnss-sdr.conf");
+        let opened_by = format!("gnss-sdr --config_file={}", path.display());
+        packed.map_or(Ok(()), |_| refuse("--gnss-sdr"))?;
+        all.push(Sidecar { path, text, opened_by });
+    }
+    if arguments.pocketsdr {
+        let text = sidecar::pocketsdr(scene, scene.clock.epoch(first))?;
+        let mut name = arguments.out.clone().into_os_string();
+        name.push(".tag");
+        let opened_by = format!("pocket_trk {}", arguments.out.display());
+        packed.map_or(Ok(()), |_| refuse("--pocketsdr"))?;
+        all.push(Sidecar { path: PathBuf::from(name), text, opened_by });
+    }
+    Ok(all)
 }
 
 /// The format that was asked for; a dongle's samples are rounded to its own zero from the start.

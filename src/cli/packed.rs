@@ -1,14 +1,16 @@
-//! Flags that say how samples lie in a recording, over what its metadata say.
+//! Flags that say how samples lie in a recording: over what its metadata say, and as they are to be written.
 
 use clap::Args;
 
 use crate::cli::error::CliError;
-use crate::gnss::packed::{Components, Encoding, Interleaved};
+use crate::generator::scene::Scene;
+use crate::gnss::facts::StageSpec;
+use crate::gnss::packed::{Components, Encoding, Interleaved, Layout};
 use crate::gnss::recording::Samples;
 
-/// Samples of a few bits, and channels.
+/// Samples of a few bits.
 #[derive(Args, Clone, Debug, Default)]
-pub struct Packed {
+pub struct Bits {
     /// Bits of a value of packed samples: 1, 2, 3, 4, 8 or 16. Complex and first in the highest bits of each
     /// byte unless other flags say so
     #[arg(long, value_name = "N", conflicts_with = "format")]
@@ -17,11 +19,8 @@ pub struct Packed {
     /// offset [default: twos-complement, of 1 bit sign]
     #[arg(long, requires = "bits")]
     encoding: Option<Encoding>,
-    /// Packed samples are real
-    #[arg(long, requires = "bits")]
-    real: bool,
     /// Of packed samples, quadrature comes before in-phase
-    #[arg(long, requires = "bits", conflicts_with = "real")]
+    #[arg(long, requires = "bits")]
     qi: bool,
     /// Packed values begin in the lowest bits
     #[arg(long, requires = "bits")]
@@ -32,6 +31,71 @@ pub struct Packed {
     /// The highest byte of a word comes first
     #[arg(long, requires = "bits")]
     big_endian: bool,
+}
+
+impl Bits {
+    /// Whether samples are packed.
+    pub fn given(&self) -> bool {
+        self.bits.is_some()
+    }
+
+    /// How samples of one channel lie in the file, real or complex ones; nothing where no flag says it.
+    fn interleaved(&self, real: bool) -> Result<Option<Interleaved>, CliError> {
+        let Some(bits) = self.bits else { return Ok(None) };
+        let components = match (real, self.qi) {
+            (true, true) => return Err(CliError::usage("--qi: real samples have no quadrature")),
+            (true, false) => Components::Real,
+            (false, true) => Components::Qi,
+            (false, false) => Components::Iq,
+        };
+        Ok(Some(Interleaved {
+            bits,
+            encoding: self.encoding.unwrap_or(if bits == 1 { Encoding::Sign } else { Encoding::TwosComplement }),
+            components,
+            lowest_first: self.lowest_first,
+            word_bytes: self.word_bytes,
+            big_endian: self.big_endian,
+            channels: 1,
+            channel: 1,
+        }))
+    }
+
+    /// How `samples` samples of a scene are packed; nothing where no flag says it.
+    ///
+    /// # Errors
+    /// A scene whose converter has other levels, and samples that are no whole words.
+    pub fn of_scene(&self, scene: &Scene, samples: u64) -> Result<Option<(Interleaved, Layout)>, CliError> {
+        let format = scene.metadata.format;
+        let Some(of) = self.interleaved(!format.is_complex())? else { return Ok(None) };
+        let layout = Layout::interleaved(&of).map_err(CliError::usage)?;
+        let refuse = |what: String| Err(CliError::usage(format!("--bits {}: {what}", of.bits)));
+        if layout.format() != format {
+            return refuse(format!("the scene's format is {format}: expected {}", layout.format()));
+        }
+        let levels = scene.front_end.iter().find_map(|stage| match stage.spec() {
+            Some(StageSpec::Adc(converter)) if !converter.whole => Some(converter.bits),
+            _ => None,
+        });
+        if levels != Some(of.bits) {
+            let has = levels.map_or_else(|| "has none".to_owned(), |bits| format!("has {bits} bits"));
+            return refuse(format!("the scene's converter {has}: expected a table adc with bits = {}", of.bits));
+        }
+        let group = layout.group_samples() as u64;
+        if samples % group != 0 {
+            return refuse(format!("{samples} samples are no multiple of the {group} that fill a word: use --samples"));
+        }
+        Ok(Some((of, layout)))
+    }
+}
+
+/// Samples of a few bits, and channels.
+#[derive(Args, Clone, Debug, Default)]
+pub struct Packed {
+    #[command(flatten)]
+    of: Bits,
+    /// Packed samples are real
+    #[arg(long, requires = "bits", conflicts_with = "qi")]
+    real: bool,
     /// Channels of a file, a sample of each in turn
     #[arg(long, value_name = "N")]
     channels: Option<u32>,
@@ -43,30 +107,14 @@ pub struct Packed {
 impl Packed {
     /// The flag that says how samples lie in the file, if one does.
     pub fn given(&self) -> Option<&'static str> {
-        let flags = [("--bits", self.bits.is_some()), ("--channels", self.channels.is_some())];
+        let flags = [("--bits", self.of.bits.is_some()), ("--channels", self.channels.is_some())];
         let more = [("--channel", self.channel.is_some())];
         flags.into_iter().chain(more).find_map(|(flag, given)| given.then_some(flag))
     }
 
     /// The samples that the flags describe, over those that metadata do: of one channel.
     pub fn over(&self, described: Option<Samples>, channels: u32) -> Result<Option<Samples>, CliError> {
-        let samples = match self.bits {
-            None => described,
-            Some(bits) => Some(Samples::Interleaved(Interleaved {
-                bits,
-                encoding: self.encoding.unwrap_or(if bits == 1 { Encoding::Sign } else { Encoding::TwosComplement }),
-                components: match (self.real, self.qi) {
-                    (true, _) => Components::Real,
-                    (_, true) => Components::Qi,
-                    _ => Components::Iq,
-                },
-                lowest_first: self.lowest_first,
-                word_bytes: self.word_bytes,
-                big_endian: self.big_endian,
-                channels: 1,
-                channel: 1,
-            })),
-        };
+        let samples = self.of.interleaved(self.real)?.map(Samples::Interleaved).or(described);
         let Some(samples) = samples else { return Ok(None) };
         let channels = self.channels.unwrap_or(channels);
         let channel = match &self.channel {

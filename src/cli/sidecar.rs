@@ -1,4 +1,5 @@
-//! A configuration of GNSS-SDR beside samples, so that it opens them at once.
+//! Files beside samples with which other receivers open them at once: a configuration of GNSS-SDR, and a tag of
+//! PocketSDR.
 
 use std::path::Path;
 
@@ -8,6 +9,7 @@ use crate::gnss::galileo::e1::E1;
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::samples::Format;
 use crate::gnss::signal::Signal;
+use crate::gnss::time::Epoch;
 
 /// What is filled in stands between signs.
 const TEMPLATE: &str = include_str!("../../assets/gnss-sdr.conf.in");
@@ -53,13 +55,40 @@ pub fn gnss_sdr(scene: &Scene, samples: &Path) -> Result<String, CliError> {
     Ok(filled.into_iter().fold(TEMPLATE.to_owned(), |text, (sign, value)| text.replace(sign, &value)))
 }
 
+/// PocketSDR's tag for a scene's samples, of which the first is taken at that time: its program's lines of
+/// format, sample rate, local oscillator and kind of sampling, in MHz.
+///
+/// PocketSDR's own front end has its quadrature turned: its `INT8X2` is a mirrored spectrum, and `CS8` one as
+/// it is.
+///
+/// # Errors
+/// Samples that it would not read, by name.
+pub fn pocketsdr(scene: &Scene, start: Epoch) -> Result<String, CliError> {
+    let metadata = &scene.metadata;
+    let refuse = |what: &str| Err(CliError::usage(format!("--pocketsdr: {what}")));
+    let (format, values) = match (metadata.format, metadata.inverted) {
+        (Format::Ci8, true) => ("INT8X2", 2),
+        (Format::Ci8, false) => ("CS8", 2),
+        (Format::Ri8, false) => ("INT8", 1),
+        (Format::Ri8, true) => return refuse("real samples of a mirrored spectrum: expected one that is not"),
+        (other, _) => return refuse(&format!("format {other}: expected ci8 or ri8")),
+    };
+    let time = start.to_utc_text();
+    let second = time.split('.').next().unwrap_or_default();
+    Ok(format!(
+        "PROG = gnss-twin\nTIME = {second}Z\nFMT  = {format}\nF_S  = {}\nF_LO = {}\nIQ   = {values}\n",
+        metadata.rate.hz() / 1e6,
+        metadata.center_hz / 1e6
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cli::scenario::{compose_all, read};
     use crate::generator::scenario::Overrides;
 
-    fn text(changes: &[(&str, &str)], format: Option<Format>) -> Result<String, CliError> {
+    fn composed(changes: &[(&str, &str)], format: Option<Format>) -> Scene {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("scene.toml");
         let scene = include_str!("../../scenarios/two_systems.toml").to_owned();
@@ -67,7 +96,11 @@ mod tests {
         std::fs::write(&path, scene).unwrap();
         let overrides = Overrides { format, ..Overrides::default() };
         let (mut scenes, _) = compose_all(&read(Some(&path)).unwrap(), &overrides).unwrap();
-        gnss_sdr(&scenes.pop().unwrap(), Path::new("/if/samples.bin"))
+        scenes.pop().unwrap()
+    }
+
+    fn text(changes: &[(&str, &str)], format: Option<Format>) -> Result<String, CliError> {
+        gnss_sdr(&composed(changes, format), Path::new("/if/samples.bin"))
     }
 
     #[test]
@@ -81,6 +114,21 @@ mod tests {
         for line in ["item_type=gr_complex", "implementation=Pass_Through", "Channels_1C.count=0", "iono_model=OFF"] {
             assert!(galileo.contains(line), "{line} in {galileo}");
         }
+    }
+
+    #[test]
+    fn a_tag_has_the_lines_of_its_program_and_the_sense_of_the_spectrum() {
+        let tag = |changes: &[(&str, &str)], format| {
+            let scene = composed(changes, format);
+            pocketsdr(&scene, scene.clock.start.plus_s(1.5)).map_err(|error| format!("{error:?}"))
+        };
+        let expected =
+            "PROG = gnss-twin\nTIME = 2020-11-29T12:50:13Z\nFMT  = CS8\nF_S  = 6.5\nF_LO = 1575.42\nIQ   = 2\n";
+        assert_eq!(tag(&[], None).unwrap(), expected);
+        let mirrored = tag(&[("[front_end]", "[front_end]\nspectrum_inverted = true")], None).unwrap();
+        assert!(mirrored.contains("FMT  = INT8X2\n"), "{mirrored}");
+        let refused = tag(&[], Some(Format::Ci16Le)).unwrap_err();
+        assert!(refused.contains("format ci16: expected ci8 or ri8") || refused.contains("ci16_le"), "{refused}");
     }
 
     #[test]

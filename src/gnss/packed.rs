@@ -5,7 +5,11 @@
 //! numbers 1, 3, … to both sides of zero, as a quantiser without a zero has them: two's complement `x` is
 //! `2x + 1`, sign and magnitude `±(2m + 1)`, offset binary `2x + 1 − 2^bits`, a sign alone `±1`. Of 8 and
 //! 16 bits, two's complement is taken as it is and offset binary of 8 bits in the middle of its step.
-//! Limits: no value lies across two words.
+//! A [`Packer`] writes what an [`Unpacker`] reads. Limits: no value lies across two words.
+
+mod packer;
+
+pub use packer::{CodeError, Packer};
 
 use std::fmt;
 use std::io::{self, Read};

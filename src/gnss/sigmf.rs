@@ -133,15 +133,43 @@ pub fn write(metadata: &IfMetadata) -> String {
 
 /// [`write()`] of a recording that belongs to a collection: the base name of its `.sigmf-collection` file.
 pub fn write_in(metadata: &IfMetadata, collection: Option<&str>) -> String {
+    document(metadata, collection, Packed::default())
+}
+
+/// [`write()`] of samples that lie packed in the file, with keys that [`describe`] reads. A program without
+/// them would take bytes for samples, so the extension is one that it must know.
+pub fn write_packed(metadata: &IfMetadata, of: &Interleaved) -> String {
+    let components = match of.components {
+        Components::Iq => "iq",
+        Components::Qi => "qi",
+        Components::Real => "real",
+    };
+    let packed = Packed {
+        bits: Some(of.bits.into()),
+        encoding: Some(of.encoding.to_string().into()),
+        components: Some(components.into()),
+        bit_order: Some(if of.lowest_first { "lsb" } else { "msb" }.into()),
+        word_bytes: Some(of.word_bytes.into()),
+        byte_order: Some(if of.big_endian { "big" } else { "little" }.into()),
+    };
+    document(metadata, None, packed)
+}
+
+fn document(metadata: &IfMetadata, collection: Option<&str>, packed: Packed) -> String {
+    let (datatype, optional) = match packed.bits {
+        Some(_) => ("ru8", false),
+        None => (metadata.format.name(), true),
+    };
     let document = Document {
         global: Global {
-            datatype: Some(metadata.format.name().into()),
+            packed,
+            datatype: Some(datatype.into()),
             sample_rate: Some(number(metadata.rate.hz())),
             version: Some(VERSION.into()),
             description: Some("GNSS IF samples".into()),
             channels: None,
             collection: collection.map(Value::from),
-            extensions: Some(serde_json::json!([{ "name": EXTENSION, "version": "0.1.0", "optional": true }])),
+            extensions: Some(serde_json::json!([{ "name": EXTENSION, "version": "0.1.0", "optional": optional }])),
             inverted: Some(metadata.inverted.into()),
             ..Global::default()
         },
