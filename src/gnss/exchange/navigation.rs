@@ -84,7 +84,10 @@ impl NavigationSets {
         for ((name, sv, issue), raws) in &self.sets {
             let Some((message, time)) = messages.get(name.as_str()) else { continue };
             let Some(records) = message.rinex else { continue };
-            let set = (message.elements)(*sv, &|name| raws.get(name).copied(), time.label(near));
+            // What a set needs and bears no issue: delays and health of I/NAV's word 5.
+            let rest = self.sets.get(&(name.clone(), *sv, 0));
+            let raw = |name: &str| raws.get(name).or_else(|| rest?.get(name)).copied();
+            let set = (message.elements)(*sv, &raw, time.label(near));
             let set = set.map(|set| set.timed(|label| time.instant(label)));
             if let Some(set) = set.filter(|set| known.insert((*sv, *issue, set.form.name))) {
                 text += &heading(version, records, *sv);
@@ -371,8 +374,13 @@ mod tests {
                 "{text}"
             );
             let file = foreign(&text);
-            assert_eq!(file.nav_ephemeris_frames_iter().count(), 6, "{text}");
+            let records = text.lines().filter(|line| line.get(1..3).is_some_and(|n| n.parse::<u8>().is_ok())).count();
+            let satellites: BTreeSet<String> =
+                file.nav_ephemeris_frames_iter().map(|(key, _)| key.sv.to_string()).collect();
+            assert_eq!((records, satellites.len()), (6, 5), "{text}");
             if version == Version::Four {
+                // In version 3 that crate keeps one of a satellite's messages of the same time.
+                assert_eq!(file.nav_ephemeris_frames_iter().count(), 6, "{text}");
                 let models = file.nav_ionosphere_models_iter().map(|(key, model)| {
                     let klobuchar = model.as_klobuchar().map(|found| [found.alpha.1, found.beta.3]);
                     let values = klobuchar.or(model.as_nequick_g().map(|found| [found.a.0, found.a.2]));
