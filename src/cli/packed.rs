@@ -81,7 +81,7 @@ impl Bits {
             return refuse(format!("the scene's converter {has}: expected a table adc with bits = {}", of.bits));
         }
         let group = layout.group_samples() as u64;
-        if samples % group != 0 {
+        if !samples.is_multiple_of(group) {
             return refuse(format!("{samples} samples are no multiple of the {group} that fill a word: use --samples"));
         }
         Ok(Some((of, layout)))

@@ -142,7 +142,7 @@ fn ionosphere_record(records: Records, sent: Coefficients, sv: Sv, near: Epoch) 
     let mut text = format!("> ION {sv} {}\n    {epoch}", records.ionosphere);
     // Three beside the time, then four a line.
     for (place, value) in values.iter().enumerate() {
-        if place >= 3 && (place - 3) % 4 == 0 {
+        if place >= 3 && (place - 3).is_multiple_of(4) {
             text += "\n    ";
         }
         text += &format!("{:>19}", exponent(*value, 12));
