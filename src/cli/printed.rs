@@ -1,7 +1,7 @@
 //! How much a command prints of its results: words, one JSON object, or nothing.
 //!
-//! Warnings and errors go to standard error in any case. Results are printed on standard output as they always
-//! are; the object is one line, so that several runs in a row are JSON lines.
+//! Warnings and errors go to standard error in any case. Results are printed on standard output as they
+//! always are; the object is one line, so that several runs in a row are JSON lines.
 
 use clap::Args;
 use serde_json::{Value, json};

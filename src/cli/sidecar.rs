@@ -1,5 +1,5 @@
-//! Files beside samples with which other receivers open them at once: a configuration of GNSS-SDR, and a tag of
-//! PocketSDR.
+//! Files beside samples with which other receivers open them at once: a configuration of GNSS-SDR, and a tag
+//! of PocketSDR.
 
 use std::path::Path;
 

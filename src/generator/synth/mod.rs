@@ -54,8 +54,8 @@ pub struct Run<'a> {
     pub amplitude: f64,
 }
 
-/// From a position to the beginning of a code step, Q16.48 steps. Steps of a run reach beyond 2^15, so neither
-/// is a signed number.
+/// From a position to the beginning of a code step, Q16.48 steps. Steps of a run reach beyond 2^15, so
+/// neither is a signed number.
 #[inline(always)]
 fn to_step(position: u64, step: u64) -> f64 {
     let edge = step * CODE_ONE;

@@ -1,8 +1,9 @@
-//! Where the antenna was, as NMEA 0183 and as tracks for maps: what a receiver without errors would have said.
+//! Where the antenna was, as NMEA 0183 and as tracks for maps: what a receiver without errors would have
+//! said.
 //!
-//! The satellites of the sentences are those of the truth, all of them in the solution; dilutions of precision
-//! are those of their directions with a clock for each system. Limits: only dilutions of four satellites and
-//! more, of which three systems' clocks take two, are there; 99.99 stands for none.
+//! The satellites of the sentences are those of the truth, all of them in the solution; dilutions of
+//! precision are those of their directions with a clock for each system. Limits: where there are fewer
+//! satellites than unknowns, 99.99 stands for dilutions.
 
 use std::collections::BTreeMap;
 use std::fs::File;
