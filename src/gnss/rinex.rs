@@ -5,6 +5,11 @@
 //! Source: RINEX 2.11, table A4; RINEX 3.05, tables A6, A8 and A18; RINEX 4.02. Lines and columns are read in
 //! `columns`; `elements` holds every element against the range of its field in the message. A record that
 //! fails is left out and named in [`Navigation::skipped`].
+//!
+//! A reader of our own, held to the `rinex` crate's in the tests (`tests/witness/orbit.rs`): that crate
+//! (0.24) panics where a `LEAP SECONDS` line has no content, refuses a whole file for one foreign letter in
+//! a comment, keeps one of a Galileo satellite's two messages of a time in version 3, and tests no element's
+//! range.
 
 mod columns;
 mod elements;

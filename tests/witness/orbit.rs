@@ -309,3 +309,89 @@ fn the_rinex_crate_reads_the_same_elements() {
         assert_eq!(compared, of_gps.count(), "{name}");
     }
 }
+
+#[test]
+fn the_rinex_crate_reads_the_same_orbits_of_other_systems() {
+    let mut files = vec![
+        ("CARD", include_bytes!("../../data/CARD00ESP_R_20203340900_15H_MN.rnx.gz").to_vec()),
+        ("navic", include_bytes!("../../scenarios/navic_2026-03-09_10h_12h.rnx").to_vec()),
+    ];
+    let name = "multi-gnss/BRD400DLR_S_20260680000_01D_MN.rnx.gz";
+    files.extend(external(name).map(|path| (name, std::fs::read(path).unwrap())));
+    let mut compared = std::collections::BTreeMap::new();
+    for (name, bytes) in files {
+        let found = rinex::read(&bytes, name).unwrap();
+        let mut text = Vec::new();
+        if flate2::read::GzDecoder::new(bytes.as_slice()).read_to_end(&mut text).is_err() {
+            text = bytes;
+        }
+        let (file, _) = Rinex::parse_with_diagnostics(&mut BufReader::new(text.as_slice())).unwrap();
+        // Messages of one satellite and time: in version 4 each has its own, in version 3 that crate keeps
+        // one.
+        let mut frames = std::collections::BTreeMap::<_, Vec<_>>::new();
+        for (key, frame) in file.nav_ephemeris_frames_iter() {
+            let since_ns = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();
+            frames.entry((key.sv.to_string(), (since_ns / 1_000_000_000) as i64)).or_default().push(frame);
+        }
+        for set in found.ephemerides.iter().filter(|set| set.sv.system != System::Gps) {
+            let own = [
+                ("crs", set.crs_m),
+                ("deltaN", set.delta_n_radps),
+                ("m0", set.m0_rad),
+                ("cuc", set.cuc_rad),
+                ("e", set.eccentricity),
+                ("cus", set.cus_rad),
+                ("sqrta", set.sqrt_a_sqrtm),
+                ("cic", set.cic_rad),
+                ("omega0", set.omega0_rad),
+                ("cis", set.cis_rad),
+                ("i0", set.i0_rad),
+                ("crc", set.crc_m),
+                ("omega", set.omega_rad),
+                ("omegaDot", set.omega_dot_radps),
+                ("idot", set.idot_radps),
+            ];
+            let theirs = frames.get(&(set.sv.to_string(), set.toc.seconds()));
+            let theirs = theirs.unwrap_or_else(|| panic!("{name}: {} {} is not there", set.sv, set.toc));
+            let same =
+                theirs.iter().any(|frame| own.iter().all(|(field, value)| frame.get_orbit_f64(field) == Some(*value)));
+            assert!(same, "{name}: {} {}: {own:?}", set.sv, set.toc);
+            *compared.entry(set.sv.system).or_insert(0) += 1;
+        }
+    }
+    // Of the shipped files alone.
+    for (system, least) in [(System::Galileo, 50), (System::BeiDou, 15), (System::Navic, 20)] {
+        assert!(compared[&system] >= least, "{compared:?}");
+    }
+}
+
+#[test]
+fn the_rinex_crate_reads_the_same_observations_of_a_station() {
+    use gnss_twin::analysis::read::rinex_obs;
+
+    // A reference station's receiver, through two converters: 120 epochs of GPS on three carriers.
+    let packed = include_bytes!("../../data/witness/MARE00ESP_R_20203341240_20M_10S_GO.rnx.gz");
+    let mut text = Vec::new();
+    flate2::read::GzDecoder::new(&packed[..]).read_to_end(&mut text).unwrap();
+    let ours = rinex_obs::read(&text).unwrap();
+    let theirs = Rinex::parse(&mut BufReader::new(text.as_slice())).unwrap();
+    assert_eq!((ours.epochs.len(), theirs.observations_iter().count()), (120, 120));
+    let mut compared = 0;
+    for (epoch, (key, observed)) in ours.epochs.iter().zip(theirs.observations_iter()) {
+        let at_ns = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();
+        assert_eq!((epoch.label.seconds(), epoch.label.fraction()), ((at_ns / 1_000_000_000) as i64, 0.0));
+        for signal in observed.signals.iter().filter(|signal| signal.value != 0.0) {
+            let (sv, code) = (signal.sv.to_string(), signal.observable.to_string());
+            let values = &epoch.values[&(sv.parse().unwrap(), code[1..].to_owned())];
+            let found = match &code[..1] {
+                "C" => values.pseudorange_m,
+                "L" => values.carrier_cycles,
+                "D" => values.doppler_hz,
+                _ => values.cn0_dbhz,
+            };
+            assert_eq!(found, Some(signal.value), "{sv} {code}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 10_000, "{compared}");
+}
