@@ -8,8 +8,7 @@
 //!
 //! A reader of our own, held to the `rinex` crate's in the tests (`tests/witness/orbit.rs`): that crate
 //! (0.24) panics where a `LEAP SECONDS` line has no content, refuses a whole file for one foreign letter in
-//! a comment, keeps one of a Galileo satellite's two messages of a time in version 3, and tests no element's
-//! range.
+//! a comment, and tests no element's range.
 
 mod columns;
 mod elements;

@@ -326,8 +326,7 @@ fn the_rinex_crate_reads_the_same_orbits_of_other_systems() {
             text = bytes;
         }
         let (file, _) = Rinex::parse_with_diagnostics(&mut BufReader::new(text.as_slice())).unwrap();
-        // Messages of one satellite and time: in version 4 each has its own, in version 3 that crate keeps
-        // one.
+        // A satellite's messages of one time have a frame each.
         let mut frames = std::collections::BTreeMap::<_, Vec<_>>::new();
         for (key, frame) in file.nav_ephemeris_frames_iter() {
             let since_ns = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();

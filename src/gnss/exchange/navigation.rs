@@ -379,7 +379,6 @@ mod tests {
                 file.nav_ephemeris_frames_iter().map(|(key, _)| key.sv.to_string()).collect();
             assert_eq!((records, satellites.len()), (6, 5), "{text}");
             if version == Version::Four {
-                // In version 3 that crate keeps one of a satellite's messages of the same time.
                 assert_eq!(file.nav_ephemeris_frames_iter().count(), 6, "{text}");
                 let models = file.nav_ionosphere_models_iter().map(|(key, model)| {
                     let klobuchar = model.as_klobuchar().map(|found| [found.alpha.1, found.beta.3]);
