@@ -57,6 +57,10 @@ impl Bank {
             let Some(samples) = entries.first().map(|entry| entry.samples.clone()) else { continue };
             let (Some(i), Some(q)) = (i.get_mut(samples.clone()), q.get_mut(samples)) else { continue };
             match kernel.arithmetic {
+                // Rays of one run each, most of all: as they lie.
+                Arithmetic::F32 if entries.iter().all(|entry| entry.part == 0) => {
+                    isa::accumulate(kernel.level, kernel.edge, &runs, i, q, &mut self.buffers);
+                }
                 Arithmetic::F32 => {
                     let mut left = runs.as_slice();
                     let rays: Vec<&[Run<'_>]> = (entries.chunk_by(|_, next| next.part > 0))

@@ -104,9 +104,15 @@ impl Pace {
         let seconds = sent.seconds() - self.behind_s;
         // A period is `steps` · 1000 thousandths, and a cycle whole periods in whole seconds.
         let per_period = i64::from(self.steps) * 1000;
-        let rest = seconds.rem_euclid(self.cycle_s) * self.step_rate_mhz;
-        let whole = seconds.div_euclid(self.cycle_s) * self.cycle_periods + rest / per_period;
-        let steps = (rest % per_period) as f64 / 1000.0 + sent.fraction() * self.step_rate_hz();
+        // Most codes have whole periods in each second: no division then, of which a run would pay several.
+        let (cycles, rest_s) = match self.cycle_s {
+            1 => (seconds, 0),
+            cycle_s => (seconds.div_euclid(cycle_s), seconds.rem_euclid(cycle_s)),
+        };
+        let rest = rest_s * self.step_rate_mhz;
+        let (rest_periods, rest) = if rest == 0 { (0, 0) } else { (rest / per_period, rest % per_period) };
+        let whole = cycles * self.cycle_periods + rest_periods;
+        let steps = rest as f64 / 1000.0 + sent.fraction() * self.step_rate_hz();
         let length = f64::from(self.steps);
         let periods = (steps / length).floor();
         let (period, left) = (whole + periods as i64, steps - periods * length);
@@ -149,14 +155,14 @@ impl Spreading {
     }
 
     /// Appends the signs around `samples` samples that start at `at` and advance by `step`, with the
-    /// data of each period (`negative` says whether it is sent inverted), and returns the position
-    /// of the first sample in them.
+    /// data of each period (`negative` says whether it is sent inverted, asked in their order), and returns the
+    /// position of the first sample in them.
     pub fn strip(
         &self,
         at: CodeTime,
         step: u64,
         samples: usize,
-        negative: impl Fn(i64) -> bool,
+        mut negative: impl FnMut(i64) -> bool,
         out: &mut Vec<u64>,
     ) -> u64 {
         let per_period = u64::from(self.pace.steps);

@@ -410,7 +410,14 @@ impl Transmitter {
             let delay_s =
                 planted!("generator.synth.code_phase", delay_s, delay_s + 2e-9 * f64::from(self.sv.number % 3));
             let at = sent.spreading.at(anchor.epoch, delay_s);
-            let negative = |period| self.symbols.negative(sent.data, period);
+            // Periods of a strip follow each other, and most share a symbol.
+            let (mut negative, mut until) = (false, i64::MIN);
+            let negative = |period| {
+                if period >= until {
+                    (negative, until) = self.symbols.negative(sent.data, period);
+                }
+                negative
+            };
             bank.push((anchor.n, end), number, samples.clone(), |bits| Run {
                 bits: &[],
                 position: sent.spreading.strip(at, step, samples.len(), negative, bits),

@@ -91,18 +91,20 @@ impl Symbols {
         Ok(())
     }
 
-    /// Whether a code period of a component is sent inverted.
-    pub fn negative(&self, data: Option<Data>, period: i64) -> bool {
-        let Some(Data { form, periods_per_symbol }) = data else { return false };
-        let Some((message, units)) = self.units.get(form) else { return false };
+    /// Whether a code period of a component is sent inverted, and the period at which its symbol ends: those
+    /// before have the same sign.
+    pub fn negative(&self, data: Option<Data>, period: i64) -> (bool, i64) {
+        let Some(Data { form, periods_per_symbol }) = data else { return (false, i64::MAX) };
+        let Some((message, units)) = self.units.get(form) else { return (false, i64::MAX) };
         let period = planted!("generator.synth.message_time", period, period + 1);
         let length = message.unit_symbols() as i64;
         // Units of a message need not begin where the week does.
         let before = (message.first_s as f64 / message.symbol_s).round() as i64;
-        let symbol = period.div_euclid(periods_per_symbol) - before;
-        let Some(symbols) = units.get(&symbol.div_euclid(length)) else { return false };
+        let since_first = period.div_euclid(periods_per_symbol);
+        let (symbol, end) = (since_first - before, (since_first + 1) * periods_per_symbol);
+        let Some(symbols) = units.get(&symbol.div_euclid(length)) else { return (false, end) };
         let place = symbol.rem_euclid(length) as usize;
         let place = planted!("generator.synth.bit_order", place, place / 30 * 30 + 29 - place % 30);
-        symbols.get(place).copied().unwrap_or(false)
+        (symbols.get(place).copied().unwrap_or(false), end)
     }
 }
