@@ -74,8 +74,41 @@ pub(super) struct Peak {
 /// The outcome for all satellites.
 pub(super) struct Peaks {
     pub of: Vec<Peak>,
-    /// Dopplers at which cross-correlation raises the cells of all codes.
-    pub crowded: usize,
+    /// Numbers of the Dopplers at which cross-correlation raises the cells of all codes.
+    pub crowded: Vec<usize>,
+    pub map: Map,
+}
+
+/// What a search saw, for the next one in the same samples.
+#[derive(Clone, Default)]
+pub(super) struct Map {
+    /// By Doppler, then by satellite.
+    strips: Vec<Vec<Strip>>,
+    /// What samples were multiplied by.
+    scale: f64,
+}
+
+/// A search again: of some satellites at all Dopplers, of the others at some, and what else was seen before
+/// stays.
+pub(super) struct Again<'a> {
+    pub before: &'a Map,
+    /// Numbers of the Dopplers for all satellites.
+    pub dopplers: &'a [usize],
+    /// Which of the satellites of before these are, and whether one is looked at everywhere.
+    pub satellites: &'a [(usize, bool)],
+}
+
+impl Map {
+    /// Takes over what a later search saw of some satellites.
+    pub fn update(&mut self, satellites: &[(usize, bool)], later: &Self) {
+        for (all, some) in self.strips.iter_mut().zip(&later.strips) {
+            for ((satellite, _), strip) in satellites.iter().zip(some) {
+                if let Some(place) = all.get_mut(*satellite) {
+                    *place = *strip;
+                }
+            }
+        }
+    }
 }
 
 /// One satellite at one Doppler: the largest cell, and sums over all cells and over those near it.
@@ -199,18 +232,33 @@ impl Grid {
         })
     }
 
-    /// The largest cell of every satellite, in their order.
-    pub fn search(&self, block: &Block, spectra: &[Spectra<'_>]) -> Peaks {
+    /// The largest cell of every satellite, in their order; `again` after something was subtracted from the samples.
+    pub fn search(&self, block: &Block, spectra: &[Spectra<'_>], again: Option<&Again<'_>>) -> Peaks {
         let power: f64 = block.i.iter().chain(block.q).map(|x| f64::from(x * x)).sum();
         let rms = (power / block.i.len().max(1) as f64).sqrt();
         if rms == 0.0 {
             let none = Peak { statistic: 0.0, threshold: self.law.threshold, doppler_hz: 0.0, lag: 0 };
-            return Peaks { of: vec![none; spectra.len()], crowded: 0 };
+            return Peaks { of: vec![none; spectra.len()], crowded: Vec::new(), map: Map::default() };
         }
-        let one = |&doppler: &f64| self.one_doppler(block, 1.0 / rms, doppler, spectra);
+        // What is compared with strips of before has their scale.
+        let scale = again.filter(|_| self.pair.is_none()).map_or(1.0 / rms, |again| again.before.scale);
+        let one = |(bin, &doppler): (usize, &f64)| match again {
+            Some(again) if !again.dopplers.contains(&bin) => {
+                let wanted = |number: usize| again.satellites.get(number).is_some_and(|(_, everywhere)| *everywhere);
+                let some: Vec<Spectra<'_>> = (0..).zip(spectra).filter(|(n, _)| wanted(*n)).map(|(_, s)| *s).collect();
+                let mut seen =
+                    if some.is_empty() { Vec::new() } else { self.one_doppler(block, scale, doppler, &some) };
+                let mut seen = seen.drain(..);
+                let before = |satellite: usize| again.before.strips.get(bin)?.get(satellite).copied();
+                (again.satellites.iter())
+                    .filter_map(|(satellite, everywhere)| if *everywhere { seen.next() } else { before(*satellite) })
+                    .collect()
+            }
+            _ => self.one_doppler(block, scale, doppler, spectra),
+        };
         let strips: Vec<Vec<Strip>> = match &self.pair {
-            None => self.dopplers_hz.par_iter().map(one).collect(),
-            Some(dwells) => self.strips_of_pairs(dwells, block, 1.0 / rms, spectra),
+            None => self.dopplers_hz.par_iter().enumerate().map(one).collect(),
+            Some(dwells) => self.strips_of_pairs(dwells, block, scale, spectra),
         };
         let heights: Vec<Vec<f64>> = (0..spectra.len()).map(|satellite| self.heights(&strips, satellite)).collect();
         let image = |bin: usize| self.dopplers_hz.get(bin).is_some_and(|doppler_hz| self.meets_image(*doppler_hz));
@@ -225,7 +273,8 @@ impl Grid {
                 lag: strips[bin][satellite].lag,
             }
         };
-        Peaks { of: heights.iter().enumerate().map(peak).collect(), crowded: bar.crowded }
+        let of = heights.iter().enumerate().map(peak).collect();
+        Peaks { of, crowded: bar.crowded, map: Map { strips, scale } }
     }
 
     /// What a statistic has to exceed in noise.

@@ -53,7 +53,7 @@ use crate::receiver::lead::{beside, followed_db, lead};
 use crate::receiver::source::Block;
 
 pub use error::AcquireError;
-use grid::Grid;
+use grid::{Again, Grid, Map};
 use refine::Refined;
 use replica::Replica;
 pub use settings::AcquisitionSettings;
@@ -372,7 +372,7 @@ impl Searcher {
         let complex = self.metadata.format.is_complex();
         let searched_s = f64::from(grid.periods) * component.period_s();
         tone::remove(&mut window, grid.rate_hz, complex);
-        let (mut findings, mut crowded) = self.detect(grid, component, &window.block(), codes);
+        let (mut findings, mut crowded, mut map) = self.detect(grid, component, &window.block(), codes, None);
         let mut strongest = 0.0;
         // Codes that are not subtracted yet.
         let mut open: Vec<usize> = (0..codes.len()).collect();
@@ -384,7 +384,7 @@ impl Searcher {
             let band_hz = if complex { grid.rate_hz } else { 0.5 * grid.rate_hz };
             let masking_hz: f64 = strong.iter().map(|(_, hit)| hit.cn0_hz).sum();
             let masked = masking_hz > MASKING_SHARE * (band_hz + masking_hz);
-            let crowding = crowded > 0 && strong.iter().any(|(_, hit)| hit.cn0_hz * searched_s > CROWDING);
+            let crowding = !crowded.is_empty() && strong.iter().any(|(_, hit)| hit.cn0_hz * searched_s > CROWDING);
             if !(weak || masked || crowding) {
                 break;
             }
@@ -403,7 +403,12 @@ impl Searcher {
             let again: Vec<usize> =
                 (open.iter().copied()).filter(|&index| findings[index].hit.is_some() || masked || crowding).collect();
             let chosen: Vec<(Sv, &Code)> = again.iter().map(|&index| codes[index]).collect();
-            let (found, still) = self.detect(grid, component, &window.block(), &chosen);
+            // Where the strong ones are no noise to speak of, the others are looked at where they were raised.
+            let satellites: Vec<(usize, bool)> =
+                again.iter().map(|&index| (index, masked || findings[index].hit.is_some())).collect();
+            let some = Again { before: &map, dopplers: &crowded, satellites: &satellites };
+            let (found, still, seen) = self.detect(grid, component, &window.block(), &chosen, Some(&some));
+            map.update(&satellites, &seen);
             crowded = still;
             for (index, mut finding) in again.into_iter().zip(found) {
                 finding.hit = finding.hit.filter(|hit| hit.power >= LEAST_SHARE * strongest);
@@ -421,19 +426,20 @@ impl Searcher {
         rows.map(|(finding, (sv, _))| finding.report(of, *sv, window.first, code_chips)).collect()
     }
 
-    /// One search of these samples, and refinement of what passes the threshold; with the number of crowded
-    /// Dopplers.
+    /// One search of these samples, and refinement of what passes the threshold; with the crowded Dopplers, and
+    /// what was seen.
     fn detect(
         &self,
         grid: &Grid,
         component: &Component,
         block: &Block,
         codes: &[(Sv, &Code)],
-    ) -> (Vec<Finding>, usize) {
+        again: Option<&Again<'_>>,
+    ) -> (Vec<Finding>, Vec<usize>, Map) {
         let (sums, coherent) = (grid.sums, grid.coherent_periods);
         let spectra: Vec<pair::Spectra<'_>> = codes.iter().map(|(_, code)| code.spectra()).collect();
         let coherent_s = component.period_s() * f64::from(coherent);
-        let peaks = grid.search(block, &spectra);
+        let peaks = grid.search(block, &spectra, again);
         let findings = (peaks.of)
             .into_par_iter()
             .zip(codes)
@@ -450,7 +456,7 @@ impl Searcher {
                 Finding { statistic: peak.statistic, threshold: peak.threshold, coarse, hit }
             })
             .collect();
-        (findings, peaks.crowded)
+        (findings, peaks.crowded, peaks.map)
     }
 }
 

@@ -53,8 +53,8 @@ pub(super) struct Law {
 /// What every bin's peak has to exceed.
 pub(super) struct Bar {
     pub thresholds: Vec<f64>,
-    /// Bins that other signals raise.
-    pub crowded: usize,
+    /// Numbers of the bins that other signals raise.
+    pub crowded: Vec<usize>,
 }
 
 /// Standardised quantiles of a Gumbel law: −ln(−ln p).
@@ -88,7 +88,7 @@ impl Law {
     /// not circular.
     pub fn bar(&self, heights: &[Vec<f64>], image: impl Fn(usize) -> bool) -> Bar {
         let bins = heights.first().map_or(0, Vec::len);
-        let mut bar = Bar { thresholds: vec![self.threshold; bins], crowded: 0 };
+        let mut bar = Bar { thresholds: vec![self.threshold; bins], crowded: Vec::new() };
         if heights.len() < LEAST_CODES {
             return bar;
         }
@@ -111,8 +111,8 @@ impl Law {
             return bar;
         }
         let reached = quantile(&mut beyond, REACHED);
-        bar.crowded = crowded.len();
         for (bin, median_root) in crowded {
+            bar.crowded.push(bin);
             let deviation = if image(bin) { self.image_deviation } else { 1.0 };
             let root = median_root + reached + deviation * self.further;
             bar.thresholds[bin] = self.threshold.max(root * root);
@@ -171,8 +171,8 @@ mod tests {
                 (0..41).map(|_| draw().into_iter().map(|u| largest(u, 3069.0)).collect()).collect();
             let heights: Vec<Vec<f64>> = (0..32).map(|code| heights.iter().map(|bin| bin[code]).collect()).collect();
             let bar = law.bar(&heights, |_| false);
-            crowded += bar.crowded;
-            assert!(bar.crowded > 0 || bar.thresholds.iter().all(|x| *x == law.threshold));
+            crowded += bar.crowded.len();
+            assert!(!bar.crowded.is_empty() || bar.thresholds.iter().all(|x| *x == law.threshold));
         }
         // Five deviations: 3e-7 of 1640 bins, if the median were normal.
         assert!(crowded <= 1, "{crowded}");
@@ -193,7 +193,7 @@ mod tests {
                 })
                 .collect();
             let bar = law.bar(&heights, |_| false);
-            assert_eq!(bar.crowded, 1);
+            assert_eq!(bar.crowded, [20]);
             let others = heights.iter().skip(4).map(|code| code[20]).fold(0.0, f64::max);
             // Over all others, and far below the four.
             assert!((others..0.5 * present).contains(&bar.thresholds[20]), "{} {others}", bar.thresholds[20]);
@@ -231,7 +231,7 @@ mod tests {
                     })
                     .collect();
                 let bar = law.bar(&heights, |_| false);
-                assert!((2..=4).contains(&bar.crowded), "{raised}: {}", bar.crowded);
+                assert!((2..=4).contains(&bar.crowded.len()), "{raised}: {:?}", bar.crowded);
                 searches += heights.len();
                 let passes = |code: &Vec<f64>| code.iter().zip(&bar.thresholds).any(|(height, least)| height > least);
                 false_ones += heights.iter().filter(|code| passes(code)).count();
@@ -251,6 +251,6 @@ mod tests {
     fn few_codes_are_no_sample() {
         let law = Law::new(1e-6, 3069, 41, 10, 1.0);
         let heights = vec![vec![500.0; 41]; LEAST_CODES - 1];
-        assert_eq!(law.bar(&heights, |_| false).crowded, 0);
+        assert!(law.bar(&heights, |_| false).crowded.is_empty());
     }
 }

@@ -107,7 +107,7 @@ fn strong_signals_that_are_no_candidates_bring_no_false_satellites() {
         let window = Window::centred(&Block { first: 0, i: &recording.i, q: &recording.q }, samples);
         let grid = searcher.grids.values().next().unwrap();
         let spectra: Vec<_> = searcher.codes.values().map(Code::spectra).collect();
-        let peaks = grid.search(&window.block(), &spectra);
+        let peaks = grid.search(&window.block(), &spectra, None);
         noise_alone += peaks.of.iter().filter(|peak| peak.statistic > grid.threshold()).count() as u32;
     }
     println!("others' signals: {total:?}, {noise_alone} above the threshold of noise");

@@ -156,7 +156,7 @@ fn a_strong_satellite_does_not_bring_others_by_cross_correlation() {
         searcher.make_codes(&all()).unwrap();
         let grid = searcher.grids.values().next().unwrap();
         let spectra: Vec<_> = searcher.codes.values().map(Code::spectra).collect();
-        let peaks = grid.search(&Block { first: 0, i: &recording.i, q: &recording.q }, &spectra);
+        let peaks = grid.search(&Block { first: 0, i: &recording.i, q: &recording.q }, &spectra, None);
         assert!(peaks.of.iter().filter(|peak| peak.statistic > grid.threshold()).count() > sent.len());
     }
 }
