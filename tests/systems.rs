@@ -104,7 +104,9 @@ fn lost_samples_cost_no_channel_of_either_system_and_are_counted_by_each_alone()
     let second = "\"synthetic A\"";
     // 1.6 ms displace codes and symbols of both systems; 4 ms are a symbol and a code period of the second,
     // whose overlay alone shows them.
-    for (signals, lost) in [(both, 7000), (second, 7000), (both, 17_200), (second, 17_200)] {
+    let cases = [(both, 7000), (second, 17_200), (second, 7000), (both, 17_200)];
+    let count = if std::env::var_os("GNSS_TWIN_LONG").is_some() { cases.len() } else { 2 };
+    for (signals, lost) in cases.into_iter().take(count) {
         let first = 36.0;
         let cut = [&bytes[..at(first)], &bytes[at(first) + 2 * lost..]].concat();
         let text = format!(
