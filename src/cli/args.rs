@@ -13,6 +13,8 @@ use crate::cli::sink::Spec;
 use crate::gnss::exchange::Version;
 use crate::gnss::samples::Format;
 use crate::gnss::time::Epoch;
+use crate::study::sweep::export::Directive;
+use crate::study::sweep::part::Part;
 
 /// A GNSS digital twin: generate IF samples from real ephemerides, receive them, judge the receiver.
 ///
@@ -466,6 +468,8 @@ pub enum StudyAction {
     Report(StudyReport),
     /// Print a script that hands the missing shards to an engine
     Export(StudyExport),
+    /// Hand the missing shards to an engine, wait, and again what is missing then; started anew, it goes on
+    Submit(StudySubmit),
 }
 
 #[derive(Args, Debug)]
@@ -495,6 +499,9 @@ pub struct StudyRun {
     /// missing]
     #[arg(long, value_name = "K")]
     pub shard: Option<Shard>,
+    /// Part of the plan, what is missing of it: part K of N, counted from 0
+    #[arg(long, value_name = "K/N", conflicts_with = "shard")]
+    pub part: Option<Part>,
     /// Threads to use [default: one a core]
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
@@ -547,6 +554,39 @@ pub struct StudyExport {
     pub engine: Engine,
     /// Directory of the study
     pub directory: PathBuf,
+    #[command(flatten)]
+    pub terms: Terms,
+}
+
+#[derive(Args, Debug)]
+pub struct StudySubmit {
+    /// Directory of the study
+    pub directory: PathBuf,
+    /// What hands out shards
+    #[arg(long, value_name = "ENGINE")]
+    pub engine: Engine,
+    /// How often what is missing is handed out
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub rounds: u32,
+    #[command(flatten)]
+    pub terms: Terms,
+}
+
+/// What a site asks of an engine's tasks.
+#[derive(Args, Debug)]
+pub struct Terms {
+    /// Tasks, each with as many shards [default: one a shard, as far as the engine's arrays go]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub tasks: Option<u32>,
+    /// Tasks that may run at a time
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub at_once: Option<u32>,
+    /// Slurm: minutes that a task may take [default: 5, and three times what the plan expects]
+    #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=525_600))]
+    pub minutes: Option<u32>,
+    /// Slurm: another option of sbatch, several times for several: --directive=--partition=long
+    #[arg(long = "directive", value_name = "OPTION", allow_hyphen_values = true)]
+    pub directives: Vec<Directive>,
 }
 
 /// What hands out shards.

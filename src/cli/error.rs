@@ -109,7 +109,8 @@ pub fn shown(path: &Path) -> String {
     escaped(&path.display().to_string()).replace('\n', "\\n")
 }
 
-/// Whether an I/O error may go away by itself or by making room.
+/// Whether an I/O error may go away by itself, by making room, or on another machine: a disk that fails, a file server that does not
+/// answer or has replaced a file.
 fn passing(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -119,5 +120,7 @@ fn passing(error: &io::Error) -> bool {
             | io::ErrorKind::WouldBlock
             | io::ErrorKind::Interrupted
             | io::ErrorKind::OutOfMemory
-    ) || matches!(error.raw_os_error(), Some(23 | 24)) // ENFILE, EMFILE
+            | io::ErrorKind::TimedOut
+            | io::ErrorKind::StaleNetworkFileHandle
+    ) || matches!(error.raw_os_error(), Some(5 | 23 | 24)) // EIO, ENFILE, EMFILE
 }

@@ -1,5 +1,8 @@
 //! `study`: plan, run, look at, merge and hand out studies; with a study alone, all of it on this machine.
 
+mod engine;
+mod queue;
+
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,11 +14,11 @@ use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, judge_error, output_error, receiver_error};
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
-use crate::study::sweep::engine::{self, Status};
+use crate::study::sweep::engine::{Status, run as run_shards, status as status_of};
 use crate::study::sweep::plan::{Cut, Plan};
 use crate::study::sweep::result::{self, Results};
 use crate::study::sweep::spec::Level;
-use crate::study::sweep::{StudyError, export, publish, sha256_of_file, shard};
+use crate::study::sweep::{StudyError, publish, sha256_of_file, shard};
 
 /// Does what is asked of a study.
 pub fn execute(arguments: &args::Study) -> Result<(), CliError> {
@@ -25,10 +28,11 @@ pub fn execute(arguments: &args::Study) -> Result<(), CliError> {
         (Some(args::StudyAction::Status(arguments)), _) => status(arguments),
         (Some(args::StudyAction::Merge(arguments)), _) => merge(arguments),
         (Some(args::StudyAction::Report(arguments)), _) => report(&load(&arguments.directory)?),
-        (Some(args::StudyAction::Export(arguments)), _) => export(arguments),
+        (Some(args::StudyAction::Export(arguments)), _) => engine::export(arguments),
+        (Some(args::StudyAction::Submit(arguments)), _) => engine::submit(arguments),
         (None, Some(study)) => whole(study, arguments),
         (None, None) => {
-            Err(CliError::usage("expected a study, or plan, run, status, merge, report or export; see --help"))
+            Err(CliError::usage("expected a study, or plan, run, status, merge, report, export or submit; see --help"))
         }
     }
 }
@@ -95,10 +99,15 @@ fn run(arguments: &args::StudyRun) -> Result<(), CliError> {
     if !plan.is_of(&build()?) {
         scenario::warn("planned by another build of this program: shards of both are merged if their bytes agree");
     }
-    let shards = match arguments.shard {
-        None => missing(&plan)?,
-        Some(args::Shard::Auto) => wanted(&plan, own_number()?)?,
-        Some(args::Shard::Number(number)) => wanted(&plan, number)?,
+    let shards = match (arguments.shard, arguments.part) {
+        (None, None) => missing(&plan)?,
+        (None, Some(part)) => {
+            let wanted: Result<Vec<Vec<u32>>, CliError> =
+                part.shards(plan.shards()).map(|number| wanted(&plan, number)).collect();
+            wanted?.concat()
+        }
+        (Some(args::Shard::Auto), _) => wanted(&plan, own_number()?)?,
+        (Some(args::Shard::Number(number)), _) => wanted(&plan, number)?,
     };
     compute(&plan, &shards)
 }
@@ -123,7 +132,7 @@ fn own_number() -> Result<u32, CliError> {
 }
 
 fn missing(plan: &Plan) -> Result<Vec<u32>, CliError> {
-    let Status { missing, bad, .. } = engine::status(plan).map_err(study_error)?;
+    let Status { missing, bad, .. } = status_of(plan).map_err(study_error)?;
     for (number, reason) in bad {
         scenario::warn(&format!("{}: {reason}: computed again", shard::path(plan, number).display()));
     }
@@ -135,7 +144,7 @@ fn compute(plan: &Plan, shards: &[u32]) -> Result<(), CliError> {
     let cases = shards.iter().map(|&number| plan.cases(number)).map(|cases| cases.end - cases.start).sum();
     let start = Instant::now();
     let progress = Progress::new(&format!("study {}", plan.study.name), Some(cases), true);
-    let ran = engine::run(plan, shards, &|done| progress.set(done));
+    let ran = run_shards(plan, shards, &|done| progress.set(done));
     drop(progress);
     let ran = ran.map_err(study_error)?;
     scenario::print(&format!(
@@ -150,7 +159,7 @@ fn compute(plan: &Plan, shards: &[u32]) -> Result<(), CliError> {
 
 fn status(arguments: &args::StudyStatus) -> Result<(), CliError> {
     let plan = load(&arguments.directory)?;
-    let Status { whole, missing, bad } = engine::status(&plan).map_err(study_error)?;
+    let Status { whole, missing, bad } = status_of(&plan).map_err(study_error)?;
     let list = shard::ranges(&missing);
     if arguments.missing {
         scenario::print(&format!("{list}\n"))?;
@@ -189,24 +198,6 @@ fn report(plan: &Plan) -> Result<(), CliError> {
     publish::write(plan, &lines, &results).map_err(study_error)?;
     let text = publish::in_short(&results);
     scenario::print(&format!("{text}report in {}\n", plan.directory.join("report.md").display()))
-}
-
-fn export(arguments: &args::StudyExport) -> Result<(), CliError> {
-    let mut plan = load(&arguments.directory)?;
-    // Where the script runs is not where it is written.
-    plan.directory =
-        fs::canonicalize(&plan.directory).map_err(|error| CliError::read(arguments.directory.display(), &error))?;
-    let program = env::current_exe().map_err(|error| CliError::read("the program's own path", &error))?;
-    let program = program.to_str().ok_or_else(|| CliError::input("the program's own path is not UTF-8"))?;
-    let missing = engine::status(&plan).map_err(study_error)?.missing;
-    if missing.is_empty() {
-        return Err(CliError::input(format!("{}: no shard is missing", arguments.directory.display())));
-    }
-    let engine = match arguments.engine {
-        args::Engine::Slurm => export::Engine::Slurm,
-        args::Engine::Parallel => export::Engine::Parallel,
-    };
-    scenario::print(&export::script(&plan, engine, program, &missing).map_err(study_error)?)
 }
 
 fn load(directory: &Path) -> Result<Plan, CliError> {

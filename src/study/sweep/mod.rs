@@ -5,7 +5,7 @@
 //! exists. A case is run by [`model`] (the loops on modelled correlations) or [`sampled`] (samples streamed
 //! from generator to receiver); [`engine`] runs what is missing on all cores, [`plan`] and [`shard`] keep
 //! manifest and results on disk, [`result`] condenses repetitions, [`ensemble`] takes all cases together,
-//! [`draw`] and [`publish`] show them, [`export`] hands shards to other machines' engines.
+//! [`draw`] and [`publish`] show them, [`export`] hands [`part`]s of the plan to other machines' engines.
 //!
 //! **Exactly once** rests on no engine: a shard's bytes are a function of the manifest and its number alone,
 //! a file under its final name is whole and bound to its manifest, and merging takes each shard once or
@@ -22,6 +22,7 @@ pub mod keys;
 pub mod model;
 #[cfg(feature = "pdf")]
 mod paper;
+pub mod part;
 pub mod plan;
 pub mod publish;
 pub mod result;

@@ -223,6 +223,11 @@ impl Plan {
         first.min(self.manifest.n_cases)..(first + self.manifest.shard_size).min(self.manifest.n_cases)
     }
 
+    /// Seconds of one core that a shard takes, roughly.
+    pub fn shard_s(&self) -> f64 {
+        self.manifest.shard_size as f64 * case_s(&self.study, &self.bases)
+    }
+
     /// The scene of a case, at samples level.
     pub fn base(&self, case: &axis::Case) -> Option<&Base> {
         let written = self.study.scenario_of(case)?;
@@ -489,11 +494,16 @@ fn cost_s(study: &Study, bases: &[Base], case: &axis::Case) -> f64 {
     }
 }
 
+/// The same of a case in the middle.
+fn case_s(study: &Study, bases: &[Base]) -> f64 {
+    let grid = &study.grid;
+    let ends = [0, grid.cases().saturating_sub(1)].map(|case| cost_s(study, bases, &grid.case(case)));
+    0.5 * (ends[0] + ends[1])
+}
+
 /// Cases a shard: those that share a signal stay together.
 fn shard_size(study: &Study, bases: &[Base], cut: Cut) -> u64 {
-    let grid = &study.grid;
-    let ends = [0, grid.cases() - 1].map(|case| cost_s(study, bases, &grid.case(case)));
-    let case_s = 0.5 * (ends[0] + ends[1]);
+    let (grid, case_s) = (&study.grid, case_s(study, bases));
     let of_minutes = |minutes: f64| (60.0 * minutes / case_s).clamp(1.0, grid.cases() as f64) as u64;
     let size = match cut {
         Cut::Shards(count) => grid.cases().div_ceil(count.max(1)),
