@@ -278,7 +278,7 @@ fn stated() -> Vec<Kind> {
         "dilutions against one another, largest departure",
     ];
     const ALL: [&str; 4] = ["sigma_east_m", "sigma_north_m", "sigma_up_m", "sigma_clock_m"];
-    const CORRELATIONS: [&str; 1] = ["formal correlations against the expected ones, largest departure"];
+    const CORRELATIONS: [&str; 1] = ["formal correlations (artanh) against the expected ones, 95 %"];
     vec![
         kind!("all sigmas larger", "times", Some(1.1), 1.6, &HORIZONTAL, AtRest, |rx, factor| scale(rx, &ALL, factor)),
         kind!("all sigmas smaller", "times", Some(0.9), 0.5, &HORIZONTAL, AtRest, |rx, factor| scale(rx, &ALL, factor)),

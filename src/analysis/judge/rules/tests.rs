@@ -215,3 +215,33 @@ fn the_verdict_names_what_was_planted_and_a_user_s_limits_come_first() {
     let table = fs::read_to_string(run.path().join("verdict.csv")).unwrap();
     assert_eq!(table.lines().count(), 1 + verdict.rows.len());
 }
+
+#[test]
+fn weights_within_a_factor_move_the_artanh_of_a_correlation_by_its_logarithm_at_most() {
+    use nalgebra::{Matrix4, Vector4};
+    let mut state = 5_u64;
+    let mut draw = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let factor: f64 = 1.259;
+    let artanh = |p: &Matrix4<f64>, a: usize, b: usize| libm::atanh(p[(a, b)] / (p[(a, a)] * p[(b, b)]).sqrt());
+    let mut largest: f64 = 0.0;
+    for _ in 0..2000 {
+        // Five to nine rows anywhere, some geometries as poor as they come.
+        let rows: Vec<Vector4<f64>> =
+            (0..5 + (8.0 * (draw() + 0.5)) as usize / 2).map(|_| Vector4::new(draw(), draw(), draw(), 0.5)).collect();
+        let of = |weights: &mut dyn FnMut() -> f64| {
+            rows.iter()
+                .fold(Matrix4::zeros(), |sum, row| sum + weights() * row * row.transpose())
+                .try_inverse()
+                .unwrap()
+        };
+        let (true_ones, stated) = (of(&mut || 1.0), of(&mut || if draw() < 0.0 { 1.0 / factor } else { factor }));
+        for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+            largest = largest.max((artanh(&true_ones, a, b) - artanh(&stated, a, b)).abs());
+        }
+    }
+    // The bound holds, and geometries come near to it.
+    assert!((0.7..=1.0).contains(&(largest / libm::log(factor))), "{largest}");
+}
