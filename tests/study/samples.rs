@@ -111,3 +111,18 @@ fn every_figure_that_a_study_may_keep_is_one_of_the_summary() {
         assert!(own || summary.pointer(&format!("/{}", path.replace('.', "/"))).is_some(), "{name}");
     }
 }
+
+#[test]
+fn a_scene_of_another_system_is_searched_for_its_own_signals() {
+    // One satellite of Galileo; the receiver's settings name no signal.
+    let scene = include_str!("../../studies/scenes/boost_galileo.toml");
+    let (scene, _) = scene.split_once("[receiver.acquisition]").unwrap();
+    let here = workplace(
+        "name = \"own\"\nlevel = \"samples\"\nscenario = \"one.toml\"\nkeep = [\"satellites.acquired\"]\n\
+         [[axis]]\nkey = \"power.cn0_dbhz\"\nvalues = [45]\n",
+    );
+    fs::write(here.path().join("one.toml"), scene.replace("duration_s = 16", "duration_s = 9.5")).unwrap();
+    good(&["study.toml", "-o", "out"], here.path());
+    let rows = cases(here.path(), "out");
+    assert_eq!(rows[0].iter().next_back(), Some("1"), "{rows:?}");
+}

@@ -178,6 +178,7 @@ pub fn run(
     let mut ears = Vec::new();
     for (number, case) in cases.iter().enumerate() {
         let (_, settings) = of(case)?;
+        let settings = twin::settings_for(std::slice::from_ref(&scene), &settings);
         let directory = below(&format!("rx{number}"))?;
         let output = Output::create(&directory)?;
         let reception = Some(Reception::new(&scene.metadata, &settings)?);
