@@ -115,6 +115,13 @@ fn picture(results: &Results, plot: &Plot, stem: String) -> Option<Picture> {
     Some(picture)
 }
 
+/// A number to two digits.
+fn shorter(x: f64) -> String {
+    let digits = if x == 0.0 { 0 } else { (1 - libm::floor(libm::log10(x.abs())) as i32).clamp(0, 3) };
+    let text = format!("{x:.*}", digits as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
 /// A value of an axis by its numbers.
 type Chosen = Option<(usize, usize)>;
 
@@ -276,13 +283,16 @@ impl View<'_> {
         let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         let (Some(x_axis), Some(y_axis)) = (self.results.axis(&self.plot.x), self.results.axis(y)) else { return };
         let share = |value: f64| if high > low { (value - low) / (high - low) } else { 0.5 };
+        // A value has to fit into its tile.
+        let columns = self.axis(x_axis).map_or(0, |axis| axis.values.len());
+        let words = |mean: f64| if columns > MOST_TICKS { shorter(mean) } else { short(mean) };
         let (mut tiles, mut labels) = (Vec::new(), Vec::new());
         for cell in cells {
             let (Some(x), Some(y)) = (cell.at.get(x_axis), cell.at.get(y_axis)) else { continue };
             let place = (*x as f64, *y as f64);
             let estimate = self.estimate(cell).and_then(|estimate| Some((estimate.mean, self.height(estimate.mean)?)));
             let (colour, label) = match estimate {
-                Some((mean, height)) => (warmth(share(height)), short(mean)),
+                Some((mean, height)) => (warmth(share(height)), words(mean)),
                 None => (RGBColor(255, 255, 255), "–".to_owned()),
             };
             tiles.push(Series::new("tile", colour, Mark::Tile(0.98, 0.98), vec![place]));
