@@ -109,8 +109,8 @@ pub fn shown(path: &Path) -> String {
     escaped(&path.display().to_string()).replace('\n', "\\n")
 }
 
-/// Whether an I/O error may go away by itself, by making room, or on another machine: a disk that fails, a file server that does not
-/// answer or has replaced a file.
+/// Whether an I/O error may go away by itself, by making room, or on another machine: a disk that fails, a
+/// file server that does not answer or has replaced a file.
 fn passing(error: &io::Error) -> bool {
     matches!(
         error.kind(),

@@ -1,7 +1,9 @@
-//! What Slurm has of a job that was submitted: asked by its own programs, `sbatch`, `squeue`, `scancel` and `scontrol`.
+//! What Slurm has of a job that was submitted: asked by its own programs, `sbatch`, `squeue`, `scancel` and
+//! `scontrol`.
 //!
-//! Which shards there are is asked of their files and of nothing else: accounting knows neither a task whose node died after its
-//! last write, nor one that was preempted and came back (`sacct` shows PREEMPTED). The queue says only whether it is worth waiting.
+//! Which shards there are is asked of their files and of nothing else: accounting knows neither a task whose
+//! node died after its last write, nor one that was preempted and came back (`sacct` shows PREEMPTED). The
+//! queue says only whether it is worth waiting.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -27,7 +29,8 @@ pub enum Queued {
     Silent,
 }
 
-/// Reasons with which a task waits for somebody to release it (`squeue(1)`, job reason codes). A controller that died leaves such.
+/// Reasons with which a task waits for somebody to release it (`squeue(1)`, job reason codes). A controller
+/// that died leaves such.
 const HELD: [&str; 6] = [
     "JobHeldUser",
     "JobHeldAdmin",

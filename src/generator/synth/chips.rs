@@ -154,8 +154,8 @@ impl Spreading {
         length > 0 && self.overlay.get(period.rem_euclid(length as i64) as usize).is_some_and(|&negative| negative)
     }
 
-    /// Appends the signs around `samples` samples that start at `at` and advance by `step`, with the
-    /// data of each period (`negative` says whether it is sent inverted, asked in their order), and returns the
+    /// Appends the signs around `samples` samples that start at `at` and advance by `step`, with the data of
+    /// each period (`negative` says whether it is sent inverted, asked in their order), and returns the
     /// position of the first sample in them.
     pub fn strip(
         &self,

@@ -232,7 +232,8 @@ impl Grid {
         })
     }
 
-    /// The largest cell of every satellite, in their order; `again` after something was subtracted from the samples.
+    /// The largest cell of every satellite, in their order; `again` after something was subtracted from the
+    /// samples.
     pub fn search(&self, block: &Block, spectra: &[Spectra<'_>], again: Option<&Again<'_>>) -> Peaks {
         let power: f64 = block.i.iter().chain(block.q).map(|x| f64::from(x * x)).sum();
         let rms = (power / block.i.len().max(1) as f64).sqrt();

@@ -403,7 +403,8 @@ impl Searcher {
             let again: Vec<usize> =
                 (open.iter().copied()).filter(|&index| findings[index].hit.is_some() || masked || crowding).collect();
             let chosen: Vec<(Sv, &Code)> = again.iter().map(|&index| codes[index]).collect();
-            // Where the strong ones are no noise to speak of, the others are looked at where they were raised.
+            // Where the strong ones are no noise to speak of, the others are looked at where they were
+            // raised.
             let satellites: Vec<(usize, bool)> =
                 again.iter().map(|&index| (index, masked || findings[index].hit.is_some())).collect();
             let some = Again { before: &map, dopplers: &crowded, satellites: &satellites };
@@ -426,8 +427,8 @@ impl Searcher {
         rows.map(|(finding, (sv, _))| finding.report(of, *sv, window.first, code_chips)).collect()
     }
 
-    /// One search of these samples, and refinement of what passes the threshold; with the crowded Dopplers, and
-    /// what was seen.
+    /// One search of these samples, and refinement of what passes the threshold; with the crowded Dopplers,
+    /// and what was seen.
     fn detect(
         &self,
         grid: &Grid,

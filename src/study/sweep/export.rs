@@ -49,7 +49,8 @@ impl FromStr for Directive {
     }
 }
 
-/// Tasks of an array where its site says nothing else: Slurm's `MaxArraySize` is 1001 by default, indices up to 1000.
+/// Tasks of an array where its site says nothing else: Slurm's `MaxArraySize` is 1001 by default, indices up
+/// to 1000.
 pub const MOST_TASKS: u32 = 1001;
 /// A task may take so many times what the plan expects, and some minutes to start.
 const PATIENCE: f64 = 3.0;
@@ -134,9 +135,9 @@ fn slurm(head: &str, run: &str, tasks: u32) -> String {
     format!(
         "#!/bin/bash\n\
          {head}\
-         # Parts of the plan in which a shard is missing when this is written. Look with `study status` afterwards: what an \
-         engine\n\
-         # loses is submitted again, what it runs twice comes out the same.\n\
+         # Parts of the plan in which a shard is missing when this is written. `study status` says what is \
+         missing afterwards:\n\
+         # what an engine loses is submitted again, what it runs twice comes out the same.\n\
          {run} --part \"$SLURM_ARRAY_TASK_ID/{tasks}\" --jobs \"${{SLURM_CPUS_PER_TASK:-1}}\"\n\
          code=$?\n\
          # 75 and deaths by a signal may pass by themselves; bad data (65) never does.\n\

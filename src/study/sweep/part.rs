@@ -1,8 +1,9 @@
 //! Parts of a plan: neighbouring shards that one task of an engine runs.
 //!
-//! An engine numbers its tasks, and caps that number (Slurm's `MaxArraySize`, 1001 by default, caps the index). A plan may
-//! have more shards. Part k of n is a range that follows from the plan alone, so that a script needs no list, and a task that runs
-//! again, later or elsewhere, finds in its part what is still missing.
+//! An engine numbers its tasks, and caps that number (Slurm's `MaxArraySize`, 1001 by default, caps the
+//! index). A plan may have more shards. Part k of n is a range that follows from the plan alone, so that a
+//! script needs no list, and a task that runs again, later or elsewhere, finds in its part what is still
+//! missing.
 
 use std::fmt;
 use std::ops::Range;

@@ -341,10 +341,10 @@ impl Case<'_> {
 
     /// Largest departure of a correlation ρ from the expected one, as the difference of their artanh.
     ///
-    /// Weights that err by a factor s at most, each in its own way, change N = Σ w h hᵀ by a share of ±ln s in
-    /// the order of matrices, and so N⁻¹. Of two axes with the correlation matrix R, that is R^½ E R^½ with
-    /// |E| ≤ ln s, and dρ = tr(G E) where G has the eigenvalues ±(1 − ρ²)/2: |dρ| ≤ (1 − ρ²) ln s. So artanh ρ
-    /// moves by ln s at most, whatever the geometry.
+    /// Weights that err by a factor s at most, each in its own way, change N = Σ w h hᵀ by a share of ±ln s
+    /// in the order of matrices, and so N⁻¹. Of two axes with the correlation matrix R, that is R^½ E R^½
+    /// with |E| ≤ ln s, and dρ = tr(G E) where G has the eigenvalues ±(1 − ρ²)/2: |dρ| ≤ (1 − ρ²) ln s. So
+    /// artanh ρ moves by ln s at most, whatever the geometry.
     fn correlation_departure(&self) -> f64 {
         let (fix, p) = (self.fix, &self.expected.stated);
         let pairs = [
