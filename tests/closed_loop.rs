@@ -161,6 +161,66 @@ fn beidou_alone_finds_its_place_by_both_messages() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
+/// A sky over Kamakura in 2025, with what GPS satellites broadcast there, as the shipped scene of three
+/// bands has it.
+const KAMAKURA: &str = r#"
+name = "kamakura"
+start = 2025-08-21T07:51:56
+seed = 7
+motion = { kind = "static", latitude_deg = 35.342, longitude_deg = 139.522, height_m = 50 }
+navigation = { file = "gps_2025-08-21_06h_08h.rnx" }
+satellites = { mask_deg = 10 }
+power = { kind = "link_budget" }
+troposphere = { model = "saastamoinen" }
+ionosphere = { model = "klobuchar" }
+receiver_clock = { bias_s = 1.3e-4, drift_sps = 5e-8 }
+noise = {}
+receiver.position = { require_ionosphere = true }
+"#;
+
+/// Runs it with some more lines, within the verdict's own limits.
+fn over_kamakura(more: &str) -> Value {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("kamakura.toml");
+    std::fs::write(&path, format!("{more}{KAMAKURA}")).unwrap();
+    let file = "gps_2025-08-21_06h_08h.rnx";
+    std::fs::copy(scenarios().join(file), place.path().join(file)).unwrap();
+    let summary = run_with(&path, &["--check".as_ref()]);
+    found_and_decoded_what_is_there(&summary);
+    assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
+    assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
+    summary
+}
+
+/// L5's bars: half a metre by the six of eight satellites that send it, and a set of CNAV, with its
+/// ionosphere, 22 s after the start. Half of the main lobe does, for speed.
+#[test]
+fn l5_alone_finds_its_place_by_cnav_and_the_satellites_that_send_it() {
+    let summary = over_kamakura(
+        "duration_s = 34\nsignals = [\"GPS L5\"]\n\
+         front_end = { center_hz = 1176.45e6, sample_rate_hz = 10.5e6, format = \"ci8\" }\n",
+    );
+    assert_eq!(number(&summary, "/satellites/used"), 6.0);
+    at_most(&summary, "/position/horizontal_p95_m", 0.5);
+    at_most(&summary, "/position/first_fix_s", 24.0);
+}
+
+/// L2C's bars: a metre by all eight satellites; messages are twice as long as those of L5, and codes of 20
+/// ms take long to find (`GNSS_TWIN_LONG=1`).
+#[test]
+fn l2c_alone_finds_its_place_by_cnav_and_the_long_code() {
+    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+        return;
+    }
+    let summary = over_kamakura(
+        "duration_s = 56\nsignals = [\"GPS L2C\"]\nreceiver.operation = { search_interval_s = 100 }\n\
+         front_end = { center_hz = 1227.6e6, sample_rate_hz = 2.1e6, format = \"ci8\" }\n",
+    );
+    assert_eq!(number(&summary, "/satellites/used"), 8.0);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/position/first_fix_s", 43.0);
+}
+
 #[test]
 fn real_samples_at_an_if_with_a_mirrored_spectrum_close_the_loop_as_well() {
     let scene = include_str!("../scenarios/static.toml")

@@ -187,21 +187,25 @@ pub fn spoiled(
     (changed != set).then_some(changed)
 }
 
-/// The unit of a slot that the satellite of `ephemeris` sends under `faults`.
+/// The unit of a slot that a satellite sends under `faults`: the sets are that of the unit before and its
+/// own.
 ///
 /// # Errors
 /// A value that the message cannot carry.
 pub fn unit(
     faults: &[MessageFault],
     sender: &dyn Sender,
-    ephemeris: &Ephemeris,
+    [before, ephemeris]: [&Ephemeris; 2],
     slot: &Slot,
 ) -> Result<Sent, FieldError> {
     let Slot { message, time, unit } = *slot;
     let sv = ephemeris.sv;
-    let spoiled = spoiled(faults, message, sv, ephemeris, slot.start());
-    let changed = spoiled.unwrap_or_else(|| (message.form)(ephemeris));
-    let encoded = sender.unit(&changed.timed(|at| time.label(at)), message.unit_start(unit))?;
+    let sent = |set: &Ephemeris, slot: &Slot| {
+        let changed = spoiled(faults, message, sv, set, slot.start()).unwrap_or_else(|| (message.form)(set));
+        changed.timed(|at| time.label(at))
+    };
+    let before = sent(before, &Slot { unit: unit - 1, ..*slot });
+    let encoded = sender.unit_after(&before, &sent(ephemeris, slot), message.unit_start(unit))?;
     let is_alert = |fault: &MessageFault| fault.kind == Kind::Alert && fault.on.contains(&slot.start());
     let alert = faults.iter().any(|fault| fault.concerns(sv) && is_alert(fault));
     let encoded = if alert { message.alert.and_then(|of| of(&encoded)).unwrap_or(encoded) } else { encoded };

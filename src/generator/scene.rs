@@ -121,7 +121,9 @@ impl Scene {
 
     /// The scene's signals that a satellite sends and of which the samples can hold anything.
     pub fn signals_of(&self, sv: Sv) -> impl Iterator<Item = &'static Signal> {
-        let own = self.signals.iter().copied().filter(move |signal| signal.system == sv.system);
+        let start = self.clock.start;
+        let sent = move |signal: &&Signal| signal.system == sv.system && (signal.sent)(sv.number, start);
+        let own = self.signals.iter().copied().filter(move |signal| sent(signal));
         own.filter(move |signal| !is_link_outside(&self.metadata, signal.link(sv)))
     }
 

@@ -48,14 +48,18 @@ pub struct Ephemeris {
     pub long_fit: bool,
     /// Age of data offset, in its 900 s units; AODE of BeiDou.
     pub aodo: u8,
-    /// Square root of the semi-major axis, √m.
+    /// Square root of the semi-major axis at the reference time, √m.
     pub sqrt_a_sqrtm: f64,
+    /// Rate of the semi-major axis; zero for messages without it.
+    pub axis_rate_mps: f64,
     /// Eccentricity of the orbit.
     pub eccentricity: f64,
     /// Mean anomaly at the reference time.
     pub m0_rad: f64,
     /// Mean motion beyond that of the semi-major axis, rad/s.
     pub delta_n_radps: f64,
+    /// Rate of that correction, rad/s²; zero for messages without it.
+    pub delta_n_rate_radps2: f64,
     /// Longitude of the ascending node at the beginning of the week.
     pub omega0_rad: f64,
     /// Rate of right ascension of the node, rad/s.
@@ -90,6 +94,8 @@ pub struct Ephemeris {
     /// The second group delay of messages that have two: BGD(E1,E5a) of Galileo beside BGD(E1,E5b) in
     /// `tgd_s`, T_GD2 of BeiDou.
     pub tgd2_s: f64,
+    /// Corrections between signals beside the group delay in `tgd_s`: of L1 C/A, L2C, I5 and Q5 in CNAV.
+    pub isc_s: [f64; 4],
     /// Group delays of signals that have one of their own, by the signal's name; others follow from `tgd_s`.
     pub signal_delays_s: Vec<(&'static str, f64)>,
 }
@@ -243,9 +249,11 @@ impl Ephemeris {
             long_fit: false,
             aodo: 0,
             sqrt_a_sqrtm: 0.0,
+            axis_rate_mps: 0.0,
             eccentricity: 0.0,
             m0_rad: 0.0,
             delta_n_radps: 0.0,
+            delta_n_rate_radps2: 0.0,
             omega0_rad: 0.0,
             omega_dot_radps: 0.0,
             omega_rad: 0.0,
@@ -262,6 +270,7 @@ impl Ephemeris {
             af2_sps2: 0.0,
             tgd_s: 0.0,
             tgd2_s: 0.0,
+            isc_s: [0.0; 4],
             signal_delays_s: Vec::new(),
         }
     }
@@ -307,6 +316,7 @@ impl Ephemeris {
             + planted!("gnss.orbit.crs", self.crs_m, -self.crs_m) * sin2
             + self.crc_m * cos2;
         let radius_rate = anomaly.semi_major_m * self.eccentricity * anomaly.sin * anomaly.rate_radps
+            + self.axis_rate_mps * anomaly.shrink
             + 2.0 * true_rate * (self.crs_m * cos2 - self.crc_m * sin2);
         let inclination_rad = self.i0_rad
             + planted!("gnss.orbit.idot", self.idot_radps, 0.0) * anomaly.since_toe_s
@@ -411,7 +421,7 @@ impl Ephemeris {
     /// S (IRNSS SIS ICD for SPS 1.1, user algorithms).
     pub fn dispersion(&self, signal: &Signal) -> f64 {
         let ratio = Constants::of(self.sv.system).delay_carrier_hz / signal.carrier_hz(self.sv);
-        ratio * ratio
+        planted!("gnss.delay.square", ratio * ratio, ratio)
     }
 
     /// The clock as a user of `signal` alone meets it.
@@ -493,14 +503,23 @@ impl Ephemeris {
         self.check()?;
         let since_toe_s = at.since(self.toe);
         let semi_major_m = self.sqrt_a_sqrtm * self.sqrt_a_sqrtm;
-        let mean_motion = (Constants::of(self.sv.system).mu_m3ps2 / (semi_major_m * semi_major_m * semi_major_m))
-            .sqrt()
-            + planted!("gnss.orbit.delta_n", self.delta_n_radps, -self.delta_n_radps);
-        let anomaly_rad = solve_kepler(self.m0_rad + mean_motion * since_toe_s, self.eccentricity)
+        let at_toe_radps = self.mean_motion_radps();
+        // Half the rate until now, the whole of it now (IS-GPS-705J, table 20-II).
+        let changed_radps = 0.5 * self.delta_n_rate_radps2 * since_toe_s;
+        let anomaly_rad = solve_kepler(self.m0_rad + (at_toe_radps + changed_radps) * since_toe_s, self.eccentricity)
             .ok_or(OrbitError::Kepler { sv: self.sv, eccentricity: self.eccentricity })?;
         let (sin, cos) = libm::sincos(anomaly_rad);
         let shrink = 1.0 - self.eccentricity * cos;
-        Ok(Anomaly { since_toe_s, semi_major_m, sin, cos, shrink, rate_radps: mean_motion / shrink })
+        let mean_radps = at_toe_radps + self.delta_n_rate_radps2 * since_toe_s;
+        let semi_major_m = semi_major_m + self.axis_rate_mps * since_toe_s;
+        Ok(Anomaly { since_toe_s, semi_major_m, sin, cos, shrink, rate_radps: mean_radps / shrink })
+    }
+
+    /// Mean motion at the reference time.
+    pub fn mean_motion_radps(&self) -> f64 {
+        let semi_major_m = self.sqrt_a_sqrtm * self.sqrt_a_sqrtm;
+        (Constants::of(self.sv.system).mu_m3ps2 / (semi_major_m * semi_major_m * semi_major_m)).sqrt()
+            + planted!("gnss.orbit.delta_n", self.delta_n_radps, -self.delta_n_radps)
     }
 }
 
@@ -587,6 +606,9 @@ mod tests {
             af2_sps2: 0.0,
             tgd_s: -1.722_946_751_76e-8,
             tgd2_s: 0.0,
+            axis_rate_mps: 0.0,
+            delta_n_rate_radps2: 0.0,
+            isc_s: [0.0; 4],
             signal_delays_s: Vec::new(),
         }
     }
@@ -610,7 +632,7 @@ mod tests {
     #[test]
     fn velocity_and_drift_are_the_derivatives_of_position_and_offset() {
         for eccentricity in [0.0, 0.0096, 0.1, 0.5] {
-            let set = Ephemeris { eccentricity, ..example() };
+            let set = Ephemeris { eccentricity, axis_rate_mps: 0.02, delta_n_rate_radps2: 1e-14, ..example() };
             for minute in -12..=12 {
                 let at = set.toe.plus_s(f64::from(minute) * 600.0 + 0.3);
                 let p = |dt: f64| set.state(at.plus_s(dt)).unwrap().position_m;

@@ -124,6 +124,15 @@ pub trait Sender: Send + Sync {
     /// # Errors
     /// A value that the message cannot carry, or a start at which no unit begins.
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError>;
+
+    /// The same after a unit that carried the set `before`: of a code that runs on from unit to unit.
+    ///
+    /// # Errors
+    /// As [`Self::unit`].
+    fn unit_after(&self, before: &Ephemeris, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        let _ = before;
+        self.unit(ephemeris, start)
+    }
 }
 
 /// What a symbol completed.

@@ -33,7 +33,7 @@ const BARE: Hardware = Hardware { tgd_s: 0.0, antenna_m: 0.0 };
 /// The subframe of a set that begins at `start` under faults.
 fn subframe(faults: &[MessageFault], sender: &dyn Sender, set: &Ephemeris, start: Epoch) -> Sent {
     let slot = Slot { message: &LNAV, time: &GPST, unit: LNAV.unit_at(start.seconds()) };
-    message::unit(faults, sender, set, &slot).unwrap()
+    message::unit(faults, sender, [set; 2], &slot).unwrap()
 }
 
 fn day() -> Precise {

@@ -24,6 +24,11 @@ const NAVIC_CODES: &str = "witness::navic::all_chips_of_all_codes_are_those_of_a
 const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_either_way_up_to_what_was_sent";
 const REDUNDANT: &str = "witness::redundancy::real_words_17_to_20_are_the_redundancy_of_the_real_words_1_to_4";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
+const DELAYS: &str = "witness::printed::clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print";
+const CIVIL: &str = "witness::cnav::shipped_messages_of_l5_and_l2c_hold_and_are_sent_by_us_bit_by_bit";
+const CARRIED: &str = "witness::cnav::a_set_of_lnav_carried_to_cnav_is_the_same_orbit_and_clock_to_its_steps";
+const L2C_CODES: &str = "witness::codes::all_chips_of_all_codes_of_l2c_are_those_of_another_program_and_take_turns";
+const L5_CODES: &str = "witness::codes::all_chips_of_all_codes_of_l5_are_those_of_another_program";
 const E5_PAGES: &str = "witness::fnav::shipped_pages_of_e5a_and_e5b_hold_and_are_sent_by_us_bit_by_bit";
 const E5_CODES: &str = "witness::codes::all_chips_of_all_codes_and_overlays_of_e5_are_those_of_another_program";
 const TWO_BANDS: &str =
@@ -183,6 +188,15 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.velocity.frame", "velocity forgets that the axes turn", EXACT),
     fault("receiver.velocity.satellite_drift", "velocity takes another drift for the satellites' clocks", EXACT),
     fault("receiver.velocity.drift_sign", "the clock's drift has the wrong sign", EXACT),
+    fault("gnss.delay.second", "the group delay of B2I has the wrong sign", DELAYS),
+    fault("gnss.delay.square", "group delays go with 1/f to other carriers", DELAYS),
+    fault("gnss.l5.advance", "XB of L5 is a chip early", L5_CODES),
+    fault("gnss.l2c.register", "the register of L2C feeds back into another stage", L2C_CODES),
+    fault("gnss.l2c.turn", "CL has the first place, and CM the second", L2C_CODES),
+    fault("gnss.cnav.l2c_order", "messages of CNAV on L2C last as long as those of L5", CIVIL),
+    fault("gnss.cnav.order", "messages of CNAV come one place early", CIVIL),
+    fault("gnss.cnav.count", "the count of a message is taken for its own beginning", CIVIL),
+    fault("gnss.cnav.isc", "corrections between signals have the wrong sign", CARRIED),
     fault("gnss.e5.registers", "the second registers of E5 give the other bit", E5_CODES),
     fault("gnss.fnav.clock", "the clock of F/NAV is on the other side of that of I/NAV", E5_PAGES),
     fault("gnss.fnav.page_order", "pages of F/NAV come one place early", E5_PAGES),

@@ -9,6 +9,8 @@
 mod atmosphere;
 #[path = "../witness/beidou.rs"]
 mod beidou;
+#[path = "../witness/cnav.rs"]
+mod cnav;
 #[path = "../witness/codes.rs"]
 mod codes;
 #[path = "../witness/data.rs"]

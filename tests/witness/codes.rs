@@ -3,6 +3,7 @@
 use gnss_twin::gnss::galileo::e1::{self, Code};
 use gnss_twin::gnss::galileo::e5;
 use gnss_twin::gnss::gps::l1ca::{CODE_CHIPS, code};
+use gnss_twin::gnss::gps::{l2c, l5};
 use gnss_twin::gnss::signal::Overlay;
 use sha2::{Digest, Sha256};
 
@@ -73,6 +74,52 @@ fn all_chips_of_all_codes_and_overlays_of_e5_are_those_of_another_program() {
     let word = |chips: Vec<i8>| chips.iter().fold(0, |word, chip| word << 1 | u32::from(*chip < 0));
     assert_eq!(word(chips(&e5::E5A.components[0].overlay, 1)), 0x842E9);
     assert_eq!(word(chips(&e5::E5B.components[0].overlay, 1)), 0xE);
+}
+
+/// The same of I5 and Q5.
+const L5_CODES: &str = include_str!("../../data/witness/l5_codes.csv");
+
+#[test]
+fn all_chips_of_all_codes_of_l5_are_those_of_another_program() {
+    let mut codes = 0;
+    for line in L5_CODES.lines().skip(1) {
+        let column: Vec<&str> = line.split(',').collect();
+        let which = if column[0] == "L5I" { l5::Code::Data } else { l5::Code::Pilot };
+        let signs = l5::code(which, column[1].parse().unwrap()).unwrap();
+        let chips: Vec<u8> = signs.into_iter().map(|sign| u8::from(sign < 0)).collect();
+        holds(&chips, &column[2..], line);
+        codes += 1;
+    }
+    assert_eq!(codes, 420);
+    assert!(l5::code(l5::Code::Data, 0).is_none() && l5::code(l5::Code::Pilot, 211).is_none());
+    // IS-GPS-705J, 3.3.3.1.2: the Neuman-Hofman codes.
+    let word = |overlay: &Overlay| overlay.of(1).unwrap().iter().fold(0, |word, chip| word << 1 | u32::from(*chip < 0));
+    assert_eq!(word(&l5::L5.components[0].overlay), 0b00_0011_0101);
+    assert_eq!(word(&l5::L5.components[1].overlay), 0b0000_0100_1101_0100_1110);
+}
+
+/// The same of CM and CL.
+const L2C_CODES: &str = include_str!("../../data/witness/l2c_codes.csv");
+
+#[test]
+fn all_chips_of_all_codes_of_l2c_are_those_of_another_program_and_take_turns() {
+    let mut codes = 0;
+    for line in L2C_CODES.lines().skip(1) {
+        let column: Vec<&str> = line.split(',').collect();
+        let (which, place) = if column[0] == "L2CM" { (l2c::Code::Moderate, 0) } else { (l2c::Code::Long, 1) };
+        let number = column[1].parse().unwrap();
+        let signs = l2c::code(which, number).unwrap();
+        let chips: Vec<u8> = signs.iter().map(|sign| u8::from(*sign < 0)).collect();
+        holds(&chips, &column[2..], line);
+        codes += 1;
+        // CM first (IS-GPS-200N, 3.2.1.5, figure 3-8).
+        let sent = (l2c::L2C.components[place].code)(number).filter(|_| number <= 3);
+        for (at, chip) in sent.into_iter().flatten().enumerate() {
+            assert_eq!(chip, if at % 2 == place { signs[at / 2] } else { 0 }, "{line} {at}");
+        }
+    }
+    assert_eq!(codes, 230);
+    assert!([0, 64, 158, 211].iter().all(|number| l2c::code(l2c::Code::Long, *number).is_none()));
 }
 
 /// The number of ones, the first and last 24 chips and the digest of a code.

@@ -252,6 +252,9 @@ fn example() -> Ephemeris {
         af2_sps2: 0.0,
         tgd_s: -1.07e-8,
         tgd2_s: 0.0,
+        axis_rate_mps: 0.0,
+        delta_n_rate_radps2: 0.0,
+        isc_s: [0.0; 4],
         signal_delays_s: Vec::new(),
     }
 }

@@ -3,11 +3,19 @@
 
 use std::fmt::Debug;
 
+use gnss_twin::gnss::beidou::in_phase::{B1I, B2I, B3I};
 use gnss_twin::gnss::bits::Store;
+use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::crc::crc24q;
 use gnss_twin::gnss::earth::{Geodetic, Look, look, rotate_earth};
 use gnss_twin::gnss::galileo::inav;
+use gnss_twin::gnss::gps::cnav::CNAV_SETS;
+use gnss_twin::gnss::gps::l1ca::L1_CA;
+use gnss_twin::gnss::gps::l2c::L2C;
+use gnss_twin::gnss::gps::l5::L5;
 use gnss_twin::gnss::gps::lnav::{self, Field, Kind};
+use gnss_twin::gnss::navic::sps;
+use gnss_twin::gnss::satellite::{Sv, System};
 use gnss_twin::gnss::time::Epoch;
 use nalgebra::Vector3;
 
@@ -352,4 +360,31 @@ fn places_and_directions_are_the_published_ones() {
     // axes turn east.
     let later = rotate_earth(&Vector3::new(1.0, 0.0, 0.0), 3600.0);
     assert!(later.y < 0.0 && (libm::atan2(-later.y, later.x) - 7.292_115_146_7e-5 * 3600.0).abs() < 1e-12);
+}
+
+#[test]
+fn clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print() {
+    let at = Epoch::from_week(2380, 370_000.0);
+    let blank = |system| Ephemeris::blank(Sv { system, number: 10 }, at);
+    let of = |set: &Ephemeris, signal| set.clock_of_signal(at, signal).unwrap().offset_s;
+    let close = |one: f64, other: f64| assert!((one - other).abs() < 1e-18, "{one:e} {other:e}");
+    // IS-GPS-200N, 20.3.3.3.3.2: Δt − T_GD on L1, and with (77/60)² on L2.
+    let lnav = Ephemeris { tgd_s: 8e-9, ..blank(System::Gps) };
+    close(of(&lnav, &L1_CA), -8e-9);
+    close(of(&lnav, &L2C), -8e-9 * (77.0 * 77.0) / (60.0 * 60.0));
+    // IS-GPS-705J, 20.3.3.3.1.2: Δt − T_GD + ISC; L5 by its pilot.
+    let cnav = Ephemeris { form: &CNAV_SETS, isc_s: [1e-9, 2e-9, 4e-9, 5e-9], ..lnav };
+    for (signal, expected_s) in [(&L1_CA, -7e-9), (&L2C, -6e-9), (&L5, -3e-9)] {
+        close(of(&cnav, signal), expected_s);
+    }
+    // BDS-SIS-ICD-2.1, 5.2.4.10: Δt − T_GD1 on B1I, − T_GD2 on B2I; the clock is that of B3I.
+    let beidou = Ephemeris { tgd_s: 8e-9, tgd2_s: 3e-9, ..blank(System::BeiDou) };
+    for (signal, expected_s) in [(&B1I, -8e-9), (&B2I, -3e-9), (&B3I, 0.0)] {
+        close(of(&beidou, signal), expected_s);
+    }
+    // IRNSS SIS ICD for SPS 1.1, user algorithms: Δt − T_GD on S, and with (f_S/f_L5)² =
+    // (2492.028/1176.45)² on L5.
+    let navic = Ephemeris { tgd_s: 8e-9, ..blank(System::Navic) };
+    close(of(&navic, &sps::S), -8e-9);
+    assert!((of(&navic, &sps::L5) / -8e-9 - 4.487_029).abs() < 1e-6);
 }

@@ -25,7 +25,7 @@ use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::rinex;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE, SYNTHETIC};
-use crate::gnss::signal::{Carrier, Component, Layer, Layers, Overlay, Shape, Signal};
+use crate::gnss::signal::{Carrier, Component, Layer, Layers, Overlay, Shape, Signal, always};
 use crate::gnss::time::{Epoch, TimeScale};
 
 /// Week 1590, whose beginning is that of every code and overlay.
@@ -40,6 +40,7 @@ static LAYERED: Signal = Signal {
     time: &TimeScale { name: "layered", behind_gpst_s: 14 },
     constellation: [1, 63],
     carrier: Carrier::Common(1_561.098e6),
+    sent: always,
     minimum_power_dbw: None,
     components: &[Component {
         power_share: 1.0,

@@ -77,12 +77,14 @@ impl Symbols {
                 let slot = Slot { message, time: signal.time, unit };
                 let fallback = || scene.catalogue.sent_at(sv, received);
                 let Some(ephemeris) = scene.catalogue.sent_at(sv, slot.start()).or_else(fallback) else { continue };
-                let SentSymbols { encoded, symbols } = message::unit(faults, sender, ephemeris, &slot)?;
+                let earlier = Slot { unit: unit - 1, ..slot }.start();
+                let before = scene.catalogue.sent_at(sv, earlier).unwrap_or(ephemeris);
+                let SentSymbols { encoded, symbols } = message::unit(faults, sender, [before, ephemeris], &slot)?;
                 // What was meant and, where wrong symbols pass for right ones, what was sent.
                 let both = [&encoded, &symbols];
                 let distinct = if symbols == encoded { 1 } else { 2 };
                 for (of_set, parameters) in both.iter().take(distinct).filter_map(|sent| (message.parameters)(sent)) {
-                    let issue = if of_set { u32::from(ephemeris.iode) } else { 0 };
+                    let issue = if of_set { u32::from((message.form)(ephemeris).iode) } else { 0 };
                     self.navigation.extend(NavigationRow::each(sv, message.name, issue, parameters));
                 }
                 units.insert(unit, symbols);

@@ -12,7 +12,7 @@
 
 use crate::gnss::beidou::d1d2::D1_D2;
 use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
 use crate::gnss::time::BDT;
 
 /// B1I: 763 times 2.046 MHz.
@@ -23,6 +23,7 @@ pub static B1I: Signal = Signal {
     time: &BDT,
     constellation: [1, 63],
     carrier: Carrier::Common(1_561.098e6),
+    sent: always,
     minimum_power_dbw: Some(-163.0),
     components: &[SHORT],
 };

@@ -44,7 +44,7 @@ pub static PLAIN: SetForm = SetForm {
 fn plain_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     match (set.sv.system, signal.carrier_hz(set.sv)) {
         (System::BeiDou, B1I_HZ) => set.given_delay_s(),
-        (System::BeiDou, B2I_HZ) => set.tgd2_s,
+        (System::BeiDou, B2I_HZ) => planted!("gnss.delay.second", set.tgd2_s, -set.tgd2_s),
         (System::BeiDou, _) => 0.0,
         _ => set.given_delay_s() * set.dispersion(signal),
     }

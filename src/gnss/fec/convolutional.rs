@@ -34,14 +34,28 @@ impl Convolutional {
         [first, second ^ self.second_inverted]
     }
 
+    /// The most likely bits of a piece of a code that runs on: neither its first nor its last state is known,
+    /// and bits near either end are less sure.
+    pub fn decode_open(self, symbols: &[f32]) -> Vec<bool> {
+        self.search(symbols, [0.0; STATES], |metrics| {
+            let best = metrics.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+            best.map_or(0, |(state, _)| state as u32)
+        })
+    }
+
     /// The most likely bits of a block that ends in the state of zeros: one for each pair of symbols, which
     /// are positive for a logical 0 and as large as they are sure.
     pub fn decode(self, symbols: &[f32]) -> Vec<bool> {
+        let mut metrics = [f32::NEG_INFINITY; STATES];
+        metrics[0] = 0.0;
+        self.search(symbols, metrics, |_| 0)
+    }
+
+    /// The bits of the best path from states of those metrics to the state that `last` takes of them.
+    fn search(self, symbols: &[f32], mut metrics: [f32; STATES], last: fn(&[f32; STATES]) -> u32) -> Vec<bool> {
         // What a path of each window adds for symbols of one: the sign of either symbol.
         let signs: Vec<[f32; 2]> =
             (0..2 * STATES as u32).map(|window| self.pair(window).map(|bit| if bit { -1.0 } else { 1.0 })).collect();
-        let mut metrics = [f32::NEG_INFINITY; STATES];
-        metrics[0] = 0.0;
         let mut decisions: Vec<u64> = Vec::with_capacity(symbols.len() / 2);
         for pair in symbols.chunks_exact(2) {
             let &[first, second] = pair else { continue };
@@ -62,7 +76,7 @@ impl Convolutional {
             metrics = next;
             decisions.push(decision);
         }
-        let mut state = 0_u32;
+        let mut state = last(&metrics);
         let mut bits: Vec<bool> = decisions
             .iter()
             .rev()

@@ -7,7 +7,7 @@
 
 use crate::gnss::galileo::inav::INAV;
 use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
 use crate::gnss::time::GST;
 
 /// Chips in a code period.
@@ -21,7 +21,8 @@ pub static E1: Signal = Signal {
     time: &GST,
     constellation: [1, 36],               // 3.6: 37 to 50 are not those of satellites
     carrier: Carrier::Common(1_575.42e6), // 2.1, table 2
-    minimum_power_dbw: Some(-157.25),     // 2.7.1, table 12: both components
+    sent: always,
+    minimum_power_dbw: Some(-157.25), // 2.7.1, table 12: both components
     components: &[
         Component {
             power_share: 0.5,

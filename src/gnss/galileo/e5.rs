@@ -11,7 +11,7 @@ use crate::gnss::galileo::fnav::FNAV;
 use crate::gnss::galileo::inav::INAV_E5B;
 use crate::gnss::message::Message;
 use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
 use crate::gnss::time::GST;
 
 /// Chips in a code period.
@@ -25,7 +25,8 @@ pub static E5A: Signal = Signal {
     time: &GST,
     constellation: [1, 36],
     carrier: Carrier::Common(1_176.45e6), // 2.1, table 2
-    minimum_power_dbw: Some(-155.25),     // 2.7.1, table 12: both components
+    sent: always,
+    minimum_power_dbw: Some(-155.25), // 2.7.1, table 12: both components
     components: &[
         data(|number| code(Code::E5aData, number), Overlay::Shared(&CS20), &FNAV),
         pilot(|number| code(Code::E5aPilot, number), overlay),

@@ -5,7 +5,7 @@
 
 use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
 use crate::gnss::time::GPST;
 
 /// Chips in a C/A code period.
@@ -19,6 +19,7 @@ pub static L1_CA: Signal = Signal {
     time: &GPST,
     constellation: [1, 32], // IS-GPS-200N, table 3-Ia, note: 33 to 37 are reserved for other uses
     carrier: Carrier::Common(1_575.42e6), // IS-GPS-200N, 3.3.1.1
+    sent: always,
     minimum_power_dbw: Some(-158.5), // IS-GPS-200N, table 3-Va
     components: &[Component {
         power_share: 1.0,

@@ -1,4 +1,8 @@
 //! GPS: one file a signal, one a message.
 
+pub mod cnav;
 pub mod l1ca;
+pub mod l2c;
+pub mod l5;
 pub mod lnav;
+pub mod modernised;

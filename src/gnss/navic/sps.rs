@@ -9,7 +9,7 @@
 
 use crate::gnss::navic::nav::SPS_NAV;
 use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
 use crate::gnss::time::IRNSST;
 
 /// Chips in a code period.
@@ -23,6 +23,7 @@ pub static L5: Signal = Signal {
     time: &IRNSST,
     constellation: [1, 14],
     carrier: Carrier::Common(1_176.45e6),
+    sent: always,
     minimum_power_dbw: Some(-159.0),
     components: &[Component { code: |number| signs(&L5_STARTS, number), ..SPS }],
 };
@@ -32,6 +33,7 @@ pub static S: Signal = Signal {
     name: "NavIC S",
     rinex: "9A",
     carrier: Carrier::Common(2_492.028e6),
+    sent: always,
     minimum_power_dbw: Some(-162.3),
     components: &[Component { code: |number| signs(&S_STARTS, number), ..SPS }],
     ..L5

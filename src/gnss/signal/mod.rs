@@ -16,7 +16,7 @@ use thiserror::Error;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::message::Message;
 use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::TimeScale;
+use crate::gnss::time::{Epoch, TimeScale};
 use crate::gnss::{beidou, galileo, gps, navic};
 
 mod shape;
@@ -26,8 +26,10 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 9] = [
+pub static SIGNALS: [&Signal; 11] = [
     &gps::l1ca::L1_CA,
+    &gps::l2c::L2C,
+    &gps::l5::L5,
     &galileo::e1::E1,
     &galileo::e5::E5A,
     &galileo::e5::E5B,
@@ -84,6 +86,8 @@ pub struct Signal {
     pub constellation: [u8; 2],
     /// Its carrier.
     pub carrier: Carrier,
+    /// Whether the satellite of a number sends it at a time.
+    pub sent: fn(u8, Epoch) -> bool,
     /// Least power received on the ground that its documents promise, of all components together; where none
     /// is known a link budget is refused.
     pub minimum_power_dbw: Option<f64>,
@@ -190,6 +194,11 @@ pub enum Overlay {
         /// A satellite's chips; `None` where none are assigned.
         of: fn(u8) -> Option<Vec<i8>>,
     },
+}
+
+/// Of a signal that every satellite of its system has always sent.
+pub fn always(_: u8, _: Epoch) -> bool {
+    true
 }
 
 impl Signal {

@@ -3,7 +3,7 @@
 //! Their codes are random. What assumes one BPSK component of 1 ms, one carrier, a code of ±1 or one time
 //! scale goes wrong with one of them.
 
-use super::{Carrier, Component, Layer, Overlay, Signal};
+use super::{Carrier, Component, Layer, Overlay, Signal, always};
 use crate::gnss::galileo::inav::INAV;
 use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::satellite::System;
@@ -24,6 +24,7 @@ pub static LONG_BOC: Signal = Signal {
     time: &OWN_TIME,
     constellation: [1, 36],
     carrier: Carrier::Common(1_575.42e6),
+    sent: always,
     minimum_power_dbw: None,
     components: &[
         Component {
@@ -59,6 +60,7 @@ pub static QUADRATURE: Signal = Signal {
     time: &GPST,
     constellation: [1, 32],
     carrier: Carrier::Common(1_176.45e6),
+    sent: always,
     minimum_power_dbw: None,
     components: &[
         Component {
@@ -109,6 +111,7 @@ pub static CHANNELS: Signal = Signal {
         step_hz: 562_500.0,
         channel: |number| (1..=24).contains(&number).then(|| (number % 14) as i8 - 7),
     },
+    sent: always,
     minimum_power_dbw: None,
     components: &[Component {
         power_share: 1.0,
@@ -130,6 +133,7 @@ pub static MULTIPLEXED: Signal = Signal {
     time: &GPST,
     constellation: [1, 32],
     carrier: Carrier::Common(1_227.60e6),
+    sent: always,
     minimum_power_dbw: None,
     components: &[
         Component {
@@ -176,6 +180,7 @@ pub static MIXED: Signal = Signal {
     time: &GPST,
     constellation: [1, 10],
     carrier: Carrier::Common(1_575.42e6),
+    sent: always,
     minimum_power_dbw: None,
     components: &[
         Component {

@@ -77,6 +77,10 @@ mod tests {
     use crate::gnss::galileo::e5::{E5A, E5B};
     use crate::gnss::galileo::fnav::FNAV_SETS;
     use crate::gnss::galileo::inav::INAV_SETS;
+    use crate::gnss::gps::cnav::CNAV_SETS;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::gps::l5::L5;
+    use crate::gnss::gps::lnav::LNAV_SETS;
     use crate::gnss::satellite::System;
     use crate::gnss::time::Epoch;
 
@@ -98,5 +102,21 @@ mod tests {
         assert_eq!(sets.satellites().collect::<Vec<_>>(), [sv]);
         sets.remove(sv);
         assert!(sets.of(sv).is_empty());
+    }
+
+    #[test]
+    fn cnav_serves_both_carriers_and_lnav_its_own() {
+        let sv = Sv::gps(24);
+        let blank = Ephemeris::blank(sv, Epoch::from_week(2380, 0.0));
+        let of = |form| Ephemeris { form, ..blank.clone() };
+        let mut sets: Sets = [of(&LNAV_SETS)].into_iter().collect();
+        let name = |sets: &Sets, signals: &[&'static Signal]| sets.serving(sv, signals).map(|set| set.form.name);
+        let of_all = |sets: &Sets| [&[&L1_CA][..], &[&L5], &[&L1_CA, &L5]].map(|signals| name(sets, signals));
+        assert_eq!(of_all(&sets), [Some("LNAV"), None, None]);
+        sets.insert(of(&CNAV_SETS));
+        assert_eq!(of_all(&sets), [Some("LNAV"), Some("CNAV"), Some("CNAV")]);
+        // L5 is unhealthy: L1 may be used all the same.
+        sets.insert(Ephemeris { health: 4, ..of(&CNAV_SETS) });
+        assert!(sets.is_healthy_on(sv, &L1_CA) && !sets.is_healthy_on(sv, &L5));
     }
 }

@@ -121,7 +121,7 @@ fn of_galileo(fault: &str) -> Result<(Vec<bool>, Vec<bool>), String> {
     // 12:50:51.
     let unit = INAV.unit_at(scene.clock.start.seconds() + 21);
     let slot = Slot { message: &INAV, time: &GST, unit };
-    let sent = |faults: &[MessageFault]| message::unit(faults, sender, set, &slot).unwrap().symbols;
+    let sent = |faults: &[MessageFault]| message::unit(faults, sender, [set; 2], &slot).unwrap().symbols;
     Ok((sent(&[]), sent(&scene.message_faults)))
 }
 

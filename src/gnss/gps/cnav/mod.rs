@@ -1,0 +1,409 @@
+//! The civil navigation message (CNAV): messages of six seconds on L5 and of twelve on L2C, encoded and
+//! decoded.
+//!
+//! Source: IS-GPS-705J, 20.3, and IS-GPS-200N, 30.3, of L2C the same bits at half the rate ([`CNAV_L2C`]). A
+//! message is 300 bits with their check, coded without a break from one to the next ([`Convolutional`]). Sent
+//! are messages 10 and 11 (orbit), 30 (clock, group delays, ionosphere) and 33 (clock, UTC) in turn.
+//! Limits: no almanacs, no offsets of other systems, no Earth orientation, no corrections; of UTC nothing
+//! is used. A set of LNAV is carried to the nearest reference time that CNAV can express, and to its
+//! steps, by which the orbit departs by 3 cm (`tests/witness`). Its one group delay gives all corrections
+//! between signals, as delays that are as 1/f²; its health is that of all signals, where real satellites
+//! call L5 unhealthy until it is declared operational.
+
+mod fields;
+mod on_l2c;
+mod reader;
+
+use crate::gnss::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::gnss::broadcast::{Ephemeris, SetForm};
+use crate::gnss::crc::crc24q;
+use crate::gnss::fec::convolutional::Convolutional;
+use crate::gnss::gps::lnav::LNAV;
+use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Sender};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+use crate::gnss::time::{Epoch, WEEK_S};
+pub use fields::tables;
+use fields::{CLOCKS, DELAY, HEADER, L1, L2, L5, ORBIT_1, ORBIT_2, STEP_S, TIME};
+pub use on_l2c::CNAV_L2C;
+pub use reader::CnavReader;
+
+/// CNAV as L5 names it.
+pub static CNAV: Message = Message {
+    name: "CNAV",
+    symbol_s: 0.01,
+    unit_s: MESSAGE_S,
+    first_s: 0,
+    sender: |common| Ok(Box::new(Messages { common: common.clone(), message: &CNAV })),
+    number: |start| type_at(&CNAV, start),
+    timed: &ORDER,
+    set: &[10, 11, 30],
+    reduced: &[],
+    ionosphere: IonosphereForm {
+        model: Model::Klobuchar,
+        unit: |start| type_at(&CNAV, start) == IONOSPHERE,
+        coefficients: ionosphere,
+    },
+    set_parameters,
+    elements: of_integers,
+    parameters: opened,
+    reader: |sv| Box::new(CnavReader::of(&CNAV, sv)),
+    form,
+    sets: &CNAV_SETS,
+    quantised,
+    adjustable,
+    alert: None,
+    adjust,
+    rinex: None,
+};
+
+/// Sets of CNAV: a correction for each signal beside the group delay, and a bit of health for each carrier.
+pub static CNAV_SETS: SetForm = SetForm {
+    name: "CNAV",
+    group_delay_s,
+    serves: |signal| [&CNAV, &CNAV_L2C, &LNAV].iter().any(|message| signal.carries(message)),
+    given_delay_s: |set| set.tgd_s - set.isc_s[0],
+    is_healthy: |set| set.health & L1 == 0,
+    healthy: |set, signal| {
+        let bit = match signal.centre_hz() {
+            hz if hz < BETWEEN_L5_L2_HZ => L5,
+            hz if hz < BETWEEN_L2_L1_HZ => L2,
+            _ => L1,
+        };
+        Some(set.health & bit == 0)
+    },
+    rinex_sources: None,
+};
+
+/// Seconds of a message on L5; counts of time are in these on L2C too (IS-GPS-200N, 30.3.3).
+const MESSAGE_S: i64 = 6;
+/// The messages in the order in which satellites send them, and that of the ionosphere.
+const ORDER: [u8; 4] = [10, 11, 30, 33];
+const IONOSPHERE: u8 = 30;
+/// Bits of a message without and with its check, and its symbols.
+const DATA_BITS: usize = 276;
+const CHECK_BITS: usize = 24;
+const BITS: usize = DATA_BITS + CHECK_BITS;
+const SYMBOLS: usize = 2 * BITS;
+const PREAMBLE: f64 = 139.0;
+/// Bits of the message before that the code remembers.
+const MEMORY_BITS: usize = 6;
+const BETWEEN_L5_L2_HZ: f64 = 1_200e6;
+const BETWEEN_L2_L1_HZ: f64 = 1_400e6;
+
+const CODE: Convolutional = Convolutional { second_inverted: false };
+
+/// What messages say, together.
+#[derive(Clone, Debug)]
+struct Content {
+    set: Ephemeris,
+    preamble: f64,
+    kind: f64,
+    tow_count: f64,
+    alert: f64,
+    week: f64,
+    top: f64,
+    ned: [f64; 3],
+    flags: f64,
+    op_week: f64,
+    klobuchar: Klobuchar,
+    utc: Utc,
+}
+
+/// What message 33 says of UTC.
+#[derive(Clone, Copy, Debug, Default)]
+struct Utc {
+    a0_s: f64,
+    a1_sps: f64,
+    a2_sps2: f64,
+    leap_s: f64,
+    tot_s: f64,
+    week: f64,
+    event_week: f64,
+    event_day: f64,
+    leap_after_s: f64,
+}
+
+impl Utc {
+    fn of(common: &Common, start: Epoch) -> Self {
+        let utc = &common.utc;
+        let reference = utc.polynomial.map_or(common.reference.unwrap_or(start), |polynomial| polynomial.reference);
+        // To the step of its field.
+        let tot_s = reference.tow_whole_s().div_euclid(16) * 16;
+        let at = Epoch::new(reference.week() * WEEK_S + tot_s, 0.0);
+        let event = utc.event.map_or((start.week(), 7, utc.leap_s), |e| (e.week, i64::from(e.day), e.after_s));
+        Self {
+            a0_s: utc.polynomial.map_or(0.0, |polynomial| polynomial.at_s(at)),
+            a1_sps: utc.polynomial.map_or(0.0, |polynomial| polynomial.a1_sps),
+            a2_sps2: 0.0,
+            leap_s: utc.leap_s as f64,
+            tot_s: tot_s as f64,
+            week: at.week().rem_euclid(8192) as f64,
+            event_week: event.0.rem_euclid(8192) as f64,
+            event_day: event.1 as f64,
+            leap_after_s: event.2 as f64,
+        }
+    }
+}
+
+/// The parameters of a unit's symbols; every message has some of a set.
+fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
+    let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
+    let bits = checked(CODE.decode_open(&soft))?;
+    parameters(&bits).map(|found| (true, found))
+}
+
+fn set_parameters() -> Vec<&'static str> {
+    of_set().into_iter().flatten().map(|element| element.field.name).collect()
+}
+
+/// Type of the message that begins at a time.
+pub fn type_at(message: &Message, start: Epoch) -> u8 {
+    let turn = start.tow_whole_s().div_euclid(planted!("gnss.cnav.l2c_order", message.unit_s, MESSAGE_S))
+        + planted!("gnss.cnav.order", 0, 1);
+    ORDER.get(turn.rem_euclid(4) as usize).copied().unwrap_or(10)
+}
+
+/// The set as CNAV has it: carried to the nearest multiple of 300 s, with the corrections between signals
+/// that agree with the one delay of LNAV, whose delays are as 1/f².
+fn form(set: &Ephemeris) -> Ephemeris {
+    if *set.form == CNAV_SETS {
+        return set.clone();
+    }
+    let toe_s = (set.toe.seconds() as f64 / STEP_S as f64).round() as i64 * STEP_S;
+    let toe = Epoch::new(toe_s, 0.0);
+    let (since_toe_s, since_toc_s) = (toe.since(set.toe), toe.since(set.toc));
+    let motion_radps = set.mean_motion_radps();
+    let issue = (toe.tow_whole_s() / STEP_S) as u16;
+    let isc_s = |hz: f64| {
+        let ratio = L1_HZ / hz;
+        set.tgd_s - set.tgd_s * ratio * ratio
+    };
+    Ephemeris {
+        form: &CNAV_SETS,
+        toe,
+        toc: toe,
+        iode: issue,
+        iodc: issue,
+        health: if set.health == 0 { 0 } else { L1 | L2 | L5 },
+        m0_rad: set.m0_rad + motion_radps * since_toe_s,
+        omega0_rad: set.omega0_rad + set.omega_dot_radps * since_toe_s,
+        i0_rad: set.i0_rad + set.idot_radps * since_toe_s,
+        af0_s: set.af0_s + since_toc_s * (set.af1_sps + since_toc_s * set.af2_sps2),
+        af1_sps: set.af1_sps + 2.0 * since_toc_s * set.af2_sps2,
+        isc_s: [0.0, isc_s(L2_HZ), isc_s(L5_HZ), isc_s(L5_HZ)],
+        ..set.clone()
+    }
+}
+
+const L1_HZ: f64 = 1_575.42e6;
+const L2_HZ: f64 = 1_227.60e6;
+const L5_HZ: f64 = 1_176.45e6;
+
+/// T_GD less the correction of the signal (20.3.3.3.1.1.1); of L5 that of the pilot, which receivers follow.
+fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
+    let [l1ca_s, l2c_s, _, l5q_s] = set.isc_s;
+    let own_s = match signal.centre_hz() {
+        hz if hz < BETWEEN_L5_L2_HZ => l5q_s,
+        hz if hz < BETWEEN_L2_L1_HZ => l2c_s,
+        _ => l1ca_s,
+    };
+    set.tgd_s - planted!("gnss.cnav.isc", own_s, -own_s)
+}
+
+/// Makes the messages of satellites.
+struct Messages {
+    common: Common,
+    message: &'static Message,
+}
+
+impl Sender for Messages {
+    fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        self.unit_after(ephemeris, ephemeris, start)
+    }
+
+    fn unit_after(&self, before: &Ephemeris, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        let Message { name, unit_s, .. } = *self.message;
+        if start.tow_whole_s() % unit_s != 0 || start.fraction() != 0.0 {
+            let expected = "the beginning of a message";
+            return Err(FieldError::Start { message: name, start_s: start.tow_s(), expected });
+        }
+        let past = self.message(before, start.plus_s(-unit_s as f64))?;
+        let memory = past.get(BITS - MEMORY_BITS..).unwrap_or_default();
+        Ok(encode(memory, &self.message(set, start)?))
+    }
+}
+
+impl Messages {
+    /// The 300 bits of the message that begins at `start`.
+    fn message(&self, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        let kind = type_at(self.message, start);
+        let next = start.plus_s(self.message.unit_s as f64);
+        let content = Content {
+            preamble: PREAMBLE,
+            kind: f64::from(kind),
+            tow_count: (next.tow_whole_s() / MESSAGE_S) as f64,
+            week: start.week().rem_euclid(8192) as f64,
+            // Predicted for the reference time itself.
+            top: set.toe.tow_s() / STEP_S as f64,
+            op_week: set.toe.week().rem_euclid(256) as f64,
+            klobuchar: self.common.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] }),
+            utc: Utc::of(&self.common, start),
+            ..blank(set.clone())
+        };
+        let mut bits = vec![false; DATA_BITS];
+        for table in of_type(kind) {
+            write_all(table, &content, &mut bits)?;
+        }
+        let check = crc24q(bits.iter().copied());
+        bits.extend(bits_of(u128::from(check), CHECK_BITS));
+        Ok(bits)
+    }
+}
+
+/// The tables of a message; none for a type that is not read.
+fn of_type(kind: u8) -> Vec<&'static [Element<Content>]> {
+    match kind {
+        10 => vec![&HEADER, &ORBIT_1],
+        11 => vec![&HEADER, &ORBIT_2],
+        30 => vec![&HEADER, &CLOCKS, &DELAY],
+        33 => vec![&HEADER, &CLOCKS, &TIME],
+        _ => Vec::new(),
+    }
+}
+
+/// The symbols of a message after the last bits of the one before.
+pub fn encode(memory: &[bool], message: &[bool]) -> Vec<bool> {
+    let all: Vec<bool> = memory.iter().chain(message).copied().collect();
+    CODE.encode(&all).split_off(2 * memory.len())
+}
+
+/// The bits of a message if their check is right.
+pub fn checked(bits: Vec<bool>) -> Option<Vec<bool>> {
+    let right = bits.len() == BITS && crc24q(bits.iter().copied()) == 0;
+    (right && number(bits.get(..8)?) as f64 == PREAMBLE).then_some(bits)
+}
+
+/// The type that a message says it has.
+pub fn message_type(bits: &[bool]) -> u8 {
+    bits.get(14..20).map_or(0, |bits| number(bits) as u8)
+}
+
+/// Parameters that are of the message and not of the set.
+const PASSING: [&str; 5] = ["preamble", "prn", "type", "tow_count", "alert"];
+
+/// The raw integers of a message but those of its header; `None` for types that are not read.
+pub fn parameters(bits: &Vec<bool>) -> Option<Parameters> {
+    let tables = of_type(message_type(bits));
+    let mut found: Parameters = tables.iter().flat_map(|table| integers(table, bits)).collect();
+    found.retain(|(name, _)| !PASSING.contains(name));
+    (!found.is_empty()).then_some(found)
+}
+
+fn of_set() -> [&'static [Element<Content>]; 4] {
+    [&ORBIT_1, &ORBIT_2, &CLOCKS, &DELAY]
+}
+
+/// Nothing read yet.
+fn blank(set: Ephemeris) -> Content {
+    Content {
+        set: Ephemeris { form: &CNAV_SETS, ..set },
+        preamble: PREAMBLE,
+        kind: 0.0,
+        tow_count: 0.0,
+        alert: 0.0,
+        week: 0.0,
+        top: 0.0,
+        ned: [0.0; 3],
+        flags: 0.0,
+        op_week: 0.0,
+        klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] },
+        utc: Utc::default(),
+    }
+}
+
+/// The elements that raw integers of messages 10, 11 and 30 give, as if they had been sent at `near`.
+fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
+    let mut content = blank(Ephemeris::blank(sv, near));
+    for table in of_set() {
+        let mut bits = vec![false; DATA_BITS];
+        for field in table.iter().map(|element| &element.field) {
+            field.write(&mut bits, raw(field.name)?);
+        }
+        read_all(table, &bits, &mut content);
+    }
+    Some(content.set)
+}
+
+/// The coefficients of the ionosphere that raw integers of message 30 give.
+fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
+    let value = |name: &str| {
+        let field = DELAY.iter().map(|element| &element.field).find(|field| field.name == name)?;
+        Some(field.value(raw(field.name)?))
+    };
+    let alpha = [value("alpha_0")?, value("alpha_1")?, value("alpha_2")?, value("alpha_3")?];
+    let beta = [value("beta_0")?, value("beta_1")?, value("beta_2")?, value("beta_3")?];
+    Some(Coefficients::Klobuchar(Klobuchar { alpha, beta }))
+}
+
+/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+///
+/// # Errors
+/// A value that the message cannot carry.
+pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+    let mut content = blank(form(ephemeris));
+    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut content))?;
+    Ok(content.set)
+}
+
+/// Parameters by which sets are distinguished, that are no set's, or that all satellites say alike.
+const FIXED_PARAMETERS: [&str; 14] = [
+    "week",
+    "toe_5min",
+    "top_5min",
+    "op_week",
+    "alpha_0",
+    "alpha_1",
+    "alpha_2",
+    "alpha_3",
+    "beta_0",
+    "beta_1",
+    "beta_2",
+    "beta_3",
+    "integrity_flags",
+    "toc_5min",
+];
+
+/// Those of messages 10, 11 and 30.
+fn adjustable() -> Vec<&'static str> {
+    let names = of_set().into_iter().flatten().map(|element| element.field.name);
+    names.filter(|name| !FIXED_PARAMETERS.contains(name) && !name.starts_with("ura_ned")).collect()
+}
+
+/// Adds `by` to a parameter in the unit of the tables; whether there is one.
+fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+    let mut content = blank(ephemeris.clone());
+    let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut content, by));
+    *ephemeris = content.set;
+    found
+}
+
+/// The set in messages 10, 11 and 30 of the same reference time, the first sent at `sent`; `None` where they
+/// do not belong together or name another satellite.
+fn elements(sv: Sv, messages: [&Vec<bool>; 3], sent: Epoch) -> Option<Ephemeris> {
+    let mut content = blank(Ephemeris::blank(sv, sent));
+    let mut toes = Vec::new();
+    for bits in messages {
+        let tables = of_type(message_type(bits));
+        let prn = number(bits.get(8..14)?);
+        if prn != u128::from(sv.number) {
+            return None;
+        }
+        tables.iter().for_each(|table| read_all(table, bits, &mut content));
+        let reference = if message_type(bits) == 30 { content.set.toc } else { content.set.toe };
+        toes.push(reference);
+    }
+    toes.windows(2).all(|pair| pair.first() == pair.last()).then_some(content.set)
+}
