@@ -22,6 +22,7 @@ const NUMBERS: &[Row] = &[
     ("", "duration_s", No, No),
     ("truth", "interval_s", No, No),
     ("satellites", "mask_deg", Yes, Yes),
+    ("navigation", "galileo_ahead_ns", Yes, Yes),
     ("orbits", "antenna_offset_m", Yes, No),
     ("motion", "latitude_deg longitude_deg height_m azimuth_deg", Yes, Yes),
     ("motion", "node_longitude_deg argument_of_perigee_deg mean_anomaly_deg", Yes, Yes),
