@@ -134,7 +134,7 @@ repetitions = 9
 keep = ["phase_sigma_deg", "code_sigma_m", "held"]
 [measure]
 settle_s = 1
-duration_s = 60
+duration_s = 600
 [[axis]]
 key = "receiver.tracking.pll_bandwidth_hz"
 values = [5, 10.0, 18]
@@ -269,7 +269,7 @@ done
 
 # ---- more shards than an array may have indices
 say "2500 shards at MaxArraySize $(scontrol show config | awk '/MaxArraySize/ { print $3 }')"
-sed -e 's/repetitions = 9/repetitions = 625/' -e 's/duration_s = 60/duration_s = 1/' "$work/study.toml" >"$work/many.toml"
+sed -e 's/repetitions = 9/repetitions = 625/' -e 's/duration_s = 600/duration_s = 1/' "$work/study.toml" >"$work/many.toml"
 "$twin" study plan "$work/many.toml" -o "$work/many" --shards 2500 | tail -2
 "$twin" study export slurm "$work/many" --directive=--hold >"$work/many.sh"
 grep -q -- '--array=0-1000$' "$work/many.sh"

@@ -97,6 +97,10 @@ pub fn submit(arguments: &args::StudySubmit) -> Result<(), CliError> {
             }
             args::Engine::Parallel => missing = parallel(&plan, &path, missing, &progress)?,
         }
+        // What was whole at one look may have been damaged since.
+        if missing.is_empty() {
+            missing = looked(&plan)?.missing;
+        }
     }
     drop(progress);
     let summary = format!(
