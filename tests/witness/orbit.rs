@@ -7,6 +7,7 @@ use std::path::Path;
 use ::rinex::navigation::NavMessageType;
 use ::rinex::prelude::{Constellation, Rinex, TimeScale};
 use gnss_twin::generator::catalogue::Catalogue;
+use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss_twin::gnss::rinex::{self, Navigation};
 use gnss_twin::gnss::satellite::{Sv, System};
@@ -61,6 +62,27 @@ pub fn sp3_columns(text: &[u8], systems: &str) -> Precise {
         }
     }
     epochs
+}
+
+/// Elements that the sets of all systems have, by the names of the `rinex` crate.
+fn elements(set: &Ephemeris) -> [(&'static str, f64); 15] {
+    [
+        ("crs", set.crs_m),
+        ("deltaN", set.delta_n_radps),
+        ("m0", set.m0_rad),
+        ("cuc", set.cuc_rad),
+        ("e", set.eccentricity),
+        ("cus", set.cus_rad),
+        ("sqrta", set.sqrt_a_sqrtm),
+        ("cic", set.cic_rad),
+        ("omega0", set.omega0_rad),
+        ("cis", set.cis_rad),
+        ("i0", set.i0_rad),
+        ("crc", set.crc_m),
+        ("omega", set.omega_rad),
+        ("omegaDot", set.omega_dot_radps),
+        ("idot", set.idot_radps),
+    ]
 }
 
 #[test]
@@ -277,27 +299,13 @@ fn the_rinex_crate_reads_the_same_elements() {
                 continue;
             };
             compared += 1;
-            for (field, value) in [
-                ("crs", set.crs_m),
-                ("deltaN", set.delta_n_radps),
-                ("m0", set.m0_rad),
-                ("cuc", set.cuc_rad),
-                ("e", set.eccentricity),
-                ("cus", set.cus_rad),
-                ("sqrta", set.sqrt_a_sqrtm),
-                ("cic", set.cic_rad),
-                ("omega0", set.omega0_rad),
-                ("cis", set.cis_rad),
-                ("i0", set.i0_rad),
-                ("crc", set.crc_m),
-                ("omega", set.omega_rad),
-                ("omegaDot", set.omega_dot_radps),
-                ("idot", set.idot_radps),
+            let of_gps = [
                 ("tgd", set.tgd_s),
                 ("iode", f64::from(set.iode)),
                 ("iodc", f64::from(set.iodc)),
                 ("health", f64::from(set.health)),
-            ] {
+            ];
+            for (field, value) in elements(set).into_iter().chain(of_gps) {
                 assert_eq!(frame.get_orbit_f64(field), Some(value), "{name} {} {field}", set.sv);
             }
             assert_eq!(
@@ -333,23 +341,7 @@ fn the_rinex_crate_reads_the_same_orbits_of_other_systems() {
             frames.entry((key.sv.to_string(), (since_ns / 1_000_000_000) as i64)).or_default().push(frame);
         }
         for set in found.ephemerides.iter().filter(|set| set.sv.system != System::Gps) {
-            let own = [
-                ("crs", set.crs_m),
-                ("deltaN", set.delta_n_radps),
-                ("m0", set.m0_rad),
-                ("cuc", set.cuc_rad),
-                ("e", set.eccentricity),
-                ("cus", set.cus_rad),
-                ("sqrta", set.sqrt_a_sqrtm),
-                ("cic", set.cic_rad),
-                ("omega0", set.omega0_rad),
-                ("cis", set.cis_rad),
-                ("i0", set.i0_rad),
-                ("crc", set.crc_m),
-                ("omega", set.omega_rad),
-                ("omegaDot", set.omega_dot_radps),
-                ("idot", set.idot_radps),
-            ];
+            let own = elements(set);
             let theirs = frames.get(&(set.sv.to_string(), set.toc.seconds()));
             let theirs = theirs.unwrap_or_else(|| panic!("{name}: {} {} is not there", set.sv, set.toc));
             let same =

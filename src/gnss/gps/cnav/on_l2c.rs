@@ -4,11 +4,7 @@
 //! seconds of the week). The order of messages is that of satellites in 2025 (`tests/witness`).
 
 use super::reader::CnavReader;
-use super::{
-    CNAV, CNAV_SETS, IONOSPHERE, MESSAGE_S, Messages, ORDER, adjust, adjustable, form, ionosphere, of_integers, opened,
-    quantised, set_parameters, type_at,
-};
-use crate::gnss::ionosphere::Model;
+use super::{CNAV, IONOSPHERE, MESSAGE_S, Messages, type_at};
 use crate::gnss::message::{IonosphereForm, Message};
 
 /// CNAV as L2C names it. Its sets are those of CNAV on L5.
@@ -16,26 +12,9 @@ pub static CNAV_L2C: Message = Message {
     name: "CNAV on L2C",
     symbol_s: 2.0 * CNAV.symbol_s,
     unit_s: MESSAGE_S * 2,
-    first_s: 0,
     sender: |common| Ok(Box::new(Messages { common: common.clone(), message: &CNAV_L2C })),
     number: |start| type_at(&CNAV_L2C, start),
-    timed: &ORDER,
-    set: CNAV.set,
-    reduced: &[],
-    ionosphere: IonosphereForm {
-        model: Model::Klobuchar,
-        unit: |start| type_at(&CNAV_L2C, start) == IONOSPHERE,
-        coefficients: ionosphere,
-    },
-    set_parameters,
-    elements: of_integers,
-    parameters: opened,
+    ionosphere: IonosphereForm { unit: |start| type_at(&CNAV_L2C, start) == IONOSPHERE, ..CNAV.ionosphere },
     reader: |sv| Box::new(CnavReader::of(&CNAV_L2C, sv)),
-    form,
-    sets: &CNAV_SETS,
-    quantised,
-    adjustable,
-    alert: None,
-    adjust,
-    rinex: None,
+    ..CNAV
 };
