@@ -4,13 +4,14 @@ use gnss_twin::gnss::earth::Geodetic;
 use nalgebra::Vector3;
 
 use crate::Kind;
-use crate::run::{Rx, Scene};
+use crate::run::{BOUND_M, Rx, Scene};
 use crate::table::{Table, normal};
 
 const PLACE: [&str; 3] = ["x_m", "y_m", "z_m"];
 const SPEED: [&str; 3] = ["vx_mps", "vy_mps", "vz_mps"];
 const FLAT: [&str; 3] = ["horizontal error, mean", "horizontal error, 95 %", "horizontal error, largest"];
 const UP: [&str; 3] = ["vertical error, mean", "vertical error, 95 %", "vertical error, largest"];
+const BOUNDED: [&str; 1] = ["position error that the scene bounds, largest"];
 const VELOCITY: [&str; 3] = ["velocity error, mean", "velocity error, 95 %", "velocity error, largest"];
 const CLOCK: [&str; 3] = ["clock error, mean", "clock error, 95 %", "clock error, largest"];
 const DRIFT: [&str; 3] = ["clock drift error, mean", "clock drift error, 95 %", "clock drift error, largest"];
@@ -129,6 +130,17 @@ fn places() -> Vec<Kind> {
         kind!("fixes that climb", "m at the end", Some(0.3), 3.0, &UP, AtRest, |rx, m| {
             add(rx, PLACE, |row, count| Vector3::z() * (m * row as f64 / count as f64));
         }),
+        kind!(
+            "one fix off where errors may have any size up to a bound",
+            "m",
+            Some(15.0),
+            1.1 * BOUND_M,
+            &BOUNDED,
+            Bounded,
+            |rx, m| {
+                add(rx, PLACE, |row, _| if row == 100 { Vector3::y() * m } else { Vector3::zeros() });
+            }
+        ),
         kind!("4 % of the fixes far off", "m", Some(0.3), 2.0, &FLAT, AtRest, |rx, m| {
             add(rx, PLACE, |row, _| if row % 25 == 7 { Vector3::x() * m } else { Vector3::zeros() });
         }),

@@ -15,6 +15,8 @@ use crate::table::Table;
 pub enum Scene {
     AtRest,
     InMotion,
+    /// At rest; the scene says that errors may have any size up to a bound.
+    Bounded,
 }
 
 struct Made {
@@ -82,7 +84,7 @@ impl Rx {
     /// Everything but `rx/` is linked.
     pub fn copy(scene: Scene, to: &Path) -> Self {
         let from = match scene {
-            Scene::AtRest => at_rest(),
+            Scene::AtRest | Scene::Bounded => at_rest(),
             Scene::InMotion => in_motion(),
         };
         for name in ["truth", "rx"] {
@@ -91,6 +93,9 @@ impl Rx {
         for entry in fs::read_dir(from.join("truth")).unwrap() {
             let entry = entry.unwrap();
             link(&entry.path(), &to.join("truth").join(entry.file_name()));
+        }
+        if scene == Scene::Bounded {
+            declare(&from.join("truth/scene.json"), &to.join("truth/scene.json"));
         }
         for name in ["psd.csv", "speed.json", "scenario.toml"] {
             link(&from.join(name), &to.join(name));
@@ -128,6 +133,17 @@ impl Rx {
             }
         }
     }
+}
+
+/// Metres that a bounded scene allows fixes to be off.
+pub const BOUND_M: f64 = 20.0;
+
+/// Copies the facts of a scene and declares in the copy what errors it allows.
+fn declare(from: &Path, to: &Path) {
+    let mut facts: serde_json::Value = serde_json::from_slice(&fs::read(from).unwrap()).unwrap();
+    facts["expect"] = serde_json::json!({"whole": {"errors": "any", "position_within_m": BOUND_M, "reason": "walls"}, "intervals": []});
+    fs::remove_file(to).unwrap();
+    fs::write(to, facts.to_string()).unwrap();
 }
 
 fn link(from: &Path, to: &Path) {

@@ -8,14 +8,16 @@ use crate::gnss::facts::{Expect, Fault, FaultKind, Fixes, Interval, Losses, Size
 pub(super) fn expect(table: &Table<'_>, duration_s: f64) -> Result<Expect, ScenarioError> {
     let intervals = table.tables("interval")?.unwrap_or_default();
     let intervals = intervals.iter().map(|table| interval(table, duration_s)).collect::<Result<Vec<_>, _>>()?;
-    let says = ["fix", "losses", "errors"].iter().any(|key| table.has(key));
+    let says = SAYS.iter().any(|key| table.has(key));
     if !says && (intervals.is_empty() || table.has("reason") || table.has("satellites")) {
         return Err(table.bad("fix", NOTHING));
     }
     Ok(Expect { whole: if says { Some(terms(table)?) } else { None }, intervals })
 }
 
-const NOTHING: &str = "at least one of fix, losses and errors";
+/// Keys of which one at least says what is expected.
+const SAYS: [&str; 4] = ["fix", "losses", "errors", "position_within_m"];
+const NOTHING: &str = "at least one of fix, losses, errors and position_within_m";
 
 fn interval(table: &Table<'_>, duration_s: f64) -> Result<Interval, ScenarioError> {
     let from_s = table.need("from_s")?;
@@ -26,7 +28,7 @@ fn interval(table: &Table<'_>, duration_s: f64) -> Result<Interval, ScenarioErro
     if to_s <= from_s {
         return Err(table.bad("to_s", format!("more than from_s = {from_s}")));
     }
-    if !["fix", "losses", "errors"].iter().any(|key| table.has(key)) {
+    if !SAYS.iter().any(|key| table.has(key)) {
         return Err(table.bad("fix", NOTHING));
     }
     Ok(Interval { from_s, to_s, terms: terms(table)? })
@@ -38,6 +40,7 @@ fn terms(table: &Table<'_>) -> Result<Terms, ScenarioError> {
         losses: table.choice("losses", &Losses::NAMES)?,
         satellites: satellite_list(table, "satellites")?,
         errors: table.choice("errors", &Sizes::NAMES)?,
+        position_within_m: table.number("position_within_m")?,
         reason: table.need_text("reason")?.to_owned(),
     };
     if terms.satellites.is_some() && terms.losses.is_none() {
@@ -98,13 +101,15 @@ mod tests {
     fn a_scene_says_what_it_expects_over_all_and_by_interval() {
         let found = read(
             "[expect]\nfix = \"none\"\nreason = \"one satellite\"\n[[expect.interval]]\nfrom_s = 10\nto_s = 20\n\
-             losses = \"any\"\nsatellites = [\"G07\"]\nerrors = \"any\"\nreason = \"jammer\"\n",
+             losses = \"any\"\nsatellites = [\"G07\"]\nerrors = \"any\"\nposition_within_m = 40\nreason = \"jammer\"\n",
         )
         .unwrap();
         let whole = found.whole.clone().unwrap();
         assert_eq!((whole.fix, whole.losses, whole.reason.as_str()), (Some(Fixes::None), None, "one satellite"));
         assert_eq!(found.losses(Sv::gps(7), 15.0), Some(Losses::Any));
         assert_eq!((found.losses(Sv::gps(8), 15.0), found.bounded(15.0), found.bounded(25.0)), (None, false, true));
+        let within = [15.0, 25.0].map(|t_s| found.position_within_m(t_s).map(|(_, bound_m)| bound_m));
+        assert_eq!(within, [Some(40.0), None]);
         assert!(read("").unwrap().is_empty());
     }
 
@@ -114,8 +119,8 @@ mod tests {
         for (text, expected) in [
             ("[expect]\nfix = \"none\"\n".to_owned(), "expect.reason = absent: expected a sentence"),
             ("[expect]\nfix = \"maybe\"\nreason = \"x\"\n".to_owned(), "one of required, none, any"),
-            ("[expect]\nreason = \"x\"\n".to_owned(), "at least one of fix, losses and errors"),
-            ("[expect]\n".to_owned(), "at least one of fix, losses and errors"),
+            ("[expect]\nreason = \"x\"\n".to_owned(), "at least one of fix, losses, errors and position_within_m"),
+            ("[expect]\n".to_owned(), "at least one of fix, losses, errors and position_within_m"),
             ("[expect]\nfixes = \"none\"\n".to_owned(), "did you mean 'fix'"),
             (format!("{interval}from_s = 20\nto_s = 10\n"), "more than from_s = 20"),
             (format!("{interval}from_s = 60\nto_s = 70\n"), "less than duration_s = 60"),

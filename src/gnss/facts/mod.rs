@@ -90,6 +90,9 @@ pub struct Terms {
     /// Of the size of the fixes' errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub errors: Option<Sizes>,
+    /// Error in space that no fix may exceed, metres, whatever is said of `errors`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position_within_m: Option<f64>,
     /// Why, in the scene's words.
     pub reason: String,
 }
@@ -138,6 +141,11 @@ impl Expect {
     pub fn losses(&self, sv: Sv, time_s: f64) -> Option<Losses> {
         let concerns = |terms: &&Terms| terms.satellites.as_ref().is_none_or(|list| list.contains(&sv));
         self.at(time_s).filter(concerns).find_map(|terms| terms.losses)
+    }
+
+    /// The terms at a time that bound the error of a fix, and their bound in metres.
+    pub fn position_within_m(&self, time_s: f64) -> Option<(&Terms, f64)> {
+        self.at(time_s).find_map(|terms| Some((terms, terms.position_within_m?)))
     }
 
     /// Whether errors at a time are to be judged.
@@ -221,6 +229,12 @@ mod tests {
         assert_eq!(expect.losses(Sv::gps(3), 16.0), Some(Losses::None));
         assert_eq!(expect.losses(Sv::gps(4), 16.0), Some(Losses::Any));
         assert_eq!(expect.losses(Sv::gps(4), 25.0), None);
+        let near = Terms { position_within_m: Some(5.0), ..Terms::default() };
+        let bounded = Expect { whole: Some(near), ..expect.clone() };
+        assert_eq!(
+            (expect.position_within_m(12.0), bounded.position_within_m(12.0).map(|(_, m)| m)),
+            (None, Some(5.0))
+        );
         assert!(expect.bounded(12.0) && !expect.is_empty() && Expect::default().is_empty());
         let json = serde_json::to_string(&expect).unwrap();
         assert_eq!(serde_json::from_str::<Expect>(&json).unwrap(), expect);

@@ -36,6 +36,13 @@ pub struct FixError {
     pub true_velocity_enu_mps: Vector3<f64>,
 }
 
+impl FixError {
+    /// Length of the error in space.
+    pub fn length_m(&self) -> f64 {
+        Vector3::new(self.east_m, self.north_m, self.up_m).norm()
+    }
+}
+
 /// What the positions come to.
 #[derive(Clone, Debug, Default)]
 pub struct Places {
@@ -98,7 +105,7 @@ pub fn measure(fixes: &[PlaceFix], timeline: &Timeline, shift_s: i64) -> Places 
         horizontal_rms_m: rms(&horizontal),
         horizontal_p95_m: percentile(&horizontal, 0.95),
         up_rms_m: rms(&axes[2]),
-        error_3d_p95_m: percentile(&of(&|row| Vector3::new(row.east_m, row.north_m, row.up_m).norm()), 0.95),
+        error_3d_p95_m: percentile(&of(&FixError::length_m), 0.95),
         ground_speed_rms_mps: rms(&ground),
         time_tag_s: time_tag(&rows),
         rows,

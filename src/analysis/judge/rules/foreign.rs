@@ -122,6 +122,9 @@ impl Verdict {
             let came = Came { samples: labels.near(&fixes), first_s: first.map(|sample| run.time_s(sample)) };
             verdict.availability(run.scene.duration_s, &run.scene.expect, &expected, &came);
             verdict.places(run, places, &labels, &expected);
+            let timed =
+                places.rows.iter().filter_map(|row| Some((run.time_s(labels.sample_at(row.label_s)?), row.length_m())));
+            verdict.within(&run.scene.expect, timed);
         }
         Ok(verdict)
     }
@@ -212,8 +215,7 @@ impl Verdict {
         };
         let rows = places.rows.iter().filter_map(|row| limited(row).map(|sigma_m| (row, sigma_m)));
         let rows: Vec<(&FixError, f64)> = rows.collect();
-        let error = |row: &FixError| libm::hypot(libm::hypot(row.east_m, row.north_m), row.up_m);
-        let all: Vec<f64> = rows.iter().map(|(row, _)| error(row)).collect();
+        let all: Vec<f64> = rows.iter().map(|(row, _)| row.length_m()).collect();
         let limits: Vec<f64> = rows.iter().map(|(_, sigma_m)| largest(3, 20) * sigma_m).collect();
         let (Some(value), Some(limit)) = (percentile(&all, 0.95), percentile(&limits, 0.95)) else {
             self.not_judged.push("errors of positions: none where satellites are placed well".to_owned());
@@ -225,11 +227,11 @@ impl Verdict {
         );
         self.judge("position error, 95 %", "position.error_3d_p95_m", value, "m", Bound::Max(limit), &source);
         let factor = largest(3, rows.len());
-        let over = |row: &FixError, sigma_m: f64| error(row) / (factor * sigma_m);
+        let over = |row: &FixError, sigma_m: f64| row.length_m() / (factor * sigma_m);
         let worst = rows.iter().max_by(|a, b| over(a.0, a.1).total_cmp(&over(b.0, b.1)));
         if let Some((row, sigma_m)) = worst {
             let source = format!("{source}; at {:.1} s, nearest to its limit or farthest beyond", row.label_s);
-            self.judge("position error, largest", "", error(row), "m", Bound::Max(factor * sigma_m), &source);
+            self.judge("position error, largest", "", row.length_m(), "m", Bound::Max(factor * sigma_m), &source);
         }
     }
 }

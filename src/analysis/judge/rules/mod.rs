@@ -19,6 +19,7 @@ mod tables;
 mod tests;
 mod tracking;
 mod values;
+mod within;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::due::Expectations;
@@ -41,6 +42,8 @@ impl Verdict {
         verdict.satellites(run, &expected);
         verdict.availability(run.scene.duration_s, &run.scene.expect, &expected, &Came::of(run));
         verdict.values(run, errors, summary)?;
+        let places = errors.positions.iter().map(|error| (error.time_s, error.enu_m.norm()));
+        verdict.within(&run.scene.expect, places);
         verdict.tracking(run, summary);
         verdict.links(run, errors)?;
         verdict.losses(run, &expected.receiver, slips)?;

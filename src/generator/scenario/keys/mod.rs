@@ -143,8 +143,10 @@ const EXPECT: &[Key] = &[
     word("fix", fixes, "whether there has to be a fix").or_else("as the satellites allow"),
     word("losses", losses, "losses of lock that are excused").or_else("those that the scene explains"),
     words("satellites", SATELLITES, "whose losses; with losses").or_else("all"),
-    word("errors", sizes, "whether errors are bounded").or_else("bounded"),
-    text("reason", WHY, "why, for the verdict; required with fix, losses and errors"),
+    word("errors", sizes, "whether errors are within what theory expects").or_else("bounded"),
+    number("position_within_m", 1e-3, 1e7, "m", "error in space that no fix may exceed, whatever errors says")
+        .or_else("unbounded"),
+    text("reason", WHY, "why, for the verdict; required with the others"),
     tables("interval", INTERVAL, "The same for a part of the scene."),
 ];
 
@@ -155,6 +157,7 @@ const INTERVAL: &[Key] = &[
     word("losses", losses, "as in [expect]").or_else("as in [expect]"),
     words("satellites", SATELLITES, "whose losses; with losses").or_else("all"),
     word("errors", sizes, "as in [expect]").or_else("as in [expect]"),
+    number("position_within_m", 1e-3, 1e7, "m", "as in [expect]").or_else("as in [expect]"),
     text("reason", WHY, "why, for the verdict").required(),
 ];
 

@@ -160,7 +160,9 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                 ("front_end", "name" | "center_hz" | "signals" | "local_oscillator" | "filter" | "iq" | "adc") => {
                     cases.push((with("front_end", &format!("{key} = 1")), table, key))
                 }
-                ("expect", "interval") => cases.push((with("expect", "interval = 1"), table, key)),
+                ("expect", "interval" | "position_within_m") => {
+                    cases.push((with("expect", &format!("{key} = 1")), table, key));
+                }
                 ("spoofer", "motion" | "drag") => {
                     cases.push((with("spoofer", &format!("power_db = 6\n{key} = 1")), table, key));
                 }
@@ -192,7 +194,7 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
     }
     let interval = "[[expect.interval]]\nfrom_s = 1\nto_s = 2\nfix = \"any\"\nlosses = \"any\"\nsatellites = \
                     [\"G02\"]\n\
-                    errors = \"any\"\nreason = \"x\"\n";
+                    errors = \"any\"\nposition_within_m = 9\nreason = \"x\"\n";
     for key in keys_of("expect.interval") {
         cases.push((format!("{MINIMAL}{STATIC}{interval}"), "expect.interval", key));
     }
