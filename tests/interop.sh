@@ -2,7 +2,8 @@
 # A receiver that this project did not write, Debian's GNSS-SDR, must find the position of the static scene, and that of the scene of
 # two systems by Galileo alone and by GPS and Galileo, to 5 m. The judge must find from its RINEX and NMEA files what the scenes put
 # into them. Debian's RTKLIB must find the static scene's place by the RINEX files that a run writes, of the receiver and of the truth;
-# and by those of a truth without a troposphere to 0.01 m. gpsdecode, pynmeagps and xmllint read NMEA, KML and GPX of fixes and truth.
+# and by those of a truth without a troposphere to 0.01 m. gpsdecode, pynmeagps and xmllint read NMEA, KML and GPX of fixes and truth,
+# and pyarrow every table as Parquet.
 #
 # usage: tests/interop.sh [GNSS_TWIN_BINARY [galileo]]     (default: target/release/gnss-twin, and GPS alone)
 # exit:  0 the mean fixes are within 5 m in three dimensions and every figure of the judgements within its bar; 1 they are not; 75 gnss-sdr could not be installed.
@@ -153,6 +154,15 @@ sed -e '/^\[troposphere\]/d; /^model = "saastamoinen"/d; s/^duration_s = .*/dura
     "$scene" >"$bare"
 "$twin" generate "$bare" --out "$work/bare.sigmf-data" --rinex --quiet 2>/dev/null
 rtklib bare "$work/bare.truth" 0.01 pos1-tropopt=off
+# The same of two systems at once, and by Galileo alone (RTKLIB's numbers of systems: 1 and 8), without an ionosphere.
+for system in 9 8; do
+    scene=$work/both.toml
+    sed -e '/^\[troposphere\]/d; /^model = "saastamoinen"/d; /^\[ionosphere\]/d; /^model = "nequick_g"/d; s/^duration_s = .*/duration_s = 27/; s/^sample_rate_hz = .*/sample_rate_hz = 4.2e6/' \
+        "$root/scenarios/two_systems.toml" >"$scene"
+    [ -d "$work/both.truth" ] || "$twin" generate "$scene" --out "$work/both.sigmf-data" --rinex --quiet 2>/dev/null
+    rtklib "both_$system" "$work/both.truth" 0.01 pos1-tropopt=off pos1-ionoopt=off "pos1-navsys=$system"
+done
+scene=$root/scenarios/static.toml
 # And what reads XML and NMEA: no word of theirs on standard error, every fix a position.
 if ! command -v xmllint >/dev/null || ! command -v gpsdecode >/dev/null; then
     { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq libxml2-utils gpsd-clients; } >/dev/null 2>&1 || {
@@ -188,8 +198,8 @@ fi
 for copy in "$work"/copies/*.toml; do "$twin" plan "$copy" >/dev/null 2>&1 || { echo "interop: plan $copy failed"; failed=1; }; done
 generate static
 # The metadata beside the samples by SigMF's own validator, which is to refuse a data type that there is not.
-python3 -m venv "$work/sigmf" && "$work/sigmf/bin/pip" install --quiet --disable-pip-version-check sigmf pynmeagps || {
-    echo "interop: cannot install sigmf and pynmeagps here" >&2
+python3 -m venv "$work/sigmf" && "$work/sigmf/bin/pip" install --quiet --disable-pip-version-check sigmf pynmeagps pyarrow || {
+    echo "interop: cannot install sigmf, pynmeagps and pyarrow here" >&2
     exit 75
 }
 # The same sentences by a parser that checks every sum and type: how far its places are from the scene's.
@@ -206,6 +216,35 @@ kinds = sorted({parsed.msgID for parsed in read})
 print(f"interop: pynmeagps read {len(fixes)} places of {len(read)} sentences ({' '.join(kinds)}), {worst * 1000:.3f} mm off")
 # Written to 1e-7 of a minute and 0.1 mm.
 sys.exit(not (len(fixes) == places and worst < 1e-3 and kinds == ["GGA", "GSA", "GSV", "RMC", "VTG", "ZDA"]))
+END
+# Every table of the run as Parquet, by Arrow's reader: names, rows and values of the CSV beside it, of which a number has all its
+# digits and an empty cell is null.
+"$twin" parquet "$work/run" >/dev/null
+"$work/sigmf/bin/python" - "$work/run" <<'END' || failed=1
+import csv, math, pathlib, sys
+import pyarrow.parquet
+
+tables = cells = wrong = 0
+for path in sorted(pathlib.Path(sys.argv[1]).rglob("*.csv")):
+    header, *rows = csv.reader(path.open(newline=""))
+    table = pyarrow.parquet.read_table(path.with_suffix(".parquet"))
+    columns = table.to_pydict()
+    tables += 1
+    wrong += list(columns) != header or table.num_rows != len(rows)
+    for place, name in enumerate(header):
+        for row, value in zip(rows, columns[name]):
+            cells += 1
+            text = row[place]
+            if value is None or text == "":
+                wrong += value is not None or text != ""
+            elif isinstance(value, bool):
+                wrong += text != str(value).lower()
+            elif isinstance(value, str):
+                wrong += text != value
+            else:
+                wrong += type(value)(text) != value and not (math.isnan(value) and math.isnan(float(text)))
+print(f"interop: pyarrow read {tables} tables, {cells} cells, {wrong} other than in the CSV")
+sys.exit(not (tables >= 10 and cells > 10_000 and wrong == 0))
 END
 sed 's/"ci8"/"ci9"/' "$work/static.sigmf-meta" >"$work/wrong.sigmf-meta"
 ln "$work/static.sigmf-data" "$work/wrong.sigmf-data"

@@ -42,6 +42,8 @@ pub enum Command {
     Plan(Plan),
     /// Run a study: a base, axes and repetitions become tables, curves and a report
     Study(Study),
+    /// Write the tables of a run or a study as Parquet too
+    Parquet(Parquet),
     /// List every key of scenarios, receiver settings, studies and limits: default, unit, range, meaning
     Reference(Reference),
     /// List the scenes that come with the program, or copy some of them
@@ -54,6 +56,17 @@ pub enum Command {
     Completions(Completions),
     /// Write the manual's pages
     Man(Man),
+}
+
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Example: gnss-twin parquet reports/static\n\nBeside TABLE.csv comes TABLE.parquet, with the same \
+                        names of columns"
+)]
+pub struct Parquet {
+    /// Directories with tables, of runs or studies, or tables (.csv)
+    #[arg(required = true, value_name = "DIR|FILE.csv")]
+    pub paths: Vec<PathBuf>,
 }
 
 #[derive(Args, Debug)]
@@ -538,8 +551,8 @@ pub struct StudyStatus {
 pub struct StudyMerge {
     /// Directory of the study
     pub directory: PathBuf,
-    /// File for the table
-    #[arg(long, short, value_name = "FILE.csv")]
+    /// File for the table: .csv or .parquet
+    #[arg(long, short, value_name = "FILE")]
     pub out: PathBuf,
 }
 

@@ -17,6 +17,8 @@ mod interrupt;
 mod lines;
 mod live;
 mod packed;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod plan;
 mod printed;
 mod progress;
@@ -84,6 +86,10 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Analyze(arguments) => analyze::execute(&arguments),
         Command::Plan(arguments) => plan::execute(&arguments),
         Command::Study(arguments) => study::execute(&arguments),
+        #[cfg(feature = "parquet")]
+        Command::Parquet(arguments) => parquet::execute(&arguments),
+        #[cfg(not(feature = "parquet"))]
+        Command::Parquet(_) => Err(no_parquet()),
         Command::Reference(arguments) => reference::execute(&arguments),
         Command::Scenes(arguments) => scenes::execute(&arguments),
         Command::Init(arguments) => scenes::init(&arguments),
@@ -91,4 +97,10 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Completions(arguments) => shell::completions(&arguments),
         Command::Man(arguments) => shell::man(&arguments),
     }
+}
+
+/// What a program without the feature says.
+#[cfg(not(feature = "parquet"))]
+fn no_parquet() -> CliError {
+    CliError::usage("this program was built without Parquet: build it with --features parquet")
 }

@@ -186,10 +186,25 @@ fn status(arguments: &args::StudyStatus) -> Result<(), CliError> {
 fn merge(arguments: &args::StudyMerge) -> Result<(), CliError> {
     let plan = load(&arguments.directory)?;
     let lines = result::merge(&plan).map_err(study_error)?;
-    let staging = Staging::file(&arguments.out)?;
-    staging.write(&result::table(&plan, &lines))?;
-    staging.commit()?;
+    let table = result::table(&plan, &lines);
+    if arguments.out.extension().is_some_and(|extension| extension == "parquet") {
+        write_parquet(&table, &arguments.out)?;
+    } else {
+        let staging = Staging::file(&arguments.out)?;
+        staging.write(&table)?;
+        staging.commit()?;
+    }
     scenario::print(&format!("{} cases in {}\n", lines.len(), arguments.out.display()))
+}
+
+#[cfg(feature = "parquet")]
+fn write_parquet(table: &[u8], target: &Path) -> Result<(), CliError> {
+    crate::cli::parquet::write_bytes(table, target).map(drop)
+}
+
+#[cfg(not(feature = "parquet"))]
+fn write_parquet(_: &[u8], _: &Path) -> Result<(), CliError> {
+    Err(crate::cli::no_parquet())
 }
 
 fn report(plan: &Plan) -> Result<(), CliError> {
