@@ -1,5 +1,12 @@
 //! A GNSS digital twin: a signal generator, a software receiver and a judge.
 //!
+//! ```text
+//!  ephemerides, motion,             samples               records
+//!  environment  ──────►  generator  ──────►  receiver  ──────►  analysis ──► verdict, pictures, report
+//!                            │                                     ▲
+//!                            └─────────────── truth ───────────────┘
+//! ```
+//!
 //! Three worlds meet only in [`gnss`], which holds what is *printed* in interface documents
 //! and standards: time, coordinates, codes, messages, broadcast orbits, file formats.
 //!
@@ -47,6 +54,10 @@
 //! Each world is a cargo feature and compiles without the others; a program that needs generator and receiver
 //! takes the package with `default-features = false, features = ["generator", "receiver"]`. Units: SI and
 //! radians inside, cycles for carrier phase, GPS time; a name ends with its unit.
+//!
+//! Versions follow cargo's rules: before 1.0 a new minor version may change what is public, a patch may
+//! not. `tests/api.txt` lists all of it, so that no change goes unseen, and the changelog says what each one
+//! asks of a program that uses the library.
 
 #[macro_use]
 pub mod plant;
