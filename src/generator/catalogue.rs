@@ -34,6 +34,9 @@ const CONTRADICTION_M: f64 = 2000.0;
 const DELAY_S: f64 = 600.0;
 /// The same for clocks: 300 m.
 const CONTRADICTION_S: f64 = 1e-6;
+/// Half of what distances to satellites in round orbits vary by: those of GLONASS have eccentricities below
+/// 0.01.
+const ROUND_M: f64 = 3e5;
 
 /// From when on which set is sent.
 #[derive(Clone, Copy, Debug)]
@@ -248,7 +251,10 @@ fn step(timeline: &Timeline, index: usize, at: Epoch) -> (f64, f64) {
 /// A total order that depends on the contents alone.
 fn compare(a: &Ephemeris, b: &Ephemeris) -> std::cmp::Ordering {
     let key = |e: &Ephemeris| (e.toe.seconds(), e.iodc, e.iode, e.health, e.ura_index);
-    let number = |e: &Ephemeris| [e.transmitted.since(e.toe), e.m0_rad, e.sqrt_a_sqrtm, e.omega0_rad, e.af0_s, e.crs_m];
+    let place_m = |e: &Ephemeris| e.vector.map_or(0.0, |vector| vector.position_m.x);
+    let number = |e: &Ephemeris| {
+        [e.transmitted.since(e.toe), e.m0_rad, e.sqrt_a_sqrtm, e.omega0_rad, e.af0_s, e.crs_m, place_m(e)]
+    };
     key(a).cmp(&key(b)).then_with(|| {
         number(a)
             .iter()
@@ -276,8 +282,12 @@ fn contradict(a: &Ephemeris, b: &Ephemeris) -> bool {
 
 /// Whether elements are those of the nominal constellation (the fields are wider): a 12 h sidereal orbit of
 /// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo, one of a day, 0° to 33°, for NavIC
-/// and 0° to 60° for BeiDou, of which others take 13 h.
+/// and 0° to 60° for BeiDou, of which others take 13 h; of a state vector whether it is as far away as the
+/// system's orbits.
 fn plausible(set: &Ephemeris) -> bool {
+    if let Some(vector) = set.vector {
+        return (vector.position_m.norm() - set.sv.orbit_m()).abs() < ROUND_M;
+    }
     let (sqrt_a_sqrtm, inclinations_deg) = match set.sv.system {
         System::Galileo => (5440.6, 52.0..60.0),
         System::Navic => (6493.4, 0.0..33.0),
@@ -331,6 +341,9 @@ fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
 ///
 /// BeiDou's sets are those of an hour, and go on the air with it.
 fn first_sent(set: &Ephemeris) -> Epoch {
+    if let Some(from) = set.sent_from() {
+        return from;
+    }
     if set.sv.system == System::BeiDou {
         return set.toe;
     }

@@ -146,6 +146,8 @@ pub enum Kind {
     Whole,
     /// Two's complement.
     Signed,
+    /// A sign and a magnitude; a negative zero is read as zero.
+    Magnitude,
     /// Two's complement of semicircles (or semicircles a second); the value is in radians.
     Semicircles,
     /// The same for an angle that is meant modulo a turn: a value outside ±π is brought there first.
@@ -203,7 +205,11 @@ impl Field {
     /// Smallest and largest integer that it holds.
     pub fn range(&self) -> (i64, i64) {
         let span = 1_i64 << self.bits();
-        if self.is_signed() { (-span / 2, span / 2 - 1) } else { (0, span - 1) }
+        match self.kind {
+            Kind::Magnitude => (1 - span / 2, span / 2 - 1),
+            _ if self.is_signed() => (-span / 2, span / 2 - 1),
+            _ => (0, span - 1),
+        }
     }
 
     /// The scale's power of two.
@@ -224,12 +230,18 @@ impl Field {
     pub fn read<S: Store>(&self, data: &S) -> i64 {
         let raw = self.pieces.iter().fold(0_i64, |raw, piece| (raw << piece.1) | i64::from(data.piece(*piece)));
         let span = 1_i64 << self.bits();
-        if self.is_signed() && raw >= span / 2 { raw - span } else { raw }
+        match self.kind {
+            Kind::Magnitude if raw >= span / 2 => planted!("gnss.bits.magnitude", span / 2 - raw, raw - span),
+            _ if self.is_signed() && raw >= span / 2 => raw - span,
+            _ => raw,
+        }
     }
 
-    /// Puts the low bits of `raw` there.
+    /// Puts the low bits of `raw` there, or its sign and magnitude.
     pub fn write<S: Store>(&self, data: &mut S, raw: i64) {
         let mut left = self.bits();
+        let sign = 1_i64 << (left - 1);
+        let raw = if self.kind == Kind::Magnitude && raw < 0 { sign | -raw } else { raw };
         for piece in self.pieces {
             left -= u32::from(piece.1);
             data.set_piece(*piece, (raw >> left) as u32);

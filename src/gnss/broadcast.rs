@@ -1,4 +1,5 @@
-//! Broadcast orbits and clocks: Keplerian ephemerides and the user algorithm that turns them into states.
+//! Broadcast orbits and clocks: ephemerides and the user algorithms that turn them into states. Keplerian
+//! elements are here, a state vector that is integrated in `vector`.
 //!
 //! Source: IS-GPS-200N, 20.3.3.3.3.1 (clock), 20.3.3.4.3 (orbit, table 20-IV; velocity from its
 //! derivative, table 20-IV part 3). Limits: one set of elements describes an orbit to about 2 m
@@ -13,8 +14,10 @@ use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, WEEK_S};
 
 mod form;
+mod vector;
 
 pub use form::{PLAIN, SetForm, status_of_record};
+pub use vector::StateVector;
 
 /// A set of broadcast elements of one satellite, in SI units and radians.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,7 +49,7 @@ pub struct Ephemeris {
     pub l2_p_data_off: bool,
     /// Whether the curve fit is longer than four hours (IS-GPS-200N, 20.3.3.4.3.1).
     pub long_fit: bool,
-    /// Age of data offset, in its 900 s units; AODE of BeiDou.
+    /// Age of data offset, in its 900 s units; AODE of BeiDou; days of GLONASS.
     pub aodo: u8,
     /// Square root of the semi-major axis at the reference time, √m.
     pub sqrt_a_sqrtm: f64,
@@ -98,6 +101,8 @@ pub struct Ephemeris {
     pub isc_s: [f64; 4],
     /// Group delays of signals that have one of their own, by the signal's name; others follow from `tgd_s`.
     pub signal_delays_s: Vec<(&'static str, f64)>,
+    /// State and forces at the reference time, of messages without elements, whose own here are zero.
+    pub vector: Option<StateVector>,
 }
 
 /// Position and velocity in ECEF at one instant.
@@ -132,6 +137,14 @@ pub enum OrbitError {
         value: f64,
         /// What an orbit would have.
         expected: &'static str,
+    },
+    /// A state vector integrated further than it means anything.
+    #[error("{sv}: {since_s} s from the state vector's reference time: expected at most 86400 s")]
+    Far {
+        /// The satellite.
+        sv: Sv,
+        /// Seconds from the reference time.
+        since_s: f64,
     },
     /// Kepler's equation without a solution.
     #[error("{sv}: Kepler's equation did not converge for eccentricity {eccentricity}")]
@@ -272,6 +285,7 @@ impl Ephemeris {
             tgd2_s: 0.0,
             isc_s: [0.0; 4],
             signal_delays_s: Vec::new(),
+            vector: None,
         }
     }
 
@@ -286,7 +300,10 @@ impl Ephemeris {
     /// # Errors
     /// [`OrbitError`] for elements that describe no orbit. The age of the elements is not judged.
     pub fn state(&self, at: Epoch) -> Result<State, OrbitError> {
-        Ok(self.state_of(&self.anomaly(at)?))
+        match &self.vector {
+            Some(vector) => vector.state(self.sv, at.since(self.toe)),
+            None => Ok(self.state_of(&self.anomaly(at)?)),
+        }
     }
 
     /// [`Self::state`] and [`Self::clock_l1`] of the same instant, for one solution of Kepler's equation.
@@ -294,6 +311,9 @@ impl Ephemeris {
     /// # Errors
     /// As [`Self::state`].
     pub fn state_and_clock_l1(&self, at: Epoch) -> Result<(State, ClockState), OrbitError> {
+        if self.vector.is_some() {
+            return Ok((self.state(at)?, self.clock_l1(at)?));
+        }
         let anomaly = self.anomaly(at)?;
         let clock = self.clock_of(&anomaly, at);
         Ok((self.state_of(&anomaly), self.on_l1(clock)))
@@ -376,6 +396,13 @@ impl Ephemeris {
     /// # Errors
     /// [`OrbitError`] for elements that describe no orbit.
     pub fn clock(&self, at: Epoch) -> Result<ClockState, OrbitError> {
+        if self.vector.is_some() {
+            self.check_clock()?;
+            // Relativity is in the clock's own rate (GLONASS ICD L1, L2 5.1, 4.4, gamma).
+            let dt_s = at.since(self.toc);
+            let af1 = planted!("gnss.glonass.gamma", self.af1_sps, -self.af1_sps);
+            return Ok(ClockState { offset_s: self.af0_s + af1 * dt_s, drift: af1 });
+        }
         Ok(self.clock_of(&self.anomaly(at)?, at))
     }
 
@@ -448,13 +475,34 @@ impl Ephemeris {
         matches!(self.sv.system, System::Galileo | System::Navic | System::BeiDou)
     }
 
-    /// Curve fit interval around the reference time. Of Galileo, NavIC and BeiDou, whose documents have none,
+    /// What distinguishes an orbit from others, to the bit.
+    pub fn orbit_bits(&self) -> [u64; 5] {
+        let vector = self.vector.unwrap_or_default();
+        let of = |element: f64, own: f64| if self.vector.is_some() { own } else { element }.to_bits();
+        [
+            of(self.sqrt_a_sqrtm, vector.position_m.x),
+            of(self.m0_rad, vector.position_m.y),
+            of(self.omega0_rad, vector.position_m.z),
+            of(self.omega_rad, vector.velocity_mps.x),
+            of(self.eccentricity, vector.velocity_mps.y),
+        ]
+    }
+
+    /// When a set goes on the air whose fit interval is that in which it is sent, as of GLONASS; `None` where
+    /// the interval is longer.
+    pub fn sent_from(&self) -> Option<Epoch> {
+        self.vector.map(|_| self.toe.plus_s(-0.5 * self.fit_interval_s()))
+    }
+
+    /// Curve fit interval around the reference time; of a state vector the half hour in whose middle it is
+    /// (GLONASS ICD L1, L2 5.1, 4.4, P1). Of Galileo, NavIC and BeiDou, whose documents have none,
     /// eight hours: a set is used for four hours after its reference time.
     ///
     /// Of GPS four hours, or what the issue of data says when the fit flag is set
     /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).
     pub fn fit_interval_s(&self) -> f64 {
         let hours = match (self.long_fit, self.iodc) {
+            _ if self.vector.is_some() => 0.5,
             _ if self.is_sent_after_reference() => 8.0,
             (false, _) => 4.0,
             (true, 240..=247) => 8.0,
@@ -463,6 +511,16 @@ impl Ephemeris {
             (true, _) => 6.0,
         };
         hours * 3600.0
+    }
+
+    fn check_clock(&self) -> Result<(), OrbitError> {
+        let parameters = [("af0", self.af0_s), ("af1", self.af1_sps), ("tgd", self.tgd_s)];
+        match parameters.into_iter().find(|(_, value)| !value.is_finite()) {
+            Some((element, value)) => {
+                Err(OrbitError::Element { sv: self.sv, element, value, expected: "a finite number" })
+            }
+            None => Ok(()),
+        }
     }
 
     fn check(&self) -> Result<(), OrbitError> {
@@ -610,6 +668,7 @@ mod tests {
             delta_n_rate_radps2: 0.0,
             isc_s: [0.0; 4],
             signal_delays_s: Vec::new(),
+            vector: None,
         }
     }
 

@@ -34,6 +34,9 @@ pub struct Message {
     pub number: fn(Epoch) -> u8,
     /// Numbers of the units that say their time, and of those that make up a set of elements.
     pub timed: &'static [u8],
+    /// Numbers of the units all of which have to be read before one of those says its whole time; none where
+    /// each says it by itself.
+    pub dated: &'static [u8],
     /// Numbers of the units that make up a set of elements.
     pub set: &'static [u8],
     /// Numbers of the units each of which carries a set in short.
@@ -163,6 +166,9 @@ pub enum Read {
     Ionosphere(Coefficients),
     /// By how much the system's time is ahead of GPS time, whole seconds apart.
     AheadOfGps(TimePolynomial),
+    /// Which satellite sends, where it is another than the one that was assumed: of those that share code and
+    /// carrier nothing but the message tells them apart. All that follows is of this one.
+    Sender(Sv),
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
 }

@@ -34,6 +34,7 @@ pub mod exchange;
 pub mod facts;
 pub mod fec;
 pub mod galileo;
+pub mod glonass;
 pub mod gps;
 #[cfg(feature = "generator")]
 pub mod inflate;

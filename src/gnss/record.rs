@@ -512,6 +512,9 @@ pub enum Event {
     PhaseLocked,
     /// The edges of symbols are known.
     BitSynchronised,
+    /// The message says which satellite it is: what was recorded of the channel before, under the name of
+    /// another on the same carrier with the same code, is of this one.
+    Identified,
     /// The message's frame is known, and with it the time.
     FrameSynchronised,
     /// Elements in short came, which serve until the ephemeris is complete.

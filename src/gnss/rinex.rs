@@ -1,10 +1,10 @@
 //! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV, Galileo I/NAV (or F/NAV of satellites
-//! that have no I/NAV) and NavIC, the coefficients of these systems' ionosphere, times of GPS and Galileo
-//! against each other and UTC, and the leap seconds.
+//! that have no I/NAV), NavIC, BeiDou D1 or D2 and GLONASS, the coefficients of these systems' ionosphere,
+//! times of GPS and Galileo against each other and UTC, and the leap seconds.
 //!
-//! Source: RINEX 2.11, table A4; RINEX 3.05, tables A6, A8 and A18; RINEX 4.02. Lines and columns are read in
-//! `columns`; `elements` holds every element against the range of its field in the message. A record that
-//! fails is left out and named in [`Navigation::skipped`].
+//! Source: RINEX 2.11, tables A4 and A10; RINEX 3.05, tables A6, A8, A10 and A18; RINEX 4.02. Lines and
+//! columns are read in `columns`; `elements` holds every element against the range of its field in the
+//! message. A record that fails is left out and named in [`Navigation::skipped`].
 //!
 //! A reader of our own, held to the `rinex` crate's in the tests (`tests/witness/orbit.rs`): that crate
 //! (0.24) panics where a `LEAP SECONDS` line has no content, refuses a whole file for one foreign letter in
@@ -27,11 +27,11 @@ use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
 
-/// What a navigation file says about GPS, Galileo, NavIC and BeiDou.
+/// What a navigation file says about GPS, Galileo, NavIC, BeiDou and GLONASS.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Navigation {
-    /// Sets of GPS LNAV, Galileo I/NAV, NavIC and BeiDou D1 or D2 by satellite and time of clock; of a
-    /// Galileo satellite without any of I/NAV those of F/NAV.
+    /// Sets of GPS LNAV, Galileo I/NAV, NavIC, BeiDou D1 or D2 and GLONASS by satellite and time of clock; of
+    /// a Galileo satellite without any of I/NAV those of F/NAV.
     pub ephemerides: Vec<Ephemeris>,
     /// Coefficients of GPS's model of the ionosphere, where the header has them.
     pub klobuchar: Option<Klobuchar>,
@@ -95,7 +95,7 @@ pub enum NavigationError {
         detail: String,
     },
     /// No set of elements that can be used.
-    #[error("{name}: no usable ephemeris of GPS, Galileo, NavIC or BeiDou: found {found}")]
+    #[error("{name}: no usable ephemeris of GPS, Galileo, NavIC, BeiDou or GLONASS: found {found}")]
     Nothing {
         /// Name of the file.
         name: String,
@@ -286,7 +286,7 @@ fn check_first_line(text: &[u8], name: &str) -> Result<(), NavigationError> {
         return Err(NavigationError::NotRinex { name: name.to_owned(), found: line.trim_end().to_owned() });
     }
     match line.get(20..21) {
-        Some("N" | "n") => Ok(()),
+        Some("N" | "n" | columns::OLD_GLONASS) => Ok(()),
         found => {
             Err(NavigationError::NotNavigation { name: name.to_owned(), found: found.unwrap_or_default().to_owned() })
         }

@@ -24,39 +24,55 @@ pub struct Epoch {
 /// The time of a satellite system, by which its codes and messages run.
 ///
 /// An [`Epoch`] stays GPS time; what a system's clock shows is some whole seconds less by definition, and off
-/// by nanoseconds in truth.
+/// by nanoseconds in truth. In an inserted second a scale with leap seconds shows the second after it, twice.
 #[derive(Debug, PartialEq, Eq)]
 pub struct TimeScale {
     /// Name, such as GPST.
     pub name: &'static str,
-    /// Whole seconds by which it is behind GPS time.
+    /// Whole seconds by which it is behind GPS time, of a scale with leap seconds behind UTC.
     pub behind_gpst_s: i64,
+    /// Whether leap seconds are inserted in it, as in UTC.
+    pub has_leap_seconds: bool,
 }
 
 impl TimeScale {
     /// What this scale's clock shows at an instant, as an [`Epoch`] whose week and seconds are the scale's
     /// own.
     pub fn label(&self, at: Epoch) -> Epoch {
-        Epoch { seconds: at.seconds - self.behind_gpst_s, ..at }
+        Epoch { seconds: at.seconds - self.behind_s(at), ..at }
     }
 
     /// The instant at which this scale's clock shows `label`.
     pub fn instant(&self, label: Epoch) -> Epoch {
-        Epoch { seconds: label.seconds + self.behind_gpst_s, ..label }
+        let utc = label.seconds + self.behind_gpst_s;
+        let leap_s = if self.has_leap_seconds { Epoch::leap_seconds_of_label(utc) } else { 0 };
+        Epoch { seconds: utc + leap_s, ..label }
+    }
+
+    /// Whole seconds by which it is behind GPS time at an instant.
+    pub fn behind_s(&self, at: Epoch) -> i64 {
+        let leap_s = if self.has_leap_seconds { at.leap_seconds() } else { 0 };
+        self.behind_gpst_s + planted!("gnss.time.scale_leaps", leap_s, 0)
     }
 }
 
 /// GPS time (IS-GPS-200N, 3.3.4).
-pub static GPST: TimeScale = TimeScale { name: "GPST", behind_gpst_s: 0 };
+pub static GPST: TimeScale = TimeScale { name: "GPST", behind_gpst_s: 0, has_leap_seconds: false };
 
 /// Galileo system time: its weeks begin when those of GPS do (Galileo OS SIS ICD 2.1, 5.1.2).
-pub static GST: TimeScale = TimeScale { name: "GST", behind_gpst_s: 0 };
+pub static GST: TimeScale = TimeScale { name: "GST", behind_gpst_s: 0, has_leap_seconds: false };
 
 /// IRNSS network time: its weeks begin when those of GPS do (IRNSS SIS ICD for SPS 1.1, system time).
-pub static IRNSST: TimeScale = TimeScale { name: "IRNSST", behind_gpst_s: 0 };
+pub static IRNSST: TimeScale = TimeScale { name: "IRNSST", behind_gpst_s: 0, has_leap_seconds: false };
 
 /// BeiDou's time: UTC of 2006-01-01, when GPS time was 14 s ahead of it (BDS-SIS-ICD-B1I 3.0, 3.3).
-pub static BDT: TimeScale = TimeScale { name: "BDT", behind_gpst_s: 14 };
+pub static BDT: TimeScale = TimeScale { name: "BDT", behind_gpst_s: 14, has_leap_seconds: false };
+
+/// GLONASS time: three hours ahead of UTC(SU), leap seconds included (GLONASS ICD L1, L2 5.1, 3.3.3).
+pub static GLONASST: TimeScale = TimeScale { name: "GLONASST", behind_gpst_s: -10_800, has_leap_seconds: true };
+
+/// UTC, by which RINEX dates GLONASS.
+pub static UTC: TimeScale = TimeScale { name: "UTC", behind_gpst_s: 0, has_leap_seconds: true };
 
 /// How far one time is ahead of another, whole seconds apart: `a0 + a1 (t − reference)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -381,6 +397,26 @@ mod tests {
                 assert_eq!(Epoch::parse(text).unwrap(), at);
             }
         }
+    }
+
+    #[test]
+    fn a_scale_with_leap_seconds_shows_what_utc_does_three_hours_ahead() {
+        // Two days before, at, and two days after the leap second of IERS Bulletin C 52.
+        for (text, shown) in [
+            ("2016-12-30T12:00:00Z", "2016-12-30T15:00:00"),
+            ("2016-12-31T23:59:59Z", "2017-01-01T02:59:59"),
+            ("2017-01-01T00:00:00Z", "2017-01-01T03:00:00"),
+            ("2017-01-02T12:00:00Z", "2017-01-02T15:00:00"),
+        ] {
+            let (at, label) = (Epoch::parse(text).unwrap(), Epoch::parse(shown).unwrap());
+            assert_eq!((GLONASST.label(at), GLONASST.instant(label)), (label, at), "{text}");
+            assert_eq!(UTC.label(at).seconds() + 10_800, label.seconds());
+        }
+        // The inserted second has the label of the one after it.
+        let inserted = Epoch::parse("2016-12-31T23:59:60Z").unwrap();
+        assert_eq!(GLONASST.label(inserted), Epoch::parse("2017-01-01T03:00:00").unwrap());
+        let at = Epoch::parse("2020-11-29T12:50:00.25").unwrap();
+        assert_eq!((BDT.instant(BDT.label(at)), GLONASST.instant(GLONASST.label(at))), (at, at));
     }
 
     #[test]

@@ -45,6 +45,8 @@ pub enum News {
         /// By how much, at GPS time.
         ahead: TimePolynomial,
     },
+    /// The satellite that sends, where it is another than was assumed.
+    Sender(Sv),
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
 }
@@ -138,6 +140,7 @@ impl Decoder {
                     news.push(News::AheadOfGps { scale: self.time, ahead });
                 }
                 Read::Ionosphere(coefficients) => news.push(News::Ionosphere(coefficients)),
+                Read::Sender(sv) => news.push(News::Sender(sv)),
                 Read::Parameters(rows) => news.push(News::Parameters(rows)),
             }
         }

@@ -19,6 +19,16 @@ const BEIDOU_CODES: &str = "witness::beidou::all_chips_of_all_codes_are_those_of
 const BEIDOU_SETS: &str = "witness::beidou::real_sets_are_the_records_of_a_converter_and_are_sent_by_us_bit_by_bit";
 const BEIDOU_GEO: &str = "witness::beidou::a_real_geostationary_satellite_stands_over_the_equator";
 const BEIDOU_DELAY: &str = "witness::beidou::delays_by_geographic_latitude_are_those_of_another_program";
+const GLONASS_CODE: &str =
+    "witness::glonass::all_chips_of_the_code_are_those_of_another_program_and_all_satellites_have_it";
+const GLONASS_CHANNELS: &str = "witness::glonass::carriers_are_the_printed_ones_and_channels_those_of_real_records";
+const GLONASS_FIELDS: &str = "witness::glonass::every_field_of_the_strings_has_the_printed_place_sign_and_scale";
+const GLONASS_STRINGS: &str =
+    "witness::glonass::real_strings_keep_their_checks_through_our_coding_and_no_wrong_bit_passes";
+const GLONASS_SETS: &str = "witness::glonass::real_sets_are_the_records_of_a_converter_and_say_their_time_and_sender";
+const GLONASS_SENT: &str = "witness::glonass::strings_that_we_send_of_a_real_set_have_the_real_bits";
+const GLONASS_NEIGHBOURS: &str = "witness::glonass::neighbouring_sets_meet_half_way_to_what_uploads_step_by";
+const GLONASS_ORBITS: &str = "witness::glonass::broadcast_orbits_meet_those_of_code_and_clocks_too";
 const NAVIC: &str = "witness::navic::subframes_are_coded_interleaved_and_timed_as_printed";
 const NAVIC_CODES: &str = "witness::navic::all_chips_of_all_codes_are_those_of_another_program";
 const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_either_way_up_to_what_was_sent";
@@ -102,6 +112,22 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.fec.field", "the field of the Reed-Solomon code has another polynomial, sent and read", REDUNDANT),
     fault("gnss.fec.interleaver", "neighbouring symbols change places", CODED),
     fault("gnss.crc.polynomial", "the check has another polynomial, sent and read", CODED),
+    fault("gnss.glonass.output", "the code comes from the ninth stage", GLONASS_CODE),
+    fault("gnss.signal.channel", "channels count downwards", GLONASS_CHANNELS),
+    fault("gnss.bits.magnitude", "a magnitude with a sign is read as if less than its most", GLONASS_FIELDS),
+    fault("gnss.glonass.hamming", "a check is missing, sent and read", GLONASS_STRINGS),
+    fault("gnss.glonass.mark", "what comes upside down is taken for upright", GLONASS_SETS),
+    fault("gnss.glonass.frame_sent", "frames say the time of the next one", GLONASS_SENT),
+    fault("gnss.glonass.frame_read", "frames are read as the ones after them", GLONASS_SETS),
+    fault("gnss.glonass.day", "days of four years count from 0", GLONASS_SETS),
+    fault("gnss.glonass.tau_sent", "the clock is sent with its own sign", GLONASS_SENT),
+    fault("gnss.glonass.tau_read", "the clock is read with the sign that is sent", GLONASS_SETS),
+    fault("gnss.glonass.delta_tau", "G2 leaves the antenna before G1", DELAYS),
+    fault("gnss.glonass.gamma", "the clock's rate with the wrong sign, on both sides", DELAYS),
+    fault("gnss.glonass.rotation", "the axes of a state vector turn the other way, on both sides", GLONASS_ORBITS),
+    fault("gnss.glonass.zonal", "state vectors move about a round Earth, on both sides", GLONASS_ORBITS),
+    fault("gnss.glonass.pull", "Moon and Sun push, on both sides", GLONASS_NEIGHBOURS),
+    fault("gnss.time.scale_leaps", "a time with leap seconds has none", GLONASS_SETS),
     fault("gnss.orbit.crs", "C_rs with the wrong sign, on both sides", ORBITS),
     fault("gnss.orbit.cus", "C_uc in place of C_us, on both sides", ORBITS),
     fault("gnss.orbit.idot", "the inclination has no rate, on both sides", ORBITS),

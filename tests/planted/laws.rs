@@ -147,7 +147,8 @@ impl Ideal {
 }
 
 /// L1 C/A in a time of its own, behind GPS time by no whole second.
-static OTHER: Signal = Signal { name: "other", time: &TimeScale { name: "other", behind_gpst_s: 0 }, ..L1_CA };
+static OTHER: Signal =
+    Signal { name: "other", time: &TimeScale { name: "other", behind_gpst_s: 0, has_leap_seconds: false }, ..L1_CA };
 
 #[test]
 fn two_systems_whose_times_differ_give_one_place_and_a_clock_of_each() {

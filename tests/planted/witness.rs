@@ -17,6 +17,8 @@ mod codes;
 mod data;
 #[path = "../witness/fnav.rs"]
 mod fnav;
+#[path = "../witness/glonass.rs"]
+mod glonass;
 #[path = "../witness/inav.rs"]
 mod inav;
 #[path = "../witness/lnav.rs"]

@@ -256,6 +256,7 @@ fn example() -> Ephemeris {
         delta_n_rate_radps2: 0.0,
         isc_s: [0.0; 4],
         signal_delays_s: Vec::new(),
+        vector: None,
     }
 }
 

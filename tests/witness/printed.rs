@@ -5,10 +5,12 @@ use std::fmt::Debug;
 
 use gnss_twin::gnss::beidou::in_phase::{B1I, B2I, B3I};
 use gnss_twin::gnss::bits::Store;
-use gnss_twin::gnss::broadcast::Ephemeris;
+use gnss_twin::gnss::broadcast::{Ephemeris, StateVector};
 use gnss_twin::gnss::crc::crc24q;
 use gnss_twin::gnss::earth::{Geodetic, Look, look, rotate_earth};
 use gnss_twin::gnss::galileo::inav;
+use gnss_twin::gnss::glonass::fdma::{G1, G2};
+use gnss_twin::gnss::glonass::gnav::GNAV_SETS;
 use gnss_twin::gnss::gps::cnav::CNAV_SETS;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::gps::l2c::L2C;
@@ -387,5 +389,13 @@ fn clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print(
     // (2492.028/1176.45)² on L5.
     let navic = Ephemeris { tgd_s: 8e-9, ..blank(System::Navic) };
     close(of(&navic, &sps::S), -8e-9);
+    // GLONASS ICD L1, L2 5.1, 4.4: a satellite's time and tau less gamma times the age are the system's, and
+    // G2 leaves the antenna later by Δτ.
+    let vector = Some(StateVector::default());
+    let (form, toc) = (&GNAV_SETS, at.plus_s(-800.0));
+    let glonass = Ephemeris { form, toc, vector, af0_s: -3e-5, af1_sps: 4e-12, tgd_s: 5e-9, ..blank(System::Glonass) };
+    for (signal, later_s) in [(&G1, 0.0), (&G2, 5e-9)] {
+        close(of(&glonass, signal), -3e-5 + 4e-12 * 800.0 - later_s);
+    }
     assert!((of(&navic, &sps::L5) / -8e-9 - 4.487_029).abs() < 1e-6);
 }

@@ -26,9 +26,6 @@ pub struct Message {
     ionospheres: Vec<Coefficients>,
 }
 
-/// A parameter that every set has.
-const OF_EVERY_SET: &str = "sqrt_a_sqrtm";
-
 impl Message {
     /// Of a run's truth.
     pub fn of(run: &Run) -> Self {
@@ -85,7 +82,10 @@ impl Message {
 /// wrote them down. A set that it read again after a loss comes before a new one.
 fn read(run: &Run, (sv, name): (Sv, &str)) -> Vec<(u64, u32)> {
     let mut issues: Vec<u32> = Vec::new();
-    let own = |row: &&NavigationRow| row.sv == sv && row.message == name && row.parameter == OF_EVERY_SET;
+    // One that every set has.
+    let of_message = messages(run, sv).find(|(message, _)| message.name == name);
+    let of_sets = of_message.and_then(|(message, _)| (message.set_parameters)().first().copied()).unwrap_or("");
+    let own = |row: &&NavigationRow| row.sv == sv && row.message == name && row.parameter == of_sets;
     for row in run.navigation.iter().filter(own) {
         if !issues.contains(&row.issue) {
             issues.push(row.issue);

@@ -87,6 +87,9 @@ pub struct Run {
     pub interference: Vec<InterferenceRow>,
     /// What the first spoofer claims; empty without one.
     pub claimed: Vec<TrajectoryRow>,
+    /// Signals that a search cannot tell from one of the truth, on the same carrier with the same code, by
+    /// whose name they count: until its message says who a satellite is, a receiver takes either name.
+    pub alike: BTreeMap<Link, Sv>,
     /// The receiver's observations.
     pub observations: SpillStore<Link, Observation>,
     /// The receiver's fixes.
@@ -115,6 +118,21 @@ pub struct Run {
     pub speed: Speed,
 }
 
+/// [`Run::alike`] of the truth's signals: of those that are not among them.
+fn alike(truth: &[Link]) -> BTreeMap<Link, Sv> {
+    let mut found = BTreeMap::new();
+    for own in truth.iter().filter(|own| own.channel().is_some()) {
+        let others = own.signal.satellites().map(|sv| own.signal.link(sv));
+        let absent = others.filter(|other| other.is_alike(*own) && !truth.contains(other));
+        found.extend(absent.map(|other| (other, own.sv)));
+    }
+    found
+}
+
+fn named(alike: &BTreeMap<Link, Sv>, link: Link) -> Sv {
+    alike.get(&link).copied().unwrap_or(link.sv)
+}
+
 const TRUTH: &str = "the generator writes it: make the run again with `gnss-twin run`, or `gnss-twin generate`";
 /// Of a receiver that does not name its own.
 const USUAL_SPACING_CHIPS: f64 = 0.5;
@@ -141,10 +159,13 @@ impl Run {
         read.claimed = optional(&truth.join("claimed.csv"))?;
         read.observations = observations(&rx.join("observations.csv"), RECEIVER, run, |_| ())?;
         read.fixes = dated(&rx.join("fixes.csv"), RECEIVER, |row: &Fix| row.gps_s)?;
+        read.alike = alike(&read.truth.keys().collect::<Vec<_>>());
         read.acquisition = rows(&rx.join("acquisition.csv"), RECEIVER)?;
+        read.acquisition.iter_mut().for_each(|row| row.sv = named(&read.alike, row.link()));
         let mut updates = Counts::default();
         each(&rx.join("tracking.csv"), RECEIVER, |_, row: TrackingRow| {
             updates.add(row.integration_s);
+            let row = TrackingRow { sv: named(&read.alike, row.link()), ..row };
             read.tracking.push(row.link(), &row)
         })?;
         read.update_s = updates.median();
@@ -154,6 +175,7 @@ impl Run {
         }
         read.navigation = rows(&rx.join("navigation.csv"), RECEIVER)?;
         read.events = rows(&rx.join("events.csv"), RECEIVER)?;
+        read.events.iter_mut().for_each(|row| row.sv = named(&read.alike, row.link()));
         read.lines = match rows(&rx.join("interference.csv"), RECEIVER) {
             Err(JudgeError::Missing { .. }) => None,
             other => Some(other?),
@@ -242,6 +264,7 @@ impl Run {
             truth_navigation: Vec::new(),
             interference: optional(&truth.join("interference.csv"))?,
             claimed: Vec::new(),
+            alike: BTreeMap::new(),
             observations: SpillStore::new(directory),
             fixes: Vec::new(),
             acquisition: Vec::new(),

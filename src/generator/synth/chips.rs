@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{Epoch, TimeScale};
 
 use super::{CODE_BITS, CODE_ONE};
 
@@ -28,8 +28,8 @@ pub struct Pace {
     /// The fewest whole seconds that are whole periods, and those periods.
     cycle_s: i64,
     cycle_periods: i64,
-    /// Whole seconds by which the system's time is behind GPS time.
-    behind_s: i64,
+    /// The time of the signal's system.
+    time: &'static TimeScale,
 }
 
 /// One sequence of ±1 of a satellite, ready to be cut into strips.
@@ -72,10 +72,10 @@ impl CodeTime {
 }
 
 impl Pace {
-    /// `steps` in a period at `step_rate_hz`, in a time `behind_s` behind GPS time. `None` for a rate that is
+    /// `steps` in a period at `step_rate_hz`, by the time of the signal's system. `None` for a rate that is
     /// not of whole thousandths of a hertz, or whose periods fill no whole seconds below 2^63 thousandths of
     /// a step.
-    pub fn new(steps: usize, step_rate_hz: f64, behind_s: i64) -> Option<Self> {
+    pub fn new(steps: usize, step_rate_hz: f64, time: &'static TimeScale) -> Option<Self> {
         let steps = u32::try_from(steps).ok().filter(|&steps| steps > 0)?;
         let exact_mhz = step_rate_hz * 1000.0;
         // Products of printed rates with small integers are rounded by an ulp or two.
@@ -88,7 +88,7 @@ impl Pace {
         let shared = greatest_common_divisor(per_period, step_rate_mhz);
         let (cycle_s, cycle_periods) = (per_period / shared, step_rate_mhz / shared);
         cycle_s.checked_mul(step_rate_mhz)?;
-        Some(Self { steps, step_rate_mhz, cycle_s, cycle_periods, behind_s })
+        Some(Self { steps, step_rate_mhz, cycle_s, cycle_periods, time })
     }
 
     /// Steps a second by the satellite's clock.
@@ -101,7 +101,7 @@ impl Pace {
     /// Whole seconds are turned into steps as integers; the fraction of a second resolves 1e-16 of its steps.
     pub fn at(&self, received: Epoch, delay_s: f64) -> CodeTime {
         let sent = received.plus_s(-delay_s);
-        let seconds = sent.seconds() - self.behind_s;
+        let seconds = sent.seconds() - self.time.behind_s(sent);
         // A period is `steps` · 1000 thousandths, and a cycle whole periods in whole seconds.
         let per_period = i64::from(self.steps) * 1000;
         // Most codes have whole periods in each second: no division then, of which a run would pay several.
@@ -229,6 +229,8 @@ mod tests {
     use super::*;
     use crate::generator::synth::waveform::plain;
     use crate::gnss::gps::l1ca::{self, L1_CA};
+    use crate::gnss::signal::synthetic::OWN_TIME;
+    use crate::gnss::time::GPST;
 
     #[test]
     fn a_strip_holds_each_chip_with_the_data_of_its_period() {
@@ -263,7 +265,7 @@ mod tests {
     #[test]
     fn periods_that_do_not_divide_a_second_are_counted_in_the_system_s_time() {
         // 1 534 500 steps in 1.5 s, in a time three seconds behind.
-        let pace = Pace::new(1_534_500, 1.023e6, 3).unwrap();
+        let pace = Pace::new(1_534_500, 1.023e6, &OWN_TIME).unwrap();
         assert_eq!((pace.cycle_s, pace.cycle_periods), (3, 2));
         for (seconds, fraction, period, steps) in [
             (3, 0.0, 0, 0.0),
@@ -278,7 +280,7 @@ mod tests {
             assert_eq!((at.period, at.steps()), (period, steps), "{seconds} {fraction}");
         }
         // A third of a thousandth of a hertz cannot be counted, nor can no steps.
-        assert_eq!(Pace::new(1023, 1.023e6 + 1.0 / 3000.0, 0), None);
-        assert_eq!(Pace::new(0, 1.023e6, 0), None);
+        assert_eq!(Pace::new(1023, 1.023e6 + 1.0 / 3000.0, &GPST), None);
+        assert_eq!(Pace::new(0, 1.023e6, &GPST), None);
     }
 }

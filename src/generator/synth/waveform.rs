@@ -142,7 +142,7 @@ impl Waveform {
         for layer in layers {
             let steps_hz = steps_hz(layer);
             let steps = self.steps(layer, layer.pulse.len());
-            let pace = Pace::new(steps.len(), steps_hz, self.link.signal.time.behind_gpst_s).ok_or_else(|| {
+            let pace = Pace::new(steps.len(), steps_hz, self.link.signal.time).ok_or_else(|| {
                 let found = format!("{} steps at {steps_hz} Hz", steps.len());
                 self.refuse("code", found, "a rate of whole thousandths of a hertz, whose periods fill whole seconds")
             })?;

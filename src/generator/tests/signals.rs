@@ -37,7 +37,7 @@ static LAYERED: Signal = Signal {
     name: "three layers",
     rinex: "1X",
     system: System::BeiDou,
-    time: &TimeScale { name: "layered", behind_gpst_s: 14 },
+    time: &TimeScale { name: "layered", behind_gpst_s: 14, has_leap_seconds: false },
     constellation: [1, 63],
     carrier: Carrier::Common(1_561.098e6),
     sent: always,

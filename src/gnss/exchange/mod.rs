@@ -4,8 +4,8 @@
 //! Source: RINEX 3.05, tables A2 to A8 (navigation) and A2, A3 (observations), section 5.2; RINEX 4.02,
 //! section 5.4 and tables A9 to A36, whose observations are those of 3.05 and whose navigation messages have
 //! a line of their own before each. The `rinex` crate writes columns as well, but holds a whole file in
-//! memory; observations of a day at 10 Hz are gigabytes. Limits: GPS, Galileo, NavIC and BeiDou, and of
-//! navigation what a message's `rinex` names; no date of the run stands in the header, since the same run
+//! memory; observations of a day at 10 Hz are gigabytes. Limits: GPS, Galileo, NavIC, BeiDou and GLONASS, and
+//! of navigation what a message's `rinex` names; no date of the run stands in the header, since the same run
 //! gives the same bytes at any time.
 
 mod navigation;

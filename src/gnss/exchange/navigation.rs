@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
 use super::{Version, calendar, header_line, opening};
-use crate::gnss::broadcast::{Ephemeris, status_of_record};
+use crate::gnss::broadcast::{Ephemeris, StateVector, status_of_record};
 use crate::gnss::ionosphere::Coefficients;
 use crate::gnss::message::{Message, Records};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{BDT, Epoch, TimeScale};
+use crate::gnss::time::{BDT, Epoch, TimeScale, UTC};
 
 /// Continuous GPS week of week 0 of BDT.
 const BDT_WEEK: i64 = 1356;
@@ -91,7 +91,8 @@ impl NavigationSets {
             let set = set.map(|set| set.timed(|label| time.instant(label)));
             if let Some(set) = set.filter(|set| known.insert((*sv, *issue, set.form.name))) {
                 text += &heading(version, records, *sv);
-                text += &record(&set);
+                let own = signals.iter().find(|signal| signal.system == sv.system);
+                text += &record(&set, own.and_then(|signal| signal.link(*sv).channel()));
             }
         }
         writer.write_all(text.as_bytes()).and_then(|()| writer.flush())
@@ -159,8 +160,41 @@ fn exponent(value: f64, digits: usize) -> String {
     format!("{mantissa}E{}{:02}", if exponent < 0 { '-' } else { '+' }, exponent.abs())
 }
 
+/// A set that is a state vector: a line with the clock, one of each axis and one with the rest (RINEX 3.05,
+/// table A10); times are UTC's.
+fn vector_record(set: &Ephemeris, vector: &StateVector, channel: Option<i8>) -> String {
+    let unhealthy = |bit: u16| f64::from(set.health >> bit & 1);
+    let channel = channel.map_or(0.0, f64::from);
+    let axis = |of: usize, last: f64| {
+        let axes = [vector.position_m, vector.velocity_mps, vector.acceleration_mps2];
+        let [place, speed, pull] = axes.map(|axis| axis.get(of).map_or(0.0, |metres| 1e-3 * metres));
+        [place, speed, pull, last]
+    };
+    let lines = [
+        axis(0, unhealthy(2)),
+        axis(1, channel),
+        axis(2, f64::from(set.aodo)),
+        [0.0, set.tgd_s, f64::from(set.ura_index), unhealthy(3)],
+    ];
+    let [year, month, day, hour, minute, second] = calendar(UTC.label(set.toc));
+    let clock = values(&[set.af0_s, set.af1_sps, UTC.label(set.transmitted).tow_s()]);
+    let mut text = format!("{} {year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}{clock}\n", set.sv);
+    for line in lines {
+        text += &format!("    {}\n", values(&line));
+    }
+    text
+}
+
+/// Fields of a record.
+fn values(values: &[f64]) -> String {
+    values.iter().map(|value| format!("{:>19}", exponent(*value, 12))).collect()
+}
+
 /// A set: a line with the clock, seven with the rest (RINEX 3.05, tables A6, A8, A14 and A18).
-fn record(set: &Ephemeris) -> String {
+fn record(set: &Ephemeris, channel: Option<i8>) -> String {
+    if let Some(vector) = &set.vector {
+        return vector_record(set, vector, channel);
+    }
     // BeiDou's records are in its own time.
     let own_time = set.sv.system == System::BeiDou;
     let set = &if own_time { set.clone().timed(|at| BDT.label(at)) } else { set.clone() };
@@ -194,8 +228,6 @@ fn record(set: &Ephemeris) -> String {
         sixth,
         [transmitted_s, after, 0.0, 0.0],
     ];
-    let values =
-        |values: &[f64]| values.iter().map(|value| format!("{:>19}", exponent(*value, 12))).collect::<String>();
     let [year, month, day, hour, minute, second] = calendar(set.toc);
     let clock = values(&[set.af0_s, set.af1_sps, set.af2_sps2]);
     let mut text = format!("{} {year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}{clock}\n", set.sv);
@@ -236,6 +268,8 @@ mod tests {
     use crate::gnss::galileo::e5::{E5A, E5B};
     use crate::gnss::galileo::fnav::FNAV;
     use crate::gnss::galileo::inav::{INAV, INAV_E5B};
+    use crate::gnss::glonass::fdma::channel;
+    use crate::gnss::glonass::gnav::GNAV;
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::gps::lnav::LNAV;
     use crate::gnss::klobuchar::Klobuchar;
@@ -249,6 +283,11 @@ mod tests {
     /// What RINEX rounds to twelve digits after the first.
     fn near(a: f64, b: f64) -> bool {
         (a - b).abs() <= 1e-12 * b.abs()
+    }
+
+    /// Kilometres of a number of metres as they are printed.
+    fn near_km(metres: f64) -> f64 {
+        exponent(1e-3 * metres, 12).parse().unwrap()
     }
 
     /// A file as the crate of that name reads it.
@@ -273,11 +312,15 @@ mod tests {
                 System::Galileo => INAV.rinex,
                 System::Navic => SPS_NAV.rinex,
                 System::BeiDou => D1_D2.rinex,
+                System::Glonass => GNAV.rinex,
                 _ => LNAV.rinex,
             };
             let title = heading(version, records.unwrap(), set.sv);
             let end = header_line("", "END OF HEADER");
-            let text = opening(version, "N: GNSS NAV DATA", &[set.sv.system], set.toe) + &end + &title + &record(&set);
+            let text = opening(version, "N: GNSS NAV DATA", &[set.sv.system], set.toe)
+                + &end
+                + &title
+                + &record(&set, channel(set.sv.number).filter(|_| set.vector.is_some()));
             let read = rinex::read(text.as_bytes(), "own").unwrap_or_else(|error| panic!("{error}\n{text}"));
             let [back] = read.ephemerides.as_slice() else { panic!("{:?}\n{text}", read.skipped) };
             assert_eq!(back.form, set.form);
@@ -287,7 +330,9 @@ mod tests {
                 let orbit = [e.sqrt_a_sqrtm, e.eccentricity, e.m0_rad, e.delta_n_radps, e.omega0_rad, e.omega_rad];
                 let rates = [e.omega_dot_radps, e.i0_rad, e.idot_radps, e.cuc_rad, e.cus_rad, e.crc_m, e.crs_m];
                 let rest = [e.cic_rad, e.cis_rad, e.af0_s, e.af1_sps, e.af2_sps2, e.tgd_s, e.tgd2_s];
-                [&orbit[..], &rates, &rest].concat()
+                let axes = e.vector.map(|of| [of.position_m, of.velocity_mps, of.acceleration_mps2]);
+                let vector = axes.iter().flatten().flat_map(|axis| axis.iter().copied());
+                [&orbit[..], &rates, &rest].concat().into_iter().chain(vector).collect::<Vec<f64>>()
             };
             assert!(values(back).iter().zip(values(&set)).all(|(a, b)| near(*a, b)), "{back:?}\n{set:?}");
             // Another program's reader finds the same elements of the same satellite and message.
@@ -298,6 +343,13 @@ mod tests {
             if version == Version::Four {
                 assert_eq!(key.msgtype.to_string(), title.trim_end().rsplit(' ').next().unwrap_or(""), "{text}");
             }
+            if let Some(vector) = set.vector {
+                let place = ["satPosX", "satPosY", "satPosZ"].map(|name| frame.get_orbit_f64(name).unwrap());
+                assert_eq!(place, [0, 1, 2].map(|axis| near_km(vector.position_m[axis])), "{text}");
+                assert_eq!((frame.clock_bias, frame.clock_drift), (set.af0_s, set.af1_sps), "{text}");
+                *count.entry(title).or_insert(0) += 1;
+                continue;
+            }
             let names = ["sqrta", "e", "m0", "deltaN", "omega0", "omega", "omegaDot", "i0", "idot", "cuc", "cus"];
             let rest = ["crc", "crs", "cic", "cis"];
             let found: Vec<f64> = names.iter().chain(&rest).filter_map(|name| frame.get_orbit_f64(name)).collect();
@@ -307,7 +359,7 @@ mod tests {
         }
         let of = |version: &str| count.keys().filter(|title| title.contains(version)).count();
         assert!(count[""] > 100, "{count:?}");
-        let per_message = [" LNAV", " INAV", " FNAV", " D1", " D2"].map(of);
+        let per_message = [" LNAV", " INAV", " FNAV", " D1", " D2", " FDMA"].map(of);
         assert!(per_message.iter().all(|satellites| *satellites > 0) && of("> EPH I") > 3, "{count:?}");
     }
 

@@ -8,9 +8,11 @@ use super::{Version, calendar, header_line, opening};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::Observation;
 use crate::gnss::satellite::{Sv, System};
-use crate::gnss::signal::{Link, Signal};
+use crate::gnss::signal::{Carrier, Link, Signal};
 use crate::gnss::time::Epoch;
 
+/// Satellites with their channels on a line of the header.
+const CHANNELS_ON_A_LINE: usize = 8;
 /// Observation types on a line of the header.
 const TYPES_ON_A_LINE: usize = 13;
 /// Largest value that `F14.3` holds.
@@ -160,6 +162,7 @@ impl<W: Write> ObservationFile<W> {
             &format!("{year:6}{month:6}{day:6}{hour:6}{minute:6}{second:5}.{ticks:07}     GPS"),
             "TIME OF FIRST OBS",
         );
+        text += &channels(&self.signals, self.version);
         // Carriers of the signals' own: none is shifted against another. RINEX 4 asks for no such line.
         for signal in self.signals.iter().filter(|_| self.version == Version::Three) {
             let one = format!("{} L{}", signal.system.letter(), signal.rinex);
@@ -169,6 +172,25 @@ impl<W: Write> ObservationFile<W> {
         self.begun = true;
         self.writer.write_all(text.as_bytes())
     }
+}
+
+/// Lines for satellites that divide a band: the channel of each, and by how much codes are aligned with
+/// carriers, which here they are (RINEX 3.05, table A2; RINEX 4 does not ask for the latter).
+fn channels(signals: &[&'static Signal], version: Version) -> String {
+    let own = |signal: &&&'static Signal| matches!(signal.carrier, Carrier::Channels { .. });
+    let Some(first) = signals.iter().find(own) else { return String::new() };
+    let all: Vec<(Sv, i8)> = first.satellites().filter_map(|sv| Some((sv, first.link(sv).channel()?))).collect();
+    let mut text = String::new();
+    for (index, some) in all.chunks(CHANNELS_ON_A_LINE).enumerate() {
+        let count = if index == 0 { format!("{:3} ", all.len()) } else { " ".repeat(4) };
+        let each: String = some.iter().map(|(sv, channel)| format!("{sv} {channel:2} ")).collect();
+        text += &header_line(&(count + &each), "GLONASS SLOT / FRQ #");
+    }
+    if version == Version::Three {
+        let each: String = signals.iter().filter(own).map(|signal| format!(" C{} {:8.3}", signal.rinex, 0.0)).collect();
+        text += &header_line(&each, "GLONASS COD/PHS/BIS");
+    }
+    text
 }
 
 /// Code, carrier, Doppler and C/N0 of a signal, each in 16 columns with its flags.

@@ -1,16 +1,17 @@
 //! A navigation file as lines and columns: the header's lines that are used, and records of GPS LNAV, Galileo
 //! I/NAV and F/NAV, NavIC and BeiDou D1 and D2, eight lines with a number or nothing in each field of 19
-//! columns.
+//! columns, and of GLONASS, four lines or, since 3.05, five.
 //!
-//! Source: RINEX 2.11, tables A3 and A4; RINEX 3.05, tables A5, A6, A8 and A18; RINEX 4.02, tables A9, A13
-//! and A33, and those of NavIC. Where a line is missing, doubled or cut, or text is beside the fields, what
-//! follows would be read into the wrong elements; so such a record is left out and named with its line and
-//! column, and so is whatever cannot be recognised as of another system. Records of other systems and
-//! messages are counted and not read.
+//! Source: RINEX 2.11, tables A3, A4, A10 and A11; RINEX 3.05, tables A5, A6, A8, A10 and A18; RINEX 4.02,
+//! tables A9, A13 and A33, and those of NavIC and GLONASS. Where a line is missing, doubled or cut, or text is
+//! beside the fields, what follows would be read into the wrong elements; so such a record is left out and
+//! named with its line and column, and so is whatever cannot be recognised as of another system. Records of
+//! other systems and messages are counted and not read.
 
 mod corrections;
 mod numbers;
 
+use crate::gnss::glonass::fdma::SLOTS;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::Epoch;
@@ -19,6 +20,8 @@ use numbers::{digits, fields, numbers};
 
 /// Lines of a record: satellite, epoch and clock, then seven lines of the orbit.
 const LINES: usize = 8;
+/// The same of GLONASS: without and with the line of later versions.
+const LINES_OF_GLONASS: std::ops::RangeInclusive<usize> = 4..=5;
 const FIELD: usize = 19;
 /// Width of a coefficient in the header, whose lines end in a label from this column on.
 const HEADER_FIELD: usize = 12;
@@ -39,9 +42,36 @@ const OF_GALILEO: [&str; FIELDS - FIRST.len()] =
 const OF_NAVIC: [&str; FIELDS - FIRST.len()] = ["", "week", "", "accuracy", "health", "tgd", "", "t_tm", "", "", ""];
 const OF_BEIDOU: [&str; FIELDS - FIRST.len()] =
     ["", "week", "", "accuracy", "health", "tgd1", "tgd2", "t_tm", "aodc", "", ""];
+/// Fields of a record of GLONASS, of the last line as it has been since 3.05.
+const OF_GLONASS: [&str; 19] = [
+    "af0",
+    "af1",
+    "t_tm",
+    "x",
+    "vx",
+    "ax",
+    "health",
+    "y",
+    "vy",
+    "ay",
+    "channel",
+    "z",
+    "vz",
+    "az",
+    "age",
+    "status",
+    "deltaTau",
+    "accuracyIndex",
+    "healthFlags",
+];
 /// Systems whose records are read, with the largest number of their satellites.
-const READ: [(char, System, u8); 4] =
-    [('G', System::Gps, 32), ('E', System::Galileo, 36), ('I', System::Navic, 14), ('C', System::BeiDou, 63)];
+const READ: [(char, System, u8); 5] = [
+    ('G', System::Gps, 32),
+    ('R', System::Glonass, SLOTS),
+    ('E', System::Galileo, 36),
+    ('I', System::Navic, 14),
+    ('C', System::BeiDou, 63),
+];
 /// Bits of an I/NAV record's sources: sent on E1-B or E5b, sent on E5a (F/NAV), and a clock of E5b and E1.
 const SENT_INAV: u32 = 0b101;
 const SENT_FNAV: u32 = 0b010;
@@ -73,6 +103,8 @@ const LABELS: [&str; 21] = [
     "END OF HEADER",
 ];
 
+/// Type of a file of version 2 with records of GLONASS.
+pub(super) const OLD_GLONASS: &str = "G";
 /// Kinds of time offsets: GPS time against UTC, and Galileo's against GPS time with its name of older
 /// versions.
 const UTC: &str = "GPUT";
@@ -90,13 +122,14 @@ const MESSAGES: [(char, &[&str]); 7] = [
     ('S', &["SBAS"]),
 ];
 
-/// A record of GPS LNAV, Galileo I/NAV or F/NAV or NavIC in form.
+/// A record in form.
 pub(super) struct Record {
     /// Whether it is one of F/NAV.
     pub is_fnav: bool,
     /// Number of its first line.
     pub line: usize,
     pub sv: Sv,
+    /// As written, in the time by which the system's records are dated.
     pub toc: Epoch,
     values: [Option<f64>; FIELDS],
 }
@@ -104,6 +137,10 @@ pub(super) struct Record {
 impl Record {
     /// A field by its name; `None` if it is blank.
     pub fn get(&self, name: &str) -> Option<f64> {
+        if self.sv.system == System::Glonass {
+            let at = OF_GLONASS.iter().position(|field| *field == name)?;
+            return self.values.get(at).copied().flatten();
+        }
         let rest = match self.sv.system {
             System::Galileo => OF_GALILEO,
             System::Navic => OF_NAVIC,
@@ -179,7 +216,10 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     let version = version.ok_or_else(|| format!("line 1, column 1: version '{written}'"))?;
     let form = Form {
         version: version as u8,
-        system: first.get(40..41).and_then(|letter| letter.chars().next()).unwrap_or(' '),
+        system: match first.get(20..21) {
+            Some(OLD_GLONASS) if version < 3.0 => 'R',
+            _ => first.get(40..41).and_then(|letter| letter.chars().next()).unwrap_or(' '),
+        },
         cut: (!text.ends_with(b"\n")).then_some(all.len()),
     };
     let mut contents = Contents::default();
@@ -241,9 +281,16 @@ enum Group {
     Other,
 }
 
+/// Whether it is a satellite of GLONASS beyond the constellation's slots, under trial or in reserve, whose
+/// channel is not known.
+fn is_spare(satellite: &str) -> bool {
+    let number = satellite.strip_prefix('R').and_then(|number| number.parse::<u8>().ok());
+    number.is_some_and(|number| number > SLOTS)
+}
+
 struct Form {
     version: u8,
-    /// Of version 3 and later: the only one in the file, or `M` for several.
+    /// The only one in the file, or `M` for several; of version 2 `R` for GLONASS.
     system: char,
     /// The number of a last line that has no end, and may be cut inside a number.
     cut: Option<usize>,
@@ -361,7 +408,7 @@ impl Form {
             ));
         }
         if self.version == 3 {
-            if !READ.iter().any(|(read, ..)| *read == letter) {
+            if !READ.iter().any(|(read, ..)| *read == letter) || is_spare(satellite) {
                 return Ok(Group::Other);
             }
             let record = self.record(group)?;
@@ -376,8 +423,8 @@ impl Form {
             ("EPH", message) if !messages.contains(&message) => {
                 refuse(&format!("message '{message}': expected {}", messages.join(" or ")))
             }
-            ("EPH", message @ ("LNAV" | "INAV" | "FNAV" | "D1" | "D2"))
-                if READ.iter().any(|(read, ..)| *read == letter) =>
+            ("EPH", message @ ("LNAV" | "INAV" | "FNAV" | "D1" | "D2" | "FDMA"))
+                if READ.iter().any(|(read, ..)| *read == letter) && !is_spare(satellite) =>
             {
                 let rest = group.get(1..).unwrap_or_default();
                 if rest.first().is_none_or(|(_, line)| line.get(..3) != Some(satellite)) {
@@ -402,8 +449,17 @@ impl Form {
         let (first, title) = record.first().copied().unwrap_or_default();
         let label: String = title.chars().take(23).collect();
         let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", label.trim_end()));
-        if record.len() != LINES {
-            return refuse(first, format!("a record of {} lines: expected {LINES}", record.len()));
+        // Version 2 leaves the letter of the only system out.
+        let read = READ.iter().find(|(letter, ..)| {
+            title.starts_with(*letter) || (self.version < 3 && self.system == 'R' && *letter == 'R')
+        });
+        let (system, most) = read.map_or((System::Gps, 32), |(_, system, most)| (*system, *most));
+        let (is_whole, expected) = match system {
+            System::Glonass => (LINES_OF_GLONASS.contains(&record.len()), "4 or 5".to_owned()),
+            _ => (record.len() == LINES, LINES.to_string()),
+        };
+        if !is_whole {
+            return refuse(first, format!("a record of {} lines: expected {expected}", record.len()));
         }
         let mut values = Vec::with_capacity(FIELDS);
         for (row, &(number, line)) in record.iter().enumerate() {
@@ -420,11 +476,8 @@ impl Form {
                 Err(reason) => return refuse(number, reason),
             }
         }
-        // Version 2 leaves the letter of the only system out.
         let letter = usize::from(self.version > 2 || title.starts_with('G'));
         let number = title.get(letter..margin - usize::from(letter == 0 || self.version > 2)).unwrap_or("");
-        let read = READ.iter().find(|(letter, ..)| title.starts_with(*letter));
-        let (system, most) = read.map_or((System::Gps, 32), |(_, system, most)| (*system, *most));
         let Some(number) = digits::<u8>(number.trim()).filter(|number| (1..=most).contains(number)) else {
             return refuse(first, format!("column {}: PRN '{}': expected 1 to {most}", letter + 1, number.trim()));
         };
@@ -438,6 +491,7 @@ impl Form {
                 format!("column {}: '{}': expected an epoch from 1980 to 2180", margin + 1, date.trim()),
             );
         };
+        values.resize(FIELDS, None);
         let Ok(values) = values.try_into() else { return refuse(first, "expected 31 fields".to_owned()) };
         Ok(Record { is_fnav: false, line: first, sv: Sv { system, number }, toc, values })
     }

@@ -4,14 +4,18 @@
 //! Source: IS-GPS-200N, tables 20-I and 20-III; Galileo OS SIS ICD 2.1, tables 57, 62 and 64; IRNSS SIS ICD
 //! for SPS 1.1, subframes 1 and 2; RINEX 3.05, table A18; RINEX 4.02, tables A9 and A13.
 
+use nalgebra::Vector3;
+
 use super::columns::Record;
 use crate::gnss::beidou::d1d2::{BDT_WEEK, issue};
-use crate::gnss::broadcast::{Ephemeris, status_of_record};
+use crate::gnss::broadcast::{Ephemeris, StateVector, status_of_record};
 use crate::gnss::galileo::fnav::FNAV_SETS;
 use crate::gnss::galileo::inav::{INAV_SETS, sisa_index};
+use crate::gnss::glonass::fdma::channel;
+use crate::gnss::glonass::gnav::GNAV_SETS;
 use crate::gnss::gps::lnav::LNAV_SETS;
 use crate::gnss::satellite::System;
-use crate::gnss::time::{BDT, Epoch, WEEK_S};
+use crate::gnss::time::{BDT, Epoch, GLONASST, UTC, WEEK_S};
 
 /// An element that must be there and lie within its range, in SI units.
 fn field(record: &Record, key: &'static str, least: f64, most: f64) -> Result<f64, String> {
@@ -33,6 +37,9 @@ fn whole(record: &Record, key: &'static str, most: u32) -> Result<u32, String> {
 /// # Errors
 /// The element that is missing or out of its range.
 pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
+    if record.sv.system == System::Glonass {
+        return glonass(record);
+    }
     // Fields that both messages have in the same units and lengths; RINEX rounds to twelve digits.
     const ANGLE_RAD: f64 = 2.0 * std::f64::consts::TAU;
     const HARMONIC_RAD: f64 = 6.104e-5;
@@ -101,6 +108,51 @@ fn beidou(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
         tgd_s: both("tgd1", 5.121e-8)?,
         tgd2_s: both("tgd2", 5.121e-8)?,
         ..common
+    })
+}
+
+/// A set of GLONASS: a state vector (GLONASS ICD L1, L2 5.1, table 4.5; RINEX 3.05, table A10). Its epoch is
+/// the reference time, in UTC.
+fn glonass(record: &Record) -> Result<Ephemeris, String> {
+    const DAY_S: f64 = 86_400.0;
+    let both = |name, most: f64| field(record, name, -most, most);
+    let three = |names: [&'static str; 3], most: f64| -> Result<Vector3<f64>, String> {
+        let [x, y, z] = names;
+        Ok(Vector3::new(both(x, most)?, both(y, most)?, both(z, most)?) * 1000.0)
+    };
+    let own = channel(record.sv.number);
+    let channel = both("channel", 24.0)?;
+    if own.map(f64::from) != Some(channel) {
+        let own = own.map_or("none".to_owned(), |own| own.to_string());
+        return Err(format!("channel = {channel}: expected {own}, the one that this program knows for the slot"));
+    }
+    let toe = UTC.instant(record.toc);
+    // The beginning of the frame, by the second of the day, or since version 3 of the week.
+    let late_s = field(record, "t_tm", 0.0, WEEK_S as f64)? - record.toc.seconds().rem_euclid(DAY_S as i64) as f64;
+    let late_s = late_s - (late_s / DAY_S).round() * DAY_S;
+    let quarter = (GLONASST.label(toe).seconds().rem_euclid(DAY_S as i64) / 900) as u16;
+    let vector = StateVector {
+        position_m: three(["x", "y", "z"], 32_768.0)?,
+        velocity_mps: three(["vx", "vy", "vz"], 8.0)?,
+        acceleration_mps2: three(["ax", "ay", "az"], 1.4e-8)?,
+    };
+    // Not known to earlier versions, and to receivers of one band.
+    let later_s = record.get("deltaTau").filter(|seconds| seconds.abs() < 1e-6).unwrap_or(0.0);
+    let accuracy = record.get("accuracyIndex").filter(|index| (0.0..15.0).contains(index)).unwrap_or(15.0);
+    let unhealthy = record.get("healthFlags").map_or(0, |flags| flags as u16 & 1);
+    Ok(Ephemeris {
+        form: &GNAV_SETS,
+        transmitted: toe.plus_s(late_s),
+        iode: quarter,
+        iodc: quarter,
+        ura_index: accuracy as u8,
+        health: if field(record, "health", 0.0, 7.0)? == 0.0 { 0 } else { 0b100 } | unhealthy << 3,
+        aodo: whole(record, "age", 31)? as u8,
+        af0_s: both("af0", 1.954e-3)?,
+        af1_sps: both("af1", 9.32e-10)?,
+        tgd_s: later_s,
+        vector: Some(vector),
+        ..Ephemeris::blank(record.sv, toe)
     })
 }
 

@@ -17,7 +17,7 @@ use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::message::Message;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::{Epoch, TimeScale};
-use crate::gnss::{beidou, galileo, gps, navic};
+use crate::gnss::{beidou, galileo, glonass, gps, navic};
 
 mod shape;
 #[cfg(any(test, feature = "planted"))]
@@ -26,7 +26,7 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 11] = [
+pub static SIGNALS: [&Signal; 13] = [
     &gps::l1ca::L1_CA,
     &gps::l2c::L2C,
     &gps::l5::L5,
@@ -38,6 +38,8 @@ pub static SIGNALS: [&Signal; 11] = [
     &beidou::in_phase::B1I,
     &beidou::in_phase::B2I,
     &beidou::in_phase::B3I,
+    &glonass::fdma::G1,
+    &glonass::fdma::G2,
 ];
 
 /// Signals that [`register`] has added. Names in files have to find them, so they are the program's, not a
@@ -212,7 +214,8 @@ impl Signal {
         match self.carrier {
             Carrier::Common(hz) => hz,
             Carrier::Channels { centre_hz, step_hz, channel } => {
-                centre_hz + step_hz * f64::from(channel(sv.number).unwrap_or(0))
+                let channel = f64::from(channel(sv.number).unwrap_or(0));
+                centre_hz + step_hz * planted!("gnss.signal.channel", channel, -channel)
             }
         }
     }
@@ -292,6 +295,24 @@ impl Link {
     /// Carrier frequency.
     pub fn carrier_hz(self) -> f64 {
         self.signal.carrier_hz(self.sv)
+    }
+
+    /// Channel of its carrier, where satellites divide the band.
+    pub fn channel(self) -> Option<i8> {
+        match self.signal.carrier {
+            Carrier::Common(_) => None,
+            Carrier::Channels { channel, .. } => channel(self.sv.number),
+        }
+    }
+
+    /// Whether another satellite's signal is the same but for its message: one signal, carrier and code.
+    pub fn is_alike(self, other: Self) -> bool {
+        let same = |component: &Component| {
+            let of = |sv: Sv| ((component.code)(sv.number), component.overlay.of(sv.number));
+            of(self.sv) == of(other.sv)
+        };
+        let on_one_channel = self.channel().is_some() && self.channel() == other.channel();
+        self == other || self.signal == other.signal && on_one_channel && self.signal.components.iter().all(same)
     }
 
     /// Whether a satellite of the constellation sends it, not another transmitter that borrows its code.

@@ -13,7 +13,7 @@ use crate::gnss::time::{GPST, TimeScale};
 pub static SYNTHETIC: [&Signal; 5] = [&LONG_BOC, &QUADRATURE, &CHANNELS, &MULTIPLEXED, &MIXED];
 
 /// Three seconds behind GPS time.
-pub static OWN_TIME: TimeScale = TimeScale { name: "synthetic", behind_gpst_s: 3 };
+pub static OWN_TIME: TimeScale = TimeScale { name: "synthetic", behind_gpst_s: 3, has_leap_seconds: false };
 
 /// Two components with codes of 4 ms in BOC(1,1), one with a coded message of a symbol a period and the other
 /// with an overlay of 25 chips, in a time of its own.

@@ -131,7 +131,7 @@ fn range(
 ) -> Option<Range> {
     let sent = observation.sent();
     let half_s = match ephemeris.long_fit {
-        _ if ephemeris.is_sent_after_reference() => 0.5 * ephemeris.fit_interval_s(),
+        _ if ephemeris.is_sent_after_reference() || ephemeris.sent_from().is_some() => 0.5 * ephemeris.fit_interval_s(),
         true => HALF_LONG_FIT_S,
         false => HALF_FIT_S,
     } + FIT_GRACE_S;

@@ -26,8 +26,6 @@ impl Session {
 
     /// Two satellites never send the same orbit: the weaker is the other's cross-correlation.
     fn drop_echoes(&mut self) {
-        let content =
-            |e: &Ephemeris| [e.sqrt_a_sqrtm, e.m0_rad, e.omega0_rad, e.omega_rad, e.eccentricity].map(f64::to_bits);
         let ephemerides = &mut self.shared.ephemerides;
         let mut tracks: Vec<&mut Track> =
             self.front_ends.iter_mut().flat_map(|front_end| front_end.tracks.iter_mut()).collect();
@@ -36,7 +34,7 @@ impl Session {
             .enumerate()
             .filter_map(|(index, track)| {
                 let ephemeris = ephemerides.of(track.channel.sv()).first()?;
-                Some((index, track.channel.sv(), track.cn0_dbhz, content(ephemeris)))
+                Some((index, track.channel.sv(), track.cn0_dbhz, ephemeris.orbit_bits()))
             })
             .collect();
         for (place, a) in known.iter().enumerate() {
@@ -59,7 +57,7 @@ impl FrontEnd {
         let sink = &mut Counted { sink, step: self.step, ticks: &[] };
         for track in &mut self.tracks {
             let near = shared.near();
-            let (sv, signal) = (track.channel.sv(), track.channel.signal());
+            let (mut sv, signal) = (track.channel.sv(), track.channel.signal());
             let Some(decoder) = &mut track.decoder else { continue };
             let slipped = track.report.events.iter().any(|(_, event)| *event == Event::CycleSlip);
             let mut all = Vec::new();
@@ -92,6 +90,13 @@ impl FrontEnd {
                         (before != Some(sent)).then_some(Event::IonosphereDecoded)
                     }
                     News::Ionosphere(_) => None,
+                    News::Sender(other) => {
+                        // Another of those that are alike was found: what follows is of it.
+                        shared.rename(sv, other);
+                        track.channel.rename(other);
+                        sv = other;
+                        Some(Event::Identified)
+                    }
                     News::Parameters(rows) => {
                         sink.take(Record::Navigation(rows))?;
                         None

@@ -6,8 +6,9 @@ use super::gap::Watched;
 use super::predict::Near;
 use super::shared::Shared;
 use super::step::Counted;
-use super::{FrontEnd, Track, WRONG_TIME_FIXES, Window};
+use super::{FrontEnd, Track, WRONG_TIME_FIXES, Window, suited};
 use crate::gnss::record::{AcquisitionRow, Event, EventRow};
+use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 use crate::receiver::acquire::{self, AcquireError, Acquired};
 use crate::receiver::decode::Decoder;
@@ -59,10 +60,10 @@ impl FrontEnd {
         }
         // Satellites that are followed are searched for too: without them their cross-correlation
         // would pass for others.
-        let all_found =
-            self.candidates.iter().all(|link| self.tracks.iter().any(|track| track.channel.link() == *link));
-        if !all_found {
-            let results = self.searcher.search(&window.block(), &self.candidates)?;
+        let sought = suited::distinct(&self.candidates);
+        let is_followed = |link: &Link| self.tracks.iter().any(|track| track.channel.link().is_alike(*link));
+        if !sought.iter().all(is_followed) {
+            let results = self.searcher.search(&window.block(), &sought)?;
             self.look(&results, end, shared);
             self.start_channels(results, block.first, shared, sink)?;
         }
@@ -98,7 +99,8 @@ impl FrontEnd {
         let Some(settings) = acquire::shortened(&self.metadata, &self.settings.acquisition, have)? else {
             return Ok(());
         };
-        let results = acquire::search(&self.metadata, &window.block(), &self.candidates, &settings)?;
+        let sought = suited::distinct(&self.candidates);
+        let results = acquire::search(&self.metadata, &window.block(), &sought, &settings)?;
         self.start_channels(results, window.first, shared, sink)?;
         self.searched = true;
         Ok(())
@@ -114,8 +116,12 @@ impl FrontEnd {
     ) -> Result<(), ReceiveError> {
         let followed: BTreeSet<Link> = self.tracks.iter().map(|track| track.channel.link()).collect();
         for (row, hit) in results {
+            let sv = self.likeliest(row.link(), shared);
+            let (row, hit) = (AcquisitionRow { sv, ..row }, hit.map(|hit| Acquired { sv, ..hit }));
             let key = row.link();
-            if followed.contains(&key) || self.refused.contains_key(&key) {
+            // What is alike cannot be told apart by a search.
+            let is_followed = followed.iter().any(|other| other.is_alike(key));
+            if is_followed || self.refused.contains_key(&key) {
                 continue;
             }
             if shared.strongest.is_none_or(|(_, best, threshold)| row.statistic * threshold > best * row.threshold) {
@@ -154,6 +160,17 @@ impl FrontEnd {
         }
         self.tracks.sort_by_key(|track| track.channel.link());
         Ok(())
+    }
+
+    /// Whose signal it is that was found, of satellites that a search cannot tell apart: of one whose elements
+    /// are known, or else, until its message says more, of the one that was searched for.
+    fn likeliest(&self, found: Link, shared: &Shared) -> Sv {
+        let is_known = |link: &&Link| !shared.ephemerides.of(link.sv).is_empty();
+        let alike = |link: &&Link| found.channel().is_some() && link.is_alike(found);
+        if is_known(&&found) {
+            return found.sv;
+        }
+        self.candidates.iter().filter(alike).find(is_known).map_or(found.sv, |link| link.sv)
     }
 
     fn plan_search(&mut self, now: u64) {

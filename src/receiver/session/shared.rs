@@ -98,6 +98,15 @@ impl Shared {
         self.noises.iter().find(|(of, _)| *of == signal).map(|(_, noise)| noise)
     }
 
+    /// What was found as one satellite is another.
+    pub fn rename(&mut self, from: Sv, to: Sv) {
+        self.acquired.remove(&from);
+        self.acquired.insert(to);
+        if let Some(progress) = self.progress.remove(&from) {
+            self.progress.insert(to, progress);
+        }
+    }
+
     /// The time near which weeks are resolved.
     pub fn near(&self) -> Epoch {
         self.timebase.clock().map(|clock| clock.start).or(self.start).unwrap_or(self.week_reference)

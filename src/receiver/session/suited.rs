@@ -65,6 +65,17 @@ pub(super) fn candidates(metadata: &IfMetadata, settings: &AcquisitionSettings) 
         .collect()
 }
 
+/// Of those that a search cannot tell apart the first.
+pub(super) fn distinct(candidates: &[Link]) -> Vec<Link> {
+    let mut all: Vec<Link> = Vec::with_capacity(candidates.len());
+    for link in candidates {
+        if !all.iter().any(|other| other.is_alike(*link)) {
+            all.push(*link);
+        }
+    }
+    all
+}
+
 /// Which signals each of several front ends receives: every signal in the first whose band holds its main
 /// lobes, or else its carrier. Samples that hold none are searched all the same, the first front end's for
 /// the first signal: that nothing is found has a diagnosis.

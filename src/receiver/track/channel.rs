@@ -273,6 +273,12 @@ impl Channel {
         self.lost
     }
 
+    /// From here on it follows `sv`, whose carrier and code are those of the satellite that was searched for.
+    pub fn rename(&mut self, sv: Sv) {
+        self.sv = sv;
+        self.hit.sv = sv;
+    }
+
     /// The satellite that is followed.
     pub fn sv(&self) -> Sv {
         self.sv

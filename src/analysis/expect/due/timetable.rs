@@ -45,14 +45,21 @@ impl Timetable {
 
     /// When a channel locked since `locked_s` knows where units begin, and their time.
     pub fn frame_by_s(&self, locked_s: f64) -> f64 {
-        self.whole_by_s(locked_s, |message, start| message.timed.contains(&(message.number)(start))) + HEADER_S
+        let one_s = self.whole_by_s(locked_s, |message, start| message.timed.contains(&(message.number)(start)));
+        let dated = self.message.map_or(&[][..], |message| message.dated);
+        self.all_by_s(dated, locked_s).max(one_s) + HEADER_S
+    }
+
+    /// When the last of some units has arrived whole, each the first of its number.
+    fn all_by_s(&self, numbers: &[u8], locked_s: f64) -> f64 {
+        let whole = |number: &u8| self.whole_by_s(locked_s, |message, start| (message.number)(start) == *number);
+        numbers.iter().map(whole).fold(0.0, f64::max)
     }
 
     /// When every unit of a set of elements has arrived whole.
     pub fn ephemeris_by_s(&self, locked_s: f64) -> f64 {
         let Some(message) = self.message else { return f64::INFINITY };
-        let whole = |number: &u8| self.whole_by_s(locked_s, |message, start| (message.number)(start) == *number);
-        message.set.iter().map(whole).fold(0.0, f64::max)
+        self.all_by_s(message.set, locked_s)
     }
 
     /// When a set in short has arrived whole; never, where the message has none.

@@ -129,7 +129,13 @@ fn counts(run: &Run) -> Result<Option<Found>, JudgeError> {
     };
     let acquired: BTreeSet<String> =
         run.acquisition.iter().filter(|row| row.acquired).map(|row| row.sv.to_string()).collect();
-    if names("acquired").is_some_and(|stated| stated != acquired) {
+    // Of what a search cannot tell apart, either name is right.
+    let either = |name: &String| {
+        let alike = run.alike.iter().find(|(link, _)| link.sv.to_string() == *name);
+        alike.map_or_else(|| name.clone(), |(_, sv)| sv.to_string())
+    };
+    let stated = names("acquired").map(|stated| stated.iter().map(either).collect::<BTreeSet<_>>());
+    if stated.is_some_and(|stated| stated != acquired) {
         found.add(|| "acquired".to_owned());
     }
     let known: HashMap<String, ()> = (run.events.iter())

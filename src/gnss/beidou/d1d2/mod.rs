@@ -37,6 +37,7 @@ pub static D1_D2: Message = Message {
     sender: |common| Ok(Box::new(Frames { klobuchar: common.klobuchar_beidou })),
     number: |_| 1,
     timed: &[1],
+    dated: &[],
     set: &[1],
     reduced: &[],
     ionosphere: IonosphereForm {

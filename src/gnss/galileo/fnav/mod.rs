@@ -39,6 +39,7 @@ pub static FNAV: Message = Message {
     sender: |common| Ok(Box::new(Pages { common: common.clone() })),
     number: page_at,
     timed: &PAGES_OF_SET,
+    dated: &[],
     set: &PAGES_OF_SET,
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| page_at(start) == 1, coefficients: ionosphere },

@@ -22,6 +22,7 @@ pub static INAV_E5B: Message = Message {
     sender: |common| Ok(Box::new(Pages { common: common.clone(), carrier: &ON_E5B })),
     number: word_at,
     timed: &[SPARE, 5, 6],
+    dated: &[],
     set: &[1, 2, 3, 4, 5],
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| word_at(start) == 5, coefficients: ionosphere },

@@ -48,6 +48,7 @@ pub static INAV: Message = Message {
     sender: |common| Ok(Box::new(Pages { common: common.clone(), carrier: &ON_E1B })),
     number: word_at,
     timed: &[SPARE, 5, 6],
+    dated: &[],
     set: &[1, 2, 3, 4, 5],
     reduced: &[REDUCED],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| word_at(start) == 5, coefficients: ionosphere },

@@ -39,6 +39,7 @@ pub static CNAV: Message = Message {
     sender: |common| Ok(Box::new(Messages { common: common.clone(), message: &CNAV })),
     number: |start| type_at(&CNAV, start),
     timed: &ORDER,
+    dated: &[],
     set: &[10, 11, 30],
     reduced: &[],
     ionosphere: IonosphereForm {

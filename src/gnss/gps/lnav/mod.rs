@@ -47,6 +47,7 @@ pub static LNAV: Message = Message {
     sender: |common| Ok(Box::new(Broadcast::of(common)?)),
     number: subframe_at,
     timed: &[1, 2, 3, 4, 5],
+    dated: &[],
     set: &[1, 2, 3],
     reduced: &[],
     ionosphere: IonosphereForm {

@@ -37,6 +37,7 @@ pub static SPS_NAV: Message = Message {
     sender: |common| Ok(Box::new(Subframes { common: common.clone() })),
     number: subframe_at,
     timed: &[1, 2, 3, 4],
+    dated: &[],
     set: &[1, 2],
     reduced: &[],
     ionosphere: IonosphereForm {

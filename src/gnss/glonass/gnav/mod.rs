@@ -1,0 +1,314 @@
+//! The message of GLONASS with frequency division: strings of two seconds, encoded and decoded.
+//!
+//! Source: GLONASS ICD L1, L2 5.1, sections 3.3.2.2 (what modulates the carrier) and 4. A string is 85 bits
+//! of 20 ms, the last eight a Hamming code's, and a time mark of 30 chips of 10 ms; fifteen strings are a
+//! frame, which begins at whole half minutes of GLONASS time. Bits are coded relative to the one before, and
+//! multiplied with a meander: each is a chip of 10 ms and its opposite. A symbol here is such a chip. Strings
+//! 1 to 4 carry a set: a state vector at a quarter of an hour, to whose middle half hour the set belongs, and
+//! the clock; string 5 has the date's four years. A set is numbered by that quarter.
+//!
+//! The document's time mark has one sign against the meander, and what is received the other way up is seen
+//! by it; bits do not depend on it.
+//!
+//! Limits: strings 6 to 15, almanacs, are empty but for their numbers. GLONASS time is sent as UTC(SU) and as
+//! GPS time, whole seconds apart. A failed check is not corrected. Sets that refer to midnight are read
+//! within half a day of when they were sent.
+
+mod fields;
+mod reader;
+
+use crate::gnss::bits::{Element, FieldError, Store, add_to, bits_of, integers, quantise_all, read_all, write_all};
+use crate::gnss::broadcast::{Ephemeris, SetForm};
+use crate::gnss::ionosphere::Model;
+use crate::gnss::message::{IonosphereForm, Message, Records, Sender};
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+pub use fields::{GlonassString, STRING_BITS, tables};
+use fields::{STRING_1, STRING_2, STRING_3, STRING_4, STRING_5, SystemTime, date, midnight};
+pub use reader::GnavReader;
+
+/// The message as signals name it.
+pub static GNAV: Message = Message {
+    name: "GNAV",
+    symbol_s: 0.01,
+    unit_s: STRING_S,
+    first_s: 0,
+    sender: |_| Ok(Box::new(Strings)),
+    number: string_at,
+    timed: &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15],
+    dated: &[1, 4, 5],
+    set: &[1, 2, 3, 4, 5],
+    reduced: &[],
+    // It says nothing of it.
+    ionosphere: IonosphereForm { model: Model::Klobuchar, unit: |_| false, coefficients: |_| None },
+    set_parameters: || of_set().into_iter().flatten().map(|element| element.field.name).collect(),
+    elements: of_integers,
+    parameters: |symbols| {
+        let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
+        let string = decode_soft(&soft)?;
+        let found = parameters(&string);
+        (!found.is_empty()).then(|| (id(&string) <= 4, found))
+    },
+    reader: |sv| Box::new(GnavReader::new(sv)),
+    form: Ephemeris::clone,
+    sets: &GNAV_SETS,
+    quantised,
+    adjustable,
+    alert: None,
+    adjust,
+    rinex: Some(Records { set: |_| "FDMA", ionosphere: "" }),
+};
+
+/// What clock and health of a set mean: the clock is that of G1, and G2 leaves the antenna later by a
+/// parameter (4.4, Δτ). Health is the first bit of B and the flag l; the other bits of B are not the user's.
+pub static GNAV_SETS: SetForm = SetForm {
+    name: "GNAV",
+    group_delay_s: |set, signal| {
+        let later_s = planted!("gnss.glonass.delta_tau", set.tgd_s, -set.tgd_s);
+        if signal.centre_hz() < BETWEEN_HZ { later_s } else { 0.0 }
+    },
+    serves: |_| true,
+    given_delay_s: |_| 0.0,
+    is_healthy,
+    healthy: |set, _| Some(is_healthy(set)),
+    rinex_sources: None,
+};
+
+/// A frequency between G1 and G2.
+const BETWEEN_HZ: f64 = 1.4e9;
+/// Bits of [`Ephemeris::health`] that the user regards.
+const UNHEALTHY: u16 = 0b1100;
+/// Seconds of a string and of a frame, and strings of it.
+const STRING_S: i64 = 2;
+const FRAME_S: i64 = 30;
+const STRINGS: u64 = 15;
+/// Symbols of a string, of them those of the bits.
+const STRING_SYMBOLS: usize = 200;
+const DATA_SYMBOLS: usize = 2 * STRING_BITS;
+/// The time mark (3.3.2.2): a shortened pseudorandom sequence.
+const MARK: u32 = 0b11_1110_0011_0111_0101_0000_1001_0110;
+const MARK_SYMBOLS: usize = 30;
+/// Bits before the checks, and checks.
+const DATA_BITS: usize = 77;
+const CHECKS: usize = 8;
+/// Places of what is in no table: number of the string, interval between sets, time of the frame's beginning
+/// (hours, minutes, half minutes), whether the reference time is odd, satellites of an almanac's frame, kind
+/// of satellite, day, slot.
+const ID: (u16, u8) = (1, 4);
+const INTERVAL: (u16, u8) = (7, 2);
+const TIME: [(u16, u8); 3] = [(9, 5), (14, 6), (20, 1)];
+const ODD: (u16, u8) = (8, 1);
+const FIVE: (u16, u8) = (5, 1);
+const KIND: (u16, u8) = (75, 2);
+const DAY: (u16, u8) = (59, 11);
+const SLOT: (u16, u8) = (70, 5);
+/// Thirty minutes between sets, five satellites, a GLONASS-M satellite.
+const HALF_AN_HOUR: u32 = 1;
+const MODERNISED: u32 = 1;
+
+fn is_healthy(set: &Ephemeris) -> bool {
+    set.health & UNHEALTHY == 0
+}
+
+/// Number of the string that begins at a time.
+fn string_at(start: Epoch) -> u8 {
+    (start.seconds().rem_euclid(FRAME_S) / STRING_S + 1) as u8
+}
+
+/// Number of a string by what it says.
+pub fn id(string: &GlonassString) -> u8 {
+    string.piece(ID) as u8
+}
+
+/// Makes the strings of satellites.
+struct Strings;
+
+impl Sender for Strings {
+    fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        if start.seconds() % STRING_S != 0 || start.fraction() != 0.0 {
+            let expected = "an even second of GLONASS time";
+            return Err(FieldError::Start { message: GNAV.name, start_s: start.tow_s(), expected });
+        }
+        let mut string = GlonassString::default();
+        let number = string_at(start);
+        let frame = Epoch::new(start.seconds() - i64::from(number - 1) * STRING_S, 0.0);
+        match number {
+            1 => {
+                write_all(&STRING_1, ephemeris, &mut string)?;
+                string.set_piece(INTERVAL, HALF_AN_HOUR);
+                let half_minutes = frame.seconds().rem_euclid(86_400) / FRAME_S;
+                let half_minutes = planted!("gnss.glonass.frame_sent", half_minutes, half_minutes + 1);
+                let parts = [half_minutes / 120, half_minutes / 2 % 60, half_minutes % 2];
+                TIME.into_iter().zip(parts).for_each(|(place, part)| string.set_piece(place, part as u32));
+            }
+            2 => {
+                write_all(&STRING_2, ephemeris, &mut string)?;
+                string.set_piece(ODD, u32::from(ephemeris.toe.seconds().rem_euclid(1800) >= 900));
+            }
+            3 => {
+                write_all(&STRING_3, ephemeris, &mut string)?;
+                string.set_piece(FIVE, 1);
+            }
+            4 => {
+                check(ephemeris)?;
+                write_all(&STRING_4, ephemeris, &mut string)?;
+                string.set_piece(DAY, date(frame).1 as u32);
+                string.set_piece(KIND, MODERNISED);
+            }
+            5 => {
+                let system = SystemTime { four_years: date(frame).0 as f64, ..SystemTime::default() };
+                write_all(&STRING_5, &system, &mut string)?;
+            }
+            _ => {}
+        }
+        string.set_piece(ID, u32::from(number));
+        Ok(encode(&string))
+    }
+}
+
+/// Position of a bit of the data, counted from the first sent, in the Hamming code (4.7): those of the
+/// document's bits 9 to 85 are the numbers from 3 on that are no powers of two.
+fn positions() -> impl Iterator<Item = u32> {
+    let mut all: Vec<u32> = (3_u32..).filter(|place| !place.is_power_of_two()).take(DATA_BITS).collect();
+    all.reverse();
+    all.into_iter()
+}
+
+/// The eight checks of a string's data, the document's bit 8 first.
+fn checks(string: &GlonassString) -> [bool; CHECKS] {
+    let (mut sums, mut all) = (0_u32, false);
+    for (bit, position) in string.0.iter().zip(positions()) {
+        if *bit {
+            sums ^= planted!("gnss.glonass.hamming", position, position & 0b11_1111);
+            all = !all;
+        }
+    }
+    let whole = all ^ (sums.count_ones() % 2 == 1);
+    let mut checks = [whole; CHECKS];
+    let own = checks.iter_mut().skip(1).zip((0..7).rev());
+    own.for_each(|(check, bit)| *check = sums >> bit & 1 == 1);
+    checks
+}
+
+/// The symbols of a string, with its checks and the time mark.
+pub fn encode(string: &GlonassString) -> Vec<bool> {
+    let data = string.0.iter().take(DATA_BITS).copied();
+    let mut coded = false;
+    let mut symbols = Vec::with_capacity(STRING_SYMBOLS);
+    for bit in data.chain(checks(string)) {
+        coded ^= bit;
+        symbols.extend([coded, !coded]);
+    }
+    symbols.extend(bits_of(u128::from(MARK), MARK_SYMBOLS));
+    symbols
+}
+
+/// The string in soft symbols, either way up, its mark among them; `None` where its checks fail.
+pub fn decode_soft(symbols: &[f32]) -> Option<GlonassString> {
+    let mut string = GlonassString::default();
+    let mut before = None;
+    for (place, pair) in string.0.iter_mut().zip(symbols.get(..DATA_SYMBOLS)?.chunks_exact(2)) {
+        let [one, opposite] = pair else { return None };
+        let coded = one - opposite < 0.0;
+        // The first bit is an idle one, zero.
+        *place = before.is_some_and(|before| before != coded);
+        before = Some(coded);
+    }
+    let sent = string.0.get(DATA_BITS..)?;
+    (checks(&string) == sent && (1..=STRINGS as u8).contains(&id(&string))).then_some(string)
+}
+
+/// The raw integers of all parameters of a string; none for those that are not read.
+pub fn parameters(string: &GlonassString) -> Vec<(&'static str, i64)> {
+    match id(string) {
+        1 => integers(&STRING_1, string),
+        2 => integers(&STRING_2, string),
+        3 => integers(&STRING_3, string),
+        4 => integers(&STRING_4, string),
+        5 => integers(&STRING_5, string),
+        _ => Vec::new(),
+    }
+}
+
+fn of_set() -> [&'static [Element<Ephemeris>]; 4] {
+    [&STRING_1, &STRING_2, &STRING_3, &STRING_4]
+}
+
+/// The elements that raw integers give, as if they had been sent at `near`.
+fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option<Ephemeris> {
+    let mut found = Ephemeris { form: &GNAV_SETS, ..Ephemeris::blank(sv, near) };
+    for table in of_set() {
+        let mut string = GlonassString::default();
+        for field in table.iter().map(|element| &element.field) {
+            field.write(&mut string, raw(field.name)?);
+        }
+        read_all(table, &string, &mut found);
+    }
+    Some(found)
+}
+
+/// The elements in strings 1 to 4, of which the first was sent at `sent`.
+pub fn elements(sv: Sv, strings: [&GlonassString; 4], sent: Epoch) -> Ephemeris {
+    let mut found = Ephemeris { form: &GNAV_SETS, ..Ephemeris::blank(sv, sent) };
+    for (table, string) in of_set().into_iter().zip(strings) {
+        read_all(table, string, &mut found);
+    }
+    // The day is that of sending, and midnight may be between.
+    let days = (sent.since(found.toe) / 86_400.0).round();
+    let toe = found.toe.plus_s(days * 86_400.0);
+    Ephemeris { toe, toc: toe, ..found }
+}
+
+/// When the frame began of which these are strings 1, 4 and 5; `None` for a time or date that is none.
+pub fn frame_began(one: &GlonassString, four: &GlonassString, five: &GlonassString) -> Option<Epoch> {
+    let [hours, minutes, halves] = TIME.map(|place| i64::from(one.piece(place)));
+    let four_years = integers(&STRING_5, five).into_iter().find(|(name, _)| *name == "four_years")?.1;
+    let day = i64::from(four.piece(DAY));
+    let exists = hours < 24 && minutes < 60 && four_years > 0 && (1..=1461).contains(&day);
+    let half_minutes = planted!("gnss.glonass.frame_read", halves, halves + 1);
+    let of_day_s = hours * 3600 + minutes * 60 + half_minutes * FRAME_S;
+    exists.then(|| Epoch::new(midnight((four_years, day)).seconds() + of_day_s, 0.0))
+}
+
+/// Slot by string 4.
+pub fn slot(four: &GlonassString) -> u8 {
+    four.piece(SLOT) as u8
+}
+
+/// One reference time is sent for orbit and clock.
+fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
+    if ephemeris.toe == ephemeris.toc {
+        Ok(())
+    } else {
+        Err(FieldError::References { toe_s: ephemeris.toe.tow_s(), toc_s: ephemeris.toc.tow_s() })
+    }
+}
+
+/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+///
+/// # Errors
+/// A value that the message cannot carry.
+pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+    check(ephemeris)?;
+    let mut sent = ephemeris.clone();
+    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut sent))?;
+    Ok(sent)
+}
+
+/// Parameters by which sets and senders are distinguished, and the health, which has a fault of its own.
+const FIXED_PARAMETERS: [&str; 5] = ["health", "tb_quarters", "unhealthy", "day", "slot"];
+
+fn adjustable() -> Vec<&'static str> {
+    let names = of_set().into_iter().flatten().map(|element| element.field.name);
+    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
+}
+
+/// Adds `by` to a parameter of strings 1 to 4 in the unit of the tables; whether there is one.
+pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+    of_set().into_iter().any(|table| add_to(table, parameter, ephemeris, by))
+}
+
+/// How many of the last symbols of a string are those of the time mark.
+fn alike(mark: impl Iterator<Item = f32>) -> usize {
+    mark.zip(bits_of(u128::from(MARK), MARK_SYMBOLS)).filter(|(soft, one)| (*soft < 0.0) == *one).count()
+}

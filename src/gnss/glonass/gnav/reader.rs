@@ -1,0 +1,170 @@
+//! Finds strings in soft symbols, whichever way up they come, learns time and sender, and gathers sets.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::{
+    GNAV, GlonassString, MARK_SYMBOLS, STRING_SYMBOLS, STRINGS, alike, decode_soft, elements, frame_began, id,
+    parameters, slot,
+};
+use crate::gnss::glonass::fdma::channel;
+use crate::gnss::message::{Read, Reader};
+use crate::gnss::record::NavigationRow;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+/// Strings in a row that fail where they are expected before they are sought elsewhere.
+const FAILURES: u32 = 3;
+/// Symbols of the time mark that may be wrong: of a million places one looks like it then, and the checks
+/// decide.
+const TOLERATED: usize = 2;
+/// Symbols of a second.
+const RATE_HZ: f64 = 100.0;
+
+/// A string and the number of its first symbol.
+type Placed = (u64, GlonassString);
+
+/// Reads the message.
+#[derive(Clone, Debug)]
+pub struct GnavReader {
+    sv: Sv,
+    /// The latest symbols, a string at most; `next` numbers the one to come.
+    symbols: VecDeque<f32>,
+    next: u64,
+    /// Number of the first symbol of some string, and those that failed since the last one that did not.
+    string: Option<u64>,
+    failures: u32,
+    /// The latest of strings 1 to 5.
+    parts: BTreeMap<u8, Placed>,
+    /// Those of the set that was reported last.
+    complete: Option<Vec<(&'static str, i64)>>,
+}
+
+impl GnavReader {
+    /// A reader that has read nothing.
+    pub fn new(sv: Sv) -> Self {
+        Self {
+            sv,
+            symbols: VecDeque::with_capacity(STRING_SYMBOLS),
+            next: 0,
+            string: None,
+            failures: 0,
+            parts: BTreeMap::new(),
+            complete: None,
+        }
+    }
+
+    /// Takes the string whose newest symbol is the last.
+    fn read(&mut self, begin: u64, string: GlonassString, inverted: bool) -> Vec<Read> {
+        let number = id(&string);
+        let mut news = Vec::new();
+        if let Some(slot) = (number == 4).then(|| slot(&string)).filter(|slot| *slot != self.sv.number) {
+            // On a channel that is not its slot's nothing is known of it.
+            if channel(slot).is_none() || channel(slot) != channel(self.sv.number) {
+                self.parts.clear();
+                return news;
+            }
+            // What was read under the other name is forgotten: another satellite may have sent it.
+            self.sv = Sv { number: slot, ..self.sv };
+            self.complete = None;
+            news.push(Read::Sender(self.sv));
+        }
+        if number <= 5 {
+            self.parts.insert(number, (begin, string));
+        }
+        // Strings of an earlier frame are those of another day, or set.
+        let oldest = begin.saturating_sub(STRINGS * STRING_SYMBOLS as u64);
+        self.parts.retain(|_, (placed, _)| *placed >= oldest);
+        let Some(start) = self.begun(begin) else { return news };
+        news.push(Read::Unit { symbols: STRING_SYMBOLS as u64, of_week_s: start.tow_whole_s(), inverted });
+        if number == 5 {
+            news.push(Read::Time(start));
+            news.push(Read::Parameters(self.rows(0, parameters(&string))));
+        }
+        self.look_for_set((begin, start), &mut news);
+        news
+    }
+
+    /// When the string with that first symbol began, by strings 1, 4 and 5 of the last frame.
+    fn begun(&self, begin: u64) -> Option<Epoch> {
+        let [one, four, five] = [1, 4, 5].map(|number| self.parts.get(&number));
+        let ((placed, one), (_, four), (_, five)) = (one?, four?, five?);
+        let frame = frame_began(one, four, five)?;
+        Some(frame.plus_s((begin as f64 - *placed as f64) / RATE_HZ))
+    }
+
+    fn look_for_set(&mut self, (begin, start): (u64, Epoch), news: &mut Vec<Read>) {
+        let [one, two, three, four] = [1, 2, 3, 4].map(|number| self.parts.get(&number));
+        let (Some(one), Some(two), Some(three), Some(four)) = (one, two, three, four) else { return };
+        let sent = |placed: &Placed| start.plus_s((placed.0 as f64 - begin as f64) / RATE_HZ);
+        let set = elements(self.sv, [&one.1, &two.1, &three.1, &four.1], sent(one));
+        // Sets change where their half hours end: all four were sent within that of the set.
+        let half_s = 0.5 * set.fit_interval_s();
+        let is_of_set = |placed: &Placed| sent(placed).since(set.toe).abs() <= half_s;
+        if ![one, two, three, four].into_iter().all(is_of_set) {
+            return;
+        }
+        let content: Vec<(&'static str, i64)> =
+            [one, two, three, four].into_iter().flat_map(|(_, string)| parameters(string)).collect();
+        if self.complete.as_ref() == Some(&content) {
+            return;
+        }
+        let rows = self.rows(u32::from(set.iode), content.clone());
+        news.push(Read::Ephemeris(Box::new(set)));
+        news.push(Read::Parameters(rows));
+        self.complete = Some(content);
+    }
+
+    fn rows(&self, issue: u32, parameters: Vec<(&'static str, i64)>) -> Vec<NavigationRow> {
+        NavigationRow::each(self.sv, GNAV.name, issue, parameters).collect()
+    }
+}
+
+impl Reader for GnavReader {
+    fn take(&mut self, soft: f32, _: Epoch) -> Vec<Read> {
+        if self.symbols.len() == STRING_SYMBOLS {
+            self.symbols.pop_front();
+        }
+        self.symbols.push_back(soft);
+        self.next += 1;
+        let whole = self.symbols.len() == STRING_SYMBOLS;
+        let Some(begin) = self.next.checked_sub(STRING_SYMBOLS as u64).filter(|_| whole) else {
+            return Vec::new();
+        };
+        let due = self.string.map(|string| begin.abs_diff(string).is_multiple_of(STRING_SYMBOLS as u64));
+        if due == Some(false) {
+            return Vec::new();
+        }
+        let alike = alike(self.symbols.iter().skip(STRING_SYMBOLS - MARK_SYMBOLS).copied());
+        if due.is_none() && (TOLERATED + 1..MARK_SYMBOLS - TOLERATED).contains(&alike) {
+            return Vec::new();
+        }
+        let inverted = planted!("gnss.glonass.mark", alike < MARK_SYMBOLS / 2, alike > MARK_SYMBOLS / 2);
+        match decode_soft(self.symbols.make_contiguous()) {
+            Some(string) => {
+                (self.string, self.failures) = (Some(begin), 0);
+                self.read(begin, string, inverted)
+            }
+            None => {
+                self.failures += u32::from(due.is_some());
+                if self.failures >= FAILURES {
+                    self.doubt();
+                }
+                Vec::new()
+            }
+        }
+    }
+
+    fn skip(&mut self) {
+        self.symbols.clear();
+        self.doubt();
+    }
+
+    fn doubt(&mut self) {
+        (self.string, self.failures) = (None, 0);
+        self.parts.clear();
+    }
+
+    fn missing(&self) -> Vec<u8> {
+        (1..=5).filter(|number| !self.parts.contains_key(number)).collect()
+    }
+}
