@@ -6,17 +6,20 @@
 //! within its fit interval.
 
 use nalgebra::Vector3;
-use thiserror::Error;
 
 use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, WEEK_S};
 
+mod error;
 mod form;
+mod kepler;
 mod vector;
 
+pub use error::OrbitError;
 pub use form::{PLAIN, SetForm, status_of_record};
+pub use kepler::solve_kepler;
 pub use vector::StateVector;
 
 /// A set of broadcast elements of one satellite, in SI units and radians.
@@ -123,47 +126,6 @@ pub struct ClockState {
     pub drift: f64,
 }
 
-/// Why elements give no state.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-pub enum OrbitError {
-    /// An element that no orbit has.
-    #[error("{sv}: {element} = {value} is not that of an orbit: expected {expected}")]
-    Element {
-        /// The satellite.
-        sv: Sv,
-        /// Name of the element.
-        element: &'static str,
-        /// In its SI unit.
-        value: f64,
-        /// What an orbit would have.
-        expected: &'static str,
-    },
-    /// A state vector integrated further than it means anything.
-    #[error("{sv}: {since_s} s from the state vector's reference time: expected at most 86400 s")]
-    Far {
-        /// The satellite.
-        sv: Sv,
-        /// Seconds from the reference time.
-        since_s: f64,
-    },
-    /// Kepler's equation without a solution.
-    #[error("{sv}: Kepler's equation did not converge for eccentricity {eccentricity}")]
-    Kepler {
-        /// The satellite.
-        sv: Sv,
-        /// Of its orbit.
-        eccentricity: f64,
-    },
-    /// A satellite at the antenna.
-    #[error("{sv}: the antenna is {range_m:.3} m away from the satellite: expected at least 1 m")]
-    Near {
-        /// The satellite.
-        sv: Sv,
-        /// Distance of the two.
-        range_m: f64,
-    },
-}
-
 /// Elements at a reference time of choice, without harmonics: [`Ephemeris::mean_at`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mean {
@@ -226,10 +188,6 @@ impl Constants {
 /// 3.0, 5.2.4.8 and BDS-SIS-ICD 2.1): clocks are those of B3I.
 const B1I_HZ: f64 = 1_561.098e6;
 const B2I_HZ: f64 = 1_207.14e6;
-
-/// Residual of Kepler's equation at which it counts as solved.
-const KEPLER_TOLERANCE_RAD: f64 = 1e-13;
-const KEPLER_STEPS: u32 = 20;
 
 /// Motion in the orbital plane: what orbit and clock have in common.
 struct Anomaly {
@@ -594,34 +552,6 @@ fn tilted(state: State, rotation_radps: f64, since_toe_s: f64) -> State {
     State { position_m, velocity_mps: about_z(about_x(state.velocity_mps)) + carried }
 }
 
-/// The angle in [−π, π] with the same direction.
-fn wrap(angle_rad: f64) -> f64 {
-    use std::f64::consts::TAU;
-    angle_rad - TAU * (angle_rad / TAU).round()
-}
-
-/// The eccentric anomaly in [−π, π] of a mean anomaly; `None` when 20 Newton steps leave a residual above
-/// 1e-13.
-///
-/// For M in [0, π] the start min(M + e, π) lies above the root, where E − e sin E is convex, so
-/// Newton's steps descend to the root for every eccentricity below one.
-pub fn solve_kepler(mean_rad: f64, eccentricity: f64) -> Option<f64> {
-    use std::f64::consts::PI;
-    let wrapped = wrap(mean_rad);
-    let target = wrapped.abs();
-    let mut anomaly = (target + eccentricity).min(PI);
-    for _ in 0..KEPLER_STEPS {
-        let (sin, cos) = libm::sincos(anomaly);
-        let residual = anomaly - eccentricity * sin - target;
-        anomaly -= residual / (1.0 - eccentricity * cos);
-        // The step just made squares what is left of the error: 1e-13 before it is round-off after it.
-        if residual.abs() < KEPLER_TOLERANCE_RAD {
-            return Some(if wrapped < 0.0 { -anomaly } else { anomaly });
-        }
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -669,22 +599,6 @@ mod tests {
             isc_s: [0.0; 4],
             signal_delays_s: Vec::new(),
             vector: None,
-        }
-    }
-
-    #[test]
-    fn keplers_equation_is_solved_for_every_eccentricity_below_one() {
-        for eccentricity in [0.0, 0.01, 0.1, 0.7, 0.9, 0.99, 0.999, 0.9999] {
-            for step in -2000..=2000 {
-                let mean = f64::from(step) * 0.004;
-                let anomaly = solve_kepler(mean, eccentricity).expect("converges");
-                let residual = anomaly - eccentricity * libm::sin(anomaly) - mean;
-                let turns = residual / std::f64::consts::TAU;
-                assert!((residual - turns.round() * std::f64::consts::TAU).abs() < 1e-13, "{eccentricity} {mean}");
-            }
-            for tiny in [1e-3, 1e-5, 1e-9, 1e-15] {
-                assert!(solve_kepler(tiny, eccentricity).is_some(), "{eccentricity} {tiny}");
-            }
         }
     }
 

@@ -309,8 +309,8 @@ fn broadcast_orbits_meet_those_of_code_and_clocks_too() {
     let navigation = rinex::read(&shipped("CARD00ESP_R_20203340900_15H_MN.rnx.gz"), "CARD").unwrap();
     let found = compared(&navigation.ephemerides, &sp3_columns(&shipped("COD21340.sp3.gz"), "R"));
     // Evaluated outside this project, by another program's integrator: 66 points of 13 satellites, 3.95 m,
-    // clocks 0.15 m; on the other day 2639 of 21, 3.36 m and 0.69 m. 2.1 m of it is the antenna's place in the
-    // satellite.
+    // clocks 0.15 m; on the other day 2639 of 21, 3.36 m and 0.69 m. 2.1 m of it is the antenna's place in
+    // the satellite.
     assert!(found.points >= 60 && (3.9..4.0).contains(&found.orbit_rms_m), "{found:?}");
     assert!(found.clock_rms_m < 0.2, "{found:?}");
     let names = ["ESBC00DNK_R_20201770000_01D_MN.rnx.gz", "COD0MGXFIN_20201770000_01D_05M_ORB.SP3.gz"];

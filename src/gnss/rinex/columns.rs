@@ -3,20 +3,22 @@
 //! columns, and of GLONASS, four lines or, since 3.05, five.
 //!
 //! Source: RINEX 2.11, tables A3, A4, A10 and A11; RINEX 3.05, tables A5, A6, A8, A10 and A18; RINEX 4.02,
-//! tables A9, A13 and A33, and those of NavIC and GLONASS. Where a line is missing, doubled or cut, or text is
-//! beside the fields, what follows would be read into the wrong elements; so such a record is left out and
+//! tables A9, A13 and A33, and those of NavIC and GLONASS. Where a line is missing, doubled or cut, or text
+//! is beside the fields, what follows would be read into the wrong elements; so such a record is left out and
 //! named with its line and column, and so is whatever cannot be recognised as of another system. Records of
-//! other systems and messages are counted and not read.
+//! other systems and messages are counted and not read. `record` has the names of fields.
 
 mod corrections;
 mod numbers;
+mod record;
 
-use crate::gnss::glonass::fdma::SLOTS;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::Epoch;
 use corrections::{delta_utc, leap_event, system_time};
 use numbers::{digits, fields, numbers};
+pub(super) use record::Record;
+use record::{CLOCK_FNAV, FIELDS, MESSAGES, READ, is_spare};
 
 /// Lines of a record: satellite, epoch and clock, then seven lines of the orbit.
 const LINES: usize = 8;
@@ -26,57 +28,6 @@ const FIELD: usize = 19;
 /// Width of a coefficient in the header, whose lines end in a label from this column on.
 const HEADER_FIELD: usize = 12;
 const LABEL: usize = 60;
-
-/// Fields of a record.
-const FIELDS: usize = 31;
-/// Those with which records begin, in their order, …
-const FIRST: [&str; 20] = [
-    "af0", "af1", "af2", "iode", "crs", "deltaN", "m0", "cuc", "e", "cus", "sqrta", "toe", "cic", "omega0", "cis",
-    "i0", "crc", "omega", "omegaDot", "idot",
-];
-/// … and the rest of an LNAV, of a Galileo and of a NavIC record; spare ones have no name.
-const OF_LNAV: [&str; FIELDS - FIRST.len()] =
-    ["l2Codes", "week", "l2p", "accuracy", "health", "tgd", "iodc", "t_tm", "fitInt", "", ""];
-const OF_GALILEO: [&str; FIELDS - FIRST.len()] =
-    ["sources", "week", "", "accuracy", "health", "bgdE5aE1", "bgdE5bE1", "t_tm", "", "", ""];
-const OF_NAVIC: [&str; FIELDS - FIRST.len()] = ["", "week", "", "accuracy", "health", "tgd", "", "t_tm", "", "", ""];
-const OF_BEIDOU: [&str; FIELDS - FIRST.len()] =
-    ["", "week", "", "accuracy", "health", "tgd1", "tgd2", "t_tm", "aodc", "", ""];
-/// Fields of a record of GLONASS, of the last line as it has been since 3.05.
-const OF_GLONASS: [&str; 19] = [
-    "af0",
-    "af1",
-    "t_tm",
-    "x",
-    "vx",
-    "ax",
-    "health",
-    "y",
-    "vy",
-    "ay",
-    "channel",
-    "z",
-    "vz",
-    "az",
-    "age",
-    "status",
-    "deltaTau",
-    "accuracyIndex",
-    "healthFlags",
-];
-/// Systems whose records are read, with the largest number of their satellites.
-const READ: [(char, System, u8); 5] = [
-    ('G', System::Gps, 32),
-    ('R', System::Glonass, SLOTS),
-    ('E', System::Galileo, 36),
-    ('I', System::Navic, 14),
-    ('C', System::BeiDou, 63),
-];
-/// Bits of an I/NAV record's sources: sent on E1-B or E5b, sent on E5a (F/NAV), and a clock of E5b and E1.
-const SENT_INAV: u32 = 0b101;
-const SENT_FNAV: u32 = 0b010;
-const CLOCK_FNAV: u32 = 1 << 8;
-const CLOCK_INAV: u32 = 1 << 9;
 
 /// Labels that a header of any version may have.
 const LABELS: [&str; 21] = [
@@ -110,60 +61,6 @@ pub(super) const OLD_GLONASS: &str = "G";
 const UTC: &str = "GPUT";
 const GALILEO: &str = "GAGP";
 const GALILEO_OLD: &str = "GPGA";
-
-/// Systems and the messages with ephemerides that each has in version 4.
-const MESSAGES: [(char, &[&str]); 7] = [
-    ('G', &["LNAV", "CNAV", "CNV2"]),
-    ('R', &["FDMA", "L1OC", "L3OC"]),
-    ('E', &["INAV", "FNAV"]),
-    ('J', &["LNAV", "CNAV", "CNV2"]),
-    ('C', &["D1", "D2", "CNV1", "CNV2", "CNV3"]),
-    ('I', &["LNAV", "L1NV"]),
-    ('S', &["SBAS"]),
-];
-
-/// A record in form.
-pub(super) struct Record {
-    /// Whether it is one of F/NAV.
-    pub is_fnav: bool,
-    /// Number of its first line.
-    pub line: usize,
-    pub sv: Sv,
-    /// As written, in the time by which the system's records are dated.
-    pub toc: Epoch,
-    values: [Option<f64>; FIELDS],
-}
-
-impl Record {
-    /// A field by its name; `None` if it is blank.
-    pub fn get(&self, name: &str) -> Option<f64> {
-        if self.sv.system == System::Glonass {
-            let at = OF_GLONASS.iter().position(|field| *field == name)?;
-            return self.values.get(at).copied().flatten();
-        }
-        let rest = match self.sv.system {
-            System::Galileo => OF_GALILEO,
-            System::Navic => OF_NAVIC,
-            System::BeiDou => OF_BEIDOU,
-            _ => OF_LNAV,
-        };
-        let at = FIRST.iter().chain(&rest).position(|field| *field == name)?;
-        self.values.get(at).copied().flatten()
-    }
-
-    /// Whether a Galileo record of version 3, which has both messages in one form, is one of F/NAV.
-    fn says_fnav(&self) -> Result<bool, String> {
-        let sources = self.get("sources").unwrap_or(0.0) as u32;
-        if sources & SENT_FNAV != 0 {
-            return Ok(true);
-        }
-        if sources & SENT_INAV != 0 && sources & CLOCK_INAV != 0 {
-            return Ok(false);
-        }
-        let expected = "bit 0, 1 or 2 for the signal, and bit 8 or 9 for the clock";
-        Err(format!("line {} ({} {}): data sources = {sources}: expected {expected}", self.line, self.sv, self.toc))
-    }
-}
 
 /// What is in a file.
 #[derive(Default)]
@@ -279,13 +176,6 @@ enum Group {
     /// The same of Galileo's time against GPS time.
     Galileo(String, Polynomial),
     Other,
-}
-
-/// Whether it is a satellite of GLONASS beyond the constellation's slots, under trial or in reserve, whose
-/// channel is not known.
-fn is_spare(satellite: &str) -> bool {
-    let number = satellite.strip_prefix('R').and_then(|number| number.parse::<u8>().ok());
-    number.is_some_and(|number| number > SLOTS)
 }
 
 struct Form {

@@ -162,8 +162,8 @@ impl FrontEnd {
         Ok(())
     }
 
-    /// Whose signal it is that was found, of satellites that a search cannot tell apart: of one whose elements
-    /// are known, or else, until its message says more, of the one that was searched for.
+    /// Whose signal it is that was found, of satellites that a search cannot tell apart: of one whose
+    /// elements are known, or else, until its message says more, of the one that was searched for.
     fn likeliest(&self, found: Link, shared: &Shared) -> Sv {
         let is_known = |link: &&Link| !shared.ephemerides.of(link.sv).is_empty();
         let alike = |link: &&Link| found.channel().is_some() && link.is_alike(found);

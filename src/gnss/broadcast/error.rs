@@ -1,0 +1,46 @@
+//! What is no orbit, by name.
+
+use thiserror::Error;
+
+use crate::gnss::satellite::Sv;
+
+/// Why elements give no state.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum OrbitError {
+    /// An element that no orbit has.
+    #[error("{sv}: {element} = {value} is not that of an orbit: expected {expected}")]
+    Element {
+        /// The satellite.
+        sv: Sv,
+        /// Name of the element.
+        element: &'static str,
+        /// In its SI unit.
+        value: f64,
+        /// What an orbit would have.
+        expected: &'static str,
+    },
+    /// A state vector integrated further than it means anything.
+    #[error("{sv}: {since_s} s from the state vector's reference time: expected at most 86400 s")]
+    Far {
+        /// The satellite.
+        sv: Sv,
+        /// Seconds from the reference time.
+        since_s: f64,
+    },
+    /// Kepler's equation without a solution.
+    #[error("{sv}: Kepler's equation did not converge for eccentricity {eccentricity}")]
+    Kepler {
+        /// The satellite.
+        sv: Sv,
+        /// Of its orbit.
+        eccentricity: f64,
+    },
+    /// A satellite at the antenna.
+    #[error("{sv}: the antenna is {range_m:.3} m away from the satellite: expected at least 1 m")]
+    Near {
+        /// The satellite.
+        sv: Sv,
+        /// Distance of the two.
+        range_m: f64,
+    },
+}
