@@ -20,6 +20,7 @@ mod vector;
 pub use error::OrbitError;
 pub use form::{PLAIN, SetForm, status_of_record};
 pub use kepler::solve_kepler;
+use kepler::wrap;
 pub use vector::StateVector;
 
 /// A set of broadcast elements of one satellite, in SI units and radians.

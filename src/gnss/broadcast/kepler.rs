@@ -7,7 +7,7 @@ const KEPLER_TOLERANCE_RAD: f64 = 1e-13;
 const KEPLER_STEPS: u32 = 20;
 
 /// The angle in [−π, π] with the same direction.
-fn wrap(angle_rad: f64) -> f64 {
+pub(super) fn wrap(angle_rad: f64) -> f64 {
     use std::f64::consts::TAU;
     angle_rad - TAU * (angle_rad / TAU).round()
 }

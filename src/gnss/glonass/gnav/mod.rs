@@ -82,6 +82,9 @@ const UNHEALTHY: u16 = 0b1100;
 const STRING_S: i64 = 2;
 const FRAME_S: i64 = 30;
 const STRINGS: u64 = 15;
+/// Frames of a superframe, which counts from midnight; all but the last have almanacs of five satellites
+/// (4.3.1).
+const FRAMES: i64 = 5;
 /// Symbols of a string, of them those of the bits.
 const STRING_SYMBOLS: usize = 200;
 const DATA_SYMBOLS: usize = 2 * STRING_BITS;
@@ -102,7 +105,7 @@ const FIVE: (u16, u8) = (5, 1);
 const KIND: (u16, u8) = (75, 2);
 const DAY: (u16, u8) = (59, 11);
 const SLOT: (u16, u8) = (70, 5);
-/// Thirty minutes between sets, five satellites, a GLONASS-M satellite.
+/// Thirty minutes between sets, a GLONASS-M satellite.
 const HALF_AN_HOUR: u32 = 1;
 const MODERNISED: u32 = 1;
 
@@ -147,7 +150,8 @@ impl Sender for Strings {
             }
             3 => {
                 write_all(&STRING_3, ephemeris, &mut string)?;
-                string.set_piece(FIVE, 1);
+                let frame_of_five = frame.seconds().rem_euclid(FRAMES * FRAME_S) / FRAME_S;
+                string.set_piece(FIVE, u32::from(frame_of_five < FRAMES - 1));
             }
             4 => {
                 check(ephemeris)?;
