@@ -291,8 +291,17 @@ fn strings_that_we_send_of_a_real_set_have_the_real_bits() {
                     continue;
                 }
                 bits[0] += 1;
-                let is_sign = [6, 21, 45, 50, 5, 27].contains(&place);
-                if ours != theirs && is_sign && *theirs {
+                // Places and lengths of fields with a sign: its magnitude is nothing then.
+                let length = match (number, place) {
+                    (1..=3, 21) => 24,
+                    (1..=3, 45) | (4, 27) => 5,
+                    (1..=3, 50) => 27,
+                    (3, 6) => 11,
+                    (4, 5) => 22,
+                    _ => 0,
+                };
+                let is_zero = length > 0 && !string.0[place + 1..place + length].contains(&true);
+                if ours != theirs && is_zero && *theirs {
                     bits[1] += 1;
                     continue;
                 }
