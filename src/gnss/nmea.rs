@@ -122,6 +122,7 @@ fn signal_number(signal: &Signal) -> u8 {
     match (signal.system, signal.rinex) {
         (System::Gps | System::Glonass | System::Sbas, "1C") => 1,
         (System::Galileo, "1C") => 7,
+        (System::Glonass, "2C") => 3,
         (System::BeiDou, "2I") => 1,
         (System::BeiDou, "6I") => 8,
         (System::BeiDou, "7I") => 0xB,
