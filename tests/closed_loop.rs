@@ -161,8 +161,8 @@ fn beidou_alone_finds_its_place_by_both_messages() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
-/// GLONASS's bars: a metre by a code whose chips are twice those of C/A; strings 1 to 5 of a frame are whole 15 s
-/// after the start. Every satellite is found by its channel and says itself who it is.
+/// GLONASS's bars: two metres, twice that of GPS, by a code whose chips are twice those of C/A; strings 1 to 5
+/// of a frame are whole 15 s after the start. A search finds channels; the message says whose they are.
 #[test]
 fn glonass_alone_finds_its_place_by_carriers_of_their_own_and_state_vectors() {
     let scene = include_str!("../scenarios/glonass.toml").replace("duration_s = 36", "duration_s = 26");
@@ -172,7 +172,7 @@ fn glonass_alone_finds_its_place_by_carriers_of_their_own_and_state_vectors() {
     std::fs::write(&path, scene).unwrap();
     let summary = run_with(&path, &["--check".as_ref()]);
     found_and_decoded_what_is_there(&summary);
-    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/position/horizontal_p95_m", 2.0);
     at_most(&summary, "/position/first_fix_s", 17.0);
     assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
