@@ -161,8 +161,8 @@ fn beidou_alone_finds_its_place_by_both_messages() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
-/// GLONASS's bars: two metres, twice that of GPS, by a code whose chips are twice those of C/A; strings 1 to 5
-/// of a frame are whole 15 s after the start. A search finds channels; the message says whose they are.
+/// GLONASS's bars: two metres, twice that of GPS, by a code whose chips are twice those of C/A; strings 1 to
+/// 5 of a frame are whole 15 s after the start. A search finds channels; the message says whose they are.
 #[test]
 fn glonass_alone_finds_its_place_by_carriers_of_their_own_and_state_vectors() {
     let scene = include_str!("../scenarios/glonass.toml").replace("duration_s = 36", "duration_s = 26");
