@@ -270,6 +270,11 @@ fn same_elements(a: &Ephemeris, b: &Ephemeris) -> bool {
     Ephemeris { transmitted: b.transmitted, ..a.clone() } == *b
 }
 
+/// Between how far apart reference times sets are compared: none so far that the middle is beyond both fits.
+fn comparable_s(set: &Ephemeris) -> f64 {
+    COMPARABLE_S.min(2.0 * set.fit_interval_s())
+}
+
 fn contradict(a: &Ephemeris, b: &Ephemeris) -> bool {
     let middle = a.toe.plus_s(b.toe.since(a.toe) / 2.0);
     let positions = a.state(middle).and_then(|x| Ok((x.position_m - b.state(middle)?.position_m).norm()));
@@ -307,7 +312,7 @@ fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
         .map(|(i, a)| {
             let others = sets.iter().enumerate();
             others
-                .map(|(j, b)| (i != j && a.toe.since(b.toe).abs() <= COMPARABLE_S).then(|| contradict(a, b)))
+                .map(|(j, b)| (i != j && a.toe.since(b.toe).abs() <= comparable_s(a)).then(|| contradict(a, b)))
                 .collect()
         })
         .collect();

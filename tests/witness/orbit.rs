@@ -12,7 +12,7 @@ use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss_twin::gnss::rinex::{self, Navigation};
 use gnss_twin::gnss::satellite::{Sv, System};
 use gnss_twin::gnss::sp3;
-use gnss_twin::gnss::time::Epoch;
+use gnss_twin::gnss::time::{Epoch, UTC};
 use nalgebra::Vector3;
 
 use super::data::external;
@@ -245,7 +245,10 @@ fn every_version_reads_to_the_number_of_records_that_it_holds() {
         let Some(bytes) = bytes else { continue };
         let found = rinex::read(&bytes, name).unwrap();
         let (catalogue, warnings) = Catalogue::new(found.ephemerides.clone());
-        assert!(warnings.is_empty(), "{name} {warnings:?}");
+        // The converter of that file joins strings of different sets of GLONASS: R06 has the z of 16:15 at
+        // 16:45 too.
+        let known = |warning: &String| name == "lnav/046r_rnx.nav" && warning.starts_with('R');
+        assert!(warnings.iter().all(known), "{name} {warnings:?}");
         println!(
             "{name}: {} records, {} satellites, skipped {:?}, {warnings:?}",
             found.ephemerides.len(),
@@ -351,7 +354,9 @@ fn the_rinex_crate_reads_the_same_orbits_of_other_systems() {
         }
         for set in found.ephemerides.iter().filter(|set| set.sv.system != System::Gps) {
             let own = set.vector.map_or_else(|| elements(set).to_vec(), |vector| axes(&vector));
-            let theirs = frames.get(&(set.sv.to_string(), set.toc.seconds()));
+            // The crate takes the UTC of records of GLONASS for GPS time.
+            let written = if set.vector.is_some() { UTC.label(set.toc) } else { set.toc };
+            let theirs = frames.get(&(set.sv.to_string(), written.seconds()));
             let theirs = theirs.unwrap_or_else(|| panic!("{name}: {} {} is not there", set.sv, set.toc));
             // Kilometres times a thousand and back are a rounding away.
             let near =
