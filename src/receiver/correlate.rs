@@ -470,8 +470,14 @@ mod tests {
                 let all: Vec<_> = kernel::Level::all()
                     .into_iter()
                     .map(|level| {
-                        let sums = kernel::correlate(level, fast, &replica.patterns[0], (i, q), &nco, &taps);
-                        (sums, kernel::power(level, i, q))
+                        let pattern = &replica.patterns[0];
+                        let sums = kernel::correlate(level, fast, pattern, (i, q), &nco, &taps);
+                        let [e, p, l] = taps;
+                        let more = [e, p, l, chips_to_units(7.0), 2 * e];
+                        let [early, prompt, late, noise, side] =
+                            kernel::correlate(level, fast, pattern, (i, q), &nco, &more);
+                        assert_eq!([early, prompt, late], sums, "{level:?} {edge:?} {rate} {fast:?}");
+                        (sums, [noise, side], kernel::power(level, i, q))
                     })
                     .collect();
                 assert!(all.windows(2).all(|pair| pair[0] == pair[1]), "{edge:?} {rate} {fast:?}");

@@ -289,7 +289,12 @@ fn a_recording_of_2016_holds_four_galileo_satellites_where_another_program_found
     let Some(i) = two_bits("if-signals/ifen_e1_2016-01-19_20msps_r2bit.bin") else { return };
     let q = vec![0.0; i.len()];
     let metadata = metadata(Format::Ri8, 20e6, 5_000_446.0);
-    let settings = AcquisitionSettings { coherent_periods: 4, noncoherent_sums: 9, ..AcquisitionSettings::default() };
+    let settings = AcquisitionSettings {
+        coherent_periods: 4,
+        noncoherent_sums: 9,
+        doppler_max_hz: 2500.0, // all that are listed; a search at 20 Msps takes its time
+        ..AcquisitionSettings::default()
+    };
     let found = acquire_e1(&metadata, &i, &q, &settings);
     // Doppler to a grid of 125 Hz and the delay in chips of the first sample, of E1-C.
     let listed = [(12, -1000.0, 3530.9), (19, -250.0, 943.2), (11, 1625.0, 905.0), (30, -500.0, 3968.8)];

@@ -8,6 +8,7 @@
 //! the band of the code's main lobe goes back to lags.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::Arc;
 
 use num_complex::Complex;
@@ -213,23 +214,22 @@ impl Grid {
             *sample = Complex::new((mean * scale) as f32, 0.0);
         }
         self.forward.process(&mut buffer);
-        self.band(&buffer).map(|(_, bin)| bin.conj()).collect()
+        let mut spectrum = vec![Complex::default(); self.inverse.len()];
+        for (_, bins, places) in self.band(buffer.len()) {
+            spectrum[places].iter_mut().zip(&buffer[bins]).for_each(|(own, bin)| *own = bin.conj());
+        }
+        spectrum
     }
 
-    /// The bins within the band, with their signed numbers, in the order of the short transform; zeros where
-    /// the long one has none.
-    fn band<'a>(&self, spectrum: &'a [Complex<f32>]) -> impl Iterator<Item = (f64, Complex<f32>)> + 'a {
-        let (length, band) = (spectrum.len(), self.inverse.len());
-        let positive = band.div_ceil(2);
-        let reach = length.div_ceil(2);
-        (0..band).map(move |n| {
-            let (number, place, apart) = if n < positive {
-                (n as f64, n, n)
-            } else {
-                (n as f64 - band as f64, (length + n).saturating_sub(band), band - n)
-            };
-            (number, if apart < reach { spectrum[place] } else { Complex::default() })
-        })
+    /// The bins of a long spectrum within the band, those from zero on and those below: the signed number of
+    /// the first, their places, and those in the order of the short transform. The others of the short one
+    /// have none.
+    fn band(&self, length: usize) -> [(f64, Range<usize>, Range<usize>); 2] {
+        let band = self.inverse.len();
+        let (positive, reach) = (band.div_ceil(2), length.div_ceil(2));
+        let above = positive.min(reach);
+        let below = (band - positive).min(reach.saturating_sub(1));
+        [(0.0, 0..above, 0..above), (-(below as f64), length - below..length, band - below..band)]
     }
 
     /// The largest cell of every satellite, in their order; `again` after something was subtracted from the
@@ -330,27 +330,17 @@ impl Grid {
         let first = begins.round();
         let fraction = begins - first;
         let step = self.phasor(-self.frequency_hz(doppler_hz), 1);
-        let mut rotation = self.phasor(-self.frequency_hz(doppler_hz), first as u64) * scale;
-        long.fill(Complex::default());
-        let data = block.i.iter().zip(block.q).skip(first as usize);
-        for (out, (i, q)) in long.iter_mut().zip(data) {
-            let x = Complex::new(f64::from(*i), f64::from(*q)) * rotation;
-            *out = Complex::new(x.re as f32, x.im as f32);
-            rotation *= step;
-        }
+        let rotation = self.phasor(-self.frequency_hz(doppler_hz), first as u64) * scale;
+        let from = (first as usize).min(block.i.len().min(block.q.len()));
+        kernel::mix(long, (&block.i[from..], &block.q[from..]), rotation, step);
         self.forward.process_with_scratch(long, scratch);
         let shift = |number: f64| {
             let (sin, cos) = libm::sincos(TAU * fraction * number / self.forward.len() as f64);
             Complex::new(cos, sin)
         };
-        let (turn, mut ramp) = (shift(1.0), Complex::default());
-        let negative_begins = self.inverse.len().div_ceil(2);
-        for (index, (sum, (number, bin))) in spectrum.iter_mut().zip(self.band(long)).enumerate() {
-            if index == 0 || index == negative_begins {
-                ramp = shift(number);
-            }
-            *sum += bin * Complex::new(ramp.re as f32, ramp.im as f32);
-            ramp *= turn;
+        let turn = shift(1.0);
+        for (first, bins, places) in self.band(long.len()) {
+            kernel::add_turned(&mut spectrum[places], &long[bins], shift(first), turn);
         }
     }
 

@@ -1,7 +1,100 @@
-//! The two passes over spectra and lags, compiled for AVX2 too; no operation is fused, so bits do not depend
-//! on it.
+//! The passes over samples, spectra and lags, compiled for AVX2 too; no operation is fused, so bits do not
+//! depend on it.
 
-use num_complex::Complex;
+use num_complex::{Complex, Complex64};
+
+/// Phasors that are turned side by side.
+const LANES: usize = 8;
+
+/// `first`·`step`ⁿ for n = 0, 1, …, eight at a time: each turns by `step`⁸, so that no product waits for the
+/// one before.
+struct Phasors {
+    re: [f64; LANES],
+    im: [f64; LANES],
+    turn: Complex64,
+}
+
+impl Phasors {
+    #[inline(always)]
+    fn new(first: Complex64, step: Complex64) -> Self {
+        let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+        let mut phasor = first;
+        for (re, im) in re.iter_mut().zip(&mut im) {
+            (*re, *im) = (phasor.re, phasor.im);
+            phasor *= step;
+        }
+        let fourth = step * step * (step * step);
+        Self { re, im, turn: fourth * fourth }
+    }
+
+    /// Those of the next eight.
+    #[inline(always)]
+    fn turn(&mut self) {
+        for (re, im) in self.re.iter_mut().zip(&mut self.im) {
+            (*re, *im) = (*re * self.turn.re - *im * self.turn.im, *re * self.turn.im + *im * self.turn.re);
+        }
+    }
+}
+
+/// out = (i + jq)·`first`·`step`ⁿ as far as all have samples. What is left of `out` is zero.
+pub(super) fn mix(out: &mut [Complex<f32>], (i, q): (&[f32], &[f32]), first: Complex64, step: Complex64) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        unsafe { mix_avx2(out, (i, q), first, step) };
+        return;
+    }
+    mix_plain(out, (i, q), first, step);
+}
+
+/// sums += bins·`first`·`step`ⁿ, the phasors in `f32`.
+pub(super) fn add_turned(sums: &mut [Complex<f32>], bins: &[Complex<f32>], first: Complex64, step: Complex64) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        unsafe { add_turned_avx2(sums, bins, first, step) };
+        return;
+    }
+    add_turned_plain(sums, bins, first, step);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn mix_avx2(out: &mut [Complex<f32>], samples: (&[f32], &[f32]), first: Complex64, step: Complex64) {
+    mix_plain(out, samples, first, step);
+}
+
+#[inline(always)]
+fn mix_plain(out: &mut [Complex<f32>], (i, q): (&[f32], &[f32]), first: Complex64, step: Complex64) {
+    let length = out.len().min(i.len()).min(q.len());
+    let (mixed, rest) = out.split_at_mut(length);
+    rest.fill(Complex::default());
+    let mut phasors = Phasors::new(first, step);
+    for ((out, i), q) in mixed.chunks_mut(LANES).zip(i.chunks(LANES)).zip(q.chunks(LANES)) {
+        for (k, ((out, i), q)) in out.iter_mut().zip(i).zip(q).enumerate() {
+            let (i, q, re, im) = (f64::from(*i), f64::from(*q), phasors.re[k], phasors.im[k]);
+            *out = Complex::new((i * re - q * im) as f32, (i * im + q * re) as f32);
+        }
+        phasors.turn();
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn add_turned_avx2(sums: &mut [Complex<f32>], bins: &[Complex<f32>], first: Complex64, step: Complex64) {
+    add_turned_plain(sums, bins, first, step);
+}
+
+#[inline(always)]
+fn add_turned_plain(sums: &mut [Complex<f32>], bins: &[Complex<f32>], first: Complex64, step: Complex64) {
+    let mut phasors = Phasors::new(first, step);
+    for (sums, bins) in sums.chunks_mut(LANES).zip(bins.chunks(LANES)) {
+        for (k, (sum, bin)) in sums.iter_mut().zip(bins).enumerate() {
+            *sum += bin * Complex::new(phasors.re[k] as f32, phasors.im[k] as f32);
+        }
+        phasors.turn();
+    }
+}
 
 /// out = a·b.
 pub(super) fn multiply(out: &mut [Complex<f32>], a: &[Complex<f32>], b: &[Complex<f32>]) {
@@ -90,6 +183,32 @@ fn add_powers_plain(powers: &mut [f32], x: &[Complex<f32>]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn phasors_side_by_side_are_those_one_after_the_other_at_every_length() {
+        let (first, step) = (Complex64::from_polar(0.7, 1.0), Complex64::from_polar(1.0, 0.3));
+        let wave = |n: usize| libm::sinf(0.37 * n as f32);
+        for length in (0..20).chain([5199, 5200, 5201]) {
+            let (i, q): (Vec<f32>, Vec<f32>) = (0..length).map(|n| (wave(n), wave(n + 3))).unzip();
+            let mut mixed = vec![Complex::new(9.0, 9.0); length + 3];
+            mix(&mut mixed, (&i, &q), first, step);
+            let bins: Vec<Complex<f32>> = i.iter().zip(&q).map(|(i, q)| Complex::new(*i, *q)).collect();
+            let mut sums = vec![Complex::new(1.0, 0.0); length];
+            add_turned(&mut sums, &bins, first, step);
+            for n in 0..length {
+                let turned = Complex64::new(f64::from(i[n]), f64::from(q[n])) * first * step.powu(n as u32);
+                // Sizes of one: a few roundings of 2⁻²⁴.
+                for (found, expected) in [(mixed[n], turned), (sums[n], turned + 1.0)] {
+                    let found = Complex64::new(f64::from(found.re), f64::from(found.im));
+                    assert!((found - expected).norm() < 4e-7, "{length} {n}: {found} for {expected}");
+                }
+            }
+            assert!(mixed[length..].iter().all(|&x| x == Complex::default()));
+            let mut plain = vec![Complex::default(); length + 3];
+            mix_plain(&mut plain, (&i, &q), first, step);
+            assert_eq!(plain, mixed);
+        }
+    }
 
     #[test]
     fn peak_and_total_are_the_obvious_ones_at_every_length() {

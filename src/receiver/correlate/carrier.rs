@@ -52,7 +52,12 @@ impl Carrier {
     pub fn new(nco: &Nco) -> Self {
         let (within, vector_turn) = Sixteen::powers(phasor(nco.carrier_step));
         let (turns, block_turn) = Sixteen::powers(vector_turn);
-        let (turns_re, turns_im) = (turns.re.map(|x| x as f32), turns.im.map(|x| x as f32));
+        // Loops take on the instruction set of where they stand; a closure that `map` calls does not.
+        let (mut turns_re, mut turns_im) = ([0.0; LANES], [0.0; LANES]);
+        for k in 0..LANES {
+            turns_re[k] = turns.re[k] as f32;
+            turns_im[k] = turns.im[k] as f32;
+        }
         Self { within, turns_re, turns_im, block: phasor(nco.carrier), block_turn }
     }
 

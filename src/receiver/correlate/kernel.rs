@@ -25,6 +25,10 @@ pub(super) const SHORT_MARGIN: usize = GROUP;
 #[cfg(target_arch = "x86_64")]
 const LOOKUP_STEP: u64 = 15 << (CODE_BITS - 4);
 
+/// Taps that share one pass, which unpacks the samples and wipes the carrier off once: the sums of five and
+/// what they need fit the registers of AVX-512 but for a few.
+const AT_ONCE: usize = 5;
+
 /// What the fast correlators compute in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fast {
@@ -94,8 +98,8 @@ pub(super) struct Job<'a> {
     short: Option<short::Steps>,
 }
 
-/// Correlates `taps` in groups of three and a rest of two or one. `level` must be one that this processor
-/// has.
+/// Correlates `taps`, those of up to [`AT_ONCE`] in one pass over the samples, more in passes of three and of
+/// what is left. `level` must be one that this processor has.
 pub(super) fn correlate<const T: usize>(
     level: Level,
     fast: Fast,
@@ -123,6 +127,9 @@ pub(super) fn correlate<const T: usize>(
         // Both are below 2⁶³.
         wrapped(code + tap as u64, period as u64)
     };
+    if T <= AT_ONCE {
+        return at_level(level, &job, taps.map(begin));
+    }
     let mut sums = [Complex64::ZERO; T];
     let (threes, rest) = taps.as_chunks::<3>();
     let (sums_of_threes, sums_of_rest) = sums.as_chunks_mut::<3>();
@@ -270,7 +277,13 @@ fn short_lanes_avx512<const T: usize, const AREA: bool>(chunk: &short::Chunk, co
         }
     }
     *code = codes;
-    short::Sums { re: sums_re.map(|sum| store_int(sum)), im: sums_im.map(|sum| store_int(sum)) }
+    // Loops, here and in what follows: a closure that `map` calls remains a call.
+    let mut sums = short::Sums { re: [[0; LANES]; T], im: [[0; LANES]; T] };
+    for t in 0..T {
+        sums.re[t] = store_int(sums_re[t]);
+        sums.im[t] = store_int(sums_im[t]);
+    }
+    sums
 }
 
 /// Samples k and k + 16 side by side, in 2⁻⁷ LSB.
@@ -338,8 +351,13 @@ fn lanes_avx512<const T: usize, const AREA: bool>(chunk: &Chunk, code: &mut [u64
     let whole = vectors_i.len();
     take(vectors_i, vectors_q, &chunk.cos, &chunk.sin);
     take(&[last_i][..rest], &[last_q][..rest], &chunk.cos[whole..], &chunk.sin[whole..]);
-    *code = phases.map(|phase| wrapped(phase, steps.period));
-    Lanes { re: sums_re.map(|sum| store(sum)), im: sums_im.map(|sum| store(sum)) }
+    let mut sums = Lanes { re: [[0.0; LANES]; T], im: [[0.0; LANES]; T] };
+    for t in 0..T {
+        code[t] = wrapped(phases[t], steps.period);
+        sums.re[t] = store(sums_re[t]);
+        sums.im[t] = store(sums_im[t]);
+    }
+    sums
 }
 
 /// A code phase below `period`; few periods are taken off.

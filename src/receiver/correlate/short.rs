@@ -60,9 +60,12 @@ impl Steps {
             Edge::Area => (half + (width << (CODE_BITS - fine)) / 2).saturating_sub(step / 2),
             Edge::Nearest => half,
         };
-        let lane = |n: usize| rounded(step * n as u64) as u16;
+        let mut lanes = [[0; 2]; LANES];
+        for (k, pair) in lanes.iter_mut().enumerate() {
+            *pair = [rounded(step * k as u64) as u16, rounded(step * (k + LANES) as u64) as u16];
+        }
         Some(Self {
-            lanes: std::array::from_fn(|k| [lane(k), lane(k + LANES)]),
+            lanes,
             fine,
             width: width as u16,
             slope,
@@ -136,14 +139,25 @@ pub(super) fn body<const T: usize>(
             }
         }
     }
-    totals.map(|(re, im)| carrier.fold(&re, &im) * SCALE)
+    let mut folded = [Complex64::ZERO; T];
+    for (folded, (re, im)) in folded.iter_mut().zip(&totals) {
+        *folded = carrier.fold(re, im) * SCALE;
+    }
+    folded
 }
 
 /// Phasors in 2⁻¹⁵, two in each integer.
 #[inline(always)]
 fn pairs(x: [f32; LANES]) -> [i32; LANES / 2] {
-    let short = x.map(|x| (x * UNIT + ROUND).to_bits());
-    std::array::from_fn(|k| (short[2 * k] & 0xffff | short[2 * k + 1] << 16) as i32)
+    let mut short = [0; LANES];
+    for (short, x) in short.iter_mut().zip(&x) {
+        *short = (x * UNIT + ROUND).to_bits();
+    }
+    let mut both = [0; LANES / 2];
+    for (both, [first, second]) in both.iter_mut().zip(short.as_chunks().0) {
+        *both = (first & 0xffff | second << 16) as i32;
+    }
+    both
 }
 
 /// One chunk in plain lanes of 32 bits, which wrap as those of 16 would.

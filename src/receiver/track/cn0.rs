@@ -45,6 +45,8 @@ pub struct Cn0 {
 
 /// Largest C/N0 reported: a noise-free signal has no other.
 pub const LARGEST_CN0_DBHZ: f64 = 100.0;
+/// The same in Hz.
+const LARGEST_CN0_HZ: f64 = 1e10;
 /// Periods that are averaged before the first value is given while symbols are unknown.
 const LEAST_PERIODS: f64 = 50.0;
 
@@ -180,12 +182,11 @@ impl Cn0 {
             return None;
         }
         let signal = if self.known { self.signal.values()[0] } else { self.unknown_signal() };
-        let largest = libm::pow(10.0, LARGEST_CN0_DBHZ / 10.0);
         if signal <= 0.0 {
             return Some(1.0);
         }
         let signal = planted!("receiver.cn0.scale", signal, 1.12 * signal);
-        Some((signal / (self.noise.values()[0].max(0.0) * self.period_s)).clamp(1.0, largest))
+        Some((signal / (self.noise.values()[0].max(0.0) * self.period_s)).clamp(1.0, LARGEST_CN0_HZ))
     }
 
     /// Power of a prompt's noise, both components; `None` before there is one.
@@ -322,5 +323,6 @@ mod tests {
         }
         // Without noise there is no other figure.
         assert_eq!(dbhz(&nothing), LARGEST_CN0_DBHZ);
+        assert_eq!(LARGEST_CN0_HZ, libm::pow(10.0, LARGEST_CN0_DBHZ / 10.0));
     }
 }
