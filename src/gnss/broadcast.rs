@@ -101,8 +101,9 @@ pub struct Ephemeris {
     /// The second group delay of messages that have two: BGD(E1,E5a) of Galileo beside BGD(E1,E5b) in
     /// `tgd_s`, T_GD2 of BeiDou.
     pub tgd2_s: f64,
-    /// Corrections between signals beside the group delay in `tgd_s`: of L1 C/A, L2C, I5 and Q5 in CNAV.
-    pub isc_s: [f64; 4],
+    /// Corrections between signals beside the group delay in `tgd_s`: of L1 C/A, L2C, I5 and Q5 in CNAV, and
+    /// of the pilot and the data of L1C in CNAV-2.
+    pub isc_s: [f64; 6],
     /// Group delays of signals that have one of their own, by the signal's name; others follow from `tgd_s`.
     pub signal_delays_s: Vec<(&'static str, f64)>,
     /// State and forces at the reference time, of messages without elements, whose own here are zero.
@@ -242,7 +243,7 @@ impl Ephemeris {
             af2_sps2: 0.0,
             tgd_s: 0.0,
             tgd2_s: 0.0,
-            isc_s: [0.0; 4],
+            isc_s: [0.0; 6],
             signal_delays_s: Vec::new(),
             vector: None,
         }
@@ -597,7 +598,7 @@ mod tests {
             tgd2_s: 0.0,
             axis_rate_mps: 0.0,
             delta_n_rate_radps2: 0.0,
-            isc_s: [0.0; 4],
+            isc_s: [0.0; 6],
             signal_delays_s: Vec::new(),
             vector: None,
         }

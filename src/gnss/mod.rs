@@ -64,3 +64,4 @@ pub mod time;
 pub mod vienna;
 #[cfg(feature = "generator")]
 pub mod vmf3;
+pub mod weil;

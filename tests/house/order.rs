@@ -11,7 +11,7 @@ pub const ORDER: Order<'static> = &[
     (
         "gnss",
         &[
-            &["time", "earth", "satellite", "crc", "fec", "inflate", "place"],
+            &["time", "earth", "satellite", "crc", "fec", "inflate", "place", "weil"],
             &["bits", "klobuchar", "nequick", "ionex", "samples", "vienna"],
             &["ionosphere"],
             &["packed", "signal", "vmf3"],

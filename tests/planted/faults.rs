@@ -35,6 +35,9 @@ const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_e
 const REDUNDANT: &str = "witness::redundancy::real_words_17_to_20_are_the_redundancy_of_the_real_words_1_to_4";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
 const DELAYS: &str = "witness::printed::clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print";
+const L1C_CODES: &str = "witness::codes::all_chips_of_all_codes_and_overlays_of_l1c_are_those_of_another_program";
+const FRAMES_L1C: &str =
+    "witness::cnav2::shipped_frames_are_coded_again_symbol_by_symbol_read_either_way_up_and_sent_again";
 const CIVIL: &str = "witness::cnav::shipped_messages_of_l5_and_l2c_hold_and_are_sent_by_us_bit_by_bit";
 const CARRIED: &str = "witness::cnav::a_set_of_lnav_carried_to_cnav_is_the_same_orbit_and_clock_to_its_steps";
 const L2C_CODES: &str = "witness::codes::all_chips_of_all_codes_of_l2c_are_those_of_another_program_and_take_turns";
@@ -219,6 +222,11 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.l5.advance", "XB of L5 is a chip early", L5_CODES),
     fault("gnss.l2c.register", "the register of L2C feeds back into another stage", L2C_CODES),
     fault("gnss.l2c.turn", "CL has the first place, and CM the second", L2C_CODES),
+    fault("gnss.l1c.insertion", "the seven chips are put into the code of L1C a chip late", L1C_CODES),
+    fault("gnss.l1c.overlay", "the register of L1C's overlay feeds back from the stages before", L1C_CODES),
+    fault("gnss.fec.ldpc", "parity of low density leaves the last bit out", FRAMES_L1C),
+    fault("gnss.cnav2.time", "the count of a frame is taken for its own beginning", FRAMES_L1C),
+    fault("gnss.cnav2.isc", "L1C is corrected as its data are", DELAYS),
     fault("gnss.cnav.l2c_order", "messages of CNAV on L2C last as long as those of L5", CIVIL),
     fault("gnss.cnav.order", "messages of CNAV come one place early", CIVIL),
     fault("gnss.cnav.count", "the count of a message is taken for its own beginning", CIVIL),

@@ -11,6 +11,8 @@ mod atmosphere;
 mod beidou;
 #[path = "../witness/cnav.rs"]
 mod cnav;
+#[path = "../witness/cnav2.rs"]
+mod cnav2;
 #[path = "../witness/codes.rs"]
 mod codes;
 #[path = "../witness/data.rs"]

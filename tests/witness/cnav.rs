@@ -8,6 +8,8 @@ use gnss_twin::gnss::crc::crc24q;
 use gnss_twin::gnss::earth::{GPS_PI, SPEED_OF_LIGHT_MPS};
 use gnss_twin::gnss::fec::convolutional::Convolutional;
 use gnss_twin::gnss::gps::cnav::{self, CNAV, CNAV_L2C};
+use gnss_twin::gnss::gps::cnav2::CNAV2;
+use gnss_twin::gnss::gps::l1c::L1C;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::gps::l2c::L2C;
 use gnss_twin::gnss::gps::l5::L5;
@@ -187,7 +189,7 @@ fn every_real_message_of_l5_and_l2c_holds_and_its_sets_are_the_records_of_the_ho
                 resent += 1;
             }
             let Some(path) = external(file) else { return };
-            let matched = records(&path).into_iter().filter(|record| agrees(record, &sets)).count();
+            let matched = records(&path, 'G').into_iter().filter(|record| agrees(record, &sets)).count();
             let count = all.len();
             println!("{name} {signal}: {count} messages, {} sets, {resent} sent again, {matched} records", sets.len());
             assert!(count > 1500 && resent > count / 2 && matched >= 5, "{count} {resent} {matched}");
@@ -195,20 +197,21 @@ fn every_real_message_of_l5_and_l2c_holds_and_its_sets_are_the_records_of_the_ho
     }
 }
 
-/// The numbers of a record of CNAV: satellite, time of clock, then rows of four.
-struct Record {
+/// The numbers of a record of CNAV of one system: satellite, time of clock, then rows of four.
+pub struct Record {
     sv: Sv,
     toc: Epoch,
     rows: Vec<Vec<f64>>,
 }
 
-fn records(path: &std::path::Path) -> Vec<Record> {
+pub fn records(path: &std::path::Path, system: char) -> Vec<Record> {
     let packed = std::fs::read(path).unwrap();
     let gz = path.extension().is_some_and(|end| end == "gz");
     let whole = if gz { inflate::inflate(&packed, 1 << 26).unwrap() } else { packed };
     let text = String::from_utf8_lossy(&whole).into_owned();
     let lines: Vec<&str> = text.lines().collect();
-    let heads = (0..lines.len()).filter(|at| lines[*at].starts_with("> EPH G") && lines[*at].contains(" CNAV"));
+    let head = format!("> EPH {system}");
+    let heads = (0..lines.len()).filter(|at| lines[*at].starts_with(&head) && lines[*at].contains(" CNAV"));
     heads
         .map(|at| {
             let head = lines[at + 1];
@@ -223,14 +226,30 @@ fn records(path: &std::path::Path) -> Vec<Record> {
         .collect()
 }
 
-/// Whether there is a set of a record's time; its values are then the record's, to half a step.
+/// Whether a value is the record's, to half a step.
+fn close(record: &Record, name: &str, [one, other]: [f64; 2], exponent: i32) {
+    let step = libm::exp2(f64::from(exponent)) * GPS_PI;
+    assert!((one - other).abs() <= 0.5 * step + 1e-12 * one.abs(), "{} {name}: {one} {other}", record.sv);
+}
+
+/// Whether there is a set of a record's time; its values are then the record's.
 fn agrees(record: &Record, sets: &BTreeMap<(Sv, i64), Ephemeris>) -> bool {
     let Some(set) = sets.get(&(record.sv, record.toc.seconds())) else { return false };
+    close(record, "tgd", [set.tgd_s, record.rows[6][2]], -37);
+    // Of blocks without a signal its correction is not available, which records leave blank.
+    for (place, own) in set.isc_s.into_iter().enumerate().take(4) {
+        if own > -1.19e-7 {
+            close(record, "isc", [own, record.rows[7][place]], -37);
+        }
+    }
+    agrees_in_orbit_and_clock(record, sets)
+}
+
+/// The same but for group delays.
+pub fn agrees_in_orbit_and_clock(record: &Record, sets: &BTreeMap<(Sv, i64), Ephemeris>) -> bool {
+    let Some(set) = sets.get(&(record.sv, record.toc.seconds())) else { return false };
     let v = |row: usize, place: usize| record.rows[row][place];
-    let close = |name: &str, one: f64, other: f64, exponent: i32| {
-        let step = libm::exp2(f64::from(exponent)) * GPS_PI;
-        assert!((one - other).abs() <= 0.5 * step + 1e-12 * one.abs(), "{} {name}: {one} {other}", record.sv);
-    };
+    let close = |name: &str, one: f64, other: f64, exponent: i32| close(record, name, [one, other], exponent);
     let turn = |angle: f64| libm::remainder(angle, std::f64::consts::TAU);
     assert_eq!(set.toc, record.toc);
     close("af0", set.af0_s, v(0, 1), -37);
@@ -253,13 +272,6 @@ fn agrees(record: &Record, sets: &BTreeMap<(Sv, i64), Ephemeris>) -> bool {
     close("omega dot", set.omega_dot_radps, v(4, 3), -44);
     close("idot", set.idot_radps, v(5, 0), -44);
     close("delta n rate", set.delta_n_rate_radps2, v(5, 1), -57);
-    close("tgd", set.tgd_s, v(6, 2), -37);
-    // Of blocks without a signal its correction is not available, which records leave blank.
-    for (place, own) in set.isc_s.into_iter().enumerate() {
-        if own > -1.19e-7 {
-            close("isc", own, v(7, place), -37);
-        }
-    }
     true
 }
 
@@ -272,15 +284,18 @@ fn a_set_of_lnav_carried_to_cnav_is_the_same_orbit_and_clock_to_its_steps() {
             continue;
         }
         let carried = (CNAV.quantised)(set).unwrap();
+        let second = (CNAV2.quantised)(set).unwrap();
+        // The same, but for its form and corrections of its own.
+        assert_eq!(Ephemeris { form: carried.form, health: carried.health, ..second.clone() }, carried);
         assert!((carried.toe.since(set.toe)).abs() <= 150.0 && carried.toe.seconds() % 300 == 0);
         for minutes in [-120, -60, -7, 0, 33, 120] {
             let at = set.toe.plus_s(60.0 * f64::from(minutes));
             let apart = carried.state(at).unwrap().position_m - set.state(at).unwrap().position_m;
             farthest_m = farthest_m.max(apart.norm());
             // Every signal has its clock: corrections have steps of 2⁻³⁵ s, 9 mm.
-            for signal in [&L1_CA, &L2C, &L5] {
+            for (carried, signal) in [(&carried, &L1_CA), (&carried, &L2C), (&carried, &L5), (&second, &L1C)] {
                 let clock_s = |set: &Ephemeris| set.clock_of_signal(at, signal).unwrap().offset_s;
-                latest_m = latest_m.max(SPEED_OF_LIGHT_MPS * (clock_s(&carried) - clock_s(set)).abs());
+                latest_m = latest_m.max(SPEED_OF_LIGHT_MPS * (clock_s(carried) - clock_s(set)).abs());
             }
         }
         sets += 1;
@@ -322,7 +337,7 @@ fn satellites_that_send_l2c_and_l5_are_those_that_broadcast_cnav_and_corrections
         let Some(path) = external(name) else { return };
         let mut senders: Vec<u8> = Vec::new();
         let mut others: Vec<u8> = Vec::new();
-        for record in records(&path) {
+        for record in records(&path, 'G') {
             let own = if record.rows[7][2] == 0.0 && record.rows[7][3] == 0.0 { &mut others } else { &mut senders };
             own.push(record.sv.number);
         }

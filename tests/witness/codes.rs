@@ -3,7 +3,7 @@
 use gnss_twin::gnss::galileo::e1::{self, Code};
 use gnss_twin::gnss::galileo::e5;
 use gnss_twin::gnss::gps::l1ca::{CODE_CHIPS, code};
-use gnss_twin::gnss::gps::{l2c, l5};
+use gnss_twin::gnss::gps::{l1c, l2c, l5};
 use gnss_twin::gnss::signal::Overlay;
 use sha2::{Digest, Sha256};
 
@@ -120,6 +120,30 @@ fn all_chips_of_all_codes_of_l2c_are_those_of_another_program_and_take_turns() {
     }
     assert_eq!(codes, 230);
     assert!([0, 64, 158, 211].iter().all(|number| l2c::code(l2c::Code::Long, *number).is_none()));
+}
+
+/// The same of L1C-D and L1C-P, and the overlays of 1800 chips as `L1CO`.
+const L1C_CODES: &str = include_str!("../../data/witness/l1c_codes.csv");
+
+#[test]
+fn all_chips_of_all_codes_and_overlays_of_l1c_are_those_of_another_program() {
+    let mut codes = 0;
+    for line in L1C_CODES.lines().skip(1) {
+        let column: Vec<&str> = line.split(',').collect();
+        let number = column[1].parse().unwrap();
+        let signs = match column[0] {
+            "L1CD" => l1c::code(l1c::Code::Data, number),
+            "L1CP" => l1c::code(l1c::Code::Pilot, number),
+            _ => l1c::overlay(number),
+        };
+        let chips: Vec<u8> = signs.unwrap().into_iter().map(|sign| u8::from(sign < 0)).collect();
+        holds(&chips, &column[2..], line);
+        codes += 1;
+    }
+    assert_eq!(codes, 189);
+    assert!(
+        [0, 64].iter().all(|number| l1c::code(l1c::Code::Data, *number).is_none() && l1c::overlay(*number).is_none())
+    );
 }
 
 /// The number of ones, the first and last 24 chips and the digest of a code.

@@ -254,7 +254,7 @@ fn example() -> Ephemeris {
         tgd2_s: 0.0,
         axis_rate_mps: 0.0,
         delta_n_rate_radps2: 0.0,
-        isc_s: [0.0; 4],
+        isc_s: [0.0; 6],
         signal_delays_s: Vec::new(),
         vector: None,
     }

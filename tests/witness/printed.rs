@@ -12,6 +12,8 @@ use gnss_twin::gnss::galileo::inav;
 use gnss_twin::gnss::glonass::fdma::{G1, G2};
 use gnss_twin::gnss::glonass::gnav::GNAV_SETS;
 use gnss_twin::gnss::gps::cnav::CNAV_SETS;
+use gnss_twin::gnss::gps::cnav2::CNAV2_SETS;
+use gnss_twin::gnss::gps::l1c::L1C;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::gps::l2c::L2C;
 use gnss_twin::gnss::gps::l5::L5;
@@ -376,9 +378,14 @@ fn clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print(
     close(of(&lnav, &L1_CA), -8e-9);
     close(of(&lnav, &L2C), -8e-9 * (77.0 * 77.0) / (60.0 * 60.0));
     // IS-GPS-705J, 20.3.3.3.1.2: Δt − T_GD + ISC; L5 by its pilot.
-    let cnav = Ephemeris { form: &CNAV_SETS, isc_s: [1e-9, 2e-9, 4e-9, 5e-9], ..lnav };
+    let cnav = Ephemeris { form: &CNAV_SETS, isc_s: [1e-9, 2e-9, 4e-9, 5e-9, 0.0, 0.0], ..lnav };
     for (signal, expected_s) in [(&L1_CA, -7e-9), (&L2C, -6e-9), (&L5, -3e-9)] {
         close(of(&cnav, signal), expected_s);
+    }
+    // IS-GPS-800J, 3.5.3.9.1: the same with the correction of L1C-P.
+    let second = Ephemeris { form: &CNAV2_SETS, isc_s: [1e-9, 2e-9, 4e-9, 5e-9, 6e-9, 7e-9], ..cnav };
+    for (signal, expected_s) in [(&L1C, -2e-9), (&L1_CA, -7e-9), (&L5, -3e-9)] {
+        close(of(&second, signal), expected_s);
     }
     // BDS-SIS-ICD-2.1, 5.2.4.10: Δt − T_GD1 on B1I, − T_GD2 on B2I; the clock is that of B3I.
     let beidou = Ephemeris { tgd_s: 8e-9, tgd2_s: 3e-9, ..blank(System::BeiDou) };

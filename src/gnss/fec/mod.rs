@@ -1,5 +1,8 @@
 //! Forward error correction of navigation messages.
 
 pub mod convolutional;
+pub mod frames;
 pub mod interleaver;
+pub mod ldpc;
 pub mod reed_solomon;
+pub mod register;

@@ -1,6 +1,8 @@
 //! GPS: one file a signal, one a message.
 
 pub mod cnav;
+pub mod cnav2;
+pub mod l1c;
 pub mod l1ca;
 pub mod l2c;
 pub mod l5;

@@ -26,8 +26,9 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 13] = [
+pub static SIGNALS: [&Signal; 14] = [
     &gps::l1ca::L1_CA,
+    &gps::l1c::L1C,
     &gps::l2c::L2C,
     &gps::l5::L5,
     &galileo::e1::E1,

@@ -8,10 +8,10 @@ use crate::gnss::earth::GPS_PI;
 use crate::gnss::time::Epoch;
 
 /// Semi-major axis and rate of the node from which the elements count (table 20-II).
-pub(super) const REFERENCE_AXIS_M: f64 = 26_559_710.0;
-pub(super) const REFERENCE_NODE_RADPS: f64 = -2.6e-9 * GPS_PI;
+pub(in crate::gnss::gps) const REFERENCE_AXIS_M: f64 = 26_559_710.0;
+pub(in crate::gnss::gps) const REFERENCE_NODE_RADPS: f64 = -2.6e-9 * GPS_PI;
 /// Step of reference times.
-pub(super) const STEP_S: i64 = 300;
+pub(in crate::gnss::gps) const STEP_S: i64 = 300;
 /// Bits of health, by carrier.
 pub(super) const L1: u16 = 1;
 pub(super) const L2: u16 = 2;

@@ -26,7 +26,8 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, WEEK_S};
 pub use fields::tables;
-use fields::{CLOCKS, DELAY, HEADER, L1, L2, L5, ORBIT_1, ORBIT_2, STEP_S, TIME};
+use fields::{CLOCKS, DELAY, HEADER, L1, L2, L5, ORBIT_1, ORBIT_2, TIME};
+pub(super) use fields::{REFERENCE_AXIS_M, REFERENCE_NODE_RADPS, STEP_S};
 pub use on_l2c::CNAV_L2C;
 pub use reader::CnavReader;
 
@@ -113,22 +114,22 @@ struct Content {
     utc: Utc,
 }
 
-/// What message 33 says of UTC.
+/// What message 33 says of UTC, and page 1 of CNAV-2.
 #[derive(Clone, Copy, Debug, Default)]
-struct Utc {
-    a0_s: f64,
-    a1_sps: f64,
-    a2_sps2: f64,
-    leap_s: f64,
-    tot_s: f64,
-    week: f64,
-    event_week: f64,
-    event_day: f64,
-    leap_after_s: f64,
+pub(super) struct Utc {
+    pub a0_s: f64,
+    pub a1_sps: f64,
+    pub a2_sps2: f64,
+    pub leap_s: f64,
+    pub tot_s: f64,
+    pub week: f64,
+    pub event_week: f64,
+    pub event_day: f64,
+    pub leap_after_s: f64,
 }
 
 impl Utc {
-    fn of(common: &Common, start: Epoch) -> Self {
+    pub fn of(common: &Common, start: Epoch) -> Self {
         let utc = &common.utc;
         let reference = utc.polynomial.map_or(common.reference.unwrap_or(start), |polynomial| polynomial.reference);
         // To the step of its field.
@@ -169,7 +170,7 @@ pub fn type_at(message: &Message, start: Epoch) -> u8 {
 
 /// The set as CNAV has it: carried to the nearest multiple of 300 s, with the corrections between signals
 /// that agree with the one delay of LNAV, whose delays are as 1/f².
-fn form(set: &Ephemeris) -> Ephemeris {
+pub(super) fn form(set: &Ephemeris) -> Ephemeris {
     if *set.form == CNAV_SETS {
         return set.clone();
     }
@@ -194,7 +195,7 @@ fn form(set: &Ephemeris) -> Ephemeris {
         i0_rad: set.i0_rad + set.idot_radps * since_toe_s,
         af0_s: set.af0_s + since_toc_s * (set.af1_sps + since_toc_s * set.af2_sps2),
         af1_sps: set.af1_sps + 2.0 * since_toc_s * set.af2_sps2,
-        isc_s: [0.0, isc_s(L2_HZ), isc_s(L5_HZ), isc_s(L5_HZ)],
+        isc_s: [0.0, isc_s(L2_HZ), isc_s(L5_HZ), isc_s(L5_HZ), 0.0, 0.0],
         ..set.clone()
     }
 }
@@ -205,7 +206,7 @@ const L5_HZ: f64 = 1_176.45e6;
 
 /// T_GD less the correction of the signal (20.3.3.3.1.1.1); of L5 that of the pilot, which receivers follow.
 fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
-    let [l1ca_s, l2c_s, _, l5q_s] = set.isc_s;
+    let [l1ca_s, l2c_s, _, l5q_s, ..] = set.isc_s;
     let own_s = match signal.centre_hz() {
         hz if hz < BETWEEN_L5_L2_HZ => l5q_s,
         hz if hz < BETWEEN_L2_L1_HZ => l2c_s,

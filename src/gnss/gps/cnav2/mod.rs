@@ -1,0 +1,384 @@
+//! CNAV-2, the message of L1C: frames of eighteen seconds, encoded and decoded.
+//!
+//! Source: IS-GPS-800J, 3.2.3 (structure, codes, interleaver) and 3.5. A frame is 1800 symbols: subframe 1,
+//! nine bits of time in 52 symbols; subframe 2, orbit and clock in 600 bits; subframe 3, one of many pages in
+//! 274. The last two have checks, are coded at rate one half and interleaved together. The matrices of the
+//! codes are those of 6.2, packed in `ldpc_2.bin` and `ldpc_3.bin`.
+//!
+//! Limits: subframe 3 is always page 1 (UTC, ionosphere, corrections between signals); of satellites that
+//! send others, too, a set is whole once page 1 has come. Left out are page 2 (other systems' times, the
+//! Earth's orientation), 3 and 4 (almanacs), 5 (corrections), 6 (text) and those of QZSS. Of UTC nothing is
+//! used. Sets of LNAV become those of CNAV-2 as they become those of CNAV ([`super::cnav`]), with delays of
+//! both parts of L1C that are those of L1.
+
+mod fields;
+mod reader;
+
+use std::sync::LazyLock;
+
+use crate::gnss::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::gnss::broadcast::{Ephemeris, SetForm};
+use crate::gnss::crc::crc24q;
+use crate::gnss::fec::interleaver::Interleaver;
+use crate::gnss::fec::ldpc::Ldpc;
+use crate::gnss::fec::register::RegisterCode;
+use crate::gnss::gps::cnav::{self, CNAV_SETS, STEP_S, Utc};
+use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::klobuchar::Klobuchar;
+use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Sender};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+use crate::gnss::time::{Epoch, WEEK_S};
+pub use fields::tables;
+use fields::{DELAY, HEADER, OF_UTC, SET};
+pub use reader::Cnav2Reader;
+
+/// CNAV-2 as L1C names it.
+pub static CNAV2: Message = Message {
+    name: "CNAV-2",
+    symbol_s: 0.01,
+    unit_s: FRAME_S,
+    first_s: 0,
+    sender: |common| Ok(Box::new(Frames(common.clone()))),
+    number: |_| 1,
+    timed: &[1],
+    dated: &[],
+    set: &[1],
+    reduced: &[],
+    ionosphere: IonosphereForm { model: Model::Klobuchar, unit: |_| true, coefficients: ionosphere },
+    set_parameters,
+    elements: of_integers,
+    parameters: opened,
+    reader: |sv| Box::new(Cnav2Reader::new(sv)),
+    form,
+    sets: &CNAV2_SETS,
+    quantised,
+    adjustable,
+    alert: None,
+    adjust,
+    rinex: None,
+};
+
+/// Sets of CNAV-2: those of CNAV with corrections for L1C, and health of L1C alone.
+pub static CNAV2_SETS: SetForm = SetForm {
+    name: "CNAV-2",
+    group_delay_s,
+    serves: |signal| signal.carries(&CNAV2) || (CNAV_SETS.serves)(signal),
+    given_delay_s: |set| set.tgd_s - set.isc_s[0],
+    is_healthy: |set| set.health == 0,
+    healthy: |set, signal| signal.carries(&CNAV2).then_some(set.health == 0),
+    rinex_sources: None,
+};
+
+/// Seconds of a frame, and of the intervals in which frames are counted.
+const FRAME_S: i64 = 18;
+const INTERVAL_S: i64 = 7200;
+const FRAMES: i64 = INTERVAL_S / FRAME_S;
+/// Bits of subframes 2 and 3 with their checks, and of a check.
+const BITS_2: usize = 600;
+const BITS_3: usize = 274;
+const CHECK_BITS: usize = 24;
+/// Symbols of subframe 1, and of a frame.
+const SYMBOLS_1: usize = 52;
+const SYMBOLS: usize = SYMBOLS_1 + 2 * BITS_2 + 2 * BITS_3;
+/// The page that is sent and read.
+const PAGE: f64 = 1.0;
+
+/// The code of the eight lower bits of the time (3.2.3.2, figure 3.2-7).
+const TIME_CODE: RegisterCode = RegisterCode { stages: 8, feedback: 0b1111_1001, symbols: SYMBOLS_1 - 1 };
+/// Rows of 46 written, columns of 38 sent (3.2.3.5).
+const INTERLEAVER: Interleaver = Interleaver { columns: 38, rows: 46 };
+
+static CODE_2: LazyLock<Ldpc> = LazyLock::new(|| Ldpc::packed(BITS_2, include_bytes!("ldpc_2.bin")));
+static CODE_3: LazyLock<Ldpc> = LazyLock::new(|| Ldpc::packed(BITS_3, include_bytes!("ldpc_3.bin")));
+
+/// What frames say.
+#[derive(Clone, Debug)]
+struct Content {
+    set: Ephemeris,
+    week: f64,
+    itow: f64,
+    top: f64,
+    ned: [f64; 3],
+    flag: f64,
+    op_week: f64,
+    page: f64,
+    klobuchar: Klobuchar,
+    utc: Utc,
+}
+
+/// A frame as decoded: its checks are right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// Count of eighteen seconds at which the next frame begins.
+    pub time: u32,
+    /// Whether symbols were upside down.
+    pub inverted: bool,
+    /// Bits of subframe 2 with their check.
+    pub two: Vec<bool>,
+    /// Those of subframe 3; `None` where it fails its check.
+    pub three: Option<Vec<bool>>,
+}
+
+impl Frame {
+    /// Seconds of the week at which it began.
+    pub fn of_week_s(&self) -> i64 {
+        let interval = number(self.two.get(13..21).unwrap_or_default()) as i64;
+        // The count is that of the frame after, the interval that of this one.
+        let before = i64::from(self.time) + planted!("gnss.cnav2.time", FRAMES - 1, FRAMES);
+        (interval * INTERVAL_S + before.rem_euclid(FRAMES) * FRAME_S).rem_euclid(WEEK_S)
+    }
+
+    /// When it began, its week near `near`.
+    pub fn sent_at(&self, near: Epoch) -> Epoch {
+        let week = number(self.two.get(..13).unwrap_or_default()) as i64;
+        Epoch::new(near.nearest_week(week, 8192) * WEEK_S + self.of_week_s(), 0.0)
+    }
+
+    /// The bits of page 1, if subframe 3 has that.
+    fn page_1(&self) -> Option<&Vec<bool>> {
+        self.three.as_ref().filter(|bits| page(bits) == PAGE)
+    }
+
+    /// The satellite's number that subframe 3 says.
+    fn prn(&self) -> Option<u128> {
+        self.three.as_ref().and_then(|bits| bits.get(..8)).map(number)
+    }
+}
+
+fn page(bits: &[bool]) -> f64 {
+    bits.get(8..14).map_or(0.0, |bits| number(bits) as f64)
+}
+
+/// The 52 symbols of a time: its highest bit, and that bit added to the code word of the others.
+pub fn time_symbols(time: u32) -> Vec<bool> {
+    let high = time >> 8 & 1 == 1;
+    std::iter::once(high).chain(TIME_CODE.encode(time & 0xFF).map(|one| one ^ high)).collect()
+}
+
+/// The symbols of a frame before they are interleaved, of a time and of bits with their checks.
+pub fn coded(time: u32, two: &[bool], three: &[bool]) -> Vec<bool> {
+    let (two, three) = (CODE_2.encode(two), CODE_3.encode(three));
+    time_symbols(time).into_iter().chain(two).chain(three).collect()
+}
+
+/// The order in which the symbols of a frame are sent.
+pub fn interleaved(coded: &[bool]) -> Vec<bool> {
+    let (first, rest) = coded.split_at(SYMBOLS_1.min(coded.len()));
+    first.iter().copied().chain(INTERLEAVER.interleave(rest)).collect()
+}
+
+/// The most likely time in 52 soft symbols, its highest bit as if they are not upside down, and how much of
+/// what they say is for it.
+pub fn likely_time(soft: &[f32]) -> (u32, f32) {
+    let Some((first, rest)) = soft.split_first() else { return (0, 0.0) };
+    let sums = (0..256).map(|low| (low, first + TIME_CODE.correlation(low, rest)));
+    let (low, sum) = sums.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap_or((0, 0.0));
+    let all: f32 = soft.iter().map(|value| value.abs()).sum();
+    (low | u32::from(sum < 0.0) << 8, sum.abs() / all.max(f32::MIN_POSITIVE))
+}
+
+/// The frame in 1800 soft symbols, positive for a logical 0, whichever way up; `None` where its checks fail.
+pub fn decode(soft: &[f32]) -> Option<Frame> {
+    let (first, rest) = soft.split_at_checked(SYMBOLS_1)?;
+    let (likely, _) = likely_time(first);
+    let rest = INTERLEAVER.deinterleave(rest);
+    for inverted in [false, true] {
+        // Upside down the highest bit is the other.
+        let time = likely ^ u32::from(inverted) << 8;
+        if i64::from(time) >= FRAMES {
+            continue;
+        }
+        let own: Vec<f32> = rest.iter().map(|value| if inverted { -value } else { *value }).collect();
+        let (two, three) = own.split_at_checked(2 * BITS_2)?;
+        let of = |code: &Ldpc, soft| code.decode(soft).filter(|bits| crc24q(bits.iter().copied()) == 0);
+        if let Some(two) = of(&CODE_2, two) {
+            return Some(Frame { time, inverted, two, three: of(&CODE_3, three) });
+        }
+    }
+    None
+}
+
+/// Makes the frames of satellites.
+struct Frames(Common);
+
+impl Sender for Frames {
+    fn unit(&self, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        if start.tow_whole_s() % FRAME_S != 0 || start.fraction() != 0.0 {
+            let expected = "a multiple of 18 s";
+            return Err(FieldError::Start { message: CNAV2.name, start_s: start.tow_s(), expected });
+        }
+        let content = Content {
+            week: start.week().rem_euclid(8192) as f64,
+            itow: (start.tow_whole_s() / INTERVAL_S) as f64,
+            // Predicted for the reference time itself.
+            top: set.toe.tow_s() / STEP_S as f64,
+            op_week: set.toe.week().rem_euclid(256) as f64,
+            klobuchar: self.0.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] }),
+            utc: Utc::of(&self.0, start),
+            ..blank(set.clone())
+        };
+        let two = checked(&[&SET], &content, BITS_2)?;
+        let three = checked(&[&HEADER, &OF_UTC, &DELAY], &content, BITS_3)?;
+        let time = (start.tow_whole_s() / FRAME_S + 1) % FRAMES;
+        Ok(interleaved(&coded(time as u32, &two, &three)))
+    }
+}
+
+/// The bits of a subframe with their check.
+fn checked(tables: &[&'static [Element<Content>]], content: &Content, count: usize) -> Result<Vec<bool>, FieldError> {
+    let mut bits = vec![false; count - CHECK_BITS];
+    for table in tables {
+        write_all(table, content, &mut bits)?;
+    }
+    let check = crc24q(bits.iter().copied());
+    bits.extend(bits_of(u128::from(check), CHECK_BITS));
+    Ok(bits)
+}
+
+/// The set as CNAV-2 has it.
+fn form(set: &Ephemeris) -> Ephemeris {
+    if *set.form == CNAV2_SETS {
+        return set.clone();
+    }
+    let civil = cnav::form(set);
+    Ephemeris { form: &CNAV2_SETS, health: u16::from(civil.health != 0), ..civil }
+}
+
+/// T_GD less the correction of the signal (3.5.3.9.1); of L1C that of the pilot, which receivers follow.
+fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
+    if signal.carries(&CNAV2) {
+        set.tgd_s - planted!("gnss.cnav2.isc", set.isc_s[4], set.isc_s[5])
+    } else {
+        (CNAV_SETS.group_delay_s)(set, signal)
+    }
+}
+
+/// Tables with parameters of a set.
+fn of_set() -> [&'static [Element<Content>]; 2] {
+    [&SET, &DELAY]
+}
+
+/// Parameters that are of the frame and not of the set.
+const PASSING: [&str; 2] = ["week", "itow_2h"];
+
+fn set_parameters() -> Vec<&'static str> {
+    let names = of_set().into_iter().flatten().map(|element| element.field.name);
+    names.filter(|name| !PASSING.contains(name)).collect()
+}
+
+/// The raw integers of the set in subframe 2 and in page 1.
+fn of_set_in(two: &Vec<bool>, page_1: &Vec<bool>) -> Parameters {
+    let mut found = integers(&SET, two);
+    found.retain(|(name, _)| !PASSING.contains(name));
+    found.extend(integers(&DELAY, page_1));
+    found
+}
+
+/// The parameters of a unit's symbols.
+fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
+    let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
+    let frame = decode(&soft)?;
+    let page_1 = frame.page_1()?;
+    let mut found = of_set_in(&frame.two, page_1);
+    found.extend(integers(&OF_UTC, page_1));
+    Some((true, found))
+}
+
+/// Nothing read yet.
+fn blank(set: Ephemeris) -> Content {
+    Content {
+        set: Ephemeris { form: &CNAV2_SETS, ..set },
+        week: 0.0,
+        itow: 0.0,
+        top: 0.0,
+        ned: [0.0; 3],
+        flag: 0.0,
+        op_week: 0.0,
+        page: PAGE,
+        klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] },
+        utc: Utc::default(),
+    }
+}
+
+/// The elements that raw integers give, as if they had been sent at `near`.
+fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
+    let mut content = blank(Ephemeris::blank(sv, near));
+    for table in of_set() {
+        let mut bits = vec![false; BITS_2];
+        for field in table.iter().map(|element| &element.field).filter(|field| !PASSING.contains(&field.name)) {
+            field.write(&mut bits, raw(field.name)?);
+        }
+        read_all(table, &bits, &mut content);
+    }
+    Some(content.set)
+}
+
+/// The coefficients of the ionosphere that raw integers of page 1 give.
+fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
+    let mut bits = vec![false; BITS_3];
+    for field in DELAY.iter().map(|element| &element.field).filter(|field| !field.name.starts_with("isc")) {
+        field.write(&mut bits, raw(field.name)?);
+    }
+    Some(Coefficients::Klobuchar(klobuchar(&bits)))
+}
+
+/// The coefficients in the bits of page 1.
+fn klobuchar(page_1: &Vec<bool>) -> Klobuchar {
+    let mut content = blank(Ephemeris::blank(Sv::gps(1), Epoch::new(0, 0.0)));
+    read_all(&DELAY, page_1, &mut content);
+    content.klobuchar
+}
+
+/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+///
+/// # Errors
+/// A value that the message cannot carry.
+pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+    let mut content = blank(form(ephemeris));
+    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut content))?;
+    Ok(content.set)
+}
+
+/// Parameters by which sets are distinguished, that are no set's, or that all satellites say alike.
+const FIXED_PARAMETERS: [&str; 15] = [
+    "week",
+    "itow_2h",
+    "toe_5min",
+    "top_5min",
+    "op_week",
+    "l1c_health",
+    "integrity_flag",
+    "alpha_0",
+    "alpha_1",
+    "alpha_2",
+    "alpha_3",
+    "beta_0",
+    "beta_1",
+    "beta_2",
+    "beta_3",
+];
+
+fn adjustable() -> Vec<&'static str> {
+    let names = of_set().into_iter().flatten().map(|element| element.field.name);
+    names.filter(|name| !FIXED_PARAMETERS.contains(name) && !name.starts_with("ura_ned")).collect()
+}
+
+/// Adds `by` to a parameter in the unit of the tables; whether there is one.
+fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+    let mut content = blank(ephemeris.clone());
+    let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut content, by));
+    *ephemeris = content.set;
+    found
+}
+
+/// The set in subframe 2 and in page 1, sent at `sent`.
+fn elements(sv: Sv, two: &Vec<bool>, page_1: &Vec<bool>, sent: Epoch) -> Ephemeris {
+    let mut content = blank(Ephemeris::blank(sv, sent));
+    read_all(&SET, two, &mut content);
+    read_all(&DELAY, page_1, &mut content);
+    content.set
+}
+
+#[cfg(test)]
+mod tests;

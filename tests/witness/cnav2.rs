@@ -1,0 +1,199 @@
+//! CNAV-2 against real frames, before the interleaver, and the RINEX records of the same hour.
+
+use std::collections::BTreeMap;
+
+use gnss_twin::gnss::bits::number;
+use gnss_twin::gnss::broadcast::Ephemeris;
+use gnss_twin::gnss::crc::crc24q;
+use gnss_twin::gnss::gps::cnav2::{self, CNAV2, Frame};
+use gnss_twin::gnss::inflate;
+use gnss_twin::gnss::message::{Common, Read};
+use gnss_twin::gnss::satellite::{Sv, System};
+use gnss_twin::gnss::time::Epoch;
+
+use super::cnav::{agrees_in_orbit_and_clock, records};
+use super::data::external;
+
+/// Eight frames of QZSS satellites, which send the same message, 2024-10-31 and 2025-08-21: of each satellite
+/// page 1 and the frame after it, and of two the last frame of two hours.
+const FRAMES: &str = include_str!("../../data/witness/cnav2_frames.csv");
+
+/// Semi-major axes from which GPS and QZSS count (IS-GPS-800J, table 3.5-1; IS-QZSS-PNT-005, 5.4).
+const AXES_M: [f64; 2] = [26_559_710.0, 42_164_200.0];
+
+/// A frame on the air: the satellite's number, when it began, and its 1800 symbols before the interleaver.
+struct Sent {
+    sv: Sv,
+    start: Epoch,
+    symbols: Vec<bool>,
+}
+
+fn bits(hex: &str, count: usize) -> Vec<bool> {
+    let digits = hex.chars().map(|digit| digit.to_digit(16).unwrap());
+    digits.flat_map(|digit| (0..4).rev().map(move |bit| digit >> bit & 1 == 1)).take(count).collect()
+}
+
+/// Of a number of the code, the week and the second at which the frame ends.
+fn sent(prn: u8, [week, end_s]: [&str; 2], hex: &str) -> Sent {
+    let start = Epoch::from_week(week.parse().unwrap(), end_s.parse::<f64>().unwrap() - 18.0);
+    // Only the number decides what is read: QZSS's own are 192 more than its satellites'.
+    Sent { sv: Sv { system: System::Gps, number: prn }, start, symbols: bits(hex, 1800) }
+}
+
+fn shipped() -> Vec<Sent> {
+    let parse = |line: &str| {
+        let column: Vec<&str> = line.split(',').collect();
+        sent(column[0].parse().unwrap(), [column[1], column[2]], column[3])
+    };
+    FRAMES.lines().skip(1).map(parse).collect()
+}
+
+fn real(name: &str) -> Option<Vec<Sent>> {
+    let packed = std::fs::read(external(name)?).unwrap();
+    let text = String::from_utf8(inflate::inflate(&packed, 1 << 26).unwrap()).unwrap();
+    let rows = text.lines().filter(|line| line.starts_with('2'));
+    let mut all: Vec<Sent> = rows
+        .map(|line| line.split(',').collect::<Vec<&str>>())
+        .map(|column| sent(192 + column[3].parse::<u8>().unwrap(), [column[0], column[1]], column[5]))
+        .collect();
+    all.sort_by_key(|sent| (sent.sv, sent.start.seconds()));
+    Some(all)
+}
+
+fn soft(symbols: &[bool], inverted: bool) -> Vec<f32> {
+    symbols.iter().map(|&one| if one ^ inverted { -1.0 } else { 1.0 }).collect()
+}
+
+/// Times, checks, and that its information is coded again to all 1800 symbols.
+fn holds(sent: &Sent) -> Frame {
+    let frame = cnav2::decode(&soft(&cnav2::interleaved(&sent.symbols), false)).unwrap();
+    assert!(!frame.inverted);
+    assert_eq!(frame.sent_at(sent.start), sent.start, "{} {}", sent.sv, sent.start);
+    let three = frame.three.as_ref().unwrap();
+    assert_eq!(number(&three[..8]), u128::from(sent.sv.number));
+    assert!(cnav2::coded(frame.time, &frame.two, three) == sent.symbols, "{} {}", sent.sv, sent.start);
+    frame
+}
+
+/// What a reader says of a satellite's frames.
+fn read(all: &[&Sent], inverted: bool) -> Vec<Read> {
+    let mut reader = (CNAV2.reader)(all[0].sv);
+    let mut news = Vec::new();
+    let mut next = all[0].start;
+    // Some symbols of the frame before.
+    news.extend(soft(&all[0].symbols[1000..1700], inverted).into_iter().flat_map(|one| reader.take(one, next)));
+    for sent in all {
+        if sent.start != next {
+            reader.skip();
+        }
+        next = sent.start.plus_s(18.0);
+        let symbols = soft(&cnav2::interleaved(&sent.symbols), inverted);
+        news.extend(symbols.into_iter().flat_map(|one| reader.take(one, sent.start)));
+    }
+    news
+}
+
+/// Whether subframe 2 is what we send of a set: all but time of prediction, accuracies and flags.
+fn is_sent(set: &Ephemeris, start: Epoch, two: &[bool]) {
+    let symbols = (CNAV2.sender)(&Common::default()).unwrap().unit(set, start).unwrap();
+    let ours = cnav2::decode(&soft(&symbols, false)).unwrap();
+    assert_eq!(ours.sent_at(start), start);
+    let compared = |place: &usize| !(21..32).contains(place) && !(459..470).contains(place) && *place < 565;
+    let differ: Vec<usize> = (0..576).filter(compared).filter(|place| ours.two[*place] != two[*place]).collect();
+    assert!(differ.is_empty(), "{} {start} {differ:?}", set.sv);
+}
+
+#[test]
+fn shipped_frames_are_coded_again_symbol_by_symbol_read_either_way_up_and_sent_again() {
+    let all = shipped();
+    let frames: Vec<Frame> = all.iter().map(holds).collect();
+    // Two are the last of their two hours: the count is that of the next, the interval their own.
+    assert_eq!(frames.iter().filter(|frame| frame.time == 0).count(), 2);
+    let mut satellites = 0;
+    for of_one in all.iter().collect::<Vec<_>>().chunk_by(|a, b| a.sv == b.sv) {
+        satellites += 1;
+        for inverted in [false, true] {
+            let news = read(of_one, inverted);
+            let units: Vec<&Read> = news.iter().filter(|read| matches!(read, Read::Unit { .. })).collect();
+            assert_eq!(units.len(), of_one.len());
+            for (unit, sent) in units.iter().zip(of_one) {
+                assert_eq!(**unit, Read::Unit { symbols: 1800, of_week_s: sent.start.tow_whole_s(), inverted });
+            }
+            assert!(news.iter().any(|read| matches!(read, Read::Ionosphere(_))));
+            let sets: Vec<&Ephemeris> = news
+                .iter()
+                .filter_map(|read| if let Read::Ephemeris(set) = read { Some(&**set) } else { None })
+                .collect();
+            assert!(!sets.is_empty());
+            for (sent, frame) in all.iter().zip(&frames).filter(|(sent, _)| sent.sv == of_one[0].sv) {
+                let toe = number(&frame.two[38..49]) as i64 * 300;
+                if let Some(set) = sets.iter().find(|set| set.toe.tow_whole_s() == toe) {
+                    is_sent(set, sent.start, &frame.two);
+                }
+            }
+        }
+    }
+    assert_eq!((satellites, all.len()), (3, 8));
+}
+
+/// What subframe 2 says; of page 1, which is not there, zeros.
+fn orbit_and_clock(sv: Sv, two: &Vec<bool>, start: Epoch) -> Ephemeris {
+    let (_, fields) = cnav2::tables().into_iter().find(|(table, _)| *table == "subframe 2").unwrap();
+    let raw = |name: &str| Some(fields.iter().find(|field| field.name == name).map_or(0, |field| field.read(two)));
+    (CNAV2.elements)(sv, &raw, start).unwrap()
+}
+
+#[test]
+fn every_real_frame_is_coded_again_and_its_sets_are_the_records_of_the_hour() {
+    for (name, file, least) in [("233h_qzscnav2", Some("navbits/233h_rnx.nav.gz"), 10), ("305a_qzscnav2", None, 0)] {
+        let Some(all) = real(&format!("navbits/{name}.csv.gz")) else { return };
+        let mut sets: BTreeMap<(Sv, i64), Ephemeris> = BTreeMap::new();
+        let mut read_whole = 0;
+        for of_one in all.chunk_by(|a, b| a.sv == b.sv) {
+            let sv = Sv { system: System::Qzss, number: of_one[0].sv.number - 192 };
+            for sent in of_one {
+                let set = orbit_and_clock(sent.sv, &holds(sent).two, sent.start);
+                let axis_m = set.sqrt_a_sqrtm * set.sqrt_a_sqrtm - AXES_M[0] + AXES_M[1];
+                sets.insert((sv, set.toe.seconds()), Ephemeris { sv, sqrt_a_sqrtm: axis_m.sqrt(), ..set });
+            }
+            // Sets are whole from the first page 1 on.
+            for read in read(&of_one.iter().collect::<Vec<_>>(), false) {
+                let Read::Ephemeris(set) = read else { continue };
+                let own = &sets[&(sv, set.toe.seconds())];
+                assert_eq!((set.af0_s, set.m0_rad, set.tgd_s), (own.af0_s, own.m0_rad, own.tgd_s), "{sv}");
+                read_whole += 1;
+            }
+        }
+        let path = match file.map(external) {
+            Some(None) => return,
+            path => path.flatten(),
+        };
+        let records = path.map_or(Vec::new(), |path| records(&path, 'J'));
+        // Records are those of CNAV, whose group delays are a step from those of CNAV-2 at times.
+        let matched = records.into_iter().filter(|record| agrees_in_orbit_and_clock(record, &sets)).count();
+        println!("{name}: {} frames, {} sets, {read_whole} read, {matched} records", all.len(), sets.len());
+        assert!(all.len() >= 800 && matched >= least && read_whole >= 3, "{} {matched} {read_whole}", all.len());
+    }
+}
+
+#[test]
+fn subframes_of_a_gps_satellite_are_sent_again_by_us_bit_by_bit() {
+    let Some(path) = external("navbits/gnsstk_gps_cnav2_sf2.csv") else { return };
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut seen = 0;
+    for line in text.lines().skip(1).filter(|line| line.contains(",G,")) {
+        let column: Vec<&str> = line.split(',').collect();
+        let two = bits(column[6], 600);
+        assert_eq!(crc24q(two.iter().copied()), 0, "{line}");
+        let week: u32 = column[0].parse().unwrap();
+        assert_eq!(number(&two[..13]), u128::from(week % 8192));
+        let interval_s = number(&two[13..21]) as f64 * 7200.0;
+        let start = Epoch::from_week(week, interval_s);
+        let set = orbit_and_clock(Sv::gps(column[3].parse().unwrap()), &two, start);
+        let radius_m = set.state(start).unwrap().position_m.norm();
+        assert!((26.3e6..26.9e6).contains(&radius_m), "{radius_m}");
+        is_sent(&set, start, &two);
+        seen += 1;
+    }
+    assert!(seen >= 4, "{seen}");
+}
