@@ -190,6 +190,7 @@ impl Constants {
 /// 3.0, 5.2.4.8 and BDS-SIS-ICD 2.1): clocks are those of B3I.
 const B1I_HZ: f64 = 1_561.098e6;
 const B2I_HZ: f64 = 1_207.14e6;
+const B3I_HZ: f64 = 1_268.52e6;
 
 /// Motion in the orbital plane: what orbit and clock have in common.
 struct Anomaly {
@@ -402,6 +403,16 @@ impl Ephemeris {
     pub fn group_delay_s(&self, signal: &Signal) -> f64 {
         let own = self.signal_delays_s.iter().find(|(name, _)| *name == signal.name);
         own.map_or_else(|| (self.form.group_delay_s)(self, signal), |(_, delay_s)| *delay_s)
+    }
+
+    /// What a delay as 1/f² on another carrier of BeiDou makes of T_GD1: zero on B3I, whose clock it is, and
+    /// T_GD1 itself on B1I.
+    pub(in crate::gnss) fn group_delay_on_s(&self, carrier_hz: f64) -> f64 {
+        let against_b3i = |hz: f64| B3I_HZ * B3I_HZ / (hz * hz) - 1.0;
+        if carrier_hz == B1I_HZ {
+            return self.given_delay_s();
+        }
+        self.given_delay_s() * against_b3i(carrier_hz) / against_b3i(B1I_HZ)
     }
 
     /// (f/f_signal)² with the carrier on which the message gives its delay: that of L1, and of NavIC that of

@@ -1,7 +1,7 @@
 //! Weil codes: a Legendre sequence added to itself some chips later.
 //!
-//! Source: IS-GPS-800J, 3.2.2.1.1 (L1C, length 10 223). For a prime
-//! p the Legendre sequence is one at the residues of squares, and zero at 0 and elsewhere.
+//! Source: IS-GPS-800J, 3.2.2.1.1 (L1C, length 10 223); BDS-SIS-ICD-B1C 1.0, 5.2 (10 243 and 3607). For a
+//! prime p the Legendre sequence is one at the residues of squares, and zero at 0 and elsewhere.
 
 /// The Legendre sequence of a prime.
 #[derive(Clone, Debug)]

@@ -35,6 +35,9 @@ const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_e
 const REDUNDANT: &str = "witness::redundancy::real_words_17_to_20_are_the_redundancy_of_the_real_words_1_to_4";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
 const DELAYS: &str = "witness::printed::clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print";
+const B1C_CODES: &str = "witness::bcnav1::all_chips_of_all_codes_and_overlays_of_b1c_are_those_of_another_program";
+const FRAMES_B1C: &str = "witness::bcnav1::frames_are_read_from_any_symbol_and_either_way_up_to_what_was_sent";
+const FIELD_64: &str = "witness::bcnav1::elements_of_six_bits_are_those_of_the_printed_field";
 const L1C_CODES: &str = "witness::codes::all_chips_of_all_codes_and_overlays_of_l1c_are_those_of_another_program";
 const FRAMES_L1C: &str =
     "witness::cnav2::shipped_frames_are_coded_again_symbol_by_symbol_read_either_way_up_and_sent_again";
@@ -222,6 +225,9 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.l5.advance", "XB of L5 is a chip early", L5_CODES),
     fault("gnss.l2c.register", "the register of L2C feeds back into another stage", L2C_CODES),
     fault("gnss.l2c.turn", "CL has the first place, and CM the second", L2C_CODES),
+    fault("gnss.b1c.truncation", "codes of B1C begin a chip late", B1C_CODES),
+    fault("gnss.bcnav1.time", "frames of B1C are taken for the ones before", FRAMES_B1C),
+    fault("gnss.fec.field64", "elements of six bits are of another field", FIELD_64),
     fault("gnss.l1c.insertion", "the seven chips are put into the code of L1C a chip late", L1C_CODES),
     fault("gnss.l1c.overlay", "the register of L1C's overlay feeds back from the stages before", L1C_CODES),
     fault("gnss.fec.ldpc", "parity of low density leaves the last bit out", FRAMES_L1C),

@@ -7,6 +7,8 @@
 
 #[path = "../witness/atmosphere.rs"]
 mod atmosphere;
+#[path = "../witness/bcnav1.rs"]
+mod bcnav1;
 #[path = "../witness/beidou.rs"]
 mod beidou;
 #[path = "../witness/cnav.rs"]

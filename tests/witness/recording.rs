@@ -1,10 +1,11 @@
 //! Acquisition on recordings that others made with real antennas.
 
+use gnss_twin::gnss::beidou::b1c::{self, B1C};
 use gnss_twin::gnss::galileo::e1::E1;
 use gnss_twin::gnss::gps::l1c::{self, L1C};
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::satellite::Sv;
+use gnss_twin::gnss::satellite::{Sv, System};
 use gnss_twin::gnss::signal::Link;
 use gnss_twin::gnss::time::Rate;
 use gnss_twin::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
@@ -283,6 +284,44 @@ fn a_recording_holds_the_pilots_of_l1c_that_others_found_in_it_where_l1_ca_is_an
     // Overlays of all satellites begin together; to reach the ground they take 67 to 87 ms. By chance: one in
     // 450.
     assert!(after_s(begins_s[0], begins_s[1]).abs() < 0.02, "{begins_s:?}");
+}
+
+/// Pilots of B1C, which others found in it: C30, C36 and C45, of those that sent it that day.
+#[test]
+fn a_recording_holds_the_pilots_of_b1c_that_others_found_in_it_and_their_overlays_begin_by_bdt() {
+    let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
+    let metadata = IfMetadata { inverted: true, ..metadata(Format::Ci8, 4e6, 0.0) };
+    let settings = AcquisitionSettings { doppler_max_hz: 3000.0, ..AcquisitionSettings::default() };
+    let mut searcher = Searcher::new(&metadata, &settings).unwrap();
+    let mut links = [30, 36, 45, 20].map(|number| B1C.link(Sv { system: System::BeiDou, number })).to_vec();
+    links.push(L1C.link(Sv::gps(18)));
+    let rows = searcher.search(&Block { first: 0, i: &i, q: &q }, &links).unwrap();
+    let hits: Vec<Acquired> = rows.into_iter().filter_map(|(_, hit)| hit).collect();
+    hits.iter().for_each(|hit| println!("{} {:.1} Hz {:.1} dB-Hz", hit.sv, hit.doppler_hz, hit.cn0_dbhz));
+    assert_eq!(hits.iter().map(|hit| hit.sv.number).collect::<Vec<_>>(), [30, 36, 45, 18], "{hits:?}");
+    // The list has that of C30 alone, on a grid of 50 Hz, and of the mirrored spectrum.
+    assert!((hits[0].doppler_hz - 600.0).abs() < 60.0, "{:?}", hits[0]);
+    let begins_s: Vec<f64> = hits
+        .iter()
+        .map(|hit| {
+            let number = hit.sv.number;
+            let chips = match hit.sv.system {
+                System::Gps => [l1c::code(l1c::Code::Pilot, number), l1c::overlay(number)],
+                _ => [b1c::code(b1c::Code::Pilot, number), b1c::overlay(number)],
+            };
+            let [code, overlay] = chips.map(Option::unwrap);
+            let (begun_s, lead) = overlay_begins_s(hit, [&i, &q], 4e6, [&code, &overlay]);
+            println!("{}: its overlay begins {begun_s:.4} s after the first sample, better by {lead:.2}", hit.sv);
+            assert!(lead > 1.5, "{lead}");
+            begun_s
+        })
+        .collect();
+    // Those of B1C begin together and 14 s after those of L1C, as BDT is 14 s behind GPS time. Medium orbits
+    // are 72 to 92 ms away, those of GPS 67 to 87 ms.
+    for begun_s in &begins_s[..3] {
+        assert!(after_s(*begun_s, begins_s[0]).abs() < 0.02, "{begins_s:?}");
+        assert!(after_s(*begun_s, begins_s[3] + 14.0).abs() < 0.025, "{begins_s:?}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-use super::{B1I_HZ, B2I_HZ, Ephemeris};
+use super::{B2I_HZ, Ephemeris};
 use crate::gnss::satellite::System;
 use crate::gnss::signal::Signal;
 
@@ -43,9 +43,8 @@ pub static PLAIN: SetForm = SetForm {
 /// The one delay of a set on the carrier of a signal; BeiDou's clock is that of B3I.
 fn plain_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     match (set.sv.system, signal.carrier_hz(set.sv)) {
-        (System::BeiDou, B1I_HZ) => set.given_delay_s(),
         (System::BeiDou, B2I_HZ) => planted!("gnss.delay.second", set.tgd2_s, -set.tgd2_s),
-        (System::BeiDou, _) => 0.0,
+        (System::BeiDou, hz) => set.group_delay_on_s(hz),
         _ => set.given_delay_s() * set.dispersion(signal),
     }
 }

@@ -4,5 +4,6 @@ pub mod convolutional;
 pub mod frames;
 pub mod interleaver;
 pub mod ldpc;
+pub mod ldpc64;
 pub mod reed_solomon;
 pub mod register;

@@ -2,7 +2,7 @@
 //!
 //! A register of so many stages begins with the word, gives its oldest stage and takes the sum of some
 //! stages: a cyclic code (BCH) in its systematic form. Source: IS-GPS-800J, 3.2.3.2 (time of interval of
-//! CNAV-2).
+//! CNAV-2); BDS-SIS-ICD-B1C 1.0, 6.2.1 (subframe 1 of B-CNAV1).
 
 /// A code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

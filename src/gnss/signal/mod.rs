@@ -26,7 +26,7 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 14] = [
+pub static SIGNALS: [&Signal; 15] = [
     &gps::l1ca::L1_CA,
     &gps::l1c::L1C,
     &gps::l2c::L2C,
@@ -39,6 +39,7 @@ pub static SIGNALS: [&Signal; 14] = [
     &beidou::in_phase::B1I,
     &beidou::in_phase::B2I,
     &beidou::in_phase::B3I,
+    &beidou::b1c::B1C,
     &glonass::fdma::G1,
     &glonass::fdma::G2,
 ];

@@ -1,0 +1,72 @@
+//! Finds frames in soft symbols, whichever way up they come, and gathers what they say.
+//!
+//! Where a frame begins shows in the code words of number and time, which is right by chance at times: the
+//! check of subframe 2 decides.
+
+use super::{B_CNAV1, Frame, SYMBOLS, SYMBOLS_1, decode, elements, likely_time, of_set_in};
+use crate::gnss::fec::frames::Frames;
+use crate::gnss::message::{Parameters, Read, Reader};
+use crate::gnss::record::NavigationRow;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+/// Of what 72 symbols say, the part that a time explains where a frame is tried: 0.89 at an amplitude of √2
+/// standard deviations, near which the codes begin to fail, with 0.05 of scatter; the best of all times among
+/// data has less than half.
+const LEAST_SHARE: f32 = 0.65;
+
+/// Reads B-CNAV1.
+#[derive(Clone, Debug)]
+pub struct BCnav1Reader {
+    sv: Sv,
+    frames: Frames,
+    /// What the set that was reported last said.
+    complete: Option<Parameters>,
+}
+
+impl BCnav1Reader {
+    /// A reader that has read nothing.
+    pub fn new(sv: Sv) -> Self {
+        Self { sv, frames: Frames::new(SYMBOLS), complete: None }
+    }
+
+    /// Takes a frame that ends with the newest symbol.
+    fn read(&mut self, frame: &Frame, near: Epoch) -> Vec<Read> {
+        let sent = frame.sent_at(near);
+        let unit = Read::Unit { symbols: SYMBOLS as u64, of_week_s: frame.of_week_s(), inverted: frame.inverted };
+        let mut news = vec![unit, Read::Time(sent)];
+        let Some(beside) = &frame.three else { return news };
+        let all = of_set_in(&frame.two, beside);
+        if self.complete.as_ref() != Some(&all) {
+            let set = elements(self.sv, &frame.two, beside, sent);
+            let rows = NavigationRow::each(self.sv, B_CNAV1.name, u32::from(set.iode), all.clone()).collect();
+            self.complete = Some(all);
+            news.push(Read::Ephemeris(Box::new(set)));
+            news.push(Read::Parameters(rows));
+        }
+        news
+    }
+}
+
+impl Reader for BCnav1Reader {
+    fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
+        let number = self.sv.number;
+        let may_begin = |symbols: &[f32]| {
+            symbols.get(..SYMBOLS_1).is_some_and(|first| likely_time(number, first).1.abs() > LEAST_SHARE)
+        };
+        let found = self.frames.take(soft, may_begin, |symbols| decode(number, symbols));
+        found.map_or_else(Vec::new, |frame| self.read(&frame, near))
+    }
+
+    fn skip(&mut self) {
+        self.frames.skip();
+    }
+
+    fn doubt(&mut self) {
+        self.frames.doubt();
+    }
+
+    fn missing(&self) -> Vec<u8> {
+        if self.complete.is_some() { Vec::new() } else { vec![1] }
+    }
+}
