@@ -81,6 +81,8 @@ const NUMBERS: &[Row] = &[
     ("fidelity", "knot_tolerance_cycles", No, No),
     // Intervals do not overlap, and end after they begin.
     ("expect.interval", "from_s to_s", Perhaps, No),
+    ("expect", "position_within_m", No, No),
+    ("expect.interval", "position_within_m", No, No),
     ("satellite_fault", "step_s", Yes, Perhaps),
     ("satellite_fault", "drift_sps on_s", Yes, No),
     ("satellite_fault", "radial_m along_m cross_m", Yes, Yes),
