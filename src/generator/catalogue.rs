@@ -286,9 +286,9 @@ fn contradict(a: &Ephemeris, b: &Ephemeris) -> bool {
 }
 
 /// Whether elements are those of the nominal constellation (the fields are wider): a 12 h sidereal orbit of
-/// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo, one of a day, 0° to 33°, for NavIC
-/// and 0° to 60° for BeiDou, of which others take 13 h; of a state vector whether it is as far away as the
-/// system's orbits.
+/// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo, one of a day, 0° to 33°, for NavIC,
+/// 0° to 50° and less round for QZSS, and 0° to 60° for BeiDou, of which others take 13 h; of a state vector
+/// whether it is as far away as the system's orbits.
 fn plausible(set: &Ephemeris) -> bool {
     if let Some(vector) = set.vector {
         return (vector.position_m.norm() - set.sv.orbit_m()).abs() < ROUND_M;
@@ -296,12 +296,13 @@ fn plausible(set: &Ephemeris) -> bool {
     let (sqrt_a_sqrtm, inclinations_deg) = match set.sv.system {
         System::Galileo => (5440.6, 52.0..60.0),
         System::Navic => (6493.4, 0.0..33.0),
+        System::Qzss => (6493.4, 0.0..50.0),
         System::BeiDou if set.sv.orbit_m() > 40e6 => (6493.4, 0.0..60.0),
         System::BeiDou => (5282.6, 51.0..59.0),
         _ => (5153.6, 51.0..59.0),
     };
     (set.sqrt_a_sqrtm - sqrt_a_sqrtm).abs() < 5.0
-        && set.eccentricity < 0.03
+        && set.eccentricity < if set.sv.system == System::Qzss { 0.1 } else { 0.03 }
         && inclinations_deg.contains(&set.i0_rad.to_degrees())
 }
 
@@ -344,7 +345,7 @@ fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
 /// When a set goes on the air. Those of Galileo and NavIC, of every ten minutes at best, do so after their
 /// reference time, and a file says when a receiver had the whole set: some minutes later.
 ///
-/// BeiDou's sets are those of an hour, and go on the air with it.
+/// BeiDou's sets are those of an hour, and go on the air with it, those of QZSS with the hour before theirs.
 fn first_sent(set: &Ephemeris) -> Epoch {
     if let Some(from) = set.sent_from() {
         return from;
@@ -354,6 +355,9 @@ fn first_sent(set: &Ephemeris) -> Epoch {
     }
     if set.is_sent_after_reference() {
         return set.toe.plus_s(set.transmitted.since(set.toe).clamp(0.0, DELAY_S));
+    }
+    if set.sv.system == System::Qzss {
+        return set.toe.plus_s(-3600.0);
     }
     let nominal = set.toe.plus_s(-7200.0);
     let on_grid = set.toe.seconds() % 7200 == 0;

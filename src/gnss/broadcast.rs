@@ -469,12 +469,14 @@ impl Ephemeris {
     /// (GLONASS ICD L1, L2 5.1, 4.4, P1). Of Galileo, NavIC and BeiDou, whose documents have none,
     /// eight hours: a set is used for four hours after its reference time.
     ///
+    /// Of QZSS two hours (IS-QZSS-PNT-005, 4.1.2.4).
     /// Of GPS four hours, or what the issue of data says when the fit flag is set
     /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).
     pub fn fit_interval_s(&self) -> f64 {
         let hours = match (self.long_fit, self.iodc) {
             _ if self.vector.is_some() => 0.5,
             _ if self.is_sent_after_reference() => 8.0,
+            (false, _) if self.sv.system == System::Qzss => 2.0,
             (false, _) => 4.0,
             (true, 240..=247) => 8.0,
             (true, 248..=255 | 496) => 14.0,

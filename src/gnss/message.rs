@@ -81,6 +81,7 @@ pub struct Records {
 }
 
 /// How a message describes the ionosphere.
+#[derive(Clone, Copy)]
 pub struct IonosphereForm {
     /// By which model.
     pub model: Model,

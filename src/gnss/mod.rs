@@ -49,6 +49,7 @@ pub mod nequick;
 pub mod nmea;
 pub mod packed;
 pub mod place;
+pub mod qzss;
 pub mod record;
 pub mod recording;
 #[cfg(feature = "generator")]

@@ -120,7 +120,7 @@ fn number(sv: Sv) -> u16 {
 /// Number of a signal in GSV, hexadecimal (NMEA 0183 4.11, GSV); 0 says that it has none.
 fn signal_number(signal: &Signal) -> u8 {
     match (signal.system, signal.rinex) {
-        (System::Gps | System::Glonass | System::Sbas, "1C") => 1,
+        (System::Gps | System::Glonass | System::Qzss | System::Sbas, "1C") => 1,
         (System::Galileo, "1C") => 7,
         (System::Glonass, "2C") => 3,
         (System::BeiDou, "2I") => 1,

@@ -103,6 +103,17 @@ impl Sv {
         if self.is_geostationary() || is_inclined { System::Navic.orbit_m() } else { self.system.orbit_m() }
     }
 
+    /// The number of its codes: of QZSS and SBAS, which share theirs with GPS, 192 and 100 more than its own
+    /// (RINEX 4.02, table 2).
+    pub fn prn(self) -> u8 {
+        let more = match self.system {
+            System::Qzss => planted!("gnss.qzss.prn", 192, 193),
+            System::Sbas => 100,
+            _ => 0,
+        };
+        self.number.saturating_add(more)
+    }
+
     /// A GPS satellite by its PRN.
     pub const fn gps(number: u8) -> Self {
         Self { system: System::Gps, number }

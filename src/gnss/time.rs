@@ -65,6 +65,9 @@ pub static GST: TimeScale = TimeScale { name: "GST", behind_gpst_s: 0, has_leap_
 /// IRNSS network time: its weeks begin when those of GPS do (IRNSS SIS ICD for SPS 1.1, system time).
 pub static IRNSST: TimeScale = TimeScale { name: "IRNSST", behind_gpst_s: 0, has_leap_seconds: false };
 
+/// QZSS's time: its weeks begin when those of GPS do (IS-QZSS-PNT-005, 3.1.4).
+pub static QZSST: TimeScale = TimeScale { name: "QZSST", behind_gpst_s: 0, has_leap_seconds: false };
+
 /// BeiDou's time: UTC of 2006-01-01, when GPS time was 14 s ahead of it (BDS-SIS-ICD-B1I 3.0, 3.3).
 pub static BDT: TimeScale = TimeScale { name: "BDT", behind_gpst_s: 14, has_leap_seconds: false };
 

@@ -22,6 +22,7 @@ pub const ORDER: Order<'static> = &[
             &["message"],
             &["nmea", "exchange"],
             &["gps", "galileo", "navic", "beidou", "glonass"],
+            &["qzss"],
             &["rinex"],
             &["sp3"],
         ],
@@ -170,6 +171,7 @@ pub const EXCEPTIONS: &[&str] = &[
     "gnss/signal: gnss/glonass",
     "gnss/signal: gnss/gps",
     "gnss/signal: gnss/navic",
+    "gnss/signal: gnss/qzss",
     "gnss/signal: gnss/message",
 ];
 

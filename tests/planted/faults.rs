@@ -35,6 +35,14 @@ const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_e
 const REDUNDANT: &str = "witness::redundancy::real_words_17_to_20_are_the_redundancy_of_the_real_words_1_to_4";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
 const DELAYS: &str = "witness::printed::clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print";
+const QZSS_CODES: &str = "witness::codes::all_chips_of_all_codes_are_those_of_another_program";
+const QZSS_PRN: &str =
+    "witness::codes::satellites_of_qzss_have_the_codes_of_the_prn_that_rinex_names_and_those_of_gps_do_not";
+const QZSS_HEALTH: &str =
+    "witness::qzss::satellites_with_l1c_b_say_that_l1_c_a_is_not_to_be_used_and_others_that_it_is";
+const QZSS_SENDERS: &str = "witness::qzss::satellites_send_the_signals_that_they_broadcast";
+const QZSS_CNAV: &str =
+    "witness::qzss::every_real_message_of_l5_and_l2c_is_read_and_sent_again_and_its_sets_are_the_records_of_the_hour";
 const B1C_CODES: &str = "witness::bcnav1::all_chips_of_all_codes_and_overlays_of_b1c_are_those_of_another_program";
 const FRAMES_B1C: &str = "witness::bcnav1::frames_are_read_from_any_symbol_and_either_way_up_to_what_was_sent";
 const FIELD_64: &str = "witness::bcnav1::elements_of_six_bits_are_those_of_the_printed_field";
@@ -225,6 +233,12 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.l5.advance", "XB of L5 is a chip early", L5_CODES),
     fault("gnss.l2c.register", "the register of L2C feeds back into another stage", L2C_CODES),
     fault("gnss.l2c.turn", "CL has the first place, and CM the second", L2C_CODES),
+    fault("gnss.qzss.codes", "codes of QZSS but the first are a chip late", QZSS_CODES),
+    fault("gnss.qzss.prn", "satellites of QZSS have the codes of the next", QZSS_PRN),
+    fault("gnss.qzss.overlay", "the second register of overlays feeds back as the first does", L1C_CODES),
+    fault("gnss.qzss.health", "bits of L1C/B count for L1 C/A", QZSS_HEALTH),
+    fault("gnss.qzss.l1cb", "J04 sends L1 C/A for ever", QZSS_SENDERS),
+    fault("gnss.qzss.axis", "elements of QZSS count from 200 m less", QZSS_CNAV),
     fault("gnss.b1c.truncation", "codes of B1C begin a chip late", B1C_CODES),
     fault("gnss.bcnav1.time", "frames of B1C are taken for the ones before", FRAMES_B1C),
     fault("gnss.fec.field64", "elements of six bits are of another field", FIELD_64),

@@ -37,6 +37,8 @@ mod packed;
 mod printed;
 #[path = "../witness/pseudorange.rs"]
 mod pseudorange;
+#[path = "../witness/qzss.rs"]
+mod qzss;
 #[path = "../witness/recording.rs"]
 mod recording;
 #[path = "../witness/reduced.rs"]

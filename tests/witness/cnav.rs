@@ -30,10 +30,10 @@ const MESSAGES_L2C: &str = include_str!("../../data/witness/gps_cnav_l2c.csv");
 const BOTH: [(&str, &Message); 2] = [("L5", &CNAV), ("L2C", &CNAV_L2C)];
 
 /// A message on the air: satellite, start and its 300 bits.
-struct Sent {
-    sv: Sv,
-    start: Epoch,
-    bits: Vec<bool>,
+pub struct Sent {
+    pub sv: Sv,
+    pub start: Epoch,
+    pub bits: Vec<bool>,
 }
 
 fn bits(hex: &str) -> Vec<bool> {
@@ -51,7 +51,7 @@ fn shipped(messages: &str) -> Vec<Sent> {
 }
 
 /// Those of a signal in a file, by satellite and time.
-fn real(name: &str, (signal, message): (&str, &Message)) -> Option<Vec<Sent>> {
+pub fn real(name: &str, (signal, message): (&str, &Message)) -> Option<Vec<Sent>> {
     let packed = std::fs::read(external(name)?).unwrap();
     let text = String::from_utf8(inflate::inflate(&packed, 1 << 26).unwrap()).unwrap();
     let mut all: Vec<Sent> = (text.lines().skip(1))
@@ -61,19 +61,19 @@ fn real(name: &str, (signal, message): (&str, &Message)) -> Option<Vec<Sent>> {
             let number = |i: usize| column[i].parse::<u32>().unwrap();
             // The file says when the message ends.
             let start = Epoch::from_week(number(0), f64::from(number(1)) - message.unit_s as f64);
-            Sent { sv: Sv::gps(number(3) as u8), start, bits: bits(column[5]) }
+            Sent { sv: format!("{}{}", column[2], column[3]).parse().unwrap(), start, bits: bits(column[5]) }
         })
         .collect();
     all.sort_by_key(|sent| (sent.sv, sent.start.seconds()));
     Some(all)
 }
 
-fn soft(one: bool) -> f32 {
+pub fn soft(one: bool) -> f32 {
     if one { -1.0 } else { 1.0 }
 }
 
 /// What a reader says of a satellite's messages, whose code runs on.
-fn read(message: &Message, all: &[Sent], inverted: bool) -> Vec<Read> {
+pub fn read(message: &Message, all: &[Sent], inverted: bool) -> Vec<Read> {
     let mut reader = (message.reader)(all[0].sv);
     let (mut memory, mut next) = (Vec::new(), all[0].start);
     let mut news = Vec::new();
@@ -199,9 +199,9 @@ fn every_real_message_of_l5_and_l2c_holds_and_its_sets_are_the_records_of_the_ho
 
 /// The numbers of a record of CNAV of one system: satellite, time of clock, then rows of four.
 pub struct Record {
-    sv: Sv,
-    toc: Epoch,
-    rows: Vec<Vec<f64>>,
+    pub sv: Sv,
+    pub toc: Epoch,
+    pub rows: Vec<Vec<f64>>,
 }
 
 pub fn records(path: &std::path::Path, system: char) -> Vec<Record> {

@@ -7,7 +7,8 @@ use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::crc::crc24q;
 use gnss_twin::gnss::gps::cnav2::{self, CNAV2, Frame};
 use gnss_twin::gnss::inflate;
-use gnss_twin::gnss::message::{Common, Read};
+use gnss_twin::gnss::message::{Common, Message, Read};
+use gnss_twin::gnss::qzss::civil;
 use gnss_twin::gnss::satellite::{Sv, System};
 use gnss_twin::gnss::time::Epoch;
 
@@ -18,10 +19,7 @@ use super::data::external;
 /// page 1 and the frame after it, and of two the last frame of two hours.
 const FRAMES: &str = include_str!("../../data/witness/cnav2_frames.csv");
 
-/// Semi-major axes from which GPS and QZSS count (IS-GPS-800J, table 3.5-1; IS-QZSS-PNT-005, 5.4).
-const AXES_M: [f64; 2] = [26_559_710.0, 42_164_200.0];
-
-/// A frame on the air: the satellite's number, when it began, and its 1800 symbols before the interleaver.
+/// A frame on the air: the satellite, when it began, and its 1800 symbols before the interleaver.
 struct Sent {
     sv: Sv,
     start: Epoch,
@@ -36,8 +34,7 @@ fn bits(hex: &str, count: usize) -> Vec<bool> {
 /// Of a number of the code, the week and the second at which the frame ends.
 fn sent(prn: u8, [week, end_s]: [&str; 2], hex: &str) -> Sent {
     let start = Epoch::from_week(week.parse().unwrap(), end_s.parse::<f64>().unwrap() - 18.0);
-    // Only the number decides what is read: QZSS's own are 192 more than its satellites'.
-    Sent { sv: Sv { system: System::Gps, number: prn }, start, symbols: bits(hex, 1800) }
+    Sent { sv: Sv { system: System::Qzss, number: prn - 192 }, start, symbols: bits(hex, 1800) }
 }
 
 fn shipped() -> Vec<Sent> {
@@ -70,14 +67,18 @@ fn holds(sent: &Sent) -> Frame {
     assert!(!frame.inverted);
     assert_eq!(frame.sent_at(sent.start), sent.start, "{} {}", sent.sv, sent.start);
     let three = frame.three.as_ref().unwrap();
-    assert_eq!(number(&three[..8]), u128::from(sent.sv.number));
+    assert_eq!(number(&three[..8]), 192 + u128::from(sent.sv.number));
     assert!(cnav2::coded(frame.time, &frame.two, three) == sent.symbols, "{} {}", sent.sv, sent.start);
     frame
 }
 
+fn message(sv: Sv) -> &'static Message {
+    if sv.system == System::Qzss { &civil::CNAV2 } else { &CNAV2 }
+}
+
 /// What a reader says of a satellite's frames.
 fn read(all: &[&Sent], inverted: bool) -> Vec<Read> {
-    let mut reader = (CNAV2.reader)(all[0].sv);
+    let mut reader = (message(all[0].sv).reader)(all[0].sv);
     let mut news = Vec::new();
     let mut next = all[0].start;
     // Some symbols of the frame before.
@@ -95,7 +96,7 @@ fn read(all: &[&Sent], inverted: bool) -> Vec<Read> {
 
 /// Whether subframe 2 is what we send of a set: all but time of prediction, accuracies and flags.
 fn is_sent(set: &Ephemeris, start: Epoch, two: &[bool]) {
-    let symbols = (CNAV2.sender)(&Common::default()).unwrap().unit(set, start).unwrap();
+    let symbols = (message(set.sv).sender)(&Common::default()).unwrap().unit(set, start).unwrap();
     let ours = cnav2::decode(&soft(&symbols, false)).unwrap();
     assert_eq!(ours.sent_at(start), start);
     let compared = |place: &usize| !(21..32).contains(place) && !(459..470).contains(place) && *place < 565;
@@ -140,7 +141,7 @@ fn shipped_frames_are_coded_again_symbol_by_symbol_read_either_way_up_and_sent_a
 fn orbit_and_clock(sv: Sv, two: &Vec<bool>, start: Epoch) -> Ephemeris {
     let (_, fields) = cnav2::tables().into_iter().find(|(table, _)| *table == "subframe 2").unwrap();
     let raw = |name: &str| Some(fields.iter().find(|field| field.name == name).map_or(0, |field| field.read(two)));
-    (CNAV2.elements)(sv, &raw, start).unwrap()
+    (message(sv).elements)(sv, &raw, start).unwrap()
 }
 
 #[test]
@@ -150,11 +151,10 @@ fn every_real_frame_is_coded_again_and_its_sets_are_the_records_of_the_hour() {
         let mut sets: BTreeMap<(Sv, i64), Ephemeris> = BTreeMap::new();
         let mut read_whole = 0;
         for of_one in all.chunk_by(|a, b| a.sv == b.sv) {
-            let sv = Sv { system: System::Qzss, number: of_one[0].sv.number - 192 };
+            let sv = of_one[0].sv;
             for sent in of_one {
                 let set = orbit_and_clock(sent.sv, &holds(sent).two, sent.start);
-                let axis_m = set.sqrt_a_sqrtm * set.sqrt_a_sqrtm - AXES_M[0] + AXES_M[1];
-                sets.insert((sv, set.toe.seconds()), Ephemeris { sv, sqrt_a_sqrtm: axis_m.sqrt(), ..set });
+                sets.insert((sv, set.toe.seconds()), set);
             }
             // Sets are whole from the first page 1 on.
             for read in read(&of_one.iter().collect::<Vec<_>>(), false) {

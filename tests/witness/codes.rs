@@ -2,9 +2,10 @@
 
 use gnss_twin::gnss::galileo::e1::{self, Code};
 use gnss_twin::gnss::galileo::e5;
-use gnss_twin::gnss::gps::l1ca::{CODE_CHIPS, code};
+use gnss_twin::gnss::gps::l1ca::{CODE_CHIPS, L1_CA, code};
 use gnss_twin::gnss::gps::{l1c, l2c, l5};
-use gnss_twin::gnss::signal::Overlay;
+use gnss_twin::gnss::qzss;
+use gnss_twin::gnss::signal::{Overlay, Signal};
 use sha2::{Digest, Sha256};
 
 /// PRN, ones, first and last 24 chips in hexadecimal, SHA-256 of a byte 0 or 1 for each chip.
@@ -20,8 +21,8 @@ fn all_chips_of_all_codes_are_those_of_another_program() {
         holds(&chips, &column[1..], line);
         codes += 1;
     }
-    assert_eq!(codes, 37);
-    assert!(code(38).is_none());
+    assert_eq!(codes, 47);
+    assert!([0, 38, 192, 203].into_iter().all(|prn| code(prn).is_none()));
 }
 
 /// Code, number, ones, first and last 24 chips in hexadecimal, SHA-256 of a byte 0 or 1 for each chip.
@@ -140,10 +141,34 @@ fn all_chips_of_all_codes_and_overlays_of_l1c_are_those_of_another_program() {
         holds(&chips, &column[2..], line);
         codes += 1;
     }
-    assert_eq!(codes, 189);
-    assert!(
-        [0, 64].iter().all(|number| l1c::code(l1c::Code::Data, *number).is_none() && l1c::overlay(*number).is_none())
-    );
+    assert_eq!(codes, 219);
+    let none = |number: &u8| l1c::code(l1c::Code::Data, *number).is_none() && l1c::overlay(*number).is_none();
+    assert!([0, 64, 192, 203].iter().all(none));
+}
+
+/// RINEX 4.02, table 2: J01 is PRN 193. What codes PRN 193 to 202 have is held above.
+#[test]
+fn satellites_of_qzss_have_the_codes_of_the_prn_that_rinex_names_and_those_of_gps_do_not() {
+    let all = [(&qzss::l1c::L1C, &l1c::L1C), (&qzss::l2c::L2C, &l2c::L2C), (&qzss::l5::L5, &l5::L5)];
+    for number in 1..=10 {
+        let prn = 192 + number;
+        let signs: Vec<i8> = code(prn).unwrap().iter().map(|&one| if one { -1 } else { 1 }).collect();
+        assert_eq!(qzss::l1ca::L1_CA.code(number).unwrap(), signs);
+        let own = |signal: &Signal, place: usize| (signal.components[place].code)(number).unwrap();
+        assert_eq!(own(&qzss::l1c::L1C, 0), l1c::code(l1c::Code::Pilot, prn).unwrap());
+        assert_eq!(own(&qzss::l1c::L1C, 1), l1c::code(l1c::Code::Data, prn).unwrap());
+        assert_eq!(qzss::l1c::L1C.components[0].overlay.of(number), l1c::overlay(prn));
+        assert_eq!(own(&qzss::l5::L5, 0), l5::code(l5::Code::Data, prn).unwrap());
+        assert_eq!(own(&qzss::l5::L5, 1), l5::code(l5::Code::Pilot, prn).unwrap());
+        for (place, which) in [(0, l2c::Code::Moderate), (1, l2c::Code::Long)] {
+            let of_turn: Vec<i8> = own(&qzss::l2c::L2C, place).into_iter().skip(place).step_by(2).collect();
+            assert_eq!(of_turn, l2c::code(which, prn).unwrap());
+        }
+    }
+    for (own, gps) in all {
+        assert!(own.satellites().count() == 10 && gps.satellites().all(|sv| sv.number <= 63), "{own}");
+    }
+    assert!(L1_CA.satellites().all(|sv| sv.number <= 37));
 }
 
 /// The number of ones, the first and last 24 chips and the digest of a code.

@@ -16,7 +16,7 @@ use num_complex::Complex64;
 
 use super::data::external;
 
-fn metadata(format: Format, rate_hz: f64, if_hz: f64) -> IfMetadata {
+pub fn metadata(format: Format, rate_hz: f64, if_hz: f64) -> IfMetadata {
     let rate = Rate::from_hz(rate_hz).unwrap();
     IfMetadata { format, rate, center_hz: L1_CA.centre_hz() - if_hz, inverted: false, start: None }
 }
@@ -39,7 +39,7 @@ fn acquire(metadata: &IfMetadata, i: &[f32], q: &[f32], settings: &AcquisitionSe
 }
 
 /// The whole recording as planar samples.
-fn read(name: &str, format: Format) -> Option<(Vec<f32>, Vec<f32>)> {
+pub fn read(name: &str, format: Format) -> Option<(Vec<f32>, Vec<f32>)> {
     let bytes = std::fs::read(external(name)?).unwrap();
     assert!(bytes.len().is_multiple_of(format.bytes()));
     let (mut i, mut q) = (Vec::new(), Vec::new());
@@ -213,7 +213,7 @@ fn one_bit_snapshots_hold_only_satellites_that_were_up() {
 /// Where overlays begin in a recording of mirrored spectrum: of the pilot that was found, by its own code and
 /// overlay, the seconds after the first sample, modulo 18; and by how much their best place is better than
 /// the next.
-fn overlay_begins_s(hit: &Acquired, [i, q]: [&[f32]; 2], rate_hz: f64, [code, overlay]: [&[i8]; 2]) -> (f64, f64) {
+pub fn overlay_begins_s(hit: &Acquired, [i, q]: [&[f32]; 2], rate_hz: f64, [code, overlay]: [&[i8]; 2]) -> (f64, f64) {
     let period_s = 0.01;
     let chips_a_sample = 1.023e6 * (1.0 + hit.doppler_hz / 1_575.42e6) / rate_hz;
     let mut prompts = vec![Complex64::default(); (i.len() as f64 / (period_s * rate_hz)) as usize];
@@ -245,7 +245,7 @@ fn overlay_begins_s(hit: &Acquired, [i, q]: [&[f32]; 2], rate_hz: f64, [code, ov
 }
 
 /// By how much one time of 18 s is after another, as near to zero as possible.
-fn after_s(one_s: f64, other_s: f64) -> f64 {
+pub fn after_s(one_s: f64, other_s: f64) -> f64 {
     (one_s - other_s + 9.0).rem_euclid(18.0) - 9.0
 }
 

@@ -72,7 +72,7 @@ impl NavigationSets {
             // Messages of one system that send the same have one record.
             if described.insert((sv.system, records.ionosphere)) {
                 match version {
-                    Version::Three => text += &ionosphere(sent),
+                    Version::Three => text += &ionosphere(sent, sv.system),
                     Version::Four => body += &ionosphere_record(records, sent, *sv, near),
                 }
             }
@@ -100,12 +100,15 @@ impl NavigationSets {
 }
 
 /// Lines of a header for the ionosphere's coefficients.
-fn ionosphere(sent: Coefficients) -> String {
+fn ionosphere(sent: Coefficients, system: System) -> String {
     let line = |name: &str, values: [f64; 4]| {
         let values = values.map(|value| format!("{:>12}", exponent(value, 4))).concat();
         header_line(&format!("{name:<5}{values}"), "IONOSPHERIC CORR")
     };
     match sent {
+        Coefficients::Klobuchar(model) if system == System::Qzss => {
+            line("QZSA", model.alpha) + &line("QZSB", model.beta)
+        }
         Coefficients::Klobuchar(model) => line("GPSA", model.alpha) + &line("GPSB", model.beta),
         Coefficients::KlobucharNavic(model) => line("IRNA", model.alpha) + &line("IRNB", model.beta),
         Coefficients::KlobucharBeidou(model) => line("BDSA", model.alpha) + &line("BDSB", model.beta),
@@ -215,6 +218,8 @@ fn record(set: &Ephemeris, channel: Option<i8>) -> String {
     let after = match set.long_fit {
         _ if own_time => f64::from(set.iodc),
         _ if set.is_sent_after_reference() => 0.0,
+        // The flag itself (RINEX 3.05, table A12).
+        long if set.sv.system == System::Qzss => f64::from(u8::from(long)),
         true => 6.0,
         false => 4.0,
     };
@@ -279,6 +284,7 @@ mod tests {
     use crate::gnss::rinex;
 
     const NAVIC: &[u8] = include_bytes!("../../../scenarios/navic_2026-03-09_10h_12h.rnx");
+    const QZSS: &[u8] = include_bytes!("../../../scenarios/qzss_2023-03-12_02h_04h.rnx");
 
     /// What RINEX rounds to twelve digits after the first.
     fn near(a: f64, b: f64) -> bool {
@@ -305,7 +311,8 @@ mod tests {
         let both = rinex::embedded_two_systems().unwrap().ephemerides;
         let fnav = both.iter().filter(|set| set.sv.system == System::Galileo).map(FNAV.form).collect::<Vec<_>>();
         let navic = rinex::read(NAVIC, "navic").unwrap().ephemerides;
-        let sets = day.chain(both).chain(fnav).chain(navic);
+        let qzss = rinex::read(QZSS, "qzss").unwrap().ephemerides;
+        let sets = day.chain(both).chain(fnav).chain(navic).chain(qzss);
         for (set, version) in sets.flat_map(|set| [(set.clone(), Version::Three), (set, Version::Four)]) {
             let records = match set.sv.system {
                 System::Galileo if set.form.name == FNAV.name => FNAV.rinex,
@@ -361,6 +368,7 @@ mod tests {
         assert!(count[""] > 100, "{count:?}");
         let per_message = [" LNAV", " INAV", " FNAV", " D1", " D2", " FDMA"].map(of);
         assert!(per_message.iter().all(|satellites| *satellites > 0) && of("> EPH I") > 3, "{count:?}");
+        assert_eq!(of("> EPH J"), 4, "{count:?}");
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! GPS L1C: data in BOC(1,1) and a pilot in TMBOC(6,1,4/33) with codes of 10 230 chips at 1.023 Mchip/s on
 //! 1575.42 MHz, the pilot under an overlay of 1800 chips of the satellite's own.
 //!
-//! Source: IS-GPS-800J, 3.2.2.1 (codes), 3.3 (modulation: both in phase, a quarter and three quarters of the
-//! power), tables 3.2-2 and 3.2-3 (Weil indices, insertion points and overlays). A code is a Weil code into
-//! which seven chips are put; overlay and message begin together, every 18 s of the week. Limits: phase
-//! against L1 C/A, which lags by a quarter of a cycle, counts for receivers that follow both as one; here
-//! every signal has a phase of its own. Numbers beyond 63 are those of other systems.
+//! Source: IS-GPS-800J, 3.2.2.1 (codes), 3.3 (modulation: both in phase, a quarter and three quarters of
+//! the power), tables 3.2-2 and 3.2-3 (Weil indices, insertion points and overlays). A code is a Weil
+//! code into which seven chips are put; overlay and message begin together, every 18 s of the week.
+//! Limits: phase against L1 C/A, which lags by a quarter of a cycle, counts for receivers that follow
+//! both as one; here every signal has a phase of its own. Numbers beyond 63 are those of other systems,
+//! of which 193 to 202 of QZSS are here (table 6.3-1): their overlays are the sum of two registers.
 
 use std::sync::LazyLock;
 
@@ -37,9 +38,9 @@ pub static L1C: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: CODE_CHIPS,
-            code: |number| code(Code::Pilot, number),
+            code: |number| code(Code::Pilot, gps(number)?),
             layers: &[Layer { chips: &ONE, ..Layer::BOC11 }, Layer { chips: &SIX, ..Layer::BOC61 }],
-            overlay: Overlay::PerSatellite { chips: OVERLAY_CHIPS, of: overlay },
+            overlay: Overlay::PerSatellite { chips: OVERLAY_CHIPS, of: |number| overlay(gps(number)?) },
             message: None,
         },
         Component {
@@ -47,13 +48,18 @@ pub static L1C: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: CODE_CHIPS,
-            code: |number| code(Code::Data, number),
+            code: |number| code(Code::Data, gps(number)?),
             layers: &[Layer::BOC11],
             overlay: Overlay::None,
             message: Some(&CNAV2),
         },
     ],
 };
+
+/// Numbers of GPS satellites; the others are those of other systems.
+fn gps(number: u8) -> Option<u8> {
+    (number <= 63).then_some(number)
+}
 
 /// Of 33 chips of the pilot those in BOC(6,1), and those in BOC(1,1) (3.3.1).
 const SIX: [bool; 33] = chips(true);
@@ -78,9 +84,23 @@ static LEGENDRE: LazyLock<Legendre> = LazyLock::new(|| Legendre::new(10_223));
 /// The chips that are put into a Weil code (3.2.2.1.1).
 const INSERTED: [bool; 7] = [false, true, true, false, true, false, false];
 
-/// The chips of a satellite by its number, 1 to 63, as ±1; `None` beyond.
+/// What a satellite's codes are made of: Weil index and insertion point of the data's code and of the
+/// pilot's, and polynomial and first state of the overlay's register, with the first state of the second
+/// one.
+type Origin = ([u16; 2], [u16; 2], [u16; 3]);
+
+/// That of a number from 1 to 63 or 193 to 202; `None` beyond.
+fn origin(number: u8) -> Option<Origin> {
+    if let Some(place) = number.checked_sub(193) {
+        return QZSS_CODES.get(usize::from(place)).copied();
+    }
+    let (data, pilot, [polynomial, start]) = *CODES.get(usize::from(number).checked_sub(1)?)?;
+    Some((data, pilot, [polynomial, start, 0]))
+}
+
+/// The chips of a satellite by its number, 1 to 63 or 193 to 202, as ±1; `None` beyond.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
-    let (data, pilot, _) = *CODES.get(usize::from(number).checked_sub(1)?)?;
+    let (data, pilot, _) = origin(number)?;
     let [later, inserted_at] = match which {
         Code::Data => data,
         Code::Pilot => pilot,
@@ -93,19 +113,29 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(chips.map(sign).collect())
 }
 
-/// The overlay of a satellite by its number, 1 to 63, as ±1; `None` beyond (3.2.2.1.2).
+/// The overlay of a satellite by its number, 1 to 63 or 193 to 202, as ±1; `None` beyond (3.2.2.1.2). A
+/// second register that has no start stays at zeros and adds none.
 pub fn overlay(number: u8) -> Option<Vec<i8>> {
-    let (.., [polynomial, start]) = *CODES.get(usize::from(number).checked_sub(1)?)?;
+    let (.., [polynomial, start, second]) = origin(number)?;
+    let second = register(planted!("gnss.qzss.overlay", SECOND_POLYNOMIAL, polynomial), second);
+    let chips = register(polynomial, start).zip(second).map(|(one, other)| sign(one ^ other));
+    Some(chips.take(OVERLAY_CHIPS as usize).collect())
+}
+
+/// The polynomial of the second register of overlays (3.2.2.1.2).
+const SECOND_POLYNOMIAL: u16 = 0o5001;
+
+/// What a register of eleven stages gives at its last stage.
+fn register(polynomial: u16, start: u16) -> impl Iterator<Item = bool> {
     // Stage n is the bit of value 2ⁿ⁻¹; the polynomial's lowest coefficient is no stage.
     let feedback = planted!("gnss.l1c.overlay", polynomial >> 1, polynomial);
     let mut stages = start;
-    let step = |_| {
+    std::iter::repeat_with(move || {
         let out = stages >> 10 & 1 == 1;
         let back = (stages & feedback).count_ones() as u16 % 2;
         stages = (stages << 1 | back) & 0x7FF;
-        sign(out)
-    };
-    Some((0..OVERLAY_CHIPS).map(step).collect())
+        out
+    })
 }
 
 fn sign(one: bool) -> i8 {
@@ -148,4 +178,14 @@ const CODES: [([u16; 2], [u16; 2], [u16; 2]); 63] = [
     ([4612, 1029], [3481, 5], [0o5411, 0o1464]), ([4784, 561], [3393, 355], [0o5141, 0o0520]),
     ([3716, 289], [3175, 909], [0o7041, 0o1766]), ([4703, 638], [2360, 1622], [0o6637, 0o3270]),
     ([4851, 4353], [1852, 6284], [0o4577, 0o0341]),
+];
+
+/// The same for numbers 193 to 202, and the first state of the second register.
+#[rustfmt::skip]
+const QZSS_CODES: [Origin; 10] = [
+    ([4834, 9753], [4311, 9864], [0o5403, 0o0500, 0o3261]), ([4456, 4799], [5024, 9753], [0o5403, 0o0254, 0o1760]),
+    ([4056, 10126], [4352, 9859], [0o5403, 0o3445, 0o0430]), ([3804, 241], [4678, 328], [0o5403, 0o2542, 0o3477]),
+    ([3672, 1245], [5034, 1], [0o5403, 0o1257, 0o1676]), ([4205, 1274], [5085, 4733], [0o6501, 0o0211, 0o1636]),
+    ([3348, 1456], [3646, 164], [0o6501, 0o0534, 0o2411]), ([4152, 9967], [4868, 135], [0o6501, 0o1420, 0o1473]),
+    ([3883, 235], [3668, 174], [0o6501, 0o3401, 0o2266]), ([3473, 512], [4211, 132], [0o6501, 0o0714, 0o2104]),
 ];

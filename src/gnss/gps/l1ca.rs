@@ -1,7 +1,8 @@
 //! GPS L1 C/A: Gold codes of 1023 chips at 1.023 Mchip/s on 1575.42 MHz.
 //!
-//! Source: IS-GPS-200N, 3.3.2.3 and table 3-Ia. The codes of PRN 1 to 37 are made from the two
-//! printed registers and the G2 delays; PRN 34 and 37 share a code, as the table says.
+//! Source: IS-GPS-200N, 3.3.2.3 and table 3-Ia. The codes of PRN 1 to 37 are made from the two printed
+//! registers and the G2 delays; PRN 34 and 37 share a code, as the table says. Those of PRN 193 to 202
+//! are of QZSS (IS-GPS-200N, table 6-I).
 
 use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::satellite::System;
@@ -26,7 +27,7 @@ pub static L1_CA: Signal = Signal {
         phase_cycles: 0.0,
         chip_rate_hz: 1.023e6, // IS-GPS-200N, 3.3.2.3
         code_chips: CODE_CHIPS,
-        code: |prn| Some(code(prn)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
+        code: |prn| Some(gps(prn).and_then(code)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
         layers: &[Layer::BPSK],
         overlay: Overlay::None,
         message: Some(&LNAV),
@@ -39,9 +40,22 @@ const G2_DELAY_CHIPS: [usize; 37] = [
     514, 515, 516, 859, 860, 861, 862, 863, 950, 947, 948, 950,
 ];
 
-/// The C/A code of a PRN from 1 to 37 (IS-GPS-200N, 3.3.2.3, figures 3-8 to 3-10).
+/// The same of PRN 193 to 202, of QZSS (IS-GPS-200N, table 6-I; IS-QZSS-PNT-005, table 3.2.2-1).
+const QZSS_G2_DELAY_CHIPS: [usize; 10] = [339, 208, 711, 189, 263, 537, 663, 942, 173, 900];
+const FIRST_OF_QZSS: u8 = 193;
+
+/// Numbers of GPS satellites; the others are those of other systems.
+fn gps(prn: u8) -> Option<u8> {
+    (usize::from(prn) <= G2_DELAY_CHIPS.len()).then_some(prn)
+}
+
+/// The C/A code of a PRN from 1 to 37 or 193 to 202 (IS-GPS-200N, 3.3.2.3, figures 3-8 to 3-10).
 pub fn code(prn: u8) -> Option<Vec<bool>> {
-    let delay = *G2_DELAY_CHIPS.get(usize::from(prn).checked_sub(1)?)?;
+    let delay = match prn.checked_sub(FIRST_OF_QZSS) {
+        Some(place) => *QZSS_G2_DELAY_CHIPS.get(usize::from(place))?,
+        None => *G2_DELAY_CHIPS.get(usize::from(prn).checked_sub(1)?)?,
+    };
+    let delay = planted!("gnss.qzss.codes", delay, delay + usize::from(prn > FIRST_OF_QZSS));
     let delay = planted!("gnss.code.g2_delay", delay, delay + usize::from(prn == 32));
     let g1 = register(&[3, 10]);
     let g2 = register(planted!("gnss.code.g2_taps", &[2, 3, 6, 8, 9, 10][..], &[2, 3, 6, 8, 10][..]));

@@ -33,7 +33,7 @@ pub static L2C: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: 2 * MODERATE_CHIPS,
-            code: |number| gps(number).and_then(|number| code(Code::Moderate, number)).map(|chips| in_turn(&chips, 0)),
+            code: |number| placed(Code::Moderate, gps(number)?),
             layers: &[Layer::BPSK],
             overlay: Overlay::None,
             message: Some(&CNAV_L2C),
@@ -43,7 +43,7 @@ pub static L2C: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: 2 * LONG_CHIPS,
-            code: |number| gps(number).and_then(|number| code(Code::Long, number)).map(|chips| in_turn(&chips, 1)),
+            code: |number| placed(Code::Long, gps(number)?),
             layers: &[Layer::BPSK],
             overlay: Overlay::None,
             message: None,
@@ -54,6 +54,15 @@ pub static L2C: Signal = Signal {
 /// Numbers of GPS satellites; the others are those of other systems.
 fn gps(number: u8) -> Option<u8> {
     (number <= 63).then_some(number)
+}
+
+/// The chips of a satellite by its number where they have their turn, those of CM first.
+pub(in crate::gnss) fn placed(which: Code, number: u8) -> Option<Vec<i8>> {
+    let first = match which {
+        Code::Moderate => 0,
+        Code::Long => 1,
+    };
+    Some(in_turn(&code(which, number)?, first))
 }
 
 /// Chips at every other place, from the first or the second on.

@@ -14,6 +14,7 @@ use crate::gnss::galileo::inav::{INAV_SETS, sisa_index};
 use crate::gnss::glonass::fdma::channel;
 use crate::gnss::glonass::gnav::GNAV_SETS;
 use crate::gnss::gps::lnav::LNAV_SETS;
+use crate::gnss::qzss::lnav;
 use crate::gnss::satellite::System;
 use crate::gnss::time::{BDT, Epoch, GLONASST, UTC, WEEK_S};
 
@@ -82,6 +83,7 @@ pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
         System::Galileo => galileo(record, common),
         System::Navic => navic(record, common),
         System::BeiDou => beidou(record, common).map(|set| set.timed(|label| BDT.instant(label))),
+        System::Qzss => gps(record, common).map(|set| Ephemeris { form: &lnav::LNAV_SETS, ..set }),
         _ => gps(record, common),
     }
 }
@@ -179,15 +181,17 @@ fn navic(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     })
 }
 
-/// The rest of an LNAV set (IS-GPS-200N, tables 20-I and 20-III).
+/// The rest of an LNAV set (IS-GPS-200N, tables 20-I and 20-III), of QZSS too.
 fn gps(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     let both = |name, most: f64| field(record, name, -most, most);
     let optional = |name, most| if record.get(name).is_some() { whole(record, name, most).map(Some) } else { Ok(None) };
     let iode = whole(record, "iode", 255)?;
+    let is_qzss = record.sv.system == System::Qzss;
+    let sqrt_a_sqrtm = if is_qzss { 6450.0..=6540.0 } else { 5000.0..=5300.0 };
     Ok(Ephemeris {
         form: &LNAV_SETS,
-        // Sets go on the air two hours before their reference time.
-        transmitted: transmitted(record, common.toe, common.toe.plus_s(-7200.0)),
+        // Sets go on the air two hours before their reference time, those of QZSS one.
+        transmitted: transmitted(record, common.toe, common.toe.plus_s(if is_qzss { -3600.0 } else { -7200.0 })),
         iode: iode as u16,
         iodc: optional("iodc", 1023)?.unwrap_or(iode) as u16,
         ura_index: ura_index(optional_accuracy(record)?),
@@ -196,7 +200,7 @@ fn gps(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
         l2_p_data_off: optional("l2p", 1)? == Some(1),
         // Hours or the flag itself, as the file's producer meant it; blank is the usual four hours.
         long_fit: record.get("fitInt").is_some_and(|fit| fit == 1.0 || fit > 4.0),
-        sqrt_a_sqrtm: field(record, "sqrta", 5000.0, 5300.0)?,
+        sqrt_a_sqrtm: field(record, "sqrta", *sqrt_a_sqrtm.start(), *sqrt_a_sqrtm.end())?,
         eccentricity: field(record, "e", 0.0, 0.1)?,
         af0_s: both("af0", 9.766e-4)?,
         af1_sps: both("af1", 3.726e-9)?,

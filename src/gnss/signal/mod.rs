@@ -17,7 +17,7 @@ use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::message::Message;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::{Epoch, TimeScale};
-use crate::gnss::{beidou, galileo, glonass, gps, navic};
+use crate::gnss::{beidou, galileo, glonass, gps, navic, qzss};
 
 mod shape;
 #[cfg(any(test, feature = "planted"))]
@@ -26,7 +26,7 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 15] = [
+pub static SIGNALS: [&Signal; 19] = [
     &gps::l1ca::L1_CA,
     &gps::l1c::L1C,
     &gps::l2c::L2C,
@@ -42,6 +42,10 @@ pub static SIGNALS: [&Signal; 15] = [
     &beidou::b1c::B1C,
     &glonass::fdma::G1,
     &glonass::fdma::G2,
+    &qzss::l1ca::L1_CA,
+    &qzss::l1c::L1C,
+    &qzss::l2c::L2C,
+    &qzss::l5::L5,
 ];
 
 /// Signals that [`register`] has added. Names in files have to find them, so they are the program's, not a

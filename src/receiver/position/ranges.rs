@@ -133,7 +133,7 @@ fn range(
     let half_s = match ephemeris.long_fit {
         _ if ephemeris.is_sent_after_reference() || ephemeris.sent_from().is_some() => 0.5 * ephemeris.fit_interval_s(),
         true => HALF_LONG_FIT_S,
-        false => HALF_FIT_S,
+        false => HALF_FIT_S.min(0.5 * ephemeris.fit_interval_s()),
     } + FIT_GRACE_S;
     if sent.since(ephemeris.toe).abs() > half_s {
         return None;

@@ -5,10 +5,17 @@ use super::Content;
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::gnss::bits::{Element, Field, element, plain};
 use crate::gnss::earth::GPS_PI;
+use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::Epoch;
 
-/// Semi-major axis and rate of the node from which the elements count (table 20-II).
-pub(in crate::gnss::gps) const REFERENCE_AXIS_M: f64 = 26_559_710.0;
+/// Semi-major axis from which the elements count (table 20-II; IS-QZSS-PNT-005, 5.4).
+pub(in crate::gnss::gps) fn reference_axis_m(sv: Sv) -> f64 {
+    match sv.system {
+        System::Qzss => planted!("gnss.qzss.axis", 42_164_200.0, 42_164_000.0),
+        _ => 26_559_710.0,
+    }
+}
+/// Rate of the node likewise.
 pub(in crate::gnss::gps) const REFERENCE_NODE_RADPS: f64 = -2.6e-9 * GPS_PI;
 /// Step of reference times.
 pub(in crate::gnss::gps) const STEP_S: i64 = 300;
@@ -80,8 +87,8 @@ pub(super) static ORBIT_1: [Of; 15] = [
         |c| f64::from(c.set.ura_index), |c, v| c.set.ura_index = v as u8),
     toe(&[(70, 11)]),
     element(Field::new("delta_a_m", &[(81, 26)], Signed, -9, ORBIT),
-        |c| c.set.sqrt_a_sqrtm * c.set.sqrt_a_sqrtm - REFERENCE_AXIS_M,
-        |c, v| c.set.sqrt_a_sqrtm = (v + REFERENCE_AXIS_M).sqrt()),
+        |c| c.set.sqrt_a_sqrtm * c.set.sqrt_a_sqrtm - reference_axis_m(c.set.sv),
+        |c, v| c.set.sqrt_a_sqrtm = (v + reference_axis_m(c.set.sv)).sqrt()),
     plain!("a_rate_mps", [(107, 25)], Signed, -21, ORBIT, set.axis_rate_mps),
     plain!("delta_n_radps", [(132, 17)], Semicircles, -44, ORBIT, set.delta_n_radps),
     plain!("delta_n_rate_radps2", [(149, 23)], Semicircles, -57, ORBIT, set.delta_n_rate_radps2),

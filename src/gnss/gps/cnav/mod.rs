@@ -27,7 +27,7 @@ use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, WEEK_S};
 pub use fields::tables;
 use fields::{CLOCKS, DELAY, HEADER, L1, L2, L5, ORBIT_1, ORBIT_2, TIME};
-pub(super) use fields::{REFERENCE_AXIS_M, REFERENCE_NODE_RADPS, STEP_S};
+pub(super) use fields::{REFERENCE_NODE_RADPS, STEP_S, reference_axis_m};
 pub use on_l2c::CNAV_L2C;
 pub use reader::CnavReader;
 
@@ -37,7 +37,7 @@ pub static CNAV: Message = Message {
     symbol_s: 0.01,
     unit_s: MESSAGE_S,
     first_s: 0,
-    sender: |common| Ok(Box::new(Messages { common: common.clone(), message: &CNAV })),
+    sender: |common| Ok(sender(common, &CNAV)),
     number: |start| type_at(&CNAV, start),
     timed: &ORDER,
     dated: &[],
@@ -213,6 +213,11 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
         _ => l1ca_s,
     };
     set.tgd_s - planted!("gnss.cnav.isc", own_s, -own_s)
+}
+
+/// A sender of one of the messages that are sent as CNAV.
+pub(in crate::gnss) fn sender(common: &Common, message: &'static Message) -> Box<dyn Sender> {
+    Box::new(Messages { common: common.clone(), message })
 }
 
 /// Makes the messages of satellites.

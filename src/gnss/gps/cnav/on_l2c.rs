@@ -4,7 +4,7 @@
 //! seconds of the week). The order of messages is that of satellites in 2025 (`tests/witness`).
 
 use super::reader::CnavReader;
-use super::{CNAV, IONOSPHERE, MESSAGE_S, Messages, type_at};
+use super::{CNAV, IONOSPHERE, MESSAGE_S, sender, type_at};
 use crate::gnss::message::{IonosphereForm, Message};
 
 /// CNAV as L2C names it. Its sets are those of CNAV on L5.
@@ -12,7 +12,7 @@ pub static CNAV_L2C: Message = Message {
     name: "CNAV on L2C",
     symbol_s: 2.0 * CNAV.symbol_s,
     unit_s: MESSAGE_S * 2,
-    sender: |common| Ok(Box::new(Messages { common: common.clone(), message: &CNAV_L2C })),
+    sender: |common| Ok(sender(common, &CNAV_L2C)),
     number: |start| type_at(&CNAV_L2C, start),
     ionosphere: IonosphereForm { unit: |start| type_at(&CNAV_L2C, start) == IONOSPHERE, ..CNAV.ionosphere },
     reader: |sv| Box::new(CnavReader::of(&CNAV_L2C, sv)),

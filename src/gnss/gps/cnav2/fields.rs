@@ -4,7 +4,7 @@
 use super::Content;
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::gnss::bits::{Element, Field, element, plain};
-use crate::gnss::gps::cnav::{REFERENCE_AXIS_M, REFERENCE_NODE_RADPS, STEP_S};
+use crate::gnss::gps::cnav::{REFERENCE_NODE_RADPS, STEP_S, reference_axis_m};
 use crate::gnss::time::Epoch;
 
 const TIME: &str = "3.5.3.1 to 3.5.3.4";
@@ -42,8 +42,8 @@ pub(super) static SET: [Of; 34] = [
             (c.set.iode, c.set.iodc) = (v as u16, v as u16);
         }),
     element(Field::new("delta_a_m", &[(49, 26)], Signed, -9, ORBIT),
-        |c| c.set.sqrt_a_sqrtm * c.set.sqrt_a_sqrtm - REFERENCE_AXIS_M,
-        |c, v| c.set.sqrt_a_sqrtm = (v + REFERENCE_AXIS_M).sqrt()),
+        |c| c.set.sqrt_a_sqrtm * c.set.sqrt_a_sqrtm - reference_axis_m(c.set.sv),
+        |c, v| c.set.sqrt_a_sqrtm = (v + reference_axis_m(c.set.sv)).sqrt()),
     plain!("a_rate_mps", [(75, 25)], Signed, -21, ORBIT, set.axis_rate_mps),
     plain!("delta_n_radps", [(100, 17)], Semicircles, -44, ORBIT, set.delta_n_radps),
     plain!("delta_n_rate_radps2", [(117, 23)], Semicircles, -57, ORBIT, set.delta_n_rate_radps2),
@@ -78,7 +78,7 @@ pub(super) static SET: [Of; 34] = [
 /// What every page of subframe 3 begins with.
 #[rustfmt::skip]
 pub(super) static HEADER: [Of; 2] = [
-    element(Field::new("prn", &[(0, 8)], Whole, 0, HEAD), |c| f64::from(c.set.sv.number), |_, _| {}),
+    element(Field::new("prn", &[(0, 8)], Whole, 0, HEAD), |c| f64::from(c.set.sv.prn()), |_, _| {}),
     plain!("page", [(8, 6)], Whole, 0, HEAD, page),
 ];
 

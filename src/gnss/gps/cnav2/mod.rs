@@ -7,9 +7,9 @@
 //!
 //! Limits: subframe 3 is always page 1 (UTC, ionosphere, corrections between signals); of satellites that
 //! send others, too, a set is whole once page 1 has come. Left out are page 2 (other systems' times, the
-//! Earth's orientation), 3 and 4 (almanacs), 5 (corrections), 6 (text) and those of QZSS. Of UTC nothing is
-//! used. Sets of LNAV become those of CNAV-2 as they become those of CNAV ([`super::cnav`]), with delays of
-//! both parts of L1C that are those of L1.
+//! Earth's orientation), 3 and 4 (almanacs), 5 (corrections), 6 (text) and those that QZSS alone sends.
+//! Of UTC nothing is used. Sets of LNAV become those of CNAV-2 as they become those of CNAV
+//! ([`super::cnav`]), with delays of both parts of L1C that are those of L1.
 
 mod fields;
 mod reader;
@@ -140,7 +140,7 @@ impl Frame {
         self.three.as_ref().filter(|bits| page(bits) == PAGE)
     }
 
-    /// The satellite's number that subframe 3 says.
+    /// The number of the satellite's codes that subframe 3 says.
     fn prn(&self) -> Option<u128> {
         self.three.as_ref().and_then(|bits| bits.get(..8)).map(number)
     }

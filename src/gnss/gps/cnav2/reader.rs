@@ -35,7 +35,7 @@ impl Cnav2Reader {
 
     /// Takes a frame that ends with the newest symbol.
     fn read(&mut self, frame: &Frame, near: Epoch) -> Vec<Read> {
-        if frame.prn().is_some_and(|prn| prn != u128::from(self.sv.number)) {
+        if frame.prn().is_some_and(|prn| prn != u128::from(self.sv.prn())) {
             return Vec::new();
         }
         let sent = frame.sent_at(near);

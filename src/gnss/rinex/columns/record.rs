@@ -3,6 +3,7 @@
 //! Source: RINEX 3.05, tables A6, A8, A10, A14 and A18; RINEX 4.02, table A9.
 
 use crate::gnss::glonass::fdma::SLOTS;
+use crate::gnss::qzss::satellites::SATELLITES;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::Epoch;
 
@@ -44,12 +45,13 @@ const OF_GLONASS: [&str; 19] = [
     "healthFlags",
 ];
 /// Systems whose records are read, with the largest number of their satellites.
-pub(super) const READ: [(char, System, u8); 5] = [
+pub(super) const READ: [(char, System, u8); 6] = [
     ('G', System::Gps, 32),
     ('R', System::Glonass, SLOTS),
     ('E', System::Galileo, 36),
     ('I', System::Navic, 14),
     ('C', System::BeiDou, 63),
+    ('J', System::Qzss, SATELLITES),
 ];
 /// Bits of an I/NAV record's sources: sent on E1-B or E5b, sent on E5a (F/NAV), and a clock of E5b and E1.
 const SENT_INAV: u32 = 0b101;

@@ -1,0 +1,90 @@
+//! CNAV and CNAV-2 as QZSS sends them: the messages of GPS, whose elements count from another semi-major
+//! axis.
+//!
+//! Source: IS-QZSS-PNT-005, 4.3 (CNAV) and 4.2 (CNAV-2). The number in CNAV is that of the satellite, in
+//! CNAV-2 that of its codes; bits of health are those of LNAV by signal. Limits: messages are those of
+//! GPS in their order (10, 11, 30, 33; page 1). Real satellites send 60 and 61 and page 61 for Japan, 32,
+//! 37, and others.
+
+use crate::gnss::broadcast::{Ephemeris, SetForm};
+use crate::gnss::gps::{cnav, cnav2};
+use crate::gnss::message::Message;
+use crate::gnss::qzss::lnav::{LNAV_SETS, unhealthy};
+use crate::gnss::qzss::own::{OwnReader, as_gps, like, named};
+
+/// CNAV as L5 of QZSS names it.
+pub static CNAV: Message = Message {
+    name: "CNAV of QZSS",
+    sender: |common| Ok(cnav::sender(common, &CNAV)),
+    elements: |sv, raw, near| (cnav::CNAV.elements)(sv, raw, near).map(|set| named(set, &CNAV)),
+    reader: |sv| OwnReader::boxed(&cnav::CNAV, &CNAV, sv),
+    form: |set| form(set, &cnav::CNAV, &CNAV),
+    sets: &CNAV_SETS,
+    quantised: |set| (cnav::CNAV.quantised)(&as_gps(&(CNAV.form)(set))).map(|set| named(set, &CNAV)),
+    adjust: |set, parameter, by| adjust(set, parameter, by, &cnav::CNAV, &CNAV),
+    ..cnav::CNAV
+};
+
+/// CNAV as L2C of QZSS names it. Its sets are those of CNAV on L5.
+pub static CNAV_L2C: Message = Message {
+    name: "CNAV of QZSS on L2C",
+    sender: |common| Ok(cnav::sender(common, &CNAV_L2C)),
+    elements: CNAV.elements,
+    reader: |sv| OwnReader::boxed(&cnav::CNAV_L2C, &CNAV_L2C, sv),
+    form: CNAV.form,
+    sets: &CNAV_SETS,
+    quantised: CNAV.quantised,
+    adjust: CNAV.adjust,
+    ..cnav::CNAV_L2C
+};
+
+/// CNAV-2 as L1C of QZSS names it.
+pub static CNAV2: Message = Message {
+    name: "CNAV-2 of QZSS",
+    elements: |sv, raw, near| (cnav2::CNAV2.elements)(sv, raw, near).map(|set| named(set, &CNAV2)),
+    reader: |sv| OwnReader::boxed(&cnav2::CNAV2, &CNAV2, sv),
+    form: |set| form(set, &cnav2::CNAV2, &CNAV2),
+    sets: &CNAV2_SETS,
+    quantised: |set| (cnav2::CNAV2.quantised)(&as_gps(&(CNAV2.form)(set))).map(|set| named(set, &CNAV2)),
+    adjust: |set, parameter, by| adjust(set, parameter, by, &cnav2::CNAV2, &CNAV2),
+    ..cnav2::CNAV2
+};
+
+/// What clock and health of sets of CNAV mean.
+pub static CNAV_SETS: SetForm = SetForm {
+    name: "CNAV of QZSS",
+    group_delay_s: |set, signal| (cnav::CNAV_SETS.group_delay_s)(set, like(signal)),
+    serves: |signal| (cnav::CNAV_SETS.serves)(like(signal)),
+    healthy: |set, signal| (cnav::CNAV_SETS.healthy)(set, like(signal)),
+    ..cnav::CNAV_SETS
+};
+
+/// The same of sets of CNAV-2.
+pub static CNAV2_SETS: SetForm = SetForm {
+    name: "CNAV-2 of QZSS",
+    group_delay_s: |set, signal| (cnav2::CNAV2_SETS.group_delay_s)(set, like(signal)),
+    serves: |signal| (cnav2::CNAV2_SETS.serves)(like(signal)),
+    healthy: |set, signal| (cnav2::CNAV2_SETS.healthy)(set, like(signal)),
+    ..cnav2::CNAV2_SETS
+};
+
+/// A set as one of these messages has it, of what GPS makes of one of LNAV.
+fn form(set: &Ephemeris, gps: &Message, message: &Message) -> Ephemeris {
+    if set.form == message.sets {
+        return set.clone();
+    }
+    let made = (gps.form)(&as_gps(set));
+    let [l1, l2, l5, l1c] = unhealthy(set);
+    let bits = if *message.sets == CNAV2_SETS { vec![l1c] } else { vec![l1, l2, l5] };
+    let of_lnav = bits.into_iter().rev().fold(0, |all, bad| all << 1 | u16::from(bad));
+    let health = if *set.form == LNAV_SETS { of_lnav } else { made.health };
+    Ephemeris { health, ..named(made, message) }
+}
+
+/// Adds to a parameter of a set of one of these messages; whether there is one.
+fn adjust(set: &mut Ephemeris, parameter: &str, by: f64, gps: &Message, message: &Message) -> bool {
+    let mut own = as_gps(&(message.form)(set));
+    let found = (gps.adjust)(&mut own, parameter, by);
+    *set = named(own, message);
+    found
+}

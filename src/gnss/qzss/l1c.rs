@@ -1,0 +1,31 @@
+//! QZSS L1C: the signal of GPS, a pilot in TMBOC under an overlay and data in BOC(1,1) with CNAV-2, with
+//! codes of PRN 193 to 202.
+//!
+//! Source: IS-QZSS-PNT-005, 3.1 and 3.2.2. Data and pilot are in phase, as those of J02 and J03 are in a
+//! recording. Limits: of J01, of Block I, the phase may be another.
+
+use crate::gnss::gps::l1c::{self, Code, OVERLAY_CHIPS, code, overlay};
+use crate::gnss::qzss::civil::CNAV2;
+use crate::gnss::qzss::satellites::{SATELLITES, prn};
+use crate::gnss::satellite::System;
+use crate::gnss::signal::{Component, Overlay, Signal, always};
+use crate::gnss::time::QZSST;
+
+/// The signal: L1C-P, and L1C-D with CNAV-2.
+pub static L1C: Signal = Signal {
+    name: "QZSS L1C",
+    system: System::Qzss,
+    time: &QZSST,
+    constellation: [1, SATELLITES],
+    sent: always,
+    minimum_power_dbw: Some(-157.0), // 3.1: both components
+    components: &[
+        Component {
+            code: |number| code(Code::Pilot, prn(number)?),
+            overlay: Overlay::PerSatellite { chips: OVERLAY_CHIPS, of: |number| overlay(prn(number)?) },
+            ..l1c::L1C.components[0]
+        },
+        Component { code: |number| code(Code::Data, prn(number)?), message: Some(&CNAV2), ..l1c::L1C.components[1] },
+    ],
+    ..l1c::L1C
+};
