@@ -316,6 +316,54 @@ fn b1c_alone_finds_its_place_by_b_cnav1_and_its_pilot() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
+/// B2a's bars: a metre by the five satellites of the third generation in view, whose HDOP is 1.55; a set is
+/// whole 13 s after the start, 3 s before the bar (`GNSS_TWIN_LONG=1`: twenty million samples a second).
+#[test]
+fn b2a_alone_finds_its_place_by_b_cnav2_and_its_pilot() {
+    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+        return;
+    }
+    let summary = run_with(&scenarios().join("beidou_b2a.toml"), &["--check".as_ref()]);
+    found_and_decoded_what_is_there(&summary);
+    assert_eq!(number(&summary, "/satellites/used"), 5.0);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/position/first_fix_s", 16.0);
+    assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
+    assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
+}
+
+/// B2b's bars: as B2a's; a set is whole after four messages of a second at most, 3 s before the bar.
+#[test]
+fn b2b_alone_finds_its_place_by_b_cnav3() {
+    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+        return;
+    }
+    let summary = run_with(&scenarios().join("beidou_b2b.toml"), &["--check".as_ref()]);
+    found_and_decoded_what_is_there(&summary);
+    assert_eq!(number(&summary, "/satellites/used"), 5.0);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/position/first_fix_s", 8.0);
+    assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
+    assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
+}
+
+/// Bars of B1C and B2a together: 2 m, as the fixes of B2a's first nine seconds, until a frame of B1C is
+/// whole, are of one carrier and have the ionosphere, some 8 m of it, in height and clock above all; and
+/// 0.3 m for the ionosphere as two bands show it (`GNSS_TWIN_LONG=1`).
+#[test]
+fn b1c_and_b2a_find_their_place_and_the_ionosphere_through_two_front_ends() {
+    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+        return;
+    }
+    let summary = run_with(&scenarios().join("beidou_bands.toml"), &["--check".as_ref()]);
+    assert_eq!(number(&summary, "/satellites/used"), 5.0);
+    assert_eq!(number(&summary, "/navigation/parameters_wrong"), 0.0);
+    at_most(&summary, "/position/horizontal_p95_m", 2.0);
+    at_most(&summary, "/position/first_fix_s", 16.0);
+    at_most(&summary, "/ionosphere/error_p95_m", 0.3);
+    assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
+}
+
 /// L2C's bars: a metre by all eight satellites; messages are twice as long as those of L5, and codes of 20
 /// ms take long to find (`GNSS_TWIN_LONG=1`).
 #[test]

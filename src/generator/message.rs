@@ -129,6 +129,11 @@ impl Slot {
     pub fn start(&self) -> Epoch {
         self.time.instant(self.message.unit_start(self.unit))
     }
+
+    /// At which time it is decided which set it is of.
+    pub fn set_chosen(&self) -> Epoch {
+        self.time.instant(self.message.unit_start(self.message.unit_of_set(self.unit)))
+    }
 }
 
 impl MessageFault {

@@ -405,14 +405,14 @@ impl Ephemeris {
         own.map_or_else(|| (self.form.group_delay_s)(self, signal), |(_, delay_s)| *delay_s)
     }
 
-    /// What a delay as 1/f² on another carrier of BeiDou makes of T_GD1: zero on B3I, whose clock it is, and
-    /// T_GD1 itself on B1I.
-    pub(in crate::gnss) fn group_delay_on_s(&self, carrier_hz: f64) -> f64 {
+    /// What a delay as 1/f² on another carrier of BeiDou makes of the one that the message gives on
+    /// `given_hz`: zero on B3I, whose clock it is.
+    pub(in crate::gnss) fn group_delay_on_s(&self, given_hz: f64, carrier_hz: f64) -> f64 {
         let against_b3i = |hz: f64| B3I_HZ * B3I_HZ / (hz * hz) - 1.0;
-        if carrier_hz == B1I_HZ {
+        if carrier_hz == given_hz {
             return self.given_delay_s();
         }
-        self.given_delay_s() * against_b3i(carrier_hz) / against_b3i(B1I_HZ)
+        self.given_delay_s() * against_b3i(carrier_hz) / against_b3i(given_hz)
     }
 
     /// (f/f_signal)² with the carrier on which the message gives its delay: that of L1, and of NavIC that of

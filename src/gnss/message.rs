@@ -26,6 +26,9 @@ pub struct Message {
     pub symbol_s: f64,
     /// Duration of a unit, which is encoded in one piece, and when in the week the first one begins.
     pub unit_s: i64,
+    /// Seconds, from one multiple of them to the next, in which all units are of one set: whole units.
+    /// Messages whose units each say of which set they are have those of one unit.
+    pub set_s: i64,
     /// Seconds after the beginning of the week at which its first unit begins.
     pub first_s: i64,
     /// Makes what all satellites of a scene send alike.
@@ -196,6 +199,12 @@ impl Message {
     /// Number of the unit, since the beginning of the system's time, in which a whole second of it lies.
     pub fn unit_at(&self, second: i64) -> i64 {
         (second - self.first_s).div_euclid(self.unit_s)
+    }
+
+    /// The unit whose beginning decides of which set a unit is.
+    pub fn unit_of_set(&self, unit: i64) -> i64 {
+        let units = (self.set_s / self.unit_s).max(1);
+        unit.div_euclid(units) * units
     }
 
     /// When a unit begins.

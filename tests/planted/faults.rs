@@ -46,6 +46,17 @@ const QZSS_CNAV: &str =
 const B1C_CODES: &str = "witness::bcnav1::all_chips_of_all_codes_and_overlays_of_b1c_are_those_of_another_program";
 const FRAMES_B1C: &str = "witness::bcnav1::frames_are_read_from_any_symbol_and_either_way_up_to_what_was_sent";
 const FIELD_64: &str = "witness::bcnav1::elements_of_six_bits_are_those_of_the_printed_field";
+const B2_CODES: &str =
+    "witness::bcnav2::all_chips_of_all_codes_and_overlays_of_b2a_and_b2b_are_those_of_another_program";
+const MESSAGES_B2: &str = "witness::bcnav2::messages_are_read_from_any_symbol_and_either_way_up_to_what_was_sent";
+const PRINTED_B2: &str =
+    "witness::bcnav2::messages_that_a_receiver_printed_are_what_it_decoded_and_are_framed_by_us_as_it_printed_them";
+const MIXED_B2: &str =
+    "witness::bcnav2::a_set_that_follows_another_is_never_mixed_with_it_wherever_reading_begins_or_fails";
+const CARRIED_B2: &str =
+    "witness::bcnav2::a_set_of_d1_carried_to_b_cnav2_and_b_cnav3_is_the_same_orbit_and_clock_to_its_steps";
+const UTC_B2: &str =
+    "witness::bcnav2::utc_is_four_seconds_behind_bdt_since_2017_and_real_polynomials_are_whole_steps_of_the_fields";
 const L1C_CODES: &str = "witness::codes::all_chips_of_all_codes_and_overlays_of_l1c_are_those_of_another_program";
 const FRAMES_L1C: &str =
     "witness::cnav2::shipped_frames_are_coded_again_symbol_by_symbol_read_either_way_up_and_sent_again";
@@ -241,6 +252,13 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.qzss.axis", "elements of QZSS count from 200 m less", QZSS_CNAV),
     fault("gnss.b1c.truncation", "codes of B1C begin a chip late", B1C_CODES),
     fault("gnss.bcnav1.time", "frames of B1C are taken for the ones before", FRAMES_B1C),
+    fault("gnss.b2a.register", "the register of B2a's data feeds back from the stage before", B2_CODES),
+    fault("gnss.b2b.register", "the register of B2b feeds back from the stage after", B2_CODES),
+    fault("gnss.bcnav.second", "messages of B2a and B2b are taken for the ones before", MESSAGES_B2),
+    fault("gnss.bcnav.preamble", "a symbol of the preambles of B2a and B2b is wrong", PRINTED_B2),
+    fault("gnss.bcnav.issue", "message 11 of B2a is of the set of any message", MIXED_B2),
+    fault("gnss.bcnav.delays", "B2a has the group delay of B1C", CARRIED_B2),
+    fault("gnss.bcnav.leap", "BDT's leap seconds are those of GPS time", UTC_B2),
     fault("gnss.fec.field64", "elements of six bits are of another field", FIELD_64),
     fault("gnss.l1c.insertion", "the seven chips are put into the code of L1C a chip late", L1C_CODES),
     fault("gnss.l1c.overlay", "the register of L1C's overlay feeds back from the stages before", L1C_CODES),

@@ -9,6 +9,8 @@
 mod atmosphere;
 #[path = "../witness/bcnav1.rs"]
 mod bcnav1;
+#[path = "../witness/bcnav2.rs"]
+mod bcnav2;
 #[path = "../witness/beidou.rs"]
 mod beidou;
 #[path = "../witness/cnav.rs"]

@@ -38,12 +38,12 @@ fn all_chips_of_all_codes_and_overlays_of_b1c_are_those_of_another_program() {
     assert!([0, 64].iter().all(|number| b1c::code(Code::Data, *number).is_none() && b1c::overlay(*number).is_none()));
 }
 
-fn soft(symbols: &[bool], inverted: bool) -> impl Iterator<Item = f32> {
+pub fn soft(symbols: &[bool], inverted: bool) -> impl Iterator<Item = f32> {
     symbols.iter().map(move |&one| if one ^ inverted { -1.0 } else { 1.0 })
 }
 
 /// Sets of satellites of the third generation in the embedded file.
-fn sets() -> Vec<Ephemeris> {
+pub fn sets() -> Vec<Ephemeris> {
     let all = rinex::embedded_two_systems().unwrap().ephemerides;
     let mut own: Vec<Ephemeris> = all.into_iter().filter(|set| b1c::sent(set.sv.number, set.toe)).collect();
     own.retain(|set| set.sv.system == System::BeiDou);
@@ -106,21 +106,28 @@ fn a_set_of_d1_carried_to_b_cnav1_is_the_same_orbit_and_clock_to_its_steps() {
     assert!(sets.len() >= 4 && farthest_m < 0.2 && latest_m < 0.0195, "{farthest_m} {latest_m}");
 }
 
+/// The columns of a file of what a maker's receiver printed.
+pub fn printed_rows(text: &str) -> Vec<Vec<String>> {
+    text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
+}
+
+/// So many bits of hexadecimal digits.
+pub fn hex_bits(hex: &str, count: usize) -> Vec<bool> {
+    let digits = hex.chars().map(|digit| digit.to_digit(16).unwrap());
+    digits.flat_map(|digit| (0..4).rev().map(move |bit| digit >> bit & 1 == 1)).take(count).collect()
+}
+
 /// What the maker's receiver decoded of a satellite, and the bits of its subframes.
 #[test]
 fn subframes_that_a_receiver_printed_are_what_it_decoded_and_are_sent_by_us_bit_by_bit() {
     let Some(path) = external("navbits/receiver_manual_examples.csv") else { return };
     let text = std::fs::read_to_string(path).unwrap();
+    let rows = printed_rows(&text);
     let row = |kind: &str, prn: &str| -> Vec<String> {
-        let rows = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<String>>());
-        rows.into_iter().find(|row| row[0] == kind && (row.get(3).is_some_and(|own| own == prn))).unwrap()
-    };
-    let bits = |hex: &str, count: usize| -> Vec<bool> {
-        let digits = hex.chars().map(|digit| digit.to_digit(16).unwrap());
-        digits.flat_map(|digit| (0..4).rev().map(move |bit| digit >> bit & 1 == 1)).take(count).collect()
+        rows.iter().find(|row| row[0] == kind && (row.get(3).is_some_and(|own| own == prn))).unwrap().clone()
     };
     let [first, two, three] = [("BCNAV1_SF1", 14), ("BCNAV1_SF2", 576), ("BCNAV1_SF3", 240)]
-        .map(|(kind, count)| bits(&row(kind, "35")[5], count));
+        .map(|(kind, count)| hex_bits(&row(kind, "35")[5], count));
     let whole = |mut bits: Vec<bool>| {
         let check = crc24q(bits.iter().copied());
         bits.extend(bits_of(u128::from(check), 24));

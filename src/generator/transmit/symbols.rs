@@ -76,8 +76,10 @@ impl Symbols {
                 }
                 let slot = Slot { message, time: signal.time, unit };
                 let fallback = || scene.catalogue.sent_at(sv, received);
-                let Some(ephemeris) = scene.catalogue.sent_at(sv, slot.start()).or_else(fallback) else { continue };
-                let earlier = Slot { unit: unit - 1, ..slot }.start();
+                let Some(ephemeris) = scene.catalogue.sent_at(sv, slot.set_chosen()).or_else(fallback) else {
+                    continue;
+                };
+                let earlier = Slot { unit: unit - 1, ..slot }.set_chosen();
                 let before = scene.catalogue.sent_at(sv, earlier).unwrap_or(ephemeris);
                 let SentSymbols { encoded, symbols } = message::unit(faults, sender, [before, ephemeris], &slot)?;
                 // What was meant and, where wrong symbols pass for right ones, what was sent.

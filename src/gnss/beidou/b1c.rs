@@ -16,6 +16,8 @@ use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
 use crate::gnss::time::{BDT, Epoch};
 use crate::gnss::weil::Legendre;
 
+/// 4.1.
+pub const CARRIER_HZ: f64 = 1_575.42e6;
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
 /// Chips of an overlay, one a code period.
@@ -28,7 +30,7 @@ pub static B1C: Signal = Signal {
     system: System::BeiDou,
     time: &BDT,
     constellation: [1, 63],
-    carrier: Carrier::Common(1_575.42e6), // 4.1
+    carrier: Carrier::Common(CARRIER_HZ),
     sent,
     minimum_power_dbw: Some(-159.0), // 4.5: both components
     components: &[

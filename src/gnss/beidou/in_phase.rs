@@ -98,10 +98,16 @@ fn short(number: u8) -> Option<Vec<i8>> {
     Some(chips.collect())
 }
 
-/// The code of B3I: two registers of thirteen stages, of which the first begins anew after 8190 chips.
+/// The code of B3I.
 fn long(number: u8) -> Option<Vec<i8>> {
     let start = *G2_STARTS.get(usize::from(number).checked_sub(1)?)?;
-    let (first, second) = (stages(&[1, 3, 4, 13]), stages(&[1, 5, 6, 7, 9, 10, 12, 13]));
+    Some(registers([1, 3, 4, 13], &[1, 5, 6, 7, 9, 10, 12, 13], start))
+}
+
+/// The code of two registers of thirteen stages, which feed back those stages: the first begins anew after
+/// 8190 chips, the second begins with `start`, from stage 1 on.
+pub(super) fn registers(first: [u32; 4], second: &[u32], start: u16) -> Vec<i8> {
+    let (first, second) = (stages(&first), stages(second));
     // Printed from stage 1 on, which is the lowest bit here.
     let (mut g1, mut g2) = (0x1FFF, start.reverse_bits() >> 3);
     let chips = (0..10_230).map(|index| {
@@ -112,7 +118,7 @@ fn long(number: u8) -> Option<Vec<i8>> {
         (g1, g2) = (step(g1, first, 13), step(g2, second, 13));
         sign(chip)
     });
-    Some(chips.collect())
+    chips.collect()
 }
 
 fn stages(numbers: &[u32]) -> u16 {

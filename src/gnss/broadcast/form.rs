@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-use super::{B2I_HZ, Ephemeris};
+use super::{B1I_HZ, B2I_HZ, Ephemeris};
 use crate::gnss::satellite::System;
 use crate::gnss::signal::Signal;
 
@@ -44,7 +44,7 @@ pub static PLAIN: SetForm = SetForm {
 fn plain_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     match (set.sv.system, signal.carrier_hz(set.sv)) {
         (System::BeiDou, B2I_HZ) => planted!("gnss.delay.second", set.tgd2_s, -set.tgd2_s),
-        (System::BeiDou, hz) => set.group_delay_on_s(hz),
+        (System::BeiDou, hz) => set.group_delay_on_s(B1I_HZ, hz),
         _ => set.given_delay_s() * set.dispersion(signal),
     }
 }

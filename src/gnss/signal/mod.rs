@@ -26,7 +26,7 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 19] = [
+pub static SIGNALS: [&Signal; 21] = [
     &gps::l1ca::L1_CA,
     &gps::l1c::L1C,
     &gps::l2c::L2C,
@@ -40,6 +40,8 @@ pub static SIGNALS: [&Signal; 19] = [
     &beidou::in_phase::B2I,
     &beidou::in_phase::B3I,
     &beidou::b1c::B1C,
+    &beidou::b2a::B2A,
+    &beidou::b2b::B2B,
     &glonass::fdma::G1,
     &glonass::fdma::G2,
     &qzss::l1ca::L1_CA,

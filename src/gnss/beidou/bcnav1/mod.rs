@@ -6,30 +6,31 @@
 //! interleaved together. The matrices of the codes are those of the document's section 6.2.2, packed in
 //! `ldpc_2.bin` and `ldpc_3.bin`.
 //!
-//! Limits: subframe 3 is always page 2, whose almanacs are empty (number 0): nothing of the ionosphere (the
-//! document's own model, BDGIM, is left out), of UTC, of other systems and of the Earth's orientation. Of
-//! other pages health alone is read. A set of D1 is carried to the nearest reference time that B-CNAV1 can
-//! express, and to its steps; its two group delays are against B3I, and those of B1C and B2a follow as delays
-//! that are as 1/f².
+//! Limits: those of [`super::bcnav`]; subframe 3 is always page 2, whose almanacs are empty (number 0). Of
+//! other pages health alone is read.
 
 mod fields;
 mod reader;
 
 use std::sync::LazyLock;
 
-use crate::gnss::beidou::d1d2::{BDT_WEEK, issue};
-use crate::gnss::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
-use crate::gnss::broadcast::{Ephemeris, PLAIN, SetForm};
+use crate::gnss::beidou::b1c::{B1C, CARRIER_HZ as B1C_HZ};
+use crate::gnss::beidou::b2a::B2A;
+use crate::gnss::beidou::bcnav::blocks::Content;
+use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, blank, integers_in, sent_at};
+use crate::gnss::beidou::bcnav2::B_CNAV2;
+use crate::gnss::bits::{FieldError, bits_of, number, read_all, write_all};
+use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::crc::crc24q;
 use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::fec::ldpc64::Ldpc64;
 use crate::gnss::fec::register::RegisterCode;
-use crate::gnss::ionosphere::Model;
-use crate::gnss::message::{IonosphereForm, Message, Parameters, Raw, Sender};
+use crate::gnss::message::{Message, Parameters, Sender};
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::{BDT, Epoch, WEEK_S};
+use crate::gnss::signal::Signal;
+use crate::gnss::time::{Epoch, WEEK_S};
 pub use fields::tables;
-use fields::{HEADER, SET, STEP_S, kind};
+use fields::{SET, THREE, TWO};
 pub use reader::BCnav1Reader;
 
 /// B-CNAV1 as B1C names it.
@@ -37,6 +38,7 @@ pub static B_CNAV1: Message = Message {
     name: "B-CNAV1",
     symbol_s: 0.01,
     unit_s: FRAME_S,
+    set_s: FRAME_S,
     first_s: 0,
     sender: |_| Ok(Box::new(Frames)),
     number: |_| 1,
@@ -44,32 +46,50 @@ pub static B_CNAV1: Message = Message {
     dated: &[],
     set: &[1],
     reduced: &[],
-    // Never sent and never read.
-    ionosphere: IonosphereForm { model: Model::KlobucharBeidou, unit: |_| false, coefficients: |_| None },
-    set_parameters,
-    elements: of_integers,
+    ionosphere: NO_IONOSPHERE,
+    set_parameters: || bcnav::set_parameters(SET),
+    elements: |sv, raw, near| bcnav::of_integers((SET, &B_CNAV1_SETS), sv, raw, near),
     parameters: opened,
     reader: |sv| Box::new(BCnav1Reader::new(sv)),
-    form: |set| carried(set, &B_CNAV1_SETS),
+    form,
     sets: &B_CNAV1_SETS,
     quantised,
-    adjustable,
+    adjustable: || bcnav::adjustable(SET),
     alert: None,
-    adjust,
+    adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
     rinex: None,
 };
 
 /// Sets of B-CNAV1: T_GD of B1C's pilot in the place of the first group delay, of B2a's in that of the
-/// second; health of the satellite.
+/// second; health of the satellite. They serve both signals, as do those of B-CNAV2.
 pub static B_CNAV1_SETS: SetForm = SetForm {
     name: "B-CNAV1",
-    group_delay_s: |set, _| set.tgd_s,
-    serves: |signal| signal.carries(&B_CNAV1),
+    group_delay_s,
+    serves,
     given_delay_s: |set| set.tgd_s,
     is_healthy: |set| set.health == 0,
-    healthy: |set, signal| signal.carries(&B_CNAV1).then_some(set.health == 0),
+    healthy: |set, signal| serves(signal).then_some(set.health == 0),
     rinex_sources: None,
 };
+
+/// The signals whose delays the sets have.
+fn serves(signal: &Signal) -> bool {
+    signal.carries(&B_CNAV1) || signal.carries(&B_CNAV2)
+}
+
+/// T_GD of a signal's pilot, which receivers follow (7.6).
+fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
+    if signal.carries(&B_CNAV2) {
+        planted!("gnss.bcnav.delays", set.tgd2_s, set.tgd_s)
+    } else {
+        set.group_delay_on_s(B1C_HZ, signal.carrier_hz(set.sv))
+    }
+}
+
+/// A set as B-CNAV1 has it.
+fn form(set: &Ephemeris) -> Ephemeris {
+    bcnav::carried(set, &B_CNAV1_SETS, &[&B1C, &B2A])
+}
 
 /// Seconds of a frame, and of the hours in which frames are counted.
 const FRAME_S: i64 = 18;
@@ -91,20 +111,8 @@ const TIME_CODE: RegisterCode = RegisterCode { stages: 8, feedback: 0b1111_1001,
 /// 36 rows of 48 written, columns of 36 sent (6.2.3).
 const INTERLEAVER: Interleaver = Interleaver { columns: 36, rows: 48 };
 
-static CODE_2: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BITS_2 / 6, include_bytes!("ldpc_2.bin")));
-static CODE_3: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BITS_3 / 6, include_bytes!("ldpc_3.bin")));
-
-/// What frames say.
-#[derive(Clone, Debug)]
-struct Content {
-    set: Ephemeris,
-    /// When the frame is sent.
-    sent: Epoch,
-    kind: f64,
-    page: f64,
-    flags: f64,
-    reserved: f64,
-}
+pub(super) static CODE_2: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BITS_2 / 6, include_bytes!("ldpc_2.bin")));
+pub(super) static CODE_3: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BITS_3 / 6, include_bytes!("ldpc_3.bin")));
 
 /// A frame as decoded: its checks are right.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -129,8 +137,7 @@ impl Frame {
 
     /// When it began, its week near `near`.
     pub fn sent_at(&self, near: Epoch) -> Epoch {
-        let week = number(self.two.get(..13).unwrap_or_default()) as i64 + BDT_WEEK;
-        Epoch::new(near.nearest_week(week, 8192) * WEEK_S + self.of_week_s(), 0.0)
+        sent_at(number(self.two.get(..13).unwrap_or_default()) as i64, self.of_week_s(), near)
     }
 }
 
@@ -212,17 +219,12 @@ impl Sender for Frames {
 }
 
 /// The bits of subframes 2 and 3 of a set without their checks.
-pub(super) fn subframes(set: &Ephemeris, start: Epoch) -> Result<[Vec<bool>; 2], FieldError> {
-    let content = Content { sent: start, ..blank(set.clone()) };
-    let [mut two, mut three] = empty();
-    write_all(&SET, &content, &mut two)?;
-    write_all(&HEADER, &content, &mut three)?;
+fn subframes(set: &Ephemeris, start: Epoch) -> Result<[Vec<bool>; 2], FieldError> {
+    let content = Content { sent: start, page: PAGE, ..blank(set.clone()) };
+    let [mut two, mut three] = [BITS_2, BITS_3].map(|bits| vec![false; bits - CHECK_BITS]);
+    TWO.iter().try_for_each(|table| write_all(table, &content, &mut two))?;
+    THREE.iter().try_for_each(|table| write_all(table, &content, &mut three))?;
     Ok([two, three])
-}
-
-/// Both subframes with nothing in them.
-pub(super) fn empty() -> [Vec<bool>; 2] {
-    [BITS_2, BITS_3].map(|bits| vec![false; bits - CHECK_BITS])
 }
 
 /// The bits of a subframe with their check.
@@ -230,59 +232,6 @@ fn checked(mut bits: Vec<bool>) -> Vec<bool> {
     let check = crc24q(bits.iter().copied());
     bits.extend(bits_of(u128::from(check), CHECK_BITS));
     bits
-}
-
-/// The set as B-CNAV1 has it, and B-CNAV2: carried to the nearest multiple of 300 s of BDT, with the delays
-/// of B1C and B2a.
-pub(super) fn carried(set: &Ephemeris, form: &'static SetForm) -> Ephemeris {
-    if *set.form != PLAIN {
-        return Ephemeris { form, ..set.clone() };
-    }
-    let label_s = BDT.label(set.toe).seconds() as f64;
-    let toe = BDT.instant(Epoch::new((label_s / STEP_S as f64).round() as i64 * STEP_S, 0.0));
-    let (since_toe_s, since_toc_s) = (toe.since(set.toe), toe.since(set.toc));
-    let motion_radps = set.mean_motion_radps();
-    let issue = issue(BDT.label(toe).tow_s());
-    Ephemeris {
-        form,
-        toe,
-        toc: toe,
-        iode: issue,
-        iodc: issue,
-        aodo: 0,
-        m0_rad: set.m0_rad + motion_radps * since_toe_s,
-        omega0_rad: set.omega0_rad + set.omega_dot_radps * since_toe_s,
-        i0_rad: set.i0_rad + set.idot_radps * since_toe_s,
-        af0_s: set.af0_s + since_toc_s * (set.af1_sps + since_toc_s * set.af2_sps2),
-        af1_sps: set.af1_sps + 2.0 * since_toc_s * set.af2_sps2,
-        tgd_s: set.group_delay_on_s(B1C_HZ),
-        tgd2_s: set.group_delay_on_s(B2A_HZ),
-        ..set.clone()
-    }
-}
-
-const B1C_HZ: f64 = 1_575.42e6;
-const B2A_HZ: f64 = 1_176.45e6;
-
-/// Tables with parameters of a set.
-fn of_set() -> [&'static [Element<Content>]; 2] {
-    [&SET, &HEADER]
-}
-
-/// Parameters that are of the frame and not of the set.
-const PASSING: [&str; 3] = ["week", "how_1h", "page"];
-
-fn set_parameters() -> Vec<&'static str> {
-    let names = of_set().into_iter().flatten().map(|element| element.field.name);
-    names.filter(|name| !PASSING.contains(name)).collect()
-}
-
-/// The raw integers of the set in subframes 2 and 3.
-pub(super) fn of_set_in(two: &Vec<bool>, three: &Vec<bool>) -> Parameters {
-    let mut found = integers(&SET, two);
-    found.extend(integers(&HEADER, three));
-    found.retain(|(name, _)| !PASSING.contains(name));
-    found
 }
 
 /// The parameters of a unit's symbols, whose satellite is the one that they name.
@@ -293,69 +242,26 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     Some((true, of_set_in(&frame.two, &frame.three?)))
 }
 
-/// Nothing read yet.
-fn blank(set: Ephemeris) -> Content {
-    let kind = kind(set.sv);
-    let sent = set.toe;
-    Content { set: Ephemeris { form: &B_CNAV1_SETS, ..set }, sent, kind, page: PAGE, flags: 0.0, reserved: 0.0 }
-}
-
-/// The elements that raw integers give, as if they had been sent at `near`.
-fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
-    let mut content = blank(Ephemeris::blank(sv, near));
-    for table in of_set() {
-        let mut bits = vec![false; BITS_2];
-        for field in table.iter().map(|element| &element.field).filter(|field| !PASSING.contains(&field.name)) {
-            field.write(&mut bits, raw(field.name)?);
-        }
-        read_all(table, &bits, &mut content);
-    }
-    Some(content.set)
-}
-
 /// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    let mut content = blank(carried(ephemeris, &B_CNAV1_SETS).timed(|at| BDT.label(at)));
-    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut content))?;
-    Ok(content.set.timed(|label| BDT.instant(label)))
+    bcnav::quantised(SET, form(ephemeris))
 }
 
-/// Parameters by which sets are distinguished, or that are no set's.
-const FIXED_PARAMETERS: [&str; 11] = [
-    "week",
-    "how_1h",
-    "page",
-    "iodc",
-    "iode",
-    "toe_5min",
-    "toc_5min",
-    "orbit_kind",
-    "reserved",
-    "health",
-    "integrity_flags",
-];
-
-fn adjustable() -> Vec<&'static str> {
-    let names = of_set().into_iter().flatten().map(|element| element.field.name);
-    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
-}
-
-/// Adds `by` to a parameter in the unit of the tables; whether there is one.
-fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    let mut content = blank(ephemeris.clone());
-    let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut content, by));
-    *ephemeris = Ephemeris { form: ephemeris.form, ..content.set };
+/// The raw integers of the set in subframes 2 and 3.
+fn of_set_in(two: &Vec<bool>, three: &Vec<bool>) -> Parameters {
+    let mut found = integers_in(TWO, two);
+    found.extend(integers_in(THREE, three));
     found
 }
 
 /// The set in subframes 2 and 3, sent at `sent`.
-pub(super) fn elements(sv: Sv, two: &Vec<bool>, three: &Vec<bool>, sent: Epoch) -> Ephemeris {
-    let mut content = blank(Ephemeris::blank(sv, sent));
-    read_all(&SET, two, &mut content);
-    read_all(&HEADER, three, &mut content);
+fn elements(sv: Sv, two: &Vec<bool>, three: &Vec<bool>, sent: Epoch) -> Ephemeris {
+    let mut content = blank(Ephemeris { form: &B_CNAV1_SETS, ..Ephemeris::blank(sv, sent) });
+    TWO.iter().for_each(|table| read_all(table, two, &mut content));
+    THREE.iter().for_each(|table| read_all(table, three, &mut content));
     content.set
 }
 

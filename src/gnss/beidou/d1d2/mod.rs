@@ -33,6 +33,7 @@ pub static D1_D2: Message = Message {
     name: "D1/D2",
     symbol_s: 0.001,
     unit_s: UNIT_S,
+    set_s: UNIT_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Frames { klobuchar: common.klobuchar_beidou })),
     number: |_| 1,

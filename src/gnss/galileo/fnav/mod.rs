@@ -35,6 +35,7 @@ pub static FNAV: Message = Message {
     name: "F/NAV",
     symbol_s: 0.02,
     unit_s: PAGE_S,
+    set_s: PAGE_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Pages { common: common.clone() })),
     number: page_at,

@@ -18,6 +18,7 @@ pub static INAV_E5B: Message = Message {
     name: "I/NAV on E5b",
     symbol_s: INAV.symbol_s,
     unit_s: PAGE_S,
+    set_s: PAGE_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Pages { common: common.clone(), carrier: &ON_E5B })),
     number: word_at,

@@ -43,6 +43,7 @@ pub static INAV: Message = Message {
     name: "I/NAV",
     symbol_s: 0.004,
     unit_s: PAGE_S,
+    set_s: PAGE_S,
     // The even part begins at an odd second on E1-B (4.3.2.2).
     first_s: 1,
     sender: |common| Ok(Box::new(Pages { common: common.clone(), carrier: &ON_E1B })),

@@ -32,6 +32,7 @@ pub static GNAV: Message = Message {
     name: "GNAV",
     symbol_s: 0.01,
     unit_s: STRING_S,
+    set_s: STRING_S,
     first_s: 0,
     sender: |_| Ok(Box::new(Strings)),
     number: string_at,

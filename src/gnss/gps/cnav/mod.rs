@@ -36,6 +36,7 @@ pub static CNAV: Message = Message {
     name: "CNAV",
     symbol_s: 0.01,
     unit_s: MESSAGE_S,
+    set_s: MESSAGE_S,
     first_s: 0,
     sender: |common| Ok(sender(common, &CNAV)),
     number: |start| type_at(&CNAV, start),

@@ -12,6 +12,7 @@ pub static CNAV_L2C: Message = Message {
     name: "CNAV on L2C",
     symbol_s: 2.0 * CNAV.symbol_s,
     unit_s: MESSAGE_S * 2,
+    set_s: MESSAGE_S * 2,
     sender: |common| Ok(sender(common, &CNAV_L2C)),
     number: |start| type_at(&CNAV_L2C, start),
     ionosphere: IonosphereForm { unit: |start| type_at(&CNAV_L2C, start) == IONOSPHERE, ..CNAV.ionosphere },

@@ -38,6 +38,7 @@ pub static CNAV2: Message = Message {
     name: "CNAV-2",
     symbol_s: 0.01,
     unit_s: FRAME_S,
+    set_s: FRAME_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Frames(common.clone()))),
     number: |_| 1,

@@ -43,6 +43,7 @@ pub static LNAV: Message = Message {
     name: "LNAV",
     symbol_s: 0.02,
     unit_s: SUBFRAME_S,
+    set_s: SUBFRAME_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Broadcast::of(common)?)),
     number: subframe_at,

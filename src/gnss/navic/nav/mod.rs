@@ -33,6 +33,7 @@ pub static SPS_NAV: Message = Message {
     name: "SPS NAV",
     symbol_s: 0.02,
     unit_s: SUBFRAME_S,
+    set_s: SUBFRAME_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Subframes { common: common.clone() })),
     number: subframe_at,

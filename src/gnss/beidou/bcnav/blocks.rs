@@ -1,0 +1,179 @@
+//! Blocks of fields that the three messages have alike, each at a place of its own in each of them: places
+//! count from 0, the first bit of a message or subframe (BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and
+//! BDS-SIS-ICD-B2b 1.0, section 7; clauses are those of B1C's).
+
+use super::Utc;
+use crate::gnss::beidou::d1d2::BDT_WEEK;
+use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::gnss::bits::{Element, Field, element, plain};
+use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+/// Step of reference times.
+pub(in crate::gnss::beidou) const STEP_S: i64 = 300;
+/// Semi-major axes from which elements count, of medium orbits and of the others (table 7-5).
+const MEDIUM_AXIS_M: f64 = 27_906_100.0;
+const HIGH_AXIS_M: f64 = 42_162_200.0;
+/// The number of medium orbits (7.4.2): 1 is of geostationary ones, 2 of inclined ones that turn with the
+/// Earth.
+const MEDIUM: f64 = 3.0;
+
+const TIME: &str = "7.3";
+const ORBIT: &str = "7.4, table 7-5";
+const CLOCK: &str = "7.5, table 7-6";
+const UTC: &str = "7.12, table 7-16";
+const HEALTH: &str = "7.14 to 7.17";
+
+/// What messages say.
+#[derive(Clone, Debug)]
+pub(in crate::gnss::beidou) struct Content {
+    pub set: Ephemeris,
+    /// When the message is sent.
+    pub sent: Epoch,
+    pub kind: f64,
+    pub page: f64,
+    /// Integrity of the signal that carries the message, and of B1C where that is another.
+    pub flags: f64,
+    pub flags_b1c: f64,
+    pub utc: Utc,
+    pub reserved: f64,
+}
+
+pub(in crate::gnss::beidou) type Of = Element<Content>;
+
+fn steps(at: Epoch) -> f64 {
+    at.tow_s() / STEP_S as f64
+}
+
+/// The kind of a satellite's orbit.
+pub(super) fn kind(sv: Sv) -> f64 {
+    match sv.orbit_m() {
+        axis_m if axis_m < 35e6 => MEDIUM,
+        _ if sv.is_geostationary() => 1.0,
+        _ => 2.0,
+    }
+}
+
+fn reference_axis_m(content: &Content) -> f64 {
+    if content.kind == MEDIUM { MEDIUM_AXIS_M } else { HIGH_AXIS_M }
+}
+
+/// The week of BDT.
+pub(in crate::gnss::beidou) const fn week<const AT: u16>() -> Of {
+    element(
+        Field::new("week", const { &[(AT, 13)] }, Whole, 0, TIME),
+        |c| (c.sent.week() - BDT_WEEK).rem_euclid(8192) as f64,
+        |_, _| {},
+    )
+}
+
+/// The issue of the clock.
+pub(in crate::gnss::beidou) const fn iodc<const AT: u16>() -> Of {
+    element(
+        Field::new("iodc", const { &[(AT, 10)] }, Whole, 0, CLOCK),
+        |c| f64::from(c.set.iodc),
+        |c, v| c.set.iodc = v as u16,
+    )
+}
+
+/// The issue of the orbit.
+pub(in crate::gnss::beidou) const fn iode<const AT: u16>() -> Of {
+    element(
+        Field::new("iode", const { &[(AT, 8)] }, Whole, 0, ORBIT),
+        |c| f64::from(c.set.iode),
+        |c, v| c.set.iode = v as u16,
+    )
+}
+
+/// The first half of the orbit, 203 bits.
+#[rustfmt::skip]
+pub(in crate::gnss::beidou) const fn first_half<const AT: u16>() -> [Of; 9] {
+    [
+        element(Field::new("toe_5min", const { &[(AT, 11)] }, Whole, 0, ORBIT),
+            |c| steps(c.set.toe), |c, v| c.set.toe = c.set.toe.nearest_tow(v as i64 * STEP_S)),
+        plain!("orbit_kind", const { [(AT + 11, 2)] }, Whole, 0, ORBIT, kind),
+        element(Field::new("delta_a_m", const { &[(AT + 13, 26)] }, Signed, -9, ORBIT),
+            |c| c.set.sqrt_a_sqrtm * c.set.sqrt_a_sqrtm - reference_axis_m(c),
+            |c, v| c.set.sqrt_a_sqrtm = (v + reference_axis_m(c)).sqrt()),
+        plain!("a_rate_mps", const { [(AT + 39, 25)] }, Signed, -21, ORBIT, set.axis_rate_mps),
+        plain!("delta_n_radps", const { [(AT + 64, 17)] }, Semicircles, -44, ORBIT, set.delta_n_radps),
+        plain!("delta_n_rate_radps2", const { [(AT + 81, 23)] }, Semicircles, -57, ORBIT, set.delta_n_rate_radps2),
+        plain!("m0_rad", const { [(AT + 104, 1), (AT + 105, 32)] }, Turn, -32, ORBIT, set.m0_rad),
+        plain!("eccentricity", const { [(AT + 137, 1), (AT + 138, 32)] }, Unsigned, -34, ORBIT, set.eccentricity),
+        plain!("omega_rad", const { [(AT + 170, 1), (AT + 171, 32)] }, Turn, -32, ORBIT, set.omega_rad),
+    ]
+}
+
+/// The second half of the orbit, 222 bits.
+#[rustfmt::skip]
+pub(in crate::gnss::beidou) const fn second_half<const AT: u16>() -> [Of; 10] {
+    [
+        plain!("omega0_rad", const { [(AT, 1), (AT + 1, 32)] }, Turn, -32, ORBIT, set.omega0_rad),
+        plain!("i0_rad", const { [(AT + 33, 1), (AT + 34, 32)] }, Semicircles, -32, ORBIT, set.i0_rad),
+        plain!("omega_dot_radps", const { [(AT + 66, 19)] }, Semicircles, -44, ORBIT, set.omega_dot_radps),
+        plain!("idot_radps", const { [(AT + 85, 15)] }, Semicircles, -44, ORBIT, set.idot_radps),
+        plain!("cis_rad", const { [(AT + 100, 16)] }, Signed, -30, ORBIT, set.cis_rad),
+        plain!("cic_rad", const { [(AT + 116, 16)] }, Signed, -30, ORBIT, set.cic_rad),
+        plain!("crs_m", const { [(AT + 132, 24)] }, Signed, -8, ORBIT, set.crs_m),
+        plain!("crc_m", const { [(AT + 156, 24)] }, Signed, -8, ORBIT, set.crc_m),
+        plain!("cus_rad", const { [(AT + 180, 21)] }, Signed, -30, ORBIT, set.cus_rad),
+        plain!("cuc_rad", const { [(AT + 201, 21)] }, Signed, -30, ORBIT, set.cuc_rad),
+    ]
+}
+
+/// The clock, 69 bits.
+#[rustfmt::skip]
+pub(in crate::gnss::beidou) const fn clock<const AT: u16>() -> [Of; 4] {
+    [
+        element(Field::new("toc_5min", const { &[(AT, 11)] }, Whole, 0, CLOCK),
+            |c| steps(c.set.toc), |c, v| c.set.toc = c.set.toc.nearest_tow(v as i64 * STEP_S)),
+        plain!("af0_s", const { [(AT + 11, 25)] }, Signed, -34, CLOCK, set.af0_s),
+        plain!("af1_sps", const { [(AT + 36, 22)] }, Signed, -50, CLOCK, set.af1_sps),
+        plain!("af2_sps2", const { [(AT + 58, 11)] }, Signed, -66, CLOCK, set.af2_sps2),
+    ]
+}
+
+/// BDT against UTC, 97 bits.
+#[rustfmt::skip]
+pub(in crate::gnss::beidou) const fn utc<const AT: u16>() -> [Of; 9] {
+    [
+        plain!("utc_a0_s", const { [(AT, 16)] }, Signed, -35, UTC, utc.a0_s),
+        plain!("utc_a1_sps", const { [(AT + 16, 13)] }, Signed, -51, UTC, utc.a1_sps),
+        plain!("utc_a2_sps2", const { [(AT + 29, 7)] }, Signed, -68, UTC, utc.a2_sps2),
+        plain!("leap_s", const { [(AT + 36, 8)] }, Signed, 0, UTC, utc.leap_s),
+        plain!("utc_tot_s", const { [(AT + 44, 16)] }, Whole, 4, UTC, utc.tot_s),
+        plain!("utc_week", const { [(AT + 60, 13)] }, Whole, 0, UTC, utc.week),
+        plain!("leap_week", const { [(AT + 73, 13)] }, Whole, 0, UTC, utc.event_week),
+        plain!("leap_day", const { [(AT + 86, 3)] }, Whole, 0, UTC, utc.event_day),
+        plain!("leap_after_s", const { [(AT + 89, 8)] }, Signed, 0, UTC, utc.leap_after_s),
+    ]
+}
+
+/// Health of the satellite.
+pub(in crate::gnss::beidou) const fn health<const AT: u16>() -> Of {
+    element(
+        Field::new("health", const { &[(AT, 2)] }, Whole, 0, HEALTH),
+        |c| f64::from(c.set.health),
+        |c, v| c.set.health = v as u16,
+    )
+}
+
+/// Integrity of the signal: three flags.
+pub(in crate::gnss::beidou) const fn flags<const AT: u16>() -> Of {
+    plain!("integrity_flags", const { [(AT, 3)] }, Whole, 0, HEALTH, flags)
+}
+
+/// Those of B1C in another signal's message.
+pub(in crate::gnss::beidou) const fn flags_b1c<const AT: u16>() -> Of {
+    plain!("integrity_flags_b1c", const { [(AT, 3)] }, Whole, 0, HEALTH, flags_b1c)
+}
+
+/// An index of the signal's accuracy, as it is monitored.
+pub(in crate::gnss::beidou) const fn sismai<const AT: u16>() -> Of {
+    element(
+        Field::new("sismai", const { &[(AT, 4)] }, Whole, 0, HEALTH),
+        |c| f64::from(c.set.ura_index),
+        |c, v| c.set.ura_index = v as u8,
+    )
+}

@@ -1,0 +1,203 @@
+//! What the messages of B1C, B2a and B2b have alike: blocks of fields, sets of elements that are carried
+//! from D1, and, of the last two, messages of one length with a type each.
+//!
+//! Sources: BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and BDS-SIS-ICD-B2b 1.0, section 7. A set of D1 is
+//! carried to the nearest reference time that the messages can express, and to their steps; its two group
+//! delays are against B3I, and those of the three signals follow as delays that are as 1/f².
+//!
+//! Limits: nothing of the ionosphere (the documents' own model, BDGIM, is left out), of other systems, of the
+//! Earth's orientation and no almanacs; nothing of UTC is read.
+
+pub(super) mod blocks;
+pub(super) mod typed;
+
+use crate::gnss::beidou::d1d2::{BDT_WEEK, issue};
+use crate::gnss::bits::{Field, FieldError, Store, add_to, integers, quantise_all, read_all};
+use crate::gnss::broadcast::{Ephemeris, PLAIN, SetForm};
+use crate::gnss::ionosphere::Model;
+use crate::gnss::message::{Common, IonosphereForm, Parameters, Raw};
+use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
+use crate::gnss::time::{BDT, Epoch, WEEK_S};
+use blocks::{Content, Of, STEP_S, kind};
+
+/// Never sent and never read.
+pub(super) const NO_IONOSPHERE: IonosphereForm =
+    IonosphereForm { model: Model::KlobucharBeidou, unit: |_| false, coefficients: |_| None };
+
+/// Tables with the parameters of a set.
+pub(super) type Tables = [&'static [Of]];
+
+/// Every field by the table that has it.
+pub(super) fn fields(all: &[(&'static str, &'static Tables)]) -> Vec<(&'static str, Vec<&'static Field>)> {
+    let of = |tables: &'static Tables| tables.iter().flat_map(|table| table.iter()).map(|own| &own.field).collect();
+    all.iter().map(|(name, tables)| (*name, of(tables))).collect()
+}
+
+/// What is said of UTC.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Utc {
+    pub a0_s: f64,
+    pub a1_sps: f64,
+    pub a2_sps2: f64,
+    pub leap_s: f64,
+    pub tot_s: f64,
+    pub week: f64,
+    pub event_week: f64,
+    pub event_day: f64,
+    pub leap_after_s: f64,
+}
+
+impl Utc {
+    /// That of BDT, a whole number of seconds behind GPS time, at a time of BDT.
+    pub fn of(common: &Common, start: Epoch) -> Self {
+        let utc = &common.utc;
+        let behind_s = BDT.behind_gpst_s as f64;
+        let reference = utc.polynomial.map(|polynomial| polynomial.reference).or(common.reference);
+        // To the step of its field.
+        let label = reference.map_or(start, |reference| BDT.label(reference));
+        let at = Epoch::new(label.seconds().div_euclid(16) * 16, 0.0);
+        // Days count from 0, Sunday, and those of GPS from 1.
+        let event = utc.event.map_or((start.week(), 6, utc.leap_s), |e| (e.week, i64::from(e.day) - 1, e.after_s));
+        Self {
+            a0_s: utc.polynomial.map_or(0.0, |polynomial| polynomial.at_s(BDT.instant(at))),
+            a1_sps: utc.polynomial.map_or(0.0, |polynomial| polynomial.a1_sps),
+            a2_sps2: 0.0,
+            leap_s: utc.leap_s as f64 - planted!("gnss.bcnav.leap", behind_s, 0.0),
+            tot_s: at.tow_s(),
+            week: (at.week() - BDT_WEEK).rem_euclid(8192) as f64,
+            event_week: (event.0 - BDT_WEEK).rem_euclid(8192) as f64,
+            event_day: event.1 as f64,
+            leap_after_s: event.2 as f64 - behind_s,
+        }
+    }
+}
+
+/// Nothing read yet.
+pub(super) fn blank(set: Ephemeris) -> Content {
+    let kind = kind(set.sv);
+    let sent = set.toe;
+    Content { set, sent, kind, page: 0.0, flags: 0.0, flags_b1c: 0.0, utc: Utc::default(), reserved: 0.0 }
+}
+
+/// A set in one of the messages: carried to the nearest multiple of 300 s of BDT, with the delays of the
+/// signals that have the first and the second place in that message.
+pub(super) fn carried(set: &Ephemeris, form: &'static SetForm, signals: &[&Signal]) -> Ephemeris {
+    if *set.form == *form {
+        return set.clone();
+    }
+    let mut delays_s = signals.iter().map(|signal| set.group_delay_s(signal));
+    let own = Ephemeris {
+        form,
+        tgd_s: delays_s.next().unwrap_or(0.0),
+        tgd2_s: delays_s.next().unwrap_or(0.0),
+        isc_s: [0.0; 6],
+        ..set.clone()
+    };
+    if *set.form != PLAIN {
+        return own;
+    }
+    let label_s = BDT.label(set.toe).seconds() as f64;
+    let toe = BDT.instant(Epoch::new((label_s / STEP_S as f64).round() as i64 * STEP_S, 0.0));
+    let (since_toe_s, since_toc_s) = (toe.since(set.toe), toe.since(set.toc));
+    let motion_radps = set.mean_motion_radps();
+    let issue = issue(BDT.label(toe).tow_s());
+    Ephemeris {
+        toe,
+        toc: toe,
+        iode: issue,
+        iodc: issue,
+        aodo: 0,
+        m0_rad: set.m0_rad + motion_radps * since_toe_s,
+        omega0_rad: set.omega0_rad + set.omega_dot_radps * since_toe_s,
+        i0_rad: set.i0_rad + set.idot_radps * since_toe_s,
+        af0_s: set.af0_s + since_toc_s * (set.af1_sps + since_toc_s * set.af2_sps2),
+        af1_sps: set.af1_sps + 2.0 * since_toc_s * set.af2_sps2,
+        ..own
+    }
+}
+
+/// The set, its times GPS time, that a receiver decodes when that one is sent.
+pub(super) fn quantised(tables: &Tables, carried: Ephemeris) -> Result<Ephemeris, FieldError> {
+    let mut content = blank(carried.timed(|at| BDT.label(at)));
+    tables.iter().try_for_each(|table| quantise_all(table, &mut content))?;
+    Ok(content.set.timed(|label| BDT.instant(label)))
+}
+
+/// Parameters that are of a message and not of the set.
+const PASSING: [&str; 3] = ["week", "how_1h", "page"];
+
+/// Names of the parameters of a set, each once.
+pub(super) fn set_parameters(tables: &Tables) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = Vec::new();
+    for name in tables.iter().flat_map(|table| table.iter()).map(|element| element.field.name) {
+        if !PASSING.contains(&name) && !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+/// The raw integers in bits whose tables those are, but those of the message itself.
+pub(super) fn integers_in<S: Store>(tables: &Tables, bits: &S) -> Parameters {
+    let mut found: Parameters = tables.iter().flat_map(|table| integers(table, bits)).collect();
+    found.retain(|(name, _)| !PASSING.contains(name));
+    found
+}
+
+/// The elements that raw integers give, as if they had been sent at `near`.
+pub(super) fn of_integers(
+    (tables, form): (&Tables, &'static SetForm),
+    sv: Sv,
+    raw: Raw<'_>,
+    near: Epoch,
+) -> Option<Ephemeris> {
+    let mut content = blank(Ephemeris { form, ..Ephemeris::blank(sv, near) });
+    for table in tables {
+        let mut bits = vec![false; LONGEST_BITS];
+        for field in table.iter().map(|element| &element.field).filter(|field| !PASSING.contains(&field.name)) {
+            field.write(&mut bits, raw(field.name)?);
+        }
+        read_all(table, &bits, &mut content);
+    }
+    Some(content.set)
+}
+
+/// At least as many bits as any subframe or message has.
+const LONGEST_BITS: usize = 600;
+
+/// Parameters by which sets are distinguished, or that are no set's.
+const FIXED_PARAMETERS: [&str; 9] = [
+    "iodc",
+    "iode",
+    "toe_5min",
+    "toc_5min",
+    "orbit_kind",
+    "reserved",
+    "health",
+    "integrity_flags",
+    "integrity_flags_b1c",
+];
+
+/// Names of the parameters of a set that may be wrong with a right check.
+pub(super) fn adjustable(tables: &Tables) -> Vec<&'static str> {
+    let mut names = set_parameters(tables);
+    names.retain(|name| !FIXED_PARAMETERS.contains(name) && !name.starts_with("utc_") && !name.starts_with("leap_"));
+    names
+}
+
+/// Adds `by` to a parameter in the unit of the tables; whether there is one.
+pub(super) fn adjust(tables: &Tables, ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+    let mut content = blank(ephemeris.clone());
+    let found = tables.iter().any(|table| add_to(table, parameter, &mut content, by));
+    *ephemeris = content.set;
+    found
+}
+
+/// When what began at a second of the week of BDT was sent, by the lower bits of its week and a time near it.
+pub(super) fn sent_at(week: i64, of_week_s: i64, near: Epoch) -> Epoch {
+    Epoch::new(near.nearest_week(week + BDT_WEEK, 8192) * WEEK_S + of_week_s, 0.0)
+}
+
+#[cfg(test)]
+mod tests;

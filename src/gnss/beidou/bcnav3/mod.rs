@@ -1,0 +1,140 @@
+//! B-CNAV3, the message of B2b: messages of a second, encoded and decoded.
+//!
+//! Source: BDS-SIS-ICD-B2b 1.0, 6.2 (structure, code) and 7. A message is 1000 symbols: 16 of a preamble, six
+//! of the satellite's number and six reserved ones, then 486 bits with their check, coded over GF(64) by the
+//! matrix of 6.2.2, packed in `ldpc.bin`. Sent are messages 10 (orbit) and 30 (clock, group delay, UTC) in
+//! turn; the document leaves the order open. Sets have no issue but their reference times, which are those of
+//! orbit and clock alike.
+//!
+//! Limits: those of [`super::bcnav`]; message 30 has zeros for BDGIM's coefficients, the Earth's orientation
+//! and predicted accuracies. Message 40 (almanacs, other systems' times) is neither sent nor read, nor are
+//! those of PPP-B2b.
+
+use std::sync::LazyLock;
+
+use crate::gnss::beidou::b2b::{B2B, CARRIER_HZ};
+use crate::gnss::beidou::bcnav::blocks::{self, Of};
+use crate::gnss::beidou::bcnav::typed::{Layout, Messages, TypedReader};
+use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, Tables};
+use crate::gnss::beidou::d1d2::issue;
+use crate::gnss::bits::Kind::{Signed, Whole};
+use crate::gnss::bits::{Field, FieldError, plain};
+use crate::gnss::broadcast::{Ephemeris, SetForm};
+use crate::gnss::fec::ldpc64::Ldpc64;
+use crate::gnss::message::Message;
+
+/// B-CNAV3 as B2b names it.
+pub static B_CNAV3: Message = Message {
+    name: "B-CNAV3",
+    symbol_s: 0.001,
+    unit_s: MESSAGE_S,
+    set_s: MESSAGE_S * ORDER.len() as i64,
+    first_s: 0,
+    sender: |common| Ok(Box::new(Messages { layout: &LAYOUT, common: common.clone() })),
+    number: |start| LAYOUT.type_at(start),
+    timed: &ORDER,
+    dated: &[],
+    set: &ORDER,
+    reduced: &[],
+    ionosphere: NO_IONOSPHERE,
+    set_parameters: || bcnav::set_parameters(SET),
+    elements: |sv, raw, near| LAYOUT.elements(SET, sv, raw, near),
+    parameters: |symbols| LAYOUT.opened(symbols),
+    reader: |sv| Box::new(TypedReader::new(&LAYOUT, sv)),
+    form,
+    sets: &B_CNAV3_SETS,
+    quantised,
+    adjustable: || bcnav::adjustable(SET),
+    alert: None,
+    adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
+    rinex: None,
+};
+
+/// Sets of B-CNAV3: T_GD of B2b in the place of the first group delay; health of the satellite.
+pub static B_CNAV3_SETS: SetForm = SetForm {
+    name: "B-CNAV3",
+    group_delay_s: |set, signal| set.group_delay_on_s(CARRIER_HZ, signal.carrier_hz(set.sv)),
+    serves: |signal| signal.carries(&B_CNAV3),
+    given_delay_s: |set| set.tgd_s,
+    is_healthy: |set| set.health == 0,
+    healthy: |set, signal| signal.carries(&B_CNAV3).then_some(set.health == 0),
+    rinex_sources: None,
+};
+
+/// Seconds of a message, in which time is counted too.
+const MESSAGE_S: i64 = 1;
+const ORDER: [u8; 2] = [10, 30];
+/// Bits of a message with its check.
+const BITS: usize = 486;
+
+pub(super) static CODE: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BITS / 6, include_bytes!("ldpc.bin")));
+
+const HEAD: &str = "6.2.1";
+const DELAYS: &str = "7.6";
+
+/// How its messages are made.
+static LAYOUT: Layout = Layout {
+    message: &B_CNAV3,
+    preamble: (0xEB90, 16),
+    plain: 12,
+    bits: BITS,
+    code: &CODE,
+    number: None,
+    kind: Field::new("type", &[(0, 6)], Whole, 0, HEAD),
+    second: Field::new("sow_s", &[(6, 20)], Whole, 0, HEAD),
+    order: &ORDER,
+    tables: &[(10, TEN), (30, THIRTY)],
+    set: &ORDER,
+    issues: &["toe_5min", "toc_5min"],
+    issue_bits: 0x7FF,
+    complete: numbered,
+};
+
+static FIRST_HALF: [Of; 9] = blocks::first_half::<30>();
+static SECOND_HALF: [Of; 10] = blocks::second_half::<233>();
+static STATUS: [Of; 2] = [blocks::flags::<455>(), blocks::sismai::<458>()];
+static TIME: [Of; 1] = [blocks::week::<26>()];
+static CLOCK: [Of; 4] = blocks::clock::<43>();
+static DELAY: [Of; 1] = [plain!("tgd_b2bi_s", [(112, 12)], Signed, -34, DELAYS, set.tgd_s)];
+static UTC: [Of; 9] = blocks::utc::<198>();
+static HEALTH: [Of; 1] = [blocks::health::<460>()];
+
+static TEN: &Tables = &[&FIRST_HALF, &SECOND_HALF, &STATUS];
+static THIRTY: &Tables = &[&TIME, &CLOCK, &DELAY, &UTC, &HEALTH];
+/// Those with parameters of a set.
+static SET: &Tables = &[&FIRST_HALF, &SECOND_HALF, &STATUS, &TIME, &CLOCK, &DELAY, &HEALTH];
+
+/// The set with the number of its reference time, if that is the clock's too.
+fn numbered(set: Ephemeris) -> Option<Ephemeris> {
+    let issue = issue(set.toe.tow_s());
+    (set.toe == set.toc).then_some(Ephemeris { iode: issue, iodc: issue, ..set })
+}
+
+/// A set as B-CNAV3 has it.
+fn form(set: &Ephemeris) -> Ephemeris {
+    bcnav::carried(set, &B_CNAV3_SETS, &[&B2B])
+}
+
+/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+///
+/// # Errors
+/// A value that the message cannot carry.
+pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+    bcnav::quantised(SET, form(ephemeris))
+}
+
+/// The symbols of a satellite's message of 486 bits with their check.
+pub fn encode(number: u8, bits: &[bool]) -> Vec<bool> {
+    LAYOUT.encode(number, bits)
+}
+
+/// The bits of a message in its 1000 soft symbols, positive for a logical 0, and whether they are upside
+/// down; `None` where its check fails.
+pub fn decode(soft: &[f32]) -> Option<(Vec<bool>, bool)> {
+    LAYOUT.decode(soft)
+}
+
+/// Every field by the message that carries it.
+pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
+    bcnav::fields(&[("message 10", TEN), ("message 30", THIRTY)])
+}
