@@ -7,7 +7,6 @@
 //! count samples of the first front end ([`step`]).
 
 use crate::gnss::samples::IfMetadata;
-use crate::gnss::signal::Component;
 use crate::receiver::correlate::layers_refusal;
 use crate::receiver::diagnosis::Stage;
 use crate::receiver::lead::{lead, refusal};
@@ -78,13 +77,13 @@ impl Session {
             let step = Step::new(number, metadata.rate, first.rate);
             front_ends.push(FrontEnd::new(step, metadata, own, signals.clone())?);
         }
-        let period_s = noises.first().and_then(|(signal, _)| lead(signal)).map_or(1.0, Component::period_s);
+        let loops = settings.tracking.least_margins(noises.iter().filter_map(|(signal, _)| lead(signal)));
         let start = metadata.iter().find_map(|metadata| metadata.start);
         Ok(Self {
             front_ends,
             shared: Shared::new(settings, noises, first.rate, (start, week_reference)),
             next_tick: 0,
-            loops: settings.tracking.margins(period_s),
+            loops,
         })
     }
 

@@ -209,6 +209,17 @@ impl TrackingSettings {
         ]
     }
 
+    /// Every loop's margin where several components are followed, each with the settings fitted to it: that of
+    /// the component which leaves least.
+    pub fn least_margins<'a>(&self, components: impl Iterator<Item = &'a Component>) -> [LoopMargin; 5] {
+        let each = components.map(|component| self.fitted(component).margins(component.period_s()));
+        let less = |one: LoopMargin, other: LoopMargin| {
+            if other.margin_share < one.margin_share { other } else { one }
+        };
+        each.reduce(|least, of| std::array::from_fn(|loop_| less(least[loop_], of[loop_])))
+            .unwrap_or_else(|| self.margins(1e-3))
+    }
+
     /// Checks every value and its range, for a code whose period is `period_s`.
     ///
     /// # Errors
@@ -259,6 +270,8 @@ impl TrackingSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::signal::Signal;
+    use crate::receiver::lead::lead;
 
     #[test]
     fn defaults_are_valid_and_a_bad_value_names_its_key() {
@@ -275,6 +288,19 @@ mod tests {
         let bad = TrackingSettings { pll_bandwidth_hz: 25.0, integration: 20, ..Default::default() };
         let text = bad.validate(1e-3).unwrap_err().to_string();
         assert!(text.contains("0.5") && text.contains("at most 20 Hz"), "{text}");
+    }
+
+    #[test]
+    fn margins_are_those_of_the_updates_that_each_code_has() {
+        let settings = TrackingSettings::default();
+        let of = |names: &[&str]| {
+            let signals = names.iter().filter_map(|name| Signal::find(name));
+            settings.least_margins(signals.filter_map(lead))[0]
+        };
+        // 18 Hz: four periods of 1 ms, and one of 10 ms. Neither makes the other's product.
+        assert!((of(&["gps_l1ca"]).bandwidth_time - 0.072).abs() < 1e-12);
+        assert!((of(&["gps_l1c"]).bandwidth_time - 0.18).abs() < 1e-12);
+        assert_eq!(of(&["gps_l1ca", "gps_l1c"]), of(&["gps_l1c"]));
     }
 
     #[test]
