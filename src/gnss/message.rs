@@ -81,7 +81,13 @@ pub struct Records {
     pub set: fn(Sv) -> &'static str,
     /// Of the ionosphere's coefficients.
     pub ionosphere: &'static str,
+    /// Lines after the clock's of sets that version 4 alone has, by the set and its raw parameters; a blank
+    /// field has no value. Absent where sets have the lines that version 3 has, too.
+    pub lines: Option<fn(&Ephemeris, Raw<'_>) -> Vec<RecordLine>>,
 }
+
+/// Four fields of a line of a record.
+pub type RecordLine = [Option<f64>; 4];
 
 /// How a message describes the ionosphere.
 #[derive(Clone, Copy)]

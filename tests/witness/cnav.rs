@@ -6,6 +6,7 @@ use gnss_twin::gnss::bits::number;
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::crc::crc24q;
 use gnss_twin::gnss::earth::{GPS_PI, SPEED_OF_LIGHT_MPS};
+use gnss_twin::gnss::exchange::{NavigationSets, Version};
 use gnss_twin::gnss::fec::convolutional::Convolutional;
 use gnss_twin::gnss::gps::cnav::{self, CNAV, CNAV_L2C};
 use gnss_twin::gnss::gps::cnav2::CNAV2;
@@ -16,6 +17,7 @@ use gnss_twin::gnss::gps::l5::L5;
 use gnss_twin::gnss::gps::modernised;
 use gnss_twin::gnss::message::{Common, Message, Read};
 use gnss_twin::gnss::satellite::Sv;
+use gnss_twin::gnss::signal::Signal;
 use gnss_twin::gnss::time::Epoch;
 use gnss_twin::gnss::{inflate, rinex};
 
@@ -167,11 +169,13 @@ fn every_real_message_of_l5_and_l2c_holds_and_its_sets_are_the_records_of_the_ho
             all.retain(|sent| cnav::message_type(&sent.bits) != 32);
             all.iter().for_each(|sent| holds(message, sent));
             let mut sets: BTreeMap<(Sv, i64), Ephemeris> = BTreeMap::new();
-            let mut resent = 0;
+            let (mut written, mut resent) = (NavigationSets::default(), 0);
             for own in all.chunk_by(|a, b| a.sv == b.sv) {
                 for read in read(message, own, false) {
-                    if let Read::Ephemeris(set) = read {
-                        sets.insert((set.sv, set.toe.seconds()), *set);
+                    match read {
+                        Read::Ephemeris(set) => _ = sets.insert((set.sv, set.toe.seconds()), *set),
+                        Read::Parameters(rows) => rows.iter().for_each(|row| written.take(row)),
+                        _ => {}
                     }
                 }
             }
@@ -189,12 +193,45 @@ fn every_real_message_of_l5_and_l2c_holds_and_its_sets_are_the_records_of_the_ho
                 resent += 1;
             }
             let Some(path) = external(file) else { return };
-            let matched = records(&path, 'G').into_iter().filter(|record| agrees(record, &sets)).count();
+            let theirs = records(&path, 'G');
+            let matched = theirs.iter().filter(|record| agrees(record, &sets)).count();
+            let same = printed_alike(&written, of, all[0].start, &theirs);
+            assert!(same == matched && same >= 5, "{same} of {matched}");
             let count = all.len();
             println!("{name} {signal}: {count} messages, {} sets, {resent} sent again, {matched} records", sets.len());
             assert!(count > 1500 && resent > count / 2 && matched >= 5, "{count} {resent} {matched}");
         }
     }
+}
+
+/// How many records that we write of decoded sets have every number of another converter's, prediction and
+/// accuracies too.
+fn printed_alike(written: &NavigationSets, (signal, _): (&str, &Message), near: Epoch, theirs: &[Record]) -> usize {
+    let signal: &Signal = if signal == "L5" { &L5 } else { &L2C };
+    let mut text = Vec::new();
+    written.write(&mut text, Version::Four, &[signal], near).unwrap();
+    let ours = records_in(&String::from_utf8(text).unwrap(), 'G');
+    let mut alike = 0;
+    for other in theirs {
+        let of_set = |own: &&Record| other.sv == own.sv && other.toc == own.toc;
+        let Some(own) = ours.iter().find(of_set) else { continue };
+        for (row, (one, another)) in own.rows.iter().zip(&other.rows).enumerate().take(8) {
+            for (place, (a, b)) in one.iter().zip(another).enumerate() {
+                // Time of transmission is that of the set there, and health of one signal.
+                let is_health = (row, place) == (6, 1);
+                // Both print what is an integer times its step, to twelve digits behind the point.
+                assert!(is_health || (a - b).abs() <= 2e-12 * a.abs(), "{} {row} {place}: {a:e} {b:e}", own.sv);
+            }
+        }
+        alike += 1;
+    }
+    let three = {
+        let mut text = Vec::new();
+        written.write(&mut text, Version::Three, &[signal], near).unwrap();
+        String::from_utf8(text).unwrap()
+    };
+    assert!(three.trim_end().ends_with("END OF HEADER"), "version 3 has no records of CNAV: {three}");
+    alike
 }
 
 /// The numbers of a record of CNAV of one system: satellite, time of clock, then rows of four.
@@ -208,7 +245,11 @@ pub fn records(path: &std::path::Path, system: char) -> Vec<Record> {
     let packed = std::fs::read(path).unwrap();
     let gz = path.extension().is_some_and(|end| end == "gz");
     let whole = if gz { inflate::inflate(&packed, 1 << 26).unwrap() } else { packed };
-    let text = String::from_utf8_lossy(&whole).into_owned();
+    records_in(&String::from_utf8_lossy(&whole), system)
+}
+
+/// The same of a text.
+fn records_in(text: &str, system: char) -> Vec<Record> {
     let lines: Vec<&str> = text.lines().collect();
     let head = format!("> EPH {system}");
     let heads = (0..lines.len()).filter(|at| lines[*at].starts_with(&head) && lines[*at].contains(" CNAV"));

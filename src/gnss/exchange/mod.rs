@@ -8,6 +8,7 @@
 //! of navigation what a message's `rinex` names; no date of the run stands in the header, since the same run
 //! gives the same bytes at any time.
 
+pub(in crate::gnss) mod modern;
 mod navigation;
 mod observation;
 mod track;

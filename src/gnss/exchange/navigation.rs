@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use super::{Version, calendar, header_line, opening};
 use crate::gnss::broadcast::{Ephemeris, StateVector, status_of_record};
 use crate::gnss::ionosphere::Coefficients;
-use crate::gnss::message::{Message, Records};
+use crate::gnss::message::{Message, RecordLine, Records};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
@@ -89,10 +89,16 @@ impl NavigationSets {
             let raw = |name: &str| raws.get(name).or_else(|| rest?.get(name)).copied();
             let set = (message.elements)(*sv, &raw, time.label(near));
             let set = set.map(|set| set.timed(|label| time.instant(label)));
-            if let Some(set) = set.filter(|set| known.insert((*sv, *issue, set.form.name))) {
+            // Version 3 has no records of the newer messages.
+            let writes = records.lines.is_none() || version == Version::Four;
+            if let Some(set) = set.filter(|set| writes && known.insert((*sv, *issue, set.form.name))) {
                 text += &heading(version, records, *sv);
                 let own = signals.iter().find(|signal| signal.system == sv.system);
-                text += &record(&set, own.and_then(|signal| signal.link(*sv).channel()));
+                let channel = own.and_then(|signal| signal.link(*sv).channel());
+                text += &match records.lines {
+                    Some(lines) => modern_record(&set, |set| lines(set, &raw)),
+                    None => record(&set, channel),
+                };
             }
         }
         writer.write_all(text.as_bytes()).and_then(|()| writer.flush())
@@ -193,6 +199,22 @@ fn values(values: &[f64]) -> String {
     values.iter().map(|value| format!("{:>19}", exponent(*value, 12))).collect()
 }
 
+/// A set in a record that version 4 alone has: a line with the clock, and those of its message.
+fn modern_record(set: &Ephemeris, lines: impl Fn(&Ephemeris) -> Vec<RecordLine>) -> String {
+    // BeiDou's records are in its own time.
+    let set = &if set.sv.system == System::BeiDou { set.clone().timed(|at| BDT.label(at)) } else { set.clone() };
+    let field = |value: Option<f64>| value.map_or(" ".repeat(19), |value| values(&[value]));
+    let body = lines(set).into_iter().map(|line| format!("    {}", line.map(field).concat().trim_end()) + "\n");
+    clock_line(set) + &body.collect::<String>()
+}
+
+/// The first line: satellite, reference time of the clock, and its polynomial.
+fn clock_line(set: &Ephemeris) -> String {
+    let [year, month, day, hour, minute, second] = calendar(set.toc);
+    let clock = values(&[set.af0_s, set.af1_sps, set.af2_sps2]);
+    format!("{} {year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}{clock}\n", set.sv)
+}
+
 /// A set: a line with the clock, seven with the rest (RINEX 3.05, tables A6, A8, A14 and A18).
 fn record(set: &Ephemeris, channel: Option<i8>) -> String {
     if let Some(vector) = &set.vector {
@@ -233,9 +255,7 @@ fn record(set: &Ephemeris, channel: Option<i8>) -> String {
         sixth,
         [transmitted_s, after, 0.0, 0.0],
     ];
-    let [year, month, day, hour, minute, second] = calendar(set.toc);
-    let clock = values(&[set.af0_s, set.af1_sps, set.af2_sps2]);
-    let mut text = format!("{} {year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}{clock}\n", set.sv);
+    let mut text = clock_line(set);
     for line in lines {
         text += &format!("    {}\n", values(&line));
     }

@@ -209,8 +209,8 @@ impl TrackingSettings {
         ]
     }
 
-    /// Every loop's margin where several components are followed, each with the settings fitted to it: that of
-    /// the component which leaves least.
+    /// Every loop's margin where several components are followed, each with the settings fitted to it: that
+    /// of the component which leaves least.
     pub fn least_margins<'a>(&self, components: impl Iterator<Item = &'a Component>) -> [LoopMargin; 5] {
         let each = components.map(|component| self.fitted(component).margins(component.period_s()));
         let less = |one: LoopMargin, other: LoopMargin| {
@@ -298,9 +298,9 @@ mod tests {
             settings.least_margins(signals.filter_map(lead))[0]
         };
         // 18 Hz: four periods of 1 ms, and one of 10 ms. Neither makes the other's product.
-        assert!((of(&["gps_l1ca"]).bandwidth_time - 0.072).abs() < 1e-12);
-        assert!((of(&["gps_l1c"]).bandwidth_time - 0.18).abs() < 1e-12);
-        assert_eq!(of(&["gps_l1ca", "gps_l1c"]), of(&["gps_l1c"]));
+        assert!((of(&["GPS L1 C/A"]).bandwidth_time - 0.072).abs() < 1e-12);
+        assert!((of(&["GPS L1C"]).bandwidth_time - 0.18).abs() < 1e-12);
+        assert_eq!(of(&["GPS L1 C/A", "GPS L1C"]), of(&["GPS L1C"]));
     }
 
     #[test]

@@ -132,7 +132,7 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
     }
     let bottom = height as i32 - (BOTTOM_PX + EDGE_PX - 7) * FINE;
     let (left, top) = area.get_base_pixel();
-    // As large as fits side by side: a digit is about 0.56 of its size wide, and a gap as wide as half a digit.
+    // As large as fits side by side: a digit is about 0.56 of its size wide, a gap half of that.
     let longest = chart.x_ticks.iter().flatten().map(|(_, label)| label.len()).max().unwrap_or(1);
     let each_px = f64::from(across_px) / chart.x_ticks.as_ref().map_or(1, Vec::len).max(1) as f64;
     let tick_px = (each_px / (0.56 * (longest as f64 + 0.5))).clamp(6.0, 11.0) as i32;

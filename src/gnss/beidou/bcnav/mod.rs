@@ -14,8 +14,9 @@ pub(super) mod typed;
 use crate::gnss::beidou::d1d2::{BDT_WEEK, issue};
 use crate::gnss::bits::{Field, FieldError, Store, add_to, integers, quantise_all, read_all};
 use crate::gnss::broadcast::{Ephemeris, PLAIN, SetForm};
+use crate::gnss::exchange::modern;
 use crate::gnss::ionosphere::Model;
-use crate::gnss::message::{Common, IonosphereForm, Parameters, Raw};
+use crate::gnss::message::{Common, IonosphereForm, Parameters, Raw, RecordLine};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{BDT, Epoch, WEEK_S};
@@ -71,6 +72,40 @@ impl Utc {
             leap_after_s: event.2 as f64 - behind_s,
         }
     }
+}
+
+/// The lines of a record of RINEX of B-CNAV1 and B-CNAV2 with their delays; what is not read (the time of the
+/// prediction and its accuracies) is blank.
+pub(super) fn record_lines(set: &Ephemeris, raw: Raw<'_>, delays: RecordLine) -> Vec<RecordLine> {
+    let mut lines = first_lines(set, raw);
+    let [accuracy, health, flags] = status(raw);
+    lines.push(delays);
+    lines.push([accuracy, health, flags, Some(f64::from(set.iodc))]);
+    lines.push([Some(modern::transmitted_s(set)), None, None, Some(f64::from(set.iode))]);
+    lines
+}
+
+/// The same of B-CNAV3, which has one delay and no issues.
+pub(super) fn record_lines_of_b2b(set: &Ephemeris, raw: Raw<'_>) -> Vec<RecordLine> {
+    let mut lines = first_lines(set, raw);
+    let [accuracy, health, flags] = status(raw);
+    lines.push([accuracy, health, flags, Some(set.tgd_s)]);
+    lines.push([Some(modern::transmitted_s(set)), None, None, None]);
+    lines
+}
+
+/// Orbit and accuracies.
+fn first_lines(set: &Ephemeris, raw: Raw<'_>) -> Vec<RecordLine> {
+    let mut lines = modern::orbit(set, Some(set.toe.tow_s()));
+    let kind = raw("orbit_kind").map(|raw| raw as f64);
+    lines.push([Some(set.idot_radps), Some(set.delta_n_rate_radps2), kind, None]);
+    lines.push([None; 4]);
+    lines
+}
+
+/// Accuracy, health and flags of the signal.
+fn status(raw: Raw<'_>) -> [Option<f64>; 3] {
+    ["sismai", "health", "integrity_flags"].map(|name| raw(name).map(|raw| raw as f64))
 }
 
 /// Nothing read yet.

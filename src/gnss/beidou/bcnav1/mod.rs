@@ -17,7 +17,7 @@ use std::sync::LazyLock;
 use crate::gnss::beidou::b1c::{B1C, CARRIER_HZ as B1C_HZ};
 use crate::gnss::beidou::b2a::B2A;
 use crate::gnss::beidou::bcnav::blocks::Content;
-use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, blank, integers_in, sent_at};
+use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, blank, integers_in, record_lines, sent_at};
 use crate::gnss::beidou::bcnav2::B_CNAV2;
 use crate::gnss::bits::{FieldError, bits_of, number, read_all, write_all};
 use crate::gnss::broadcast::{Ephemeris, SetForm};
@@ -25,7 +25,7 @@ use crate::gnss::crc::crc24q;
 use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::fec::ldpc64::Ldpc64;
 use crate::gnss::fec::register::RegisterCode;
-use crate::gnss::message::{Message, Parameters, Sender};
+use crate::gnss::message::{Message, Parameters, Records, Sender};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, WEEK_S};
@@ -57,7 +57,11 @@ pub static B_CNAV1: Message = Message {
     adjustable: || bcnav::adjustable(SET),
     alert: None,
     adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
-    rinex: None,
+    rinex: Some(Records {
+        set: |_| "CNV1",
+        ionosphere: "",
+        lines: Some(|set, raw| record_lines(set, raw, [Some(set.isc_s[0]), None, Some(set.tgd_s), Some(set.tgd2_s)])),
+    }),
 };
 
 /// Sets of B-CNAV1: T_GD of B1C's pilot in the place of the first group delay, of B2a's in that of the

@@ -16,13 +16,13 @@ use crate::gnss::beidou::b1c::B1C;
 use crate::gnss::beidou::b2a::B2A;
 use crate::gnss::beidou::bcnav::blocks::{self, Of};
 use crate::gnss::beidou::bcnav::typed::{Layout, Messages, TypedReader};
-use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, Tables};
+use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, Tables, record_lines};
 use crate::gnss::beidou::bcnav1::B_CNAV1_SETS;
 use crate::gnss::bits::Kind::{Signed, Whole};
 use crate::gnss::bits::{Field, FieldError, plain};
 use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::fec::ldpc64::Ldpc64;
-use crate::gnss::message::Message;
+use crate::gnss::message::{Message, Records};
 
 /// B-CNAV2 as B2a names it.
 pub static B_CNAV2: Message = Message {
@@ -48,7 +48,11 @@ pub static B_CNAV2: Message = Message {
     adjustable: || bcnav::adjustable(SET),
     alert: None,
     adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
-    rinex: None,
+    rinex: Some(Records {
+        set: |_| "CNV2",
+        ionosphere: "",
+        lines: Some(|set, raw| record_lines(set, raw, [None, Some(set.isc_s[0]), Some(set.tgd_s), Some(set.tgd2_s)])),
+    }),
 };
 
 /// Sets of B-CNAV2: as those of B-CNAV1.

@@ -15,13 +15,13 @@ use std::sync::LazyLock;
 use crate::gnss::beidou::b2b::{B2B, CARRIER_HZ};
 use crate::gnss::beidou::bcnav::blocks::{self, Of};
 use crate::gnss::beidou::bcnav::typed::{Layout, Messages, TypedReader};
-use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, Tables};
+use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, Tables, record_lines_of_b2b};
 use crate::gnss::beidou::d1d2::issue;
 use crate::gnss::bits::Kind::{Signed, Whole};
 use crate::gnss::bits::{Field, FieldError, plain};
 use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::fec::ldpc64::Ldpc64;
-use crate::gnss::message::Message;
+use crate::gnss::message::{Message, Records};
 
 /// B-CNAV3 as B2b names it.
 pub static B_CNAV3: Message = Message {
@@ -47,7 +47,7 @@ pub static B_CNAV3: Message = Message {
     adjustable: || bcnav::adjustable(SET),
     alert: None,
     adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
-    rinex: None,
+    rinex: Some(Records { set: |_| "CNV3", ionosphere: "", lines: Some(record_lines_of_b2b) }),
 };
 
 /// Sets of B-CNAV3: T_GD of B2b in the place of the first group delay; health of the satellite.

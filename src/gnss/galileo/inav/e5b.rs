@@ -37,7 +37,7 @@ pub static INAV_E5B: Message = Message {
     adjustable,
     alert: Some(alerted),
     adjust,
-    rinex: Some(Records { set: |_| "INAV", ionosphere: "IFNV" }),
+    rinex: Some(Records { set: |_| "INAV", ionosphere: "IFNV", lines: None }),
 };
 
 /// The last 24 of the reserved bits before the check are ones and zeros in turn.

@@ -17,11 +17,12 @@ mod reader;
 use crate::gnss::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
 use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::crc::crc24q;
+use crate::gnss::exchange::modern;
 use crate::gnss::fec::convolutional::Convolutional;
 use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Sender};
+use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLine, Records, Sender};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, WEEK_S};
@@ -59,7 +60,7 @@ pub static CNAV: Message = Message {
     adjustable,
     alert: None,
     adjust,
-    rinex: None,
+    rinex: Some(Records { set: |_| "CNAV", ionosphere: "CNVX", lines: Some(record_lines) }),
 };
 
 /// Sets of CNAV: a correction for each signal beside the group delay, and a bit of health for each carrier.
@@ -79,6 +80,12 @@ pub static CNAV_SETS: SetForm = SetForm {
     },
     rinex_sources: None,
 };
+
+/// The lines of a record of RINEX, where health has L1 in the highest of three bits.
+fn record_lines(set: &Ephemeris, raw: Raw<'_>) -> Vec<RecordLine> {
+    let bit = |carrier: u16, place: u16| u16::from(set.health & carrier > 0) << place;
+    modern::of_gps(set, raw, bit(L1, 2) | bit(L2, 1) | bit(L5, 0), &[0, 1, 2, 3])
+}
 
 /// Seconds of a message on L5; counts of time are in these on L2C too (IS-GPS-200N, 30.3.3).
 const MESSAGE_S: i64 = 6;

@@ -19,13 +19,14 @@ use std::sync::LazyLock;
 use crate::gnss::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
 use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::crc::crc24q;
+use crate::gnss::exchange::modern;
 use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::fec::ldpc::Ldpc;
 use crate::gnss::fec::register::RegisterCode;
 use crate::gnss::gps::cnav::{self, CNAV_SETS, STEP_S, Utc};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Sender};
+use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLine, Records, Sender};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, WEEK_S};
@@ -57,7 +58,7 @@ pub static CNAV2: Message = Message {
     adjustable,
     alert: None,
     adjust,
-    rinex: None,
+    rinex: Some(Records { set: |_| "CNV2", ionosphere: "CNVX", lines: Some(record_lines) }),
 };
 
 /// Sets of CNAV-2: those of CNAV with corrections for L1C, and health of L1C alone.
@@ -70,6 +71,11 @@ pub static CNAV2_SETS: SetForm = SetForm {
     healthy: |set, signal| signal.carries(&CNAV2).then_some(set.health == 0),
     rinex_sources: None,
 };
+
+/// The lines of a record of RINEX; corrections of the data come before those of the pilot.
+fn record_lines(set: &Ephemeris, raw: Raw<'_>) -> Vec<RecordLine> {
+    modern::of_gps(set, raw, set.health, &[0, 1, 2, 3, 5, 4])
+}
 
 /// Seconds of a frame, and of the intervals in which frames are counted.
 const FRAME_S: i64 = 18;
