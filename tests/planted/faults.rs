@@ -61,6 +61,7 @@ const L1C_CODES: &str = "witness::codes::all_chips_of_all_codes_and_overlays_of_
 const FRAMES_L1C: &str =
     "witness::cnav2::shipped_frames_are_coded_again_symbol_by_symbol_read_either_way_up_and_sent_again";
 const CIVIL: &str = "witness::cnav::shipped_messages_of_l5_and_l2c_hold_and_are_sent_by_us_bit_by_bit";
+const WRITTEN: &str = "witness::cnav::shipped_sets_are_written_in_the_numbers_of_another_converter";
 const CARRIED: &str = "witness::cnav::a_set_of_lnav_carried_to_cnav_is_the_same_orbit_and_clock_to_its_steps";
 const L2C_CODES: &str = "witness::codes::all_chips_of_all_codes_of_l2c_are_those_of_another_program_and_take_turns";
 const L5_CODES: &str = "witness::codes::all_chips_of_all_codes_of_l5_are_those_of_another_program";
@@ -265,6 +266,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.fec.ldpc", "parity of low density leaves the last bit out", FRAMES_L1C),
     fault("gnss.cnav2.time", "the count of a frame is taken for its own beginning", FRAMES_L1C),
     fault("gnss.cnav2.isc", "L1C is corrected as its data are", DELAYS),
+    fault("gnss.exchange.accuracy", "accuracies in records of CNAV have no sign", WRITTEN),
     fault("gnss.cnav.l2c_order", "messages of CNAV on L2C last as long as those of L5", CIVIL),
     fault("gnss.cnav.order", "messages of CNAV come one place early", CIVIL),
     fault("gnss.cnav.count", "the count of a message is taken for its own beginning", CIVIL),

@@ -28,6 +28,9 @@ const MESSAGES: &str = include_str!("../../data/witness/gps_cnav.csv");
 /// Seven of L2C, 2025-08-21: two satellites of Block IIR-M and one of IIF.
 const MESSAGES_L2C: &str = include_str!("../../data/witness/gps_cnav_l2c.csv");
 
+/// Another converter's records of their sets.
+const RECORDS_L2C: &str = include_str!("../../data/witness/gps_cnav_records.rnx");
+
 /// The message of each signal as the files name it.
 const BOTH: [(&str, &Message); 2] = [("L5", &CNAV), ("L2C", &CNAV_L2C)];
 
@@ -159,6 +162,19 @@ fn shipped_messages_of_l5_and_l2c_hold_and_are_sent_by_us_bit_by_bit() {
         }
         assert_eq!((satellites, all.len()), (3, count));
     }
+}
+
+#[test]
+fn shipped_sets_are_written_in_the_numbers_of_another_converter() {
+    let all = shipped(MESSAGES_L2C);
+    let mut written = NavigationSets::default();
+    for own in all.chunk_by(|a, b| a.sv == b.sv) {
+        for read in read(&CNAV_L2C, own, false) {
+            let Read::Parameters(rows) = read else { continue };
+            rows.iter().for_each(|row| written.take(row));
+        }
+    }
+    assert_eq!(printed_alike(&written, BOTH[1], all[0].start, &records_in(RECORDS_L2C, 'G')), 3);
 }
 
 #[test]

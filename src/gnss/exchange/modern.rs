@@ -31,7 +31,8 @@ pub fn transmitted_s(set: &Ephemeris) -> f64 {
 pub fn of_gps(set: &Ephemeris, raw: Raw<'_>, health: u16, delays: &[usize]) -> Vec<RecordLine> {
     let value = |name: &str| raw(name).map(|raw| raw as f64);
     // Five bits, of which the highest is the sign.
-    let accuracy = raw("ura_ed_index").map(|raw| if raw >= 16 { raw - 32 } else { raw } as f64);
+    let sign = planted!("gnss.exchange.accuracy", 16, 32);
+    let accuracy = raw("ura_ed_index").map(|raw| if raw >= sign { raw - 32 } else { raw } as f64);
     // Weeks by their lowest eight bits, that nearest to the set.
     let week = raw("op_week").map(|low| {
         let near = set.toe.week();
