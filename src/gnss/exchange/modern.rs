@@ -1,7 +1,8 @@
 //! Lines of the records of messages whose sets have rates of the axis and of the mean motion.
 //!
-//! Source: RINEX 4.02, sections 5.4.2 (CNAV), 5.4.3 (CNAV-2) and 5.4.8 (B-CNAV1). The reference time of the
-//! clock, with which a record begins, is that of the orbit too where the record has no other.
+//! Source: RINEX 4.02, sections 5.4.2 (CNAV), 5.4.3 (CNAV-2) and 5.4.8 to 5.4.10 (B-CNAV1 to 3). The
+//! reference time of the clock, with which a record begins, is that of the orbit too where the record has no
+//! other.
 
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::message::{Raw, RecordLine};
@@ -49,6 +50,7 @@ pub fn of_gps(set: &Ephemeris, raw: Raw<'_>, health: u16, delays: &[usize]) -> V
         }
         lines.push(line);
     }
-    lines.push([Some(transmitted_s(set)), week, None, None]);
+    let flags = value("integrity_flags").or(value("integrity_flag"));
+    lines.push([Some(transmitted_s(set)), week, flags, None]);
     lines
 }

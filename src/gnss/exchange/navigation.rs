@@ -287,6 +287,12 @@ fn sisa_m(index: u8) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::beidou::b1c::B1C;
+    use crate::gnss::beidou::b2a::B2A;
+    use crate::gnss::beidou::b2b::B2B;
+    use crate::gnss::beidou::bcnav1::B_CNAV1;
+    use crate::gnss::beidou::bcnav2::B_CNAV2;
+    use crate::gnss::beidou::bcnav3::B_CNAV3;
     use crate::gnss::beidou::d1d2::D1_D2;
     use crate::gnss::beidou::in_phase::B1I;
     use crate::gnss::galileo::e1::E1;
@@ -295,6 +301,10 @@ mod tests {
     use crate::gnss::galileo::inav::{INAV, INAV_E5B};
     use crate::gnss::glonass::fdma::channel;
     use crate::gnss::glonass::gnav::GNAV;
+    use crate::gnss::gps;
+    use crate::gnss::gps::cnav::CNAV;
+    use crate::gnss::gps::cnav2::CNAV2;
+    use crate::gnss::gps::l1c::L1C;
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::gps::lnav::LNAV;
     use crate::gnss::klobuchar::Klobuchar;
@@ -391,6 +401,80 @@ mod tests {
         assert_eq!(of("> EPH J"), 4, "{count:?}");
     }
 
+    /// What a satellite sends in half a quarter of an hour, as long as the slowest, LNAV, takes for its page
+    /// with the ionosphere, from a second on at which units of every length begin.
+    fn send(sets: &mut NavigationSets, (message, signal, set): &(&Message, &Signal, Ephemeris), common: &Common) {
+        let sender = (message.sender)(common).unwrap();
+        let set = (message.form)(set).timed(|at| signal.time.label(at));
+        let begin = set.toe.seconds().div_euclid(4500) * 4500 + message.first_s;
+        for start in (0..750).step_by(message.unit_s as usize) {
+            let symbols = sender.unit(&set, Epoch::new(begin + start, 0.0)).unwrap();
+            let Some((of_set, parameters)) = (message.parameters)(&symbols) else { continue };
+            let issue = if of_set { u32::from(set.iode) } else { 0 };
+            NavigationRow::each(set.sv, message.name, issue, parameters).for_each(|row| sets.take(&row));
+        }
+    }
+
+    #[test]
+    fn sets_of_newer_messages_are_found_elsewhere_under_their_names() {
+        let both = rinex::embedded_two_systems().unwrap().ephemerides;
+        let first = |system, least: u8| {
+            let mut own = both.iter().filter(|set| set.sv.system == system && set.sv.number >= least);
+            own.find(|set| set.is_healthy()).unwrap().clone()
+        };
+        let [gps, beidou] = [first(System::Gps, 1), first(System::BeiDou, 19)];
+        let sent: [(&Message, &'static Signal, Ephemeris, &str, &[&str]); 5] = [
+            (&CNAV, &gps::l5::L5, gps.clone(), "CNAV", &["tgd", "iscL1Ca", "iscL5Q5"]),
+            (&CNAV2, &L1C, gps, "CNV2", &["tgd", "iscL1Cp", "iscL1Cd"]),
+            (&B_CNAV1, &B1C, beidou.clone(), "CNV1", &["tgdB1Cp", "tgdB2ap", "toe", "iode", "iodc"]),
+            (&B_CNAV2, &B2A, beidou.clone(), "CNV2", &["tgdB1Cp", "tgdB2ap", "toe", "iode", "iodc"]),
+            (&B_CNAV3, &B2B, beidou, "CNV3", &["tgdB2bI", "toe"]),
+        ];
+        for (message, signal, set, name, own) in sent {
+            let mut sets = NavigationSets::default();
+            send(&mut sets, &(message, signal, set.clone()), &Common::default());
+            let mut bytes = Vec::new();
+            sets.write(&mut bytes, Version::Four, &[signal], set.toe).unwrap();
+            let text = String::from_utf8(bytes).unwrap();
+            let decoded = (message.quantised)(&(message.form)(&set)).unwrap();
+            let file = foreign(&text);
+            let frames: Vec<_> = file.nav_ephemeris_frames_iter().collect();
+            let [(key, frame)] = frames.as_slice() else { panic!("{} frames\n{text}", frames.len()) };
+            assert_eq!((key.sv.to_string(), key.msgtype.to_string()), (set.sv.to_string(), name.to_owned()), "{text}");
+            let in_own_time = if set.sv.system == System::BeiDou { BDT.label(decoded.toe) } else { decoded.toe };
+            let value = |field: &str| match field {
+                "sqrta" => decoded.sqrt_a_sqrtm,
+                "adot" => decoded.axis_rate_mps,
+                "m0" => decoded.m0_rad,
+                "crs" => decoded.crs_m,
+                "cis" => decoded.cis_rad,
+                "omegaDot" => decoded.omega_dot_radps,
+                "idot" => decoded.idot_radps,
+                "deltaN0Dot" => decoded.delta_n_rate_radps2,
+                "toe" => in_own_time.tow_s(),
+                "iode" => f64::from(decoded.iode),
+                "iodc" => f64::from(decoded.iodc),
+                "tgd" | "tgdB1Cp" | "tgdB2bI" => decoded.tgd_s,
+                "tgdB2ap" => decoded.tgd2_s,
+                "iscL1Ca" => decoded.isc_s[0],
+                "iscL5Q5" => decoded.isc_s[3],
+                "iscL1Cp" => decoded.isc_s[4],
+                "iscL1Cd" => decoded.isc_s[5],
+                other => panic!("{other}"),
+            };
+            let all = ["sqrta", "adot", "m0", "crs", "cis", "omegaDot", "idot", "deltaN0Dot"];
+            for field in all.iter().chain(own) {
+                let found = frame.get_orbit_f64(field).unwrap_or_else(|| panic!("{name}: no {field}\n{text}"));
+                let sent = value(field);
+                // An angle may be a turn away.
+                let turn = if *field == "m0" { std::f64::consts::TAU } else { 0.0 };
+                let apart = [-turn, 0.0, turn].map(|turn| (found - sent + turn).abs());
+                let least = apart.into_iter().fold(f64::MAX, f64::min);
+                assert!(least <= 2e-12 * sent.abs(), "{name} {field}: {found:e} {sent:e}\n{text}");
+            }
+        }
+    }
+
     #[test]
     fn a_file_of_all_messages_sent_has_each_set_and_each_systems_ionosphere() {
         let both = rinex::embedded_two_systems().unwrap();
@@ -421,18 +505,7 @@ mod tests {
             (&SPS_NAV, &L5, first(System::Navic)),
         ];
         let mut sets = NavigationSets::default();
-        for (message, signal, set) in &sent {
-            let sender = (message.sender)(&common).unwrap();
-            let set = (message.form)(&set.clone().timed(|at| signal.time.label(at)));
-            // As long as the slowest, LNAV, takes for its page with the ionosphere.
-            let begin = set.toe.seconds().div_euclid(1500) * 1500 + message.first_s;
-            for start in (0..750).step_by(message.unit_s as usize) {
-                let symbols = sender.unit(&set, Epoch::new(begin + start, 0.0)).unwrap();
-                let Some((of_set, parameters)) = (message.parameters)(&symbols) else { continue };
-                let issue = if of_set { u32::from(set.iode) } else { 0 };
-                NavigationRow::each(set.sv, message.name, issue, parameters).for_each(|row| sets.take(&row));
-            }
-        }
+        sent.iter().for_each(|sent| send(&mut sets, sent, &common));
         let signals: Vec<&'static Signal> = sent.iter().map(|(_, signal, _)| *signal).collect();
         for version in [Version::Three, Version::Four] {
             let mut bytes = Vec::new();
