@@ -173,7 +173,7 @@ impl Cn0 {
         let m = f64::from(self.group);
         let coherent = self.sum.norm_sqr() / m;
         let noise = if self.wiped && coherent > 0.0 {
-            // Σ of the squared components along the sum, whose deviations from their mean do not depend on it.
+            // Components along the sum, squared: their deviations from their mean do not depend on it.
             let turn = (self.sum * self.sum).conj() / self.sum.norm_sqr();
             let in_phase = 0.5 * (self.power + (self.squares * turn).re);
             2.0 * (in_phase - coherent) / (m - 1.0)
