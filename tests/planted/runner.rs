@@ -1,9 +1,9 @@
 //! Runs the check of every fault in a process of its own.
 
 use std::collections::BTreeSet;
-use std::fmt::Write as _;
+use std::fmt::Write;
 use std::fs;
-use std::io::Read as _;
+use std::io::{Read as _, Write as _};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Mutex;
@@ -20,6 +20,8 @@ struct Outcome {
     fault: &'static Fault,
     /// The first line of what failed.
     caught: Result<String, String>,
+    /// The check passed without data from outside of the repository, which it looked for: it says nothing.
+    blind: bool,
     seconds: f64,
 }
 
@@ -61,7 +63,8 @@ fn outcome(fault: &'static Fault, run: &Path) -> Outcome {
         Some(_) if text.contains("1 passed; 0 failed") => Err("survives".to_owned()),
         Some(status) => Err(format!("{} did not run: {status}: {text}", fault.check)),
     };
-    Outcome { fault, caught, seconds: begun.elapsed().as_secs_f64() }
+    let blind = text.contains("1 passed; 0 failed") && text.contains("skipped: ");
+    Outcome { fault, caught, blind, seconds: begun.elapsed().as_secs_f64() }
 }
 
 /// The line after the first panic.
@@ -100,7 +103,12 @@ fn every_planted_fault_is_noticed() {
     if let Some(path) = std::env::var_os("GNSS_TWIN_WRITE_PLANTED") {
         fs::write(path, report(&outcomes)).unwrap();
     }
-    let missed: Vec<String> = outcomes
+    let (blind, seeing): (Vec<&Outcome>, Vec<&Outcome>) = outcomes.iter().partition(|outcome| outcome.blind);
+    for outcome in blind {
+        // Past the capture of output: a fault that nobody looked for is no fault that was noticed.
+        let _ = writeln!(std::io::stderr(), "not looked for: {}, whose check lacks data", outcome.fault.name);
+    }
+    let missed: Vec<String> = seeing
         .iter()
         .filter_map(|outcome| outcome.caught.as_ref().err().map(|why| format!("{}: {why}", outcome.fault.name)))
         .collect();
