@@ -13,10 +13,6 @@
 //! **After.** Power within and between the M prompts of a symbol (narrow against wide band, as moments): all
 //! noise is within. The reference is not needed any more.
 //!
-//! **Pilots.** Prompts without signs are updates of the phase loop, one each, whose own jitter turns the
-//! signal within a group: at 18 Hz and 10 ms it adds a third to the noise across. Of them only the noise in
-//! phase with the group's sum counts, twice.
-//!
 //! **Spread.** With s = T·C/N0 and N periods averaged (an exponential mean of N periods counts as 2N, one
 //! whose weights grow linearly as 3N/4) the relative variance is that of the signal, (4s + 1)/2s² before and
 //! (2s + 1/M)/s² after, and that of the noise, 1 and M/(M − 1), over N: [`relative_sigma`]. With 0.3 s
@@ -36,15 +32,11 @@ pub struct Cn0 {
     group: u32,
     /// Every prompt has a sign of its own: the signal is what its power exceeds the noise by.
     single: bool,
-    /// Prompts have no signs: only noise in phase counts.
-    wiped: bool,
     known: bool,
     previous: Option<Complex64>,
     seen: u32,
     sum: Complex64,
     power: f64,
-    /// Sum of the squares of prompts, which has the direction in which their power lies.
-    squares: Complex64,
     /// Mean product of neighbours while symbols are unknown, then the signal's power in the first place.
     signal: Mean,
     /// Power of a prompt's noise, both components.
@@ -67,13 +59,11 @@ impl Cn0 {
             average_periods,
             group: group.max(1),
             single: false,
-            wiped: false,
             known: false,
             previous: None,
             seen: 0,
             sum: Complex64::ZERO,
             power: 0.0,
-            squares: Complex64::ZERO,
             signal: Mean::leaning(average_periods),
             noise: Mean::new(average_periods),
         }
@@ -87,7 +77,7 @@ impl Cn0 {
     /// Prompts have no signs any more: they are summed in groups.
     pub fn wiped(&self, group: u32) -> Self {
         let signal = self.unknown_signal();
-        let mut wiped = Self { group: group.max(1), single: false, wiped: true, previous: None, ..self.clone() };
+        let mut wiped = Self { group: group.max(1), single: false, previous: None, ..self.clone() };
         let share = wiped.share();
         wiped.signal = self.signal.with(self.average_periods, self.signal.count(), [signal * share, 0.0]);
         wiped
@@ -95,7 +85,7 @@ impl Cn0 {
 
     /// From now on the next prompt opens a symbol. Of what was seen before, the means stay.
     pub fn know_symbols(&mut self) {
-        self.begin();
+        (self.seen, self.sum, self.power) = (0, Complex64::ZERO, 0.0);
         if self.known || self.group < 2 {
             return;
         }
@@ -155,15 +145,9 @@ impl Cn0 {
         }
     }
 
-    /// The next prompt opens a group.
-    fn begin(&mut self) {
-        (self.seen, self.sum, self.power, self.squares) = (0, Complex64::ZERO, 0.0, Complex64::ZERO);
-    }
-
     fn add_in_symbol(&mut self, prompt: Complex64) {
         self.sum += prompt;
         self.power += prompt.norm_sqr();
-        self.squares += prompt * prompt;
         self.seen += 1;
         if self.seen < self.group {
             return;
@@ -172,17 +156,10 @@ impl Cn0 {
         // MA²+2Mσ².
         let m = f64::from(self.group);
         let coherent = self.sum.norm_sqr() / m;
-        let noise = if self.wiped && coherent > 0.0 {
-            // Components along the sum, squared: their deviations from their mean do not depend on it.
-            let turn = (self.sum * self.sum).conj() / self.sum.norm_sqr();
-            let in_phase = 0.5 * (self.power + (self.squares * turn).re);
-            2.0 * (in_phase - coherent) / (m - 1.0)
-        } else {
-            (self.power - coherent) / (m - 1.0)
-        };
+        let noise = (self.power - coherent) / (m - 1.0);
         self.signal.add([(coherent - noise) / m, 0.0]);
         self.noise.add([noise, 0.0]);
-        self.begin();
+        (self.seen, self.sum, self.power) = (0, Complex64::ZERO, 0.0);
     }
 
     /// What a symbol's edges leave of the mean product of neighbours.
@@ -305,35 +282,6 @@ mod tests {
             assert!((mean - expected).abs() < 0.03 + 0.3 * stated, "{expected}: {mean}");
             // 100 values know their deviation to 7 %.
             assert!((sigma / stated - 1.0).abs() < 0.25, "{expected}: {sigma} for {stated}");
-        }
-    }
-
-    #[test]
-    fn what_the_phase_loop_adds_to_a_pilot_is_no_noise_of_it() {
-        // A loop of the first order of 18 Hz with updates of 10 ms: K = 4BT/(1 + 2BT).
-        let gain = 4.0 * 0.18 / 1.36;
-        for expected in [35.0, 40.0, 45.0] {
-            let amplitude = (2.0 * libm::pow(10.0, expected / 10.0) * 1e-2).sqrt();
-            let (mean, sigma) = spread(100, |run| {
-                let mut normal = Normal::new(500 + run);
-                let mut estimate = Cn0::of_single_periods(1e-2, 2.0).wiped(2);
-                estimate.know_symbols();
-                let mut phase = 0.0;
-                for _ in 0..600 {
-                    let (sin, cos) = libm::sincos(phase);
-                    let noise = Complex64::new(normal.next(), normal.next());
-                    let prompt = Complex64::new(cos, sin) * amplitude + noise;
-                    estimate.add(prompt, None);
-                    phase -= gain * libm::atan2(prompt.im, prompt.re);
-                }
-                dbhz(&estimate)
-            });
-            println!("{expected} dB-Hz: {mean:.3} ± {sigma:.3} dB");
-            // 200 periods count as 400; of a pair one component counts: 2·2/400, 0.1, 0.43 dB. The logarithm
-            // is low by half its square for the signal and high for the noise: 0.02 dB. In 100 runs 0.04 dB;
-            // the signal loses half of the phase's variance, KT/(2 - K) of 1/(2s): 0.03 dB at 35 dB-Hz.
-            // Noise across would leave 0.5 dB.
-            assert!((mean - expected).abs() < 0.2 && (sigma / 0.43 - 1.0).abs() < 0.25, "{expected}: {mean} {sigma}");
         }
     }
 
