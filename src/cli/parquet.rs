@@ -45,16 +45,16 @@ pub fn execute(arguments: &args::Parquet) -> Result<(), CliError> {
             return Err(CliError::input(format!("{}: expected tables (.csv) in it", path.display())));
         }
     }
-    let mut told = String::new();
+    let mut report = String::new();
     for table in &tables {
         let target = table.with_extension("parquet");
         if target == *table {
             return Err(CliError::usage(format!("{}: expected a table, a .csv", table.display())));
         }
         let rows = write_file(table, &target)?;
-        told.push_str(&format!("{} ({rows} rows)\n", target.display()));
+        report.push_str(&format!("{} ({rows} rows)\n", target.display()));
     }
-    scenario::print(&told)
+    scenario::print(&report)
 }
 
 /// Tables of a directory and of those in it, by name.

@@ -62,15 +62,15 @@ fn write_all(directory: &Path, copies: BTreeMap<PathBuf, Vec<u8>>, force: bool) 
         return Err(CliError::refused_output(format!("{} is there: --force replaces it", path.display())));
     }
     fs::create_dir_all(directory).map_err(|error| CliError::create(directory.display(), &error))?;
-    let mut told = String::new();
+    let mut report = String::new();
     for (name, bytes) in copies {
         let path = directory.join(name);
         let staging = Staging::file(&path)?;
         staging.write(&bytes)?;
         staging.commit()?;
-        told += &format!("{}\n", path.display());
+        report += &format!("{}\n", path.display());
     }
-    scenario::print(&told)
+    scenario::print(&report)
 }
 
 /// The shipped scenes by name; `extremes/leo` lies in a directory below.

@@ -16,7 +16,7 @@ use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, TimePolynomial};
+use crate::gnss::time::{Epoch, TimePolynomial, TimeScale, WEEK_S};
 
 /// A form of message.
 pub struct Message {
@@ -128,6 +128,47 @@ pub struct Common {
     pub almanac: Vec<Ephemeris>,
     /// Time near which the almanac holds.
     pub reference: Option<Epoch>,
+}
+
+/// What messages newer than LNAV and D1 say of UTC: a polynomial and a change of leap seconds, in numbers of
+/// their system's own time (IS-GPS-705J, 20.3.3.6; BDS-SIS-ICD-B2a 1.0, 7.12).
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::gnss) struct UtcNumbers {
+    pub a0_s: f64,
+    pub a1_sps: f64,
+    pub a2_sps2: f64,
+    pub leap_s: f64,
+    pub tot_s: f64,
+    pub week: f64,
+    pub event_week: f64,
+    pub event_day: f64,
+    pub leap_after_s: f64,
+}
+
+impl UtcNumbers {
+    /// Those of a time that is whole seconds behind GPS time, in a unit that begins at `start` of that time.
+    /// Weeks are numbers from `first_week` on; Sundays are day `sunday`.
+    pub fn of(common: &Common, start: Epoch, time: &TimeScale, (first_week, sunday): (i64, i64)) -> Self {
+        let utc = &common.utc;
+        let behind_s = time.behind_gpst_s as f64;
+        let reference = utc.polynomial.map(|polynomial| polynomial.reference).or(common.reference);
+        // To the step of its field.
+        let label = reference.map_or(start, |reference| time.label(reference));
+        let tot_s = label.tow_whole_s().div_euclid(16) * 16;
+        let at = Epoch::new(label.week() * WEEK_S + tot_s, 0.0);
+        let event = utc.event.map_or((start.week(), 7, utc.leap_s), |e| (e.week, i64::from(e.day), e.after_s));
+        Self {
+            a0_s: utc.polynomial.map_or(0.0, |polynomial| polynomial.at_s(time.instant(at))),
+            a1_sps: utc.polynomial.map_or(0.0, |polynomial| polynomial.a1_sps),
+            a2_sps2: 0.0,
+            leap_s: utc.leap_s as f64 - planted!("gnss.bcnav.leap", behind_s, 0.0),
+            tot_s: tot_s as f64,
+            week: (label.week() - first_week).rem_euclid(8192) as f64,
+            event_week: (event.0 - first_week).rem_euclid(8192) as f64,
+            event_day: (event.1 - 1 + sunday) as f64,
+            leap_after_s: event.2 as f64 - behind_s,
+        }
+    }
 }
 
 /// Encodes the units of one form of message.

@@ -71,6 +71,9 @@ pub static QZSST: TimeScale = TimeScale { name: "QZSST", behind_gpst_s: 0, has_l
 /// BeiDou's time: UTC of 2006-01-01, when GPS time was 14 s ahead of it (BDS-SIS-ICD-B1I 3.0, 3.3).
 pub static BDT: TimeScale = TimeScale { name: "BDT", behind_gpst_s: 14, has_leap_seconds: false };
 
+/// Number of the week of GPS time in which BDT began: its week 0.
+pub const BDT_WEEK: i64 = 1356;
+
 /// GLONASS time: three hours ahead of UTC(SU), leap seconds included (GLONASS ICD L1, L2 5.1, 3.3.3).
 pub static GLONASST: TimeScale = TimeScale { name: "GLONASST", behind_gpst_s: -10_800, has_leap_seconds: true };
 

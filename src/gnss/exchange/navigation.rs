@@ -10,10 +10,7 @@ use crate::gnss::message::{Message, RecordLine, Records};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{BDT, Epoch, TimeScale, UTC};
-
-/// Continuous GPS week of week 0 of BDT.
-const BDT_WEEK: i64 = 1356;
+use crate::gnss::time::{BDT, BDT_WEEK, Epoch, TimeScale, UTC};
 
 /// The parameters of a set, or of what is common to all, by name.
 type Raws = BTreeMap<String, i64>;

@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 
 use super::columns::Record;
-use crate::gnss::beidou::d1d2::{BDT_WEEK, issue};
+use crate::gnss::beidou::d1d2::issue;
 use crate::gnss::broadcast::{Ephemeris, StateVector, status_of_record};
 use crate::gnss::galileo::fnav::FNAV_SETS;
 use crate::gnss::galileo::inav::{INAV_SETS, sisa_index};
@@ -16,7 +16,7 @@ use crate::gnss::glonass::gnav::GNAV_SETS;
 use crate::gnss::gps::lnav::LNAV_SETS;
 use crate::gnss::qzss::lnav;
 use crate::gnss::satellite::System;
-use crate::gnss::time::{BDT, Epoch, GLONASST, UTC, WEEK_S};
+use crate::gnss::time::{BDT, BDT_WEEK, Epoch, GLONASST, UTC, WEEK_S};
 
 /// An element that must be there and lie within its range, in SI units.
 fn field(record: &Record, key: &'static str, least: f64, most: f64) -> Result<f64, String> {

@@ -2,13 +2,12 @@
 //! count from 0, the first bit of a message or subframe (BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and
 //! BDS-SIS-ICD-B2b 1.0, section 7; clauses are those of B1C's).
 
-use super::Utc;
-use crate::gnss::beidou::d1d2::BDT_WEEK;
 use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::gnss::bits::{Element, Field, element, plain};
 use crate::gnss::broadcast::Ephemeris;
+use crate::gnss::message::UtcNumbers;
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{BDT_WEEK, Epoch};
 
 /// Step of reference times.
 pub(in crate::gnss::beidou) const STEP_S: i64 = 300;
@@ -36,7 +35,7 @@ pub(in crate::gnss::beidou) struct Content {
     /// Integrity of the signal that carries the message, and of B1C where that is another.
     pub flags: f64,
     pub flags_b1c: f64,
-    pub utc: Utc,
+    pub utc: UtcNumbers,
     pub reserved: f64,
 }
 

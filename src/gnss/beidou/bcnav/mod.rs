@@ -11,15 +11,15 @@
 pub(super) mod blocks;
 pub(super) mod typed;
 
-use crate::gnss::beidou::d1d2::{BDT_WEEK, issue};
+use crate::gnss::beidou::d1d2::issue;
 use crate::gnss::bits::{Field, FieldError, Store, add_to, integers, quantise_all, read_all};
 use crate::gnss::broadcast::{Ephemeris, PLAIN, SetForm};
 use crate::gnss::exchange::modern;
 use crate::gnss::ionosphere::Model;
-use crate::gnss::message::{Common, IonosphereForm, Parameters, Raw, RecordLine};
+use crate::gnss::message::{IonosphereForm, Parameters, Raw, RecordLine, UtcNumbers};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{BDT, Epoch, WEEK_S};
+use crate::gnss::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 use blocks::{Content, Of, STEP_S, kind};
 
 /// Never sent and never read.
@@ -33,45 +33,6 @@ pub(super) type Tables = [&'static [Of]];
 pub(super) fn fields(all: &[(&'static str, &'static Tables)]) -> Vec<(&'static str, Vec<&'static Field>)> {
     let of = |tables: &'static Tables| tables.iter().flat_map(|table| table.iter()).map(|own| &own.field).collect();
     all.iter().map(|(name, tables)| (*name, of(tables))).collect()
-}
-
-/// What is said of UTC.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Utc {
-    pub a0_s: f64,
-    pub a1_sps: f64,
-    pub a2_sps2: f64,
-    pub leap_s: f64,
-    pub tot_s: f64,
-    pub week: f64,
-    pub event_week: f64,
-    pub event_day: f64,
-    pub leap_after_s: f64,
-}
-
-impl Utc {
-    /// That of BDT, a whole number of seconds behind GPS time, at a time of BDT.
-    pub fn of(common: &Common, start: Epoch) -> Self {
-        let utc = &common.utc;
-        let behind_s = BDT.behind_gpst_s as f64;
-        let reference = utc.polynomial.map(|polynomial| polynomial.reference).or(common.reference);
-        // To the step of its field.
-        let label = reference.map_or(start, |reference| BDT.label(reference));
-        let at = Epoch::new(label.seconds().div_euclid(16) * 16, 0.0);
-        // Days count from 0, Sunday, and those of GPS from 1.
-        let event = utc.event.map_or((start.week(), 6, utc.leap_s), |e| (e.week, i64::from(e.day) - 1, e.after_s));
-        Self {
-            a0_s: utc.polynomial.map_or(0.0, |polynomial| polynomial.at_s(BDT.instant(at))),
-            a1_sps: utc.polynomial.map_or(0.0, |polynomial| polynomial.a1_sps),
-            a2_sps2: 0.0,
-            leap_s: utc.leap_s as f64 - planted!("gnss.bcnav.leap", behind_s, 0.0),
-            tot_s: at.tow_s(),
-            week: (at.week() - BDT_WEEK).rem_euclid(8192) as f64,
-            event_week: (event.0 - BDT_WEEK).rem_euclid(8192) as f64,
-            event_day: event.1 as f64,
-            leap_after_s: event.2 as f64 - behind_s,
-        }
-    }
 }
 
 /// The lines of a record of RINEX of B-CNAV1 and B-CNAV2 with their delays; what is not read (the time of the
@@ -112,7 +73,7 @@ fn status(raw: Raw<'_>) -> [Option<f64>; 3] {
 pub(super) fn blank(set: Ephemeris) -> Content {
     let kind = kind(set.sv);
     let sent = set.toe;
-    Content { set, sent, kind, page: 0.0, flags: 0.0, flags_b1c: 0.0, utc: Utc::default(), reserved: 0.0 }
+    Content { set, sent, kind, page: 0.0, flags: 0.0, flags_b1c: 0.0, utc: UtcNumbers::default(), reserved: 0.0 }
 }
 
 /// A set in one of the messages: carried to the nearest multiple of 300 s of BDT, with the delays of the

@@ -9,16 +9,16 @@ use std::fmt;
 use std::sync::LazyLock;
 
 use super::blocks::Content;
-use super::{Tables, Utc, blank, integers_in, of_integers, sent_at};
+use super::{Tables, blank, integers_in, of_integers, sent_at};
 use crate::gnss::bits::{Field, FieldError, bits_of, read_all, write_all};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::crc::crc24q;
 use crate::gnss::fec::frames::Frames;
 use crate::gnss::fec::ldpc64::Ldpc64;
-use crate::gnss::message::{Common, Message, Parameters, Raw, Read, Reader, Sender};
+use crate::gnss::message::{Common, Message, Parameters, Raw, Read, Reader, Sender, UtcNumbers};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::gnss::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 
 /// Bits of a check, and of a satellite's number.
 const CHECK_BITS: usize = 24;
@@ -173,7 +173,7 @@ impl Sender for Messages {
             return Err(FieldError::Start { message: name, start_s: start.tow_s(), expected });
         }
         let kind = layout.type_at(start);
-        let utc = Utc::of(&self.common, start);
+        let utc = UtcNumbers::of(&self.common, start, &BDT, (BDT_WEEK, 0));
         let content = Content { sent: start, utc, ..blank(set.clone()) };
         let mut bits = vec![false; layout.bits - CHECK_BITS];
         if let Some(field) = &layout.number {

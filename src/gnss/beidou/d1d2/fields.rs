@@ -6,7 +6,7 @@ use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::gnss::bits::{Bits, Element, Field, element, plain};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::time::Epoch;
+use crate::gnss::time::{BDT_WEEK, Epoch};
 
 /// Bits of a subframe.
 pub const SUBFRAME_BITS: usize = 300;
@@ -18,9 +18,6 @@ pub const D2_PARTS: usize = 10;
 pub type D1Set = Bits<{ D1_PARTS * SUBFRAME_BITS }>;
 /// Pages 1 to 10 of D2's subframe 1.
 pub type D2Set = Bits<{ D2_PARTS * SUBFRAME_BITS }>;
-
-/// Continuous GPS week of week 0 of BDT.
-pub const BDT_WEEK: i64 = 1356;
 
 /// What a set says.
 #[derive(Clone, Debug)]

@@ -23,9 +23,9 @@ use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::message::{IonosphereForm, Message, Records, Sender};
 use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, WEEK_S};
-pub use fields::{BDT_WEEK, SUBFRAME_BITS, tables};
+use crate::gnss::time::{BDT_WEEK, Epoch, WEEK_S};
 use fields::{D1_PARTS, D1_SET, D1Set, D2_PARTS, D2_SET, D2Set, Orbit};
+pub use fields::{SUBFRAME_BITS, tables};
 pub use reader::D1D2Reader;
 
 /// D1 and D2 as signals name them.

@@ -22,10 +22,10 @@ use crate::gnss::fec::convolutional::Convolutional;
 use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLine, Records, Sender};
+use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLine, Records, Sender, UtcNumbers};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::gnss::time::{Epoch, GPST};
 pub use fields::tables;
 use fields::{CLOCKS, DELAY, HEADER, L1, L2, L5, ORBIT_1, ORBIT_2, TIME};
 pub(super) use fields::{REFERENCE_NODE_RADPS, STEP_S, reference_axis_m};
@@ -119,43 +119,7 @@ struct Content {
     flags: f64,
     op_week: f64,
     klobuchar: Klobuchar,
-    utc: Utc,
-}
-
-/// What message 33 says of UTC, and page 1 of CNAV-2.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Utc {
-    pub a0_s: f64,
-    pub a1_sps: f64,
-    pub a2_sps2: f64,
-    pub leap_s: f64,
-    pub tot_s: f64,
-    pub week: f64,
-    pub event_week: f64,
-    pub event_day: f64,
-    pub leap_after_s: f64,
-}
-
-impl Utc {
-    pub fn of(common: &Common, start: Epoch) -> Self {
-        let utc = &common.utc;
-        let reference = utc.polynomial.map_or(common.reference.unwrap_or(start), |polynomial| polynomial.reference);
-        // To the step of its field.
-        let tot_s = reference.tow_whole_s().div_euclid(16) * 16;
-        let at = Epoch::new(reference.week() * WEEK_S + tot_s, 0.0);
-        let event = utc.event.map_or((start.week(), 7, utc.leap_s), |e| (e.week, i64::from(e.day), e.after_s));
-        Self {
-            a0_s: utc.polynomial.map_or(0.0, |polynomial| polynomial.at_s(at)),
-            a1_sps: utc.polynomial.map_or(0.0, |polynomial| polynomial.a1_sps),
-            a2_sps2: 0.0,
-            leap_s: utc.leap_s as f64,
-            tot_s: tot_s as f64,
-            week: at.week().rem_euclid(8192) as f64,
-            event_week: event.0.rem_euclid(8192) as f64,
-            event_day: event.1 as f64,
-            leap_after_s: event.2 as f64,
-        }
-    }
+    utc: UtcNumbers,
 }
 
 /// The parameters of a unit's symbols; every message has some of a set.
@@ -265,7 +229,7 @@ impl Messages {
             top: set.toe.tow_s() / STEP_S as f64,
             op_week: set.toe.week().rem_euclid(256) as f64,
             klobuchar: self.common.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] }),
-            utc: Utc::of(&self.common, start),
+            utc: UtcNumbers::of(&self.common, start, &GPST, (0, 1)),
             ..blank(set.clone())
         };
         let mut bits = vec![false; DATA_BITS];
@@ -335,7 +299,7 @@ fn blank(set: Ephemeris) -> Content {
         flags: 0.0,
         op_week: 0.0,
         klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] },
-        utc: Utc::default(),
+        utc: UtcNumbers::default(),
     }
 }
 

@@ -23,13 +23,13 @@ use crate::gnss::exchange::modern;
 use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::fec::ldpc::Ldpc;
 use crate::gnss::fec::register::RegisterCode;
-use crate::gnss::gps::cnav::{self, CNAV_SETS, STEP_S, Utc};
+use crate::gnss::gps::cnav::{self, CNAV_SETS, STEP_S};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLine, Records, Sender};
+use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLine, Records, Sender, UtcNumbers};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::gnss::time::{Epoch, GPST, WEEK_S};
 pub use fields::tables;
 use fields::{DELAY, HEADER, OF_UTC, SET};
 pub use reader::Cnav2Reader;
@@ -111,7 +111,7 @@ struct Content {
     op_week: f64,
     page: f64,
     klobuchar: Klobuchar,
-    utc: Utc,
+    utc: UtcNumbers,
 }
 
 /// A frame as decoded: its checks are right.
@@ -222,7 +222,7 @@ impl Sender for Frames {
             top: set.toe.tow_s() / STEP_S as f64,
             op_week: set.toe.week().rem_euclid(256) as f64,
             klobuchar: self.0.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] }),
-            utc: Utc::of(&self.0, start),
+            utc: UtcNumbers::of(&self.0, start, &GPST, (0, 1)),
             ..blank(set.clone())
         };
         let two = checked(&[&SET], &content, BITS_2)?;
@@ -304,7 +304,7 @@ fn blank(set: Ephemeris) -> Content {
         op_week: 0.0,
         page: PAGE,
         klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] },
-        utc: Utc::default(),
+        utc: UtcNumbers::default(),
     }
 }
 
