@@ -158,6 +158,14 @@ impl Catalogue {
         std::iter::once(before).chain(gaps).filter(concerns).collect()
     }
 
+    /// Whether what reaches an antenna from `from` to `to` has an orbit and was sent without a break. `false`
+    /// may be too cautious within a second of either end.
+    pub fn sent_throughout(&self, sv: Sv, from: Epoch, to: Epoch) -> bool {
+        // Signals are on their way for less than a second.
+        let from = from.plus_s(-1.0);
+        self.silences(sv, from, to).is_empty() && self.precise.as_ref().is_none_or(|orbits| orbits.covers(sv, from, to))
+    }
+
     /// The set of `sv` whose reference time is nearest to `at`.
     pub fn nearest_set(&self, sv: Sv, at: Epoch) -> Option<&Ephemeris> {
         let sets = &self.satellites.get(&sv)?.sets;

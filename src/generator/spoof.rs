@@ -123,6 +123,19 @@ impl Constellation {
         motion
     }
 
+    /// A bound on the speed of that motion until `until_s`; `None` where motion comes from outside as it flows.
+    pub fn fastest_mps(&self, antenna: &Trajectory, until_s: f64) -> Option<f64> {
+        let trajectory = match &self.place {
+            Place::Antenna => antenna,
+            Place::Claimed(trajectory) => trajectory,
+        };
+        // Between the instants that extremes are sampled at, a quintic is little faster.
+        let known = trajectory.grown().is_none();
+        let own_mps = if trajectory.is_static() { 0.0 } else { 1.25 * trajectory.extremes(until_s).speed_mps };
+        let dragged_mps = self.drag.as_ref().map_or(0.0, |drag| drag.speed_mps);
+        known.then_some(own_mps + dragged_mps)
+    }
+
     /// Its clock minus GPS time, `t_s` true seconds after the scene's start.
     pub fn clock_s(&self, t_s: f64) -> f64 {
         self.clock_bias_s + self.clock_drift * t_s

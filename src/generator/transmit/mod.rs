@@ -4,6 +4,7 @@
 //! the runs of any block of the stretch and changes nothing, so blocks are made side by side. Everything is
 //! decided on absolute grids: view by whole seconds, parts and runs by sample numbers.
 
+mod rising;
 mod symbols;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -250,7 +251,10 @@ impl Transmitter {
     pub fn prepare(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
         let first = scene.clock.rate.elapsed(from).0 as u64;
         if self.view.is_empty() && first > 0 {
-            self.since = self.rising(scene, first)?;
+            let sample = |second| scene.clock.rate.first_sample_at(second, 1);
+            let presence =
+                |second| arrival::presence_from(scene, &self.from, self.sv, scene.clock.epoch(sample(second)));
+            self.since = rising::rising(scene, (&self.from, self.sv), first, presence)?.map(sample);
         }
         self.prepare_alone(scene, from, to)
     }
@@ -296,21 +300,6 @@ impl Transmitter {
         }
         self.fast.prepare(scene.fast_phases(), self.from.fading(self.sv), self.signal.carrier_hz(self.sv), from, to);
         self.prepare_messages(scene, from, to)
-    }
-
-    /// The first sample of the stretch of whole seconds in view that lasts until `second`, for a stream that
-    /// begins there.
-    fn rising(&self, scene: &Scene, mut second: u64) -> Result<Option<u64>, GenerateError> {
-        let sample = |second: u64| scene.clock.rate.first_sample_at(second, 1);
-        let mut since = None;
-        while second > 0 {
-            second -= 1;
-            if !arrival::in_view_from(scene, &self.from, self.sv, scene.clock.epoch(sample(second)))? {
-                break;
-            }
-            since = Some(sample(second));
-        }
-        Ok(since)
     }
 
     fn prepare_messages(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
