@@ -299,6 +299,18 @@ fn qzss_on_three_bands_finds_its_place_through_an_ionosphere_of_maps() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
+/// SBAS's bars: a metre by three satellites of GPS, which alone give no place, and three of WAAS, whose
+/// HDOP of 1.04 and, by theory, 0.4 m of code noise leave one fix in a hundred beyond it.
+#[test]
+fn three_satellites_of_gps_and_three_of_sbas_find_the_place_that_gps_alone_does_not() {
+    let summary = run_with(&scenarios().join("sbas.toml"), &["--check".as_ref()]);
+    found_and_decoded_what_is_there(&summary);
+    assert_eq!(number(&summary, "/satellites/used"), 6.0);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/position/first_fix_s", 24.0);
+    assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
+}
+
 /// B1C's bars: a metre by the five satellites of the third generation in view, whose HDOP of 1.55 and, by
 /// theory, 0.3 m of code noise leave one fix in a hundred beyond it; a set is whole 22 s after the start, 4 s
 /// before the bar (`GNSS_TWIN_LONG=1`: codes of 10 ms take long to find).

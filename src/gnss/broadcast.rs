@@ -462,18 +462,23 @@ impl Ephemeris {
     /// When a set goes on the air whose fit interval is that in which it is sent, as of GLONASS; `None` where
     /// the interval is longer.
     pub fn sent_from(&self) -> Option<Epoch> {
-        self.vector.map(|_| self.toe.plus_s(-0.5 * self.fit_interval_s()))
+        match self.sv.system {
+            // Sets of a network are those of its next message.
+            System::Sbas => Some(self.transmitted),
+            _ => self.vector.map(|_| self.toe.plus_s(-0.5 * self.fit_interval_s())),
+        }
     }
 
     /// Curve fit interval around the reference time; of a state vector the half hour in whose middle it is
     /// (GLONASS ICD L1, L2 5.1, 4.4, P1). Of Galileo, NavIC and BeiDou, whose documents have none,
     /// eight hours: a set is used for four hours after its reference time.
     ///
-    /// Of QZSS two hours (IS-QZSS-PNT-005, 4.1.2.4).
+    /// Of QZSS two hours (IS-QZSS-PNT-005, 4.1.2.4), of SBAS twelve minutes (RTCA DO-229D, table A-25).
     /// Of GPS four hours, or what the issue of data says when the fit flag is set
     /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).
     pub fn fit_interval_s(&self) -> f64 {
         let hours = match (self.long_fit, self.iodc) {
+            _ if self.sv.system == System::Sbas => 0.2,
             _ if self.vector.is_some() => 0.5,
             _ if self.is_sent_after_reference() => 8.0,
             (false, _) if self.sv.system == System::Qzss => 2.0,

@@ -56,6 +56,7 @@ pub mod recording;
 pub mod rinex;
 pub mod samples;
 pub mod satellite;
+pub mod sbas;
 pub mod sigmf;
 pub mod signal;
 #[cfg(feature = "generator")]

@@ -1,6 +1,7 @@
-//! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV, Galileo I/NAV (or F/NAV of satellites
-//! that have no I/NAV), NavIC, BeiDou D1 or D2, GLONASS and LNAV of QZSS, the coefficients of these systems'
-//! ionosphere but QZSS's, times of GPS and Galileo against each other and UTC, and the leap seconds.
+//! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV, Galileo I/NAV (or F/NAV of
+//! satellites that have no I/NAV), NavIC, BeiDou D1 or D2, GLONASS, LNAV of QZSS and SBAS, the
+//! coefficients of these systems' ionosphere but of the last two, times of GPS and Galileo against each
+//! other and UTC, and the leap seconds.
 //!
 //! Source: RINEX 2.11, tables A4 and A10; RINEX 3.05, tables A6, A8, A10, A12 and A18; RINEX 4.02. Lines and
 //! columns are read in `columns`; `elements` holds every element against the range of its field in the
@@ -27,11 +28,11 @@ use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
 
-/// What a navigation file says about GPS, Galileo, NavIC, BeiDou, GLONASS and QZSS.
+/// What a navigation file says about GPS, Galileo, NavIC, BeiDou, GLONASS, QZSS and SBAS.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Navigation {
-    /// Sets of LNAV of GPS and QZSS, Galileo I/NAV, NavIC, BeiDou D1 or D2 and GLONASS by satellite and
-    /// time of clock; of a Galileo satellite without any of I/NAV those of F/NAV.
+    /// Sets of LNAV of GPS and QZSS, Galileo I/NAV, NavIC, BeiDou D1 or D2, GLONASS and SBAS by satellite
+    /// and time of clock; of a Galileo satellite without any of I/NAV those of F/NAV.
     pub ephemerides: Vec<Ephemeris>,
     /// Coefficients of GPS's model of the ionosphere, where the header has them.
     pub klobuchar: Option<Klobuchar>,
@@ -95,7 +96,7 @@ pub enum NavigationError {
         detail: String,
     },
     /// No set of elements that can be used.
-    #[error("{name}: no usable ephemeris of GPS, Galileo, NavIC, BeiDou, GLONASS or QZSS: found {found}")]
+    #[error("{name}: no usable ephemeris of GPS, Galileo, NavIC, BeiDou, GLONASS, QZSS or SBAS: found {found}")]
     Nothing {
         /// Name of the file.
         name: String,

@@ -22,7 +22,7 @@ pub const ORDER: Order<'static> = &[
             &["message"],
             &["nmea", "exchange"],
             &["gps", "galileo", "navic", "beidou", "glonass"],
-            &["qzss"],
+            &["qzss", "sbas"],
             &["rinex"],
             &["sp3"],
         ],
@@ -172,6 +172,7 @@ pub const EXCEPTIONS: &[&str] = &[
     "gnss/signal: gnss/gps",
     "gnss/signal: gnss/navic",
     "gnss/signal: gnss/qzss",
+    "gnss/signal: gnss/sbas",
     "gnss/signal: gnss/message",
 ];
 

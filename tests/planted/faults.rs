@@ -35,6 +35,8 @@ const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_e
 const REDUNDANT: &str = "witness::redundancy::real_words_17_to_20_are_the_redundancy_of_the_real_words_1_to_4";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
 const DELAYS: &str = "witness::printed::clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print";
+const SBAS_SETS: &str =
+    "witness::sbas::shipped_sets_are_whole_steps_of_the_fields_and_are_read_again_from_any_symbol_and_either_way_up";
 const QZSS_CODES: &str = "witness::codes::all_chips_of_all_codes_are_those_of_another_program";
 const QZSS_PRN: &str =
     "witness::codes::satellites_of_qzss_have_the_codes_of_the_prn_that_rinex_names_and_those_of_gps_do_not";
@@ -245,6 +247,11 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.l5.advance", "XB of L5 is a chip early", L5_CODES),
     fault("gnss.l2c.register", "the register of L2C feeds back into another stage", L2C_CODES),
     fault("gnss.l2c.turn", "CL has the first place, and CM the second", L2C_CODES),
+    fault("gnss.sbas.codes", "the code of PRN 131 is a chip late", QZSS_CODES),
+    fault("gnss.sbas.place", "x of augmentation systems has the steps of z", SBAS_SETS),
+    fault("gnss.sbas.accuracy", "satellites that range count as such that do not", SBAS_SETS),
+    fault("gnss.sbas.tow", "blocks of type 12 are taken for the ones before", SBAS_SETS),
+    fault("gnss.sbas.acceleration", "accelerations count twice", SBAS_SETS),
     fault("gnss.qzss.codes", "codes of QZSS but the first are a chip late", QZSS_CODES),
     fault("gnss.qzss.prn", "satellites of QZSS have the codes of the next", QZSS_PRN),
     fault("gnss.qzss.overlay", "the second register of overlays feeds back as the first does", L1C_CODES),

@@ -47,5 +47,7 @@ mod recording;
 mod reduced;
 #[path = "../witness/redundancy.rs"]
 mod redundancy;
+#[path = "../witness/sbas.rs"]
+mod sbas;
 #[path = "../witness/stability.rs"]
 mod stability;

@@ -350,7 +350,9 @@ fn the_rinex_crate_reads_the_same_orbits_of_other_systems() {
         let mut frames = std::collections::BTreeMap::<_, Vec<_>>::new();
         for (key, frame) in file.nav_ephemeris_frames_iter() {
             let since_ns = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();
-            frames.entry((key.sv.to_string(), (since_ns / 1_000_000_000) as i64)).or_default().push(frame);
+            // The plain form names satellites of augmentation systems.
+            let place = (format!("{:x}", key.sv), (since_ns / 1_000_000_000) as i64);
+            frames.entry(place).or_default().push(frame);
         }
         for set in found.ephemerides.iter().filter(|set| set.sv.system != System::Gps) {
             let own = set.vector.map_or_else(|| elements(set).to_vec(), |vector| axes(&vector));

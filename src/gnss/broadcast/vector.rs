@@ -5,12 +5,12 @@
 //! PZ-90.11, which agrees with WGS 84 and ITRF to centimetres: they are taken for the same. Steps of
 //! [`STEP_S`] leave 0.1 mm in a quarter of an hour; where one ends the next begins, so that the
 //! state is as smooth as the motion. Limits: the pull is held fast in earth-fixed axes, good for 15 min to
-//! either side; a day away is refused.
+//! either side; a day away is refused. Those of augmentation systems are polynomials.
 
 use nalgebra::Vector3;
 
 use super::{OrbitError, State};
-use crate::gnss::satellite::Sv;
+use crate::gnss::satellite::{Sv, System};
 
 /// Gravitational constant, second zonal harmonic, equatorial radius and rotation of the Earth in PZ-90.11
 /// (GLONASS ICD L1, L2 5.1, table A.1).
@@ -32,7 +32,7 @@ pub struct StateVector {
     pub position_m: Vector3<f64>,
     /// Velocity in the rotating axes.
     pub velocity_mps: Vector3<f64>,
-    /// Pull of Moon and Sun.
+    /// Pull of Moon and Sun; of augmentation systems all of the acceleration in those axes.
     pub acceleration_mps2: Vector3<f64>,
 }
 
@@ -46,6 +46,9 @@ impl StateVector {
     /// [`OrbitError`] for what is no satellite's state, or a time that is too far away.
     pub fn state(&self, sv: Sv, since_s: f64) -> Result<State, OrbitError> {
         self.check(sv)?;
+        if sv.system == System::Sbas {
+            return Ok(self.straight(since_s));
+        }
         if !(-FARTHEST_S..=FARTHEST_S).contains(&since_s) {
             return Err(OrbitError::Far { sv, since_s });
         }
@@ -56,6 +59,16 @@ impl StateVector {
         }
         let (position_m, velocity_mps) = self.step(phase, since_s - whole * STEP_S);
         Ok(State { position_m, velocity_mps })
+    }
+
+    /// The same of a geostationary satellite, whose acceleration is that of its motion in the rotating
+    /// axes (RTCA DO-229D, A.4.4.11).
+    fn straight(&self, since_s: f64) -> State {
+        let half_s = planted!("gnss.sbas.acceleration", 0.5 * since_s, since_s);
+        State {
+            position_m: self.position_m + (self.velocity_mps + self.acceleration_mps2 * half_s) * since_s,
+            velocity_mps: self.velocity_mps + self.acceleration_mps2 * since_s,
+        }
     }
 
     /// One step of the Runge-Kutta method of fourth order.
@@ -105,6 +118,10 @@ impl StateVector {
             return error("speed", speed_mps, "at most 2e4 m/s");
         }
         let pull_mps2 = self.acceleration_mps2.norm();
+        if sv.system == System::Sbas {
+            // As much as type 9 has bits for.
+            return if pull_mps2 <= 0.034 { Ok(()) } else { error("acceleration", pull_mps2, "at most 0.034 m/s2") };
+        }
         if !(0.0..=1e-3).contains(&pull_mps2) {
             return error("acceleration by Moon and Sun", pull_mps2, "at most 1e-3 m/s2");
         }
@@ -115,7 +132,6 @@ impl StateVector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::satellite::System;
 
     const SV: Sv = Sv { system: System::Glonass, number: 5 };
 

@@ -169,13 +169,12 @@ fn exponent(value: f64, digits: usize) -> String {
 /// A set that is a state vector: a line with the clock, one of each axis and one with the rest (RINEX 3.05,
 /// table A10); times are UTC's.
 fn vector_record(set: &Ephemeris, vector: &StateVector, channel: Option<i8>) -> String {
+    if set.sv.system == System::Sbas {
+        return geostationary_record(set, vector);
+    }
     let unhealthy = |bit: u16| f64::from(set.health >> bit & 1);
     let channel = channel.map_or(0.0, f64::from);
-    let axis = |of: usize, last: f64| {
-        let axes = [vector.position_m, vector.velocity_mps, vector.acceleration_mps2];
-        let [place, speed, pull] = axes.map(|axis| axis.get(of).map_or(0.0, |metres| 1e-3 * metres));
-        [place, speed, pull, last]
-    };
+    let axis = |of: usize, last: f64| axis_km(vector, of, last);
     let lines = [
         axis(0, unhealthy(2)),
         axis(1, channel),
@@ -187,6 +186,28 @@ fn vector_record(set: &Ephemeris, vector: &StateVector, channel: Option<i8>) -> 
     let mut text = format!("{} {year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}{clock}\n", set.sv);
     for line in lines {
         text += &format!("    {}\n", values(&line));
+    }
+    text
+}
+
+/// Place, velocity and acceleration along an axis in kilometres, and what ends their line.
+fn axis_km(vector: &StateVector, of: usize, last: f64) -> [f64; 4] {
+    let axes = [vector.position_m, vector.velocity_mps, vector.acceleration_mps2];
+    let [place, speed, pull] = axes.map(|axis| axis.get(of).map_or(0.0, |metres| 1e-3 * metres));
+    [place, speed, pull, last]
+}
+
+/// A state vector of an augmentation system (RINEX 3.05, table A16), whose times are those of GPS. Health is
+/// that of type 17, which is not read: zero.
+fn geostationary_record(set: &Ephemeris, vector: &StateVector) -> String {
+    // An index of 15 has no metres.
+    let accuracy_m = if set.ura_index == 15 { 32_767.0 } else { ura_m(set.ura_index) };
+    let [year, month, day, hour, minute, second] = calendar(set.toc);
+    let transmitted_s = set.transmitted.tow_s();
+    let mut text = format!("{} {year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}", set.sv);
+    text += &format!("{}\n", values(&[set.af0_s, set.af1_sps, transmitted_s]));
+    for (of, last) in [0.0, accuracy_m, f64::from(set.aodo)].into_iter().enumerate() {
+        text += &format!("    {}\n", values(&axis_km(vector, of, last)));
     }
     text
 }
@@ -309,6 +330,7 @@ mod tests {
     use crate::gnss::navic::nav::SPS_NAV;
     use crate::gnss::navic::sps::L5;
     use crate::gnss::rinex;
+    use crate::gnss::sbas::message::SBAS;
 
     const NAVIC: &[u8] = include_bytes!("../../../scenarios/navic_2026-03-09_10h_12h.rnx");
     const QZSS: &[u8] = include_bytes!("../../../scenarios/qzss_2023-03-12_02h_04h.rnx");
@@ -347,6 +369,7 @@ mod tests {
                 System::Navic => SPS_NAV.rinex,
                 System::BeiDou => D1_D2.rinex,
                 System::Glonass => GNAV.rinex,
+                System::Sbas => SBAS.rinex,
                 _ => LNAV.rinex,
             };
             let title = heading(version, records.unwrap(), set.sv);
@@ -373,7 +396,8 @@ mod tests {
             let file = foreign(&text);
             let frames: Vec<_> = file.nav_ephemeris_frames_iter().collect();
             let [(key, frame)] = frames.as_slice() else { panic!("{} frames\n{text}", frames.len()) };
-            assert_eq!(key.sv.to_string(), set.sv.to_string(), "{text}");
+            // Its plain form names satellites of augmentation systems.
+            assert_eq!(format!("{:x}", key.sv), set.sv.to_string(), "{text}");
             if version == Version::Four {
                 assert_eq!(key.msgtype.to_string(), title.trim_end().rsplit(' ').next().unwrap_or(""), "{text}");
             }

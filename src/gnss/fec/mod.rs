@@ -7,3 +7,4 @@ pub mod ldpc;
 pub mod ldpc64;
 pub mod reed_solomon;
 pub mod register;
+pub mod running;

@@ -1,8 +1,8 @@
 //! GPS L1 C/A: Gold codes of 1023 chips at 1.023 Mchip/s on 1575.42 MHz.
 //!
 //! Source: IS-GPS-200N, 3.3.2.3 and table 3-Ia. The codes of PRN 1 to 37 are made from the two printed
-//! registers and the G2 delays; PRN 34 and 37 share a code, as the table says. Those of PRN 193 to 202
-//! are of QZSS (IS-GPS-200N, table 6-I).
+//! registers and the G2 delays; PRN 34 and 37 share a code, as the table says. Those of PRN 120 to 158 are
+//! of augmentation systems and those of PRN 193 to 202 of QZSS (IS-GPS-200N, table 6-I).
 
 use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::satellite::System;
@@ -40,6 +40,13 @@ const G2_DELAY_CHIPS: [usize; 37] = [
     514, 515, 516, 859, 860, 861, 862, 863, 950, 947, 948, 950,
 ];
 
+/// The same of PRN 120 to 158, of augmentation systems (IS-GPS-200N, table 6-I).
+const SBAS_G2_DELAY_CHIPS: [usize; 39] = [
+    145, 175, 52, 21, 237, 235, 886, 657, 634, 762, 355, 1012, 176, 603, 130, 359, 595, 68, 386, 797, 456, 499, 883,
+    307, 127, 211, 121, 118, 163, 628, 853, 484, 289, 811, 202, 1021, 463, 568, 904,
+];
+const FIRST_OF_SBAS: u8 = 120;
+
 /// The same of PRN 193 to 202, of QZSS (IS-GPS-200N, table 6-I; IS-QZSS-PNT-005, table 3.2.2-1).
 const QZSS_G2_DELAY_CHIPS: [usize; 10] = [339, 208, 711, 189, 263, 537, 663, 942, 173, 900];
 const FIRST_OF_QZSS: u8 = 193;
@@ -49,12 +56,14 @@ fn gps(prn: u8) -> Option<u8> {
     (usize::from(prn) <= G2_DELAY_CHIPS.len()).then_some(prn)
 }
 
-/// The C/A code of a PRN from 1 to 37 or 193 to 202 (IS-GPS-200N, 3.3.2.3, figures 3-8 to 3-10).
+/// The C/A code of a PRN from 1 to 37, 120 to 158 or 193 to 202 (IS-GPS-200N, 3.3.2.3, figures 3-8 to 3-10).
 pub fn code(prn: u8) -> Option<Vec<bool>> {
-    let delay = match prn.checked_sub(FIRST_OF_QZSS) {
-        Some(place) => *QZSS_G2_DELAY_CHIPS.get(usize::from(place))?,
-        None => *G2_DELAY_CHIPS.get(usize::from(prn).checked_sub(1)?)?,
+    let delay = match prn {
+        FIRST_OF_QZSS.. => *QZSS_G2_DELAY_CHIPS.get(usize::from(prn - FIRST_OF_QZSS))?,
+        FIRST_OF_SBAS.. => *SBAS_G2_DELAY_CHIPS.get(usize::from(prn - FIRST_OF_SBAS))?,
+        _ => *G2_DELAY_CHIPS.get(usize::from(prn).checked_sub(1)?)?,
     };
+    let delay = planted!("gnss.sbas.codes", delay, delay + usize::from(prn == 131));
     let delay = planted!("gnss.qzss.codes", delay, delay + usize::from(prn > FIRST_OF_QZSS));
     let delay = planted!("gnss.code.g2_delay", delay, delay + usize::from(prn == 32));
     let g1 = register(&[3, 10]);

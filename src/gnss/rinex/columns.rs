@@ -313,7 +313,7 @@ impl Form {
             ("EPH", message) if !messages.contains(&message) => {
                 refuse(&format!("message '{message}': expected {}", messages.join(" or ")))
             }
-            ("EPH", message @ ("LNAV" | "INAV" | "FNAV" | "D1" | "D2" | "FDMA"))
+            ("EPH", message @ ("LNAV" | "INAV" | "FNAV" | "D1" | "D2" | "FDMA" | "SBAS"))
                 if READ.iter().any(|(read, ..)| *read == letter) && !is_spare(satellite) =>
             {
                 let rest = group.get(1..).unwrap_or_default();
@@ -346,6 +346,7 @@ impl Form {
         let (system, most) = read.map_or((System::Gps, 32), |(_, system, most)| (*system, *most));
         let (is_whole, expected) = match system {
             System::Glonass => (LINES_OF_GLONASS.contains(&record.len()), "4 or 5".to_owned()),
+            System::Sbas => (record.len() == *LINES_OF_GLONASS.start(), LINES_OF_GLONASS.start().to_string()),
             _ => (record.len() == LINES, LINES.to_string()),
         };
         if !is_whole {

@@ -16,6 +16,7 @@ use crate::gnss::glonass::gnav::GNAV_SETS;
 use crate::gnss::gps::lnav::LNAV_SETS;
 use crate::gnss::qzss::lnav;
 use crate::gnss::satellite::System;
+use crate::gnss::sbas::message::{SBAS_SETS, step_of_day};
 use crate::gnss::time::{BDT, BDT_WEEK, Epoch, GLONASST, UTC, WEEK_S};
 
 /// An element that must be there and lie within its range, in SI units.
@@ -40,6 +41,9 @@ fn whole(record: &Record, key: &'static str, most: u32) -> Result<u32, String> {
 pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
     if record.sv.system == System::Glonass {
         return glonass(record);
+    }
+    if record.sv.system == System::Sbas {
+        return sbas(record);
     }
     // Fields that both messages have in the same units and lengths; RINEX rounds to twelve digits.
     const ANGLE_RAD: f64 = 2.0 * std::f64::consts::TAU;
@@ -153,6 +157,37 @@ fn glonass(record: &Record) -> Result<Ephemeris, String> {
         af0_s: both("af0", 1.954e-3)?,
         af1_sps: both("af1", 9.32e-10)?,
         tgd_s: later_s,
+        vector: Some(vector),
+        ..Ephemeris::blank(record.sv, toe)
+    })
+}
+
+/// A set of an augmentation system (RTCA DO-229D, A.4.4.11; RINEX 3.05, table A16), whose epoch is the
+/// reference time. Flags of health, which type 9 does not have, are left alone.
+fn sbas(record: &Record) -> Result<Ephemeris, String> {
+    let both = |name, most: f64| field(record, name, -most, most);
+    let three = |names: [&'static str; 3], [most, across]: [f64; 2]| -> Result<Vector3<f64>, String> {
+        let [x, y, z] = names;
+        Ok(Vector3::new(both(x, most)?, both(y, most)?, both(z, across)?) * 1000.0)
+    };
+    let toe = record.toc;
+    let late_s = field(record, "t_tm", 0.0, WEEK_S as f64)? - toe.tow_s();
+    let late_s = late_s - (late_s / WEEK_S as f64).round() * WEEK_S as f64;
+    let vector = StateVector {
+        position_m: three(["x", "y", "z"], [42_950.0, 6_711.0])?,
+        velocity_mps: three(["vx", "vy", "vz"], [0.040_96, 0.524_3])?,
+        acceleration_mps2: three(["ax", "ay", "az"], [6.4e-6, 3.2e-5])?,
+    };
+    let step = step_of_day(toe) as u16;
+    Ok(Ephemeris {
+        form: &SBAS_SETS,
+        transmitted: toe.plus_s(late_s),
+        iode: step,
+        iodc: step,
+        aodo: whole(record, "iodn", 255)? as u8,
+        ura_index: ura_index(optional_accuracy(record)?),
+        af0_s: both("af0", 9.54e-7)?,
+        af1_sps: both("af1", 1.165e-10)?,
         vector: Some(vector),
         ..Ephemeris::blank(record.sv, toe)
     })

@@ -17,7 +17,7 @@ use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::message::Message;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::{Epoch, TimeScale};
-use crate::gnss::{beidou, galileo, glonass, gps, navic, qzss};
+use crate::gnss::{beidou, galileo, glonass, gps, navic, qzss, sbas};
 
 mod shape;
 #[cfg(any(test, feature = "planted"))]
@@ -26,7 +26,7 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 21] = [
+pub static SIGNALS: [&Signal; 22] = [
     &gps::l1ca::L1_CA,
     &gps::l1c::L1C,
     &gps::l2c::L2C,
@@ -48,6 +48,7 @@ pub static SIGNALS: [&Signal; 21] = [
     &qzss::l1c::L1C,
     &qzss::l2c::L2C,
     &qzss::l5::L5,
+    &sbas::l1::L1,
 ];
 
 /// Signals that [`register`] has added. Names in files have to find them, so they are the program's, not a

@@ -37,6 +37,9 @@ pub struct AcquisitionSettings {
 }
 }
 
+/// Code periods of a symbol that are too few to sum more than one coherently before its edges are known.
+const FEW: u32 = 3;
+
 impl Default for AcquisitionSettings {
     fn default() -> Self {
         Self {
@@ -73,7 +76,9 @@ impl AcquisitionSettings {
         let whole = 1e-3 * f64::from(self.coherent_periods) / component.period_s();
         let steady = match component.message {
             _ if component.overlay.periods() > 1 => 1,
-            Some(_) => component.periods_per_symbol().unwrap_or(1),
+            // Sums as long as a symbol of few periods all straddle an edge if one does: half of the power is
+            // then found beside the Doppler.
+            Some(_) => component.periods_per_symbol().filter(|periods| *periods > FEW).unwrap_or(1),
             None => u32::MAX,
         };
         // Beyond rounding of the quotient a period that has begun counts.

@@ -92,11 +92,10 @@ const MESSAGE_S: i64 = 6;
 /// The messages in the order in which satellites send them, and that of the ionosphere.
 const ORDER: [u8; 4] = [10, 11, 30, 33];
 const IONOSPHERE: u8 = 30;
-/// Bits of a message without and with its check, and its symbols.
+/// Bits of a message without and with its check.
 const DATA_BITS: usize = 276;
 const CHECK_BITS: usize = 24;
 const BITS: usize = DATA_BITS + CHECK_BITS;
-const SYMBOLS: usize = 2 * BITS;
 const PREAMBLE: f64 = 139.0;
 /// Bits of the message before that the code remembers.
 const MEMORY_BITS: usize = 6;
@@ -261,8 +260,13 @@ pub fn encode(memory: &[bool], message: &[bool]) -> Vec<bool> {
 
 /// The bits of a message if their check is right.
 pub fn checked(bits: Vec<bool>) -> Option<Vec<bool>> {
-    let right = bits.len() == BITS && crc24q(bits.iter().copied()) == 0;
-    (right && number(bits.get(..8)?) as f64 == PREAMBLE).then_some(bits)
+    is_message(&bits).then_some(bits)
+}
+
+/// Whether bits are a message: their beginning, before the sum over all of them.
+fn is_message(bits: &[bool]) -> bool {
+    let begins = bits.get(..8).is_some_and(|begin| number(begin) as f64 == PREAMBLE);
+    begins && bits.len() == BITS && crc24q(bits.iter().copied()) == 0
 }
 
 /// The type that a message says it has.

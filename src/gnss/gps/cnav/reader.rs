@@ -1,23 +1,15 @@
-//! Finds messages in soft symbols whose code runs on, whichever way up they come, and gathers what they say.
-//!
-//! Both polynomials have an odd number of taps, so that symbols upside down are bits upside down. A message
-//! is decoded once the code's memory after it is there too.
+//! Gathers what the messages found in soft symbols say ([`Running`]).
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
-use super::{BITS, CODE, IONOSPHERE, MESSAGE_S, SYMBOLS, checked, elements, ionosphere, message_type, parameters};
+use super::{BITS, IONOSPHERE, MESSAGE_S, elements, ionosphere, is_message, message_type, parameters};
 use crate::gnss::bits::number;
+use crate::gnss::fec::running::Running;
 use crate::gnss::message::{Message, Parameters, Read, Reader};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::Sv;
 use crate::gnss::time::{Epoch, WEEK_S};
 
-/// Symbols before and after a message by which its first and last bits are as sure as the others: some
-/// constraint lengths.
-const MARGIN: usize = 80;
-const WINDOW: usize = MARGIN + SYMBOLS + MARGIN;
-/// Messages in a row that fail where they are expected before they are sought elsewhere.
-const FAILURES: u32 = 4;
 /// Types whose parameters make up a set.
 const OF_SET: [u8; 3] = [10, 11, 30];
 
@@ -26,12 +18,7 @@ const OF_SET: [u8; 3] = [10, 11, 30];
 pub struct CnavReader {
     message: &'static Message,
     sv: Sv,
-    /// The latest symbols, a message with margins at most; `next` numbers the one to come.
-    symbols: VecDeque<f32>,
-    next: u64,
-    /// Number of the first symbol of some message, and messages that failed since the last one that did not.
-    frame: Option<u64>,
-    failures: u32,
+    code: Running,
     /// The latest messages by type.
     messages: BTreeMap<u8, Vec<bool>>,
     /// What the set that was reported last said.
@@ -41,45 +28,7 @@ pub struct CnavReader {
 impl CnavReader {
     /// A reader of one of the two messages that has read nothing.
     pub fn of(message: &'static Message, sv: Sv) -> Self {
-        Self {
-            message,
-            sv,
-            symbols: VecDeque::with_capacity(WINDOW),
-            next: 0,
-            frame: None,
-            failures: 0,
-            messages: BTreeMap::new(),
-            complete: None,
-        }
-    }
-
-    /// Where a message may begin in the window: a preamble followed by what ends in a right check. The window
-    /// is decoded for both ways in which symbols may be pairs.
-    fn search(&mut self) -> Option<(usize, Vec<bool>, bool)> {
-        let soft = self.symbols.make_contiguous();
-        for offset in 0..2 {
-            let bits = CODE.decode_open(soft.get(offset..)?);
-            for first in 0..bits.len().saturating_sub(BITS - 1) {
-                for inverted in [false, true] {
-                    let own: Vec<bool> = bits.get(first..first + BITS)?.iter().map(|bit| bit ^ inverted).collect();
-                    // The preamble before the sum over all bits.
-                    if number(own.get(..8)?) == 0x8B
-                        && let Some(message) = checked(own)
-                    {
-                        return Some((offset + 2 * first, message, inverted));
-                    }
-                }
-            }
-        }
-        None
-    }
-
-    /// The message that begins after the margin.
-    fn decode(&mut self) -> Option<(Vec<bool>, bool)> {
-        let bits = CODE.decode_open(self.symbols.make_contiguous());
-        let own = bits.get(MARGIN / 2..MARGIN / 2 + BITS)?.to_vec();
-        let flipped: Vec<bool> = own.iter().map(|bit| !bit).collect();
-        checked(own).map(|bits| (bits, false)).or_else(|| checked(flipped).map(|bits| (bits, true)))
+        Self { message, sv, code: Running::new(BITS, is_message), messages: BTreeMap::new(), complete: None }
     }
 
     /// Takes a message that began so many symbols before the newest.
@@ -136,52 +85,16 @@ impl CnavReader {
 
 impl Reader for CnavReader {
     fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
-        if self.symbols.len() == WINDOW {
-            self.symbols.pop_front();
-        }
-        self.symbols.push_back(soft);
-        self.next += 1;
-        if self.symbols.len() < WINDOW {
-            return Vec::new();
-        }
-        let begin = self.next - WINDOW as u64;
-        match self.frame {
-            Some(frame) => {
-                let first = begin + MARGIN as u64;
-                // The message that was found has been read.
-                if first <= frame || !(first - frame).is_multiple_of(SYMBOLS as u64) {
-                    return Vec::new();
-                }
-                if let Some((bits, inverted)) = self.decode() {
-                    self.failures = 0;
-                    return self.read(bits, inverted, self.next - first, near);
-                }
-                self.failures += 1;
-                if self.failures >= FAILURES {
-                    self.doubt();
-                }
-                Vec::new()
-            }
-            // Every place comes by within the margins.
-            None if self.next.is_multiple_of(MARGIN as u64) => match self.search() {
-                Some((place, bits, inverted)) => {
-                    let first = begin + place as u64;
-                    (self.frame, self.failures) = (Some(first), 0);
-                    self.read(bits, inverted, self.next - first, near)
-                }
-                None => Vec::new(),
-            },
-            None => Vec::new(),
-        }
+        let found = self.code.take(soft);
+        found.map_or_else(Vec::new, |found| self.read(found.bits, found.inverted, found.symbols, near))
     }
 
     fn skip(&mut self) {
-        self.symbols.clear();
-        self.doubt();
+        self.code.skip();
     }
 
     fn doubt(&mut self) {
-        (self.frame, self.failures) = (None, 0);
+        self.code.doubt();
     }
 
     fn missing(&self) -> Vec<u8> {

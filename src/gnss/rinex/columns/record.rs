@@ -1,10 +1,11 @@
 //! Records by system: which are read, and the names of their fields.
 //!
-//! Source: RINEX 3.05, tables A6, A8, A10, A14 and A18; RINEX 4.02, table A9.
+//! Source: RINEX 3.05, tables A6, A8, A10, A14, A16 and A18; RINEX 4.02, table A9.
 
 use crate::gnss::glonass::fdma::SLOTS;
 use crate::gnss::qzss::satellites::SATELLITES;
 use crate::gnss::satellite::{Sv, System};
+use crate::gnss::sbas::l1::SATELLITES as SBAS_SATELLITES;
 use crate::gnss::time::Epoch;
 
 /// Fields of a record.
@@ -44,14 +45,18 @@ const OF_GLONASS: [&str; 19] = [
     "accuracyIndex",
     "healthFlags",
 ];
+/// Fields of a record of an augmentation system (RINEX 3.05, table A16).
+const OF_SBAS: [&str; 15] =
+    ["af0", "af1", "t_tm", "x", "vx", "ax", "health", "y", "vy", "ay", "accuracy", "z", "vz", "az", "iodn"];
 /// Systems whose records are read, with the largest number of their satellites.
-pub(super) const READ: [(char, System, u8); 6] = [
+pub(super) const READ: [(char, System, u8); 7] = [
     ('G', System::Gps, 32),
     ('R', System::Glonass, SLOTS),
     ('E', System::Galileo, 36),
     ('I', System::Navic, 14),
     ('C', System::BeiDou, 63),
     ('J', System::Qzss, SATELLITES),
+    ('S', System::Sbas, SBAS_SATELLITES[1]),
 ];
 /// Bits of an I/NAV record's sources: sent on E1-B or E5b, sent on E5a (F/NAV), and a clock of E5b and E1.
 const SENT_INAV: u32 = 0b101;
@@ -87,6 +92,10 @@ impl Record {
     pub fn get(&self, name: &str) -> Option<f64> {
         if self.sv.system == System::Glonass {
             let at = OF_GLONASS.iter().position(|field| *field == name)?;
+            return self.values.get(at).copied().flatten();
+        }
+        if self.sv.system == System::Sbas {
+            let at = OF_SBAS.iter().position(|field| *field == name)?;
             return self.values.get(at).copied().flatten();
         }
         let rest = match self.sv.system {

@@ -1,0 +1,204 @@
+//! SBAS's message on L1: 250 bits a second, encoded and decoded.
+//!
+//! Source: RTCA DO-229D, A.4.3 (blocks, three beginnings in turn, check) and A.4.4. A block is coded
+//! without a break from one to the next (`fec::running`). Sent are types 12 (time), 9 (where the satellite
+//! is) and 63 (nothing) in rounds of six seconds; real satellites send the first two every minute or
+//! five. A set is a place with its velocity and acceleration at a multiple of 16 s, good for six minutes
+//! to either side (A.4.5.1.3, table A-25). Only type 12 says which second of the week it is.
+//!
+//! Limits: corrections, integrity and ionosphere (types 0 to 7, 10, 18, 24 to 28) and almanacs (17) are
+//! neither sent nor read: their blocks pass the check and count as time alone. Health is the accuracy, of
+//! which 15 says that the satellite is not to be ranged to. Of UTC nothing is said.
+
+mod fields;
+mod reader;
+
+use crate::gnss::bits::{FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::gnss::broadcast::{Ephemeris, SetForm};
+use crate::gnss::crc::crc24q;
+use crate::gnss::fec::convolutional::Convolutional;
+use crate::gnss::ionosphere::Model;
+use crate::gnss::message::{IonosphereForm, Message, Parameters, Raw, Records, Sender};
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+pub(in crate::gnss) use fields::step_of_day;
+pub use fields::tables;
+use fields::{GEO, TIME};
+pub use reader::SbasReader;
+
+/// The message as the signal names it.
+pub static SBAS: Message = Message {
+    name: "SBAS",
+    symbol_s: 0.002,
+    unit_s: 1,
+    first_s: 0,
+    set_s: 1,
+    sender: |_| Ok(Box::new(Blocks)),
+    number: type_at,
+    timed: &[OF_TIME],
+    dated: &[],
+    set: &[OF_TIME, OF_PLACE],
+    reduced: &[],
+    // Its grid is left out.
+    ionosphere: IonosphereForm { model: Model::Klobuchar, unit: |_| false, coefficients: |_| None },
+    set_parameters: || GEO.iter().map(|element| element.field.name).collect(),
+    elements: of_integers,
+    parameters: opened,
+    reader: |sv| Box::new(SbasReader::new(sv)),
+    form: Ephemeris::clone,
+    sets: &SBAS_SETS,
+    quantised,
+    adjustable,
+    alert: None,
+    adjust,
+    rinex: Some(Records { set: |_| "SBAS", ionosphere: "", lines: None }),
+};
+
+/// What clock and health of its sets mean: the clock is that of L1.
+pub static SBAS_SETS: SetForm = SetForm {
+    name: "SBAS",
+    group_delay_s: |_, _| 0.0,
+    serves: |_| true,
+    given_delay_s: |_| 0.0,
+    is_healthy,
+    healthy: |set, _| Some(is_healthy(set)),
+    rinex_sources: None,
+};
+
+/// Types of blocks.
+const OF_PLACE: u8 = 9;
+const OF_TIME: u8 = 12;
+const EMPTY: u8 = 63;
+/// Types in the order in which they are sent.
+const ORDER: [u8; 6] = [OF_TIME, OF_PLACE, EMPTY, EMPTY, EMPTY, EMPTY];
+/// How blocks begin, in turn from a multiple of six seconds on (A.4.3.2).
+const PREAMBLES: [u128; 3] = [0x53, 0x9A, 0xC6];
+/// Bits of a block without and with its check; symbols of a second.
+const DATA_BITS: usize = 226;
+const CHECK_BITS: usize = 24;
+const BITS: usize = DATA_BITS + CHECK_BITS;
+const RATE_HZ: f64 = 500.0;
+/// Bits of the block before that the code remembers.
+const MEMORY_BITS: usize = 6;
+/// An accuracy that says that there is none (A.4.4.11).
+const NOT_TO_BE_USED: u8 = 15;
+/// A standard that says that there is none (A.4.4.15).
+const NO_UTC: f64 = 7.0;
+
+const CODE: Convolutional = Convolutional { second_inverted: false };
+
+/// What type 12 says.
+#[derive(Clone, Copy, Debug, Default)]
+struct Network {
+    utc_standard: f64,
+    tow_s: f64,
+    week: f64,
+}
+
+fn is_healthy(set: &Ephemeris) -> bool {
+    set.ura_index < planted!("gnss.sbas.accuracy", NOT_TO_BE_USED, 0)
+}
+
+/// Type of the block that begins at a time.
+pub fn type_at(start: Epoch) -> u8 {
+    let turn = start.tow_whole_s().rem_euclid(ORDER.len() as i64) as usize;
+    ORDER.get(turn).copied().unwrap_or(EMPTY)
+}
+
+/// Makes the blocks of satellites.
+struct Blocks;
+
+impl Sender for Blocks {
+    fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        self.unit_after(ephemeris, ephemeris, start)
+    }
+
+    fn unit_after(&self, before: &Ephemeris, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        if start.fraction() != 0.0 {
+            let expected = "a whole second";
+            return Err(FieldError::Start { message: SBAS.name, start_s: start.tow_s(), expected });
+        }
+        let past = block(before, start.plus_s(-1.0))?;
+        let memory = past.get(BITS - MEMORY_BITS..).unwrap_or_default();
+        let all: Vec<bool> = memory.iter().chain(&block(set, start)?).copied().collect();
+        Ok(CODE.encode(&all).split_off(2 * memory.len()))
+    }
+}
+
+/// The bits of the block that begins at `start`.
+fn block(set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+    let kind = type_at(start);
+    let preamble = PREAMBLES.get(start.tow_whole_s().rem_euclid(3) as usize).copied().unwrap_or_default();
+    let mut bits: Vec<bool> = bits_of(preamble, 8).chain(bits_of(u128::from(kind), 6)).collect();
+    bits.resize(DATA_BITS, false);
+    match kind {
+        OF_PLACE => write_all(&GEO, set, &mut bits)?,
+        OF_TIME => {
+            let week = start.week().rem_euclid(1024) as f64;
+            let tow_s = start.tow_whole_s() as f64;
+            write_all(&TIME, &Network { utc_standard: NO_UTC, tow_s, week }, &mut bits)?;
+        }
+        _ => {}
+    }
+    let check = crc24q(bits.iter().copied());
+    bits.extend(bits_of(u128::from(check), CHECK_BITS));
+    Ok(bits)
+}
+
+/// Whether bits are a block: one of the three beginnings, and the check.
+fn is_block(bits: &[bool]) -> bool {
+    let begins = bits.get(..8).is_some_and(|begin| PREAMBLES.contains(&number(begin)));
+    begins && bits.len() == BITS && crc24q(bits.iter().copied()) == 0
+}
+
+/// The type that a block says it has.
+fn type_of(bits: &[bool]) -> u8 {
+    bits.get(8..14).map_or(0, |bits| number(bits) as u8)
+}
+
+/// The parameters of a unit's symbols; none but of a set.
+fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
+    let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
+    let bits = CODE.decode_open(&soft);
+    (is_block(&bits) && type_of(&bits) == OF_PLACE).then(|| (true, integers(&GEO, &bits)))
+}
+
+/// The set in a block of type 9 that was sent at `sent`.
+fn elements(sv: Sv, bits: &Vec<bool>, sent: Epoch) -> Ephemeris {
+    let mut found = Ephemeris { form: &SBAS_SETS, ..Ephemeris::blank(sv, sent) };
+    read_all(&GEO, bits, &mut found);
+    found
+}
+
+/// The set that raw integers give, as if they had been sent at `near`.
+fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
+    let mut bits = vec![false; DATA_BITS];
+    for field in GEO.iter().map(|element| &element.field) {
+        field.write(&mut bits, raw(field.name)?);
+    }
+    // Blocks begin with seconds.
+    Some(elements(sv, &bits, Epoch::new(near.seconds(), 0.0)))
+}
+
+/// The set that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+///
+/// # Errors
+/// A value that the message cannot carry.
+pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+    let mut sent = ephemeris.clone();
+    quantise_all(&GEO, &mut sent)?;
+    Ok(sent)
+}
+
+/// Parameters by which sets are distinguished, and the accuracy, which is the health.
+const FIXED_PARAMETERS: [&str; 3] = ["iodn", "t0_16s", "ura_index"];
+
+fn adjustable() -> Vec<&'static str> {
+    let names = GEO.iter().map(|element| element.field.name);
+    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
+}
+
+/// Adds `by` to a parameter of type 9 in the unit of the tables; whether there is one.
+fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+    add_to(&GEO, parameter, ephemeris, by)
+}

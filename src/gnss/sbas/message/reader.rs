@@ -1,0 +1,98 @@
+//! Gathers what the blocks found in soft symbols say ([`Running`]): the second of the week by type 12, and
+//! from it on by counting, and the satellite's place by type 9.
+
+use super::{BITS, OF_PLACE, OF_TIME, RATE_HZ, SBAS, TIME, elements, is_block, type_of};
+use crate::gnss::bits::integers;
+use crate::gnss::fec::running::Running;
+use crate::gnss::message::{Parameters, Read, Reader};
+use crate::gnss::record::NavigationRow;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::{Epoch, WEEK_S};
+
+/// Reads the message.
+#[derive(Clone, Debug)]
+pub struct SbasReader {
+    sv: Sv,
+    code: Running,
+    /// The latest block of type 12: number of its first symbol, and when it began.
+    time: Option<(u64, Epoch)>,
+    /// The latest block of type 9 likewise.
+    place: Option<(u64, Vec<bool>)>,
+    /// What the set that was reported last said.
+    complete: Option<Parameters>,
+}
+
+impl SbasReader {
+    /// A reader that has read nothing.
+    pub fn new(sv: Sv) -> Self {
+        Self { sv, code: Running::new(BITS, is_block), time: None, place: None, complete: None }
+    }
+
+    /// When the block with that first symbol began.
+    fn begun(&self, begin: u64) -> Option<Epoch> {
+        let (timed, at) = self.time?;
+        Some(at.plus_s((begin as f64 - timed as f64) / RATE_HZ))
+    }
+
+    /// The time that a block of type 12 says it began at, its week near `near`.
+    fn said(bits: &Vec<bool>, near: Epoch) -> Option<Epoch> {
+        let all = integers(&TIME, bits);
+        let value = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
+        let (tow_s, week) = (value("tow_s")?, value("week")?);
+        let tow_s = planted!("gnss.sbas.tow", tow_s, tow_s - 1);
+        (tow_s < WEEK_S).then(|| Epoch::new(near.nearest_week(week, 1024) * WEEK_S + tow_s, 0.0))
+    }
+
+    fn look_for_set(&mut self, news: &mut Vec<Read>) {
+        let Some((begin, bits)) = &self.place else { return };
+        let Some(sent) = self.begun(*begin) else { return };
+        let content = integers(&super::GEO, bits);
+        if self.complete.as_ref() == Some(&content) {
+            return;
+        }
+        let set = elements(self.sv, bits, sent);
+        let rows = NavigationRow::each(self.sv, SBAS.name, u32::from(set.iode), content.clone()).collect();
+        self.complete = Some(content);
+        news.push(Read::Ephemeris(Box::new(set)));
+        news.push(Read::Parameters(rows));
+    }
+}
+
+impl Reader for SbasReader {
+    fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
+        let Some(found) = self.code.take(soft) else { return Vec::new() };
+        let begin = self.code.next() - found.symbols;
+        let mut news = Vec::new();
+        match type_of(&found.bits) {
+            OF_TIME => {
+                if let Some(at) = Self::said(&found.bits, near) {
+                    self.time = Some((begin, at));
+                    news.push(Read::Time(at));
+                }
+            }
+            OF_PLACE => self.place = Some((begin, found.bits)),
+            _ => {}
+        }
+        if let Some(at) = self.begun(begin) {
+            let (symbols, inverted) = (found.symbols, found.inverted);
+            news.insert(0, Read::Unit { symbols, of_week_s: at.tow_whole_s(), inverted });
+        }
+        self.look_for_set(&mut news);
+        news
+    }
+
+    fn skip(&mut self) {
+        self.code.skip();
+        (self.time, self.place) = (None, None);
+    }
+
+    fn doubt(&mut self) {
+        self.code.doubt();
+        (self.time, self.place) = (None, None);
+    }
+
+    fn missing(&self) -> Vec<u8> {
+        let parts = [(OF_TIME, self.time.is_none()), (OF_PLACE, self.place.is_none())];
+        parts.into_iter().filter(|(_, lacks)| *lacks).map(|(number, _)| number).collect()
+    }
+}
