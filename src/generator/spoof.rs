@@ -123,7 +123,8 @@ impl Constellation {
         motion
     }
 
-    /// A bound on the speed of that motion until `until_s`; `None` where motion comes from outside as it flows.
+    /// A bound on the speed of that motion until `until_s`; `None` where motion comes from outside as it
+    /// flows.
     pub fn fastest_mps(&self, antenna: &Trajectory, until_s: f64) -> Option<f64> {
         let trajectory = match &self.place {
             Place::Antenna => antenna,

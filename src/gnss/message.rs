@@ -9,7 +9,7 @@
 
 use std::fmt;
 
-use crate::gnss::bits::FieldError;
+use crate::gnss::bits::{Field, FieldError};
 use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::gps::lnav::UtcData;
 use crate::gnss::ionosphere::{Coefficients, Model};
@@ -79,8 +79,10 @@ pub struct Message {
 pub struct Records {
     /// Of the sets of a satellite.
     pub set: fn(Sv) -> &'static str,
-    /// Of the ionosphere's coefficients.
-    pub ionosphere: &'static str,
+    /// Of what all satellites say alike: the ionosphere's coefficients, and the time of other systems.
+    pub common: &'static str,
+    /// The fields of the message, from which offsets of time are read.
+    pub fields: fn() -> Vec<(&'static str, Vec<&'static Field>)>,
     /// Lines after the clock's of sets that version 4 alone has, by the set and its raw parameters; a blank
     /// field has no value. Absent where sets have the lines that version 3 has, too.
     pub lines: Option<fn(&Ephemeris, Raw<'_>) -> Vec<RecordLine>>,

@@ -11,7 +11,7 @@ use crate::generator::spoof::Constellation;
 use crate::gnss::earth::SEMI_MAJOR_AXIS_M;
 use crate::gnss::satellite::Sv;
 
-/// Satellites in the Earth's axes are slower: 3.9 km/s the fastest there are, and a quarter for a fault's own.
+/// Satellites in the Earth's axes are slower: 3.9 km/s the fastest, and a quarter more for a fault's own.
 const SATELLITE_MPS: f64 = 5000.0;
 /// No leap is longer, so that ranges stay about what they are.
 const LEAP_S: f64 = 600.0;

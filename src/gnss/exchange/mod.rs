@@ -11,6 +11,7 @@
 pub(in crate::gnss) mod modern;
 mod navigation;
 mod observation;
+mod offset;
 mod track;
 
 pub use navigation::NavigationSets;

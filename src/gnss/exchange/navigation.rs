@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 
+use super::offset::offsets;
 use super::{Version, calendar, header_line, opening};
 use crate::gnss::broadcast::{Ephemeris, StateVector, status_of_record};
 use crate::gnss::ionosphere::Coefficients;
@@ -59,18 +60,26 @@ impl NavigationSets {
         let mut text = opening(version, "N: GNSS NAV DATA", &systems, near);
         let (mut body, mut described) = (String::new(), BTreeSet::new());
         for (name, (message, _)) in &messages {
-            // BeiDou's come with the sets.
             let own = self.sets.iter().filter(|((known, ..), _)| known == name);
-            let mut raws = self.common.get(*name).into_iter().chain(own.clone().map(|(_, raws)| raws));
+            let (Some(records), Some(((_, sv, _), _))) = (message.rinex, own.clone().next()) else { continue };
+            // Messages of one system that send the same have one record, and one line in a header.
+            let form = if version == Version::Four { records.common } else { "" };
+            let mut once = |what| described.insert((sv.system, form, what));
+            let common = self.common.get(*name);
+            // BeiDou's come with the sets.
+            let mut raws = common.into_iter().chain(own.map(|(_, raws)| raws));
             let sent = raws.find_map(|raws| (message.ionosphere.coefficients)(&|name| raws.get(name).copied()));
-            let (Some(sent), Some(records), Some(((_, sv, _), _))) = (sent, message.rinex, own.clone().next()) else {
-                continue;
-            };
-            // Messages of one system that send the same have one record.
-            if described.insert((sv.system, records.ionosphere)) {
+            if let Some(sent) = sent.filter(|_| once("")) {
                 match version {
                     Version::Three => text += &ionosphere(sent, sv.system),
                     Version::Four => body += &ionosphere_record(records, sent, *sv, near),
+                }
+            }
+            let raw = |name: &str| common.and_then(|raws| raws.get(name)).copied();
+            for offset in offsets(&records, sv.system, &raw, near).into_iter().filter(|offset| once(offset.pair)) {
+                match version {
+                    Version::Three => text += &offset.line(sv.system),
+                    Version::Four => body += &offset.record(&records, *sv),
                 }
             }
         }
@@ -146,7 +155,7 @@ fn ionosphere_record(records: Records, sent: Coefficients, sv: Sv, near: Epoch) 
         Coefficients::NequickG(model) => [&model.coefficients[..], &[0.0]].concat(),
     };
     let epoch = format!("{year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}");
-    let mut text = format!("> ION {sv} {}\n    {epoch}", records.ionosphere);
+    let mut text = format!("> ION {sv} {}\n    {epoch}", records.common);
     // Three beside the time, then four a line.
     for (place, value) in values.iter().enumerate() {
         if place >= 3 && (place - 3).is_multiple_of(4) {
@@ -159,7 +168,7 @@ fn ionosphere_record(records: Records, sent: Coefficients, sv: Sv, near: Epoch) 
 }
 
 /// A number with an exponent of two digits.
-fn exponent(value: f64, digits: usize) -> String {
+pub(super) fn exponent(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$E}");
     let (mantissa, exponent) = text.split_once('E').unwrap_or((&text, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
@@ -324,13 +333,14 @@ mod tests {
     use crate::gnss::gps::cnav2::CNAV2;
     use crate::gnss::gps::l1c::L1C;
     use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::gps::lnav::LNAV;
+    use crate::gnss::gps::lnav::{LNAV, UtcData};
     use crate::gnss::klobuchar::Klobuchar;
     use crate::gnss::message::Common;
     use crate::gnss::navic::nav::SPS_NAV;
     use crate::gnss::navic::sps::L5;
     use crate::gnss::rinex;
     use crate::gnss::sbas::message::SBAS;
+    use crate::gnss::time::{TimePolynomial, WEEK_S};
 
     const NAVIC: &[u8] = include_bytes!("../../../scenarios/navic_2026-03-09_10h_12h.rnx");
     const QZSS: &[u8] = include_bytes!("../../../scenarios/qzss_2023-03-12_02h_04h.rnx");
@@ -504,11 +514,20 @@ mod tests {
             alpha: [1.0, -2.0, 8.0, -16.0].map(|steps: f64| steps * scale * libm::exp2(-27.0)),
             beta: [3.0, -1.0, 4.0, -8.0].map(|steps: f64| steps * scale * libm::exp2(14.0)),
         };
+        let toe = both.ephemerides.iter().find(|set| set.sv.system == System::Gps).unwrap().toe;
+        let ahead = |steps: f64, rate: f64, of_week_s: i64| TimePolynomial {
+            a0_s: steps * libm::exp2(-30.0),
+            a1_sps: rate * libm::exp2(-50.0),
+            reference: Epoch::new(toe.week() * WEEK_S + of_week_s, 0.0),
+        };
         let common = Common {
             klobuchar: Some(alpha_beta(1.0)),
             klobuchar_navic: Some(alpha_beta(2.0)),
             klobuchar_beidou: Some(alpha_beta(4.0)),
             nequick: Some([100.0, 0.25, 0.0625]),
+            // On steps of their fields: 36 times 4096 s, and 40 hours.
+            utc: UtcData { leap_s: 18, polynomial: Some(ahead(3.0, 64.0, 147_456)), event: None },
+            galileo: Some(ahead(-5.0, -16.0, 144_000)),
             ..Common::default()
         };
         let first = |system| {
@@ -547,6 +566,14 @@ mod tests {
                 (printed(common.klobuchar_beidou), common.nequick),
                 "{text}"
             );
+            let shortened = |offset: Option<TimePolynomial>| {
+                let shortened = |value, digits| exponent(value, digits).parse::<f64>().unwrap();
+                let [a0, a1] = if version == Version::Three { [10, 9] } else { [12, 12] };
+                let short = |o: TimePolynomial| (shortened(o.a0_s, a0), shortened(o.a1_sps, a1), o.reference);
+                offset.map(short)
+            };
+            assert_eq!(shortened(ours.utc), shortened(common.utc.polynomial), "{text}");
+            assert_eq!(shortened(ours.galileo), shortened(common.galileo), "{text}");
             let file = foreign(&text);
             let records = text.lines().filter(|line| line.get(1..3).is_some_and(|n| n.parse::<u8>().is_ok())).count();
             let satellites: BTreeSet<String> =
@@ -566,6 +593,17 @@ mod tests {
                 assert_eq!(models["IRNSS (IN) LNAV"], sent(common.klobuchar_navic), "{text}");
                 assert_eq!(models["BeiDou (CH) D1D2"], sent(common.klobuchar_beidou), "{text}");
                 assert_eq!(models["Galileo (EU) IFNV"], Some([100.0, 0.0625]), "{text}");
+                let offsets = file.nav_system_time_frames_iter().map(|(key, offset)| {
+                    let pair = offset.time_system.clone().unwrap_or_default();
+                    (format!("{pair} {} {}", key.msgtype, offset.utc.clone().unwrap_or_default()), offset.polynomial)
+                });
+                let offsets: BTreeMap<String, (f64, f64, f64)> = offsets.collect();
+                let named: Vec<&str> = offsets.keys().map(String::as_str).collect();
+                assert_eq!(
+                    named,
+                    ["GAGP IFNV ", "GAUT IFNV UTCGAL", "GPUT LNAV UTC(USNO)", "IRUT LNAV UTCIRN"],
+                    "{text}"
+                );
             } else {
                 assert_eq!(text.matches("IONOSPHERIC CORR").count(), 7, "{text}");
             }

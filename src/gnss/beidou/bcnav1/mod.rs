@@ -59,7 +59,8 @@ pub static B_CNAV1: Message = Message {
     adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
     rinex: Some(Records {
         set: |_| "CNV1",
-        ionosphere: "",
+        common: "CNVX",
+        fields: tables,
         lines: Some(|set, raw| record_lines(set, raw, [Some(set.isc_s[0]), None, Some(set.tgd_s), Some(set.tgd2_s)])),
     }),
 };

@@ -50,7 +50,8 @@ pub static B_CNAV2: Message = Message {
     adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
     rinex: Some(Records {
         set: |_| "CNV2",
-        ionosphere: "",
+        common: "CNVX",
+        fields: tables,
         lines: Some(|set, raw| record_lines(set, raw, [None, Some(set.isc_s[0]), Some(set.tgd_s), Some(set.tgd2_s)])),
     }),
 };

@@ -47,7 +47,7 @@ pub static B_CNAV3: Message = Message {
     adjustable: || bcnav::adjustable(SET),
     alert: None,
     adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
-    rinex: Some(Records { set: |_| "CNV3", ionosphere: "", lines: Some(record_lines_of_b2b) }),
+    rinex: Some(Records { set: |_| "CNV3", common: "CNVX", fields: tables, lines: Some(record_lines_of_b2b) }),
 };
 
 /// Sets of B-CNAV3: T_GD of B2b in the place of the first group delay; health of the satellite.

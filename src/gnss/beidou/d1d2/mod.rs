@@ -73,7 +73,12 @@ pub static D1_D2: Message = Message {
     adjustable,
     alert: None,
     adjust,
-    rinex: Some(Records { set: |sv| if sv.is_geostationary() { "D2" } else { "D1" }, ionosphere: "D1D2", lines: None }),
+    rinex: Some(Records {
+        set: |sv| if sv.is_geostationary() { "D2" } else { "D1" },
+        common: "D1D2",
+        fields: tables,
+        lines: None,
+    }),
 };
 
 /// Seconds of a unit, of a subframe of D1 and of a frame of D2.

@@ -64,7 +64,7 @@ pub static FNAV: Message = Message {
     adjustable,
     alert: None,
     adjust,
-    rinex: Some(Records { set: |_| "FNAV", ionosphere: "IFNV", lines: None }),
+    rinex: Some(Records { set: |_| "FNAV", common: "IFNV", fields: tables, lines: None }),
 };
 
 /// Sets of F/NAV: its clock and its delay are those of E1 and E5a (5.1.5, table 66).

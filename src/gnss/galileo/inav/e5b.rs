@@ -7,7 +7,7 @@
 use super::reader::InavReader;
 use super::{
     INAV, INAV_SETS, On, PAGE_S, Pages, SPARE, SUBFRAME_S, adjust, adjustable, alerted, form, ionosphere, of_integers,
-    of_issue, opened, quantised,
+    of_issue, opened, quantised, tables,
 };
 use crate::gnss::ionosphere::Model;
 use crate::gnss::message::{IonosphereForm, Message, Records};
@@ -37,7 +37,7 @@ pub static INAV_E5B: Message = Message {
     adjustable,
     alert: Some(alerted),
     adjust,
-    rinex: Some(Records { set: |_| "INAV", ionosphere: "IFNV", lines: None }),
+    rinex: Some(Records { set: |_| "INAV", common: "IFNV", fields: tables, lines: None }),
 };
 
 /// The last 24 of the reserved bits before the check are ones and zeros in turn.

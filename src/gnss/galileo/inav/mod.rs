@@ -63,7 +63,7 @@ pub static INAV: Message = Message {
     adjustable,
     alert: Some(alerted),
     adjust,
-    rinex: Some(Records { set: |_| "INAV", ionosphere: "IFNV", lines: None }),
+    rinex: Some(Records { set: |_| "INAV", common: "IFNV", fields: tables, lines: None }),
 };
 
 /// The set as I/NAV has it, of either message.

@@ -57,7 +57,7 @@ pub static GNAV: Message = Message {
     adjustable,
     alert: None,
     adjust,
-    rinex: Some(Records { set: |_| "FDMA", ionosphere: "", lines: None }),
+    rinex: Some(Records { set: |_| "FDMA", common: "FDMA", fields: Vec::new, lines: None }),
 };
 
 /// What clock and health of a set mean: the clock is that of G1, and G2 leaves the antenna later by a

@@ -60,7 +60,7 @@ pub static CNAV: Message = Message {
     adjustable,
     alert: None,
     adjust,
-    rinex: Some(Records { set: |_| "CNAV", ionosphere: "CNVX", lines: Some(record_lines) }),
+    rinex: Some(Records { set: |_| "CNAV", common: "CNVX", fields: tables, lines: Some(record_lines) }),
 };
 
 /// Sets of CNAV: a correction for each signal beside the group delay, and a bit of health for each carrier.

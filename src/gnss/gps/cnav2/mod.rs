@@ -58,7 +58,7 @@ pub static CNAV2: Message = Message {
     adjustable,
     alert: None,
     adjust,
-    rinex: Some(Records { set: |_| "CNV2", ionosphere: "CNVX", lines: Some(record_lines) }),
+    rinex: Some(Records { set: |_| "CNV2", common: "CNVX", fields: tables, lines: Some(record_lines) }),
 };
 
 /// Sets of CNAV-2: those of CNAV with corrections for L1C, and health of L1C alone.

@@ -76,7 +76,7 @@ pub static LNAV: Message = Message {
     adjustable,
     alert: None,
     adjust,
-    rinex: Some(Records { set: |_| "LNAV", ionosphere: "LNAV", lines: None }),
+    rinex: Some(Records { set: |_| "LNAV", common: "LNAV", fields: tables, lines: None }),
 };
 
 /// Sets of LNAV: one group delay, and six bits of health that speak of all signals together (IS-GPS-200N,

@@ -66,7 +66,7 @@ pub static SPS_NAV: Message = Message {
     adjustable,
     alert: None,
     adjust,
-    rinex: Some(Records { set: |_| "LNAV", ionosphere: "LNAV", lines: None }),
+    rinex: Some(Records { set: |_| "LNAV", common: "LNAV", fields: tables, lines: None }),
 };
 
 /// Continuous GPS week of week 0 of NavIC's time, which began on 1999-08-22.

@@ -51,7 +51,7 @@ pub static SBAS: Message = Message {
     adjustable,
     alert: None,
     adjust,
-    rinex: Some(Records { set: |_| "SBAS", ionosphere: "", lines: None }),
+    rinex: Some(Records { set: |_| "SBAS", common: "SBAS", fields: tables, lines: None }),
 };
 
 /// What clock and health of its sets mean: the clock is that of L1.
