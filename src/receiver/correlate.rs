@@ -2,9 +2,10 @@
 //!
 //! The replica's phases are exact integers: carrier in 2⁻⁶⁴ turns, code in 2⁻⁴⁷ chips. A replica sample is
 //! the chip at the sample's instant ([`Edge::Nearest`]) or the mean of the chips over the interval of one
-//! sample centred on that instant ([`Edge::Area`]). Sums come in three arithmetics: integers of 16 bits for
-//! samples of 8 ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin
-//! of both in `f64` ([`Replica::slow`]). A chip has the steps of its pulse ([`Wave`]); phases count chips,
+//! sample centred on that instant ([`Edge::Area`]). Sums come in four arithmetics: pieces of equal sign by
+//! running sums of samples of 8 bits (`pieces`), integers of 16 bits for such samples
+//! ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin of all in `f64`
+//! ([`Replica::slow`]). A chip has the steps of its pulse ([`Wave`]); phases count chips,
 //! kernels see steps. A replica is a weighted sum of patterns of signs, each of which takes a pass: steps of
 //! zero are the mean of +1 and −1, and a waveform of several layers has a pattern for each. Limits: area
 //! edges are exact up to one step a sample; beyond that they leave steps out. A period has fewer than 2¹⁶
@@ -19,11 +20,15 @@ use crate::gnss::signal::{Component, Layers, Shape};
 mod carrier;
 mod kernel;
 mod pattern;
+mod pieces;
 mod short;
 mod single;
+pub mod sums;
 pub mod wave;
 
 use pattern::Pattern;
+use pieces::Pieces;
+use sums::Samples;
 pub use wave::{Wave, fits, layers_refusal};
 
 /// How a replica's chips meet the samples.
@@ -42,6 +47,9 @@ pub enum Edge {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Arithmetic {
+    /// Running sums of samples of 8 bits, a difference for each change of the code's sign; [`Self::I16`] where the
+    /// carrier is far from zero or samples are few to a chip.
+    Sums,
     /// Integers of 16 bits where samples have 8, `f32` where they have more.
     I16,
     /// Floating point of 32 bits.
@@ -68,6 +76,8 @@ pub fn units_to_chips(units: i64) -> f64 {
 pub struct Replica {
     wave: Wave,
     patterns: Vec<Pattern>,
+    /// The same by pieces; none for nearest edges and where they cannot be counted.
+    pieces: Vec<Pieces>,
 }
 
 /// Steps from which on a period cannot be counted in 64 bits.
@@ -97,7 +107,8 @@ impl Replica {
     /// A replica of those steps; `None` below 64 of them and from 2¹⁶ on.
     pub fn of(wave: Wave, edge: Edge) -> Option<Self> {
         let patterns = Pattern::of(&wave, Complex64::ONE, edge)?;
-        Some(Self { wave, patterns })
+        let pieces = by_pieces(&[(&wave, Complex64::ONE)], edge);
+        Some(Self { wave, patterns, pieces })
     }
 
     /// A replica of a satellite's component in that waveform; `None` where the documents assign it no code,
@@ -107,12 +118,15 @@ impl Replica {
         if waveform == Layers::Strongest {
             return Self::of(wave, edge);
         }
-        let patterns = component.layers.iter().map(|layer| {
+        let layers = component.layers.iter().map(|layer| {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * layer.phase_cycles);
-            Pattern::of(&Wave::of(component, layer, number)?, layer.weight * Complex64::new(cos, -sin), edge)
+            Some((Wave::of(component, layer, number)?, layer.weight * Complex64::new(cos, -sin)))
         });
+        let layers = layers.collect::<Option<Vec<_>>>()?;
+        let patterns = layers.iter().map(|(wave, gain)| Pattern::of(wave, *gain, edge));
         let patterns = patterns.collect::<Option<Vec<_>>>()?.concat();
-        Some(Self { wave, patterns })
+        let pieces = by_pieces(&layers.iter().map(|(wave, gain)| (wave, *gain)).collect::<Vec<_>>(), edge);
+        Some(Self { wave, patterns, pieces })
     }
 
     /// Length of the period in code phase units.
@@ -189,19 +203,45 @@ impl Replica {
         }
     }
 
-    /// One of the three. [`Arithmetic::I16`] is for samples that [`Self::correlate_short`] can take.
-    pub fn correlate_in<const T: usize>(
+    /// One of the four. [`Arithmetic::Sums`] and [`Arithmetic::I16`] are for samples that [`Self::correlate_short`]
+    /// can take; without running sums the former is the latter.
+    pub fn correlate_in<'a, const T: usize>(
         &self,
         arithmetic: Arithmetic,
-        (i, q): (&[f32], &[f32]),
+        samples: impl Into<Samples<'a>>,
         nco: &Nco,
         taps: &[i64; T],
     ) -> [Complex64; T] {
+        let samples = samples.into();
+        let Samples { i, q, .. } = samples;
         match arithmetic {
+            Arithmetic::Sums => {
+                self.correlate_sums(samples, nco, taps).unwrap_or_else(|| self.correlate_short(i, q, nco, taps))
+            }
             Arithmetic::I16 => self.correlate_short(i, q, nco, taps),
             Arithmetic::F32 => self.correlate(i, q, nco, taps),
             Arithmetic::F64 => self.slow(i, q, nco, taps),
         }
+    }
+
+    /// The same by pieces, where running sums are there and the steps of carrier and code suit it.
+    fn correlate_sums<const T: usize>(&self, samples: Samples, nco: &Nco, taps: &[i64; T]) -> Option<[Complex64; T]> {
+        let sums = samples.sums?;
+        if !self.takes_sums(nco) {
+            return None;
+        }
+        let level = kernel::Level::best();
+        let mut totals = [Complex64::ZERO; T];
+        for pieces in &self.pieces {
+            let found = pieces.correlate(level, sums, nco, taps);
+            totals.iter_mut().zip(found).for_each(|(total, sum)| *total += pieces.gain() * sum);
+        }
+        Some(totals)
+    }
+
+    /// Whether [`Arithmetic::Sums`] uses running sums at these steps of carrier and code.
+    pub fn takes_sums(&self, nco: &Nco) -> bool {
+        !self.pieces.is_empty() && self.pieces.iter().all(|pieces| pieces.suit(nco))
     }
 
     /// The same in the obvious way: `f64`, one sample after the other.
@@ -216,6 +256,16 @@ impl Replica {
             pattern.gain.re * pattern.value(code.rem_euclid(self.period()) * each as i64, step * each as u64)
         };
         self.patterns.iter().map(one).sum()
+    }
+}
+
+/// The pieces of waves whose sum is a replica; none unless all can be counted.
+fn by_pieces(waves: &[(&Wave, Complex64)], edge: Edge) -> Vec<Pieces> {
+    match edge {
+        Edge::Area => {
+            waves.iter().map(|(wave, gain)| Pieces::of(wave, *gain)).collect::<Option<_>>().unwrap_or_default()
+        }
+        Edge::Nearest => Vec::new(),
     }
 }
 

@@ -9,6 +9,7 @@
 use std::ops::Range;
 
 use crate::gnss::samples::Format;
+use crate::receiver::correlate::sums::RunningSums;
 
 /// Consecutive samples; `q` is all zeros for a real recording.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +29,8 @@ pub struct Planes {
     pub i: Vec<f32>,
     /// Quadrature samples.
     pub q: Vec<f32>,
+    /// Room for their running sums.
+    pub sums: RunningSums,
 }
 
 /// Consecutive samples as they were packed.
@@ -59,6 +62,41 @@ impl Packed<'_> {
         let bytes = self.bytes.get(start * size..end * size).unwrap_or_default();
         self.format.unpack(bytes, &mut planes.i, &mut planes.q);
         Block { first: self.first + start as u64, i: &planes.i, q: &planes.q }
+    }
+}
+
+/// The last samples of a stream, packed, so that a block can be shown with those before it.
+#[derive(Debug, Default)]
+pub struct Lookback {
+    first: u64,
+    bytes: Vec<u8>,
+}
+
+impl Lookback {
+    /// The block behind all that was kept.
+    pub fn join<'a>(&'a mut self, block: &Packed<'a>) -> Packed<'a> {
+        let kept = (self.bytes.len() / block.format.bytes()) as u64;
+        if kept == 0 || self.first + kept != block.first {
+            self.first = block.first;
+            self.bytes.clear();
+            return *block;
+        }
+        self.bytes.extend_from_slice(block.bytes);
+        Packed { first: self.first, format: block.format, bytes: &self.bytes }
+    }
+
+    /// Keeps the samples from number `from` on, after [`Lookback::join`] of this block.
+    pub fn keep(&mut self, block: &Packed, from: u64) {
+        let size = block.format.bytes();
+        if self.bytes.is_empty() {
+            let start = (from.max(block.first) - block.first) as usize * size;
+            self.bytes.extend_from_slice(block.bytes.get(start..).unwrap_or_default());
+            self.first = from.max(block.first);
+            return;
+        }
+        let before = from.saturating_sub(self.first);
+        self.bytes.drain(..(before as usize * size).min(self.bytes.len()));
+        self.first += before;
     }
 }
 

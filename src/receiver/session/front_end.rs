@@ -13,6 +13,7 @@ use crate::gnss::record::{EventRow, LineRow};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::{Link, Signal};
 use crate::receiver::acquire::{self, AcquireError, Searcher};
+use crate::receiver::correlate::sums::Samples;
 use crate::receiver::decode::Decoder;
 use crate::receiver::interference::{Followed, Watch};
 use crate::receiver::lead::lead;
@@ -22,15 +23,15 @@ use crate::receiver::output::{Record, Sink};
 use crate::receiver::parting::{Estimate, Line, Offset};
 use crate::receiver::position::CodeNoise;
 use crate::receiver::settings::Settings;
-use crate::receiver::source::{Block, Packed, Planes};
+use crate::receiver::source::{Block, Lookback, Packed, Planes};
 use crate::receiver::track::loops::CodeShape;
-use crate::receiver::track::{Channel, ReplicaModel, Report};
+use crate::receiver::track::{Channel, ReplicaModel, Report, Shown};
 
-/// Channels go over a block in parts of so many samples at least: 512 KiB in planar `f32`, a core's own cache
-/// …
-const PART_SAMPLES: usize = 1 << 16;
-/// … and so long at least, as a code period that a part's end cuts is copied.
-const PART_S: f64 = 0.01;
+/// Channels go over a block in parts of so many samples at least: 512 KiB in planar `f32` with running sums, a
+/// core's own cache …
+const PART_SAMPLES: usize = 1 << 15;
+/// … and of so many of the longest code period, as one that a part's end cuts is unpacked again.
+const PART_PERIODS: f64 = 4.0;
 
 /// One channel and its decoder.
 pub(super) struct Track {
@@ -105,6 +106,8 @@ pub(super) struct FrontEnd {
     pub tracks: Vec<Track>,
     /// Of each share of the tracks.
     planes: Vec<Planes>,
+    /// Samples of code periods that the last block's end has cut.
+    lookback: Lookback,
     pub lost: BTreeMap<Link, u64>,
     pub refused: BTreeMap<Link, u64>,
     pub offset: Offset,
@@ -152,6 +155,7 @@ impl FrontEnd {
             window: None,
             tracks: Vec::new(),
             planes: Vec::new(),
+            lookback: Lookback::default(),
             lost: BTreeMap::new(),
             refused: BTreeMap::new(),
             offset: Offset::default(),
@@ -200,17 +204,18 @@ impl FrontEnd {
         let ticks: Vec<u64> = ticks.iter().map(|tick| tick.own).collect();
         let share = self.tracks.len().div_ceil(rayon::current_num_threads()).max(1);
         self.planes.resize_with(self.tracks.len().div_ceil(share), Planes::default);
-        let part = PART_SAMPLES.max(self.samples(PART_S) as usize);
+        let longest_s = self.tracks.iter().map(|track| track.channel.period_s()).fold(0.0, f64::max);
+        let part = PART_SAMPLES.max(self.samples(PART_PERIODS * longest_s) as usize);
+        let joined = self.lookback.join(block);
         self.tracks.par_chunks_mut(share).zip(&mut self.planes).for_each(|(tracks, planes)| {
             tracks.iter_mut().for_each(|track| clear(&mut track.report));
             for start in (0..block.samples()).step_by(part) {
-                let samples = block.unpack(start..start + part, planes);
-                let ticks = within(&ticks, samples.first, samples.first + samples.i.len() as u64);
-                for track in tracks.iter_mut() {
-                    track.channel.advance(&samples, ticks, &mut track.report);
-                }
+                let (from, to) = (block.first + start as u64, block.end().min(block.first + (start + part) as u64));
+                follow(tracks, (&joined, planes), (from, to), within(&ticks, from, to));
             }
         });
+        let needed = self.tracks.iter().filter_map(|track| track.channel.needs()).min();
+        self.lookback.keep(block, needed.unwrap_or(block.end()));
     }
 
     /// Writes rows and events of all channels.
@@ -266,6 +271,21 @@ impl FrontEnd {
             }
         }
         Ok(())
+    }
+}
+
+/// Takes channels through the samples `from` to `to` of a stream, which begins with those that they need again.
+fn follow(tracks: &mut [Track], (joined, planes): (&Packed, &mut Planes), (from, to): (u64, u64), ticks: &[u64]) {
+    let needed = tracks.iter().filter_map(|track| track.channel.needs()).min();
+    let first = needed.unwrap_or(from).clamp(joined.first, from);
+    let range = (first - joined.first) as usize..(to - joined.first) as usize;
+    joined.unpack(range, planes);
+    let Planes { i, q, sums } = planes;
+    let summed = tracks.iter().any(|track| track.channel.takes_sums());
+    let sums = if summed { sums.of(i, q) } else { None };
+    let shown = Shown { first, samples: Samples { i, q, sums }, from };
+    for track in tracks.iter_mut() {
+        track.channel.follow(&shown, ticks, &mut track.report);
     }
 }
 

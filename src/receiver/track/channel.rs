@@ -5,7 +5,7 @@
 //! collected while the carrier's oscillator runs free; frequency, phase and the probable edges follow from it
 //! ([`super::pull_in`]), integrations keep to these edges at once, and symbols are given out when the edges
 //! are beyond doubt. Every correlation spans one code period of the replica, from the first sample of the
-//! period on; samples of an unfinished period are kept, so that results do not depend on blocks.
+//! period on; samples of an unfinished period are shown again or kept, so that results do not depend on blocks.
 
 use num_complex::Complex64;
 
@@ -25,6 +25,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Component, Link, Signal};
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
+use crate::receiver::correlate::sums::{RunningSums, Samples};
 use crate::receiver::correlate::{Arithmetic, Replica, chips_to_units, units_to_chips};
 use crate::receiver::lead::{followed_db, lead};
 use crate::receiver::parting::Phases;
@@ -52,6 +53,34 @@ const SETTLED: f64 = 1.0;
 /// Signals that the search found weaker than this are pulled in by a batch of prompts: T·C/N0 is then below
 /// ten, and a frequency loop's discriminator, ±250 Hz wide, scatters by more than 40 Hz.
 const WEAK_DBHZ: f64 = 40.0;
+
+/// What a channel is shown of the samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown<'a> {
+    /// Number of the first sample.
+    pub first: u64,
+    /// All that are shown, those that were shown before among them.
+    pub samples: Samples<'a>,
+    /// Number of the first sample that was not shown before.
+    pub from: u64,
+}
+
+impl Shown<'_> {
+    /// Number of the sample after the last one.
+    fn end(&self) -> u64 {
+        self.first + self.samples.i.len().min(self.samples.q.len()) as u64
+    }
+}
+
+/// Samples of an unfinished code period, and room for their running sums.
+#[derive(Clone, Debug, Default)]
+struct Kept {
+    first: u64,
+    i: Vec<f32>,
+    q: Vec<f32>,
+    sums: RunningSums,
+}
+
 /// How far a channel is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
@@ -122,7 +151,7 @@ pub struct Channel {
     carrier: i128,
     code_step: i64,
     carrier_step: i128,
-    carry: (Vec<f32>, Vec<f32>),
+    kept: Kept,
     whole: bool,
 
     loops: Loops,
@@ -216,9 +245,9 @@ impl Channel {
             lost: replica.is_none(),
             replica,
             arithmetic: match (settings.arithmetic, metadata.format) {
-                (Arithmetic::I16, Format::Ci8 | Format::Cu8 | Format::Ri8) => Arithmetic::I16,
-                (Arithmetic::I16 | Arithmetic::F32, _) => Arithmetic::F32,
                 (Arithmetic::F64, _) => Arithmetic::F64,
+                (arithmetic, Format::Ci8 | Format::Cu8 | Format::Ri8) => arithmetic,
+                (_, Format::Ci16Le | Format::Ri16Le | Format::Cf32Le) => Arithmetic::F32,
             },
             replica_power: share * model.map_or(1.0, |model| model.power),
             taps: [chips_to_units(half), 0, -chips_to_units(half)],
@@ -230,7 +259,7 @@ impl Channel {
             carrier: 0,
             code_step: 0,
             carrier_step: 0,
-            carry: (Vec::new(), Vec::new()),
+            kept: Kept::default(),
             whole: false,
             loops,
             wide: true,
@@ -328,18 +357,53 @@ impl Channel {
     }
 
     /// Follows the signal through the next block. `ticks` are samples inside the block, ascending, at which
-    /// to measure.
+    /// to measure. Samples of a code period that the block cuts are kept.
     pub fn advance(&mut self, block: &Block, ticks: &[u64], report: &mut Report) {
+        let mut kept = std::mem::take(&mut self.kept);
+        if kept.i.is_empty() {
+            kept.first = block.first;
+        }
+        kept.i.extend_from_slice(block.i);
+        kept.q.extend_from_slice(block.q);
+        let sums = if self.takes_sums() { kept.sums.of(&kept.i, &kept.q) } else { None };
+        let samples = Samples { i: &kept.i, q: &kept.q, sums };
+        self.follow(&Shown { first: kept.first, samples, from: block.first }, ticks, report);
+        let needed = self.needs().unwrap_or(u64::MAX).saturating_sub(kept.first);
+        let done = usize::try_from(needed).unwrap_or(usize::MAX).min(kept.i.len());
+        kept.i.drain(..done);
+        kept.q.drain(..done);
+        kept.first += done as u64;
+        self.kept = kept;
+    }
+
+    /// Length of a code period.
+    pub fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    /// The first sample of the running code period: what is shown next has to begin there or before. `None`
+    /// while the channel has seen nothing, and when it is lost.
+    pub fn needs(&self) -> Option<u64> {
+        self.start.filter(|_| !self.lost).map(|_| self.first)
+    }
+
+    /// Whether running sums of the samples are of use.
+    pub fn takes_sums(&self) -> bool {
+        self.arithmetic == Arithmetic::Sums
+            && self.replica.as_ref().is_some_and(|replica| replica.takes_sums(&self.oscillators()))
+    }
+
+    /// [`Channel::advance`] on samples that the caller keeps as far as the channel [`Channel::needs`] them.
+    pub fn follow(&mut self, shown: &Shown, ticks: &[u64], report: &mut Report) {
         if self.lost {
             return;
         }
         let Some(mut replica) = self.replica.take() else { return };
         if self.start.is_none() {
-            self.begin(block.first, &replica);
+            self.begin(shown.from, &replica);
         }
         let mut ticks = ticks.iter().copied().peekable();
-        let end = block.first + block.i.len().min(block.q.len()) as u64;
-        let mut taken = block.first;
+        let end = shown.end();
         while !self.lost {
             if let Some(segment) = self.next_segment() {
                 replica = segment;
@@ -348,16 +412,10 @@ impl Channel {
             while let Some(tick) = ticks.next_if(|&tick| tick < next.min(end)) {
                 self.measure(tick, &replica, report);
             }
-            if next > end {
-                break;
-            }
-            let range = (taken - block.first) as usize..(next - block.first) as usize;
-            self.correlate(&replica, &block.i[range.clone()], &block.q[range], next, report);
-            taken = next;
+            let Some(from) = self.first.checked_sub(shown.first).filter(|_| next <= end) else { break };
+            let period = shown.samples.part(from as usize, (next - shown.first) as usize);
+            self.correlate(&replica, period, next, report);
         }
-        let rest = (taken.min(end) - block.first) as usize..(end - block.first) as usize;
-        self.carry.0.extend_from_slice(&block.i[rest.clone()]);
-        self.carry.1.extend_from_slice(&block.q[rest]);
         self.replica = Some(replica);
     }
 

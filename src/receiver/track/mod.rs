@@ -29,7 +29,7 @@ mod sync;
 #[cfg(test)]
 mod tests;
 
-pub use channel::{Channel, Glance, pilot_group};
+pub use channel::{Channel, Glance, Shown, pilot_group};
 pub use model::ReplicaModel;
 pub use settings::{CodeDiscriminator, LoopMargin, TrackingSettings, TrackingSettingsError};
 

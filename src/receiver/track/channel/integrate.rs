@@ -4,7 +4,7 @@
 use num_complex::Complex64;
 
 use super::{Channel, Stage};
-use crate::gnss::time::tone_turns;
+use crate::receiver::correlate::sums::Samples;
 use crate::receiver::correlate::{self, Nco, Replica, TURN, chips_to_units};
 use crate::receiver::track::side::SidePeaks;
 use crate::receiver::track::{Report, Symbol};
@@ -28,21 +28,10 @@ struct Correlations {
 impl Channel {
     /// Correlates the running period, whose last samples these are, and moves on to the next, which begins at
     /// `next`.
-    pub(super) fn correlate(&mut self, replica: &Replica, i: &[f32], q: &[f32], next: u64, report: &mut Report) {
-        let nco = Nco {
-            carrier: tone_turns(self.if_hz, self.rate, self.first).wrapping_add(self.carrier as u64),
-            carrier_step: self.if_step.wrapping_add(self.carrier_step as u64),
-            code: self.code,
-            code_step: self.code_step as u64,
-        };
-        let mut carry = std::mem::take(&mut self.carry);
-        let carried = !carry.0.is_empty();
-        if carried {
-            carry.0.extend_from_slice(i);
-            carry.1.extend_from_slice(q);
-        }
-        let (i, q) = if carried { (&carry.0[..], &carry.1[..]) } else { (i, q) };
-        let Correlations { sums, noise, sides } = self.correlations(replica, (i, q), &nco);
+    pub(super) fn correlate(&mut self, replica: &Replica, samples: Samples, next: u64, report: &mut Report) {
+        let nco = self.oscillators();
+        let (i, q) = (samples.i, samples.q);
+        let Correlations { sums, noise, sides } = self.correlations(replica, samples, &nco);
         let read = self.whole && self.confirmed && !self.held && self.overlay_phase.is_some();
         if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
             let power = correlate::power(i, q) / i.len().max(1) as f64;
@@ -50,19 +39,16 @@ impl Channel {
                 Some(self.power.map_or(power, |mean| mean + (power - mean) * POWER_EVERY as f64 / POWER_PERIODS));
         }
         let mean = self.power.unwrap_or_default();
-        let samples = next - self.first;
+        let count = next - self.first;
         // Noise of a correlation, per component: half the samples' power (real samples too) times the
         // replica's energy.
-        let deviation = (0.5 * mean * samples as f64 * self.replica_power).sqrt();
+        let deviation = (0.5 * mean * count as f64 * self.replica_power).sqrt();
         let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
         if read && let Some(data) = &mut self.data {
             let phase = self.overlay_phase.unwrap_or_default();
-            report.symbols.extend(data.read((i, q), self.arithmetic, &nco, (self.period, phase, next), scale));
+            report.symbols.extend(data.read(samples, self.arithmetic, &nco, (self.period, phase, next), scale));
         }
-        let found = self.seek_segment((i, q), &nco, scale);
-        carry.0.clear();
-        carry.1.clear();
-        self.carry = carry;
+        let found = self.seek_segment(samples, &nco, scale);
         self.pass(next);
         self.code -= replica.period();
         let finished = self.period;
@@ -89,7 +75,7 @@ impl Channel {
     }
 
     /// All taps of the running period in one pass.
-    fn correlations(&self, replica: &Replica, samples: (&[f32], &[f32]), nco: &Nco) -> Correlations {
+    fn correlations(&self, replica: &Replica, samples: Samples, nco: &Nco) -> Correlations {
         let arithmetic = self.arithmetic;
         let [e, p, l] = self.taps;
         let sides = self.side_peaks.as_ref().filter(|_| self.whole && !self.held).map(SidePeaks::taps);

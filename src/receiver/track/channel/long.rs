@@ -2,6 +2,7 @@
 
 use super::pilot::Data;
 use super::{Channel, Stage};
+use crate::receiver::correlate::sums::Samples;
 use crate::receiver::correlate::{Nco, Replica};
 use crate::receiver::lead::lead;
 use crate::receiver::track::long::LongCode;
@@ -23,14 +24,14 @@ impl Channel {
 
     /// Correlates the running period with all segments of the long code, where the carrier is locked to
     /// symbols; gives the long code's phase once it is beyond doubt.
-    pub(super) fn seek_segment(&mut self, (i, q): (&[f32], &[f32]), nco: &Nco, scale: f64) -> Option<OverlayPhase> {
+    pub(super) fn seek_segment(&mut self, samples: Samples, nco: &Nco, scale: f64) -> Option<OverlayPhase> {
         let ready = self.whole && self.confirmed && !self.held && !self.moved && self.overlay_phase.is_none();
         if !ready || !matches!(self.stage, Stage::Tracking(_)) || !self.lock.is_locked() {
             return None;
         }
         let arithmetic = self.arithmetic;
         let prompt = |replica: &Replica| {
-            let [sum] = replica.correlate_in(arithmetic, (i, q), nco, &[0]);
+            let [sum] = replica.correlate_in(arithmetic, samples, nco, &[0]);
             scale * sum.re
         };
         self.long.as_mut()?.add(self.period, prompt)

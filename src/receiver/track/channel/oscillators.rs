@@ -1,7 +1,8 @@
 //! A channel's oscillators: where they begin, what they run at, and how many code periods an update has.
 
 use super::Channel;
-use crate::receiver::correlate::{Replica, TURN, chips_to_units};
+use crate::gnss::time::tone_turns;
+use crate::receiver::correlate::{Nco, Replica, TURN, chips_to_units};
 
 /// Places of the code at which the noise is measured, in turn.
 const NOISE_PLACES: usize = 16;
@@ -15,6 +16,16 @@ impl Channel {
         (self.start, self.first, self.stage_since, self.update_since) = (Some(first), first, first, first);
         self.pull_in_since = first;
         self.noise_taps = replica.quiet_taps(NOISE_PLACES);
+    }
+
+    /// The oscillators at the running period's first sample.
+    pub(super) fn oscillators(&self) -> Nco {
+        Nco {
+            carrier: tone_turns(self.if_hz, self.rate, self.first).wrapping_add(self.carrier as u64),
+            carrier_step: self.if_step.wrapping_add(self.carrier_step as u64),
+            code: self.code,
+            code_step: self.code_step as u64,
+        }
     }
 
     /// Samples from the running period's first to the next one's.

@@ -8,6 +8,7 @@ use super::supervise::pilot_group;
 use super::{Channel, Symbol};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Component, Signal};
+use crate::receiver::correlate::sums::Samples;
 use crate::receiver::correlate::{Arithmetic, Nco, Replica, TURN, Wave};
 use crate::receiver::lead::beside;
 use crate::receiver::track::TrackingSettings;
@@ -70,7 +71,7 @@ impl Data {
     /// ends with it; `scale` brings the pilot's noise to unit variance a component.
     pub(super) fn read(
         &mut self,
-        samples: (&[f32], &[f32]),
+        samples: Samples,
         arithmetic: Arithmetic,
         nco: &Nco,
         (number, phase, end): (u64, OverlayPhase, u64),

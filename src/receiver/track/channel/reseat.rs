@@ -204,8 +204,6 @@ impl Channel {
         let code = self.code + chips_to_units(chips);
         self.code = code.rem_euclid(length);
         self.period = (i128::from(self.period) + i128::from(code.div_euclid(length))).max(0) as u64;
-        self.carry.0.clear();
-        self.carry.1.clear();
         (self.whole, self.moved) = (false, true);
         self.update_since = now;
         (self.sums, self.summed) = ([Complex64::ZERO; 3], 0);

@@ -1,0 +1,347 @@
+//! Groups of pieces eight at a time with AVX2, and running sums; elsewhere [`super::lanes`].
+//!
+//! Sums lie as (in-phase, quadrature) pairs, four to a register. Phasors and places of a chunk are made first:
+//! so every loop has few values at hand, and runs that do not wait for each other. No operation is fused, so the
+//! bits are those of the plain twin.
+
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64 as x86;
+
+use super::super::kernel::Level;
+use super::lanes::{self, Chunk, Products};
+#[cfg(target_arch = "x86_64")]
+use super::lanes::{PLACE_BITS, PRODUCT_BITS, SINE, TURNS};
+#[cfg(target_arch = "x86_64")]
+use super::{GROUP, GROUPS};
+
+/// Adds the products of a chunk. Groups `inner` go by windows: early, prompt and late a sample apart at most, with
+/// two samples on either side of every place; `level` must be one that this processor has.
+pub(super) fn add<const T: usize>(level: Level, chunk: &Chunk<T>, inner: [usize; 2], products: &mut Products<T>) {
+    let ([from, to], all) = (inner, chunk.starts.len());
+    match level {
+        Level::Baseline => {
+            lanes::anywhere(chunk, (0, from), products);
+            lanes::window(chunk, (from, to), products);
+            lanes::anywhere(chunk, (to, all), products);
+        }
+        // SAFETY: `Level` values beyond the baseline come from `best` (and `all` in tests), which detected AVX2.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 => unsafe {
+            groups::<T, false>(chunk, (0, from), products);
+            groups::<T, true>(chunk, (from, to), products);
+            groups::<T, false>(chunk, (to, all), products);
+        },
+    }
+}
+
+/// Fills `entries`, one more than samples, with the sums of the samples before each: halves are summed as
+/// integers.
+pub(in super::super) fn running_sums(level: Level, i: &[f32], q: &[f32], entries: &mut [[f32; 2]]) {
+    let done = match level {
+        Level::Baseline => Done { samples: 0, halves: [0; 2] },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 => unsafe { running_sums_avx2(i, q, entries) },
+    };
+    let mut halves = done.halves;
+    if let Some(first) = entries.first_mut() {
+        *first = [0.0; 2];
+    }
+    let rest = i.iter().zip(q).zip(entries.iter_mut().skip(1)).skip(done.samples);
+    for ((i, q), entry) in rest {
+        halves = [halves[0].wrapping_add((2.0 * i) as i32), halves[1].wrapping_add((2.0 * q) as i32)];
+        *entry = halves.map(|sum| 0.5 * sum as f32);
+    }
+}
+
+/// How far sums are, and what they are there.
+struct Done {
+    samples: usize,
+    halves: [i32; 2],
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn running_sums_avx2(i: &[f32], q: &[f32], entries: &mut [[f32; 2]]) -> Done {
+    let (fours_i, fours_q) = (i.as_chunks::<4>().0, q.as_chunks::<4>().0);
+    let fours = entries.get_mut(1..).unwrap_or_default().as_chunks_mut::<4>().0;
+    let half = x86::_mm256_set1_ps(0.5);
+    let last = x86::_mm256_setr_epi32(6, 7, 6, 7, 6, 7, 6, 7);
+    let none = x86::_mm256_setzero_si256();
+    let mut before = none;
+    let mut samples = 0;
+    for ((i, q), out) in fours_i.iter().zip(fours_q).zip(fours) {
+        // SAFETY: four values are at either, and any alignment will do.
+        let (i, q) = unsafe { (x86::_mm_loadu_ps(i.as_ptr()), x86::_mm_loadu_ps(q.as_ptr())) };
+        let pairs = x86::_mm256_insertf128_ps::<1>(
+            x86::_mm256_castps128_ps256(x86::_mm_unpacklo_ps(i, q)),
+            x86::_mm_unpackhi_ps(i, q),
+        );
+        let one = x86::_mm256_cvttps_epi32(x86::_mm256_add_ps(pairs, pairs));
+        let two = x86::_mm256_add_epi32(one, x86::_mm256_slli_si256::<8>(one));
+        // The upper half gets what the lower one adds up to.
+        let lower = x86::_mm256_blend_epi32::<0x0f>(x86::_mm256_permute4x64_epi64::<0x50>(two), none);
+        let four = x86::_mm256_add_epi32(two, lower);
+        let sums = x86::_mm256_mul_ps(x86::_mm256_cvtepi32_ps(x86::_mm256_add_epi32(four, before)), half);
+        before = x86::_mm256_add_epi32(before, x86::_mm256_permutevar8x32_epi32(four, last));
+        // SAFETY: there is room for four pairs, and any alignment will do.
+        unsafe { x86::_mm256_storeu_ps(out.as_mut_ptr().cast(), sums) };
+        samples += 4;
+    }
+    let pair = x86::_mm256_castsi256_si128(before);
+    Done { samples, halves: [x86::_mm_extract_epi32::<0>(pair), x86::_mm_extract_epi32::<1>(pair)] }
+}
+
+/// What is made of a group before its samples are looked at.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+#[repr(C, align(32))]
+struct Made {
+    cos: [f32; GROUP],
+    sin: [f32; GROUP],
+    places: [u32; GROUP],
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn groups<const T: usize, const WINDOW: bool>(
+    chunk: &Chunk<T>,
+    (from, to): (usize, usize),
+    products: &mut Products<T>,
+) {
+    let count = to.saturating_sub(from);
+    if count == 0 {
+        return;
+    }
+    let mut made = [const { std::mem::MaybeUninit::<Made>::uninit() }; GROUPS];
+    let made = make(chunk, (from, to), &mut products.last, &mut made);
+    let (mut cos, mut sin) = ([x86::_mm256_setzero_ps(); T], [x86::_mm256_setzero_ps(); T]);
+    if WINDOW {
+        windows(chunk, made, &mut cos, &mut sin);
+    } else {
+        anywhere(chunk, made, &mut cos, &mut sin);
+    }
+    for t in 0..T {
+        for (sums, own) in [(&mut products.cos[t], cos[t]), (&mut products.sin[t], sin[t])] {
+            // SAFETY: eight values are there, and any alignment will do.
+            unsafe {
+                let sum = x86::_mm256_add_ps(x86::_mm256_loadu_ps(sums.as_ptr()), own);
+                x86::_mm256_storeu_ps(sums.as_mut_ptr(), sum);
+            }
+        }
+    }
+}
+
+/// Places of the groups' starts, and by how much the replica times the phasor changes there.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn make<'a, const T: usize>(
+    chunk: &Chunk<T>,
+    (from, to): (usize, usize),
+    last: &mut [f32; 2],
+    room: &'a mut [std::mem::MaybeUninit<Made>; GROUPS],
+) -> &'a [Made] {
+    let (phase, phase_a_step) =
+        (x86::_mm256_set1_epi32(chunk.phase as i32), x86::_mm256_set1_epi32(chunk.phase_a_step as i32));
+    let (place, samples_a_step) =
+        (x86::_mm256_set1_epi64x(chunk.place), x86::_mm256_set1_epi64x(i64::from(chunk.samples_a_step)));
+    let along = x86::_mm256_setr_epi32(7, 0, 1, 2, 3, 4, 5, 6);
+    let mut before = last.map(|part| x86::_mm256_set1_ps(part));
+    let groups = chunk.starts[from..to].iter().zip(&chunk.middles[from..to]).zip(&chunk.levels[from..to]);
+    let mut filled = 0;
+    for (((starts, middles), levels), made) in groups.zip(room.iter_mut()) {
+        // SAFETY: eight values are at each, and any alignment will do.
+        let (starts, middles, levels) = unsafe {
+            (
+                x86::_mm256_loadu_si256(starts.as_ptr().cast()),
+                x86::_mm256_loadu_si256(middles.as_ptr().cast()),
+                x86::_mm256_loadu_ps(levels.as_ptr()),
+            )
+        };
+        let turned = x86::_mm256_add_epi32(phase, x86::_mm256_mullo_epi32(middles, phase_a_step));
+        let now = phasors(turned).map(|part| x86::_mm256_mul_ps(part, levels));
+        let moved = now.map(|part| {
+            x86::_mm256_castsi256_ps(x86::_mm256_permutevar8x32_epi32(x86::_mm256_castps_si256(part), along))
+        });
+        let changes = [0, 1].map(|c| x86::_mm256_sub_ps(x86::_mm256_blend_ps::<1>(moved[c], before[c]), now[c]));
+        before = moved;
+        let even = x86::_mm256_add_epi64(x86::_mm256_mul_epu32(starts, samples_a_step), place);
+        let odd = x86::_mm256_srli_epi64::<32>(starts);
+        let odd = x86::_mm256_add_epi64(x86::_mm256_mul_epu32(odd, samples_a_step), place);
+        const DOWN: i32 = (PRODUCT_BITS - PLACE_BITS) as i32;
+        let places = x86::_mm256_blend_epi32::<0xaa>(
+            x86::_mm256_srli_epi64::<DOWN>(even),
+            x86::_mm256_slli_epi64::<{ 32 - DOWN }>(odd),
+        );
+        let made = made.as_mut_ptr();
+        // SAFETY: `made` points at room for three times eight values.
+        unsafe {
+            x86::_mm256_storeu_ps((&raw mut (*made).cos).cast(), changes[0]);
+            x86::_mm256_storeu_ps((&raw mut (*made).sin).cast(), changes[1]);
+            x86::_mm256_storeu_si256((&raw mut (*made).places).cast(), places);
+        }
+        filled += 1;
+    }
+    *last = before.map(|part| x86::_mm256_cvtss_f32(part));
+    // SAFETY: so many were filled just now.
+    unsafe { std::slice::from_raw_parts(room.as_ptr().cast(), filled) }
+}
+
+/// [`lanes::phasor`] of eight phases.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn phasors(phase: x86::__m256i) -> [x86::__m256; 2] {
+    let (sign, quarter) = (x86::_mm256_set1_ps(-0.0), x86::_mm256_set1_ps(0.25));
+    let turns = x86::_mm256_mul_ps(x86::_mm256_cvtepi32_ps(phase), x86::_mm256_set1_ps(TURNS));
+    let rising = x86::_mm256_sub_ps(quarter, x86::_mm256_andnot_ps(sign, turns));
+    let folded = x86::_mm256_sub_ps(quarter, x86::_mm256_andnot_ps(sign, rising));
+    let folded = x86::_mm256_or_ps(folded, x86::_mm256_and_ps(sign, turns));
+    [sines(rising), sines(folded)]
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn sines(y: x86::__m256) -> x86::__m256 {
+    let z = x86::_mm256_mul_ps(y, y);
+    let [a, b, c, d] = SINE.map(|factor| x86::_mm256_set1_ps(factor));
+    let sum = x86::_mm256_add_ps(c, x86::_mm256_mul_ps(z, d));
+    let sum = x86::_mm256_add_ps(b, x86::_mm256_mul_ps(z, sum));
+    let sum = x86::_mm256_add_ps(a, x86::_mm256_mul_ps(z, sum));
+    x86::_mm256_mul_ps(y, sum)
+}
+
+/// What lies behind the points of eight places.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn fractions(places: x86::__m256i) -> x86::__m256 {
+    let bits = x86::_mm256_srli_epi32::<{ (16 + PLACE_BITS - 23) as i32 }>(x86::_mm256_slli_epi32::<16>(places));
+    let with_one = x86::_mm256_or_si256(bits, x86::_mm256_set1_epi32(0x3f80_0000));
+    x86::_mm256_sub_ps(x86::_mm256_castsi256_ps(with_one), x86::_mm256_set1_ps(1.0))
+}
+
+/// Half a group, each value twice.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn twice(half: usize, values: x86::__m256) -> x86::__m256 {
+    if half == 0 { x86::_mm256_unpacklo_ps(values, values) } else { x86::_mm256_unpackhi_ps(values, values) }
+}
+
+/// The entries of half a group's places, and those after them.
+///
+/// # Safety
+/// `entries` and two pairs from each place on must be within one allocation.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+unsafe fn two(entries: *const [f32; 2], places: &[u32; GROUP], half: usize) -> [x86::__m256; 2] {
+    let at = |piece: usize| {
+        // SAFETY: a place that is there. Volatile, or the compiler would take it from a register in two steps on
+        // one port.
+        let place = unsafe { std::ptr::read_volatile(&raw const places[piece]) } >> PLACE_BITS;
+        // SAFETY: the caller's.
+        unsafe { x86::_mm_loadu_pd(entries.wrapping_add(place as usize).cast()) }
+    };
+    let pair =
+        |piece: usize| x86::_mm256_insertf128_pd::<1>(x86::_mm256_castpd128_pd256(at(piece)), at(piece + GROUP / 2));
+    let (a, b) = (pair(2 * half), pair(2 * half + 1));
+    [x86::_mm256_castpd_ps(x86::_mm256_unpacklo_pd(a, b)), x86::_mm256_castpd_ps(x86::_mm256_unpackhi_pd(a, b))]
+}
+
+/// The sum before the first sample, four times.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn bases<const T: usize>(chunk: &Chunk<T>) -> x86::__m256 {
+    let [i, q] = chunk.base;
+    x86::_mm256_setr_ps(i, q, i, q, i, q, i, q)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn anywhere<const T: usize>(chunk: &Chunk<T>, made: &[Made], cos: &mut [x86::__m256; T], sin: &mut [x86::__m256; T]) {
+    let base = bases(chunk);
+    let entries = chunk.sums.entries().as_ptr().wrapping_offset(chunk.origin);
+    let [first, last] = chunk.bounds.map(|bound| x86::_mm256_set1_epi32(bound));
+    for t in 0..T {
+        let tap = x86::_mm256_set1_epi32(chunk.taps[t]);
+        let (mut by_cos, mut by_sin) = (cos[t], sin[t]);
+        for made in made {
+            // SAFETY: eight values are at each, and any alignment will do.
+            let (places, change_cos, change_sin) = unsafe {
+                (
+                    x86::_mm256_loadu_si256(made.places.as_ptr().cast()),
+                    x86::_mm256_loadu_ps(made.cos.as_ptr()),
+                    x86::_mm256_loadu_ps(made.sin.as_ptr()),
+                )
+            };
+            let places = x86::_mm256_add_epi32(places, tap);
+            let places = x86::_mm256_min_epi32(x86::_mm256_max_epi32(places, first), last);
+            let mut held = [0_u32; GROUP];
+            // SAFETY: there is room for eight values.
+            unsafe { x86::_mm256_storeu_si256(held.as_mut_ptr().cast(), places) };
+            let f = fractions(places);
+            for half in 0..2 {
+                // SAFETY: places are held between the first entry and that after the last sample, beyond which
+                // there is one more.
+                let [a, b] = unsafe { two(entries, &held, half) };
+                let part = x86::_mm256_mul_ps(twice(half, f), x86::_mm256_sub_ps(b, a));
+                let value = x86::_mm256_add_ps(x86::_mm256_sub_ps(a, base), part);
+                by_cos = x86::_mm256_add_ps(by_cos, x86::_mm256_mul_ps(twice(half, change_cos), value));
+                by_sin = x86::_mm256_add_ps(by_sin, x86::_mm256_mul_ps(twice(half, change_sin), value));
+            }
+        }
+        (cos[t], sin[t]) = (by_cos, by_sin);
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn windows<const T: usize>(chunk: &Chunk<T>, made: &[Made], cos: &mut [x86::__m256; T], sin: &mut [x86::__m256; T]) {
+    let base = bases(chunk);
+    let entries = chunk.sums.entries().as_ptr().wrapping_offset(chunk.origin - 1);
+    let (one, none, apart) = (x86::_mm256_set1_ps(1.0), x86::_mm256_setzero_ps(), x86::_mm256_set1_ps(chunk.apart));
+    for made in made {
+        // SAFETY: eight values are at each, and any alignment will do.
+        let (places, change_cos, change_sin) = unsafe {
+            (
+                x86::_mm256_loadu_si256(made.places.as_ptr().cast()),
+                x86::_mm256_loadu_ps(made.cos.as_ptr()),
+                x86::_mm256_loadu_ps(made.sin.as_ptr()),
+            )
+        };
+        let f = fractions(places);
+        let (less, more) = (x86::_mm256_sub_ps(f, apart), x86::_mm256_add_ps(f, apart));
+        let shares = [
+            x86::_mm256_max_ps(less, none),
+            x86::_mm256_min_ps(less, none),
+            x86::_mm256_min_ps(more, one),
+            x86::_mm256_max_ps(x86::_mm256_sub_ps(more, one), none),
+        ];
+        for half in 0..2 {
+            // SAFETY: the caller's groups have two entries on either side of every place.
+            let ([s0, s1], [s2, s3]) =
+                unsafe { (two(entries, &made.places, half), two(entries.wrapping_add(2), &made.places, half)) };
+            let (before, here, after) =
+                (x86::_mm256_sub_ps(s1, s0), x86::_mm256_sub_ps(s2, s1), x86::_mm256_sub_ps(s3, s2));
+            let begun = x86::_mm256_sub_ps(s1, base);
+            let of = |share: usize, part| x86::_mm256_mul_ps(twice(half, shares[share]), part);
+            let values = [
+                x86::_mm256_add_ps(begun, x86::_mm256_add_ps(of(0, here), of(1, before))),
+                x86::_mm256_add_ps(begun, x86::_mm256_mul_ps(twice(half, f), here)),
+                x86::_mm256_add_ps(begun, x86::_mm256_add_ps(of(2, here), of(3, after))),
+            ];
+            let (change_cos, change_sin) = (twice(half, change_cos), twice(half, change_sin));
+            for (value, (cos, sin)) in values.into_iter().zip(cos.iter_mut().zip(sin.iter_mut())) {
+                *cos = x86::_mm256_add_ps(*cos, x86::_mm256_mul_ps(change_cos, value));
+                *sin = x86::_mm256_add_ps(*sin, x86::_mm256_mul_ps(change_sin, value));
+            }
+        }
+    }
+}

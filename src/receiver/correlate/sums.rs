@@ -1,0 +1,104 @@
+//! Samples with their running sums, by which the correlator by pieces needs no sample twice.
+//!
+//! Sums are made of integers, in halves of a sample's last bit, so they are exact while they stay below 2²³ of
+//! them and right to 6e-8 of their size beyond.
+
+use super::kernel::Level;
+use super::pieces::kernel;
+
+/// Consecutive samples, and their running sums where they were made.
+#[derive(Clone, Copy, Debug)]
+pub struct Samples<'a> {
+    /// In-phase samples.
+    pub i: &'a [f32],
+    /// Quadrature samples.
+    pub q: &'a [f32],
+    /// What all of them before each one add up to, as far as that was made.
+    pub sums: Option<Sums<'a>>,
+}
+
+impl<'a> From<(&'a [f32], &'a [f32])> for Samples<'a> {
+    fn from((i, q): (&'a [f32], &'a [f32])) -> Self {
+        Self { i, q, sums: None }
+    }
+}
+
+impl<'a> Samples<'a> {
+    /// The samples from `from` to `to`.
+    pub fn part(&self, from: usize, to: usize) -> Self {
+        let sums = self.sums.and_then(|sums| sums.part(from, to));
+        Self { i: &self.i[from..to], q: &self.q[from..to], sums }
+    }
+}
+
+/// Running sums of samples: entry n is that of all samples before sample n, with one entry more at the end.
+#[derive(Clone, Copy, Debug)]
+pub struct Sums<'a>(&'a [[f32; 2]]);
+
+impl<'a> Sums<'a> {
+    /// Entries beyond the number of samples.
+    const MORE: usize = 2;
+
+    /// Sums as [`RunningSums`] made them.
+    fn new(entries: &'a [[f32; 2]]) -> Option<Self> {
+        (entries.len() > Self::MORE).then_some(Self(entries))
+    }
+
+    /// Number of the samples.
+    pub(super) fn samples(&self) -> usize {
+        self.0.len() - Self::MORE
+    }
+
+    /// The entries; at least three.
+    pub(super) fn entries(&self) -> &'a [[f32; 2]] {
+        self.0
+    }
+
+    /// The samples from `from` to `to`.
+    pub(super) fn part(&self, from: usize, to: usize) -> Option<Self> {
+        self.0.get(from..to + Self::MORE).and_then(Self::new)
+    }
+}
+
+/// Room for running sums.
+#[derive(Clone, Debug, Default)]
+pub struct RunningSums(Vec<[f32; 2]>);
+
+impl RunningSums {
+    /// The running sums of samples of 8 bits: within ±127.5, in steps of a half or more.
+    pub fn of(&mut self, i: &[f32], q: &[f32]) -> Option<Sums<'_>> {
+        let samples = i.len().min(q.len());
+        self.0.resize(samples + Sums::MORE, [0.0; 2]);
+        let (i, q) = (&i[..samples], &q[..samples]);
+        kernel::running_sums(Level::best(), i, q, &mut self.0[..=samples]);
+        self.0[samples + 1] = self.0[samples];
+        Sums::new(&self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entry_n_is_the_sum_of_the_samples_before_n_at_every_level() {
+        let value = |k: usize, by: usize| ((k * by % 511) as f32 - 255.0) / 2.0;
+        for count in [0, 1, 2, 3, 4, 5, 7, 8, 9, 63, 1000, 70_001] {
+            let i: Vec<f32> = (0..count).map(|k| value(k, 37)).collect();
+            // All of one sign: 70 001 of them pass 2²³ halves.
+            let q: Vec<f32> = (0..count).map(|k| 127.5 - value(k, 91).abs() / 8.0).collect();
+            let q: Vec<f32> = q.iter().map(|x| (2.0 * x).round() / 2.0).collect();
+            let mut expected = vec![[0.0_f32; 2]; count + 1];
+            let mut sum = [0.0_f64; 2];
+            for k in 0..count {
+                sum = [sum[0] + f64::from(i[k]), sum[1] + f64::from(q[k])];
+                expected[k + 1] = sum.map(|x| x as f32);
+            }
+            for level in Level::all() {
+                let mut made = vec![[7.0_f32; 2]; count + 1];
+                kernel::running_sums(level, &i, &q, &mut made);
+                assert_eq!(made, expected, "{level:?} {count}");
+            }
+        }
+    }
+}
