@@ -19,6 +19,7 @@ use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::signal::Link;
 use gnss_twin::gnss::time::Rate;
 use gnss_twin::receiver::acquire::{AcquisitionSettings, Searcher, samples_needed};
+use gnss_twin::receiver::correlate::sums::{RunningSums, Samples};
 use gnss_twin::receiver::correlate::{Arithmetic, CODE_BITS, Edge, Nco, Replica, Wave, chips_to_units};
 use gnss_twin::receiver::source::Block;
 
@@ -43,17 +44,18 @@ struct Row {
     values: Vec<f64>,
 }
 
-/// Noise of 8 bits, by a 64-bit congruential generator.
-/// Oscillators of channel `n`: all of them differ.
+/// Oscillators of channel `n`: all of them differ, and the Dopplers are those of a sky.
 fn oscillators(n: usize, rate_hz: f64) -> Nco {
+    let doppler_hz = 700.0 * (n as f64 - 5.4);
     Nco {
         carrier: 0,
-        carrier_step: (n as u64 + 1) << 52,
+        carrier_step: (doppler_hz / rate_hz * 18_446_744_073_709_551_616.0) as i64 as u64,
         code: chips_to_units(n as f64 * 0.1),
         code_step: chips_to_units(CHIP_HZ / rate_hz) as u64,
     }
 }
 
+/// Noise of 8 bits, by a 64-bit congruential generator.
 fn noise(bytes: usize) -> Vec<u8> {
     let mut state = 1_u64;
     let mut next = || {
@@ -64,8 +66,20 @@ fn noise(bytes: usize) -> Vec<u8> {
     (0..bytes).map(|_| ((0..4).map(|_| next() % 32).sum::<u32>() as i32 - 62) as i8 as u8).collect()
 }
 
-/// Channel·samples a second, in 1e9: blocks of 50 ms (at most 2^17 samples) unpacked once, then every channel
-/// period by period.
+/// Samples as channels are shown them.
+fn unpacked<'a>(
+    bytes: &[u8],
+    arithmetic: Arithmetic,
+    (i, q): (&'a mut Vec<f32>, &'a mut Vec<f32>),
+    room: &'a mut RunningSums,
+) -> Samples<'a> {
+    Format::Ci8.unpack(bytes, i, q);
+    let sums = if arithmetic == Arithmetic::Sums { room.of(i, q) } else { None };
+    Samples { i, q, sums }
+}
+
+/// Channel·samples a second, in 1e9: blocks of 50 ms (at most 2^17 samples) unpacked and, where it is asked
+/// for, summed up once, then every channel period by period.
 fn tracking(rate_hz: f64, edge: Edge, arithmetic: Arithmetic) -> Box<dyn FnMut() -> f64> {
     let block = ((rate_hz * 0.05) as usize).min(1 << 17);
     let period = (rate_hz * 1e-3) as usize;
@@ -74,17 +88,16 @@ fn tracking(rate_hz: f64, edge: Edge, arithmetic: Arithmetic) -> Box<dyn FnMut()
     let taps = TAPS.map(chips_to_units);
     // The twin is not waited for.
     let channels = if arithmetic == Arithmetic::F64 { 1 } else { CHANNELS };
-    let (mut i, mut q) = (Vec::new(), Vec::new());
+    let (mut i, mut q, mut room) = (Vec::new(), Vec::new(), RunningSums::default());
     Box::new(move || {
         let begin = Instant::now();
-        Format::Ci8.unpack(&bytes, &mut i, &mut q);
+        let samples = unpacked(&bytes, arithmetic, (&mut i, &mut q), &mut room);
         let mut done = 0;
         for (n, replica) in replicas.iter().take(channels).enumerate() {
             let nco = oscillators(n, rate_hz);
             // Periods of a real channel begin anywhere.
-            let (i, q) = (&i[n..], &q[n..]);
-            for (i, q) in i.chunks_exact(period).zip(q.chunks_exact(period)) {
-                black_box(replica.correlate_in(arithmetic, (i, q), &nco, &taps));
+            for from in (n..=block - period).step_by(period) {
+                black_box(replica.correlate_in(arithmetic, samples.part(from, from + period), &nco, &taps));
                 done += period;
             }
         }
@@ -187,15 +200,15 @@ fn tracking_pairs(arithmetic: Arithmetic) -> Box<dyn FnMut() -> f64> {
     };
     let (data, pilot) = (of(0), of(1));
     let taps = [0.15, 0.0, -0.15, 0.5, -0.5].map(chips_to_units);
-    let (mut i, mut q) = (Vec::new(), Vec::new());
+    let (mut i, mut q, mut room) = (Vec::new(), Vec::new(), RunningSums::default());
     Box::new(move || {
         let begin = Instant::now();
-        Format::Ci8.unpack(&bytes, &mut i, &mut q);
+        let all = unpacked(&bytes, arithmetic, (&mut i, &mut q), &mut room);
         let mut done = 0;
         for (n, (data, pilot)) in data.iter().zip(&pilot).enumerate() {
             let nco = oscillators(n, rate_hz);
-            let (i, q) = (&i[n..], &q[n..]);
-            for samples in i.chunks_exact(period).zip(q.chunks_exact(period)) {
+            for from in (n..=block - period).step_by(period) {
+                let samples = all.part(from, from + period);
                 black_box(pilot.correlate_in(arithmetic, samples, &nco, &taps));
                 black_box(data.correlate_in(arithmetic, samples, &nco, &[0]));
                 done += period;
@@ -257,7 +270,9 @@ fn errors(arithmetic: Arithmetic, rate_hz: f64) -> Errors {
                 i[n] = (f64::from(i[n]) + sign * cos).round().clamp(-127.0, 127.0) as f32;
                 q[n] = (f64::from(q[n]) + sign * sin).round().clamp(-127.0, 127.0) as f32;
             }
-            let tested = replica.correlate_in(arithmetic, (&i, &q), &nco, &taps);
+            let mut room = RunningSums::default();
+            let samples = Samples { i: &i, q: &q, sums: room.of(&i, &q) };
+            let tested = replica.correlate_in(arithmetic, samples, &nco, &taps);
             let exact = replica.slow(&i, &q, &nco, &taps);
             // Early less late is twice the error of a triangle, over the prompt that the signal has on
             // average.
@@ -306,6 +321,10 @@ fn rows() -> Vec<Row> {
             }
         }
     }
+    for msps in [2.6, 10.0, 20.0] {
+        let figure = format!("tracking by sums, area edges, 3 taps, ci8, {msps} Msps");
+        add(figure, "G channel·samples/s/core", None, tracking(msps * 1e6, Edge::Area, Arithmetic::Sums));
+    }
     let noncoherent = AcquisitionSettings { coherent_periods: 1, doppler_step_cycles: 0.5, ..Default::default() };
     for (settings, name) in [(AcquisitionSettings::default(), "10 × 2 ms"), (noncoherent, "10 × 1 ms")] {
         let figure = format!("search, 32 PRNs, ±5 kHz, {name}, 2.6 Msps, two cores");
@@ -317,7 +336,8 @@ fn rows() -> Vec<Row> {
         Some(-1.0),
         cold_search(2),
     );
-    for (arithmetic, name, bar) in [(Arithmetic::I16, "i16", Some(0.8)), (Arithmetic::F32, "f32", None)] {
+    let pairs = [(Arithmetic::Sums, "sums", Some(0.8)), (Arithmetic::I16, "i16", None), (Arithmetic::F32, "f32", None)];
+    for (arithmetic, name, bar) in pairs {
         let figure = format!("tracking in {name}, Galileo E1, 5 taps of the pilot and 1 of the data, ci8, 10 Msps");
         add(figure, "G channel·samples/s/core", bar, tracking_pairs(arithmetic));
     }
@@ -343,7 +363,7 @@ impl Row {
     }
 }
 
-/// What bounds the default correlator, from the medians at 2.6 and 10 Msps.
+/// What bounds the correlator in 16 bits, from the medians at 2.6 and 10 Msps.
 fn limits(rows: &[Row]) -> String {
     let ghz = clock_ghz();
     let [slow, fast] = [0, 1].map(|n| rows.get(n).map_or(f64::NAN, Row::median));
@@ -353,8 +373,8 @@ fn limits(rows: &[Row]) -> String {
     let sample_ns = (long_ns - short_ns) / 7400.0;
     let fixed_ns = short_ns - 2600.0 * sample_ns;
     format!(
-        "**Limit.** With AVX-512, 32 samples and three taps with area edges take {OPERATIONS} operations of 512 bits \
-         in 16-bit integers, {OPERATIONS_A_CYCLE} a cycle at most: {limit:.1} G channel·samples a second at the \
+        "**Limit of i16.** With AVX-512, 32 samples and three taps with area edges take {OPERATIONS} operations of 512 \
+         bits in 16-bit integers, {OPERATIONS_A_CYCLE} a cycle at most: {limit:.1} G channel·samples a second at the \
          {ghz:.2} GHz measured here. Of a period at 2.6 Msps {:.0} % is fixed ({fixed_ns:.0} ns: powers of the \
          carrier's turn, the last sums, both in f64), and its samples take {sample_ns:.3} ns each, {:.0} % of the \
          limit's speed; loads that cross cache lines, and a processor's window that holds about one group's \
@@ -392,7 +412,7 @@ fn main() {
         cpu.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or("").trim_start_matches(['\t', ' ', ':']);
     let mut text = format!(
         "{model}, {} cores; {}; release profile, instruction set chosen at run time; {}; medians of {ROUNDS} \
-         interleaved runs. The default is i16 for 8-bit formats.\n\n|figure|value|unit|bar|met|\n\
+         interleaved runs. The default is sums for 8-bit formats.\n\n|figure|value|unit|bar|met|\n\
          |---|---|---|---|---|\n",
         std::thread::available_parallelism().map_or(1, |n| n.get()),
         output_of("rustc", &["--version"]),
@@ -409,7 +429,7 @@ fn main() {
          |---|---|---|---|---|---|\n",
         limits(&rows)
     );
-    for (arithmetic, name) in [(Arithmetic::I16, "i16"), (Arithmetic::F32, "f32")] {
+    for (arithmetic, name) in [(Arithmetic::Sums, "sums"), (Arithmetic::I16, "i16"), (Arithmetic::F32, "f32")] {
         for msps in [2.6, 10.0] {
             let found = errors(arithmetic, msps * 1e6);
             let _ = writeln!(

@@ -4,12 +4,11 @@
 //! the chip at the sample's instant ([`Edge::Nearest`]) or the mean of the chips over the interval of one
 //! sample centred on that instant ([`Edge::Area`]). Sums come in four arithmetics: pieces of equal sign by
 //! running sums of samples of 8 bits (`pieces`), integers of 16 bits for such samples
-//! ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin of all in `f64`
-//! ([`Replica::slow`]). A chip has the steps of its pulse ([`Wave`]); phases count chips,
-//! kernels see steps. A replica is a weighted sum of patterns of signs, each of which takes a pass: steps of
-//! zero are the mean of +1 and −1, and a waveform of several layers has a pattern for each. Limits: area
-//! edges are exact up to one step a sample; beyond that they leave steps out. A period has fewer than 2¹⁶
-//! steps.
+//! ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin of all in
+//! `f64` ([`Replica::slow`]). A chip has the steps of its pulse ([`Wave`]); phases count chips, kernels see
+//! steps. A replica is a weighted sum of patterns of signs, each of which takes a pass: steps of zero are the
+//! mean of +1 and −1, and a waveform of several layers has a pattern for each. Limits: area edges are exact
+//! up to one step a sample; beyond that they leave steps out. A period has fewer than 2¹⁶ steps.
 
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
@@ -47,8 +46,8 @@ pub enum Edge {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Arithmetic {
-    /// Running sums of samples of 8 bits, a difference for each change of the code's sign; [`Self::I16`] where the
-    /// carrier is far from zero or samples are few to a chip.
+    /// Running sums of samples of 8 bits, a difference for each change of the code's sign; [`Self::I16`]
+    /// where the carrier is far from zero or samples are few to a chip.
     Sums,
     /// Integers of 16 bits where samples have 8, `f32` where they have more.
     I16,
@@ -203,8 +202,8 @@ impl Replica {
         }
     }
 
-    /// One of the four. [`Arithmetic::Sums`] and [`Arithmetic::I16`] are for samples that [`Self::correlate_short`]
-    /// can take; without running sums the former is the latter.
+    /// One of the four. [`Arithmetic::Sums`] and [`Arithmetic::I16`] are for samples that
+    /// [`Self::correlate_short`] can take; without running sums the former is the latter.
     pub fn correlate_in<'a, const T: usize>(
         &self,
         arithmetic: Arithmetic,

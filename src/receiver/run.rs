@@ -24,7 +24,7 @@ use crate::receiver::source::{Packed, Queue, Source};
 const BLOCK_MS: u64 = 50;
 /// Samples in a block at most.
 const BLOCK_SAMPLES: u64 = 1 << 17;
-/// Bytes read at a time.
+/// Bytes read at a time of each of several front ends.
 const READ_BYTES: usize = 1 << 18;
 
 /// A reception that is given its samples piece by piece.
@@ -129,6 +129,14 @@ impl Reception {
             }
         }
         Ok(())
+    }
+
+    /// Bytes that are best taken at a time: a block, so that none has to be kept for the next.
+    fn piece_bytes(&self) -> usize {
+        match &self.source {
+            Input::One(source) => source.block_bytes(),
+            Input::Several { .. } => READ_BYTES,
+        }
     }
 
     /// Samples of the first front end taken so far, those of a block that is not full yet left out.
@@ -330,7 +338,7 @@ pub fn receive_several<R: Read>(
 ) -> Result<Outcome, ReceiveError> {
     let metadata: Vec<IfMetadata> = front_ends.iter().map(|(metadata, _)| metadata.clone()).collect();
     let mut reception = Reception::of_several(&metadata, settings)?;
-    let mut bytes = vec![0; READ_BYTES];
+    let mut bytes = vec![0; reception.piece_bytes()];
     let mut read_s = vec![0.0_f64; front_ends.len()];
     loop {
         // The one that is least far.

@@ -9,7 +9,6 @@
 use std::ops::Range;
 
 use crate::gnss::samples::Format;
-use crate::receiver::correlate::sums::RunningSums;
 
 /// Consecutive samples; `q` is all zeros for a real recording.
 #[derive(Clone, Copy, Debug)]
@@ -29,8 +28,8 @@ pub struct Planes {
     pub i: Vec<f32>,
     /// Quadrature samples.
     pub q: Vec<f32>,
-    /// Room for their running sums.
-    pub sums: RunningSums,
+    /// Room for samples of two blocks.
+    packed: Vec<u8>,
 }
 
 /// Consecutive samples as they were packed.
@@ -73,30 +72,46 @@ pub struct Lookback {
 }
 
 impl Lookback {
-    /// The block behind all that was kept.
-    pub fn join<'a>(&'a mut self, block: &Packed<'a>) -> Packed<'a> {
-        let kept = (self.bytes.len() / block.format.bytes()) as u64;
-        if kept == 0 || self.first + kept != block.first {
-            self.first = block.first;
-            self.bytes.clear();
-            return *block;
-        }
-        self.bytes.extend_from_slice(block.bytes);
-        Packed { first: self.first, format: block.format, bytes: &self.bytes }
+    /// The first sample that can be shown with `block`.
+    pub fn first(&self, block: &Packed) -> u64 {
+        if self.is_before(block) { self.first } else { block.first }
     }
 
-    /// Keeps the samples from number `from` on, after [`Lookback::join`] of this block.
-    pub fn keep(&mut self, block: &Packed, from: u64) {
-        let size = block.format.bytes();
-        if self.bytes.is_empty() {
-            let start = (from.max(block.first) - block.first) as usize * size;
-            self.bytes.extend_from_slice(block.bytes.get(start..).unwrap_or_default());
-            self.first = from.max(block.first);
-            return;
+    /// The samples from number `from`, one that is kept or of the block, up to `to`, one of the block,
+    /// unpacked into `planes`.
+    pub fn unpack<'a>(&self, block: &Packed, (from, to): (u64, u64), planes: &'a mut Planes) -> Block<'a> {
+        let end = to.saturating_sub(block.first) as usize;
+        let kept = self.kept(block, from);
+        if kept.is_empty() {
+            return block.unpack(from.saturating_sub(block.first) as usize..end, planes);
         }
-        let before = from.saturating_sub(self.first);
-        self.bytes.drain(..(before as usize * size).min(self.bytes.len()));
-        self.first += before;
+        let mut packed = std::mem::take(&mut planes.packed);
+        packed.clear();
+        packed.extend_from_slice(kept);
+        packed.extend_from_slice(block.bytes.get(..end * block.format.bytes()).unwrap_or(block.bytes));
+        block.format.unpack(&packed, &mut planes.i, &mut planes.q);
+        planes.packed = packed;
+        Block { first: from, i: &planes.i, q: &planes.q }
+    }
+
+    /// Keeps the samples from number `from` on, up to the block's end.
+    pub fn keep(&mut self, block: &Packed, from: u64) {
+        let from = from.clamp(self.first(block), block.end());
+        let before = self.bytes.len() - self.kept(block, from).len();
+        self.bytes.drain(..before);
+        let start = from.saturating_sub(block.first) as usize * block.format.bytes();
+        self.bytes.extend_from_slice(block.bytes.get(start..).unwrap_or_default());
+        self.first = from;
+    }
+
+    fn is_before(&self, block: &Packed) -> bool {
+        self.first + (self.bytes.len() / block.format.bytes()) as u64 == block.first
+    }
+
+    /// What is kept from number `from` on, if the block comes next.
+    fn kept(&self, block: &Packed, from: u64) -> &[u8] {
+        let start = from.saturating_sub(self.first) as usize * block.format.bytes();
+        if self.is_before(block) { self.bytes.get(start..).unwrap_or_default() } else { &[] }
     }
 }
 
@@ -147,6 +162,11 @@ impl Source {
         self.samples += whole as u64;
         let bytes = self.kept.get(..whole * self.format.bytes()).unwrap_or_default();
         ((whole > 0).then_some(Packed { first, format: self.format, bytes }), cut_bytes)
+    }
+
+    /// Bytes of a block.
+    pub fn block_bytes(&self) -> usize {
+        self.block_bytes
     }
 
     /// Samples given out so far.
@@ -256,6 +276,32 @@ mod tests {
         let part = packed.unpack(8..20, &mut planes);
         assert_eq!((part.first, part.i, part.q), (18, &[36.0, 38.0][..], &[37.0, 39.0][..]));
         assert_eq!((packed.first, packed.end()), (10, 20));
+    }
+
+    #[test]
+    fn samples_that_are_kept_are_shown_with_the_next_block() {
+        let bytes: Vec<u8> = (0..120).collect();
+        let packed = |from: usize, to: usize| Packed {
+            first: from as u64,
+            format: Format::Ci8,
+            bytes: &bytes[2 * from..2 * to],
+        };
+        let (mut lookback, mut planes) = (Lookback::default(), Planes::default());
+        // From where each block's end is kept, and where the next one is shown from.
+        for (block, from) in [((0, 20), 20), ((20, 40), 37), ((40, 42), 38), ((42, 60), 41)] {
+            let block = packed(block.0, block.1);
+            let first = lookback.first(&block);
+            for shown in first..=block.end() {
+                let samples = lookback.unpack(&block, (shown, block.end()), &mut planes);
+                let expected: Vec<f32> = (shown..block.end()).map(|n| 2.0 * n as f32).collect();
+                assert_eq!((samples.first, samples.i), (shown, &expected[..]), "{first} {shown}");
+            }
+            lookback.keep(&block, from);
+            assert_eq!((lookback.first, lookback.bytes.len() as u64), (from, 2 * (block.end() - from)));
+        }
+        // A block that does not follow is shown alone.
+        let later = packed(60, 60);
+        assert_eq!(lookback.first(&Packed { first: 70, ..later }), 70);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use gnss_twin::gnss::gps::l1ca;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::receiver::acquire::search;
+use gnss_twin::receiver::correlate::sums::{RunningSums, Samples};
 use gnss_twin::receiver::correlate::{Arithmetic, CODE_BITS, Edge, Nco, Replica, chips_to_units};
 use gnss_twin::receiver::source::Block;
 
@@ -134,6 +135,14 @@ fn full_scale_for_a_second_overflows_nothing() {
             "",
         );
     }
+    // By running sums: area edges take half a sample at each of some 512 changes in 50 000 samples.
+    let replica = Replica::new(l1ca::code(9).unwrap(), Edge::Area).unwrap();
+    let mut room = RunningSums::default();
+    let samples = Samples { i: &i, q: &q, sums: room.of(&i, &q) };
+    assert!(replica.takes_sums(&nco));
+    let [sum] = replica.correlate_in(Arithmetic::Sums, samples, &nco, &[0]);
+    let less = 1.0 - 512.0 * 0.5 / 50_000.0;
+    the.at_most("sums: sum of 2e6 full-scale samples, relative", (sum.re / expected / less - 1.0).abs(), 3e-3, "");
 }
 
 #[test]

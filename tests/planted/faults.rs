@@ -211,6 +211,8 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.loops.step", "a loop update takes too little of what the half intervals bring", LOOP),
     fault("receiver.nco.carrier_aid", "the carrier aids the code with the wrong sign", LOOP),
     fault("receiver.nco.carrier_between_updates", "a measurement forgets the carrier since the last code period", LOOP),
+    fault("receiver.sums.place", "changes of the code's sign are met half a sample late", LOOP),
+    fault("receiver.sums.window", "early and late are taken from the wrong sides", LOOP),
     fault("receiver.measure.doppler_sign", "Doppler with the wrong sign", LOOP),
     fault("receiver.measure.carrier_sign", "the carrier with the wrong sign", LOOP),
     fault("receiver.cn0.scale", "C/N0 reads 0.5 dB too high", LOOP),

@@ -15,11 +15,12 @@ use num_complex::Complex;
 use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
-use super::kernel;
 use super::multiple_access::Law;
 use super::pair::{Dwells, Spectra};
+use super::refine::Refined;
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
+use super::{Acquired, kernel};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Component;
 use crate::receiver::source::Block;
@@ -395,6 +396,19 @@ impl Grid {
         }
         let floor = total / cells.max(1) as f64 / (2.0 * f64::from(self.sums));
         scaled.into_iter().map(|height| if floor > 0.0 { height / floor } else { 0.0 }).collect()
+    }
+
+    /// The place of a satellite that is known, at sample `first`.
+    pub fn refined(&self, known: &Acquired, first: u64) -> Refined {
+        let later = first as f64 - known.sample as f64;
+        let code_phase_chips = known.code_phase_chips + later * self.received_chips_per_sample(known.doppler_hz);
+        let period_chips = (self.period_samples * self.chips_per_sample).round();
+        Refined {
+            code_phase_chips: code_phase_chips.rem_euclid(period_chips),
+            doppler_hz: known.doppler_hz,
+            cn0_hz: libm::pow(10.0, known.cn0_dbhz / 10.0),
+            power: 0.0,
+        }
     }
 
     /// Where a carrier of that Doppler appears in the samples.

@@ -231,6 +231,18 @@ impl Code {
         Some(Self { replica, spectrum, companion })
     }
 
+    /// Takes the code, and the one beside it, out of the samples; returns the mean power of the former's sum
+    /// over a period.
+    fn subtract(&self, grid: &Grid, (chips, complex): (f64, bool), place: &Refined, window: &mut Window) -> f64 {
+        let samples = (&mut window.i[..], &mut window.q[..]);
+        let power = refine::subtract(grid, chips, &self.replica, place, complex, samples);
+        if let Some((replica, _)) = &self.companion {
+            let samples = (&mut window.i[..], &mut window.q[..]);
+            refine::subtract(grid, chips, replica, place, complex, samples);
+        }
+        power
+    }
+
     /// Spectra of the code and of the one beside it; of a code that is alone the same twice.
     fn spectra(&self) -> pair::Spectra<'_> {
         let beside = self.companion.as_ref().map_or(&self.spectrum, |(_, spectrum)| spectrum);
@@ -280,13 +292,29 @@ impl Searcher {
         block: &Block,
         candidates: &[Link],
     ) -> Result<Vec<(AcquisitionRow, Option<Acquired>)>, AcquireError> {
+        self.search_beside(block, candidates, &[])
+    }
+
+    /// The same beside satellites that are known to be there, and where: they are taken out of the samples
+    /// first, and none of `candidates` has to be one of them.
+    ///
+    /// # Errors
+    /// As [`Searcher::search`].
+    pub fn search_beside(
+        &mut self,
+        block: &Block,
+        candidates: &[Link],
+        known: &[Acquired],
+    ) -> Result<Vec<(AcquisitionRow, Option<Acquired>)>, AcquireError> {
         if block.i.len() != block.q.len() {
             return Err(AcquireError::Uneven { i: block.i.len(), q: block.q.len() });
         }
-        for link in candidates {
+        let known_links = known.iter().map(Acquired::link);
+        let links: Vec<Link> = candidates.iter().copied().chain(known_links).collect();
+        for link in &links {
             self.prepare(*link)?;
         }
-        self.make_codes(candidates)?;
+        self.make_codes(&links)?;
         let mut results: Vec<Option<(AcquisitionRow, Option<Acquired>)>> = vec![None; candidates.len()];
         for (band, grid) in &self.grids {
             let chosen: Vec<(usize, Sv, &Code)> = candidates
@@ -304,7 +332,12 @@ impl Searcher {
             }
             let codes: Vec<(Sv, &Code)> = chosen.iter().map(|&(_, sv, code)| (sv, code)).collect();
             let window = Window::centred(block, need as usize);
-            for ((index, ..), result) in chosen.iter().zip(self.search_signal(band.signal, grid, window, &codes)) {
+            let known: Vec<(&Code, Refined)> = (known.iter())
+                .filter(|one| Band::of(one.link()) == *band)
+                .filter_map(|one| Some((self.codes.get(&one.link())?, grid.refined(one, block.first))))
+                .collect();
+            let found = self.search_signal(band.signal, grid, window, (&codes, &known));
+            for ((index, ..), result) in chosen.iter().zip(found) {
                 if let Some(slot) = results.get_mut(*index) {
                     *slot = Some(result);
                 }
@@ -365,15 +398,18 @@ impl Searcher {
         signal: &'static Signal,
         grid: &Grid,
         mut window: Window,
-        codes: &[(Sv, &Code)],
+        (codes, known): (&[(Sv, &Code)], &[(&Code, Refined)]),
     ) -> Vec<(AcquisitionRow, Option<Acquired>)> {
         let Some(component) = lead(signal) else { return Vec::new() };
         let code_chips = f64::from(component.code_chips);
         let complex = self.metadata.format.is_complex();
         let searched_s = f64::from(grid.periods) * component.period_s();
         tone::remove(&mut window, grid.rate_hz, complex);
-        let (mut findings, mut crowded, mut map) = self.detect(grid, component, &window.block(), codes, None);
         let mut strongest = 0.0;
+        for (code, place) in known {
+            strongest = f64::max(strongest, code.subtract(grid, (code_chips, complex), place, &mut window));
+        }
+        let (mut findings, mut crowded, mut map) = self.detect(grid, component, &window.block(), codes, None);
         // Codes that are not subtracted yet.
         let mut open: Vec<usize> = (0..codes.len()).collect();
         for _ in 1..LARGEST_LOOKS {
@@ -391,12 +427,7 @@ impl Searcher {
             strongest = f64::max(strongest, here);
             strong.sort_by(|a, b| b.1.power.total_cmp(&a.1.power));
             for (index, hit) in &strong {
-                let samples = (&mut window.i[..], &mut window.q[..]);
-                refine::subtract(grid, code_chips, &codes[*index].1.replica, hit, complex, samples);
-                if let Some((replica, _)) = &codes[*index].1.companion {
-                    let samples = (&mut window.i[..], &mut window.q[..]);
-                    refine::subtract(grid, code_chips, replica, hit, complex, samples);
-                }
+                codes[*index].1.subtract(grid, (code_chips, complex), hit, &mut window);
             }
             open.retain(|index| strong.iter().all(|(taken, _)| taken != index));
             // Weak hits alone need few codes; what the strong ones hid may be any.

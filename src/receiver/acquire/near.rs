@@ -36,7 +36,7 @@ impl Searcher {
                 return Err(AcquireError::TooFewSamples { have, need });
             }
             let window = Window::centred(block, need as usize);
-            results.extend(self.search_signal(link.signal, &grid, window, &[(link.sv, code)]));
+            results.extend(self.search_signal(link.signal, &grid, window, (&[(link.sv, code)], &[])));
         }
         Ok(results)
     }

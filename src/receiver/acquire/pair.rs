@@ -222,7 +222,8 @@ impl Grid {
             spectrum
         };
         let spectra: Vec<Vec<Complex<f32>>> = wanted.par_iter().map(one).collect();
-        let spectra = spectra.chunks(dwells.begins.len()).map(<[_]>::to_vec).collect();
+        let mut spectra = spectra.into_iter();
+        let spectra = parts.iter().map(|_| spectra.by_ref().take(dwells.begins.len()).collect()).collect();
         Transforms { parts, spectra }
     }
 

@@ -198,7 +198,8 @@ fn square_frequency_cycles(prompts: &[Complex<f64>], reach: f64) -> f64 {
 }
 
 /// Takes a found satellite out of the samples, one code period at a time with the amplitude and phase
-/// that it shows there. A real recording holds the carrier's cosine only.
+/// that it shows there. A real recording holds the carrier's cosine only. Returns the mean power of a code
+/// period's sum.
 pub(super) fn subtract(
     grid: &Grid,
     code_chips: f64,
@@ -206,12 +207,13 @@ pub(super) fn subtract(
     hit: &Refined,
     complex: bool,
     (i, q): (&mut [f32], &mut [f32]),
-) {
+) -> f64 {
     let step = grid.received_chips_per_sample(hit.doppler_hz);
     let frequency_hz = grid.frequency_hz(hit.doppler_hz);
     let turn = grid.phasor(frequency_hz, 1);
     let mut waveform: Vec<Complex<f64>> = Vec::new();
     let (mut from, length) = (0, i.len());
+    let (mut power, mut periods) = (0.0, 0_u32);
     for period in 1_u64.. {
         let boundary = ((period as f64 * code_chips - hit.code_phase_chips) / step).ceil().max(0.0) as usize;
         let to = boundary.min(length);
@@ -222,11 +224,13 @@ pub(super) fn subtract(
             waveform.push(rotation * chip);
             rotation *= turn;
         }
-        let (Some(i), Some(q)) = (i.get_mut(from..to), q.get_mut(from..to)) else { return };
+        let (Some(i), Some(q)) = (i.get_mut(from..to), q.get_mut(from..to)) else { break };
         let samples = i.iter().zip(q.iter()).map(|(i, q)| Complex::new(f64::from(*i), f64::from(*q)));
         let sum: Complex<f64> = samples.zip(&waveform).map(|(x, w)| x * w.conj()).sum();
         let energy: f64 = waveform.iter().map(|w| w.norm_sqr()).sum();
         let amplitude = if energy > 0.0 { sum / energy } else { Complex::default() };
+        power += sum.norm_sqr();
+        periods += 1;
         for ((i, q), w) in i.iter_mut().zip(q).zip(&waveform) {
             let x = amplitude * w;
             if complex {
@@ -237,8 +241,9 @@ pub(super) fn subtract(
             }
         }
         if boundary >= length {
-            return;
+            break;
         }
         from = to;
     }
+    power / f64::from(periods.max(1))
 }

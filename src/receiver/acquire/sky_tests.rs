@@ -140,6 +140,47 @@ fn satellites_twenty_five_decibels_below_another_are_found() {
 }
 
 #[test]
+fn beside_satellites_that_are_known_weak_ones_are_found_and_none_that_is_not_there() {
+    let (metadata, samples, mut searcher) = searcher(&AcquisitionSettings::default());
+    let (mut total, mut blind) = (Count::default(), 0);
+    for seed in skies(4) {
+        let mut random = Noise(900 + seed);
+        let sent = satellites(&mut random, &[64.0, 60.0, 57.0, 52.0, 42.0, 41.0, 41.0, 40.0]);
+        let recording = quantised(record(metadata.clone(), samples, &sent, seed));
+        let block = Block { first: 0, i: &recording.i, q: &recording.q };
+        // As a channel knows them a while before the block: to 0.02 chip and 2 Hz.
+        let known: Vec<Acquired> = (sent[..4].iter())
+            .map(|sent| Acquired {
+                sv: Sv::gps(sent.prn),
+                signal: &crate::gnss::gps::l1ca::L1_CA,
+                sample: 0,
+                code_phase_chips: sent.phase_chips.rem_euclid(1023.0) + 0.02,
+                doppler_hz: sent.doppler_hz + 2.0,
+                cn0_dbhz: sent.cn0_dbhz,
+            })
+            .collect();
+        let sought: Vec<Link> = all().into_iter().filter(|link| known.iter().all(|one| one.link() != *link)).collect();
+        let mut hits = |known: &[Acquired]| -> Vec<Acquired> {
+            searcher.search_beside(&block, &sought, known).unwrap().into_iter().filter_map(|(_, hit)| hit).collect()
+        };
+        let right = |hit: &Acquired| {
+            let near = |sent: &Sent| difference_chips(hit.code_phase_chips, sent.phase_chips).abs() < 1.0;
+            sent[4..].iter().any(|sent| hit.sv.number == sent.prn && near(sent))
+        };
+        let found = hits(&known);
+        total.skies += 1;
+        total.there += 4;
+        total.found += found.iter().filter(|hit| right(hit)).count() as u32;
+        total.false_ones += found.iter().filter(|hit| !right(hit)).count() as u32;
+        blind += hits(&[]).iter().filter(|hit| right(hit)).count() as u32;
+    }
+    println!("beside the known: {total:?}; without being told {blind}");
+    assert_eq!(total.false_ones, 0, "{total:?}");
+    assert!(f64::from(total.found) >= 0.95 * f64::from(total.there), "{total:?}");
+    assert!(blind < total.found / 2, "{blind}: the test would show nothing");
+}
+
+#[test]
 fn a_strong_tone_brings_no_satellites_and_hides_none() {
     let (metadata, samples, mut searcher) = searcher(&AcquisitionSettings::default());
     for jn0_dbhz in [50.0, 56.0, 75.0, 90.0] {

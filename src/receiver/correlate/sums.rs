@@ -1,7 +1,7 @@
 //! Samples with their running sums, by which the correlator by pieces needs no sample twice.
 //!
-//! Sums are made of integers, in halves of a sample's last bit, so they are exact while they stay below 2²³ of
-//! them and right to 6e-8 of their size beyond.
+//! Sums are integers, in halves of a sample's last bit and modulo 2³², so that differences are exact wherever
+//! the sums began.
 
 use super::kernel::Level;
 use super::pieces::kernel;
@@ -31,16 +31,17 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// Running sums of samples: entry n is that of all samples before sample n, with one entry more at the end.
+/// Running sums of samples, in halves: entry n is that of all samples before sample n, with one entry more at
+/// the end.
 #[derive(Clone, Copy, Debug)]
-pub struct Sums<'a>(&'a [[f32; 2]]);
+pub struct Sums<'a>(&'a [[i32; 2]]);
 
 impl<'a> Sums<'a> {
     /// Entries beyond the number of samples.
     const MORE: usize = 2;
 
     /// Sums as [`RunningSums`] made them.
-    fn new(entries: &'a [[f32; 2]]) -> Option<Self> {
+    fn new(entries: &'a [[i32; 2]]) -> Option<Self> {
         (entries.len() > Self::MORE).then_some(Self(entries))
     }
 
@@ -50,7 +51,7 @@ impl<'a> Sums<'a> {
     }
 
     /// The entries; at least three.
-    pub(super) fn entries(&self) -> &'a [[f32; 2]] {
+    pub(super) fn entries(&self) -> &'a [[i32; 2]] {
         self.0
     }
 
@@ -62,13 +63,13 @@ impl<'a> Sums<'a> {
 
 /// Room for running sums.
 #[derive(Clone, Debug, Default)]
-pub struct RunningSums(Vec<[f32; 2]>);
+pub struct RunningSums(Vec<[i32; 2]>);
 
 impl RunningSums {
     /// The running sums of samples of 8 bits: within ±127.5, in steps of a half or more.
     pub fn of(&mut self, i: &[f32], q: &[f32]) -> Option<Sums<'_>> {
         let samples = i.len().min(q.len());
-        self.0.resize(samples + Sums::MORE, [0.0; 2]);
+        self.0.resize(samples + Sums::MORE, [0; 2]);
         let (i, q) = (&i[..samples], &q[..samples]);
         kernel::running_sums(Level::best(), i, q, &mut self.0[..=samples]);
         self.0[samples + 1] = self.0[samples];
@@ -85,17 +86,17 @@ mod tests {
         let value = |k: usize, by: usize| ((k * by % 511) as f32 - 255.0) / 2.0;
         for count in [0, 1, 2, 3, 4, 5, 7, 8, 9, 63, 1000, 70_001] {
             let i: Vec<f32> = (0..count).map(|k| value(k, 37)).collect();
-            // All of one sign: 70 001 of them pass 2²³ halves.
+            // All of one sign.
             let q: Vec<f32> = (0..count).map(|k| 127.5 - value(k, 91).abs() / 8.0).collect();
             let q: Vec<f32> = q.iter().map(|x| (2.0 * x).round() / 2.0).collect();
-            let mut expected = vec![[0.0_f32; 2]; count + 1];
+            let mut expected = vec![[0_i32; 2]; count + 1];
             let mut sum = [0.0_f64; 2];
             for k in 0..count {
                 sum = [sum[0] + f64::from(i[k]), sum[1] + f64::from(q[k])];
-                expected[k + 1] = sum.map(|x| x as f32);
+                expected[k + 1] = sum.map(|x| (2.0 * x) as i32);
             }
             for level in Level::all() {
-                let mut made = vec![[7.0_f32; 2]; count + 1];
+                let mut made = vec![[7_i32; 2]; count + 1];
                 kernel::running_sums(level, &i, &q, &mut made);
                 assert_eq!(made, expected, "{level:?} {count}");
             }

@@ -13,7 +13,7 @@ use crate::gnss::record::{EventRow, LineRow};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::{Link, Signal};
 use crate::receiver::acquire::{self, AcquireError, Searcher};
-use crate::receiver::correlate::sums::Samples;
+use crate::receiver::correlate::sums::{RunningSums, Samples};
 use crate::receiver::decode::Decoder;
 use crate::receiver::interference::{Followed, Watch};
 use crate::receiver::lead::lead;
@@ -27,11 +27,18 @@ use crate::receiver::source::{Block, Lookback, Packed, Planes};
 use crate::receiver::track::loops::CodeShape;
 use crate::receiver::track::{Channel, ReplicaModel, Report, Shown};
 
-/// Channels go over a block in parts of so many samples at least: 512 KiB in planar `f32` with running sums, a
-/// core's own cache …
+/// Channels go over a block in parts of so many samples at least: 512 KiB in planar `f32` with running sums,
+/// a core's own cache …
 const PART_SAMPLES: usize = 1 << 15;
 /// … and of so many of the longest code period, as one that a part's end cuts is unpacked again.
 const PART_PERIODS: f64 = 4.0;
+
+/// Samples of a part of a block, unpacked and summed up.
+#[derive(Default)]
+struct Room {
+    planes: Planes,
+    sums: RunningSums,
+}
 
 /// One channel and its decoder.
 pub(super) struct Track {
@@ -105,7 +112,7 @@ pub(super) struct FrontEnd {
     pub window: Option<Window>,
     pub tracks: Vec<Track>,
     /// Of each share of the tracks.
-    planes: Vec<Planes>,
+    rooms: Vec<Room>,
     /// Samples of code periods that the last block's end has cut.
     lookback: Lookback,
     pub lost: BTreeMap<Link, u64>,
@@ -154,7 +161,7 @@ impl FrontEnd {
             next_foreseen: 0,
             window: None,
             tracks: Vec::new(),
-            planes: Vec::new(),
+            rooms: Vec::new(),
             lookback: Lookback::default(),
             lost: BTreeMap::new(),
             refused: BTreeMap::new(),
@@ -203,15 +210,15 @@ impl FrontEnd {
     fn advance(&mut self, block: &Packed, ticks: &[Tick]) {
         let ticks: Vec<u64> = ticks.iter().map(|tick| tick.own).collect();
         let share = self.tracks.len().div_ceil(rayon::current_num_threads()).max(1);
-        self.planes.resize_with(self.tracks.len().div_ceil(share), Planes::default);
+        self.rooms.resize_with(self.tracks.len().div_ceil(share), Room::default);
         let longest_s = self.tracks.iter().map(|track| track.channel.period_s()).fold(0.0, f64::max);
         let part = PART_SAMPLES.max(self.samples(PART_PERIODS * longest_s) as usize);
-        let joined = self.lookback.join(block);
-        self.tracks.par_chunks_mut(share).zip(&mut self.planes).for_each(|(tracks, planes)| {
+        let stream = (&self.lookback, block);
+        self.tracks.par_chunks_mut(share).zip(&mut self.rooms).for_each(|(tracks, room)| {
             tracks.iter_mut().for_each(|track| clear(&mut track.report));
             for start in (0..block.samples()).step_by(part) {
                 let (from, to) = (block.first + start as u64, block.end().min(block.first + (start + part) as u64));
-                follow(tracks, (&joined, planes), (from, to), within(&ticks, from, to));
+                follow(tracks, stream, room, (from, to), within(&ticks, from, to));
             }
         });
         let needed = self.tracks.iter().filter_map(|track| track.channel.needs()).min();
@@ -274,15 +281,21 @@ impl FrontEnd {
     }
 }
 
-/// Takes channels through the samples `from` to `to` of a stream, which begins with those that they need again.
-fn follow(tracks: &mut [Track], (joined, planes): (&Packed, &mut Planes), (from, to): (u64, u64), ticks: &[u64]) {
+/// Takes channels through the samples `from` to `to` of a stream, which begins with those that they need
+/// again.
+fn follow(
+    tracks: &mut [Track],
+    (lookback, block): (&Lookback, &Packed),
+    room: &mut Room,
+    (from, to): (u64, u64),
+    ticks: &[u64],
+) {
     let needed = tracks.iter().filter_map(|track| track.channel.needs()).min();
-    let first = needed.unwrap_or(from).clamp(joined.first, from);
-    let range = (first - joined.first) as usize..(to - joined.first) as usize;
-    joined.unpack(range, planes);
-    let Planes { i, q, sums } = planes;
+    let first = needed.unwrap_or(from).clamp(lookback.first(block), from);
+    let samples = lookback.unpack(block, (first, to), &mut room.planes);
+    let (i, q) = (samples.i, samples.q);
     let summed = tracks.iter().any(|track| track.channel.takes_sums());
-    let sums = if summed { sums.of(i, q) } else { None };
+    let sums = if summed { room.sums.of(i, q) } else { None };
     let shown = Shown { first, samples: Samples { i, q, sums }, from };
     for track in tracks.iter_mut() {
         track.channel.follow(&shown, ticks, &mut track.report);

@@ -58,12 +58,14 @@ impl FrontEnd {
             }
             return self.start_channels(believed, block.first, shared, sink);
         }
-        // Satellites that are followed are searched for too: without them their cross-correlation
-        // would pass for others.
-        let sought = suited::distinct(&self.candidates);
+        // Satellites that are followed are searched for too, or taken out of the samples: without that their
+        // cross-correlation would pass for others.
+        let known = self.known(shared);
+        let mut sought = suited::distinct(&self.candidates);
         let is_followed = |link: &Link| self.tracks.iter().any(|track| track.channel.link().is_alike(*link));
         if !sought.iter().all(is_followed) {
-            let results = self.searcher.search(&window.block(), &sought)?;
+            sought.retain(|link| !known.iter().any(|one| one.link().is_alike(*link)));
+            let results = self.searcher.search_beside(&window.block(), &sought, &known)?;
             self.look(&results, end, shared);
             self.start_channels(results, block.first, shared, sink)?;
         }
@@ -74,6 +76,24 @@ impl FrontEnd {
             self.next_search = end;
         }
         Ok(())
+    }
+
+    /// Where the satellites are that are followed beyond doubt; none before there was a fix, while searches
+    /// may still say that the samples are not what they seem.
+    fn known(&self, shared: &Shared) -> Vec<Acquired> {
+        let settled = self.tracks.iter().filter(|track| shared.fixes > 0 && track.channel.is_settled());
+        let place = |track: &Track| {
+            let (link, phases) = (track.channel.link(), track.channel.phases());
+            Acquired {
+                sv: link.sv,
+                signal: link.signal,
+                sample: phases.sample,
+                code_phase_chips: phases.chips,
+                doppler_hz: track.channel.doppler_hz(),
+                cn0_dbhz: track.cn0_dbhz,
+            }
+        };
+        settled.map(place).collect()
     }
 
     /// Whether a search begins with this block: one for all, or one for the satellites that are foreseen.

@@ -5,7 +5,8 @@
 //! collected while the carrier's oscillator runs free; frequency, phase and the probable edges follow from it
 //! ([`super::pull_in`]), integrations keep to these edges at once, and symbols are given out when the edges
 //! are beyond doubt. Every correlation spans one code period of the replica, from the first sample of the
-//! period on; samples of an unfinished period are shown again or kept, so that results do not depend on blocks.
+//! period on; samples of an unfinished period are shown again or kept, so that results do not depend on
+//! blocks.
 
 use num_complex::Complex64;
 

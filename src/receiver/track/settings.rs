@@ -54,8 +54,8 @@ pub struct TrackingSettings {
     pub waveform: Layers,
     /// How the replica's chips fall on the samples.
     pub replica: Edge,
-    /// What correlations are computed in: sums for running sums of 8-bit samples, where carrier and rate suit them,
-    /// i16 for products of 16 bits, f32, or f64 for the exact twin of all.
+    /// What correlations are computed in: sums for running sums of 8-bit samples, where carrier and rate suit
+    /// them, i16 for products of 16 bits, f32, or f64 for the exact twin of all.
     pub arithmetic: Arithmetic,
     /// Phase lock (mean cosine of twice the phase error) is declared at this value …
     pub phase_lock_threshold: f64,

@@ -1,8 +1,8 @@
 //! Groups of pieces eight at a time with AVX2, and running sums; elsewhere [`super::lanes`].
 //!
-//! Sums lie as (in-phase, quadrature) pairs, four to a register. Phasors and places of a chunk are made first:
-//! so every loop has few values at hand, and runs that do not wait for each other. No operation is fused, so the
-//! bits are those of the plain twin.
+//! Sums lie as (in-phase, quadrature) pairs, four to a register. Phasors and places of a chunk are made
+//! first: so every loop has few values at hand, and runs that do not wait for each other. No operation is
+//! fused, so the bits are those of the plain twin.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64 as x86;
@@ -10,12 +10,13 @@ use std::arch::x86_64 as x86;
 use super::super::kernel::Level;
 use super::lanes::{self, Chunk, Products};
 #[cfg(target_arch = "x86_64")]
-use super::lanes::{PLACE_BITS, PRODUCT_BITS, SINE, TURNS};
+use super::lanes::{PLACE_BITS, PRODUCT_BITS, SINE, TURNS, WINDOW_TAPS};
 #[cfg(target_arch = "x86_64")]
 use super::{GROUP, GROUPS};
 
-/// Adds the products of a chunk. Groups `inner` go by windows: early, prompt and late a sample apart at most, with
-/// two samples on either side of every place; `level` must be one that this processor has.
+/// Adds the products of a chunk. Groups `inner` go by windows: early, prompt and late come first, a sample
+/// apart at most, with two samples on either side of every place; `level` must be one that this processor
+/// has.
 pub(super) fn add<const T: usize>(level: Level, chunk: &Chunk<T>, inner: [usize; 2], products: &mut Products<T>) {
     let ([from, to], all) = (inner, chunk.starts.len());
     match level {
@@ -24,7 +25,8 @@ pub(super) fn add<const T: usize>(level: Level, chunk: &Chunk<T>, inner: [usize;
             lanes::window(chunk, (from, to), products);
             lanes::anywhere(chunk, (to, all), products);
         }
-        // SAFETY: `Level` values beyond the baseline come from `best` (and `all` in tests), which detected AVX2.
+        // SAFETY: `Level` values beyond the baseline come from `best` (and `all` in tests), which detected
+        // AVX2.
         #[cfg(target_arch = "x86_64")]
         Level::Avx2 | Level::Avx512 => unsafe {
             groups::<T, false>(chunk, (0, from), products);
@@ -36,7 +38,7 @@ pub(super) fn add<const T: usize>(level: Level, chunk: &Chunk<T>, inner: [usize;
 
 /// Fills `entries`, one more than samples, with the sums of the samples before each: halves are summed as
 /// integers.
-pub(in super::super) fn running_sums(level: Level, i: &[f32], q: &[f32], entries: &mut [[f32; 2]]) {
+pub(in super::super) fn running_sums(level: Level, i: &[f32], q: &[f32], entries: &mut [[i32; 2]]) {
     let done = match level {
         Level::Baseline => Done { samples: 0, halves: [0; 2] },
         // SAFETY: as above.
@@ -45,12 +47,12 @@ pub(in super::super) fn running_sums(level: Level, i: &[f32], q: &[f32], entries
     };
     let mut halves = done.halves;
     if let Some(first) = entries.first_mut() {
-        *first = [0.0; 2];
+        *first = [0; 2];
     }
     let rest = i.iter().zip(q).zip(entries.iter_mut().skip(1)).skip(done.samples);
     for ((i, q), entry) in rest {
         halves = [halves[0].wrapping_add((2.0 * i) as i32), halves[1].wrapping_add((2.0 * q) as i32)];
-        *entry = halves.map(|sum| 0.5 * sum as f32);
+        *entry = halves;
     }
 }
 
@@ -62,10 +64,9 @@ struct Done {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn running_sums_avx2(i: &[f32], q: &[f32], entries: &mut [[f32; 2]]) -> Done {
+fn running_sums_avx2(i: &[f32], q: &[f32], entries: &mut [[i32; 2]]) -> Done {
     let (fours_i, fours_q) = (i.as_chunks::<4>().0, q.as_chunks::<4>().0);
     let fours = entries.get_mut(1..).unwrap_or_default().as_chunks_mut::<4>().0;
-    let half = x86::_mm256_set1_ps(0.5);
     let last = x86::_mm256_setr_epi32(6, 7, 6, 7, 6, 7, 6, 7);
     let none = x86::_mm256_setzero_si256();
     let mut before = none;
@@ -82,10 +83,10 @@ fn running_sums_avx2(i: &[f32], q: &[f32], entries: &mut [[f32; 2]]) -> Done {
         // The upper half gets what the lower one adds up to.
         let lower = x86::_mm256_blend_epi32::<0x0f>(x86::_mm256_permute4x64_epi64::<0x50>(two), none);
         let four = x86::_mm256_add_epi32(two, lower);
-        let sums = x86::_mm256_mul_ps(x86::_mm256_cvtepi32_ps(x86::_mm256_add_epi32(four, before)), half);
+        let sums = x86::_mm256_add_epi32(four, before);
         before = x86::_mm256_add_epi32(before, x86::_mm256_permutevar8x32_epi32(four, last));
         // SAFETY: there is room for four pairs, and any alignment will do.
-        unsafe { x86::_mm256_storeu_ps(out.as_mut_ptr().cast(), sums) };
+        unsafe { x86::_mm256_storeu_si256(out.as_mut_ptr().cast(), sums) };
         samples += 4;
     }
     let pair = x86::_mm256_castsi256_si128(before);
@@ -118,9 +119,8 @@ fn groups<const T: usize, const WINDOW: bool>(
     let (mut cos, mut sin) = ([x86::_mm256_setzero_ps(); T], [x86::_mm256_setzero_ps(); T]);
     if WINDOW {
         windows(chunk, made, &mut cos, &mut sin);
-    } else {
-        anywhere(chunk, made, &mut cos, &mut sin);
     }
+    each_tap(chunk, made, if WINDOW { WINDOW_TAPS } else { 0 }, &mut cos, &mut sin);
     for t in 0..T {
         for (sums, own) in [(&mut products.cos[t], cos[t]), (&mut products.sin[t], sin[t])] {
             // SAFETY: eight values are there, and any alignment will do.
@@ -223,6 +223,14 @@ fn fractions(places: x86::__m256i) -> x86::__m256 {
     x86::_mm256_sub_ps(x86::_mm256_castsi256_ps(with_one), x86::_mm256_set1_ps(1.0))
 }
 
+/// The difference of two sums.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn less(a: x86::__m256i, b: x86::__m256i) -> x86::__m256 {
+    x86::_mm256_cvtepi32_ps(x86::_mm256_sub_epi32(a, b))
+}
+
 /// Half a group, each value twice.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
@@ -238,37 +246,43 @@ fn twice(half: usize, values: x86::__m256) -> x86::__m256 {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]
-unsafe fn two(entries: *const [f32; 2], places: &[u32; GROUP], half: usize) -> [x86::__m256; 2] {
+unsafe fn two(entries: *const [i32; 2], places: &[u32; GROUP], half: usize) -> [x86::__m256i; 2] {
     let at = |piece: usize| {
-        // SAFETY: a place that is there. Volatile, or the compiler would take it from a register in two steps on
-        // one port.
+        // SAFETY: a place that is there. Volatile, or the compiler would take it from a register in two steps
+        // on one port.
         let place = unsafe { std::ptr::read_volatile(&raw const places[piece]) } >> PLACE_BITS;
         // SAFETY: the caller's.
-        unsafe { x86::_mm_loadu_pd(entries.wrapping_add(place as usize).cast()) }
+        unsafe { x86::_mm_loadu_si128(entries.wrapping_add(place as usize).cast()) }
     };
     let pair =
-        |piece: usize| x86::_mm256_insertf128_pd::<1>(x86::_mm256_castpd128_pd256(at(piece)), at(piece + GROUP / 2));
+        |piece: usize| x86::_mm256_inserti128_si256::<1>(x86::_mm256_castsi128_si256(at(piece)), at(piece + GROUP / 2));
     let (a, b) = (pair(2 * half), pair(2 * half + 1));
-    [x86::_mm256_castpd_ps(x86::_mm256_unpacklo_pd(a, b)), x86::_mm256_castpd_ps(x86::_mm256_unpackhi_pd(a, b))]
+    [x86::_mm256_unpacklo_epi64(a, b), x86::_mm256_unpackhi_epi64(a, b)]
 }
 
-/// The sum before the first sample, four times.
+/// What is taken off all entries, four times.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]
-fn bases<const T: usize>(chunk: &Chunk<T>) -> x86::__m256 {
+fn bases<const T: usize>(chunk: &Chunk<T>) -> x86::__m256i {
     let [i, q] = chunk.base;
-    x86::_mm256_setr_ps(i, q, i, q, i, q, i, q)
+    x86::_mm256_setr_epi32(i, q, i, q, i, q, i, q)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]
-fn anywhere<const T: usize>(chunk: &Chunk<T>, made: &[Made], cos: &mut [x86::__m256; T], sin: &mut [x86::__m256; T]) {
+fn each_tap<const T: usize>(
+    chunk: &Chunk<T>,
+    made: &[Made],
+    first_tap: usize,
+    cos: &mut [x86::__m256; T],
+    sin: &mut [x86::__m256; T],
+) {
     let base = bases(chunk);
     let entries = chunk.sums.entries().as_ptr().wrapping_offset(chunk.origin);
     let [first, last] = chunk.bounds.map(|bound| x86::_mm256_set1_epi32(bound));
-    for t in 0..T {
+    for t in first_tap..T {
         let tap = x86::_mm256_set1_epi32(chunk.taps[t]);
         let (mut by_cos, mut by_sin) = (cos[t], sin[t]);
         for made in made {
@@ -287,11 +301,11 @@ fn anywhere<const T: usize>(chunk: &Chunk<T>, made: &[Made], cos: &mut [x86::__m
             unsafe { x86::_mm256_storeu_si256(held.as_mut_ptr().cast(), places) };
             let f = fractions(places);
             for half in 0..2 {
-                // SAFETY: places are held between the first entry and that after the last sample, beyond which
-                // there is one more.
+                // SAFETY: places are held between the first entry and that after the last sample, beyond
+                // which there is one more.
                 let [a, b] = unsafe { two(entries, &held, half) };
-                let part = x86::_mm256_mul_ps(twice(half, f), x86::_mm256_sub_ps(b, a));
-                let value = x86::_mm256_add_ps(x86::_mm256_sub_ps(a, base), part);
+                let part = x86::_mm256_mul_ps(twice(half, f), less(b, a));
+                let value = x86::_mm256_add_ps(less(a, base), part);
                 by_cos = x86::_mm256_add_ps(by_cos, x86::_mm256_mul_ps(twice(half, change_cos), value));
                 by_sin = x86::_mm256_add_ps(by_sin, x86::_mm256_mul_ps(twice(half, change_sin), value));
             }
@@ -317,20 +331,19 @@ fn windows<const T: usize>(chunk: &Chunk<T>, made: &[Made], cos: &mut [x86::__m2
             )
         };
         let f = fractions(places);
-        let (less, more) = (x86::_mm256_sub_ps(f, apart), x86::_mm256_add_ps(f, apart));
+        let (early, late) = (x86::_mm256_sub_ps(f, apart), x86::_mm256_add_ps(f, apart));
         let shares = [
-            x86::_mm256_max_ps(less, none),
-            x86::_mm256_min_ps(less, none),
-            x86::_mm256_min_ps(more, one),
-            x86::_mm256_max_ps(x86::_mm256_sub_ps(more, one), none),
+            x86::_mm256_max_ps(early, none),
+            x86::_mm256_min_ps(early, none),
+            x86::_mm256_min_ps(late, one),
+            x86::_mm256_max_ps(x86::_mm256_sub_ps(late, one), none),
         ];
         for half in 0..2 {
             // SAFETY: the caller's groups have two entries on either side of every place.
             let ([s0, s1], [s2, s3]) =
                 unsafe { (two(entries, &made.places, half), two(entries.wrapping_add(2), &made.places, half)) };
-            let (before, here, after) =
-                (x86::_mm256_sub_ps(s1, s0), x86::_mm256_sub_ps(s2, s1), x86::_mm256_sub_ps(s3, s2));
-            let begun = x86::_mm256_sub_ps(s1, base);
+            let (before, here, after) = (less(s1, s0), less(s2, s1), less(s3, s2));
+            let begun = less(s1, base);
             let of = |share: usize, part| x86::_mm256_mul_ps(twice(half, shares[share]), part);
             let values = [
                 x86::_mm256_add_ps(begun, x86::_mm256_add_ps(of(0, here), of(1, before))),

@@ -10,8 +10,11 @@ pub(super) const PRODUCT_BITS: u32 = 26;
 pub(super) const PAIRS: usize = GROUP / 2;
 /// The pieces of either half of a group, as two instructions part them.
 const HALVES: [[usize; PAIRS]; 2] = [[0, 1, 4, 5], [2, 3, 6, 7]];
-/// sin 2πy = y·(…y²) for |y| ≤ 1/4 to 5e-6: coefficients of the polynomial that is nearest at Chebyshev's places.
+/// sin 2πy = y·(…y²) for |y| ≤ 1/4 to 5e-6: coefficients of the polynomial that is nearest at Chebyshev's
+/// places.
 pub(super) const SINE: [f32; 4] = [6.283_180_5, -41.339_246, 81.408_01, -71.607_68];
+/// Taps that a window serves.
+pub(super) const WINDOW_TAPS: usize = 3;
 /// Turns of an integer phase of 32 bits.
 pub(super) const TURNS: f32 = 1.0 / 4_294_967_296.0;
 
@@ -21,8 +24,8 @@ pub(super) struct Chunk<'a, const T: usize> {
     pub middles: &'a [[u32; GROUP]],
     pub levels: &'a [[f32; GROUP]],
     pub sums: Sums<'a>,
-    /// The sum before the first sample.
-    pub base: [f32; 2],
+    /// What is taken off all entries.
+    pub base: [i32; 2],
     /// The entry from which places count, which may lie before the first one.
     pub origin: isize,
     /// Places of the first and after the last sample.
@@ -68,42 +71,31 @@ pub(super) fn phasor(phase: u32) -> [f32; 2] {
     [sine(quarter), sine(folded)]
 }
 
-/// Groups `from` to `to` of a chunk, taps wherever they are; places beyond the samples are held at their ends.
-pub(super) fn anywhere<const T: usize>(chunk: &Chunk<T>, (from, to): (usize, usize), products: &mut Products<T>) {
+/// Groups `from` to `to` of a chunk, taps wherever they are; places beyond the samples are held at their
+/// ends.
+pub(super) fn anywhere<const T: usize>(chunk: &Chunk<T>, groups: (usize, usize), products: &mut Products<T>) {
     let mut own = Products::after(products.last);
-    let gains = changes(chunk, (from, to), &mut own.last);
-    for t in 0..T {
-        for (g, gains) in (from..to).zip(&gains) {
-            for (k, pair) in in_order() {
-                let at = (place(chunk, g, k) + chunk.taps[t]).max(chunk.bounds[0]).min(chunk.bounds[1]);
-                let f = fraction(at);
-                for c in 0..2 {
-                    let (a, b) = (sum(chunk, at, 0, c), sum(chunk, at, 1, c));
-                    let value = (a - chunk.base[c]) + f * (b - a);
-                    own.cos[t][2 * pair + c] += gains[k][0] * value;
-                    own.sin[t][2 * pair + c] += gains[k][1] * value;
-                }
-            }
-        }
-    }
+    let gains = changes(chunk, groups, &mut own.last);
+    each_tap(chunk, groups.0, &gains, 0, &mut own);
     add(products, &own);
 }
 
-/// The same for early, prompt and late at most a sample apart, from the four sums about the prompt's place, all
-/// of which are there.
-pub(super) fn window<const T: usize>(chunk: &Chunk<T>, (from, to): (usize, usize), products: &mut Products<T>) {
+/// The same where the first three taps, early, prompt and late, are a sample apart at most: these from the
+/// four sums about the prompt's place, all of which are there.
+pub(super) fn window<const T: usize>(chunk: &Chunk<T>, groups: (usize, usize), products: &mut Products<T>) {
     let mut own = Products::after(products.last);
-    let gains = changes(chunk, (from, to), &mut own.last);
-    for (g, gains) in (from..to).zip(&gains) {
+    let gains = changes(chunk, groups, &mut own.last);
+    for (g, gains) in (groups.0..).zip(&gains) {
         for (k, pair) in in_order() {
             let at = place(chunk, g, k);
             let f = fraction(at);
-            let (less, more) = (f - chunk.apart, f + chunk.apart);
-            let shares = [less.max(0.0), less.min(0.0), more.min(1.0), (more - 1.0).max(0.0)];
+            let (early, late) = (f - chunk.apart, f + chunk.apart);
+            let shares = [early.max(0.0), early.min(0.0), late.min(1.0), (late - 1.0).max(0.0)];
             for c in 0..2 {
                 let s = |n: isize| sum(chunk, at, n, c);
-                let [before, here, after] = [s(0) - s(-1), s(1) - s(0), s(2) - s(1)];
-                let begun = s(0) - chunk.base[c];
+                let less = |a: i32, b: i32| a.wrapping_sub(b) as f32;
+                let [before, here, after] = [less(s(0), s(-1)), less(s(1), s(0)), less(s(2), s(1))];
+                let begun = less(s(0), chunk.base[c]);
                 let values = [
                     begun + (shares[0] * here + shares[1] * before),
                     begun + f * here,
@@ -116,11 +108,36 @@ pub(super) fn window<const T: usize>(chunk: &Chunk<T>, (from, to): (usize, usize
             }
         }
     }
+    each_tap(chunk, groups.0, &gains, WINDOW_TAPS, &mut own);
     add(products, &own);
 }
 
+/// Taps from number `first` on, one after the other.
+fn each_tap<const T: usize>(
+    chunk: &Chunk<T>,
+    from: usize,
+    gains: &[[[f32; 2]; GROUP]],
+    first: usize,
+    own: &mut Products<T>,
+) {
+    for t in first..T {
+        for (g, gains) in (from..).zip(gains) {
+            for (k, pair) in in_order() {
+                let at = (place(chunk, g, k) + chunk.taps[t]).max(chunk.bounds[0]).min(chunk.bounds[1]);
+                let f = fraction(at);
+                for c in 0..2 {
+                    let (a, b) = (sum(chunk, at, 0, c), sum(chunk, at, 1, c));
+                    let value = a.wrapping_sub(chunk.base[c]) as f32 + f * b.wrapping_sub(a) as f32;
+                    own.cos[t][2 * pair + c] += gains[k][0] * value;
+                    own.sin[t][2 * pair + c] += gains[k][1] * value;
+                }
+            }
+        }
+    }
+}
+
 /// Sum of the samples before the one at a place, or `beyond` places further.
-fn sum<const T: usize>(chunk: &Chunk<T>, at: i32, beyond: isize, c: usize) -> f32 {
+fn sum<const T: usize>(chunk: &Chunk<T>, at: i32, beyond: isize, c: usize) -> i32 {
     let entry = chunk.origin + (at >> PLACE_BITS) as isize + beyond;
     chunk.sums.entries()[entry as usize][c]
 }

@@ -12,8 +12,8 @@
 //!
 //! The one approximation is the carrier, which stands still within a piece. Pieces end at [`LONGEST_CHIPS`],
 //! and are taken only where it turns by [`MOST_TURNS`] at most in so long: against a replica that turns with
-//! every sample that costs (πfL)²/3 of the power on average over pieces of length L, 0.003 dB at 5 kHz and 0.011 dB
-//! at 10 kHz for C/A, and no bias. Positions have 2⁻¹⁶ of a sample, phasors an error of 5e-6.
+//! every sample that costs (πfL)²/3 of the power on average over pieces of length L, 0.003 dB at 5 kHz and
+//! 0.011 dB at 10 kHz for C/A, and no bias. Positions have 2⁻¹⁶ of a sample, phasors an error of 5e-6.
 //!
 //! [`lanes`] is the plain twin of [`kernel`]: the same sums in the same order, so the same bits.
 
@@ -41,12 +41,13 @@ const LONGEST_CHIPS: usize = 4;
 const MOST_TURNS: f64 = 0.04;
 /// Pieces a sample at most: with more of them products sample by sample are quicker.
 const MOST_PIECES: f64 = 0.3;
-/// Samples that a group spans at most: places within a chunk have 16 bits.
+/// Samples that a group spans at most: places within a chunk have 16 bits, and sums 24.
 const MOST_SAMPLES: f64 = 28_000.0;
 /// Samples in a step at most: steps have 6 bits before the point.
 const MOST_SAMPLES_A_STEP: f64 = 60.0;
 
-/// The pieces of a period and a little more, in groups. Counted is from [`MARGIN`] steps before the period on.
+/// The pieces of a period and a little more, in groups. Counted is from [`MARGIN`] steps before the period
+/// on.
 #[derive(Clone, Debug)]
 pub(super) struct Pieces {
     /// Part of the replica.
@@ -72,10 +73,14 @@ impl Pieces {
         }
         let margin = MARGIN as usize;
         let values: Vec<i8> = (length - margin..2 * length + margin).map(|step| wave.values[step % length]).collect();
-        let longest = LONGEST_CHIPS * wave.steps_per_chip;
+        // A piece that the samples cut is not met in its middle: where a period begins and ends they are
+        // short.
+        let period = margin..margin + length;
+        let longest = |step: usize| if period.contains(&step) { LONGEST_CHIPS } else { 1 } * wave.steps_per_chip;
         let mut starts: Vec<usize> = vec![0];
         for (step, pair) in (1..).zip(values.windows(2)) {
-            if pair[0] != pair[1] || starts.last().is_some_and(|last| step - last >= longest) {
+            let is_long = starts.last().is_some_and(|last| step - last >= longest(*last));
+            if pair[0] != pair[1] || is_long || step == period.start || step == period.end {
                 starts.push(step);
             }
         }
@@ -140,9 +145,15 @@ impl Pieces {
         }
         let by_themselves = if first.is_some() { 3 } else { 0 };
         for (tap, found) in taps.iter().zip(&mut found).skip(by_themselves) {
-            [*found] = self.together(level, sums, &nco, [*tap]);
+            // Counted from itself it has a place near those of its changes.
+            [*found] = self.together(level, sums, &Nco { code: self.moved(nco.code, *tap), ..nco }, [0]);
         }
         found
+    }
+
+    /// A phase of steps and a tap, within the period.
+    fn moved(&self, code: i64, tap: i64) -> i64 {
+        (i128::from(code) + i128::from(tap)).rem_euclid(i128::from(self.period())) as i64
     }
 
     /// The same for taps that are near each other: over one end of the table after the other.
@@ -150,7 +161,7 @@ impl Pieces {
         let (samples, period, step) = (sums.samples(), self.period(), nco.code_step as i64);
         let (low, high) = extent(&taps);
         let margin = MARGIN << CODE_BITS;
-        let begin = (i128::from(nco.code) + i128::from(low + margin / 2)).rem_euclid(i128::from(period)) as i64;
+        let begin = self.moved(nco.code, low + margin / 2);
         let mut nco = Nco { code: begin - margin / 2 - low, ..*nco };
         let mut totals = [Complex64::ZERO; T];
         let mut done = 0;

@@ -10,6 +10,8 @@ use super::{GROUP, GROUPS, LONGEST_CHIPS, MARGIN, MOST_SAMPLES, Pieces, extent, 
 
 /// Places of chunks are held within 16 bits.
 const FARTHEST: f64 = 32_000.0;
+/// What entries count.
+const HALF: f64 = 0.5;
 /// 2³².
 const PHASE: f64 = 4_294_967_296.0;
 
@@ -25,11 +27,12 @@ pub(super) fn correlate<const T: usize>(
     let entries = sums.entries();
     let base = entries[0];
     let mut totals = [([0.0_f64; 2 * PAIRS], [0.0_f64; 2 * PAIRS]); T];
+    let mut bases = ([0.0_f64; 2], [0.0_f64; 2]);
     let mut last = None;
     let mut from = way.groups.0;
     while from < way.groups.1 {
         let to = way.groups.1.min(from + way.most);
-        let chunk = way.chunk(pieces, sums, base, (from, to), taps);
+        let chunk = way.chunk(pieces, sums, (from, to), taps);
         let before = last.unwrap_or_else(|| way.before(pieces, &chunk, from));
         let mut products = Products::after(before);
         let inner = [way.inner.0, way.inner.1].map(|group| group.clamp(from, to) - from);
@@ -38,20 +41,27 @@ pub(super) fn correlate<const T: usize>(
             total.0.iter_mut().zip(cos).for_each(|(total, one)| *total += f64::from(*one));
             total.1.iter_mut().zip(sin).for_each(|(total, one)| *total += f64::from(*one));
         }
+        // What the chunk's base is above the first entry meets the sum of all changes.
+        let above = [0, 1].map(|c| f64::from(chunk.base[c].wrapping_sub(base[c])));
+        let changed = [0, 1].map(|part| f64::from(before[part]) - f64::from(products.last[part]));
+        for c in 0..2 {
+            bases.0[c] += changed[0] * above[c];
+            bases.1[c] += changed[1] * above[c];
+        }
         last = Some(products.last);
         from = to;
     }
     let [cos, sin] = last.unwrap_or_default().map(f64::from);
     let end = entries[sums.samples()];
-    let whole = [0, 1].map(|c| f64::from(end[c] - base[c]));
+    let whole = [0, 1].map(|c| f64::from(end[c].wrapping_sub(base[c])));
     let mut found = [Complex64::ZERO; T];
     for ((found, (by_cos, by_sin)), tap) in found.iter_mut().zip(&totals).zip(taps) {
         let fold = |sums: &[f64; 2 * PAIRS], c: usize| (0..PAIRS).map(|pair| sums[2 * pair + c]).sum::<f64>();
-        let [ci, cq] = [0, 1].map(|c| fold(by_cos, c) + cos * whole[c]);
-        let [si, sq] = [0, 1].map(|c| fold(by_sin, c) + sin * whole[c]);
+        let [ci, cq] = [0, 1].map(|c| fold(by_cos, c) + bases.0[c] + cos * whole[c]);
+        let [si, sq] = [0, 1].map(|c| fold(by_sin, c) + bases.1[c] + sin * whole[c]);
         // A tap ahead meets each piece so much earlier.
         let [turn_re, turn_im] = phasor(phase(way.turns * (*tap as f64 * way.samples_a_unit))).map(f64::from);
-        *found = Complex64::new(ci + sq, cq - si) * Complex64::new(turn_re, turn_im);
+        *found = Complex64::new(ci + sq, cq - si) * Complex64::new(turn_re, turn_im) * HALF;
     }
     found
 }
@@ -82,7 +92,8 @@ impl Way {
         let samples_a_unit = 1.0 / step as f64;
         let samples_a_step = samples_a_unit * (1_u64 << CODE_BITS) as f64;
         let apart = taps.first().map_or(0.0, |tap| *tap as f64 * samples_a_unit);
-        let is_window = matches!(taps.as_slice(), [early, 0, late] if *late == -early) && (0.0..=1.0).contains(&apart);
+        let is_window =
+            matches!(taps.as_slice(), [early, 0, late, ..] if *late == -early) && (0.0..=1.0).contains(&apart);
         // Two samples off either end, so that rounding does not matter.
         let inner = if is_window {
             (seek(pieces, begin + 2 * step), seek(pieces, begin + step * (count - 3)).saturating_sub(1))
@@ -107,7 +118,6 @@ impl Way {
         &self,
         pieces: &'a Pieces,
         sums: Sums<'a>,
-        base: [f32; 2],
         (from, to): (usize, usize),
         taps: &[i64; T],
     ) -> Chunk<'a, T> {
@@ -121,7 +131,9 @@ impl Way {
         let origin = (at - reach).floor();
         let bound = |sample: f64| (sample - origin).clamp(-FARTHEST, FARTHEST) as i32 * (1 << PLACE_BITS);
         let rounding = 1_i64 << (PRODUCT_BITS - PLACE_BITS - 1);
-        let place = ((at - origin) * (1_u64 << PRODUCT_BITS) as f64).round() as i64 + rounding;
+        let place = ((at - origin + planted!("receiver.sums.place", 0.0, 0.5)) * (1_u64 << PRODUCT_BITS) as f64).round()
+            as i64
+            + rounding;
         // The middle of the first sample is half a sample after its interval's begin.
         let phase_there = phase(self.first_turns + (at - 0.5) * self.turns);
         Chunk {
@@ -129,7 +141,8 @@ impl Way {
             middles: &pieces.middles[from..to],
             levels: &pieces.levels[from..to],
             sums,
-            base,
+            // Above this one the sums of a chunk are below 2²⁴ halves, which f32 holds.
+            base: sums.entries()[origin.clamp(0.0, sums.samples() as f64) as usize],
             origin: origin as isize,
             bounds: [bound(0.0), bound(sums.samples() as f64)],
             place: place - (u64::from(first) * u64::from(product)) as i64,
@@ -137,7 +150,7 @@ impl Way {
             taps: tap_samples.map(|samples| (samples * f64::from(1 << PLACE_BITS)).round() as i32),
             phase: phase_there.wrapping_sub((2 * first).wrapping_mul(phase_a_step)),
             phase_a_step,
-            apart: self.apart as f32,
+            apart: planted!("receiver.sums.window", self.apart, -self.apart) as f32,
         }
     }
 

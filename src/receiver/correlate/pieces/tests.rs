@@ -60,8 +60,9 @@ fn with_the_carrier_at_rest_sums_are_those_of_the_slow_twin_at_any_length_place_
             for code in [-3.7, 0.0, 0.01, 0.39, 300.5, 1022.9, 5000.0] {
                 let nco = nco(rate_hz, 1.023e6, 0.0, code + 0.001 * turn as f64);
                 let samples = (&i[..length], &q[..length]);
-                // Sums have 2⁻²⁴ of up to 2e5 (an offset of 2 in 50 000 samples) and the shares 2⁻¹⁷, at each
-                // of 600 changes a millisecond with samples of 23 rms; phasors 5e-6 of the sum.
+                // Products of a chunk reach 1e5 (an offset of 2 in 12 000 samples), and 300 sums of them in
+                // f32 err by 0.1; places have 2⁻¹⁷ sample at each of 600 changes a millisecond; phasors 5e-6
+                // of the sum.
                 let bound = 0.02 + 2e-4 * (length as f64).sqrt() * 23.0;
                 if length == 0 {
                     continue;
@@ -86,7 +87,7 @@ fn every_waveform_has_the_sums_of_its_slow_twin() {
         (&E1.components[1], Layers::Strongest, 10e6),
         (&E1.components[1], Layers::Whole, 25e6),
         (&LONG_BOC.components[0], Layers::Strongest, 12e6),
-        (&MIXED.components[0], Layers::Whole, 25e6),
+        (&MIXED.components[0], Layers::Strongest, 12e6),
         (&MULTIPLEXED.components[0], Layers::Strongest, 12e6),
     ];
     for (component, waveform, rate_hz) in cases {
@@ -96,8 +97,9 @@ fn every_waveform_has_the_sums_of_its_slow_twin() {
             let nco = nco(rate_hz, component.chip_rate_hz, 0.0, code);
             let (found, slow) = both(&replica, (&i, &q), &nco, &taps);
             for (a, b) in found.iter().zip(&slow) {
-                // As above, with up to 40 000 changes and several passes.
-                assert!((a - b).norm() < 2e-4 * 60_000_f64.sqrt() * 23.0, "{waveform:?} {rate_hz} {code}: {a} {b}");
+                // A chunk of 500 changes errs by 0.2 in f32; up to 80 of them, in up to four layers: three
+                // sigma.
+                assert!((a - b).norm() < 3.0 * 0.2 * 80_f64.sqrt(), "{waveform:?} {rate_hz} {code}: {a} {b}");
             }
         }
     }
@@ -122,14 +124,18 @@ fn a_carrier_that_turns_costs_what_is_stated_and_biases_nothing() {
         let ([early, prompt, late], [slow_early, slow, slow_late]) =
             both(&replica, (&i, &q), &nco, &[0.25, 0.0, -0.25].map(chips_to_units));
         // Amplitude: (πfL)²/6 with pieces' mean of L³ over that of L below 8 chips², and 2e-5 of phasors.
-        let most = (std::f64::consts::PI * doppler_hz / 1.023e6).powi(2) * 8.0 / 6.0 + 2e-5;
+        let turned = std::f64::consts::PI * doppler_hz / 1.023e6;
+        let most = turned.powi(2) * 8.0 / 6.0 + 2e-5;
         let less = 1.0 - prompt.norm() / slow.norm();
         assert!((-2e-5..most).contains(&less), "{doppler_hz}: {less}");
-        // No phase, and the code no nearer to one side: 1e-5 of the sum is 3 mm.
-        assert!((prompt / slow).arg().abs() < 2e-5, "{doppler_hz}: {}", (prompt / slow).arg());
+        // Phase: a sample at a piece's end is shared by two, which puts the middle of what a piece holds off
+        // by a sample or less; on 580 of them 0.006 sample of 4000, and four times that. 1e-5 of phasors.
+        let apart = 0.024 * std::f64::consts::TAU * doppler_hz.abs() / rate_hz + 1e-5;
+        assert!((prompt / slow).arg().abs() < apart, "{doppler_hz}: {}", (prompt / slow).arg());
+        // Early and late lose the same but for such places, a tenth of it.
         let balance = |early: Complex64, late: Complex64| (early.norm() - late.norm()) / (early.norm() + late.norm());
         let moved = balance(early, late) - balance(slow_early, slow_late);
-        assert!(moved.abs() < 2e-5, "{doppler_hz}: {moved}");
+        assert!(moved.abs() < 0.1 * most + 1e-5, "{doppler_hz}: {moved}");
     }
 }
 
