@@ -2,7 +2,8 @@
 # A receiver that this project did not write, Debian's GNSS-SDR, must find the position of the static scene, and that of the scene of
 # two systems by Galileo alone and by GPS and Galileo, to 5 m. The judge must find from its RINEX and NMEA files what the scenes put
 # into them. Debian's RTKLIB must find the static scene's place by the RINEX files that a run writes, of the receiver and of the truth;
-# and by those of a truth without a troposphere to 0.01 m. gpsdecode, pynmeagps and xmllint read NMEA, KML and GPX of fixes and truth,
+# and by those of a truth without a troposphere to 0.01 m: of GPS and Galileo, and of two carriers of four systems through an ionosphere.
+# georinex reads of those what the tables say. gpsdecode, pynmeagps and xmllint read NMEA, KML and GPX of fixes and truth,
 # and pyarrow every table as Parquet.
 #
 # usage: tests/interop.sh [GNSS_TWIN_BINARY [galileo]]     (default: target/release/gnss-twin, and GPS alone)
@@ -126,7 +127,7 @@ bars() { # C/N0 beside the truth's, and its bar
 rtklib() { # name, directory of the files, bar in m, options
     printf '%s\n' pos1-posmode=single pos1-elmask=5 pos1-ionoopt=brdc pos1-tropopt=saas out-solformat=llh out-timeform=hms \
         out-height=ellipsoidal "${@:4}" >"$work/rtklib.conf"
-    rnx2rtkp -k "$work/rtklib.conf" -o "$work/$1.pos" "$2/observations.rnx" "$2/navigation.rnx" 2>/dev/null
+    rnx2rtkp -k "$work/rtklib.conf" -o "$work/$1.pos" "$2/observations.rnx" "$2"/navigation*.rnx 2>/dev/null
     awk -v name="$1" -v lat0="$(value latitude_deg)" -v lon0="$(value longitude_deg)" -v h0="$(value height_m)" -v limit="$3" \
         -v epochs="$(grep -c '^>' "$2/observations.rnx")" '
         !/^%/ && $6 == 5 { n++; slat += $3; slon += $4; sh += $5 }
@@ -161,6 +162,27 @@ for system in 9 8; do
         "$root/scenarios/two_systems.toml" >"$scene"
     [ -d "$work/both.truth" ] || "$twin" generate "$scene" --out "$work/both.sigmf-data" --rinex --quiet 2>/dev/null
     rtklib "both_$system" "$work/both.truth" 0.01 pos1-tropopt=off pos1-ionoopt=off "pos1-navsys=$system"
+done
+# Two carriers of each satellite, through an ionosphere that nothing else corrects: GPS L1 C/A and L2C, Galileo E1 and E5b, GLONASS G1
+# and G2, BeiDou B1I and B2I (RTKLIB's pairs; it knows no other of Galileo and BeiDou), each system alone (1, 8, 4, 32) and all as one.
+# Nine seconds have the four strings of GLONASS's sets; those of GPS and Galileo are of the run before. The combination has 3 times the
+# 0.3 mm of each range, a dilution of 3 makes 3 mm of it in an epoch.
+"$twin" scenes glonass_two_bands --out "$work/four" >/dev/null
+scene=$work/four/four.toml
+{
+    sed -e '/^#/d; /^\[troposphere\]/d; /^model = "saastamoinen"/d; /^\[noise\]/d; /^\[receiver.position\]/,$d' \
+        -e 's/^start = .*/start = 2020-11-29T12:50:48/; s/^duration_s = .*/duration_s = 9/' \
+        -e 's/^signals = .*/signals = ["GPS L1 C\/A", "GPS L2C", "Galileo E1", "Galileo E5b", "GLONASS G1", "GLONASS G2", "BeiDou B1I", "BeiDou B2I"]/' \
+        "$work/four/glonass_two_bands.toml"
+    # Name, middle and rate: just the main lobes.
+    printf '\n[[front_end]]\nname = "%s"\ncenter_hz = %s\nsample_rate_hz = %s\nformat = "ci8"\n' \
+        l1 1575.42e6 4.2e6 b1 1561.098e6 4.2e6 l2 1227.60e6 2.6e6 b2 1207.14e6 21.3e6
+} >"$scene"
+"$twin" generate "$scene" --out "$work/bands" --rinex --quiet 2>/dev/null
+rm -f "$work"/bands/*.sigmf-data
+cp "$work/both.truth/navigation.rnx" "$work/bands/truth/navigation_before.rnx"
+for system in 1 8 4 32 45; do
+    rtklib "bands_$system" "$work/bands/truth" 0.01 pos1-tropopt=off pos1-ionoopt=dual-freq pos1-frequency=l1+l2 "pos1-navsys=$system"
 done
 scene=$root/scenarios/static.toml
 # And what reads XML and NMEA: no word of theirs on standard error, every fix a position.
@@ -198,11 +220,52 @@ fi
 for copy in "$work"/copies/*.toml; do "$twin" plan "$copy" >/dev/null 2>&1 || { echo "interop: plan $copy failed"; failed=1; }; done
 generate static
 # The metadata beside the samples by SigMF's own validator, which is to refuse a data type that there is not.
-python3 -m venv "$work/sigmf" && "$work/sigmf/bin/pip" install --quiet --disable-pip-version-check sigmf pynmeagps pyarrow || {
-    echo "interop: cannot install sigmf, pynmeagps and pyarrow here" >&2
+python3 -m venv "$work/sigmf" && "$work/sigmf/bin/pip" install --quiet --disable-pip-version-check sigmf pynmeagps pyarrow georinex || {
+    echo "interop: cannot install sigmf, pynmeagps, pyarrow and georinex here" >&2
     exit 75
 }
-# The same sentences by a parser that checks every sum and type: how far its places are from the scene's.
+# What RTKLIB read of four systems, by georinex: every figure of half a second and the sets' elements are those of the tables.
+"$work/sigmf/bin/python" - "$work/bands/truth" 2020-11-29T12:50:48 <<'END' || failed=1
+import csv, datetime, math, sys, warnings
+
+import georinex
+import numpy
+
+warnings.simplefilter("ignore")
+truth, start = sys.argv[1], datetime.datetime.fromisoformat(sys.argv[2])
+CODES = {"GPS L1 C/A": "1C", "GPS L2C": "2L", "Galileo E1": "1C", "Galileo E5b": "7Q", "GLONASS G1": "1C", "GLONASS G2": "2C",
+         "BeiDou B1I": "2I", "BeiDou B2I": "7I"}
+with open(f"{truth}/observations.csv", newline="") as stream:
+    rows = list(csv.DictReader(stream))
+samples = sorted({int(row["sample"]) for row in rows})[:5]
+found = georinex.load(f"{truth}/observations.rnx", tlim=(start, start + datetime.timedelta(seconds=0.45)))
+compared = wrong = 0
+for row in rows:
+    if int(row["sample"]) not in samples:
+        continue
+    at = found.isel(time=samples.index(int(row["sample"]))).sel(sv=row["sv"])
+    for kind, column in (("C", "pseudorange_m"), ("L", "carrier_cycles"), ("D", "doppler_hz"), ("S", "cn0_dbhz")):
+        compared += 1
+        wrong += float(at[kind + CODES[row["signal"]]]) != float(f"{float(row[column]):.3f}")
+print(f"interop: georinex read {compared} observations of {len(found.sv)} satellites, {wrong} other than in the CSV")
+# Elements whose scales LNAV, I/NAV and D1 share, and places of GLONASS.
+SCALES = {"sqrt_a_sqrtm": ("sqrtA", 2.0**-19), "eccentricity": ("Eccentricity", 2.0**-33), "m0_rad": ("M0", math.pi * 2.0**-31),
+          "i0_rad": ("Io", math.pi * 2.0**-31), "x_km": ("X", 1e3 * 2.0**-11), "y_km": ("Y", 1e3 * 2.0**-11), "z_km": ("Z", 1e3 * 2.0**-11)}
+sets = [georinex.load(f"{truth}/{name}.rnx") for name in ("navigation", "navigation_before")]
+elements = off = 0
+with open(f"{truth}/navigation.csv", newline="") as stream:
+    for row in csv.DictReader(stream):
+        if row["parameter"] not in SCALES or row["message"].startswith("CNAV"):
+            continue
+        name, scale = SCALES[row["parameter"]]
+        values = [value for read in sets if row["sv"] in read.sv for value in read[name].sel(sv=row["sv"]).values.flat]
+        elements += 1
+        # Twelve digits after the first are printed.
+        off += not any(math.isclose(value, int(row["raw"]) * scale, rel_tol=1e-12, abs_tol=1e-15) for value in values)
+print(f"interop: georinex read {elements} elements, {off} other than in the CSV")
+sys.exit(not (compared > 1000 and elements > 60 and wrong == off == 0))
+END
+# Sentences by a parser that checks every sum and type: how far its places are from the scene's.
 "$work/sigmf/bin/python" - "$work/run/truth/trajectory.nmea" "$(value latitude_deg)" "$(value longitude_deg)" "$(value height_m)" "$places" <<'END' || failed=1
 import sys
 from pynmeagps import ERR_RAISE, NMEAReader, VALCKSUM
