@@ -1,12 +1,16 @@
 #!/usr/bin/env bash
-# A Debian package of the program, its manual's pages, completions and scenes: target/debian/*.deb. Needs cargo-deb
-# (`cargo install cargo-deb`).
+# A Debian package of the program, which has its scenes within itself, its manual's pages and completions: target/debian/*.deb.
+# Needs cargo-deb (`cargo install cargo-deb --locked`).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo build --locked --profile dist --bin gnss-twin
 out=target/dist
+rm -rf "$out/man" "$out/completions"
 mkdir -p "$out/man" "$out/completions"
 "$out/gnss-twin" man --out "$out/man"
+# As Debian has them: packed, and without the time of packing.
+gzip -9n "$out"/man/*.1
+gzip -9nc CHANGELOG.md >"$out/changelog.gz"
 "$out/gnss-twin" completions bash >"$out/completions/gnss-twin"
 "$out/gnss-twin" completions zsh >"$out/completions/_gnss-twin"
 "$out/gnss-twin" completions fish >"$out/completions/gnss-twin.fish"
