@@ -178,6 +178,39 @@ fn glonass_alone_finds_its_place_by_carriers_of_their_own_and_state_vectors() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
+/// E6's bars: a metre in the combination with E1, which tells it time and orbit; pages of C/NAV among
+/// the parameters that are the ones sent.
+#[test]
+fn galileo_e6_is_told_its_time_by_e1_and_alone_it_is_refused() {
+    let scene = include_str!("../scenarios/galileo_e6.toml")
+        .replace("sample_rate_hz = 6.5e6", "sample_rate_hz = 4.1e6")
+        .replace("duration_s = 60", "duration_s = 40");
+    assert!(scene.contains("4.1e6") && scene.contains("duration_s = 40"));
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("galileo_e6.toml");
+    std::fs::write(&path, &scene).unwrap();
+    std::fs::copy(scenarios().join("igrg3380.10i.gz"), place.path().join("igrg3380.10i.gz")).unwrap();
+    let summary = run_with(&path, &["--check".as_ref()]);
+    found_and_decoded_what_is_there(&summary);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/position/first_fix_s", 35.0);
+    assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
+    assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
+
+    let of_e1 = "[[front_end]]\nname = \"e1\"\ncenter_hz = 1575.42e6\nsample_rate_hz = 4.1e6\nformat = \"ci8\"\n";
+    assert!(scene.contains(of_e1));
+    let alone = scene.replace("\"Galileo E1\", ", "").replace(of_e1, "");
+    std::fs::write(&path, alone).unwrap();
+    let run = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
+        .args(["run".as_ref(), path.as_os_str(), "--out".as_ref(), place.path().join("alone").as_os_str()])
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&run.stderr).into_owned();
+    let sentence = "Galileo E6 cannot be received: its message says neither time nor orbit: expected Galileo E1 or \
+                    Galileo E5b beside it, which says both";
+    assert!(!run.status.success() && text.contains(sentence), "{text}");
+}
+
 /// A sky over Kamakura in 2025, with what GPS satellites broadcast there, as the shipped scene of three
 /// bands has it.
 const KAMAKURA: &str = r#"

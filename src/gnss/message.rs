@@ -35,7 +35,7 @@ pub struct Message {
     pub sender: fn(&Common) -> Result<Box<dyn Sender>, FieldError>,
     /// Number by which faults name the unit that begins then: a subframe's, a word's type.
     pub number: fn(Epoch) -> u8,
-    /// Numbers of the units that say their time, and of those that make up a set of elements.
+    /// Numbers of the units that say their time; none where another signal of the satellite has to tell it.
     pub timed: &'static [u8],
     /// Numbers of the units all of which have to be read before one of those says its whole time; none where
     /// each says it by itself.
@@ -203,6 +203,13 @@ pub enum Read {
         /// Whether symbols are received upside down.
         inverted: bool,
     },
+    /// The same of a message that does not say its time.
+    Undated {
+        /// From its first symbol to the newest, both counted.
+        symbols: u64,
+        /// Whether symbols are received upside down.
+        inverted: bool,
+    },
     /// The start of a unit with its week, resolved near what the reader was given.
     Time(Epoch),
     /// A whole set of elements.
@@ -240,6 +247,11 @@ pub trait Reader: fmt::Debug + Send + Sync {
 }
 
 impl Message {
+    /// Whether it says its time by itself.
+    pub fn is_dated(&self) -> bool {
+        !self.timed.is_empty()
+    }
+
     /// Symbols of a unit.
     pub fn unit_symbols(&self) -> usize {
         (self.unit_s as f64 / self.symbol_s).round() as usize

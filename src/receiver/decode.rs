@@ -2,7 +2,8 @@
 //!
 //! A [`Decoder`] belongs to one channel. It gives the symbols to the reader of the signal's message, ties the
 //! channel's code period number to the satellite's time of week, and brings the times of messages to GPS
-//! time. A time that contradicts the one before drops both.
+//! time. A time that contradicts the one before drops both. Of a message that does not say its time the
+//! beginnings of units are known, and another signal of the satellite tells which ones they are.
 
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::ionosphere::Coefficients;
@@ -68,6 +69,18 @@ pub struct Decoder {
     /// First code period of the symbol to come.
     expected: Option<u64>,
     anchor: Option<Anchor>,
+    /// Where units lie in the week, of a message that does not say their time.
+    undated: Option<Units>,
+}
+
+/// Units of a message that does not say when they begin.
+#[derive(Clone, Copy, Debug)]
+struct Units {
+    /// Seconds of a unit, and after the beginning of the week those of the first.
+    unit_s: i64,
+    first_s: i64,
+    /// First code period of one that was read.
+    begin: Option<u64>,
 }
 
 impl Decoder {
@@ -86,7 +99,40 @@ impl Decoder {
             periods_per_second: periods_per_second as i64,
             expected: None,
             anchor: None,
+            undated: (!message.is_dated()).then_some(Units {
+                unit_s: message.unit_s,
+                first_s: message.first_s,
+                begin: None,
+            }),
         })
+    }
+
+    /// Whether another signal of the satellite has to tell the time.
+    pub fn is_dated_elsewhere(&self) -> bool {
+        self.undated.is_some()
+    }
+
+    /// Whether units of the message were found, be their time known or not.
+    pub fn has_units(&self) -> bool {
+        self.anchor.is_some() || self.undated.is_some_and(|units| units.begin.is_some())
+    }
+
+    /// Takes the time of week by the satellite's clock in the code period `period` from another of its
+    /// signals; whether the time of this one is known from here on. One that puts the beginnings of units
+    /// further from their places than a code period is not believed.
+    pub fn date(&mut self, period: u64, of_week: (i64, f64)) -> bool {
+        let Some(Units { unit_s, first_s, begin: Some(begin) }) = self.undated else { return false };
+        let rate = self.periods_per_second as f64;
+        let passed_s = (i128::from(period) - i128::from(begin)) as f64 / rate;
+        // Half a code period in the mean after its beginning.
+        let begun_s = (of_week.0 - first_s) as f64 + (of_week.1 - passed_s) - 0.5 / rate;
+        let unit = (begun_s / unit_s as f64).round();
+        if (begun_s - unit * unit_s as f64).abs() > 1.0 / rate {
+            return false;
+        }
+        let unit = planted!("receiver.decode.dated", unit as i64, unit as i64 + 1);
+        let of_week = (unit * unit_s + first_s).rem_euclid(WEEK_S) * self.periods_per_second;
+        self.anchor.replace(Anchor { period: begin, of_week }).is_none()
     }
 
     /// Whether the satellite's time of week is known.
@@ -127,6 +173,9 @@ impl Decoder {
                 Read::Unit { symbols, of_week_s, inverted } => {
                     self.tie(next.checked_sub(symbols * self.periods_per_symbol), of_week_s, inverted, &mut news);
                 }
+                Read::Undated { symbols, inverted } => {
+                    self.place(next.checked_sub(symbols * self.periods_per_symbol), inverted, &mut news);
+                }
                 Read::Time(label) => news.push(News::Time(self.time.instant(label))),
                 Read::Ephemeris(set) => {
                     news.push(News::Ephemeris(Box::new(set.timed(|label| self.time.instant(label)))));
@@ -145,6 +194,21 @@ impl Decoder {
             }
         }
         news
+    }
+
+    /// Takes in where a unit of unknown time began. What does not fit those before drops the time.
+    fn place(&mut self, period: Option<u64>, inverted: bool, news: &mut Vec<News>) {
+        let (Some(period), Some(units)) = (period, &mut self.undated) else { return };
+        let length = (units.unit_s * self.periods_per_second).unsigned_abs();
+        let fits = units.begin.is_none_or(|begin| begin.abs_diff(period).is_multiple_of(length));
+        units.begin = fits.then_some(period);
+        if !fits {
+            self.anchor = None;
+            self.reader.doubt();
+            news.push(News::Contradiction);
+            return;
+        }
+        news.push(News::Polarity { inverted });
     }
 
     /// Ties period numbers to the time at which a unit says that it began.

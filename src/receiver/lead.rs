@@ -1,6 +1,6 @@
 //! The component of a signal that a receiver searches and follows.
 
-use crate::gnss::signal::{Component, Layers, Shape, Signal};
+use crate::gnss::signal::{self, Component, Layers, Shape, Signal};
 use crate::receiver::correlate::fits;
 
 /// The strongest component whose code is short enough to be made; of equally strong ones a pilot.
@@ -82,9 +82,25 @@ pub fn refusal(signal: &'static Signal) -> Option<String> {
     unread.then(|| "its data do not begin where the overlay of its pilot does".to_owned())
 }
 
+/// The first of some signals that cannot be dated by the others, and why.
+pub fn undated(signals: &[&'static Signal]) -> Option<(&'static Signal, String)> {
+    let has_data = |signal: &Signal| signal.components.iter().any(|component| component.message.is_some());
+    let alone = |signal: &&'static Signal| {
+        has_data(signal) && !signal.is_dated() && signal.told_by(signals.iter().copied()).next().is_none()
+    };
+    let signal = signals.iter().copied().find(alone)?;
+    let names: Vec<&str> = signal.told_by(signal::all()).map(|teller| teller.name).collect();
+    let names = names.join(" or ");
+    let reason = format!("its message says neither time nor orbit: expected {names} beside it, which says both");
+    Some((signal, reason))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::galileo::e1::E1;
+    use crate::gnss::galileo::e5::{E5A, E5B};
+    use crate::gnss::galileo::e6::E6;
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::signal::Overlay;
     use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, MULTIPLEXED_DATA, QUADRATURE, QUADRATURE_DATA};
@@ -101,6 +117,17 @@ mod tests {
         let long = |signal: &'static Signal| long_beside(lead(signal).unwrap(), signal);
         assert!(long(&MULTIPLEXED).is_some_and(|pilot| std::ptr::eq(pilot, &MULTIPLEXED.components[1])));
         assert!([&L1_CA, &LONG_BOC, &QUADRATURE, &QUADRATURE_DATA, &MIXED].map(long).iter().all(Option::is_none));
+    }
+
+    #[test]
+    fn what_says_no_time_is_refused_without_a_signal_that_tells_it() {
+        let (signal, reason) = undated(&[&E6, &L1_CA]).unwrap();
+        assert!(*signal == E6 && reason.contains("Galileo E1 or Galileo E5b"), "{reason}");
+        // F/NAV has no delay that would make its clock that of E6.
+        assert!(undated(&[&E6, &E5A]).is_some());
+        for told in [&[&E1, &E6][..], &[&E6, &E5B], &[&L1_CA, &E5A], &[&MIXED]] {
+            assert_eq!(undated(told), None, "{told:?}");
+        }
     }
 
     #[test]

@@ -68,6 +68,10 @@ const CARRIED: &str = "witness::cnav::a_set_of_lnav_carried_to_cnav_is_the_same_
 const L2C_CODES: &str = "witness::codes::all_chips_of_all_codes_of_l2c_are_those_of_another_program_and_take_turns";
 const L5_CODES: &str = "witness::codes::all_chips_of_all_codes_of_l5_are_those_of_another_program";
 const E5_PAGES: &str = "witness::fnav::shipped_pages_of_e5a_and_e5b_hold_and_are_sent_by_us_bit_by_bit";
+const E6_CODES: &str = "witness::codes::all_chips_of_all_codes_of_e6_are_those_of_another_program";
+const E6_PAGES: &str = "witness::galileo_e6::pages_of_e6_are_coded_and_interleaved_as_printed";
+const E6_TIME: &str =
+    "witness::galileo_e6::pages_of_e6_are_read_from_any_symbol_and_another_signal_tells_which_second_they_are_of";
 const E5_CODES: &str = "witness::codes::all_chips_of_all_codes_and_overlays_of_e5_are_those_of_another_program";
 const TWO_BANDS: &str =
     "laws::two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_place_without_it";
@@ -280,6 +284,10 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.cnav.order", "messages of CNAV come one place early", CIVIL),
     fault("gnss.cnav.count", "the count of a message is taken for its own beginning", CIVIL),
     fault("gnss.cnav.isc", "corrections between signals have the wrong sign", CARRIED),
+    fault("gnss.e6.codes", "the code of E6 is that of another satellite", E6_CODES),
+    fault("gnss.e6.delay", "E6 has the group delay of E1 by its wavelength", DELAYS),
+    fault("gnss.galileo_cnav.pattern", "pages of C/NAV begin with the inverse of their pattern", E6_PAGES),
+    fault("receiver.decode.dated", "a page that is told its second is taken for the one after it", E6_TIME),
     fault("gnss.e5.registers", "the second registers of E5 give the other bit", E5_CODES),
     fault("gnss.fnav.clock", "the clock of F/NAV is on the other side of that of I/NAV", E5_PAGES),
     fault("gnss.fnav.page_order", "pages of F/NAV come one place early", E5_PAGES),

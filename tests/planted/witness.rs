@@ -23,6 +23,8 @@ mod codes;
 mod data;
 #[path = "../witness/fnav.rs"]
 mod fnav;
+#[path = "../witness/galileo_e6.rs"]
+mod galileo_e6;
 #[path = "../witness/glonass.rs"]
 mod glonass;
 #[path = "../witness/inav.rs"]

@@ -2,6 +2,7 @@
 
 use gnss_twin::gnss::galileo::e1::{self, Code};
 use gnss_twin::gnss::galileo::e5;
+use gnss_twin::gnss::galileo::e6;
 use gnss_twin::gnss::gps::l1ca::{CODE_CHIPS, L1_CA, code};
 use gnss_twin::gnss::gps::{l1c, l2c, l5};
 use gnss_twin::gnss::qzss;
@@ -75,6 +76,27 @@ fn all_chips_of_all_codes_and_overlays_of_e5_are_those_of_another_program() {
     let word = |chips: Vec<i8>| chips.iter().fold(0, |word, chip| word << 1 | u32::from(*chip < 0));
     assert_eq!(word(chips(&e5::E5A.components[0].overlay, 1)), 0x842E9);
     assert_eq!(word(chips(&e5::E5B.components[0].overlay, 1)), 0xE);
+}
+
+/// The same of E6-B and E6-C.
+const E6_CODES: &str = include_str!("../../data/witness/e6_codes.csv");
+
+#[test]
+fn all_chips_of_all_codes_of_e6_are_those_of_another_program() {
+    let mut codes = 0;
+    for line in E6_CODES.lines().skip(1) {
+        let column: Vec<&str> = line.split(',').collect();
+        let which = if column[0] == "E6B" { Code::Data } else { Code::Pilot };
+        let signs = e6::code(which, column[1].parse().unwrap()).unwrap();
+        let chips: Vec<u8> = signs.into_iter().map(|sign| u8::from(sign < 0)).collect();
+        assert_eq!(chips.len(), e6::CODE_CHIPS as usize);
+        holds(&chips, &column[2..], line);
+        codes += 1;
+    }
+    assert_eq!(codes, 100);
+    assert!([0, 51].into_iter().all(|number| e6::code(Code::Pilot, number).is_none()));
+    // The pilot's overlay is that of E5a's (E6-B/C codes technical note).
+    assert_eq!(e6::E6.components[1].overlay.of(17), e5::overlay(17));
 }
 
 /// The same of I5 and Q5.

@@ -8,7 +8,10 @@ use gnss_twin::gnss::bits::Store;
 use gnss_twin::gnss::broadcast::{Ephemeris, StateVector};
 use gnss_twin::gnss::crc::crc24q;
 use gnss_twin::gnss::earth::{Geodetic, Look, look, rotate_earth};
-use gnss_twin::gnss::galileo::inav;
+use gnss_twin::gnss::galileo::e1::E1;
+use gnss_twin::gnss::galileo::e6::E6;
+use gnss_twin::gnss::galileo::fnav::FNAV;
+use gnss_twin::gnss::galileo::inav::{self, INAV_SETS};
 use gnss_twin::gnss::glonass::fdma::{G1, G2};
 use gnss_twin::gnss::glonass::gnav::GNAV_SETS;
 use gnss_twin::gnss::gps::cnav::CNAV_SETS;
@@ -387,6 +390,12 @@ fn clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print(
     for (signal, expected_s) in [(&L1C, -2e-9), (&L1_CA, -7e-9), (&L5, -3e-9)] {
         close(of(&second, signal), expected_s);
     }
+    // Galileo OS SIS ICD 2.1, 5.1.5: Δt − BGD on E1; nothing is said of E6, which has the clock of I/NAV
+    // here, by whichever message the set came.
+    let galileo = Ephemeris { form: &INAV_SETS, tgd_s: 8e-9, tgd2_s: 3e-9, ..blank(System::Galileo) };
+    close(of(&galileo, &E1), -8e-9);
+    close(of(&galileo, &E6), 0.0);
+    close(of(&(FNAV.form)(&galileo), &E6), 0.0);
     // BDS-SIS-ICD-2.1, 5.2.4.10: Δt − T_GD1 on B1I, − T_GD2 on B2I; the clock is that of B3I.
     let beidou = Ephemeris { tgd_s: 8e-9, tgd2_s: 3e-9, ..blank(System::BeiDou) };
     for (signal, expected_s) in [(&B1I, -8e-9), (&B2I, -3e-9), (&B3I, 0.0)] {

@@ -6,6 +6,8 @@
 //! infinite bandwidth; the document's reference receiver has 24.552 MHz.
 
 use crate::gnss::galileo::inav::INAV;
+pub use crate::gnss::galileo::memory::Code;
+use crate::gnss::galileo::memory::{self, COUNT};
 use crate::gnss::satellite::System;
 use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
 use crate::gnss::time::GST;
@@ -68,31 +70,12 @@ const fn overlay(word: u32) -> [i8; 25] {
     chips
 }
 
-/// Which of the two codes of a satellite.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Code {
-    /// Of E1-B, which carries the message.
-    Data,
-    /// Of E1-C, which has an overlay.
-    Pilot,
-}
-
-/// The codes of numbers 1 to 50: those of E1-B, then those of E1-C, each in 512 bytes, first chip in the
-/// highest bit.
-static CODES: &[u8; 2 * COUNT * BYTES] = include_bytes!("e1_codes.bin");
-const COUNT: usize = 50;
-const BYTES: usize = 512;
+/// The codes of numbers 1 to 50: those of E1-B, then those of E1-C, each in 512 bytes.
+static CODES: &[u8; 2 * COUNT * 512] = include_bytes!("e1_codes.bin");
 
 /// The chips of a satellite by its number, 1 to 50, as ±1; `None` beyond.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
-    let index = usize::from(number).checked_sub(1).filter(|&index| index < COUNT)?;
-    let first = match which {
-        Code::Data => 0,
-        Code::Pilot => COUNT,
-    };
-    let bytes = CODES.chunks_exact(BYTES).nth(first + index)?;
-    let chips = bytes.iter().flat_map(|byte| (0..8).rev().map(move |bit| byte >> bit & 1));
-    Some(chips.take(CODE_CHIPS as usize).map(|one| if one == 1 { -1 } else { 1 }).collect())
+    memory::chips(CODES, CODE_CHIPS, which, number)
 }
 
 #[cfg(test)]

@@ -1,7 +1,10 @@
 //! Galileo: one file a signal, one a message.
 
+pub mod cnav;
 pub mod e1;
 pub mod e5;
+pub mod e6;
 pub mod fnav;
 pub mod inav;
+mod memory;
 mod status;

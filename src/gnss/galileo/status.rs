@@ -2,7 +2,9 @@
 //!
 //! Source: Galileo OS SIS ICD 2.1, 5.1.9.6 and 5.1.9.7 (status), 5.1.5 (broadcast group delays). I/NAV has
 //! the clock of the combination of E1 and E5b, F/NAV that of E1 and E5a; a set keeps BGD(E1,E5b) in `tgd_s`
-//! and BGD(E1,E5a) in `tgd2_s`, whichever clock it has.
+//! and BGD(E1,E5a) in `tgd2_s`, whichever clock it has. Of E6 neither says anything: it has the clock of
+//! I/NAV here, without a delay, as a user takes it who knows no more; real satellites delay E6 by what only
+//! the high accuracy service tells.
 
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::signal::Signal;
@@ -50,8 +52,9 @@ impl Status {
 
 /// Between the carriers of E5a and E5b.
 const BETWEEN_HZ: f64 = 1_191.795e6;
-/// Between those of E5b and E6.
+/// Between those of E5b and E6, and of E6 and E1.
 const ABOVE_E5_HZ: f64 = 1_240e6;
+const ABOVE_E6_HZ: f64 = 1_400e6;
 
 /// Of which part of the spectrum a signal is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +65,8 @@ pub(super) enum Band {
     E5a,
     /// Its upper side.
     E5b,
+    /// E6.
+    E6,
 }
 
 /// The band of a signal.
@@ -69,16 +74,18 @@ pub(super) fn band(signal: &Signal) -> Band {
     match signal.centre_hz() {
         hz if hz < BETWEEN_HZ => Band::E5a,
         hz if hz < ABOVE_E5_HZ => Band::E5b,
+        hz if hz < ABOVE_E6_HZ => Band::E6,
         _ => Band::E1,
     }
 }
 
 /// Group delay of a signal against the clock of E1 and E5b: BGD(E1,E5b) on E1, (f₁/f)² times that on E5b,
-/// and on E5a what makes the combination of E1 and E5a have the clock of F/NAV.
+/// on E5a what makes the combination of E1 and E5a have the clock of F/NAV, and none on E6.
 pub(super) fn against_inav_s(set: &Ephemeris, signal: &Signal) -> f64 {
     match band(signal) {
         Band::E5a => set.tgd_s + set.tgd2_s * set.dispersion(signal) - set.tgd2_s,
         Band::E1 | Band::E5b => set.tgd_s * set.dispersion(signal),
+        Band::E6 => planted!("gnss.e6.delay", 0.0, set.tgd_s * set.dispersion(signal)),
     }
 }
 
@@ -87,6 +94,7 @@ pub(super) fn against_fnav_s(set: &Ephemeris, signal: &Signal) -> f64 {
     match band(signal) {
         Band::E5b => set.tgd2_s + set.tgd_s * set.dispersion(signal) - set.tgd_s,
         Band::E1 | Band::E5a => set.tgd2_s * set.dispersion(signal),
+        Band::E6 => fnav_ahead_s(set),
     }
 }
 
@@ -102,6 +110,7 @@ pub(super) fn healthy(set: &Ephemeris, signal: &Signal, says: &[Band]) -> Option
         Band::E1 => E1B,
         Band::E5a => E5A,
         Band::E5b => E5B,
+        Band::E6 => return None,
     };
     says.contains(&band).then(|| status.is_good(set))
 }

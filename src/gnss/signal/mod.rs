@@ -19,6 +19,7 @@ use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::{Epoch, TimeScale};
 use crate::gnss::{beidou, galileo, glonass, gps, navic, qzss, sbas};
 
+mod dated;
 mod shape;
 #[cfg(any(test, feature = "planted"))]
 pub mod synthetic;
@@ -26,7 +27,7 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 22] = [
+pub static SIGNALS: [&Signal; 23] = [
     &gps::l1ca::L1_CA,
     &gps::l1c::L1C,
     &gps::l2c::L2C,
@@ -34,6 +35,7 @@ pub static SIGNALS: [&Signal; 22] = [
     &galileo::e1::E1,
     &galileo::e5::E5A,
     &galileo::e5::E5B,
+    &galileo::e6::E6,
     &navic::sps::L5,
     &navic::sps::S,
     &beidou::in_phase::B1I,

@@ -69,7 +69,9 @@ impl FrontEnd {
             let progress = shared.progress.entry(sv).or_default();
             progress.symbols |= track.symbols > 0;
             progress.frame |= decoder.is_synchronised();
-            progress.missing = decoder.missing();
+            if !decoder.is_dated_elsewhere() {
+                progress.missing = decoder.missing();
+            }
             for (sample, news) in all {
                 let event = match news {
                     News::FrameSynchronised => Some(Event::FrameSynchronised),

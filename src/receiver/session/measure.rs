@@ -1,7 +1,7 @@
 //! Observations and a fix at one tick.
 
 use super::{FrontEnd, Session, Tick, WRONG_TIME_FIXES};
-use crate::gnss::record::Observation;
+use crate::gnss::record::{Event, EventRow, Observation};
 use crate::receiver::observe::Reading;
 use crate::receiver::outcome::ReceiveError;
 use crate::receiver::output::{Record, Sink};
@@ -26,11 +26,31 @@ impl FrontEnd {
         };
         self.tracks.iter().filter(|track| !track.dropped).filter_map(one).collect()
     }
+
+    /// Tells channels whose messages do not say their time what other signals of their satellites read at a
+    /// tick.
+    fn date(&mut self, main: u64, known: &[Reading], sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        let Some(Tick { own, .. }) = self.ticks.iter().find(|tick| tick.main == main).copied() else { return Ok(()) };
+        let sink = &mut super::step::Counted { sink, step: self.step, ticks: &[] };
+        for track in &mut self.tracks {
+            let (sv, signal) = (track.channel.sv(), track.channel.signal());
+            let Some(decoder) = track.decoder.as_mut().filter(|decoder| decoder.is_dated_elsewhere()) else { continue };
+            let measurement = track.report.measurements.iter().find(|one| one.sample == own && one.locked);
+            let other = known.iter().find(|other| other.sv == sv && other.signal.time == signal.time);
+            let (Some(measurement), Some(other)) = (measurement, other) else { continue };
+            if decoder.date(measurement.code_periods, other.sent_of_week) {
+                let event = Event::FrameSynchronised;
+                sink.take(Record::Event(EventRow { sample: own, sv, signal, event }))?;
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Session {
     /// Observes and solves at one tick.
     pub(super) fn measure(&mut self, tick: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        self.date(tick, sink)?;
         let readings = self.readings(tick, sink)?;
         let shared = &mut self.shared;
         let observed = shared.timebase.observe(tick, &readings);
@@ -70,6 +90,23 @@ impl Session {
             Err(reason) => shared.reason = Some(reason),
         }
         Ok(())
+    }
+
+    /// Tells channels their time that cannot know it by themselves: front ends that are in step read the same
+    /// to a sample.
+    fn date(&mut self, tick: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        let waiting = |front_end: &FrontEnd| {
+            let mut decoders = front_end.tracks.iter().filter_map(|track| track.decoder.as_ref());
+            decoders.any(|decoder| decoder.is_dated_elsewhere())
+        };
+        if !self.front_ends.iter().any(waiting) {
+            return Ok(());
+        }
+        let in_step = self.front_ends.iter().filter(|front_end| front_end.gap.unknown.is_none());
+        let known: Vec<Reading> = in_step.flat_map(|front_end| front_end.readings(tick)).collect();
+        let known: Vec<Reading> = known.into_iter().filter(|reading| reading.signal.is_dated()).collect();
+        let each = &mut self.front_ends.iter_mut().filter(|front_end| front_end.gap.unknown.is_none());
+        each.try_for_each(|front_end| front_end.date(tick, &known, sink))
     }
 
     /// What all channels read at a tick, sorted as channels are. A front end that lost an unknown number of

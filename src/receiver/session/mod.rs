@@ -9,7 +9,7 @@
 use crate::gnss::samples::IfMetadata;
 use crate::receiver::correlate::layers_refusal;
 use crate::receiver::diagnosis::Stage;
-use crate::receiver::lead::{lead, refusal};
+use crate::receiver::lead::{lead, refusal, undated};
 use crate::receiver::outcome::{Conditioning, Outcome, ReceiveError};
 use crate::receiver::output::Sink;
 use crate::receiver::position::Noises;
@@ -58,6 +58,9 @@ impl Session {
         let assigned = suited::assigned(metadata, &settings.acquisition.signals());
         let all = assigned.iter().flatten();
         if let Some((signal, reason)) = all.filter_map(|signal| Some((signal, refusal(signal)?))).next() {
+            return Err(ReceiveError::Unsupported { signal: signal.name, reason });
+        }
+        if let Some((signal, reason)) = undated(&assigned.concat()) {
             return Err(ReceiveError::Unsupported { signal: signal.name, reason });
         }
         for (metadata, signals) in metadata.iter().zip(&assigned) {

@@ -211,7 +211,7 @@ impl FrontEnd {
         for track in std::mem::take(&mut self.tracks) {
             let link = track.channel.link();
             let Link { sv, signal } = link;
-            let synchronised = track.decoder.as_ref().is_some_and(Decoder::is_synchronised);
+            let synchronised = track.decoder.as_ref().is_some_and(Decoder::has_units);
             let fruitless = !synchronised && now > track.since + limit;
             if track.channel.is_lost() {
                 self.lost.insert(link, now);

@@ -157,7 +157,7 @@ impl Expectations {
             let receiver = found.receiver.of_signal(link.signal);
             let scene = Scene {
                 receiver: &receiver,
-                timetable: Timetable::new(link.signal, start),
+                timetable: Timetable::beside(link.signal, &run.signals, start),
                 expect: &run.scene.expect,
                 faults: &run.scene.faults,
                 interval_s,
@@ -205,7 +205,12 @@ impl Expectations {
         let excuses: Vec<Excuse> = plain.iter().filter_map(|row| scene.excuse(link.sv, row, usual_dbhz)).collect();
         one.excuse = excuses.get(excuses.len() / 2).copied();
         let measured = self.measured();
+        let told_s = if link.signal.is_dated() { Some(f64::NEG_INFINITY) } else { counted.told_s };
         for ((sample, row), required) in rows.iter().zip(&required) {
+            // What does not say its time is told it once another signal of the satellite is observed.
+            let told = told_s.is_some_and(|told_s| row.time_s >= told_s);
+            let required = &if told { *required } else { Required { observed: false, used: false, ..*required } };
+            counted.tell(link.signal, required, row.time_s);
             let Ok(at) = self.epochs.binary_search_by_key(sample, |due| due.sample) else { continue };
             one.take(row, required, measured.contains_at(at, self), seen.contains(sample));
             let Some(due) = self.epochs.get_mut(at) else { continue };
@@ -230,8 +235,8 @@ impl Expectations {
         let Some(four_s) = self.four_by_s else { return };
         let acquired_s = self.satellites.values().filter_map(|one| one.acquired_by_s).fold(f64::INFINITY, f64::min);
         let signals: BTreeSet<&'static Signal> = self.satellites.keys().map(|link| link.signal).collect();
-        let page_s =
-            |signal: &&'static Signal| Timetable::new(signal, start).ionosphere_by_s(acquired_s + satellite::LOCK_S);
+        let table = |signal: &&'static Signal| Timetable::beside(signal, &signals, start);
+        let page_s = |signal: &&'static Signal| table(signal).ionosphere_by_s(acquired_s + satellite::LOCK_S);
         let page_s = signals.iter().map(page_s).fold(f64::INFINITY, f64::min);
         let waited_s = four_s + receiver.ionosphere_wait_s;
         let due_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
@@ -263,13 +268,23 @@ struct Counted {
     sv: Option<Sv>,
     held: HashSet<u64>,
     used: HashSet<u64>,
+    /// Since when one of its signals that say their time must be observed. They come before those that do
+    /// not, as signals are sorted.
+    told_s: Option<f64>,
 }
 
 impl Counted {
+    fn tell(&mut self, signal: &Signal, required: &Required, time_s: f64) {
+        if signal.is_dated() && required.observed {
+            self.told_s = Some(self.told_s.map_or(time_s, |told_s| told_s.min(time_s)));
+        }
+    }
+
     fn begin(&mut self, sv: Sv) {
         if self.sv.replace(sv) != Some(sv) {
             self.held.clear();
             self.used.clear();
+            self.told_s = None;
         }
     }
 }

@@ -96,7 +96,7 @@ impl Witness {
         })?;
         let usual_dbhz = median(&rows.iter().map(|row| row.cn0_dbhz).collect::<Vec<_>>()).unwrap_or(0.0);
         let start = run.trajectory.first().map_or(Epoch::new(0, 0.0), |row| row.time().plus_s(-run.time_s(row.sample)));
-        let timetable = Timetable::new(link.signal, start);
+        let timetable = Timetable::beside(link.signal, &run.signals, start);
         Ok(Self { rows, usual_dbhz, interval_s: run.truth_interval_s(), timetable })
     }
 

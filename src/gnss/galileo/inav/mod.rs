@@ -21,6 +21,7 @@ use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::crc::crc24q;
 use crate::gnss::fec::convolutional::Convolutional;
 use crate::gnss::fec::interleaver::Interleaver;
+use crate::gnss::galileo::cnav::CNAV;
 use crate::gnss::galileo::fnav::FNAV_SETS;
 use crate::gnss::galileo::status::{self, Band};
 use crate::gnss::ionosphere::{Coefficients, Model};
@@ -76,7 +77,7 @@ fn form(set: &Ephemeris) -> Ephemeris {
 pub static INAV_SETS: SetForm = SetForm {
     name: "I/NAV",
     group_delay_s: status::against_inav_s,
-    serves: |signal| signal.carries(&INAV) || signal.carries(&INAV_E5B),
+    serves: |signal| [&INAV, &INAV_E5B, &CNAV].into_iter().any(|message| signal.carries(message)),
     given_delay_s: |set| set.tgd_s,
     is_healthy: |set| status::E1B.is_good(set),
     healthy: |set, signal| status::healthy(set, signal, &[Band::E1, Band::E5b]),

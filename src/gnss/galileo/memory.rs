@@ -1,0 +1,26 @@
+//! Codes that have no generator: the document prints their chips, and a file holds them bit by bit.
+
+/// Numbers that have codes.
+pub(super) const COUNT: usize = 50;
+
+/// Which of the two codes of a satellite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Code {
+    /// Of the component that carries the message.
+    Data,
+    /// Of the one that has an overlay.
+    Pilot,
+}
+
+/// The chips of a satellite by its number, 1 to 50, as ±1; `None` beyond. `table` has the codes of the data's
+/// numbers, then those of the pilot's, each from a new byte on, first chip in the highest bit.
+pub(super) fn chips(table: &[u8], chips: u32, which: Code, number: u8) -> Option<Vec<i8>> {
+    let index = usize::from(number).checked_sub(1).filter(|&index| index < COUNT)?;
+    let first = match which {
+        Code::Data => 0,
+        Code::Pilot => COUNT,
+    };
+    let bytes = table.chunks_exact(chips.div_ceil(8) as usize).nth(first + index)?;
+    let bits = bytes.iter().flat_map(|byte| (0..8).rev().map(move |bit| byte >> bit & 1));
+    Some(bits.take(chips as usize).map(|one| if one == 1 { -1 } else { 1 }).collect())
+}
