@@ -45,6 +45,8 @@ mod pseudorange;
 mod qzss;
 #[path = "../witness/recording.rs"]
 mod recording;
+#[path = "../witness/recording_e5.rs"]
+mod recording_e5;
 #[path = "../witness/reduced.rs"]
 mod reduced;
 #[path = "../witness/redundancy.rs"]

@@ -396,7 +396,7 @@ fn a_recording_holds_the_galileo_satellites_that_others_found_in_it() {
 }
 
 /// Two bits a sample, real, four in a byte from the low bits on, at 20 Msps and an IF of 5 000 446 Hz.
-fn two_bits(name: &str) -> Option<Vec<f32>> {
+pub fn two_bits(name: &str) -> Option<Vec<f32>> {
     let bytes = std::fs::read(external(name)?).unwrap();
     let value = |pair: u8| [1.0, 3.0, -3.0, -1.0][usize::from(pair & 3)];
     Some(bytes.iter().flat_map(|byte| (0..4).map(move |place| value(byte >> (2 * place)))).collect())
