@@ -12,6 +12,7 @@ use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, WEEK_S};
 
+mod carried;
 mod error;
 mod form;
 mod kepler;
@@ -102,8 +103,11 @@ pub struct Ephemeris {
     /// `tgd_s`, T_GD2 of BeiDou.
     pub tgd2_s: f64,
     /// Corrections between signals beside the group delay in `tgd_s`: of L1 C/A, L2C, I5 and Q5 in CNAV, and
-    /// of the pilot and the data of L1C in CNAV-2.
+    /// of the pilot and the data of L1C in CNAV-2; of NavIC on L1 the two of its message at the last places.
     pub isc_s: [f64; 6],
+    /// Which carriers the clock is of, where a message says it: of NavIC on L1 0 for L1 and L5, 1 for S and
+    /// L5; 0 of others.
+    pub reference_flag: u8,
     /// Group delays of signals that have one of their own, by the signal's name; others follow from `tgd_s`.
     pub signal_delays_s: Vec<(&'static str, f64)>,
     /// State and forces at the reference time, of messages without elements, whose own here are zero.
@@ -245,6 +249,7 @@ impl Ephemeris {
             tgd_s: 0.0,
             tgd2_s: 0.0,
             isc_s: [0.0; 6],
+            reference_flag: 0,
             signal_delays_s: Vec::new(),
             vector: None,
         }
@@ -617,6 +622,7 @@ mod tests {
             axis_rate_mps: 0.0,
             delta_n_rate_radps2: 0.0,
             isc_s: [0.0; 6],
+            reference_flag: 0,
             signal_delays_s: Vec::new(),
             vector: None,
         }

@@ -31,6 +31,12 @@ const GLONASS_NEIGHBOURS: &str = "witness::glonass::neighbouring_sets_meet_half_
 const GLONASS_ORBITS: &str = "witness::glonass::broadcast_orbits_meet_those_of_code_and_clocks_too";
 const NAVIC: &str = "witness::navic::subframes_are_coded_interleaved_and_timed_as_printed";
 const NAVIC_CODES: &str = "witness::navic::all_chips_of_all_codes_are_those_of_another_program";
+const NAVIC_L1_CODES: &str =
+    "witness::navic_l1::all_chips_of_all_codes_and_overlays_of_l1_are_those_of_another_program";
+const NAVIC_L1_COUNT: &str =
+    "witness::navic_l1::frames_are_counted_to_their_end_from_1_to_400_in_the_two_hours_in_which_they_begin";
+const NAVIC_L1_CARRIED: &str =
+    "witness::navic_l1::a_set_of_the_older_message_carried_to_l1_nav_is_the_same_orbit_and_clock_to_its_steps";
 const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_either_way_up_to_what_was_sent";
 const REDUNDANT: &str = "witness::redundancy::real_words_17_to_20_are_the_redundancy_of_the_real_words_1_to_4";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
@@ -139,6 +145,9 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.beidou.tilt", "the plane of geostationary orbits is tilted the other way", BEIDOU_GEO),
     fault("gnss.beidou.latitude", "the ionosphere's latitude has a sign", BEIDOU_DELAY),
     fault("gnss.navic.g2_start", "the code of PRN 7 begins elsewhere", NAVIC_CODES),
+    fault("gnss.navic.carry", "the second register of L1's codes misses what adding carries", NAVIC_L1_CODES),
+    fault("gnss.navic.l1_time", "the count of a frame of L1 is taken for its own beginning", NAVIC_L1_COUNT),
+    fault("gnss.navic.isc", "the correction of L1 is taken off where it is added", NAVIC_L1_CARRIED),
     fault("gnss.navic.time_sent", "a subframe counts itself and not the next one", NAVIC),
     fault("gnss.navic.time_read", "a subframe is read as the one after it", NAVIC_READ),
     fault("gnss.fec.field", "the field of the Reed-Solomon code has another polynomial, sent and read", REDUNDANT),

@@ -33,6 +33,8 @@ mod inav;
 mod lnav;
 #[path = "../witness/navic.rs"]
 mod navic;
+#[path = "../witness/navic_l1.rs"]
+mod navic_l1;
 #[path = "../witness/orbit.rs"]
 mod orbit;
 #[path = "../witness/packed.rs"]

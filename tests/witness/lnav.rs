@@ -255,6 +255,7 @@ fn example() -> Ephemeris {
         axis_rate_mps: 0.0,
         delta_n_rate_radps2: 0.0,
         isc_s: [0.0; 6],
+        reference_flag: 0,
         signal_delays_s: Vec::new(),
         vector: None,
     }

@@ -24,7 +24,7 @@ const CODES: &str = include_str!("../../data/witness/navic_codes.csv");
 #[test]
 fn all_chips_of_all_codes_are_those_of_another_program() {
     let mut codes = 0;
-    for line in CODES.lines().skip(1) {
+    for line in CODES.lines().skip(1).filter(|line| !line.starts_with("NAVL1")) {
         let column: Vec<&str> = line.split(',').collect();
         let signal = if column[0] == "NAVL5" { &L5 } else { &S };
         let signs = signal.code(column[1].parse().unwrap()).unwrap();

@@ -132,8 +132,17 @@ impl Scenario {
                 spoofing_and_jamming::spoofers(self, first, world.end_s, directory, overrides, &mut warnings)?;
             scenes.iter_mut().for_each(|scene| scene.spoofers.clone_from(&spoofers));
         }
-        for (scene, front_end) in scenes.iter_mut().zip(&self.front_ends) {
-            self.look(scene, front_end, &mut warnings)?;
+        // A position may be by the signals of several front ends: the most satellites count.
+        let mut most = 0;
+        for scene in &mut scenes {
+            most = most.max(self.look(scene)?);
+        }
+        if most < 4 {
+            let mask_deg = self.mask_rad.to_degrees();
+            warnings.push(format!(
+                "{most} satellites above satellites.mask_deg = {mask_deg}, or from space not behind the Earth, at the \
+                 start: a position needs 4"
+            ));
         }
         if let Some(first) = scenes.first() {
             let missing = presence::missing(first, world.end_s).map_err(|e| self.orbit(&e))?;
@@ -256,9 +265,8 @@ impl Scenario {
         Ok(scene)
     }
 
-    /// Looks at the sky over a scene's start: sets the level of its playback, and warns of too few
-    /// satellites.
-    fn look(&self, scene: &mut Scene, front_end: &FrontEnd, warnings: &mut Vec<String>) -> Result<(), ScenarioError> {
+    /// Looks at the sky over a scene's start: sets the level of its playback, and counts its satellites.
+    fn look(&self, scene: &mut Scene) -> Result<usize, ScenarioError> {
         let (visible, signals_lsb) = at_start(scene).map_err(|e| self.orbit(&e))?;
         if let Some(PlaybackSpec { bits, load_sigma, attenuation_db }) = self.playback {
             let step_lsb = signals_lsb * 2.0 * load_sigma / libm::exp2(f64::from(bits));
@@ -268,14 +276,7 @@ impl Scenario {
             }
             scene.playback = Some(Playback { bits, step_lsb: step_lsb as f32, attenuation_db });
         }
-        if visible < 4 {
-            let (mask_deg, of_it) = (self.mask_rad.to_degrees(), front_end.of_it());
-            warnings.push(format!(
-                "{of_it}{visible} satellites above satellites.mask_deg = {mask_deg}, or from space not behind the \
-                 Earth, at the start: a position needs 4"
-            ));
-        }
-        Ok(())
+        Ok(visible)
     }
 }
 

@@ -7,7 +7,7 @@ use super::offset::offsets;
 use super::{Version, calendar, header_line, opening};
 use crate::gnss::broadcast::{Ephemeris, StateVector, status_of_record};
 use crate::gnss::ionosphere::Coefficients;
-use crate::gnss::message::{Message, RecordLine, Records};
+use crate::gnss::message::{Message, Raw, RecordLine, Records};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Signal;
@@ -69,13 +69,13 @@ impl NavigationSets {
             // BeiDou's come with the sets.
             let mut raws = common.into_iter().chain(own.map(|(_, raws)| raws));
             let sent = raws.find_map(|raws| (message.ionosphere.coefficients)(&|name| raws.get(name).copied()));
+            let raw = |name: &str| common.and_then(|raws| raws.get(name)).copied();
             if let Some(sent) = sent.filter(|_| once("")) {
                 match version {
                     Version::Three => text += &ionosphere(sent, sv.system),
-                    Version::Four => body += &ionosphere_record(records, sent, *sv, near),
+                    Version::Four => body += &ionosphere_record(records, (sent, region(&raw)), *sv, near),
                 }
             }
-            let raw = |name: &str| common.and_then(|raws| raws.get(name)).copied();
             for offset in offsets(&records, sv.system, &raw, near).into_iter().filter(|offset| once(offset.pair)) {
                 match version {
                     Version::Three => text += &offset.line(sv.system),
@@ -139,15 +139,29 @@ fn heading(version: Version, records: Records, sv: Sv) -> String {
     }
 }
 
+/// Issue and region of coefficients that have them, those of NavIC on L1: western, eastern, southern and
+/// northern border in degrees (RINEX 4.02, table A41).
+fn region(raw: Raw<'_>) -> Option<[f64; 5]> {
+    let degrees = |border: &str| raw(border).map(|steps| 5.0 * steps as f64);
+    let issue = raw("iodk")? as f64;
+    let [west, east] = [degrees("region_west_5deg")?, degrees("region_east_5deg")?];
+    Some([issue, west, east, degrees("region_south_5deg")?, degrees("region_north_5deg")?])
+}
+
 /// A message with the ionosphere's coefficients (RINEX 4.02, tables of `ION` records) of a satellite that
 /// sent them, its time that of the file.
-fn ionosphere_record(records: Records, sent: Coefficients, sv: Sv, near: Epoch) -> String {
+fn ionosphere_record(
+    records: Records,
+    (sent, region): (Coefficients, Option<[f64; 5]>),
+    sv: Sv,
+    near: Epoch,
+) -> String {
     // Those of BeiDou are in its own time.
     let [year, month, day, hour, minute, second] = calendar(match sv.system {
         System::BeiDou => BDT.label(near),
         _ => near,
     });
-    let values = match &sent {
+    let mut values = match &sent {
         Coefficients::Klobuchar(model) | Coefficients::KlobucharNavic(model) | Coefficients::KlobucharBeidou(model) => {
             [model.alpha, model.beta].concat()
         }
@@ -155,10 +169,15 @@ fn ionosphere_record(records: Records, sent: Coefficients, sv: Sv, near: Epoch) 
         Coefficients::NequickG(model) => [&model.coefficients[..], &[0.0]].concat(),
     };
     let epoch = format!("{year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}");
+    // Three beside the time, then four a line; of those with a region the issue alone beside the time.
+    let beside = if region.is_some() { 1 } else { 3 };
+    if let Some([issue, borders @ ..]) = region {
+        values.insert(0, issue);
+        values.extend(borders);
+    }
     let mut text = format!("> ION {sv} {}\n    {epoch}", records.common);
-    // Three beside the time, then four a line.
     for (place, value) in values.iter().enumerate() {
-        if place >= 3 && (place - 3).is_multiple_of(4) {
+        if place >= beside && (place - beside).is_multiple_of(4) {
             text += "\n    ";
         }
         text += &format!("{:>19}", exponent(*value, 12));

@@ -7,4 +7,7 @@ pub mod ldpc;
 pub mod ldpc64;
 pub mod reed_solomon;
 pub mod register;
+#[cfg(test)]
+pub(in crate::gnss) mod reliability;
 pub mod running;
+pub mod subframes;

@@ -27,7 +27,7 @@ pub mod synthetic;
 pub use shape::{Shape, sinc_squared};
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 23] = [
+pub static SIGNALS: [&Signal; 24] = [
     &gps::l1ca::L1_CA,
     &gps::l1c::L1C,
     &gps::l2c::L2C,
@@ -38,6 +38,7 @@ pub static SIGNALS: [&Signal; 23] = [
     &galileo::e6::E6,
     &navic::sps::L5,
     &navic::sps::S,
+    &navic::l1::L1,
     &beidou::in_phase::B1I,
     &beidou::in_phase::B2I,
     &beidou::in_phase::B3I,

@@ -95,22 +95,8 @@ pub(super) fn carried(set: &Ephemeris, form: &'static SetForm, signals: &[&Signa
     }
     let label_s = BDT.label(set.toe).seconds() as f64;
     let toe = BDT.instant(Epoch::new((label_s / STEP_S as f64).round() as i64 * STEP_S, 0.0));
-    let (since_toe_s, since_toc_s) = (toe.since(set.toe), toe.since(set.toc));
-    let motion_radps = set.mean_motion_radps();
     let issue = issue(BDT.label(toe).tow_s());
-    Ephemeris {
-        toe,
-        toc: toe,
-        iode: issue,
-        iodc: issue,
-        aodo: 0,
-        m0_rad: set.m0_rad + motion_radps * since_toe_s,
-        omega0_rad: set.omega0_rad + set.omega_dot_radps * since_toe_s,
-        i0_rad: set.i0_rad + set.idot_radps * since_toe_s,
-        af0_s: set.af0_s + since_toc_s * (set.af1_sps + since_toc_s * set.af2_sps2),
-        af1_sps: set.af1_sps + 2.0 * since_toc_s * set.af2_sps2,
-        ..own
-    }
+    Ephemeris { iode: issue, iodc: issue, aodo: 0, ..own.carried_to(toe) }
 }
 
 /// The set, its times GPS time, that a receiver decodes when that one is sent.

@@ -147,8 +147,6 @@ pub(super) fn form(set: &Ephemeris) -> Ephemeris {
     }
     let toe_s = (set.toe.seconds() as f64 / STEP_S as f64).round() as i64 * STEP_S;
     let toe = Epoch::new(toe_s, 0.0);
-    let (since_toe_s, since_toc_s) = (toe.since(set.toe), toe.since(set.toc));
-    let motion_radps = set.mean_motion_radps();
     let issue = (toe.tow_whole_s() / STEP_S) as u16;
     let isc_s = |hz: f64| {
         let ratio = L1_HZ / hz;
@@ -156,18 +154,11 @@ pub(super) fn form(set: &Ephemeris) -> Ephemeris {
     };
     Ephemeris {
         form: &CNAV_SETS,
-        toe,
-        toc: toe,
         iode: issue,
         iodc: issue,
         health: if set.health == 0 { 0 } else { L1 | L2 | L5 },
-        m0_rad: set.m0_rad + motion_radps * since_toe_s,
-        omega0_rad: set.omega0_rad + set.omega_dot_radps * since_toe_s,
-        i0_rad: set.i0_rad + set.idot_radps * since_toe_s,
-        af0_s: set.af0_s + since_toc_s * (set.af1_sps + since_toc_s * set.af2_sps2),
-        af1_sps: set.af1_sps + 2.0 * since_toc_s * set.af2_sps2,
         isc_s: [0.0, isc_s(L2_HZ), isc_s(L5_HZ), isc_s(L5_HZ), 0.0, 0.0],
-        ..set.clone()
+        ..set.carried_to(toe)
     }
 }
 

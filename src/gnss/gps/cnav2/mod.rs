@@ -23,6 +23,7 @@ use crate::gnss::exchange::modern;
 use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::fec::ldpc::Ldpc;
 use crate::gnss::fec::register::RegisterCode;
+use crate::gnss::fec::subframes::{Blocks, Subframes};
 use crate::gnss::gps::cnav::{self, CNAV_SETS, STEP_S};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::klobuchar::Klobuchar;
@@ -91,13 +92,20 @@ const SYMBOLS: usize = SYMBOLS_1 + 2 * BITS_2 + 2 * BITS_3;
 /// The page that is sent and read.
 const PAGE: f64 = 1.0;
 
-/// The code of the eight lower bits of the time (3.2.3.2, figure 3.2-7).
-const TIME_CODE: RegisterCode = RegisterCode { stages: 8, feedback: 0b1111_1001, symbols: SYMBOLS_1 - 1 };
-/// Rows of 46 written, columns of 38 sent (3.2.3.5).
-const INTERLEAVER: Interleaver = Interleaver { columns: 38, rows: 46 };
-
 static CODE_2: LazyLock<Ldpc> = LazyLock::new(|| Ldpc::packed(BITS_2, include_bytes!("ldpc_2.bin")));
 static CODE_3: LazyLock<Ldpc> = LazyLock::new(|| Ldpc::packed(BITS_3, include_bytes!("ldpc_3.bin")));
+
+static FRAME: Subframes = Subframes {
+    // Of the eight lower bits (3.2.3.2, figure 3.2-7).
+    time: RegisterCode { stages: 8, feedback: 0b1111_1001, symbols: SYMBOLS_1 - 1 },
+    has_high_bit: true,
+    times: 0..=FRAMES as u32 - 1,
+    two: (&CODE_2, BITS_2),
+    three: (&CODE_3, BITS_3),
+    // Rows of 46 written, columns of 38 sent (3.2.3.5).
+    interleaver: Interleaver { columns: 38, rows: 46 },
+    is_right: |bits| crc24q(bits.iter().copied()) == 0,
+};
 
 /// What frames say.
 #[derive(Clone, Debug)]
@@ -157,53 +165,20 @@ fn page(bits: &[bool]) -> f64 {
     bits.get(8..14).map_or(0.0, |bits| number(bits) as f64)
 }
 
-/// The 52 symbols of a time: its highest bit, and that bit added to the code word of the others.
-pub fn time_symbols(time: u32) -> Vec<bool> {
-    let high = time >> 8 & 1 == 1;
-    std::iter::once(high).chain(TIME_CODE.encode(time & 0xFF).map(|one| one ^ high)).collect()
-}
-
 /// The symbols of a frame before they are interleaved, of a time and of bits with their checks.
 pub fn coded(time: u32, two: &[bool], three: &[bool]) -> Vec<bool> {
-    let (two, three) = (CODE_2.encode(two), CODE_3.encode(three));
-    time_symbols(time).into_iter().chain(two).chain(three).collect()
+    FRAME.coded(time, two, three)
 }
 
 /// The order in which the symbols of a frame are sent.
 pub fn interleaved(coded: &[bool]) -> Vec<bool> {
-    let (first, rest) = coded.split_at(SYMBOLS_1.min(coded.len()));
-    first.iter().copied().chain(INTERLEAVER.interleave(rest)).collect()
-}
-
-/// The most likely time in 52 soft symbols, its highest bit as if they are not upside down, and how much of
-/// what they say is for it.
-pub fn likely_time(soft: &[f32]) -> (u32, f32) {
-    let Some((first, rest)) = soft.split_first() else { return (0, 0.0) };
-    let sums = (0..256).map(|low| (low, first + TIME_CODE.correlation(low, rest)));
-    let (low, sum) = sums.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap_or((0, 0.0));
-    let all: f32 = soft.iter().map(|value| value.abs()).sum();
-    (low | u32::from(sum < 0.0) << 8, sum.abs() / all.max(f32::MIN_POSITIVE))
+    FRAME.interleaved(coded)
 }
 
 /// The frame in 1800 soft symbols, positive for a logical 0, whichever way up; `None` where its checks fail.
 pub fn decode(soft: &[f32]) -> Option<Frame> {
-    let (first, rest) = soft.split_at_checked(SYMBOLS_1)?;
-    let (likely, _) = likely_time(first);
-    let rest = INTERLEAVER.deinterleave(rest);
-    for inverted in [false, true] {
-        // Upside down the highest bit is the other.
-        let time = likely ^ u32::from(inverted) << 8;
-        if i64::from(time) >= FRAMES {
-            continue;
-        }
-        let own: Vec<f32> = rest.iter().map(|value| if inverted { -value } else { *value }).collect();
-        let (two, three) = own.split_at_checked(2 * BITS_2)?;
-        let of = |code: &Ldpc, soft| code.decode(soft).filter(|bits| crc24q(bits.iter().copied()) == 0);
-        if let Some(two) = of(&CODE_2, two) {
-            return Some(Frame { time, inverted, two, three: of(&CODE_3, three) });
-        }
-    }
-    None
+    let Blocks { time, inverted, two, three } = FRAME.decode(soft)?;
+    Some(Frame { time, inverted, two, three })
 }
 
 /// Makes the frames of satellites.

@@ -3,7 +3,7 @@
 //! Where a frame begins shows in the code word of its time, which is right by chance at times: the check of
 //! subframe 2 decides.
 
-use super::{CNAV2, Frame, SYMBOLS, SYMBOLS_1, decode, elements, klobuchar, likely_time, of_set_in};
+use super::{CNAV2, FRAME, Frame, SYMBOLS, decode, elements, klobuchar, of_set_in};
 use crate::gnss::fec::frames::Frames;
 use crate::gnss::ionosphere::Coefficients;
 use crate::gnss::message::{Parameters, Read, Reader};
@@ -60,8 +60,7 @@ impl Cnav2Reader {
 
 impl Reader for Cnav2Reader {
     fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
-        let may_begin =
-            |symbols: &[f32]| symbols.get(..SYMBOLS_1).is_some_and(|first| likely_time(first).1 > LEAST_SHARE);
+        let may_begin = |symbols: &[f32]| FRAME.likely_times(symbols).1 > LEAST_SHARE;
         let found = self.frames.take(soft, may_begin, decode);
         found.map_or_else(Vec::new, |frame| self.read(&frame, near))
     }

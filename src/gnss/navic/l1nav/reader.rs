@@ -1,0 +1,79 @@
+//! Finds frames in soft symbols, whichever way up they come, and gathers what they say.
+//!
+//! Where a frame begins shows in the code word of its time, which is right by chance at times: the check of
+//! subframe 2 decides.
+
+use super::{FRAME, Frame, L1_NAV, SYMBOLS, coefficients_in, decode, elements, of_electrons_in, of_set_in};
+use crate::gnss::fec::frames::Frames;
+use crate::gnss::message::{Parameters, Read, Reader};
+use crate::gnss::record::NavigationRow;
+use crate::gnss::satellite::Sv;
+use crate::gnss::time::Epoch;
+
+/// Of what 52 symbols say, the part that a time explains where a frame is tried: 0.89 at an amplitude of √2
+/// standard deviations, near which the codes begin to fail, with 0.05 of scatter; the best of all times among
+/// data has about half.
+const LEAST_SHARE: f32 = 0.65;
+
+/// Reads NavIC's message on L1.
+#[derive(Clone, Debug)]
+pub struct L1NavReader {
+    sv: Sv,
+    frames: Frames,
+    /// What the set that was reported last said.
+    complete: Option<Parameters>,
+}
+
+impl L1NavReader {
+    /// A reader that has read nothing.
+    pub fn new(sv: Sv) -> Self {
+        Self { sv, frames: Frames::new(SYMBOLS), complete: None }
+    }
+
+    /// Takes a frame that ends with the newest symbol.
+    fn read(&mut self, frame: &Frame, near: Epoch) -> Vec<Read> {
+        if frame.prn().is_some_and(|prn| prn != u128::from(self.sv.prn())) {
+            return Vec::new();
+        }
+        let sent = frame.sent_at(near);
+        let (symbols, inverted) = (SYMBOLS as u64, frame.0.inverted);
+        let mut news = vec![Read::Unit { symbols, of_week_s: frame.of_week_s(), inverted }, Read::Time(sent)];
+        if let Some(three) = frame.electrons() {
+            news.push(Read::Ionosphere(coefficients_in(three)));
+            news.push(Read::Parameters(self.rows(0, of_electrons_in(three))));
+        }
+        let all = of_set_in(&frame.0.two);
+        if self.complete.as_ref() != Some(&all) {
+            let set = elements(self.sv, &frame.0.two, sent);
+            let rows = self.rows(u32::from(set.iode), all.clone());
+            self.complete = Some(all);
+            news.push(Read::Ephemeris(Box::new(set)));
+            news.push(Read::Parameters(rows));
+        }
+        news
+    }
+
+    fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {
+        NavigationRow::each(self.sv, L1_NAV.name, issue, parameters).collect()
+    }
+}
+
+impl Reader for L1NavReader {
+    fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
+        let may_begin = |symbols: &[f32]| FRAME.likely_times(symbols).1 > LEAST_SHARE;
+        let found = self.frames.take(soft, may_begin, decode);
+        found.map_or_else(Vec::new, |frame| self.read(&frame, near))
+    }
+
+    fn skip(&mut self) {
+        self.frames.skip();
+    }
+
+    fn doubt(&mut self) {
+        self.frames.doubt();
+    }
+
+    fn missing(&self) -> Vec<u8> {
+        if self.complete.is_some() { Vec::new() } else { vec![1] }
+    }
+}
