@@ -209,6 +209,9 @@ impl Band {
     }
 }
 
+/// A satellite that is known to be there, and its place.
+type Known<'a> = (&'a Code, Refined);
+
 struct Code {
     replica: Replica,
     spectrum: Vec<Complex<f32>>,
@@ -332,7 +335,7 @@ impl Searcher {
             }
             let codes: Vec<(Sv, &Code)> = chosen.iter().map(|&(_, sv, code)| (sv, code)).collect();
             let window = Window::centred(block, need as usize);
-            let known: Vec<(&Code, Refined)> = (known.iter())
+            let known: Vec<Known<'_>> = (known.iter())
                 .filter(|one| Band::of(one.link()) == *band)
                 .filter_map(|one| Some((self.codes.get(&one.link())?, grid.refined(one, block.first))))
                 .collect();
@@ -398,7 +401,7 @@ impl Searcher {
         signal: &'static Signal,
         grid: &Grid,
         mut window: Window,
-        (codes, known): (&[(Sv, &Code)], &[(&Code, Refined)]),
+        (codes, known): (&[(Sv, &Code)], &[Known<'_>]),
     ) -> Vec<(AcquisitionRow, Option<Acquired>)> {
         let Some(component) = lead(signal) else { return Vec::new() };
         let code_chips = f64::from(component.code_chips);

@@ -44,9 +44,9 @@ pub(super) fn correlate<const T: usize>(
         // What the chunk's base is above the first entry meets the sum of all changes.
         let above = [0, 1].map(|c| f64::from(chunk.base[c].wrapping_sub(base[c])));
         let changed = [0, 1].map(|part| f64::from(before[part]) - f64::from(products.last[part]));
-        for c in 0..2 {
-            bases.0[c] += changed[0] * above[c];
-            bases.1[c] += changed[1] * above[c];
+        for ((by_cos, by_sin), above) in bases.0.iter_mut().zip(&mut bases.1).zip(above) {
+            *by_cos += changed[0] * above;
+            *by_sin += changed[1] * above;
         }
         last = Some(products.last);
         from = to;
