@@ -49,7 +49,7 @@ pub fn twin_error(count: usize) -> f64 {
         let step = chips_to_units(1.023e6 / 50e6) as u64;
         let nco =
             Nco { carrier: 77 << 50, carrier_step: 0x0123_4567_89ab_cdef, code: chips_to_units(12.3), code_step: step };
-        let [found] = replica.correlate_in(Arithmetic::F64, (&i, &q), &nco, &[0]);
+        let [found] = replica.correlate_in(Arithmetic::F64, (&i[..], &q[..]), &nco, &[0]);
         let (mut re, mut im) = (Double::default(), Double::default());
         for (n, (&i, &q)) in (0_u64..).zip(i.iter().zip(&q)) {
             let turns = nco.carrier.wrapping_add(nco.carrier_step.wrapping_mul(n));
@@ -91,7 +91,7 @@ pub fn sum_error(arithmetic: Arithmetic, count: usize, dc: f32) -> f64 {
         };
         let taps = [chips_to_units(0.25), 0, chips_to_units(-0.25)];
         let exact = replica.slow(&i, &q, &nco, &taps);
-        let found = replica.correlate_in(arithmetic, (&i, &q), &nco, &taps);
+        let found = replica.correlate_in(arithmetic, (&i[..], &q[..]), &nco, &taps);
         // Noise of a component of the sum: the square root of the count.
         worst = exact.iter().zip(&found).fold(worst, |w, (a, b)| w.max((a - b).norm() / (count as f64).sqrt()));
     }
@@ -125,7 +125,7 @@ fn full_scale_for_a_second_overflows_nothing() {
     let q = vec![0.0_f32; count];
     let expected = 127.0 * count as f64;
     for (name, arithmetic) in [("i16", Arithmetic::I16), ("f32", Arithmetic::F32)] {
-        let [sum] = replica.correlate_in(arithmetic, (&i, &q), &nco, &[0]);
+        let [sum] = replica.correlate_in(arithmetic, (&i[..], &q[..]), &nco, &[0]);
         // Nearest chips of the two may fall on the other side of an edge once in a while, 2 in 1e5; a wrapped
         // integer would miss by all.
         the.at_most(
