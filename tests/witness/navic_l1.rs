@@ -224,7 +224,7 @@ fn a_real_set_is_whole_steps_of_the_fields_stands_over_its_place_and_is_written_
     let ours = body("> ePH I10 L1NV\n").lines().chain(body("> ION I10 L1NV KLOB\n").lines().skip(1));
     let theirs = RECORD.lines().chain(IONOSPHERE.lines());
     for (ours, theirs) in ours.zip(theirs) {
-        let fields = |line: &str| line[4..].as_bytes().chunks(19).map(<[u8]>::to_vec).collect::<Vec<_>>();
+        let fields = |line: &str| line.as_bytes()[4..].chunks(19).map(<[u8]>::to_vec).collect::<Vec<_>>();
         if ours[..4] == theirs[..4] {
             let (ours, theirs) = (fields(ours), fields(theirs));
             let pairs = ours.iter().zip(&theirs).filter(|(one, other)| one != other);
