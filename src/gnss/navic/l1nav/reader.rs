@@ -38,14 +38,16 @@ impl L1NavReader {
         let sent = frame.sent_at(near);
         let (symbols, inverted) = (SYMBOLS as u64, frame.0.inverted);
         let mut news = vec![Read::Unit { symbols, of_week_s: frame.of_week_s(), inverted }, Read::Time(sent)];
+        let set = elements(self.sv, &frame.0.two, sent);
+        // A frame is of one set, and what it says besides bears its issue.
+        let issue = u32::from(set.iode);
         if let Some(three) = frame.electrons() {
             news.push(Read::Ionosphere(coefficients_in(three)));
-            news.push(Read::Parameters(self.rows(0, of_electrons_in(three))));
+            news.push(Read::Parameters(self.rows(issue, of_electrons_in(three))));
         }
         let all = of_set_in(&frame.0.two);
         if self.complete.as_ref() != Some(&all) {
-            let set = elements(self.sv, &frame.0.two, sent);
-            let rows = self.rows(u32::from(set.iode), all.clone());
+            let rows = self.rows(issue, all.clone());
             self.complete = Some(all);
             news.push(Read::Ephemeris(Box::new(set)));
             news.push(Read::Parameters(rows));
