@@ -214,11 +214,13 @@ impl FrontEnd {
         let longest_s = self.tracks.iter().map(|track| track.channel.period_s()).fold(0.0, f64::max);
         let part = PART_SAMPLES.max(self.samples(PART_PERIODS * longest_s) as usize);
         let stream = (&self.lookback, block);
+        // For all or none: results must not depend on who shares a core with whom.
+        let summed = self.tracks.iter().any(|track| track.channel.takes_sums());
         self.tracks.par_chunks_mut(share).zip(&mut self.rooms).for_each(|(tracks, room)| {
             tracks.iter_mut().for_each(|track| clear(&mut track.report));
             for start in (0..block.samples()).step_by(part) {
                 let (from, to) = (block.first + start as u64, block.end().min(block.first + (start + part) as u64));
-                follow(tracks, stream, room, (from, to), within(&ticks, from, to));
+                follow(tracks, stream, (room, summed), (from, to), within(&ticks, from, to));
             }
         });
         let needed = self.tracks.iter().filter_map(|track| track.channel.needs()).min();
@@ -286,7 +288,7 @@ impl FrontEnd {
 fn follow(
     tracks: &mut [Track],
     (lookback, block): (&Lookback, &Packed),
-    room: &mut Room,
+    (room, summed): (&mut Room, bool),
     (from, to): (u64, u64),
     ticks: &[u64],
 ) {
@@ -294,7 +296,6 @@ fn follow(
     let first = needed.unwrap_or(from).clamp(lookback.first(block), from);
     let samples = lookback.unpack(block, (first, to), &mut room.planes);
     let (i, q) = (samples.i, samples.q);
-    let summed = tracks.iter().any(|track| track.channel.takes_sums());
     let sums = if summed { room.sums.of(i, q) } else { None };
     let shown = Shown { first, samples: Samples { i, q, sums }, from };
     for track in tracks.iter_mut() {
