@@ -66,14 +66,17 @@ impl NavigationSets {
             let form = if version == Version::Four { records.common } else { "" };
             let mut once = |what| described.insert((sv.system, form, what));
             let common = self.common.get(*name);
-            // BeiDou's come with the sets.
+            // BeiDou's, and those of NavIC on L1, come with the sets.
             let mut raws = common.into_iter().chain(own.map(|(_, raws)| raws));
-            let sent = raws.find_map(|raws| (message.ionosphere.coefficients)(&|name| raws.get(name).copied()));
+            let sent = raws.find_map(|raws| {
+                let raw = |name: &str| raws.get(name).copied();
+                Some(((message.ionosphere.coefficients)(&raw)?, region(&raw)))
+            });
             let raw = |name: &str| common.and_then(|raws| raws.get(name)).copied();
             if let Some(sent) = sent.filter(|_| once("")) {
                 match version {
-                    Version::Three => text += &ionosphere(sent, sv.system),
-                    Version::Four => body += &ionosphere_record(records, (sent, region(&raw)), *sv, near),
+                    Version::Three => text += &ionosphere(sent.0, sv.system),
+                    Version::Four => body += &ionosphere_record(records, sent, *sv, near),
                 }
             }
             for offset in offsets(&records, sv.system, &raw, near).into_iter().filter(|offset| once(offset.pair)) {
