@@ -24,10 +24,11 @@ impl<'a> From<(&'a [f32], &'a [f32])> for Samples<'a> {
 }
 
 impl<'a> Samples<'a> {
-    /// The samples from `from` to `to`.
+    /// The samples from `from` to `to`; none where some of them are not there.
     pub fn part(&self, from: usize, to: usize) -> Self {
         let sums = self.sums.and_then(|sums| sums.part(from, to));
-        Self { i: &self.i[from..to], q: &self.q[from..to], sums }
+        let of = |plane: &'a [f32]| plane.get(from..to).unwrap_or_default();
+        Self { i: of(self.i), q: of(self.q), sums }
     }
 }
 

@@ -79,9 +79,11 @@ impl FrontEnd {
     }
 
     /// Where the satellites are that are followed beyond doubt; none before there was a fix, while searches
-    /// may still say that the samples are not what they seem.
+    /// may still say that the samples are not what they seem, and none while codes are not where they were
+    /// to be.
     fn known(&self, shared: &Shared) -> Vec<Acquired> {
-        let settled = self.tracks.iter().filter(|track| shared.fixes > 0 && track.channel.is_settled());
+        let trusted = shared.fixes > 0 && !self.gap.is_busy();
+        let settled = self.tracks.iter().filter(|track| trusted && track.channel.is_settled());
         let place = |track: &Track| {
             let (link, phases) = (track.channel.link(), track.channel.phases());
             Acquired {
