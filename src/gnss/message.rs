@@ -35,7 +35,7 @@ pub struct Message {
     pub sender: fn(&Common) -> Result<Box<dyn Sender>, FieldError>,
     /// Number by which faults name the unit that begins then: a subframe's, a word's type.
     pub number: fn(Epoch) -> u8,
-    /// Numbers of the units that say their time; none where another signal of the satellite has to tell it.
+    /// Numbers of the units that say their time; none where another signal of the satellite has to give it.
     pub timed: &'static [u8],
     /// Numbers of the units all of which have to be read before one of those says its whole time; none where
     /// each says it by itself.

@@ -3,7 +3,7 @@
 //! A [`Decoder`] belongs to one channel. It gives the symbols to the reader of the signal's message, ties the
 //! channel's code period number to the satellite's time of week, and brings the times of messages to GPS
 //! time. A time that contradicts the one before drops both. Of a message that does not say its time the
-//! beginnings of units are known, and another signal of the satellite tells which ones they are.
+//! beginnings of units are known, and another signal of the satellite shows which ones they are.
 
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::ionosphere::Coefficients;
@@ -107,7 +107,7 @@ impl Decoder {
         })
     }
 
-    /// Whether another signal of the satellite has to tell the time.
+    /// Whether another signal of the satellite has to give the time.
     pub fn is_dated_elsewhere(&self) -> bool {
         self.undated.is_some()
     }

@@ -86,10 +86,10 @@ pub fn refusal(signal: &'static Signal) -> Option<String> {
 pub fn undated(signals: &[&'static Signal]) -> Option<(&'static Signal, String)> {
     let has_data = |signal: &Signal| signal.components.iter().any(|component| component.message.is_some());
     let alone = |signal: &&'static Signal| {
-        has_data(signal) && !signal.is_dated() && signal.told_by(signals.iter().copied()).next().is_none()
+        has_data(signal) && !signal.is_dated() && signal.dated_by(signals.iter().copied()).next().is_none()
     };
     let signal = signals.iter().copied().find(alone)?;
-    let names: Vec<&str> = signal.told_by(signal::all()).map(|teller| teller.name).collect();
+    let names: Vec<&str> = signal.dated_by(signal::all()).map(|other| other.name).collect();
     let names = names.join(" or ");
     let reason = format!("its message says neither time nor orbit: expected {names} beside it, which says both");
     Some((signal, reason))
@@ -120,13 +120,13 @@ mod tests {
     }
 
     #[test]
-    fn what_says_no_time_is_refused_without_a_signal_that_tells_it() {
+    fn what_says_no_time_is_refused_without_a_signal_that_gives_it() {
         let (signal, reason) = undated(&[&E6, &L1_CA]).unwrap();
         assert!(*signal == E6 && reason.contains("Galileo E1 or Galileo E5b"), "{reason}");
         // F/NAV has no delay that would make its clock that of E6.
         assert!(undated(&[&E6, &E5A]).is_some());
-        for told in [&[&E1, &E6][..], &[&E6, &E5B], &[&L1_CA, &E5A], &[&MIXED]] {
-            assert_eq!(undated(told), None, "{told:?}");
+        for dated in [&[&E1, &E6][..], &[&E6, &E5B], &[&L1_CA, &E5A], &[&MIXED]] {
+            assert_eq!(undated(dated), None, "{dated:?}");
         }
     }
 

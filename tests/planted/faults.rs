@@ -296,7 +296,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.e6.codes", "the code of E6 is that of another satellite", E6_CODES),
     fault("gnss.e6.delay", "E6 has the group delay of E1 by its wavelength", DELAYS),
     fault("gnss.galileo_cnav.pattern", "pages of C/NAV begin with the inverse of their pattern", E6_PAGES),
-    fault("receiver.decode.dated", "a page that is told its second is taken for the one after it", E6_TIME),
+    fault("receiver.decode.dated", "a page that is given its second is taken for the one after it", E6_TIME),
     fault("gnss.e5.registers", "the second registers of E5 give the other bit", E5_CODES),
     fault("gnss.fnav.clock", "the clock of F/NAV is on the other side of that of I/NAV", E5_PAGES),
     fault("gnss.fnav.page_order", "pages of F/NAV come one place early", E5_PAGES),

@@ -1,4 +1,4 @@
-//! Galileo's C/NAV on E6-B against pages that satellites sent, and the time that E6 is told.
+//! Galileo's C/NAV on E6-B against pages that satellites sent, and the time that E6 is given.
 
 use gnss_twin::gnss::bits::{Store, bits_of};
 use gnss_twin::gnss::broadcast::Ephemeris;

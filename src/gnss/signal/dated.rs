@@ -1,4 +1,4 @@
-//! Signals whose messages say when they are sent and from where, and those that are told it by these.
+//! Signals whose messages say when they are sent and from where, and those that take it from these.
 
 use super::Signal;
 use crate::gnss::message::Message;
@@ -14,16 +14,16 @@ impl Signal {
         self.messages().any(Message::is_dated)
     }
 
-    /// Of some signals those that tell the time of this one, whose message does not say it, and where its
+    /// Of some signals those that give the time of this one, whose message does not say it, and where its
     /// satellites are: signals of the same satellites whose sets serve this one.
-    pub fn told_by(
+    pub fn dated_by(
         &'static self,
         signals: impl IntoIterator<Item = &'static Self>,
     ) -> impl Iterator<Item = &'static Self> {
         let serves = move |other: &Self| other.messages().any(|message| (message.sets.serves)(self));
-        let tells = move |other: &&'static Self| {
+        let dates = move |other: &&'static Self| {
             other.system == self.system && other.time == self.time && other.is_dated() && serves(other)
         };
-        signals.into_iter().filter(tells)
+        signals.into_iter().filter(dates)
     }
 }

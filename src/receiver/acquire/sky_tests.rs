@@ -174,7 +174,7 @@ fn beside_satellites_that_are_known_weak_ones_are_found_and_none_that_is_not_the
         total.false_ones += found.iter().filter(|hit| !right(hit)).count() as u32;
         blind += hits(&[]).iter().filter(|hit| right(hit)).count() as u32;
     }
-    println!("beside the known: {total:?}; without being told {blind}");
+    println!("beside the known: {total:?}; without that {blind}");
     assert_eq!(total.false_ones, 0, "{total:?}");
     assert!(f64::from(total.found) >= 0.95 * f64::from(total.there), "{total:?}");
     assert!(blind < total.found / 2, "{blind}: the test would show nothing");

@@ -27,8 +27,8 @@ impl FrontEnd {
         self.tracks.iter().filter(|track| !track.dropped).filter_map(one).collect()
     }
 
-    /// Tells channels whose messages do not say their time what other signals of their satellites read at a
-    /// tick.
+    /// Dates channels whose messages do not say their time by what other signals of their satellites read at
+    /// a tick.
     fn date(&mut self, main: u64, known: &[Reading], sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let Some(Tick { own, .. }) = self.ticks.iter().find(|tick| tick.main == main).copied() else { return Ok(()) };
         let sink = &mut super::step::Counted { sink, step: self.step, ticks: &[] };
@@ -92,7 +92,7 @@ impl Session {
         Ok(())
     }
 
-    /// Tells channels their time that cannot know it by themselves: front ends that are in step read the same
+    /// Dates channels that cannot know their time by themselves: front ends that are in step read the same
     /// to a sample.
     fn date(&mut self, tick: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let waiting = |front_end: &FrontEnd| {

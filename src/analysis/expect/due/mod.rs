@@ -205,12 +205,12 @@ impl Expectations {
         let excuses: Vec<Excuse> = plain.iter().filter_map(|row| scene.excuse(link.sv, row, usual_dbhz)).collect();
         one.excuse = excuses.get(excuses.len() / 2).copied();
         let measured = self.measured();
-        let told_s = if link.signal.is_dated() { Some(f64::NEG_INFINITY) } else { counted.told_s };
+        let dated_s = if link.signal.is_dated() { Some(f64::NEG_INFINITY) } else { counted.dated_s };
         for ((sample, row), required) in rows.iter().zip(&required) {
-            // What does not say its time is told it once another signal of the satellite is observed.
-            let told = told_s.is_some_and(|told_s| row.time_s >= told_s);
-            let required = &if told { *required } else { Required { observed: false, used: false, ..*required } };
-            counted.tell(link.signal, required, row.time_s);
+            // What does not say its time has it once another signal of the satellite is observed.
+            let dated = dated_s.is_some_and(|dated_s| row.time_s >= dated_s);
+            let required = &if dated { *required } else { Required { observed: false, used: false, ..*required } };
+            counted.date(link.signal, required, row.time_s);
             let Ok(at) = self.epochs.binary_search_by_key(sample, |due| due.sample) else { continue };
             one.take(row, required, measured.contains_at(at, self), seen.contains(sample));
             let Some(due) = self.epochs.get_mut(at) else { continue };
@@ -270,13 +270,13 @@ struct Counted {
     used: HashSet<u64>,
     /// Since when one of its signals that say their time must be observed. They come before those that do
     /// not, as signals are sorted.
-    told_s: Option<f64>,
+    dated_s: Option<f64>,
 }
 
 impl Counted {
-    fn tell(&mut self, signal: &Signal, required: &Required, time_s: f64) {
+    fn date(&mut self, signal: &Signal, required: &Required, time_s: f64) {
         if signal.is_dated() && required.observed {
-            self.told_s = Some(self.told_s.map_or(time_s, |told_s| told_s.min(time_s)));
+            self.dated_s = Some(self.dated_s.map_or(time_s, |dated_s| dated_s.min(time_s)));
         }
     }
 
@@ -284,7 +284,7 @@ impl Counted {
         if self.sv.replace(sv) != Some(sv) {
             self.held.clear();
             self.used.clear();
-            self.told_s = None;
+            self.dated_s = None;
         }
     }
 }

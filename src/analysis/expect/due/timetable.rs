@@ -23,7 +23,7 @@ const LARGEST_UNITS: i64 = 250;
 pub struct Timetable {
     message: Option<&'static Message>,
     /// Of another signal of the satellite, where this one's says neither its time nor its orbit.
-    teller: Option<&'static Message>,
+    dating: Option<&'static Message>,
     /// The first sample, by the clock of the system that sends.
     start: Epoch,
 }
@@ -32,20 +32,20 @@ impl Timetable {
     /// Of a signal in a scene whose first sample was taken then.
     pub fn new(signal: &Signal, start: Epoch) -> Self {
         let message = signal.components.iter().find_map(|component| component.message);
-        Self { message, teller: None, start: signal.time.label(start) }
+        Self { message, dating: None, start: signal.time.label(start) }
     }
 
-    /// The same beside other signals, of which one may have to tell time and orbit.
+    /// The same beside other signals, of which one may have to give time and orbit.
     pub fn beside(signal: &'static Signal, signals: &BTreeSet<&'static Signal>, start: Epoch) -> Self {
         let undated = !signal.is_dated();
-        let teller =
-            signal.told_by(signals.iter().copied()).find_map(|other| other.components.iter().find_map(|c| c.message));
-        Self { teller: teller.filter(|_| undated), ..Self::new(signal, start) }
+        let dating =
+            signal.dated_by(signals.iter().copied()).find_map(|other| other.components.iter().find_map(|c| c.message));
+        Self { dating: dating.filter(|_| undated), ..Self::new(signal, start) }
     }
 
     /// That of the message which says when it is and where the satellite is.
-    fn told(&self) -> Self {
-        Self { message: self.teller.or(self.message), teller: None, ..*self }
+    fn dated(&self) -> Self {
+        Self { message: self.dating.or(self.message), dating: None, ..*self }
     }
 
     /// When the first unit of those that `wanted` picks by its start has arrived whole of those that begin
@@ -62,9 +62,9 @@ impl Timetable {
 
     /// When a channel locked since `locked_s` knows where units begin, and their time.
     pub fn frame_by_s(&self, locked_s: f64) -> f64 {
-        if self.teller.is_some() {
+        if self.dating.is_some() {
             let unit_s = self.whole_by_s(locked_s, |_, _| true) + HEADER_S;
-            return unit_s.max(self.told().frame_by_s(locked_s));
+            return unit_s.max(self.dated().frame_by_s(locked_s));
         }
         let one_s = self.whole_by_s(locked_s, |message, start| message.timed.contains(&(message.number)(start)));
         let dated = self.message.map_or(&[][..], |message| message.dated);
@@ -79,19 +79,19 @@ impl Timetable {
 
     /// When every unit of a set of elements has arrived whole.
     pub fn ephemeris_by_s(&self, locked_s: f64) -> f64 {
-        let told = self.told();
-        let Some(message) = told.message else { return f64::INFINITY };
-        told.all_by_s(message.set, locked_s)
+        let dated = self.dated();
+        let Some(message) = dated.message else { return f64::INFINITY };
+        dated.all_by_s(message.set, locked_s)
     }
 
     /// When a set in short has arrived whole; never, where the message has none.
     pub fn reduced_by_s(&self, locked_s: f64) -> f64 {
-        self.told().whole_by_s(locked_s, |message, start| message.reduced.contains(&(message.number)(start)))
+        self.dated().whole_by_s(locked_s, |message, start| message.reduced.contains(&(message.number)(start)))
     }
 
     /// When the ionosphere has arrived whole; never, where the message does not carry it.
     pub fn ionosphere_by_s(&self, locked_s: f64) -> f64 {
-        self.told().whole_by_s(locked_s, |message, start| (message.ionosphere.unit)(start))
+        self.dated().whole_by_s(locked_s, |message, start| (message.ionosphere.unit)(start))
     }
 }
 
@@ -131,15 +131,15 @@ mod tests {
     }
 
     #[test]
-    fn a_signal_that_says_no_time_waits_for_the_one_that_tells_it() {
+    fn a_signal_that_says_no_time_waits_for_the_one_that_gives_it() {
         let start = Epoch::parse("2020-11-29T12:50:30").unwrap();
         let both: BTreeSet<&'static Signal> = [&E1, &E6].into_iter().collect();
-        let (told, teller) = (Timetable::beside(&E6, &both, start), Timetable::new(&E1, start));
-        assert_eq!(told.frame_by_s(0.0), teller.frame_by_s(0.0));
-        assert_eq!(told.ephemeris_by_s(0.0), teller.ephemeris_by_s(0.0));
-        assert_eq!(told.ionosphere_by_s(3.0), teller.ionosphere_by_s(3.0));
-        assert_eq!(Timetable::beside(&E1, &both, start), teller);
-        // Nobody tells it: never.
+        let (dated, dating) = (Timetable::beside(&E6, &both, start), Timetable::new(&E1, start));
+        assert_eq!(dated.frame_by_s(0.0), dating.frame_by_s(0.0));
+        assert_eq!(dated.ephemeris_by_s(0.0), dating.ephemeris_by_s(0.0));
+        assert_eq!(dated.ionosphere_by_s(3.0), dating.ionosphere_by_s(3.0));
+        assert_eq!(Timetable::beside(&E1, &both, start), dating);
+        // Nothing gives it: never.
         let alone: BTreeSet<&'static Signal> = [&E6].into_iter().collect();
         assert!(Timetable::beside(&E6, &alone, start).frame_by_s(0.0).is_infinite());
     }
