@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::lanes::Buffers;
-use super::{Kernel, Run, isa};
+use super::{Kernel, Run, exact, isa};
 use crate::generator::fidelity::Arithmetic;
 
 /// Runs, the strips that they read, and scratch of the kernels.
@@ -16,7 +16,7 @@ pub struct Bank {
     bits: Vec<u64>,
     entries: Vec<Entry>,
     buffers: Buffers,
-    exact: Vec<f64>,
+    exact: Vec<exact::Block>,
 }
 
 struct Entry {

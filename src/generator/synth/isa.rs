@@ -101,7 +101,7 @@ pub fn accumulate_exact(
     run: &Run<'_>,
     i: &mut [f32],
     q: &mut [f32],
-    wave: &mut Vec<f64>,
+    wave: &mut Vec<exact::Block>,
 ) {
     match level {
         #[cfg(target_arch = "x86_64")]
@@ -116,13 +116,13 @@ pub fn accumulate_exact(
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn exact_avx512(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32], wave: &mut Vec<f64>) {
+fn exact_avx512(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32], wave: &mut Vec<exact::Block>) {
     exact::accumulate(edge, run, i, q, wave);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn exact_avx2(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32], wave: &mut Vec<f64>) {
+fn exact_avx2(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32], wave: &mut Vec<exact::Block>) {
     exact::accumulate(edge, run, i, q, wave);
 }
 

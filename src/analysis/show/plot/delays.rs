@@ -14,7 +14,9 @@ pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let chart = |title: &str, of: fn(&SkyRow) -> f64| {
         let (mut series, mut ends, mut first_s) = (Vec::new(), vec![0.0], f64::INFINITY);
         for (index, sv) in run.sky.keys().enumerate() {
-            let points: Vec<(f64, f64)> = run.sky.map(sv, |row| (run.time_s(row.sample), of(&row)))?;
+            let mut points: Vec<(f64, f64)> = run.sky.map(sv, |row| (run.time_s(row.sample), of(&row)))?;
+            // Of several front ends the first one's.
+            points.dedup_by_key(|point| point.0);
             first_s = points.iter().map(|point| point.0).fold(first_s, f64::min);
             let values = || points.iter().map(|point| point.1).filter(|value| value.is_finite());
             ends.extend(values().reduce(f64::min).into_iter().chain(values().reduce(f64::max)));
@@ -25,10 +27,10 @@ pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let x = judged.time_axis(std::iter::once(first_s));
         Ok::<_, JudgeError>(Chart::new(title, x, Axis::around("slant delay (m)", ends.into_iter(), 1.0), series))
     };
-    // The sky's rows have a satellite's delay once, whatever it sends.
+    // The sky's rows have a satellite's delay once in each front end, whatever it sends there.
     let mut carriers = Emission::all(run.truth.keys()).into_iter();
     let first = carriers.next().map(|one| one.carrier_hz() / 1e6).filter(|_| carriers.next().is_none());
-    let on = first.map_or(String::new(), |mhz| format!(" at {mhz:.2} MHz"));
+    let on = first.map_or(" on a satellite's first carrier".to_owned(), |mhz| format!(" at {mhz:.2} MHz"));
     let charts = [
         chart(&format!("Ionosphere{on}, as it is"), |row| row.ionosphere_m)?,
         chart("Troposphere, as it is", |row| row.troposphere_m)?,
