@@ -156,10 +156,10 @@ impl Fidelity {
             (Arithmetic::F32, CodeEdge::Area, _) => 0.4,
             (Arithmetic::F32, CodeEdge::BandLimited, false) => 3.4,
             (Arithmetic::F32, CodeEdge::BandLimited, true) => 1.5,
-            (Arithmetic::F64, CodeEdge::Nearest, _) => 4.1,
-            (Arithmetic::F64, CodeEdge::Area, _) => 6.2,
-            (Arithmetic::F64, CodeEdge::BandLimited, false) => 7.6,
-            (Arithmetic::F64, CodeEdge::BandLimited, true) => 5.0,
+            (Arithmetic::F64, CodeEdge::Nearest, _) => 1.2,
+            (Arithmetic::F64, CodeEdge::Area, _) => 1.3,
+            (Arithmetic::F64, CodeEdge::BandLimited, false) => 4.0,
+            (Arithmetic::F64, CodeEdge::BandLimited, true) => 1.5,
         }
     }
 
