@@ -27,7 +27,7 @@ use gnss_twin::gnss::record::{
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::{Sv, System};
 use gnss_twin::gnss::signal::register;
-use gnss_twin::gnss::signal::synthetic::{LONG_BOC, OWN_TIME};
+use gnss_twin::gnss::signal::synthetic::{LONG_BOC, OWN_TIME, SIDES};
 use gnss_twin::receiver::output::{Output, Record};
 use gnss_twin::receiver::receive;
 use gnss_twin::receiver::settings::Settings;
@@ -265,4 +265,54 @@ fn holds(case: &Case) {
     println!("horizontal, 95 %: GPS {:.3} m, second {:.3} m, both {:.3} m", flat_m[0], flat_m[1], flat_m[2]);
     assert!(flat_m[1] <= 1.0, "{flat_m:?}");
     assert!(flat_m[2] <= flat_m[0].max(flat_m[1]), "{flat_m:?}");
+}
+
+/// Of a signal whose chips are ten times as long as those of Galileo's E5: four satellites, by I/NAV of the
+/// upper side and the pilots of both.
+#[test]
+fn four_satellites_whose_signals_have_two_sides_give_a_position_to_decimetres_by_both() {
+    register(&SIDES).unwrap();
+    let text = "name = \"sides\"\nstart = 2020-11-29T12:50:30\nduration_s = 34\nseed = 5\nsignals = [\"synthetic F\"]\n\
+        [motion]\nkind = \"static\"\nlatitude_deg = 37.605\nlongitude_deg = -0.986\nheight_m = 60\n\
+        [satellites]\nmask_deg = 25\n[front_end]\nsample_rate_hz = 6.53e6\nformat = \"ci8\"\n[power]\n\
+        cn0_dbhz = 47\n[noise]\n[receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n";
+    let scenario = Scenario::parse(text, "sides").unwrap();
+    let (scene, _) = scenario.compose(Path::new("."), &Overrides::default()).unwrap();
+    let directory = tempfile::tempdir().unwrap();
+    let there = directory.path().join("truth");
+    std::fs::create_dir_all(&there).unwrap();
+    let mut writer = truth::Writer::create(&there).unwrap();
+    let mut bytes = Vec::new();
+    let whole = 0..scene.samples;
+    generate_part(&scene, whole, &mut bytes, &mut writer, &mut |_| (), &Options::default()).unwrap();
+    let settings =
+        "[acquisition]\nsignals = [\"synthetic F\"]\n[position]\nionosphere = \"none\"\ntroposphere = \"none\"\n";
+    let settings = Settings::from_table(settings.parse().unwrap(), "sides").unwrap();
+    let rx = directory.path().join("rx");
+    std::fs::create_dir_all(&rx).unwrap();
+    let mut output = Output::create(&rx).unwrap();
+    let outcome = receive(&scene.metadata, bytes.as_slice(), &settings, &mut output, &mut |_| ()).unwrap();
+    println!("{outcome}");
+    let events: Vec<EventRow> = rows(&rx, "events.csv");
+    let bad: Vec<&EventRow> =
+        events.iter().filter(|row| matches!(row.event, Event::CycleSlip | Event::LossOfLock)).collect();
+    assert!(bad.is_empty(), "{bad:?}");
+    let path: Vec<TrajectoryRow> = rows(&there, "trajectory.csv");
+    let fixes: Vec<Fix> = rows(&rx, "fixes.csv");
+    assert!(fixes.len() > 15 && fixes.iter().all(|fix| fix.satellites == 4), "{} fixes", fixes.len());
+    let to_enu = Geodetic::from_ecef(&path[0].position_m()).ecef_to_enu();
+    let flat = |fix: &Fix| {
+        let true_row = path.iter().find(|row| row.sample == fix.sample).unwrap();
+        let error_m = to_enu * (fix.position_m() - true_row.position_m());
+        libm::hypot(error_m.x, error_m.y)
+    };
+    let horizontal_m = p95(fixes.iter().map(flat).collect());
+    let summary = assess(directory.path(), None).unwrap();
+    let verdict = &summary.details.verdict;
+    println!("{}", verdict.in_words());
+    let failed = verdict.rows.iter().filter(|row| row.status == Status::Fail);
+    let failed: Vec<String> = failed.map(|row| format!("{} {}, {}", row.figure, row.value_text(), row.bound)).collect();
+    assert!(failed.is_empty(), "{failed:#?}");
+    println!("horizontal, 95 %: {horizontal_m:.3} m");
+    assert!(horizontal_m < 0.3, "{horizontal_m} m");
 }

@@ -411,7 +411,13 @@ fn name(root: &Table<'_>) -> Result<String, ScenarioError> {
 }
 
 fn signals(root: &Table<'_>) -> Result<Vec<&'static Signal>, ScenarioError> {
-    Ok(signal_list(root, "signals")?.unwrap_or_else(|| vec![&crate::gnss::gps::l1ca::L1_CA]))
+    let signals = signal_list(root, "signals")?.unwrap_or_else(|| vec![&crate::gnss::gps::l1ca::L1_CA]);
+    let sides =
+        |whole: &'static Signal| signals.iter().filter(|side| whole.has_side(side)).map(move |side| (whole, *side));
+    match signals.iter().copied().find_map(|whole| sides(whole).next()) {
+        Some((whole, side)) => Err(root.bad("signals", format!("{whole} or {side}, which is a part of it, not both"))),
+        None => Ok(signals),
+    }
 }
 
 /// An array of different signals.

@@ -14,13 +14,15 @@ use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::{Component, Layers, Shape};
+use crate::gnss::signal::{Component, Layers, Shape, Tone};
 
 mod carrier;
 mod kernel;
 mod pattern;
 mod pieces;
 mod short;
+#[cfg(test)]
+mod sides_tests;
 mod single;
 pub mod sums;
 pub mod wave;
@@ -28,7 +30,7 @@ pub mod wave;
 use pattern::Pattern;
 use pieces::Pieces;
 use sums::Samples;
-pub use wave::{Wave, fits, layers_refusal};
+pub use wave::{Wave, fits, layers_refusal, steps_of_chip};
 
 /// How a replica's chips meet the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -114,6 +116,9 @@ impl Replica {
     /// or the code is too long.
     pub fn made(component: &Component, number: u8, waveform: Layers, edge: Edge) -> Option<Self> {
         let wave = Wave::new(component, number)?;
+        if let Some(tone) = component.tone() {
+            return Self::of_side(wave, edge, tone);
+        }
         if waveform == Layers::Strongest {
             return Self::of(wave, edge);
         }
@@ -126,6 +131,53 @@ impl Replica {
         let patterns = patterns.collect::<Option<Vec<_>>>()?.concat();
         let pieces = by_pieces(&layers.iter().map(|(wave, gain)| (wave, *gain)).collect::<Vec<_>>(), edge);
         Some(Self { wave, patterns, pieces })
+    }
+
+    /// The same in samples whose spectrum may be inverted.
+    pub fn made_in(component: &Component, number: u8, (made, edge): (Layers, Edge), inverted: bool) -> Option<Self> {
+        let replica = Self::made(component, number, made, edge)?;
+        Some(if inverted && component.tone().is_some() { replica.mirrored() } else { replica })
+    }
+
+    /// One side of a sub-carrier: its chips times the tone. Taps have the tone's phase at the prompt.
+    fn of_side(wave: Wave, edge: Edge, tone: Tone) -> Option<Self> {
+        let patterns = Pattern::of(&wave, tone.gain.conj() / tone.gain.norm(), edge)?;
+        let toned = |pattern| Pattern { half_cycles: tone.half_cycles, ..pattern };
+        Some(Self { wave, patterns: patterns.into_iter().map(toned).collect(), pieces: Vec::new() })
+    }
+
+    /// The same where the spectrum is inverted.
+    fn mirrored(mut self) -> Self {
+        for pattern in &mut self.patterns {
+            (pattern.half_cycles, pattern.gain) = (-pattern.half_cycles, pattern.gain.conj());
+        }
+        self
+    }
+
+    /// Both sides of a sub-carrier with equal parts and the noise of one: every tap has the tones' phases at
+    /// its own place. `None` unless either is one.
+    pub fn joined(first: &Self, second: &Self) -> Option<Self> {
+        let [first_pattern] = first.patterns.as_slice() else { return None };
+        let [second_pattern] = second.patterns.as_slice() else { return None };
+        let part = |pattern: &Pattern| Pattern {
+            gain: pattern.gain * std::f64::consts::FRAC_1_SQRT_2,
+            turns_at_taps: true,
+            ..pattern.clone()
+        };
+        let patterns = vec![part(first_pattern), part(second_pattern)];
+        Some(Self { wave: first.wave.clone(), patterns, pieces: Vec::new() })
+    }
+
+    /// Inverts the second side, or does not.
+    pub fn set_second(&mut self, inverted: bool) {
+        if let [_, second] = self.patterns.as_mut_slice() {
+            second.is_inverted = inverted;
+        }
+    }
+
+    /// The oscillators with the sub-carrier of its first pattern.
+    pub fn beside_carrier(&self, nco: &Nco) -> Nco {
+        self.patterns.first().map_or(*nco, |pattern| pattern.beside_carrier(nco))
     }
 
     /// Length of the period in code phase units.
@@ -196,7 +248,8 @@ impl Replica {
         match self.patterns.as_slice() {
             [alone] if alone.gain == Complex64::ONE => of(alone),
             several => several.iter().fold([Complex64::ZERO; T], |mut sums, pattern| {
-                sums.iter_mut().zip(of(pattern)).for_each(|(sum, own)| *sum += pattern.gain * own);
+                let own = taps.iter().zip(of(pattern));
+                sums.iter_mut().zip(own).for_each(|(sum, (tap, own))| *sum += pattern.factor(*tap) * own);
                 sums
             }),
         }

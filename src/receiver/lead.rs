@@ -1,6 +1,6 @@
 //! The component of a signal that a receiver searches and follows.
 
-use crate::gnss::signal::{self, Component, Layers, Shape, Signal};
+use crate::gnss::signal::{self, Component, Layer, Layers, Shape, Signal};
 use crate::receiver::correlate::fits;
 
 /// The strongest component whose code is short enough to be made; of equally strong ones a pilot.
@@ -16,16 +16,36 @@ pub fn lead(signal: &'static Signal) -> Option<&'static Component> {
 }
 
 /// The component whose data can be read once the overlay of `pilot` is aligned: their codes have the same
-/// length, and symbols and overlay of the data begin where the pilot's overlay does.
+/// length, symbols and overlay of the data begin where the pilot's overlay does, and both are on the same
+/// side of a sub-carrier where they have one.
 pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
+    let side = pilot.tone().map(|tone| tone.half_cycles);
     let fits = |component: &&Component| {
         let periods = component.periods_per_symbol().unwrap_or(0);
         let whole = |periods: u32| pilot.overlay.periods().is_multiple_of(periods.max(1));
         let same = (component.period_s() / pilot.period_s() - 1.0).abs() < 1e-12;
-        periods > 0 && same && whole(periods) && whole(component.overlay.periods())
+        let on_side = component.tone().map(|tone| tone.half_cycles) == side;
+        periods > 0 && same && whole(periods) && whole(component.overlay.periods()) && on_side
     };
     signal.components.iter().find(|component| !std::ptr::eq(*component, pilot) && fits(component))
 }
+
+/// The pilot on the other side of the sub-carrier of which `pilot` is one side, as strong and with an overlay
+/// as long: both are followed together once the overlay is aligned.
+pub fn other_side(pilot: &Component, signal: &'static Signal) -> Option<&'static Component> {
+    let tone = pilot.tone().filter(|_| pilot.message.is_none() && pilot.overlay.periods() > 1)?;
+    let is_other = |other: &&Component| {
+        let like = |of: fn(&Component) -> (f64, f64, f64)| of(pilot) == of(other);
+        other.message.is_none()
+            && like(|one| (one.power_share, one.phase_cycles, one.chip_rate_hz))
+            && (pilot.code_chips, pilot.overlay.periods()) == (other.code_chips, other.overlay.periods())
+            && other.tone().is_some_and(|other| other.is_opposite(&tone))
+    };
+    signal.components.iter().find(is_other)
+}
+
+/// C/N0 of both sides over that of one.
+pub const BOTH_SIDES: f64 = 2.0;
 
 /// The pilot whose code begins with that of `lead` and is whole periods of it long: too long to be searched
 /// for, but found once `lead` is followed.
@@ -42,9 +62,17 @@ pub fn long_beside(lead: &'static Component, signal: &'static Signal) -> Option<
     signal.components.iter().find(|pilot| lead.overlay.periods() == 1 && is_long(pilot))
 }
 
-/// Correlation of a component with the replica that is made of it, and of the replica with itself.
+/// Correlation of a component with the replica that is made of it, and of the replica with itself. Of one
+/// side of a sub-carrier that of the chips alone: what a tone beside the carrier finds of them.
 pub fn shapes(component: &Component, made: Layers) -> Option<[Shape; 2]> {
     let strongest = component.strongest()?;
+    if let Some(tone) = component.tone() {
+        let chips = |weight| {
+            let layer = [Layer { weight, ..Layer::BPSK }];
+            Shape::between(&layer, &[Layer::BPSK], component.chip_rate_hz)
+        };
+        return Some([chips(tone.gain.norm()), chips(1.0)]);
+    }
     Some(match made {
         Layers::Strongest => component.shapes_by(Layers::Whole, strongest),
         Layers::Whole => [component.shape(), component.shape()],

@@ -4,7 +4,8 @@
 //! √(2T·C/N0)·R(ε)·sinc(ΔfT)·e^(jφ) and unit noise a component whose covariance is that of the taps; they go
 //! through the loops, discriminators and C/N0 estimate of `receiver::track`, and what is left between truth
 //! and oscillators is measured. Source of the model: Kaplan and Hegarty, Understanding GPS 2nd ed., 5.3.
-//! Limits: one satellite, constant C/N0, no multipath; a period lasts its nominal time.
+//! Limits: one satellite, constant C/N0, no multipath; a period lasts its nominal time; signals of which both
+//! sides of a sub-carrier are followed are left out.
 
 use num_complex::Complex64;
 
@@ -16,7 +17,7 @@ use super::watch::Watch;
 use crate::analysis::expect::theory::clock::PowerLaw;
 use crate::gnss::signal::{self, Carrier, Component, Signal};
 use crate::receiver::correlate::units_to_chips;
-use crate::receiver::lead::lead;
+use crate::receiver::lead::{lead, other_side};
 use crate::receiver::track::closed::{Loops, Mode, Update};
 use crate::receiver::track::cn0::Cn0;
 use crate::receiver::track::loops::Rates;
@@ -54,10 +55,12 @@ pub struct Case {
     pub seed: u64,
 }
 
-/// The signals that a channel of this kind can follow: those whose carrier is the same for all satellites.
+/// The signals that a channel of this kind can follow: those whose carrier is the same for all satellites,
+/// and of which one component is followed.
 pub fn signals() -> Vec<&'static Signal> {
-    let common = |signal: &&'static Signal| matches!(signal.carrier, Carrier::Common(_)) && lead(signal).is_some();
-    signal::all().into_iter().filter(common).collect()
+    let common = |signal: &&'static Signal| matches!(signal.carrier, Carrier::Common(_));
+    let alone = |signal: &&'static Signal| lead(signal).is_some_and(|lead| other_side(lead, signal).is_none());
+    signal::all().into_iter().filter(|signal| common(signal) && alone(signal)).collect()
 }
 
 impl Case {

@@ -74,6 +74,8 @@ const CARRIED: &str = "witness::cnav::a_set_of_lnav_carried_to_cnav_is_the_same_
 const L2C_CODES: &str = "witness::codes::all_chips_of_all_codes_of_l2c_are_those_of_another_program_and_take_turns";
 const L5_CODES: &str = "witness::codes::all_chips_of_all_codes_of_l5_are_those_of_another_program";
 const E5_PAGES: &str = "witness::fnav::shipped_pages_of_e5a_and_e5b_hold_and_are_sent_by_us_bit_by_bit";
+const ALTBOC: &str = "witness::altboc::the_waveform_of_e5_is_what_the_table_of_phases_has_of_its_four_codes";
+const SIDES: &str = "sides::both_sides_of_a_sub_carrier_are_followed_on_the_peak_that_they_make_together";
 const E6_CODES: &str = "witness::codes::all_chips_of_all_codes_of_e6_are_those_of_another_program";
 const E6_PAGES: &str = "witness::galileo_e6::pages_of_e6_are_coded_and_interleaved_as_printed";
 const E6_TIME: &str =
@@ -293,6 +295,10 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.cnav.order", "messages of CNAV come one place early", CIVIL),
     fault("gnss.cnav.count", "the count of a message is taken for its own beginning", CIVIL),
     fault("gnss.cnav.isc", "corrections between signals have the wrong sign", CARRIED),
+    fault("gnss.altboc.odd_chips", "the sub-carrier of E5 is upright on every chip", ALTBOC),
+    fault("gnss.altboc.delay", "both sides of E5 are delayed like the upper one", DELAYS),
+    fault("receiver.correlate.side", "taps of both sides turn the wrong way", SIDES),
+    fault("receiver.sides.overlay", "both sides are added without the signs of their overlays", SIDES),
     fault("gnss.e6.codes", "the code of E6 is that of another satellite", E6_CODES),
     fault("gnss.e6.delay", "E6 has the group delay of E1 by its wavelength", DELAYS),
     fault("gnss.galileo_cnav.pattern", "pages of C/NAV begin with the inverse of their pattern", E6_PAGES),

@@ -10,4 +10,5 @@ mod judge;
 mod laws;
 mod loops;
 mod runner;
+mod sides;
 mod witness;

@@ -5,6 +5,8 @@
 //! (`tests/witness_skips.rs`). They are tests of this target because most planted faults of `gnss` are theirs
 //! to notice, and one target compiles and runs them once.
 
+#[path = "../witness/altboc.rs"]
+mod altboc;
 #[path = "../witness/atmosphere.rs"]
 mod atmosphere;
 #[path = "../witness/bcnav1.rs"]

@@ -14,16 +14,16 @@ use num_complex::Complex64;
 
 use super::recording::two_bits;
 
-const FILE: &str = "if-signals/ifen_e5_2016-01-19_100msps_r2bit.bin";
-const RATE_HZ: f64 = 100e6;
+pub const FILE: &str = "if-signals/ifen_e5_2016-01-19_100msps_r2bit.bin";
+pub const RATE_HZ: f64 = 100e6;
 /// The middle of E5, and where it is in the samples.
-const CENTRE_HZ: f64 = 1_191.795e6;
-const IF_HZ: f64 = 74_999_467.6;
+pub const CENTRE_HZ: f64 = 1_191.795e6;
+pub const IF_HZ: f64 = 74_999_467.6;
 /// Cycles of E5's subcarrier a chip (Galileo OS SIS ICD 2.1, table 5): sides are that far from the middle.
 const CYCLES_PER_CHIP: f64 = 1.5;
-const CHIPS: f64 = 10_230.0;
+pub const CHIPS: f64 = 10_230.0;
 
-fn search(i: &[f32], signal: &'static Signal, doppler_max_hz: f64) -> Vec<Acquired> {
+pub fn search(i: &[f32], signal: &'static Signal, doppler_max_hz: f64) -> Vec<Acquired> {
     let metadata = IfMetadata {
         format: Format::Ri8,
         rate: Rate::from_hz(RATE_HZ).unwrap(),
@@ -59,7 +59,7 @@ fn search(i: &[f32], signal: &'static Signal, doppler_max_hz: f64) -> Vec<Acquir
 
 /// Exactly these satellites, each where another program found it to a chip; where the list has no delay, the
 /// number alone.
-fn assert_found(found: &[Acquired], listed: &[(u8, Option<f64>)]) {
+pub fn assert_found(found: &[Acquired], listed: &[(u8, Option<f64>)]) {
     let numbers: Vec<u8> = found.iter().map(|hit| hit.sv.number).collect();
     assert_eq!(numbers, listed.iter().map(|(number, _)| *number).collect::<Vec<_>>());
     for (hit, (_, delay_chips)) in found.iter().zip(listed) {
@@ -108,7 +108,7 @@ fn periods(i: &[f32], hit: &Acquired, [code_a, code_b]: [&[i8]; 2]) -> Vec<[[Com
 }
 
 /// Where an overlay begins among code periods, and by how much the sum that finds it is larger than the next.
-fn overlay_place(prompts: &[Complex64], overlay: &[i8]) -> (usize, f64) {
+pub fn overlay_place(prompts: &[Complex64], overlay: &[i8]) -> (usize, f64) {
     let sum = |first: usize, hz: f64| -> Complex64 {
         let one = |(k, prompt): (usize, &Complex64)| {
             let (sin, cos) = libm::sincos(-TAU * hz * 1e-3 * k as f64);

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::analysis::read::Run;
 use crate::analysis::waveform::{Waveform, leading};
-use crate::gnss::signal::{Layers, Signal};
+use crate::gnss::signal::{Component, Layer, Layers, Shape, Signal, Tone};
 
 /// What `receiver.json` says of a signal.
 #[derive(Clone, Debug, Deserialize)]
@@ -14,6 +14,8 @@ struct Entry {
     component: usize,
     /// None where the replica has all.
     layer: Option<usize>,
+    /// Of both sides of a sub-carrier the other.
+    other_side: Option<usize>,
     spacing_chips: f64,
     integration_s: f64,
     pll_bandwidth_hz: f64,
@@ -31,7 +33,10 @@ pub(in crate::analysis) struct Followed {
     pub own: Waveform,
     /// Of the whole waveform with itself.
     pub whole: Waveform,
-    /// Power of the component over the whole signal's.
+    /// The sub-carrier, of which both sides are followed: what is found, assumed and the replica's own are
+    /// those of the chips then.
+    pub sides: Option<Tone>,
+    /// Power of what is followed over the whole signal's.
     pub share: f64,
     /// Distance of early and late, chips; the settings' where the receiver does not say it, as the others.
     pub spacing_chips: Option<f64>,
@@ -61,20 +66,35 @@ impl Followed {
             Some(layer) => component.shapes_by(sent, layer),
             None => [component.shape_between(sent, Layers::Whole), component.shape()],
         };
-        let ([found, own], [assumed, _]) = (by(run.scene.waveform), by(Layers::Whole));
+        let other = entry.as_ref().and_then(|entry| signal.components.get(entry.other_side?));
+        let sides = component.tone().filter(|_| other.is_some());
+        let ([found, own], [assumed, _]) = match sides {
+            Some(tone) => [(); 2].map(|()| chips_of_side(component, &tone)).into(),
+            None => (by(run.scene.waveform), by(Layers::Whole)),
+        };
         let of = |shape| Waveform::of_shape(shape, component.chip_rate_hz);
         Some(Self {
             found: of(found),
             assumed: of(assumed),
             own: of(own),
             whole: of(component.shape()),
-            share: component.power_share,
+            sides,
+            share: component.power_share + other.map_or(0.0, |other| other.power_share),
             spacing_chips: entry.as_ref().map(|entry| entry.spacing_chips),
             integration_s: entry.as_ref().map(|entry| entry.integration_s),
             pll_bandwidth_hz: entry.as_ref().map(|entry| entry.pll_bandwidth_hz),
             dll_bandwidth_hz: entry.as_ref().map(|entry| entry.dll_bandwidth_hz),
         })
     }
+}
+
+/// Correlation of the chips of one side of a sub-carrier with those of a replica that has the sub-carrier's
+/// line alone, and of that one with itself.
+fn chips_of_side(component: &Component, tone: &Tone) -> [Shape; 2] {
+    [tone.gain.norm(), 1.0].map(|weight| {
+        let found = [Layer { weight, ..Layer::BPSK }];
+        Shape::between(&found, &[Layer::BPSK], component.chip_rate_hz)
+    })
 }
 
 #[cfg(test)]

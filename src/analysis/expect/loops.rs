@@ -18,7 +18,7 @@ use crate::analysis::read::Run;
 use crate::analysis::statistics::Sum;
 use crate::analysis::waveform::{Edge, Waveform, leading};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::{Link, Signal};
+use crate::gnss::signal::{Link, Signal, Tone, sinc_squared};
 
 /// Which loop a row is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -203,6 +203,9 @@ struct Peak {
     corners: Vec<(f64, f64)>,
     width_chips: f64,
     averages: u32,
+    /// Of both sides of a sub-carrier together, whose chips those are. Averages leave the sub-carrier as it
+    /// is.
+    sides: Option<Tone>,
 }
 
 impl Peak {
@@ -210,14 +213,26 @@ impl Peak {
     fn new(waveform: &Waveform, width_chips: f64, averages: u32) -> Self {
         let chip_s = 1.0 / waveform.chip_rate_hz();
         let corners = waveform.corners().into_iter().map(|(at_s, bend)| (at_s / chip_s, bend * chip_s)).collect();
-        Self { corners, width_chips, averages }
+        Self { corners, width_chips, averages, sides: None }
+    }
+
+    /// The same of chips that a sub-carrier turns, where its sides are followed together.
+    fn between(self, sides: Option<Tone>) -> Self {
+        Self { sides, ..self }
+    }
+
+    /// The same `gain` times as high.
+    fn times(mut self, gain: f64) -> Self {
+        self.corners.iter_mut().for_each(|(_, bend)| *bend *= gain);
+        self
     }
 
     /// Value at a delay in chips.
     fn value(&self, x: f64) -> f64 {
         let w = self.width_chips;
         let sum = |of: &dyn Fn(f64) -> f64| self.corners.iter().map(|(at, bend)| bend * of(x - at)).sum::<f64>();
-        match self.averages {
+        let both = self.sides.map_or(1.0, |tone| tone.both_sides(x));
+        both * match self.averages {
             0 => sum(&|y| 0.5 * y.abs()),
             // Integrals of |x|/2: x|x|/4 and |x|³/12.
             1 => sum(&|y| (y + 0.5 * w) * (y + 0.5 * w).abs() / 4.0 - (y - 0.5 * w) * (y - 0.5 * w).abs() / 4.0) / w,
@@ -253,6 +268,20 @@ impl Code {
     /// That of a signal's waveform.
     pub fn of(waveform: &Waveform) -> Self {
         Self { peak: Peak::new(waveform, 0.0, 0), reach_chips: waveform.reach_s() * waveform.chip_rate_hz() }
+    }
+
+    /// That of what is followed of a signal.
+    fn found(followed: &Followed) -> Self {
+        let code = Self::of(&followed.found);
+        let Some(tone) = followed.sides else { return code };
+        // The triangle of the chips bends the first minimum, half a cycle away, by a fiftieth of a chip
+        // inwards.
+        let half_chips = 1.0 / f64::from(tone.half_cycles.abs().max(1));
+        let peak = code.peak.between(Some(tone));
+        let fine = |k: u32| half_chips * f64::from(k) / 1000.0;
+        let rises = |k: &u32| peak.value(fine(k + 1)) > peak.value(fine(*k));
+        let reach_chips = (0..1000).find(rises).map_or(half_chips, fine);
+        Self { peak, reach_chips }
     }
 
     /// Correlation at a delay.
@@ -295,7 +324,7 @@ impl Theory {
         let followed = Followed::of(run, link.signal)?;
         let settings = settings.fitted(&followed);
         let chip_rate_hz = followed.found.chip_rate_hz();
-        let code = Code::of(&followed.found);
+        let code = Code::found(&followed);
         if 0.5 * settings.spacing_chips >= code.reach_chips {
             return None;
         }
@@ -304,9 +333,14 @@ impl Theory {
         let width_chips = chip_rate_hz / run.rate_hz(link.signal);
         let of_replica = u32::from(settings.averaged_replica);
         let of_signal = u32::from(run.scene.code_edge == Edge::Area);
-        let peak = |waveform: &Waveform| Peak::new(waveform, width_chips, of_replica + of_signal);
+        // What the sampler's means leave of a sub-carrier, whose tone in the replica has none.
+        let side_hz = followed.sides.map_or(0.0, |tone| tone.side_hz(chip_rate_hz));
+        let left = if of_signal > 0 { sinc_squared(side_hz / run.rate_hz(link.signal)).sqrt() } else { 1.0 };
+        let peak = |waveform: &Waveform| {
+            Peak::new(waveform, width_chips, of_replica + of_signal).between(followed.sides).times(left)
+        };
         let (found, assumed) = (peak(&followed.found), peak(&followed.assumed));
-        let own = Peak::new(&followed.own, width_chips, 2 * of_replica);
+        let own = Peak::new(&followed.own, width_chips, 2 * of_replica).between(followed.sides);
         let dll_gain = found.steepness(settings.spacing_chips) / assumed.steepness(settings.spacing_chips);
         let dll = PhaseLoop { gains: made_for.gains.map(|gain| dll_gain * gain), ..made_for };
         // Of the component's power in the samples, which is whole whatever their averages leave of a layer.

@@ -325,21 +325,25 @@ fn the_spectrum_of_samples_is_that_of_the_component() {
             // The density counts where the code is not zero.
             let power = waveform.power(Edge::Area, RATE_HZ) / waveform.power(Edge::Nearest, RATE_HZ);
             let made = stretches(&waveform, kernel(Edge::Area), RATE_HZ, STRETCHES, 7.317_31e-3);
+            // Of one side of a sub-carrier the shape is the mean of this side and the other.
+            let sides: &[f64] = if component.tone().is_some() { &[1.0, -1.0] } else { &[1.0] };
             let (shape, width_hz) = (component.shape(), 0.8e6 * (component.chip_rate_hz / 1.023e6).min(1.0));
             for band in 0..BANDS {
                 let (mut found, mut expected) = (0.0, 0.0);
                 for line in 0..LINES {
                     let hz = width_hz * (f64::from(band) + (f64::from(line) + 0.37) / f64::from(LINES));
                     expected += folded_density(&shape, hz, RATE_HZ) / power / f64::from(LINES);
-                    let turn = Complex64::from_polar(1.0, -TAU * hz / RATE_HZ);
-                    for window in made.iter().filter_map(|samples| samples.get(..WINDOW)) {
+                    let windows = || made.iter().filter_map(|samples| samples.get(..WINDOW));
+                    for (side, window) in sides.iter().flat_map(|side| windows().map(move |window| (side, window))) {
+                        let turn = Complex64::from_polar(1.0, -TAU * side * hz / RATE_HZ);
                         let mut phasor = Complex64::ONE;
                         let mut sum = Complex64::ZERO;
                         for sample in window {
                             sum += sample * phasor;
                             phasor *= turn;
                         }
-                        found += sum.norm_sqr() / WINDOW as f64 / f64::from(LINES * STRETCHES);
+                        let windows = f64::from(LINES * STRETCHES) * sides.len() as f64;
+                        found += sum.norm_sqr() / WINDOW as f64 / windows;
                     }
                 }
                 // Independent values of a line: one a stretch, as far as the code does not repeat; lines

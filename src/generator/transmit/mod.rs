@@ -42,6 +42,17 @@ struct Sent {
     gain: f64,
     /// Carrier phase relative to the signal's, in samples: the other way round in an inverted spectrum.
     turns: u64,
+    /// Place among those that are added in one pass, from 0.
+    part: usize,
+}
+
+/// Puts sequences that are half a turn apart next to each other: they can be added before they are turned.
+fn in_chords(sent: &mut [Sent]) {
+    let line = |sent: &Sent| sent.turns << 1;
+    sent.sort_by_key(line);
+    for chord in sent.chunk_by_mut(|a, b| line(a) == line(b)) {
+        chord.iter_mut().enumerate().for_each(|(part, sent)| sent.part = part);
+    }
 }
 
 /// A satellite's signal in a scene.
@@ -152,8 +163,12 @@ impl Transmitter {
                     data: symbols.of(component),
                     gain: component.power_share.sqrt() * amplitude,
                     turns: turns(if scene.metadata.inverted { -cycles } else { cycles }),
+                    part: sent.len(),
                 });
             }
+        }
+        if signal.sides_hz() > 0.0 {
+            in_chords(&mut sent);
         }
         let carrier_hz = signal.carrier_hz(sv);
         let if_hz = scene.metadata.if_hz(carrier_hz);
@@ -390,7 +405,7 @@ impl Transmitter {
         let gain = 0.5 * (first.gain + last.gain);
         let real = planted!("generator.synth.amplitude", real, 1.06 * real);
         let amplitude = real * gain * (2.0 * cn0_hz.max(0.0) / rate_hz).sqrt() * f64::from(scene.noise_lsb);
-        for (number, sent) in self.sent.iter().enumerate() {
+        for sent in &self.sent {
             let sent_s = length / rate_hz - path.delay.change(u, v) - (last.delay_s - first.delay_s);
             let sent_s = planted!("generator.synth.code_rate", sent_s, sent_s * (1.0 + 2e-5));
             let step = (sent_s * sent.spreading.pace().step_rate_hz() / length * CODE_ONE as f64) as u64;
@@ -407,7 +422,7 @@ impl Transmitter {
                 }
                 negative
             };
-            bank.push((anchor.n, end), number, samples.clone(), |bits| Run {
+            bank.push((anchor.n, end), sent.part, samples.clone(), |bits| Run {
                 bits: &[],
                 position: sent.spreading.strip(at, step, samples.len(), negative, bits),
                 step,

@@ -1,5 +1,6 @@
 //! Galileo: one file a signal, one a message.
 
+pub mod altboc;
 pub mod cnav;
 pub mod e1;
 pub mod e5;

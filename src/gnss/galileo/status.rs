@@ -4,8 +4,10 @@
 //! the clock of the combination of E1 and E5b, F/NAV that of E1 and E5a; a set keeps BGD(E1,E5b) in `tgd_s`
 //! and BGD(E1,E5a) in `tgd2_s`, whichever clock it has. Of E6 neither says anything: it has the clock of
 //! I/NAV here, without a delay, as a user takes it who knows no more; real satellites delay E6 by what only
-//! the high accuracy service tells.
+//! the high accuracy service tells. Of both sides of E5 as one signal neither says anything either: here it
+//! is delayed by the mean of what delays its sides, which have equal power.
 
+use super::e5;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::signal::Signal;
 
@@ -50,8 +52,9 @@ impl Status {
     }
 }
 
-/// Between the carriers of E5a and E5b.
-const BETWEEN_HZ: f64 = 1_191.795e6;
+/// Between the carriers of E5a and of both sides of E5, and between that and E5b's.
+const ABOVE_E5A_HZ: f64 = 1_184e6;
+const BELOW_E5B_HZ: f64 = 1_199e6;
 /// Between those of E5b and E6, and of E6 and E1.
 const ABOVE_E5_HZ: f64 = 1_240e6;
 const ABOVE_E6_HZ: f64 = 1_400e6;
@@ -65,6 +68,8 @@ pub(super) enum Band {
     E5a,
     /// Its upper side.
     E5b,
+    /// Both sides as one signal.
+    E5,
     /// E6.
     E6,
 }
@@ -72,7 +77,8 @@ pub(super) enum Band {
 /// The band of a signal.
 pub(super) fn band(signal: &Signal) -> Band {
     match signal.centre_hz() {
-        hz if hz < BETWEEN_HZ => Band::E5a,
+        hz if hz < ABOVE_E5A_HZ => Band::E5a,
+        hz if hz < BELOW_E5B_HZ => Band::E5,
         hz if hz < ABOVE_E5_HZ => Band::E5b,
         hz if hz < ABOVE_E6_HZ => Band::E6,
         _ => Band::E1,
@@ -80,11 +86,13 @@ pub(super) fn band(signal: &Signal) -> Band {
 }
 
 /// Group delay of a signal against the clock of E1 and E5b: BGD(E1,E5b) on E1, (f₁/f)² times that on E5b,
-/// on E5a what makes the combination of E1 and E5a have the clock of F/NAV, and none on E6.
+/// on E5a what makes the combination of E1 and E5a have the clock of F/NAV, the mean of both on E5, and none
+/// on E6.
 pub(super) fn against_inav_s(set: &Ephemeris, signal: &Signal) -> f64 {
     match band(signal) {
         Band::E5a => set.tgd_s + set.tgd2_s * set.dispersion(signal) - set.tgd2_s,
         Band::E1 | Band::E5b => set.tgd_s * set.dispersion(signal),
+        Band::E5 => of_both(set, against_inav_s),
         Band::E6 => planted!("gnss.e6.delay", 0.0, set.tgd_s * set.dispersion(signal)),
     }
 }
@@ -94,8 +102,15 @@ pub(super) fn against_fnav_s(set: &Ephemeris, signal: &Signal) -> f64 {
     match band(signal) {
         Band::E5b => set.tgd2_s + set.tgd_s * set.dispersion(signal) - set.tgd_s,
         Band::E1 | Band::E5a => set.tgd2_s * set.dispersion(signal),
+        Band::E5 => of_both(set, against_fnav_s),
         Band::E6 => fnav_ahead_s(set),
     }
+}
+
+/// Mean delay of both sides of E5.
+fn of_both(set: &Ephemeris, of: fn(&Ephemeris, &Signal) -> f64) -> f64 {
+    let upper_s = of(set, &e5::E5B);
+    0.5 * (of(set, planted!("gnss.altboc.delay", &e5::E5A, &e5::E5B)) + upper_s)
 }
 
 /// By how much the clock of F/NAV is ahead of that of I/NAV: on E1 both have to be one clock.
@@ -105,12 +120,14 @@ pub(super) fn fnav_ahead_s(set: &Ephemeris) -> f64 {
 
 /// Whether a set says that a signal may be used, of those bands of which its message says something.
 pub(super) fn healthy(set: &Ephemeris, signal: &Signal, says: &[Band]) -> Option<bool> {
-    let band = band(signal);
-    let status = match band {
-        Band::E1 => E1B,
-        Band::E5a => E5A,
-        Band::E5b => E5B,
-        Band::E6 => return None,
+    let parts: &[(Band, Status)] = match band(signal) {
+        Band::E1 => &[(Band::E1, E1B)],
+        Band::E5a => &[(Band::E5a, E5A)],
+        Band::E5b => &[(Band::E5b, E5B)],
+        Band::E5 => &[(Band::E5a, E5A), (Band::E5b, E5B)],
+        Band::E6 => &[],
     };
-    says.contains(&band).then(|| status.is_good(set))
+    let mut said = parts.iter().filter(|(band, _)| says.contains(band)).peekable();
+    said.peek()?;
+    Some(said.all(|(_, status)| status.is_good(set)))
 }

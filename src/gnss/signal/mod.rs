@@ -23,11 +23,13 @@ mod dated;
 mod shape;
 #[cfg(any(test, feature = "planted"))]
 pub mod synthetic;
+mod tone;
 
 pub use shape::{Shape, sinc_squared};
+pub use tone::Tone;
 
 /// The built-in signals.
-pub static SIGNALS: [&Signal; 24] = [
+pub static SIGNALS: [&Signal; 25] = [
     &gps::l1ca::L1_CA,
     &gps::l1c::L1C,
     &gps::l2c::L2C,
@@ -35,6 +37,7 @@ pub static SIGNALS: [&Signal; 24] = [
     &galileo::e1::E1,
     &galileo::e5::E5A,
     &galileo::e5::E5B,
+    &galileo::altboc::E5,
     &galileo::e6::E6,
     &navic::sps::L5,
     &navic::sps::S,
@@ -406,10 +409,12 @@ impl Component {
         self.layers.iter().fold(1, |steps, layer| least_common_multiple(steps, layer.pulse.len().max(1)))
     }
 
-    /// The layers that it is made with.
+    /// The layers that it is made with: all of a component that is one side of a sub-carrier, which none of
+    /// them is alone.
     pub fn made_with(&self, layers: Layers) -> &[Layer] {
         match layers {
             Layers::Whole => self.layers,
+            Layers::Strongest if self.tone().is_some() => self.layers,
             Layers::Strongest => self.strongest().map_or(&[], std::slice::from_ref),
         }
     }
@@ -589,6 +594,9 @@ mod tests {
                 assert_eq!(overlay.len(), component.overlay.periods() as usize, "{signal} {sv}");
                 assert!(overlay.iter().all(|chip| chip.abs() == 1), "{signal} {sv}");
             }
+            // A sub-carrier is upright again at a period's end.
+            let halves = component.tone().map_or(0, |tone| tone.half_cycles.unsigned_abs());
+            assert!((halves * component.code_chips).is_multiple_of(2), "{signal}");
         }
     }
 }

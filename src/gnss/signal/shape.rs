@@ -72,7 +72,7 @@ impl Shape {
 }
 
 /// The steps of chip `index` with all layers.
-fn chip(layers: &[Layer], index: usize, steps: usize) -> Vec<Complex64> {
+pub(super) fn chip(layers: &[Layer], index: usize, steps: usize) -> Vec<Complex64> {
     let mut wave = vec![Complex64::ZERO; steps];
     for layer in layers.iter().filter(|layer| layer.covers(index)) {
         let (sin, cos) = libm::sincos(TAU * layer.phase_cycles);

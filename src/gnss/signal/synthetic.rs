@@ -4,13 +4,15 @@
 //! scale goes wrong with one of them.
 
 use super::{Carrier, Component, Layer, Overlay, Signal, always};
-use crate::gnss::galileo::inav::INAV;
+use crate::gnss::galileo::altboc::{DOWN, UP};
+use crate::gnss::galileo::fnav::FNAV;
+use crate::gnss::galileo::inav::{INAV, INAV_E5B};
 use crate::gnss::gps::lnav::LNAV;
 use crate::gnss::satellite::System;
-use crate::gnss::time::{GPST, TimeScale};
+use crate::gnss::time::{GPST, GST, TimeScale};
 
 /// All of them.
-pub static SYNTHETIC: [&Signal; 5] = [&LONG_BOC, &QUADRATURE, &CHANNELS, &MULTIPLEXED, &MIXED];
+pub static SYNTHETIC: [&Signal; 6] = [&LONG_BOC, &QUADRATURE, &CHANNELS, &MULTIPLEXED, &MIXED, &SIDES];
 
 /// Three seconds behind GPS time.
 pub static OWN_TIME: TimeScale = TimeScale { name: "synthetic", behind_gpst_s: 3, has_leap_seconds: false };
@@ -207,6 +209,60 @@ pub static MIXED: Signal = Signal {
             message: None,
         },
     ],
+};
+
+/// Data and pilot on either side of a sub-carrier, a tenth as fast as those of Galileo's E5.
+pub static SIDES: Signal = Signal {
+    name: "synthetic F",
+    rinex: "8X",
+    system: System::Galileo,
+    time: &GST,
+    constellation: [1, 36],
+    carrier: Carrier::Common(1_191.795e6),
+    sent: always,
+    minimum_power_dbw: None,
+    components: &[
+        Component {
+            phase_cycles: 0.0,
+            code: |number| assigned(number, 36, || random(2046, 1100 + u64::from(number))),
+            overlay: Overlay::Shared(&[1, -1]),
+            message: Some(&INAV_E5B),
+            ..UPPER_PILOT
+        },
+        UPPER_PILOT,
+        Component {
+            phase_cycles: 0.0,
+            code: |number| assigned(number, 36, || random(2046, 1400 + u64::from(number))),
+            overlay: Overlay::Shared(&[1, 1, -1, 1, -1, -1, -1, 1, 1, 1]),
+            message: Some(&FNAV),
+            ..LOWER_PILOT
+        },
+        LOWER_PILOT,
+    ],
+};
+
+const UPPER_PILOT: Component = Component {
+    power_share: 0.25,
+    phase_cycles: 0.25,
+    chip_rate_hz: 1.023e6,
+    code_chips: 2046,
+    code: |number| assigned(number, 36, || random(2046, 1200 + u64::from(number))),
+    layers: &UP,
+    overlay: Overlay::PerSatellite {
+        chips: 20,
+        of: |number| assigned(number, 36, || random(20, 1300 + u64::from(number))),
+    },
+    message: None,
+};
+
+const LOWER_PILOT: Component = Component {
+    code: |number| assigned(number, 36, || random(2046, 1500 + u64::from(number))),
+    layers: &DOWN,
+    overlay: Overlay::PerSatellite {
+        chips: 20,
+        of: |number| assigned(number, 36, || random(20, 1600 + u64::from(number))),
+    },
+    ..UPPER_PILOT
 };
 
 const fn chips_with_six(six: bool) -> [bool; 33] {

@@ -23,6 +23,7 @@ use super::settings::AcquisitionSettings;
 use super::{Acquired, kernel};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Component;
+use crate::receiver::correlate::steps_of_chip;
 use crate::receiver::source::Block;
 use crate::receiver::threshold::{of_one_cell, threshold};
 
@@ -37,7 +38,9 @@ pub(super) struct Grid {
     pub period_samples: f64,
     pub chips_per_sample: f64,
     pub rate_hz: f64,
+    /// Of the carrier; of a component that is one side of a sub-carrier the middle of that.
     if_hz: f64,
+    /// In the samples, for each hertz of the carrier: negative in an inverted spectrum.
     doppler_sign: f64,
     pub(super) carrier_hz: f64,
     /// Code periods in a coherent sum.
@@ -134,7 +137,8 @@ pub(super) fn samples_needed(period_samples: f64, coherent_periods: f64, sums: u
 
 /// Steps of a replica a second: cells are theirs, as its correlation is as narrow as they are.
 fn step_rate_hz(component: &Component) -> Option<f64> {
-    Some(component.chip_rate_hz * component.strongest()?.pulse.len() as f64)
+    component.strongest()?;
+    Some(component.chip_rate_hz * steps_of_chip(component) as f64)
 }
 
 impl Grid {
@@ -166,12 +170,14 @@ impl Grid {
         let image_scale = threshold(per_cell, 2 * sums) / (2.0 * threshold(per_cell, sums));
         let law = Law::new(settings.false_alarm_probability, lags, dopplers_hz.len(), sums, image_scale);
         let mut planner = FftPlanner::new();
+        let side_hz = component.side_hz();
+        let share = 1.0 + side_hz / carrier_hz;
         Some(Self {
             period_samples,
             chips_per_sample: component.chip_rate_hz / rate_hz,
             rate_hz,
-            if_hz: metadata.if_hz(carrier_hz),
-            doppler_sign: if metadata.inverted { -1.0 } else { 1.0 },
+            if_hz: metadata.if_hz(carrier_hz + side_hz),
+            doppler_sign: if metadata.inverted { -share } else { share },
             carrier_hz,
             coherent_periods,
             sums,
@@ -416,9 +422,9 @@ impl Grid {
         self.if_hz + self.doppler_sign * doppler_hz
     }
 
-    /// Doppler per hertz in the samples: −1 where the spectrum is inverted.
+    /// Doppler per hertz in the samples: negative where the spectrum is inverted.
     pub fn doppler_sign(&self) -> f64 {
-        self.doppler_sign
+        1.0 / self.doppler_sign
     }
 
     /// e^{jθ} of a tone at sample `n`.

@@ -99,10 +99,16 @@ impl Acquired {
     }
 }
 
-/// Whether a signal's carrier lies within the band of the samples. Of a real recording the IF may lie beyond
-/// half the rate on purpose.
+/// Whether a signal's carrier lies within the band of the samples, with both sides of its sub-carrier if it
+/// has one. Of a real recording the IF may lie beyond half the rate on purpose.
 pub fn can_hold(metadata: &IfMetadata, signal: &Signal) -> bool {
-    !metadata.format.is_complex() || metadata.if_hz(signal.centre_hz()).abs() <= 0.5 * metadata.rate.hz()
+    !metadata.format.is_complex() || far_hz(metadata, signal, signal.centre_hz()).abs() <= 0.5 * metadata.rate.hz()
+}
+
+/// Where a carrier lies in the samples, or the farther side of its sub-carrier.
+fn far_hz(metadata: &IfMetadata, signal: &Signal, carrier_hz: f64) -> f64 {
+    let if_hz = metadata.if_hz(carrier_hz);
+    if_hz + libm::copysign(signal.sides_hz(), if_hz)
 }
 
 /// Samples that a search for the signals that are asked for looks at, from the first sample of its block.
@@ -377,7 +383,7 @@ impl Searcher {
         if rate_hz < component.chip_rate_hz {
             return Err(AcquireError::RateTooLow { signal: signal.name, rate_hz, need_hz: component.chip_rate_hz });
         }
-        let (if_hz, half_hz) = (self.metadata.if_hz(link.carrier_hz()), 0.5 * rate_hz);
+        let (if_hz, half_hz) = (far_hz(&self.metadata, signal, link.carrier_hz()), 0.5 * rate_hz);
         // Of a real recording the IF may lie beyond half the rate on purpose.
         if self.metadata.format.is_complex() && if_hz.abs() > half_hz {
             return Err(AcquireError::OutOfBand { signal: signal.name, if_hz, half_hz });

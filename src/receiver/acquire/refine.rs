@@ -11,7 +11,7 @@ use rustfft::FftPlanner;
 
 use super::grid::Grid;
 use super::replica::Replica;
-use crate::gnss::signal::{Component, Shape};
+use crate::gnss::signal::{Component, Layer, Shape};
 use crate::receiver::correlate::{Nco, TURN, chips_to_units, units_to_chips};
 use crate::receiver::source::Block;
 
@@ -61,7 +61,8 @@ pub(super) fn refine(
     };
     let doppler_hz = correlators.fine_doppler_hz(phase, doppler_hz);
 
-    let shape = component.strongest().map_or_else(
+    let made = component.tone().map_or(component.strongest(), |_| Some(&Layer::BPSK));
+    let shape = made.map_or_else(
         || component.shape(),
         |layer| {
             let layers = [*layer];

@@ -1,8 +1,13 @@
 //! A period of signs, as kernels take it: the sum of such patterns is a replica.
 
+use std::f64::consts::PI;
+
 use num_complex::Complex64;
 
-use super::{CODE_BITS, Edge, MOST_STEPS, Nco, TURN, Wave, kernel, short};
+use super::{CODE_BITS, Edge, MOST_STEPS, Nco, TURN, Wave, kernel, short, units_to_chips};
+
+/// Half a turn in 2⁻⁶⁴ turns for each unit of code phase.
+const HALF_TURN_OF_CHIP: u64 = 1 << (63 - CODE_BITS);
 
 /// One period of steps of ±1, and its part in a replica.
 #[derive(Clone, Debug)]
@@ -20,6 +25,12 @@ pub(super) struct Pattern {
     pub edge: Edge,
     /// Steps of a period.
     pub length: usize,
+    /// Half cycles that its sub-carrier makes in a chip, of a component that is one side of one …
+    pub half_cycles: i32,
+    /// … and whether taps beside the prompt have the sub-carrier's phase there, or the prompt's.
+    pub turns_at_taps: bool,
+    /// Whether its part is taken the other way.
+    pub is_inverted: bool,
 }
 
 impl Pattern {
@@ -50,7 +61,20 @@ impl Pattern {
         let short_values = signs.iter().map(|sign| sign * short::AMPLITUDE).collect();
         let short_changes = signs.windows(2).map(|pair| (pair[1] - pair[0]) / 2).collect();
         let length = steps.len();
-        Self { gain, steps_per_chip, words, values, changes, short_values, short_changes, edge, length }
+        Self {
+            gain,
+            steps_per_chip,
+            words,
+            values,
+            changes,
+            short_values,
+            short_changes,
+            edge,
+            length,
+            half_cycles: 0,
+            turns_at_taps: false,
+            is_inverted: false,
+        }
     }
 
     /// Length of the period in phase units of steps.
@@ -62,8 +86,28 @@ impl Pattern {
     pub fn in_steps<const T: usize>(&self, nco: &Nco, taps: &[i64; T]) -> (Nco, [i64; T]) {
         let each = self.steps_per_chip as i64;
         let code = if each == 1 { nco.code } else { nco.code.rem_euclid(self.period() / each) * each };
-        let nco = Nco { code, code_step: nco.code_step * each as u64, ..*nco };
+        let nco = Nco { code, code_step: nco.code_step * each as u64, ..self.beside_carrier(nco) };
         (nco, taps.map(|tap| tap * each))
+    }
+
+    /// The carrier with the sub-carrier, which turns with the code: exactly, for whole turns wrap in both.
+    pub fn beside_carrier(&self, nco: &Nco) -> Nco {
+        let turns = |units: u64| units.wrapping_mul(self.half_cycles as u64).wrapping_mul(HALF_TURN_OF_CHIP);
+        Nco {
+            carrier: nco.carrier.wrapping_add(turns(nco.code as u64)),
+            carrier_step: nco.carrier_step.wrapping_add(turns(nco.code_step)),
+            ..*nco
+        }
+    }
+
+    /// What a sum at a tap is multiplied by: gain, and the sub-carrier's turn from the prompt to there.
+    pub fn factor(&self, tap: i64) -> Complex64 {
+        let gain = if self.is_inverted { -self.gain } else { self.gain };
+        if !self.turns_at_taps {
+            return gain;
+        }
+        let (sin, cos) = libm::sincos(-PI * f64::from(self.half_cycles) * units_to_chips(tap));
+        gain * Complex64::new(cos, planted!("receiver.correlate.side", sin, -sin))
     }
 
     pub fn slow<const T: usize>(&self, (i, q): (&[f32], &[f32]), nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {

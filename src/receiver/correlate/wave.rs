@@ -2,14 +2,16 @@
 //!
 //! BPSK and BOC are made as they are. Of CBOC, TMBOC and QMBOC the strongest layer is made, unless settings
 //! say otherwise: against the full waveform that costs 0.4 dB where BOC(6,1) has a tenth of the power, and
-//! spares steps six times as short, which take six times the samples, and a pass for each layer.
+//! spares steps six times as short, which take six times the samples, and a pass for each layer. Of one side
+//! of a sub-carrier chips are made without steps, and the sub-carrier as a tone beside the carrier: it lacks
+//! lines that no front end passes.
 
 use crate::gnss::signal::{Component, Layer, Layers, Signal};
 
 /// Why samples at `rate_hz` do not do for replicas of these layers, if they do not: area edges want a sample
 /// in each step.
 pub fn layers_refusal(made: Layers, signal: &Signal, rate_hz: f64) -> Option<String> {
-    let several = signal.components.iter().filter(|component| component.layers.len() > 1);
+    let several = signal.components.iter().filter(|one| one.layers.len() > 1 && one.tone().is_none());
     let steps_hz = several.map(|component| component.chip_rate_hz * component.steps_per_chip() as f64);
     let need_hz = steps_hz.fold(0.0, f64::max);
     (made == Layers::Whole && rate_hz < need_hz).then(|| {
@@ -34,9 +36,17 @@ pub struct Wave {
 }
 
 impl Wave {
-    /// The strongest layer of a satellite by its number; `None` where the documents assign it no code.
+    /// The strongest layer of a satellite by its number; of a component that is one side of a sub-carrier the
+    /// chips that its tone has. `None` where the documents assign it no code.
     pub fn new(component: &Component, number: u8) -> Option<Self> {
-        Self::of(component, component.strongest()?, number)
+        let Some(tone) = component.tone() else {
+            return Self::of(component, component.strongest()?, number);
+        };
+        let mut chips = Self::of(component, &Layer::BPSK, number)?;
+        if tone.half_cycles % 2 != 0 {
+            chips.values.iter_mut().skip(1).step_by(2).for_each(|chip| *chip = -*chip);
+        }
+        Some(chips)
     }
 
     /// One of its layers.
@@ -54,8 +64,13 @@ impl Wave {
 
 /// Whether a replica can be made of a component's code: its period has fewer than 2¹⁶ steps.
 pub fn fits(component: &Component) -> bool {
-    let each = component.strongest().map_or(0, |layer| layer.pulse.len());
+    let each = steps_of_chip(component);
     (64..super::MOST_STEPS).contains(&(component.code_chips as usize * each))
+}
+
+/// Steps of a chip of the replica that is made of a component's strongest layer, or of its tone.
+pub fn steps_of_chip(component: &Component) -> usize {
+    component.tone().map_or_else(|| component.strongest().map_or(0, |layer| layer.pulse.len()), |_| 1)
 }
 
 #[cfg(test)]

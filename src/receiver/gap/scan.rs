@@ -61,6 +61,7 @@ impl Scan {
     /// Adds what a block shows of one channel, whose replica and oscillators are `nco` at the block's first
     /// sample.
     pub fn add(&self, block: &Block, replica: &Replica, nco: &Nco, profile: &mut Profile) {
+        let nco = &replica.beside_carrier(nco);
         profile.powers.resize(self.length, 0.0);
         let half = (self.length / 2) as i64;
         let mut samples = vec![Complex::new(0.0, 0.0); 2 * self.length];

@@ -44,8 +44,10 @@ pub(super) fn shares(
     let mut segment = vec![Complex::default(); window.len()];
     for one in followed {
         let carrier_hz = one.link.carrier_hz();
-        let turns = (metadata.if_hz(carrier_hz) + sense * one.doppler_hz) / rate_hz;
         for component in one.link.signal.components {
+            let side_hz = component.side_hz();
+            let doppler_hz = one.doppler_hz * (1.0 + side_hz / carrier_hz);
+            let turns = (metadata.if_hz(carrier_hz + side_hz) + sense * doppler_hz) / rate_hz;
             let Some(wave) = Wave::new(component, one.link.sv.number) else { continue };
             let chips_per_sample = component.chip_rate_hz * (1.0 + one.doppler_hz / carrier_hz) / rate_hz;
             let begins = one.chips + (first as f64 - one.sample as f64) * chips_per_sample;

@@ -16,7 +16,7 @@ use crate::receiver::acquire::{self, AcquireError, Searcher};
 use crate::receiver::correlate::sums::{RunningSums, Samples};
 use crate::receiver::decode::Decoder;
 use crate::receiver::interference::{Followed, Watch};
-use crate::receiver::lead::lead;
+use crate::receiver::lead::{lead, other_side};
 use crate::receiver::looks::Looks;
 use crate::receiver::outcome::{Interfered, ReceiveError};
 use crate::receiver::output::{Record, Sink};
@@ -311,7 +311,11 @@ pub(super) fn noise(signal: &'static Signal, metadata: &IfMetadata, settings: &S
     CodeNoise {
         chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
         shape: component
-            .and_then(|c| ReplicaModel::new(&tracking, c, metadata.rate.hz()))
+            .and_then(|c| {
+                let made =
+                    if other_side(c, signal).is_some() { ReplicaModel::of_both_sides } else { ReplicaModel::new };
+                made(&tracking, c, metadata.rate.hz())
+            })
             .map_or(CodeShape::triangle(tracking.spacing_chips), |model| model.shape),
         bandwidth_hz: tracking.dll_bandwidth_hz,
         integration_s: period_s * f64::from(tracking.integration),

@@ -19,6 +19,7 @@ use super::model::ReplicaModel;
 use super::overlay::{OverlayPhase, OverlaySync};
 use super::pull_in::Batch;
 use super::side::SidePeaks;
+use super::sides::Sides;
 use super::sync::SymbolSync;
 use super::{Report, Symbol, TrackingSettings};
 use crate::gnss::samples::{Format, IfMetadata};
@@ -39,6 +40,7 @@ mod oscillators;
 mod pilot;
 mod reseat;
 mod side;
+mod sides;
 mod supervise;
 
 use pilot::Data;
@@ -131,6 +133,8 @@ pub struct Channel {
     long: Option<LongCode>,
     segment: Option<u64>,
     side_peaks: Option<SidePeaks>,
+    /// The other side of the sub-carrier of which what is followed is one.
+    sides: Option<Sides>,
     /// C/N0 of what is followed over that of the whole signal.
     followed_db: f64,
     /// Carrier phase of what is followed against the signal's.
@@ -209,11 +213,17 @@ impl Channel {
         };
         let has_symbols = message.is_some() || overlay.is_some();
         let waveform = settings.waveform;
-        let replica = component.and_then(|c| Replica::made(c, hit.sv.number, waveform, settings.replica));
-        let model = component.and_then(|c| ReplicaModel::new(settings, c, metadata.rate.hz()));
-        let half = 0.5 * settings.spacing_chips;
+        let (number, made) = (hit.sv.number, (waveform, settings.replica));
+        let replica = component.and_then(|c| Replica::made_in(c, number, made, metadata.inverted));
         let sense = if metadata.inverted { -1.0 } else { 1.0 };
-        let shape = model.map_or(CodeShape::triangle(settings.spacing_chips), |model| model.shape);
+        let rates = (metadata.rate.hz(), sense);
+        let sides = component.and_then(|c| Sides::beside(c, (hit.signal, number), settings, rates));
+        // One side has the triangle of its chips.
+        let wider = component.filter(|_| sides.is_some()).map_or(1.0, |c| settings.narrower(c));
+        let alone = TrackingSettings { spacing_chips: wider * settings.spacing_chips, ..settings.clone() };
+        let model = component.and_then(|c| ReplicaModel::new(&alone, c, metadata.rate.hz()));
+        let half = 0.5 * alone.spacing_chips;
+        let shape = model.map_or(CodeShape::triangle(alone.spacing_chips), |model| model.shape);
         let share = replica.as_ref().map_or(1.0, Replica::share);
         let followed = component.map_or(0.0, |c| followed_db(c, waveform));
         let loops = Loops::new(settings, shape, has_symbols, sense * hit.doppler_hz);
@@ -235,12 +245,13 @@ impl Channel {
             has_symbols,
             data: component
                 .filter(|_| overlay.is_some())
-                .and_then(|c| Data::beside(c, (hit.signal, hit.sv), settings, (metadata.rate.hz(), sense))),
+                .and_then(|c| Data::beside(c, (hit.signal, hit.sv), settings, rates)),
             overlay,
             overlay_phase: None,
             long: component.and_then(|c| LongCode::beside(c, hit.signal, hit.sv.number, settings.replica)),
             segment: None,
             side_peaks: component.and_then(|c| SidePeaks::new(c, waveform)),
+            sides,
             followed_db: followed,
             phase_cycles: component.map_or(0.0, |c| c.phase_cycles),
             lost: replica.is_none(),
@@ -406,9 +417,7 @@ impl Channel {
         let mut ticks = ticks.iter().copied().peekable();
         let end = shown.end();
         while !self.lost {
-            if let Some(segment) = self.next_segment() {
-                replica = segment;
-            }
+            self.ready(&mut replica);
             let next = self.first + self.samples_left(&replica);
             while let Some(tick) = ticks.next_if(|&tick| tick < next.min(end)) {
                 self.measure(tick, &replica, report);

@@ -69,10 +69,6 @@ impl Loops {
     /// Loops that run at `carrier_hz` and correct nothing before they are designed.
     pub fn new(settings: &TrackingSettings, shape: CodeShape, has_symbols: bool, carrier_hz: f64) -> Self {
         let none = Gains::of_root(1, 1.0);
-        let gain = match settings.dll_discriminator {
-            CodeDiscriminator::EarlyMinusLate => CodeGain::new(|snr| shape.early_minus_late_gain(snr)),
-            CodeDiscriminator::DotProduct => CodeGain::new(loops::dot_product_gain),
-        };
         Self {
             carrier: Rates { rate: carrier_hz, acceleration: 0.0 },
             code: Rates::default(),
@@ -81,9 +77,14 @@ impl Loops {
             dll: none,
             discriminator: settings.dll_discriminator,
             shape,
-            gain,
+            gain: gain(settings, shape),
             has_symbols,
         }
+    }
+
+    /// The correlation at early and late is another from now on.
+    pub fn reshape(&mut self, settings: &TrackingSettings, shape: CodeShape) {
+        (self.shape, self.gain) = (shape, gain(settings, shape));
     }
 
     /// Prompts have no signs of symbols from now on.
@@ -153,5 +154,13 @@ impl Loops {
         };
         (self.code, update.code_jump_chips) = loops::step(&self.dll, &self.code, update.dll_chips, t_s);
         update
+    }
+}
+
+/// Mean gain of the code discriminator.
+fn gain(settings: &TrackingSettings, shape: CodeShape) -> CodeGain {
+    match settings.dll_discriminator {
+        CodeDiscriminator::EarlyMinusLate => CodeGain::new(|snr| shape.early_minus_late_gain(snr)),
+        CodeDiscriminator::DotProduct => CodeGain::new(loops::dot_product_gain),
     }
 }

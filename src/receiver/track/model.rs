@@ -2,7 +2,7 @@
 
 use super::TrackingSettings;
 use super::loops::CodeShape;
-use crate::gnss::signal::{Component, Layers, Shape};
+use crate::gnss::signal::{Component, Layers, Shape, Tone};
 use crate::receiver::correlate::correlation;
 use crate::receiver::lead::{efficiency, shapes};
 
@@ -20,9 +20,25 @@ pub struct ReplicaModel {
 impl ReplicaModel {
     /// For samples of `rate_hz`. `None` for a component without layers.
     pub fn new(settings: &TrackingSettings, component: &Component, rate_hz: f64) -> Option<Self> {
+        Self::of(settings, component, None, rate_hz)
+    }
+
+    /// Of both sides of a sub-carrier together, of which `component` is one; `None` of one that is none.
+    pub fn of_both_sides(settings: &TrackingSettings, component: &Component, rate_hz: f64) -> Option<Self> {
+        Self::of(settings, component, Some(component.tone()?), rate_hz)
+    }
+
+    fn of(settings: &TrackingSettings, component: &Component, sides: Option<Tone>, rate_hz: f64) -> Option<Self> {
         let [signal, own] = shapes(component, settings.waveform)?;
         let chips_per_sample = component.chip_rate_hz / rate_hz;
-        let at = |shape: &Shape, chips: f64| correlation(shape, settings.replica, chips_per_sample, chips);
+        // The tones are those at the samples' instants, whatever the chips are.
+        let at = |shape: &Shape, chips: f64| {
+            let (value, slope) = correlation(shape, settings.replica, chips_per_sample, chips);
+            sides.map_or((value, slope), |tone| {
+                let both = tone.both_sides(chips);
+                (value * both, slope * both + value * tone.slope_of_both(chips))
+            })
+        };
         let (half, (peak, _)) = (0.5 * settings.spacing_chips, at(&signal, 0.0));
         let ((side, slope), (power, _)) = (at(&signal, half), at(&own, 0.0));
         let (common, _) = at(&own, settings.spacing_chips);
@@ -38,6 +54,21 @@ pub struct SidePeak {
     pub chips: f64,
     /// Correlation there over that of the main peak, with its sign.
     pub ratio: f64,
+}
+
+/// The side peak nearest to the main one of both sides of a sub-carrier together; `None` without one.
+pub fn side_peak_of_both(component: &Component) -> Option<SidePeak> {
+    let tone = component.tone()?;
+    // Of (1 − x)·cos(πmx), which has its extreme a little before half a cycle's end.
+    let at = |chips: f64| (1.0 - chips) * tone.both_sides(chips);
+    let slope = |chips: f64| (1.0 - chips) * tone.slope_of_both(chips) - tone.both_sides(chips);
+    let end = 1.0 / f64::from(tone.half_cycles.abs());
+    let (mut low, mut high) = (0.5 * end, end);
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if slope(middle) < 0.0 { low = middle } else { high = middle }
+    }
+    Some(SidePeak { chips: low, ratio: at(low) })
 }
 
 /// The side peak nearest to the main one of a component's replica; `None` where there is none.

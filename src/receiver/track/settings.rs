@@ -168,16 +168,13 @@ impl TrackingSettings {
         let period_s = component.period_s();
         let most = (1e-3 * f64::from(self.integration) / period_s + 1e-9).floor() as u32;
         let integration = INTEGRATIONS.into_iter().rev().find(|periods| *periods <= most).unwrap_or(1);
-        let steps = match self.waveform {
-            Layers::Strongest => component.strongest().map_or(1, |layer| layer.pulse.len()),
-            Layers::Whole => component.steps_per_chip(),
-        };
+        let steps = self.narrower(component);
         let fit = |bandwidth_hz: f64, periods: u32| {
             bandwidth_hz.min(LARGEST_BANDWIDTH_TIME / (period_s * f64::from(periods)))
         };
         Self {
             integration,
-            spacing_chips: self.spacing_chips / steps as f64,
+            spacing_chips: self.spacing_chips / steps,
             pll_bandwidth_hz: fit(self.pll_bandwidth_hz, integration),
             dll_bandwidth_hz: fit(self.dll_bandwidth_hz, integration),
             dll_pull_in_bandwidth_hz: fit(self.dll_pull_in_bandwidth_hz, integration),
@@ -185,6 +182,20 @@ impl TrackingSettings {
             fll_assist_bandwidth_hz: fit(self.fll_assist_bandwidth_hz, 1),
             ..self.clone()
         }
+    }
+
+    /// What early and late of a component are nearer to each other by than those of BPSK: as many times as
+    /// its chips have steps. Both sides of a sub-carrier count as a square wave of as many half cycles, and
+    /// chips about them.
+    pub fn narrower(&self, component: &Component) -> f64 {
+        if let Some(tone) = component.tone() {
+            return 1.0 + f64::from(tone.half_cycles.abs());
+        }
+        let steps = match self.waveform {
+            Layers::Strongest => component.strongest().map_or(1, |layer| layer.pulse.len()),
+            Layers::Whole => component.steps_per_chip(),
+        };
+        steps as f64
     }
 
     /// Every loop's bandwidth times update time and its margin, for a code whose period is `period_s`.

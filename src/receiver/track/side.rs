@@ -20,7 +20,7 @@
 //! lock and the search for the overlay go on. Limits: of pulses with more side peaks the code moves from one
 //! to the next.
 
-use super::model::side_peak;
+use super::model::{SidePeak, side_peak, side_peak_of_both};
 use crate::gnss::signal::{Component, Layers};
 use crate::receiver::correlate::chips_to_units;
 
@@ -45,10 +45,18 @@ pub struct SidePeaks {
 impl SidePeaks {
     /// `None` where the correlation has one peak.
     pub fn new(component: &Component, made: Layers) -> Option<Self> {
-        let peak = side_peak(component, made)?;
+        Some(Self::at(side_peak(component, made)?, component))
+    }
+
+    /// Of both sides of a sub-carrier that are followed together, of which `component` is one.
+    pub fn of_both_sides(component: &Component) -> Option<Self> {
+        Some(Self::at(side_peak_of_both(component)?, component))
+    }
+
+    fn at(peak: SidePeak, component: &Component) -> Self {
         // Two sums may go wrong.
         let enough = libm::log(2.0 * BETWEEN_FALSE_S / component.period_s());
-        Some(Self { step: chips_to_units(peak.chips), ratio: peak.ratio, enough, evidence: [0.0; 2] })
+        Self { step: chips_to_units(peak.chips), ratio: peak.ratio, enough, evidence: [0.0; 2] }
     }
 
     /// Code phases of the neighbours, ahead of the prompt and behind.

@@ -8,10 +8,12 @@ use num_complex::Complex64;
 use super::stream_tests::{Stream, symbol};
 use super::*;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, MULTIPLEXED_DATA, QUADRATURE_DATA};
+use crate::gnss::signal::synthetic::{
+    CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, MULTIPLEXED_DATA, QUADRATURE_DATA, SIDES,
+};
 use crate::gnss::signal::{Component, Layers, Link, Signal};
 use crate::receiver::acquire::{Acquired, AcquisitionSettings, search};
-use crate::receiver::lead::{followed_db, lead, long_beside};
+use crate::receiver::lead::{BOTH_SIDES, followed_db, lead, long_beside, other_side};
 
 /// One satellite's signal: its code at time zero, and a Doppler that code and carrier share.
 struct Sky {
@@ -52,7 +54,7 @@ impl Made {
     fn symbol(&self, period: i64) -> f64 {
         match self.component.periods_per_symbol() {
             Some(periods) => symbol(period.div_euclid(i64::from(periods))),
-            None if self.component.power_share < 0.3 => symbol(period),
+            None if self.component.power_share < 0.3 && self.overlay.len() == 1 => symbol(period),
             None => 1.0,
         }
     }
@@ -132,6 +134,7 @@ fn skies() -> Vec<Sky> {
         of(&MULTIPLEXED, 9, 2.6e6),
         of(&MULTIPLEXED_DATA, 11, 2.6e6),
         of(&MIXED, 2, 5.3e6),
+        of(&SIDES, 4, 6.53e6),
     ]
 }
 
@@ -248,12 +251,15 @@ fn every_synthetic_signal_is_followed_with_the_phase_of_the_whole_signal() {
             found.symbols.len()
         );
         let component = lead(sky.link.signal).unwrap();
-        let followed_hz = libm::pow(10.0, 0.1 * (sky.cn0_dbhz + followed_db(component, Layers::Strongest)));
+        let sides = other_side(component, sky.link.signal).map_or(1.0, |_| BOTH_SIDES);
+        let followed_db = followed_db(component, Layers::Strongest);
+        let followed_hz = sides * libm::pow(10.0, 0.1 * (sky.cn0_dbhz + followed_db));
         // Early minus late of a correlation of slope s at ±d/2: σ² = B·(1 − R(d))/(2 s² C/N0) (squaring loss
         // apart), and both the mean over a second and a half of a loop of half a hertz and its scatter are
         // within 4 σ.
         let settings = TrackingSettings::default().fitted(component);
-        let shape = ReplicaModel::new(&settings, component, sky.rate_hz).unwrap().shape;
+        let model = if sides > 1.0 { ReplicaModel::of_both_sides } else { ReplicaModel::new };
+        let shape = model(&settings, component, sky.rate_hz).unwrap().shape;
         let sigma =
             (settings.dll_bandwidth_hz * (1.0 - shape.common) / (2.0 * shape.slope * shape.slope * followed_hz)).sqrt();
         assert!(code.0.abs() < 4.0 * sigma + 0.002, "{}: {} chips for {sigma}", sky.link, code.0);

@@ -79,12 +79,24 @@ pub(super) fn symbol(number: i64) -> f64 {
 }
 
 impl Integral {
-    fn new(component: &'static Component, number: u8) -> Self {
+    /// Of layers in phase or against it and, where there are any at right angles, of those.
+    fn all(component: &'static Component, number: u8) -> impl Iterator<Item = Self> {
+        let quarters = |layer: &Layer| 4.0 * layer.phase_cycles;
+        assert!(component.layers.iter().all(|layer| quarters(layer).fract() == 0.0));
+        let turned = component.layers.iter().any(|layer| quarters(layer) % 2.0 != 0.0);
+        let both = [Some(false), turned.then_some(true)];
+        both.into_iter().flatten().map(move |turned| Self::new(component, number, turned))
+    }
+
+    fn new(component: &'static Component, number: u8, turned: bool) -> Self {
         let (code, steps) = ((component.code)(number).unwrap(), component.steps_per_chip());
         let duty = code.iter().filter(|chip| **chip != 0).count() as f64 / code.len() as f64;
-        // In phase or against it.
-        assert!(component.layers.iter().all(|layer| layer.phase_cycles == 0.0 || layer.phase_cycles == 0.5));
-        let weight = |layer: &Layer| if layer.phase_cycles == 0.5 { -layer.weight } else { layer.weight };
+        let turn_cycles = if turned { 0.25 } else { 0.0 };
+        let weight = |layer: &Layer| match (4.0 * (layer.phase_cycles - turn_cycles)).rem_euclid(4.0) {
+            0.0 => layer.weight,
+            2.0 => -layer.weight,
+            _ => 0.0,
+        };
         let mut sums = vec![0.0];
         for (index, &chip) in code.iter().enumerate() {
             let layers = || component.layers.iter().filter(|layer| layer.covers(index));
@@ -95,10 +107,10 @@ impl Integral {
                 sums.push(sums[sums.len() - 1] + value * f64::from(chip) / steps as f64);
             }
         }
-        let (sin, cos) = libm::sincos(TAU * component.phase_cycles);
+        let (sin, cos) = libm::sincos(TAU * (component.phase_cycles + turn_cycles));
         let phasor = Complex64::new(cos, sin) * (component.power_share / duty).sqrt();
-        // What carries a small share of the power are data: a symbol a period.
-        let symbol_periods = (component.power_share < 0.3).then_some(1);
+        // What carries a small share of the power and has no overlay are data: a symbol a period.
+        let symbol_periods = (component.power_share < 0.3 && component.overlay.periods() == 1).then_some(1);
         let overlay = component.overlay.of(number).unwrap();
         Self { component, overlay, phasor, steps: steps as f64, sums, symbol_periods }
     }
@@ -169,7 +181,7 @@ const IF_SHARE: f64 = 0.07;
 
 impl Stream {
     pub fn new(link: Link, rate_hz: f64, seed: u64) -> Self {
-        let components = link.signal.components.iter().map(|c| Integral::new(c, link.sv.number)).collect();
+        let components = link.signal.components.iter().flat_map(|c| Integral::all(c, link.sv.number)).collect();
         Self {
             link,
             rate_hz,

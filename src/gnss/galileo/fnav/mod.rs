@@ -19,7 +19,7 @@ use crate::gnss::crc::crc24q;
 use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::galileo::inav::almanac::{Offset, TRIPLES, Triple, offset_of};
 use crate::gnss::galileo::inav::fields::{Orbit, Utc};
-use crate::gnss::galileo::inav::{GST_WEEK, INAV, code};
+use crate::gnss::galileo::inav::{GST_WEEK, INAV, INAV_E5B, code};
 use crate::gnss::galileo::status::{self, Band};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Records, Sender};
@@ -71,7 +71,8 @@ pub static FNAV: Message = Message {
 pub static FNAV_SETS: SetForm = SetForm {
     name: "F/NAV",
     group_delay_s: status::against_fnav_s,
-    serves: |signal| signal.carries(&FNAV) || signal.carries(&INAV),
+    // E5 as one signal needs the delay of its upper side too, which I/NAV alone says.
+    serves: |signal| signal.carries(&FNAV) && !signal.carries(&INAV_E5B) || signal.carries(&INAV),
     given_delay_s: |set| set.tgd2_s,
     is_healthy: |set| status::E5A.is_good(set),
     healthy: |set, signal| status::healthy(set, signal, &[Band::E5a]),

@@ -48,7 +48,8 @@ impl Data {
         (rate_hz, sense): (f64, f64),
     ) -> Option<Self> {
         let model = |component| ReplicaModel::new(settings, component, rate_hz);
-        let replica = Replica::made(component, number, settings.waveform, settings.replica)?;
+        let made = (settings.waveform, settings.replica);
+        let replica = Replica::made_in(component, number, made, sense < 0.0)?;
         let share = replica.share() * model(component)?.power;
         let own = Wave::new(pilot, number)?.share * model(pilot)?.power;
         let (sin, cos) = libm::sincos(TAU * sense * (pilot.phase_cycles - component.phase_cycles));
@@ -110,6 +111,7 @@ impl Channel {
         self.has_symbols = false;
         self.loops.wipe();
         self.cn0 = self.cn0.wiped(self.group);
+        self.join_sides();
         self.previous = None;
         self.previous_sum = None;
         self.watch_overlay();

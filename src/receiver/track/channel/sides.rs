@@ -1,0 +1,31 @@
+//! From one side of a sub-carrier to both.
+
+use super::Channel;
+use crate::receiver::correlate::Replica;
+use crate::receiver::lead::BOTH_SIDES;
+
+impl Channel {
+    /// Makes the replica ready for the running period: with the segment of a long code, or with both sides of
+    /// a sub-carrier once the overlay is known, in the signs that they have.
+    pub(super) fn ready(&mut self, replica: &mut Replica) {
+        if let Some(segment) = self.next_segment() {
+            *replica = segment;
+        }
+        let (Some(phase), Some(sides)) = (self.overlay_phase, &mut self.sides) else { return };
+        if let Some(both) = sides.replica() {
+            *replica = both;
+        }
+        replica.set_second(sides.are_opposed(phase, self.period));
+    }
+
+    /// From the next code period on both sides are followed: the noise is that of one, the power twice as
+    /// large.
+    pub(super) fn join_sides(&mut self) {
+        let Some(both) = self.sides.as_ref().map(|sides| sides.both().clone()) else { return };
+        self.taps = both.taps;
+        self.side_peaks = both.peaks;
+        self.loops.reshape(&self.settings, both.shape);
+        self.cn0.raise(BOTH_SIDES);
+        self.followed_db += 10.0 * libm::log10(BOTH_SIDES);
+    }
+}

@@ -1,0 +1,78 @@
+//! Both sides of a sub-carrier, followed together.
+//!
+//! Either side alone is a code like any other: it is searched for and pulled in by itself, by the triangle of
+//! its chips, which has no side peaks. The pilot of each side has an overlay of its own, and a sum of both
+//! has to know them: once the first one's is aligned, the replica has both, with the signs of the period, and
+//! early and late draw near to the peak that they make together. A side alone brings the code to a few
+//! hundredths of a chip; the neighbouring peak of both is a third of a chip away for AltBOC(15,10), and is
+//! left like that of any other signal ([`super::side`]).
+
+use super::TrackingSettings;
+use super::loops::CodeShape;
+use super::model::ReplicaModel;
+use super::overlay::{OverlayPhase, OverlaySync};
+use super::side::SidePeaks;
+use crate::gnss::signal::{Component, Signal};
+use crate::receiver::correlate::{Replica, chips_to_units};
+use crate::receiver::lead::other_side;
+
+/// What a channel needs to follow the other side too.
+#[derive(Clone, Debug)]
+pub struct Sides {
+    /// Of both; handed over where it is first used.
+    replica: Option<Replica>,
+    overlays: [OverlaySync; 2],
+    both: Both,
+}
+
+/// What both sides together look like in the correlators.
+#[derive(Clone, Debug)]
+pub struct Both {
+    /// Code phases of early, prompt and late.
+    pub taps: [i64; 3],
+    /// Correlation there.
+    pub shape: CodeShape,
+    /// The neighbouring peaks.
+    pub peaks: Option<SidePeaks>,
+}
+
+impl Sides {
+    /// The other side of `pilot` in its signal, with settings that are fitted to it; `None` where it has
+    /// none. `sense` is −1 in an inverted spectrum.
+    pub fn beside(
+        pilot: &Component,
+        (signal, number): (&'static Signal, u8),
+        settings: &TrackingSettings,
+        (rate_hz, sense): (f64, f64),
+    ) -> Option<Self> {
+        let other = other_side(pilot, signal)?;
+        let made = |component| Replica::made_in(component, number, (settings.waveform, settings.replica), sense < 0.0);
+        let overlay = |component: &Component| Some(OverlaySync::new(component.overlay.of(number)?));
+        let half = chips_to_units(0.5 * settings.spacing_chips);
+        Some(Self {
+            replica: Some(Replica::joined(&made(pilot)?, &made(other)?)?),
+            overlays: [overlay(pilot)?, overlay(other)?],
+            both: Both {
+                taps: [half, 0, -half],
+                shape: ReplicaModel::of_both_sides(settings, pilot, rate_hz)?.shape,
+                peaks: SidePeaks::of_both_sides(pilot),
+            },
+        })
+    }
+
+    /// The replica of both, the first time.
+    pub fn replica(&mut self) -> Option<Replica> {
+        self.replica.take()
+    }
+
+    /// What both look like.
+    pub fn both(&self) -> &Both {
+        &self.both
+    }
+
+    /// Whether the overlays of both sides have different signs in a code period.
+    pub fn are_opposed(&self, phase: OverlayPhase, number: u64) -> bool {
+        let [first, second] = self.overlays.each_ref().map(|overlay| overlay.chip(phase, number));
+        planted!("receiver.sides.overlay", first != second, false)
+    }
+}
