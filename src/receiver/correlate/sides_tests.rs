@@ -40,7 +40,7 @@ fn both_sides_together_are_chips_and_tones_at_the_place_of_every_tap_and_every_a
         };
         let slow = both.slow(&i, &q, &nco, &taps);
         if edge == Edge::Nearest {
-            let codes = pilots.map(|pilot| e5_code(pilot));
+            let codes = pilots.map(e5_code);
             for (tap, found) in taps_chips.iter().zip(&slow) {
                 let mut sum = Complex64::ZERO;
                 for n in 0..SAMPLES {
@@ -55,12 +55,11 @@ fn both_sides_together_are_chips_and_tones_at_the_place_of_every_tap_and_every_a
                 assert!((sum - found).norm() < 100.0, "{tap}: {sum} {found}");
             }
         }
-        let largest = slow.iter().map(|sum| sum.norm()).fold(1.0, f64::max);
+        // Two nearest samples of up to 90 may take the chip on the other side of an edge; means of chips err
+        // by what 16 bits leave of them, a sample in a thousand.
+        let allowed = if edge == Edge::Nearest { 300.0 } else { 60.0 };
         for fast in [both.correlate(&i, &q, &nco, &taps), both.correlate_short(&i, &q, &nco, &taps)] {
-            // Single precision, and 16 bits: a sample in four thousand at an edge.
-            fast.iter()
-                .zip(&slow)
-                .for_each(|(a, b)| assert!((a - b).norm() < 0.01 * largest + 20.0, "{edge:?}: {a} {b}"));
+            fast.iter().zip(&slow).for_each(|(a, b)| assert!((a - b).norm() < allowed, "{edge:?}: {a} {b}"));
         }
     }
 }

@@ -88,6 +88,7 @@ pub fn side_peak(component: &Component, made: Layers) -> Option<SidePeak> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::galileo::altboc::E5;
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::signal::Layer;
     use crate::gnss::signal::synthetic::{LONG_BOC, MIXED};
@@ -109,6 +110,27 @@ mod tests {
         near(&[Layer::BOC61], 1.0 / 12.0, -11.0 / 12.0);
         near(&COSINE, 0.5, -0.5);
         assert_eq!(side_peak(&L1_CA.components[0], Layers::Strongest), None);
+    }
+
+    #[test]
+    fn both_sides_make_the_triangle_times_the_sub_carrier_with_its_peaks_and_slopes() {
+        let pilot = &E5.components[1];
+        // AltBOC(15,10): one and a half cycles a chip.
+        let printed = |chips: f64| (1.0 - chips) * libm::cos(3.0 * std::f64::consts::PI * chips);
+        let found = side_peak_of_both(pilot).unwrap();
+        let grid = (1667..5000).map(|k| 1e-4 * f64::from(k));
+        let lowest = grid.fold(0.0, |lowest, chips| if printed(chips) < printed(lowest) { chips } else { lowest });
+        assert!((found.chips - lowest).abs() < 1e-4 && (found.ratio - printed(lowest)).abs() < 1e-6, "{found:?}");
+        assert_eq!(side_peak(pilot, Layers::Strongest), None);
+        let settings = TrackingSettings::default().fitted(pilot);
+        assert_eq!(settings.spacing_chips, 0.125);
+        let shape = ReplicaModel::of_both_sides(&settings, pilot, f64::INFINITY).unwrap().shape;
+        let slope = (printed(0.0625 - 1e-6) - printed(0.0625 + 1e-6)) / 2e-6;
+        // The integral of the slope in 2000 midpoints.
+        let worst = (shape.value - printed(0.0625)).abs().max((shape.common - printed(0.125)).abs());
+        assert!(worst < 2e-3 && (shape.slope - slope).abs() < 0.02, "{shape:?} {slope}");
+        let alone = ReplicaModel::new(&settings, pilot, f64::INFINITY).unwrap().shape;
+        assert!((alone.value - 0.9375).abs() < 2e-3 && (alone.slope - 1.0).abs() < 2e-3, "{alone:?}");
     }
 
     #[test]
