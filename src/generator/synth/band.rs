@@ -40,7 +40,7 @@ pub struct Response<'a, const N: usize> {
 impl<const N: usize> Response<'_, N> {
     /// At `B` samples of which `first` is the first.
     #[inline(always)]
-    pub fn from<const B: usize>(&self, first: usize) -> [f64; B] {
+    pub fn at<const B: usize>(&self, first: usize) -> [f64; B] {
         let row = |row: &[f64; N]| row.get(first..).and_then(|row| row.first_chunk::<B>()).copied();
         let mut values = [0.0; B];
         if let [Some(a), Some(b), Some(c), Some(d)] = self.rows.map(row) {
@@ -231,7 +231,7 @@ mod tests {
             for k in 0..1000 {
                 let (fraction, place) = (f64::from(k) / 1000.0, (k % 9) as usize);
                 let response = filter.response::<{ 3 * HALF_WIDTH }>(fraction, place).unwrap();
-                for (n, found) in response.from::<{ 3 * HALF_WIDTH }>(0).into_iter().enumerate() {
+                for (n, found) in response.at::<{ 3 * HALF_WIDTH }>(0).into_iter().enumerate() {
                     let x = n as f64 - place as f64 - HALF_WIDTH as f64 + fraction;
                     let ideal = if n >= place + HALF_WIDTH { 1.0 } else { 0.0 };
                     let within = (place..place + WIDTH).contains(&n);

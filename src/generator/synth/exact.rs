@@ -181,7 +181,7 @@ fn add_responses(filter: &Filter, run: &Run<'_>, samples: usize, wave: &mut [Blo
             let response = filter.response::<{ BLOCK * (BORDER + 1) }>(behind[k], within);
             let (Some(touched), Some(response)) = (touched, response) else { continue };
             for (b, block) in touched.iter_mut().enumerate() {
-                let more = response.from::<BLOCK>(BLOCK * b);
+                let more = response.at::<BLOCK>(BLOCK * b);
                 for (value, more) in block.0.iter_mut().zip(more) {
                     *value += signed(more, signs[k]);
                 }
