@@ -1,6 +1,6 @@
 //! The component of a signal that a receiver searches and follows.
 
-use crate::gnss::signal::{self, Component, Layer, Layers, Shape, Signal};
+use crate::gnss::signal::{self, Component, Layers, Shape, Signal};
 use crate::receiver::correlate::fits;
 
 /// The strongest component whose code is short enough to be made; of equally strong ones a pilot.
@@ -67,11 +67,7 @@ pub fn long_beside(lead: &'static Component, signal: &'static Signal) -> Option<
 pub fn shapes(component: &Component, made: Layers) -> Option<[Shape; 2]> {
     let strongest = component.strongest()?;
     if let Some(tone) = component.tone() {
-        let chips = |weight| {
-            let layer = [Layer { weight, ..Layer::BPSK }];
-            Shape::between(&layer, &[Layer::BPSK], component.chip_rate_hz)
-        };
-        return Some([chips(tone.gain.norm()), chips(1.0)]);
+        return Some(tone.shapes(component.chip_rate_hz));
     }
     Some(match made {
         Layers::Strongest => component.shapes_by(Layers::Whole, strongest),

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::analysis::read::Run;
 use crate::analysis::waveform::{Waveform, leading};
-use crate::gnss::signal::{Component, Layer, Layers, Shape, Signal, Tone};
+use crate::gnss::signal::{Layers, Signal, Tone};
 
 /// What `receiver.json` says of a signal.
 #[derive(Clone, Debug, Deserialize)]
@@ -69,7 +69,10 @@ impl Followed {
         let other = entry.as_ref().and_then(|entry| signal.components.get(entry.other_side?));
         let sides = component.tone().filter(|_| other.is_some());
         let ([found, own], [assumed, _]) = match sides {
-            Some(tone) => [(); 2].map(|()| chips_of_side(component, &tone)).into(),
+            Some(tone) => {
+                let chips = tone.shapes(component.chip_rate_hz);
+                (chips.clone(), chips)
+            }
             None => (by(run.scene.waveform), by(Layers::Whole)),
         };
         let of = |shape| Waveform::of_shape(shape, component.chip_rate_hz);
@@ -86,15 +89,6 @@ impl Followed {
             dll_bandwidth_hz: entry.as_ref().map(|entry| entry.dll_bandwidth_hz),
         })
     }
-}
-
-/// Correlation of the chips of one side of a sub-carrier with those of a replica that has the sub-carrier's
-/// line alone, and of that one with itself.
-fn chips_of_side(component: &Component, tone: &Tone) -> [Shape; 2] {
-    [tone.gain.norm(), 1.0].map(|weight| {
-        let found = [Layer { weight, ..Layer::BPSK }];
-        Shape::between(&found, &[Layer::BPSK], component.chip_rate_hz)
-    })
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 //! over satellites is `f32`.
 
 use super::band::{Filter, HALF_WIDTH};
-use super::chips::{sign, window};
+use super::chips::{Changes, sign, window};
 use super::{CODE_ONE, Edge, Run, reference};
 
 /// Samples of a group, of which the carrier's two factors are counted.
@@ -202,58 +202,6 @@ fn first_behind(ahead: u64, step: u64, per_step: f64) -> (u64, f64) {
     (place, step.wrapping_mul(place).wrapping_sub(ahead) as i64 as f64 * per_step)
 }
 
-/// Changes of sign in a strip, in order.
-struct Changes<'a> {
-    bits: &'a [u64],
-    word: usize,
-    /// Steps of the word at which its sign changes, from the next one on.
-    left: u64,
-    /// Where the next one is, Q16.48 steps; beyond all positions behind the last.
-    at: u64,
-    /// The strip's signs from there on.
-    signs: u64,
-}
-
-impl<'a> Changes<'a> {
-    /// Those behind a step.
-    #[inline(always)]
-    fn after(bits: &'a [u64], step: u64) -> Self {
-        let word = (step / 64) as usize;
-        let mut changes = Self { bits, word, left: 0, at: 0, signs: 0 };
-        changes.left = changes.of_word() & (u64::MAX >> (step % 64) >> 1);
-        changes.settle();
-        changes
-    }
-
-    /// Steps of the word whose sign is not that of the step before.
-    #[inline(always)]
-    fn of_word(&self) -> u64 {
-        let before = self.word.checked_sub(1).and_then(|word| self.bits.get(word)).copied().unwrap_or(0);
-        self.bits.get(self.word).map_or(0, |word| word ^ (word >> 1 | before << 63))
-    }
-
-    #[inline(always)]
-    fn settle(&mut self) {
-        while self.left == 0 {
-            self.word += 1;
-            if self.word >= self.bits.len() {
-                self.at = u64::MAX;
-                return;
-            }
-            self.left = self.of_word();
-        }
-        let within = self.left.leading_zeros();
-        self.at = (64 * self.word as u64 + u64::from(within)).saturating_mul(CODE_ONE);
-        self.signs = self.bits.get(self.word).map_or(0, |word| word << within);
-    }
-
-    #[inline(always)]
-    fn advance(&mut self) {
-        self.left &= u64::MAX >> self.left.leading_zeros() >> 1;
-        self.settle();
-    }
-}
-
 /// Cosine and sine of phases in 2^-64 turn.
 #[inline(always)]
 fn cos_sin(turns: &[u64; LANES]) -> ([f64; LANES], [f64; LANES]) {
@@ -319,6 +267,22 @@ mod tests {
                 // The argument is rounded in both (1.1e-16 of π), the series to an ulp or two.
                 let (s, c) = libm::sincos(radians(turns[k]));
                 assert!((cos[k] - c).abs() < 1e-15 && (sin[k] - s).abs() < 1e-15, "{}", turns[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_change_lies_behind_the_sample_before_and_not_behind_that_which_it_is_given_to() {
+        let steps = [CODE_ONE / 2, CODE_ONE, 11 * CODE_ONE / 26, CODE_ONE / 25 + 1, 15 * CODE_ONE - 12_345];
+        for step in steps {
+            let per_step = 1.0 / step as f64;
+            for sample in [1, 2, 3, 77, 4095, 4112_u64] {
+                // On a sample, and as near to it as positions are counted.
+                for ahead in [step * sample - 1, step * sample, step * sample - step + 1, step * sample - step / 3] {
+                    let (place, behind) = first_behind(ahead, step, per_step);
+                    let whole = ahead.div_ceil(step);
+                    assert_eq!((place, behind), (whole, (step * whole - ahead) as f64 * per_step), "{step} {ahead}");
+                }
             }
         }
     }

@@ -10,7 +10,7 @@
 
 use super::angle::{cos_sin, ramp};
 use super::band::{Filter, HALF_WIDTH};
-use super::chips::window;
+use super::chips::{Changes, sign, window};
 use super::chorus::{self, Chord};
 use super::{CODE_BITS, CODE_ONE, Edge, RUN_SAMPLES, Run, reference, to_step};
 
@@ -313,37 +313,28 @@ fn band_limited(filter: &Filter, run: &Run<'_>, samples: usize, wave: &mut Vec<f
     let first = (run.position - reach) / CODE_ONE;
     let last = (run.position + run.step * samples as u64 + reach) / CODE_ONE;
     let per_step = 1.0 / run.step as f64;
-    let mut negative = window(run.bits, first as usize) >> 63;
     let mut filled = 0;
-    let mut step = first + 1;
-    while step <= last {
-        // Skips to the next change of sign within the window.
-        let ahead = window(run.bits, step as usize) ^ negative.wrapping_neg();
-        let zeros = u64::from(ahead.leading_zeros());
-        step += zeros;
-        if zeros == 64 || step > last {
-            continue;
-        }
-        let x = to_step(run.position, step) * per_step;
+    let mut changes = Changes::after(run.bits, first);
+    while changes.at / CODE_ONE <= last {
+        let new = if changes.signs >> 63 == 1 { -1.0 } else { 1.0 };
+        let x = to_step(run.position, changes.at / CODE_ONE) * per_step;
         let place = x.ceil();
         let at = (place as i64 + BORDER as i64).max(0) as usize;
-        let old = if negative == 1 { -1.0 } else { 1.0 };
         if let Some(run) = wave.get_mut(filled..at) {
-            run.iter_mut().for_each(|w| *w += old);
+            run.iter_mut().for_each(|w| *w -= new);
         }
         filled = filled.max(at);
         if let Some(near) = at.checked_sub(HALF_WIDTH).and_then(|from| wave.get_mut(from..from + 2 * HALF_WIDTH)) {
-            let change = -2.0 * old;
+            let change = 2.0 * new;
             for (w, r) in near.iter_mut().zip(filter.residual(place - x)) {
                 *w += change * r;
             }
         }
-        negative ^= 1;
-        step += 1;
+        changes.advance();
     }
-    let old = if negative == 1 { -1.0 } else { 1.0 };
-    if let Some(rest) = wave.get_mut(filled..) {
-        rest.iter_mut().for_each(|w| *w += old);
+    let rest = sign(run.bits, last as usize) as f32;
+    if let Some(wave) = wave.get_mut(filled..) {
+        wave.iter_mut().for_each(|w| *w += rest);
     }
     BORDER
 }

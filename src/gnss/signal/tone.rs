@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::{Component, Signal, shape};
+use super::{Component, Layer, Shape, Signal, shape};
 
 /// The line of a component that is one side of a sub-carrier.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +68,15 @@ impl Tone {
     /// Whether both are the sides of one sub-carrier.
     pub fn is_opposite(&self, other: &Self) -> bool {
         self.half_cycles == -other.half_cycles
+    }
+
+    /// Correlation of a component's chips with those of a replica that has the line alone, and of that one
+    /// with itself.
+    pub fn shapes(&self, chip_rate_hz: f64) -> [Shape; 2] {
+        [self.gain.norm(), 1.0].map(|weight| {
+            let found = [Layer { weight, ..Layer::BPSK }];
+            Shape::between(&found, &[Layer::BPSK], chip_rate_hz)
+        })
     }
 
     /// What both sides together correlate to, `chips` apart, over what chips without a sub-carrier do.
