@@ -1,8 +1,9 @@
 //! All sequences of one ray in one pass: components and layers that share a carrier.
 //!
-//! Data and pilot of CBOC are four sequences on one carrier, half a turn apart at most. Their waves are added
-//! first and turned once. Sequences that step together (*a layer*) share their places and, for area edges,
-//! the shares of a sample that its steps have. Each half of a group begins its window anew, so that a sample
+//! Data and pilot of CBOC are four sequences on one carrier, half a turn apart at most; those of QMBOC and of
+//! data and pilot at right angles are a quarter apart. Waves in phase are added first, so are those in
+//! quadrature, and both are turned by one carrier. Sequences that step together (*a layer*) share their places
+//! and, for area edges, the shares of a sample that its steps have. Each half of a group begins its window anew, so that a sample
 //! may span two steps: BOC(6,1) from 6.4 Msps on. Accuracy and order of operations are those of
 //! [`super::lanes`]: the same bits on every instruction set.
 
@@ -16,8 +17,11 @@ const DENSEST: u64 = 29 * CODE_ONE / 15;
 /// The sequences of a ray made ready.
 #[derive(Default)]
 pub(super) struct Chord {
+    /// That of the first sequence.
     carrier: Carrier,
-    layers: Vec<Layer>,
+    /// In phase with it, and a quarter of a turn ahead.
+    in_phase: Vec<Layer>,
+    quadrature: Vec<Layer>,
 }
 
 /// Sequences that step together.
@@ -44,7 +48,7 @@ pub(super) fn fits(edge: Edge<'_>, runs: &[Run<'_>]) -> bool {
     let Some(first) = runs.first() else { return false };
     let together = |run: &Run<'_>| {
         let apart = run.turns.wrapping_sub(first.turns);
-        run.turns_step == first.turns_step && apart << 1 == 0 && run.step <= DENSEST
+        run.turns_step == first.turns_step && apart << 2 == 0 && run.step <= DENSEST
     };
     !matches!(edge, Edge::BandLimited(_)) && runs.iter().all(together)
 }
@@ -72,17 +76,18 @@ impl Chord {
     fn anchor<const AREA: bool>(&mut self, runs: &[Run<'_>]) {
         let Some(first) = runs.first() else { return };
         self.carrier.anchor(first, 1.0);
-        self.layers.clear();
+        (self.in_phase.clear(), self.quadrature.clear());
         for (number, run) in runs.iter().enumerate() {
-            let sign = if run.turns == first.turns { 1.0 } else { -1.0 };
-            let amplitude = sign * run.amplitude;
-            let known = self.layers.iter_mut().find(|layer| layer.step == run.step && layer.begins == run.position);
+            let quarters = run.turns.wrapping_sub(first.turns) >> (u64::BITS - 2);
+            let layers = if quarters % 2 == 0 { &mut self.in_phase } else { &mut self.quadrature };
+            let amplitude = if quarters < 2 { run.amplitude } else { -run.amplitude };
+            let known = layers.iter_mut().find(|layer| layer.step == run.step && layer.begins == run.position);
             match known {
                 Some(layer) => layer.voices.push((number, layer.scaled::<AREA>(amplitude))),
                 None => {
                     let mut layer = Layer::new::<AREA>(run);
                     layer.voices.push((number, layer.scaled::<AREA>(amplitude)));
-                    self.layers.push(layer);
+                    layers.push(layer);
                 }
             }
         }
@@ -93,10 +98,7 @@ impl Chord {
     fn add<const AREA: bool>(&self, runs: &[Run<'_>], group: usize, sums: &mut Sums) {
         let Carrier { cos, sin, re, im } = &self.carrier;
         let (Some(re), Some(im)) = (re.get(group), im.get(group)) else { return };
-        let (mut before, mut after) = ([0.0_f32; HALF], [0.0_f32; HALF]);
-        for layer in &self.layers {
-            layer.add::<AREA>(runs, group as u64, &mut before, &mut after);
-        }
+        let [before, after] = waves::<AREA>(&self.in_phase, runs, group);
         for k in 0..HALF {
             let (a, b, c, d) = (re * cos[k], im * sin[k], re * sin[k], im * cos[k]);
             sums.i_before[k] += before[k] * (a + b);
@@ -104,7 +106,28 @@ impl Chord {
             sums.i_after[k] += after[k] * (a - b);
             sums.q_after[k] += after[k] * (d + c);
         }
+        if self.quadrature.is_empty() {
+            return;
+        }
+        let [before, after] = waves::<AREA>(&self.quadrature, runs, group);
+        for k in 0..HALF {
+            let (a, b, c, d) = (re * cos[k], im * sin[k], re * sin[k], im * cos[k]);
+            sums.i_before[k] -= before[k] * (d - c);
+            sums.q_before[k] += before[k] * (a + b);
+            sums.i_after[k] -= after[k] * (d + c);
+            sums.q_after[k] += after[k] * (a - b);
+        }
     }
+}
+
+/// The sum of layers over a group, its earlier half backwards.
+#[inline(always)]
+fn waves<const AREA: bool>(layers: &[Layer], runs: &[Run<'_>], group: usize) -> [Side; 2] {
+    let [mut before, mut after] = [[0.0; HALF]; 2];
+    for layer in layers {
+        layer.add::<AREA>(runs, group as u64, &mut before, &mut after);
+    }
+    [before, after]
 }
 
 impl Layer {

@@ -187,17 +187,23 @@ pub fn accumulate(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32]
         match edge {
             Edge::Nearest if !runs.iter().any(dense) => fused::<false>(runs, voices, i, q),
             Edge::Area if !runs.iter().any(dense) => fused::<true>(runs, voices, i, q),
-            Edge::Nearest | Edge::Area => runs.iter().for_each(|run| {
-                wave.clear();
-                wave.extend(
-                    (0..i.len()).map(|n| reference::waveform(edge, run, run.position + run.step * n as u64) as f32),
-                );
-                rotate(run, wave, voices, i, q);
-            }),
-            Edge::BandLimited(filter) => runs.iter().for_each(|run| {
-                let skip = band_limited(filter, run, i.len(), wave);
-                rotate(run, wave.get(skip..).unwrap_or(&[]), voices, i, q);
-            }),
+            // Loops, here and below: the compiler may take a closure out of a function and leave its
+            // instruction set behind.
+            Edge::Nearest | Edge::Area => {
+                for run in runs {
+                    wave.clear();
+                    wave.extend(
+                        (0..i.len()).map(|n| reference::waveform(edge, run, run.position + run.step * n as u64) as f32),
+                    );
+                    rotate(run, wave, voices, i, q);
+                }
+            }
+            Edge::BandLimited(filter) => {
+                for run in runs {
+                    let skip = band_limited(filter, run, i.len(), wave);
+                    rotate(run, wave.get(skip..).unwrap_or(&[]), voices, i, q);
+                }
+            }
         }
     }
 }
@@ -208,7 +214,9 @@ pub fn accumulate_rays(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &m
     for rays in rays.chunk_by(|a, b| chorus::fits(edge, a) == chorus::fits(edge, b)) {
         match edge {
             _ if !rays.iter().all(|runs| chorus::fits(edge, runs)) => {
-                rays.iter().for_each(|runs| accumulate(edge, runs, i, q, buffers));
+                for runs in rays {
+                    accumulate(edge, runs, i, q, buffers);
+                }
             }
             Edge::Nearest => chorus::accumulate::<false>(rays, &mut buffers.chords, i, q),
             Edge::Area | Edge::BandLimited(_) => chorus::accumulate::<true>(rays, &mut buffers.chords, i, q),

@@ -138,10 +138,11 @@ impl Waveform {
             }
         }
         let gain = 1.0 / self.power(edge, rate_hz).sqrt();
+        let apart = || layers.iter().map(|layer| (layer, self.steps(layer, layer.pulse.len()), steps_hz(layer)));
+        let turns = self.in_turn(layers).zip(layers.first());
+        let made = turns.map_or_else(|| apart().collect(), |((steps, steps_hz), layer)| vec![(layer, steps, steps_hz)]);
         let mut voices = Vec::new();
-        for layer in layers {
-            let steps_hz = steps_hz(layer);
-            let steps = self.steps(layer, layer.pulse.len());
+        for (layer, steps, steps_hz) in made {
             let pace = Pace::new(steps.len(), steps_hz, self.link.signal.time).ok_or_else(|| {
                 let found = format!("{} steps at {steps_hz} Hz", steps.len());
                 self.refuse("code", found, "a rate of whole thousandths of a hertz, whose periods fill whole seconds")
@@ -160,6 +161,23 @@ impl Waveform {
             }
         }
         Ok(voices)
+    }
+
+    /// Layers that take turns, chip by chip, as the one sequence that they are, with its rate of steps.
+    fn in_turn(&self, layers: &[Layer]) -> Option<(Vec<i8>, f64)> {
+        let [first, others @ ..] = layers else { return None };
+        let alike = |layer: &Layer| layer.weight == first.weight && layer.phase_cycles == first.phase_cycles;
+        let per_chip = layers.iter().map(|layer| layer.pulse.len()).max()?;
+        let fits = |layer: &Layer| alike(layer) && per_chip.is_multiple_of(layer.pulse.len());
+        let has_one = |chip: usize| layers.iter().filter(|layer| layer.covers(chip)).count() == 1;
+        if others.is_empty() || !others.iter().all(fits) || !(0..self.chips.len()).all(has_one) {
+            return None;
+        }
+        let mut steps = self.steps(first, per_chip);
+        for layer in others {
+            steps.iter_mut().zip(self.steps(layer, per_chip)).for_each(|(step, other)| *step += other);
+        }
+        (!steps.contains(&0)).then_some((steps, self.component.chip_rate_hz * per_chip as f64))
     }
 
     /// Mean power behind `edge`, all layers together.

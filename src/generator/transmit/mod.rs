@@ -46,11 +46,11 @@ struct Sent {
     part: usize,
 }
 
-/// Puts sequences that are half a turn apart next to each other: they can be added before they are turned.
+/// Puts sequences that are quarters of a turn apart next to each other: one carrier turns all.
 fn in_chords(sent: &mut [Sent]) {
-    let line = |sent: &Sent| sent.turns << 1;
-    sent.sort_by_key(line);
-    for chord in sent.chunk_by_mut(|a, b| line(a) == line(b)) {
+    let cross = |sent: &Sent| sent.turns << 2;
+    sent.sort_by_key(cross);
+    for chord in sent.chunk_by_mut(|a, b| cross(a) == cross(b)) {
         chord.iter_mut().enumerate().for_each(|(part, sent)| sent.part = part);
     }
 }

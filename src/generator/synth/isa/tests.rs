@@ -8,7 +8,10 @@ use crate::generator::synth::chips::{CodeTime, MAX_STEP};
 use crate::generator::synth::tone::Modulation;
 use crate::generator::synth::waveform::{Waveform, plain};
 use crate::generator::synth::{CODE_ONE, reference};
+use crate::gnss::beidou::b1c::B1C;
+use crate::gnss::beidou::b2a::B2A;
 use crate::gnss::galileo::e1::E1;
+use crate::gnss::gps::l1c::L1C;
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::signal::Layers;
@@ -122,23 +125,30 @@ fn the_longest_runs_are_their_twins_to_the_last_sample() {
     }
 }
 
-/// Data and pilot of Galileo E1 with both layers, as runs of one ray.
+/// Data and pilot with all layers, as runs of one ray: of Galileo E1 on one line, of BeiDou B1C and B2a at right
+/// angles, of GPS L1C with layers that take turns as one.
 #[test]
 fn rays_of_several_runs_are_the_sums_of_their_twins_at_every_length_and_offset() {
-    let link = E1.link(Sv { system: System::Galileo, number: 11 });
+    let signals = [(&E1, 11, 4), (&B1C, 27, 3), (&B2A, 27, 2), (&L1C, 14, 2)];
     // A sample spans up to 1.93, 1.23 and 0.49 steps of BOC(6,1), and at 5 Msps too many for one pass.
-    for rate_hz in [5e6, 6.4e6, 10e6, 25e6] {
+    for ((signal, number, count), rate_hz) in
+        signals.into_iter().flat_map(|of| [5e6, 6.4e6, 10e6, 25e6].map(|r| (of, r)))
+    {
+        let link = signal.link(Sv { system: signal.system, number });
         for (edge, bar) in [(Edge::Nearest, 2e-6), (Edge::Area, 2.8e-6)] {
             let (mut strips, mut runs) = (Vec::new(), Vec::new());
-            for (index, component) in E1.components.iter().enumerate() {
+            for (index, component) in signal.components.iter().enumerate() {
                 for voice in Waveform::new(link, index).unwrap().unwrap().voices(Layers::Whole, edge, rate_hz).unwrap()
                 {
                     let (pace, mut bits) = (voice.spreading.pace(), Vec::new());
                     let step = (pace.step_rate_hz() / rate_hz * CODE_ONE as f64) as u64;
-                    let from = CodeTime::new(8, u64::from(pace.steps) * CODE_ONE - 5 * step / 3);
+                    // The last steps of a period, or of as much of one as 64 bits count.
+                    let last = u64::from(pace.steps).min(65_000);
+                    let from = CodeTime::new(8, last * CODE_ONE - 5 * step / 3);
                     let position = voice.spreading.strip(from, step, LENGTHS, |period| period % 3 == 1, &mut bits);
-                    let half = component.phase_cycles + voice.phase_cycles == 0.5;
-                    let turns = 0x1234_5678_9abc_def0 + if half { 1 << 63 } else { 0 };
+                    let quarters = (4.0 * (component.phase_cycles + voice.phase_cycles)).rem_euclid(4.0);
+                    assert_eq!(quarters.fract(), 0.0);
+                    let turns = 0x1234_5678_9abc_def0_u64.wrapping_add((quarters as u64) << 62);
                     runs.push((position, step, turns, 0.5_f64.sqrt() * voice.amplitude));
                     strips.push(bits);
                 }
@@ -153,16 +163,23 @@ fn rays_of_several_runs_are_the_sums_of_their_twins_at_every_length_and_offset()
                     amplitude,
                 })
                 .collect();
-            assert_eq!(runs.len(), 4);
+            assert_eq!(runs.len(), count, "{}", signal.name);
+            let some = &runs[1..count.min(3)];
+            let amplitude: f64 = runs.iter().chain(some).map(|run| run.amplitude).sum();
             everywhere(
-                |level, i, q| accumulate_rays(level, edge, &[&runs, &runs[1..3]], i, q, &mut Buffers::default()),
+                |level, i, q| accumulate_rays(level, edge, &[&runs, some], i, q, &mut Buffers::default()),
                 |i, q| {
                     let (mut ri, mut rq) = (vec![0.0; i.len()], vec![0.0; q.len()]);
-                    for run in runs.iter().chain(&runs[1..3]) {
+                    for run in runs.iter().chain(some) {
                         reference::accumulate(edge, run, &mut ri, &mut rq);
                     }
-                    // The bar of one run of amplitude one, for amplitudes of 2.7 together.
-                    assert!(difference((i, q), (&ri, &rq)) < 2.7 * bar, "{edge:.0?} {rate_hz} {}", i.len());
+                    // The bar of one run of amplitude one, for all amplitudes together.
+                    let name = signal.name;
+                    assert!(
+                        difference((i, q), (&ri, &rq)) < amplitude * bar,
+                        "{name} {edge:.0?} {rate_hz} {}",
+                        i.len()
+                    );
                 },
             );
         }
