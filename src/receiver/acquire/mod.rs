@@ -28,6 +28,7 @@
 //! worst losses of code (2.0 dB) and Doppler (0.9 dB) and one sum in ten lost to a data bit, 20 + λ = 138 ±
 //! 23 exceeds a threshold of 95. A bit that turns within a sum leaves a third of its power on average.
 
+mod codes;
 mod error;
 mod grid;
 mod kernel;
@@ -42,7 +43,6 @@ mod window;
 
 use std::collections::BTreeMap;
 
-use num_complex::Complex;
 use rayon::prelude::*;
 
 use crate::gnss::record::AcquisitionRow;
@@ -52,10 +52,10 @@ use crate::gnss::signal::{Component, Layers, Link, Signal};
 use crate::receiver::lead::{beside, followed_db, lead};
 use crate::receiver::source::Block;
 
+use codes::{Code, Codes};
 pub use error::AcquireError;
 use grid::{Again, Grid, Map};
 use refine::Refined;
-use replica::Replica;
 pub use settings::AcquisitionSettings;
 use window::Window;
 
@@ -198,7 +198,7 @@ pub struct Searcher {
     settings: AcquisitionSettings,
     centre_hz: f64,
     grids: BTreeMap<Band, Grid>,
-    codes: BTreeMap<Link, Code>,
+    codes: Codes,
 }
 
 /// What candidates share a grid: signal and carrier, in hertz from the middle of the signal's band.
@@ -217,47 +217,6 @@ impl Band {
 
 /// A satellite that is known to be there, and its place.
 type Known<'a> = (&'a Code, Refined);
-
-struct Code {
-    replica: Replica,
-    spectrum: Vec<Complex<f32>>,
-    /// The same of the data beside a pilot, where both are searched for.
-    companion: Option<(Replica, Vec<Complex<f32>>)>,
-}
-
-impl Code {
-    fn new(grid: &Grid, component: &Component, companion: Option<&Component>, number: u8) -> Option<Self> {
-        let both = |component| {
-            let replica = Replica::new(component, number)?;
-            let spectrum = grid.spectrum(&replica);
-            Some((replica, spectrum))
-        };
-        let (replica, spectrum) = both(component)?;
-        let companion = match companion {
-            Some(companion) => Some(both(companion)?),
-            None => None,
-        };
-        Some(Self { replica, spectrum, companion })
-    }
-
-    /// Takes the code, and the one beside it, out of the samples; returns the mean power of the former's sum
-    /// over a period.
-    fn subtract(&self, grid: &Grid, (chips, complex): (f64, bool), place: &Refined, window: &mut Window) -> f64 {
-        let samples = (&mut window.i[..], &mut window.q[..]);
-        let power = refine::subtract(grid, chips, &self.replica, place, complex, samples);
-        if let Some((replica, _)) = &self.companion {
-            let samples = (&mut window.i[..], &mut window.q[..]);
-            refine::subtract(grid, chips, replica, place, complex, samples);
-        }
-        power
-    }
-
-    /// Spectra of the code and of the one beside it; of a code that is alone the same twice.
-    fn spectra(&self) -> pair::Spectra<'_> {
-        let beside = self.companion.as_ref().map_or(&self.spectrum, |(_, spectrum)| spectrum);
-        [&self.spectrum, beside]
-    }
-}
 
 /// The data beside a pilot, where both are searched for: they have the same power, and the pilot's overlay
 /// keeps coherent sums to one code period.
@@ -286,7 +245,7 @@ impl Searcher {
             settings: settings.clone(),
             centre_hz,
             grids: BTreeMap::new(),
-            codes: BTreeMap::new(),
+            codes: Codes::default(),
         })
     }
 
@@ -323,18 +282,21 @@ impl Searcher {
         for link in &links {
             self.prepare(*link)?;
         }
-        self.make_codes(&links)?;
         let mut results: Vec<Option<(AcquisitionRow, Option<Acquired>)>> = vec![None; candidates.len()];
-        for (band, grid) in &self.grids {
+        let bands: Vec<Band> = self.grids.keys().copied().collect();
+        for band in &bands {
+            self.codes.trim();
+            if candidates.iter().all(|link| Band::of(*link) != *band) {
+                continue;
+            }
+            self.codes.make(&self.grids, links.iter().filter(|link| Band::of(**link) == *band))?;
+            let Some(grid) = self.grids.get(band) else { continue };
             let chosen: Vec<(usize, Sv, &Code)> = candidates
                 .iter()
                 .enumerate()
                 .filter(|(_, link)| Band::of(**link) == *band)
                 .filter_map(|(index, link)| Some((index, link.sv, self.codes.get(link)?)))
                 .collect();
-            if chosen.is_empty() {
-                continue;
-            }
             let (have, need) = (block.i.len() as u64, grid.samples_needed());
             if have < need {
                 return Err(AcquireError::TooFewSamples { have, need });
@@ -352,24 +314,8 @@ impl Searcher {
                 }
             }
         }
+        self.codes.trim();
         Ok(results.into_iter().flatten().collect())
-    }
-
-    /// Makes sure that code spectra are there.
-    fn make_codes(&mut self, candidates: &[Link]) -> Result<(), AcquireError> {
-        let missing: Vec<Link> = candidates.iter().copied().filter(|link| !self.codes.contains_key(link)).collect();
-        let make = |link: &Link| {
-            let component = lead(link.signal)?;
-            let grid = self.grids.get(&Band::of(*link))?;
-            Some((*link, Code::new(grid, component, companion(component, link.signal), link.sv.number)?))
-        };
-        let made: Vec<Option<(Link, Code)>> = missing.par_iter().map(make).collect();
-        for (link, code) in missing.iter().zip(made) {
-            let Link { sv, signal } = *link;
-            let (link, code) = code.ok_or(AcquireError::NoCode { signal: signal.name, sv })?;
-            self.codes.insert(link, code);
-        }
-        Ok(())
     }
 
     /// Makes sure that plans are there.
@@ -457,7 +403,7 @@ impl Searcher {
             }
         }
         for index in 1..codes.len() {
-            let same = |earlier: usize| codes[earlier].1.replica == codes[index].1.replica;
+            let same = |earlier: usize| codes[earlier].1.is_alike(codes[index].1);
             if (0..index).any(|earlier| findings[earlier].hit.is_some() && same(earlier)) {
                 findings[index].hit = None;
             }
@@ -492,8 +438,9 @@ impl Searcher {
                     cn0_hz: excess.max(f64::MIN_POSITIVE) / coherent_s,
                     power: 0.0,
                 };
-                let hit = (peak.statistic > peak.threshold)
-                    .then(|| refine::refine(grid, block, component, &code.replica, coarse, grid.periods as usize));
+                let replica = if peak.statistic > peak.threshold { code.replica() } else { None };
+                let periods = grid.periods as usize;
+                let hit = replica.map(|replica| refine::refine(grid, block, component, &replica, coarse, periods));
                 Finding { statistic: peak.statistic, threshold: peak.threshold, coarse, hit }
             })
             .collect();

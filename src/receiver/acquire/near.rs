@@ -24,7 +24,8 @@ impl Searcher {
         for link in &links {
             self.prepare(*link)?;
         }
-        self.make_codes(&links)?;
+        self.codes.trim();
+        self.codes.make(&self.grids, links.iter())?;
         let settings = AcquisitionSettings { doppler_max_hz: half_hz, ..self.settings.clone() };
         let mut results = Vec::with_capacity(near.len());
         for (link, doppler_hz) in near {

@@ -1,5 +1,7 @@
 use std::f64::consts::TAU;
 
+use num_complex::Complex;
+
 use super::tests::Noise;
 use super::*;
 use crate::gnss::galileo::e1::{self, E1};

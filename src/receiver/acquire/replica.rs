@@ -17,12 +17,6 @@ pub(super) struct Replica {
     correlator: correlate::Replica,
 }
 
-impl PartialEq for Replica {
-    fn eq(&self, other: &Self) -> bool {
-        self.levels == other.levels && self.steps_per_chip == other.steps_per_chip
-    }
-}
-
 impl Replica {
     /// The code of satellite `number`, or `None` if it has none.
     pub fn new(component: &Component, number: u8) -> Option<Self> {

@@ -153,7 +153,7 @@ fn a_strong_satellite_does_not_bring_others_by_cross_correlation() {
         for link in all() {
             searcher.prepare(link).unwrap();
         }
-        searcher.make_codes(&all()).unwrap();
+        searcher.codes.make(&searcher.grids, all().iter()).unwrap();
         let grid = searcher.grids.values().next().unwrap();
         let spectra: Vec<_> = searcher.codes.values().map(Code::spectra).collect();
         let peaks = grid.search(&Block { first: 0, i: &recording.i, q: &recording.q }, &spectra, None);

@@ -43,8 +43,11 @@ impl FrontEnd {
         let missing = (self.needed as usize).saturating_sub(window.samples.i.len());
         let mut planes = Planes::default();
         let samples = block.unpack(0..missing, &mut planes);
-        window.samples.i.extend_from_slice(samples.i);
-        window.samples.q.extend_from_slice(samples.q);
+        for (kept, new) in [(&mut window.samples.i, samples.i), (&mut window.samples.q, samples.q)] {
+            // Most searches want a few blocks.
+            kept.reserve_exact(new.len());
+            kept.extend_from_slice(new);
+        }
         if (window.samples.i.len() as u64) < self.needed {
             return Ok(());
         }
