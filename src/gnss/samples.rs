@@ -105,6 +105,7 @@ impl Format {
 
     /// Reads the whole samples in `bytes` into planar LSB values, replacing what `i` and `q` held.
     /// Real formats give `q` = 0; a cut sample at the end is left out. A non-finite float reads as 0.
+    #[inline(always)]
     pub fn unpack(self, bytes: &[u8], i: &mut Vec<f32>, q: &mut Vec<f32>) {
         // Whole samples as integers: shifts make vectors where picking bytes does not.
         match self {
@@ -130,6 +131,7 @@ impl Format {
 }
 
 /// Fills `i` and `q` with the components of every sample.
+#[inline(always)]
 fn split<const N: usize>(
     samples: &[[u8; N]],
     i: &mut Vec<f32>,

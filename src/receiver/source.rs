@@ -8,6 +8,7 @@
 
 use std::ops::Range;
 
+use super::unpack::unpack;
 use crate::gnss::samples::Format;
 
 /// Consecutive samples; `q` is all zeros for a real recording.
@@ -59,7 +60,7 @@ impl Packed<'_> {
         let end = range.end.min(self.samples());
         let start = range.start.min(end);
         let bytes = self.bytes.get(start * size..end * size).unwrap_or_default();
-        self.format.unpack(bytes, &mut planes.i, &mut planes.q);
+        unpack(self.format, bytes, &mut planes.i, &mut planes.q);
         Block { first: self.first + start as u64, i: &planes.i, q: &planes.q }
     }
 }
@@ -89,7 +90,7 @@ impl Lookback {
         packed.clear();
         packed.extend_from_slice(kept);
         packed.extend_from_slice(block.bytes.get(..end * block.format.bytes()).unwrap_or(block.bytes));
-        block.format.unpack(&packed, &mut planes.i, &mut planes.q);
+        unpack(block.format, &packed, &mut planes.i, &mut planes.q);
         planes.packed = packed;
         Block { first: from, i: &planes.i, q: &planes.q }
     }
