@@ -20,6 +20,7 @@ use crate::gnss::record::IonosphereModel;
 /// Sums over the satellites of a fix. Vectors are east, north, up and the clocks of all time scales.
 #[derive(Clone, Debug)]
 struct Sums {
+    /// Satellites, each with all its ranges.
     least: u32,
     most: u32,
     /// Ranges of the satellite that came last.
@@ -96,10 +97,14 @@ impl Sums {
         let pairs = own.iter().flat_map(|a| own.iter().map(move |b| (a, b)));
         let apart = |(a, b): &(&Forecast, &Forecast)| a.carrier_hz / b.carrier_hz - 1.0;
         let widest = pairs.max_by(|one, other| apart(one).total_cmp(&apart(other)));
-        match widest.filter(|pair| scene.choices.combined && apart(pair) >= SAME_BAND) {
-            Some((first, second)) => self.add(&combined(first, second), scene.choices.model_sigma_m),
-            None => own.iter().for_each(|range| self.add(range, scene.choices.model_sigma_m)),
-        }
+        let ranges = match widest.filter(|pair| scene.choices.combined && apart(pair) >= SAME_BAND) {
+            Some((first, second)) => vec![combined(first, second)],
+            None => own,
+        };
+        let used = || ranges.iter().filter(|range| !range.excluded);
+        self.least += u32::from(used().any(|range| !range.near_mask));
+        self.most += u32::from(used().next().is_some());
+        ranges.iter().for_each(|range| self.add(range, scene.choices.model_sigma_m));
     }
 
     fn add(&mut self, range: &Forecast, model_sigma_m: f64) {
@@ -120,8 +125,6 @@ impl Sums {
         let weight = 1.0 / variance;
         let cosine2 = SHELL * SHELL * (1.0 - range.sight.z * range.sight.z);
         let shell_m2 = IONOSPHERE_SIGMA_M * IONOSPHERE_SIGMA_M / (1.0 - cosine2);
-        self.least += u32::from(!range.near_mask);
-        self.most += 1;
         self.normal.ger(weight, &row, &row, 1.0);
         self.loose.ger(1.0 / (variance + shell_m2), &row, &row, 1.0);
         self.plain.ger(1.0, &row, &row, 1.0);
