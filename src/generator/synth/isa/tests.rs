@@ -13,7 +13,7 @@ use crate::gnss::beidou::b2a::B2A;
 use crate::gnss::galileo::e1::E1;
 use crate::gnss::gps::l1c::L1C;
 use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::satellite::{Sv, System};
+use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Layers;
 
 /// Longest length, number of offsets, and a plane that holds both.
