@@ -47,6 +47,8 @@ mod printed;
 mod pseudorange;
 #[path = "../witness/qzss.rs"]
 mod qzss;
+#[path = "../witness/received.rs"]
+mod received;
 #[path = "../witness/recording.rs"]
 mod recording;
 #[path = "../witness/recording_e5.rs"]

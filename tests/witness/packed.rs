@@ -124,15 +124,19 @@ fn a_real_two_bit_recording_holds_the_satellites_that_others_found_in_it() {
     assert_listed(&found, &strong, 300.0);
 }
 
-/// Facts of the file as its makers and the manifest of the recording have them, in the standard's elements.
-const HANOI: &str = r#"<metadata><lane id="m"><system id="f"/><block><cycles>0</cycles><chunk>
+/// Facts of the file as its makers and the manifest of the recording have them, in the standard's elements:
+/// in a word of 0.2 µs from its highest bit on a sample of L1, one of L2 and six of L5.
+pub const HANOI: &str = r#"<metadata><lane id="m"><system id="f"/><block><cycles>0</cycles><chunk>
     <sizeword>2</sizeword><countwords>1</countwords><endian>Little</endian><lump>
     <stream id="L1"><ratefactor>1</ratefactor><quantization>1</quantization><packedbits>2</packedbits><shift>Left</shift>
       <format>IQn</format><encoding>SIGN</encoding><band id="L1"><centerfreq format="GHz">1.57542</centerfreq>
       <translatedfreq format="kHz">-48.75</translatedfreq></band></stream>
-    <stream id="rest"><ratefactor>7</ratefactor><quantization>1</quantization><packedbits>14</packedbits><shift>Left</shift>
+    <stream id="L2"><ratefactor>1</ratefactor><quantization>1</quantization><packedbits>2</packedbits><shift>Left</shift>
       <format>IQn</format><encoding>SIGN</encoding><band id="L2"><centerfreq format="MHz">1227.6</centerfreq>
-      <translatedfreq format="kHz">-56.25</translatedfreq></band></stream></lump></chunk></block></lane>
+      <translatedfreq format="kHz">-56.25</translatedfreq></band></stream>
+    <stream id="L5"><ratefactor>6</ratefactor><quantization>1</quantization><packedbits>12</packedbits><shift>Left</shift>
+      <format>IQn</format><encoding>SIGN</encoding><band id="L5"><centerfreq format="MHz">1176.45</centerfreq>
+      <translatedfreq format="kHz">121.875</translatedfreq></band></stream></lump></chunk></block></lane>
     <system id="f"><freqbase format="MHz">5.0</freqbase></system></metadata>"#;
 
 #[test]

@@ -10,8 +10,9 @@
 //! subtracted from the samples, code period by code period, and weak ones are looked for again; where the
 //! strong ones have a good part of all power, or raise the cells of all codes, so is everything else. What is
 //! strong among the rest goes the same way. Signals that are no candidates are not subtracted: where they
-//! raise the cells of all codes, the threshold rises (`multiple_access`). Continuous waves that could pass
-//! for satellites are taken out first (`tone`).
+//! raise the cells of all codes, the threshold rises (`multiple_access`). Hits that strong ones of another
+//! signal may have made have to show without these (`across`). Continuous waves that could pass for
+//! satellites are taken out first (`tone`).
 //!
 //! **Threshold.** A cell's statistic is Σ|S|² in units of half its noise power: chi-square with 2K degrees of
 //! freedom for K sums. With N cells (lags in one code period times Dopplers), a cell is given 1 − (1 −
@@ -28,6 +29,7 @@
 //! worst losses of code (2.0 dB) and Doppler (0.9 dB) and one sum in ten lost to a data bit, 20 + λ = 138 ±
 //! 23 exceeds a threshold of 95. A bit that turns within a sum leaves a third of its power on average.
 
+mod across;
 mod codes;
 mod error;
 mod grid;
@@ -105,6 +107,12 @@ pub fn can_hold(metadata: &IfMetadata, signal: &Signal) -> bool {
     !metadata.format.is_complex() || far_hz(metadata, signal, signal.centre_hz()).abs() <= 0.5 * metadata.rate.hz()
 }
 
+/// The same of a satellite's own carrier.
+pub(in crate::receiver) fn can_hold_carrier(metadata: &IfMetadata, link: Link) -> bool {
+    let far_hz = far_hz(metadata, link.signal, link.carrier_hz());
+    !metadata.format.is_complex() || far_hz.abs() <= 0.5 * metadata.rate.hz()
+}
+
 /// Where a carrier lies in the samples, or the farther side of its sub-carrier.
 fn far_hz(metadata: &IfMetadata, signal: &Signal, carrier_hz: f64) -> f64 {
     let if_hz = metadata.if_hz(carrier_hz);
@@ -154,13 +162,21 @@ pub fn shortened(
     Ok(None)
 }
 
-/// Samples below which nothing is searched for: two code periods.
+/// Samples below which nothing is searched for: two code periods of the signal with the shortest.
 ///
 /// # Errors
 /// As [`AcquisitionSettings::validate`].
 pub fn least_samples(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Result<u64, AcquireError> {
-    let least = AcquisitionSettings { coherent_periods: 1, noncoherent_sums: 1, ..settings.clone() };
-    samples_needed(metadata, &least)
+    settings.validate()?;
+    let inside = settings.signals().into_iter().filter(|signal| can_hold(metadata, signal));
+    let mut least = None;
+    for signal in inside {
+        let signals = vec![signal.name.to_owned()];
+        let alone = AcquisitionSettings { signals, coherent_periods: 1, noncoherent_sums: 1, ..settings.clone() };
+        let need = samples_needed(metadata, &alone)?;
+        least = Some(least.map_or(need, |least: u64| least.min(need)));
+    }
+    Ok(least.unwrap_or(0))
 }
 
 /// Chips between neighbouring cells of a search for `signal`.
@@ -197,6 +213,8 @@ pub struct Searcher {
     metadata: IfMetadata,
     settings: AcquisitionSettings,
     centre_hz: f64,
+    /// Samples that there are, where a search has to do with them.
+    have: Option<u64>,
     grids: BTreeMap<Band, Grid>,
     codes: Codes,
 }
@@ -244,9 +262,38 @@ impl Searcher {
             metadata: metadata.clone(),
             settings: settings.clone(),
             centre_hz,
+            have: None,
             grids: BTreeMap::new(),
             codes: Codes::default(),
         })
+    }
+
+    /// A search that does with `have` samples: each signal is searched for as if it were alone, by as many
+    /// sums as these have room for ([`shortened`]). Long codes of one signal cost the others nothing.
+    ///
+    /// # Errors
+    /// As [`AcquisitionSettings::validate`].
+    pub(in crate::receiver) fn fitted(
+        metadata: &IfMetadata,
+        settings: &AcquisitionSettings,
+        have: u64,
+    ) -> Result<Self, AcquireError> {
+        Ok(Self { have: Some(have), ..Self::new(metadata, settings)? })
+    }
+
+    /// Settings by which a signal is searched for; `None` where there are too few samples for it.
+    fn settings_of(&self, signal: &Signal) -> Result<Option<AcquisitionSettings>, AcquireError> {
+        let Some(have) = self.have else { return Ok(Some(self.settings.clone())) };
+        let alone = AcquisitionSettings { signals: vec![signal.name.to_owned()], ..self.settings.clone() };
+        shortened(&self.metadata, &alone, have)
+    }
+
+    /// Whether there are samples enough to search for this signal at all.
+    ///
+    /// # Errors
+    /// As [`AcquisitionSettings::validate`].
+    pub(in crate::receiver) fn has_room(&self, signal: &Signal) -> Result<bool, AcquireError> {
+        Ok(self.settings_of(signal)?.is_some())
     }
 
     /// Searches the beginning of `block` for every candidate, by the component of its signal that leads; rows
@@ -314,8 +361,11 @@ impl Searcher {
                 }
             }
         }
+        let mut results: Vec<(AcquisitionRow, Option<Acquired>)> = results.into_iter().flatten().collect();
         self.codes.trim();
-        Ok(results.into_iter().flatten().collect())
+        self.clear_across(block, known, &mut results)?;
+        self.codes.trim();
+        Ok(results)
     }
 
     /// Makes sure that plans are there.
@@ -329,9 +379,8 @@ impl Searcher {
         if rate_hz < component.chip_rate_hz {
             return Err(AcquireError::RateTooLow { signal: signal.name, rate_hz, need_hz: component.chip_rate_hz });
         }
-        let (if_hz, half_hz) = (far_hz(&self.metadata, signal, link.carrier_hz()), 0.5 * rate_hz);
-        // Of a real recording the IF may lie beyond half the rate on purpose.
-        if self.metadata.format.is_complex() && if_hz.abs() > half_hz {
+        if !can_hold_carrier(&self.metadata, link) {
+            let (if_hz, half_hz) = (far_hz(&self.metadata, signal, link.carrier_hz()), 0.5 * rate_hz);
             return Err(AcquireError::OutOfBand { signal: signal.name, if_hz, half_hz });
         }
         if sv.system != signal.system {
@@ -339,8 +388,13 @@ impl Searcher {
         }
         let band = Band::of(link);
         if !self.grids.contains_key(&band) {
+            let Some(settings) = self.settings_of(signal)? else {
+                let alone = AcquisitionSettings { signals: vec![signal.name.to_owned()], ..self.settings.clone() };
+                let need = least_samples(&self.metadata, &alone)?;
+                return Err(AcquireError::TooFewSamples { have: self.have.unwrap_or(0), need });
+            };
             let one = (component, companion(component, signal).is_some(), link.carrier_hz());
-            let Some(grid) = Grid::new(one, &self.metadata, &self.settings, self.centre_hz) else {
+            let Some(grid) = Grid::new(one, &self.metadata, &settings, self.centre_hz) else {
                 return Err(no_code);
             };
             self.grids.insert(band, grid);

@@ -10,7 +10,7 @@ use super::{FrontEnd, Track, WRONG_TIME_FIXES, Window, suited};
 use crate::gnss::record::{AcquisitionRow, Event, EventRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
-use crate::receiver::acquire::{self, AcquireError, Acquired};
+use crate::receiver::acquire::{AcquireError, Acquired, Searcher};
 use crate::receiver::decode::Decoder;
 use crate::receiver::outcome::ReceiveError;
 use crate::receiver::output::{Record, Sink};
@@ -116,16 +116,21 @@ impl FrontEnd {
     }
 
     /// Searches a recording that ended before the first search had all the samples that it asks for: by fewer
-    /// sums, and by sums of one code period where there is no room for another.
+    /// sums, and by sums of one code period where there is no room for another. A signal for which there is no
+    /// room at all is left out.
     pub(super) fn search_rest(&mut self, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let sink = &mut Counted { sink, step: self.step, ticks: &[] };
         let Some(window) = self.window.take().filter(|_| !self.searched) else { return Ok(()) };
         let have = window.samples.i.len() as u64;
-        let Some(settings) = acquire::shortened(&self.metadata, &self.settings.acquisition, have)? else {
+        let mut searcher = Searcher::fitted(&self.metadata, &self.settings.acquisition, have)?;
+        let mut sought = Vec::new();
+        for link in suited::distinct(&self.candidates) {
+            sought.extend(searcher.has_room(link.signal)?.then_some(link));
+        }
+        if sought.is_empty() && !self.candidates.is_empty() {
             return Ok(());
-        };
-        let sought = suited::distinct(&self.candidates);
-        let results = acquire::search(&self.metadata, &window.block(), &sought, &settings)?;
+        }
+        let results = searcher.search(&window.block(), &sought)?;
         self.start_channels(results, window.first, shared, sink)?;
         self.searched = true;
         Ok(())

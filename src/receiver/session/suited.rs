@@ -56,12 +56,14 @@ fn image(metadata: &IfMetadata, signal: &Signal, doppler_max_hz: f64) -> Option<
     })
 }
 
-/// Signals and satellites that are searched for, as far as the samples can hold them.
+/// Signals and satellites that are searched for, as far as the samples can hold them: of a signal whose
+/// carriers differ by satellite, those whose own carrier lies within the band.
 pub(super) fn candidates(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Vec<Link> {
     let signals = settings.signals().into_iter().filter(|signal| acquire::can_hold(metadata, signal));
     signals
         .flat_map(|signal| signal.satellites().map(move |sv| signal.link(sv)))
         .filter(|link| settings.reserved_codes || link.is_of_constellation())
+        .filter(|link| acquire::can_hold_carrier(metadata, *link))
         .collect()
 }
 
