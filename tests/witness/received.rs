@@ -92,7 +92,7 @@ fn one_bit_samples_of_l2_hold_l2c_as_listed_and_none_else() {
     assert_found(&found, &[("GPS L2C", "G01 G03 G07 G30", "G06 G09 G17")]);
 }
 
-/// A satellite of NavIC is there with 49 dB-Hz, whose lines at whole kilohertz passed for three of BeiDou,
+/// A satellite of NavIC is there with 60 dB-Hz, whose lines at whole kilohertz passed for three of BeiDou,
 /// which sent no B2a in 2015. Beyond the list G09, as on L1 and L2.
 #[test]
 fn one_bit_samples_of_l5_hold_three_systems_as_listed_and_nothing_of_a_fourth() {
