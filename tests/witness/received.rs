@@ -69,8 +69,8 @@ fn hanoi(place: &Path) -> Option<PathBuf> {
     Some(metadata)
 }
 
-/// Beyond the list are six of GPS. Each is found in both halves of the recording, which share no sample, at one
-/// Doppler to 6 Hz (by chance, in steps of 250 Hz over ±5 kHz: once in 800), and three of them on another
+/// Beyond the list are six of GPS. Each is found in both halves of the recording, which share no sample, at
+/// one Doppler to 6 Hz (by chance, in steps of 250 Hz over ±5 kHz: once in 800), and three of them on another
 /// carrier.
 #[test]
 fn one_bit_samples_of_l1_hold_gps_and_galileo_as_listed_and_none_else() {
@@ -121,8 +121,8 @@ fn two_bit_samples_of_l1_hold_gps_and_galileo_as_listed_and_none_else() {
     assert_found(&found, &[("GPS L1 C/A", listed, "G12 G14"), ("Galileo E1", "E11 E12 E19 E30", "E20")]);
 }
 
-/// Four carriers in 50 MHz, by a hundred million samples a second: `GNSS_TWIN_LONG=1`. Beyond the list is C02,
-/// which stands still over the equator as C05 does, and has its Doppler to 2 Hz.
+/// Four carriers in 50 MHz, by a hundred million samples a second: `GNSS_TWIN_LONG=1`. Beyond the list is
+/// C02, which stands still over the equator as C05 does, and has its Doppler to 2 Hz.
 #[test]
 fn fifty_megahertz_hold_four_signals_of_three_systems_as_listed_and_none_else() {
     let Some(file) = external(super::recording_e5::FILE).filter(|_| is_long()) else { return };
@@ -173,8 +173,8 @@ fn half_a_second_holds_gps_and_galileo_as_listed_and_none_else() {
     assert_found(&found, &[("GPS L1 C/A", "G04 G16 G18 G25 G26 G29 G31 G32", ""), ("Galileo E1", galileo, "E19")]);
 }
 
-/// Codes of 20 ms take long to find: `GNSS_TWIN_LONG=1`. Beyond the list is G27, whose Doppler on L1 is by sums
-/// over 200 ms the one that both carriers' ratio makes of it, to a hertz.
+/// Codes of 20 ms take long to find: `GNSS_TWIN_LONG=1`. Beyond the list is G27, whose Doppler on L1 is by
+/// sums over 200 ms the one that both carriers' ratio makes of it, to a hertz.
 #[test]
 fn half_a_second_of_the_second_carrier_holds_l2c_as_listed_and_none_else() {
     let Some(file) = external("if/pocket_l2_2021-12-02_4msps_ci8.bin").filter(|_| is_long()) else { return };

@@ -116,8 +116,8 @@ impl FrontEnd {
     }
 
     /// Searches a recording that ended before the first search had all the samples that it asks for: by fewer
-    /// sums, and by sums of one code period where there is no room for another. A signal for which there is no
-    /// room at all is left out.
+    /// sums, and by sums of one code period where there is no room for another. A signal for which there is
+    /// no room at all is left out.
     pub(super) fn search_rest(&mut self, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let sink = &mut Counted { sink, step: self.step, ticks: &[] };
         let Some(window) = self.window.take().filter(|_| !self.searched) else { return Ok(()) };
