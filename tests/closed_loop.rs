@@ -412,9 +412,9 @@ fn b2a_alone_finds_its_place_by_b_cnav2_and_its_pilot() {
 }
 
 /// BeiDou's open signal of that name alone, over Cartagena, where the shipped scene has B1I: place, message
-/// and both loops within 5 % of theory. A deviation of N independent errors scatters by the root of 1/(2N): by
-/// 2 % of the carrier's at ten a second over 37 s and four satellites, but by 4 to 6 % of the code's, whose
-/// loop has 0.5 Hz. The seed is that of the scene; another one's code may break the bar.
+/// and both loops within 5 % of theory. A deviation of N independent errors scatters by the root of 1/(2N):
+/// by 2 % of the carrier's at ten a second over 37 s and four satellites, but by 4 to 6 % of the code's,
+/// whose loop has 0.5 Hz. The seed is that of the scene; another one's code may break the bar.
 fn in_phase_alone(signal: &str, front_end: &str, satellites: &str) -> Value {
     let scene = include_str!("../scenarios/beidou.toml")
         .replace("BeiDou B1I\"]", &format!("{signal}\"]"))
