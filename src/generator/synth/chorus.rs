@@ -76,7 +76,8 @@ impl Chord {
     fn anchor<const AREA: bool>(&mut self, runs: &[Run<'_>]) {
         let Some(first) = runs.first() else { return };
         self.carrier.anchor(first, 1.0);
-        (self.in_phase.clear(), self.quadrature.clear());
+        self.in_phase.clear();
+        self.quadrature.clear();
         for (number, run) in runs.iter().enumerate() {
             let quarters = run.turns.wrapping_sub(first.turns) >> (u64::BITS - 2);
             let layers = if quarters % 2 == 0 { &mut self.in_phase } else { &mut self.quadrature };
