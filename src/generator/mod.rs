@@ -41,6 +41,7 @@
 #![warn(missing_docs)]
 
 pub mod arrival;
+pub mod augmentation;
 pub mod catalogue;
 pub mod clock;
 pub mod dynamics;

@@ -6,6 +6,7 @@
 //! radians and ratios from here on. `[receiver]` is kept as written for the receiver's own settings.
 
 mod attitude;
+mod augmentation;
 mod band;
 mod compose;
 mod expect;
@@ -37,6 +38,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 use toml::de::DeTable;
 
+pub use augmentation::SbasSpec;
 pub use compose::Overrides;
 pub use front_end::{FrontEnd, Tuned};
 pub use hardware::ClockSpec;
@@ -216,6 +218,8 @@ pub struct Scenario {
     pub include_unhealthy: bool,
     /// True orbits and clocks; absent means those that are broadcast.
     pub orbits: Option<OrbitsSpec>,
+    /// What augmentation systems say of other satellites; absent means nothing.
+    pub sbas: Option<SbasSpec>,
     /// Faults of satellites' clocks and orbits.
     pub satellite_faults: Vec<SatelliteFault>,
     /// Faults of navigation messages.
@@ -309,8 +313,8 @@ impl Scenario {
     /// Reads every table, and goes on where one is refused; `None` where a scene has no sense without it.
     fn read(root: &Table<'_>, refusals: &mut Refusals) -> Option<Self> {
         let mut open = |name: &'static str| refusals.take(root.table(name)).flatten();
-        let [navigation, of_satellites, orbits, motion, attitude, power] =
-            ["navigation", "satellites", "orbits", "motion", "attitude", "power"].map(&mut open);
+        let [navigation, of_satellites, orbits, sbas, motion, attitude, power] =
+            ["navigation", "satellites", "orbits", "sbas", "motion", "attitude", "power"].map(&mut open);
         let [ionosphere, troposphere, scintillation, receiver_clock, noise, truth, playback, expect] =
             ["ionosphere", "troposphere", "scintillation", "receiver_clock", "noise", "truth", "playback", "expect"]
                 .map(&mut open);
@@ -329,6 +333,7 @@ impl Scenario {
         let motion = motion.and_then(|t| refusals.take(MotionSpec::read(&t)));
         let power = refusals.take(link::power(power.as_ref()));
         let clock = refusals.take(hardware::receiver_clock(receiver_clock.as_ref()));
+        let sbas = refusals.take(sbas.map(|t| augmentation::sbas(&t)).transpose());
         let orbits = refusals.take(orbits.map(|t| satellite::orbits(&t)).transpose());
         let attitude = refusals.take(attitude.map(|t| attitude::attitude(&t)).transpose());
         let ionosphere = refusals.take(ionosphere.map(|t| propagation::ionosphere(&t)).transpose());
@@ -364,6 +369,7 @@ impl Scenario {
             excluded,
             include_unhealthy,
             orbits: orbits?,
+            sbas: sbas?,
             satellite_faults,
             message_faults,
             motion: motion?,

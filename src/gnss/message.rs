@@ -8,7 +8,9 @@
 //! [`TimeScale::label`]: crate::gnss::time::TimeScale::label
 
 use std::fmt;
+use std::sync::Arc;
 
+use crate::gnss::augmentation::{Content, Network};
 use crate::gnss::bits::{Field, FieldError};
 use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::gps::lnav::UtcData;
@@ -130,6 +132,8 @@ pub struct Common {
     pub almanac: Vec<Ephemeris>,
     /// Time near which the almanac holds.
     pub reference: Option<Epoch>,
+    /// Who knows what augmentation systems send of others; absent means that they say nothing of them.
+    pub network: Option<Arc<dyn Network>>,
 }
 
 /// What messages newer than LNAV and D1 say of UTC: a polynomial and a change of leap seconds, in numbers of
@@ -226,6 +230,8 @@ pub enum Read {
     Ionosphere(Coefficients),
     /// By how much the system's time is ahead of GPS time, whole seconds apart.
     AheadOfGps(TimePolynomial),
+    /// What an augmentation system says of other satellites, in a block that began at that time.
+    Augmentation(Epoch, Box<Content>),
     /// Which satellite sends, where it is another than the one that was assumed: of those that share code and
     /// carrier nothing but the message tells them apart. All that follows is of this one.
     Sender(Sv),

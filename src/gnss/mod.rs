@@ -24,6 +24,7 @@
 
 #![warn(missing_docs)]
 
+pub mod augmentation;
 pub mod beidou;
 pub mod bits;
 pub mod broadcast;

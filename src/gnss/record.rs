@@ -351,6 +351,8 @@ pub enum IonosphereModel {
     NequickG,
     /// Two carriers of every satellite, in the combination that has no ionosphere.
     Combined,
+    /// The grid that an augmentation system sends; where it has no points what would correct without it.
+    Grid,
 }
 
 impl Fix {

@@ -5,6 +5,7 @@
 //! time. A time that contradicts the one before drops both. Of a message that does not say its time the
 //! beginnings of units are known, and another signal of the satellite shows which ones they are.
 
+use crate::gnss::augmentation::Content;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::ionosphere::Coefficients;
 use crate::gnss::message::{Read, Reader};
@@ -48,6 +49,13 @@ pub enum News {
     },
     /// The satellite that sends, where it is another than was assumed.
     Sender(Sv),
+    /// What an augmentation system says of other satellites.
+    Augmentation {
+        /// When its block began, GPS time.
+        sent: Epoch,
+        /// What it says.
+        content: Box<Content>,
+    },
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
 }
@@ -191,6 +199,9 @@ impl Decoder {
                 Read::Ionosphere(coefficients) => news.push(News::Ionosphere(coefficients)),
                 Read::Sender(sv) => news.push(News::Sender(sv)),
                 Read::Parameters(rows) => news.push(News::Parameters(rows)),
+                Read::Augmentation(label, content) => {
+                    news.push(News::Augmentation { sent: self.time.instant(label), content });
+                }
             }
         }
         news

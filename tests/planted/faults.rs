@@ -43,6 +43,8 @@ const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_ar
 const DELAYS: &str = "witness::printed::clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print";
 const SBAS_SETS: &str =
     "witness::sbas::shipped_sets_are_whole_steps_of_the_fields_and_are_read_again_from_any_symbol_and_either_way_up";
+const SBAS_MASK: &str = "witness::sbas::blocks_of_a_mask_and_of_ageing_are_the_printed_ones";
+const SBAS_GRID: &str = "witness::sbas::points_of_printed_masks_of_the_grid_lie_where_the_bands_have_them";
 const QZSS_CODES: &str = "witness::codes::all_chips_of_all_codes_are_those_of_another_program";
 const QZSS_PRN: &str =
     "witness::codes::satellites_of_qzss_have_the_codes_of_the_prn_that_rinex_names_and_those_of_gps_do_not";
@@ -268,6 +270,8 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.sbas.place", "x of augmentation systems has the steps of z", SBAS_SETS),
     fault("gnss.sbas.accuracy", "satellites that range count as such that do not", SBAS_SETS),
     fault("gnss.sbas.tow", "blocks of type 12 are taken for the ones before", SBAS_SETS),
+    fault("gnss.sbas.mask", "a mask names the satellites before those that it means", SBAS_MASK),
+    fault("gnss.sbas.bands", "every second meridian of the grid lacks its points beyond 55 degrees", SBAS_GRID),
     fault("gnss.sbas.acceleration", "accelerations count twice", SBAS_SETS),
     fault("gnss.qzss.codes", "codes of QZSS but the first are a chip late", QZSS_CODES),
     fault("gnss.qzss.prn", "satellites of QZSS have the codes of the next", QZSS_PRN),

@@ -1,12 +1,14 @@
-//! SBAS's places by real records, and its blocks read from any symbol on.
+//! SBAS's places by real records, its blocks read from any symbol on, and its corrections by printed blocks.
 
+use gnss_twin::gnss::augmentation::grid::{Point, points};
+use gnss_twin::gnss::augmentation::{Content, Degradation, GridMask, Mask};
 use gnss_twin::gnss::bits::number;
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::fec::convolutional::Convolutional;
 use gnss_twin::gnss::message::{Common, Read};
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::System;
-use gnss_twin::gnss::sbas::message::{SBAS, type_at};
+use gnss_twin::gnss::sbas::message::{SBAS, tables, type_at};
 use gnss_twin::gnss::time::Epoch;
 
 use super::orbit::outside;
@@ -148,4 +150,112 @@ fn neighbouring_sets_of_four_minutes_meet_half_way() {
     println!("{pairs} pairs: {rms_m:.3} m rms");
     // Both say that they are good for 2 m; steps of their fields make 0.35 m.
     assert!(pairs > 900 && rms_m < 2.0, "{pairs} {rms_m}");
+}
+
+/// The bits of a block whose 212 bits of content are printed in hexadecimal digits.
+fn printed(digits: &str) -> Vec<bool> {
+    let digits = digits.chars().filter(|digit| !digit.is_whitespace());
+    let content = digits.flat_map(|digit| {
+        let value = digit.to_digit(16).unwrap();
+        (0..4).rev().map(move |place| value >> place & 1 == 1)
+    });
+    let bits: Vec<bool> = vec![false; 14].into_iter().chain(content).collect();
+    assert_eq!(bits.len(), 226);
+    bits
+}
+
+/// What a block says; and that it is written in the bits that it was read from.
+fn read_and_written(kind: u8, bits: &Vec<bool>) -> Content {
+    let content = Content::read(kind, bits).unwrap();
+    let mut again = vec![false; 226];
+    content.write(&mut again).unwrap();
+    assert_eq!((content.kind(), &again), (kind, bits));
+    content
+}
+
+/// Spirent, GSS6100 and SimCHAN user manual (DGP000814AAA 12-01), H.1.2.4 and H.1.2.8.
+#[test]
+fn blocks_of_a_mask_and_of_ageing_are_the_printed_ones() {
+    let mask = printed("42420481000000000000000000 00010000000000000000000000 3");
+    let numbers = vec![2, 7, 10, 15, 22, 25, 32, 120];
+    assert_eq!(read_and_written(1, &mask), Content::Mask(Mask { iodp: 3, numbers }));
+    let ageing = printed("0C000550555555555555555555 55555555555555555555555555 5");
+    let Content::Degradation(said) = read_and_written(7, &ageing) else { panic!("no type 7") };
+    let Degradation { latency_s, iodp, indicators } = *said;
+    assert_eq!((latency_s, iodp, &indicators[..6]), (0, 3, &[0, 0, 0, 5, 5, 0][..]));
+    assert_eq!(indicators[6..], [5; 45]);
+}
+
+/// The same manual, H.1.2.12: points of bands 2 and 3, chosen alike on both sides of the equator but for
+/// three; and a mask of MSAS that a receiver has decoded (ComNav, OEM board reference manual
+/// CNT-OEM-RM001 1.8, 4.2.10.11), whose points of a meridian leave none out between 5° and 50° north.
+#[test]
+fn points_of_printed_masks_of_the_grid_lie_where_the_bands_have_them() {
+    let [second, third] = [
+        "321FE00FF0890083FC07F81000 10FF007F8440441FC01FC10001 0",
+        "331FF01FF0800081FC01FC1101 10FF007F8400041FE03FC10001 0",
+    ]
+    .map(|digits| {
+        let Content::GridMask(mask) = read_and_written(18, &printed(digits)) else { panic!("no type 18") };
+        mask
+    });
+    let on_earth = |mask: &GridMask| -> Vec<Point> {
+        let all = points(mask.band);
+        mask.points.iter().map(|number| all[usize::from(*number) - 1]).collect()
+    };
+    let alone = |mask: &GridMask| {
+        let all = on_earth(mask);
+        all.iter().filter(|(latitude, longitude)| !all.contains(&(-latitude, *longitude))).count()
+    };
+    assert_eq!((second.bands, second.band, second.iodi, third.bands, third.band, third.iodi), (3, 2, 0, 3, 3, 0));
+    println!("{:?}", on_earth(&second));
+    assert_eq!((alone(&second), alone(&third)), (3, 0));
+    // The first meridian of band 3 has the points between 20° and 65° on both sides.
+    let first: Vec<i16> = on_earth(&third).iter().filter(|point| point.1 == -60).map(|point| point.0).collect();
+    assert_eq!(first[9..], [20, 25, 30, 35, 40, 45, 50, 55, 65]);
+    // 208 bits of 201, without the head.
+    let digits = "0003FFC180FFC0C03FF0001FF00007FC0000FC00003F00000000";
+    let bits: Vec<bool> = digits
+        .chars()
+        .flat_map(|digit| (0..4).rev().map(move |place| digit.to_digit(16).unwrap() >> place & 1 == 1))
+        .collect();
+    let received: Vec<Point> =
+        points(0).into_iter().zip(&bits).filter(|(_, set)| **set).map(|(point, _)| point).collect();
+    for longitude in (-180..-145).step_by(5) {
+        let north: Vec<i16> =
+            received.iter().filter(|point| point.1 == longitude && (5..=50).contains(&point.0)).map(|p| p.0).collect();
+        assert!(north.len() >= 5 && north.windows(2).all(|two| two[1] - two[0] == 5), "{longitude}: {north:?}");
+        assert_eq!(north.last(), Some(&50));
+    }
+    assert_eq!(received.iter().filter(|point| point.0 < 0).count(), 4);
+}
+
+/// Fields fill the 212 bits of a block but for the spare ones that documents name: of type 6 none, of type 7
+/// two, of type 18 one, of type 24 four in its first half, of type 26 seven, of half a block one or none.
+#[test]
+fn fields_of_corrections_fill_their_blocks_and_none_lies_on_another() {
+    for (name, first, bits, spare) in [
+        ("type 1", 14, 212, 0),
+        ("types 0 and 2 to 5", 14, 212, 0),
+        ("type 6", 14, 212, 0),
+        ("type 7", 14, 212, 2),
+        ("type 18", 14, 212, 1),
+        ("type 24, first half", 14, 106, 4),
+        ("types 24 and 25, half with velocity code 0", 0, 106, 1),
+        ("types 24 and 25, half with velocity code 1", 0, 106, 0),
+        ("type 26", 14, 212, 7),
+    ] {
+        let (_, fields) = tables().into_iter().find(|(other, _)| *other == name).unwrap();
+        let mut taken = vec![false; first + bits];
+        for (place, length) in fields.iter().flat_map(|field| field.pieces) {
+            for bit in usize::from(*place)..usize::from(*place) + usize::from(*length) {
+                assert!(!std::mem::replace(&mut taken[bit], true), "{name}: bit {bit}");
+            }
+        }
+        // The velocity code is the first bit of either half.
+        let code = usize::from(first == 0);
+        let free = taken.iter().skip(first).filter(|bit| !**bit).count();
+        assert_eq!(free - code, spare, "{name}");
+        assert!(taken.iter().take(first).all(|bit| !bit), "{name}");
+    }
 }

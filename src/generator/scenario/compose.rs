@@ -193,17 +193,23 @@ impl Scenario {
         let navigation = parts::navigation(self, directory, overrides, warnings)?;
         let sky = parts::sky(self, &navigation, files, end_s, warnings)?;
         let effects = parts::effects(self, files, &navigation, (&sky, &trajectory), end_s)?;
+        let effects: Vec<Arc<dyn Effect>> = effects.into_iter().map(Arc::from).collect();
+        let message_faults = satellite::message_faults(self, &sky.catalogue, seed)?;
+        let parts::Sky { catalogue, mut common, excluded } = sky;
+        let catalogue = Arc::new(catalogue);
+        common.network = self.network(&catalogue, &effects, &message_faults, (&trajectory, end_s), warnings)?;
+        let messages = Arc::new(parts::messages(self, &common)?);
         let felt = self.scintillation.clone().filter(|strength| strength.is_felt());
         Ok(World {
-            message_faults: satellite::message_faults(self, &sky.catalogue, seed)?,
-            satellite_clocks: Arc::new(satellite::clocks(self, &sky.catalogue, &receiver_clock, seed, nodes.rate())),
-            effects: effects.into_iter().map(Arc::from).collect(),
+            message_faults,
+            satellite_clocks: Arc::new(satellite::clocks(self, &catalogue, &receiver_clock, seed, nodes.rate())),
+            effects,
             scintillation: felt.map(|strength| {
                 Arc::new(Scintillation::new(strength, nodes.rate(), Stream::new(seed, "scintillation")))
             }),
-            catalogue: Arc::new(sky.catalogue),
-            messages: Arc::new(sky.messages),
-            excluded: sky.excluded,
+            catalogue,
+            messages,
+            excluded,
             seed,
             nodes,
             switches: trajectory.tick_samples().map(|samples| Arc::new(Switches::new(samples))),

@@ -25,7 +25,8 @@ const LISTED: usize = 4;
 /// Orbits, messages, and who is left out.
 pub(super) struct Sky {
     pub catalogue: Catalogue,
-    pub messages: Senders,
+    /// What they say alike.
+    pub common: Common,
     pub excluded: Vec<Sv>,
 }
 
@@ -142,8 +143,8 @@ pub(super) fn sky(
         .filter(|sv| catalogue.healthy(*sv, start))
         .filter_map(|sv| catalogue.sent_at(sv, start).cloned())
         .collect();
-    let messages = messages(scenario, navigation, almanac)?;
-    Ok(Sky { catalogue, messages, excluded })
+    let common = common(scenario, navigation, almanac);
+    Ok(Sky { catalogue, common, excluded })
 }
 
 /// Galileo's time against GPS time: as the scene gives it, or else as the file does.
@@ -153,17 +154,15 @@ fn galileo_ahead(scenario: &Scenario, navigation: &Navigation) -> Option<TimePol
 }
 
 /// What the satellites send about the ionosphere is what the scenario gives, or what the file says.
-fn messages(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>) -> Result<Senders, ScenarioError> {
+fn common(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>) -> Common {
     let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent);
     let utc = UtcData {
         leap_s: navigation.leap_seconds.unwrap_or_else(|| scenario.start.leap_seconds()),
         polynomial: navigation.utc,
         event: navigation.leap_event,
     };
-    let key = if given.is_some() { "ionosphere" } else { "navigation.file" };
-    let klobuchar = given.or(navigation.klobuchar);
-    let common = Common {
-        klobuchar,
+    Common {
+        klobuchar: given.or(navigation.klobuchar),
         klobuchar_navic: klobuchar_navic(scenario, navigation),
         klobuchar_beidou: navigation.klobuchar_beidou,
         nequick: scenario.ionosphere.as_ref().and_then(Ionosphere::sent_nequick).or(navigation.nequick),
@@ -171,8 +170,15 @@ fn messages(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris
         galileo: galileo_ahead(scenario, navigation),
         almanac,
         reference: Some(scenario.start),
-    };
-    Senders::new(&common, &scenario.signals)
+        network: None,
+    }
+}
+
+/// Those who encode what satellites say.
+pub(super) fn messages(scenario: &Scenario, common: &Common) -> Result<Senders, ScenarioError> {
+    let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent);
+    let key = if given.is_some() { "ionosphere" } else { "navigation.file" };
+    Senders::new(common, &scenario.signals)
         .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
 }
 

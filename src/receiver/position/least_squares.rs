@@ -15,6 +15,7 @@ use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, Look, SPEED_OF_LIGHT_MP
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, GPST, TimeScale};
+use crate::receiver::position::augmentation::{Grid, model_sigma_m};
 use crate::receiver::position::ionosphere::{DelayError, Delays, NOMINAL};
 use crate::receiver::position::{NoFix, troposphere};
 
@@ -75,6 +76,9 @@ pub enum Ionosphere {
     Known(Delays),
     /// The model has an error that is common to all satellites: it is estimated with the position.
     Uncertain(Delays, DelayError),
+    /// A grid has it, each delay with a deviation of its own; where it has none, what stands beside it, with
+    /// the deviation of a model.
+    Grid(Grid, Box<Self>),
 }
 
 /// What corrects and weights ranges.
@@ -227,7 +231,10 @@ fn line(range: &Range, clock: usize, at: &Estimate, corrections: &Corrections, d
         elevation_rad = direction.elevation_rad;
         let sine = libm::sin(elevation_rad);
         let received = range.emitted.plus_s(distance_m / SPEED_OF_LIGHT_MPS);
-        let air = atmosphere(range, corrections, user, direction, received, day);
+        let dry = if corrections.troposphere { troposphere::delay_m(user, sine, day) } else { 0.0 };
+        let dry = planted!("receiver.position.troposphere", dry, 1.02 * dry);
+        computed_m += dry;
+        let air = electrons(range, &corrections.ionosphere, user, direction, received);
         computed_m += air.delay_m;
         variance += air.own_m * air.own_m;
         common_m = air.common_m;
@@ -246,8 +253,7 @@ fn line(range: &Range, clock: usize, at: &Estimate, corrections: &Corrections, d
     }
 }
 
-/// Delay by the atmosphere, and deviations of the ionosphere's part: common to all satellites, and this one's
-/// own.
+/// Delay by the ionosphere, and deviations of it: common to all satellites, and this one's own.
 #[derive(Default)]
 struct Air {
     delay_m: f64,
@@ -255,35 +261,35 @@ struct Air {
     own_m: f64,
 }
 
-fn atmosphere(
-    range: &Range,
-    corrections: &Corrections,
-    user: Geodetic,
-    direction: Look,
-    received: Epoch,
-    day: f64,
-) -> Air {
-    let sine = libm::sin(direction.elevation_rad);
-    let delay_m = if corrections.troposphere { troposphere::delay_m(user, sine, day) } else { 0.0 };
-    let delay_m = planted!("receiver.position.troposphere", delay_m, 1.02 * delay_m);
-    let alone = Air { delay_m, ..Air::default() };
+fn electrons(range: &Range, ionosphere: &Ionosphere, user: Geodetic, direction: Look, received: Epoch) -> Air {
     if range.is_combined {
-        return alone;
+        return Air::default();
     }
-    match &corrections.ionosphere {
-        Ionosphere::Absent => alone,
+    match ionosphere {
+        Ionosphere::Absent => Air::default(),
         Ionosphere::Known(delays) => {
             let delay_s = delays.delay_s(range, user, direction, received);
             let delay_s = planted!("receiver.position.ionosphere", delay_s, 0.9 * delay_s);
-            Air { delay_m: delay_m + SPEED_OF_LIGHT_MPS * delay_s, ..alone }
+            Air { delay_m: SPEED_OF_LIGHT_MPS * delay_s, ..Air::default() }
         }
         // Above all electrons there is no error of them.
-        Ionosphere::Uncertain(_, _) if user.height_m > IONOSPHERE_TOP_M => alone,
+        Ionosphere::Uncertain(_, _) if user.height_m > IONOSPHERE_TOP_M => Air::default(),
         Ionosphere::Uncertain(delays, error) => {
             let delay_s = delays.delay_s(range, user, direction, received);
             let obliquity = NOMINAL.bulge(user, direction, received).obliquity;
             let (common_m, own_m) = error.slant_m(delay_s, obliquity, direction);
-            Air { delay_m: delay_m + SPEED_OF_LIGHT_MPS * delay_s, common_m, own_m }
+            Air { delay_m: SPEED_OF_LIGHT_MPS * delay_s, common_m, own_m }
+        }
+        Ionosphere::Grid(grid, otherwise) => {
+            let on_ground = user.height_m < SPACE_M;
+            match grid.slant_m(user, direction, range.carrier_hz).filter(|_| on_ground) {
+                Some((delay_m, own_m)) => Air { delay_m, own_m, ..Air::default() },
+                None => {
+                    let air = electrons(range, otherwise, user, direction, received);
+                    let own_m = libm::hypot(air.own_m, model_sigma_m(air.delay_m, user, direction));
+                    Air { own_m, ..air }
+                }
+            }
         }
     }
 }

@@ -4,7 +4,8 @@
 //! by the decoded ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`troposphere`],
 //! solves ([`least_squares`]), with a clock for each time scale, and tests the residuals, leaving out the
 //! fewest satellites that contradict the others ([`exclusion`]). Two carriers of a satellite are used in the
-//! [`combination`] without ionosphere. Limits: delays of one band's front end against another's are not
+//! [`combination`] without ionosphere. What augmentation systems say of satellites and the ionosphere is
+//! applied where it is received ([`augmentation`]). Limits: delays of one band's front end against another's are not
 //! estimated.
 
 use std::collections::BTreeMap;
@@ -13,16 +14,18 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::gnss::augmentation::Content;
 use crate::gnss::earth::Geodetic;
 use crate::gnss::ionosphere::{Coefficients, Model, NAVIC_HZ};
 use crate::gnss::klobuchar::L1_HZ;
 use crate::gnss::record::{ClockRow, Fix, IonosphereModel, IonosphereRow, Observation, SightRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{Rate, SampleClock, TimePolynomial, TimeScale};
+use crate::gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
 use crate::receiver::described::described;
 use crate::receiver::track::loops::CodeShape;
 
+mod augmentation;
 pub mod combination;
 mod dispersion;
 mod electrons;
@@ -38,6 +41,7 @@ pub mod smooth;
 mod tests;
 pub mod troposphere;
 
+use augmentation::Augmentation;
 use electrons::Electrons;
 pub use exclusion::{Consistent, chi_square_threshold, consistent, without_faults};
 use ionosphere::{DelayError, Delays, NOMINAL, NOMINAL_ERROR};
@@ -92,6 +96,18 @@ pub enum TroposphereChoice {
     None,
 }
 
+/// What is used of what augmentation systems say of other satellites and of the ionosphere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SbasChoice {
+    /// Corrections and integrity of systems that are fit for safety.
+    Corrections,
+    /// Those of systems in test mode too.
+    Test,
+    /// Nothing: their satellites range and that is all.
+    None,
+}
+
 /// What is taken for the difference of two systems' times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -133,6 +149,10 @@ pub struct PositionSettings {
     /// Whether a Galileo satellite is used by its elements in short, word 16, until its whole set is
     /// decoded: a first fix within 20 s, but to metres, and at first without the satellites' health.
     pub reduced_elements: bool,
+    /// What SBAS says of GPS satellites on L1 C/A and of the ionosphere, where its signals are received:
+    /// corrections for its corrections, its integrity and its grid, unless it is in test mode; test for those
+    /// of a system in test mode too; none.
+    pub sbas: SbasChoice,
     /// How the times of two systems are joined: estimated for a clock of each, of which a second one takes a
     /// satellite more; broadcast for one clock and the offset that Galileo sends, which counts as exact, so
     /// that any four satellites give a fix once it is decoded.
@@ -154,6 +174,7 @@ impl Default for PositionSettings {
             ionosphere_wait_s: 0.0,
             // Metres in place of decimetres, and of satellites that may be unhealthy: only who asks for it.
             reduced_elements: false,
+            sbas: SbasChoice::Corrections,
             // Real offsets are off by nanoseconds, metres of range, as estimated ones are not.
             system_clocks: SystemClocks::Estimated,
         }
@@ -295,6 +316,8 @@ pub struct Solver {
     reduced: BTreeMap<Sv, InShort>,
     /// What other times are ahead of GPS time.
     ahead: Vec<(&'static TimeScale, TimePolynomial)>,
+    /// What augmentation systems say.
+    augmentation: Augmentation,
 }
 
 impl Solver {
@@ -315,6 +338,7 @@ impl Solver {
             ready_since: None,
             reduced: BTreeMap::new(),
             ahead: Vec::new(),
+            augmentation: Augmentation::default(),
         }
     }
 
@@ -331,6 +355,13 @@ impl Solver {
     pub fn take_ahead(&mut self, scale: &'static TimeScale, ahead: TimePolynomial) {
         self.ahead.retain(|(known, _)| **known != *scale);
         self.ahead.push((scale, ahead));
+    }
+
+    /// Takes what a satellite of an augmentation system says of others in a block that began at `sent`.
+    pub fn take_augmentation(&mut self, from: Sv, sent: Epoch, content: &Content) {
+        if self.settings.sbas != SbasChoice::None {
+            self.augmentation.take(from, sent, content, self.settings.sbas == SbasChoice::Test);
+        }
     }
 
     /// Samples of the front end with these signals were lost or doubled: carriers are whole to a quarter of a
@@ -353,14 +384,14 @@ impl Solver {
         ephemerides: &Sets,
         sent: Option<Coefficients>,
     ) -> Result<Solved, NoFix> {
-        let ranges = self.ranges(observations, ephemerides);
+        let (ranges, grid) = self.ranges(observations, ephemerides);
         let measured = self.measured_ionosphere(observations, ephemerides);
         if freedom(&ranges) < 0 || ranges.is_empty() {
             let need = COORDINATES + scales(&ranges).len().max(1);
             return Err(NoFix::TooFew { have: ranges.len(), need });
         }
         if ranges.iter().any(|range| !range.is_combined) {
-            self.await_ionosphere(sample, sent.is_some())?;
+            self.await_ionosphere(sample, sent.is_some() || grid.is_some())?;
         }
         let mut corrections = Corrections {
             ionosphere: Ionosphere::Absent,
@@ -375,6 +406,10 @@ impl Solver {
             (last_m, _) => last_m.unwrap_or_else(Vector3::zeros),
         };
         let (ionosphere, model) = self.ionosphere(sent, &ranges, &start_m);
+        let (ionosphere, model) = match grid {
+            Some(grid) => (Ionosphere::Grid(grid, Box::new(ionosphere)), IonosphereModel::Grid),
+            None => (ionosphere, model),
+        };
         corrections.ionosphere = ionosphere;
         let first = least_squares::position(&ranges, start_m, &corrections);
         // A stale estimate may be too far away for its atmosphere.

@@ -2,14 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use super::augmentation::{Grid, Standing};
 use super::combination::{Combination, Used, paired};
-use super::least_squares::Range;
+use super::least_squares::{Range, freedom};
 use super::reduced::InShort;
 use super::smooth::Smoothed;
 use super::{IonosphereChoice, Sets, Solver, SystemClocks};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::record::Observation;
+use crate::gnss::satellite::System;
 use crate::gnss::signal::Link;
 use crate::gnss::time::GPST;
 
@@ -21,8 +24,9 @@ const FIT_GRACE_S: f64 = 600.0;
 
 impl Solver {
     /// The ranges of observations whose satellites' ephemerides are known: of a satellite with two carriers
-    /// their combination, if the settings say so.
-    pub(super) fn ranges(&mut self, observations: &[Observation], ephemerides: &Sets) -> Vec<Range> {
+    /// their combination, if the settings say so. As augmentation systems correct them, where they do, and then
+    /// with their grid of the ionosphere.
+    pub(super) fn ranges(&mut self, observations: &[Observation], ephemerides: &Sets) -> (Vec<Range>, Option<Grid>) {
         let is_known = |row: &Observation| {
             let short = |short: &InShort| short.serves(&[row.signal], row.sent());
             ephemerides.serving(row.sv, &[row.signal]).is_some() || self.reduced.get(&row.sv).is_some_and(short)
@@ -70,12 +74,47 @@ impl Solver {
                 }
             }?;
             let range = self.on_one_time(range);
-            Some(match in_short.filter(|_| whole.is_none()) {
+            let iode = set.iode;
+            let range = match in_short.filter(|_| whole.is_none()) {
                 Some(short) => Range { noise_m: libm::hypot(range.noise_m, short.sigma_m), ..range },
                 None => range,
-            })
+            };
+            Some((range, iode))
         };
-        used.iter().filter_map(&mut one).collect()
+        let ranges: Vec<(Range, u16)> = used.iter().filter_map(&mut one).collect();
+        self.augmented(ranges)
+    }
+
+    /// Ranges with the corrections of an augmentation system, and its grid; without those that it has none of,
+    /// so that none are mixed whose errors differ. Where the corrected ones do not suffice to test a position,
+    /// all as they are, but for those that must not be used.
+    fn augmented(&self, ranges: Vec<(Range, u16)>) -> (Vec<Range>, Option<Grid>) {
+        let now = ranges.first().map(|(range, _)| range.emitted);
+        let Some((store, now)) = now.and_then(|now| Some((self.augmentation.serving(now)?, now))) else {
+            return (ranges.into_iter().map(|(range, _)| range).collect(), None);
+        };
+        let (mut plain, mut corrected, mut count) = (Vec::new(), Vec::new(), 0);
+        for (range, iode) in ranges {
+            if range.sv.system != System::Gps {
+                corrected.push(range.clone());
+                plain.push(range);
+                continue;
+            }
+            match store.standing(range.sv.prn(), iode, range.emitted) {
+                Standing::DoNotUse => {}
+                Standing::Corrected(correction) if range.signal == &L1_CA && !range.is_combined => {
+                    corrected.push(correction.of(&range));
+                    plain.push(range);
+                    count += 1;
+                }
+                Standing::Corrected(_) | Standing::Without => plain.push(range),
+            }
+        }
+        if count == 0 || freedom(&corrected) < 1 {
+            return (plain, None);
+        }
+        let wanted = self.settings.ionosphere != IonosphereChoice::None;
+        (corrected, store.grid(now).filter(|_| wanted))
     }
 
     /// The range with its clock against GPS time, where the settings take the system's offset from it out of

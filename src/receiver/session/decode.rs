@@ -103,6 +103,10 @@ impl FrontEnd {
                         sink.take(Record::Navigation(rows))?;
                         None
                     }
+                    News::Augmentation { sent, content } => {
+                        shared.solver.take_augmentation(sv, sent, &content);
+                        None
+                    }
                     News::AheadOfGps { scale, ahead } => {
                         shared.solver.take_ahead(scale, ahead);
                         None

@@ -55,6 +55,7 @@ fn mismatches(run: &Run) -> Vec<String> {
             || used(IonosphereModel::Broadcast)
             || used(IonosphereModel::NequickG)
             || used(IonosphereModel::Combined)
+            || used(IonosphereModel::Grid)
             || run.ionosphere_m < NOTHING_M
         {
             compare("ionosphere", run.ionosphere_m, ionosphere != "none", "broadcast");

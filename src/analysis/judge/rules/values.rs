@@ -216,7 +216,12 @@ impl Verdict {
         let others = run.fixes.iter().filter(|fix| !excused(fix.sample));
         let odd = others.filter(|fix| !expected.get(&fix.sample).is_some_and(|case| case.is_whole())).count();
         let source = "observed, with a message, above the mask, not excluded";
-        self.judge("fixes of other satellites than those observed", "", odd, "", Bound::Max(0.0), source);
+        let figure = "fixes of other satellites than those observed";
+        if is_augmented(run) {
+            self.not_judged.push(format!("{figure}: SBAS's corrections choose among them"));
+        } else {
+            self.judge(figure, "", odd, "", Bound::Max(0.0), source);
+        }
         if run.claimed.is_empty() {
             let blamed = |case: &&Case<'_>| case.expected.blameless > 0 && bounded.holds(case.error.time_s);
             let share = cases.iter().filter(blamed).count() as f64 / run.fixes.len().max(1) as f64;
@@ -257,6 +262,7 @@ impl Verdict {
             IonosphereModel::Broadcast => !known(fix) || corrected == Some("nequick_g"),
             IonosphereModel::NequickG => !known(fix) || corrected == Some("klobuchar"),
             IonosphereModel::Combined => corrected != Some("combined"),
+            IonosphereModel::Grid => setting("sbas").and_then(serde_json::Value::as_str) == Some("none"),
         };
         let count = run.fixes.iter().filter(wrong).count();
         let source = "decoded parameters are used from their event on, and none before";
@@ -479,4 +485,10 @@ fn kinds(run: &Run, choices: &Choices, cases: &[Case<'_>]) -> Vec<Kind> {
             position(case, error, libm::hypot(e.rate_noise.m44.sqrt(), oscillator_mps), allowed)
         }),
     ]
+}
+
+/// Whether the receiver has decoded corrections of an augmentation system and may use them.
+fn is_augmented(run: &Run) -> bool {
+    let choice = run.receiver.pointer("/settings/position/sbas").and_then(serde_json::Value::as_str);
+    choice.is_some_and(|choice| choice != "none") && run.navigation.iter().any(|row| row.parameter == "prc_1_m")
 }

@@ -37,6 +37,12 @@ pub const SCENARIO: &[Key] = &[
         satellites::SATELLITE_FAULT,
         "What a satellite's clock or orbit does that it does not broadcast.",
     ),
+    table(
+        "sbas",
+        satellites::SBAS,
+        "What SBAS satellites say of GPS satellites and of the ionosphere: what of both differs from what GPS \
+         broadcasts. Absent: nothing.",
+    ),
     tables("message_fault", satellites::MESSAGE_FAULT, "What goes wrong with a navigation message."),
     table("motion", motion::MOTION, "Where the antenna is, and how it moves.").required(),
     table(

@@ -1,9 +1,9 @@
-//! Keys of `[orbits]`, `[[satellite_fault]]`, `[[message_fault]]` and `[power]`.
+//! Keys of `[orbits]`, `[sbas]`, `[[satellite_fault]]`, `[[message_fault]]` and `[power]`.
 
 use super::{A_PATH, LONGEST_S, SATELLITES};
 use crate::generator::clock::oscillator::PowerLaw;
 use crate::generator::effect::transmit::Block;
-use crate::generator::scenario::schema::{Key, by_satellite, integer, number, numbers, text, texts, word, words};
+use crate::generator::scenario::schema::{Key, by_satellite, flag, integer, number, numbers, text, texts, word, words};
 use crate::gnss::signal::SIGNALS;
 
 const OFFSET: Key = number("G01", -5.0, 5.0, "m", "of one satellite, by its name");
@@ -15,6 +15,11 @@ pub(crate) const ORBITS: &[Key] = &[
         .required(),
     number("antenna_offset_m", -5.0, 5.0, "m", "antennas below the centre of mass, towards the Earth").or(0.0),
     by_satellite("antenna_offsets_m", &OFFSET, "Antenna offsets by satellite."),
+];
+
+pub(crate) const SBAS: &[Key] = &[
+    flag("test", "whether the system says that it is in test mode and not for safety"),
+    words("do_not_use", SATELLITES, "GPS satellites that it says must not be used, whatever is true of them"),
 ];
 
 const fn on() -> Key {

@@ -2,7 +2,7 @@
 //! A.4.4.11 and A.4.4.15). Steps of places, velocities and accelerations are no powers of two: fields
 //! count them.
 
-use super::Network;
+use super::NetworkTime;
 use crate::gnss::bits::Kind::{Signed, Whole};
 use crate::gnss::bits::{Element, Field, element, plain};
 use crate::gnss::broadcast::{Ephemeris, StateVector};
@@ -79,7 +79,7 @@ pub(super) static GEO: [Of; 14] = [
 
 /// Type 12: the network's time. That UTC is not given is said by its own number.
 #[rustfmt::skip]
-pub(super) static TIME: [Element<Network>; 3] = [
+pub(super) static TIME: [Element<NetworkTime>; 3] = [
     plain!("utc_standard", [(118, 3)], Whole, 0, TIME_CLAUSE, utc_standard),
     plain!("tow_s", [(121, 20)], Whole, 0, TIME_CLAUSE, tow_s),
     plain!("week", [(141, 10)], Whole, 0, TIME_CLAUSE, week),
@@ -87,8 +87,9 @@ pub(super) static TIME: [Element<Network>; 3] = [
 
 /// Every field by the message that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    vec![
+    let own = vec![
         ("type 9", GEO.iter().map(|element| &element.field).collect()),
         ("type 12", TIME.iter().map(|element| &element.field).collect()),
-    ]
+    ];
+    own.into_iter().chain(super::corrections::tables()).collect()
 }

@@ -1,18 +1,25 @@
 //! SBAS's message on L1: 250 bits a second, encoded and decoded.
 //!
 //! Source: RTCA DO-229D, A.4.3 (blocks, three beginnings in turn, check) and A.4.4. A block is coded
-//! without a break from one to the next (`fec::running`). Sent are types 12 (time), 9 (where the satellite
-//! is) and 63 (nothing) in rounds of six seconds; real satellites send the first two every minute or
-//! five. A set is a place with its velocity and acceleration at a multiple of 16 s, good for six minutes
-//! to either side (A.4.5.1.3, table A-25). Only type 12 says which second of the week it is.
+//! without a break from one to the next (`fec::running`). Types 12 (time) and 9 (where the satellite is) are
+//! sent in rounds of six seconds; real satellites send them every minute or five. A set is a place with its
+//! velocity and acceleration at a multiple of 16 s, good for six minutes to either side (A.4.5.1.3, table
+//! Only type 12 says which second of the week it is. Where a network knows something of other
+//! satellites, the rest of a round has its corrections ([`schedule`]), else type 63 (nothing).
 //!
-//! Limits: corrections, integrity and ionosphere (types 0 to 7, 10, 18, 24 to 28) and almanacs (17) are
-//! neither sent nor read: their blocks pass the check and count as time alone. Health is the accuracy, of
-//! which 15 says that the satellite is not to be ranged to. Of UTC nothing is said.
+//! Limits: types 10, 17, 27 and 28 are neither sent nor read: their blocks pass the check and count as time
+//! alone. Health is the accuracy, of which 15 says that the satellite is not to be ranged to. Of UTC nothing
+//! is said.
 
+mod content;
+mod corrections;
 mod fields;
 mod reader;
+mod schedule;
 
+use std::sync::Arc;
+
+use crate::gnss::augmentation::{Content, Network};
 use crate::gnss::bits::{FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
 use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::crc::crc24q;
@@ -33,7 +40,7 @@ pub static SBAS: Message = Message {
     unit_s: 1,
     first_s: 0,
     set_s: 1,
-    sender: |_| Ok(Box::new(Blocks)),
+    sender: |common| Ok(Box::new(Blocks { network: common.network.clone() })),
     number: type_at,
     timed: &[OF_TIME],
     dated: &[],
@@ -89,7 +96,7 @@ const CODE: Convolutional = Convolutional { second_inverted: false };
 
 /// What type 12 says.
 #[derive(Clone, Copy, Debug, Default)]
-struct Network {
+struct NetworkTime {
     utc_standard: f64,
     tow_s: f64,
     week: f64,
@@ -99,14 +106,17 @@ fn is_healthy(set: &Ephemeris) -> bool {
     set.ura_index < planted!("gnss.sbas.accuracy", NOT_TO_BE_USED, 0)
 }
 
-/// Type of the block that begins at a time.
+/// Type of the block that begins at a time where nothing is said of other satellites; blocks with corrections
+/// take the places of type 63.
 pub fn type_at(start: Epoch) -> u8 {
     let turn = start.tow_whole_s().rem_euclid(ORDER.len() as i64) as usize;
     ORDER.get(turn).copied().unwrap_or(EMPTY)
 }
 
 /// Makes the blocks of satellites.
-struct Blocks;
+struct Blocks {
+    network: Option<Arc<dyn Network>>,
+}
 
 impl Sender for Blocks {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
@@ -118,31 +128,36 @@ impl Sender for Blocks {
             let expected = "a whole second";
             return Err(FieldError::Start { message: SBAS.name, start_s: start.tow_s(), expected });
         }
-        let past = block(before, start.plus_s(-1.0))?;
+        let past = self.block(before, start.plus_s(-1.0))?;
         let memory = past.get(BITS - MEMORY_BITS..).unwrap_or_default();
-        let all: Vec<bool> = memory.iter().chain(&block(set, start)?).copied().collect();
+        let all: Vec<bool> = memory.iter().chain(&self.block(set, start)?).copied().collect();
         Ok(CODE.encode(&all).split_off(2 * memory.len()))
     }
 }
 
-/// The bits of the block that begins at `start`.
-fn block(set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-    let kind = type_at(start);
-    let preamble = PREAMBLES.get(start.tow_whole_s().rem_euclid(3) as usize).copied().unwrap_or_default();
-    let mut bits: Vec<bool> = bits_of(preamble, 8).chain(bits_of(u128::from(kind), 6)).collect();
-    bits.resize(DATA_BITS, false);
-    match kind {
-        OF_PLACE => write_all(&GEO, set, &mut bits)?,
-        OF_TIME => {
-            let week = start.week().rem_euclid(1024) as f64;
-            let tow_s = start.tow_whole_s() as f64;
-            write_all(&TIME, &Network { utc_standard: NO_UTC, tow_s, week }, &mut bits)?;
+impl Blocks {
+    /// The bits of the block that begins at `start`.
+    fn block(&self, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
+        let kind = type_at(start);
+        let said = self.network.as_deref().filter(|_| kind == EMPTY).and_then(|network| schedule::said(network, start));
+        let kind = said.as_ref().map_or(kind, Content::kind);
+        let preamble = PREAMBLES.get(start.tow_whole_s().rem_euclid(3) as usize).copied().unwrap_or_default();
+        let mut bits: Vec<bool> = bits_of(preamble, 8).chain(bits_of(u128::from(kind), 6)).collect();
+        bits.resize(DATA_BITS, false);
+        match (said, kind) {
+            (Some(content), _) => content.write(&mut bits)?,
+            (None, OF_PLACE) => write_all(&GEO, set, &mut bits)?,
+            (None, OF_TIME) => {
+                let week = start.week().rem_euclid(1024) as f64;
+                let tow_s = start.tow_whole_s() as f64;
+                write_all(&TIME, &NetworkTime { utc_standard: NO_UTC, tow_s, week }, &mut bits)?;
+            }
+            (None, _) => {}
         }
-        _ => {}
+        let check = crc24q(bits.iter().copied());
+        bits.extend(bits_of(u128::from(check), CHECK_BITS));
+        Ok(bits)
     }
-    let check = crc24q(bits.iter().copied());
-    bits.extend(bits_of(u128::from(check), CHECK_BITS));
-    Ok(bits)
 }
 
 /// Whether bits are a block: one of the three beginnings, and the check.
@@ -156,11 +171,16 @@ fn type_of(bits: &[bool]) -> u8 {
     bits.get(8..14).map_or(0, |bits| number(bits) as u8)
 }
 
-/// The parameters of a unit's symbols; none but of a set.
+/// The parameters of a unit's symbols.
 fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
     let bits = CODE.decode_open(&soft);
-    (is_block(&bits) && type_of(&bits) == OF_PLACE).then(|| (true, integers(&GEO, &bits)))
+    let kind = is_block(&bits).then(|| type_of(&bits))?;
+    if kind == OF_PLACE {
+        return Some((true, integers(&GEO, &bits)));
+    }
+    let parameters = Content::raw(kind, &bits);
+    (!parameters.is_empty()).then_some((false, parameters))
 }
 
 /// The set in a block of type 9 that was sent at `sent`.

@@ -1,7 +1,8 @@
 //! Gathers what the blocks found in soft symbols say ([`Running`]): the second of the week by type 12, and
-//! from it on by counting, and the satellite's place by type 9.
+//! from it on by counting, the satellite's place by type 9, and what is said of others from then on.
 
 use super::{BITS, OF_PLACE, OF_TIME, RATE_HZ, SBAS, TIME, elements, is_block, type_of};
+use crate::gnss::augmentation::Content;
 use crate::gnss::bits::integers;
 use crate::gnss::fec::running::Running;
 use crate::gnss::message::{Parameters, Read, Reader};
@@ -43,6 +44,16 @@ impl SbasReader {
         (tow_s < WEEK_S).then(|| Epoch::new(near.nearest_week(week, 1024) * WEEK_S + tow_s, 0.0))
     }
 
+    /// Without a time a correction is of no use.
+    fn look_for_content(&self, kind: u8, begin: u64, bits: &Vec<bool>, news: &mut Vec<Read>) {
+        let (Some(sent), Some(content)) = (self.begun(begin), Content::read(kind, bits)) else { return };
+        news.push(Read::Augmentation(sent, Box::new(content)));
+        let rows: Vec<NavigationRow> = NavigationRow::each(self.sv, SBAS.name, 0, Content::raw(kind, bits)).collect();
+        if !rows.is_empty() {
+            news.push(Read::Parameters(rows));
+        }
+    }
+
     fn look_for_set(&mut self, news: &mut Vec<Read>) {
         let Some((begin, bits)) = &self.place else { return };
         let Some(sent) = self.begun(*begin) else { return };
@@ -71,7 +82,7 @@ impl Reader for SbasReader {
                 }
             }
             OF_PLACE => self.place = Some((begin, found.bits)),
-            _ => {}
+            kind => self.look_for_content(kind, begin, &found.bits, &mut news),
         }
         if let Some(at) = self.begun(begin) {
             let (symbols, inverted) = (found.symbols, found.inverted);

@@ -1,0 +1,231 @@
+//! What augmentation systems say of other systems' satellites and of the ionosphere, apart from how it is
+//! sent: the content of each block, what a network of ground stations knows, and what it means.
+//!
+//! Source: RTCA DO-229D, A.4.4.1 to A.4.4.10. Satellites go by their place in the mask of type 1, points of
+//! the grid by theirs in the mask of type 18. Limits: types 10, 17, 27 and 28 are not among them.
+
+use std::fmt;
+
+use crate::gnss::time::Epoch;
+use accuracy::NOT_MONITORED;
+
+pub mod accuracy;
+pub mod grid;
+
+/// Numbers that a mask of satellites has bits for, and how many of them it may name.
+pub const NUMBERS: u8 = 210;
+/// The most satellites of a mask.
+pub const MASKED: usize = 51;
+/// Satellites of a block of fast corrections, of one of type 24, points of a block of delays.
+pub const FAST_SLOTS: usize = 13;
+/// Satellites of the fast half of a block of type 24.
+pub const MIXED_SLOTS: usize = 6;
+/// Points of a block of delays.
+pub const DELAY_SLOTS: usize = 15;
+/// Issue of fast corrections that says that an alarm is on (A.4.4.4).
+pub const ALARM: u8 = 3;
+
+/// Type 1: which satellites are corrected.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mask {
+    /// Issue of the mask.
+    pub iodp: u8,
+    /// Numbers of the satellites, in ascending order: GPS has 1 to 37.
+    pub numbers: Vec<u8>,
+}
+
+/// Types 2 to 5, and 0: fast corrections of thirteen satellites.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Fast {
+    /// Which thirteen of the mask, from 0.
+    pub part: u8,
+    /// Whether the block says that the system is in test mode, not to be used for safety (type 0).
+    pub is_test: bool,
+    /// Issue of these corrections.
+    pub iodf: u8,
+    /// Issue of the mask.
+    pub iodp: u8,
+    /// What is added to the ranges, in metres.
+    pub correction_m: [f64; FAST_SLOTS],
+    /// Indicators of their accuracy.
+    pub udrei: [u8; FAST_SLOTS],
+}
+
+/// Type 6: integrity of all satellites of the mask.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Integrity {
+    /// Issues of the fast corrections that they belong to, of types 2 to 5.
+    pub iodf: [u8; 4],
+    /// Indicators of the accuracy.
+    pub udrei: [u8; MASKED],
+}
+
+/// Type 7: how fast corrections age.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Degradation {
+    /// Latency of the system in seconds.
+    pub latency_s: u8,
+    /// Issue of the mask.
+    pub iodp: u8,
+    /// Indicators of the degradation.
+    pub indicators: [u8; MASKED],
+}
+
+/// Long-term corrections of one satellite.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LongTerm {
+    /// Place in the mask from 1; 0 for none.
+    pub place: u8,
+    /// Issue of the elements that they correct.
+    pub iode: u8,
+    /// What is added to the satellite's place in ECEF, in metres.
+    pub place_m: [f64; 3],
+    /// What is added to its velocity, in m/s.
+    pub velocity_mps: [f64; 3],
+    /// What is added to its clock.
+    pub af0_s: f64,
+    /// What is added to its clock's drift.
+    pub af1_sps: f64,
+    /// Second of the day at which all that holds, a multiple of 16 s.
+    pub second_of_day: f64,
+}
+
+/// Half of a block of long-term corrections.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Half {
+    /// Velocity code 0: places and clocks of two satellites.
+    Steady {
+        /// Issue of the mask.
+        iodp: u8,
+        /// The satellites'.
+        both: [LongTerm; 2],
+    },
+    /// Velocity code 1: place and clock of one satellite, with their rates.
+    Moving {
+        /// Issue of the mask.
+        iodp: u8,
+        /// The satellite's.
+        one: LongTerm,
+    },
+}
+
+/// Type 24: fast corrections of six satellites, and half a block of long-term ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mixed {
+    /// The fast ones, the others of their thirteen zero and not monitored.
+    pub fast: Fast,
+    /// The long-term ones.
+    pub half: Half,
+}
+
+/// Type 18: which points of a band have delays.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GridMask {
+    /// Bands that are sent.
+    pub bands: u8,
+    /// The band.
+    pub band: u8,
+    /// Issue of the masks.
+    pub iodi: u8,
+    /// Numbers of the band's points, from 1, in ascending order.
+    pub points: Vec<u8>,
+}
+
+/// Type 26: vertical delays at fifteen points of a band.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Delays {
+    /// The band.
+    pub band: u8,
+    /// Which fifteen of its mask, from 0.
+    pub part: u8,
+    /// Issue of the masks.
+    pub iodi: u8,
+    /// Delays on L1, in metres.
+    pub vertical_m: [f64; DELAY_SLOTS],
+    /// Indicators of their accuracy.
+    pub givei: [u8; DELAY_SLOTS],
+}
+
+/// What a block says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Content {
+    /// Type 0 without corrections: the system is in test mode.
+    Test,
+    /// Type 1.
+    Mask(Mask),
+    /// Types 2 to 5, and 0 with the content of type 2.
+    Fast(Fast),
+    /// Type 6.
+    Integrity(Box<Integrity>),
+    /// Type 7.
+    Degradation(Box<Degradation>),
+    /// Type 24.
+    Mixed(Box<Mixed>),
+    /// Type 25.
+    LongTerm(Box<[Half; 2]>),
+    /// Type 18.
+    GridMask(GridMask),
+    /// Type 26.
+    Delays(Box<Delays>),
+}
+
+impl Half {
+    /// Issue of the mask.
+    pub fn iodp(&self) -> u8 {
+        match self {
+            Self::Steady { iodp, .. } | Self::Moving { iodp, .. } => *iodp,
+        }
+    }
+
+    /// The satellites' corrections.
+    pub fn each(&self) -> impl Iterator<Item = &LongTerm> {
+        let all = match self {
+            Self::Steady { both, .. } => both.as_slice(),
+            Self::Moving { one, .. } => std::slice::from_ref(one),
+        };
+        all.iter().filter(|one| one.place > 0)
+    }
+}
+
+impl Fast {
+    /// Corrections of none of the satellites of a part of the mask.
+    pub fn unmonitored(part: u8) -> Self {
+        Self { part, udrei: [NOT_MONITORED; FAST_SLOTS], ..Self::default() }
+    }
+}
+
+/// What a network knows of a satellite at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Known {
+    /// Fast correction: what is added to ranges beside the long-term correction, in metres.
+    pub correction_m: f64,
+    /// Indicator of the accuracy after both.
+    pub udrei: u8,
+    /// Indicator of how fast the correction ages.
+    pub degradation: u8,
+    /// Long-term correction; its place in the mask is 0.
+    pub long_term: LongTerm,
+    /// Whether the latter has rates.
+    pub is_moving: bool,
+}
+
+impl Known {
+    /// Nothing but the indicator of why.
+    pub fn nothing(udrei: u8) -> Self {
+        Self { correction_m: 0.0, udrei, degradation: 0, long_term: LongTerm::default(), is_moving: false }
+    }
+}
+
+/// A network of ground stations whose knowledge satellites send.
+pub trait Network: fmt::Debug + Send + Sync {
+    /// Whether it says that it must not be used for safety.
+    fn is_test(&self) -> bool;
+    /// Numbers of the satellites that it corrects, in ascending order.
+    fn numbers(&self) -> &[u8];
+    /// What it knows of one of them.
+    fn satellite(&self, number: u8, at: Epoch) -> Known;
+    /// Bands of the grid with the numbers of the points that it has delays of, in ascending order.
+    fn bands(&self) -> &[(u8, Vec<u8>)];
+    /// Vertical delay on L1 at a point of a band and what bounds its error, in metres.
+    fn vertical_m(&self, band: u8, point: u8, at: Epoch) -> Option<(f64, f64)>;
+}
