@@ -5,8 +5,8 @@
 //! solves ([`least_squares`]), with a clock for each time scale, and tests the residuals, leaving out the
 //! fewest satellites that contradict the others ([`exclusion`]). Two carriers of a satellite are used in the
 //! [`combination`] without ionosphere. What augmentation systems say of satellites and the ionosphere is
-//! applied where it is received ([`augmentation`]). Limits: delays of one band's front end against another's are not
-//! estimated.
+//! applied where it is received ([`augmentation`]). Limits: delays of one band's front end against another's
+//! are not estimated.
 
 use std::collections::BTreeMap;
 
@@ -25,7 +25,7 @@ use crate::gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
 use crate::receiver::described::described;
 use crate::receiver::track::loops::CodeShape;
 
-mod augmentation;
+pub mod augmentation;
 pub mod combination;
 mod dispersion;
 mod electrons;

@@ -24,8 +24,8 @@ const FIT_GRACE_S: f64 = 600.0;
 
 impl Solver {
     /// The ranges of observations whose satellites' ephemerides are known: of a satellite with two carriers
-    /// their combination, if the settings say so. As augmentation systems correct them, where they do, and then
-    /// with their grid of the ionosphere.
+    /// their combination, if the settings say so. As augmentation systems correct them, where they do, and
+    /// then with their grid of the ionosphere.
     pub(super) fn ranges(&mut self, observations: &[Observation], ephemerides: &Sets) -> (Vec<Range>, Option<Grid>) {
         let is_known = |row: &Observation| {
             let short = |short: &InShort| short.serves(&[row.signal], row.sent());
@@ -85,9 +85,9 @@ impl Solver {
         self.augmented(ranges)
     }
 
-    /// Ranges with the corrections of an augmentation system, and its grid; without those that it has none of,
-    /// so that none are mixed whose errors differ. Where the corrected ones do not suffice to test a position,
-    /// all as they are, but for those that must not be used.
+    /// Ranges with the corrections of an augmentation system, and its grid; without those that it has none
+    /// of, so that none are mixed whose errors differ. Where the corrected ones do not suffice to test a
+    /// position, all as they are, but for those that must not be used.
     fn augmented(&self, ranges: Vec<(Range, u16)>) -> (Vec<Range>, Option<Grid>) {
         let now = ranges.first().map(|(range, _)| range.emitted);
         let Some((store, now)) = now.and_then(|now| Some((self.augmentation.serving(now)?, now))) else {

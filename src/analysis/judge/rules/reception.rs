@@ -8,7 +8,7 @@ use crate::analysis::judge::judgement::Bound;
 use crate::analysis::judge::summary::Summary;
 use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::read::Run;
-use crate::gnss::record::{Event, Fix};
+use crate::gnss::record::{Event, Fix, IonosphereModel};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 
@@ -20,6 +20,29 @@ const OBSERVED_SHARE: f64 = 0.95;
 const UNUSED_PERCENT: f64 = 5.0;
 
 impl Verdict {
+    /// Whether fixes say of the ionosphere what the settings and the decoded parameters allow.
+    pub(super) fn ionosphere_of_fixes(&mut self, run: &Run) {
+        let setting = |key: &str| run.receiver.pointer(&format!("/settings/position/{key}"));
+        let corrected = setting("ionosphere").and_then(serde_json::Value::as_str);
+        if matches!(corrected, None | Some("none")) {
+            return;
+        }
+        let decoded = run.events.iter().find(|row| row.event == Event::IonosphereDecoded).map(|row| row.sample);
+        let known = |fix: &Fix| decoded.is_some_and(|since| since <= fix.sample);
+        let required = setting("require_ionosphere").and_then(serde_json::Value::as_bool) == Some(true);
+        let wrong = |fix: &&Fix| match fix.ionosphere {
+            IonosphereModel::None => true,
+            IonosphereModel::Nominal => required || known(fix),
+            IonosphereModel::Broadcast => !known(fix) || corrected == Some("nequick_g"),
+            IonosphereModel::NequickG => !known(fix) || corrected == Some("klobuchar"),
+            IonosphereModel::Combined => corrected != Some("combined"),
+            IonosphereModel::Grid => setting("sbas").and_then(serde_json::Value::as_str) == Some("none"),
+        };
+        let count = run.fixes.iter().filter(wrong).count();
+        let source = "decoded parameters are used from their event on, and none before";
+        self.judge("fixes whose word on the ionosphere is impossible", "", count, "", Bound::Max(0.0), source);
+    }
+
     pub(super) fn reception(&mut self, summary: &Summary) {
         let (satellites, navigation) = (&summary.satellites, &summary.navigation);
         self.judge(
@@ -185,4 +208,10 @@ fn never_found(link: &Link, one: &Satellite, expected: &Expectations) -> String 
         );
     }
     text
+}
+
+/// Whether the receiver has decoded corrections of an augmentation system and may use them.
+pub(super) fn is_augmented(run: &Run) -> bool {
+    let choice = run.receiver.pointer("/settings/position/sbas").and_then(serde_json::Value::as_str);
+    choice.is_some_and(|choice| choice != "none") && run.navigation.iter().any(|row| row.parameter == "prc_1_m")
 }

@@ -11,6 +11,7 @@ use std::collections::{BTreeMap, HashMap};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 use super::motion::Motion;
+use super::reception::is_augmented;
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::due::satellite::FADE_DB;
 use crate::analysis::expect::loops::Theory;
@@ -24,7 +25,7 @@ use crate::analysis::measure::errors::{Errors, PositionError};
 use crate::analysis::read::{Emission, Run};
 use crate::analysis::statistics::{mean, percentile};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::{Event, Fix, IonosphereModel};
+use crate::gnss::record::{Event, Fix};
 use crate::gnss::signal::Link;
 
 /// By how much theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a real
@@ -247,28 +248,6 @@ impl Verdict {
         }
     }
 
-    fn ionosphere_of_fixes(&mut self, run: &Run) {
-        let setting = |key: &str| run.receiver.pointer(&format!("/settings/position/{key}"));
-        let corrected = setting("ionosphere").and_then(serde_json::Value::as_str);
-        if matches!(corrected, None | Some("none")) {
-            return;
-        }
-        let decoded = run.events.iter().find(|row| row.event == Event::IonosphereDecoded).map(|row| row.sample);
-        let known = |fix: &Fix| decoded.is_some_and(|since| since <= fix.sample);
-        let required = setting("require_ionosphere").and_then(serde_json::Value::as_bool) == Some(true);
-        let wrong = |fix: &&Fix| match fix.ionosphere {
-            IonosphereModel::None => true,
-            IonosphereModel::Nominal => required || known(fix),
-            IonosphereModel::Broadcast => !known(fix) || corrected == Some("nequick_g"),
-            IonosphereModel::NequickG => !known(fix) || corrected == Some("klobuchar"),
-            IonosphereModel::Combined => corrected != Some("combined"),
-            IonosphereModel::Grid => setting("sbas").and_then(serde_json::Value::as_str) == Some("none"),
-        };
-        let count = run.fixes.iter().filter(wrong).count();
-        let source = "decoded parameters are used from their event on, and none before";
-        self.judge("fixes whose word on the ionosphere is impossible", "", count, "", Bound::Max(0.0), source);
-    }
-
     /// Normalised errors squared against the ones that theory expects of the stated covariance.
     fn consistency(&mut self, summary: &Summary, cases: &[Case<'_>]) {
         let position = &summary.position;
@@ -485,10 +464,4 @@ fn kinds(run: &Run, choices: &Choices, cases: &[Case<'_>]) -> Vec<Kind> {
             position(case, error, libm::hypot(e.rate_noise.m44.sqrt(), oscillator_mps), allowed)
         }),
     ]
-}
-
-/// Whether the receiver has decoded corrections of an augmentation system and may use them.
-fn is_augmented(run: &Run) -> bool {
-    let choice = run.receiver.pointer("/settings/position/sbas").and_then(serde_json::Value::as_str);
-    choice.is_some_and(|choice| choice != "none") && run.navigation.iter().any(|row| row.parameter == "prc_1_m")
 }

@@ -5,7 +5,7 @@
 //! sent in rounds of six seconds; real satellites send them every minute or five. A set is a place with its
 //! velocity and acceleration at a multiple of 16 s, good for six minutes to either side (A.4.5.1.3, table
 //! Only type 12 says which second of the week it is. Where a network knows something of other
-//! satellites, the rest of a round has its corrections ([`schedule`]), else type 63 (nothing).
+//! satellites, the rest of a round has its corrections (`schedule`), else type 63 (nothing).
 //!
 //! Limits: types 10, 17, 27 and 28 are neither sent nor read: their blocks pass the check and count as time
 //! alone. Health is the accuracy, of which 15 says that the satellite is not to be ranged to. Of UTC nothing
