@@ -247,9 +247,9 @@ fn fields_of_corrections_fill_their_blocks_and_none_lies_on_another() {
         let (_, fields) = tables().into_iter().find(|(other, _)| *other == name).unwrap();
         let mut taken = vec![false; first + bits];
         for (place, length) in fields.iter().flat_map(|field| field.pieces) {
-            for bit in usize::from(*place)..usize::from(*place) + usize::from(*length) {
-                assert!(!std::mem::replace(&mut taken[bit], true), "{name}: bit {bit}");
-            }
+            let (from, to) = (usize::from(*place), usize::from(*place) + usize::from(*length));
+            assert!(taken[from..to].iter().all(|bit| !bit), "{name}: bits {from} to {to}");
+            taken[from..to].fill(true);
         }
         // The velocity code is the first bit of either half.
         let code = usize::from(first == 0);
