@@ -27,7 +27,6 @@ mod single;
 pub mod sums;
 pub mod wave;
 
-pub(in crate::receiver) use kernel::Level;
 use pattern::Pattern;
 use pieces::Pieces;
 use sums::Samples;

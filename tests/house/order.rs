@@ -66,6 +66,7 @@ pub const ORDER: Order<'static> = &[
     (
         "receiver",
         &[
+            &["unpack"],
             &["source"],
             &["described"],
             &["format"],

@@ -2,10 +2,10 @@
 //!
 //! Data and pilot of CBOC are four sequences on one carrier, half a turn apart at most; those of QMBOC and of
 //! data and pilot at right angles are a quarter apart. Waves in phase are added first, so are those in
-//! quadrature, and both are turned by one carrier. Sequences that step together (*a layer*) share their places
-//! and, for area edges, the shares of a sample that its steps have. Each half of a group begins its window anew, so that a sample
-//! may span two steps: BOC(6,1) from 6.4 Msps on. Accuracy and order of operations are those of
-//! [`super::lanes`]: the same bits on every instruction set.
+//! quadrature, and both are turned by one carrier. Sequences that step together (*a layer*) share their
+//! places and, for area edges, the shares of a sample that its steps have. Each half of a group begins its
+//! window anew, so that a sample may span two steps: BOC(6,1) from 6.4 Msps on. Accuracy and order of
+//! operations are those of [`super::lanes`]: the same bits on every instruction set.
 
 use super::chips::window;
 use super::lanes::{Carrier, FRACTION, GROUP, HALF, LANE_BITS, SIGN, Side, Sums, lane};

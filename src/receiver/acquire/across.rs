@@ -78,3 +78,59 @@ impl Searcher {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{Sent, metadata, record};
+    use super::super::{AcquisitionSettings, samples_needed};
+    use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::qzss::l1ca::L1_CA as QZSS_L1_CA;
+    use crate::gnss::samples::Format;
+
+    #[test]
+    fn what_a_strong_signal_makes_in_codes_of_another_is_taken_away_and_what_is_there_stays() {
+        let metadata = metadata(Format::Ci8, 2.6e6, 0.0, false);
+        let signals = [&L1_CA, &QZSS_L1_CA].map(|signal| signal.name.to_owned()).to_vec();
+        let settings = AcquisitionSettings { signals, ..AcquisitionSettings::default() };
+        let strong = Sent { prn: 5, doppler_hz: 1200.0, phase_chips: 300.4, cn0_dbhz: 60.0 };
+        // J02, whose code has number 194.
+        let there = Sent { prn: 194, doppler_hz: -2300.0, phase_chips: 700.2, cn0_dbhz: 43.0 };
+        let samples = samples_needed(&metadata, &settings).unwrap() as usize;
+        let recording = record(metadata.clone(), samples, &[strong, there], 11);
+        let block = Block { first: 0, i: &recording.i, q: &recording.q };
+        let mut searcher = Searcher::new(&metadata, &settings).unwrap();
+        let gps = searcher.search(&block, &[L1_CA.link(Sv::gps(5))]).unwrap();
+        let known: Vec<Acquired> = gps.into_iter().filter_map(|(_, hit)| hit).collect();
+        let links: Vec<Link> = QZSS_L1_CA.satellites().map(|sv| QZSS_L1_CA.link(sv)).collect();
+        let mut results = searcher.search(&block, &links).unwrap();
+
+        // Every largest cell as if it had passed.
+        for (row, hit) in &mut results {
+            let (sv, signal, sample) = (row.sv, row.signal, row.sample);
+            let (code_phase_chips, doppler_hz) = (row.code_phase_chips, row.doppler_hz);
+            let cn0_dbhz = row.cn0_dbhz.min(45.0);
+            *hit = hit.or(Some(Acquired { sv, signal, sample, code_phase_chips, doppler_hz, cn0_dbhz }));
+            row.acquired = true;
+        }
+        let largest = |results: &[Found]| {
+            let absent = results.iter().filter(|(row, _)| row.sv.number != 2);
+            absent.map(|(row, _)| row.statistic).fold(0.0, f64::max)
+        };
+        let before = largest(&results);
+        searcher.clear_across(&block, &known, &mut results).unwrap();
+        let kept: Vec<u8> = results.iter().filter_map(|(_, hit)| hit.map(|hit| hit.sv.number)).collect();
+        assert_eq!(kept, [2]);
+        assert!(results.iter().all(|(row, hit)| row.acquired == hit.is_some()));
+        // C/A codes meet at 21 to 24 dB down: 20 and 2 · 20 ms · 4000 to 8000 Hz, where noise has 60.
+        let after = largest(&results);
+        println!("largest cell of absent satellites: {before:.1} beside the strong one, {after:.1} without it");
+        assert!(before > 2.0 * after, "{before} {after}");
+
+        // Nothing is taken away by satellites of its own signal, or by those that are not 10 dB stronger.
+        let mut alone = searcher.search(&block, &links).unwrap();
+        let weak: Vec<Acquired> = known.iter().map(|hit| Acquired { cn0_dbhz: 45.0, ..*hit }).collect();
+        searcher.clear_across(&block, &weak, &mut alone).unwrap();
+        assert!(alone.iter().any(|(row, hit)| row.sv.number == 2 && hit.is_some()));
+    }
+}

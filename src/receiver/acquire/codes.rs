@@ -2,8 +2,8 @@
 //! search as far as there is room.
 //!
 //! A spectrum has a value for each lag: 16 kB of C/A, 650 kB of a pilot and its data of 10 ms in BOC(1,1).
-//! All candidates of a full sky would take 130 MB, and the codes themselves in the forms that correlators want
-//! twice as much, so only spectra stay, and a code is made again for what is found.
+//! All candidates of a full sky would take 130 MB, and the codes themselves in the forms that correlators
+//! want twice as much, so only spectra stay, and a code is made again for what is found.
 
 use std::collections::BTreeMap;
 

@@ -12,9 +12,9 @@
 //!
 //! **After.** Power within and between the M prompts of a symbol (narrow against wide band, as moments): all
 //! noise is within. It is taken along the mean prompt alone. Across it the carrier loop's own jitter comes on
-//! top, at any C/N0 by 2·T·B of the noise's 1 in a loop of bandwidth B: 0.3 dB of the sum for 4 ms and 18 Hz, 0.7
-//! for 10 ms. What prompts differ by from their mean is independent of the mean, so its direction biases
-//! nothing. The reference is not needed any more.
+//! top, at any C/N0 by 2·T·B of the noise's 1 in a loop of bandwidth B: 0.3 dB of the sum for 4 ms and 18
+//! Hz, 0.7 for 10 ms. What prompts differ by from their mean is independent of the mean, so its direction
+//! biases nothing. The reference is not needed any more.
 //!
 //! **Spread.** With s = T·C/N0 and N periods averaged (an exponential mean of N periods counts as 2N, one
 //! whose weights grow linearly as 3N/4) the relative variance is that of the signal, (4s + 1)/2s² before and

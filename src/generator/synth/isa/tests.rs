@@ -125,8 +125,8 @@ fn the_longest_runs_are_their_twins_to_the_last_sample() {
     }
 }
 
-/// Data and pilot with all layers, as runs of one ray: of Galileo E1 on one line, of BeiDou B1C and B2a at right
-/// angles, of GPS L1C with layers that take turns as one.
+/// Data and pilot with all layers, as runs of one ray: of Galileo E1 on one line, of BeiDou B1C and B2a at
+/// right angles, of GPS L1C with layers that take turns as one.
 #[test]
 fn rays_of_several_runs_are_the_sums_of_their_twins_at_every_length_and_offset() {
     let signals = [(&E1, 11, 4), (&B1C, 27, 3), (&B2A, 27, 2), (&L1C, 14, 2)];
