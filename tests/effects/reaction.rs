@@ -93,8 +93,8 @@ fn a_converter_of_few_bits_costs_the_receiver_what_its_levels_cost() {
         let lost = exact - cn0("ci8", &format!("[adc]\nbits = {bits}\n"));
         let expected = -10.0 * libm::log10(left);
         // Each estimate scatters, over 27000 prompts at 45 dB-Hz in symbols of 20, by that of the signal's
-        // power, (2s + 1/20)/s² with s = 31.6, and that of the noise's, 2·20/19. Of the latter both share what
-        // the levels leave. Four deviations are 0.13, 0.08 and 0.04 dB.
+        // power, (2s + 1/20)/s² with s = 31.6, and that of the noise's, 2·20/19. Of the latter both share
+        // what the levels leave. Four deviations are 0.13, 0.08 and 0.04 dB.
         let (s, prompts) = (31.6, 27e3);
         let variance = 2.0 * ((2.0 * s + 0.05) / (s * s) + (1.0 - left) * 40.0 / 19.0) / prompts;
         let bar = 4.0 * variance.sqrt() * 10.0 / std::f64::consts::LN_10;
