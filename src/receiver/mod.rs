@@ -59,7 +59,6 @@ pub mod settings;
 pub mod source;
 mod threshold;
 pub mod track;
-mod unpack;
 
 pub use outcome::{Conditioning, Interfered, Outcome, ReceiveError};
 pub use run::{Receiver, Reception, receive, receive_several};

@@ -6,9 +6,12 @@
 //! each has a [`Queue`]: blocks end where those of the first do, and it keeps what another has not caught up
 //! with.
 
+mod kernel;
+
 use std::ops::Range;
 
-use super::unpack::unpack;
+use kernel::unpack;
+
 use crate::gnss::samples::Format;
 
 /// Consecutive samples; `q` is all zeros for a real recording.

@@ -66,7 +66,6 @@ pub const ORDER: Order<'static> = &[
     (
         "receiver",
         &[
-            &["unpack"],
             &["source"],
             &["described"],
             &["format"],

@@ -347,7 +347,7 @@ mod tests {
     }
 
     /// All that a correction takes, ageing slowly.
-    fn told(contents: &[(f64, Content)]) -> Augmentation {
+    fn after(contents: &[(f64, Content)]) -> Augmentation {
         let first =
             [(0.0, mask(0)), (0.0, ageing(0)), (1.0, fast(1, [2.0, -3.0, 0.5], [0, 5, 15])), (2.0, long(40, 1.5))];
         let mut all = Augmentation::default();
@@ -368,7 +368,7 @@ mod tests {
 
     #[test]
     fn a_correction_is_of_its_satellite_and_of_its_set_and_none_is_of_one_that_must_not_be_used() {
-        let all = told(&[]);
+        let all = after(&[]);
         // UDREI 0: 0.0520 m².
         assert_eq!(corrected(&all, 5.0), Some((2.0, 1.5, 0.0520_f64.sqrt())));
         // Of a longer issue the low eight bits count.
@@ -377,34 +377,34 @@ mod tests {
         assert_eq!(standing(&all, 9, 40, 5.0), Standing::DoNotUse);
         assert_eq!(standing(&all, 7, 40, 5.0), Standing::Without);
         // The next set is corrected beside the running one.
-        let both = told(&[(4.0, long(41, -0.5))]);
+        let both = after(&[(4.0, long(41, -0.5))]);
         assert_eq!(corrected(&both, 5.0).map(|found| found.1), Some(1.5));
         assert!(matches!(standing(&both, 3, 41, 5.0), Standing::Corrected(found) if found.place_m.x == -0.5));
     }
 
     #[test]
     fn what_is_said_ends_with_its_time_out() {
-        let all = told(&[]);
+        let all = after(&[]);
         assert!(corrected(&all, 13.0).is_some() && corrected(&all, 13.1).is_none());
         // Indicators go on by type 6, the fast correction until its ageing ends it, 120 s.
         let integrity = |iodf| Content::Integrity(Box::new(Integrity { iodf: [iodf; 4], udrei: [1; MASKED] }));
         let each =
             |iodf: u8| -> Vec<(f64, Content)> { (1..40).map(|k| (6.0 * f64::from(k), integrity(iodf))).collect() };
-        let kept = told(&each(1));
+        let kept = after(&each(1));
         assert!(corrected(&kept, 121.0).is_some() && corrected(&kept, 121.1).is_none());
         // Of other fast corrections they say nothing, but for an alarm.
-        assert!(corrected(&told(&each(2)), 20.0).is_none());
+        assert!(corrected(&after(&each(2)), 20.0).is_none());
         let out = Content::Integrity(Box::new(Integrity { iodf: [ALARM; 4], udrei: [DO_NOT_USE; MASKED] }));
-        assert_eq!(standing(&told(&[(4.0, out)]), 3, 40, 5.0), Standing::DoNotUse);
+        assert_eq!(standing(&after(&[(4.0, out)]), 3, 40, 5.0), Standing::DoNotUse);
         // A long-term correction ends after 240 s.
         let quick: Vec<(f64, Content)> = (1..60).map(|k| (6.0 * f64::from(k), fast(1, [0.0; 3], [0; 3]))).collect();
-        let kept = told(&quick);
+        let kept = after(&quick);
         assert!(corrected(&kept, 242.0).is_some() && corrected(&kept, 242.1).is_none());
     }
 
     #[test]
     fn a_correction_that_ages_is_extrapolated_and_its_deviation_grows() {
-        let all = told(&[(3.0, ageing(15)), (7.0, fast(2, [5.0, 0.0, 0.0], [0; 3]))]);
+        let all = after(&[(3.0, ageing(15)), (7.0, fast(2, [5.0, 0.0, 0.0], [0; 3]))]);
         let (range_m, _, sigma_m) = corrected(&all, 9.0).unwrap();
         // 3 m in 6 s for 2 s, and 0.0058 m/s² over 2 s (tables ).
         assert!((range_m - 6.0).abs() < 1e-12);
@@ -415,11 +415,11 @@ mod tests {
 
     #[test]
     fn another_mask_and_the_test_mode_end_everything() {
-        assert!(corrected(&told(&[(3.0, mask(1))]), 5.0).is_none());
-        assert!(corrected(&told(&[(3.0, mask(0))]), 5.0).is_some());
-        let closed = told(&[(3.0, Content::Test)]);
+        assert!(corrected(&after(&[(3.0, mask(1))]), 5.0).is_none());
+        assert!(corrected(&after(&[(3.0, mask(0))]), 5.0).is_some());
+        let closed = after(&[(3.0, Content::Test)]);
         assert!(closed.serving(at(5.0)).is_none());
-        let mut open = told(&[]);
+        let mut open = after(&[]);
         open.take(FROM, at(3.0), &Content::Test, true);
         assert!(corrected(&open, 5.0).is_some());
     }
@@ -438,7 +438,7 @@ mod tests {
             second_of_day,
         };
         let half = Half::Moving { iodp: 0, one };
-        let all = told(&[(3.0, Content::LongTerm(Box::new([half.clone(), half])))]);
+        let all = after(&[(3.0, Content::LongTerm(Box::new([half.clone(), half])))]);
         let Standing::Corrected(found) = standing(&all, 3, 40, 5.0) else { panic!("not corrected") };
         let expected_m = Vector3::new(1.0 + 0.01 * since_s, 2.0, 3.0 - 0.02 * since_s);
         assert!((found.place_m - expected_m).norm() < 1e-12);
@@ -458,7 +458,7 @@ mod tests {
         let user = Geodetic::from_degrees(32.5, -107.5, 0.0);
         let up = Look { azimuth_rad: 0.0, elevation_rad: std::f64::consts::FRAC_PI_2 };
         let grid = |contents: &[(f64, Content)], second: f64| {
-            told(contents).serving(at(5.0)).and_then(|store| store.grid(at(second)))
+            after(contents).serving(at(5.0)).and_then(|store| store.grid(at(second)))
         };
         let found = grid(&[(1.0, mask(2)), (2.0, delays.clone())], 10.0).unwrap();
         let (delay_m, sigma_m) = found.slant_m(user, up, L1_HZ).unwrap();

@@ -83,28 +83,29 @@ impl Sums {
         }
     }
 
-    /// Takes a range; they come satellite by satellite.
-    fn take(&mut self, range: Forecast, scene: &Scene<'_>) {
+    /// Takes a range; they come satellite by satellite. Whether the receiver combines bands, and the deviation
+    /// of its models.
+    fn take(&mut self, range: Forecast, choice: (bool, f64)) {
         if self.pending.first().is_some_and(|first| first.sv != range.sv) {
-            self.finish(scene);
+            self.finish(choice);
         }
         self.pending.push(range);
     }
 
     /// Adds what the last satellite has: its two bands farthest apart as one, or all its ranges.
-    fn finish(&mut self, scene: &Scene<'_>) {
+    fn finish(&mut self, (combines, model_sigma_m): (bool, f64)) {
         let own = std::mem::take(&mut self.pending);
         let pairs = own.iter().flat_map(|a| own.iter().map(move |b| (a, b)));
         let apart = |(a, b): &(&Forecast, &Forecast)| a.carrier_hz / b.carrier_hz - 1.0;
         let widest = pairs.max_by(|one, other| apart(one).total_cmp(&apart(other)));
-        let ranges = match widest.filter(|pair| scene.choices.combined && apart(pair) >= SAME_BAND) {
+        let ranges = match widest.filter(|pair| combines && apart(pair) >= SAME_BAND) {
             Some((first, second)) => vec![combined(first, second)],
             None => own,
         };
         let used = || ranges.iter().filter(|range| !range.excluded);
         self.least += u32::from(used().any(|range| !range.near_mask));
         self.most += u32::from(used().next().is_some());
-        ranges.iter().for_each(|range| self.add(range, scene.choices.model_sigma_m));
+        ranges.iter().for_each(|range| self.add(range, model_sigma_m));
     }
 
     fn add(&mut self, range: &Forecast, model_sigma_m: f64) {
@@ -194,14 +195,15 @@ const TROPOSPHERE_SHARE: f64 = 0.05;
 /// [`JudgeError::Read`] where spilled rows cannot be read.
 pub fn expected(scene: &Scene<'_>, errors: &Errors) -> Result<Vec<Expected>, JudgeError> {
     let mut sums = vec![Sums::new(scene.scales.len().max(1)); scene.run.fixes.len()];
+    let choice = (scene.choices.combined, scene.choices.model_sigma_m);
     for link in errors.signals.keys() {
         scene.ranges(errors, link, |fix, range| {
             if let Some(sums) = sums.get_mut(fix) {
-                sums.take(range, scene);
+                sums.take(range, choice);
             }
         })?;
     }
-    sums.iter_mut().for_each(|sums| sums.finish(scene));
+    sums.iter_mut().for_each(|sums| sums.finish(choice));
     let of = |(fix, sums): (&crate::gnss::record::Fix, &Sums)| {
         let sent = matches!(fix.ionosphere, IonosphereModel::Broadcast | IonosphereModel::NequickG);
         let exact = scene.choices.ionosphere_error_share == 0.0 && sent;
@@ -286,4 +288,57 @@ impl Expected {
 pub fn largest_axis(covariance: &Matrix4<f64>) -> f64 {
     let flat = Matrix2::new(covariance.m11, covariance.m12, covariance.m21, covariance.m22);
     flat.symmetric_eigenvalues().max().max(0.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::gnss::satellite::Sv;
+
+    #[test]
+    fn a_satellite_counts_once_whatever_it_sends_and_only_if_one_of_its_ranges_is_used() {
+        let range = |number: u8, carrier_hz: f64, near_mask: bool, excluded: bool| Forecast {
+            sv: Sv::gps(number),
+            clock: 0,
+            carrier_hz,
+            sight: Vector3::new(0.6, 0.0, 0.8),
+            bias_m: 0.0,
+            stepping: false,
+            ionosphere_m: 0.0,
+            troposphere_m: 0.0,
+            noise_m2: 1.0,
+            other_m2: 0.0,
+            memory_s: 0.0,
+            rate_sigma_mps: 0.0,
+            rate_bias_mps: 0.0,
+            cn0_hz: 1e4,
+            steady: true,
+            fading: false,
+            slant: 1.25,
+            near_mask,
+            excluded,
+        };
+        let (l1_hz, l5_hz) = (1_575.42e6, 1_176.45e6);
+        let all = [
+            // Three ranges of one, two of one at the mask, one of two left out, both of one left out.
+            range(1, l1_hz, false, false),
+            range(1, l1_hz, false, false),
+            range(1, l5_hz, false, false),
+            range(2, l1_hz, true, false),
+            range(2, l5_hz, true, false),
+            range(3, l1_hz, false, true),
+            range(3, l5_hz, false, false),
+            range(4, l1_hz, false, true),
+            range(4, l5_hz, false, true),
+        ];
+        // A combination of two is left out with either.
+        for (combines, expected) in [(false, (2, 3)), (true, (1, 2))] {
+            let mut sums = Sums::new(1);
+            all.iter().for_each(|range| sums.take(*range, (combines, 0.5)));
+            sums.finish((combines, 0.5));
+            assert_eq!((sums.least, sums.most), expected, "{combines}");
+        }
+    }
 }

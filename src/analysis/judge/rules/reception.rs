@@ -8,7 +8,7 @@ use crate::analysis::judge::judgement::Bound;
 use crate::analysis::judge::summary::Summary;
 use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::read::Run;
-use crate::gnss::record::{Event, Fix, IonosphereModel};
+use crate::gnss::record::{Event, Fix, IonosphereModel, NavigationRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 
@@ -210,8 +210,9 @@ fn never_found(link: &Link, one: &Satellite, expected: &Expectations) -> String 
     text
 }
 
-/// Whether the receiver has decoded corrections of an augmentation system and may use them.
+/// Whether an augmentation system sent corrections, and the receiver has decoded some and may use them.
 pub(super) fn is_augmented(run: &Run) -> bool {
     let choice = run.receiver.pointer("/settings/position/sbas").and_then(serde_json::Value::as_str);
-    choice.is_some_and(|choice| choice != "none") && run.navigation.iter().any(|row| row.parameter == "prc_1_m")
+    let corrects = |rows: &[NavigationRow]| rows.iter().any(|row| row.parameter == "prc_1_m");
+    choice.is_some_and(|choice| choice != "none") && corrects(&run.truth_navigation) && corrects(&run.navigation)
 }
