@@ -83,8 +83,8 @@ impl Sums {
         }
     }
 
-    /// Takes a range; they come satellite by satellite. Whether the receiver combines bands, and the deviation
-    /// of its models.
+    /// Takes a range; they come satellite by satellite. `choice`: whether the receiver combines bands, and
+    /// the deviation of its models.
     fn take(&mut self, range: Forecast, choice: (bool, f64)) {
         if self.pending.first().is_some_and(|first| first.sv != range.sv) {
             self.finish(choice);
