@@ -208,7 +208,8 @@ mod tests {
         let (mut truth, mut records) = (Vec::new(), Vec::new());
         let done = run(std::slice::from_ref(&scene), &settings, &mut truth, &mut records).unwrap();
 
-        let mut receiver = Receiver::new(&scene.metadata, &settings).unwrap();
+        let own = settings_for(std::slice::from_ref(&scene), &settings);
+        let mut receiver = Receiver::new(&scene.metadata, &own).unwrap();
         let (mut own_truth, mut own_records, mut bytes) = (Vec::new(), Vec::new(), 0);
         let mut generator = Generator::new(&scene).unwrap();
         for batch in &mut generator {

@@ -183,7 +183,8 @@ mod fields {
     rows! {
         Observation { sample, sv, signal, sent_s, sent_fraction_s, pseudorange_m, carrier_cycles, doppler_hz, cn0_dbhz,
             locked_s }
-        SkyRow { sample, sv, azimuth_deg, elevation_deg, range_m, satellite_clock_m, ionosphere_m, troposphere_m }
+        SkyRow { sample, sv, signal, azimuth_deg, elevation_deg, range_m, satellite_clock_m, ionosphere_m,
+            troposphere_m }
         PassRow { sv, sample, until_sample, begins_by, ends_by }
         RayRow { sample, sv, signal, ray, excess_m, amplitude_ratio, phase_cycles }
         TrajectoryRow { sample, gps_s, gps_fraction_s, x_m, y_m, z_m, vx_mps, vy_mps, vz_mps, clock_bias_s,

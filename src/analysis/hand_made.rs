@@ -104,6 +104,7 @@ pub(in crate::analysis) fn write_truth(run: &Path) {
     let sky = |(tick, index): (u64, usize)| SkyRow {
         sample: tick * RATE_HZ / 10,
         sv: Sv::gps(PRNS[index]),
+        signal: &L1_CA,
         azimuth_deg: 40.0 * index as f64 + 0.02 * tick as f64,
         // The first is below the mask of 5 degrees.
         elevation_deg: 4.0 + 9.5 * index as f64 + 0.004 * tick as f64,

@@ -15,10 +15,11 @@ use crate::cli::run::generator_error;
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
 use crate::generator::scene::Scene;
-use crate::generator::stream::{Fronts, Generated, Options};
+use crate::generator::stream::Generated;
 use crate::generator::{GenerateError, truth};
-use crate::gnss::sigmf::{self, Member};
+use crate::gnss::sigmf::{self, Beside, Member};
 use crate::study::sweep::sha512_hex;
+use crate::twin;
 
 /// Writes the samples of every front end below the directory that `--out` names.
 pub fn generate(arguments: &args::Generate, scenes: &[Scene]) -> Result<(), CliError> {
@@ -76,33 +77,44 @@ fn check(arguments: &args::Generate, names: &[&str]) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Makes the samples of all front ends, slice by slice.
+/// What ends the work early.
+enum Failure {
+    Generate(GenerateError),
+    Write(CliError),
+}
+
+impl From<GenerateError> for Failure {
+    fn from(error: GenerateError) -> Self {
+        Self::Generate(error)
+    }
+}
+
+/// Makes the samples of all front ends, slice by slice: one is written while the next is made.
 fn samples(
     scenes: &[Scene],
-    truth: &mut dyn truth::Sink,
+    truth: &mut (dyn truth::Sink + Send),
     files: &mut [Samples],
     with_progress: bool,
 ) -> Result<Vec<Generated>, CliError> {
-    let first = scenes.first().map(|scene| (scene.name.as_str(), scene.samples));
-    let label = format!("generate {}", first.unwrap_or_default().0);
+    let first = scenes.first().map(|scene| (scene, scene.samples));
+    let label = format!("generate {}", first.map_or("", |(scene, _)| &scene.name));
     let progress = Progress::new(&label, first.map(|(_, count)| count), with_progress);
-    let mut fronts = Fronts::new(scenes, truth, &Options::default()).map_err(generator_error)?;
-    let mut packed = Vec::new();
-    // Which file a write failed on.
-    let mut failed = None;
-    loop {
-        let mut sink = |number: usize, bytes: &[u8]| {
-            let Some(file) = files.get_mut(number) else { return Ok(()) };
-            file.file.write_all(bytes).inspect_err(|_| failed = Some(file.path.clone()))
-        };
-        let more = fronts.next(truth, &mut packed, &mut sink).map_err(|error| match (error, &failed) {
-            (GenerateError::Write(error), Some(path)) => CliError::output(path.display(), &error),
-            (error, _) => generator_error(error),
-        })?;
-        if !more {
-            return fronts.finish(truth).map_err(generator_error);
+    let sample_bytes = first.map_or(1, |(scene, _)| scene.metadata.format.bytes());
+    let mut done = 0;
+    let fed = twin::feed(scenes, truth, &mut |number, bytes| {
+        let Some(file) = files.get_mut(number) else { return Ok(()) };
+        let written = file.file.write_all(bytes);
+        written.map_err(|error| Failure::Write(CliError::output(file.path.display(), &error)))?;
+        if number == 0 {
+            done += (bytes.len() / sample_bytes) as u64;
+            progress.set(done);
         }
-        progress.set(fronts.samples());
+        Ok(())
+    });
+    match fed {
+        Ok(fed) => Ok(fed.generated),
+        Err(Failure::Generate(error)) => Err(generator_error(error)),
+        Err(Failure::Write(error)) => Err(error),
     }
 }
 
@@ -110,7 +122,8 @@ fn samples(
 fn describe(directory: &Path, base: &str, scenes: &[Scene], names: &[&str]) -> Result<(), CliError> {
     let mut members = Vec::with_capacity(scenes.len());
     for (scene, name) in scenes.iter().zip(names) {
-        let text = sigmf::write_in(&scene.metadata, Some(base));
+        let beside = Beside { signals: &scene.signals, collection: Some(base), ..Beside::default() };
+        let text = sigmf::write_with(&scene.metadata, &beside);
         members.push(Member { name: (*name).to_owned(), hash: sha512_hex(text.as_bytes()) });
         put(&directory.join(format!("{name}.sigmf-meta")), &text)?;
     }

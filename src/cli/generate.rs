@@ -23,7 +23,7 @@ use crate::generator::stream::Options;
 use crate::generator::{self, GenerateError, truth};
 use crate::gnss::packed::Packer;
 use crate::gnss::samples::{Format, IfMetadata};
-use crate::gnss::sigmf;
+use crate::gnss::sigmf::{self, Beside};
 
 /// Writes a scene's samples to a file.
 pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
@@ -120,10 +120,8 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     drop(writer);
     // What the receiver's clock reads at the first sample of the file.
     let metadata = IfMetadata { start: Some(scene.clock.epoch(first)), ..scene.metadata.clone() };
-    let text = match &packed {
-        None => sigmf::write(&metadata),
-        Some((of, _)) => sigmf::write_packed(&metadata, of),
-    };
+    let packed = packed.as_ref().map(|(of, _)| of);
+    let text = sigmf::write_with(&metadata, &Beside { signals: &scene.signals, packed, ..Beside::default() });
     meta.write(text.as_bytes())?;
     // Metadata last, and never those of other samples: a run that is killed here leaves none.
     discard(&meta_path)?;

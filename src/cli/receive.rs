@@ -18,6 +18,7 @@ use crate::cli::scenario;
 use crate::cli::source::Ahead;
 use crate::cli::staging::{InSight, Staging};
 use crate::gnss::samples::IfMetadata;
+use crate::gnss::signal::Signal;
 use crate::receiver;
 use crate::receiver::Outcome;
 use crate::receiver::output::{JsonLines, Nmea, Output, OutputError, Record, Rinex, Sink};
@@ -38,6 +39,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
         return Err(CliError::usage("--nmea - and --json: standard output takes one of them"));
     }
     let recordings = recording::open(arguments)?;
+    let settings = searched(&recordings, settings);
     let samples = recordings.first().and_then(|first| first.samples);
     let format = recordings.first().map(|first| first.metadata.format);
     let broken: Vec<Arc<OnceLock<String>>> = recordings.iter().filter_map(|one| one.broken.clone()).collect();
@@ -69,6 +71,29 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
         return Err(CliError::broken(format!("{broken}: the results end there")));
     }
     outcome.diagnosis.map_or(Ok(()), |diagnosis| Err(CliError::incomplete(diagnosis.headline())))
+}
+
+/// The settings with the signals that are searched for, where they name none: those that every recording's
+/// metadata name, or else those that the bands hold, which is said.
+fn searched(recordings: &[Recording], mut settings: Settings) -> Settings {
+    if !settings.acquisition.signals.is_empty() {
+        return settings;
+    }
+    if recordings.iter().all(|recording| !recording.signals.is_empty()) {
+        let mut named: Vec<&'static Signal> = Vec::new();
+        for signal in recordings.iter().flat_map(|recording| &recording.signals) {
+            if !named.contains(signal) {
+                named.push(signal);
+            }
+        }
+        settings.acquisition.or_signals(&named);
+        return settings;
+    }
+    let metadata: Vec<IfMetadata> = recordings.iter().map(|recording| recording.metadata.clone()).collect();
+    let settings = receiver::searched(&metadata, &settings);
+    let names: Vec<&str> = settings.acquisition.signals().into_iter().map(|signal| signal.name).collect();
+    scenario::note(&format!("searching for what the band holds: {}", names.join(", ")));
+    settings
 }
 
 /// What came of it, on standard output unless lines go there.

@@ -15,12 +15,15 @@ use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::packed::{Layout, Unpacker};
 use crate::gnss::recording::{Description, Samples};
 use crate::gnss::samples::{Format, IfMetadata};
+use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, Rate};
 use crate::gnss::{ion, sigmf};
 
 /// The samples of a front end.
 pub struct Recording {
     pub metadata: IfMetadata,
+    /// The signals that its metadata name.
+    pub signals: Vec<&'static Signal>,
     pub reader: Box<dyn Read + Send>,
     /// How many there are, where that is known.
     pub samples: Option<u64>,
@@ -53,7 +56,8 @@ fn of_stream(spec: &source::Spec, arguments: &args::Receive) -> Result<Recording
     }
     let (metadata, layout) = metadata(&arguments, Description::default())?;
     let stream = spec.open(&metadata)?;
-    Ok(Recording { metadata, broken: Some(stream.broken()), reader: unpacked(layout, stream), samples: None })
+    let broken = Some(stream.broken());
+    Ok(Recording { metadata, signals: Vec::new(), broken, reader: unpacked(layout, stream), samples: None })
 }
 
 /// The reader of samples, unpacked where they are packed.
@@ -79,7 +83,8 @@ fn open_one(arguments: &args::Receive) -> Result<Recording, CliError> {
     let extension = arguments.file.extension().and_then(|extension| extension.to_str());
     if arguments.file.as_os_str() == "-" {
         let (metadata, layout) = metadata(arguments, Description::default())?;
-        return Ok(Recording { metadata, reader: unpacked(layout, io::stdin()), samples: None, broken: None });
+        let reader = unpacked(layout, io::stdin());
+        return Ok(Recording { metadata, signals: Vec::new(), reader, samples: None, broken: None });
     }
     let found = match extension {
         Some("sigmf") => of_archive(&arguments.file)?,
@@ -90,6 +95,7 @@ fn open_one(arguments: &args::Receive) -> Result<Recording, CliError> {
     let (header, trailing) = (description.header_bytes, description.trailing_bytes);
     let skipped = description.skipped_samples;
     let channels = u64::from(description.channels);
+    let signals = description.signals.clone();
     let (metadata, layout) = metadata(arguments, description)?;
     // Samples before the first one that is described: of all channels.
     let sample_bytes = metadata.format.bytes() as u64;
@@ -112,7 +118,7 @@ fn open_one(arguments: &args::Receive) -> Result<Recording, CliError> {
         Some(left) => unpacked(layout, file.take(left)),
         None => unpacked(layout, file),
     };
-    Ok(Recording { metadata, reader, samples, broken: None })
+    Ok(Recording { metadata, signals, reader, samples, broken: None })
 }
 
 /// A file of samples, and how many bytes it has where it is a regular one.

@@ -28,7 +28,8 @@ use crate::generator::scene::Scene;
 use crate::generator::stream::Generated;
 use crate::generator::{GenerateError, truth};
 use crate::gnss::samples::IfMetadata;
-use crate::gnss::sigmf;
+use crate::gnss::sigmf::{self, Beside};
+use crate::gnss::signal::Signal;
 use crate::receiver::output::{Nmea, Output, OutputError, Rinex, Sink, Tracks};
 use crate::receiver::settings::Settings;
 use crate::receiver::{Outcome, ReceiveError, Reception};
@@ -175,6 +176,7 @@ fn timed<T>(busy: &mut Duration, work: impl FnOnce() -> T) -> T {
 /// whose spectrum changes, and keeps all samples if asked to.
 struct Tap {
     metadata: IfMetadata,
+    signals: Vec<&'static Signal>,
     psd: Psd,
     /// Bytes seen, the piece that is looked at next, and the way from one to the next.
     seen: u64,
@@ -205,7 +207,18 @@ impl Tap {
         let length = (SPECTRUM_S * metadata.rate.hz()) as u64 / pieces * sample_bytes;
         let stride = scene.samples / pieces * sample_bytes;
         let psd = Psd::new(metadata.rate.hz(), !metadata.format.is_complex(), SPECTRUM_BINS);
-        Ok(Self { psd, metadata, seen: 0, piece: 0..length, stride, i: Vec::new(), q: Vec::new(), name, kept })
+        Ok(Self {
+            metadata,
+            signals: scene.signals.clone(),
+            psd,
+            seen: 0,
+            piece: 0..length,
+            stride,
+            i: Vec::new(),
+            q: Vec::new(),
+            name,
+            kept,
+        })
     }
 
     fn see(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -238,7 +251,9 @@ impl Tap {
             let path = run.join(format!("{}.sigmf-data", self.name));
             file.flush().map_err(|error| CliError::output(path.display(), &error))?;
             let path = run.join(format!("{}.sigmf-meta", self.name));
-            fs::write(&path, sigmf::write(&self.metadata)).map_err(|error| CliError::output(path.display(), &error))?;
+            let beside = Beside { signals: &self.signals, ..Beside::default() };
+            let text = sigmf::write_with(&self.metadata, &beside);
+            fs::write(&path, text).map_err(|error| CliError::output(path.display(), &error))?;
         }
         Ok(())
     }

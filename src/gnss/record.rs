@@ -23,7 +23,7 @@ macro_rules! linked {
     )*};
 }
 
-linked!(Observation, RayRow, AcquisitionRow, TrackingRow, EventRow);
+linked!(Observation, SkyRow, RayRow, AcquisitionRow, TrackingRow, EventRow);
 
 /// One satellite's signal at one sample: `observations.csv`, on both sides.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -66,15 +66,18 @@ pub struct SkyRow {
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
+    /// Its signal, whose clock and ionosphere these are.
+    #[serde(with = "by_name")]
+    pub signal: &'static Signal,
     /// From north over east.
     pub azimuth_deg: f64,
     /// Above the horizon.
     pub elevation_deg: f64,
     /// Geometric range with light time and Earth rotation.
     pub range_m: f64,
-    /// Satellite clock as the signal carries it (relativity and group delay included), in metres.
+    /// Satellite clock as that signal carries it (relativity and group delay included), in metres.
     pub satellite_clock_m: f64,
-    /// Group delay of the ionosphere on this signal.
+    /// Group delay of the ionosphere on that signal.
     pub ionosphere_m: f64,
     /// Delay of the troposphere.
     pub troposphere_m: f64,

@@ -3,6 +3,7 @@
 
 use crate::gnss::packed::{Components, Encoding, Interleaved, Layout, LayoutError};
 use crate::gnss::samples::Format;
+use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, Rate};
 
 /// How samples lie in a file.
@@ -27,6 +28,8 @@ pub struct Description {
     pub center_hz: Option<f64>,
     /// Whether the spectrum is mirrored.
     pub inverted: bool,
+    /// The signals in it; none where nothing says it.
+    pub signals: Vec<&'static Signal>,
     /// What the recorder's clock read at the first sample.
     pub start: Option<Epoch>,
     /// Channels, a sample of each in turn.
@@ -48,6 +51,7 @@ impl Default for Description {
             rate: None,
             center_hz: None,
             inverted: false,
+            signals: Vec::new(),
             start: None,
             channels: 1,
             header_bytes: 0,

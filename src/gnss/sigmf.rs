@@ -6,7 +6,9 @@
 //! must be known and is not are refused by name. Recordings of one time are grouped by a collection. What
 //! has no core key is in an extension: `gnss_twin:spectrum_inverted`, and of samples of a few bits, whose
 //! `core:datatype` is `ru8`, `gnss_twin:bits` with `encoding`, `components` (`real`, `iq`, `qi`),
-//! `bit_order` (`msb` or `lsb` first), `word_bytes` and `byte_order` (`little` or `big`).
+//! `bit_order` (`msb` or `lsb` first), `word_bytes` and `byte_order` (`little` or `big`), and
+//! `gnss_twin:signals` with the names of the signals that samples were made of; names that this version does
+//! not know are passed over.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -15,6 +17,7 @@ use thiserror::Error;
 use crate::gnss::packed::{Components, Encoding, Interleaved};
 use crate::gnss::recording::{Description, Samples};
 use crate::gnss::samples::{Format, IfMetadata};
+use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, Rate};
 
 const VERSION: &str = "1.2.0";
@@ -93,6 +96,8 @@ struct Global {
     extensions: Option<Value>,
     #[serde(rename = "gnss_twin:spectrum_inverted", skip_serializing_if = "Option::is_none")]
     inverted: Option<Value>,
+    #[serde(rename = "gnss_twin:signals", skip_serializing_if = "Option::is_none")]
+    signals: Option<Value>,
 }
 
 /// Samples of a few bits.
@@ -113,6 +118,24 @@ struct Packed {
     byte_order: Option<Value>,
 }
 
+impl Packed {
+    fn of(layout: &Interleaved) -> Self {
+        let components = match layout.components {
+            Components::Iq => "iq",
+            Components::Qi => "qi",
+            Components::Real => "real",
+        };
+        Self {
+            bits: Some(layout.bits.into()),
+            encoding: Some(layout.encoding.to_string().into()),
+            components: Some(components.into()),
+            bit_order: Some(if layout.lowest_first { "lsb" } else { "msb" }.into()),
+            word_bytes: Some(layout.word_bytes.into()),
+            byte_order: Some(if layout.big_endian { "big" } else { "little" }.into()),
+        }
+    }
+}
+
 #[derive(Default, Serialize, Deserialize)]
 #[serde(default)]
 struct Capture {
@@ -126,51 +149,42 @@ struct Capture {
     header_bytes: Option<Value>,
 }
 
+/// What metadata say of a recording beside what its samples are.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Beside<'a> {
+    /// The signals in it; none where it is not known.
+    pub signals: &'a [&'static Signal],
+    /// The collection that it belongs to: the base name of its `.sigmf-collection` file.
+    pub collection: Option<&'a str>,
+    /// How samples lie packed in the file. A program that does not know it would take bytes for samples, so
+    /// the extension is one that it must know.
+    pub packed: Option<&'a Interleaved>,
+}
+
 /// The metadata as the JSON text of a `.sigmf-meta` file.
 pub fn write(metadata: &IfMetadata) -> String {
-    write_in(metadata, None)
+    write_with(metadata, &Beside::default())
 }
 
-/// [`write()`] of a recording that belongs to a collection: the base name of its `.sigmf-collection` file.
-pub fn write_in(metadata: &IfMetadata, collection: Option<&str>) -> String {
-    document(metadata, collection, Packed::default())
-}
-
-/// [`write()`] of samples that lie packed in the file, with keys that [`describe`] reads. A program without
-/// them would take bytes for samples, so the extension is one that it must know.
-pub fn write_packed(metadata: &IfMetadata, of: &Interleaved) -> String {
-    let components = match of.components {
-        Components::Iq => "iq",
-        Components::Qi => "qi",
-        Components::Real => "real",
-    };
-    let packed = Packed {
-        bits: Some(of.bits.into()),
-        encoding: Some(of.encoding.to_string().into()),
-        components: Some(components.into()),
-        bit_order: Some(if of.lowest_first { "lsb" } else { "msb" }.into()),
-        word_bytes: Some(of.word_bytes.into()),
-        byte_order: Some(if of.big_endian { "big" } else { "little" }.into()),
-    };
-    document(metadata, None, packed)
-}
-
-fn document(metadata: &IfMetadata, collection: Option<&str>, packed: Packed) -> String {
-    let (datatype, optional) = match packed.bits {
+/// The same with what else is known.
+pub fn write_with(metadata: &IfMetadata, beside: &Beside<'_>) -> String {
+    let (datatype, optional) = match beside.packed {
         Some(_) => ("ru8", false),
         None => (metadata.format.name(), true),
     };
+    let names = || beside.signals.iter().map(|signal| signal.name).collect::<Value>();
     let document = Document {
         global: Global {
-            packed,
+            packed: beside.packed.map(Packed::of).unwrap_or_default(),
             datatype: Some(datatype.into()),
             sample_rate: Some(number(metadata.rate.hz())),
             version: Some(VERSION.into()),
             description: Some("GNSS IF samples".into()),
             channels: None,
-            collection: collection.map(Value::from),
+            collection: beside.collection.map(Value::from),
             extensions: Some(serde_json::json!([{ "name": EXTENSION, "version": "0.1.0", "optional": optional }])),
             inverted: Some(metadata.inverted.into()),
+            signals: (!beside.signals.is_empty()).then(names),
             ..Global::default()
         },
         captures: vec![Capture {
@@ -292,6 +306,7 @@ pub fn describe(text: &str, name: &str) -> Result<Description, SigmfError> {
         Some(Value::Bool(inverted)) => inverted,
         Some(other) => return Err(file.bad("gnss_twin:spectrum_inverted", &other, "true or false")),
     };
+    let signals = file.signals(global.signals)?;
     let channels = file.count("core:num_channels", global.channels, 1)?;
     let channels = u32::try_from(channels).ok().filter(|channels| (1..=64).contains(channels));
     let channels = channels.ok_or_else(|| file.bad("core:num_channels", &"0, or too many".into(), "1 to 64"))?;
@@ -305,6 +320,7 @@ pub fn describe(text: &str, name: &str) -> Result<Description, SigmfError> {
         samples,
         rate,
         inverted,
+        signals,
         channels,
         dataset,
         trailing_bytes: file.count("core:trailing_bytes", global.trailing_bytes, 0)?,
@@ -338,6 +354,14 @@ impl File<'_> {
             None => Ok(usual),
             Some(value) => value.as_u64().ok_or_else(|| self.bad(key, &value, "a whole number, 0 or more")),
         }
+    }
+
+    /// Those signals that are known of the names that are said.
+    fn signals(&self, said: Option<Value>) -> Result<Vec<&'static Signal>, SigmfError> {
+        let Some(said) = said else { return Ok(Vec::new()) };
+        let names = said.as_array().map(|names| names.iter().map(Value::as_str).collect::<Option<Vec<&str>>>());
+        let names = names.flatten().ok_or_else(|| self.bad("gnss_twin:signals", &said, "an array of names"))?;
+        Ok(names.into_iter().filter_map(Signal::find).collect())
     }
 
     /// Refuses an extension that must be known and is not.
@@ -463,6 +487,7 @@ impl File<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::samples::Format;
 
     #[test]
@@ -510,7 +535,7 @@ mod tests {
             inverted: false,
             start: None,
         };
-        let text = write_in(&metadata, Some("both"));
+        let text = write_with(&metadata, &Beside { collection: Some("both"), ..Beside::default() });
         assert!(text.contains("\"core:collection\": \"both\""), "{text}");
         assert_eq!(parse(&text, "x").unwrap(), metadata);
         assert!(!write(&metadata).contains("core:collection"));
@@ -535,13 +560,17 @@ mod tests {
 
     #[test]
     fn errors_name_file_key_value_and_what_was_expected() {
-        let good = write(&IfMetadata {
+        let metadata = IfMetadata {
             format: Format::Ci8,
             rate: Rate::from_hz(2.6e6).unwrap(),
             center_hz: 1_575.42e6,
             inverted: false,
             start: Some(Epoch::parse("2010-07-01T00:00:00Z").unwrap()),
-        });
+        };
+        let good = write_with(&metadata, &Beside { signals: &[&L1_CA], ..Beside::default() });
+        assert_eq!(describe(&good, "x").unwrap().signals, [&L1_CA]);
+        let newer = good.replace("\"GPS L1 C/A\"", "\"GPS L9\", \"GPS L1 C/A\"");
+        assert_eq!(describe(&newer, "x").unwrap().signals, [&L1_CA]);
         for (from, to, words) in [
             ("\"ci8\"", "\"ci12\"", ["core:datatype", "ci12", "ci16_le"]),
             ("\"core:datatype\"", "\"core:data\"", ["core:datatype", "missing", "ci16_le"]),
@@ -556,6 +585,7 @@ mod tests {
                 ["core:header_bytes", "512", "0"],
             ),
             ("false", "\"no\"", ["spectrum_inverted", "no", "true or false"]),
+            ("\"GPS L1 C/A\"", "1", ["gnss_twin:signals", "1", "array of names"]),
             ("{", "[", ["not SigMF", "", ""]),
         ] {
             let text = good.replace(from, to);

@@ -61,4 +61,4 @@ mod threshold;
 pub mod track;
 
 pub use outcome::{Conditioning, Interfered, Outcome, ReceiveError};
-pub use run::{Receiver, Reception, receive, receive_several};
+pub use run::{Receiver, Reception, receive, receive_several, searched};

@@ -16,7 +16,7 @@ use crate::receiver::followed::Followed;
 use crate::receiver::format::Check;
 use crate::receiver::outcome::{Outcome, ReceiveError};
 use crate::receiver::output::{Record, Sink};
-use crate::receiver::session::Session;
+use crate::receiver::session::{Session, held};
 use crate::receiver::settings::Settings;
 use crate::receiver::source::{Packed, Queue, Source};
 
@@ -26,6 +26,14 @@ const BLOCK_MS: u64 = 50;
 const BLOCK_SAMPLES: u64 = 1 << 17;
 /// Bytes read at a time of each of several front ends.
 const READ_BYTES: usize = 1 << 18;
+
+/// Settings with the signals that are searched for: where they name none, all that these bands hold and this
+/// receiver can follow to a position.
+pub fn searched(metadata: &[IfMetadata], settings: &Settings) -> Settings {
+    let mut own = settings.clone();
+    own.acquisition.or_signals(&held(metadata, settings));
+    own
+}
 
 /// A reception that is given its samples piece by piece.
 ///
@@ -65,6 +73,7 @@ impl Reception {
     /// As [`Reception::new`], and [`ReceiveError::NoFrontEnd`].
     pub fn of_several(metadata: &[IfMetadata], settings: &Settings) -> Result<Self, ReceiveError> {
         settings.validate("settings")?;
+        let settings = &searched(metadata, settings);
         let session = Session::new(metadata, settings)?;
         let interval = u64::from(settings.operation.measurement_interval_ms).min(BLOCK_MS);
         let length = |metadata: &IfMetadata| metadata.rate.first_sample_at(interval, 1000);

@@ -41,9 +41,9 @@ pub struct OperationSettings {
     pub tracking_interval_ms: u32,
     /// Time between searches for satellites that have not been found.
     pub search_interval_s: f64,
-    /// Time between searches while a satellite is missing that was followed within the last 30 s. After a fix
-    /// also between short ones for the satellites that known ephemerides predict, a quarter of it while one
-    /// was lost.
+    /// Time between searches while a satellite is missing that was followed within the last 30 s. Also
+    /// between short ones for what should be there: satellites of which another signal is followed, and after
+    /// a fix those that known ephemerides predict; a quarter of it while one was lost.
     pub reacquisition_interval_s: f64,
     /// In searches after the first, the probability of a false alarm is multiplied by this.
     pub repeated_false_alarm_share: f64,

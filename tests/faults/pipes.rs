@@ -49,9 +49,11 @@ impl Read for Halting<'_> {
 fn received(reader: impl Read, place: &Path) -> Files {
     let meta = fs::read_to_string(place.join("rec.sigmf-meta")).unwrap();
     let metadata = sigmf::parse(&meta, "rec.sigmf-meta").unwrap();
+    let mut settings = Settings::default();
+    settings.acquisition.or_signals(&sigmf::describe(&meta, "rec.sigmf-meta").unwrap().signals);
     let out = tempfile::tempdir().unwrap();
     let mut output = Output::create(out.path()).unwrap();
-    receive(&metadata, reader, &Settings::default(), &mut output, &mut |_| ()).unwrap();
+    receive(&metadata, reader, &settings, &mut output, &mut |_| ()).unwrap();
     files(out.path())
 }
 

@@ -128,7 +128,7 @@ impl Timeline {
         let mut tracks = BTreeMap::new();
         for link in links {
             let elevations: HashMap<u64, f64> =
-                run.sky.map(link.sv, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
+                run.seen(link.sv, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
             let node = |row: Observation| {
                 let (t_s, place) = places.get(*at.get(&row.sample)?)?;
                 let carrier_hz = row.signal.carrier_hz(row.sv);

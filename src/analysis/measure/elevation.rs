@@ -104,8 +104,7 @@ pub struct Elevations {
 /// # Errors
 /// [`JudgeError::Read`] where spilled rows cannot be read.
 pub fn points(run: &Run, errors: &Errors, link: Link) -> Result<Vec<Point>, JudgeError> {
-    let elevations: HashMap<u64, f64> =
-        run.sky.map(link.sv, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
+    let elevations: HashMap<u64, f64> = run.seen(link.sv, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
     let rows = errors.signals.rows(link)?;
     let one = |(row, multipath_m): (&SignalError, f64)| {
         Some(Point {

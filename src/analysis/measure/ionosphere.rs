@@ -1,8 +1,7 @@
 //! What the receiver measured of the ionosphere with two bands, against the truth's delays.
 //!
-//! Of the truth's rows of a satellite at a sample, one a signal, the least delay is that of the highest
-//! carrier; (f/1575.42 MHz)² brings it to the receiver's carrier. Limits: delays between the receiver's own
-//! bands count as its error.
+//! The truth has a delay on each signal's carrier; (f/1575.42 MHz)² of that carrier brings it to the
+//! receiver's. Limits: delays between the receiver's own bands count as its error.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +11,7 @@ use crate::analysis::error::JudgeError;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::{mean, percentile, rms};
 use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::record::IonosphereRow;
+use crate::gnss::record::{IonosphereRow, SkyRow};
 
 /// `ionosphere` in `summary.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -37,19 +36,15 @@ impl Ionosphere {
     pub fn of(run: &Run) -> Result<Option<Self>, JudgeError> {
         let (mut errors_m, mut true_m, mut stated_m) = (Vec::new(), Vec::new(), Vec::new());
         for sv in run.ionosphere.keys() {
-            let carriers = run.truth.keys().filter(|link| link.sv == sv).map(|link| link.carrier_hz());
-            let highest_hz = carriers.fold(0.0, f64::max);
-            let ratio = highest_hz / L1_CA.carrier_hz(sv);
-            let mut delays_m: BTreeMap<u64, f64> = BTreeMap::new();
-            for (sample, delay_m) in run.sky.map(sv, |row| (row.sample, row.ionosphere_m))? {
-                let least_m = delays_m.entry(sample).or_insert(delay_m);
-                *least_m = least_m.min(delay_m);
-            }
+            let on_l1 = |row: SkyRow| {
+                let ratio = row.link().carrier_hz() / L1_CA.carrier_hz(sv);
+                (row.sample, ratio * ratio * row.ionosphere_m)
+            };
+            let delays_m: BTreeMap<u64, f64> = run.seen(sv, on_l1)?.into_iter().collect();
             run.ionosphere.each(sv, |row: IonosphereRow| {
                 let Some(delay_m) = delays_m.get(&row.sample) else { return };
-                let delay_m = ratio * ratio * delay_m;
                 errors_m.push(row.delay_m - delay_m);
-                true_m.push(delay_m);
+                true_m.push(*delay_m);
                 stated_m.push(row.sigma_m);
             })?;
         }

@@ -58,7 +58,7 @@ impl SpillRow<Link> for TrackingRow {
     }
 }
 
-impl SpillRow<Sv> for SkyRow {
+impl SpillRow<Link> for SkyRow {
     const WORDS: usize = 7;
 
     fn put(&self, words: &mut Vec<u64>) {
@@ -67,9 +67,10 @@ impl SpillRow<Sv> for SkyRow {
         words.extend([self.satellite_clock_m, self.ionosphere_m, self.troposphere_m].map(f64::to_bits));
     }
 
-    fn take(sv: Sv, words: &mut Words<'_>) -> Self {
+    fn take(Link { sv, signal }: Link, words: &mut Words<'_>) -> Self {
         Self {
             sv,
+            signal,
             sample: words.word(),
             azimuth_deg: words.number(),
             elevation_deg: words.number(),
@@ -153,6 +154,7 @@ mod tests {
         let sky = SkyRow {
             sample: 4,
             sv,
+            signal: &L1_CA,
             azimuth_deg: 1.0,
             elevation_deg: 2.0,
             range_m: 3.0,
@@ -179,7 +181,7 @@ mod tests {
         }
         back(link, &observation, place);
         back(link, &tracking, place);
-        back(sv, &sky, place);
+        back(sky.link(), &sky, place);
         back(link, &ray, place);
     }
 }

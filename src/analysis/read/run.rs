@@ -60,7 +60,7 @@ pub struct Run {
     /// True observations.
     pub truth: SpillStore<Link, Observation>,
     /// Where the satellites are, and what delays their signals.
-    pub sky: SpillStore<Sv, SkyRow>,
+    pub sky: SpillStore<Link, SkyRow>,
     /// The truth's signals.
     pub signals: BTreeSet<&'static Signal>,
     /// Satellites in the truth's first epoch.
@@ -243,7 +243,7 @@ impl Run {
             if row.sample == first {
                 in_view_at_start.insert(row.sv);
             }
-            sky.push(row.sv, &row)
+            sky.push(row.link(), &row)
         })?;
         Ok(Self {
             scene,
@@ -279,6 +279,23 @@ impl Run {
             psd: Vec::new(),
             speed: Speed::default(),
         })
+    }
+
+    /// Satellites that are in the sky at some time.
+    pub fn in_the_sky(&self) -> BTreeSet<Sv> {
+        self.sky.keys().map(|link| link.sv).collect()
+    }
+
+    /// What `of` makes of the rows of a satellite in the sky: those of one of its signals, the one that is
+    /// there longest, as where it stands is the same for all.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
+    pub fn seen<U>(&self, sv: Sv, of: impl Fn(SkyRow) -> U) -> Result<Vec<U>, JudgeError> {
+        let own = self.sky.keys().filter(|link| link.sv == sv);
+        // Of equal ones the first.
+        let longest = own.rev().max_by_key(|link| self.sky.count(link));
+        longest.map_or(Ok(Vec::new()), |link| self.sky.map(link, of))
     }
 
     /// Seconds from sample 0 by the receiver's clock.

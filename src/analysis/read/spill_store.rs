@@ -102,7 +102,7 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
     }
 
     /// Keys in order.
-    pub fn keys(&self) -> impl Iterator<Item = K> + '_ {
+    pub fn keys(&self) -> impl DoubleEndedIterator<Item = K> + '_ {
         self.stacks.keys().copied()
     }
 

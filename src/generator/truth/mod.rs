@@ -151,6 +151,7 @@ pub fn observe_by(
     let sky = SkyRow {
         sample,
         sv,
+        signal,
         azimuth_deg: sight.look.azimuth_rad.to_degrees(),
         elevation_deg: sight.look.elevation_rad.to_degrees(),
         range_m: sight.range_m,

@@ -239,6 +239,7 @@ mod tests {
                 let sky = SkyRow {
                     sample: 100 * tick as u64,
                     sv,
+                    signal,
                     azimuth_deg: 123.0,
                     elevation_deg: 45.0,
                     range_m: 2e7,

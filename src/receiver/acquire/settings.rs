@@ -15,7 +15,8 @@ described! {
 pub struct AcquisitionSettings {
     /// Dopplers from minus to plus this are searched. It has to hold the offset of the local oscillator too.
     pub doppler_max_hz: f64,
-    /// Names of the signals that are searched for; empty for GPS L1 C/A, and in `run` for those of the scene.
+    /// Names of the signals that are searched for. Empty for those that a recording's metadata name, in `run`
+    /// those of the scene, and else for all that the bands of the samples hold.
     pub signals: Vec<String>,
     /// Code periods of 1 ms summed coherently; of longer codes as many as begin in that time, under an
     /// overlay code one.
@@ -58,7 +59,7 @@ impl Default for AcquisitionSettings {
 impl AcquisitionSettings {
     /// Searches for these where no names are set.
     pub fn or_signals(&mut self, signals: &[&'static Signal]) {
-        if self.signals.is_empty() && signals != [&L1_CA] {
+        if self.signals.is_empty() {
             self.signals = signals.iter().map(|signal| signal.name.to_owned()).collect();
         }
     }

@@ -157,6 +157,26 @@ pub fn freedom(ranges: &[Range]) -> isize {
     ranges.len() as isize - (COORDINATES + scales(ranges).len()) as isize
 }
 
+/// Dilution of precision of the coordinates at a place near the Earth, by the ranges whose satellites stand
+/// above a mask; `None` where these give no position. The satellites' places are taken as they are: light
+/// times turn a direction by 1e-5 at most.
+pub fn dilution(ranges: &[Range], place_m: &Vector3<f64>, mask_rad: f64) -> Option<f64> {
+    let user = Geodetic::from_ecef(place_m);
+    let is_above = |range: &&Range| look(user, place_m, &range.satellite.position_m).elevation_rad >= mask_rad;
+    let seen: Vec<Range> = ranges.iter().filter(is_above).cloned().collect();
+    let scales = scales(&seen);
+    let unknowns = COORDINATES + scales.len();
+    let normal = seen.iter().fold(DMatrix::zeros(unknowns, unknowns), |mut normal, range| {
+        let clock = scales.iter().position(|scale| *scale == range.time).unwrap_or(0);
+        let row = row(&(range.satellite.position_m - place_m).normalize(), clock, scales.len());
+        normal.ger(1.0, &row, &row, 1.0);
+        normal
+    });
+    condition(&normal).ok()?;
+    let cofactors = Cholesky::new(normal)?.inverse();
+    Some(cofactors.diagonal().rows(0, COORDINATES).sum().sqrt())
+}
+
 fn row(sight: &Vector3<f64>, clock: usize, clocks: usize) -> DVector<f64> {
     let mut row = DVector::zeros(COORDINATES + clocks);
     row.fixed_rows_mut::<COORDINATES>(0).copy_from(&-sight);

@@ -384,7 +384,8 @@ impl Solver {
         ephemerides: &Sets,
         sent: Option<Coefficients>,
     ) -> Result<Solved, NoFix> {
-        let (ranges, grid) = self.ranges(observations, ephemerides);
+        let offered = self.ranges(observations, ephemerides);
+        let (ranges, grid) = self.chosen(offered);
         let measured = self.measured_ionosphere(observations, ephemerides);
         if freedom(&ranges) < 0 || ranges.is_empty() {
             let need = COORDINATES + scales(&ranges).len().max(1);

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
+
 use super::augmentation::{Grid, Standing};
 use super::combination::{Combination, Used, paired};
-use super::least_squares::{Range, freedom};
+use super::least_squares::{self, Corrections, Ionosphere, Range, freedom};
 use super::reduced::InShort;
 use super::smooth::Smoothed;
 use super::{IonosphereChoice, Sets, Solver, SystemClocks};
@@ -22,11 +24,23 @@ const HALF_LONG_FIT_S: f64 = 10_800.0;
 /// A set is used a little beyond its interval, until the next one is decoded.
 const FIT_GRACE_S: f64 = 600.0;
 
+/// Corrected ranges serve while the directions of their satellites dilute a position by no more than this
+/// times what those of all do: corrections take away most of a range's error, and nothing of a Doppler's.
+const LARGEST_LOSS: f64 = 1.5;
+
+/// Ranges that a position may be made of.
+pub(super) struct Offered {
+    /// As they are.
+    pub plain: Vec<Range>,
+    /// Those that an augmentation system corrects, with ranges of systems that it says nothing of, and its
+    /// grid of the ionosphere.
+    pub corrected: Option<(Vec<Range>, Option<Grid>)>,
+}
+
 impl Solver {
     /// The ranges of observations whose satellites' ephemerides are known: of a satellite with two carriers
-    /// their combination, if the settings say so. As augmentation systems correct them, where they do, and
-    /// then with their grid of the ionosphere.
-    pub(super) fn ranges(&mut self, observations: &[Observation], ephemerides: &Sets) -> (Vec<Range>, Option<Grid>) {
+    /// their combination, if the settings say so. Beside them those that an augmentation system corrects.
+    pub(super) fn ranges(&mut self, observations: &[Observation], ephemerides: &Sets) -> Offered {
         let is_known = |row: &Observation| {
             let short = |short: &InShort| short.serves(&[row.signal], row.sent());
             ephemerides.serving(row.sv, &[row.signal]).is_some() || self.reduced.get(&row.sv).is_some_and(short)
@@ -85,13 +99,12 @@ impl Solver {
         self.augmented(ranges)
     }
 
-    /// Ranges with the corrections of an augmentation system, and its grid; without those that it has none
-    /// of, so that none are mixed whose errors differ. Where the corrected ones do not suffice to test a
-    /// position, all as they are, but for those that must not be used.
-    fn augmented(&self, ranges: Vec<(Range, u16)>) -> (Vec<Range>, Option<Grid>) {
+    /// Ranges as they are, but for those that must not be used, and those with the corrections of an
+    /// augmentation system.
+    fn augmented(&self, ranges: Vec<(Range, u16)>) -> Offered {
         let now = ranges.first().map(|(range, _)| range.emitted);
         let Some((store, now)) = now.and_then(|now| Some((self.augmentation.serving(now)?, now))) else {
-            return (ranges.into_iter().map(|(range, _)| range).collect(), None);
+            return Offered { plain: ranges.into_iter().map(|(range, _)| range).collect(), corrected: None };
         };
         let (mut plain, mut corrected, mut count) = (Vec::new(), Vec::new(), 0);
         for (range, iode) in ranges {
@@ -110,11 +123,28 @@ impl Solver {
                 Standing::Corrected(_) | Standing::Without => plain.push(range),
             }
         }
-        if count == 0 || freedom(&corrected) < 1 {
-            return (plain, None);
-        }
-        let wanted = self.settings.ionosphere != IonosphereChoice::None;
-        (corrected, store.grid(now).filter(|_| wanted))
+        let grid = store.grid(now).filter(|_| self.settings.ionosphere != IonosphereChoice::None);
+        Offered { plain, corrected: (count > 0).then_some((corrected, grid)) }
+    }
+
+    /// Those that a position is made of: the corrected ones where enough of them are seen from there, never
+    /// some corrected and some not, whose errors differ.
+    pub(super) fn chosen(&self, offered: Offered) -> (Vec<Range>, Option<Grid>) {
+        let Offered { plain, corrected: Some((corrected, grid)) } = offered else { return (offered.plain, None) };
+        let bare = Corrections {
+            ionosphere: Ionosphere::Absent,
+            troposphere: false,
+            model_sigma_m: self.settings.model_sigma_m,
+        };
+        let first_m = || Some(least_squares::position(&plain, Vector3::zeros(), &bare).ok()?.position_m);
+        let place_m = self.last_m.or_else(first_m);
+        let mask_rad = self.settings.mask_deg.to_radians();
+        let dilution = |ranges: &[Range]| least_squares::dilution(ranges, &place_m?, mask_rad);
+        let suffices = match (dilution(&corrected), dilution(&plain)) {
+            (Some(of_corrected), Some(of_all)) => of_corrected <= LARGEST_LOSS * of_all,
+            (of_corrected, _) => of_corrected.is_some(),
+        };
+        if suffices && freedom(&corrected) >= 1 { (corrected, grid) } else { (plain, None) }
     }
 
     /// The range with its clock against GPS time, where the settings take the system's offset from it out of

@@ -77,10 +77,10 @@ mod tests {
         };
         let none = Sets::default();
         let mut wants = solver(true);
-        assert!(wants.ranges(&[sent(60.0)], &none).0.is_empty());
+        assert!(wants.ranges(&[sent(60.0)], &none).plain.is_empty());
         assert!(wants.take_reduced(set.clone(), false) && !wants.take_reduced(set.clone(), false));
         let noise_m = |solver: &mut Solver, after_s: f64, whole: &Sets| -> Vec<f64> {
-            solver.ranges(&[sent(after_s)], whole).0.iter().map(|range| range.noise_m).collect()
+            solver.ranges(&[sent(after_s)], whole).plain.iter().map(|range| range.noise_m).collect()
         };
         // 2 m of elements and 1.5 m of a delay that is not known; code noise is 0.4 m.
         assert!(matches!(noise_m(&mut wants, 60.0, &none)[..], [sigma_m] if (2.5..2.7).contains(&sigma_m)));

@@ -199,6 +199,7 @@ impl FrontEnd {
         if !self.gap.is_busy() {
             self.part(block.end(), shared);
         }
+        self.announce(shared);
         self.ticks = ticks;
         Ok(())
     }

@@ -20,6 +20,7 @@ use crate::receiver::track::LoopMargin;
 use front_end::{FrontEnd, Track, Window};
 use shared::Shared;
 use step::{Step, Tick};
+pub(super) use suited::held;
 
 mod decode;
 mod front_end;

@@ -1,11 +1,14 @@
-//! Searches for satellites that are known to be there: after a loss, or risen.
+//! Searches for satellites that are known to be there: after a loss, risen, or followed on another signal.
 //!
-//! Place, velocity and clock of the last fix and a satellite's ephemeris give its elevation and Doppler. Such
+//! Place, velocity and clock of the last fix and a satellite's ephemeris give its elevation and Doppler; a
+//! signal of it that any front end follows gives the Doppler of its others, in the ratio of carriers. Such
 //! a search looks at a few Doppler bins of a few satellites, a tenth of the work for each, and so comes four
 //! times as often as one for all. What it may miss is left to those: the place errs by a fraction of a hertz
 //! for each hundred metres, but velocity and clock change, by [`GROWTH_HZ`] a second (2 m/s²) while there
 //! is no fix. Limits: the strong satellites are not subtracted first, so a hit that their cross-correlation
 //! may have made is left to a search for all.
+
+use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
@@ -13,7 +16,8 @@ use super::FrontEnd;
 use super::shared::Shared;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS, look, rotate_earth};
-use crate::gnss::record::AcquisitionRow;
+use crate::gnss::record::{AcquisitionRow, Fix};
+use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 use crate::gnss::time::Epoch;
 use crate::receiver::acquire::{Acquired, WEAK_SHARE};
@@ -42,27 +46,47 @@ fn seen((here_m, velocity_mps): (Vector3<f64>, Vector3<f64>), at: Epoch, ephemer
 }
 
 impl FrontEnd {
-    /// Satellites that are not followed and should be there.
+    /// Lets all front ends know which Dopplers it follows.
+    pub(super) fn announce(&self, shared: &mut Shared) {
+        shared.dopplers.retain(|link, _| !self.signals.contains(&link.signal));
+        let settled = self.tracks.iter().filter(|track| !self.gap.is_busy() && track.channel.is_settled());
+        shared.dopplers.extend(settled.map(|track| {
+            let link = track.channel.link();
+            (link, (track.channel.doppler_hz() - self.offset.hz()) / link.carrier_hz())
+        }));
+    }
+
+    /// Links that are not followed and should be there.
     pub(super) fn foreseen(&self, now: u64, shared: &Shared) -> Near {
-        let Some(fix) = &shared.latest else { return (Vec::new(), 0.0) };
-        let later_s = self.metadata.rate.elapsed_s(now.saturating_sub(self.step.own(fix.sample)));
-        if later_s > OLDEST_S {
-            return (Vec::new(), 0.0);
-        }
+        let (by_fix, later_s) = self.foreseen_by_fix(now, shared);
+        let one = |link: &Link| {
+            let followed = self.tracks.iter().any(|track| track.channel.link() == *link);
+            if followed || self.refused.contains_key(link) || !shared.ephemerides.is_healthy_on(link.sv, link.signal) {
+                return None;
+            }
+            let beside = shared.dopplers.iter().find(|(other, _)| other.sv == link.sv);
+            let doppler = beside.map(|(_, doppler)| *doppler).or_else(|| by_fix.get(&link.sv).copied())?;
+            Some((*link, doppler * link.carrier_hz() + self.offset.hz()))
+        };
+        let half_hz = HALF_HZ + GROWTH_HZ * later_s;
+        (self.candidates.iter().filter_map(one).collect(), half_hz.min(self.settings.acquisition.doppler_max_hz))
+    }
+
+    /// The Dopplers, in parts of the carrier, of satellites that a fix and their ephemerides put above the
+    /// mask, and its age.
+    fn foreseen_by_fix(&self, now: u64, shared: &Shared) -> (BTreeMap<Sv, f64>, f64) {
+        let age = |fix: &Fix| self.metadata.rate.elapsed_s(now.saturating_sub(self.step.own(fix.sample)));
+        let young = shared.latest.as_ref().map(|fix| (fix, age(fix))).filter(|(_, later_s)| *later_s <= OLDEST_S);
+        let Some((fix, later_s)) = young else { return (BTreeMap::new(), 0.0) };
         let velocity_mps = Vector3::new(fix.vx_mps, fix.vy_mps, fix.vz_mps);
         let here_m = Vector3::new(fix.x_m, fix.y_m, fix.z_m) + velocity_mps * later_s;
         let at = Epoch::new(fix.gps_s, fix.gps_fraction_s).plus_s(later_s);
         let mask_rad = self.settings.position.mask_deg.to_radians();
-        let one = |link: &Link| {
-            let followed = self.tracks.iter().any(|track| track.channel.link() == *link);
-            let healthy = shared.ephemerides.is_healthy_on(link.sv, link.signal);
-            let ephemeris = shared.ephemerides.of(link.sv).first().filter(|_| !followed && healthy)?;
-            let (doppler, elevation_rad) = seen((here_m, velocity_mps), at, ephemeris)?;
-            let doppler_hz = (doppler - fix.clock_drift) * link.carrier_hz() + self.offset.hz();
-            (elevation_rad > mask_rad && !self.refused.contains_key(link)).then_some((*link, doppler_hz))
+        let one = |sv: Sv| {
+            let (doppler, elevation_rad) = seen((here_m, velocity_mps), at, shared.ephemerides.of(sv).first()?)?;
+            (elevation_rad > mask_rad).then_some((sv, doppler - fix.clock_drift))
         };
-        let half_hz = HALF_HZ + GROWTH_HZ * later_s;
-        (self.candidates.iter().filter_map(one).collect(), half_hz.min(self.settings.acquisition.doppler_max_hz))
+        (shared.ephemerides.satellites().filter_map(one).collect(), later_s)
     }
 
     /// Samples from one such search to the next: less while a satellite has been lost.
@@ -90,8 +114,35 @@ impl FrontEnd {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Session;
     use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::gps::l5::L5;
     use crate::gnss::rinex;
+    use crate::gnss::samples::{Format, IfMetadata};
+    use crate::gnss::time::Rate;
+    use crate::receiver::settings::Settings;
+
+    #[test]
+    fn a_satellite_that_one_front_end_follows_is_foreseen_by_the_other_before_there_is_a_fix() {
+        let of = |center_hz: f64, rate_hz: f64| {
+            let rate = Rate::from_hz(rate_hz).unwrap();
+            IfMetadata { format: Format::Ci8, rate, center_hz, inverted: false, start: None }
+        };
+        let mut settings = Settings::default();
+        settings.acquisition.or_signals(&[&L1_CA, &L5]);
+        let mut session = Session::new(&[of(1_575.42e6, 2.6e6), of(1_176.45e6, 21e6)], &settings).unwrap();
+        let [first, second] = session.front_ends.as_slice() else { panic!("two front ends") };
+        assert!(second.foreseen(0, &session.shared).0.is_empty());
+        session.shared.dopplers.insert(L1_CA.link(Sv::gps(10)), -1.5e-6);
+        let (near, half_hz) = second.foreseen(0, &session.shared);
+        assert_eq!((near.len(), half_hz), (1, HALF_HZ));
+        assert_eq!(near[0].0, L5.link(Sv::gps(10)));
+        assert!((near[0].1 + 1.5e-6 * 1_176.45e6).abs() < 1e-6, "{}", near[0].1);
+        // Nothing is followed any more: nothing is foreseen.
+        first.announce(&mut session.shared);
+        assert!(second.foreseen(0, &session.shared).0.is_empty());
+    }
 
     #[test]
     fn a_predicted_doppler_is_the_rate_at_which_the_range_shrinks() {

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::record::Fix;
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::{Link, Signal};
 use crate::gnss::time::{Epoch, Rate};
 use crate::receiver::diagnosis::Stage;
 use crate::receiver::observe::Timebase;
@@ -47,6 +47,8 @@ pub(super) struct Shared {
     pub last_fix: Option<LastFix>,
     /// By which satellites are predicted.
     pub latest: Option<Fix>,
+    /// Dopplers that are followed, in parts of the carrier.
+    pub dopplers: BTreeMap<Link, f64>,
     pub clock_drift: Option<f64>,
     pub fixes: u64,
     pub first_fix_s: Option<f64>,
@@ -80,6 +82,7 @@ impl Shared {
             ionosphere: None,
             last_fix: None,
             latest: None,
+            dopplers: BTreeMap::new(),
             clock_drift: None,
             fixes: 0,
             first_fix_s: None,

@@ -1,10 +1,11 @@
 //! What of samples and settings makes the results worse than need be, and which links samples can hold.
 
+use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::samples::IfMetadata;
-use crate::gnss::signal::{Component, Link, Signal};
+use crate::gnss::signal::{self, Component, Link, Signal};
 use crate::receiver::acquire::{self, AcquisitionSettings};
-use crate::receiver::correlate::standing_bias_m;
-use crate::receiver::lead::lead;
+use crate::receiver::correlate::{layers_refusal, standing_bias_m};
+use crate::receiver::lead::{lead, refusal, undated};
 use crate::receiver::settings::Settings;
 
 /// Errors of the code from which on a rate is warned of.
@@ -78,6 +79,51 @@ pub(super) fn distinct(candidates: &[Link]) -> Vec<Link> {
     all
 }
 
+/// Of the main lobes of a signal's spectrum this much has to lie within a band for it to be searched for
+/// unasked: at 4 Msps E1, L1C and B1C do, at 2.6 Msps they do not.
+const HELD_SHARE: f64 = 0.9;
+
+/// The zone of a band that holds a signal: 0 between minus and plus half the rate of complex samples, of real
+/// ones the whole half rates below it, as recorders sample above half their rate on purpose.
+fn zone(metadata: &IfMetadata, signal: &Signal) -> Option<u64> {
+    let half_hz = 0.5 * metadata.rate.hz();
+    let (if_hz, lobe_hz) = (metadata.if_hz(signal.centre_hz()), HELD_SHARE * signal.lobe_hz());
+    if metadata.format.is_complex() {
+        return (if_hz.abs() + lobe_hz <= half_hz).then_some(0);
+    }
+    let [low, high] = [if_hz - lobe_hz, if_hz + lobe_hz].map(|hz| (hz / half_hz).floor());
+    (low == high && low >= 0.0).then_some(low as u64)
+}
+
+/// The signals that the bands of these samples hold, as far as this receiver can follow them to a position
+/// without others; without those of two sides of a sub-carrier, whose sides are signals too. Of real samples
+/// the lowest zone that holds any is meant. At least one: where the bands hold none, GPS L1 C/A, whose
+/// absence has a diagnosis.
+pub(in crate::receiver) fn held(metadata: &[IfMetadata], settings: &Settings) -> Vec<&'static Signal> {
+    let all = signal::all();
+    let is_followed = |signal: &'static Signal, metadata: &IfMetadata| {
+        let rate_hz = metadata.rate.hz();
+        lead(signal).is_some_and(|component| rate_hz >= component.chip_rate_hz)
+            && layers_refusal(settings.tracking.waveform, signal, rate_hz).is_none()
+    };
+    let mut held: Vec<&'static Signal> = Vec::new();
+    for metadata in metadata {
+        let fits = |signal: &&&'static Signal| {
+            signal.sides_hz() == 0.0 && refusal(signal).is_none() && is_followed(signal, metadata)
+        };
+        let zones: Vec<(u64, &'static Signal)> =
+            all.iter().filter(fits).filter_map(|signal| Some((zone(metadata, signal)?, *signal))).collect();
+        let lowest = zones.iter().map(|(zone, _)| *zone).min();
+        held.extend(zones.iter().filter(|(zone, _)| Some(*zone) == lowest).map(|(_, signal)| signal));
+    }
+    // In the table's order, each once.
+    let mut held: Vec<&'static Signal> = all.into_iter().filter(|signal| held.contains(signal)).collect();
+    while let Some((undated, _)) = undated(&held) {
+        held.retain(|signal| *signal != undated);
+    }
+    if held.is_empty() { vec![&L1_CA] } else { held }
+}
+
 /// Which signals each of several front ends receives: every signal in the first whose band holds its main
 /// lobes, or else its carrier. Samples that hold none are searched all the same, the first front end's for
 /// the first signal: that nothing is found has a diagnosis.
@@ -99,4 +145,43 @@ pub(super) fn assigned(metadata: &[IfMetadata], signals: &[&'static Signal]) -> 
         own.extend(signals.first());
     }
     assigned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::samples::Format;
+    use crate::gnss::time::Rate;
+
+    #[test]
+    fn what_is_searched_for_unasked_is_what_the_bands_hold() {
+        let of = |format: Format, rate_hz: f64, center_hz: f64| {
+            let rate = Rate::from_hz(rate_hz).unwrap();
+            IfMetadata { format, rate, center_hz, inverted: false, start: None }
+        };
+        let held = |all: &[IfMetadata]| -> Vec<&'static str> {
+            let all = super::held(all, &Settings::default()).into_iter();
+            // Other tests add signals of their own.
+            all.filter(|signal| signal::SIGNALS.contains(signal)).map(|signal| signal.name).collect()
+        };
+        let narrow = ["GPS L1 C/A", "QZSS L1 C/A", "SBAS L1"];
+        assert_eq!(held(&[of(Format::Ci8, 2.6e6, 1_575.42e6)]), narrow);
+        let wide = held(&[of(Format::Ci8, 4e6, 1_575.42e6)]);
+        assert!(["Galileo E1", "GPS L1C", "BeiDou B1C"].iter().all(|name| wide.contains(name)), "{wide:?}");
+        assert!(narrow.iter().all(|name| wide.contains(name)), "{wide:?}");
+        // Both sides, not the one signal of them.
+        let e5 = held(&[of(Format::Ci8, 65e6, 1_191.795e6)]);
+        assert!(e5.contains(&"Galileo E5a") && e5.contains(&"Galileo E5b") && !e5.contains(&"Galileo E5"), "{e5:?}");
+        // Real samples at an IF of 4.092 MHz, and beyond half the rate: L1 in both, nothing of other bands
+        // that would fold into them.
+        for center_hz in [1_575.42e6 - 4.092e6, 1_575.42e6 - 20.46e6] {
+            let real = held(&[of(Format::Ri8, 16.368e6, center_hz)]);
+            assert!(narrow.iter().all(|name| real.contains(name)), "{real:?}");
+            assert!(real.iter().all(|name| name.contains("L1") || name.contains("E1") || name.contains("B1C")));
+        }
+        // Two bands, and one that holds nothing.
+        let two = held(&[of(Format::Ci8, 4e6, 1_575.42e6), of(Format::Ci8, 21e6, 1_176.45e6)]);
+        assert!(["GPS L1 C/A", "GPS L5", "Galileo E5a", "BeiDou B2a"].iter().all(|name| two.contains(name)));
+        assert_eq!(held(&[of(Format::Ci8, 4e6, 900e6)]), ["GPS L1 C/A"]);
+    }
 }

@@ -180,7 +180,7 @@ impl Expectations {
         observed: &impl Observed,
     ) -> Result<Satellite, JudgeError> {
         let sky: HashMap<u64, (f64, f64)> =
-            run.sky.map(link.sv, |row| (row.sample, (row.azimuth_deg, row.elevation_deg)))?.into_iter().collect();
+            run.seen(link.sv, |row| (row.sample, (row.azimuth_deg, row.elevation_deg)))?.into_iter().collect();
         let rows: Vec<(u64, SatelliteEpoch)> = run.truth.map(link, |row| {
             let elevation_deg = sky.get(&row.sample).map_or(90.0, |(_, elevation_deg)| *elevation_deg);
             let expected = SatelliteEpoch {

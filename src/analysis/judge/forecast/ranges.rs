@@ -250,7 +250,7 @@ impl<'r> Scene<'r> {
         let theory = update_s.and_then(|update_s| Theory::new(self.run, self.choices.loops, &link, *update_s));
         let Some(theory) = theory else { return Ok(()) };
         let truth: HashMap<u64, Observation> = self.run.truth.map(link, |row| (row.sample, row))?.into_iter().collect();
-        let sky: HashMap<u64, SkyRow> = self.run.sky.map(link.sv, |row| (row.sample, row))?.into_iter().collect();
+        let sky: HashMap<u64, SkyRow> = self.run.seen(link.sv, |row| (row.sample, row))?.into_iter().collect();
         let rays = self.rays(link, &theory)?;
         let smoothing = || Smoothing::new(self.choices.smoothing_s, self.choices.loops.dll_bandwidth_hz);
         let (mut parting, mut reflected) = (smoothing(), smoothing());

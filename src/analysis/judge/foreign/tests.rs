@@ -113,6 +113,7 @@ fn write_truth(truth: &Path) {
             sky.push(SkyRow {
                 sample,
                 sv: Sv::gps(prn),
+                signal: &L1_CA,
                 azimuth_deg: 40.0 * index as f64,
                 elevation_deg: 10.0 + 8.0 * index as f64,
                 range_m,

@@ -60,7 +60,7 @@ fn missing(run: &Run) -> Found {
 }
 
 fn strangers(run: &Run) -> Found {
-    let there: BTreeSet<Sv> = run.truth.keys().map(|Link { sv, .. }| sv).chain(run.sky.keys()).collect();
+    let there: BTreeSet<Sv> = run.truth.keys().map(|Link { sv, .. }| sv).chain(run.in_the_sky()).collect();
     let senders: BTreeSet<Sv> = run.navigation.iter().map(|row| row.sv).collect();
     let mut found = Found::default();
     for sv in senders.difference(&there) {

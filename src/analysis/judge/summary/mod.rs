@@ -352,7 +352,7 @@ fn satellites(run: &Run, details: &mut Details) -> Satellites {
     let mut ever: BTreeSet<Link> = run.truth.keys().collect();
     let received: BTreeSet<Sv> = ever.iter().map(|link| link.sv).collect();
     // In the sky, and never in the truth's observations: with any of the scene's signals.
-    for sv in run.sky.keys().filter(|sv| !received.contains(sv)) {
+    for sv in run.in_the_sky().into_iter().filter(|sv| !received.contains(sv)) {
         ever.extend(run.signals.iter().filter(|signal| signal.system == sv.system).map(|signal| signal.link(sv)));
     }
     let acquired: BTreeSet<Link> = run.acquisition.iter().filter(|row| row.acquired).map(|row| row.link()).collect();

@@ -13,10 +13,8 @@ pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let run = judged.run;
     let chart = |title: &str, of: fn(&SkyRow) -> f64| {
         let (mut series, mut ends, mut first_s) = (Vec::new(), vec![0.0], f64::INFINITY);
-        for (index, sv) in run.sky.keys().enumerate() {
-            let mut points: Vec<(f64, f64)> = run.sky.map(sv, |row| (run.time_s(row.sample), of(&row)))?;
-            // Of several front ends the first one's.
-            points.dedup_by_key(|point| point.0);
+        for (index, sv) in run.in_the_sky().into_iter().enumerate() {
+            let points: Vec<(f64, f64)> = run.seen(sv, |row| (run.time_s(row.sample), of(&row)))?;
             first_s = points.iter().map(|point| point.0).fold(first_s, f64::min);
             let values = || points.iter().map(|point| point.1).filter(|value| value.is_finite());
             ends.extend(values().reduce(f64::min).into_iter().chain(values().reduce(f64::max)));
@@ -27,7 +25,6 @@ pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let x = judged.time_axis(std::iter::once(first_s));
         Ok::<_, JudgeError>(Chart::new(title, x, Axis::around("slant delay (m)", ends.into_iter(), 1.0), series))
     };
-    // The sky's rows have a satellite's delay once in each front end, whatever it sends there.
     let mut carriers = Emission::all(run.truth.keys()).into_iter();
     let first = carriers.next().map(|one| one.carrier_hz() / 1e6).filter(|_| carriers.next().is_none());
     let on = first.map_or(" on a satellite's first carrier".to_owned(), |mhz| format!(" at {mhz:.2} MHz"));
@@ -35,7 +32,8 @@ pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         chart(&format!("Ionosphere{on}, as it is"), |row| row.ionosphere_m)?,
         chart("Troposphere, as it is", |row| row.troposphere_m)?,
     ];
-    let names: Vec<Series> = run.sky.keys().enumerate().map(|(index, sv)| line(sv, index, Vec::new())).collect();
+    let names: Vec<Series> =
+        run.in_the_sky().into_iter().enumerate().map(|(index, sv)| line(sv, index, Vec::new())).collect();
     Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, charts, names)))
 }
 

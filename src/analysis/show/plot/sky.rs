@@ -28,8 +28,8 @@ struct Track {
 pub fn sky(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let run = judged.run;
     let mut tracks = Vec::new();
-    for sv in run.sky.keys() {
-        let mut places: Vec<(i32, i32)> = run.sky.map(sv, |row| place(row.azimuth_deg, row.elevation_deg))?;
+    for sv in run.in_the_sky() {
+        let mut places: Vec<(i32, i32)> = run.seen(sv, |row| place(row.azimuth_deg, row.elevation_deg))?;
         places.dedup();
         let cn0: Vec<f64> = run.expected.iter().filter(|one| one.sv == sv).map(|one| one.cn0_mean_dbhz).collect();
         let observed = judged.errors.signals.keys().any(|link| link.sv == sv);

@@ -143,7 +143,7 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
     for link in judged.errors.signals.keys() {
         let rows = judged.errors.signals.rows(link)?;
         let of = |value: fn(&SignalError) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
-        let elevation = judged.run.sky.map(link.sv, |row| row.elevation_deg)?;
+        let elevation = judged.run.seen(link.sv, |row| row.elevation_deg)?;
         let cn0 = [of(|row| row.cn0_true_dbhz), of(|row| row.cn0_effective_dbhz), of(|row| row.cn0_dbhz)];
         table.row([
             judged.run.name(link),
