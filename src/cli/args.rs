@@ -105,7 +105,7 @@ pub struct Schema {
 pub enum SchemaOf {
     /// A scene
     Scenario,
-    /// The settings of `receive --settings`
+    /// The settings of `receive --receiver`
     Receiver,
     /// A study
     Study,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::predict::Near;
+use super::predict::{Missed, Near};
 use super::shared::Shared;
 use super::step::{Counted, Step, Tick};
 use super::{gap, plan, suited};
@@ -117,6 +117,7 @@ pub(super) struct FrontEnd {
     lookback: Lookback,
     pub lost: BTreeMap<Link, u64>,
     pub refused: BTreeMap<Link, u64>,
+    pub missed: BTreeMap<Link, Missed>,
     pub offset: Offset,
     /// Channels that measure it.
     pub lines: usize,
@@ -165,6 +166,7 @@ impl FrontEnd {
             lookback: Lookback::default(),
             lost: BTreeMap::new(),
             refused: BTreeMap::new(),
+            missed: BTreeMap::new(),
             offset: Offset::default(),
             lines: 0,
             offset_moved: 0,

@@ -31,8 +31,19 @@ const OLDEST_S: f64 = 60.0;
 /// Time between such searches over that between searches for all while a satellite is lost.
 const SHARE: f64 = 0.25;
 
+/// What such searches do not find is waited for twice as long each time, up to so many times.
+const MOST_DOUBLINGS: u32 = 6;
+
 /// Satellites that should be there, with their Dopplers, and how far these may be off.
 pub(super) type Near = (Vec<(Link, f64)>, f64);
+
+/// A link that was searched for where it should be, and not found.
+#[derive(Clone, Copy)]
+pub(super) struct Missed {
+    times: u32,
+    /// The sample from which on it is searched for again.
+    until: u64,
+}
 
 /// Doppler of a satellite at an antenna's place and velocity, without the receiver's clock, in parts of the
 /// carrier, and its elevation.
@@ -61,7 +72,9 @@ impl FrontEnd {
         let (by_fix, later_s) = self.foreseen_by_fix(now, shared);
         let one = |link: &Link| {
             let followed = self.tracks.iter().any(|track| track.channel.link() == *link);
-            if followed || self.refused.contains_key(link) || !shared.ephemerides.is_healthy_on(link.sv, link.signal) {
+            let waiting = self.missed.get(link).is_some_and(|missed| now < missed.until);
+            let healthy = shared.ephemerides.is_healthy_on(link.sv, link.signal);
+            if followed || waiting || self.refused.contains_key(link) || !healthy {
                 return None;
             }
             let beside = shared.dopplers.iter().find(|(other, _)| other.sv == link.sv);
@@ -87,6 +100,20 @@ impl FrontEnd {
             (elevation_rad > mask_rad).then_some((sv, doppler - fix.clock_drift))
         };
         (shared.ephemerides.satellites().filter_map(one).collect(), later_s)
+    }
+
+    /// Takes note of what such a search did not find: most of it is not sent at all.
+    pub(super) fn note_missed(&mut self, results: &[(AcquisitionRow, Option<Acquired>)], now: u64) {
+        let wait = self.foreseen_wait();
+        for (row, hit) in results {
+            let link = row.link();
+            if hit.is_some() || self.lost.contains_key(&link) {
+                self.missed.remove(&link);
+                continue;
+            }
+            let times = self.missed.get(&link).map_or(0, |missed| missed.times + 1).min(MOST_DOUBLINGS);
+            self.missed.insert(link, Missed { times, until: now + (wait << times) });
+        }
     }
 
     /// Samples from one such search to the next: less while a satellite has been lost.

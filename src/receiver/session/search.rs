@@ -55,6 +55,7 @@ impl FrontEnd {
         self.refused.retain(|_, until| *until > end);
         if let Some((near, half_hz)) = &window.near {
             let results = self.searcher.search_near(&window.block(), near, *half_hz)?;
+            self.note_missed(&results, end);
             let (believed, doubted) = self.believed(results);
             if doubted {
                 self.next_search = self.next_search.min(end);
@@ -223,6 +224,7 @@ impl FrontEnd {
             let Link { sv, signal } = link;
             let synchronised = track.decoder.as_ref().is_some_and(Decoder::has_units);
             let fruitless = !synchronised && now > track.since + limit;
+            self.missed.remove(&link);
             if track.channel.is_lost() {
                 self.lost.insert(link, now);
             } else if track.dropped || fruitless {
