@@ -39,7 +39,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
         return Err(CliError::usage("--nmea - and --json: standard output takes one of them"));
     }
     let recordings = recording::open(arguments)?;
-    let settings = searched(&recordings, settings);
+    let settings = searched(&recordings, settings, printed(arguments).in_words());
     let samples = recordings.first().and_then(|first| first.samples);
     let format = recordings.first().map(|first| first.metadata.format);
     let broken: Vec<Arc<OnceLock<String>>> = recordings.iter().filter_map(|one| one.broken.clone()).collect();
@@ -75,7 +75,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
 
 /// The settings with the signals that are searched for, where they name none: those that every recording's
 /// metadata name, or else those that the bands hold, which is said.
-fn searched(recordings: &[Recording], mut settings: Settings) -> Settings {
+fn searched(recordings: &[Recording], mut settings: Settings, in_words: bool) -> Settings {
     if !settings.acquisition.signals.is_empty() {
         return settings;
     }
@@ -91,8 +91,10 @@ fn searched(recordings: &[Recording], mut settings: Settings) -> Settings {
     }
     let metadata: Vec<IfMetadata> = recordings.iter().map(|recording| recording.metadata.clone()).collect();
     let settings = receiver::searched(&metadata, &settings);
-    let names: Vec<&str> = settings.acquisition.signals().into_iter().map(|signal| signal.name).collect();
-    scenario::note(&format!("searching for what the band holds: {}", names.join(", ")));
+    if in_words {
+        let names: Vec<&str> = settings.acquisition.signals().into_iter().map(|signal| signal.name).collect();
+        scenario::note(&format!("searching for what the bands hold: {}", names.join(", ")));
+    }
     settings
 }
 

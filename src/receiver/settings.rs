@@ -44,7 +44,7 @@ pub struct OperationSettings {
     /// Time between searches while a satellite is missing that was followed within the last 30 s. Also
     /// between short ones for what should be there: satellites of which another signal is followed, and after
     /// a fix those that known ephemerides predict; a quarter of it while one was lost, and twice as long each
-    /// time that nothing is found, up to 64 times.
+    /// time that nothing is found, up to 16 times.
     pub reacquisition_interval_s: f64,
     /// In searches after the first, the probability of a false alarm is multiplied by this.
     pub repeated_false_alarm_share: f64,

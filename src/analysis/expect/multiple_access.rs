@@ -14,7 +14,7 @@ use crate::analysis::expect::jamming;
 use crate::analysis::read::{Emission, Run};
 use crate::analysis::waveform::Waveform;
 use crate::gnss::record::Observation;
-use crate::gnss::signal::Signal;
+use crate::gnss::signal::{Link, Signal};
 
 /// C/N0 that a receiver can measure, per true observation.
 pub struct MultipleAccess<'r> {
@@ -54,6 +54,17 @@ impl<'r> MultipleAccess<'r> {
         let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
         let jammed = self.jammed.get(&(row.sample, own)).copied().unwrap_or(0.0);
         10.0 * libm::log10(own_hz / (thermal + shared + jammed))
+    }
+
+    /// C/N0 of a signal whose true one is `own_hz`, where all power in the samples counts as white noise, its
+    /// own too: in such units a receiver has its prompts. Hertz.
+    pub fn white_hz(&self, sample: u64, link: Link, own_hz: f64) -> f64 {
+        let own = Emission::of(link);
+        let met = self.kappa_s.get(&own).map_or(&[][..], Vec::as_slice).iter().map(|(emission, _)| *emission);
+        let all_hz: f64 = met.filter_map(|emission| self.run.cn0_sums_hz.get(&(sample, emission))).sum();
+        let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
+        let jammed = self.jammed.get(&(sample, own)).copied().unwrap_or(0.0);
+        own_hz / (thermal + all_hz / self.run.rate_hz(link.signal) + jammed)
     }
 }
 

@@ -29,7 +29,16 @@ pub static B1I: Signal = Signal {
 };
 
 /// B2I, of satellites of the second generation: the codes of B1I on another carrier.
-pub static B2I: Signal = Signal { name: "BeiDou B2I", rinex: "7I", carrier: Carrier::Common(1_207.14e6), ..B1I };
+pub static B2I: Signal = Signal {
+    name: "BeiDou B2I",
+    rinex: "7I",
+    carrier: Carrier::Common(1_207.14e6),
+    sent: |number, _| number <= SECOND_GENERATION,
+    ..B1I
+};
+
+/// The last number of that generation; those beyond it send B2b on the carrier.
+const SECOND_GENERATION: u8 = 18;
 
 /// B3I, to which the satellites' clocks refer.
 pub static B3I: Signal = Signal {

@@ -18,9 +18,10 @@ use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS, look, rotate_earth};
 use crate::gnss::record::{AcquisitionRow, Fix};
 use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
+use crate::gnss::signal::{Link, Signal};
 use crate::gnss::time::Epoch;
 use crate::receiver::acquire::{Acquired, WEAK_SHARE};
+use crate::receiver::lead::lead;
 
 /// A Doppler may be so far from the predicted one …
 const HALF_HZ: f64 = 500.0;
@@ -32,7 +33,7 @@ const OLDEST_S: f64 = 60.0;
 const SHARE: f64 = 0.25;
 
 /// What such searches do not find is waited for twice as long each time, up to so many times.
-const MOST_DOUBLINGS: u32 = 6;
+const MOST_DOUBLINGS: u32 = 4;
 
 /// Satellites that should be there, with their Dopplers, and how far these may be off.
 pub(super) type Near = (Vec<(Link, f64)>, f64);
@@ -43,6 +44,8 @@ pub(super) struct Missed {
     times: u32,
     /// The sample from which on it is searched for again.
     until: u64,
+    /// Whether another signal of the satellite was followed.
+    led: bool,
 }
 
 /// Doppler of a satellite at an antenna's place and velocity, without the receiver's clock, in parts of the
@@ -72,12 +75,13 @@ impl FrontEnd {
         let (by_fix, later_s) = self.foreseen_by_fix(now, shared);
         let one = |link: &Link| {
             let followed = self.tracks.iter().any(|track| track.channel.link() == *link);
-            let waiting = self.missed.get(link).is_some_and(|missed| now < missed.until);
             let healthy = shared.ephemerides.is_healthy_on(link.sv, link.signal);
-            if followed || waiting || self.refused.contains_key(link) || !healthy {
+            let beside = shared.dopplers.iter().find(|(other, _)| other.sv == link.sv);
+            // Once another signal of it is followed it is there.
+            let waits = |missed: &Missed| now < missed.until && (missed.led || beside.is_none());
+            if followed || self.missed.get(link).is_some_and(waits) || self.refused.contains_key(link) || !healthy {
                 return None;
             }
-            let beside = shared.dopplers.iter().find(|(other, _)| other.sv == link.sv);
             let doppler = beside.map(|(_, doppler)| *doppler).or_else(|| by_fix.get(&link.sv).copied())?;
             Some((*link, doppler * link.carrier_hz() + self.offset.hz()))
         };
@@ -102,8 +106,25 @@ impl FrontEnd {
         (shared.ephemerides.satellites().filter_map(one).collect(), later_s)
     }
 
+    /// Whether searches for all leave a link out: its satellite sends another signal as well, by its block, that
+    /// is received and costs less to search for, and by which this one is foreseen.
+    pub(super) fn is_led(link: Link, shared: &Shared) -> bool {
+        let at = shared.near();
+        // Dopplers as many as the period is long, of lags as many as there are chips.
+        let cost = |signal: &'static Signal| lead(signal).map_or(0.0, |one| one.period_s() * f64::from(one.code_chips));
+        let received = || shared.noises.iter().map(|(signal, _)| *signal);
+        let place = |signal: &'static Signal| received().position(|other| other == signal);
+        let rank = |signal: &'static Signal| (cost(signal), place(signal));
+        received().any(|other| {
+            other.system == link.sv.system
+                && rank(other) < rank(link.signal)
+                && (other.sent)(link.sv.number, at)
+                && other.satellites().any(|sv| sv == link.sv)
+        })
+    }
+
     /// Takes note of what such a search did not find: most of it is not sent at all.
-    pub(super) fn note_missed(&mut self, results: &[(AcquisitionRow, Option<Acquired>)], now: u64) {
+    pub(super) fn note_missed(&mut self, results: &[(AcquisitionRow, Option<Acquired>)], now: u64, shared: &Shared) {
         let wait = self.foreseen_wait();
         for (row, hit) in results {
             let link = row.link();
@@ -112,7 +133,8 @@ impl FrontEnd {
                 continue;
             }
             let times = self.missed.get(&link).map_or(0, |missed| missed.times + 1).min(MOST_DOUBLINGS);
-            self.missed.insert(link, Missed { times, until: now + (wait << times) });
+            let led = shared.dopplers.keys().any(|other| other.sv == link.sv);
+            self.missed.insert(link, Missed { times, until: now + (wait << times), led });
         }
     }
 

@@ -55,7 +55,7 @@ impl FrontEnd {
         self.refused.retain(|_, until| *until > end);
         if let Some((near, half_hz)) = &window.near {
             let results = self.searcher.search_near(&window.block(), near, *half_hz)?;
-            self.note_missed(&results, end);
+            self.note_missed(&results, end, shared);
             let (believed, doubted) = self.believed(results);
             if doubted {
                 self.next_search = self.next_search.min(end);
@@ -66,6 +66,8 @@ impl FrontEnd {
         // cross-correlation would pass for others.
         let known = self.known(shared);
         let mut sought = suited::distinct(&self.candidates);
+        // The first search shows all that there is.
+        sought.retain(|link| !self.searched || !Self::is_led(*link, shared));
         let is_followed = |link: &Link| self.tracks.iter().any(|track| track.channel.link().is_alike(*link));
         if !sought.iter().all(is_followed) {
             sought.retain(|link| !known.iter().any(|one| one.link().is_alike(*link)));

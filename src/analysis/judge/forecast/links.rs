@@ -208,8 +208,8 @@ struct One<'a> {
     raw: BTreeMap<Loop, f64>,
     span_s: f64,
     settings: Settings,
-    /// C/N0 by which variances go, by which powers do, and the mean of its decibels: over an hour in which a
-    /// satellite rises they are apart by more than a decibel.
+    /// C/N0 by which variances go, by which a prompt's power does, in units of the samples' own, and the mean
+    /// of its decibels: over an hour in which a satellite rises they are apart by more than a decibel.
     cn0_hz: f64,
     power_hz: f64,
     middle_dbhz: f64,
@@ -236,7 +236,11 @@ impl<'a> One<'a> {
         let hz = |row: &SignalError| libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
         // Variances go with one over C/N0.
         let cn0_hz = rows.len() as f64 / rows.iter().map(|row| 1.0 / hz(row)).sum::<f64>();
-        let power_hz = rows.iter().map(hz).sum::<f64>() / rows.len() as f64;
+        let white_hz = |row: &SignalError| {
+            let linear = |db: f64| libm::pow(10.0, db / 10.0);
+            access.white_hz(row.sample, link, linear(row.cn0_true_dbhz)) / linear(cost_db)
+        };
+        let power_hz = rows.iter().map(white_hz).sum::<f64>() / rows.len() as f64;
         let middle_dbhz = rows.iter().map(|row| row.cn0_effective_dbhz - cost_db).sum::<f64>() / rows.len() as f64;
         let share = |row: &SignalError| libm::pow(10.0, (row.cn0_true_dbhz - row.cn0_effective_dbhz) / 10.0) - 1.0;
         let others = rows.iter().map(share).sum::<f64>() / rows.len() as f64;
