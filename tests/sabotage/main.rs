@@ -83,11 +83,16 @@ fn outcome(kind: &Kind) -> (String, Option<String>) {
 
 #[test]
 fn every_kind_of_damage_passes_where_it_is_tolerable_and_fails_by_its_row_where_it_is_not() {
-    let kinds = kinds();
+    let mut kinds = kinds();
     let names: BTreeSet<&str> = kinds.iter().map(|kind| kind.name).collect();
     assert_eq!(names.len(), kinds.len(), "two kinds bear one name");
     let both = kinds.iter().filter(|kind| kind.tolerable.is_some()).count();
     assert!(both >= 60, "{both} kinds with two sizes");
+    // Every third each day, all with `GNSS_TWIN_LONG`.
+    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+        let mut number = 0..;
+        kinds.retain(|_| number.next().is_some_and(|n: usize| n % 3 == 0));
+    }
     let (next, found) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     std::thread::scope(|scope| {

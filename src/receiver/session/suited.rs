@@ -83,41 +83,35 @@ pub(super) fn distinct(candidates: &[Link]) -> Vec<Link> {
 /// unasked: at 4 Msps E1, L1C and B1C do, at 2.6 Msps they do not.
 const HELD_SHARE: f64 = 0.9;
 
-/// The zone of a band that holds a signal: 0 between minus and plus half the rate of complex samples, of real
-/// ones the whole half rates below it, as recorders sample above half their rate on purpose.
-fn zone(metadata: &IfMetadata, signal: &Signal) -> Option<u64> {
+/// Recorders of real samples convert no higher frequency than this.
+const HIGHEST_IF_HZ: f64 = 100e6;
+
+/// Whether that much of a signal lies within one band of the samples: between minus and plus half the rate of
+/// complex samples, of real ones in one of the bands of half the rate above 0 Hz, as recorders sample beyond
+/// the first on purpose and nothing says which is meant.
+fn is_within(metadata: &IfMetadata, signal: &Signal) -> bool {
     let half_hz = 0.5 * metadata.rate.hz();
     let (if_hz, lobe_hz) = (metadata.if_hz(signal.centre_hz()), HELD_SHARE * signal.lobe_hz());
     if metadata.format.is_complex() {
-        return (if_hz.abs() + lobe_hz <= half_hz).then_some(0);
+        return if_hz.abs() + lobe_hz <= half_hz;
     }
     let [low, high] = [if_hz - lobe_hz, if_hz + lobe_hz].map(|hz| (hz / half_hz).floor());
-    (low == high && low >= 0.0).then_some(low as u64)
+    low == high && low >= 0.0 && if_hz <= HIGHEST_IF_HZ
 }
 
 /// The signals that the bands of these samples hold, as far as this receiver can follow them to a position
-/// without others; without those of two sides of a sub-carrier, whose sides are signals too. Of real samples
-/// the lowest zone that holds any is meant. At least one: where the bands hold none, GPS L1 C/A, whose
-/// absence has a diagnosis.
+/// without others; without those of two sides of a sub-carrier, whose sides are signals too. At least one:
+/// where the bands hold none, GPS L1 C/A, whose absence has a diagnosis.
 pub(in crate::receiver) fn held(metadata: &[IfMetadata], settings: &Settings) -> Vec<&'static Signal> {
-    let all = signal::all();
-    let is_followed = |signal: &'static Signal, metadata: &IfMetadata| {
+    let is_held = |signal: &'static Signal, metadata: &IfMetadata| {
         let rate_hz = metadata.rate.hz();
-        lead(signal).is_some_and(|component| rate_hz >= component.chip_rate_hz)
+        is_within(metadata, signal)
+            && lead(signal).is_some_and(|component| rate_hz >= component.chip_rate_hz)
             && layers_refusal(settings.tracking.waveform, signal, rate_hz).is_none()
     };
-    let mut held: Vec<&'static Signal> = Vec::new();
-    for metadata in metadata {
-        let fits = |signal: &&&'static Signal| {
-            signal.sides_hz() == 0.0 && refusal(signal).is_none() && is_followed(signal, metadata)
-        };
-        let zones: Vec<(u64, &'static Signal)> =
-            all.iter().filter(fits).filter_map(|signal| Some((zone(metadata, signal)?, *signal))).collect();
-        let lowest = zones.iter().map(|(zone, _)| *zone).min();
-        held.extend(zones.iter().filter(|(zone, _)| Some(*zone) == lowest).map(|(_, signal)| signal));
-    }
-    // In the table's order, each once.
-    let mut held: Vec<&'static Signal> = all.into_iter().filter(|signal| held.contains(signal)).collect();
+    let is_followed = |signal: &'static Signal| signal.sides_hz() == 0.0 && refusal(signal).is_none();
+    let mut held = signal::all();
+    held.retain(|signal| is_followed(signal) && metadata.iter().any(|metadata| is_held(signal, metadata)));
     while let Some((undated, _)) = undated(&held) {
         held.retain(|signal| *signal != undated);
     }
@@ -172,13 +166,15 @@ mod tests {
         // Both sides, not the one signal of them.
         let e5 = held(&[of(Format::Ci8, 65e6, 1_191.795e6)]);
         assert!(e5.contains(&"Galileo E5a") && e5.contains(&"Galileo E5b") && !e5.contains(&"Galileo E5"), "{e5:?}");
-        // Real samples at an IF of 4.092 MHz, and beyond half the rate: L1 in both, nothing of other bands
-        // that would fold into them.
-        for center_hz in [1_575.42e6 - 4.092e6, 1_575.42e6 - 20.46e6] {
-            let real = held(&[of(Format::Ri8, 16.368e6, center_hz)]);
-            assert!(narrow.iter().all(|name| real.contains(name)), "{real:?}");
-            assert!(real.iter().all(|name| name.contains("L1") || name.contains("E1") || name.contains("B1C")));
-        }
+        // Real samples at an IF of 4.092 MHz, and beyond half the rate, where B1I may be meant as well.
+        let real = |if_hz: f64| held(&[of(Format::Ri8, 16.368e6, 1_575.42e6 - if_hz)]);
+        assert!(narrow.iter().all(|name| real(4.092e6).contains(name)), "{:?}", real(4.092e6));
+        assert!(!real(4.092e6).contains(&"BeiDou B1I"));
+        let folded = real(20.46e6);
+        assert!(narrow.iter().all(|name| folded.contains(name)) && folded.contains(&"BeiDou B1I"), "{folded:?}");
+        // Samples of E5 at 75 MHz, into which L1 would fold.
+        let wide = held(&[of(Format::Ri8, 100e6, 1_191.795e6 - 75e6)]);
+        assert!(wide.contains(&"Galileo E5a") && !wide.contains(&"GPS L1 C/A"), "{wide:?}");
         // Two bands, and one that holds nothing.
         let two = held(&[of(Format::Ci8, 4e6, 1_575.42e6), of(Format::Ci8, 21e6, 1_176.45e6)]);
         assert!(["GPS L1 C/A", "GPS L5", "Galileo E5a", "BeiDou B2a"].iter().all(|name| two.contains(name)));
