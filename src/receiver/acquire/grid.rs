@@ -20,7 +20,7 @@ use super::pair::{Dwells, Spectra};
 use super::refine::Refined;
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
-use super::shifted::{Rooms, Shifted};
+use super::shifted::Shifted;
 use super::{Acquired, kernel};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Component;
@@ -255,10 +255,15 @@ impl Grid {
         let shifted = if everywhere && self.pair.is_none() { Shifted::new(self, block, scale) } else { None };
         let one_doppler = |bin: usize, spectra: &[Spectra<'_>]| {
             let dwells = match &shifted {
-                Some(shifted) => self.dwells(|period, spectrum, _| shifted.add_period(self, bin, period, spectrum)),
-                None => self.dwells(|period, spectrum, rooms| {
-                    self.add_period(block, scale, self.dopplers_hz[bin], period, rooms, spectrum);
-                }),
+                Some(shifted) => self.dwells(|period, spectrum| shifted.add_period(self, bin, period, spectrum)),
+                None => {
+                    let mut scratch = vec![Complex::default(); self.forward.get_inplace_scratch_len()];
+                    let mut long = vec![Complex::default(); self.forward.len()];
+                    self.dwells(|period, spectrum| {
+                        let rooms = (&mut long[..], &mut scratch[..]);
+                        self.add_period(block, scale, self.dopplers_hz[bin], period, rooms, spectrum);
+                    })
+                }
             };
             self.strips(&dwells, spectra)
         };
@@ -303,15 +308,13 @@ impl Grid {
     }
 
     /// The spectra of all coherent sums, to which `add` adds each period.
-    fn dwells(&self, add: impl Fn(u32, &mut [Complex<f32>], Rooms<'_>)) -> Vec<Vec<Complex<f32>>> {
-        let mut scratch = vec![Complex::default(); self.forward.get_inplace_scratch_len()];
-        let mut long = vec![Complex::default(); self.forward.len()];
+    fn dwells(&self, mut add: impl FnMut(u32, &mut [Complex<f32>])) -> Vec<Vec<Complex<f32>>> {
         let periods = self.coherent_periods;
         (0..self.sums)
             .map(|dwell| {
                 let mut spectrum = vec![Complex::default(); self.inverse.len()];
                 for period in dwell * periods..(dwell + 1) * periods {
-                    add(period, &mut spectrum, (&mut long, &mut scratch));
+                    add(period, &mut spectrum);
                 }
                 spectrum
             })

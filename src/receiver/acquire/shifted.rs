@@ -20,7 +20,7 @@ const MOST_OFF: f64 = 0.008;
 const MOST_BYTES: usize = 64 << 20;
 
 /// Room for a spectrum, and for making it.
-pub(super) type Rooms<'a> = (&'a mut [Complex<f32>], &'a mut [Complex<f32>]);
+type Rooms<'a> = (&'a mut [Complex<f32>], &'a mut [Complex<f32>]);
 
 impl Grid {
     /// Adds the spectrum of one code period with carrier removed, turned to where the period begins.
@@ -108,15 +108,17 @@ impl Shifted {
             return None;
         }
         let [_, (lowest, ..)] = grid.band(length);
-        let one = |number: usize| {
+        let rooms = || {
+            let scratch = vec![Complex::default(); grid.forward.get_inplace_scratch_len()];
+            (vec![Complex::default(); length], scratch)
+        };
+        let one = |(long, scratch): &mut (Vec<_>, Vec<_>), number: usize| {
             let doppler_hz = middle_hz(grid, groups, number / periods);
-            let mut long = vec![Complex::default(); length];
-            let mut scratch = vec![Complex::default(); grid.forward.get_inplace_scratch_len()];
-            grid.transform(block, scale, doppler_hz, (number % periods) as u32, (&mut long, &mut scratch));
+            grid.transform(block, scale, doppler_hz, (number % periods) as u32, (long, scratch));
             let from = lowest as i64 - reach as i64;
             (from..from + stored as i64).map(|bin| long[bin.rem_euclid(length as i64) as usize]).collect()
         };
-        let spectra = (0..groups * periods).into_par_iter().map(one).collect();
+        let spectra = (0..groups * periods).into_par_iter().map_init(rooms, one).collect();
         Some(Self { groups, reach, spectra })
     }
 

@@ -49,8 +49,6 @@ pub(super) fn correlate<const T: usize>(level: Level, job: &Job, codes: [i64; T]
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-// A closure has the instruction set of its function.
-#[expect(clippy::redundant_closure)]
 fn correlate_avx2<const T: usize>(job: &Job, codes: [i64; T]) -> [Complex64; T] {
     body(job, codes, |segment, sums| add_avx2(segment, sums))
 }
@@ -105,12 +103,12 @@ fn add_plain<const T: usize>(segment: &Segment<T>, sums: &mut Sums<T>) {
         for k in 0..LANES {
             let re = product(i[k], cos) + product(q[k], sin);
             let im = product(q[k], cos) - product(i[k], sin);
-            for t in 0..T {
+            for (t, sums) in sums.iter_mut().enumerate() {
                 let [near, next] = segment.entries[segment.from[t] + LANES * v + k].map(i32::from);
                 let [weight, next_weight] = segment.weights[t].map(i32::from);
                 let value = weight * near + next_weight * next;
-                sums[t][0][k / 2] += f64::from(re * value);
-                sums[t][1][k / 2] += f64::from(im * value);
+                sums[0][k / 2] += f64::from(re * value);
+                sums[1][k / 2] += f64::from(im * value);
             }
         }
     }
