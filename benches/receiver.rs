@@ -75,7 +75,7 @@ fn unpacked<'a>(
 ) -> Samples<'a> {
     Format::Ci8.unpack(bytes, i, q);
     let sums = if arithmetic == Arithmetic::Sums { room.of(i, q) } else { None };
-    Samples { i, q, sums }
+    Samples { i, q, sums, fixed: None }
 }
 
 /// Channel·samples a second, in 1e9: blocks of 50 ms (at most 2^17 samples) unpacked and, where it is asked
@@ -271,7 +271,7 @@ fn errors(arithmetic: Arithmetic, rate_hz: f64) -> Errors {
                 q[n] = (f64::from(q[n]) + sign * sin).round().clamp(-127.0, 127.0) as f32;
             }
             let mut room = RunningSums::default();
-            let samples = Samples { i: &i, q: &q, sums: room.of(&i, &q) };
+            let samples = Samples { i: &i, q: &q, sums: room.of(&i, &q), fixed: None };
             let tested = replica.correlate_in(arithmetic, samples, &nco, &taps);
             let exact = replica.slow(&i, &q, &nco, &taps);
             // Early less late is twice the error of a triangle, over the prompt that the signal has on

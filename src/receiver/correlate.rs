@@ -2,9 +2,9 @@
 //!
 //! The replica's phases are exact integers: carrier in 2⁻⁶⁴ turns, code in 2⁻⁴⁷ chips. A replica sample is
 //! the chip at the sample's instant ([`Edge::Nearest`]) or the mean of the chips over the interval of one
-//! sample centred on that instant ([`Edge::Area`]). Sums come in four arithmetics: pieces of equal sign by
-//! running sums of samples of 8 bits (`pieces`), integers of 16 bits for such samples
-//! ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin of all in
+//! sample centred on that instant ([`Edge::Area`]). Sums come in four arithmetics: for samples of 8 bits
+//! products with a table (`rows`) or pieces of equal sign by running sums (`pieces`), integers of 16 bits for
+//! such samples ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin of all in
 //! `f64` ([`Replica::slow`]). A chip has the steps of its pulse ([`Wave`]); phases count chips, kernels see
 //! steps. A replica is a weighted sum of patterns of signs, each of which takes a pass: steps of zero are the
 //! mean of +1 and −1, and a waveform of several layers has a pattern for each. Limits: area edges are exact
@@ -17,9 +17,11 @@ use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::signal::{Component, Layers, Shape, Tone};
 
 mod carrier;
+pub mod fixed;
 mod kernel;
 mod pattern;
 mod pieces;
+mod rows;
 mod short;
 #[cfg(test)]
 mod sides_tests;
@@ -29,6 +31,7 @@ pub mod wave;
 
 use pattern::Pattern;
 use pieces::Pieces;
+use rows::Rows;
 use sums::Samples;
 pub use wave::{Wave, fits, layers_refusal, steps_of_chip};
 
@@ -48,8 +51,9 @@ pub enum Edge {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Arithmetic {
-    /// Running sums of samples of 8 bits, a difference for each change of the code's sign; [`Self::I16`]
-    /// where the carrier is far from zero or samples are few to a chip.
+    /// Of samples of 8 bits: products with a table of the replica where samples are few to a chip, and else
+    /// running sums, a difference for each change of the code's sign; [`Self::I16`] where neither does, as
+    /// with a carrier far from zero.
     Sums,
     /// Integers of 16 bits where samples have 8, `f32` where they have more.
     I16,
@@ -79,6 +83,8 @@ pub struct Replica {
     patterns: Vec<Pattern>,
     /// The same by pieces; none for nearest edges and where they cannot be counted.
     pieces: Vec<Pieces>,
+    /// The same by rows, where samples are few to a chip.
+    rows: Option<Rows>,
 }
 
 /// Steps from which on a period cannot be counted in 64 bits.
@@ -109,7 +115,7 @@ impl Replica {
     pub fn of(wave: Wave, edge: Edge) -> Option<Self> {
         let patterns = Pattern::of(&wave, Complex64::ONE, edge)?;
         let pieces = by_pieces(&[(&wave, Complex64::ONE)], edge);
-        Some(Self { wave, patterns, pieces })
+        Some(Self { wave, patterns, pieces, rows: None })
     }
 
     /// A replica of a satellite's component in that waveform; `None` where the documents assign it no code,
@@ -130,7 +136,7 @@ impl Replica {
         let patterns = layers.iter().map(|(wave, gain)| Pattern::of(wave, *gain, edge));
         let patterns = patterns.collect::<Option<Vec<_>>>()?.concat();
         let pieces = by_pieces(&layers.iter().map(|(wave, gain)| (wave, *gain)).collect::<Vec<_>>(), edge);
-        Some(Self { wave, patterns, pieces })
+        Some(Self { wave, patterns, pieces, rows: None })
     }
 
     /// The same in samples whose spectrum may be inverted.
@@ -143,7 +149,7 @@ impl Replica {
     fn of_side(wave: Wave, edge: Edge, tone: Tone) -> Option<Self> {
         let patterns = Pattern::of(&wave, tone.gain.conj() / tone.gain.norm(), edge)?;
         let toned = |pattern| Pattern { half_cycles: tone.half_cycles, ..pattern };
-        Some(Self { wave, patterns: patterns.into_iter().map(toned).collect(), pieces: Vec::new() })
+        Some(Self { wave, patterns: patterns.into_iter().map(toned).collect(), pieces: Vec::new(), rows: None })
     }
 
     /// The same where the spectrum is inverted.
@@ -165,7 +171,7 @@ impl Replica {
             ..pattern.clone()
         };
         let patterns = vec![part(first_pattern), part(second_pattern)];
-        Some(Self { wave: first.wave.clone(), patterns, pieces: Vec::new() })
+        Some(Self { wave: first.wave.clone(), patterns, pieces: Vec::new(), rows: None })
     }
 
     /// Inverts the second side, or does not.
@@ -178,6 +184,12 @@ impl Replica {
     /// The oscillators with the sub-carrier of its first pattern.
     pub fn beside_carrier(&self, nco: &Nco) -> Nco {
         self.patterns.first().map_or(*nco, |pattern| pattern.beside_carrier(nco))
+    }
+
+    /// Makes what is quicker by a table for a code that moves by about `code_step` phase units a sample.
+    pub fn prepare(&mut self, code_step: u64) {
+        let alone = matches!(self.pieces.as_slice(), [alone] if alone.gain() == Complex64::ONE);
+        self.rows = if alone { Rows::of(&self.wave, code_step) } else { None };
     }
 
     /// Length of the period in code phase units.
@@ -265,21 +277,33 @@ impl Replica {
         taps: &[i64; T],
     ) -> [Complex64; T] {
         let samples = samples.into();
-        let Samples { i, q, .. } = samples;
         match arithmetic {
             Arithmetic::Sums => {
-                self.correlate_sums(samples, nco, taps).unwrap_or_else(|| self.correlate_short(i, q, nco, taps))
+                let by_rows = self.correlate_rows(samples, nco, taps);
+                let found = by_rows.or_else(|| self.correlate_sums(samples, nco, taps));
+                found.unwrap_or_else(|| samples.by_planes(|i, q| self.correlate_short(i, q, nco, taps)))
             }
-            Arithmetic::I16 => self.correlate_short(i, q, nco, taps),
-            Arithmetic::F32 => self.correlate(i, q, nco, taps),
-            Arithmetic::F64 => self.slow(i, q, nco, taps),
+            Arithmetic::I16 => samples.by_planes(|i, q| self.correlate_short(i, q, nco, taps)),
+            Arithmetic::F32 => samples.by_planes(|i, q| self.correlate(i, q, nco, taps)),
+            Arithmetic::F64 => samples.by_planes(|i, q| self.slow(i, q, nco, taps)),
         }
+    }
+
+    /// The same by rows, where fixed-point samples are there and the steps of carrier and code suit it.
+    fn correlate_rows<const T: usize>(&self, samples: Samples, nco: &Nco, taps: &[i64; T]) -> Option<[Complex64; T]> {
+        let (rows, fixed) = (self.rows.as_ref()?, samples.fixed?);
+        rows.suit(nco).then(|| rows.correlate(kernel::Level::best(), fixed, nco, taps))
+    }
+
+    /// Whether [`Arithmetic::Sums`] uses fixed-point samples at these steps of carrier and code.
+    pub fn takes_fixed(&self, nco: &Nco) -> bool {
+        self.rows.as_ref().is_some_and(|rows| rows.suit(nco))
     }
 
     /// The same by pieces, where running sums are there and the steps of carrier and code suit it.
     fn correlate_sums<const T: usize>(&self, samples: Samples, nco: &Nco, taps: &[i64; T]) -> Option<[Complex64; T]> {
         let sums = samples.sums?;
-        if !self.takes_sums(nco) {
+        if self.pieces.is_empty() || !self.pieces.iter().all(|pieces| pieces.suit(nco)) {
             return None;
         }
         let level = kernel::Level::best();
@@ -293,7 +317,7 @@ impl Replica {
 
     /// Whether [`Arithmetic::Sums`] uses running sums at these steps of carrier and code.
     pub fn takes_sums(&self, nco: &Nco) -> bool {
-        !self.pieces.is_empty() && self.pieces.iter().all(|pieces| pieces.suit(nco))
+        !self.takes_fixed(nco) && !self.pieces.is_empty() && self.pieces.iter().all(|pieces| pieces.suit(nco))
     }
 
     /// The same in the obvious way: `f64`, one sample after the other.

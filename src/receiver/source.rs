@@ -10,9 +10,10 @@ mod kernel;
 
 use std::ops::Range;
 
-use kernel::unpack;
+use kernel::{fixed, unpack};
 
 use crate::gnss::samples::Format;
+use crate::receiver::correlate::fixed::{Fixed, FixedSamples};
 
 /// Consecutive samples; `q` is all zeros for a real recording.
 #[derive(Clone, Copy, Debug)]
@@ -96,6 +97,21 @@ impl Lookback {
         unpack(block.format, &packed, &mut planes.i, &mut planes.q);
         planes.packed = packed;
         Block { first: from, i: &planes.i, q: &planes.q }
+    }
+
+    /// The same of samples of 8 bits, as fixed-point numbers; those of other formats are left out.
+    pub fn fixed<'a>(&self, block: &Packed, (from, to): (u64, u64), room: &'a mut FixedSamples) -> Fixed<'a> {
+        let size = block.format.bytes();
+        let kept = self.kept(block, from);
+        let start = from.saturating_sub(block.first) as usize * size;
+        let end = to.saturating_sub(block.first) as usize * size;
+        let bytes = block.bytes.get(start..end.min(block.bytes.len())).unwrap_or_default();
+        room.clear();
+        for bytes in [kept, bytes] {
+            let [i, q] = room.more(bytes.len() / size);
+            fixed(block.format, bytes, i, q);
+        }
+        room.samples()
     }
 
     /// Keeps the samples from number `from` on, up to the block's end.
@@ -299,6 +315,9 @@ mod tests {
                 let samples = lookback.unpack(&block, (shown, block.end()), &mut planes);
                 let expected: Vec<f32> = (shown..block.end()).map(|n| 2.0 * n as f32).collect();
                 assert_eq!((samples.first, samples.i), (shown, &expected[..]), "{first} {shown}");
+                let (mut room, mut other) = (FixedSamples::default(), FixedSamples::default());
+                let fixed = lookback.fixed(&block, (shown, block.end()), &mut room);
+                assert_eq!(fixed, other.of(samples.i, samples.q), "{first} {shown}");
             }
             lookback.keep(&block, from);
             assert_eq!((lookback.first, lookback.bytes.len() as u64), (from, 2 * (block.end() - from)));

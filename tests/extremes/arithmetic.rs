@@ -138,7 +138,7 @@ fn full_scale_for_a_second_overflows_nothing() {
     // By running sums: area edges take half a sample at each of some 512 changes in 50 000 samples.
     let replica = Replica::new(l1ca::code(9).unwrap(), Edge::Area).unwrap();
     let mut room = RunningSums::default();
-    let samples = Samples { i: &i, q: &q, sums: room.of(&i, &q) };
+    let samples = Samples { i: &i, q: &q, sums: room.of(&i, &q), fixed: None };
     assert!(replica.takes_sums(&nco));
     let [sum] = replica.correlate_in(Arithmetic::Sums, samples, &nco, &[0]);
     let less = 1.0 - 512.0 * 0.5 / 50_000.0;

@@ -86,6 +86,7 @@ const E5_CODES: &str = "witness::codes::all_chips_of_all_codes_and_overlays_of_e
 const TWO_BANDS: &str =
     "laws::two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_place_without_it";
 const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_place_and_a_clock_of_each";
+const SUMS: &str = "laws::running_sums_give_what_every_sample_by_itself_does";
 const OFFSET: &str = "laws::with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_time";
 const PAGES: &str =
     "witness::printed::the_page_with_the_ionosphere_and_the_count_of_the_handover_are_where_they_are_printed";
@@ -228,8 +229,9 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.loops.step", "a loop update takes too little of what the half intervals bring", LOOP),
     fault("receiver.nco.carrier_aid", "the carrier aids the code with the wrong sign", LOOP),
     fault("receiver.nco.carrier_between_updates", "a measurement forgets the carrier since the last code period", LOOP),
-    fault("receiver.sums.place", "changes of the code's sign are met half a sample late", LOOP),
-    fault("receiver.sums.window", "early and late are taken from the wrong sides", LOOP),
+    fault("receiver.rows.place", "the code is read from its table half a sample late", LOOP),
+    fault("receiver.sums.place", "changes of the code's sign are met half a sample late", SUMS),
+    fault("receiver.sums.window", "early and late are taken from the wrong sides", SUMS),
     fault("receiver.measure.doppler_sign", "Doppler with the wrong sign", LOOP),
     fault("receiver.measure.carrier_sign", "the carrier with the wrong sign", LOOP),
     fault("receiver.cn0.scale", "C/N0 reads 0.5 dB too high", LOOP),

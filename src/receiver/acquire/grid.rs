@@ -20,6 +20,7 @@ use super::pair::{Dwells, Spectra};
 use super::refine::Refined;
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
+use super::shifted::Shifted;
 use super::{Acquired, kernel};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Component;
@@ -231,7 +232,7 @@ impl Grid {
     /// The bins of a long spectrum within the band, those from zero on and those below: the signed number of
     /// the first, their places, and those in the order of the short transform. The others of the short one
     /// have none.
-    fn band(&self, length: usize) -> [(f64, Range<usize>, Range<usize>); 2] {
+    pub(super) fn band(&self, length: usize) -> [(f64, Range<usize>, Range<usize>); 2] {
         let band = self.inverse.len();
         let (positive, reach) = (band.div_ceil(2), length.div_ceil(2));
         let above = positive.min(reach);
@@ -250,22 +251,37 @@ impl Grid {
         }
         // What is compared with strips of before has their scale.
         let scale = again.filter(|_| self.pair.is_none()).map_or(1.0 / rms, |again| again.before.scale);
-        let one = |(bin, &doppler): (usize, &f64)| match again {
+        let everywhere = again.is_none_or(|again| again.satellites.iter().any(|(_, everywhere)| *everywhere));
+        let shifted = if everywhere && self.pair.is_none() { Shifted::new(self, block, scale) } else { None };
+        let one_doppler = |bin: usize, spectra: &[Spectra<'_>]| {
+            let dwells = match &shifted {
+                Some(shifted) => self.dwells(|period, spectrum| shifted.add_period(self, bin, period, spectrum)),
+                None => {
+                    let mut scratch = vec![Complex::default(); self.forward.get_inplace_scratch_len()];
+                    let mut long = vec![Complex::default(); self.forward.len()];
+                    self.dwells(|period, spectrum| {
+                        let rooms = (&mut long[..], &mut scratch[..]);
+                        self.add_period(block, scale, self.dopplers_hz[bin], period, rooms, spectrum);
+                    })
+                }
+            };
+            self.strips(&dwells, spectra)
+        };
+        let one = |bin: usize| match again {
             Some(again) if !again.dopplers.contains(&bin) => {
                 let wanted = |number: usize| again.satellites.get(number).is_some_and(|(_, everywhere)| *everywhere);
                 let some: Vec<Spectra<'_>> = (0..).zip(spectra).filter(|(n, _)| wanted(*n)).map(|(_, s)| *s).collect();
-                let mut seen =
-                    if some.is_empty() { Vec::new() } else { self.one_doppler(block, scale, doppler, &some) };
+                let mut seen = if some.is_empty() { Vec::new() } else { one_doppler(bin, &some) };
                 let mut seen = seen.drain(..);
                 let before = |satellite: usize| again.before.strips.get(bin)?.get(satellite).copied();
                 (again.satellites.iter())
                     .filter_map(|(satellite, everywhere)| if *everywhere { seen.next() } else { before(*satellite) })
                     .collect()
             }
-            _ => self.one_doppler(block, scale, doppler, spectra),
+            _ => one_doppler(bin, spectra),
         };
         let strips: Vec<Vec<Strip>> = match &self.pair {
-            None => self.dopplers_hz.par_iter().enumerate().map(one).collect(),
+            None => (0..self.dopplers_hz.len()).into_par_iter().map(one).collect(),
             Some(dwells) => self.strips_of_pairs(dwells, block, scale, spectra),
         };
         let heights: Vec<Vec<f64>> = (0..spectra.len()).map(|satellite| self.heights(&strips, satellite)).collect();
@@ -291,29 +307,30 @@ impl Grid {
         self.law.threshold
     }
 
-    fn one_doppler(&self, block: &Block, scale: f64, doppler_hz: f64, spectra: &[Spectra<'_>]) -> Vec<Strip> {
-        let mut scratch = vec![
-            Complex::default();
-            self.forward.get_inplace_scratch_len().max(self.inverse.get_inplace_scratch_len())
-        ];
-        let mut long = vec![Complex::default(); self.forward.len()];
+    /// The spectra of all coherent sums, to which `add` adds each period.
+    fn dwells(&self, mut add: impl FnMut(u32, &mut [Complex<f32>])) -> Vec<Vec<Complex<f32>>> {
         let periods = self.coherent_periods;
-        let dwells: Vec<Vec<Complex<f32>>> = (0..self.sums)
+        (0..self.sums)
             .map(|dwell| {
                 let mut spectrum = vec![Complex::default(); self.inverse.len()];
                 for period in dwell * periods..(dwell + 1) * periods {
-                    self.add_period(block, scale, doppler_hz, period, (&mut long, &mut scratch), &mut spectrum);
+                    add(period, &mut spectrum);
                 }
                 spectrum
             })
-            .collect();
+            .collect()
+    }
+
+    /// What satellites show in these sums.
+    fn strips(&self, dwells: &[Vec<Complex<f32>>], spectra: &[Spectra<'_>]) -> Vec<Strip> {
+        let mut scratch = vec![Complex::default(); self.inverse.get_inplace_scratch_len()];
         let mut short = vec![Complex::default(); self.inverse.len()];
         let mut powers = vec![0.0_f32; self.lags];
         spectra
             .iter()
             .map(|[spectrum, _]| {
                 powers.fill(0.0);
-                for data in &dwells {
+                for data in dwells {
                     kernel::multiply(&mut short, data, spectrum);
                     self.inverse.process_with_scratch(&mut short, &mut scratch);
                     kernel::add_powers(&mut powers, &short);
@@ -321,43 +338,6 @@ impl Grid {
                 self.strip(&powers)
             })
             .collect()
-    }
-
-    /// Adds the spectrum of one code period with carrier removed, turned to where the period begins.
-    fn add_period(
-        &self,
-        block: &Block,
-        scale: f64,
-        doppler_hz: f64,
-        period: u32,
-        (long, scratch): (&mut [Complex<f32>], &mut [Complex<f32>]),
-        spectrum: &mut [Complex<f32>],
-    ) {
-        let begins = f64::from(period) * self.period_samples / (1.0 + doppler_hz / self.carrier_hz);
-        let first = begins.round();
-        let fraction = begins - first;
-        let step = self.phasor(-self.frequency_hz(doppler_hz), 1);
-        let rotation = self.phasor(-self.frequency_hz(doppler_hz), first as u64) * scale;
-        let from = (first as usize).min(block.i.len().min(block.q.len()));
-        kernel::mix(long, (&block.i[from..], &block.q[from..]), rotation, step);
-        self.forward.process_with_scratch(long, scratch);
-        let shift = |number: f64| {
-            let (sin, cos) = libm::sincos(TAU * fraction * number / self.forward.len() as f64);
-            Complex::new(cos, sin)
-        };
-        let turn = shift(1.0);
-        for (first, bins, places) in self.band(long.len()) {
-            kernel::add_turned(&mut spectrum[places], &long[bins], shift(first), turn);
-        }
-    }
-
-    #[cfg(test)]
-    pub fn spectrum_of_period(&self, block: &Block, doppler_hz: f64, period: u32) -> Vec<Complex<f32>> {
-        let (mut long, mut sum) =
-            (vec![Complex::default(); self.forward.len()], vec![Complex::default(); self.inverse.len()]);
-        let mut scratch = vec![Complex::default(); self.forward.get_inplace_scratch_len()];
-        self.add_period(block, 1.0, doppler_hz, period, (&mut long, &mut scratch), &mut sum);
-        sum
     }
 
     pub(super) fn strip(&self, powers: &[f32]) -> Strip {

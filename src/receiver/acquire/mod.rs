@@ -41,6 +41,7 @@ mod refine;
 mod replica;
 mod room;
 mod settings;
+mod shifted;
 mod tone;
 mod window;
 

@@ -448,3 +448,35 @@ fn power_lanes(i: &[f32], q: &[f32]) -> f64 {
     }
     total
 }
+
+/// Σ i² + q² of short integers within ±2048.
+pub(super) fn fixed_power(level: Level, i: &[i16], q: &[i16]) -> f64 {
+    match level {
+        Level::Baseline => fixed_power_lanes(i, q),
+        // SAFETY: as in `at_level`.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 => unsafe { fixed_power_avx2(i, q) },
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn fixed_power_avx2(i: &[i16], q: &[i16]) -> f64 {
+    fixed_power_lanes(i, q)
+}
+
+#[inline(always)]
+fn fixed_power_lanes(i: &[i16], q: &[i16]) -> f64 {
+    let mut total = 0_u64;
+    for plane in [i, q] {
+        // 128 squares up to 2²² stay below 2³².
+        for part in plane.chunks(128) {
+            let mut sum = 0_u32;
+            for &x in part {
+                sum = sum.wrapping_add((i32::from(x) * i32::from(x)) as u32);
+            }
+            total += u64::from(sum);
+        }
+    }
+    total as f64
+}

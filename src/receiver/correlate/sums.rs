@@ -1,34 +1,61 @@
-//! Samples with their running sums, by which the correlator by pieces needs no sample twice.
+//! Samples with their running sums, by which the correlator by pieces needs no sample twice, and in 16 bits.
 //!
 //! Sums are integers, in halves of a sample's last bit and modulo 2³², so that differences are exact wherever
 //! the sums began.
 
+use super::fixed::Fixed;
 use super::kernel::Level;
 use super::pieces::kernel;
+use super::power;
 
-/// Consecutive samples, and their running sums where they were made.
+/// Consecutive samples, and their running sums where they were made. Planes may be left out where there are
+/// samples in 16 bits.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a> {
-    /// In-phase samples.
+    /// In-phase samples; none where they were left out.
     pub i: &'a [f32],
-    /// Quadrature samples.
+    /// Quadrature samples; none where they were left out.
     pub q: &'a [f32],
     /// What all of them before each one add up to, as far as that was made.
     pub sums: Option<Sums<'a>>,
+    /// The same samples in 16 bits, where they were made.
+    pub fixed: Option<Fixed<'a>>,
 }
 
 impl<'a> From<(&'a [f32], &'a [f32])> for Samples<'a> {
     fn from((i, q): (&'a [f32], &'a [f32])) -> Self {
-        Self { i, q, sums: None }
+        Self { i, q, sums: None, fixed: None }
     }
 }
 
 impl<'a> Samples<'a> {
+    /// Number of the samples.
+    pub fn count(&self) -> usize {
+        self.fixed.map_or(self.i.len().min(self.q.len()), |fixed| fixed.count())
+    }
+
+    /// Σ |x|².
+    pub fn power(&self) -> f64 {
+        self.fixed.map_or_else(|| power(self.i, self.q), |fixed| fixed.power())
+    }
+
+    /// What `of` makes of the planes, which are made where they were left out.
+    pub(super) fn by_planes<R>(&self, of: impl FnOnce(&[f32], &[f32]) -> R) -> R {
+        match self.fixed.filter(|_| self.i.is_empty()) {
+            Some(fixed) => {
+                let [i, q] = fixed.planes();
+                of(&i, &q)
+            }
+            None => of(self.i, self.q),
+        }
+    }
+
     /// The samples from `from` to `to`; none where some of them are not there.
     pub fn part(&self, from: usize, to: usize) -> Self {
         let sums = self.sums.and_then(|sums| sums.part(from, to));
         let of = |plane: &'a [f32]| plane.get(from..to).unwrap_or_default();
-        Self { i: of(self.i), q: of(self.q), sums }
+        let fixed = self.fixed.and_then(|fixed| fixed.part(from, to));
+        Self { i: of(self.i), q: of(self.q), sums, fixed }
     }
 }
 
@@ -62,7 +89,7 @@ impl<'a> Sums<'a> {
     }
 }
 
-/// Room for running sums.
+/// Room for running sums, which only grows.
 #[derive(Clone, Debug, Default)]
 pub struct RunningSums(Vec<[i32; 2]>);
 
@@ -70,11 +97,23 @@ impl RunningSums {
     /// The running sums of samples of 8 bits: within ±127.5, in steps of a half or more.
     pub fn of(&mut self, i: &[f32], q: &[f32]) -> Option<Sums<'_>> {
         let samples = i.len().min(q.len());
-        self.0.resize(samples + Sums::MORE, [0; 2]);
-        let (i, q) = (&i[..samples], &q[..samples]);
-        kernel::running_sums(Level::best(), i, q, &mut self.0[..=samples]);
-        self.0[samples + 1] = self.0[samples];
-        Sums::new(&self.0)
+        self.made(samples, |entries| kernel::running_sums(Level::best(), &i[..samples], &q[..samples], entries))
+    }
+
+    /// The same of samples in 16 bits.
+    pub fn of_fixed(&mut self, fixed: Fixed) -> Option<Sums<'_>> {
+        self.made(fixed.count(), |entries| kernel::running_sums_of_fixed(Level::best(), fixed.i, fixed.q, entries))
+    }
+
+    fn made(&mut self, samples: usize, fill: impl FnOnce(&mut [[i32; 2]])) -> Option<Sums<'_>> {
+        let whole = samples + Sums::MORE;
+        if self.0.len() < whole {
+            self.0.resize(whole, [0; 2]);
+        }
+        let entries = &mut self.0[..whole];
+        fill(&mut entries[..=samples]);
+        entries[samples + 1] = entries[samples];
+        Sums::new(entries)
     }
 }
 
@@ -100,6 +139,11 @@ mod tests {
                 let mut made = vec![[7_i32; 2]; count + 1];
                 kernel::running_sums(level, &i, &q, &mut made);
                 assert_eq!(made, expected, "{level:?} {count}");
+                let [short_i, short_q] =
+                    [&i, &q].map(|plane| plane.iter().map(|x| (16.0 * x) as i16).collect::<Vec<_>>());
+                made.fill([7; 2]);
+                kernel::running_sums_of_fixed(level, &short_i, &short_q, &mut made);
+                assert_eq!(made, expected, "{level:?} {count} in 16 bits");
             }
         }
     }

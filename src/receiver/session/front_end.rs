@@ -13,6 +13,7 @@ use crate::gnss::record::{EventRow, LineRow};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::{Link, Signal};
 use crate::receiver::acquire::{self, AcquireError, Searcher};
+use crate::receiver::correlate::fixed::FixedSamples;
 use crate::receiver::correlate::sums::{RunningSums, Samples};
 use crate::receiver::decode::Decoder;
 use crate::receiver::interference::{Followed, Watch};
@@ -33,11 +34,20 @@ const PART_SAMPLES: usize = 1 << 15;
 /// … and of so many of the longest code period, as one that a part's end cuts is unpacked again.
 const PART_PERIODS: f64 = 4.0;
 
+/// What is made of samples for all channels of a front end.
+#[derive(Clone, Copy)]
+struct Wanted {
+    sums: bool,
+    fixed: bool,
+    planes: bool,
+}
+
 /// Samples of a part of a block, unpacked and summed up.
 #[derive(Default)]
 struct Room {
     planes: Planes,
     sums: RunningSums,
+    fixed: FixedSamples,
 }
 
 /// One channel and its decoder.
@@ -218,16 +228,25 @@ impl FrontEnd {
         let part = PART_SAMPLES.max(self.samples(PART_PERIODS * longest_s) as usize);
         let stream = (&self.lookback, block);
         // For all or none: results must not depend on who shares a core with whom.
-        let summed = self.tracks.iter().any(|track| track.channel.takes_sums());
+        let wanted = self.wanted();
         self.tracks.par_chunks_mut(share).zip(&mut self.rooms).for_each(|(tracks, room)| {
             tracks.iter_mut().for_each(|track| clear(&mut track.report));
             for start in (0..block.samples()).step_by(part) {
                 let (from, to) = (block.first + start as u64, block.end().min(block.first + (start + part) as u64));
-                follow(tracks, stream, (room, summed), (from, to), within(&ticks, from, to));
+                follow(tracks, stream, (room, wanted), (from, to), within(&ticks, from, to));
             }
         });
         let needed = self.tracks.iter().filter_map(|track| track.channel.needs()).min();
         self.lookback.keep(block, needed.unwrap_or(block.end()));
+    }
+
+    /// What channels want to be shown.
+    fn wanted(&self) -> Wanted {
+        let channels = || self.tracks.iter().map(|track| &track.channel);
+        let sums = channels().any(Channel::takes_sums);
+        let fixed = channels().all(|channel| channel.takes_sums() || channel.takes_fixed());
+        let also_fixed = channels().any(Channel::takes_fixed);
+        Wanted { sums, fixed: fixed || also_fixed, planes: !fixed }
     }
 
     /// Writes rows and events of all channels.
@@ -291,16 +310,24 @@ impl FrontEnd {
 fn follow(
     tracks: &mut [Track],
     (lookback, block): (&Lookback, &Packed),
-    (room, summed): (&mut Room, bool),
+    (room, wanted): (&mut Room, Wanted),
     (from, to): (u64, u64),
     ticks: &[u64],
 ) {
     let needed = tracks.iter().filter_map(|track| track.channel.needs()).min();
     let first = needed.unwrap_or(from).clamp(lookback.first(block), from);
-    let samples = lookback.unpack(block, (first, to), &mut room.planes);
-    let (i, q) = (samples.i, samples.q);
-    let sums = if summed { room.sums.of(i, q) } else { None };
-    let shown = Shown { first, samples: Samples { i, q, sums }, from };
+    let fixed = wanted.fixed.then(|| lookback.fixed(block, (first, to), &mut room.fixed));
+    let (mut i, mut q): (&[f32], &[f32]) = (&[], &[]);
+    if wanted.planes {
+        let samples = lookback.unpack(block, (first, to), &mut room.planes);
+        (i, q) = (samples.i, samples.q);
+    }
+    let sums = match fixed.filter(|_| wanted.sums) {
+        Some(fixed) => room.sums.of_fixed(fixed),
+        None if wanted.sums => room.sums.of(i, q),
+        None => None,
+    };
+    let shown = Shown { first, samples: Samples { i, q, sums, fixed }, from };
     for track in tracks.iter_mut() {
         track.channel.follow(&shown, ticks, &mut track.report);
     }

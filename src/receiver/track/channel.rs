@@ -27,6 +27,7 @@ use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Component, Link, Signal};
 use crate::gnss::time::{Rate, tone_turns};
 use crate::receiver::acquire::Acquired;
+use crate::receiver::correlate::fixed::FixedSamples;
 use crate::receiver::correlate::sums::{RunningSums, Samples};
 use crate::receiver::correlate::{Arithmetic, Replica, chips_to_units, units_to_chips};
 use crate::receiver::lead::{followed_db, lead};
@@ -71,17 +72,18 @@ pub struct Shown<'a> {
 impl Shown<'_> {
     /// Number of the sample after the last one.
     fn end(&self) -> u64 {
-        self.first + self.samples.i.len().min(self.samples.q.len()) as u64
+        self.first + self.samples.count() as u64
     }
 }
 
-/// Samples of an unfinished code period, and room for their running sums.
+/// Samples of an unfinished code period, and room for what is made of them.
 #[derive(Clone, Debug, Default)]
 struct Kept {
     first: u64,
     i: Vec<f32>,
     q: Vec<f32>,
     sums: RunningSums,
+    fixed: FixedSamples,
 }
 
 /// How far a channel is.
@@ -306,6 +308,11 @@ impl Channel {
         };
         channel.design();
         channel.set_steps();
+        if channel.arithmetic == Arithmetic::Sums
+            && let Some(replica) = &mut channel.replica
+        {
+            replica.prepare(chips_to_units(chip_rate_hz / metadata.rate.hz()).max(1) as u64);
+        }
         channel
     }
 
@@ -378,7 +385,8 @@ impl Channel {
         kept.i.extend_from_slice(block.i);
         kept.q.extend_from_slice(block.q);
         let sums = if self.takes_sums() { kept.sums.of(&kept.i, &kept.q) } else { None };
-        let samples = Samples { i: &kept.i, q: &kept.q, sums };
+        let fixed = self.takes_fixed().then(|| kept.fixed.of(&kept.i, &kept.q));
+        let samples = Samples { i: &kept.i, q: &kept.q, sums, fixed };
         self.follow(&Shown { first: kept.first, samples, from: block.first }, ticks, report);
         let needed = self.needs().unwrap_or(u64::MAX).saturating_sub(kept.first);
         let done = usize::try_from(needed).unwrap_or(usize::MAX).min(kept.i.len());
@@ -403,6 +411,12 @@ impl Channel {
     pub fn takes_sums(&self) -> bool {
         self.arithmetic == Arithmetic::Sums
             && self.replica.as_ref().is_some_and(|replica| replica.takes_sums(&self.oscillators()))
+    }
+
+    /// Whether samples in 16 bits are of use.
+    pub fn takes_fixed(&self) -> bool {
+        self.arithmetic == Arithmetic::Sums
+            && self.replica.as_ref().is_some_and(|replica| replica.takes_fixed(&self.oscillators()))
     }
 
     /// [`Channel::advance`] on samples that the caller keeps as far as the channel [`Channel::needs`] them.

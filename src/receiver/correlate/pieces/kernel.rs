@@ -7,6 +7,7 @@
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64 as x86;
 
+use super::super::fixed::POINT_BITS;
 use super::super::kernel::Level;
 use super::lanes::{self, Chunk, Products};
 #[cfg(target_arch = "x86_64")]
@@ -88,6 +89,71 @@ fn running_sums_avx2(i: &[f32], q: &[f32], entries: &mut [[i32; 2]]) -> Done {
         // SAFETY: there is room for four pairs, and any alignment will do.
         unsafe { x86::_mm256_storeu_si256(out.as_mut_ptr().cast(), sums) };
         samples += 4;
+    }
+    let pair = x86::_mm256_castsi256_si128(before);
+    Done { samples, halves: [x86::_mm_extract_epi32::<0>(pair), x86::_mm_extract_epi32::<1>(pair)] }
+}
+
+/// The same of samples in 16 bits.
+pub(in super::super) fn running_sums_of_fixed(level: Level, i: &[i16], q: &[i16], entries: &mut [[i32; 2]]) {
+    const DOWN: u32 = POINT_BITS - 1;
+    let done = match level {
+        Level::Baseline => Done { samples: 0, halves: [0; 2] },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 => unsafe { running_sums_of_fixed_avx2(i, q, entries) },
+    };
+    let mut halves = done.halves;
+    if let Some(first) = entries.first_mut() {
+        *first = [0; 2];
+    }
+    let rest = i.iter().zip(q).zip(entries.iter_mut().skip(1)).skip(done.samples);
+    for ((i, q), entry) in rest {
+        halves = [halves[0].wrapping_add(i32::from(i >> DOWN)), halves[1].wrapping_add(i32::from(q >> DOWN))];
+        *entry = halves;
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn running_sums_of_fixed_avx2(i: &[i16], q: &[i16], entries: &mut [[i32; 2]]) -> Done {
+    const DOWN: i32 = POINT_BITS as i32 - 1;
+    const EACH: usize = 16;
+    let (all_i, all_q) = (i.as_chunks::<EACH>().0, q.as_chunks::<EACH>().0);
+    let rooms = entries.get_mut(1..).unwrap_or_default().as_chunks_mut::<EACH>().0;
+    let last = x86::_mm256_setr_epi32(6, 7, 6, 7, 6, 7, 6, 7);
+    let mut before = x86::_mm256_setzero_si256();
+    let mut samples = 0;
+    for ((i, q), room) in all_i.iter().zip(all_q).zip(rooms) {
+        // SAFETY: sixteen values are at either, and any alignment will do.
+        let planes =
+            unsafe { [x86::_mm256_loadu_si256(i.as_ptr().cast()), x86::_mm256_loadu_si256(q.as_ptr().cast())] };
+        // Sums of up to eight halves, which 16 bits hold.
+        let mut summed = planes;
+        for plane in &mut summed {
+            let one = x86::_mm256_srai_epi16::<DOWN>(*plane);
+            let two = x86::_mm256_add_epi16(one, x86::_mm256_slli_si256::<2>(one));
+            let four = x86::_mm256_add_epi16(two, x86::_mm256_slli_si256::<4>(two));
+            *plane = x86::_mm256_add_epi16(four, x86::_mm256_slli_si256::<8>(four));
+        }
+        let (low, high) =
+            (x86::_mm256_unpacklo_epi16(summed[0], summed[1]), x86::_mm256_unpackhi_epi16(summed[0], summed[1]));
+        let eights = [
+            [x86::_mm256_castsi256_si128(low), x86::_mm256_castsi256_si128(high)],
+            [x86::_mm256_extracti128_si256::<1>(low), x86::_mm256_extracti128_si256::<1>(high)],
+        ];
+        let rooms = room.as_chunks_mut::<8>().0;
+        for (eight, room) in eights.iter().zip(rooms) {
+            let (first, second) = (x86::_mm256_cvtepi16_epi32(eight[0]), x86::_mm256_cvtepi16_epi32(eight[1]));
+            let out = room.as_mut_ptr().cast::<x86::__m256i>();
+            // SAFETY: there is room for eight pairs, and any alignment will do.
+            unsafe {
+                x86::_mm256_storeu_si256(out, x86::_mm256_add_epi32(first, before));
+                x86::_mm256_storeu_si256(out.add(1), x86::_mm256_add_epi32(second, before));
+            }
+            before = x86::_mm256_add_epi32(before, x86::_mm256_permutevar8x32_epi32(second, last));
+        }
+        samples += EACH;
     }
     let pair = x86::_mm256_castsi256_si128(before);
     Done { samples, halves: [x86::_mm_extract_epi32::<0>(pair), x86::_mm_extract_epi32::<1>(pair)] }

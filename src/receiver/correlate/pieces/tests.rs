@@ -152,7 +152,7 @@ fn pieces_are_left_where_products_are_quicker_or_the_carrier_turns_too_far() {
     assert!(nearest.pieces.is_empty());
     let (i, q) = (noise(2600, 5), noise(2600, 6));
     let mut room = RunningSums::default();
-    let samples = Samples { i: &i, q: &q, sums: room.of(&i, &q) };
+    let samples = Samples { i: &i, q: &q, sums: room.of(&i, &q), fixed: None };
     let at = nco(2.6e6, 1.023e6, 20e3, 0.0);
     let taps = [0];
     let by = |arithmetic| replica.correlate_in(arithmetic, samples, &at, &taps);

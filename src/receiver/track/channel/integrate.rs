@@ -5,7 +5,7 @@ use num_complex::Complex64;
 
 use super::{Channel, Stage};
 use crate::receiver::correlate::sums::Samples;
-use crate::receiver::correlate::{self, Nco, Replica, TURN, chips_to_units};
+use crate::receiver::correlate::{Nco, Replica, TURN, chips_to_units};
 use crate::receiver::track::side::SidePeaks;
 use crate::receiver::track::{Report, Symbol};
 
@@ -30,11 +30,10 @@ impl Channel {
     /// `next`.
     pub(super) fn correlate(&mut self, replica: &Replica, samples: Samples, next: u64, report: &mut Report) {
         let nco = self.oscillators();
-        let (i, q) = (samples.i, samples.q);
         let Correlations { sums, noise, sides } = self.correlations(replica, samples, &nco);
         let read = self.whole && self.confirmed && !self.held && self.overlay_phase.is_some();
         if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
-            let power = correlate::power(i, q) / i.len().max(1) as f64;
+            let power = samples.power() / samples.count().max(1) as f64;
             self.power =
                 Some(self.power.map_or(power, |mean| mean + (power - mean) * POWER_EVERY as f64 / POWER_PERIODS));
         }
