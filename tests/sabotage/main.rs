@@ -91,7 +91,7 @@ fn every_kind_of_damage_passes_where_it_is_tolerable_and_fails_by_its_row_where_
     // Every third each day, all with `GNSS_TWIN_LONG`.
     if std::env::var_os("GNSS_TWIN_LONG").is_none() {
         let mut number = 0..;
-        kinds.retain(|_| number.next().is_some_and(|n: usize| n % 3 == 0));
+        kinds.retain(|_| number.next().is_some_and(|n: usize| n.is_multiple_of(3)));
     }
     let (next, found) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
