@@ -143,8 +143,9 @@ fn fifty_megahertz_hold_four_signals_of_three_systems_as_listed_and_none_else() 
     );
 }
 
-/// Two front ends of one moment, of which nothing says what they hold but where they lie. The band of the first ends below channel 6. Its list has channels 1 and 5 as
-/// weak: 4 ms are too short for them, and 5 is 63 Hz beyond the default band of Dopplers, as G2 shows it.
+/// Two front ends of one moment, of which nothing says what they hold but where they lie. The band of the
+/// first ends below channel 6. Its list has channels 1 and 5 as weak: 4 ms are too short for them, and 5 is
+/// 63 Hz beyond the default band of Dopplers, as G2 shows it.
 #[test]
 fn both_bands_of_glonass_hold_the_channels_listed_and_none_else() {
     let flags = |if_hz: &'static str| ["--format", "ci8", "--rate-hz", "6.625e6", "--if-hz", if_hz];

@@ -1,5 +1,5 @@
-//! Samples of 8 bits as fixed-point numbers of 16: what the fast correlators take, made of the packed bytes at
-//! once.
+//! Samples of 8 bits as fixed-point numbers of 16: what the fast correlators take, made of the packed bytes
+//! at once.
 
 use super::kernel::{self, Level};
 use super::rows;

@@ -106,8 +106,8 @@ impl FrontEnd {
         (shared.ephemerides.satellites().filter_map(one).collect(), later_s)
     }
 
-    /// Whether searches for all leave a link out: its satellite sends another signal as well, by its block, that
-    /// is received and costs less to search for, and by which this one is foreseen.
+    /// Whether searches for all leave a link out: its satellite sends another signal as well, by its block,
+    /// that is received and costs less to search for, and by which this one is foreseen.
     pub(super) fn is_led(link: Link, shared: &Shared) -> bool {
         let at = shared.near();
         // Dopplers as many as the period is long, of lags as many as there are chips.

@@ -1,4 +1,5 @@
-//! [`Format::unpack`], and the same to fixed-point numbers, compiled for the widest vectors that its loops make use of.
+//! [`Format::unpack`], and the same to fixed-point numbers, compiled for the widest vectors that its loops
+//! make use of.
 
 use crate::gnss::samples::Format;
 use crate::receiver::correlate::fixed::POINT_BITS;

@@ -2,9 +2,9 @@
 //! a chip.
 //!
 //! A row is a period of the replica, area edges and all, sampled at the signal's nominal code rate. Rows are
-//! 1/16 sample apart, and what lies between two of them is their weighted mean. That mean is exact but where a
-//! change enters or leaves a sample between the two rows: there the edge is as if smoothed over less than 1/16
-//! sample, with no shift. Values have 8 bits; what rounding does to one edge the next ones make up for.
+//! 1/16 sample apart, and what lies between two of them is their weighted mean. That mean is exact but where
+//! a change enters or leaves a sample between the two rows: there the edge is as if smoothed over less than
+//! 1/16 sample, with no shift. Values have 8 bits; what rounding does to one edge the next ones make up for.
 //! Weights are those of the middle of [`SEGMENT`] samples, in steps of 2⁻¹⁰ sample; what rounding does to one
 //! segment the next one makes up for.
 //!
