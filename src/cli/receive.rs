@@ -21,6 +21,7 @@ use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Signal;
 use crate::receiver;
 use crate::receiver::Outcome;
+use crate::receiver::acquire::ALL;
 use crate::receiver::output::{JsonLines, Nmea, Output, OutputError, Record, Rinex, Sink};
 use crate::receiver::settings::Settings;
 
@@ -39,7 +40,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
         return Err(CliError::usage("--nmea - and --json: standard output takes one of them"));
     }
     let recordings = recording::open(arguments)?;
-    let settings = searched(&recordings, settings, printed(arguments).in_words());
+    let settings = searched(&recordings, settings, arguments);
     let samples = recordings.first().and_then(|first| first.samples);
     let format = recordings.first().map(|first| first.metadata.format);
     let broken: Vec<Arc<OnceLock<String>>> = recordings.iter().filter_map(|one| one.broken.clone()).collect();
@@ -73,13 +74,14 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     outcome.diagnosis.map_or(Ok(()), |diagnosis| Err(CliError::incomplete(diagnosis.headline())))
 }
 
-/// The settings with the signals that are searched for, where they name none: those that every recording's
-/// metadata name, or else those that the bands hold, which is said.
-fn searched(recordings: &[Recording], mut settings: Settings, in_words: bool) -> Settings {
-    if !settings.acquisition.signals.is_empty() {
-        return settings;
+/// The settings with the signals that are searched for: the flag's, or those that they name; or else those that
+/// every recording's metadata name; or else what the bands hold, which is said.
+fn searched(recordings: &[Recording], mut settings: Settings, arguments: &args::Receive) -> Settings {
+    if !arguments.signals.is_empty() {
+        settings.acquisition.signals = arguments.signals.iter().map(|name| name.trim().to_owned()).collect();
     }
-    if recordings.iter().all(|recording| !recording.signals.is_empty()) {
+    let are_named = recordings.iter().all(|recording| !recording.signals.is_empty());
+    if settings.acquisition.signals.is_empty() && are_named {
         let mut named: Vec<&'static Signal> = Vec::new();
         for signal in recordings.iter().flat_map(|recording| &recording.signals) {
             if !named.contains(signal) {
@@ -87,13 +89,26 @@ fn searched(recordings: &[Recording], mut settings: Settings, in_words: bool) ->
             }
         }
         settings.acquisition.or_signals(&named);
+    }
+    let is_open = settings.acquisition.signals.is_empty() || settings.acquisition.is_all();
+    if !is_open || settings.validate("settings").is_err() {
         return settings;
     }
     let metadata: Vec<IfMetadata> = recordings.iter().map(|recording| recording.metadata.clone()).collect();
     let settings = receiver::searched(&metadata, &settings);
-    if in_words {
-        let names: Vec<&str> = settings.acquisition.signals().into_iter().map(|signal| signal.name).collect();
-        scenario::note(&format!("searching for what the bands hold: {}", names.join(", ")));
+    if printed(arguments).in_words() {
+        let names = |settings: &Settings| -> Vec<&str> {
+            settings.acquisition.signals().into_iter().map(|signal| signal.name).collect()
+        };
+        let mut all = settings.clone();
+        all.acquisition.signals = vec![ALL.to_owned()];
+        let (chosen, held) = (names(&settings), names(&receiver::searched(&metadata, &all)));
+        let others: Vec<&str> = held.into_iter().filter(|name| !chosen.contains(name)).collect();
+        let more = match others.as_slice() {
+            [] => String::new(),
+            others => format!("; --signals all adds what else the bands hold: {}", others.join(", ")),
+        };
+        scenario::note(&format!("searching for {}{more}", chosen.join(", ")));
     }
     settings
 }

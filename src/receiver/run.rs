@@ -8,6 +8,7 @@ use std::io::{ErrorKind, Read};
 
 use serde_json::json;
 
+use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
 use crate::receiver::acquire;
@@ -27,11 +28,20 @@ const BLOCK_SAMPLES: u64 = 1 << 17;
 /// Bytes read at a time of each of several front ends.
 const READ_BYTES: usize = 1 << 18;
 
-/// Settings with the signals that are searched for: where they name none, all that these bands hold and this
-/// receiver can follow to a position.
+/// Settings with the signals that are searched for: where they say `all`, what these bands hold and this receiver
+/// can follow to a position; where they name none, GPS L1 C/A if it is among those, and else all of them.
 pub fn searched(metadata: &[IfMetadata], settings: &Settings) -> Settings {
     let mut own = settings.clone();
-    own.acquisition.or_signals(&held(metadata, settings));
+    if own.acquisition.is_all() {
+        own.acquisition.signals.clear();
+        own.acquisition.or_signals(&held(metadata, settings));
+    } else if own.acquisition.signals.is_empty() {
+        let mut held = held(metadata, settings);
+        if held.contains(&&L1_CA) {
+            held = vec![&L1_CA];
+        }
+        own.acquisition.or_signals(&held);
+    }
     own
 }
 

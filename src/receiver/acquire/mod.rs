@@ -61,7 +61,7 @@ pub use error::AcquireError;
 use grid::{Again, Grid, Map};
 use refine::Refined;
 pub use room::{least_samples, samples_needed, shortened};
-pub use settings::AcquisitionSettings;
+pub use settings::{ALL, AcquisitionSettings};
 use window::Window;
 
 /// Hits this much weaker than the strongest (10 dB) have to show without those that are stronger.

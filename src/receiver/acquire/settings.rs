@@ -15,8 +15,9 @@ described! {
 pub struct AcquisitionSettings {
     /// Dopplers from minus to plus this are searched. It has to hold the offset of the local oscillator too.
     pub doppler_max_hz: f64,
-    /// Names of the signals that are searched for. Empty for those that a recording's metadata name, in `run`
-    /// those of the scene, and else for all that the bands of the samples hold.
+    /// Names of the signals that are searched for, or "all" for what the bands of the samples hold. Empty for
+    /// those that a recording's metadata name, in `run` those of the scene, and else for GPS L1 C/A where the
+    /// bands hold it, all that they hold where not.
     pub signals: Vec<String>,
     /// Code periods of 1 ms summed coherently; of longer codes as many as begin in that time, under an
     /// overlay code one.
@@ -37,6 +38,9 @@ pub struct AcquisitionSettings {
     pub reserved_codes: bool,
 }
 }
+
+/// In place of names: all that the bands hold.
+pub const ALL: &str = "all";
 
 /// Code periods of a symbol that are too few to sum more than one coherently before its edges are known.
 const FEW: u32 = 3;
@@ -62,6 +66,11 @@ impl AcquisitionSettings {
         if self.signals.is_empty() {
             self.signals = signals.iter().map(|signal| signal.name.to_owned()).collect();
         }
+    }
+
+    /// Whether it is left to the bands what is searched for.
+    pub fn is_all(&self) -> bool {
+        self.signals == [ALL]
     }
 
     /// The signals that are searched for, of names that are known.
@@ -106,7 +115,7 @@ impl AcquisitionSettings {
             ("cells_per_chip", self.cells_per_chip, 2.0, 100.0, "2 to 100"),
             ("false_alarm_probability", self.false_alarm_probability, 1e-12, 0.5, "1e-12 to 0.5"),
         ];
-        if let Some(name) = self.signals.iter().find(|name| Signal::find(name).is_none()) {
+        if let Some(name) = self.signals.iter().find(|name| Signal::find(name).is_none() && !self.is_all()) {
             let known =
                 signal::all().iter().map(|signal| format!("\"{}\"", signal.name)).collect::<Vec<_>>().join(", ");
             return Err(AcquireError::UnknownSignal { name: name.clone(), known });
