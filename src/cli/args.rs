@@ -374,8 +374,8 @@ pub struct Receive {
     /// Receiver settings [default: the built-in ones]
     #[arg(long, value_name = "SETTINGS.toml")]
     pub receiver: Option<PathBuf>,
-    /// Signals to search for: all that the bands hold, or names like "GPS L1 C/A,Galileo E1" [default: the settings'; those
-    /// that the metadata name; GPS L1 C/A, or all where the bands do not hold it]
+    /// Signals to search for: all that the bands hold, or names like "GPS L1 C/A,Galileo E1" [default: the
+    /// settings'; those that the metadata name; GPS L1 C/A, or all where the bands do not hold it]
     #[arg(long, value_name = "all|NAMES", value_delimiter = ',')]
     pub signals: Vec<String>,
     /// Sample format of a raw file or stream: ci8, cu8, ci16, cf32, ri8, ri16

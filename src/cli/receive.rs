@@ -74,8 +74,8 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     outcome.diagnosis.map_or(Ok(()), |diagnosis| Err(CliError::incomplete(diagnosis.headline())))
 }
 
-/// The settings with the signals that are searched for: the flag's, or those that they name; or else those that
-/// every recording's metadata name; or else what the bands hold, which is said.
+/// The settings with the signals that are searched for: the flag's, or those that they name; or else those
+/// that every recording's metadata name; or else what the bands hold, which is said.
 fn searched(recordings: &[Recording], mut settings: Settings, arguments: &args::Receive) -> Settings {
     if !arguments.signals.is_empty() {
         settings.acquisition.signals = arguments.signals.iter().map(|name| name.trim().to_owned()).collect();

@@ -28,8 +28,9 @@ const BLOCK_SAMPLES: u64 = 1 << 17;
 /// Bytes read at a time of each of several front ends.
 const READ_BYTES: usize = 1 << 18;
 
-/// Settings with the signals that are searched for: where they say `all`, what these bands hold and this receiver
-/// can follow to a position; where they name none, GPS L1 C/A if it is among those, and else all of them.
+/// Settings with the signals that are searched for: where they say `all`, what these bands hold and this
+/// receiver can follow to a position; where they name none, GPS L1 C/A if it is among those, and else all of
+/// them.
 pub fn searched(metadata: &[IfMetadata], settings: &Settings) -> Settings {
     let mut own = settings.clone();
     if own.acquisition.is_all() {

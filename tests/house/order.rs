@@ -66,11 +66,11 @@ pub const ORDER: Order<'static> = &[
     (
         "receiver",
         &[
-            &["source"],
             &["described"],
             &["format"],
             &["threshold"],
             &["correlate"],
+            &["source"],
             &["lead"],
             &["gap"],
             &["interference"],
