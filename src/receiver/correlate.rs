@@ -5,10 +5,11 @@
 //! sample centred on that instant ([`Edge::Area`]). Sums come in four arithmetics: for samples of 8 bits
 //! products with a table (`rows`) or pieces of equal sign by running sums (`pieces`), integers of 16 bits for
 //! such samples ([`Replica::correlate_short`]), `f32` for any ([`Replica::correlate`]) and the obvious twin
-//! of all in `f64` ([`Replica::slow`]). A chip has the steps of its pulse ([`Wave`]); phases count chips, kernels see
-//! steps. A replica is a weighted sum of patterns of signs, each of which takes a pass: steps of zero are the
-//! mean of +1 and −1, and a waveform of several layers has a pattern for each. Limits: area edges are exact
-//! up to one step a sample; beyond that they leave steps out. A period has fewer than 2¹⁶ steps.
+//! of all in `f64` ([`Replica::slow`]). A chip has the steps of its pulse ([`Wave`]); phases count chips,
+//! kernels see steps. A replica is a weighted sum of patterns of signs, each of which takes a pass: steps of
+//! zero are the mean of +1 and −1, and a waveform of several layers has a pattern for each. Limits: area
+//! edges are exact up to one step a sample; beyond that they leave steps out. A period has fewer than 2¹⁶
+//! steps.
 
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
