@@ -87,12 +87,7 @@ pub fn run(
 
 /// The settings with which a scene is received: where they name no signals to search for, those of the scene.
 pub fn settings_for(scenes: &[Scene], settings: &Settings) -> Settings {
-    let mut signals: Vec<&'static Signal> = Vec::new();
-    for signal in scenes.iter().flat_map(|scene| &scene.signals) {
-        if !signals.contains(signal) {
-            signals.push(signal);
-        }
-    }
+    let signals: Vec<&'static Signal> = scenes.iter().flat_map(|scene| scene.signals.iter().copied()).collect();
     let mut own = settings.clone();
     own.acquisition.or_signals(&signals);
     own

@@ -62,6 +62,32 @@ fn usage_errors_exit_with_two() {
     assert_eq!(code(&twin(&["--help"], here.path())), 0);
 }
 
+/// What `receive` searches for is what the flag says, a name that it does not know is refused as the flag's,
+/// and without either the samples' band decides: GLONASS G1 where GPS is far away.
+#[test]
+fn signals_are_those_of_the_flag_or_of_the_band() {
+    let here = workplace();
+    fs::write(here.path().join("a.ci8"), vec![0; 1_000_000]).unwrap();
+    let received = |more: &[&str]| {
+        let usual = ["receive", "a.ci8", "--format", "ci8", "--rate-hz", "6.6e6", "--out", "out"];
+        twin(&[&usual[..], more].concat(), here.path())
+    };
+    let wrong = received(&["--signals", "GPS L9"]);
+    assert_eq!(code(&wrong), 2, "{}", stderr(&wrong));
+    assert!(stderr(&wrong).contains("--signals") && stderr(&wrong).contains("GPS L9"), "{}", stderr(&wrong));
+    let searched = |output: &Output| {
+        let summary: serde_json::Value =
+            serde_json::from_slice(&fs::read(here.path().join("out/receiver.json")).unwrap()).unwrap();
+        assert_eq!(code(output), 3, "{}", stderr(output));
+        summary["settings"]["acquisition"]["signals"].to_string()
+    };
+    assert_eq!(searched(&received(&["--signals", "Galileo E1, GPS L1 C/A"])), r#"["Galileo E1","GPS L1 C/A"]"#);
+    assert_eq!(searched(&received(&["--if-hz=-26.58e6"])), r#"["GLONASS G1"]"#);
+    assert_eq!(searched(&received(&[])), r#"["GPS L1 C/A"]"#);
+    let all = searched(&received(&["--signals", "all", "--if-hz=-26.58e6"]));
+    assert_eq!(all, r#"["GLONASS G1"]"#);
+}
+
 #[test]
 fn a_misspelt_key_is_named_with_its_place_and_the_nearest_right_one() {
     let here = workplace();

@@ -21,7 +21,7 @@ use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Signal;
 use crate::receiver;
 use crate::receiver::Outcome;
-use crate::receiver::acquire::ALL;
+use crate::receiver::acquire::{ALL, AcquisitionSettings};
 use crate::receiver::output::{JsonLines, Nmea, Output, OutputError, Record, Rinex, Sink};
 use crate::receiver::settings::Settings;
 
@@ -40,7 +40,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
         return Err(CliError::usage("--nmea - and --json: standard output takes one of them"));
     }
     let recordings = recording::open(arguments)?;
-    let settings = searched(&recordings, settings, arguments);
+    let settings = searched(&recordings, settings, arguments)?;
     let samples = recordings.first().and_then(|first| first.samples);
     let format = recordings.first().map(|first| first.metadata.format);
     let broken: Vec<Arc<OnceLock<String>>> = recordings.iter().filter_map(|one| one.broken.clone()).collect();
@@ -76,23 +76,22 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
 
 /// The settings with the signals that are searched for: the flag's, or those that they name; or else those
 /// that every recording's metadata name; or else what the bands hold, which is said.
-fn searched(recordings: &[Recording], mut settings: Settings, arguments: &args::Receive) -> Settings {
+fn searched(recordings: &[Recording], mut settings: Settings, arguments: &args::Receive) -> Result<Settings, CliError> {
     if !arguments.signals.is_empty() {
-        settings.acquisition.signals = arguments.signals.iter().map(|name| name.trim().to_owned()).collect();
+        let signals = arguments.signals.iter().map(|name| name.trim().to_owned()).collect();
+        let asked = AcquisitionSettings { signals, ..AcquisitionSettings::default() };
+        asked.validate().map_err(|error| CliError::usage(format!("--signals: {error}")))?;
+        settings.acquisition.signals = asked.signals;
     }
     let are_named = recordings.iter().all(|recording| !recording.signals.is_empty());
     if settings.acquisition.signals.is_empty() && are_named {
-        let mut named: Vec<&'static Signal> = Vec::new();
-        for signal in recordings.iter().flat_map(|recording| &recording.signals) {
-            if !named.contains(signal) {
-                named.push(signal);
-            }
-        }
+        let named: Vec<&'static Signal> =
+            recordings.iter().flat_map(|recording| recording.signals.iter().copied()).collect();
         settings.acquisition.or_signals(&named);
     }
     let is_open = settings.acquisition.signals.is_empty() || settings.acquisition.is_all();
     if !is_open || settings.validate("settings").is_err() {
-        return settings;
+        return Ok(settings);
     }
     let metadata: Vec<IfMetadata> = recordings.iter().map(|recording| recording.metadata.clone()).collect();
     let settings = receiver::searched(&metadata, &settings);
@@ -110,7 +109,7 @@ fn searched(recordings: &[Recording], mut settings: Settings, arguments: &args::
         };
         scenario::note(&format!("searching for {}{more}", chosen.join(", ")));
     }
-    settings
+    Ok(settings)
 }
 
 /// What came of it, on standard output unless lines go there.

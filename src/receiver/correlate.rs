@@ -20,6 +20,8 @@ use crate::gnss::signal::{Component, Layers, Shape, Tone};
 mod carrier;
 pub mod fixed;
 mod kernel;
+#[cfg(test)]
+mod noise;
 mod pattern;
 mod pieces;
 mod rows;

@@ -61,10 +61,14 @@ impl Default for AcquisitionSettings {
 }
 
 impl AcquisitionSettings {
-    /// Searches for these where no names are set.
+    /// Searches for these, each once, where no names are set.
     pub fn or_signals(&mut self, signals: &[&'static Signal]) {
         if self.signals.is_empty() {
-            self.signals = signals.iter().map(|signal| signal.name.to_owned()).collect();
+            let first = |(number, signal): &(usize, &&Signal)| {
+                signals.iter().position(|other| other == *signal) == Some(*number)
+            };
+            let each = signals.iter().enumerate().filter(first);
+            self.signals = each.map(|(_, signal)| signal.name.to_owned()).collect();
         }
     }
 

@@ -69,7 +69,7 @@ fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Resul
     let shaded = if skyline_deg.is_empty() { "" } else { "; shaded: obstructed at the start" };
     let mut lines = vec![format!("filled: observed by the receiver{shaded}")];
     if systems.len() > 1 {
-        let shapes = systems.iter().zip(SHAPES).map(|(system, shape)| format!("{shape}: {system}"));
+        let shapes = systems.iter().zip(SHAPES).map(|(system, (shape, _))| format!("{shape}: {system}"));
         lines.push(shapes.collect::<Vec<_>>().join("; "));
     }
     for (line, above) in lines.into_iter().rev().zip([16, 34]) {
@@ -78,22 +78,26 @@ fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Resul
     Ok(())
 }
 
-/// The dots of the first system, the second, and so on.
-const SHAPES: [&str; 4] = ["circles", "squares", "diamonds", "triangles"];
+/// The dots of the first system, the second, and so on: one for each that there is. Corners are in eighths of
+/// a circle's radius and give about a circle's area; the circle has none.
+const SHAPES: [(&str, &[(i32, i32)]); 7] = [
+    ("circles", &[]),
+    ("squares", &[(-7, -7), (7, -7), (7, 7), (-7, 7)]),
+    ("diamonds", &[(0, -10), (10, 0), (0, 10), (-10, 0)]),
+    ("triangles", &[(0, -10), (9, 6), (-9, 6)]),
+    ("triangles down", &[(0, 10), (9, -6), (-9, -6)]),
+    ("bars", &[(-11, -4), (11, -4), (11, 4), (-11, 4)]),
+    ("posts", &[(-4, -11), (4, -11), (4, 11), (-4, 11)]),
+];
 
 /// A satellite's dot in the shape of its system: colours inside and of its rim.
 fn dot(area: &Area<'_>, (x, y): (i32, i32), system: usize, (inside, rim): (RGBColor, RGBColor)) -> Result<(), Failure> {
-    // Corners in eighths of a circle's radius that give about a circle's area.
-    let corners: &[(i32, i32)] = match system {
-        0 => {
-            area.draw(&Circle::new((x, y), 8 * FINE, inside.filled()))?;
-            area.draw(&Circle::new((x, y), 8 * FINE, rim.stroke_width(2 * FINE as u32)))?;
-            return Ok(());
-        }
-        1 => &[(-7, -7), (7, -7), (7, 7), (-7, 7)],
-        2 => &[(0, -10), (10, 0), (0, 10), (-10, 0)],
-        _ => &[(0, -10), (9, 6), (-9, 6)],
-    };
+    let (_, corners) = SHAPES[system % SHAPES.len()];
+    if corners.is_empty() {
+        area.draw(&Circle::new((x, y), 8 * FINE, inside.filled()))?;
+        area.draw(&Circle::new((x, y), 8 * FINE, rim.stroke_width(2 * FINE as u32)))?;
+        return Ok(());
+    }
     let outline: Vec<(i32, i32)> = corners.iter().map(|(dx, dy)| (x + dx * FINE, y + dy * FINE)).collect();
     area.draw(&Polygon::new(outline.clone(), inside.filled()))?;
     let closed: Vec<(i32, i32)> = outline.iter().chain(outline.first()).copied().collect();

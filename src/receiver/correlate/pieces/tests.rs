@@ -6,15 +6,9 @@ use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED};
 use crate::receiver::correlate::sums::{RunningSums, Samples};
 use crate::receiver::correlate::{Arithmetic, Edge, Replica, chips_to_units};
 
-/// Samples of 8 bits with a constant offset, even over ±40.
+/// With a constant offset.
 fn noise(count: usize, seed: u64) -> Vec<f32> {
-    let mut state = seed;
-    (0..count)
-        .map(|_| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 40) as f32 / 16_777_216.0 * 80.0 - 38.0).round()
-        })
-        .collect()
+    super::super::noise::noise(count, seed, 2.0)
 }
 
 fn nco(rate_hz: f64, chip_hz: f64, doppler_hz: f64, code_chips: f64) -> Nco {

@@ -7,15 +7,9 @@ use crate::receiver::correlate::{Arithmetic, Edge, Replica, chips_to_units};
 
 const CHIP_HZ: f64 = 1.023e6;
 
-/// Samples of 8 bits, even over ±40: 33 LSB of both components.
+/// 33 LSB of both components.
 fn noise(count: usize, seed: u64) -> Vec<f32> {
-    let mut state = seed;
-    (0..count)
-        .map(|_| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 40) as f32 / 16_777_216.0 * 80.0 - 40.0).round()
-        })
-        .collect()
+    super::super::noise::noise(count, seed, 0.0)
 }
 
 fn step(rate_hz: f64) -> u64 {
