@@ -165,10 +165,14 @@ impl FrontEnd {
 mod tests {
     use super::super::Session;
     use super::*;
+    use crate::gnss::beidou::b1c::B1C;
+    use crate::gnss::beidou::in_phase::B2I;
+    use crate::gnss::gps::l1c::L1C;
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::gps::l5::L5;
     use crate::gnss::rinex;
     use crate::gnss::samples::{Format, IfMetadata};
+    use crate::gnss::satellite::System;
     use crate::gnss::time::Rate;
     use crate::receiver::settings::Settings;
 
@@ -191,6 +195,56 @@ mod tests {
         // Nothing is followed any more: nothing is foreseen.
         first.announce(&mut session.shared);
         assert!(second.foreseen(0, &session.shared).0.is_empty());
+    }
+
+    #[test]
+    fn later_searches_leave_out_what_another_signal_of_the_satellite_leads_to() {
+        let rate = Rate::from_hz(21e6).unwrap();
+        let start = Some(Epoch::parse("2026-03-09T10:00:00").unwrap());
+        let of = |center_hz: f64| IfMetadata { format: Format::Ci8, rate, center_hz, inverted: false, start };
+        let shared = |signals: &[&'static Signal]| {
+            let mut settings = Settings::default();
+            settings.acquisition.or_signals(signals);
+            Session::new(&[of(1_575.42e6), of(1_207.14e6)], &settings).unwrap().shared
+        };
+        let both = shared(&[&L1_CA, &L1C]);
+        assert!(FrontEnd::is_led(L1C.link(Sv::gps(4)), &both) && !FrontEnd::is_led(L1_CA.link(Sv::gps(4)), &both));
+        assert!(!FrontEnd::is_led(L1C.link(Sv::gps(4)), &shared(&[&L1C])), "nothing leads to it");
+        // B2I is cheaper than B1C, but satellites of the third generation do not send it.
+        let both = shared(&[&B1C, &B2I]);
+        let beidou = |number| Sv { system: System::BeiDou, number };
+        assert!(!FrontEnd::is_led(B1C.link(beidou(25)), &both) && FrontEnd::is_led(B1C.link(beidou(10)), &both));
+    }
+
+    #[test]
+    fn what_is_not_found_waits_twice_as_long_each_time_until_another_signal_is_followed() {
+        let rate = Rate::from_hz(2.6e6).unwrap();
+        let metadata = IfMetadata { format: Format::Ci8, rate, center_hz: 1_575.42e6, inverted: false, start: None };
+        let mut session = Session::new(&[metadata], &Settings::default()).unwrap();
+        let (shared, front_end) = (&mut session.shared, &mut session.front_ends[0]);
+        let link = L1_CA.link(Sv::gps(7));
+        let row = AcquisitionRow {
+            sample: 0,
+            sv: link.sv,
+            signal: link.signal,
+            acquired: false,
+            statistic: 1.0,
+            threshold: 2.0,
+            doppler_hz: 0.0,
+            code_phase_chips: 0.0,
+            cn0_dbhz: 30.0,
+        };
+        let wait = front_end.foreseen_wait();
+        for doublings in [0, 1, 2, 3, 4, 4] {
+            front_end.note_missed(&[(row.clone(), None)], 1000, shared);
+            assert_eq!(front_end.missed[&link].until, 1000 + (wait << doublings));
+        }
+        // Led by another signal it is due at once, and when it is missed then it waits again.
+        shared.dopplers.insert(L5.link(link.sv), 0.0);
+        let is_due = |front_end: &FrontEnd, shared: &Shared| front_end.foreseen(1001, shared).0 == [(link, 0.0)];
+        assert!(is_due(front_end, shared));
+        front_end.note_missed(&[(row, None)], 1000, shared);
+        assert!(!is_due(front_end, shared));
     }
 
     #[test]

@@ -126,6 +126,11 @@ fn what_signals_differ_by_is_no_error_and_each_disturbs_the_other() {
         let lost = 1.0 + kappa(own, own) * (sum_hz - own_hz) + kappa(own, other) * sum_hz;
         let found = linear_hz(row.cn0_true_dbhz - row.cn0_effective_dbhz);
         assert!((found / lost - 1.0).abs() < 1e-9, "{signal}: {found} {lost}");
+        // In units of all power in the samples its spectrum does not matter.
+        let sums_hz: f64 = run.cn0_sums_hz.iter().filter(|((at, _), _)| *at == row.sample).map(|(_, hz)| hz).sum();
+        let white_hz = own_hz / (1.0 + sums_hz / run.scene.sample_rate_hz);
+        let found_hz = MultipleAccess::new(&run).white_hz(row.sample, link, own_hz);
+        assert!((found_hz / white_hz - 1.0).abs() < 1e-9, "{signal}: {found_hz} {white_hz}");
     }
 }
 
