@@ -335,6 +335,7 @@ fn the_rinex_crate_reads_the_same_orbits_of_other_systems() {
     let mut files = vec![
         ("CARD", include_bytes!("../../data/CARD00ESP_R_20203340900_15H_MN.rnx.gz").to_vec()),
         ("navic", include_bytes!("../../scenarios/navic_2026-03-09_10h_12h.rnx").to_vec()),
+        ("full sky", include_bytes!("../../scenarios/full_sky_2026-03-09_10h_12h.rnx").to_vec()),
     ];
     let name = "multi-gnss/BRD400DLR_S_20260680000_01D_MN.rnx.gz";
     files.extend(external(name).map(|path| (name, std::fs::read(path).unwrap())));
