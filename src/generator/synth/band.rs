@@ -8,12 +8,23 @@ use std::f64::consts::PI;
 
 /// Half width of the response in samples.
 pub const HALF_WIDTH: usize = 8;
-const WIDTH: usize = 2 * HALF_WIDTH;
+/// Samples of the response.
+pub const WIDTH: usize = 2 * HALF_WIDTH;
 const ROWS: usize = 256;
 /// Points a sample in the table that the reference reads.
 const FINE: usize = 4096;
-/// Cells a sample in the table of the kernel in `f64`.
-const CELLS: usize = 64;
+/// Cells a sample in the table of responses in `f64`.
+pub const CELLS: usize = 64;
+/// Cells a sample in that of responses in [`UNIT`]s, which from the middle of a cell to its ends may not
+/// change by 2^22 units: they do not where the cut-off is below 0.4995 cycles a sample.
+pub const UNIT_CELLS: usize = 128;
+/// Unit of responses in whole numbers. 2^31 of them are 4, and no filter makes more than 1.7 times the
+/// largest value of what it is given.
+pub const UNIT: f64 = 1.0 / (1_u32 << 29) as f64;
+/// One in [`UNIT`]s.
+pub const UNITS: i32 = 1 << 29;
+/// Has a last place of one, as has each sum with a number below 2^22: bits of the sum count it.
+const COUNTER: f32 = 1.5 * (1 << 23) as f32;
 /// Kaiser's shape parameter: 60 dB in the stop band.
 const BETA: f64 = 5.65;
 
@@ -23,30 +34,51 @@ pub struct Filter {
     fine: Vec<f64>,
     rows: Vec<[f32; WIDTH]>,
     cells: Vec<Cell>,
+    unit_cells: Vec<UnitCell>,
 }
 
-/// Polynomials of the response to a change from −1 to 1 between two places in a sample, from the constant up,
-/// with as many zeros before and after it as it may begin late in a block.
-type Cell = [[f64; 2 * WIDTH]; 4];
-
-/// The response to a change from −1 to 1, less the change itself, at consecutive samples.
+/// The response to a change from −1 to 1, less the change itself, at the sixteen samples that it reaches, for
+/// changes between two places in a sample: cubic polynomials from the constant up (error below 1e-9).
 #[derive(Clone, Copy, Debug)]
-pub struct Response<'a, const N: usize> {
-    rows: [&'a [f64; N]; 4],
-    /// Where in its cell it is.
-    x: f64,
+#[repr(align(64))]
+pub struct Cell([[f64; WIDTH]; 4]);
+
+/// The same in [`UNIT`]s: a whole number in the middle of the cell, and polynomials of what is more elsewhere
+/// from the linear term up (error below 1.6 units, 3e-9).
+///
+/// The number in the middle and the sum that becomes a whole number are rounded, by half a unit each. What is
+/// more stays below 2^22 units, so that roundings of the place within the cell, of the linear coefficient, of
+/// its sum with the higher terms and of the product are an eighth of a unit each at most. The cubic polynomial
+/// is within 0.02 units.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub struct UnitCell {
+    middle: [i32; WIDTH],
+    more: [[f32; WIDTH]; 3],
 }
 
-impl<const N: usize> Response<'_, N> {
-    /// At `B` samples of which `first` is the first.
+impl Cell {
+    /// At the place `x` within the cell, 0 to 1.
     #[inline(always)]
-    pub fn at<const B: usize>(&self, first: usize) -> [f64; B] {
-        let row = |row: &[f64; N]| row.get(first..).and_then(|row| row.first_chunk::<B>()).copied();
-        let mut values = [0.0; B];
-        if let [Some(a), Some(b), Some(c), Some(d)] = self.rows.map(row) {
-            for k in 0..B {
-                values[k] = a[k] + self.x * (b[k] + self.x * (c[k] + self.x * d[k]));
-            }
+    pub fn at(&self, x: f64) -> [f64; WIDTH] {
+        let Self([a, b, c, d]) = self;
+        let mut values = [0.0; WIDTH];
+        for k in 0..WIDTH {
+            values[k] = a[k] + x * (b[k] + x * (c[k] + x * d[k]));
+        }
+        values
+    }
+}
+
+impl UnitCell {
+    /// At the place `x` from the middle of the cell, −½ to ½.
+    #[inline(always)]
+    pub fn at(&self, x: f32) -> [i32; WIDTH] {
+        let Self { middle, more: [b, c, d] } = self;
+        let mut values = [0; WIDTH];
+        for k in 0..WIDTH {
+            let counted = COUNTER + x * (b[k] + x * (c[k] + x * d[k]));
+            values[k] = middle[k].wrapping_add(counted.to_bits() as i32);
         }
         values
     }
@@ -59,13 +91,15 @@ impl Filter {
         let cell = 1.0 / FINE as f64;
         let mut sum = 0.0;
         let mut fine = vec![0.0];
+        // At every half cell from the middle on; it is even.
+        let half: Vec<f64> = (0..=2 * HALF_WIDTH * FINE).map(|k| at(0.5 * cell * k as f64)).collect();
+        let halves_on = |k: usize| half.get(k.abs_diff(2 * HALF_WIDTH * FINE)).copied().unwrap_or(0.0);
         for k in 0..WIDTH * FINE {
-            let x = k as f64 * cell - HALF_WIDTH as f64;
-            sum += cell / 6.0 * (at(x) + 4.0 * at(x + 0.5 * cell) + at(x + cell));
+            sum += cell / 6.0 * (halves_on(2 * k) + 4.0 * halves_on(2 * k + 1) + halves_on(2 * k + 2));
             fine.push(sum);
         }
         fine.iter_mut().for_each(|value| *value /= sum);
-        let mut filter = Self { fine, rows: Vec::new(), cells: Vec::new() };
+        let mut filter = Self { fine, rows: Vec::new(), cells: Vec::new(), unit_cells: Vec::new() };
         let jump = |k: usize| if k >= HALF_WIDTH { 1.0 } else { 0.0 };
         let x = |k: usize, fraction: f64| k as f64 - HALF_WIDTH as f64 + fraction;
         filter.rows = (0..=ROWS)
@@ -78,15 +112,27 @@ impl Filter {
             let more = (x - from) / 6.0 * (at(from) + 4.0 * at(0.5 * (from + x)) + at(x));
             filter.fine.get(point as usize).map_or(1.0, |before| before + more / sum)
         };
-        let cell = |number: usize| {
-            let mut cell = [[0.0; 2 * WIDTH]; 4];
-            for k in 0..WIDTH {
-                let value = |within: f64| 2.0 * (exactly(x(k, (number as f64 + within) / CELLS as f64)) - jump(k));
-                cell.iter_mut().zip(cubic(value)).for_each(|(row, term)| row[HALF_WIDTH + k] = term);
+        // Between two places of the change behind the sample before it.
+        let polynomials = |number: usize, cells: usize| -> [[f64; 4]; WIDTH] {
+            let from = |k: usize, within: f64| x(k, 1.0 - (number as f64 + within) / cells as f64);
+            std::array::from_fn(|k| cubic(|within| 2.0 * (exactly(from(k, within)) - jump(k))))
+        };
+        let cell = |number| {
+            let terms = polynomials(number, CELLS);
+            Cell(std::array::from_fn(|power| terms.map(|terms| terms[power])))
+        };
+        let unit_cell = |number| {
+            // About the middle.
+            let terms = polynomials(number, UNIT_CELLS).map(|[a, b, c, d]| {
+                [a + 0.5 * b + 0.25 * c + 0.125 * d, b + c + 0.75 * d, c + 1.5 * d, d].map(|term| term / UNIT)
+            });
+            UnitCell {
+                middle: terms.map(|[a, ..]| (a.round() as i32).wrapping_sub(COUNTER.to_bits() as i32)),
+                more: [1, 2, 3].map(|power| terms.map(|terms| terms[power] as f32)),
             }
-            cell
         };
         filter.cells = (0..CELLS).map(cell).collect();
+        filter.unit_cells = (0..UNIT_CELLS).map(unit_cell).collect();
         filter
     }
 
@@ -123,15 +169,17 @@ impl Filter {
         }
     }
 
-    /// Twice [`Filter::residual`] in `f64` (error below 1e-9) at samples of which number `place`, at most
-    /// `HALF_WIDTH`, is the first that it reaches; `None` for more samples than that.
+    /// Twice [`Filter::residual`] in `f64`, in the cells of a sample in the order in which a change may lie
+    /// behind the sample before it.
     #[inline(always)]
-    pub fn response<const N: usize>(&self, fraction: f64, place: usize) -> Option<Response<'_, N>> {
-        let within = fraction * CELLS as f64;
-        let index = (within as i64).clamp(0, CELLS as i64 - 1);
-        let from = HALF_WIDTH.saturating_sub(place);
-        let [a, b, c, d] = self.cells.get(index as usize)?.each_ref().map(|row| row.get(from..)?.first_chunk());
-        Some(Response { rows: [a?, b?, c?, d?], x: within - index as f64 })
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
+    /// The same in [`UNIT`]s.
+    #[inline(always)]
+    pub fn unit_cells(&self) -> &[UnitCell] {
+        &self.unit_cells
     }
 
     /// Mean power of a stepped waveform behind the filter, for its autocorrelation by whole steps.
@@ -221,22 +269,27 @@ mod tests {
     }
 
     #[test]
-    fn a_response_in_f64_is_twice_the_step_s_wherever_it_begins() {
-        for cutoff_cps in [0.05, 0.3, 0.45, 0.5] {
+    fn responses_of_cells_are_twice_the_step_s_wherever_a_change_lies() {
+        for cutoff_cps in [0.05, 0.3, 0.45, 0.499, 0.5] {
             let filter = Filter::new(cutoff_cps);
             // Twice a 24th of the fourth derivative, 4π³·edge⁴ at most, times a quarter of a cell to the
             // fourth, for a change of two. The window moves the band's edge out by half its transition.
             let edge = cutoff_cps + 0.12;
-            let bound = 2.0 * 4.0 * PI.powi(3) * edge.powi(4) / 12.0 * (0.25 / CELLS as f64).powi(4);
+            let bound = |cells: usize| 2.0 * 4.0 * PI.powi(3) * edge.powi(4) / 12.0 * (0.25 / cells as f64).powi(4);
             for k in 0..1000 {
-                let (fraction, place) = (f64::from(k) / 1000.0, (k % 9) as usize);
-                let response = filter.response::<{ 3 * HALF_WIDTH }>(fraction, place).unwrap();
-                for (n, found) in response.at::<{ 3 * HALF_WIDTH }>(0).into_iter().enumerate() {
-                    let x = n as f64 - place as f64 - HALF_WIDTH as f64 + fraction;
-                    let ideal = if n >= place + HALF_WIDTH { 1.0 } else { 0.0 };
-                    let within = (place..place + WIDTH).contains(&n);
-                    let expected = if within { 2.0 * (filter.step(x) - ideal) } else { 0.0 };
-                    assert!((found - expected).abs() < bound, "{cutoff_cps} {fraction} {n}: {found} {expected}");
+                let place = f64::from(k) / 1000.0;
+                let of = |cells: usize| ((place * cells as f64) as usize, (place * cells as f64).fract());
+                let ((cell, x), (unit_cell, unit_x)) = (of(CELLS), of(UNIT_CELLS));
+                let found = filter.cells()[cell].at(x);
+                let units = filter.unit_cells()[unit_cell].at((unit_x - 0.5) as f32);
+                for n in 0..WIDTH {
+                    let x = n as f64 - HALF_WIDTH as f64 + 1.0 - place;
+                    let expected = 2.0 * (filter.step(x) - if n >= HALF_WIDTH { 1.0 } else { 0.0 });
+                    assert!((found[n] - expected).abs() < bound(CELLS), "{cutoff_cps} {place} {n}");
+                    // Three halves of a unit as documented, and the polynomial's.
+                    let error = (f64::from(units[n]) * UNIT - expected).abs();
+                    let counts = cutoff_cps < 0.4995;
+                    assert!(!counts || error < 1.5 * UNIT + bound(UNIT_CELLS), "{cutoff_cps} {place} {n} {error}");
                 }
             }
         }

@@ -16,7 +16,7 @@ pub struct Bank {
     bits: Vec<u64>,
     entries: Vec<Entry>,
     buffers: Buffers,
-    exact: Vec<exact::Block>,
+    exact: exact::Scratch,
 }
 
 struct Entry {
@@ -75,9 +75,9 @@ impl Bank {
                         }
                     }
                 }
-                Arithmetic::F64 => runs
-                    .iter()
-                    .for_each(|run| isa::accumulate_exact(kernel.level, kernel.edge, run, i, q, &mut self.exact)),
+                Arithmetic::F64 => {
+                    isa::accumulate_exact(kernel.level, kernel.edge, &runs, i, q, &mut self.exact);
+                }
             }
         }
         self.entries.clear();

@@ -98,32 +98,32 @@ fn rays_avx2(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], 
 pub fn accumulate_exact(
     level: Level,
     edge: Edge<'_>,
-    run: &Run<'_>,
+    runs: &[Run<'_>],
     i: &mut [f32],
     q: &mut [f32],
-    wave: &mut Vec<exact::Block>,
+    scratch: &mut exact::Scratch,
 ) {
     match level {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has these instructions.
-        Level::Avx512 if level.is_available() => unsafe { exact_avx512(edge, run, i, q, wave) },
+        Level::Avx512 if level.is_available() => unsafe { exact_avx512(edge, runs, i, q, scratch) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has these instructions.
-        Level::Avx2 if level.is_available() => unsafe { exact_avx2(edge, run, i, q, wave) },
-        _ => exact::accumulate(edge, run, i, q, wave),
+        Level::Avx2 if level.is_available() => unsafe { exact_avx2(edge, runs, i, q, scratch) },
+        _ => exact::accumulate(edge, runs, i, q, scratch),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn exact_avx512(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32], wave: &mut Vec<exact::Block>) {
-    exact::accumulate(edge, run, i, q, wave);
+fn exact_avx512(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32], scratch: &mut exact::Scratch) {
+    exact::accumulate(edge, runs, i, q, scratch);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn exact_avx2(edge: Edge<'_>, run: &Run<'_>, i: &mut [f32], q: &mut [f32], wave: &mut Vec<exact::Block>) {
-    exact::accumulate(edge, run, i, q, wave);
+fn exact_avx2(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32], scratch: &mut exact::Scratch) {
+    exact::accumulate(edge, runs, i, q, scratch);
 }
 
 /// [`noise::add_block`] on one instruction set; the baseline where the processor lacks it.

@@ -20,6 +20,7 @@ pub mod lanes;
 pub mod noise;
 pub mod reference;
 pub mod resample;
+mod responses;
 pub mod tone;
 pub mod waveform;
 

@@ -94,7 +94,7 @@ fn signals_are_their_twins_at_every_length_and_offset() {
                 |i, q| twin(i, q, bar),
             );
             everywhere(
-                |level, i, q| accumulate_exact(level, edge, &run, i, q, &mut Vec::new()),
+                |level, i, q| accumulate_exact(level, edge, &[run], i, q, &mut exact::Scratch::default()),
                 |i, q| twin(i, q, exact_bar(edge)),
             );
         }
@@ -120,7 +120,7 @@ fn the_longest_runs_are_their_twins_to_the_last_sample() {
         accumulate(Level::Baseline, edge, &[run], &mut i, &mut q, &mut Buffers::default());
         assert!(difference((&i, &q), (&ri, &rq)) < bar, "{edge:.0?}");
         let (mut i, mut q) = (plane(), plane());
-        accumulate_exact(Level::Baseline, edge, &run, &mut i, &mut q, &mut Vec::new());
+        accumulate_exact(Level::Baseline, edge, &[run], &mut i, &mut q, &mut exact::Scratch::default());
         assert!(difference((&i, &q), (&ri, &rq)) < exact_bar(edge), "{edge:.0?}");
     }
 }
