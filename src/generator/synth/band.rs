@@ -9,20 +9,20 @@ use std::f64::consts::PI;
 /// Half width of the response in samples.
 pub const HALF_WIDTH: usize = 8;
 /// Samples of the response.
-pub const WIDTH: usize = 2 * HALF_WIDTH;
+pub(super) const WIDTH: usize = 2 * HALF_WIDTH;
 const ROWS: usize = 256;
 /// Points a sample in the table that the reference reads.
 const FINE: usize = 4096;
 /// Cells a sample in the table of responses in `f64`.
-pub const CELLS: usize = 64;
+pub(super) const CELLS: usize = 64;
 /// Cells a sample in that of responses in [`UNIT`]s, which from the middle of a cell to its ends may not
 /// change by 2^22 units: they do not where the cut-off is below 0.4995 cycles a sample.
-pub const UNIT_CELLS: usize = 128;
+pub(super) const UNIT_CELLS: usize = 128;
 /// Unit of responses in whole numbers. 2^31 of them are 4, and no filter makes more than 1.7 times the
 /// largest value of what it is given.
-pub const UNIT: f64 = 1.0 / (1_u32 << 29) as f64;
+pub(super) const UNIT: f64 = 1.0 / (1_u32 << 29) as f64;
 /// One in [`UNIT`]s.
-pub const UNITS: i32 = 1 << 29;
+pub(super) const UNITS: i32 = 1 << 29;
 /// Has a last place of one, as has each sum with a number below 2^22: bits of the sum count it.
 const COUNTER: f32 = 1.5 * (1 << 23) as f32;
 /// Kaiser's shape parameter: 60 dB in the stop band.
@@ -41,7 +41,7 @@ pub struct Filter {
 /// changes between two places in a sample: cubic polynomials from the constant up (error below 1e-9).
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub struct Cell([[f64; WIDTH]; 4]);
+pub(super) struct Cell([[f64; WIDTH]; 4]);
 
 /// The same in [`UNIT`]s: a whole number in the middle of the cell, and polynomials of what is more elsewhere
 /// from the linear term up (error below 1.6 units, 3e-9).
@@ -52,7 +52,7 @@ pub struct Cell([[f64; WIDTH]; 4]);
 /// is within 0.02 units.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub struct UnitCell {
+pub(super) struct UnitCell {
     middle: [i32; WIDTH],
     more: [[f32; WIDTH]; 3],
 }
@@ -60,7 +60,7 @@ pub struct UnitCell {
 impl Cell {
     /// At the place `x` within the cell, 0 to 1.
     #[inline(always)]
-    pub fn at(&self, x: f64) -> [f64; WIDTH] {
+    pub(super) fn at(&self, x: f64) -> [f64; WIDTH] {
         let Self([a, b, c, d]) = self;
         let mut values = [0.0; WIDTH];
         for k in 0..WIDTH {
@@ -73,7 +73,7 @@ impl Cell {
 impl UnitCell {
     /// At the place `x` from the middle of the cell, −½ to ½.
     #[inline(always)]
-    pub fn at(&self, x: f32) -> [i32; WIDTH] {
+    pub(super) fn at(&self, x: f32) -> [i32; WIDTH] {
         let Self { middle, more: [b, c, d] } = self;
         let mut values = [0; WIDTH];
         for k in 0..WIDTH {
@@ -172,13 +172,13 @@ impl Filter {
     /// Twice [`Filter::residual`] in `f64`, in the cells of a sample in the order in which a change may lie
     /// behind the sample before it.
     #[inline(always)]
-    pub fn cells(&self) -> &[Cell] {
+    pub(super) fn cells(&self) -> &[Cell] {
         &self.cells
     }
 
     /// The same in [`UNIT`]s.
     #[inline(always)]
-    pub fn unit_cells(&self) -> &[UnitCell] {
+    pub(super) fn unit_cells(&self) -> &[UnitCell] {
         &self.unit_cells
     }
 
@@ -240,6 +240,10 @@ fn bessel_i0(x: f64) -> f64 {
     for k in 1..30 {
         term *= quarter / f64::from(k * k);
         sum += term;
+        // Terms fall from here on: none changes the sum any more.
+        if term < 1e-17 * sum {
+            break;
+        }
     }
     sum
 }
