@@ -293,6 +293,7 @@ const COSINE: [f64; 8] = [
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::generator::synth::band::Filter;
     use crate::generator::synth::chips::CodeTime;
     use crate::generator::synth::radians;
     use crate::generator::synth::waveform::plain;
