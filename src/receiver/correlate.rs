@@ -211,12 +211,13 @@ impl Replica {
         let (steps, each) = (&self.wave.values, self.wave.steps_per_chip);
         let length = steps.len();
         let correlation = |shift: usize| {
-            let behind = steps.iter().cycle().skip(shift % length);
-            steps.iter().zip(behind).map(|(a, b)| i64::from(a * b)).sum::<i64>().abs()
+            let (before, behind) = steps.split_at(shift % length);
+            let products = |a: &[i8], b: &[i8]| a.iter().zip(b).map(|(a, b)| i32::from(a * b)).sum::<i32>();
+            (products(steps, behind) + products(&steps[behind.len()..], before)).abs()
         };
         let candidates = 4 * places;
         let chips = length / each;
-        let mut ranked: Vec<(i64, usize)> = (1..=candidates)
+        let mut ranked: Vec<(i32, usize)> = (1..=candidates)
             .map(|n| n * chips / (candidates + 1))
             .filter(|chip| (4..chips.saturating_sub(4)).contains(chip))
             .map(|chip| ((each * (chip - 1)..=each * (chip + 1)).map(correlation).max().unwrap_or(0), chip))

@@ -69,6 +69,73 @@ impl Packed<'_> {
     }
 }
 
+/// Samples that something looks at more than once: in planes, or as they were packed.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::receiver) enum Stretch<'a> {
+    Planes(Block<'a>),
+    Packed(Packed<'a>),
+}
+
+impl Stretch<'_> {
+    /// Number of the first sample.
+    pub fn first(&self) -> u64 {
+        match self {
+            Self::Planes(block) => block.first,
+            Self::Packed(packed) => packed.first,
+        }
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        match self {
+            Self::Planes(block) => block.i.len(),
+            Self::Packed(packed) => packed.samples(),
+        }
+    }
+
+    /// Planes of the first `samples` of them, or of as many as there are.
+    pub fn planes(&self, samples: usize) -> [Vec<f32>; 2] {
+        match self {
+            Self::Planes(block) => [block.i, block.q].map(|plane| plane.iter().take(samples).copied().collect()),
+            Self::Packed(packed) => {
+                let mut planes = Planes::default();
+                packed.unpack(0..samples, &mut planes);
+                [planes.i, planes.q]
+            }
+        }
+    }
+}
+
+/// Samples that come piece by piece, kept as they are packed.
+#[derive(Clone, Debug)]
+pub(in crate::receiver) struct Gathered {
+    first: u64,
+    format: Format,
+    bytes: Vec<u8>,
+}
+
+impl Gathered {
+    /// None yet of those that begin with a block.
+    pub fn from(block: &Packed) -> Self {
+        Self { first: block.first, format: block.format, bytes: Vec::new() }
+    }
+
+    /// Takes samples of the next block until there are `samples` of them; says whether there are.
+    pub fn take(&mut self, block: &Packed, samples: usize) -> bool {
+        let size = self.format.bytes();
+        let missing = (samples * size).saturating_sub(self.bytes.len()).min(block.bytes.len());
+        // Most searches want a few blocks.
+        self.bytes.reserve_exact(missing);
+        self.bytes.extend_from_slice(&block.bytes[..missing]);
+        self.bytes.len() >= samples * size
+    }
+
+    /// What there is.
+    pub fn packed(&self) -> Packed<'_> {
+        Packed { first: self.first, format: self.format, bytes: &self.bytes }
+    }
+}
+
 /// The last samples of a stream, packed, so that a block can be shown with those before it.
 #[derive(Debug, Default)]
 pub struct Lookback {

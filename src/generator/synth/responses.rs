@@ -403,9 +403,9 @@ mod tests {
                     // As documented for each of the changes in reach.
                     let changes = 2.0 * HALF_WIDTH as f64 * step as f64 / CODE_ONE as f64 + 1.0;
                     let bound = changes * if step <= LONGEST_IN_UNITS { 3e-9 } else { 1e-9 };
-                    for n in 0..TILE {
+                    for (n, value) in wave.iter().enumerate() {
                         let place = position + step * n as u64;
-                        let error = wave[n] - reference::waveform(Edge::BandLimited(&filter), &run, place);
+                        let error = value - reference::waveform(Edge::BandLimited(&filter), &run, place);
                         assert!(error.abs() < bound, "{step} {position} {n} {error}");
                     }
                 }

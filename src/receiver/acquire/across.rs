@@ -15,7 +15,7 @@ use crate::gnss::record::AcquisitionRow;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 use crate::receiver::lead::lead;
-use crate::receiver::source::Block;
+use crate::receiver::source::Stretch;
 
 /// A row for a candidate, and where it was found.
 type Found = (AcquisitionRow, Option<Acquired>);
@@ -30,7 +30,7 @@ impl Searcher {
     /// `known` before.
     pub(super) fn clear_across(
         &mut self,
-        block: &Block,
+        stretch: &Stretch,
         known: &[Acquired],
         results: &mut [Found],
     ) -> Result<(), AcquireError> {
@@ -48,21 +48,22 @@ impl Searcher {
         let complex = self.metadata.format.is_complex();
         for (band, doubted) in doubted {
             let Some(grid) = self.grids.get(&band) else { continue };
-            let mut window = Window::centred(block, grid.samples_needed() as usize);
+            let mut window = Window::centred(stretch, grid.samples_needed() as usize);
             let mut others: Vec<&Acquired> =
                 hits.iter().filter(|other| doubted.iter().any(|(_, hit)| is_covered(hit, other))).collect();
             others.sort_by(|a, b| b.cn0_dbhz.total_cmp(&a.cn0_dbhz));
             for other in others {
                 let its = (self.grids.get(&Band::of(other.link())), self.codes.get(&other.link()), lead(other.signal));
                 let (Some(grid), Some(code), Some(component)) = its else { continue };
-                let place = grid.refined(other, block.first);
+                let place = grid.refined(other, stretch.first());
                 code.subtract(grid, (f64::from(component.code_chips), complex), &place, &mut window);
             }
             // Those of its own signal that are beyond doubt are taken out as in the search before.
             let sure = hits.iter().filter(|hit| Band::of(hit.link()) == band);
             let sure = sure.filter(|hit| doubted.iter().all(|(_, other)| other.sv != hit.sv));
-            let sure: Vec<Known<'_>> =
-                sure.filter_map(|hit| Some((self.codes.get(&hit.link())?, grid.refined(hit, block.first)))).collect();
+            let sure: Vec<Known<'_>> = sure
+                .filter_map(|hit| Some((self.codes.get(&hit.link())?, grid.refined(hit, stretch.first()))))
+                .collect();
             let codes: Vec<(usize, Sv, &Code)> = (doubted.iter())
                 .filter_map(|(index, hit)| Some((*index, hit.sv, self.codes.get(&hit.link())?)))
                 .collect();
@@ -87,6 +88,7 @@ mod tests {
     use crate::gnss::gps::l1ca::L1_CA;
     use crate::gnss::qzss::l1ca::L1_CA as QZSS_L1_CA;
     use crate::gnss::samples::Format;
+    use crate::receiver::source::Block;
 
     #[test]
     fn what_a_strong_signal_makes_in_codes_of_another_is_taken_away_and_what_is_there_stays() {
@@ -118,7 +120,7 @@ mod tests {
             absent.map(|(row, _)| row.statistic).fold(0.0, f64::max)
         };
         let before = largest(&results);
-        searcher.clear_across(&block, &known, &mut results).unwrap();
+        searcher.clear_across(&Stretch::Planes(block), &known, &mut results).unwrap();
         let kept: Vec<u8> = results.iter().filter_map(|(_, hit)| hit.map(|hit| hit.sv.number)).collect();
         assert_eq!(kept, [2]);
         assert!(results.iter().all(|(row, hit)| row.acquired == hit.is_some()));
@@ -130,7 +132,7 @@ mod tests {
         // Nothing is taken away by satellites of its own signal, or by those that are not 10 dB stronger.
         let mut alone = searcher.search(&block, &links).unwrap();
         let weak: Vec<Acquired> = known.iter().map(|hit| Acquired { cn0_dbhz: 45.0, ..*hit }).collect();
-        searcher.clear_across(&block, &weak, &mut alone).unwrap();
+        searcher.clear_across(&Stretch::Planes(block), &weak, &mut alone).unwrap();
         assert!(alone.iter().any(|(row, hit)| row.sv.number == 2 && hit.is_some()));
     }
 }

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use num_complex::Complex;
 use rayon::prelude::*;
 
+use super::dwells::Spectra;
 use super::grid::Grid;
-use super::pair::Spectra;
 use super::refine::{self, Refined};
 use super::replica::Replica;
 use super::window::Window;

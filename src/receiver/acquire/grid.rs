@@ -15,13 +15,14 @@ use num_complex::Complex;
 use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
+use super::Acquired;
+use super::dwells::{Dwells, Spectra};
 use super::multiple_access::Law;
-use super::pair::{Dwells, Spectra};
+use super::pair::Transforms;
 use super::refine::Refined;
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
 use super::shifted::Shifted;
-use super::{Acquired, kernel};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Component;
 use crate::receiver::correlate::steps_of_chip;
@@ -49,8 +50,9 @@ pub(super) struct Grid {
     pub sums: u32,
     /// Code periods that the search looks at.
     pub periods: u32,
-    /// Where data and pilot are searched for together.
-    pub(super) pair: Option<Dwells>,
+    pub(super) dwells: Dwells,
+    /// Whether data and pilot are searched for together.
+    is_pair: bool,
     pub dopplers_hz: Vec<f64>,
     /// From one of them to the next.
     pub step_hz: f64,
@@ -129,6 +131,52 @@ pub(super) struct Strip {
     pub sums: u32,
 }
 
+/// Samples from which the coherent sums of any Doppler are made.
+enum Sums<'a> {
+    /// Of data and pilot.
+    Pair(Transforms),
+    /// Of one code, from spectra that Dopplers share.
+    Shared(Shifted),
+    /// Of one code, where they share none.
+    Alone { block: &'a Block<'a>, scale: f64 },
+}
+
+impl<'a> Sums<'a> {
+    fn new(grid: &Grid, block: &'a Block<'a>, scale: f64, everywhere: bool) -> Self {
+        if grid.is_pair {
+            return Self::Pair(grid.transforms(block, scale));
+        }
+        let shared = if everywhere { Shifted::new(grid, block, scale) } else { None };
+        shared.map_or(Self::Alone { block, scale }, Self::Shared)
+    }
+
+    /// What makes the spectrum of one dwell after the other at a Doppler.
+    fn at<'b>(&'b self, grid: &'b Grid, bin: usize) -> impl FnMut(usize) -> Vec<Complex<f32>> + 'b {
+        let doppler_hz = grid.dopplers_hz[bin];
+        let (mut long, mut scratch) = (Vec::new(), Vec::new());
+        move |dwell| {
+            if let Self::Pair(transforms) = self {
+                return grid.shifted(transforms, doppler_hz, dwell);
+            }
+            let mut spectrum = vec![Complex::default(); grid.inverse.len()];
+            let first = dwell as u32 * grid.coherent_periods;
+            for period in first..first + grid.coherent_periods {
+                match self {
+                    Self::Shared(shifted) => shifted.add_period(grid, bin, period, &mut spectrum),
+                    Self::Alone { block, scale } => {
+                        long.resize(grid.forward.len(), Complex::default());
+                        scratch.resize(grid.forward.get_inplace_scratch_len(), Complex::default());
+                        let rooms = (&mut long[..], &mut scratch[..]);
+                        grid.add_period(block, *scale, doppler_hz, period, rooms, &mut spectrum);
+                    }
+                    Self::Pair(_) => {}
+                }
+            }
+            spectrum
+        }
+    }
+}
+
 /// Samples up to the last lag of the last dwell, at the code rate of the slowest code over the nominal one.
 pub(super) fn samples_needed(period_samples: f64, coherent_periods: f64, sums: u32, slowest: f64) -> u64 {
     let coherent_samples = coherent_periods * period_samples;
@@ -144,7 +192,7 @@ fn step_rate_hz(component: &Component) -> Option<f64> {
 
 impl Grid {
     pub fn new(
-        (component, pair, carrier_hz): (&Component, bool, f64),
+        (component, is_pair, carrier_hz): (&Component, bool, f64),
         metadata: &IfMetadata,
         settings: &AcquisitionSettings,
         centre_hz: f64,
@@ -165,8 +213,8 @@ impl Grid {
         let lags = (period_samples / lag_samples).ceil() as usize;
         let per_cell = of_one_cell(settings.false_alarm_probability, (lags * dopplers_hz.len()) as f64);
         let looked = settings.sums(component);
-        let pair = pair.then(|| Dwells::new(looked, lags));
-        let sums = pair.as_ref().map_or(looked, Dwells::sums);
+        let dwells = if is_pair { Dwells::of_pair(looked, lags) } else { Dwells::alone(looked, coherent_periods) };
+        let sums = dwells.sums();
         // One degree of freedom a sum, with the same mean.
         let image_scale = threshold(per_cell, 2 * sums) / (2.0 * threshold(per_cell, sums));
         let law = Law::new(settings.false_alarm_probability, lags, dopplers_hz.len(), sums, image_scale);
@@ -183,7 +231,8 @@ impl Grid {
             coherent_periods,
             sums,
             periods: looked * coherent_periods,
-            pair,
+            dwells,
+            is_pair,
             dopplers_hz,
             step_hz,
             lags,
@@ -250,40 +299,27 @@ impl Grid {
             return Peaks { of: vec![none; spectra.len()], crowded: Vec::new(), map: Map::default() };
         }
         // What is compared with strips of before has their scale.
-        let scale = again.filter(|_| self.pair.is_none()).map_or(1.0 / rms, |again| again.before.scale);
+        let again = again.filter(|_| !self.is_pair);
+        let scale = again.map_or(1.0 / rms, |again| again.before.scale);
         let everywhere = again.is_none_or(|again| again.satellites.iter().any(|(_, everywhere)| *everywhere));
-        let shifted = if everywhere && self.pair.is_none() { Shifted::new(self, block, scale) } else { None };
-        let one_doppler = |bin: usize, spectra: &[Spectra<'_>]| {
-            let dwells = match &shifted {
-                Some(shifted) => self.dwells(|period, spectrum| shifted.add_period(self, bin, period, spectrum)),
-                None => {
-                    let mut scratch = vec![Complex::default(); self.forward.get_inplace_scratch_len()];
-                    let mut long = vec![Complex::default(); self.forward.len()];
-                    self.dwells(|period, spectrum| {
-                        let rooms = (&mut long[..], &mut scratch[..]);
-                        self.add_period(block, scale, self.dopplers_hz[bin], period, rooms, spectrum);
-                    })
-                }
-            };
-            self.strips(&dwells, spectra)
-        };
+        let sums = Sums::new(self, block, scale, everywhere);
+        let column =
+            |bin: usize, spectra: &[Spectra<'_>]| self.column(self.dopplers_hz[bin], spectra, &mut sums.at(self, bin));
         let one = |bin: usize| match again {
             Some(again) if !again.dopplers.contains(&bin) => {
                 let wanted = |number: usize| again.satellites.get(number).is_some_and(|(_, everywhere)| *everywhere);
                 let some: Vec<Spectra<'_>> = (0..).zip(spectra).filter(|(n, _)| wanted(*n)).map(|(_, s)| *s).collect();
-                let mut seen = if some.is_empty() { Vec::new() } else { one_doppler(bin, &some) };
+                let mut seen = if some.is_empty() { Vec::new() } else { column(bin, &some) };
                 let mut seen = seen.drain(..);
                 let before = |satellite: usize| again.before.strips.get(bin)?.get(satellite).copied();
                 (again.satellites.iter())
                     .filter_map(|(satellite, everywhere)| if *everywhere { seen.next() } else { before(*satellite) })
                     .collect()
             }
-            _ => one_doppler(bin, spectra),
+            _ => column(bin, spectra),
         };
-        let strips: Vec<Vec<Strip>> = match &self.pair {
-            None => (0..self.dopplers_hz.len()).into_par_iter().map(one).collect(),
-            Some(dwells) => self.strips_of_pairs(dwells, block, scale, spectra),
-        };
+        let mut strips: Vec<Vec<Strip>> = (0..self.dopplers_hz.len()).into_par_iter().map(one).collect();
+        self.complete(&mut strips, spectra, &sums);
         let heights: Vec<Vec<f64>> = (0..spectra.len()).map(|satellite| self.heights(&strips, satellite)).collect();
         let image = |bin: usize| self.dopplers_hz.get(bin).is_some_and(|doppler_hz| self.meets_image(*doppler_hz));
         let bar = self.law.bar(&heights, image);
@@ -307,37 +343,21 @@ impl Grid {
         self.law.threshold
     }
 
-    /// The spectra of all coherent sums, to which `add` adds each period.
-    fn dwells(&self, mut add: impl FnMut(u32, &mut [Complex<f32>])) -> Vec<Vec<Complex<f32>>> {
-        let periods = self.coherent_periods;
-        (0..self.sums)
-            .map(|dwell| {
-                let mut spectrum = vec![Complex::default(); self.inverse.len()];
-                for period in dwell * periods..(dwell + 1) * periods {
-                    add(period, &mut spectrum);
-                }
-                spectrum
+    /// Of every satellite one strip has all dwells: where none stayed, that which came nearest to it.
+    fn complete(&self, strips: &mut [Vec<Strip>], spectra: &[Spectra<'_>], sums: &Sums<'_>) {
+        let missing: Vec<(usize, usize)> = (0..spectra.len())
+            .filter(|&satellite| strips.iter().all(|column| column[satellite].sums < self.sums))
+            .filter_map(|satellite| {
+                let height = |bin: &usize| strips[*bin][satellite].peak;
+                let best = (0..strips.len()).max_by(|a, b| height(a).total_cmp(&height(b)))?;
+                Some((best, satellite))
             })
-            .collect()
-    }
-
-    /// What satellites show in these sums.
-    fn strips(&self, dwells: &[Vec<Complex<f32>>], spectra: &[Spectra<'_>]) -> Vec<Strip> {
-        let mut scratch = vec![Complex::default(); self.inverse.get_inplace_scratch_len()];
-        let mut short = vec![Complex::default(); self.inverse.len()];
-        let mut powers = vec![0.0_f32; self.lags];
-        spectra
-            .iter()
-            .map(|[spectrum, _]| {
-                powers.fill(0.0);
-                for data in dwells {
-                    kernel::multiply(&mut short, data, spectrum);
-                    self.inverse.process_with_scratch(&mut short, &mut scratch);
-                    kernel::add_powers(&mut powers, &short);
-                }
-                self.strip(&powers)
-            })
-            .collect()
+            .collect();
+        let whole = |&(bin, satellite): &(usize, usize)| self.whole(&spectra[satellite], &mut sums.at(self, bin));
+        let found: Vec<Strip> = missing.par_iter().map(whole).collect();
+        for ((bin, satellite), strip) in missing.into_iter().zip(found) {
+            strips[bin][satellite] = strip;
+        }
     }
 
     pub(super) fn strip(&self, powers: &[f32]) -> Strip {
@@ -360,9 +380,9 @@ impl Grid {
         (PEAK_CHIPS / (self.chips_per_sample * self.lag_samples)).ceil() as usize
     }
 
-    /// The largest cell of a satellite at every Doppler, zero where that was left, over the noise floor of
-    /// its map. Of each Doppler
-    /// whose own largest cell lies at the peak's code phase, the neighbourhood is left out of the floor.
+    /// The largest cell of a satellite at every Doppler, zero where that was left, over the noise floor of all
+    /// its maps. Of each Doppler whose own largest cell lies at the peak's code phase, the neighbourhood is left
+    /// out of the floor.
     fn heights(&self, strips: &[Vec<Strip>], satellite: usize) -> Vec<f64> {
         let column = || strips.iter().filter_map(|strip| strip.get(satellite));
         let scaled: Vec<f64> = (column().zip(&self.dopplers_hz))
@@ -373,14 +393,15 @@ impl Grid {
             .collect();
         let highest = (0..scaled.len()).fold(0, |best, bin| if scaled[bin] > scaled[best] { bin } else { best });
         let best_lag = column().nth(highest).map_or(0, |strip| strip.lag);
-        let (mut total, mut cells) = (0.0, 0);
-        for strip in column().filter(|strip| strip.sums == self.sums) {
+        let (mut total, mut powers) = (0.0, 0.0);
+        for strip in column() {
             let apart = strip.lag.abs_diff(best_lag);
             let same = apart.min(self.lags - apart.min(self.lags)) <= self.near_cells();
-            total += strip.total - if same { strip.near } else { 0.0 };
-            cells += self.lags - if same { strip.near_cells } else { 0 };
+            let out = same && strip.sums == self.sums;
+            total += strip.total - if out { strip.near } else { 0.0 };
+            powers += f64::from(strip.sums) * (self.lags - if out { strip.near_cells } else { 0 }) as f64;
         }
-        let floor = total / cells.max(1) as f64 / (2.0 * f64::from(self.sums));
+        let floor = total / (2.0 * powers.max(1.0));
         scaled.into_iter().map(|height| if floor > 0.0 { height / floor } else { 0.0 }).collect()
     }
 

@@ -96,8 +96,29 @@ fn add_turned_plain(sums: &mut [Complex<f32>], bins: &[Complex<f32>], first: Com
     }
 }
 
-/// out = a·b.
-pub(super) fn multiply(out: &mut [Complex<f32>], a: &[Complex<f32>], b: &[Complex<f32>]) {
+/// Numbers by which others are multiplied, each as the two factors of either part: of a product's real part
+/// re·re and im·(−im), of the imaginary one im·re and re·im.
+pub(super) struct Factors(Vec<[[f32; PARTS]; 2]>);
+
+/// Parts of numbers that are multiplied side by side.
+const PARTS: usize = 16;
+
+impl Factors {
+    pub fn of(numbers: &[Complex<f32>]) -> Self {
+        let one = |numbers: &[Complex<f32>]| {
+            let mut factors = [[0.0; PARTS]; 2];
+            for (k, number) in numbers.iter().enumerate() {
+                (factors[0][2 * k], factors[0][2 * k + 1]) = (number.re, number.re);
+                (factors[1][2 * k], factors[1][2 * k + 1]) = (-number.im, number.im);
+            }
+            factors
+        };
+        Self(numbers.chunks(PARTS / 2).map(one).collect())
+    }
+}
+
+/// out = a·b, as far as all have numbers.
+pub(super) fn multiply(out: &mut [Complex<f32>], a: &[Complex<f32>], b: &Factors) {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
@@ -156,7 +177,7 @@ fn peak_and_total_plain(powers: &[f32]) -> (f32, f64) {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn multiply_avx2(out: &mut [Complex<f32>], a: &[Complex<f32>], b: &[Complex<f32>]) {
+fn multiply_avx2(out: &mut [Complex<f32>], a: &[Complex<f32>], b: &Factors) {
     multiply_plain(out, a, b);
 }
 
@@ -167,10 +188,34 @@ fn add_powers_avx2(powers: &mut [f32], x: &[Complex<f32>]) {
 }
 
 #[inline(always)]
-fn multiply_plain(out: &mut [Complex<f32>], a: &[Complex<f32>], b: &[Complex<f32>]) {
-    for ((out, a), b) in out.iter_mut().zip(a).zip(b) {
-        *out = Complex::new(a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re);
+fn multiply_plain(out: &mut [Complex<f32>], a: &[Complex<f32>], b: &Factors) {
+    let length = out.len().min(a.len());
+    let (out, a) = (parts_mut(&mut out[..length]), parts(&a[..length]));
+    let (whole_out, rest_out) = out.as_chunks_mut::<PARTS>();
+    let (whole, rest) = a.as_chunks::<PARTS>();
+    for ((out, a), [of_own, of_other]) in whole_out.iter_mut().zip(whole).zip(&b.0) {
+        for k in 0..PARTS {
+            out[k] = a[k] * of_own[k] + a[k ^ 1] * of_other[k];
+        }
     }
+    let Some([of_own, of_other]) = b.0.get(whole.len()) else { return };
+    for k in 0..rest.len() {
+        rest_out[k] = rest[k] * of_own[k] + rest[k ^ 1] * of_other[k];
+    }
+}
+
+/// Real and imaginary parts in turn.
+#[inline(always)]
+fn parts(numbers: &[Complex<f32>]) -> &[f32] {
+    // SAFETY: a `Complex` is laid out as two of its parts.
+    unsafe { std::slice::from_raw_parts(numbers.as_ptr().cast(), 2 * numbers.len()) }
+}
+
+/// The same, to be written.
+#[inline(always)]
+fn parts_mut(numbers: &mut [Complex<f32>]) -> &mut [f32] {
+    // SAFETY: as above.
+    unsafe { std::slice::from_raw_parts_mut(numbers.as_mut_ptr().cast(), 2 * numbers.len()) }
 }
 
 #[inline(always)]
@@ -236,7 +281,7 @@ mod tests {
                 let (a, b) = (&a[offset..offset + length], &b[31 - offset..31 - offset + length]);
                 let mut products = vec![Complex::new(77.0, 77.0); 200];
                 let mut powers = vec![2.5; 200];
-                multiply(&mut products[offset..offset + length], a, b);
+                multiply(&mut products[offset..offset + length], a, &Factors::of(b));
                 add_powers(&mut powers[offset..offset + length], a);
                 for (n, (product, power)) in products.iter().zip(&powers).enumerate() {
                     let (expected, sum) = match n.checked_sub(offset).filter(|n| *n < length) {

@@ -22,8 +22,8 @@
 //! Near a multiple of half the rate of a real recording a carrier meets its own image and a sum has one
 //! degree of freedom only; there the statistic is scaled by the ratio of both thresholds.
 //!
-//! **Data and pilot** of equal power and equal codes' length are searched for together, in eight dwells where
-//! a single code has ten sums, and a Doppler is left early where nothing is (`pair`).
+//! **Data and pilot** of equal power and equal codes' length are searched for together (`pair`), in eight
+//! dwells where a single code has ten sums, and a Doppler is left early where nothing is (`dwells`).
 //!
 //! **Sensitivity.** By default 10 sums of 2 ms with half-cycle steps. At 38 dB-Hz and 2.6 Msps, with the
 //! worst losses of code (2.0 dB) and Doppler (0.9 dB) and one sum in ten lost to a data bit, 20 + λ = 138 ±
@@ -31,6 +31,7 @@
 
 mod across;
 mod codes;
+mod dwells;
 mod error;
 mod grid;
 mod kernel;
@@ -54,7 +55,7 @@ use crate::gnss::samples::IfMetadata;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Component, Layers, Link, Signal};
 use crate::receiver::lead::{beside, followed_db, lead};
-use crate::receiver::source::Block;
+use crate::receiver::source::{Block, Stretch};
 
 use codes::{Code, Codes};
 pub use error::AcquireError;
@@ -267,6 +268,16 @@ impl Searcher {
         if block.i.len() != block.q.len() {
             return Err(AcquireError::Uneven { i: block.i.len(), q: block.q.len() });
         }
+        self.search_stretch(&Stretch::Planes(*block), candidates, known)
+    }
+
+    /// The same of samples as they are.
+    pub(in crate::receiver) fn search_stretch(
+        &mut self,
+        stretch: &Stretch,
+        candidates: &[Link],
+        known: &[Acquired],
+    ) -> Result<Vec<(AcquisitionRow, Option<Acquired>)>, AcquireError> {
         let known_links = known.iter().map(Acquired::link);
         let links: Vec<Link> = candidates.iter().copied().chain(known_links).collect();
         for link in &links {
@@ -287,15 +298,15 @@ impl Searcher {
                 .filter(|(_, link)| Band::of(**link) == *band)
                 .filter_map(|(index, link)| Some((index, link.sv, self.codes.get(link)?)))
                 .collect();
-            let (have, need) = (block.i.len() as u64, grid.samples_needed());
+            let (have, need) = (stretch.samples() as u64, grid.samples_needed());
             if have < need {
                 return Err(AcquireError::TooFewSamples { have, need });
             }
             let codes: Vec<(Sv, &Code)> = chosen.iter().map(|&(_, sv, code)| (sv, code)).collect();
-            let window = Window::centred(block, need as usize);
+            let window = Window::centred(stretch, need as usize);
             let known: Vec<Known<'_>> = (known.iter())
                 .filter(|one| Band::of(one.link()) == *band)
-                .filter_map(|one| Some((self.codes.get(&one.link())?, grid.refined(one, block.first))))
+                .filter_map(|one| Some((self.codes.get(&one.link())?, grid.refined(one, stretch.first()))))
                 .collect();
             let found = self.search_signal(band.signal, grid, window, (&codes, &known));
             for ((index, ..), result) in chosen.iter().zip(found) {
@@ -306,7 +317,7 @@ impl Searcher {
         }
         let mut results: Vec<(AcquisitionRow, Option<Acquired>)> = results.into_iter().flatten().collect();
         self.codes.trim();
-        self.clear_across(block, known, &mut results)?;
+        self.clear_across(stretch, known, &mut results)?;
         self.codes.trim();
         Ok(results)
     }
@@ -421,7 +432,7 @@ impl Searcher {
         again: Option<&Again<'_>>,
     ) -> (Vec<Finding>, Vec<usize>, Map) {
         let (sums, coherent) = (grid.sums, grid.coherent_periods);
-        let spectra: Vec<pair::Spectra<'_>> = codes.iter().map(|(_, code)| code.spectra()).collect();
+        let spectra: Vec<dwells::Spectra<'_>> = codes.iter().map(|(_, code)| code.spectra()).collect();
         let coherent_s = component.period_s() * f64::from(coherent);
         let peaks = grid.search(block, &spectra, again);
         let findings = (peaks.of)

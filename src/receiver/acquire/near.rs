@@ -6,17 +6,17 @@ use super::{AcquireError, Acquired, AcquisitionSettings, Searcher, companion};
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::signal::Link;
 use crate::receiver::lead::lead;
-use crate::receiver::source::Block;
+use crate::receiver::source::Stretch;
 
 impl Searcher {
-    /// Searches the beginning of `block` for every one of `near`, within `half_hz` of its Doppler; rows come
+    /// Searches the beginning of `stretch` for every one of `near`, within `half_hz` of its Doppler; rows come
     /// in their order. Each is searched for by itself: what others' cross-correlation makes is found too.
     ///
     /// # Errors
     /// As [`Searcher::search`].
-    pub fn search_near(
+    pub(in crate::receiver) fn search_near(
         &mut self,
-        block: &Block,
+        stretch: &Stretch,
         near: &[(Link, f64)],
         half_hz: f64,
     ) -> Result<Vec<(AcquisitionRow, Option<Acquired>)>, AcquireError> {
@@ -32,11 +32,11 @@ impl Searcher {
             let (Some(component), Some(code)) = (lead(link.signal), self.codes.get(link)) else { continue };
             let one = (component, companion(component, link.signal).is_some(), link.carrier_hz());
             let Some(grid) = Grid::new(one, &self.metadata, &settings, *doppler_hz) else { continue };
-            let (have, need) = (block.i.len() as u64, grid.samples_needed());
+            let (have, need) = (stretch.samples() as u64, grid.samples_needed());
             if have < need {
                 return Err(AcquireError::TooFewSamples { have, need });
             }
-            let window = Window::centred(block, need as usize);
+            let window = Window::centred(stretch, need as usize);
             results.extend(self.search_signal(link.signal, &grid, window, (&[(link.sv, code)], &[])));
         }
         Ok(results)

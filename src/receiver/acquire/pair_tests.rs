@@ -2,6 +2,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex;
 
+use super::dwells::Dwells;
 use super::tests::Noise;
 use super::*;
 use crate::gnss::galileo::e1::{self, E1};
@@ -102,10 +103,10 @@ fn leaving_dopplers_brings_no_more_false_alarms_than_designed() {
 /// Share of satellites that a search finds, by a model of one cell: signs that turn at random at a random
 /// place, a Doppler anywhere in its bin, a lag anywhere in its cell. `leaving` is `None` for ten dwells by
 /// the pilot alone that begin at one place of the code.
-fn share_found(cn0_dbhz: f64, dwells: Option<&pair::Dwells>, random: &mut Noise) -> f64 {
+fn share_found(cn0_dbhz: f64, dwells: Option<&Dwells>, random: &mut Noise) -> f64 {
     const TRIALS: u32 = 4000;
     const CELLS: f64 = 24_552.0;
-    let sums = dwells.map_or(10, pair::Dwells::sums);
+    let sums = dwells.map_or(10, Dwells::sums);
     let bar = threshold(of_one_cell(1e-6, 81.0 * CELLS), 2 * sums);
     let begins = dwells.map_or(vec![0.0; 10], |dwells| dwells.begins().to_vec());
     let mut found = 0;
@@ -136,7 +137,7 @@ fn share_found(cn0_dbhz: f64, dwells: Option<&pair::Dwells>, random: &mut Noise)
 
 #[test]
 fn eight_dwells_by_both_find_as_many_as_ten_by_the_pilot_alone() {
-    let dwells = pair::Dwells::new(10, 24_552);
+    let dwells = Dwells::of_pair(10, 24_552);
     let mut random = Noise(12);
     for cn0_dbhz in 34..=42 {
         let [alone, both] = [None, Some(&dwells)].map(|dwells| share_found(f64::from(cn0_dbhz), dwells, &mut random));
@@ -155,7 +156,7 @@ fn satellites_are_found_where_they_are_no_less_often_than_the_model_says() {
     let samples = samples_needed(&metadata, &settings).unwrap() as usize;
     let mut searcher = Searcher::new(&metadata, &settings).unwrap();
     let mut random = Noise(31);
-    let expected = share_found(38.0, Some(&pair::Dwells::new(10, 24_552)), &mut random);
+    let expected = share_found(38.0, Some(&Dwells::of_pair(10, 24_552)), &mut random);
     let (mut found, trials) = (0, 60);
     for trial in 0..trials {
         let (doppler_hz, phase) = (900.0 * random.uniform() - 450.0, 4092.0 * random.uniform());

@@ -104,7 +104,7 @@ fn strong_signals_that_are_no_candidates_bring_no_false_satellites() {
         let recording = quantised(record(metadata.clone(), samples, &sent, seed));
         count(&mut searcher, &recording, &candidates, &candidates, &mut total);
         // Above the threshold of noise there are many.
-        let window = Window::centred(&Block { first: 0, i: &recording.i, q: &recording.q }, samples);
+        let window = Window::centred(&Stretch::Planes(Block { first: 0, i: &recording.i, q: &recording.q }), samples);
         let grid = searcher.grids.values().next().unwrap();
         let spectra: Vec<_> = searcher.codes.values().map(Code::spectra).collect();
         let peaks = grid.search(&window.block(), &spectra, None);

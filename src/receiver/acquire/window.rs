@@ -1,6 +1,6 @@
 //! The samples of one search.
 
-use crate::receiver::source::Block;
+use crate::receiver::source::{Block, Stretch};
 
 /// The samples of one search, with their mean taken out: a front end's constant offset correlates with
 /// the spectral lines of every code, one each kilohertz for C/A, and would pass for satellites there.
@@ -11,12 +11,14 @@ pub(super) struct Window {
 }
 
 impl Window {
-    pub fn centred(block: &Block, samples: usize) -> Self {
-        let centred = |x: &[f32]| -> Vec<f32> {
-            let mean = x.iter().take(samples).map(|x| f64::from(*x)).sum::<f64>() / samples.max(1) as f64;
-            x.iter().take(samples).map(|x| (f64::from(*x) - mean) as f32).collect()
-        };
-        Self { first: block.first, i: centred(block.i), q: centred(block.q) }
+    pub fn centred(stretch: &Stretch, samples: usize) -> Self {
+        let mut planes = stretch.planes(samples);
+        for plane in &mut planes {
+            let mean = plane.iter().map(|x| f64::from(*x)).sum::<f64>() / samples.max(1) as f64;
+            plane.iter_mut().for_each(|x| *x = (f64::from(*x) - mean) as f32);
+        }
+        let [i, q] = planes;
+        Self { first: stretch.first(), i, q }
     }
 
     pub fn block(&self) -> Block<'_> {

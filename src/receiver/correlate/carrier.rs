@@ -81,15 +81,15 @@ impl Carrier {
         (cos, sin)
     }
 
-    /// The same of pairs of lanes, each by the mean of its two turns.
+    /// Turns within a vector of pairs of lanes, each the mean of two.
     #[inline(always)]
-    pub fn fold_pairs(&self, re: &[f64; LANES / 2], im: &[f64; LANES / 2]) -> Complex64 {
-        let mut turned = Complex64::ZERO;
+    pub fn pairs(&self) -> Pairs {
+        let mut pairs = Pairs { re: [0.0; LANES / 2], im: [0.0; LANES / 2] };
         for k in 0..LANES / 2 {
-            let turn = |x: &[f64; LANES]| 0.5 * (x[2 * k] + x[2 * k + 1]);
-            turned += Complex64::new(re[k], im[k]) * Complex64::new(turn(&self.within.re), -turn(&self.within.im));
+            pairs.re[k] = 0.5 * (self.within.re[2 * k] + self.within.re[2 * k + 1]);
+            pairs.im[k] = 0.5 * (self.within.im[2 * k] + self.within.im[2 * k + 1]);
         }
-        turned
+        pairs
     }
 
     /// The sum of lanes, each turned back to the vectors' first samples.
@@ -104,6 +104,25 @@ impl Carrier {
     }
 }
 
+/// Turns within a vector, by pairs of lanes.
+pub(super) struct Pairs {
+    re: [f64; LANES / 2],
+    im: [f64; LANES / 2],
+}
+
+impl Pairs {
+    /// The sum of pairs of lanes, each turned back to the vectors' first samples.
+    #[inline(always)]
+    pub fn fold(&self, re: &[f64; LANES / 2], im: &[f64; LANES / 2]) -> Complex64 {
+        let (mut turned_re, mut turned_im) = ([0.0; LANES / 2], [0.0; LANES / 2]);
+        for k in 0..LANES / 2 {
+            turned_re[k] = re[k] * self.re[k] + im[k] * self.im[k];
+            turned_im[k] = im[k] * self.re[k] - re[k] * self.im[k];
+        }
+        Complex64::new(sum(turned_re), sum(turned_im))
+    }
+}
+
 /// The few samples after the last whole vector or group, and zeros.
 #[inline(always)]
 pub(super) fn filled<const N: usize>(rest: &[f32]) -> [f32; N] {
@@ -112,13 +131,15 @@ pub(super) fn filled<const N: usize>(rest: &[f32]) -> [f32; N] {
     all
 }
 
-/// Halves added to each other until one is left.
+/// Halves added to each other until one is left; of as many as a power of two.
 #[inline(always)]
-fn sum(mut x: [f64; LANES]) -> f64 {
-    for half in [8, 4, 2, 1] {
+fn sum<const N: usize>(mut x: [f64; N]) -> f64 {
+    let mut half = N / 2;
+    while half > 0 {
         for k in 0..half {
             x[k] += x[k + half];
         }
+        half /= 2;
     }
     x[0]
 }

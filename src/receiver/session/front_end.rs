@@ -24,7 +24,7 @@ use crate::receiver::output::{Record, Sink};
 use crate::receiver::parting::{Estimate, Line, Offset};
 use crate::receiver::position::CodeNoise;
 use crate::receiver::settings::Settings;
-use crate::receiver::source::{Block, Lookback, Packed, Planes};
+use crate::receiver::source::{Gathered, Lookback, Packed, Planes, Stretch};
 use crate::receiver::track::loops::CodeShape;
 use crate::receiver::track::{Channel, ReplicaModel, Report, Shown};
 
@@ -83,15 +83,14 @@ impl Track {
 
 /// Samples collected for a search.
 pub(super) struct Window {
-    pub first: u64,
-    pub samples: Planes,
+    pub samples: Gathered,
     /// What is searched for; all where there is none.
     pub near: Option<Near>,
 }
 
 impl Window {
-    pub fn block(&self) -> Block<'_> {
-        Block { first: self.first, i: &self.samples.i, q: &self.samples.q }
+    pub fn stretch(&self) -> Stretch<'_> {
+        Stretch::Packed(self.samples.packed())
     }
 }
 

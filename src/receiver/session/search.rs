@@ -15,7 +15,7 @@ use crate::receiver::decode::Decoder;
 use crate::receiver::outcome::ReceiveError;
 use crate::receiver::output::{Record, Sink};
 use crate::receiver::parting::Line;
-use crate::receiver::source::{Packed, Planes};
+use crate::receiver::source::{Gathered, Packed};
 use crate::receiver::track::{Channel, Report};
 
 /// A satellite that was lost is searched for eagerly so long.
@@ -37,24 +37,16 @@ impl FrontEnd {
         }
         if self.window.is_none() {
             let Some(near) = self.due(block, shared)? else { return Ok(()) };
-            self.window = Some(Window { first: block.first, samples: Planes::default(), near });
+            self.window = Some(Window { samples: Gathered::from(block), near });
         }
         let Some(window) = &mut self.window else { return Ok(()) };
-        let missing = (self.needed as usize).saturating_sub(window.samples.i.len());
-        let mut planes = Planes::default();
-        let samples = block.unpack(0..missing, &mut planes);
-        for (kept, new) in [(&mut window.samples.i, samples.i), (&mut window.samples.q, samples.q)] {
-            // Most searches want a few blocks.
-            kept.reserve_exact(new.len());
-            kept.extend_from_slice(new);
-        }
-        if (window.samples.i.len() as u64) < self.needed {
+        if !window.samples.take(block, self.needed as usize) {
             return Ok(());
         }
         let Some(window) = self.window.take() else { return Ok(()) };
         self.refused.retain(|_, until| *until > end);
         if let Some((near, half_hz)) = &window.near {
-            let results = self.searcher.search_near(&window.block(), near, *half_hz)?;
+            let results = self.searcher.search_near(&window.stretch(), near, *half_hz)?;
             self.note_missed(&results, end, shared);
             let (believed, doubted) = self.believed(results);
             if doubted {
@@ -71,7 +63,7 @@ impl FrontEnd {
         let is_followed = |link: &Link| self.tracks.iter().any(|track| track.channel.link().is_alike(*link));
         if !sought.iter().all(is_followed) {
             sought.retain(|link| !known.iter().any(|one| one.link().is_alike(*link)));
-            let results = self.searcher.search_beside(&window.block(), &sought, &known)?;
+            let results = self.searcher.search_stretch(&window.stretch(), &sought, &known)?;
             self.look(&results, end, shared);
             self.start_channels(results, block.first, shared, sink)?;
         }
@@ -124,7 +116,8 @@ impl FrontEnd {
     pub(super) fn search_rest(&mut self, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let sink = &mut Counted { sink, step: self.step, ticks: &[] };
         let Some(window) = self.window.take().filter(|_| !self.searched) else { return Ok(()) };
-        let have = window.samples.i.len() as u64;
+        let packed = window.samples.packed();
+        let have = packed.samples() as u64;
         let mut searcher = Searcher::fitted(&self.metadata, &self.settings.acquisition, have)?;
         let mut sought = Vec::new();
         for link in suited::distinct(&self.candidates) {
@@ -133,8 +126,8 @@ impl FrontEnd {
         if sought.is_empty() && !self.candidates.is_empty() {
             return Ok(());
         }
-        let results = searcher.search(&window.block(), &sought)?;
-        self.start_channels(results, window.first, shared, sink)?;
+        let results = searcher.search_stretch(&window.stretch(), &sought, &[])?;
+        self.start_channels(results, packed.first, shared, sink)?;
         self.searched = true;
         Ok(())
     }

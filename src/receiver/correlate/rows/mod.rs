@@ -76,29 +76,28 @@ impl Rows {
             return None;
         }
         let stride = BEFORE + samples.ceil() as usize + AFTER;
-        // What steps add up to at every row's place, from half a sample before the first entry on.
-        let integral = Integral::of(&wave.values);
-        let at = |place: usize| (place as f64 / ROWS as f64 - BEFORE as f64 - 0.5) * step;
-        let sums: Vec<f64> = (0..=(stride + 2) * ROWS).map(|place| integral.to(at(place))).collect();
+        // From half a sample before the first entry on.
+        let first = -(BEFORE as f64 + 0.5) * step;
+        let places = Places::of(&wave.values, first, step / ROWS as f64, (stride + 2) * ROWS + 1);
         let mut entries = vec![[0; 2]; stride * ROWS];
-        for row in 0..=ROWS {
-            let mut owed = 0.0;
-            for entry in 0..stride {
+        let mut owed = [0.0; ROWS + 1];
+        // All rows at once, as what one owes waits for its entry before.
+        for entry in 0..stride {
+            let mut values = [0; ROWS + 1];
+            for (row, (value, owed)) in values.iter_mut().zip(&mut owed).enumerate() {
                 let from = entry * ROWS + row;
-                let mean = (sums[from + ROWS] - sums[from]) / step;
+                let mean = (places.sums[from + ROWS] - places.sums[from]) / step;
                 // A change's place is seen in the sign in which it goes.
-                let way = f64::from((integral.value(at(from + ROWS)) - integral.value(at(from))).signum());
+                let way = f64::from((places.values[from + ROWS] - places.values[from]).signum());
                 let way = if mean.abs() < 1.0 { way } else { 0.0 };
                 let exact = AMPLITUDE * mean;
-                let value = (exact + way * owed).round().clamp(-AMPLITUDE, AMPLITUDE);
-                owed += way * (exact - value);
-                let value = value as i8;
-                if row < ROWS {
-                    entries[row * stride + entry][0] = value;
-                }
-                if row > 0 {
-                    entries[(row - 1) * stride + entry][1] = value;
-                }
+                let wanted = exact + way * *owed;
+                let whole = f64::from((wanted + 0.5_f64.copysign(wanted)) as i32).clamp(-AMPLITUDE, AMPLITUDE);
+                *owed += way * (exact - whole);
+                *value = whole as i8;
+            }
+            for (row, pair) in values.windows(2).enumerate() {
+                entries[row * stride + entry] = [pair[0], pair[1]];
             }
         }
         Some(Self {
@@ -246,40 +245,41 @@ fn body<const T: usize>(job: &Job, codes: [i64; T], add: impl Fn(&kernel::Segmen
         add(&segment, &mut totals);
     }
     let mut found = [Complex64::ZERO; T];
+    let pairs = carrier.pairs();
     for t in 0..T {
-        found[t] = carrier.fold_pairs(&totals[t][0], &totals[t][1]) * SCALE;
+        found[t] = pairs.fold(&totals[t][0], &totals[t][1]) * SCALE;
     }
     found
 }
 
-/// What the steps of a period add up to.
-struct Integral<'a> {
-    values: &'a [i8],
-    before: Vec<i64>,
+/// A period's steps at places that are equally far apart, less than a step: what they add up to, and the step
+/// there.
+struct Places {
+    sums: Vec<f64>,
+    values: Vec<i8>,
 }
 
-impl<'a> Integral<'a> {
-    fn of(values: &'a [i8]) -> Self {
-        let mut sum = 0;
-        let mut before = vec![0];
-        before.extend(values.iter().map(|&value| {
-            sum += i64::from(value);
-            sum
-        }));
-        Self { values, before }
-    }
-
-    /// The step at a phase.
-    fn value(&self, phase: f64) -> i8 {
-        self.values[(phase.floor() as i64).rem_euclid(self.values.len() as i64) as usize]
-    }
-
-    /// The integral from zero to a phase.
-    fn to(&self, phase: f64) -> f64 {
-        let (whole, length) = (phase.floor(), self.values.len() as i64);
-        let (periods, step) = ((whole as i64).div_euclid(length), (whole as i64).rem_euclid(length) as usize);
-        let sum = periods * self.before[length as usize] + self.before[step];
-        sum as f64 + (phase - whole) * f64::from(self.values[step])
+impl Places {
+    /// From `first` on, less than a period before zero.
+    fn of(steps: &[i8], first: f64, apart: f64, count: usize) -> Self {
+        let mut places = Self { sums: Vec::with_capacity(count), values: Vec::with_capacity(count) };
+        // The number of the step, and the sum of those before it.
+        let length = steps.len();
+        let begin = first + length as f64;
+        let mut number = begin as usize;
+        let mut before: i64 = steps.iter().take(number).map(|&step| i64::from(step)).sum();
+        for place in 0..count {
+            let at = begin + place as f64 * apart;
+            let here = at as usize;
+            while number < here {
+                before += i64::from(steps[number % length]);
+                number += 1;
+            }
+            let step = steps[number % length];
+            places.sums.push(before as f64 + (at - here as f64) * f64::from(step));
+            places.values.push(step);
+        }
+        places
     }
 }
 
