@@ -156,10 +156,10 @@ impl Fidelity {
             (Arithmetic::F32, CodeEdge::Area, _) => 0.4,
             (Arithmetic::F32, CodeEdge::BandLimited, false) => 3.4,
             (Arithmetic::F32, CodeEdge::BandLimited, true) => 1.5,
-            (Arithmetic::F64, CodeEdge::Nearest, _) => 1.2,
-            (Arithmetic::F64, CodeEdge::Area, _) => 1.3,
-            (Arithmetic::F64, CodeEdge::BandLimited, false) => 4.0,
-            (Arithmetic::F64, CodeEdge::BandLimited, true) => 1.5,
+            (Arithmetic::F64, CodeEdge::Nearest, _) => 0.8,
+            (Arithmetic::F64, CodeEdge::Area, _) => 0.95,
+            (Arithmetic::F64, CodeEdge::BandLimited, false) => 1.6,
+            (Arithmetic::F64, CodeEdge::BandLimited, true) => 0.7,
         }
     }
 
@@ -314,8 +314,9 @@ pub struct Choice {
 /// arithmetic where there is `noise`, and of the waveform where one of the `signals` has several layers.
 pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal]) -> Vec<Choice> {
     let level = Fidelity::suited(chosen.grade, rate_hz, chosen.allowed_m);
-    let f32_carrier = Fidelity { carrier: Arithmetic::F32, ..chosen };
-    let edge_ns = f32_carrier.satellite_sample_ns(rate_hz);
+    let at_area = |carrier| Fidelity { carrier, code_edge: CodeEdge::Area, ..chosen }.satellite_sample_ns(rate_hz);
+    let carrier_ns = at_area(chosen.carrier) - at_area(Arithmetic::F32);
+    let edge_ns = chosen.satellite_sample_ns(rate_hz) - carrier_ns;
     let mut found = vec![
         Choice {
             knob: "code_edge",
@@ -339,7 +340,7 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal])
                 Arithmetic::F32 => "carrier 1e-6 cycle".to_owned(),
                 Arithmetic::F64 => "carrier 1e-10 cycle".to_owned(),
             },
-            cost: format!("{:.2} ns", chosen.satellite_sample_ns(rate_hz) - edge_ns),
+            cost: format!("{carrier_ns:.2} ns"),
         },
         Choice {
             knob: "knot_tolerance_cycles",

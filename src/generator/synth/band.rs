@@ -48,8 +48,8 @@ pub(super) struct Cell([[f64; WIDTH]; 4]);
 ///
 /// The number in the middle and the sum that becomes a whole number are rounded, by half a unit each. What is
 /// more stays below 2^22 units, so that roundings of the place within the cell, of the linear coefficient, of
-/// its sum with the higher terms and of the product are an eighth of a unit each at most. The cubic polynomial
-/// is within 0.02 units.
+/// its sum with the higher terms and of the product are an eighth of a unit each at most. The cubic
+/// polynomial is within 0.02 units.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct UnitCell {

@@ -1,9 +1,9 @@
 //! The band-limited waveform of a run for the `f64` kernel, a tile of samples at a time.
 //!
-//! It is the square wave, which changes its sign at the first sample behind each change of the code's, plus at
-//! each change the filter's response less the change itself. Places of changes are counted in 2^-48 sample
-//! from the tile on (error below 2^-35). Changes take turns in three sums, so that one need not wait for
-//! what the one before has written where they reach the same samples.
+//! It is the square wave, which changes its sign at the first sample behind each change of the code's, plus
+//! at each change the filter's response less the change itself. Places of changes are counted in 2^-48 sample
+//! from the tile on (error below 2^-35). Changes take turns in three sums, so that one need not wait for what
+//! the one before has written where they reach the same samples.
 //!
 //! Where at most nine changes reach a sample the sums are whole numbers of 2^-29, exact in any order. A
 //! response is within 3e-9 there, and nine of them within 2.7e-8: less than the rounding of a sum of `f32`

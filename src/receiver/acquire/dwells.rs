@@ -2,10 +2,11 @@
 //!
 //! Most satellites are absent, and of one that is there most Dopplers are wrong. Where data and pilot are
 //! searched for together a Doppler stays after some of its dwells where its largest cell exceeds what that of
-//! noise exceeds with a stated probability; where it does not, it is left. The threshold of all dwells is that
-//! of a search which leaves nothing, so false alarms come no more often. Detections: of ten dwells by the
-//! pilot alone eight dwells by both keep as many, at any C/N0 (model of signs, Doppler and lag in the tests of
-//! `pair`). When a Doppler may be left is a share of all dwells, as weak signals that ask for many show late.
+//! noise exceeds with a stated probability; where it does not, it is left. The threshold of all dwells is
+//! that of a search which leaves nothing, so false alarms come no more often. Detections: of ten dwells by
+//! the pilot alone eight dwells by both keep as many, at any C/N0 (model of signs, Doppler and lag in the
+//! tests of `pair`). When a Doppler may be left is a share of all dwells, as weak signals that ask for many
+//! show late.
 //!
 //! Where cross-correlation raises a Doppler for all codes, many of them stay; then all do, and
 //! [`super::multiple_access`] judges whole columns. Of C/A codes alone none is left: one satellite raises the

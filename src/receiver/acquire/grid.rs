@@ -18,11 +18,10 @@ use rustfft::{Fft, FftPlanner};
 use super::Acquired;
 use super::dwells::{Dwells, Spectra};
 use super::multiple_access::Law;
-use super::pair::Transforms;
 use super::refine::Refined;
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
-use super::shifted::Shifted;
+use super::sums::Sums;
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::signal::Component;
 use crate::receiver::correlate::steps_of_chip;
@@ -52,7 +51,7 @@ pub(super) struct Grid {
     pub periods: u32,
     pub(super) dwells: Dwells,
     /// Whether data and pilot are searched for together.
-    is_pair: bool,
+    pub(super) is_pair: bool,
     pub dopplers_hz: Vec<f64>,
     /// From one of them to the next.
     pub step_hz: f64,
@@ -129,52 +128,6 @@ pub(super) struct Strip {
     pub near_cells: usize,
     /// Powers in every cell: fewer than all where the Doppler was left.
     pub sums: u32,
-}
-
-/// Samples from which the coherent sums of any Doppler are made.
-enum Sums<'a> {
-    /// Of data and pilot.
-    Pair(Transforms),
-    /// Of one code, from spectra that Dopplers share.
-    Shared(Shifted),
-    /// Of one code, where they share none.
-    Alone { block: &'a Block<'a>, scale: f64 },
-}
-
-impl<'a> Sums<'a> {
-    fn new(grid: &Grid, block: &'a Block<'a>, scale: f64, everywhere: bool) -> Self {
-        if grid.is_pair {
-            return Self::Pair(grid.transforms(block, scale));
-        }
-        let shared = if everywhere { Shifted::new(grid, block, scale) } else { None };
-        shared.map_or(Self::Alone { block, scale }, Self::Shared)
-    }
-
-    /// What makes the spectrum of one dwell after the other at a Doppler.
-    fn at<'b>(&'b self, grid: &'b Grid, bin: usize) -> impl FnMut(usize) -> Vec<Complex<f32>> + 'b {
-        let doppler_hz = grid.dopplers_hz[bin];
-        let (mut long, mut scratch) = (Vec::new(), Vec::new());
-        move |dwell| {
-            if let Self::Pair(transforms) = self {
-                return grid.shifted(transforms, doppler_hz, dwell);
-            }
-            let mut spectrum = vec![Complex::default(); grid.inverse.len()];
-            let first = dwell as u32 * grid.coherent_periods;
-            for period in first..first + grid.coherent_periods {
-                match self {
-                    Self::Shared(shifted) => shifted.add_period(grid, bin, period, &mut spectrum),
-                    Self::Alone { block, scale } => {
-                        long.resize(grid.forward.len(), Complex::default());
-                        scratch.resize(grid.forward.get_inplace_scratch_len(), Complex::default());
-                        let rooms = (&mut long[..], &mut scratch[..]);
-                        grid.add_period(block, *scale, doppler_hz, period, rooms, &mut spectrum);
-                    }
-                    Self::Pair(_) => {}
-                }
-            }
-            spectrum
-        }
-    }
 }
 
 /// Samples up to the last lag of the last dwell, at the code rate of the slowest code over the nominal one.
@@ -380,9 +333,9 @@ impl Grid {
         (PEAK_CHIPS / (self.chips_per_sample * self.lag_samples)).ceil() as usize
     }
 
-    /// The largest cell of a satellite at every Doppler, zero where that was left, over the noise floor of all
-    /// its maps. Of each Doppler whose own largest cell lies at the peak's code phase, the neighbourhood is left
-    /// out of the floor.
+    /// The largest cell of a satellite at every Doppler, zero where that was left, over the noise floor of
+    /// all its maps. Of each Doppler whose own largest cell lies at the peak's code phase, the neighbourhood
+    /// is left out of the floor.
     fn heights(&self, strips: &[Vec<Strip>], satellite: usize) -> Vec<f64> {
         let column = || strips.iter().filter_map(|strip| strip.get(satellite));
         let scaled: Vec<f64> = (column().zip(&self.dopplers_hz))

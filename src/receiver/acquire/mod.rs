@@ -43,6 +43,7 @@ mod replica;
 mod room;
 mod settings;
 mod shifted;
+mod sums;
 mod tone;
 mod window;
 

@@ -9,8 +9,9 @@ use crate::receiver::lead::lead;
 use crate::receiver::source::Stretch;
 
 impl Searcher {
-    /// Searches the beginning of `stretch` for every one of `near`, within `half_hz` of its Doppler; rows come
-    /// in their order. Each is searched for by itself: what others' cross-correlation makes is found too.
+    /// Searches the beginning of `stretch` for every one of `near`, within `half_hz` of its Doppler; rows
+    /// come in their order. Each is searched for by itself: what others' cross-correlation makes is found
+    /// too.
     ///
     /// # Errors
     /// As [`Searcher::search`].

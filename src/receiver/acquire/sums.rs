@@ -1,0 +1,55 @@
+//! Where the coherent sums of a search come from.
+
+use num_complex::Complex;
+
+use super::grid::Grid;
+use super::pair::Transforms;
+use super::shifted::Shifted;
+use crate::receiver::source::Block;
+
+/// Samples from which the coherent sums of any Doppler are made.
+pub(super) enum Sums<'a> {
+    /// Of data and pilot.
+    Pair(Transforms),
+    /// Of one code, from spectra that Dopplers share.
+    Shared(Shifted),
+    /// Of one code, where they share none.
+    Alone { block: &'a Block<'a>, scale: f64 },
+}
+
+impl<'a> Sums<'a> {
+    pub fn new(grid: &Grid, block: &'a Block<'a>, scale: f64, everywhere: bool) -> Self {
+        if grid.is_pair {
+            return Self::Pair(grid.transforms(block, scale));
+        }
+        let shared = if everywhere { Shifted::new(grid, block, scale) } else { None };
+        shared.map_or(Self::Alone { block, scale }, Self::Shared)
+    }
+
+    /// What makes the spectrum of one dwell after the other at a Doppler.
+    pub fn at<'b>(&'b self, grid: &'b Grid, bin: usize) -> impl FnMut(usize) -> Vec<Complex<f32>> + 'b {
+        let doppler_hz = grid.dopplers_hz[bin];
+        let (mut long, mut scratch) = (Vec::new(), Vec::new());
+        move |dwell| {
+            let first = dwell as u32 * grid.coherent_periods;
+            let mut spectrum = vec![Complex::default(); grid.inverse.len()];
+            match self {
+                Self::Pair(transforms) => return grid.shifted(transforms, doppler_hz, dwell),
+                Self::Shared(shifted) => {
+                    for period in first..first + grid.coherent_periods {
+                        shifted.add_period(grid, bin, period, &mut spectrum);
+                    }
+                }
+                Self::Alone { block, scale } => {
+                    long.resize(grid.forward.len(), Complex::default());
+                    scratch.resize(grid.forward.get_inplace_scratch_len(), Complex::default());
+                    for period in first..first + grid.coherent_periods {
+                        let rooms = (&mut long[..], &mut scratch[..]);
+                        grid.add_period(block, *scale, doppler_hz, period, rooms, &mut spectrum);
+                    }
+                }
+            }
+            spectrum
+        }
+    }
+}
