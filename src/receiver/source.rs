@@ -323,6 +323,38 @@ mod tests {
     use super::*;
 
     #[test]
+    fn samples_that_were_gathered_piece_by_piece_are_those_of_the_planes() {
+        for (format, _) in Format::NAMES {
+            let size = format.bytes();
+            let bytes: Vec<u8> = (0..100 * size as u32).map(|n| (n * 37 % 251) as u8).collect();
+            let mut all = Planes::default();
+            format.unpack(&bytes, &mut all.i, &mut all.q);
+            for (piece, samples) in [(1, 40), (7, 40), (40, 40), (64, 40), (33, 100)] {
+                let mut gathered: Option<Gathered> = None;
+                let mut first = 500;
+                for bytes in bytes.chunks(piece * size) {
+                    let block = Packed { first, format, bytes };
+                    let end = block.end() as usize - 500;
+                    let is_whole = gathered.get_or_insert_with(|| Gathered::from(&block)).take(&block, samples);
+                    assert_eq!(is_whole, end >= samples, "{format} {piece} {end}");
+                    first = block.end();
+                }
+                let gathered = gathered.unwrap();
+                let packed = Stretch::Packed(gathered.packed());
+                let planes = Stretch::Planes(Block { first: 500, i: &all.i[..samples], q: &all.q[..samples] });
+                for stretch in [packed, planes] {
+                    assert_eq!((stretch.first(), stretch.samples()), (500, samples), "{format} {piece}");
+                    for part in [0, 1, samples - 1, samples, samples + 5] {
+                        let [i, q] = stretch.planes(part);
+                        let part = part.min(samples);
+                        assert_eq!((&i[..], &q[..]), (&all.i[..part], &all.q[..part]), "{format} {piece} {part}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
     fn blocks_do_not_depend_on_how_the_bytes_arrive() {
         for (format, _) in Format::NAMES {
             let bytes: Vec<u8> = (0..1003_u32).map(|n| (n * 37 % 251) as u8).collect();

@@ -32,24 +32,28 @@ impl<'a> Sums<'a> {
         let (mut long, mut scratch) = (Vec::new(), Vec::new());
         move |dwell| {
             let first = dwell as u32 * grid.coherent_periods;
-            let mut spectrum = vec![Complex::default(); grid.inverse.len()];
+            let periods = first..first + grid.coherent_periods;
+            let room = || vec![Complex::default(); grid.inverse.len()];
             match self {
-                Self::Pair(transforms) => return grid.shifted(transforms, doppler_hz, dwell),
+                Self::Pair(transforms) => grid.shifted(transforms, doppler_hz, dwell),
                 Self::Shared(shifted) => {
-                    for period in first..first + grid.coherent_periods {
+                    let mut spectrum = room();
+                    for period in periods {
                         shifted.add_period(grid, bin, period, &mut spectrum);
                     }
+                    spectrum
                 }
                 Self::Alone { block, scale } => {
+                    let mut spectrum = room();
                     long.resize(grid.forward.len(), Complex::default());
                     scratch.resize(grid.forward.get_inplace_scratch_len(), Complex::default());
-                    for period in first..first + grid.coherent_periods {
+                    for period in periods {
                         let rooms = (&mut long[..], &mut scratch[..]);
                         grid.add_period(block, *scale, doppler_hz, period, rooms, &mut spectrum);
                     }
+                    spectrum
                 }
             }
-            spectrum
         }
     }
 }
