@@ -51,21 +51,20 @@ const RISE: f64 = 2.0;
 const EDGE: f64 = 0.05;
 const EDGE_ERFC: f64 = 2.63;
 
-/// What the section says of a run.
-pub fn judge(run: &Run) -> Spectrum {
-    let theory_db = theory_db(run);
+/// What the section says of a run and of what [`theory_db`] expects there.
+pub fn judge(run: &Run, theory_db: &[f64]) -> Spectrum {
     let mut found = Spectrum::default();
     if theory_db.is_empty() {
         found.null_reason = Some("there is no spectrum, or no signal in it");
         return found;
     }
     let peak_db = theory_db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let pairs = || run.psd.iter().zip(&theory_db).filter(|(_, theory)| **theory > peak_db - 20.0);
+    let pairs = || run.psd.iter().zip(theory_db).filter(|(_, theory)| **theory > peak_db - 20.0);
     let errors: Vec<f64> = pairs().map(|(row, theory)| row.density_db - theory).collect();
     found.level_error_db = median(&errors);
     let about: Vec<f64> = errors.iter().map(|e| (e - found.level_error_db.unwrap_or(0.0)).abs()).collect();
     found.shape_error_p95_db = crate::analysis::statistics::percentile(&about, 0.95);
-    match nulls(run, &theory_db) {
+    match nulls(run, theory_db) {
         Ok([low, high]) => {
             (found.null_low_hz, found.null_low_expected_hz) = (Some(low.0), Some(low.1));
             (found.null_high_hz, found.null_high_expected_hz) = (Some(high.0), Some(high.1));
@@ -338,7 +337,9 @@ mod tests {
             let row =
                 |(frequency_hz, density): (f64, f64)| PsdRow { frequency_hz, density_db: 10.0 * libm::log10(density) };
             run.psd = psd.density().unwrap().into_iter().map(row).collect();
-            (theory_db(&run), run.psd.clone(), judge(&run))
+            let theory_db = theory_db(&run);
+            let found = judge(&run, &theory_db);
+            (theory_db, run.psd.clone(), found)
         };
         let (theory_db, measured, _) = estimate(512);
         let peak_db = theory_db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -360,7 +361,7 @@ mod tests {
             );
         }
         run.scene.noise = true;
-        let hidden = judge(&run);
+        let hidden = judge(&run, &super::theory_db(&run));
         assert!(hidden.null_low_hz.is_none() && hidden.null_reason.unwrap().starts_with("hidden"), "{hidden:?}");
     }
 }

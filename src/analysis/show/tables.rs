@@ -10,7 +10,6 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
-use crate::analysis::expect::spectrum;
 use crate::analysis::measure::elevation::Elevations;
 use crate::analysis::measure::jitter::Jitter;
 use crate::analysis::measure::psd::Psd;
@@ -162,10 +161,10 @@ pub(in crate::analysis) fn write(directory: &Path, judged: &Judged<'_>) -> Resul
         }
     }
     histograms.finish()?;
-    let theory = spectrum::theory_db(judged.run);
+    let theory = &judged.summary.details.psd_theory_db;
     if !theory.is_empty() {
         let rows = judged.run.psd.iter().zip(theory);
-        let rows = rows.map(|(row, density_db)| TheoryRow { frequency_hz: row.frequency_hz, density_db });
+        let rows = rows.map(|(row, &density_db)| TheoryRow { frequency_hz: row.frequency_hz, density_db });
         write_rows(&directory.join("psd_theory.csv"), rows)?;
     }
     write_rows(&directory.join("verdict.csv"), judged.summary.details.verdict.csv_rows())

@@ -266,6 +266,8 @@ pub struct Details {
     pub thresholds: Thresholds,
     /// Lowest point of the spectrum near each first null of the code, noise-free scenes only.
     pub psd_nulls_hz: Vec<f64>,
+    /// Expected density at the frequencies of `psd.csv`, in its decibels; empty where there is none.
+    pub psd_theory_db: Vec<f64>,
     /// Observations that the truth has no row for.
     pub unmatched_observations: usize,
     /// Wrong parameters, as decoded.
@@ -306,7 +308,8 @@ impl Summary {
         let observables = observables(errors, None, &mut details)?;
         let tracking = tracking(run, errors, &mut details)?;
         let navigation = navigation(run, &mut details);
-        let psd = spectrum::judge(run);
+        details.psd_theory_db = spectrum::theory_db(run);
+        let psd = spectrum::judge(run, &details.psd_theory_db);
         details.psd_nulls_hz = psd.null_low_hz.into_iter().chain(psd.null_high_hz).collect();
         details.unmatched_observations = errors.unmatched;
         Ok(Self {

@@ -79,7 +79,7 @@ impl Drawing {
             tiny_skia::Pixmap::new(size(self.width_px), size(self.height_px)).ok_or("a picture needs a size")?;
         let shrink = scale / FINE as f32;
         resvg::render(&self.tree()?, tiny_skia::Transform::from_scale(shrink, shrink), &mut pixels.as_mut());
-        Ok(pixels.encode_png()?)
+        png_of(&pixels)
     }
 
     /// Writes that PNG.
@@ -87,6 +87,21 @@ impl Drawing {
         let failed = |error: Failure| JudgeError::Plot { path: path.to_owned(), reason: error.to_string() };
         crate::analysis::show::write::write_whole(path, &self.png(scale).map_err(failed)?)
     }
+}
+
+/// Pictures are opaque, as their background is filled. Lines and flat areas pack best as they are, without
+/// differences of neighbours; half as fast, level 6 saves 7 % more.
+fn png_of(pixels: &tiny_skia::Pixmap) -> Result<Vec<u8>, Failure> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, pixels.width(), pixels.height());
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_filter(png::Filter::NoFilter);
+    encoder.set_deflate_compression(png::DeflateCompression::Level(3));
+    let mut writer = encoder.write_header()?;
+    let colours: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+    writer.write_image_data(&colours)?;
+    writer.finish()?;
+    Ok(bytes)
 }
 
 /// The bundled font alone, whatever the machine has.

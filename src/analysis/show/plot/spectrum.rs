@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use crate::analysis::error::JudgeError;
-use crate::analysis::expect::spectrum;
 use crate::analysis::read::Run;
 use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
 use crate::analysis::show::plot::judged::Judged;
@@ -19,7 +18,7 @@ pub fn psd(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     }
     let measured: Vec<(f64, f64)> = rows.iter().map(|row| (row.frequency_hz / 1e6, row.density_db)).collect();
     let theory: Vec<(f64, f64)> =
-        measured.iter().zip(spectrum::theory_db(judged.run)).map(|((mhz, _), theory_db)| (*mhz, theory_db)).collect();
+        measured.iter().zip(&judged.summary.details.psd_theory_db).map(|(&(mhz, _), &db)| (mhz, db)).collect();
     let x = Axis::new(
         "frequency in the samples (MHz)",
         (measured.first().map_or(0.0, |p| p.0), measured.last().map_or(1.0, |p| p.0)),
