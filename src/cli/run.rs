@@ -41,6 +41,8 @@ const SPECTRUM_S: f64 = 0.2;
 const SPECTRUM_PIECES: u64 = 60;
 /// Points of that spectrum.
 const SPECTRUM_BINS: usize = 2048;
+/// Bytes that are made numbers at a time: whole samples of any format.
+const SEEN_BYTES: usize = 1 << 17;
 
 /// Runs a scene end to end.
 pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
@@ -227,8 +229,10 @@ impl Tap {
         while self.piece.start < self.seen {
             let place = |at: u64| (at.clamp(begin, self.seen) - begin) as usize;
             let inside = bytes.get(place(self.piece.start)..place(self.piece.end)).unwrap_or(&[]);
-            self.metadata.format.unpack(inside, &mut self.i, &mut self.q);
-            self.psd.add(&self.i, &self.q);
+            for part in inside.chunks(SEEN_BYTES) {
+                self.metadata.format.unpack(part, &mut self.i, &mut self.q);
+                self.psd.add(&self.i, &self.q);
+            }
             if self.piece.end > self.seen {
                 break;
             }

@@ -164,11 +164,18 @@ impl Grid {
     ) -> Result<Vec<Part>, E> {
         let (start, end) = (root * self.root_samples, (root + 1) * self.root_samples);
         let mut parts = Vec::new();
-        self.halve(start, end, start, end, observe, &mut parts)?;
+        // A file of motion may have breaks by the thousand in a root.
+        let next = self.breaks.partition_point(|&at| at <= start);
+        let breaks = self.breaks.get(next..).unwrap_or_default().iter().copied().take_while(|&at| at < end);
+        let mut from = start;
+        for to in breaks.chain([end]) {
+            self.halve(start, end, from, to, observe, &mut parts)?;
+            from = to;
+        }
         Ok(parts)
     }
 
-    /// Covers the dyadic cell [`low`, `high`) within [`start`, `end`), its share between breaks.
+    /// Covers the dyadic cell [`low`, `high`) within [`start`, `end`), where there is no break.
     fn halve<E>(
         &self,
         low: u64,
@@ -178,11 +185,6 @@ impl Grid {
         observe: &impl Fn(u64) -> Result<Option<Vec<Arrival>>, E>,
         parts: &mut Vec<Part>,
     ) -> Result<(), E> {
-        let inside = self.breaks.iter().find(|&&b| start < b && b < end);
-        if let Some(&b) = inside {
-            self.halve(low, high, start, b, observe, parts)?;
-            return self.halve(low, high, b, end, observe, parts);
-        }
         let part = self.fit(start, end, observe)?;
         let good = part.as_ref().is_some_and(|part| {
             part.error_cycles <= 0.5 * self.tolerance_cycles && part.amplitude_error <= AMPLITUDE_ERROR
@@ -351,6 +353,23 @@ mod tests {
         }
         // A ray that is silent needs no path.
         assert!(made(&|_| 0.0).iter().all(|part| part.paths.is_empty()));
+    }
+
+    #[test]
+    fn breaks_by_the_hundred_thousand_in_a_root_each_end_a_part() {
+        let rate = Rate::from_hz(2.6e6).unwrap();
+        // A row of motion every 64 µs, in a root of 13 s.
+        let breaks: Vec<u64> = (0..300_000).map(|k| 167 * k + 50).collect();
+        let observe = |n: u64| Ok::<_, ()>(Some(vec![arrival(rate.elapsed_s(n), 0.0)]));
+        let grid = Grid::new(rate, breaks, 1e-4, CARRIER_HZ);
+        let size = grid.root_samples();
+        let parts = [0, 1].map(|root| grid.root(root, &observe).unwrap()).concat();
+        let inside = (0..300_000).map(|k| 167 * k + 50).filter(|at| *at < 2 * size).count();
+        assert!(inside > 200_000, "{inside}");
+        // And where the second root begins.
+        assert_eq!(parts.len(), inside + 2);
+        assert!(parts.windows(2).all(|pair| pair[0].end == pair[1].start && pair[0].end > pair[0].start));
+        assert_eq!((parts[0].start, parts[parts.len() - 1].end), (0, 2 * size));
     }
 
     #[test]

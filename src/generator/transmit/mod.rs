@@ -33,6 +33,9 @@ use crate::gnss::time::{Epoch, tone_turns};
 
 /// Length of a short polynomial of an orbit at least, where roots are shorter.
 const SPAN_S: f64 = 8.0;
+/// Breaks of the motion a second from which on nodes are dense: without breaks a curve lasts a second and
+/// more.
+const DENSE_BREAKS: f64 = 5.0;
 
 /// A sequence of ±1 of a component.
 struct Sent {
@@ -237,10 +240,12 @@ impl Transmitter {
         ((SPAN_S * scene.clock.rate.hz()) as u64 / self.root_samples()).max(1)
     }
 
-    /// The span of a root, where nodes are dense: a spinning antenna needs thousands a second, and pushed
-    /// motion seven a tick.
+    /// The span of a root, where nodes are dense: a spinning antenna needs thousands a second, pushed motion
+    /// seven a tick, and a file of motion seven a row.
     fn span(&self, scene: &Scene, root: u64) -> Option<u64> {
-        let dense = scene.trajectory.spins() || scene.trajectory.grown().is_some();
+        let dense = scene.trajectory.spins()
+            || scene.trajectory.grown().is_some()
+            || scene.trajectory.breaks_a_second() > DENSE_BREAKS;
         dense.then(|| root / self.roots_of_span(scene))
     }
 

@@ -216,6 +216,12 @@ impl Trajectory {
         &self.breaks_s
     }
 
+    /// How many of these a second there are, from the first to the last.
+    pub fn breaks_a_second(&self) -> f64 {
+        let (Some(first), Some(last)) = (self.breaks_s.first(), self.breaks_s.last()) else { return 0.0 };
+        (self.breaks_s.len() - 1) as f64 / (last - first).max(1.0)
+    }
+
     /// The knots themselves; of a growing motion the first alone.
     pub fn knots(&self) -> &[Knot] {
         &self.knots

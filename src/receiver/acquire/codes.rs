@@ -1,17 +1,17 @@
 //! Spectra of the codes that a search looks for, made when they are first needed and kept for the next
 //! search as far as there is room.
 //!
-//! A spectrum has a value for each lag: 16 kB of C/A, 650 kB of a pilot and its data of 10 ms in BOC(1,1).
-//! All candidates of a full sky would take 130 MB, and the codes themselves in the forms that correlators
+//! A spectrum has a value for each lag: 10 kB of C/A, 500 kB of a pilot and its data of 10 ms in BOC(1,1).
+//! All candidates of a full sky would take 100 MB, and the codes themselves in the forms that correlators
 //! want twice as much, so only spectra stay, and a code is made again for what is found.
 
 use std::collections::BTreeMap;
 
-use num_complex::Complex;
 use rayon::prelude::*;
 
 use super::dwells::Spectra;
 use super::grid::Grid;
+use super::kernel::Spectrum;
 use super::refine::{self, Refined};
 use super::replica::Replica;
 use super::window::Window;
@@ -20,13 +20,13 @@ use crate::gnss::signal::{Component, Link};
 use crate::receiver::lead::lead;
 
 /// Spectra that are kept from one search to the next, in bytes.
-const KEPT_BYTES: usize = 16 << 20;
+const KEPT_BYTES: usize = 8 << 20;
 
 /// A component of one satellite: its code's spectrum, and how to make the code.
 struct Sent {
     component: &'static Component,
     number: u8,
-    spectrum: Vec<Complex<f32>>,
+    spectrum: Spectrum,
 }
 
 impl Sent {
@@ -40,7 +40,7 @@ impl Sent {
     }
 
     fn bytes(&self) -> usize {
-        std::mem::size_of_val(self.spectrum.as_slice())
+        self.spectrum.bytes()
     }
 }
 

@@ -16,7 +16,7 @@
 use num_complex::Complex;
 
 use super::grid::{Grid, Strip};
-use super::kernel::{self, Factors};
+use super::kernel::{self, Factors, Spectrum};
 use crate::receiver::threshold::{of_one_cell, threshold};
 
 /// Shares of the dwells after which a Doppler may be left, and probabilities that noise stays.
@@ -29,7 +29,7 @@ const MANY: f64 = 0.4;
 const LEAST_CODES: usize = 12;
 
 /// Conjugate spectra of a satellite's codes: of one that is alone the same twice.
-pub(super) type Spectra<'a> = [&'a [Complex<f32>]; 2];
+pub(super) type Spectra<'a> = [&'a Spectrum; 2];
 
 /// When the dwells of a search begin, and where a Doppler is left.
 pub(super) struct Dwells {

@@ -17,6 +17,7 @@ use rustfft::{Fft, FftPlanner};
 
 use super::Acquired;
 use super::dwells::{Dwells, Spectra};
+use super::kernel::Spectrum;
 use super::multiple_access::Law;
 use super::refine::Refined;
 use super::replica::Replica;
@@ -149,6 +150,7 @@ impl Grid {
         metadata: &IfMetadata,
         settings: &AcquisitionSettings,
         centre_hz: f64,
+        planner: &mut FftPlanner<f32>,
     ) -> Option<Self> {
         let rate_hz = metadata.rate.hz();
         let period_samples = component.period_s() * rate_hz;
@@ -171,7 +173,6 @@ impl Grid {
         // One degree of freedom a sum, with the same mean.
         let image_scale = threshold(per_cell, 2 * sums) / (2.0 * threshold(per_cell, sums));
         let law = Law::new(settings.false_alarm_probability, lags, dopplers_hz.len(), sums, image_scale);
-        let mut planner = FftPlanner::new();
         let side_hz = component.side_hz();
         let share = 1.0 + side_hz / carrier_hz;
         Some(Self {
@@ -216,7 +217,7 @@ impl Grid {
 
     /// Conjugate spectrum of a satellite's code, over the band. Sample n covers the phases from n to n + 1
     /// samples.
-    pub fn spectrum(&self, replica: &Replica) -> Vec<Complex<f32>> {
+    pub fn spectrum(&self, replica: &Replica) -> Spectrum {
         let mut buffer = vec![Complex::default(); self.forward.len()];
         // Scaled so that powers stay near one whatever the length.
         let scale = 1.0 / self.forward.len() as f64;
@@ -228,7 +229,7 @@ impl Grid {
         for (_, bins, places) in self.band(buffer.len()) {
             spectrum[places].iter_mut().zip(&buffer[bins]).for_each(|(own, bin)| *own = bin.conj());
         }
-        spectrum
+        Spectrum::of(&spectrum)
     }
 
     /// The bins of a long spectrum within the band, those from zero on and those below: the signed number of

@@ -50,6 +50,7 @@ mod window;
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
+use rustfft::FftPlanner;
 
 use crate::gnss::record::AcquisitionRow;
 use crate::gnss::samples::IfMetadata;
@@ -135,7 +136,8 @@ pub fn cell_chips(
 ) -> Result<f64, AcquireError> {
     settings.validate()?;
     let one = |component| (component, companion(component, signal).is_some(), signal.centre_hz());
-    let grid = lead(signal).and_then(|component| Grid::new(one(component), metadata, settings, 0.0));
+    let mut planner = FftPlanner::new();
+    let grid = lead(signal).and_then(|component| Grid::new(one(component), metadata, settings, 0.0, &mut planner));
     let none = AcquireError::NoCode { signal: signal.name, sv: Sv { system: signal.system, number: 0 } };
     grid.map(|grid| grid.lag_samples * grid.chips_per_sample).ok_or(none)
 }
@@ -161,6 +163,8 @@ pub struct Searcher {
     /// Samples that there are, where a search has to do with them.
     have: Option<u64>,
     grids: BTreeMap<Band, Grid>,
+    /// Signals with codes of one length share their transforms.
+    planner: FftPlanner<f32>,
     codes: Codes,
 }
 
@@ -209,6 +213,7 @@ impl Searcher {
             centre_hz,
             have: None,
             grids: BTreeMap::new(),
+            planner: FftPlanner::new(),
             codes: Codes::default(),
         })
     }
@@ -349,7 +354,8 @@ impl Searcher {
                 return Err(AcquireError::TooFewSamples { have: self.have.unwrap_or(0), need });
             };
             let one = (component, companion(component, signal).is_some(), link.carrier_hz());
-            let Some(grid) = Grid::new(one, &self.metadata, &settings, self.centre_hz) else {
+            let grid = Grid::new(one, &self.metadata, &settings, self.centre_hz, &mut self.planner);
+            let Some(grid) = grid else {
                 return Err(no_code);
             };
             self.grids.insert(band, grid);

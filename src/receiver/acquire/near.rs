@@ -25,14 +25,16 @@ impl Searcher {
         for link in &links {
             self.prepare(*link)?;
         }
-        self.codes.trim();
-        self.codes.make(&self.grids, links.iter())?;
         let settings = AcquisitionSettings { doppler_max_hz: half_hz, ..self.settings.clone() };
         let mut results = Vec::with_capacity(near.len());
         for (link, doppler_hz) in near {
+            // One after the other: spectra of all of them would be the largest part of a receiver's memory.
+            self.codes.trim();
+            self.codes.make(&self.grids, [link].into_iter())?;
             let (Some(component), Some(code)) = (lead(link.signal), self.codes.get(link)) else { continue };
             let one = (component, companion(component, link.signal).is_some(), link.carrier_hz());
-            let Some(grid) = Grid::new(one, &self.metadata, &settings, *doppler_hz) else { continue };
+            let grid = Grid::new(one, &self.metadata, &settings, *doppler_hz, &mut self.planner);
+            let Some(grid) = grid else { continue };
             let (have, need) = (stretch.samples() as u64, grid.samples_needed());
             if have < need {
                 return Err(AcquireError::TooFewSamples { have, need });

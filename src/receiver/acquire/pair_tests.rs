@@ -59,7 +59,10 @@ fn a_spectrum_that_is_read_from_another_bin_on_is_that_of_the_turned_samples() {
     {
         let metadata = metadata(rate_hz, if_hz, inverted);
         let settings = AcquisitionSettings { noncoherent_sums: 2, doppler_max_hz: 1000.0, ..Default::default() };
-        let of = |pair| Grid::new((lead(&E1).unwrap(), pair, E1.centre_hz()), &metadata, &settings, 0.0).unwrap();
+        let of = |pair| {
+            Grid::new((lead(&E1).unwrap(), pair, E1.centre_hz()), &metadata, &settings, 0.0, &mut FftPlanner::new())
+                .unwrap()
+        };
         let (grid, alone) = (of(true), of(false));
         let [i, q] = record(rate_hz, grid.samples_needed() as usize, None, &mut Noise(4));
         let block = Block { first: 0, i: &i, q: &q };

@@ -333,7 +333,7 @@ fn a_spectrum_that_dopplers_share_is_that_of_each_by_itself() {
         let metadata = IfMetadata { format: Format::Ci8, rate, center_hz, inverted, start: None };
         let settings = AcquisitionSettings::default();
         let one = (lead(&L1_CA).unwrap(), false, L1_CA.centre_hz());
-        let grid = grid::Grid::new(one, &metadata, &settings, 0.0).unwrap();
+        let grid = grid::Grid::new(one, &metadata, &settings, 0.0, &mut rustfft::FftPlanner::new()).unwrap();
         let Recording { i, q, .. } = record(metadata, grid.samples_needed() as usize, &[], 4);
         let block = Block { first: 0, i: &i, q: &q };
         let shifted = shifted::Shifted::new(&grid, &block, 1.0).unwrap();

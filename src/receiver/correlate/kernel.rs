@@ -11,6 +11,8 @@ use num_complex::Complex64;
 use super::carrier::LANES;
 #[cfg(target_arch = "x86_64")]
 use super::carrier::filled;
+#[cfg(target_arch = "x86_64")]
+use super::pattern::Table;
 use super::short::{self, GROUP};
 use super::single::{self, CHUNK};
 #[cfg(target_arch = "x86_64")]
@@ -213,7 +215,7 @@ fn short_avx512<const T: usize, const AREA: bool>(job: &Job, steps: &short::Step
 #[inline]
 fn short_lanes_avx512<const T: usize, const AREA: bool>(chunk: &short::Chunk, code: &mut [u64; T]) -> short::Sums<T> {
     let steps = chunk.steps;
-    let (values, changes) = (chunk.replica.short_values.as_slice(), chunk.replica.short_changes.as_slice());
+    let Table { values, changes } = chunk.replica.shorts();
     // Code phases are below the period.
     assert!((steps.period >> CODE_BITS) as usize + GROUP <= values.len().min(changes.len()));
     let lanes = load_lanes(&steps.lanes);
@@ -313,7 +315,7 @@ fn lanes_avx512<const T: usize, const AREA: bool>(chunk: &Chunk, code: &mut [u64
     let mut sums_re = [x86::_mm512_setzero_ps(); T];
     let mut sums_im = [x86::_mm512_setzero_ps(); T];
     // A chunk moves by less than 1024 chips, which the tables hold beyond a period.
-    let (values, changes) = (chunk.replica.values.as_slice(), chunk.replica.changes.as_slice());
+    let Table { values, changes } = chunk.replica.floats();
     let farthest = code.iter().map(|&code| (code.wrapping_add(CHUNK as u64 * LOOKUP_STEP) >> CODE_BITS) as usize).max();
     assert!(farthest.unwrap_or(0) + LANES <= values.len().min(changes.len()));
     let (vectors_i, rest_i) = chunk.i.as_chunks::<LANES>();

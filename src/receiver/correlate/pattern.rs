@@ -1,13 +1,26 @@
 //! A period of signs, as kernels take it: the sum of such patterns is a replica.
 
 use std::f64::consts::PI;
+#[cfg(target_arch = "x86_64")]
+use std::sync::OnceLock;
 
 use num_complex::Complex64;
 
-use super::{CODE_BITS, Edge, MOST_STEPS, Nco, TURN, Wave, kernel, short, units_to_chips};
+use super::{CODE_BITS, Edge, MOST_STEPS, Nco, TURN, Wave, units_to_chips};
+#[cfg(target_arch = "x86_64")]
+use super::{kernel, short};
 
 /// Half a turn in 2⁻⁶⁴ turns for each unit of code phase.
 const HALF_TURN_OF_CHIP: u64 = 1 << (63 - CODE_BITS);
+
+/// Steps as a kernel looks them up, a little longer than the period.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Debug)]
+pub(super) struct Table<T> {
+    pub values: Vec<T>,
+    /// What each value is short of the next, in short integers by −1, 0 or 1 of them.
+    pub changes: Vec<T>,
+}
 
 /// One period of steps of ±1, and its part in a replica.
 #[derive(Clone, Debug)]
@@ -16,15 +29,14 @@ pub(super) struct Pattern {
     pub steps_per_chip: usize,
     /// Entry j holds the 64 steps from step 32 j on, cyclically, first step in the top bit, 1 for −1.
     pub words: Vec<u64>,
-    /// What steps are sent as, and what each is short of the next; a little longer than the period.
-    pub values: Vec<f32>,
-    pub changes: Vec<f32>,
-    /// The same in short integers; changes are −1, 0 or 1.
-    pub short_values: Vec<i16>,
-    pub short_changes: Vec<i16>,
+    /// What a period's steps are sent as.
+    pub steps: Vec<i8>,
     pub edge: Edge,
-    /// Steps of a period.
-    pub length: usize,
+    /// Tables that only kernels with AVX-512 and these numbers want, made when one does.
+    #[cfg(target_arch = "x86_64")]
+    pub(super) floats: OnceLock<Table<f32>>,
+    #[cfg(target_arch = "x86_64")]
+    pub(super) shorts: OnceLock<Table<i16>>,
     /// Half cycles that its sub-carrier makes in a chip, of a component that is one side of one …
     pub half_cycles: i32,
     /// … and whether taps beside the prompt have the sub-carrier's phase there, or the prompt's.
@@ -54,32 +66,56 @@ impl Pattern {
             steps.iter().cycle().skip(start).take(64).fold(0_u64, |word, &step| word << 1 | u64::from(step < 0))
         };
         let words = (0..=steps.len() / 32).map(|j| word(32 * j)).collect();
-        let cyclic = |margin: usize| steps.iter().cycle().take(steps.len() + margin + 1);
-        let values: Vec<f32> = cyclic(kernel::TABLE_MARGIN).map(|&step| f32::from(step)).collect();
-        let changes = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let signs: Vec<i16> = cyclic(kernel::SHORT_MARGIN).map(|&step| i16::from(step)).collect();
-        let short_values = signs.iter().map(|sign| sign * short::AMPLITUDE).collect();
-        let short_changes = signs.windows(2).map(|pair| (pair[1] - pair[0]) / 2).collect();
-        let length = steps.len();
         Self {
             gain,
             steps_per_chip,
             words,
-            values,
-            changes,
-            short_values,
-            short_changes,
+            steps,
             edge,
-            length,
+            #[cfg(target_arch = "x86_64")]
+            floats: OnceLock::new(),
+            #[cfg(target_arch = "x86_64")]
+            shorts: OnceLock::new(),
             half_cycles: 0,
             turns_at_taps: false,
             is_inverted: false,
         }
     }
 
+    /// Steps of a period.
+    pub fn length(&self) -> usize {
+        self.steps.len()
+    }
+
     /// Length of the period in phase units of steps.
     pub fn period(&self) -> i64 {
-        (self.length as i64) << CODE_BITS
+        (self.length() as i64) << CODE_BITS
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    fn cyclic(&self, margin: usize) -> impl Iterator<Item = i8> {
+        self.steps.iter().copied().cycle().take(self.length() + margin + 1)
+    }
+
+    /// Steps in floating point.
+    #[cfg(target_arch = "x86_64")]
+    pub fn floats(&self) -> &Table<f32> {
+        self.floats.get_or_init(|| {
+            let values: Vec<f32> = self.cyclic(kernel::TABLE_MARGIN).map(f32::from).collect();
+            let changes = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            Table { values, changes }
+        })
+    }
+
+    /// Steps in short integers.
+    #[cfg(target_arch = "x86_64")]
+    pub fn shorts(&self) -> &Table<i16> {
+        self.shorts.get_or_init(|| {
+            let signs: Vec<i16> = self.cyclic(kernel::SHORT_MARGIN).map(i16::from).collect();
+            let values = signs.iter().map(|sign| sign * short::AMPLITUDE).collect();
+            let changes = signs.windows(2).map(|pair| (pair[1] - pair[0]) / 2).collect();
+            Table { values, changes }
+        })
     }
 
     /// Phases of chips as those of steps.
@@ -133,7 +169,7 @@ impl Pattern {
     pub fn value(&self, code: i64, step: u64) -> f64 {
         let at = |units: i64| {
             let index = (units.rem_euclid(self.period()) >> CODE_BITS) as usize;
-            self.values.get(index).map_or(0.0, |&value| f64::from(value))
+            self.steps.get(index).map_or(0.0, |&step| f64::from(step))
         };
         match self.edge {
             Edge::Nearest => at(code),
