@@ -77,7 +77,7 @@ pub fn judge(run: &Run, theory_db: &[f64]) -> Spectrum {
 /// Expected density at the frequencies of `psd.csv`, in the same decibels. Where the truth does not state the
 /// level (no `noise_lsb`), it is fitted. Empty without a spectrum or without signals.
 pub fn theory_db(run: &Run) -> Vec<f64> {
-    let signals = &run.expected;
+    let signals: Vec<&MeanSignal> = run.expected.iter().filter(|one| is_in(run, one.signal)).collect();
     let sources = jamming::sources(run);
     let Some(center_hz) = run.scene.center_hz.filter(|_| !signals.is_empty() && !run.psd.is_empty()) else {
         return Vec::new();
@@ -96,7 +96,7 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
     let known: BTreeMap<&Signal, (Waveform, f64)> =
         run.signals.iter().filter_map(|&signal| Some((signal, with_power(signal)?))).collect();
     let waveforms: Vec<(&MeanSignal, &(Waveform, f64))> =
-        signals.iter().filter_map(|signal| Some((signal, known.get(signal.signal)?))).collect();
+        signals.iter().filter_map(|&signal| Some((signal, known.get(signal.signal)?))).collect();
     let mut density: Vec<f64> = run
         .psd
         .iter()
@@ -135,6 +135,13 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
     let near = run.psd.iter().zip(&shape).filter(|(_, shape)| **shape > peak_db - 20.0);
     let level_db = median(&near.map(|(row, shape)| row.density_db - shape).collect::<Vec<_>>()).unwrap_or(0.0);
     shape.into_iter().map(|shape| shape + level_db).collect()
+}
+
+/// Whether the samples whose spectrum is judged have a signal: of several front ends they are those of the
+/// first.
+fn is_in(run: &Run, signal: &Signal) -> bool {
+    let first = run.scene.front_ends.first();
+    first.is_none_or(|first| first.signals.iter().any(|name| name == signal.name))
 }
 
 /// Power gain of a filter at a frequency from its middle.
@@ -223,7 +230,7 @@ fn passed(filter: &FilterSpec, run: &Run, signal: &Signal) -> f64 {
 
 /// The nulls beside the main lobe of the code, where the samples hold one signal on one carrier.
 fn nulls(run: &Run, theory_db: &[f64]) -> Result<[Null; 2], &'static str> {
-    let mut emissions = Emission::all(run.truth.keys()).into_iter();
+    let mut emissions = Emission::all(run.truth.keys().filter(|link| is_in(run, link.signal))).into_iter();
     let emission = emissions.next().ok_or("there is no signal")?;
     if emissions.next().is_some() {
         return Err("filled: several signals or carriers share the spectrum");
@@ -286,6 +293,8 @@ mod tests {
     use crate::analysis::measure::psd::Psd;
     use crate::analysis::read::PsdRow;
     use crate::analysis::waveform::Edge;
+    use crate::gnss::facts::FrontEndFacts;
+    use crate::gnss::gps::l5::L5;
 
     #[test]
     fn converters_lose_what_the_literature_says() {
@@ -360,6 +369,15 @@ mod tests {
                 "{found_hz} {expected_hz}"
             );
         }
+        // What another front end receives is not in these samples, though its carrier has an alias there.
+        let alone = super::theory_db(&run);
+        let beside = MeanSignal { signal: &L5, carrier_hz: 1_176.45e6, nominal_hz: 1_176.45e6, ..run.expected[0] };
+        run.expected.push(beside);
+        run.signals.insert(&L5);
+        assert_ne!(super::theory_db(&run), alone);
+        let of = |signal: &Signal| FrontEndFacts { signals: vec![signal.name.to_owned()], ..FrontEndFacts::default() };
+        run.scene.front_ends = vec![of(run.expected[0].signal), of(&L5)];
+        assert_eq!(super::theory_db(&run), alone);
         run.scene.noise = true;
         let hidden = judge(&run, &super::theory_db(&run));
         assert!(hidden.null_low_hz.is_none() && hidden.null_reason.unwrap().starts_with("hidden"), "{hidden:?}");
