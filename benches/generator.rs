@@ -5,6 +5,11 @@
 //! time of that thread, the median of interleaved runs. The end-to-end rows start the program itself on two
 //! threads.
 
+#[path = "shared/machine.rs"]
+mod machine;
+#[path = "shared/page.rs"]
+mod page;
+
 use std::fmt::Write as _;
 use std::hint::black_box;
 use std::path::Path;
@@ -410,24 +415,10 @@ fn day(lines: &mut Vec<Line>) {
     }
 }
 
-fn output_of(program: &str, arguments: &[&str]) -> String {
-    let found = Command::new(program).args(arguments).output().ok();
-    found.map_or_else(String::new, |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
-}
-
-/// Replaces what is between the marks of `reports/performance.md`.
+/// Puts the figures into `reports/performance.md`.
 fn publish(lines: &[Line], split: usize, profile: &[Line]) {
     const HEAD: &str = "|figure|value|unit|bar|met|\n|---|---|---|---|---|\n";
-    let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model =
-        cpu.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or("").trim_start_matches(['\t', ' ', ':']);
-    let mut text = format!(
-        "{model}, {} cores; {}; release profile, instruction set chosen at run time ({:?}); {}.\n\n{HEAD}",
-        std::thread::available_parallelism().map_or(1, |n| n.get()),
-        output_of("rustc", &["--version"]),
-        Level::detect(),
-        output_of("date", &["-u", "+%F"]),
-    );
+    let mut text = format!("{} ({:?}).\n\n{HEAD}", machine::machine(), Level::detect());
     for (index, line) in lines.iter().enumerate() {
         if index == split {
             let _ = write!(text, "\n### Only what the scene requires\n\n{HEAD}");
@@ -438,15 +429,9 @@ fn publish(lines: &[Line], split: usize, profile: &[Line]) {
     for line in profile {
         let _ = writeln!(shares, "|{}|{:.3}|{}|", line.figure, line.value, line.unit);
     }
-    let path = Path::new("reports/performance.md");
-    let mut page = std::fs::read_to_string(path).unwrap();
     for (mark, text) in [("generator", text), ("profile", shares)] {
-        let (begin, end) = (format!("<!-- {mark} -->\n"), format!("<!-- end of {mark} -->\n"));
-        let (before, rest) = page.split_once(&begin).unwrap();
-        let (_, after) = rest.split_once(&end).unwrap();
-        page = format!("{before}{begin}{text}{end}{after}");
+        page::put(mark, &text).expect("the page and its marks");
     }
-    std::fs::write(path, page).unwrap();
 }
 
 fn main() {

@@ -4,10 +4,13 @@
 //! Speeds are medians of runs that take turns, so that a disturbance of the machine meets all of them. Errors
 //! are against correlation in `f64` of the same samples, millisecond by millisecond.
 
+#[path = "shared/machine.rs"]
+mod machine;
+#[path = "shared/page.rs"]
+mod page;
+
 use std::fmt::Write as _;
 use std::hint::black_box;
-use std::path::Path;
-use std::process::Command;
 use std::time::Instant;
 
 use num_complex::Complex64;
@@ -384,21 +387,6 @@ fn limits(rows: &[Row]) -> String {
     )
 }
 
-fn output_of(program: &str, arguments: &[&str]) -> String {
-    let found = Command::new(program).args(arguments).output().ok();
-    found.map_or_else(String::new, |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
-}
-
-/// Replaces what is between two marks of `reports/performance.md`.
-fn publish(text: &str) {
-    let path = Path::new("reports/performance.md");
-    let page = std::fs::read_to_string(path).expect("the page");
-    let (begin, end) = ("<!-- receiver -->\n", "<!-- end of receiver -->\n");
-    let (before, rest) = page.split_once(begin).expect("the first mark");
-    let (_, after) = rest.split_once(end).expect("the second mark");
-    std::fs::write(path, format!("{before}{begin}{text}{end}{after}")).expect("room for the page");
-}
-
 fn main() {
     let mut rows = rows();
     for _ in 0..ROUNDS {
@@ -407,16 +395,10 @@ fn main() {
             row.values.push(value);
         }
     }
-    let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model =
-        cpu.lines().find_map(|line| line.strip_prefix("model name")).unwrap_or("").trim_start_matches(['\t', ' ', ':']);
     let mut text = format!(
-        "{model}, {} cores; {}; release profile, instruction set chosen at run time; {}; medians of {ROUNDS} \
-         interleaved runs. The default is sums for 8-bit formats.\n\n|figure|value|unit|bar|met|\n\
+        "{}; medians of {ROUNDS} interleaved runs. The default is sums for 8-bit formats.\n\n|figure|value|unit|bar|met|\n\
          |---|---|---|---|---|\n",
-        std::thread::available_parallelism().map_or(1, |n| n.get()),
-        output_of("rustc", &["--version"]),
-        output_of("date", &["-u", "+%F"]),
+        machine::machine(),
     );
     for row in &rows {
         let _ = writeln!(text, "{}", row.text());
@@ -441,6 +423,6 @@ fn main() {
     }
     println!("{text}");
     if std::env::args().any(|argument| argument == "--write") {
-        publish(&text);
+        page::put("receiver", &text).expect("the page and its marks");
     }
 }

@@ -1,11 +1,11 @@
 //! Ladders of whole processes: what the shipped scenes cost when one quantity of theirs grows.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use gnss_twin::analysis::statistics::median;
 
 use crate::ladder::{Ladder, Step};
-use crate::process::{Spent, spent};
+use crate::process::{Spent, remove, spent};
 
 /// Each process runs so often; of the longest one run is enough.
 const ROUNDS: usize = 3;
@@ -80,33 +80,26 @@ fn step(room: &Path, work: Work, case: &Case) -> Result<Step, String> {
     }
     let (samples, results) = (room.join("samples.sigmf-data"), room.join("results"));
     let text = |path: &Path| path.display().to_string();
+    let (scene, samples_at, results_at) = (text(&scene), text(&samples), text(&results));
+    let program = Path::new(env!("CARGO_BIN_EXE_gnss-twin"));
     if let Work::Receive = work {
         remove(&samples)?;
-        spent(&["generate", &text(&scene), "--allow-outside", "--out", &text(&samples)])?;
+        spent(program, &["generate", &scene, "--allow-outside", "--out", &samples_at])?;
     }
     let mut found: Vec<Spent> = Vec::new();
     while found.len() < ROUNDS && found.last().is_none_or(|last| last.cpu_s < LONG_S) {
         remove(&results)?;
-        found.push(match work {
-            Work::Generate => spent(&["generate", &text(&scene), "--allow-outside", "--out", "-", "--threads", "1"]),
-            Work::Receive => spent(&["receive", &text(&samples), "--out", &text(&results), "--threads", "1"]),
-            Work::Run => spent(&["run", &text(&scene), "--allow-outside", "--out", &text(&results), "--threads", "1"]),
-        }?);
+        let arguments: &[&str] = match work {
+            Work::Generate => &["generate", &scene, "--allow-outside", "--out", "-", "--threads", "1"],
+            Work::Receive => &["receive", &samples_at, "--out", &results_at, "--threads", "1"],
+            Work::Run => &["run", &scene, "--allow-outside", "--out", &results_at, "--threads", "1"],
+        };
+        found.push(spent(program, arguments)?);
     }
     remove(&results)?;
     let cpu_s = median(&found.iter().map(|spent| spent.cpu_s).collect::<Vec<_>>()).unwrap_or(f64::NAN);
     let peak_mib = found.iter().map(|spent| spent.peak_mib).fold(0.0, f64::max);
     Ok(Step { x: case.x, cost: cpu_s / case.duration_s, peak_mib: Some(peak_mib) })
-}
-
-/// A result or recording of before, and what stands beside it.
-fn remove(path: &Path) -> Result<(), String> {
-    let sidecars: [PathBuf; 3] = [path.to_owned(), path.with_extension("sigmf-meta"), path.with_extension("truth")];
-    for path in sidecars.iter().filter(|path| path.exists()) {
-        let gone = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
-        gone.map_err(|error| format!("{}: {error}", path.display()))?;
-    }
-    Ok(())
 }
 
 fn plans() -> Result<Vec<Plan>, String> {

@@ -6,11 +6,12 @@
 //! the whole generator on one thread. Run alone: `cargo bench --bench trade`; `-- --widths` measures the
 //! widths of samples alone.
 
+#[path = "../shared/machine.rs"]
+mod machine;
 mod widths;
 
 use std::f64::consts::TAU;
 use std::path::Path;
-use std::process::Command;
 use std::time::Instant;
 
 use gnss_twin::analysis;
@@ -348,22 +349,6 @@ fn measure(site: Site, settings: &[(String, Fidelity)], rounds: usize, count: us
     }
 }
 
-fn output_of(program: &str, arguments: &[&str]) -> String {
-    let found = Command::new(program).args(arguments).output().ok();
-    found.map_or_else(String::new, |o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
-}
-
-/// Processor, compiler and date.
-fn machine() -> String {
-    let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = cpu
-        .lines()
-        .find_map(|line| line.strip_prefix("model name"))
-        .map_or("", |x| x.trim_start_matches([' ', '\t', ':']));
-    let (compiler, date) = (output_of("rustc", &["--version"]), output_of("date", &["-u", "+%F"]));
-    format!("{model}, {compiler}, {date}, release profile, instruction set chosen at run time.")
-}
-
 fn preface() -> String {
     format!(
         "Each row is one setting of `[fidelity]`. Errors are against the `reference` level, without noise and \
@@ -375,8 +360,8 @@ fn preface() -> String {
          processor time, medians of interleaved runs. The position is the closed loop's mean over 45 s with noise, \
          against that of `reference` with the same seed. Settings that no other beats in cost and pseudorange error \
          are on the front. Widths of samples and qualities of noise have [a page of their own](widths.md).\n\n\
-         {} `cargo bench --bench trade` makes this page.",
-        machine()
+         {}. `cargo bench --bench trade` makes this page.",
+        machine::machine()
     )
 }
 
@@ -384,7 +369,7 @@ fn main() {
     let widths = widths::measure();
     let reports = Path::new("reports");
     if std::env::args().any(|argument| argument == "--widths") {
-        return trade::write_widths(reports, &widths, &machine()).unwrap();
+        return trade::write_widths(reports, &widths, &format!("{}.", machine::machine())).unwrap();
     }
     let mut rows = Vec::new();
     measure(STATIC, &settings(STATIC.rate_msps), 7, 3, &mut rows);
@@ -399,5 +384,5 @@ fn main() {
     }
     measure(BOOST, &knots(), 3, 3, &mut rows);
     trade::write(reports, &rows, &preface()).unwrap();
-    trade::write_widths(reports, &widths, &machine()).unwrap();
+    trade::write_widths(reports, &widths, &format!("{}.", machine::machine())).unwrap();
 }

@@ -93,8 +93,9 @@ pub fn theory_db(run: &Run) -> Vec<f64> {
         let power = Waveform::of(signal)?.power(edge, rate_hz);
         Some((Waveform::sent(signal, run.scene.waveform)?, power))
     };
+    let own = run.signals.iter().filter(|signal| is_in(run, signal));
     let known: BTreeMap<&Signal, (Waveform, f64)> =
-        run.signals.iter().filter_map(|&signal| Some((signal, with_power(signal)?))).collect();
+        own.filter_map(|&signal| Some((signal, with_power(signal)?))).collect();
     let waveforms: Vec<(&MeanSignal, &(Waveform, f64))> =
         signals.iter().filter_map(|&signal| Some((signal, known.get(signal.signal)?))).collect();
     let mut density: Vec<f64> = run

@@ -89,8 +89,6 @@ impl Sums {
         if self.pending.first().is_some_and(|first| first.sv != range.sv) {
             self.finish(choice);
         }
-        // Most satellites have one range, and every fix of a run waits here.
-        self.pending.reserve_exact(1);
         self.pending.push(range);
     }
 

@@ -265,6 +265,7 @@ mod tests {
         assert_eq!(differing, 0);
         assert!(one.data().iter().filter(|value| **value < 128).count() > 1000, "nothing was drawn");
     }
+
     #[test]
     fn a_tall_picture_in_bands_is_the_one_that_is_drawn_at_once() {
         let height_px = BAND_ROWS + 700;

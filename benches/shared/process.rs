@@ -1,7 +1,6 @@
 //! A program's processor time and its largest memory.
 
-use std::ffi::OsStr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -19,10 +18,12 @@ pub struct Spent {
     pub peak_mib: f64,
 }
 
-/// Runs this program with these arguments; of `receive` a recording without a fix is none to complain about.
-pub fn spent<A: AsRef<OsStr>>(arguments: &[A]) -> Result<Spent, String> {
+/// Runs a program with these arguments; of `receive` a recording without a fix is none to complain about.
+///
+/// # Errors
+/// In words, where it cannot run or fails.
+pub fn spent(program: &Path, arguments: &[&str]) -> Result<Spent, String> {
     let before = of_children_s()?;
-    let program = Path::new(env!("CARGO_BIN_EXE_gnss-twin"));
     let mut child = Command::new(program)
         .args(arguments)
         .stdout(Stdio::null())
@@ -43,8 +44,7 @@ pub fn spent<A: AsRef<OsStr>>(arguments: &[A]) -> Result<Spent, String> {
         }
     };
     if !matches!(status.code(), Some(0 | 3)) {
-        let words: Vec<String> = arguments.iter().map(|word| word.as_ref().to_string_lossy().into_owned()).collect();
-        return Err(format!("{}: {status}", words.join(" ")));
+        return Err(format!("{} {}: {status}", program.display(), arguments.join(" ")));
     }
     Ok(Spent { cpu_s: of_children_s()? - before, peak_mib: peak_kib / 1024.0 })
 }
@@ -56,4 +56,17 @@ fn of_children_s() -> Result<f64, String> {
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
     let ticks = |at: usize| fields.get(at).and_then(|field| field.parse::<f64>().ok()).unwrap_or(f64::NAN);
     Ok((ticks(13) + ticks(14)) / TICKS)
+}
+
+/// Takes a result or a recording of before away, and what stands beside it.
+///
+/// # Errors
+/// In words, where it does not go.
+pub fn remove(path: &Path) -> Result<(), String> {
+    let all: [PathBuf; 3] = [path.to_owned(), path.with_extension("sigmf-meta"), path.with_extension("truth")];
+    for path in all.iter().filter(|path| path.exists()) {
+        let gone = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
+        gone.map_err(|error| format!("{}: {error}", path.display()))?;
+    }
+    Ok(())
 }
