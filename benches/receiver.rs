@@ -396,8 +396,8 @@ fn main() {
         }
     }
     let mut text = format!(
-        "{}; medians of {ROUNDS} interleaved runs. The default is sums for 8-bit formats.\n\n|figure|value|unit|bar|met|\n\
-         |---|---|---|---|---|\n",
+        "{}; medians of {ROUNDS} interleaved runs. The default is sums for 8-bit formats.\n\n\
+         |figure|value|unit|bar|met|\n|---|---|---|---|---|\n",
         machine::machine(),
     );
     for row in &rows {
