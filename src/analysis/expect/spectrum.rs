@@ -18,7 +18,7 @@ use crate::analysis::expect::jamming;
 use crate::analysis::read::{Emission, MeanSignal, Run};
 use crate::analysis::statistics::median;
 use crate::analysis::waveform::Waveform;
-use crate::gnss::facts::{BalanceSpec, ConverterSpec, FilterShape, FilterSpec};
+use crate::gnss::facts::{BalanceSpec, ConverterSpec, FilterShape, FilterSpec, converter, filters};
 use crate::gnss::signal::Signal;
 
 /// The section `psd` of `summary.json`: frequencies from the carrier.
@@ -200,29 +200,36 @@ fn quantiser(adc: Option<&ConverterSpec>, sigma_lsb: f64) -> (f64, f64) {
 /// A null as measured and as expected.
 type Null = (f64, f64);
 
-/// Decibels of C/N0 that the front end's filter and converter cost each signal's code, noise alone counted: a
+/// Decibels of C/N0 that filter and converter of its front end cost each signal's code, noise alone counted: a
 /// filter passes less of the code than of noise with the code's spectrum, and rounding adds noise.
 pub fn costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
-    let kept = run.scene.noise_lsb.filter(|_| run.scene.noise).map_or(1.0, |sigma_lsb| {
-        let (gain, added) = quantiser(run.scene.converter(), sigma_lsb);
-        let power = (gain * sigma_lsb) * (gain * sigma_lsb);
-        power / (power + added)
-    });
-    let filtered =
-        |signal: &'static Signal| run.scene.filters().next().map_or(1.0, |filter| passed(filter, run, signal));
-    run.signals.iter().map(|&signal| (signal, -10.0 * libm::log10(filtered(signal) * kept))).collect()
+    let kept = |signal: &Signal| {
+        let place = run.front_end(signal);
+        let stages = run.scene.stages(place).0;
+        let noise_lsb = run.scene.front_ends.get(place).map_or(run.scene.noise_lsb, |own| Some(own.noise_lsb));
+        let converted = noise_lsb.filter(|_| run.scene.noise).map_or(1.0, |sigma_lsb| {
+            let (gain, added) = quantiser(converter(stages), sigma_lsb);
+            let power = (gain * sigma_lsb) * (gain * sigma_lsb);
+            power / (power + added)
+        });
+        converted * filters(stages).next().map_or(1.0, |filter| passed(filter, run, signal))
+    };
+    run.signals.iter().map(|&signal| (signal, -10.0 * libm::log10(kept(signal)))).collect()
 }
 
-/// What a filter about the first signal's carrier leaves of a code's power over noise:
+/// What a filter about the carrier of its front end's first signal leaves of a code's power over noise:
 /// (∫S|H| df)²/(∫S|H|² df · ∫S df).
 fn passed(filter: &FilterSpec, run: &Run, signal: &Signal) -> f64 {
     let Some(code) = Waveform::sent(signal, run.scene.waveform) else { return 1.0 };
-    let rate_hz = run.scene.sample_rate_hz;
-    let off_hz = run.expected.first().map_or(0.0, |first| signal.centre_hz() - first.nominal_hz);
+    let place = run.front_end(signal);
+    let (edge, rate_hz) =
+        (run.scene.front_ends.get(place).map_or(run.scene.code_edge, |own| own.code_edge), run.rate_hz(signal));
+    let first = run.expected.iter().find(|one| run.front_end(one.signal) == place);
+    let off_hz = first.map_or(0.0, |first| signal.centre_hz() - first.nominal_hz);
     let (mut all, mut amplitude, mut power) = (0.0, 0.0, 0.0);
     for k in -1000..1000 {
         let f_hz = (f64::from(k) + 0.5) * rate_hz / 2000.0;
-        let density = code.sampled(run.scene.code_edge, f_hz, rate_hz);
+        let density = code.sampled(edge, f_hz, rate_hz);
         let gain = filter_power(filter, f_hz + off_hz);
         (all, amplitude, power) = (all + density, amplitude + density * gain.sqrt(), power + density * gain);
     }
@@ -294,7 +301,7 @@ mod tests {
     use crate::analysis::measure::psd::Psd;
     use crate::analysis::read::PsdRow;
     use crate::analysis::waveform::Edge;
-    use crate::gnss::facts::FrontEndFacts;
+    use crate::gnss::facts::{FrontEndFacts, StageSpec};
     use crate::gnss::gps::l5::L5;
 
     #[test]
@@ -329,6 +336,37 @@ mod tests {
             .collect();
         assert!((parabola(&points, 1.023e6, 1.023e6).unwrap() - 1.0242e6).abs() < 1e-3);
         assert_eq!(parabola(&[], 1.0, 1.0), None);
+    }
+
+    #[test]
+    fn a_filter_costs_the_signals_of_its_own_front_end_alone() {
+        let directory = planted();
+        let mut run = Run::read(directory.path()).unwrap();
+        let l1 = run.expected[0].signal;
+        run.expected.push(MeanSignal {
+            signal: &L5,
+            carrier_hz: 1_176.45e6,
+            nominal_hz: 1_176.45e6,
+            ..run.expected[0]
+        });
+        run.signals.insert(&L5);
+        let narrow = FilterSpec { shape: FilterShape::BrickWall, bandwidth_hz: 2.2e6, group_delay_s: 0.0 };
+        let of = |rate_hz: f64, stages: Vec<StageSpec>| FrontEndFacts {
+            sample_rate_hz: rate_hz,
+            noise_lsb: 28.0,
+            front_end: stages,
+            ..FrontEndFacts::default()
+        };
+        run.scene.front_ends = vec![of(10.23e6, vec![StageSpec::Filter(narrow)]), of(25e6, Vec::new())];
+        run.front_ends = [(l1, 0), (&L5, 1)].into_iter().collect();
+        let costs_db = costs_db(&run);
+        // A filter as wide as the main lobe takes a third of a decibel; rounding at 28 LSB a ten-thousandth.
+        assert!((0.05..0.6).contains(&costs_db[l1]), "{costs_db:?}");
+        assert!(costs_db[&L5] < 0.001, "{costs_db:?}");
+        // The other way round it is wide enough for neither lobe of L5.
+        run.front_ends = [(l1, 1), (&L5, 0)].into_iter().collect();
+        let turned_db = super::costs_db(&run);
+        assert!(turned_db[l1] < 0.001 && turned_db[&L5] > 1.0, "{turned_db:?}");
     }
 
     #[test]

@@ -100,8 +100,8 @@ pub struct Run {
     pub tracking: SpillStore<Link, TrackingRow>,
     /// Median time of the loops' updates.
     pub update_s: Option<f64>,
-    /// Samples a second of the front end in which each signal is received.
-    pub rates_hz: BTreeMap<&'static Signal, f64>,
+    /// Place of the front end in which each signal is received.
+    pub front_ends: BTreeMap<&'static Signal, usize>,
     /// The ionosphere that it measured with two bands; none without.
     pub ionosphere: SpillStore<Sv, IonosphereRow>,
     /// Parameters as it decoded them.
@@ -191,8 +191,7 @@ impl Run {
                 front_ends.and_then(|all| all.iter().position(has)).unwrap_or(0)
             };
             read.common.set_front_end(&read.scene, spacing_chips, &received);
-            let rate_hz = |signal: &&'static Signal| (*signal, read.scene.stages(received(signal)).1);
-            read.rates_hz = read.signals.iter().map(rate_hz).collect();
+            read.front_ends = read.signals.iter().map(|&signal| (signal, received(signal))).collect();
         }
         read.psd = optional(&run.join("psd.csv"))?;
         read.speed = json(&run.join("speed.json"))?.unwrap_or_default();
@@ -270,7 +269,7 @@ impl Run {
             acquisition: Vec::new(),
             tracking: SpillStore::new(directory),
             update_s: None,
-            rates_hz: BTreeMap::new(),
+            front_ends: BTreeMap::new(),
             ionosphere: SpillStore::new(directory),
             navigation: Vec::new(),
             events: Vec::new(),
@@ -303,9 +302,14 @@ impl Run {
         sample as f64 / self.scene.sample_rate_hz
     }
 
+    /// Place of the front end in which a signal is received.
+    pub fn front_end(&self, signal: &Signal) -> usize {
+        self.front_ends.get(signal).copied().unwrap_or(0)
+    }
+
     /// Samples a second of what a signal is received from.
     pub fn rate_hz(&self, signal: &Signal) -> f64 {
-        self.rates_hz.get(signal).copied().unwrap_or(self.scene.sample_rate_hz)
+        self.scene.stages(self.front_end(signal)).1
     }
 
     /// C/N0 of the strongest satellite at a sample.

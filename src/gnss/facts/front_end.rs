@@ -40,6 +40,11 @@ pub fn filters(stages: &[StageSpec]) -> impl Iterator<Item = &FilterSpec> {
     stages.iter().filter_map(|stage| if let StageSpec::Filter(filter) = stage { Some(filter) } else { None })
 }
 
+/// The converter among stages, if there is one.
+pub fn converter(stages: &[StageSpec]) -> Option<&ConverterSpec> {
+    stages.iter().find_map(|stage| if let StageSpec::Adc(converter) = stage { Some(converter) } else { None })
+}
+
 /// By how much oscillators among stages bring carriers higher in the samples, Hz.
 pub fn oscillator_offset_hz(stages: &[StageSpec]) -> f64 {
     let offset_hz =

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::gnss::satellite::Sv;
 pub use front_end::{
-    BalanceSpec, ConverterSpec, Edge, FilterShape, FilterSpec, StageSpec, filters, oscillator_offset_hz,
+    BalanceSpec, ConverterSpec, Edge, FilterShape, FilterSpec, StageSpec, converter, filters, oscillator_offset_hz,
 };
 pub use interference::Interference;
 pub use scene::{FrontEndFacts, OscillatorFacts, SceneFacts};

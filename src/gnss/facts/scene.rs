@@ -125,9 +125,7 @@ impl SceneFacts {
 
     /// The converter, if there is one.
     pub fn converter(&self) -> Option<&super::ConverterSpec> {
-        self.front_end
-            .iter()
-            .find_map(|stage| if let StageSpec::Adc(converter) = stage { Some(converter) } else { None })
+        super::converter(&self.front_end)
     }
 
     /// The filters, in order.
