@@ -36,6 +36,7 @@ pub mod correlator;
 pub mod demand;
 pub mod detection;
 pub mod expect;
+pub mod leaving;
 pub mod limits;
 pub mod measure;
 pub mod motion;

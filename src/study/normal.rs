@@ -13,6 +13,7 @@ pub(super) enum Purpose {
     Oscillator = 2,
     Symbols = 3,
     Places = 4,
+    Columns = 5,
 }
 
 /// SplitMix64's finaliser (Steele, Lea, Flood 2014).

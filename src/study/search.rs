@@ -12,6 +12,7 @@ use std::f64::consts::TAU;
 use nalgebra::DMatrix;
 use num_complex::Complex64;
 
+use super::leaving::Leaving;
 use super::normal::{Normals, Purpose, uniform};
 use crate::analysis::waveform::Waveform;
 use crate::gnss::signal::{Signal, sinc_squared};
@@ -119,8 +120,9 @@ fn sinc(x: f64) -> f64 {
 
 impl Model {
     /// Share of `draws` in which the satellite is found, its Doppler each of `doppler_hz` off the nearest bin
-    /// in turn, the edges of its symbols anywhere.
-    pub fn probability(&self, doppler_hz: &[f64], draws: u32, seed: u64) -> f64 {
+    /// in turn, the edges of its symbols anywhere. Of cells beyond the neighbourhood `leaving` knows what keeps
+    /// a Doppler.
+    pub fn probability(&self, doppler_hz: &[f64], leaving: &Leaving, draws: u32, seed: u64) -> f64 {
         let lags: Vec<f64> = (-SIDE_LAGS..=SIDE_LAGS).map(f64::from).collect();
         let bins: Vec<f64> = (-SIDE_BINS..=SIDE_BINS).map(f64::from).collect();
         let covariance = |places: &[f64], of: &dyn Fn(f64) -> f64| {
@@ -150,6 +152,7 @@ impl Model {
             let height = |number: &f64| chips.signal((offset - number) * lag, between + number * lag);
             let shape: Vec<f64> = lags.iter().map(height).collect();
             let mut powers = [[0.0; LAGS]; BINS];
+            let mut largest = [const { Vec::new() }; BINS];
             for sum in 0..self.sums {
                 let begin_s = f64::from(sum) * self.coherent_s;
                 let symbols = Symbols { seed, first: u64::from(draw) << 16, edge_s, symbol_s: self.symbol_s };
@@ -168,8 +171,16 @@ impl Model {
                         *power += (noise + mean * height * amplitude).norm_sqr();
                     }
                 }
+                for (largest, powers) in largest.iter_mut().zip(&powers) {
+                    largest.push(powers.iter().fold(0.0, |a, b| f64::max(a, b / floor)));
+                }
             }
-            found += u32::from(powers.iter().flatten().any(|power| power / floor > self.threshold));
+            // Noise of every Doppler is another's.
+            let stays = |(bin, largest): (usize, &Vec<f64>)| {
+                largest.last().is_some_and(|last| *last > self.threshold)
+                    && leaving.stays(largest.iter().copied(), BINS * draw as usize + bin)
+            };
+            found += u32::from(largest.iter().enumerate().any(stays));
         }
         f64::from(found) / f64::from(draws.max(1))
     }
@@ -291,12 +302,13 @@ mod tests {
             code_spread: 0.0,
             cn0_dbhz: 38.0,
         };
+        let none = Leaving::new(vec![0.0; 10], 1, 1);
         for cn0_dbhz in [35.0, 37.0, 38.0] {
             let lambda = detection::noncentrality(10, 1e-3, libm::pow(10.0, cn0_dbhz / 10.0), 1.0);
             let expected = detection::detection(model.threshold, 10, lambda);
             // Of the signal the lags hold what lies within the band that has as many of them.
             let share_db = 10.0 * libm::log10(Folded::new(&chips(), model.sample_chips, 12.5).share);
-            let found = Model { cn0_dbhz: cn0_dbhz - share_db, ..model }.probability(&[0.0], DRAWS, 1);
+            let found = Model { cn0_dbhz: cn0_dbhz - share_db, ..model }.probability(&[0.0], &none, DRAWS, 1);
             // Four deviations of a count, and the other cells' own alarms: 34 of 1e-7.
             let scatter = 4.0 * (expected * (1.0 - expected) / f64::from(DRAWS)).sqrt() + 4e-6;
             assert!((found - expected).abs() < scatter, "{cn0_dbhz} dB-Hz: {found}, expected {expected}");
@@ -306,7 +318,7 @@ mod tests {
         let shared = Model { lag_chips: 0.4, doppler_step_hz: 500.0, cn0_dbhz: 36.0, ..model };
         let lambda = detection::noncentrality(10, 1e-3, libm::pow(10.0, 3.6), detection::frequency_loss(250.0, 1e-3));
         let alone = detection::detection(model.threshold, 10, lambda);
-        let found = shared.probability(&[250.0], DRAWS, 2);
+        let found = shared.probability(&[250.0], &none, DRAWS, 2);
         assert!(found > alone + 0.05, "{found}, one cell {alone}");
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::generator::dynamics::*;
 use crate::generator::scenario::{Overrides, Scenario};
 use crate::generator::scene::Scene;
+use crate::generator::stream::{Options, generate_with};
 use crate::generator::truth;
 use crate::gnss::satellite::Sv;
 
@@ -47,5 +48,40 @@ fn the_satellites_share_is_the_second_difference_of_the_true_range() {
         // Light time stretches the range by 1e-5, gravity is that of a point (1e-3 m/s²), and over a
         // minute the acceleration itself moves by 2e-5 m/s³ · 30 s.
         assert!((line.acceleration_mps2 - second.abs()).abs() < 2e-3, "{line:?} {second}");
+    }
+}
+
+#[test]
+fn rows_by_the_thousand_describe_the_same_signal_as_few() {
+    let directory = tempfile::tempdir().unwrap();
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let scene = include_str!("../../../scenarios/trajectory_file.toml").replace("duration_s = 60", "duration_s = 1.5");
+    // 30 m/s along a straight line. Nodes of a satellite's curve are as dense as rows, and beyond five a second
+    // its orbit is a polynomial that they share.
+    let samples = |rows_a_second: u32| {
+        let rows = (0..=4 * rows_a_second).map(|row| {
+            let t_s = f64::from(row) / f64::from(rows_a_second) - 1.0;
+            format!("{t_s},{},{},{}\n", 970_500.0 + 18.0 * t_s, 5_628_000.0 - 24.0 * t_s, 2_830_200.0)
+        });
+        let file = directory.path().join(format!("{rows_a_second}.csv"));
+        std::fs::write(&file, format!("time_s,x_m,y_m,z_m\n{}", rows.collect::<String>())).unwrap();
+        let scenario = Scenario::parse(&scene.replace("ride.csv", file.to_str().unwrap()), "rows").unwrap();
+        let overrides = Overrides { allow_outside: true, ..Overrides::default() };
+        let (scene, _) = scenario.compose(&shipped, &overrides).unwrap();
+        let truths = tempfile::tempdir().unwrap();
+        let mut truth = truth::Writer::create(truths.path()).unwrap();
+        let mut bytes = Vec::new();
+        generate_with(&scene, &mut bytes, &mut truth, &mut |_| (), &Options::default()).unwrap();
+        bytes
+    };
+    let few = samples(1);
+    for rows_a_second in [50, 1000] {
+        let many = samples(rows_a_second);
+        let steps = || few.iter().zip(&many).map(|(a, b)| (*a as i8).abs_diff(*b as i8)).filter(|step| *step > 0);
+        println!("{rows_a_second} rows a second: {} of {} bytes differ", steps().count(), few.len());
+        // A phase is right to 2e-5 cycles by either, and 1e-4 of the amplitude brings few values over a step's
+        // edge: noise of ten steps lies that near one in a share of 1e-4 at most.
+        assert!(many.len() == few.len() && steps().count() < few.len() / 10_000, "{rows_a_second}");
+        assert!(steps().all(|step| step == 1), "{rows_a_second}");
     }
 }

@@ -7,6 +7,7 @@
 //! a data bit may turn anywhere within a dwell (it takes two thirds of that dwell's power on average). Only
 //! the band of the code's main lobe goes back to lags.
 
+use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
@@ -16,9 +17,9 @@ use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
 use super::Acquired;
-use super::dwells::{Dwells, Spectra};
+use super::dwells::{Dwells, Room, Spectra};
 use super::kernel::Spectrum;
-use super::multiple_access::Law;
+use super::multiple_access::{LEAST_CODES, Law};
 use super::refine::Refined;
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
@@ -31,6 +32,9 @@ use crate::receiver::threshold::{of_one_cell, threshold};
 
 /// Cells within this of a peak are not noise.
 const PEAK_CHIPS: f64 = 2.0;
+/// What is so many times its threshold needs no column: a signal whose cross-correlation reached that would
+/// raise a quarter of all other codes' cells half as high, and all of them would have stayed.
+const SURE: f64 = 4.0;
 /// The band that goes back to lags, over the one asked for or that of the samples, is this at least.
 const BAND_SHARE: f64 = 0.98;
 
@@ -61,6 +65,8 @@ pub(super) struct Grid {
     pub lag_samples: f64,
     /// What a satellite's statistic has to exceed, by Doppler.
     law: Law,
+    /// The same where a Doppler may be left for the first time.
+    pub(super) early: Law,
     /// What the statistic is multiplied by where a real recording's noise is not circular.
     image_scale: f64,
     is_real: bool,
@@ -168,11 +174,14 @@ impl Grid {
         let lags = (period_samples / lag_samples).ceil() as usize;
         let per_cell = of_one_cell(settings.false_alarm_probability, (lags * dopplers_hz.len()) as f64);
         let looked = settings.sums(component);
-        let dwells = if is_pair { Dwells::of_pair(looked, lags) } else { Dwells::alone(looked, coherent_periods) };
+        let dwells =
+            if is_pair { Dwells::of_pair(looked, lags) } else { Dwells::alone(looked, coherent_periods, lags) };
         let sums = dwells.sums();
         // One degree of freedom a sum, with the same mean.
         let image_scale = threshold(per_cell, 2 * sums) / (2.0 * threshold(per_cell, sums));
-        let law = Law::new(settings.false_alarm_probability, lags, dopplers_hz.len(), sums, image_scale);
+        let bins = dopplers_hz.len();
+        let of_sums = |sums| Law::new(settings.false_alarm_probability, lags, bins, sums, image_scale);
+        let early = of_sums(dwells.first_bar().map_or(sums, |made| dwells.sums_after(made)));
         let side_hz = component.side_hz();
         let share = 1.0 + side_hz / carrier_hz;
         Some(Self {
@@ -191,7 +200,8 @@ impl Grid {
             step_hz,
             lags,
             lag_samples,
-            law,
+            law: of_sums(sums),
+            early,
             image_scale,
             is_real: !metadata.format.is_complex(),
             forward: planner.plan_fft_forward(length),
@@ -257,44 +267,101 @@ impl Grid {
         let scale = again.map_or(1.0 / rms, |again| again.before.scale);
         let everywhere = again.is_none_or(|again| again.satellites.iter().any(|(_, everywhere)| *everywhere));
         let sums = Sums::new(self, block, scale, everywhere);
-        let column =
-            |bin: usize, spectra: &[Spectra<'_>]| self.column(self.dopplers_hz[bin], spectra, &mut sums.at(self, bin));
-        let one = |bin: usize| match again {
+        let column = |bin: usize, spectra: &[Spectra<'_>], room: &mut Room| {
+            self.column(self.dopplers_hz[bin], spectra, &mut sums.at(self, bin), room)
+        };
+        let one = |room: &mut Room, bin: usize| match again {
             Some(again) if !again.dopplers.contains(&bin) => {
                 let wanted = |number: usize| again.satellites.get(number).is_some_and(|(_, everywhere)| *everywhere);
                 let some: Vec<Spectra<'_>> = (0..).zip(spectra).filter(|(n, _)| wanted(*n)).map(|(_, s)| *s).collect();
-                let mut seen = if some.is_empty() { Vec::new() } else { column(bin, &some) };
-                let mut seen = seen.drain(..);
+                let (seen, crowded) = if some.is_empty() { (Vec::new(), false) } else { column(bin, &some, room) };
+                let mut seen = seen.into_iter();
                 let before = |satellite: usize| again.before.strips.get(bin)?.get(satellite).copied();
-                (again.satellites.iter())
+                let strips = (again.satellites.iter())
                     .filter_map(|(satellite, everywhere)| if *everywhere { seen.next() } else { before(*satellite) })
-                    .collect()
+                    .collect();
+                (strips, crowded)
             }
-            _ => column(bin, spectra),
+            _ => column(bin, spectra, room),
         };
-        let mut strips: Vec<Vec<Strip>> = (0..self.dopplers_hz.len()).into_par_iter().map(one).collect();
+        let (mut strips, raised): (Vec<Vec<Strip>>, Vec<bool>) =
+            (0..self.dopplers_hz.len()).into_par_iter().map_init(|| self.room(), one).unzip();
         self.complete(&mut strips, spectra, &sums);
-        let heights: Vec<Vec<f64>> = (0..spectra.len()).map(|satellite| self.heights(&strips, satellite)).collect();
+        // Satellites that are not looked at again were seen beside what has been subtracted since.
+        let old = |bin: usize, satellite: usize| {
+            let again = again.filter(|again| !again.dopplers.contains(&bin));
+            again.and_then(|again| again.satellites.get(satellite)).is_some_and(|(_, everywhere)| !everywhere)
+        };
+        let mut filled = BTreeSet::new();
+        let (of, mut crowded) = loop {
+            let (of, crowded) = self.peaks(&strips, spectra.len());
+            let is_open = |bin: usize| {
+                let open = |(satellite, strip): (usize, &Strip)| strip.sums < self.sums || old(bin, satellite);
+                !filled.contains(&bin) && strips[bin].iter().enumerate().any(open)
+            };
+            let doubtful = self.doubtful(&of, is_open);
+            if doubtful.is_empty() {
+                break (of, crowded);
+            }
+            let columns = strips.par_iter_mut().enumerate().filter(|(bin, _)| doubtful.contains(bin));
+            columns.for_each(|(bin, column)| {
+                column.iter_mut().enumerate().filter(|(n, _)| old(bin, *n)).for_each(|(_, strip)| strip.sums = 0);
+                self.fill(column, spectra, &mut sums.at(self, bin));
+            });
+            filled.extend(doubtful);
+        };
+        crowded.extend((0..).zip(raised).filter_map(|(bin, raised)| raised.then_some(bin)));
+        crowded.sort_unstable();
+        crowded.dedup();
+        let of = of.into_iter().map(|(_, peak)| peak).collect();
+        Peaks { of, crowded, map: Map { strips, scale } }
+    }
+
+    /// The best Doppler of every satellite, its number first, and the crowded ones.
+    fn peaks(&self, strips: &[Vec<Strip>], satellites: usize) -> (Vec<(usize, Peak)>, Vec<usize>) {
+        let heights: Vec<Vec<f64>> = (0..satellites).map(|satellite| self.heights(strips, satellite)).collect();
         let image = |bin: usize| self.dopplers_hz.get(bin).is_some_and(|doppler_hz| self.meets_image(*doppler_hz));
         let bar = self.law.bar(&heights, image);
         let peak = |(satellite, heights): (usize, &Vec<f64>)| {
             let share = |bin: usize| heights[bin] / bar.thresholds[bin];
             let bin = (1..heights.len()).fold(0, |best, bin| if share(bin) > share(best) { bin } else { best });
-            Peak {
-                statistic: heights[bin],
-                threshold: bar.thresholds[bin],
-                doppler_hz: self.dopplers_hz[bin],
-                lag: strips[bin][satellite].lag,
-            }
+            let (statistic, threshold) = (heights[bin], bar.thresholds[bin]);
+            let (doppler_hz, lag) = (self.dopplers_hz[bin], strips[bin][satellite].lag);
+            (bin, Peak { statistic, threshold, doppler_hz, lag })
         };
-        let of = heights.iter().enumerate().map(peak).collect();
-        Peaks { of, crowded: bar.crowded, map: Map { strips, scale } }
+        (heights.iter().enumerate().map(peak).collect(), bar.crowded)
+    }
+
+    /// Numbers of the Dopplers at which a satellite seems to be that may be cross-correlation, and whose law is
+    /// not known as not all codes' sums are there.
+    fn doubtful(&self, peaks: &[(usize, Peak)], is_open: impl Fn(usize) -> bool) -> BTreeSet<usize> {
+        if self.is_pair || peaks.len() < LEAST_CODES {
+            return BTreeSet::new();
+        }
+        let unsure = |peak: &Peak| (1.0..SURE).contains(&(peak.statistic / peak.threshold));
+        peaks.iter().filter(|(_, peak)| unsure(peak)).map(|(bin, _)| *bin).filter(|bin| is_open(*bin)).collect()
     }
 
     /// What a statistic has to exceed in noise.
     #[cfg(test)]
     pub fn threshold(&self) -> f64 {
         self.law.threshold
+    }
+
+    /// Peaks that may be cross-correlation and were not judged by all codes' sums.
+    #[cfg(test)]
+    pub fn unjudged(&self, peaks: &Peaks) -> usize {
+        let bin = |peak: &Peak| self.dopplers_hz.iter().position(|doppler_hz| *doppler_hz == peak.doppler_hz);
+        let numbered: Vec<(usize, Peak)> = peaks.of.iter().map(|peak| (bin(peak).unwrap(), *peak)).collect();
+        let strips = &peaks.map.strips;
+        self.doubtful(&numbered, |bin| strips[bin].iter().any(|strip| strip.sums < self.sums)).len()
+    }
+
+    /// Sums that were made, of all that a search without leaving makes.
+    #[cfg(test)]
+    pub fn share_made(&self, peaks: &Peaks) -> f64 {
+        let made: u32 = peaks.map.strips.iter().flatten().map(|strip| strip.sums).sum();
+        f64::from(made) / (f64::from(self.sums) * peaks.map.strips.iter().flatten().count() as f64)
     }
 
     /// Of every satellite one strip has all dwells: where none stayed, that which came nearest to it.

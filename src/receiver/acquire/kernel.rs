@@ -98,22 +98,22 @@ fn add_turned_plain(sums: &mut [Complex<f32>], bins: &[Complex<f32>], first: Com
 
 /// Numbers by which others are multiplied, each as the two factors of either part: of a product's real part
 /// re·re and im·(−im), of the imaginary one im·re and re·im.
+#[derive(Default)]
 pub(super) struct Factors(Vec<[[f32; PARTS]; 2]>);
 
 /// Parts of numbers that are multiplied side by side.
 const PARTS: usize = 16;
 
 impl Factors {
-    pub fn of(numbers: &[Complex<f32>]) -> Self {
-        let one = |numbers: &[Complex<f32>]| {
-            let mut factors = [[0.0; PARTS]; 2];
+    /// Takes these numbers in place of those before.
+    pub fn set(&mut self, numbers: &[Complex<f32>]) {
+        self.0.resize(numbers.len().div_ceil(PARTS / 2), [[0.0; PARTS]; 2]);
+        for (factors, numbers) in self.0.iter_mut().zip(numbers.chunks(PARTS / 2)) {
             for (k, number) in numbers.iter().enumerate() {
                 (factors[0][2 * k], factors[0][2 * k + 1]) = (number.re, number.re);
                 (factors[1][2 * k], factors[1][2 * k + 1]) = (-number.im, number.im);
             }
-            factors
-        };
-        Self(numbers.chunks(PARTS / 2).map(one).collect())
+        }
     }
 }
 
@@ -325,7 +325,9 @@ mod tests {
                 let a = spectrum.bins();
                 let mut products = vec![Complex::new(77.0, 77.0); 200];
                 let mut powers = vec![2.5; 200];
-                multiply(&mut products[offset..offset + length], &spectrum, &Factors::of(b));
+                let mut factors = Factors::default();
+                factors.set(b);
+                multiply(&mut products[offset..offset + length], &spectrum, &factors);
                 add_powers(&mut powers[offset..offset + length], &a);
                 for (n, (product, power)) in products.iter().zip(&powers).enumerate() {
                     let (expected, sum) = match n.checked_sub(offset).filter(|n| *n < length) {

@@ -134,12 +134,28 @@ pub fn cell_chips(
     signal: &'static Signal,
     settings: &AcquisitionSettings,
 ) -> Result<f64, AcquireError> {
+    grid(metadata, signal, settings).map(|grid| grid.lag_samples * grid.chips_per_sample)
+}
+
+/// What the largest cell of a Doppler has to exceed after each sum of a search for `signal`, in units in which
+/// noise is chi-square; zero where no Doppler is left. What many codes reach raises it.
+///
+/// # Errors
+/// As [`cell_chips`].
+pub fn bars(
+    metadata: &IfMetadata,
+    signal: &'static Signal,
+    settings: &AcquisitionSettings,
+) -> Result<Vec<f64>, AcquireError> {
+    grid(metadata, signal, settings).map(|grid| grid.dwells.stay().to_vec())
+}
+
+fn grid(metadata: &IfMetadata, signal: &'static Signal, settings: &AcquisitionSettings) -> Result<Grid, AcquireError> {
     settings.validate()?;
     let one = |component| (component, companion(component, signal).is_some(), signal.centre_hz());
     let mut planner = FftPlanner::new();
     let grid = lead(signal).and_then(|component| Grid::new(one(component), metadata, settings, 0.0, &mut planner));
-    let none = AcquireError::NoCode { signal: signal.name, sv: Sv { system: signal.system, number: 0 } };
-    grid.map(|grid| grid.lag_samples * grid.chips_per_sample).ok_or(none)
+    grid.ok_or(AcquireError::NoCode { signal: signal.name, sv: Sv { system: signal.system, number: 0 } })
 }
 
 /// Searches `block` once for every candidate; rows come in the order of the candidates.
@@ -503,6 +519,8 @@ impl Finding {
     }
 }
 
+#[cfg(test)]
+mod dwell_tests;
 #[cfg(test)]
 mod pair_tests;
 #[cfg(test)]

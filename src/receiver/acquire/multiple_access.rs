@@ -19,7 +19,7 @@
 use crate::receiver::threshold::{of_one_cell, threshold};
 
 /// Fewer codes are no sample.
-const LEAST_CODES: usize = 12;
+pub(super) const LEAST_CODES: usize = 12;
 /// A bin is crowded when its median is so many standard deviations above that of noise.
 const CROWDED: f64 = 5.0;
 /// Standard deviation of a Gumbel sample's median over scale, times √n: 1 / (2 × density there, ½ ln 2) =
@@ -89,22 +89,12 @@ impl Law {
     pub fn bar(&self, heights: &[Vec<f64>], image: impl Fn(usize) -> bool) -> Bar {
         let bins = heights.first().map_or(0, Vec::len);
         let mut bar = Bar { thresholds: vec![self.threshold; bins], crowded: Vec::new() };
-        if heights.len() < LEAST_CODES {
-            return bar;
-        }
-        let count = heights.len() as f64;
         let (mut crowded, mut beyond) = (Vec::new(), Vec::new());
         for bin in 0..bins {
-            let (place, scale) = if image(bin) { self.image } else { self.circular };
-            let mut column: Vec<f64> = heights.iter().filter_map(|code| code.get(bin).copied()).collect();
-            let mut median = quantile(&mut column, 0.5);
-            if stands_out(&column, median) {
-                column.retain(|height| !is_beyond_cross_correlation(*height, median));
-                median = quantile(&mut column, 0.5);
-            }
-            if median > place + CROWDED * MEDIAN_SPREAD * scale / count.sqrt() {
-                crowded.push((bin, median.sqrt()));
-                beyond.extend(column.iter().map(|height| height.sqrt() - median.sqrt()));
+            let column = heights.iter().filter_map(|code| code.get(bin).copied()).collect();
+            if let Some((median_root, excesses)) = self.crowded(column, image(bin)) {
+                crowded.push((bin, median_root));
+                beyond.extend(excesses);
             }
         }
         if crowded.is_empty() {
@@ -118,6 +108,30 @@ impl Law {
             bar.thresholds[bin] = self.threshold.max(root * root);
         }
         bar
+    }
+
+    /// What nine codes in ten stay below in a bin that is crowded; `None` where it is not. Noise is circular.
+    pub fn reached(&self, column: Vec<f64>) -> Option<f64> {
+        let (median_root, mut beyond) = self.crowded(column, false)?;
+        let root = median_root + quantile(&mut beyond, REACHED);
+        Some(root * root)
+    }
+
+    /// The median of the largest cells of a crowded bin and by how much each exceeds that, in amplitude.
+    fn crowded(&self, mut column: Vec<f64>, image: bool) -> Option<(f64, Vec<f64>)> {
+        if column.len() < LEAST_CODES {
+            return None;
+        }
+        let (place, scale) = if image { self.image } else { self.circular };
+        let deviation = MEDIAN_SPREAD * scale / (column.len() as f64).sqrt();
+        let mut median = quantile(&mut column, 0.5);
+        if stands_out(&column, median) {
+            column.retain(|height| !is_beyond_cross_correlation(*height, median));
+            median = quantile(&mut column, 0.5);
+        }
+        let excess = |height: f64| height.sqrt() - median.sqrt();
+        (median > place + CROWDED * deviation)
+            .then(|| (median.sqrt(), column.iter().map(|height| excess(*height)).collect()))
     }
 }
 

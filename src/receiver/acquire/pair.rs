@@ -70,12 +70,14 @@ impl Grid {
 
     #[cfg(test)]
     pub fn spectrum_of_dwell(&self, block: &Block, doppler_hz: f64, dwell: usize) -> Vec<Complex<f32>> {
-        self.shifted(&self.transforms(block, 1.0), doppler_hz, dwell)
+        let mut out = vec![Complex::default(); self.inverse.len()];
+        self.shifted(&self.transforms(block, 1.0), doppler_hz, dwell, &mut out);
+        out
     }
 
     /// The band of a dwell's spectrum around a Doppler, turned as if the dwell began with a code period of
     /// the satellite that began one with the first sample.
-    pub(super) fn shifted(&self, transforms: &Transforms, doppler_hz: f64, dwell: usize) -> Vec<Complex<f32>> {
+    pub(super) fn shifted(&self, transforms: &Transforms, doppler_hz: f64, dwell: usize, out: &mut [Complex<f32>]) {
         let (bin, part) = self.place(doppler_hz);
         let part = transforms.parts.binary_search(&part).unwrap_or(0);
         let kept = &transforms.spectra[part][dwell];
@@ -84,7 +86,6 @@ impl Grid {
         let period = self.period_samples / (1.0 + doppler_hz / self.carrier_hz);
         let late = begin.round() * period - (begin * self.period_samples).round();
         let (positive, reach) = (band.div_ceil(2), length.div_ceil(2));
-        let mut out = vec![Complex::default(); band];
         let (above, below) = out.split_at_mut(positive);
         for (side, first) in [(above, 0_i64), (below, positive as i64 - band as i64)] {
             let (coarse, fine) = ramp(late, length, first, side.len());
@@ -96,7 +97,6 @@ impl Grid {
                 place = if place + 1 == length { 0 } else { place + 1 };
             }
         }
-        out
     }
 }
 

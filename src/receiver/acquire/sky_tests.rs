@@ -55,6 +55,9 @@ fn count(searcher: &mut Searcher, recording: &Recording, sent: &[Sent], counted:
     total.there += counted.len() as u32;
     total.found += hits.iter().filter(|hit| right(hit, counted)).count() as u32;
     total.false_ones += hits.iter().filter(|hit| !right(hit, sent)).count() as u32;
+    for hit in hits.iter().filter(|hit| !right(hit, sent)) {
+        println!("nobody sends {} at {:.1} chips and {:.0} Hz", hit.sv, hit.code_phase_chips, hit.doppler_hz);
+    }
 }
 
 fn searcher(settings: &AcquisitionSettings) -> (IfMetadata, usize, Searcher) {
@@ -83,6 +86,31 @@ fn an_open_sky_brings_no_false_satellites() {
     let expected = f64::from(total.skies) / 1000.0;
     assert!(f64::from(total.false_ones) <= expected + 3.0 * expected.sqrt(), "{total:?}");
     assert!(f64::from(total.found) >= 0.97 * f64::from(total.there), "{total:?}");
+}
+
+#[test]
+fn what_may_be_cross_correlation_is_judged_by_all_codes_and_most_sums_are_not_made() {
+    let (metadata, samples, mut searcher) = searcher(&AcquisitionSettings::default());
+    let (mut passed, mut shares) = (0, Vec::new());
+    for seed in skies(4) {
+        let mut random = Noise(1200 + seed);
+        let cn0_dbhz: Vec<f64> = (0..10).map(|_| 36.0 + 16.0 * random.uniform()).collect();
+        let recording = quantised(record(metadata.clone(), samples, &satellites(&mut random, &cn0_dbhz), seed));
+        let block = Block { first: 0, i: &recording.i, q: &recording.q };
+        // Makes the spectra too.
+        searcher.search(&block, &all()).unwrap();
+        let window = Window::centred(&Stretch::Planes(block), samples);
+        let grid = searcher.grids.values().next().unwrap();
+        let spectra: Vec<_> = searcher.codes.values().map(Code::spectra).collect();
+        let peaks = grid.search(&window.block(), &spectra, None);
+        assert_eq!(grid.unjudged(&peaks), 0);
+        passed += peaks.of.iter().filter(|peak| peak.statistic > peak.threshold).count();
+        shares.push(grid.share_made(&peaks));
+    }
+    println!("{passed} passed, of all sums {shares:.2?}");
+    assert!(passed > 6 * shares.len());
+    // Noise leaves 0.53.
+    assert!(shares.iter().all(|share| (0.53..0.8).contains(share)), "{shares:?}");
 }
 
 #[test]

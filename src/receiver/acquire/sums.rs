@@ -27,31 +27,22 @@ impl<'a> Sums<'a> {
     }
 
     /// What makes the spectrum of one dwell after the other at a Doppler.
-    pub fn at<'b>(&'b self, grid: &'b Grid, bin: usize) -> impl FnMut(usize) -> Vec<Complex<f32>> + 'b {
+    pub fn at<'b>(&'b self, grid: &'b Grid, bin: usize) -> impl FnMut(usize, &mut [Complex<f32>]) + 'b {
         let doppler_hz = grid.dopplers_hz[bin];
         let (mut long, mut scratch) = (Vec::new(), Vec::new());
-        move |dwell| {
+        move |dwell, spectrum| {
             let first = dwell as u32 * grid.coherent_periods;
             let periods = first..first + grid.coherent_periods;
-            let room = || vec![Complex::default(); grid.inverse.len()];
             match self {
-                Self::Pair(transforms) => grid.shifted(transforms, doppler_hz, dwell),
-                Self::Shared(shifted) => {
-                    let mut spectrum = room();
-                    for period in periods {
-                        shifted.add_period(grid, bin, period, &mut spectrum);
-                    }
-                    spectrum
-                }
+                Self::Pair(transforms) => grid.shifted(transforms, doppler_hz, dwell, spectrum),
+                Self::Shared(shifted) => periods.for_each(|period| shifted.add_period(grid, bin, period, spectrum)),
                 Self::Alone { block, scale } => {
-                    let mut spectrum = room();
                     long.resize(grid.forward.len(), Complex::default());
                     scratch.resize(grid.forward.get_inplace_scratch_len(), Complex::default());
                     for period in periods {
                         let rooms = (&mut long[..], &mut scratch[..]);
-                        grid.add_period(block, *scale, doppler_hz, period, rooms, &mut spectrum);
+                        grid.add_period(block, *scale, doppler_hz, period, rooms, spectrum);
                     }
-                    spectrum
                 }
             }
         }
