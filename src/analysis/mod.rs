@@ -140,11 +140,12 @@ struct Measured {
 
 fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, JudgeError> {
     let errors = Errors::measure(&read)?;
-    let clock = Clock::measure(&read, &errors)?;
-    let consistency = Consistency::measure(&read, &errors);
+    let mut clock = Clock::measure(&read, &errors)?;
+    let consistency = Consistency::measure(&read, &errors)?;
+    let mut summary = Summary::new(&read, &errors, &clock)?;
+    clock.forget_phases();
     let slips = Slips::find(&read, &errors)?;
     let jitter = Jitter::measure(&read, &errors)?;
-    let mut summary = Summary::new(&read, &errors, &clock)?;
     summary.add(&consistency, &slips, &jitter);
     let not_json = |source| JudgeError::Json { path: run.join("summary.json"), source };
     let verdict = Verdict::of(&read, &errors, &slips, &summary)?;
@@ -152,6 +153,8 @@ fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, J
         Some(limits) => verdict.with_user(limits.judge(&serde_json::to_value(&summary).map_err(not_json)?)),
         None => verdict,
     };
+    read.sound()?;
+    errors.sound()?;
     Ok(Measured { read, errors, clock, consistency, slips, jitter, summary })
 }
 
@@ -167,6 +170,8 @@ fn find(run: &Path, limits: Option<&Limits>) -> Result<Found, JudgeError> {
     let report = RunReport::new(&judged)?;
     #[cfg(not(feature = "pdf"))]
     let report = ();
+    read.sound()?;
+    errors.sound()?;
     Ok(Found { summary, sketches, report })
 }
 

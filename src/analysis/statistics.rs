@@ -18,11 +18,18 @@ pub struct Spread {
 }
 
 /// A mean in the making, of numbers that need not be held.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sum {
     count: usize,
     sum: f64,
     squares: f64,
+}
+
+impl Default for Sum {
+    fn default() -> Self {
+        // As the sum of an iterator begins, so that zeros keep their sign.
+        Self { count: 0, sum: -0.0, squares: -0.0 }
+    }
 }
 
 impl Sum {
@@ -65,8 +72,13 @@ pub fn std(values: &[f64]) -> Option<f64> {
     let mean = mean(values)?;
     let count = finite(values).count();
     let squares: f64 = finite(values).map(|value| (value - mean) * (value - mean)).sum();
+    Some(deviation(squares, count))
+}
+
+/// Standard deviation of so many values whose squares about their mean have that sum.
+pub(crate) fn deviation(squares: f64, count: usize) -> f64 {
     let freedom = planted!("analysis.statistics.deviation", count - 1, 2 * count);
-    Some(if count > 1 { (squares / freedom as f64).sqrt() } else { 0.0 })
+    if count > 1 { (squares / freedom as f64).sqrt() } else { 0.0 }
 }
 
 /// The value below which a share `p` (0 to 1) of the list lies.
@@ -78,11 +90,16 @@ pub fn percentile(values: &[f64], p: f64) -> Option<f64> {
 
 /// [`percentile`] of a list that is finite and sorted already.
 pub fn ranked(sorted: &[f64], p: f64) -> Option<f64> {
-    let p = planted!("analysis.statistics.percentile", p, p * p);
-    let rank = p.clamp(0.0, 1.0) * sorted.len().checked_sub(1)? as f64;
+    let rank = rank(sorted.len(), p)?;
     let below = *sorted.get(rank.floor() as usize)?;
     let above = *sorted.get(rank.ceil() as usize)?;
     Some(below + (above - below) * (rank - rank.floor()))
+}
+
+/// Rank of that percentile among so many values; none of none.
+pub(crate) fn rank(count: usize, p: f64) -> Option<f64> {
+    let p = planted!("analysis.statistics.percentile", p, p * p);
+    Some(p.clamp(0.0, 1.0) * count.checked_sub(1)? as f64)
 }
 
 /// The middle value.

@@ -94,9 +94,9 @@ pub const ORDER: Order<'static> = &[
     (
         "analysis/read",
         &[
-            &["facts", "fault", "files", "spill_store"],
-            &["rinex_obs", "nmea", "delay", "emission", "rows"],
-            &["common"],
+            &["facts", "fault", "files", "numbers", "spill_store"],
+            &["rinex_obs", "nmea", "delay", "emission", "levels", "rows", "table"],
+            &["common", "fixes"],
             &["run"],
         ],
     ),
@@ -130,7 +130,7 @@ pub const ORDER: Order<'static> = &[
             &["rules"],
         ],
     ),
-    ("analysis/judge/forecast", &[&["links"], &["ranges"], &["solution"]]),
+    ("analysis/judge/forecast", &[&["settled"], &["links"], &["ranges"], &["solution"]]),
     (
         "analysis/judge/foreign",
         &[&["fit", "pairs"], &["measured", "place"], &["carriers", "judged"], &["observables", "report"]],

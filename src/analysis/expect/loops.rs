@@ -8,7 +8,6 @@ use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::followed::Followed;
-use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::expect::theory::clock::PowerLaw;
 use crate::analysis::expect::theory::dll::{Discriminator, Taps};
 use crate::analysis::expect::theory::linear::{Feedback, PhaseLoop, controlled_root, controlled_root_gains};
@@ -502,20 +501,19 @@ impl Stresses {
 }
 
 /// Errors in degrees that the true motion leaves in the phase loop of a satellite, with their times since
-/// sample 0.
+/// sample 0: those of them at times that `wanted` tells.
 ///
 /// # Errors
 /// [`JudgeError::Read`] where spilled rows cannot be read.
 pub fn motion_error_deg(
     run: &Run,
-    access: &MultipleAccess<'_>,
     link: Link,
-    settings: Settings,
-    update_s: f64,
+    (settings, update_s): (Settings, f64),
+    wanted: impl Fn(f64) -> bool,
 ) -> Result<Vec<(f64, f64)>, JudgeError> {
     let settings = Followed::of(run, link.signal).map_or(settings, |followed| settings.fitted(&followed));
     let (Some(timeline), Some(closed)) =
-        (Timeline::of(run, access, link)?, exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s))
+        (Timeline::of(run, link)?, exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s))
     else {
         return Ok(Vec::new());
     };
@@ -529,7 +527,8 @@ pub fn motion_error_deg(
         let mut follower = Follower::new(&closed, update_s);
         let phases = (0..count).map_while(|k| Some(timeline.state(&link, at(k))?.carrier_cycles - start));
         let errors = phases.filter_map(|phase| follower.error(phase)).enumerate();
-        series.extend(errors.map(|(k, error)| (at(k) + skip_s - origin_s, 360.0 * error)));
+        let errors = errors.map(|(k, error)| (at(k) + skip_s - origin_s, 360.0 * error));
+        series.extend(errors.filter(|(at_s, _)| wanted(*at_s)));
     }
     Ok(series)
 }

@@ -4,8 +4,15 @@
 //! half a spacing to either side. Limits: the front end's rounding of the correlation is left out, and rays
 //! are taken as steady over the loop's time constant, so that what moves fast is overrated.
 
+use std::collections::HashMap;
+use std::iter::Peekable;
+
+use crate::analysis::error::JudgeError;
 use crate::analysis::expect::loops::Code;
+use crate::analysis::read::Run;
+use crate::analysis::read::spill_store::Cursor;
 use crate::gnss::record::RayRow;
+use crate::gnss::signal::Link;
 
 /// Where the loop rests, in chips late of the direct ray, for rays of (excess in chips, amplitude, phase in
 /// cycles).
@@ -34,8 +41,79 @@ pub(in crate::analysis) fn error_chips(code: &Code, rays: &[(f64, f64, f64)], sp
 }
 
 /// The three numbers of a ray.
-pub fn ray(row: &RayRow, chip_m: f64) -> (f64, f64, f64) {
-    (row.excess_m / chip_m, row.amplitude_ratio, row.phase_cycles)
+type Ray = (f64, f64, f64);
+
+/// The reflected rays of a satellite, sample by sample: those of one are held, or all where samples fall.
+pub(in crate::analysis) struct Rays<'r> {
+    cursor: Peekable<Cursor<'r, Link, RayRow>>,
+    all: Option<HashMap<u64, Vec<Ray>>>,
+    chip_m: f64,
+    now: Vec<Ray>,
+    sample: Option<u64>,
+}
+
+impl<'r> Rays<'r> {
+    /// Those of a run's satellite whose chips have that length.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
+    pub fn of(run: &'r Run, link: Link, chip_m: f64) -> Result<Self, JudgeError> {
+        let cursor = run.rays.cursor(link).peekable();
+        let mut rays = Self { cursor, all: None, chip_m, now: Vec::new(), sample: None };
+        if !run.rays.is_ordered(&link) {
+            let mut all: HashMap<u64, Vec<Ray>> = HashMap::new();
+            run.rays.each(link, |row| all.entry(row.sample).or_default().push(rays.ray(&row)))?;
+            rays.all = Some(all);
+        }
+        Ok(rays)
+    }
+
+    fn ray(&self, row: &RayRow) -> Ray {
+        (row.excess_m / self.chip_m, row.amplitude_ratio, row.phase_cycles)
+    }
+
+    /// Those at a sample; samples are asked for in their order.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn at(&mut self, sample: u64) -> Result<&[Ray], JudgeError> {
+        if let Some(all) = &self.all {
+            return Ok(all.get(&sample).map_or(&[], Vec::as_slice));
+        }
+        if self.sample.replace(sample) != Some(sample) {
+            self.now.clear();
+        }
+        let due = |row: &Result<RayRow, JudgeError>| row.as_ref().map_or(true, |row| row.sample <= sample);
+        while let Some(row) = self.cursor.next_if(due) {
+            let row = row?;
+            if row.sample == sample {
+                self.now.push(self.ray(&row));
+            }
+        }
+        Ok(&self.now)
+    }
+
+    /// The largest sum of amplitudes at a sample.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn strongest(run: &'r Run, link: Link) -> Result<f64, JudgeError> {
+        let mut strongest = 0.0_f64;
+        if !run.rays.is_ordered(&link) {
+            let rays = Self::of(run, link, 1.0)?.all.unwrap_or_default();
+            let sums = rays.values().map(|rays| rays.iter().map(|ray| ray.1).sum::<f64>());
+            return Ok(sums.fold(strongest, f64::max));
+        }
+        let mut sum = (0, -0.0);
+        run.rays.each(link, |row| {
+            if row.sample != sum.0 {
+                strongest = strongest.max(sum.1);
+                sum = (row.sample, -0.0);
+            }
+            sum.1 += row.amplitude_ratio;
+        })?;
+        Ok(strongest.max(sum.1))
+    }
 }
 
 #[cfg(test)]

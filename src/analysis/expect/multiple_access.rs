@@ -8,9 +8,11 @@
 //! power. Interference adds its own power times its own separation ([`super::jamming`]). Limits: components
 //! of one signal do not disturb each other; what folds back from beyond the band is left out.
 
+use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
 
 use crate::analysis::expect::jamming;
+use crate::analysis::read::levels::LevelFinder;
 use crate::analysis::read::{Emission, Run};
 use crate::analysis::waveform::Waveform;
 use crate::gnss::record::Observation;
@@ -21,8 +23,23 @@ pub struct MultipleAccess<'r> {
     run: &'r Run,
     /// κ of the emissions that a signal meets, its own among them.
     kappa_s: HashMap<Emission, Vec<(Emission, f64)>>,
-    /// What interference adds to the noise density at a sample, in units of the thermal one.
-    jammed: HashMap<(u64, Emission), f64>,
+    sums_hz: RefCell<LevelFinder<'r, Emission>>,
+    jammed: Jammed,
+}
+
+/// What interference adds to the noise density at a sample, in units of the thermal one: the samples with
+/// interference in their order, and a number for each of them and each emission.
+#[derive(Default)]
+struct Jammed {
+    samples: Vec<u64>,
+    of: HashMap<Emission, Vec<f64>>,
+}
+
+impl Jammed {
+    fn get(&self, sample: u64, emission: Emission) -> f64 {
+        let place = self.samples.binary_search(&sample).ok();
+        place.and_then(|place| self.of.get(&emission)?.get(place)).copied().unwrap_or(0.0)
+    }
 }
 
 impl<'r> MultipleAccess<'r> {
@@ -33,14 +50,19 @@ impl<'r> MultipleAccess<'r> {
             .iter()
             .filter_map(|one| Some((one.signal, Waveform::sent(one.signal, run.scene.waveform)?)))
             .collect();
-        Self { run, kappa_s: separations(run, &emissions, &waveforms), jammed: jammed(run, &emissions, &waveforms) }
+        Self {
+            run,
+            kappa_s: separations(run, &emissions, &waveforms),
+            sums_hz: RefCell::new(run.cn0_sums_hz.finder()),
+            jammed: jammed(run, &emissions, &waveforms),
+        }
     }
 
     /// C/N0 of a true observation with the other satellites and interference counted as noise; infinite
     /// without any.
     pub fn effective_dbhz(&self, row: &Observation) -> f64 {
         let (own_hz, own) = (linear(row.cn0_dbhz), Emission::of(row.link()));
-        let sum_hz = |emission: Emission| self.run.cn0_sums_hz.get(&(row.sample, emission)).copied();
+        let sum_hz = |emission: Emission| self.sums_hz.borrow_mut().get(row.sample, emission);
         let others = |(emission, kappa_s): &(Emission, f64)| {
             let others_hz = if *emission == own {
                 let sum_hz = sum_hz(own).unwrap_or(own_hz);
@@ -52,7 +74,7 @@ impl<'r> MultipleAccess<'r> {
         };
         let shared: f64 = self.kappa_s.get(&own).map_or(&[][..], Vec::as_slice).iter().map(others).sum();
         let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
-        let jammed = self.jammed.get(&(row.sample, own)).copied().unwrap_or(0.0);
+        let jammed = self.jammed.get(row.sample, own);
         10.0 * libm::log10(own_hz / (thermal + shared + jammed))
     }
 
@@ -61,9 +83,9 @@ impl<'r> MultipleAccess<'r> {
     pub fn white_hz(&self, sample: u64, link: Link, own_hz: f64) -> f64 {
         let own = Emission::of(link);
         let met = self.kappa_s.get(&own).map_or(&[][..], Vec::as_slice).iter().map(|(emission, _)| *emission);
-        let all_hz: f64 = met.filter_map(|emission| self.run.cn0_sums_hz.get(&(sample, emission))).sum();
+        let all_hz: f64 = met.filter_map(|emission| self.sums_hz.borrow_mut().get(sample, emission)).sum();
         let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
-        let jammed = self.jammed.get(&(sample, own)).copied().unwrap_or(0.0);
+        let jammed = self.jammed.get(sample, own);
         own_hz / (thermal + all_hz / self.run.rate_hz(link.signal) + jammed)
     }
 }
@@ -97,13 +119,15 @@ fn separations(
     all
 }
 
-fn jammed(
-    run: &Run,
-    emissions: &BTreeSet<Emission>,
-    waveforms: &HashMap<&Signal, Waveform>,
-) -> HashMap<(u64, Emission), f64> {
+fn jammed(run: &Run, emissions: &BTreeSet<Emission>, waveforms: &HashMap<&Signal, Waveform>) -> Jammed {
+    if run.interference.is_empty() {
+        return Jammed::default();
+    }
     let sources = jamming::sources(run);
-    let mut sums = HashMap::new();
+    let mut samples: Vec<u64> = run.interference.iter().map(|row| row.sample).collect();
+    samples.sort_unstable();
+    samples.dedup();
+    let mut of = HashMap::new();
     for emission in emissions {
         let Some(waveform) = waveforms.get(emission.signal) else { continue };
         let sign = if run.scene.inverted { -1.0 } else { 1.0 };
@@ -115,12 +139,17 @@ fn jammed(
                 (*number, jamming::separation_s(source, waveform, signal_hz, edge, rate_hz))
             })
             .collect();
+        let mut sums = vec![0.0; samples.len()];
         for row in &run.interference {
             let kappa_s = kappa.get(&row.source).copied().unwrap_or(0.0);
-            *sums.entry((row.sample, *emission)).or_insert(0.0) += kappa_s * linear(row.jn0_dbhz);
+            let place = samples.binary_search(&row.sample).ok();
+            if let Some(sum) = place.and_then(|place| sums.get_mut(place)) {
+                *sum += kappa_s * linear(row.jn0_dbhz);
+            }
         }
+        of.insert(*emission, sums);
     }
-    sums
+    Jammed { samples, of }
 }
 
 fn linear(cn0_dbhz: f64) -> f64 {

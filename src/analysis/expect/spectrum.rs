@@ -200,8 +200,8 @@ fn quantiser(adc: Option<&ConverterSpec>, sigma_lsb: f64) -> (f64, f64) {
 /// A null as measured and as expected.
 type Null = (f64, f64);
 
-/// Decibels of C/N0 that filter and converter of its front end cost each signal's code, noise alone counted: a
-/// filter passes less of the code than of noise with the code's spectrum, and rounding adds noise.
+/// Decibels of C/N0 that filter and converter of its front end cost each signal's code, noise alone counted:
+/// a filter passes less of the code than of noise with the code's spectrum, and rounding adds noise.
 pub fn costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
     let kept = |signal: &Signal| {
         let place = run.front_end(signal);

@@ -7,7 +7,7 @@
 //! error in the middle of an interval. Limits: a step of acceleration between two rows costs a·h²/62 and
 //! shows in that figure.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
@@ -16,7 +16,6 @@ use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::Observation;
 use crate::gnss::signal::Link;
 use crate::gnss::time::Epoch;
 
@@ -37,10 +36,31 @@ pub struct State {
     pub elevation_deg: f64,
 }
 
-/// States of one satellite at ascending times.
+/// A satellite's range and carrier, as in [`State`].
+#[derive(Clone, Copy, Debug)]
+struct Ray {
+    range_m: f64,
+    carrier_cycles: f64,
+    doppler_hz: f64,
+}
+
+/// How strong and how high it is, as in [`State`].
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    cn0_dbhz: f64,
+    effective_dbhz: f64,
+    elevation_deg: f64,
+}
+
+impl Seen {
+    const UNKNOWN: Self = Self { cn0_dbhz: f64::NAN, effective_dbhz: f64::NAN, elevation_deg: f64::NAN };
+}
+
+/// Rays of one satellite at ascending times, and what is seen there; nothing of a single satellite's.
 #[derive(Clone, Debug, Default)]
 struct Track {
-    nodes: Vec<(f64, State)>,
+    nodes: Vec<(f64, Ray)>,
+    seen: Vec<Seen>,
 }
 
 /// Antenna and sampler's clock at an instant.
@@ -73,6 +93,7 @@ pub struct Timeline {
     pub origin: Epoch,
     interval_s: f64,
     tracks: BTreeMap<Link, Track>,
+    /// None of a single satellite's.
     places: Vec<(f64, Place)>,
     /// Largest errors of interpolation between rows.
     pub interpolation: Interpolation,
@@ -87,66 +108,73 @@ impl Timeline {
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn new(run: &Run) -> Result<Option<Self>, JudgeError> {
-        let Some(mut timeline) = Self::of_links(run, &MultipleAccess::new(run), run.truth.keys())? else {
+        let Some(mut timeline) = Self::of_links(run, Some(&MultipleAccess::new(run)), run.truth.keys())? else {
             return Ok(None);
         };
+        let origin = timeline.origin;
+        timeline.places = run.trajectory.map(|row| {
+            let place = Place {
+                position_m: row.position_m(),
+                velocity_mps: row.velocity_mps(),
+                clock_bias_s: row.clock_bias_s,
+                clock_drift: row.clock_drift,
+            };
+            (row.time().since(origin), place)
+        })?;
         timeline.interpolation = timeline.missed();
         Ok(Some(timeline))
     }
 
-    /// That of one satellite; how well it is interpolated is not looked at.
+    /// That of one satellite's range and carrier alone; how well it is interpolated is not looked at.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn of(run: &Run, access: &MultipleAccess<'_>, link: Link) -> Result<Option<Self>, JudgeError> {
-        Self::of_links(run, access, std::iter::once(link))
+    pub fn of(run: &Run, link: Link) -> Result<Option<Self>, JudgeError> {
+        Self::of_links(run, None, std::iter::once(link))
     }
 
     fn of_links(
         run: &Run,
-        access: &MultipleAccess<'_>,
+        access: Option<&MultipleAccess<'_>>,
         links: impl Iterator<Item = Link>,
     ) -> Result<Option<Self>, JudgeError> {
         let Some(first) = run.trajectory.first() else { return Ok(None) };
         // The nearest second: a clock that is a little ahead does not begin a second earlier.
         let origin = Epoch::new(first.gps_s, first.gps_fraction_s.round());
-        let places: Vec<(f64, Place)> = run
-            .trajectory
-            .iter()
-            .map(|row| {
-                let place = Place {
-                    position_m: row.position_m(),
-                    velocity_mps: row.velocity_mps(),
-                    clock_bias_s: row.clock_bias_s,
-                    clock_drift: row.clock_drift,
-                };
-                (row.time().since(origin), place)
-            })
-            .collect();
-        let steps: Vec<f64> = places.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
-        let at: HashMap<u64, usize> = run.trajectory.iter().map(|row| row.sample).zip(0..).collect();
+        let mut steps: Vec<f64> = run.trajectory.map(|row| row.time().since(origin))?;
+        for index in 1..steps.len() {
+            steps[index - 1] = steps[index] - steps[index - 1];
+        }
+        steps.pop();
+        let interval_s = median(&steps).unwrap_or(1.0);
+        drop(steps);
+        let mut places = run.trajectory.finder()?;
         let mut tracks = BTreeMap::new();
         for link in links {
-            let elevations: HashMap<u64, f64> =
-                run.seen(link.sv, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
-            let node = |row: Observation| {
-                let (t_s, place) = places.get(*at.get(&row.sample)?)?;
+            let mut sky = run.seen_at(link.sv)?;
+            let (mut nodes, mut seen) = (Vec::with_capacity(run.truth.count(&link)), Vec::new());
+            run.truth.each(link, |row| {
+                let Some(place) = places.get(row.sample) else { return };
                 let carrier_hz = row.signal.carrier_hz(row.sv);
-                let state = State {
+                let ray = Ray {
                     range_m: row.pseudorange_m - SPEED_OF_LIGHT_MPS * place.clock_bias_s,
                     carrier_cycles: row.carrier_cycles - carrier_hz * place.clock_bias_s,
                     // Rates by the sampler's clock become rates by GPS time.
                     doppler_hz: (row.doppler_hz + carrier_hz * place.clock_drift) / (1.0 - place.clock_drift),
-                    cn0_dbhz: row.cn0_dbhz,
-                    effective_dbhz: access.effective_dbhz(&row),
-                    elevation_deg: elevations.get(&row.sample).copied().unwrap_or(f64::NAN),
                 };
-                Some((*t_s, state))
-            };
-            tracks.insert(link, Track { nodes: run.truth.map(link, node)?.into_iter().flatten().collect() });
+                nodes.push((place.time().since(origin), ray));
+                if let Some(access) = access {
+                    let sky = sky.as_mut().and_then(|sky| sky.get(row.sample));
+                    seen.push(Seen {
+                        cn0_dbhz: row.cn0_dbhz,
+                        effective_dbhz: access.effective_dbhz(&row),
+                        elevation_deg: sky.map_or(f64::NAN, |row| row.elevation_deg),
+                    });
+                }
+            })?;
+            tracks.insert(link, Track { nodes, seen });
         }
-        let interval_s = median(&steps).unwrap_or(1.0);
-        Ok(Some(Self { origin, interval_s, tracks, places, interpolation: Interpolation::default() }))
+        Ok(Some(Self { origin, interval_s, tracks, places: Vec::new(), interpolation: Interpolation::default() }))
     }
 
     /// First and last time.
@@ -161,22 +189,38 @@ impl Timeline {
 
     /// Times over which each satellite is there without a gap.
     pub fn stretches_s(&self) -> BTreeMap<Link, Vec<(f64, f64)>> {
-        let whole = |a: &(f64, State), b: &(f64, State)| b.0 - a.0 <= GAP * self.interval_s;
-        let ends = |nodes: &[(f64, State)]| Some((nodes.first()?.0, nodes.last()?.0));
+        let whole = |a: &(f64, Ray), b: &(f64, Ray)| b.0 - a.0 <= GAP * self.interval_s;
+        let ends = |nodes: &[(f64, Ray)]| Some((nodes.first()?.0, nodes.last()?.0));
         let of = |track: &Track| track.nodes.chunk_by(whole).filter_map(ends).collect();
         self.tracks.iter().map(|(link, track)| (*link, of(track))).collect()
     }
 
     /// A satellite at a time; `None` where it is not there on both sides.
     pub fn state(&self, link: &Link, t_s: f64) -> Option<State> {
-        let nodes = &self.tracks.get(link)?.nodes;
-        let (a, b) = around(nodes, t_s)?;
-        (b.0 - a.0 <= GAP * self.interval_s).then(|| between(link, a, b, t_s))
+        let Track { nodes, seen } = self.tracks.get(link)?;
+        let place = before(nodes, t_s)?;
+        let (a, b) = (nodes.get(place)?, nodes.get(place + 1)?);
+        let Ray { range_m, carrier_cycles, doppler_hz } =
+            (b.0 - a.0 <= GAP * self.interval_s).then(|| between(link, a, b, t_s))?;
+        let u = (t_s - a.0) / (b.0 - a.0);
+        let line = |of: fn(&Seen) -> f64| {
+            let [x, y] = [place, place + 1].map(|place| of(seen.get(place).unwrap_or(&Seen::UNKNOWN)));
+            x + (y - x) * u
+        };
+        Some(State {
+            range_m,
+            carrier_cycles,
+            doppler_hz,
+            cn0_dbhz: line(|seen| seen.cn0_dbhz),
+            effective_dbhz: line(|seen| seen.effective_dbhz),
+            elevation_deg: line(|seen| seen.elevation_deg),
+        })
     }
 
     /// Antenna and sampler's clock at a time within the truth.
     pub fn place(&self, t_s: f64) -> Option<Place> {
-        let (a, b) = around(&self.places, t_s)?;
+        let place = before(&self.places, t_s)?;
+        let (a, b) = (self.places.get(place)?, self.places.get(place + 1)?);
         if b.0 - a.0 > GAP * self.interval_s {
             return None;
         }
@@ -222,11 +266,11 @@ impl Timeline {
 /// Something at a time.
 type At<T> = (f64, T);
 
-/// The rows on either side of a time.
-fn around<T>(nodes: &[At<T>], t_s: f64) -> Option<(&At<T>, &At<T>)> {
+/// Where the row before a time is that has one after it.
+fn before<T>(nodes: &[At<T>], t_s: f64) -> Option<usize> {
     let after = nodes.partition_point(|node| node.0 <= t_s);
     let after = if after == nodes.len() && nodes.last().is_some_and(|last| last.0 == t_s) { after - 1 } else { after };
-    Some((nodes.get(after.checked_sub(1)?)?, nodes.get(after)?))
+    after.checked_sub(1).filter(|_| after < nodes.len())
 }
 
 /// Weights of value and rate at both ends of an interval of unit length, and those of the derivative.
@@ -245,7 +289,7 @@ impl Cubic {
     }
 }
 
-fn between(link: &Link, a: &(f64, State), b: &(f64, State), t_s: f64) -> State {
+fn between(link: &Link, a: &At<Ray>, b: &At<Ray>, t_s: f64) -> Ray {
     let h_s = b.0 - a.0;
     let u = (t_s - a.0) / h_s;
     let cubic = Cubic::at(u);
@@ -259,15 +303,11 @@ fn between(link: &Link, a: &(f64, State), b: &(f64, State), t_s: f64) -> State {
     let wavelength_m = link.wavelength_m();
     let range_rise = far.range_m - near.range_m;
     let range_rates = (wavelength_m * carrier_rates.0, wavelength_m * carrier_rates.1);
-    let line = |x: f64, y: f64| x + (y - x) * u;
-    State {
+    Ray {
         range_m: near.range_m + blend(&cubic.value, range_rise, range_rates),
         carrier_cycles: near.carrier_cycles + blend(&cubic.value, carrier_rise, carrier_rates),
         doppler_hz: -(cubic.rate[2] * carrier_rise / h_s
             + cubic.rate[1] * carrier_rates.0
             + cubic.rate[3] * carrier_rates.1),
-        cn0_dbhz: line(near.cn0_dbhz, far.cn0_dbhz),
-        effective_dbhz: line(near.effective_dbhz, far.effective_dbhz),
-        elevation_deg: line(near.elevation_deg, far.elevation_deg),
     }
 }

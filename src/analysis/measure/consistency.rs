@@ -10,12 +10,13 @@
 use nalgebra::{Cholesky, Matrix3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use std::collections::HashMap;
 
+use crate::analysis::error::JudgeError;
 use crate::analysis::measure::errors::Errors;
 use crate::analysis::measure::independent::Correlated;
-use crate::analysis::read::Run;
-use crate::analysis::statistics::mean;
+use crate::analysis::read::spill_store::{SpillRow, Words};
+use crate::analysis::read::{Run, Table};
+use crate::analysis::statistics::Sum;
 use crate::gnss::record::Fix;
 
 /// Degrees of freedom of one fix.
@@ -70,11 +71,35 @@ pub struct NormalisedError {
     pub nees: f64,
 }
 
+impl SpillRow<()> for NormalisedError {
+    const WORDS: usize = 9;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.extend([self.sample, self.time_s.to_bits()]);
+        words.extend([self.east_m, self.north_m, self.up_m].map(f64::to_bits));
+        words.extend([self.sigma_east_m, self.sigma_north_m, self.sigma_up_m, self.nees].map(f64::to_bits));
+    }
+
+    fn take((): (), words: &mut Words<'_>) -> Self {
+        Self {
+            sample: words.word(),
+            time_s: words.number(),
+            east_m: words.number(),
+            north_m: words.number(),
+            up_m: words.number(),
+            sigma_east_m: words.number(),
+            sigma_north_m: words.number(),
+            sigma_up_m: words.number(),
+            nees: words.number(),
+        }
+    }
+}
+
 /// A run's covariance against its errors.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug)]
 pub struct Consistency {
     /// Every fix that states a covariance.
-    pub rows: Vec<NormalisedError>,
+    pub rows: Table<NormalisedError>,
     /// Mean of the normalised errors squared; 3 where the covariance is right.
     pub nees_mean: Option<f64>,
     /// How many independent fixes the mean is worth.
@@ -92,14 +117,19 @@ pub const TWO_SIGMA_SHARE: f64 = 0.954_499_736;
 
 impl Consistency {
     /// Measures it.
-    pub fn measure(run: &Run, errors: &Errors) -> Self {
-        let fixes: HashMap<u64, &Fix> = run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
-        let (mut rows, mut white) = (Vec::new(), [Vec::new(), Vec::new(), Vec::new()]);
-        for error in &errors.positions {
-            let Some(fix) = fixes.get(&error.sample) else { continue };
-            let Some(factor) = factor(fix) else { continue };
+    ///
+    /// # Errors
+    /// [`JudgeError`] where rows cannot be read or put away.
+    pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
+        let mut fixes = run.fixes.finder()?;
+        let (mut rows, mut white) = (Table::new(errors.positions.directory()), [Vec::new(), Vec::new(), Vec::new()]);
+        let [mut squares, mut within] = [Sum::default(); 2];
+        for error in errors.positions.cursor() {
+            let error = error?;
+            let Some(fix) = fixes.get(error.sample) else { continue };
+            let Some(factor) = factor(&fix) else { continue };
             let Some(whitened) = factor.l().solve_lower_triangular(&error.enu_m) else { continue };
-            rows.push(NormalisedError {
+            let row = NormalisedError {
                 sample: error.sample,
                 time_s: error.time_s,
                 east_m: error.enu_m.x,
@@ -109,12 +139,18 @@ impl Consistency {
                 sigma_north_m: fix.sigma_north_m,
                 sigma_up_m: fix.sigma_up_m,
                 nees: whitened.norm_squared(),
-            });
+            };
+            squares.add(row.nees);
+            let axes = [(row.east_m, row.sigma_east_m), (row.north_m, row.sigma_north_m), (row.up_m, row.sigma_up_m)];
+            for (error, sigma) in axes {
+                within.add(if error.abs() <= 2.0 * sigma { 1.0 } else { 0.0 });
+            }
+            rows.push(row)?;
             for (axis, value) in white.iter_mut().zip(whitened.iter()) {
                 axis.push(*value);
             }
         }
-        let nees_mean = mean(&rows.iter().map(|row| row.nees).collect::<Vec<_>>());
+        let nees_mean = squares.mean();
         // The three axes are three series of one kind; each holds a third of the values.
         let independent = Correlated::about_zero(&white).map(|found| (found.independent() / FREEDOM).max(1.0));
         let band = independent.and_then(band);
@@ -123,14 +159,7 @@ impl Consistency {
             mean if mean < low => Calibration::Pessimistic,
             _ => Calibration::Consistent,
         });
-        let within = rows
-            .iter()
-            .flat_map(|row| {
-                [(row.east_m, row.sigma_east_m), (row.north_m, row.sigma_north_m), (row.up_m, row.sigma_up_m)]
-            })
-            .map(|(error, sigma)| if error.abs() <= 2.0 * sigma { 1.0 } else { 0.0 });
-        let within_two_sigma = mean(&within.collect::<Vec<_>>());
-        Self { rows, nees_mean, independent, band, verdict, within_two_sigma }
+        Ok(Self { rows, nees_mean, independent, band, verdict, within_two_sigma: within.mean() })
     }
 }
 

@@ -6,14 +6,15 @@
 //! multipath, and beside it is what only the truth shows, the code's error. Bands of elevation are ten
 //! degrees wide; errors in them are without the epoch's common part of their signal.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::measure::errors::{Errors, Link, SignalError};
-use crate::analysis::read::Run;
-use crate::analysis::statistics::{Sum, mean, percentile, rms, std};
+use crate::analysis::read::{Numbers, Run};
+use crate::analysis::statistics::Sum;
 use crate::gnss::satellite::Sv;
 
 /// Width of a band of elevation.
@@ -99,28 +100,36 @@ pub struct Elevations {
     pub bands: Vec<Band>,
 }
 
-/// The points of a satellite.
+/// Shows `see` the points of a satellite.
 ///
 /// # Errors
-/// [`JudgeError::Read`] where spilled rows cannot be read.
-pub fn points(run: &Run, errors: &Errors, link: Link) -> Result<Vec<Point>, JudgeError> {
-    let elevations: HashMap<u64, f64> = run.seen(link.sv, |row| (row.sample, row.elevation_deg))?.into_iter().collect();
-    let rows = errors.signals.rows(link)?;
-    let one = |(row, multipath_m): (&SignalError, f64)| {
-        Some(Point {
+/// [`JudgeError::Read`] where spilled rows cannot be read, and those of `see`.
+pub fn points(
+    run: &Run,
+    errors: &Errors,
+    link: Link,
+    mut see: impl FnMut(Point) -> Result<(), JudgeError>,
+) -> Result<(), JudgeError> {
+    let Some(mut sky) = run.seen_at(link.sv)? else { return Ok(()) };
+    let mut common = errors.common(link.signal)?;
+    let mut arcs = Arcs::default();
+    errors.signals.each(link, |row| arcs.add(&link, &row))?;
+    let mut arcs = arcs.means();
+    for row in errors.signals.cursor(link) {
+        let row = row?;
+        let multipath_m = arcs.departure_m(&link, &row);
+        let Some(sky) = sky.get(row.sample) else { continue };
+        see(Point {
             time_s: row.time_s,
-            elevation_deg: *elevations.get(&row.sample)?,
-            code_m: errors
-                .common_m(link.signal, row.sample)
-                .filter(|(_, count)| *count > 1)
-                .map(|it| row.code_m - it.0),
+            elevation_deg: sky.elevation_deg,
+            code_m: common.of_several(row.sample).map(|common_m| row.code_m - common_m),
             carrier_cycles: row.carrier_cycles,
             doppler_hz: row.doppler_hz,
             cn0_db: row.cn0_dbhz - row.cn0_effective_dbhz,
             multipath_m,
-        })
-    };
-    Ok(rows.iter().zip(multipath_m(&link, &rows)).filter_map(one).collect())
+        })?;
+    }
+    Ok(())
 }
 
 impl Elevations {
@@ -129,47 +138,73 @@ impl Elevations {
     /// # Errors
     /// As [`points`].
     pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
+        let directory = errors.signals.directory();
         let mut satellites = Vec::new();
         let mut layers: BTreeMap<i64, Layer> = BTreeMap::new();
         for link in errors.signals.keys() {
-            let points = points(run, errors, link)?;
-            for point in &points {
-                layers.entry((point.elevation_deg / BAND_DEG).floor() as i64).or_default().add(point);
-            }
-            satellites.push(Satellite::of(link, &points));
+            let mut values = Values::new(directory);
+            points(run, errors, link, |point| {
+                let number = (point.elevation_deg / BAND_DEG).floor() as i64;
+                layers.entry(number).or_insert_with(|| Layer::new(directory)).add(&point)?;
+                values.add(&point)
+            })?;
+            satellites.push(values.satellite(link)?);
         }
-        Ok(Self { satellites, bands: layers.into_iter().map(|(number, layer)| layer.band(number)).collect() })
+        let bands = layers.into_iter().map(|(number, layer)| layer.band(number)).collect::<Result<_, _>>()?;
+        Ok(Self { satellites, bands })
     }
 }
 
-impl Satellite {
-    fn of(Link { sv, signal }: Link, points: &[Point]) -> Self {
-        let of = |of: fn(&Point) -> f64| points.iter().map(of).collect::<Vec<f64>>();
-        let code: Vec<f64> = points.iter().filter_map(|point| point.code_m).collect();
-        let (doppler, cn0) = (of(|p| p.doppler_hz), of(|p| p.cn0_db));
-        Self {
+/// A satellite in the making.
+struct Values {
+    elevation_deg: Sum,
+    code_m: Numbers,
+    carrier_cycles: Numbers,
+    doppler_hz: Numbers,
+    cn0_db: Numbers,
+    multipath_m: Sum,
+}
+
+impl Values {
+    fn new(directory: &Path) -> Self {
+        let [code_m, carrier_cycles, doppler_hz, cn0_db] = std::array::from_fn(|_| Numbers::new(directory));
+        let [elevation_deg, multipath_m] = [Sum::default(); 2];
+        Self { elevation_deg, code_m, carrier_cycles, doppler_hz, cn0_db, multipath_m }
+    }
+
+    fn add(&mut self, point: &Point) -> Result<(), JudgeError> {
+        self.elevation_deg.add(point.elevation_deg);
+        point.code_m.map_or(Ok(()), |code_m| self.code_m.push(code_m))?;
+        self.carrier_cycles.push(point.carrier_cycles)?;
+        self.doppler_hz.push(point.doppler_hz)?;
+        self.cn0_db.push(point.cn0_db)?;
+        self.multipath_m.add(point.multipath_m);
+        Ok(())
+    }
+
+    fn satellite(&self, Link { sv, signal }: Link) -> Result<Satellite, JudgeError> {
+        let std = |numbers: &Numbers| Ok::<_, JudgeError>(numbers.std()?.map(|(sigma, _)| sigma));
+        Ok(Satellite {
             sv,
             signal: signal.name,
-            observations: points.len(),
-            elevation_mean_deg: mean(&of(|p| p.elevation_deg)),
-            code_mean_m: mean(&code),
-            code_sigma_m: std(&code),
-            carrier_sigma_cycles: std(&of(|p| p.carrier_cycles)),
-            doppler_mean_hz: mean(&doppler),
-            doppler_sigma_hz: std(&doppler),
-            cn0_bias_db: mean(&cn0),
-            cn0_sigma_db: std(&cn0),
-            multipath_rms_m: rms(&of(|p| p.multipath_m)),
-        }
+            observations: self.carrier_cycles.len(),
+            elevation_mean_deg: self.elevation_deg.mean(),
+            code_mean_m: self.code_m.mean()?,
+            code_sigma_m: std(&self.code_m)?,
+            carrier_sigma_cycles: std(&self.carrier_cycles)?,
+            doppler_mean_hz: self.doppler_hz.mean()?,
+            doppler_sigma_hz: std(&self.doppler_hz)?,
+            cn0_bias_db: self.cn0_db.mean()?,
+            cn0_sigma_db: std(&self.cn0_db)?,
+            multipath_rms_m: self.multipath_m.rms(),
+        })
     }
 }
 
 /// A band in the making.
-#[derive(Default)]
 struct Layer {
     observations: usize,
-    /// For the one figure that needs all values.
-    code_m: Vec<f64>,
+    code_m: Numbers,
     carrier_cycles: Sum,
     doppler_hz: Sum,
     cn0_db: Sum,
@@ -177,42 +212,85 @@ struct Layer {
 }
 
 impl Layer {
-    fn add(&mut self, point: &Point) {
+    fn new(directory: &Path) -> Self {
+        let [carrier_cycles, doppler_hz, cn0_db, multipath_m] = [Sum::default(); 4];
+        let code_m = Numbers::new(directory);
+        Self { observations: 0, code_m, carrier_cycles, doppler_hz, cn0_db, multipath_m }
+    }
+
+    fn add(&mut self, point: &Point) -> Result<(), JudgeError> {
         self.observations += 1;
-        self.code_m.extend(point.code_m);
         self.carrier_cycles.add(point.carrier_cycles);
         self.doppler_hz.add(point.doppler_hz);
         self.cn0_db.add(point.cn0_db);
         self.multipath_m.add(point.multipath_m);
+        point.code_m.map_or(Ok(()), |code_m| self.code_m.push(code_m))
     }
 
-    fn band(self, number: i64) -> Band {
-        let magnitudes: Vec<f64> = self.code_m.iter().map(|code_m| code_m.abs()).collect();
-        Band {
+    fn band(&self, number: i64) -> Result<Band, JudgeError> {
+        Ok(Band {
             from_deg: number as f64 * BAND_DEG,
             // A table may hold any elevation.
             to_deg: (number as f64 + 1.0) * BAND_DEG,
             observations: self.observations,
-            code_rms_m: rms(&self.code_m),
-            code_p95_m: percentile(&magnitudes, 0.95),
+            code_rms_m: self.code_m.rms()?,
+            code_p95_m: self.code_m.size_percentile(0.95)?,
             carrier_rms_cycles: self.carrier_cycles.rms(),
             doppler_rms_hz: self.doppler_hz.rms(),
             cn0_bias_db: self.cn0_db.mean(),
             multipath_rms_m: self.multipath_m.rms(),
-        }
+        })
     }
 }
 
-/// P − λφ − 2I of each row, about the mean of its arc. Errors are against the truth, whose code minus carrier
-/// is 2I and a constant, so that their difference is the combination already.
-fn multipath_m(link: &Link, rows: &[SignalError]) -> Vec<f64> {
-    let mut found = Vec::with_capacity(rows.len());
-    for arc in rows.chunk_by(|a, b| b.locked_s > a.locked_s) {
-        let combined: Vec<f64> = arc.iter().map(|row| row.code_m - row.carrier_cycles * link.wavelength_m()).collect();
-        let middle = mean(&combined).unwrap_or(0.0);
-        found.extend(combined.into_iter().map(|value| value - middle));
+/// P − λφ − 2I of each row. Errors are against the truth, whose code minus carrier is 2I and a constant, so
+/// that their difference is the combination already.
+fn combined_m(link: &Link, row: &SignalError) -> f64 {
+    row.code_m - row.carrier_cycles * link.wavelength_m()
+}
+
+/// Means of the combination over the arcs of a satellite, one after the other.
+#[derive(Default)]
+struct Arcs {
+    locked_s: Option<f64>,
+    sums: Vec<Sum>,
+}
+
+impl Arcs {
+    fn add(&mut self, link: &Link, row: &SignalError) {
+        if self.locked_s.replace(row.locked_s).is_none_or(|before_s| !goes_on(before_s, row)) {
+            self.sums.push(Sum::default());
+        }
+        if let Some(sum) = self.sums.last_mut() {
+            sum.add(combined_m(link, row));
+        }
     }
-    found
+
+    fn means(self) -> ArcMeans {
+        ArcMeans { locked_s: None, means_m: self.sums.into_iter(), mean_m: 0.0 }
+    }
+}
+
+/// Whether an arc goes on with a row, by the lock of the one before.
+fn goes_on(before_s: f64, row: &SignalError) -> bool {
+    row.locked_s > before_s
+}
+
+/// Those means on a second way through the rows.
+struct ArcMeans {
+    locked_s: Option<f64>,
+    means_m: std::vec::IntoIter<Sum>,
+    mean_m: f64,
+}
+
+impl ArcMeans {
+    /// The combination of the next row, about the mean of its arc.
+    fn departure_m(&mut self, link: &Link, row: &SignalError) -> f64 {
+        if self.locked_s.replace(row.locked_s).is_none_or(|before_s| !goes_on(before_s, row)) {
+            self.mean_m = self.means_m.next().and_then(|sum| sum.mean()).unwrap_or(0.0);
+        }
+        combined_m(link, row) - self.mean_m
+    }
 }
 
 #[cfg(test)]
@@ -235,8 +313,11 @@ mod tests {
             locked_s: sample as f64,
         };
         let link = L1_CA.link(Sv::gps(3));
-        let rows = vec![row(1, 101.0, 0.0), row(2, 103.0, 0.0)];
-        assert_eq!(multipath_m(&link, &rows), vec![-1.0, 1.0]);
+        let rows = [row(1, 101.0, 0.0), row(2, 103.0, 0.0)];
+        let mut arcs = Arcs::default();
+        rows.iter().for_each(|row| arcs.add(&link, row));
+        let mut arcs = arcs.means();
+        assert_eq!(rows.iter().map(|row| arcs.departure_m(&link, row)).collect::<Vec<_>>(), vec![-1.0, 1.0]);
         let point = |elevation_deg: f64, code_m: f64| Point {
             time_s: 0.0,
             elevation_deg,
@@ -247,12 +328,15 @@ mod tests {
             multipath_m: code_m,
         };
         let points = [point(5.0, 3.0), point(8.0, -3.0), point(42.0, 1.0)];
-        let (mut low, mut high) = (Layer::default(), Layer::default());
-        points[..2].iter().for_each(|point| low.add(point));
-        high.add(&points[2]);
-        let bands = [low.band(0), high.band(4)];
+        let place = tempfile::tempdir().unwrap();
+        let (mut low, mut high) = (Layer::new(place.path()), Layer::new(place.path()));
+        points[..2].iter().for_each(|point| low.add(point).unwrap());
+        high.add(&points[2]).unwrap();
+        let bands = [low.band(0).unwrap(), high.band(4).unwrap()];
         assert_eq!((bands[0].from_deg, bands[0].observations, bands[1].to_deg), (0.0, 2, 50.0));
         assert_eq!((bands[0].code_rms_m, bands[1].cn0_bias_db), (Some(3.0), Some(-0.5)));
-        assert!((Satellite::of(link, &points).code_mean_m.unwrap() - 1.0 / 3.0).abs() < 1e-12);
+        let mut values = Values::new(place.path());
+        points.iter().for_each(|point| values.add(point).unwrap());
+        assert!((values.satellite(link).unwrap().code_mean_m.unwrap() - 1.0 / 3.0).abs() < 1e-12);
     }
 }

@@ -3,15 +3,13 @@
 //! The truth has a delay on each signal's carrier; (f/1575.42 MHz)² of that carrier brings it to the
 //! receiver's. Limits: delays between the receiver's own bands count as its error.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
-use crate::analysis::read::Run;
-use crate::analysis::statistics::{mean, percentile, rms};
+use crate::analysis::read::{Numbers, Run};
+use crate::analysis::statistics::Sum;
 use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::record::{IonosphereRow, SkyRow};
+use crate::gnss::record::SkyRow;
 
 /// `ionosphere` in `summary.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -34,22 +32,23 @@ impl Ionosphere {
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn of(run: &Run) -> Result<Option<Self>, JudgeError> {
-        let (mut errors_m, mut true_m, mut stated_m) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut errors_m, [mut true_m, mut stated_m]) =
+            (Numbers::new(run.ionosphere.directory()), [Sum::default(); 2]);
         for sv in run.ionosphere.keys() {
             let on_l1 = |row: SkyRow| {
                 let ratio = row.link().carrier_hz() / L1_CA.carrier_hz(sv);
-                (row.sample, ratio * ratio * row.ionosphere_m)
+                ratio * ratio * row.ionosphere_m
             };
-            let delays_m: BTreeMap<u64, f64> = run.seen(sv, on_l1)?.into_iter().collect();
-            run.ionosphere.each(sv, |row: IonosphereRow| {
-                let Some(delay_m) = delays_m.get(&row.sample) else { return };
-                errors_m.push(row.delay_m - delay_m);
-                true_m.push(*delay_m);
-                stated_m.push(row.sigma_m);
-            })?;
+            let Some(mut delays) = run.seen_at(sv)? else { continue };
+            for row in run.ionosphere.cursor(sv) {
+                let row = row?;
+                let Some(delay_m) = delays.get(row.sample).map(on_l1) else { continue };
+                errors_m.push(row.delay_m - delay_m)?;
+                true_m.add(delay_m);
+                stated_m.add(row.sigma_m);
+            }
         }
-        let sizes_m: Vec<f64> = errors_m.iter().map(|error_m| error_m.abs()).collect();
-        let figures = (mean(&true_m), rms(&errors_m), percentile(&sizes_m, 0.95), rms(&stated_m));
+        let figures = (true_m.mean(), errors_m.rms()?, errors_m.size_percentile(0.95)?, stated_m.rms());
         let (Some(true_mean_m), Some(error_rms_m), Some(error_p95_m), Some(stated_rms_m)) = figures else {
             return Ok(None);
         };

@@ -14,12 +14,12 @@ use serde::Serialize;
 use crate::analysis::error::JudgeError;
 pub use crate::analysis::expect::loops::{Loop, Settings, motion_error_deg};
 use crate::analysis::expect::loops::{Stresses, Theory};
-use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::expect::timeline::Timeline;
 use crate::analysis::measure::errors::{Errors, Link, PULL_IN_S, SignalError};
 use crate::analysis::measure::independent::Correlated;
-use crate::analysis::read::Run;
+use crate::analysis::read::{Numbers, Run};
 use crate::analysis::statistics::{mean, median};
+use crate::gnss::record::TrackingRow;
 
 /// One loop of one satellite: a row of `jitter.csv`. Sigmas and limits are in `unit`: chips, degrees or
 /// hertz.
@@ -114,25 +114,33 @@ impl Jitter {
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
         let Some(settings) = Settings::of(run) else { return Ok(Self::default()) };
-        let access = MultipleAccess::new(run);
         let mut rows = Vec::new();
         for link in &errors.signals.keys().collect::<Vec<_>>() {
-            let all = errors.signals.rows(*link)?;
-            let stretches = settled(&all, |row| run.scene.expect.bounded(row.time_s));
-            if stretches.iter().map(Vec::len).sum::<usize>() < 10 {
+            let (past, span) = settled(errors, *link, |row| run.scene.expect.bounded(row.time_s))?;
+            if past.len() < 10 {
                 continue;
             }
-            let updates = updates(run, *link, &stretches)?;
-            let times: Vec<f64> = updates.iter().map(|row| row.integration_s).collect();
-            let Some(update_s) = median(&times) else { continue };
+            let steps: Vec<f64> = past.windows(2).map(|two| two[1].time_s - two[0].time_s).collect();
+            let usual_s = median(&steps).unwrap_or(0.0);
+            drop(steps);
+            let whole = |a: &Past, b: &Past| b.locked_s > a.locked_s && b.time_s - a.time_s < 1.5 * usual_s;
+            let stretches: Vec<&[Past]> = past.chunk_by(whole).collect();
+            let spans: Vec<(u64, u64)> =
+                stretches.iter().filter_map(|rows| Some((rows.first()?.sample, rows.last()?.sample))).collect();
+            let of_updates = |of: &dyn Fn(&TrackingRow) -> Option<f64>| of_updates(run, *link, &spans, of);
+            let Some(update_s) = of_updates(&|row| Some(row.integration_s))?.percentile(0.5)? else { continue };
             let Some(theory) = Theory::new(run, settings, link, update_s) else { continue };
             // Times of samples by the sampler's clock are near enough to GPS time here.
-            let span = (all.first(), all.last());
-            let (Some(first), Some(last)) = span else { continue };
-            let Some(timeline) = Timeline::of(run, &access, *link)? else { continue };
-            let stresses = Stresses::new(&theory, &timeline, link, (first.time_s, last.time_s));
+            let Some(timeline) = Timeline::of(run, *link)? else { continue };
+            let stresses = Stresses::new(&theory, &timeline, link, span);
+            drop(timeline);
             for which in [Loop::Dll, Loop::Pll, Loop::Fll] {
-                rows.extend(row(link, which, &stretches, &updates, &theory, &stresses));
+                let put_out = of_updates(&|row| {
+                    let whole = (row.integration_s - theory.update_s).abs() < 1e-9;
+                    whole.then(|| put_out(which, row))
+                })?;
+                let raw_sigma = put_out.std()?.map(|(sigma, _)| sigma);
+                rows.extend(row(link, which, &stretches, raw_sigma, &theory, &stresses));
             }
         }
         Ok(Self { rows })
@@ -156,73 +164,87 @@ impl Jitter {
     }
 }
 
-/// Stretches of observations past their pull-in, without interruption, where the scene does not expect any
-/// errors.
-fn settled(all: &[SignalError], bounded: impl Fn(&SignalError) -> bool) -> Vec<Vec<SignalError>> {
+/// What is taken of an observation past its pull-in.
+#[derive(Clone, Copy)]
+struct Past {
+    sample: u64,
+    time_s: f64,
+    locked_s: f64,
+    cn0_dbhz: f64,
+    code_m: f64,
+    carrier_cycles: f64,
+    doppler_hz: f64,
+}
+
+/// Observations past their pull-in where the scene does not expect any errors, and the times of the first and
+/// the last of all.
+fn settled(
+    errors: &Errors,
+    link: Link,
+    bounded: impl Fn(&SignalError) -> bool,
+) -> Result<(Vec<Past>, (f64, f64)), JudgeError> {
     // A scene that expects them throughout is measured all the same.
-    let any = all.iter().any(&bounded);
-    let past: Vec<SignalError> =
-        all.iter().filter(|row| row.locked_s >= PULL_IN_S && (bounded(row) || !any)).copied().collect();
-    let steps: Vec<f64> = past.windows(2).map(|two| two[1].time_s - two[0].time_s).collect();
-    let usual_s = median(&steps).unwrap_or(0.0);
-    past.chunk_by(|a, b| b.locked_s > a.locked_s && b.time_s - a.time_s < 1.5 * usual_s).map(<[_]>::to_vec).collect()
-}
-
-/// What a loop update put out.
-struct Update {
-    integration_s: f64,
-    dll_chips: f64,
-    pll_cycles: f64,
-    fll_hz: f64,
-}
-
-/// Loop updates within those stretches, pull-in left out.
-fn updates(run: &Run, link: Link, stretches: &[Vec<SignalError>]) -> Result<Vec<Update>, JudgeError> {
-    let spans: Vec<(u64, u64)> =
-        stretches.iter().filter_map(|rows| Some((rows.first()?.sample, rows.last()?.sample))).collect();
-    let mut found = Vec::new();
-    run.tracking.each(link, |row| {
-        let update = Update {
-            integration_s: row.integration_s,
-            dll_chips: row.dll_discriminator_chips,
-            pll_cycles: row.pll_discriminator_cycles,
-            fll_hz: row.fll_discriminator_hz,
-        };
-        found.extend(spans.iter().any(|(from, to)| (*from..=*to).contains(&row.sample)).then_some(update));
+    let (mut any, mut span) = (false, None);
+    errors.signals.each(link, |row| {
+        any |= bounded(&row);
+        span = Some((span.map_or(row.time_s, |(first_s, _)| first_s), row.time_s));
     })?;
+    let mut past = Vec::new();
+    errors.signals.each(link, |row| {
+        let SignalError { sample, time_s, locked_s, cn0_dbhz, code_m, carrier_cycles, doppler_hz, .. } = row;
+        let is_past = locked_s >= PULL_IN_S && (bounded(&row) || !any);
+        past.extend(is_past.then_some(Past { sample, time_s, locked_s, cn0_dbhz, code_m, carrier_cycles, doppler_hz }));
+    })?;
+    Ok((past, span.unwrap_or_default()))
+}
+
+/// What a loop puts out in an update, in its unit.
+fn put_out(which: Loop, row: &TrackingRow) -> f64 {
+    match which {
+        Loop::Dll => row.dll_discriminator_chips,
+        Loop::Pll => 360.0 * row.pll_discriminator_cycles,
+        Loop::Fll => row.fll_discriminator_hz,
+    }
+}
+
+/// What `of` makes of the loop updates within those spans.
+fn of_updates(
+    run: &Run,
+    link: Link,
+    spans: &[(u64, u64)],
+    of: &dyn Fn(&TrackingRow) -> Option<f64>,
+) -> Result<Numbers, JudgeError> {
+    let mut found = Numbers::new(run.tracking.directory());
+    for row in run.tracking.cursor(link) {
+        let row = row?;
+        if let Some(value) = of(&row).filter(|_| spans.iter().any(|(from, to)| (*from..=*to).contains(&row.sample))) {
+            found.push(value)?;
+        }
+    }
     Ok(found)
 }
 
 fn row(
     link: &Link,
     which: Loop,
-    stretches: &[Vec<SignalError>],
-    updates: &[Update],
+    stretches: &[&[Past]],
+    raw_sigma: Option<f64>,
     theory: &Theory,
     stresses: &Stresses,
 ) -> Option<LinkJitter> {
-    let error = |row: &SignalError| match which {
+    let error = |row: &Past| match which {
         Loop::Dll => row.code_m / theory.chip_m,
         Loop::Pll => 360.0 * row.carrier_cycles,
         Loop::Fll => row.doppler_hz,
     };
-    let groups: Vec<Vec<f64>> = stretches.iter().map(|rows| rows.iter().map(error).collect()).collect();
-    let all: Vec<f64> = groups.iter().flatten().copied().collect();
-    let middle = mean(&all)?;
+    let all: Vec<f64> = stretches.iter().copied().flatten().map(error).collect();
+    let (middle, values) = (mean(&all)?, all.len());
+    drop(all);
     let centred: Vec<Vec<f64>> =
-        groups.iter().map(|group| group.iter().map(|value| value - middle).collect()).collect();
+        stretches.iter().map(|rows| rows.iter().map(|row| error(row) - middle).collect()).collect();
     let found = Correlated::about_zero(&centred)?;
     let sigma = found.variance().sqrt();
-    let put_out: Vec<f64> = updates
-        .iter()
-        .filter(|row| (row.integration_s - theory.update_s).abs() < 1e-9)
-        .map(|row| match which {
-            Loop::Dll => row.dll_chips,
-            Loop::Pll => 360.0 * row.pll_cycles,
-            Loop::Fll => row.fll_hz,
-        })
-        .collect();
-    let cn0_dbhz = mean(&stretches.iter().flatten().map(|row| row.cn0_dbhz).collect::<Vec<_>>())?;
+    let cn0_dbhz = mean(&stretches.iter().copied().flatten().map(|row| row.cn0_dbhz).collect::<Vec<_>>())?;
     let (raw_theory, thermal) = theory.noise(which, libm::pow(10.0, cn0_dbhz / 10.0));
     let oscillator_theory = theory.oscillator(which);
     let (stress_rms, stress_max) = (stresses.of(which).rms(), stresses.of(which).max);
@@ -240,9 +262,9 @@ fn row(
         },
         cn0_dbhz,
         integration_s: theory.update_s,
-        raw_sigma: crate::analysis::statistics::std(&put_out),
-        raw_theory_sigma: (!put_out.is_empty()).then_some(raw_theory),
-        values: all.len(),
+        raw_sigma,
+        raw_theory_sigma: raw_sigma.map(|_| raw_theory),
+        values,
         independent: found.independent(),
         mean: middle,
         sigma,

@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
+use crate::analysis::error::JudgeError;
 use crate::analysis::read::Run;
 use crate::gnss::facts::Interference;
 use crate::gnss::record::{InterferenceRow, LineRow};
@@ -38,15 +39,19 @@ pub struct Lines {
 
 impl Lines {
     /// `None` where the receiver did not look, and where there was nothing to see and nothing reported.
-    pub fn of(run: &Run) -> Option<Self> {
-        let told = run.lines.as_ref()?;
-        if told.is_empty() && run.interference.is_empty() {
-            return None;
-        }
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
+    pub fn of(run: &Run) -> Result<Option<Self>, JudgeError> {
+        let Some(told) = run.lines.as_ref().filter(|told| !told.is_empty() || !run.interference.is_empty()) else {
+            return Ok(None);
+        };
         let rate_hz = run.scene.sample_rate_hz;
         // The truth is written at intervals: within one of a second is what is true of it.
-        let ticks: BTreeSet<u64> = run.trajectory.iter().map(|row| row.sample).collect();
-        let interval = ticks.iter().zip(ticks.iter().skip(1)).map(|(a, b)| b - a).min().unwrap_or(0) as f64;
+        let mut ticks = run.trajectory.map(|row| row.sample)?;
+        ticks.sort_unstable();
+        ticks.dedup();
+        let interval = ticks.windows(2).map(|two| two[1] - two[0]).min().unwrap_or(0) as f64;
         let second = |first: u64| {
             let (low, high) = (first as f64 - (interval - rate_hz).max(0.0), first as f64 + rate_hz.max(interval));
             move |sample: u64| (low..high).contains(&(sample as f64))
@@ -86,7 +91,7 @@ impl Lines {
         let found = |first: &&u64| told.iter().any(|line| (line.sample.abs_diff(**first) as f64) < 0.5 * rate_hz);
         let errors: Vec<(f64, f64)> = told.iter().filter_map(nearest).collect();
         let largest = |of: fn(&(f64, f64)) -> f64| errors.iter().map(of).max_by(f64::total_cmp);
-        Some(Self {
+        Ok(Some(Self {
             told: told.len(),
             false_told: told
                 .iter()
@@ -97,7 +102,7 @@ impl Lines {
             frequency_error_max_hz: largest(|error| error.0),
             resolution_hz: told.iter().map(|line| line.resolution_hz).max_by(f64::total_cmp),
             jn0_error_max_db: largest(|error| error.1),
-        })
+        }))
     }
 }
 

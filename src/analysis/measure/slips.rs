@@ -10,6 +10,7 @@
 //! tenth of a second apart, can show.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
@@ -21,7 +22,7 @@ use crate::analysis::measure::errors::{Errors, Link, SLIP_CYCLES, SignalError, f
 use crate::analysis::measure::jitter::{Settings, motion_error_deg};
 use crate::analysis::read::Run;
 use crate::analysis::statistics::median;
-use crate::gnss::record::{Event, Observation};
+use crate::gnss::record::Event;
 
 /// A fall of the true C/N0 against its median over the run that counts as an obstruction or a fade.
 pub const FADE_DB: f64 = 6.0;
@@ -120,11 +121,11 @@ impl Slips {
         let links: BTreeSet<Link> = errors.signals.keys().chain(lost.map(|row| row.link())).collect();
         let mut rows = Vec::new();
         for link in links {
-            let found = breaks(run, link, &errors.signals.rows(link)?);
+            let found = breaks(run, link, &errors.signals.map(link, |row| Carrier::of(&row))?);
             if found.is_empty() {
                 continue;
             }
-            let known = Known::of(&evidence, link)?;
+            let known = Known::of(&evidence, link, &found)?;
             rows.extend(found.iter().map(|one| evidence.slip(link, one, known.as_ref())));
         }
         rows.sort_by(|a, b| (a.sample, &a.sv).cmp(&(b.sample, &b.sv)));
@@ -150,8 +151,22 @@ struct Break {
     size_cycles: Option<f64>,
 }
 
+/// What an observation says of a slip.
+#[derive(Clone, Copy)]
+struct Carrier {
+    sample: u64,
+    raw_cycles: f64,
+    locked_s: f64,
+}
+
+impl Carrier {
+    fn of(row: &SignalError) -> Self {
+        Self { sample: row.sample, raw_cycles: row.raw_cycles, locked_s: row.locked_s }
+    }
+}
+
 /// Losses of lock, then slips: those of the events, and those that the errors show.
-fn breaks(run: &Run, link: Link, all: &[SignalError]) -> Vec<Break> {
+fn breaks(run: &Run, link: Link, all: &[Carrier]) -> Vec<Break> {
     let of = |event: Event| {
         let own = run.events.iter().filter(move |row| row.link() == link && row.event == event);
         own.map(|row| row.sample)
@@ -169,7 +184,7 @@ fn breaks(run: &Run, link: Link, all: &[SignalError]) -> Vec<Break> {
 
 /// Difference of the carrier's constants on either side of a declared slip; `None` where a lock was lost in
 /// between or a side has no rows.
-fn size_across(all: &[SignalError], sample: u64, lost: &[u64]) -> Option<f64> {
+fn size_across(all: &[Carrier], sample: u64, lost: &[u64]) -> Option<f64> {
     let at = all.partition_point(|row| row.sample < sample);
     let (before, after) = all.split_at(at);
     // The first rows after an interruption come when the carrier is locked again.
@@ -177,15 +192,15 @@ fn size_across(all: &[SignalError], sample: u64, lost: &[u64]) -> Option<f64> {
     if lost.iter().any(|lost| (last.sample..=next.sample).contains(lost)) {
         return None;
     }
-    let carriers = |rows: &[SignalError]| median(&rows.iter().map(|row| row.raw_cycles).collect::<Vec<_>>());
+    let carriers = |rows: &[Carrier]| median(&rows.iter().map(|row| row.raw_cycles).collect::<Vec<_>>());
     let before = carriers(&before[before.len().saturating_sub(SIDE)..])?;
     let after = carriers(&after[..after.len().min(SIDE)])?;
     Some(after - before)
 }
 
 /// Samples and sizes of jumps that the receiver did not declare.
-fn undeclared(all: &[SignalError], declared: &[u64]) -> Vec<(u64, f64)> {
-    let broken = |a: &SignalError, b: &SignalError| {
+fn undeclared(all: &[Carrier], declared: &[u64]) -> Vec<(u64, f64)> {
+    let broken = |a: &Carrier, b: &Carrier| {
         b.locked_s < a.locked_s || declared.iter().any(|slip| (a.sample + 1..=b.sample).contains(slip))
     };
     let mut found = Vec::new();
@@ -217,28 +232,39 @@ struct Evidence<'r> {
     last: u64,
 }
 
+/// A satellite's strength at a sample.
+struct Strength {
+    sample: u64,
+    cn0_dbhz: f64,
+    effective_dbhz: f64,
+}
+
 /// What it knows of one satellite.
 struct Known {
-    rows: Vec<Observation>,
-    effective_dbhz: Vec<f64>,
+    rows: Vec<Strength>,
     usual_dbhz: f64,
     motion_deg: Vec<(f64, f64)>,
 }
 
 impl Known {
     /// `None` of a satellite that the truth does not have.
-    fn of(evidence: &Evidence<'_>, link: Link) -> Result<Option<Self>, JudgeError> {
+    fn of(evidence: &Evidence<'_>, link: Link, found: &[Break]) -> Result<Option<Self>, JudgeError> {
         let run = evidence.run;
-        let rows = run.truth.rows(link)?;
+        let rows = run.truth.map(link, |row| Strength {
+            sample: row.sample,
+            cn0_dbhz: row.cn0_dbhz,
+            effective_dbhz: evidence.access.effective_dbhz(&row),
+        })?;
         let Some(usual_dbhz) = median(&rows.iter().map(|row| row.cn0_dbhz).collect::<Vec<_>>()) else {
             return Ok(None);
         };
         let motion_deg = match evidence.settings.zip(update_s(run, link.signal)) {
-            Some((settings, update_s)) => motion_error_deg(run, &evidence.access, link, settings, update_s)?,
+            Some(choice) => motion_error_deg(run, link, choice, |at_s| {
+                found.iter().any(|one| evidence.before_s(run.time_s(one.sample)).contains(&at_s))
+            })?,
             None => Vec::new(),
         };
-        let effective_dbhz = rows.iter().map(|row| evidence.access.effective_dbhz(row)).collect();
-        Ok(Some(Self { rows, effective_dbhz, usual_dbhz, motion_deg }))
+        Ok(Some(Self { rows, usual_dbhz, motion_deg }))
     }
 }
 
@@ -252,6 +278,12 @@ impl<'r> Evidence<'r> {
             interval_s: run.truth_interval_s(),
             last: run.trajectory.last().map_or(0, |row| row.sample),
         }
+    }
+
+    /// Times at which the cause of what happened at a time is looked for: the channel notices after its own
+    /// loss time.
+    fn before_s(&self, time_s: f64) -> RangeInclusive<f64> {
+        time_s - (BEFORE_S + self.run.tracking_setting("loss_s").unwrap_or(0.0))..=time_s
     }
 
     fn slip(&self, link: Link, found: &Break, known: Option<&Known>) -> Slip {
@@ -273,23 +305,18 @@ impl<'r> Evidence<'r> {
             motion_deg: None,
             noise_3sigma_deg: None,
         };
-        let Some(Known { rows, effective_dbhz, usual_dbhz, motion_deg }) = known else {
+        let Some(Known { rows, usual_dbhz, motion_deg }) = known else {
             slip.cause = Cause::NotThere;
             return slip;
         };
-        // The channel notices after its own loss time.
-        let back_s = BEFORE_S + run.tracking_setting("loss_s").unwrap_or(0.0);
-        let within = |at: u64| (time_s - back_s..=time_s).contains(&run.time_s(at));
-        let near: Vec<(f64, f64)> = rows
-            .iter()
-            .zip(effective_dbhz)
-            .filter(|(row, _)| within(row.sample))
-            .map(|(row, effective_dbhz)| (row.cn0_dbhz, *effective_dbhz))
-            .collect();
+        let before_s = self.before_s(time_s);
+        let within = |at: u64| before_s.contains(&run.time_s(at));
+        let near = rows.iter().filter(|row| within(row.sample));
+        let near: Vec<(f64, f64)> = near.map(|row| (row.cn0_dbhz, row.effective_dbhz)).collect();
         slip.cn0_dbhz = near.iter().map(|(_, effective_dbhz)| *effective_dbhz).reduce(f64::min);
         let set_dbhz = near.iter().map(|(cn0_dbhz, _)| *cn0_dbhz).reduce(f64::min);
         slip.interference_db = near.iter().map(|(cn0_dbhz, effective_dbhz)| cn0_dbhz - effective_dbhz).reduce(f64::max);
-        let inside = motion_deg.iter().filter(|(t_s, _)| (time_s - back_s..=time_s).contains(t_s));
+        let inside = motion_deg.iter().filter(|(t_s, _)| before_s.contains(t_s));
         slip.motion_deg = inside.map(|(_, error)| error.abs()).reduce(f64::max);
         slip.noise_3sigma_deg = slip.cn0_dbhz.zip(self.settings.zip(update_s(self.run, link.signal))).map(
             |(dbhz, (settings, update_s))| {
@@ -328,7 +355,7 @@ mod tests {
     fn sizes_are_those_of_the_steps_and_what_is_declared_is_found_once() {
         let carrier: Vec<f64> =
             (0..60).map(|k| 7.3 + if k >= 20 { 0.5 } else { 0.0 } + if k >= 40 { -1.0 } else { 0.0 }).collect();
-        let all = arc(&carrier);
+        let all: Vec<Carrier> = arc(&carrier).iter().map(Carrier::of).collect();
         let found = undeclared(&all, &[]);
         assert_eq!(found.iter().map(|slip| slip.0).collect::<Vec<_>>(), vec![2000, 4000]);
         assert!((found[0].1 - 0.5).abs() < 1e-12 && (found[1].1 + 1.0).abs() < 1e-12, "{found:?}");

@@ -3,10 +3,9 @@
 //! A fix counts as captured when it lies nearer to what the first spoofer claims than to the truth and the
 //! two are further apart than the fixes' own scatter. Limits: one spoofer; its clock is not judged.
 
-use std::collections::HashMap;
-
 use serde::Serialize;
 
+use crate::analysis::error::JudgeError;
 use crate::analysis::read::Run;
 use crate::analysis::statistics::percentile;
 
@@ -39,44 +38,52 @@ pub struct Moved {
     pub claim_from_truth_m: f64,
 }
 
-/// The fixes for which the first spoofer claims something.
-pub fn moved(run: &Run) -> Vec<Moved> {
-    let truth: HashMap<u64, _> = run.trajectory.iter().map(|row| (row.sample, row.position_m())).collect();
-    let claims: HashMap<u64, _> = run.claimed.iter().map(|row| (row.sample, row.position_m())).collect();
-    let one = |fix: &crate::gnss::record::Fix| {
-        let (truth_m, claim_m) = (truth.get(&fix.sample)?, claims.get(&fix.sample)?);
-        Some(Moved {
+/// Shows `see` the fixes for which the first spoofer claims something.
+///
+/// # Errors
+/// [`JudgeError::Read`] where spilled rows cannot be read.
+pub fn moved(run: &Run, mut see: impl FnMut(Moved)) -> Result<(), JudgeError> {
+    let (mut truth, mut claims) = (run.trajectory.finder()?, run.claimed.finder()?);
+    run.fixes.each(|fix| {
+        let (Some(truth), Some(claim)) = (truth.get(fix.sample), claims.get(fix.sample)) else { return };
+        let (truth_m, claim_m) = (truth.position_m(), claim.position_m());
+        see(Moved {
             time_s: run.time_s(fix.sample),
             from_truth_m: (fix.position_m() - truth_m).norm(),
             from_claim_m: (fix.position_m() - claim_m).norm(),
             claim_from_truth_m: (claim_m - truth_m).norm(),
-        })
-    };
-    run.fixes.iter().filter_map(one).collect()
+        });
+    })
 }
 
 impl Spoofing {
     /// `None` in a run without a spoofer.
-    pub fn of(run: &Run) -> Option<Self> {
-        let claimed = || {
-            let truth: HashMap<u64, _> = run.trajectory.iter().map(|row| (row.sample, row.position_m())).collect();
-            let distance =
-                |row: &crate::gnss::record::TrajectoryRow| Some((row.position_m() - truth.get(&row.sample)?).norm());
-            run.claimed.iter().filter_map(distance).fold(0.0, f64::max)
-        };
+    ///
+    /// # Errors
+    /// As [`moved`].
+    pub fn of(run: &Run) -> Result<Option<Self>, JudgeError> {
         if run.claimed.is_empty() {
-            return None;
+            return Ok(None);
         }
-        let fixes = moved(run);
-        let apart: Vec<&Moved> = fixes.iter().filter(|fix| fix.claim_from_truth_m >= APART_M).collect();
-        let captured: Vec<f64> =
-            apart.iter().filter(|fix| fix.from_claim_m < fix.from_truth_m).map(|fix| fix.from_claim_m).collect();
-        let farthest = fixes.iter().map(|fix| fix.from_truth_m).max_by(f64::total_cmp);
-        Some(Self {
-            displacement_max_m: farthest,
-            claimed_displacement_max_m: claimed(),
-            captured_share: (!apart.is_empty()).then(|| captured.len() as f64 / apart.len() as f64),
+        let (mut truth, mut claimed_m) = (run.trajectory.finder()?, 0.0_f64);
+        run.claimed.each(|row| {
+            let truth = truth.get(row.sample);
+            claimed_m = truth.map_or(claimed_m, |truth| claimed_m.max((row.position_m() - truth.position_m()).norm()));
+        })?;
+        let (mut apart, mut captured, mut farthest_m) = (0_usize, Vec::new(), None);
+        moved(run, |fix| {
+            let farther = |most_m: &f64| most_m.total_cmp(&fix.from_truth_m).is_gt();
+            farthest_m = farthest_m.filter(farther).or(Some(fix.from_truth_m));
+            if fix.claim_from_truth_m >= APART_M {
+                apart += 1;
+                captured.extend((fix.from_claim_m < fix.from_truth_m).then_some(fix.from_claim_m));
+            }
+        })?;
+        Ok(Some(Self {
+            displacement_max_m: farthest_m,
+            claimed_displacement_max_m: claimed_m,
+            captured_share: (apart > 0).then(|| captured.len() as f64 / apart as f64),
             from_claim_p95_m: percentile(&captured, 0.95),
-        })
+        }))
     }
 }

@@ -27,9 +27,9 @@ pub struct Common {
     /// By how much every Doppler is higher.
     pub doppler_hz: f64,
     last: HashMap<Link, (u64, f64)>,
-    /// Sum and number, by epoch, of what each satellite's carrier gained on its pseudorange since the epoch
-    /// before, in metres a sample.
-    gains: HashMap<u64, (f64, u32)>,
+    /// Sample of each epoch in their order, with sum and number of what each satellite's carrier gained on
+    /// its pseudorange since the epoch before, in metres a sample.
+    gains: Vec<(u64, f64, u32)>,
     rate_hz: f64,
 }
 
@@ -84,9 +84,23 @@ impl Common {
         let apart_m = row.carrier_cycles * row.signal.wavelength_m(row.sv) - row.pseudorange_m;
         let before = self.last.insert(row.link(), (row.sample, apart_m));
         if let Some((sample, before_m)) = before.filter(|(sample, _)| row.sample > *sample) {
-            let (sum, count) = self.gains.entry(row.sample).or_default();
-            (*sum, *count) = (*sum + (apart_m - before_m) / (row.sample - sample) as f64, *count + 1);
+            let place = match self.gains.last() {
+                Some((last, ..)) if *last < row.sample => Err(self.gains.len()),
+                _ => self.place(row.sample),
+            };
+            let place = place.unwrap_or_else(|place| {
+                self.gains.insert(place, (row.sample, 0.0, 0));
+                place
+            });
+            if let Some((_, sum, count)) = self.gains.get_mut(place) {
+                (*sum, *count) = (*sum + (apart_m - before_m) / (row.sample - sample) as f64, *count + 1);
+            }
         }
+    }
+
+    /// Where the epoch of a sample is among the gains, or would be.
+    fn place(&self, sample: u64) -> Result<usize, usize> {
+        self.gains.binary_search_by_key(&sample, |gain| gain.0)
     }
 
     /// Carrier that an oscillator's offset takes from every satellite until a sample, in cycles (carriers
@@ -98,7 +112,8 @@ impl Common {
     /// Rate at which carriers gain on pseudoranges at a sample, wind-up and oscillator together: metres a
     /// second that a clock solved from Dopplers drifts more than the clock does.
     pub fn drift_mps(&self, sample: u64, wavelength_m: f64) -> f64 {
-        let both = self.gains.get(&sample).map_or(0.0, |(sum, count)| sum / f64::from(*count) * self.rate_hz);
+        let gain = self.place(sample).ok().and_then(|place| self.gains.get(place));
+        let both = gain.map_or(0.0, |(_, sum, count)| sum / f64::from(*count) * self.rate_hz);
         both - self.doppler_hz * wavelength_m
     }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::read::spill_store::SpillStore;
-use crate::analysis::statistics::mean;
+use crate::analysis::statistics::Sum;
 use crate::gnss::record::Observation;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal};
@@ -56,9 +56,13 @@ pub struct MeanSignal {
 pub(super) fn means(truth: &SpillStore<Link, Observation>) -> Result<Vec<MeanSignal>, JudgeError> {
     let mut all = Vec::new();
     for Link { sv, signal } in truth.keys() {
-        let rows = truth.rows(Link { sv, signal })?;
-        let of = |of: fn(&Observation) -> f64| mean(&rows.iter().map(of).collect::<Vec<_>>());
-        let means = (of(|row| row.doppler_hz), of(|row| libm::pow(10.0, row.cn0_dbhz / 10.0)), of(|row| row.cn0_dbhz));
+        let [mut doppler_hz, mut cn0_hz, mut cn0_dbhz] = [Sum::default(); 3];
+        truth.each(Link { sv, signal }, |row| {
+            doppler_hz.add(row.doppler_hz);
+            cn0_hz.add(libm::pow(10.0, row.cn0_dbhz / 10.0));
+            cn0_dbhz.add(row.cn0_dbhz);
+        })?;
+        let means = (doppler_hz.mean(), cn0_hz.mean(), cn0_dbhz.mean());
         let (Some(doppler_hz), Some(cn0_hz), Some(cn0_mean_dbhz)) = means else { continue };
         all.push(MeanSignal {
             sv,

@@ -85,21 +85,6 @@ pub(super) fn believable(path: &Path, line: u64, seconds: i64) -> Result<(), Jud
     Err(JudgeError::Line { path: path.to_owned(), line, what })
 }
 
-/// All rows of a CSV file whose times are believable.
-pub(super) fn dated<T: DeserializeOwned>(
-    path: &Path,
-    remedy: &'static str,
-    seconds: impl Fn(&T) -> i64,
-) -> Result<Vec<T>, JudgeError> {
-    let mut rows = Vec::new();
-    each(path, remedy, |line, row| {
-        believable(path, line, seconds(&row))?;
-        rows.push(row);
-        Ok(())
-    })?;
-    Ok(rows)
-}
-
 /// All rows of a CSV file that a run may lack.
 pub(super) fn optional<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, JudgeError> {
     match rows(path, "") {

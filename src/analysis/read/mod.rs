@@ -1,6 +1,6 @@
 //! Reading: everything that a run wrote, and the files of other receivers, as values.
 //!
-//! [`Run`] is a run's directory read once. Tables with a row for every satellite of every epoch go to a
+//! [`Run`] is a run's directory read once. Tables with a row an epoch, or for every satellite of one, go to a
 //! [`spill_store`], so that a long run takes little more memory than a short one. [`rinex_obs`] and [`nmea`]
 //! are the formats in which a receiver that this project did not write hands over its results. This room
 //! decides nothing: it refuses what is not a table, a number or a time, and knows no theory.
@@ -10,13 +10,20 @@ mod delay;
 mod emission;
 mod fault;
 mod files;
+pub mod fixes;
+pub mod levels;
 pub mod nmea;
+pub mod numbers;
 pub mod rinex_obs;
 mod rows;
 mod run;
 pub mod spill_store;
+pub mod table;
 
 pub use common::Common;
 pub use emission::{Emission, MeanSignal};
 pub use fault::Fault;
+pub use fixes::Fixes;
+pub use numbers::Numbers;
 pub use run::{PsdRow, Run, Speed};
+pub use table::Table;

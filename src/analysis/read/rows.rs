@@ -1,7 +1,7 @@
 //! How the rows of a run's long tables are put into a [`super::spill_store::SpillStore`].
 
 use crate::analysis::read::spill_store::{SpillRow, Words};
-use crate::gnss::record::{IonosphereRow, Observation, RayRow, SkyRow, TrackingRow};
+use crate::gnss::record::{IonosphereRow, Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 
@@ -78,6 +78,32 @@ impl SpillRow<Link> for SkyRow {
             satellite_clock_m: words.number(),
             ionosphere_m: words.number(),
             troposphere_m: words.number(),
+        }
+    }
+}
+
+impl SpillRow<()> for TrajectoryRow {
+    const WORDS: usize = 11;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.extend([self.sample, self.gps_s.cast_unsigned(), self.gps_fraction_s.to_bits()]);
+        words.extend([self.x_m, self.y_m, self.z_m, self.vx_mps, self.vy_mps, self.vz_mps].map(f64::to_bits));
+        words.extend([self.clock_bias_s, self.clock_drift].map(f64::to_bits));
+    }
+
+    fn take((): (), words: &mut Words<'_>) -> Self {
+        Self {
+            sample: words.word(),
+            gps_s: words.word().cast_signed(),
+            gps_fraction_s: words.number(),
+            x_m: words.number(),
+            y_m: words.number(),
+            z_m: words.number(),
+            vx_mps: words.number(),
+            vy_mps: words.number(),
+            vz_mps: words.number(),
+            clock_bias_s: words.number(),
+            clock_drift: words.number(),
         }
     }
 }
@@ -183,5 +209,19 @@ mod tests {
         back(link, &tracking, place);
         back(sky.link(), &sky, place);
         back(link, &ray, place);
+        let place_row = TrajectoryRow {
+            sample: 6,
+            gps_s: -7,
+            gps_fraction_s: 0.5,
+            x_m: 1.0,
+            y_m: 2.0,
+            z_m: 3.0,
+            vx_mps: 4.0,
+            vy_mps: 5.0,
+            vz_mps: 6.0,
+            clock_bias_s: 7.0,
+            clock_drift: 8.0,
+        };
+        back((), &place_row, place);
     }
 }

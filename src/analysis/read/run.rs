@@ -2,9 +2,9 @@
 //!
 //! Truth and estimate are CSV files of the rows in [`crate::gnss::record`]; the scene and the receiver's
 //! settings are JSON. Tables with a row for every satellite of every epoch go to spill stores, grouped by
-//! satellite; those with a row an epoch, and shorter ones, stay in memory.
+//! satellite, those with a row an epoch to spilled tables; shorter ones stay in memory.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -12,9 +12,12 @@ use serde_json::Value;
 
 use super::common::Common;
 use super::emission::{self, Emission, MeanSignal};
-use super::files::{believable, dated, each, json, missing, optional, rows, text};
+use super::files::{believable, each, json, missing, optional, rows, text};
 use crate::analysis::error::JudgeError;
-use crate::analysis::read::spill_store::SpillStore;
+use crate::analysis::read::fixes::Fixes;
+use crate::analysis::read::levels::{LevelFinder, Levels};
+use crate::analysis::read::spill_store::{Finder, SpillStore};
+use crate::analysis::read::table::Table;
 use crate::analysis::statistics::{mean, median};
 use crate::gnss::facts::{FrontEndFacts, SceneFacts};
 use crate::gnss::record::{
@@ -66,9 +69,9 @@ pub struct Run {
     /// Satellites in the truth's first epoch.
     pub in_view_at_start: BTreeSet<Sv>,
     /// Sum of C/N0 at a sample over the satellites that send a signal on the same carrier.
-    pub cn0_sums_hz: HashMap<(u64, Emission), f64>,
+    pub cn0_sums_hz: Levels<Emission>,
     /// C/N0 of a signal's strongest satellite at a sample.
-    pub cn0_most_hz: HashMap<(u64, &'static str), f64>,
+    pub cn0_most_hz: Levels<&'static Signal>,
     /// What satellites' carriers and front end have in common beside the clock.
     pub common: Common,
     /// Largest delays of the atmosphere.
@@ -80,20 +83,22 @@ pub struct Run {
     /// Reflected rays; none in a scene without multipath.
     pub rays: SpillStore<Link, RayRow>,
     /// The antenna's true places.
-    pub trajectory: Vec<TrajectoryRow>,
+    pub trajectory: Table<TrajectoryRow>,
+    /// Usual time between them.
+    truth_interval_s: f64,
     /// Parameters as sent.
     pub truth_navigation: Vec<NavigationRow>,
     /// Empty without interference.
     pub interference: Vec<InterferenceRow>,
     /// What the first spoofer claims; empty without one.
-    pub claimed: Vec<TrajectoryRow>,
+    pub claimed: Table<TrajectoryRow>,
     /// Signals that a search cannot tell from one of the truth, on the same carrier with the same code, by
     /// whose name they count: until its message says who a satellite is, a receiver takes either name.
     pub alike: BTreeMap<Link, Sv>,
     /// The receiver's observations.
     pub observations: SpillStore<Link, Observation>,
     /// The receiver's fixes.
-    pub fixes: Vec<Fix>,
+    pub fixes: Fixes,
     /// What its search found.
     pub acquisition: Vec<AcquisitionRow>,
     /// Its loops' updates.
@@ -156,9 +161,16 @@ impl Run {
             Err(error) => return Err(error),
         }
         read.truth_navigation = rows(&truth.join("navigation.csv"), TRUTH)?;
-        read.claimed = optional(&truth.join("claimed.csv"))?;
-        read.observations = observations(&rx.join("observations.csv"), RECEIVER, run, |_| ())?;
-        read.fixes = dated(&rx.join("fixes.csv"), RECEIVER, |row: &Fix| row.gps_s)?;
+        match each(&truth.join("claimed.csv"), "", |_, row: TrajectoryRow| read.claimed.push(row)) {
+            Ok(()) | Err(JudgeError::Missing { .. }) => {}
+            Err(error) => return Err(error),
+        }
+        read.observations = observations(&rx.join("observations.csv"), RECEIVER, run, |_| Ok(()))?;
+        let fixes = rx.join("fixes.csv");
+        each(&fixes, RECEIVER, |line, row: Fix| {
+            believable(&fixes, line, row.gps_s)?;
+            read.fixes.push(row)
+        })?;
         read.alike = alike(&read.truth.keys().collect::<Vec<_>>());
         read.acquisition = rows(&rx.join("acquisition.csv"), RECEIVER)?;
         read.acquisition.iter_mut().for_each(|row| row.sv = named(&read.alike, row.link()));
@@ -219,15 +231,17 @@ impl Run {
             let expected = "the offset of the first front end: Dopplers are judged against one of all";
             return Err(JudgeError::Scene { key: "front_end.local_oscillator", value: own_hz(other), expected });
         }
-        let (mut cn0_sums_hz, mut cn0_most_hz) = (HashMap::new(), HashMap::new());
+        let (mut cn0_sums_hz, mut cn0_most_hz) = (Levels::new(directory), Levels::new(directory));
         let mut common = Common::new(scene.sample_rate_hz);
         let observed = observations(&truth.join("observations.csv"), TRUTH, directory, |row| {
             let cn0_hz = libm::pow(10.0, row.cn0_dbhz / 10.0);
-            *cn0_sums_hz.entry((row.sample, Emission::of(row.link()))).or_insert(0.0) += cn0_hz;
-            let most_hz: &mut f64 = cn0_most_hz.entry((row.sample, row.signal.name)).or_insert(0.0);
-            *most_hz = most_hz.max(cn0_hz);
+            cn0_sums_hz.change(row.sample, Emission::of(row.link()), |sum_hz| sum_hz + cn0_hz)?;
+            cn0_most_hz.change(row.sample, row.signal, |most_hz| most_hz.max(cn0_hz))?;
             common.add(row);
+            Ok(())
         })?;
+        cn0_sums_hz.close()?;
+        cn0_most_hz.close()?;
         Self::fold(&mut scene, &Emission::all(observed.keys()))?;
         common.set_front_end(&scene, USUAL_SPACING_CHIPS, &|_| 0);
         let (mut ionosphere_m, mut troposphere_m) = (0.0_f64, 0.0_f64);
@@ -244,6 +258,16 @@ impl Run {
             }
             sky.push(row.link(), &row)
         })?;
+        let path = truth.join("trajectory.csv");
+        let (mut trajectory, mut samples) = (Table::new(directory), Vec::new());
+        each(&path, TRUTH, |line, row: TrajectoryRow| {
+            believable(&path, line, row.gps_s)?;
+            samples.push(row.sample);
+            trajectory.push(row)
+        })?;
+        let time_s = |sample: u64| sample as f64 / scene.sample_rate_hz;
+        let steps = samples.windows(2).map(|two| time_s(two[1]) - time_s(two[0]));
+        let truth_interval_s = median(&steps.collect::<Vec<_>>()).unwrap_or(0.0);
         Ok(Self {
             scene,
             scene_json: Value::Null,
@@ -259,13 +283,14 @@ impl Run {
             ionosphere_m,
             troposphere_m,
             rays: SpillStore::new(directory),
-            trajectory: dated(&truth.join("trajectory.csv"), TRUTH, |row: &TrajectoryRow| row.gps_s)?,
+            trajectory,
+            truth_interval_s,
             truth_navigation: Vec::new(),
             interference: optional(&truth.join("interference.csv"))?,
-            claimed: Vec::new(),
+            claimed: Table::new(directory),
             alike: BTreeMap::new(),
             observations: SpillStore::new(directory),
-            fixes: Vec::new(),
+            fixes: Fixes::new(directory),
             acquisition: Vec::new(),
             tracking: SpillStore::new(directory),
             update_s: None,
@@ -290,11 +315,40 @@ impl Run {
     ///
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
-    pub fn seen<U>(&self, sv: Sv, of: impl Fn(SkyRow) -> U) -> Result<Vec<U>, JudgeError> {
+    pub fn seen<U>(&self, sv: Sv, of: impl FnMut(SkyRow) -> U) -> Result<Vec<U>, JudgeError> {
+        self.seen_longest(sv).map_or(Ok(Vec::new()), |link| self.sky.map(link, of))
+    }
+
+    /// The same rows by their samples.
+    ///
+    /// # Errors
+    /// As [`SpillStore::finder`].
+    pub fn seen_at(&self, sv: Sv) -> Result<Option<Finder<'_, Link, SkyRow>>, JudgeError> {
+        self.seen_longest(sv).map(|link| self.sky.finder(link)).transpose()
+    }
+
+    fn seen_longest(&self, sv: Sv) -> Option<Link> {
         let own = self.sky.keys().filter(|link| link.sv == sv);
         // Of equal ones the first.
-        let longest = own.rev().max_by_key(|link| self.sky.count(link));
-        longest.map_or(Ok(Vec::new()), |link| self.sky.map(link, of))
+        own.rev().max_by_key(|link| self.sky.count(link))
+    }
+
+    /// That all rows could be read which were looked for by their samples.
+    ///
+    /// # Errors
+    /// As [`SpillStore::sound`].
+    pub fn sound(&self) -> Result<(), JudgeError> {
+        self.truth.sound()?;
+        self.sky.sound()?;
+        self.rays.sound()?;
+        self.observations.sound()?;
+        self.tracking.sound()?;
+        self.ionosphere.sound()?;
+        self.cn0_sums_hz.sound()?;
+        self.cn0_most_hz.sound()?;
+        self.trajectory.sound()?;
+        self.claimed.sound()?;
+        self.fixes.sound()
     }
 
     /// Seconds from sample 0 by the receiver's clock.
@@ -313,8 +367,8 @@ impl Run {
     }
 
     /// C/N0 of the strongest satellite at a sample.
-    pub fn strongest_dbhz(&self, sample: u64, signal: &Signal) -> f64 {
-        10.0 * libm::log10(self.cn0_most_hz.get(&(sample, signal.name)).copied().unwrap_or(1.0))
+    pub fn strongest_dbhz(most_hz: &mut LevelFinder<'_, &'static Signal>, sample: u64, signal: &'static Signal) -> f64 {
+        10.0 * libm::log10(most_hz.get(sample, signal).unwrap_or(1.0))
     }
 
     /// A satellite's signal in words: the satellite alone where the truth has one signal.
@@ -329,8 +383,7 @@ impl Run {
 
     /// Usual time between the truth's rows.
     pub fn truth_interval_s(&self) -> f64 {
-        let steps = self.trajectory.windows(2).map(|two| self.time_s(two[1].sample) - self.time_s(two[0].sample));
-        median(&steps.collect::<Vec<_>>()).unwrap_or(0.0)
+        self.truth_interval_s
     }
 
     /// Folds an IF above half the rate of real samples to its alias.
@@ -370,12 +423,12 @@ fn observations(
     path: &Path,
     remedy: &'static str,
     directory: &Path,
-    mut see: impl FnMut(&Observation),
+    mut see: impl FnMut(&Observation) -> Result<(), JudgeError>,
 ) -> Result<SpillStore<Link, Observation>, JudgeError> {
     let mut store = SpillStore::new(directory);
     each(path, remedy, |line, row: Observation| {
         believable(path, line, row.sent_s)?;
-        see(&row);
+        see(&row)?;
         store.push(row.link(), &row)
     })?;
     Ok(store)

@@ -2,10 +2,13 @@
 //!
 //! Tables come epoch by epoch and are needed satellite by satellite. A [`SpillStore`] collects the rows of
 //! each key until there are 256 of them, then appends them as plain words to a file without a name, which the
-//! system removes when the process ends, however it ends. Groups under 256 rows stay in memory. Limits: the
-//! rows of one key are read all at once; rows of a key keep their order, rows of different keys do not.
+//! system removes when the process ends, however it ends. Groups under 256 rows stay in memory. Rows of a key
+//! are read one after the other ([`SpillStore::each`], [`Cursor`]) or by their sample ([`Finder`]); a
+//! satellite's rows over a day are tens of megabytes, so that few should ask for all at once. Limits: rows of
+//! a key keep their order, rows of different keys do not; by their sample only those are found without being
+//! held whose samples ascend.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -16,7 +19,8 @@ use crate::analysis::error::JudgeError;
 /// Rows of a key that are kept in memory.
 const MOST_ROWS: usize = 256;
 
-/// What a store can take: a row as words of 64 bits, its key left out.
+/// What a store can take: a row as words of 64 bits, its key left out. The first word is its sample, by which
+/// it is found.
 pub trait SpillRow<K>: Sized {
     /// Words of a row.
     const WORDS: usize;
@@ -52,22 +56,43 @@ pub struct SpillStore<K, T> {
     /// Words in the file.
     filed: u64,
     stacks: BTreeMap<K, Stack>,
-    kind: std::marker::PhantomData<T>,
+    /// What a [`Finder`] could not read.
+    failed: Mutex<Option<io::Error>>,
+    kind: std::marker::PhantomData<fn() -> T>,
 }
 
 #[derive(Debug, Default)]
 struct Stack {
-    /// Where its full lots begin in the file, in words.
-    lots: Vec<u64>,
+    lots: Vec<Lot>,
     /// What is not in the file yet.
     words: Vec<u64>,
+    /// Sample of the newest row, and whether one came with the sample of the row before, or with a smaller
+    /// one.
+    last: Option<u64>,
+    repeats: bool,
+    falls: bool,
+}
+
+impl Stack {
+    fn ascends(&self) -> bool {
+        !self.repeats && !self.falls
+    }
+}
+
+/// A full lot of rows in the file.
+#[derive(Clone, Copy, Debug)]
+struct Lot {
+    /// Where it begins, in words.
+    start: u64,
+    /// Sample of its first row.
+    first: u64,
 }
 
 impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
     /// An empty one, whose file is made in that directory.
     pub fn new(directory: &Path) -> Self {
-        let (file, stacks) = (None, BTreeMap::new());
-        Self { directory: directory.to_owned(), file, filed: 0, stacks, kind: std::marker::PhantomData }
+        let (file, stacks, failed) = (None, BTreeMap::new(), Mutex::new(None));
+        Self { directory: directory.to_owned(), file, filed: 0, stacks, failed, kind: std::marker::PhantomData }
     }
 
     /// Where its file is made.
@@ -81,7 +106,12 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
     /// [`JudgeError::File`] where the file cannot be made or written.
     pub fn push(&mut self, key: K, row: &T) -> Result<(), JudgeError> {
         let stack = self.stacks.entry(key).or_default();
+        let begin = stack.words.len();
         row.put(&mut stack.words);
+        let sample = stack.words.get(begin).copied();
+        stack.repeats |= stack.last == sample;
+        stack.falls |= stack.last > sample;
+        stack.last = sample;
         if stack.words.len() < MOST_ROWS * T::WORDS {
             return Ok(());
         }
@@ -95,7 +125,7 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
             // Reading has left the place where it ends.
             file.seek(SeekFrom::Start(8 * self.filed)).and_then(|_| file.write_all(&bytes)).map_err(failed)?;
         }
-        stack.lots.push(self.filed);
+        stack.lots.push(Lot { start: self.filed, first: stack.words.first().copied().unwrap_or(0) });
         self.filed += stack.words.len() as u64;
         stack.words.clear();
         Ok(())
@@ -138,7 +168,7 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
     ///
     /// # Errors
     /// As [`Self::rows`].
-    pub fn map<U>(&self, key: K, of: impl Fn(T) -> U) -> Result<Vec<U>, JudgeError> {
+    pub fn map<U>(&self, key: K, mut of: impl FnMut(T) -> U) -> Result<Vec<U>, JudgeError> {
         let mut found = Vec::with_capacity(self.count(&key));
         self.each(key, |row| found.push(of(row)))?;
         Ok(found)
@@ -151,17 +181,63 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
     pub fn each(&self, key: K, mut see: impl FnMut(T)) -> Result<(), JudgeError> {
         let Some(stack) = self.stacks.get(&key) else { return Ok(()) };
         let mut show = |words: &[u64]| words.chunks(T::WORDS).for_each(|row| see(T::take(key, &mut Words(row.iter()))));
-        let mut lot = Vec::new();
-        for start in &stack.lots {
-            self.lot(*start, &mut lot).map_err(|source| JudgeError::Read { path: self.directory.clone(), source })?;
-            show(&lot);
+        let mut words = Vec::new();
+        for lot in &stack.lots {
+            self.lot(*lot, &mut words).map_err(|source| self.unreadable(source))?;
+            show(&words);
         }
         show(&stack.words);
         Ok(())
     }
 
+    /// The rows of a key one after the other.
+    pub fn cursor(&self, key: K) -> Cursor<'_, K, T> {
+        Cursor { store: self, key, lot: 0, words: Vec::new(), at: 0 }
+    }
+
+    /// The rows of a key by their samples.
+    ///
+    /// # Errors
+    /// As [`Self::rows`], of rows whose samples do not ascend: those are read here.
+    pub fn finder(&self, key: K) -> Result<Finder<'_, K, T>, JudgeError> {
+        let stack = self.stacks.get(&key);
+        let mut finder = Finder { store: self, stack, key, lot: None, words: Vec::new(), all: None };
+        if stack.is_some_and(|stack| !stack.ascends()) {
+            let mut all = HashMap::new();
+            let mut cursor = self.cursor(key);
+            while let Some(row) = cursor.words().transpose()? {
+                all.insert(row.first().copied().unwrap_or(0), row.to_vec());
+            }
+            finder.all = Some(all);
+        }
+        Ok(finder)
+    }
+
+    /// Whether the samples of a key's rows ascend.
+    pub fn ascends(&self, key: &K) -> bool {
+        self.stacks.get(key).is_none_or(Stack::ascends)
+    }
+
+    /// Whether no row of a key has a smaller sample than the one before.
+    pub fn is_ordered(&self, key: &K) -> bool {
+        self.stacks.get(key).is_none_or(|stack| !stack.falls)
+    }
+
+    /// That every [`Finder`] could read what it looked for.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where one could not.
+    pub fn sound(&self) -> Result<(), JudgeError> {
+        let failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner).take();
+        failed.map_or(Ok(()), |source| Err(self.unreadable(source)))
+    }
+
+    fn unreadable(&self, source: io::Error) -> JudgeError {
+        JudgeError::Read { path: self.directory.clone(), source }
+    }
+
     /// A lot of the file.
-    fn lot(&self, start: u64, words: &mut Vec<u64>) -> io::Result<()> {
+    fn lot(&self, Lot { start, .. }: Lot, words: &mut Vec<u64>) -> io::Result<()> {
         let Some(file) = &self.file else { return Ok(()) };
         let mut bytes = vec![0; 8 * MOST_ROWS * T::WORDS];
         {
@@ -173,6 +249,116 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
         let word = |bytes: &[u8]| bytes.try_into().map_or(0, u64::from_le_bytes);
         words.extend(bytes.chunks_exact(8).map(word));
         Ok(())
+    }
+}
+
+/// The rows of a key one after the other, of which a lot is held.
+pub struct Cursor<'s, K, T> {
+    store: &'s SpillStore<K, T>,
+    key: K,
+    /// The lot that comes next.
+    lot: usize,
+    words: Vec<u64>,
+    /// Words of this lot that have been shown.
+    at: usize,
+}
+
+impl<K: Copy + Ord, T: SpillRow<K>> Cursor<'_, K, T> {
+    /// The words of the next row.
+    fn words(&mut self) -> Option<Result<&[u64], JudgeError>> {
+        let stack = self.store.stacks.get(&self.key)?;
+        if self.at == self.words.len() {
+            (self.at, self.lot) = (0, self.lot + 1);
+            match stack.lots.get(self.lot - 1) {
+                Some(lot) => {
+                    if let Err(source) = self.store.lot(*lot, &mut self.words) {
+                        return Some(Err(self.store.unreadable(source)));
+                    }
+                }
+                None if self.lot == stack.lots.len() + 1 => self.words.clone_from(&stack.words),
+                None => return None,
+            }
+        }
+        let begin = self.at;
+        self.at = (begin + T::WORDS).min(self.words.len());
+        self.words.get(begin..self.at).filter(|row| !row.is_empty()).map(Ok)
+    }
+}
+
+impl<K: Copy + Ord, T: SpillRow<K>> Iterator for Cursor<'_, K, T> {
+    type Item = Result<T, JudgeError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let key = self.key;
+        Some(self.words()?.map(|words| T::take(key, &mut Words(words.iter()))))
+    }
+}
+
+/// The rows of a key by their samples: the lot in which it found one is held, so that samples are best asked
+/// for in their order. Of several rows of a sample it is the last.
+pub struct Finder<'s, K, T> {
+    store: &'s SpillStore<K, T>,
+    stack: Option<&'s Stack>,
+    key: K,
+    /// The lot that is held.
+    lot: Option<usize>,
+    words: Vec<u64>,
+    /// All rows, where samples do not ascend.
+    all: Option<HashMap<u64, Vec<u64>>>,
+}
+
+impl<K: Copy + Ord, T: SpillRow<K>> Finder<'_, K, T> {
+    /// The row of a sample; none where it cannot be read either, of which [`SpillStore::sound`] tells.
+    pub fn get(&mut self, sample: u64) -> Option<T> {
+        let key = self.key;
+        let take = |words: &[u64]| T::take(key, &mut Words(words.iter()));
+        if let Some(all) = &self.all {
+            return all.get(&sample).map(|words| take(words));
+        }
+        let (words, rows) = self.until(sample)?;
+        let row = words.get((rows - 1) * T::WORDS..rows * T::WORDS)?;
+        (row.first() == Some(&sample)).then(|| take(row))
+    }
+
+    /// The last row that is not after a sample.
+    pub fn until_sample(&mut self, sample: u64) -> Option<T> {
+        let last = self.before(sample.saturating_add(1))?;
+        self.get(last)
+    }
+
+    /// Sample of the last row before that one.
+    pub fn before(&mut self, sample: u64) -> Option<u64> {
+        if let Some(all) = &self.all {
+            return all.keys().copied().filter(|before| *before < sample).max();
+        }
+        let (words, rows) = self.until(sample.checked_sub(1)?)?;
+        words.get((rows - 1) * T::WORDS).copied()
+    }
+
+    /// The lot in which a sample lies or ends, and how many of its rows, one at least, are not after it.
+    fn until(&mut self, sample: u64) -> Option<(&[u64], usize)> {
+        let stack = self.stack?;
+        let words = if stack.words.first().is_some_and(|first| *first <= sample) {
+            &stack.words
+        } else {
+            let lot = stack.lots.partition_point(|lot| lot.first <= sample).checked_sub(1)?;
+            if self.lot != Some(lot) {
+                self.lot = None;
+                if let Err(source) = self.store.lot(*stack.lots.get(lot)?, &mut self.words) {
+                    *self.store.failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(source);
+                    return None;
+                }
+                self.lot = Some(lot);
+            }
+            &self.words
+        };
+        let at = |row: usize| words.get(row * T::WORDS).copied().unwrap_or(u64::MAX);
+        let (mut low, mut high) = (0, words.len() / T::WORDS);
+        while low < high {
+            let middle = low.midpoint(high);
+            (low, high) = if at(middle) <= sample { (middle + 1, high) } else { (low, middle) };
+        }
+        (low > 0).then_some((words.as_slice(), low))
     }
 }
 
@@ -220,6 +406,46 @@ mod tests {
         assert!(store.stacks.values().all(|stack| stack.words.len() < 2 * MOST_ROWS) && store.filed > 2 * 2500);
         // The file bears no name.
         assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn rows_are_found_by_their_samples_wherever_they_lie_and_in_whatever_order_they_came() {
+        let place = tempfile::tempdir().unwrap();
+        let row = |n: u64| Pair(3 * n, -1.0 / n as f64);
+        for disordered in [false, true] {
+            let mut store = SpillStore::new(place.path());
+            (1..=1000).for_each(|n| store.push(0, &row(n)).unwrap());
+            if disordered {
+                store.push(0, &Pair(300, 7.0)).unwrap();
+            }
+            assert_eq!(store.ascends(&0), !disordered);
+            let read: Vec<Pair> = store.cursor(0).map(Result::unwrap).collect();
+            assert_eq!(read, store.rows(0).unwrap());
+            let mut found = store.finder(0).unwrap();
+            // Forward, and backward as well.
+            for n in (1..=1000).chain((1..=1000).rev()) {
+                let expected = if disordered && n == 100 { Pair(300, 7.0) } else { row(n) };
+                assert_eq!((found.get(3 * n), found.get(3 * n + 1)), (Some(expected), None), "{n}");
+                assert_eq!(found.before(3 * n), (n > 1).then(|| 3 * n - 3), "{n}");
+            }
+            assert_eq!((found.get(0), found.before(9999)), (None, Some(3000)));
+            assert_eq!((store.finder(1).unwrap().get(3), store.cursor(1).count()), (None, 0));
+            // No more than a lot is held of rows that ascend.
+            assert!(disordered || found.words.len() <= 2 * MOST_ROWS && found.all.is_none());
+            store.sound().unwrap();
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_found_is_told_when_the_store_is_asked() {
+        let place = tempfile::tempdir().unwrap();
+        let mut store = SpillStore::new(place.path());
+        (0..600).for_each(|n| store.push(0, &Pair(n, 0.0)).unwrap());
+        store.file.as_mut().unwrap().get_mut().unwrap().set_len(8 * 600).unwrap();
+        let mut found = store.finder(0).unwrap();
+        assert!(found.get(100).is_some() && store.sound().is_ok());
+        assert!(found.get(400).is_none());
+        assert!(matches!(store.sound(), Err(JudgeError::Read { .. })));
     }
 
     #[test]

@@ -4,19 +4,19 @@
 //! σ, `histograms.csv` the histograms of the loops, `psd_theory.csv` the expected spectrum, `verdict.csv`
 //! what was judged.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::measure::elevation::Elevations;
+use crate::analysis::measure::errors::PositionError;
 use crate::analysis::measure::jitter::Jitter;
 use crate::analysis::measure::psd::Psd;
 use crate::analysis::measure::slips::{COLUMNS, Slips};
 use crate::analysis::show::plot::Judged;
 use crate::analysis::show::plot::jitter::{Histogram, loops};
-use crate::analysis::show::write::{Table, write_rows, write_whole};
+use crate::analysis::show::write::{Table, write_read_rows, write_rows, write_whole};
 use crate::gnss::record::Fix;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
@@ -98,9 +98,9 @@ pub(in crate::analysis) fn write_measured(
     slips: &Slips,
     jitter: &Jitter,
 ) -> Result<(), JudgeError> {
-    write_rows(&directory.join("clock.csv"), judged.clock.rows.iter())?;
+    write_read_rows(&directory.join("clock.csv"), judged.clock.rows.cursor())?;
     write_rows(&directory.join("allan.csv"), judged.clock.stability())?;
-    write_rows(&directory.join("honesty.csv"), judged.consistency.rows.iter())?;
+    write_read_rows(&directory.join("honesty.csv"), judged.consistency.rows.cursor())?;
     write_rows(&directory.join("satellites.csv"), elevations.satellites.iter())?;
     write_rows(&directory.join("elevation.csv"), elevations.bands.iter())?;
     write_slips(directory, slips)?;
@@ -119,9 +119,9 @@ pub(in crate::analysis) fn write(directory: &Path, judged: &Judged<'_>) -> Resul
     let mut errors = Table::create(&directory.join("errors.csv"))?;
     for link in judged.errors.signals.keys() {
         let Link { sv, signal } = link;
-        let mut written = Ok(());
-        judged.errors.signals.each(link, |row| {
-            let row = ErrorRow {
+        for row in judged.errors.signals.cursor(link) {
+            let row = row?;
+            errors.row(&ErrorRow {
                 sample: row.sample,
                 time_s: row.time_s,
                 sv,
@@ -133,19 +133,18 @@ pub(in crate::analysis) fn write(directory: &Path, judged: &Judged<'_>) -> Resul
                 cn0_true_dbhz: row.cn0_true_dbhz,
                 cn0_effective_dbhz: row.cn0_effective_dbhz,
                 locked_s: row.locked_s,
-            };
-            if written.is_ok() {
-                written = errors.row(&row);
-            }
-        })?;
-        written?;
+            })?;
+        }
     }
     errors.finish()?;
-    write_rows(&directory.join("position.csv"), positions(judged).into_iter())?;
+    let mut fixes = judged.run.fixes.finder()?;
+    let rows = judged.errors.positions.cursor();
+    let rows = rows.map(|error| error.map(|error| position(&error, fixes.get(error.sample).as_ref())));
+    write_read_rows(&directory.join("position.csv"), rows)?;
     let mut histograms = Table::create(&directory.join("histograms.csv"))?;
     for one in loops(judged) {
         let one = one?;
-        let histogram = Histogram::new(&one);
+        let histogram = Histogram::new(&one)?;
         for (bin, observations) in histogram.counts.iter().enumerate() {
             histograms.row(&HistogramRow {
                 r#loop: one.name,
@@ -170,29 +169,24 @@ pub(in crate::analysis) fn write(directory: &Path, judged: &Judged<'_>) -> Resul
     write_rows(&directory.join("verdict.csv"), judged.summary.details.verdict.csv_rows())
 }
 
-fn positions(judged: &Judged<'_>) -> Vec<PositionRow> {
-    let fixes: HashMap<u64, &Fix> = judged.run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
-    let row = |error: &crate::analysis::measure::errors::PositionError| {
-        let fix = fixes.get(&error.sample);
-        let of = |what: fn(&Fix) -> f64| fix.map(|fix| what(fix));
-        PositionRow {
-            sample: error.sample,
-            time_s: error.time_s,
-            east_m: error.enu_m.x,
-            north_m: error.enu_m.y,
-            up_m: error.enu_m.z,
-            clock_m: error.clock_m,
-            velocity_east_mps: error.velocity_enu_mps.x,
-            velocity_north_mps: error.velocity_enu_mps.y,
-            velocity_up_mps: error.velocity_enu_mps.z,
-            sigma_east_m: of(|fix| fix.sigma_east_m),
-            sigma_north_m: of(|fix| fix.sigma_north_m),
-            sigma_up_m: of(|fix| fix.sigma_up_m),
-            sigma_clock_m: of(|fix| fix.sigma_clock_m),
-            hdop: of(|fix| fix.hdop),
-            vdop: of(|fix| fix.vdop),
-            satellites: fix.map(|fix| fix.satellites),
-        }
-    };
-    judged.errors.positions.iter().map(row).collect()
+fn position(error: &PositionError, fix: Option<&Fix>) -> PositionRow {
+    let of = |what: fn(&Fix) -> f64| fix.map(what);
+    PositionRow {
+        sample: error.sample,
+        time_s: error.time_s,
+        east_m: error.enu_m.x,
+        north_m: error.enu_m.y,
+        up_m: error.enu_m.z,
+        clock_m: error.clock_m,
+        velocity_east_mps: error.velocity_enu_mps.x,
+        velocity_north_mps: error.velocity_enu_mps.y,
+        velocity_up_mps: error.velocity_enu_mps.z,
+        sigma_east_m: of(|fix| fix.sigma_east_m),
+        sigma_north_m: of(|fix| fix.sigma_north_m),
+        sigma_up_m: of(|fix| fix.sigma_up_m),
+        sigma_clock_m: of(|fix| fix.sigma_clock_m),
+        hdop: of(|fix| fix.hdop),
+        vdop: of(|fix| fix.vdop),
+        satellites: fix.map(|fix| fix.satellites),
+    }
 }

@@ -53,6 +53,16 @@ pub(crate) fn write_rows<T: Serialize>(path: &Path, mut rows: impl Iterator<Item
     table.finish()
 }
 
+/// The same of rows that are read while they are written.
+pub(crate) fn write_read_rows<T: Serialize>(
+    path: &Path,
+    mut rows: impl Iterator<Item = Result<T, JudgeError>>,
+) -> Result<(), JudgeError> {
+    let mut table = Table::create(path)?;
+    rows.try_for_each(|row| table.row(&row?))?;
+    table.finish()
+}
+
 /// The name under which a file is made.
 fn part(path: &Path) -> PathBuf {
     let mut part = OsString::from(".");

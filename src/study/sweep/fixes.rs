@@ -5,10 +5,9 @@
 //! says when a receiver that has locked can have an ephemeris (IS-GPS-200N, 20.3.3: subframes of 6 s, 1 to 3
 //! once in 30 s).
 
-use std::collections::HashMap;
-
 use nalgebra::Vector3;
 
+use crate::analysis::error::JudgeError;
 use crate::analysis::measure::consistency::Consistency;
 use crate::analysis::measure::errors::Errors;
 use crate::analysis::read::Run;
@@ -47,8 +46,8 @@ const SUBFRAME_S: f64 = 6.0;
 const FRAME_S: f64 = 30.0;
 
 /// A fix with its error.
-struct Judged<'r> {
-    fix: &'r Fix,
+struct Judged {
+    fix: Fix,
     enu_m: Vector3<f64>,
     speed_error_mps: f64,
     nees: Option<f64>,
@@ -58,27 +57,33 @@ struct Judged<'r> {
 pub struct Fixes<'r> {
     run: &'r Run,
     slips: usize,
-    rows: Vec<Judged<'r>>,
+    rows: Vec<Judged>,
 }
 
 impl<'r> Fixes<'r> {
     /// Joins fixes with their errors.
-    pub fn of(run: &'r Run, errors: &Errors) -> Self {
-        let fixes: HashMap<u64, &Fix> = run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
-        let consistency = Consistency::measure(run, errors);
-        let nees: HashMap<u64, f64> = consistency.rows.iter().map(|row| (row.sample, row.nees)).collect();
-        let judged = |error: &crate::analysis::measure::errors::PositionError| {
-            Some(Judged {
-                fix: fixes.get(&error.sample)?,
+    ///
+    /// # Errors
+    /// [`JudgeError`] where rows cannot be read or put away.
+    pub fn of(run: &'r Run, errors: &Errors) -> Result<Self, JudgeError> {
+        let consistency = Consistency::measure(run, errors)?;
+        let (mut fixes, mut nees, mut rows) = (run.fixes.finder()?, consistency.rows.finder()?, Vec::new());
+        errors.positions.each(|error| {
+            let Some(fix) = fixes.get(error.sample) else { return };
+            rows.push(Judged {
+                fix,
                 enu_m: error.enu_m,
                 speed_error_mps: error.velocity_enu_mps.norm(),
-                nees: nees.get(&error.sample).copied(),
-            })
-        };
-        Self { run, slips: errors.cycle_slips, rows: errors.positions.iter().filter_map(judged).collect() }
+                nees: nees.get(error.sample).map(|row| row.nees),
+            });
+        })?;
+        consistency.rows.sound()?;
+        run.sound()?;
+        errors.sound()?;
+        Ok(Self { run, slips: errors.cycle_slips, rows })
     }
 
-    fn with(&self, model: IonosphereModel) -> impl DoubleEndedIterator<Item = &Judged<'r>> {
+    fn with(&self, model: IonosphereModel) -> impl DoubleEndedIterator<Item = &Judged> {
         // What is broadcast, of whichever model.
         let of = |used| if used == IonosphereModel::NequickG { IonosphereModel::Broadcast } else { used };
         self.rows.iter().filter(move |row| of(row.fix.ionosphere) == model)
@@ -92,7 +97,7 @@ impl<'r> Fixes<'r> {
     fn step(&self) -> Option<(Vector3<f64>, &Fix)> {
         let before = self.with(IonosphereModel::Nominal).next_back()?;
         let after = self.with(IonosphereModel::Broadcast).next()?;
-        Some((after.enu_m - before.enu_m, before.fix))
+        Some((after.enu_m - before.enu_m, &before.fix))
     }
 
     /// When the last of subframes 1 to 3 that begins [`LOCK_S`] after the start or later has come from all

@@ -205,7 +205,7 @@ fn figures(here: &Path, truth: &Path, ear: &Ear, keep: &[String]) -> Result<Vec<
     let summary = Summary::new(&run, &errors, &Clock::measure(&run, &errors)?)?;
     let json = serde_json::to_value(&summary).map_err(|e| StudyError::Bug(e.to_string()))?;
     let places = places_s(&run)?;
-    let fixes = Fixes::of(&run, &errors);
+    let fixes = Fixes::of(&run, &errors)?;
     // Theory is of one channel: where signals or components differ it has nothing to say.
     let channel = alone(&run).map(|signal| {
         limits::channel_of(signal, &ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz)

@@ -11,7 +11,7 @@ pub mod receiver;
 pub mod satellite;
 pub mod timetable;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix4, Vector4};
 
@@ -102,16 +102,18 @@ pub struct Satellite {
 
 /// When things happened to a receiver's channels, however it reports them.
 pub trait Observed {
-    /// Times of a satellite's observations, in the epochs of the truth: samples.
+    /// Times of a satellite's observations, in the epochs of the truth: samples, sorted.
     ///
     /// # Errors
     /// Rows that cannot be read.
-    fn samples(&self, link: Link) -> Result<HashSet<u64>, JudgeError>;
+    fn samples(&self, link: Link) -> Result<Vec<u64>, JudgeError>;
 }
 
 impl Observed for Run {
-    fn samples(&self, link: Link) -> Result<HashSet<u64>, JudgeError> {
-        Ok(self.observations.map(link, |row| row.sample)?.into_iter().collect())
+    fn samples(&self, link: Link) -> Result<Vec<u64>, JudgeError> {
+        let mut samples = self.observations.map(link, |row| row.sample)?;
+        samples.sort_unstable();
+        Ok(samples)
     }
 }
 
@@ -141,7 +143,7 @@ impl Expectations {
         let due = |sample: u64| Due { sample, time_s: run.time_s(sample), ..Due::default() };
         let mut found = Self {
             satellites: BTreeMap::new(),
-            epochs: run.trajectory.iter().map(|row| due(row.sample)).collect(),
+            epochs: run.trajectory.map(|row| due(row.sample))?,
             receiver,
             first_fix_s: None,
             four_by_s: None,
@@ -162,7 +164,7 @@ impl Expectations {
                 faults: &run.scene.faults,
                 interval_s,
             };
-            counted.begin(link.sv);
+            counted.begin(link.sv, found.epochs.len());
             let one = found.satellite(run, &scene, (&access, &mut counted), link, in_space, observed)?;
             found.satellites.insert(link, one);
         }
@@ -179,44 +181,49 @@ impl Expectations {
         in_space: bool,
         observed: &impl Observed,
     ) -> Result<Satellite, JudgeError> {
-        let sky: HashMap<u64, (f64, f64)> =
-            run.seen(link.sv, |row| (row.sample, (row.azimuth_deg, row.elevation_deg)))?.into_iter().collect();
-        let rows: Vec<(u64, SatelliteEpoch)> = run.truth.map(link, |row| {
-            let elevation_deg = sky.get(&row.sample).map_or(90.0, |(_, elevation_deg)| *elevation_deg);
-            let expected = SatelliteEpoch {
+        let mut sky = run.seen_at(link.sv)?;
+        let mut look = |sample: u64| {
+            let row = sky.as_mut()?.get(sample)?;
+            Some((row.azimuth_deg, row.elevation_deg))
+        };
+        let mut most_hz = run.cn0_most_hz.finder();
+        let mut samples = Vec::with_capacity(run.truth.count(&link));
+        let plain: Vec<SatelliteEpoch> = run.truth.map(link, |row| {
+            let elevation_deg = look(row.sample).map_or(90.0, |(_, elevation_deg)| elevation_deg);
+            samples.push(row.sample);
+            SatelliteEpoch {
                 time_s: run.time_s(row.sample),
                 cn0_dbhz: row.cn0_dbhz,
                 effective_dbhz: access.effective_dbhz(&row) - self.receiver.cost_db,
-                strongest_dbhz: run.strongest_dbhz(row.sample, link.signal),
+                strongest_dbhz: Run::strongest_dbhz(&mut most_hz, row.sample, link.signal),
                 doppler_hz: row.doppler_hz,
                 above_mask: in_space || elevation_deg >= self.receiver.mask_deg,
-            };
-            (row.sample, expected)
+            }
         })?;
-        let strengths: Vec<f64> = rows.iter().map(|(_, row)| row.cn0_dbhz).collect();
+        let strengths: Vec<f64> = plain.iter().map(|row| row.cn0_dbhz).collect();
         let usual_dbhz = median(&strengths).unwrap_or(0.0);
+        drop(strengths);
         let healthy =
             self.message.says_healthy(link) || run.scene.faults.iter().any(|fault| fault.kind == FaultKind::Health);
-        let plain: Vec<SatelliteEpoch> = rows.iter().map(|(_, row)| *row).collect();
         let required = scene.required(link.sv, &plain, usual_dbhz, healthy);
         let seen = observed.samples(link)?;
-        let mut one = Satellite { epochs: rows.len(), usual_dbhz, ..Satellite::default() };
+        let mut one = Satellite { epochs: plain.len(), usual_dbhz, ..Satellite::default() };
         one.doppler_hz = plain.iter().map(|row| row.doppler_hz.abs()).fold(0.0, f64::max);
         let excuses: Vec<Excuse> = plain.iter().filter_map(|row| scene.excuse(link.sv, row, usual_dbhz)).collect();
         one.excuse = excuses.get(excuses.len() / 2).copied();
         let measured = self.measured();
         let dated_s = if link.signal.is_dated() { Some(f64::NEG_INFINITY) } else { counted.dated_s };
-        for ((sample, row), required) in rows.iter().zip(&required) {
+        for ((sample, row), required) in samples.iter().zip(&plain).zip(&required) {
             // What does not say its time has it once another signal of the satellite is observed.
             let dated = dated_s.is_some_and(|dated_s| row.time_s >= dated_s);
             let required = &if dated { *required } else { Required { observed: false, used: false, ..*required } };
             counted.date(link.signal, required, row.time_s);
             let Ok(at) = self.epochs.binary_search_by_key(sample, |due| due.sample) else { continue };
-            one.take(row, required, measured.contains_at(at, self), seen.contains(sample));
+            one.take(row, required, measured.contains_at(at, self), seen.binary_search(sample).is_ok());
             let Some(due) = self.epochs.get_mut(at) else { continue };
-            due.held += u32::from(required.held && counted.held.insert(*sample));
-            let used = required.used && counted.used.insert(*sample);
-            if let (true, Some((azimuth_deg, elevation_deg))) = (used, sky.get(sample)) {
+            due.held += u32::from(required.held && Counted::is_first(&mut counted.held, at));
+            let used = required.used && Counted::is_first(&mut counted.used, at);
+            if let (true, Some((azimuth_deg, elevation_deg))) = (used, look(*sample)) {
                 due.add(azimuth_deg.to_radians(), elevation_deg.to_radians());
             }
         }
@@ -262,12 +269,12 @@ impl Expectations {
     }
 }
 
-/// Samples at which a satellite counts already by another of its signals: a second one adds no direction.
+/// Epochs at which a satellite counts already by another of its signals: a second one adds no direction.
 #[derive(Default)]
 struct Counted {
     sv: Option<Sv>,
-    held: HashSet<u64>,
-    used: HashSet<u64>,
+    held: Vec<bool>,
+    used: Vec<bool>,
     /// Since when one of its signals that say their time must be observed. They come before those that do
     /// not, as signals are sorted.
     dated_s: Option<f64>,
@@ -280,12 +287,16 @@ impl Counted {
         }
     }
 
-    fn begin(&mut self, sv: Sv) {
+    fn begin(&mut self, sv: Sv, epochs: usize) {
         if self.sv.replace(sv) != Some(sv) {
-            self.held.clear();
-            self.used.clear();
+            (self.held, self.used) = (vec![false; epochs], vec![false; epochs]);
             self.dated_s = None;
         }
+    }
+
+    /// Whether an epoch was not counted before; it is from now on.
+    fn is_first(counted: &mut [bool], at: usize) -> bool {
+        counted.get_mut(at).is_some_and(|counted| !std::mem::replace(counted, true))
     }
 }
 

@@ -6,4 +6,5 @@
 
 pub mod links;
 pub mod ranges;
+mod settled;
 pub mod solution;

@@ -6,7 +6,8 @@
 //! Hatch's filter. Apart from these: chip edges between samples, and reflected rays. Limits: the difference
 //! of the receiver's troposphere from the true one is a stated share of it.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::BTreeMap;
+use std::iter::Peekable;
 
 use nalgebra::Vector3;
 
@@ -14,19 +15,20 @@ use crate::analysis::error::JudgeError;
 use crate::analysis::expect::due::satellite::{FADE_DB, is_stepping};
 use crate::analysis::expect::loops::{Theory, update_s};
 use crate::analysis::expect::message::Message;
-use crate::analysis::expect::multipath;
+use crate::analysis::expect::multipath::{self, Rays};
 use crate::analysis::expect::smoothing::Smoothing;
 use crate::analysis::expect::theory::edges;
 use crate::analysis::judge::forecast::links::CN0_DB;
 use crate::analysis::measure::errors::{Errors, SignalError};
 use crate::analysis::measure::jitter::{Loop, Settings};
 use crate::analysis::read::Run;
+use crate::analysis::read::spill_store::{Cursor, Finder};
 use crate::analysis::waveform::Edge;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
 use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::message::Message as Form;
-use crate::gnss::record::{Event, IonosphereModel, Observation, RayRow, SkyRow, TrajectoryRow};
+use crate::gnss::record::{Event, Fix, IonosphereModel, Observation, SkyRow, TrajectoryRow};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::{Link, Signal};
 use crate::gnss::time::GPST;
@@ -58,12 +60,11 @@ impl Choices {
         let position = run.receiver.get("settings")?.get("position")?;
         let number = |key: &str| position.get(key)?.as_f64();
         let word = |key: &str| position.get(key)?.as_str();
-        let used = |model: IonosphereModel| run.fixes.iter().any(|fix| fix.ionosphere == model);
         let ionosphere = match word("ionosphere")? {
             "none" => None,
             "nequick_g" => Some(Model::NequickG),
             "klobuchar" => Some(klobuchar(run)),
-            _ if used(IonosphereModel::NequickG) => Some(Model::NequickG),
+            _ if run.fixes.uses(IonosphereModel::NequickG) => Some(Model::NequickG),
             _ => Some(klobuchar(run)),
         };
         Some(Self {
@@ -167,11 +168,6 @@ pub struct Scene<'r> {
     pub message: Message,
     /// Names of the time scales of the run's signals, GPS time first.
     pub scales: Vec<&'static str>,
-    /// The truth's places by sample.
-    pub trajectory: HashMap<u64, &'r TrajectoryRow>,
-    /// Samples with a fix, and those of them that leave satellites out.
-    pub fixes: HashMap<u64, usize>,
-    excluded: HashMap<u64, HashSet<String>>,
     /// From when on each satellite's message is known, in short or whole, and while it says that it is
     /// unhealthy.
     known: BTreeMap<(Sv, &'static str), (u64, &'static Form)>,
@@ -207,16 +203,11 @@ impl<'r> Scene<'r> {
                 _ => {}
             }
         }
-        let names = |text: &str| text.split_whitespace().map(str::to_owned).collect::<HashSet<_>>();
-        let left_out = run.fixes.iter().filter(|fix| !fix.excluded.is_empty());
         Some(Self {
             run,
             choices: Choices::of(run)?,
             message: Message::of(run),
             scales: scales(run),
-            trajectory: run.trajectory.iter().map(|row| (row.sample, row)).collect(),
-            fixes: run.fixes.iter().map(|fix| fix.sample).zip(0..).collect(),
-            excluded: left_out.map(|fix| (fix.sample, names(&fix.excluded))).collect(),
             known,
             whole,
             health,
@@ -236,72 +227,40 @@ impl<'r> Scene<'r> {
         known && last.is_none_or(|(_, healthy)| *healthy)
     }
 
-    /// Whether a fix leaves the satellite out.
-    fn left_out(&self, sv: Sv, sample: u64) -> bool {
-        self.excluded.get(&sample).is_some_and(|names| names.contains(&sv.to_string()))
-    }
-
-    /// Gives every range of a satellite that a fix may use to `take`, with the number of that fix.
+    /// The ranges of a satellite's signal, fix by fix; none where the settings make no loop that holds it.
     ///
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
-    pub fn ranges(&self, errors: &Errors, link: Link, mut take: impl FnMut(usize, Forecast)) -> Result<(), JudgeError> {
+    pub fn ranges<'s>(&'s self, errors: &'s Errors, link: Link) -> Result<Option<Ranges<'s, 'r>>, JudgeError> {
         let update_s = self.choices.updates_s.get(link.signal);
         let theory = update_s.and_then(|update_s| Theory::new(self.run, self.choices.loops, &link, *update_s));
-        let Some(theory) = theory else { return Ok(()) };
-        let truth: HashMap<u64, Observation> = self.run.truth.map(link, |row| (row.sample, row))?.into_iter().collect();
-        let sky: HashMap<u64, SkyRow> = self.run.seen(link.sv, |row| (row.sample, row))?.into_iter().collect();
-        let rays = self.rays(link, &theory)?;
+        let (Some(theory), Some(sky)) = (theory, self.run.seen_at(link.sv)?) else { return Ok(None) };
         let smoothing = || Smoothing::new(self.choices.smoothing_s, self.choices.loops.dll_bandwidth_hz);
-        let (mut parting, mut reflected) = (smoothing(), smoothing());
-        let mut unmodelled = Rate::default();
-        let mut fades = Fades::default();
-        errors.signals.each(link, |row| {
-            let (Some(true_row), Some(sky)) = (truth.get(&row.sample), sky.get(&row.sample)) else { return };
-            let fading = fades.take(row.time_s, true_row.cn0_dbhz);
-            let parted_m = true_row.pseudorange_m - link.wavelength_m() * true_row.carrier_cycles;
-            let ray_m = rays.get(&row.sample).copied().unwrap_or(0.0);
-            let smooth = parting.take(row.time_s, row.locked_s, parted_m + ray_m);
-            let bounced = reflected.take(row.time_s, row.locked_s, ray_m.abs());
-            let Some(&fix) = self.fixes.get(&row.sample) else { return };
-            if !self.usable(link, row.sample) {
-                return;
-            }
-            let Some((one, phase_m)) = self.one(&theory, &row, true_row, sky) else { return };
-            let bounced_m = MULTIPATH_SHARE * bounced.value_m;
-            // A fix with one clock brought all ranges to its time.
-            let joined = self.run.fixes.get(fix).is_some_and(|fix| fix.clocks == Some(1));
-            let whole = Forecast {
-                clock: if joined { 0 } else { one.clock },
-                bias_m: one.bias_m + smooth.value_m - parted_m,
-                noise_m2: one.noise_m2 * smooth.variance_ratio + self.short_m2(link.sv, row.sample),
-                other_m2: one.other_m2 + bounced_m * bounced_m,
-                memory_s: smooth.memory_s,
-                rate_bias_mps: unmodelled.of(row.time_s, phase_m),
-                fading,
-                ..one
-            };
-            take(fix, whole);
-        })
-    }
-
-    /// The reflected rays' effect on the code at each sample.
-    fn rays(&self, link: Link, theory: &Theory) -> Result<HashMap<u64, f64>, JudgeError> {
-        let mut groups: HashMap<u64, Vec<(f64, f64, f64)>> = HashMap::new();
-        self.run.rays.each(link, |row: RayRow| {
-            groups.entry(row.sample).or_default().push(multipath::ray(&row, theory.chip_m));
-        })?;
-        let spacing = theory.spacing_chips();
-        Ok(groups
-            .into_iter()
-            .map(|(at, rays)| (at, theory.chip_m * multipath::error_chips(&theory.code, &rays, spacing)))
-            .collect())
+        Ok(Some(Ranges {
+            scene: self,
+            link,
+            name: link.sv.to_string(),
+            rows: errors.signals.cursor(link).peekable(),
+            truth: self.run.truth.finder(link)?,
+            sky,
+            rays: Rays::of(self.run, link, theory.chip_m)?,
+            theory,
+            parting: smoothing(),
+            reflected: smoothing(),
+            unmodelled: Rate::default(),
+            fades: Fades::default(),
+        }))
     }
 
     /// A range without smoothing; and, up to a constant, by how much its carrier is longer than what the
     /// message says.
-    fn one(&self, theory: &Theory, row: &SignalError, true_row: &Observation, sky: &SkyRow) -> Option<(Forecast, f64)> {
-        let place = self.trajectory.get(&row.sample)?;
+    fn one(
+        &self,
+        theory: &Theory,
+        row: &SignalError,
+        (true_row, sky): (&Observation, &SkyRow),
+        place: &TrajectoryRow,
+    ) -> Option<(Forecast, f64)> {
         let user = Geodetic::from_ecef(&place.position_m());
         let in_space = user.height_m >= SPACE_M;
         let elevation_rad = sky.elevation_deg.to_radians();
@@ -352,7 +311,7 @@ impl<'r> Scene<'r> {
             fading: false,
             slant: if in_space { 1.0 } else { 1.0 / sin.max(0.05) },
             near_mask: !in_space && elevation_rad < self.choices.mask_rad + MASK_SLACK_RAD,
-            excluded: self.left_out(true_row.sv, row.sample),
+            excluded: false,
         };
         Some((forecast, phase_m))
     }
@@ -369,6 +328,83 @@ impl<'r> Scene<'r> {
         let patterns = (row.doppler_hz / row.link().carrier_hz() * rate_hz).abs() * self.choices.smoothing_s.max(1.0);
         let left_m = self.edges_m.get(row.signal).copied().unwrap_or(0.0) / (1.0 + 2.0 * patterns);
         left_m * left_m
+    }
+}
+
+/// The ranges of a satellite's signal, fix by fix: what smoothing remembers of it, and its rows.
+pub struct Ranges<'s, 'r> {
+    scene: &'s Scene<'r>,
+    link: Link,
+    name: String,
+    theory: Theory,
+    rows: Peekable<Cursor<'s, Link, SignalError>>,
+    truth: Finder<'r, Link, Observation>,
+    sky: Finder<'r, Link, SkyRow>,
+    rays: Rays<'r>,
+    parting: Smoothing,
+    reflected: Smoothing,
+    unmodelled: Rate,
+    fades: Fades,
+}
+
+impl Ranges<'_, '_> {
+    /// Gives the ranges that a fix may use to `take`; fixes come in the order of their samples, with the true
+    /// place of each.
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
+    pub fn of_fix(
+        &mut self,
+        fix: &Fix,
+        place: Option<&TrajectoryRow>,
+        mut take: impl FnMut(Forecast),
+    ) -> Result<(), JudgeError> {
+        let due = |row: &Result<SignalError, JudgeError>| row.as_ref().map_or(true, |row| row.sample <= fix.sample);
+        while let Some(row) = self.rows.next_if(due) {
+            let row = row?;
+            if let Some(range) = self.range(&row, fix, place)? {
+                take(range);
+            }
+        }
+        Ok(())
+    }
+
+    /// Smoothing takes every row, a range is of the fix's alone.
+    fn range(
+        &mut self,
+        row: &SignalError,
+        fix: &Fix,
+        place: Option<&TrajectoryRow>,
+    ) -> Result<Option<Forecast>, JudgeError> {
+        let (Some(true_row), Some(sky)) = (self.truth.get(row.sample), self.sky.get(row.sample)) else {
+            return Ok(None);
+        };
+        let (scene, theory, link) = (self.scene, &self.theory, self.link);
+        let fading = self.fades.take(row.time_s, true_row.cn0_dbhz);
+        let parted_m = true_row.pseudorange_m - link.wavelength_m() * true_row.carrier_cycles;
+        let ray_m = match self.rays.at(row.sample)? {
+            [] => 0.0,
+            rays => theory.chip_m * multipath::error_chips(&theory.code, rays, theory.spacing_chips()),
+        };
+        let smooth = self.parting.take(row.time_s, row.locked_s, parted_m + ray_m);
+        let bounced = self.reflected.take(row.time_s, row.locked_s, ray_m.abs());
+        let Some(place) = place.filter(|_| row.sample == fix.sample && scene.usable(link, row.sample)) else {
+            return Ok(None);
+        };
+        let Some((one, phase_m)) = scene.one(theory, row, (&true_row, &sky), place) else { return Ok(None) };
+        let bounced_m = MULTIPATH_SHARE * bounced.value_m;
+        Ok(Some(Forecast {
+            // A fix with one clock brought all ranges to its time.
+            clock: if fix.clocks == Some(1) { 0 } else { one.clock },
+            bias_m: one.bias_m + smooth.value_m - parted_m,
+            noise_m2: one.noise_m2 * smooth.variance_ratio + scene.short_m2(link.sv, row.sample),
+            other_m2: one.other_m2 + bounced_m * bounced_m,
+            memory_s: smooth.memory_s,
+            rate_bias_mps: self.unmodelled.of(row.time_s, phase_m),
+            fading,
+            excluded: fix.excluded.split_whitespace().any(|name| name == self.name),
+            ..one
+        }))
     }
 }
 

@@ -3,9 +3,9 @@
 //!
 //! With rows h = (−sight, 1 at the place of the range's clock), weights W of the receiver's choices at the
 //! true C/N0 and N = Σ h W hᵀ: biases b become N⁻¹ Σ h W b, noise of covariance R becomes N⁻¹ (Σ h W R W hᵀ)
-//! N⁻¹, and N⁻¹ is what the receiver ought to state. One set of sums a fix is kept, whatever the number of
-//! satellites; of several clocks the first with ranges is the fix's. Limits: weights by the measured C/N0
-//! differ from these by its noise.
+//! N⁻¹, and N⁻¹ is what the receiver ought to state. Fixes are taken one after the other, with the rows of
+//! all satellites side by side, so that the sums of one are held; of several clocks the first with ranges is
+//! the fix's. Limits: weights by the measured C/N0 differ from these by its noise.
 //!
 //! Two bands of a satellite that the receiver combines are one range here too, with a₁ = f₁²/(f₁²−f₂²) and
 //! a₂ = 1 − a₁: what the ionosphere adds to either cancels, noise grows to √(a₁²σ₁² + a₂²σ₂²).
@@ -15,7 +15,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix4, Vector4};
 use super::ranges::{Forecast, Scene};
 use crate::analysis::error::JudgeError;
 use crate::analysis::measure::errors::Errors;
-use crate::gnss::record::IonosphereModel;
+use crate::analysis::read::spill_store::Words;
+use crate::gnss::record::{Fix, IonosphereModel, TrajectoryRow};
 
 /// Sums over the satellites of a fix. Vectors are east, north, up and the clocks of all time scales.
 #[derive(Clone, Debug)]
@@ -189,29 +190,38 @@ const BIAS_SHARE: f64 = 0.1;
 /// of the wet delay (Saastamoinen 1972 against weather).
 const TROPOSPHERE_SHARE: f64 = 0.05;
 
-/// Expectations of all fixes that have a truth and enough satellites.
+/// Shows `see` the expectations of all fixes that have a truth and enough satellites, in the order of their
+/// samples: each with its fix and the true place.
 ///
 /// # Errors
-/// [`JudgeError::Read`] where spilled rows cannot be read.
-pub fn expected(scene: &Scene<'_>, errors: &Errors) -> Result<Vec<Expected>, JudgeError> {
-    let mut sums = vec![Sums::new(scene.scales.len().max(1)); scene.run.fixes.len()];
+/// [`JudgeError::Read`] where spilled rows cannot be read, and those of `see`.
+pub fn expected(
+    scene: &Scene<'_>,
+    errors: &Errors,
+    mut see: impl FnMut(Fix, TrajectoryRow, Expected) -> Result<(), JudgeError>,
+) -> Result<(), JudgeError> {
     let choice = (scene.choices.combined, scene.choices.model_sigma_m);
+    let mut links = Vec::new();
     for link in errors.signals.keys() {
-        scene.ranges(errors, link, |fix, range| {
-            if let Some(sums) = sums.get_mut(fix) {
-                sums.take(range, choice);
-            }
-        })?;
+        links.extend(scene.ranges(errors, link)?);
     }
-    sums.iter_mut().for_each(|sums| sums.finish(choice));
-    let of = |(fix, sums): (&crate::gnss::record::Fix, &Sums)| {
+    let mut places = scene.run.trajectory.finder()?;
+    for fix in scene.run.fixes.in_order()? {
+        let (fix, mut sums) = (fix?, Sums::new(scene.scales.len().max(1)));
+        let place = places.get(fix.sample);
+        for ranges in &mut links {
+            ranges.of_fix(&fix, place.as_ref(), |range| sums.take(range, choice))?;
+        }
+        sums.finish(choice);
         let sent = matches!(fix.ionosphere, IonosphereModel::Broadcast | IonosphereModel::NequickG);
         let exact = scene.choices.ionosphere_error_share == 0.0 && sent;
         let combined = fix.ionosphere == IonosphereModel::Combined;
         let corrected = exact || combined || scene.choices.ionosphere.is_none();
-        one(fix.sample, sums, corrected)
-    };
-    Ok(scene.run.fixes.iter().zip(&sums).filter_map(of).collect())
+        if let (Some(place), Some(expected)) = (place, one(fix.sample, &sums, corrected)) {
+            see(fix, place, expected)?;
+        }
+    }
+    Ok(())
 }
 
 /// Two bands as one range; what is of the carrier and of the satellite is the first one's, the higher.
@@ -278,6 +288,54 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
 }
 
 impl Expected {
+    /// Words of a spilled one, its sample left out.
+    pub(in crate::analysis::judge) const WORDS: usize = 4 + 5 * 16 + 3 * 4 + 2;
+
+    /// Appends them.
+    pub(in crate::analysis::judge) fn put(&self, words: &mut Vec<u64>) {
+        let flags = [self.corrected, self.steady, self.fading].map(u64::from);
+        words.extend([self.satellites.0, self.satellites.1, self.blameless].map(u64::from));
+        words.push(flags[0] | flags[1] << 1 | flags[2] << 2);
+        for matrix in [&self.noise, &self.thermal, &self.stated, &self.dilution, &self.rate_noise] {
+            words.extend(matrix.iter().map(|value| value.to_bits()));
+        }
+        for vector in [&self.bias, &self.allowed, &self.rate_allowed] {
+            words.extend(vector.iter().map(|value| value.to_bits()));
+        }
+        words.extend([self.condition, self.memory_s].map(f64::to_bits));
+    }
+
+    /// The one of those words.
+    pub(in crate::analysis::judge) fn take(sample: u64, words: &mut Words<'_>) -> Self {
+        // Counts were put as such.
+        let mut count = || u32::try_from(words.word()).unwrap_or(0);
+        let (satellites, blameless) = ((count(), count()), count());
+        let flags = words.word();
+        let mut matrix = || Matrix4::from_iterator(std::iter::repeat_with(|| words.number()).take(16));
+        let [noise, thermal, stated, dilution, rate_noise] = std::array::from_fn(|_| matrix());
+        let mut vector = || Vector4::from_iterator(std::iter::repeat_with(|| words.number()).take(4));
+        let [bias, allowed, rate_allowed] = std::array::from_fn(|_| vector());
+        let [condition, memory_s] = std::array::from_fn(|_| words.number());
+        Self {
+            sample,
+            satellites,
+            blameless,
+            bias,
+            allowed,
+            noise,
+            thermal,
+            stated,
+            dilution,
+            condition,
+            corrected: flags & 1 != 0,
+            steady: flags & 2 != 0,
+            fading: flags & 4 != 0,
+            memory_s,
+            rate_noise,
+            rate_allowed,
+        }
+    }
+
     /// Longest axis of the horizontal noise.
     pub fn flat_sigma_m(&self) -> f64 {
         largest_axis(&self.noise)

@@ -10,6 +10,7 @@ use std::collections::BTreeSet;
 use super::{Finding, Found};
 use crate::analysis::error::JudgeError;
 use crate::analysis::read::Run;
+use crate::analysis::read::spill_store::Finder;
 use crate::analysis::waveform::leading;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{AcquisitionRow, Event, Observation};
@@ -70,15 +71,15 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
             continue;
         }
         let Some(component) = leading(link.signal) else { continue };
-        let truth = run.truth.rows(link)?;
+        let mut truth = run.truth.finder(link)?;
         for row in searches {
-            let Some((true_row, after_s)) = near(&truth, row.sample, run.scene.sample_rate_hz) else { continue };
+            let Some((true_row, after_s)) = near(&mut truth, row.sample, run.scene.sample_rate_hz) else { continue };
             count += 1;
             let bin_hz = 1.0 / (periods * component.period_s());
             doppler = doppler
                 .max((row.doppler_hz - true_row.doppler_hz - run.common.doppler_hz).abs() / (DOPPLER_BINS * bin_hz));
             let chips = sent_chips(
-                true_row,
+                &true_row,
                 after_s - run.common.code_delay_s(link.signal),
                 component.chip_rate_hz,
                 f64::from(component.code_chips),
@@ -120,9 +121,8 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
 }
 
 /// The truth's row at or before a sample, and the time from it.
-fn near(truth: &[Observation], sample: u64, rate_hz: f64) -> Option<(&Observation, f64)> {
-    let index = truth.partition_point(|row| row.sample <= sample).checked_sub(1)?;
-    let row = truth.get(index)?;
+fn near(truth: &mut Finder<'_, Link, Observation>, sample: u64, rate_hz: f64) -> Option<(Observation, f64)> {
+    let row = truth.until_sample(sample)?;
     let after_s = (sample - row.sample) as f64 / rate_hz;
     (after_s < 1.5).then_some((row, after_s))
 }

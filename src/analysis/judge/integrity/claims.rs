@@ -51,7 +51,7 @@ fn missing(run: &Run) -> Found {
     let nequick = ["ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
     let models = [(IonosphereModel::Broadcast, &klobuchar[..]), (IonosphereModel::NequickG, &nequick[..])];
     for (model, names) in models {
-        if run.fixes.iter().any(|fix| fix.ionosphere == model) {
+        if run.fixes.uses(model) {
             let lacks = |name: &&&str| !run.navigation.iter().any(|row| row.parameter == **name);
             names.iter().filter(lacks).for_each(|name| found.add(|| (*name).to_owned()));
         }
@@ -93,8 +93,11 @@ fn order(run: &Run) -> Result<Found, JudgeError> {
     }
     for link in run.observations.keys() {
         let framed = reached.get(&link).and_then(|steps| steps.get(&4).copied()).unwrap_or(u64::MAX);
-        let early = run.observations.map(link, |row| row.sample)?.into_iter().filter(|sample| *sample < framed);
-        early.for_each(|sample| found.add(|| format!("observation of {} at sample {sample}", link.sv)));
+        run.observations.each(link, |row| {
+            if row.sample < framed {
+                found.add(|| format!("observation of {} at sample {}", link.sv, row.sample));
+            }
+        })?;
     }
     Ok(found)
 }
@@ -113,7 +116,7 @@ fn counts(run: &Run) -> Result<Option<Found>, JudgeError> {
     };
     whole("fixes", run.fixes.len());
     whole("losses", run.events.iter().filter(|row| row.event == Event::LossOfLock).count());
-    let first = run.fixes.first().map(|fix| run.time_s(fix.sample));
+    let first = run.fixes.first_sample().map(|sample| run.time_s(sample));
     let stated = run.receiver.get("first_fix_s").and_then(serde_json::Value::as_f64);
     // Half a sample.
     if run.receiver.get("first_fix_s").is_some()
@@ -143,7 +146,7 @@ fn counts(run: &Run) -> Result<Option<Found>, JudgeError> {
         .map(|row| (row.sv.to_string(), ()))
         .collect();
     if let Some(used) = names("used") {
-        let most = run.fixes.iter().map(|fix| fix.satellites as usize).max().unwrap_or(0);
+        let most = run.fixes.most_satellites();
         if used.len() < most || used.iter().any(|sv| !known.contains_key(sv)) {
             found.add(|| "used".to_owned());
         }

@@ -5,12 +5,9 @@
 //! constant. That constant is the same for every row of every table. Limits: a receiver that sets its clock
 //! anew within a run has several.
 
-use std::collections::HashMap;
-
 use super::{Finding, Found};
 use crate::analysis::error::JudgeError;
-use crate::analysis::read::Run;
-use crate::analysis::statistics::median;
+use crate::analysis::read::{Numbers, Run};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{Event, Observation};
 use crate::gnss::signal::Link;
@@ -24,34 +21,35 @@ const IDENTITY: f64 = 1e-9;
 
 pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     let (mut lock_s, mut breaks, mut impossible) = (0.0_f64, Found::default(), Found::default());
-    let mut readings = Vec::new();
+    let mut readings = Numbers::new(run.observations.directory());
     for link in run.observations.keys() {
-        let all = run.observations.rows(link)?;
-        lock_s = lock_s.max(locks(run, link, &all, &mut breaks, &mut impossible));
-        let truth: HashMap<u64, Observation> = run.truth.map(link, |row| (row.sample, row))?.into_iter().collect();
-        readings.extend(all.iter().filter_map(|row| {
-            let true_row = truth.get(&row.sample)?;
+        lock_s = lock_s.max(locks(run, link, &mut breaks, &mut impossible)?);
+        let mut truth = run.truth.finder(link)?;
+        for row in run.observations.cursor(link) {
+            let row = row?;
+            let Some(true_row) = truth.get(row.sample) else { continue };
             let ahead_s = row.sent().since(true_row.sent());
-            Some(row.pseudorange_m - true_row.pseudorange_m + SPEED_OF_LIGHT_MPS * ahead_s)
-        }));
+            readings.push(row.pseudorange_m - true_row.pseudorange_m + SPEED_OF_LIGHT_MPS * ahead_s)?;
+        }
     }
-    let reading_m = median(&readings);
+    let reading_m = readings.percentile(0.5)?;
     let mut all = vec![
         Finding::most("lock time against the samples", lock_s, "s", LOCK_S, "an update's length"),
         Finding::none("breaks of lock without an event", breaks, "a lock begins anew with an event"),
         Finding::none("lock times longer than the run", impossible, "no lock is older than its acquisition"),
     ];
     if let Some(reading_m) = reading_m {
-        let most = readings.iter().map(|one| (one - reading_m).abs()).fold(0.0, f64::max);
+        let mut most = 0.0_f64;
+        readings.each(|one| most = most.max((one - reading_m).abs()))?;
         let source = "one clock reads both";
         all.push(Finding::most("pseudorange against time sent, largest", most, "m", READING_M, source));
     }
-    all.extend(fixes(run, reading_m));
+    all.extend(fixes(run, reading_m)?);
     Ok(all)
 }
 
 /// Largest difference of lock time and samples passed; a lock that begins anew needs an event.
-fn locks(run: &Run, link: Link, all: &[Observation], breaks: &mut Found, impossible: &mut Found) -> f64 {
+fn locks(run: &Run, link: Link, breaks: &mut Found, impossible: &mut Found) -> Result<f64, JudgeError> {
     let events: Vec<u64> = run
         .events
         .iter()
@@ -60,57 +58,53 @@ fn locks(run: &Run, link: Link, all: &[Observation], breaks: &mut Found, impossi
         .map(|row| row.sample)
         .collect();
     let acquired = run.events.iter().find(|row| row.link() == link).map_or(0, |row| row.sample);
-    let mut most_s = 0.0_f64;
-    for row in all {
+    let (mut most_s, mut before) = (0.0_f64, None::<Observation>);
+    run.observations.each(link, |row| {
         let since_s = row.sample.saturating_sub(acquired) as f64 / run.scene.sample_rate_hz;
         if row.locked_s > since_s + LOCK_S || row.locked_s < 0.0 {
             impossible.add(|| format!("{} at sample {}", link.sv, row.sample));
         }
-    }
-    for two in all.windows(2) {
-        let passed_s = two[1].sample.saturating_sub(two[0].sample) as f64 / run.scene.sample_rate_hz;
-        let grown_s = two[1].locked_s - two[0].locked_s;
+        let (sample, locked_s) = (row.sample, row.locked_s);
+        let Some(old) = before.replace(row) else { return };
+        let passed_s = sample.saturating_sub(old.sample) as f64 / run.scene.sample_rate_hz;
+        let grown_s = locked_s - old.locked_s;
         if grown_s > -LOCK_S && (grown_s - passed_s).abs() <= LOCK_S {
             most_s = most_s.max((grown_s - passed_s).abs());
-            continue;
+            return;
         }
         // The event may come an update after the row that shows it.
         let slack = (LOCK_S * run.scene.sample_rate_hz) as u64;
-        let declared =
-            events.iter().any(|at| (two[0].sample.saturating_sub(slack)..=two[1].sample + slack).contains(at));
+        let declared = events.iter().any(|at| (old.sample.saturating_sub(slack)..=sample + slack).contains(at));
         if !declared {
-            breaks.add(|| format!("{} at sample {}", link.sv, two[1].sample));
+            breaks.add(|| format!("{} at sample {sample}", link.sv));
         }
-    }
-    most_s
+    })?;
+    Ok(most_s)
 }
 
 /// A fix's bias and time make the reading of the clock that pseudoranges have; its dilutions add up.
-fn fixes(run: &Run, reading_m: Option<f64>) -> Vec<Finding> {
-    let truth: HashMap<u64, _> = run.trajectory.iter().map(|row| (row.sample, row)).collect();
-    let readings: Vec<f64> = run
-        .fixes
-        .iter()
-        .filter_map(|fix| {
-            let true_row = truth.get(&fix.sample)?;
+fn fixes(run: &Run, reading_m: Option<f64>) -> Result<Vec<Finding>, JudgeError> {
+    let mut truth = run.trajectory.finder()?;
+    let (mut any, mut most_m, mut most): (_, f64, Option<f64>) = (false, 0.0, None);
+    run.fixes.each(|fix| {
+        if let Some(true_row) = truth.get(fix.sample) {
             // Both are by the scale of the fix, and what that is ahead of GPS time cancels.
             let bias_m = SPEED_OF_LIGHT_MPS * (fix.clock_bias_s - true_row.clock_bias_s);
-            Some(SPEED_OF_LIGHT_MPS * fix.time().since(true_row.time()) + bias_m)
-        })
-        .collect();
-    let mut found = Vec::new();
-    if let (Some(reading_m), false) = (reading_m, readings.is_empty()) {
-        let most = readings.iter().map(|one| (one - reading_m).abs()).fold(0.0, f64::max);
-        let source = "time found and bias make the reading that pseudoranges have";
-        found.push(Finding::most("clock bias of fixes against their time, largest", most, "m", READING_M, source));
-    }
-    let sums = run.fixes.iter().map(|fix| {
+            let one = SPEED_OF_LIGHT_MPS * fix.time().since(true_row.time()) + bias_m;
+            (any, most_m) = (true, reading_m.map_or(most_m, |reading_m| most_m.max((one - reading_m).abs())));
+        }
         let off = |whole: f64, a: f64, b: f64| ((a * a + b * b) / (whole * whole) - 1.0).abs();
-        off(fix.gdop, fix.pdop, fix.tdop).max(off(fix.pdop, fix.hdop, fix.vdop))
-    });
-    if let Some(most) = sums.max_by(f64::total_cmp) {
+        let new = off(fix.gdop, fix.pdop, fix.tdop).max(off(fix.pdop, fix.hdop, fix.vdop));
+        most = Some(most.filter(|old| old.total_cmp(&new).is_gt()).unwrap_or(new));
+    })?;
+    let mut found = Vec::new();
+    if reading_m.is_some() && any {
+        let source = "time found and bias make the reading that pseudoranges have";
+        found.push(Finding::most("clock bias of fixes against their time, largest", most_m, "m", READING_M, source));
+    }
+    if let Some(most) = most {
         let source = "squares of dilutions add up";
         found.push(Finding::most("dilutions against one another, largest departure", most, "of 1", IDENTITY, source));
     }
-    found
+    Ok(found)
 }

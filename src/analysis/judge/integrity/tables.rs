@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use super::{Finding, Found};
 use crate::analysis::error::JudgeError;
 use crate::analysis::measure::errors::{Errors, Link};
-use crate::analysis::read::Run;
+use crate::analysis::read::{Numbers, Run};
 use crate::analysis::statistics::median;
 use crate::gnss::record::{Event, Fix, Observation, TrackingRow};
 
@@ -44,10 +44,10 @@ pub(super) fn findings(run: &Run, errors: &Errors) -> Result<Vec<Finding>, Judge
     for link in run.tracking.keys() {
         tracking(run, link, &mut rows)?;
     }
-    fixes(&run.fixes, &mut rows);
+    fixes(run, &mut rows)?;
     short(run, &mut rows);
     let orphans = Found { count: errors.unmatched, first: None };
-    let lost = run.fixes.len() - errors.positions.len().min(run.fixes.len());
+    let lost = run.fixes.len().saturating_sub(errors.positions.len());
     Ok(vec![
         Finding::none("rows doubled", rows.doubled, "one row a satellite and sample"),
         Finding::none("rows out of time order", rows.disordered, "a receiver writes as time goes"),
@@ -59,32 +59,37 @@ pub(super) fn findings(run: &Run, errors: &Errors) -> Result<Vec<Finding>, Judge
 }
 
 fn observations(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
-    let all = run.observations.rows(link)?;
     let values = |row: &Observation| {
         [row.sent_fraction_s, row.pseudorange_m, row.carrier_cycles, row.doppler_hz, row.cn0_dbhz].map(f64::to_bits)
     };
     let key = run.name(link);
-    let steps: Vec<f64> = all.windows(2).map(|two| two[1].sample as f64 - two[0].sample as f64).collect();
+    let (mut steps, mut before) = (Vec::new(), None);
+    run.observations.each(link, |row| {
+        steps.extend(before.replace(row.sample).map(|before| row.sample as f64 - before as f64));
+    })?;
     let usual = median(&steps).unwrap_or(0.0);
-    for (two, step) in all.windows(2).zip(steps) {
-        rows.order("observation of", &key, two[0].sample, two[1].sample);
-        if values(&two[0]) == values(&two[1]) {
-            rows.repeated.add(|| format!("observation of {key} at sample {}", two[1].sample));
+    drop(steps);
+    let mut before: Option<Observation> = None;
+    run.observations.each(link, |row| {
+        let Some(old) = before.replace(row.clone()) else { return };
+        let step = row.sample as f64 - old.sample as f64;
+        rows.order("observation of", &key, old.sample, row.sample);
+        if values(&old) == values(&row) {
+            rows.repeated.add(|| format!("observation of {key} at sample {}", row.sample));
         }
-        let locked = two[1].locked_s - two[0].locked_s;
+        let locked = row.locked_s - old.locked_s;
         // The lock is as old as before and the time that passed: it went on.
         if step > GAP * usual
             && (locked - step / run.scene.sample_rate_hz).abs() < 0.5 * usual / run.scene.sample_rate_hz
         {
-            rows.missing.add(|| format!("observation of {key} before sample {}", two[1].sample));
+            rows.missing.add(|| format!("observation of {key} before sample {}", row.sample));
         }
-    }
-    Ok(())
+    })
 }
 
 fn tracking(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
     let mut before: Option<TrackingRow> = None;
-    let mut steps = Vec::new();
+    let mut steps = Numbers::new(run.tracking.directory());
     let key = run.name(link);
     let lost: Vec<u64> = run
         .events
@@ -92,7 +97,10 @@ fn tracking(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
         .filter(|row| row.link() == link && matches!(row.event, Event::LossOfLock | Event::Acquired))
         .map(|row| row.sample)
         .collect();
-    run.tracking.each(link, |row| {
+    // A channel that ended and began anew has nothing between.
+    let goes_on = |old: u64, sample: u64| !lost.iter().any(|at| (old..=sample).contains(at));
+    for row in run.tracking.cursor(link) {
+        let row = row?;
         if let Some(old) = &before {
             rows.order("loop update of", &key, old.sample, row.sample);
             let values = |row: &TrackingRow| {
@@ -102,33 +110,37 @@ fn tracking(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
             if row.prompt_i != 0.0 && values(old) == values(&row) {
                 rows.repeated.add(|| format!("loop update of {key} at sample {}", row.sample));
             }
-            // A channel that ended and began anew has nothing between.
-            if !lost.iter().any(|at| (old.sample..=row.sample).contains(at)) {
-                steps.push((row.sample, row.sample as f64 - old.sample as f64));
+            if goes_on(old.sample, row.sample) {
+                steps.push(row.sample as f64 - old.sample as f64)?;
             }
         }
         before = Some(row);
-    })?;
-    let usual = median(&steps.iter().map(|step| step.1).collect::<Vec<_>>()).unwrap_or(0.0);
-    for (sample, step) in steps {
-        if step > GAP * usual {
+    }
+    let usual = steps.percentile(0.5)?.unwrap_or(0.0);
+    let mut before = None;
+    run.tracking.each(link, |TrackingRow { sample, .. }| {
+        let step = |old: &u64| sample as f64 - *old as f64;
+        if before.replace(sample).is_some_and(|old| goes_on(old, sample) && step(&old) > GAP * usual) {
             rows.missing.add(|| format!("loop update of {key} before sample {sample}"));
         }
-    }
-    Ok(())
+    })
 }
 
-fn fixes(all: &[Fix], rows: &mut Rows) {
+fn fixes(run: &Run, rows: &mut Rows) -> Result<(), JudgeError> {
     let values = |fix: &Fix| {
         [fix.x_m, fix.y_m, fix.z_m, fix.vx_mps, fix.vy_mps, fix.vz_mps, fix.clock_bias_s, fix.clock_drift]
             .map(f64::to_bits)
     };
-    for two in all.windows(2) {
-        rows.order("fix", "", two[0].sample, two[1].sample);
-        if values(&two[0]) == values(&two[1]) {
-            rows.repeated.add(|| format!("fix at sample {}", two[1].sample));
+    let mut before: Option<Fix> = None;
+    run.fixes.each(|fix| {
+        if let Some(old) = &before {
+            rows.order("fix", "", old.sample, fix.sample);
+            if values(old) == values(&fix) {
+                rows.repeated.add(|| format!("fix at sample {}", fix.sample));
+            }
         }
-    }
+        before = Some(fix);
+    })
 }
 
 /// Tables of a few rows.

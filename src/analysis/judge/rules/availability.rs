@@ -1,7 +1,6 @@
 //! Whether fixes came when the scene allows them: the first one in time, no epoch and no stretch without.
 
-use std::collections::HashSet;
-
+use crate::analysis::error::JudgeError;
 use crate::analysis::expect::due::{Due, Expectations};
 use crate::analysis::judge::judgement::Bound;
 use crate::analysis::judge::verdict::Verdict;
@@ -15,16 +14,26 @@ const GAP_S: f64 = 1.0;
 
 /// A receiver's fixes, however it reports them.
 pub(crate) struct Came {
-    /// Epochs of the truth with a fix.
-    pub samples: HashSet<u64>,
+    /// Epochs of the truth with a fix, sorted.
+    pub samples: Vec<u64>,
     pub first_s: Option<f64>,
 }
 
 impl Came {
     /// Those of a run's table.
-    pub(super) fn of(run: &Run) -> Self {
-        let samples: HashSet<u64> = run.fixes.iter().map(|fix| fix.sample).collect();
-        Self { first_s: samples.iter().min().map(|sample| run.time_s(*sample)), samples }
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
+    pub(super) fn of(run: &Run) -> Result<Self, JudgeError> {
+        let mut samples = run.fixes.map(|fix| fix.sample)?;
+        samples.sort_unstable();
+        Ok(Self { first_s: run.fixes.earliest_sample().map(|sample| run.time_s(sample)), samples })
+    }
+}
+
+impl Came {
+    fn has(&self, sample: u64) -> bool {
+        self.samples.binary_search(&sample).is_ok()
     }
 }
 
@@ -42,8 +51,7 @@ impl Verdict {
             if own.is_empty() {
                 continue;
             }
-            let lacking: Vec<f64> =
-                own.iter().filter(|due| !came.samples.contains(&due.sample)).map(|due| due.time_s).collect();
+            let lacking: Vec<f64> = own.iter().filter(|due| !came.has(due.sample)).map(|due| due.time_s).collect();
             let percent = 100.0 * lacking.len() as f64 / own.len() as f64;
             let source = format!("{} epochs have four satellites and their orbits, well placed", own.len());
             let figure = format!("epochs without a fix{name}");
@@ -134,7 +142,7 @@ impl Verdict {
             let terms = expect.at(from_s).find(|terms| terms.fix.is_some());
             let Some(terms) = terms.filter(|terms| terms.fix == Some(Fixes::None)) else { continue };
             let own = expected.epochs.iter().filter(|due| (from_s..to_s).contains(&due.time_s));
-            let count = own.filter(|due| came.samples.contains(&due.sample)).count();
+            let count = own.filter(|due| came.has(due.sample)).count();
             let source = format!("the scene expects none: {}", terms.reason);
             self.judge(&format!("fixes{name}"), "", count, "", Bound::Max(0.0), &source);
         }
@@ -173,10 +181,10 @@ fn step_s(epochs: &[Due]) -> f64 {
 fn longest_gap(due: &[&Due], came: &Came, interval_s: f64) -> (f64, f64) {
     let mut longest = (0.0, 0.0);
     for run in due.chunk_by(|a, b| b.time_s - a.time_s < 1.5 * interval_s) {
-        for gap in run.chunk_by(|a, b| came.samples.contains(&a.sample) == came.samples.contains(&b.sample)) {
+        for gap in run.chunk_by(|a, b| came.has(a.sample) == came.has(b.sample)) {
             let (Some(first), Some(last)) = (gap.first(), gap.last()) else { continue };
             let length_s = last.time_s - first.time_s + interval_s;
-            if !came.samples.contains(&first.sample) && length_s > longest.0 {
+            if !came.has(first.sample) && length_s > longest.0 {
                 longest = (length_s, first.time_s);
             }
         }

@@ -6,7 +6,7 @@
 //! with equal weights. Limits: what a scene's effects do to a range (multipath, interference, spoofing) is
 //! left to a user's limits, and such a scene's errors are not judged here.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::availability::Came;
 use super::tracking::ONE_BIT_LOSS_DB;
@@ -51,7 +51,7 @@ struct Labels {
 }
 
 impl Labels {
-    fn new(run: &Run, measured: Option<&Measured>, places: Option<&Places>, truth_s: f64) -> Self {
+    fn new(run: &Run, measured: Option<&Measured>, places: Option<&Places>, truth_s: f64) -> Result<Self, JudgeError> {
         let mut of_links: BTreeMap<Link, Vec<f64>> = BTreeMap::new();
         for row in measured.iter().flat_map(|measured| &measured.rows) {
             of_links.entry(row.link).or_default().push(row.label_s);
@@ -64,16 +64,19 @@ impl Labels {
         // Labels count from the second that is nearest to the truth's first row.
         let origin = run.trajectory.first().map(|row| Epoch::new(row.gps_s, row.gps_fraction_s.round()));
         let since_s = |time: Epoch| origin.map_or(0.0, |origin| time.since(origin));
-        let epochs = run.trajectory.iter().map(|row| (row.sample, since_s(row.time()))).collect();
-        Self { epochs, reach_s: 0.5 * interval_s + 1e-3, interval_s, of_links }
+        let epochs = run.trajectory.map(|row| (row.sample, since_s(row.time())))?;
+        Ok(Self { epochs, reach_s: 0.5 * interval_s + 1e-3, interval_s, of_links })
     }
 
-    fn near(&self, labels: &[f64]) -> HashSet<u64> {
+    fn near(&self, labels: &[f64]) -> Vec<u64> {
         let is_near = |t_s: f64| {
             let next = labels.partition_point(|label_s| *label_s < t_s - self.reach_s);
             labels.get(next).is_some_and(|label_s| *label_s <= t_s + self.reach_s)
         };
-        self.epochs.iter().filter(|(_, t_s)| is_near(*t_s)).map(|(sample, _)| *sample).collect()
+        let near = self.epochs.iter().filter(|(_, t_s)| is_near(*t_s)).map(|(sample, _)| *sample);
+        let mut samples: Vec<u64> = near.collect();
+        samples.sort_unstable();
+        samples
     }
 
     /// The truth's first epoch from a label on.
@@ -83,7 +86,7 @@ impl Labels {
 }
 
 impl Observed for Labels {
-    fn samples(&self, link: Link) -> Result<HashSet<u64>, JudgeError> {
+    fn samples(&self, link: Link) -> Result<Vec<u64>, JudgeError> {
         Ok(self.of_links.get(&link).map(|labels| self.near(labels)).unwrap_or_default())
     }
 }
@@ -96,7 +99,7 @@ impl Verdict {
     pub fn of_foreign(found: &Judgement) -> Result<Self, JudgeError> {
         let (run, judged, summary) = (&found.run, &found.judged, &found.summary);
         let (measured, places) = (judged.observables.as_ref(), judged.places.as_ref());
-        let labels = Labels::new(run, measured, places, judged.truth_interval_s);
+        let labels = Labels::new(run, measured, places, judged.truth_interval_s)?;
         let mut receiver = Receiver::of(run);
         receiver.interval_s = labels.interval_s;
         let mut expected = Expectations::of(run, receiver, &labels)?;

@@ -50,7 +50,7 @@ fn mismatches(run: &Run) -> Vec<String> {
         compare("troposphere", run.troposphere_m, troposphere != "none", "standard");
     }
     if let Some(ionosphere) = choice("ionosphere") {
-        let used = |model: IonosphereModel| run.fixes.iter().any(|fix| fix.ionosphere == model);
+        let used = |model: IonosphereModel| run.fixes.uses(model);
         if ionosphere == "none"
             || used(IonosphereModel::Broadcast)
             || used(IonosphereModel::NequickG)

@@ -1,5 +1,6 @@
 //! What the receiver reported of continuous waves, and whether it followed a spoofer.
 
+use crate::analysis::error::JudgeError;
 use crate::analysis::judge::judgement::Bound;
 use crate::analysis::judge::summary::Summary;
 use crate::analysis::judge::verdict::Verdict;
@@ -41,19 +42,20 @@ impl Verdict {
         }
     }
 
-    pub(super) fn spoofing(&mut self, run: &Run, summary: &Summary) {
-        let Some(spoofing) = &summary.spoofing else { return };
-        let claimed = run.claimed.iter().map(|row| run.time_s(row.sample));
+    pub(super) fn spoofing(&mut self, run: &Run, summary: &Summary) -> Result<(), JudgeError> {
+        let Some(spoofing) = &summary.spoofing else { return Ok(()) };
+        let mut bounded = false;
+        run.claimed.each(|row| bounded |= run.scene.expect.bounded(run.time_s(row.sample)))?;
         let expected = run.scene.expect.whole.iter().chain(run.scene.expect.intervals.iter().map(|one| &one.terms));
         let reasons: Vec<&str> = expected.map(|terms| terms.reason.as_str()).collect();
         if let Some(share) = spoofing.captured_share {
-            if claimed.clone().count() > 0 && !claimed.clone().any(|time_s| run.scene.expect.bounded(time_s)) {
+            if !run.claimed.is_empty() && !bounded {
                 let percent = 100.0 * share;
                 self.not_judged.push(format!(
                     "fixes captured by the spoofer ({percent:.0} %): the scene expects it: {}",
                     reasons.join("; ")
                 ));
-                return;
+                return Ok(());
             }
             let source = "no fix should follow a spoofer";
             self.judge(
@@ -65,5 +67,6 @@ impl Verdict {
                 source,
             );
         }
+        Ok(())
     }
 }

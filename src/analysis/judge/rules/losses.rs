@@ -86,11 +86,12 @@ struct Witness {
 
 impl Witness {
     fn new(run: &Run, access: &MultipleAccess<'_>, receiver: &Receiver, link: Link) -> Result<Self, JudgeError> {
+        let mut most_hz = run.cn0_most_hz.finder();
         let rows = run.truth.map(link, |row| SatelliteEpoch {
             time_s: run.time_s(row.sample),
             cn0_dbhz: row.cn0_dbhz,
             effective_dbhz: access.effective_dbhz(&row) - receiver.cost_db,
-            strongest_dbhz: run.strongest_dbhz(row.sample, link.signal),
+            strongest_dbhz: Run::strongest_dbhz(&mut most_hz, row.sample, link.signal),
             doppler_hz: row.doppler_hz,
             above_mask: true,
         })?;

@@ -6,6 +6,7 @@
 //! rules of thumb, not the points at which a receiver fails; several figures of one run share their causes.
 
 mod availability;
+mod cases;
 mod foreign;
 mod hints;
 mod interference;
@@ -39,18 +40,21 @@ impl Verdict {
     pub fn of(run: &Run, errors: &Errors, slips: &Slips, summary: &Summary) -> Result<Self, JudgeError> {
         let mut verdict = Self::default();
         let expected = Expectations::of(run, Receiver::of(run), run)?;
-        verdict.satellites(run, &expected);
-        verdict.availability(run.scene.duration_s, &run.scene.expect, &expected, &Came::of(run));
+        verdict.satellites(run, &expected)?;
+        verdict.availability(run.scene.duration_s, &run.scene.expect, &expected, &Came::of(run)?);
+        let receiver = expected.receiver.clone();
+        // They have a row an epoch.
+        drop(expected);
         verdict.values(run, errors, summary)?;
-        let places = errors.positions.iter().map(|error| (error.time_s, error.enu_m.norm()));
-        verdict.within(&run.scene.expect, places);
+        let places = errors.positions.map(|error| (error.time_s, error.enu_m.norm()))?;
+        verdict.within(&run.scene.expect, places.into_iter());
         verdict.tracking(run, summary);
         verdict.links(run, errors)?;
-        verdict.losses(run, &expected.receiver, slips)?;
+        verdict.losses(run, &receiver, slips)?;
         verdict.reception(summary);
         verdict.cn0(run, summary);
         verdict.interference(summary);
-        verdict.spoofing(run, summary);
+        verdict.spoofing(run, summary)?;
         verdict.tables(run, errors)?;
         verdict.hint(run);
         Ok(verdict)

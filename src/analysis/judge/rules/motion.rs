@@ -3,11 +3,14 @@
 //!
 //! Limits: acceleration and jerk are differences of the truth's velocities, at least a truth's interval wide.
 
-use std::collections::HashMap;
+use std::cell::RefCell;
 
+use crate::analysis::error::JudgeError;
 use crate::analysis::expect::loops::{exact_loop, natural_radps};
 use crate::analysis::judge::forecast::ranges::Choices;
 use crate::analysis::read::Run;
+use crate::analysis::read::levels::Levels;
+use crate::gnss::record::TrajectoryRow;
 
 /// The rate of a loop (s + ω)³ lags by 3J/ω² under jerk J, that of a loop (s + ω)² by 2a/ω under acceleration
 /// a; neither overshoots.
@@ -25,11 +28,11 @@ const REST_MPS: f64 = 2e-3;
 
 /// Bounds of a run's epochs.
 pub(super) struct Motion {
-    at: HashMap<u64, f64>,
+    at: Levels<()>,
 }
 
 impl Motion {
-    pub fn new(run: &Run, choices: &Choices) -> Self {
+    pub fn new(run: &Run, choices: &Choices) -> Result<Self, JudgeError> {
         let loops = &choices.loops;
         let of = |update_s: &f64| {
             let closed = exact_loop(loops.pll_order, loops.pll_bandwidth_hz * update_s)?;
@@ -40,19 +43,25 @@ impl Motion {
         let update_s = choices.updates_s.values().copied().fold(0.0, f64::max);
         let second = if loops.pll_order < 3 { SECOND_ORDER / natural_radps } else { 0.0 };
         let wavelength_m = run.mean_wavelength_m().unwrap_or(0.0);
-        let rows = &run.trajectory;
-        let accelerations: Vec<_> = rows
-            .windows(2)
-            .map(|two| (two[1].velocity_mps() - two[0].velocity_mps()) / two[1].time().since(two[0].time()).max(1e-6))
-            .collect();
-        let single: Vec<f64> = (0..rows.len())
-            .map(|index| {
+        let (mut before, mut first_step_s): (Option<TrajectoryRow>, _) = (None, None);
+        let (mut samples, mut accelerations) = (Vec::new(), Vec::new());
+        run.trajectory.each(|row| {
+            samples.push(row.sample);
+            if let Some(before) = &before {
+                let step_s = row.time().since(before.time()).max(1e-6);
+                first_step_s.get_or_insert(step_s);
+                accelerations.push((row.velocity_mps() - before.velocity_mps()) / step_s);
+            }
+            before = Some(row);
+        })?;
+        let step_s = first_step_s.unwrap_or(0.1);
+        let single: Vec<f64> = (samples.iter().enumerate())
+            .map(|(index, sample)| {
                 let around = accelerations.get(index.saturating_sub(2)..(index + 1).min(accelerations.len()));
                 let around = around.unwrap_or(&[]);
                 let most = around.iter().map(|a| a.norm()).fold(0.0, f64::max);
-                let step_s = rows.get(1).zip(rows.first()).map_or(0.1, |(b, a)| b.time().since(a.time()).max(1e-6));
                 let jerk = around.windows(2).map(|two| (two[1] - two[0]).norm() / step_s).fold(0.0, f64::max);
-                let wound_mps = rows.get(index).map_or(0.0, |row| run.common.wound_mps(row.sample, wavelength_m));
+                let wound_mps = run.common.wound_mps(*sample, wavelength_m);
                 most * (update_s + second)
                     + THIRD_ORDER * jerk / (natural_radps * natural_radps)
                     + WIND_UP_SHARE * wound_mps.abs()
@@ -62,11 +71,23 @@ impl Motion {
             let around = single.get(index.saturating_sub(ROWS)..(index + 2).min(single.len())).unwrap_or(&[]);
             around.iter().copied().fold(0.0, f64::max)
         };
-        Self { at: rows.iter().enumerate().map(|(index, row)| (row.sample, REST_MPS + worst(index))).collect() }
+        drop(accelerations);
+        let mut at = Levels::new(run.trajectory.directory());
+        for (index, sample) in samples.into_iter().enumerate() {
+            at.change(sample, (), |_| REST_MPS + worst(index))?;
+        }
+        at.close()?;
+        Ok(Self { at })
     }
 
-    /// What may come on top of noise at a sample.
-    pub fn allowed_mps(&self, sample: u64) -> f64 {
-        self.at.get(&sample).copied().unwrap_or(REST_MPS)
+    /// What may come on top of noise, sample by sample.
+    pub fn allowed_mps(&self) -> impl Fn(u64) -> f64 + '_ {
+        let found = RefCell::new(self.at.finder());
+        move |sample| found.borrow_mut().get(sample, ()).unwrap_or(REST_MPS)
+    }
+
+    /// That every bound could be read which was looked for.
+    pub fn sound(&self) -> Result<(), JudgeError> {
+        self.at.sound()
     }
 }

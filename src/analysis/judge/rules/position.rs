@@ -1,5 +1,6 @@
 //! Errors of the fixes, against the receiver's own covariance.
 
+use crate::analysis::error::JudgeError;
 use crate::analysis::judge::judgement::Bound;
 use crate::analysis::judge::summary::Summary;
 use crate::analysis::judge::verdict::Verdict;
@@ -12,21 +13,24 @@ const WORST_OF_TWELVE: f64 = 3.3;
 const STEPS_M: f64 = 0.035;
 
 impl Verdict {
-    pub(super) fn position(&mut self, run: &Run, summary: &Summary) {
+    pub(super) fn position(&mut self, run: &Run, summary: &Summary) -> Result<(), JudgeError> {
         let position = &summary.position;
         if run.fixes.is_empty() || !run.scene.expect.bounded(0.0) {
-            return;
+            return Ok(());
         }
         let expected = |factor: f64, of: fn(&Fix) -> f64| {
-            let variance = run.fixes.iter().map(of).sum::<f64>() / run.fixes.len().max(1) as f64;
-            (variance > 0.0).then(|| factor * variance.sqrt())
+            let mut sum = -0.0;
+            run.fixes.each(|fix| sum += of(&fix))?;
+            let variance = sum / run.fixes.len().max(1) as f64;
+            Ok::<_, JudgeError>((variance > 0.0).then(|| factor * variance.sqrt()))
         };
         // A circle that holds 95 % of two equal normals has a radius of √(−2 ln 0.05) σ; an ellipse of the
         // same mean variance needs less, so that the bound is not too tight.
-        let flat =
-            expected(2.4477, |fix| 0.5 * (fix.sigma_east_m * fix.sigma_east_m + fix.sigma_north_m * fix.sigma_north_m));
-        let up = expected(1.96, |fix| fix.sigma_up_m * fix.sigma_up_m);
-        let clock = expected(1.96, |fix| fix.sigma_clock_m * fix.sigma_clock_m);
+        let flat = expected(2.4477, |fix| {
+            0.5 * (fix.sigma_east_m * fix.sigma_east_m + fix.sigma_north_m * fix.sigma_north_m)
+        })?;
+        let up = expected(1.96, |fix| fix.sigma_up_m * fix.sigma_up_m)?;
+        let clock = expected(1.96, |fix| fix.sigma_clock_m * fix.sigma_clock_m)?;
         if let Some(measured) = &summary.ionosphere {
             // Errors last as long as an arc is smoothed, so that each satellite counts as one: the largest of
             // a dozen normals stays below 3.3 of their deviations in 99 of 100 runs.
@@ -46,5 +50,6 @@ impl Verdict {
             let source = format!("{factor} of the receiver's own covariance");
             self.judge(figure, path, value, "m", Bound::Max(bound), &source);
         }
+        Ok(())
     }
 }

@@ -1,8 +1,9 @@
 //! Satellites: those that are not there, and those that must be found, observed and used but are not, each
 //! with its reason; and decoded navigation parameters.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
+use crate::analysis::error::JudgeError;
 use crate::analysis::expect::due::{Expectations, Satellite};
 use crate::analysis::judge::judgement::Bound;
 use crate::analysis::judge::summary::Summary;
@@ -21,16 +22,16 @@ const UNUSED_PERCENT: f64 = 5.0;
 
 impl Verdict {
     /// Whether fixes say of the ionosphere what the settings and the decoded parameters allow.
-    pub(super) fn ionosphere_of_fixes(&mut self, run: &Run) {
+    pub(super) fn ionosphere_of_fixes(&mut self, run: &Run) -> Result<(), JudgeError> {
         let setting = |key: &str| run.receiver.pointer(&format!("/settings/position/{key}"));
         let corrected = setting("ionosphere").and_then(serde_json::Value::as_str);
         if matches!(corrected, None | Some("none")) {
-            return;
+            return Ok(());
         }
         let decoded = run.events.iter().find(|row| row.event == Event::IonosphereDecoded).map(|row| row.sample);
         let known = |fix: &Fix| decoded.is_some_and(|since| since <= fix.sample);
         let required = setting("require_ionosphere").and_then(serde_json::Value::as_bool) == Some(true);
-        let wrong = |fix: &&Fix| match fix.ionosphere {
+        let wrong = |fix: &Fix| match fix.ionosphere {
             IonosphereModel::None => true,
             IonosphereModel::Nominal => required || known(fix),
             IonosphereModel::Broadcast => !known(fix) || corrected == Some("nequick_g"),
@@ -38,9 +39,11 @@ impl Verdict {
             IonosphereModel::Combined => corrected != Some("combined"),
             IonosphereModel::Grid => setting("sbas").and_then(serde_json::Value::as_str) == Some("none"),
         };
-        let count = run.fixes.iter().filter(wrong).count();
+        let mut count: usize = 0;
+        run.fixes.each(|fix| count += usize::from(wrong(&fix)))?;
         let source = "decoded parameters are used from their event on, and none before";
         self.judge("fixes whose word on the ionosphere is impossible", "", count, "", Bound::Max(0.0), source);
+        Ok(())
     }
 
     pub(super) fn reception(&mut self, summary: &Summary) {
@@ -68,7 +71,10 @@ impl Verdict {
     }
 
     /// Satellites that the scene requires, against the receiver's own searches and observations.
-    pub(super) fn satellites(&mut self, run: &Run, expected: &Expectations) {
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
+    pub(super) fn satellites(&mut self, run: &Run, expected: &Expectations) -> Result<(), JudgeError> {
         let seen = Seen::of(run);
         let must = |of: fn(&Satellite) -> bool| expected.satellites.iter().filter(move |(_, one)| of(one));
         let found = must(|one| one.acquired_by_s.is_some()).count();
@@ -81,13 +87,14 @@ impl Verdict {
             self.explain(lines);
         }
         self.observed(expected, |link, one| seen.why_unobserved(link, one));
-        self.used(run, expected, &seen);
+        self.used(run, expected, &seen)?;
         let excused: Vec<String> = must(|one| one.acquired_by_s.is_none() && one.excuse.is_some())
             .filter_map(|(link, one)| Some(format!("{} ({})", link.sv, one.excuse?.word())))
             .collect();
         if !excused.is_empty() {
             self.not_judged.push(format!("satellites not required: {}", excused.join(", ")));
         }
+        Ok(())
     }
 
     /// Satellites that must be observed; `why` says what became of one that is not.
@@ -108,21 +115,21 @@ impl Verdict {
         self.explain(lines);
     }
 
-    fn used(&mut self, run: &Run, expected: &Expectations, seen: &Seen) {
-        let fixes: HashMap<u64, &Fix> = run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
+    fn used(&mut self, run: &Run, expected: &Expectations, seen: &Seen) -> Result<(), JudgeError> {
+        let mut fixes = run.fixes.finder()?;
         let (mut due, mut lacking) = (0_u64, 0_u64);
-        let mut left_out: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut left_out: BTreeMap<String, usize> = BTreeMap::new();
         for epoch in expected.epochs.iter().filter(|epoch| epoch.used > 0) {
-            let Some(fix) = fixes.get(&epoch.sample) else { continue };
+            let Some(fix) = fixes.get(epoch.sample) else { continue };
             due += u64::from(epoch.used);
             let excluded = fix.excluded.split_whitespace();
             // Where the scene expects any errors the residual test has a reason.
             let blameless = if run.scene.expect.bounded(epoch.time_s) { 0 } else { excluded.clone().count() as u32 };
             lacking += u64::from(epoch.used.saturating_sub(fix.satellites + blameless));
-            excluded.for_each(|name| *left_out.entry(name).or_default() += 1);
+            excluded.for_each(|name| *left_out.entry(name.to_owned()).or_default() += 1);
         }
         if due == 0 {
-            return;
+            return Ok(());
         }
         let mut lines: Vec<String> =
             left_out.iter().map(|(name, count)| format!("{name}: excluded from {count} fixes")).collect();
@@ -139,6 +146,7 @@ impl Verdict {
         let source = "healthy, above the receiver's mask, with an ephemeris that has been sent";
         self.judge("required satellites left out of fixes", "", percent, "%", Bound::Max(UNUSED_PERCENT), source);
         self.explain(if percent > 0.0 { lines } else { Vec::new() });
+        Ok(())
     }
 }
 

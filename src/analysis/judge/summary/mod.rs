@@ -21,8 +21,8 @@ use crate::analysis::measure::jitter::{Jitter as LoopJitter, Loop, Pooled};
 use crate::analysis::measure::lines::Lines;
 use crate::analysis::measure::slips::{Cause, Slips};
 use crate::analysis::measure::spoofing::Spoofing;
-use crate::analysis::read::{Run, Speed};
-use crate::analysis::statistics::{Spread, mean, percentile, pooled_std, rms, spread, std};
+use crate::analysis::read::{Numbers, Run, Speed};
+use crate::analysis::statistics::{Spread, Sum, mean};
 use crate::analysis::waveform::leading;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{Event, NavigationRow};
@@ -303,8 +303,8 @@ impl Summary {
     pub fn new(run: &Run, errors: &Errors, clock: &clock::Clock) -> Result<Self, JudgeError> {
         let mut details = Details::default();
         let satellites = satellites(run, &mut details);
-        let position = position(run, errors, &mut details);
-        let clock = clock_section(clock, &mut details);
+        let position = position(run, errors, &mut details)?;
+        let clock = clock_section(clock, &mut details)?;
         let observables = observables(errors, None, &mut details)?;
         let tracking = tracking(run, errors, &mut details)?;
         let navigation = navigation(run, &mut details);
@@ -326,8 +326,8 @@ impl Summary {
             signals: by_signal(run, errors)?,
             navigation,
             psd,
-            interference: Lines::of(run),
-            spoofing: Spoofing::of(run),
+            interference: Lines::of(run)?,
+            spoofing: Spoofing::of(run)?,
             ionosphere: Ionosphere::of(run)?,
             jammed: !run.scene.interference.is_empty(),
             speed: run.speed,
@@ -365,58 +365,64 @@ fn satellites(run: &Run, details: &mut Details) -> Satellites {
         // The truth's sky holds what is in view and nothing else; from space the mask does not bound it.
         in_view: run.in_view_at_start.len(),
         acquired: acquired.iter().map(|link| link.sv).collect::<BTreeSet<_>>().len(),
-        used: run.fixes.iter().map(|fix| fix.satellites as usize).max().unwrap_or(0),
+        used: run.fixes.most_satellites(),
         false_acquired: details.false_satellites.len(),
     }
 }
 
-fn position(run: &Run, errors: &Errors, details: &mut Details) -> Position {
+fn position(run: &Run, errors: &Errors, details: &mut Details) -> Result<Position, JudgeError> {
     let of = |f: &dyn Fn(&crate::analysis::measure::errors::PositionError) -> f64| {
-        errors.positions.iter().map(f).collect::<Vec<f64>>()
+        let mut found = Numbers::new(errors.positions.directory());
+        for error in errors.positions.cursor() {
+            found.push(f(&error?))?;
+        }
+        Ok::<_, JudgeError>(found)
     };
-    let [east, north, up] = [0, 1, 2].map(|axis| of(&|error| error.enu_m[axis]));
+    let axis = |axis: usize| of(&|error| error.enu_m[axis])?.spread();
+    (details.east_m, details.north_m, details.up_m) = (axis(0)?, axis(1)?, axis(2)?);
+    details.clock_m = of(&|error| error.clock_m)?.spread()?;
     let horizontal =
-        of(&|error| libm::hypot(error.enu_m.x, planted!("analysis.summary.horizontal", error.enu_m.y, 0.0)));
-    let vertical = of(&|error| error.enu_m.z.abs());
-    let error_3d = of(&|error| error.enu_m.norm());
-    let velocity = of(&|error| error.velocity_enu_mps.norm());
-    details.east_m = spread(&east);
-    details.north_m = spread(&north);
-    details.up_m = spread(&up);
-    details.clock_m = spread(&of(&|error| error.clock_m));
-    details.velocity_mps = spread(&velocity);
-    let bias = match (mean(&east), mean(&north), mean(&up)) {
-        (Some(east), Some(north), Some(up)) => Some([east, north, up]),
+        of(&|error| libm::hypot(error.enu_m.x, planted!("analysis.summary.horizontal", error.enu_m.y, 0.0)))?;
+    let vertical = of(&|error| error.enu_m.z.abs())?;
+    let error_3d = of(&|error| error.enu_m.norm())?;
+    let velocity = of(&|error| error.velocity_enu_mps.norm())?;
+    details.velocity_mps = velocity.spread()?;
+    let bias = match (details.east_m, details.north_m, details.up_m) {
+        (Some(east), Some(north), Some(up)) => Some([east.mean, north.mean, up.mean]),
         _ => None,
     };
-    Position {
+    Ok(Position {
         fixes: run.fixes.len(),
-        first_fix_s: run.fixes.iter().map(|fix| fix.sample).min().map(|sample| run.time_s(sample)),
-        horizontal_mean_m: mean(&horizontal),
-        horizontal_p95_m: percentile(&horizontal, 0.95),
-        vertical_p95_m: percentile(&vertical, 0.95),
-        error_3d_p95_m: percentile(&error_3d, 0.95),
+        first_fix_s: run.fixes.earliest_sample().map(|sample| run.time_s(sample)),
+        horizontal_mean_m: horizontal.mean()?,
+        horizontal_p95_m: horizontal.percentile(0.95)?,
+        vertical_p95_m: vertical.percentile(0.95)?,
+        error_3d_p95_m: error_3d.percentile(0.95)?,
         bias_enu_m: bias,
-        velocity_p95_mps: percentile(&velocity, 0.95),
+        velocity_p95_mps: velocity.percentile(0.95)?,
         nees_mean: None,
         nees_band: None,
         nees_independent: None,
         nees_verdict: None,
-    }
+    })
 }
 
-fn clock_section(clock: &clock::Clock, details: &mut Details) -> Clock {
-    let errors: Vec<f64> = clock.rows.iter().map(|row| row.error_s).collect();
-    let detrended =
-        |line: clock::Line| -> Vec<f64> { clock.rows.iter().map(|row| row.error_s - line.at(row.time_s)).collect() };
+fn clock_section(clock: &clock::Clock, details: &mut Details) -> Result<Clock, JudgeError> {
+    let (mut errors, directory) = (Sum::default(), clock.rows.directory());
+    let mut detrended = Numbers::new(directory);
+    for row in clock.rows.cursor() {
+        let row = row?;
+        errors.add(row.error_s);
+        clock.error_line.map_or(Ok(()), |line| detrended.push(row.error_s - line.at(row.time_s)))?;
+    }
     let (estimate, truth) = (clock.series(Of::Estimate), clock.series(Of::Truth));
     let at = |series: Option<&Series>, deviation| series?.at(deviation, 1.0);
     let value = |series, deviation| at(series, deviation).map(|point| point.deviation);
     details.clock_oadev_1s = at(estimate, Deviation::Oadev);
-    Clock {
+    Ok(Clock {
         fixes: clock.rows.len(),
-        bias_mean_s: mean(&errors),
-        bias_sigma_s: clock.error_line.and_then(|line| std(&detrended(line))),
+        bias_mean_s: errors.mean(),
+        bias_sigma_s: detrended.std()?.map(|(sigma, _)| sigma),
         drift: clock.estimate_line.map(|line| line.slope),
         true_drift: clock.truth_line.map(|line| line.slope),
         oadev_1s: details.clock_oadev_1s.map(|point| point.deviation),
@@ -427,15 +433,13 @@ fn clock_section(clock: &clock::Clock, details: &mut Details) -> Clock {
         code_noise_oadev_1s: clock.code_sigma_s.map(|sigma_s| white_phase(Deviation::Oadev, sigma_s, 1.0, 1.0)),
         h: estimate.and_then(Series::power_law).map(|law| law.h),
         true_h: truth.and_then(Series::power_law).map(|law| law.h),
-    }
+    })
 }
 
 fn by_signal(run: &Run, errors: &Errors) -> Result<BTreeMap<&'static str, BySignal>, JudgeError> {
     let signals: BTreeSet<&'static Signal> = errors.signals.keys().map(|link| link.signal).collect();
     let one = |signal: &'static Signal| {
-        let sigma = |of: LoopError| {
-            Ok::<_, JudgeError>(pooled_std(errors.settled_of(Some(signal), of)?.iter().map(Vec::as_slice)))
-        };
+        let sigma = |of: LoopError| errors.settled_std(Some(signal), of);
         let lost = run.events.iter().filter(|row| row.event == Event::LossOfLock && row.signal == signal);
         let figures = BySignal {
             satellites: errors.signals.keys().filter(|link| link.signal == signal).count(),
@@ -455,26 +459,39 @@ fn by_signal(run: &Run, errors: &Errors) -> Result<BTreeMap<&'static str, BySign
 /// Of one signal, or of all.
 fn observables(errors: &Errors, signal: Option<&Signal>, details: &mut Details) -> Result<Observables, JudgeError> {
     let code = errors.code_without_clock_m(signal)?;
-    let carrier = errors.pooled_of(signal, |error| error.carrier_cycles)?;
-    let doppler = errors.pooled_of(signal, |error| error.doppler_hz)?;
-    let cn0 = errors.pooled_of(signal, |error| error.cn0_dbhz - error.cn0_effective_dbhz)?;
-    let mut means = Vec::new();
+    let pseudorange_rms_m = code.rms()?;
+    details.pseudorange_m = code.spread()?;
+    drop(code);
+    let carrier = errors.pooled(signal, |error| error.carrier_cycles)?;
+    let carrier_rms_cycles = carrier.rms()?;
+    details.carrier_cycles = carrier.spread()?;
+    drop(carrier);
+    let doppler = errors.pooled(signal, |error| error.doppler_hz)?;
+    let doppler_rms_hz = doppler.rms()?;
+    details.doppler_hz = doppler.spread()?;
+    drop(doppler);
+    let cn0 = errors.pooled(signal, |error| error.cn0_dbhz - error.cn0_effective_dbhz)?;
+    details.cn0_db = cn0.spread()?;
+    let (mut means, [mut truth, mut effective, mut measured]) = (Vec::new(), [Sum::default(); 3]);
     for link in errors.signals.keys().filter(|link| signal.is_none_or(|signal| link.signal == signal)) {
-        means.extend(mean(&errors.signals.map(link, |row| row.code_m)?));
+        let mut code_m = Sum::default();
+        errors.signals.each(link, |row| {
+            code_m.add(row.code_m);
+            truth.add(row.cn0_true_dbhz);
+            effective.add(row.cn0_effective_dbhz);
+            measured.add(row.cn0_dbhz);
+        })?;
+        means.extend(code_m.mean());
     }
-    details.pseudorange_m = spread(&code);
-    details.carrier_cycles = spread(&carrier);
-    details.doppler_hz = spread(&doppler);
-    details.cn0_db = spread(&cn0);
-    details.cn0_true_dbhz = mean(&errors.pooled_of(signal, |error| error.cn0_true_dbhz)?);
-    details.cn0_effective_dbhz = mean(&errors.pooled_of(signal, |error| error.cn0_effective_dbhz)?);
-    details.cn0_measured_dbhz = mean(&errors.pooled_of(signal, |error| error.cn0_dbhz)?);
+    details.cn0_true_dbhz = truth.mean();
+    details.cn0_effective_dbhz = effective.mean();
+    details.cn0_measured_dbhz = measured.mean();
     Ok(Observables {
-        pseudorange_rms_m: rms(&code),
+        pseudorange_rms_m,
         pseudorange_bias_m: mean(&means),
-        carrier_rms_cycles: rms(&carrier),
-        doppler_rms_hz: rms(&doppler),
-        cn0_bias_db: mean(&cn0),
+        carrier_rms_cycles,
+        doppler_rms_hz,
+        cn0_bias_db: cn0.mean()?,
     })
 }
 
@@ -486,8 +503,7 @@ pub(crate) const PLL_DEG: LoopError = |_, row| row.carrier_cycles * 360.0;
 pub(crate) const FLL_HZ: LoopError = |_, row| row.doppler_hz;
 
 fn tracking(run: &Run, errors: &Errors, details: &mut Details) -> Result<Tracking, JudgeError> {
-    let sigma = |of: LoopError| Ok::<_, JudgeError>(pooled_std(errors.settled(of)?.iter().map(Vec::as_slice)));
-
+    let sigma = |of: LoopError| errors.settled_std(None, of);
     // Of a receiver that does not say, the longest code period.
     let periods = run.signals.iter().filter_map(|signal| leading(signal)).map(Component::period_s);
     let longest_s = periods.fold(0.0, f64::max);

@@ -15,8 +15,9 @@ use crate::analysis::error::JudgeError;
 use crate::analysis::expect::theory::clock::PowerLaw;
 use crate::analysis::measure::allan::{self, Deviation, Point, decades, fit, octaves};
 use crate::analysis::measure::errors::Errors;
-use crate::analysis::read::Run;
-use crate::analysis::statistics::{mean, median, pooled_std};
+use crate::analysis::read::spill_store::{SpillRow, Words};
+use crate::analysis::read::{Run, Table};
+use crate::analysis::statistics::{mean, median};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 
 /// Probability with which an interval contains the true deviation.
@@ -39,6 +40,26 @@ pub struct ClockRow {
     pub detrended_s: f64,
 }
 
+impl SpillRow<()> for ClockRow {
+    const WORDS: usize = 6;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.push(self.sample);
+        words.extend([self.time_s, self.estimate_s, self.truth_s, self.error_s, self.detrended_s].map(f64::to_bits));
+    }
+
+    fn take((): (), words: &mut Words<'_>) -> Self {
+        Self {
+            sample: words.word(),
+            time_s: words.number(),
+            estimate_s: words.number(),
+            truth_s: words.number(),
+            error_s: words.number(),
+            detrended_s: words.number(),
+        }
+    }
+}
+
 /// A straight line through a series, by least squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
@@ -50,10 +71,9 @@ pub struct Line {
 
 impl Line {
     /// `None` without two different times.
-    fn through(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Self> {
-        let [times, values]: [Vec<f64>; 2] = [points.clone().map(|p| p.0).collect(), points.map(|p| p.1).collect()];
-        let middle = (mean(&times)?, mean(&values)?);
-        let about = || times.iter().zip(&values).map(|(time, value)| (time - middle.0, value - middle.1));
+    fn through(times: &[f64], values: &[f64]) -> Option<Self> {
+        let middle = (mean(times)?, mean(values)?);
+        let about = || times.iter().zip(values).map(|(time, value)| (time - middle.0, value - middle.1));
         let square: f64 = about().map(|(time, _)| time * time).sum();
         let product: f64 = about().map(|(time, value)| time * value).sum();
         (square > 0.0).then(|| Self { middle, slope: product / square })
@@ -134,10 +154,10 @@ impl Series {
 }
 
 /// The clock over a run.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug)]
 pub struct Clock {
     /// The longest stretch of fixes without a gap.
-    pub rows: Vec<ClockRow>,
+    pub rows: Table<ClockRow>,
     /// Straight line of the estimate.
     pub estimate_line: Option<Line>,
     /// Straight line of the truth.
@@ -160,42 +180,67 @@ impl Clock {
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
-        let samples: Vec<u64> = errors.positions.iter().map(|error| error.sample).collect();
+        let samples = errors.positions.map(|error| error.sample)?;
         let stretch = longest_even(&samples);
-        let mut rows: Vec<ClockRow> = errors.positions[stretch.clone()]
-            .iter()
-            .map(|error| {
-                let error_s = -error.clock_m / SPEED_OF_LIGHT_MPS;
-                let (truth_s, estimate_s) = (error.true_clock_s, error.true_clock_s + error_s);
-                ClockRow { sample: error.sample, time_s: error.time_s, estimate_s, truth_s, error_s, detrended_s: 0.0 }
+        let tau0_s = interval_s(run, &samples[stretch.clone()]);
+        drop(samples);
+        let each = |see: &mut dyn FnMut(ClockRow)| {
+            let mut number = 0;
+            errors.positions.each(|error| {
+                number += 1;
+                if stretch.contains(&(number - 1)) {
+                    let error_s = -error.clock_m / SPEED_OF_LIGHT_MPS;
+                    let (truth_s, estimate_s) = (error.true_clock_s, error.true_clock_s + error_s);
+                    let (sample, time_s) = (error.sample, error.time_s);
+                    see(ClockRow { sample, time_s, estimate_s, truth_s, error_s, detrended_s: 0.0 });
+                }
             })
-            .collect();
-        let line = |of: fn(&ClockRow) -> f64| Line::through(rows.iter().map(|row| (row.time_s, of(row))));
-        let (estimate_line, truth_line, error_line) =
-            (line(|row| row.estimate_s), line(|row| row.truth_s), line(|row| row.error_s));
-        for row in &mut rows {
+        };
+        let of_rows = |of: fn(&ClockRow) -> f64| {
+            let mut found = Vec::with_capacity(stretch.len());
+            each(&mut |row| found.push(of(&row)))?;
+            Ok::<_, JudgeError>(found)
+        };
+        let times = of_rows(|row| row.time_s)?;
+        let (estimate, error) = (of_rows(|row| row.estimate_s)?, of_rows(|row| row.error_s)?);
+        let line = |values: &[f64]| Line::through(&times, values);
+        let (estimate_line, error_line) = (line(&estimate), line(&error));
+        let truth_line = line(&of_rows(|row| row.truth_s)?);
+        drop(times);
+        let mut rows = Table::new(errors.positions.directory());
+        let mut put = Ok(());
+        each(&mut |mut row| {
             row.detrended_s = row.estimate_s - estimate_line.map_or(row.estimate_s, |line| line.at(row.time_s));
-        }
-        let of_rows = |of: fn(&ClockRow) -> f64| rows.iter().map(of).collect::<Vec<f64>>();
+            if put.is_ok() {
+                put = rows.push(row);
+            }
+        })?;
+        put?;
         let mut series = Vec::new();
-        if let Some(tau0_s) = interval_s(run, &samples[stretch]) {
-            series.push(Series::new(Of::Estimate, of_rows(|row| row.estimate_s), tau0_s));
-            series.push(Series::new(Of::Error, of_rows(|row| row.error_s), tau0_s));
+        if let Some(tau0_s) = tau0_s {
+            series.push(Series::new(Of::Estimate, estimate, tau0_s));
+            series.push(Series::new(Of::Error, error, tau0_s));
         }
-        series.extend(truth(run));
-        let sigma_s = |sigma_m: Option<f64>| Some(tdop(run, &rows)? * sigma_m? / SPEED_OF_LIGHT_MPS);
-        let code = errors.settled(|_, row| row.code_m)?;
-        let carrier = errors.settled(|link, row| row.carrier_cycles * link.wavelength_m())?;
+        series.extend(truth(run)?);
+        let tdop = tdop(run, &rows)?;
+        let sigma_s = |sigma_m: Option<f64>| Some(tdop? * sigma_m? / SPEED_OF_LIGHT_MPS);
+        let code_m = errors.settled_std(None, |_, row| row.code_m)?;
+        let carrier_m = errors.settled_std(None, |link, row| row.carrier_cycles * link.wavelength_m())?;
         Ok(Self {
             estimate_line,
             truth_line,
             error_line,
             series,
-            code_sigma_s: sigma_s(pooled_std(code.iter().map(Vec::as_slice))),
-            carrier_sigma_s: sigma_s(pooled_std(carrier.iter().map(Vec::as_slice))),
+            code_sigma_s: sigma_s(code_m),
+            carrier_sigma_s: sigma_s(carrier_m),
             oscillator: run.scene.oscillator.map(|oscillator| PowerLaw { h: oscillator.h }),
             rows,
         })
+    }
+
+    /// Gives the phases of its series back; what was found of them stays.
+    pub(in crate::analysis) fn forget_phases(&mut self) {
+        self.series.iter_mut().for_each(|series| series.phases_s = Vec::new());
     }
 
     /// One of its series.
@@ -251,12 +296,19 @@ impl AllanRow {
 }
 
 /// The clock as it was, over the whole run.
-fn truth(run: &Run) -> Option<Series> {
-    let samples: Vec<u64> = run.trajectory.iter().map(|row| row.sample).collect();
+fn truth(run: &Run) -> Result<Option<Series>, JudgeError> {
+    let samples = run.trajectory.map(|row| row.sample)?;
     let stretch = longest_even(&samples);
-    let tau0_s = interval_s(run, &samples[stretch.clone()])?;
-    let phases_s = run.trajectory[stretch].iter().map(|row| row.clock_bias_s).collect();
-    Some(Series::new(Of::Truth, phases_s, tau0_s))
+    let tau0_s = interval_s(run, &samples[stretch.clone()]);
+    drop(samples);
+    let Some(tau0_s) = tau0_s else { return Ok(None) };
+    let mut phases_s = Vec::with_capacity(stretch.len());
+    let mut number = 0;
+    run.trajectory.each(|row| {
+        phases_s.extend(stretch.contains(&number).then_some(row.clock_bias_s));
+        number += 1;
+    })?;
+    Ok(Some(Series::new(Of::Truth, phases_s, tau0_s)))
 }
 
 /// The longest run of samples at their usual distance, within one: an interval need not be a whole number of
@@ -283,9 +335,11 @@ fn interval_s(run: &Run, samples: &[u64]) -> Option<f64> {
 }
 
 /// Median time dilution of the fixes in a stretch.
-fn tdop(run: &Run, rows: &[ClockRow]) -> Option<f64> {
-    let within = rows.first()?.sample..=rows.last()?.sample;
-    median(&run.fixes.iter().filter(|fix| within.contains(&fix.sample)).map(|fix| fix.tdop).collect::<Vec<_>>())
+fn tdop(run: &Run, rows: &Table<ClockRow>) -> Result<Option<f64>, JudgeError> {
+    let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(None) };
+    let mut found = Vec::new();
+    run.fixes.each(|fix| found.extend((first.sample..=last.sample).contains(&fix.sample).then_some(fix.tdop)))?;
+    Ok(median(&found))
 }
 
 #[cfg(test)]

@@ -17,9 +17,9 @@ fn the_longest_stretch_without_a_gap_is_taken_though_an_interval_is_no_whole_num
 
 #[test]
 fn a_line_goes_through_the_middle_with_the_slope_of_least_squares() {
-    let line = Line::through([(0.0, 1.0), (1.0, 2.0), (2.0, 6.0)].into_iter()).unwrap();
+    let line = Line::through(&[0.0, 1.0, 2.0], &[1.0, 2.0, 6.0]).unwrap();
     assert!((line.slope - 2.5).abs() < 1e-15 && (line.at(1.0) - 3.0).abs() < 1e-15);
-    assert_eq!(Line::through([(1.0, 1.0)].into_iter()), None);
+    assert_eq!(Line::through(&[1.0], &[1.0]), None);
 }
 
 fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Vec<T> {

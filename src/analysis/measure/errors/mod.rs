@@ -5,14 +5,15 @@
 //! constant, a multiple of half a cycle, is taken from each uninterrupted arc. What the receiver
 //! reports where the truth has no row (a satellite that is not there) is counted, not measured.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::multiple_access::MultipleAccess;
-use crate::analysis::read::Run;
-use crate::analysis::read::spill_store::{SpillRow, SpillStore, Words};
+use crate::analysis::read::numbers::Pooled;
+use crate::analysis::read::spill_store::{Finder, SpillRow, SpillStore, Words};
+use crate::analysis::read::{Numbers, Run, Table};
 use crate::analysis::statistics::median;
 use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use crate::gnss::record::{Event, EventRow, Observation};
@@ -89,16 +90,67 @@ impl SpillRow<Link> for SignalError {
     }
 }
 
+impl SpillRow<()> for PositionError {
+    const WORDS: usize = 10;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.extend([self.sample, self.time_s.to_bits()]);
+        words.extend(self.enu_m.iter().map(|value| value.to_bits()));
+        words.extend([self.clock_m, self.true_clock_s].map(f64::to_bits));
+        words.extend(self.velocity_enu_mps.iter().map(|value| value.to_bits()));
+    }
+
+    fn take((): (), words: &mut Words<'_>) -> Self {
+        let (sample, time_s) = (words.word(), words.number());
+        let enu_m = Vector3::from_fn(|_, _| words.number());
+        let (clock_m, true_clock_s) = (words.number(), words.number());
+        let velocity_enu_mps = Vector3::from_fn(|_, _| words.number());
+        Self { sample, time_s, enu_m, clock_m, true_clock_s, velocity_enu_mps }
+    }
+}
+
+/// Sum and number of a signal's code errors at an epoch.
+struct EpochSum {
+    sample: u64,
+    sum_m: f64,
+    count: u64,
+}
+
+impl SpillRow<&'static Signal> for EpochSum {
+    const WORDS: usize = 3;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.extend([self.sample, self.sum_m.to_bits(), self.count]);
+    }
+
+    fn take(_: &'static Signal, words: &mut Words<'_>) -> Self {
+        Self { sample: words.word(), sum_m: words.number(), count: words.word() }
+    }
+}
+
+/// What the code errors of a signal have in common, by the samples of their epochs.
+pub struct Common<'e>(Finder<'e, &'static Signal, EpochSum>);
+
+impl Common<'_> {
+    /// Mean of the code errors at an epoch, and how many they are.
+    pub fn get(&mut self, sample: u64) -> Option<(f64, u64)> {
+        self.0.get(sample).map(|EpochSum { sum_m, count, .. }| (sum_m / count as f64, count))
+    }
+
+    /// The same where there are several.
+    pub fn of_several(&mut self, sample: u64) -> Option<f64> {
+        self.get(sample).filter(|(_, count)| *count > 1).map(|(mean_m, _)| mean_m)
+    }
+}
+
 /// Every error of a run.
-#[derive(Debug)]
 pub struct Errors {
     /// In the order of their samples.
     pub signals: SpillStore<Link, SignalError>,
-    /// Sum and number of the code errors of each epoch, signal by signal: what signals differ by is no error
-    /// of a satellite.
-    epochs: BTreeMap<(u64, &'static Signal), (f64, usize)>,
+    /// Those of each epoch together, signal by signal: what signals differ by is no error of a satellite.
+    epochs: SpillStore<&'static Signal, EpochSum>,
     /// Errors of all fixes that have a truth.
-    pub positions: Vec<PositionError>,
+    pub positions: Table<PositionError>,
     /// Changes of the carrier's constant: those declared by the receiver's events after a satellite's first
     /// observation, and jumps of at least [`SLIP_CYCLES`] that stay and that it did not declare.
     pub cycle_slips: usize,
@@ -113,9 +165,9 @@ const DETECTION_S: f64 = 0.5;
 
 /// Whether a sample that the truth has for other satellites follows so closely on this one's last row that no
 /// receiver can know yet that the signal is gone.
-fn has_just_gone(run: &Run, link: Link, sample: u64, truth: &HashMap<u64, Observation>) -> bool {
-    let last = truth.keys().copied().filter(|before| *before < sample).max();
-    run.cn0_most_hz.contains_key(&(sample, link.signal.name))
+fn has_just_gone(run: &Run, link: Link, sample: u64, truth: &mut Finder<'_, Link, Observation>) -> bool {
+    let last = truth.before(sample);
+    run.cn0_most_hz.finder().get(sample, link.signal).is_some()
         && last.is_some_and(|last| run.time_s(sample) - run.time_s(last) <= DETECTION_S)
 }
 
@@ -129,10 +181,11 @@ const SIDE: usize = 5;
 impl Errors {
     /// Joins and measures; rows that are too many for memory spill to a file beside those of the run.
     pub fn measure(run: &Run) -> Result<Self, JudgeError> {
+        let directory = run.observations.directory();
         let mut errors = Self {
-            signals: SpillStore::new(run.observations.directory()),
-            epochs: BTreeMap::new(),
-            positions: Vec::new(),
+            signals: SpillStore::new(directory),
+            epochs: SpillStore::new(directory),
+            positions: Table::new(directory),
             cycle_slips: 0,
             unmatched: 0,
         };
@@ -143,21 +196,23 @@ impl Errors {
         if errors.signals.is_empty() && !run.observations.is_empty() {
             return Err(JudgeError::NothingJoins { what: "observations", count: run.observations.len() });
         }
+        errors.sum_epochs()?;
         errors.measure_positions(run)?;
         Ok(errors)
     }
 
     fn measure_signal(&mut self, run: &Run, access: &MultipleAccess<'_>, link: Link) -> Result<(), JudgeError> {
-        let truth: HashMap<u64, Observation> = run.truth.map(link, |row| (row.sample, row))?.into_iter().collect();
-        let mut rows = Vec::new();
-        for estimate in run.observations.rows(link)? {
+        let mut truth = run.truth.finder(link)?;
+        let mut rows = Vec::with_capacity(run.observations.count(&link));
+        for estimate in run.observations.cursor(link) {
+            let estimate = estimate?;
             let at = planted!(
                 "analysis.errors.join",
                 estimate.sample,
                 run.observations.rows(link)?.first().map_or(0, |row| row.sample)
             );
-            let Some(true_row) = truth.get(&at) else {
-                self.unmatched += usize::from(!has_just_gone(run, link, at, &truth));
+            let Some(true_row) = truth.get(at) else {
+                self.unmatched += usize::from(!has_just_gone(run, link, at, &mut truth));
                 continue;
             };
             let common = &run.common;
@@ -177,7 +232,7 @@ impl Errors {
                 ),
                 cn0_dbhz: estimate.cn0_dbhz,
                 cn0_true_dbhz: true_row.cn0_dbhz,
-                cn0_effective_dbhz: access.effective_dbhz(true_row),
+                cn0_effective_dbhz: access.effective_dbhz(&true_row),
                 locked_s: estimate.locked_s,
             });
         }
@@ -189,17 +244,38 @@ impl Errors {
             self.cycle_slips += declared.len() + level_carrier(&mut rows, &declared);
         }
         for row in &rows {
-            let (sum_m, count) = self.epochs.entry((row.sample, link.signal)).or_default();
-            (*sum_m, *count) = (*sum_m + row.code_m, *count + 1);
             self.signals.push(link, row)?;
         }
         Ok(())
     }
 
+    /// Adds the code errors of each epoch and signal up: the satellites' rows, which are in the order of
+    /// their samples, side by side.
+    fn sum_epochs(&mut self) -> Result<(), JudgeError> {
+        let signals: BTreeSet<&'static Signal> = self.signals.keys().map(|link| link.signal).collect();
+        for signal in signals {
+            let links = self.signals.keys().filter(|link| link.signal == signal);
+            let mut rows: Vec<_> = links.map(|link| self.signals.cursor(link)).collect();
+            let mut next = rows.iter_mut().map(|rows| rows.next().transpose()).collect::<Result<Vec<_>, _>>()?;
+            while let Some(sample) = next.iter().flatten().map(|row| row.sample).min() {
+                let mut epoch = EpochSum { sample, sum_m: 0.0, count: 0 };
+                for (next, rows) in next.iter_mut().zip(&mut rows) {
+                    while let Some(row) = next.filter(|row| row.sample == sample) {
+                        (epoch.sum_m, epoch.count) = (epoch.sum_m + row.code_m, epoch.count + 1);
+                        *next = rows.next().transpose()?;
+                    }
+                }
+                self.epochs.push(signal, &epoch)?;
+            }
+        }
+        Ok(())
+    }
+
     fn measure_positions(&mut self, run: &Run) -> Result<(), JudgeError> {
-        let truth: HashMap<u64, _> = run.trajectory.iter().map(|row| (row.sample, row)).collect();
-        for fix in &run.fixes {
-            let Some(true_row) = truth.get(&fix.sample) else { continue };
+        let mut truth = run.trajectory.finder()?;
+        let mut fixes = run.fixes.cursor();
+        while let Some(fix) = fixes.next().transpose()? {
+            let Some(true_row) = truth.get(fix.sample) else { continue };
             let to_enu = Geodetic::from_ecef(&true_row.position_m()).ecef_to_enu();
             self.positions.push(PositionError {
                 sample: fix.sample,
@@ -219,7 +295,7 @@ impl Errors {
                         fix.velocity_mps() - true_row.velocity_mps(),
                         Vector3::zeros()
                     ),
-            });
+            })?;
         }
         if self.positions.is_empty() && !run.fixes.is_empty() {
             return Err(JudgeError::NothingJoins { what: "fixes", count: run.fixes.len() });
@@ -232,54 +308,94 @@ impl Errors {
         self.signals.keys().filter(move |link| signal.is_none_or(|signal| link.signal == signal))
     }
 
-    /// One number of every observation.
-    pub fn pooled(&self, of: impl Fn(&SignalError) -> f64) -> Result<Vec<f64>, JudgeError> {
-        self.pooled_of(None, of)
-    }
-
-    /// The same of one signal, or of all.
-    pub fn pooled_of(&self, signal: Option<&Signal>, of: impl Fn(&SignalError) -> f64) -> Result<Vec<f64>, JudgeError> {
-        let mut all = Vec::with_capacity(self.signals.len());
+    /// One number of every observation, of one signal or of all.
+    ///
+    /// # Errors
+    /// [`JudgeError`] where rows cannot be read or numbers cannot be put away.
+    pub fn pooled(&self, signal: Option<&Signal>, of: impl Fn(&SignalError) -> f64) -> Result<Numbers, JudgeError> {
+        let mut all = Numbers::new(self.signals.directory());
         for link in self.of(signal) {
-            self.signals.each(link, |row| all.push(of(&row)))?;
+            for row in self.signals.cursor(link) {
+                all.push(of(&row?))?;
+            }
         }
         Ok(all)
     }
 
-    /// One number of every observation that is past its pull-in, a list a satellite.
-    pub fn settled(&self, of: impl Fn(&Link, &SignalError) -> f64) -> Result<Vec<Vec<f64>>, JudgeError> {
-        self.settled_of(None, of)
-    }
-
-    /// The same of one signal, or of all.
-    pub fn settled_of(
+    /// Shows `see` one number of every observation that is past its pull-in, a list a satellite; of one
+    /// signal, or of all.
+    ///
+    /// # Errors
+    /// As [`Self::pooled`].
+    pub fn settled(
         &self,
         signal: Option<&Signal>,
         of: impl Fn(&Link, &SignalError) -> f64,
-    ) -> Result<Vec<Vec<f64>>, JudgeError> {
-        let one = |link: Link| {
-            let mut found = Vec::with_capacity(self.signals.count(&link));
-            self.signals.each(link, |row| found.extend((row.locked_s >= PULL_IN_S).then(|| of(&link, &row))))?;
-            Ok(found)
-        };
-        self.of(signal).map(one).collect()
+        mut see: impl FnMut(&Numbers) -> Result<(), JudgeError>,
+    ) -> Result<(), JudgeError> {
+        for link in self.of(signal) {
+            let mut found = Numbers::new(self.signals.directory());
+            for row in self.signals.cursor(link) {
+                let row = row?;
+                if row.locked_s >= PULL_IN_S {
+                    found.push(of(&link, &row))?;
+                }
+            }
+            see(&found)?;
+        }
+        Ok(())
+    }
+
+    /// Standard deviation of those numbers, each satellite about its own mean.
+    ///
+    /// # Errors
+    /// As [`Self::pooled`].
+    pub fn settled_std(
+        &self,
+        signal: Option<&Signal>,
+        of: impl Fn(&Link, &SignalError) -> f64,
+    ) -> Result<Option<f64>, JudgeError> {
+        let mut pooled = Pooled::default();
+        self.settled(signal, of, |group| pooled.add(group))?;
+        Ok(pooled.std())
     }
 
     /// Code errors after the mean over the satellites of each epoch and signal is removed: receiver clock,
     /// time scale and the delay of the signal's own path. Epochs of one satellite are left out. With n
     /// satellites the mean takes 1/n of the variance with it. Of one signal, or of all.
-    pub fn code_without_clock_m(&self, of: Option<&Signal>) -> Result<Vec<f64>, JudgeError> {
-        let mut all = Vec::with_capacity(self.signals.len());
+    ///
+    /// # Errors
+    /// As [`Self::pooled`].
+    pub fn code_without_clock_m(&self, of: Option<&Signal>) -> Result<Numbers, JudgeError> {
+        let mut all = Numbers::new(self.signals.directory());
         for link in self.of(of) {
-            let several = |row: &SignalError| self.common_m(link.signal, row.sample).filter(|(_, count)| *count > 1);
-            self.signals.each(link, |row| all.extend(several(&row).map(|(common_m, _)| row.code_m - common_m)))?;
+            let mut common = self.common(link.signal)?;
+            for row in self.signals.cursor(link) {
+                let row = row?;
+                if let Some(common_m) = common.of_several(row.sample) {
+                    all.push(row.code_m - common_m)?;
+                }
+            }
         }
         Ok(all)
     }
 
-    /// Mean of a signal's code errors at an epoch, and how many they are.
-    pub fn common_m(&self, signal: &'static Signal, sample: u64) -> Option<(f64, usize)> {
-        self.epochs.get(&(sample, signal)).map(|(sum_m, count)| (sum_m / *count as f64, *count))
+    /// What the code errors of a signal have in common.
+    ///
+    /// # Errors
+    /// As [`SpillStore::finder`].
+    pub fn common(&self, signal: &'static Signal) -> Result<Common<'_>, JudgeError> {
+        Ok(Common(self.epochs.finder(signal)?))
+    }
+
+    /// That all rows could be read which were looked for by their samples.
+    ///
+    /// # Errors
+    /// As [`SpillStore::sound`].
+    pub fn sound(&self) -> Result<(), JudgeError> {
+        self.signals.sound()?;
+        self.epochs.sound()?;
+        self.positions.sound()
     }
 }
 

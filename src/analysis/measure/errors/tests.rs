@@ -5,7 +5,7 @@ use crate::analysis::hand_made::{PLANTED, RATE_HZ, planted, planted_run, write};
 use crate::analysis::measure::clock::Clock;
 use crate::analysis::read::Emission;
 use crate::analysis::waveform::{Edge, Waveform};
-use crate::analysis::{Summary, judge, statistics};
+use crate::analysis::{Summary, judge};
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::synthetic::LONG_BOC;
@@ -97,7 +97,8 @@ fn what_signals_differ_by_is_no_error_and_each_disturbs_the_other() {
         let other = LONG_BOC.link(link.sv);
         for row in run.truth.rows(link).unwrap() {
             let row = Observation { signal: &LONG_BOC, ..row };
-            *run.cn0_sums_hz.entry((row.sample, Emission::of(other))).or_insert(0.0) += linear_hz(row.cn0_dbhz);
+            let own_hz = linear_hz(row.cn0_dbhz);
+            run.cn0_sums_hz.change(row.sample, Emission::of(other), |sum_hz| sum_hz + own_hz).unwrap();
             run.truth.push(other, &row).unwrap();
         }
         for row in run.observations.rows(link).unwrap() {
@@ -105,9 +106,10 @@ fn what_signals_differ_by_is_no_error_and_each_disturbs_the_other() {
             run.observations.push(other, &Observation { signal: &LONG_BOC, sent_fraction_s, ..row }).unwrap();
         }
     }
+    run.cn0_sums_hz.close().unwrap();
     run.signals.insert(&LONG_BOC);
     let both = Errors::measure(&run).unwrap();
-    let rms_m = |errors: &Errors| statistics::rms(&errors.code_without_clock_m(None).unwrap()).unwrap();
+    let rms_m = |errors: &Errors| errors.code_without_clock_m(None).unwrap().rms().unwrap().unwrap();
     // A fraction of a second resolves 1e-16 s.
     assert!((rms_m(&both) - rms_m(&alone)).abs() < 1e-6, "{} {}", rms_m(&both), rms_m(&alone));
     let summary = Summary::new(&run, &both, &Clock::measure(&run, &both).unwrap()).unwrap();
@@ -121,13 +123,15 @@ fn what_signals_differ_by_is_no_error_and_each_disturbs_the_other() {
     for (own, other, signal) in [(&code, &boc, &L1_CA), (&boc, &code, &LONG_BOC)] {
         let link = run.truth.keys().find(|link| link.signal == signal).unwrap();
         let row = both.signals.rows(link).unwrap()[0];
-        let sum_hz = run.cn0_sums_hz[&(row.sample, Emission::of(link))];
+        let mut levels = run.cn0_sums_hz.finder();
+        let mut sum_hz = |signal: &'static Signal| levels.get(row.sample, Emission::of(signal.link(link.sv))).unwrap();
+        let sums_hz = sum_hz(&L1_CA) + sum_hz(&LONG_BOC);
+        let sum_hz = sum_hz(signal);
         let own_hz = linear_hz(row.cn0_true_dbhz);
         let lost = 1.0 + kappa(own, own) * (sum_hz - own_hz) + kappa(own, other) * sum_hz;
         let found = linear_hz(row.cn0_true_dbhz - row.cn0_effective_dbhz);
         assert!((found / lost - 1.0).abs() < 1e-9, "{signal}: {found} {lost}");
         // In units of all power in the samples its spectrum does not matter.
-        let sums_hz: f64 = run.cn0_sums_hz.iter().filter(|((at, _), _)| *at == row.sample).map(|(_, hz)| hz).sum();
         let white_hz = own_hz / (1.0 + sums_hz / run.scene.sample_rate_hz);
         let found_hz = MultipleAccess::new(&run).white_hz(row.sample, link, own_hz);
         assert!((found_hz / white_hz - 1.0).abs() < 1e-9, "{signal}: {found_hz} {white_hz}");

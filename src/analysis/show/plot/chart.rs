@@ -156,14 +156,95 @@ impl Series {
     /// drawn.
     pub fn thin(&mut self, clouds: usize) {
         if !matches!(self.mark, Mark::Bars(_) | Mark::Tile(..)) {
-            let most = if self.is_cloud() { (MOST_MARKS / clouds.max(1)).clamp(100, MOST_POINTS) } else { MOST_POINTS };
-            self.points = thinned(&self.points, self.mark, most);
+            self.points = thinned(&self.points, self.mark, self.mark.most_points(clouds));
         }
     }
 
     /// Whether its points are separate marks.
     pub(super) fn is_cloud(&self) -> bool {
-        matches!(self.mark, Mark::Dots | Mark::Rings)
+        self.mark.is_cloud()
+    }
+}
+
+impl Mark {
+    fn is_cloud(self) -> bool {
+        matches!(self, Self::Dots | Self::Rings)
+    }
+
+    /// Points with which a series of it is drawn where so many series of marks share a chart.
+    fn most_points(self, clouds: usize) -> usize {
+        if self.is_cloud() { (MOST_MARKS / clouds.max(1)).clamp(100, MOST_POINTS) } else { MOST_POINTS }
+    }
+}
+
+/// Ends of a range of numbers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ends {
+    low: f64,
+    high: f64,
+}
+
+impl Ends {
+    /// Of no number.
+    pub fn none() -> Self {
+        Self { low: f64::INFINITY, high: f64::NEG_INFINITY }
+    }
+
+    /// Counts a number in that is finite.
+    pub fn add(&mut self, value: f64) {
+        if value.is_finite() {
+            *self = Self { low: self.low.min(value), high: self.high.max(value) };
+        }
+    }
+
+    /// Counts others in.
+    pub fn with(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// Both ends, if there is a number: an axis around all numbers is one around these.
+    pub fn values(self) -> impl Iterator<Item = f64> {
+        [self.low, self.high].into_iter().filter(move |_| self.low <= self.high)
+    }
+}
+
+/// The points of a series that are drawn, of however many, and the ends of all.
+pub(super) struct Shown {
+    pub points: Vec<(f64, f64)>,
+    pub x: Ends,
+    pub y: Ends,
+    /// How many of all are finite.
+    pub count: usize,
+}
+
+impl Shown {
+    /// Of the points that `each` shows whenever it is asked, which are drawn with that mark where one series
+    /// of marks is in the chart.
+    ///
+    /// # Errors
+    /// Those of `each`.
+    pub fn of<E>(mark: Mark, each: impl Fn(&mut dyn FnMut(f64, f64)) -> Result<(), E>) -> Result<Self, E> {
+        Self::among(1, mark, each)
+    }
+
+    /// The same where so many series of marks are in the chart.
+    ///
+    /// # Errors
+    /// Those of `each`.
+    pub fn among<E>(
+        clouds: usize,
+        mark: Mark,
+        each: impl Fn(&mut dyn FnMut(f64, f64)) -> Result<(), E>,
+    ) -> Result<Self, E> {
+        let (mut x, mut y, mut count) = (Ends::none(), Ends::none(), 0);
+        each(&mut |a, b| {
+            x.add(a);
+            y.add(b);
+            count += usize::from(a.is_finite() && b.is_finite());
+        })?;
+        let mut thinner = Thinner::new(mark, mark.most_points(clouds), count);
+        each(&mut |a, b| thinner.add((a, b)))?;
+        Ok(Self { points: thinner.points(), x, y, count })
     }
 }
 
@@ -175,23 +256,71 @@ const MOST_MARKS: usize = 4000;
 /// Few enough points to draw. Of a line, the lowest and the highest of each run of neighbours, so that no
 /// spike is lost; of separate marks, every so many, so that their density stays true.
 fn thinned(points: &[(f64, f64)], mark: Mark, most: usize) -> Vec<(f64, f64)> {
-    let finite: Vec<(f64, f64)> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
-    if finite.len() <= most {
-        return finite;
+    let count = points.iter().filter(|(x, y)| x.is_finite() && y.is_finite()).count();
+    let mut thinner = Thinner::new(mark, most, count);
+    points.iter().for_each(|point| thinner.add(*point));
+    thinner.points()
+}
+
+/// [`thinned`] of points that come one after the other.
+struct Thinner {
+    is_line: bool,
+    /// Neighbours of which the extremes of a line or the first of separate marks stay.
+    run: usize,
+    /// Finite points so far.
+    seen: usize,
+    /// Numbers and points of the lowest and the highest of the newest run.
+    extremes: Option<[(usize, (f64, f64)); 2]>,
+    points: Vec<(f64, f64)>,
+}
+
+impl Thinner {
+    /// For so many finite points.
+    fn new(mark: Mark, most: usize, count: usize) -> Self {
+        let is_line = matches!(mark, Mark::Line | Mark::Dash) && count > most;
+        let run = match count <= most {
+            true => 1,
+            false if is_line => count.div_ceil(most / 2),
+            false => count.div_ceil(most),
+        };
+        Self { is_line, run, seen: 0, extremes: None, points: Vec::new() }
     }
-    if !matches!(mark, Mark::Line | Mark::Dash) {
-        return finite.iter().copied().step_by(finite.len().div_ceil(most)).collect();
+
+    fn add(&mut self, point: (f64, f64)) {
+        if !point.0.is_finite() || !point.1.is_finite() {
+            return;
+        }
+        let begins = self.seen.is_multiple_of(self.run);
+        let new = (self.seen, point);
+        self.seen += 1;
+        if !self.is_line {
+            self.points.extend(begins.then_some(point));
+            return;
+        }
+        if begins {
+            self.close();
+        }
+        // Of equal ones the first is the lowest and the last the highest.
+        self.extremes = Some(self.extremes.map_or([new, new], |[low, high]| {
+            [
+                if point.1.total_cmp(&low.1.1).is_lt() { new } else { low },
+                if point.1.total_cmp(&high.1.1).is_ge() { new } else { high },
+            ]
+        }));
     }
-    let extremes = |run: &[(f64, f64)]| {
-        let numbered = || run.iter().enumerate();
-        let low = numbered().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
-        let high = numbered().max_by(|a, b| a.1.1.total_cmp(&b.1.1));
-        let mut pair: Vec<(usize, (f64, f64))> =
-            low.into_iter().chain(high).map(|(index, point)| (index, *point)).collect();
-        pair.sort_by_key(|(index, _)| *index);
-        pair.into_iter().map(|(_, point)| point)
-    };
-    finite.chunks(finite.len().div_ceil(most / 2)).flat_map(extremes).collect()
+
+    /// Ends a run of a line.
+    fn close(&mut self) {
+        if let Some([low, high]) = self.extremes.take() {
+            let pair = if low.0 <= high.0 { [low.1, high.1] } else { [high.1, low.1] };
+            self.points.extend(pair);
+        }
+    }
+
+    fn points(mut self) -> Vec<(f64, f64)> {
+        self.close();
+        self.points
+    }
 }
 
 /// The points with which a series is drawn, whoever made it.
@@ -214,5 +343,16 @@ mod tests {
         assert!(few.len() <= MOST_POINTS + 2);
         assert!(few.contains(&(54_321.0, 9.0)) && few.contains(&(54_400.0, -9.0)));
         assert!(few.windows(2).all(|pair| pair[0].0 <= pair[1].0));
+        // Points that come one after the other are thinned alike, and what is thin stays as it is.
+        for (mark, thin) in [(Mark::Line, few), (Mark::Dots, dots)] {
+            let each = |see: &mut dyn FnMut(f64, f64)| {
+                points.iter().for_each(|(x, y)| see(*x, *y));
+                Ok::<(), ()>(())
+            };
+            let shown = Shown::of(mark, each).unwrap();
+            assert_eq!(shown.points, thin);
+            assert_eq!(shown.y.values().collect::<Vec<_>>(), [-9.0, 9.0]);
+            assert_eq!(thinned(&thin, mark, MOST_POINTS), thin);
+        }
     }
 }

@@ -7,41 +7,47 @@ use crate::analysis::expect::theory::clock::white_phase;
 use crate::analysis::measure::allan::{Deviation, Point};
 use crate::analysis::measure::clock::{ClockRow, Line, Of};
 use crate::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::show::plot::chart::{Ends, Shown};
 use crate::analysis::show::plot::judged::Judged;
 use crate::analysis::show::plot::sketch::Sketch;
 
 type Points = Vec<(f64, f64)>;
 
+const ESTIMATE: (&str, RGBColor, Mark) = ("estimate", BLUE, Mark::Dots);
+const TRUTH: (&str, RGBColor, Mark) = ("truth", ORANGE, Mark::Line);
+const STRAIGHT: (&str, RGBColor, Mark) = ("straight line", COLOURS[6], Mark::Dash);
+
 /// Bias as estimated and as it was with the straight line through it, the error, and both without their
 /// lines.
 pub fn bias(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let clock = judged.clock;
-    let points = |scale: f64, of: &dyn Fn(&ClockRow) -> f64| -> Points {
-        clock.rows.iter().map(|row| (row.time_s, scale * of(row))).collect()
+    let mut times = Ends::none();
+    clock.rows.each(|row| times.add(row.time_s))?;
+    let shown = |(name, colour, mark): (&str, RGBColor, Mark), scale: f64, of: &dyn Fn(&ClockRow) -> f64| {
+        let shown = Shown::of(mark, |see| clock.rows.each(|row| see(row.time_s, scale * of(&row))))?;
+        Ok::<_, JudgeError>((Series::new(name, colour, mark, shown.points), shown.y))
     };
-    let straight = |scale: f64, line: Option<Line>| -> Points {
-        line.map_or_else(Vec::new, |line| points(scale, &|row| line.at(row.time_s)))
+    let line = |scale: f64, line: Option<Line>| match line {
+        Some(line) => shown(STRAIGHT, scale, &|row| line.at(row.time_s)),
+        None => Ok((Series::new(STRAIGHT.0, STRAIGHT.1, STRAIGHT.2, Vec::new()), Ends::none())),
     };
-    let line = |scale, of| Series::new("straight line", COLOURS[6], Mark::Dash, straight(scale, of));
-    let estimate = |points| Series::new("estimate", BLUE, Mark::Dots, points);
-    let truth = |points| Series::new("truth", ORANGE, Mark::Line, points);
-    let chart = |title: String, label: &str, least: f64, series: Vec<Series>| {
-        let values = series.iter().flat_map(|series| series.points.iter().map(|point| point.1));
-        let y = Axis::around(label, values, least);
-        Chart::new(title, judged.time_axis(clock.rows.iter().map(|row| row.time_s)), y, series)
+    let chart = |title: String, label: &str, least: f64, series: Vec<(Series, Ends)>| {
+        let ends = series.iter().fold(Ends::none(), |ends, (_, own)| ends.with(*own));
+        let series = series.into_iter().map(|(series, _)| series).collect();
+        Chart::new(title, judged.time_axis(times.values()), Axis::around(label, ends.values(), least), series)
     };
     let drift = |line: Option<Line>| line.map_or_else(|| "unknown".to_owned(), |line| format!("{:+.4e}", line.slope));
     let above = vec![
-        estimate(points(1e6, &|row| row.estimate_s)),
-        truth(points(1e6, &|row| row.truth_s)),
-        line(1e6, clock.estimate_line),
+        shown(ESTIMATE, 1e6, &|row| row.estimate_s)?,
+        shown(TRUTH, 1e6, &|row| row.truth_s)?,
+        line(1e6, clock.estimate_line)?,
     ];
     let title =
         format!("Clock bias: drift {} s/s estimated, {} s/s true", drift(clock.estimate_line), drift(clock.truth_line));
-    let legend = above.clone();
-    let error = vec![estimate(points(1e9, &|row| row.error_s)), line(1e9, clock.error_line)];
+    let legend: Vec<Series> = above.iter().map(|(series, _)| series.clone()).collect();
+    let error = vec![shown(ESTIMATE, 1e9, &|row| row.error_s)?, line(1e9, clock.error_line)?];
     let true_rest = |row: &ClockRow| clock.truth_line.map_or(0.0, |line| row.truth_s - line.at(row.time_s));
-    let rest = vec![truth(points(1e9, &true_rest)), estimate(points(1e9, &|row| row.detrended_s))];
+    let rest = vec![shown(TRUTH, 1e9, &true_rest)?, shown(ESTIMATE, 1e9, &|row| row.detrended_s)?];
     let charts = [
         chart(title, "bias (µs)", 1e-3, above),
         chart("Estimate minus truth".to_owned(), "error (ns)", 0.1, error),

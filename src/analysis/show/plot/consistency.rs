@@ -3,17 +3,18 @@
 use crate::analysis::error::JudgeError;
 use crate::analysis::measure::consistency::{FREEDOM, NormalisedError};
 use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::show::plot::chart::{Ends, Shown};
 use crate::analysis::show::plot::judged::Judged;
 use crate::analysis::show::plot::sketch::Sketch;
-
-type Points = Vec<(f64, f64)>;
 
 /// Draws them.
 pub fn consistency(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let found = judged.consistency;
-    let x = judged.time_axis(found.rows.iter().map(|row| row.time_s));
-    let over = |of: &dyn Fn(&NormalisedError) -> f64| -> Points {
-        found.rows.iter().map(|row| (row.time_s, of(row))).collect()
+    let mut times = Ends::none();
+    found.rows.each(|row| times.add(row.time_s))?;
+    let x = judged.time_axis(times.values());
+    let over = |mark: Mark, of: &dyn Fn(&NormalisedError) -> f64| {
+        Shown::of(mark, |see| found.rows.each(|row| see(row.time_s, of(&row))))
     };
     type Axis3 = (&'static str, fn(&NormalisedError) -> f64, fn(&NormalisedError) -> f64);
     let axes: [Axis3; 3] = [
@@ -21,22 +22,23 @@ pub fn consistency(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         ("North", |row| row.north_m, |row| row.sigma_north_m),
         ("Up", |row| row.up_m, |row| row.sigma_up_m),
     ];
-    let mut charts: Vec<Chart> = axes
-        .into_iter()
-        .map(|(name, error, sigma)| {
-            let series = vec![
-                Series::new("error", BLUE, Mark::Dots, over(&error)),
-                Series::new("formal ±2σ", ORANGE, Mark::Line, over(&|row| 2.0 * sigma(row))),
-                Series::new("", ORANGE, Mark::Line, over(&|row| -2.0 * sigma(row))),
-            ];
-            let y = Axis::around("error (m)", series.iter().flat_map(|s| s.points.iter().map(|p| p.1)), 0.2);
-            Chart::new(format!("{name} with the receiver's own ±2σ"), x.clone(), y, series)
-        })
-        .collect();
-    let nees = over(&|row| row.nees);
+    let mut charts = Vec::new();
+    for (name, error, sigma) in axes {
+        let error = over(Mark::Dots, &error)?;
+        let above = over(Mark::Line, &|row| 2.0 * sigma(row))?;
+        let below = over(Mark::Line, &|row| -2.0 * sigma(row))?;
+        let y = Axis::around("error (m)", error.y.with(above.y).with(below.y).values(), 0.2);
+        let series = vec![
+            Series::new("error", BLUE, Mark::Dots, error.points),
+            Series::new("formal ±2σ", ORANGE, Mark::Line, above.points),
+            Series::new("", ORANGE, Mark::Line, below.points),
+        ];
+        charts.push(Chart::new(format!("{name} with the receiver's own ±2σ"), x.clone(), y, series));
+    }
+    let nees = over(Mark::Dots, &|row| row.nees)?;
     let flat = |value: f64| vec![(x.from, value), (x.to, value)];
     let mut series = vec![
-        Series::new("normalised error²", BLUE, Mark::Dots, nees),
+        Series::new("normalised error²", BLUE, Mark::Dots, nees.points),
         Series::new("expected", GREEN, Mark::Dash, flat(FREEDOM)),
         Series::new("mean", ORANGE, Mark::Line, found.nees_mean.map(flat).unwrap_or_default()),
     ];
@@ -50,7 +52,8 @@ pub fn consistency(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         ),
         _ => "Normalised error squared: no fixes".to_owned(),
     };
-    let y = Axis::around("eᵀP⁻¹e", series.iter().flat_map(|s| s.points.iter().map(|p| p.1)).chain([0.0]), 4.0);
+    let others = series.iter().flat_map(|s| s.points.iter().map(|p| p.1)).chain([0.0]);
+    let y = Axis::around("eᵀP⁻¹e", others.chain(nees.y.values()), 4.0);
     charts.push(Chart::new(words, x, y, series));
     let legend = [
         Series::new("error", BLUE, Mark::Dots, Vec::new()),

@@ -3,6 +3,7 @@
 use crate::analysis::error::JudgeError;
 use crate::analysis::read::Emission;
 use crate::analysis::show::plot::canvas::{Axis, COLOURS, Chart, Mark, Series, WIDTH_PX};
+use crate::analysis::show::plot::chart::{Ends, Shown};
 use crate::analysis::show::plot::judged::Judged;
 use crate::analysis::show::plot::sketch::Sketch;
 use crate::gnss::record::SkyRow;
@@ -12,18 +13,19 @@ use crate::gnss::satellite::Sv;
 pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let run = judged.run;
     let chart = |title: &str, of: fn(&SkyRow) -> f64| {
-        let (mut series, mut ends, mut first_s) = (Vec::new(), vec![0.0], f64::INFINITY);
+        let (mut series, mut ends, mut times) = (Vec::new(), Ends::none(), Ends::none());
+        ends.add(0.0);
         for (index, sv) in run.in_the_sky().into_iter().enumerate() {
-            let points: Vec<(f64, f64)> = run.seen(sv, |row| (run.time_s(row.sample), of(&row)))?;
-            first_s = points.iter().map(|point| point.0).fold(first_s, f64::min);
-            let values = || points.iter().map(|point| point.1).filter(|value| value.is_finite());
-            ends.extend(values().reduce(f64::min).into_iter().chain(values().reduce(f64::max)));
-            let mut one = line(sv, index, points);
-            one.thin(1);
+            let mut one = line(sv, index, Vec::new());
+            let shown = Shown::of(one.mark, |see| {
+                run.seen(sv, |row| see(run.time_s(row.sample), of(&row))).map(|_: Vec<()>| ())
+            })?;
+            (ends, times) = (ends.with(shown.y), times.with(shown.x));
+            one.points = shown.points;
             series.push(one);
         }
-        let x = judged.time_axis(std::iter::once(first_s));
-        Ok::<_, JudgeError>(Chart::new(title, x, Axis::around("slant delay (m)", ends.into_iter(), 1.0), series))
+        let x = judged.time_axis(times.values());
+        Ok::<_, JudgeError>(Chart::new(title, x, Axis::around("slant delay (m)", ends.values(), 1.0), series))
     };
     let mut carriers = Emission::all(run.truth.keys()).into_iter();
     let first = carriers.next().map(|one| one.carrier_hz() / 1e6).filter(|_| carriers.next().is_none());

@@ -4,15 +4,21 @@ use crate::analysis::error::JudgeError;
 use crate::analysis::measure::elevation::{Point, points};
 use crate::analysis::show::plot::canvas::{Axis, Chart, WIDTH_PX};
 use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::signals::{Cloud, Frame, legend, observed, over_time};
+use crate::analysis::show::plot::signals::{Cloud, Frame, See, legend, observed, over_time};
 use crate::analysis::show::plot::sketch::Sketch;
 
 /// Draws them.
 pub fn elevation(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let links = observed(judged);
-    let points = |link| points(judged.run, judged.errors, link);
+    let points = |link, of: &dyn Fn(&Point) -> (f64, f64), see: See<'_>| {
+        points(judged.run, judged.errors, link, |point| {
+            let (x, y) = of(&point);
+            see(x, y);
+            Ok(())
+        })
+    };
     let chart = |title, y_label, least, of: fn(&Point) -> f64| {
-        let of_link = |link| Ok(points(link)?.iter().map(|point| (point.elevation_deg, of(point))).collect());
+        let of_link = |link, see: See<'_>| points(link, &|point| (point.elevation_deg, of(point)), see);
         let cloud = Cloud::new(judged, &links, &Frame { title, y_label, least }, of_link)?;
         Ok::<_, JudgeError>(Chart::new(title, Axis::new("elevation (degrees)", (0.0, 90.0)), cloud.y, cloud.series))
     };
@@ -25,8 +31,8 @@ pub fn elevation(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         chart("Carrier error", "error (cycles)", 0.01, |point| point.carrier_cycles)?,
         chart("Doppler error", "error (Hz)", 0.1, |point| point.doppler_hz)?,
         chart("C/N0 measured minus expected", "difference (dB)", 1.0, |point| point.cn0_db)?,
-        over_time(judged, &links, &combination, |link| {
-            Ok(points(link)?.iter().map(|point| (point.time_s, point.multipath_m)).collect())
+        over_time(judged, &links, &combination, |link, see| {
+            points(link, &|point| (point.time_s, point.multipath_m), see)
         })?,
     ];
     Ok(Some(Sketch::charts((WIDTH_PX, 900), 1, charts, legend(judged, &links))))

@@ -5,16 +5,16 @@ use std::f64::consts::TAU;
 use crate::analysis::error::JudgeError;
 use crate::analysis::judge::judgement::digits;
 use crate::analysis::judge::summary::{DLL_CHIPS, FLL_HZ, PLL_DEG};
+use crate::analysis::read::Numbers;
 use crate::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREY, Mark, ORANGE, Series, WIDTH_PX};
 use crate::analysis::show::plot::judged::Judged;
 use crate::analysis::show::plot::sketch::Sketch;
-use crate::analysis::statistics::{mean, std};
 
 /// The errors of one loop, each satellite about its own mean, and the rule for their σ.
 pub(crate) struct Loop {
     pub name: &'static str,
     pub unit: &'static str,
-    pub errors: Vec<f64>,
+    pub errors: Numbers,
     pub threshold: f64,
 }
 
@@ -27,11 +27,11 @@ pub(crate) fn loops<'a>(judged: &'a Judged<'_>) -> impl Iterator<Item = Result<L
         ("FLL", "Hz", FLL_HZ, limits.fll_hz),
     ];
     all.into_iter().map(|(name, unit, of, threshold)| {
-        let mut errors = Vec::with_capacity(judged.errors.signals.len());
-        for group in judged.errors.settled(of)? {
-            let middle = mean(&group).unwrap_or(0.0);
-            errors.extend(group.into_iter().map(|value| value - middle));
-        }
+        let mut errors = Numbers::new(judged.errors.signals.directory());
+        judged.errors.settled(None, of, |group| {
+            let middle = group.mean()?.unwrap_or(0.0);
+            group.try_each(|value| errors.push(value - middle))
+        })?;
         Ok(Loop { name, unit, errors, threshold })
     })
 }
@@ -48,20 +48,20 @@ pub(crate) struct Histogram {
 }
 
 impl Histogram {
-    pub fn new(of: &Loop) -> Self {
-        let sigma = std(&of.errors).unwrap_or(0.0);
+    pub fn new(of: &Loop) -> Result<Self, JudgeError> {
+        let sigma = of.errors.std()?.map_or(0.0, |(sigma, _)| sigma);
         let tails = (5.0 * sigma).max(1e-9);
         // The threshold is drawn if it is not so far that the histogram would disappear.
         let half = if of.threshold < 2.0 * tails { tails.max(1.15 * of.threshold) } else { tails };
         let width = 2.0 * half / BINS as f64;
         let mut counts = [0; BINS];
-        for value in &of.errors {
+        of.errors.each(|value| {
             let bin = ((value + half) / width).floor();
             if let Some(count) = (bin >= 0.0).then(|| counts.get_mut(bin as usize)).flatten() {
                 *count += 1;
             }
-        }
-        Self { sigma, half, width, counts, total: of.errors.len() }
+        })?;
+        Ok(Self { sigma, half, width, counts, total: of.errors.len() })
     }
 
     /// Middle of a bin.
@@ -83,7 +83,7 @@ impl Histogram {
 
 /// Histograms with the fitted normal curve, ±σ and the threshold.
 pub fn jitter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
-    let charts = loops(judged).map(|one| Ok(histogram(&one?))).collect::<Result<Vec<Chart>, JudgeError>>()?;
+    let charts = loops(judged).map(|one| histogram(&one?)).collect::<Result<Vec<Chart>, JudgeError>>()?;
     let legend = [
         Series::new("replica − truth", BLUE, Mark::Bars(1.0), Vec::new()),
         Series::new("normal", COLOURS[6], Mark::Line, Vec::new()),
@@ -93,9 +93,9 @@ pub fn jitter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     Ok(Some(Sketch::charts((WIDTH_PX, 270), 3, charts, legend)))
 }
 
-fn histogram(of: &Loop) -> Chart {
+fn histogram(of: &Loop) -> Result<Chart, JudgeError> {
     let Loop { name, unit, threshold, .. } = of;
-    let histogram = Histogram::new(of);
+    let histogram = Histogram::new(of)?;
     let Histogram { sigma, half, width, .. } = histogram;
     let bars: Vec<(f64, f64)> = (0..BINS).map(|bin| (histogram.middle(bin), histogram.share(bin))).collect();
     let curve: Vec<(f64, f64)> = if sigma > 0.0 {
@@ -115,5 +115,5 @@ fn histogram(of: &Loop) -> Chart {
     }
     let x = Axis::new(&format!("error ({unit})"), (-half, half));
     let title = format!("{name}: σ {}, threshold {}", digits(sigma, 3), digits(*threshold, 3));
-    Chart::new(title, x, Axis::new("observations (%)", (0.0, top)), series)
+    Ok(Chart::new(title, x, Axis::new("observations (%)", (0.0, top)), series))
 }

@@ -19,18 +19,19 @@ pub fn multipath(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let errors = Frame { title: "Code error", y_label: "error (m)", least: 0.1 };
     let fading = Frame { title: "All rays against the direct one", y_label: "amplitude (dB)", least: 1.0 };
     let charts = [
-        over_time(judged, &links, &errors, |link| of_observations(judged, link, |row| row.code_m))?,
-        over_time(judged, &links, &fading, |link| {
+        over_time(judged, &links, &errors, |link, see| of_observations(judged, link, |row| row.code_m, see))?,
+        over_time(judged, &links, &fading, |link, see| {
             // Phasors of the echoes, summed at each instant.
             let mut sums: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
-            for ray in run.rays.rows(link)? {
+            run.rays.each(link, |ray| {
                 let sum = sums.entry(ray.sample).or_insert((1.0, 0.0));
                 let (sin, cos) = libm::sincos(TAU * ray.phase_cycles);
                 sum.0 += ray.amplitude_ratio * cos;
                 sum.1 += ray.amplitude_ratio * sin;
-            }
+            })?;
             let decibels = |(re, im): (f64, f64)| 20.0 * libm::log10(libm::hypot(re, im));
-            Ok(sums.into_iter().map(|(sample, sum)| (run.time_s(sample), decibels(sum))).collect())
+            sums.into_iter().for_each(|(sample, sum)| see(run.time_s(sample), decibels(sum)));
+            Ok(())
         })?,
     ];
     Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, charts, legend(judged, &links))))

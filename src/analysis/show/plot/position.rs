@@ -1,13 +1,12 @@
 //! Where the fixes fell: about the truth, over time, and along the way.
 
-use std::collections::HashMap;
-
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::measure::errors::PositionError;
 use crate::analysis::measure::spoofing;
 use crate::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::analysis::show::plot::chart::{Ends, Shown};
 use crate::analysis::show::plot::judged::Judged;
 use crate::analysis::show::plot::sketch::Sketch;
 use crate::analysis::statistics::percentile;
@@ -20,9 +19,12 @@ type Points = Vec<(f64, f64)>;
 /// errors.
 pub fn scatter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let errors = &judged.errors.positions;
-    let flat: Vec<Vector2<f64>> = errors.iter().map(|error| error.enu_m.xy()).collect();
-    let fixes = flat.iter().map(|at| (at.x, at.y)).collect();
-    let mut series = vec![Series::new("fixes", BLUE, Mark::Dots, fixes)];
+    let flat: Vec<Vector2<f64>> = errors.map(|error| error.enu_m.xy())?;
+    let fixes = Shown::of(Mark::Dots, |see| {
+        flat.iter().for_each(|at| see(at.x, at.y));
+        Ok::<_, JudgeError>(())
+    })?;
+    let mut series = vec![Series::new("fixes", BLUE, Mark::Dots, fixes.points)];
     if let Some(spread) = Spread::of(&flat) {
         for (p, colour) in [(0.5, GREEN), (0.95, ORANGE)] {
             series.push(Series::new(format!("{:.0} % ellipse", 100.0 * p), colour, Mark::Line, spread.ellipse(p)));
@@ -31,26 +33,29 @@ pub fn scatter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     }
     series.push(Series::new("truth", COLOURS[6], Mark::Cross, vec![(0.0, 0.0)]));
     let ends = || series.iter().flat_map(|one| one.points.iter()).flat_map(|&(x, y)| [x.abs(), y.abs()]);
-    let reach = 1.1 * ends().fold(0.05, f64::max);
+    let far = fixes.x.values().chain(fixes.y.values()).map(f64::abs);
+    let reach = 1.1 * ends().chain(far).fold(0.05, f64::max);
     let axis = |label| Axis::new(label, (-reach, reach));
     let mut legend = series.clone();
     let mut cloud = Chart::new("Horizontal error", axis("east (m)"), axis("north (m)"), series);
     cloud.equal = true;
 
-    let horizontal: Vec<f64> = flat.iter().map(|at| at.norm()).collect();
-    let vertical: Vec<f64> = errors.iter().map(|error| error.enu_m.z.abs()).collect();
-    let distributions = vec![
-        Series::new("horizontal", BLUE, Mark::Line, distribution(&horizontal)),
-        Series::new("vertical", COLOURS[3], Mark::Dash, distribution(&vertical)),
-    ];
-    legend.extend(distributions.iter().cloned());
-    let longest = horizontal.iter().chain(&vertical).copied().fold(0.05, f64::max);
-    let x = Axis::new("error (m)", (0.0, 1.02 * longest));
-    let marks = [50.0, 95.0].map(|p| Series::new("", GREY, Mark::Dash, vec![(0.0, p), (1.02 * longest, p)]));
+    let mut horizontal: Vec<f64> = flat.iter().map(|at| at.norm()).collect();
+    drop(flat);
     let title = match [0.5, 0.95].map(|p| percentile(&horizontal, p)) {
         [Some(half), Some(most)] => format!("Horizontal: 50 % {half:.2} m, 95 % {most:.2} m"),
         _ => "No fixes".to_owned(),
     };
+    let across = distribution(&mut horizontal, Mark::Line);
+    let mut longest = horizontal.into_iter().fold(0.05, f64::max);
+    let mut vertical = errors.map(|error| error.enu_m.z.abs())?;
+    let up = distribution(&mut vertical, Mark::Dash);
+    longest = vertical.into_iter().fold(longest, f64::max);
+    let distributions =
+        vec![Series::new("horizontal", BLUE, Mark::Line, across), Series::new("vertical", COLOURS[3], Mark::Dash, up)];
+    legend.extend(distributions.iter().cloned());
+    let x = Axis::new("error (m)", (0.0, 1.02 * longest));
+    let marks = [50.0, 95.0].map(|p| Series::new("", GREY, Mark::Dash, vec![(0.0, p), (1.02 * longest, p)]));
     let curves = marks.into_iter().chain(distributions).collect();
     let share = Chart::new(title, x, Axis::new("fixes below (%)", (0.0, 100.0)), curves);
     Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, [cloud, share], legend)))
@@ -91,43 +96,63 @@ impl Spread {
     }
 }
 
-/// Percentage of the values at or below each of them.
-fn distribution(values: &[f64]) -> Points {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let count = sorted.len().max(1) as f64;
-    let steps = (1..).zip(&sorted).map(|(rank, value)| (*value, 100.0 * f64::from(rank) / count));
-    std::iter::once((0.0, 0.0)).filter(|_| !values.is_empty()).chain(steps).collect()
+/// Percentage of the values at or below each of them, as it is drawn; they are sorted.
+fn distribution(values: &mut [f64], mark: Mark) -> Points {
+    values.sort_by(f64::total_cmp);
+    let count = values.len().max(1) as f64;
+    let shown = Shown::of(mark, |see| {
+        if !values.is_empty() {
+            see(0.0, 0.0);
+        }
+        (1..).zip(values.iter()).for_each(|(rank, value)| see(*value, 100.0 * f64::from(rank) / count));
+        Ok::<_, std::convert::Infallible>(())
+    });
+    shown.map_or_else(|never| match never {}, |shown| shown.points)
 }
 
 /// Errors east, north, up and of the clock, between the bounds of the receiver's own covariance.
 pub fn time(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
-    let formal: HashMap<u64, &Fix> = judged.run.fixes.iter().map(|fix| (fix.sample, fix)).collect();
     type Of<T> = fn(&T) -> f64;
     let chart = |title: &str, of: Of<PositionError>, sigma: Of<Fix>| {
         let errors = &judged.errors.positions;
-        let points: Points = errors.iter().map(|error| (error.time_s, of(error))).collect();
-        let bound = |sign: f64| -> Points {
-            let known = errors.iter().filter_map(|error| Some((error.time_s, formal.get(&error.sample)?)));
-            known.map(|(time_s, fix)| (time_s, sign * NORMAL_95 * sigma(fix))).collect()
+        let points = Shown::of(Mark::Dots, |see| errors.each(|error| see(error.time_s, of(&error))))?;
+        let bounds = |see: &mut dyn FnMut(f64, f64)| {
+            let mut formal = judged.run.fixes.finder()?;
+            errors.each(|error| {
+                if let Some(fix) = formal.get(error.sample) {
+                    see(error.time_s, NORMAL_95 * sigma(&fix));
+                }
+            })
         };
-        let bounds = [bound(-1.0), bound(1.0)];
         // A bound far outside the errors would hide them.
-        let own = points.iter().map(|p| p.1.abs()).fold(0.05, f64::max);
-        let near = bounds.iter().flatten().map(|p| p.1).filter(|value| value.abs() < 12.0 * own);
-        let y = Axis::around("error (m)", points.iter().map(|p| p.1).chain([0.0]).chain(near), 0.1);
-        let x = judged.time_axis(points.iter().map(|p| p.0));
-        let inside = |points: Points| points.into_iter().filter(|p| (y.from..=y.to).contains(&p.1)).collect();
+        let own = points.y.values().map(f64::abs).fold(0.05, f64::max);
+        let mut ends = points.y;
+        ends.add(0.0);
+        bounds(&mut |_, bound| {
+            let near = [-bound, bound].into_iter().filter(|value| value.abs() < 12.0 * own);
+            near.for_each(|value| ends.add(value));
+        })?;
+        let y = Axis::around("error (m)", ends.values(), 0.1);
+        let x = judged.time_axis(points.x.values());
         let mut series = vec![Series::new("", GREY, Mark::Line, vec![(x.from, 0.0), (x.to, 0.0)])];
-        series.push(Series::new("", BLUE, Mark::Dots, points));
-        series.extend(bounds.map(|bound| Series::new("", ORANGE, Mark::Line, inside(bound))));
-        Chart::new(title, x, y, series)
+        series.push(Series::new("", BLUE, Mark::Dots, points.points));
+        for sign in [-1.0, 1.0] {
+            let bound = Shown::of(Mark::Line, |see| {
+                bounds(&mut |time_s, bound| {
+                    if (y.from..=y.to).contains(&(sign * bound)) {
+                        see(time_s, sign * bound);
+                    }
+                })
+            })?;
+            series.push(Series::new("", ORANGE, Mark::Line, bound.points));
+        }
+        Ok::<_, JudgeError>(Chart::new(title, x, y, series))
     };
     let charts = [
-        chart("East", |error| error.enu_m.x, |fix| fix.sigma_east_m),
-        chart("North", |error| error.enu_m.y, |fix| fix.sigma_north_m),
-        chart("Up", |error| error.enu_m.z, |fix| fix.sigma_up_m),
-        chart("Clock, as a distance", |error| error.clock_m, |fix| fix.sigma_clock_m),
+        chart("East", |error| error.enu_m.x, |fix| fix.sigma_east_m)?,
+        chart("North", |error| error.enu_m.y, |fix| fix.sigma_north_m)?,
+        chart("Up", |error| error.enu_m.z, |fix| fix.sigma_up_m)?,
+        chart("Clock, as a distance", |error| error.clock_m, |fix| fix.sigma_clock_m)?,
     ];
     let legend = [
         Series::new("fixes", BLUE, Mark::Dots, Vec::new()),
@@ -139,6 +164,10 @@ pub fn time(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
 /// Quantile of the normal distribution that leaves 2.5 % above.
 const NORMAL_95: f64 = 1.959_964;
 
+fn pass(see: &mut dyn FnMut(f64, f64), (x, y): (f64, f64)) {
+    see(x, y);
+}
+
 /// Where the fixes went between the truth and what a spoofer claims; nothing without one.
 pub fn spoofing(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let run = judged.run;
@@ -149,31 +178,38 @@ pub fn spoofing(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let enu = to_enu * (position_m - origin_m);
         (enu.x, enu.y)
     };
+    let fixes = Shown::of(Mark::Dots, |see| run.fixes.each(|fix| pass(see, plan(fix.position_m()))))?;
+    let claimed = Shown::of(Mark::Dash, |see| run.claimed.each(|row| pass(see, plan(row.position_m()))))?;
+    let truth = Shown::of(Mark::Cross, |see| {
+        let mut number = 0_usize;
+        run.trajectory.each(|row| {
+            if number.is_multiple_of(50) {
+                pass(see, plan(row.position_m()));
+            }
+            number += 1;
+        })
+    })?;
+    let ends = |of: fn(&Shown) -> Ends| of(&fixes).with(of(&claimed)).with(of(&truth)).values();
+    let east = Axis::around("east of the start (m)", ends(|shown| shown.x), 2.0);
+    let north = Axis::around("north of the start (m)", ends(|shown| shown.y), 2.0);
     let series = vec![
-        Series::new("fixes", ORANGE, Mark::Dots, run.fixes.iter().map(|fix| plan(fix.position_m())).collect()),
-        Series::new("claimed", GREEN, Mark::Dash, run.claimed.iter().map(|row| plan(row.position_m())).collect()),
-        Series::new(
-            "truth",
-            BLUE,
-            Mark::Cross,
-            run.trajectory.iter().step_by(50).map(|row| plan(row.position_m())).collect(),
-        ),
+        Series::new("fixes", ORANGE, Mark::Dots, fixes.points),
+        Series::new("claimed", GREEN, Mark::Dash, claimed.points),
+        Series::new("truth", BLUE, Mark::Cross, truth.points),
     ];
-    let values =
-        |of: fn(&(f64, f64)) -> f64| series.iter().flat_map(move |one| one.points.iter().map(of)).collect::<Vec<_>>();
-    let east = Axis::around("east of the start (m)", values(|p| p.0).into_iter(), 2.0);
-    let north = Axis::around("north of the start (m)", values(|p| p.1).into_iter(), 2.0);
-    let moved = spoofing::moved(run);
-    let distance = |name: &str, colour, mark, of: fn(&spoofing::Moved) -> f64| {
-        Series::new(name, colour, mark, moved.iter().map(|fix| (fix.time_s, of(fix))).collect())
+    let (mut times, mut all) = (Ends::none(), Ends::none());
+    let mut distance = |name: &str, colour, mark, of: fn(&spoofing::Moved) -> f64| {
+        let shown = Shown::of(mark, |see| spoofing::moved(run, |fix| see(fix.time_s, of(&fix))))?;
+        (times, all) = (times.with(shown.x), all.with(shown.y));
+        Ok::<_, JudgeError>(Series::new(name, colour, mark, shown.points))
     };
     let distances = vec![
-        distance("fix from truth", ORANGE, Mark::Dots, |fix| fix.from_truth_m),
-        distance("claim from truth", GREEN, Mark::Dash, |fix| fix.claim_from_truth_m),
-        distance("fix from claim", COLOURS[3], Mark::Line, |fix| fix.from_claim_m),
+        distance("fix from truth", ORANGE, Mark::Dots, |fix| fix.from_truth_m)?,
+        distance("claim from truth", GREEN, Mark::Dash, |fix| fix.claim_from_truth_m)?,
+        distance("fix from claim", COLOURS[3], Mark::Line, |fix| fix.from_claim_m)?,
     ];
-    let y = Axis::around("distance (m)", distances.iter().flat_map(|one| one.points.iter().map(|p| p.1)), 1.0);
-    let x = judged.time_axis(moved.iter().map(|fix| fix.time_s));
+    let y = Axis::around("distance (m)", all.values(), 1.0);
+    let x = judged.time_axis(times.values());
     let legend = [series.clone(), distances.clone()].concat();
     let mut plan = Chart::new("Plan view", east, north, series);
     plan.equal = true;
@@ -190,23 +226,22 @@ pub fn trajectory(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         (enu.x, enu.y)
     };
     let height = |position_m: Vector3<f64>| Geodetic::from_ecef(&position_m).height_m;
-    let pair = |truth: Points, fixes: Points| {
-        vec![Series::new("fixes", ORANGE, Mark::Dots, fixes), Series::new("truth", BLUE, Mark::Line, truth)]
+    let pair = |truth: Shown, fixes: Shown| {
+        let (x, y) = (truth.x.with(fixes.x), truth.y.with(fixes.y));
+        let fixes = Series::new("fixes", ORANGE, Mark::Dots, fixes.points);
+        (vec![fixes, Series::new("truth", BLUE, Mark::Line, truth.points)], x, y)
     };
-    let plans = pair(
-        run.trajectory.iter().map(|row| plan(row.position_m())).collect(),
-        run.fixes.iter().map(|fix| plan(fix.position_m())).collect(),
+    let (plans, across, along) = pair(
+        Shown::of(Mark::Line, |see| run.trajectory.each(|row| pass(see, plan(row.position_m()))))?,
+        Shown::of(Mark::Dots, |see| run.fixes.each(|fix| pass(see, plan(fix.position_m()))))?,
     );
-    let heights = pair(
-        run.trajectory.iter().map(|row| (run.time_s(row.sample), height(row.position_m()))).collect(),
-        run.fixes.iter().map(|fix| (run.time_s(fix.sample), height(fix.position_m()))).collect(),
+    let (heights, _, up) = pair(
+        Shown::of(Mark::Line, |see| run.trajectory.each(|row| see(run.time_s(row.sample), height(row.position_m()))))?,
+        Shown::of(Mark::Dots, |see| run.fixes.each(|fix| see(run.time_s(fix.sample), height(fix.position_m()))))?,
     );
-    let values = |series: &[Series], of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
-        series.iter().flat_map(|series| series.points.iter().map(of)).collect()
-    };
-    let east = Axis::around("east of the start (m)", values(&plans, |p| p.0).into_iter(), 2.0);
-    let north = Axis::around("north of the start (m)", values(&plans, |p| p.1).into_iter(), 2.0);
-    let up = Axis::around("height above the ellipsoid (m)", values(&heights, |p| p.1).into_iter(), 2.0);
+    let east = Axis::around("east of the start (m)", across.values(), 2.0);
+    let north = Axis::around("north of the start (m)", along.values(), 2.0);
+    let up = Axis::around("height above the ellipsoid (m)", up.values(), 2.0);
     let mut legend = plans.clone();
     legend.push(Series::new("start", COLOURS[6], Mark::Cross, vec![(0.0, 0.0)]));
     let mut plan = Chart::new("Plan view", east, north, legend.clone());

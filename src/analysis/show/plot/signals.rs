@@ -3,12 +3,14 @@
 use crate::analysis::error::JudgeError;
 use crate::analysis::measure::errors::{Link, SignalError};
 use crate::analysis::show::plot::canvas::{Axis, Chart, Mark, Series, WIDTH_PX};
+use crate::analysis::show::plot::chart::{Ends, Shown};
 use crate::analysis::show::plot::judged::Judged;
 use crate::analysis::show::plot::sketch::Sketch;
 use crate::analysis::statistics::ranked;
 use crate::gnss::record::TrackingRow;
 
-pub(super) type Points = Vec<(f64, f64)>;
+/// What points are shown to, one after the other.
+pub(super) type See<'a> = &'a mut dyn FnMut(f64, f64);
 
 /// What a chart of one kind of value is called, and the least span of its axis.
 pub(super) struct Frame<'a> {
@@ -32,20 +34,20 @@ pub(super) struct Cloud {
 }
 
 impl Cloud {
-    /// Asks twice for the points of each satellite, so that only one satellite's are held: for the axis, and
-    /// to keep some.
+    /// Asks three times for the points of each satellite, so that none are held but those that are drawn: for
+    /// the axis, for how many there are, and to keep some.
     pub fn new(
         judged: &Judged<'_>,
         links: &[Link],
         frame: &Frame<'_>,
-        points: impl Fn(Link) -> Result<Points, JudgeError>,
+        points: impl Fn(Link, See<'_>) -> Result<(), JudgeError>,
     ) -> Result<Self, JudgeError> {
         let (mut values, mut total, mut stride, mut first_x) = (Vec::new(), 0, 1, f64::INFINITY);
         for link in links {
-            for (x, y) in points(*link)? {
+            points(*link, &mut |x, y| {
                 first_x = first_x.min(x);
                 if !y.is_finite() {
-                    continue;
+                    return;
                 }
                 if total % stride == 0 {
                     values.push(y);
@@ -60,7 +62,7 @@ impl Cloud {
                     });
                     stride *= 2;
                 }
-            }
+            })?;
         }
         values.sort_by(f64::total_cmp);
         // Pull-in may be far outside; the axis shows what holds most of the time.
@@ -69,11 +71,16 @@ impl Cloud {
         let y = Axis::around(frame.y_label, [low, high].into_iter(), frame.least.max(1.3 * (high - low)));
         let (mut series, mut inside) = (Vec::new(), 0);
         for (index, link) in links.iter().enumerate() {
-            let mut shown = points(*link)?;
-            shown.retain(|point| (y.from..=y.to).contains(&point.1));
-            inside += shown.len();
-            let mut one = Series::numbered(judged.run.name(*link), index, shown);
-            one.thin(links.len());
+            let mut one = Series::numbered(judged.run.name(*link), index, Vec::new());
+            let shown = Shown::among(links.len(), one.mark, |see| {
+                points(*link, &mut |at, value| {
+                    if (y.from..=y.to).contains(&value) {
+                        see(at, value);
+                    }
+                })
+            })?;
+            inside += shown.count;
+            one.points = shown.points;
             series.push(one);
         }
         Ok(Self { y, series, first_x, total, outside: total - inside })
@@ -85,7 +92,7 @@ pub(super) fn over_time(
     judged: &Judged<'_>,
     links: &[Link],
     frame: &Frame<'_>,
-    points: impl Fn(Link) -> Result<Points, JudgeError>,
+    points: impl Fn(Link, See<'_>) -> Result<(), JudgeError>,
 ) -> Result<Chart, JudgeError> {
     let Cloud { y, series, first_x, total, outside } = Cloud::new(judged, links, frame, points)?;
     let title = frame.title;
@@ -104,8 +111,8 @@ pub fn discriminators(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError>
     let run = judged.run;
     let links: Vec<Link> = run.tracking.keys().collect();
     let chart = |title, y_label, least, of: fn(&TrackingRow) -> f64| {
-        over_time(judged, &links, &Frame { title, y_label, least }, |link| {
-            run.tracking.map(link, |row| (run.time_s(row.sample), of(&row)))
+        over_time(judged, &links, &Frame { title, y_label, least }, |link, see| {
+            run.tracking.each(link, |row| see(run.time_s(row.sample), of(&row)))
         })
     };
     let charts = [
@@ -126,8 +133,9 @@ pub(super) fn of_observations(
     judged: &Judged<'_>,
     link: Link,
     of: impl Fn(&SignalError) -> f64,
-) -> Result<Points, JudgeError> {
-    judged.errors.signals.map(link, |row| (row.time_s, of(&row)))
+    see: See<'_>,
+) -> Result<(), JudgeError> {
+    judged.errors.signals.each(link, |row| see(row.time_s, of(&row)))
 }
 
 /// C/N0 over time as measured and as it was, and the means side by side.
@@ -140,22 +148,20 @@ pub fn cn0(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         ("set", |row| row.cn0_true_dbhz)
     };
     let chart = |title: &str, y_label, least, of: &dyn Fn(&SignalError) -> f64| {
-        over_time(judged, &links, &Frame { title, y_label, least }, |link| of_observations(judged, link, of))
+        over_time(judged, &links, &Frame { title, y_label, least }, |link, see| of_observations(judged, link, of, see))
     };
     let title = format!("C/N0 as measured (points) and as {word} (lines)");
     let mut above = chart(&title, "C/N0 (dB-Hz)", 4.0, &|row| row.cn0_dbhz)?;
-    let mut all = Vec::new();
+    let mut all = Ends::none();
     for (index, link) in links.iter().enumerate() {
-        let rows = judged.errors.signals.map(*link, |row| (row.time_s, row.cn0_dbhz, reference(&row)))?;
-        let finite = rows.iter().flat_map(|row| [row.1, row.2]).filter(|value| value.is_finite());
-        let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-        all.extend([low, high]);
-        let mut line = Series::numbered(judged.run.name(*link), index, rows.iter().map(|row| (row.0, row.2)).collect());
+        of_observations(judged, *link, |row| row.cn0_dbhz, &mut |_, dbhz| all.add(dbhz))?;
+        let shown = Shown::among(links.len(), Mark::Line, |see| of_observations(judged, *link, reference, see))?;
+        all = all.with(shown.y);
+        let mut line = Series::numbered(judged.run.name(*link), index, shown.points);
         line.mark = Mark::Line;
-        line.thin(links.len());
         above.series.push(line);
     }
-    above.y = Axis::around("C/N0 (dB-Hz)", all.into_iter(), 4.0);
+    above.y = Axis::around("C/N0 (dB-Hz)", all.values(), 4.0);
     let title = format!("C/N0 measured minus {word}");
     let below = chart(&title, "difference (dB)", 1.0, &|row| row.cn0_dbhz - reference(row))?;
     Ok(Some(Sketch::charts((WIDTH_PX, 430), 1, [above, below], legend(judged, &links))))
@@ -165,7 +171,7 @@ pub fn cn0(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
 pub fn observables(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let links = observed(judged);
     let chart = |title, y_label, least, of: fn(&SignalError) -> f64| {
-        over_time(judged, &links, &Frame { title, y_label, least }, |link| of_observations(judged, link, of))
+        over_time(judged, &links, &Frame { title, y_label, least }, |link, see| of_observations(judged, link, of, see))
     };
     let charts = [
         chart("Code error", "error (m)", 0.1, |row| row.code_m)?,

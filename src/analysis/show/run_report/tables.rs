@@ -2,10 +2,11 @@
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::judge::judgement::number;
-use crate::analysis::measure::errors::{Link, SignalError};
+use crate::analysis::measure::errors::Link;
+use crate::analysis::read::Numbers;
 use crate::analysis::show::pdf::{Report, Side, Table};
 use crate::analysis::show::plot::Judged;
-use crate::analysis::statistics::{Spread, mean, std};
+use crate::analysis::statistics::{Spread, Sum};
 use crate::gnss::record::{Event, EventRow};
 
 /// Most rows of the table of events.
@@ -141,19 +142,29 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
     let mut table =
         Table::new("By satellite: mean elevation and C/N0; errors of its observations, the clock's included.", columns);
     for link in judged.errors.signals.keys() {
-        let rows = judged.errors.signals.rows(link)?;
-        let of = |value: fn(&SignalError) -> f64| rows.iter().map(value).collect::<Vec<f64>>();
-        let elevation = judged.run.seen(link.sv, |row| row.elevation_deg)?;
-        let cn0 = [of(|row| row.cn0_true_dbhz), of(|row| row.cn0_effective_dbhz), of(|row| row.cn0_dbhz)];
+        let [mut elevation, mut truth, mut effective, mut measured] = [Sum::default(); 4];
+        judged.run.seen(link.sv, |row| elevation.add(row.elevation_deg))?;
+        let [mut code, mut carrier, mut doppler] =
+            std::array::from_fn(|_| Numbers::new(judged.errors.signals.directory()));
+        for row in judged.errors.signals.cursor(link) {
+            let row = row?;
+            truth.add(row.cn0_true_dbhz);
+            effective.add(row.cn0_effective_dbhz);
+            measured.add(row.cn0_dbhz);
+            code.push(row.code_m)?;
+            carrier.push(row.carrier_cycles)?;
+            doppler.push(row.doppler_hz)?;
+        }
+        let std = |numbers: &Numbers| Ok::<_, JudgeError>(numbers.std()?.map(|(sigma, _)| sigma));
         table.row([
             judged.run.name(link),
-            fixed(mean(&elevation), 1),
-            cn0.map(|values| fixed(mean(&values), 1)).join(" / "),
-            format!("{} / {}", fixed(mean(&of(|row| row.code_m)), 2), fixed(std(&of(|row| row.code_m)), 2)),
-            fixed(std(&of(|row| row.carrier_cycles)), 4),
-            fixed(std(&of(|row| row.doppler_hz)), 3),
+            fixed(elevation.mean(), 1),
+            [truth, effective, measured].map(|values| fixed(values.mean(), 1)).join(" / "),
+            format!("{} / {}", fixed(code.mean()?, 2), fixed(std(&code)?, 2)),
+            fixed(std(&carrier)?, 4),
+            fixed(std(&doppler)?, 3),
             losses(judged, &link).to_string(),
-            rows.len().to_string(),
+            code.len().to_string(),
         ]);
     }
     report.table(table);
