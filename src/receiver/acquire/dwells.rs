@@ -10,7 +10,8 @@
 //! C/N0 (model of signs, Doppler and lag in the tests of `pair`).
 //!
 //! **One code** leaves from the middle on. That costs 0.06 dB where half of all satellites are found and
-//! 0.09 dB where nine in ten are, from 5 sums to 100 (the same tests), and saves 0.47 of the sums.
+//! 0.09 dB where nine in ten are, from 5 sums to 100 (a model in the tests of this module), and saves 0.47 of the
+//! sums.
 //!
 //! **Crowded Dopplers.** Cross-correlation may raise a Doppler for all codes; [`super::multiple_access`] judges
 //! that by whole columns. Of data and pilot all codes stay where many do. C/A codes need more: one satellite
@@ -131,15 +132,15 @@ impl Dwells {
 }
 
 impl Grid {
-    /// All satellites at one Doppler, and whether that is crowded as far as codes that were left show it; `make`
-    /// gives the spectrum of a dwell there.
+    /// All satellites at one Doppler, and where that is crowded what nine codes in ten would at most reach by all
+    /// sums, as far as codes that were left show it; `make` gives the spectrum of a dwell there.
     pub fn column(
         &self,
         doppler_hz: f64,
         spectra: &[Spectra<'_>],
         make: &mut Make<'_>,
         room: &mut Room,
-    ) -> (Vec<Strip>, bool) {
+    ) -> (Vec<Strip>, Option<f64>) {
         room.clear();
         let all = self.meets_image(doppler_hz);
         if let Some(first) = self.dwells.first_bar().filter(|_| !self.is_pair && !all) {
@@ -151,18 +152,17 @@ impl Grid {
         if column.len() >= LEAST_CODES && stayed as f64 >= MANY * column.len() as f64 {
             self.fill_by(&mut column, spectra, make, room);
         }
-        (column, false)
+        (column, None)
     }
 
-    /// The same of one code a satellite: with the first `first` dwells of all codes it shows what cross-correlation
-    /// adds.
+    /// The same of one code a satellite: `first` dwells of all codes show what cross-correlation adds.
     fn column_alone(
         &self,
         spectra: &[Spectra<'_>],
         make: &mut Make<'_>,
         room: &mut Room,
         first: usize,
-    ) -> (Vec<Strip>, bool) {
+    ) -> (Vec<Strip>, Option<f64>) {
         let least = self.dwells.stay[first - 1];
         let (mut heights, mut kept) = (Vec::new(), Vec::new());
         let mut column = Vec::with_capacity(spectra.len());
@@ -179,22 +179,21 @@ impl Grid {
         let reached = self.early.reached(heights.clone());
         // Cross-correlation is the same in every dwell.
         let rise = reached.map_or(0.0, |reached| f64::max(reached - least, 0.0) / first as f64);
-        let bar = |made: usize| self.dwells.stay[made - 1] + rise * made as f64;
+        let bar = |made: usize| match self.dwells.stay[made - 1] {
+            0.0 => 0.0,
+            noise => noise + rise * made as f64,
+        };
         for (number, powers) in kept.into_iter().filter(|(number, _)| heights[*number] > bar(first)) {
             room.powers = powers;
             column[number] = (first + 1..=self.dwells.stay.len())
                 .find_map(|made| {
                     self.add(make, &spectra[number], made - 1, room);
-                    let (height, total) = if self.dwells.stay[made - 1] > 0.0 {
-                        self.height(&room.powers, made)
-                    } else {
-                        (f64::MAX, 0.0)
-                    };
+                    let (height, total) = self.height(&room.powers, made);
                     (height <= bar(made)).then(|| self.left(height / bar(made), total, made))
                 })
                 .unwrap_or_else(|| self.strip(&room.powers));
         }
-        (column, reached.is_some())
+        (column, reached.map(|reached| reached * self.dwells.stay.len() as f64 / first as f64))
     }
 
     /// Gives the satellites of a column the dwells that they were left without.

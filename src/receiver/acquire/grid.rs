@@ -19,7 +19,7 @@ use rustfft::{Fft, FftPlanner};
 use super::Acquired;
 use super::dwells::{Dwells, Room, Spectra};
 use super::kernel::Spectrum;
-use super::multiple_access::{LEAST_CODES, Law};
+use super::multiple_access::Law;
 use super::refine::Refined;
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
@@ -32,9 +32,6 @@ use crate::receiver::threshold::{of_one_cell, threshold};
 
 /// Cells within this of a peak are not noise.
 const PEAK_CHIPS: f64 = 2.0;
-/// What is so many times its threshold needs no column: a signal whose cross-correlation reached that would
-/// raise a quarter of all other codes' cells half as high, and all of them would have stayed.
-const SURE: f64 = 4.0;
 /// The band that goes back to lags, over the one asked for or that of the samples, is this at least.
 const BAND_SHARE: f64 = 0.98;
 
@@ -64,11 +61,11 @@ pub(super) struct Grid {
     pub lags: usize,
     pub lag_samples: f64,
     /// What a satellite's statistic has to exceed, by Doppler.
-    law: Law,
+    pub(super) law: Law,
     /// The same where a Doppler may be left for the first time.
     pub(super) early: Law,
     /// What the statistic is multiplied by where a real recording's noise is not circular.
-    image_scale: f64,
+    pub(super) image_scale: f64,
     is_real: bool,
     pub(super) forward: Arc<dyn Fft<f32>>,
     pub(super) inverse: Arc<dyn Fft<f32>>,
@@ -97,7 +94,7 @@ pub(super) struct Peaks {
 #[derive(Clone, Default)]
 pub(super) struct Map {
     /// By Doppler, then by satellite.
-    strips: Vec<Vec<Strip>>,
+    pub(super) strips: Vec<Vec<Strip>>,
     /// What samples were multiplied by.
     scale: f64,
 }
@@ -274,17 +271,17 @@ impl Grid {
             Some(again) if !again.dopplers.contains(&bin) => {
                 let wanted = |number: usize| again.satellites.get(number).is_some_and(|(_, everywhere)| *everywhere);
                 let some: Vec<Spectra<'_>> = (0..).zip(spectra).filter(|(n, _)| wanted(*n)).map(|(_, s)| *s).collect();
-                let (seen, crowded) = if some.is_empty() { (Vec::new(), false) } else { column(bin, &some, room) };
+                let (seen, reached) = if some.is_empty() { (Vec::new(), None) } else { column(bin, &some, room) };
                 let mut seen = seen.into_iter();
                 let before = |satellite: usize| again.before.strips.get(bin)?.get(satellite).copied();
                 let strips = (again.satellites.iter())
                     .filter_map(|(satellite, everywhere)| if *everywhere { seen.next() } else { before(*satellite) })
                     .collect();
-                (strips, crowded)
+                (strips, reached)
             }
             _ => column(bin, spectra, room),
         };
-        let (mut strips, raised): (Vec<Vec<Strip>>, Vec<bool>) =
+        let (mut strips, reached): (Vec<Vec<Strip>>, Vec<Option<f64>>) =
             (0..self.dopplers_hz.len()).into_par_iter().map_init(|| self.room(), one).unzip();
         self.complete(&mut strips, spectra, &sums);
         // Satellites that are not looked at again were seen beside what has been subtracted since.
@@ -294,7 +291,7 @@ impl Grid {
         };
         let mut filled = BTreeSet::new();
         let (of, mut crowded) = loop {
-            let (of, crowded) = self.peaks(&strips, spectra.len());
+            let (of, crowded) = self.peaks(&strips, &reached, spectra.len());
             let is_open = |bin: usize| {
                 let open = |(satellite, strip): (usize, &Strip)| strip.sums < self.sums || old(bin, satellite);
                 !filled.contains(&bin) && strips[bin].iter().enumerate().any(open)
@@ -310,58 +307,17 @@ impl Grid {
             });
             filled.extend(doubtful);
         };
-        crowded.extend((0..).zip(raised).filter_map(|(bin, raised)| raised.then_some(bin)));
+        crowded.extend((0..).zip(&reached).filter_map(|(bin, reached)| reached.map(|_| bin)));
         crowded.sort_unstable();
         crowded.dedup();
         let of = of.into_iter().map(|(_, peak)| peak).collect();
         Peaks { of, crowded, map: Map { strips, scale } }
     }
 
-    /// The best Doppler of every satellite, its number first, and the crowded ones.
-    fn peaks(&self, strips: &[Vec<Strip>], satellites: usize) -> (Vec<(usize, Peak)>, Vec<usize>) {
-        let heights: Vec<Vec<f64>> = (0..satellites).map(|satellite| self.heights(strips, satellite)).collect();
-        let image = |bin: usize| self.dopplers_hz.get(bin).is_some_and(|doppler_hz| self.meets_image(*doppler_hz));
-        let bar = self.law.bar(&heights, image);
-        let peak = |(satellite, heights): (usize, &Vec<f64>)| {
-            let share = |bin: usize| heights[bin] / bar.thresholds[bin];
-            let bin = (1..heights.len()).fold(0, |best, bin| if share(bin) > share(best) { bin } else { best });
-            let (statistic, threshold) = (heights[bin], bar.thresholds[bin]);
-            let (doppler_hz, lag) = (self.dopplers_hz[bin], strips[bin][satellite].lag);
-            (bin, Peak { statistic, threshold, doppler_hz, lag })
-        };
-        (heights.iter().enumerate().map(peak).collect(), bar.crowded)
-    }
-
-    /// Numbers of the Dopplers at which a satellite seems to be that may be cross-correlation, and whose law is
-    /// not known as not all codes' sums are there.
-    fn doubtful(&self, peaks: &[(usize, Peak)], is_open: impl Fn(usize) -> bool) -> BTreeSet<usize> {
-        if self.is_pair || peaks.len() < LEAST_CODES {
-            return BTreeSet::new();
-        }
-        let unsure = |peak: &Peak| (1.0..SURE).contains(&(peak.statistic / peak.threshold));
-        peaks.iter().filter(|(_, peak)| unsure(peak)).map(|(bin, _)| *bin).filter(|bin| is_open(*bin)).collect()
-    }
-
     /// What a statistic has to exceed in noise.
     #[cfg(test)]
     pub fn threshold(&self) -> f64 {
         self.law.threshold
-    }
-
-    /// Peaks that may be cross-correlation and were not judged by all codes' sums.
-    #[cfg(test)]
-    pub fn unjudged(&self, peaks: &Peaks) -> usize {
-        let bin = |peak: &Peak| self.dopplers_hz.iter().position(|doppler_hz| *doppler_hz == peak.doppler_hz);
-        let numbered: Vec<(usize, Peak)> = peaks.of.iter().map(|peak| (bin(peak).unwrap(), *peak)).collect();
-        let strips = &peaks.map.strips;
-        self.doubtful(&numbered, |bin| strips[bin].iter().any(|strip| strip.sums < self.sums)).len()
-    }
-
-    /// Sums that were made, of all that a search without leaving makes.
-    #[cfg(test)]
-    pub fn share_made(&self, peaks: &Peaks) -> f64 {
-        let made: u32 = peaks.map.strips.iter().flatten().map(|strip| strip.sums).sum();
-        f64::from(made) / (f64::from(self.sums) * peaks.map.strips.iter().flatten().count() as f64)
     }
 
     /// Of every satellite one strip has all dwells: where none stayed, that which came nearest to it.
@@ -397,33 +353,8 @@ impl Grid {
         Strip { peak, lag, total, near, near_cells, sums: self.sums }
     }
 
-    fn near_cells(&self) -> usize {
+    pub(super) fn near_cells(&self) -> usize {
         (PEAK_CHIPS / (self.chips_per_sample * self.lag_samples)).ceil() as usize
-    }
-
-    /// The largest cell of a satellite at every Doppler, zero where that was left, over the noise floor of
-    /// all its maps. Of each Doppler whose own largest cell lies at the peak's code phase, the neighbourhood
-    /// is left out of the floor.
-    fn heights(&self, strips: &[Vec<Strip>], satellite: usize) -> Vec<f64> {
-        let column = || strips.iter().filter_map(|strip| strip.get(satellite));
-        let scaled: Vec<f64> = (column().zip(&self.dopplers_hz))
-            .map(|(strip, &doppler_hz)| {
-                let whole = if strip.sums == self.sums { f64::from(strip.peak) } else { 0.0 };
-                whole * if self.meets_image(doppler_hz) { self.image_scale } else { 1.0 }
-            })
-            .collect();
-        let highest = (0..scaled.len()).fold(0, |best, bin| if scaled[bin] > scaled[best] { bin } else { best });
-        let best_lag = column().nth(highest).map_or(0, |strip| strip.lag);
-        let (mut total, mut powers) = (0.0, 0.0);
-        for strip in column() {
-            let apart = strip.lag.abs_diff(best_lag);
-            let same = apart.min(self.lags - apart.min(self.lags)) <= self.near_cells();
-            let out = same && strip.sums == self.sums;
-            total += strip.total - if out { strip.near } else { 0.0 };
-            powers += f64::from(strip.sums) * (self.lags - if out { strip.near_cells } else { 0 }) as f64;
-        }
-        let floor = total / (2.0 * powers.max(1.0));
-        scaled.into_iter().map(|height| if floor > 0.0 { height / floor } else { 0.0 }).collect()
     }
 
     /// The place of a satellite that is known, at sample `first`.

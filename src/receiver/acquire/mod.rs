@@ -30,6 +30,7 @@
 //! 23 exceeds a threshold of 95. A bit that turns within a sum leaves a third of its power on average.
 
 mod across;
+mod choice;
 mod codes;
 mod dwells;
 mod error;

@@ -1,0 +1,102 @@
+//! Which Doppler of a satellite counts, what its largest cell has to exceed there, and which columns need all
+//! sums before that is known.
+//!
+//! Where a search leaves Dopplers early ([`super::dwells`]), the law of a crowded one is not known: it needs the
+//! largest cells of all codes ([`super::multiple_access`]). There what nine codes in ten reach is the threshold
+//! to begin with. A satellite that passes it by less than four times has its column filled, and all are chosen
+//! anew, until none is left that does. So no satellite is found by less than a search without leaving asks for.
+
+use std::collections::BTreeSet;
+
+#[cfg(test)]
+use super::grid::Peaks;
+use super::grid::{Grid, Peak, Strip};
+use super::multiple_access::LEAST_CODES;
+
+/// What is so many times its threshold, and so many times what other codes reach there, needs no column:
+/// cross-correlations of a family differ by less.
+const SURE: f64 = 4.0;
+
+impl Grid {
+    /// The best Doppler of every satellite, its number first, and the crowded ones. Where the law of a crowded
+    /// column is not known, what others reach there is the threshold.
+    pub fn peaks(
+        &self,
+        strips: &[Vec<Strip>],
+        reached: &[Option<f64>],
+        satellites: usize,
+    ) -> (Vec<(usize, Peak)>, Vec<usize>) {
+        let heights: Vec<Vec<f64>> = (0..satellites).map(|satellite| self.heights(strips, satellite)).collect();
+        let image = |bin: usize| self.dopplers_hz.get(bin).is_some_and(|doppler_hz| self.meets_image(*doppler_hz));
+        let mut bar = self.law.bar(&heights, image);
+        for ((threshold, column), others) in bar.thresholds.iter_mut().zip(strips).zip(reached) {
+            let known = column.iter().all(|strip| strip.sums == self.sums);
+            *threshold = threshold.max(others.filter(|_| !known).unwrap_or(0.0));
+        }
+        let peak = |(satellite, heights): (usize, &Vec<f64>)| {
+            let share = |bin: usize| heights[bin] / bar.thresholds[bin];
+            let best = |of: &dyn Fn(usize) -> f64| {
+                (1..heights.len()).fold(0, |best, n| if of(n) > of(best) { n } else { best })
+            };
+            // Of one that is surely there side lobes in Doppler may meet lower thresholds.
+            let highest = best(&|bin| heights[bin]);
+            let bin = if share(highest) >= SURE { highest } else { best(&share) };
+            let (statistic, threshold) = (heights[bin], bar.thresholds[bin]);
+            let (doppler_hz, lag) = (self.dopplers_hz[bin], strips[bin][satellite].lag);
+            (bin, Peak { statistic, threshold, doppler_hz, lag })
+        };
+        (heights.iter().enumerate().map(peak).collect(), bar.crowded)
+    }
+
+    /// Numbers of the Dopplers at which a satellite seems to be that may be cross-correlation, and whose law is
+    /// not known as not all codes' sums are there.
+    pub fn doubtful(&self, peaks: &[(usize, Peak)], is_open: impl Fn(usize) -> bool) -> BTreeSet<usize> {
+        if self.is_pair || peaks.len() < LEAST_CODES {
+            return BTreeSet::new();
+        }
+        let unsure = |peak: &Peak| (1.0..SURE).contains(&(peak.statistic / peak.threshold));
+        peaks.iter().filter(|(_, peak)| unsure(peak)).map(|(bin, _)| *bin).filter(|bin| is_open(*bin)).collect()
+    }
+
+    /// The largest cell of a satellite at every Doppler, zero where that was left, over the noise floor of
+    /// all its maps. Of each Doppler whose own largest cell lies at the peak's code phase, the neighbourhood
+    /// is left out of the floor.
+    fn heights(&self, strips: &[Vec<Strip>], satellite: usize) -> Vec<f64> {
+        let column = || strips.iter().filter_map(|strip| strip.get(satellite));
+        let scaled: Vec<f64> = (column().zip(&self.dopplers_hz))
+            .map(|(strip, &doppler_hz)| {
+                let whole = if strip.sums == self.sums { f64::from(strip.peak) } else { 0.0 };
+                whole * if self.meets_image(doppler_hz) { self.image_scale } else { 1.0 }
+            })
+            .collect();
+        let highest = (0..scaled.len()).fold(0, |best, bin| if scaled[bin] > scaled[best] { bin } else { best });
+        let best_lag = column().nth(highest).map_or(0, |strip| strip.lag);
+        let (mut total, mut powers) = (0.0, 0.0);
+        for strip in column() {
+            let apart = strip.lag.abs_diff(best_lag);
+            let same = apart.min(self.lags - apart.min(self.lags)) <= self.near_cells();
+            let out = same && strip.sums == self.sums;
+            total += strip.total - if out { strip.near } else { 0.0 };
+            powers += f64::from(strip.sums) * (self.lags - if out { strip.near_cells } else { 0 }) as f64;
+        }
+        let floor = total / (2.0 * powers.max(1.0));
+        scaled.into_iter().map(|height| if floor > 0.0 { height / floor } else { 0.0 }).collect()
+    }
+
+    /// Dopplers at which a peak may be cross-correlation and was not judged by all codes' sums.
+    #[cfg(test)]
+    pub fn unjudged(&self, peaks: &Peaks) -> usize {
+        let bin = |peak: &Peak| self.dopplers_hz.iter().position(|doppler_hz| *doppler_hz == peak.doppler_hz);
+        let numbered: Vec<(usize, Peak)> = peaks.of.iter().map(|peak| (bin(peak).unwrap(), *peak)).collect();
+        let strips = &peaks.map.strips;
+        let is_open = |bin: usize| strips[bin].iter().any(|strip| strip.sums < self.sums);
+        self.doubtful(&numbered, is_open).len()
+    }
+
+    /// Sums that were made, of all that a search without leaving makes.
+    #[cfg(test)]
+    pub fn share_made(&self, peaks: &Peaks) -> f64 {
+        let made: u32 = peaks.map.strips.iter().flatten().map(|strip| strip.sums).sum();
+        f64::from(made) / (f64::from(self.sums) * peaks.map.strips.iter().flatten().count() as f64)
+    }
+}
