@@ -41,7 +41,8 @@ impl Leaving {
         Self { bars, noise }
     }
 
-    /// Whether a Doppler stays to the end whose cell has these powers after each sum, in noise of that number.
+    /// Whether a Doppler stays to the end whose cell has these powers after each sum, in noise of that
+    /// number.
     pub fn stays(&self, powers: impl IntoIterator<Item = f64>, number: usize) -> bool {
         let noise = &self.noise[number % self.noise.len()];
         self.bars.iter().zip(noise).zip(powers).all(|((bar, noise), power)| *noise || power > *bar)

@@ -119,9 +119,9 @@ fn sinc(x: f64) -> f64 {
 }
 
 impl Model {
-    /// Share of `draws` in which the satellite is found, its Doppler each of `doppler_hz` off the nearest bin
-    /// in turn, the edges of its symbols anywhere. Of cells beyond the neighbourhood `leaving` knows what keeps
-    /// a Doppler.
+    /// Share of `draws` in which the satellite is found, its Doppler each of `doppler_hz` off the nearest
+    /// bin in turn, the edges of its symbols anywhere. Of cells beyond the neighbourhood `leaving` knows
+    /// what keeps a Doppler.
     pub fn probability(&self, doppler_hz: &[f64], leaving: &Leaving, draws: u32, seed: u64) -> f64 {
         let lags: Vec<f64> = (-SIDE_LAGS..=SIDE_LAGS).map(f64::from).collect();
         let bins: Vec<f64> = (-SIDE_BINS..=SIDE_BINS).map(f64::from).collect();

@@ -154,7 +154,8 @@ pub const ORDER: Order<'static> = &[
         "study",
         &[
             &["correlation", "demand", "measure", "normal", "watch"],
-            &["motion", "search"],
+            &["leaving", "motion"],
+            &["search"],
             &["correlator", "detection"],
             &["expect"],
             &["limits", "proof"],

@@ -1,7 +1,7 @@
 //! A list of numbers that may be longer than memory: mean, spread and percentiles, exactly as
 //! [`crate::analysis::statistics`] has them of a list that is held.
 //!
-//! Up to [`HELD`] numbers are held, the rest lie in a file without a name and are read again for each sum. An
+//! Up to 16 384 numbers are held, the rest lie in a file without a name and are read again for each sum. An
 //! order statistic is found by its bits, sixteen at a time: a count of how many numbers begin with each
 //! sixteen leaves those that begin like it.
 

@@ -56,8 +56,8 @@ fn rows_by_the_thousand_describe_the_same_signal_as_few() {
     let directory = tempfile::tempdir().unwrap();
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     let scene = include_str!("../../../scenarios/trajectory_file.toml").replace("duration_s = 60", "duration_s = 1.5");
-    // 30 m/s along a straight line. Nodes of a satellite's curve are as dense as rows, and beyond five a second
-    // its orbit is a polynomial that they share.
+    // 30 m/s along a straight line. Nodes of a satellite's curve are as dense as rows, and beyond five a
+    // second its orbit is a polynomial that they share.
     let samples = |rows_a_second: u32| {
         let rows = (0..=4 * rows_a_second).map(|row| {
             let t_s = f64::from(row) / f64::from(rows_a_second) - 1.0;
@@ -79,8 +79,8 @@ fn rows_by_the_thousand_describe_the_same_signal_as_few() {
         let many = samples(rows_a_second);
         let steps = || few.iter().zip(&many).map(|(a, b)| (*a as i8).abs_diff(*b as i8)).filter(|step| *step > 0);
         println!("{rows_a_second} rows a second: {} of {} bytes differ", steps().count(), few.len());
-        // A phase is right to 2e-5 cycles by either, and 1e-4 of the amplitude brings few values over a step's
-        // edge: noise of ten steps lies that near one in a share of 1e-4 at most.
+        // A phase is right to 2e-5 cycles by either, and 1e-4 of the amplitude brings few values over a
+        // step's edge: noise of ten steps lies that near one in a share of 1e-4 at most.
         assert!(many.len() == few.len() && steps().count() < few.len() / 10_000, "{rows_a_second}");
         assert!(steps().all(|step| step == 1), "{rows_a_second}");
     }

@@ -1,10 +1,11 @@
 //! Which Doppler of a satellite counts, what its largest cell has to exceed there, and which columns need all
 //! sums before that is known.
 //!
-//! Where a search leaves Dopplers early ([`super::dwells`]), the law of a crowded one is not known: it needs the
-//! largest cells of all codes ([`super::multiple_access`]). There what nine codes in ten reach is the threshold
-//! to begin with. A satellite that passes it by less than four times has its column filled, and all are chosen
-//! anew, until none is left that does. So no satellite is found by less than a search without leaving asks for.
+//! Where a search leaves Dopplers early ([`super::dwells`]), the law of a crowded one is not known: it needs
+//! the largest cells of all codes ([`super::multiple_access`]). There what nine codes in ten reach is the
+//! threshold to begin with. A satellite that passes it by less than four times has its column filled, and
+//! all are chosen anew, until none is left that does. So no satellite is found by less than a search without
+//! leaving asks for.
 
 use std::collections::BTreeSet;
 
@@ -18,8 +19,8 @@ use super::multiple_access::LEAST_CODES;
 const SURE: f64 = 4.0;
 
 impl Grid {
-    /// The best Doppler of every satellite, its number first, and the crowded ones. Where the law of a crowded
-    /// column is not known, what others reach there is the threshold.
+    /// The best Doppler of every satellite, its number first, and the crowded ones. Where the law of a
+    /// crowded column is not known, what others reach there is the threshold.
     pub fn peaks(
         &self,
         strips: &[Vec<Strip>],
@@ -48,8 +49,8 @@ impl Grid {
         (heights.iter().enumerate().map(peak).collect(), bar.crowded)
     }
 
-    /// Numbers of the Dopplers at which a satellite seems to be that may be cross-correlation, and whose law is
-    /// not known as not all codes' sums are there.
+    /// Numbers of the Dopplers at which a satellite seems to be that may be cross-correlation, and whose law
+    /// is not known as not all codes' sums are there.
     pub fn doubtful(&self, peaks: &[(usize, Peak)], is_open: impl Fn(usize) -> bool) -> BTreeSet<usize> {
         if self.is_pair || peaks.len() < LEAST_CODES {
             return BTreeSet::new();

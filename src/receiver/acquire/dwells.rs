@@ -1,24 +1,24 @@
 //! Coherent sums one after the other, and Dopplers that are left before all are made.
 //!
-//! Most satellites are absent, and of one that is there most Dopplers are wrong. A Doppler stays after some of
-//! its dwells where its largest cell exceeds what that of noise exceeds with a stated probability; where it
-//! does not, it is left. The threshold of all dwells is that of a search which leaves nothing, so false alarms
-//! come no more often. When a Doppler may be left is a share of all dwells, as weak signals that ask for many
-//! show late.
+//! Most satellites are absent, and of one that is there most Dopplers are wrong. A Doppler stays after some
+//! of its dwells where its largest cell exceeds what that of noise exceeds with a stated probability; where
+//! it does not, it is left. The threshold of all dwells is that of a search which leaves nothing, so false
+//! alarms come no more often. When a Doppler may be left is a share of all dwells, as weak signals that ask
+//! for many show late.
 //!
 //! **Data and pilot**: of ten dwells by the pilot alone eight dwells by both keep as many satellites, at any
 //! C/N0 (model of signs, Doppler and lag in the tests of `pair`).
 //!
 //! **One code** leaves from the middle on. That costs 0.06 dB where half of all satellites are found and
-//! 0.09 dB where nine in ten are, from 5 sums to 100 (a model in the tests of this module), and saves 0.47 of the
-//! sums.
+//! 0.09 dB where nine in ten are, from 5 sums to 100 (a model in the tests of this module), and saves 0.47
+//! of the sums.
 //!
-//! **Crowded Dopplers.** Cross-correlation may raise a Doppler for all codes; [`super::multiple_access`] judges
-//! that by whole columns. Of data and pilot all codes stay where many do. C/A codes need more: one satellite
-//! raises the cells of all others at every kilohertz, so most Dopplers of an open sky are crowded, and those
-//! that are raised by too little to show so early make some pass for satellites. So one code has to exceed what
-//! nine in ten of the others reach, and the search fills every column in which a candidate stands that is not
-//! sure ([`Grid::search`]).
+//! **Crowded Dopplers.** Cross-correlation may raise a Doppler for all codes; [`super::multiple_access`]
+//! judges that by whole columns. Of data and pilot all codes stay where many do. C/A codes need more: one
+//! satellite raises the cells of all others at every kilohertz, so most Dopplers of an open sky are crowded,
+//! and those that are raised by too little to show so early make some pass for satellites. So one code has
+//! to exceed what nine in ten of the others reach, and the search fills every column in which a candidate
+//! stands that is not sure ([`Grid::search`]).
 
 use num_complex::Complex;
 
@@ -33,8 +33,8 @@ type Stay = (f64, f64);
 const PAIR: [Stay; 6] = [(0.25, 0.25), (0.375, 0.12), (0.5, 0.06), (0.625, 0.03), (0.75, 0.02), (0.875, 0.01)];
 /// Of one code.
 const ALONE: [Stay; 5] = [(0.5, 0.25), (0.6, 0.06), (0.7, 0.03), (0.8, 0.02), (0.9, 0.01)];
-/// Fewer sums of one code are all made: a data bit that turns in the middle of one takes it, and with it a half
-/// or a quarter of those before the first bar.
+/// Fewer sums of one code are all made: a data bit that turns in the middle of one takes it, and with it a
+/// half or a quarter of those before the first bar.
 const LEAST_SUMS: u32 = 5;
 /// Dwells of data and pilot for each code period that is asked for.
 const DWELLS: f64 = 0.8;
@@ -132,8 +132,8 @@ impl Dwells {
 }
 
 impl Grid {
-    /// All satellites at one Doppler, and where that is crowded what nine codes in ten would at most reach by all
-    /// sums, as far as codes that were left show it; `make` gives the spectrum of a dwell there.
+    /// All satellites at one Doppler, and where that is crowded what nine codes in ten would at most reach
+    /// by all sums, as far as codes that were left show it; `make` gives the spectrum of a dwell there.
     pub fn column(
         &self,
         doppler_hz: f64,

@@ -138,8 +138,8 @@ pub fn cell_chips(
     grid(metadata, signal, settings).map(|grid| grid.lag_samples * grid.chips_per_sample)
 }
 
-/// What the largest cell of a Doppler has to exceed after each sum of a search for `signal`, in units in which
-/// noise is chi-square; zero where no Doppler is left. What many codes reach raises it.
+/// What the largest cell of a Doppler has to exceed after each sum of a search for `signal`, in units in
+/// which noise is chi-square; zero where no Doppler is left. What many codes reach raises it.
 ///
 /// # Errors
 /// As [`cell_chips`].
