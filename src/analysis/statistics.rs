@@ -17,6 +17,11 @@ pub struct Spread {
     pub p95: f64,
 }
 
+/// The larger of two numbers in their total order, where there is one before; of equal ones the later.
+pub fn larger(before: Option<f64>, new: f64) -> Option<f64> {
+    Some(before.filter(|before| before.total_cmp(&new).is_gt()).unwrap_or(new))
+}
+
 /// A mean in the making, of numbers that need not be held.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sum {
@@ -38,6 +43,16 @@ impl Sum {
         if value.is_finite() {
             *self = Self { count: self.count + 1, sum: self.sum + value, squares: self.squares + value * value };
         }
+    }
+
+    /// How many were finite.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Sum of their squares.
+    pub fn squares(&self) -> f64 {
+        self.squares
     }
 
     /// As [`mean`].

@@ -94,7 +94,8 @@ pub const ORDER: Order<'static> = &[
     (
         "analysis/read",
         &[
-            &["facts", "fault", "files", "numbers", "spill_store"],
+            &["facts", "fault", "files", "word_file"],
+            &["numbers", "spill_store"],
             &["rinex_obs", "nmea", "delay", "emission", "levels", "rows", "table"],
             &["common", "fixes"],
             &["run"],

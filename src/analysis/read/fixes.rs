@@ -58,6 +58,19 @@ const MODELS: [IonosphereModel; 6] = [
     IonosphereModel::Combined,
     IonosphereModel::Grid,
 ];
+
+/// Place of a model among [`MODELS`]; another one does not compile without a place.
+fn place(model: IonosphereModel) -> u64 {
+    match model {
+        IonosphereModel::None => 0,
+        IonosphereModel::Nominal => 1,
+        IonosphereModel::Broadcast => 2,
+        IonosphereModel::NequickG => 3,
+        IonosphereModel::Combined => 4,
+        IonosphereModel::Grid => 5,
+    }
+}
+
 /// A count that the file does not say.
 const NOT_SAID: u64 = u64::MAX;
 
@@ -73,7 +86,7 @@ impl SpillRow<()> for Row {
         words.extend([fix.correlation_en, fix.correlation_eu, fix.correlation_nu].map(f64::to_bits));
         words.extend([fix.gdop, fix.pdop, fix.hdop, fix.vdop, fix.tdop, fix.condition].map(f64::to_bits));
         words.extend([u64::from(fix.satellites), fix.chi_square.to_bits(), self.excluded, self.time_scale]);
-        words.push(MODELS.iter().position(|model| *model == fix.ionosphere).unwrap_or(0) as u64);
+        words.push(place(fix.ionosphere));
         words.extend([fix.ranges, fix.clocks].map(|count| count.map_or(NOT_SAID, u64::from)));
     }
 
@@ -288,6 +301,11 @@ mod tests {
 
     fn text(fixes: impl IntoIterator<Item = Fix>) -> String {
         fixes.into_iter().map(|fix| format!("{fix:?}\n")).collect()
+    }
+
+    #[test]
+    fn every_model_is_at_its_place() {
+        assert!(MODELS.iter().zip(0..).all(|(model, number)| place(*model) == number));
     }
 
     #[test]

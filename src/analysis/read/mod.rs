@@ -19,6 +19,7 @@ mod rows;
 mod run;
 pub mod spill_store;
 pub mod table;
+mod word_file;
 
 pub use common::Common;
 pub use emission::{Emission, MeanSignal};

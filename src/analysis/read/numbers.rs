@@ -5,13 +5,11 @@
 //! order statistic is found by its bits, sixteen at a time: a count of how many numbers begin with each
 //! sixteen leaves those that begin like it.
 
-use std::cell::RefCell;
-use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::analysis::error::JudgeError;
-use crate::analysis::statistics::{Spread, deviation, rank};
+use crate::analysis::read::word_file::WordFile;
+use crate::analysis::statistics::{Spread, Sum, deviation, rank};
 
 /// Numbers that are held.
 const HELD: usize = 1 << 14;
@@ -19,11 +17,7 @@ const HELD: usize = 1 << 14;
 /// The list.
 #[derive(Debug)]
 pub struct Numbers {
-    /// Where the file is made once it is needed.
-    directory: PathBuf,
-    /// The file and how many numbers are in it.
-    file: Option<RefCell<File>>,
-    filed: usize,
+    file: WordFile,
     /// What came after those.
     held: Vec<f64>,
 }
@@ -31,7 +25,7 @@ pub struct Numbers {
 impl Numbers {
     /// An empty list, whose file is made in that directory.
     pub fn new(directory: &Path) -> Self {
-        Self { directory: directory.to_owned(), file: None, filed: 0, held: Vec::new() }
+        Self { file: WordFile::new(directory), held: Vec::new() }
     }
 
     /// Adds a number.
@@ -43,25 +37,15 @@ impl Numbers {
         if self.held.len() < HELD {
             return Ok(());
         }
-        let failed = |source| JudgeError::File { path: self.directory.clone(), source };
-        if self.file.is_none() {
-            self.file = Some(RefCell::new(tempfile::tempfile_in(&self.directory).map_err(failed)?));
-        }
-        if let Some(file) = &mut self.file {
-            let bytes: Vec<u8> = self.held.iter().flat_map(|value| value.to_le_bytes()).collect();
-            let file = file.get_mut();
-            // Reading has left the place where it ends.
-            let begin = SeekFrom::Start(8 * self.filed as u64);
-            file.seek(begin).and_then(|_| file.write_all(&bytes)).map_err(failed)?;
-        }
-        self.filed += self.held.len();
+        let words: Vec<u64> = self.held.iter().map(|value| value.to_bits()).collect();
+        self.file.append(&words)?;
         self.held.clear();
         Ok(())
     }
 
     /// How many there are.
     pub fn len(&self) -> usize {
-        self.filed + self.held.len()
+        self.file.len() as usize + self.held.len()
     }
 
     /// Whether there is none.
@@ -74,7 +58,11 @@ impl Numbers {
     /// # Errors
     /// [`JudgeError::Read`] where the file cannot be read.
     pub fn each(&self, mut see: impl FnMut(f64)) -> Result<(), JudgeError> {
-        self.filed(&mut see).map_err(|source| JudgeError::Read { path: self.directory.clone(), source })?;
+        let mut words = Vec::new();
+        for start in (0..self.file.len()).step_by(HELD) {
+            self.file.read(start, HELD, &mut words).map_err(|source| self.file.unreadable(source))?;
+            words.iter().for_each(|word| see(f64::from_bits(*word)));
+        }
         self.held.iter().for_each(|value| see(*value));
         Ok(())
     }
@@ -93,29 +81,15 @@ impl Numbers {
         seen
     }
 
-    fn filed(&self, see: &mut impl FnMut(f64)) -> io::Result<()> {
-        let Some(file) = &self.file else { return Ok(()) };
-        let mut file = file.borrow_mut();
-        file.seek(SeekFrom::Start(0))?;
-        let mut reader = BufReader::with_capacity(1 << 16, &mut *file);
-        let mut bytes = [0; 8];
-        for _ in 0..self.filed {
-            reader.read_exact(&mut bytes)?;
-            see(f64::from_le_bytes(bytes));
-        }
-        Ok(())
-    }
-
-    /// Sum and number of what `of` makes of those that are finite.
-    fn sum(&self, of: impl Fn(f64) -> f64) -> Result<(f64, usize), JudgeError> {
-        // As the sum of an iterator begins.
-        let (mut sum, mut count) = (-0.0, 0);
+    /// Sums of what `of` makes of those that are finite.
+    fn sums(&self, of: impl Fn(f64) -> f64) -> Result<Sum, JudgeError> {
+        let mut sums = Sum::default();
         self.each(|value| {
             if value.is_finite() {
-                (sum, count) = (sum + of(value), count + 1);
+                sums.add(of(value));
             }
         })?;
-        Ok((sum, count))
+        Ok(sums)
     }
 
     /// Arithmetic mean.
@@ -123,8 +97,7 @@ impl Numbers {
     /// # Errors
     /// As [`Self::each`].
     pub fn mean(&self) -> Result<Option<f64>, JudgeError> {
-        let (sum, count) = self.sum(|value| value)?;
-        Ok((count > 0).then(|| sum / count as f64))
+        Ok(self.sums(|value| value)?.mean())
     }
 
     /// Root of the mean square about zero.
@@ -132,8 +105,7 @@ impl Numbers {
     /// # Errors
     /// As [`Self::each`].
     pub fn rms(&self) -> Result<Option<f64>, JudgeError> {
-        let (sum, count) = self.sum(|value| value * value)?;
-        Ok((count > 0).then(|| (sum / count as f64).sqrt()))
+        Ok(self.sums(|value| value)?.rms())
     }
 
     /// Standard deviation about the mean, n − 1 in the divisor, and how many numbers it is of; 0 for one.
@@ -142,8 +114,8 @@ impl Numbers {
     /// As [`Self::each`].
     pub fn std(&self) -> Result<Option<(f64, usize)>, JudgeError> {
         let Some(mean) = self.mean()? else { return Ok(None) };
-        let (squares, count) = self.sum(|value| (value - mean) * (value - mean))?;
-        Ok(Some((deviation(squares, count), count)))
+        let about = self.sums(|value| value - mean)?;
+        Ok(Some((deviation(about.squares(), about.count()), about.count())))
     }
 
     /// The value below which a share `p` (0 to 1) of the numbers' sizes lies.
@@ -163,7 +135,7 @@ impl Numbers {
     }
 
     fn ranked(&self, p: f64, of: impl Fn(f64) -> f64) -> Result<Option<f64>, JudgeError> {
-        let (_, count) = self.sum(|value| value)?;
+        let count = self.sums(|value| value)?.count();
         let Some(rank) = rank(count, p) else { return Ok(None) };
         let below = self.order(rank.floor() as usize, &of)?;
         let above = if rank.ceil() > rank.floor() { self.order(rank.ceil() as usize, &of)? } else { below };

@@ -9,12 +9,12 @@
 //! held whose samples ascend.
 
 use std::collections::{BTreeMap, HashMap};
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::io;
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use crate::analysis::error::JudgeError;
+use crate::analysis::read::word_file::WordFile;
 
 /// Rows of a key that are kept in memory.
 const MOST_ROWS: usize = 256;
@@ -50,11 +50,7 @@ impl Words<'_> {
 /// Rows by key.
 #[derive(Debug)]
 pub struct SpillStore<K, T> {
-    /// Where the file is made once it is needed.
-    directory: PathBuf,
-    file: Option<Mutex<File>>,
-    /// Words in the file.
-    filed: u64,
+    file: WordFile,
     stacks: BTreeMap<K, Stack>,
     /// What a [`Finder`] could not read.
     failed: Mutex<Option<io::Error>>,
@@ -91,13 +87,13 @@ struct Lot {
 impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
     /// An empty one, whose file is made in that directory.
     pub fn new(directory: &Path) -> Self {
-        let (file, stacks, failed) = (None, BTreeMap::new(), Mutex::new(None));
-        Self { directory: directory.to_owned(), file, filed: 0, stacks, failed, kind: std::marker::PhantomData }
+        let (file, stacks, failed) = (WordFile::new(directory), BTreeMap::new(), Mutex::new(None));
+        Self { file, stacks, failed, kind: std::marker::PhantomData }
     }
 
     /// Where its file is made.
     pub fn directory(&self) -> &Path {
-        &self.directory
+        self.file.directory()
     }
 
     /// Adds a row behind those of its key.
@@ -115,18 +111,8 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
         if stack.words.len() < MOST_ROWS * T::WORDS {
             return Ok(());
         }
-        let failed = |source| JudgeError::File { path: self.directory.clone(), source };
-        if self.file.is_none() {
-            self.file = Some(Mutex::new(tempfile::tempfile_in(&self.directory).map_err(failed)?));
-        }
-        if let Some(file) = &mut self.file {
-            let bytes: Vec<u8> = stack.words.iter().flat_map(|word| word.to_le_bytes()).collect();
-            let file = file.get_mut().unwrap_or_else(PoisonError::into_inner);
-            // Reading has left the place where it ends.
-            file.seek(SeekFrom::Start(8 * self.filed)).and_then(|_| file.write_all(&bytes)).map_err(failed)?;
-        }
-        stack.lots.push(Lot { start: self.filed, first: stack.words.first().copied().unwrap_or(0) });
-        self.filed += stack.words.len() as u64;
+        let start = self.file.append(&stack.words)?;
+        stack.lots.push(Lot { start, first: stack.words.first().copied().unwrap_or(0) });
         stack.words.clear();
         Ok(())
     }
@@ -183,7 +169,7 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
         let mut show = |words: &[u64]| words.chunks(T::WORDS).for_each(|row| see(T::take(key, &mut Words(row.iter()))));
         let mut words = Vec::new();
         for lot in &stack.lots {
-            self.lot(*lot, &mut words).map_err(|source| self.unreadable(source))?;
+            self.lot(*lot, &mut words).map_err(|source| self.file.unreadable(source))?;
             show(&words);
         }
         show(&stack.words);
@@ -229,26 +215,12 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
     /// [`JudgeError::Read`] where one could not.
     pub fn sound(&self) -> Result<(), JudgeError> {
         let failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner).take();
-        failed.map_or(Ok(()), |source| Err(self.unreadable(source)))
-    }
-
-    fn unreadable(&self, source: io::Error) -> JudgeError {
-        JudgeError::Read { path: self.directory.clone(), source }
+        failed.map_or(Ok(()), |source| Err(self.file.unreadable(source)))
     }
 
     /// A lot of the file.
-    fn lot(&self, Lot { start, .. }: Lot, words: &mut Vec<u64>) -> io::Result<()> {
-        let Some(file) = &self.file else { return Ok(()) };
-        let mut bytes = vec![0; 8 * MOST_ROWS * T::WORDS];
-        {
-            let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
-            file.seek(SeekFrom::Start(8 * start))?;
-            file.read_exact(&mut bytes)?;
-        }
-        words.clear();
-        let word = |bytes: &[u8]| bytes.try_into().map_or(0, u64::from_le_bytes);
-        words.extend(bytes.chunks_exact(8).map(word));
-        Ok(())
+    fn lot(&self, lot: Lot, words: &mut Vec<u64>) -> io::Result<()> {
+        self.file.read(lot.start, MOST_ROWS * T::WORDS, words)
     }
 }
 
@@ -272,7 +244,7 @@ impl<K: Copy + Ord, T: SpillRow<K>> Cursor<'_, K, T> {
             match stack.lots.get(self.lot - 1) {
                 Some(lot) => {
                     if let Err(source) = self.store.lot(*lot, &mut self.words) {
-                        return Some(Err(self.store.unreadable(source)));
+                        return Some(Err(self.store.file.unreadable(source)));
                     }
                 }
                 None if self.lot == stack.lots.len() + 1 => self.words.clone_from(&stack.words),
@@ -403,7 +375,7 @@ mod tests {
         assert_eq!((store.len(), store.rows(9).unwrap().len(), store.is_empty()), (3003, 0, false));
         assert_eq!(store.keys().collect::<Vec<_>>(), [0, 1, 2]);
         // What is held beyond the file is less than a lot a key.
-        assert!(store.stacks.values().all(|stack| stack.words.len() < 2 * MOST_ROWS) && store.filed > 2 * 2500);
+        assert!(store.stacks.values().all(|stack| stack.words.len() < 2 * MOST_ROWS) && store.file.len() > 2 * 2500);
         // The file bears no name.
         assert_eq!(std::fs::read_dir(place.path()).unwrap().count(), 0);
     }
@@ -441,7 +413,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let mut store = SpillStore::new(place.path());
         (0..600).for_each(|n| store.push(0, &Pair(n, 0.0)).unwrap());
-        store.file.as_mut().unwrap().get_mut().unwrap().set_len(8 * 600).unwrap();
+        store.file.cut(600);
         let mut found = store.finder(0).unwrap();
         assert!(found.get(100).is_some() && store.sound().is_ok());
         assert!(found.get(400).is_none());

@@ -18,6 +18,11 @@ use super::multiple_access::LEAST_CODES;
 /// cross-correlations of a family differ by less.
 const SURE: f64 = 4.0;
 
+/// Place of the largest value, of equal ones the first.
+fn place_of_largest(values: &[f64]) -> usize {
+    (0..values.len()).fold(0, |best, n| if values[n] > values[best] { n } else { best })
+}
+
 impl Grid {
     /// The best Doppler of every satellite, its number first, and the crowded ones. Where the law of a
     /// crowded column is not known, what others reach there is the threshold.
@@ -35,13 +40,10 @@ impl Grid {
             *threshold = threshold.max(others.filter(|_| !known).unwrap_or(0.0));
         }
         let peak = |(satellite, heights): (usize, &Vec<f64>)| {
-            let share = |bin: usize| heights[bin] / bar.thresholds[bin];
-            let best = |of: &dyn Fn(usize) -> f64| {
-                (1..heights.len()).fold(0, |best, n| if of(n) > of(best) { n } else { best })
-            };
+            let shares: Vec<f64> = heights.iter().zip(&bar.thresholds).map(|(height, least)| height / least).collect();
             // Of one that is surely there side lobes in Doppler may meet lower thresholds.
-            let highest = best(&|bin| heights[bin]);
-            let bin = if share(highest) >= SURE { highest } else { best(&share) };
+            let highest = place_of_largest(heights);
+            let bin = if shares[highest] >= SURE { highest } else { place_of_largest(&shares) };
             let (statistic, threshold) = (heights[bin], bar.thresholds[bin]);
             let (doppler_hz, lag) = (self.dopplers_hz[bin], strips[bin][satellite].lag);
             (bin, Peak { statistic, threshold, doppler_hz, lag })
@@ -70,8 +72,7 @@ impl Grid {
                 whole * if self.meets_image(doppler_hz) { self.image_scale } else { 1.0 }
             })
             .collect();
-        let highest = (0..scaled.len()).fold(0, |best, bin| if scaled[bin] > scaled[best] { bin } else { best });
-        let best_lag = column().nth(highest).map_or(0, |strip| strip.lag);
+        let best_lag = column().nth(place_of_largest(&scaled)).map_or(0, |strip| strip.lag);
         let (mut total, mut powers) = (0.0, 0.0);
         for strip in column() {
             let apart = strip.lag.abs_diff(best_lag);

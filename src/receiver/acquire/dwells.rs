@@ -24,7 +24,7 @@ use num_complex::Complex;
 
 use super::grid::{Grid, Strip};
 use super::kernel::{self, Factors, Spectrum};
-use super::multiple_access::LEAST_CODES;
+use super::multiple_access::{LEAST_CODES, Law};
 use crate::receiver::threshold::{of_one_cell, threshold};
 
 /// A share of the dwells after which a Doppler may be left, and the probability that noise stays.
@@ -143,8 +143,8 @@ impl Grid {
     ) -> (Vec<Strip>, Option<f64>) {
         room.clear();
         let all = self.meets_image(doppler_hz);
-        if let Some(first) = self.dwells.first_bar().filter(|_| !self.is_pair && !all) {
-            return self.column_alone(spectra, make, room, first);
+        if let Some((first, law)) = self.early.as_ref().filter(|_| !all) {
+            return self.column_alone(spectra, make, room, (*first, law));
         }
         let mut column: Vec<Strip> = spectra.iter().map(|codes| self.map(make, codes, all, room)).collect();
         let first_left = column.iter().map(|strip| strip.sums).min().unwrap_or(0);
@@ -161,7 +161,7 @@ impl Grid {
         spectra: &[Spectra<'_>],
         make: &mut Make<'_>,
         room: &mut Room,
-        first: usize,
+        (first, law): (usize, &Law),
     ) -> (Vec<Strip>, Option<f64>) {
         let least = self.dwells.stay[first - 1];
         let (mut heights, mut kept) = (Vec::new(), Vec::new());
@@ -176,7 +176,7 @@ impl Grid {
                 kept.push((number, room.powers.clone()));
             }
         }
-        let reached = self.early.reached(heights.clone());
+        let reached = law.reached(heights.clone());
         // Cross-correlation is the same in every dwell.
         let rise = reached.map_or(0.0, |reached| f64::max(reached - least, 0.0) / first as f64);
         let bar = |made: usize| match self.dwells.stay[made - 1] {

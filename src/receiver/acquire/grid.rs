@@ -62,8 +62,8 @@ pub(super) struct Grid {
     pub lag_samples: f64,
     /// What a satellite's statistic has to exceed, by Doppler.
     pub(super) law: Law,
-    /// The same where a Doppler may be left for the first time.
-    pub(super) early: Law,
+    /// Of one code: the dwells after which a Doppler may be left for the first time, and the law then.
+    pub(super) early: Option<(usize, Law)>,
     /// What the statistic is multiplied by where a real recording's noise is not circular.
     pub(super) image_scale: f64,
     is_real: bool,
@@ -178,7 +178,7 @@ impl Grid {
         let image_scale = threshold(per_cell, 2 * sums) / (2.0 * threshold(per_cell, sums));
         let bins = dopplers_hz.len();
         let of_sums = |sums| Law::new(settings.false_alarm_probability, lags, bins, sums, image_scale);
-        let early = of_sums(dwells.first_bar().map_or(sums, |made| dwells.sums_after(made)));
+        let early = dwells.first_bar().filter(|_| !is_pair).map(|made| (made, of_sums(dwells.sums_after(made))));
         let side_hz = component.side_hz();
         let share = 1.0 + side_hz / carrier_hz;
         Some(Self {

@@ -8,6 +8,7 @@
 use super::{Finding, Found};
 use crate::analysis::error::JudgeError;
 use crate::analysis::read::{Numbers, Run};
+use crate::analysis::statistics::larger;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
 use crate::gnss::record::{Event, Observation};
 use crate::gnss::signal::Link;
@@ -95,7 +96,7 @@ fn fixes(run: &Run, reading_m: Option<f64>) -> Result<Vec<Finding>, JudgeError> 
         }
         let off = |whole: f64, a: f64, b: f64| ((a * a + b * b) / (whole * whole) - 1.0).abs();
         let new = off(fix.gdop, fix.pdop, fix.tdop).max(off(fix.pdop, fix.hdop, fix.vdop));
-        most = Some(most.filter(|old| old.total_cmp(&new).is_gt()).unwrap_or(new));
+        most = larger(most, new);
     })?;
     let mut found = Vec::new();
     if reading_m.is_some() && any {

@@ -24,7 +24,7 @@ use crate::analysis::judge::summary::Summary;
 use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::measure::errors::Errors;
 use crate::analysis::read::{Emission, Numbers, Run, Table};
-use crate::analysis::statistics::Sum;
+use crate::analysis::statistics::{Sum, larger};
 use crate::gnss::record::{Event, Fix};
 use crate::gnss::signal::Link;
 
@@ -200,22 +200,21 @@ impl Verdict {
     }
 
     fn geometry(&mut self, cases: &Table<Case>) -> Result<(), JudgeError> {
-        let (mut largest, mut most) = (None, None);
-        let later = |old: Option<f64>, new: f64| Some(old.filter(|old| old.total_cmp(&new).is_gt()).unwrap_or(new));
+        let (mut farthest, mut most) = (None, None);
         let mut departures = Numbers::new(cases.directory());
         for case in cases.cursor() {
             let case = case?;
             if !case.is_whole() {
                 continue;
             }
-            largest = later(largest, case.geometry_departure());
+            farthest = larger(farthest, case.geometry_departure());
             if case.expected.corrected && case.expected.steady {
                 let departure = case.correlation_departure();
                 departures.push(departure)?;
-                most = later(most, departure);
+                most = larger(most, departure);
             }
         }
-        if let Some(value) = largest {
+        if let Some(value) = farthest {
             let source = "directions to the satellites in the truth";
             let figure = "dilutions and condition against the true geometry, largest departure";
             self.judge(figure, "", value, "of 1", Bound::Max(GEOMETRY), source);
@@ -254,7 +253,7 @@ impl Verdict {
                 odd += usize::from(!expected.get(fix.sample).is_some_and(|case| case.is_whole()));
             }
             if let Some(new) = tested(&fix) {
-                most = Some(most.filter(|old| old.total_cmp(&new).is_gt()).unwrap_or(new));
+                most = larger(most, new);
             }
         })?;
         let source = "observed, with a message, above the mask, not excluded";
