@@ -41,7 +41,7 @@ impl Watch {
         let slipped = self.symbol_lock.add(symbol, cn0_hz.map(|hz| hz * self.symbol_s));
         let slipped = slipped && self.state.slip(now);
         let lock = (self.symbol_lock.value(), self.symbol_lock.settled());
-        let change = self.state.follow(now, lock, is_weak(cn0_hz, settings), settings);
+        let change = self.state.follow(now, lock, is_weak(cn0_hz, settings.least_cn0_hz()), settings);
         self.interruptions += u64::from(slipped) + u64::from(change == Some(LockChange::Broken));
         let time_s = |period: u64| period as f64 * self.period_s;
         self.state.is_lost(|since| time_s(now) - time_s(since), settings)

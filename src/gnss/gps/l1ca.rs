@@ -70,18 +70,20 @@ pub fn code(prn: u8) -> Option<Vec<bool>> {
     let g2 = register(planted!("gnss.code.g2_taps", &[2, 3, 6, 8, 9, 10][..], &[2, 3, 6, 8, 10][..]));
     let length = CODE_CHIPS as usize;
     let late = |i: usize| planted!("gnss.code.chips_beyond_512", i, i + usize::from(i > 512));
-    Some((0..length).map(|i| g1[i] ^ g2[(late(i) + length - delay) % length]).collect())
+    let delayed = |i: usize| late(i).checked_sub(delay).unwrap_or(late(i) + length - delay);
+    Some((0..length).map(|i| g1[i] ^ g2[delayed(i)]).collect())
 }
 
 /// One period of a ten-stage register that starts with all ones; `taps` are the stages fed back.
 fn register(taps: &[usize]) -> Vec<bool> {
-    let mut stages = [true; 10];
+    // Stage 1 in the lowest bit.
+    let fed_back = taps.iter().fold(0, |mask, stage| mask | 1_u16 << (stage - 1));
+    let mut stages = 0x3ff_u16;
     (0..CODE_CHIPS)
         .map(|_| {
-            let output = stages[9];
-            let feedback = taps.iter().fold(false, |sum, &stage| sum ^ stages[stage - 1]);
-            stages.rotate_right(1);
-            stages[0] = feedback;
+            let output = stages >> 9 & 1 == 1;
+            let feedback = (stages & fed_back).count_ones() as u16 & 1;
+            stages = (stages << 1 | feedback) & 0x3ff;
             output
         })
         .collect()

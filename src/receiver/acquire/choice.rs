@@ -2,10 +2,10 @@
 //! sums before that is known.
 //!
 //! Where a search leaves Dopplers early ([`super::dwells`]), the law of a crowded one is not known: it needs
-//! the largest cells of all codes ([`super::multiple_access`]). There what nine codes in ten reach is the
-//! threshold to begin with. A satellite that passes it by less than four times has its column filled, and
-//! all are chosen anew, until none is left that does. So no satellite is found by less than a search without
-//! leaving asks for.
+//! the largest cells of all codes ([`super::multiple_access`]). There the threshold to begin with is seven
+//! tenths of what the codes' first dwells let expect of it, and not below what nine of them in ten reach. A
+//! satellite that passes it by less than what makes it sure has its column filled, and all are chosen anew,
+//! until none is left that does. So no satellite is found by less than a search without leaving asks for.
 
 use std::collections::BTreeSet;
 
@@ -14,9 +14,12 @@ use super::grid::Peaks;
 use super::grid::{Grid, Peak, Strip};
 use super::multiple_access::LEAST_CODES;
 
-/// What is so many times its threshold, and so many times what other codes reach there, needs no column:
-/// cross-correlations of a family differ by less.
+/// What is so many times its threshold, or where that is not known so many times what other codes reach
+/// there, needs no column: cross-correlations of a family differ by less.
 const SURE: f64 = 4.0;
+/// What a satellite has to exceed of the threshold that is expected, for its column to be filled. Where noise
+/// has most of what the first dwells show, the threshold is 0.8 of what they let expect.
+const DOUBTFUL: f64 = 0.7;
 
 /// Place of the largest value, of equal ones the first.
 fn place_of_largest(values: &[f64]) -> usize {
@@ -24,8 +27,8 @@ fn place_of_largest(values: &[f64]) -> usize {
 }
 
 impl Grid {
-    /// The best Doppler of every satellite, its number first, and the crowded ones. Where the law of a
-    /// crowded column is not known, what others reach there is the threshold.
+    /// The best Doppler of every satellite, its number first, and the crowded ones. `reached` has what nine
+    /// codes in ten reach in crowded columns, as far as their law is not known.
     pub fn peaks(
         &self,
         strips: &[Vec<Strip>],
@@ -35,30 +38,38 @@ impl Grid {
         let heights: Vec<Vec<f64>> = (0..satellites).map(|satellite| self.heights(strips, satellite)).collect();
         let image = |bin: usize| self.dopplers_hz.get(bin).is_some_and(|doppler_hz| self.meets_image(*doppler_hz));
         let mut bar = self.law.bar(&heights, image);
-        for ((threshold, column), others) in bar.thresholds.iter_mut().zip(strips).zip(reached) {
-            let known = column.iter().all(|strip| strip.sums == self.sums);
-            *threshold = threshold.max(others.filter(|_| !known).unwrap_or(0.0));
+        let mut sure: Vec<f64> = bar.thresholds.iter().map(|threshold| SURE * threshold).collect();
+        for (bin, others) in reached.iter().enumerate() {
+            let known = strips[bin].iter().all(|strip| strip.sums == self.sums);
+            if let Some(others) = others.filter(|_| !known) {
+                sure[bin] = sure[bin].max(SURE * others);
+                let expected = DOUBTFUL * self.law.beyond(others);
+                bar.thresholds[bin] = bar.thresholds[bin].max(others).max(expected);
+            }
         }
-        let peak = |(satellite, heights): (usize, &Vec<f64>)| {
+        let choice = |(satellite, heights): (usize, &Vec<f64>)| {
             let shares: Vec<f64> = heights.iter().zip(&bar.thresholds).map(|(height, least)| height / least).collect();
             // Of one that is surely there side lobes in Doppler may meet lower thresholds.
             let highest = place_of_largest(heights);
-            let bin = if shares[highest] >= SURE { highest } else { place_of_largest(&shares) };
+            let bin = if heights[highest] >= sure[highest] { highest } else { place_of_largest(&shares) };
             let (statistic, threshold) = (heights[bin], bar.thresholds[bin]);
             let (doppler_hz, lag) = (self.dopplers_hz[bin], strips[bin][satellite].lag);
-            (bin, Peak { statistic, threshold, doppler_hz, lag })
+            (bin, Peak { statistic, threshold, is_sure: statistic >= sure[bin], doppler_hz, lag })
         };
-        (heights.iter().enumerate().map(peak).collect(), bar.crowded)
+        (heights.iter().enumerate().map(choice).collect(), bar.crowded)
     }
 
-    /// Numbers of the Dopplers at which a satellite seems to be that may be cross-correlation, and whose law
-    /// is not known as not all codes' sums are there.
-    pub fn doubtful(&self, peaks: &[(usize, Peak)], is_open: impl Fn(usize) -> bool) -> BTreeSet<usize> {
+    /// Numbers of the Dopplers at which a satellite seems to be that may be cross-correlation, and that are
+    /// open for it: not all sums of all codes are there.
+    pub fn doubtful(&self, peaks: &[(usize, Peak)], is_open: impl Fn(usize, usize) -> bool) -> BTreeSet<usize> {
         if self.is_pair || peaks.len() < LEAST_CODES {
             return BTreeSet::new();
         }
-        let unsure = |peak: &Peak| (1.0..SURE).contains(&(peak.statistic / peak.threshold));
-        peaks.iter().filter(|(_, peak)| unsure(peak)).map(|(bin, _)| *bin).filter(|bin| is_open(*bin)).collect()
+        let doubtful = |(satellite, (bin, peak)): (usize, &(usize, Peak))| {
+            let unsure = peak.statistic >= peak.threshold && !peak.is_sure;
+            (unsure && is_open(*bin, satellite)).then_some(*bin)
+        };
+        peaks.iter().enumerate().filter_map(doubtful).collect()
     }
 
     /// The largest cell of a satellite at every Doppler, zero where that was left, over the noise floor of
@@ -91,7 +102,7 @@ impl Grid {
         let bin = |peak: &Peak| self.dopplers_hz.iter().position(|doppler_hz| *doppler_hz == peak.doppler_hz);
         let numbered: Vec<(usize, Peak)> = peaks.of.iter().map(|peak| (bin(peak).unwrap(), *peak)).collect();
         let strips = &peaks.map.strips;
-        let is_open = |bin: usize| strips[bin].iter().any(|strip| strip.sums < self.sums);
+        let is_open = |bin: usize, _| strips[bin].iter().any(|strip| strip.sums < self.sums);
         self.doubtful(&numbered, is_open).len()
     }
 

@@ -17,6 +17,7 @@ use super::replica::Replica;
 use super::window::Window;
 use super::{AcquireError, Band, companion};
 use crate::gnss::signal::{Component, Link};
+use crate::receiver::correlate::{self, Edge, Wave};
 use crate::receiver::lead::lead;
 
 /// Spectra that are kept from one search to the next, in bytes.
@@ -63,8 +64,9 @@ impl Code {
     }
 
     /// The code as correlators want it.
-    pub fn replica(&self) -> Option<Replica> {
-        self.leading.replica()
+    pub fn correlator(&self) -> Option<correlate::Replica> {
+        let Sent { component, number, .. } = self.leading;
+        correlate::Replica::of(Wave::new(component, number)?, Edge::Area)
     }
 
     /// Whether the leading codes are the same.

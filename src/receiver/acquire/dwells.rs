@@ -20,10 +20,12 @@
 //! to exceed what nine in ten of the others reach, and the search fills every column in which a candidate
 //! stands that is not sure ([`Grid::search`]).
 
+use std::sync::{Mutex, PoisonError};
+
 use num_complex::Complex;
 
 use super::grid::{Grid, Strip};
-use super::kernel::{self, Factors, Spectrum};
+use super::kernel::{self, Spectrum};
 use super::multiple_access::{LEAST_CODES, Law};
 use crate::receiver::threshold::{of_one_cell, threshold};
 
@@ -58,13 +60,31 @@ pub(super) struct Dwells {
 /// What writes the spectrum of a dwell at a Doppler, onto zeros.
 pub(super) type Make<'a> = dyn FnMut(usize, &mut [Complex<f32>]) + 'a;
 
+/// Rooms for the Dopplers of all looks at some samples: as many as are worked on at a time.
+#[derive(Default)]
+pub(super) struct Rooms(Mutex<Vec<Room>>);
+
+impl Rooms {
+    /// Lends a room of that grid's size.
+    pub fn with<T>(&self, grid: &Grid, work: impl FnOnce(&mut Room) -> T) -> T {
+        let free = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let idle = free().pop();
+        let mut room = idle.unwrap_or_else(|| grid.room());
+        let made = work(&mut room);
+        free().push(room);
+        made
+    }
+}
+
 /// Room in which the maps of a Doppler are made, to be used for one after the other.
 pub(super) struct Room {
     fft: Vec<Complex<f32>>,
     short: Vec<Complex<f32>>,
     powers: Vec<f32>,
+    /// Those of satellites that stay after the first dwells.
+    kept: Vec<Vec<f32>>,
     /// Of every dwell, and whether it has been made.
-    spectra: Vec<(bool, Factors)>,
+    spectra: Vec<(bool, Vec<Complex<f32>>)>,
 }
 
 impl Room {
@@ -164,7 +184,7 @@ impl Grid {
         (first, law): (usize, &Law),
     ) -> (Vec<Strip>, Option<f64>) {
         let least = self.dwells.stay[first - 1];
-        let (mut heights, mut kept) = (Vec::new(), Vec::new());
+        let (mut heights, mut stayed) = (Vec::new(), Vec::new());
         let mut column = Vec::with_capacity(spectra.len());
         for (number, codes) in spectra.iter().enumerate() {
             room.powers.fill(0.0);
@@ -173,7 +193,11 @@ impl Grid {
             heights.push(height);
             column.push(self.left(height / least, total, first));
             if height > least {
-                kept.push((number, room.powers.clone()));
+                match room.kept.get_mut(stayed.len()) {
+                    Some(place) => place.copy_from_slice(&room.powers),
+                    None => room.kept.push(room.powers.clone()),
+                }
+                stayed.push(number);
             }
         }
         let reached = law.reached(heights.clone());
@@ -183,8 +207,8 @@ impl Grid {
             0.0 => 0.0,
             noise => noise + rise * made as f64,
         };
-        for (number, powers) in kept.into_iter().filter(|(number, _)| heights[*number] > bar(first)) {
-            room.powers = powers;
+        for (place, number) in stayed.into_iter().enumerate().filter(|(_, number)| heights[*number] > bar(first)) {
+            std::mem::swap(&mut room.powers, &mut room.kept[place]);
             column[number] = (first + 1..=self.dwells.stay.len())
                 .find_map(|made| {
                     self.add(make, &spectra[number], made - 1, room);
@@ -197,8 +221,9 @@ impl Grid {
     }
 
     /// Gives the satellites of a column the dwells that they were left without.
-    pub fn fill(&self, column: &mut [Strip], spectra: &[Spectra<'_>], make: &mut Make<'_>) {
-        self.fill_by(column, spectra, make, &mut self.room());
+    pub fn fill(&self, column: &mut [Strip], spectra: &[Spectra<'_>], make: &mut Make<'_>, room: &mut Room) {
+        room.clear();
+        self.fill_by(column, spectra, make, room);
     }
 
     fn fill_by(&self, column: &mut [Strip], spectra: &[Spectra<'_>], make: &mut Make<'_>, room: &mut Room) {
@@ -208,17 +233,19 @@ impl Grid {
     }
 
     /// One satellite at one Doppler with all its dwells.
-    pub fn whole(&self, codes: &Spectra<'_>, make: &mut Make<'_>) -> Strip {
-        self.map(make, codes, true, &mut self.room())
+    pub fn whole(&self, codes: &Spectra<'_>, make: &mut Make<'_>, room: &mut Room) -> Strip {
+        room.clear();
+        self.map(make, codes, true, room)
     }
 
     /// Room for the maps of any Doppler.
-    pub fn room(&self) -> Room {
+    fn room(&self) -> Room {
         Room {
             fft: vec![Complex::default(); self.inverse.get_inplace_scratch_len()],
             short: vec![Complex::default(); self.inverse.len()],
             powers: vec![0.0; self.lags],
-            spectra: self.dwells.begins.iter().map(|_| (false, Factors::default())).collect(),
+            kept: Vec::new(),
+            spectra: self.dwells.begins.iter().map(|_| (false, Vec::new())).collect(),
         }
     }
 
@@ -240,15 +267,15 @@ impl Grid {
 
     /// Adds the powers of a dwell.
     fn add(&self, make: &mut Make<'_>, codes: &Spectra<'_>, dwell: usize, room: &mut Room) {
-        let Some((made, factors)) = room.spectra.get_mut(dwell) else { return };
+        let Some((made, spectrum)) = room.spectra.get_mut(dwell) else { return };
         if !*made {
-            room.short.fill(Complex::default());
-            make(dwell, &mut room.short);
-            factors.set(&room.short);
+            spectrum.clear();
+            spectrum.resize(self.inverse.len(), Complex::default());
+            make(dwell, spectrum);
             *made = true;
         }
         for code in codes.iter().take(self.dwells.codes) {
-            kernel::multiply(&mut room.short, code, factors);
+            kernel::multiply(&mut room.short, code, spectrum);
             self.inverse.process_with_scratch(&mut room.short, &mut room.fft);
             kernel::add_powers(&mut room.powers, &room.short);
         }

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
 use super::Acquired;
-use super::dwells::{Dwells, Room, Spectra};
+use super::dwells::{Dwells, Room, Rooms, Spectra};
 use super::kernel::Spectrum;
 use super::multiple_access::Law;
 use super::refine::Refined;
@@ -78,6 +78,8 @@ pub(super) struct Peak {
     pub statistic: f64,
     /// What it has to exceed at its Doppler.
     pub threshold: f64,
+    /// Whether no law of that Doppler would make it cross-correlation.
+    pub is_sure: bool,
     pub doppler_hz: f64,
     pub lag: usize,
 }
@@ -226,10 +228,12 @@ impl Grid {
     /// samples.
     pub fn spectrum(&self, replica: &Replica) -> Spectrum {
         let mut buffer = vec![Complex::default(); self.forward.len()];
+        let mut means = vec![0.0; self.forward.len()];
+        replica.means(0.0, self.chips_per_sample, &mut means);
         // Scaled so that powers stay near one whatever the length.
-        let scale = 1.0 / self.forward.len() as f64;
-        for (sample, mean) in buffer.iter_mut().zip(replica.means(0.0, self.chips_per_sample)) {
-            *sample = Complex::new((mean * scale) as f32, 0.0);
+        let scale = 1.0 / self.forward.len() as f32;
+        for (sample, mean) in buffer.iter_mut().zip(means) {
+            *sample = Complex::new(mean * scale, 0.0);
         }
         self.forward.process(&mut buffer);
         let mut spectrum = vec![Complex::default(); self.inverse.len()];
@@ -252,11 +256,11 @@ impl Grid {
 
     /// The largest cell of every satellite, in their order; `again` after something was subtracted from the
     /// samples.
-    pub fn search(&self, block: &Block, spectra: &[Spectra<'_>], again: Option<&Again<'_>>) -> Peaks {
+    pub fn search(&self, block: &Block, spectra: &[Spectra<'_>], again: Option<&Again<'_>>, rooms: &Rooms) -> Peaks {
         let power: f64 = block.i.iter().chain(block.q).map(|x| f64::from(x * x)).sum();
         let rms = (power / block.i.len().max(1) as f64).sqrt();
         if rms == 0.0 {
-            let none = Peak { statistic: 0.0, threshold: self.law.threshold, doppler_hz: 0.0, lag: 0 };
+            let none = Peak { statistic: 0.0, threshold: self.law.threshold, is_sure: false, doppler_hz: 0.0, lag: 0 };
             return Peaks { of: vec![none; spectra.len()], crowded: Vec::new(), map: Map::default() };
         }
         // What is compared with strips of before has their scale.
@@ -282,8 +286,8 @@ impl Grid {
             _ => column(bin, spectra, room),
         };
         let (mut strips, reached): (Vec<Vec<Strip>>, Vec<Option<f64>>) =
-            (0..self.dopplers_hz.len()).into_par_iter().map_init(|| self.room(), one).unzip();
-        self.complete(&mut strips, spectra, &sums);
+            (0..self.dopplers_hz.len()).into_par_iter().map(|bin| rooms.with(self, |room| one(room, bin))).unzip();
+        self.complete(&mut strips, spectra, &sums, rooms);
         // Satellites that are not looked at again were seen beside what has been subtracted since.
         let old = |bin: usize, satellite: usize| {
             let again = again.filter(|again| !again.dopplers.contains(&bin));
@@ -292,9 +296,10 @@ impl Grid {
         let mut filled = BTreeSet::new();
         let (of, mut crowded) = loop {
             let (of, crowded) = self.peaks(&strips, &reached, spectra.len());
-            let is_open = |bin: usize| {
-                let open = |(satellite, strip): (usize, &Strip)| strip.sums < self.sums || old(bin, satellite);
-                !filled.contains(&bin) && strips[bin].iter().enumerate().any(open)
+            // Of others all sums are enough: what was subtracted since made them larger, if anything.
+            let is_open = |bin: usize, satellite: usize| {
+                let open = |strip: &Strip| strip.sums < self.sums;
+                !filled.contains(&bin) && (old(bin, satellite) || strips[bin].iter().any(open))
             };
             let doubtful = self.doubtful(&of, is_open);
             if doubtful.is_empty() {
@@ -303,7 +308,7 @@ impl Grid {
             let columns = strips.par_iter_mut().enumerate().filter(|(bin, _)| doubtful.contains(bin));
             columns.for_each(|(bin, column)| {
                 column.iter_mut().enumerate().filter(|(n, _)| old(bin, *n)).for_each(|(_, strip)| strip.sums = 0);
-                self.fill(column, spectra, &mut sums.at(self, bin));
+                rooms.with(self, |room| self.fill(column, spectra, &mut sums.at(self, bin), room));
             });
             filled.extend(doubtful);
         };
@@ -321,7 +326,7 @@ impl Grid {
     }
 
     /// Of every satellite one strip has all dwells: where none stayed, that which came nearest to it.
-    fn complete(&self, strips: &mut [Vec<Strip>], spectra: &[Spectra<'_>], sums: &Sums<'_>) {
+    fn complete(&self, strips: &mut [Vec<Strip>], spectra: &[Spectra<'_>], sums: &Sums<'_>, rooms: &Rooms) {
         let missing: Vec<(usize, usize)> = (0..spectra.len())
             .filter(|&satellite| strips.iter().all(|column| column[satellite].sums < self.sums))
             .filter_map(|satellite| {
@@ -330,7 +335,9 @@ impl Grid {
                 Some((best, satellite))
             })
             .collect();
-        let whole = |&(bin, satellite): &(usize, usize)| self.whole(&spectra[satellite], &mut sums.at(self, bin));
+        let whole = |&(bin, satellite): &(usize, usize)| {
+            rooms.with(self, |room| self.whole(&spectra[satellite], &mut sums.at(self, bin), room))
+        };
         let found: Vec<Strip> = missing.par_iter().map(whole).collect();
         for ((bin, satellite), strip) in missing.into_iter().zip(found) {
             strips[bin][satellite] = strip;

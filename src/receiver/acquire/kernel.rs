@@ -1,6 +1,9 @@
 //! The passes over samples, spectra and lags, compiled for AVX2 too; no operation is fused, so bits do not
 //! depend on it.
 
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64 as x86;
+
 use num_complex::{Complex, Complex64};
 
 /// Phasors that are turned side by side.
@@ -85,37 +88,115 @@ fn add_turned_avx2(sums: &mut [Complex<f32>], bins: &[Complex<f32>], first: Comp
     add_turned_plain(sums, bins, first, step);
 }
 
+/// Phasors whose products with those of every so many are all.
+const RAMP: usize = 64;
+
 #[inline(always)]
 fn add_turned_plain(sums: &mut [Complex<f32>], bins: &[Complex<f32>], first: Complex64, step: Complex64) {
+    let [mut fine_re, mut fine_im] = [[0.0_f32; RAMP]; 2];
+    let mut phasors = Phasors::new(Complex64::ONE, step);
+    for (re, im) in fine_re.as_chunks_mut::<LANES>().0.iter_mut().zip(fine_im.as_chunks_mut::<LANES>().0) {
+        for k in 0..LANES {
+            (re[k], im[k]) = (phasors.re[k] as f32, phasors.im[k] as f32);
+        }
+        phasors.turn();
+    }
+    // As far as eight turns by eight have come.
+    let whole = Complex64::new(phasors.re[0], phasors.im[0]);
+    let mut coarse = first;
+    for (sums, bins) in sums.chunks_mut(RAMP).zip(bins.chunks(RAMP)) {
+        let (re, im) = (coarse.re as f32, coarse.im as f32);
+        for (((sum, bin), fine_re), fine_im) in sums.iter_mut().zip(bins).zip(&fine_re).zip(&fine_im) {
+            *sum += bin * Complex::new(re * fine_re - im * fine_im, re * fine_im + im * fine_re);
+        }
+        coarse *= whole;
+    }
+}
+
+/// out = x·`first`·`step`ⁿ, as far as both have numbers.
+pub(super) fn turn(out: &mut [Complex<f32>], x: &[f32], first: Complex64, step: Complex64) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        unsafe { turn_avx2(out, x, first, step) };
+        return;
+    }
+    turn_plain(out, x, first, step);
+}
+
+/// Σ (i + jq)·conj(w) and Σ |w|², in `f64`.
+pub(super) fn project(samples: (&[f32], &[f32]), w: &[Complex<f32>]) -> (Complex64, f64) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { project_avx2(samples, w) };
+    }
+    project_plain(samples, w)
+}
+
+/// i + jq −= w·`by`, as far as each of both planes has samples.
+pub(super) fn subtract(planes: (&mut [f32], &mut [f32]), w: &[Complex<f32>], by: Complex64) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        unsafe { subtract_avx2(planes, w, by) };
+        return;
+    }
+    subtract_plain(planes, w, by);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn turn_avx2(out: &mut [Complex<f32>], x: &[f32], first: Complex64, step: Complex64) {
+    turn_plain(out, x, first, step);
+}
+
+#[inline(always)]
+fn turn_plain(out: &mut [Complex<f32>], x: &[f32], first: Complex64, step: Complex64) {
     let mut phasors = Phasors::new(first, step);
-    for (sums, bins) in sums.chunks_mut(LANES).zip(bins.chunks(LANES)) {
-        for (k, (sum, bin)) in sums.iter_mut().zip(bins).enumerate() {
-            *sum += bin * Complex::new(phasors.re[k] as f32, phasors.im[k] as f32);
+    for (out, x) in out.chunks_mut(LANES).zip(x.chunks(LANES)) {
+        for (k, (out, x)) in out.iter_mut().zip(x).enumerate() {
+            *out = Complex::new(phasors.re[k] as f32 * x, phasors.im[k] as f32 * x);
         }
         phasors.turn();
     }
 }
 
-/// Numbers by which others are multiplied, each as the two factors of either part: of a product's real part
-/// re·re and im·(−im), of the imaginary one im·re and re·im.
-#[derive(Default)]
-pub(super) struct Factors(Vec<[[f32; PARTS]; 2]>);
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn project_avx2(samples: (&[f32], &[f32]), w: &[Complex<f32>]) -> (Complex64, f64) {
+    project_plain(samples, w)
+}
 
-/// Parts of numbers that are multiplied side by side.
-const PARTS: usize = 16;
-
-impl Factors {
-    /// Takes these numbers in place of those before.
-    pub fn set(&mut self, numbers: &[Complex<f32>]) {
-        self.0.resize(numbers.len().div_ceil(PARTS / 2), [[0.0; PARTS]; 2]);
-        for (factors, numbers) in self.0.iter_mut().zip(numbers.chunks(PARTS / 2)) {
-            for (k, number) in numbers.iter().enumerate() {
-                (factors[0][2 * k], factors[0][2 * k + 1]) = (number.re, number.re);
-                (factors[1][2 * k], factors[1][2 * k + 1]) = (-number.im, number.im);
-            }
+#[inline(always)]
+fn project_plain((i, q): (&[f32], &[f32]), w: &[Complex<f32>]) -> (Complex64, f64) {
+    let [mut re, mut im, mut energy] = [[0.0; LANES]; 3];
+    for ((i, q), w) in i.chunks(LANES).zip(q.chunks(LANES)).zip(w.chunks(LANES)) {
+        for (k, ((i, q), w)) in i.iter().zip(q).zip(w).enumerate() {
+            let (i, q, w_re, w_im) = (f64::from(*i), f64::from(*q), f64::from(w.re), f64::from(w.im));
+            re[k] += i * w_re + q * w_im;
+            im[k] += q * w_re - i * w_im;
+            energy[k] += w_re * w_re + w_im * w_im;
         }
     }
+    (Complex64::new(re.iter().sum(), im.iter().sum()), energy.iter().sum())
 }
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn subtract_avx2(planes: (&mut [f32], &mut [f32]), w: &[Complex<f32>], by: Complex64) {
+    subtract_plain(planes, w, by);
+}
+
+#[inline(always)]
+fn subtract_plain((i, q): (&mut [f32], &mut [f32]), w: &[Complex<f32>], by: Complex64) {
+    let (re, im) = (by.re as f32, by.im as f32);
+    i.iter_mut().zip(w).for_each(|(i, w)| *i -= w.re * re - w.im * im);
+    q.iter_mut().zip(w).for_each(|(q, w)| *q -= w.re * im + w.im * re);
+}
+
+/// Parts of numbers that are multiplied side by side.
+const PARTS: usize = 8;
 
 /// A code's spectrum in 16 bits: to half a step of 2⁻¹⁵ of its largest part, which is 90 dB below that of a
 /// random code's bins, where its cross-correlations are 20 dB below.
@@ -145,7 +226,7 @@ impl Spectrum {
 }
 
 /// out = a·b, as far as all have numbers.
-pub(super) fn multiply(out: &mut [Complex<f32>], a: &Spectrum, b: &Factors) {
+pub(super) fn multiply(out: &mut [Complex<f32>], a: &Spectrum, b: &[Complex<f32>]) {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
@@ -204,32 +285,43 @@ fn peak_and_total_plain(powers: &[f32]) -> (f32, f64) {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn multiply_avx2(out: &mut [Complex<f32>], a: &Spectrum, b: &Factors) {
-    multiply_plain(out, a, b);
+fn multiply_avx2(out: &mut [Complex<f32>], a: &Spectrum, b: &[Complex<f32>]) {
+    let length = out.len().min(b.len()).min(a.parts.len() / 2);
+    let (whole_out, rest_out) = parts_mut(&mut out[..length]).as_chunks_mut::<PARTS>();
+    let (whole_b, rest_b) = parts(&b[..length]).as_chunks::<PARTS>();
+    let (whole_a, rest_a) = a.parts[..2 * length].as_chunks::<PARTS>();
+    let step = x86::_mm256_set1_ps(a.step);
+    for ((out, a), b) in whole_out.iter_mut().zip(whole_a).zip(whole_b) {
+        // SAFETY: eight parts are at each, and any alignment will do.
+        unsafe {
+            let a = x86::_mm256_cvtepi16_epi32(x86::_mm_loadu_si128(a.as_ptr().cast()));
+            let a = x86::_mm256_mul_ps(x86::_mm256_cvtepi32_ps(a), step);
+            let b = x86::_mm256_loadu_ps(b.as_ptr());
+            let own = x86::_mm256_mul_ps(a, x86::_mm256_moveldup_ps(b));
+            let other = x86::_mm256_mul_ps(x86::_mm256_permute_ps::<0b10_11_00_01>(a), x86::_mm256_movehdup_ps(b));
+            x86::_mm256_storeu_ps(out.as_mut_ptr(), x86::_mm256_addsub_ps(own, other));
+        }
+    }
+    multiply_parts(rest_out, (rest_a, a.step), rest_b);
+}
+
+fn multiply_plain(out: &mut [Complex<f32>], a: &Spectrum, b: &[Complex<f32>]) {
+    let length = out.len().min(b.len()).min(a.parts.len() / 2);
+    multiply_parts(parts_mut(&mut out[..length]), (&a.parts[..2 * length], a.step), parts(&b[..length]));
+}
+
+/// The products of real and imaginary parts in turn, all of as many numbers.
+fn multiply_parts(out: &mut [f32], (a, step): (&[i16], f32), b: &[f32]) {
+    for ((out, a), b) in out.as_chunks_mut::<2>().0.iter_mut().zip(a.as_chunks::<2>().0).zip(b.as_chunks::<2>().0) {
+        let [re, im] = a.map(|part| f32::from(part) * step);
+        *out = [re * b[0] - im * b[1], im * b[0] + re * b[1]];
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn add_powers_avx2(powers: &mut [f32], x: &[Complex<f32>]) {
     add_powers_plain(powers, x);
-}
-
-#[inline(always)]
-fn multiply_plain(out: &mut [Complex<f32>], a: &Spectrum, b: &Factors) {
-    let length = (2 * out.len()).min(a.parts.len());
-    let (whole_out, rest_out) = parts_mut(out)[..length].as_chunks_mut::<PARTS>();
-    let (whole, rest) = a.parts[..length].as_chunks::<PARTS>();
-    for ((out, a_parts), [of_own, of_other]) in whole_out.iter_mut().zip(whole).zip(&b.0) {
-        let a = a_parts.map(|part| f32::from(part) * a.step);
-        for k in 0..PARTS {
-            out[k] = a[k] * of_own[k] + a[k ^ 1] * of_other[k];
-        }
-    }
-    let Some([of_own, of_other]) = b.0.get(whole.len()) else { return };
-    for k in 0..rest.len() {
-        let [own, other] = [rest[k], rest[k ^ 1]].map(|part| f32::from(part) * a.step);
-        rest_out[k] = own * of_own[k] + other * of_other[k];
-    }
 }
 
 /// Real and imaginary parts in turn.
@@ -284,6 +376,40 @@ mod tests {
     }
 
     #[test]
+    fn a_waveform_is_turned_found_and_taken_out_at_every_length() {
+        let wave = |n: usize| libm::sinf(0.37 * n as f32);
+        let (first, step) = (Complex64::from_polar(0.7, 1.0), Complex64::from_polar(1.0, 0.3));
+        for length in (0..20).chain([2599, 2600]) {
+            let means: Vec<f32> = (0..length).map(|n| wave(7 * n)).collect();
+            let (mut i, mut q): (Vec<f32>, Vec<f32>) = (0..length).map(|n| (wave(n), wave(n + 3))).unzip();
+            let mut turned = vec![Complex::default(); length];
+            turn(&mut turned, &means, first, step);
+            let exact: Vec<Complex64> =
+                (0..length).map(|n| first * step.powu(n as u32) * f64::from(means[n])).collect();
+            let wide = |x: &Complex<f32>| Complex64::new(f64::from(x.re), f64::from(x.im));
+            // Sizes of one: a few roundings of 2⁻²⁴.
+            assert!(turned.iter().zip(&exact).all(|(found, exact)| (wide(found) - exact).norm() < 2e-7));
+            let (sum, energy) = project((&i, &q), &turned);
+            let samples = || i.iter().zip(&q).map(|(i, q)| Complex64::new(f64::from(*i), f64::from(*q)));
+            let (expected, squares) = samples().zip(&turned).fold((Complex64::ZERO, 0.0), |(sum, squares), (x, w)| {
+                (sum + x * wide(w).conj(), squares + wide(w).norm_sqr())
+            });
+            // The order of the sum.
+            assert!((sum - expected).norm() < 1e-12 * (1.0 + squares) && (energy - squares).abs() <= 1e-12 * squares);
+            let by = Complex64::new(0.3, -1.1);
+            let left: Vec<Complex64> = samples().zip(&turned).map(|(x, w)| x - wide(w) * by).collect();
+            let only = i.clone();
+            subtract((&mut i, &mut q), &turned, by);
+            for n in 0..length {
+                assert!((Complex64::new(f64::from(i[n]), f64::from(q[n])) - left[n]).norm() < 4e-7, "{length} {n}");
+            }
+            let (mut i, q_before) = (only, q.clone());
+            subtract((&mut i, &mut []), &turned, by);
+            assert!(i.iter().zip(&left).all(|(i, left)| (f64::from(*i) - left.re).abs() < 4e-7) && q == q_before);
+        }
+    }
+
+    #[test]
     fn peak_and_total_are_the_obvious_ones_at_every_length() {
         let powers: Vec<f32> = (0..5000_u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 8) as f32 * 1e-3).collect();
         for length in (0..200).chain([1023, 1024, 1025, 2048, 4999]) {
@@ -325,9 +451,10 @@ mod tests {
                 let a = spectrum.bins();
                 let mut products = vec![Complex::new(77.0, 77.0); 200];
                 let mut powers = vec![2.5; 200];
-                let mut factors = Factors::default();
-                factors.set(b);
-                multiply(&mut products[offset..offset + length], &spectrum, &factors);
+                let mut plain = products.clone();
+                multiply(&mut products[offset..offset + length], &spectrum, b);
+                multiply_plain(&mut plain[offset..offset + length], &spectrum, b);
+                assert_eq!(plain, products);
                 add_powers(&mut powers[offset..offset + length], &a);
                 for (n, (product, power)) in products.iter().zip(&powers).enumerate() {
                     let (expected, sum) = match n.checked_sub(offset).filter(|n| *n < length) {

@@ -61,6 +61,7 @@ use crate::receiver::lead::{beside, followed_db, lead};
 use crate::receiver::source::{Block, Stretch};
 
 use codes::{Code, Codes};
+use dwells::Rooms;
 pub use error::AcquireError;
 use grid::{Again, Grid, Map};
 use refine::Refined;
@@ -396,7 +397,8 @@ impl Searcher {
         for (code, place) in known {
             strongest = f64::max(strongest, code.subtract(grid, (code_chips, complex), place, &mut window));
         }
-        let (mut findings, mut crowded, mut map) = self.detect(grid, component, &window.block(), codes, None);
+        let rooms = Rooms::default();
+        let (mut findings, mut crowded, mut map) = self.detect(grid, component, &window.block(), codes, (None, &rooms));
         // Codes that are not subtracted yet.
         let mut open: Vec<usize> = (0..codes.len()).collect();
         for _ in 1..LARGEST_LOOKS {
@@ -426,7 +428,7 @@ impl Searcher {
             let satellites: Vec<(usize, bool)> =
                 again.iter().map(|&index| (index, masked || findings[index].hit.is_some())).collect();
             let some = Again { before: &map, dopplers: &crowded, satellites: &satellites };
-            let (found, still, seen) = self.detect(grid, component, &window.block(), &chosen, Some(&some));
+            let (found, still, seen) = self.detect(grid, component, &window.block(), &chosen, (Some(&some), &rooms));
             map.update(&satellites, &seen);
             crowded = still;
             for (index, mut finding) in again.into_iter().zip(found) {
@@ -453,12 +455,12 @@ impl Searcher {
         component: &Component,
         block: &Block,
         codes: &[(Sv, &Code)],
-        again: Option<&Again<'_>>,
+        (again, rooms): (Option<&Again<'_>>, &Rooms),
     ) -> (Vec<Finding>, Vec<usize>, Map) {
         let (sums, coherent) = (grid.sums, grid.coherent_periods);
         let spectra: Vec<dwells::Spectra<'_>> = codes.iter().map(|(_, code)| code.spectra()).collect();
         let coherent_s = component.period_s() * f64::from(coherent);
-        let peaks = grid.search(block, &spectra, again);
+        let peaks = grid.search(block, &spectra, again, rooms);
         let findings = (peaks.of)
             .into_par_iter()
             .zip(codes)
@@ -470,7 +472,7 @@ impl Searcher {
                     cn0_hz: excess.max(f64::MIN_POSITIVE) / coherent_s,
                     power: 0.0,
                 };
-                let replica = if peak.statistic > peak.threshold { code.replica() } else { None };
+                let replica = if peak.statistic > peak.threshold { code.correlator() } else { None };
                 let periods = grid.periods as usize;
                 let hit = replica.map(|replica| refine::refine(grid, block, component, &replica, coarse, periods));
                 Finding { statistic: peak.statistic, threshold: peak.threshold, coarse, hit }

@@ -117,6 +117,12 @@ impl Law {
         Some(root * root)
     }
 
+    /// What a peak has to exceed in a crowded bin where nine codes in ten stay below `reached`.
+    pub fn beyond(&self, reached: f64) -> f64 {
+        let root = reached.sqrt() + self.further;
+        root * root
+    }
+
     /// The median of the largest cells of a crowded bin and by how much each exceeds that, in amplitude.
     fn crowded(&self, mut column: Vec<f64>, image: bool) -> Option<(f64, Vec<f64>)> {
         if column.len() < LEAST_CODES {

@@ -10,9 +10,10 @@ use num_complex::Complex;
 use rustfft::FftPlanner;
 
 use super::grid::Grid;
+use super::kernel;
 use super::replica::Replica;
 use crate::gnss::signal::{Component, Layer, Shape};
-use crate::receiver::correlate::{Nco, TURN, chips_to_units, units_to_chips};
+use crate::receiver::correlate::{self, Nco, TURN, chips_to_units, steps_of_chip, units_to_chips};
 use crate::receiver::source::Block;
 
 /// Correlators that measure the noise.
@@ -36,7 +37,7 @@ pub(super) struct Refined {
 struct Correlators<'a> {
     grid: &'a Grid,
     block: &'a Block<'a>,
-    replica: &'a Replica,
+    replica: &'a correlate::Replica,
     code_chips: f64,
     periods: usize,
 }
@@ -47,7 +48,7 @@ pub(super) fn refine(
     grid: &Grid,
     block: &Block,
     component: &Component,
-    replica: &Replica,
+    replica: &correlate::Replica,
     coarse: Refined,
     periods: usize,
 ) -> Refined {
@@ -69,10 +70,16 @@ pub(super) fn refine(
             Shape::between(&layers, &layers, component.chip_rate_hz)
         },
     );
-    let noise_offsets = replica.correlator().quiet_taps(NOISE_TAPS).into_iter().map(units_to_chips).collect::<Vec<_>>();
-    let noise = mean(noise_offsets.iter().map(|&offset| correlators.powers(phase, doppler_hz, &[offset])[0]));
+    let quiet_chips: Vec<f64> = replica.quiet_taps(NOISE_TAPS).into_iter().map(units_to_chips).collect();
+    // Taps of one pass share the carrier.
+    let (fours, rest) = quiet_chips.as_chunks::<4>();
+    let of_fours = fours.iter().flat_map(|offsets| correlators.powers(phase, doppler_hz, offsets));
+    let noises: Vec<f64> =
+        of_fours.chain(rest.iter().map(|&offset| correlators.powers(phase, doppler_hz, &[offset])[0])).collect();
+    let noise = mean(noises.into_iter());
     // Early less late over their sum is the slope there times twice the error over twice the value.
-    let reach = if replica.steps_per_chip() > 1.0 { 0.25 / replica.steps_per_chip() } else { 0.5 };
+    let steps = steps_of_chip(component);
+    let reach = if steps > 1 { 0.25 / steps as f64 } else { 0.5 };
     let correlation = |chips: f64| shape.correlation(chips / component.chip_rate_hz);
     // Beside the peak it falls in a straight line.
     let slope = (correlation(0.5 * reach) - correlation(reach)) / (0.5 * reach);
@@ -124,7 +131,7 @@ impl Correlators<'_> {
                 code: chips_to_units(phase_chips + from as f64 * step - (period + 1) as f64 * self.code_chips),
                 code_step: chips_to_units(step) as u64,
             };
-            let taps = self.replica.correlator().correlate(i, q, &nco, &taps);
+            let taps = self.replica.correlate(i, q, &nco, &taps);
             sums.iter_mut().zip(taps).for_each(|(sum, tap)| sum.push(tap));
         }
         sums
@@ -212,34 +219,26 @@ pub(super) fn subtract(
     let step = grid.received_chips_per_sample(hit.doppler_hz);
     let frequency_hz = grid.frequency_hz(hit.doppler_hz);
     let turn = grid.phasor(frequency_hz, 1);
-    let mut waveform: Vec<Complex<f64>> = Vec::new();
+    let (mut means, mut waveform): (Vec<f32>, Vec<Complex<f32>>) = (Vec::new(), Vec::new());
     let (mut from, length) = (0, i.len());
     let (mut power, mut periods) = (0.0, 0_u32);
     for period in 1_u64.. {
         let boundary = ((period as f64 * code_chips - hit.code_phase_chips) / step).ceil().max(0.0) as usize;
         let to = boundary.min(length);
         let start = hit.code_phase_chips + from as f64 * step - (period - 1) as f64 * code_chips;
-        let mut rotation = grid.phasor(frequency_hz, from as u64);
-        waveform.clear();
-        for chip in replica.means(start - 0.5 * step, step).take(to - from) {
-            waveform.push(rotation * chip);
-            rotation *= turn;
-        }
         let (Some(i), Some(q)) = (i.get_mut(from..to), q.get_mut(from..to)) else { break };
-        let samples = i.iter().zip(q.iter()).map(|(i, q)| Complex::new(f64::from(*i), f64::from(*q)));
-        let sum: Complex<f64> = samples.zip(&waveform).map(|(x, w)| x * w.conj()).sum();
-        let energy: f64 = waveform.iter().map(|w| w.norm_sqr()).sum();
+        means.resize(i.len(), 0.0);
+        replica.means(start - 0.5 * step, step, &mut means);
+        waveform.resize(i.len(), Complex::default());
+        kernel::turn(&mut waveform, &means, grid.phasor(frequency_hz, from as u64), turn);
+        let (sum, energy) = kernel::project((i, q), &waveform);
         let amplitude = if energy > 0.0 { sum / energy } else { Complex::default() };
         power += sum.norm_sqr();
         periods += 1;
-        for ((i, q), w) in i.iter_mut().zip(q).zip(&waveform) {
-            let x = amplitude * w;
-            if complex {
-                *i -= x.re as f32;
-                *q -= x.im as f32;
-            } else {
-                *i -= 2.0 * x.re as f32;
-            }
+        if complex {
+            kernel::subtract((i, q), &waveform, amplitude);
+        } else {
+            kernel::subtract((i, &mut []), &waveform, 2.0 * amplitude);
         }
         if boundary >= length {
             break;

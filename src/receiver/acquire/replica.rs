@@ -4,7 +4,7 @@
 //! says and not on the nearest sample; any chip shape made of equal steps works.
 
 use crate::gnss::signal::Component;
-use crate::receiver::correlate::{self, Edge, Wave};
+use crate::receiver::correlate::Wave;
 
 /// The running integral of one code period, in steps of the chip's shape.
 #[derive(Clone, Debug)]
@@ -13,8 +13,6 @@ pub(super) struct Replica {
     integral: Vec<f64>,
     levels: Vec<f64>,
     steps_per_chip: f64,
-    /// The same for the tracking correlator.
-    correlator: correlate::Replica,
 }
 
 impl Replica {
@@ -29,39 +27,34 @@ impl Replica {
                 Some(*sum)
             }))
             .collect();
-        let correlator = correlate::Replica::of(wave, Edge::Area)?;
-        Some(Self { integral, levels, steps_per_chip, correlator })
+        Some(Self { integral, levels, steps_per_chip })
     }
 
-    /// For correlation with phases in chips.
-    pub fn correlator(&self) -> &correlate::Replica {
-        &self.correlator
-    }
-
-    pub fn steps_per_chip(&self) -> f64 {
-        self.steps_per_chip
-    }
-
-    /// Integral of the periodic code from phase 0, in steps.
-    fn integral(&self, phase_chips: f64) -> f64 {
-        let steps = phase_chips * self.steps_per_chip;
-        let length = self.levels.len() as f64;
-        let periods = (steps / length).floor();
-        let rest = steps - periods * length;
-        let index = (rest as usize).min(self.levels.len() - 1);
-        periods * self.integral[self.levels.len()] + self.integral[index] + (rest - index as f64) * self.levels[index]
-    }
-
-    /// Means over consecutive intervals of `step_chips`, the first beginning at `start_chips`.
-    pub fn means(&self, start_chips: f64, step_chips: f64) -> impl Iterator<Item = f64> + '_ {
-        let scale = 1.0 / (step_chips * self.steps_per_chip);
-        let mut previous = self.integral(start_chips);
-        (1_u64..).map(move |n| {
-            let next = self.integral(start_chips + n as f64 * step_chips);
-            let mean = (next - previous) * scale;
+    /// Means over consecutive intervals of `step_chips`, less than a period, the first beginning at
+    /// `start_chips`.
+    pub fn means(&self, start_chips: f64, step_chips: f64, out: &mut [f32]) {
+        let (levels, last) = (&self.levels[..], self.levels.len() - 1);
+        let (period, whole) = (levels.len() as f64, self.integral[levels.len()]);
+        let (start, step) = (start_chips * self.steps_per_chip, step_chips * self.steps_per_chip);
+        let scale = 1.0 / step;
+        let integral = |steps: f64| {
+            let index = (steps as u32 as usize).min(last);
+            self.integral[index] + (steps - index as f64) * levels[index]
+        };
+        // Whole periods are taken out as they pass.
+        let mut passed = period * (start / period).floor();
+        let mut previous = integral(start - passed);
+        for (n, out) in out.iter_mut().enumerate() {
+            let mut steps = start + (n + 1) as f64 * step - passed;
+            if steps >= period {
+                passed += period;
+                steps -= period;
+                previous -= whole;
+            }
+            let next = integral(steps);
+            *out = ((next - previous) * scale) as f32;
             previous = next;
-            mean
-        })
+        }
     }
 }
 
@@ -75,11 +68,15 @@ mod tests {
         let component = &l1ca::L1_CA.components[0];
         let replica = Replica::new(component, 7).unwrap();
         let level = |chip: usize| if l1ca::code(7).unwrap()[chip % 1023] { -1.0 } else { 1.0 };
-        let whole: Vec<f64> = replica.means(0.0, 1.0).take(2046).collect();
-        assert!((0..2046).all(|n| whole[n] == level(n)));
+        let mut whole = [0.0; 2046];
+        for start in [0.0, -2046.0, 5.0 * 1023.0] {
+            replica.means(start, 1.0, &mut whole);
+            assert!((0..2046).all(|n| whole[n] == level(n)));
+        }
         // From 0.75 before the end of the period, over 1.5 chips: ¾ of the last and ¾ of the first.
-        let mean = replica.means(1022.25, 1.5).next().unwrap();
-        assert!((mean - 0.5 * (level(1022) + level(0))).abs() < 1e-12);
+        let mut mean = [0.0];
+        replica.means(1022.25, 1.5, &mut mean);
+        assert!((mean[0] - 0.5 * (level(1022) + level(0))).abs() < 1e-7);
         assert!(Replica::new(component, 0).is_none());
     }
 }

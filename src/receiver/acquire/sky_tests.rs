@@ -19,7 +19,11 @@ struct Count {
 }
 
 fn skies(short: u64) -> std::ops::Range<u64> {
-    0..if std::env::var_os("GNSS_TWIN_LONG").is_some() { 30 * short } else { short }
+    0..if is_long() { 30 * short } else { short }
+}
+
+fn is_long() -> bool {
+    std::env::var_os("GNSS_TWIN_LONG").is_some()
 }
 
 /// Satellites of different PRN, of these C/N0, anywhere in Doppler, code phase and message.
@@ -71,7 +75,10 @@ fn searcher(settings: &AcquisitionSettings) -> (IfMetadata, usize, Searcher) {
 fn an_open_sky_brings_no_false_satellites() {
     let (metadata, samples, mut searcher) = searcher(&AcquisitionSettings::default());
     let mut total = Count::default();
-    for seed in skies(12) {
+    // Skies that brought false satellites where columns of before a subtraction were not filled again; the
+    // long run has them too.
+    let once_false: &[u64] = if is_long() { &[] } else { &[94, 147, 162, 177, 266, 283, 336] };
+    for seed in skies(12).chain(once_false.iter().copied()) {
         let mut random = Noise(7000 + seed);
         let count_of_them = 8 + (random.uniform() * 5.0) as usize;
         let cn0_dbhz: Vec<f64> = (0..count_of_them).map(|_| 35.0 + 17.0 * random.uniform()).collect();
@@ -102,7 +109,7 @@ fn what_may_be_cross_correlation_is_judged_by_all_codes_and_most_sums_are_not_ma
         let window = Window::centred(&Stretch::Planes(block), samples);
         let grid = searcher.grids.values().next().unwrap();
         let spectra: Vec<_> = searcher.codes.values().map(Code::spectra).collect();
-        let peaks = grid.search(&window.block(), &spectra, None);
+        let peaks = grid.search(&window.block(), &spectra, None, &Rooms::default());
         assert_eq!(grid.unjudged(&peaks), 0);
         passed += peaks.of.iter().filter(|peak| peak.statistic > peak.threshold).count();
         shares.push(grid.share_made(&peaks));
@@ -135,7 +142,7 @@ fn strong_signals_that_are_no_candidates_bring_no_false_satellites() {
         let window = Window::centred(&Stretch::Planes(Block { first: 0, i: &recording.i, q: &recording.q }), samples);
         let grid = searcher.grids.values().next().unwrap();
         let spectra: Vec<_> = searcher.codes.values().map(Code::spectra).collect();
-        let peaks = grid.search(&window.block(), &spectra, None);
+        let peaks = grid.search(&window.block(), &spectra, None, &Rooms::default());
         noise_alone += peaks.of.iter().filter(|peak| peak.statistic > grid.threshold()).count() as u32;
     }
     println!("others' signals: {total:?}, {noise_alone} above the threshold of noise");
@@ -147,11 +154,13 @@ fn strong_signals_that_are_no_candidates_bring_no_false_satellites() {
 #[test]
 fn satellites_twenty_five_decibels_below_another_are_found() {
     let (metadata, samples, mut searcher) = searcher(&AcquisitionSettings::default());
-    let long = std::env::var_os("GNSS_TWIN_LONG").is_some();
-    let ratios_db: &[f64] = if long { &[10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0] } else { &[20.0, 25.0] };
-    for &ratio_db in ratios_db {
+    // With skies in which a Doppler's side lobe was chosen by thresholds that cannot be compared.
+    let short: &[(f64, &[u64])] = &[(10.0, &[56]), (15.0, &[18, 22, 65]), (20.0, &[0, 1, 2]), (25.0, &[0, 1, 2])];
+    let every: Vec<u64> = skies(3).collect();
+    let long = [10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0].map(|ratio_db| (ratio_db, &every[..]));
+    for &(ratio_db, seeds) in if is_long() { &long[..] } else { short } {
         let mut total = Count::default();
-        for seed in skies(3) {
+        for &seed in seeds {
             let mut random = Noise(300 + seed);
             let cn0_dbhz = [&[42.0 + ratio_db][..], &[42.0; 10]].concat();
             let sent = satellites(&mut random, &cn0_dbhz);

@@ -156,7 +156,8 @@ fn a_strong_satellite_does_not_bring_others_by_cross_correlation() {
         searcher.codes.make(&searcher.grids, all().iter()).unwrap();
         let grid = searcher.grids.values().next().unwrap();
         let spectra: Vec<_> = searcher.codes.values().map(Code::spectra).collect();
-        let peaks = grid.search(&Block { first: 0, i: &recording.i, q: &recording.q }, &spectra, None);
+        let peaks =
+            grid.search(&Block { first: 0, i: &recording.i, q: &recording.q }, &spectra, None, &Rooms::default());
         assert!(peaks.of.iter().filter(|peak| peak.statistic > grid.threshold()).count() > sent.len());
     }
 }

@@ -125,8 +125,8 @@ impl Pairs {
 
 /// The few samples after the last whole vector or group, and zeros.
 #[inline(always)]
-pub(super) fn filled<const N: usize>(rest: &[f32]) -> [f32; N] {
-    let mut all = [0.0; N];
+pub(super) fn filled<T: Copy + Default, const N: usize>(rest: &[T]) -> [T; N] {
+    let mut all = [T::default(); N];
     all[..rest.len()].copy_from_slice(rest);
     all
 }

@@ -111,6 +111,7 @@ impl Stage {
 #[derive(Clone, Debug)]
 pub struct Channel {
     settings: TrackingSettings,
+    least_cn0_hz: f64,
     sv: Sv,
     signal: &'static Signal,
     hit: Acquired,
@@ -232,6 +233,7 @@ impl Channel {
         let if_hz = metadata.if_hz(hit.link().carrier_hz());
         let mut channel = Self {
             settings: settings.clone(),
+            least_cn0_hz: settings.least_cn0_hz(),
             sv: hit.sv,
             signal: hit.signal,
             hit: *hit,

@@ -160,7 +160,7 @@ impl Loops {
 /// Mean gain of the code discriminator.
 fn gain(settings: &TrackingSettings, shape: CodeShape) -> CodeGain {
     match settings.dll_discriminator {
-        CodeDiscriminator::EarlyMinusLate => CodeGain::new(|snr| shape.early_minus_late_gain(snr)),
-        CodeDiscriminator::DotProduct => CodeGain::new(loops::dot_product_gain),
+        CodeDiscriminator::EarlyMinusLate => CodeGain::new(shape, |shape, snr| shape.early_minus_late_gain(snr)),
+        CodeDiscriminator::DotProduct => CodeGain::new(shape, |_, snr| loops::dot_product_gain(snr)),
     }
 }

@@ -162,9 +162,10 @@ impl SymbolLock {
     }
 }
 
-/// Whether C/N0 is below what a channel is kept for; nothing is known of a signal without an estimate.
-pub fn is_weak(cn0_hz: Option<f64>, settings: &TrackingSettings) -> bool {
-    cn0_hz.is_some_and(|hz| 10.0 * libm::log10(hz) < settings.cn0_threshold_dbhz)
+/// Whether C/N0 is below what a channel is kept for ([`TrackingSettings::least_cn0_hz`]); nothing is known
+/// of a signal without an estimate.
+pub fn is_weak(cn0_hz: Option<f64>, least_cn0_hz: f64) -> bool {
+    cn0_hz.is_some_and(|hz| hz < least_cn0_hz)
 }
 
 /// What changed in a [`LockState`].

@@ -174,10 +174,13 @@ pub fn dot_product_gain(snr: f64) -> f64 {
     -libm::expm1(-snr)
 }
 
-/// The gain of a code discriminator over T·C/N0 from 1 (below, that of 1) to 2²⁰ (beyond, one).
+/// The gain of a code discriminator over T·C/N0 from 1 (below, that of 1) to 2²⁰ (beyond, one): a table whose
+/// entries are made when they are first needed.
 #[derive(Clone, Debug)]
 pub struct CodeGain {
-    table: Vec<f64>,
+    shape: CodeShape,
+    gain: fn(&CodeShape, f64) -> f64,
+    table: Vec<Option<f64>>,
 }
 
 /// Entries of the table an octave, and octaves: interpolation errs by less than 1e-3.
@@ -185,20 +188,24 @@ const ENTRIES: f64 = 4.0;
 const OCTAVES: f64 = 20.0;
 
 impl CodeGain {
-    /// Tabulates a gain.
-    pub fn new(gain: impl Fn(f64) -> f64) -> Self {
-        let entries = (ENTRIES * OCTAVES) as u32;
-        Self { table: (0..=entries).map(|k| gain(libm::exp2(f64::from(k) / ENTRIES))).collect() }
+    /// A table of that gain for the shape.
+    pub fn new(shape: CodeShape, gain: fn(&CodeShape, f64) -> f64) -> Self {
+        Self { shape, gain, table: vec![None; (ENTRIES * OCTAVES) as usize + 1] }
     }
 
     /// The gain at T·C/N0.
-    pub fn at(&self, snr: f64) -> f64 {
+    pub fn at(&mut self, snr: f64) -> f64 {
         let x = ENTRIES * libm::log2(snr.max(1.0));
-        let rest = self.table.get(x.min(ENTRIES * OCTAVES) as usize..);
-        match rest.and_then(|rest| rest.first_chunk()) {
-            Some([a, b]) => a + (b - a) * (x - x.floor()),
-            None => 1.0,
-        }
+        let (below, part) = (x.min(ENTRIES * OCTAVES) as usize, x - x.floor());
+        let (Some(a), Some(b)) = (self.entry(below), self.entry(below + 1)) else { return 1.0 };
+        a + (b - a) * part
+    }
+
+    /// `None` beyond the table.
+    fn entry(&mut self, number: usize) -> Option<f64> {
+        let Self { shape, gain, table } = self;
+        let of = || gain(shape, libm::exp2(number as f64 / ENTRIES));
+        table.get_mut(number).map(|entry| *entry.get_or_insert_with(of))
     }
 }
 

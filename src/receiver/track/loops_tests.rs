@@ -220,7 +220,7 @@ fn the_gain_given_back_is_the_mean_slope_of_the_discriminator() {
 #[test]
 fn the_tabled_gain_is_the_gain() {
     let shape = CodeShape::triangle(0.5);
-    let table = CodeGain::new(|snr| shape.early_minus_late_gain(snr));
+    let mut table = CodeGain::new(shape, |shape, snr| shape.early_minus_late_gain(snr));
     for snr in [1.0, 1.1, 2.3, 7.0, 31.0, 400.0, 9e5] {
         assert!((table.at(snr) - shape.early_minus_late_gain(snr)).abs() < 1e-3, "{snr}");
     }

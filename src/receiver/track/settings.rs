@@ -161,6 +161,11 @@ pub struct LoopMargin {
 }
 
 impl TrackingSettings {
+    /// C/N0 from which on a signal is kept, in Hz.
+    pub fn least_cn0_hz(&self) -> f64 {
+        libm::exp10(0.1 * self.cn0_threshold_dbhz)
+    }
+
     /// These settings for a component. Numbers of code periods are those of 1 ms, so an update of longer
     /// codes has fewer; the spacing is that of BPSK, so pulses of several steps have as much less; bandwidths
     /// that an update of one code period cannot have are the largest that it can.

@@ -14,7 +14,7 @@
 
 use num_complex::Complex64;
 
-use super::carrier::{BLOCK, Carrier, LANES};
+use super::carrier::{BLOCK, Carrier, LANES, filled};
 use super::fixed::{Fixed, POINT_BITS};
 use super::kernel::Level;
 use super::{CODE_BITS, MOST_STEPS, Nco, TURN, Wave};
@@ -50,7 +50,7 @@ const MOST_APART: f64 = 5e-5;
 /// A period of the replica at every row's place.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
-    steps_per_chip: usize,
+    steps_per_chip: i64,
     /// Length of the period in phase units of steps.
     period: i64,
     /// Nominal samples in a phase unit of steps.
@@ -78,30 +78,11 @@ impl Rows {
         let stride = BEFORE + samples.ceil() as usize + AFTER;
         // From half a sample before the first entry on.
         let first = -(BEFORE as f64 + 0.5) * step;
-        let places = Places::of(&wave.values, first, step / ROWS as f64, (stride + 2) * ROWS + 1);
+        let places = Places::new(&wave.values, (first, step / ROWS as f64), (stride + 2) * ROWS);
         let mut entries = vec![[0; 2]; stride * ROWS];
-        let mut owed = [0.0; ROWS + 1];
-        // All rows at once, as what one owes waits for its entry before.
-        for entry in 0..stride {
-            let mut values = [0; ROWS + 1];
-            for (row, (value, owed)) in values.iter_mut().zip(&mut owed).enumerate() {
-                let from = entry * ROWS + row;
-                let mean = (places.sums[from + ROWS] - places.sums[from]) / step;
-                // A change's place is seen in the sign in which it goes.
-                let way = f64::from((places.values[from + ROWS] - places.values[from]).signum());
-                let way = if mean.abs() < 1.0 { way } else { 0.0 };
-                let exact = AMPLITUDE * mean;
-                let wanted = exact + way * *owed;
-                let whole = f64::from((wanted + 0.5_f64.copysign(wanted)) as i32).clamp(-AMPLITUDE, AMPLITUDE);
-                *owed += way * (exact - whole);
-                *value = whole as i8;
-            }
-            for (row, pair) in values.windows(2).enumerate() {
-                entries[row * stride + entry] = [pair[0], pair[1]];
-            }
-        }
+        kernel::fill(Level::best(), &mut entries, &places, step);
         Some(Self {
-            steps_per_chip: wave.steps_per_chip,
+            steps_per_chip: wave.steps_per_chip as i64,
             period: (length as i64) << CODE_BITS,
             samples_a_unit: 1.0 / (step * unit),
             stride,
@@ -138,16 +119,21 @@ impl Rows {
     }
 
     fn together<const T: usize>(&self, level: Level, samples: Fixed, nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
-        let each = self.steps_per_chip as i64;
-        let code = nco.code.rem_euclid(self.period / each) * each;
-        let mut places = [0; T];
-        for (place, tap) in places.iter_mut().zip(taps) {
-            let tap = (tap * each).rem_euclid(self.period);
-            // Both are below 2⁶³.
-            *place = ((code as u64 + tap as u64) % self.period as u64) as i64;
-        }
+        let each = self.steps_per_chip;
+        let code = within(within(nco.code, self.period / each) * each, self.period);
+        // Both are below 2⁶³, their sum may not be.
+        let places = taps.map(|tap| {
+            let tap = within(tap * each, self.period);
+            if code >= self.period - tap { code - (self.period - tap) } else { code + tap }
+        });
         kernel::correlate(level, &Job { rows: self, samples, nco, step: nco.code_step as i64 * each }, places)
     }
+}
+
+/// A phase within a period; most are.
+#[inline(always)]
+fn within(phase: i64, period: i64) -> i64 {
+    if (0..period).contains(&phase) { phase } else { phase.rem_euclid(period) }
 }
 
 /// Samples and rows of one call.
@@ -212,37 +198,30 @@ fn body<const T: usize>(job: &Job, codes: [i64; T], add: impl Fn(&kernel::Segmen
         places[t].at = at + planted!("receiver.rows.place", 0, 1 << (PLACE_BITS - 1));
     }
     let mut totals: Sums<T> = [[[0.0; PAIRS]; 2]; T];
-    let (mut last_i, mut last_q) = ([0; SEGMENT], [0; SEGMENT]);
     for (i, q) in job.samples.i.chunks(SEGMENT).zip(job.samples.q.chunks(SEGMENT)) {
         let samples = i.len();
         let (mut from, mut weights) = ([0; T], [[0; 2]; T]);
         for t in 0..T {
             (from[t], weights[t]) = motion.next(&mut places[t], samples);
         }
-        let (i, q) = if samples < SEGMENT {
-            last_i[..samples].copy_from_slice(i);
-            last_q[..samples].copy_from_slice(q);
-            let whole = samples.next_multiple_of(LANES);
-            (&last_i[..whole], &last_q[..whole])
-        } else {
-            (i, q)
-        };
         let (mut cos, mut sin) = ([0; kernel::VECTORS], [0; kernel::VECTORS]);
         let blocks = cos.as_chunks_mut().0.iter_mut().zip(sin.as_chunks_mut().0);
         for (cos, sin) in blocks.take(samples.div_ceil(BLOCK)) {
             let phasors = carrier.next_block();
             (*cos, *sin) = (kernel::twice(phasors.0), kernel::twice(phasors.1));
         }
-        let segment = kernel::Segment {
-            i: i.as_chunks().0,
-            q: q.as_chunks().0,
-            cos,
-            sin,
-            entries: &job.rows.entries,
-            from,
-            weights,
-        };
-        add(&segment, &mut totals);
+        let (i, last_i) = i.as_chunks();
+        let (q, last_q) = q.as_chunks();
+        let entries = &job.rows.entries;
+        let (cos, sin) = (cos.as_chunks().0, sin.as_chunks().0);
+        add(&kernel::Segment { i, q, cos, sin, entries, from, weights }, &mut totals);
+        if !last_i.is_empty() {
+            let whole = i.len();
+            let (i, q) = (&[filled(last_i)], &[filled(last_q)]);
+            from = from.map(|from| from + kernel::TOGETHER * whole);
+            let (cos, sin) = (&cos[whole..], &sin[whole..]);
+            add(&kernel::Segment { i, q, cos, sin, entries, from, weights }, &mut totals);
+        }
     }
     let mut found = [Complex64::ZERO; T];
     let pairs = carrier.pairs();
@@ -252,34 +231,44 @@ fn body<const T: usize>(job: &Job, codes: [i64; T], add: impl Fn(&kernel::Segmen
     found
 }
 
-/// A period's steps at places that are equally far apart, less than a step: what they add up to, and the step
-/// there.
+/// A period's steps at places that are equally far apart, less than a step.
 struct Places {
-    sums: Vec<f64>,
-    values: Vec<i8>,
+    /// From a whole number of periods before zero on, at each step's beginning and at the end.
+    integral: Vec<f64>,
+    /// The first place in steps from there, and from one to the next.
+    begin: f64,
+    apart: f64,
 }
 
 impl Places {
-    /// From `first` on, less than a period before zero.
-    fn of(steps: &[i8], first: f64, apart: f64, count: usize) -> Self {
-        let mut places = Self { sums: Vec::with_capacity(count), values: Vec::with_capacity(count) };
-        // The number of the step, and the sum of those before it.
-        let length = steps.len();
-        let begin = first + length as f64;
-        let mut number = begin as usize;
-        let mut before: i64 = steps.iter().take(number).map(|&step| i64::from(step)).sum();
-        for place in 0..count {
-            let at = begin + place as f64 * apart;
-            let here = at as usize;
-            while number < here {
-                before += i64::from(steps[number % length]);
-                number += 1;
-            }
-            let step = steps[number % length];
-            places.sums.push(before as f64 + (at - here as f64) * f64::from(step));
-            places.values.push(step);
+    /// So many from `first` on.
+    fn new(steps: &[i8], (first, apart): (f64, f64), count: usize) -> Self {
+        let period = steps.len() as f64;
+        let begin = first - period * (first / period).floor();
+        let reached = (begin + count as f64 * apart).ceil() as usize + 1;
+        let mut integral = Vec::with_capacity(reached + 1);
+        let mut sum = 0.0;
+        integral.push(sum);
+        for step in steps.iter().cycle().take(reached) {
+            sum += f64::from(*step);
+            integral.push(sum);
         }
-        places
+        Self { integral, begin, apart }
+    }
+
+    /// At a row's next places: what steps add up to, and the step there.
+    #[inline(always)]
+    fn at(&self, entry: usize) -> [[f64; ROWS]; 2] {
+        let [mut sums, mut steps] = [[0.0; ROWS]; 2];
+        for row in 0..ROWS {
+            let at = self.begin + (entry * ROWS + row) as f64 * self.apart;
+            let number = at as u32;
+            if let Some([from, to]) = self.integral.get(number as usize..).and_then(|rest| rest.first_chunk()) {
+                steps[row] = to - from;
+                sums[row] = from + (at - f64::from(number)) * steps[row];
+            }
+        }
+        [sums, steps]
     }
 }
 

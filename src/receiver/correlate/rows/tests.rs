@@ -73,6 +73,38 @@ fn sums_are_those_of_the_slow_twin_at_any_length_place_and_rate() {
 }
 
 #[test]
+fn rows_hold_the_means_of_a_samples_steps_at_every_level() {
+    let wave = Wave::new(&L1_CA.components[0], 7).unwrap();
+    let mean = |from: f64, to: f64| {
+        // A step counts as far as the sample covers it.
+        let steps = from.floor() as i64..=to.floor() as i64;
+        let part = |n: i64| (to.min((n + 1) as f64) - from.max(n as f64)).max(0.0);
+        steps.map(|n| part(n) * f64::from(wave.values[n.rem_euclid(1023) as usize])).sum::<f64>() / (to - from)
+    };
+    for step in [0.1, 0.3935, 0.999] {
+        let stride = 3000;
+        let first = -700.5 * step;
+        let places = Places::new(&wave.values, (first, step / ROWS as f64), (stride + 2) * ROWS);
+        let mut entries = vec![[0; 2]; stride * ROWS];
+        kernel::fill(Level::Baseline, &mut entries, &places, step);
+        for level in Level::all() {
+            let mut others = vec![[1; 2]; stride * ROWS];
+            kernel::fill(level, &mut others, &places, step);
+            assert!(others == entries, "{level:?} {step}");
+        }
+        for (number, pair) in entries.iter().enumerate() {
+            let (row, entry) = (number / stride, number % stride);
+            for (later, value) in pair.iter().enumerate() {
+                let from = first + (entry as f64 + (row + later) as f64 / ROWS as f64) * step;
+                let exact = AMPLITUDE * mean(from, from + step);
+                // Half for its own rounding, half for what one before owed.
+                assert!((f64::from(*value) - exact).abs() <= 1.0 + 1e-6, "{step} {row} {entry}: {value} {exact}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_code_stands_where_that_of_the_slow_twin_does() {
     for (rate_hz, worst_m) in [(2.6e6, 0.04), (4.0e6, 0.02), (4.092e6, 0.02)] {
         let replica = prepared(rate_hz);

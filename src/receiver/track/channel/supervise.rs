@@ -223,7 +223,7 @@ impl Channel {
     /// Follows phase lock; a dip is a slip, a long one the end.
     fn watch_phase(&mut self, report: &mut Report) {
         let (settled, weak) = match self.stage {
-            Stage::Tracking(_) => (self.symbol_lock.settled(), is_weak(self.cn0.hz(), &self.settings)),
+            Stage::Tracking(_) => (self.symbol_lock.settled(), is_weak(self.cn0.hz(), self.least_cn0_hz)),
             Stage::Assisted => (self.phase_lock.settled(), false),
             Stage::Open | Stage::Frequency => (false, false),
         };
