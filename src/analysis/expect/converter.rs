@@ -4,7 +4,7 @@
 //! c_n = Σ jump·φ(e)·He_(n−1)(e)/√(n!) over its edges e, in σ. Then the autocorrelation of what comes out is
 //! Σ c_n²·ρⁿ for that ρ of what goes in (Price 1958, Bussgang 1952): n = 1 is the signal with the gain c_1/σ,
 //! the rest is what quantisation adds, coloured as powers of ρ are. Of complex samples with a circular
-//! spectrum ρ is that of one component and of the cross term in turn. Orders beyond [`ORDERS`] count as
+//! spectrum ρ is that of one component and of the cross term in turn. Orders beyond 32 count as
 //! white. Limits: samples are Gaussian, so that a strong line through a coarse converter is not described.
 
 use rustfft::num_complex::Complex;
