@@ -130,8 +130,15 @@ fn a_run_receives_all_front_ends_or_the_one_that_is_chosen() {
     let here = workplace();
     let text = done(&["run", "two.toml", "--keep-if", "--out", "both"], here.path());
     assert!(text.matches("made ").count() == 2, "{text}");
-    for name in ["wide.sigmf-data", "wide.sigmf-meta", "narrow.sigmf-data", "psd.csv", "summary.json"] {
+    for name in ["wide.sigmf-data", "wide.sigmf-meta", "narrow.sigmf-data", "psd.csv", "psd-narrow.csv", "summary.json"]
+    {
         assert!(here.path().join("both").join(name).exists(), "{name}");
+    }
+    // The spectrum of each is judged.
+    let verdict = fs::read_to_string(here.path().join("both/verdict.csv")).unwrap();
+    for name in ["wide", "narrow"] {
+        let row = verdict.lines().find(|row| row.starts_with(&format!("level of the samples of {name} ")));
+        assert!(row.is_some_and(|row| row.contains("pass")), "{name}: {verdict}");
     }
     refused(&["run", "two.toml", "--front-end", "broad"], here.path(), 2, &["broad", "wide, narrow"]);
     done(&["run", "two.toml", "--front-end", "narrow", "--keep-if", "--out", "run"], here.path());

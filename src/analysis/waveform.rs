@@ -1,12 +1,140 @@
 //! A signal's spectrum as a sampler meets it, and the correlation whose transform that is.
 //!
 //! Both are sums over the signal's components by their shares of power, each from its own pulses
-//! ([`crate::gnss::signal::Shape`]). Samples show a spectrum with its aliases. Limits: codes count as random,
-//! so that the lines of a short code, its overlay and the data are left out; a chip that is another
-//! component's turn counts as any other.
+//! ([`crate::gnss::signal::Shape`]). Samples show a spectrum with its aliases, behind the response of what
+//! samples it ([`Sampler`]). Limits: codes count as random, so that the lines of a short code, its overlay
+//! and the data are left out; a chip that is another component's turn counts as any other.
+
+use std::sync::Arc;
 
 pub use crate::gnss::facts::Edge;
-use crate::gnss::signal::{Component, Layers, Shape, Signal, sinc_squared};
+use crate::gnss::signal::{Component, Layers, Shape, Signal};
+
+/// Cut-off of band-limited edges where a scene's facts do not state it, in cycles a sample.
+pub const CUTOFF_CPS: f64 = 0.45;
+/// Half width in samples and shape parameter of the window of that filter.
+const LIMITED: (f64, f64) = (8.0, 5.65);
+
+/// A sinc under a Kaiser window (Kaiser 1974): its response in closed form.
+///
+/// The window's transform is 2h·sinh(√(β² − (2πfh)²))/(I0(β)·√(…)) for a half width of h samples, and the
+/// response of the product is that of the ideal filter convolved with it: the integral of the transform
+/// from f − cut-off to f + cut-off, over its whole.
+#[derive(Clone, Debug)]
+pub struct KaiserSinc {
+    cutoff_cps: f64,
+    step_cps: f64,
+    /// Integral of the transform from 0 on, at multiples of the step.
+    integral: Vec<f64>,
+}
+
+/// Steps of that integral in 1/half width, and side lobes up to which it goes: the rest is below 1e-4 of the
+/// largest side lobe's share.
+const STEPS: f64 = 64.0;
+const LOBES: f64 = 24.0;
+
+impl KaiserSinc {
+    /// Of a cut-off (−6 dB) in cycles a sample, a half width of the window in samples and its β.
+    pub fn new(cutoff_cps: f64, half_width: f64, beta: f64) -> Self {
+        let step_cps = 1.0 / (half_width * STEPS);
+        let transform = |f: f64| {
+            let turn = std::f64::consts::TAU * f * half_width;
+            let square = beta * beta - turn * turn;
+            let root = square.abs().sqrt();
+            match (root < 1e-6, square > 0.0) {
+                (true, _) => 1.0,
+                (_, true) => libm::sinh(root) / root,
+                (_, false) => libm::sin(root) / root,
+            }
+        };
+        let mut integral = vec![0.0];
+        let mut sum = 0.0;
+        for k in 0..(LOBES * STEPS) as u32 {
+            let at = |part: f64| transform((f64::from(k) + part) * step_cps);
+            // Simpson's rule; the scale cancels.
+            sum += at(0.0) + 4.0 * at(0.5) + at(1.0);
+            integral.push(sum);
+        }
+        Self { cutoff_cps, step_cps, integral }
+    }
+
+    /// Amplitude at `f_cps` cycles a sample from the middle of the filter, 1 there.
+    pub fn amplitude(&self, f_cps: f64) -> f64 {
+        let between = |f: f64| self.to(f + self.cutoff_cps) - self.to(f - self.cutoff_cps);
+        between(f_cps) / between(0.0)
+    }
+
+    fn to(&self, f_cps: f64) -> f64 {
+        let place = f_cps.abs() / self.step_cps;
+        let index = place as usize;
+        let value = match (self.integral.get(index), self.integral.get(index + 1)) {
+            (Some(a), Some(b)) => a + (b - a) * (place - index as f64),
+            _ => self.integral.last().copied().unwrap_or(0.0),
+        };
+        value * f_cps.signum()
+    }
+}
+
+/// What makes samples of a waveform: how edges of chips fall between them, and how often.
+#[derive(Clone, Debug)]
+pub struct Sampler {
+    edge: Edge,
+    rate_hz: f64,
+    limited: Option<Arc<KaiserSinc>>,
+}
+
+impl Sampler {
+    /// At `rate_hz`, band-limited edges cut off at [`CUTOFF_CPS`].
+    pub fn new(edge: Edge, rate_hz: f64) -> Self {
+        Self::with_cutoff(edge, rate_hz, CUTOFF_CPS)
+    }
+
+    /// The same with band-limited edges cut off (−6 dB) at so many cycles a sample.
+    pub fn with_cutoff(edge: Edge, rate_hz: f64, cutoff_cps: f64) -> Self {
+        let limited = (edge == Edge::BandLimited).then(|| {
+            let (half_width, beta) = LIMITED;
+            Arc::new(KaiserSinc::new(cutoff_cps, half_width, beta))
+        });
+        Self { edge, rate_hz, limited }
+    }
+
+    /// How edges fall.
+    pub fn edge(&self) -> Edge {
+        self.edge
+    }
+
+    /// Samples a second.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Amplitude of its response at `hz` from the carrier.
+    pub fn amplitude(&self, hz: f64) -> f64 {
+        match (&self.limited, self.edge) {
+            (Some(filter), _) => filter.amplitude(hz / self.rate_hz),
+            // A mean over the sample's interval is a sinc.
+            (None, Edge::Area) => sinc(hz / self.rate_hz),
+            (None, _) => 1.0,
+        }
+    }
+
+    /// By how many sample rates aliases are away that count.
+    pub fn aliases(&self) -> std::ops::RangeInclusive<i32> {
+        match self.edge {
+            // Beyond one and a half rates the filter stops by more than 60 dB.
+            Edge::BandLimited => -1..=1,
+            // Densities fall with the fourth power of the frequency, of instants with the second: the tail is
+            // below 1e-4 of the one and 1 % of the other, 40 and 50 dB below the peak.
+            Edge::Area => -12..=12,
+            Edge::Nearest => -50..=50,
+        }
+    }
+}
+
+fn sinc(x: f64) -> f64 {
+    let turn = std::f64::consts::PI * x;
+    if turn.abs() < 1e-9 { 1.0 } else { libm::sin(turn) / turn }
+}
 
 /// The components of a signal that a receiver correlates: all of them, by their shares of power.
 #[derive(Clone, Debug)]
@@ -96,39 +224,31 @@ impl Waveform {
     }
 
     /// The same as the sampler meets it, before anything aliases.
-    pub fn met(&self, edge: Edge, hz: f64, rate_hz: f64) -> f64 {
-        match edge {
-            Edge::BandLimited if hz.abs() > 0.5 * rate_hz => 0.0,
-            Edge::BandLimited | Edge::Nearest => self.density(hz),
-            // A mean over the sample's interval has its own sinc².
-            Edge::Area => self.density(hz) * sinc_squared(hz / rate_hz),
-        }
+    pub fn met(&self, sampler: &Sampler, hz: f64) -> f64 {
+        let amplitude = sampler.amplitude(hz);
+        if amplitude == 0.0 { 0.0 } else { self.density(hz) * amplitude * amplitude }
     }
 
     /// The same in the samples, aliases in.
-    pub fn sampled(&self, edge: Edge, hz: f64, rate_hz: f64) -> f64 {
-        let met = |hz: f64| self.met(edge, hz, rate_hz);
-        match edge {
-            // No alias but the one that the frequency itself may be.
-            Edge::BandLimited => met(hz - rate_hz * (hz / rate_hz).round()),
-            // The tail after ±50 is below 1 % of a density that is itself 50 dB down.
-            Edge::Area | Edge::Nearest => (-50..=50).map(|k| met(hz + f64::from(k) * rate_hz)).sum(),
-        }
+    pub fn sampled(&self, sampler: &Sampler, hz: f64) -> f64 {
+        let rate_hz = sampler.rate_hz();
+        let within_hz = hz - rate_hz * (hz / rate_hz).round();
+        sampler.aliases().map(|k| self.met(sampler, within_hz + f64::from(k) * rate_hz)).sum()
     }
 
     /// Power that the sampler meets, over that of the signal.
-    pub fn power(&self, edge: Edge, rate_hz: f64) -> f64 {
+    pub fn power(&self, sampler: &Sampler) -> f64 {
         const HALF: i32 = 500;
-        let step_hz = 0.5 * rate_hz / f64::from(HALF);
+        let step_hz = 0.5 * sampler.rate_hz() / f64::from(HALF);
         // Midpoints over the samples' band, which holds every alias.
-        let at = |k: i32| self.sampled(edge, (f64::from(k) + 0.5) * step_hz, rate_hz);
+        let at = |k: i32| self.sampled(sampler, (f64::from(k) + 0.5) * step_hz);
         step_hz * (-HALF..HALF).map(at).sum::<f64>()
     }
 
     /// What is left of a whole signal's power in samples that have it with some of its layers alone.
-    pub fn kept(signal: &Signal, layers: Layers, edge: Edge, rate_hz: f64) -> f64 {
+    pub fn kept(signal: &Signal, layers: Layers, sampler: &Sampler) -> f64 {
         let [sent, whole] = [layers, Layers::Whole].map(|layers| Self::sent(signal, layers));
-        sent.zip(whole).map_or(0.0, |(sent, whole)| sent.power(edge, rate_hz) / whole.power(edge, rate_hz))
+        sent.zip(whole).map_or(0.0, |(sent, whole)| sent.power(sampler) / whole.power(sampler))
     }
 
     /// κ of another signal against this one: what its power adds to the noise density, over that power, in
@@ -136,7 +256,7 @@ impl Waveform {
     ///
     /// ∫ S₁·S₂ df/(∫S₁ df · ∫S₂ df) (J. W. Betz, NAVIGATION 48(4), 2001) of the spectra that the sampler
     /// meets.
-    pub fn separation_s(&self, other: &Self, apart_hz: f64, edge: Edge, rate_hz: f64) -> f64 {
+    pub fn separation_s(&self, other: &Self, apart_hz: f64, sampler: &Sampler) -> f64 {
         let ((own_step_s, own_chip_s), (step_s, chip_s)) = (self.scales_s(), other.scales_s());
         // To ±30 step rates, where the tail of S² is below 1e-7 of the whole; midpoints every hundredth of a
         // chip rate.
@@ -145,10 +265,10 @@ impl Waveform {
         let (mut own, mut others, mut shared) = (0.0, 0.0, 0.0);
         for k in -half..half {
             let hz = (f64::from(k) + 0.5) * step_hz;
-            let met = self.met(edge, hz, rate_hz);
+            let met = self.met(sampler, hz);
             own += met;
-            others += other.met(edge, hz, rate_hz);
-            shared += met * other.met(edge, hz - apart_hz, rate_hz);
+            others += other.met(sampler, hz);
+            shared += met * other.met(sampler, hz - apart_hz);
         }
         shared / (own * others * step_hz)
     }
@@ -169,14 +289,16 @@ mod tests {
     fn a_sampled_code_keeps_its_power_and_has_its_nulls() {
         let code = of(&L1_CA);
         for edge in [Edge::Nearest, Edge::BandLimited] {
-            let rate_hz = 10.0e6;
+            let sampler = Sampler::new(edge, 10.0e6);
             let step_hz = 1e3;
-            let power: f64 = (-5000..5000).map(|k| step_hz * code.sampled(edge, f64::from(k) * step_hz, rate_hz)).sum();
-            // Outside ±5 MHz lies 1/(pi^2 * 4.9) of the power or 2 %; aliases bring it back.
-            let expected = if edge == Edge::Nearest { 1.0 } else { 0.98 };
+            let power: f64 = (-5000..5000).map(|k| step_hz * code.sampled(&sampler, f64::from(k) * step_hz)).sum();
+            // Outside ±4.5 MHz, where the filter cuts off, lies 1/(pi^2 * 4.4) of the power or 2.3 %; aliases
+            // bring it back.
+            let expected = if edge == Edge::Nearest { 1.0 } else { 0.977 };
             assert!((power - expected).abs() < 5e-3, "{edge:?} {power}");
         }
-        assert!(code.sampled(Edge::BandLimited, 1.023e6, 10e6) < 1e-20);
+        // What is left of the aliases is 60 dB down, of lobes that are 30 dB down.
+        assert!(code.sampled(&Sampler::new(Edge::BandLimited, 10e6), 1.023e6) < 1e-8 * code.density(0.0));
     }
 
     #[test]
@@ -184,16 +306,16 @@ mod tests {
         // The triangle over ±w about a BPSK peak leaves 1 − w/3 of it; the tail beyond the fiftieth alias is
         // below a thousandth.
         for rate_hz in [2.6e6, 10e6] {
-            let found = of(&L1_CA).power(Edge::Area, rate_hz);
+            let found = of(&L1_CA).power(&Sampler::new(Edge::Area, rate_hz));
             assert!((found - (1.0 - 1.023e6 / rate_hz / 3.0)).abs() < 1e-3, "{found}");
-            assert!((of(&L1_CA).power(Edge::Nearest, rate_hz) - 1.0).abs() < 3e-3);
+            assert!((of(&L1_CA).power(&Sampler::new(Edge::Nearest, rate_hz)) - 1.0).abs() < 3e-3);
         }
     }
 
     #[test]
     fn separation_is_two_thirds_of_a_chip_and_more_where_samples_are_means() {
         let code = of(&L1_CA);
-        let chips = |edge, rate_hz: f64| code.separation_s(&code, 0.0, edge, rate_hz) * 1.023e6;
+        let chips = |edge, rate_hz: f64| code.separation_s(&code, 0.0, &Sampler::new(edge, rate_hz)) * 1.023e6;
         // The cut at ±30 chip rates leaves 1/(30 π²) = 0.3 % of the power out, twice that in the square.
         assert!((chips(Edge::Nearest, 2.6e6) - 2.0 / 3.0).abs() < 0.006);
         // Computed by another program from the same definition.
@@ -205,9 +327,12 @@ mod tests {
     fn separations_of_bpsk_and_boc_are_the_printed_ones() {
         // J. W. Betz, "Binary offset carrier modulations for radionavigation" (2001), within 24 MHz: −61.8 dB
         // of C/A from itself, −67.9 dB of BOC(1,1) from C/A, −64.8 dB of BOC(1,1) from itself.
-        let db = |a: &Signal, b: &Signal, apart_hz: f64| {
-            10.0 * libm::log10(of(a).separation_s(&of(b), apart_hz, Edge::BandLimited, 24e6))
+        let ideal = Sampler {
+            limited: Some(Arc::new(KaiserSinc::new(0.5, 800.0, 5.65))),
+            ..Sampler::new(Edge::BandLimited, 24e6)
         };
+        let db =
+            |a: &Signal, b: &Signal, apart_hz: f64| 10.0 * libm::log10(of(a).separation_s(&of(b), apart_hz, &ideal));
         let inside = |signal: &Signal| -> f64 {
             let code = of(signal);
             (-12_000..12_000).map(|k| 1e3 * code.density(1e3 * (f64::from(k) + 0.5))).sum()
@@ -222,7 +347,7 @@ mod tests {
         }
         // ∫R²: BOC(1,1) is 1 − 3τ to half a chip and τ − 1 after it, 1/8 and 1/24 on either side.
         let exact = 2.0 * (1.0 / 8.0 + 1.0 / 24.0) / 1.023e6;
-        let wide = of(&LONG_BOC).separation_s(&of(&LONG_BOC), 0.0, Edge::Nearest, 60e6);
+        let wide = of(&LONG_BOC).separation_s(&of(&LONG_BOC), 0.0, &Sampler::new(Edge::Nearest, 60e6));
         // The cut leaves 1 % of the power out.
         assert!((wide / exact - 1.0).abs() < 0.02, "{wide} {exact}");
         // A carrier a chip rate away meets the other's null: less than half of what one beside it takes.
@@ -277,16 +402,53 @@ mod tests {
         for hz in [0.31e6, 1.1e6, 2.9e6, 6.1e6] {
             assert!((alone.density(hz) / (10.0 / 11.0 * printed(hz, 1.0)) - 1.0).abs() < 1e-9, "{hz}");
         }
-        let kept = |layers, edge, rate_hz| Waveform::kept(&E1, layers, edge, rate_hz);
+        let kept = |layers, edge, rate_hz| Waveform::kept(&E1, layers, &Sampler::new(edge, rate_hz));
         for edge in [Edge::Nearest, Edge::Area, Edge::BandLimited] {
             assert_eq!(kept(Layers::Whole, edge, 6.5e6), 1.0);
         }
         assert!((kept(Layers::Strongest, Edge::Nearest, 6.5e6) - 10.0 / 11.0).abs() < 1e-3);
-        // Midpoints every kilohertz to half the rate.
-        let within = |m: f64| (0..3250).map(|k| 2e3 * printed(1e3 * (f64::from(k) + 0.5), m)).sum::<f64>();
+        // Midpoints every kilohertz up to where the filter has stopped.
+        let filter = |hz: f64| direct(hz / 6.5e6, 0.45).powi(2);
+        let within = |m: f64| {
+            let at = |k: i32| 1e3 * (f64::from(k) + 0.5);
+            (0..4500).map(|k| 2e3 * printed(at(k), m) * filter(at(k))).sum::<f64>()
+        };
         let [strong, weak] = [10.0 * within(1.0), within(6.0)];
         let found = kept(Layers::Strongest, Edge::BandLimited, 6.5e6);
-        assert!((found - strong / (strong + weak)).abs() < 1e-4, "{found}: {strong}, {weak}");
+        assert!((found - strong / (strong + weak)).abs() < 2e-4, "{found}: {strong}, {weak}");
+    }
+
+    /// Amplitude of a sinc of that cut-off under a Kaiser window of ±8 samples and β 5.65, by summing its
+    /// response.
+    fn direct(f_cps: f64, cutoff_cps: f64) -> f64 {
+        let bessel = |x: f64| {
+            let term = |sum: &mut f64, k: i32| {
+                *sum *= x * x / 4.0 / f64::from(k * k);
+                Some(*sum)
+            };
+            1.0 + (1..40).scan(1.0, term).sum::<f64>()
+        };
+        let response = |x: f64| sinc(2.0 * cutoff_cps * x) * bessel(5.65 * (1.0 - (x / 8.0) * (x / 8.0)).sqrt());
+        let sum = |f_cps: f64| -> f64 {
+            let at = |k: i32| (f64::from(k) + 0.5) / 64.0 - 8.0;
+            (0..1024).map(at).map(|x| response(x) * libm::cos(std::f64::consts::TAU * f_cps * x)).sum()
+        };
+        sum(f_cps) / sum(0.0)
+    }
+
+    #[test]
+    fn a_band_limiting_filter_has_the_response_of_its_taps() {
+        for cutoff_cps in [0.2, 0.45] {
+            let sampler = Sampler::with_cutoff(Edge::BandLimited, 1.0, cutoff_cps);
+            for k in 0..60 {
+                let f_cps = 0.025 * f64::from(k);
+                let (found, expected) = (sampler.amplitude(f_cps), direct(f_cps, cutoff_cps));
+                // Lines between 64 points a lobe: 1e-4 of the lobe's height, and the rest of the lobes.
+                assert!((found - expected).abs() < 3e-4, "{cutoff_cps} {f_cps}: {found} {expected}");
+            }
+            assert!((sampler.amplitude(cutoff_cps) - 0.5).abs() < 1e-3);
+        }
+        assert!((Sampler::new(Edge::Area, 2e6).amplitude(1e6) - 2.0 / std::f64::consts::PI).abs() < 1e-12);
     }
 
     #[test]

@@ -11,8 +11,10 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 
+use crate::analysis::expect::welch::{self, Looks};
 use crate::analysis::judge::schema::SUMMARY;
 use crate::analysis::measure::psd::Psd;
+use crate::analysis::read::psd_name;
 use crate::analysis::show::tables;
 use crate::analysis::{self, JudgeError};
 use crate::cli::args;
@@ -35,12 +37,6 @@ use crate::receiver::settings::Settings;
 use crate::receiver::{Outcome, ReceiveError, Reception};
 use crate::twin;
 
-/// Length of the signal's start from which the spectrum is estimated.
-const SPECTRUM_S: f64 = 0.2;
-/// Pieces that share it where the spectrum changes.
-const SPECTRUM_PIECES: u64 = 60;
-/// Points of that spectrum.
-const SPECTRUM_BINS: usize = 2048;
 /// Bytes that are made numbers at a time: whole samples of any format.
 const SEEN_BYTES: usize = 1 << 17;
 
@@ -79,14 +75,17 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     ]);
     let mut files =
         Rinex::create(&rx_in, arguments.rinex, &scene.name, &settings.acquisition.signals()).map_err(output_error)?;
-    let mut taps: Vec<Tap> =
-        scenes.iter().map(|scene| Tap::new(scene, run, arguments.keep_if, scenes.len())).collect::<Result<_, _>>()?;
+    let (keep, changing) = (arguments.keep_if, scenes.iter().any(|scene| !scene.interference.is_empty()));
+    let tap = |scene: &Scene| Tap::new(scene, run, (keep, changing), scenes.len());
+    let mut taps: Vec<Tap> = scenes.iter().map(tap).collect::<Result<_, _>>()?;
     let mut sentences = sentences(&rx_in)?;
     let mut tracks = Tracks::create(&rx_in, &scene.name).map_err(output_error)?;
     let outputs = &mut (&mut output, &mut (&mut files, &mut (&mut sentences, &mut tracks)));
     let both = both(&scenes, &settings, &mut truth, outputs, (&mut taps, arguments.printed.in_words()))?;
-    // The spectrum that is judged is that of the first front end.
-    taps.first().map_or(Ok(()), |first| first.write_psd(run))?;
+    for (place, tap) in taps.iter().enumerate() {
+        let later = Some(tap.name.as_str()).filter(|_| place > 0);
+        tables::write_psd(&run.join(psd_name(later)), &tap.psd).map_err(judge_error)?;
+    }
     taps.into_iter().try_for_each(|tap| tap.finish(run))?;
     drop((truth, output, files, sentences, tracks));
 
@@ -193,7 +192,7 @@ struct Tap {
 
 impl Tap {
     /// For one of so many front ends.
-    fn new(scene: &Scene, run: &Path, keep: bool, front_ends: usize) -> Result<Self, CliError> {
+    fn new(scene: &Scene, run: &Path, (keep, changing): (bool, bool), front_ends: usize) -> Result<Self, CliError> {
         let own = scene.front_end_name.as_ref().filter(|_| front_ends > 1);
         let name = own.map_or_else(|| "if".to_owned(), Clone::clone);
         let kept = if keep {
@@ -204,11 +203,10 @@ impl Tap {
             None
         };
         let metadata = scene.metadata.clone();
-        let pieces = if scene.interference.is_empty() { 1 } else { SPECTRUM_PIECES };
         let sample_bytes = metadata.format.bytes() as u64;
-        let length = (SPECTRUM_S * metadata.rate.hz()) as u64 / pieces * sample_bytes;
-        let stride = scene.samples / pieces * sample_bytes;
-        let psd = Psd::new(metadata.rate.hz(), !metadata.format.is_complex(), SPECTRUM_BINS);
+        let looks = Looks::at(scene.samples, metadata.rate.hz(), changing);
+        let (length, stride) = (looks.length * sample_bytes, looks.stride * sample_bytes);
+        let psd = Psd::new(metadata.rate.hz(), !metadata.format.is_complex(), welch::BINS);
         Ok(Self {
             metadata,
             signals: scene.signals.clone(),
@@ -237,17 +235,12 @@ impl Tap {
                 break;
             }
             self.psd.cut();
-            let step = self.stride.max(self.piece.end - self.piece.start);
-            self.piece = self.piece.start + step..self.piece.end + step;
+            self.piece = self.piece.start + self.stride..self.piece.end + self.stride;
         }
         match &mut self.kept {
             Some(file) => file.write_all(bytes),
             None => Ok(()),
         }
-    }
-
-    fn write_psd(&self, run: &Path) -> Result<(), CliError> {
-        tables::write_psd(&run.join("psd.csv"), &self.psd).map_err(judge_error)
     }
 
     fn finish(self, run: &Path) -> Result<(), CliError> {

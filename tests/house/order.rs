@@ -105,8 +105,10 @@ pub const ORDER: Order<'static> = &[
         "analysis/expect",
         &[
             &["theory"],
-            &["followed", "jamming", "message", "quantile", "smoothing"],
-            &["multiple_access", "spectrum"],
+            &["converter", "followed", "jamming", "message", "quantile", "response", "smoothing", "welch"],
+            &["front_end", "multiple_access"],
+            &["samples"],
+            &["spectrum"],
             &["due", "timeline"],
             &["loops"],
             &["multipath"],
@@ -116,7 +118,7 @@ pub const ORDER: Order<'static> = &[
     (
         "analysis/measure",
         &[
-            &["allan", "errors", "independent", "ionosphere", "lines", "psd", "spoofing"],
+            &["allan", "errors", "independent", "ionosphere", "lines", "psd", "spectrum", "spoofing"],
             &["clock", "consistency", "elevation", "jitter"],
             &["slips"],
         ],

@@ -1,17 +1,18 @@
 //! The judge judged: results of a sound receiver are damaged, a little and a little more, and the verdict
 //! must pass the one and fail the other.
 //!
-//! Two closed loops are run, one at rest and one in motion. Each kind of damage edits the tables of `rx/` in
-//! a copy and has two sizes: one that an evaluator would still call sound, with which no row may fail, and
-//! one a small factor larger, which must fail by a row that names it. Where no size is sound (a row twice, a
-//! week too many) the smaller one is absent. `GNSS_TWIN_WRITE_SABOTAGE=$PWD/reports/sabotage.md` makes a run
-//! write the table.
+//! Two closed loops are run, one at rest and one in motion. Each kind of damage edits the tables of `rx/` or
+//! the spectrum in a copy and has two sizes: one that an evaluator would still call sound, with which no row
+//! may fail, and one a small factor larger, which must fail by a row that names it. Where no size is sound (a
+//! row twice, a week too many) the smaller one is absent. `GNSS_TWIN_WRITE_SABOTAGE=$PWD/reports/sabotage.md`
+//! makes a run write the table.
 #![cfg(all(feature = "cli", feature = "pdf"))]
 
 mod fixes;
 mod links;
 mod observations;
 mod run;
+mod spectrum;
 mod table;
 mod tables;
 
@@ -37,7 +38,10 @@ pub struct Kind {
 }
 
 fn kinds() -> Vec<Kind> {
-    [fixes::kinds(), observations::kinds(), links::kinds(), tables::kinds()].into_iter().flatten().collect()
+    [fixes::kinds(), observations::kinds(), links::kinds(), tables::kinds(), spectrum::kinds()]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// Rows that fail of a scene's results, damaged so.
@@ -120,7 +124,7 @@ fn every_kind_of_damage_passes_where_it_is_tolerable_and_fails_by_its_row_where_
 fn report(both: usize, found: &[(usize, (String, Option<String>))]) -> String {
     let caught = found.iter().filter(|(_, (_, wrong))| wrong.is_none()).count();
     let mut text = format!(
-        "# Sabotaged results\n\nThe results of a sound receiver, damaged in `rx/` and judged again. The tolerable \
+        "# Sabotaged results\n\nThe results of a sound receiver, damaged in `rx/` or `psd.csv` and judged again. The tolerable \
          size passes every row, the broken one fails by the rows named; {both} of {} kinds have a tolerable size. \
          Caught: {caught} of {}. Written by `tests/sabotage`.\n\n\
          | damage | tolerable | broken | failed by |\n| --- | --- | --- | --- |\n",

@@ -78,6 +78,7 @@ pub struct Rx {
     to: PathBuf,
     tables: BTreeMap<&'static str, Table>,
     receiver: Option<serde_json::Value>,
+    psd: Option<Table>,
 }
 
 impl Rx {
@@ -100,7 +101,7 @@ impl Rx {
         for name in ["psd.csv", "speed.json", "scenario.toml"] {
             link(&from.join(name), &to.join(name));
         }
-        Self { from: from.to_owned(), to: to.to_owned(), tables: BTreeMap::new(), receiver: None }
+        Self { from: from.to_owned(), to: to.to_owned(), tables: BTreeMap::new(), receiver: None, psd: None }
     }
 
     /// A table to edit.
@@ -115,6 +116,12 @@ impl Rx {
         self.receiver.get_or_insert_with(|| serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap())
     }
 
+    /// The spectrum of the samples to edit.
+    pub fn psd(&mut self) -> &mut Table {
+        let path = self.from.join("psd.csv");
+        self.psd.get_or_insert_with(|| Table::read(&path))
+    }
+
     /// Samples a second.
     pub fn rate_hz(&self) -> f64 {
         2.6e6
@@ -122,6 +129,11 @@ impl Rx {
 
     /// Writes what was edited and links the rest.
     pub fn write(&self) {
+        if let Some(psd) = &self.psd {
+            // Written anew: what is there is a link to the run's own.
+            fs::remove_file(self.to.join("psd.csv")).unwrap();
+            psd.write(&self.to.join("psd.csv"));
+        }
         for entry in fs::read_dir(self.from.join("rx")).unwrap() {
             let entry = entry.unwrap();
             let target = self.to.join("rx").join(entry.file_name());

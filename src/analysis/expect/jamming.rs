@@ -13,7 +13,7 @@ use rustfft::num_complex::Complex;
 
 use crate::analysis::read::Run;
 use crate::analysis::statistics::mean;
-use crate::analysis::waveform::{Edge, Waveform};
+use crate::analysis::waveform::{Sampler, Waveform};
 use crate::gnss::facts::Interference;
 use crate::gnss::signal::sinc_squared;
 
@@ -150,8 +150,9 @@ pub fn sources(run: &Run) -> BTreeMap<usize, Source> {
 }
 
 /// κ of a source against a signal at `signal_hz` in the samples, in seconds.
-pub fn separation_s(source: &Source, signal: &Waveform, signal_hz: f64, edge: Edge, rate_hz: f64) -> f64 {
-    let code = |f_hz: f64| signal.sampled(edge, f_hz - signal_hz, rate_hz);
+pub fn separation_s(source: &Source, signal: &Waveform, signal_hz: f64, sampler: &Sampler) -> f64 {
+    let rate_hz = sampler.rate_hz();
+    let code = |f_hz: f64| signal.sampled(sampler, f_hz - signal_hz);
     // The band in 4000 pieces, each looked at in its middle.
     let step_hz = rate_hz / 4000.0;
     let middles = (-2000..2000).map(|k| (f64::from(k) + 0.5) * step_hz);
@@ -188,12 +189,18 @@ pub(super) fn hann(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::waveform::Edge;
     use crate::gnss::gps::l1ca::L1_CA;
 
     /// Separation from C/A at the carrier, wide sampling, in dB of seconds.
     fn separation_db(shape: &Interference, frequency_hz: f64) -> f64 {
         let source = Source { spectrum: Spectrum::of(shape), frequency_hz, jn0_hz: 1.0 };
-        10.0 * libm::log10(separation_s(&source, &Waveform::of(&L1_CA).unwrap(), 0.0, Edge::Nearest, 60e6))
+        10.0 * libm::log10(separation_s(
+            &source,
+            &Waveform::of(&L1_CA).unwrap(),
+            0.0,
+            &Sampler::new(Edge::Nearest, 60e6),
+        ))
     }
 
     #[test]

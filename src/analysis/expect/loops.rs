@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::followed::Followed;
+use crate::analysis::expect::spectrum::edge_cost_db;
 use crate::analysis::expect::theory::clock::PowerLaw;
 use crate::analysis::expect::theory::dll::{Discriminator, Taps};
 use crate::analysis::expect::theory::linear::{Feedback, PhaseLoop, controlled_root, controlled_root_gains};
@@ -345,6 +346,13 @@ impl Theory {
         // Of the component's power in the samples, which is whole whatever their averages leave of a layer.
         let efficiency = found.value(0.0) * found.value(0.0) / own.value(0.0);
         let efficiency = efficiency / Peak::new(&followed.whole, width_chips, 2 * of_signal).value(0.0);
+        let efficiency = if run.scene.code_edge == Edge::BandLimited {
+            // What a filter leaves of layers is no average's.
+            let (nominal, own) = (followed.assumed.correlation(0.0), followed.own.correlation(0.0));
+            nominal * nominal / own * libm::pow(10.0, -0.1 * edge_cost_db(run, link.signal))
+        } else {
+            efficiency
+        };
         Some(Self {
             settings,
             update_s,

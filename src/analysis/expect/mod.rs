@@ -1,22 +1,28 @@
 //! Expecting: what theory and the scene's truth let one expect, before any result of a receiver is looked at.
 //!
-//! [`theory`] has the closed forms with their sources. [`spectrum`] is the density that the samples should
-//! have; [`jamming`] and [`multiple_access`] say what interference and other satellites take from C/N0.
-//! [`timeline`] is the truth as a function of time. `loops` are the receiver's three loops as linear systems,
-//! [`multipath`] is the code error that reflected rays leave in them, [`smoothing`] what the carrier makes of
-//! the code, [`quantile`] how far random errors may go. [`message`] is what the satellites sent, and [`due`]
-//! when each satellite must be found, observed and used. Of the receiver only its settings enter, and the
-//! times at which it took its rows.
+//! [`theory`] has the closed forms with their sources. [`samples`] is the density that the samples should
+//! have as [`welch`] shows it, through a [`converter`] and the [`response`] of a filter, and [`spectrum`]
+//! what follows from it; [`jamming`] and [`multiple_access`] say what interference and other satellites take
+//! from C/N0. [`timeline`] is the truth as a function of time. `loops` are the receiver's three loops as
+//! linear systems, [`multipath`] is the code error that reflected rays leave in them, [`smoothing`] what the
+//! carrier makes of the code, [`quantile`] how far random errors may go. [`message`] is what the satellites
+//! sent, and [`due`] when each satellite must be found, observed and used. Of the receiver only its settings
+//! enter, and the times at which it took its rows.
 
+pub mod converter;
 pub mod due;
 pub(in crate::analysis) mod followed;
+pub mod front_end;
 pub mod jamming;
 pub(in crate::analysis) mod loops;
 pub mod message;
 pub mod multipath;
 pub mod multiple_access;
 pub mod quantile;
+pub mod response;
+pub mod samples;
 pub mod smoothing;
 pub mod spectrum;
 pub mod theory;
 pub mod timeline;
+pub mod welch;

@@ -96,9 +96,9 @@ fn separations(
     emissions: &BTreeSet<Emission>,
     waveforms: &HashMap<&Signal, Waveform>,
 ) -> HashMap<Emission, Vec<(Emission, f64)>> {
-    let (edge, rate_hz) = (run.scene.code_edge, run.scene.sample_rate_hz);
+    let (sampler, rate_hz) = (run.sampler(0), run.scene.sample_rate_hz);
     let kept: HashMap<&Signal, f64> =
-        waveforms.keys().map(|signal| (*signal, Waveform::kept(signal, run.scene.waveform, edge, rate_hz))).collect();
+        waveforms.keys().map(|signal| (*signal, Waveform::kept(signal, run.scene.waveform, &sampler))).collect();
     // Spectra are even: κ depends on the size of the distance, and on the pair in either order.
     let mut known: HashMap<(&str, &str, u64), f64> = HashMap::new();
     let mut all: HashMap<Emission, Vec<(Emission, f64)>> = HashMap::new();
@@ -111,7 +111,7 @@ fn separations(
             }
             let [a, b] = [own.signal.name, other.signal.name];
             let key = (a.min(b), a.max(b), apart_hz.to_bits());
-            let kappa_s = *known.entry(key).or_insert_with(|| one.separation_s(two, apart_hz, edge, rate_hz));
+            let kappa_s = *known.entry(key).or_insert_with(|| one.separation_s(two, apart_hz, &sampler));
             let kept = kept.get(other.signal).copied().unwrap_or(1.0);
             all.entry(*own).or_default().push((*other, kept * kappa_s));
         }
@@ -123,7 +123,7 @@ fn jammed(run: &Run, emissions: &BTreeSet<Emission>, waveforms: &HashMap<&Signal
     if run.interference.is_empty() {
         return Jammed::default();
     }
-    let sources = jamming::sources(run);
+    let (sources, sampler) = (jamming::sources(run), run.sampler(0));
     let mut samples: Vec<u64> = run.interference.iter().map(|row| row.sample).collect();
     samples.sort_unstable();
     samples.dedup();
@@ -134,10 +134,7 @@ fn jammed(run: &Run, emissions: &BTreeSet<Emission>, waveforms: &HashMap<&Signal
         let signal_hz = sign * (emission.carrier_hz() - run.scene.center_hz.unwrap_or(emission.carrier_hz()));
         let kappa: HashMap<usize, f64> = sources
             .iter()
-            .map(|(number, source)| {
-                let (edge, rate_hz) = (run.scene.code_edge, run.scene.sample_rate_hz);
-                (*number, jamming::separation_s(source, waveform, signal_hz, edge, rate_hz))
-            })
+            .map(|(number, source)| (*number, jamming::separation_s(source, waveform, signal_hz, &sampler)))
             .collect();
         let mut sums = vec![0.0; samples.len()];
         for row in &run.interference {

@@ -1,24 +1,23 @@
 //! The spectrum that theory expects of the samples, front end and converter in, and the nulls of the code
 //! found against it.
 //!
-//! Absolute, in LSB²/Hz: noise of N0 = 2σ²/fs, satellites of C/N0·N0 under the spectra of their signals,
-//! interference, all through the filter and the converter's gain; then quantisation. An integer format rounds
-//! with 1/12 a component; a converter of few levels is g·x + d for Gaussian x (Bussgang 1952), with g and the
-//! power of d summed over its cells. d counts as white. Nothing is fitted: the median of measured over
-//! expected is reported. Limits: a Butterworth's response is the analogue one, a wall's edge an error
-//! function between its −80 dB points, both about the first signal's carrier; a local oscillator's offset and
-//! phase noise are left out.
+//! [`super::samples`] has the spectrum itself. Nothing is fitted: the median of measured over expected is
+//! reported. Limits: nulls are looked for where the samples have one signal on one carrier.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use statrs::function::erf::{erf, erfc};
 
-use crate::analysis::expect::jamming;
-use crate::analysis::read::{Emission, MeanSignal, Run};
+use crate::analysis::error::JudgeError;
+use crate::analysis::expect::converter::Staircase;
+use crate::analysis::expect::followed::Followed;
+use crate::analysis::expect::front_end::FrontEnd;
+use crate::analysis::expect::samples::{Expected, Sent};
+use crate::analysis::read::{Emission, Run};
 use crate::analysis::statistics::median;
-use crate::analysis::waveform::Waveform;
-use crate::gnss::facts::{BalanceSpec, ConverterSpec, FilterShape, FilterSpec, converter, filters};
+use crate::analysis::waveform::{Edge, Sampler, Waveform};
+use crate::gnss::facts::{converter, filters};
+use crate::gnss::samples::Format;
 use crate::gnss::signal::Signal;
 
 /// The section `psd` of `summary.json`: frequencies from the carrier.
@@ -47,9 +46,6 @@ const BOTTOM: f64 = 0.02;
 const BOTTOM_BINS: f64 = 4.0;
 /// The spectrum must rise by this factor on both sides for a null to be visible.
 const RISE: f64 = 2.0;
-/// Width of a wall's edge over the filter's, and the argument of erfc there: amplitude 1e-4.
-const EDGE: f64 = 0.05;
-const EDGE_ERFC: f64 = 2.63;
 
 /// What the section says of a run and of what [`theory_db`] expects there.
 pub fn judge(run: &Run, theory_db: &[f64]) -> Spectrum {
@@ -76,169 +72,117 @@ pub fn judge(run: &Run, theory_db: &[f64]) -> Spectrum {
 
 /// Expected density at the frequencies of `psd.csv`, in the same decibels. Where the truth does not state the
 /// level (no `noise_lsb`), it is fitted. Empty without a spectrum or without signals.
-pub fn theory_db(run: &Run) -> Vec<f64> {
-    let signals: Vec<&MeanSignal> = run.expected.iter().filter(|one| is_in(run, one.signal)).collect();
-    let sources = jamming::sources(run);
-    let Some(center_hz) = run.scene.center_hz.filter(|_| !signals.is_empty() && !run.psd.is_empty()) else {
-        return Vec::new();
-    };
-    let rate_hz = run.scene.sample_rate_hz;
-    let floor = if run.scene.noise { 1.0 } else { 0.0 };
-    let sign = if run.scene.inverted { -1.0 } else { 1.0 };
-    let bin_hz = run.psd.get(1).zip(run.psd.first()).map_or(1.0, |(b, a)| b.frequency_hz - a.frequency_hz);
-    let if_hz = signals.first().map_or(0.0, |signal| sign * (signal.nominal_hz - center_hz));
-    // Samples of a whole signal have its whole power, whatever of its spectrum the sampler meets.
-    let edge = run.scene.code_edge;
-    let with_power = |signal: &Signal| {
-        let power = Waveform::of(signal)?.power(edge, rate_hz);
-        Some((Waveform::sent(signal, run.scene.waveform)?, power))
-    };
-    let own = run.signals.iter().filter(|signal| is_in(run, signal));
-    let known: BTreeMap<&Signal, (Waveform, f64)> =
-        own.filter_map(|&signal| Some((signal, with_power(signal)?))).collect();
-    let waveforms: Vec<(&MeanSignal, &(Waveform, f64))> =
-        signals.iter().filter_map(|&signal| Some((signal, known.get(signal.signal)?))).collect();
-    let mut density: Vec<f64> = run
-        .psd
-        .iter()
-        .map(|row| {
-            let of = |(signal, (waveform, power)): &(&MeanSignal, &(Waveform, f64))| {
-                let from_carrier_hz = row.frequency_hz - sign * (signal.carrier_hz - center_hz);
-                signal.cn0_hz * waveform.sampled(edge, from_carrier_hz, rate_hz) / power
-            };
-            let jammed: f64 = sources.values().map(|source| jamming::density(source, row.frequency_hz, bin_hz)).sum();
-            floor + waveforms.iter().map(of).sum::<f64>() + jammed
-        })
-        .collect();
-    let level = run.scene.noise_lsb.map(|sigma| 2.0 * sigma * sigma / rate_hz);
-    density.iter_mut().for_each(|value| *value *= level.unwrap_or(1.0));
-    if let Some(filter) = run.scene.filters().next() {
-        for (value, row) in density.iter_mut().zip(&run.psd) {
-            *value *= filter_power(filter, row.frequency_hz - if_hz);
-        }
+///
+/// # Errors
+/// [`JudgeError::Read`] where spilled rows cannot be read.
+pub fn theory_db(run: &Run) -> Result<Vec<f64>, JudgeError> {
+    let front_end = FrontEnd::of(run, 0);
+    let sent = Sent::of(run, &front_end)?;
+    if sent.is_empty() {
+        return Ok(Vec::new());
     }
-    if let Some(balance) = run.scene.balance() {
-        unbalance(&mut density, balance, run, bin_hz);
-    }
-    if level.is_some() {
-        // Of a one-sided spectrum the integral is the one component's power, of a two-sided one that of both.
-        let one_sided = run.psd.first().is_some_and(|row| row.frequency_hz >= 0.0);
-        let power = density.iter().sum::<f64>() * bin_hz * if one_sided { 1.0 } else { 0.5 };
-        let (gain, added) = quantiser(run.scene.converter(), power.sqrt());
-        density.iter_mut().for_each(|value| *value = *value * gain * gain + 2.0 * added / rate_hz);
-    }
-    let shape: Vec<f64> = density.into_iter().map(|value| 10.0 * libm::log10(value.max(1e-30))).collect();
-    if level.is_some() {
-        return shape;
-    }
-    // Near the nulls quantisation, not the codes, sets the level.
-    let peak_db = shape.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let near = run.psd.iter().zip(&shape).filter(|(_, shape)| **shape > peak_db - 20.0);
-    let level_db = median(&near.map(|(row, shape)| row.density_db - shape).collect::<Vec<_>>()).unwrap_or(0.0);
-    shape.into_iter().map(|shape| shape + level_db).collect()
-}
-
-/// Whether the samples whose spectrum is judged have a signal: of several front ends they are those of the
-/// first.
-fn is_in(run: &Run, signal: &Signal) -> bool {
-    let first = run.scene.front_ends.first();
-    first.is_none_or(|first| first.signals.iter().any(|name| name == signal.name))
-}
-
-/// Power gain of a filter at a frequency from its middle.
-fn filter_power(filter: &FilterSpec, f_hz: f64) -> f64 {
-    let half_hz = 0.5 * filter.bandwidth_hz;
-    match filter.shape {
-        FilterShape::Butterworth { order } => 1.0 / (1.0 + libm::pow((f_hz / half_hz).abs(), f64::from(2 * order))),
-        FilterShape::BrickWall => {
-            let amplitude = 0.5 * erfc(EDGE_ERFC * (f_hz.abs() - half_hz) / (EDGE * half_hz));
-            amplitude * amplitude
-        }
-    }
-}
-
-/// Adds the image of quadratures out of balance and the line of direct current.
-fn unbalance(density: &mut [f64], balance: &BalanceSpec, run: &Run, bin_hz: f64) {
-    let image = libm::pow(10.0, balance.image_db.unwrap_or(-300.0) / 10.0);
-    let before = density.to_vec();
-    for ((value, row), index) in density.iter_mut().zip(&run.psd).zip(0..) {
-        // Two-sided frequencies run from −N/2: bin k mirrors to N − k.
-        let mirrored = before.get(before.len() - usize::min(index, before.len())).copied().unwrap_or(0.0);
-        *value += image * mirrored;
-        *value += balance.dc_power_lsb2 * jamming::hann(row.frequency_hz / bin_hz) / bin_hz;
-    }
-}
-
-/// Gain of the converter, and the power that quantisation adds to a component, for Gaussian samples of
-/// `sigma_lsb`.
-fn quantiser(adc: Option<&ConverterSpec>, sigma_lsb: f64) -> (f64, f64) {
-    let Some(adc) = adc else { return (1.0, 1.0 / 12.0) };
-    let made_for_lsb = if adc.gain_control { sigma_lsb } else { adc.nominal_lsb };
-    let step_lsb = adc.step_sigma * made_for_lsb;
-    if adc.whole {
-        return (1.0 / step_lsb, 1.0 / 12.0);
-    }
-    // Cells of the step's width, levels 2k + 1, outermost cells endless.
-    let half = 1_i64 << (adc.bits - 1);
-    let cumulated = |x: f64| 0.5 * (1.0 + erf(x / std::f64::consts::SQRT_2));
-    let bell = |x: f64| libm::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
-    let edge = |k: i64| match k {
-        k if k <= -half => f64::NEG_INFINITY,
-        k if k >= half => f64::INFINITY,
-        k => k as f64 * step_lsb / sigma_lsb,
-    };
-    let (mut square, mut product) = (0.0, 0.0);
-    for k in -half..half {
-        let (low, high, out) = (edge(k), edge(k + 1), (2 * k + 1) as f64);
-        square += out * out * (cumulated(high) - cumulated(low));
-        product += out * (bell(low) - bell(high));
-    }
-    let gain = product / sigma_lsb;
-    (gain, (square - product * product).max(0.0))
+    Ok(Expected::of(run, &front_end, &sent, &run.psd).map_or_else(Vec::new, |expected| expected.density_db()))
 }
 
 /// A null as measured and as expected.
 type Null = (f64, f64);
 
-/// Decibels of C/N0 that filter and converter of its front end cost each signal's code, noise alone counted:
-/// a filter passes less of the code than of noise with the code's spectrum, and rounding adds noise.
+/// Decibels of C/N0 that filter and converter of its front end cost each signal's replica, noise alone
+/// counted: a filter passes less of the code than of noise with the code's spectrum, and rounding adds noise.
+/// What edges between samples cost beside is [`edge_costs_db`].
 pub fn costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
-    let kept = |signal: &Signal| {
+    let kept = |signal: &'static Signal| {
         let place = run.front_end(signal);
         let stages = run.scene.stages(place).0;
-        let noise_lsb = run.scene.front_ends.get(place).map_or(run.scene.noise_lsb, |own| Some(own.noise_lsb));
+        let own = run.scene.front_ends.get(place);
+        let noise_lsb = own.map_or(run.scene.noise_lsb, |own| Some(own.noise_lsb));
+        let format: Option<Format> = own.map_or(&run.scene.format, |own| &own.format).parse().ok();
         let converted = noise_lsb.filter(|_| run.scene.noise).map_or(1.0, |sigma_lsb| {
-            let (gain, added) = quantiser(converter(stages), sigma_lsb);
+            let staircase = Staircase::of(converter(stages), format.and_then(Format::full_scale_lsb), sigma_lsb);
+            let (gain, added) = staircase.map_or((1.0, 0.0), |staircase| staircase.gain_and_noise(sigma_lsb));
             let power = (gain * sigma_lsb) * (gain * sigma_lsb);
             power / (power + added)
         });
-        converted * filters(stages).next().map_or(1.0, |filter| passed(filter, run, signal))
+        let passed = match filters(stages).next() {
+            Some(_) => {
+                found(run, signal, true).zip(found(run, signal, false)).map_or(1.0, |(with, without)| with / without)
+            }
+            None => 1.0,
+        };
+        converted * passed
     };
     run.signals.iter().map(|&signal| (signal, -10.0 * libm::log10(kept(signal)))).collect()
 }
 
-/// What a filter about the carrier of its front end's first signal leaves of a code's power over noise:
-/// (∫S|H| df)²/(∫S|H|² df · ∫S df).
-fn passed(filter: &FilterSpec, run: &Run, signal: &Signal) -> f64 {
-    let Some(code) = Waveform::sent(signal, run.scene.waveform) else { return 1.0 };
+/// Decibels of C/N0 that edges between samples cost a signal's replica, negative where it gains.
+///
+/// The truth's C/N0 has all power that the samples have of the signal, P of what the whole waveform brings
+/// through the response X of the sampler. A replica whose samples have the response R finds the amplitude ∫
+/// S_x·X·R·F df of it behind a filter F, S_x the cross spectrum of what is sent and the replica, in the noise
+/// ∫ S_r·R²·F² df, S_r the replica's own spectrum. A receiver takes the loss of its replica for
+/// (∫ S_w df)²/∫ S_r df, of the whole waveform before any filter. So what it states is
+///
+/// (∫ S_x·X·R·F)²/(P·∫ S_r·R²·F²) · ∫ S_r/(∫ S_w)²
+///
+/// of the truth's. It is above 1 where BOC(6,1) is cut off: the power that it would have had is in BOC(1,1)
+/// then, which is all that the replica wants.
+pub fn edge_cost_db(run: &Run, signal: &'static Signal) -> f64 {
+    -10.0 * libm::log10(found(run, signal, false).unwrap_or(1.0))
+}
+
+/// The same of every signal.
+pub fn edge_costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
+    run.signals.iter().map(|&signal| (signal, edge_cost_db(run, signal))).collect()
+}
+
+/// Steps of those integrals over the samples' band.
+const STEPS: i32 = 1000;
+
+/// What a replica finds of a signal behind sampler and, where wanted, filter, over what the receiver takes it
+/// for.
+fn found(run: &Run, signal: &'static Signal, filtered: bool) -> Option<f64> {
     let place = run.front_end(signal);
-    let (edge, rate_hz) =
-        (run.scene.front_ends.get(place).map_or(run.scene.code_edge, |own| own.code_edge), run.rate_hz(signal));
-    let first = run.expected.iter().find(|one| run.front_end(one.signal) == place);
-    let off_hz = first.map_or(0.0, |first| signal.centre_hz() - first.nominal_hz);
-    let (mut all, mut amplitude, mut power) = (0.0, 0.0, 0.0);
-    for k in -1000..1000 {
-        let f_hz = (f64::from(k) + 0.5) * rate_hz / 2000.0;
-        let density = code.sampled(edge, f_hz, rate_hz);
-        let gain = filter_power(filter, f_hz + off_hz);
-        (all, amplitude, power) = (all + density, amplitude + density * gain.sqrt(), power + density * gain);
+    let sampler = run.sampler(place);
+    let rate_hz = sampler.rate_hz();
+    let followed = Followed::of(run, signal)?;
+    let replica = Sampler::new(replica_edge(run, sampler.edge()), rate_hz);
+    let front_end = FrontEnd::of(run, place);
+    let first_hz = run.expected.iter().find(|one| front_end.has(one.signal))?.nominal_hz;
+    let filter = Some(&front_end).filter(|_| filtered).and_then(|own| own.filter_at(first_hz));
+    let carrier_hz = front_end.place_hz(signal.centre_hz());
+    // Of both sides of a sub-carrier the chips are what is found, about the sub-carrier's frequency.
+    let side_hz = followed.sides.map_or(0.0, |tone| tone.side_hz(followed.own.chip_rate_hz()));
+    let step_hz = rate_hz / f64::from(STEPS);
+    let (mut amplitude, mut noise) = (0.0, 0.0);
+    for k in -STEPS / 2..STEPS / 2 {
+        let within_hz = (f64::from(k) + 0.5) * step_hz;
+        let passed = filter.as_ref().map_or(1.0, |filter| filter.amplitude(carrier_hz + within_hz));
+        for alias in sampler.aliases() {
+            let hz = within_hz + f64::from(alias) * rate_hz;
+            let by = replica.amplitude(hz - side_hz);
+            amplitude += step_hz * followed.found.density(hz - side_hz) * sampler.amplitude(hz) * by * passed;
+            noise += step_hz * followed.own.density(hz - side_hz) * by * by * passed * passed;
+        }
     }
-    amplitude * amplitude / (power * all)
+    let power = Waveform::of(signal)?.power(&sampler);
+    let (assumed, own) = (followed.assumed.correlation(0.0), followed.own.correlation(0.0));
+    Some(amplitude * amplitude / (power * noise) * own / (assumed * assumed))
+}
+
+/// How the receiver's replica meets samples, as it says itself; one that does not say it has the samples'
+/// own edges, but no filter.
+fn replica_edge(run: &Run, samples: Edge) -> Edge {
+    let settings = run.receiver.get("settings").unwrap_or(&run.receiver);
+    match (settings.pointer("/tracking/replica").and_then(serde_json::Value::as_str), samples) {
+        (Some("area"), _) | (None, Edge::Area) => Edge::Area,
+        _ => Edge::Nearest,
+    }
 }
 
 /// The nulls beside the main lobe of the code, where the samples hold one signal on one carrier.
 fn nulls(run: &Run, theory_db: &[f64]) -> Result<[Null; 2], &'static str> {
-    let mut emissions = Emission::all(run.truth.keys().filter(|link| is_in(run, link.signal))).into_iter();
+    let front_end = FrontEnd::of(run, 0);
+    let mut emissions = Emission::all(run.truth.keys().filter(|link| front_end.has(link.signal))).into_iter();
     let emission = emissions.next().ok_or("there is no signal")?;
     if emissions.next().is_some() {
         return Err("filled: several signals or carriers share the spectrum");
@@ -299,34 +243,10 @@ mod tests {
     use super::*;
     use crate::analysis::hand_made::{Draw, planted};
     use crate::analysis::measure::psd::Psd;
-    use crate::analysis::read::PsdRow;
-    use crate::analysis::waveform::Edge;
-    use crate::gnss::facts::{FrontEndFacts, StageSpec};
+    use crate::analysis::read::{MeanSignal, PsdRow};
+    use crate::gnss::facts::{FilterShape, FilterSpec, FrontEndFacts, StageSpec};
+    use crate::gnss::galileo::e1::E1;
     use crate::gnss::gps::l5::L5;
-
-    #[test]
-    fn converters_lose_what_the_literature_says() {
-        // Correlation loss 10 lg(g²σ²/(g²σ² + d)) (Hegarty 2011): 1.96 dB of one bit, 0.549 of two and 0.166
-        // of three at best steps.
-        for (bits, step_sigma, loss_db) in [(1, 1.0, 1.961), (2, 0.9957, 0.549), (3, 0.586, 0.166)] {
-            let adc = ConverterSpec { bits, step_sigma, nominal_lsb: 28.0, gain_control: false, whole: false };
-            let (gain, added) = quantiser(Some(&adc), 28.0);
-            let kept = gain * gain * 28.0 * 28.0;
-            let found = 10.0 * libm::log10((kept + added) / kept);
-            assert!((found - loss_db).abs() < 1e-3, "{bits} bits: {found}");
-        }
-        assert_eq!(quantiser(None, 28.0), (1.0, 1.0 / 12.0));
-    }
-
-    #[test]
-    fn filters_halve_the_power_where_they_say() {
-        let filter = |shape| FilterSpec { shape, bandwidth_hz: 2e6, group_delay_s: 0.0 };
-        let butterworth = filter(FilterShape::Butterworth { order: 4 });
-        assert!((filter_power(&butterworth, 1e6) - 0.5).abs() < 1e-12);
-        assert!((filter_power(&butterworth, 2e6) - 1.0 / 257.0).abs() < 1e-12);
-        let wall = filter(FilterShape::BrickWall);
-        assert!((filter_power(&wall, 0.9e6) - 1.0).abs() < 1e-6 && filter_power(&wall, 1.06e6) < 1e-7);
-    }
 
     #[test]
     fn a_parabola_has_its_bottom_where_it_was_put() {
@@ -350,14 +270,19 @@ mod tests {
             ..run.expected[0]
         });
         run.signals.insert(&L5);
-        let narrow = FilterSpec { shape: FilterShape::BrickWall, bandwidth_hz: 2.2e6, group_delay_s: 0.0 };
-        let of = |rate_hz: f64, stages: Vec<StageSpec>| FrontEndFacts {
+        let narrow =
+            FilterSpec { shape: FilterShape::BrickWall, bandwidth_hz: 2.2e6, group_delay_s: 0.0, middle_hz: None };
+        let of = |rate_hz: f64, stages: Vec<StageSpec>, signals: [&Signal; 1]| FrontEndFacts {
             sample_rate_hz: rate_hz,
+            center_hz: signals[0].centre_hz(),
+            format: "ci8".to_owned(),
+            code_edge: Edge::Area,
+            signals: signals.map(|signal| signal.name.to_owned()).to_vec(),
             noise_lsb: 28.0,
             front_end: stages,
             ..FrontEndFacts::default()
         };
-        run.scene.front_ends = vec![of(10.23e6, vec![StageSpec::Filter(narrow)]), of(25e6, Vec::new())];
+        run.scene.front_ends = vec![of(10.23e6, vec![StageSpec::Filter(narrow)], [l1]), of(25e6, Vec::new(), [&L5])];
         run.front_ends = [(l1, 0), (&L5, 1)].into_iter().collect();
         let costs_db = costs_db(&run);
         // A filter as wide as the main lobe takes a third of a decibel; rounding at 28 LSB a ten-thousandth.
@@ -365,6 +290,7 @@ mod tests {
         assert!(costs_db[&L5] < 0.001, "{costs_db:?}");
         // The other way round it is wide enough for neither lobe of L5.
         run.front_ends = [(l1, 1), (&L5, 0)].into_iter().collect();
+        run.scene.front_ends = vec![of(10.23e6, vec![StageSpec::Filter(narrow)], [&L5]), of(25e6, Vec::new(), [l1])];
         let turned_db = super::costs_db(&run);
         assert!(turned_db[l1] < 0.001 && turned_db[&L5] > 1.0, "{turned_db:?}");
     }
@@ -373,7 +299,6 @@ mod tests {
     fn the_spectrum_of_random_chips_is_the_theory_s_and_has_its_nulls() {
         let directory = planted();
         let mut run = Run::read(directory.path()).unwrap();
-        run.expected.iter_mut().for_each(|signal| signal.carrier_hz = signal.nominal_hz);
         (run.scene.noise, run.scene.code_edge, run.scene.sample_rate_hz) = (false, Edge::Nearest, 10.23e6);
         let mut draw = Draw(3);
         let chips = (0..400_000).map(|_| if draw.normal() < 0.0 { -30.0_f32 } else { 30.0 });
@@ -385,7 +310,7 @@ mod tests {
             let row =
                 |(frequency_hz, density): (f64, f64)| PsdRow { frequency_hz, density_db: 10.0 * libm::log10(density) };
             run.psd = psd.density().unwrap().into_iter().map(row).collect();
-            let theory_db = theory_db(&run);
+            let theory_db = without_doppler(&run);
             let found = judge(&run, &theory_db);
             (theory_db, run.psd.clone(), found)
         };
@@ -408,17 +333,112 @@ mod tests {
                 "{found_hz} {expected_hz}"
             );
         }
-        // What another front end receives is not in these samples, though its carrier has an alias there.
-        let alone = super::theory_db(&run);
-        let beside = MeanSignal { signal: &L5, carrier_hz: 1_176.45e6, nominal_hz: 1_176.45e6, ..run.expected[0] };
-        run.expected.push(beside);
-        run.signals.insert(&L5);
-        assert_ne!(super::theory_db(&run), alone);
-        let of = |signal: &Signal| FrontEndFacts { signals: vec![signal.name.to_owned()], ..FrontEndFacts::default() };
-        run.scene.front_ends = vec![of(run.expected[0].signal), of(&L5)];
-        assert_eq!(super::theory_db(&run), alone);
         run.scene.noise = true;
-        let hidden = judge(&run, &super::theory_db(&run));
+        let hidden = judge(&run, &without_doppler(&run));
         assert!(hidden.null_low_hz.is_none() && hidden.null_reason.unwrap().starts_with("hidden"), "{hidden:?}");
+    }
+    /// What is expected of the samples were all carriers at rest.
+    fn without_doppler(run: &Run) -> Vec<f64> {
+        let front_end = FrontEnd::of(run, 0);
+        let mut sent = Sent::of(run, &front_end).unwrap();
+        sent.iter_mut().for_each(|one| one.carrier_hz = one.nominal_hz);
+        Expected::of(run, &front_end, &sent, &run.psd).unwrap().density_db()
+    }
+
+    /// A run of one signal alone, received with replicas of its strongest layer.
+    fn of_one(directory: &std::path::Path, signal: &'static Signal, (edge, rate_hz): (Edge, f64)) -> Run {
+        let mut run = Run::read(directory).unwrap();
+        let first = run.expected[0];
+        let carrier_hz = signal.centre_hz();
+        run.expected = vec![MeanSignal { signal, carrier_hz, nominal_hz: carrier_hz, ..first }];
+        run.signals = [signal].into_iter().collect();
+        run.front_ends = [(signal, 0)].into_iter().collect();
+        (run.scene.code_edge, run.scene.sample_rate_hz, run.scene.noise) = (edge, rate_hz, false);
+        run.scene.center_hz = Some(carrier_hz);
+        run.receiver = serde_json::json!({
+            "settings": {"tracking": {"replica": "area"}},
+            "followed": [{"signal": signal.name, "component": 1, "layer": 0, "other_side": null,
+                "spacing_chips": 0.1, "integration_s": 0.004, "pll_bandwidth_hz": 15.0, "dll_bandwidth_hz": 1.0}],
+        });
+        run
+    }
+
+    /// What a replica of BOC(1,1) by means over samples finds of a pilot of CBOC whose samples are means too,
+    /// or are taken behind a filter of 0.45 cycles a sample, over what it takes the whole for: by samples
+    /// made step by step.
+    fn made(limited: bool, rate_hz: f64) -> f64 {
+        const FINE: usize = 120; // steps a chip
+        let fine_hz = FINE as f64 * 1.023e6;
+        let mut draw = Draw(5);
+        let chips: Vec<f64> = (0..20_000).map(|_| if draw.normal() < 0.0 { -1.0 } else { 1.0 }).collect();
+        let square = |n: usize, periods: usize| if (2 * periods * n / FINE).is_multiple_of(2) { 1.0 } else { -1.0 };
+        let waves = |n: usize| {
+            let chip = chips.get(n / FINE).copied().unwrap_or(0.0);
+            (chip * square(n % FINE, 1), chip * square(n % FINE, 6))
+        };
+        let per_sample = fine_hz / rate_hz;
+        // A response about each sample's instant: a mean over its interval, or the filter's taps.
+        let kernel = |limited: bool| -> Vec<f64> {
+            let reach = if limited { 8.0 * per_sample } else { 0.5 * per_sample };
+            let half = reach.floor() as i32;
+            let tap = |k: i32| {
+                let x = f64::from(k) / per_sample;
+                if !limited {
+                    return 1.0;
+                }
+                let turn = std::f64::consts::TAU * 0.45 * x;
+                let sinc = if k == 0 { 1.0 } else { libm::sin(turn) / turn };
+                let bessel = |y: f64| {
+                    (1..40)
+                        .fold((1.0, 1.0), |(sum, term), k| {
+                            let term: f64 = term * y * y / 4.0 / f64::from(k * k);
+                            (sum + term, term)
+                        })
+                        .0
+                };
+                sinc * bessel(5.65 * (1.0 - (x / 8.0) * (x / 8.0)).max(0.0).sqrt())
+            };
+            let taps: Vec<f64> = (-half..=half).map(tap).collect();
+            let sum: f64 = taps.iter().sum();
+            taps.into_iter().map(|tap| tap / sum).collect()
+        };
+        let (own, other) = (kernel(limited), kernel(false));
+        let at = |kernel: &[f64], middle: usize, of: &dyn Fn(usize) -> f64| -> f64 {
+            let from = middle - kernel.len() / 2;
+            kernel.iter().enumerate().map(|(k, tap)| tap * of(from + k)).sum()
+        };
+        // Data and pilot are alike, with the weak wave added and subtracted: the mean of both powers counts.
+        let (strong, weak) = ((10.0_f64 / 11.0).sqrt(), (1.0_f64 / 11.0).sqrt());
+        let (mut found, mut noise, mut power) = (0.0, 0.0, 0.0);
+        let samples = 12_000;
+        for sample in 0..samples {
+            let middle = 2000 + (f64::from(sample) * per_sample * 1.000_013).round() as usize;
+            let one = |n: usize| waves(n).0;
+            let [a, b] = [at(&own, middle, &one), at(&own, middle, &|n| waves(n).1)];
+            let replica = at(&other, middle, &one);
+            found += (strong * a - weak * b) * replica;
+            noise += replica * replica;
+            power += strong * strong * a * a + weak * weak * b * b;
+        }
+        found * found / (power * noise) / (strong * strong)
+    }
+
+    #[test]
+    fn a_replica_of_boc_1_1_gains_what_a_filter_takes_from_boc_6_1() {
+        let directory = planted();
+        for (edge, rate_hz) in
+            [(Edge::BandLimited, 5e6), (Edge::BandLimited, 6.5e6), (Edge::Area, 6.5e6), (Edge::Area, 10e6)]
+        {
+            let run = of_one(directory.path(), &E1, (edge, rate_hz));
+            let gain_db = -edge_cost_db(&run, &E1);
+            let expected_db = 10.0 * libm::log10(made(edge == Edge::BandLimited, rate_hz));
+            // 12 000 samples at most of 2500 chips: each product of different chips averages to 1/50 of what
+            // it is, and the weak wave is three tenths of the strong one behind the filter.
+            assert!((gain_db - expected_db).abs() < 0.08, "{edge:?} {rate_hz}: {gain_db} {expected_db}");
+            assert!((0.0..0.42).contains(&gain_db), "{edge:?} {rate_hz}: {gain_db}");
+        }
+        // Nothing is lost where samples are instants and the band is wide.
+        let run = of_one(directory.path(), &E1, (Edge::Nearest, 200e6));
+        assert!(edge_cost_db(&run, &E1).abs() < 0.03, "{}", edge_cost_db(&run, &E1));
     }
 }

@@ -19,4 +19,5 @@ pub mod jitter;
 pub mod lines;
 pub mod psd;
 pub mod slips;
+pub mod spectrum;
 pub mod spoofing;

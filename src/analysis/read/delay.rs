@@ -81,6 +81,7 @@ mod tests {
                 shape: FilterShape::Butterworth { order: 4 },
                 bandwidth_hz,
                 group_delay_s: 2.6131 / (std::f64::consts::PI * bandwidth_hz),
+                middle_hz: None,
             };
             299_792_458.0 * code_delay_s(&filter, &Waveform::of(&L1_CA).unwrap(), rate_hz, 0.5)
         };

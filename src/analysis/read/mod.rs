@@ -26,5 +26,5 @@ pub use emission::{Emission, MeanSignal};
 pub use fault::Fault;
 pub use fixes::Fixes;
 pub use numbers::Numbers;
-pub use run::{PsdRow, Run, Speed};
+pub use run::{PsdRow, Run, Speed, psd_name};
 pub use table::Table;

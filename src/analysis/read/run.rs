@@ -19,6 +19,7 @@ use crate::analysis::read::levels::{LevelFinder, Levels};
 use crate::analysis::read::spill_store::{Finder, SpillStore};
 use crate::analysis::read::table::Table;
 use crate::analysis::statistics::{mean, median};
+use crate::analysis::waveform::{self, Sampler};
 use crate::gnss::facts::{FrontEndFacts, SceneFacts};
 use crate::gnss::record::{
     AcquisitionRow, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation, RayRow, SkyRow,
@@ -41,6 +42,11 @@ pub struct Speed {
     pub cpu_s: Option<f64>,
     /// Largest memory of the process, MiB.
     pub peak_memory_mib: Option<f64>,
+}
+
+/// Name of the file with the spectrum of the first front end, or of a later one by its name.
+pub fn psd_name(later: Option<&str>) -> String {
+    later.map_or_else(|| "psd.csv".to_owned(), |name| format!("psd-{name}.csv"))
 }
 
 /// One point of `psd.csv`.
@@ -117,8 +123,11 @@ pub struct Run {
     pub lines: Option<Vec<LineRow>>,
     /// `rx/receiver.json`, or null when there is none.
     pub receiver: Value,
-    /// Spectrum of the samples; empty where it was not estimated.
+    /// Spectrum of the samples, of several front ends of those of the first; empty where it was not
+    /// estimated.
     pub psd: Vec<PsdRow>,
+    /// Of several front ends the spectra of the others by their places, as far as they were estimated.
+    pub other_psds: BTreeMap<usize, Vec<PsdRow>>,
     /// How fast the stages ran.
     pub speed: Speed,
 }
@@ -205,7 +214,11 @@ impl Run {
             read.common.set_front_end(&read.scene, spacing_chips, &received);
             read.front_ends = read.signals.iter().map(|&signal| (signal, received(signal))).collect();
         }
-        read.psd = optional(&run.join("psd.csv"))?;
+        read.psd = optional(&run.join(psd_name(None)))?;
+        for (place, front_end) in read.scene.front_ends.iter().enumerate().skip(1) {
+            let rows = optional(&run.join(psd_name(front_end.name.as_deref())))?;
+            read.other_psds.insert(place, rows);
+        }
         read.speed = json(&run.join("speed.json"))?.unwrap_or_default();
         Ok(read)
     }
@@ -301,6 +314,7 @@ impl Run {
             lines: None,
             receiver: Value::Null,
             psd: Vec::new(),
+            other_psds: BTreeMap::new(),
             speed: Speed::default(),
         })
     }
@@ -364,6 +378,15 @@ impl Run {
     /// Samples a second of what a signal is received from.
     pub fn rate_hz(&self, signal: &Signal) -> f64 {
         self.scene.stages(self.front_end(signal)).1
+    }
+
+    /// What makes the samples of a front end, by its place among several.
+    pub fn sampler(&self, front_end: usize) -> Sampler {
+        let (edge, rate_hz, cutoff_cps) = match self.scene.front_ends.get(front_end) {
+            Some(own) => (own.code_edge, own.sample_rate_hz, own.edge_cutoff_cps),
+            None => (self.scene.code_edge, self.scene.sample_rate_hz, self.scene.edge_cutoff_cps),
+        };
+        Sampler::with_cutoff(edge, rate_hz, cutoff_cps.unwrap_or(waveform::CUTOFF_CPS))
     }
 
     /// C/N0 of the strongest satellite at a sample.

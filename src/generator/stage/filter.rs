@@ -43,6 +43,8 @@ pub struct Filter {
     pub bandwidth_hz: f64,
     /// Delay of the envelope in the middle of the band.
     pub group_delay_s: f64,
+    /// Frequency in the samples of its middle.
+    pub middle_hz: f64,
     /// The response by ascending lag; imaginary parts are zero for a filter around zero.
     re: Vec<f32>,
     im: Vec<f32>,
@@ -106,7 +108,7 @@ impl Filter {
         let re = low_pass.iter().enumerate().map(|(k, h)| (scale * h * phase(k).1) as f32).collect();
         let im =
             if real { Vec::new() } else { low_pass.iter().enumerate().map(|(k, h)| (h * phase(k).0) as f32).collect() };
-        Ok(Self { shape, bandwidth_hz, group_delay_s: delay / rate_hz, re, im, real })
+        Ok(Self { shape, bandwidth_hz, group_delay_s: delay / rate_hz, middle_hz: if_hz, re, im, real })
     }
 
     /// Length of the response.
@@ -223,7 +225,7 @@ impl Stage for Filter {
             Shape::Butterworth { order } => FilterShape::Butterworth { order },
         };
         let (bandwidth_hz, group_delay_s) = (self.bandwidth_hz, self.group_delay_s);
-        Some(StageSpec::Filter(FilterSpec { shape, bandwidth_hz, group_delay_s }))
+        Some(StageSpec::Filter(FilterSpec { shape, bandwidth_hz, group_delay_s, middle_hz: Some(self.middle_hz) }))
     }
 
     fn memory_samples(&self) -> usize {

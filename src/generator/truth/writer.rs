@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::record::{Record, Sink, TruthError};
 use super::skyline::skyline_deg;
-use crate::generator::scene::{Scene, sources};
+use crate::generator::scene::{CodeEdge, Scene, sources};
 use crate::generator::switches::{Stray, Switches};
 use crate::gnss::facts::{Fault, FaultKind, FrontEndFacts, OscillatorFacts, SceneFacts, TimeOffset};
 use crate::gnss::record::{Geographic, TrajectoryRow};
@@ -131,10 +131,16 @@ fn front_end(scene: &Scene) -> FrontEndFacts {
         inverted: scene.metadata.inverted,
         format: scene.metadata.format.name().to_owned(),
         code_edge: scene.fidelity.code_edge.fact(),
+        edge_cutoff_cps: edge_cutoff_cps(scene),
         signals: signals(std::slice::from_ref(scene)),
         noise_lsb: decimal(scene.noise_lsb),
         front_end: scene.front_end.iter().filter_map(|stage| stage.spec()).collect(),
     }
+}
+
+/// Where edges are band-limited, their cut-off.
+fn edge_cutoff_cps(scene: &Scene) -> Option<f64> {
+    (scene.fidelity.code_edge == CodeEdge::BandLimited).then(|| scene.cutoff_cps())
 }
 
 /// The number that has the same shortest decimal text: what a reader of that text takes it for.
@@ -206,6 +212,7 @@ impl Writer {
             format: scene.metadata.format.name().to_owned(),
             fidelity: scene.fidelity.grade.name().to_owned(),
             code_edge: scene.fidelity.code_edge.fact(),
+            edge_cutoff_cps: edge_cutoff_cps(scene),
             waveform: scene.fidelity.waveform,
             carrier: scene.fidelity.carrier.name().to_owned(),
             knot_tolerance_cycles: scene.fidelity.knot_tolerance_cycles,

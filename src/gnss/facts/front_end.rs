@@ -63,6 +63,9 @@ pub struct FilterSpec {
     pub bandwidth_hz: f64,
     /// Delay in the middle of the band, seconds: every satellite's code has it in common.
     pub group_delay_s: f64,
+    /// Frequency in the samples of its middle, Hz; without it that of the first signal's carrier.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub middle_hz: Option<f64>,
 }
 
 /// The response of a filter.
@@ -112,7 +115,7 @@ mod tests {
     /// The text of `scene.json` before there was a typed record, key by key.
     #[test]
     fn stages_are_written_as_they_always_were_and_read_again() {
-        let filter = |shape| FilterSpec { shape, bandwidth_hz: 2.4e6, group_delay_s: 3.5e-7 };
+        let filter = |shape| FilterSpec { shape, bandwidth_hz: 2.4e6, group_delay_s: 3.5e-7, middle_hz: None };
         let converter =
             ConverterSpec { bits: 4, step_sigma: 0.335, nominal_lsb: 28.0, gain_control: true, whole: false };
         for (stage, text) in [

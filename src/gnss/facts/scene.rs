@@ -43,6 +43,9 @@ pub struct SceneFacts {
     /// How the edges of chips fall between samples.
     #[serde(default)]
     pub code_edge: Edge,
+    /// Cut-off (−6 dB) of band-limited edges, cycles a sample.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edge_cutoff_cps: Option<f64>,
     /// What of waveforms of several layers is sent.
     #[serde(default, skip_serializing_if = "is_whole")]
     pub waveform: Layers,
@@ -165,6 +168,9 @@ pub struct FrontEndFacts {
     pub format: String,
     /// How the edges of chips fall between samples.
     pub code_edge: Edge,
+    /// Cut-off (−6 dB) of band-limited edges, cycles a sample.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub edge_cutoff_cps: Option<f64>,
     /// Names of the signals.
     pub signals: Vec<String>,
     /// Standard deviation of the thermal noise per component, in LSB.

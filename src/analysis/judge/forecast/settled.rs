@@ -48,7 +48,8 @@ pub(super) struct Settled {
 }
 
 impl Settled {
-    /// Those of a satellite whose C/N0 the front end lowers by so much.
+    /// Those of a satellite whose C/N0 the front end lowers by so much, and edges between samples by so much,
+    /// which theory has in its share of the power.
     ///
     /// # Errors
     /// [`JudgeError`] where rows cannot be read or numbers cannot be put away.
@@ -57,7 +58,7 @@ impl Settled {
         errors: &Errors,
         link: Link,
         theory: &Theory,
-        cost_db: f64,
+        [cost_db, edge_db]: [f64; 2],
     ) -> Result<Self, JudgeError> {
         let jammed = |row: &SignalError| row.cn0_true_dbhz - row.cn0_effective_dbhz;
         let mut least = f64::INFINITY;
@@ -87,7 +88,7 @@ impl Settled {
             };
             let own_hz = libm::pow(10.0, row.cn0_true_dbhz / 10.0);
             let white_hz = access.white_hz(row.sample, link, own_hz) / libm::pow(10.0, cost_db / 10.0);
-            found.add(&row, (ray_m, white_hz), cost_db)?;
+            found.add(&row, (ray_m, white_hz), [cost_db, edge_db])?;
         }
         Ok(found)
     }
@@ -114,7 +115,12 @@ impl Settled {
         }
     }
 
-    fn add(&mut self, row: &SignalError, (ray_m, white_hz): (f64, f64), cost_db: f64) -> Result<(), JudgeError> {
+    fn add(
+        &mut self,
+        row: &SignalError,
+        (ray_m, white_hz): (f64, f64),
+        [cost_db, edge_db]: [f64; 2],
+    ) -> Result<(), JudgeError> {
         let goes_on = row.locked_s > self.locked_s && row.time_s - self.ends_s.1 < 1.0;
         match self.spans.last_mut() {
             Some(span) if goes_on => span.1 = row.sample,
@@ -128,9 +134,9 @@ impl Settled {
         self.doppler.push(row.doppler_hz)?;
         self.inverse_hz += 1.0 / libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
         self.white_hz += white_hz;
-        self.dbhz += row.cn0_effective_dbhz - cost_db;
+        self.dbhz += row.cn0_effective_dbhz - cost_db - edge_db;
         self.others += libm::pow(10.0, (row.cn0_true_dbhz - row.cn0_effective_dbhz) / 10.0) - 1.0;
-        let off_db = row.cn0_dbhz - row.cn0_effective_dbhz + cost_db;
+        let off_db = row.cn0_dbhz - row.cn0_effective_dbhz + cost_db + edge_db;
         self.off_db += off_db;
         self.most_off_db = self.most_off_db.max(off_db.abs());
         Ok(())

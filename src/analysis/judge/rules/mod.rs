@@ -15,6 +15,7 @@ mod losses;
 mod motion;
 mod position;
 mod reception;
+mod spectrum;
 mod tables;
 #[cfg(test)]
 mod tests;
@@ -53,6 +54,7 @@ impl Verdict {
         verdict.losses(run, &receiver, slips)?;
         verdict.reception(summary);
         verdict.cn0(run, summary);
+        verdict.spectrum(run)?;
         verdict.interference(summary);
         verdict.spoofing(run, summary)?;
         verdict.tables(run, errors)?;

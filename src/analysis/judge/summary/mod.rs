@@ -169,7 +169,9 @@ pub struct Observables {
     /// Root mean square of the Doppler errors, Hz.
     pub doppler_rms_hz: Option<f64>,
     /// Mean of measured minus expected: the scene's C/N0 with other satellites and interference counted as
-    /// noise (see [`crate::analysis::expect::multiple_access`]). The quantiser's loss is not counted.
+    /// noise (see [`crate::analysis::expect::multiple_access`]), less what edges between samples and the
+    /// replica cost ([`crate::analysis::expect::spectrum::edge_costs_db`]). Losses of filter and quantiser
+    /// are not counted.
     pub cn0_bias_db: Option<f64>,
 }
 
@@ -305,10 +307,11 @@ impl Summary {
         let satellites = satellites(run, &mut details);
         let position = position(run, errors, &mut details)?;
         let clock = clock_section(clock, &mut details)?;
-        let observables = observables(errors, None, &mut details)?;
+        let costs_db = spectrum::edge_costs_db(run);
+        let observables = observables(errors, (None, &costs_db), &mut details)?;
         let tracking = tracking(run, errors, &mut details)?;
         let navigation = navigation(run, &mut details);
-        details.psd_theory_db = spectrum::theory_db(run);
+        details.psd_theory_db = spectrum::theory_db(run)?;
         let psd = spectrum::judge(run, &details.psd_theory_db);
         details.psd_nulls_hz = psd.null_low_hz.into_iter().chain(psd.null_high_hz).collect();
         details.unmatched_observations = errors.unmatched;
@@ -323,7 +326,7 @@ impl Summary {
             clock,
             observables,
             tracking,
-            signals: by_signal(run, errors)?,
+            signals: by_signal(run, errors, &costs_db)?,
             navigation,
             psd,
             interference: Lines::of(run)?,
@@ -436,14 +439,18 @@ fn clock_section(clock: &clock::Clock, details: &mut Details) -> Result<Clock, J
     })
 }
 
-fn by_signal(run: &Run, errors: &Errors) -> Result<BTreeMap<&'static str, BySignal>, JudgeError> {
+fn by_signal(
+    run: &Run,
+    errors: &Errors,
+    costs_db: &BTreeMap<&Signal, f64>,
+) -> Result<BTreeMap<&'static str, BySignal>, JudgeError> {
     let signals: BTreeSet<&'static Signal> = errors.signals.keys().map(|link| link.signal).collect();
     let one = |signal: &'static Signal| {
         let sigma = |of: LoopError| errors.settled_std(Some(signal), of);
         let lost = run.events.iter().filter(|row| row.event == Event::LossOfLock && row.signal == signal);
         let figures = BySignal {
             satellites: errors.signals.keys().filter(|link| link.signal == signal).count(),
-            observables: observables(errors, Some(signal), &mut Details::default())?,
+            observables: observables(errors, (Some(signal), costs_db), &mut Details::default())?,
             tracking: SignalTracking {
                 losses_of_lock: lost.count(),
                 dll_sigma_chips: sigma(DLL_CHIPS)?,
@@ -457,7 +464,11 @@ fn by_signal(run: &Run, errors: &Errors) -> Result<BTreeMap<&'static str, BySign
 }
 
 /// Of one signal, or of all.
-fn observables(errors: &Errors, signal: Option<&Signal>, details: &mut Details) -> Result<Observables, JudgeError> {
+fn observables(
+    errors: &Errors,
+    (signal, costs_db): (Option<&Signal>, &BTreeMap<&Signal, f64>),
+    details: &mut Details,
+) -> Result<Observables, JudgeError> {
     let code = errors.code_without_clock_m(signal)?;
     let pseudorange_rms_m = code.rms()?;
     details.pseudorange_m = code.spread()?;
@@ -470,7 +481,8 @@ fn observables(errors: &Errors, signal: Option<&Signal>, details: &mut Details) 
     let doppler_rms_hz = doppler.rms()?;
     details.doppler_hz = doppler.spread()?;
     drop(doppler);
-    let cn0 = errors.pooled(signal, |error| error.cn0_dbhz - error.cn0_effective_dbhz)?;
+    let cost_db = |link: &Link| costs_db.get(link.signal).copied().unwrap_or(0.0);
+    let cn0 = errors.pooled_by(signal, |link, error| error.cn0_dbhz - error.cn0_effective_dbhz + cost_db(link))?;
     details.cn0_db = cn0.spread()?;
     let (mut means, [mut truth, mut effective, mut measured]) = (Vec::new(), [Sum::default(); 3]);
     for link in errors.signals.keys().filter(|link| signal.is_none_or(|signal| link.signal == signal)) {

@@ -313,10 +313,22 @@ impl Errors {
     /// # Errors
     /// [`JudgeError`] where rows cannot be read or numbers cannot be put away.
     pub fn pooled(&self, signal: Option<&Signal>, of: impl Fn(&SignalError) -> f64) -> Result<Numbers, JudgeError> {
+        self.pooled_by(signal, |_, row| of(row))
+    }
+
+    /// The same of a number that depends on the satellite's signal too.
+    ///
+    /// # Errors
+    /// As [`Self::pooled`].
+    pub fn pooled_by(
+        &self,
+        signal: Option<&Signal>,
+        of: impl Fn(&Link, &SignalError) -> f64,
+    ) -> Result<Numbers, JudgeError> {
         let mut all = Numbers::new(self.signals.directory());
         for link in self.of(signal) {
             for row in self.signals.cursor(link) {
-                all.push(of(&row?))?;
+                all.push(of(&link, &row?))?;
             }
         }
         Ok(all)

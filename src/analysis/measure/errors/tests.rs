@@ -4,7 +4,7 @@ use super::*;
 use crate::analysis::hand_made::{PLANTED, RATE_HZ, planted, planted_run, write};
 use crate::analysis::measure::clock::Clock;
 use crate::analysis::read::Emission;
-use crate::analysis::waveform::{Edge, Waveform};
+use crate::analysis::waveform::{Edge, Sampler, Waveform};
 use crate::analysis::{Summary, judge};
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::satellite::Sv;
@@ -119,7 +119,8 @@ fn what_signals_differ_by_is_no_error_and_each_disturbs_the_other() {
     assert!((bias_m(LONG_BOC.name) - bias_m(L1_CA.name) - 30.0).abs() < 1e-6);
     // Spectral separation of both, each from itself and from the other.
     let [code, boc] = [&L1_CA, &LONG_BOC].map(|signal| Waveform::of(signal).unwrap());
-    let kappa = |a: &Waveform, b: &Waveform| a.separation_s(b, 0.0, Edge::Area, run.scene.sample_rate_hz);
+    let sampler = Sampler::new(Edge::Area, run.scene.sample_rate_hz);
+    let kappa = |a: &Waveform, b: &Waveform| a.separation_s(b, 0.0, &sampler);
     for (own, other, signal) in [(&code, &boc, &L1_CA), (&boc, &code, &LONG_BOC)] {
         let link = run.truth.keys().find(|link| link.signal == signal).unwrap();
         let row = both.signals.rows(link).unwrap()[0];
