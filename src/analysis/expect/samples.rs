@@ -37,7 +37,7 @@ const LINE_BINS: f64 = 8.0;
 pub struct Sent {
     /// The signal.
     pub signal: &'static Signal,
-    /// Carrier as sent, and as received, Hz.
+    /// Carrier as sent, Hz.
     pub nominal_hz: f64,
     /// Carrier as received, Hz.
     pub carrier_hz: f64,
