@@ -240,7 +240,7 @@ impl Jammer<'_> {
     fn scatter(&self) -> f64 {
         let Interference::Pulse { repetition_hz, .. } = *self.shape else { return 0.0 };
         let on = self.levels_hz.iter().filter(|level| **level > 0.0).count() as f64;
-        let seen_s = 0.2 * on / self.levels_hz.len().max(1) as f64;
+        let seen_s = welch::LOOKED_S * on / self.levels_hz.len().max(1) as f64;
         1.0 / (repetition_hz * seen_s).max(1.0)
     }
 }
@@ -256,10 +256,9 @@ fn smooth(run: &Run, front_end: &FrontEnd<'_>, sent: &[Sent], points: usize, n0:
         }
         // Samples of a whole signal have its whole power, whatever of its spectrum the sampler meets.
         let power = Waveform::of(one.signal)?.power(&front_end.sampler);
-        let period_s = |shares: f64, component: &crate::gnss::signal::Component| {
-            shares + component.power_share * component.power_share / component.period_s()
-        };
-        let lines_hz = one.signal.components.iter().fold(0.0, period_s);
+        let lines_hz: f64 = (one.signal.components.iter())
+            .map(|component| component.power_share * component.power_share / component.period_s())
+            .sum();
         let waveform = Waveform::sent(one.signal, run.scene.waveform)?;
         // Over half a period of the samples' spectrum, which is even.
         let step_hz = rate_hz / points as f64;

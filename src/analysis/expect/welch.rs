@@ -16,7 +16,7 @@ use std::ops::Range;
 /// Points of the estimate.
 pub const BINS: usize = 2048;
 /// Length of the samples that are looked at, seconds.
-const LOOKED_S: f64 = 0.2;
+pub(super) const LOOKED_S: f64 = 0.2;
 /// Pieces that share it where the spectrum changes.
 const PIECES: u64 = 60;
 /// Relative variance of one bin and of the mean of many, for one segment and one bin.
