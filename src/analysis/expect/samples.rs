@@ -254,15 +254,13 @@ fn smooth(run: &Run, front_end: &FrontEnd<'_>, sent: &[Sent], points: usize, n0:
         if known.contains_key(one.signal) {
             continue;
         }
-        // Samples of a whole signal have its whole power, whatever of its spectrum the sampler meets.
-        let power = Waveform::of(one.signal)?.power(&front_end.sampler);
         let lines_hz: f64 = (one.signal.components.iter())
             .map(|component| component.power_share * component.power_share / component.period_s())
             .sum();
-        let waveform = Waveform::sent(one.signal, run.scene.waveform)?;
+        let waveform = Waveform::in_samples(one.signal, run.scene.waveform, &front_end.sampler)?;
         // Over half a period of the samples' spectrum, which is even.
         let step_hz = rate_hz / points as f64;
-        let at = |index: usize| waveform.sampled(&front_end.sampler, index as f64 * step_hz) / power;
+        let at = |index: usize| waveform.sampled(&front_end.sampler, index as f64 * step_hz);
         known.insert(one.signal, ((0..=points / 2).map(at).collect(), lines_hz));
     }
     let filter = front_end.filter_at(sent.first().map_or(0.0, |first| first.nominal_hz));
