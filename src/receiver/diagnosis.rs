@@ -3,11 +3,16 @@
 use std::fmt;
 
 use crate::gnss::satellite::Sv;
+use crate::gnss::signal::Signal;
 use crate::receiver::position::NoFix;
 use crate::receiver::position::least_squares::UNKNOWNS;
 
 /// A cold start needs this much signal: one whole frame of 30 s and up to one subframe before it.
 pub const SHORTEST_S: f64 = 36.0;
+/// Symbols come a second or two after the start: of a strong signal, whose edges or overlay are found then.
+const SYMBOLS_S: f64 = 2.0;
+/// What to check where symbols make no frame.
+const TOO_WEAK: &str = "the signal's strength: below 27 dB-Hz words are lost to wrong bits";
 /// Minutes between transmissions of one page of subframes 4 and 5 (IS-GPS-200N, 20.3.3.5).
 const PAGE_EVERY_MIN: f64 = 12.5;
 
@@ -108,16 +113,43 @@ impl Diagnosis {
                 say(format!("the sample rate: {rate_hz} Hz was taken; a small error shows here first"));
                 say("the signal's strength: below 25 dB-Hz symbols cannot be distinguished".into());
             }
-            Stage::NoFrame { .. } | Stage::NoEphemeris { .. } => {
+            Stage::NoFrame { .. } => say(TOO_WEAK.into()),
+            Stage::NoEphemeris { .. } => {
                 if seconds < SHORTEST_S {
                     say(format!("the length: a cold start needs {SHORTEST_S} s, there are {length}"));
                 }
-                say("the signal's strength: below 27 dB-Hz words are lost to wrong bits".into());
+                say(TOO_WEAK.into());
             }
             Stage::NoPosition { reason, .. } => advice.extend(without_position(reason.as_ref(), &length)),
         }
         Self { stage, seconds, advice }
     }
+
+    /// Puts first what the messages of these signals take, where no frame was found and the recording may
+    /// have been too short for one.
+    pub(super) fn with_messages(mut self, signals: &[&'static Signal]) -> Self {
+        if matches!(self.stage, Stage::NoFrame { .. }) {
+            let lengths = signals.iter().filter_map(|signal| too_short(signal, self.seconds));
+            self.advice.splice(0..0, lengths);
+        }
+        self
+    }
+}
+
+/// How long a signal's time and orbit take to be read, where a recording of `seconds` may be too short for
+/// it. Nothing is read before a unit of its message is whole: the first one that begins in the recording may
+/// begin a unit's length after symbols do.
+fn too_short(signal: &Signal, seconds: f64) -> Option<String> {
+    let message = signal.components.iter().find_map(|component| component.message)?;
+    let (unit_s, whole_s) = (message.unit_s, SYMBOLS_S + 2.0 * message.unit_s as f64);
+    let length = duration(seconds);
+    (seconds < whole_s).then(|| {
+        format!(
+            "the length: a unit of {name} on {signal} lasts {unit_s} s and is read when it is whole, up to {whole_s} s \
+             after the start; there are {length}",
+            name = message.name,
+        )
+    })
 }
 
 /// What to check where there are ephemerides enough, by what the last attempt failed of.
@@ -213,6 +245,8 @@ impl fmt::Display for Diagnosis {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::gps::l1c::L1C;
+    use crate::gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn a_diagnosis_names_the_stage_the_numbers_and_what_to_check() {
@@ -226,6 +260,24 @@ mod tests {
         let text = Diagnosis::new(stage, 20.0, 2.6e6, "ci8", 0.0, 0, 7).to_string();
         assert!(text.contains("G09 lacks subframe 2, 3") && text.contains("36"), "{text}");
         assert!(!text.contains("may be false"), "{text}");
+    }
+
+    #[test]
+    fn a_recording_shorter_than_a_message_is_said_to_be_so_with_the_time_that_the_message_takes() {
+        let text = |seconds: f64, signals: &[&'static Signal]| {
+            let stage = Stage::NoFrame { with_symbols: vec![Sv::gps(18); 5] };
+            Diagnosis::new(stage, seconds, 5e6, "ci8", 0.0, 0, 5).with_messages(signals).to_string()
+        };
+        // A frame of CNAV-2 lasts 18 s (IS-GPS-800J, 3.2.3), a subframe of LNAV 6 s.
+        let short = text(12.0, &[&L1C]);
+        for part in ["CNAV-2 on GPS L1C lasts 18 s", "up to 38 s after the start", "there are 12.0 s"] {
+            assert!(short.contains(part), "{part}: {short}");
+        }
+        assert!(!short.contains("a cold start needs"), "{short}");
+        let both = text(12.0, &[&L1_CA, &L1C]);
+        assert!(both.contains("LNAV on GPS L1 C/A lasts 6 s") && both.contains("GPS L1C lasts 18 s"), "{both}");
+        let long = text(40.0, &[&L1_CA, &L1C]);
+        assert!(!long.contains("the length") && long.contains("27 dB-Hz"), "{long}");
     }
 
     #[test]

@@ -220,10 +220,12 @@ impl Reception {
                 let needed = acquire::least_samples(metadata, &settings.acquisition)?;
                 Stage::NothingSearched { samples: count, needed }
             };
-            let if_hz = settings.acquisition.signals().first().map_or(0.0, |signal| metadata.if_hz(signal.centre_hz()));
+            let signals = settings.acquisition.signals();
+            let if_hz = signals.first().map_or(0.0, |signal| metadata.if_hz(signal.centre_hz()));
             let format = metadata.format.name();
             let (rate_hz, acquired) = (metadata.rate.hz(), outcome.acquired.len());
-            let mut diagnosis = Diagnosis::new(stage, seconds, rate_hz, format, if_hz, cut_bytes, acquired);
+            let mut diagnosis =
+                Diagnosis::new(stage, seconds, rate_hz, format, if_hz, cut_bytes, acquired).with_messages(&signals);
             if let Some(seen) = &outcome.interfered {
                 diagnosis.advice.insert(0, format!("the spectrum: {seen}"));
             }
