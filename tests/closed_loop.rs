@@ -30,7 +30,11 @@ fn run_file(scenario: &Path) -> Value {
 
 fn run_with(scenario: &Path, more: &[&OsStr]) -> Value {
     let out = tempfile::tempdir().unwrap();
-    let target = out.path().join("run");
+    run_to(&out.path().join("run"), scenario, more)
+}
+
+/// The same with its files in `target`.
+fn run_to(target: &Path, scenario: &Path, more: &[&OsStr]) -> Value {
     let run = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
         .args(["run".as_ref(), scenario.as_os_str(), "--out".as_ref(), target.as_os_str()])
         .args(more)
@@ -485,24 +489,28 @@ fn b2a_alone_finds_its_place_by_b_cnav2_and_its_pilot() {
 }
 
 /// BeiDou's open signal of that name alone, over Cartagena, where the shipped scene has B1I: place, message
-/// and both loops within 5 % of theory. A deviation of N independent errors scatters by the root of 1/(2N):
-/// by 2 % of the carrier's at ten a second over 37 s and four satellites, but by 4 to 6 % of the code's,
-/// whose loop has 0.5 Hz. The seed is that of the scene; another one's code may break the bar.
-fn in_phase_alone(signal: &str, front_end: &str) -> Value {
+/// and both loops as theory has them. A deviation of N independent errors scatters by the root of 1/(2N),
+/// with the N that the judge states: three of these are the bar, and 5 % where they are more. In 42 s and
+/// four satellites they are 6 % of the carrier's, at ten a second, but 13 % of the code's, whose loop has 0.5
+/// Hz: of 24 seeds of B2I 4 are more than 5 % off there, with a mean of 0.994 ± 0.007, and none of 8 in 150 s.
+fn in_phase_alone(signal: &str, front_end: &str, duration_s: u32) -> Value {
+    let duration = format!("duration_s = {duration_s}\n");
     let scene = include_str!("../scenarios/beidou.toml")
         .replace("BeiDou B1I\"]", &format!("{signal}\"]"))
-        .replace("sample_rate_hz = 4.1e6", front_end);
+        .replace("sample_rate_hz = 4.1e6", front_end)
+        .replace("duration_s = 42\n", &duration);
     let place = tempfile::tempdir().unwrap();
-    let path = place.path().join("in_phase.toml");
-    assert!([signal, front_end].iter().all(|own| scene.contains(own)), "{scene}");
+    let (path, target) = (place.path().join("in_phase.toml"), place.path().join("run"));
+    assert!([signal, front_end, &duration].iter().all(|own| scene.contains(own)), "{scene}");
     std::fs::write(&path, scene).unwrap();
-    let summary = run_with(&path, &["--check".as_ref()]);
+    let summary = run_to(&target, &path, &["--check".as_ref()]);
     found_and_decoded_what_is_there(&summary);
-    for figure in ["dll_chips", "pll_deg"] {
+    for (figure, which) in [("dll_chips", "dll"), ("pll_deg", "pll")] {
         let of = |part: &str| number(&summary, &format!("/tracking/{figure}/{part}"));
         let ratio = of("sigma") / of("theory_sigma");
-        println!("{signal}: {figure} {ratio:.3} of theory");
-        assert!((ratio - 1.0).abs() < 0.05, "{signal}, {figure}: {ratio}");
+        let bar = (3.0 / (2.0 * independent(&target, which)).sqrt()).min(0.05);
+        println!("{signal}: {figure} {ratio:.3} of theory, within {bar:.3}");
+        assert!((ratio - 1.0).abs() < bar, "{signal}, {figure}: {ratio}, {bar}");
     }
     assert_eq!(number(&summary, "/navigation/parameters_wrong"), 0.0);
     assert_eq!(number(&summary, "/tracking/losses_of_lock"), 0.0);
@@ -510,11 +518,21 @@ fn in_phase_alone(signal: &str, front_end: &str) -> Value {
     summary
 }
 
+/// How many independent errors of a loop all satellites of a run have together.
+fn independent(run: &Path, which: &str) -> f64 {
+    let mut table = csv::Reader::from_path(run.join("jitter.csv")).unwrap();
+    let place = |name: &str, head: &csv::StringRecord| head.iter().position(|one| one == name).unwrap();
+    let head = table.headers().unwrap().clone();
+    let (own, count) = (place("loop", &head), place("independent", &head));
+    let rows = table.records().map(Result::unwrap).filter(|row| &row[own] == which);
+    rows.map(|row| row[count].parse::<f64>().unwrap()).sum()
+}
+
 /// B2I's bars: half a metre by the four satellites of the second generation in view, the only ones that send
 /// it, once elements by D2 are whole, 35 s after the start at most.
 #[test]
 fn b2i_alone_finds_its_place_by_the_four_satellites_that_send_it() {
-    let summary = in_phase_alone("BeiDou B2I", "center_hz = 1207.14e6\nsample_rate_hz = 4.1e6");
+    let summary = in_phase_alone("BeiDou B2I", "center_hz = 1207.14e6\nsample_rate_hz = 4.1e6", 150);
     assert_eq!(number(&summary, "/satellites/used"), 4.0);
     at_most(&summary, "/position/horizontal_p95_m", 0.5);
     at_most(&summary, "/position/first_fix_s", 35.0);
@@ -527,7 +545,7 @@ fn b3i_alone_finds_its_place_to_a_decimetre() {
     if std::env::var_os("GNSS_TWIN_LONG").is_none() {
         return;
     }
-    let summary = in_phase_alone("BeiDou B3I", "center_hz = 1268.52e6\nsample_rate_hz = 21.3e6");
+    let summary = in_phase_alone("BeiDou B3I", "center_hz = 1268.52e6\nsample_rate_hz = 21.3e6", 42);
     assert_eq!(number(&summary, "/satellites/used"), 8.0);
     at_most(&summary, "/position/horizontal_p95_m", 0.1);
     at_most(&summary, "/position/first_fix_s", 26.0);
