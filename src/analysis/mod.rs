@@ -46,6 +46,7 @@ pub mod expect;
 pub mod judge;
 pub mod measure;
 pub mod read;
+pub mod response;
 pub mod show;
 pub mod statistics;
 pub mod waveform;

@@ -8,6 +8,7 @@
 use std::sync::Arc;
 
 pub use crate::gnss::facts::Edge;
+use crate::gnss::facts::SceneFacts;
 use crate::gnss::signal::{Component, Layers, Shape, Signal};
 
 /// Cut-off of band-limited edges where a scene's facts do not state it, in cycles a sample.
@@ -96,6 +97,15 @@ impl Sampler {
             Arc::new(KaiserSinc::new(cutoff_cps, half_width, beta))
         });
         Self { edge, rate_hz, limited }
+    }
+
+    /// Of a front end of a scene, by its place among several.
+    pub fn of(scene: &SceneFacts, front_end: usize) -> Self {
+        let (edge, rate_hz, cutoff_cps) = match scene.front_ends.get(front_end) {
+            Some(own) => (own.code_edge, own.sample_rate_hz, own.edge_cutoff_cps),
+            None => (scene.code_edge, scene.sample_rate_hz, scene.edge_cutoff_cps),
+        };
+        Self::with_cutoff(edge, rate_hz, cutoff_cps.unwrap_or(CUTOFF_CPS))
     }
 
     /// How edges fall.

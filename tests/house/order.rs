@@ -90,7 +90,18 @@ pub const ORDER: Order<'static> = &[
             &["run"],
         ],
     ),
-    ("analysis", &[&["error", "statistics", "waveform"], &["read"], &["expect"], &["measure"], &["judge"], &["show"]]),
+    (
+        "analysis",
+        &[
+            &["error", "statistics", "waveform"],
+            &["response"],
+            &["read"],
+            &["expect"],
+            &["measure"],
+            &["judge"],
+            &["show"],
+        ],
+    ),
     (
         "analysis/read",
         &[
@@ -105,7 +116,7 @@ pub const ORDER: Order<'static> = &[
         "analysis/expect",
         &[
             &["theory"],
-            &["converter", "followed", "jamming", "message", "quantile", "response", "smoothing", "welch"],
+            &["converter", "followed", "jamming", "message", "quantile", "smoothing", "welch"],
             &["front_end", "multiple_access"],
             &["samples"],
             &["spectrum"],

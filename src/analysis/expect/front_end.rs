@@ -1,8 +1,8 @@
 //! A front end as the judge knows it from the scene's facts, one of several or the only one.
 
-use crate::analysis::expect::response::Response;
 use crate::analysis::expect::welch::Looks;
 use crate::analysis::read::Run;
+use crate::analysis::response::Response;
 use crate::analysis::waveform::Sampler;
 use crate::gnss::facts::{BalanceSpec, FilterSpec, StageSpec, converter, filters};
 use crate::gnss::samples::Format;

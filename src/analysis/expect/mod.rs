@@ -19,7 +19,6 @@ pub mod message;
 pub mod multipath;
 pub mod multiple_access;
 pub mod quantile;
-pub mod response;
 pub mod samples;
 pub mod smoothing;
 pub mod spectrum;

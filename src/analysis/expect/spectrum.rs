@@ -13,9 +13,9 @@ use crate::analysis::expect::converter::Staircase;
 use crate::analysis::expect::followed::Followed;
 use crate::analysis::expect::front_end::FrontEnd;
 use crate::analysis::expect::samples::{Expected, Sent};
-use crate::analysis::read::{Emission, Run};
+use crate::analysis::read::{Emission, Run, replica_edge};
 use crate::analysis::statistics::median;
-use crate::analysis::waveform::{Edge, Sampler, Waveform};
+use crate::analysis::waveform::{Sampler, Waveform};
 use crate::gnss::facts::{converter, filters};
 use crate::gnss::samples::Format;
 use crate::gnss::signal::Signal;
@@ -146,7 +146,7 @@ fn found(run: &Run, signal: &'static Signal, filtered: bool) -> Option<f64> {
     let sampler = run.sampler(place);
     let rate_hz = sampler.rate_hz();
     let followed = Followed::of(run, signal)?;
-    let replica = Sampler::new(replica_edge(run, sampler.edge()), rate_hz);
+    let replica = Sampler::new(replica_edge(&run.receiver, sampler.edge()), rate_hz);
     let front_end = FrontEnd::of(run, place);
     let first_hz = run.expected.iter().find(|one| front_end.has(one.signal))?.nominal_hz;
     let filter = Some(&front_end).filter(|_| filtered).and_then(|own| own.filter_at(first_hz));
@@ -168,16 +168,6 @@ fn found(run: &Run, signal: &'static Signal, filtered: bool) -> Option<f64> {
     let power = followed.whole.power(&sampler);
     let (assumed, own) = (followed.assumed.correlation(0.0), followed.own.correlation(0.0));
     Some(amplitude * amplitude / (power * noise) * own / (assumed * assumed))
-}
-
-/// How the receiver's replica meets samples, as it says itself; one that does not say it has the samples'
-/// own edges, but no filter.
-fn replica_edge(run: &Run, samples: Edge) -> Edge {
-    let settings = run.receiver.get("settings").unwrap_or(&run.receiver);
-    match (settings.pointer("/tracking/replica").and_then(serde_json::Value::as_str), samples) {
-        (Some("area"), _) | (None, Edge::Area) => Edge::Area,
-        _ => Edge::Nearest,
-    }
 }
 
 /// The nulls beside the main lobe of the code, where the samples hold one signal on one carrier.

@@ -9,14 +9,38 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use serde_json::Value;
+
 use super::delay;
-use crate::analysis::waveform::Waveform;
+use crate::analysis::waveform::{Edge, Sampler, Waveform};
 use crate::gnss::facts::{FilterSpec, SceneFacts, filters, oscillator_offset_hz};
 use crate::gnss::record::Observation;
 use crate::gnss::signal::{Link, Signal};
 
 /// What the ionosphere may make of a carrier less its pseudorange, metres a second.
 const LEAST_WOUND_MPS: f64 = 0.02;
+
+/// Distance of early and late where the receiver does not state it, chips.
+const USUAL_SPACING_CHIPS: f64 = 0.5;
+
+/// How the receiver's replica meets samples, as it says itself; one that does not say it has the samples'
+/// own edges, but no filter.
+pub(in crate::analysis) fn replica_edge(receiver: &Value, samples: Edge) -> Edge {
+    let settings = receiver.get("settings").unwrap_or(receiver);
+    match (settings.pointer("/tracking/replica").and_then(Value::as_str), samples) {
+        (Some("area"), _) | (None, Edge::Area) => Edge::Area,
+        _ => Edge::Nearest,
+    }
+}
+
+/// Distance of early and late with which a signal is followed.
+fn spacing_chips(receiver: &Value, signal: &Signal) -> f64 {
+    let is_own = |one: &&Value| one.get("signal").and_then(Value::as_str) == Some(signal.name);
+    let followed = receiver.get("followed").and_then(Value::as_array);
+    let own = followed.and_then(|all| all.iter().find(is_own)?.get("spacing_chips"));
+    let settings = receiver.get("settings").unwrap_or(receiver);
+    own.or_else(|| settings.pointer("/tracking/spacing_chips")).and_then(Value::as_f64).unwrap_or(USUAL_SPACING_CHIPS)
+}
 
 /// The common part.
 #[derive(Clone, Debug, Default)]
@@ -39,14 +63,9 @@ impl Common {
         Self { rate_hz, ..Self::default() }
     }
 
-    /// Takes what a scene's facts say, for the rows counted so far and a code loop of that spacing;
-    /// `received` gives the front end in which a signal is received, by its place.
-    pub(super) fn set_front_end(
-        &mut self,
-        scene: &SceneFacts,
-        spacing_chips: f64,
-        received: &dyn Fn(&Signal) -> usize,
-    ) {
+    /// Takes what a scene's facts say, for the rows counted so far and what `receiver.json` says of code
+    /// loops; `received` gives the front end in which a signal is received, by its place.
+    pub(super) fn set_front_end(&mut self, scene: &SceneFacts, receiver: &Value, received: &dyn Fn(&Signal) -> usize) {
         let offset_hz = oscillator_offset_hz(&scene.front_end);
         self.doppler_hz = if scene.inverted { -offset_hz } else { offset_hz };
         self.satellites.clear();
@@ -56,7 +75,10 @@ impl Common {
         let delay_s = |signal: &&'static Signal| {
             let code = Waveform::sent(signal, scene.waveform)?;
             let (stages, rate_hz) = scene.stages(received(signal));
-            let of = |filter: &FilterSpec| delay::code_delay_s(filter, &code, rate_hz, spacing_chips);
+            let samples = Sampler::of(scene, received(signal));
+            let replica = Sampler::new(replica_edge(receiver, samples.edge()), rate_hz);
+            let spacing_chips = spacing_chips(receiver, signal);
+            let of = |filter: &FilterSpec| delay::code_delay_s(filter, &code, [&samples, &replica], spacing_chips);
             Some((*signal, filters(stages).map(of).sum()))
         };
         self.code_delays_s = self.satellites.keys().filter_map(delay_s).collect();

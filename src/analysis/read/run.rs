@@ -19,7 +19,7 @@ use crate::analysis::read::levels::{LevelFinder, Levels};
 use crate::analysis::read::spill_store::{Finder, SpillStore};
 use crate::analysis::read::table::Table;
 use crate::analysis::statistics::{mean, median};
-use crate::analysis::waveform::{self, Sampler};
+use crate::analysis::waveform::Sampler;
 use crate::gnss::facts::{FrontEndFacts, SceneFacts};
 use crate::gnss::record::{
     AcquisitionRow, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation, RayRow, SkyRow,
@@ -148,8 +148,6 @@ fn named(alike: &BTreeMap<Link, Sv>, link: Link) -> Sv {
 }
 
 const TRUTH: &str = "the generator writes it: make the run again with `gnss-twin run`, or `gnss-twin generate`";
-/// Of a receiver that does not name its own.
-const USUAL_SPACING_CHIPS: f64 = 0.5;
 const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
 
 impl Run {
@@ -202,7 +200,7 @@ impl Run {
             other => Some(other?),
         };
         read.receiver = json(&rx.join("receiver.json"))?.unwrap_or(Value::Null);
-        if let Some(spacing_chips) = read.tracking_setting("spacing_chips") {
+        if read.tracking_setting("spacing_chips").is_some() {
             let front_ends = read.receiver.pointer("/front_ends").and_then(Value::as_array);
             let received = |signal: &Signal| {
                 let has = |one: &Value| {
@@ -211,7 +209,7 @@ impl Run {
                 };
                 front_ends.and_then(|all| all.iter().position(has)).unwrap_or(0)
             };
-            read.common.set_front_end(&read.scene, spacing_chips, &received);
+            read.common.set_front_end(&read.scene, &read.receiver, &received);
             read.front_ends = read.signals.iter().map(|&signal| (signal, received(signal))).collect();
         }
         read.psd = optional(&run.join(psd_name(None)))?;
@@ -256,7 +254,7 @@ impl Run {
         cn0_sums_hz.close()?;
         cn0_most_hz.close()?;
         Self::fold(&mut scene, &Emission::all(observed.keys()))?;
-        common.set_front_end(&scene, USUAL_SPACING_CHIPS, &|_| 0);
+        common.set_front_end(&scene, &Value::Null, &|_| 0);
         let (mut ionosphere_m, mut troposphere_m) = (0.0_f64, 0.0_f64);
         let (mut first, mut in_view_at_start) = (u64::MAX, BTreeSet::new());
         let mut sky = SpillStore::new(directory);
@@ -382,11 +380,7 @@ impl Run {
 
     /// What makes the samples of a front end, by its place among several.
     pub fn sampler(&self, front_end: usize) -> Sampler {
-        let (edge, rate_hz, cutoff_cps) = match self.scene.front_ends.get(front_end) {
-            Some(own) => (own.code_edge, own.sample_rate_hz, own.edge_cutoff_cps),
-            None => (self.scene.code_edge, self.scene.sample_rate_hz, self.scene.edge_cutoff_cps),
-        };
-        Sampler::with_cutoff(edge, rate_hz, cutoff_cps.unwrap_or(waveform::CUTOFF_CPS))
+        Sampler::of(&self.scene, front_end)
     }
 
     /// C/N0 of the strongest satellite at a sample.

@@ -50,7 +50,8 @@ impl Response {
                 let angle = |k: u32| std::f64::consts::PI * f64::from(2 * k + order + 1) / f64::from(2 * order);
                 let pole = |k: u32| Complex::new(omega * libm::cos(angle(k)), omega * libm::sin(angle(k)));
                 let mut made = Self::Poles { poles: (0..order).map(pole).collect(), omega, rate_hz, scale: 1.0 };
-                let at_zero = made.amplitude(0.0);
+                // Real, as every alias meets its mirror image there.
+                let at_zero = made.gain(0.0).re;
                 if let Self::Poles { scale, .. } = &mut made {
                     *scale = 1.0 / at_zero;
                 }
@@ -66,17 +67,26 @@ impl Response {
                 let cycles = f_hz / rate_hz;
                 wall.amplitude(cycles - cycles.round())
             }
+            Self::Poles { rate_hz, .. } => self.gain(f_hz - rate_hz * (f_hz / rate_hz).round()).norm(),
+        }
+    }
+
+    /// Amplitude and phase at `f_hz` from the middle, within half a sample rate of it. Of poles the phase is
+    /// that of the response at its own instants, the middles of intervals: samples, which count from the
+    /// first of them, come half an interval earlier. Of a wall it is zero, without the wall's delay.
+    pub fn gain(&self, f_hz: f64) -> Complex<f64> {
+        match self {
+            Self::Wall(..) => Complex::new(self.amplitude(f_hz), 0.0),
             Self::Poles { poles, omega, rate_hz, scale } => {
                 let analogue = |f_hz: f64| {
                     let at = Complex::new(0.0, std::f64::consts::TAU * f_hz);
                     poles.iter().fold(Complex::new(1.0, 0.0), |product, pole| product * *omega / (at - pole))
                 };
-                let within_hz = f_hz - rate_hz * (f_hz / rate_hz).round();
                 let alias = |k: i32| {
                     let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-                    analogue(within_hz + f64::from(k) * rate_hz) * sign
+                    analogue(f_hz + f64::from(k) * rate_hz) * sign
                 };
-                (-ALIASES..=ALIASES).map(alias).sum::<Complex<f64>>().norm() * scale
+                (-ALIASES..=ALIASES).map(alias).sum::<Complex<f64>>() * *scale
             }
         }
     }
